@@ -1,0 +1,12 @@
+//! Reads logged data of a stage, fits its calibration, judges it and writes the parameter
+//! blob for the firmware. The command line is a thin shell over this library.
+//!
+//! Modules in the order of the data:
+//!
+//! | module | step |
+//! |---|---|
+//! | [`stage`] | `stage.toml`: designed geometry, scales, search ranges |
+//! | [`dataset`] | a log as rows in SI units, by movement |
+
+pub mod dataset;
+pub mod stage;

@@ -1,0 +1,263 @@
+//! The parameter blob: the bytes of a [`ParameterSet`] in a file or in flash.
+//!
+//! | offset | bytes | what |
+//! |---|---|---|
+//! | 0 | 4 | magic, `HALL` in ASCII |
+//! | 4 | 2 | layout version, little-endian: 1 |
+//! | 6 | 2 | reserved: 0 |
+//! | 8 | 4 | payload length n in bytes, little-endian |
+//! | 12 | n | payload: the [`ParameterSet`] in postcard |
+//! | 12 + n | 4 | CRC-32C (Castagnoli) of everything before it, little-endian |
+//!
+//! The payload holds the fields in the order of the struct: unsigned integers as varints
+//! (7 bits a byte, lowest first), signed ones zigzagged first, `f32` as four bytes
+//! little-endian, text as a length and its bytes, arrays without a length. `inspect` shows
+//! every field; the golden example in `golden.rs` fixes the bytes.
+//!
+//! The CRC finds any five flipped bits in a blob of up to [`MAX_BYTES`], and any burst of
+//! up to 32. In a file the length is exact; in flash the header gives the length and the
+//! rest is padding. A layout that cannot be read by this version gets a new version number,
+//! and this version's blobs stay readable. Not promised: that an older decoder reads a
+//! newer layout, or that two layouts of one calibration have the same length.
+
+use crate::parameters::{ParameterError, ParameterSet};
+use crc::{CRC_32_ISCSI, Crc, NoTable};
+
+/// First bytes of every blob.
+pub const MAGIC: [u8; 4] = *b"HALL";
+/// The layout that this version writes, and the newest that it reads.
+pub const LAYOUT_VERSION: u16 = 1;
+/// Bytes before the payload.
+pub const HEADER_BYTES: usize = 12;
+/// Bytes of the check after the payload.
+pub const CRC_BYTES: usize = 4;
+/// The largest blob: up to here CRC-32C finds any five flipped bits.
+pub const MAX_BYTES: usize = 512;
+
+/// CRC-32C without a table: a blob is read once, at start, and flash is short.
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
+
+/// Why bytes are not a usable blob.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BlobError {
+    /// Shorter than a header, or than the header says.
+    Truncated {
+        /// Bytes that are needed, as far as is known.
+        needed: usize,
+        /// Bytes that are there.
+        found: usize,
+    },
+    /// All bytes are 0xFF or all 0x00: flash that holds no blob.
+    Erased,
+    /// The first four bytes are not `HALL`: no parameter blob at all.
+    BadMagic {
+        /// The bytes that are there.
+        found: [u8; 4],
+    },
+    /// A layout that this version does not read.
+    UnknownVersion {
+        /// Version in the header.
+        found: u16,
+        /// Newest version that is read.
+        supported: u16,
+    },
+    /// A payload length that no blob has, or reserved bytes that are not zero.
+    BadHeader {
+        /// Payload length in the header.
+        payload_bytes: u32,
+    },
+    /// Bytes follow the blob in a file, where its length must be exact.
+    TrailingBytes {
+        /// Bytes of the blob.
+        blob_bytes: usize,
+        /// Bytes that are there.
+        found: usize,
+    },
+    /// The check over header and payload fails: a bit is wrong.
+    BadCrc {
+        /// The check that the blob carries.
+        stored: u32,
+        /// The check of its bytes.
+        computed: u32,
+    },
+    /// The check holds, yet the payload is not a parameter set of this layout.
+    BadPayload,
+    /// The parameters are readable but unusable.
+    Parameters(ParameterError),
+    /// The blob belongs to another stage than the one expected.
+    OtherStage,
+    /// The buffer to write into is too small.
+    BufferTooSmall {
+        /// Its size.
+        bytes: usize,
+    },
+}
+
+impl core::fmt::Display for BlobError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            Self::Truncated { needed, found } => {
+                write!(
+                    f,
+                    "cut short: {found} bytes where at least {needed} are needed"
+                )
+            }
+            Self::Erased => f.write_str("erased memory: no parameter blob was written here"),
+            Self::BadMagic { found } => write!(
+                f,
+                "not a parameter blob: it starts with {found:02x?} where {MAGIC:02x?} (\"HALL\") belongs"
+            ),
+            Self::UnknownVersion { found, supported } => write!(
+                f,
+                "layout version {found}, but this program reads versions 1 to {supported}"
+            ),
+            Self::BadHeader { payload_bytes } => write!(
+                f,
+                "damaged header: payload length {payload_bytes}, or reserved bytes not zero"
+            ),
+            Self::TrailingBytes { blob_bytes, found } => write!(
+                f,
+                "the blob ends after {blob_bytes} bytes but the file has {found}: padded or joined"
+            ),
+            Self::BadCrc { stored, computed } => write!(
+                f,
+                "damaged: stored check {stored:08x}, computed {computed:08x}"
+            ),
+            Self::BadPayload => f.write_str("the check holds but the payload cannot be read"),
+            Self::Parameters(error) => write!(f, "unusable parameters: {error}"),
+            Self::OtherStage => f.write_str("the parameters belong to another stage"),
+            Self::BufferTooSmall { bytes } => {
+                write!(
+                    f,
+                    "a blob takes up to {MAX_BYTES} bytes, the buffer has {bytes}"
+                )
+            }
+        }
+    }
+}
+
+impl core::error::Error for BlobError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Parameters(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl ParameterSet {
+    /// Writes the blob into `buffer` ([`MAX_BYTES`] always suffice) and gives its bytes.
+    ///
+    /// # Errors
+    /// [`BlobError::BufferTooSmall`]. The set is written as it is: [`ParameterSet::check`] it.
+    pub fn to_bytes<'b>(&self, buffer: &'b mut [u8]) -> Result<&'b [u8], BlobError> {
+        let bytes = buffer.len();
+        let too_small = BlobError::BufferTooSmall { bytes };
+        let room = buffer.get_mut(HEADER_BYTES..).ok_or(too_small)?;
+        let payload = postcard::to_slice(self, room).map_err(|_| too_small)?.len();
+        let payload_bytes = u32::try_from(payload).map_err(|_| too_small)?;
+        let header = buffer.first_chunk_mut::<HEADER_BYTES>().ok_or(too_small)?;
+        let [m0, m1, m2, m3] = MAGIC;
+        let [v0, v1] = LAYOUT_VERSION.to_le_bytes();
+        let [n0, n1, n2, n3] = payload_bytes.to_le_bytes();
+        *header = [m0, m1, m2, m3, v0, v1, 0, 0, n0, n1, n2, n3];
+        let end = HEADER_BYTES + payload;
+        let (body, rest) = buffer.split_at_mut_checked(end).ok_or(too_small)?;
+        let check = rest.first_chunk_mut::<CRC_BYTES>().ok_or(too_small)?;
+        *check = CRC.checksum(body).to_le_bytes();
+        buffer.get(..end + CRC_BYTES).ok_or(too_small)
+    }
+
+    /// Reads a blob that must fill `bytes` exactly, as in a file, and checks it.
+    ///
+    /// # Errors
+    /// Every variant but `BufferTooSmall` and `OtherStage`; see [`BlobError`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, BlobError> {
+        let length = blob_length(bytes)?;
+        if bytes.len() > length {
+            return Err(BlobError::TrailingBytes {
+                blob_bytes: length,
+                found: bytes.len(),
+            });
+        }
+        Self::from_flash(bytes)
+    }
+
+    /// Reads a blob at the start of `memory`, as in flash, where padding follows it, and
+    /// checks it.
+    ///
+    /// # Errors
+    /// As [`ParameterSet::from_bytes`], but for `TrailingBytes`.
+    pub fn from_flash(memory: &[u8]) -> Result<Self, BlobError> {
+        let length = blob_length(memory)?;
+        let blob = memory.get(..length).ok_or(BlobError::Truncated {
+            needed: length,
+            found: memory.len(),
+        })?;
+        let (body, check) = blob
+            .split_last_chunk::<CRC_BYTES>()
+            .ok_or(BlobError::BadPayload)?;
+        let stored = u32::from_le_bytes(*check);
+        let computed = CRC.checksum(body);
+        if stored != computed {
+            return Err(BlobError::BadCrc { stored, computed });
+        }
+        let payload = body.get(HEADER_BYTES..).ok_or(BlobError::BadPayload)?;
+        let (set, rest) =
+            postcard::take_from_bytes::<Self>(payload).map_err(|_| BlobError::BadPayload)?;
+        if !rest.is_empty() {
+            return Err(BlobError::BadPayload);
+        }
+        set.check().map_err(BlobError::Parameters)?;
+        Ok(set)
+    }
+
+    /// Refuses a set of another stage than `serial`.
+    ///
+    /// # Errors
+    /// [`BlobError::OtherStage`].
+    pub fn expect_serial(&self, serial: &str) -> Result<(), BlobError> {
+        if self.serial.as_bytes() == serial.as_bytes() {
+            Ok(())
+        } else {
+            Err(BlobError::OtherStage)
+        }
+    }
+}
+
+/// The whole length of the blob that starts `bytes`, by its header.
+fn blob_length(bytes: &[u8]) -> Result<usize, BlobError> {
+    let header = bytes
+        .first_chunk::<HEADER_BYTES>()
+        .ok_or(BlobError::Truncated {
+            needed: HEADER_BYTES,
+            found: bytes.len(),
+        })?;
+    if header.iter().all(|&b| b == 0xff) || header.iter().all(|&b| b == 0) {
+        return Err(BlobError::Erased);
+    }
+    let [m0, m1, m2, m3, v0, v1, r0, r1, n0, n1, n2, n3] = *header;
+    let found = [m0, m1, m2, m3];
+    if found != MAGIC {
+        return Err(BlobError::BadMagic { found });
+    }
+    let version = u16::from_le_bytes([v0, v1]);
+    if version == 0 || version > LAYOUT_VERSION {
+        return Err(BlobError::UnknownVersion {
+            found: version,
+            supported: LAYOUT_VERSION,
+        });
+    }
+    let payload_bytes = u32::from_le_bytes([n0, n1, n2, n3]);
+    let most = MAX_BYTES - HEADER_BYTES - CRC_BYTES;
+    match usize::try_from(payload_bytes) {
+        Ok(payload) if payload <= most && [r0, r1] == [0, 0] => {
+            Ok(HEADER_BYTES + payload + CRC_BYTES)
+        }
+        _ => Err(BlobError::BadHeader { payload_bytes }),
+    }
+}
+
+#[cfg(test)]
+#[path = "golden.rs"]
+mod golden;

@@ -1,0 +1,139 @@
+//! What a fit yields, in SI units and `f64`, and how it becomes a parameter set.
+
+use crate::capacitive::{ProbePositions, vertical_rows};
+use crate::decoder::DecoderConstants;
+use crate::frame::CodeWindow;
+use crate::geometry::{ProbeGeometry, inverse_rows};
+use crate::model::{ModelKind, Sensitivity};
+use crate::parameters::{
+    CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
+};
+use crate::real::Real;
+
+/// A calibrated stage: the parameters of one model and the scales that they hold for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibration {
+    /// Which model the parameters belong to. Models that fix a parameter store its value.
+    pub model: ModelKind,
+    /// Lever arms and misalignments of the probes A, B, C.
+    pub geometry: ProbeGeometry<f64>,
+    /// Sensitivities of the probes A, B, C.
+    pub sensitivity: [Sensitivity<f64>; 3],
+    /// Designed displacement per Hall code, m.
+    pub hall_m_per_code: f64,
+    /// Hall codes that are decoded.
+    pub hall_window: CodeWindow,
+    /// Where the capacitive sensors stand, m.
+    pub capacitive_probes_m: ProbePositions<f64>,
+    /// Gap change per capacitive code, m.
+    pub capacitive_m_per_code: f64,
+    /// Capacitive codes that are decoded.
+    pub capacitive_window: CodeWindow,
+    /// Largest magnitude of X, Y, Rz that the calibration vouches for, m, m, rad.
+    pub calibrated_planar: [f64; 3],
+    /// Largest magnitude of Z, Rx, Ry that the calibration vouches for, m, rad, rad.
+    pub calibrated_vertical: [f64; 3],
+    /// Smallest magnitude of phi that is decoded; [`Calibration::SENSITIVITY_MIN`] if in doubt.
+    pub sensitivity_min: f64,
+}
+
+/// Where a parameter set comes from: text and figures for [`Calibration::prepare`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Origin {
+    /// Serial number of the stage; empty if none was given.
+    pub serial: Text,
+    /// When the set was made, as given by the user; empty if not given.
+    pub created: Text,
+    /// SHA-256 of the decompressed input logs, one after the other.
+    pub logs_sha256: [u8; 32],
+    /// How good the fit was.
+    pub fit: FitRecord,
+}
+
+impl Calibration {
+    /// Default of `sensitivity_min`: a tenth of the designed sensitivity. A sound probe reads
+    /// 0.65 to 1; at 0.1 a noise of 0.5 um already makes 5 um.
+    pub const SENSITIVITY_MIN: f64 = 0.1;
+
+    /// The decoder's constants in `f64`: for a high-precision reference, and to be rounded.
+    ///
+    /// # Errors
+    /// [`ParameterError::SingularPlane`] when PM has no inverse,
+    /// [`ParameterError::CapacitiveProbesInLine`] when the three gaps define no plane.
+    pub fn constants(&self) -> Result<DecoderConstants<f64>, ParameterError> {
+        let plane = self.geometry.plane_rows();
+        let inverse = inverse_rows(&plane).ok_or(ParameterError::SingularPlane)?;
+        let vertical = vertical_rows(&self.capacitive_probes_m)
+            .ok_or(ParameterError::CapacitiveProbesInLine)?;
+        Ok(DecoderConstants {
+            vertical_per_code: vertical.map(|row| row.map(|x| x * self.capacitive_m_per_code)),
+            sensitivity: self.sensitivity,
+            planar_per_code: inverse.map(|row| row.map(|x| x * self.hall_m_per_code)),
+            calibrated_vertical: self.calibrated_vertical,
+            calibrated_planar: self.calibrated_planar,
+            sensitivity_min: self.sensitivity_min,
+            hall_window: self.hall_window,
+            capacitive_window: self.capacitive_window,
+        })
+    }
+
+    /// The parameter set for the target: everything computed in `f64`, rounded once to `f32`,
+    /// then checked as the target will check it.
+    ///
+    /// # Errors
+    /// As [`Calibration::constants`], and every error of [`ParameterSet::check`].
+    pub fn prepare(&self, origin: &Origin) -> Result<ParameterSet, ParameterError> {
+        let plane = self.geometry.plane_rows();
+        let inverse = inverse_rows(&plane).ok_or(ParameterError::SingularPlane)?;
+        let vertical = vertical_rows(&self.capacitive_probes_m)
+            .ok_or(ParameterError::CapacitiveProbesInLine)?;
+        let set = ParameterSet {
+            model: self.model,
+            serial: origin.serial.clone(),
+            created: origin.created.clone(),
+            logs_sha256: origin.logs_sha256,
+            fit: origin.fit,
+            geometry: ProbeGeometry {
+                lever_arm_m: self.geometry.lever_arm_m.map(round),
+                misalignment_rad: self.geometry.misalignment_rad.map(round),
+            },
+            plane: plane.map(|row| row.map(round)),
+            plane_inverse: inverse.map(|row| row.map(round)),
+            hall: HallInput {
+                m_per_code: round(self.hall_m_per_code),
+            },
+            capacitive: CapacitiveInput {
+                vertical_per_m: vertical.map(|row| row.map(round)),
+                m_per_code: round(self.capacitive_m_per_code),
+            },
+            constants: self.constants()?.rounded(),
+        };
+        set.check()?;
+        Ok(set)
+    }
+}
+
+fn round(x: f64) -> f32 {
+    f32::from_f64(x)
+}
+
+impl DecoderConstants<f64> {
+    /// Each constant rounded to the nearest `f32`.
+    pub fn rounded(&self) -> DecoderConstants<f32> {
+        DecoderConstants {
+            vertical_per_code: self.vertical_per_code.map(|row| row.map(round)),
+            sensitivity: self.sensitivity.map(|s| Sensitivity {
+                eta: round(s.eta),
+                per_z_m: round(s.per_z_m),
+                per_rx_rad: round(s.per_rx_rad),
+                per_ry_rad: round(s.per_ry_rad),
+            }),
+            planar_per_code: self.planar_per_code.map(|row| row.map(round)),
+            calibrated_vertical: self.calibrated_vertical.map(round),
+            calibrated_planar: self.calibrated_planar.map(round),
+            sensitivity_min: round(self.sensitivity_min),
+            hall_window: self.hall_window,
+            capacitive_window: self.capacitive_window,
+        }
+    }
+}

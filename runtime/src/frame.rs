@@ -1,0 +1,161 @@
+//! One servo period's codes as the converters gave them, and what makes a code bad.
+
+use serde::{Deserialize, Serialize};
+
+/// In place of a code that could not be read. No converter gives it, and it lies below
+/// every [`CodeWindow`], so a missing code is never decoded.
+pub const MISSING_CODE: i32 = i32::MIN;
+
+/// The largest magnitude of a code that the decoder accepts: 24 bits, signed, which `f32`
+/// still holds exactly.
+pub const CODE_MAGNITUDE_MAX: i32 = 1 << 23;
+
+/// The codes of one servo period. Time and sequence arrive as data: the runtime reads
+/// no clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct RawFrame {
+    /// Hall codes of the probes A, B, C.
+    pub hall: [i32; 3],
+    /// Capacitive codes of the gaps 1, 2, 3.
+    pub capacitive: [i32; 3],
+    /// Number of the servo period, wrapping.
+    pub sequence: u32,
+    /// When the codes were sampled, in us, wrapping (after 71 minutes).
+    pub time_us: u32,
+}
+
+/// The codes that a sensor can plausibly give: both ends belong to it.
+///
+/// The narrowest sensible window leaves out the converter's two end codes, since a
+/// saturated converter gives those for every larger signal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(C)]
+pub struct CodeWindow {
+    /// Smallest accepted code.
+    pub low: i32,
+    /// Largest accepted code.
+    pub high: i32,
+}
+
+/// Why a code is not decoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CodeFault {
+    /// The adapter had no code for this channel in this period.
+    Missing,
+    /// The code lies below the window: the lower rail, or an implausible value.
+    BelowWindow {
+        /// The code.
+        code: i32,
+        /// Smallest accepted code.
+        low: i32,
+    },
+    /// The code lies above the window: the upper rail, or an implausible value.
+    AboveWindow {
+        /// The code.
+        code: i32,
+        /// Largest accepted code.
+        high: i32,
+    },
+}
+
+impl CodeWindow {
+    /// All codes strictly between the converter's end codes, or `None` unless
+    /// `-2^23 <= code_min < code_max - 1` and `code_max <= 2^23`.
+    pub const fn between_rails(code_min: i32, code_max: i32) -> Option<Self> {
+        if code_min < -CODE_MAGNITUDE_MAX
+            || code_max > CODE_MAGNITUDE_MAX
+            || code_min >= code_max - 1
+        {
+            return None;
+        }
+        Some(Self {
+            low: code_min + 1,
+            high: code_max - 1,
+        })
+    }
+
+    /// Whether the window holds at least one code and only codes of up to 24 bits.
+    pub const fn is_sound(&self) -> bool {
+        -CODE_MAGNITUDE_MAX <= self.low && self.low <= self.high && self.high <= CODE_MAGNITUDE_MAX
+    }
+
+    /// Whether the code lies in the window: one subtraction and one comparison.
+    #[inline(always)]
+    pub const fn contains(&self, code: i32) -> bool {
+        code.wrapping_sub(self.low) as u32 <= self.high.wrapping_sub(self.low) as u32
+    }
+
+    /// The code itself, or why it is not decoded.
+    pub const fn check(&self, code: i32) -> Result<i32, CodeFault> {
+        if code == MISSING_CODE {
+            Err(CodeFault::Missing)
+        } else if code < self.low {
+            Err(CodeFault::BelowWindow {
+                code,
+                low: self.low,
+            })
+        } else if code > self.high {
+            Err(CodeFault::AboveWindow {
+                code,
+                high: self.high,
+            })
+        } else {
+            Ok(code)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WINDOW: CodeWindow = CodeWindow {
+        low: -32767,
+        high: 32766,
+    };
+
+    #[test]
+    fn the_rails_of_a_converter_lie_outside_its_window() {
+        assert_eq!(CodeWindow::between_rails(-32768, 32767), Some(WINDOW));
+        for (code, inside) in [
+            (-32768, false),
+            (-32767, true),
+            (0, true),
+            (32766, true),
+            (32767, false),
+            (i32::MAX, false),
+            (MISSING_CODE, false),
+        ] {
+            assert_eq!(WINDOW.contains(code), inside, "{code}");
+            assert_eq!(WINDOW.check(code).is_ok(), inside, "{code}");
+        }
+    }
+
+    #[test]
+    fn each_bad_code_has_its_reason() {
+        assert_eq!(WINDOW.check(MISSING_CODE), Err(CodeFault::Missing));
+        assert_eq!(
+            WINDOW.check(-32768),
+            Err(CodeFault::BelowWindow {
+                code: -32768,
+                low: -32767
+            })
+        );
+        assert_eq!(
+            WINDOW.check(40000),
+            Err(CodeFault::AboveWindow {
+                code: 40000,
+                high: 32766
+            })
+        );
+    }
+
+    #[test]
+    fn a_window_beyond_24_bits_or_without_codes_is_refused() {
+        assert_eq!(CodeWindow::between_rails(0, 1), None);
+        assert_eq!(CodeWindow::between_rails(5, -5), None);
+        assert_eq!(CodeWindow::between_rails(0, CODE_MAGNITUDE_MAX + 1), None);
+        assert!(!CodeWindow { low: 3, high: 2 }.is_sound());
+    }
+}

@@ -1,0 +1,65 @@
+//! Pose of a 6-DOF precision stage from three Hall and three capacitive codes,
+//! every servo period, with a calibration that `host-fit` made.
+//!
+//! The crate is `no_std`, allocates nothing, reads no clock and no pin. Data flow
+//! one way, one type a step:
+//!
+//! ```text
+//! RawFrame --Decoder::decode--> Reading (Pose + Status) --Servo::tick--> Reading, Health
+//!     parameters: ParameterSet::from_bytes, checked once, then borrowed read-only
+//! ```
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`pose`] | the pose, its frame and its signs (one drawing) |
+//! | [`geometry`] | lever arms, misalignments and the plane matrix PM (equations 11, 32) |
+//! | [`model`] | Models (12), (15), (30) and (31), for `f32` and `f64` |
+//! | [`capacitive`] | three gaps to Z, Rx, Ry and back |
+//! | [`frame`] | codes as the converters gave them, and what makes a code bad |
+//! | [`status`] | the documented bit mask that goes with every pose |
+//! | [`calibration`] | what a fit yields, in SI units, and how it becomes decoder constants |
+//! | [`decoder`] | one frame to one reading: the flat tick path |
+//! | [`servo`] | what lasts from tick to tick: hold, sequence, counters, re-zero |
+//! | [`rezero`] | the zero deviation measured at rest |
+//! | [`parameters`], [`blob`] | the parameter set, and its bytes in flash |
+//! | [`real`] | the operations that a number must have to run the model |
+//!
+//! Symbols of the paper and the names here:
+//!
+//! | paper | here | unit |
+//! |---|---|---|
+//! | X, Y, Rz | [`pose::PlanarPose`] `x_m`, `y_m`, `rz_rad` | m, m, rad |
+//! | Z, Rx, Ry | [`pose::VerticalPose`] `z_m`, `rx_rad`, `ry_rad` | m, rad, rad |
+//! | H1x .. H3y | [`geometry::ProbeCoordinates`] | m |
+//! | third column of PM | lever arm, `lever_arm_m` | m |
+//! | theta_A, theta_B, theta_C | misalignment, `misalignment_rad` | rad |
+//! | eta_yA, eta_yB, eta_x | `sensitivity` at the zero of the vertical pose | 1 |
+//! | a, b, c | `per_z_m`, `per_rx_rad`, `per_ry_rad` | 1/m, 1/rad, 1/rad |
+//! | phi_A, phi_B, phi_C | sensitivity at a vertical pose | 1 |
+//! | delta_A, delta_B, delta_C | zero deviation | m |
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod blob;
+pub mod calibration;
+pub mod capacitive;
+pub mod decoder;
+pub mod frame;
+pub mod geometry;
+pub mod model;
+pub mod parameters;
+pub mod pose;
+pub mod real;
+pub mod rezero;
+pub mod servo;
+pub mod status;
+
+pub use blob::BlobError;
+pub use calibration::Calibration;
+pub use decoder::{Decoder, Reading};
+pub use frame::RawFrame;
+pub use model::ModelKind;
+pub use parameters::ParameterSet;
+pub use pose::{PlanarPose, Pose, VerticalPose};
+pub use servo::{OnInvalid, Servo};
+pub use status::Status;

@@ -1,0 +1,279 @@
+//! Re-zero: the zero deviation measured at rest.
+//!
+//! The stage stands at its zero. The poses of N ticks are averaged; the mean is the pose
+//! that the decoder shows where it should show none, and is subtracted from then on. The
+//! run refuses when the stage moves: when the poses spread further than noise does, or the
+//! mean of the second half differs from that of the first.
+
+use crate::decoder::Reading;
+use crate::pose::PlanarPose;
+use crate::status::Status;
+
+/// How long to average, and what still counts as rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RezeroSettings {
+    /// Ticks to average, 2 or more; an odd number is rounded down to even.
+    pub ticks: u16,
+    /// Largest peak-to-peak spread of X, Y, Rz over the run, m, m, rad.
+    pub spread_max: [f32; 3],
+    /// Largest difference between the means of the run's halves, m, m, rad.
+    pub drift_max: [f32; 3],
+}
+
+impl Default for RezeroSettings {
+    /// 500 ticks (1 s). Spread: ten times the rms noise of a sound stage (1 um, 0.5 um,
+    /// 2.4 urad), which noise exceeds in one run of millions. Drift: twelve times the
+    /// standard deviation of the difference of two means of 250.
+    fn default() -> Self {
+        Self {
+            ticks: 500,
+            spread_max: [10e-6, 5e-6, 25e-6],
+            drift_max: [1e-6, 0.5e-6, 2.5e-6],
+        }
+    }
+}
+
+/// Why a re-zero was refused. The zero deviation stays as it was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RezeroRefusal {
+    /// Fewer than two ticks were asked for.
+    TooShort {
+        /// Ticks asked for.
+        ticks: u16,
+    },
+    /// A tick of the run gave no planar pose.
+    NoPose {
+        /// The status of that tick.
+        status: Status,
+    },
+    /// The poses spread further than rest allows.
+    Moved {
+        /// Axis, 0 to 2 for X, Y, Rz.
+        axis: u8,
+        /// Peak-to-peak spread, m or rad.
+        spread: f32,
+    },
+    /// The pose drifted between the run's halves.
+    Drifted {
+        /// Axis, 0 to 2 for X, Y, Rz.
+        axis: u8,
+        /// Difference of the means, m or rad.
+        drift: f32,
+    },
+}
+
+/// Where a re-zero stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RezeroState {
+    /// None was asked for.
+    Idle,
+    /// It runs.
+    Running {
+        /// Ticks still to come.
+        ticks_left: u16,
+    },
+    /// It ended, and this pose is now subtracted.
+    Done {
+        /// Mean pose at rest, m, m, rad.
+        zero: PlanarPose<f32>,
+    },
+    /// It was refused.
+    Refused(RezeroRefusal),
+}
+
+/// One run in progress. Sums are of differences from the first pose, so that `f32` keeps
+/// their digits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RezeroRun {
+    settings: RezeroSettings,
+    half: u16,
+    taken: u16,
+    first: [f32; 3],
+    low: [f32; 3],
+    high: [f32; 3],
+    sum_first_half: [f32; 3],
+    sum_second_half: [f32; 3],
+}
+
+impl RezeroRun {
+    /// Starts a run.
+    ///
+    /// # Errors
+    /// [`RezeroRefusal::TooShort`].
+    pub const fn start(settings: RezeroSettings) -> Result<Self, RezeroRefusal> {
+        let half = settings.ticks / 2;
+        if half == 0 {
+            return Err(RezeroRefusal::TooShort {
+                ticks: settings.ticks,
+            });
+        }
+        Ok(Self {
+            settings,
+            half,
+            taken: 0,
+            first: [0.0; 3],
+            low: [0.0; 3],
+            high: [0.0; 3],
+            sum_first_half: [0.0; 3],
+            sum_second_half: [0.0; 3],
+        })
+    }
+
+    /// Takes one reading, decoded with no zero deviation subtracted.
+    pub fn take(&mut self, reading: &Reading) -> RezeroState {
+        let Some(pose) = reading.planar() else {
+            return RezeroState::Refused(RezeroRefusal::NoPose {
+                status: reading.status,
+            });
+        };
+        let pose = pose.to_array();
+        if self.taken == 0 {
+            self.first = pose;
+        }
+        let d = [
+            pose[0] - self.first[0],
+            pose[1] - self.first[1],
+            pose[2] - self.first[2],
+        ];
+        let sum = if self.taken < self.half {
+            &mut self.sum_first_half
+        } else {
+            &mut self.sum_second_half
+        };
+        *sum = [sum[0] + d[0], sum[1] + d[1], sum[2] + d[2]];
+        for ((low, high), d) in self.low.iter_mut().zip(&mut self.high).zip(d) {
+            *low = if d < *low { d } else { *low };
+            *high = if d > *high { d } else { *high };
+        }
+        self.taken = self.taken.saturating_add(1);
+        if let Some(refusal) = self.moved() {
+            return RezeroState::Refused(refusal);
+        }
+        let all = self.half.saturating_mul(2);
+        if self.taken < all {
+            RezeroState::Running {
+                ticks_left: all - self.taken,
+            }
+        } else {
+            self.finish()
+        }
+    }
+
+    fn moved(&self) -> Option<RezeroRefusal> {
+        let limits = self.settings.spread_max;
+        (0u8..)
+            .zip(self.low.iter().zip(&self.high).zip(limits))
+            .find_map(|(axis, ((low, high), limit))| {
+                let spread = high - low;
+                (spread > limit).then_some(RezeroRefusal::Moved { axis, spread })
+            })
+    }
+
+    fn finish(&self) -> RezeroState {
+        let (n, limits) = (f32::from(self.half), self.settings.drift_max);
+        let (early, late) = (self.sum_first_half, self.sum_second_half);
+        let drift = [
+            (late[0] - early[0]) / n,
+            (late[1] - early[1]) / n,
+            (late[2] - early[2]) / n,
+        ];
+        for (axis, (drift, limit)) in (0u8..).zip(drift.into_iter().zip(limits)) {
+            if drift.abs() > limit {
+                return RezeroState::Refused(RezeroRefusal::Drifted { axis, drift });
+            }
+        }
+        let all = n + n;
+        RezeroState::Done {
+            zero: PlanarPose {
+                x_m: self.first[0] + (early[0] + late[0]) / all,
+                y_m: self.first[1] + (early[1] + late[1]) / all,
+                rz_rad: self.first[2] + (early[2] + late[2]) / all,
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pose::Pose;
+
+    fn reading(x_m: f32) -> Reading {
+        let planar = PlanarPose {
+            x_m,
+            y_m: 2e-6,
+            rz_rad: -3e-6,
+        };
+        Reading {
+            pose: Pose {
+                planar,
+                ..Pose::default()
+            },
+            status: Status::GOOD,
+        }
+    }
+
+    fn run(ticks: u16, pose_at: impl Fn(u16) -> f32) -> RezeroState {
+        let settings = RezeroSettings {
+            ticks,
+            ..RezeroSettings::default()
+        };
+        let mut run = RezeroRun::start(settings).expect("long enough");
+        let mut state = RezeroState::Idle;
+        for k in 0..ticks {
+            state = run.take(&reading(pose_at(k)));
+            if !matches!(state, RezeroState::Running { .. }) {
+                break;
+            }
+        }
+        state
+    }
+
+    #[test]
+    fn the_mean_of_noise_at_rest_becomes_the_zero() {
+        // +-1 um around 5 um, as many up as down.
+        let state = run(100, |k| if k % 2 == 0 { 6e-6 } else { 4e-6 });
+        let RezeroState::Done { zero } = state else {
+            panic!("{state:?}")
+        };
+        assert!((zero.x_m - 5e-6).abs() < 1e-12);
+        assert!((zero.y_m - 2e-6).abs() < 1e-12 && (zero.rz_rad + 3e-6).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_jump_refuses_at_once_and_names_the_axis() {
+        let state = run(100, |k| if k < 50 { 0.0 } else { 11e-6 });
+        assert!(
+            matches!(state, RezeroState::Refused(RezeroRefusal::Moved { axis: 0, spread }) if spread > 10e-6)
+        );
+    }
+
+    #[test]
+    fn a_slow_drift_below_the_spread_limit_is_still_refused() {
+        let state = run(500, |k| f32::from(k) * 8e-9);
+        assert!(
+            matches!(state, RezeroState::Refused(RezeroRefusal::Drifted { axis: 0, drift }) if drift > 1.9e-6)
+        );
+    }
+
+    #[test]
+    fn a_bad_reading_ends_the_run_with_its_status() {
+        let mut run = RezeroRun::start(RezeroSettings::default()).expect("long enough");
+        let bad = Reading {
+            status: Status::PLANAR_INVALID.with(Status::HALL_A),
+            ..reading(0.0)
+        };
+        assert_eq!(
+            run.take(&bad),
+            RezeroState::Refused(RezeroRefusal::NoPose { status: bad.status })
+        );
+        let settings = RezeroSettings {
+            ticks: 1,
+            ..RezeroSettings::default()
+        };
+        assert_eq!(
+            RezeroRun::start(settings),
+            Err(RezeroRefusal::TooShort { ticks: 1 })
+        );
+    }
+}

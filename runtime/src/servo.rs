@@ -1,0 +1,249 @@
+//! What lasts from tick to tick: the last valid pose, the sequence of the frames, counters,
+//! and a re-zero in progress.
+//!
+//! [`Servo::tick`] is what a controller calls every servo period. Time is not read here:
+//! the frame carries its sequence number, and a period without a frame is told to the servo
+//! by [`Servo::tick_without_frame`].
+
+use crate::decoder::{Decoder, Reading};
+use crate::frame::RawFrame;
+use crate::pose::{PlanarPose, Pose, VerticalPose};
+use crate::rezero::{RezeroRefusal, RezeroRun, RezeroSettings, RezeroState};
+use crate::status::Status;
+
+/// What an invalid field reads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OnInvalid {
+    /// Zero, marked invalid.
+    #[default]
+    Zero,
+    /// The last valid value, marked invalid and held, for at most `ticks` ticks in a row;
+    /// zero after that.
+    Hold {
+        /// How many ticks in a row a value may be repeated.
+        ticks: u16,
+    },
+}
+
+/// Counters since start. They saturate: they never wrap to a good-looking zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct Health {
+    /// Ticks, with and without a frame.
+    pub ticks: u32,
+    /// Ticks whose planar pose was invalid.
+    pub planar_invalid: u32,
+    /// Ticks whose vertical pose was invalid.
+    pub vertical_invalid: u32,
+    /// Ticks in which a value was held.
+    pub held: u32,
+    /// Servo periods that had no frame, by the sequence numbers or by
+    /// [`Servo::tick_without_frame`].
+    pub frames_missed: u32,
+    /// Frames that repeated an earlier sequence number.
+    pub frames_repeated: u32,
+}
+
+/// Runs a borrowed decoder from tick to tick.
+#[derive(Clone, Debug)]
+pub struct Servo<'d> {
+    decoder: &'d Decoder,
+    on_invalid: OnInvalid,
+    zero: PlanarPose<f32>,
+    last: Pose,
+    planar_holds_left: u16,
+    vertical_holds_left: u16,
+    last_sequence: Option<u32>,
+    rezero: RezeroState,
+    run: Option<RezeroRun>,
+    health: Health,
+}
+
+/// A pose of zeros, in a `const`.
+const NO_POSE: Pose = Pose {
+    planar: PlanarPose {
+        x_m: 0.0,
+        y_m: 0.0,
+        rz_rad: 0.0,
+    },
+    vertical: VerticalPose {
+        z_m: 0.0,
+        rx_rad: 0.0,
+        ry_rad: 0.0,
+    },
+};
+
+/// The reading of a period without new codes.
+const NOTHING: Reading = Reading {
+    pose: NO_POSE,
+    status: Status::PLANAR_INVALID.with(Status::VERTICAL_INVALID),
+};
+
+impl<'d> Servo<'d> {
+    /// A servo with no zero deviation, no pose to hold and all counters zero.
+    pub const fn new(decoder: &'d Decoder, on_invalid: OnInvalid) -> Self {
+        Self {
+            decoder,
+            on_invalid,
+            zero: NO_POSE.planar,
+            last: NO_POSE,
+            planar_holds_left: 0,
+            vertical_holds_left: 0,
+            last_sequence: None,
+            rezero: RezeroState::Idle,
+            run: None,
+            health: Health {
+                ticks: 0,
+                planar_invalid: 0,
+                vertical_invalid: 0,
+                held: 0,
+                frames_missed: 0,
+                frames_repeated: 0,
+            },
+        }
+    }
+
+    /// One servo period: decodes the frame, subtracts the zero deviation, holds or zeroes
+    /// what is invalid, counts, and feeds a re-zero in progress.
+    ///
+    /// A frame whose sequence number is not ahead of the last one's (modulo 2^32, by less
+    /// than half of it) is not new and is not decoded.
+    pub fn tick(&mut self, frame: &RawFrame) -> Reading {
+        let ahead = match self.last_sequence {
+            None => 1,
+            Some(last) => frame.sequence.wrapping_sub(last),
+        };
+        if ahead == 0 || ahead > u32::MAX / 2 {
+            self.health.frames_repeated = self.health.frames_repeated.saturating_add(1);
+            return self.conclude(NOTHING, Status::FRAME_REPEATED);
+        }
+        self.last_sequence = Some(frame.sequence);
+        let missed = ahead - 1;
+        self.health.frames_missed = self.health.frames_missed.saturating_add(missed);
+        let sequence = if missed == 0 {
+            Status::GOOD
+        } else {
+            Status::FRAMES_MISSED
+        };
+        let reading = self
+            .decoder
+            .decode(frame.hall, frame.capacitive, &self.zero);
+        self.feed_rezero(frame);
+        self.conclude(reading, sequence)
+    }
+
+    /// One servo period in which no frame came: nothing is measured, values are held or zero.
+    pub fn tick_without_frame(&mut self) -> Reading {
+        self.health.frames_missed = self.health.frames_missed.saturating_add(1);
+        self.last_sequence = self.last_sequence.map(|last| last.wrapping_add(1));
+        if self.run.take().is_some() {
+            let status = Status::FRAMES_MISSED;
+            self.rezero = RezeroState::Refused(RezeroRefusal::NoPose { status });
+        }
+        self.conclude(NOTHING, Status::FRAMES_MISSED)
+    }
+
+    /// Starts to average at rest; [`Servo::rezero_state`] tells how it goes. The zero
+    /// deviation in use stays until the run is done, and stays for good if it is refused.
+    pub fn start_rezero(&mut self, settings: RezeroSettings) {
+        match RezeroRun::start(settings) {
+            Ok(run) => {
+                self.run = Some(run);
+                self.rezero = RezeroState::Running {
+                    ticks_left: settings.ticks & !1,
+                };
+            }
+            Err(refusal) => {
+                self.run = None;
+                self.rezero = RezeroState::Refused(refusal);
+            }
+        }
+    }
+
+    /// Where the re-zero stands.
+    pub const fn rezero_state(&self) -> RezeroState {
+        self.rezero
+    }
+
+    /// The zero deviation that is subtracted, as a pose.
+    pub const fn zero(&self) -> PlanarPose<f32> {
+        self.zero
+    }
+
+    /// Subtracts a zero deviation that is known, for instance from before a restart. One
+    /// that is not finite is ignored and `false` returned.
+    pub fn set_zero(&mut self, zero: PlanarPose<f32>) -> bool {
+        let finite = zero.to_array().iter().all(|x| x.is_finite());
+        if finite {
+            self.zero = zero;
+        }
+        finite
+    }
+
+    /// The counters.
+    pub const fn health(&self) -> Health {
+        self.health
+    }
+
+    /// Forgets the pose to hold and the sequence, for a new movement or after a pause; zero
+    /// deviation and counters stay.
+    pub const fn forget(&mut self) {
+        self.planar_holds_left = 0;
+        self.vertical_holds_left = 0;
+        self.last_sequence = None;
+    }
+
+    fn feed_rezero(&mut self, frame: &RawFrame) {
+        let Some(run) = &mut self.run else { return };
+        let unzeroed = self
+            .decoder
+            .decode(frame.hall, frame.capacitive, &PlanarPose::ZERO);
+        self.rezero = run.take(&unzeroed);
+        match self.rezero {
+            RezeroState::Running { .. } => {}
+            RezeroState::Done { zero } => {
+                self.zero = zero;
+                self.run = None;
+            }
+            RezeroState::Idle | RezeroState::Refused(_) => self.run = None,
+        }
+    }
+
+    /// Holds or zeroes what is invalid, and counts.
+    fn conclude(&mut self, mut reading: Reading, sequence: Status) -> Reading {
+        reading.status = reading.status.with(sequence);
+        let hold = match self.on_invalid {
+            OnInvalid::Zero => 0,
+            OnInvalid::Hold { ticks } => ticks,
+        };
+        let health = &mut self.health;
+        health.ticks = health.ticks.saturating_add(1);
+        let mut held = false;
+        if reading.status.any(Status::PLANAR_INVALID) {
+            health.planar_invalid = health.planar_invalid.saturating_add(1);
+            if let Some(left) = self.planar_holds_left.checked_sub(1) {
+                self.planar_holds_left = left;
+                reading.pose.planar = self.last.planar;
+                reading.status = reading.status.with(Status::PLANAR_HELD);
+                held = true;
+            }
+        } else {
+            self.last.planar = reading.pose.planar;
+            self.planar_holds_left = hold;
+        }
+        if reading.status.any(Status::VERTICAL_INVALID) {
+            health.vertical_invalid = health.vertical_invalid.saturating_add(1);
+            if let Some(left) = self.vertical_holds_left.checked_sub(1) {
+                self.vertical_holds_left = left;
+                reading.pose.vertical = self.last.vertical;
+                reading.status = reading.status.with(Status::VERTICAL_HELD);
+                held = true;
+            }
+        } else {
+            self.last.vertical = reading.pose.vertical;
+            self.vertical_holds_left = hold;
+        }
+        health.held = health.held.saturating_add(u32::from(held));
+        reading
+    }
+}

@@ -1,0 +1,145 @@
+//! What is wrong with a reading: a bit mask, 0 when all is good.
+//!
+//! | bit | value | meaning | effect |
+//! |---|---|---|---|
+//! | 0, 1, 2 | 1, 2, 4 | Hall code A, B, C at a rail, implausible or missing | X, Y, Rz invalid |
+//! | 3, 4, 5 | 8, 16, 32 | capacitive code 1, 2, 3 likewise | all six invalid |
+//! | 6, 7, 8 | 64, 128, 256 | phi of A, B, C too near zero, or not finite | X, Y, Rz invalid |
+//! | 9 | 512 | a planar result is not finite | X, Y, Rz invalid |
+//! | 10 | 1024 | a vertical result is not finite | all six invalid |
+//! | 11 | 2048 | vertical pose outside the calibrated range | none: extrapolated |
+//! | 12 | 4096 | planar pose outside the calibrated range | none: extrapolated |
+//! | 13 | 8192 | X, Y, Rz invalid in this period | they are 0, or held |
+//! | 14 | 16384 | Z, Rx, Ry invalid in this period | they are 0, or held |
+//! | 15 | 32768 | X, Y, Rz are the last valid ones, repeated | |
+//! | 16 | 65536 | Z, Rx, Ry are the last valid ones, repeated | |
+//! | 17 | 131072 | one or more servo periods had no frame before this one | |
+//! | 18 | 262144 | the frame repeats an earlier sequence number: nothing new | all six invalid |
+//!
+//! Bits 11 and 12 mean something only while bits 14 and 13 are clear.
+
+/// The status of one reading, as a bit mask. See the module's table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(transparent)]
+pub struct Status(u32);
+
+impl Status {
+    /// All good.
+    pub const GOOD: Self = Self(0);
+    /// Hall code A bad; B and C are the next two bits.
+    pub const HALL_A: Self = Self(1 << 0);
+    /// Any Hall code bad.
+    pub const HALL: Self = Self(0b111);
+    /// Capacitive code 1 bad; 2 and 3 are the next two bits.
+    pub const CAPACITIVE_1: Self = Self(1 << 3);
+    /// Any capacitive code bad.
+    pub const CAPACITIVE: Self = Self(0b111 << 3);
+    /// phi of probe A too near zero or not finite; B and C are the next two bits.
+    pub const SENSITIVITY_A: Self = Self(1 << 6);
+    /// Any phi too near zero or not finite.
+    pub const SENSITIVITY: Self = Self(0b111 << 6);
+    /// A planar result is not finite.
+    pub const PLANAR_NOT_FINITE: Self = Self(1 << 9);
+    /// A vertical result is not finite.
+    pub const VERTICAL_NOT_FINITE: Self = Self(1 << 10);
+    /// The vertical pose lies outside the calibrated range.
+    pub const VERTICAL_EXTRAPOLATED: Self = Self(1 << 11);
+    /// The planar pose lies outside the calibrated range.
+    pub const PLANAR_EXTRAPOLATED: Self = Self(1 << 12);
+    /// X, Y, Rz are invalid.
+    pub const PLANAR_INVALID: Self = Self(1 << 13);
+    /// Z, Rx, Ry are invalid.
+    pub const VERTICAL_INVALID: Self = Self(1 << 14);
+    /// X, Y, Rz are repeated.
+    pub const PLANAR_HELD: Self = Self(1 << 15);
+    /// Z, Rx, Ry are repeated.
+    pub const VERTICAL_HELD: Self = Self(1 << 16);
+    /// Frames are missing before this one.
+    pub const FRAMES_MISSED: Self = Self(1 << 17);
+    /// The frame is not new.
+    pub const FRAME_REPEATED: Self = Self(1 << 18);
+
+    /// Every bit with its name, lowest first, for reports.
+    pub const NAMES: [(Self, &'static str); 19] = [
+        (Self(1), "Hall code A bad"),
+        (Self(1 << 1), "Hall code B bad"),
+        (Self(1 << 2), "Hall code C bad"),
+        (Self(1 << 3), "capacitive code 1 bad"),
+        (Self(1 << 4), "capacitive code 2 bad"),
+        (Self(1 << 5), "capacitive code 3 bad"),
+        (Self(1 << 6), "sensitivity of A too near zero"),
+        (Self(1 << 7), "sensitivity of B too near zero"),
+        (Self(1 << 8), "sensitivity of C too near zero"),
+        (Self::PLANAR_NOT_FINITE, "planar pose not finite"),
+        (Self::VERTICAL_NOT_FINITE, "vertical pose not finite"),
+        (
+            Self::VERTICAL_EXTRAPOLATED,
+            "vertical pose outside the calibrated range",
+        ),
+        (
+            Self::PLANAR_EXTRAPOLATED,
+            "planar pose outside the calibrated range",
+        ),
+        (Self::PLANAR_INVALID, "planar pose invalid"),
+        (Self::VERTICAL_INVALID, "vertical pose invalid"),
+        (Self::PLANAR_HELD, "planar pose held"),
+        (Self::VERTICAL_HELD, "vertical pose held"),
+        (Self::FRAMES_MISSED, "frames missed"),
+        (Self::FRAME_REPEATED, "frame repeated"),
+    ];
+
+    /// The mask as a number, as it is sent and logged.
+    #[inline(always)]
+    pub const fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// A status from its mask, for readers of logs and buses. Unknown bits are kept.
+    #[inline(always)]
+    pub const fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    /// Whether nothing at all is wrong.
+    #[inline(always)]
+    pub const fn is_good(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether any bit of `other` is set.
+    #[inline(always)]
+    pub const fn any(self, other: Self) -> bool {
+        self.0 & other.0 != 0
+    }
+
+    /// Both masks together.
+    #[inline(always)]
+    #[must_use]
+    pub const fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// The names of the bits that are set.
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        Self::NAMES
+            .iter()
+            .filter(move |(bit, _)| self.any(*bit))
+            .map(|(_, name)| *name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bit_of_the_table_has_one_name() {
+        for (k, (bit, _)) in Status::NAMES.iter().enumerate() {
+            assert_eq!(bit.bits(), 1 << k);
+        }
+        let all = Status::NAMES
+            .iter()
+            .fold(Status::GOOD, |sum, (bit, _)| sum.with(*bit));
+        assert_eq!(all.names().count(), Status::NAMES.len());
+    }
+}
