@@ -9,4 +9,10 @@
 //! | [`dataset`] | a log as rows in SI units, by movement |
 
 pub mod dataset;
+pub mod least_squares;
+pub mod parameters;
+pub mod problem;
+pub mod solver;
 pub mod stage;
+pub mod train;
+pub mod zero_deviation;
