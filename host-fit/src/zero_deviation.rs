@@ -51,4 +51,16 @@ impl ZeroDeviation {
             clipped: true,
         }
     }
+
+    /// A zero deviation that is known, m at the probes.
+    pub fn given(parameters: &Parameters, delta_m: [f64; 3]) -> Self {
+        let pose = inverse_rows(&parameters.geometry.plane_rows()).map_or([0.0; 3], |inverse| {
+            zero_pose(&inverse, parameters.eta(), delta_m).to_array()
+        });
+        Self {
+            delta_m,
+            pose,
+            clipped: false,
+        }
+    }
 }

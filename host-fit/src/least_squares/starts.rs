@@ -4,7 +4,7 @@ use super::coordinates::{Boxed, Coordinates, Gains, parameters_of, point_of};
 use super::descend::{Descent, DescentEnd, descend};
 use super::normal::{Column, Point, best_gain};
 use super::scatter::{Offset, Ratios, scatter};
-use crate::parameters::{COUNT, ParameterId, Parameters, search_box};
+use crate::parameters::{ParameterId, Parameters, search_box};
 use crate::problem::{Group, Problem};
 use crate::solver::{Projection, Solution, SolveError, Solver, SolverOptions};
 use crate::zero_deviation::ZeroDeviation;

@@ -1,0 +1,225 @@
+//! The command line.
+
+use crate::solver::Projection;
+use crate::train::Draw;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use runtime::ModelKind;
+use runtime::parameters::Text;
+use std::path::PathBuf;
+
+/// Calibrates the Hall-sensor array of a 6-DOF precision stage from logged data.
+///
+/// Exit status: 0 good; 2 wrong usage; 3 bad input or output; 4 the fit failed its own checks;
+/// 130 interrupted, best so far kept.
+#[derive(Debug, Parser)]
+#[command(name = "host-fit", version, max_term_width = 100)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run the main job on a log that ships with the program, beside the figures of the paper.
+    Demo(DemoArgs),
+    /// Fit a calibration to one or more logs and write the parameter blob.
+    Fit(Box<FitArgs>),
+    /// Judge a parameter blob on one or more logs with reference.
+    Eval(EvalArgs),
+    /// Decode a log with a parameter blob, by the code that runs on the target.
+    Decode(DecodeArgs),
+    /// Show what a parameter blob holds.
+    Inspect(InspectArgs),
+}
+
+/// Arguments of `demo`.
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Where to write params.bin, pose.csv and the report; a temporary folder if not given.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Also print the zero deviation of each movement (Table A1).
+    #[arg(long)]
+    pub zero_deviations: bool,
+}
+
+/// The models on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ModelChoice {
+    /// The best that this program has: today (31).
+    Auto,
+    /// Geometry only.
+    #[value(name = "12")]
+    M12,
+    /// Geometry and sensitivity.
+    #[value(name = "15")]
+    M15,
+    /// As 15, with a zero deviation for each movement.
+    #[value(name = "30")]
+    M30,
+    /// As 30, with a sensitivity that follows Z, Rx, Ry.
+    #[value(name = "31")]
+    M31,
+}
+
+impl ModelChoice {
+    /// The model that is fitted.
+    pub const fn kind(self) -> ModelKind {
+        match self {
+            Self::M12 => ModelKind::M12,
+            Self::M15 => ModelKind::M15,
+            Self::M30 => ModelKind::M30,
+            Self::M31 | Self::Auto => ModelKind::M31,
+        }
+    }
+}
+
+/// What to do with rows that cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BadRowsChoice {
+    /// Stop at the first and say where it is.
+    Refuse,
+    /// Leave them out and count them.
+    Skip,
+}
+
+/// `all` or a number of rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Train {
+    /// All rows.
+    All,
+    /// So many.
+    Rows(usize),
+}
+
+fn train(text: &str) -> Result<Train, String> {
+    match text {
+        "all" => Ok(Train::All),
+        number => match number.parse() {
+            Ok(0) | Err(_) => Err("expected `all` or a number of rows, 1 or more".into()),
+            Ok(rows) => Ok(Train::Rows(rows)),
+        },
+    }
+}
+
+fn text(value: &str) -> Result<Text, String> {
+    Text::try_from(value).map_err(|_| "at most 32 bytes fit in the blob".into())
+}
+
+/// Arguments of `fit`.
+#[derive(Debug, Args)]
+pub struct FitArgs {
+    /// Logs: CSV or CSV.gz, one or more.
+    #[arg(required = true, value_name = "LOG")]
+    pub logs: Vec<PathBuf>,
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    pub stage: PathBuf,
+    /// Where to write the parameter blob.
+    #[arg(long, value_name = "params.bin")]
+    pub out: PathBuf,
+    /// Measurement model.
+    #[arg(long, value_enum, default_value = "auto")]
+    pub model: ModelChoice,
+    /// Solver; see `host-fit fit --help` of this list, or leave the best to the program.
+    #[arg(long, value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(crate::cli::SOLVERS), default_value = crate::cli::DEFAULT_SOLVER)]
+    pub solver: String,
+    /// How much of the problem is solved in closed form.
+    #[arg(long, value_enum, default_value = "linear")]
+    pub project: Projection,
+    /// Rows to fit: `all` or a number.
+    #[arg(long, value_name = "N|all", default_value = "all", value_parser = train)]
+    pub train: Train,
+    /// How rows are drawn.
+    #[arg(long, value_enum, default_value = "stratified")]
+    pub draw: Draw,
+    /// Individuals of a population.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(4..=100_000))]
+    pub population: u32,
+    /// Generations of a population.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub generations: u32,
+    /// Seed of everything random.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Threads; all cores if not given. The result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Serial number of the stage, for the blob; at most 32 bytes.
+    #[arg(long, value_name = "TEXT", value_parser = text)]
+    pub serial: Option<Text>,
+    /// Creation time, for the blob, as you want it to read; at most 32 bytes.
+    #[arg(long, value_name = "TIME", value_parser = text)]
+    pub created: Option<Text>,
+    /// What to do with rows that cannot be used.
+    #[arg(long, value_enum, default_value = "refuse")]
+    pub bad_rows: BadRowsChoice,
+    /// Write a report with plots into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Write the figures as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+/// How `eval` treats zero deviations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum DeltaChoice {
+    /// Refit them for each movement.
+    Fit,
+    /// None: as the target reads without a re-zero.
+    Zero,
+}
+
+/// Arguments of `eval`.
+#[derive(Debug, Args)]
+pub struct EvalArgs {
+    /// The parameter blob.
+    #[arg(value_name = "params.bin")]
+    pub params: PathBuf,
+    /// Logs: CSV or CSV.gz, one or more.
+    #[arg(required = true, value_name = "LOG")]
+    pub logs: Vec<PathBuf>,
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    pub stage: PathBuf,
+    /// Zero deviations.
+    #[arg(long, value_enum, default_value = "fit")]
+    pub delta: DeltaChoice,
+    /// Write the figures as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+/// Arguments of `decode`.
+#[derive(Debug, Args)]
+pub struct DecodeArgs {
+    /// The parameter blob.
+    #[arg(value_name = "params.bin")]
+    pub params: PathBuf,
+    /// The log: CSV or CSV.gz; it needs no reference.
+    #[arg(value_name = "LOG")]
+    pub log: PathBuf,
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    pub stage: PathBuf,
+    /// Where to write the poses.
+    #[arg(long, value_name = "pose.csv")]
+    pub out: PathBuf,
+    /// Repeat the last valid pose for at most so many rows where codes are bad.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub hold: u16,
+}
+
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub struct InspectArgs {
+    /// The parameter blob.
+    #[arg(value_name = "params.bin")]
+    pub params: PathBuf,
+    /// Write everything as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}

@@ -1,0 +1,59 @@
+//! `host-fit eval`.
+
+use super::args::{DeltaChoice, EvalArgs};
+use crate::error::HostError;
+use crate::judge::{Zeros, judge};
+use crate::log::{self, ReadOptions};
+use crate::report::json::of_eval;
+use crate::report::text;
+use crate::stage::Stage;
+use std::time::Instant;
+
+/// Judges a blob on logs with reference.
+pub fn run(args: &EvalArgs) -> Result<(), HostError> {
+    let started = Instant::now();
+    let set = super::read_blob(&args.params)?;
+    let stage = Stage::from_file(&args.stage)?;
+    super::same_scales(&set, &stage, &args.stage)?;
+    let log = log::read(&args.logs, &stage, &ReadOptions::for_eval())?;
+    let (zeros, name) = match args.delta {
+        DeltaChoice::Fit => (Zeros::Refit, "fit"),
+        DeltaChoice::Zero => (Zeros::None, "zero"),
+    };
+    let judgement = judge(&set, &log.dataset, &stage, zeros);
+    let mut circumstances = super::circumstances(&log, &stage, started);
+    if judgement.undecoded > 0 {
+        circumstances.warnings.push(format!(
+            "{} rows have codes that the decoder refuses; they are not part of the errors",
+            judgement.undecoded
+        ));
+    }
+    let clipped = judgement.zeros.iter().filter(|zero| zero.clipped).count();
+    if clipped > 0 {
+        circumstances.warnings.push(format!(
+            "the zero deviation of {clipped} of {} movements was clipped to its range",
+            judgement.zeros.len()
+        ));
+    }
+    let report = of_eval(&set, &judgement, name, &circumstances);
+    if let Some(path) = &args.json {
+        super::write_json(&report, path)?;
+    }
+    if args.json.as_deref().is_none_or(|path| path.as_os_str() != "-") {
+        let title = match args.delta {
+            DeltaChoice::Fit => "errors, zero deviations refitted",
+            DeltaChoice::Zero => "errors, no zero deviation taken off",
+        };
+        super::print(&format!(
+            "Model ({}), {} rows in {} movements\n\n{}",
+            report.model,
+            report.rows,
+            report.movements,
+            text::errors(title, &judgement.errors, None)
+        ))?;
+    }
+    for warning in &report.warnings {
+        eprintln!("warning: {warning}");
+    }
+    Ok(())
+}

@@ -1,0 +1,122 @@
+//! `host-fit fit`.
+
+use super::args::{BadRowsChoice, FitArgs, Train};
+use crate::error::HostError;
+use crate::fit::{Fit, FitSettings, fit};
+use crate::log::{BadRows, Log, ReadOptions};
+use crate::parameters::Parameters;
+use crate::report::json::{Circumstances, Report, of_fit};
+use crate::report::{html, plots, text};
+use crate::solver::SolverOptions;
+use crate::stage::Stage;
+use crate::{blob_file, judge, log, output};
+use std::time::Instant;
+
+/// Reads, fits, judges; then writes blob, JSON and report, in this order.
+pub fn run(args: &FitArgs) -> Result<(), HostError> {
+    let started = Instant::now();
+    super::use_threads(args.threads);
+    let stage = Stage::from_file(&args.stage)?;
+    let options = ReadOptions {
+        bad_rows: match args.bad_rows {
+            BadRowsChoice::Refuse => BadRows::Refuse,
+            BadRowsChoice::Skip => BadRows::Skip,
+        },
+        ..ReadOptions::for_fit()
+    };
+    let log = log::read(&args.logs, &stage, &options)?;
+    let solver = super::solver(&args.solver)?;
+    let settings = FitSettings {
+        model: args.model.kind(),
+        train: match args.train {
+            Train::All => None,
+            Train::Rows(rows) => Some(rows),
+        },
+        draw: args.draw,
+        solver: SolverOptions {
+            projection: args.project,
+            seed: args.seed,
+            population: args.population as usize,
+            generations: args.generations as usize,
+        },
+        serial: args.serial.clone().unwrap_or_default(),
+        created: args.created.clone().unwrap_or_default(),
+    };
+    let fit = fit(&log.dataset, &stage, solver.as_ref(), &settings)?;
+    let circumstances = super::circumstances(&log, &stage, started);
+    let report = of_fit(&fit, solver.name(), args.project.name(), args.seed, &circumstances);
+    blob_file::write(&args.out, &fit.set)?;
+    if let Some(path) = &args.json {
+        super::write_json(&report, path)?;
+    }
+    if let Some(folder) = &args.report {
+        let names: Vec<String> = args.logs.iter().map(|p| p.display().to_string()).collect();
+        write_report(&report, &fit, &log, &names, folder)?;
+    }
+    // JSON on standard output is for a program: nothing else goes there.
+    if args.json.as_deref().is_none_or(|path| path.as_os_str() != "-") {
+        super::print(&summary(&fit, &report, &stage))?;
+        super::print(&format!("wrote {}\n", args.out.display()))?;
+    }
+    for warning in &report.warnings {
+        eprintln!("warning: {warning}");
+    }
+    Ok(())
+}
+
+/// The figures of a fit for a terminal.
+pub fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
+    format!(
+        "Model ({}), {} rows in {} movements, {} fitted, {} skipped; solver {}: {} evaluations in {:.1} ms, {}\n\
+         train fitness {:.4}\n\n{}\n{}",
+        report.model,
+        report.rows,
+        report.movements,
+        report.train_rows,
+        report.skipped_rows,
+        report.solver.as_deref().unwrap_or("-"),
+        fit.solution.evaluations,
+        fit.solution.elapsed.as_secs_f64() * 1e3,
+        fit.solution.stopped,
+        fit.train_fitness,
+        text::errors("errors over all rows, zero deviations refitted", &fit.judgement.errors, None),
+        text::parameters(
+            &fit.solution.parameters,
+            &Parameters::designed(stage),
+            &fit.uncertainty.standard_error,
+            None
+        ),
+    )
+}
+
+/// Writes `index.html` into a folder, which is made if it is missing.
+pub fn write_report(
+    report: &Report,
+    fit: &Fit,
+    log: &Log,
+    names: &[String],
+    folder: &std::path::Path,
+) -> Result<(), HostError> {
+    let mut errors = judge::pose_errors(&fit.set.decoder(), &log.dataset);
+    for (movement, zero) in log.dataset.movements.iter().zip(&fit.judgement.zeros) {
+        for error in errors[movement.rows.clone()].iter_mut().flatten() {
+            for (error, zero) in error.iter_mut().zip(zero.pose) {
+                *error -= zero;
+            }
+        }
+    }
+    let plots = [
+        (
+            "Errors over the log".to_owned(),
+            plots::errors_over_rows("zero deviations refitted", &errors, &log.dataset)?,
+        ),
+        (
+            "Distribution of the errors".to_owned(),
+            plots::distribution("errors in units of their rms", &errors)?,
+        ),
+    ];
+    output::make_folder(folder)?;
+    let page = html::page(report, names, &plots);
+    output::write_atomically(&folder.join("index.html"), page.as_bytes())?;
+    Ok(())
+}

@@ -1,0 +1,107 @@
+//! `host-fit inspect`.
+
+use super::args::InspectArgs;
+use crate::error::HostError;
+use crate::judge::parameters_of;
+use crate::parameters::COUNT;
+use crate::report::json::parameters;
+use runtime::ParameterSet;
+use serde_json::json;
+use std::fmt::Write;
+
+/// Shows every field of a blob.
+pub fn run(args: &InspectArgs) -> Result<(), HostError> {
+    let set = super::read_blob(&args.params)?;
+    if let Some(path) = &args.json {
+        super::write_json(&as_json(&set), path)?;
+        if path.as_os_str() == "-" {
+            return Ok(());
+        }
+    }
+    super::print(&as_text(&set))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut out, byte| {
+        let _ = write!(out, "{byte:02x}");
+        out
+    })
+}
+
+fn as_json(set: &ParameterSet) -> serde_json::Value {
+    let c = &set.constants;
+    json!({
+        "layout_version": runtime::blob::LAYOUT_VERSION,
+        "model": set.model.equation().to_string(),
+        "serial": set.serial.as_str(),
+        "created": set.created.as_str(),
+        "logs_sha256": hex(&set.logs_sha256),
+        "fit": {
+            "rows": set.fit.rows,
+            "train_rows": set.fit.train_rows,
+            "errors": {
+                "x": { "rmse_um": set.fit.rms[0] * 1e6, "peak_um": set.fit.peak[0] * 1e6 },
+                "y": { "rmse_um": set.fit.rms[1] * 1e6, "peak_um": set.fit.peak[1] * 1e6 },
+                "rz": { "rmse_urad": set.fit.rms[2] * 1e6, "peak_urad": set.fit.peak[2] * 1e6 },
+            },
+        },
+        "parameters": parameters(&parameters_of(set), &[None; COUNT]),
+        "plane_matrix": set.plane,
+        "plane_matrix_inverse": set.plane_inverse,
+        "hall_m_per_count": set.hall.m_per_code,
+        "capacitive_m_per_count": set.capacitive.m_per_code,
+        "capacitive_plane_matrix": set.capacitive.vertical_per_m,
+        "planar_per_code": c.planar_per_code,
+        "vertical_per_code": c.vertical_per_code,
+        "calibrated_range": {
+            "x_m": c.calibrated_planar[0], "y_m": c.calibrated_planar[1], "rz_rad": c.calibrated_planar[2],
+            "z_m": c.calibrated_vertical[0], "rx_rad": c.calibrated_vertical[1], "ry_rad": c.calibrated_vertical[2],
+        },
+        "sensitivity_min": c.sensitivity_min,
+        "hall_codes": [c.hall_window.low, c.hall_window.high],
+        "capacitive_codes": [c.capacitive_window.low, c.capacitive_window.high],
+    })
+}
+
+fn as_text(set: &ParameterSet) -> String {
+    let c = &set.constants;
+    let mut out = String::new();
+    let or_dash = |text: &str| if text.is_empty() { "-".to_owned() } else { text.to_owned() };
+    let _ = writeln!(out, "layout          {}", runtime::blob::LAYOUT_VERSION);
+    let _ = writeln!(out, "model           ({})", set.model.equation());
+    let _ = writeln!(out, "serial          {}", or_dash(&set.serial));
+    let _ = writeln!(out, "created         {}", or_dash(&set.created));
+    let _ = writeln!(out, "logs SHA-256    {}", hex(&set.logs_sha256));
+    let _ = writeln!(out, "rows            {} ({} fitted)", set.fit.rows, set.fit.train_rows);
+    let [x, y, rz] = set.fit.rms.map(|e| e * 1e6);
+    let _ = writeln!(out, "rms error       {x:.3} um, {y:.3} um, {rz:.3} urad");
+    let [x, y, rz] = set.fit.peak.map(|e| e * 1e6);
+    let _ = writeln!(out, "peak error      {x:.3} um, {y:.3} um, {rz:.3} urad");
+    for (name, p) in parameters(&parameters_of(set), &[None; COUNT]) {
+        let _ = writeln!(out, "{name:<15} {:>14.7} {}", p.value, p.unit);
+    }
+    for (name, rows) in [
+        ("PM", &set.plane),
+        ("PM^-1", &set.plane_inverse),
+        ("capacitive plane", &set.capacitive.vertical_per_m),
+        ("planar per code", &c.planar_per_code),
+        ("vertical per code", &c.vertical_per_code),
+    ] {
+        for (k, row) in rows.iter().enumerate() {
+            let name = if k == 0 { name } else { "" };
+            let _ = writeln!(out, "{name:<18}{:>15.7e}{:>15.7e}{:>15.7e}", row[0], row[1], row[2]);
+        }
+    }
+    let _ = writeln!(out, "Hall scale      {:e} m per code", set.hall.m_per_code);
+    let _ = writeln!(out, "capacitive      {:e} m per code", set.capacitive.m_per_code);
+    let _ = writeln!(out, "Hall codes      {} to {}", c.hall_window.low, c.hall_window.high);
+    let _ = writeln!(out, "capacitive      {} to {}", c.capacitive_window.low, c.capacitive_window.high);
+    let [x, y, rz] = c.calibrated_planar.map(|e| e * 1e6);
+    let [z, rx, ry] = c.calibrated_vertical.map(|e| e * 1e6);
+    let _ = writeln!(
+        out,
+        "range           X {x:.1} um, Y {y:.1} um, Rz {rz:.1} urad, Z {z:.1} um, Rx {rx:.1} urad, Ry {ry:.1} urad"
+    );
+    let _ = writeln!(out, "smallest phi    {}", c.sensitivity_min);
+    out
+}

@@ -1,0 +1,235 @@
+//! Whether a log can determine the model at all, and whether the model describes the log.
+
+use crate::dataset::Dataset;
+use crate::parameters::{ParameterId, Parameters, Quantity, search_box};
+use crate::stage::Stage;
+use crate::statistics::PoseError;
+use crate::uncertainty::Uncertainty;
+use runtime::ModelKind;
+
+/// An axis moves when its span is at least this many times its noise from sample to sample: a
+/// million samples of noise alone span ten times its standard deviation.
+const SPAN_TO_NOISE_MIN: f64 = 20.0;
+/// A parameter is determined when its standard error is below this part of its search range.
+const ERROR_TO_RANGE_MAX: f64 = 0.1;
+/// The model describes the log when its rms errors are below this part of the rms motion.
+const ERROR_TO_MOTION_MAX: f64 = 0.5;
+
+/// What a log lacks, or what is wrong with a fit to it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitFailure {
+    /// Fewer rows than unknowns.
+    #[error(
+        "{rows} rows cannot determine {unknowns} unknowns of model ({model}): use a longer log or a larger --train"
+    )]
+    TooFewRows {
+        /// Rows that the fit had.
+        rows: usize,
+        /// Unknowns, zero deviations counted.
+        unknowns: usize,
+        /// Equation of the model.
+        model: u8,
+    },
+    /// An axis does not move in the log.
+    #[error(
+        "{axis} does not move in the log (span {span_micro:.3} {unit}, noise {noise_micro:.3} {unit}), so {parameters} \
+         cannot be found: {remedy}"
+    )]
+    NoMotion {
+        /// The axis.
+        axis: &'static str,
+        /// Peak-to-peak over the log, um or urad.
+        span_micro: f64,
+        /// Noise from sample to sample, um or urad.
+        noise_micro: f64,
+        /// um or urad.
+        unit: &'static str,
+        /// The parameters that need the motion.
+        parameters: &'static str,
+        /// What to record.
+        remedy: &'static str,
+    },
+    /// The log moves, but not so that these parameters show.
+    #[error("the log does not determine {what}: {remedy}")]
+    NotDetermined {
+        /// The parameters, with their standard errors where there are any.
+        what: String,
+        /// What to record.
+        remedy: String,
+    },
+    /// The fitted model leaves most of the motion unexplained.
+    #[error(
+        "the fitted model ({model}) is wrong by {error_micro:.1} {unit} rms in {axis} where the motion itself has \
+         {motion_micro:.1} {unit} rms: it does not describe this log. Check the column mapping, the order and signs \
+         of the sensors and the scales in stage.toml"
+    )]
+    NotDescribed {
+        /// Equation of the model.
+        model: u8,
+        /// The axis.
+        axis: &'static str,
+        /// rms error, um or urad.
+        error_micro: f64,
+        /// rms motion, um or urad.
+        motion_micro: f64,
+        /// um or urad.
+        unit: &'static str,
+    },
+}
+
+/// Axes of the pose: name, unit, the parameters that need their motion, what to record.
+const AXES: [(&str, &str, &str, &str); 6] = [
+    ("X", "um", "the sensitivity of probe C and the misalignments of A and B", "record movements along X"),
+    ("Y", "um", "the sensitivities of probes A and B and the misalignment of C", "record movements along Y"),
+    ("Rz", "urad", "the lever arms", "record rotations about Z"),
+    (
+        "Z",
+        "um",
+        "a of the three probes",
+        "record movements at different heights, or fit a model without vertical terms (--model 30)",
+    ),
+    (
+        "Rx",
+        "urad",
+        "b of the three probes",
+        "record movements at different tilts Rx, or fit a model without vertical terms (--model 30)",
+    ),
+    (
+        "Ry",
+        "urad",
+        "c of the three probes",
+        "record movements at different tilts Ry, or fit a model without vertical terms (--model 30)",
+    ),
+];
+
+/// Refuses a log in which an axis that the model needs does not move.
+///
+/// # Errors
+/// [`FitFailure::NoMotion`] for the first such axis, [`FitFailure::TooFewRows`].
+pub fn check_motion(dataset: &Dataset, train_rows: usize, model: ModelKind) -> Result<(), FitFailure> {
+    let free = ParameterId::all().filter(|id| id.is_free_in(model)).count();
+    let zeros = if model.has_zero_deviation() { 3 * dataset.movements.len() } else { 0 };
+    if 3 * train_rows <= free + zeros {
+        return Err(FitFailure::TooFewRows {
+            rows: train_rows,
+            unknowns: free + zeros,
+            model: model.equation(),
+        });
+    }
+    let axes = if model.has_vertical_terms() { 6 } else { 3 };
+    for (axis, &(name, unit, parameters, remedy)) in AXES.iter().enumerate().take(axes) {
+        let (span, noise) = span_and_noise(dataset, axis);
+        if span <= SPAN_TO_NOISE_MIN * noise || span == 0.0 {
+            return Err(FitFailure::NoMotion {
+                axis: name,
+                span_micro: span * 1e6,
+                noise_micro: noise * 1e6,
+                unit,
+                parameters,
+                remedy,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Peak-to-peak of an axis (X, Y, Rz within movements, since offsets differ between them; Z, Rx,
+/// Ry over the log) and the median over movements of its noise from sample to sample.
+fn span_and_noise(dataset: &Dataset, axis: usize) -> (f64, f64) {
+    let value = |row: &crate::dataset::Row| {
+        if axis < 3 { row.reference[axis] } else { row.vertical[axis - 3] }
+    };
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut span: f64 = 0.0;
+    let mut noises = Vec::new();
+    for movement in &dataset.movements {
+        let rows = &dataset.rows[movement.rows.clone()];
+        if axis < 3 {
+            (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
+        }
+        for row in rows {
+            low = low.min(value(row));
+            high = high.max(value(row));
+        }
+        span = span.max(high - low);
+        let steps: f64 = rows.windows(2).map(|w| (value(&w[1]) - value(&w[0])).powi(2)).sum();
+        if rows.len() > 1 {
+            noises.push((steps / (2.0 * (rows.len() - 1) as f64)).sqrt());
+        }
+    }
+    noises.sort_by(f64::total_cmp);
+    (span, noises.get(noises.len() / 2).copied().unwrap_or(0.0))
+}
+
+/// Refuses a fit whose parameters the log leaves open.
+///
+/// # Errors
+/// [`FitFailure::NotDetermined`] with every such parameter.
+pub fn check_determined(
+    stage: &Stage,
+    parameters: &Parameters,
+    uncertainty: &Uncertainty,
+) -> Result<(), FitFailure> {
+    let ranges = search_box(stage, parameters.geometry.misalignment_rad);
+    let mut what = Vec::new();
+    let mut remedies: Vec<&str> = Vec::new();
+    for (k, id) in ParameterId::all().enumerate() {
+        let open = uncertainty.undetermined.contains(&id);
+        let error = uncertainty.standard_error[k].unwrap_or(0.0);
+        if !open && error <= ERROR_TO_RANGE_MAX * ranges[k].width() {
+            continue;
+        }
+        what.push(if open {
+            id.name()
+        } else {
+            format!("{} (standard error {error:.3e} {})", id.name(), id.unit())
+        });
+        if !remedies.contains(&id.seen_in()) {
+            remedies.push(id.seen_in());
+        }
+    }
+    if what.is_empty() {
+        return Ok(());
+    }
+    let mut remedy = format!(
+        "record independent {}, with larger amplitude or more rows",
+        remedies.join(", ")
+    );
+    let vertical = |id: ParameterId| {
+        matches!(id.quantity, Quantity::PerZ | Quantity::PerRx | Quantity::PerRy)
+    };
+    if uncertainty.undetermined.iter().any(|id| vertical(*id)) {
+        remedy.push_str("; without vertical motion use --model 30");
+    }
+    Err(FitFailure::NotDetermined {
+        what: what.join(", "),
+        remedy,
+    })
+}
+
+/// Refuses a fit that leaves most of the motion unexplained.
+///
+/// # Errors
+/// [`FitFailure::NotDescribed`] for the first such axis.
+pub fn check_described(
+    dataset: &Dataset,
+    errors: &PoseError,
+    model: ModelKind,
+) -> Result<(), FitFailure> {
+    let n = dataset.rows.len().max(1) as f64;
+    for (axis, &(name, unit, ..)) in AXES.iter().enumerate().take(3) {
+        let squares: f64 = dataset.rows.iter().map(|r| r.reference[axis].powi(2)).sum();
+        let motion = (squares / n).sqrt();
+        let error = errors.axes[axis].rms;
+        if error > ERROR_TO_MOTION_MAX * motion {
+            return Err(FitFailure::NotDescribed {
+                model: model.equation(),
+                axis: name,
+                error_micro: error * 1e6,
+                motion_micro: motion * 1e6,
+                unit,
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,255 @@
+//! The machine-readable report of `fit`, `eval` and `inspect`.
+
+use crate::fit::Fit;
+use crate::judge::Judgement;
+use crate::parameters::{COUNT, ParameterId, Parameters};
+use crate::stage::Stage;
+use crate::statistics::PoseError;
+use runtime::ParameterSet;
+use runtime::geometry::ProbeCoordinates;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// rms and peak of a displacement.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Micrometres {
+    /// um.
+    pub rmse_um: f64,
+    /// um.
+    pub peak_um: f64,
+}
+
+/// rms and peak of a rotation.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Microradians {
+    /// urad.
+    pub rmse_urad: f64,
+    /// urad.
+    pub peak_urad: f64,
+}
+
+/// Errors of the three planar axes.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Errors {
+    /// X.
+    pub x: Micrometres,
+    /// Y.
+    pub y: Micrometres,
+    /// Rz.
+    pub rz: Microradians,
+}
+
+impl From<&PoseError> for Errors {
+    fn from(error: &PoseError) -> Self {
+        let [x, y, rz] = error.axes;
+        let linear = |a: crate::statistics::AxisError| Micrometres {
+            rmse_um: a.rms * 1e6,
+            peak_um: a.peak * 1e6,
+        };
+        Self {
+            x: linear(x),
+            y: linear(y),
+            rz: Microradians {
+                rmse_urad: rz.rms * 1e6,
+                peak_urad: rz.peak * 1e6,
+            },
+        }
+    }
+}
+
+/// One parameter.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Parameter {
+    /// SI value.
+    pub value: f64,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Standard error, SI; null where the model fixes the parameter, where it stands at an end of
+    /// its range, or where it is not known (`eval`, `inspect`).
+    pub standard_error: Option<f64>,
+}
+
+/// The six coordinates nearest to the designed ones: a choice, not a measurement.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Coordinates {
+    /// m.
+    pub h1x_m: f64,
+    /// m.
+    pub h1y_m: f64,
+    /// m.
+    pub h2x_m: f64,
+    /// m.
+    pub h2y_m: f64,
+    /// m.
+    pub h3x_m: f64,
+    /// m.
+    pub h3y_m: f64,
+    /// What they are.
+    pub note: &'static str,
+}
+
+impl From<ProbeCoordinates<f64>> for Coordinates {
+    fn from(h: ProbeCoordinates<f64>) -> Self {
+        Self {
+            h1x_m: h.h1x_m,
+            h1y_m: h.h1y_m,
+            h2x_m: h.h2x_m,
+            h2y_m: h.h2y_m,
+            h3x_m: h.h3x_m,
+            h3y_m: h.h3y_m,
+            note: "smallest change from the designed values that gives the lever arms; data cannot tell the two coordinates of a probe apart",
+        }
+    }
+}
+
+/// Parameters by name.
+pub fn parameters(
+    values: &Parameters,
+    standard_error: &[Option<f64>; COUNT],
+) -> BTreeMap<String, Parameter> {
+    ParameterId::all()
+        .zip(values.to_array())
+        .zip(standard_error)
+        .map(|((id, value), &standard_error)| {
+            let parameter = Parameter {
+                value,
+                unit: id.unit(),
+                standard_error,
+            };
+            (id.name(), parameter)
+        })
+        .collect()
+}
+
+/// What `fit` and `eval` both report.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Equation of the model: "12", "15", "30" or "31".
+    pub model: String,
+    /// Solver; null for `eval`.
+    pub solver: Option<String>,
+    /// How much was projected out; null for `eval`.
+    pub project: Option<&'static str>,
+    /// Seed; null for `eval`.
+    pub seed: Option<u64>,
+    /// Rows of the logs named.
+    pub rows: usize,
+    /// Rows that the fit used.
+    pub train_rows: usize,
+    /// Movements of the logs named.
+    pub movements: usize,
+    /// Rows that were skipped as bad.
+    pub skipped_rows: usize,
+    /// Evaluations of the cost; null for `eval`.
+    pub evaluations: Option<u64>,
+    /// Time of the whole command up to here, log reading included, s.
+    pub elapsed_s: f64,
+    /// Time of the solver alone, s; null for `eval`.
+    pub solver_s: Option<f64>,
+    /// Why the solver stopped; null for `eval`.
+    pub stopped: Option<String>,
+    /// Fitness over the rows that the fit used, with the solver's own zero deviations; for `eval`
+    /// that of the errors below.
+    pub train_fitness: f64,
+    /// Over all rows of the logs named; zero deviations refitted unless `delta` says zero.
+    pub errors: Errors,
+    /// Over the same rows with the solver's own zero deviations; null where there are none.
+    pub errors_solver_delta: Option<Errors>,
+    /// How zero deviations were treated: "fit" or "zero".
+    pub delta: &'static str,
+    /// By name: lever_arm, theta, eta, a, b, c of the probes a, b, c.
+    pub parameters: BTreeMap<String, Parameter>,
+    /// H1x .. H3y nearest to the designed ones.
+    pub coordinates: Coordinates,
+    /// Serial number in the blob.
+    pub serial: String,
+    /// Zero deviation of each movement, um at A, B, C.
+    pub zero_deviations_um: Vec<[f64; 3]>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// What a command knows besides the fit or judgement itself.
+#[derive(Clone, Debug)]
+pub struct Circumstances<'a> {
+    /// The stage.
+    pub stage: &'a Stage,
+    /// Rows of the logs.
+    pub rows: usize,
+    /// Movements of the logs.
+    pub movements: usize,
+    /// Rows skipped as bad.
+    pub skipped_rows: usize,
+    /// Time so far, s.
+    pub elapsed_s: f64,
+    /// Warnings from reading.
+    pub warnings: Vec<String>,
+}
+
+fn deltas_um(judgement: &Judgement) -> Vec<[f64; 3]> {
+    let um = |z: &crate::zero_deviation::ZeroDeviation| z.delta_m.map(|d| d * 1e6);
+    judgement.zeros.iter().map(um).collect()
+}
+
+/// The report of a fit.
+pub fn of_fit(fit: &Fit, solver: &str, project: &'static str, seed: u64, c: &Circumstances) -> Report {
+    let parameters_fitted = &fit.solution.parameters;
+    let mut warnings = c.warnings.clone();
+    warnings.extend(fit.warnings.iter().map(ToString::to_string));
+    Report {
+        model: fit.model.equation().to_string(),
+        solver: Some(solver.to_owned()),
+        project: Some(project),
+        seed: Some(seed),
+        rows: c.rows,
+        train_rows: fit.train_rows,
+        movements: c.movements,
+        skipped_rows: c.skipped_rows,
+        evaluations: Some(fit.solution.evaluations),
+        elapsed_s: c.elapsed_s,
+        solver_s: Some(fit.solution.elapsed.as_secs_f64()),
+        stopped: Some(fit.solution.stopped.clone()),
+        train_fitness: fit.train_fitness,
+        errors: Errors::from(&fit.judgement.errors),
+        errors_solver_delta: Some(Errors::from(&fit.judgement_solver_zeros.errors)),
+        delta: if fit.model.has_zero_deviation() { "fit" } else { "zero" },
+        parameters: parameters(parameters_fitted, &fit.uncertainty.standard_error),
+        coordinates: c.stage.designed.nearest_with(&parameters_fitted.geometry).into(),
+        serial: fit.set.serial.as_str().to_owned(),
+        zero_deviations_um: deltas_um(&fit.judgement),
+        warnings,
+    }
+}
+
+/// The report of a judgement of a blob.
+pub fn of_eval(
+    set: &ParameterSet,
+    judgement: &Judgement,
+    delta: &'static str,
+    c: &Circumstances,
+) -> Report {
+    let values = crate::judge::parameters_of(set);
+    Report {
+        model: set.model.equation().to_string(),
+        solver: None,
+        project: None,
+        seed: None,
+        rows: c.rows,
+        train_rows: set.fit.train_rows as usize,
+        movements: c.movements,
+        skipped_rows: c.skipped_rows,
+        evaluations: None,
+        elapsed_s: c.elapsed_s,
+        solver_s: None,
+        stopped: None,
+        train_fitness: judgement.errors.fitness(),
+        errors: Errors::from(&judgement.errors),
+        errors_solver_delta: None,
+        delta,
+        parameters: parameters(&values, &[None; COUNT]),
+        coordinates: c.stage.designed.nearest_with(&values.geometry).into(),
+        serial: set.serial.as_str().to_owned(),
+        zero_deviations_um: deltas_um(judgement),
+        warnings: c.warnings.clone(),
+    }
+}

@@ -1,0 +1,65 @@
+//! Tables for a terminal.
+
+use crate::parameters::{COUNT, ParameterId, Parameters, Quantity};
+use crate::statistics::PoseError;
+use std::fmt::Write;
+
+/// Errors by axis, as Tables 2, 4 and 8 of the paper show them; `paper` stands beside them as
+/// (rms, peak) of X, Y (um) and Rz (urad).
+pub fn errors(title: &str, error: &PoseError, paper: Option<[(f64, f64); 3]>) -> String {
+    let mut out = format!("{title}\n");
+    let beside = if paper.is_some() { "   paper: rms      peak" } else { "" };
+    let _ = writeln!(out, "  {:<10}{:>10}{:>10}{beside}", "", "rms", "peak");
+    for (axis, (name, unit)) in [("X", "um"), ("Y", "um"), ("Rz", "urad")].iter().enumerate() {
+        let a = error.axes[axis];
+        let label = format!("{name} ({unit})");
+        let _ = write!(out, "  {label:<10}{:>10.3}{:>10.3}", a.rms * 1e6, a.peak * 1e6);
+        if let Some(paper) = paper {
+            let (rms, peak) = paper[axis];
+            let _ = write!(out, "   {rms:>10.4}{peak:>10.4}");
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// Parameters beside the designed ones (Table 7), angles in degrees as the paper prints them;
+/// `paper` holds its values in the same order and units.
+pub fn parameters(
+    fitted: &Parameters,
+    designed: &Parameters,
+    standard_error: &[Option<f64>; COUNT],
+    paper: Option<&[f64; COUNT]>,
+) -> String {
+    let mut out = String::new();
+    let beside = if paper.is_some() { "       paper" } else { "" };
+    let _ = writeln!(
+        out,
+        "  {:<14}{:>13}{:>13}{:>13}  {:<6}{beside}",
+        "", "value", "std. error", "designed", "unit"
+    );
+    let values = fitted.to_array().into_iter().zip(designed.to_array());
+    for (k, (id, (value, designed))) in ParameterId::all().zip(values).enumerate() {
+        let (scale, unit) = match id.quantity {
+            Quantity::Misalignment => (180.0 / std::f64::consts::PI, "deg"),
+            _ => (1.0, id.unit()),
+        };
+        let error = standard_error[k].map_or_else(|| "-".to_owned(), |e| format!("{:.2e}", e * scale));
+        let digits = match id.quantity {
+            Quantity::PerZ | Quantity::PerRx | Quantity::PerRy => 3,
+            _ => 6,
+        };
+        let _ = write!(
+            out,
+            "  {:<14}{:>13.digits$}{error:>13}{:>13.digits$}  {unit:<6}",
+            id.name(),
+            value * scale,
+            designed * scale
+        );
+        if let Some(paper) = paper {
+            let _ = write!(out, "{:>12.4}", paper[k]);
+        }
+        out.push('\n');
+    }
+    out
+}

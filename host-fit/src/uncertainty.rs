@@ -1,0 +1,170 @@
+//! Standard errors of the parameters.
+//!
+//! The residuals of neighbouring rows are not independent: the interferometers drift. So the
+//! covariance is the sandwich A^-1 M A^-1 with M summed over clusters of rows that may depend on
+//! each other: whole movements where there are at least [`CLUSTERS_MIN`], else blocks of
+//! [`BLOCK_S`] within them. Where independence would give the larger figure that one is taken,
+//! so that a chance cancellation within few clusters promises nothing.
+
+use crate::least_squares::coordinates::{Boxed, Coordinates, point_of};
+use crate::least_squares::normal::{Column, Point, Square, gram, residual_products};
+use crate::least_squares::scatter::{Offset, Q, Scatter, U, origin, regressors, scatter};
+use crate::parameters::{COUNT, ParameterId, Parameters};
+use crate::problem::{Problem, TrainRow};
+use nalgebra::{Matrix3, SymmetricEigen};
+
+/// Fewer movements than this are cut into blocks.
+const CLUSTERS_MIN: usize = 20;
+/// Length of a block, s: the drift of an interferometer in a laboratory changes over seconds.
+const BLOCK_S: f64 = 0.5;
+
+/// How well the log determines the parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Uncertainty {
+    /// Standard error of each parameter, SI; `None` for one that the model fixes, that stands at
+    /// an end of its range, or that the log does not determine at all.
+    pub standard_error: [Option<f64>; COUNT],
+    /// Parameters that the log does not determine: no motion shows them, or only in combination
+    /// with others.
+    pub undetermined: Vec<ParameterId>,
+}
+
+/// Smallest eigenvalue of the scaled curvature that still counts as information.
+const EIGENVALUE_MIN: f64 = 1e-10;
+
+/// Standard errors at a solution; `held` are parameters that stand at an end of their range.
+/// `None` when the solution itself cannot be evaluated.
+pub fn uncertainty(
+    problem: &Problem,
+    parameters: &Parameters,
+    held: &[ParameterId],
+) -> Option<Uncertainty> {
+    let point = point_of(parameters)?;
+    let offset = if problem.model.has_zero_deviation() {
+        Offset::Free
+    } else {
+        Offset::Fixed([0.0; 3])
+    };
+    let sums = scatter(problem, &point.ratios, &vec![offset; problem.groups.len()])?;
+    let coordinates = Boxed {
+        stage: problem.stage,
+        model: problem.model,
+    };
+    let chain = coordinates.jacobian(&parameters.to_array().into(), &point);
+    let weights = Matrix3::from_diagonal(&problem.weights.into());
+    let to_parameters = |x: Square| chain.transpose() * x * chain;
+    let curvature = to_parameters(gram(&sums, &point.gain, &weights));
+    let clustered = to_parameters(clustered_scores(problem, &point, offset)?);
+    let independent = to_parameters(independent_scores(problem, &sums, &point, &weights));
+
+    let free: Vec<usize> = (0..COUNT)
+        .filter(|&k| {
+            let id = ParameterId::at(k);
+            id.is_free_in(problem.model) && !held.contains(&id)
+        })
+        .collect();
+    let (inverse, undetermined) = pseudo_inverse(&curvature, &free);
+    let mut standard_error = [None; COUNT];
+    for &k in &free {
+        let row = inverse.row(k);
+        let variance = |meat: &Square| (row * meat * row.transpose())[0];
+        let error = variance(&clustered).max(variance(&independent)).sqrt();
+        if !undetermined.contains(&k) && error.is_finite() {
+            standard_error[k] = Some(error);
+        }
+    }
+    Some(Uncertainty {
+        standard_error,
+        undetermined: undetermined.into_iter().map(ParameterId::at).collect(),
+    })
+}
+
+/// The inverse of the curvature over the free parameters, without the directions that hold no
+/// information, and the parameters that take part in such a direction.
+fn pseudo_inverse(curvature: &Square, free: &[usize]) -> (Square, Vec<usize>) {
+    let scale = Column::from_fn(|k, _| {
+        let d = curvature[(k, k)].sqrt();
+        if free.contains(&k) && d.is_normal() { 1.0 / d } else { 0.0 }
+    });
+    let mut scaled = Square::from_fn(|i, j| curvature[(i, j)] * scale[i] * scale[j]);
+    for k in 0..COUNT {
+        scaled[(k, k)] = 1.0;
+    }
+    let mut undetermined: Vec<usize> = free.iter().copied().filter(|&k| scale[k] == 0.0).collect();
+    let eigen = SymmetricEigen::new(scaled);
+    let mut inverse = Square::zeros();
+    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        if *value > EIGENVALUE_MIN {
+            inverse += vector * vector.transpose() / *value;
+        } else {
+            undetermined.extend(free.iter().copied().filter(|&k| vector[k].abs() > 0.1));
+        }
+    }
+    undetermined.sort_unstable();
+    undetermined.dedup();
+    let inverse = Square::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]);
+    (inverse, undetermined)
+}
+
+/// Sum of J' W S W J with the covariance S of the residuals: rows independent, axes not.
+fn independent_scores(
+    problem: &Problem,
+    sums: &Scatter,
+    point: &Point,
+    weights: &Matrix3<f64>,
+) -> Square {
+    let covariance = residual_products(sums, &point.gain) / problem.rows.len() as f64;
+    gram(sums, &point.gain, &(weights * covariance * weights))
+}
+
+/// Sum over clusters of the outer product of their summed scores J' W e, with the usual
+/// correction for few clusters.
+fn clustered_scores(problem: &Problem, point: &Point, offset: Offset) -> Option<Square> {
+    let block = if problem.groups.len() >= CLUSTERS_MIN {
+        usize::MAX
+    } else {
+        (BLOCK_S / problem.stage.servo_period_s).ceil().max(1.0) as usize
+    };
+    let mut total = Square::zeros();
+    let mut clusters = 0;
+    for group in &problem.groups {
+        let rows = &problem.rows[group.rows.clone()];
+        let origin = origin(rows, &point.ratios, offset)?;
+        for cluster in rows.chunks(block.min(rows.len())) {
+            let mut sum = Column::zeros();
+            for row in cluster {
+                sum += score(problem, point, row, &origin)?;
+            }
+            total += sum * sum.transpose();
+            clusters += 1;
+        }
+    }
+    let n = f64::from(clusters);
+    Some(if clusters > 1 { total * (n / (n - 1.0)) } else { total })
+}
+
+/// J' W e of one row.
+fn score(
+    problem: &Problem,
+    point: &Point,
+    row: &TrainRow,
+    origin: &[f64],
+) -> Option<Column> {
+    let mut z = regressors(row, &point.ratios)?;
+    for (z, origin) in z.iter_mut().zip(origin) {
+        *z -= origin;
+    }
+    let weighted: [f64; 3] = std::array::from_fn(|axis| {
+        let decoded: f64 = (0..3).map(|k| point.gain[(axis, k)] * z[k]).sum();
+        problem.weights[axis] * (z[Q + axis] - decoded)
+    });
+    Some(Column::from_fn(|k, _| {
+        if k < 9 {
+            weighted[k / 3] * z[k % 3]
+        } else {
+            let probe = (k - 9) / 3;
+            let pull: f64 = (0..3).map(|axis| weighted[axis] * point.gain[(axis, probe)]).sum();
+            pull * z[U + k - 9]
+        }
+    }))
+}
