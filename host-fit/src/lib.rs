@@ -6,10 +6,12 @@
 //! | module | step |
 //! |---|---|
 //! | [`stage`] | `stage.toml`: designed geometry, scales, search ranges |
+//! | [`log`] | CSV or CSV.gz logs, checked cell by cell |
 //! | [`dataset`] | a log as rows in SI units, by movement |
 
 pub mod dataset;
 pub mod least_squares;
+pub mod log;
 pub mod parameters;
 pub mod problem;
 pub mod solver;
