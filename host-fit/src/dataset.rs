@@ -1,6 +1,71 @@
 //! A log as the fit sees it: rows in SI units, grouped by movement.
 
-use runtime::RawFrame;
+use runtime::{Decoder, PlanarPose, RawFrame, Reading, VerticalPose};
+use std::path::PathBuf;
+
+/// What one servo period of a log gives the decoder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LoggedFrame {
+    /// All six codes, as on the target.
+    Codes(RawFrame),
+    /// Hall codes, and a vertical pose that the log holds in SI units: there are no
+    /// capacitive codes, so this goes through [`Decoder::decode_at`].
+    HallCodes {
+        /// Hall codes of the probes A, B, C.
+        hall: [i32; 3],
+        /// Z, Rx, Ry rounded to the decoder's words: m, rad, rad.
+        vertical: VerticalPose<f32>,
+        /// Number of the servo period, wrapping.
+        sequence: u32,
+        /// When the codes were sampled, in us, wrapping.
+        time_us: u32,
+    },
+}
+
+impl LoggedFrame {
+    /// Hall codes of the probes A, B, C.
+    pub const fn hall(&self) -> [i32; 3] {
+        match self {
+            Self::Codes(frame) => frame.hall,
+            Self::HallCodes { hall, .. } => *hall,
+        }
+    }
+
+    /// Codes of the capacitive gaps 1, 2, 3, where the log has them.
+    pub const fn capacitive(&self) -> Option<[i32; 3]> {
+        match self {
+            Self::Codes(frame) => Some(frame.capacitive),
+            Self::HallCodes { .. } => None,
+        }
+    }
+
+    /// Number of the servo period within its movement, from 0: by time, so a gap in the log
+    /// shows as frames missed.
+    pub const fn sequence(&self) -> u32 {
+        match self {
+            Self::Codes(frame) => frame.sequence,
+            Self::HallCodes { sequence, .. } => *sequence,
+        }
+    }
+
+    /// The same frame with another sequence number.
+    #[must_use]
+    pub const fn with_sequence(mut self, number: u32) -> Self {
+        match &mut self {
+            Self::Codes(frame) => frame.sequence = number,
+            Self::HallCodes { sequence, .. } => *sequence = number,
+        }
+        self
+    }
+
+    /// The reading of the runtime's own decoder, less `zero`.
+    pub fn decode(&self, decoder: &Decoder, zero: &PlanarPose<f32>) -> Reading {
+        match self {
+            Self::Codes(frame) => decoder.decode(frame.hall, frame.capacitive, zero),
+            Self::HallCodes { hall, vertical, .. } => decoder.decode_at(*hall, *vertical, zero),
+        }
+    }
+}
 
 /// One sampled servo period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,8 +74,8 @@ pub struct Row {
     pub movement: usize,
     /// Time within the log, us.
     pub t_us: i64,
-    /// The codes.
-    pub frame: RawFrame,
+    /// What the decoder takes.
+    pub frame: LoggedFrame,
     /// Displacement read by the Hall probes A, B, C at the designed scale, m.
     pub signal_m: [f64; 3],
     /// Z, Rx, Ry by the capacitive sensors: m, rad, rad.
@@ -22,12 +87,23 @@ pub struct Row {
 /// One movement of one log: between its start and its end the interferometers were not reset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Movement {
-    /// Which of the logs named on the command line, from 0.
+    /// Which of the logs named on the command line, from 0: an index into [`Dataset::logs`].
     pub log: usize,
     /// Its number in that log's `movement` column.
     pub index: i64,
     /// Its rows in [`Dataset::rows`].
     pub rows: core::ops::Range<usize>,
+}
+
+/// One log that the rows came from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogSource {
+    /// The file, as it was named.
+    pub path: PathBuf,
+    /// Its rows in [`Dataset::rows`].
+    pub rows: core::ops::Range<usize>,
+    /// Whether it holds the interferometers' reference; if not, [`Row::reference`] is zero.
+    pub has_reference: bool,
 }
 
 /// All rows of one or more logs, movement after movement.
@@ -37,6 +113,8 @@ pub struct Dataset {
     pub rows: Vec<Row>,
     /// The movements, in the order of their first rows.
     pub movements: Vec<Movement>,
+    /// The logs, in the order in which they were named.
+    pub logs: Vec<LogSource>,
     /// SHA-256 of the decompressed logs, one after the other.
     pub sha256: [u8; 32],
 }

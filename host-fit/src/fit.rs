@@ -96,7 +96,9 @@ pub enum FitError {
     #[error(transparent)]
     Solver(#[from] SolveError),
     /// The fitted parameters cannot serve a decoder.
-    #[error("the fitted parameters cannot be used: {0}. Check the vertical motion in the log and the search ranges")]
+    #[error(
+        "the fitted parameters cannot be used: {0}. Check the vertical motion in the log and the search ranges"
+    )]
     Unusable(ParameterError),
 }
 
@@ -206,7 +208,10 @@ fn warnings(
     for group in &problem.groups {
         present[group.movement] = true;
     }
-    let missed = present.iter().zip(&dataset.movements).filter(|(present, _)| !**present);
+    let missed = present
+        .iter()
+        .zip(&dataset.movements)
+        .filter(|(present, _)| !**present);
     let missed: Vec<i64> = missed.map(|(_, movement)| movement.index).collect();
     if problem.model.has_zero_deviation() && !missed.is_empty() {
         warnings.push(FitWarning::MovementsMissed { movements: missed });

@@ -79,8 +79,18 @@ pub enum FitFailure {
 
 /// Axes of the pose: name, unit, the parameters that need their motion, what to record.
 const AXES: [(&str, &str, &str, &str); 6] = [
-    ("X", "um", "the sensitivity of probe C and the misalignments of A and B", "record movements along X"),
-    ("Y", "um", "the sensitivities of probes A and B and the misalignment of C", "record movements along Y"),
+    (
+        "X",
+        "um",
+        "the sensitivity of probe C and the misalignments of A and B",
+        "record movements along X",
+    ),
+    (
+        "Y",
+        "um",
+        "the sensitivities of probes A and B and the misalignment of C",
+        "record movements along Y",
+    ),
     ("Rz", "urad", "the lever arms", "record rotations about Z"),
     (
         "Z",
@@ -106,9 +116,17 @@ const AXES: [(&str, &str, &str, &str); 6] = [
 ///
 /// # Errors
 /// [`FitFailure::NoMotion`] for the first such axis, [`FitFailure::TooFewRows`].
-pub fn check_motion(dataset: &Dataset, train_rows: usize, model: ModelKind) -> Result<(), FitFailure> {
+pub fn check_motion(
+    dataset: &Dataset,
+    train_rows: usize,
+    model: ModelKind,
+) -> Result<(), FitFailure> {
     let free = ParameterId::all().filter(|id| id.is_free_in(model)).count();
-    let zeros = if model.has_zero_deviation() { 3 * dataset.movements.len() } else { 0 };
+    let zeros = if model.has_zero_deviation() {
+        3 * dataset.movements.len()
+    } else {
+        0
+    };
     if 3 * train_rows <= free + zeros {
         return Err(FitFailure::TooFewRows {
             rows: train_rows,
@@ -137,7 +155,11 @@ pub fn check_motion(dataset: &Dataset, train_rows: usize, model: ModelKind) -> R
 /// Ry over the log) and the median over movements of its noise from sample to sample.
 fn span_and_noise(dataset: &Dataset, axis: usize) -> (f64, f64) {
     let value = |row: &crate::dataset::Row| {
-        if axis < 3 { row.reference[axis] } else { row.vertical[axis - 3] }
+        if axis < 3 {
+            row.reference[axis]
+        } else {
+            row.vertical[axis - 3]
+        }
     };
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut span: f64 = 0.0;
@@ -152,7 +174,10 @@ fn span_and_noise(dataset: &Dataset, axis: usize) -> (f64, f64) {
             high = high.max(value(row));
         }
         span = span.max(high - low);
-        let steps: f64 = rows.windows(2).map(|w| (value(&w[1]) - value(&w[0])).powi(2)).sum();
+        let steps: f64 = rows
+            .windows(2)
+            .map(|w| (value(&w[1]) - value(&w[0])).powi(2))
+            .sum();
         if rows.len() > 1 {
             noises.push((steps / (2.0 * (rows.len() - 1) as f64)).sqrt());
         }
@@ -196,7 +221,10 @@ pub fn check_determined(
         remedies.join(", ")
     );
     let vertical = |id: ParameterId| {
-        matches!(id.quantity, Quantity::PerZ | Quantity::PerRx | Quantity::PerRy)
+        matches!(
+            id.quantity,
+            Quantity::PerZ | Quantity::PerRx | Quantity::PerRy
+        )
     };
     if uncertainty.undetermined.iter().any(|id| vertical(*id)) {
         remedy.push_str("; without vertical motion use --model 30");

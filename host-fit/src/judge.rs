@@ -52,7 +52,11 @@ pub fn parameters_of(set: &ParameterSet) -> Parameters {
 /// decoder found bad codes.
 pub fn pose_errors(decoder: &Decoder, dataset: &Dataset) -> Vec<Option<[f64; 3]>> {
     let one = |row: &crate::dataset::Row| {
-        let pose = row.frame.decode(decoder, &PlanarPose::ZERO).planar()?.to_array();
+        let pose = row
+            .frame
+            .decode(decoder, &PlanarPose::ZERO)
+            .planar()?
+            .to_array();
         Some(std::array::from_fn(|axis| {
             f64::from(pose[axis]) - row.reference[axis]
         }))
@@ -74,9 +78,9 @@ pub fn judge(set: &ParameterSet, dataset: &Dataset, stage: &Stage, zeros: Zeros)
             Zeros::Refit => mean(errors).map_or(ZeroDeviation::NONE, |mean| {
                 ZeroDeviation::of_mean_error(&parameters, mean, &stage.search.delta_m)
             }),
-            Zeros::Given(deltas) => deltas
-                .get(index)
-                .map_or(ZeroDeviation::NONE, |&delta| ZeroDeviation::given(&parameters, delta)),
+            Zeros::Given(deltas) => deltas.get(index).map_or(ZeroDeviation::NONE, |&delta| {
+                ZeroDeviation::given(&parameters, delta)
+            }),
         };
         for error in errors {
             match error {

@@ -6,13 +6,22 @@
 //! | module | step |
 //! |---|---|
 //! | [`stage`] | `stage.toml`: designed geometry, scales, search ranges |
+//! | [`log`] | CSV or CSV.gz logs, checked cell by cell |
 //! | [`dataset`] | a log as rows in SI units, by movement |
 
 pub mod dataset;
+pub mod fit;
+pub mod identify;
+pub mod judge;
 pub mod least_squares;
+pub mod log;
 pub mod parameters;
+pub mod precision;
 pub mod problem;
+pub mod report;
 pub mod solver;
 pub mod stage;
+pub mod statistics;
 pub mod train;
+pub mod uncertainty;
 pub mod zero_deviation;

@@ -31,7 +31,11 @@ pub fn largest_difference(
     dataset: &Dataset,
 ) -> [f64; 3] {
     let one = |row: &crate::dataset::Row| {
-        let words = row.frame.decode(decoder, &PlanarPose::ZERO).planar()?.to_array();
+        let words = row
+            .frame
+            .decode(decoder, &PlanarPose::ZERO)
+            .planar()?
+            .to_array();
         let vertical = match row.frame.capacitive() {
             Some(codes) => vertical_pose(&constants.vertical_per_code, codes.map(f64::from_code)),
             None => VerticalPose::from_array(row.vertical),
@@ -40,5 +44,9 @@ pub fn largest_difference(
         Some([0, 1, 2].map(|k| (f64::from(words[k]) - exact[k]).abs()))
     };
     let larger = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| a[k].max(b[k]));
-    dataset.rows.par_iter().filter_map(one).reduce(|| [0.0; 3], larger)
+    dataset
+        .rows
+        .par_iter()
+        .filter_map(one)
+        .reduce(|| [0.0; 3], larger)
 }

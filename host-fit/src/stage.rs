@@ -1,5 +1,13 @@
 //! The stage as designed: geometry, scales, and the ranges in which a fit may search.
 
+mod columns;
+mod error;
+mod file;
+mod value;
+
+pub use error::{Place, StageError, ValueFault};
+
+use crate::log::layout::LogLayout;
 use runtime::capacitive::ProbePositions;
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeCoordinates;
@@ -75,4 +83,6 @@ pub struct Stage {
     pub servo_period_s: f64,
     /// Search ranges.
     pub search: SearchRanges,
+    /// Which column of a log holds what.
+    pub log: LogLayout,
 }

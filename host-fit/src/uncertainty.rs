@@ -84,7 +84,11 @@ pub fn uncertainty(
 fn pseudo_inverse(curvature: &Square, free: &[usize]) -> (Square, Vec<usize>) {
     let scale = Column::from_fn(|k, _| {
         let d = curvature[(k, k)].sqrt();
-        if free.contains(&k) && d.is_normal() { 1.0 / d } else { 0.0 }
+        if free.contains(&k) && d.is_normal() {
+            1.0 / d
+        } else {
+            0.0
+        }
     });
     let mut scaled = Square::from_fn(|i, j| curvature[(i, j)] * scale[i] * scale[j]);
     for k in 0..COUNT {
@@ -93,7 +97,11 @@ fn pseudo_inverse(curvature: &Square, free: &[usize]) -> (Square, Vec<usize>) {
     let mut undetermined: Vec<usize> = free.iter().copied().filter(|&k| scale[k] == 0.0).collect();
     let eigen = SymmetricEigen::new(scaled);
     let mut inverse = Square::zeros();
-    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+    for (value, vector) in eigen
+        .eigenvalues
+        .iter()
+        .zip(eigen.eigenvectors.column_iter())
+    {
         if *value > EIGENVALUE_MIN {
             inverse += vector * vector.transpose() / *value;
         } else {
@@ -140,16 +148,15 @@ fn clustered_scores(problem: &Problem, point: &Point, offset: Offset) -> Option<
         }
     }
     let n = f64::from(clusters);
-    Some(if clusters > 1 { total * (n / (n - 1.0)) } else { total })
+    Some(if clusters > 1 {
+        total * (n / (n - 1.0))
+    } else {
+        total
+    })
 }
 
 /// J' W e of one row.
-fn score(
-    problem: &Problem,
-    point: &Point,
-    row: &TrainRow,
-    origin: &[f64],
-) -> Option<Column> {
+fn score(problem: &Problem, point: &Point, row: &TrainRow, origin: &[f64]) -> Option<Column> {
     let mut z = regressors(row, &point.ratios)?;
     for (z, origin) in z.iter_mut().zip(origin) {
         *z -= origin;
@@ -163,7 +170,9 @@ fn score(
             weighted[k / 3] * z[k % 3]
         } else {
             let probe = (k - 9) / 3;
-            let pull: f64 = (0..3).map(|axis| weighted[axis] * point.gain[(axis, probe)]).sum();
+            let pull: f64 = (0..3)
+                .map(|axis| weighted[axis] * point.gain[(axis, probe)])
+                .sum();
             pull * z[U + k - 9]
         }
     }))

@@ -10,7 +10,9 @@ td,th{padding:.25em .8em;border-bottom:1px solid #ddd;text-align:right}th:first-
 
 /// Writes text so that a browser shows it as it is.
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
 }
 
 /// The page. `plots` are (caption, SVG).
@@ -18,7 +20,11 @@ pub fn page(report: &Report, logs: &[String], plots: &[(String, String)]) -> Str
     let mut out = format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Calibration {serial}</title>\
          <style>{STYLE}</style></head><body>\n<h1>Calibration of stage {serial}</h1>\n",
-        serial = escape(if report.serial.is_empty() { "(no serial)" } else { &report.serial })
+        serial = escape(if report.serial.is_empty() {
+            "(no serial)"
+        } else {
+            &report.serial
+        })
     );
     let _ = writeln!(
         out,
@@ -45,11 +51,16 @@ pub fn page(report: &Report, logs: &[String], plots: &[(String, String)]) -> Str
         ("Y", e.y.rmse_um, e.y.peak_um, "um"),
         ("Rz", e.rz.rmse_urad, e.rz.peak_urad, "urad"),
     ] {
-        let _ = writeln!(out, "<tr><td>{name}</td><td>{rms:.3}</td><td>{peak:.3}</td><td>{unit}</td></tr>");
+        let _ = writeln!(
+            out,
+            "<tr><td>{name}</td><td>{rms:.3}</td><td>{peak:.3}</td><td>{unit}</td></tr>"
+        );
     }
     out.push_str("</table>\n<h2>Parameters</h2>\n<table><tr><th></th><th>value</th><th>standard error</th><th>unit</th></tr>\n");
     for (name, p) in &report.parameters {
-        let error = p.standard_error.map_or_else(|| "-".to_owned(), |e| format!("{e:.2e}"));
+        let error = p
+            .standard_error
+            .map_or_else(|| "-".to_owned(), |e| format!("{e:.2e}"));
         let _ = writeln!(
             out,
             "<tr><td>{name}</td><td>{:.6}</td><td>{error}</td><td>{}</td></tr>",
@@ -62,7 +73,10 @@ pub fn page(report: &Report, logs: &[String], plots: &[(String, String)]) -> Str
     }
     out.push_str("<h2>Zero deviations, um</h2>\n<table><tr><th>movement</th><th>A</th><th>B</th><th>C</th></tr>\n");
     for (index, [a, b, c]) in report.zero_deviations_um.iter().enumerate() {
-        let _ = writeln!(out, "<tr><td>{index}</td><td>{a:.2}</td><td>{b:.2}</td><td>{c:.2}</td></tr>");
+        let _ = writeln!(
+            out,
+            "<tr><td>{index}</td><td>{a:.2}</td><td>{b:.2}</td><td>{c:.2}</td></tr>"
+        );
     }
     out.push_str("</table>\n</body></html>\n");
     out

@@ -192,7 +192,13 @@ fn deltas_um(judgement: &Judgement) -> Vec<[f64; 3]> {
 }
 
 /// The report of a fit.
-pub fn of_fit(fit: &Fit, solver: &str, project: &'static str, seed: u64, c: &Circumstances) -> Report {
+pub fn of_fit(
+    fit: &Fit,
+    solver: &str,
+    project: &'static str,
+    seed: u64,
+    c: &Circumstances,
+) -> Report {
     let parameters_fitted = &fit.solution.parameters;
     let mut warnings = c.warnings.clone();
     warnings.extend(fit.warnings.iter().map(ToString::to_string));
@@ -212,9 +218,17 @@ pub fn of_fit(fit: &Fit, solver: &str, project: &'static str, seed: u64, c: &Cir
         train_fitness: fit.train_fitness,
         errors: Errors::from(&fit.judgement.errors),
         errors_solver_delta: Some(Errors::from(&fit.judgement_solver_zeros.errors)),
-        delta: if fit.model.has_zero_deviation() { "fit" } else { "zero" },
+        delta: if fit.model.has_zero_deviation() {
+            "fit"
+        } else {
+            "zero"
+        },
         parameters: parameters(parameters_fitted, &fit.uncertainty.standard_error),
-        coordinates: c.stage.designed.nearest_with(&parameters_fitted.geometry).into(),
+        coordinates: c
+            .stage
+            .designed
+            .nearest_with(&parameters_fitted.geometry)
+            .into(),
         serial: fit.set.serial.as_str().to_owned(),
         zero_deviations_um: deltas_um(&fit.judgement),
         warnings,

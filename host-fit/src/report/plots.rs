@@ -130,7 +130,11 @@ fn draw_distribution(svg: &mut String, title: &str, errors: &[Option<[f64; 3]>])
         .draw_series(LineSeries::new(bell, BLACK.mix(0.4)))?
         .label("normal")
         .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], BLACK.mix(0.4)));
-    let colours = [RGBColor(20, 90, 160), RGBColor(190, 80, 20), RGBColor(30, 130, 60)];
+    let colours = [
+        RGBColor(20, 90, 160),
+        RGBColor(190, 80, 20),
+        RGBColor(30, 130, 60),
+    ];
     for (axis, (colour, name)) in colours.into_iter().zip(["X", "Y", "Rz"]).enumerate() {
         let values: Vec<f64> = errors.iter().flatten().map(|error| error[axis]).collect();
         let n = values.len().max(1) as f64;
@@ -151,7 +155,10 @@ fn draw_distribution(svg: &mut String, title: &str, errors: &[Option<[f64; 3]>])
             .label(name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour));
     }
-    chart.configure_series_labels().border_style(BLACK.mix(0.3)).draw()?;
+    chart
+        .configure_series_labels()
+        .border_style(BLACK.mix(0.3))
+        .draw()?;
     root.present()?;
     Ok(())
 }

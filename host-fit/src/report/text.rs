@@ -8,12 +8,24 @@ use std::fmt::Write;
 /// (rms, peak) of X, Y (um) and Rz (urad).
 pub fn errors(title: &str, error: &PoseError, paper: Option<[(f64, f64); 3]>) -> String {
     let mut out = format!("{title}\n");
-    let beside = if paper.is_some() { "   paper: rms      peak" } else { "" };
+    let beside = if paper.is_some() {
+        "   paper: rms      peak"
+    } else {
+        ""
+    };
     let _ = writeln!(out, "  {:<10}{:>10}{:>10}{beside}", "", "rms", "peak");
-    for (axis, (name, unit)) in [("X", "um"), ("Y", "um"), ("Rz", "urad")].iter().enumerate() {
+    for (axis, (name, unit)) in [("X", "um"), ("Y", "um"), ("Rz", "urad")]
+        .iter()
+        .enumerate()
+    {
         let a = error.axes[axis];
         let label = format!("{name} ({unit})");
-        let _ = write!(out, "  {label:<10}{:>10.3}{:>10.3}", a.rms * 1e6, a.peak * 1e6);
+        let _ = write!(
+            out,
+            "  {label:<10}{:>10.3}{:>10.3}",
+            a.rms * 1e6,
+            a.peak * 1e6
+        );
         if let Some(paper) = paper {
             let (rms, peak) = paper[axis];
             let _ = write!(out, "   {rms:>10.4}{peak:>10.4}");
@@ -44,7 +56,8 @@ pub fn parameters(
             Quantity::Misalignment => (180.0 / std::f64::consts::PI, "deg"),
             _ => (1.0, id.unit()),
         };
-        let error = standard_error[k].map_or_else(|| "-".to_owned(), |e| format!("{:.2e}", e * scale));
+        let error =
+            standard_error[k].map_or_else(|| "-".to_owned(), |e| format!("{:.2e}", e * scale));
         let digits = match id.quantity {
             Quantity::PerZ | Quantity::PerRx | Quantity::PerRy => 3,
             _ => 6,

@@ -1,0 +1,264 @@
+//! Why a log is refused: what, where, and what to do.
+
+use super::cell::CellFault;
+use std::path::PathBuf;
+
+/// One cell of a log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CellPlace {
+    /// The file.
+    pub path: PathBuf,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column of the table, from 1.
+    pub column: usize,
+    /// The column's name in the header.
+    pub name: String,
+    /// The movement, if its own cell could be read.
+    pub movement: Option<i64>,
+}
+
+impl core::fmt::Display for CellPlace {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(
+            f,
+            "{}:{}: column {} ({})",
+            self.path.display(),
+            self.line,
+            self.column,
+            self.name
+        )?;
+        match self.movement {
+            Some(movement) => write!(f, ", movement {movement}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Why a log is refused.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// No log was named.
+    #[error("no log was named; name one or more CSV or CSV.gz files")]
+    NoLog,
+    /// There is no such file.
+    #[error("{}: no such file; check the path", path.display())]
+    NotFound {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A folder was named.
+    #[error("{}: is a folder; name the log files in it", path.display())]
+    IsFolder {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The system refuses to read it.
+    #[error("{}: cannot be read: {source}; check its permissions and the disk", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Nothing in it, or only comments and blank lines.
+    #[error("{}: the log is empty; record it again or name another file", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A header and no row.
+    #[error("{}:{line}: a header but no rows; record the log again or name another file", path.display())]
+    HeaderOnly {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+    },
+    /// The first line holds numbers only.
+    #[error("{}:{line}: the first line holds numbers, not column names; put a header such as movement,t_us,... above it", path.display())]
+    NoHeader {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: usize,
+    },
+    /// Not text.
+    #[error("{}: not a text file (byte {offset}): it looks like {looks_like}", path.display())]
+    Binary {
+        /// The file.
+        path: PathBuf,
+        /// The first byte that no text has, from 0, after decompression.
+        offset: usize,
+        /// What it seems to be, and what to do.
+        looks_like: &'static str,
+    },
+    /// The gzip stream ends too early.
+    #[error("{}: the gzip file is cut short (after {bytes} decompressed bytes); copy or record it again", path.display())]
+    GzipCut {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that could be decompressed.
+        bytes: usize,
+    },
+    /// The gzip stream is damaged, or its checksum fails.
+    #[error("{}: the gzip file is damaged (after {bytes} decompressed bytes: {source}); copy or record it again", path.display())]
+    GzipDamaged {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that could be decompressed.
+        bytes: usize,
+        /// What the decompressor says.
+        source: std::io::Error,
+    },
+    /// Something follows the gzip stream.
+    #[error("{}: {bytes} bytes that are not gzip follow the gzip data; copy the file again, or decompress it and check its end", path.display())]
+    GzipTrailing {
+        /// The file.
+        path: PathBuf,
+        /// How many bytes.
+        bytes: usize,
+    },
+    /// More bytes than any log has.
+    #[error("{}: more than {limit_bytes} bytes of text; split the log", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// How many bytes are read at most.
+        limit_bytes: u64,
+    },
+    /// A column that is needed is not there.
+    #[error("{}:{line}: the column `{column}` is missing; record it, or name the column that holds it with `{key} = \"...\"` in the [log] table of stage.toml", path.display())]
+    MissingColumn {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// The name that is expected.
+        column: String,
+        /// Its key in the table `[log]`.
+        key: &'static str,
+    },
+    /// A column that nobody knows.
+    #[error("{}:{line}: column {column}, `{name}`, is unknown; map it, or drop it with `ignore = [\"{name}\"]`, in the [log] table of stage.toml (known columns: {known})", path.display())]
+    UnknownColumn {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// Column of the table, from 1.
+        column: usize,
+        /// Its name, shortened.
+        name: String,
+        /// Names that are known.
+        known: String,
+    },
+    /// A column without a name.
+    #[error("{}:{line}: column {column} has no name; name it, or remove the separator too many", path.display())]
+    UnnamedColumn {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// Column of the table, from 1.
+        column: usize,
+    },
+    /// One name stands twice in the header.
+    #[error("{}:{line}: column {column} repeats the name `{name}` of column {first}; rename or remove one", path.display())]
+    RepeatedColumn {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// Column of the table, from 1.
+        column: usize,
+        /// The earlier column of that name.
+        first: usize,
+        /// The name.
+        name: String,
+    },
+    /// Two sets of columns hold one thing, such as capacitive codes and `z_m, rx_rad, ry_rad`.
+    #[error("{}:{line}: both `{one}` and `{other}` are there and hold the same thing; drop one set with `ignore = [...]` in the [log] table of stage.toml", path.display())]
+    AmbiguousColumns {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// A column of the first set.
+        one: String,
+        /// A column of the second set.
+        other: String,
+    },
+    /// A row with too few or too many cells.
+    #[error("{}:{line}: {found} cells where the header has {expected}; correct or remove the line", path.display())]
+    CellCount {
+        /// The file.
+        path: PathBuf,
+        /// Line.
+        line: usize,
+        /// Cells of the header.
+        expected: usize,
+        /// Cells of this row.
+        found: usize,
+    },
+    /// The file ends in the middle of its last line.
+    #[error("{}:{line}: the file ends in the middle of this line ({found} of {expected} cells); copy it again, or remove the line", path.display())]
+    CutLine {
+        /// The file.
+        path: PathBuf,
+        /// The last line.
+        line: usize,
+        /// Cells of the header.
+        expected: usize,
+        /// Whole cells of the last line.
+        found: usize,
+    },
+    /// A cell that is no sound number of its column.
+    #[error("{place}: {fault}")]
+    Cell {
+        /// Which cell.
+        place: Box<CellPlace>,
+        /// What is wrong with it.
+        fault: CellFault,
+    },
+    /// A time before that of the row above, in one movement.
+    #[error(
+        "{place}: time runs backwards, from {before_us} us to {t_us} us; sort the rows by time, or give each run a movement number of its own"
+    )]
+    TimeBackwards {
+        /// The cell of the time.
+        place: Box<CellPlace>,
+        /// Time of the row above, us.
+        before_us: i64,
+        /// Time of this row, us.
+        t_us: i64,
+    },
+    /// A row with the movement and the time of the row above.
+    #[error("{place}: the row repeats the time {t_us} us of the row above; remove the duplicate")]
+    DuplicatedRow {
+        /// The cell of the time.
+        place: Box<CellPlace>,
+        /// The time, us.
+        t_us: i64,
+    },
+    /// A movement that goes on after another one began.
+    #[error(
+        "{place}: the movement was left at line {left_line} and comes back; keep the rows of a movement together, or give the second part a number of its own"
+    )]
+    MovementReturns {
+        /// The cell of the movement.
+        place: Box<CellPlace>,
+        /// The line at which another movement began.
+        left_line: usize,
+    },
+    /// Every row was left out.
+    #[error("{}: all {rows} rows are bad and were left out (the first: {first}); record the log again", path.display())]
+    NoGoodRows {
+        /// The file.
+        path: PathBuf,
+        /// How many rows.
+        rows: usize,
+        /// What is wrong with the first of them.
+        first: Box<LogError>,
+    },
+}

@@ -1,0 +1,70 @@
+//! The order of the rows of a log: movement after movement, time forwards.
+
+use std::collections::HashMap;
+
+/// What is wrong with the place of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum OrderFault {
+    /// Time runs backwards.
+    Backwards { before_us: i64 },
+    /// Same movement and time as the row above.
+    Repeated,
+    /// The movement was left at this byte and comes back.
+    Returns { left_byte: u64 },
+}
+
+/// Follows the rows of one log.
+#[derive(Debug, Default)]
+pub(super) struct Order {
+    current: Option<(i64, i64)>,
+    left: HashMap<i64, u64>,
+}
+
+impl Order {
+    /// Takes the next row, which starts at `byte`; tells whether a movement begins.
+    pub(super) fn take(&mut self, movement: i64, t_us: i64, byte: u64) -> Result<bool, OrderFault> {
+        let begins = match self.current {
+            Some((current, before_us)) if current == movement => {
+                if t_us < before_us {
+                    return Err(OrderFault::Backwards { before_us });
+                }
+                if t_us == before_us {
+                    return Err(OrderFault::Repeated);
+                }
+                false
+            }
+            Some((current, _)) => {
+                self.left.insert(current, byte);
+                if let Some(&left_byte) = self.left.get(&movement) {
+                    return Err(OrderFault::Returns { left_byte });
+                }
+                true
+            }
+            None => true,
+        };
+        self.current = Some((movement, t_us));
+        Ok(begins)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_go_movement_after_movement_and_forwards_in_time() {
+        let mut order = Order::default();
+        assert_eq!(order.take(3, 10, 0), Ok(true));
+        assert_eq!(order.take(3, 11, 1), Ok(false));
+        assert_eq!(order.take(3, 11, 2), Err(OrderFault::Repeated));
+        assert_eq!(
+            order.take(3, 9, 3),
+            Err(OrderFault::Backwards { before_us: 11 })
+        );
+        assert_eq!(order.take(1, 0, 4), Ok(true));
+        assert_eq!(
+            order.take(3, 12, 5),
+            Err(OrderFault::Returns { left_byte: 4 })
+        );
+    }
+}

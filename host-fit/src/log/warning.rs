@@ -1,0 +1,104 @@
+//! What is odd about a log without being wrong.
+
+use super::cell::CellFault;
+use super::error::CellPlace;
+use std::path::PathBuf;
+
+/// Why rows were left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SkipReason {
+    /// An empty cell.
+    Empty,
+    /// A cell that is not a number.
+    NotANumber,
+    /// NaN or an infinity.
+    NotFinite,
+    /// A fraction where a whole number belongs.
+    NotWhole,
+    /// A number beyond every sensible magnitude.
+    Absurd,
+    /// A code that the converter cannot give.
+    OutsideConverter,
+    /// A code at a rail of the converter.
+    Saturated,
+}
+
+impl SkipReason {
+    /// The reason, in words.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Empty => "an empty cell",
+            Self::NotANumber => "a cell that is not a number",
+            Self::NotFinite => "a NaN or an infinity",
+            Self::NotWhole => "a fraction where a whole number belongs",
+            Self::Absurd => "an absurd number",
+            Self::OutsideConverter => "a code outside the converter's range",
+            Self::Saturated => "a saturated code",
+        }
+    }
+}
+
+impl From<&CellFault> for SkipReason {
+    fn from(fault: &CellFault) -> Self {
+        match fault {
+            CellFault::Empty => Self::Empty,
+            CellFault::NotANumber { .. } => Self::NotANumber,
+            CellFault::Nan | CellFault::Infinite { .. } => Self::NotFinite,
+            CellFault::NotWhole { .. } => Self::NotWhole,
+            CellFault::Absurd { .. } => Self::Absurd,
+            CellFault::OutsideConverter { .. } => Self::OutsideConverter,
+            CellFault::Saturated { .. } => Self::Saturated,
+        }
+    }
+}
+
+/// Something that the user should know about a log that was read.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LogWarning {
+    /// Rows were left out, as the user asked.
+    #[error("{}: {rows} rows left out for {} (the first: line {}, column {}, {})", first.path.display(), reason.text(), first.line, first.column, first.name)]
+    RowsSkipped {
+        /// Why.
+        reason: SkipReason,
+        /// How many.
+        rows: usize,
+        /// The bad cell of the first of them.
+        first: Box<CellPlace>,
+    },
+    /// All rows of a movement were left out.
+    #[error("{}: movement {movement} is left out: all its {rows} rows are bad; record it again if its setting matters", path.display())]
+    MovementSkipped {
+        /// The file.
+        path: PathBuf,
+        /// The movement.
+        movement: i64,
+        /// Its rows.
+        rows: usize,
+    },
+    /// A movement with one row: its zero deviation takes up all that the row could tell.
+    #[error("{}: movement {movement} has one row, which tells the fit nothing: its zero deviation fits it exactly; check the movement column", path.display())]
+    SingleRow {
+        /// The file.
+        path: PathBuf,
+        /// The movement.
+        movement: i64,
+    },
+    /// The last line does not end in a line break.
+    #[error("{}:{line}: the last line has no line break; if the file was cut, its last number may be cut too", path.display())]
+    NoFinalLineBreak {
+        /// The file.
+        path: PathBuf,
+        /// The last line.
+        line: usize,
+    },
+    /// The log was sampled at another period than the servo's.
+    #[error("{}: rows are {log_us} us apart, but the servo period is {servo_us} us; missed frames are counted by the log's own period", path.display())]
+    OtherPeriod {
+        /// The file.
+        path: PathBuf,
+        /// Median time between rows, us.
+        log_us: i64,
+        /// Servo period of `stage.toml`, us.
+        servo_us: f64,
+    },
+}
