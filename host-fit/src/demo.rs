@@ -7,6 +7,7 @@ use crate::judge::{Zeros, judge};
 use crate::log::{self, ReadOptions};
 use crate::parameters::{COUNT, Parameters};
 use crate::solver::{Projection, Solver, SolverOptions};
+use crate::shipped::{LOG_GZ, STAGE_TOML};
 use crate::stage::Stage;
 use crate::statistics::{ErrorSums, PoseError};
 use crate::train::Draw;
@@ -19,11 +20,6 @@ use runtime::parameters::Text;
 use runtime::servo::OnInvalid;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-
-/// The log that ships with the program, compressed.
-pub const LOG_GZ: &[u8] = include_bytes!("../data/paper.csv.gz");
-/// Its stage.
-pub const STAGE_TOML: &str = include_str!("../data/stage.toml");
 
 /// rms and peak of X, Y (um) and Rz (urad) as a table of the paper prints them.
 pub type PaperErrors = [(f64, f64); 3];

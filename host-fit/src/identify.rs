@@ -10,10 +10,13 @@ use runtime::ModelKind;
 /// An axis moves when its span is at least this many times its noise from sample to sample: a
 /// million samples of noise alone span ten times its standard deviation.
 const SPAN_TO_NOISE_MIN: f64 = 20.0;
-/// A parameter is determined when its standard error is below this part of its search range.
+/// A parameter is determined when the error that the motion allows is below this part of its search range.
 const ERROR_TO_RANGE_MAX: f64 = 0.1;
-/// The model describes the log when its rms errors are below this part of the rms motion.
-const ERROR_TO_MOTION_MAX: f64 = 0.5;
+/// The model describes the log when its rms errors are below this part of the rms motion: the
+/// vertical terms that (30) lacks cost it less than a tenth.
+const ERROR_TO_MOTION_MAX: f64 = 0.2;
+/// Without sensitivity or zero deviations a model may miss much, but not more than there is.
+const ERROR_TO_MOTION_MAX_BASELINE: f64 = 1.0;
 
 /// What a log lacks, or what is wrong with a fit to it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -200,7 +203,7 @@ pub fn check_determined(
     let mut remedies: Vec<&str> = Vec::new();
     for (k, id) in ParameterId::all().enumerate() {
         let open = uncertainty.undetermined.contains(&id);
-        let error = uncertainty.standard_error[k].unwrap_or(0.0);
+        let error = uncertainty.motion_error[k];
         if !open && error <= ERROR_TO_RANGE_MAX * ranges[k].width() {
             continue;
         }
@@ -249,7 +252,12 @@ pub fn check_described(
         let squares: f64 = dataset.rows.iter().map(|r| r.reference[axis].powi(2)).sum();
         let motion = (squares / n).sqrt();
         let error = errors.axes[axis].rms;
-        if error > ERROR_TO_MOTION_MAX * motion {
+        let most = if model.has_zero_deviation() {
+            ERROR_TO_MOTION_MAX
+        } else {
+            ERROR_TO_MOTION_MAX_BASELINE
+        };
+        if error > most * motion {
             return Err(FitFailure::NotDescribed {
                 model: model.equation(),
                 axis: name,

@@ -24,6 +24,9 @@ pub struct Uncertainty {
     /// Standard error of each parameter, SI; `None` for one that the model fixes, that stands at
     /// an end of its range, or that the log does not determine at all.
     pub standard_error: [Option<f64>; COUNT],
+    /// The same if rows were independent: what the log's motion alone allows, whatever the model
+    /// leaves unexplained. Zero where there is none.
+    pub motion_error: [f64; COUNT],
     /// Parameters that the log does not determine: no motion shows them, or only in combination
     /// with others.
     pub undetermined: Vec<ParameterId>,
@@ -64,17 +67,29 @@ pub fn uncertainty(
         })
         .collect();
     let (inverse, undetermined) = pseudo_inverse(&curvature, &free);
+    // What the fit itself used up: unknowns and zero deviations.
+    let used = free.len()
+        + if offset == Offset::Free {
+            3 * problem.groups.len()
+        } else {
+            0
+        };
+    let all = 3 * problem.rows.len();
+    let scale = all as f64 / all.saturating_sub(used).max(1) as f64;
     let mut standard_error = [None; COUNT];
+    let mut motion_error = [0.0; COUNT];
     for &k in &free {
         let row = inverse.row(k);
-        let variance = |meat: &Square| (row * meat * row.transpose())[0];
-        let error = variance(&clustered).max(variance(&independent)).sqrt();
-        if !undetermined.contains(&k) && error.is_finite() {
-            standard_error[k] = Some(error);
+        let error = |meat: &Square| ((row * meat * row.transpose())[0] * scale).sqrt();
+        motion_error[k] = error(&independent);
+        let largest = motion_error[k].max(error(&clustered));
+        if !undetermined.contains(&k) && largest.is_finite() {
+            standard_error[k] = Some(largest);
         }
     }
     Some(Uncertainty {
         standard_error,
+        motion_error,
         undetermined: undetermined.into_iter().map(ParameterId::at).collect(),
     })
 }

@@ -16,3 +16,6 @@ pub mod descend;
 pub mod normal;
 pub mod scatter;
 pub mod starts;
+
+#[cfg(test)]
+mod tests;
