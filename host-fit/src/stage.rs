@@ -86,3 +86,6 @@ pub struct Stage {
     /// Which column of a log holds what.
     pub log: LogLayout,
 }
+
+#[cfg(test)]
+pub(crate) mod tests;

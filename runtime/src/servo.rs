@@ -109,27 +109,52 @@ impl<'d> Servo<'d> {
     /// A frame whose sequence number is not ahead of the last one's (modulo 2^32, by less
     /// than half of it) is not new and is not decoded.
     pub fn tick(&mut self, frame: &RawFrame) -> Reading {
-        let ahead = match self.last_sequence {
-            None => 1,
-            Some(last) => frame.sequence.wrapping_sub(last),
-        };
-        if ahead == 0 || ahead > u32::MAX / 2 {
-            self.health.frames_repeated = self.health.frames_repeated.saturating_add(1);
+        let Some(sequence) = self.follow(frame.sequence) else {
             return self.conclude(NOTHING, Status::FRAME_REPEATED);
-        }
-        self.last_sequence = Some(frame.sequence);
-        let missed = ahead - 1;
-        self.health.frames_missed = self.health.frames_missed.saturating_add(missed);
-        let sequence = if missed == 0 {
-            Status::GOOD
-        } else {
-            Status::FRAMES_MISSED
         };
         let reading = self
             .decoder
             .decode(frame.hall, frame.capacitive, &self.zero);
-        self.feed_rezero(frame);
+        self.feed_rezero(|decoder| decoder.decode(frame.hall, frame.capacitive, &PlanarPose::ZERO));
         self.conclude(reading, sequence)
+    }
+
+    /// As [`Servo::tick`], with a vertical pose that is known by other means (a log in SI
+    /// columns) in place of capacitive codes.
+    pub fn tick_at(
+        &mut self,
+        hall: [i32; 3],
+        vertical: VerticalPose<f32>,
+        sequence: u32,
+    ) -> Reading {
+        let Some(sequence) = self.follow(sequence) else {
+            return self.conclude(NOTHING, Status::FRAME_REPEATED);
+        };
+        let reading = self.decoder.decode_at(hall, vertical, &self.zero);
+        self.feed_rezero(|decoder| decoder.decode_at(hall, vertical, &PlanarPose::ZERO));
+        self.conclude(reading, sequence)
+    }
+
+    /// Takes note of a frame's sequence number: what it says about missed frames, or `None`
+    /// when the frame is not new.
+    #[inline(always)]
+    fn follow(&mut self, sequence: u32) -> Option<Status> {
+        let ahead = match self.last_sequence {
+            None => 1,
+            Some(last) => sequence.wrapping_sub(last),
+        };
+        if ahead == 0 || ahead > u32::MAX / 2 {
+            self.health.frames_repeated = self.health.frames_repeated.saturating_add(1);
+            return None;
+        }
+        self.last_sequence = Some(sequence);
+        let missed = ahead - 1;
+        self.health.frames_missed = self.health.frames_missed.saturating_add(missed);
+        Some(if missed == 0 {
+            Status::GOOD
+        } else {
+            Status::FRAMES_MISSED
+        })
     }
 
     /// One servo period in which no frame came: nothing is measured, values are held or zero.
@@ -193,11 +218,9 @@ impl<'d> Servo<'d> {
         self.last_sequence = None;
     }
 
-    fn feed_rezero(&mut self, frame: &RawFrame) {
+    fn feed_rezero(&mut self, decode: impl FnOnce(&Decoder) -> Reading) {
         let Some(run) = &mut self.run else { return };
-        let unzeroed = self
-            .decoder
-            .decode(frame.hall, frame.capacitive, &PlanarPose::ZERO);
+        let unzeroed = decode(self.decoder);
         self.rezero = run.take(&unzeroed);
         match self.rezero {
             RezeroState::Running { .. } => {}

@@ -1,0 +1,311 @@
+//! Writes output files whole or not at all.
+//!
+//! The bytes go to a new file in the same folder, reach the disk, and then take the place
+//! of the target in one step: whoever reads the target sees the old file or the new one.
+
+use std::fs::{self, Metadata, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// Why an output was not written. The target is as it was before.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// No file name was given.
+    #[error("the name of the output is empty; name a file")]
+    NoName,
+    /// The target is a folder.
+    #[error("{}: is a folder; name a file in it", path.display())]
+    IsFolder {
+        /// The target.
+        path: PathBuf,
+    },
+    /// The folder of the target does not exist.
+    #[error("{}: the folder {} does not exist; create it or name another", path.display(), folder.display())]
+    NoFolder {
+        /// The target.
+        path: PathBuf,
+        /// Its folder.
+        folder: PathBuf,
+    },
+    /// What should be the folder of the target is a file.
+    #[error("{}: {} is a file, not a folder; name another folder", path.display(), folder.display())]
+    NotAFolder {
+        /// The target.
+        path: PathBuf,
+        /// What should be its folder.
+        folder: PathBuf,
+    },
+    /// The target exists and must not be written.
+    #[error("{}: the file is read-only; make it writable or name another", path.display())]
+    ReadOnly {
+        /// The target.
+        path: PathBuf,
+    },
+    /// The folder must not be written.
+    #[error("{}: no permission to write into {}: {source}; change its permissions or name another folder", path.display(), folder.display())]
+    NotPermitted {
+        /// The target.
+        path: PathBuf,
+        /// Its folder.
+        folder: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// No room is left.
+    #[error("{}: no room for {bytes} bytes: {source}; free some space or name another folder", path.display())]
+    Full {
+        /// The target.
+        path: PathBuf,
+        /// How many bytes were to be written.
+        bytes: usize,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Anything else that the system says.
+    #[error("{}: cannot be written: {source}; name another file", path.display())]
+    Failed {
+        /// The target.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+/// Writes `bytes` to `path`: all of them, or nothing. An existing file is replaced and
+/// keeps its permissions; a link is followed; a device or pipe is written to directly.
+///
+/// # Errors
+/// Every variant of [`OutputError`].
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    let (target, existing) = resolve(path)?;
+    let explain = |source| explain(source, path, &folder_of(&target), bytes.len());
+    match existing {
+        Some(metadata) if !metadata.is_file() => write_through(&target, bytes),
+        existing => replace(&target, bytes, existing),
+    }
+    .map_err(explain)
+}
+
+/// Whether `path` can be written by [`write_atomically`], as far as can be told without
+/// writing: for a check before long work.
+///
+/// # Errors
+/// Every variant of [`OutputError`] but `Full`.
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    let (target, existing) = resolve(path)?;
+    if existing.is_some_and(|metadata| !metadata.is_file()) {
+        return Ok(());
+    }
+    let folder = folder_of(&target);
+    match temporary(&folder) {
+        Ok(_) => Ok(()),
+        Err(source) => Err(explain(source, path, &folder, 0)),
+    }
+}
+
+/// The file that `path` leads to, and what is there now.
+fn resolve(path: &Path) -> Result<(PathBuf, Option<Metadata>), OutputError> {
+    if path.as_os_str().is_empty() {
+        return Err(OutputError::NoName);
+    }
+    let named = || path.to_path_buf();
+    match fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => Err(OutputError::IsFolder { path: named() }),
+        Ok(metadata) if metadata.is_file() && metadata.permissions().readonly() => {
+            Err(OutputError::ReadOnly { path: named() })
+        }
+        // A link keeps its place: what it leads to is replaced.
+        Ok(metadata) => {
+            let target = fs::canonicalize(path).unwrap_or_else(|_| named());
+            Ok((target, Some(metadata)))
+        }
+        Err(_) if path.file_name().is_none() || ends_in_separator(path) => {
+            Err(OutputError::IsFolder { path: named() })
+        }
+        Err(_) => Ok((named(), None)),
+    }
+}
+
+/// Whether the name asks for a folder, as `out/` does.
+fn ends_in_separator(path: &Path) -> bool {
+    let last = path.as_os_str().as_encoded_bytes().last();
+    last.is_some_and(|last| std::path::is_separator(char::from(*last)))
+}
+
+fn folder_of(target: &Path) -> PathBuf {
+    match target.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),
+        _ => PathBuf::from("."),
+    }
+}
+
+/// A new file in `folder` with the permissions of any new file; removed unless persisted.
+fn temporary(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".host-fit-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // Less the user's umask.
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+/// Puts a new file in the place of `target`.
+fn replace(target: &Path, bytes: &[u8], existing: Option<Metadata>) -> std::io::Result<()> {
+    let folder = folder_of(target);
+    let mut file = temporary(&folder)?;
+    file.write_all(bytes)?;
+    if let Some(metadata) = existing {
+        file.as_file().set_permissions(metadata.permissions())?;
+    }
+    file.as_file().sync_all()?;
+    file.persist(target).map_err(|error| error.error)?;
+    // The name is on the disk too once its folder is. Not every file system can do it, and
+    // the file itself is safe already.
+    #[cfg(unix)]
+    let _ = fs::File::open(&folder).and_then(|folder| folder.sync_all());
+    Ok(())
+}
+
+/// Writes to a device or a pipe, which cannot be replaced.
+fn write_through(target: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut device = OpenOptions::new().write(true).open(target)?;
+    device.write_all(bytes)?;
+    device.flush()
+}
+
+/// The system's error in the user's terms.
+fn explain(source: std::io::Error, path: &Path, folder: &Path, bytes: usize) -> OutputError {
+    let path = path.to_path_buf();
+    let folder = folder.to_path_buf();
+    match source.kind() {
+        ErrorKind::NotFound => OutputError::NoFolder { path, folder },
+        ErrorKind::NotADirectory => OutputError::NotAFolder { path, folder },
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => OutputError::NotPermitted {
+            path,
+            folder,
+            source,
+        },
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            OutputError::Full {
+                path,
+                bytes,
+                source,
+            }
+        }
+        _ => OutputError::Failed { path, source },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).expect("a folder");
+        let name = |entry: std::io::Result<fs::DirEntry>| {
+            let name = entry.expect("an entry").file_name();
+            name.to_string_lossy().into_owned()
+        };
+        let mut names: Vec<_> = entries.map(name).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_is_written_whole_and_replaced_whole_and_leaves_nothing_beside_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("params.bin");
+        check_writable(&path).expect("writable");
+        assert!(names(folder.path()).is_empty(), "the check leaves nothing");
+        write_atomically(&path, b"first, and longer").expect("written");
+        write_atomically(&path, b"second").expect("replaced");
+        assert_eq!(fs::read(&path).expect("readable"), b"second");
+        assert_eq!(names(folder.path()), ["params.bin"]);
+    }
+
+    #[test]
+    fn a_target_that_cannot_be_is_named_with_its_reason() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("file"), b"old").expect("written");
+        let write = |path: &Path| write_atomically(path, b"new").expect_err("refused");
+        let (is_folder, no_folder) = (write(folder.path()), write(&at("missing/params.bin")));
+        assert!(
+            matches!(is_folder, OutputError::IsFolder { .. }),
+            "{is_folder}"
+        );
+        assert!(
+            matches!(no_folder, OutputError::NoFolder { .. }),
+            "{no_folder}"
+        );
+        assert!(no_folder.to_string().contains("create it"), "{no_folder}");
+        let slash = write(&at("new/"));
+        assert!(matches!(slash, OutputError::IsFolder { .. }), "{slash}");
+        let empty = write(Path::new(""));
+        assert!(matches!(empty, OutputError::NoName), "{empty}");
+        let below_file = write(&at("file/params.bin"));
+        #[cfg(unix)]
+        assert!(
+            matches!(below_file, OutputError::NotAFolder { .. }),
+            "{below_file}"
+        );
+        assert!(below_file.to_string().contains("another"), "{below_file}");
+        assert_eq!(names(folder.path()), ["file"]);
+    }
+
+    #[test]
+    fn a_read_only_file_stays_as_it_is() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("params.bin");
+        fs::write(&path, b"old").expect("written");
+        let writable = fs::metadata(&path).expect("there").permissions();
+        let mut locked = writable.clone();
+        locked.set_readonly(true);
+        fs::set_permissions(&path, locked).expect("set");
+        let error = write_atomically(&path, b"new").expect_err("refused");
+        assert!(matches!(error, OutputError::ReadOnly { .. }), "{error}");
+        assert_eq!(fs::read(&path).expect("readable"), b"old");
+        fs::set_permissions(&path, writable).expect("set");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn permissions_are_those_of_a_new_file_or_of_the_file_replaced() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().expect("a folder");
+        let mode = |path: &Path| fs::metadata(path).expect("there").permissions().mode();
+        let (ordinary, ours) = (folder.path().join("a"), folder.path().join("b"));
+        fs::write(&ordinary, b"").expect("written");
+        write_atomically(&ours, b"").expect("written");
+        assert_eq!(mode(&ours), mode(&ordinary));
+        fs::set_permissions(&ours, fs::Permissions::from_mode(0o640)).expect("set");
+        write_atomically(&ours, b"again").expect("replaced");
+        assert_eq!(mode(&ours) & 0o777, 0o640);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_is_followed_not_replaced() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        fs::write(&file, b"old").expect("written");
+        std::os::unix::fs::symlink(&file, &link).expect("linked");
+        write_atomically(&link, b"new").expect("written");
+        assert_eq!(fs::read(&file).expect("readable"), b"new");
+        assert!(fs::symlink_metadata(&link).expect("there").is_symlink());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_is_written_to_and_a_full_one_says_so() {
+        write_atomically(Path::new("/dev/null"), b"new").expect("swallowed");
+        let error = write_atomically(Path::new("/dev/full"), b"new").expect_err("full");
+        assert!(
+            matches!(error, OutputError::Full { bytes: 3, .. }),
+            "{error}"
+        );
+    }
+}

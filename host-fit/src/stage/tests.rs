@@ -1,0 +1,499 @@
+use super::*;
+use proptest::prelude::*;
+use std::path::Path;
+
+/// A sound stage file; the tests spoil one thing at a time.
+pub(crate) const SOUND: &str = r#"# a note
+[hall]
+h1x_m = 0.1975
+h1y_m = 0.40
+h2x_m = 0.1975
+h2y_m = 0.42
+h3x_m = 0.1975
+h3y_m = 0.36
+m_per_count = 6.25e-8
+code_min = -32768
+code_max = 32767
+
+[capacitive]
+probes_m = [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]]
+m_per_count = 1.5625e-8
+code_min = -32768
+code_max = 32767
+
+[interferometer]
+y_baseline_m = 0.10
+
+[servo]
+period_s = 0.002
+
+[search]
+h1x_m = [0.1475, 0.2475]
+h2x_m = [0.1475, 0.2475]
+h3y_m = [0.26, 0.46]
+h3x_m = [0.1475, 0.2475]
+h1y_m = [0.30, 0.50]
+h2y_m = [0.32, 0.52]
+eta_a = [0.78, 0.98]
+eta_b = [0.65, 0.85]
+eta_c = [0.72, 0.92]
+theta_deg = [-8.0, 8.0]
+a_per_m = [[-5000.0, 0.0], [-5000.0, 0.0], [-5000.0, 0.0]]
+b_per_rad = [[-5000.0, 0.0], [-5000.0, 0.0], [-5000.0, 0.0]]
+c_per_rad = [[0.0, 5000.0], [-5000.0, 0.0], [0.0, 5000.0]]
+delta_m = [-10e-6, 10e-6]
+"#;
+
+fn parse(text: &str) -> Result<Stage, StageError> {
+    Stage::from_toml(text, Path::new("stage.toml"))
+}
+
+/// The error after replacing `old`, which must be there once, by `new`.
+#[track_caller]
+fn refused(old: &str, new: &str) -> StageError {
+    assert_eq!(SOUND.matches(old).count(), 1, "{old}");
+    parse(&SOUND.replace(old, new)).expect_err(new)
+}
+
+/// Where the error is and which key it names.
+fn place_and_key(error: &StageError) -> Option<(usize, usize, &str)> {
+    match error {
+        StageError::Missing { place, key, .. }
+        | StageError::Unknown { place, key, .. }
+        | StageError::WrongType { place, key, .. }
+        | StageError::Absurd { place, key, .. } => Some((place.line, place.column, key)),
+        _ => None,
+    }
+}
+
+/// The fault of a value that is refused at `line`, `column` as `key`.
+#[track_caller]
+fn fault_at(error: StageError, line: usize, column: usize, key: &str) -> ValueFault {
+    assert_eq!(place_and_key(&error), Some((line, column, key)), "{error}");
+    let message = error.to_string();
+    assert!(
+        message.starts_with(&format!("stage.toml:{line}:{column}: `{key}`")),
+        "{message}"
+    );
+    match error {
+        StageError::Absurd { fault, .. } => fault,
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn a_sound_file_gives_the_stage_in_si_units() {
+    let stage = parse(SOUND).expect("sound");
+    assert_eq!(stage.designed.h3y_m, 0.36);
+    assert_eq!(stage.hall.m_per_count, 6.25e-8);
+    assert_eq!(
+        (stage.hall.window.low, stage.hall.window.high),
+        (-32767, 32766)
+    );
+    assert_eq!(stage.capacitive_probes_m[2], [0.0, -0.12]);
+    assert_eq!(stage.y_baseline_m, 0.1);
+    assert_eq!(stage.search.theta_rad.high, 8f64.to_radians());
+    assert_eq!(stage.search.c_per_rad[1].low, -5000.0);
+    assert_eq!(stage.search.delta_m.high, 10e-6);
+    assert_eq!(stage.log, crate::log::layout::LogLayout::default());
+    let crlf = format!("\u{feff}{}", SOUND.replace('\n', "\r\n"));
+    assert_eq!(parse(&crlf).expect("sound"), stage);
+}
+
+#[test]
+fn every_key_is_needed_and_its_absence_named() {
+    for line in SOUND.lines().filter(|line| line.contains('=')) {
+        let key = line.split(' ').next().expect("a key");
+        let without = SOUND.replacen(&format!("{line}\n"), "", 1);
+        let error = parse(&without).expect_err(line);
+        let StageError::Missing {
+            key: named, place, ..
+        } = &error
+        else {
+            panic!("{line}: {error}");
+        };
+        assert!(named.ends_with(&format!(".{key}")), "{line}: {error}");
+        let table = without.lines().nth(place.line - 1).expect("a line");
+        assert!(table.starts_with('['), "points at the table: {error}");
+        assert!(error.to_string().contains("add it"), "{error}");
+    }
+    for table in ["hall", "capacitive", "interferometer", "servo", "search"] {
+        let error = parse(&SOUND.replace(&format!("[{table}]"), "[log]")).expect_err(table);
+        assert!(
+            matches!(&error, StageError::Missing { key, .. } if key == table),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn an_unknown_key_is_refused_with_those_that_are_known() {
+    for (text, line, column, key) in [
+        (SOUND.replace("period_s", "perod_s"), 23, 1, "servo.perod_s"),
+        (SOUND.replace("[servo]", "[servos]"), 22, 2, "servos"),
+        (format!("serial = 7\n{SOUND}"), 1, 1, "serial"),
+        (
+            format!("{SOUND}eta_d = [0.0, 1.0]\n"),
+            40,
+            1,
+            "search.eta_d",
+        ),
+        (format!("{SOUND}[log]\nhal_a = \"x\"\n"), 41, 1, "log.hal_a"),
+    ] {
+        let error = parse(&text).expect_err(key);
+        assert!(matches!(error, StageError::Unknown { .. }), "{error}");
+        assert_eq!(place_and_key(&error), Some((line, column, key)), "{error}");
+        assert!(
+            error.to_string().contains("correct its spelling"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn a_value_of_another_kind_is_refused() {
+    for (old, new, line, column, key) in [
+        ("h1y_m = 0.40", "h1y_m = \"0.40\"", 4, 9, "hall.h1y_m"),
+        (
+            "period_s = 0.002",
+            "period_s = true",
+            23,
+            12,
+            "servo.period_s",
+        ),
+        (
+            "y_baseline_m = 0.10",
+            "y_baseline_m = [0.1]",
+            20,
+            16,
+            "interferometer.y_baseline_m",
+        ),
+        (
+            "eta_a = [0.78, 0.98]",
+            "eta_a = 0.88",
+            32,
+            9,
+            "search.eta_a",
+        ),
+        (
+            "eta_a = [0.78, 0.98]",
+            "eta_a = [0.78]",
+            32,
+            9,
+            "search.eta_a",
+        ),
+        (
+            "eta_a = [0.78, 0.98]",
+            "eta_a = [0.78, \"1\"]",
+            32,
+            16,
+            "search.eta_a[1]",
+        ),
+        (
+            "[0.12, 0.0]",
+            "[0.12, 0.0, 0.0]",
+            14,
+            13,
+            "capacitive.probes_m[0]",
+        ),
+        (", [0.0, -0.12]", "", 14, 12, "capacitive.probes_m"),
+    ] {
+        let error = refused(old, new);
+        assert!(matches!(error, StageError::WrongType { .. }), "{error}");
+        assert_eq!(place_and_key(&error), Some((line, column, key)), "{error}");
+        assert!(error.to_string().contains("; write "), "{error}");
+    }
+    let error =
+        parse(&SOUND.replace("code_min = -32768", "code_min = -32768.0")).expect_err("float");
+    assert!(matches!(error, StageError::WrongType { .. }), "{error}");
+    let error = parse(&format!("log = 3\n{SOUND}")).expect_err("no table");
+    assert_eq!(place_and_key(&error), Some((1, 7, "log")), "{error}");
+}
+
+#[test]
+fn a_number_that_cannot_be_true_is_refused() {
+    let fault = fault_at(refused("h3y_m = 0.36", "h3y_m = nan"), 8, 9, "hall.h3y_m");
+    assert!(matches!(fault, ValueFault::NotFinite { .. }), "{fault}");
+    let fault = fault_at(refused("h3y_m = 0.36", "h3y_m = -inf"), 8, 9, "hall.h3y_m");
+    assert!(matches!(fault, ValueFault::NotFinite { .. }), "{fault}");
+    let fault = fault_at(refused("h3y_m = 0.36", "h3y_m = 360.0"), 8, 9, "hall.h3y_m");
+    assert!(
+        matches!(fault, ValueFault::Implausible { value: 360.0, .. }),
+        "{fault}"
+    );
+    let fault = fault_at(
+        refused("= 6.25e-8", "= -6.25e-8"),
+        9,
+        15,
+        "hall.m_per_count",
+    );
+    assert!(matches!(fault, ValueFault::NotPositive { .. }), "{fault}");
+    let fault = fault_at(refused("= 6.25e-8", "= 6.25e-5"), 9, 15, "hall.m_per_count");
+    assert!(matches!(fault, ValueFault::FullScale { .. }), "{fault}");
+    let fault = fault_at(
+        refused("= 1.5625e-8", "= 1.5e-18"),
+        15,
+        15,
+        "capacitive.m_per_count",
+    );
+    assert!(matches!(fault, ValueFault::FullScale { .. }), "{fault}");
+    let key = "interferometer.y_baseline_m";
+    let fault = fault_at(
+        refused("y_baseline_m = 0.10", "y_baseline_m = 0"),
+        20,
+        16,
+        key,
+    );
+    assert!(matches!(fault, ValueFault::NotPositive { .. }), "{fault}");
+    for (period, positive) in [
+        ("0.0", false),
+        ("-0.002", false),
+        ("2e-9", true),
+        ("2000", true),
+    ] {
+        let error = refused("period_s = 0.002", &format!("period_s = {period}"));
+        let fault = fault_at(error, 23, 12, "servo.period_s");
+        assert_eq!(
+            matches!(fault, ValueFault::Implausible { .. }),
+            positive,
+            "{fault}"
+        );
+        assert_eq!(
+            matches!(fault, ValueFault::NotPositive { .. }),
+            !positive,
+            "{fault}"
+        );
+    }
+}
+
+#[test]
+fn codes_that_leave_no_window_are_refused() {
+    let with = |low: i64, high: i64| {
+        let codes = format!("m_per_count = 6.25e-8\ncode_min = {low}\ncode_max = {high}\n");
+        refused(
+            "m_per_count = 6.25e-8\ncode_min = -32768\ncode_max = 32767\n",
+            &codes,
+        )
+    };
+    for (low, high) in [(5, 5), (32767, -32768), (0, 1)] {
+        let fault = fault_at(with(low, high), 11, 12, "hall.code_max");
+        assert!(matches!(fault, ValueFault::NoCodes { .. }), "{fault}");
+    }
+    let fault = fault_at(with(-32768, 1 << 24), 11, 12, "hall.code_max");
+    assert_eq!(fault, ValueFault::Beyond24Bits { code: 1 << 24 });
+    let fault = fault_at(with(i64::MIN, 0), 10, 12, "hall.code_min");
+    assert_eq!(fault, ValueFault::Beyond24Bits { code: i64::MIN });
+}
+
+#[test]
+fn sensors_that_define_no_plane_are_refused() {
+    let fault = fault_at(
+        refused("[0.0, -0.12]", "[0.0, 0.00001]"),
+        14,
+        12,
+        "capacitive.probes_m",
+    );
+    assert_eq!(fault, ValueFault::ProbesInLine);
+    let fault = fault_at(
+        refused("[-0.12, 0.0]", "[0.12, 0.0]"),
+        14,
+        12,
+        "capacitive.probes_m",
+    );
+    assert_eq!(fault, ValueFault::ProbesInLine);
+    let error = refused("h2x_m = 0.1975", "h2x_m = -0.1975");
+    let fault = fault_at(error, 5, 9, "hall.h2x_m");
+    assert_eq!(fault, ValueFault::ProbesAlike { x_m: 0.1975 });
+}
+
+#[test]
+fn ranges_that_are_reversed_or_exclude_the_design_are_refused() {
+    let fault = fault_at(
+        refused("[0.65, 0.85]", "[0.85, 0.65]"),
+        33,
+        9,
+        "search.eta_b",
+    );
+    assert_eq!(
+        fault,
+        ValueFault::Reversed {
+            low: 0.85,
+            high: 0.65
+        }
+    );
+    let fault = fault_at(
+        refused("eta_b = [0.65", "eta_b = [-inf"),
+        33,
+        10,
+        "search.eta_b[0]",
+    );
+    assert!(matches!(fault, ValueFault::NotFinite { .. }), "{fault}");
+    let fault = fault_at(
+        refused("a_per_m = [[-5000.0, 0.0]", "a_per_m = [[0.0, -5000.0]"),
+        36,
+        12,
+        "search.a_per_m[0]",
+    );
+    assert!(matches!(fault, ValueFault::Reversed { .. }), "{fault}");
+    let fault = fault_at(
+        refused("[0.26, 0.46]", "[0.26, 0.35]"),
+        28,
+        9,
+        "search.h3y_m",
+    );
+    assert!(
+        matches!(fault, ValueFault::ExcludesDesigned { designed: 0.36, .. }),
+        "{fault}"
+    );
+    let fault = fault_at(
+        refused("[-8.0, 8.0]", "[1.0, 8.0]"),
+        35,
+        13,
+        "search.theta_deg",
+    );
+    assert!(
+        matches!(fault, ValueFault::ExcludesDesigned { designed: 0.0, .. }),
+        "{fault}"
+    );
+    let fault = fault_at(
+        refused("[-8.0, 8.0]", "[-180.0, 8.0]"),
+        35,
+        14,
+        "search.theta_deg[0]",
+    );
+    assert!(matches!(fault, ValueFault::Implausible { .. }), "{fault}");
+    let fault = fault_at(
+        refused("[-10e-6, 10e-6]", "[-10.0, 10.0]"),
+        39,
+        12,
+        "search.delta_m[0]",
+    );
+    assert!(matches!(fault, ValueFault::Implausible { .. }), "{fault}");
+    // The designed eta of 1 lies outside its range on purpose.
+    assert!(!parse(SOUND).expect("sound").search.eta[0].contains(1.0));
+}
+
+#[test]
+fn text_that_is_not_toml_is_refused_with_its_place() {
+    let error = refused("h1x_m = 0.1975\nh1y_m", "h1x_m = 0.1975 m\nh1y_m");
+    let StageError::Syntax { place, .. } = &error else {
+        panic!("{error}");
+    };
+    assert_eq!(place.line, 3, "{error}");
+    let error = refused("h1y_m = 0.40", "h1x_m = 0.40");
+    assert!(
+        matches!(error, StageError::Syntax { ref place, .. } if place.line == 4),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let error = Stage::from_file(folder.path()).expect_err("a folder");
+    assert!(matches!(error, StageError::IsFolder { .. }), "{error}");
+    let error = Stage::from_file(&folder.path().join("none.toml")).expect_err("missing");
+    assert!(matches!(error, StageError::Unreadable { .. }), "{error}");
+    assert!(error.to_string().contains("--stage"), "{error}");
+    let binary = folder.path().join("binary.toml");
+    std::fs::write(&binary, b"[hall]\n\xff\xfe").expect("written");
+    let error = Stage::from_file(&binary).expect_err("binary");
+    assert!(
+        matches!(error, StageError::NotText { offset: 7, .. }),
+        "{error}"
+    );
+}
+
+mod columns_of_a_log {
+    use super::*;
+    use crate::log::layout::Quantity;
+
+    fn with(log: &str) -> Result<Stage, StageError> {
+        parse(&format!("{SOUND}[log]\n{log}\n"))
+    }
+
+    #[test]
+    fn names_units_and_scales_are_mapped() {
+        let log = "movement = \"run\"\nhall_b = { column = \"ADC 2\" }\nifm_x = \"stage_x_um\"\n\
+                   ifm_y1 = { column = \"left\", unit = \"mm\" }\n\
+                   ifm_y2 = { column = \"right\", scale = -6.25e-10 }\n\
+                   time = { column = \"t\", scale = 0.002 }\nignore = [\"temperature\", \"x_m\"]";
+        let stage = with(log).expect("sound");
+        let column = |quantity| {
+            let column = stage.log.column(quantity);
+            (column.name.as_str(), column.scale)
+        };
+        assert_eq!(column(Quantity::Movement), ("run", 1.0));
+        assert_eq!(column(Quantity::HallB), ("ADC 2", 1.0));
+        assert_eq!(column(Quantity::BeamX), ("stage_x_um", 1e-6));
+        assert_eq!(column(Quantity::BeamY1), ("left", 1e-3));
+        assert_eq!(column(Quantity::BeamY2), ("right", -6.25e-10));
+        assert_eq!(column(Quantity::Time), ("t", 2000.0));
+        assert_eq!(column(Quantity::HallC), ("hall_c_cnt", 1.0), "not mapped");
+        assert!(stage.log.ignores("temperature") && stage.log.ignores("x_m"));
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_column_is_named() {
+        let cases: [(&str, usize, &str, fn(&ValueFault) -> bool); 9] = [
+            ("ifm_x = \"laser\"", 9, "log.ifm_x", |f| {
+                matches!(f, ValueFault::NoUnit { .. })
+            }),
+            ("rz = \"rz_um\"", 6, "log.rz", |f| {
+                matches!(f, ValueFault::NoUnit { .. })
+            }),
+            (
+                "ifm_x = { column = \"a\", unit = \"in\" }",
+                32,
+                "log.ifm_x.unit",
+                |f| matches!(f, ValueFault::UnknownUnit { .. }),
+            ),
+            (
+                "ifm_x = { column = \"a\", unit = \"m\", scale = 1.0 }",
+                45,
+                "log.ifm_x.scale",
+                |f| matches!(f, ValueFault::UnitAndScale),
+            ),
+            (
+                "ifm_x = { column = \"a\", scale = 0.0 }",
+                33,
+                "log.ifm_x.scale",
+                |f| matches!(f, ValueFault::Implausible { .. }),
+            ),
+            (
+                "cap_1 = { column = \"a\", scale = 2.0 }",
+                33,
+                "log.cap_1.scale",
+                |f| matches!(f, ValueFault::NoScaleHere { .. }),
+            ),
+            ("cap_1 = \"\"", 9, "log.cap_1", |f| {
+                matches!(f, ValueFault::NoName)
+            }),
+            ("cap_1 = \"cap2_cnt\"", 9, "log.cap_1", |f| {
+                matches!(f, ValueFault::ColumnTwice { .. })
+            }),
+            (
+                "cap_1 = \"a\"\nignore = [\"a\"]",
+                11,
+                "log.ignore[0]",
+                |f| matches!(f, ValueFault::ColumnTwice { .. }),
+            ),
+        ];
+        for (log, column, key, expected) in cases {
+            let line = 40 + log.lines().count();
+            let fault = fault_at(with(log).expect_err(log), line, column, key);
+            assert!(expected(&fault), "{fault}");
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_text_makes_the_reader_panic(at in 0..SOUND.len(), cut in 0..40usize, paste in "[-0-9a-z.=\\[\\]{}\", \n_]{0,20}") {
+        let mut text = SOUND.to_owned();
+        text.replace_range(at..(at + cut).min(text.len()), &paste);
+        if let Err(error) = parse(&text) {
+            prop_assert!(error.to_string().contains("; ") || matches!(error, StageError::Absurd { .. }), "{}", error);
+        }
+    }
+}
