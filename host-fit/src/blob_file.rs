@@ -18,7 +18,7 @@ pub enum BlobFileError {
         cause: std::io::Error,
     },
     /// The file is no usable blob.
-    #[error("{}: {cause}. {}", path.display(), remedy(cause))]
+    #[error("{}: {cause}; {}", path.display(), remedy(cause))]
     Unusable {
         /// The file.
         path: PathBuf,
@@ -27,14 +27,17 @@ pub enum BlobFileError {
     },
 }
 
+/// What to do about a blob that is refused.
 const fn remedy(cause: &BlobError) -> &'static str {
     match cause {
-        BlobError::BadMagic { .. } => "Name a file that `host-fit fit` wrote",
-        BlobError::UnknownVersion { .. } => "Use the version of host-fit that wrote it, or a newer one",
-        BlobError::TrailingBytes { .. } => {
-            "Use the file as `host-fit fit` wrote it, or cut the padding off"
+        BlobError::Truncated { .. } | BlobError::BadCrc { .. } | BlobError::BadHeader { .. } => {
+            "copy the file again, or fit again"
         }
-        _ => "Copy the file again from where it was made, or fit again",
+        BlobError::TrailingBytes { .. } => "cut the file to the blob's length, or copy it again",
+        BlobError::UnknownVersion { .. } => "use a newer version of this program, or fit again",
+        BlobError::Erased | BlobError::BadMagic { .. } => "name a file that `host-fit fit` wrote",
+        BlobError::OtherStage => "name the blob of this stage",
+        _ => "fit again",
     }
 }
 
@@ -68,6 +71,25 @@ pub fn write(path: &Path, set: &ParameterSet) -> Result<(), OutputError> {
     match set.to_bytes(&mut buffer) {
         Ok(bytes) => write_atomically(path, bytes),
         // The buffer has the size that every blob fits into.
-        Err(cause) => Err(OutputError::other(path, cause.to_string())),
+        Err(cause) => Err(OutputError::Failed {
+            path: path.to_owned(),
+            source: std::io::Error::other(cause),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_blob_is_named_with_its_remedy() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("p.bin");
+        std::fs::write(&path, b"HAL").expect("written");
+        let error = read(&path).expect_err("too short").to_string();
+        assert!(error.contains(
+            "p.bin: cut short: 3 bytes where at least 12 are needed; copy the file again"
+        ));
     }
 }

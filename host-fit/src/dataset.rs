@@ -118,3 +118,33 @@ pub struct Dataset {
     /// SHA-256 of the decompressed logs, one after the other.
     pub sha256: [u8; 32],
 }
+
+impl Dataset {
+    /// The movements whose rows `keep` wants, numbered anew; logs and hash stay those of the
+    /// whole.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(&[Row]) -> bool) -> Self {
+        let mut out = Self {
+            rows: Vec::new(),
+            movements: Vec::new(),
+            logs: self.logs.clone(),
+            sha256: self.sha256,
+        };
+        for movement in &self.movements {
+            let rows = &self.rows[movement.rows.clone()];
+            if keep(rows) {
+                let start = out.rows.len();
+                let number = out.movements.len();
+                out.rows.extend(rows.iter().map(|row| Row {
+                    movement: number,
+                    ..*row
+                }));
+                out.movements.push(Movement {
+                    rows: start..out.rows.len(),
+                    ..movement.clone()
+                });
+            }
+        }
+        out
+    }
+}

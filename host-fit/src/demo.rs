@@ -6,8 +6,8 @@ use crate::fit::{Fit, FitSettings, calibration, fit};
 use crate::judge::{Zeros, judge};
 use crate::log::{self, ReadOptions};
 use crate::parameters::{COUNT, Parameters};
-use crate::solver::{Projection, Solver, SolverOptions};
 use crate::shipped::{LOG_GZ, STAGE_TOML};
+use crate::solver::{Projection, Solver, SolverOptions};
 use crate::stage::Stage;
 use crate::statistics::{ErrorSums, PoseError};
 use crate::train::Draw;
@@ -101,7 +101,11 @@ pub fn run(folder: &Path, solver: &dyn Solver) -> Result<Demo, HostError> {
 
     let started = Instant::now();
     let stage = Stage::from_file(&stage_path)?;
-    let log = log::read(std::slice::from_ref(&log_path), &stage, &ReadOptions::for_fit())?;
+    let log = log::read(
+        std::slice::from_ref(&log_path),
+        &stage,
+        &ReadOptions::default(),
+    )?;
     let dataset = &log.dataset;
     let reading = started.elapsed();
 
@@ -115,10 +119,13 @@ pub fn run(folder: &Path, solver: &dyn Solver) -> Result<Demo, HostError> {
 
     blob_file::write(&blob_path, &model_31.set)?;
     let set = blob_file::read(&blob_path)?;
-    let decoded = pose_file::decode(&set.decoder(), dataset, OnInvalid::Zero);
-    pose_file::write(&pose_path, &decoded)?;
+    let decoded = pose_file::decode(dataset, &set.decoder(), OnInvalid::Zero);
+    output::write_atomically(&pose_path, &pose_file::to_text(&decoded))?;
     let errors = pose_file_errors(&pose_path, dataset, &stage, &model_31.solution.parameters)?;
-    let constants = model_31.calibration.constants().map_err(crate::fit::FitError::Unusable)?;
+    let constants = model_31
+        .calibration
+        .constants()
+        .map_err(crate::fit::FitError::Unusable)?;
     let movements = dataset.movements.iter().zip(&model_31.judgement.zeros);
     Ok(Demo {
         designed,

@@ -10,11 +10,13 @@
 //!
 //! Every message says what is wrong, where, and what to do.
 
+use crate::blob_file::BlobFileError;
+use crate::fit::FitError;
 use crate::log::LogError;
 use crate::output::OutputError;
 use crate::pose_file::PoseFileError;
+use crate::report::plots::PlotError;
 use crate::stage::StageError;
-use runtime::BlobError;
 use std::path::PathBuf;
 
 /// Why a run ended early.
@@ -37,33 +39,42 @@ pub enum HostError {
     /// A pose file is refused.
     #[error(transparent)]
     PoseFile(#[from] PoseFileError),
-    /// A parameter blob cannot be read.
-    #[error("{}: cannot read the parameter blob: {source}; check the path", path.display())]
-    BlobUnreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
     /// A parameter blob is refused.
-    #[error("{}: {error}; {}", path.display(), blob_remedy(error))]
-    Blob {
-        /// The file.
+    #[error(transparent)]
+    Blob(#[from] BlobFileError),
+    /// A blob was made for other scales than the stage file gives.
+    #[error(
+        "{}: {key} is {stage:e}, but the parameter blob was made for {blob:e}: name the stage.toml that the blob was \
+         fitted with", path.display()
+    )]
+    OtherScale {
+        /// The stage file.
         path: PathBuf,
-        /// What is wrong with it.
-        error: BlobError,
+        /// The key in it.
+        key: &'static str,
+        /// Its value, m per code.
+        stage: f64,
+        /// That of the blob, m per code.
+        blob: f64,
     },
+    /// A plot could not be drawn.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    /// A report could not be turned into JSON.
+    #[error("cannot write the figures as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    /// There is no place for temporary files.
+    #[error("cannot make a temporary folder: {0}; name one with --out")]
+    NoTemporaryFolder(std::io::Error),
+    /// Standard output cannot be written.
+    #[error("cannot write to standard output: {0}")]
+    Standard(std::io::Error),
     /// An output was not written.
     #[error(transparent)]
     Output(#[from] OutputError),
     /// The fit failed its own checks: nothing was written.
-    #[error("the fit failed its own checks: {failure}; no parameter blob was written. {remedy}")]
-    Fit {
-        /// What failed.
-        failure: String,
-        /// What is missing, or what to do.
-        remedy: String,
-    },
+    #[error("the fit failed its own checks, and no parameter blob was written: {0}")]
+    Fit(#[from] FitError),
     /// The user interrupted the run.
     #[error("interrupted; {kept}")]
     Interrupted {
@@ -80,41 +91,31 @@ impl HostError {
             Self::Stage(_)
             | Self::Log(_)
             | Self::PoseFile(_)
-            | Self::BlobUnreadable { .. }
-            | Self::Blob { .. }
+            | Self::Blob(_)
+            | Self::OtherScale { .. }
+            | Self::Plot(_)
+            | Self::Json(_)
+            | Self::NoTemporaryFolder(_)
+            | Self::Standard(_)
             | Self::Output(_) => 3,
-            Self::Fit { .. } => 4,
+            Self::Fit(_) => 4,
             Self::Interrupted { .. } => 130,
         }
-    }
-}
-
-/// What to do about a blob that is refused.
-const fn blob_remedy(error: &BlobError) -> &'static str {
-    match error {
-        BlobError::Truncated { .. } | BlobError::BadCrc { .. } | BlobError::BadHeader { .. } => {
-            "copy the file again, or fit again"
-        }
-        BlobError::TrailingBytes { .. } => "cut the file to the blob's length, or copy it again",
-        BlobError::UnknownVersion { .. } => "update this program, or fit again with it",
-        BlobError::Erased | BlobError::BadMagic { .. } => "name a file that fit wrote",
-        BlobError::BadPayload | BlobError::Parameters(_) => "fit again",
-        BlobError::OtherStage => "name the blob of this stage",
-        BlobError::BufferTooSmall { .. } => "give the buffer more bytes",
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solver::SolveError;
 
     #[test]
     fn each_kind_of_end_has_its_exit_status() {
-        let blob = HostError::Blob {
+        let blob = BlobFileError::Unusable {
             path: "p.bin".into(),
-            error: BlobError::Erased,
+            cause: runtime::BlobError::Erased,
         };
-        assert_eq!(blob.exit_status(), 3);
+        assert_eq!(HostError::from(blob).exit_status(), 3);
         assert_eq!(HostError::from(LogError::NoLog).exit_status(), 3);
         assert_eq!(HostError::from(OutputError::NoName).exit_status(), 3);
         let usage = HostError::Usage {
@@ -122,29 +123,11 @@ mod tests {
             problem: "0 rows".to_owned(),
         };
         assert_eq!(usage.exit_status(), 2);
-        let fit = HostError::Fit {
-            failure: "the log is constant".to_owned(),
-            remedy: "Record movements.".to_owned(),
-        };
-        assert_eq!(fit.exit_status(), 4);
+        let fit = FitError::from(SolveError::NoPlanarMotion);
+        assert_eq!(HostError::from(fit).exit_status(), 4);
         let interrupted = HostError::Interrupted {
             kept: "nothing was written".to_owned(),
         };
         assert_eq!(interrupted.exit_status(), 130);
-    }
-
-    #[test]
-    fn a_refused_blob_is_named_with_its_remedy() {
-        let error = HostError::Blob {
-            path: "p.bin".into(),
-            error: BlobError::Truncated {
-                needed: 12,
-                found: 3,
-            },
-        };
-        assert_eq!(
-            error.to_string(),
-            "p.bin: cut short: 3 bytes where at least 12 are needed; copy the file again, or fit again"
-        );
     }
 }

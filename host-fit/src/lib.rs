@@ -1,18 +1,31 @@
 //! Reads logged data of a stage, fits its calibration, judges it and writes the parameter
 //! blob for the firmware. The command line is a thin shell over this library.
 //!
-//! Modules in the order of the data:
+//! Modules in the order of the data, the steps of the main job:
 //!
 //! | module | step |
 //! |---|---|
 //! | [`stage`] | `stage.toml`: designed geometry, scales, search ranges |
 //! | [`log`] | CSV or CSV.gz logs, checked cell by cell |
 //! | [`dataset`] | a log as rows in SI units, by movement |
-//! | [`pose_file`] | a log decoded by the runtime, as text |
-//! | [`output`] | files written whole or not at all |
+//! | [`train`] | which rows the fit uses |
+//! | [`problem`], [`parameters`] | what is minimised, over which unknowns |
+//! | [`solver`], [`least_squares`] | how |
+//! | [`zero_deviation`] | each movement's offset in closed form |
+//! | [`uncertainty`], [`identify`] | standard errors; whether the log determines the model |
+//! | [`judge`], [`statistics`], [`precision`] | errors by the target's own decoder |
+//! | [`fit`] | all of these in a row |
+//! | [`report`] | JSON, tables, plots, an HTML page |
+//! | [`blob_file`], [`pose_file`], [`output`] | files, written whole or not at all |
 //! | [`error`] | all of it with the exit status that it leads to |
+//! | [`cli`], [`demo`], [`shipped`] | the commands, and the log that ships with them |
+//! | [`synthetic`] | logs whose true parameters are known |
+#![forbid(unsafe_code)]
 
+pub mod blob_file;
+pub mod cli;
 pub mod dataset;
+pub mod demo;
 pub mod error;
 pub mod fit;
 pub mod identify;

@@ -1,2 +1,7 @@
-//! x
-fn main() {}
+//! `host-fit`: the command line. See [`host_fit::cli`].
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    host_fit::cli::main()
+}

@@ -86,6 +86,23 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     .map_err(explain)
 }
 
+/// Makes a folder, with those above it, unless it is there.
+///
+/// # Errors
+/// [`OutputError::NotAFolder`], [`OutputError::Failed`].
+pub fn make_folder(path: &Path) -> Result<(), OutputError> {
+    if path.is_file() {
+        return Err(OutputError::NotAFolder {
+            path: path.to_path_buf(),
+            folder: path.to_path_buf(),
+        });
+    }
+    fs::create_dir_all(path).map_err(|source| OutputError::Failed {
+        path: path.to_path_buf(),
+        source,
+    })
+}
+
 /// Whether `path` can be written by [`write_atomically`], as far as can be told without
 /// writing: for a check before long work.
 ///

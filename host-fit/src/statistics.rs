@@ -29,9 +29,10 @@ pub struct ErrorSums {
 impl ErrorSums {
     /// Takes the error of one row: m, m, rad.
     pub fn add(&mut self, error: [f64; 3]) {
-        for axis in 0..3 {
-            self.squares[axis] += error[axis] * error[axis];
-            self.peaks[axis] = self.peaks[axis].max(error[axis].abs());
+        let sums = self.squares.iter_mut().zip(&mut self.peaks);
+        for ((square, peak), error) in sums.zip(error) {
+            *square += error * error;
+            *peak = peak.max(error.abs());
         }
         self.rows += 1;
     }

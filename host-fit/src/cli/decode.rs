@@ -1,28 +1,41 @@
 //! `host-fit decode`.
 
 use super::args::DecodeArgs;
+use crate::blob_file;
 use crate::error::HostError;
 use crate::log::{self, ReadOptions};
-use crate::pose_file;
+use crate::output;
+use crate::pose_file::{self, StatusCounts};
 use crate::stage::Stage;
 use runtime::servo::OnInvalid;
 
 /// Decodes a log into a pose file.
 pub fn run(args: &DecodeArgs) -> Result<(), HostError> {
-    let set = super::read_blob(&args.params)?;
+    let set = blob_file::read(&args.params)?;
     let stage = Stage::from_file(&args.stage)?;
     super::same_scales(&set, &stage, &args.stage)?;
-    let log = log::read(std::slice::from_ref(&args.log), &stage, &ReadOptions::for_decode())?;
+    let log = log::read(
+        std::slice::from_ref(&args.log),
+        &stage,
+        &ReadOptions::DECODE,
+    )?;
     let on_invalid = match args.hold {
         0 => OnInvalid::Zero,
         ticks => OnInvalid::Hold { ticks },
     };
-    let decoded = pose_file::decode(&set.decoder(), &log.dataset, on_invalid);
-    pose_file::write(&args.out, &decoded)?;
-    super::print(&pose_file::summary(&decoded))?;
-    super::print(&format!("wrote {}\n", args.out.display()))?;
-    for warning in &log.warnings {
-        eprintln!("warning: {warning}");
+    let decoded = pose_file::decode(&log.dataset, &set.decoder(), on_invalid);
+    output::write_atomically(&args.out, &pose_file::to_text(&decoded))?;
+    let counts = StatusCounts::of(&decoded);
+    let mut summary = format!(
+        "{} rows, {} of them with status 0\n",
+        counts.rows, counts.good
+    );
+    for (name, rows) in counts.named() {
+        summary.push_str(&format!("  {rows} rows: {name}\n"));
     }
+    super::print(&summary)?;
+    super::print(&format!("wrote {}\n", args.out.display()))?;
+    let warnings: Vec<String> = log.warnings.iter().map(ToString::to_string).collect();
+    super::warn(&warnings);
     Ok(())
 }

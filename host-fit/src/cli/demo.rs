@@ -19,14 +19,17 @@ pub fn run(args: &DemoArgs) -> Result<(), HostError> {
             folder.as_path()
         }
         None => {
-            temporary = output::temporary_folder()?;
+            temporary = tempfile::tempdir().map_err(HostError::NoTemporaryFolder)?;
             temporary.path()
         }
     };
     let solver = super::solver(super::DEFAULT_SOLVER)?;
     let demo = demo::run(folder, solver.as_ref())?;
     super::print(&as_text(&demo, args.zero_deviations))?;
-    let mut end = format!("\nall of this took {:.2} s\n", started.elapsed().as_secs_f64());
+    let mut end = format!(
+        "\nall of this took {:.2} s\n",
+        started.elapsed().as_secs_f64()
+    );
     if args.out.is_some() {
         for file in &demo.files {
             let _ = writeln!(end, "wrote {}", file.display());
@@ -52,9 +55,21 @@ fn as_text(demo: &Demo, zero_deviations: bool) -> String {
         &demo.designed,
         Some(TABLE_2),
     );
-    errors("Table 4: Model (30) fitted to the same movements", &demo.model_30.judgement.errors, Some(TABLE_4));
-    errors("the same Model (30) over all 19 vertical settings", &demo.model_30_everywhere, None);
-    errors("Table 8: Model (31) fitted to all rows", &fit.judgement.errors, Some(TABLE_8));
+    errors(
+        "Table 4: Model (30) fitted to the same movements",
+        &demo.model_30.judgement.errors,
+        Some(TABLE_4),
+    );
+    errors(
+        "the same Model (30) over all 19 vertical settings",
+        &demo.model_30_everywhere,
+        None,
+    );
+    errors(
+        "Table 8: Model (31) fitted to all rows",
+        &fit.judgement.errors,
+        Some(TABLE_8),
+    );
     let _ = writeln!(
         out,
         "Table 7: parameters (lever arms in place of H, which no data can tell apart)\n{}",
@@ -83,10 +98,17 @@ fn as_text(demo: &Demo, zero_deviations: bool) -> String {
     let _ = writeln!(
         out,
         "{}",
-        text::errors("The log decoded by the target's f32 decoder from the blob just written", &demo.decoded, None)
+        text::errors(
+            "The log decoded by the target's f32 decoder from the blob just written",
+            &demo.decoded,
+            None
+        )
     );
     let [x, y, rz] = demo.f32_difference.map(|d| d * 1e9);
-    let _ = writeln!(out, "f32 against f64, largest over all rows: X {x:.3} nm, Y {y:.3} nm, Rz {rz:.3} nrad");
+    let _ = writeln!(
+        out,
+        "f32 against f64, largest over all rows: X {x:.3} nm, Y {y:.3} nm, Rz {rz:.3} nrad"
+    );
     let _ = writeln!(
         out,
         "log read in {:.0} ms; Model (31) fitted and judged in {:.0} ms, of which the solver {:.1} ms ({} passes, {})",

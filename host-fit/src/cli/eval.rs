@@ -1,9 +1,10 @@
 //! `host-fit eval`.
 
 use super::args::{DeltaChoice, EvalArgs};
+use crate::blob_file;
 use crate::error::HostError;
 use crate::judge::{Zeros, judge};
-use crate::log::{self, ReadOptions};
+use crate::log;
 use crate::report::json::of_eval;
 use crate::report::text;
 use crate::stage::Stage;
@@ -12,10 +13,10 @@ use std::time::Instant;
 /// Judges a blob on logs with reference.
 pub fn run(args: &EvalArgs) -> Result<(), HostError> {
     let started = Instant::now();
-    let set = super::read_blob(&args.params)?;
+    let set = blob_file::read(&args.params)?;
     let stage = Stage::from_file(&args.stage)?;
     super::same_scales(&set, &stage, &args.stage)?;
-    let log = log::read(&args.logs, &stage, &ReadOptions::for_eval())?;
+    let log = log::read(&args.logs, &stage, &super::EVAL)?;
     let (zeros, name) = match args.delta {
         DeltaChoice::Fit => (Zeros::Refit, "fit"),
         DeltaChoice::Zero => (Zeros::None, "zero"),
@@ -39,7 +40,7 @@ pub fn run(args: &EvalArgs) -> Result<(), HostError> {
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
     }
-    if args.json.as_deref().is_none_or(|path| path.as_os_str() != "-") {
+    if !super::is_standard_output(args.json.as_deref()) {
         let title = match args.delta {
             DeltaChoice::Fit => "errors, zero deviations refitted",
             DeltaChoice::Zero => "errors, no zero deviation taken off",
@@ -52,8 +53,6 @@ pub fn run(args: &EvalArgs) -> Result<(), HostError> {
             text::errors(title, &judgement.errors, None)
         ))?;
     }
-    for warning in &report.warnings {
-        eprintln!("warning: {warning}");
-    }
+    super::warn(&report.warnings);
     Ok(())
 }

@@ -3,9 +3,9 @@
 use super::args::{BadRowsChoice, FitArgs, Train};
 use crate::error::HostError;
 use crate::fit::{Fit, FitSettings, fit};
-use crate::log::{BadRows, Log, ReadOptions};
+use crate::log::{BadRows, LogReading, ReadOptions};
 use crate::parameters::Parameters;
-use crate::report::json::{Circumstances, Report, of_fit};
+use crate::report::json::{Report, of_fit};
 use crate::report::{html, plots, text};
 use crate::solver::SolverOptions;
 use crate::stage::Stage;
@@ -22,8 +22,9 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
             BadRowsChoice::Refuse => BadRows::Refuse,
             BadRowsChoice::Skip => BadRows::Skip,
         },
-        ..ReadOptions::for_fit()
+        ..ReadOptions::default()
     };
+    output::check_writable(&args.out)?;
     let log = log::read(&args.logs, &stage, &options)?;
     let solver = super::solver(&args.solver)?;
     let settings = FitSettings {
@@ -44,7 +45,13 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
     };
     let fit = fit(&log.dataset, &stage, solver.as_ref(), &settings)?;
     let circumstances = super::circumstances(&log, &stage, started);
-    let report = of_fit(&fit, solver.name(), args.project.name(), args.seed, &circumstances);
+    let report = of_fit(
+        &fit,
+        solver.name(),
+        args.project.name(),
+        args.seed,
+        &circumstances,
+    );
     blob_file::write(&args.out, &fit.set)?;
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
@@ -54,13 +61,11 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
         write_report(&report, &fit, &log, &names, folder)?;
     }
     // JSON on standard output is for a program: nothing else goes there.
-    if args.json.as_deref().is_none_or(|path| path.as_os_str() != "-") {
+    if !super::is_standard_output(args.json.as_deref()) {
         super::print(&summary(&fit, &report, &stage))?;
         super::print(&format!("wrote {}\n", args.out.display()))?;
     }
-    for warning in &report.warnings {
-        eprintln!("warning: {warning}");
-    }
+    super::warn(&report.warnings);
     Ok(())
 }
 
@@ -79,7 +84,11 @@ pub fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
         fit.solution.elapsed.as_secs_f64() * 1e3,
         fit.solution.stopped,
         fit.train_fitness,
-        text::errors("errors over all rows, zero deviations refitted", &fit.judgement.errors, None),
+        text::errors(
+            "errors over all rows, zero deviations refitted",
+            &fit.judgement.errors,
+            None
+        ),
         text::parameters(
             &fit.solution.parameters,
             &Parameters::designed(stage),
@@ -93,7 +102,7 @@ pub fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
 pub fn write_report(
     report: &Report,
     fit: &Fit,
-    log: &Log,
+    log: &LogReading,
     names: &[String],
     folder: &std::path::Path,
 ) -> Result<(), HostError> {

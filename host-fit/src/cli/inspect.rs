@@ -1,6 +1,7 @@
 //! `host-fit inspect`.
 
 use super::args::InspectArgs;
+use crate::blob_file;
 use crate::error::HostError;
 use crate::judge::parameters_of;
 use crate::parameters::COUNT;
@@ -11,10 +12,10 @@ use std::fmt::Write;
 
 /// Shows every field of a blob.
 pub fn run(args: &InspectArgs) -> Result<(), HostError> {
-    let set = super::read_blob(&args.params)?;
+    let set = blob_file::read(&args.params)?;
     if let Some(path) = &args.json {
         super::write_json(&as_json(&set), path)?;
-        if path.as_os_str() == "-" {
+        if super::is_standard_output(Some(path)) {
             return Ok(());
         }
     }
@@ -66,13 +67,23 @@ fn as_json(set: &ParameterSet) -> serde_json::Value {
 fn as_text(set: &ParameterSet) -> String {
     let c = &set.constants;
     let mut out = String::new();
-    let or_dash = |text: &str| if text.is_empty() { "-".to_owned() } else { text.to_owned() };
+    let or_dash = |text: &str| {
+        if text.is_empty() {
+            "-".to_owned()
+        } else {
+            text.to_owned()
+        }
+    };
     let _ = writeln!(out, "layout          {}", runtime::blob::LAYOUT_VERSION);
     let _ = writeln!(out, "model           ({})", set.model.equation());
     let _ = writeln!(out, "serial          {}", or_dash(&set.serial));
     let _ = writeln!(out, "created         {}", or_dash(&set.created));
     let _ = writeln!(out, "logs SHA-256    {}", hex(&set.logs_sha256));
-    let _ = writeln!(out, "rows            {} ({} fitted)", set.fit.rows, set.fit.train_rows);
+    let _ = writeln!(
+        out,
+        "rows            {} ({} fitted)",
+        set.fit.rows, set.fit.train_rows
+    );
     let [x, y, rz] = set.fit.rms.map(|e| e * 1e6);
     let _ = writeln!(out, "rms error       {x:.3} um, {y:.3} um, {rz:.3} urad");
     let [x, y, rz] = set.fit.peak.map(|e| e * 1e6);
@@ -89,13 +100,29 @@ fn as_text(set: &ParameterSet) -> String {
     ] {
         for (k, row) in rows.iter().enumerate() {
             let name = if k == 0 { name } else { "" };
-            let _ = writeln!(out, "{name:<18}{:>15.7e}{:>15.7e}{:>15.7e}", row[0], row[1], row[2]);
+            let _ = writeln!(
+                out,
+                "{name:<18}{:>15.7e}{:>15.7e}{:>15.7e}",
+                row[0], row[1], row[2]
+            );
         }
     }
     let _ = writeln!(out, "Hall scale      {:e} m per code", set.hall.m_per_code);
-    let _ = writeln!(out, "capacitive      {:e} m per code", set.capacitive.m_per_code);
-    let _ = writeln!(out, "Hall codes      {} to {}", c.hall_window.low, c.hall_window.high);
-    let _ = writeln!(out, "capacitive      {} to {}", c.capacitive_window.low, c.capacitive_window.high);
+    let _ = writeln!(
+        out,
+        "capacitive      {:e} m per code",
+        set.capacitive.m_per_code
+    );
+    let _ = writeln!(
+        out,
+        "Hall codes      {} to {}",
+        c.hall_window.low, c.hall_window.high
+    );
+    let _ = writeln!(
+        out,
+        "capacitive      {} to {}",
+        c.capacitive_window.low, c.capacitive_window.high
+    );
     let [x, y, rz] = c.calibrated_planar.map(|e| e * 1e6);
     let [z, rx, ry] = c.calibrated_vertical.map(|e| e * 1e6);
     let _ = writeln!(

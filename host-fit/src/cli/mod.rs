@@ -9,23 +9,38 @@ mod inspect;
 
 use crate::error::HostError;
 use crate::least_squares::starts::LeastSquares;
+use crate::log::{LogReading, ReadOptions, ReferenceUse};
+use crate::output::write_atomically;
+use crate::report::json::Circumstances;
 use crate::solver::Solver;
+use crate::stage::Stage;
 use args::{Cli, Command};
 use clap::Parser;
 use runtime::ParameterSet;
+use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::Instant;
 
 /// Names of the solvers.
 pub const SOLVERS: [&str; 1] = ["lm"];
 /// The solver that gives the best result.
 pub const DEFAULT_SOLVER: &str = "lm";
 
+/// How `eval` reads: it needs the reference, and the decoder marks saturated codes.
+const EVAL: ReadOptions = ReadOptions {
+    reference: ReferenceUse::Required,
+    ..ReadOptions::DECODE
+};
+
 /// The solver of a name.
-fn solver(name: &str) -> Option<Box<dyn Solver>> {
+fn solver(name: &str) -> Result<Box<dyn Solver>, HostError> {
     match name {
-        "lm" => Some(Box::new(LeastSquares)),
-        _ => None,
+        "lm" => Ok(Box::new(LeastSquares)),
+        _ => Err(HostError::Usage {
+            argument: "--solver",
+            problem: format!("no solver is called {name}"),
+        }),
     }
 }
 
@@ -42,24 +57,90 @@ pub fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("host-fit: {error}");
+            let _ = writeln!(std::io::stderr(), "host-fit: {error}");
             ExitCode::from(error.exit_status())
         }
     }
 }
 
-/// Writes a report as JSON to a file, or to standard output for `-`.
-fn write_json(report: &impl serde::Serialize, path: &Path) -> Result<(), HostError> {
-    let mut text = serde_json::to_string_pretty(report).map_err(HostError::json)?;
-    text.push('\n');
-    if path == Path::new("-") {
-        print!("{text}");
-        return Ok(());
+/// Writes to standard output. A reader that has gone away, as `head` does, is no error.
+fn print(text: &str) -> Result<(), HostError> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(HostError::Standard(error)),
+        _ => Ok(()),
     }
-    Ok(crate::output::write_atomically(path, text.as_bytes())?)
 }
 
-/// Reads a parameter blob and refuses one that is not exactly that.
-fn read_blob(path: &Path) -> Result<ParameterSet, HostError> {
-    crate::blob_file::read(path).map_err(HostError::from)
+/// Writes warnings to standard error.
+fn warn(warnings: &[String]) {
+    for warning in warnings {
+        // Nobody is left to tell when standard error is gone.
+        let _ = writeln!(std::io::stderr(), "warning: {warning}");
+    }
+}
+
+/// Whether a report goes to standard output, where nothing else may then be written.
+fn is_standard_output(path: Option<&Path>) -> bool {
+    path.is_some_and(|path| path.as_os_str() == "-")
+}
+
+/// Writes a report as JSON to a file, or to standard output for `-`.
+fn write_json(report: &impl serde::Serialize, path: &Path) -> Result<(), HostError> {
+    let mut text = serde_json::to_string_pretty(report)?;
+    text.push('\n');
+    if is_standard_output(Some(path)) {
+        print(&text)
+    } else {
+        Ok(write_atomically(path, text.as_bytes())?)
+    }
+}
+
+/// Limits the threads of everything that follows. The results do not depend on it.
+fn use_threads(threads: Option<u16>) {
+    if let Some(threads) = threads {
+        // Fails only if the pool exists already, which no command makes before this.
+        let _ = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.into())
+            .build_global();
+    }
+}
+
+/// Refuses a blob that was made for other scales than `stage.toml` gives.
+fn same_scales(set: &ParameterSet, stage: &Stage, path: &Path) -> Result<(), HostError> {
+    let pairs = [
+        (
+            "hall.m_per_count",
+            stage.hall.m_per_count,
+            set.hall.m_per_code,
+        ),
+        (
+            "capacitive.m_per_count",
+            stage.capacitive.m_per_count,
+            set.capacitive.m_per_code,
+        ),
+    ];
+    for (key, stage, blob) in pairs {
+        if stage as f32 != blob {
+            return Err(HostError::OtherScale {
+                path: path.to_owned(),
+                key,
+                stage,
+                blob: blob.into(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// What the reports say of the logs.
+fn circumstances<'s>(log: &LogReading, stage: &'s Stage, started: Instant) -> Circumstances<'s> {
+    Circumstances {
+        stage,
+        rows: log.dataset.rows.len(),
+        movements: log.dataset.movements.len(),
+        skipped_rows: log.skipped_rows,
+        elapsed_s: started.elapsed().as_secs_f64(),
+        warnings: log.warnings.iter().map(ToString::to_string).collect(),
+    }
 }
