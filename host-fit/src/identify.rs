@@ -64,7 +64,7 @@ pub enum FitFailure {
     #[error(
         "the fitted model ({model}) is wrong by {error_micro:.1} {unit} rms in {axis} where the motion itself has \
          {motion_micro:.1} {unit} rms: it does not describe this log. Check the column mapping, the order and signs \
-         of the sensors and the scales in stage.toml"
+         of the sensors and the scales in stage.toml, and record a log in which the stage moves along {axis}"
     )]
     NotDescribed {
         /// Equation of the model.

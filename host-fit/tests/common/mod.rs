@@ -1,0 +1,142 @@
+//! Runs the program in a folder of its own, on logs made from the one that ships with it.
+#![allow(dead_code, reason = "each test program uses its own part")]
+#![allow(missing_docs, reason = "not a library")]
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder with `stage.toml` in it.
+pub struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        let bench = Self {
+            folder: tempfile::tempdir().expect("a folder"),
+        };
+        bench.write("stage.toml", host_fit::shipped::STAGE_TOML);
+        bench
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        std::fs::write(&path, content).expect("written");
+        path
+    }
+
+    pub fn read(&self, name: &str) -> Vec<u8> {
+        std::fs::read(self.path(name)).expect("read")
+    }
+
+    pub fn json(&self, name: &str) -> serde_json::Value {
+        serde_json::from_slice(&self.read(name)).expect("JSON")
+    }
+
+    /// Runs the program with arguments separated by spaces, in the folder.
+    pub fn run(&self, arguments: &str) -> Output {
+        self.run_args(&arguments.split_whitespace().collect::<Vec<_>>())
+    }
+
+    pub fn run_args(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_host-fit"))
+            .args(arguments)
+            .current_dir(self.folder.path())
+            .output()
+            .expect("the program runs")
+    }
+
+    /// Runs the program, which must succeed.
+    pub fn good(&self, arguments: &str) -> Output {
+        let output = self.run(arguments);
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{arguments}: {}",
+            stderr(&output)
+        );
+        output
+    }
+
+    /// Runs the program, which must end with `status` and a message that holds all of `parts`.
+    pub fn bad(&self, arguments: &str, status: i32, parts: &[&str]) {
+        let output = self.run(arguments);
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(status), "{arguments}: {message}");
+        for part in parts {
+            assert!(
+                message.contains(part),
+                "{arguments}: no `{part}` in: {message}"
+            );
+        }
+        assert!(!message.contains("panicked"), "{message}");
+    }
+
+    /// Whether nothing but the named files is in the folder.
+    pub fn holds_only(&self, names: &[&str]) -> bool {
+        let entries = std::fs::read_dir(self.folder.path()).expect("listed");
+        entries.map(|e| e.expect("entry").file_name()).all(|name| {
+            let known = names.iter().any(|known| name == *known);
+            known || name == "stage.toml"
+        })
+    }
+}
+
+pub fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+pub fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// The shipped log as text.
+pub fn shipped_log() -> String {
+    let mut text = String::new();
+    flate2::read::GzDecoder::new(host_fit::shipped::LOG_GZ)
+        .read_to_string(&mut text)
+        .expect("the shipped log");
+    text
+}
+
+/// The shipped log with every `stride`-th row of each movement and only the movements wanted.
+pub fn thinned_log(stride: usize, keep: impl Fn(usize) -> bool) -> String {
+    let log = shipped_log();
+    let mut lines = log.lines();
+    let mut out = lines.next().expect("a header").to_owned() + "\n";
+    for (row, line) in lines.enumerate() {
+        let movement: usize = line
+            .split(',')
+            .next()
+            .and_then(|m| m.parse().ok())
+            .expect("a movement");
+        if row % stride == 0 && keep(movement) {
+            out.push_str(line);
+            out.push('\n');
+        }
+    }
+    out
+}
+
+/// Replaces one cell of a log: row from 0 after the header, column by name.
+pub fn with_cell(log: &str, row: usize, column: &str, value: &str) -> String {
+    let mut lines: Vec<String> = log.lines().map(str::to_owned).collect();
+    let index = lines[0]
+        .split(',')
+        .position(|name| name == column)
+        .expect("the column");
+    let mut cells: Vec<&str> = lines[row + 1].split(',').collect();
+    cells[index] = value;
+    lines[row + 1] = cells.join(",");
+    lines.join("\n") + "\n"
+}
+
+/// Whether a path exists.
+pub fn exists(path: &Path) -> bool {
+    path.exists()
+}
