@@ -94,6 +94,9 @@ fn columns_come_in_any_order_and_under_any_name() {
         &named,
         &stage_with("movement = \"run\"\nhall_b = \"ADC 2\""),
     );
+    let long = "a column with a name that is longer than any message would show it";
+    let named = LOG.replace("cap3_cnt", long);
+    same_rows(&named, &stage_with(&format!("cap_3 = \"{long}\"")));
     let wider = LOG.replace("\n", ",note\n");
     same_rows(&wider, &stage_with("ignore = [\"note\"]"));
 }
