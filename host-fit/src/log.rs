@@ -146,3 +146,6 @@ fn append(
     reading.skipped_rows += reader::append(&text, stage, options, dataset, warnings)?;
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

@@ -83,6 +83,16 @@ pub enum LogError {
         /// The line.
         line: usize,
     },
+    /// The header is a single cell.
+    #[error("{}:{line}: \"{text}\" is not a header with several columns; separate the cells by commas, semicolons or tabs, or name a log", path.display())]
+    NoSeparator {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// What is there, shortened.
+        text: String,
+    },
     /// Not text.
     #[error("{}: not a text file (byte {offset}): it looks like {looks_like}", path.display())]
     Binary {

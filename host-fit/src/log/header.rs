@@ -64,12 +64,20 @@ pub(super) fn columns(
     layout: &LogLayout,
     reference: ReferenceUse,
 ) -> Result<Columns, LogError> {
-    let names: Vec<String> = record.iter().map(|cell| shown(cell.trim_ascii())).collect();
+    let name = |cell: &[u8]| String::from_utf8_lossy(cell.trim_ascii()).into_owned();
+    let names: Vec<String> = record.iter().map(name).collect();
     let owned = || path.to_path_buf();
     if names.iter().all(|name| name.parse::<f64>().is_ok()) {
         return Err(LogError::NoHeader {
             path: owned(),
             line,
+        });
+    }
+    if let [one] = names.as_slice() {
+        return Err(LogError::NoSeparator {
+            path: owned(),
+            line,
+            text: shown(one.as_bytes()),
         });
     }
     let mut cells = [None; 17];
@@ -90,7 +98,7 @@ pub(super) fn columns(
                 path: owned(),
                 line,
                 column,
-                name: name.clone(),
+                name: shown(name.as_bytes()),
                 known: Quantity::ALL
                     .map(|q| layout.column(q).name.as_str())
                     .join(", "),

@@ -10,8 +10,9 @@ use runtime::{RawFrame, VerticalPose};
 
 /// Largest sensible rotation, rad: the models are linear in rotations.
 const ROTATION_MAX_RAD: f64 = 0.1;
-/// Largest sensible displacement, in full scales of the sensor that follows it.
-const FULL_SCALES: f64 = 10.0;
+/// Largest sensible displacement, in full scales of the sensor that follows it: no sensor
+/// that is worth reading has a quarter of its designed sensitivity.
+const FULL_SCALES: f64 = 4.0;
 
 /// A bad cell: which one, from 0, and what is wrong.
 pub(super) struct BadCell {

@@ -69,9 +69,11 @@ impl<'a> Text<'a> {
         1 + breaks.count()
     }
 
-    /// Whether the text does not end in a line break.
+    /// Whether the last line is a record and no line break follows it.
     pub(super) fn is_open(&self) -> bool {
-        !matches!(self.bytes.last(), Some(b'\n' | b'\r'))
+        let mut lines = self.bytes.rsplit(|b| *b == b'\n' || *b == b'\r');
+        let last = lines.next().unwrap_or_default();
+        !last.trim_ascii().is_empty() && !last.starts_with(&[COMMENT])
     }
 }
 

@@ -1,0 +1,106 @@
+use super::*;
+
+#[track_caller]
+fn refused(bytes: &[u8]) -> LogError {
+    let path = Path::new("log.csv.gz");
+    let error = read_bytes(bytes, path, stage(), &ReadOptions::default()).expect_err("refused");
+    let message = error.to_string();
+    assert!(message.starts_with("log.csv.gz: "), "{message}");
+    assert!(message.contains("; "), "names a remedy: {message}");
+    error
+}
+
+#[test]
+fn no_log_no_file_and_a_folder() {
+    let read =
+        |paths: &[&Path]| read(paths, stage(), &ReadOptions::default()).expect_err("refused");
+    let error = read(&[]);
+    assert!(matches!(error, LogError::NoLog), "{error}");
+    let folder = tempfile::tempdir().expect("a folder");
+    let error = read(&[folder.path()]);
+    assert!(
+        matches!(&error, LogError::IsFolder { path } if path == folder.path()),
+        "{error}"
+    );
+    let error = read(&[&folder.path().join("none.csv")]);
+    assert!(matches!(error, LogError::NotFound { .. }), "{error}");
+    assert!(error.to_string().contains("check the path"), "{error}");
+}
+
+#[test]
+fn binary_files() {
+    let error = refused(b"\x7fELF\x02\x01\x01\0\0\0");
+    assert!(
+        matches!(error, LogError::Binary { offset: 0, .. }),
+        "{error}"
+    );
+    let error = refused(format!("{LOG}\0").as_bytes());
+    assert!(
+        matches!(error, LogError::Binary { offset, .. } if offset == LOG.len()),
+        "{error}"
+    );
+    let utf16: Vec<u8> = LOG.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let error = refused(&[b"\xff\xfe".as_slice(), &utf16].concat());
+    assert!(error.to_string().contains("UTF-16"), "{error}");
+    let error = refused(b"PK\x03\x04rest");
+    assert!(error.to_string().contains("export it as CSV"), "{error}");
+    let error = refused(&gzip(&gzip(LOG.as_bytes())));
+    assert!(error.to_string().contains("gzip inside gzip"), "{error}");
+    // Bytes that no text has further on are a bad cell, shown without them.
+    let latin = LOG.replace(",161,", ",\u{b5}61,").into_bytes();
+    let error = read_bytes(
+        &latin,
+        Path::new("log.csv"),
+        stage(),
+        &ReadOptions::default(),
+    );
+    assert_eq!(place(&error.expect_err("refused")).0, 3);
+}
+
+#[test]
+fn a_gzip_file_cut_anywhere_damaged_or_followed_by_rubbish() {
+    let packed = gzip(LOG.as_bytes());
+    for end in 2..packed.len() {
+        let error = refused(&packed[..end]);
+        assert!(matches!(error, LogError::GzipCut { .. }), "{end}: {error}");
+    }
+    let last = packed.len() - 1;
+    for at in [last, last - 4] {
+        let mut wrong = packed.clone();
+        wrong[at] ^= 1;
+        let error = refused(&wrong);
+        assert!(
+            matches!(error, LogError::GzipDamaged { .. }),
+            "checksum and length: {error}"
+        );
+    }
+    let mut wrong = packed.clone();
+    wrong[3] = 0xe0;
+    let error = refused(&wrong);
+    assert!(
+        matches!(error, LogError::GzipDamaged { .. }),
+        "header flags: {error}"
+    );
+    let error = refused(&[packed.as_slice(), b"rubbish"].concat());
+    assert!(
+        matches!(error, LogError::GzipTrailing { bytes: 7, .. }),
+        "{error}"
+    );
+    let error = refused(&gzip(b""));
+    assert!(matches!(error, LogError::Empty { .. }), "{error}");
+}
+
+#[test]
+fn every_flipped_bit_of_a_gzip_file_is_refused_or_harmless() {
+    let packed = gzip(LOG.as_bytes());
+    let want = sound(LOG).dataset;
+    for bit in 0..8 * packed.len() {
+        let mut wrong = packed.clone();
+        wrong[bit / 8] ^= 1 << (bit % 8);
+        // Time, file name and system of the gzip header mean nothing to the log.
+        if let Ok(reading) = read_bytes(&wrong, Path::new("log"), stage(), &ReadOptions::default())
+        {
+            assert_eq!(reading.dataset.rows, want.rows, "bit {bit}");
+        }
+    }
+}

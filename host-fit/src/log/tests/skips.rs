@@ -1,0 +1,121 @@
+use super::*;
+
+const SKIP: ReadOptions = ReadOptions {
+    bad_rows: BadRows::Skip,
+    saturated: SaturatedCodes::Bad,
+    reference: ReferenceUse::Required,
+};
+
+fn codes(reading: &LogReading) -> Vec<i32> {
+    let first = |row: &Row| row.frame.hall()[0];
+    reading.dataset.rows.iter().map(first).collect()
+}
+
+#[test]
+fn bad_cells_are_left_out_and_counted_by_reason() {
+    let text = LOG
+        .replace(",97,", ",32767,")
+        .replace(",180,", ",-32768,")
+        .replace(",90,", ",,")
+        .replace("-860", "NaN");
+    let reading = read_text(&text, &SKIP).expect("read");
+    assert_eq!(codes(&reading), [13, 11]);
+    assert_eq!(reading.skipped_rows, 4);
+    let counts: Vec<_> = reading
+        .warnings
+        .iter()
+        .filter_map(|warning| match warning {
+            LogWarning::RowsSkipped {
+                reason,
+                rows,
+                first,
+            } => Some((*reason, *rows, first.line, first.column)),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(
+        counts,
+        [
+            (SkipReason::Saturated, 2, 3, 9),
+            (SkipReason::Empty, 1, 6, 9),
+            (SkipReason::NotFinite, 1, 7, 3)
+        ]
+    );
+    let movements: Vec<_> = reading
+        .dataset
+        .movements
+        .iter()
+        .map(|m| (m.index, m.rows.clone()))
+        .collect();
+    assert_eq!(movements, [(0, 0..1), (4, 1..2)]);
+}
+
+#[test]
+fn a_gap_left_by_a_bad_row_shows_in_the_sequence() {
+    let text = LOG.replace(",97,", ",x,");
+    let reading = read_text(&text, &SKIP).expect("read");
+    let sequences: Vec<_> = reading
+        .dataset
+        .rows
+        .iter()
+        .map(|row| row.frame.sequence())
+        .collect();
+    // The median of the steps left, 2, 2 and 4 ms, is the servo's.
+    assert_eq!(sequences, [0, 2, 0, 1, 2]);
+}
+
+#[test]
+fn a_movement_of_which_nothing_is_left_gives_a_warning() {
+    let text = LOG
+        .replace(",13,14", ",a,14")
+        .replace(",97,", ",b,")
+        .replace(",180,", ",c,");
+    let reading = read_text(&text, &SKIP).expect("read");
+    assert_eq!(reading.dataset.movements.len(), 1);
+    assert_eq!(reading.dataset.rows[0].movement, 0);
+    let lost = |w: &LogWarning| {
+        matches!(
+            w,
+            LogWarning::MovementSkipped {
+                movement: 0,
+                rows: 3,
+                ..
+            }
+        )
+    };
+    assert!(reading.warnings.iter().any(lost), "{:?}", reading.warnings);
+}
+
+#[test]
+fn a_log_of_which_nothing_is_left_is_refused() {
+    let text: String = LOG
+        .replace(",1,", ",?,")
+        .replace(",2,", ",?,")
+        .replace(",-767,", ",?,")
+        .replace(",-765,", ",?,")
+        .replace(",-766,", ",?,");
+    let error = read_text(&text, &SKIP).expect_err("nothing left");
+    let LogError::NoGoodRows { rows: 6, first, .. } = &error else {
+        panic!("{error}");
+    };
+    assert!(matches!(**first, LogError::Cell { .. }), "{error}");
+}
+
+#[test]
+fn a_wrong_structure_is_refused_all_the_same() {
+    let refused = |text: &str| read_text(text, &SKIP).expect_err("refused");
+    let short = refused(&LOG.replace("97,87,-6", "97,87"));
+    assert!(matches!(short, LogError::CellCount { .. }), "{short}");
+    let cut = refused(LOG.strip_suffix("150,2\n").expect("its end"));
+    assert!(matches!(cut, LogError::CutLine { .. }), "{cut}");
+    let backwards = refused(&LOG.replace("\n4,2000,-871", "\n4,-1,x"));
+    assert!(
+        matches!(backwards, LogError::TimeBackwards { .. }),
+        "{backwards}"
+    );
+    let unknown = refused(&LOG.replace("hall_b_cnt", "hall_d_cnt"));
+    assert!(
+        matches!(unknown, LogError::UnknownColumn { .. }),
+        "{unknown}"
+    );
+}
