@@ -2,13 +2,17 @@
 //!
 //! [`Decoder::decode`] does the whole arithmetic of a servo period: six codes checked
 //! against their windows and scaled, vertical pose, three sensitivities, planar pose, checks
-//! for finite results and for the calibrated range, status. It has no branch that depends on
-//! data, no loop, no call and no panic, so its time is the same for every input.
+//! for finite results and for the calibrated range, status. It has no branch, no loop, no
+//! call and no panic, so the number of its instructions is the same for every input.
 //!
 //! The scale of the codes is folded into the constants on the host, in `f64`: a code is
 //! converted to `f32` exactly (up to 24 bits) and never scaled by itself.
 
 use crate::capacitive::vertical_pose;
+use crate::checks::{
+    keep_without, shift_in_any_beyond, shift_in_faulty, shift_in_outside, shift_in_outside_doubled,
+    with_bit_if_any_beyond,
+};
 use crate::frame::{CodeFault, CodeWindow, RawFrame};
 use crate::model::{Sensitivity, planar_pose, sensitivity_at};
 use crate::pose::{PlanarPose, Pose, VerticalPose};
@@ -52,9 +56,10 @@ pub struct Reading {
 
 /// Runs one calibration. Borrow it, call [`Decoder::decode`] every servo period.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(transparent)]
+#[repr(C)]
 pub struct Decoder {
     constants: DecoderConstants<f32>,
+    limits: Limits,
 }
 
 /// Why a code of a frame is not decoded, with the channel it belongs to.
@@ -76,54 +81,96 @@ pub enum ChannelFault {
     },
 }
 
-const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
-
-/// The bits of |x|: ordered like the magnitudes, with every NaN above infinity.
-#[inline(always)]
-const fn magnitude_bits(x: f32) -> u32 {
-    x.to_bits() & 0x7fff_ffff
+/// The limits of a tick as the words that it compares with, made once from the constants.
+///
+/// Magnitudes are compared as the integers that their bits are, doubled to leave out the
+/// sign: these are ordered like the magnitudes, with every NaN above infinity, so no
+/// comparison needs a flag of the FPU. A `room` is what fits above the largest accepted
+/// word: see [`crate::checks`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+struct Limits {
+    capacitive_low: u32,
+    capacitive_room: u32,
+    vertical_room: [u32; 3],
+    sensitivity_low: u32,
+    sensitivity_room: u32,
+    hall_low: u32,
+    hall_room: u32,
+    planar_room: [u32; 3],
 }
 
-/// Whether any of the three is infinite or NaN.
+/// The bits of |x|, those of `largest` at most.
 #[inline(always)]
-const fn any_not_finite(v: [f32; 3]) -> bool {
-    (magnitude_bits(v[0]) >= INFINITY_BITS)
-        | (magnitude_bits(v[1]) >= INFINITY_BITS)
-        | (magnitude_bits(v[2]) >= INFINITY_BITS)
+const fn magnitude_up_to(x: f32, largest: f32) -> u32 {
+    let (bits, largest) = (x.to_bits() & 0x7fff_ffff, largest.to_bits());
+    if bits > largest { largest } else { bits }
 }
 
-/// Whether any of the three is larger in magnitude than its limit.
-#[inline(always)]
-fn any_beyond(v: [f32; 3], limits: &[f32; 3]) -> bool {
-    (magnitude_bits(v[0]) > magnitude_bits(limits[0]))
-        | (magnitude_bits(v[1]) > magnitude_bits(limits[1]))
-        | (magnitude_bits(v[2]) > magnitude_bits(limits[2]))
+/// What fits above twice the bits of each magnitude. A limit of NaN becomes infinity: NaNs
+/// differ from machine to machine, so none may be compared with another.
+const fn room(v: &[f32; 3]) -> [u32; 3] {
+    [
+        !(magnitude_up_to(v[0], f32::INFINITY) << 1),
+        !(magnitude_up_to(v[1], f32::INFINITY) << 1),
+        !(magnitude_up_to(v[2], f32::INFINITY) << 1),
+    ]
 }
 
-/// `bit` if `condition`, without a branch.
-#[inline(always)]
-const fn bit_if(condition: bool, bit: Status) -> u32 {
-    (condition as u32) * bit.bits()
+/// What fits above twice the bits of every finite magnitude: a carry from twice those of an
+/// infinity or a NaN.
+const FINITE_ROOM: u32 = (f32::INFINITY.to_bits() << 1).wrapping_neg();
+
+/// All bits that make X, Y, Rz invalid lie below that of the vertical range.
+const FAULTS_FROM_THE_TOP: u32 = Status::VERTICAL_EXTRAPOLATED.bits().leading_zeros() + 1;
+const PLANAR_EXTRAPOLATED_AT: u32 = Status::PLANAR_EXTRAPOLATED.bits().trailing_zeros();
+
+impl Limits {
+    const fn of(c: &DecoderConstants<f32>) -> Self {
+        let low = magnitude_up_to(c.sensitivity_min, f32::MAX);
+        Self {
+            capacitive_low: c.capacitive_window.low as u32,
+            capacitive_room: !c.capacitive_window.span(),
+            vertical_room: room(&c.calibrated_vertical),
+            sensitivity_low: low << 1,
+            sensitivity_room: !((f32::MAX.to_bits() - low) << 1),
+            hall_low: c.hall_window.low as u32,
+            hall_room: !c.hall_window.span(),
+            planar_room: room(&c.calibrated_planar),
+        }
+    }
 }
 
-/// The three bits from `first` up, for three conditions.
+/// The bits of three numbers.
 #[inline(always)]
-const fn bits_if(conditions: [bool; 3], first: Status) -> u32 {
-    (conditions[0] as u32 | (conditions[1] as u32) << 1 | (conditions[2] as u32) << 2)
-        * first.bits()
+const fn bits(v: [f32; 3]) -> [u32; 3] {
+    [v[0].to_bits(), v[1].to_bits(), v[2].to_bits()]
 }
 
-/// `x` if `keep` is all ones, +0 if it is all zeros.
+/// Codes as numbers, exactly.
 #[inline(always)]
-const fn masked(x: f32, keep: u32) -> f32 {
-    f32::from_bits(x.to_bits() & keep)
+fn numbers(codes: &[i32; 3]) -> [f32; 3] {
+    [
+        f32::from_code(codes[0]),
+        f32::from_code(codes[1]),
+        f32::from_code(codes[2]),
+    ]
+}
+
+/// Codes as words.
+#[inline(always)]
+const fn words(codes: &[i32; 3]) -> [u32; 3] {
+    [codes[0] as u32, codes[1] as u32, codes[2] as u32]
 }
 
 impl Decoder {
     /// A decoder with constants that were checked: see [`crate::ParameterSet::decoder`].
     /// Unchecked ones give no panic and no NaN either, only a status.
     pub const fn new(constants: DecoderConstants<f32>) -> Self {
-        Self { constants }
+        Self {
+            constants,
+            limits: Limits::of(&constants),
+        }
     }
 
     /// The constants.
@@ -131,49 +178,34 @@ impl Decoder {
         &self.constants
     }
 
-    /// The vertical pose of three capacitive codes, with the bits that concern it.
-    #[inline(always)]
-    fn vertical(&self, codes: [i32; 3]) -> (VerticalPose<f32>, u32) {
-        let c = &self.constants;
-        let bad = codes.map(|code| !c.capacitive_window.contains(code));
-        let v = vertical_pose(&c.vertical_per_code, codes.map(f32::from_code));
-        let status = bits_if(bad, Status::CAPACITIVE_1)
-            | bit_if(any_not_finite(v.to_array()), Status::VERTICAL_NOT_FINITE);
-        (v, status)
-    }
-
-    /// The planar pose of three Hall codes at a vertical pose, with the bits that concern it.
-    #[inline(always)]
-    fn planar(
-        &self,
-        codes: [i32; 3],
-        vertical: &VerticalPose<f32>,
-        zero: &PlanarPose<f32>,
-    ) -> (PlanarPose<f32>, u32) {
-        let c = &self.constants;
-        let bad = codes.map(|code| !c.hall_window.contains(code));
-        let phi = [
-            sensitivity_at(&c.sensitivity[0], vertical),
-            sensitivity_at(&c.sensitivity[1], vertical),
-            sensitivity_at(&c.sensitivity[2], vertical),
-        ];
-        let low = magnitude_bits(c.sensitivity_min);
-        // One comparison for "too near zero" and "not finite".
-        let usable =
-            phi.map(|phi| magnitude_bits(phi).wrapping_sub(low) < INFINITY_BITS.wrapping_sub(low));
-        let q = planar_pose(&c.planar_per_code, codes.map(f32::from_code), phi, zero);
-        let status = bits_if(bad, Status::HALL_A)
-            | bits_if(usable.map(|u| !u), Status::SENSITIVITY_A)
-            | bit_if(any_not_finite(q.to_array()), Status::PLANAR_NOT_FINITE);
-        (q, status)
-    }
-
     /// The vertical pose of three capacitive codes and the planar pose of three Hall codes,
     /// less `zero`; invalid fields are 0 and the status says why. Never NaN.
     #[inline(always)]
     pub fn decode(&self, hall: [i32; 3], capacitive: [i32; 3], zero: &PlanarPose<f32>) -> Reading {
-        let (vertical, vertical_status) = self.vertical(capacitive);
-        self.finish(hall, vertical, vertical_status, zero)
+        let mut reading = Reading::default();
+        self.decode_into(&hall, &capacitive, zero, &mut reading);
+        reading
+    }
+
+    /// [`Decoder::decode`] with the codes read, and the reading written, where they lie: on a
+    /// core with few registers this saves copies.
+    #[inline(always)]
+    pub fn decode_into(
+        &self,
+        hall: &[i32; 3],
+        capacitive: &[i32; 3],
+        zero: &PlanarPose<f32>,
+        reading: &mut Reading,
+    ) {
+        let limits = &self.limits;
+        let bad = shift_in_outside(
+            0,
+            words(capacitive),
+            limits.capacitive_low,
+            limits.capacitive_room,
+        );
+        let v = vertical_pose(&self.constants.vertical_per_code, numbers(capacitive));
+        self.finish(hall, v, bad, zero, reading);
     }
 
     /// As [`Decoder::decode`], with a vertical pose that is known by other means (a log
@@ -184,52 +216,65 @@ impl Decoder {
         vertical: VerticalPose<f32>,
         zero: &PlanarPose<f32>,
     ) -> Reading {
-        let not_finite = bit_if(
-            any_not_finite(vertical.to_array()),
-            Status::VERTICAL_NOT_FINITE,
-        );
-        self.finish(hall, vertical, not_finite, zero)
+        let mut reading = Reading::default();
+        self.finish(&hall, vertical, 0, zero, &mut reading);
+        reading
     }
 
+    /// The checks of a vertical pose, the planar pose at it, and the checks of that.
+    ///
+    /// The bits are shifted in from the highest down, so that those of the single channels
+    /// end where [`Status`] has them without being moved.
     #[inline(always)]
     fn finish(
         &self,
-        hall: [i32; 3],
-        v: VerticalPose<f32>,
-        vertical_status: u32,
+        hall: &[i32; 3],
+        vertical: VerticalPose<f32>,
+        capacitive_bad: u32,
         zero: &PlanarPose<f32>,
-    ) -> Reading {
-        let c = &self.constants;
-        let (q, planar_status) = self.planar(hall, &v, zero);
-        let faults = vertical_status | planar_status;
-        let keep_vertical = ((vertical_status == 0) as u32).wrapping_neg();
-        let keep_planar = ((faults == 0) as u32).wrapping_neg();
-        let status = faults
-            | bit_if(
-                any_beyond(v.to_array(), &c.calibrated_vertical),
-                Status::VERTICAL_EXTRAPOLATED,
-            )
-            | bit_if(
-                any_beyond(q.to_array(), &c.calibrated_planar),
-                Status::PLANAR_EXTRAPOLATED,
-            )
-            | (!keep_planar & Status::PLANAR_INVALID.bits())
-            | (!keep_vertical & Status::VERTICAL_INVALID.bits());
-        Reading {
-            pose: Pose {
-                planar: PlanarPose {
-                    x_m: masked(q.x_m, keep_planar),
-                    y_m: masked(q.y_m, keep_planar),
-                    rz_rad: masked(q.rz_rad, keep_planar),
-                },
-                vertical: VerticalPose {
-                    z_m: masked(v.z_m, keep_vertical),
-                    rx_rad: masked(v.rx_rad, keep_vertical),
-                    ry_rad: masked(v.ry_rad, keep_vertical),
-                },
-            },
-            status: Status::from_bits(status),
-        }
+        reading: &mut Reading,
+    ) {
+        let (c, limits) = (&self.constants, &self.limits);
+
+        let found = bits([vertical.z_m, vertical.rx_rad, vertical.ry_rad]);
+        let seen = shift_in_any_beyond(capacitive_bad, found, limits.vertical_room);
+        let finite = [FINITE_ROOM, FINITE_ROOM, FINITE_ROOM];
+        let seen = shift_in_any_beyond(seen, found, finite);
+        // Beyond the calibrated range, the second bit, is no fault.
+        let keep = keep_without(seen & !0b10);
+        let invalid = keep.wrapping_add(1);
+        reading.pose.vertical = VerticalPose {
+            z_m: f32::from_bits(found[0] & keep),
+            rx_rad: f32::from_bits(found[1] & keep),
+            ry_rad: f32::from_bits(found[2] & keep),
+        };
+
+        let phi = [
+            sensitivity_at(&c.sensitivity[0], &vertical),
+            sensitivity_at(&c.sensitivity[1], &vertical),
+            sensitivity_at(&c.sensitivity[2], &vertical),
+        ];
+        let (low, room) = (limits.sensitivity_low, limits.sensitivity_room);
+        // Beyond, vertical not finite, and room for planar not finite; then the channels.
+        let status = shift_in_outside_doubled((seen & 0b11) << 1, bits(phi), low, room);
+        let status = (status << 3) | (seen >> 2);
+        let status = shift_in_outside(status, words(hall), limits.hall_low, limits.hall_room);
+        let planar = planar_pose(&c.planar_per_code, numbers(hall), phi, zero);
+
+        let found = bits([planar.x_m, planar.y_m, planar.rz_rad]);
+        let status = with_bit_if_any_beyond::<{ Status::PLANAR_NOT_FINITE.bits() }>(
+            status,
+            found,
+            FINITE_ROOM,
+        );
+        let (top, keep) = shift_in_faulty(invalid, status << FAULTS_FROM_THE_TOP);
+        let top = shift_in_any_beyond(top, found, limits.planar_room);
+        reading.pose.planar = PlanarPose {
+            x_m: f32::from_bits(found[0] & keep),
+            y_m: f32::from_bits(found[1] & keep),
+            rz_rad: f32::from_bits(found[2] & keep),
+        };
+        reading.status = Status::from_bits(status | (top << PLANAR_EXTRAPOLATED_AT));
     }
 
     /// Every bad code of a frame with its reason, for diagnosis off the tick path.

@@ -80,10 +80,15 @@ impl CodeWindow {
         -CODE_MAGNITUDE_MAX <= self.low && self.low <= self.high && self.high <= CODE_MAGNITUDE_MAX
     }
 
+    /// How far the window's largest code lies above its smallest.
+    pub const fn span(&self) -> u32 {
+        self.high.wrapping_sub(self.low) as u32
+    }
+
     /// Whether the code lies in the window: one subtraction and one comparison.
     #[inline(always)]
     pub const fn contains(&self, code: i32) -> bool {
-        code.wrapping_sub(self.low) as u32 <= self.high.wrapping_sub(self.low) as u32
+        code.wrapping_sub(self.low) as u32 <= self.span()
     }
 
     /// The code itself, or why it is not decoded.

@@ -95,6 +95,13 @@ pub fn dot<T: Real>(row: &[T; 3], column: [T; 3]) -> T {
     (row[0] * column[0] + row[1] * column[1]) + row[2] * column[2]
 }
 
+/// As [`dot`], less `offset`, which is subtracted from the first product: a core with a
+/// multiply-and-subtract does both in one instruction.
+#[inline(always)]
+pub fn dot_less<T: Real>(row: &[T; 3], column: [T; 3], offset: T) -> T {
+    ((row[0] * column[0] - offset) + row[1] * column[1]) + row[2] * column[2]
+}
+
 /// phi: sensitivity of one probe at a vertical pose (equation 33).
 #[inline(always)]
 pub fn sensitivity_at<T: Real>(probe: &Sensitivity<T>, vertical: &VerticalPose<T>) -> T {
@@ -115,9 +122,9 @@ pub fn planar_pose<T: Real>(
 ) -> PlanarPose<T> {
     let ratio = [signal[0] / phi[0], signal[1] / phi[1], signal[2] / phi[2]];
     PlanarPose {
-        x_m: dot(&pose_rows[0], ratio) - zero.x_m,
-        y_m: dot(&pose_rows[1], ratio) - zero.y_m,
-        rz_rad: dot(&pose_rows[2], ratio) - zero.rz_rad,
+        x_m: dot_less(&pose_rows[0], ratio, zero.x_m),
+        y_m: dot_less(&pose_rows[1], ratio, zero.y_m),
+        rz_rad: dot_less(&pose_rows[2], ratio, zero.rz_rad),
     }
 }
 

@@ -112,10 +112,14 @@ impl<'d> Servo<'d> {
         let Some(sequence) = self.follow(frame.sequence) else {
             return self.conclude(NOTHING, Status::FRAME_REPEATED);
         };
-        let reading = self
-            .decoder
-            .decode(frame.hall, frame.capacitive, &self.zero);
-        self.feed_rezero(|decoder| decoder.decode(frame.hall, frame.capacitive, &PlanarPose::ZERO));
+        let mut reading = Reading::default();
+        self.decoder
+            .decode_into(&frame.hall, &frame.capacitive, &self.zero, &mut reading);
+        if self.run.is_some() {
+            self.feed_rezero(|decoder| {
+                decoder.decode(frame.hall, frame.capacitive, &PlanarPose::ZERO)
+            });
+        }
         self.conclude(reading, sequence)
     }
 
@@ -218,6 +222,10 @@ impl<'d> Servo<'d> {
         self.last_sequence = None;
     }
 
+    /// Feeds a re-zero in progress with a reading without the zero deviation in use. Apart
+    /// from the tick, which so stays short where no re-zero runs.
+    #[cold]
+    #[inline(never)]
     fn feed_rezero(&mut self, decode: impl FnOnce(&Decoder) -> Reading) {
         let Some(run) = &mut self.run else { return };
         let unzeroed = decode(self.decoder);
