@@ -18,12 +18,13 @@ pub struct Timing {
 }
 
 impl Default for Timing {
-    /// For a servo period of 2 ms: half a period, and 1.75 periods, so that a source that
-    /// falls silent is called stale within 4 ms and 1.5 ms of jitter are none.
+    /// For a servo period of 2 ms: half a period, and one and a half, so that a source that
+    /// falls silent is called stale within 4 ms by a receiver that is polled every
+    /// millisecond.
     fn default() -> Self {
         Self {
             assembly_us: 1_000,
-            stale_us: 3_500,
+            stale_us: 3_000,
         }
     }
 }

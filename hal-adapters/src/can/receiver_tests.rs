@@ -92,10 +92,10 @@ fn the_passing_of_time_ends_a_tick_and_then_calls_the_source_stale() {
     assert_eq!(r.deadline_us(), Some(5_000));
     assert_eq!(r.poll(4_999), Taken::NOTHING);
     assert_eq!(r.poll(5_000).tick.map(|t| t.hall), Some(raw(2).hall));
-    assert_eq!(r.deadline_us(), Some(7_500));
-    assert_eq!(r.poll(7_499), Taken::NOTHING);
-    let fault = Some(BusFault::Stale { age_us: 3_500 });
-    assert_eq!(r.poll(7_500), Taken { tick: None, fault });
+    assert_eq!(r.deadline_us(), Some(7_000));
+    assert_eq!(r.poll(6_999), Taken::NOTHING);
+    let fault = Some(BusFault::Stale { age_us: 3_000 });
+    assert_eq!(r.poll(7_000), Taken { tick: None, fault });
     assert!(r.is_stale());
     assert_eq!((r.poll(9_000), r.deadline_us()), (Taken::NOTHING, None));
     assert_eq!(feed(&mut r, Layout::Bits16, 3).0, Some(raw(3)));
