@@ -1,0 +1,316 @@
+//! Requests to the decoding node and its answers, and everything else that comes now and
+//! then: [`Mailbox`] numbers what is sent and checks what is received.
+
+use super::e2e::{Payload, Sequence, Verdict, protect, unprotect};
+use super::frame::Coded;
+use super::group::BusFault;
+use super::status::{HealthPage, NodeStatus};
+use super::table::{FRAME_BYTES, Message};
+use embedded_can::{Frame, Id};
+use runtime::rezero::RezeroRefusal;
+
+/// What a node is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// Average `ticks` ticks at rest and subtract the mean from then on; 0 for the default
+    /// of [`runtime::rezero::RezeroSettings`].
+    Rezero {
+        /// Ticks to average.
+        ticks: u16,
+    },
+    /// Send the serial number and blink for so many seconds.
+    Identify {
+        /// How long, s.
+        seconds: u8,
+    },
+    /// Subtract nothing any more.
+    ClearZero,
+}
+
+/// A request with the token that its answer will carry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Command {
+    /// What is asked for; `None` for a request that this version does not know.
+    pub request: Option<Request>,
+    /// Number of the command in the frame, 0 to 15.
+    pub number: u8,
+    /// Chosen by the sender.
+    pub token: u8,
+}
+
+impl Command {
+    /// A command.
+    pub const fn new(request: Request, token: u8) -> Self {
+        let number = match request {
+            Request::Rezero { .. } => 1,
+            Request::Identify { .. } => 2,
+            Request::ClearZero => 3,
+        };
+        Self {
+            request: Some(request),
+            number,
+            token,
+        }
+    }
+
+    /// The 52 bits of the frame.
+    pub const fn payload(&self) -> Payload {
+        let long = match self.request {
+            Some(Request::Rezero { ticks }) => ticks as u32,
+            Some(Request::Identify { seconds }) => seconds as u32,
+            Some(Request::ClearZero) | None => 0,
+        };
+        Payload {
+            short: (self.token as u32) << 4 | (self.number & 0xf) as u32,
+            long,
+        }
+    }
+
+    /// From the 52 bits of a frame.
+    pub fn from_payload(p: Payload) -> Self {
+        let number = (p.short & 0xf) as u8;
+        let ticks = u16::try_from(p.long);
+        let request = match (number, p.long) {
+            (1, _) => ticks.ok().map(|ticks| Request::Rezero { ticks }),
+            (2, seconds) => u8::try_from(seconds)
+                .ok()
+                .map(|seconds| Request::Identify { seconds }),
+            (3, 0) => Some(Request::ClearZero),
+            _ => None,
+        };
+        Self {
+            request,
+            number,
+            token: (p.short >> 4) as u8,
+        }
+    }
+}
+
+/// How a request ended: the numbers of the frame, as in the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Outcome {
+    /// It was done.
+    Done = 0,
+    /// It runs; another answer follows.
+    Started = 1,
+    /// This node does not know it.
+    UnknownCommand = 2,
+    /// There is no usable parameter blob.
+    NoParameters = 3,
+    /// Too few ticks were asked for.
+    TooShort = 4,
+    /// A tick had no pose; the detail is its status.
+    NoPose = 5,
+    /// The stage moved; the detail is the axis.
+    Moved = 6,
+    /// The stage drifted; the detail is the axis.
+    Drifted = 7,
+    /// Another request is still running.
+    Busy = 8,
+}
+
+impl Outcome {
+    const ALL: [Self; 9] = [
+        Self::Done,
+        Self::Started,
+        Self::UnknownCommand,
+        Self::NoParameters,
+        Self::TooShort,
+        Self::NoPose,
+        Self::Moved,
+        Self::Drifted,
+        Self::Busy,
+    ];
+}
+
+impl Outcome {
+    /// Outcome and detail of a refused re-zero.
+    pub fn of_refusal(refusal: &RezeroRefusal) -> (Self, u32) {
+        match *refusal {
+            RezeroRefusal::TooShort { .. } => (Self::TooShort, 0),
+            RezeroRefusal::NoPose { status } => (Self::NoPose, status.bits()),
+            RezeroRefusal::Moved { axis, .. } => (Self::Moved, u32::from(axis)),
+            RezeroRefusal::Drifted { axis, .. } => (Self::Drifted, u32::from(axis)),
+        }
+    }
+}
+
+/// The answer to a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// Number of the command.
+    pub number: u8,
+    /// Its token.
+    pub token: u8,
+    /// How it ended; `None` for a number that this version does not know.
+    pub outcome: Option<Outcome>,
+    /// See [`Outcome`].
+    pub detail: u32,
+}
+
+impl Answer {
+    /// The 52 bits of the frame. An outcome of `None` is sent as 255.
+    pub const fn payload(&self) -> Payload {
+        let outcome = match self.outcome {
+            Some(outcome) => outcome as u32,
+            None => 0xff,
+        };
+        Payload {
+            short: outcome << 12 | (self.token as u32) << 4 | (self.number & 0xf) as u32,
+            long: self.detail,
+        }
+    }
+
+    /// From the 52 bits of a frame.
+    pub fn from_payload(p: Payload) -> Self {
+        let outcome = usize::try_from(p.short >> 12 & 0xff).ok();
+        Self {
+            number: (p.short & 0xf) as u8,
+            token: (p.short >> 4) as u8,
+            outcome: outcome.and_then(|k| Outcome::ALL.get(k)).copied(),
+            detail: p.long,
+        }
+    }
+}
+
+/// Six characters of the stage's serial number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IdentityPage {
+    /// Which six, from 0.
+    pub page: u8,
+    /// UTF-8 bytes, 0 after the end.
+    pub text: [u8; 6],
+}
+
+impl IdentityPage {
+    /// Pages there are: 36 bytes for a text of up to 32.
+    pub const PAGES: u8 = 6;
+
+    /// One page of a serial number.
+    pub fn of(serial: &str, page: u8) -> Self {
+        let mut text = [0; 6];
+        let rest = serial.bytes().skip(usize::from(page) * text.len());
+        for (to, from) in text.iter_mut().zip(rest) {
+            *to = from;
+        }
+        Self { page, text }
+    }
+
+    /// The 52 bits of the frame.
+    pub const fn payload(&self) -> Payload {
+        let [a, b, c, d, e, f] = self.text;
+        Payload {
+            short: u16::from_le_bytes([a, b]) as u32 * 16 + (self.page & 0xf) as u32,
+            long: u32::from_le_bytes([c, d, e, f]),
+        }
+    }
+
+    /// From the 52 bits of a frame.
+    pub const fn from_payload(p: Payload) -> Self {
+        let [a, b, _, _] = (p.short >> 4).to_le_bytes();
+        let [c, d, e, f] = p.long.to_le_bytes();
+        Self {
+            page: (p.short & 0xf) as u8,
+            text: [a, b, c, d, e, f],
+        }
+    }
+}
+
+/// What an occasional frame tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Told {
+    /// What the decoding node is doing.
+    Status(NodeStatus),
+    /// One of its counters.
+    Health(HealthPage),
+    /// A request.
+    Command(Command),
+    /// The answer to one.
+    Answer(Answer),
+    /// A page of the serial number.
+    Identity(IdentityPage),
+}
+
+impl Told {
+    const MESSAGES: [Message; 5] = [
+        Message::NodeStatus,
+        Message::Health,
+        Message::Command,
+        Message::Answer,
+        Message::Identity,
+    ];
+
+    fn payload(&self) -> (usize, Payload) {
+        match self {
+            Self::Status(x) => (0, x.payload()),
+            Self::Health(x) => (1, x.payload()),
+            Self::Command(x) => (2, x.payload()),
+            Self::Answer(x) => (3, x.payload()),
+            Self::Identity(x) => (4, x.payload()),
+        }
+    }
+
+    fn read(k: usize, p: Payload) -> Self {
+        match k {
+            0 => Self::Status(NodeStatus::from_payload(p)),
+            1 => Self::Health(HealthPage::from_payload(p)),
+            2 => Self::Command(Command::from_payload(p)),
+            3 => Self::Answer(Answer::from_payload(p)),
+            _ => Self::Identity(IdentityPage::from_payload(p)),
+        }
+    }
+}
+
+/// Numbers and checks the occasional frames of one node.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Mailbox {
+    sent: [u8; 5],
+    received: [Sequence; 5],
+}
+
+impl Mailbox {
+    /// The frame that tells `what`.
+    pub fn send(&mut self, what: &Told) -> Option<Coded> {
+        let (k, payload) = what.payload();
+        let (message, counter) = (*Told::MESSAGES.get(k)?, self.sent.get_mut(k)?);
+        let bytes = protect(message.spec().key, *counter, payload);
+        *counter = counter.wrapping_add(1);
+        Some(Coded { message, bytes })
+    }
+
+    /// What a frame tells; `None` for a frame of another kind.
+    ///
+    /// A gap in the numbers is no fault here, and neither is a sender that starts anew: what
+    /// comes now and then has no rhythm to keep. A repeated frame is.
+    pub fn take<F: Frame>(&mut self, frame: &F) -> Option<Result<Told, BusFault>> {
+        let Id::Standard(id) = frame.id() else {
+            return None;
+        };
+        let k = Told::MESSAGES.iter().position(|m| m.id() == id)?;
+        let (message, sequence) = (*Told::MESSAGES.get(k)?, self.received.get_mut(k)?);
+        let data = if frame.is_remote_frame() {
+            &[]
+        } else {
+            frame.data()
+        };
+        let Some(bytes) = data
+            .first_chunk::<FRAME_BYTES>()
+            .filter(|_| data.len() == FRAME_BYTES)
+        else {
+            let bytes = data.len() as u8;
+            return Some(Err(BusFault::WrongLength { message, bytes }));
+        };
+        let Some((counter, payload)) = unprotect(message.spec().key, bytes) else {
+            return Some(Err(BusFault::WrongCheck { message }));
+        };
+        if sequence.judge(counter) == Verdict::Repeated {
+            return Some(Err(BusFault::Repeated { message }));
+        }
+        Some(Ok(Told::read(k, payload)))
+    }
+}
+
+#[cfg(test)]
+#[path = "command_tests.rs"]
+mod tests;

@@ -1,0 +1,71 @@
+use super::super::frame::BusFrame;
+use super::*;
+use proptest::prelude::*;
+
+#[test]
+fn a_request_worked_by_hand() {
+    let command = Command::new(Request::Rezero { ticks: 500 }, 0xa7);
+    let payload = Payload {
+        short: 0xa71,
+        long: 500,
+    };
+    assert_eq!(command.payload(), payload);
+    assert_eq!(Command::from_payload(payload), command);
+}
+
+#[test]
+fn an_argument_that_does_not_fit_is_an_unknown_request() {
+    let read = |short, long| Command::from_payload(Payload { short, long }).request;
+    assert_eq!(read(1, 65536), None);
+    assert_eq!(read(2, 256), None);
+    assert_eq!(read(3, 1), None);
+    assert_eq!(read(9, 0), None);
+    assert_eq!(read(2, 255), Some(Request::Identify { seconds: 255 }));
+}
+
+#[test]
+fn every_outcome_has_the_number_of_its_place() {
+    for (number, outcome) in (0u8..).zip(Outcome::ALL) {
+        assert_eq!(outcome as u8, number);
+    }
+}
+
+#[test]
+fn a_serial_number_of_32_bytes_comes_over_in_pages() {
+    let serial = "stage-0007/hall-array/2026-11-é!";
+    assert_eq!(serial.len(), 32 + 1);
+    let pages = (0..IdentityPage::PAGES).map(|page| IdentityPage::of(serial, page));
+    let bytes: [[u8; 6]; 6] = core::array::from_fn(|k| {
+        let sent = pages.clone().nth(k).expect("six pages");
+        let read = IdentityPage::from_payload(sent.payload());
+        assert_eq!(read, sent);
+        read.text
+    });
+    assert_eq!(&bytes.as_flattened()[..33], serial.as_bytes());
+    assert_eq!(&bytes.as_flattened()[33..], [0; 3]);
+}
+
+#[test]
+fn a_mailbox_reads_what_another_sent_and_refuses_a_repeat() {
+    let (mut host, mut node) = (Mailbox::default(), Mailbox::default());
+    let command = Told::Command(Command::new(Request::Identify { seconds: 3 }, 9));
+    let frame = BusFrame::from(host.send(&command).expect("known"));
+    assert_eq!(node.take(&frame), Some(Ok(command)));
+    let message = Message::Command;
+    assert_eq!(node.take(&frame), Some(Err(BusFault::Repeated { message })));
+    let again = BusFrame::from(host.send(&command).expect("known"));
+    assert_eq!(node.take(&again), Some(Ok(command)));
+    let damaged = again.flipped(1 << 40);
+    let fault = BusFault::WrongCheck { message };
+    assert_eq!(node.take(&damaged), Some(Err(fault)));
+    let fault = BusFault::WrongLength { message, bytes: 7 };
+    assert_eq!(node.take(&again.resized(7)), Some(Err(fault)));
+}
+
+proptest! {
+    #[test]
+    fn answers_come_back_as_sent(number in 0u8..16, token: u8, outcome in 0usize..9, detail: u32) {
+        let sent = Answer { number, token, outcome: Some(Outcome::ALL[outcome]), detail };
+        prop_assert_eq!(Answer::from_payload(sent.payload()), sent);
+    }
+}

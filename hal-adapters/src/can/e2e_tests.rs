@@ -1,0 +1,119 @@
+use super::*;
+use crc::{CRC_8_AUTOSAR, Crc};
+use proptest::prelude::*;
+
+/// Worked with an independent implementation of Profile 2 (the Python package autosar-e2e):
+/// counter 4, data 01 .. 06, data ID list 0, 1, .. 15.
+#[test]
+fn the_check_equals_profile_2() {
+    let bytes = [0x32, 0x04, 1, 2, 3, 4, 5, 6];
+    assert_eq!(check_byte(&bytes, 4), bytes[0]);
+}
+
+#[test]
+fn a_frame_worked_by_hand() {
+    // Payload short = 0xABCDE above counter 0x7 in bytes 1 to 3, long in bytes 4 to 7.
+    let payload = Payload {
+        short: 0xabcde,
+        long: 0x1234_5678,
+    };
+    let bytes = protect(0x5a, 7, payload);
+    assert_eq!(bytes[1..], [0xe7, 0xcd, 0xab, 0x78, 0x56, 0x34, 0x12]);
+    let mut sent = [0; 8];
+    sent[..7].copy_from_slice(&bytes[1..]);
+    sent[7] = BASE_LIST[7] ^ 0x5a;
+    assert_eq!(bytes[0], Crc::<u8>::new(&CRC_8_AUTOSAR).checksum(&sent));
+    assert_eq!(unprotect(0x5a, &bytes), Some((7, payload)));
+}
+
+proptest! {
+    #[test]
+    fn coding_and_checking_undo_each_other(key: u8, counter in 0u8..16, short in 0u32..1 << 20, long: u32) {
+        let payload = Payload { short, long };
+        prop_assert_eq!(unprotect(key, &protect(key, counter, payload)), Some((counter, payload)));
+    }
+
+    /// The check is linear, so what passes at one payload passes at all: this is why the
+    /// exhaustive test may use one.
+    #[test]
+    fn whether_a_pattern_passes_does_not_depend_on_the_payload(
+        key: u8, counter in 0u8..16, a: (u32, u32), b: (u32, u32), flip: u64,
+    ) {
+        let pass = |(short, long): (u32, u32)| {
+            let bytes = protect(key, counter, Payload { short, long });
+            unprotect(key, &(u64::from_be_bytes(bytes) ^ flip).to_be_bytes()).is_some()
+        };
+        prop_assert_eq!(pass(a), pass(b));
+    }
+}
+
+/// Every pattern of one to three flipped bits and every burst of up to eight, as masks over
+/// the 64 data bits in the order in which they are sent.
+pub(crate) fn small_patterns() -> impl Iterator<Item = u64> {
+    let bit = |k: u32| 1u64 << k;
+    let flips = (0..64).flat_map(move |i| {
+        (i..64).flat_map(move |j| (j..64).map(move |k| bit(i) | bit(j) | bit(k)))
+    });
+    let bursts =
+        (1u64..256).flat_map(|pattern| (0..=pattern.leading_zeros()).map(move |up| pattern << up));
+    flips.chain(bursts)
+}
+
+#[test]
+fn no_three_flipped_bits_and_no_burst_of_eight_pass_at_any_counter() {
+    let mut tried = 0u32;
+    for counter in 0..16 {
+        let bytes = protect(0, counter, Payload::default());
+        for pattern in small_patterns() {
+            let damaged = (u64::from_be_bytes(bytes) ^ pattern).to_be_bytes();
+            assert_eq!(unprotect(0, &damaged), None, "{counter} {pattern:016x}");
+            tried += 1;
+        }
+    }
+    assert_eq!(tried, 16 * (64 * 65 * 66 / 6 + bursts()));
+}
+
+/// Bursts of 1 to 8 bits, with both ends set, that fit into 64 bits, counted by length; a
+/// pattern of length w with trailing zeros is a shorter burst and is tried again.
+fn bursts() -> u32 {
+    (1u32..256).map(|p| u64::from(p).leading_zeros() + 1).sum()
+}
+
+#[test]
+fn the_base_list_holds_sixteen_different_ids() {
+    for (k, id) in BASE_LIST.iter().enumerate() {
+        assert!(!BASE_LIST[..k].contains(id));
+    }
+}
+
+#[test]
+fn the_counter_wraps_without_a_verdict() {
+    let mut sequence = Sequence::START;
+    assert_eq!(sequence.judge(14), Verdict::First);
+    for counter in [15, 0, 1, 2] {
+        assert_eq!(sequence.judge(counter), Verdict::Next);
+    }
+}
+
+#[test]
+fn gaps_repeats_and_late_frames_are_told_apart() {
+    let mut sequence = Sequence::START;
+    assert_eq!(sequence.judge(3), Verdict::First);
+    assert_eq!(sequence.judge(3), Verdict::Repeated);
+    assert_eq!(sequence.judge(5), Verdict::Lost { frames: 1 });
+    assert_eq!(sequence.judge(4), Verdict::WrongSequence { ahead: 15 });
+    assert_eq!(sequence.judge(6), Verdict::Next);
+    assert_eq!(sequence.judge(9), Verdict::Lost { frames: 2 });
+    assert_eq!(sequence.judge(13), Verdict::WrongSequence { ahead: 4 });
+    assert_eq!(sequence.judge(14), Verdict::Resumed);
+    assert_eq!(sequence.judge(15), Verdict::Next);
+}
+
+#[test]
+fn two_late_frames_in_a_row_do_not_resume_when_they_are_not_successive() {
+    let mut sequence = Sequence::START;
+    sequence.judge(10);
+    assert_eq!(sequence.judge(4), Verdict::WrongSequence { ahead: 10 });
+    assert_eq!(sequence.judge(2), Verdict::WrongSequence { ahead: 8 });
+    assert_eq!(sequence.judge(11), Verdict::Next);
+}

@@ -1,0 +1,182 @@
+//! Frames by value: coded ones on their way to any controller, and an owned frame for
+//! replays, wrappers and logs.
+
+use super::table::Message;
+use embedded_can::{Frame, Id, StandardId};
+
+/// A protected frame, ready to be sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Coded {
+    /// Which message.
+    pub message: Message,
+    /// Its eight bytes.
+    pub bytes: [u8; 8],
+}
+
+impl Coded {
+    /// The frame in the type of a CAN controller's driver. `None` only if that type refuses
+    /// eight bytes.
+    pub fn to_frame<F: Frame>(&self) -> Option<F> {
+        F::new(self.message.id(), &self.bytes)
+    }
+}
+
+/// A classic CAN frame by value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BusFrame {
+    /// Identifier, standard or extended.
+    pub id: Id,
+    /// Data length, 0 to 8.
+    length: u8,
+    remote: bool,
+    bytes: [u8; 8],
+}
+
+impl From<Coded> for BusFrame {
+    fn from(coded: Coded) -> Self {
+        Self {
+            id: Id::Standard(coded.message.id()),
+            length: 8,
+            remote: false,
+            bytes: coded.bytes,
+        }
+    }
+}
+
+impl BusFrame {
+    /// Copies any frame.
+    pub fn copy_of<F: Frame>(frame: &F) -> Self {
+        let mut bytes = [0; 8];
+        for (to, from) in bytes.iter_mut().zip(frame.data()) {
+            *to = *from;
+        }
+        Self {
+            id: frame.id(),
+            length: frame.dlc().min(8) as u8,
+            remote: frame.is_remote_frame(),
+            bytes,
+        }
+    }
+
+    /// The same frame with its bytes XOR `mask`; the most significant byte of the mask falls
+    /// on byte 0.
+    #[must_use]
+    pub fn flipped(&self, mask: u64) -> Self {
+        let bytes = (u64::from_be_bytes(self.bytes) ^ mask).to_be_bytes();
+        Self { bytes, ..*self }
+    }
+
+    /// The same frame cut or padded with zeros to `length` bytes, at most 8.
+    #[must_use]
+    pub fn resized(&self, length: u8) -> Self {
+        let length = length.min(8);
+        let mut bytes = [0; 8];
+        let kept = usize::from(length);
+        for (to, from) in bytes.iter_mut().zip(self.bytes).take(kept) {
+            *to = from;
+        }
+        Self {
+            length,
+            bytes,
+            ..*self
+        }
+    }
+
+    /// The same frame under another standard identifier.
+    #[must_use]
+    pub fn renamed(&self, id: StandardId) -> Self {
+        Self {
+            id: Id::Standard(id),
+            ..*self
+        }
+    }
+}
+
+impl Frame for BusFrame {
+    fn new(id: impl Into<Id>, data: &[u8]) -> Option<Self> {
+        let mut bytes = [0; 8];
+        bytes.get_mut(..data.len())?.copy_from_slice(data);
+        Some(Self {
+            id: id.into(),
+            length: data.len() as u8,
+            remote: false,
+            bytes,
+        })
+    }
+
+    fn new_remote(id: impl Into<Id>, dlc: usize) -> Option<Self> {
+        if dlc > 8 {
+            return None;
+        }
+        Some(Self {
+            id: id.into(),
+            length: dlc as u8,
+            remote: true,
+            bytes: [0; 8],
+        })
+    }
+
+    fn is_extended(&self) -> bool {
+        matches!(self.id, Id::Extended(_))
+    }
+
+    fn is_remote_frame(&self) -> bool {
+        self.remote
+    }
+
+    fn id(&self) -> Id {
+        self.id
+    }
+
+    fn dlc(&self) -> usize {
+        usize::from(self.length)
+    }
+
+    fn data(&self) -> &[u8] {
+        let length = if self.remote { 0 } else { self.dlc() };
+        self.bytes.get(..length).unwrap_or(&self.bytes)
+    }
+}
+
+/// A frame and when it was received.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StampedFrame {
+    /// Receive time, us since any fixed moment.
+    pub time_us: u64,
+    /// The frame.
+    pub frame: BusFrame,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ID: StandardId = StandardId::MAX;
+
+    #[test]
+    fn a_copy_keeps_identifier_length_and_bytes() {
+        for length in 0..=8 {
+            let data = &[1, 2, 3, 4, 5, 6, 7, 8][..length];
+            let frame = BusFrame::new(ID, data).expect("up to eight bytes");
+            assert_eq!(BusFrame::copy_of(&frame), frame);
+            assert_eq!((frame.dlc(), frame.data()), (length, data));
+        }
+        assert_eq!(BusFrame::new(ID, &[0; 9]), None);
+    }
+
+    #[test]
+    fn a_remote_frame_has_a_length_and_no_data() {
+        let frame = BusFrame::new_remote(ID, 5).expect("up to eight");
+        assert_eq!((frame.dlc(), frame.data().len()), (5, 0));
+        assert!(frame.is_remote_frame());
+        assert_eq!(BusFrame::new_remote(ID, 9), None);
+    }
+
+    #[test]
+    fn a_mask_falls_on_byte_0_first() {
+        let frame = BusFrame::new(ID, &[0; 8]).expect("eight bytes");
+        assert_eq!(frame.flipped(0x80 << 56).data()[0], 0x80);
+        assert_eq!(frame.flipped(1).data()[7], 1);
+        assert_eq!(frame.flipped(u64::MAX).resized(3).data(), [0xff; 3]);
+    }
+}

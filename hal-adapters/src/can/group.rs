@@ -1,0 +1,392 @@
+//! Frames of one tick, collected: what [`super::receiver`] and [`super::pose`] share.
+//!
+//! A group is a set of messages that are sent together, each once a tick, with the same
+//! counter. Frames may come in any order within a tick. A tick is handed out as soon as it
+//! is complete, when a frame of a later tick comes, or when its time is over; what is
+//! missing then is missing.
+
+use super::e2e::{Payload, Sequence, Verdict, unprotect};
+use super::table::{FRAME_BYTES, Message};
+
+/// Times in us by which a receiver judges. All are data: nothing here reads a clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// A tick whose frames are not complete this long after its first one is handed out.
+    pub assembly_us: u32,
+    /// With no good frame for this long the source is stale.
+    pub stale_us: u32,
+}
+
+impl Default for Timing {
+    /// For a servo period of 2 ms: half a period, and one and a half, so that a source that
+    /// falls silent is called stale within 4 ms by a receiver that is polled every
+    /// millisecond.
+    fn default() -> Self {
+        Self {
+            assembly_us: 1_000,
+            stale_us: 3_000,
+        }
+    }
+}
+
+/// What is wrong with a frame, or with a source that sends none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BusFault {
+    /// Not eight bytes, or a remote frame.
+    WrongLength {
+        /// Which message.
+        message: Message,
+        /// Its data length.
+        bytes: u8,
+    },
+    /// The check fails: damaged, or a frame of another message.
+    WrongCheck {
+        /// Which message.
+        message: Message,
+    },
+    /// The last frame again.
+    Repeated {
+        /// Which message.
+        message: Message,
+    },
+    /// The counter neither repeats nor follows: late, or after a long gap.
+    WrongSequence {
+        /// Which message.
+        message: Message,
+        /// Distance to the last used counter, modulo 16.
+        ahead: u8,
+    },
+    /// Frames are missing before this one, which is used.
+    Lost {
+        /// Which message.
+        message: Message,
+        /// How many.
+        frames: u8,
+    },
+    /// A good frame of a tick that was already handed out.
+    Late {
+        /// Which message.
+        message: Message,
+    },
+    /// Whole ticks are missing in a multiple of 16, as the sensor node's own count shows.
+    TicksLost {
+        /// How many.
+        ticks: u32,
+    },
+    /// The sensor node counts its ticks anew: it started again.
+    SenderRestarted,
+    /// No good frame for [`Timing::stale_us`].
+    Stale {
+        /// Age of the last good frame, us.
+        age_us: u32,
+    },
+}
+
+impl core::fmt::Display for BusFault {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let name = |message: &Message| message.spec().name;
+        match self {
+            Self::WrongLength { message, bytes } => {
+                write!(f, "{}: {bytes} bytes instead of 8", name(message))
+            }
+            Self::WrongCheck { message } => write!(f, "{}: check fails", name(message)),
+            Self::Repeated { message } => write!(f, "{}: repeated", name(message)),
+            Self::WrongSequence { message, ahead } => {
+                write!(f, "{}: counter {ahead} ahead", name(message))
+            }
+            Self::Lost { message, frames } => write!(f, "{}: {frames} lost", name(message)),
+            Self::Late { message } => write!(f, "{}: late", name(message)),
+            Self::TicksLost { ticks } => write!(f, "{ticks} ticks lost"),
+            Self::SenderRestarted => f.write_str("the sensor node started again"),
+            Self::Stale { age_us } => write!(f, "stale: no good frame for {age_us} us"),
+        }
+    }
+}
+
+/// Counters of a receiver since start; they stay at their largest value.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BusHealth {
+    /// Frames that were used.
+    pub good: u32,
+    /// Frames of a wrong length.
+    pub wrong_length: u32,
+    /// Frames whose check failed.
+    pub wrong_check: u32,
+    /// Repeated frames.
+    pub repeated: u32,
+    /// Frames out of sequence.
+    pub wrong_sequence: u32,
+    /// Frames missing by the counters.
+    pub lost: u32,
+    /// Good frames of a tick that was already handed out.
+    pub late: u32,
+    /// Ticks handed out with a frame missing.
+    pub incomplete: u32,
+    /// Times that the source went stale.
+    pub stale: u32,
+}
+
+impl BusHealth {
+    fn count(&mut self, fault: &BusFault) {
+        let (field, by) = match fault {
+            BusFault::WrongLength { .. } => (&mut self.wrong_length, 1),
+            BusFault::WrongCheck { .. } => (&mut self.wrong_check, 1),
+            BusFault::Repeated { .. } => (&mut self.repeated, 1),
+            BusFault::WrongSequence { .. } => (&mut self.wrong_sequence, 1),
+            BusFault::Lost { frames, .. } => (&mut self.lost, u32::from(*frames)),
+            BusFault::Late { .. } => (&mut self.late, 1),
+            BusFault::TicksLost { ticks } => (&mut self.lost, *ticks),
+            BusFault::SenderRestarted => return,
+            BusFault::Stale { .. } => (&mut self.stale, 1),
+        };
+        *field = field.saturating_add(by);
+    }
+}
+
+/// The frames of one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GroupTick<const N: usize> {
+    /// Number of the tick, counted by the receiver.
+    pub sequence: u32,
+    /// When its first frame came, us.
+    pub time_us: u32,
+    /// The payloads, in the order of the group; `None` for a frame that did not come or was
+    /// not good.
+    pub payloads: [Option<Payload>; N],
+}
+
+/// What a frame, or the passing of time, gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Taken<T> {
+    /// A tick that is over.
+    pub tick: Option<T>,
+    /// What is wrong with the frame that was taken, or with the source.
+    pub fault: Option<BusFault>,
+}
+
+impl<T> Taken<T> {
+    pub(super) const NOTHING: Self = Self {
+        tick: None,
+        fault: None,
+    };
+
+    pub(super) fn map<U>(self, make: impl FnOnce(T) -> U) -> Taken<U> {
+        Taken {
+            tick: self.tick.map(make),
+            fault: self.fault,
+        }
+    }
+}
+
+/// Collects the frames of `N` messages.
+#[derive(Clone, Debug)]
+pub(super) struct Group<const N: usize> {
+    messages: [Message; N],
+    timing: Timing,
+    sequences: [Sequence; N],
+    newest: Option<u32>,
+    done: Option<u32>,
+    pending: Option<GroupTick<N>>,
+    last_good_us: Option<u32>,
+    stale: bool,
+    health: BusHealth,
+}
+
+/// Time from `then` to `now`, 0 if the clock stepped back.
+const fn elapsed(now: u32, then: u32) -> u32 {
+    let passed = now.wrapping_sub(then);
+    if passed > u32::MAX / 2 { 0 } else { passed }
+}
+
+/// Whether tick `a` comes after tick `b`.
+const fn is_after(a: u32, b: u32) -> bool {
+    a != b && a.wrapping_sub(b) <= u32::MAX / 2
+}
+
+impl<const N: usize> Group<N> {
+    pub(super) const fn new(messages: [Message; N], timing: Timing) -> Self {
+        Self {
+            messages,
+            timing,
+            sequences: [Sequence::START; N],
+            newest: None,
+            done: None,
+            pending: None,
+            last_good_us: None,
+            stale: false,
+            health: BusHealth {
+                good: 0,
+                wrong_length: 0,
+                wrong_check: 0,
+                repeated: 0,
+                wrong_sequence: 0,
+                lost: 0,
+                late: 0,
+                incomplete: 0,
+                stale: 0,
+            },
+        }
+    }
+
+    pub(super) const fn health(&self) -> &BusHealth {
+        &self.health
+    }
+
+    pub(super) const fn is_stale(&self) -> bool {
+        self.stale
+    }
+
+    /// The tick whose number ends in `counter` and is nearest to the newest one.
+    #[inline(always)]
+    pub(super) const fn nearest(&self, counter: u8) -> u32 {
+        match self.newest {
+            None => counter as u32,
+            Some(newest) => {
+                let ahead = (counter as u32).wrapping_sub(newest) << 28;
+                newest.wrapping_add((ahead as i32 >> 28) as u32)
+            }
+        }
+    }
+
+    /// Counts `ticks` ticks that no frame told of.
+    pub(super) const fn skip(&mut self, ticks: u32) {
+        if let Some(newest) = self.newest {
+            self.newest = Some(newest.wrapping_add(ticks));
+        }
+    }
+
+    /// Notes a fault of the source and returns it.
+    pub(super) fn note(&mut self, fault: BusFault) -> BusFault {
+        self.health.count(&fault);
+        fault
+    }
+
+    /// Takes one frame of the group's `k`th message.
+    #[inline]
+    pub(super) fn take(&mut self, k: usize, data: &[u8], now_us: u32) -> Taken<GroupTick<N>> {
+        let (Some(&message), Some(sequence)) = (self.messages.get(k), self.sequences.get_mut(k))
+        else {
+            return Taken::NOTHING;
+        };
+        let checked = match data.first_chunk::<FRAME_BYTES>() {
+            Some(bytes) if data.len() == FRAME_BYTES => unprotect(message.spec().key, bytes),
+            _ => {
+                let bytes = data.len() as u8;
+                return self.refuse(BusFault::WrongLength { message, bytes });
+            }
+        };
+        let Some((counter, payload)) = checked else {
+            return self.refuse(BusFault::WrongCheck { message });
+        };
+        let verdict = sequence.judge(counter);
+        let lost = match verdict {
+            Verdict::Repeated => return self.refuse(BusFault::Repeated { message }),
+            Verdict::WrongSequence { ahead } => {
+                return self.refuse(BusFault::WrongSequence { message, ahead });
+            }
+            Verdict::Lost { frames } => Some(BusFault::Lost { message, frames }),
+            Verdict::First | Verdict::Next | Verdict::Resumed => None,
+        };
+        if let Some(fault) = &lost {
+            self.health.count(fault);
+        }
+        self.health.good = self.health.good.saturating_add(1);
+        self.last_good_us = Some(now_us);
+        self.stale = false;
+        let mut tick = self.nearest(counter);
+        if self.done.is_some_and(|done| !is_after(tick, done)) {
+            if verdict != Verdict::Resumed {
+                return self.refuse(BusFault::Late { message });
+            }
+            // After a break the sender goes on from anywhere: on with the numbers, never back.
+            tick = tick.wrapping_add(16);
+        }
+        self.collect(k, tick, payload, lost, now_us)
+    }
+
+    fn refuse(&mut self, fault: BusFault) -> Taken<GroupTick<N>> {
+        Taken {
+            tick: None,
+            fault: Some(self.note(fault)),
+        }
+    }
+
+    /// Adds a good frame to its tick, and hands out the tick that is over by it.
+    #[inline(always)]
+    fn collect(
+        &mut self,
+        k: usize,
+        tick: u32,
+        payload: Payload,
+        mut fault: Option<BusFault>,
+        now_us: u32,
+    ) -> Taken<GroupTick<N>> {
+        let mut over = None;
+        if let Some(pending) = &self.pending {
+            // A tick whose time is over takes no more frames: 16 ticks on, its counter returns.
+            let expired = elapsed(now_us, pending.time_us) >= self.timing.assembly_us;
+            let same = pending.sequence == tick;
+            let older = !same && !is_after(tick, pending.sequence);
+            if expired || !(same || older) {
+                over = self.hand_out();
+            }
+            if older || (same && expired) {
+                let message = self.messages.get(k).copied();
+                fault = message.map(|message| self.note(BusFault::Late { message }));
+                return Taken { tick: over, fault };
+            }
+        }
+        self.newest = Some(tick);
+        let pending = self.pending.get_or_insert(GroupTick {
+            sequence: tick,
+            time_us: now_us,
+            payloads: [None; N],
+        });
+        if let Some(slot) = pending.payloads.get_mut(k) {
+            *slot = Some(payload);
+        }
+        if pending.payloads.iter().all(Option::is_some) {
+            over = self.hand_out();
+        }
+        Taken { tick: over, fault }
+    }
+
+    #[inline(always)]
+    fn hand_out(&mut self) -> Option<GroupTick<N>> {
+        let tick = self.pending.take()?;
+        self.done = Some(tick.sequence);
+        if !tick.payloads.iter().all(Option::is_some) {
+            self.health.incomplete = self.health.incomplete.saturating_add(1);
+        }
+        Some(tick)
+    }
+
+    /// What the passing of time gives: a tick whose time is over, a source that is stale.
+    pub(super) fn poll(&mut self, now_us: u32) -> Taken<GroupTick<N>> {
+        let mut taken = Taken::NOTHING;
+        if let Some(pending) = &self.pending
+            && elapsed(now_us, pending.time_us) >= self.timing.assembly_us
+        {
+            taken.tick = self.hand_out();
+        }
+        if let Some(last) = self.last_good_us
+            && !self.stale
+        {
+            let age_us = elapsed(now_us, last);
+            if age_us >= self.timing.stale_us {
+                self.stale = true;
+                taken.fault = Some(self.note(BusFault::Stale { age_us }));
+            }
+        }
+        taken
+    }
+
+    /// When [`Group::poll`] has something to say at the latest, if no frame comes.
+    pub(super) fn deadline_us(&self) -> Option<u32> {
+        if let Some(pending) = &self.pending {
+            return Some(pending.time_us.wrapping_add(self.timing.assembly_us));
+        }
+        let last = self.last_good_us.filter(|_| !self.stale)?;
+        Some(last.wrapping_add(self.timing.stale_us))
+    }
+}

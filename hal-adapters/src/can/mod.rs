@@ -1,0 +1,24 @@
+#![doc = include_str!("protocol.md")]
+
+pub mod command;
+pub mod dbc;
+pub mod e2e;
+pub mod frame;
+pub mod group;
+pub mod load;
+pub mod pose;
+pub mod receiver;
+pub mod sensor;
+pub mod signals;
+pub mod status;
+pub mod table;
+
+pub use frame::{BusFrame, Coded, StampedFrame};
+pub use group::{BusFault, BusHealth, Timing};
+pub use pose::{PoseReceiver, PoseSender};
+pub use receiver::SensorReceiver;
+pub use sensor::Layout;
+pub use table::Message;
+
+/// Version of this protocol, as [`Message::NodeStatus`] tells it.
+pub const PROTOCOL_VERSION: u8 = 1;

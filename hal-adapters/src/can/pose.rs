@@ -1,0 +1,236 @@
+//! Pose frames: each axis is the decoder's own `f32` word with the 20 low bits of the status,
+//! so a reader sees from every frame alone whether its value may be used, and the bits on the
+//! bus are the bits of the decoder.
+
+use super::e2e::{Payload, Sequence, Verdict, protect, unprotect};
+use super::frame::Coded;
+use super::group::{BusFault, BusHealth, Group, GroupTick, Taken, Timing};
+use super::table::{FRAME_BYTES, Message, VERTICAL_TICKS};
+use embedded_can::{Frame, Id};
+use runtime::{PlanarPose, Reading, Status};
+
+/// The planar axes, in the order of the pose.
+const PLANAR: [Message; 3] = [Message::PoseX, Message::PoseY, Message::PoseRz];
+/// The vertical axes.
+const VERTICAL: [Message; 3] = [Message::PoseZ, Message::PoseRx, Message::PoseRy];
+
+const fn axis_frame(message: Message, counter: u32, value: f32, status: Status) -> Coded {
+    let payload = Payload {
+        short: status.bits(),
+        long: value.to_bits(),
+    };
+    Coded {
+        message,
+        bytes: protect(message.spec().key, counter as u8, payload),
+    }
+}
+
+/// The three frames of the planar pose; `counter` rises by one from call to call.
+#[inline]
+pub const fn planar_frames(reading: &Reading, counter: u32) -> [Coded; 3] {
+    let (p, status) = (&reading.pose.planar, reading.status);
+    [
+        axis_frame(Message::PoseX, counter, p.x_m, status),
+        axis_frame(Message::PoseY, counter, p.y_m, status),
+        axis_frame(Message::PoseRz, counter, p.rz_rad, status),
+    ]
+}
+
+/// Numbers the pose frames of one node and decides when the vertical axes are sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PoseSender {
+    tick: u32,
+    vertical_ticks: u32,
+}
+
+impl Default for PoseSender {
+    fn default() -> Self {
+        Self::new(VERTICAL_TICKS)
+    }
+}
+
+impl PoseSender {
+    /// A sender of each vertical axis in every `vertical_ticks`th tick: 1, 2, 4, 8 or 16;
+    /// any other number is rounded down to one of these (0 counts as 1).
+    pub const fn new(vertical_ticks: u8) -> Self {
+        let ticks = if vertical_ticks > 16 {
+            16
+        } else {
+            vertical_ticks | (vertical_ticks == 0) as u8
+        };
+        Self {
+            tick: 0,
+            vertical_ticks: 1 << ticks.ilog2(),
+        }
+    }
+
+    /// The frames of one tick: X, Y, Rz, and the vertical axes that are due.
+    pub fn frames(&mut self, reading: &Reading) -> impl Iterator<Item = Coded> + use<> {
+        let (tick, every) = (self.tick, self.vertical_ticks);
+        self.tick = tick.wrapping_add(1);
+        let (values, status) = (reading.pose.vertical.to_array(), reading.status);
+        // The axes take turns, so that no tick carries all three unless every tick does.
+        let due = (0u32..).zip(VERTICAL.into_iter().zip(values));
+        let vertical = due.filter_map(move |(k, (message, value))| {
+            let turn = k.wrapping_mul(every) / 3;
+            (tick % every == turn).then(|| axis_frame(message, tick / every, value, status))
+        });
+        planar_frames(reading, tick).into_iter().chain(vertical)
+    }
+}
+
+/// The planar pose of one tick, as it came over the bus.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReceivedPose {
+    /// X, Y, Rz; an axis that did not come is 0.
+    pub pose: PlanarPose<f32>,
+    /// The status that all three frames carry, 20 bits. With an axis missing, or three
+    /// statuses that differ, [`Status::PLANAR_INVALID`] and [`Status::FRAMES_MISSED`] are set.
+    pub status: Status,
+    /// Number of the tick, counted by the receiver.
+    pub sequence: u32,
+    /// When its first frame came, us.
+    pub time_us: u32,
+}
+
+impl ReceivedPose {
+    /// The pose if it was measured in this tick and came whole.
+    pub fn valid(&self) -> Option<PlanarPose<f32>> {
+        (!self.status.any(Status::PLANAR_INVALID)).then_some(self.pose)
+    }
+}
+
+/// One vertical axis as it came last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReceivedAxis {
+    /// The value, m or rad.
+    pub value: f32,
+    /// Its status.
+    pub status: Status,
+    /// When it came, us.
+    pub time_us: u32,
+}
+
+/// Receives pose frames.
+#[derive(Clone, Debug)]
+pub struct PoseReceiver {
+    planar: Group<3>,
+    sequences: [Sequence; 3],
+    vertical: [Option<ReceivedAxis>; 3],
+}
+
+fn received(tick: GroupTick<3>) -> ReceivedPose {
+    let lost = Status::PLANAR_INVALID.with(Status::FRAMES_MISSED);
+    let [x, y, rz] = tick.payloads;
+    let status = match (x, y, rz) {
+        (Some(x), Some(y), Some(rz)) if x.short == y.short && y.short == rz.short => {
+            Status::from_bits(x.short)
+        }
+        _ => lost,
+    };
+    let value = |p: Option<Payload>| p.map_or(0.0, |p| f32::from_bits(p.long));
+    ReceivedPose {
+        pose: PlanarPose {
+            x_m: value(x),
+            y_m: value(y),
+            rz_rad: value(rz),
+        },
+        status,
+        sequence: tick.sequence,
+        time_us: tick.time_us,
+    }
+}
+
+impl PoseReceiver {
+    /// A receiver that has seen no frame.
+    pub const fn new(timing: Timing) -> Self {
+        Self {
+            planar: Group::new(PLANAR, timing),
+            sequences: [Sequence::START; 3],
+            vertical: [None; 3],
+        }
+    }
+
+    /// Takes one frame, received at `now_us`. Frames of other messages are ignored.
+    pub fn take<F: Frame>(&mut self, frame: &F, now_us: u32) -> Taken<ReceivedPose> {
+        let Id::Standard(id) = frame.id() else {
+            return Taken::NOTHING;
+        };
+        let is = |message: &Message| message.id() == id;
+        let data = if frame.is_remote_frame() {
+            &[]
+        } else {
+            frame.data()
+        };
+        if let Some(k) = PLANAR.iter().position(is) {
+            return self.planar.take(k, data, now_us).map(received);
+        }
+        let fault = VERTICAL
+            .iter()
+            .position(is)
+            .and_then(|k| self.take_vertical(k, data, now_us));
+        Taken { tick: None, fault }
+    }
+
+    fn take_vertical(&mut self, k: usize, data: &[u8], time_us: u32) -> Option<BusFault> {
+        let (message, sequence) = (*VERTICAL.get(k)?, self.sequences.get_mut(k)?);
+        let fault = match data.first_chunk::<FRAME_BYTES>() {
+            Some(bytes) if data.len() == FRAME_BYTES => {
+                match unprotect(message.spec().key, bytes) {
+                    None => BusFault::WrongCheck { message },
+                    Some((counter, payload)) => match sequence.judge(counter) {
+                        Verdict::Repeated => BusFault::Repeated { message },
+                        Verdict::WrongSequence { ahead } => {
+                            BusFault::WrongSequence { message, ahead }
+                        }
+                        used => {
+                            *self.vertical.get_mut(k)? = Some(ReceivedAxis {
+                                value: f32::from_bits(payload.long),
+                                status: Status::from_bits(payload.short),
+                                time_us,
+                            });
+                            match used {
+                                Verdict::Lost { frames } => BusFault::Lost { message, frames },
+                                _ => return None,
+                            }
+                        }
+                    },
+                }
+            }
+            _ => BusFault::WrongLength {
+                message,
+                bytes: data.len() as u8,
+            },
+        };
+        Some(self.planar.note(fault))
+    }
+
+    /// What the passing of time gives, as [`super::SensorReceiver::poll`].
+    pub fn poll(&mut self, now_us: u32) -> Taken<ReceivedPose> {
+        self.planar.poll(now_us).map(received)
+    }
+
+    /// When [`PoseReceiver::poll`] has something to say if no frame comes.
+    pub fn deadline_us(&self) -> Option<u32> {
+        self.planar.deadline_us()
+    }
+
+    /// Whether there was no good planar frame for too long.
+    pub const fn is_stale(&self) -> bool {
+        self.planar.is_stale()
+    }
+
+    /// Z, Rx, Ry as they came last.
+    pub const fn vertical(&self) -> &[Option<ReceivedAxis>; 3] {
+        &self.vertical
+    }
+
+    /// The counters.
+    pub const fn health(&self) -> &BusHealth {
+        self.planar.health()
+    }
+}
+
+#[cfg(test)]
+#[path = "pose_tests.rs"]
+mod tests;

@@ -1,0 +1,94 @@
+use super::super::frame::BusFrame;
+use super::*;
+use runtime::{Pose, VerticalPose};
+
+fn reading(k: u16) -> Reading {
+    let x = f32::from(k) * 1.3e-7;
+    Reading {
+        pose: Pose {
+            planar: PlanarPose {
+                x_m: x,
+                y_m: -x,
+                rz_rad: x / 3.0,
+            },
+            vertical: VerticalPose {
+                z_m: 2.0 * x,
+                rx_rad: x / 7.0,
+                ry_rad: -0.0,
+            },
+        },
+        status: Status::from_bits(0x1000 * u32::from(k & 1)),
+    }
+}
+
+#[test]
+fn an_axis_worked_by_hand() {
+    // 1.0 is 0x3f800000; status 0x41001 spans bits 12 to 31.
+    let frame = axis_frame(Message::PoseY, 0x1b, 1.0, Status::from_bits(0x41001));
+    assert_eq!(frame.bytes[1..], [0x1b, 0x00, 0x41, 0, 0, 0x80, 0x3f]);
+}
+
+#[test]
+fn the_words_of_the_decoder_come_back_to_the_bit() {
+    let (mut sender, mut receiver) = (PoseSender::default(), PoseReceiver::new(Timing::default()));
+    for k in 0..100 {
+        let mut got = None;
+        for frame in sender.frames(&reading(k)) {
+            let taken = receiver.take(&BusFrame::from(frame), u32::from(k) * 2_000);
+            assert_eq!(taken.fault, None);
+            got = got.or(taken.tick);
+        }
+        let got = got.expect("all three axes came");
+        assert_eq!(got.status, reading(k).status);
+        let bits = |p: PlanarPose<f32>| p.to_array().map(f32::to_bits);
+        assert_eq!(bits(got.pose), bits(reading(k).pose.planar));
+    }
+    let vertical = receiver
+        .vertical()
+        .map(|axis| axis.map(|a| a.value.to_bits()));
+    // In every fourth tick: Z when the tick's number is 0 modulo 4, Rx at 1, Ry at 2.
+    let sent = |k, of: fn(Pose) -> f32| Some(of(reading(k).pose).to_bits());
+    assert_eq!(vertical[0], sent(96, |p| p.vertical.z_m));
+    assert_eq!(vertical[1], sent(97, |p| p.vertical.rx_rad));
+    assert_eq!(vertical[2], sent(98, |p| p.vertical.ry_rad));
+}
+
+#[test]
+fn a_pose_with_an_axis_missing_is_invalid() {
+    let mut receiver = PoseReceiver::new(Timing::default());
+    let [x, y, _] = planar_frames(&reading(2), 0).map(BusFrame::from);
+    receiver.take(&x, 0);
+    receiver.take(&y, 100);
+    let got = receiver.poll(1_000).tick.expect("its time is over");
+    assert_eq!(got.valid(), None);
+    assert!(got.status.any(Status::FRAMES_MISSED));
+}
+
+#[test]
+fn axes_that_disagree_on_the_status_are_invalid() {
+    let mut receiver = PoseReceiver::new(Timing::default());
+    let [x, y, _] = planar_frames(&reading(2), 0).map(BusFrame::from);
+    let [_, _, rz] = planar_frames(&reading(3), 0).map(BusFrame::from);
+    receiver.take(&x, 0);
+    receiver.take(&y, 0);
+    let got = receiver.take(&rz, 0).tick.expect("complete");
+    assert_eq!(got.valid(), None);
+}
+
+#[test]
+fn every_vertical_axis_is_sent_at_its_rate_and_numbered_without_a_gap() {
+    for (asked, every) in [(0, 1), (1, 1), (2, 2), (3, 2), (4, 4), (16, 16), (200, 16)] {
+        let mut sender = PoseSender::new(asked);
+        let mut receiver = PoseReceiver::new(Timing::default());
+        let mut sent = 0;
+        for k in 0..64 {
+            let frames = sender.frames(&reading(k));
+            for frame in frames.skip(3) {
+                sent += 1;
+                let taken = receiver.take(&BusFrame::from(frame), 0);
+                assert_eq!(taken.fault, None, "{asked}");
+            }
+        }
+        assert_eq!(sent, 3 * 64 / every, "{asked}");
+    }
+}

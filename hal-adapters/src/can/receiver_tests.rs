@@ -1,0 +1,227 @@
+use super::super::frame::BusFrame;
+use super::super::sensor::frames;
+use super::*;
+use proptest::prelude::*;
+
+const LAYOUTS: [Layout; 2] = [Layout::Bits16, Layout::Bits24];
+
+fn raw(sequence: u32) -> RawFrame {
+    let code = sequence as i32 % 30_000;
+    RawFrame {
+        hall: [code, -code, 17],
+        capacitive: [code / 2, 5, -code / 3],
+        sequence,
+        time_us: sequence.wrapping_mul(2_000),
+    }
+}
+
+fn new(layout: Layout) -> SensorReceiver {
+    SensorReceiver::new(layout, Timing::default())
+}
+
+/// Feeds the frames of a tick at 2 ms a tick; gives the ticks and faults that come out.
+fn feed(r: &mut SensorReceiver, layout: Layout, sequence: u32) -> (Option<RawFrame>, u32) {
+    let (mut tick, mut faults) = (None, 0);
+    for frame in frames(layout, &raw(sequence)) {
+        let taken = r.take(&BusFrame::from(frame), sequence.wrapping_mul(2_000));
+        assert!(tick.is_none() || taken.tick.is_none());
+        tick = tick.or(taken.tick);
+        faults += u32::from(taken.fault.is_some());
+    }
+    (tick, faults)
+}
+
+fn codes(frame: &RawFrame) -> ([i32; 3], [i32; 3]) {
+    (frame.hall, frame.capacitive)
+}
+
+#[test]
+fn every_tick_comes_out_whole_and_numbered_across_counter_wraps() {
+    for layout in LAYOUTS {
+        let mut r = new(layout);
+        for sequence in 5..200 {
+            assert_eq!(feed(&mut r, layout, sequence), (Some(raw(sequence)), 0));
+        }
+        let health = r.health();
+        assert_eq!(health.good as usize, 195 * layout.messages().len());
+        let good = health.good;
+        assert_eq!(
+            *health,
+            BusHealth {
+                good,
+                ..BusHealth::default()
+            }
+        );
+    }
+}
+
+#[test]
+fn frames_of_a_tick_may_come_in_any_order() {
+    let mut r = new(Layout::Bits16);
+    for sequence in 1..40 {
+        let [hall, gaps] = super::super::sensor::frames_16(&raw(sequence)).map(BusFrame::from);
+        assert_eq!(r.take(&gaps, sequence * 2000), Taken::NOTHING);
+        let tick = r.take(&hall, sequence * 2000).tick;
+        assert_eq!(tick, Some(raw(sequence)));
+    }
+}
+
+#[test]
+fn a_dropped_frame_leaves_its_codes_missing_and_the_next_tick_whole() {
+    let mut r = new(Layout::Bits16);
+    feed(&mut r, Layout::Bits16, 1);
+    let [hall, _] = super::super::sensor::frames_16(&raw(2)).map(BusFrame::from);
+    assert_eq!(r.take(&hall, 4_000), Taken::NOTHING);
+    let [hall, gaps] = super::super::sensor::frames_16(&raw(3)).map(BusFrame::from);
+    let taken = r.take(&hall, 6_000);
+    let partial = taken.tick.expect("the tick is over");
+    assert_eq!(codes(&partial), (raw(2).hall, [MISSING_CODE; 3]));
+    let taken = r.take(&gaps, 6_000);
+    let message = Message::Capacitive;
+    assert_eq!(taken.fault, Some(BusFault::Lost { message, frames: 1 }));
+    assert_eq!(taken.tick, Some(raw(3)));
+    assert_eq!(r.health().incomplete, 1);
+}
+
+#[test]
+fn the_passing_of_time_ends_a_tick_and_then_calls_the_source_stale() {
+    let mut r = new(Layout::Bits16);
+    feed(&mut r, Layout::Bits16, 1);
+    let [hall, _] = super::super::sensor::frames_16(&raw(2)).map(BusFrame::from);
+    r.take(&hall, 4_000);
+    assert_eq!(r.deadline_us(), Some(5_000));
+    assert_eq!(r.poll(4_999), Taken::NOTHING);
+    assert_eq!(r.poll(5_000).tick.map(|t| t.hall), Some(raw(2).hall));
+    assert_eq!(r.deadline_us(), Some(7_000));
+    assert_eq!(r.poll(6_999), Taken::NOTHING);
+    let fault = Some(BusFault::Stale { age_us: 3_000 });
+    assert_eq!(r.poll(7_000), Taken { tick: None, fault });
+    assert!(r.is_stale());
+    assert_eq!((r.poll(9_000), r.deadline_us()), (Taken::NOTHING, None));
+    assert_eq!(feed(&mut r, Layout::Bits16, 3).0, Some(raw(3)));
+    assert!(!r.is_stale());
+}
+
+#[test]
+fn a_clock_that_steps_back_makes_nothing_stale() {
+    let mut r = new(Layout::Bits16);
+    feed(&mut r, Layout::Bits16, 100);
+    assert_eq!(r.poll(0), Taken::NOTHING);
+}
+
+#[test]
+fn a_delayed_frame_is_late_and_its_codes_are_not_used() {
+    let mut r = new(Layout::Bits16);
+    feed(&mut r, Layout::Bits16, 1);
+    let [hall_2, gaps_2] = super::super::sensor::frames_16(&raw(2)).map(BusFrame::from);
+    let [hall_3, gaps_3] = super::super::sensor::frames_16(&raw(3)).map(BusFrame::from);
+    r.take(&hall_2, 4_000);
+    assert!(r.take(&hall_3, 6_000).tick.is_some());
+    let message = Message::Capacitive;
+    let late = r.take(&gaps_2, 6_010);
+    assert_eq!(late.fault, Some(BusFault::Late { message }));
+    let taken = r.take(&gaps_3, 6_020);
+    assert_eq!((taken.tick, taken.fault), (Some(raw(3)), None));
+}
+
+#[test]
+fn a_frame_sixteen_ticks_on_is_not_joined_to_an_old_one() {
+    let mut r = new(Layout::Bits16);
+    let [hall, _] = super::super::sensor::frames_16(&raw(2)).map(BusFrame::from);
+    let [_, gaps] = super::super::sensor::frames_16(&raw(18)).map(BusFrame::from);
+    r.take(&hall, 4_000);
+    let taken = r.take(&gaps, 36_000);
+    let partial = taken.tick.expect("the old tick, without the new codes");
+    assert_eq!(codes(&partial), (raw(2).hall, [MISSING_CODE; 3]));
+}
+
+#[test]
+fn sixteen_lost_ticks_are_told_by_the_time_frame() {
+    let mut r = new(Layout::Bits16);
+    for sequence in 12..18 {
+        feed(&mut r, Layout::Bits16, sequence);
+    }
+    // 18 to 33 are lost: the counter goes on as if nothing had happened.
+    let mut lost = 0;
+    for sequence in 34..50 {
+        for frame in frames(Layout::Bits16, &raw(sequence)) {
+            if let Some(BusFault::TicksLost { ticks }) =
+                r.take(&BusFrame::from(frame), sequence * 2000).fault
+            {
+                lost += ticks;
+            }
+        }
+    }
+    assert_eq!(lost, 16);
+    assert_eq!(r.sensor_time().map(|t| t.time_us), Some(48 * 2_000));
+    // Receiver's numbers again run with the sender's.
+    assert_eq!(feed(&mut r, Layout::Bits16, 50).0, Some(raw(50)));
+}
+
+#[test]
+fn a_sender_that_starts_again_is_used_from_its_second_frame_on() {
+    let mut r = new(Layout::Bits16);
+    for sequence in 20..39 {
+        feed(&mut r, Layout::Bits16, sequence);
+    }
+    let mut whole = [false; 20];
+    let mut restarted = false;
+    for sequence in 0..20u32 {
+        for frame in frames(Layout::Bits16, &raw(sequence)) {
+            let taken = r.take(&BusFrame::from(frame), 100_000 + sequence * 2_000);
+            restarted |= taken.fault == Some(BusFault::SenderRestarted);
+            let ticks = taken.tick.filter(|t| codes(t) == codes(&raw(sequence)));
+            whole[sequence as usize] |= ticks.is_some();
+        }
+    }
+    assert!(!whole[0] && whole[1..].iter().all(|w| *w), "{whole:?}");
+    assert!(restarted);
+}
+
+#[test]
+fn a_remote_frame_a_short_one_and_a_foreign_one_give_no_tick() {
+    let mut r = new(Layout::Bits16);
+    let id = Message::Hall.id();
+    let message = Message::Hall;
+    let remote = BusFrame::new_remote(id, 8).expect("eight");
+    let fault = Some(BusFault::WrongLength { message, bytes: 0 });
+    assert_eq!(r.take(&remote, 0), Taken { tick: None, fault });
+    let short = BusFrame::new(id, &[0; 7]).expect("seven");
+    let fault = Some(BusFault::WrongLength { message, bytes: 7 });
+    assert_eq!(r.take(&short, 0), Taken { tick: None, fault });
+    for foreign in [
+        BusFrame::new(embedded_can::StandardId::ZERO, &[0; 8]),
+        BusFrame::new(embedded_can::ExtendedId::ZERO, &[0; 8]),
+        BusFrame::new(Message::HallAb24.id(), &[0; 8]),
+    ] {
+        assert_eq!(r.take(&foreign.expect("eight"), 0), Taken::NOTHING);
+    }
+}
+
+proptest! {
+    /// Whatever is on the bus, no code that was not sent comes out unmarked, nothing panics,
+    /// and numbers only rise.
+    #[test]
+    fn arbitrary_frames_give_no_codes_but_those_sent(
+        noise in prop::collection::vec((0usize..8, any::<[u8; 8]>(), 0usize..=8), 0..60)
+    ) {
+        let mut r = new(Layout::Bits16);
+        let (mut k, mut last) = (0u32, None);
+        for (what, bytes, length) in noise {
+            k += 1;
+            let ours = frames(Layout::Bits16, &raw(k));
+            let id = super::super::table::TABLE[what].message.id();
+            let noise = BusFrame::new(id, &bytes[..length]).expect("up to eight");
+            // A random word passes its check once in 256 times: those are left out.
+            let passes = unprotect(super::super::table::TABLE[what].key, &bytes).is_some();
+            let noise = (!passes || length < 8).then_some(noise);
+            for frame in ours.map(BusFrame::from).chain(noise) {
+                if let Some(tick) = r.take(&frame, k * 2000).tick {
+                    prop_assert!(last.is_none_or(|l| l < tick.sequence));
+                    last = Some(tick.sequence);
+                    prop_assert_eq!(codes(&tick), codes(&raw(tick.sequence)));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! Sensor frames: the codes of one tick, in one of two layouts.
+//!
+//! Coding needs no state: the counter of each frame is the low nibble of the tick's number,
+//! so a tick that the node skips is seen as lost by every receiver.
+
+use super::e2e::{Payload, protect};
+use super::frame::Coded;
+use super::table::{Message, SLOW_TICKS};
+use runtime::RawFrame;
+use runtime::frame::MISSING_CODE;
+
+/// How wide the codes are on the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// Codes of 16 bits: two frames a tick.
+    Bits16,
+    /// Codes of up to 24 bits, for parts of 18 and 24: three frames a tick.
+    Bits24,
+}
+
+impl Layout {
+    /// The messages of one tick, in the order in which they are sent.
+    pub const fn messages(self) -> &'static [Message] {
+        match self {
+            Self::Bits16 => &[Message::Hall, Message::Capacitive],
+            Self::Bits24 => &[
+                Message::HallAb24,
+                Message::HallCCapacitive1At24,
+                Message::Capacitive23At24,
+            ],
+        }
+    }
+
+    /// The narrowest layout that holds every code from `low` to `high`, or `None` if 24 bits
+    /// are too few.
+    pub const fn that_holds(low: i32, high: i32) -> Option<Self> {
+        if fits(low, 16) && fits(high, 16) {
+            Some(Self::Bits16)
+        } else if fits(low, 24) && fits(high, 24) {
+            Some(Self::Bits24)
+        } else {
+            None
+        }
+    }
+}
+
+/// Whether `code` is a two's complement number of `bits` bits.
+const fn fits(code: i32, bits: u32) -> bool {
+    let top = 32 - bits;
+    code << top >> top == code
+}
+
+/// A code's bits and 1 in place of 0 for a code that is missing or too wide.
+#[inline(always)]
+const fn coded(code: i32, bits: u32) -> (u32, u32) {
+    if fits(code, bits) {
+        (code as u32 & (u32::MAX >> (32 - bits)), 0)
+    } else {
+        (0, 1)
+    }
+}
+
+#[inline(always)]
+const fn three_codes([a, b, c]: [i32; 3]) -> Payload {
+    let ((a, no_a), (b, no_b), (c, no_c)) = (coded(a, 16), coded(b, 16), coded(c, 16));
+    Payload {
+        short: a << 4 | no_c << 2 | no_b << 1 | no_a,
+        long: c << 16 | b,
+    }
+}
+
+#[inline(always)]
+const fn two_codes(a: i32, b: i32) -> Payload {
+    let ((a, no_a), (b, no_b)) = (coded(a, 24), coded(b, 24));
+    Payload {
+        short: (a & 0xffff) << 4 | no_b << 1 | no_a,
+        long: b << 8 | a >> 16,
+    }
+}
+
+/// A code of `bits` bits in the low end of `word`, or [`MISSING_CODE`].
+#[inline(always)]
+const fn code(word: u32, bits: u32, is_missing: u32) -> i32 {
+    if is_missing & 1 == 0 {
+        let top = 32 - bits;
+        (word << top) as i32 >> top
+    } else {
+        MISSING_CODE
+    }
+}
+
+/// The three codes of a frame of [`Message::Hall`] or [`Message::Capacitive`].
+#[inline(always)]
+pub(super) const fn read_three(p: Payload) -> [i32; 3] {
+    [
+        code(p.short >> 4, 16, p.short),
+        code(p.long, 16, p.short >> 1),
+        code(p.long >> 16, 16, p.short >> 2),
+    ]
+}
+
+/// The two codes of a frame of the 24-bit layout.
+#[inline(always)]
+pub(super) const fn read_two(p: Payload) -> [i32; 2] {
+    let first = (p.short >> 4 & 0xffff) | p.long << 16;
+    [
+        code(first, 24, p.short),
+        code(p.long >> 8, 24, p.short >> 1),
+    ]
+}
+
+#[inline(always)]
+const fn frame_of(message: Message, counter: u32, payload: Payload) -> Coded {
+    Coded {
+        message,
+        bytes: protect(message.spec().key, counter as u8, payload),
+    }
+}
+
+/// The two frames of a tick in the 16-bit layout. A code that does not fit is sent as
+/// missing, never cut.
+#[inline]
+pub const fn frames_16(frame: &RawFrame) -> [Coded; 2] {
+    [
+        frame_of(Message::Hall, frame.sequence, three_codes(frame.hall)),
+        frame_of(
+            Message::Capacitive,
+            frame.sequence,
+            three_codes(frame.capacitive),
+        ),
+    ]
+}
+
+/// The three frames of a tick in the 24-bit layout; as [`frames_16`].
+#[inline]
+pub const fn frames_24(frame: &RawFrame) -> [Coded; 3] {
+    let ([a, b, c], [g1, g2, g3]) = (frame.hall, frame.capacitive);
+    let counter = frame.sequence;
+    [
+        frame_of(Message::HallAb24, counter, two_codes(a, b)),
+        frame_of(Message::HallCCapacitive1At24, counter, two_codes(c, g1)),
+        frame_of(Message::Capacitive23At24, counter, two_codes(g2, g3)),
+    ]
+}
+
+/// The frame that tells number and time of a tick, in every [`SLOW_TICKS`]th tick, before
+/// the frames with its codes.
+pub const fn time_frame(frame: &RawFrame) -> Option<Coded> {
+    let slow = SLOW_TICKS as u32;
+    if !frame.sequence.is_multiple_of(slow) {
+        return None;
+    }
+    let payload = Payload {
+        short: frame.sequence,
+        long: frame.time_us,
+    };
+    Some(frame_of(
+        Message::SensorTime,
+        frame.sequence / slow,
+        payload,
+    ))
+}
+
+/// Every frame of a tick in the order in which it is sent.
+pub fn frames(layout: Layout, frame: &RawFrame) -> impl Iterator<Item = Coded> + use<> {
+    let codes = match layout {
+        Layout::Bits16 => {
+            let [a, b] = frames_16(frame);
+            [Some(a), Some(b), None]
+        }
+        Layout::Bits24 => frames_24(frame).map(Some),
+    };
+    time_frame(frame)
+        .into_iter()
+        .chain(codes.into_iter().flatten())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::e2e::unprotect;
+    use super::*;
+    use proptest::prelude::*;
+
+    const FRAME: RawFrame = RawFrame {
+        hall: [0x1234, -2, i16::MIN as i32],
+        capacitive: [1, MISSING_CODE, 70000],
+        sequence: 0x35,
+        time_us: 7,
+    };
+
+    #[test]
+    fn sixteen_bit_frames_worked_by_hand() {
+        let [hall, gaps] = frames_16(&FRAME);
+        // Counter 5, nothing missing, then 0x1234, -2 = 0xfffe, -32768 = 0x8000, low byte first.
+        assert_eq!(hall.bytes[1..], [0x05, 0x34, 0x12, 0xfe, 0xff, 0x00, 0x80]);
+        // Codes 2 (missing) and 3 (does not fit) are flagged, bits 1 and 2, and sent as 0.
+        assert_eq!(gaps.bytes[1..], [0x65, 0x01, 0, 0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn twenty_four_bit_frames_worked_by_hand() {
+        let [first, second, third] = frames_24(&FRAME);
+        assert_eq!(first.bytes[1..], [0x05, 0x34, 0x12, 0x00, 0xfe, 0xff, 0xff]);
+        assert_eq!(
+            second.bytes[1..],
+            [0x05, 0x00, 0x80, 0xff, 0x01, 0x00, 0x00]
+        );
+        // 70000 = 0x11170; capacitive code 2, the first of this frame, is missing.
+        assert_eq!(third.bytes[1..], [0x15, 0, 0, 0, 0x70, 0x11, 0x01]);
+    }
+
+    #[test]
+    fn every_sixteenth_tick_tells_its_number_and_time() {
+        let at = |sequence| RawFrame { sequence, ..FRAME };
+        let sent: Option<Coded> = time_frame(&at(0x1_2340));
+        // Counter 4 of this message's own frames, sequence 0x12340, time 7.
+        let bytes = sent.expect("a sixteenth tick").bytes;
+        assert_eq!(bytes[1..], [0x04, 0x34, 0x12, 7, 0, 0, 0]);
+        assert_eq!(time_frame(&at(0x1_2341)), None);
+        assert_eq!(frames(Layout::Bits16, &at(0)).count(), 3);
+        assert_eq!(frames(Layout::Bits24, &at(1)).count(), 3);
+    }
+
+    #[test]
+    fn the_narrowest_layout_is_taken() {
+        assert_eq!(Layout::that_holds(-32768, 32767), Some(Layout::Bits16));
+        assert_eq!(Layout::that_holds(-32769, 0), Some(Layout::Bits24));
+        assert_eq!(Layout::that_holds(0, 1 << 23), None);
+    }
+
+    proptest! {
+        #[test]
+        fn codes_of_their_width_come_back_and_others_are_missing(hall: [i32; 3], capacitive: [i32; 3], shift in 0u32..24) {
+            let frame = RawFrame { hall: hall.map(|c| c >> shift), capacitive: capacitive.map(|c| c >> shift), ..FRAME };
+            let want = |code: i32, bits: u32| {
+                let half = 1i64 << (bits - 1);
+                if (-half..half).contains(&i64::from(code)) { code } else { MISSING_CODE }
+            };
+            let payload = |c: Coded| unprotect(c.message.spec().key, &c.bytes).expect("sound").1;
+            let [h, g] = frames_16(&frame).map(payload).map(read_three);
+            prop_assert_eq!(h, frame.hall.map(|c| want(c, 16)));
+            prop_assert_eq!(g, frame.capacitive.map(|c| want(c, 16)));
+            let [[a, b], [c, g1], [g2, g3]] = frames_24(&frame).map(payload).map(read_two);
+            prop_assert_eq!([a, b, c], frame.hall.map(|c| want(c, 24)));
+            prop_assert_eq!([g1, g2, g3], frame.capacitive.map(|c| want(c, 24)));
+        }
+    }
+}

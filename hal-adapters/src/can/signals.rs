@@ -1,0 +1,253 @@
+//! The signals of each message. Bits are numbered as in a `.dbc` file, little-endian: bit 8 n
+//! is the lowest of byte n. Check and counter take bits 0 to 11 of every message.
+
+/// How a signal's bits are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Unsigned integer.
+    Unsigned,
+    /// Two's complement.
+    Signed,
+    /// IEEE 754 single precision, 32 bits.
+    Float,
+    /// Selects which of the paged signals the frame carries.
+    Selector,
+}
+
+/// One signal.
+#[derive(Clone, Copy, Debug)]
+pub struct Signal {
+    /// Its name in the `.dbc` file.
+    pub name: &'static str,
+    /// Lowest bit.
+    pub start: u8,
+    /// How many bits.
+    pub bits: u8,
+    /// How they are read.
+    pub kind: Kind,
+    /// Unit; empty for none.
+    pub unit: &'static str,
+    /// For a paged signal: the value of the selector with which it is sent.
+    pub page: Option<u8>,
+    /// Named values.
+    pub values: &'static [(u8, &'static str)],
+    /// What it tells.
+    pub what: &'static str,
+}
+
+const fn signal(
+    name: &'static str,
+    (start, bits): (u8, u8),
+    kind: Kind,
+    unit: &'static str,
+    what: &'static str,
+) -> Signal {
+    Signal {
+        name,
+        start,
+        bits,
+        kind,
+        unit,
+        page: None,
+        values: &[],
+        what,
+    }
+}
+
+const fn named(signal: Signal, values: &'static [(u8, &'static str)]) -> Signal {
+    Signal { values, ..signal }
+}
+
+const fn paged(page: u8, name: &'static str, what: &'static str) -> Signal {
+    Signal {
+        page: Some(page),
+        ..signal(name, (32, 32), U, "", what)
+    }
+}
+
+use Kind::{Float as F, Selector, Signed as S, Unsigned as U};
+
+/// Check and counter: the first signals of every message.
+pub const PROTECTION: [Signal; 2] = [
+    signal("Check", (0, 8), U, "", "CRC-8, see E2E Profile 2"),
+    signal(
+        "Counter",
+        (8, 4),
+        U,
+        "",
+        "frames of this message, modulo 16",
+    ),
+];
+
+const fn code(name: &'static str, start: u8, bits: u8) -> Signal {
+    signal(
+        name,
+        (start, bits),
+        S,
+        "count",
+        "converter code; 0 if missing",
+    )
+}
+
+const fn missing(bits: u8, what: &'static str) -> Signal {
+    signal("Missing", (12, bits), U, "", what)
+}
+
+const THREE: &str = "bit k set: code k was not measured in this tick";
+const TWO: &str = "bit k set: code k of this frame was not measured in this tick";
+
+pub(super) const HALL: [Signal; 4] = [
+    missing(3, THREE),
+    code("HallA", 16, 16),
+    code("HallB", 32, 16),
+    code("HallC", 48, 16),
+];
+pub(super) const CAPACITIVE: [Signal; 4] = [
+    missing(3, THREE),
+    code("Capacitive1", 16, 16),
+    code("Capacitive2", 32, 16),
+    code("Capacitive3", 48, 16),
+];
+pub(super) const HALL_AB_24: [Signal; 3] = [
+    missing(2, TWO),
+    code("HallA", 16, 24),
+    code("HallB", 40, 24),
+];
+pub(super) const HALL_C_CAPACITIVE_1_24: [Signal; 3] = [
+    missing(2, TWO),
+    code("HallC", 16, 24),
+    code("Capacitive1", 40, 24),
+];
+pub(super) const CAPACITIVE_23_24: [Signal; 3] = [
+    missing(2, TWO),
+    code("Capacitive2", 16, 24),
+    code("Capacitive3", 40, 24),
+];
+
+pub(super) const SENSOR_TIME: [Signal; 2] = [
+    signal(
+        "Sequence",
+        (12, 20),
+        U,
+        "",
+        "number of the tick, modulo 2^20",
+    ),
+    signal(
+        "Time",
+        (32, 32),
+        U,
+        "us",
+        "when its codes were sampled, wrapping",
+    ),
+];
+
+const fn axis(name: &'static str, unit: &'static str) -> [Signal; 2] {
+    [
+        signal(
+            "Status",
+            (12, 20),
+            U,
+            "",
+            "bit mask of runtime::status; 0 when all is good",
+        ),
+        signal(
+            name,
+            (32, 32),
+            F,
+            unit,
+            "the decoder's own word; 0 if invalid",
+        ),
+    ]
+}
+
+pub(super) const POSE_X: [Signal; 2] = axis("X", "m");
+pub(super) const POSE_Y: [Signal; 2] = axis("Y", "m");
+pub(super) const POSE_RZ: [Signal; 2] = axis("Rz", "rad");
+pub(super) const POSE_Z: [Signal; 2] = axis("Z", "m");
+pub(super) const POSE_RX: [Signal; 2] = axis("Rx", "rad");
+pub(super) const POSE_RY: [Signal; 2] = axis("Ry", "rad");
+
+#[rustfmt::skip]
+pub(super) const NODE_STATUS: [Signal; 6] = [
+    named(
+        signal("State", (12, 4), U, "", "what the node is doing"),
+        &[(0, "starting"), (1, "running"), (2, "no parameters"), (3, "bad parameters"), (4, "no frames"), (5, "sensor fault"), (6, "self-test failed")],
+    ),
+    signal("Reason", (16, 8), U, "", "detail of the state, by the node; 0 for none"),
+    signal("Flags", (24, 8), U, "", "1 watchdog reset, 2 bus was off, 4 re-zero runs, 8 re-zeroed, 16 re-zero refused, 32 identifying"),
+    signal("MissedTicks", (32, 16), U, "", "ticks that came late or not at all; stays at 65535"),
+    signal("BusOff", (48, 8), U, "", "times the bus was off; stays at 255"),
+    signal("Version", (56, 8), U, "", "version of this protocol"),
+];
+
+pub(super) const COMMANDS: &[(u8, &str)] = &[(1, "re-zero"), (2, "identify"), (3, "clear zero")];
+
+#[rustfmt::skip]
+pub(super) const COMMAND: [Signal; 3] = [
+    named(signal("Command", (12, 4), U, "", "what is asked for"), COMMANDS),
+    signal("Token", (16, 8), U, "", "chosen by the sender, returned in the answer"),
+    signal("Argument", (32, 32), U, "", "re-zero: ticks to average, 0 for the default; identify: s to blink; else 0"),
+];
+
+#[rustfmt::skip]
+pub(super) const ANSWER: [Signal; 4] = [
+    named(signal("Command", (12, 4), U, "", "what was asked for"), COMMANDS),
+    signal("Token", (16, 8), U, "", "the token of the request"),
+    named(
+        signal("Outcome", (24, 8), U, "", "how it ended"),
+        &[(0, "done"), (1, "started"), (2, "unknown command"), (3, "no parameters"), (4, "too short"), (5, "no pose"), (6, "stage moved"), (7, "stage drifted"), (8, "busy")],
+    ),
+    signal("Detail", (32, 32), U, "", "stage moved or drifted: axis, 0 to 2 for X, Y, Rz; no pose: status; else 0"),
+];
+
+pub(super) const HEALTH: [Signal; 7] = [
+    signal("Page", (12, 4), Selector, "", "which counter"),
+    paged(0, "Ticks", "ticks, with and without a frame"),
+    paged(1, "PlanarInvalid", "ticks whose planar pose was invalid"),
+    paged(
+        2,
+        "VerticalInvalid",
+        "ticks whose vertical pose was invalid",
+    ),
+    paged(3, "Held", "ticks in which a value was held"),
+    paged(4, "FramesMissed", "servo periods without a frame"),
+    paged(5, "FramesRepeated", "frames that were not new"),
+];
+
+pub(super) const IDENTITY: [Signal; 3] = [
+    signal("Part", (12, 4), U, "", "page, 0 to 5; six characters each"),
+    signal(
+        "Text12",
+        (16, 16),
+        U,
+        "",
+        "characters 1 and 2 of the page, UTF-8, 0 at the end",
+    ),
+    signal("Text3456", (32, 32), U, "", "characters 3 to 6 of the page"),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::super::table::TABLE;
+    use super::*;
+
+    #[test]
+    fn no_two_signals_of_a_frame_share_a_bit() {
+        for row in &TABLE {
+            let pages = row.signals.iter().filter_map(|s| s.page).max();
+            for page in 0..=pages.unwrap_or(0) {
+                let mut used = 0u64;
+                for s in PROTECTION.iter().chain(row.signals) {
+                    if s.page.is_some_and(|p| p != page) {
+                        continue;
+                    }
+                    assert!(s.bits >= 1 && s.start + s.bits <= 64, "{}", s.name);
+                    let mask = (u64::MAX >> (64 - s.bits)) << s.start;
+                    assert_eq!(used & mask, 0, "{} {}", row.name, s.name);
+                    used |= mask;
+                    assert!(s.kind != Kind::Float || s.bits == 32);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! Slow frames of the decoding node: what it does, and its counters.
+
+use super::e2e::Payload;
+use runtime::servo::Health;
+
+/// What the decoding node is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum NodeState {
+    /// Between reset and the first tick.
+    Starting = 0,
+    /// It decodes.
+    Running = 1,
+    /// There is no parameter blob: no pose.
+    NoParameters = 2,
+    /// The parameter blob is refused: no pose. The reason says why.
+    BadParameters = 3,
+    /// No frames come from the sensors.
+    NoFrames = 4,
+    /// A sensor or its converter reports a fault.
+    SensorFault = 5,
+    /// The node failed its own test at start: no pose.
+    SelfTestFailed = 6,
+}
+
+impl NodeState {
+    const ALL: [Self; 7] = [
+        Self::Starting,
+        Self::Running,
+        Self::NoParameters,
+        Self::BadParameters,
+        Self::NoFrames,
+        Self::SensorFault,
+        Self::SelfTestFailed,
+    ];
+
+    /// From its number, or `None` for a state of a later version.
+    pub fn from_number(number: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(number)).copied()
+    }
+}
+
+/// Flags of [`NodeStatus`], as bits.
+pub mod flag {
+    /// The last reset came from the watchdog.
+    pub const WATCHDOG_RESET: u8 = 1;
+    /// The bus was off since start.
+    pub const BUS_WAS_OFF: u8 = 1 << 1;
+    /// A re-zero runs.
+    pub const REZERO_RUNS: u8 = 1 << 2;
+    /// A re-zero was done.
+    pub const REZEROED: u8 = 1 << 3;
+    /// The last re-zero was refused.
+    pub const REZERO_REFUSED: u8 = 1 << 4;
+    /// The node shows where it is.
+    pub const IDENTIFYING: u8 = 1 << 5;
+}
+
+/// A frame of [`super::Message::NodeStatus`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeStatus {
+    /// What the node is doing; `None` for a number that this version does not know.
+    pub state: Option<NodeState>,
+    /// Detail of the state, by the node; 0 for none.
+    pub reason: u8,
+    /// Bits of [`flag`].
+    pub flags: u8,
+    /// Ticks that came late or not at all.
+    pub missed_ticks: u16,
+    /// Times the bus was off.
+    pub bus_off: u8,
+    /// Version of the protocol.
+    pub version: u8,
+}
+
+impl NodeStatus {
+    /// The 52 bits of the frame. A state of `None` is sent as 15.
+    pub const fn payload(&self) -> Payload {
+        let state = match self.state {
+            Some(state) => state as u32,
+            None => 15,
+        };
+        Payload {
+            short: (self.flags as u32) << 12 | (self.reason as u32) << 4 | state,
+            long: (self.version as u32) << 24
+                | (self.bus_off as u32) << 16
+                | self.missed_ticks as u32,
+        }
+    }
+
+    /// From the 52 bits of a frame.
+    pub fn from_payload(p: Payload) -> Self {
+        let [m0, m1, bus_off, version] = p.long.to_le_bytes();
+        Self {
+            state: NodeState::from_number((p.short & 0xf) as u8),
+            reason: (p.short >> 4) as u8,
+            flags: (p.short >> 12) as u8,
+            missed_ticks: u16::from_le_bytes([m0, m1]),
+            bus_off,
+            version,
+        }
+    }
+}
+
+/// One counter of [`runtime::servo::Health`], with its page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HealthPage {
+    /// Which counter, 0 to 5 in the order of the struct.
+    pub page: u8,
+    /// Its value.
+    pub value: u32,
+}
+
+impl HealthPage {
+    /// Pages there are.
+    pub const PAGES: u8 = 6;
+
+    /// Page `number` modulo [`HealthPage::PAGES`].
+    pub const fn of(health: &Health, number: u32) -> Self {
+        let page = (number % Self::PAGES as u32) as u8;
+        let value = match page {
+            0 => health.ticks,
+            1 => health.planar_invalid,
+            2 => health.vertical_invalid,
+            3 => health.held,
+            4 => health.frames_missed,
+            _ => health.frames_repeated,
+        };
+        Self { page, value }
+    }
+
+    /// The 52 bits of the frame.
+    pub const fn payload(&self) -> Payload {
+        Payload {
+            short: self.page as u32,
+            long: self.value,
+        }
+    }
+
+    /// From the 52 bits of a frame.
+    pub const fn from_payload(p: Payload) -> Self {
+        Self {
+            page: (p.short & 0xf) as u8,
+            value: p.long,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_status_worked_by_hand() {
+        let status = NodeStatus {
+            state: Some(NodeState::BadParameters),
+            reason: 0x21,
+            flags: flag::WATCHDOG_RESET | flag::IDENTIFYING,
+            missed_ticks: 0x1234,
+            bus_off: 5,
+            version: 1,
+        };
+        let want = Payload {
+            short: 0x2_1213,
+            long: 0x0105_1234,
+        };
+        assert_eq!(status.payload(), want);
+        assert_eq!(NodeStatus::from_payload(want), status);
+    }
+
+    #[test]
+    fn every_state_has_the_number_of_its_place() {
+        for (number, state) in (0u8..).zip(NodeState::ALL) {
+            assert_eq!(state as u8, number);
+        }
+        assert_eq!(NodeState::from_number(7), None);
+    }
+
+    proptest! {
+        #[test]
+        fn any_frame_reads_back_as_it_was_sent(short in 0u32..1 << 20, long: u32) {
+            let sent = Payload { short, long };
+            let status = NodeStatus::from_payload(sent);
+            if status.state.is_some() { prop_assert_eq!(status.payload(), sent); }
+            let health = HealthPage::from_payload(Payload { short: short & 0xf, long });
+            prop_assert_eq!(health.payload(), Payload { short: short & 0xf, long });
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Damaged frames of the bus never become a pose that is called valid: a million and more,
+//! through coder, damage, receiver and decoder.
+
+use embedded_can::Frame;
+use hal_adapters::can::e2e::unprotect;
+use hal_adapters::can::{BusFrame, Layout, SensorReceiver, StampedFrame, Timing, sensor};
+use hal_adapters::fault::{Damage, Fault, FaultRates, Faulty, Random};
+use hal_adapters::source::FrameSource;
+use runtime::calibration::Origin;
+use runtime::frame::CodeWindow;
+use runtime::geometry::ProbeGeometry;
+use runtime::model::Sensitivity;
+use runtime::{Calibration, Decoder, ModelKind, PlanarPose, RawFrame, Reading, Status};
+use std::convert::Infallible;
+
+/// A stage near the designed one.
+fn decoder() -> Decoder {
+    let window = CodeWindow::between_rails(-32768, 32767).expect("16 bits");
+    let probe = |eta| Sensitivity {
+        eta,
+        per_z_m: -190.0,
+        per_rx_rad: -70.0,
+        per_ry_rad: 15.0,
+    };
+    let calibration = Calibration {
+        model: ModelKind::M31,
+        geometry: ProbeGeometry {
+            lever_arm_m: [0.1975, -0.1975, -0.36],
+            misalignment_rad: [0.02, -0.03, 0.01],
+        },
+        sensitivity: [probe(0.87), probe(0.70), probe(0.86)],
+        hall_m_per_code: 6.25e-8,
+        hall_window: window,
+        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
+        capacitive_m_per_code: 1.5625e-8,
+        capacitive_window: window,
+        calibrated_planar: [5e-4; 3],
+        calibrated_vertical: [3e-4; 3],
+        sensitivity_min: Calibration::SENSITIVITY_MIN,
+    };
+    let set = calibration.prepare(&Origin::default());
+    set.expect("a sound stage").decoder()
+}
+
+/// A tick whose six codes tell its number and where they belong.
+fn tick(n: u32) -> RawFrame {
+    let part = |shift: u32, channel: i32| ((n >> shift & 0xfff) as i32) * 8 + channel - 16_384;
+    RawFrame {
+        hall: [part(0, 0), part(12, 1), part(0, 2)],
+        capacitive: [part(0, 3), part(12, 4), part(0, 5)],
+        sequence: n,
+        time_us: n.wrapping_mul(2_000),
+    }
+}
+
+/// The number of the tick that a received code belongs to, by its two parts.
+fn number(low: i32, high: i32) -> u32 {
+    let part = |code: i32| ((code + 16_384) >> 3) as u32;
+    part(low) | part(high) << 12
+}
+
+/// Sends ticks over a bus with faults.
+struct Ticks {
+    next: u32,
+    end: u32,
+    left: Vec<BusFrame>,
+}
+
+impl FrameSource for Ticks {
+    type Frame = StampedFrame;
+    type Error = Infallible;
+
+    fn next_frame(&mut self) -> Result<Option<StampedFrame>, Infallible> {
+        if self.left.is_empty() {
+            if self.next == self.end {
+                return Ok(None);
+            }
+            let frames = sensor::frames(Layout::Bits16, &tick(self.next));
+            self.left = frames.map(BusFrame::from).collect();
+            self.left.reverse();
+            self.next += 1;
+        }
+        let time_us = u64::from(self.next) * 2_000;
+        Ok(self.left.pop().map(|frame| StampedFrame { time_us, frame }))
+    }
+}
+
+fn bits(reading: &Reading) -> [u32; 7] {
+    let (p, v) = (&reading.pose.planar, &reading.pose.vertical);
+    [
+        p.x_m.to_bits(),
+        p.y_m.to_bits(),
+        p.rz_rad.to_bits(),
+        v.z_m.to_bits(),
+        v.rx_rad.to_bits(),
+        v.ry_rad.to_bits(),
+        reading.status.bits(),
+    ]
+}
+
+struct Outcome {
+    frames: u32,
+    damaged: u32,
+    valid_poses: u32,
+    wrong_poses: u32,
+}
+
+/// Runs `ticks` ticks; counts poses that are called valid, and those among them that are not
+/// the pose of one tick that was sent.
+fn run(ticks: u32, rates: FaultRates, damaging: &[Fault], seed: u64) -> Outcome {
+    let decoder = decoder();
+    let source = Ticks {
+        next: 0,
+        end: ticks,
+        left: Vec::new(),
+    };
+    let mut source = Faulty::new(source, rates, seed);
+    let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
+    let mut out = Outcome {
+        frames: 0,
+        damaged: 0,
+        valid_poses: 0,
+        wrong_poses: 0,
+    };
+    while let Ok(Some(stamped)) = source.next_frame() {
+        out.frames += 1;
+        let now_us = stamped.time_us as u32;
+        let Some(got) = receiver.take(&stamped.frame, now_us).tick else {
+            continue;
+        };
+        let reading = decoder.decode(got.hall, got.capacitive, &PlanarPose::ZERO);
+        if reading.status.any(Status::PLANAR_INVALID) {
+            continue;
+        }
+        out.valid_poses += 1;
+        let sent = tick(number(got.hall[0], got.hall[1]));
+        let same = (sent.hall, sent.capacitive) == (got.hall, got.capacitive);
+        let want = decoder.decode(sent.hall, sent.capacitive, &PlanarPose::ZERO);
+        out.wrong_poses += u32::from(!same || bits(&want) != bits(&reading));
+    }
+    out.damaged = damaging.iter().map(|f| source.injected(*f)).sum();
+    out
+}
+
+#[test]
+fn no_pose_is_valid_from_three_flipped_bits_or_a_burst_of_eight() {
+    let rates = FaultRates::each(10_000)
+        .with(Fault::Flip, 200_000)
+        .with(Fault::Burst, 200_000)
+        .with(Fault::Noise, 0);
+    let out = run(600_000, rates, &[Fault::Flip, Fault::Burst], 1);
+    println!(
+        "RESULT light_damage_frames={} damaged={} valid_poses={} wrong_poses={} expected=0",
+        out.frames, out.damaged, out.valid_poses, out.wrong_poses
+    );
+    assert!(out.frames >= 1_000_000 && out.damaged >= 400_000);
+    // Nearly half of the frames have a fault, so a quarter of the ticks is whole: the check
+    // above means something only if many poses are valid.
+    assert!(out.valid_poses >= 100_000);
+    assert_eq!(out.wrong_poses, 0);
+}
+
+#[test]
+fn heavier_damage_passes_the_check_no_more_often_than_once_in_256() {
+    let key = hal_adapters::can::Message::Hall.spec().key;
+    let [frame, _] = sensor::frames_16(&tick(12_345)).map(BusFrame::from);
+    let mut random = Random::new(2);
+    let frames = 1_000_000u32;
+    let mut passed = 0u32;
+    for _ in 0..frames {
+        let damaged = frame.damaged(Fault::Noise, &mut random);
+        let bytes = damaged.data().try_into().expect("eight bytes");
+        passed += u32::from(unprotect(key, &bytes).is_some());
+    }
+    let expected = f64::from(frames) / 256.0;
+    println!("RESULT heavy_damage_frames={frames} passed={passed} expected={expected:.0}");
+    // Five standard deviations of a binomial count: exceeded once in three million seeds.
+    assert!(f64::from(passed) < expected + 5.0 * expected.sqrt());
+    assert!(f64::from(passed) > expected - 5.0 * expected.sqrt());
+}
+
+#[test]
+fn heavier_damage_becomes_a_pose_less_often_than_the_check_lets_pass() {
+    let rates = FaultRates::NONE.with(Fault::Noise, 300_000);
+    let out = run(600_000, rates, &[Fault::Noise], 3);
+    let expected = f64::from(out.damaged) / 256.0;
+    println!(
+        "RESULT heavy_damage_ticks=600000 damaged={} wrong_poses={} check_alone={expected:.0}",
+        out.damaged, out.wrong_poses
+    );
+    assert!(out.damaged >= 300_000);
+    // The counter must fit too, and both halves of the tick must come: far below.
+    assert!(f64::from(out.wrong_poses) < expected);
+}

@@ -1,0 +1,184 @@
+//! Every fault of a bus is noticed within one tick, wherever it falls; silence within 4 ms.
+
+use hal_adapters::can::{
+    BusFault, BusFrame, Layout, Message, SensorReceiver, StampedFrame, Timing, sensor,
+};
+use hal_adapters::fault::{Damage, Fault, Random};
+use runtime::RawFrame;
+use runtime::frame::MISSING_CODE;
+
+const PERIOD_US: u64 = 2_000;
+/// From frame to frame at 1 Mbit/s.
+const FRAME_US: u64 = 135;
+const LAYOUTS: [Layout; 2] = [Layout::Bits16, Layout::Bits24];
+
+fn tick(n: u32) -> RawFrame {
+    RawFrame {
+        hall: [n as i32 % 1000, 2, 3],
+        capacitive: [4, 5, n as i32 % 777],
+        sequence: n,
+        time_us: n * 2_000,
+    }
+}
+
+/// The frames of ticks `first` to `last` as a bus carries them.
+fn traffic(layout: Layout, first: u32, last: u32) -> Vec<StampedFrame> {
+    let mut all = Vec::new();
+    for n in first..=last {
+        let frames = sensor::frames(layout, &tick(n));
+        for (k, frame) in (0u64..).zip(frames) {
+            let time_us = u64::from(n) * PERIOD_US + k * FRAME_US;
+            let frame = BusFrame::from(frame);
+            all.push(StampedFrame { time_us, frame });
+        }
+    }
+    all
+}
+
+fn is_whole(frame: &RawFrame) -> bool {
+    let codes = frame.hall.iter().chain(&frame.capacitive);
+    !codes.into_iter().any(|code| *code == MISSING_CODE)
+}
+
+/// When the receiver first reports anything but whole ticks in good order, asked every ms.
+fn first_notice_us(layout: Layout, frames: &[StampedFrame], end_us: u64) -> Option<u64> {
+    let mut receiver = SensorReceiver::new(layout, Timing::default());
+    let mut frames = frames.iter().peekable();
+    let start_us = frames.peek()?.time_us;
+    for now_us in (start_us..end_us).step_by(5) {
+        while let Some(stamped) = frames.next_if(|f| f.time_us <= now_us) {
+            let taken = receiver.take(&stamped.frame, stamped.time_us as u32);
+            if taken.fault.is_some() || taken.tick.is_some_and(|t| !is_whole(&t)) {
+                return Some(stamped.time_us);
+            }
+        }
+        if now_us % 1_000 == 0 {
+            let taken = receiver.poll(now_us as u32);
+            if taken.fault.is_some() || taken.tick.is_some_and(|t| !is_whole(&t)) {
+                return Some(now_us);
+            }
+        }
+    }
+    None
+}
+
+/// Puts `fault` on frame `at`; gives the traffic and when the fault is there to be noticed.
+fn with_fault(
+    mut frames: Vec<StampedFrame>,
+    at: usize,
+    fault: Fault,
+    random: &mut Random,
+) -> (Vec<StampedFrame>, u64) {
+    let hit = frames[at];
+    match fault {
+        Fault::Drop => {
+            frames.remove(at);
+        }
+        Fault::Repeat => {
+            let time_us = hit.time_us + 1 + random.below(PERIOD_US - 1);
+            frames.push(StampedFrame { time_us, ..hit });
+            frames.sort_by_key(|f| f.time_us);
+            return (frames, time_us);
+        }
+        Fault::Swap => {
+            // With the next frame of the same message: one tick on.
+            let next = (at + 1..frames.len())
+                .find(|k| frames[*k].frame.id == hit.frame.id)
+                .expect("traffic goes on");
+            let (a, b) = (frames[at].frame, frames[next].frame);
+            frames[at].frame = b;
+            frames[next].frame = a;
+        }
+        Fault::Delay => {
+            // Beyond the time in which a tick is collected, from its first frame that comes.
+            let late = 1_000 + 3 * FRAME_US + random.below(9 * PERIOD_US);
+            frames[at].time_us += late;
+            frames.sort_by_key(|f| f.time_us);
+        }
+        _ => frames[at] = hit.damaged(fault, random),
+    }
+    (frames, hit.time_us)
+}
+
+#[test]
+fn each_injected_fault_is_noticed_within_one_tick() {
+    let mut random = Random::new(11);
+    let mut worst_us = [0u64; 9];
+    let mut trials = 0;
+    for _ in 0..400 {
+        for layout in LAYOUTS {
+            for fault in Fault::ALL {
+                if fault == Fault::Noise {
+                    continue; // passes once in 256 times, as it must
+                }
+                let first = random.below(1 << 20) as u32;
+                let frames = traffic(layout, first, first + 40);
+                let at = frames
+                    .iter()
+                    .position(|f| f.time_us >= u64::from(first + 10) * PERIOD_US)
+                    .expect("ten ticks on");
+                let at = at + random.below(40) as usize;
+                if frames[at].frame.id == Message::SensorTime.id().into() {
+                    continue; // carries no codes
+                }
+                let (frames, fault_us) = with_fault(frames, at, fault, &mut random);
+                let end_us = u64::from(first + 35) * PERIOD_US;
+                let noticed_us = first_notice_us(layout, &frames, end_us);
+                let noticed_us = noticed_us.unwrap_or_else(|| panic!("{fault:?} unnoticed"));
+                assert!(noticed_us >= fault_us, "{fault:?} before it happened");
+                let worst = &mut worst_us[fault as usize];
+                *worst = (*worst).max(noticed_us - fault_us);
+                trials += 1;
+            }
+        }
+    }
+    assert!(trials > 5_000);
+    for (fault, worst) in Fault::ALL.iter().zip(worst_us) {
+        println!("RESULT fault={fault:?} worst_notice_us={worst}");
+        assert!(worst <= PERIOD_US, "{fault:?}: {worst} us");
+    }
+}
+
+#[test]
+fn traffic_without_faults_gives_no_notice() {
+    for layout in LAYOUTS {
+        let frames = traffic(layout, 1_000, 2_000);
+        let end_us = 2_000 * PERIOD_US;
+        assert_eq!(first_notice_us(layout, &frames, end_us), None);
+    }
+}
+
+#[test]
+fn silence_is_stale_within_4_ms_of_the_last_frame_when_asked_every_millisecond() {
+    let mut worst_us = 0;
+    for phase_us in (0..1_000).step_by(7) {
+        let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
+        let frames = traffic(Layout::Bits16, 100, 120);
+        for f in &frames {
+            receiver.take(&f.frame, f.time_us as u32);
+        }
+        let last_us = frames.last().map(|f| f.time_us).expect("frames");
+        let mut now_us = last_us + phase_us;
+        while !matches!(
+            receiver.poll(now_us as u32).fault,
+            Some(BusFault::Stale { .. })
+        ) {
+            now_us += 1_000;
+            assert!(now_us < last_us + 10_000, "never stale");
+        }
+        worst_us = worst_us.max(now_us - last_us);
+    }
+    println!("RESULT stale_after_us_max={worst_us}");
+    assert!(worst_us <= 4_000);
+}
+
+#[test]
+fn the_deadline_that_the_receiver_names_is_when_it_calls_the_source_stale() {
+    let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
+    for f in traffic(Layout::Bits16, 100, 120) {
+        receiver.take(&f.frame, f.time_us as u32);
+    }
+    let deadline_us = receiver.deadline_us().expect("frames came");
+    assert_eq!(receiver.poll(deadline_us - 1).fault, None);
+    assert!(receiver.poll(deadline_us).fault.is_some());
+}
