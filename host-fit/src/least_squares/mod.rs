@@ -9,7 +9,7 @@
 //! | [`starts`] | several starts on few rows, the finish on all |
 //!
 //! Our own, and not the `levenberg-marquardt` or `varpro` crate, because both want the Jacobian
-//! of every row in memory: `cargo bench -p host-fit --bench solvers` prints both.
+//! of every row in memory: `cargo bench -p host-fit --bench least_squares` prints both.
 
 pub mod coordinates;
 pub mod descend;

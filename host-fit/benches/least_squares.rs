@@ -1,0 +1,181 @@
+//! What the main job costs, and why the least-squares solver is our own: the same problem by the
+//! `levenberg-marquardt` crate, which keeps the Jacobian of every row in memory.
+//!
+//! Prints `RESULT key=value` lines, medians of several runs.
+
+use host_fit::fit::{FitSettings, fit};
+use host_fit::least_squares::coordinates::{Coordinates, Gains};
+use host_fit::least_squares::normal::{Point, best_gain};
+use host_fit::least_squares::scatter::{Offset, Q, Ratios, U, mean, regressors, scatter};
+use host_fit::least_squares::starts::LeastSquares;
+use host_fit::log;
+use host_fit::problem::Problem;
+use host_fit::solver::{Projection, Solver, SolverOptions};
+use host_fit::stage::Stage;
+use host_fit::train::{Draw, draw_rows};
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use nalgebra::{DVector, Dyn, OVector, Owned, U18};
+use runtime::ModelKind;
+use std::time::Instant;
+
+/// Median time of `runs` calls, ms.
+fn median_ms(runs: usize, mut call: impl FnMut()) -> f64 {
+    let mut times: Vec<f64> = (0..runs)
+        .map(|_| {
+            let started = Instant::now();
+            call();
+            started.elapsed().as_secs_f64() * 1e3
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    times[runs / 2]
+}
+
+/// The residuals with the offsets projected out, for the crate: 18 unknowns (G, r).
+struct Crate<'p> {
+    problem: &'p Problem<'p>,
+    x: OVector<f64, U18>,
+}
+
+impl Crate<'_> {
+    fn point(&self) -> Point {
+        let gains = Gains {
+            model: ModelKind::M31,
+        };
+        gains.point(&self.x).expect("any gains are a point")
+    }
+
+    /// The centred regressors of every row.
+    fn each(&self, ratios: &Ratios, mut take: impl FnMut(usize, &[f64])) {
+        for group in &self.problem.groups {
+            let rows = &self.problem.rows[group.rows.clone()];
+            let mean = mean(rows, ratios).expect("no pole");
+            for (k, row) in rows.iter().enumerate() {
+                let mut z = regressors(row, ratios).expect("no pole");
+                z.iter_mut().zip(mean).for_each(|(z, mean)| *z -= mean);
+                take(group.rows.start + k, &z);
+            }
+        }
+    }
+}
+
+impl LeastSquaresProblem<f64, Dyn, U18> for Crate<'_> {
+    type ParameterStorage = Owned<f64, U18>;
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, U18>;
+
+    fn set_params(&mut self, x: &OVector<f64, U18>) {
+        self.x = *x;
+    }
+    fn params(&self) -> OVector<f64, U18> {
+        self.x
+    }
+    fn residuals(&self) -> Option<DVector<f64>> {
+        let point = self.point();
+        let mut out = DVector::zeros(3 * self.problem.rows.len());
+        self.each(&point.ratios, |row, z| {
+            for axis in 0..3 {
+                let decoded: f64 = (0..3).map(|k| point.gain[(axis, k)] * z[k]).sum();
+                out[3 * row + axis] = decoded - z[Q + axis];
+            }
+        });
+        Some(out)
+    }
+    fn jacobian(&self) -> Option<nalgebra::OMatrix<f64, Dyn, U18>> {
+        let point = self.point();
+        let mut out = nalgebra::OMatrix::<f64, Dyn, U18>::zeros(3 * self.problem.rows.len());
+        self.each(&point.ratios, |row, z| {
+            for axis in 0..3 {
+                for k in 0..3 {
+                    out[(3 * row + axis, 3 * axis + k)] = z[k];
+                }
+                for k in 0..9 {
+                    out[(3 * row + axis, 9 + k)] = point.gain[(axis, k / 3)] * z[U + k];
+                }
+            }
+        });
+        Some(out)
+    }
+}
+
+fn compare(name: &str, problem: &Problem, runs: usize) {
+    let options = SolverOptions {
+        projection: Projection::Linear,
+        seed: 1,
+        population: 0,
+        generations: 0,
+    };
+    let mut cost = 0.0;
+    let ours = median_ms(runs, || {
+        cost = LeastSquares
+            .solve(problem, &options)
+            .expect("a solution")
+            .cost;
+    });
+    println!("RESULT least_squares_{name}_ms={ours:.3}");
+    let ratios = [[0.0; 3]; 3];
+    let offsets = vec![Offset::Free; problem.groups.len()];
+    let sums = scatter(problem, &ratios, &offsets).expect("no pole");
+    let gain = best_gain(&sums).expect("a gain");
+    let x = Gains::unknowns(&Point { gain, ratios });
+    let mut theirs_cost = 0.0;
+    let theirs = median_ms(runs.min(5), || {
+        let (_, report) = LevenbergMarquardt::new().minimize(Crate { problem, x });
+        theirs_cost = 2.0 * report.objective_function;
+    });
+    println!("RESULT levenberg_marquardt_crate_{name}_ms={theirs:.3}");
+    println!(
+        "RESULT cost_difference_{name}={:.1e}",
+        (cost / theirs_cost - 1.0).abs()
+    );
+}
+
+fn main() {
+    let stage = Stage::from_toml(host_fit::shipped::STAGE_TOML, "stage.toml".as_ref())
+        .expect("the shipped stage");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("log.csv.gz");
+    std::fs::write(&path, host_fit::shipped::LOG_GZ).expect("written");
+    let read = || {
+        log::read(
+            std::slice::from_ref(&path),
+            &stage,
+            &log::ReadOptions::default(),
+        )
+        .expect("read")
+    };
+    println!(
+        "RESULT read_57000_rows_ms={:.1}",
+        median_ms(9, || drop(read()))
+    );
+    let dataset = read().dataset;
+    let settings = FitSettings {
+        model: ModelKind::M31,
+        train: None,
+        draw: Draw::Stratified,
+        solver: SolverOptions {
+            projection: Projection::Linear,
+            seed: 1,
+            population: 0,
+            generations: 0,
+        },
+        serial: runtime::parameters::Text::new(),
+        created: runtime::parameters::Text::new(),
+    };
+    let whole = median_ms(9, || {
+        fit(&dataset, &stage, &LeastSquares, &settings).expect("a fit");
+    });
+    println!("RESULT fit_and_judge_57000_rows_ms={whole:.1}");
+    let all: Vec<usize> = (0..dataset.rows.len()).collect();
+    compare(
+        "57000_rows",
+        &Problem::new(&dataset, &all, &stage, ModelKind::M31),
+        9,
+    );
+    let some = draw_rows(&dataset, 200, Draw::Stratified, 1);
+    compare(
+        "200_rows",
+        &Problem::new(&dataset, &some, &stage, ModelKind::M31),
+        51,
+    );
+}
