@@ -80,7 +80,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let (target, existing) = resolve(path)?;
     let explain = |source| explain(source, path, &folder_of(&target), bytes.len());
     match existing {
-        Some(metadata) if !metadata.is_file() => write_through(&target, bytes),
+        Some(metadata) if is_stream(path, &metadata) => write_through(path, bytes),
         existing => replace(&target, bytes, existing),
     }
     .map_err(explain)
@@ -110,7 +110,7 @@ pub fn make_folder(path: &Path) -> Result<(), OutputError> {
 /// Every variant of [`OutputError`] but `Full`.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     let (target, existing) = resolve(path)?;
-    if existing.is_some_and(|metadata| !metadata.is_file()) {
+    if existing.is_some_and(|metadata| is_stream(path, &metadata)) {
         return Ok(());
     }
     let folder = folder_of(&target);
@@ -143,6 +143,13 @@ fn resolve(path: &Path) -> Result<(PathBuf, Option<Metadata>), OutputError> {
     }
 }
 
+/// Whether `path` is something to write to, not to replace: a device, a pipe, or the
+/// standard output under its name in the file system, which a shell may have led to a file.
+fn is_stream(path: &Path, metadata: &Metadata) -> bool {
+    let named_stream = cfg!(unix) && (path.starts_with("/dev") || path.starts_with("/proc"));
+    named_stream || !metadata.is_file()
+}
+
 /// Whether the name asks for a folder, as `out/` does.
 fn ends_in_separator(path: &Path) -> bool {
     let last = path.as_os_str().as_encoded_bytes().last();
@@ -166,14 +173,17 @@ fn temporary(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
         // Less the user's umask.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder)
+    // Without the temporary name, which means nothing to the user.
+    builder
+        .tempfile_in(folder)
+        .map_err(|error| std::io::Error::from(error.kind()))
 }
 
 /// Puts a new file in the place of `target`.
 fn replace(target: &Path, bytes: &[u8], existing: Option<Metadata>) -> std::io::Result<()> {
     let folder = folder_of(target);
     let mut file = temporary(&folder)?;
-    file.write_all(bytes)?;
+    file.as_file_mut().write_all(bytes)?;
     if let Some(metadata) = existing {
         file.as_file().set_permissions(metadata.permissions())?;
     }
@@ -186,9 +196,9 @@ fn replace(target: &Path, bytes: &[u8], existing: Option<Metadata>) -> std::io::
     Ok(())
 }
 
-/// Writes to a device or a pipe, which cannot be replaced.
+/// Writes to what cannot be replaced, after what is there.
 fn write_through(target: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut device = OpenOptions::new().write(true).open(target)?;
+    let mut device = OpenOptions::new().append(true).open(target)?;
     device.write_all(bytes)?;
     device.flush()
 }

@@ -196,6 +196,22 @@ fn word() -> impl Strategy<Value = u32> {
     prop_oneof![any, (-1e-3f32..1e-3).prop_map(f32::to_bits)]
 }
 
+#[test]
+fn every_row_of_the_log_that_ships_with_the_program_is_restored() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
+    let stage = crate::stage::Stage::from_file(&data.join("stage.toml")).expect("sound");
+    let logs = [data.join("paper.csv.gz")];
+    let reading = crate::log::read(&logs, &stage, &crate::log::ReadOptions::DECODE).expect("sound");
+    let rows = decode(&reading.dataset, &decoder(), OnInvalid::Zero);
+    let text = String::from_utf8(to_text(&rows)).expect("ASCII");
+    let read = parse(&text, Path::new("x")).expect("own text");
+    assert_eq!(read.len(), 57_000);
+    for (read, written) in read.iter().zip(&rows) {
+        assert_eq!(words(read), words(written));
+        assert_eq!(read, written);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 

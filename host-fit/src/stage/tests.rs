@@ -94,7 +94,14 @@ fn a_sound_file_gives_the_stage_in_si_units() {
     );
     assert_eq!(stage.capacitive_probes_m[2], [0.0, -0.12]);
     assert_eq!(stage.y_baseline_m, 0.1);
-    assert_eq!(stage.search.theta_rad.high, 8f64.to_radians());
+    let theta = 8f64.to_radians();
+    assert_eq!(
+        stage.search.theta_rad,
+        Range {
+            low: -theta,
+            high: theta
+        }
+    );
     assert_eq!(stage.search.c_per_rad[1].low, -5000.0);
     assert_eq!(stage.search.delta_m.high, 10e-6);
     assert_eq!(stage.log, crate::log::layout::LogLayout::default());
