@@ -305,9 +305,14 @@ fn wrong_usage_ends_with_status_2() {
         "fit log.csv --stage stage.toml --out p.bin --seed -1",
         "fit log.csv --stage stage.toml --out p.bin --threads 0",
         "decode p.bin --out pose.csv",
+        "fit log.csv --stage stage.toml --out log.csv",
+        "fit log.csv --stage stage.toml --out ./stage.toml",
+        "fit log.csv --stage stage.toml --out p.bin --json p.bin",
+        "inspect log.csv --json log.csv",
     ] {
         assert_eq!(bench.run(arguments).status.code(), Some(2), "{arguments}");
     }
+    assert!(bench.holds_only(&["log.csv"]));
     let serial = "x".repeat(33);
     let long = bench.run_args(&[
         "fit",

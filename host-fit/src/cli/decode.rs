@@ -11,6 +11,12 @@ use runtime::servo::OnInvalid;
 
 /// Decodes a log into a pose file.
 pub fn run(args: &DecodeArgs) -> Result<(), HostError> {
+    let inputs = [
+        args.params.as_path(),
+        args.log.as_path(),
+        args.stage.as_path(),
+    ];
+    super::keep_apart(&[Some(&args.out)], &inputs)?;
     let set = blob_file::read(&args.params)?;
     let stage = Stage::from_file(&args.stage)?;
     super::same_scales(&set, &stage, &args.stage)?;

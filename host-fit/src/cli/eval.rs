@@ -8,11 +8,15 @@ use crate::log;
 use crate::report::json::of_eval;
 use crate::report::text;
 use crate::stage::Stage;
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Judges a blob on logs with reference.
 pub fn run(args: &EvalArgs) -> Result<(), HostError> {
     let started = Instant::now();
+    let mut inputs = vec![args.params.as_path(), args.stage.as_path()];
+    inputs.extend(args.logs.iter().map(PathBuf::as_path));
+    super::keep_apart(&[args.json.as_deref()], &inputs)?;
     let set = blob_file::read(&args.params)?;
     let stage = Stage::from_file(&args.stage)?;
     super::same_scales(&set, &stage, &args.stage)?;

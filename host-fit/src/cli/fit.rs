@@ -10,11 +10,24 @@ use crate::report::{html, plots, text};
 use crate::solver::SolverOptions;
 use crate::stage::Stage;
 use crate::{blob_file, judge, log, output};
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Reads, fits, judges; then writes blob, JSON and report, in this order.
 pub fn run(args: &FitArgs) -> Result<(), HostError> {
     let started = Instant::now();
+    let inputs: Vec<&Path> = args
+        .logs
+        .iter()
+        .chain([&args.stage])
+        .map(PathBuf::as_path)
+        .collect();
+    let outputs = [
+        Some(args.out.as_path()),
+        args.json.as_deref(),
+        args.report.as_deref(),
+    ];
+    super::keep_apart(&outputs, &inputs)?;
     super::use_threads(args.threads);
     let stage = Stage::from_file(&args.stage)?;
     let options = ReadOptions {
@@ -104,7 +117,7 @@ pub fn write_report(
     fit: &Fit,
     log: &LogReading,
     names: &[String],
-    folder: &std::path::Path,
+    folder: &Path,
 ) -> Result<(), HostError> {
     let mut errors = judge::pose_errors(&fit.set.decoder(), &log.dataset);
     for (movement, zero) in log.dataset.movements.iter().zip(&fit.judgement.zeros) {

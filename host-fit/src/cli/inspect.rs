@@ -12,6 +12,7 @@ use std::fmt::Write;
 
 /// Shows every field of a blob.
 pub fn run(args: &InspectArgs) -> Result<(), HostError> {
+    super::keep_apart(&[args.json.as_deref()], &[&args.params])?;
     let set = blob_file::read(&args.params)?;
     if let Some(path) = &args.json {
         super::write_json(&as_json(&set), path)?;

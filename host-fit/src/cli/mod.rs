@@ -96,6 +96,26 @@ fn write_json(report: &impl serde::Serialize, path: &Path) -> Result<(), HostErr
     }
 }
 
+/// Refuses outputs that would replace an input, or each other.
+fn keep_apart(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<(), HostError> {
+    let place = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let mut taken: Vec<_> = inputs.iter().map(|path| place(path)).collect();
+    for output in outputs.iter().flatten() {
+        let here = place(output);
+        if taken.contains(&here) && !is_standard_output(Some(output)) {
+            return Err(HostError::Usage {
+                argument: "output",
+                problem: format!(
+                    "{} is an input or another output of this command; name another file",
+                    output.display()
+                ),
+            });
+        }
+        taken.push(here);
+    }
+    Ok(())
+}
+
 /// Limits the threads of everything that follows. The results do not depend on it.
 fn use_threads(threads: Option<u16>) {
     if let Some(threads) = threads {
