@@ -3,6 +3,7 @@
 mod columns;
 mod error;
 mod file;
+mod ranges;
 mod value;
 
 pub use error::{Place, StageError, ValueFault};

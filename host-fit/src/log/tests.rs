@@ -1,6 +1,7 @@
 mod accepts;
 mod fuzz;
 mod refuses;
+mod refuses_cells;
 mod refuses_files;
 mod skips;
 
@@ -64,4 +65,14 @@ fn place(error: &LogError) -> (usize, usize, &str, Option<i64>) {
         }
         other => panic!("no cell: {other}"),
     }
+}
+
+/// The error of a log that is refused, which must name the file and a remedy.
+#[track_caller]
+fn refused(text: &str) -> LogError {
+    let error = read_text(text, &ReadOptions::default()).expect_err("refused");
+    let message = error.to_string();
+    assert!(message.starts_with("log.csv"), "names the file: {message}");
+    assert!(message.contains("; "), "names a remedy: {message}");
+    error
 }

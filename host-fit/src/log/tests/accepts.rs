@@ -69,7 +69,7 @@ fn separators_line_ends_comments_and_marks_do_not_matter() {
     let commented = LOG.replace("\n4,0", "\n# second, movement\n\n4,0");
     same_rows(
         &format!("# made, by hand; twice\n\n{commented}\n  \n# end"),
-        &stage(),
+        stage(),
     );
     same_rows(&LOG.replace(',', " , "), stage());
     same_rows(&LOG.replace("movement", "\"movement\""), stage());

@@ -1,7 +1,7 @@
 use super::*;
 
 #[track_caller]
-fn refused(bytes: &[u8]) -> LogError {
+fn refused_file(bytes: &[u8]) -> LogError {
     let path = Path::new("log.csv.gz");
     let error = read_bytes(bytes, path, stage(), &ReadOptions::default()).expect_err("refused");
     let message = error.to_string();
@@ -29,22 +29,22 @@ fn no_log_no_file_and_a_folder() {
 
 #[test]
 fn binary_files() {
-    let error = refused(b"\x7fELF\x02\x01\x01\0\0\0");
+    let error = refused_file(b"\x7fELF\x02\x01\x01\0\0\0");
     assert!(
         matches!(error, LogError::Binary { offset: 0, .. }),
         "{error}"
     );
-    let error = refused(format!("{LOG}\0").as_bytes());
+    let error = refused_file(format!("{LOG}\0").as_bytes());
     assert!(
         matches!(error, LogError::Binary { offset, .. } if offset == LOG.len()),
         "{error}"
     );
     let utf16: Vec<u8> = LOG.encode_utf16().flat_map(u16::to_le_bytes).collect();
-    let error = refused(&[b"\xff\xfe".as_slice(), &utf16].concat());
+    let error = refused_file(&[b"\xff\xfe".as_slice(), &utf16].concat());
     assert!(error.to_string().contains("UTF-16"), "{error}");
-    let error = refused(b"PK\x03\x04rest");
+    let error = refused_file(b"PK\x03\x04rest");
     assert!(error.to_string().contains("export it as CSV"), "{error}");
-    let error = refused(&gzip(&gzip(LOG.as_bytes())));
+    let error = refused_file(&gzip(&gzip(LOG.as_bytes())));
     assert!(error.to_string().contains("gzip inside gzip"), "{error}");
     // Bytes that no text has further on are a bad cell, shown without them.
     let latin = LOG.replace(",161,", ",\u{b5}61,").into_bytes();
@@ -61,14 +61,14 @@ fn binary_files() {
 fn a_gzip_file_cut_anywhere_damaged_or_followed_by_rubbish() {
     let packed = gzip(LOG.as_bytes());
     for end in 2..packed.len() {
-        let error = refused(&packed[..end]);
+        let error = refused_file(&packed[..end]);
         assert!(matches!(error, LogError::GzipCut { .. }), "{end}: {error}");
     }
     let last = packed.len() - 1;
     for at in [last, last - 4] {
         let mut wrong = packed.clone();
         wrong[at] ^= 1;
-        let error = refused(&wrong);
+        let error = refused_file(&wrong);
         assert!(
             matches!(error, LogError::GzipDamaged { .. }),
             "checksum and length: {error}"
@@ -76,17 +76,17 @@ fn a_gzip_file_cut_anywhere_damaged_or_followed_by_rubbish() {
     }
     let mut wrong = packed.clone();
     wrong[3] = 0xe0;
-    let error = refused(&wrong);
+    let error = refused_file(&wrong);
     assert!(
         matches!(error, LogError::GzipDamaged { .. }),
         "header flags: {error}"
     );
-    let error = refused(&[packed.as_slice(), b"rubbish"].concat());
+    let error = refused_file(&[packed.as_slice(), b"rubbish"].concat());
     assert!(
         matches!(error, LogError::GzipTrailing { bytes: 7, .. }),
         "{error}"
     );
-    let error = refused(&gzip(b""));
+    let error = refused_file(&gzip(b""));
     assert!(matches!(error, LogError::Empty { .. }), "{error}");
 }
 

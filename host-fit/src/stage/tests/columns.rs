@@ -26,9 +26,12 @@ fn names_units_and_scales_are_mapped() {
     assert!(stage.log.ignores("temperature") && stage.log.ignores("x_m"));
 }
 
+/// A table `[log]`, the column and the key of its fault, and which fault it is.
+type Case = (&'static str, usize, &'static str, fn(&ValueFault) -> bool);
+
 #[test]
 fn what_is_wrong_with_a_column_is_named() {
-    let cases: [(&str, usize, &str, fn(&ValueFault) -> bool); 9] = [
+    let cases: [Case; 9] = [
         ("ifm_x = \"laser\"", 9, "log.ifm_x", |f| {
             matches!(f, ValueFault::NoUnit { .. })
         }),

@@ -1,0 +1,107 @@
+use super::*;
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("a folder");
+    let name = |entry: std::io::Result<fs::DirEntry>| {
+        let name = entry.expect("an entry").file_name();
+        name.to_string_lossy().into_owned()
+    };
+    let mut names: Vec<_> = entries.map(name).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_file_is_written_whole_and_replaced_whole_and_leaves_nothing_beside_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("params.bin");
+    check_writable(&path).expect("writable");
+    assert!(names(folder.path()).is_empty(), "the check leaves nothing");
+    write_atomically(&path, b"first, and longer").expect("written");
+    write_atomically(&path, b"second").expect("replaced");
+    assert_eq!(fs::read(&path).expect("readable"), b"second");
+    assert_eq!(names(folder.path()), ["params.bin"]);
+}
+
+#[test]
+fn a_target_that_cannot_be_is_named_with_its_reason() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("file"), b"old").expect("written");
+    let write = |path: &Path| write_atomically(path, b"new").expect_err("refused");
+    let (is_folder, no_folder) = (write(folder.path()), write(&at("missing/params.bin")));
+    assert!(
+        matches!(is_folder, OutputError::IsFolder { .. }),
+        "{is_folder}"
+    );
+    assert!(
+        matches!(no_folder, OutputError::NoFolder { .. }),
+        "{no_folder}"
+    );
+    assert!(no_folder.to_string().contains("create it"), "{no_folder}");
+    let slash = write(&at("new/"));
+    assert!(matches!(slash, OutputError::IsFolder { .. }), "{slash}");
+    let empty = write(Path::new(""));
+    assert!(matches!(empty, OutputError::NoName), "{empty}");
+    let below_file = write(&at("file/params.bin"));
+    #[cfg(unix)]
+    assert!(
+        matches!(below_file, OutputError::NotAFolder { .. }),
+        "{below_file}"
+    );
+    assert!(below_file.to_string().contains("another"), "{below_file}");
+    assert_eq!(names(folder.path()), ["file"]);
+}
+
+#[test]
+fn a_read_only_file_stays_as_it_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("params.bin");
+    fs::write(&path, b"old").expect("written");
+    let writable = fs::metadata(&path).expect("there").permissions();
+    let mut locked = writable.clone();
+    locked.set_readonly(true);
+    fs::set_permissions(&path, locked).expect("set");
+    let error = write_atomically(&path, b"new").expect_err("refused");
+    assert!(matches!(error, OutputError::ReadOnly { .. }), "{error}");
+    assert_eq!(fs::read(&path).expect("readable"), b"old");
+    fs::set_permissions(&path, writable).expect("set");
+}
+
+#[cfg(unix)]
+#[test]
+fn permissions_are_those_of_a_new_file_or_of_the_file_replaced() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().expect("a folder");
+    let mode = |path: &Path| fs::metadata(path).expect("there").permissions().mode();
+    let (ordinary, ours) = (folder.path().join("a"), folder.path().join("b"));
+    fs::write(&ordinary, b"").expect("written");
+    write_atomically(&ours, b"").expect("written");
+    assert_eq!(mode(&ours), mode(&ordinary));
+    fs::set_permissions(&ours, fs::Permissions::from_mode(0o640)).expect("set");
+    write_atomically(&ours, b"again").expect("replaced");
+    assert_eq!(mode(&ours) & 0o777, 0o640);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_is_followed_not_replaced() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+    fs::write(&file, b"old").expect("written");
+    std::os::unix::fs::symlink(&file, &link).expect("linked");
+    write_atomically(&link, b"new").expect("written");
+    assert_eq!(fs::read(&file).expect("readable"), b"new");
+    assert!(fs::symlink_metadata(&link).expect("there").is_symlink());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_device_is_written_to_and_a_full_one_says_so() {
+    write_atomically(Path::new("/dev/null"), b"new").expect("swallowed");
+    let error = write_atomically(Path::new("/dev/full"), b"new").expect_err("full");
+    assert!(
+        matches!(error, OutputError::Full { bytes: 3, .. }),
+        "{error}"
+    );
+}
