@@ -26,7 +26,7 @@ pub use cell::CellFault;
 pub use error::{CellPlace, LogError};
 pub use warning::{LogWarning, SkipReason};
 
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, LogSource, Row};
 use crate::stage::Stage;
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -144,7 +144,27 @@ fn append(
     let text = Text::new(path, bytes);
     let (dataset, warnings) = (&mut reading.dataset, &mut reading.warnings);
     reading.skipped_rows += reader::append(&text, stage, options, dataset, warnings)?;
-    Ok(())
+    refuse_repeated_log(&reading.dataset)
+}
+
+/// Refuses the last log if an earlier one holds the same rows.
+fn refuse_repeated_log(dataset: &Dataset) -> Result<(), LogError> {
+    let Some((last, earlier)) = dataset.logs.split_last() else {
+        return Ok(());
+    };
+    let rows = |source: &LogSource| dataset.rows.get(source.rows.clone()).unwrap_or_default();
+    let same = |a: &Row, b: &Row| (a.t_us, a.frame, a.reference) == (b.t_us, b.frame, b.reference);
+    let repeats = |first: &&LogSource| {
+        let (first, last) = (rows(first), rows(last));
+        first.len() == last.len() && first.iter().zip(last).all(|(a, b)| same(a, b))
+    };
+    match earlier.iter().find(repeats) {
+        None => Ok(()),
+        Some(first) => Err(LogError::SameLog {
+            path: last.path.clone(),
+            first: first.path.clone(),
+        }),
+    }
 }
 
 #[cfg(test)]

@@ -261,6 +261,14 @@ pub enum LogError {
         /// The line at which another movement began.
         left_line: usize,
     },
+    /// A log holds the same rows as one named before it, so they would count twice.
+    #[error("{}: the same rows as in {}; name each log once", path.display(), first.display())]
+    SameLog {
+        /// The file.
+        path: PathBuf,
+        /// The file named before it.
+        first: PathBuf,
+    },
     /// Every row was left out.
     #[error("{}: all {rows} rows are bad and were left out (the first: {first}); record the log again", path.display())]
     NoGoodRows {

@@ -6,7 +6,6 @@ mod refuses_files;
 mod skips;
 
 use super::*;
-use crate::dataset::Row;
 use crate::stage::tests::SOUND;
 use std::io::Write;
 

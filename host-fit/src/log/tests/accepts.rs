@@ -227,7 +227,7 @@ fn several_logs_are_one_dataset_hashed_in_their_order() {
     let (plain, packed) = (folder.path().join("a.csv.gz"), folder.path().join("b.csv"));
     // Names say nothing: the plain one is called gz, the packed one is not.
     std::fs::write(&plain, LOG).expect("written");
-    let other = LOG.replace("\n0,", "\n3,");
+    let other = LOG.replace("\n0,", "\n3,").replace(",97,", ",98,");
     let (head, tail) = other.split_at(200);
     let members = [gzip(head.as_bytes()), gzip(tail.as_bytes())].concat();
     std::fs::write(&packed, members).expect("written");
