@@ -220,7 +220,7 @@ pub enum LogError {
         line: usize,
         /// Cells of the header.
         expected: usize,
-        /// Whole cells of the last line.
+        /// Cells of the last line; the last of them may be cut too.
         found: usize,
     },
     /// A cell that is no sound number of its column.
@@ -270,7 +270,7 @@ pub enum LogError {
         first: PathBuf,
     },
     /// Every row was left out.
-    #[error("{}: all {rows} rows are bad and were left out (the first: {first}); record the log again", path.display())]
+    #[error("{}: every row is bad and was left out, {rows} in all (the first: {first}); record the log again", path.display())]
     NoGoodRows {
         /// The file.
         path: PathBuf,

@@ -56,7 +56,7 @@ impl From<&CellFault> for SkipReason {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LogWarning {
     /// Rows were left out, as the user asked.
-    #[error("{}: {rows} rows left out for {} (the first: line {}, column {}, {})", first.path.display(), reason.text(), first.line, first.column, first.name)]
+    #[error("{}: rows left out for {}: {rows} (the first: line {}, column {}, {})", first.path.display(), reason.text(), first.line, first.column, first.name)]
     RowsSkipped {
         /// Why.
         reason: SkipReason,
@@ -66,7 +66,7 @@ pub enum LogWarning {
         first: Box<CellPlace>,
     },
     /// All rows of a movement were left out.
-    #[error("{}: movement {movement} is left out: all its {rows} rows are bad; record it again if its setting matters", path.display())]
+    #[error("{}: movement {movement} is left out: all its rows ({rows}) are bad; record it again if its setting matters", path.display())]
     MovementSkipped {
         /// The file.
         path: PathBuf,
