@@ -1,1 +1,16 @@
-//! x
+//! What the checks across crates and machines share.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`job`] | frames in, words out: the files that host and target exchange |
+//! | [`motion`] | frames and parameters for a job: a log, random codes, random words |
+//! | [`compare`] | the host's words of a job beside the target's |
+//! | [`trace`] | executed instructions, counted from an emulator's log |
+
+#[cfg(test)]
+extern crate self as tests;
+
+pub mod compare;
+pub mod job;
+pub mod motion;
+pub mod trace;

@@ -1,0 +1,216 @@
+//! Compares the words of a target with those of the host. See `compare --help`.
+
+use clap::{Parser, Subcommand};
+use host_fit::log::{self, ReadOptions};
+use host_fit::stage::Stage;
+use host_fit::{pose_file, shipped};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use runtime::blob::MAX_BYTES;
+use runtime::{OnInvalid, ParameterSet, PlanarPose};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use tests::compare::{Comparison, compare, to_bytes};
+use tests::motion::{self, Section};
+
+/// Compares the words that a target gives with those of the host, bit for bit.
+///
+/// `make` writes the frames of a log, random codes and random parameters into a job file; an
+/// image that does the job on the target answers with a file of words; `check` compares them.
+/// `poses` compares a pose file that a controller recorded with the host's decoder.
+#[derive(Parser)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Write a job file.
+    Make {
+        /// The parameter blob.
+        params: PathBuf,
+        /// The log; the one that ships with the program if not given.
+        #[arg(long)]
+        log: Option<PathBuf>,
+        /// The stage that the log belongs to.
+        #[arg(long, requires = "log")]
+        stage: Option<PathBuf>,
+        /// Where to write the job.
+        #[arg(long)]
+        out: PathBuf,
+        /// Ticks of uniform random codes.
+        #[arg(long, default_value_t = 800_000)]
+        codes: usize,
+        /// Ticks with random parameters.
+        #[arg(long, default_value_t = 160_000)]
+        parameters: usize,
+        /// Ticks for which what is invalid is held.
+        #[arg(long, default_value_t = 3)]
+        hold: u16,
+        /// Seed of everything random.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
+    /// Do a job on this machine and compare the target's words.
+    Check {
+        /// The job file.
+        job: PathBuf,
+        /// The target's words.
+        words: PathBuf,
+    },
+    /// Compare recorded poses with the host's decoder.
+    Poses {
+        /// The parameter blob that the controller runs.
+        params: PathBuf,
+        /// The log of the codes.
+        log: PathBuf,
+        /// The stage that the log belongs to.
+        #[arg(long)]
+        stage: PathBuf,
+        /// The poses that the controller gave for them, in a pose file.
+        poses: PathBuf,
+        /// Ticks for which the controller holds what is invalid.
+        #[arg(long, default_value_t = 0)]
+        hold: u16,
+    },
+}
+
+fn main() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Make {
+            params,
+            log,
+            stage,
+            out,
+            codes,
+            parameters,
+            hold,
+            seed,
+        } => make(&params, log.as_deref().zip(stage.as_deref()), codes, parameters, hold, seed)
+            .and_then(|bytes| Ok(std::fs::write(&out, bytes).map(|()| true)?)),
+        Command::Check { job, words } => check(&job, &words),
+        Command::Poses {
+            params,
+            log,
+            stage,
+            poses,
+            hold,
+        } => check_poses(&params, &log, &stage, &poses, hold),
+    };
+    match done {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("compare: {error}");
+            ExitCode::from(3)
+        }
+    }
+}
+
+fn read_blob(path: &Path) -> Result<ParameterSet, Box<dyn Error>> {
+    let named = |error: &dyn Error| format!("{}: {error}", path.display());
+    let bytes = std::fs::read(path).map_err(|error| named(&error))?;
+    Ok(ParameterSet::from_bytes(&bytes).map_err(|error| named(&error))?)
+}
+
+fn make(
+    params: &Path,
+    log: Option<(&Path, &Path)>,
+    codes: usize,
+    parameters: usize,
+    hold: u16,
+    seed: u64,
+) -> Result<Vec<u8>, Box<dyn Error>> {
+    /// Frames that share one set of random parameters.
+    const FRAMES_PER_SET: usize = 32;
+    let set = read_blob(params)?;
+    let mut buffer = [0; MAX_BYTES];
+    let blob = set.to_bytes(&mut buffer)?;
+    let dataset = match log {
+        Some((log, stage)) => {
+            log::read(&[log], &Stage::from_file(stage)?, &ReadOptions::DECODE)?.dataset
+        }
+        None => {
+            let stage = Stage::from_toml(shipped::STAGE_TOML, Path::new("stage.toml"))?;
+            let name = Path::new("paper.csv.gz");
+            log::read_bytes(shipped::LOG_GZ, name, &stage, &ReadOptions::DECODE)?.dataset
+        }
+    };
+    let mut sections = motion::of_log(blob, &dataset, hold)
+        .ok_or("the log holds a vertical pose in place of capacitive codes")?;
+    let rows = dataset.rows.len();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    sections.push(motion::of_blob(blob, motion::uniform_frames(&mut rng, codes), hold));
+    sections.extend((0..parameters / FRAMES_PER_SET).map(|_| {
+        let words = motion::odd_parameters(&mut rng, &set.constants);
+        let frames = motion::uniform_frames(&mut rng, FRAMES_PER_SET);
+        motion::of_words(words, frames)
+    }));
+    let wild = motion::wild_frames(&mut rng, parameters / 8);
+    let sound = tests::job::to_words(&set.constants, &PlanarPose::ZERO);
+    sections.push(motion::of_words(sound, wild));
+    let ticks: usize = sections.iter().map(|s: &Section| s.frames.len()).sum();
+    println!("RESULT job_ticks={ticks}");
+    println!("RESULT job_log_rows={rows}");
+    Ok(to_bytes(&sections))
+}
+
+fn check(job: &Path, words: &Path) -> Result<bool, Box<dyn Error>> {
+    let found = compare(&std::fs::read(job)?, &std::fs::read(words)?)?;
+    let Comparison {
+        ticks,
+        nans,
+        good,
+        differing,
+        first,
+    } = &found;
+    println!("RESULT ticks={ticks}");
+    println!("RESULT good_ticks={good}");
+    println!("RESULT words={}", ticks * tests::job::ANSWER_WORDS);
+    println!("RESULT differing_words={differing}");
+    println!("RESULT nan_words={nans}");
+    for difference in first {
+        println!("{difference}");
+    }
+    Ok(*differing == 0 && *nans == 0 && *ticks > 0)
+}
+
+fn check_poses(
+    params: &Path,
+    log: &Path,
+    stage: &Path,
+    poses: &Path,
+    hold: u16,
+) -> Result<bool, Box<dyn Error>> {
+    let set: ParameterSet = read_blob(params)?;
+    let stage = Stage::from_file(stage)?;
+    let dataset = log::read(&[log], &stage, &ReadOptions::DECODE)?.dataset;
+    let on_invalid = match hold {
+        0 => OnInvalid::Zero,
+        ticks => OnInvalid::Hold { ticks },
+    };
+    let host = pose_file::decode(&dataset, &set.decoder(), on_invalid);
+    let target = pose_file::read(poses)?;
+    if host.len() != target.len() {
+        let (rows, lines) = (host.len(), target.len());
+        return Err(format!("the log has {rows} rows and the pose file {lines}").into());
+    }
+    let mut differing = 0;
+    for (row, (host, target)) in host.iter().zip(&target).enumerate() {
+        let words = [host, target].map(|pose| tests::job::answer(&pose.reading));
+        if words[0] != words[1] {
+            differing += 1;
+            if differing <= 10 {
+                println!(
+                    "row {row} (movement {}, {} us): {:08x?} on the host, {:08x?} recorded; codes {:?}",
+                    host.movement, host.t_us, words[0], words[1], dataset.rows[row].frame,
+                );
+            }
+        }
+    }
+    println!("RESULT rows={}", host.len());
+    println!("RESULT differing_rows={differing}");
+    Ok(differing == 0 && !host.is_empty())
+}

@@ -1,0 +1,140 @@
+//! Sections of a job: the rows of a log, uniform random codes, random words as parameters.
+
+use crate::job::{self, Head, PARAMETER_WORDS};
+use host_fit::dataset::{Dataset, LoggedFrame};
+use rand::{Rng, RngExt};
+use runtime::decoder::DecoderConstants;
+use runtime::frame::MISSING_CODE;
+use runtime::{PlanarPose, RawFrame};
+
+/// One section: parameters as they lie in the file, and the frames.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Section {
+    /// What the parameters are.
+    pub head: Head,
+    /// The parameters, in bytes of whole words.
+    pub parameters: Vec<u8>,
+    /// The frames.
+    pub frames: Vec<RawFrame>,
+}
+
+/// Every movement of a log as a section, run by a servo from the blob.
+///
+/// A row of SI columns has no capacitive codes and cannot be put into a frame: such a log
+/// gives `None`.
+pub fn of_log(blob: &[u8], dataset: &Dataset, hold: u16) -> Option<Vec<Section>> {
+    let frame_of = |row: &host_fit::dataset::Row| match row.frame {
+        LoggedFrame::Codes(frame) => Some(frame),
+        LoggedFrame::HallCodes { .. } => None,
+    };
+    let section = |movement: &host_fit::dataset::Movement| {
+        let rows = dataset.rows.get(movement.rows.clone())?;
+        let frames = rows.iter().map(frame_of).collect::<Option<Vec<_>>>()?;
+        Some(of_blob(blob, frames, hold))
+    };
+    dataset.movements.iter().map(section).collect()
+}
+
+/// Frames run by a servo from a blob.
+pub fn of_blob(blob: &[u8], frames: Vec<RawFrame>, hold: u16) -> Section {
+    let mut parameters = blob.to_vec();
+    parameters.resize(blob.len().next_multiple_of(4), 0xff);
+    Section {
+        head: Head {
+            source: job::BLOB,
+            frames: count(&frames),
+            hold: hold.into(),
+            blob_bytes: count(blob),
+        },
+        parameters,
+        frames,
+    }
+}
+
+/// Frames run by a bare decoder with unchecked parameters.
+pub fn of_words(words: [u32; PARAMETER_WORDS], frames: Vec<RawFrame>) -> Section {
+    Section {
+        head: Head {
+            source: job::WORDS,
+            frames: count(&frames),
+            hold: 0,
+            blob_bytes: 0,
+        },
+        parameters: words.map(u32::to_le_bytes).as_flattened().to_vec(),
+        frames,
+    }
+}
+
+fn count<T>(items: &[T]) -> u32 {
+    u32::try_from(items.len()).unwrap_or(u32::MAX)
+}
+
+/// Codes of a 16-bit converter, each as likely as any other, now and then one missing, with
+/// a gap or a repeated number in the sequence here and there.
+pub fn uniform_frames(rng: &mut impl Rng, frames: usize) -> Vec<RawFrame> {
+    let mut sequence = 0u32;
+    let code = |rng: &mut dyn Rng| match rng.random_range(0..200u32) {
+        0 => MISSING_CODE,
+        _ => rng.random_range(-32768..=32767),
+    };
+    let frame = |_| {
+        sequence = sequence.wrapping_add(match rng.random_range(0..100u32) {
+            0 => 0,
+            1 => 3,
+            _ => 1,
+        });
+        RawFrame {
+            hall: std::array::from_fn(|_| code(rng)),
+            capacitive: std::array::from_fn(|_| code(rng)),
+            sequence,
+            time_us: 0,
+        }
+    };
+    (0..frames).map(frame).collect()
+}
+
+/// Codes of any 32 bits.
+pub fn wild_frames(rng: &mut impl Rng, frames: usize) -> Vec<RawFrame> {
+    let frame = |_| job::frame(std::array::from_fn(|_| rng.random()));
+    (0..frames).map(frame).collect()
+}
+
+/// A word of a kind that arithmetic handles apart: any bits, subnormal, infinite, NaN (quiet
+/// or signalling), zero, huge, tiny or ordinary.
+fn odd_word(rng: &mut impl Rng) -> u32 {
+    let sign = rng.random_range(0..2u32) << 31;
+    let fraction = rng.random_range(1..1u32 << 23);
+    let number = match rng.random_range(0..9u32) {
+        0 => return rng.random(),
+        1 => fraction,
+        2 => f32::INFINITY.to_bits(),
+        3 => f32::NAN.to_bits() | fraction,
+        4 => f32::INFINITY.to_bits() | (fraction & 0x3f_ffff).max(1),
+        5 => 0,
+        6 => f32::MAX.to_bits() - fraction,
+        7 => f32::MIN_POSITIVE.to_bits() + fraction,
+        _ => 1f32.to_bits() + (rng.random_range(0..64u32) << 23) + fraction - (32 << 23),
+    };
+    sign | number
+}
+
+/// Sound parameters of which some words, or all, are replaced by odd ones.
+pub fn odd_parameters(
+    rng: &mut impl Rng,
+    sound: &DecoderConstants<f32>,
+) -> [u32; PARAMETER_WORDS] {
+    let mut words = job::to_words(sound, &PlanarPose::ZERO);
+    let replaced = match rng.random_range(0..4u32) {
+        0 => words.len(),
+        _ => rng.random_range(1..4),
+    };
+    for k in 0..replaced {
+        let place = if replaced == words.len() {
+            k
+        } else {
+            rng.random_range(0..words.len())
+        };
+        words[place] = odd_word(rng);
+    }
+    words
+}
