@@ -22,7 +22,9 @@ pub enum JobError {
         source: BlobError,
     },
     /// The target gave too few or too many words.
-    #[error("the target gave {found} bytes where {wanted} belong: it stopped early, or did another job")]
+    #[error(
+        "the target gave {found} bytes where {wanted} belong: it stopped early, or did another job"
+    )]
     AnswerLength {
         /// Bytes that belong there.
         wanted: usize,
@@ -157,7 +159,11 @@ fn run(
         let words = words::<PARAMETER_WORDS>(&section.parameters);
         let (decoder, zero) = job::from_words(&words.unwrap_or([0; PARAMETER_WORDS]));
         for (tick, frame) in frames {
-            take(tick, frame, decoder.decode(frame.hall, frame.capacitive, &zero));
+            take(
+                tick,
+                frame,
+                decoder.decode(frame.hall, frame.capacitive, &zero),
+            );
         }
         return Ok(());
     }

@@ -88,9 +88,16 @@ impl Head {
 pub fn from_words(words: &[u32; PARAMETER_WORDS]) -> (Decoder, PlanarPose<f32>) {
     let mut rest = words.iter().copied();
     let mut next = || rest.next().unwrap_or_default();
-    let mut three = || [f32::from_bits(next()), f32::from_bits(next()), f32::from_bits(next())];
+    let mut three = || {
+        [
+            f32::from_bits(next()),
+            f32::from_bits(next()),
+            f32::from_bits(next()),
+        ]
+    };
     let vertical_per_code = [three(), three(), three()];
-    let [[a0, a1, a2], [a3, b0, b1], [b2, b3, c0], [c1, c2, c3]] = [three(), three(), three(), three()];
+    let [[a0, a1, a2], [a3, b0, b1], [b2, b3, c0], [c1, c2, c3]] =
+        [three(), three(), three(), three()];
     let sensitivity = |eta, per_z_m, per_rx_rad, per_ry_rad| Sensitivity {
         eta,
         per_z_m,
@@ -126,7 +133,9 @@ pub fn from_words(words: &[u32; PARAMETER_WORDS]) -> (Decoder, PlanarPose<f32>) 
 pub fn to_words(c: &DecoderConstants<f32>, zero: &PlanarPose<f32>) -> [u32; PARAMETER_WORDS] {
     let [hall, gaps] = [&c.hall_window, &c.capacitive_window];
     let windows = [hall.low, hall.high, gaps.low, gaps.high].map(|code| code as u32);
-    let probes = c.sensitivity.map(|s| [s.eta, s.per_z_m, s.per_rx_rad, s.per_ry_rad]);
+    let probes = c
+        .sensitivity
+        .map(|s| [s.eta, s.per_z_m, s.per_rx_rad, s.per_ry_rad]);
     let numbers = (c.vertical_per_code.as_flattened().iter())
         .chain(probes.as_flattened())
         .chain(c.planar_per_code.as_flattened())
@@ -134,7 +143,10 @@ pub fn to_words(c: &DecoderConstants<f32>, zero: &PlanarPose<f32>) -> [u32; PARA
         .chain(&c.calibrated_planar)
         .map(|number| number.to_bits());
     let zero = zero.to_array().map(f32::to_bits);
-    let all = numbers.chain(zero).chain(windows).chain([c.sensitivity_min.to_bits()]);
+    let all = numbers
+        .chain(zero)
+        .chain(windows)
+        .chain([c.sensitivity_min.to_bits()]);
     let mut words = [0; PARAMETER_WORDS];
     for (word, value) in words.iter_mut().zip(all) {
         *word = value;
@@ -155,7 +167,15 @@ pub const fn frame([a, b, c, g1, g2, g3, sequence]: [u32; FRAME_WORDS]) -> RawFr
 /// The words of a frame.
 pub const fn frame_words(frame: &RawFrame) -> [u32; FRAME_WORDS] {
     let ([a, b, c], [g1, g2, g3]) = (frame.hall, frame.capacitive);
-    [a as u32, b as u32, c as u32, g1 as u32, g2 as u32, g3 as u32, frame.sequence]
+    [
+        a as u32,
+        b as u32,
+        c as u32,
+        g1 as u32,
+        g2 as u32,
+        g3 as u32,
+        frame.sequence,
+    ]
 }
 
 /// The words of a reading.

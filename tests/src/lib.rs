@@ -5,12 +5,11 @@
 //! | [`job`] | frames in, words out: the files that host and target exchange |
 //! | [`motion`] | frames and parameters for a job: a log, random codes, random words |
 //! | [`compare`] | the host's words of a job beside the target's |
+//! | [`listing`] | the instructions of an image: stack, cycles, calls |
 //! | [`trace`] | executed instructions, counted from an emulator's log |
-
-#[cfg(test)]
-extern crate self as tests;
 
 pub mod compare;
 pub mod job;
+pub mod listing;
 pub mod motion;
 pub mod trace;

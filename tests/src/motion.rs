@@ -119,10 +119,7 @@ fn odd_word(rng: &mut impl Rng) -> u32 {
 }
 
 /// Sound parameters of which some words, or all, are replaced by odd ones.
-pub fn odd_parameters(
-    rng: &mut impl Rng,
-    sound: &DecoderConstants<f32>,
-) -> [u32; PARAMETER_WORDS] {
+pub fn odd_parameters(rng: &mut impl Rng, sound: &DecoderConstants<f32>) -> [u32; PARAMETER_WORDS] {
     let mut words = job::to_words(sound, &PlanarPose::ZERO);
     let replaced = match rng.random_range(0..4u32) {
         0 => words.len(),

@@ -1,1 +1,138 @@
-//! x
+//! Executed instructions, counted from an emulator's log.
+//!
+//! QEMU with one instruction to a translation block (`-singlestep`, from version 8.1
+//! `-accel tcg,one-insn-per-tb=on`) and `-d exec,nochain` logs every executed instruction
+//! with its address. A call is counted from the first instruction of a function to its
+//! return, callees included: until the address after the calling instruction comes up.
+
+use crate::listing::{Instruction, Listing};
+use std::collections::BTreeMap;
+use std::io::BufRead;
+
+/// What the calls of one function took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Calls.
+    pub calls: usize,
+    /// Fewest instructions of a call.
+    pub fewest: u64,
+    /// Most instructions of a call.
+    pub most: u64,
+    /// Most divisions of a call.
+    pub divisions: u64,
+    /// Most cycles of a call, estimated: see [`Instruction::cycles`].
+    pub cycles: u64,
+    /// Instructions outside the function itself, over all calls: those of its callees.
+    pub in_callees: u64,
+}
+
+/// A call in progress.
+struct Call {
+    entry: u32,
+    end: u32,
+    return_to: [u32; 2],
+    instructions: u64,
+    divisions: u64,
+    cycles: u64,
+    in_callees: u64,
+}
+
+/// The address of a log line, or `None` for any other line.
+///
+/// `Trace 0: 0x7f00 [00800408/0000114e/00000110/ff000201] name`: the second of the four.
+pub fn address(line: &str) -> Option<u32> {
+    let inside = line.strip_prefix("Trace ")?.split_once('[')?.1;
+    u32::from_str_radix(inside.split('/').nth(1)?, 16).ok()
+}
+
+/// Counts every call of the functions in `functions`, name to first and last address.
+pub fn count(
+    log: impl BufRead,
+    listing: &Listing,
+    functions: &BTreeMap<String, (u32, u32)>,
+) -> std::io::Result<BTreeMap<String, Counts>> {
+    let by_entry: BTreeMap<u32, (&String, u32)> = functions
+        .iter()
+        .map(|(name, &(entry, end))| (entry, (name, end)))
+        .collect();
+    let mut counts: BTreeMap<String, Counts> = BTreeMap::new();
+    let mut call: Option<Call> = None;
+    let mut before = 0;
+    for line in log.lines() {
+        let Some(at) = address(&line?) else { continue };
+        if let Some(done) = call.take_if(|call| call.return_to.contains(&at)) {
+            if let Some((name, _)) = by_entry.get(&done.entry) {
+                counts.entry((*name).clone()).or_default().add(&done);
+            }
+        }
+        if let (None, Some(&(_, end))) = (&call, by_entry.get(&at)) {
+            call = Some(Call {
+                entry: at,
+                end,
+                // A calling instruction is four bytes long, or two.
+                return_to: [before + 4, before + 2],
+                instructions: 0,
+                divisions: 0,
+                cycles: 0,
+                in_callees: 0,
+            });
+        }
+        if let Some(call) = &mut call {
+            let instruction = listing.at(at);
+            call.instructions += 1;
+            call.divisions += u64::from(instruction.is_some_and(Instruction::is_division));
+            call.cycles += instruction.map_or(1, Instruction::cycles);
+            call.in_callees += u64::from(!(call.entry..call.end).contains(&at));
+        }
+        before = at;
+    }
+    Ok(counts)
+}
+
+impl Counts {
+    fn add(&mut self, call: &Call) {
+        self.fewest = match self.calls {
+            0 => call.instructions,
+            _ => self.fewest.min(call.instructions),
+        };
+        self.calls += 1;
+        self.most = self.most.max(call.instructions);
+        self.divisions = self.divisions.max(call.divisions);
+        self.cycles = self.cycles.max(call.cycles);
+        self.in_callees += call.in_callees;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A caller at 0x10 calls 0x100, which calls 0x200.
+    const LISTING: &str = "\
+     100:\tpush\t{r4, lr}
+     102:\tvdiv.f32\ts0, s1, s2
+     106:\tbl\t200 <callee>
+     10a:\tpop\t{r4, pc}
+     200:\tbx\tlr
+";
+
+    fn log(addresses: &[u32]) -> String {
+        let line = |at| format!("Trace 0: 0x7f3c [00800408/{at:08x}/00000110/ff000201] name\n");
+        addresses.iter().map(line).collect()
+    }
+
+    #[test]
+    fn a_call_is_counted_with_its_callees() {
+        let run = [0x10, 0x100, 0x102, 0x106, 0x200, 0x10a, 0x14, 0x16];
+        let functions = BTreeMap::from([("f".to_owned(), (0x100, 0x10c))]);
+        let text = log(&run) + "another line\n" + &log(&[0x10, 0x100, 0x10a, 0x14]);
+        let counts = count(text.as_bytes(), &Listing::parse(LISTING), &functions).expect("text");
+        let Some(f) = counts.get("f") else {
+            panic!("not counted")
+        };
+        assert_eq!((f.calls, f.fewest, f.most), (2, 2, 5));
+        assert_eq!((f.divisions, f.in_callees), (1, 1));
+        // push 3, vdiv 14, bl 4, bx 4, pop with pc 6.
+        assert_eq!(f.cycles, 3 + 14 + 4 + 4 + 6);
+    }
+}

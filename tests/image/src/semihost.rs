@@ -53,7 +53,11 @@ impl File {
     pub fn write(&self, bytes: &[u8]) -> Result<(), Fault> {
         // SAFETY: the host reads `len` bytes of the slice.
         let left = unsafe { syscall!(WRITE, self.0, bytes.as_ptr(), bytes.len()) };
-        if left == 0 { Ok(()) } else { Err(Fault::Transfer) }
+        if left == 0 {
+            Ok(())
+        } else {
+            Err(Fault::Transfer)
+        }
     }
 }
 
@@ -65,7 +69,11 @@ impl core::fmt::Write for File {
 
 /// Ends the run with exit status 0, or 1.
 pub fn exit(good: bool) -> ! {
-    debug::exit(if good { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+    debug::exit(if good {
+        debug::EXIT_SUCCESS
+    } else {
+        debug::EXIT_FAILURE
+    });
     loop {
         cortex_m::asm::wfi();
     }

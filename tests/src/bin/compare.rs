@@ -88,8 +88,15 @@ fn main() -> ExitCode {
             parameters,
             hold,
             seed,
-        } => make(&params, log.as_deref().zip(stage.as_deref()), codes, parameters, hold, seed)
-            .and_then(|bytes| Ok(std::fs::write(&out, bytes).map(|()| true)?)),
+        } => make(
+            &params,
+            log.as_deref().zip(stage.as_deref()),
+            codes,
+            parameters,
+            hold,
+            seed,
+        )
+        .and_then(|bytes| Ok(std::fs::write(&out, bytes).map(|()| true)?)),
         Command::Check { job, words } => check(&job, &words),
         Command::Poses {
             params,
@@ -142,7 +149,11 @@ fn make(
         .ok_or("the log holds a vertical pose in place of capacitive codes")?;
     let rows = dataset.rows.len();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    sections.push(motion::of_blob(blob, motion::uniform_frames(&mut rng, codes), hold));
+    sections.push(motion::of_blob(
+        blob,
+        motion::uniform_frames(&mut rng, codes),
+        hold,
+    ));
     sections.extend((0..parameters / FRAMES_PER_SET).map(|_| {
         let words = motion::odd_parameters(&mut rng, &set.constants);
         let frames = motion::uniform_frames(&mut rng, FRAMES_PER_SET);

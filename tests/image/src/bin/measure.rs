@@ -1,79 +1,292 @@
+//! Runs the pose kernel and the tick over many inputs, for an emulator's log of executed
+//! instructions to be counted, and prints the stack that each has touched.
+//!
+//! What is counted is one call of a function whose name starts with `counted_`, from its
+//! first instruction to its return. `counted_loop_1000` is a check of the counting: its
+//! length is known.
 #![no_std]
 #![no_main]
+
+use core::fmt::Write;
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use runtime::decoder::{Decoder, DecoderConstants, Reading};
-use runtime::frame::{CodeWindow, RawFrame};
+use image::job::{self, FRAME_WORDS, PARAMETER_WORDS};
+use image::semihost::{CONSOLE, File, exit};
+use runtime::decoder::{Decoder, DecoderConstants};
+use runtime::frame::CodeWindow;
 use runtime::model::{Sensitivity, planar_pose, sensitivity_at};
-use runtime::{PlanarPose, Servo, OnInvalid, VerticalPose};
+use runtime::{OnInvalid, PlanarPose, RawFrame, Reading, Servo, VerticalPose};
 
-unsafe extern "C" { fn a_panic_can_be_reached() -> !; }
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo<'_>) -> ! { unsafe { a_panic_can_be_reached() } }
-
+/// Displacements read by the probes.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct Signal([f32; 3]);
 
-#[unsafe(no_mangle)]
-#[inline(never)]
-pub extern "C" fn measured_kernel_by_value(c: &DecoderConstants<f32>, s: Signal, v: VerticalPose<f32>, zero: PlanarPose<f32>) -> PlanarPose<f32> {
+/// The pose kernel, Model (31): three sensitivities, three quotients, X, Y, Rz.
+#[inline(always)]
+fn kernel(
+    c: &DecoderConstants<f32>,
+    signal: &Signal,
+    vertical: &VerticalPose<f32>,
+    zero: &PlanarPose<f32>,
+) -> PlanarPose<f32> {
     let phi = [
-        sensitivity_at(&c.sensitivity[0], &v),
-        sensitivity_at(&c.sensitivity[1], &v),
-        sensitivity_at(&c.sensitivity[2], &v),
+        sensitivity_at(&c.sensitivity[0], vertical),
+        sensitivity_at(&c.sensitivity[1], vertical),
+        sensitivity_at(&c.sensitivity[2], vertical),
     ];
-    planar_pose(&c.planar_per_code, s.0, phi, &zero)
-}
-#[unsafe(no_mangle)]
-#[inline(never)]
-pub extern "C" fn measured_kernel(c: &DecoderConstants<f32>, s: &Signal, v: &VerticalPose<f32>, zero: &PlanarPose<f32>, out: &mut PlanarPose<f32>) {
-    let phi = [
-        sensitivity_at(&c.sensitivity[0], v),
-        sensitivity_at(&c.sensitivity[1], v),
-        sensitivity_at(&c.sensitivity[2], v),
-    ];
-    *out = planar_pose(&c.planar_per_code, s.0, phi, zero)
-}
-#[unsafe(no_mangle)]
-#[inline(never)]
-pub extern "C" fn measured_tick(d: &Decoder, f: &RawFrame, zero: &PlanarPose<f32>, out: &mut Reading) {
-    d.decode_into(&f.hall, &f.capacitive, zero, out);
-}
-#[unsafe(no_mangle)]
-#[inline(never)]
-pub extern "C" fn measured_servo(s: &mut Servo<'_>, f: &RawFrame, out: &mut Reading) {
-    *out = s.tick(f);
+    planar_pose(&c.planar_per_code, signal.0, phi, zero)
 }
 
-fn constants() -> DecoderConstants<f32> {
-    DecoderConstants {
-        vertical_per_code: [[1e-9, 2e-9, 3e-9]; 3],
-        sensitivity: [Sensitivity { eta: 0.8, per_z_m: -100., per_rx_rad: 20., per_ry_rad: 30. }; 3],
-        planar_per_code: [[1e-9, 2e-9, 3e-9]; 3],
-        calibrated_vertical: [1e-3; 3],
-        calibrated_planar: [1e-3; 3],
-        sensitivity_min: 0.1,
-        hall_window: CodeWindow { low: -32767, high: 32766 },
-        capacitive_window: CodeWindow { low: -32767, high: 32766 },
+#[unsafe(no_mangle)]
+#[inline(never)]
+extern "C" fn counted_kernel(
+    c: &DecoderConstants<f32>,
+    signal: &Signal,
+    vertical: &VerticalPose<f32>,
+    zero: &PlanarPose<f32>,
+    pose: &mut PlanarPose<f32>,
+) {
+    *pose = kernel(c, signal, vertical, zero);
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+extern "C" fn counted_kernel_by_value(
+    c: &DecoderConstants<f32>,
+    signal: Signal,
+    vertical: VerticalPose<f32>,
+    zero: PlanarPose<f32>,
+) -> PlanarPose<f32> {
+    kernel(c, &signal, &vertical, &zero)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+extern "C" fn counted_tick(
+    decoder: &Decoder,
+    frame: &RawFrame,
+    zero: &PlanarPose<f32>,
+    reading: &mut Reading,
+) {
+    decoder.decode_into(&frame.hall, &frame.capacitive, zero, reading);
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+extern "C" fn counted_servo_tick(servo: &mut Servo<'_>, frame: &RawFrame, reading: &mut Reading) {
+    *reading = servo.tick(frame);
+}
+
+#[cfg(c_reference)]
+#[allow(improper_ctypes)] // repr(C) structs of numbers, but for Status, which is transparent
+unsafe extern "C" {
+    fn counted_c_kernel(
+        c: &DecoderConstants<f32>,
+        signal: &Signal,
+        vertical: &VerticalPose<f32>,
+        zero: &PlanarPose<f32>,
+        pose: &mut PlanarPose<f32>,
+    );
+    fn counted_c_uncontracted_kernel(
+        c: &DecoderConstants<f32>,
+        signal: &Signal,
+        vertical: &VerticalPose<f32>,
+        zero: &PlanarPose<f32>,
+        pose: &mut PlanarPose<f32>,
+    );
+    fn counted_c_tick(
+        c: &DecoderConstants<f32>,
+        frame: &RawFrame,
+        zero: &PlanarPose<f32>,
+        reading: &mut Reading,
+    );
+    fn counted_c_uncontracted_tick(
+        c: &DecoderConstants<f32>,
+        frame: &RawFrame,
+        zero: &PlanarPose<f32>,
+        reading: &mut Reading,
+    );
+}
+
+// A loop of 3 + 1000 * 3 instructions.
+core::arch::global_asm!(
+    ".global counted_loop_1000",
+    ".type counted_loop_1000, %function",
+    ".thumb_func",
+    "counted_loop_1000:",
+    "movw r0, #1000",
+    "2:",
+    "nop",
+    "subs r0, #1",
+    "bne 2b",
+    "nop",
+    "bx lr",
+    ".size counted_loop_1000, . - counted_loop_1000",
+);
+
+unsafe extern "C" {
+    fn counted_loop_1000();
+}
+
+/// A sound stage, in round numbers.
+const SOUND: DecoderConstants<f32> = DecoderConstants {
+    vertical_per_code: [
+        [7.8e-9, 7.8e-9, 0.0],
+        [6.5e-8, 6.5e-8, -1.3e-7],
+        [-6.5e-8, 6.5e-8, 0.0],
+    ],
+    sensitivity: [
+        Sensitivity {
+            eta: 0.86,
+            per_z_m: -186.0,
+            per_rx_rad: -63.0,
+            per_ry_rad: 36.0,
+        },
+        Sensitivity {
+            eta: 0.70,
+            per_z_m: -164.0,
+            per_rx_rad: -58.0,
+            per_ry_rad: -36.0,
+        },
+        Sensitivity {
+            eta: 0.86,
+            per_z_m: -188.0,
+            per_rx_rad: -62.0,
+            per_ry_rad: 37.0,
+        },
+    ],
+    planar_per_code: [
+        [5.7e-8, -5.7e-8, 6.2e-8],
+        [3.1e-8, 3.1e-8, 1e-10],
+        [1.6e-7, -1.6e-7, 2e-10],
+    ],
+    calibrated_vertical: [3e-4, 1e-3, 1e-3],
+    calibrated_planar: [6e-4, 6e-4, 5e-4],
+    sensitivity_min: 0.1,
+    hall_window: CodeWindow {
+        low: -32767,
+        high: 32766,
+    },
+    capacitive_window: CodeWindow {
+        low: -32767,
+        high: 32766,
+    },
+};
+
+/// A plain pseudo-random sequence (xorshift), for inputs only.
+struct Words(u32);
+
+impl Words {
+    fn next(&mut self) -> u32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        self.0
     }
+}
+
+/// The inputs of one round: codes of 16 bits or of any; sound parameters or any words.
+fn round(words: &mut Words, k: u32) -> (Decoder, PlanarPose<f32>, RawFrame) {
+    let frame = core::array::from_fn::<u32, FRAME_WORDS, _>(|_| match k % 4 {
+        3 => words.next(),
+        _ => (words.next() as i32 >> 16) as u32,
+    });
+    let (decoder, zero) = match k % 3 {
+        0 => (Decoder::new(SOUND), PlanarPose::ZERO),
+        1 => job::from_words(&core::array::from_fn::<u32, PARAMETER_WORDS, _>(|_| {
+            words.next()
+        })),
+        _ => job::from_words(&[f32::NAN.to_bits(); PARAMETER_WORDS]),
+    };
+    (decoder, zero, job::frame(frame))
+}
+
+/// Bytes below the stack pointer that are painted, above those that painting itself uses.
+const PAINTED: usize = 2048;
+const PAINT: u32 = 0xa5a5_5a5a;
+
+/// Paints the unused stack, runs `work`, and gives the bytes that it has touched.
+#[inline(never)]
+fn touched(work: impl FnOnce()) -> usize {
+    let top = cortex_m::register::msp::read() as usize;
+    let cells = |k: usize| (top - 4 * (k + 1)) as *mut u32;
+    for k in 0..PAINTED / 4 {
+        // SAFETY: below the stack pointer of this function, which calls nothing meanwhile, lies
+        // nothing but unused stack; no interrupt is enabled.
+        unsafe { cells(k).write_volatile(PAINT) };
+    }
+    work();
+    // SAFETY: as above; reads what was painted.
+    let clean = (0..PAINTED / 4)
+        .rev()
+        .take_while(|&k| unsafe { cells(k).read_volatile() } == PAINT);
+    PAINTED - 4 * clean.count()
 }
 
 #[entry]
 fn main() -> ! {
-    let d = Decoder::new(black_box(constants()));
-    let f = black_box(RawFrame { hall: [1000, 2000, 3000], capacitive: [100, 200, 300], sequence: 1, time_us: 2 });
-    let mut r = Reading::default();
-    measured_tick(black_box(&d), &f, &PlanarPose::ZERO, &mut r);
-    black_box(&r);
-    let mut p = PlanarPose::ZERO;
-    measured_kernel(black_box(d.constants()), &Signal([1., 2., 3.]), &VerticalPose::ZERO, &PlanarPose::ZERO, &mut p);
-    black_box(&p);
-    let p = measured_kernel_by_value(black_box(d.constants()), Signal([1., 2., 3.]), VerticalPose::ZERO, PlanarPose::ZERO);
-    black_box(&p);
-    let mut s = Servo::new(&d, OnInvalid::Hold { ticks: 3 });
-    measured_servo(black_box(&mut s), &f, &mut r);
-    black_box(&r);
-    cortex_m_semihosting::debug::exit(cortex_m_semihosting::debug::EXIT_SUCCESS);
-    loop {}
+    let Ok(mut console) = File::write_to(CONSOLE) else {
+        exit(false)
+    };
+    let mut words = Words(0x1234_5678);
+    let mut reading = Reading::default();
+    // SAFETY: the loop above, which touches r0 and the flags.
+    unsafe { counted_loop_1000() };
+    for k in 0..300 {
+        let (decoder, zero, frame) = black_box(round(&mut words, k));
+        let signal = Signal(frame.hall.map(|code| code as f32));
+        let vertical = VerticalPose::from_array(frame.capacitive.map(|code| code as f32 * 1e-8));
+        let mut pose = PlanarPose::ZERO;
+        counted_kernel(decoder.constants(), &signal, &vertical, &zero, &mut pose);
+        black_box(&pose);
+        black_box(counted_kernel_by_value(
+            decoder.constants(),
+            signal,
+            vertical,
+            zero,
+        ));
+        counted_tick(&decoder, &frame, &zero, &mut reading);
+        black_box(&reading);
+        #[cfg(c_reference)]
+        // SAFETY: structs of the same layout, as the C file declares them.
+        unsafe {
+            counted_c_kernel(decoder.constants(), &signal, &vertical, &zero, &mut pose);
+            counted_c_uncontracted_kernel(
+                decoder.constants(),
+                &signal,
+                &vertical,
+                &zero,
+                &mut pose,
+            );
+            counted_c_tick(decoder.constants(), &frame, &zero, &mut reading);
+            counted_c_uncontracted_tick(decoder.constants(), &frame, &zero, &mut reading);
+        }
+    }
+    let decoder = black_box(Decoder::new(SOUND));
+    let mut servo = Servo::new(&decoder, OnInvalid::Hold { ticks: 3 });
+    let mut frame = RawFrame {
+        hall: [900, -800, 700],
+        capacitive: [50, 60, 70],
+        sequence: 0,
+        time_us: 0,
+    };
+    for k in 0..100 {
+        frame.sequence += 1 + u32::from(k % 7 == 0);
+        frame.hall[0] = if k % 5 == 0 { i32::MIN } else { 900 };
+        counted_servo_tick(&mut servo, black_box(&frame), &mut reading);
+        black_box(&reading);
+    }
+    let base = touched(|| ());
+    let tick = touched(|| counted_tick(&decoder, &frame, &PlanarPose::ZERO, &mut reading));
+    frame.sequence += 1;
+    let servo_tick = touched(|| counted_servo_tick(&mut servo, &frame, &mut reading));
+    let printed = writeln!(console, "RESULT painted_stack_tick={}", tick - base).and_then(|()| {
+        writeln!(
+            console,
+            "RESULT painted_stack_servo_tick={}",
+            servo_tick - base
+        )
+    });
+    exit(printed.is_ok() && image::fpu_at_reset())
 }

@@ -1,0 +1,202 @@
+//! The instructions of an image, as `objdump -d --no-show-raw-insn` lists them.
+
+use std::collections::BTreeMap;
+
+/// One instruction.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Instruction {
+    mnemonic: String,
+    operands: String,
+}
+
+/// Instructions by address.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Listing(BTreeMap<u32, Instruction>);
+
+impl Listing {
+    /// Reads a listing; lines that hold no instruction are passed over.
+    pub fn parse(text: &str) -> Self {
+        let line = |line: &str| {
+            let (address, rest) = line.split_once(":\t")?;
+            let address = u32::from_str_radix(address.trim(), 16).ok()?;
+            let (mnemonic, operands) = rest.split_once('\t').unwrap_or((rest, ""));
+            let operands = operands.split(['@', ';']).next().unwrap_or("").trim();
+            Some((
+                address,
+                Instruction {
+                    mnemonic: mnemonic.trim().to_owned(),
+                    operands: operands.to_owned(),
+                },
+            ))
+        };
+        Self(text.lines().filter_map(line).collect())
+    }
+
+    /// The instruction at an address.
+    pub fn at(&self, address: u32) -> Option<&Instruction> {
+        self.0.get(&address)
+    }
+
+    /// The instructions from an address up to another.
+    pub fn between(&self, from: u32, to: u32) -> impl Iterator<Item = &Instruction> {
+        self.0.range(from..to).map(|(_, instruction)| instruction)
+    }
+}
+
+impl Instruction {
+    /// Whether it divides floating-point numbers.
+    pub fn is_division(&self) -> bool {
+        self.mnemonic.starts_with("vdiv")
+    }
+
+    /// Whether it calls a function, directly or through a register.
+    pub fn is_call(&self) -> bool {
+        matches!(self.mnemonic.as_str(), "bl" | "blx")
+    }
+
+    /// Whether it jumps within a function or out of it, other than to return.
+    pub fn is_jump(&self) -> bool {
+        let name = self.mnemonic.split('.').next().unwrap_or("");
+        let returns = name == "bx" && self.operands == "lr";
+        let branch = name.starts_with('b')
+            && !name.starts_with("bic")
+            && !name.starts_with("bf")
+            && !name.starts_with("bkpt");
+        (branch && !returns) || matches!(name, "cbz" | "cbnz" | "tbb" | "tbh")
+    }
+
+    /// Registers of a list like `{r4, r5, d8-d15}`: words that they hold.
+    fn listed_words(&self) -> u64 {
+        let Some((_, list)) = self.operands.split_once('{') else {
+            return 0;
+        };
+        let list = list.split('}').next().unwrap_or("");
+        let number = |name: &str| name.get(1..).and_then(|digits| digits.parse::<u64>().ok());
+        let words = |item: &str| {
+            let item = item.trim();
+            let each = if item.starts_with('d') { 2 } else { 1 };
+            match item.split_once('-') {
+                Some((from, to)) => match (number(from), number(to)) {
+                    (Some(from), Some(to)) => each * (to + 1).saturating_sub(from),
+                    _ => each,
+                },
+                None => each,
+            }
+        };
+        list.split(',').map(words).sum()
+    }
+
+    /// Bytes by which it lowers the stack pointer.
+    pub fn pushed_bytes(&self) -> u64 {
+        let name = self.mnemonic.split('.').next().unwrap_or("");
+        let immediate = || {
+            let (_, text) = self.operands.rsplit_once('#')?;
+            text.trim_end_matches(['!', ']']).parse::<i64>().ok()
+        };
+        match name {
+            "push" | "vpush" => 4 * self.listed_words(),
+            "stmdb" if self.operands.starts_with("sp!") => 4 * self.listed_words(),
+            "sub" | "subw" if self.operands.starts_with("sp,") => immediate()
+                .and_then(|bytes| bytes.try_into().ok())
+                .unwrap_or(0),
+            "str" | "strd" if self.operands.contains("[sp, #-") && self.operands.ends_with('!') => {
+                immediate().map_or(0, i64::unsigned_abs)
+            }
+            _ => 0,
+        }
+    }
+
+    /// Cycles on a Cortex-M4 with zero-wait memory, by the instruction tables of its
+    /// technical reference manual (sections 3.3.1 and 7.2.3): each instruction by itself,
+    /// so loads that the pipeline overlaps count in full and a taken jump counts three
+    /// cycles of refill.
+    pub fn cycles(&self) -> u64 {
+        const REFILL: u64 = 3;
+        let name = self.mnemonic.split('.').next().unwrap_or("");
+        let words = self.listed_words();
+        let refill = if self.operands.contains("pc}") {
+            REFILL
+        } else {
+            0
+        };
+        match name {
+            "vdiv" | "vsqrt" => 14,
+            "push" | "pop" | "vpush" | "vpop" => 1 + words + refill,
+            _ if name.starts_with("ldm") || name.starts_with("stm") => 1 + words + refill,
+            _ if name.starts_with("vldm") || name.starts_with("vstm") => 1 + words,
+            _ if name.starts_with("ldrd") || name.starts_with("strd") => 3,
+            _ if name.starts_with("ldr") || name.starts_with("str") => 2,
+            _ if name.starts_with("vldr") || name.starts_with("vstr") => 2,
+            _ if ["vmla", "vmls", "vnml", "vfma", "vfms", "vfnm"]
+                .iter()
+                .any(|start| name.starts_with(start)) =>
+            {
+                3
+            }
+            "bl" | "blx" | "bx" => 1 + REFILL,
+            _ if self.is_jump() => 1 + REFILL,
+            _ => 1,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(text: &str) -> Instruction {
+        let listing = Listing::parse(&format!("  1154:\t{text}\n"));
+        listing.at(0x1154).expect("an instruction").clone()
+    }
+
+    #[test]
+    fn stack_is_what_pushes_and_subtractions_take() {
+        for (text, bytes) in [
+            ("push\t{r4, r5, r6, r7, lr}", 20),
+            ("stmdb\tsp!, {r8, r9, sl, fp}", 16),
+            ("vpush\t{d8-d15}", 64),
+            ("sub\tsp, #44\t@ 0x2c", 44),
+            ("str.w\tr2, [sp, #-4]!", 4),
+            ("strd\tr3, r2, [sp, #-8]!", 8),
+            ("str\tr1, [sp, #8]", 0),
+            ("sub.w\tr4, ip, lr", 0),
+            ("add\tsp, #4", 0),
+        ] {
+            assert_eq!(one(text).pushed_bytes(), bytes, "{text}");
+        }
+    }
+
+    #[test]
+    fn jumps_calls_and_divisions_are_told_apart() {
+        for (text, jump, call, division) in [
+            ("bl\tf88 <f>", true, true, false),
+            ("bne.n\t1276 <f+0x2a>", true, false, false),
+            ("cbz\tr3, 8d2 <f+0x68>", true, false, false),
+            ("bx\tlr", false, false, false),
+            ("bic.w\tr5, r4, #2", false, false, false),
+            ("bfc\tr6, #11, #21", false, false, false),
+            ("vdiv.f32\ts0, s1, s2", false, false, true),
+            ("blx\tr3", true, true, false),
+        ] {
+            let found = one(text);
+            assert_eq!(found.is_jump(), jump, "{text}");
+            assert_eq!(found.is_call(), call, "{text}");
+            assert_eq!(found.is_division(), division, "{text}");
+        }
+    }
+
+    #[test]
+    fn cycles_follow_the_manual() {
+        for (text, cycles) in [
+            ("vldr\ts10, [r0, #40]\t@ 0x28", 2),
+            ("vmla.f32\ts10, s3, s12", 3),
+            ("vdiv.f32\ts0, s0, s10", 14),
+            ("ldmia.w\tfp, {r2, r3, r6}", 4),
+            ("pop\t{r4, r5, r6, r7, pc}", 9),
+            ("adc.w\tr4, r4, r4", 1),
+            ("itt\tcc", 1),
+        ] {
+            assert_eq!(one(text).cycles(), cycles, "{text}");
+        }
+    }
+}
