@@ -310,3 +310,10 @@ impl Reading {
         usable.then_some(self.pose.planar)
     }
 }
+
+#[cfg(test)]
+#[path = "decoder_tests.rs"]
+mod tests;
+#[cfg(test)]
+#[path = "decoder_word_tests.rs"]
+mod word_tests;

@@ -1,1 +1,319 @@
+//! Tests of the blob: a golden example both ways, and every kind of damage.
 
+use super::*;
+use crate::parameters::Text;
+use crate::sample;
+
+/// The blob of [`sample::parameters`], byte by byte.
+const GOLDEN: &str = "\
+    48414c4c 01000000 87010000 03074853 2d303030 37143230 32362d31 312d3231 \
+    5431303a 30303a30 305a0001 02030405 06070809 0a0b0c0d 0e0f1011 12131415 \
+    16171819 1a1b1c1d 1e1fa8bd 03c80181 037f3559 d90035b3 591a36bd 378636bd \
+    370636ac c52737cd cc4c3ecd cc4cbe33 33b3be0a d7233c0a d7a3bc8f c2f53c57 \
+    d623bcb9 fc7f3fcd cc4c3e3e d4a33ce5 f27f3fcd cc4cbe83 e27f3f20 b9f53c33 \
+    33b3be91 37623fae 246abf12 88833f13 c5fd3ecd 2f013f9c 5ca8bbbe 3a2440ef \
+    6624c07a d59d3dbd 37863300 00003f00 00003f00 00000055 55854055 55854055 \
+    5505c155 5585c055 55854000 000000bd 378632bd 370632bd 37063200 00000065 \
+    cf8b3365 cf8b3365 cf0bb465 cf8bb365 cf8b3300 00000052 b85e3f00 003ec300 \
+    008cc200 00704133 33333f00 0020c300 0064c200 005cc2f6 285c3f00 0034c300 \
+    007cc200 005041ae 346d335c 8475b3ba eb893368 0c05334c 76073344 8ab0af03 \
+    352c3459 632cb436 80a531f7 cc923952 499d3a52 499d3ae0 2d103ae0 2d103a34 \
+    80b739cd cccc3dfd ff03fcff 03fdff03 fcff031a 83985d";
+
+fn golden() -> ([u8; MAX_BYTES], usize) {
+    let mut bytes = [0; MAX_BYTES];
+    let digits = || GOLDEN.bytes().filter(u8::is_ascii_hexdigit);
+    let value = |digit: u8| char::from(digit).to_digit(16).expect("a digit");
+    for (byte, (high, low)) in (bytes.iter_mut()).zip(
+        digits()
+            .step_by(2)
+            .map(value)
+            .zip(digits().skip(1).step_by(2).map(value)),
+    ) {
+        *byte = u8::try_from(16 * high + low).expect("a byte");
+    }
+    (bytes, digits().count() / 2)
+}
+
+/// CRC-32C bit by bit, as its definition says: polynomial 1EDC6F41, reflected.
+fn crc32c(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+            (crc >> 1) ^ (0x82f6_3b78 * (crc & 1))
+        })
+    })
+}
+
+/// Puts the right check behind the first `n` bytes.
+fn seal(blob: &mut [u8], n: usize) {
+    let check = crc32c(&blob[..n]).to_le_bytes();
+    blob[n..n + CRC_BYTES].copy_from_slice(&check);
+}
+
+/// Sets, other than the sample, written into a blob: for damage that a CRC does not show.
+fn blob_of(set: &ParameterSet) -> ([u8; MAX_BYTES], usize) {
+    let mut buffer = [0; MAX_BYTES];
+    let n = set.to_bytes(&mut buffer).expect("room enough").len();
+    (buffer, n)
+}
+
+/// A plain pseudo-random sequence (xorshift).
+struct Words(u32);
+
+impl Words {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        usize::try_from(self.0).expect("32 bits") % end
+    }
+}
+
+#[test]
+fn the_golden_blob_is_written_byte_for_byte() {
+    let (golden, n) = golden();
+    let mut buffer = [0; MAX_BYTES];
+    let written = sample::parameters().to_bytes(&mut buffer).map(<[u8]>::len);
+    if written != Ok(n) || buffer[..n] != golden[..n] {
+        let written = written.unwrap_or(0);
+        panic!("{written} bytes: {:02x?}", &buffer[..written]);
+    }
+}
+
+#[test]
+fn the_golden_blob_reads_as_the_set_that_it_was_made_of() {
+    let (golden, n) = golden();
+    assert_eq!(
+        ParameterSet::from_bytes(&golden[..n]),
+        Ok(sample::parameters())
+    );
+    assert_eq!(ParameterSet::from_flash(&golden), Ok(sample::parameters()));
+}
+
+#[test]
+fn the_layout_is_as_documented() {
+    let (golden, n) = golden();
+    assert_eq!(&golden[..8], b"HALL\x01\x00\x00\x00");
+    let payload = u32::from_le_bytes(golden[8..12].try_into().expect("four bytes"));
+    assert_eq!(HEADER_BYTES + payload as usize + CRC_BYTES, n);
+    let check = u32::from_le_bytes(golden[n - 4..n].try_into().expect("four bytes"));
+    assert_eq!(check, crc32c(&golden[..n - 4]));
+    // Model (31) is the fourth kind; then the serial number with its length.
+    assert_eq!(&golden[12..21], b"\x03\x07HS-0007");
+    assert!(n <= MAX_BYTES);
+}
+
+#[test]
+fn the_largest_set_fits_the_largest_blob() {
+    let mut set = sample::parameters();
+    set.serial = Text::try_from("01234567890123456789012345678901").expect("32 bytes");
+    set.created = set.serial.clone();
+    set.fit.rows = u32::MAX;
+    set.fit.train_rows = u32::MAX;
+    set.constants.hall_window.low = -crate::frame::CODE_MAGNITUDE_MAX;
+    set.constants.capacitive_window.high = crate::frame::CODE_MAGNITUDE_MAX;
+    let (blob, n) = blob_of(&set);
+    assert_eq!(ParameterSet::from_bytes(&blob[..n]), Ok(set));
+    let mut short = [0; MAX_BYTES];
+    for room in 0..n {
+        assert_eq!(
+            sample::parameters().to_bytes(&mut short[..room]).is_ok(),
+            room >= golden().1
+        );
+    }
+}
+
+#[test]
+fn every_flipped_bit_is_refused() {
+    let (mut blob, n) = golden();
+    for bit in 0..8 * n {
+        blob[bit / 8] ^= 1 << (bit % 8);
+        assert!(ParameterSet::from_bytes(&blob[..n]).is_err(), "bit {bit}");
+        assert!(ParameterSet::from_flash(&blob).is_err(), "bit {bit}");
+        blob[bit / 8] ^= 1 << (bit % 8);
+    }
+}
+
+#[test]
+fn up_to_five_flipped_bits_are_refused() {
+    let (mut blob, n) = golden();
+    let mut words = Words(1);
+    for round in 0..3000 {
+        let bits: [usize; 5] = core::array::from_fn(|_| words.below(8 * n));
+        let flips = 2 + round % 4;
+        for bit in &bits[..flips] {
+            blob[bit / 8] ^= 1 << (bit % 8);
+        }
+        // The same bit twice is no flip: only blobs that differ are damaged.
+        if blob[..n] != golden().0[..n] {
+            assert!(ParameterSet::from_flash(&blob).is_err(), "{bits:?}");
+        }
+        for bit in &bits[..flips] {
+            blob[bit / 8] ^= 1 << (bit % 8);
+        }
+    }
+}
+
+#[test]
+fn every_truncation_is_refused_with_what_is_missing() {
+    let (blob, n) = golden();
+    for found in 0..n {
+        let needed = if found < HEADER_BYTES {
+            HEADER_BYTES
+        } else {
+            n
+        };
+        let truncated = Err(BlobError::Truncated { needed, found });
+        assert_eq!(ParameterSet::from_bytes(&blob[..found]), truncated);
+        assert_eq!(ParameterSet::from_flash(&blob[..found]), truncated);
+    }
+}
+
+#[test]
+fn a_write_that_lost_power_is_refused() {
+    let (blob, n) = golden();
+    for written in 0..n {
+        let mut flash = [0xff; MAX_BYTES];
+        flash[..written].copy_from_slice(&blob[..written]);
+        let refused = ParameterSet::from_flash(&flash);
+        // The last bytes of the check may be 0xFF themselves; then nothing is missing.
+        assert_eq!(refused.is_ok(), flash[..n] == blob[..n], "{written} bytes");
+    }
+}
+
+#[test]
+fn padding_is_refused_in_a_file_and_passed_over_in_flash() {
+    let (blob, n) = golden();
+    for fill in [0x00, 0xff, 0x5a] {
+        let mut padded = [fill; MAX_BYTES];
+        padded[..n].copy_from_slice(&blob[..n]);
+        for found in n + 1..=MAX_BYTES {
+            let trailing = BlobError::TrailingBytes {
+                blob_bytes: n,
+                found,
+            };
+            assert_eq!(ParameterSet::from_bytes(&padded[..found]), Err(trailing));
+            assert!(ParameterSet::from_flash(&padded[..found]).is_ok());
+        }
+    }
+}
+
+#[test]
+fn other_versions_are_refused_even_with_a_right_check() {
+    for found in [0, LAYOUT_VERSION + 1, 0x0100, u16::MAX] {
+        let (mut blob, n) = golden();
+        blob[4..6].copy_from_slice(&found.to_le_bytes());
+        seal(&mut blob, n - CRC_BYTES);
+        let unknown = BlobError::UnknownVersion {
+            found,
+            supported: LAYOUT_VERSION,
+        };
+        assert_eq!(ParameterSet::from_bytes(&blob[..n]), Err(unknown));
+    }
+}
+
+#[test]
+fn erased_and_foreign_memory_are_told_apart() {
+    for fill in [0x00, 0xff] {
+        assert_eq!(
+            ParameterSet::from_flash(&[fill; MAX_BYTES]),
+            Err(BlobError::Erased)
+        );
+    }
+    let foreign = *b"\x7fELF\x01\x01\x01\x00\x00\x00\x00\x00";
+    let found = *b"\x7fELF";
+    assert_eq!(
+        ParameterSet::from_flash(&foreign),
+        Err(BlobError::BadMagic { found })
+    );
+}
+
+#[test]
+fn a_length_that_no_blob_has_is_refused() {
+    let most = MAX_BYTES - HEADER_BYTES - CRC_BYTES;
+    for payload_bytes in [most as u32 + 1, u32::MAX, u32::MAX - 15] {
+        let (mut blob, _) = golden();
+        blob[8..12].copy_from_slice(&payload_bytes.to_le_bytes());
+        assert_eq!(
+            ParameterSet::from_flash(&blob),
+            Err(BlobError::BadHeader { payload_bytes })
+        );
+    }
+    let (mut blob, n) = golden();
+    blob[6] = 1;
+    seal(&mut blob, n - CRC_BYTES);
+    assert!(matches!(
+        ParameterSet::from_flash(&blob),
+        Err(BlobError::BadHeader { .. })
+    ));
+}
+
+/// With the check made right again, the payload itself must hold the damage off.
+#[test]
+fn a_sealed_payload_of_another_length_is_refused() {
+    let (golden, n) = golden();
+    for payload in 0..MAX_BYTES - HEADER_BYTES - CRC_BYTES {
+        if HEADER_BYTES + payload + CRC_BYTES == n {
+            continue;
+        }
+        let mut blob = golden;
+        blob[8..12].copy_from_slice(&(payload as u32).to_le_bytes());
+        seal(&mut blob, HEADER_BYTES + payload);
+        assert_eq!(
+            ParameterSet::from_flash(&blob),
+            Err(BlobError::BadPayload),
+            "{payload}"
+        );
+    }
+}
+
+#[test]
+fn a_sealed_payload_of_noise_gives_no_unsound_set() {
+    let mut words = Words(7);
+    for _ in 0..2000 {
+        let (mut blob, n) = golden();
+        for _ in 0..1 + words.below(8) {
+            let at = HEADER_BYTES + words.below(n - HEADER_BYTES - CRC_BYTES);
+            blob[at] = words.below(256) as u8;
+        }
+        seal(&mut blob, n - CRC_BYTES);
+        if let Ok(set) = ParameterSet::from_flash(&blob) {
+            assert_eq!(set.check(), Ok(()));
+        }
+    }
+}
+
+#[test]
+fn unusable_parameters_are_refused_by_their_reason() {
+    let refused = |change: fn(&mut ParameterSet)| {
+        let mut set = sample::parameters();
+        change(&mut set);
+        let (blob, n) = blob_of(&set);
+        match ParameterSet::from_bytes(&blob[..n]) {
+            Err(BlobError::Parameters(error)) => error,
+            other => panic!("{other:?}"),
+        }
+    };
+    let group = "the sensitivities";
+    assert_eq!(
+        refused(|set| set.constants.sensitivity[1].per_z_m = f32::NAN),
+        ParameterError::NotFinite { group }
+    );
+    assert!(matches!(
+        refused(|set| {
+            set.plane[1] = set.plane[0];
+            set.geometry.lever_arm_m[1] = set.geometry.lever_arm_m[0];
+            set.geometry.misalignment_rad[1] = set.geometry.misalignment_rad[0];
+        }),
+        ParameterError::NotTheInverse { .. }
+    ));
+}
+
+#[test]
+fn another_stage_is_refused_when_one_is_expected() {
+    let set = sample::parameters();
+    assert_eq!(set.expect_serial("HS-0007"), Ok(()));
+    for serial in ["HS-0008", "HS-00071", "HS-000", "", "hs-0007"] {
+        assert_eq!(set.expect_serial(serial), Err(BlobError::OtherStage));
+    }
+}

@@ -53,6 +53,8 @@ pub mod parameters;
 pub mod pose;
 pub mod real;
 pub mod rezero;
+#[cfg(test)]
+mod sample;
 pub mod servo;
 pub mod status;
 

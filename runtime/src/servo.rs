@@ -278,3 +278,7 @@ impl<'d> Servo<'d> {
         reading
     }
 }
+
+#[cfg(test)]
+#[path = "servo_tests.rs"]
+mod tests;

@@ -60,10 +60,10 @@ pub fn count(
     let mut before = 0;
     for line in log.lines() {
         let Some(at) = address(&line?) else { continue };
-        if let Some(done) = call.take_if(|call| call.return_to.contains(&at)) {
-            if let Some((name, _)) = by_entry.get(&done.entry) {
-                counts.entry((*name).clone()).or_default().add(&done);
-            }
+        if let Some(done) = call.take_if(|call| call.return_to.contains(&at))
+            && let Some((name, _)) = by_entry.get(&done.entry)
+        {
+            counts.entry((*name).clone()).or_default().add(&done);
         }
         if let (None, Some(&(_, end))) = (&call, by_entry.get(&at)) {
             call = Some(Call {

@@ -1,0 +1,259 @@
+//! Tests of the tick: every status bit, what is zero when, no NaN, `f32` against `f64`.
+
+use super::*;
+use crate::calibration::Calibration;
+use crate::frame::MISSING_CODE;
+use crate::sample;
+
+pub(super) const HALL: [i32; 3] = [1200, 900, 700];
+pub(super) const CAPACITIVE: [i32; 3] = [300, -200, 100];
+
+pub(super) fn decoder() -> Decoder {
+    sample::parameters().decoder()
+}
+
+pub(super) fn changed(change: impl FnOnce(&mut DecoderConstants<f32>)) -> Decoder {
+    let mut constants = *decoder().constants();
+    change(&mut constants);
+    Decoder::new(constants)
+}
+
+pub(super) fn decode(decoder: &Decoder, hall: [i32; 3], capacitive: [i32; 3]) -> Reading {
+    decoder.decode(hall, capacitive, &PlanarPose::ZERO)
+}
+
+pub(super) fn words(reading: &Reading) -> [u32; 7] {
+    let [x, y, rz] = reading.pose.planar.to_array().map(f32::to_bits);
+    let [z, rx, ry] = reading.pose.vertical.to_array().map(f32::to_bits);
+    [x, y, rz, z, rx, ry, reading.status.bits()]
+}
+
+#[test]
+fn a_bad_hall_code_sets_its_bit_and_takes_x_y_and_rz() {
+    let good = decode(&decoder(), HALL, CAPACITIVE);
+    for probe in 0..3 {
+        for bad in [-32768, 32767, MISSING_CODE, i32::MAX] {
+            let mut hall = HALL;
+            hall[probe] = bad;
+            let reading = decode(&decoder(), hall, CAPACITIVE);
+            let bits =
+                Status::from_bits(Status::HALL_A.bits() << probe).with(Status::PLANAR_INVALID);
+            assert!(
+                reading
+                    .status
+                    .any(Status::from_bits(Status::HALL_A.bits() << probe))
+            );
+            let range = Status::PLANAR_EXTRAPOLATED.bits();
+            assert_eq!(
+                reading.status.bits() & !range,
+                bits.bits(),
+                "probe {probe}, code {bad}"
+            );
+            assert_eq!(reading.pose.planar, PlanarPose::ZERO);
+            assert_eq!(reading.pose.vertical, good.pose.vertical);
+            assert_eq!(
+                (reading.planar(), reading.vertical()),
+                (None, good.vertical())
+            );
+        }
+    }
+}
+
+#[test]
+fn a_bad_capacitive_code_sets_its_bit_and_takes_all_six() {
+    for gap in 0..3 {
+        for bad in [-32768, 32767, MISSING_CODE] {
+            let mut capacitive = CAPACITIVE;
+            capacitive[gap] = bad;
+            let reading = decode(&decoder(), HALL, capacitive);
+            let bit = Status::from_bits(Status::CAPACITIVE_1.bits() << gap);
+            assert!(reading.status.any(bit));
+            assert!(reading.status.any(Status::PLANAR_INVALID));
+            assert!(reading.status.any(Status::VERTICAL_INVALID));
+            assert_eq!(
+                reading.status.bits() & Status::CAPACITIVE.bits(),
+                bit.bits()
+            );
+            assert_eq!(reading.pose, Pose::default());
+            assert_eq!((reading.planar(), reading.vertical()), (None, None));
+        }
+    }
+}
+
+#[test]
+fn a_sensitivity_too_near_zero_sets_its_bit_and_takes_x_y_and_rz() {
+    for probe in 0..3 {
+        for eta in [
+            0.0,
+            0.0999,
+            -0.0999,
+            f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+        ] {
+            let decoder = changed(|c| c.sensitivity[probe] = Sensitivity::constant(eta));
+            let status = decode(&decoder, HALL, CAPACITIVE).status;
+            let bit = Status::SENSITIVITY_A.bits() << probe;
+            assert_eq!(status.bits() & Status::SENSITIVITY.bits(), bit, "eta {eta}");
+            assert!(status.any(Status::PLANAR_INVALID) && !status.any(Status::VERTICAL_INVALID));
+        }
+        for eta in [0.1, -0.1, 1e30] {
+            let decoder = changed(|c| c.sensitivity[probe] = Sensitivity::constant(eta));
+            assert!(
+                !decode(&decoder, HALL, CAPACITIVE)
+                    .status
+                    .any(Status::SENSITIVITY),
+                "eta {eta}"
+            );
+        }
+    }
+}
+
+#[test]
+fn results_that_are_not_finite_are_marked_and_zero() {
+    for axis in 0..3 {
+        let decoder = changed(|c| c.planar_per_code[axis][1] = f32::MAX);
+        let reading = decode(&decoder, HALL, CAPACITIVE);
+        assert!(reading.status.any(Status::PLANAR_NOT_FINITE));
+        assert_eq!(reading.pose.planar, PlanarPose::ZERO);
+        assert!(reading.vertical().is_some());
+        let decoder = changed(|c| c.vertical_per_code[axis][1] = f32::NEG_INFINITY);
+        let reading = decode(&decoder, HALL, CAPACITIVE);
+        assert!(reading.status.any(Status::VERTICAL_NOT_FINITE));
+        assert_eq!(reading.pose, Pose::default());
+    }
+    let zero = PlanarPose {
+        x_m: 0.0,
+        y_m: f32::NAN,
+        rz_rad: 0.0,
+    };
+    let reading = decoder().decode(HALL, CAPACITIVE, &zero);
+    assert!(reading.status.any(Status::PLANAR_NOT_FINITE));
+}
+
+#[test]
+fn a_pose_outside_the_calibrated_range_is_marked_and_given() {
+    let good = decode(&decoder(), HALL, CAPACITIVE);
+    for axis in 0..3 {
+        // The limit itself lies within the range, on either side; the next number beyond does not.
+        for (limit, bit) in [
+            (
+                good.pose.planar.to_array()[axis],
+                Status::PLANAR_EXTRAPOLATED,
+            ),
+            (
+                good.pose.vertical.to_array()[axis],
+                Status::VERTICAL_EXTRAPOLATED,
+            ),
+        ] {
+            let planar = bit == Status::PLANAR_EXTRAPOLATED;
+            let limited = |limit: f32| {
+                changed(|c| {
+                    let limits = if planar {
+                        &mut c.calibrated_planar
+                    } else {
+                        &mut c.calibrated_vertical
+                    };
+                    limits[axis] = limit;
+                })
+            };
+            let at = decode(&limited(limit.abs()), HALL, CAPACITIVE);
+            assert!(at.status.is_good());
+            let below = f32::from_bits(limit.abs().to_bits() - 1);
+            let beyond = decode(&limited(below), HALL, CAPACITIVE);
+            assert_eq!(beyond.status, bit);
+            assert_eq!(beyond.pose, good.pose);
+        }
+    }
+}
+
+#[test]
+fn a_known_vertical_pose_decodes_like_the_codes_that_give_it() {
+    let by_codes = decode(&decoder(), HALL, CAPACITIVE);
+    let by_pose = decoder().decode_at(HALL, by_codes.pose.vertical, &PlanarPose::ZERO);
+    assert_eq!(words(&by_codes), words(&by_pose));
+    let nan = VerticalPose {
+        z_m: f32::NAN,
+        ..VerticalPose::ZERO
+    };
+    let status = decoder().decode_at(HALL, nan, &PlanarPose::ZERO).status;
+    assert!(status.any(Status::VERTICAL_NOT_FINITE) && status.any(Status::PLANAR_INVALID));
+}
+
+#[test]
+fn the_zero_deviation_is_taken_off() {
+    let zero = PlanarPose {
+        x_m: 3e-6,
+        y_m: -2e-6,
+        rz_rad: 1e-6,
+    };
+    let plain = decode(&decoder(), HALL, CAPACITIVE).pose.planar.to_array();
+    let less = decoder()
+        .decode(HALL, CAPACITIVE, &zero)
+        .pose
+        .planar
+        .to_array();
+    for ((less, plain), zero) in less.into_iter().zip(plain).zip(zero.to_array()) {
+        assert!((f64::from(plain) - f64::from(zero) - f64::from(less)).abs() < 2e-11);
+    }
+}
+
+#[test]
+fn channel_faults_name_channel_and_reason() {
+    let frame = RawFrame {
+        hall: [5, MISSING_CODE, 6],
+        capacitive: [1, 2, 40000],
+        sequence: 0,
+        time_us: 0,
+    };
+    let mut faults = decoder().channel_faults(&frame);
+    let fault = CodeFault::Missing;
+    assert_eq!(faults.next(), Some(ChannelFault::Hall { probe: 1, fault }));
+    let fault = CodeFault::AboveWindow {
+        code: 40000,
+        high: sample::WINDOW.high,
+    };
+    assert_eq!(
+        faults.next(),
+        Some(ChannelFault::Capacitive { gap: 2, fault })
+    );
+    assert_eq!(faults.next(), None);
+}
+
+/// Motion over the whole calibrated range, codes as the converters would give them: `f32`
+/// stays within 0.25 nm and 1 nrad of the same constants in `f64`.
+#[test]
+fn f32_follows_f64_over_the_range_of_motion() {
+    let calibration: Calibration = sample::calibration();
+    let exact = calibration.constants().expect("a sound stage");
+    let decoder = decoder();
+    let steps = [-20_000, -6_001, -17, 0, 3, 9_999, 20_000];
+    let (mut worst_m, mut worst_rad) = (0f64, 0f64);
+    for &a in &steps {
+        for &b in &steps {
+            for &c in &steps {
+                let hall = [a, b, c].map(|code: i32| code / 3);
+                let capacitive = [b, c, a].map(|code: i32| code * 4 / 5);
+                let reading = decode(&decoder, hall, capacitive);
+                let v = vertical_pose(&exact.vertical_per_code, capacitive.map(f64::from));
+                let phi = exact.sensitivity.map(|s| sensitivity_at(&s, &v));
+                if !reading.status.is_good() {
+                    continue;
+                }
+                let hall = hall.map(f64::from);
+                let q = planar_pose(&exact.planar_per_code, hall, phi, &PlanarPose::ZERO);
+                let off = |have: f32, want: f64| (f64::from(have) - want).abs();
+                let (p, w) = (reading.pose.planar, reading.pose.vertical);
+                worst_m = worst_m
+                    .max(off(p.x_m, q.x_m))
+                    .max(off(p.y_m, q.y_m))
+                    .max(off(w.z_m, v.z_m));
+                worst_rad = (worst_rad.max(off(p.rz_rad, q.rz_rad)))
+                    .max(off(w.rx_rad, v.rx_rad))
+                    .max(off(w.ry_rad, v.ry_rad));
+            }
+        }
+    }
+    assert!(worst_m > 0.0 && worst_m <= 0.25e-9, "{worst_m:e} m");
+    assert!(worst_rad > 0.0 && worst_rad <= 1e-9, "{worst_rad:e} rad");
+}

@@ -1,0 +1,272 @@
+//! Tests of what lasts from tick to tick: hold, sequence, counters, re-zero.
+
+use super::*;
+use crate::frame::MISSING_CODE;
+use crate::sample;
+
+fn frame(sequence: u32) -> RawFrame {
+    RawFrame {
+        hall: [1200, 900, 700],
+        capacitive: [300, -200, 100],
+        sequence,
+        time_us: 0,
+    }
+}
+
+fn bad_hall(sequence: u32) -> RawFrame {
+    RawFrame {
+        hall: [MISSING_CODE, 900, 700],
+        ..frame(sequence)
+    }
+}
+
+fn bad_gap(sequence: u32) -> RawFrame {
+    RawFrame {
+        capacitive: [300, MISSING_CODE, 100],
+        ..frame(sequence)
+    }
+}
+
+const HOLD_2: OnInvalid = OnInvalid::Hold { ticks: 2 };
+
+#[test]
+fn invalid_fields_read_zero_without_hold() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, OnInvalid::Zero);
+    assert!(servo.tick(&frame(0)).status.is_good());
+    let reading = servo.tick(&bad_gap(1));
+    assert_eq!(reading.pose, NO_POSE);
+    assert!(
+        !reading
+            .status
+            .any(Status::PLANAR_HELD.with(Status::VERTICAL_HELD))
+    );
+}
+
+#[test]
+fn the_last_valid_pose_is_held_for_so_many_ticks_and_no_longer() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, HOLD_2);
+    let good = servo.tick(&frame(0));
+    for sequence in 1..=2 {
+        let held = servo.tick(&bad_gap(sequence));
+        assert_eq!(held.pose, good.pose);
+        assert!(held.status.any(Status::PLANAR_HELD) && held.status.any(Status::VERTICAL_HELD));
+        assert!(held.status.any(Status::PLANAR_INVALID) && held.planar().is_none());
+        assert_eq!(held.planar_or_held(), Some(good.pose.planar));
+    }
+    let over = servo.tick(&bad_gap(3));
+    assert_eq!((over.pose, over.planar_or_held()), (NO_POSE, None));
+    assert!(
+        !over
+            .status
+            .any(Status::PLANAR_HELD.with(Status::VERTICAL_HELD))
+    );
+    // A valid pose renews the hold.
+    assert!(servo.tick(&frame(4)).status.is_good());
+    assert_eq!(servo.tick(&bad_gap(5)).pose, good.pose);
+    assert_eq!(servo.health().held, 3);
+}
+
+#[test]
+fn only_what_is_invalid_is_held() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, HOLD_2);
+    let good = servo.tick(&frame(0));
+    let moved = RawFrame {
+        capacitive: [310, -200, 100],
+        ..bad_hall(1)
+    };
+    let reading = servo.tick(&moved);
+    assert_eq!(reading.pose.planar, good.pose.planar);
+    assert_ne!(reading.pose.vertical, good.pose.vertical);
+    assert!(reading.status.any(Status::PLANAR_HELD) && !reading.status.any(Status::VERTICAL_HELD));
+    assert!(reading.vertical().is_some());
+}
+
+#[test]
+fn nothing_is_held_before_a_first_valid_pose() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, HOLD_2);
+    let reading = servo.tick(&bad_gap(0));
+    assert_eq!(reading.pose, NO_POSE);
+    assert!(
+        !reading
+            .status
+            .any(Status::PLANAR_HELD.with(Status::VERTICAL_HELD))
+    );
+}
+
+#[test]
+fn a_gap_in_the_sequence_is_marked_and_counted() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, HOLD_2);
+    servo.tick(&frame(u32::MAX - 1));
+    let reading = servo.tick(&frame(2));
+    assert_eq!(reading.status, Status::FRAMES_MISSED);
+    assert!(reading.planar().is_some());
+    assert_eq!(servo.health().frames_missed, 3);
+    assert!(servo.tick(&frame(3)).status.is_good());
+}
+
+#[test]
+fn a_repeated_or_older_frame_is_not_decoded() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, HOLD_2);
+    let good = servo.tick(&frame(7));
+    for (sequence, held) in [(7, true), (5, true), (7, false)] {
+        let reading = servo.tick(&frame(sequence));
+        assert!(reading.status.any(Status::FRAME_REPEATED));
+        assert!(reading.planar().is_none() && reading.vertical().is_none());
+        assert_eq!(reading.pose == good.pose, held, "frame {sequence}");
+    }
+    assert_eq!(servo.health().frames_repeated, 3);
+    assert!(servo.tick(&frame(8)).status.is_good());
+}
+
+#[test]
+fn a_period_without_a_frame_holds_and_keeps_the_count_in_step() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, HOLD_2);
+    let good = servo.tick(&frame(0));
+    let reading = servo.tick_without_frame();
+    assert_eq!(reading.pose, good.pose);
+    assert!(reading.status.any(Status::FRAMES_MISSED) && reading.status.any(Status::PLANAR_HELD));
+    // The missed period was told: the next frame is in step.
+    assert!(servo.tick(&frame(2)).status.is_good());
+    let health = servo.health();
+    assert_eq!((health.ticks, health.frames_missed, health.held), (3, 1, 1));
+    assert_eq!((health.planar_invalid, health.vertical_invalid), (1, 1));
+}
+
+#[test]
+fn forgetting_drops_pose_and_sequence_and_keeps_zero_and_counters() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, HOLD_2);
+    let zero = PlanarPose {
+        x_m: 1e-6,
+        y_m: 2e-6,
+        rz_rad: 3e-6,
+    };
+    assert!(servo.set_zero(zero));
+    servo.tick(&frame(100));
+    servo.forget();
+    let reading = servo.tick(&bad_gap(3));
+    assert_eq!(reading.pose, NO_POSE);
+    assert!(
+        !reading
+            .status
+            .any(Status::FRAMES_MISSED.with(Status::FRAME_REPEATED))
+    );
+    assert_eq!((servo.zero(), servo.health().ticks), (zero, 2));
+}
+
+#[test]
+fn counters_stay_at_their_largest_value() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, HOLD_2);
+    servo.health = Health {
+        ticks: u32::MAX,
+        planar_invalid: u32::MAX,
+        vertical_invalid: u32::MAX,
+        held: u32::MAX,
+        frames_missed: u32::MAX - 1,
+        frames_repeated: u32::MAX,
+    };
+    let full = Health {
+        frames_missed: u32::MAX,
+        ..servo.health
+    };
+    servo.tick(&frame(0));
+    servo.tick(&bad_gap(10));
+    servo.tick(&frame(10));
+    servo.tick_without_frame();
+    assert_eq!(servo.health(), full);
+}
+
+#[test]
+fn a_re_zero_at_rest_is_taken_off_from_then_on() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, OnInvalid::Zero);
+    let rest = servo.tick(&frame(0)).pose.planar.to_array();
+    servo.start_rezero(RezeroSettings {
+        ticks: 10,
+        ..RezeroSettings::default()
+    });
+    for sequence in 1..=10 {
+        assert!(
+            matches!(servo.rezero_state(), RezeroState::Running { ticks_left } if u32::from(ticks_left) == 11 - sequence)
+        );
+        servo.tick(&frame(sequence));
+    }
+    assert!(matches!(servo.rezero_state(), RezeroState::Done { .. }));
+    let after = servo.tick(&frame(11)).pose.planar.to_array();
+    for ((rest, after), zero) in rest.into_iter().zip(after).zip(servo.zero().to_array()) {
+        assert!(
+            rest.abs() > 1e-6 && after.abs() < 1e-11,
+            "{rest:e} {after:e}"
+        );
+        assert!((rest - zero).abs() < 1e-11);
+    }
+    // A second run measures from the pose without the zero, not from what is left of it.
+    let before = servo.zero();
+    servo.start_rezero(RezeroSettings {
+        ticks: 2,
+        ..RezeroSettings::default()
+    });
+    servo.tick(&frame(12));
+    servo.tick(&frame(13));
+    for (before, again) in before.to_array().into_iter().zip(servo.zero().to_array()) {
+        assert!((before - again).abs() < 1e-11);
+    }
+}
+
+#[test]
+fn a_bad_or_missing_frame_refuses_the_re_zero_and_keeps_the_zero_in_use() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, HOLD_2);
+    let zero = PlanarPose {
+        x_m: 1e-6,
+        y_m: 2e-6,
+        rz_rad: 3e-6,
+    };
+    assert!(servo.set_zero(zero));
+    servo.tick(&frame(0));
+    servo.start_rezero(RezeroSettings::default());
+    servo.tick(&bad_hall(1));
+    assert!(matches!(
+        servo.rezero_state(),
+        RezeroState::Refused(RezeroRefusal::NoPose { status }) if status.any(Status::HALL_A)
+    ));
+    servo.start_rezero(RezeroSettings::default());
+    servo.tick_without_frame();
+    assert!(matches!(
+        servo.rezero_state(),
+        RezeroState::Refused(RezeroRefusal::NoPose {
+            status: Status::FRAMES_MISSED
+        })
+    ));
+    servo.start_rezero(RezeroSettings {
+        ticks: 1,
+        ..RezeroSettings::default()
+    });
+    assert_eq!(
+        servo.rezero_state(),
+        RezeroState::Refused(RezeroRefusal::TooShort { ticks: 1 })
+    );
+    assert_eq!(servo.zero(), zero);
+}
+
+#[test]
+fn a_zero_that_is_no_number_is_ignored() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&decoder, OnInvalid::Zero);
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        assert!(!servo.set_zero(PlanarPose {
+            y_m: bad,
+            ..PlanarPose::ZERO
+        }));
+    }
+    assert_eq!(servo.zero(), PlanarPose::ZERO);
+    assert!(servo.tick(&frame(0)).status.is_good());
+}
