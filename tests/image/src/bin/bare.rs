@@ -1,0 +1,36 @@
+//! What a controller links at the least: a blob loaded from flash, the tick of a servo with
+//! hold and re-zero. Its size is that of the runtime in flash.
+#![no_std]
+#![no_main]
+
+use core::hint::black_box;
+use cortex_m_rt::entry;
+use runtime::blob::MAX_BYTES;
+use runtime::rezero::RezeroSettings;
+use runtime::{OnInvalid, ParameterSet, RawFrame, Servo};
+
+extern crate image;
+
+#[entry]
+fn main() -> ! {
+    let memory = black_box([0xff; MAX_BYTES]);
+    if let Ok(set) = ParameterSet::from_flash(&memory)
+        && set.expect_serial("HS-0007").is_ok()
+    {
+        let decoder = set.decoder();
+        let mut servo = Servo::new(&decoder, OnInvalid::Hold { ticks: 3 });
+        servo.start_rezero(RezeroSettings::default());
+        loop {
+            let frame = black_box(RawFrame {
+                hall: [0; 3],
+                capacitive: [0; 3],
+                sequence: 0,
+                time_us: 0,
+            });
+            black_box(servo.tick(&frame));
+        }
+    }
+    loop {
+        cortex_m::asm::wfi();
+    }
+}

@@ -1,0 +1,49 @@
+//! Uses every function that a controller calls, so that the linker shows whether any of them
+//! can reach a panic. Without the feature `may-panic` it links; with it, which adds one
+//! indexing that may fail, it must not.
+#![no_std]
+#![no_main]
+
+use core::hint::black_box;
+use cortex_m_rt::entry;
+use runtime::blob::MAX_BYTES;
+use runtime::rezero::RezeroSettings;
+use runtime::{OnInvalid, ParameterSet, PlanarPose, RawFrame, Servo, VerticalPose};
+
+extern crate image;
+
+const FRAME: RawFrame = RawFrame {
+    hall: [0; 3],
+    capacitive: [0; 3],
+    sequence: 0,
+    time_us: 0,
+};
+
+#[entry]
+fn main() -> ! {
+    let memory = black_box([0xff_u8; MAX_BYTES]);
+    let length = black_box(MAX_BYTES);
+    let frame = black_box(FRAME);
+    #[cfg(feature = "may-panic")]
+    black_box(memory[length]);
+    let memory = memory.get(..length).unwrap_or_default();
+    let _ = black_box(ParameterSet::from_bytes(memory));
+    if let Ok(set) = ParameterSet::from_flash(memory) {
+        let _ = black_box(set.expect_serial("HS-0007"));
+        let mut buffer = [0; MAX_BYTES];
+        let _ = black_box(set.to_bytes(&mut buffer));
+        let decoder = black_box(set.decoder());
+        let mut servo = Servo::new(&decoder, black_box(OnInvalid::Hold { ticks: 3 }));
+        servo.start_rezero(black_box(RezeroSettings::default()));
+        black_box(servo.tick(&frame));
+        black_box(servo.tick_without_frame());
+        black_box(servo.tick_at(frame.hall, black_box(VerticalPose::ZERO), 1));
+        black_box(servo.set_zero(black_box(PlanarPose::ZERO)));
+        servo.forget();
+        black_box((servo.rezero_state(), servo.health(), servo.zero()));
+        black_box(decoder.channel_faults(&frame).count());
+    }
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
