@@ -159,9 +159,11 @@ fn make(
         let frames = motion::uniform_frames(&mut rng, FRAMES_PER_SET);
         motion::of_words(words, frames)
     }));
-    let wild = motion::wild_frames(&mut rng, parameters / 8);
-    let sound = tests::job::to_words(&set.constants, &PlanarPose::ZERO);
-    sections.push(motion::of_words(sound, wild));
+    if parameters > 0 {
+        let wild = motion::wild_frames(&mut rng, parameters / 8);
+        let sound = tests::job::to_words(&set.constants, &PlanarPose::ZERO);
+        sections.push(motion::of_words(sound, wild));
+    }
     let ticks: usize = sections.iter().map(|s: &Section| s.frames.len()).sum();
     println!("RESULT job_ticks={ticks}");
     println!("RESULT job_log_rows={rows}");

@@ -1,0 +1,227 @@
+// Reads the pose of a 6-DOF stage from its Hall and capacitive codes, in C.
+// Link libhall_runtime.a with --gc-sections. See runtime/c/example/main.c for a whole program.
+
+#ifndef HALL_RUNTIME_H
+#define HALL_RUNTIME_H
+
+// Made by cbindgen from runtime/c/src: change it there.
+
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+// Words of a decoder.
+#define HALL_DECODER_WORDS 53
+
+// Words of a servo.
+#define HALL_SERVO_WORDS 48
+
+// In place of a code that could not be read: INT32_MIN.
+#define HALL_MISSING_CODE INT32_MIN
+
+// X, Y, Rz are invalid.
+#define HALL_STATUS_PLANAR_INVALID (1 << 13)
+
+// Z, Rx, Ry are invalid.
+#define HALL_STATUS_VERTICAL_INVALID (1 << 14)
+
+// X, Y, Rz are the last valid ones, repeated.
+#define HALL_STATUS_PLANAR_HELD (1 << 15)
+
+// Z, Rx, Ry are the last valid ones, repeated.
+#define HALL_STATUS_VERTICAL_HELD (1 << 16)
+
+// One or more servo periods had no frame before this one.
+#define HALL_STATUS_FRAMES_MISSED (1 << 17)
+
+// The frame repeats an earlier sequence number.
+#define HALL_STATUS_FRAME_REPEATED (1 << 18)
+
+// What became of a call. 32 bits wide, whatever a compiler makes of enums.
+enum HallResult
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // Done.
+  HALL_RESULT_OK = 0,
+  // A pointer that is needed is NULL.
+  HALL_RESULT_NULL_POINTER = 1,
+  // The memory is shorter than a blob, or than the blob's header says.
+  HALL_RESULT_TRUNCATED = 2,
+  // The memory is erased: no blob was written.
+  HALL_RESULT_ERASED = 3,
+  // Something else than a blob.
+  HALL_RESULT_BAD_MAGIC = 4,
+  // A layout that this version does not read.
+  HALL_RESULT_UNKNOWN_VERSION = 5,
+  // A length that no blob has.
+  HALL_RESULT_BAD_HEADER = 6,
+  // A bit is wrong.
+  HALL_RESULT_BAD_CRC = 7,
+  // The check holds, yet the payload is not a parameter set.
+  HALL_RESULT_BAD_PAYLOAD = 8,
+  // A parameter is NaN or infinite, a matrix singular, or the like.
+  HALL_RESULT_UNUSABLE_PARAMETERS = 9,
+  // The blob belongs to another stage than the one expected.
+  HALL_RESULT_OTHER_STAGE = 10,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum HallResult HallResult;
+#else
+typedef uint32_t HallResult;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// Where a re-zero stands.
+enum HallRezero
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // None was asked for.
+  HALL_REZERO_IDLE = 0,
+  // It runs.
+  HALL_REZERO_RUNNING = 1,
+  // It ended, and the zero deviation is in use.
+  HALL_REZERO_DONE = 2,
+  // Refused: fewer than two ticks were asked for.
+  HALL_REZERO_TOO_SHORT = 3,
+  // Refused: a tick gave no planar pose.
+  HALL_REZERO_NO_POSE = 4,
+  // Refused: the stage moved.
+  HALL_REZERO_MOVED = 5,
+  // Refused: the pose drifted.
+  HALL_REZERO_DRIFTED = 6,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum HallRezero HallRezero;
+#else
+typedef uint32_t HallRezero;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// A decoder, as C sees it. Its contents are nobody's business.
+typedef struct {
+  uint32_t opaque[HALL_DECODER_WORDS];
+} HallDecoder;
+
+// A servo, as C sees it. Its contents are nobody's business.
+typedef struct {
+  uint32_t opaque[HALL_SERVO_WORDS];
+} HallServo;
+
+// The codes of one servo period.
+typedef struct {
+  // Hall codes of the probes A, B, C.
+  int32_t hall[3];
+  // Capacitive codes of the gaps 1, 2, 3.
+  int32_t capacitive[3];
+  // Number of the servo period, wrapping.
+  uint32_t sequence;
+  // When the codes were sampled, in us, wrapping.
+  uint32_t time_us;
+} HallFrame;
+
+// A pose and what is wrong with it: status 0 is all good. Invalid fields are 0 unless held.
+typedef struct {
+  // Displacement along X, m.
+  float x_m;
+  // Displacement along Y, m.
+  float y_m;
+  // Rotation about Z, rad.
+  float rz_rad;
+  // Displacement along Z, m.
+  float z_m;
+  // Rotation about X, rad.
+  float rx_rad;
+  // Rotation about Y, rad.
+  float ry_rad;
+  // The bits that HALL_STATUS_ names.
+  uint32_t status;
+} HallReading;
+
+// Motion in the plane.
+typedef struct {
+  // Displacement along X, m.
+  float x_m;
+  // Displacement along Y, m.
+  float y_m;
+  // Rotation about Z, rad.
+  float rz_rad;
+} HallPlanarPose;
+
+// Counters since start. They stay at their largest value.
+typedef struct {
+  // Ticks, with and without a frame.
+  uint32_t ticks;
+  // Ticks whose planar pose was invalid.
+  uint32_t planar_invalid;
+  // Ticks whose vertical pose was invalid.
+  uint32_t vertical_invalid;
+  // Ticks in which a value was held.
+  uint32_t held;
+  // Servo periods that had no frame.
+  uint32_t frames_missed;
+  // Frames that repeated an earlier sequence number.
+  uint32_t frames_repeated;
+} HallHealth;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+// Loads the parameter blob at the start of `memory` (flash, padding may follow), checks it,
+// and makes a decoder of it. `serial` is the serial number of the stage that is expected, or
+// NULL to take that of any. Anything but HALL_RESULT_OK leaves the decoder as it was.
+//
+// # Safety
+// `memory` points to `length` readable bytes; `serial` is NULL or ends in a zero byte;
+// `decoder` is NULL or points to a HallDecoder that no servo uses.
+HallResult hall_load(const uint8_t *memory,
+                     size_t length,
+                     const char *serial,
+                     HallDecoder *decoder);
+
+// Starts a servo: no zero deviation, nothing to hold, all counters zero. What is invalid is
+// held for `hold_ticks` ticks in a row, and zero after that.
+//
+// # Safety
+// `decoder` was filled by hall_load and stays as it is, and where it is, for as long as the
+// servo is used.
+HallResult hall_servo_start(HallServo *servo, const HallDecoder *decoder, uint16_t hold_ticks);
+
+// One servo period: decodes the frame into `reading`.
+void hall_tick(HallServo *servo, const HallFrame *frame, HallReading *reading);
+
+// One servo period in which no frame came: values are held or zero.
+void hall_tick_without_frame(HallServo *servo, HallReading *reading);
+
+// Forgets the pose to hold and the sequence; zero deviation and counters stay.
+void hall_forget(HallServo *servo);
+
+// Starts to average at rest, over `ticks` ticks with the default limits of movement.
+void hall_rezero_start(HallServo *servo, uint16_t ticks);
+
+// Where the re-zero stands.
+HallRezero hall_rezero_state(const HallServo *servo);
+
+// The zero deviation that is subtracted, as a pose; zeros for a null pointer.
+HallPlanarPose hall_zero(const HallServo *servo);
+
+// Subtracts a zero deviation that is known, for instance from before a restart. One that is
+// not finite is ignored and `false` returned.
+bool hall_set_zero(HallServo *servo, HallPlanarPose zero);
+
+// The counters; zeros for a null pointer.
+HallHealth hall_health(const HallServo *servo);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* HALL_RUNTIME_H */

@@ -1,0 +1,201 @@
+//! What C hands in and gets back.
+
+use runtime::servo::Health;
+use runtime::{PlanarPose, RawFrame, Reading};
+
+/// In place of a code that could not be read: INT32_MIN.
+pub const HALL_MISSING_CODE: i32 = i32::MIN;
+
+/// What became of a call. 32 bits wide, whatever a compiler makes of enums.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HallResult {
+    /// Done.
+    Ok = 0,
+    /// A pointer that is needed is NULL.
+    NullPointer = 1,
+    /// The memory is shorter than a blob, or than the blob's header says.
+    Truncated = 2,
+    /// The memory is erased: no blob was written.
+    Erased = 3,
+    /// Something else than a blob.
+    BadMagic = 4,
+    /// A layout that this version does not read.
+    UnknownVersion = 5,
+    /// A length that no blob has.
+    BadHeader = 6,
+    /// A bit is wrong.
+    BadCrc = 7,
+    /// The check holds, yet the payload is not a parameter set.
+    BadPayload = 8,
+    /// A parameter is NaN or infinite, a matrix singular, or the like.
+    UnusableParameters = 9,
+    /// The blob belongs to another stage than the one expected.
+    OtherStage = 10,
+}
+
+/// Where a re-zero stands.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HallRezero {
+    /// None was asked for.
+    Idle = 0,
+    /// It runs.
+    Running = 1,
+    /// It ended, and the zero deviation is in use.
+    Done = 2,
+    /// Refused: fewer than two ticks were asked for.
+    TooShort = 3,
+    /// Refused: a tick gave no planar pose.
+    NoPose = 4,
+    /// Refused: the stage moved.
+    Moved = 5,
+    /// Refused: the pose drifted.
+    Drifted = 6,
+}
+
+/// The codes of one servo period.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct HallFrame {
+    /// Hall codes of the probes A, B, C.
+    pub hall: [i32; 3],
+    /// Capacitive codes of the gaps 1, 2, 3.
+    pub capacitive: [i32; 3],
+    /// Number of the servo period, wrapping.
+    pub sequence: u32,
+    /// When the codes were sampled, in us, wrapping.
+    pub time_us: u32,
+}
+
+/// Motion in the plane.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct HallPlanarPose {
+    /// Displacement along X, m.
+    pub x_m: f32,
+    /// Displacement along Y, m.
+    pub y_m: f32,
+    /// Rotation about Z, rad.
+    pub rz_rad: f32,
+}
+
+/// A pose and what is wrong with it: status 0 is all good. Invalid fields are 0 unless held.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct HallReading {
+    /// Displacement along X, m.
+    pub x_m: f32,
+    /// Displacement along Y, m.
+    pub y_m: f32,
+    /// Rotation about Z, rad.
+    pub rz_rad: f32,
+    /// Displacement along Z, m.
+    pub z_m: f32,
+    /// Rotation about X, rad.
+    pub rx_rad: f32,
+    /// Rotation about Y, rad.
+    pub ry_rad: f32,
+    /// The bits that HALL_STATUS_ names.
+    pub status: u32,
+}
+
+/// X, Y, Rz are invalid.
+pub const HALL_STATUS_PLANAR_INVALID: u32 = 1 << 13;
+/// Z, Rx, Ry are invalid.
+pub const HALL_STATUS_VERTICAL_INVALID: u32 = 1 << 14;
+/// X, Y, Rz are the last valid ones, repeated.
+pub const HALL_STATUS_PLANAR_HELD: u32 = 1 << 15;
+/// Z, Rx, Ry are the last valid ones, repeated.
+pub const HALL_STATUS_VERTICAL_HELD: u32 = 1 << 16;
+/// One or more servo periods had no frame before this one.
+pub const HALL_STATUS_FRAMES_MISSED: u32 = 1 << 17;
+/// The frame repeats an earlier sequence number.
+pub const HALL_STATUS_FRAME_REPEATED: u32 = 1 << 18;
+
+const _: () = assert!(HALL_STATUS_PLANAR_INVALID == runtime::Status::PLANAR_INVALID.bits());
+const _: () = assert!(HALL_STATUS_VERTICAL_INVALID == runtime::Status::VERTICAL_INVALID.bits());
+const _: () = assert!(HALL_STATUS_PLANAR_HELD == runtime::Status::PLANAR_HELD.bits());
+const _: () = assert!(HALL_STATUS_VERTICAL_HELD == runtime::Status::VERTICAL_HELD.bits());
+const _: () = assert!(HALL_STATUS_FRAMES_MISSED == runtime::Status::FRAMES_MISSED.bits());
+const _: () = assert!(HALL_STATUS_FRAME_REPEATED == runtime::Status::FRAME_REPEATED.bits());
+const _: () = assert!(HALL_MISSING_CODE == runtime::frame::MISSING_CODE);
+
+/// Counters since start. They stay at their largest value.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct HallHealth {
+    /// Ticks, with and without a frame.
+    pub ticks: u32,
+    /// Ticks whose planar pose was invalid.
+    pub planar_invalid: u32,
+    /// Ticks whose vertical pose was invalid.
+    pub vertical_invalid: u32,
+    /// Ticks in which a value was held.
+    pub held: u32,
+    /// Servo periods that had no frame.
+    pub frames_missed: u32,
+    /// Frames that repeated an earlier sequence number.
+    pub frames_repeated: u32,
+}
+
+impl HallFrame {
+    pub(crate) const fn raw(&self) -> RawFrame {
+        RawFrame {
+            hall: self.hall,
+            capacitive: self.capacitive,
+            sequence: self.sequence,
+            time_us: self.time_us,
+        }
+    }
+}
+
+impl HallPlanarPose {
+    pub(crate) const ZERO: Self = Self {
+        x_m: 0.0,
+        y_m: 0.0,
+        rz_rad: 0.0,
+    };
+}
+
+impl From<PlanarPose<f32>> for HallPlanarPose {
+    fn from(pose: PlanarPose<f32>) -> Self {
+        let PlanarPose { x_m, y_m, rz_rad } = pose;
+        Self { x_m, y_m, rz_rad }
+    }
+}
+
+impl From<HallPlanarPose> for PlanarPose<f32> {
+    fn from(pose: HallPlanarPose) -> Self {
+        let HallPlanarPose { x_m, y_m, rz_rad } = pose;
+        Self { x_m, y_m, rz_rad }
+    }
+}
+
+impl From<Reading> for HallReading {
+    fn from(reading: Reading) -> Self {
+        let (planar, vertical) = (reading.pose.planar, reading.pose.vertical);
+        Self {
+            x_m: planar.x_m,
+            y_m: planar.y_m,
+            rz_rad: planar.rz_rad,
+            z_m: vertical.z_m,
+            rx_rad: vertical.rx_rad,
+            ry_rad: vertical.ry_rad,
+            status: reading.status.bits(),
+        }
+    }
+}
+
+impl From<Health> for HallHealth {
+    fn from(health: Health) -> Self {
+        Self {
+            ticks: health.ticks,
+            planar_invalid: health.planar_invalid,
+            vertical_invalid: health.vertical_invalid,
+            held: health.held,
+            frames_missed: health.frames_missed,
+            frames_repeated: health.frames_repeated,
+        }
+    }
+}

@@ -1,0 +1,58 @@
+/* Does a job file through the C interface: only sections with a blob (see tests/src/job.rs).
+ * Reads job.bin, writes words.bin. */
+#include "hall_runtime.h"
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static HallDecoder decoder;
+static HallServo servo;
+static uint8_t blob[512];
+static uint32_t frames[256][7];
+static HallReading readings[256];
+
+_Static_assert(sizeof(HallReading) == 28, "seven words");
+
+static int all(ssize_t (*transfer)(int, void *, size_t), int file, void *bytes, size_t length)
+{
+    for (size_t done = 0; done < length;) {
+        ssize_t now = transfer(file, (char *)bytes + done, length - done);
+        if (now <= 0)
+            return 0;
+        done += (size_t)now;
+    }
+    return 1;
+}
+
+static ssize_t put(int file, void *bytes, size_t length) { return write(file, bytes, length); }
+
+int main(void)
+{
+    int job = open("job.bin", O_RDONLY), words = open("words.bin", O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    uint32_t head[4];
+    if (job < 0 || words < 0)
+        return 2;
+    while (all(read, job, head, sizeof head)) {
+        size_t length = (head[3] + 3) / 4 * 4;
+        if (head[0] != 2 || length > sizeof blob || !all(read, job, blob, length))
+            return 3;
+        if (hall_load(blob, length, NULL, &decoder) != HALL_RESULT_OK)
+            return 4;
+        hall_servo_start(&servo, &decoder, (uint16_t)head[2]);
+        for (uint32_t left = head[1]; left > 0;) {
+            uint32_t now = left < 256 ? left : 256;
+            if (!all(read, job, frames, now * sizeof frames[0]))
+                return 5;
+            for (uint32_t k = 0; k < now; k++) {
+                HallFrame frame = { .time_us = 0 };
+                memcpy(&frame, frames[k], sizeof frames[k]);
+                hall_tick(&servo, &frame, &readings[k]);
+            }
+            if (!all(put, words, readings, now * sizeof readings[0]))
+                return 6;
+            left -= now;
+        }
+    }
+    return 0;
+}
