@@ -138,9 +138,14 @@ fn a_request_to_identify_is_answered_with_the_serial_number() {
 }
 
 /// Asks for a re-zero, feeds ticks, gives every outcome that was answered.
-fn rezero(node: &mut Node<'_>, ticks: u16, at: impl Fn(u32) -> u32) -> Vec<Option<Outcome>> {
+fn rezero(
+    node: &mut Node<'_>,
+    ticks: u16,
+    token: u8,
+    at: impl Fn(u32) -> u32,
+) -> Vec<Option<Outcome>> {
     let mut host = Mailbox::default();
-    let command = Command::new(Request::Rezero { ticks }, 7);
+    let command = Command::new(Request::Rezero { ticks }, token);
     let frame = host.send(&Told::Command(command)).expect("known");
     let mut out = Vec::new();
     node.take(&stamped(frame, 0), &mut out);
@@ -163,7 +168,7 @@ fn rezero(node: &mut Node<'_>, ticks: u16, at: impl Fn(u32) -> u32) -> Vec<Optio
 fn a_re_zero_at_rest_is_started_and_done() {
     let decoder = decoder();
     let mut node = Node::new(&decoder, "", &SETTINGS);
-    let outcomes = rezero(&mut node, 50, |_| 400);
+    let outcomes = rezero(&mut node, 50, 1, |_| 400);
     assert_eq!(outcomes, [Some(Outcome::Started), Some(Outcome::Done)]);
     assert!(node.servo().zero().x_m != 0.0);
 }
@@ -172,8 +177,8 @@ fn a_re_zero_at_rest_is_started_and_done() {
 fn a_re_zero_in_motion_is_refused_with_its_reason() {
     let decoder = decoder();
     let mut node = Node::new(&decoder, "", &SETTINGS);
-    let outcomes = rezero(&mut node, 50, |k| k * 20);
+    let outcomes = rezero(&mut node, 50, 1, |k| k * 20);
     assert_eq!(outcomes, [Some(Outcome::Started), Some(Outcome::Moved)]);
-    let outcomes = rezero(&mut node, 1, |_| 400);
+    let outcomes = rezero(&mut node, 1, 2, |_| 400);
     assert_eq!(outcomes, [Some(Outcome::TooShort)]);
 }
