@@ -113,6 +113,9 @@ pub struct Replayed {
     pub late_max_s: f64,
 }
 
+/// Most rows that are sent at once when the replay is late.
+const BATCH_ROWS: usize = 20;
+
 /// How long a frame may wait for a place in the transmit queue.
 const SEND_DEADLINE: Duration = Duration::from_secs(1);
 
@@ -218,20 +221,33 @@ fn send(
 ) -> Result<Replayed, ReplayError> {
     let mut done = Replayed::default();
     let started = Instant::now();
-    let mut pacer = Pacer::new(started, rate);
-    for due in frames {
+    let pacer = Pacer::new(started, rate);
+    let mut batch = Vec::with_capacity(BATCH_ROWS * 4);
+    let mut left = frames;
+    while let [first, ..] = left {
+        let (now_us, late_s) = pacer.wait_until(first.at_us, stop);
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        done.late_max_s = done.late_max_s.max(pacer.wait_until(due.at_us, stop));
-        for coded in sensor::frames(layout, &due.frame) {
-            let sent = bus.send(&BusFrame::from(coded), SEND_DEADLINE);
-            let rows = done.rows;
-            sent.map_err(|cause| ReplayError::Bus { cause, rows })?;
-            done.frames += 1;
+        done.late_max_s = done.late_max_s.max(late_s);
+        // Everything that is due by now goes to the kernel in one call.
+        let due = left
+            .iter()
+            .take(BATCH_ROWS)
+            .take_while(|d| d.at_us <= now_us);
+        let due = due.count().max(1);
+        let (now, later) = left.split_at_checked(due).unwrap_or((left, &[]));
+        batch.clear();
+        for due in now {
+            batch.extend(sensor::frames(layout, &due.frame).map(BusFrame::from));
+            done.logged_s = due.at_us as f64 * 1e-6;
         }
-        done.rows += 1;
-        done.logged_s = due.at_us as f64 * 1e-6;
+        let rows = done.rows;
+        bus.send(&batch, SEND_DEADLINE)
+            .map_err(|cause| ReplayError::Bus { cause, rows })?;
+        done.frames += batch.len();
+        done.rows += now.len();
+        left = later;
     }
     done.elapsed_s = started.elapsed().as_secs_f64();
     Ok(done)

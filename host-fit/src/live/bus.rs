@@ -53,13 +53,18 @@ impl Bus {
     }
 
     /// The next frame, waiting for it up to `wait`.
-    pub(crate) fn receive(&self, wait: Duration) -> Result<Option<StampedFrame>, BusError> {
+    pub(crate) fn receive(&mut self, wait: Duration) -> Result<Option<StampedFrame>, BusError> {
         Ok(self.socket.receive(wait)?)
     }
 
-    /// Sends one frame, waiting up to `deadline` for a place in the queue.
-    pub(crate) fn send(&self, frame: &BusFrame, deadline: Duration) -> Result<(), BusError> {
-        Ok(self.socket.send(frame, deadline)?)
+    /// Whether the next frame is at hand without asking the kernel.
+    pub(crate) fn has_frame(&self) -> bool {
+        self.socket.has_frame()
+    }
+
+    /// Sends frames in this order, waiting up to `deadline` for a place in the queue.
+    pub(crate) fn send(&self, frames: &[BusFrame], deadline: Duration) -> Result<(), BusError> {
+        Ok(self.socket.send_all(frames, deadline)?)
     }
 
     /// Frames that the kernel dropped because they were not read in time.
@@ -74,11 +79,15 @@ impl Bus {
         Err(BusError::NoSocketCan)
     }
 
-    pub(crate) fn receive(&self, _wait: Duration) -> Result<Option<StampedFrame>, BusError> {
+    pub(crate) fn receive(&mut self, _wait: Duration) -> Result<Option<StampedFrame>, BusError> {
         Err(BusError::NoSocketCan)
     }
 
-    pub(crate) fn send(&self, _frame: &BusFrame, _deadline: Duration) -> Result<(), BusError> {
+    pub(crate) fn has_frame(&self) -> bool {
+        false
+    }
+
+    pub(crate) fn send(&self, _frames: &[BusFrame], _deadline: Duration) -> Result<(), BusError> {
         Err(BusError::NoSocketCan)
     }
 

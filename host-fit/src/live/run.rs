@@ -135,20 +135,30 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// One frame, or the passing of time.
+    /// All frames that are at hand, or the passing of time; then what the node has to say.
     fn turn(&mut self) -> Result<(), LiveError> {
-        let patience = self.node.patience_us(now_us());
-        let wait = patience.map_or(WAIT_MAX, |us| Duration::from_micros(us.into()));
-        if let Some(frame) = self.receive(wait.min(WAIT_MAX))? {
-            return self.take(&frame);
+        let mut frame = self.receive(Duration::ZERO)?;
+        if frame.is_none() {
+            let patience = self.node.patience_us(now_us());
+            let wait = patience.map_or(WAIT_MAX, |us| Duration::from_micros(us.into()));
+            frame = self.receive(wait.min(WAIT_MAX))?;
         }
-        // The time is taken before the bus is asked again: what came before it was read.
-        let time_us = now_us();
-        if let Some(frame) = self.receive(Duration::ZERO)? {
-            return self.take(&frame);
+        if frame.is_none() {
+            // The time is taken before the bus is asked again: what came before it was read.
+            let time_us = now_us();
+            frame = self.receive(Duration::ZERO)?;
+            if frame.is_none() {
+                let step = self.node.poll(time_us, &mut self.out);
+                self.note(step.fault);
+            }
         }
-        let step = self.node.poll(time_us, &mut self.out);
-        self.note(step.fault);
+        while let Some(stamped) = frame {
+            self.take(&stamped)?;
+            if !self.bus.has_frame() {
+                break;
+            }
+            frame = self.receive(Duration::ZERO)?;
+        }
         self.publish()
     }
 
@@ -179,7 +189,7 @@ impl Session<'_> {
             self.display.say(&format!("request: {command:?}"));
         }
         self.note(step.fault);
-        self.publish()
+        Ok(())
     }
 
     fn note(&mut self, fault: Option<BusFault>) {
@@ -190,25 +200,22 @@ impl Session<'_> {
 
     /// Sends what the node has to say.
     fn publish(&mut self) -> Result<(), LiveError> {
-        let out = core::mem::take(&mut self.out);
-        if self.sends && !self.is_down {
-            for coded in &out {
-                let frame = BusFrame::from(*coded);
-                match self.bus.send(&frame, SEND_DEADLINE) {
-                    Ok(()) => {
-                        if let Some(record) = &mut self.record {
-                            record.sent(frame, now_us())?;
-                        }
-                    }
-                    Err(error) => {
-                        self.not_sent = self.not_sent.saturating_add(1);
-                        self.forgive(error)?;
-                    }
-                }
+        if self.out.is_empty() || !self.sends || self.is_down {
+            self.out.clear();
+            return Ok(());
+        }
+        let frames: Vec<BusFrame> = self.out.drain(..).map(BusFrame::from).collect();
+        if let Err(error) = self.bus.send(&frames, SEND_DEADLINE) {
+            let count = u32::try_from(frames.len()).unwrap_or(u32::MAX);
+            self.not_sent = self.not_sent.saturating_add(count);
+            return self.forgive(error);
+        }
+        if let Some(record) = &mut self.record {
+            let time_us = now_us();
+            for frame in frames {
+                record.sent(frame, time_us)?;
             }
         }
-        self.out = out;
-        self.out.clear();
         Ok(())
     }
 

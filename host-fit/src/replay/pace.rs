@@ -19,16 +19,15 @@ impl Pacer {
         Self { started, rate }
     }
 
-    /// Waits until `at_us` of the log is due, or until `stop`; gives how late it is, s.
-    pub(super) fn wait_until(&mut self, at_us: u64, stop: &AtomicBool) -> f64 {
+    /// Waits until `at_us` of the log is due, or until `stop`. Gives the time of the log that
+    /// is due by then, us, and how late `at_us` is, s.
+    pub(super) fn wait_until(&self, at_us: u64, stop: &AtomicBool) -> (u64, f64) {
         let due = Duration::from_secs_f64(at_us as f64 * 1e-6 / self.rate);
         loop {
             let now = self.started.elapsed();
-            if now >= due {
-                return (now - due).as_secs_f64();
-            }
-            if stop.load(Ordering::Relaxed) {
-                return 0.0;
+            if now >= due || stop.load(Ordering::Relaxed) {
+                let logged_us = now.as_secs_f64() * self.rate * 1e6;
+                return (logged_us as u64, now.saturating_sub(due).as_secs_f64());
             }
             std::thread::sleep((due - now).min(SLEEP_MAX));
         }
