@@ -12,9 +12,11 @@
 
 use crate::blob_file::BlobFileError;
 use crate::fit::FitError;
+use crate::live::LiveError;
 use crate::log::LogError;
 use crate::output::OutputError;
 use crate::pose_file::PoseFileError;
+use crate::replay::ReplayError;
 use crate::report::plots::PlotError;
 use crate::stage::StageError;
 use std::path::PathBuf;
@@ -75,6 +77,12 @@ pub enum HostError {
     /// The fit failed its own checks: nothing was written.
     #[error("the fit failed its own checks, and no parameter blob was written: {0}")]
     Fit(#[from] FitError),
+    /// `live` ended early.
+    #[error(transparent)]
+    Live(#[from] LiveError),
+    /// `replay` ended early.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
     /// The user interrupted the run.
     #[error("interrupted; {kept}")]
     Interrupted {
@@ -97,6 +105,8 @@ impl HostError {
             | Self::Json(_)
             | Self::NoTemporaryFolder(_)
             | Self::Standard(_)
+            | Self::Live(_)
+            | Self::Replay(_)
             | Self::Output(_) => 3,
             Self::Fit(_) => 4,
             Self::Interrupted { .. } => 130,

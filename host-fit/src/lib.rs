@@ -19,6 +19,7 @@
 //! | [`blob_file`], [`pose_file`], [`output`] | files, written whole or not at all |
 //! | [`error`] | all of it with the exit status that it leads to |
 //! | [`cli`], [`demo`], [`shipped`] | the commands, and the log that ships with them |
+//! | [`live`], [`replay`], [`import`] | the stage on a CAN bus: decoded as it comes, played from a log, made into a log |
 //! | [`synthetic`] | logs whose true parameters are known |
 #![forbid(unsafe_code)]
 
@@ -29,14 +30,17 @@ pub mod demo;
 pub mod error;
 pub mod fit;
 pub mod identify;
+pub mod import;
 pub mod judge;
 pub mod least_squares;
+pub mod live;
 pub mod log;
 pub mod output;
 pub mod parameters;
 pub mod pose_file;
 pub mod precision;
 pub mod problem;
+pub mod replay;
 pub mod report;
 pub mod shipped;
 pub mod solver;

@@ -1,7 +1,7 @@
 //! Requests to the decoding node and its answers, and everything else that comes now and
 //! then: [`Mailbox`] numbers what is sent and checks what is received.
 
-use super::e2e::{Payload, Sequence, Verdict, protect, unprotect};
+use super::e2e::{Payload, protect, unprotect};
 use super::frame::Coded;
 use super::group::BusFault;
 use super::status::{HealthPage, NodeStatus};
@@ -266,7 +266,7 @@ impl Told {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mailbox {
     sent: [u8; 5],
-    received: [Sequence; 5],
+    received: [Option<[u8; FRAME_BYTES]>; 5],
 }
 
 impl Mailbox {
@@ -282,13 +282,14 @@ impl Mailbox {
     /// What a frame tells; `None` for a frame of another kind.
     ///
     /// A gap in the numbers is no fault here, and neither is a sender that starts anew: what
-    /// comes now and then has no rhythm to keep. A repeated frame is.
+    /// comes now and then has no rhythm to keep. The last frame again, bit for bit, is: a
+    /// program that sends one request and ends must choose another token each time.
     pub fn take<F: Frame>(&mut self, frame: &F) -> Option<Result<Told, BusFault>> {
         let Id::Standard(id) = frame.id() else {
             return None;
         };
         let k = Told::MESSAGES.iter().position(|m| m.id() == id)?;
-        let (message, sequence) = (*Told::MESSAGES.get(k)?, self.received.get_mut(k)?);
+        let (message, last) = (*Told::MESSAGES.get(k)?, self.received.get_mut(k)?);
         let data = if frame.is_remote_frame() {
             &[]
         } else {
@@ -301,10 +302,10 @@ impl Mailbox {
             let bytes = data.len() as u8;
             return Some(Err(BusFault::WrongLength { message, bytes }));
         };
-        let Some((counter, payload)) = unprotect(message.spec().key, bytes) else {
+        let Some((_, payload)) = unprotect(message.spec().key, bytes) else {
             return Some(Err(BusFault::WrongCheck { message }));
         };
-        if sequence.judge(counter) == Verdict::Repeated {
+        if last.replace(*bytes) == Some(*bytes) {
             return Some(Err(BusFault::Repeated { message }));
         }
         Some(Ok(Told::read(k, payload)))

@@ -1,6 +1,7 @@
 //! The `.dbc` file and the tables of `protocol.md`, written from [`TABLE`].
 
 use super::PROTOCOL_VERSION;
+use super::e2e::BASE_LIST;
 use super::load::{FRAME_BITS_MAX, Traffic};
 use super::sensor::Layout;
 use super::signals::{Kind, PROTECTION, Signal};
@@ -31,9 +32,19 @@ pub fn write_dbc(out: &mut impl Write) -> Result {
     }
     write_comments(out)?;
     out.write_str(
-        "BA_DEF_ BO_ \"GenMsgCycleTime\" INT 0 60000;\nBA_DEF_DEF_ \"GenMsgCycleTime\" 0;\n",
+        "BA_DEF_ \"E2EProfile\" STRING;\nBA_DEF_ \"E2EDataIdBaseList\" STRING;\n\
+         BA_DEF_ BO_ \"E2EDataIdKey\" INT 0 255;\n\
+         BA_DEF_ BO_ \"GenMsgCycleTime\" INT 0 60000;\n\
+         BA_DEF_DEF_ \"E2EProfile\" \"\";\nBA_DEF_DEF_ \"E2EDataIdBaseList\" \"\";\n\
+         BA_DEF_DEF_ \"E2EDataIdKey\" 0;\nBA_DEF_DEF_ \"GenMsgCycleTime\" 0;\n\
+         BA_ \"E2EProfile\" \"2\";\nBA_ \"E2EDataIdBaseList\" \"",
     )?;
+    for id in BASE_LIST {
+        write!(out, "{id:02X}")?;
+    }
+    out.write_str("\";\n")?;
     for row in &TABLE {
+        writeln!(out, "BA_ \"E2EDataIdKey\" BO_ {} {};", row.id, row.key)?;
         if let Rate::Ticks(ticks) | Rate::Decimated(ticks) = row.rate {
             let cycle_ms = u32::from(ticks) * PERIOD_MS;
             writeln!(out, "BA_ \"GenMsgCycleTime\" BO_ {} {cycle_ms};", row.id)?;

@@ -185,7 +185,7 @@ pub(super) const COMMANDS: &[(u8, &str)] = &[(1, "re-zero"), (2, "identify"), (3
 #[rustfmt::skip]
 pub(super) const COMMAND: [Signal; 3] = [
     named(signal("Command", (12, 4), U, "", "what is asked for"), COMMANDS),
-    signal("Token", (16, 8), U, "", "chosen by the sender, returned in the answer"),
+    signal("Token", (16, 8), U, "", "chosen by the sender, another each time; returned in the answer"),
     signal("Argument", (32, 32), U, "", "re-zero: ticks to average, 0 for the default; identify: s to blink; else 0"),
 ];
 

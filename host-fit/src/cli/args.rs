@@ -1,5 +1,7 @@
 //! The command line.
 
+use crate::live::LiveArgs;
+use crate::replay::ReplayArgs;
 use crate::solver::Projection;
 use crate::train::Draw;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -32,6 +34,10 @@ pub enum Command {
     Decode(DecodeArgs),
     /// Show what a parameter blob holds.
     Inspect(InspectArgs),
+    /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
+    Live(LiveArgs),
+    /// Play a log onto a CAN bus as the sensor node would send it (Linux).
+    Replay(ReplayArgs),
 }
 
 /// Arguments of `demo`.

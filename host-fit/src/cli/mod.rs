@@ -11,6 +11,7 @@ use crate::error::HostError;
 use crate::least_squares::starts::LeastSquares;
 use crate::log::{LogReading, ReadOptions, ReferenceUse};
 use crate::output::write_atomically;
+use crate::replay::ReplayArgs;
 use crate::report::json::Circumstances;
 use crate::solver::Solver;
 use crate::stage::Stage;
@@ -53,6 +54,8 @@ pub fn main() -> ExitCode {
         Command::Eval(args) => eval::run(args),
         Command::Decode(args) => decode::run(args),
         Command::Inspect(args) => inspect::run(args),
+        Command::Live(args) => crate::live::run(args).map_err(HostError::from),
+        Command::Replay(args) => replay(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -61,6 +64,20 @@ pub fn main() -> ExitCode {
             ExitCode::from(error.exit_status())
         }
     }
+}
+
+/// Plays a log onto a bus and says how it went.
+fn replay(args: &ReplayArgs) -> Result<(), HostError> {
+    let done = crate::replay::run(args)?;
+    print(&format!(
+        "{} rows in {} frames, {:.3} s of the log in {:.3} s ({:.1} times real time), at most {:.1} ms late\n",
+        done.rows,
+        done.frames,
+        done.logged_s,
+        done.elapsed_s,
+        done.logged_s / done.elapsed_s,
+        done.late_max_s * 1e3
+    ))
 }
 
 /// Writes to standard output. A reader that has gone away, as `head` does, is no error.

@@ -1,0 +1,216 @@
+//! SocketCAN: the frames of a Linux CAN interface, with the kernel's receive times.
+//!
+//! The kernel hands over only the messages that were asked for, so foreign traffic costs
+//! nothing. Frames that the kernel had to drop because nobody read them in time are counted
+//! ([`SocketCan::dropped`]); that they are missing shows in the counters of the protocol too.
+//! A full transmit queue (ENOBUFS) is waited for, up to a deadline.
+//!
+//! An interface that goes down is reported once by [`SocketCanError::Down`]; when it comes up
+//! again the same socket goes on.
+
+mod batch;
+mod error;
+
+pub use error::SocketCanError;
+
+use crate::can::{BusFrame, Message, StampedFrame};
+use crate::source::FrameSource;
+use error::sort;
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, ppoll};
+use nix::sys::time::TimeSpec;
+use socketcan::{CanAddr, CanFilter, CanSocket, Socket, SocketOptions};
+use std::collections::VecDeque;
+use std::os::fd::{AsFd, AsRawFd};
+use std::string::{String, ToString};
+use std::time::{Duration, Instant};
+use std::vec::Vec;
+
+/// Receive buffer that is asked for: some 10,000 frames. The kernel grants less to ordinary
+/// users.
+const RECEIVE_BUFFER_BYTES: i32 = 8 << 20;
+
+/// How long to wait before a full transmit queue is tried again: less than two frames take at
+/// 1 Mbit/s.
+const QUEUE_RETRY: Duration = Duration::from_micros(200);
+
+/// Mask of a filter that lets one standard identifier through.
+const STANDARD_MASK: u32 = 0x8000_07ff;
+
+/// Socket level, and options that `libc` does not name (the values of all but three rare
+/// architectures).
+const SOL_SOCKET: i32 = 1;
+const SO_RCVBUF: i32 = 8;
+const SO_RCVBUFFORCE: i32 = 33;
+const SO_MEMINFO: i32 = 55;
+/// Place of the drop counter in the answer to `SO_MEMINFO`.
+const MEMINFO_DROPS: usize = 8;
+
+/// One CAN interface, for receiving and sending.
+#[derive(Debug)]
+pub struct SocketCan {
+    socket: CanSocket,
+    interface: String,
+    wait: Duration,
+    read: VecDeque<StampedFrame>,
+}
+
+impl SocketCan {
+    /// Opens an interface and asks the kernel for the frames of `messages` only.
+    ///
+    /// # Errors
+    /// Every variant but `QueueFull`. An interface that is down opens; the first read tells.
+    pub fn open(interface: &str, messages: &[Message]) -> Result<Self, SocketCanError> {
+        let failed = |cause| sort(interface, "open it", cause);
+        let addr = CanAddr::from_iface(interface).map_err(|_| SocketCanError::NoSuchInterface {
+            interface: interface.to_string(),
+        })?;
+        let socket = CanSocket::open_addr(&addr).map_err(|cause| {
+            match cause.raw_os_error().map(Errno::from_raw) {
+                Some(Errno::ENODEV) => SocketCanError::NotCan {
+                    interface: interface.to_string(),
+                },
+                _ => failed(cause),
+            }
+        })?;
+        let filters: Vec<CanFilter> = messages
+            .iter()
+            .map(|message| CanFilter::new(u32::from(message.spec().id), STANDARD_MASK))
+            .collect();
+        socket.set_filters(&filters).map_err(failed)?;
+        socket.set_recv_timestamp(true).map_err(failed)?;
+        // Only a privileged user gets more than the system's limit; a smaller buffer works too.
+        let buffer = RECEIVE_BUFFER_BYTES;
+        let forced = socket.set_socket_option_int(SOL_SOCKET, SO_RCVBUFFORCE, buffer);
+        if forced.is_err() {
+            let asked = socket.set_socket_option_int(SOL_SOCKET, SO_RCVBUF, buffer);
+            asked.map_err(failed)?;
+        }
+        Ok(Self {
+            socket,
+            interface: interface.to_string(),
+            wait: Duration::ZERO,
+            read: VecDeque::with_capacity(batch::BATCH),
+        })
+    }
+
+    /// Sets how long [`FrameSource::next_frame`] waits for a frame; at first it does not.
+    #[must_use]
+    pub const fn waiting(mut self, wait: Duration) -> Self {
+        self.wait = wait;
+        self
+    }
+
+    /// The next frame, waiting for it up to `wait`; `None` if none came.
+    ///
+    /// # Errors
+    /// `Down`, `Gone`, or `Io`.
+    pub fn receive(&mut self, wait: Duration) -> Result<Option<StampedFrame>, SocketCanError> {
+        if self.read.is_empty() {
+            self.fill()?;
+        }
+        if self.read.is_empty() && !wait.is_zero() && self.wait_for_frame(wait)? {
+            self.fill()?;
+        }
+        Ok(self.read.pop_front())
+    }
+
+    /// Whether a frame was taken from the kernel already, so that the next call of
+    /// [`SocketCan::receive`] costs nothing.
+    pub fn has_frame(&self) -> bool {
+        !self.read.is_empty()
+    }
+
+    /// Takes what the kernel has, up to a batch.
+    fn fill(&mut self) -> Result<(), SocketCanError> {
+        loop {
+            match batch::receive(self.socket.as_raw_fd(), &mut self.read) {
+                // Errors of the controller are no frames of the bus: look on behind them.
+                Ok(count) if count > 0 && self.read.is_empty() => {}
+                Ok(_) | Err(Errno::EAGAIN) => return Ok(()),
+                Err(Errno::EINTR) => {}
+                Err(errno) => return Err(sort(&self.interface, "receive", errno.into())),
+            }
+        }
+    }
+
+    /// Whether there is something to read within `wait`. A signal ends the wait early.
+    fn wait_for_frame(&self, wait: Duration) -> Result<bool, SocketCanError> {
+        let mut fds = [PollFd::new(self.socket.as_fd(), PollFlags::POLLIN)];
+        match ppoll(&mut fds, Some(TimeSpec::from_duration(wait)), None) {
+            Ok(ready) => Ok(ready > 0),
+            Err(Errno::EINTR) => Ok(false),
+            Err(errno) => Err(sort(&self.interface, "wait", errno.into())),
+        }
+    }
+
+    /// Sends one frame; waits up to `deadline` while the transmit queue is full.
+    ///
+    /// # Errors
+    /// `QueueFull`, `Down`, `Gone` or `Io`.
+    pub fn send(&self, frame: &BusFrame, deadline: Duration) -> Result<(), SocketCanError> {
+        self.send_all(core::slice::from_ref(frame), deadline)
+    }
+
+    /// Sends frames in this order; waits up to `deadline` for each batch that finds the
+    /// transmit queue full.
+    ///
+    /// # Errors
+    /// As [`SocketCan::send`]; the frames before the one that failed were sent.
+    pub fn send_all(
+        &self,
+        mut frames: &[BusFrame],
+        deadline: Duration,
+    ) -> Result<(), SocketCanError> {
+        let mut since = None;
+        while !frames.is_empty() {
+            match batch::send(self.socket.as_raw_fd(), frames) {
+                Ok(sent) => {
+                    frames = frames.get(sent..).unwrap_or_default();
+                    since = None;
+                }
+                Err(Errno::ENOBUFS | Errno::EAGAIN) => {
+                    let waited = since.get_or_insert_with(Instant::now).elapsed();
+                    if waited >= deadline {
+                        return Err(SocketCanError::QueueFull {
+                            interface: self.interface.clone(),
+                            waited,
+                        });
+                    }
+                    std::thread::sleep(QUEUE_RETRY.min(deadline - waited));
+                }
+                Err(Errno::EINTR) => {}
+                Err(errno) => return Err(sort(&self.interface, "send", errno.into())),
+            }
+        }
+        Ok(())
+    }
+
+    /// Frames that the kernel dropped because they were not read in time, since the socket
+    /// was opened; 0 on a kernel that does not tell.
+    pub fn dropped(&self) -> u32 {
+        let mut answer = [0; 4 * (MEMINFO_DROPS + 1)];
+        let length = self
+            .socket
+            .get_socket_option_bytes(SOL_SOCKET, SO_MEMINFO, &mut answer);
+        match (length, answer.last_chunk::<4>()) {
+            (Ok(length), Some(drops)) if length == answer.len() => u32::from_ne_bytes(*drops),
+            _ => 0,
+        }
+    }
+
+    /// Name of the interface.
+    pub fn interface(&self) -> &str {
+        &self.interface
+    }
+}
+
+impl FrameSource for SocketCan {
+    type Frame = StampedFrame;
+    type Error = SocketCanError;
+
+    /// The next frame; `None` when none came within the time that was set.
+    fn next_frame(&mut self) -> Result<Option<StampedFrame>, SocketCanError> {
+        self.receive(self.wait)
+    }
+}

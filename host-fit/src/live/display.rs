@@ -1,0 +1,151 @@
+//! What `live` shows: a few lines that stay in place on a terminal, plain lines elsewhere.
+
+use super::rhythm::Pace;
+use hal_adapters::can::BusHealth;
+use runtime::servo::Health;
+use runtime::{Reading, Status};
+use std::io::{IsTerminal, Write};
+
+/// Everything that is shown.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shown<'s> {
+    pub(super) elapsed_s: f64,
+    pub(super) reading: Option<&'s Reading>,
+    pub(super) pace: Option<Pace>,
+    pub(super) servo: Health,
+    pub(super) bus: BusHealth,
+    pub(super) dropped: u32,
+    pub(super) not_sent: u32,
+    pub(super) is_stale: bool,
+    pub(super) is_down: bool,
+}
+
+/// Shows on standard output.
+#[derive(Debug)]
+pub(super) struct Display {
+    in_place: bool,
+    lines_up: usize,
+}
+
+impl Display {
+    pub(super) fn new() -> Self {
+        Self {
+            in_place: std::io::stdout().is_terminal(),
+            lines_up: 0,
+        }
+    }
+
+    /// Seconds from one display to the next: ten times a second on a terminal.
+    pub(super) const fn interval_s(&self, every_s: f64) -> f64 {
+        if self.in_place { 0.1 } else { every_s }
+    }
+
+    /// Shows the present state. A reader that has gone away is no reason to stop decoding.
+    pub(super) fn show(&mut self, shown: &Shown<'_>) {
+        let mut out = std::io::stdout().lock();
+        if self.in_place {
+            let lines = block(shown);
+            let up = match self.lines_up {
+                0 => String::new(),
+                lines => format!("\x1b[{lines}A"),
+            };
+            self.lines_up = lines.len();
+            let text: String = lines.iter().map(|l| format!("\x1b[2K{l}\n")).collect();
+            let _ = write!(out, "{up}{text}");
+        } else {
+            let _ = writeln!(out, "{}", line(shown));
+        }
+        let _ = out.flush();
+    }
+
+    /// Says something once, in a line of its own.
+    pub(super) fn say(&mut self, what: &str) {
+        self.lines_up = 0;
+        let _ = writeln!(std::io::stderr(), "{what}");
+    }
+}
+
+fn state(shown: &Shown<'_>) -> String {
+    let status = shown.reading.map_or(Status::GOOD, |r| r.status);
+    if shown.is_down {
+        "interface down".to_owned()
+    } else if shown.reading.is_none() {
+        "no frames yet".to_owned()
+    } else if shown.is_stale {
+        "stale: no good frames".to_owned()
+    } else if status.is_good() {
+        "good".to_owned()
+    } else {
+        status.names().collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// X, Y, Rz, Z, Rx, Ry in um and urad.
+fn pose(reading: &Reading) -> [f64; 6] {
+    let (p, v) = (
+        reading.pose.planar.to_array(),
+        reading.pose.vertical.to_array(),
+    );
+    let [x, y, rz] = p.map(|q| f64::from(q) * 1e6);
+    let [z, rx, ry] = v.map(|q| f64::from(q) * 1e6);
+    [x, y, rz, z, rx, ry]
+}
+
+fn faults(bus: &BusHealth) -> String {
+    format!(
+        "good {}, lost {}, repeated {}, sequence {}, check {}, length {}, late {}, incomplete ticks {}, stale {}",
+        bus.good,
+        bus.lost,
+        bus.repeated,
+        bus.wrong_sequence,
+        bus.wrong_check,
+        bus.wrong_length,
+        bus.late,
+        bus.incomplete,
+        bus.stale
+    )
+}
+
+fn block(shown: &Shown<'_>) -> Vec<String> {
+    let [x, y, rz, z, rx, ry] = shown.reading.map(pose).unwrap_or_default();
+    let pace = shown.pace.unwrap_or_default();
+    vec![
+        format!("{:9.1} s   {}", shown.elapsed_s, state(shown)),
+        format!("X  {x:10.3} um    Y  {y:10.3} um    Rz {rz:10.3} urad"),
+        format!("Z  {z:10.3} um    Rx {rx:10.3} urad  Ry {ry:10.3} urad"),
+        format!(
+            "{:.1} ticks/s   jitter {:.0} us rms, {:.0} us peak to peak",
+            pace.rate_hz, pace.jitter_rms_us, pace.jitter_span_us
+        ),
+        format!(
+            "ticks {}   invalid {} planar, {} vertical   missed {}   dropped by the kernel {}   not sent {}",
+            shown.servo.ticks,
+            shown.servo.planar_invalid,
+            shown.servo.vertical_invalid,
+            shown.servo.frames_missed,
+            shown.dropped,
+            shown.not_sent
+        ),
+        format!("frames: {}", faults(&shown.bus)),
+    ]
+}
+
+fn line(shown: &Shown<'_>) -> String {
+    let [x, y, rz, z, rx, ry] = shown.reading.map(pose).unwrap_or_default();
+    let pace = shown.pace.unwrap_or_default();
+    format!(
+        "{:.1} s: x {x:.3} um, y {y:.3} um, rz {rz:.3} urad, z {z:.3} um, rx {rx:.3} urad, ry {ry:.3} urad; \
+         {:.1} ticks/s, jitter {:.0} us rms, {:.0} us peak to peak; ticks {}, missed {}, dropped {}, not sent {}; \
+         frames: {}; {}",
+        shown.elapsed_s,
+        pace.rate_hz,
+        pace.jitter_rms_us,
+        pace.jitter_span_us,
+        shown.servo.ticks,
+        shown.servo.frames_missed,
+        shown.dropped,
+        shown.not_sent,
+        faults(&shown.bus),
+        state(shown)
+    )
+}

@@ -1,0 +1,184 @@
+use super::*;
+use hal_adapters::can::{BusFrame, PoseReceiver, sensor};
+use runtime::Calibration;
+use runtime::calibration::Origin;
+use runtime::frame::CodeWindow;
+use runtime::geometry::ProbeGeometry;
+use runtime::model::Sensitivity;
+
+const SETTINGS: NodeSettings = NodeSettings {
+    layout: Layout::Bits16,
+    timing: Timing {
+        assembly_us: 1_000,
+        stale_us: 3_000,
+    },
+    on_invalid: OnInvalid::Zero,
+    vertical_ticks: 4,
+};
+
+fn decoder() -> Decoder {
+    let window = CodeWindow::between_rails(-32768, 32767).expect("16 bits");
+    let set = Calibration {
+        model: runtime::ModelKind::M30,
+        geometry: ProbeGeometry {
+            lever_arm_m: [0.2, -0.2, -0.36],
+            misalignment_rad: [0.0; 3],
+        },
+        sensitivity: [Sensitivity::constant(0.9); 3],
+        hall_m_per_code: 6.25e-8,
+        hall_window: window,
+        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
+        capacitive_m_per_code: 1.5625e-8,
+        capacitive_window: window,
+        calibrated_planar: [1e-3; 3],
+        calibrated_vertical: [1e-3; 3],
+        sensitivity_min: Calibration::SENSITIVITY_MIN,
+    };
+    set.prepare(&Origin::default())
+        .expect("a sound stage")
+        .decoder()
+}
+
+fn raw(sequence: u32) -> RawFrame {
+    let code = (sequence % 1000) as i32;
+    RawFrame {
+        hall: [code, 2 * code - 500, -code],
+        capacitive: [10, -code / 2, 30],
+        sequence,
+        time_us: sequence * 2_000,
+    }
+}
+
+fn stamped(coded: Coded, time_us: u64) -> StampedFrame {
+    StampedFrame {
+        time_us,
+        frame: BusFrame::from(coded),
+    }
+}
+
+/// Feeds one tick; gives what the node sent.
+fn feed(node: &mut Node<'_>, frame: &RawFrame) -> Vec<Coded> {
+    let mut out = Vec::new();
+    for coded in sensor::frames(Layout::Bits16, frame) {
+        node.take(&stamped(coded, u64::from(frame.time_us)), &mut out);
+    }
+    out
+}
+
+fn told(node_sent: &[Coded], mailbox: &mut Mailbox) -> Vec<Told> {
+    let frames = node_sent.iter().map(|c| BusFrame::from(*c));
+    frames
+        .filter_map(|f| mailbox.take(&f)?.ok())
+        .filter(|t| !matches!(t, Told::Status(_) | Told::Health(_)))
+        .collect()
+}
+
+#[test]
+fn the_published_pose_has_the_bits_of_the_decoder() {
+    let decoder = decoder();
+    let mut node = Node::new(&decoder, "", &SETTINGS);
+    let mut servo = Servo::new(&decoder, OnInvalid::Zero);
+    let mut receiver = PoseReceiver::new(SETTINGS.timing);
+    for sequence in 3..500 {
+        let want = servo.tick(&raw(sequence));
+        let sent = feed(&mut node, &raw(sequence));
+        let poses = sent
+            .iter()
+            .filter_map(|c| receiver.take(&BusFrame::from(*c), 0).tick);
+        let got: Vec<_> = poses.collect();
+        assert_eq!(got.len(), 1);
+        let bits = |p: PlanarPose<f32>| p.to_array().map(f32::to_bits);
+        assert_eq!(bits(got[0].pose), bits(want.pose.planar));
+        assert_eq!(got[0].status, want.status);
+    }
+}
+
+#[test]
+fn a_silent_bus_is_published_as_invalid_until_frames_come_again() {
+    let decoder = decoder();
+    let mut node = Node::new(&decoder, "", &SETTINGS);
+    feed(&mut node, &raw(1));
+    let mut out = Vec::new();
+    assert_eq!(node.patience_us(4_500), Some(500));
+    node.poll(4_500, &mut out);
+    assert!(out.is_empty());
+    let step = node.poll(5_000, &mut out);
+    assert!(matches!(step.fault, Some(BusFault::Stale { .. })));
+    let mut receiver = PoseReceiver::new(SETTINGS.timing);
+    let got = out
+        .iter()
+        .find_map(|c| receiver.take(&BusFrame::from(*c), 0).tick);
+    assert_eq!(got.and_then(|pose| pose.valid()), None);
+    assert!(got.is_some_and(|pose| pose.status.any(Status::FRAMES_MISSED)));
+    assert!(!feed(&mut node, &raw(2)).is_empty());
+    assert!(!node.receiver().is_stale());
+}
+
+#[test]
+fn a_request_to_identify_is_answered_with_the_serial_number() {
+    let decoder = decoder();
+    let mut node = Node::new(&decoder, "stage 7", &SETTINGS);
+    let mut host = Mailbox::default();
+    let command = Command::new(Request::Identify { seconds: 1 }, 42);
+    let frame = host.send(&Told::Command(command)).expect("known");
+    let mut out = Vec::new();
+    let step = node.take(&stamped(frame, 0), &mut out);
+    assert_eq!(step.command, Some(command));
+    let mut text = Vec::new();
+    let mut outcome = None;
+    for told in told(&out, &mut host) {
+        match told {
+            Told::Identity(page) => text.extend(page.text),
+            Told::Answer(answer) => outcome = Some((answer.token, answer.outcome)),
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!(&text[..8], b"stage 7\0");
+    assert_eq!(outcome, Some((42, Some(Outcome::Done))));
+}
+
+/// Asks for a re-zero, feeds ticks, gives every outcome that was answered.
+fn rezero(
+    node: &mut Node<'_>,
+    ticks: u16,
+    token: u8,
+    at: impl Fn(u32) -> u32,
+) -> Vec<Option<Outcome>> {
+    let mut host = Mailbox::default();
+    let command = Command::new(Request::Rezero { ticks }, token);
+    let frame = host.send(&Told::Command(command)).expect("known");
+    let mut out = Vec::new();
+    node.take(&stamped(frame, 0), &mut out);
+    for k in 1..60 {
+        let frame = RawFrame {
+            sequence: k,
+            time_us: k * 2_000,
+            ..raw(at(k))
+        };
+        out.extend(feed(node, &frame));
+    }
+    let outcome = |told| match told {
+        Told::Answer(answer) => answer.outcome,
+        other => panic!("{other:?}"),
+    };
+    told(&out, &mut host).into_iter().map(outcome).collect()
+}
+
+#[test]
+fn a_re_zero_at_rest_is_started_and_done() {
+    let decoder = decoder();
+    let mut node = Node::new(&decoder, "", &SETTINGS);
+    let outcomes = rezero(&mut node, 50, 1, |_| 400);
+    assert_eq!(outcomes, [Some(Outcome::Started), Some(Outcome::Done)]);
+    assert!(node.servo().zero().x_m != 0.0);
+}
+
+#[test]
+fn a_re_zero_in_motion_is_refused_with_its_reason() {
+    let decoder = decoder();
+    let mut node = Node::new(&decoder, "", &SETTINGS);
+    let outcomes = rezero(&mut node, 50, 1, |k| k * 20);
+    assert_eq!(outcomes, [Some(Outcome::Started), Some(Outcome::Moved)]);
+    let outcomes = rezero(&mut node, 1, 2, |_| 400);
+    assert_eq!(outcomes, [Some(Outcome::TooShort)]);
+}

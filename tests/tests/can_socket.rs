@@ -1,0 +1,317 @@
+//! The SocketCAN adapter on a real interface: `tests/vcan` runs these on a virtual one, whose
+//! name is in `CAN_TEST_INTERFACE`.
+#![cfg(target_os = "linux")]
+
+use embedded_can::{Frame, StandardId};
+use hal_adapters::can::{
+    BusFault, BusFrame, Layout, Message, SensorReceiver, StampedFrame, Timing, sensor,
+};
+use hal_adapters::fault::{Fault, FaultRates, Faulty};
+use hal_adapters::record::Recorded;
+use hal_adapters::socketcan::{SocketCan, SocketCanError};
+use hal_adapters::source::{FrameSource, SliceSource};
+use runtime::RawFrame;
+use std::process::Command;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+const WAIT: Duration = Duration::from_millis(200);
+
+fn now_us() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.expect("after 1970").as_micros() as u64
+}
+
+fn interface() -> String {
+    std::env::var("CAN_TEST_INTERFACE").expect("run tests/vcan")
+}
+
+fn open(messages: &[Message]) -> SocketCan {
+    SocketCan::open(&interface(), messages).expect("the interface is up")
+}
+
+fn run(command: &str) {
+    let status = Command::new("sh").args(["-c", command]).status();
+    assert!(status.expect("sh runs").success(), "{command}");
+}
+
+fn tick(n: u32) -> RawFrame {
+    let code = (n % 30_000) as i32;
+    RawFrame {
+        hall: [code, -code, 1],
+        capacitive: [2, 3, code],
+        sequence: n,
+        time_us: n.wrapping_mul(2_000),
+    }
+}
+
+fn traffic(layout: Layout, ticks: u32) -> Vec<BusFrame> {
+    (0..ticks)
+        .flat_map(|n| sensor::frames(layout, &tick(n)))
+        .map(BusFrame::from)
+        .collect()
+}
+
+/// A receiver that is patient with a busy machine.
+fn receiver(layout: Layout) -> SensorReceiver {
+    let timing = Timing {
+        assembly_us: 500_000,
+        stale_us: 2_000_000,
+    };
+    SensorReceiver::new(layout, timing)
+}
+
+/// Reads everything that is there.
+fn drain(bus: &mut SocketCan) -> Vec<StampedFrame> {
+    let mut all = Vec::new();
+    while let Some(frame) = bus.receive(Duration::from_millis(20)).expect("up") {
+        all.push(frame);
+    }
+    all
+}
+
+#[test]
+#[ignore = "needs a CAN interface: run tests/vcan"]
+fn what_is_sent_is_received_in_order_with_its_time() {
+    for layout in [Layout::Bits16, Layout::Bits24] {
+        let mut messages = layout.messages().to_vec();
+        messages.push(Message::SensorTime);
+        let (sender, mut bus) = (open(&[]), open(&messages));
+        let sent = traffic(layout, 1_000);
+        let before_us = now_us();
+        for frame in &sent {
+            sender.send(frame, WAIT).expect("room");
+        }
+        let after_us = now_us();
+        let got = drain(&mut bus);
+        let frames: Vec<_> = got.iter().map(|f| f.frame).collect();
+        assert_eq!(frames, sent);
+        assert!(got.is_sorted_by_key(|f| f.time_us));
+        assert!(
+            got.iter()
+                .all(|f| (before_us..=after_us).contains(&f.time_us))
+        );
+        let mut receiver = receiver(layout);
+        let ticks: Vec<_> = got
+            .iter()
+            .filter_map(|f| receiver.take(&f.frame, f.time_us as u32).tick)
+            .map(|t| (t.hall, t.capacitive, t.sequence))
+            .collect();
+        let want = (0..1_000).map(tick);
+        let want: Vec<_> = want.map(|t| (t.hall, t.capacitive, t.sequence)).collect();
+        assert_eq!(ticks, want);
+    }
+}
+
+#[test]
+#[ignore = "needs a CAN interface: run tests/vcan"]
+fn nothing_is_lost_at_full_speed_while_it_is_read() {
+    let mut bus = open(Layout::Bits16.messages());
+    let name = interface();
+    let ticks = 50_000u32;
+    let started = Instant::now();
+    let sender = std::thread::spawn(move || {
+        let sender = SocketCan::open(&name, &[]).expect("up");
+        for frame in traffic(Layout::Bits16, ticks) {
+            sender.send(&frame, Duration::from_secs(5)).expect("room");
+        }
+    });
+    let mut receiver = receiver(Layout::Bits16);
+    let mut whole = 0;
+    while whole < ticks {
+        let Some(frame) = bus.receive(Duration::from_secs(2)).expect("up") else {
+            break;
+        };
+        let taken = receiver.take(&frame.frame, frame.time_us as u32);
+        assert_eq!(taken.fault, None);
+        whole += u32::from(taken.tick.is_some());
+    }
+    let elapsed = started.elapsed().as_secs_f64();
+    sender.join().expect("sender");
+    println!(
+        "RESULT socket_ticks={whole} elapsed_s={elapsed:.2} times_real_time={:.0} dropped={}",
+        f64::from(whole) / 500.0 / elapsed,
+        bus.dropped()
+    );
+    assert_eq!((whole, bus.dropped()), (ticks, 0));
+}
+
+#[test]
+#[ignore = "needs a CAN interface: run tests/vcan"]
+fn foreign_traffic_does_not_reach_the_receiver() {
+    let (sender, mut bus) = (open(&[]), open(&[Message::Hall]));
+    let foreign = |id| BusFrame::new(StandardId::new(id).expect("11 bits"), &[7; 8]);
+    for id in 0..0x7ff {
+        if Message::Hall.id().as_raw() != id {
+            sender
+                .send(&foreign(id).expect("eight"), WAIT)
+                .expect("room");
+        }
+    }
+    let extended = embedded_can::ExtendedId::new(0x100).expect("29 bits");
+    let extended = BusFrame::new(extended, &[7; 8]).expect("eight");
+    sender.send(&extended, WAIT).expect("room");
+    assert_eq!(drain(&mut bus), []);
+}
+
+#[test]
+#[ignore = "needs a CAN interface: run tests/vcan"]
+fn frames_that_nobody_reads_in_time_are_counted_and_seen_as_lost() {
+    let (sender, mut bus) = (open(&[]), open(Layout::Bits16.messages()));
+    let sent = traffic(Layout::Bits16, 60_000);
+    for frame in &sent {
+        sender.send(frame, WAIT).expect("room");
+    }
+    let dropped = bus.dropped();
+    assert!(dropped > 0);
+    let mut receiver = receiver(Layout::Bits16);
+    let mut last = None;
+    let mut got = 0;
+    for frame in drain(&mut bus) {
+        got += 1;
+        let taken = receiver.take(&frame.frame, frame.time_us as u32);
+        last = taken.tick.map(|t| t.sequence).or(last);
+    }
+    let codes = sent
+        .iter()
+        .filter(|f| f.id != Message::SensorTime.id().into());
+    assert_eq!(got + dropped as usize, codes.count());
+    // What is sent after the gap tells that there was one.
+    for frame in traffic(Layout::Bits16, 60_003).iter().rev().take(6).rev() {
+        sender.send(frame, WAIT).expect("room");
+    }
+    let faults: Vec<_> = drain(&mut bus)
+        .iter()
+        .filter_map(|f| receiver.take(&f.frame, f.time_us as u32).fault)
+        .collect();
+    assert!(last.is_some() && !faults.is_empty(), "{last:?}");
+}
+
+#[test]
+#[ignore = "needs a CAN interface: run tests/vcan"]
+fn every_fault_of_a_real_bus_shows_at_the_receiver() {
+    let sent: Vec<_> = traffic(Layout::Bits16, 500)
+        .into_iter()
+        .filter(|f| f.id != Message::SensorTime.id().into())
+        .map(|frame| StampedFrame { time_us: 0, frame })
+        .collect();
+    for fault in Fault::ALL {
+        let (sender, bus) = (open(&[]), open(Layout::Bits16.messages()));
+        let rates = FaultRates::NONE.with(fault, 20_000);
+        let mut faulty = Faulty::new(SliceSource::new(&sent), rates, 5);
+        while let Ok(Some(stamped)) = faulty.next_frame() {
+            sender.send(&stamped.frame, WAIT).expect("room");
+        }
+        let mut kept = 0;
+        let recorder = |_: &StampedFrame| {
+            kept += 1;
+            Ok::<(), core::convert::Infallible>(())
+        };
+        let mut source = Recorded::new(bus.waiting(Duration::from_millis(20)), recorder);
+        let mut receiver = receiver(Layout::Bits16);
+        let (mut faults, mut whole) = (0, 0);
+        while let Ok(Some(f)) = source.next_frame() {
+            let taken = receiver.take(&f.frame, f.time_us as u32);
+            faults += u32::from(taken.fault.is_some());
+            let Some(got) = taken.tick else { continue };
+            let want = tick(got.sequence);
+            if (got.hall, got.capacitive) == (want.hall, want.capacitive) {
+                whole += 1;
+            } else {
+                faults += 1;
+            }
+        }
+        let injected = faulty.injected(fault);
+        println!("RESULT vcan_fault={fault:?} injected={injected} noticed={faults} whole={whole}");
+        // Frames of one tick in another order are no fault.
+        let swaps_within_a_tick = if fault == Fault::Swap { injected } else { 0 };
+        assert!(
+            injected >= 5 && faults + swaps_within_a_tick >= injected,
+            "{fault:?}"
+        );
+        assert!(
+            whole >= 400 && kept >= 900,
+            "{fault:?}: {whole} of 500, {kept}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "needs a CAN interface: run tests/vcan"]
+fn a_full_transmit_queue_is_waited_for_until_the_deadline() {
+    let name = interface();
+    let bus = open(&[]);
+    let [frame, _] = sensor::frames_16(&tick(1)).map(BusFrame::from);
+    // A queue that takes no frame at all.
+    run(&format!("tc qdisc add dev {name} root bfifo limit 1"));
+    let started = Instant::now();
+    let refused = bus.send(&frame, Duration::from_millis(50));
+    let waited = started.elapsed();
+    let freed = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(100));
+        run(&format!("tc qdisc del dev {name} root"));
+    });
+    let sent = bus.send(&frame, Duration::from_secs(10));
+    freed.join().expect("tc");
+    assert!(
+        matches!(refused, Err(SocketCanError::QueueFull { .. })),
+        "{refused:?}"
+    );
+    assert!(waited >= Duration::from_millis(50));
+    sent.expect("sent once there is room");
+}
+
+#[test]
+#[ignore = "needs a CAN interface: run tests/vcan"]
+fn an_interface_that_is_down_says_so_and_the_socket_goes_on_when_it_is_up() {
+    let name = interface();
+    let (sender, mut bus) = (open(&[]), open(Layout::Bits16.messages()));
+    let [frame, _] = sensor::frames_16(&tick(1)).map(BusFrame::from);
+    run(&format!("ip link set {name} down"));
+    assert!(matches!(
+        bus.receive(WAIT),
+        Err(SocketCanError::Down { .. })
+    ));
+    let refused = sender.send(&frame, WAIT);
+    run(&format!("ip link set {name} up"));
+    assert!(
+        matches!(refused, Err(SocketCanError::Down { .. })),
+        "{refused:?}"
+    );
+    sender.send(&frame, WAIT).expect("up again");
+    let got = bus.receive(WAIT).expect("up again");
+    assert_eq!(got.map(|f| f.frame), Some(frame));
+}
+
+#[test]
+#[ignore = "needs a CAN interface: run tests/vcan"]
+fn what_is_no_can_interface_is_refused_by_name() {
+    let missing = SocketCan::open("can-none", &[]);
+    assert!(matches!(
+        missing,
+        Err(SocketCanError::NoSuchInterface { .. })
+    ));
+    let loopback = SocketCan::open("lo", &[]);
+    assert!(
+        matches!(loopback, Err(SocketCanError::NotCan { .. })),
+        "{loopback:?}"
+    );
+}
+
+#[test]
+#[ignore = "needs a CAN interface: run tests/vcan"]
+fn silence_is_noticed_at_the_deadline_of_the_receiver() {
+    let (sender, mut bus) = (open(&[]), open(Layout::Bits16.messages()));
+    let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
+    for frame in traffic(Layout::Bits16, 1) {
+        sender.send(&frame, WAIT).expect("room");
+    }
+    let mut last_us = 0;
+    for f in drain(&mut bus) {
+        last_us = f.time_us;
+        receiver.take(&f.frame, f.time_us as u32);
+    }
+    let deadline_us = receiver.deadline_us().expect("a frame came");
+    assert_eq!(deadline_us.wrapping_sub(last_us as u32), 3_000);
+    let stale = receiver.poll(deadline_us).fault;
+    assert!(matches!(stale, Some(BusFault::Stale { .. })));
+}
