@@ -11,6 +11,7 @@
 //! | [`train`] | which rows the fit uses |
 //! | [`problem`], [`parameters`] | what is minimised, over which unknowns |
 //! | [`solver`], [`least_squares`] | how |
+//! | [`objective`], [`search`] | the fitness as a function, and SHTLBO with its relatives |
 //! | [`zero_deviation`] | each movement's offset in closed form |
 //! | [`uncertainty`], [`identify`] | standard errors; whether the log determines the model |
 //! | [`judge`], [`statistics`], [`precision`] | errors by the target's own decoder |
@@ -32,6 +33,7 @@ pub mod identify;
 pub mod judge;
 pub mod least_squares;
 pub mod log;
+pub mod objective;
 pub mod output;
 pub mod parameters;
 pub mod pose_file;
@@ -39,6 +41,7 @@ pub mod precision;
 pub mod problem;
 pub mod report;
 pub mod shipped;
+pub mod search;
 pub mod solver;
 pub mod stage;
 pub mod statistics;
