@@ -11,7 +11,7 @@
 //! | [`train`] | which rows the fit uses |
 //! | [`problem`], [`parameters`] | what is minimised, over which unknowns |
 //! | [`solver`], [`least_squares`] | how |
-//! | [`objective`], [`search`] | the fitness as a function, and SHTLBO with its relatives |
+//! | [`objective`], [`search`], [`population`] | the fitness as a function, SHTLBO and its relatives, both as a solver |
 //! | [`zero_deviation`] | each movement's offset in closed form |
 //! | [`uncertainty`], [`identify`] | standard errors; whether the log determines the model |
 //! | [`judge`], [`statistics`], [`precision`] | errors by the target's own decoder |
@@ -19,6 +19,7 @@
 //! | [`report`] | JSON, tables, plots, an HTML page |
 //! | [`blob_file`], [`pose_file`], [`output`] | files, written whole or not at all |
 //! | [`error`] | all of it with the exit status that it leads to |
+//! | [`interrupt`] | Ctrl-C |
 //! | [`cli`], [`demo`], [`shipped`] | the commands, and the log that ships with them |
 //! | [`synthetic`] | logs whose true parameters are known |
 #![forbid(unsafe_code)]
@@ -30,18 +31,20 @@ pub mod demo;
 pub mod error;
 pub mod fit;
 pub mod identify;
+pub mod interrupt;
 pub mod judge;
 pub mod least_squares;
 pub mod log;
 pub mod objective;
 pub mod output;
 pub mod parameters;
+pub mod population;
 pub mod pose_file;
 pub mod precision;
 pub mod problem;
 pub mod report;
-pub mod shipped;
 pub mod search;
+pub mod shipped;
 pub mod solver;
 pub mod stage;
 pub mod statistics;

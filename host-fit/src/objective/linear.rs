@@ -80,11 +80,11 @@ impl<'a> LinearCost<'a> {
         for group in &problem.groups {
             let rows = &mut rows[group.rows.clone()];
             let n = rows.len() as f64;
-            for k in 0..3 {
+            for (k, squares) in reference_squares.iter_mut().enumerate() {
                 let mean = rows.iter().fold(0.0, |sum, row| sum + row.reference_um[k]) / n;
                 for row in &mut *rows {
                     row.reference_um[k] -= mean;
-                    reference_squares[k] += row.reference_um[k] * row.reference_um[k];
+                    *squares += row.reference_um[k] * row.reference_um[k];
                 }
             }
         }
@@ -109,12 +109,9 @@ impl<'a> LinearCost<'a> {
                 let shares = shares(&ratios, row);
                 smallest.note(shares[0].smaller(shares[1]).smaller(shares[2]));
                 let s = corrected_um(shares, row);
-                for k in 0..3 {
-                    mean[k] += s[k];
-                    for axis in 0..3 {
-                        reference[axis][k] += s[k] * row.reference_um[axis];
-                    }
-                }
+                mean = each(|k| mean[k] + s[k]);
+                reference =
+                    each(|axis| each(|k| reference[axis][k] + s[k] * row.reference_um[axis]));
                 for (sum, (i, j)) in signal.iter_mut().zip(PAIRS) {
                     *sum += s[i] * s[j];
                 }

@@ -11,11 +11,13 @@
 //!
 //! | module | what the forms share |
 //! |---|---|
+//! | [`form`] | one of the three, behind one type |
 //! | [`lanes`] | eight individuals in SIMD registers |
 //! | [`model`] | Model (31) for eight individuals |
 //! | [`poles`] | keeps `delta` and `linear` away from the poles of 1/phi |
 
 pub mod delta;
+pub mod form;
 pub mod full;
 pub mod lanes;
 pub mod linear;
@@ -23,6 +25,6 @@ pub mod model;
 pub mod poles;
 
 #[cfg(test)]
-mod sample;
+pub(crate) mod sample;
 #[cfg(test)]
 mod tests;

@@ -149,9 +149,10 @@ pub fn fitness_by_the_runtime(
                 .map(|s| sensitivity_at(&s, &vertical));
             let signal = row.signal_um.map(|s| s * 1e-6);
             let pose = planar_pose(&inverse, signal, phi, &zero).to_array();
-            for k in 0..3 {
-                let error = pose[k] * 1e6 - row.reference_um[k];
-                cost += problem.weights[k] * error * error;
+            let axes = pose.iter().zip(row.reference_um).zip(problem.weights);
+            for ((pose, reference), weight) in axes {
+                let error = pose * 1e6 - reference;
+                cost += weight * error * error;
             }
         }
     }
