@@ -17,3 +17,8 @@ pub fn watch() -> &'static AtomicBool {
     });
     &INTERRUPTED
 }
+
+/// Whether Ctrl-C was pressed since [`watch`].
+pub fn requested() -> bool {
+    INTERRUPTED.load(Ordering::Relaxed)
+}

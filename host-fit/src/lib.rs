@@ -16,6 +16,7 @@
 //! | [`uncertainty`], [`identify`] | standard errors; whether the log determines the model |
 //! | [`judge`], [`statistics`], [`precision`] | errors by the target's own decoder |
 //! | [`fit`] | all of these in a row |
+//! | [`compare`] | the solvers beside each other |
 //! | [`report`] | JSON, tables, plots, an HTML page |
 //! | [`blob_file`], [`pose_file`], [`output`] | files, written whole or not at all |
 //! | [`error`] | all of it with the exit status that it leads to |
@@ -26,6 +27,7 @@
 
 pub mod blob_file;
 pub mod cli;
+pub mod compare;
 pub mod dataset;
 pub mod demo;
 pub mod error;

@@ -81,6 +81,17 @@ impl SearchKind {
         Self::Random,
     ];
 
+    /// The names of all, in the same order.
+    pub const NAMES: [&'static str; 11] = {
+        let mut names = [""; 11];
+        let mut index = 0;
+        while index < names.len() {
+            names[index] = Self::ALL[index].name();
+            index += 1;
+        }
+        names
+    };
+
     /// The name on the command line and in reports.
     pub const fn name(self) -> &'static str {
         match self {
