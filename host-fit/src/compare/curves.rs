@@ -3,6 +3,7 @@
 use super::Run;
 use super::summary::Spread;
 use crate::report::plots::PlotError;
+use crate::search::kind::SearchKind;
 use crate::solver::Projection;
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -205,8 +206,10 @@ where
         .x_label_formatter(&|x| format!("{x:.0}"))
         .y_label_formatter(&|y| format!("{y:.1}"))
         .draw()?;
-    for (index, (name, points)) in curves.iter().enumerate() {
-        let colour = Palette99::pick(index).to_rgba();
+    for (name, points) in curves {
+        // The same colour for a solver in every plot.
+        let place = SearchKind::NAMES.iter().position(|other| other == name);
+        let colour = Palette99::pick(place.unwrap_or(SearchKind::NAMES.len())).to_rgba();
         let style = colour.stroke_width(2);
         chart
             .draw_series(LineSeries::new(points.iter().copied(), style))?
@@ -215,6 +218,7 @@ where
     }
     chart
         .configure_series_labels()
+        .position(SeriesLabelPosition::LowerLeft)
         .background_style(WHITE.mix(0.8))
         .border_style(BLACK.mix(0.3))
         .draw()?;
