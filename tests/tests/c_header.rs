@@ -6,7 +6,8 @@ use std::path::Path;
 #[test]
 fn the_c_header_is_made_from_the_source() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../runtime/c");
-    let config = cbindgen::Config::from_file(folder.join("cbindgen.toml")).expect("a configuration");
+    let config =
+        cbindgen::Config::from_file(folder.join("cbindgen.toml")).expect("a configuration");
     let mut builder = cbindgen::Builder::new().with_config(config);
     for source in ["lib.rs", "storage.rs", "types.rs"] {
         builder = builder.with_src(folder.join("src").join(source));

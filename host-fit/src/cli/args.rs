@@ -2,8 +2,10 @@
 
 use crate::live::LiveArgs;
 use crate::replay::ReplayArgs;
+use crate::search::kind::SearchKind;
 use crate::solver::Projection;
 use crate::train::Draw;
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use runtime::ModelKind;
 use runtime::parameters::Text;
@@ -38,6 +40,8 @@ pub enum Command {
     Live(LiveArgs),
     /// Play a log onto a CAN bus as the sensor node would send it (Linux).
     Replay(ReplayArgs),
+    /// Compare the solvers on one or more logs, over several seeds at equal evaluations.
+    Compare(CompareArgs),
 }
 
 /// Arguments of `demo`.
@@ -130,7 +134,7 @@ pub struct FitArgs {
     #[arg(long, value_enum, default_value = "auto")]
     pub model: ModelChoice,
     /// Solver; see `host-fit fit --help` of this list, or leave the best to the program.
-    #[arg(long, value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(crate::cli::SOLVERS), default_value = crate::cli::DEFAULT_SOLVER)]
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(crate::cli::solver_names()), default_value = crate::cli::DEFAULT_SOLVER)]
     pub solver: String,
     /// How much of the problem is solved in closed form.
     #[arg(long, value_enum, default_value = "linear")]
@@ -150,6 +154,9 @@ pub struct FitArgs {
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Warm start: a search begins with the parameters of this blob among its population.
+    #[arg(long, value_name = "params.bin")]
+    pub start: Option<PathBuf>,
     /// Threads; all cores if not given. The result does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -228,4 +235,47 @@ pub struct InspectArgs {
     /// Write everything as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
+}
+
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// Logs: CSV or CSV.gz, one or more.
+    #[arg(required = true, value_name = "LOG")]
+    pub logs: Vec<PathBuf>,
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    pub stage: PathBuf,
+    /// Forms of the problem, separated by commas.
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        default_value = "none,delta,linear"
+    )]
+    pub project: Vec<Projection>,
+    /// Searches, separated by commas; all if not given. Least squares is always there.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', default_values = SearchKind::NAMES, value_parser = PossibleValuesParser::new(SearchKind::NAMES))]
+    pub solvers: Vec<String>,
+    /// Runs of each: seeds 1 to N.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub seeds: u64,
+    /// Rows that each seed draws: `all` or a number.
+    #[arg(long, value_name = "N|all", default_value = "200", value_parser = train)]
+    pub train: Train,
+    /// How rows are drawn.
+    #[arg(long, value_enum, default_value = "stratified")]
+    pub draw: Draw,
+    /// Evaluations of each run; the paper's are 100 + 100 generations of 200.
+    #[arg(long, value_name = "N", default_value_t = 20_100, value_parser = clap::value_parser!(u32).range(4..=1_000_000_000))]
+    pub evaluations: u32,
+    /// Individuals of a population.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(4..=100_000))]
+    pub population: u32,
+    /// Threads; all cores if not given. The results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Write table, runs, histories (CSV) and plots (SVG) into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }

@@ -23,7 +23,7 @@ pub fn run(args: &DemoArgs) -> Result<(), HostError> {
             temporary.path()
         }
     };
-    let solver = super::solver(super::DEFAULT_SOLVER)?;
+    let solver = super::solver(super::DEFAULT_SOLVER, None)?;
     let demo = demo::run(folder, solver.as_ref())?;
     super::print(&as_text(&demo, args.zero_deviations))?;
     let mut end = format!(

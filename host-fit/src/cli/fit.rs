@@ -9,7 +9,7 @@ use crate::report::json::{Report, of_fit};
 use crate::report::{html, plots, text};
 use crate::solver::SolverOptions;
 use crate::stage::Stage;
-use crate::{blob_file, judge, log, output};
+use crate::{blob_file, interrupt, judge, log, output};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -20,6 +20,7 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
         .logs
         .iter()
         .chain([&args.stage])
+        .chain(&args.start)
         .map(PathBuf::as_path)
         .collect();
     let outputs = [
@@ -39,7 +40,11 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
     };
     output::check_writable(&args.out)?;
     let log = log::read(&args.logs, &stage, &options)?;
-    let solver = super::solver(&args.solver)?;
+    let known = match &args.start {
+        Some(path) => Some(judge::parameters_of(&blob_file::read(path)?)),
+        None => None,
+    };
+    let solver = super::solver(&args.solver, known)?;
     let settings = FitSettings {
         model: args.model.kind(),
         train: match args.train {
@@ -56,7 +61,14 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
         serial: args.serial.clone().unwrap_or_default(),
         created: args.created.clone().unwrap_or_default(),
     };
-    let fit = fit(&log.dataset, &stage, solver.as_ref(), &settings)?;
+    let fit = match fit(&log.dataset, &stage, solver.as_ref(), &settings) {
+        Err(error) if interrupt::requested() => {
+            return Err(HostError::Interrupted {
+                kept: format!("no parameter blob was written: {error}"),
+            });
+        }
+        result => result?,
+    };
     let circumstances = super::circumstances(&log, &stage, started);
     let report = of_fit(
         &fit,
@@ -79,6 +91,11 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
         super::print(&format!("wrote {}\n", args.out.display()))?;
     }
     super::warn(&report.warnings);
+    if interrupt::requested() {
+        return Err(HostError::Interrupted {
+            kept: format!("{} holds the best so far", args.out.display()),
+        });
+    }
     Ok(())
 }
 

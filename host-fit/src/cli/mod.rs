@@ -1,6 +1,7 @@
 //! The commands: arguments, one file a command, and nothing that the library could do.
 
 pub mod args;
+mod compare;
 mod decode;
 mod demo;
 mod eval;
@@ -8,11 +9,15 @@ mod fit;
 mod inspect;
 
 use crate::error::HostError;
+use crate::interrupt;
 use crate::least_squares::starts::LeastSquares;
 use crate::log::{LogReading, ReadOptions, ReferenceUse};
 use crate::output::write_atomically;
+use crate::parameters::Parameters;
+use crate::population::{self, PopulationSolver};
 use crate::replay::ReplayArgs;
 use crate::report::json::Circumstances;
+use crate::search::kind::SearchKind;
 use crate::solver::Solver;
 use crate::stage::Stage;
 use args::{Cli, Command};
@@ -23,10 +28,16 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
+/// The solver that gives the best result: SHTLBO, finished by least squares.
+pub const DEFAULT_SOLVER: &str = population::FINISHED;
+
 /// Names of the solvers.
-pub const SOLVERS: [&str; 1] = ["lm"];
-/// The solver that gives the best result.
-pub const DEFAULT_SOLVER: &str = "lm";
+pub fn solver_names() -> Vec<&'static str> {
+    [DEFAULT_SOLVER, LeastSquares.name()]
+        .into_iter()
+        .chain(SearchKind::NAMES)
+        .collect()
+}
 
 /// How `eval` reads: it needs the reference, and the decoder marks saturated codes.
 const EVAL: ReadOptions = ReadOptions {
@@ -34,15 +45,18 @@ const EVAL: ReadOptions = ReadOptions {
     ..ReadOptions::DECODE
 };
 
-/// The solver of a name.
-fn solver(name: &str) -> Result<Box<dyn Solver>, HostError> {
-    match name {
-        "lm" => Ok(Box::new(LeastSquares)),
-        _ => Err(HostError::Usage {
-            argument: "--solver",
-            problem: format!("no solver is called {name}"),
-        }),
+/// The solver of a name. A search among them watches for Ctrl-C and begins at `known`.
+fn solver(name: &str, known: Option<Parameters>) -> Result<Box<dyn Solver>, HostError> {
+    if name == LeastSquares.name() {
+        return Ok(Box::new(LeastSquares));
     }
+    let mut search = PopulationSolver::by_name(name).ok_or_else(|| HostError::Usage {
+        argument: "--solver",
+        problem: format!("no solver is called {name}"),
+    })?;
+    search.interrupt = Some(interrupt::watch());
+    search.known = known;
+    Ok(Box::new(search))
 }
 
 /// Parses the command line, runs the command, prints an error if there is one.
@@ -56,6 +70,7 @@ pub fn main() -> ExitCode {
         Command::Inspect(args) => inspect::run(args),
         Command::Live(args) => crate::live::run(args).map_err(HostError::from),
         Command::Replay(args) => replay(args),
+        Command::Compare(args) => compare::run(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -32,11 +32,26 @@ impl Solver for LeastSquares {
     }
 
     fn solve(&self, problem: &Problem, options: &SolverOptions) -> Result<Solution, SolveError> {
+        let starts = starts(&thinned(problem, START_ROWS), options.seed);
+        self.solve_from(&starts, problem, options)
+    }
+}
+
+impl LeastSquares {
+    /// Descends from each of the given parameters and finishes the best on all rows.
+    ///
+    /// # Errors
+    /// See [`SolveError`].
+    pub fn solve_from(
+        &self,
+        starts: &[Parameters],
+        problem: &Problem,
+        options: &SolverOptions,
+    ) -> Result<Solution, SolveError> {
         let started = Instant::now();
         let free = free_offsets(problem);
         let few = thinned(problem, START_ROWS);
         let few_offsets = free_offsets(&few);
-        let starts = starts(&few, options.seed);
         let boxed = Boxed {
             stage: problem.stage,
             model: problem.model,
@@ -49,9 +64,9 @@ impl Solver for LeastSquares {
             evaluations: 0,
         };
         let found = if by_gains {
-            search.by_gains(&few, &few_offsets, &starts)?
+            search.by_gains(&few, &few_offsets, starts)?
         } else {
-            search.by_parameters(&boxed, &few, &few_offsets, &starts)?
+            search.by_parameters(&boxed, &few, &few_offsets, starts)?
         };
         let mut descent = found.best;
         // A solution outside its box is brought back, for the least cost on the box's edge.
@@ -226,7 +241,7 @@ fn free_offsets(problem: &Problem) -> Vec<Offset> {
 
 /// The zero deviation of every movement of the log at a solution; none where the model has none
 /// or the movement no row.
-fn zero_deviations(
+pub fn zero_deviations(
     problem: &Problem,
     parameters: &Parameters,
     point: &Point,
@@ -251,7 +266,7 @@ fn zero_deviations(
 }
 
 /// The problem on about `most` of its rows, evenly from each movement.
-fn thinned<'a>(problem: &Problem<'a>, most: usize) -> Problem<'a> {
+pub fn thinned<'a>(problem: &Problem<'a>, most: usize) -> Problem<'a> {
     let stride = problem.rows.len().div_ceil(most).max(1);
     let mut few = Problem {
         rows: Vec::with_capacity(problem.rows.len() / stride + problem.groups.len()),

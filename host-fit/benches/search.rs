@@ -1,0 +1,274 @@
+//! Times of the population searches on the log that ships with the program, or on another one:
+//! an evaluation, the paper's experiment, the way to the least-squares optimum, threads.
+//!
+//! `cargo bench -p host-fit --bench search [-- LOG STAGE]`
+//!
+//! `cargo bench -p host-fit --bench search -- --export DIR` writes the 200 rows of the paper's
+//! experiment, its bounds and one individual with its fitness into DIR, for other programs to
+//! be measured on the same problem, and prints what this one does with it.
+
+use host_fit::least_squares::starts::LeastSquares;
+use host_fit::log::{ReadOptions, read, read_bytes};
+use host_fit::objective::delta::DeltaCost;
+use host_fit::objective::full::FullCost;
+use host_fit::objective::linear::LinearCost;
+use host_fit::problem::Problem;
+use host_fit::search::cost::CostFunction;
+use host_fit::search::kind::{SearchKind, Settings};
+use host_fit::search::run::{Outcome, Start, StopCriteria};
+use host_fit::solver::{Projection, Solver, SolverOptions};
+use host_fit::stage::Stage;
+use host_fit::train::{Draw, draw_rows};
+use runtime::ModelKind;
+use std::error::Error;
+use std::fmt::Write;
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Instant;
+
+/// Np and Gm of the paper.
+const PAPER: usize = 100;
+/// Rows of the paper's experiment.
+const ROWS: usize = 200;
+/// Individuals for the form `linear`: nine unknowns want no more.
+const FEW: usize = 20;
+
+/// Median of some numbers.
+fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    let middle = numbers.len() / 2;
+    if numbers.len().is_multiple_of(2) {
+        0.5 * (numbers[middle - 1] + numbers[middle])
+    } else {
+        numbers[middle]
+    }
+}
+
+/// Times of several calls in us: the fastest and the median.
+fn time_us(repeats: usize, mut call: impl FnMut()) -> (f64, f64) {
+    let time = |_| {
+        let started = Instant::now();
+        call();
+        started.elapsed().as_secs_f64() * 1e6
+    };
+    let times: Vec<f64> = (0..repeats).map(time).collect();
+    (
+        times.iter().copied().fold(f64::INFINITY, f64::min),
+        median(times),
+    )
+}
+
+/// An individual inside the middle half of the box.
+fn inside(cost: &impl CostFunction, number: usize) -> Vec<f64> {
+    let place = |(j, range): (usize, &host_fit::stage::Range)| {
+        let share = 0.25 + 0.5 * ((number * 31 + j * 17) % 97) as f64 / 96.0;
+        range.low + share * range.width()
+    };
+    cost.bounds().iter().enumerate().map(place).collect()
+}
+
+/// Time of one evaluation of the objective alone.
+fn objective(name: &str, cost: &impl CostFunction) {
+    let count = 96;
+    let individuals: Vec<f64> = (0..count).flat_map(|k| inside(cost, k)).collect();
+    let mut costs = vec![0.0; count];
+    let (least, middle) = time_us(501, || cost.costs(black_box(&individuals), &mut costs));
+    let one = inside(cost, 0);
+    let (alone, _) = time_us(2001, || {
+        black_box(cost.cost(black_box(&one)));
+    });
+    println!(
+        "evaluation, form {name:<6} {:>3} unknowns: {:.3} us (median {:.3}) in a population, {alone:.2} us alone",
+        cost.bounds().len(),
+        least / count as f64,
+        middle / count as f64,
+    );
+}
+
+fn settings(seed: u64, population: usize) -> Settings<'static> {
+    Settings {
+        seed,
+        start: Start {
+            population,
+            individuals: &[],
+        },
+        ..Settings::default()
+    }
+}
+
+fn generations(count: usize) -> StopCriteria<'static> {
+    StopCriteria {
+        generations: Some(count),
+        ..StopCriteria::default()
+    }
+}
+
+/// The paper's experiment: time and fitness of ten seeds, each with its own plain draw.
+fn papers_experiment(problem: &impl Fn(usize, Draw, u64) -> Problem<'static>) {
+    let run = |seed| {
+        let problem = problem(ROWS, Draw::Plain, seed);
+        let cost = FullCost::new(&problem);
+        let mut fitness = 0.0;
+        let (least, middle) = time_us(5, || {
+            let found =
+                SearchKind::Shtlbo.minimize(&cost, &settings(seed, PAPER), &generations(PAPER));
+            fitness = found.cost;
+        });
+        (fitness, least, middle)
+    };
+    let runs: Vec<_> = (1..=10).map(run).collect();
+    let fitness =
+        |numbers: &dyn Fn(f64, f64) -> f64, start| runs.iter().map(|r| r.0).fold(start, numbers);
+    println!(
+        "the paper's experiment (192 unknowns, 200 rows, 20,100 evaluations), ten seeds, one core: \
+         {:.1} ms (median {:.1}) = {:.3} us per evaluation; train fitness {:.2} ({:.2} to {:.2})",
+        runs.iter().map(|r| r.1).fold(f64::INFINITY, f64::min) / 1e3,
+        median(runs.iter().map(|r| r.2).collect()) / 1e3,
+        median(runs.iter().map(|r| r.2).collect()) / 20_100.0,
+        median(runs.iter().map(|r| r.0).collect()),
+        fitness(&f64::min, f64::INFINITY),
+        fitness(&f64::max, 0.0),
+    );
+}
+
+/// How long a search takes to a share above the least-squares optimum, ten seeds.
+fn to_the_floor(name: &str, cost: &impl CostFunction, floor: f64, share: f64, population: usize) {
+    let mut evaluations = Vec::new();
+    let mut times = Vec::new();
+    let mut arrived = 0;
+    for seed in 1..=10 {
+        let criteria = StopCriteria {
+            evaluations: Some(200_000),
+            target_cost: Some(floor * (1.0 + share)),
+            ..StopCriteria::default()
+        };
+        let started = Instant::now();
+        let found = SearchKind::Shtlbo.minimize(cost, &settings(seed, population), &criteria);
+        times.push(started.elapsed().as_secs_f64() * 1e3);
+        evaluations.push(found.evaluations as f64);
+        arrived += usize::from(found.cost <= floor * (1.0 + share));
+    }
+    println!(
+        "shtlbo, form {name}, Np {population}: {arrived} of 10 seeds within {share:e} of the least-squares \
+         fitness {floor:.6}, median {:.0} evaluations, {:.2} ms",
+        median(evaluations),
+        median(times),
+    );
+}
+
+/// The same search on one thread and on two: time, and whether the path is the same.
+fn threads(problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
+    let cost = FullCost::new(problem);
+    let mut found: Vec<Outcome> = Vec::new();
+    let mut times = Vec::new();
+    for threads in [1, 2] {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()?;
+        let started = Instant::now();
+        let search = || SearchKind::Shtlbo.minimize(&cost, &settings(1, PAPER), &generations(5));
+        found.push(pool.install(search));
+        times.push(started.elapsed().as_secs_f64() * 1e3);
+    }
+    println!(
+        "1,100 evaluations on {} rows: {:.0} ms on one thread, {:.0} ms on two, same path: {}",
+        problem.rows.len(),
+        times[0],
+        times[1],
+        found[0] == found[1],
+    );
+    Ok(())
+}
+
+/// Writes the paper's problem of seed 1 for other programs, and measures this one on it.
+fn export(folder: &Path, problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
+    std::fs::create_dir_all(folder)?;
+    let mut rows =
+        String::from("movement,s_a_um,s_b_um,s_c_um,z_m,rx_rad,ry_rad,x_um,y_um,rz_urad\n");
+    for group in &problem.groups {
+        for row in &problem.rows[group.rows.clone()] {
+            let numbers = [row.signal_um, row.vertical, row.reference_um].concat();
+            let text: Vec<String> = numbers.iter().map(f64::to_string).collect();
+            writeln!(rows, "{},{}", group.movement, text.join(","))?;
+        }
+    }
+    std::fs::write(folder.join("rows.csv"), rows)?;
+    let cost = FullCost::new(problem);
+    let individual = inside(&cost, 1);
+    let mut unknowns = String::from("low,high,individual\n");
+    for (range, x) in cost.bounds().iter().zip(&individual) {
+        writeln!(unknowns, "{},{},{x}", range.low, range.high)?;
+    }
+    std::fs::write(folder.join("unknowns.csv"), unknowns)?;
+    for (kind, name) in [(SearchKind::Tlbo, "tlbo"), (SearchKind::Shtlbo, "shtlbo")] {
+        let mut fitness = Vec::new();
+        let (_, middle) = time_us(5, || {
+            let seed = fitness.len() as u64 + 1;
+            let found = kind.minimize(&cost, &settings(seed, PAPER), &generations(PAPER));
+            fitness.push(found.cost);
+        });
+        println!("RESULT {name}_us_per_evaluation={:.4}", middle / 20_100.0);
+        println!("RESULT {name}_fitness={:.4}", median(fitness));
+    }
+    println!(
+        "RESULT fitness_of_individual={:.12}",
+        cost.cost(&individual)
+    );
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| a != "--bench")
+        .collect();
+    let named: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let options = ReadOptions::default();
+    let (stage, reading) = if let [log, stage] = named[..]
+        && log != "--export"
+    {
+        let stage = Stage::from_file(Path::new(stage))?;
+        let reading = read(&[log], &stage, &options)?;
+        (stage, reading)
+    } else {
+        let shipped = Path::new("the log that ships with the program");
+        let stage = Stage::from_toml(host_fit::shipped::STAGE_TOML, shipped)?;
+        let reading = read_bytes(host_fit::shipped::LOG_GZ, shipped, &stage, &options)?;
+        (stage, reading)
+    };
+    // Lives as long as the program.
+    let stage: &'static Stage = Box::leak(Box::new(stage));
+    let problem = |count, draw, seed| {
+        let rows = draw_rows(&reading.dataset, count, draw, seed);
+        Problem::new(&reading.dataset, &rows, stage, ModelKind::M31)
+    };
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    if let ["--export", folder] = named[..] {
+        return one
+            .install(|| {
+                export(Path::new(folder), &problem(ROWS, Draw::Plain, 1)).map_err(|e| e.to_string())
+            })
+            .map_err(Into::into);
+    }
+    let few = problem(ROWS, Draw::Stratified, 1);
+    let all = problem(usize::MAX, Draw::Stratified, 1);
+    let linear = LinearCost::new(&few).ok_or("Model (31) has ratios")?;
+    let lm = SolverOptions {
+        projection: Projection::Linear,
+        seed: 1,
+        population: 0,
+        generations: 0,
+    };
+    let floor = few.fitness(LeastSquares.solve(&few, &lm)?.cost);
+    one.install(|| {
+        objective("none", &FullCost::new(&few));
+        objective("delta", &DeltaCost::new(&few));
+        objective("linear", &linear);
+        papers_experiment(&problem);
+        // 1e-6 of the sum of squares is 5e-7 of its root.
+        to_the_floor("linear", &linear, floor, 5e-7, FEW);
+        to_the_floor("linear", &linear, floor, 5e-7, PAPER);
+        to_the_floor("delta", &DeltaCost::new(&few), floor, 0.01, PAPER);
+    });
+    threads(&all)
+}

@@ -1,0 +1,228 @@
+//! Every search on every form, over several seeds, at equal numbers of evaluations.
+//!
+//! Each seed draws its own rows, as `fit --seed` does, and every solver gets the same rows. The
+//! floor of a seed is the fitness of the least-squares fit on these rows; it stands in the
+//! table as `lm`. A search counts as arrived once its best fitness is within 1 % of the floor.
+//! Times are of this machine, of one search after the other.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`summary`] | medians and spreads, the table |
+//! | [`curves`] | convergence and course of p, as CSV and SVG |
+
+pub mod curves;
+pub mod summary;
+
+use crate::dataset::Dataset;
+use crate::fit::calibration;
+use crate::judge::{Zeros, judge};
+use crate::least_squares::starts::LeastSquares;
+use crate::objective::form::Form;
+use crate::population::solution_of;
+use crate::problem::Problem;
+use crate::search::kind::{SearchKind, Settings};
+use crate::search::run::{Checkpoint, Start, StopCriteria};
+use crate::solver::{Projection, Solution, SolveError, Solver, SolverOptions};
+use crate::stage::Stage;
+use crate::train::{Draw, draw_rows};
+use runtime::ModelKind;
+use runtime::calibration::Origin;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Share above the floor at which a search has arrived.
+pub const ARRIVED: f64 = 0.01;
+/// Name of the least-squares fit in tables and files.
+pub const LEAST_SQUARES: &str = "lm";
+
+/// What is compared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// The forms of the problem.
+    pub forms: Vec<Projection>,
+    /// The searches.
+    pub searches: Vec<SearchKind>,
+    /// Seeds 1 to this.
+    pub seeds: u64,
+    /// Rows drawn by each seed; all if `None`.
+    pub train: Option<usize>,
+    /// How they are drawn.
+    pub draw: Draw,
+    /// Evaluations of each run.
+    pub evaluations: usize,
+    /// Np.
+    pub population: usize,
+}
+
+/// One solver on one form with one seed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// The form.
+    pub form: Projection,
+    /// Name of the solver.
+    pub solver: &'static str,
+    /// The seed of rows and search.
+    pub seed: u64,
+    /// Fitness over the rows that the run used, um, um, urad.
+    pub fitness: f64,
+    /// Fitness of the least-squares fit on the same rows.
+    pub floor: f64,
+    /// Evaluations made.
+    pub evaluations: usize,
+    /// How many of them had no cost.
+    pub nan_costs: usize,
+    /// Time of the run, s.
+    pub elapsed_s: f64,
+    /// rms of X, Y, Rz over all rows of the logs by the target's decoder, zero deviations
+    /// refitted, um, um, urad; `None` where the parameters cannot serve a decoder.
+    pub rms: Option<[f64; 3]>,
+    /// The course of the search; empty for least squares.
+    pub history: Vec<Checkpoint>,
+}
+
+impl Run {
+    /// Evaluations until the best fitness was within [`ARRIVED`] of the floor, to the end of
+    /// the generation.
+    pub fn arrived_after(&self) -> Option<usize> {
+        let target = self.floor * (1.0 + ARRIVED);
+        if self.history.is_empty() {
+            return (self.fitness <= target).then_some(self.evaluations);
+        }
+        let first = self
+            .history
+            .iter()
+            .find(|point| point.best_cost <= target)?;
+        Some(first.evaluations)
+    }
+
+    /// The same in s, by the run's mean time of an evaluation.
+    pub fn arrived_after_s(&self) -> Option<f64> {
+        Some(self.elapsed_s * self.arrived_after()? as f64 / self.evaluations.max(1) as f64)
+    }
+}
+
+/// Makes all runs, form after form, solver after solver; `done` is told of each. Ends early,
+/// with what there is, once `interrupt` is set.
+///
+/// # Errors
+/// See [`SolveError`]: when the least-squares fit, which gives the floor, fails.
+pub fn compare(
+    dataset: &Dataset,
+    stage: &Stage,
+    comparison: &Comparison,
+    interrupt: &AtomicBool,
+    mut done: impl FnMut(&Run),
+) -> Result<Vec<Run>, SolveError> {
+    let count = comparison.train.unwrap_or(dataset.rows.len());
+    let draw = |seed| draw_rows(dataset, count, comparison.draw, seed);
+    let drawn: Vec<Vec<usize>> = (1..=comparison.seeds).map(draw).collect();
+    let problem = |rows: &[usize]| Problem::new(dataset, rows, stage, ModelKind::M31);
+    let mut runs = Vec::new();
+    for &form in &comparison.forms {
+        let mut floors = Vec::new();
+        for (seed, rows) in (1..).zip(&drawn) {
+            let run = least_squares(dataset, &problem(rows), form, seed)?;
+            floors.push(run.floor);
+            done(&run);
+            runs.push(run);
+        }
+        for &search in &comparison.searches {
+            for ((seed, rows), &floor) in (1..).zip(&drawn).zip(&floors) {
+                if interrupt.load(Ordering::Relaxed) {
+                    return Ok(runs);
+                }
+                let problem = problem(rows);
+                let Some(form) = Form::new(&problem, form).map(|f| (f, form)) else {
+                    continue;
+                };
+                let run = one_search(dataset, &problem, form, search, seed, floor, comparison);
+                done(&run);
+                runs.push(run);
+            }
+        }
+    }
+    Ok(runs)
+}
+
+fn least_squares(
+    dataset: &Dataset,
+    problem: &Problem<'_>,
+    form: Projection,
+    seed: u64,
+) -> Result<Run, SolveError> {
+    let options = SolverOptions {
+        projection: form,
+        seed,
+        population: 0,
+        generations: 0,
+    };
+    let solution = LeastSquares.solve(problem, &options)?;
+    let fitness = problem.fitness(solution.cost);
+    Ok(Run {
+        form,
+        solver: LEAST_SQUARES,
+        seed,
+        fitness,
+        floor: fitness,
+        evaluations: usize::try_from(solution.evaluations).unwrap_or(usize::MAX),
+        nan_costs: 0,
+        elapsed_s: solution.elapsed.as_secs_f64(),
+        rms: rms_over_all_rows(dataset, problem, &solution),
+        history: Vec::new(),
+    })
+}
+
+fn one_search(
+    dataset: &Dataset,
+    problem: &Problem<'_>,
+    (form, projection): (Form<'_>, Projection),
+    search: SearchKind,
+    seed: u64,
+    floor: f64,
+    comparison: &Comparison,
+) -> Run {
+    let settings = Settings {
+        seed,
+        start: Start {
+            population: comparison.population,
+            individuals: &[],
+        },
+        ..Settings::default()
+    };
+    let criteria = StopCriteria {
+        evaluations: Some(comparison.evaluations),
+        ..StopCriteria::default()
+    };
+    let started = Instant::now();
+    let found = search.minimize(&form, &settings, &criteria);
+    let elapsed_s = started.elapsed().as_secs_f64();
+    let solution = solution_of(problem, &form, &found).ok();
+    Run {
+        form: projection,
+        solver: search.name(),
+        seed,
+        fitness: found.cost,
+        floor,
+        evaluations: found.evaluations,
+        nan_costs: found.nan_costs,
+        elapsed_s,
+        rms: solution.and_then(|solution| rms_over_all_rows(dataset, problem, &solution)),
+        history: found.history,
+    }
+}
+
+/// Errors over all rows, by the decoder of the target, um, um, urad.
+fn rms_over_all_rows(
+    dataset: &Dataset,
+    problem: &Problem<'_>,
+    solution: &Solution,
+) -> Option<[f64; 3]> {
+    let calibration = calibration(dataset, problem.stage, problem.model, &solution.parameters);
+    let set = calibration.prepare(&Origin::default()).ok()?;
+    let judgement = judge(&set, dataset, problem.stage, Zeros::Refit);
+    Some(judgement.errors.axes.map(|axis| axis.rms * 1e6))
+}
+
+#[cfg(test)]
+#[path = "tests.rs"]
+mod tests;

@@ -1,0 +1,24 @@
+//! Ctrl-C: a search ends and keeps the best so far; a second Ctrl-C ends the program.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Exit status of an interrupted program.
+pub const EXIT_STATUS: u8 = 130;
+
+/// From now on Ctrl-C sets the flag that this returns.
+pub fn watch() -> &'static AtomicBool {
+    // Fails only where a handler is set already: then that one stays in charge.
+    let _ = ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            std::process::exit(EXIT_STATUS.into());
+        }
+    });
+    &INTERRUPTED
+}
+
+/// Whether Ctrl-C was pressed since [`watch`].
+pub fn requested() -> bool {
+    INTERRUPTED.load(Ordering::Relaxed)
+}

@@ -1,0 +1,116 @@
+//! Model (31) for eight individuals at once, in um, um, urad.
+//!
+//! The same equations as `runtime::model`, which is the model; a test holds the two equal
+//! within rounding. Two rearrangements: eta moves from phi into the matrix,
+//! PM^-1 (s / phi - delta / eta) = G (s' - delta) with G = PM^-1 diag(1/eta) and
+//! s' = s / (phi / eta), and three divisions are one division by their product.
+
+use super::lanes::{Lanes, dot, each};
+use crate::problem::TrainRow;
+
+/// PM and its inverse (equations 11, 32).
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    /// Rows of PM.
+    pub rows: [[Lanes; 3]; 3],
+    /// Rows of PM^-1.
+    pub inverse: [[Lanes; 3]; 3],
+}
+
+/// Sine and cosine of the three misalignments.
+#[derive(Clone, Copy, Debug)]
+pub struct Turns {
+    /// Sines.
+    pub sin: [Lanes; 3],
+    /// Cosines.
+    pub cos: [Lanes; 3],
+}
+
+impl Turns {
+    /// Of misalignments in rad.
+    #[inline(always)]
+    pub fn of(misalignment_rad: [Lanes; 3]) -> Self {
+        let both = each(|k| misalignment_rad[k].sin_cos());
+        Self {
+            sin: each(|k| both[k].0),
+            cos: each(|k| both[k].1),
+        }
+    }
+}
+
+impl Plane {
+    /// PM of lever arms in m and turns. Where PM is singular the inverse is not finite, and so
+    /// neither is the cost.
+    #[inline(always)]
+    pub fn new(lever_arm_m: [Lanes; 3], turns: &Turns) -> Self {
+        let Turns { sin, cos } = turns;
+        let rows = [
+            [-sin[0], cos[0], lever_arm_m[0]],
+            [-sin[1], cos[1], lever_arm_m[1]],
+            [cos[2], sin[2], lever_arm_m[2]],
+        ];
+        Self {
+            rows,
+            inverse: inverse(&rows),
+        }
+    }
+}
+
+/// The inverse of a 3x3 matrix by its adjugate.
+#[inline(always)]
+pub fn inverse(m: &[[Lanes; 3]; 3]) -> [[Lanes; 3]; 3] {
+    let [[a, b, c], [d, e, f], [g, h, i]] = *m;
+    let cofactor = [e * i - f * h, f * g - d * i, d * h - e * g];
+    let determinant = (a * cofactor[0] + b * cofactor[1]) + c * cofactor[2];
+    let r = Lanes::splat(1.0) / determinant;
+    [
+        [cofactor[0] * r, (c * h - b * i) * r, (b * f - c * e) * r],
+        [cofactor[1] * r, (a * i - c * g) * r, (c * d - a * f) * r],
+        [cofactor[2] * r, (b * g - a * h) * r, (a * e - b * d) * r],
+    ]
+}
+
+/// What the rows need to know of the parameters: the gain and the ratios.
+#[derive(Clone, Copy, Debug)]
+pub struct Linearized {
+    /// G = PM^-1 diag(1/eta), rows X, Y, Rz.
+    pub gain: [[Lanes; 3]; 3],
+    /// (a, b, c) / eta of A, B, C.
+    pub ratios: [[Lanes; 3]; 3],
+}
+
+impl Linearized {
+    /// Of a plane, eta and slopes: a of A, B, C, then b, then c.
+    #[inline(always)]
+    pub fn new(plane: &Plane, eta: [Lanes; 3], slopes: [[Lanes; 3]; 3]) -> Self {
+        let per_eta = each(|k| Lanes::splat(1.0) / eta[k]);
+        Self {
+            gain: each(|i| each(|k| plane.inverse[i][k] * per_eta[k])),
+            ratios: each(|k| each(|axis| slopes[axis][k] * per_eta[k])),
+        }
+    }
+
+    /// Decoded pose minus reference, without the zero deviation (equation 31): um, um, urad.
+    #[inline(always)]
+    pub fn pose_error(&self, shares: [Lanes; 3], row: &TrainRow) -> [Lanes; 3] {
+        let corrected = corrected_um(shares, row);
+        each(|k| dot(&self.gain[k], corrected) - row.reference_um[k])
+    }
+}
+
+/// phi / eta = 1 + r v of the three probes (equation 33), for ratios r = (a, b, c) / eta.
+#[inline(always)]
+pub fn shares(ratios: &[[Lanes; 3]; 3], row: &TrainRow) -> [Lanes; 3] {
+    let [z, rx, ry] = row.vertical;
+    each(|k| ((ratios[k][0] * z + ratios[k][1] * rx) + ratios[k][2] * ry) + 1.0)
+}
+
+/// s' = s / (phi / eta) of the three probes, um, with one division for all three.
+#[inline(always)]
+pub fn corrected_um(shares: [Lanes; 3], row: &TrainRow) -> [Lanes; 3] {
+    let [a, b, c] = shares;
+    let ab = a * b;
+    let r = Lanes::splat(1.0) / (ab * c);
+    let [s_a, s_b, s_c] = row.signal_um;
+    [((b * c) * r) * s_a, ((a * c) * r) * s_b, (ab * r) * s_c]
+}

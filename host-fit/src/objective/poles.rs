@@ -1,0 +1,66 @@
+//! Keeps a search away from the poles of 1/phi.
+//!
+//! The boxes of Table 5 are wide: phi = eta + a Z + b Rx + c Ry passes through zero inside them
+//! (|b| near 1,740 /rad at a tilt of 500 urad), and beyond a pole a probe would read backwards
+//! at one end of the log. Such parameters are worthless, yet each pole parts the box into
+//! basins of their own, in which a search gets stuck. So the forms `delta` and `linear` keep to
+//! the side where the stage is: every row must have phi / eta above [`SHARE_MIN`], else the cost
+//! is NaN; and the range of each slope is cut where it alone would break that rule. The form
+//! `none` is the paper's and has neither.
+
+use super::lanes::Lanes;
+use crate::problem::TrainRow;
+use crate::stage::Range;
+
+/// Smallest phi / eta of any row: at a twentieth, noise is already twenty times larger.
+pub const SHARE_MIN: f64 = 0.05;
+
+/// Lowest and highest Z, Rx, Ry of some rows, zero included: m, rad, rad.
+pub fn vertical_extent(rows: &[TrainRow]) -> [Range; 3] {
+    let mut extent = [Range {
+        low: 0.0,
+        high: 0.0,
+    }; 3];
+    for row in rows {
+        for (range, v) in extent.iter_mut().zip(row.vertical) {
+            range.low = range.low.min(v);
+            range.high = range.high.max(v);
+        }
+    }
+    extent
+}
+
+/// The part of `slopes` (a, b or c) in which, the other slopes being zero, `eta` + slope v stays
+/// above [`SHARE_MIN`] times eta over the extent. A range without such a part stays as it is.
+pub fn cut(slopes: Range, eta: f64, extent: Range) -> Range {
+    // eta (1 - SHARE_MIN) + slope v > 0 at both ends of the extent.
+    let room = (1.0 - SHARE_MIN) * eta.abs();
+    let low = slopes.low.max(-room / extent.high);
+    let high = slopes.high.min(-room / extent.low);
+    if low < high {
+        Range { low, high }
+    } else {
+        slopes
+    }
+}
+
+/// The smallest share phi / eta seen so far, for eight individuals.
+#[derive(Clone, Copy, Debug)]
+pub struct Smallest(Lanes);
+
+impl Smallest {
+    /// Nothing seen yet.
+    pub const NONE: Self = Self(Lanes::splat(f64::INFINITY));
+
+    /// Takes note of a share.
+    #[inline(always)]
+    pub fn note(&mut self, share: Lanes) {
+        self.0 = self.0.smaller(share);
+    }
+
+    /// `cost`, or NaN where a share was below [`SHARE_MIN`] or not a number.
+    #[inline(always)]
+    pub fn judge(&self, cost: Lanes) -> Lanes {
+        self.0.select_above(SHARE_MIN, cost)
+    }
+}

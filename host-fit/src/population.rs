@@ -1,0 +1,210 @@
+//! The population searches as solvers of the fit.
+//!
+//! [`PopulationSolver`] runs a search on the form of the problem that the user chose. With a
+//! finish (the program's default, `shtlbo-lm`) the search runs on a few hundred rows, evenly
+//! from each movement, until it hardly improves; what it found and the designed geometry are
+//! then the starts of the least-squares fit on all rows. So the result is the least-squares
+//! optimum whatever the seed, and the search guards against a start that leads nowhere.
+
+use crate::least_squares::coordinates::{Boxed, Coordinates};
+use crate::least_squares::normal::Column;
+use crate::least_squares::starts::{LeastSquares, thinned};
+use crate::objective::delta::DeltaCost;
+use crate::objective::form::{Form, best_delta_m};
+use crate::parameters::Parameters;
+use crate::problem::Problem;
+use crate::search::cost::CostFunction;
+use crate::search::kind::{SearchKind, Settings};
+use crate::search::run::{Outcome, Stall, Start, StopCriteria};
+use crate::solver::{Projection, Solution, SolveError, Solver, SolverOptions};
+use runtime::ModelKind;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+/// Rows for a search that a least-squares fit finishes.
+const FEW_ROWS: usize = 400;
+/// Such a search ends when its best cost falls by less than this share ...
+const STALL_DECLINE: f64 = 1e-4;
+/// ... over so many generations.
+const STALL_GENERATIONS: usize = 8;
+
+/// Name of SHTLBO with a least-squares finish.
+pub const FINISHED: &str = "shtlbo-lm";
+
+/// A population search, with or without a least-squares finish.
+#[derive(Clone, Debug)]
+pub struct PopulationSolver {
+    /// The search.
+    pub kind: SearchKind,
+    /// Whether a least-squares fit follows.
+    pub finish: bool,
+    /// Set by Ctrl-C: the search then ends and keeps the best so far.
+    pub interrupt: Option<&'static AtomicBool>,
+    /// Known parameters to start from, such as those of an earlier blob.
+    pub known: Option<Parameters>,
+}
+
+impl PopulationSolver {
+    /// The solver of a name: that of a search, or [`FINISHED`].
+    pub fn by_name(name: &str) -> Option<Self> {
+        let finish = name == FINISHED;
+        let kind = if finish {
+            SearchKind::Shtlbo
+        } else {
+            SearchKind::by_name(name)?
+        };
+        Some(Self {
+            kind,
+            finish,
+            interrupt: None,
+            known: None,
+        })
+    }
+
+    fn search(&self, form: &Form<'_>, problem: &Problem<'_>, options: &SolverOptions) -> Outcome {
+        let known: Vec<Vec<f64>> = self
+            .known
+            .iter()
+            .map(|known| form.individual(known, problem))
+            .collect();
+        let settings = Settings {
+            seed: options.seed,
+            start: Start {
+                population: options.population,
+                individuals: &known,
+            },
+            ..Settings::default()
+        };
+        let stall = Stall {
+            generations: STALL_GENERATIONS,
+            relative_decline: STALL_DECLINE,
+        };
+        let criteria = StopCriteria {
+            generations: Some(options.generations),
+            stall: self.finish.then_some(stall),
+            interrupt: self.interrupt,
+            ..StopCriteria::default()
+        };
+        self.kind.minimize(form, &settings, &criteria)
+    }
+
+    /// Search on few rows, then least squares on all.
+    fn solve_with_finish(
+        &self,
+        problem: &Problem<'_>,
+        options: &SolverOptions,
+    ) -> Result<Solution, SolveError> {
+        let few = thinned(problem, FEW_ROWS);
+        // Where nothing nonlinear is left to search for, least squares alone is exact.
+        let form = match options.projection {
+            Projection::Linear if problem.model == ModelKind::M12 => Projection::Delta,
+            other => other,
+        };
+        let Some(form) = Form::new(&few, form) else {
+            return LeastSquares.solve(problem, options);
+        };
+        let found = self.search(&form, &few, options);
+        let mut starts: Vec<Parameters> = Vec::new();
+        if found.cost.is_finite() {
+            starts.extend(form.parameters(&found.best));
+        }
+        starts.extend(self.known);
+        starts.push(middle_of_the_box(problem));
+        let mut solution = LeastSquares.solve_from(&starts, problem, options)?;
+        solution.evaluations += found.evaluations as u64;
+        solution.stopped = format!("search: {}; finish: {}", found.reason, solution.stopped);
+        Ok(solution)
+    }
+}
+
+/// The designed geometry with sensitivities from the middle of their ranges.
+fn middle_of_the_box(problem: &Problem<'_>) -> Parameters {
+    let mut middle = Parameters::designed(problem.stage);
+    if problem.model.has_sensitivity() {
+        let ranges = problem.stage.search.eta;
+        for (sensitivity, range) in middle.sensitivity.iter_mut().zip(ranges) {
+            sensitivity.eta = 0.5 * (range.low + range.high);
+        }
+    }
+    middle
+}
+
+impl Solver for PopulationSolver {
+    fn name(&self) -> &'static str {
+        if self.finish {
+            FINISHED
+        } else {
+            self.kind.name()
+        }
+    }
+
+    fn solve(&self, problem: &Problem, options: &SolverOptions) -> Result<Solution, SolveError> {
+        let started = Instant::now();
+        let mut solution = if self.finish {
+            self.solve_with_finish(problem, options)?
+        } else {
+            let form = Form::new(problem, options.projection).ok_or(SolveError::Unsupported {
+                solver: self.name(),
+                model: problem.model.equation(),
+                projection: options.projection.name(),
+                reason: "in this form only Model (31) has unknowns left to search for: \
+                         use --project delta or none, or --solver lm",
+            })?;
+            let found = self.search(&form, problem, options);
+            solution_of(problem, &form, &found)?
+        };
+        solution.elapsed = started.elapsed();
+        Ok(solution)
+    }
+}
+
+/// What a search found, within the search box.
+///
+/// # Errors
+/// [`SolveError::NoUsableStart`] when no individual had a cost, [`SolveError::NoPlanarMotion`]
+/// when the best gain is singular.
+pub fn solution_of(
+    problem: &Problem<'_>,
+    form: &Form<'_>,
+    found: &Outcome,
+) -> Result<Solution, SolveError> {
+    if !found.cost.is_finite() {
+        return Err(SolveError::NoUsableStart);
+    }
+    let best = form
+        .parameters(&found.best)
+        .ok_or(SolveError::NoPlanarMotion)?;
+    let boxed = Boxed {
+        stage: problem.stage,
+        model: problem.model,
+    };
+    let unknowns = Column::from(best.to_array());
+    let mut clipped = unknowns;
+    let mut fitness = found.cost;
+    // The linear form knows no box of lever arms, angles and eta: bring its result back.
+    if let Form::Linear(_) = form {
+        clipped = boxed.clip(unknowns);
+        if clipped != unknowns {
+            let delta = DeltaCost::new(problem);
+            fitness = delta.cost(&delta.individual(&Parameters::from_array(&clipped.into())));
+        }
+    }
+    let parameters = Parameters::from_array(&clipped.into());
+    let own = form.own_delta_m(&found.best);
+    Ok(Solution {
+        delta_m: own.unwrap_or_else(|| best_delta_m(problem, &parameters)),
+        parameters,
+        cost: fitness * fitness * 3.0 * problem.rows.len() as f64,
+        evaluations: found.evaluations as u64,
+        elapsed: std::time::Duration::ZERO,
+        stopped: format!(
+            "{}; {} of {} evaluations had no cost",
+            found.reason, found.nan_costs, found.evaluations
+        ),
+        at_limit: boxed.at_limit(&clipped),
+    })
+}
+
+#[cfg(test)]
+#[path = "population_tests.rs"]
+mod tests;

@@ -1,0 +1,190 @@
+//! The searches by name.
+
+use super::cost::{CostFunction, Evaluator};
+use super::peers::cmaes::Covariance;
+use super::peers::de::Differential;
+use super::peers::ga::Genetic;
+use super::peers::pso::Swarm;
+use super::peers::random::RandomSearch;
+use super::random::SeededStreams;
+use super::run::{Outcome, Start, StopCriteria, run};
+use super::tlbo::{Tlbo, Variant};
+
+/// A search method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum SearchKind {
+    /// SHTLBO (equations 23, 24, 27-29).
+    Shtlbo,
+    /// TLBO (equations 16-18).
+    Tlbo,
+    /// Gaussian bare-bones TLBO (equations 19, 20).
+    Gbtlbo,
+    /// The paper's mutation alone (equations 21, 22).
+    Mutation,
+    /// The hybrid with a fixed p (equations 23, 24).
+    Hybrid,
+    /// The hybrid with p by the success ratio (equation 25).
+    SuccessRatio,
+    /// Differential evolution.
+    De,
+    /// Particle swarm.
+    Pso,
+    /// Genetic algorithm.
+    Ga,
+    /// CMA-ES.
+    Cmaes,
+    /// Random draws.
+    Random,
+}
+
+/// What a search needs besides the function and the stop criteria.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings<'a> {
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// The first population; the paper's Np is 100.
+    pub start: Start<'a>,
+    /// p of [`SearchKind::Hybrid`], 0 to 1.
+    pub fixed_p: f64,
+    /// Generations from one update of p to the next.
+    pub learning_period: usize,
+}
+
+impl Default for Settings<'_> {
+    /// Np = 100, drawn with seed 1; p = 0.5, updated every generation.
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            start: Start {
+                population: 100,
+                individuals: &[],
+            },
+            fixed_p: 0.5,
+            learning_period: 1,
+        }
+    }
+}
+
+impl SearchKind {
+    /// All of them, the paper's and its ablations first.
+    pub const ALL: [Self; 11] = [
+        Self::Shtlbo,
+        Self::Tlbo,
+        Self::Gbtlbo,
+        Self::Mutation,
+        Self::Hybrid,
+        Self::SuccessRatio,
+        Self::De,
+        Self::Pso,
+        Self::Ga,
+        Self::Cmaes,
+        Self::Random,
+    ];
+
+    /// The names of all, in the same order.
+    pub const NAMES: [&'static str; 11] = {
+        let mut names = [""; 11];
+        let mut index = 0;
+        while index < names.len() {
+            names[index] = Self::ALL[index].name();
+            index += 1;
+        }
+        names
+    };
+
+    /// The name on the command line and in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Shtlbo => "shtlbo",
+            Self::Tlbo => "tlbo",
+            Self::Gbtlbo => "gbtlbo",
+            Self::Mutation => "mutation",
+            Self::Hybrid => "hybrid",
+            Self::SuccessRatio => "success-ratio",
+            Self::De => "de",
+            Self::Pso => "pso",
+            Self::Ga => "ga",
+            Self::Cmaes => "cmaes",
+            Self::Random => "random",
+        }
+    }
+
+    /// The method of that name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// The equations of the paper that the method consists of, or where it comes from.
+    pub const fn source(self) -> &'static str {
+        match self {
+            Self::Shtlbo => "eqs 23, 24, 27-29",
+            Self::Tlbo => "eqs 16-18",
+            Self::Gbtlbo => "eqs 19, 20",
+            Self::Mutation => "eqs 21, 22",
+            Self::Hybrid => "eqs 23, 24",
+            Self::SuccessRatio => "eqs 23-25",
+            Self::De => "DE/rand/1/bin",
+            Self::Pso => "global best",
+            Self::Ga => "breeder GA",
+            Self::Cmaes => "cmaes crate",
+            Self::Random => "uniform draws",
+        }
+    }
+
+    /// The variant of TLBO, for those that are one.
+    const fn variant(self, fixed_p: f64) -> Option<Variant> {
+        match self {
+            Self::Shtlbo => Some(Variant::Shtlbo),
+            Self::Tlbo => Some(Variant::Tlbo),
+            Self::Gbtlbo => Some(Variant::Gbtlbo),
+            Self::Mutation => Some(Variant::Mutation),
+            Self::Hybrid => Some(Variant::Hybrid { p: fixed_p }),
+            Self::SuccessRatio => Some(Variant::SuccessRatio),
+            Self::De | Self::Pso | Self::Ga | Self::Cmaes | Self::Random => None,
+        }
+    }
+
+    /// Searches for the minimum of `function`. Without any stop criterion it runs until the
+    /// interrupt flag is set.
+    pub fn minimize<F: CostFunction + ?Sized>(
+        self,
+        function: &F,
+        settings: &Settings<'_>,
+        criteria: &StopCriteria<'_>,
+    ) -> Outcome {
+        let streams = SeededStreams::new(settings.seed);
+        let mut evaluator = Evaluator::new(function);
+        let start = &settings.start;
+        if let Some(variant) = self.variant(settings.fixed_p) {
+            let period = settings.learning_period;
+            let method = Tlbo::new(variant, period, streams, &mut evaluator, start);
+            return run(method, evaluator, criteria);
+        }
+        match self {
+            Self::De => {
+                let method = Differential::new(streams, &mut evaluator, start);
+                run(method, evaluator, criteria)
+            }
+            Self::Pso => {
+                let method = Swarm::new(streams, &mut evaluator, start);
+                run(method, evaluator, criteria)
+            }
+            Self::Ga => {
+                let method = Genetic::new(streams, &mut evaluator, start);
+                run(method, evaluator, criteria)
+            }
+            Self::Cmaes => {
+                let method = Covariance::new(streams, &mut evaluator, start);
+                run(method, evaluator, criteria)
+            }
+            _ => {
+                let method = RandomSearch::new(streams, &mut evaluator, start);
+                run(method, evaluator, criteria)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "kind_tests.rs"]
+mod tests;
