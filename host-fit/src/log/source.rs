@@ -27,8 +27,27 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, LogError> {
             _ => LogError::Unreadable { path, source },
         }
     };
-    let raw = std::fs::read(path).map_err(unreadable)?;
+    let mut file = std::fs::File::open(path).map_err(unreadable)?;
+    let mut raw = Vec::new();
+    read_up_to(&mut file, PROBE_BYTES as u64, &mut raw).map_err(unreadable)?;
+    refuse_endless(&raw, path)?;
+    read_up_to(&mut file, BYTES_MAX, &mut raw).map_err(unreadable)?;
     unpack(raw.into(), path).map(Cow::into_owned)
+}
+
+/// Refuses by its start what is plainly no log: a device or a damaged file may have no end.
+fn refuse_endless(start: &[u8], path: &Path) -> Result<(), LogError> {
+    if start.starts_with(&GZIP_MAGIC) {
+        Ok(())
+    } else {
+        refuse_binary(start, path)
+    }
+}
+
+/// Appends what `source` holds, stopping soon after `limit` bytes.
+fn read_up_to(source: &mut impl Read, limit: u64, bytes: &mut Vec<u8>) -> std::io::Result<()> {
+    source.take(limit.saturating_add(1)).read_to_end(bytes)?;
+    Ok(())
 }
 
 /// Decompresses `raw` if its first bytes say gzip, and refuses what is no text.
@@ -60,8 +79,13 @@ fn decompress(raw: &[u8], path: &Path) -> Result<Vec<u8>, LogError> {
             });
         }
         let mut decoder = GzDecoder::new(rest);
+        // As with a plain file: what is plainly no log is unpacked no further.
+        let read = read_up_to(&mut decoder, PROBE_BYTES as u64, &mut bytes);
+        if read.is_ok() {
+            refuse_binary(&bytes, path)?;
+        }
         let room = BYTES_MAX.saturating_sub(bytes.len() as u64);
-        let read = decoder.by_ref().take(room + 1).read_to_end(&mut bytes);
+        let read = read.and_then(|()| read_up_to(&mut decoder, room, &mut bytes));
         if bytes.len() as u64 > BYTES_MAX {
             return Err(LogError::TooLarge {
                 path: path.to_path_buf(),

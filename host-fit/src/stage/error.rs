@@ -36,6 +36,14 @@ pub enum StageError {
         /// The folder.
         path: PathBuf,
     },
+    /// More bytes than any stage file has.
+    #[error("{}: more than {limit_bytes} bytes, so no stage file; name a stage.toml", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// How many bytes are read at most.
+        limit_bytes: u64,
+    },
     /// The file is not text.
     #[error("{}: not a text file: byte {offset} is not UTF-8; name a stage.toml, or save it as UTF-8", path.display())]
     NotText {

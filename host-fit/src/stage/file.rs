@@ -11,9 +11,11 @@ use crate::log::layout::LogLayout;
 use runtime::capacitive::ProbePositions;
 use runtime::frame::{CODE_MAGNITUDE_MAX, CodeWindow};
 use runtime::geometry::ProbeCoordinates;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 
+/// Largest stage file that is read: a sound one has a few thousand bytes.
+const BYTES_MAX: u64 = 1 << 20;
 /// Largest distance of a probe from the stage's centre, m: stages of this kind are decimetres.
 pub(super) const COORDINATE_MAX_M: f64 = 10.0;
 /// Smallest full scale of a converter that makes sense, m.
@@ -37,7 +39,11 @@ impl Stage {
     /// # Errors
     /// Every variant of [`StageError`]; each names the file and, inside it, line and key.
     pub fn from_file(path: &Path) -> Result<Self, StageError> {
-        let bytes = std::fs::read(path).map_err(|source| {
+        let mut bytes = Vec::new();
+        // One byte more than is allowed: a device may have no end.
+        let read = std::fs::File::open(path)
+            .and_then(|file| file.take(BYTES_MAX + 1).read_to_end(&mut bytes));
+        read.map_err(|source| {
             if source.kind() == ErrorKind::IsADirectory || path.is_dir() {
                 StageError::IsFolder {
                     path: path.to_path_buf(),
@@ -49,6 +55,12 @@ impl Stage {
                 }
             }
         })?;
+        if bytes.len() as u64 > BYTES_MAX {
+            return Err(StageError::TooLarge {
+                path: path.to_path_buf(),
+                limit_bytes: BYTES_MAX,
+            });
+        }
         let text = String::from_utf8(bytes).map_err(|error| StageError::NotText {
             path: path.to_path_buf(),
             offset: error.utf8_error().valid_up_to(),

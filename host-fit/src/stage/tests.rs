@@ -249,6 +249,9 @@ fn a_file_that_cannot_be_read_is_named() {
         matches!(error, StageError::NotText { offset: 7, .. }),
         "{error}"
     );
+    std::fs::write(&binary, [b'\n'; (1 << 20) + 1]).expect("written");
+    let error = Stage::from_file(&binary).expect_err("too large");
+    assert!(matches!(error, StageError::TooLarge { .. }), "{error}");
 }
 
 proptest! {

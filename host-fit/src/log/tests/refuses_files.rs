@@ -75,6 +75,24 @@ fn binary_files() {
     assert_eq!(place(&error.expect_err("refused")).0, 3);
 }
 
+/// Unpacking stops before the end, where the fault of the gzip stream would show.
+#[test]
+fn a_gzip_file_of_binary_data_is_unpacked_no_further_than_its_start() {
+    let packed = gzip(&[0; 1 << 20]);
+    let error = refused_file(&packed[..packed.len() - 9]);
+    assert!(
+        matches!(error, LogError::Binary { offset: 0, .. }),
+        "{error}"
+    );
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_device_without_end() {
+    let error = read(&["/dev/zero"], stage(), &ReadOptions::default()).expect_err("refused");
+    assert!(matches!(error, LogError::Binary { .. }), "{error}");
+}
+
 #[test]
 fn a_gzip_file_cut_anywhere_damaged_or_followed_by_rubbish() {
     let packed = gzip(LOG.as_bytes());
