@@ -119,7 +119,7 @@ pub struct Fit {
     pub train_fitness: f64,
     /// Rows that the fit used.
     pub train_rows: usize,
-    /// Over all rows, zero deviations refitted, by the target's decoder.
+    /// Over all rows, by the target's decoder; zero deviations refitted where the model has them.
     pub judgement: Judgement,
     /// The same with the solver's own zero deviations.
     pub judgement_solver_zeros: Judgement,
@@ -154,12 +154,7 @@ pub fn fit(
         fit: FitRecord::default(),
     };
     let unjudged = calibration.prepare(&origin).map_err(FitError::Unusable)?;
-    let zeros = if settings.model.has_zero_deviation() {
-        Zeros::Refit
-    } else {
-        Zeros::None
-    };
-    let judgement = judge(&unjudged, dataset, stage, zeros);
+    let judgement = judge(&unjudged, dataset, stage, Zeros::of_model(settings.model));
     check_described(dataset, &judgement.errors, settings.model)?;
     let judgement_solver_zeros = judge(&unjudged, dataset, stage, Zeros::Given(&solution.delta_m));
     let axes = judgement.errors.axes;

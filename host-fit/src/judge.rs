@@ -8,7 +8,7 @@ use crate::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
 use runtime::geometry::ProbeGeometry;
 use runtime::model::Sensitivity;
-use runtime::{Decoder, ParameterSet, PlanarPose};
+use runtime::{Decoder, ModelKind, ParameterSet, PlanarPose};
 
 /// Which zero deviations are taken off before errors are counted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +19,34 @@ pub enum Zeros<'z> {
     Refit,
     /// Given ones, by movement, m at the probes.
     Given(&'z [[f64; 3]]),
+}
+
+impl Zeros<'_> {
+    /// The way to judge a model as it was fitted: refitted where it has zero deviations.
+    pub const fn of_model(model: ModelKind) -> Self {
+        if model.has_zero_deviation() {
+            Self::Refit
+        } else {
+            Self::None
+        }
+    }
+
+    /// How JSON names it: "zero" where none are taken off, else "fit".
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::None => "zero",
+            Self::Refit | Self::Given(_) => "fit",
+        }
+    }
+
+    /// How a title names it.
+    pub const fn words(&self) -> &'static str {
+        match self {
+            Self::None => "no zero deviation taken off",
+            Self::Refit => "zero deviations refitted",
+            Self::Given(_) => "given zero deviations taken off",
+        }
+    }
 }
 
 /// The figures of one parameter set on one dataset.

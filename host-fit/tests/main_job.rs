@@ -111,6 +111,13 @@ fn every_model_and_form_fits_and_richer_models_fit_better() {
             bench.good(&arguments);
             let json = bench.json("p.json");
             assert_eq!(json["model"], model);
+            bench.good("eval p.bin log.csv --stage stage.toml --json eval.json");
+            let eval = bench.json("eval.json");
+            assert_eq!(
+                (&eval["errors"], &eval["delta"]),
+                (&json["errors"], &json["delta"]),
+                "({model}) {project}"
+            );
             let fitness = json["train_fitness"].as_f64().expect("a number");
             if project == "linear" {
                 assert!(

@@ -198,9 +198,9 @@ pub struct EvalArgs {
     /// The stage as designed.
     #[arg(long, value_name = "stage.toml")]
     pub stage: PathBuf,
-    /// Zero deviations.
-    #[arg(long, value_enum, default_value = "fit")]
-    pub delta: DeltaChoice,
+    /// Zero deviations; as the blob's model has them if not given: models (12) and (15) have none.
+    #[arg(long, value_enum)]
+    pub delta: Option<DeltaChoice>,
     /// Write the figures as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,

@@ -21,9 +21,10 @@ pub fn run(args: &EvalArgs) -> Result<(), HostError> {
     let stage = Stage::from_file(&args.stage)?;
     super::same_scales(&set, &stage, &args.stage)?;
     let log = log::read(&args.logs, &stage, &super::EVAL)?;
-    let (zeros, name) = match args.delta {
-        DeltaChoice::Fit => (Zeros::Refit, "fit"),
-        DeltaChoice::Zero => (Zeros::None, "zero"),
+    let zeros = match args.delta {
+        None => Zeros::of_model(set.model),
+        Some(DeltaChoice::Fit) => Zeros::Refit,
+        Some(DeltaChoice::Zero) => Zeros::None,
     };
     let judgement = judge(&set, &log.dataset, &stage, zeros);
     let mut circumstances = super::circumstances(&log, &stage, started);
@@ -40,21 +41,21 @@ pub fn run(args: &EvalArgs) -> Result<(), HostError> {
             judgement.zeros.len()
         ));
     }
-    let report = of_eval(&set, &judgement, name, &circumstances);
+    let report = of_eval(&set, &judgement, zeros, &circumstances);
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
     }
     if !super::is_standard_output(args.json.as_deref()) {
-        let title = match args.delta {
-            DeltaChoice::Fit => "errors, zero deviations refitted",
-            DeltaChoice::Zero => "errors, no zero deviation taken off",
-        };
         super::print(&format!(
             "Model ({}), {} rows in {} movements\n\n{}",
             report.model,
             report.rows,
             report.movements,
-            text::errors(title, &judgement.errors, None)
+            text::errors(
+                &format!("errors, {}", report.zeros_in_words),
+                &judgement.errors,
+                None
+            )
         ))?;
     }
     super::warn(&report.warnings);

@@ -115,7 +115,7 @@ pub fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
         fit.solution.stopped,
         fit.train_fitness,
         text::errors(
-            "errors over all rows, zero deviations refitted",
+            &format!("errors over all rows, {}", report.zeros_in_words),
             &fit.judgement.errors,
             None
         ),
@@ -147,7 +147,7 @@ pub fn write_report(
     let plots = [
         (
             "Errors over the log".to_owned(),
-            plots::errors_over_rows("zero deviations refitted", &errors, &log.dataset)?,
+            plots::errors_over_rows(report.zeros_in_words, &errors, &log.dataset)?,
         ),
         (
             "Distribution of the errors".to_owned(),

@@ -44,7 +44,11 @@ pub fn page(report: &Report, logs: &[String], plots: &[(String, String)]) -> Str
     for warning in &report.warnings {
         let _ = writeln!(out, "<p class=\"warn\">{}</p>", escape(warning));
     }
-    out.push_str("<h2>Errors over all rows, zero deviations refitted</h2>\n<table><tr><th></th><th>rms</th><th>peak</th><th>unit</th></tr>\n");
+    let _ = writeln!(
+        out,
+        "<h2>Errors over all rows, {}</h2>\n<table><tr><th></th><th>rms</th><th>peak</th><th>unit</th></tr>",
+        report.zeros_in_words
+    );
     let e = &report.errors;
     for (name, rms, peak, unit) in [
         ("X", e.x.rmse_um, e.x.peak_um, "um"),

@@ -1,7 +1,7 @@
 //! The machine-readable report of `fit`, `eval` and `inspect`.
 
 use crate::fit::Fit;
-use crate::judge::Judgement;
+use crate::judge::{Judgement, Zeros};
 use crate::parameters::{COUNT, ParameterId, Parameters};
 use crate::stage::Stage;
 use crate::statistics::PoseError;
@@ -157,6 +157,9 @@ pub struct Report {
     pub errors_solver_delta: Option<Errors>,
     /// How zero deviations were treated: "fit" or "zero".
     pub delta: &'static str,
+    /// The same for a title.
+    #[serde(skip)]
+    pub zeros_in_words: &'static str,
     /// By name: lever_arm, theta, eta, a, b, c of the probes a, b, c.
     pub parameters: BTreeMap<String, Parameter>,
     /// H1x .. H3y nearest to the designed ones.
@@ -200,6 +203,7 @@ pub fn of_fit(
     c: &Circumstances,
 ) -> Report {
     let parameters_fitted = &fit.solution.parameters;
+    let zeros = Zeros::of_model(fit.model);
     let mut warnings = c.warnings.clone();
     warnings.extend(fit.warnings.iter().map(ToString::to_string));
     Report {
@@ -218,11 +222,8 @@ pub fn of_fit(
         train_fitness: fit.train_fitness,
         errors: Errors::from(&fit.judgement.errors),
         errors_solver_delta: Some(Errors::from(&fit.judgement_solver_zeros.errors)),
-        delta: if fit.model.has_zero_deviation() {
-            "fit"
-        } else {
-            "zero"
-        },
+        delta: zeros.name(),
+        zeros_in_words: zeros.words(),
         parameters: parameters(parameters_fitted, &fit.uncertainty.standard_error),
         coordinates: c
             .stage
@@ -239,7 +240,7 @@ pub fn of_fit(
 pub fn of_eval(
     set: &ParameterSet,
     judgement: &Judgement,
-    delta: &'static str,
+    zeros: Zeros,
     c: &Circumstances,
 ) -> Report {
     let values = crate::judge::parameters_of(set);
@@ -259,7 +260,8 @@ pub fn of_eval(
         train_fitness: judgement.errors.fitness(),
         errors: Errors::from(&judgement.errors),
         errors_solver_delta: None,
-        delta,
+        delta: zeros.name(),
+        zeros_in_words: zeros.words(),
         parameters: parameters(&values, &[None; COUNT]),
         coordinates: c.stage.designed.nearest_with(&values.geometry).into(),
         serial: set.serial.as_str().to_owned(),
