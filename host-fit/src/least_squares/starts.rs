@@ -2,7 +2,7 @@
 
 use super::coordinates::{Boxed, Coordinates, Gains, parameters_of, point_of};
 use super::descend::{Descent, DescentEnd, descend};
-use super::normal::{Column, Point, best_gain};
+use super::normal::{Column, Point, best_gain, cost};
 use super::scatter::{Offset, Ratios, scatter};
 use crate::parameters::{ParameterId, Parameters, search_box};
 use crate::problem::{Group, Problem};
@@ -87,13 +87,11 @@ impl LeastSquares {
             descent = search.with_clipped_offsets(&boxed, descent);
         }
         let parameters = Parameters::from_array(&descent.unknowns.into());
+        let zeros = zero_deviations(problem, &parameters, &descent.point);
         Ok(Solution {
-            delta_m: zero_deviations(problem, &parameters, &descent.point)
-                .iter()
-                .map(|zero| zero.delta_m)
-                .collect(),
+            delta_m: zeros.iter().map(|zero| zero.delta_m).collect(),
             parameters,
-            cost: descent.cost,
+            cost: search.cost_with(&descent, &zeros),
             evaluations: search.evaluations,
             elapsed: started.elapsed(),
             stopped: format!(
@@ -200,13 +198,33 @@ impl Search<'_, '_> {
         })
     }
 
+    /// The cost with the zero deviations that are reported: where some were clipped it is more
+    /// than that of the free offsets.
+    fn cost_with(&mut self, descent: &Descent, zeros: &[ZeroDeviation]) -> f64 {
+        if zeros.iter().all(|zero| !zero.clipped) {
+            return descent.cost;
+        }
+        let of = |group: &Group| Offset::Fixed(zeros[group.movement].pose.map(|x| x * 1e6));
+        let offsets: Vec<Offset> = self.problem.groups.iter().map(of).collect();
+        self.evaluations += 1;
+        scatter(self.problem, &descent.point.ratios, &offsets).map_or(descent.cost, |sums| {
+            cost(&sums, &descent.point.gain, self.problem.weights)
+        })
+    }
+
     /// Zero deviations as unknowns within their range: those that would leave it are fixed at
-    /// its end and the rest fitted again, until none changes.
+    /// its end and the rest fitted again, until none changes. Clipping is no descent, so the
+    /// best of these fits is kept, the first one included.
     fn with_clipped_offsets(&mut self, boxed: &Boxed, mut descent: Descent) -> Descent {
         let mut offsets = self.offsets.to_vec();
+        let mut best: Option<(f64, Descent)> = None;
         for _ in 0..20 {
             let parameters = Parameters::from_array(&descent.unknowns.into());
             let zeros = zero_deviations(self.problem, &parameters, &descent.point);
+            let cost = self.cost_with(&descent, &zeros);
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, descent.clone()));
+            }
             let mut changed = false;
             for (offset, group) in offsets.iter_mut().zip(&self.problem.groups) {
                 let zero = &zeros[group.movement];
@@ -225,7 +243,7 @@ impl Search<'_, '_> {
             self.evaluations += next.evaluations;
             descent = next;
         }
-        descent
+        best.map_or(descent, |(_, best)| best)
     }
 }
 

@@ -93,6 +93,10 @@ fn gradient_matches_differences_of_the_cost() {
     };
     let mut at = Column::from(truth().to_array());
     at *= 1.01;
+    // Angles that are not small, so that the sign of a sine shows.
+    for (k, theta) in [0.05, -0.04, 0.06].into_iter().enumerate() {
+        at[3 + k] = theta;
+    }
     let cost_at = |p: &Column| {
         let point = boxed.point(p).expect("regular");
         let sums = scatter(&problem, &point.ratios, &offsets).expect("no pole");
@@ -231,6 +235,15 @@ fn a_truth_outside_the_box_ends_on_its_edge_and_is_named() {
     let sums = scatter(&problem, &point.ratios, &offsets).expect("no pole");
     assert!(free.cost < solution.cost);
     assert!(solution.cost < cost(&sums, &point.gain, problem.weights));
+
+    let mut high = stage();
+    high.search.eta[2].low = 0.88;
+    let solution = solve(
+        &Problem::new(&dataset, &all, &high, ModelKind::M31),
+        Projection::Linear,
+    );
+    let names: Vec<String> = solution.at_limit.iter().map(|id| id.name()).collect();
+    assert_eq!(names, ["eta_c"]);
 }
 
 #[test]
@@ -243,7 +256,13 @@ fn zero_deviations_beyond_their_range_are_clipped_as_unknowns() {
     let problem = Problem::new(&dataset, &all, &tight, ModelKind::M31);
     let solution = solve(&problem, Projection::None);
     assert!(solution.delta_m.iter().flatten().all(|d| d.abs() <= 2e-6));
-    assert!(solution.cost > solve(&problem, Projection::Linear).cost);
+    // As unknowns of the fit they cost no more than clipped after it, and more than free.
+    let afterwards = solve(&problem, Projection::Linear);
+    assert!(afterwards.delta_m.iter().flatten().all(|d| d.abs() <= 2e-6));
+    assert!(solution.cost <= afterwards.cost * (1.0 + 1e-6));
+    let wide = stage();
+    let free = Problem::new(&dataset, &all, &wide, ModelKind::M31);
+    assert!(2.0 * solve(&free, Projection::Linear).cost < solution.cost);
 }
 
 #[test]
