@@ -63,3 +63,75 @@ fn stratified(dataset: &Dataset, count: usize, random: &mut impl Rng) -> Vec<usi
     }
     rows
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::Movement;
+    use crate::shipped::STAGE_TOML;
+    use crate::stage::Stage;
+
+    /// A log of movements of these sizes; a draw looks at nothing else of it.
+    fn log(sizes: &[usize]) -> Dataset {
+        let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+        let truth = crate::parameters::Parameters::designed(&stage);
+        let row = crate::synthetic::Protocol::exact(truth, 1)
+            .dataset(&stage)
+            .rows[0];
+        let mut dataset = Dataset::default();
+        for (movement, size) in sizes.iter().enumerate() {
+            let start = dataset.rows.len();
+            dataset.rows.resize(start + size, row);
+            dataset.movements.push(Movement {
+                log: 0,
+                index: movement as i64,
+                rows: start..start + size,
+            });
+        }
+        dataset
+    }
+
+    fn by_movement(dataset: &Dataset, rows: &[usize]) -> Vec<usize> {
+        let of = |m: &Movement| rows.iter().filter(|row| m.rows.contains(row)).count();
+        dataset.movements.iter().map(of).collect()
+    }
+
+    #[test]
+    fn a_stratified_draw_misses_no_movement_while_there_are_rows_enough() {
+        let dataset = log(&[1000, 1000, 2, 1]);
+        for seed in 0..20 {
+            let rows = draw_rows(&dataset, 10, Draw::Stratified, seed);
+            assert_eq!(by_movement(&dataset, &rows), [4, 4, 1, 1], "seed {seed}");
+        }
+        let rows = draw_rows(&dataset, 2, Draw::Stratified, 1);
+        assert_eq!(rows.len(), 2);
+    }
+
+    #[test]
+    fn a_draw_has_no_row_twice_and_its_seed_says_which() {
+        let dataset = log(&[30, 1, 50, 7]);
+        for draw in [Draw::Stratified, Draw::Plain] {
+            for count in 1..=90 {
+                let rows = draw_rows(&dataset, count, draw, 5);
+                assert_eq!(rows.len(), count.min(88));
+                assert!(rows.is_sorted_by(|a, b| a < b) && rows[rows.len() - 1] < 88);
+                assert_eq!(rows, draw_rows(&dataset, count, draw, 5));
+            }
+            let other = draw_rows(&dataset, 20, draw, 6);
+            assert_ne!(draw_rows(&dataset, 20, draw, 5), other);
+        }
+    }
+
+    #[test]
+    fn a_plain_draw_takes_any_row_with_the_same_chance() {
+        let dataset = log(&[10, 30]);
+        let mut times = [0; 40];
+        for seed in 0..4000 {
+            for row in draw_rows(&dataset, 4, Draw::Plain, seed) {
+                times[row] += 1;
+            }
+        }
+        // 400 each, with a standard deviation of 19.
+        assert!(times.iter().all(|n| (300..500).contains(n)), "{times:?}");
+    }
+}

@@ -64,3 +64,36 @@ impl ZeroDeviation {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shipped::STAGE_TOML;
+    use crate::stage::Stage;
+
+    /// Aligned probes with arms 0.1975, -0.1975, -0.36 m and eta 1: a pose offset of (x, y, rz)
+    /// reads y + 0.1975 rz, y - 0.1975 rz, x - 0.36 rz.
+    #[test]
+    fn a_mean_error_becomes_the_deviation_of_each_probe_within_its_range() {
+        let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+        let designed = Parameters::designed(&stage);
+        let range = Range {
+            low: -10e-6,
+            high: 10e-6,
+        };
+        let within = ZeroDeviation::of_mean_error(&designed, [3e-6, 2e-6, 10e-6], &range);
+        for (have, want) in within.delta_m.iter().zip([3.975e-6, 0.025e-6, -0.6e-6]) {
+            assert!((have - want).abs() < 1e-15, "{have:e} {want:e}");
+        }
+        assert!(!within.clipped && within.pose == [3e-6, 2e-6, 10e-6]);
+        // Both ends; what is taken off is then what the clipped ones stand for.
+        let beyond = ZeroDeviation::of_mean_error(&designed, [-30e-6, 40e-6, 0.0], &range);
+        assert_eq!(beyond.delta_m, [10e-6, 10e-6, -10e-6]);
+        assert!(beyond.clipped);
+        for (have, want) in beyond.pose.iter().zip([-10e-6, 10e-6, 0.0]) {
+            assert!((have - want).abs() < 1e-15, "{have:e} {want:e}");
+        }
+        let given = ZeroDeviation::given(&designed, beyond.delta_m);
+        assert_eq!(given.pose, beyond.pose);
+    }
+}

@@ -179,6 +179,25 @@ fn a_log_in_si_columns_other_separators_and_line_ends_gives_the_same_figures() {
 }
 
 #[test]
+fn movements_that_a_plain_draw_misses_are_named_and_a_stratified_one_misses_none() {
+    let bench = Bench::new();
+    bench.write("log.csv", thinned_log(20, |_| true));
+    for (draw, missed) in [("plain", 1), ("stratified", 0)] {
+        bench.good(&format!(
+            "fit log.csv --stage stage.toml --out p.bin --json p.json --train 150 --draw {draw}"
+        ));
+        let json = bench.json("p.json");
+        assert_eq!(json["train_rows"], 150);
+        let warnings = json["warnings"].as_array().expect("a list");
+        let named = warnings
+            .iter()
+            .filter_map(Value::as_str)
+            .filter(|warning| warning.contains("the draw of rows misses"));
+        assert_eq!(named.count(), missed, "{draw}: {warnings:?}");
+    }
+}
+
+#[test]
 fn several_logs_are_fitted_together_and_hashed_in_their_order() {
     let bench = Bench::new();
     bench.write("a.csv", thinned_log(20, |m| m < 30));
