@@ -139,7 +139,7 @@ pub fn fit(
 ) -> Result<Fit, FitError> {
     let count = settings.train.unwrap_or(dataset.rows.len());
     let selected = draw_rows(dataset, count, settings.draw, settings.solver.seed);
-    check_motion(dataset, selected.len(), settings.model)?;
+    check_motion(dataset, stage, selected.len(), settings.model)?;
     let problem = Problem::new(dataset, &selected, stage, settings.model);
     let solution = solver.solve(&problem, &settings.solver)?;
     let uncertainty = uncertainty(&problem, &solution.parameters, &solution.at_limit)

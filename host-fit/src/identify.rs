@@ -1,15 +1,19 @@
 //! Whether a log can determine the model at all, and whether the model describes the log.
 
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, Row};
 use crate::parameters::{ParameterId, Parameters, Quantity, search_box};
 use crate::stage::Stage;
 use crate::statistics::PoseError;
 use crate::uncertainty::Uncertainty;
 use runtime::ModelKind;
+use runtime::model::dot;
 
 /// An axis moves when its span is at least this many times its noise from sample to sample: a
 /// million samples of noise alone span ten times its standard deviation.
 const SPAN_TO_NOISE_MIN: f64 = 20.0;
+/// An axis or probe that spans more than this (m or rad) moves, however coarsely it was sampled:
+/// far apart, samples of a motion differ as those of noise do.
+const SPAN_OF_MOTION: f64 = 20e-6;
 /// A parameter is determined when the error that the motion allows is below this part of its search range.
 const ERROR_TO_RANGE_MAX: f64 = 0.1;
 /// The model describes the log when its rms errors are below this part of the rms motion: the
@@ -51,6 +55,19 @@ pub enum FitFailure {
         parameters: &'static str,
         /// What to record.
         remedy: &'static str,
+    },
+    /// A Hall probe reads nothing but noise while the stage moves.
+    #[error(
+        "Hall probe {probe} does not follow the motion in the log (span {span_micro:.3} um, noise {noise_micro:.3} um): \
+         check the probe, its cable and its column"
+    )]
+    DeadProbe {
+        /// The probe.
+        probe: &'static str,
+        /// Peak-to-peak of its displacement within a movement, um.
+        span_micro: f64,
+        /// Its noise from sample to sample, um.
+        noise_micro: f64,
     },
     /// The log moves, but not so that these parameters show.
     #[error("the log does not determine {what}: {remedy}")]
@@ -115,12 +132,14 @@ const AXES: [(&str, &str, &str, &str); 6] = [
     ),
 ];
 
-/// Refuses a log in which an axis that the model needs does not move.
+/// Refuses a log in which an axis that the model needs does not move, or a probe does not see it.
 ///
 /// # Errors
-/// [`FitFailure::NoMotion`] for the first such axis, [`FitFailure::TooFewRows`].
+/// [`FitFailure::NoMotion`] for the first such axis, [`FitFailure::DeadProbe`] for the first such
+/// probe, [`FitFailure::TooFewRows`].
 pub fn check_motion(
     dataset: &Dataset,
+    stage: &Stage,
     train_rows: usize,
     model: ModelKind,
 ) -> Result<(), FitFailure> {
@@ -139,8 +158,12 @@ pub fn check_motion(
     }
     let axes = if model.has_vertical_terms() { 6 } else { 3 };
     for (axis, &(name, unit, parameters, remedy)) in AXES.iter().enumerate().take(axes) {
-        let (span, noise) = span_and_noise(dataset, axis);
-        if span <= SPAN_TO_NOISE_MIN * noise || span == 0.0 {
+        let (span, noise) = if axis < 3 {
+            span_and_noise(dataset, true, |row| row.reference[axis])
+        } else {
+            span_and_noise(dataset, false, |row| row.vertical[axis - 3])
+        };
+        if stands_still(span, noise) {
             return Err(FitFailure::NoMotion {
                 axis: name,
                 span_micro: span * 1e6,
@@ -151,30 +174,45 @@ pub fn check_motion(
             });
         }
     }
+    let plane = Parameters::designed(stage).geometry.plane_rows();
+    for (k, probe) in ["A", "B", "C"].into_iter().enumerate() {
+        let (span, noise) = span_and_noise(dataset, true, |row| row.signal_m[k]);
+        let (moved, _) = span_and_noise(dataset, true, |row| dot(&plane[k], row.reference));
+        if stands_still(span, noise) && moved > SPAN_OF_MOTION {
+            return Err(FitFailure::DeadProbe {
+                probe,
+                span_micro: span * 1e6,
+                noise_micro: noise * 1e6,
+            });
+        }
+    }
     Ok(())
 }
 
-/// Peak-to-peak of an axis (X, Y, Rz within movements, since offsets differ between them; Z, Rx,
-/// Ry over the log) and the median over movements of its noise from sample to sample.
-fn span_and_noise(dataset: &Dataset, axis: usize) -> (f64, f64) {
-    let value = |row: &crate::dataset::Row| {
-        if axis < 3 {
-            row.reference[axis]
-        } else {
-            row.vertical[axis - 3]
-        }
-    };
+fn stands_still(span: f64, noise: f64) -> bool {
+    span == 0.0 || (span <= SPAN_TO_NOISE_MIN * noise && span <= SPAN_OF_MOTION)
+}
+
+/// Peak-to-peak of a value (within movements where offsets differ between them, as for X, Y, Rz
+/// and the probes; else over the log) and the median over movements of its noise from sample to
+/// sample.
+fn span_and_noise(
+    dataset: &Dataset,
+    within_movements: bool,
+    value: impl Fn(&Row) -> f64,
+) -> (f64, f64) {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut span: f64 = 0.0;
     let mut noises = Vec::new();
     for movement in &dataset.movements {
         let rows = &dataset.rows[movement.rows.clone()];
-        if axis < 3 {
+        if within_movements {
             (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
         }
         for row in rows {
-            low = low.min(value(row));
-            high = high.max(value(row));
+            let value = value(row);
+            low = low.min(value);
+            high = high.max(value);
         }
         span = span.max(high - low);
         let steps: f64 = rows
