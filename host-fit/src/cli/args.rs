@@ -47,7 +47,7 @@ pub enum Command {
 /// Arguments of `demo`.
 #[derive(Debug, Args)]
 pub struct DemoArgs {
-    /// Where to write params.bin, pose.csv and the report; a temporary folder if not given.
+    /// Where to leave log, stage.toml, params.bin and pose.csv; a temporary folder if not given.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Also print the zero deviation of each movement (Table A1).

@@ -130,7 +130,18 @@ fn write_json(report: &impl serde::Serialize, path: &Path) -> Result<(), HostErr
 
 /// Refuses outputs that would replace an input, or each other.
 fn keep_apart(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<(), HostError> {
-    let place = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    // A file that is not there yet is known by its folder and its name.
+    let new = |path: &Path| {
+        let folder = match path.parent()? {
+            parent if parent.as_os_str().is_empty() => Path::new("."),
+            parent => parent,
+        };
+        Some(folder.canonicalize().ok()?.join(path.file_name()?))
+    };
+    let place = |path: &Path| {
+        let there = path.canonicalize().ok().or_else(|| new(path));
+        there.unwrap_or_else(|| path.to_owned())
+    };
     let mut taken: Vec<_> = inputs.iter().map(|path| place(path)).collect();
     for output in outputs.iter().flatten() {
         let here = place(output);
