@@ -176,6 +176,15 @@ fn an_output_that_cannot_be_written_is_refused_and_the_old_one_stays() {
         3,
         &["no/such"],
     );
+    // None of the outputs is written when one of them cannot be.
+    bench.write("file", "");
+    for output in ["--json no/such/p.json", "--report file"] {
+        let arguments = format!("fit log.csv --stage stage.toml --out p.bin {output}");
+        bench.bad(&arguments, 3, &["folder"]);
+        assert!(!common::exists(&bench.path("p.bin")), "{output}");
+    }
+    let twice = "fit log.csv --stage stage.toml --out p.bin --json ./p.bin";
+    bench.bad(twice, 2, &["another output"]);
     std::fs::create_dir(bench.path("p.bin")).expect("a folder");
     bench.bad("fit log.csv --stage stage.toml --out p.bin", 3, &["p.bin"]);
     bench.write("old.bin", "old");
@@ -262,6 +271,37 @@ fn a_log_that_cannot_identify_the_model_ends_with_status_4_and_no_blob() {
     assert!(bench.holds_only(&["constant.csv", "height.csv", "no_tilt.csv", "only_y.csv"]));
     // The same log is good enough for a model without vertical terms.
     bench.good("fit height.csv --stage stage.toml --out p.bin --model 30");
+}
+
+#[test]
+fn a_probe_that_reads_the_same_whatever_the_stage_does_is_named() {
+    let bench = Bench::new();
+    let dead = thinned_log(20, |_| true)
+        .lines()
+        .map(|line| match line.rsplit_once(',') {
+            Some((cells, c)) if c.parse::<i32>().is_ok() => format!("{cells},7\n"),
+            _ => format!("{line}\n"),
+        })
+        .collect::<String>();
+    bench.write("dead.csv", dead);
+    let parts = ["Hall probe C does not follow the motion", "its cable"];
+    bench.bad("fit dead.csv --stage stage.toml --out p.bin", 4, &parts);
+}
+
+/// 40 ms apart, samples of a movement differ by a tenth of it.
+#[test]
+fn a_coarsely_sampled_log_of_one_long_movement_moves() {
+    let bench = Bench::new();
+    let whole = thinned_log(20, |_| true);
+    let mut joined = String::new();
+    for (k, line) in whole.lines().enumerate() {
+        match line.splitn(3, ',').nth(2) {
+            Some(rest) if k > 0 => joined.push_str(&format!("0,{},{rest}\n", k * 2000)),
+            _ => joined.push_str(&format!("{line}\n")),
+        }
+    }
+    bench.write("long.csv", joined);
+    bench.good("fit long.csv --stage stage.toml --out p.bin");
 }
 
 #[test]

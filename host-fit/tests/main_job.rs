@@ -188,6 +188,12 @@ fn movements_that_a_plain_draw_misses_are_named_and_a_stratified_one_misses_none
         ));
         let json = bench.json("p.json");
         assert_eq!(json["train_rows"], 150);
+        // The zero deviations that the few rows gave fit all rows worse than refitted ones.
+        let rms = |errors: &Value| errors["x"]["rmse_um"].as_f64().expect("a number");
+        assert!(
+            rms(&json["errors_solver_delta"]) > 1.02 * rms(&json["errors"]),
+            "{draw}"
+        );
         let warnings = json["warnings"].as_array().expect("a list");
         let named = warnings
             .iter()

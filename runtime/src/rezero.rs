@@ -254,6 +254,10 @@ mod tests {
         assert!(
             matches!(state, RezeroState::Refused(RezeroRefusal::Drifted { axis: 0, drift }) if drift > 1.9e-6)
         );
+        let state = run(500, |k| f32::from(k) * -8e-9);
+        assert!(
+            matches!(state, RezeroState::Refused(RezeroRefusal::Drifted { axis: 0, drift }) if drift < -1.9e-6)
+        );
     }
 
     #[test]
