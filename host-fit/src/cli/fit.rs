@@ -40,10 +40,10 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
     };
     // Before the work, so that no blob is left without the figures that were asked for.
     output::check_writable(&args.out)?;
-    if let Some(path) = &args.json {
-        if !super::is_standard_output(Some(path)) {
-            output::check_writable(path)?;
-        }
+    if let Some(path) = &args.json
+        && !super::is_standard_output(Some(path))
+    {
+        output::check_writable(path)?;
     }
     if let Some(folder) = args.report.as_deref().filter(|folder| folder.exists()) {
         output::make_folder(folder)?;
