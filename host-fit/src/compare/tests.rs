@@ -10,7 +10,7 @@ fn comparison() -> Comparison {
         seeds: 2,
         train: Some(60),
         draw: Draw::Stratified,
-        evaluations: 3_000,
+        evaluations: 12_000,
         population: 30,
     }
 }
@@ -25,7 +25,7 @@ fn every_solver_runs_on_every_form_with_every_seed_at_equal_evaluations() {
     for run in &runs {
         assert!(run.fitness >= run.floor * (1.0 - 1e-6), "{run:?}");
         if run.solver != LEAST_SQUARES {
-            assert!((3_000..3_060).contains(&run.evaluations));
+            assert!((12_000..12_060).contains(&run.evaluations));
         }
     }
     let summaries = summaries(&runs);
