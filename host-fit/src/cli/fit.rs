@@ -31,6 +31,7 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
     ];
     super::keep_apart(&outputs, &inputs)?;
     super::use_threads(args.threads);
+    interrupt::watch();
     let stage = Stage::from_file(&args.stage)?;
     let options = ReadOptions {
         bad_rows: match args.bad_rows {
