@@ -6,6 +6,7 @@ use crate::fit::{Fit, FitSettings, calibration, fit};
 use crate::judge::{Zeros, judge};
 use crate::log::{self, ReadOptions};
 use crate::parameters::{COUNT, Parameters};
+use crate::population::default_size;
 use crate::shipped::{LOG_GZ, STAGE_TOML};
 use crate::solver::{Projection, Solver, SolverOptions};
 use crate::stage::Stage;
@@ -145,6 +146,7 @@ pub fn run(folder: &Path, solver: &dyn Solver) -> Result<Demo, HostError> {
 }
 
 fn settings(model: ModelKind) -> FitSettings {
+    let (population, generations) = default_size(Projection::Linear);
     FitSettings {
         model,
         train: None,
@@ -152,8 +154,8 @@ fn settings(model: ModelKind) -> FitSettings {
         solver: SolverOptions {
             projection: Projection::Linear,
             seed: 1,
-            population: 100,
-            generations: 100,
+            population,
+            generations,
         },
         serial: Text::default(),
         created: Text::default(),

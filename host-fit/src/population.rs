@@ -23,13 +23,29 @@ use std::time::Instant;
 
 /// Rows for a search that a least-squares fit finishes.
 const FEW_ROWS: usize = 400;
-/// Such a search ends when its best cost falls by less than this share ...
-const STALL_DECLINE: f64 = 1e-4;
-/// ... over so many generations.
-const STALL_GENERATIONS: usize = 8;
+/// When a search that is finished by least squares has found the right neighbourhood.
+const NEAR: Stall = Stall {
+    generations: 8,
+    relative_decline: 1e-4,
+};
+/// When a search on the form `linear` is at the optimum: to 5e-7 of the fitness on each of 200
+/// seeds tried.
+const EXACT: Stall = Stall {
+    generations: 20,
+    relative_decline: 1e-7,
+};
 
 /// Name of SHTLBO with a least-squares finish.
 pub const FINISHED: &str = "shtlbo-lm";
+
+/// Np and Gm for a form if the user names none: those of the paper, but for `linear`, whose nine
+/// unknowns want a smaller population, and as many generations as it takes.
+pub const fn default_size(projection: Projection) -> (usize, usize) {
+    match projection {
+        Projection::None | Projection::Delta => (100, 100),
+        Projection::Linear => (16, 1000),
+    }
+}
 
 /// A population search, with or without a least-squares finish.
 #[derive(Clone, Debug)]
@@ -62,26 +78,26 @@ impl PopulationSolver {
     }
 
     fn search(&self, form: &Form<'_>, problem: &Problem<'_>, options: &SolverOptions) -> Outcome {
-        let known: Vec<Vec<f64>> = self
-            .known
-            .iter()
-            .map(|known| form.individual(known, problem))
-            .collect();
+        let known = self.known.iter();
+        let mut first: Vec<Vec<f64>> = known.map(|p| form.individual(p, problem)).collect();
+        first.extend(form.first_population(options.population, options.seed));
         let settings = Settings {
             seed: options.seed,
             start: Start {
                 population: options.population,
-                individuals: &known,
+                individuals: &first,
             },
             ..Settings::default()
         };
-        let stall = Stall {
-            generations: STALL_GENERATIONS,
-            relative_decline: STALL_DECLINE,
+        // The other forms fall in steps with long rests between them.
+        let stall = match (self.finish, options.projection) {
+            (true, _) => Some(NEAR),
+            (false, Projection::Linear) => Some(EXACT),
+            (false, Projection::None | Projection::Delta) => None,
         };
         let criteria = StopCriteria {
             generations: Some(options.generations),
-            stall: self.finish.then_some(stall),
+            stall,
             interrupt: self.interrupt,
             ..StopCriteria::default()
         };

@@ -145,12 +145,13 @@ pub struct FitArgs {
     /// How rows are drawn.
     #[arg(long, value_enum, default_value = "stratified")]
     pub draw: Draw,
-    /// Individuals of a population.
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(4..=100_000))]
-    pub population: u32,
-    /// Generations of a population.
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
-    pub generations: u32,
+    /// Individuals of a population: 100 as in the paper, or 16 with --project linear.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=100_000))]
+    pub population: Option<u32>,
+    /// Generations of a population: 100 as in the paper; with --project linear at most 1000,
+    /// fewer once the fitness hardly falls any more.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub generations: Option<u32>,
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,

@@ -5,6 +5,7 @@ use crate::error::HostError;
 use crate::fit::{Fit, FitSettings, fit};
 use crate::log::{BadRows, LogReading, ReadOptions};
 use crate::parameters::Parameters;
+use crate::population::default_size;
 use crate::report::json::{Report, of_fit};
 use crate::report::{html, plots, text};
 use crate::solver::SolverOptions;
@@ -30,6 +31,7 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
     ];
     super::keep_apart(&outputs, &inputs)?;
     super::use_threads(args.threads);
+    interrupt::watch();
     let stage = Stage::from_file(&args.stage)?;
     let options = ReadOptions {
         bad_rows: match args.bad_rows {
@@ -54,6 +56,7 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
         None => None,
     };
     let solver = super::solver(&args.solver, known)?;
+    let (population, generations) = default_size(args.project);
     let settings = FitSettings {
         model: args.model.kind(),
         train: match args.train {
@@ -64,8 +67,8 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
         solver: SolverOptions {
             projection: args.project,
             seed: args.seed,
-            population: args.population as usize,
-            generations: args.generations as usize,
+            population: args.population.map_or(population, |n| n as usize),
+            generations: args.generations.map_or(generations, |n| n as usize),
         },
         serial: args.serial.clone().unwrap_or_default(),
         created: args.created.clone().unwrap_or_default(),

@@ -1,7 +1,7 @@
 //! Convergence and course of p: every generation as CSV, medians over the seeds as SVG.
 
-use super::Run;
 use super::summary::Spread;
+use super::{ARRIVED, EXACT, Run};
 use crate::report::plots::PlotError;
 use crate::search::kind::SearchKind;
 use crate::solver::Projection;
@@ -15,21 +15,24 @@ const POINTS: usize = 160;
 const SIZE: (u32, u32) = (900, 520);
 
 /// Every run in one line: `form,solver,seed,fitness,floor,evaluations,nan_costs,elapsed_s,
-/// evaluations_to_floor,x_rms_um,y_rms_um,rz_rms_urad`; empty where there is none.
+/// evaluations_to_1_percent,evaluations_to_floor,x_rms_um,y_rms_um,rz_rms_urad`; empty where there is none.
 pub fn runs_csv(runs: &[Run]) -> String {
     let mut text = String::from(
-        "form,solver,seed,fitness,floor,evaluations,nan_costs,elapsed_s,evaluations_to_floor,\
-         x_rms_um,y_rms_um,rz_rms_urad\n",
+        "form,solver,seed,fitness,floor,evaluations,nan_costs,elapsed_s,\
+         evaluations_to_1_percent,evaluations_to_floor,x_rms_um,y_rms_um,rz_rms_urad\n",
     );
     for run in runs {
-        let arrived = run.arrived_after().map_or(String::new(), |n| n.to_string());
+        let [arrived, exact] = [ARRIVED, EXACT].map(|share| {
+            let evaluations = run.evaluations_to(share);
+            evaluations.map_or(String::new(), |n| n.to_string())
+        });
         let rms = run.rms.map_or([(); 3].map(|()| String::new()), |rms| {
             rms.map(|x| x.to_string())
         });
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{},{:.6},{arrived},{}",
+            "{},{},{},{},{},{},{},{:.6},{arrived},{exact},{}",
             run.form.name(),
             run.solver,
             run.seed,

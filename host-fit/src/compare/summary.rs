@@ -1,6 +1,6 @@
 //! Medians and spreads over the seeds, and the table of a comparison.
 
-use super::{ARRIVED, LEAST_SQUARES, Run};
+use super::{ARRIVED, EXACT, LEAST_SQUARES, Run};
 use crate::search::kind::SearchKind;
 use crate::solver::Projection;
 use std::fmt::Write;
@@ -32,6 +32,30 @@ impl Spread {
     }
 }
 
+/// The seeds that came within a share of the floor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrival {
+    /// How many.
+    pub seeds: usize,
+    /// Median of the evaluations to there, over these seeds.
+    pub evaluations: Option<f64>,
+    /// Median of the time to there, s.
+    pub seconds: Option<f64>,
+}
+
+impl Arrival {
+    fn of(runs: &[Run], share: f64) -> Self {
+        let evaluations = || runs.iter().filter_map(|run| run.evaluations_to(share));
+        let seconds = runs.iter().filter_map(|run| run.seconds_to(share));
+        let median = |spread: Spread| spread.median;
+        Self {
+            seeds: evaluations().count(),
+            evaluations: Spread::of(evaluations().map(|n| n as f64)).map(median),
+            seconds: Spread::of(seconds).map(median),
+        }
+    }
+}
+
 /// All seeds of one solver on one form.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
@@ -45,12 +69,10 @@ pub struct Summary {
     pub fitness: Spread,
     /// rms of X, Y, Rz over all rows, um, um, urad; `None` where no seed could be decoded.
     pub rms: [Option<Spread>; 3],
-    /// Seeds that arrived within 1 % of the floor.
-    pub arrived: usize,
-    /// Median of evaluations to there, over the seeds that arrived.
-    pub evaluations_to_floor: Option<f64>,
-    /// Median of the time to there, s.
-    pub seconds_to_floor: Option<f64>,
+    /// How many seeds came within 1 % of the floor, and how soon.
+    pub arrived: Arrival,
+    /// How many came to the floor itself, and how soon.
+    pub exact: Arrival,
     /// Median time of an evaluation, s.
     pub seconds_per_evaluation: f64,
 }
@@ -63,12 +85,7 @@ pub fn summaries(runs: &[Run]) -> Vec<Summary> {
 
 fn summary(runs: &[Run]) -> Option<Summary> {
     let first = runs.first()?;
-    let arrived: Vec<&Run> = runs
-        .iter()
-        .filter(|r| r.arrived_after().is_some())
-        .collect();
     let rms = |axis: usize| Spread::of(runs.iter().filter_map(|run| Some(run.rms?[axis])));
-    let median = |numbers: Vec<f64>| Spread::of(numbers).map(|spread| spread.median);
     let each = |r: &Run| r.elapsed_s / r.evaluations.max(1) as f64;
     Some(Summary {
         form: first.form,
@@ -76,31 +93,31 @@ fn summary(runs: &[Run]) -> Option<Summary> {
         seeds: runs.len(),
         fitness: Spread::of(runs.iter().map(|run| run.fitness))?,
         rms: [rms(0), rms(1), rms(2)],
-        arrived: arrived.len(),
-        evaluations_to_floor: median(
-            arrived
-                .iter()
-                .filter_map(|run| Some(run.arrived_after()? as f64))
-                .collect(),
-        ),
-        seconds_to_floor: median(arrived.iter().filter_map(|r| r.arrived_after_s()).collect()),
-        seconds_per_evaluation: median(runs.iter().map(each).collect())?,
+        arrived: Arrival::of(runs, ARRIVED),
+        exact: Arrival::of(runs, EXACT),
+        seconds_per_evaluation: Spread::of(runs.iter().map(each))?.median,
     })
 }
 
 /// The table in Markdown.
 pub fn table(summaries: &[Summary]) -> String {
-    let mut text = format!(
+    let mut text = String::from(
         "| form | solver | steps | train fitness: median (range) | X rms, um | Y rms, um | Rz rms, urad \
-         | within {:.0} % of the floor | evaluations to there | ms to there | us per evaluation |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|\n",
-        ARRIVED * 100.0
+         | within 1 % of the floor: seeds, evaluations, ms | at the floor (1e-6): seeds, evaluations, ms \
+         | us per evaluation |\n\
+         |---|---|---|---|---|---|---|---|---|---|\n",
     );
     for s in summaries {
         let rms = |axis: usize| s.rms[axis].map_or("-".to_owned(), |rms| figure(rms.median));
         let source = SearchKind::by_name(s.solver).map_or("least squares", SearchKind::source);
-        let to_floor = |number: Option<f64>, scale: f64, decimals: usize| {
-            number.map_or("-".to_owned(), |x| format!("{:.decimals$}", x * scale))
+        let arrival = |arrival: &Arrival| match (arrival.evaluations, arrival.seconds) {
+            (Some(evaluations), Some(seconds)) => format!(
+                "{} of {}, {evaluations:.0}, {:.2}",
+                arrival.seeds,
+                s.seeds,
+                seconds * 1e3
+            ),
+            _ => format!("0 of {}", s.seeds),
         };
         // Least squares counts passes over the rows, which are not evaluations of the fitness.
         let per_evaluation = if s.solver == LEAST_SQUARES {
@@ -111,7 +128,7 @@ pub fn table(summaries: &[Summary]) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "| {} | {} | {source} | {} ({} to {}) | {} | {} | {} | {} of {} | {} | {} | {per_evaluation} |",
+            "| {} | {} | {source} | {} ({} to {}) | {} | {} | {} | {} | {} | {per_evaluation} |",
             s.form.name(),
             s.solver,
             figure(s.fitness.median),
@@ -120,10 +137,8 @@ pub fn table(summaries: &[Summary]) -> String {
             rms(0),
             rms(1),
             rms(2),
-            s.arrived,
-            s.seeds,
-            to_floor(s.evaluations_to_floor, 1.0, 0),
-            to_floor(s.seconds_to_floor, 1e3, 2),
+            arrival(&s.arrived),
+            arrival(&s.exact),
         );
     }
     text

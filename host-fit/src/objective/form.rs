@@ -68,6 +68,15 @@ impl<'a> Form<'a> {
             Self::Linear(cost) => cost.individual(parameters),
         }
     }
+
+    /// The first individuals of a search, as far as the form has a better idea than uniform
+    /// draws from the box: none but for `linear`.
+    pub fn first_population(&self, count: usize, seed: u64) -> Vec<Vec<f64>> {
+        match self {
+            Self::Full(_) | Self::Delta(_) => Vec::new(),
+            Self::Linear(cost) => cost.first_population(count, seed),
+        }
+    }
 }
 
 /// The best zero deviation of each movement of the log within its range, m; zero for movements

@@ -19,6 +19,7 @@ use crate::least_squares::normal::Point;
 use crate::parameters::Parameters;
 use crate::problem::{Problem, TrainRow};
 use crate::search::cost::CostFunction;
+use crate::search::random::{Phase, RandomSource, RandomStreams, SeededStreams};
 use crate::stage::Range;
 use nalgebra::Matrix3;
 
@@ -139,6 +140,27 @@ impl<'a> LinearCost<'a> {
             gain: Matrix3::from_fn(|i, j| gain[i][j].0[0]),
             ratios: [0, 1, 2].map(|k| [ratios[3 * k], ratios[3 * k + 1], ratios[3 * k + 2]]),
         })
+    }
+
+    /// The first `count` individuals of a search: uniform draws from the box, each shrunk towards
+    /// zero slopes by the cube of a uniform number. Stages lie near zero: a probe that changes its
+    /// sensitivity by a tenth over the log fills a tenth of each range, and all nine of a
+    /// billionth of the box.
+    pub fn first_population(&self, count: usize, seed: u64) -> Vec<Vec<f64>> {
+        let streams = SeededStreams::new(seed);
+        let draw = |k: usize| {
+            let mut random = streams.stream(0, Phase::Start, k);
+            let u = random.uniform();
+            let shrink = u * u * u;
+            let number = |range: &Range| {
+                // Zero, or the end that is nearest to it.
+                let centre = range.clip(0.0);
+                let drawn = range.low + random.uniform() * range.width();
+                centre + shrink * (drawn - centre)
+            };
+            self.bounds.iter().map(number).collect()
+        };
+        (0..count).map(draw).collect()
     }
 
     /// An individual with the ratios of these parameters, for a warm start.

@@ -34,6 +34,10 @@ impl Bench {
         std::fs::read(self.path(name)).expect("read")
     }
 
+    pub fn text(&self, name: &str) -> String {
+        String::from_utf8(self.read(name)).expect("text")
+    }
+
     pub fn json(&self, name: &str) -> serde_json::Value {
         serde_json::from_slice(&self.read(name)).expect("JSON")
     }
@@ -44,11 +48,15 @@ impl Bench {
     }
 
     pub fn run_args(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_host-fit"))
-            .args(arguments)
-            .current_dir(self.folder.path())
-            .output()
-            .expect("the program runs")
+        let mut command = self.command(arguments);
+        command.output().expect("the program runs")
+    }
+
+    /// The program with its arguments, not yet started.
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_host-fit"));
+        command.args(arguments).current_dir(self.folder.path());
+        command
     }
 
     /// Runs the program, which must succeed.

@@ -1,0 +1,128 @@
+//! The population searches through the command line, on the log that ships with the program.
+
+mod common;
+
+use common::Bench;
+use serde_json::Value;
+
+fn bench() -> Bench {
+    let bench = Bench::new();
+    bench.write("log.csv.gz", host_fit::shipped::LOG_GZ);
+    bench
+}
+
+fn number(json: &Value, key: &str) -> f64 {
+    json[key].as_f64().expect("a number")
+}
+
+#[test]
+fn the_papers_experiment_runs_and_ends_far_above_the_floor() {
+    let bench = bench();
+    let fit = "fit log.csv.gz --stage stage.toml --out p.bin --json fit.json --solver shtlbo \
+               --project none --train 200 --draw plain --seed 3";
+    bench.good(fit);
+    let json = bench.json("fit.json");
+    assert_eq!(json["evaluations"], 20_100);
+    assert_eq!(json["train_rows"], 200);
+    assert_eq!(
+        (&json["solver"], &json["project"]),
+        (&"shtlbo".into(), &"none".into())
+    );
+    let fitness = number(&json, "train_fitness");
+    assert!((3.0..15.0).contains(&fitness), "{fitness}");
+    // With its own zero deviations it is worse than with refitted ones.
+    let rms = |key: &str| number(&json[key]["y"], "rmse_um");
+    assert!(rms("errors_solver_delta") > rms("errors"));
+}
+
+#[test]
+fn shtlbo_on_the_linear_form_is_exact_at_any_thread_count() {
+    let bench = bench();
+    let fit = "fit log.csv.gz --stage stage.toml --train 200 --seed 2";
+    bench.good(&format!("{fit} --solver lm --out lm.bin --json lm.json"));
+    bench.good(&format!(
+        "{fit} --solver shtlbo --threads 1 --out one.bin --json shtlbo.json"
+    ));
+    bench.good(&format!("{fit} --solver shtlbo --threads 2 --out two.bin"));
+    assert_eq!(bench.read("one.bin"), bench.read("two.bin"));
+    let [exact, found] =
+        ["lm.json", "shtlbo.json"].map(|name| number(&bench.json(name), "train_fitness"));
+    assert!((found / exact - 1.0).abs() < 5e-7, "{found} and {exact}");
+}
+
+#[test]
+fn the_default_gives_the_least_squares_blob_with_any_seed() {
+    let bench = bench();
+    let fit = "fit log.csv.gz --stage stage.toml";
+    bench.good(&format!("{fit} --solver lm --out lm.bin --json lm.json"));
+    let exact = number(&bench.json("lm.json"), "train_fitness");
+    for seed in 1..=3 {
+        bench.good(&format!("{fit} --seed {seed} --out p.bin --json p.json"));
+        let json = bench.json("p.json");
+        assert_eq!(json["solver"], "shtlbo-lm");
+        let found = number(&json, "train_fitness");
+        assert!(
+            (found / exact - 1.0).abs() < 1e-9,
+            "seed {seed}: {found} and {exact}"
+        );
+    }
+}
+
+#[test]
+fn a_warm_start_continues_from_a_blob() {
+    let bench = bench();
+    let fit = "fit log.csv.gz --stage stage.toml --train 200 --project none";
+    bench.good(&format!("{fit} --solver lm --out lm.bin"));
+    bench.good(&format!(
+        "{fit} --solver shtlbo --generations 2 --start lm.bin --out p.bin --json p.json"
+    ));
+    let fitness = number(&bench.json("p.json"), "train_fitness");
+    assert!(fitness < 1.3, "{fitness}");
+}
+
+#[test]
+fn compare_prints_its_table_and_writes_curves() {
+    let bench = bench();
+    let printed = bench.good(
+        "compare log.csv.gz --stage stage.toml --project delta,linear --solvers shtlbo,de --seeds 2 \
+         --evaluations 3000 --population 30 --out report",
+    );
+    let table = common::stdout(&printed);
+    assert_eq!(table.lines().count(), 2 + 2 * 3);
+    for row in ["| delta | lm |", "| delta | shtlbo |", "| linear | de |"] {
+        assert!(table.contains(row), "{row}");
+    }
+    assert_eq!(bench.text("report/table.md"), table);
+    for name in ["convergence-delta.svg", "p-linear.svg"] {
+        assert!(
+            bench.text(&format!("report/{name}")).contains("shtlbo"),
+            "{name}"
+        );
+    }
+    assert_eq!(bench.text("report/runs.csv").lines().count(), 1 + 2 * 3 * 2);
+    assert!(bench.text("report/history.csv").lines().count() > 8 * 50);
+}
+
+/// Ctrl-C ends a search that would take hours, with status 130 and a usable blob.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_the_best_so_far() {
+    let bench = bench();
+    let fit = "fit log.csv.gz --stage stage.toml --out p.bin --solver shtlbo --project delta \
+               --train 200 --generations 10000000";
+    let mut running = bench
+        .command(&fit.split_whitespace().collect::<Vec<_>>())
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .expect("host-fit starts");
+    let id = running.id().to_string();
+    std::thread::sleep(std::time::Duration::from_secs(3));
+    let sent = std::process::Command::new("kill")
+        .args(["-INT", &id])
+        .status();
+    assert!(sent.expect("kill runs").success());
+    let ended = running.wait().expect("host-fit ends");
+    assert_eq!(ended.code(), Some(130));
+    bench.good("inspect p.bin");
+}
