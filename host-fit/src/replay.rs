@@ -144,7 +144,7 @@ pub fn run(args: &ReplayArgs) -> Result<Replayed, ReplayError> {
     send(frames, layout, args.rate, &bus, &stop)
 }
 
-fn choose_layout(choice: LayoutChoice, stage: &Stage) -> Result<Layout, ReplayError> {
+pub(crate) fn choose_layout(choice: LayoutChoice, stage: &Stage) -> Result<Layout, ReplayError> {
     let (hall, gaps) = (stage.hall.window, stage.capacitive.window);
     // The rails themselves are sent too: the receiver marks them.
     let low = hall.low.min(gaps.low) - 1;
