@@ -12,6 +12,7 @@
 
 use crate::blob_file::BlobFileError;
 use crate::fit::FitError;
+use crate::import::ImportError;
 use crate::live::LiveError;
 use crate::log::LogError;
 use crate::output::OutputError;
@@ -77,6 +78,9 @@ pub enum HostError {
     /// The fit failed its own checks: nothing was written.
     #[error("the fit failed its own checks, and no parameter blob was written: {0}")]
     Fit(#[from] FitError),
+    /// `import` refused its input.
+    #[error(transparent)]
+    Import(#[from] ImportError),
     /// `live` ended early.
     #[error(transparent)]
     Live(#[from] LiveError),
@@ -105,6 +109,7 @@ impl HostError {
             | Self::Json(_)
             | Self::NoTemporaryFolder(_)
             | Self::Standard(_)
+            | Self::Import(_)
             | Self::Live(_)
             | Self::Replay(_)
             | Self::Output(_) => 3,

@@ -114,7 +114,4 @@ pub enum LiveError {
     /// The record's file cannot be made.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// Ctrl-C cannot be caught.
-    #[error("cannot catch Ctrl-C: {0}")]
-    Signal(#[from] ctrlc::Error),
 }

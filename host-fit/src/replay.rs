@@ -3,6 +3,7 @@
 mod pace;
 
 use crate::dataset::{Dataset, LoggedFrame};
+use crate::interrupt;
 use crate::live::{Bus, BusError};
 use crate::log::{self, LogError, ReadOptions};
 use crate::stage::{Stage, StageError};
@@ -11,7 +12,6 @@ use hal_adapters::can::{BusFrame, Layout, sensor};
 use pace::Pacer;
 use runtime::RawFrame;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -93,9 +93,6 @@ pub enum ReplayError {
         /// Rows that were sent.
         rows: usize,
     },
-    /// Ctrl-C cannot be caught.
-    #[error("cannot catch Ctrl-C: {0}")]
-    Signal(#[from] ctrlc::Error),
 }
 
 /// How a replay went.
@@ -138,13 +135,10 @@ pub fn run(args: &ReplayArgs) -> Result<Replayed, ReplayError> {
         .get(..args.rows.unwrap_or(usize::MAX))
         .unwrap_or(&frames);
     let bus = Bus::open(&args.can, &[]).map_err(|cause| ReplayError::Bus { cause, rows: 0 })?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let stopped = Arc::clone(&stop);
-    ctrlc::set_handler(move || stopped.store(true, Ordering::Relaxed))?;
-    send(frames, layout, args.rate, &bus, &stop)
+    send(frames, layout, args.rate, &bus, interrupt::watch())
 }
 
-fn choose_layout(choice: LayoutChoice, stage: &Stage) -> Result<Layout, ReplayError> {
+pub(crate) fn choose_layout(choice: LayoutChoice, stage: &Stage) -> Result<Layout, ReplayError> {
     let (hall, gaps) = (stage.hall.window, stage.capacitive.window);
     // The rails themselves are sent too: the receiver marks them.
     let low = hall.low.min(gaps.low) - 1;

@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::import::ImportArgs;
 use crate::live::LiveArgs;
 use crate::replay::ReplayArgs;
 use crate::search::kind::SearchKind;
@@ -42,6 +43,8 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Compare the solvers on one or more logs, over several seeds at equal evaluations.
     Compare(CompareArgs),
+    /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
+    Import(Box<ImportArgs>),
 }
 
 /// Arguments of `demo`.

@@ -9,6 +9,7 @@ mod fit;
 mod inspect;
 
 use crate::error::HostError;
+use crate::import::ImportArgs;
 use crate::interrupt;
 use crate::least_squares::starts::LeastSquares;
 use crate::log::{LogReading, ReadOptions, ReferenceUse};
@@ -71,6 +72,7 @@ pub fn main() -> ExitCode {
         Command::Live(args) => crate::live::run(args).map_err(HostError::from),
         Command::Replay(args) => replay(args),
         Command::Compare(args) => compare::run(args),
+        Command::Import(args) => import(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -93,6 +95,12 @@ fn replay(args: &ReplayArgs) -> Result<(), HostError> {
         done.logged_s / done.elapsed_s,
         done.late_max_s * 1e3
     ))
+}
+
+/// Joins a record of the bus and a reference, and says how it went.
+fn import(args: &ImportArgs) -> Result<(), HostError> {
+    let report = crate::import::run(args)?;
+    print(&format!("{report}wrote {}\n", args.out.display()))
 }
 
 /// Writes to standard output. A reader that has gone away, as `head` does, is no error.

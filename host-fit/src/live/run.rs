@@ -5,10 +5,9 @@ use super::node::{Node, NodeSettings};
 use super::record::Record;
 use super::rhythm::{Pace, Rhythm};
 use super::{Bus, BusError, LiveArgs, LiveError};
-use crate::blob_file;
+use crate::{blob_file, interrupt};
 use hal_adapters::can::{BusFault, BusFrame, Coded, Layout, StampedFrame, Timing};
 use runtime::{OnInvalid, ParameterSet, Reading};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -44,9 +43,7 @@ pub fn run(args: &LiveArgs) -> Result<(), LiveError> {
         Some(path) => Some(Record::create(path, &args.can)?),
         None => None,
     };
-    let stop = Arc::new(AtomicBool::new(false));
-    let stopped = Arc::clone(&stop);
-    ctrlc::set_handler(move || stopped.store(true, Ordering::Relaxed))?;
+    let stop = interrupt::watch();
     let decoder = set.decoder();
     let mut session = Session {
         node: Node::new(&decoder, &set.serial, &settings),
@@ -63,7 +60,7 @@ pub fn run(args: &LiveArgs) -> Result<(), LiveError> {
         is_down: false,
     };
     let end = args.duration.map(Duration::from_secs_f64);
-    let ended = session.until(&stop, end, args.every);
+    let ended = session.until(stop, end, args.every);
     // What was recorded is kept whatever ended the run.
     let flushed = session.record.as_mut().map_or(Ok(()), Record::flush);
     session.show();

@@ -1,0 +1,192 @@
+//! Lines of a candump log to ticks, by the receiver that a controller has.
+
+use super::{ImportArgs, ImportError, text};
+use hal_adapters::can::{BusFault, BusHealth, Layout, SensorReceiver, StampedFrame, Timing};
+use hal_adapters::candump::{LineError, LogLine};
+use runtime::RawFrame;
+use runtime::frame::MISSING_CODE;
+use std::path::Path;
+
+/// A whole tick of a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BusTick {
+    /// Its number, lost ticks counted.
+    pub sequence: u64,
+    /// Whether the sensor node counted on from the tick before.
+    pub follows: bool,
+    /// When its first frame was received, us.
+    pub received_us: u64,
+    /// Hall codes of A, B, C.
+    pub hall: [i32; 3],
+    /// Capacitive codes 1, 2, 3.
+    pub capacitive: [i32; 3],
+}
+
+/// What a record held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BusCounts {
+    /// Lines with a frame.
+    pub frames: usize,
+    /// Lines that were left out because they cannot be read.
+    pub bad_lines: usize,
+    /// Lines that hold no classic data frame: error frames, CAN FD.
+    pub other_lines: usize,
+    /// Whole ticks.
+    pub ticks: usize,
+    /// Ticks missing between them, those that were not whole included.
+    pub ticks_missing: u64,
+    /// Places where ticks are missing.
+    pub gaps: usize,
+    /// What the receiver noticed.
+    pub health: BusHealth,
+}
+
+/// The ticks of a record.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BusReading {
+    /// Whole ticks, in order.
+    pub ticks: Vec<BusTick>,
+    /// What else there was.
+    pub counts: BusCounts,
+}
+
+/// A recorded tick may have been delayed as a whole: what is missing shows by the counters.
+const TIMING: Timing = Timing {
+    assembly_us: 20_000,
+    stale_us: u32::MAX / 4,
+};
+
+/// Reads a record.
+///
+/// # Errors
+/// `Unreadable`, `BadLine`, `NotText`, `SeveralInterfaces`, `NoTicks`.
+pub fn read(args: &ImportArgs, layout: Layout) -> Result<BusReading, ImportError> {
+    let path = args.bus.as_path();
+    let bytes = text::read(path)?;
+    let mut collector = Collector {
+        receiver: SensorReceiver::new(layout, TIMING),
+        reading: BusReading::default(),
+        last: None,
+        restarted: false,
+    };
+    let mut interface = args.interface.clone();
+    for (line, bytes) in (1..).zip(bytes.split(|b| *b == b'\n')) {
+        let bytes = bytes.trim_ascii();
+        if bytes.is_empty() {
+            continue;
+        }
+        let not_text = |_| ImportError::NotText {
+            path: path.to_owned(),
+            line,
+        };
+        let parsed = match std::str::from_utf8(bytes) {
+            Ok(text) => LogLine::parse(text),
+            Err(_) if args.skip_bad_lines => Err(LineError::BadTime),
+            Err(error) => return Err(not_text(error)),
+        };
+        match parsed {
+            Ok(found) => {
+                if chosen(&mut interface, &found, args, path, line)? {
+                    collector.take(&found.stamped());
+                }
+            }
+            Err(LineError::ErrorFrame | LineError::FlexibleDataRate) => {
+                collector.reading.counts.other_lines += 1;
+            }
+            Err(_) if args.skip_bad_lines => collector.reading.counts.bad_lines += 1,
+            Err(fault) => {
+                return Err(ImportError::BadLine {
+                    path: path.to_owned(),
+                    line,
+                    fault,
+                });
+            }
+        }
+    }
+    collector.finish(path)
+}
+
+/// Whether a frame belongs to the interface that is read; the first one's, if none was named.
+fn chosen(
+    interface: &mut Option<String>,
+    found: &LogLine<'_>,
+    args: &ImportArgs,
+    path: &Path,
+    line: usize,
+) -> Result<bool, ImportError> {
+    match interface {
+        None => *interface = Some(found.interface.to_owned()),
+        Some(name) if name == found.interface => {}
+        Some(_) if args.interface.is_some() => return Ok(false),
+        Some(name) => {
+            return Err(ImportError::SeveralInterfaces {
+                path: path.to_owned(),
+                line,
+                interface: name.clone(),
+                other: found.interface.to_owned(),
+            });
+        }
+    }
+    Ok(true)
+}
+
+struct Collector {
+    receiver: SensorReceiver,
+    reading: BusReading,
+    last: Option<u32>,
+    restarted: bool,
+}
+
+impl Collector {
+    fn take(&mut self, stamped: &StampedFrame) {
+        self.reading.counts.frames += 1;
+        // The receiver's times wrap after 71 minutes.
+        let taken = self.receiver.take(&stamped.frame, stamped.time_us as u32);
+        self.restarted |= matches!(
+            taken.fault,
+            Some(BusFault::SenderRestarted | BusFault::WrongSequence { .. })
+        );
+        if let Some(tick) = taken.tick {
+            self.tick(&tick, stamped.time_us);
+        }
+    }
+
+    fn tick(&mut self, raw: &RawFrame, now_us: u64) {
+        let whole = !raw
+            .hall
+            .iter()
+            .chain(&raw.capacitive)
+            .any(|c| *c == MISSING_CODE);
+        if !whole {
+            return;
+        }
+        let ahead = self.last.map_or(0, |last| raw.sequence.wrapping_sub(last));
+        self.last = Some(raw.sequence);
+        let counts = &mut self.reading.counts;
+        counts.ticks += 1;
+        if ahead > 1 {
+            counts.gaps += 1;
+            counts.ticks_missing += u64::from(ahead - 1);
+        }
+        let before = self.reading.ticks.last().map_or(0, |t| t.sequence);
+        let age_us = (now_us as u32).wrapping_sub(raw.time_us);
+        self.reading.ticks.push(BusTick {
+            sequence: before + u64::from(ahead),
+            follows: !core::mem::take(&mut self.restarted),
+            received_us: now_us.saturating_sub(age_us.into()),
+            hall: raw.hall,
+            capacitive: raw.capacitive,
+        });
+    }
+
+    fn finish(mut self, path: &Path) -> Result<BusReading, ImportError> {
+        self.reading.counts.health = *self.receiver.health();
+        if self.reading.ticks.is_empty() {
+            return Err(ImportError::NoTicks {
+                path: path.to_owned(),
+                frames: self.reading.counts.frames,
+            });
+        }
+        Ok(self.reading)
+    }
+}
