@@ -120,6 +120,16 @@ pub struct Dataset {
 }
 
 impl Dataset {
+    /// How to name a movement: its number, after the name of its log where there are several.
+    pub fn movement_name(&self, movement: &Movement) -> String {
+        match self.logs.get(movement.log) {
+            Some(log) if self.logs.len() > 1 => {
+                format!("{}:{}", log.path.display(), movement.index)
+            }
+            _ => movement.index.to_string(),
+        }
+    }
+
     /// The movements whose rows `keep` wants, numbered anew; logs and hash stay those of the
     /// whole.
     #[must_use]

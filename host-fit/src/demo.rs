@@ -182,18 +182,18 @@ fn pose_file_errors(
     let mut sums = ErrorSums::default();
     for movement in &dataset.movements {
         let pairs = movement.rows.clone().zip(&poses[movement.rows.clone()]);
-        let errors: Vec<[f64; 3]> = pairs
+        let errors: Vec<(usize, [f64; 3])> = pairs
             .filter_map(|(row, pose)| {
                 let decoded = pose.reading.planar()?.to_array();
                 let reference = dataset.rows[row].reference;
-                Some([0, 1, 2].map(|k| f64::from(decoded[k]) - reference[k]))
+                Some((row, [0, 1, 2].map(|k| f64::from(decoded[k]) - reference[k])))
             })
             .collect();
         let n = errors.len().max(1) as f64;
-        let mean = [0, 1, 2].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / n);
+        let mean = [0, 1, 2].map(|k| errors.iter().map(|(_, e)| e[k]).sum::<f64>() / n);
         let zero = ZeroDeviation::of_mean_error(parameters, mean, &stage.search.delta_m);
-        for error in errors {
-            sums.add([0, 1, 2].map(|k| error[k] - zero.pose[k]));
+        for (row, error) in errors {
+            sums.add(row, [0, 1, 2].map(|k| error[k] - zero.pose[k]));
         }
     }
     Ok(sums.finish())

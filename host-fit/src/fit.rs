@@ -10,6 +10,7 @@ use crate::parameters::{ParameterId, Parameters};
 use crate::problem::Problem;
 use crate::solver::{Solution, SolveError, Solver, SolverOptions};
 use crate::stage::Stage;
+use crate::statistics::AxisError;
 use crate::train::{Draw, draw_rows};
 use crate::uncertainty::{Uncertainty, uncertainty};
 use runtime::calibration::Origin;
@@ -69,8 +70,36 @@ pub enum FitWarning {
         movements.len(), join(movements)
     )]
     MovementsMissed {
-        /// Their numbers in the log.
-        movements: Vec<i64>,
+        /// Their names, by [`Dataset::movement_name`].
+        movements: Vec<String>,
+    },
+    /// Several vertical terms stand at an end of their range.
+    #[error(
+        "{count} of the nine vertical terms stand at an end of their range: check the order and the signs of the \
+         capacitive sensors in the log and in stage.toml"
+    )]
+    VerticalTermsAtLimit {
+        /// How many.
+        count: usize,
+    },
+    /// An error is far larger than noise makes it.
+    #[error(
+        "the largest error, {error_micro:.1} {unit} in {axis}, is {ratio:.0} times the rms: see movement {movement} at \
+         t_us = {t_us}. If the row is wrong, take it out of the log and fit again"
+    )]
+    WildRow {
+        /// The axis.
+        axis: &'static str,
+        /// um or urad.
+        unit: &'static str,
+        /// The error, um or urad.
+        error_micro: f64,
+        /// The error over the rms of its axis.
+        ratio: f64,
+        /// The movement, by [`Dataset::movement_name`].
+        movement: String,
+        /// Its time in the log, us.
+        t_us: i64,
     },
     /// Rows that the decoder refused count in no error.
     #[error("{rows} rows have codes that the decoder refuses; they are not part of the errors")]
@@ -80,10 +109,10 @@ pub enum FitWarning {
     },
 }
 
-fn join(numbers: &[i64]) -> String {
-    let shown: Vec<String> = numbers.iter().take(10).map(i64::to_string).collect();
-    let dots = if numbers.len() > 10 { ", ..." } else { "" };
-    shown.join(", ") + dots
+fn join(names: &[String]) -> String {
+    const SHOWN: usize = 10;
+    let dots = if names.len() > SHOWN { ", ..." } else { "" };
+    names[..names.len().min(SHOWN)].join(", ") + dots
 }
 
 /// Why there is no calibration.
@@ -144,18 +173,30 @@ pub fn fit(
     let solution = solver.solve(&problem, &settings.solver)?;
     let uncertainty = uncertainty(&problem, &solution.parameters, &solution.at_limit)
         .ok_or(SolveError::NoUsableStart)?;
-    check_determined(stage, &solution.parameters, &uncertainty)?;
-
     let calibration = calibration(dataset, stage, settings.model, &solution.parameters);
+    let determined = check_determined(
+        stage,
+        &solution.parameters,
+        &uncertainty,
+        calibration.calibrated_vertical,
+    );
     let mut origin = Origin {
         serial: settings.serial.clone(),
         created: settings.created.clone(),
         logs_sha256: dataset.sha256,
         fit: FitRecord::default(),
     };
-    let unjudged = calibration.prepare(&origin).map_err(FitError::Unusable)?;
+    let unjudged = match calibration.prepare(&origin) {
+        Ok(set) => set,
+        Err(error) => {
+            determined?;
+            return Err(FitError::Unusable(error));
+        }
+    };
     let judgement = judge(&unjudged, dataset, stage, Zeros::of_model(settings.model));
+    // First this: a log that the model does not describe determines nothing, but for that reason.
     check_described(dataset, &judgement.errors, settings.model)?;
+    determined?;
     let judgement_solver_zeros = judge(&unjudged, dataset, stage, Zeros::Given(&solution.delta_m));
     let axes = judgement.errors.axes;
     origin.fit = FitRecord {
@@ -192,6 +233,15 @@ fn warnings(
             warnings.push(FitWarning::AtLimit { id, value });
         }
     }
+    let vertical = solution
+        .at_limit
+        .iter()
+        .filter(|id| id.quantity.is_vertical())
+        .count();
+    if vertical > 1 {
+        warnings.push(FitWarning::VerticalTermsAtLimit { count: vertical });
+    }
+    warnings.extend(wild_row(dataset, judgement));
     let clipped = judgement.zeros.iter().filter(|zero| zero.clipped).count();
     if clipped > 0 {
         warnings.push(FitWarning::ZeroDeviationClipped {
@@ -207,7 +257,9 @@ fn warnings(
         .iter()
         .zip(&dataset.movements)
         .filter(|(present, _)| !**present);
-    let missed: Vec<i64> = missed.map(|(_, movement)| movement.index).collect();
+    let missed: Vec<String> = missed
+        .map(|(_, movement)| dataset.movement_name(movement))
+        .collect();
     if problem.model.has_zero_deviation() && !missed.is_empty() {
         warnings.push(FitWarning::MovementsMissed { movements: missed });
     }
@@ -217,6 +269,31 @@ fn warnings(
         });
     }
     warnings
+}
+
+/// In a million rows of noise alone the largest is five times the rms.
+const PEAK_TO_RMS_MAX: f64 = 8.0;
+
+/// The row with the largest error in terms of its axis' rms, if that is too large for noise.
+fn wild_row(dataset: &Dataset, judgement: &Judgement) -> Option<FitWarning> {
+    const AXES: [(&str, &str); 3] = [("X", "um"), ("Y", "um"), ("Rz", "urad")];
+    let axes = AXES.into_iter().zip(judgement.errors.axes);
+    let ((axis, unit), error) = axes.max_by(|(_, a), (_, b)| {
+        let ratio = |e: &AxisError| e.peak / e.rms.max(f64::MIN_POSITIVE);
+        ratio(a).total_cmp(&ratio(b))
+    })?;
+    if error.peak <= PEAK_TO_RMS_MAX * error.rms {
+        return None;
+    }
+    let row = dataset.rows.get(error.peak_row)?;
+    Some(FitWarning::WildRow {
+        axis,
+        unit,
+        error_micro: error.peak * 1e6,
+        ratio: error.peak / error.rms,
+        movement: dataset.movement_name(dataset.movements.get(row.movement)?),
+        t_us: row.t_us,
+    })
 }
 
 /// The calibration that `parameters` make with the stage's scales, vouched for over the motion

@@ -227,7 +227,21 @@ fn span_and_noise(
     (span, noises.get(noises.len() / 2).copied().unwrap_or(0.0))
 }
 
-/// Refuses a fit whose parameters the log leaves open.
+/// An error that does no harm, however narrow the search range: one per cent of sensitivity, of
+/// a radian or of a lever arm of a quarter metre: one per cent of a motion.
+fn tolerable(id: ParameterId, vertical_span: [f64; 3]) -> f64 {
+    const PART: f64 = 0.01;
+    match id.quantity {
+        Quantity::LeverArm => PART * 0.25,
+        Quantity::Misalignment | Quantity::Eta => PART,
+        Quantity::PerZ => PART / vertical_span[0],
+        Quantity::PerRx => PART / vertical_span[1],
+        Quantity::PerRy => PART / vertical_span[2],
+    }
+}
+
+/// Refuses a fit whose parameters the log leaves open; `vertical_span` is the largest magnitude
+/// of Z, Rx, Ry in the log (m, rad, rad).
 ///
 /// # Errors
 /// [`FitFailure::NotDetermined`] with every such parameter.
@@ -235,6 +249,7 @@ pub fn check_determined(
     stage: &Stage,
     parameters: &Parameters,
     uncertainty: &Uncertainty,
+    vertical_span: [f64; 3],
 ) -> Result<(), FitFailure> {
     let ranges = search_box(stage, parameters.geometry.misalignment_rad);
     let mut what = Vec::new();
@@ -242,7 +257,8 @@ pub fn check_determined(
     for (k, id) in ParameterId::all().enumerate() {
         let open = uncertainty.undetermined.contains(&id);
         let error = uncertainty.motion_error[k];
-        if !open && error <= ERROR_TO_RANGE_MAX * ranges[k].width() {
+        let useless = ERROR_TO_RANGE_MAX * ranges[k].width();
+        if !open && (error <= useless || error <= tolerable(id, vertical_span)) {
             continue;
         }
         what.push(if open {
@@ -261,13 +277,11 @@ pub fn check_determined(
         "record independent {}, with larger amplitude or more rows",
         remedies.join(", ")
     );
-    let vertical = |id: ParameterId| {
-        matches!(
-            id.quantity,
-            Quantity::PerZ | Quantity::PerRx | Quantity::PerRy
-        )
-    };
-    if uncertainty.undetermined.iter().any(|id| vertical(*id)) {
+    if uncertainty
+        .undetermined
+        .iter()
+        .any(|id| id.quantity.is_vertical())
+    {
         remedy.push_str("; without vertical motion use --model 30");
     }
     Err(FitFailure::NotDetermined {

@@ -110,9 +110,9 @@ pub fn judge(set: &ParameterSet, dataset: &Dataset, stage: &Stage, zeros: Zeros)
                 ZeroDeviation::given(&parameters, delta)
             }),
         };
-        for error in errors {
+        for (row, error) in movement.rows.clone().zip(errors) {
             match error {
-                Some(error) => sums.add(std::array::from_fn(|k| error[k] - zero.pose[k])),
+                Some(error) => sums.add(row, std::array::from_fn(|k| error[k] - zero.pose[k])),
                 None => undecoded += 1,
             }
         }

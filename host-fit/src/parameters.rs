@@ -28,6 +28,13 @@ pub enum Quantity {
     PerRy,
 }
 
+impl Quantity {
+    /// Whether it is a change of sensitivity with the vertical pose.
+    pub const fn is_vertical(self) -> bool {
+        matches!(self, Self::PerZ | Self::PerRx | Self::PerRy)
+    }
+}
+
 /// One parameter: what it is, and of which probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParameterId {

@@ -6,8 +6,7 @@
 //! then the starts of the least-squares fit on all rows. So the result is the least-squares
 //! optimum whatever the seed, and the search guards against a start that leads nowhere.
 
-use crate::least_squares::coordinates::{Boxed, Coordinates};
-use crate::least_squares::normal::Column;
+use crate::least_squares::coordinates::Boxed;
 use crate::least_squares::starts::{LeastSquares, thinned};
 use crate::objective::delta::DeltaCost;
 use crate::objective::form::{Form, best_delta_m};
@@ -194,18 +193,16 @@ pub fn solution_of(
         stage: problem.stage,
         model: problem.model,
     };
-    let unknowns = Column::from(best.to_array());
-    let mut clipped = unknowns;
+    let mut parameters = best;
     let mut fitness = found.cost;
     // The linear form knows no box of lever arms, angles and eta: bring its result back.
     if let Form::Linear(_) = form {
-        clipped = boxed.clip(unknowns);
-        if clipped != unknowns {
+        parameters = boxed.clipped(&best);
+        if parameters != best {
             let delta = DeltaCost::new(problem);
-            fitness = delta.cost(&delta.individual(&Parameters::from_array(&clipped.into())));
+            fitness = delta.cost(&delta.individual(&parameters));
         }
     }
-    let parameters = Parameters::from_array(&clipped.into());
     let own = form.own_delta_m(&found.best);
     Ok(Solution {
         delta_m: own.unwrap_or_else(|| best_delta_m(problem, &parameters)),
@@ -217,7 +214,7 @@ pub fn solution_of(
             "{}; {} of {} evaluations had no cost",
             found.reason, found.nan_costs, found.evaluations
         ),
-        at_limit: boxed.at_limit(&clipped),
+        at_limit: boxed.at_limit(&parameters),
     })
 }
 

@@ -7,6 +7,8 @@ pub struct AxisError {
     pub rms: f64,
     /// Largest magnitude, m or rad.
     pub peak: f64,
+    /// The row of the peak.
+    pub peak_row: usize,
 }
 
 /// Errors of X, Y, Rz.
@@ -23,16 +25,19 @@ pub struct PoseError {
 pub struct ErrorSums {
     squares: [f64; 3],
     peaks: [f64; 3],
+    peak_rows: [usize; 3],
     rows: usize,
 }
 
 impl ErrorSums {
-    /// Takes the error of one row: m, m, rad.
-    pub fn add(&mut self, error: [f64; 3]) {
-        let sums = self.squares.iter_mut().zip(&mut self.peaks);
-        for ((square, peak), error) in sums.zip(error) {
-            *square += error * error;
-            *peak = peak.max(error.abs());
+    /// Takes the error of one row: m, m, rad; `row` is its number in the log.
+    pub fn add(&mut self, row: usize, error: [f64; 3]) {
+        for (axis, error) in error.into_iter().enumerate() {
+            self.squares[axis] += error * error;
+            if error.abs() > self.peaks[axis] {
+                self.peaks[axis] = error.abs();
+                self.peak_rows[axis] = row;
+            }
         }
         self.rows += 1;
     }
@@ -44,6 +49,7 @@ impl ErrorSums {
             axes: std::array::from_fn(|axis| AxisError {
                 rms: (self.squares[axis] / n).sqrt(),
                 peak: self.peaks[axis],
+                peak_row: self.peak_rows[axis],
             }),
             rows: self.rows,
         }
@@ -65,11 +71,12 @@ mod tests {
     #[test]
     fn rms_and_peak_of_errors_worked_by_hand() {
         let mut sums = ErrorSums::default();
-        sums.add([3e-6, -1e-6, 0.0]);
-        sums.add([-4e-6, 1e-6, 6e-6]);
+        sums.add(4, [3e-6, -1e-6, 0.0]);
+        sums.add(7, [-4e-6, 1e-6, 6e-6]);
         let error = sums.finish();
         assert!((error.axes[0].rms - 12.5e-12f64.sqrt()).abs() < 1e-18);
         assert_eq!(error.axes[0].peak, 4e-6);
+        assert_eq!(error.axes.map(|a| a.peak_row), [7, 4, 7]);
         assert!((error.axes[1].rms - 1e-6).abs() < 1e-18);
         assert_eq!(error.axes[2].peak, 6e-6);
         // (12.5 + 1 + 18) / 3

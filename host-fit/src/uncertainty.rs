@@ -6,7 +6,7 @@
 //! [`BLOCK_S`] within them. Where independence would give the larger figure that one is taken,
 //! so that a chance cancellation within few clusters promises nothing.
 
-use crate::least_squares::coordinates::{Boxed, Coordinates, point_of};
+use crate::least_squares::coordinates::{Boxed, Coordinates, parameter_jacobian, point_of};
 use crate::least_squares::normal::{Column, Point, Square, gram, residual_products};
 use crate::least_squares::scatter::{Offset, Q, Scatter, U, origin, regressors, scatter};
 use crate::parameters::{COUNT, ParameterId, Parameters};
@@ -53,18 +53,16 @@ pub fn uncertainty(
         stage: problem.stage,
         model: problem.model,
     };
-    let chain = coordinates.jacobian(&parameters.to_array().into(), &point);
+    let chain = parameter_jacobian(parameters, &point);
     let weights = Matrix3::from_diagonal(&problem.weights.into());
     let to_parameters = |x: Square| chain.transpose() * x * chain;
     let curvature = to_parameters(gram(&sums, &point.gain, &weights));
     let clustered = to_parameters(clustered_scores(problem, &point, offset)?);
     let independent = to_parameters(independent_scores(problem, &sums, &point, &weights));
 
+    let may_change = coordinates.free();
     let free: Vec<usize> = (0..COUNT)
-        .filter(|&k| {
-            let id = ParameterId::at(k);
-            id.is_free_in(problem.model) && !held.contains(&id)
-        })
+        .filter(|&k| may_change[k] && !held.contains(&ParameterId::at(k)))
         .collect();
     let (inverse, undetermined) = pseudo_inverse(&curvature, &free);
     // What the fit itself used up: unknowns and zero deviations.

@@ -205,11 +205,10 @@ fn same_scales(set: &ParameterSet, stage: &Stage, path: &Path) -> Result<(), Hos
 }
 
 /// What the reports say of the logs.
-fn circumstances<'s>(log: &LogReading, stage: &'s Stage, started: Instant) -> Circumstances<'s> {
+fn circumstances<'s>(log: &'s LogReading, stage: &'s Stage, started: Instant) -> Circumstances<'s> {
     Circumstances {
         stage,
-        rows: log.dataset.rows.len(),
-        movements: log.dataset.movements.len(),
+        dataset: &log.dataset,
         skipped_rows: log.skipped_rows,
         elapsed_s: started.elapsed().as_secs_f64(),
         warnings: log.warnings.iter().map(ToString::to_string).collect(),

@@ -5,7 +5,7 @@
 
 use super::normal::{Column, Point, Square};
 use crate::parameters::{COUNT, ParameterId, Parameters, search_box};
-use crate::stage::Stage;
+use crate::stage::{Range, Stage};
 use nalgebra::{Matrix3, RowVector3};
 use runtime::ModelKind;
 use runtime::geometry::{ProbeGeometry, inverse_rows, matrix};
@@ -64,7 +64,8 @@ impl Coordinates for Gains {
     }
 }
 
-/// The 18 parameters within their search box.
+/// The 18 parameters within their search box. In place of a lever arm stands where it lies in its
+/// range, 0 to 1: the range moves with the misalignment, so only then is the box a box.
 #[derive(Clone, Copy, Debug)]
 pub struct Boxed<'a> {
     /// Search ranges.
@@ -73,75 +74,141 @@ pub struct Boxed<'a> {
     pub model: ModelKind,
 }
 
+/// Step for the derivative of the ends of a lever arm's range, rad: they are sums of sines.
+const RANGE_STEP_RAD: f64 = 1e-5;
+
 impl Boxed<'_> {
-    /// The free parameters that stand at an end of their range.
-    pub fn at_limit(&self, unknowns: &Column) -> Vec<ParameterId> {
+    /// The unknowns of parameters.
+    pub fn unknowns(&self, parameters: &Parameters) -> Column {
+        let ranges = search_box(self.stage, parameters.geometry.misalignment_rad);
+        let mut unknowns = Column::from(parameters.to_array());
+        for k in 0..3 {
+            let width = ranges[k].width();
+            let place = (unknowns[k] - ranges[k].low) / width;
+            unknowns[k] = if width > 0.0 { place } else { 0.0 };
+        }
+        unknowns
+    }
+
+    /// The parameters of unknowns.
+    pub fn parameters(&self, unknowns: &Column) -> Parameters {
         let ranges = search_box(self.stage, [unknowns[3], unknowns[4], unknowns[5]]);
+        let mut p: [f64; COUNT] = (*unknowns).into();
+        for k in 0..3 {
+            p[k] = ranges[k].low + unknowns[k] * ranges[k].width();
+        }
+        Parameters::from_array(&p)
+    }
+
+    /// The nearest parameters within the box.
+    pub fn clipped(&self, parameters: &Parameters) -> Parameters {
+        let mut p = parameters.to_array();
+        for theta in &mut p[3..6] {
+            *theta = self.stage.search.theta_rad.clip(*theta);
+        }
+        let ranges = search_box(self.stage, [p[3], p[4], p[5]]);
+        for (k, (p, range)) in p.iter_mut().zip(ranges).enumerate() {
+            if ParameterId::at(k).is_free_in(self.model) {
+                *p = range.clip(*p);
+            }
+        }
+        Parameters::from_array(&p)
+    }
+
+    /// The free parameters that stand at an end of their range. A range without width fixes its
+    /// parameter, as the user asked, and is not one of them.
+    pub fn at_limit(&self, parameters: &Parameters) -> Vec<ParameterId> {
+        let ranges = search_box(self.stage, parameters.geometry.misalignment_rad);
+        let values = parameters.to_array();
+        let edges = ranges.iter().zip(values).map(|(range, value)| {
+            let edge = 1e-9 * range.width();
+            value <= range.low + edge || value >= range.high - edge
+        });
+        let free = self.free();
         ParameterId::all()
-            .enumerate()
-            .filter(|&(k, id)| {
-                let edge = 1e-12 * ranges[k].width();
-                id.is_free_in(self.model)
-                    && (unknowns[k] <= ranges[k].low + edge || unknowns[k] >= ranges[k].high - edge)
-            })
-            .map(|(_, id)| id)
+            .zip(edges)
+            .zip(free)
+            .filter(|((_, at_edge), free)| *at_edge && *free)
+            .map(|((id, _), _)| id)
             .collect()
     }
 }
 
 impl Coordinates for Boxed<'_> {
     fn point(&self, unknowns: &Column) -> Option<Point> {
-        point_of(&Parameters::from_array(&(*unknowns).into()))
+        point_of(&self.parameters(unknowns))
     }
 
     fn jacobian(&self, unknowns: &Column, point: &Point) -> Square {
-        let p = Parameters::from_array(&(*unknowns).into());
-        let eta = p.eta();
-        // PM^-1 = G diag(eta).
-        let inverse = Matrix3::from_fn(|i, j| point.gain[(i, j)] * eta[j]);
-        let mut out = Square::zeros();
-        for probe in 0..3 {
-            let (sin, cos) = p.geometry.misalignment_rad[probe].sin_cos();
-            let turned = if probe < 2 {
-                RowVector3::new(-cos, -sin, 0.0)
-            } else {
-                RowVector3::new(-sin, cos, 0.0)
-            };
-            let turned = turned * point.gain;
-            for i in 0..3 {
-                for j in 0..3 {
-                    let gain = 3 * i + j;
-                    out[(gain, probe)] = -inverse[(i, probe)] * point.gain[(2, j)];
-                    out[(gain, 3 + probe)] = -inverse[(i, probe)] * turned[j];
-                }
-                out[(3 * i + probe, 6 + probe)] = -point.gain[(i, probe)] / eta[probe];
-            }
-            for k in 0..3 {
-                let ratio = 9 + 3 * probe + k;
-                out[(ratio, 9 + 3 * k + probe)] = 1.0 / eta[probe];
-                out[(ratio, 6 + probe)] = -point.ratios[probe][k] / eta[probe];
+        let p = self.parameters(unknowns);
+        let mut chain = parameter_jacobian(&p, point);
+        let theta = p.geometry.misalignment_rad;
+        let ranges = search_box(self.stage, theta);
+        let before = search_box(self.stage, theta.map(|t| t - RANGE_STEP_RAD));
+        let after = search_box(self.stage, theta.map(|t| t + RANGE_STEP_RAD));
+        for k in 0..3 {
+            let slope =
+                |at: fn(&Range) -> f64| (at(&after[k]) - at(&before[k])) / (2.0 * RANGE_STEP_RAD);
+            let arm_per_theta = slope(|range| range.low) + unknowns[k] * slope(Range::width);
+            for row in 0..COUNT {
+                let per_arm = chain[(row, k)];
+                chain[(row, 3 + k)] += per_arm * arm_per_theta;
+                chain[(row, k)] = per_arm * ranges[k].width();
             }
         }
-        out
+        chain
     }
 
     fn free(&self) -> [bool; COUNT] {
-        std::array::from_fn(|k| ParameterId::at(k).is_free_in(self.model))
+        // Away from zero, where both coordinates of a probe count in its lever arm.
+        let ranges = search_box(self.stage, [0.1; 3]);
+        std::array::from_fn(|k| {
+            ParameterId::at(k).is_free_in(self.model) && ranges[k].width() > 0.0
+        })
     }
 
     fn clip(&self, mut unknowns: Column) -> Column {
-        let free = self.free();
-        for k in 3..6 {
-            unknowns[k] = self.stage.search.theta_rad.clip(unknowns[k]);
-        }
-        let ranges = search_box(self.stage, [unknowns[3], unknowns[4], unknowns[5]]);
+        let ranges = search_box(self.stage, [0.0; 3]);
         for k in 0..COUNT {
-            if free[k] {
+            if k < 3 {
+                unknowns[k] = unknowns[k].clamp(0.0, 1.0);
+            } else if ParameterId::at(k).is_free_in(self.model) {
                 unknowns[k] = ranges[k].clip(unknowns[k]);
             }
         }
         unknowns
     }
+}
+
+/// Derivative of x = (G, r) with respect to the 18 parameters, at the point that they mean.
+pub fn parameter_jacobian(p: &Parameters, point: &Point) -> Square {
+    let eta = p.eta();
+    // PM^-1 = G diag(eta).
+    let inverse = Matrix3::from_fn(|i, j| point.gain[(i, j)] * eta[j]);
+    let mut out = Square::zeros();
+    for probe in 0..3 {
+        let (sin, cos) = p.geometry.misalignment_rad[probe].sin_cos();
+        let turned = if probe < 2 {
+            RowVector3::new(-cos, -sin, 0.0)
+        } else {
+            RowVector3::new(-sin, cos, 0.0)
+        };
+        let turned = turned * point.gain;
+        for i in 0..3 {
+            for j in 0..3 {
+                let gain = 3 * i + j;
+                out[(gain, probe)] = -inverse[(i, probe)] * point.gain[(2, j)];
+                out[(gain, 3 + probe)] = -inverse[(i, probe)] * turned[j];
+            }
+            out[(3 * i + probe, 6 + probe)] = -point.gain[(i, probe)] / eta[probe];
+        }
+        for k in 0..3 {
+            let ratio = 9 + 3 * probe + k;
+            out[(ratio, 9 + 3 * k + probe)] = 1.0 / eta[probe];
+            out[(ratio, 6 + probe)] = -point.ratios[probe][k] / eta[probe];
+        }
+    }
+    out
 }
 
 /// The point (G, r) of a set of parameters, or `None` where PM is singular or an eta is zero.

@@ -69,24 +69,22 @@ impl LeastSquares {
             search.by_parameters(&boxed, &few, &few_offsets, starts)?
         };
         let mut descent = found.best;
+        let mut parameters = parameters_of(&descent.point).ok_or(SolveError::NoPlanarMotion)?;
         // A solution outside its box is brought back, for the least cost on the box's edge.
-        let parameters = if by_gains {
-            parameters_of(&descent.point).ok_or(SolveError::NoPlanarMotion)?
-        } else {
-            Parameters::from_array(&descent.unknowns.into())
-        };
-        let unknowns = Column::from(parameters.to_array());
-        if by_gains && boxed.clip(unknowns) != unknowns {
+        let clipped = boxed.clipped(&parameters);
+        if by_gains && clipped != parameters {
             descent = search
-                .finish(&boxed, unknowns)
+                .finish(&boxed, boxed.unknowns(&clipped))
                 .ok_or(SolveError::NoUsableStart)?;
-        } else {
-            descent.unknowns = unknowns;
         }
-        if options.projection == Projection::None {
+        if !by_gains || clipped != parameters {
+            parameters = boxed.parameters(&descent.unknowns);
+        }
+        if options.projection == Projection::None && problem.model.has_zero_deviation() {
+            descent.unknowns = boxed.unknowns(&parameters);
             descent = search.with_clipped_offsets(&boxed, descent);
+            parameters = boxed.parameters(&descent.unknowns);
         }
-        let parameters = Parameters::from_array(&descent.unknowns.into());
         let zeros = zero_deviations(problem, &parameters, &descent.point);
         Ok(Solution {
             delta_m: zeros.iter().map(|zero| zero.delta_m).collect(),
@@ -104,7 +102,7 @@ impl LeastSquares {
                 found.agreeing,
                 found.tried
             ),
-            at_limit: boxed.at_limit(&descent.unknowns),
+            at_limit: boxed.at_limit(&parameters),
         })
     }
 }
@@ -169,7 +167,14 @@ impl Search<'_, '_> {
     ) -> Result<Found, SolveError> {
         let tried = starts
             .iter()
-            .filter_map(|start| descend(few, few_offsets, boxed, start.to_array().into()))
+            .filter_map(|start| {
+                descend(
+                    few,
+                    few_offsets,
+                    boxed,
+                    boxed.unknowns(&boxed.clipped(start)),
+                )
+            })
             .collect();
         self.best_of(tried, boxed)
     }
@@ -213,13 +218,14 @@ impl Search<'_, '_> {
     }
 
     /// Zero deviations as unknowns within their range: those that would leave it are fixed at
-    /// its end and the rest fitted again, until none changes. Clipping is no descent, so the
-    /// best of these fits is kept, the first one included.
+    /// its end and the rest fitted again, until none changes. Each of the three of a movement is
+    /// clipped by itself, which is near the best within the range but not it, and no descent: so
+    /// the best of these fits is kept, the first one included.
     fn with_clipped_offsets(&mut self, boxed: &Boxed, mut descent: Descent) -> Descent {
         let mut offsets = self.offsets.to_vec();
         let mut best: Option<(f64, Descent)> = None;
         for _ in 0..20 {
-            let parameters = Parameters::from_array(&descent.unknowns.into());
+            let parameters = boxed.parameters(&descent.unknowns);
             let zeros = zero_deviations(self.problem, &parameters, &descent.point);
             let cost = self.cost_with(&descent, &zeros);
             if best.as_ref().is_none_or(|(least, _)| cost < *least) {

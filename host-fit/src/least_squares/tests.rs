@@ -91,7 +91,7 @@ fn gradient_matches_differences_of_the_cost() {
         stage: &stage,
         model: ModelKind::M31,
     };
-    let mut at = Column::from(truth().to_array());
+    let mut at = boxed.unknowns(&truth());
     at *= 1.01;
     // Angles that are not small, so that the sign of a sine shows.
     for (k, theta) in [0.05, -0.04, 0.06].into_iter().enumerate() {
@@ -229,8 +229,7 @@ fn a_truth_outside_the_box_ends_on_its_edge_and_is_named() {
         stage: &narrow,
         model: ModelKind::M31,
     };
-    let clipped = boxed.clip(Column::from(free.parameters.to_array()));
-    let point = boxed.point(&clipped).expect("regular");
+    let point = point_of(&boxed.clipped(&free.parameters)).expect("regular");
     let offsets = vec![Offset::Free; problem.groups.len()];
     let sums = scatter(&problem, &point.ratios, &offsets).expect("no pole");
     assert!(free.cost < solution.cost);
@@ -278,7 +277,15 @@ fn a_start_next_to_a_pole_is_refused() {
         model: ModelKind::M31,
     };
     let offsets = vec![Offset::Free; problem.groups.len()];
-    assert!(descend(&problem, &offsets, &boxed, pole.into()).is_none());
+    assert!(
+        descend(
+            &problem,
+            &offsets,
+            &boxed,
+            boxed.unknowns(&Parameters::from_array(&pole))
+        )
+        .is_none()
+    );
 }
 
 #[test]
@@ -319,5 +326,47 @@ fn standard_errors_match_the_spread_over_repeated_logs() {
             "{k}: claimed {:e}, spread {spread:e}",
             claimed[k]
         );
+    }
+}
+
+/// With the coordinates of the probes fixed, the lever arms follow the misalignments: no set of
+/// angles near the solution does better, each arm moving with its angle.
+#[test]
+fn lever_arms_on_their_limits_follow_the_misalignments() {
+    let mut fixed = stage();
+    let h = fixed.designed;
+    let point = |value| crate::stage::Range {
+        low: value,
+        high: value,
+    };
+    fixed.search.h_m = runtime::geometry::ProbeCoordinates {
+        h1x_m: point(h.h1x_m),
+        h1y_m: point(h.h1y_m),
+        h2x_m: point(h.h2x_m),
+        h2y_m: point(h.h2y_m),
+        h3x_m: point(h.h3x_m),
+        h3y_m: point(h.h3y_m),
+    };
+    let dataset = noisy(13).dataset(&fixed);
+    let all: Vec<usize> = (0..dataset.rows.len()).collect();
+    let problem = Problem::new(&dataset, &all, &fixed, ModelKind::M31);
+    let solution = solve(&problem, Projection::Linear);
+    assert!(solution.at_limit.is_empty(), "{:?}", solution.at_limit);
+    let offsets = vec![Offset::Free; problem.groups.len()];
+    let cost_at = |theta: [f64; 3]| {
+        let mut p = solution.parameters;
+        p.geometry = h.geometry(theta);
+        let point = point_of(&p).expect("regular");
+        let sums = scatter(&problem, &point.ratios, &offsets).expect("no pole");
+        cost(&sums, &point.gain, problem.weights)
+    };
+    let theta = solution.parameters.geometry.misalignment_rad;
+    assert!((cost_at(theta) / solution.cost - 1.0).abs() < 1e-9);
+    for probe in 0..3 {
+        for step in [-1e-4, 1e-4] {
+            let mut moved = theta;
+            moved[probe] += step;
+            assert!(cost_at(moved) > solution.cost, "probe {probe}, step {step}");
+        }
     }
 }

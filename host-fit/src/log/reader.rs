@@ -82,11 +82,14 @@ pub(super) fn append(
         });
     }
     warnings.extend(skipped.warnings(text.path, movements));
-    let single = movements.iter().filter(|movement| movement.rows.len() == 1);
-    warnings.extend(single.map(|movement| LogWarning::SingleRow {
-        path: source.path.clone(),
-        movement: movement.index,
-    }));
+    let mut single = movements.iter().filter(|movement| movement.rows.len() == 1);
+    if let Some(first) = single.next() {
+        warnings.push(LogWarning::SingleRow {
+            path: source.path.clone(),
+            first: first.index,
+            others: single.count(),
+        });
+    }
     sequence::number(
         &mut dataset.rows,
         movements,

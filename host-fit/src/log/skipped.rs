@@ -4,7 +4,7 @@ use super::cell::CellFault;
 use super::error::{CellPlace, LogError};
 use super::warning::{LogWarning, SkipReason};
 use crate::dataset::Movement;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The rows of one log that were left out.
@@ -68,10 +68,11 @@ impl Skipped {
                     rows,
                     first,
                 });
+        let kept: BTreeSet<i64> = kept.iter().map(|kept| kept.index).collect();
         let lost = self
             .by_movement
             .into_iter()
-            .filter(|(movement, _)| !kept.iter().any(|kept| kept.index == *movement))
+            .filter(|(movement, _)| !kept.contains(movement))
             .map(|(movement, rows)| LogWarning::MovementSkipped {
                 path: path.to_path_buf(),
                 movement,

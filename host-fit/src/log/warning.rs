@@ -52,6 +52,14 @@ impl From<&CellFault> for SkipReason {
     }
 }
 
+/// How many more of the same there are.
+fn and_others(others: usize) -> String {
+    match others {
+        0 => String::new(),
+        others => format!(" (as have {others} more)"),
+    }
+}
+
 /// Something that the user should know about a log that was read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LogWarning {
@@ -76,12 +84,14 @@ pub enum LogWarning {
         rows: usize,
     },
     /// A movement with one row: its zero deviation takes up all that the row could tell.
-    #[error("{}: movement {movement} has one row, which tells the fit nothing: its zero deviation fits it exactly; check the movement column", path.display())]
+    #[error("{}: movement {first} has one row{}, which tells the fit nothing: its zero deviation fits it exactly; check the movement column", path.display(), and_others(*others))]
     SingleRow {
         /// The file.
         path: PathBuf,
-        /// The movement.
-        movement: i64,
+        /// The first such movement.
+        first: i64,
+        /// How many more there are.
+        others: usize,
     },
     /// The last line does not end in a line break.
     #[error("{}:{line}: the last line has no line break; if the file was cut, its last number may be cut too", path.display())]

@@ -76,10 +76,14 @@ pub fn page(report: &Report, logs: &[String], plots: &[(String, String)]) -> Str
         let _ = writeln!(out, "<h2>{}</h2>\n{svg}", escape(caption));
     }
     out.push_str("<h2>Zero deviations, um</h2>\n<table><tr><th>movement</th><th>A</th><th>B</th><th>C</th></tr>\n");
-    for (index, [a, b, c]) in report.zero_deviations_um.iter().enumerate() {
+    for zero in &report.zero_deviations {
         let _ = writeln!(
             out,
-            "<tr><td>{index}</td><td>{a:.2}</td><td>{b:.2}</td><td>{c:.2}</td></tr>"
+            "<tr><td>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td></tr>",
+            escape(&zero.movement),
+            zero.a_um,
+            zero.b_um,
+            zero.c_um
         );
     }
     out.push_str("</table>\n</body></html>\n");

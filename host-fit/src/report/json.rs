@@ -1,5 +1,6 @@
 //! The machine-readable report of `fit`, `eval` and `inspect`.
 
+use crate::dataset::Dataset;
 use crate::fit::Fit;
 use crate::judge::{Judgement, Zeros};
 use crate::parameters::{COUNT, ParameterId, Parameters};
@@ -121,6 +122,21 @@ pub fn parameters(
         .collect()
 }
 
+/// The zero deviation of one movement.
+#[derive(Clone, Debug, Serialize)]
+pub struct MovementZero {
+    /// Its number, after the name of its log where there are several.
+    pub movement: String,
+    /// At probe A, um.
+    pub a_um: f64,
+    /// At probe B, um.
+    pub b_um: f64,
+    /// At probe C, um.
+    pub c_um: f64,
+    /// Whether it was clipped to its range.
+    pub clipped: bool,
+}
+
 /// What `fit` and `eval` both report.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
@@ -166,8 +182,8 @@ pub struct Report {
     pub coordinates: Coordinates,
     /// Serial number in the blob.
     pub serial: String,
-    /// Zero deviation of each movement, um at A, B, C.
-    pub zero_deviations_um: Vec<[f64; 3]>,
+    /// Zero deviation of each movement.
+    pub zero_deviations: Vec<MovementZero>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -177,10 +193,8 @@ pub struct Report {
 pub struct Circumstances<'a> {
     /// The stage.
     pub stage: &'a Stage,
-    /// Rows of the logs.
-    pub rows: usize,
-    /// Movements of the logs.
-    pub movements: usize,
+    /// The rows.
+    pub dataset: &'a Dataset,
     /// Rows skipped as bad.
     pub skipped_rows: usize,
     /// Time so far, s.
@@ -189,9 +203,20 @@ pub struct Circumstances<'a> {
     pub warnings: Vec<String>,
 }
 
-fn deltas_um(judgement: &Judgement) -> Vec<[f64; 3]> {
-    let um = |z: &crate::zero_deviation::ZeroDeviation| z.delta_m.map(|d| d * 1e6);
-    judgement.zeros.iter().map(um).collect()
+fn movement_zeros(judgement: &Judgement, dataset: &Dataset) -> Vec<MovementZero> {
+    let movements = dataset.movements.iter().zip(&judgement.zeros);
+    movements
+        .map(|(movement, zero)| {
+            let [a_um, b_um, c_um] = zero.delta_m.map(|d| d * 1e6);
+            MovementZero {
+                movement: dataset.movement_name(movement),
+                a_um,
+                b_um,
+                c_um,
+                clipped: zero.clipped,
+            }
+        })
+        .collect()
 }
 
 /// The report of a fit.
@@ -211,9 +236,9 @@ pub fn of_fit(
         solver: Some(solver.to_owned()),
         project: Some(project),
         seed: Some(seed),
-        rows: c.rows,
+        rows: c.dataset.rows.len(),
         train_rows: fit.train_rows,
-        movements: c.movements,
+        movements: c.dataset.movements.len(),
         skipped_rows: c.skipped_rows,
         evaluations: Some(fit.solution.evaluations),
         elapsed_s: c.elapsed_s,
@@ -231,7 +256,7 @@ pub fn of_fit(
             .nearest_with(&parameters_fitted.geometry)
             .into(),
         serial: fit.set.serial.as_str().to_owned(),
-        zero_deviations_um: deltas_um(&fit.judgement),
+        zero_deviations: movement_zeros(&fit.judgement, c.dataset),
         warnings,
     }
 }
@@ -249,9 +274,9 @@ pub fn of_eval(
         solver: None,
         project: None,
         seed: None,
-        rows: c.rows,
+        rows: c.dataset.rows.len(),
         train_rows: set.fit.train_rows as usize,
-        movements: c.movements,
+        movements: c.dataset.movements.len(),
         skipped_rows: c.skipped_rows,
         evaluations: None,
         elapsed_s: c.elapsed_s,
@@ -265,7 +290,7 @@ pub fn of_eval(
         parameters: parameters(&values, &[None; COUNT]),
         coordinates: c.stage.designed.nearest_with(&values.geometry).into(),
         serial: set.serial.as_str().to_owned(),
-        zero_deviations_um: deltas_um(judgement),
+        zero_deviations: movement_zeros(judgement, c.dataset),
         warnings: c.warnings.clone(),
     }
 }

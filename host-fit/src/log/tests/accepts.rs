@@ -188,7 +188,14 @@ fn a_last_line_without_line_break_is_whole_but_gives_a_warning() {
 fn a_movement_with_one_row_gives_a_warning() {
     let reading = sound(&format!("{LOG}9,0,0,0,0,0,0,0,0,0,0\n"));
     assert_eq!(reading.dataset.movements.len(), 3);
-    let [LogWarning::SingleRow { movement: 9, .. }] = reading.warnings.as_slice() else {
+    let [
+        LogWarning::SingleRow {
+            first: 9,
+            others: 0,
+            ..
+        },
+    ] = reading.warnings.as_slice()
+    else {
         panic!("{:?}", reading.warnings);
     };
 }

@@ -1,0 +1,110 @@
+//! Fits that succeed, with something that the user must be told.
+
+mod common;
+
+use common::{Bench, stderr, thinned_log, with_cell};
+use host_fit::shipped::STAGE_TOML;
+
+fn log() -> String {
+    thinned_log(20, |_| true)
+}
+
+#[test]
+fn one_wild_code_is_named_with_its_movement_and_time() {
+    let bench = Bench::new();
+    // Row 1000 of the thinned log: movement 20, its first row.
+    bench.write("log.csv", with_cell(&log(), 1010, "hall_a_cnt", "3000"));
+    let output = bench.good("fit log.csv --stage stage.toml --out p.bin");
+    let message = stderr(&output);
+    assert!(
+        message.contains("see movement 20 at t_us = 400000"),
+        "{message}"
+    );
+    bench.write("log.csv", log());
+    let output = bench.good("fit log.csv --stage stage.toml --out p.bin");
+    assert_eq!(stderr(&output).matches("times the rms").count(), 0);
+}
+
+#[test]
+fn a_range_that_is_narrower_than_the_errors_or_without_width_holds_its_parameter() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    for range in ["[0.8374, 0.83745]", "[0.85, 0.85]"] {
+        bench.write(
+            "stage.toml",
+            STAGE_TOML.replace("eta_a = [0.78, 0.98]", &format!("eta_a = {range}")),
+        );
+        bench.good("fit log.csv --stage stage.toml --out p.bin --json p.json");
+        let json = bench.json("p.json");
+        let eta = &json["parameters"]["eta_a"];
+        if range == "[0.85, 0.85]" {
+            assert_eq!(eta["value"], 0.85);
+            assert!(eta["standard_error"].is_null());
+            assert!(
+                !json["warnings"].to_string().contains("eta_a"),
+                "{}",
+                json["warnings"]
+            );
+        } else {
+            let value = eta["value"].as_f64().expect("a number");
+            assert!((0.8374..=0.83745).contains(&value), "{value}");
+        }
+    }
+}
+
+#[test]
+fn capacitive_sensors_in_the_wrong_order_are_suspected() {
+    let bench = Bench::new();
+    let swapped = log().replacen(
+        "cap1_cnt,cap2_cnt,cap3_cnt",
+        "cap3_cnt,cap2_cnt,cap1_cnt",
+        1,
+    );
+    bench.write("log.csv", swapped);
+    let output = bench.run("fit log.csv --stage stage.toml --out p.bin");
+    assert!(
+        stderr(&output).contains("the capacitive sensors"),
+        "{}",
+        stderr(&output)
+    );
+}
+
+#[test]
+fn a_blob_of_other_scales_is_refused() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    bench.good("fit log.csv --stage stage.toml --out p.bin");
+    for (from, to, key) in [
+        (
+            "m_per_count = 6.25e-8",
+            "m_per_count = 6.26e-8",
+            "hall.m_per_count",
+        ),
+        (
+            "m_per_count = 1.5625e-8",
+            "m_per_count = 1.5626e-8",
+            "capacitive.m_per_count",
+        ),
+    ] {
+        assert!(STAGE_TOML.contains(from));
+        bench.write("stage.toml", STAGE_TOML.replace(from, to));
+        bench.bad("eval p.bin log.csv --stage stage.toml", 3, &[key]);
+        bench.bad(
+            "decode p.bin log.csv --stage stage.toml --out pose.csv",
+            3,
+            &[key],
+        );
+    }
+    assert!(bench.holds_only(&["log.csv", "p.bin"]));
+}
+
+#[test]
+fn movements_of_several_logs_are_told_apart() {
+    let bench = Bench::new();
+    bench.write("a.csv", thinned_log(20, |m| m < 30));
+    bench.write("b.csv", thinned_log(20, |m| m < 57));
+    bench.good("fit a.csv b.csv --stage stage.toml --out p.bin --json p.json");
+    let json = bench.json("p.json");
+    assert_eq!(json["zero_deviations"][0]["movement"], "a.csv:0");
+    assert_eq!(json["zero_deviations"][30]["movement"], "b.csv:0");
+}
