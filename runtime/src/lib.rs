@@ -48,6 +48,7 @@ mod checks;
 pub mod decoder;
 pub mod frame;
 pub mod geometry;
+mod layout;
 pub mod model;
 pub mod parameters;
 pub mod pose;
@@ -56,6 +57,7 @@ pub mod rezero;
 #[cfg(test)]
 mod sample;
 pub mod servo;
+mod soundness;
 pub mod status;
 
 pub use blob::BlobError;
