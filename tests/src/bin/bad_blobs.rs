@@ -56,6 +56,9 @@ fn write_all(good: &Path, folder: &Path) -> Result<(), Box<dyn Error>> {
         "nan.bin",
         &changed(&|set| set.constants.sensitivity[1].per_z_m = f32::NAN)?,
     )?;
-    write("singular.bin", &changed(&|set| set.plane[1] = set.plane[0])?)?;
+    write(
+        "singular.bin",
+        &changed(&|set| set.plane[1] = set.plane[0])?,
+    )?;
     Ok(())
 }
