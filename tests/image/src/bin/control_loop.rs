@@ -99,8 +99,8 @@ fn main() -> ! {
     let Ok(mut console) = File::write_to(CONSOLE) else {
         exit(false)
     };
-    if !image::fpu_at_reset() {
-        let _ = writeln!(console, "the FPU is not set as after reset");
+    if let Err(fault) = runtime::arithmetic::check() {
+        let _ = writeln!(console, "{fault}");
         exit(false);
     }
     let mut loaded = None;
