@@ -11,6 +11,7 @@
 //! Every message says what is wrong, where, and what to do.
 
 use crate::blob_file::BlobFileError;
+use crate::export::ExportError;
 use crate::fit::FitError;
 use crate::import::ImportError;
 use crate::live::LiveError;
@@ -81,6 +82,9 @@ pub enum HostError {
     /// `import` refused its input.
     #[error(transparent)]
     Import(#[from] ImportError),
+    /// A blob cannot be exported.
+    #[error(transparent)]
+    Export(#[from] ExportError),
     /// `live` ended early.
     #[error(transparent)]
     Live(#[from] LiveError),
@@ -99,7 +103,8 @@ impl HostError {
     /// The exit status of a run that ends with this error.
     pub const fn exit_status(&self) -> u8 {
         match self {
-            Self::Usage { .. } => 2,
+            Self::Usage { .. }
+            | Self::Export(ExportError::NoSlot { .. } | ExportError::Unaligned { .. }) => 2,
             Self::Stage(_)
             | Self::Log(_)
             | Self::PoseFile(_)
@@ -110,6 +115,7 @@ impl HostError {
             | Self::NoTemporaryFolder(_)
             | Self::Standard(_)
             | Self::Import(_)
+            | Self::Export(_)
             | Self::Live(_)
             | Self::Replay(_)
             | Self::Output(_) => 3,

@@ -32,6 +32,7 @@ pub mod compare;
 pub mod dataset;
 pub mod demo;
 pub mod error;
+pub mod export;
 pub mod fit;
 pub mod identify;
 pub mod import;

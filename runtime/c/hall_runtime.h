@@ -175,6 +175,10 @@ typedef struct {
 extern "C" {
 #endif // __cplusplus
 
+// Whether floating-point arithmetic is set as after a reset, so that poses are, bit for bit,
+// those that the host computed. Check it once, before the first tick.
+bool hall_arithmetic_is_sound(void);
+
 // Loads the parameter blob at the start of `memory` (flash, padding may follow), checks it,
 // and makes a decoder of it. `serial` is the serial number of the stage that is expected, or
 // NULL to take that of any. Anything but HALL_RESULT_OK leaves the decoder as it was.

@@ -20,6 +20,7 @@
 //! and this version's blobs stay readable. Not promised: that an older decoder reads a
 //! newer layout, or that two layouts of one calibration have the same length.
 
+use crate::layout::Layout;
 use crate::parameters::{ParameterError, ParameterSet};
 use crc::{CRC_32_ISCSI, Crc, NoTable};
 
@@ -154,7 +155,9 @@ impl ParameterSet {
         let bytes = buffer.len();
         let too_small = BlobError::BufferTooSmall { bytes };
         let room = buffer.get_mut(HEADER_BYTES..).ok_or(too_small)?;
-        let payload = postcard::to_slice(self, room).map_err(|_| too_small)?.len();
+        let payload = postcard::to_slice(&Layout::from(self), room)
+            .map_err(|_| too_small)?
+            .len();
         let payload_bytes = u32::try_from(payload).map_err(|_| too_small)?;
         let header = buffer.first_chunk_mut::<HEADER_BYTES>().ok_or(too_small)?;
         let [m0, m1, m2, m3] = MAGIC;
@@ -203,12 +206,14 @@ impl ParameterSet {
             return Err(BlobError::BadCrc { stored, computed });
         }
         let payload = body.get(HEADER_BYTES..).ok_or(BlobError::BadPayload)?;
-        let (set, rest) =
-            postcard::take_from_bytes::<Self>(payload).map_err(|_| BlobError::BadPayload)?;
+        let (layout, rest) =
+            postcard::take_from_bytes::<Layout>(payload).map_err(|_| BlobError::BadPayload)?;
         if !rest.is_empty() {
             return Err(BlobError::BadPayload);
         }
-        set.check().map_err(BlobError::Parameters)?;
+        (layout.numbers.check_finite()).map_err(BlobError::Parameters)?;
+        let set = Self::from(layout);
+        set.check_terms().map_err(BlobError::Parameters)?;
         Ok(set)
     }
 

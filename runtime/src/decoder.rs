@@ -18,12 +18,11 @@ use crate::model::{Sensitivity, planar_pose, sensitivity_at};
 use crate::pose::{PlanarPose, Pose, VerticalPose};
 use crate::real::Real;
 use crate::status::Status;
-use serde::{Deserialize, Serialize};
 
 /// Everything that a tick reads: about 170 bytes, borrowed read-only.
 ///
 /// Made by [`crate::Calibration::prepare`] in `f64` and rounded once to `f32`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct DecoderConstants<T> {
     /// Rows Z, Rx, Ry: m, rad, rad per capacitive code.

@@ -6,7 +6,6 @@
 
 use crate::real::Real;
 use nalgebra::Matrix3;
-use serde::{Deserialize, Serialize};
 
 /// Coordinates of the Hall probes in the stage's frame, with the paper's signs:
 /// A at (`h1x`, `h1y`), B at (-`h2x`, `h2y`), C at (`h3x`, `h3y`). All in m.
@@ -27,7 +26,7 @@ pub struct ProbeCoordinates<T> {
 }
 
 /// Lever arms and misalignments of the probes A, B, C: all that PM depends on.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbeGeometry<T> {
     /// Third column of PM: displacement along the sensing axis per rad of Rz, m.
     pub lever_arm_m: [T; 3],

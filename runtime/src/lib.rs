@@ -22,6 +22,7 @@
 //! | [`servo`] | what lasts from tick to tick: hold, sequence, counters, re-zero |
 //! | [`rezero`] | the zero deviation measured at rest |
 //! | [`parameters`], [`blob`] | the parameter set, and its bytes in flash |
+//! | [`arithmetic`] | the check at start-up that this machine rounds as the host does |
 //! | [`real`] | the operations that a number must have to run the model |
 //!
 //! Symbols of the paper and the names here:
@@ -40,6 +41,7 @@
 #![no_std]
 #![deny(unsafe_code)]
 
+pub mod arithmetic;
 pub mod blob;
 pub mod calibration;
 pub mod capacitive;
@@ -48,6 +50,7 @@ mod checks;
 pub mod decoder;
 pub mod frame;
 pub mod geometry;
+mod layout;
 pub mod model;
 pub mod parameters;
 pub mod pose;
@@ -56,6 +59,7 @@ pub mod rezero;
 #[cfg(test)]
 mod sample;
 pub mod servo;
+mod soundness;
 pub mod status;
 
 pub use blob::BlobError;

@@ -64,7 +64,7 @@ impl ModelKind {
 }
 
 /// Sensitivity of one probe and its change with the vertical pose (equation 33).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Sensitivity<T> {
     /// eta: sensitivity at the zero of the vertical pose, relative to the designed one.

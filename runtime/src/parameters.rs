@@ -2,18 +2,18 @@
 
 use crate::decoder::{Decoder, DecoderConstants};
 use crate::geometry::{ProbeGeometry, matrix};
-use crate::model::{ModelKind, Sensitivity};
+use crate::model::ModelKind;
 use heapless::String;
 use nalgebra::Matrix3;
-use serde::{Deserialize, Serialize};
 
 /// A short text of a parameter set: at most 32 bytes of UTF-8.
 pub type Text = String<32>;
 
 /// Everything that the decoder needs, and what `inspect` and a later refit need.
 ///
-/// The order of the fields is the blob's layout (see [`crate::blob`]).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// The order of the fields is that of the blob (see [`crate::blob`]), where the code windows
+/// come last and the counts before the numbers.
+#[derive(Clone, Debug, PartialEq)]
 pub struct ParameterSet {
     /// Which model was fitted.
     pub model: ModelKind,
@@ -40,14 +40,14 @@ pub struct ParameterSet {
 }
 
 /// How Hall codes become displacements at the designed sensitivity.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HallInput {
     /// Displacement per code, m.
     pub m_per_code: f32,
 }
 
 /// How capacitive codes become the vertical pose.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CapacitiveInput {
     /// Rows Z, Rx, Ry of the plane matrix: m, rad, rad per m of gap change.
     pub vertical_per_m: [[f32; 3]; 3],
@@ -56,7 +56,7 @@ pub struct CapacitiveInput {
 }
 
 /// Errors of the fit over all rows of its logs, zero deviations refitted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FitRecord {
     /// Rows of the logs.
     pub rows: u32,
@@ -143,14 +143,6 @@ impl core::fmt::Display for ParameterError {
 
 impl core::error::Error for ParameterError {}
 
-/// Largest element of PM PM^-1 - I that the check accepts: 100 times the rounding of `f32`
-/// for lever arms of decimetres.
-const INVERSE_TOLERANCE: f32 = 1e-5;
-
-/// Largest relative difference between a precomputed term and the product of its parts:
-/// four roundings of `f32`.
-const PRODUCT_TOLERANCE: f32 = 5e-7;
-
 impl ParameterSet {
     /// A decoder with this set's constants.
     pub const fn decoder(&self) -> Decoder {
@@ -171,172 +163,6 @@ impl ParameterSet {
     pub const fn eta(&self) -> [f32; 3] {
         let [a, b, c] = &self.constants.sensitivity;
         [a.eta, b.eta, c.eta]
-    }
-
-    /// Checks that every number is finite, PM^-1 inverts PM, each precomputed term follows
-    /// from its parts, scales and limits are above zero, code windows are sound and no phi
-    /// comes near zero within the calibrated range.
-    ///
-    /// # Errors
-    /// The first of these that does not hold.
-    pub fn check(&self) -> Result<(), ParameterError> {
-        self.check_finite()?;
-        self.check_signs()?;
-        self.check_products()?;
-        let c = &self.constants;
-        for (probe, s) in (0u8..).zip(&c.sensitivity) {
-            if smallest_sensitivity(s, &c.calibrated_vertical) < c.sensitivity_min {
-                return Err(ParameterError::PoleInRange { probe });
-            }
-        }
-        Ok(())
-    }
-
-    fn check_finite(&self) -> Result<(), ParameterError> {
-        let c = &self.constants;
-        let sensitivity = |s: &Sensitivity<f32>| [s.eta, s.per_z_m, s.per_rx_rad, s.per_ry_rad];
-        finite("the fit record", [self.fit.rms, self.fit.peak])?;
-        finite(
-            "the probe geometry",
-            [self.geometry.lever_arm_m, self.geometry.misalignment_rad],
-        )?;
-        finite("PM", self.plane)?;
-        finite("PM^-1", self.plane_inverse)?;
-        finite(
-            "the scales",
-            [[self.hall.m_per_code, self.capacitive.m_per_code]],
-        )?;
-        finite(
-            "the capacitive plane matrix",
-            self.capacitive.vertical_per_m,
-        )?;
-        finite("the vertical constants", c.vertical_per_code)?;
-        let [a, b, d] = &c.sensitivity;
-        finite(
-            "the sensitivities",
-            [sensitivity(a), sensitivity(b), sensitivity(d)],
-        )?;
-        finite("the planar constants", c.planar_per_code)?;
-        finite(
-            "the calibrated range",
-            [c.calibrated_vertical, c.calibrated_planar],
-        )?;
-        finite("the smallest sensitivity", [[c.sensitivity_min]])
-    }
-
-    fn check_signs(&self) -> Result<(), ParameterError> {
-        let c = &self.constants;
-        let positive = |value: &'static str, x: f32| {
-            if x > 0.0 {
-                Ok(())
-            } else {
-                Err(ParameterError::NotPositive { value })
-            }
-        };
-        positive("the scale of the Hall codes", self.hall.m_per_code)?;
-        positive(
-            "the scale of the capacitive codes",
-            self.capacitive.m_per_code,
-        )?;
-        positive("the smallest sensitivity", c.sensitivity_min)?;
-        for limit in c.calibrated_planar.iter().chain(&c.calibrated_vertical) {
-            if *limit < 0.0 {
-                return Err(ParameterError::NotPositive {
-                    value: "a calibrated range",
-                });
-            }
-        }
-        if !c.hall_window.is_sound() {
-            return Err(ParameterError::UnsoundWindow { sensors: "Hall" });
-        }
-        if !c.capacitive_window.is_sound() {
-            return Err(ParameterError::UnsoundWindow {
-                sensors: "capacitive",
-            });
-        }
-        Ok(())
-    }
-
-    fn check_products(&self) -> Result<(), ParameterError> {
-        let difference = (self.plane_matrix() * self.plane_inverse_matrix() - Matrix3::identity())
-            .iter()
-            .fold(
-                0.0f32,
-                |largest, x| if x.abs() > largest { x.abs() } else { largest },
-            );
-        if difference > INVERSE_TOLERANCE {
-            return Err(ParameterError::NotTheInverse {
-                largest: difference,
-            });
-        }
-        let c = &self.constants;
-        let follows = |term, made: &[[f32; 3]; 3], from: &[[f32; 3]; 3], scale: f32| {
-            for (made, from) in made.iter().flatten().zip(from.iter().flatten()) {
-                let product = from * scale;
-                if (made - product).abs() > PRODUCT_TOLERANCE * product.abs() + f32::MIN_POSITIVE {
-                    return Err(ParameterError::Inconsistent { term });
-                }
-            }
-            Ok(())
-        };
-        follows(
-            "the planar constants",
-            &c.planar_per_code,
-            &self.plane_inverse,
-            self.hall.m_per_code,
-        )?;
-        follows(
-            "the vertical constants",
-            &c.vertical_per_code,
-            &self.capacitive.vertical_per_m,
-            self.capacitive.m_per_code,
-        )?;
-        for (k, row) in self.plane.iter().enumerate() {
-            let (sin, cos) = sin_cos_series(self.geometry.misalignment_rad[k]);
-            let axis = if k < 2 { [-sin, cos] } else { [cos, sin] };
-            let from = [axis[0], axis[1], self.geometry.lever_arm_m[k]];
-            for (made, from) in row.iter().zip(from) {
-                let near = (made - from).abs() <= INVERSE_TOLERANCE;
-                if !near {
-                    return Err(ParameterError::Inconsistent { term: "PM" });
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Sine and cosine of an angle in rad by their series, within 1e-6 up to a right angle and
-/// wrong beyond it, where no misalignment lies. That is enough for a check, and a tenth of
-/// the flash that functions for any angle take.
-fn sin_cos_series(angle: f32) -> (f32, f32) {
-    let square = angle * angle;
-    let (mut sin, mut cos) = (1.0, 1.0);
-    let mut k = 12.0;
-    while k > 0.0 {
-        cos = 1.0 - square / (k * (k - 1.0)) * cos;
-        sin = 1.0 - square / (k * (k + 1.0)) * sin;
-        k -= 2.0;
-    }
-    (angle * sin, cos)
-}
-
-/// The smallest |phi| over the box |Z|, |Rx|, |Ry| <= limits, or 0 when phi changes sign.
-fn smallest_sensitivity(s: &Sensitivity<f32>, limits: &[f32; 3]) -> f32 {
-    let swing = (s.per_z_m.abs() * limits[0] + s.per_rx_rad.abs() * limits[1])
-        + s.per_ry_rad.abs() * limits[2];
-    let smallest = s.eta.abs() - swing;
-    if smallest > 0.0 { smallest } else { 0.0 }
-}
-
-fn finite<const N: usize, const M: usize>(
-    group: &'static str,
-    rows: [[f32; N]; M],
-) -> Result<(), ParameterError> {
-    if rows.iter().flatten().all(|x| x.is_finite()) {
-        Ok(())
-    } else {
-        Err(ParameterError::NotFinite { group })
     }
 }
 

@@ -116,9 +116,7 @@ impl<'d> Servo<'d> {
         self.decoder
             .decode_into(&frame.hall, &frame.capacitive, &self.zero, &mut reading);
         if self.run.is_some() {
-            self.feed_rezero(|decoder| {
-                decoder.decode(frame.hall, frame.capacitive, &PlanarPose::ZERO)
-            });
+            self.feed_rezero(&reading);
         }
         self.conclude(reading, sequence)
     }
@@ -135,7 +133,9 @@ impl<'d> Servo<'d> {
             return self.conclude(NOTHING, Status::FRAME_REPEATED);
         };
         let reading = self.decoder.decode_at(hall, vertical, &self.zero);
-        self.feed_rezero(|decoder| decoder.decode_at(hall, vertical, &PlanarPose::ZERO));
+        if self.run.is_some() {
+            self.feed_rezero(&reading);
+        }
         self.conclude(reading, sequence)
     }
 
@@ -222,13 +222,16 @@ impl<'d> Servo<'d> {
         self.last_sequence = None;
     }
 
-    /// Feeds a re-zero in progress with a reading without the zero deviation in use. Apart
+    /// Feeds a re-zero in progress with the reading, the zero deviation in use put back. Apart
     /// from the tick, which so stays short where no re-zero runs.
     #[cold]
     #[inline(never)]
-    fn feed_rezero(&mut self, decode: impl FnOnce(&Decoder) -> Reading) {
+    fn feed_rezero(&mut self, reading: &Reading) {
         let Some(run) = &mut self.run else { return };
-        let unzeroed = decode(self.decoder);
+        let mut unzeroed = *reading;
+        unzeroed.pose.planar.x_m += self.zero.x_m;
+        unzeroed.pose.planar.y_m += self.zero.y_m;
+        unzeroed.pose.planar.rz_rad += self.zero.rz_rad;
         self.rezero = run.take(&unzeroed);
         match self.rezero {
             RezeroState::Running { .. } => {}

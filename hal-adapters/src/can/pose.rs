@@ -67,13 +67,16 @@ impl PoseSender {
     /// The frames of one tick: X, Y, Rz, and the vertical axes that are due.
     pub fn frames(&mut self, reading: &Reading) -> impl Iterator<Item = Coded> + use<> {
         let (tick, every) = (self.tick, self.vertical_ticks);
+        let mask = every.wrapping_sub(1);
         self.tick = tick.wrapping_add(1);
         let (values, status) = (reading.pose.vertical.to_array(), reading.status);
         // The axes take turns, so that no tick carries all three unless every tick does.
         let due = (0u32..).zip(VERTICAL.into_iter().zip(values));
         let vertical = due.filter_map(move |(k, (message, value))| {
             let turn = k.wrapping_mul(every) / 3;
-            (tick % every == turn).then(|| axis_frame(message, tick / every, value, status))
+            // A power of two: remainder and quotient without a division that could fail.
+            let (phase, count) = (tick & mask, tick.wrapping_shr(mask.count_ones()));
+            (phase == turn).then(|| axis_frame(message, count, value, status))
         });
         planar_frames(reading, tick).into_iter().chain(vertical)
     }

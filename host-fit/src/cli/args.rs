@@ -1,5 +1,6 @@
 //! The command line.
 
+use super::export::ExportArgs;
 use crate::import::ImportArgs;
 use crate::live::LiveArgs;
 use crate::replay::ReplayArgs;
@@ -41,6 +42,8 @@ pub enum Command {
     Live(LiveArgs),
     /// Play a log onto a CAN bus as the sensor node would send it (Linux).
     Replay(ReplayArgs),
+    /// Write a parameter blob as the file that a flash tool takes.
+    Export(ExportArgs),
     /// Compare the solvers on one or more logs, over several seeds at equal evaluations.
     Compare(CompareArgs),
     /// Join a record of the CAN bus and a log of the interferometers into a calibration log.

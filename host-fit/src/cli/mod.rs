@@ -5,6 +5,7 @@ mod compare;
 mod decode;
 mod demo;
 mod eval;
+pub mod export;
 mod fit;
 mod inspect;
 
@@ -71,6 +72,7 @@ pub fn main() -> ExitCode {
         Command::Inspect(args) => inspect::run(args),
         Command::Live(args) => crate::live::run(args).map_err(HostError::from),
         Command::Replay(args) => replay(args),
+        Command::Export(args) => export::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Import(args) => import(args),
     };

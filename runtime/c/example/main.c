@@ -28,6 +28,10 @@ static bool read_frame(uint32_t period, HallFrame *frame)
 
 int main(void)
 {
+    if (!hall_arithmetic_is_sound()) {
+        printf("the FPU is not set as after reset\n");
+        return 98;
+    }
     HallResult loaded = hall_load(_parameter_slot_0, (size_t)_parameter_slot_bytes, NULL, &decoder);
     if (loaded != HALL_RESULT_OK) {
         printf("parameters refused: %u\n", (unsigned)loaded);

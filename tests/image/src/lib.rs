@@ -19,20 +19,22 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     unsafe { a_panic_can_be_reached() }
 }
 
-/// Whether the FPU rounds to nearest and keeps subnormal numbers, as after a reset. Always
-/// so without an FPU.
-pub fn fpu_at_reset() -> bool {
+/// The bits of FPSCR that change results: AHP, DN, FZ, RMode. Zero without an FPU.
+pub fn fpu_settings() -> u32 {
     #[cfg(target_abi = "eabihf")]
     {
-        // AHP, DN, FZ, RMode.
-        const SETTINGS: u32 = 0b11111 << 22;
         let fpscr: u32;
         // SAFETY: reads a register of the FPU, which the start-up code has switched on.
         unsafe {
             core::arch::asm!("vmrs {}, fpscr", out(reg) fpscr, options(nomem, nostack, preserves_flags));
         }
-        fpscr & SETTINGS == 0
+        fpscr & (0b11111 << 22)
     }
     #[cfg(not(target_abi = "eabihf"))]
-    true
+    0
+}
+
+/// Whether the FPU is set as after a reset, by its register and by what it computes.
+pub fn fpu_at_reset() -> bool {
+    fpu_settings() == 0 && runtime::arithmetic::check().is_ok()
 }

@@ -12,6 +12,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use image::job::{self, FRAME_WORDS, PARAMETER_WORDS};
 use image::semihost::{CONSOLE, File, exit};
+use runtime::arithmetic::ArithmeticFault;
 use runtime::decoder::{Decoder, DecoderConstants};
 use runtime::frame::CodeWindow;
 use runtime::model::{Sensitivity, planar_pose, sensitivity_at};
@@ -224,6 +225,29 @@ fn touched(work: impl FnOnce()) -> usize {
     PAINTED - 4 * clean.count()
 }
 
+/// What the check of arithmetic says with FPSCR set to `settings`.
+#[cfg(target_abi = "eabihf")]
+fn check_with(settings: u32) -> Result<(), ArithmeticFault> {
+    let set = |fpscr: u32| {
+        // SAFETY: writes a register of the FPU; not `pure`, so it stays before and behind
+        // the check, whose operands pass through memory.
+        unsafe { core::arch::asm!("vmsr fpscr, {}", in(reg) fpscr, options(nostack)) }
+    };
+    set(settings);
+    let found = runtime::arithmetic::check();
+    set(0);
+    found
+}
+
+/// Whether the check of arithmetic finds each setting of the FPU that would change results.
+#[cfg(target_abi = "eabihf")]
+fn wrong_settings_are_found() -> bool {
+    let rounding = Err(ArithmeticFault::RoundingChanged);
+    check_with(0).is_ok()
+        && check_with(1 << 24) == Err(ArithmeticFault::SubnormalsLost)
+        && (1..=3).all(|mode| check_with(mode << 22) == rounding)
+}
+
 #[entry]
 fn main() -> ! {
     let Ok(mut console) = File::write_to(CONSOLE) else {
@@ -288,5 +312,7 @@ fn main() -> ! {
             servo_tick - base
         )
     });
-    exit(printed.is_ok() && image::fpu_at_reset())
+    let found = wrong_settings_are_found();
+    let printed = printed.and_then(|()| writeln!(console, "wrong FPU settings found: {found}"));
+    exit(printed.is_ok() && found && image::fpu_at_reset())
 }

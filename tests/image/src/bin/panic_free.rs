@@ -1,4 +1,4 @@
-//! Uses every function that a controller calls, so that the linker shows whether any of them
+//! Uses every function that a controller calls, frame coding on the CAN bus included, so that the linker shows whether any of them
 //! can reach a panic. Without the feature `may-panic` it links; with it, which adds one
 //! indexing that may fail, it must not.
 #![no_std]
@@ -6,9 +6,10 @@
 
 use core::hint::black_box;
 use cortex_m_rt::entry;
+use hal_adapters::can::{BusFrame, Layout, PoseSender, SensorReceiver, Timing, sensor};
 use runtime::blob::MAX_BYTES;
 use runtime::rezero::RezeroSettings;
-use runtime::{OnInvalid, ParameterSet, PlanarPose, RawFrame, Servo, VerticalPose};
+use runtime::{OnInvalid, ParameterSet, PlanarPose, RawFrame, Reading, Servo, VerticalPose};
 
 extern crate image;
 
@@ -42,8 +43,26 @@ fn main() -> ! {
         servo.forget();
         black_box((servo.rezero_state(), servo.health(), servo.zero()));
         black_box(decoder.channel_faults(&frame).count());
+        bus(&frame, &servo.tick(&frame));
     }
     loop {
         cortex_m::asm::wfi();
+    }
+}
+
+/// Codes to frames, frames to codes, poses to frames, commands both ways.
+fn bus(frame: &RawFrame, reading: &Reading) {
+    for layout in [Layout::Bits16, Layout::Bits24] {
+        let mut receiver = SensorReceiver::new(black_box(layout), black_box(Timing::default()));
+        for coded in sensor::frames(layout, frame) {
+            if let Some(on_bus) = coded.to_frame::<BusFrame>() {
+                let _ = black_box(receiver.take(&black_box(on_bus), black_box(7)));
+            }
+        }
+        let _ = black_box(receiver.poll(black_box(9)));
+    }
+    let mut sender = PoseSender::new(black_box(10));
+    for coded in sender.frames(reading) {
+        let _ = black_box(coded.to_frame::<BusFrame>());
     }
 }

@@ -1,0 +1,144 @@
+//! A parameter blob as the file that a flash tool takes.
+//!
+//! | format | for | address |
+//! |---|---|---|
+//! | `bin` | st-flash, OpenOCD, probe-rs with `--binary-format bin` | given to the tool |
+//! | `hex` | Intel HEX: probe-rs, OpenOCD, vendors' tools | in the file |
+//! | `elf` | probe-rs, OpenOCD, debuggers | in the file |
+//!
+//! Only the bytes of the blob are written: what follows in the sector stays erased, and the
+//! target takes the length from the blob's header.
+
+mod elf;
+mod memory_map;
+
+pub use memory_map::{SLOTS, Slot};
+
+use runtime::{BlobError, ParameterSet};
+
+/// What the file is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExportFormat {
+    /// The bytes themselves.
+    Bin,
+    /// Intel HEX.
+    Hex,
+    /// ELF with one segment.
+    Elf,
+}
+
+/// Where the blob goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// An address in flash.
+    Address(u32),
+    /// A parameter slot of `memory.x`, 0 or 1.
+    Slot(u8),
+}
+
+/// Why nothing is exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The bytes are no blob: nothing else is worth flashing.
+    #[error("not a usable parameter blob: {0}")]
+    Blob(BlobError),
+    /// A slot that the memory map does not have.
+    #[error("slot {slot}: memory.x has slots 0 and 1; or give an address")]
+    NoSlot {
+        /// The slot asked for.
+        slot: u8,
+    },
+    /// An address that flash cannot be written at.
+    #[error("address {address:#010x} is not a multiple of 4; flash is written by words")]
+    Unaligned {
+        /// The address.
+        address: u32,
+    },
+    /// The blob would reach beyond the address space.
+    #[error("{bytes} bytes at {address:#010x} reach beyond 32 bits of address")]
+    BeyondMemory {
+        /// The address.
+        address: u32,
+        /// Bytes of the blob.
+        bytes: usize,
+    },
+    /// The Intel HEX file cannot be made.
+    #[error("Intel HEX: {0}")]
+    Hex(ihex::WriterError),
+    /// The ELF file cannot be made.
+    #[error("ELF: {0}")]
+    Elf(object::write::Error),
+}
+
+impl Place {
+    /// The address.
+    ///
+    /// # Errors
+    /// [`ExportError::NoSlot`].
+    pub fn address(self) -> Result<u32, ExportError> {
+        match self {
+            Self::Address(address) => Ok(address),
+            Self::Slot(slot) => SLOTS
+                .get(usize::from(slot))
+                .map(|found| found.address)
+                .ok_or(ExportError::NoSlot { slot }),
+        }
+    }
+}
+
+/// The file for a blob at a place in flash. The blob is checked first, as the target will
+/// check it.
+///
+/// # Errors
+/// Every variant of [`ExportError`].
+pub fn export(blob: &[u8], format: ExportFormat, place: Place) -> Result<Vec<u8>, ExportError> {
+    ParameterSet::from_bytes(blob).map_err(ExportError::Blob)?;
+    let address = place.address()?;
+    if address % 4 != 0 {
+        return Err(ExportError::Unaligned { address });
+    }
+    let bytes = blob.len();
+    let end = u32::try_from(bytes)
+        .ok()
+        .and_then(|n| address.checked_add(n));
+    if end.is_none() {
+        return Err(ExportError::BeyondMemory { address, bytes });
+    }
+    match format {
+        ExportFormat::Bin => Ok(blob.to_vec()),
+        ExportFormat::Hex => hex(blob, address).map_err(ExportError::Hex),
+        ExportFormat::Elf => elf::image(blob, address).map_err(ExportError::Elf),
+    }
+}
+
+/// Intel HEX with 16 bytes to a record; the upper half of the address in a record of its own
+/// wherever it changes.
+fn hex(blob: &[u8], address: u32) -> Result<Vec<u8>, ihex::WriterError> {
+    let mut records = Vec::new();
+    let mut upper = None;
+    let starts = (address..).step_by(16);
+    for (at, chunk) in starts.zip(blob.chunks(16)) {
+        // Addresses are multiples of 4 and blobs short: a record may still cross 64 KiB.
+        let room = 0x1_0000 - (at & 0xffff) as usize;
+        let (first, second) = chunk.split_at(room.min(chunk.len()));
+        for (at, part) in [(at, first), (at.wrapping_add(first.len() as u32), second)] {
+            if part.is_empty() {
+                continue;
+            }
+            let half = (at >> 16) as u16;
+            if upper != Some(half) {
+                upper = Some(half);
+                records.push(ihex::Record::ExtendedLinearAddress(half));
+            }
+            records.push(ihex::Record::Data {
+                offset: (at & 0xffff) as u16,
+                value: part.to_vec(),
+            });
+        }
+    }
+    records.push(ihex::Record::EndOfFile);
+    ihex::create_object_file_representation(&records).map(String::into_bytes)
+}
+
+#[cfg(test)]
+mod tests;

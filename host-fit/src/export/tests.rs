@@ -1,0 +1,141 @@
+//! What a flash tool would write, read back from the padded sector.
+
+use super::*;
+use object::read::elf::{ElfFile32, ProgramHeader};
+use object::{Endianness, Object, ObjectSection};
+use runtime::blob::MAX_BYTES;
+use runtime::calibration::Origin;
+use runtime::frame::CodeWindow;
+use runtime::geometry::ProbeGeometry;
+use runtime::model::{ModelKind, Sensitivity};
+use runtime::{Calibration, ParameterSet};
+
+fn set() -> ParameterSet {
+    let window = CodeWindow {
+        low: -32767,
+        high: 32766,
+    };
+    let calibration = Calibration {
+        model: ModelKind::M30,
+        geometry: ProbeGeometry {
+            lever_arm_m: [0.2, -0.19, -0.36],
+            misalignment_rad: [0.01, -0.02, 0.03],
+        },
+        sensitivity: [0.88, 0.75, 0.82].map(Sensitivity::constant),
+        hall_m_per_code: 6.25e-8,
+        hall_window: window,
+        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
+        capacitive_m_per_code: 1.5625e-8,
+        capacitive_window: window,
+        calibrated_planar: [0.01; 3],
+        calibrated_vertical: [3e-4; 3],
+        sensitivity_min: Calibration::SENSITIVITY_MIN,
+    };
+    calibration.prepare(&Origin::default()).expect("sound")
+}
+
+fn blob() -> Vec<u8> {
+    let mut buffer = [0; MAX_BYTES];
+    set().to_bytes(&mut buffer).expect("room").to_vec()
+}
+
+/// A sector of erased flash from `start`, with these bytes written to it.
+fn flashed(start: u32, writes: &[(u32, Vec<u8>)]) -> Vec<u8> {
+    let mut sector = vec![0xff; SLOTS[0].bytes as usize];
+    for (address, bytes) in writes {
+        let at = (address - start) as usize;
+        sector[at..at + bytes.len()].copy_from_slice(bytes);
+    }
+    sector
+}
+
+/// The writes that an Intel HEX file asks for.
+fn hex_writes(file: &[u8]) -> Vec<(u32, Vec<u8>)> {
+    let text = std::str::from_utf8(file).expect("text");
+    let (mut upper, mut writes, mut ended) = (0, Vec::new(), false);
+    for record in ihex::Reader::new(text) {
+        match record.expect("a record") {
+            ihex::Record::ExtendedLinearAddress(half) => upper = u32::from(half) << 16,
+            ihex::Record::Data { offset, value } => {
+                writes.push((upper | u32::from(offset), value));
+            }
+            ihex::Record::EndOfFile => ended = true,
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(ended);
+    writes
+}
+
+#[test]
+fn the_slots_are_those_of_the_memory_map() {
+    let [first, second] = SLOTS;
+    assert_eq!((first.address, first.bytes), (0x0800_4000, 16 * 1024));
+    assert_eq!((second.address, second.bytes), (0x0800_8000, 16 * 1024));
+    assert!(MAX_BYTES as u32 <= first.bytes);
+    assert!(matches!(
+        Place::Slot(2).address(),
+        Err(ExportError::NoSlot { slot: 2 })
+    ));
+}
+
+#[test]
+fn each_format_read_back_from_padded_flash_is_the_same_set() {
+    for (slot, found) in (0..).zip(SLOTS) {
+        let made = |format| export(&blob(), format, Place::Slot(slot)).expect("a file");
+        let bin = vec![(found.address, made(ExportFormat::Bin))];
+        let hex = hex_writes(&made(ExportFormat::Hex));
+        let elf_file = made(ExportFormat::Elf);
+        let elf = ElfFile32::<Endianness>::parse(&*elf_file).expect("an ELF file");
+        let [segment] = elf.elf_program_headers() else {
+            panic!("one segment")
+        };
+        let end = Endianness::Little;
+        let data = segment.data(end, &*elf_file).expect("data").to_vec();
+        assert_eq!(segment.p_paddr(end), segment.p_vaddr(end));
+        let elf_writes = vec![(segment.p_paddr(end), data)];
+        for writes in [bin, hex, elf_writes] {
+            let sector = flashed(found.address, &writes);
+            assert_eq!(ParameterSet::from_flash(&sector), Ok(set()));
+        }
+        let section = elf.section_by_name(".parameters").expect("a section");
+        assert_eq!(section.address(), u64::from(found.address));
+        assert_eq!(section.data().expect("data"), blob());
+    }
+}
+
+#[test]
+fn intel_hex_crosses_a_boundary_of_64_kib() {
+    let start = 0x0800_ff00;
+    for address in [0x0800_ff04, 0x0800_fff8, 0x0800_fffc, 0x0801_0000] {
+        let file = export(&blob(), ExportFormat::Hex, Place::Address(address)).expect("a file");
+        let writes = hex_writes(&file);
+        let sector = flashed(start, &writes);
+        let at = (address - start) as usize;
+        assert_eq!(ParameterSet::from_flash(&sector[at..]), Ok(set()));
+        for (from, bytes) in writes {
+            assert_eq!(from >> 16, (from + bytes.len() as u32 - 1) >> 16);
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_flashed_is_refused() {
+    let refused = |bytes: &[u8], address| {
+        export(bytes, ExportFormat::Hex, Place::Address(address)).expect_err("refused")
+    };
+    assert!(matches!(
+        refused(&blob(), 0x0800_4002),
+        ExportError::Unaligned { .. }
+    ));
+    assert!(matches!(
+        refused(&blob(), 0xffff_fff0),
+        ExportError::BeyondMemory { .. }
+    ));
+    let mut damaged = blob();
+    damaged[40] ^= 1;
+    assert!(matches!(
+        refused(&damaged, 0x0800_4000),
+        ExportError::Blob(BlobError::BadCrc { .. })
+    ));
+}

@@ -1,0 +1,319 @@
+//! The checks that a parameter set must pass, on the host as on the target.
+
+use crate::layout::{GROUPS, Numbers};
+use crate::model::{Sensitivity, dot};
+use crate::parameters::{ParameterError, ParameterSet};
+
+/// Largest element of PM PM^-1 - I that the check accepts: 100 times the rounding of `f32`
+/// for lever arms of decimetres.
+const INVERSE_TOLERANCE: f32 = 1e-5;
+
+/// Largest relative difference between a precomputed term and the product of its parts:
+/// four roundings of `f32`.
+const PRODUCT_TOLERANCE: f32 = 5e-7;
+
+impl ParameterSet {
+    /// Checks that every number is finite, PM^-1 inverts PM, each precomputed term follows
+    /// from its parts, scales and limits are above zero, code windows are sound and no phi
+    /// comes near zero within the calibrated range.
+    ///
+    /// # Errors
+    /// The first of these that does not hold.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        Numbers::of(self).check_finite()?;
+        self.check_terms()
+    }
+
+    /// The checks of [`ParameterSet::check`] for a set whose numbers are finite.
+    pub(crate) fn check_terms(&self) -> Result<(), ParameterError> {
+        self.check_signs()?;
+        self.check_inverse()?;
+        self.check_products()?;
+        let c = &self.constants;
+        for (probe, s) in (0u8..).zip(&c.sensitivity) {
+            if smallest_sensitivity(s, &c.calibrated_vertical) < c.sensitivity_min {
+                return Err(ParameterError::PoleInRange { probe });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_signs(&self) -> Result<(), ParameterError> {
+        let c = &self.constants;
+        let scales = [
+            ("the scale of the Hall codes", self.hall.m_per_code),
+            (
+                "the scale of the capacitive codes",
+                self.capacitive.m_per_code,
+            ),
+            ("the smallest sensitivity", c.sensitivity_min),
+        ];
+        for (value, x) in scales {
+            if x <= 0.0 {
+                return Err(ParameterError::NotPositive { value });
+            }
+        }
+        for limit in c.calibrated_planar.iter().chain(&c.calibrated_vertical) {
+            if *limit < 0.0 {
+                return Err(ParameterError::NotPositive {
+                    value: "a calibrated range",
+                });
+            }
+        }
+        for (sensors, window) in [
+            ("Hall", &c.hall_window),
+            ("capacitive", &c.capacitive_window),
+        ] {
+            if !window.is_sound() {
+                return Err(ParameterError::UnsoundWindow { sensors });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_inverse(&self) -> Result<(), ParameterError> {
+        let mut largest = 0.0f32;
+        for (i, row) in self.plane.iter().enumerate() {
+            for j in 0..3 {
+                let column = self.plane_inverse.map(|row| row[j]);
+                let off = (dot(row, column) - if i == j { 1.0 } else { 0.0 }).abs();
+                // A sum of overflows is no number, and larger than any.
+                largest = if off <= largest { largest } else { off };
+            }
+        }
+        if largest <= INVERSE_TOLERANCE {
+            Ok(())
+        } else {
+            Err(ParameterError::NotTheInverse { largest })
+        }
+    }
+
+    fn check_products(&self) -> Result<(), ParameterError> {
+        let c = &self.constants;
+        check_scaled(
+            "the planar constants",
+            c.planar_per_code.as_flattened(),
+            self.plane_inverse.as_flattened(),
+            self.hall.m_per_code,
+        )?;
+        check_scaled(
+            "the vertical constants",
+            c.vertical_per_code.as_flattened(),
+            self.capacitive.vertical_per_m.as_flattened(),
+            self.capacitive.m_per_code,
+        )?;
+        let geometry = &self.geometry;
+        let parts = geometry.misalignment_rad.iter().zip(&geometry.lever_arm_m);
+        for (k, (row, (&angle, &arm))) in self.plane.iter().zip(parts).enumerate() {
+            let (sin, cos) = sin_cos_series(angle);
+            let from = if k < 2 {
+                [-sin, cos, arm]
+            } else {
+                [cos, sin, arm]
+            };
+            for (made, from) in row.iter().zip(from) {
+                let follows = (made - from).abs() <= INVERSE_TOLERANCE;
+                if !follows {
+                    return Err(ParameterError::Inconsistent { term: "PM" });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Numbers {
+    /// Refuses a number that is not finite, by the name of its group.
+    ///
+    /// Apart from its caller, as is [`check_scaled`], so that its loop stays a loop: a blob is
+    /// checked once, and flash is short.
+    #[inline(never)]
+    pub(crate) fn check_finite(&self) -> Result<(), ParameterError> {
+        match self.0.iter().position(|number| !number.is_finite()) {
+            None => Ok(()),
+            Some(at) => {
+                let group = GROUPS.iter().find(|(_, end)| at < *end);
+                let group = group.map_or("a number", |(group, _)| group);
+                Err(ParameterError::NotFinite { group })
+            }
+        }
+    }
+}
+
+#[inline(never)]
+fn check_scaled(
+    term: &'static str,
+    made: &[f32],
+    from: &[f32],
+    scale: f32,
+) -> Result<(), ParameterError> {
+    for (made, from) in made.iter().zip(from) {
+        let product = from * scale;
+        let allowed = PRODUCT_TOLERANCE * product.abs() + f32::MIN_POSITIVE;
+        let follows = (made - product).abs() <= allowed;
+        if !follows {
+            return Err(ParameterError::Inconsistent { term });
+        }
+    }
+    Ok(())
+}
+
+/// Sine and cosine of an angle in rad by their series, within 1e-6 up to a right angle and
+/// wrong beyond it, where no misalignment lies. That is enough for a check, and a tenth of
+/// the flash that functions for any angle take.
+fn sin_cos_series(angle: f32) -> (f32, f32) {
+    let square = angle * angle;
+    let (mut sin, mut cos) = (1.0, 1.0);
+    let mut k = 12.0;
+    while k > 0.0 {
+        cos = 1.0 - square / (k * (k - 1.0)) * cos;
+        sin = 1.0 - square / (k * (k + 1.0)) * sin;
+        k -= 2.0;
+    }
+    (angle * sin, cos)
+}
+
+/// The smallest |phi| over the box |Z|, |Rx|, |Ry| <= limits, or 0 when phi changes sign.
+fn smallest_sensitivity(s: &Sensitivity<f32>, limits: &[f32; 3]) -> f32 {
+    let swing = (s.per_z_m.abs() * limits[0] + s.per_rx_rad.abs() * limits[1])
+        + s.per_ry_rad.abs() * limits[2];
+    let smallest = s.eta.abs() - swing;
+    if smallest > 0.0 { smallest } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::CodeWindow;
+    use crate::sample;
+
+    fn refused(change: impl FnOnce(&mut ParameterSet)) -> ParameterError {
+        let mut set = sample::parameters();
+        change(&mut set);
+        set.check().expect_err("an unusable set")
+    }
+
+    #[test]
+    fn the_series_agree_with_sine_and_cosine_up_to_a_right_angle() {
+        for k in -157..=157 {
+            let angle = 0.01 * k as f32;
+            let (sin, cos) = sin_cos_series(angle);
+            let (sin_true, cos_true) = libm::sincos(f64::from(angle));
+            assert!((f64::from(sin) - sin_true).abs() < 1e-6, "{angle}");
+            assert!((f64::from(cos) - cos_true).abs() < 1e-6, "{angle}");
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_not_finite_is_refused_by_the_name_of_its_group() {
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let group = |change: fn(&mut ParameterSet, f32)| match refused(|set| change(set, bad)) {
+                ParameterError::NotFinite { group } => group,
+                other => panic!("{other}"),
+            };
+            assert_eq!(group(|s, x| s.fit.peak[2] = x), "the fit record");
+            assert_eq!(
+                group(|s, x| s.geometry.lever_arm_m[0] = x),
+                "the probe geometry"
+            );
+            assert_eq!(group(|s, x| s.plane[2][2] = x), "PM");
+            assert_eq!(group(|s, x| s.plane_inverse[0][0] = x), "PM^-1");
+            assert_eq!(group(|s, x| s.hall.m_per_code = x), GROUPS[4].0);
+            assert_eq!(
+                group(|s, x| s.capacitive.vertical_per_m[1][1] = x),
+                GROUPS[5].0
+            );
+            assert_eq!(group(|s, x| s.capacitive.m_per_code = x), GROUPS[6].0);
+            assert_eq!(
+                group(|s, x| s.constants.vertical_per_code[2][2] = x),
+                GROUPS[7].0
+            );
+            assert_eq!(
+                group(|s, x| s.constants.sensitivity[2].per_ry_rad = x),
+                GROUPS[8].0
+            );
+            assert_eq!(
+                group(|s, x| s.constants.planar_per_code[0][0] = x),
+                GROUPS[9].0
+            );
+            assert_eq!(
+                group(|s, x| s.constants.calibrated_planar[2] = x),
+                GROUPS[10].0
+            );
+            assert_eq!(group(|s, x| s.constants.sensitivity_min = x), GROUPS[11].0);
+        }
+    }
+
+    #[test]
+    fn terms_that_do_not_follow_from_each_other_are_refused() {
+        assert!(matches!(
+            refused(|set| set.plane_inverse[0][1] *= 1.001),
+            ParameterError::NotTheInverse { largest } if largest > INVERSE_TOLERANCE
+        ));
+        assert!(matches!(
+            refused(|set| set.plane_inverse = [[f32::MAX, f32::MAX, -f32::MAX]; 3]),
+            ParameterError::NotTheInverse { .. }
+        ));
+        let term = "the planar constants";
+        let inconsistent = ParameterError::Inconsistent { term };
+        assert_eq!(
+            refused(|set| set.constants.planar_per_code[2][0] *= 1.00001),
+            inconsistent
+        );
+        let term = "the vertical constants";
+        let inconsistent = ParameterError::Inconsistent { term };
+        assert_eq!(
+            refused(|set| set.capacitive.m_per_code *= 1.00001),
+            inconsistent
+        );
+        let inconsistent = ParameterError::Inconsistent { term: "PM" };
+        assert_eq!(
+            refused(|set| set.geometry.misalignment_rad[2] += 1e-4),
+            inconsistent
+        );
+        assert_eq!(
+            refused(|set| set.geometry.lever_arm_m[1] += 1e-4),
+            inconsistent
+        );
+        assert_eq!(
+            refused(|set| set.geometry.misalignment_rad[0] = 1e30),
+            inconsistent
+        );
+    }
+
+    #[test]
+    fn scales_limits_and_windows_must_make_sense() {
+        let value = "the smallest sensitivity";
+        assert_eq!(
+            refused(|set| set.constants.sensitivity_min = 0.0),
+            ParameterError::NotPositive { value }
+        );
+        let value = "the scale of the Hall codes";
+        assert_eq!(
+            refused(|set| set.hall.m_per_code = -6.25e-8),
+            ParameterError::NotPositive { value }
+        );
+        let value = "a calibrated range";
+        assert_eq!(
+            refused(|set| set.constants.calibrated_vertical[1] = -1e-3),
+            ParameterError::NotPositive { value }
+        );
+        let sensors = "capacitive";
+        assert_eq!(
+            refused(|set| set.constants.capacitive_window = CodeWindow { low: 5, high: 4 }),
+            ParameterError::UnsoundWindow { sensors }
+        );
+    }
+
+    #[test]
+    fn a_pole_within_the_calibrated_range_is_refused() {
+        assert_eq!(
+            refused(|set| set.constants.sensitivity[2].per_z_m = 5000.0),
+            ParameterError::PoleInRange { probe: 2 }
+        );
+        assert_eq!(
+            refused(|set| set.constants.calibrated_vertical[0] = 1.0),
+            ParameterError::PoleInRange { probe: 0 }
+        );
+    }
+}

@@ -1,0 +1,64 @@
+//! Writes parameter blobs that a target must refuse, one for each reason, made of a good one.
+
+use runtime::blob::{CRC_BYTES, LAYOUT_VERSION, MAX_BYTES};
+use runtime::parameters::Text;
+use runtime::{BlobError, ParameterSet};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
+    let [good, folder] = arguments.as_slice() else {
+        eprintln!("use: bad_blobs params.bin FOLDER");
+        return ExitCode::from(2);
+    };
+    match write_all(good, folder) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("bad_blobs: {error}");
+            ExitCode::from(3)
+        }
+    }
+}
+
+fn write_all(good: &Path, folder: &Path) -> Result<(), Box<dyn Error>> {
+    let blob = std::fs::read(good)?;
+    let set = ParameterSet::from_bytes(&blob)?;
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.join(name), bytes);
+    write("good.bin", &blob)?;
+    // Power was lost: the rest of the sector is erased.
+    let mut cut = blob.clone();
+    if let Some(lost) = cut.get_mut(blob.len() * 2 / 3..) {
+        lost.fill(0xff);
+    }
+    cut.resize(16 * 1024, 0xff);
+    write("cut.bin", &cut)?;
+    write("erased.bin", &[0xff; 16 * 1024])?;
+    let mut newer = blob.clone();
+    let body = newer.len() - CRC_BYTES;
+    if let Some(version) = newer.get_mut(4..6) {
+        version.copy_from_slice(&(LAYOUT_VERSION + 1).to_le_bytes());
+    }
+    let check = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&newer[..body]);
+    newer.truncate(body);
+    newer.extend(check.to_le_bytes());
+    write("newer.bin", &newer)?;
+    let changed = |change: &dyn Fn(&mut ParameterSet)| -> Result<Vec<u8>, BlobError> {
+        let mut changed = set.clone();
+        change(&mut changed);
+        let mut buffer = [0; MAX_BYTES];
+        Ok(changed.to_bytes(&mut buffer)?.to_vec())
+    };
+    let other = Text::try_from("another stage")?;
+    write("other.bin", &changed(&|set| set.serial = other.clone())?)?;
+    write(
+        "nan.bin",
+        &changed(&|set| set.constants.sensitivity[1].per_z_m = f32::NAN)?,
+    )?;
+    write(
+        "singular.bin",
+        &changed(&|set| set.plane[1] = set.plane[0])?,
+    )?;
+    Ok(())
+}
