@@ -22,7 +22,7 @@
 //! | [`Verdict::WrongSequence`] | WRONGSEQUENCE |
 //! | [`Verdict::Resumed`] | SYNC, concluded |
 //! | failed check | WRONGCRC |
-//! | stale ([`super::receiver`]) | NONEWDATA |
+//! | stale ([`super::notice`]) | NONEWDATA |
 
 /// The 52 bits that a protected frame carries beside check and counter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

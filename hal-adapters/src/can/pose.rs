@@ -4,7 +4,8 @@
 
 use super::e2e::{Payload, Sequence, Verdict, protect, unprotect};
 use super::frame::Coded;
-use super::group::{BusFault, BusHealth, Group, GroupTick, Taken, Timing};
+use super::group::{Group, GroupTick};
+use super::notice::{BusFault, BusHealth, Taken, Timing};
 use super::table::{FRAME_BYTES, Message, VERTICAL_TICKS};
 use embedded_can::{Frame, Id};
 use runtime::{PlanarPose, Reading, Status};

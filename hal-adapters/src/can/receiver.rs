@@ -21,7 +21,8 @@
 //! ```
 
 use super::e2e::{SHORT_BITS, Sequence, Verdict, unprotect};
-use super::group::{BusFault, BusHealth, Group, GroupTick, Taken, Timing};
+use super::group::{Group, GroupTick};
+use super::notice::{BusFault, BusHealth, Taken, Timing};
 use super::sensor::{Layout, read_three, read_two};
 use super::table::{FRAME_BYTES, Message};
 use embedded_can::{Frame, Id};
