@@ -3,7 +3,7 @@
 
 use super::e2e::{Payload, protect, unprotect};
 use super::frame::Coded;
-use super::group::BusFault;
+use super::notice::BusFault;
 use super::status::{HealthPage, NodeStatus};
 use super::table::{FRAME_BYTES, Message};
 use embedded_can::{Frame, Id};

@@ -22,7 +22,7 @@
 //! | [`Verdict::WrongSequence`] | WRONGSEQUENCE |
 //! | [`Verdict::Resumed`] | SYNC, concluded |
 //! | failed check | WRONGCRC |
-//! | stale ([`super::receiver`]) | NONEWDATA |
+//! | stale ([`super::notice`]) | NONEWDATA |
 
 /// The 52 bits that a protected frame carries beside check and counter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,12 +69,15 @@ const fn step(register: u8, byte: u8) -> u8 {
     TABLE[(register ^ byte) as usize]
 }
 
-/// The check of a frame's bytes 1 to 7 with a data ID.
+/// The check over bytes 1 to 7 of a frame and a data ID. `low` holds bytes 0 to 3 and `high`
+/// bytes 4 to 7, lowest first: words, since a controller handles them as it does bytes.
 #[inline(always)]
-const fn check_byte(bytes: &[u8; 8], data_id: u8) -> u8 {
-    let [_, b1, b2, b3, b4, b5, b6, b7] = *bytes;
-    let head = step(step(step(step(0xff, b1), b2), b3), b4);
-    step(step(step(step(head, b5), b6), b7), data_id) ^ 0xff
+const fn check_byte(low: u32, high: u32, data_id: u8) -> u8 {
+    let head = step(0xff, (low >> 8) as u8);
+    let head = step(step(head, (low >> 16) as u8), (low >> 24) as u8);
+    let tail = step(step(head, high as u8), (high >> 8) as u8);
+    let tail = step(step(tail, (high >> 16) as u8), (high >> 24) as u8);
+    step(tail, data_id) ^ 0xff
 }
 
 /// The data ID of the message with this key at this counter (its low nibble).
@@ -84,27 +87,26 @@ pub const fn data_id(key: u8, counter: u8) -> u8 {
 }
 
 /// The eight bytes of a frame. Only the low nibble of `counter` is used.
-#[inline]
+#[inline(always)]
 pub const fn protect(key: u8, counter: u8, payload: Payload) -> [u8; 8] {
     let counter = counter & 0xf;
-    let [s0, s1, s2, _] = (payload.short << 4 | counter as u32).to_le_bytes();
-    let [l0, l1, l2, l3] = payload.long.to_le_bytes();
-    let mut bytes = [0, s0, s1, s2, l0, l1, l2, l3];
-    bytes[0] = check_byte(&bytes, data_id(key, counter));
-    bytes
+    let low = payload.short << 12 | (counter as u32) << 8;
+    let check = check_byte(low, payload.long, data_id(key, counter));
+    ((payload.long as u64) << 32 | (low | check as u32) as u64).to_le_bytes()
 }
 
 /// Counter and payload of a frame of the message with this key, or `None` if its check fails.
-#[inline]
+#[inline(always)]
 pub const fn unprotect(key: u8, bytes: &[u8; 8]) -> Option<(u8, Payload)> {
-    let [check, b1, b2, b3, b4, b5, b6, b7] = *bytes;
-    let counter = b1 & 0xf;
-    if check_byte(bytes, data_id(key, counter)) != check {
+    let word = u64::from_le_bytes(*bytes);
+    let (low, high) = (word as u32, (word >> 32) as u32);
+    let counter = (low >> 8 & 0xf) as u8;
+    if check_byte(low, high, data_id(key, counter)) != low as u8 {
         return None;
     }
     let payload = Payload {
-        short: u32::from_le_bytes([b1, b2, b3, 0]) >> 4,
-        long: u32::from_le_bytes([b4, b5, b6, b7]),
+        short: low >> 12,
+        long: high,
     };
     Some((counter, payload))
 }
@@ -147,44 +149,63 @@ impl Verdict {
 pub const LOST_MAX: u8 = 2;
 
 /// The counters of one message, as its receiver knows them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sequence {
-    last: Option<u8>,
-    candidate: Option<u8>,
+    /// The last one used.
+    last: u8,
+    /// One out of sequence, whose successor may resume.
+    candidate: u8,
+}
+
+/// In place of a counter that there is not yet.
+const NO_COUNTER: u8 = 0xff;
+
+impl Default for Sequence {
+    fn default() -> Self {
+        Self::START
+    }
 }
 
 impl Sequence {
     /// Before the first frame.
     pub const START: Self = Self {
-        last: None,
-        candidate: None,
+        last: NO_COUNTER,
+        candidate: NO_COUNTER,
     };
 
-    /// Judges the counter of a frame whose check held.
-    #[inline]
+    /// Takes the counter of a frame whose check held if it follows the last one; `false`, and
+    /// no change, if not.
+    #[inline(always)]
+    pub(super) const fn follow(&mut self, counter: u8) -> bool {
+        // Where there is no last counter yet, this is never true.
+        let follows = self.last == counter.wrapping_sub(1) & 0xf;
+        if follows {
+            self.last = counter;
+            self.candidate = NO_COUNTER;
+        }
+        follows
+    }
+
+    /// Judges the counter, 0 to 15, of a frame whose check held.
     pub const fn judge(&mut self, counter: u8) -> Verdict {
-        let Some(last) = self.last else {
-            self.last = Some(counter);
-            return Verdict::First;
-        };
-        let ahead = counter.wrapping_sub(last) & 0xf;
-        let verdict = if ahead == 1 {
-            Verdict::Next
+        if self.follow(counter) {
+            return Verdict::Next;
+        }
+        let ahead = counter.wrapping_sub(self.last) & 0xf;
+        let verdict = if self.last == NO_COUNTER {
+            Verdict::First
         } else if ahead == 0 {
             return Verdict::Repeated;
         } else if ahead <= LOST_MAX + 1 {
             Verdict::Lost { frames: ahead - 1 }
+        } else if self.candidate != NO_COUNTER && counter.wrapping_sub(self.candidate) & 0xf == 1 {
+            Verdict::Resumed
         } else {
-            match self.candidate {
-                Some(candidate) if counter.wrapping_sub(candidate) & 0xf == 1 => Verdict::Resumed,
-                _ => {
-                    self.candidate = Some(counter);
-                    return Verdict::WrongSequence { ahead };
-                }
-            }
+            self.candidate = counter;
+            return Verdict::WrongSequence { ahead };
         };
-        self.last = Some(counter);
-        self.candidate = None;
+        self.last = counter;
+        self.candidate = NO_COUNTER;
         verdict
     }
 }

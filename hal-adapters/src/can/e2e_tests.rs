@@ -6,8 +6,8 @@ use proptest::prelude::*;
 /// counter 4, data 01 .. 06, data ID list 0, 1, .. 15.
 #[test]
 fn the_check_equals_profile_2() {
-    let bytes = [0x32, 0x04, 1, 2, 3, 4, 5, 6];
-    assert_eq!(check_byte(&bytes, 4), bytes[0]);
+    let (low, high) = (0x0201_0432, 0x0605_0403);
+    assert_eq!(check_byte(low, high, 4), 0x32);
 }
 
 #[test]

@@ -6,187 +6,47 @@
 //! missing then is missing.
 
 use super::e2e::{Payload, Sequence, Verdict, unprotect};
+use super::notice::{BusFault, BusHealth, Taken, Timing};
 use super::table::{FRAME_BYTES, Message};
-
-/// Times in us by which a receiver judges. All are data: nothing here reads a clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Timing {
-    /// A tick whose frames are not complete this long after its first one is handed out.
-    pub assembly_us: u32,
-    /// With no good frame for this long the source is stale.
-    pub stale_us: u32,
-}
-
-impl Default for Timing {
-    /// For a servo period of 2 ms: half a period, and one and a half, so that a source that
-    /// falls silent is called stale within 4 ms by a receiver that is polled every
-    /// millisecond.
-    fn default() -> Self {
-        Self {
-            assembly_us: 1_000,
-            stale_us: 3_000,
-        }
-    }
-}
-
-/// What is wrong with a frame, or with a source that sends none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BusFault {
-    /// Not eight bytes, or a remote frame.
-    WrongLength {
-        /// Which message.
-        message: Message,
-        /// Its data length.
-        bytes: u8,
-    },
-    /// The check fails: damaged, or a frame of another message.
-    WrongCheck {
-        /// Which message.
-        message: Message,
-    },
-    /// The last frame again.
-    Repeated {
-        /// Which message.
-        message: Message,
-    },
-    /// The counter neither repeats nor follows: late, or after a long gap.
-    WrongSequence {
-        /// Which message.
-        message: Message,
-        /// Distance to the last used counter, modulo 16.
-        ahead: u8,
-    },
-    /// Frames are missing before this one, which is used.
-    Lost {
-        /// Which message.
-        message: Message,
-        /// How many.
-        frames: u8,
-    },
-    /// A good frame of a tick that was already handed out.
-    Late {
-        /// Which message.
-        message: Message,
-    },
-    /// Whole ticks are missing in a multiple of 16, as the sensor node's own count shows.
-    TicksLost {
-        /// How many.
-        ticks: u32,
-    },
-    /// The sensor node counts its ticks anew: it started again.
-    SenderRestarted,
-    /// No good frame for [`Timing::stale_us`].
-    Stale {
-        /// Age of the last good frame, us.
-        age_us: u32,
-    },
-}
-
-impl core::fmt::Display for BusFault {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let name = |message: &Message| message.spec().name;
-        match self {
-            Self::WrongLength { message, bytes } => {
-                write!(f, "{}: {bytes} bytes instead of 8", name(message))
-            }
-            Self::WrongCheck { message } => write!(f, "{}: check fails", name(message)),
-            Self::Repeated { message } => write!(f, "{}: repeated", name(message)),
-            Self::WrongSequence { message, ahead } => {
-                write!(f, "{}: counter {ahead} ahead", name(message))
-            }
-            Self::Lost { message, frames } => write!(f, "{}: {frames} lost", name(message)),
-            Self::Late { message } => write!(f, "{}: late", name(message)),
-            Self::TicksLost { ticks } => write!(f, "{ticks} ticks lost"),
-            Self::SenderRestarted => f.write_str("the sensor node started again"),
-            Self::Stale { age_us } => write!(f, "stale: no good frame for {age_us} us"),
-        }
-    }
-}
-
-/// Counters of a receiver since start; they stay at their largest value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct BusHealth {
-    /// Frames that were used.
-    pub good: u32,
-    /// Frames of a wrong length.
-    pub wrong_length: u32,
-    /// Frames whose check failed.
-    pub wrong_check: u32,
-    /// Repeated frames.
-    pub repeated: u32,
-    /// Frames out of sequence.
-    pub wrong_sequence: u32,
-    /// Frames missing by the counters.
-    pub lost: u32,
-    /// Good frames of a tick that was already handed out.
-    pub late: u32,
-    /// Ticks handed out with a frame missing.
-    pub incomplete: u32,
-    /// Times that the source went stale.
-    pub stale: u32,
-}
-
-impl BusHealth {
-    fn count(&mut self, fault: &BusFault) {
-        let (field, by) = match fault {
-            BusFault::WrongLength { .. } => (&mut self.wrong_length, 1),
-            BusFault::WrongCheck { .. } => (&mut self.wrong_check, 1),
-            BusFault::Repeated { .. } => (&mut self.repeated, 1),
-            BusFault::WrongSequence { .. } => (&mut self.wrong_sequence, 1),
-            BusFault::Lost { frames, .. } => (&mut self.lost, u32::from(*frames)),
-            BusFault::Late { .. } => (&mut self.late, 1),
-            BusFault::TicksLost { ticks } => (&mut self.lost, *ticks),
-            BusFault::SenderRestarted => return,
-            BusFault::Stale { .. } => (&mut self.stale, 1),
-        };
-        *field = field.saturating_add(by);
-    }
-}
 
 /// The frames of one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GroupTick<const N: usize> {
+pub(super) struct GroupTick<const N: usize> {
     /// Number of the tick, counted by the receiver.
-    pub sequence: u32,
+    pub(super) sequence: u32,
     /// When its first frame came, us.
-    pub time_us: u32,
-    /// The payloads, in the order of the group; `None` for a frame that did not come or was
-    /// not good.
-    pub payloads: [Option<Payload>; N],
+    pub(super) time_us: u32,
+    /// Bit k is set if frame k of the group came and was good.
+    came: u32,
+    payloads: [Payload; N],
 }
 
-/// What a frame, or the passing of time, gave.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Taken<T> {
-    /// A tick that is over.
-    pub tick: Option<T>,
-    /// What is wrong with the frame that was taken, or with the source.
-    pub fault: Option<BusFault>,
-}
+impl<const N: usize> GroupTick<N> {
+    const ALL: u32 = (1 << N) - 1;
 
-impl<T> Taken<T> {
-    pub(super) const NOTHING: Self = Self {
-        tick: None,
-        fault: None,
-    };
+    /// The payload of frame `k`, if it came and was good.
+    #[inline(always)]
+    pub(super) fn payload(&self, k: usize) -> Option<Payload> {
+        let payload = self.payloads.get(k)?;
+        (self.came >> k & 1 == 1).then_some(*payload)
+    }
 
-    pub(super) fn map<U>(self, make: impl FnOnce(T) -> U) -> Taken<U> {
-        Taken {
-            tick: self.tick.map(make),
-            fault: self.fault,
-        }
+    #[inline(always)]
+    const fn is_whole(&self) -> bool {
+        self.came == Self::ALL
     }
 }
 
 /// Collects the frames of `N` messages.
 #[derive(Clone, Debug)]
 pub(super) struct Group<const N: usize> {
-    messages: [Message; N],
     timing: Timing,
     sequences: [Sequence; N],
-    newest: Option<u32>,
+    is_started: bool,
+    newest: u32,
     done: Option<u32>,
-    pending: Option<GroupTick<N>>,
+    is_open: bool,
+    pending: GroupTick<N>,
     last_good_us: Option<u32>,
     stale: bool,
     health: BusHealth,
@@ -204,14 +64,20 @@ const fn is_after(a: u32, b: u32) -> bool {
 }
 
 impl<const N: usize> Group<N> {
-    pub(super) const fn new(messages: [Message; N], timing: Timing) -> Self {
+    pub(super) const fn new(timing: Timing) -> Self {
         Self {
-            messages,
             timing,
             sequences: [Sequence::START; N],
-            newest: None,
+            is_started: false,
+            newest: 0,
             done: None,
-            pending: None,
+            is_open: false,
+            pending: GroupTick {
+                sequence: 0,
+                time_us: 0,
+                came: 0,
+                payloads: [Payload { short: 0, long: 0 }; N],
+            },
             last_good_us: None,
             stale: false,
             health: BusHealth {
@@ -239,20 +105,16 @@ impl<const N: usize> Group<N> {
     /// The tick whose number ends in `counter` and is nearest to the newest one.
     #[inline(always)]
     pub(super) const fn nearest(&self, counter: u8) -> u32 {
-        match self.newest {
-            None => counter as u32,
-            Some(newest) => {
-                let ahead = (counter as u32).wrapping_sub(newest) << 28;
-                newest.wrapping_add((ahead as i32 >> 28) as u32)
-            }
+        if !self.is_started {
+            return counter as u32;
         }
+        let ahead = (counter as u32).wrapping_sub(self.newest) << 28;
+        self.newest.wrapping_add((ahead as i32 >> 28) as u32)
     }
 
     /// Counts `ticks` ticks that no frame told of.
     pub(super) const fn skip(&mut self, ticks: u32) {
-        if let Some(newest) = self.newest {
-            self.newest = Some(newest.wrapping_add(ticks));
-        }
+        self.newest = self.newest.wrapping_add(ticks);
     }
 
     /// Notes a fault of the source and returns it.
@@ -261,38 +123,89 @@ impl<const N: usize> Group<N> {
         fault
     }
 
-    /// Takes one frame of the group's `k`th message.
-    #[inline]
-    pub(super) fn take(&mut self, k: usize, data: &[u8], now_us: u32) -> Taken<GroupTick<N>> {
-        let (Some(&message), Some(sequence)) = (self.messages.get(k), self.sequences.get_mut(k))
-        else {
-            return Taken::NOTHING;
-        };
-        let checked = match data.first_chunk::<FRAME_BYTES>() {
-            Some(bytes) if data.len() == FRAME_BYTES => unprotect(message.spec().key, bytes),
+    /// Takes one frame of the group's `k`th message, which is `message`; `make` turns a tick
+    /// that is over into what the caller wants of it.
+    #[inline(always)]
+    pub(super) fn take<T>(
+        &mut self,
+        k: usize,
+        message: Message,
+        data: &[u8],
+        now_us: u32,
+        make: impl Fn(&GroupTick<N>) -> T,
+    ) -> Taken<T> {
+        let bytes = match data.first_chunk::<FRAME_BYTES>() {
+            Some(bytes) if data.len() == FRAME_BYTES => bytes,
             _ => {
                 let bytes = data.len() as u8;
                 return self.refuse(BusFault::WrongLength { message, bytes });
             }
         };
-        let Some((counter, payload)) = checked else {
+        let Some((counter, payload)) = unprotect(message.spec().key, bytes) else {
             return self.refuse(BusFault::WrongCheck { message });
         };
+        if !self.is_due(k, counter, now_us) {
+            return self.take_odd(k, message, (counter, payload), now_us, make);
+        }
+        self.is_good(now_us);
+        if !self.is_open {
+            self.newest = self.newest.wrapping_add(1);
+            self.open(self.newest, now_us);
+        }
+        Taken {
+            tick: self.fill(k, payload, make),
+            fault: None,
+        }
+    }
+
+    /// Whether a counter is the one that is due, of a tick that can be taken; if so it is
+    /// noted. Anything else is left to [`Group::take_odd`].
+    #[inline(always)]
+    fn is_due(&mut self, k: usize, counter: u8, now_us: u32) -> bool {
+        let tick = if self.is_open {
+            if elapsed(now_us, self.pending.time_us) >= self.timing.assembly_us {
+                return false;
+            }
+            self.pending.sequence
+        } else {
+            self.newest.wrapping_add(1)
+        };
+        let fits = tick & 0xf == u32::from(counter);
+        fits && self.sequences.get_mut(k).is_some_and(|s| s.follow(counter))
+    }
+
+    /// Notes that a good frame came.
+    #[inline(always)]
+    const fn is_good(&mut self, now_us: u32) {
+        self.health.good = self.health.good.saturating_add(1);
+        self.last_good_us = Some(now_us);
+        self.stale = false;
+    }
+
+    /// A frame whose check held, but which is not the one that is due.
+    #[cold]
+    #[inline(never)]
+    fn take_odd<T>(
+        &mut self,
+        k: usize,
+        message: Message,
+        (counter, payload): (u8, Payload),
+        now_us: u32,
+        make: impl Fn(&GroupTick<N>) -> T,
+    ) -> Taken<T> {
+        let Some(sequence) = self.sequences.get_mut(k) else {
+            return Taken::NOTHING;
+        };
         let verdict = sequence.judge(counter);
-        let lost = match verdict {
+        let fault = match verdict {
             Verdict::Repeated => return self.refuse(BusFault::Repeated { message }),
             Verdict::WrongSequence { ahead } => {
                 return self.refuse(BusFault::WrongSequence { message, ahead });
             }
-            Verdict::Lost { frames } => Some(BusFault::Lost { message, frames }),
+            Verdict::Lost { frames } => Some(self.note(BusFault::Lost { message, frames })),
             Verdict::First | Verdict::Next | Verdict::Resumed => None,
         };
-        if let Some(fault) = &lost {
-            self.health.count(fault);
-        }
-        self.health.good = self.health.good.saturating_add(1);
-        self.last_good_us = Some(now_us);
-        self.stale = false;
+        self.is_good(now_us);
         let mut tick = self.nearest(counter);
         if self.done.is_some_and(|done| !is_after(tick, done)) {
             if verdict != Verdict::Resumed {
@@ -301,73 +214,84 @@ impl<const N: usize> Group<N> {
             // After a break the sender goes on from anywhere: on with the numbers, never back.
             tick = tick.wrapping_add(16);
         }
-        self.collect(k, tick, payload, lost, now_us)
+        let mut over = None;
+        if self.is_open {
+            // A tick whose time is over takes no more frames: 16 ticks on, its counter returns.
+            let expired = elapsed(now_us, self.pending.time_us) >= self.timing.assembly_us;
+            let same = self.pending.sequence == tick;
+            let older = !same && !is_after(tick, self.pending.sequence);
+            if expired || !(same || older) {
+                over = self.hand_out(&make);
+            }
+            if older || (same && expired) {
+                let fault = Some(self.note(BusFault::Late { message }));
+                return Taken { tick: over, fault };
+            }
+        }
+        self.newest = tick;
+        self.is_started = true;
+        if !self.is_open {
+            self.open(tick, now_us);
+        }
+        // A group has two messages at least, so a tick that was just opened is not whole.
+        let whole = self.fill(k, payload, make);
+        Taken {
+            tick: over.or(whole),
+            fault,
+        }
     }
 
-    fn refuse(&mut self, fault: BusFault) -> Taken<GroupTick<N>> {
+    #[inline(always)]
+    const fn open(&mut self, tick: u32, now_us: u32) {
+        self.is_open = true;
+        self.pending.sequence = tick;
+        self.pending.time_us = now_us;
+        self.pending.came = 0;
+    }
+
+    /// Puts a payload into the open tick, and hands the tick out if it is whole by it.
+    #[inline(always)]
+    fn fill<T>(
+        &mut self,
+        k: usize,
+        payload: Payload,
+        make: impl Fn(&GroupTick<N>) -> T,
+    ) -> Option<T> {
+        if let Some(slot) = self.pending.payloads.get_mut(k) {
+            *slot = payload;
+        }
+        self.pending.came |= 1 << k;
+        if !self.pending.is_whole() {
+            return None;
+        }
+        self.is_open = false;
+        self.done = Some(self.pending.sequence);
+        Some(make(&self.pending))
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn refuse<T>(&mut self, fault: BusFault) -> Taken<T> {
         Taken {
             tick: None,
             fault: Some(self.note(fault)),
         }
     }
 
-    /// Adds a good frame to its tick, and hands out the tick that is over by it.
-    #[inline(always)]
-    fn collect(
-        &mut self,
-        k: usize,
-        tick: u32,
-        payload: Payload,
-        mut fault: Option<BusFault>,
-        now_us: u32,
-    ) -> Taken<GroupTick<N>> {
-        let mut over = None;
-        if let Some(pending) = &self.pending {
-            // A tick whose time is over takes no more frames: 16 ticks on, its counter returns.
-            let expired = elapsed(now_us, pending.time_us) >= self.timing.assembly_us;
-            let same = pending.sequence == tick;
-            let older = !same && !is_after(tick, pending.sequence);
-            if expired || !(same || older) {
-                over = self.hand_out();
-            }
-            if older || (same && expired) {
-                let message = self.messages.get(k).copied();
-                fault = message.map(|message| self.note(BusFault::Late { message }));
-                return Taken { tick: over, fault };
-            }
-        }
-        self.newest = Some(tick);
-        let pending = self.pending.get_or_insert(GroupTick {
-            sequence: tick,
-            time_us: now_us,
-            payloads: [None; N],
-        });
-        if let Some(slot) = pending.payloads.get_mut(k) {
-            *slot = Some(payload);
-        }
-        if pending.payloads.iter().all(Option::is_some) {
-            over = self.hand_out();
-        }
-        Taken { tick: over, fault }
-    }
-
-    #[inline(always)]
-    fn hand_out(&mut self) -> Option<GroupTick<N>> {
-        let tick = self.pending.take()?;
-        self.done = Some(tick.sequence);
-        if !tick.payloads.iter().all(Option::is_some) {
-            self.health.incomplete = self.health.incomplete.saturating_add(1);
-        }
-        Some(tick)
+    /// Hands out the pending tick, whole or not.
+    #[cold]
+    fn hand_out<T>(&mut self, make: impl Fn(&GroupTick<N>) -> T) -> Option<T> {
+        self.is_open = false;
+        self.done = Some(self.pending.sequence);
+        self.health.incomplete = self.health.incomplete.saturating_add(1);
+        Some(make(&self.pending))
     }
 
     /// What the passing of time gives: a tick whose time is over, a source that is stale.
-    pub(super) fn poll(&mut self, now_us: u32) -> Taken<GroupTick<N>> {
+    pub(super) fn poll<T>(&mut self, now_us: u32, make: impl Fn(&GroupTick<N>) -> T) -> Taken<T> {
         let mut taken = Taken::NOTHING;
-        if let Some(pending) = &self.pending
-            && elapsed(now_us, pending.time_us) >= self.timing.assembly_us
-        {
-            taken.tick = self.hand_out();
+        if self.is_open && elapsed(now_us, self.pending.time_us) >= self.timing.assembly_us {
+            taken.tick = self.hand_out(make);
         }
         if let Some(last) = self.last_good_us
             && !self.stale
@@ -383,8 +307,8 @@ impl<const N: usize> Group<N> {
 
     /// When [`Group::poll`] has something to say at the latest, if no frame comes.
     pub(super) fn deadline_us(&self) -> Option<u32> {
-        if let Some(pending) = &self.pending {
-            return Some(pending.time_us.wrapping_add(self.timing.assembly_us));
+        if self.is_open {
+            return Some(self.pending.time_us.wrapping_add(self.timing.assembly_us));
         }
         let last = self.last_good_us.filter(|_| !self.stale)?;
         Some(last.wrapping_add(self.timing.stale_us))

@@ -4,7 +4,8 @@
 
 use super::e2e::{Payload, Sequence, Verdict, protect, unprotect};
 use super::frame::Coded;
-use super::group::{BusFault, BusHealth, Group, GroupTick, Taken, Timing};
+use super::group::{Group, GroupTick};
+use super::notice::{BusFault, BusHealth, Taken, Timing};
 use super::table::{FRAME_BYTES, Message, VERTICAL_TICKS};
 use embedded_can::{Frame, Id};
 use runtime::{PlanarPose, Reading, Status};
@@ -122,9 +123,9 @@ pub struct PoseReceiver {
     vertical: [Option<ReceivedAxis>; 3],
 }
 
-fn received(tick: GroupTick<3>) -> ReceivedPose {
+fn received(tick: &GroupTick<3>) -> ReceivedPose {
     let lost = Status::PLANAR_INVALID.with(Status::FRAMES_MISSED);
-    let [x, y, rz] = tick.payloads;
+    let [x, y, rz] = [0, 1, 2].map(|k| tick.payload(k));
     let status = match (x, y, rz) {
         (Some(x), Some(y), Some(rz)) if x.short == y.short && y.short == rz.short => {
             Status::from_bits(x.short)
@@ -148,7 +149,7 @@ impl PoseReceiver {
     /// A receiver that has seen no frame.
     pub const fn new(timing: Timing) -> Self {
         Self {
-            planar: Group::new(PLANAR, timing),
+            planar: Group::new(timing),
             sequences: [Sequence::START; 3],
             vertical: [None; 3],
         }
@@ -165,8 +166,9 @@ impl PoseReceiver {
         } else {
             frame.data()
         };
-        if let Some(k) = PLANAR.iter().position(is) {
-            return self.planar.take(k, data, now_us).map(received);
+        let planar = (0usize..).zip(PLANAR).find(|(_, message)| is(message));
+        if let Some((k, message)) = planar {
+            return self.planar.take(k, message, data, now_us, received);
         }
         let fault = VERTICAL
             .iter()
@@ -210,7 +212,7 @@ impl PoseReceiver {
 
     /// What the passing of time gives, as [`super::SensorReceiver::poll`].
     pub fn poll(&mut self, now_us: u32) -> Taken<ReceivedPose> {
-        self.planar.poll(now_us).map(received)
+        self.planar.poll(now_us, received)
     }
 
     /// When [`PoseReceiver::poll`] has something to say if no frame comes.

@@ -21,7 +21,8 @@
 //! ```
 
 use super::e2e::{SHORT_BITS, Sequence, Verdict, unprotect};
-use super::group::{BusFault, BusHealth, Group, GroupTick, Taken, Timing};
+use super::group::{Group, GroupTick};
+use super::notice::{BusFault, BusHealth, Taken, Timing};
 use super::sensor::{Layout, read_three, read_two};
 use super::table::{FRAME_BYTES, Message};
 use embedded_can::{Frame, Id};
@@ -66,21 +67,20 @@ macro_rules! either {
     };
 }
 
-fn raw_16(tick: GroupTick<2>) -> RawFrame {
-    let [hall, capacitive] = tick
-        .payloads
-        .map(|p| p.map_or([MISSING_CODE; 3], read_three));
+#[inline(always)]
+fn raw_16(tick: &GroupTick<2>) -> RawFrame {
+    let codes = |k| tick.payload(k).map_or([MISSING_CODE; 3], read_three);
     RawFrame {
-        hall,
-        capacitive,
+        hall: codes(0),
+        capacitive: codes(1),
         sequence: tick.sequence,
         time_us: tick.time_us,
     }
 }
 
-fn raw_24(tick: GroupTick<3>) -> RawFrame {
-    let codes = tick.payloads.map(|p| p.map_or([MISSING_CODE; 2], read_two));
-    let [[a, b], [c, g1], [g2, g3]] = codes;
+fn raw_24(tick: &GroupTick<3>) -> RawFrame {
+    let codes = |k| tick.payload(k).map_or([MISSING_CODE; 2], read_two);
+    let ([a, b], [c, g1], [g2, g3]) = (codes(0), codes(1), codes(2));
     RawFrame {
         hall: [a, b, c],
         capacitive: [g1, g2, g3],
@@ -91,14 +91,10 @@ fn raw_24(tick: GroupTick<3>) -> RawFrame {
 
 impl SensorReceiver {
     /// A receiver that has seen no frame.
-    pub fn new(layout: Layout, timing: Timing) -> Self {
-        use Message as M;
+    pub const fn new(layout: Layout, timing: Timing) -> Self {
         let group = match layout {
-            Layout::Bits16 => Frames::Bits16(Group::new([M::Hall, M::Capacitive], timing)),
-            Layout::Bits24 => Frames::Bits24(Group::new(
-                [M::HallAb24, M::HallCCapacitive1At24, M::Capacitive23At24],
-                timing,
-            )),
+            Layout::Bits16 => Frames::Bits16(Group::new(timing)),
+            Layout::Bits24 => Frames::Bits24(Group::new(timing)),
         };
         Self {
             group,
@@ -126,18 +122,19 @@ impl SensorReceiver {
     /// As [`SensorReceiver::take`], from a standard identifier and the data of a data frame.
     #[inline]
     pub fn take_data(&mut self, id: u16, data: &[u8], now_us: u32) -> Taken<RawFrame> {
-        const HALL: u16 = Message::Hall.spec().id;
+        use Message as M;
+        const HALL: u16 = M::Hall.spec().id;
         const CAPACITIVE: u16 = Message::Capacitive.spec().id;
         const FIRST: u16 = Message::HallAb24.spec().id;
         const SECOND: u16 = Message::HallCCapacitive1At24.spec().id;
         const THIRD: u16 = Message::Capacitive23At24.spec().id;
         const TIME: u16 = Message::SensorTime.spec().id;
         match (&mut self.group, id) {
-            (Frames::Bits16(g), HALL) => g.take(0, data, now_us).map(raw_16),
-            (Frames::Bits16(g), CAPACITIVE) => g.take(1, data, now_us).map(raw_16),
-            (Frames::Bits24(g), FIRST) => g.take(0, data, now_us).map(raw_24),
-            (Frames::Bits24(g), SECOND) => g.take(1, data, now_us).map(raw_24),
-            (Frames::Bits24(g), THIRD) => g.take(2, data, now_us).map(raw_24),
+            (Frames::Bits16(g), HALL) => g.take(0, M::Hall, data, now_us, raw_16),
+            (Frames::Bits16(g), CAPACITIVE) => g.take(1, M::Capacitive, data, now_us, raw_16),
+            (Frames::Bits24(g), FIRST) => g.take(0, M::HallAb24, data, now_us, raw_24),
+            (Frames::Bits24(g), SECOND) => g.take(1, M::HallCCapacitive1At24, data, now_us, raw_24),
+            (Frames::Bits24(g), THIRD) => g.take(2, M::Capacitive23At24, data, now_us, raw_24),
             (_, TIME) => Taken {
                 tick: None,
                 fault: self.take_time(data),
@@ -200,8 +197,8 @@ impl SensorReceiver {
     /// source is called stale once; [`SensorReceiver::is_stale`] holds until a good frame.
     pub fn poll(&mut self, now_us: u32) -> Taken<RawFrame> {
         match &mut self.group {
-            Frames::Bits16(g) => g.poll(now_us).map(raw_16),
-            Frames::Bits24(g) => g.poll(now_us).map(raw_24),
+            Frames::Bits16(g) => g.poll(now_us, raw_16),
+            Frames::Bits24(g) => g.poll(now_us, raw_24),
         }
     }
 

@@ -119,7 +119,7 @@ const fn frame_of(message: Message, counter: u32, payload: Payload) -> Coded {
 
 /// The two frames of a tick in the 16-bit layout. A code that does not fit is sent as
 /// missing, never cut.
-#[inline]
+#[inline(always)]
 pub const fn frames_16(frame: &RawFrame) -> [Coded; 2] {
     [
         frame_of(Message::Hall, frame.sequence, three_codes(frame.hall)),

@@ -34,6 +34,10 @@ const LIMITS: [(&str, u64, u64, u64); 3] = [
     ("tick", 200, 96, 3),
 ];
 
+/// Functions that together make one job, and the most instructions that it may take: the two
+/// bus frames of a tick coded, and checked and put together again.
+const JOBS: [(&str, &[&str], u64); 1] = [("can_tick", &["can_code", "can_check"], 400)];
+
 /// Instructions of the loop that checks the counting: 1 + 1000 * 3 + 2.
 const LOOP: (&str, u64) = ("loop_1000", 3003);
 
@@ -84,6 +88,16 @@ fn run(cli: &Cli) -> Result<Vec<String>, Box<dyn Error>> {
         println!("RESULT {key}_text_bytes={}", end - entry);
         println!("RESULT {key}_jumps={jumps}");
         broken.extend(check(name, &key, c, stack, calls_out + jumps));
+    }
+    for (job, parts, most) in JOBS {
+        let part = |name: &&str| counts.get(*name).map_or(u64::MAX, |c| c.most);
+        let found = parts.iter().map(part).fold(0, u64::saturating_add);
+        println!("RESULT {}{job}_instructions={found}", cli.prefix);
+        if found > most {
+            broken.push(format!(
+                "{job}: {found} instructions, at most {most} are allowed"
+            ));
+        }
     }
     for name in LIMITS.map(|limit| limit.0).into_iter().chain([LOOP.0]) {
         if !functions.contains_key(name) {

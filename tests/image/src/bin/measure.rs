@@ -10,6 +10,8 @@
 use core::fmt::Write;
 use core::hint::black_box;
 use cortex_m_rt::entry;
+use hal_adapters::can::pose::planar_frames;
+use hal_adapters::can::{Coded, Layout, Message, SensorReceiver, Timing, sensor};
 use image::job::{self, FRAME_WORDS, PARAMETER_WORDS};
 use image::semihost::{CONSOLE, File, exit};
 use runtime::arithmetic::ArithmeticFault;
@@ -77,6 +79,42 @@ extern "C" fn counted_tick(
 #[inline(never)]
 extern "C" fn counted_servo_tick(servo: &mut Servo<'_>, frame: &RawFrame, reading: &mut Reading) {
     *reading = servo.tick(frame);
+}
+
+/// Codes the two bus frames of a tick (16-bit layout).
+#[unsafe(no_mangle)]
+#[inline(never)]
+extern "C" fn counted_can_code(frame: &RawFrame, coded: &mut [Coded; 2]) {
+    *coded = sensor::frames_16(frame);
+}
+
+/// Checks them and puts the tick together, in sequence; gives whether it is whole.
+#[unsafe(no_mangle)]
+#[inline(never)]
+extern "C" fn counted_can_check(
+    receiver: &mut SensorReceiver,
+    [first, second]: &[Coded; 2],
+    now_us: u32,
+    frame: &mut RawFrame,
+) -> bool {
+    const HALL: u16 = Message::Hall.spec().id;
+    const CAPACITIVE: u16 = Message::Capacitive.spec().id;
+    receiver.take_data(HALL, &first.bytes, now_us);
+    let taken = receiver.take_data(CAPACITIVE, &second.bytes, now_us);
+    match taken.tick {
+        Some(tick) => {
+            *frame = tick;
+            true
+        }
+        None => false,
+    }
+}
+
+/// Codes X, Y, Rz of a reading.
+#[unsafe(no_mangle)]
+#[inline(never)]
+extern "C" fn counted_can_pose(reading: &Reading, counter: u32, coded: &mut [Coded; 3]) {
+    *coded = planar_frames(reading, counter);
 }
 
 #[cfg(c_reference)]
@@ -300,6 +338,25 @@ fn main() -> ! {
         frame.hall[0] = if k % 5 == 0 { i32::MIN } else { 900 };
         counted_servo_tick(&mut servo, black_box(&frame), &mut reading);
         black_box(&reading);
+    }
+    let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
+    let mut coded = sensor::frames_16(&frame);
+    let mut poses = planar_frames(&reading, 0);
+    // The first tick starts the sequence; from then on every frame is the one that is due.
+    for first in sensor::frames_16(&RawFrame {
+        sequence: 0,
+        ..frame
+    }) {
+        receiver.take_data(first.message.id().as_raw(), &first.bytes, 0);
+    }
+    for k in 1..100 {
+        let (_, _, mut sent) = round(&mut words, 0);
+        sent.sequence = k;
+        counted_can_code(black_box(&sent), &mut coded);
+        counted_can_check(&mut receiver, black_box(&coded), 2000 * k, &mut sent);
+        black_box(&sent);
+        counted_can_pose(black_box(&reading), k, &mut poses);
+        black_box(&poses);
     }
     let base = touched(|| ());
     let tick = touched(|| counted_tick(&decoder, &frame, &PlanarPose::ZERO, &mut reading));

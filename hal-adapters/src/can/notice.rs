@@ -1,0 +1,154 @@
+//! What a receiver notices: faults of frames and of the source, counted.
+
+use super::table::Message;
+
+/// Times in us by which a receiver judges. All are data: nothing here reads a clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// A tick whose frames are not complete this long after its first one is handed out.
+    pub assembly_us: u32,
+    /// With no good frame for this long the source is stale.
+    pub stale_us: u32,
+}
+
+impl Default for Timing {
+    /// For a servo period of 2 ms: half a period, and one and a half, so that a source that
+    /// falls silent is called stale within 4 ms by a receiver that is polled every
+    /// millisecond.
+    fn default() -> Self {
+        Self {
+            assembly_us: 1_000,
+            stale_us: 3_000,
+        }
+    }
+}
+
+/// What is wrong with a frame, or with a source that sends none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BusFault {
+    /// Not eight bytes, or a remote frame.
+    WrongLength {
+        /// Which message.
+        message: Message,
+        /// Its data length.
+        bytes: u8,
+    },
+    /// The check fails: damaged, or a frame of another message.
+    WrongCheck {
+        /// Which message.
+        message: Message,
+    },
+    /// The last frame again.
+    Repeated {
+        /// Which message.
+        message: Message,
+    },
+    /// The counter neither repeats nor follows: late, or after a long gap.
+    WrongSequence {
+        /// Which message.
+        message: Message,
+        /// Distance to the last used counter, modulo 16.
+        ahead: u8,
+    },
+    /// Frames are missing before this one, which is used.
+    Lost {
+        /// Which message.
+        message: Message,
+        /// How many.
+        frames: u8,
+    },
+    /// A good frame of a tick that was already handed out.
+    Late {
+        /// Which message.
+        message: Message,
+    },
+    /// Whole ticks are missing in a multiple of 16, as the sensor node's own count shows.
+    TicksLost {
+        /// How many.
+        ticks: u32,
+    },
+    /// The sensor node counts its ticks anew: it started again.
+    SenderRestarted,
+    /// No good frame for [`Timing::stale_us`].
+    Stale {
+        /// Age of the last good frame, us.
+        age_us: u32,
+    },
+}
+
+impl core::fmt::Display for BusFault {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let name = |message: &Message| message.spec().name;
+        match self {
+            Self::WrongLength { message, bytes } => {
+                write!(f, "{}: {bytes} bytes instead of 8", name(message))
+            }
+            Self::WrongCheck { message } => write!(f, "{}: check fails", name(message)),
+            Self::Repeated { message } => write!(f, "{}: repeated", name(message)),
+            Self::WrongSequence { message, ahead } => {
+                write!(f, "{}: counter {ahead} ahead", name(message))
+            }
+            Self::Lost { message, frames } => write!(f, "{}: {frames} lost", name(message)),
+            Self::Late { message } => write!(f, "{}: late", name(message)),
+            Self::TicksLost { ticks } => write!(f, "{ticks} ticks lost"),
+            Self::SenderRestarted => f.write_str("the sensor node started again"),
+            Self::Stale { age_us } => write!(f, "stale: no good frame for {age_us} us"),
+        }
+    }
+}
+
+/// Counters of a receiver since start; they stay at their largest value.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BusHealth {
+    /// Frames that were used.
+    pub good: u32,
+    /// Frames of a wrong length.
+    pub wrong_length: u32,
+    /// Frames whose check failed.
+    pub wrong_check: u32,
+    /// Repeated frames.
+    pub repeated: u32,
+    /// Frames out of sequence.
+    pub wrong_sequence: u32,
+    /// Frames missing by the counters.
+    pub lost: u32,
+    /// Good frames of a tick that was already handed out.
+    pub late: u32,
+    /// Ticks handed out with a frame missing.
+    pub incomplete: u32,
+    /// Times that the source went stale.
+    pub stale: u32,
+}
+
+impl BusHealth {
+    pub(super) fn count(&mut self, fault: &BusFault) {
+        let (field, by) = match fault {
+            BusFault::WrongLength { .. } => (&mut self.wrong_length, 1),
+            BusFault::WrongCheck { .. } => (&mut self.wrong_check, 1),
+            BusFault::Repeated { .. } => (&mut self.repeated, 1),
+            BusFault::WrongSequence { .. } => (&mut self.wrong_sequence, 1),
+            BusFault::Lost { frames, .. } => (&mut self.lost, u32::from(*frames)),
+            BusFault::Late { .. } => (&mut self.late, 1),
+            BusFault::TicksLost { ticks } => (&mut self.lost, *ticks),
+            BusFault::SenderRestarted => return,
+            BusFault::Stale { .. } => (&mut self.stale, 1),
+        };
+        *field = field.saturating_add(by);
+    }
+}
+
+/// What a frame, or the passing of time, gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Taken<T> {
+    /// A tick that is over.
+    pub tick: Option<T>,
+    /// What is wrong with the frame that was taken, or with the source.
+    pub fault: Option<BusFault>,
+}
+
+impl<T> Taken<T> {
+    pub(super) const NOTHING: Self = Self {
+        tick: None,
+        fault: None,
+    };
+}
