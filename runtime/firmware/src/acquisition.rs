@@ -5,8 +5,9 @@ use hal_adapters::adc::stuck::StuckWatch;
 use hal_adapters::adc::{AdcError, FrameSampler};
 use runtime::RawFrame;
 
-/// Ticks in a row without codes after which the converter is started again: 0.13 s.
-pub const RESTART_TICKS: u16 = 64;
+/// Ticks in a row without codes after which the converter is started again: 32 ms. A start
+/// takes about 130 us of SPI.
+pub const RESTART_TICKS: u16 = 16;
 
 /// A converter and what is known of it.
 #[derive(Debug)]
@@ -15,24 +16,32 @@ pub struct Acquisition<A: FrameSampler> {
     watch: StuckWatch,
     /// The fault of a trigger, told by the sample that follows it.
     trigger_fault: Option<AdcError<A::Bus>>,
-    started: bool,
     faults_in_a_row: u16,
     faults: u32,
     starts: u32,
 }
 
 impl<A: FrameSampler> Acquisition<A> {
-    /// A converter that the first [`Self::sample`] starts.
+    /// A converter that is not started yet: see [`Self::start`].
     pub const fn new(converter: A) -> Self {
         Self {
             converter,
             watch: StuckWatch::NEW,
             trigger_fault: None,
-            started: false,
             faults_in_a_row: 0,
             faults: 0,
             starts: 0,
         }
+    }
+
+    /// Resets the converter and sets it up.
+    ///
+    /// # Errors
+    /// Why it could not be. Ticks go on, and it is started again after [`RESTART_TICKS`].
+    pub fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<A::Bus>> {
+        self.starts = self.starts.saturating_add(1);
+        self.faults_in_a_row = 0;
+        self.converter.start(delay)
     }
 
     /// Starts the conversion of a tick. A fault is told by the sample of this tick.
@@ -43,8 +52,8 @@ impl<A: FrameSampler> Acquisition<A> {
     /// The codes of a tick.
     ///
     /// # Errors
-    /// Why there are none. A converter that does not give any for [`RESTART_TICKS`] ticks is
-    /// started again in place of being read.
+    /// Why there are none. After [`RESTART_TICKS`] such ticks in a row the converter is started
+    /// again in place of being read, and gives codes from the next tick on.
     pub fn sample(
         &mut self,
         sequence: u32,
@@ -52,15 +61,11 @@ impl<A: FrameSampler> Acquisition<A> {
         delay: &mut impl DelayNs,
     ) -> Result<RawFrame, AdcError<A::Bus>> {
         let result = self.try_sample(sequence, time_us, delay);
-        match result {
-            Ok(_) => self.faults_in_a_row = 0,
-            Err(_) => {
-                self.faults = self.faults.saturating_add(1);
-                self.faults_in_a_row = self.faults_in_a_row.saturating_add(1);
-                if self.faults_in_a_row >= RESTART_TICKS {
-                    self.started = false;
-                }
-            }
+        if result.is_ok() {
+            self.faults_in_a_row = 0;
+        } else {
+            self.faults = self.faults.saturating_add(1);
+            self.faults_in_a_row = self.faults_in_a_row.saturating_add(1);
         }
         result
     }
@@ -84,14 +89,10 @@ impl<A: FrameSampler> Acquisition<A> {
         if let Some(fault) = self.trigger_fault.take() {
             return Err(fault);
         }
-        if !self.started {
-            // Whether it starts or not: the next ticks read it, and tell what is wrong then.
-            self.started = true;
-            self.faults_in_a_row = 0;
-            self.starts = self.starts.saturating_add(1);
-            self.converter.start(delay)?;
-            self.converter.trigger(delay)?;
-            delay.delay_us(A::SETTLE_US);
+        if self.faults_in_a_row >= RESTART_TICKS {
+            self.start(delay)?;
+            let (ready, read) = (0, 0);
+            return Err(AdcError::NotReady { ready, read });
         }
         let frame = self.converter.sample(sequence, time_us)?;
         self.watch.pass(frame)
@@ -151,14 +152,16 @@ mod tests {
     #[test]
     fn a_converter_that_comes_back_is_started_again_by_itself() {
         let mut adc = Acquisition::new(Fake::default());
+        assert_eq!(adc.start(&mut NoDelay), Ok(()));
         assert!(adc.sample(0, 0, &mut NoDelay).is_ok());
         adc.converter.broken = true;
         let faults = (0..200).filter(|&k| adc.sample(k, 0, &mut NoDelay).is_err());
         assert_eq!(faults.count(), 200);
         adc.converter.broken = false;
-        let back = (0..u32::from(RESTART_TICKS)).find(|&k| adc.sample(k, 0, &mut NoDelay).is_ok());
+        let back =
+            (0..=2 * u32::from(RESTART_TICKS)).find(|&k| adc.sample(k, 0, &mut NoDelay).is_ok());
         assert!(back.is_some());
-        assert_eq!(adc.starts(), 2 + 200 / u32::from(RESTART_TICKS));
+        assert_eq!(adc.starts(), 2 + 199 / u32::from(RESTART_TICKS));
         assert_eq!(adc.faults(), 200 + back.unwrap_or(0));
     }
 }

@@ -33,7 +33,9 @@ impl Bus {
             .leave_disabled();
         if let Some(id) = StandardId::new(Message::Command.spec().id) {
             let commands = Mask32::frames_with_std_id(id, StandardId::MAX);
-            can.modify_filters().clear().enable_bank(0, Fifo::Fifo0, commands);
+            can.modify_filters()
+                .clear()
+                .enable_bank(0, Fifo::Fifo0, commands);
         }
         can.enable_interrupt(Interrupt::TransmitMailboxEmpty);
         Self {
@@ -84,10 +86,12 @@ impl Bus {
             return;
         }
         while let Some(coded) = self.outbox.front() {
-            if let Some(frame) = coded.to_frame::<Frame>()
-                && self.can.transmit(&frame).is_err()
-            {
-                return;
+            if let Some(frame) = coded.to_frame::<Frame>() {
+                match self.can.transmit(&frame) {
+                    Err(_) => return,
+                    Ok(status) if status.dequeued_frame().is_some() => self.outbox.count_dropped(1),
+                    Ok(_) => {}
+                }
             }
             self.outbox.pop();
             self.sent = self.sent.wrapping_add(1);

@@ -25,11 +25,15 @@ impl FpuSettings for Fpu {
         let fpscr: u32;
         // SAFETY: reads a register of the FPU, which the start-up code has switched on. It may
         // touch memory as far as the compiler knows, so that no call is moved past it.
-        unsafe { core::arch::asm!("vmrs {}, fpscr", out(reg) fpscr, options(nostack, preserves_flags)) };
+        unsafe {
+            core::arch::asm!("vmrs {}, fpscr", out(reg) fpscr, options(nostack, preserves_flags))
+        };
         let changed = fpscr & SETTINGS != 0;
         if changed {
             // SAFETY: the settings that every function of this program assumes.
-            unsafe { core::arch::asm!("vmsr fpscr, {}", in(reg) 0u32, options(nostack, preserves_flags)) };
+            unsafe {
+                core::arch::asm!("vmsr fpscr, {}", in(reg) 0u32, options(nostack, preserves_flags))
+            };
         }
         changed
     }

@@ -42,7 +42,9 @@ mod tests {
     fn each_state_has_its_number_of_flashes() {
         let flashes = |state, identifying| {
             let on = |tick| is_on(state, identifying, tick);
-            (1..=SECOND).filter(|&tick| on(tick) && !on(tick - 1)).count()
+            (1..=SECOND)
+                .filter(|&tick| on(tick) && !on(tick - 1))
+                .count()
         };
         assert_eq!(flashes(NodeState::Running, false), 1);
         assert_eq!(flashes(NodeState::BadParameters, false), 2);

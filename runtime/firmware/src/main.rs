@@ -63,11 +63,10 @@ mod app {
     use firmware::fpu::{Fpu, FpuSettings};
     use firmware::node::{Facts, Node, Parameters, SampleFault};
     use firmware::schedule::{Schedule, Tick};
-    use firmware::slots;
+    use firmware::slots::{self, Loaded};
     use firmware::telemetry::{Counters, Ended, STAGE};
     use hal_adapters::adc::FrameSampler;
-    use runtime::parameters::Text;
-    use runtime::{Decoder, OnInvalid, Servo};
+    use runtime::{OnInvalid, Servo};
     use stm32f4xx_hal::can::CanExt;
     use stm32f4xx_hal::gpio::{Output, PA4, PB0, PC1, PinState, Speed};
     use stm32f4xx_hal::pac::TIM2;
@@ -104,7 +103,7 @@ mod app {
         _reset: PB0<Output>,
     }
 
-    #[init(local = [decoder: Option<Decoder> = None, serial: Text = Text::new()])]
+    #[init(local = [loaded: Option<Loaded> = None])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let device = cx.device;
         let watchdog_reset = device.RCC.csr().read().wdgrstf().bit_is_set();
@@ -129,7 +128,9 @@ mod app {
         let mode = hal_adapters::adc::ads131m08::MODE;
         #[cfg(feature = "ads8688")]
         let mode = hal_adapters::adc::ads8688::MODE;
-        let spi = device.SPI1.spi(pins, mode, Hertz::from_raw(board::SPI_HZ), &mut rcc);
+        let spi = device
+            .SPI1
+            .spi(pins, mode, Hertz::from_raw(board::SPI_HZ), &mut rcc);
         let spi = infallible(ExclusiveDevice::new_no_delay(spi, select));
         #[cfg(not(feature = "ads8688"))]
         let converter = Converter::new(spi, sync, board::CHANNELS);
@@ -138,25 +139,32 @@ mod app {
 
         let bus = Bus::new(device.CAN1.can((gpiob.pb9, gpiob.pb8), &mut rcc));
 
-        let chosen = slots::choose(flash::parameter_slots(), board::STAGE_SERIAL);
+        let memory = flash::parameter_slots();
+        let choice = slots::choose(memory, board::STAGE_SERIAL);
+        let loaded = choice
+            .slot
+            .and_then(|slot| memory.get(slot))
+            .and_then(|slot| slots::load(slot));
         // Settings of the FPU that do not stay as they are put cannot be relied on.
         let mut fpu = Fpu;
         fpu.restore();
         let parameters = if fpu.restore() || !Fpu::defaults_are_sound() {
             Parameters::SelfTestFailed
-        } else if let Some(set) = chosen.set {
-            let decoder: &'static Decoder = cx.local.decoder.insert(set.decoder());
-            *cx.local.serial = set.serial;
+        } else if let Some(loaded) = loaded {
+            let loaded: &'static Loaded = cx.local.loaded.insert(loaded);
             Parameters::Usable {
-                servo: Servo::new(decoder, OnInvalid::Zero),
-                serial: cx.local.serial.as_str(),
-                other_slot: chosen.refusal,
+                servo: Servo::new(&loaded.decoder, OnInvalid::Zero),
+                serial: &loaded.serial,
+                other_slot: choice.refusal,
             }
         } else {
             Parameters::None {
-                refusal: chosen.refusal.unwrap_or(slots::Refusal::NEITHER),
+                refusal: choice.refusal.unwrap_or(slots::Refusal::NEITHER),
             }
         };
+        let mut acquisition = Acquisition::new(converter);
+        // A converter that is not there yet is started again by the ticks, which tell why.
+        let _ = acquisition.start(&mut Cycles);
 
         TIM2::enable(&mut rcc);
         let mut clock = Clock::new(device.TIM2);
@@ -171,7 +179,7 @@ mod app {
                 clock,
                 schedule,
                 open: None,
-                acquisition: Acquisition::new(converter),
+                acquisition,
                 node: Node::new(parameters, watchdog_reset),
                 watchdog,
                 led: gpioc.pc1.into_push_pull_output(),
@@ -231,13 +239,14 @@ mod app {
 
         let sample = acquisition.sample(tick.sequence, tick.started_us, &mut Cycles);
         bus.start_tick();
-        bus.receive(node);
         let facts = Facts {
             missed_ticks: schedule.missed(),
             bus_off: bus.bus_off(),
         };
         let sample = sample.map_err(|fault| SampleFault::from(&fault));
         let reading = node.tick(sample, &facts, &mut Fpu, &mut bus.outbox);
+        // Behind the pose, so that its frames find the mailboxes empty.
+        bus.receive(node);
         bus.send();
         led.set_state(PinState::from(node.light()));
 

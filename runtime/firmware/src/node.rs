@@ -28,8 +28,16 @@ pub const REASON_FPU: u8 = 1;
 /// The reading of a tick that gave no pose.
 const NOTHING: Reading = Reading {
     pose: runtime::Pose {
-        planar: PlanarPose { x_m: 0.0, y_m: 0.0, rz_rad: 0.0 },
-        vertical: runtime::VerticalPose { z_m: 0.0, rx_rad: 0.0, ry_rad: 0.0 },
+        planar: PlanarPose {
+            x_m: 0.0,
+            y_m: 0.0,
+            rz_rad: 0.0,
+        },
+        vertical: runtime::VerticalPose {
+            z_m: 0.0,
+            rx_rad: 0.0,
+            ry_rad: 0.0,
+        },
     },
     status: Status::PLANAR_INVALID.with(Status::VERTICAL_INVALID),
 };
@@ -177,7 +185,11 @@ impl<'d> Node<'d> {
         self.answer(command.number, command.token, outcome, detail, outbox);
     }
 
-    fn decode(&mut self, sample: &Result<RawFrame, SampleFault>, fpu: &mut impl FpuSettings) -> Reading {
+    fn decode(
+        &mut self,
+        sample: &Result<RawFrame, SampleFault>,
+        fpu: &mut impl FpuSettings,
+    ) -> Reading {
         let Parameters::Usable { servo, .. } = &mut self.parameters else {
             return NOTHING;
         };
@@ -191,7 +203,11 @@ impl<'d> Node<'d> {
         if changed_meanwhile { NOTHING } else { reading }
     }
 
-    fn state_of(&self, sample: &Result<RawFrame, SampleFault>, reading: &Reading) -> (NodeState, u8) {
+    fn state_of(
+        &self,
+        sample: &Result<RawFrame, SampleFault>,
+        reading: &Reading,
+    ) -> (NodeState, u8) {
         let other_slot = match &self.parameters {
             Parameters::SelfTestFailed => return (NodeState::SelfTestFailed, REASON_FPU),
             Parameters::None { refusal } if refusal.erased => {
@@ -286,7 +302,8 @@ impl<'d> Node<'d> {
 
     /// Answers once the re-zero that runs has ended.
     fn follow_rezero(&mut self, outbox: &mut Outbox) {
-        let (Some(token), Parameters::Usable { servo, .. }) = (self.rezero, &self.parameters) else {
+        let (Some(token), Parameters::Usable { servo, .. }) = (self.rezero, &self.parameters)
+        else {
             return;
         };
         let (outcome, detail) = match servo.rezero_state() {
@@ -319,7 +336,14 @@ impl<'d> Node<'d> {
         }
     }
 
-    fn answer(&mut self, number: u8, token: u8, outcome: Outcome, detail: u32, outbox: &mut Outbox) {
+    fn answer(
+        &mut self,
+        number: u8,
+        token: u8,
+        outcome: Outcome,
+        detail: u32,
+        outbox: &mut Outbox,
+    ) {
         let answer = Answer {
             number,
             token,

@@ -54,7 +54,10 @@ impl Schedule {
         let due_us = self.due_us.wrapping_add(skipped.wrapping_mul(PERIOD_US));
         let late = now_us.wrapping_sub(due_us) > LATE_US;
         let sequence = self.sequence.wrapping_add(skipped);
-        self.missed = self.missed.saturating_add(skipped).saturating_add(late as u32);
+        self.missed = self
+            .missed
+            .saturating_add(skipped)
+            .saturating_add(late as u32);
         self.due_us = due_us.wrapping_add(PERIOD_US);
         self.sequence = sequence.wrapping_add(1);
         Tick {
@@ -85,7 +88,11 @@ mod tests {
             let due_us = start.wrapping_add((n + 1) * PERIOD_US);
             assert_eq!(schedule.due_us(), due_us);
             let started_us = due_us.wrapping_add(late);
-            let want = Tick { sequence: n, due_us, started_us };
+            let want = Tick {
+                sequence: n,
+                due_us,
+                started_us,
+            };
             assert_eq!(schedule.start_tick(started_us), want);
         }
         assert_eq!(schedule.missed(), 0);

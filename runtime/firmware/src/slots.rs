@@ -6,7 +6,8 @@
 //! slot that is torn by a power failure leaves the other one to run on.
 
 use runtime::blob::BlobError;
-use runtime::ParameterSet;
+use runtime::parameters::Text;
+use runtime::{Decoder, ParameterSet};
 
 /// Slots there are.
 pub const SLOTS: usize = 2;
@@ -49,26 +50,28 @@ impl Refusal {
     }
 }
 
-/// What the slots hold.
-#[derive(Clone, Debug)]
-pub struct Chosen {
-    /// The parameters to use, if any.
-    pub set: Option<ParameterSet>,
+/// Which slot to use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// Its number, if any is sound.
+    pub slot: Option<usize>,
     /// The worst that is wrong with a slot: of damaged and empty ones a damaged one, slot 0
     /// first. `None` if both are sound.
     pub refusal: Option<Refusal>,
 }
 
-/// Reads both slots. With a `serial`, blobs of other stages are refused.
-pub fn choose(slots: [&[u8]; SLOTS], serial: Option<&str>) -> Chosen {
-    let read = |memory: &[u8]| {
-        let set = ParameterSet::from_flash(memory)?;
-        if let Some(serial) = serial {
-            set.expect_serial(serial)?;
-        }
-        Ok(set)
-    };
-    let [first, second] = slots.map(read);
+/// What a sound slot gives.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The decoder.
+    pub decoder: Decoder,
+    /// Serial number of the stage.
+    pub serial: Text,
+}
+
+/// Looks at both slots. With a `serial`, blobs of other stages are refused.
+pub fn choose(slots: [&[u8]; SLOTS], serial: Option<&str>) -> Choice {
+    let [first, second] = slots.map(|memory| created(memory, serial));
     let refusals = [
         first.as_ref().err().map(|e| Refusal::of(0, e)),
         second.as_ref().err().map(|e| Refusal::of(1, e)),
@@ -77,10 +80,36 @@ pub fn choose(slots: [&[u8]; SLOTS], serial: Option<&str>) -> Chosen {
         [Some(a), Some(b)] if a.erased && !b.erased => Some(b),
         [a, b] => a.or(b),
     };
-    let set = match (first, second) {
-        (Ok(a), Ok(b)) if b.created.as_str() > a.created.as_str() => Some(b),
-        (Ok(a), _) => Some(a),
-        (Err(_), b) => b.ok(),
+    let slot = match (first, second) {
+        (Ok(a), Ok(b)) if b.as_str() > a.as_str() => Some(1),
+        (Ok(_), _) => Some(0),
+        (Err(_), Ok(_)) => Some(1),
+        (Err(_), Err(_)) => None,
     };
-    Chosen { set, refusal }
+    Choice { slot, refusal }
 }
+
+/// When the blob of a slot was made. A parameter set has 700 bytes and is read at start only:
+/// in functions of their own, these leave the stack at once.
+#[inline(never)]
+fn created(memory: &[u8], serial: Option<&str>) -> Result<Text, BlobError> {
+    let set = ParameterSet::from_flash(memory)?;
+    if let Some(serial) = serial {
+        set.expect_serial(serial)?;
+    }
+    Ok(set.created)
+}
+
+/// Reads a slot that [`choose`] found sound.
+#[inline(never)]
+pub fn load(memory: &[u8]) -> Option<Loaded> {
+    let set = ParameterSet::from_flash(memory).ok()?;
+    Some(Loaded {
+        decoder: set.decoder(),
+        serial: set.serial,
+    })
+}
+
+#[cfg(test)]
+#[path = "slots_tests.rs"]
+pub(crate) mod tests;

@@ -89,7 +89,8 @@ pub struct Ended {
 impl Telemetry {
     /// Notes a tick.
     pub fn put(&self, ended: &Ended) {
-        self.updates.store(self.updates.load(Relaxed).wrapping_add(1), Relaxed);
+        self.updates
+            .store(self.updates.load(Relaxed).wrapping_add(1), Relaxed);
         compiler_fence(Release);
         self.state.store(ended.state.0.into(), Relaxed);
         self.reason.store(ended.state.1.into(), Relaxed);
@@ -117,7 +118,8 @@ impl Telemetry {
             to.store(from, Relaxed);
         }
         compiler_fence(Release);
-        self.updates.store(self.updates.load(Relaxed).wrapping_add(1), Relaxed);
+        self.updates
+            .store(self.updates.load(Relaxed).wrapping_add(1), Relaxed);
     }
 
     /// Notes how long a tick took.

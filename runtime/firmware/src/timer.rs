@@ -21,7 +21,9 @@ pub struct Alarms {
 impl Clock {
     /// Starts the clock. TIM2 must have been switched on.
     pub fn new(timer: TIM2) -> Self {
-        timer.psc().write(|w| w.psc().set((board::TIMER_HZ / 1_000_000 - 1) as u16));
+        timer
+            .psc()
+            .write(|w| w.psc().set((board::TIMER_HZ / 1_000_000 - 1) as u16));
         timer.arr().write(|w| w.arr().set(u32::MAX));
         timer.egr().write(|w| w.ug().set_bit());
         timer.sr().write(|w| w.uif().clear_bit());
@@ -58,7 +60,9 @@ impl Clock {
         let tick = flags.cc1if().bit_is_set() && armed.cc1ie().bit_is_set();
         let settled = flags.cc2if().bit_is_set() && armed.cc2ie().bit_is_set();
         // Writing 1 leaves a flag as it is.
-        self.timer.sr().write(|w| w.cc1if().bit(!tick).cc2if().bit(!settled));
+        self.timer
+            .sr()
+            .write(|w| w.cc1if().bit(!tick).cc2if().bit(!settled));
         if settled {
             self.timer.dier().modify(|_, w| w.cc2ie().clear_bit());
         }

@@ -51,7 +51,9 @@ pub struct Adc {
 
 fn crc(bytes: &[u8]) -> u16 {
     bytes.iter().fold(0xffff, |crc, byte| {
-        (0..8).fold(crc ^ u16::from(*byte) << 8, |c, _| c << 1 ^ if c >> 15 == 1 { 0x1021 } else { 0 })
+        (0..8).fold(crc ^ u16::from(*byte) << 8, |c, _| {
+            c << 1 ^ if c >> 15 == 1 { 0x1021 } else { 0 }
+        })
     })
 }
 
@@ -161,7 +163,11 @@ impl Adc {
             let (head, value) = (self.received[0], self.received[1]);
             let register = usize::from(head >> 1);
             self.reply = if head == 0 && value == 0 {
-                let channel = if self.sequence.is_empty() { 0 } else { self.sequence.remove(0) };
+                let channel = if self.sequence.is_empty() {
+                    0
+                } else {
+                    self.sequence.remove(0)
+                };
                 self.sequence.push(channel);
                 let code = self.codes.get(usize::from(channel)).copied().unwrap_or(0);
                 let [high, mut low] = ((code + 0x8000) as u16).to_be_bytes();
@@ -184,7 +190,10 @@ impl Adc {
                 vec![0, 0, 0]
             };
         }
-        at.checked_sub(2).and_then(|k| self.reply.get(k)).copied().unwrap_or(0)
+        at.checked_sub(2)
+            .and_then(|k| self.reply.get(k))
+            .copied()
+            .unwrap_or(0)
     }
 
     /// Chip select rises.

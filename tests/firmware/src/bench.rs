@@ -49,7 +49,10 @@ impl Bench {
         let bytes = |name: &str| std::fs::read(file(name)).map_err(|e| format!("{name}: {e}"));
         Ok(Self {
             library,
-            images: [Image::read(&file("ads131m08.elf"))?, Image::read(&file("ads8688.elf"))?],
+            images: [
+                Image::read(&file("ads131m08.elf"))?,
+                Image::read(&file("ads8688.elf"))?,
+            ],
             blob: bytes("params.bin")?,
             later: bytes("later.bin")?,
             other: bytes("other.bin")?,
@@ -93,7 +96,14 @@ fn columns<'a>(header: &str, names: [&'a str; 6]) -> Result<[usize; 6], String> 
 
 fn rows(text: &str) -> Result<Vec<Row>, Failure> {
     let mut lines = text.lines();
-    let names = ["hall_a_cnt", "hall_b_cnt", "hall_c_cnt", "cap1_cnt", "cap2_cnt", "cap3_cnt"];
+    let names = [
+        "hall_a_cnt",
+        "hall_b_cnt",
+        "hall_c_cnt",
+        "cap1_cnt",
+        "cap2_cnt",
+        "cap3_cnt",
+    ];
     let at = columns(lines.next().unwrap_or_default(), names)?;
     let row = |line: &str| -> Result<Row, Failure> {
         let cells: Vec<_> = line.split(',').collect();
@@ -183,11 +193,14 @@ impl Seen {
             return;
         };
         match message {
-            Message::NodeStatus => self.statuses.push((tick, NodeStatus::from_payload(payload))),
+            Message::NodeStatus => self
+                .statuses
+                .push((tick, NodeStatus::from_payload(payload))),
             Message::Health => self.health.push(HealthPage::from_payload(payload)),
             Message::Answer => self.answers.push((tick, Answer::from_payload(payload))),
             Message::Identity => {
-                self.identity.extend(IdentityPage::from_payload(payload).text);
+                self.identity
+                    .extend(IdentityPage::from_payload(payload).text);
             }
             _ => match AXES.iter().position(|axis| *axis == message) {
                 Some(axis) => self.axes.push(Axis {

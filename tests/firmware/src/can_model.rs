@@ -85,7 +85,10 @@ impl CanModel {
     pub fn receive(&mut self, id: u16, bytes: [u8; 8]) {
         let [a, b, c, d, e, f, g, h] = bytes;
         if self.received.len() < 3 {
-            let (low, high) = (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]));
+            let (low, high) = (
+                u32::from_le_bytes([a, b, c, d]),
+                u32::from_le_bytes([e, f, g, h]),
+            );
             self.received.push_back([u32::from(id) << 21, 8, low, high]);
         }
     }
@@ -115,8 +118,10 @@ impl CanModel {
             let mailbox = &mut self.mailboxes[k];
             mailbox.pending = false;
             mailbox.registers[0] &= !TXRQ;
-            let ([a, b, c, d], [e, f, g, h]) =
-                (mailbox.registers[2].to_le_bytes(), mailbox.registers[3].to_le_bytes());
+            let ([a, b, c, d], [e, f, g, h]) = (
+                mailbox.registers[2].to_le_bytes(),
+                mailbox.registers[3].to_le_bytes(),
+            );
             self.sent.push(Sent {
                 asked_ns: mailbox.asked_ns,
                 done_ns: at,
@@ -148,7 +153,10 @@ impl CanModel {
                 BusState::Off => 0b111,
             },
             0x180..0x1b0 => self.mailboxes[(offset - 0x180) / 16].registers[offset % 16 / 4],
-            0x1b0..0x1c0 => self.received.front().map_or(0, |frame| frame[offset % 16 / 4]),
+            0x1b0..0x1c0 => self
+                .received
+                .front()
+                .map_or(0, |frame| frame[offset % 16 / 4]),
             _ => self.plain[offset / 4 % 256],
         }
     }

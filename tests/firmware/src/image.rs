@@ -36,11 +36,16 @@ impl Image {
             if segment.p_type(endian) != object::elf::PT_LOAD {
                 continue;
             }
-            let data = segment.data(endian, &*bytes).map_err(|()| "segment out of the file")?;
+            let data = segment
+                .data(endian, &*bytes)
+                .map_err(|()| "segment out of the file")?;
             let (load, run) = (segment.p_paddr(endian), segment.p_vaddr(endian));
             if !data.is_empty() {
                 let at = load.checked_sub(FLASH).ok_or("segment below flash")? as usize;
-                flash.get_mut(at..at + data.len()).ok_or("segment beyond flash")?.copy_from_slice(data);
+                flash
+                    .get_mut(at..at + data.len())
+                    .ok_or("segment beyond flash")?
+                    .copy_from_slice(data);
                 text_bytes += data.len();
             }
             if run >= RAM {
@@ -53,19 +58,28 @@ impl Image {
             .filter_map(|s| Some((s.name().ok()?.to_owned(), s.address() as u32)))
             .collect();
         let static_bytes = (static_end - RAM) as usize;
-        Ok(Self { flash, text_bytes, static_bytes, symbols })
+        Ok(Self {
+            flash,
+            text_bytes,
+            static_bytes,
+            symbols,
+        })
     }
 
     /// Address of a symbol whose name contains `part`, without the Thumb bit.
     pub fn address(&self, part: &str) -> Result<u32, String> {
         let exact = self.symbols.iter().find(|(name, _)| name == part);
         let found = exact.or_else(|| self.symbols.iter().find(|(name, _)| name.contains(part)));
-        found.map(|(_, at)| at & !1).ok_or_else(|| format!("the program has no symbol {part}"))
+        found
+            .map(|(_, at)| at & !1)
+            .ok_or_else(|| format!("the program has no symbol {part}"))
     }
 
     /// A word of flash.
     pub fn word(&self, address: u32) -> u32 {
         let at = (address - FLASH) as usize;
-        self.flash.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        self.flash
+            .get(at..at + 4)
+            .map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
     }
 }

@@ -71,7 +71,10 @@ extern "C" fn read_bit(_: Handle, offset: u64, _: c_uint, user: *mut c_void) -> 
 extern "C" fn write_bit(_: Handle, offset: u64, _: c_uint, value: u64, user: *mut c_void) {
     // SAFETY: as in `read`.
     let chip = unsafe { &mut *user.cast::<Peripherals>() };
-    let (at, bit) = (offset as usize / 32 & !3, offset / 4 % 8 + 8 * (offset / 32 % 4));
+    let (at, bit) = (
+        offset as usize / 32 & !3,
+        offset / 4 % 8 + 8 * (offset / 32 % 4),
+    );
     let word = chip.read(at) & !(1 << bit) | (value as u32 & 1) << bit;
     chip.write(at, word);
 }
@@ -88,7 +91,11 @@ extern "C" fn write_core(_: Handle, offset: u64, bytes: c_uint, value: u64, user
     let (shift, mask) = (8 * (offset & 3), u32::MAX >> (32 - 8 * bytes.min(4)));
     let at = offset as usize & !3;
     let enables = (0xe100..0xe120).contains(&at);
-    let kept = if enables { 0 } else { chip.read_core(at) & !(mask << shift) };
+    let kept = if enables {
+        0
+    } else {
+        chip.read_core(at) & !(mask << shift)
+    };
     chip.write_core(at, kept | (value as u32 & mask) << shift);
 }
 
@@ -127,7 +134,10 @@ impl Machine {
         let core = Unicorn::open(library)?;
         let mut flash = memory::<FLASH_BYTES>(0xff);
         flash.0.copy_from_slice(&image.flash);
-        for (slot, name) in slots.into_iter().zip(["_parameter_slot_0", "_parameter_slot_1"]) {
+        for (slot, name) in slots
+            .into_iter()
+            .zip(["_parameter_slot_0", "_parameter_slot_1"])
+        {
             let at = (image.address(name)? - FLASH) as usize;
             flash.0[at..at + slot.len()].copy_from_slice(slot);
         }
@@ -135,16 +145,15 @@ impl Machine {
         let mut returns = memory::<4096>(0);
         let mut chip = Box::new(Peripherals::new(part, rows));
         let user: *mut c_void = (&raw mut *chip).cast();
-        let failed = |fault: crate::unicorn::Fault| format!("{fault:?}");
         // SAFETY: flash, RAM and chip are boxes that the machine keeps as long as the core,
         // and that are touched only between two runs of it.
         unsafe {
-            core.map_memory(FLASH.into(), flash.0.as_mut_ptr(), FLASH_BYTES).map_err(failed)?;
-            core.map_memory(RAM.into(), ram.0.as_mut_ptr(), RAM_BYTES).map_err(failed)?;
-            core.map_memory(RETURN.into(), returns.0.as_mut_ptr(), 4096).map_err(failed)?;
-            core.map_io(RANGE, read, write, user).map_err(failed)?;
-            core.map_io(BIT_BAND, read_bit, write_bit, user).map_err(failed)?;
-            core.map_io(CORE, read_core, write_core, user).map_err(failed)?;
+            core.map_memory(FLASH.into(), flash.0.as_mut_ptr(), FLASH_BYTES)?;
+            core.map_memory(RAM.into(), ram.0.as_mut_ptr(), RAM_BYTES)?;
+            core.map_memory(RETURN.into(), returns.0.as_mut_ptr(), 4096)?;
+            core.map_io(RANGE, read, write, user)?;
+            core.map_io(BIT_BAND, read_bit, write_bit, user)?;
+            core.map_io(CORE, read_core, write_core, user)?;
         }
         let mut vectors = [0; 48];
         for (k, vector) in vectors.iter_mut().enumerate() {
@@ -169,7 +178,7 @@ impl Machine {
     pub fn count_instructions(&mut self) -> Result<(), String> {
         let user: *mut c_void = (&raw mut *self.chip).cast();
         // SAFETY: as in `new`.
-        unsafe { self.core.hook_code(count, user, (1, 0)) }.map_err(|fault| format!("{fault:?}"))
+        unsafe { self.core.hook_code(count, user, (1, 0)) }.map_err(|fault| fault.to_string())
     }
 
     /// Writes `fpscr_to_write`, unless 0, to FPSCR whenever the core comes to `address`. Call
@@ -182,7 +191,7 @@ impl Machine {
         let user: *mut c_void = (&raw mut *Box::leak(Box::new(hook))).cast();
         let at = u64::from(address);
         // SAFETY: as in `new`; the hook is leaked.
-        unsafe { self.core.hook_code(set_fpscr, user, (at, at)) }.map_err(|fault| format!("{fault:?}"))
+        unsafe { self.core.hook_code(set_fpscr, user, (at, at)) }.map_err(|fault| fault.to_string())
     }
 
     /// Changes FPSCR while the core sleeps, as an interrupt may that does not change it back.
@@ -276,7 +285,8 @@ impl Machine {
                 at if at != before => at,
                 _ => self.chip.instructions,
             };
-            self.instructions.push((upto - before, self.chip.spi_bytes - spi_before));
+            self.instructions
+                .push((upto - before, self.chip.spi_bytes - spi_before));
         }
         for (k, word) in saved.into_iter().enumerate() {
             match k {
@@ -295,20 +305,28 @@ impl Machine {
         let pc = self.core.get(register::PC);
         match ran {
             Ok(()) if pc & !1 == until => Ok(()),
-            Ok(()) => Err(format!("the program stopped at {pc:#010x}, not at {until:#010x}")),
-            Err(fault) => Err(format!("{fault:?} at {pc:#010x}")),
+            Ok(()) => Err(format!(
+                "the program stopped at {pc:#010x}, not at {until:#010x}"
+            )),
+            Err(fault) => Err(format!("{fault} at {pc:#010x}")),
         }
     }
 
     /// A word of RAM.
     pub fn word(&self, address: u32) -> u32 {
         let at = (address - RAM) as usize;
-        self.ram.0.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        self.ram
+            .0
+            .get(at..at + 4)
+            .map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
     }
 
     /// Bytes of stack that were ever used.
     pub fn stack_bytes(&self, static_bytes: usize) -> usize {
-        let untouched = self.ram.0[static_bytes..].iter().take_while(|&&b| b == PAINT).count();
+        let untouched = self.ram.0[static_bytes..]
+            .iter()
+            .take_while(|&&b| b == PAINT)
+            .count();
         RAM_BYTES - static_bytes - untouched
     }
 
@@ -320,10 +338,15 @@ impl Machine {
 
 /// The one place where the program sleeps.
 fn waits_at(image: &Image) -> Result<u32, String> {
-    let start = image.address("_stext").or_else(|_| image.address("__stext"))?;
+    let start = image
+        .address("_stext")
+        .or_else(|_| image.address("__stext"))?;
     let end = image.address("__etext")?;
     let code = &image.flash[(start - FLASH) as usize..(end - FLASH) as usize];
-    let found: Vec<_> = (0u32..).zip(code.as_chunks::<2>().0).filter(|(_, b)| u16::from_le_bytes(**b) == WFI).collect();
+    let found: Vec<_> = (0u32..)
+        .zip(code.as_chunks::<2>().0)
+        .filter(|(_, b)| u16::from_le_bytes(**b) == WFI)
+        .collect();
     match found.as_slice() {
         [(k, _)] => Ok(start + 2 * k),
         all => Err(format!("{} places look like WFI, not one", all.len())),

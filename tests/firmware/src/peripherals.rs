@@ -37,7 +37,6 @@ const LSI_HZ: u64 = 32_000;
 /// One of the two alarms of the timer.
 #[derive(Clone, Copy, Default)]
 struct Alarm {
-    compare: u32,
     at_ns: Option<u64>,
 }
 
@@ -134,7 +133,9 @@ impl Peripherals {
     }
 
     fn row(&mut self) -> Row {
-        let since = self.now_ns.saturating_sub(self.first_tick_ns.unwrap_or(self.now_ns));
+        let since = self
+            .now_ns
+            .saturating_sub(self.first_tick_ns.unwrap_or(self.now_ns));
         let k = (since / (2000 * US)) as usize % self.rows.len().max(1);
         self.rows.get(k).copied().unwrap_or_default()
     }
@@ -147,7 +148,10 @@ impl Peripherals {
     /// When something happens by itself next.
     pub fn next_event_ns(&self) -> Option<u64> {
         let alarms = self.alarms.iter().filter_map(|alarm| alarm.at_ns);
-        alarms.chain(self.can.next_event_ns()).chain(self.watchdog_ns).min()
+        alarms
+            .chain(self.can.next_event_ns())
+            .chain(self.watchdog_ns)
+            .min()
     }
 
     /// Lets happen what is due by now.
@@ -177,7 +181,8 @@ impl Peripherals {
 
     /// The interrupt that is taken next.
     pub fn pending_interrupt(&self) -> Option<u32> {
-        let enabled = |irq: u32| self.core_words[0xe100 / 4 + irq as usize / 32] >> (irq % 32) & 1 == 1;
+        let enabled =
+            |irq: u32| self.core_words[0xe100 / 4 + irq as usize / 32] >> (irq % 32) & 1 == 1;
         let armed = self.words[(TIM2 + 0x0c) / 4];
         if self.can.transmit_interrupt() && enabled(IRQ_CAN1_TX) {
             Some(IRQ_CAN1_TX)
@@ -242,7 +247,9 @@ impl Peripherals {
                 self.spi_bytes += 1;
                 self.now_ns += self.spi_byte_ns;
             }
-            o if o == GPIOA + 0x18 || o == GPIOB + 0x18 || o == GPIOC + 0x18 => self.set_pins(o, value),
+            o if o == GPIOA + 0x18 || o == GPIOB + 0x18 || o == GPIOC + 0x18 => {
+                self.set_pins(o, value)
+            }
             o if (CAN1..CAN1 + 0x400).contains(&o) => {
                 let filled = self.can.filled;
                 self.can.write(o - CAN1, value, self.now_ns);
@@ -259,7 +266,7 @@ impl Peripherals {
         let start = self.timer_started_ns.unwrap_or(self.now_ns);
         let us = (self.now_ns - start) / US + u64::from(left);
         let at_ns = (left > 0).then_some(start + us * US);
-        self.alarms[k] = Alarm { compare, at_ns };
+        self.alarms[k] = Alarm { at_ns };
     }
 
     fn key(&mut self, key: u32) {

@@ -47,11 +47,26 @@ type Close = unsafe extern "C" fn(Handle) -> c_int;
 /// Reads or writes a register: handle, number, value.
 pub type Register = unsafe extern "C" fn(Handle, c_int, *mut c_void) -> c_int;
 type MapPointer = unsafe extern "C" fn(Handle, u64, u64, u32, *mut c_void) -> c_int;
-type MapIo =
-    unsafe extern "C" fn(Handle, u64, u64, ReadCallback, *mut c_void, WriteCallback, *mut c_void) -> c_int;
+type MapIo = unsafe extern "C" fn(
+    Handle,
+    u64,
+    u64,
+    ReadCallback,
+    *mut c_void,
+    WriteCallback,
+    *mut c_void,
+) -> c_int;
 type Start = unsafe extern "C" fn(Handle, u64, u64, u64, usize) -> c_int;
-type HookAdd =
-    unsafe extern "C" fn(Handle, *mut usize, c_int, *mut c_void, *mut c_void, u64, u64, ...) -> c_int;
+type HookAdd = unsafe extern "C" fn(
+    Handle,
+    *mut usize,
+    c_int,
+    *mut c_void,
+    *mut c_void,
+    u64,
+    u64,
+    ...
+) -> c_int;
 
 /// An emulated core.
 pub struct Unicorn {
@@ -75,8 +90,20 @@ pub struct Fault {
     pub number: c_int,
 }
 
+impl core::fmt::Display for Fault {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "the emulator: {}: error {}", self.what, self.number)
+    }
+}
+
+impl std::error::Error for Fault {}
+
 fn check(what: &'static str, number: c_int) -> Result<(), Fault> {
-    if number == 0 { Ok(()) } else { Err(Fault { what, number }) }
+    if number == 0 {
+        Ok(())
+    } else {
+        Err(Fault { what, number })
+    }
 }
 
 impl Unicorn {
@@ -90,9 +117,9 @@ impl Unicorn {
             let ctl: Ctl = *library.get(b"uc_ctl")?;
             let mut handle = std::ptr::null_mut();
             let ok = open(ARCH_ARM, MODE_THUMB_MCLASS, &mut handle);
-            check("open", ok).map_err(|fault| format!("{fault:?}"))?;
+            check("open", ok)?;
             let ok = ctl(handle, CTL_WRITE_CPU_MODEL, CORTEX_M4);
-            check("model", ok).map_err(|fault| format!("{fault:?}"))?;
+            check("model", ok)?;
             Ok(Self {
                 handle,
                 close: *library.get(b"uc_close")?,
@@ -125,9 +152,16 @@ impl Unicorn {
     ///
     /// # Safety
     /// The memory must live as long as the emulator, and be touched only while it stands.
-    pub unsafe fn map_memory(&self, address: u64, memory: *mut u8, bytes: usize) -> Result<(), Fault> {
+    pub unsafe fn map_memory(
+        &self,
+        address: u64,
+        memory: *mut u8,
+        bytes: usize,
+    ) -> Result<(), Fault> {
         // SAFETY: as the caller promises.
-        let ok = unsafe { (self.map_pointer)(self.handle, address, bytes as u64, PROT_ALL, memory.cast()) };
+        let ok = unsafe {
+            (self.map_pointer)(self.handle, address, bytes as u64, PROT_ALL, memory.cast())
+        };
         check("map memory", ok)
     }
 
@@ -160,7 +194,15 @@ impl Unicorn {
         let mut hook = 0;
         // SAFETY: as the caller promises.
         let ok = unsafe {
-            (self.hook_add)(self.handle, &mut hook, HOOK_CODE, callback as *mut c_void, user, first, last)
+            (self.hook_add)(
+                self.handle,
+                &mut hook,
+                HOOK_CODE,
+                callback as *mut c_void,
+                user,
+                first,
+                last,
+            )
         };
         check("hook", ok)
     }
