@@ -69,7 +69,10 @@ impl<B> From<&AdcError<B>> for SampleFault {
 
 /// Why a node decodes or does not.
 #[derive(Clone, Debug)]
-#[expect(clippy::large_enum_variant, reason = "there is one, in a static, and no heap")]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one, in a static, and no heap"
+)]
 pub enum Parameters<'d> {
     /// There are parameters.
     Usable {

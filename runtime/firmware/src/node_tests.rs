@@ -2,7 +2,6 @@ extern crate std;
 
 use super::*;
 use crate::slots::{Loaded, load};
-use embedded_can::Frame as _;
 use hal_adapters::can::command::Outcome;
 use hal_adapters::can::{BusFrame, Message};
 use runtime::OnInvalid;

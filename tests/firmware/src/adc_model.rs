@@ -172,7 +172,7 @@ impl Adc {
                 let code = self.codes.get(usize::from(channel)).copied().unwrap_or(0);
                 let [high, mut low] = ((code + 0x8000) as u16).to_be_bytes();
                 let features = self.registers[3];
-                let mut sign = channel << 4 | (features >> 6 & 3) as u8 * 4;
+                let mut sign = (channel << 4) | ((features >> 6 & 3) as u8 * 4);
                 if features & 7 != 2 {
                     sign = 0;
                 }

@@ -85,7 +85,7 @@ impl Bench {
     }
 }
 
-fn columns<'a>(header: &str, names: [&'a str; 6]) -> Result<[usize; 6], String> {
+fn columns(header: &str, names: [&str; 6]) -> Result<[usize; 6], String> {
     let found = names.map(|name| header.split(',').position(|cell| cell == name));
     let mut at = [0; 6];
     for (at, (found, name)) in at.iter_mut().zip(found.into_iter().zip(names)) {

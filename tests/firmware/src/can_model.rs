@@ -201,7 +201,7 @@ impl CanModel {
             0x180..0x1b0 => {
                 let mailbox = &mut self.mailboxes[(offset - 0x180) / 16];
                 mailbox.registers[offset % 16 / 4] = value;
-                if offset % 16 == 0 && value & TXRQ != 0 {
+                if offset.is_multiple_of(16) && value & TXRQ != 0 {
                     mailbox.pending = true;
                     mailbox.asked_ns = now_ns;
                     self.filled += 1;

@@ -72,7 +72,7 @@ extern "C" fn write_bit(_: Handle, offset: u64, _: c_uint, value: u64, user: *mu
     // SAFETY: as in `read`.
     let chip = unsafe { &mut *user.cast::<Peripherals>() };
     let (at, bit) = (
-        offset as usize / 32 & !3,
+        (offset as usize / 32) & !3,
         offset / 4 % 8 + 8 * (offset / 32 % 4),
     );
     let word = chip.read(at) & !(1 << bit) | (value as u32 & 1) << bit;
