@@ -32,7 +32,8 @@ impl Bus {
             .set_automatic_retransmit(true)
             .leave_disabled();
         if let Some(id) = StandardId::new(Message::Command.spec().id) {
-            let commands = Mask32::frames_with_std_id(id, StandardId::MAX);
+            let mut commands = Mask32::frames_with_std_id(id, StandardId::MAX);
+            commands.data_frames_only();
             can.modify_filters()
                 .clear()
                 .enable_bank(0, Fifo::Fifo0, commands);
@@ -71,7 +72,12 @@ impl Bus {
     /// Hands the commands that came to the node.
     pub fn receive(&mut self, node: &mut Node<'_>) {
         for _ in 0..COMMANDS_PER_TICK {
+            // SAFETY: as in `start_tick`.
+            let length = unsafe { (*CAN1::PTR).rx(0).rdtr().read().dlc().bits() };
             match self.can.receive() {
+                // A data length code of 9 to 15 also means eight bytes, by the standard.
+                // `bxcan` panics on the first look into such a frame; no command is one.
+                Ok(_) if length > 8 => {}
                 Ok(frame) => node.take(&frame, &mut self.outbox),
                 Err(nb::Error::WouldBlock) => return,
                 Err(nb::Error::Other(_)) => {} // An overrun: a command was lost, unanswered.

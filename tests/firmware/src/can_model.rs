@@ -83,13 +83,19 @@ impl CanModel {
 
     /// A frame from another node.
     pub fn receive(&mut self, id: u16, bytes: [u8; 8]) {
+        self.receive_coded(id, 8, bytes);
+    }
+
+    /// A frame from another node, with any data length code: 9 to 15 mean eight bytes too.
+    pub fn receive_coded(&mut self, id: u16, length_code: u8, bytes: [u8; 8]) {
         let [a, b, c, d, e, f, g, h] = bytes;
         if self.received.len() < 3 {
             let (low, high) = (
                 u32::from_le_bytes([a, b, c, d]),
                 u32::from_le_bytes([e, f, g, h]),
             );
-            self.received.push_back([u32::from(id) << 21, 8, low, high]);
+            self.received
+                .push_back([u32::from(id) << 21, length_code.into(), low, high]);
         }
     }
 

@@ -38,7 +38,12 @@ pub struct Machine {
     _returns: Box<Memory<4096>>,
     vectors: [u32; 48],
     waits_at: u32,
+    panics_at: u32,
     asleep: bool,
+    /// The program panicked: nothing but the watchdog helps.
+    panicked: bool,
+    /// Panics of the program.
+    pub panics: u32,
     /// Time by which the next tick's interrupt is held back, ns.
     pub hold_ns: u64,
     /// Resets by the watchdog.
@@ -99,6 +104,11 @@ extern "C" fn write_core(_: Handle, offset: u64, bytes: c_uint, value: u64, user
     chip.write_core(at, kept | (value as u32 & mask) << shift);
 }
 
+extern "C" fn stop(handle: Handle, _: u64, _: u32, user: *mut c_void) {
+    // SAFETY: `user` is the function of the library that ends a run, kept for ever.
+    unsafe { (*user.cast::<crate::unicorn::Stop>())(handle) };
+}
+
 extern "C" fn count(_: Handle, _: u64, _: u32, user: *mut c_void) {
     // SAFETY: as in `read`.
     unsafe { (*user.cast::<Peripherals>()).instructions += 1 };
@@ -155,6 +165,12 @@ impl Machine {
             core.map_io(BIT_BAND, read_bit, write_bit, user)?;
             core.map_io(CORE, read_core, write_core, user)?;
         }
+        let panics_at = image.address("9panic_fmt")?;
+        let stopper: &'static crate::unicorn::Stop = Box::leak(Box::new(core.stopper()));
+        let user: *mut c_void = std::ptr::from_ref(stopper).cast_mut().cast();
+        let at = u64::from(panics_at);
+        // SAFETY: the pointer to the function is leaked.
+        unsafe { core.hook_code(stop, user, (at, at))? };
         let mut vectors = [0; 48];
         for (k, vector) in vectors.iter_mut().enumerate() {
             *vector = image.word(FLASH + 4 * k as u32);
@@ -167,7 +183,10 @@ impl Machine {
             _returns: returns,
             vectors,
             waits_at: waits_at(image)?,
+            panics_at,
             asleep: false,
+            panicked: false,
+            panics: 0,
             hold_ns: 0,
             watchdog_resets: 0,
             instructions: Vec::new(),
@@ -214,7 +233,7 @@ impl Machine {
                 }
             }
             self.chip.advance();
-            while let Some(irq) = self.chip.pending_interrupt() {
+            while let Some(irq) = self.chip.pending_interrupt().filter(|_| !self.panicked) {
                 if irq == IRQ_TIM2 && self.chip.tick_is_due() && self.hold_ns > 0 {
                     self.chip.now_ns += std::mem::take(&mut self.hold_ns);
                     self.chip.advance();
@@ -229,6 +248,7 @@ impl Machine {
                 self.watchdog_resets += 1;
                 self.chip.reset(1 << 29 | 1 << 26);
                 self.asleep = false;
+                self.panicked = false;
             }
         }
     }
@@ -288,6 +308,9 @@ impl Machine {
             self.instructions
                 .push((upto - before, self.chip.spi_bytes - spi_before));
         }
+        if self.panicked {
+            return Ok(());
+        }
         for (k, word) in saved.into_iter().enumerate() {
             match k {
                 0..6 => self.core.set(registers[k], word),
@@ -300,11 +323,17 @@ impl Machine {
         Ok(())
     }
 
+    /// Runs until `until`, or until the program panics.
     fn go(&mut self, from: u32, until: u32) -> Result<(), String> {
         let ran = self.core.run(from, until);
         let pc = self.core.get(register::PC);
         match ran {
             Ok(()) if pc & !1 == until => Ok(()),
+            Ok(()) if pc & !1 == self.panics_at => {
+                self.panicked = true;
+                self.panics += 1;
+                Ok(())
+            }
             Ok(()) => Err(format!(
                 "the program stopped at {pc:#010x}, not at {until:#010x}"
             )),

@@ -114,6 +114,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("command: identify", &|| commands::identify(bench));
     check("command: re-zero", &|| commands::rezero(bench));
     check("command: odd ones", &|| commands::odd_commands(bench));
+    check("command: any data length code", &|| {
+        commands::any_length_code(bench)
+    });
     if ticks > 0 {
         check("the long run", &|| {
             log::same_words(bench, Part::Ads131m08, ticks, "long")

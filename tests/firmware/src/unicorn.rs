@@ -57,6 +57,8 @@ type MapIo = unsafe extern "C" fn(
     *mut c_void,
 ) -> c_int;
 type Start = unsafe extern "C" fn(Handle, u64, u64, u64, usize) -> c_int;
+/// Ends a run from within a callback: handle.
+pub type Stop = unsafe extern "C" fn(Handle) -> c_int;
 type HookAdd = unsafe extern "C" fn(
     Handle,
     *mut usize,
@@ -77,6 +79,7 @@ pub struct Unicorn {
     map_pointer: MapPointer,
     map_io: MapIo,
     start: Start,
+    stop: Stop,
     hook_add: HookAdd,
     _library: Library,
 }
@@ -128,6 +131,7 @@ impl Unicorn {
                 map_pointer: *library.get(b"uc_mem_map_ptr")?,
                 map_io: *library.get(b"uc_mmio_map")?,
                 start: *library.get(b"uc_emu_start")?,
+                stop: *library.get(b"uc_emu_stop")?,
                 hook_add: *library.get(b"uc_hook_add")?,
                 _library: library,
             })
@@ -212,6 +216,11 @@ impl Unicorn {
         // SAFETY: the core is set up; callbacks only touch their own state.
         let ok = unsafe { (self.start)(self.handle, u64::from(address | 1), until.into(), 0, 0) };
         check("run", ok)
+    }
+
+    /// Ends a run from within a callback.
+    pub fn stopper(&self) -> Stop {
+        self.stop
     }
 
     /// Sets a register from within a callback.

@@ -57,7 +57,11 @@ pub fn goes_and_comes_back(bench: &Bench, bus: BusState) -> Outcome {
         off * flag::BUS_WAS_OFF,
     )?;
     equal("missed ticks", status.missed_ticks, 0)?;
-    equal("watchdog resets", machine.watchdog_resets, 0)
+    equal(
+        "panics and watchdog resets",
+        (machine.panics, machine.watchdog_resets),
+        (0, 0),
+    )
 }
 
 /// A controller that gets its power alone on the bus ticks, and is heard once others come.
@@ -80,5 +84,9 @@ pub fn alone_from_the_start(bench: &Bench) -> Outcome {
     expect(comparison.planar >= 98, || {
         format!("only {} poses", comparison.planar)
     })?;
-    equal("watchdog resets", machine.watchdog_resets, 0)
+    equal(
+        "panics and watchdog resets",
+        (machine.panics, machine.watchdog_resets),
+        (0, 0),
+    )
 }

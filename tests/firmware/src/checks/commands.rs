@@ -170,3 +170,25 @@ pub fn odd_commands(bench: &Bench) -> Outcome {
         1,
     )
 }
+
+/// Frames under the command's identifier with every data length code: none stops the program.
+pub fn any_length_code(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(50)?;
+    for code in 0..16 {
+        let (id, bytes) = command(Request::ClearZero, code, code);
+        machine.chip.can.receive_coded(id, code, bytes);
+        machine.run_ticks(20)?;
+    }
+    equal(
+        "panics and watchdog resets",
+        (machine.panics, machine.watchdog_resets),
+        (0, 0),
+    )?;
+    let seen = Seen::since_last(&mut machine);
+    equal(
+        "tokens answered",
+        seen.answers.iter().map(|(_, a)| a.token).collect(),
+        vec![8],
+    )
+}

@@ -55,7 +55,11 @@ pub fn same_words(bench: &Bench, part: Part, ticks: u64, name: &str) -> Outcome 
         format!("only {} words", comparison.words)
     })?;
     equal("damaged frames", seen.damaged, 0)?;
-    equal("watchdog resets", machine.watchdog_resets, 0)?;
+    equal(
+        "panics and watchdog resets",
+        (machine.panics, machine.watchdog_resets),
+        (0, 0),
+    )?;
     equal("missed ticks", stage.missed_ticks, 0)?;
     equal("ticks without codes", stage.adc_faults, 0)?;
     equal("times the bus was off", stage.bus_off, 0)?;

@@ -62,7 +62,11 @@ pub fn none_usable(
     let stage = Stage::read(&machine, bench, PART)?;
     expect(stage.ticks >= 399, || format!("only {} ticks", stage.ticks))?;
     equal("the pose in STAGE", stage.pose, [0; 6])?;
-    equal("watchdog resets", machine.watchdog_resets, 0)
+    equal(
+        "panics and watchdog resets",
+        (machine.panics, machine.watchdog_resets),
+        (0, 0),
+    )
 }
 
 /// Every kind of unusable parameters.

@@ -151,5 +151,9 @@ pub fn survives(bench: &Bench, part: Part, case: &Case) -> Outcome {
         before.damaged + during.damaged + after.damaged,
         0,
     )?;
-    equal("watchdog resets", machine.watchdog_resets, 0)
+    equal(
+        "panics and watchdog resets",
+        (machine.panics, machine.watchdog_resets),
+        (0, 0),
+    )
 }
