@@ -138,6 +138,8 @@ fn poses(text: &str) -> Result<Vec<Words>, Failure> {
 pub struct Axis {
     /// Periods since the first tick.
     pub tick: u64,
+    /// Time from the start of that period to the mailbox, us.
+    pub into_tick_us: u64,
     /// Axis, 0 to 5 for X, Y, Rz, Z, Rx, Ry.
     pub axis: usize,
     /// The word.
@@ -184,7 +186,8 @@ impl Seen {
     }
 
     fn take(&mut self, sent: &Sent, first_ns: u64) {
-        let tick = sent.asked_ns.saturating_sub(first_ns) / 2_000_000;
+        let since_ns = sent.asked_ns.saturating_sub(first_ns);
+        let tick = since_ns / 2_000_000;
         let id = StandardId::new(sent.id).map(Id::Standard);
         let message = id.and_then(Message::from_id);
         let read = message.and_then(|m| Some((m, unprotect(m.spec().key, &sent.bytes)?.1)));
@@ -205,6 +208,7 @@ impl Seen {
             _ => match AXES.iter().position(|axis| *axis == message) {
                 Some(axis) => self.axes.push(Axis {
                     tick,
+                    into_tick_us: since_ns % 2_000_000 / 1000,
                     axis,
                     word: payload.long,
                     status: payload.short,

@@ -28,6 +28,17 @@ fn memory<const N: usize>(fill: u8) -> Box<Memory<N>> {
     }
 }
 
+/// What an interrupt took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cost {
+    /// Instructions up to the last mailbox that it filled, or all if it filled none.
+    pub instructions: u64,
+    /// Bytes over the SPI.
+    pub spi_bytes: u64,
+    /// Mailboxes filled.
+    pub mailboxes: u64,
+}
+
 /// A controller with a program in flash.
 pub struct Machine {
     core: Unicorn,
@@ -48,8 +59,8 @@ pub struct Machine {
     pub hold_ns: u64,
     /// Resets by the watchdog.
     pub watchdog_resets: u32,
-    /// Instructions of the last interrupts of the timer up to the last filled mailbox.
-    pub instructions: Vec<(u64, u64)>,
+    /// What each interrupt of the timer took, where instructions are counted.
+    pub costs: Vec<Cost>,
 }
 
 extern "C" fn read(_: Handle, offset: u64, _: c_uint, user: *mut c_void) -> u64 {
@@ -189,7 +200,7 @@ impl Machine {
             panics: 0,
             hold_ns: 0,
             watchdog_resets: 0,
-            instructions: Vec::new(),
+            costs: Vec::new(),
         })
     }
 
@@ -297,7 +308,7 @@ impl Machine {
         self.core.set(register::SP, frame);
         self.core.set(register::LR, RETURN | 1);
         let before = self.chip.instructions;
-        let spi_before = self.chip.spi_bytes;
+        let (spi_before, filled_before) = (self.chip.spi_bytes, self.chip.can.filled);
         self.chip.instructions_at_mailbox = before;
         self.go(self.vectors[16 + irq as usize], RETURN)?;
         if irq == IRQ_TIM2 && self.chip.instructions != before {
@@ -305,8 +316,11 @@ impl Machine {
                 at if at != before => at,
                 _ => self.chip.instructions,
             };
-            self.instructions
-                .push((upto - before, self.chip.spi_bytes - spi_before));
+            self.costs.push(Cost {
+                instructions: upto - before,
+                spi_bytes: self.chip.spi_bytes - spi_before,
+                mailboxes: self.chip.can.filled - filled_before,
+            });
         }
         if self.panicked {
             return Ok(());

@@ -3,6 +3,7 @@
 use super::{Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Seen};
+use crate::machine::Cost;
 
 /// Flash that the program may take, bytes.
 const TEXT_BYTES_MAX: usize = 48 << 10;
@@ -51,20 +52,30 @@ pub fn interrupt_to_mailbox(bench: &Bench, part: Part, name: &str) -> Outcome {
     expect(seen.axes.len() > 600, || "too few poses".to_owned())?;
     // With a converter that settles, a tick is two interrupts: its trigger, and its codes.
     let per_tick = if part == Part::Ads131m08 { 2 } else { 1 };
-    let (ticks, _) = machine.instructions.as_chunks::<2>();
-    let of_tick: Vec<(u64, u64)> = if per_tick == 2 {
-        ticks.iter().map(|[a, b]| (a.0 + b.0, a.1 + b.1)).collect()
-    } else {
-        machine.instructions.clone()
-    };
-    // The first ticks start the converter and join the bus.
-    let steady = of_tick.get(4..).unwrap_or_default();
+    let of_tick = machine.costs.chunks_exact(per_tick).map(|interrupts| {
+        let mut sum = Cost::default();
+        for cost in interrupts {
+            sum.instructions += cost.instructions;
+            sum.spi_bytes += cost.spi_bytes;
+            sum.mailboxes += cost.mailboxes;
+        }
+        sum
+    });
+    // The first ticks join the bus.
+    let steady: Vec<_> = of_tick.skip(4).collect();
+    expect(steady.len() > 190, || "too few ticks".to_owned())?;
+    let counts = steady.iter().map(|tick| tick.instructions);
     let (most, fewest) = (
-        steady.iter().map(|t| t.0).max(),
-        steady.iter().map(|t| t.0).min(),
+        counts.clone().max().unwrap_or(u64::MAX),
+        counts.min().unwrap_or(0),
     );
-    let (most, fewest) = (most.unwrap_or(u64::MAX), fewest.unwrap_or(0));
-    let spi_bytes = steady.iter().map(|t| t.1).max().unwrap_or(0);
+    let all_three = steady.iter().filter(|tick| tick.mailboxes == 3).count();
+    equal(
+        "ticks that fill three mailboxes at once",
+        all_three,
+        steady.len(),
+    )?;
+    let spi_bytes = steady.iter().map(|tick| tick.spi_bytes).max().unwrap_or(0);
     equal(
         "bytes over the SPI",
         spi_bytes,

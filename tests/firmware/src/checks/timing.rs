@@ -16,6 +16,13 @@ fn flags(seen: &Seen) -> u8 {
     seen.last_status().map_or(0, |status| status.flags)
 }
 
+/// All ticks but these few send X within 0.2 ms of when they were due.
+fn stays_in_step(seen: &Seen, late: usize) -> Outcome {
+    let x = seen.axes.iter().filter(|axis| axis.axis == 0);
+    let found = x.filter(|axis| axis.into_tick_us > 200).count();
+    equal("ticks out of step", found, late)
+}
+
 /// A tick that comes 0.5 ms late is decoded and counted, and shifts no other.
 pub fn a_late_tick(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
@@ -34,6 +41,7 @@ pub fn a_late_tick(bench: &Bench) -> Outcome {
         seen.last_status().map(|s| s.missed_ticks),
         Some(1),
     )?;
+    stays_in_step(&seen, 1)?;
     equal(
         "panics and watchdog resets",
         (machine.panics, machine.watchdog_resets),
@@ -71,6 +79,7 @@ pub fn ticks_that_never_come(bench: &Bench) -> Outcome {
         seen.last_status().map(|s| s.missed_ticks),
         Some(3),
     )?;
+    stays_in_step(&seen, 1)?;
     equal(
         "panics and watchdog resets",
         (machine.panics, machine.watchdog_resets),
