@@ -77,7 +77,8 @@ impl Adc {
         adc
     }
 
-    fn reset(&mut self) {
+    /// Everything as after power-up: what a reset or a short loss of power leaves.
+    pub fn reset(&mut self) {
         self.registers = [0; 64];
         match self.part {
             Part::Ads131m08 => {

@@ -73,6 +73,14 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
             });
         }
     }
+    for (part, name) in parts {
+        check(&format!("{name}: dead from the start"), &|| {
+            sensors::dead_from_the_start(bench, part)
+        });
+        check(&format!("{name}: reset by itself"), &|| {
+            sensors::reset_by_itself(bench, part)
+        });
+    }
     check("a debugger reads the last pose", &|| {
         log::a_debugger_reads_the_last_pose(bench)
     });
@@ -80,6 +88,7 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("ticks that never come", &|| {
         timing::ticks_that_never_come(bench)
     });
+    check("the clock wraps", &|| timing::the_clock_wraps(bench));
     check("a watchdog reset", &|| timing::a_watchdog_reset(bench));
     check("overrun ticks do not feed the watchdog", &|| {
         timing::overrun_ticks_do_not_feed(bench)

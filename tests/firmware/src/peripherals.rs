@@ -54,6 +54,8 @@ pub struct Peripherals {
     pub can: CanModel,
     /// Rows that the converter plays, round and round.
     pub rows: Vec<Row>,
+    /// What the timer reads when it is started, us: 0 on the chip.
+    pub timer_offset_us: u32,
     /// When row 0 is played, ns: the first tick.
     pub first_tick_ns: Option<u64>,
     /// When the watchdog bites, if it was started.
@@ -93,6 +95,7 @@ impl Peripherals {
             adc: Adc::new(part),
             can: CanModel::new(),
             rows,
+            timer_offset_us: 0,
             first_tick_ns: None,
             watchdog_ns: None,
             fed: 0,
@@ -142,7 +145,7 @@ impl Peripherals {
 
     fn timer_us(&self) -> u32 {
         let since = self.timer_started_ns.map_or(0, |start| self.now_ns - start);
-        (since / US) as u32
+        ((since / US) as u32).wrapping_add(self.timer_offset_us)
     }
 
     /// When something happens by itself next.

@@ -3,6 +3,7 @@
 use super::{Outcome, equal, expect};
 use crate::adc_model::{AdcFault, Part};
 use crate::bench::{Bench, Comparison, Seen};
+use crate::machine::Machine;
 use hal_adapters::can::status::NodeState;
 use runtime::Status;
 
@@ -156,4 +157,53 @@ pub fn survives(bench: &Bench, part: Part, case: &Case) -> Outcome {
         (machine.panics, machine.watchdog_resets),
         (0, 0),
     )
+}
+
+/// Good poses up to the end, and none that differ from `first` on.
+fn all_good(machine: &mut Machine, bench: &Bench, first: u64, least: u64) -> Outcome {
+    let seen = Seen::since_last(machine);
+    let mut good = Comparison::default();
+    good.add(&seen.axes, &bench.poses, first);
+    equal("words that differ", good.differing, 0)?;
+    expect(good.planar >= least, || {
+        format!("only {} poses", good.planar)
+    })?;
+    let state = seen.last_status().and_then(|status| status.state);
+    equal("state", state, Some(NodeState::Running))?;
+    let resets = (machine.panics, machine.watchdog_resets);
+    equal("panics and watchdog resets", resets, (0, 0))
+}
+
+/// A converter that is dead when the controller starts, and comes alive later.
+pub fn dead_from_the_start(bench: &Bench, part: Part) -> Outcome {
+    let mut machine = bench.machine(part, [&bench.blob, &[]])?;
+    machine.chip.adc.fault = AdcFault::Line(0xff);
+    machine.run_ticks(200)?;
+    let seen = Seen::since_last(&mut machine);
+    let state = seen.last_status().and_then(|status| status.state);
+    equal("state", state, Some(NodeState::NoFrames))?;
+    machine.chip.adc.fault = AdcFault::None;
+    machine.run_ticks(200)?;
+    all_good(&mut machine, bench, 225, 170)
+}
+
+/// A converter that loses its settings: noticed in the next tick, started again.
+pub fn reset_by_itself(bench: &Bench, part: Part) -> Outcome {
+    let mut machine = bench.machine(part, [&bench.blob, &[]])?;
+    machine.run_ticks(100)?;
+    Seen::since_last(&mut machine);
+    machine.chip.adc.reset();
+    machine.run_ticks(10)?;
+    let during = Seen::since_last(&mut machine);
+    let shown = during
+        .axes
+        .iter()
+        .filter(|axis| axis.tick > 100 && axis.axis < 3);
+    let told = shown
+        .clone()
+        .filter(|axis| axis.status & NOTHING.bits() == NOTHING.bits())
+        .count();
+    equal("words told invalid", told, shown.count())?;
+    machine.run_ticks(200)?;
+    all_good(&mut machine, bench, 125, 180)
 }

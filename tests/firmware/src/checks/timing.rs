@@ -175,3 +175,23 @@ pub fn fpu_settings_changed_during_the_decoding(bench: &Bench) -> Outcome {
         format!("only {} poses after", comparison.planar)
     })
 }
+
+/// The clock of 32 bits wraps after 71 minutes: no tick is lost or doubled.
+pub fn the_clock_wraps(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.chip.timer_offset_us = u32::MAX - 200_500;
+    machine.run_ticks(300)?;
+    let seen = Seen::since_last(&mut machine);
+    let mut comparison = Comparison::default();
+    comparison.add(&seen.axes, &bench.poses, 0);
+    equal("words that differ", comparison.differing, 0)?;
+    expect(comparison.planar >= 298, || {
+        format!("only {} poses", comparison.planar)
+    })?;
+    stays_in_step(&seen, 0)?;
+    equal(
+        "missed ticks",
+        seen.last_status().map(|s| s.missed_ticks),
+        Some(0),
+    )
+}
