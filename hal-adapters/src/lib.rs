@@ -6,6 +6,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`source`] | the traits [`FrameSource`] and [`PoseSink`], and a source over a slice |
+//! | [`adc`] | converters on SPI: codes to raw frames |
 //! | [`can`] | frames, signals and identifiers; coding, protection, assembly of a tick |
 //! | [`candump`] | one line of a `candump -L` log, read and written |
 //! | [`fault`] | a source that drops, repeats, delays and damages, by a seed |
@@ -17,6 +18,7 @@
 #[cfg(feature = "std")]
 extern crate std;
 
+pub mod adc;
 pub mod can;
 pub mod candump;
 pub mod fault;

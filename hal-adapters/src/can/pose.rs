@@ -41,7 +41,8 @@ pub const fn planar_frames(reading: &Reading, counter: u32) -> [Coded; 3] {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PoseSender {
     tick: u32,
-    vertical_ticks: u32,
+    /// Binary logarithm of the ticks between two frames of a vertical axis.
+    vertical_shift: u32,
 }
 
 impl Default for PoseSender {
@@ -61,23 +62,21 @@ impl PoseSender {
         };
         Self {
             tick: 0,
-            vertical_ticks: 1 << ticks.ilog2(),
+            vertical_shift: ticks.ilog2(),
         }
     }
 
     /// The frames of one tick: X, Y, Rz, and the vertical axes that are due.
     pub fn frames(&mut self, reading: &Reading) -> impl Iterator<Item = Coded> + use<> {
-        let (tick, every) = (self.tick, self.vertical_ticks);
-        let mask = every.wrapping_sub(1);
+        let (tick, shift) = (self.tick, self.vertical_shift & 0xf);
+        let every = 1u32 << shift;
         self.tick = tick.wrapping_add(1);
         let (values, status) = (reading.pose.vertical.to_array(), reading.status);
         // The axes take turns, so that no tick carries all three unless every tick does.
         let due = (0u32..).zip(VERTICAL.into_iter().zip(values));
         let vertical = due.filter_map(move |(k, (message, value))| {
             let turn = k.wrapping_mul(every) / 3;
-            // A power of two: remainder and quotient without a division that could fail.
-            let (phase, count) = (tick & mask, tick.wrapping_shr(mask.count_ones()));
-            (phase == turn).then(|| axis_frame(message, count, value, status))
+            (tick & (every - 1) == turn).then(|| axis_frame(message, tick >> shift, value, status))
         });
         planar_frames(reading, tick).into_iter().chain(vertical)
     }

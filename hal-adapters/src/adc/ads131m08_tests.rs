@@ -1,0 +1,244 @@
+//! Byte sequences worked out from the data sheet; the checks were computed bit by bit with
+//! polynomial 0x1021 from 0xFFFF, apart from the code under test.
+
+extern crate std;
+
+use super::*;
+use embedded_hal::spi::ErrorKind;
+use embedded_hal_mock::eh1::delay::NoopDelay;
+use embedded_hal_mock::eh1::digital::{Mock as PinMock, State, Transaction as PinTransaction};
+use embedded_hal_mock::eh1::spi::{Mock, Transaction};
+use std::vec;
+use std::vec::Vec;
+
+/// CRC-16 one bit at a time, as the data sheet draws it.
+fn check(bytes: &[u8]) -> [u8; 3] {
+    let mut register = 0xffffu16;
+    for byte in bytes {
+        for bit in (0..8).rev() {
+            let carry = (register >> 15) as u8 ^ (byte >> bit & 1);
+            register = register << 1 ^ if carry == 1 { 0x1021 } else { 0 };
+        }
+    }
+    let [high, low] = register.to_be_bytes();
+    [high, low, 0]
+}
+
+/// A frame of the part: response, eight codes, check.
+fn answer(response: u16, codes: [i32; 8]) -> Vec<u8> {
+    let [high, low] = response.to_be_bytes();
+    let mut bytes = vec![high, low, 0];
+    for code in codes {
+        bytes.extend(&code.to_be_bytes()[1..]);
+    }
+    let check = check(&bytes);
+    bytes.extend(check);
+    bytes
+}
+
+fn frame(command: u16, data: u16, back: Vec<u8>) -> Vec<Transaction<u8>> {
+    let ([c0, c1], [d0, d1]) = (command.to_be_bytes(), data.to_be_bytes());
+    let mut sent = vec![0; FRAME_BYTES];
+    sent[..6].copy_from_slice(&[c0, c1, 0, d0, d1, 0]);
+    vec![
+        Transaction::transaction_start(),
+        Transaction::transfer_in_place(sent, back),
+        Transaction::transaction_end(),
+    ]
+}
+
+const QUIET: [i32; 8] = [0; 8];
+
+fn try_start(expected: &[Transaction<u8>]) -> Result<(), AdcError<ErrorKind>> {
+    let mut pin = PinMock::new(&[PinTransaction::set(State::High)]);
+    let mut adc = Ads131m08::new(Mock::new(expected), pin.clone(), Channels::IN_ORDER);
+    let result = adc.start(&mut NoopDelay::new());
+    adc.release().0.done();
+    pin.done();
+    result
+}
+
+fn try_sample(back: Vec<u8>) -> Result<RawFrame, AdcError<ErrorKind>> {
+    let mut pin = PinMock::new(&[]);
+    let mut adc = Ads131m08::new(
+        Mock::new(&frame(0, 0, back)),
+        pin.clone(),
+        Channels::IN_ORDER,
+    );
+    let result = adc.sample(7, 14_000);
+    adc.release().0.done();
+    pin.done();
+    result
+}
+
+/// Everything that a good start exchanges, each entry one frame.
+fn started() -> Vec<Vec<Transaction<u8>>> {
+    vec![
+        frame(0x0011, 0, answer(0x0500, QUIET)),
+        frame(0xa000, 0, answer(0xff28, QUIET)),
+        frame(0x0000, 0, answer(0x2804, QUIET)),
+        frame(0x6180, 0x3f02, answer(0x0500, QUIET)),
+        frame(0x0000, 0, answer(0x4180, QUIET)),
+        frame(0xa180, 0, answer(0x0500, QUIET)),
+        frame(0x0000, 0, answer(0x3f02, QUIET)),
+        frame(0x6100, 0x0110, answer(0x0500, QUIET)),
+        frame(0x0000, 0, answer(0x4100, QUIET)),
+        frame(0xa100, 0, answer(0x0100, QUIET)),
+        frame(0x0000, 0, answer(0x0110, QUIET)),
+    ]
+}
+
+#[test]
+fn the_check_is_that_of_the_data_sheet() {
+    assert_eq!(check(b"123456789"), [0x29, 0xb1, 0]);
+    assert_eq!(CRC.checksum(b"123456789"), 0x29b1);
+}
+
+#[test]
+fn a_start_resets_identifies_sets_and_reads_back() {
+    assert_eq!(try_start(&started().concat()), Ok(()));
+}
+
+#[test]
+fn a_damaged_frame_before_the_reset_does_not_matter() {
+    let mut all = started();
+    all[0] = frame(0x0011, 0, vec![0x55; FRAME_BYTES]);
+    assert_eq!(try_start(&all.concat()), Ok(()));
+}
+
+#[test]
+fn a_part_that_does_not_confirm_its_reset_or_has_other_channels_is_refused() {
+    let mut all = started()[..2].to_vec();
+    all[1] = frame(0xa000, 0, answer(0xff24, QUIET));
+    let (found, expected) = (0xff24, 0xff28);
+    assert_eq!(
+        try_start(&all.concat()),
+        Err(AdcError::WrongId { found, expected })
+    );
+
+    let mut all = started()[..3].to_vec();
+    all[2] = frame(0x0000, 0, answer(0x2401, QUIET));
+    let (found, expected) = (0x2401, 0x2800);
+    assert_eq!(
+        try_start(&all.concat()),
+        Err(AdcError::WrongId { found, expected })
+    );
+}
+
+#[test]
+fn a_setting_that_does_not_read_back_is_named() {
+    let mut all = started()[..7].to_vec();
+    all[6] = frame(0x0000, 0, answer(0xff0e, QUIET));
+    let error = AdcError::WrongSetting {
+        register: 0x03,
+        found: 0xff0e,
+        wanted: 0x3f02,
+    };
+    assert_eq!(try_start(&all.concat()), Err(error));
+}
+
+/// Written out whole, so that nothing but this list says what a frame is.
+#[test]
+fn a_good_frame_gives_signed_codes_of_24_bits() {
+    #[rustfmt::skip]
+    let bytes = vec![
+        0x01, 0x3f, 0x00,
+        0x00, 0x03, 0xe8, 0xff, 0xf8, 0x30, 0x00, 0x0b, 0xb8, 0xff, 0xff, 0xff,
+        0x00, 0x00, 0x00, 0x7f, 0xff, 0xff, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+        0x0a, 0x99, 0x00,
+    ];
+    let want = RawFrame {
+        hall: [1000, -2000, 3000],
+        capacitive: [-1, 0, 8_388_607],
+        sequence: 7,
+        time_us: 14_000,
+    };
+    assert_eq!(try_sample(bytes), Ok(want));
+}
+
+#[test]
+fn a_resynchronisation_is_no_fault_and_rails_stay_rails() {
+    let codes = [-8_388_608, 8_388_607, 0, 0, 0, 0, 0, 0];
+    let frame = try_sample(answer(0x413f, codes)).expect("a good frame");
+    assert_eq!(frame.hall, [-8_388_608, 8_388_607, 0]);
+}
+
+#[test]
+fn every_flipped_bit_of_a_frame_is_noticed() {
+    let good = answer(0x013f, [1000, -2000, 3000, -1, 0, 77, 0, 0]);
+    // The last eight bits pad the check's word and carry nothing.
+    for bit in 0..8 * (FRAME_BYTES - 1) {
+        let mut bytes = good.clone();
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        let result = try_sample(bytes);
+        assert!(
+            matches!(result, Err(AdcError::WrongCheck { .. })),
+            "bit {bit}: {result:?}"
+        );
+    }
+}
+
+#[test]
+fn a_line_that_never_moves_is_silent() {
+    for level in [0x00, 0xff] {
+        let result = try_sample(vec![level; FRAME_BYTES]);
+        assert_eq!(result, Err(AdcError::Silent { level }));
+    }
+}
+
+#[test]
+fn a_part_that_was_reset_or_locked_meanwhile_is_not_read() {
+    for found in [0x053f, 0x813f, 0x113f, 0x033f] {
+        let error = AdcError::WrongSetting {
+            register: 0x01,
+            found,
+            wanted: 0x0100,
+        };
+        assert_eq!(try_sample(answer(found, QUIET)), Err(error));
+    }
+}
+
+#[test]
+fn codes_that_are_not_new_are_not_read() {
+    let (ready, read) = (0x1f, 0x3f);
+    assert_eq!(
+        try_sample(answer(0x011f, QUIET)),
+        Err(AdcError::NotReady { ready, read })
+    );
+}
+
+#[test]
+fn a_trigger_is_a_pulse_on_sync() {
+    let mut pin = PinMock::new(&[
+        PinTransaction::set(State::Low),
+        PinTransaction::set(State::High),
+    ]);
+    let mut adc = Ads131m08::new(Mock::new(&[]), pin.clone(), Channels::IN_ORDER);
+    assert_eq!(adc.trigger(&mut NoopDelay::new()), Ok(()));
+    adc.release().0.done();
+    pin.done();
+}
+
+/// A bus that fails.
+struct Broken;
+impl embedded_hal::spi::ErrorType for Broken {
+    type Error = ErrorKind;
+}
+impl SpiDevice for Broken {
+    fn transaction(
+        &mut self,
+        _: &mut [embedded_hal::spi::Operation<'_, u8>],
+    ) -> Result<(), ErrorKind> {
+        Err(ErrorKind::ModeFault)
+    }
+}
+
+#[test]
+fn the_error_of_the_bus_is_kept() {
+    let mut pin = PinMock::new(&[PinTransaction::set(State::High)]);
+    let mut adc = Ads131m08::new(Broken, pin.clone(), Channels::IN_ORDER);
+    let error = AdcError::Bus(ErrorKind::ModeFault);
+    assert_eq!(adc.start(&mut NoopDelay::new()), Err(error));
+    assert_eq!(adc.sample(0, 0), Err(error));
+    pin.done();
+}

@@ -1,0 +1,173 @@
+//! Byte sequences worked out from the data sheet: command tables and SDO format of the part.
+
+extern crate std;
+
+use super::*;
+use embedded_hal::spi::ErrorKind;
+use embedded_hal_mock::eh1::delay::NoopDelay;
+use embedded_hal_mock::eh1::spi::{Mock, Transaction};
+use std::vec;
+use std::vec::Vec;
+
+const CHANNELS: Channels = Channels::IN_ORDER;
+
+fn frame(out: [u8; 2], back: [u8; 3]) -> Vec<Transaction<u8>> {
+    let (mut sent, mut read) = (out.to_vec(), vec![0, 0]);
+    sent.extend([0; 3]);
+    read.extend(back);
+    vec![
+        Transaction::transaction_start(),
+        Transaction::transfer_in_place(sent, read),
+        Transaction::transaction_end(),
+    ]
+}
+
+/// Register n is addressed by the upper seven bits; the bit after them writes.
+fn written(register: u8, value: u8) -> Vec<Transaction<u8>> {
+    let write = frame([register << 1 | 1, value], [value, 0, 0]);
+    [write, frame([register << 1, 0], [value, 0, 0])].concat()
+}
+
+fn started() -> Vec<Transaction<u8>> {
+    let mut all = frame([0x85, 0x00], [0, 0, 0]);
+    all.extend(frame([0x02, 0x00], [0xff, 0, 0]));
+    all.extend(written(0x01, 0x3f));
+    all.extend(written(0x02, 0xc0));
+    all.extend(written(0x03, 0x42));
+    (0x05..=0x0a).for_each(|range| all.extend(written(range, 0)));
+    all
+}
+
+/// The sequence is started, then each channel gives its code, its number and the device's.
+fn sampled(codes: [[u8; 2]; 6]) -> Vec<Transaction<u8>> {
+    let mut all = frame([0xa0, 0x00], [0x12, 0x34, 0x54]);
+    for (k, [high, low]) in codes.into_iter().enumerate() {
+        all.extend(frame(
+            [0, 0],
+            [high, low, [0x04, 0x14, 0x24, 0x34, 0x44, 0x54][k]],
+        ));
+    }
+    all
+}
+
+const ZERO: [[u8; 2]; 6] = [[0x80, 0]; 6];
+
+fn try_start(expected: Vec<Transaction<u8>>) -> Result<(), AdcError<ErrorKind>> {
+    let mut adc = Ads8688::new(Mock::new(&expected), CHANNELS);
+    let result = adc.start(&mut NoopDelay::new());
+    adc.release().done();
+    result
+}
+
+fn try_sample(expected: Vec<Transaction<u8>>) -> Result<RawFrame, AdcError<ErrorKind>> {
+    let mut adc = Ads8688::new(Mock::new(&expected), CHANNELS);
+    let result = adc.sample(7, 14_000);
+    adc.release().done();
+    result
+}
+
+#[test]
+fn a_start_resets_identifies_sets_and_reads_back() {
+    assert_eq!(try_start(started()), Ok(()));
+}
+
+#[test]
+fn codes_are_signed_around_half_scale_and_rails_stay_rails() {
+    let codes = [
+        [0x80, 0x01],
+        [0x7f, 0xff],
+        [0x00, 0x00],
+        [0xff, 0xff],
+        [0x83, 0xe8],
+        [0x80, 0],
+    ];
+    let want = RawFrame {
+        hall: [1, -1, -32768],
+        capacitive: [32767, 1000, 0],
+        sequence: 7,
+        time_us: 14_000,
+    };
+    assert_eq!(try_sample(sampled(codes)), Ok(want));
+}
+
+#[test]
+fn registers_that_are_not_at_reset_belong_to_another_part() {
+    let mut all = frame([0x85, 0x00], [0, 0, 0]);
+    all.extend(frame([0x02, 0x00], [0x3f, 0, 0]));
+    let (found, expected) = (0x3f, 0xff);
+    assert_eq!(try_start(all), Err(AdcError::WrongId { found, expected }));
+}
+
+#[test]
+fn a_setting_that_does_not_read_back_is_named() {
+    let mut all = started();
+    let last = frame([0x14, 0x00], [0x01, 0, 0]);
+    all.splice(all.len() - last.len().., last);
+    let error = AdcError::WrongSetting {
+        register: 0x0a,
+        found: 1,
+        wanted: 0,
+    };
+    assert_eq!(try_start(all), Err(error));
+}
+
+#[test]
+fn a_code_of_another_channel_or_device_is_refused() {
+    for found in [0x24, 0x10, 0x18, 0x15] {
+        let mut all = sampled(ZERO);
+        let wrong = frame([0, 0], [0x80, 0, found]);
+        all.truncate(6);
+        all.splice(6.., wrong);
+        let expected = 0x14;
+        assert_eq!(
+            try_sample(all),
+            Err(AdcError::WrongInput { found, expected })
+        );
+    }
+}
+
+#[test]
+fn a_line_that_never_moves_is_silent() {
+    let mut low = frame([0xa0, 0x00], [0, 0, 0]);
+    low.extend(frame([0, 0], [0, 0, 0]));
+    assert_eq!(try_sample(low), Err(AdcError::Silent { level: 0 }));
+    let high = |out: u8| {
+        let sent = vec![out, 0, 0, 0, 0];
+        let all = [
+            Transaction::transaction_start(),
+            Transaction::transfer_in_place(sent, vec![0xff; 5]),
+            Transaction::transaction_end(),
+        ];
+        all.to_vec()
+    };
+    assert_eq!(
+        try_sample([high(0xa0), high(0)].concat()),
+        Err(AdcError::Silent { level: 0xff })
+    );
+    assert_eq!(
+        try_start([high(0x85), high(0x02)].concat()),
+        Err(AdcError::Silent { level: 0xff })
+    );
+}
+
+/// A bus that fails.
+struct Broken;
+impl embedded_hal::spi::ErrorType for Broken {
+    type Error = ErrorKind;
+}
+impl SpiDevice for Broken {
+    fn transaction(
+        &mut self,
+        _: &mut [embedded_hal::spi::Operation<'_, u8>],
+    ) -> Result<(), ErrorKind> {
+        Err(ErrorKind::Overrun)
+    }
+}
+
+#[test]
+fn the_error_of_the_bus_is_kept() {
+    let mut adc = Ads8688::new(Broken, CHANNELS);
+    let error = AdcError::Bus(ErrorKind::Overrun);
+    assert_eq!(adc.start(&mut NoopDelay::new()), Err(error));
+    assert_eq!(adc.sample(0, 0), Err(error));
+}

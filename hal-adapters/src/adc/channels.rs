@@ -1,0 +1,83 @@
+//! Which input of the converter carries which sensor.
+
+/// Inputs of both parts.
+pub const INPUTS: usize = 8;
+
+/// The inputs of the six sensors: 0 to 7, no two alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Channels {
+    hall: [u8; 3],
+    capacitive: [u8; 3],
+}
+
+impl Channels {
+    /// Hall probes A, B, C on inputs 0, 1, 2 and gaps 1, 2, 3 on inputs 3, 4, 5.
+    pub const IN_ORDER: Self = Self {
+        hall: [0, 1, 2],
+        capacitive: [3, 4, 5],
+    };
+
+    /// The inputs of Hall probes A, B, C and of capacitive gaps 1, 2, 3; `None` unless all
+    /// six are below 8 and differ.
+    pub const fn new(hall: [u8; 3], capacitive: [u8; 3]) -> Option<Self> {
+        let all = [
+            hall[0],
+            hall[1],
+            hall[2],
+            capacitive[0],
+            capacitive[1],
+            capacitive[2],
+        ];
+        let (mut mask, mut k) = (0u32, 0);
+        while k < all.len() {
+            if all[k] as usize >= INPUTS || mask & (1 << all[k]) != 0 {
+                return None;
+            }
+            mask |= 1 << all[k];
+            k += 1;
+        }
+        Some(Self { hall, capacitive })
+    }
+
+    /// Bit k set: input k is read.
+    pub const fn mask(&self) -> u8 {
+        let ([a, b, c], [d, e, f]) = (self.hall, self.capacitive);
+        1 << a | 1 << b | 1 << c | 1 << d | 1 << e | 1 << f
+    }
+
+    /// The codes of Hall probes and gaps out of those of all inputs.
+    pub(super) const fn pick(&self, codes: &[i32; INPUTS]) -> ([i32; 3], [i32; 3]) {
+        // The masks change nothing, and show the compiler that no index is out of range.
+        const fn three(codes: &[i32; INPUTS], at: [u8; 3]) -> [i32; 3] {
+            [
+                codes[(at[0] & 7) as usize],
+                codes[(at[1] & 7) as usize],
+                codes[(at[2] & 7) as usize],
+            ]
+        }
+        (three(codes, self.hall), three(codes, self.capacitive))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inputs_beyond_the_part_or_used_twice_are_refused() {
+        assert_eq!(Channels::new([0, 1, 8], [3, 4, 5]), None);
+        assert_eq!(Channels::new([0, 1, 2], [3, 4, 0]), None);
+        assert_eq!(
+            Channels::new([0, 1, 2], [3, 4, 5]),
+            Some(Channels::IN_ORDER)
+        );
+    }
+
+    #[test]
+    fn each_sensor_gets_the_code_of_its_input() {
+        let channels = Channels::new([7, 0, 3], [1, 6, 2]).expect("six inputs");
+        assert_eq!(channels.mask(), 0b1100_1111);
+        let codes = [10, 11, 12, 13, 14, 15, 16, 17];
+        assert_eq!(channels.pick(&codes), ([17, 10, 13], [11, 16, 12]));
+    }
+}

@@ -1,0 +1,187 @@
+//! Converters on SPI: six codes of one servo period into one [`RawFrame`].
+//!
+//! | module | part | what it is |
+//! |---|---|---|
+//! | [`ads131m08`] | TI ADS131M08 | eight channels of 24 bits sampled at once, CRC over every frame |
+//! | [`ads8688`] | TI ADS8688 | eight channels of 16 bits one after the other, no CRC |
+//! | [`channels`] | any | which input carries which sensor |
+//! | [`stuck`] | any | codes that never change: a converter that stands still |
+//!
+//! Which to take: the first where the stage moves fast or the cable is long. The skew of the
+//! second costs 48 nm at the fastest motion of a service log (4.8 mm/s; see [`ads8688`]),
+//! a tenth of the Hall noise, and its frames carry no check but a signature of six bits.
+//!
+//! The drivers own an [`SpiDevice`](embedded_hal::spi::SpiDevice), which owns chip select.
+//! They allocate nothing, have no panic and wait for nothing that may not come: 10 us for a
+//! reset in [`FrameSampler::start`], 1 us for a pulse in [`FrameSampler::trigger`]. No driver crate of either part served: that of the ADS131M08
+//! owns chip select and data-ready pins itself, waits 100 ms at start and offers the last
+//! codes in place of damaged ones; of the ADS8688 there is none.
+
+pub mod ads131m08;
+pub mod ads8688;
+pub mod channels;
+pub mod stuck;
+
+pub use ads131m08::Ads131m08;
+pub use ads8688::Ads8688;
+pub use channels::Channels;
+
+use embedded_hal::delay::DelayNs;
+use embedded_hal::digital;
+use runtime::RawFrame;
+
+/// Samples all six codes of one servo period.
+///
+/// Call [`trigger`](Self::trigger) on the servo's schedule, and [`sample`](Self::sample)
+/// [`SETTLE_US`](Self::SETTLE_US) later. After an error the next period may be tried as it
+/// is, or after [`start`](Self::start).
+pub trait FrameSampler {
+    /// The bus's own error.
+    type Bus: embedded_hal::spi::Error;
+
+    /// From the trigger until the codes are there, us.
+    const SETTLE_US: u32;
+
+    /// Resets the part, checks what it is, sets it up and reads the settings back.
+    ///
+    /// # Errors
+    /// See [`AdcError`]; the part may then be in any state, and this may be called again.
+    fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<Self::Bus>>;
+
+    /// Starts the conversion of one period, on parts that have a way to.
+    ///
+    /// # Errors
+    /// [`AdcError::Pin`].
+    fn trigger(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<Self::Bus>>;
+
+    /// Reads the codes of one period. `sequence` and `time_us` go into the frame as they are.
+    /// A code at a rail is no error here: the decoder's window refuses it.
+    ///
+    /// # Errors
+    /// See [`AdcError`]; no code of such a period is to be used.
+    fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<Self::Bus>>;
+}
+
+/// Why a converter gave no codes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AdcError<B> {
+    /// The bus reports an error of its own.
+    Bus(B),
+    /// A control pin reports an error of its own.
+    Pin(digital::ErrorKind),
+    /// The data line never moved: no power, no clock, a broken wire.
+    Silent {
+        /// The byte that was read all along.
+        level: u8,
+    },
+    /// Another part answers than the one expected, or it was not reset.
+    WrongId {
+        /// What identifies the part that is there.
+        found: u16,
+        /// What identifies the part that was expected.
+        expected: u16,
+    },
+    /// A setting does not read back, or was lost since.
+    WrongSetting {
+        /// Address of the register.
+        register: u8,
+        /// Its value, as far as it is known.
+        found: u16,
+        /// The value that was wanted.
+        wanted: u16,
+    },
+    /// The check of a frame fails.
+    WrongCheck {
+        /// The check that the frame carries.
+        received: u16,
+        /// The check of its bytes.
+        computed: u16,
+    },
+    /// No new codes: the part does not convert.
+    NotReady {
+        /// Bit k set: input k had a new code.
+        ready: u8,
+        /// Bit k set: input k is read.
+        read: u8,
+    },
+    /// The code of another input came, or a frame without the part's signature.
+    WrongInput {
+        /// The signature that came.
+        found: u8,
+        /// The signature that was expected.
+        expected: u8,
+    },
+    /// All six codes stayed the same for too long.
+    Stuck {
+        /// For how many periods.
+        periods: u8,
+    },
+}
+
+impl<B> AdcError<B> {
+    /// A number for status frames, the same in every version: 1 for the first variant.
+    pub const fn number(&self) -> u8 {
+        match self {
+            Self::Bus(_) => 1,
+            Self::Pin(_) => 2,
+            Self::Silent { .. } => 3,
+            Self::WrongId { .. } => 4,
+            Self::WrongSetting { .. } => 5,
+            Self::WrongCheck { .. } => 6,
+            Self::NotReady { .. } => 7,
+            Self::WrongInput { .. } => 8,
+            Self::Stuck { .. } => 9,
+        }
+    }
+}
+
+impl<B: core::fmt::Debug> core::fmt::Display for AdcError<B> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Bus(error) => write!(f, "the bus to the converter: {error:?}"),
+            Self::Pin(error) => write!(f, "a control pin of the converter: {error:?}"),
+            Self::Silent { level } => {
+                write!(
+                    f,
+                    "the converter is silent: nothing but {level:#04x} was read"
+                )
+            }
+            Self::WrongId { found, expected } => {
+                write!(f, "another part: it says {found:#06x}, not {expected:#06x}")
+            }
+            Self::WrongSetting {
+                register,
+                found,
+                wanted,
+            } => write!(
+                f,
+                "register {register:#04x} of the converter is {found:#06x}, not {wanted:#06x}"
+            ),
+            Self::WrongCheck { received, computed } => {
+                write!(
+                    f,
+                    "damaged frame: check {received:04x}, computed {computed:04x}"
+                )
+            }
+            Self::NotReady { ready, read } => {
+                write!(f, "no new codes: inputs {ready:#010b} of {read:#010b}")
+            }
+            Self::WrongInput { found, expected } => {
+                write!(
+                    f,
+                    "a frame signed {found:#08b} came where {expected:#08b} belongs"
+                )
+            }
+            Self::Stuck { periods } => write!(f, "all codes the same for {periods} periods"),
+        }
+    }
+}
+
+impl<B: core::fmt::Debug> core::error::Error for AdcError<B> {}
+
+/// The byte that a whole frame consists of, if it does.
+fn silent(bytes: &[u8]) -> Option<u8> {
+    let first = *bytes.first()?;
+    let quiet = first == 0x00 || first == 0xff;
+    (quiet && bytes.iter().all(|&b| b == first)).then_some(first)
+}

@@ -1,0 +1,10 @@
+//! Tells the linker where `memory.x` lies: at the top of the repository.
+fn main() {
+    let manifest = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default();
+    println!("cargo:rustc-link-search={manifest}/../..");
+    println!("cargo:rerun-if-changed=../../memory.x");
+    println!("cargo:rerun-if-env-changed=STAGE_SERIAL");
+    if std::env::var("CARGO_CFG_TARGET_OS").is_ok_and(|os| os == "none") {
+        println!("cargo:rustc-link-arg-bins=-Tlink.x");
+    }
+}

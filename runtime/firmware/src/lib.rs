@@ -1,0 +1,32 @@
+//! What the stage controller does, apart from the chip that it does it on.
+//!
+//! ```text
+//! timer --Schedule--> trigger --110 us--> Acquisition --RawFrame--> Node --frames--> Outbox --> CAN
+//!                                          CAN commands --> Node          Telemetry <-- Node
+//! ```
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`schedule`] | ticks at multiples of 2 ms, and those that were missed |
+//! | [`acquisition`] | a converter that is started, read, and started again after faults |
+//! | [`slots`] | which of the two parameter slots is used, and what is wrong with the other |
+//! | [`node`] | one tick: decode, report, obey |
+//! | [`light`] | what the LED shows |
+//! | [`outbox`] | frames that wait for a mailbox |
+//! | [`telemetry`] | what a debugger reads |
+//! | [`fpu`] | the rounding mode that the decoder relies on |
+//!
+//! The program around it is `main.rs`; pins, clocks and bit timing are in `board.rs`.
+#![no_std]
+#![deny(unsafe_code)]
+
+pub mod acquisition;
+#[allow(unsafe_code)] // a register of the FPU; see its text
+pub mod fpu;
+pub mod light;
+pub mod node;
+pub mod outbox;
+pub mod schedule;
+pub mod slots;
+#[allow(unsafe_code)] // a symbol name that a debugger finds; see its text
+pub mod telemetry;

@@ -1,0 +1,55 @@
+//! What the LED shows, so that a look at the board tells the state.
+//!
+//! | LED | state |
+//! |---|---|
+//! | one flash a second | decoding |
+//! | two flashes a second | no parameters, or bad ones |
+//! | three flashes a second | no codes from the converter, or a sensor fault |
+//! | steadily on | the controller failed its own test |
+//! | blinking fast, on as long as off | asked to show where it is |
+//! | off | no power, or between reset and the first tick |
+
+use hal_adapters::can::status::NodeState;
+
+/// Ticks of a second.
+const SECOND: u32 = 500;
+/// Ticks of a flash, and of the pause after it: 0.1 s.
+const FLASH: u32 = 50;
+/// Ticks of half a period while identifying: 62 ms.
+const FAST: u32 = 31;
+
+/// Whether the LED is on in this tick.
+pub const fn is_on(state: NodeState, identifying: bool, tick: u32) -> bool {
+    if identifying {
+        return (tick / FAST).is_multiple_of(2);
+    }
+    let flashes = match state {
+        NodeState::Starting => return false,
+        NodeState::SelfTestFailed => return true,
+        NodeState::Running => 1,
+        NodeState::NoParameters | NodeState::BadParameters => 2,
+        NodeState::NoFrames | NodeState::SensorFault => 3,
+    };
+    let slot = (tick % SECOND) / FLASH;
+    slot.is_multiple_of(2) && slot / 2 < flashes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_state_has_its_number_of_flashes() {
+        let flashes = |state, identifying| {
+            let on = |tick| is_on(state, identifying, tick);
+            (1..=SECOND)
+                .filter(|&tick| on(tick) && !on(tick - 1))
+                .count()
+        };
+        assert_eq!(flashes(NodeState::Running, false), 1);
+        assert_eq!(flashes(NodeState::BadParameters, false), 2);
+        assert_eq!(flashes(NodeState::SensorFault, false), 3);
+        assert_eq!(flashes(NodeState::SelfTestFailed, false), 0);
+        assert!(flashes(NodeState::Running, true) >= 8);
+    }
+}

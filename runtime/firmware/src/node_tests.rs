@@ -1,0 +1,216 @@
+extern crate std;
+
+use super::*;
+use crate::slots::{Loaded, load};
+use hal_adapters::can::command::Outcome;
+use hal_adapters::can::{BusFrame, Message};
+use runtime::OnInvalid;
+use std::boxed::Box;
+use std::vec::Vec;
+
+/// An FPU whose settings something else changes: before these calls, counted from 0.
+#[derive(Default)]
+struct Disturbed {
+    calls: usize,
+    at: Vec<usize>,
+}
+
+impl FpuSettings for Disturbed {
+    fn restore(&mut self) -> bool {
+        self.calls += 1;
+        self.at.contains(&(self.calls - 1))
+    }
+}
+
+fn loaded() -> &'static Loaded {
+    let memory = crate::slots::tests::slot("stage-7", "");
+    Box::leak(Box::new(load(&memory).expect("a sound slot")))
+}
+
+fn node() -> Node<'static> {
+    let loaded = loaded();
+    let parameters = Parameters::Usable {
+        servo: Servo::new(&loaded.decoder, OnInvalid::Zero),
+        serial: &loaded.serial,
+        other_slot: None,
+    };
+    Node::new(parameters, false)
+}
+
+fn frame(sequence: u32) -> RawFrame {
+    RawFrame {
+        hall: [100, 200, 300],
+        capacitive: [10, 20, 30],
+        sequence,
+        time_us: sequence * 2000,
+    }
+}
+
+/// Frames that one tick sends.
+fn tick(
+    node: &mut Node<'_>,
+    sample: Result<RawFrame, SampleFault>,
+) -> Vec<hal_adapters::can::Coded> {
+    let mut outbox = Outbox::new();
+    node.tick(
+        sample,
+        &Facts::default(),
+        &mut Disturbed::default(),
+        &mut outbox,
+    );
+    core::iter::from_fn(|| outbox.pop()).collect()
+}
+
+fn told(frames: &[hal_adapters::can::Coded]) -> Vec<Told> {
+    let mut mailbox = Mailbox::default();
+    let read = |coded: &hal_adapters::can::Coded| mailbox.take(&BusFrame::from(*coded))?.ok();
+    frames.iter().filter_map(read).collect()
+}
+
+fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Told> {
+    let coded = Mailbox::default().send(&Told::Command(Command::new(request, token)));
+    let mut outbox = Outbox::new();
+    node.mailbox = Mailbox::default(); // each command comes from a sender that starts anew
+    node.take(&BusFrame::from(coded.expect("a command")), &mut outbox);
+    told(&core::iter::from_fn(|| outbox.pop()).collect::<Vec<_>>())
+}
+
+#[test]
+fn pose_frames_come_lowest_priority_first_so_that_all_find_a_mailbox() {
+    let mut node = node();
+    for k in 0..32 {
+        let frames = tick(&mut node, Ok(frame(k)));
+        let planar: Vec<_> = frames.iter().take(3).map(|coded| coded.message).collect();
+        assert_eq!(planar, [Message::PoseRz, Message::PoseY, Message::PoseX]);
+    }
+}
+
+#[test]
+fn every_sixteenth_tick_tells_the_state_and_half_way_a_counter() {
+    let mut node = node();
+    for k in 0..64u32 {
+        let told = told(&tick(&mut node, Ok(frame(k))));
+        let status = told
+            .iter()
+            .any(|t| matches!(t, Told::Status(s) if s.state == Some(NodeState::Running)));
+        let health = told.iter().any(|t| matches!(t, Told::Health(_)));
+        assert_eq!((status, health), (k % 16 == 0, k % 16 == 8), "{k}");
+    }
+}
+
+#[test]
+fn a_fault_of_the_converter_is_a_state_and_an_invalid_pose() {
+    let mut node = node();
+    tick(&mut node, Ok(frame(0)));
+    for (error, state) in [
+        (AdcError::Silent { level: 0 }, NodeState::NoFrames),
+        (
+            AdcError::WrongCheck {
+                received: 1,
+                computed: 2,
+            },
+            NodeState::SensorFault,
+        ),
+        (AdcError::Bus(()), NodeState::SensorFault),
+    ] {
+        tick(&mut node, Err(SampleFault::from(&error)));
+        assert_eq!(node.state(), (state, error.number()));
+    }
+    let rail = RawFrame {
+        capacitive: [0, 32767, 0],
+        ..frame(9)
+    };
+    tick(&mut node, Ok(rail));
+    assert_eq!(node.state(), (NodeState::SensorFault, REASON_CHANNEL + 4));
+}
+
+#[test]
+fn without_parameters_there_are_states_but_no_poses() {
+    let refusal = Refusal {
+        reason: 7,
+        erased: false,
+    };
+    let mut node = Node::new(Parameters::None { refusal }, true);
+    for k in 0..32 {
+        let frames = tick(&mut node, Ok(frame(k)));
+        assert!(
+            frames
+                .iter()
+                .all(|c| matches!(c.message, Message::NodeStatus | Message::Health))
+        );
+        for told in told(&frames) {
+            if let Told::Status(status) = told {
+                assert_eq!(
+                    (status.state, status.reason),
+                    (Some(NodeState::BadParameters), 7)
+                );
+                assert_eq!(status.flags, flag::WATCHDOG_RESET);
+            }
+        }
+    }
+    let answers = ask(&mut node, Request::Rezero { ticks: 10 }, 3);
+    assert!(matches!(answers[..], [Told::Answer(a)] if a.outcome == Some(Outcome::NoParameters)));
+}
+
+#[test]
+fn a_pose_decoded_under_other_fpu_settings_is_withdrawn() {
+    let run = |at: &[usize]| {
+        let mut node = node();
+        let mut fpu = Disturbed {
+            calls: 0,
+            at: at.to_vec(),
+        };
+        let reading = node.tick(
+            Ok(frame(0)),
+            &Facts::default(),
+            &mut fpu,
+            &mut Outbox::new(),
+        );
+        (reading, node.fpu_restored())
+    };
+    let (good, none) = run(&[]);
+    assert!(good.planar().is_some() && none == 0);
+    assert_eq!(run(&[0]), (good, 1));
+    assert_eq!(run(&[1]), (NOTHING, 1));
+}
+
+#[test]
+fn a_rezero_answers_twice_and_refuses_others_meanwhile() {
+    let mut node = node();
+    tick(&mut node, Ok(frame(0)));
+    let outcome = |told: &[Told]| match told {
+        [Told::Answer(answer)] => answer.outcome,
+        _ => None,
+    };
+    let first = ask(&mut node, Request::Rezero { ticks: 4 }, 1);
+    assert_eq!(outcome(&first), Some(Outcome::Started));
+    assert_eq!(
+        outcome(&ask(&mut node, Request::ClearZero, 2)),
+        Some(Outcome::Busy)
+    );
+    let answers: Vec<_> = (1..8)
+        .flat_map(|k| told(&tick(&mut node, Ok(frame(k)))))
+        .collect();
+    assert_eq!(outcome(&answers), Some(Outcome::Done));
+    assert_eq!(node.rezero_flags, flag::REZEROED);
+    assert_eq!(
+        outcome(&ask(&mut node, Request::ClearZero, 3)),
+        Some(Outcome::Done)
+    );
+    assert_eq!(node.rezero_flags, 0);
+    assert_eq!(
+        outcome(&ask(&mut node, Request::Rezero { ticks: 1 }, 4)),
+        Some(Outcome::TooShort)
+    );
+}
+
+#[test]
+fn a_remote_frame_or_a_foreign_one_is_no_command() {
+    let mut node = node();
+    let mut outbox = Outbox::new();
+    let remote = BusFrame::new_remote(Message::Command.id(), 8).expect("eight bytes");
+    node.take(&remote, &mut outbox);
+    let foreign = BusFrame::new(embedded_can::StandardId::MAX, &[0; 8]).expect("eight bytes");
+    node.take(&foreign, &mut outbox);
+    assert_eq!(outbox.front(), None);
+}

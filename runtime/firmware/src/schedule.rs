@@ -1,0 +1,119 @@
+//! The absolute schedule: tick n is due n periods after the start, however late the ticks
+//! before it came. A deadline of "now and a period" would drift.
+
+/// The servo period, us.
+pub const PERIOD_US: u32 = 2000;
+
+/// A tick that starts later than this was sampled at the wrong time, us. An interrupt of this
+/// program takes 100 us at most.
+pub const LATE_US: u32 = 200;
+
+/// One tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tick {
+    /// Its number, wrapping. Numbers of missed ticks are left out.
+    pub sequence: u32,
+    /// When it was due, us of the timer.
+    pub due_us: u32,
+    /// When it started, us of the timer.
+    pub started_us: u32,
+}
+
+/// Gives each tick its number and counts those that were missed.
+#[derive(Clone, Copy, Debug)]
+pub struct Schedule {
+    due_us: u32,
+    sequence: u32,
+    missed: u32,
+}
+
+impl Schedule {
+    /// A schedule whose first tick is due one period after `now_us`.
+    pub const fn starting(now_us: u32) -> Self {
+        Self {
+            due_us: now_us.wrapping_add(PERIOD_US),
+            sequence: 0,
+            missed: 0,
+        }
+    }
+
+    /// When the next tick is due, us of the timer.
+    pub const fn due_us(&self) -> u32 {
+        self.due_us
+    }
+
+    /// Ticks that came more than [`LATE_US`] late or not at all. Saturates.
+    pub const fn missed(&self) -> u32 {
+        self.missed
+    }
+
+    /// The tick that starts at `now_us`, which is not before the one that is due. If whole
+    /// periods have passed since then, their ticks are missed and this is the latest one.
+    pub const fn start_tick(&mut self, now_us: u32) -> Tick {
+        let skipped = now_us.wrapping_sub(self.due_us) / PERIOD_US;
+        let due_us = self.due_us.wrapping_add(skipped.wrapping_mul(PERIOD_US));
+        let late = now_us.wrapping_sub(due_us) > LATE_US;
+        let sequence = self.sequence.wrapping_add(skipped);
+        self.missed = self
+            .missed
+            .saturating_add(skipped)
+            .saturating_add(late as u32);
+        self.due_us = due_us.wrapping_add(PERIOD_US);
+        self.sequence = sequence.wrapping_add(1);
+        Tick {
+            sequence,
+            due_us,
+            started_us: now_us,
+        }
+    }
+}
+
+impl Tick {
+    /// Whether the tick that is done at `now_us` was done before the next one was due.
+    pub const fn on_schedule(&self, now_us: u32) -> bool {
+        now_us.wrapping_sub(self.due_us) < PERIOD_US
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn late_ticks_do_not_shift_the_ones_after_them() {
+        let start = u32::MAX - 3000; // The timer wraps in between.
+        let mut schedule = Schedule::starting(start);
+        for (n, late) in [0, 3, 150, 0, 190].into_iter().enumerate() {
+            let n = n as u32;
+            let due_us = start.wrapping_add((n + 1) * PERIOD_US);
+            assert_eq!(schedule.due_us(), due_us);
+            let started_us = due_us.wrapping_add(late);
+            let want = Tick {
+                sequence: n,
+                due_us,
+                started_us,
+            };
+            assert_eq!(schedule.start_tick(started_us), want);
+        }
+        assert_eq!(schedule.missed(), 0);
+    }
+
+    #[test]
+    fn ticks_that_never_came_keep_their_numbers() {
+        let mut schedule = Schedule::starting(0);
+        assert_eq!(schedule.start_tick(2001).sequence, 0);
+        let tick = schedule.start_tick(4000 + 3 * PERIOD_US + 7);
+        assert_eq!((tick.sequence, tick.due_us), (4, 10_000));
+        assert_eq!(schedule.missed(), 3);
+        assert_eq!(schedule.due_us(), 12_000);
+        assert_eq!(schedule.start_tick(12_000 + LATE_US + 1).sequence, 5);
+        assert_eq!(schedule.missed(), 4);
+    }
+
+    #[test]
+    fn a_tick_is_done_on_schedule_before_the_next_is_due() {
+        let tick = Schedule::starting(0).start_tick(2500);
+        assert!(tick.on_schedule(3999));
+        assert!(!tick.on_schedule(4000));
+    }
+}

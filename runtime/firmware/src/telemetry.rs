@@ -1,0 +1,137 @@
+//! What a debugger reads while the program runs: the static `STAGE`, by its symbol.
+//!
+//! In gdb: `print STAGE`. Poses are the decoder's words as they are: `STAGE.pose` are the bits
+//! of six `float`s, X, Y, Rz, Z, Rx, Ry in m and rad. `updates` is odd while the words change
+//! and even when they belong together.
+
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed, Ordering::Release, compiler_fence};
+use runtime::Reading;
+
+/// Counters that the program keeps beside those of the servo.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Ticks that came late or not at all.
+    pub missed_ticks: u32,
+    /// Ticks that were not done before the next one was due.
+    pub overrun_ticks: u32,
+    /// Ticks without codes.
+    pub adc_faults: u32,
+    /// How often the converter was started.
+    pub adc_starts: u32,
+    /// Frames handed to a mailbox.
+    pub frames_sent: u32,
+    /// Frames thrown away because newer ones followed.
+    pub frames_dropped: u32,
+    /// Times the bus was off.
+    pub bus_off: u32,
+    /// Ticks in which the FPU's settings had been changed.
+    pub fpu_restored: u32,
+}
+
+/// The words of `STAGE`.
+#[derive(Debug)]
+#[repr(C)]
+pub struct Telemetry {
+    updates: AtomicU32,
+    state: AtomicU32,
+    reason: AtomicU32,
+    ticks: AtomicU32,
+    sequence: AtomicU32,
+    time_us: AtomicU32,
+    status: AtomicU32,
+    pose: [AtomicU32; 6],
+    counters: [AtomicU32; 8],
+    /// Time that the last tick took from its start to its end, and the longest, us.
+    last_us: AtomicU32,
+    longest_us: AtomicU32,
+    /// 1 if the last reset came from the watchdog.
+    watchdog_reset: AtomicU32,
+}
+
+#[allow(clippy::declare_interior_mutable_const)] // only to fill arrays
+const ZERO: AtomicU32 = AtomicU32::new(0);
+
+/// The last pose and the counters. The name is the symbol's, so that any debugger finds it.
+// SAFETY: no other symbol of this program is called so.
+#[unsafe(no_mangle)]
+pub static STAGE: Telemetry = Telemetry {
+    updates: ZERO,
+    state: ZERO,
+    reason: ZERO,
+    ticks: ZERO,
+    sequence: ZERO,
+    time_us: ZERO,
+    status: ZERO,
+    pose: [ZERO; 6],
+    counters: [ZERO; 8],
+    last_us: ZERO,
+    longest_us: ZERO,
+    watchdog_reset: ZERO,
+};
+
+/// What a tick ended with.
+#[derive(Clone, Copy, Debug)]
+pub struct Ended {
+    /// Number of the state and its reason, as in the status frame.
+    pub state: (u8, u8),
+    /// Ticks since start.
+    pub ticks: u32,
+    /// Number of the tick.
+    pub sequence: u32,
+    /// When it started, us.
+    pub time_us: u32,
+    /// What it read.
+    pub reading: Reading,
+    /// The counters.
+    pub counters: Counters,
+}
+
+impl Telemetry {
+    /// Notes a tick.
+    pub fn put(&self, ended: &Ended) {
+        self.updates
+            .store(self.updates.load(Relaxed).wrapping_add(1), Relaxed);
+        compiler_fence(Release);
+        self.state.store(ended.state.0.into(), Relaxed);
+        self.reason.store(ended.state.1.into(), Relaxed);
+        self.ticks.store(ended.ticks, Relaxed);
+        self.sequence.store(ended.sequence, Relaxed);
+        self.time_us.store(ended.time_us, Relaxed);
+        self.status.store(ended.reading.status.bits(), Relaxed);
+        let (p, v) = (ended.reading.pose.planar, ended.reading.pose.vertical);
+        let pose = [p.x_m, p.y_m, p.rz_rad, v.z_m, v.rx_rad, v.ry_rad];
+        for (to, from) in self.pose.iter().zip(pose) {
+            to.store(from.to_bits(), Relaxed);
+        }
+        let c = &ended.counters;
+        let counters = [
+            c.missed_ticks,
+            c.overrun_ticks,
+            c.adc_faults,
+            c.adc_starts,
+            c.frames_sent,
+            c.frames_dropped,
+            c.bus_off,
+            c.fpu_restored,
+        ];
+        for (to, from) in self.counters.iter().zip(counters) {
+            to.store(from, Relaxed);
+        }
+        compiler_fence(Release);
+        self.updates
+            .store(self.updates.load(Relaxed).wrapping_add(1), Relaxed);
+    }
+
+    /// Notes how long a tick took.
+    pub fn put_duration(&self, us: u32) {
+        self.last_us.store(us, Relaxed);
+        if us > self.longest_us.load(Relaxed) {
+            self.longest_us.store(us, Relaxed);
+        }
+    }
+
+    /// Notes where the last reset came from.
+    pub fn put_watchdog_reset(&self, watchdog: bool) {
+        self.watchdog_reset.store(watchdog.into(), Relaxed);
+    }
+}

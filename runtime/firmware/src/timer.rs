@@ -1,0 +1,71 @@
+//! TIM2 as a clock in us that never stops, with two alarms. Its 32 bits wrap after 71
+//! minutes, like the time of a frame.
+
+use crate::board;
+use stm32f4xx_hal::pac::TIM2;
+
+/// The clock.
+pub struct Clock {
+    timer: TIM2,
+}
+
+/// Which alarms went off.
+#[derive(Clone, Copy)]
+pub struct Alarms {
+    /// A tick is due.
+    pub tick: bool,
+    /// The converter has settled.
+    pub settled: bool,
+}
+
+impl Clock {
+    /// Starts the clock. TIM2 must have been switched on.
+    pub fn new(timer: TIM2) -> Self {
+        timer
+            .psc()
+            .write(|w| w.psc().set((board::TIMER_HZ / 1_000_000 - 1) as u16));
+        timer.arr().write(|w| w.arr().set(u32::MAX));
+        timer.egr().write(|w| w.ug().set_bit());
+        timer.sr().write(|w| w.uif().clear_bit());
+        timer.cr1().write(|w| w.cen().set_bit());
+        Self { timer }
+    }
+
+    /// Now, us.
+    pub fn now_us(&self) -> u32 {
+        self.timer.cnt().read().cnt().bits()
+    }
+
+    /// Sets off the alarm for ticks at `due_us`; at once, if that is past.
+    pub fn set_tick_alarm(&mut self, due_us: u32) {
+        self.timer.ccr1().write(|w| w.ccr().set(due_us));
+        self.timer.dier().modify(|_, w| w.cc1ie().set_bit());
+        if self.now_us().wrapping_sub(due_us) < u32::MAX / 2 {
+            self.timer.egr().write(|w| w.cc1g().set_bit());
+        }
+    }
+
+    /// Sets off the alarm for the converter at `due_us`; at once, if that is past.
+    pub fn set_settled_alarm(&mut self, due_us: u32) {
+        self.timer.ccr2().write(|w| w.ccr().set(due_us));
+        self.timer.dier().modify(|_, w| w.cc2ie().set_bit());
+        if self.now_us().wrapping_sub(due_us) < u32::MAX / 2 {
+            self.timer.egr().write(|w| w.cc2g().set_bit());
+        }
+    }
+
+    /// The alarms that went off and were armed; they are silenced.
+    pub fn take_alarms(&mut self) -> Alarms {
+        let (flags, armed) = (self.timer.sr().read(), self.timer.dier().read());
+        let tick = flags.cc1if().bit_is_set() && armed.cc1ie().bit_is_set();
+        let settled = flags.cc2if().bit_is_set() && armed.cc2ie().bit_is_set();
+        // Writing 1 leaves a flag as it is.
+        self.timer
+            .sr()
+            .write(|w| w.cc1if().bit(!tick).cc2if().bit(!settled));
+        if settled {
+            self.timer.dier().modify(|_, w| w.cc2ie().clear_bit());
+        }
+        Alarms { tick, settled }
+    }
+}

@@ -1,0 +1,169 @@
+//! The whole log through converter, decoder and bus.
+
+use super::{Outcome, equal, expect};
+use crate::adc_model::Part;
+use crate::bench::{Bench, Comparison, Seen};
+use crate::machine::Machine;
+
+/// Ticks between two looks at the bus.
+const STEP: u64 = 1000;
+
+/// Runs `ticks` ticks and compares every word on the bus with the host's.
+pub fn compare(
+    bench: &Bench,
+    machine: &mut Machine,
+    ticks: u64,
+) -> Result<(Comparison, Seen), super::Failure> {
+    let mut comparison = Comparison::default();
+    let mut all = Seen::default();
+    let mut left = ticks;
+    while left > 0 {
+        let now = left.min(STEP);
+        machine.run_ticks(now)?;
+        left -= now;
+        let seen = Seen::since_last(machine);
+        comparison.add(&seen.axes, &bench.poses, 0);
+        all.damaged += seen.damaged;
+        all.statuses = seen.statuses;
+        all.health = seen.health;
+    }
+    Ok((comparison, all))
+}
+
+/// The words of `ticks` ticks are those of `host-fit decode`, and nothing else is told.
+pub fn same_words(bench: &Bench, part: Part, ticks: u64, name: &str) -> Outcome {
+    let mut machine = bench.machine(part, [&bench.blob, &[]])?;
+    let (comparison, seen) = compare(bench, &mut machine, ticks)?;
+    let image = bench.image(part);
+    println!("RESULT firmware_{name}_ticks={ticks}");
+    println!("RESULT firmware_{name}_words={}", comparison.words);
+    println!("RESULT firmware_{name}_differing={}", comparison.differing);
+    println!(
+        "RESULT firmware_{name}_stack_bytes={}",
+        machine.stack_bytes(image.static_bytes)
+    );
+    let stage = Stage::read(&machine, bench, part)?;
+    for (counter, value) in stage.counters() {
+        println!("RESULT firmware_{name}_{counter}={value}");
+    }
+    equal("words that differ", comparison.differing, 0)?;
+    // The first tick joins the bus, the last one is still on its way.
+    expect(comparison.planar >= ticks - 2, || {
+        format!("only {} poses", comparison.planar)
+    })?;
+    expect(comparison.words >= (ticks - 2) * 15 / 4 - 8, || {
+        format!("only {} words", comparison.words)
+    })?;
+    equal("damaged frames", seen.damaged, 0)?;
+    equal(
+        "panics and watchdog resets",
+        (machine.panics, machine.watchdog_resets),
+        (0, 0),
+    )?;
+    equal("missed ticks", stage.missed_ticks, 0)?;
+    equal("ticks without codes", stage.adc_faults, 0)?;
+    equal("times the bus was off", stage.bus_off, 0)?;
+    expect(stage.frames_dropped <= 8, || {
+        format!("{} frames dropped", stage.frames_dropped)
+    })?;
+    // Setting the watchdog up writes its key once too.
+    let fed = machine.chip.fed - 1;
+    equal("feeds of the watchdog", fed, stage.ticks.into())?;
+    equal("state", stage.state, 1)?;
+    let ticks_told = seen
+        .health
+        .iter()
+        .rev()
+        .find(|page| page.page == 0)
+        .map_or(0, |page| page.value);
+    expect(u64::from(ticks_told) + 200 > ticks, || {
+        format!("health tells {ticks_told} ticks")
+    })?;
+    let wrong = seen
+        .health
+        .iter()
+        .find(|page| page.page != 0 && page.value != 0);
+    equal(
+        "a counter of the health frames",
+        wrong.map(|page| page.page),
+        None,
+    )
+}
+
+/// The static `STAGE` as a debugger reads it.
+pub struct Stage {
+    /// State as in the status frame.
+    pub state: u32,
+    /// Ticks since start.
+    pub ticks: u32,
+    /// Bits of the pose.
+    pub pose: [u32; 6],
+    /// Missed ticks.
+    pub missed_ticks: u32,
+    /// Ticks not done in time.
+    pub overrun_ticks: u32,
+    /// Ticks without codes.
+    pub adc_faults: u32,
+    /// Starts of the converter.
+    pub adc_starts: u32,
+    /// Frames sent.
+    pub frames_sent: u32,
+    /// Frames dropped.
+    pub frames_dropped: u32,
+    /// Times the bus was off.
+    pub bus_off: u32,
+    /// Ticks with settings of the FPU put back.
+    pub fpu_restored: u32,
+    /// Whether the last reset came from the watchdog.
+    pub watchdog_reset: u32,
+}
+
+impl Stage {
+    /// Reads it by its symbol.
+    pub fn read(machine: &Machine, bench: &Bench, part: Part) -> Result<Self, String> {
+        let at = bench.image(part).address("STAGE")?;
+        let word = |k: u32| machine.word(at + 4 * k);
+        expect(word(0) % 2 == 0, || "STAGE is torn".to_owned()).map_err(|e| e.to_string())?;
+        Ok(Self {
+            state: word(1),
+            ticks: word(3),
+            pose: [7, 8, 9, 10, 11, 12].map(word),
+            missed_ticks: word(13),
+            overrun_ticks: word(14),
+            adc_faults: word(15),
+            adc_starts: word(16),
+            frames_sent: word(17),
+            frames_dropped: word(18),
+            bus_off: word(19),
+            fpu_restored: word(20),
+            watchdog_reset: word(23),
+        })
+    }
+
+    fn counters(&self) -> [(&'static str, u32); 8] {
+        [
+            ("missed_ticks", self.missed_ticks),
+            ("overrun_ticks", self.overrun_ticks),
+            ("adc_faults", self.adc_faults),
+            ("adc_starts", self.adc_starts),
+            ("frames_sent", self.frames_sent),
+            ("frames_dropped", self.frames_dropped),
+            ("bus_off", self.bus_off),
+            ("fpu_restored", self.fpu_restored),
+        ]
+    }
+}
+
+/// What a debugger reads is the pose of the last tick.
+pub fn a_debugger_reads_the_last_pose(bench: &Bench) -> Outcome {
+    let part = Part::Ads131m08;
+    let mut machine = bench.machine(part, [&bench.blob, &[]])?;
+    machine.run_ticks(321)?;
+    let stage = Stage::read(&machine, bench, part)?;
+    equal(
+        "pose",
+        stage.pose,
+        bench.poses[stage.ticks as usize - 1].words,
+    )?;
+    expect(stage.ticks >= 320, || format!("{} ticks", stage.ticks))
+}

@@ -1,0 +1,51 @@
+//! Every property that is checked, and how it is told.
+
+pub mod bus;
+pub mod commands;
+pub mod figures;
+pub mod log;
+pub mod parameters;
+pub mod sensors;
+pub mod timing;
+
+/// Why a check failed.
+pub type Failure = Box<dyn std::error::Error>;
+/// How a check ended.
+pub type Outcome = Result<(), Failure>;
+
+/// Counts what passed.
+#[derive(Default)]
+pub struct Report {
+    /// Checks that passed.
+    pub passed: u32,
+    /// Checks that failed.
+    pub failed: u32,
+}
+
+impl Report {
+    /// Tells how a check ended.
+    pub fn note(&mut self, name: &str, outcome: Outcome) {
+        match outcome {
+            Ok(()) => {
+                self.passed += 1;
+                println!("ok      {name}");
+            }
+            Err(failure) => {
+                self.failed += 1;
+                println!("FAILED  {name}: {failure}");
+            }
+        }
+    }
+}
+
+/// Fails with `text` unless `holds`.
+pub fn expect(holds: bool, text: impl FnOnce() -> String) -> Outcome {
+    if holds { Ok(()) } else { Err(text().into()) }
+}
+
+/// Fails unless both are equal.
+pub fn equal<T: PartialEq + core::fmt::Debug>(what: &str, found: T, wanted: T) -> Outcome {
+    expect(found == wanted, || {
+        format!("{what} is {found:?}, not {wanted:?}")
+    })
+}

@@ -1,0 +1,143 @@
+//! Parameter slots in every state.
+
+use super::log::Stage;
+use super::{Outcome, equal, expect};
+use crate::adc_model::Part;
+use crate::bench::{Bench, Comparison, Seen};
+use hal_adapters::can::status::NodeState;
+use runtime::blob::CRC_BYTES;
+
+const PART: Part = Part::Ads131m08;
+
+/// The blob cut short as a power failure leaves it: the rest is erased.
+fn torn(blob: &[u8]) -> Vec<u8> {
+    let mut torn = blob.to_vec();
+    torn[blob.len() / 2..].fill(0xff);
+    torn
+}
+
+/// The blob with another layout version, its check made good again.
+fn newer(blob: &[u8]) -> Vec<u8> {
+    let mut newer = blob.to_vec();
+    newer[4] = 9;
+    let body = newer.len() - CRC_BYTES;
+    let register = newer[..body].iter().fold(u32::MAX, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |c, _| {
+            c >> 1 ^ if c & 1 == 1 { 0x82f6_3b78 } else { 0 }
+        })
+    });
+    newer[body..].copy_from_slice(&(!register).to_le_bytes());
+    newer
+}
+
+fn foreign(blob: &[u8]) -> Vec<u8> {
+    let mut foreign = blob.to_vec();
+    foreign[..4].copy_from_slice(b"FONT");
+    foreign
+}
+
+/// Without usable parameters the controller lives, says why in every status frame and gives
+/// no pose.
+pub fn none_usable(
+    bench: &Bench,
+    [slot_0, slot_1]: [&[u8]; 2],
+    state: NodeState,
+    reason: u8,
+) -> Outcome {
+    let mut machine = bench.machine(PART, [slot_0, slot_1])?;
+    machine.run_ticks(400)?;
+    let seen = Seen::since_last(&mut machine);
+    equal("words of poses", seen.axes.len(), 0)?;
+    expect(seen.statuses.len() >= 24, || {
+        format!("only {} status frames", seen.statuses.len())
+    })?;
+    for (tick, status) in &seen.statuses {
+        let found = (status.state, status.reason);
+        equal(
+            &format!("state at tick {tick}"),
+            found,
+            (Some(state), reason),
+        )?;
+    }
+    let stage = Stage::read(&machine, bench, PART)?;
+    expect(stage.ticks >= 399, || format!("only {} ticks", stage.ticks))?;
+    equal("the pose in STAGE", stage.pose, [0; 6])?;
+    equal(
+        "panics and watchdog resets",
+        (machine.panics, machine.watchdog_resets),
+        (0, 0),
+    )
+}
+
+/// Every kind of unusable parameters.
+pub fn unusable_kinds(bench: &Bench) -> Vec<(&'static str, Outcome)> {
+    let (torn, newer, foreign) = (torn(&bench.blob), newer(&bench.blob), foreign(&bench.blob));
+    let bad = NodeState::BadParameters;
+    let check = |slots, state, reason| none_usable(bench, slots, state, reason);
+    vec![
+        (
+            "both slots erased",
+            check([&[], &[]], NodeState::NoParameters, 2),
+        ),
+        ("a torn blob", check([&torn, &[]], bad, 7)),
+        ("a newer blob", check([&newer, &[]], bad, 4)),
+        ("something else in the slot", check([&foreign, &[]], bad, 3)),
+        (
+            "the blob of another stage",
+            check([&bench.other, &[]], bad, 10),
+        ),
+        ("a torn blob in slot 1", check([&[], &torn], bad, 0x17)),
+    ]
+}
+
+/// With one sound slot the controller runs on it, and tells what is wrong with the other.
+pub fn one_usable(bench: &Bench) -> Outcome {
+    let torn = torn(&bench.blob);
+    let cases: [([&[u8]; 2], u8); 4] = [
+        ([&bench.blob, &[]], 0),
+        ([&[], &bench.blob], 0),
+        ([&torn, &bench.blob], 0x87),
+        ([&bench.blob, &torn], 0x97),
+    ];
+    for (slots, reason) in cases {
+        let mut machine = bench.machine(PART, slots)?;
+        machine.run_ticks(100)?;
+        let seen = Seen::since_last(&mut machine);
+        let mut comparison = Comparison::default();
+        comparison.add(&seen.axes, &bench.poses, 0);
+        equal("words that differ", comparison.differing, 0)?;
+        expect(comparison.planar >= 98, || {
+            format!("only {} poses", comparison.planar)
+        })?;
+        let status = seen.last_status().ok_or("no status frame")?;
+        equal(
+            "state",
+            (status.state, status.reason),
+            (Some(NodeState::Running), reason),
+        )?;
+    }
+    Ok(())
+}
+
+/// Of two sound slots the later one is used, whichever it is.
+pub fn the_later_of_two(bench: &Bench) -> Outcome {
+    let run = |slots: [&[u8]; 2]| -> Result<[u32; 6], super::Failure> {
+        let mut machine = bench.machine(PART, slots)?;
+        machine.run_ticks(100)?;
+        Ok(Stage::read(&machine, bench, PART)?.pose)
+    };
+    let (only_old, only_new) = (run([&bench.blob, &[]])?, run([&bench.later, &[]])?);
+    expect(only_old != only_new, || {
+        "both calibrations decode alike".to_owned()
+    })?;
+    equal(
+        "later in slot 1",
+        run([&bench.blob, &bench.later])?,
+        only_new,
+    )?;
+    equal(
+        "later in slot 0",
+        run([&bench.later, &bench.blob])?,
+        only_new,
+    )
+}

@@ -1,0 +1,197 @@
+//! Ticks that come late, a watchdog that bites, settings of the FPU that change.
+
+use super::log::Stage;
+use super::{Outcome, equal, expect};
+use crate::adc_model::Part;
+use crate::bench::{Bench, Comparison, Seen};
+use hal_adapters::can::status::flag;
+use runtime::Status;
+
+const PART: Part = Part::Ads131m08;
+const MS: u64 = 1_000_000;
+/// FPSCR that rounds towards zero and flushes subnormal numbers.
+const OTHER_SETTINGS: u32 = 0b111 << 22;
+
+fn flags(seen: &Seen) -> u8 {
+    seen.last_status().map_or(0, |status| status.flags)
+}
+
+/// All ticks but these few send X within 0.2 ms of when they were due.
+fn stays_in_step(seen: &Seen, late: usize) -> Outcome {
+    let x = seen.axes.iter().filter(|axis| axis.axis == 0);
+    let found = x.filter(|axis| axis.into_tick_us > 200).count();
+    equal("ticks out of step", found, late)
+}
+
+/// A tick that comes 0.5 ms late is decoded and counted, and shifts no other.
+pub fn a_late_tick(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(100)?;
+    machine.hold_ns = MS / 2;
+    machine.run_ticks(100)?;
+    let seen = Seen::since_last(&mut machine);
+    let mut comparison = Comparison::default();
+    comparison.add(&seen.axes, &bench.poses, 0);
+    equal("words that differ", comparison.differing, 0)?;
+    expect(comparison.planar >= 198, || {
+        format!("only {} poses", comparison.planar)
+    })?;
+    equal(
+        "missed ticks told",
+        seen.last_status().map(|s| s.missed_ticks),
+        Some(1),
+    )?;
+    stays_in_step(&seen, 1)?;
+    equal(
+        "panics and watchdog resets",
+        (machine.panics, machine.watchdog_resets),
+        (0, 0),
+    )
+}
+
+/// Ticks that never come keep their numbers, and the schedule stays where it was.
+pub fn ticks_that_never_come(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(100)?;
+    // Due at tick k, comes 2.3 periods later: ticks k and k + 1 are missed, k + 2 is late.
+    machine.hold_ns = 46 * MS / 10;
+    machine.run_ticks(200)?;
+    let seen = Seen::since_last(&mut machine);
+    let gap = seen
+        .axes
+        .iter()
+        .find(|a| a.status == Status::FRAMES_MISSED.bits());
+    let gap = gap.ok_or("no pose tells of missed frames")?.tick;
+    let mut comparison = Comparison::default();
+    let others: Vec<_> = seen
+        .axes
+        .iter()
+        .filter(|a| a.tick != gap)
+        .copied()
+        .collect();
+    comparison.add(&others, &bench.poses, 0);
+    equal("words that differ", comparison.differing, 0)?;
+    expect(others.iter().any(|a| a.tick > gap + 100), || {
+        "no poses after".to_owned()
+    })?;
+    equal(
+        "missed ticks told",
+        seen.last_status().map(|s| s.missed_ticks),
+        Some(3),
+    )?;
+    stays_in_step(&seen, 1)?;
+    equal(
+        "panics and watchdog resets",
+        (machine.panics, machine.watchdog_resets),
+        (0, 0),
+    )
+}
+
+/// The watchdog bites when ticks stay away; the program starts again, says so and goes on.
+pub fn a_watchdog_reset(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(1000)?;
+    let before = Seen::since_last(&mut machine);
+    equal("the flag before", flags(&before) & flag::WATCHDOG_RESET, 0)?;
+    machine.hold_ns = 60 * MS;
+    machine.run_ticks(2000)?;
+    equal("watchdog resets", machine.watchdog_resets, 1)?;
+    let after = Seen::since_last(&mut machine);
+    equal(
+        "the flag after",
+        flags(&after) & flag::WATCHDOG_RESET,
+        flag::WATCHDOG_RESET,
+    )?;
+    let good = after.axes.iter().filter(|a| a.status == 0).count();
+    expect(good > 3 * 1900, || {
+        format!("only {good} good words after the reset")
+    })?;
+    let stage = Stage::read(&machine, bench, PART)?;
+    equal("STAGE tells of the reset", stage.watchdog_reset, 1)
+}
+
+/// Ticks that all overrun are not taken for sound ones: the watchdog bites.
+pub fn overrun_ticks_do_not_feed(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(100)?;
+    // An SPI so slow that the codes of a tick take 2.4 ms.
+    machine.chip.spi_byte_ns = 80_000;
+    machine.run_ticks(30)?;
+    expect(machine.watchdog_resets >= 1, || {
+        "the watchdog was fed".to_owned()
+    })?;
+    machine.chip.spi_byte_ns = 381;
+    machine.run_ticks(1000)?;
+    let after = Seen::since_last(&mut machine);
+    let good = after.axes.iter().filter(|a| a.status == 0).count();
+    expect(good > 2000, || {
+        format!("only {good} good words after the reset")
+    })
+}
+
+/// Settings that an interrupt left behind are put back before the decoding, and counted.
+pub fn fpu_settings_left_behind(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(100)?;
+    for _ in 0..50 {
+        machine.set_fpscr(OTHER_SETTINGS);
+        machine.run_ticks(2)?;
+    }
+    machine.set_fpscr(0);
+    let seen = Seen::since_last(&mut machine);
+    let mut comparison = Comparison::default();
+    comparison.add(&seen.axes, &bench.poses, 0);
+    equal("words that differ", comparison.differing, 0)?;
+    expect(comparison.planar > 190, || {
+        format!("only {} poses", comparison.planar)
+    })?;
+    let counted = Stage::read(&machine, bench, PART)?.fpu_restored;
+    expect(counted >= 50, || format!("only {counted} counted"))
+}
+
+/// Settings that change during the decoding: the pose of that tick is withdrawn.
+pub fn fpu_settings_changed_during_the_decoding(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.hook_fpscr(bench.image(PART).address("firmware4node3run")?)?;
+    machine.run_ticks(100)?;
+    Seen::since_last(&mut machine);
+    machine.chip.fpscr_to_write = OTHER_SETTINGS;
+    machine.run_ticks(100)?;
+    let during = Seen::since_last(&mut machine);
+    let invalid = Status::PLANAR_INVALID.with(Status::VERTICAL_INVALID).bits();
+    let wrong = during.axes.iter().filter(|a| a.tick > 101);
+    let wrong = wrong.filter(|a| a.word != 0 || a.status != invalid).count();
+    equal("words that were not withdrawn", wrong, 0)?;
+    expect(during.axes.len() > 300, || {
+        format!("only {} words", during.axes.len())
+    })?;
+    machine.chip.fpscr_to_write = 0;
+    machine.run_ticks(100)?;
+    let after = Seen::since_last(&mut machine);
+    let mut comparison = Comparison::default();
+    comparison.add(&after.axes, &bench.poses, 203);
+    equal("words that differ after", comparison.differing, 0)?;
+    expect(comparison.planar > 80, || {
+        format!("only {} poses after", comparison.planar)
+    })
+}
+
+/// The clock of 32 bits wraps after 71 minutes: no tick is lost or doubled.
+pub fn the_clock_wraps(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.chip.timer_offset_us = u32::MAX - 200_500;
+    machine.run_ticks(300)?;
+    let seen = Seen::since_last(&mut machine);
+    let mut comparison = Comparison::default();
+    comparison.add(&seen.axes, &bench.poses, 0);
+    equal("words that differ", comparison.differing, 0)?;
+    expect(comparison.planar >= 298, || {
+        format!("only {} poses", comparison.planar)
+    })?;
+    stays_in_step(&seen, 0)?;
+    equal(
+        "missed ticks",
+        seen.last_status().map(|s| s.missed_ticks),
+        Some(0),
+    )
+}

@@ -1,0 +1,85 @@
+//! The program as an ELF file: its bytes in flash and its symbols.
+
+use object::read::elf::{FileHeader, ProgramHeader};
+use object::{Object, ObjectSymbol};
+use std::path::Path;
+
+/// Start of flash.
+pub const FLASH: u32 = 0x0800_0000;
+/// Bytes of flash.
+pub const FLASH_BYTES: usize = 1 << 20;
+/// Start of RAM.
+pub const RAM: u32 = 0x2000_0000;
+/// Bytes of RAM.
+pub const RAM_BYTES: usize = 128 << 10;
+
+/// A program.
+pub struct Image {
+    /// Flash as it is after flashing onto an erased chip.
+    pub flash: Vec<u8>,
+    /// Bytes of flash that the program takes: code, constants, initial values.
+    pub text_bytes: usize,
+    /// Bytes of RAM that its statics take.
+    pub static_bytes: usize,
+    symbols: Vec<(String, u32)>,
+}
+
+impl Image {
+    /// Reads an ELF file.
+    pub fn read(path: &Path) -> Result<Self, Box<dyn std::error::Error>> {
+        let bytes = std::fs::read(path)?;
+        let elf = object::elf::FileHeader32::<object::Endianness>::parse(&*bytes)?;
+        let endian = elf.endian()?;
+        let mut flash = vec![0xff; FLASH_BYTES];
+        let (mut text_bytes, mut static_end) = (0, RAM);
+        for segment in elf.program_headers(endian, &*bytes)? {
+            if segment.p_type(endian) != object::elf::PT_LOAD {
+                continue;
+            }
+            let data = segment
+                .data(endian, &*bytes)
+                .map_err(|()| "segment out of the file")?;
+            let (load, run) = (segment.p_paddr(endian), segment.p_vaddr(endian));
+            if !data.is_empty() {
+                let at = load.checked_sub(FLASH).ok_or("segment below flash")? as usize;
+                flash
+                    .get_mut(at..at + data.len())
+                    .ok_or("segment beyond flash")?
+                    .copy_from_slice(data);
+                text_bytes += data.len();
+            }
+            if run >= RAM {
+                static_end = static_end.max(run + segment.p_memsz(endian));
+            }
+        }
+        let file = object::File::parse(&*bytes)?;
+        let symbols = file
+            .symbols()
+            .filter_map(|s| Some((s.name().ok()?.to_owned(), s.address() as u32)))
+            .collect();
+        let static_bytes = (static_end - RAM) as usize;
+        Ok(Self {
+            flash,
+            text_bytes,
+            static_bytes,
+            symbols,
+        })
+    }
+
+    /// Address of a symbol whose name contains `part`, without the Thumb bit.
+    pub fn address(&self, part: &str) -> Result<u32, String> {
+        let exact = self.symbols.iter().find(|(name, _)| name == part);
+        let found = exact.or_else(|| self.symbols.iter().find(|(name, _)| name.contains(part)));
+        found
+            .map(|(_, at)| at & !1)
+            .ok_or_else(|| format!("the program has no symbol {part}"))
+    }
+
+    /// A word of flash.
+    pub fn word(&self, address: u32) -> u32 {
+        let at = (address - FLASH) as usize;
+        self.flash
+            .get(at..at + 4)
+            .map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+    }
+}

@@ -1,0 +1,397 @@
+//! The chip: core, memory, peripherals, interrupts.
+
+use crate::adc_model::{Part, Row};
+use crate::image::{FLASH, FLASH_BYTES, Image, RAM, RAM_BYTES};
+use crate::peripherals::{BIT_BAND, CORE, IRQ_TIM2, Peripherals, RANGE};
+use crate::unicorn::{Handle, Unicorn, register};
+use std::ffi::{OsStr, c_uint, c_void};
+
+/// Where an interrupt returns to: no program is there.
+const RETURN: u32 = 0x1fff_0000;
+/// What unused RAM is filled with.
+const PAINT: u8 = 0xa5;
+const WFI: u16 = 0xbf30;
+
+/// Memory that the core sees, at an address that its pages like.
+#[repr(C, align(4096))]
+struct Memory<const N: usize>([u8; N]);
+
+fn memory<const N: usize>(fill: u8) -> Box<Memory<N>> {
+    let filled = vec![fill; N].into_boxed_slice();
+    let layout = std::alloc::Layout::new::<Memory<N>>();
+    // SAFETY: the memory is allocated with the layout of the type and filled before it is used.
+    unsafe {
+        let raw = std::alloc::alloc(layout).cast::<Memory<N>>();
+        assert!(!raw.is_null(), "no memory for the emulated chip");
+        std::ptr::copy_nonoverlapping(filled.as_ptr(), raw.cast(), N);
+        Box::from_raw(raw)
+    }
+}
+
+/// What an interrupt took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cost {
+    /// Instructions up to the last mailbox that it filled, or all if it filled none.
+    pub instructions: u64,
+    /// Bytes over the SPI.
+    pub spi_bytes: u64,
+    /// Mailboxes filled.
+    pub mailboxes: u64,
+}
+
+/// A controller with a program in flash.
+pub struct Machine {
+    core: Unicorn,
+    /// Everything around the core.
+    pub chip: Box<Peripherals>,
+    flash: Box<Memory<FLASH_BYTES>>,
+    ram: Box<Memory<RAM_BYTES>>,
+    _returns: Box<Memory<4096>>,
+    vectors: [u32; 48],
+    waits_at: u32,
+    panics_at: u32,
+    asleep: bool,
+    /// The program panicked: nothing but the watchdog helps.
+    panicked: bool,
+    /// Panics of the program.
+    pub panics: u32,
+    /// Time by which the next tick's interrupt is held back, ns.
+    pub hold_ns: u64,
+    /// Resets by the watchdog.
+    pub watchdog_resets: u32,
+    /// What each interrupt of the timer took, where instructions are counted.
+    pub costs: Vec<Cost>,
+}
+
+extern "C" fn read(_: Handle, offset: u64, _: c_uint, user: *mut c_void) -> u64 {
+    // SAFETY: `user` is the `Peripherals` that `Machine` keeps in its box.
+    let chip = unsafe { &mut *user.cast::<Peripherals>() };
+    u64::from(chip.read(offset as usize & !3) >> (8 * (offset & 3)))
+}
+
+extern "C" fn write(_: Handle, offset: u64, bytes: c_uint, value: u64, user: *mut c_void) {
+    // SAFETY: as in `read`.
+    let chip = unsafe { &mut *user.cast::<Peripherals>() };
+    let value = value as u32 & (u32::MAX >> (32 - 8 * bytes.min(4)));
+    // The converter's and the watchdog's data registers are written in parts of words.
+    chip.write(offset as usize & !3, value << (8 * (offset & 3)));
+}
+
+extern "C" fn read_bit(_: Handle, offset: u64, _: c_uint, user: *mut c_void) -> u64 {
+    // SAFETY: as in `read`.
+    let chip = unsafe { &mut *user.cast::<Peripherals>() };
+    let (at, bit) = (offset as usize / 32, offset / 4 % 8 + 8 * (offset / 32 % 4));
+    u64::from(chip.read(at & !3) >> bit & 1)
+}
+
+extern "C" fn write_bit(_: Handle, offset: u64, _: c_uint, value: u64, user: *mut c_void) {
+    // SAFETY: as in `read`.
+    let chip = unsafe { &mut *user.cast::<Peripherals>() };
+    let (at, bit) = (
+        (offset as usize / 32) & !3,
+        offset / 4 % 8 + 8 * (offset / 32 % 4),
+    );
+    let word = chip.read(at) & !(1 << bit) | (value as u32 & 1) << bit;
+    chip.write(at, word);
+}
+
+extern "C" fn read_core(_: Handle, offset: u64, _: c_uint, user: *mut c_void) -> u64 {
+    // SAFETY: as in `read`.
+    let chip = unsafe { &mut *user.cast::<Peripherals>() };
+    u64::from(chip.read_core(offset as usize & !3) >> (8 * (offset & 3)))
+}
+
+extern "C" fn write_core(_: Handle, offset: u64, bytes: c_uint, value: u64, user: *mut c_void) {
+    // SAFETY: as in `read`.
+    let chip = unsafe { &mut *user.cast::<Peripherals>() };
+    let (shift, mask) = (8 * (offset & 3), u32::MAX >> (32 - 8 * bytes.min(4)));
+    let at = offset as usize & !3;
+    let enables = (0xe100..0xe120).contains(&at);
+    let kept = if enables {
+        0
+    } else {
+        chip.read_core(at) & !(mask << shift)
+    };
+    chip.write_core(at, kept | (value as u32 & mask) << shift);
+}
+
+extern "C" fn stop(handle: Handle, _: u64, _: u32, user: *mut c_void) {
+    // SAFETY: `user` is the function of the library that ends a run, kept for ever.
+    unsafe { (*user.cast::<crate::unicorn::Stop>())(handle) };
+}
+
+extern "C" fn count(_: Handle, _: u64, _: u32, user: *mut c_void) {
+    // SAFETY: as in `read`.
+    unsafe { (*user.cast::<Peripherals>()).instructions += 1 };
+}
+
+extern "C" fn set_fpscr(handle: Handle, _: u64, _: u32, user: *mut c_void) {
+    // SAFETY: `user` is a `FpscrHook` that is never freed.
+    let hook = unsafe { &*user.cast::<FpscrHook>() };
+    // SAFETY: the chip lives as long as the emulator that calls this.
+    let chip = unsafe { &*hook.chip };
+    if chip.fpscr_to_write != 0 {
+        let mut value = chip.fpscr_to_write;
+        // SAFETY: FPSCR has 32 bits.
+        unsafe { (hook.write)(handle, register::FPSCR, (&raw mut value).cast()) };
+    }
+}
+
+/// What a hook needs to change FPSCR.
+struct FpscrHook {
+    chip: *const Peripherals,
+    write: unsafe extern "C" fn(Handle, i32, *mut c_void) -> i32,
+}
+
+impl Machine {
+    /// A chip with the program and two parameter slots in flash, before its first instruction.
+    pub fn new(
+        library: &OsStr,
+        image: &Image,
+        part: Part,
+        rows: Vec<Row>,
+        slots: [&[u8]; 2],
+    ) -> Result<Self, Box<dyn std::error::Error>> {
+        let core = Unicorn::open(library)?;
+        let mut flash = memory::<FLASH_BYTES>(0xff);
+        flash.0.copy_from_slice(&image.flash);
+        for (slot, name) in slots
+            .into_iter()
+            .zip(["_parameter_slot_0", "_parameter_slot_1"])
+        {
+            let at = (image.address(name)? - FLASH) as usize;
+            flash.0[at..at + slot.len()].copy_from_slice(slot);
+        }
+        let mut ram = memory::<RAM_BYTES>(PAINT);
+        let mut returns = memory::<4096>(0);
+        let mut chip = Box::new(Peripherals::new(part, rows));
+        let user: *mut c_void = (&raw mut *chip).cast();
+        // SAFETY: flash, RAM and chip are boxes that the machine keeps as long as the core,
+        // and that are touched only between two runs of it.
+        unsafe {
+            core.map_memory(FLASH.into(), flash.0.as_mut_ptr(), FLASH_BYTES)?;
+            core.map_memory(RAM.into(), ram.0.as_mut_ptr(), RAM_BYTES)?;
+            core.map_memory(RETURN.into(), returns.0.as_mut_ptr(), 4096)?;
+            core.map_io(RANGE, read, write, user)?;
+            core.map_io(BIT_BAND, read_bit, write_bit, user)?;
+            core.map_io(CORE, read_core, write_core, user)?;
+        }
+        let panics_at = image.address("9panic_fmt")?;
+        let stopper: &'static crate::unicorn::Stop = Box::leak(Box::new(core.stopper()));
+        let user: *mut c_void = std::ptr::from_ref(stopper).cast_mut().cast();
+        let at = u64::from(panics_at);
+        // SAFETY: the pointer to the function is leaked.
+        unsafe { core.hook_code(stop, user, (at, at))? };
+        let mut vectors = [0; 48];
+        for (k, vector) in vectors.iter_mut().enumerate() {
+            *vector = image.word(FLASH + 4 * k as u32);
+        }
+        Ok(Self {
+            core,
+            chip,
+            flash,
+            ram,
+            _returns: returns,
+            vectors,
+            waits_at: waits_at(image)?,
+            panics_at,
+            asleep: false,
+            panicked: false,
+            panics: 0,
+            hold_ns: 0,
+            watchdog_resets: 0,
+            costs: Vec::new(),
+        })
+    }
+
+    /// Counts instructions from now on. Call it before the first run.
+    pub fn count_instructions(&mut self) -> Result<(), String> {
+        let user: *mut c_void = (&raw mut *self.chip).cast();
+        // SAFETY: as in `new`.
+        unsafe { self.core.hook_code(count, user, (1, 0)) }.map_err(|fault| fault.to_string())
+    }
+
+    /// Writes `fpscr_to_write`, unless 0, to FPSCR whenever the core comes to `address`. Call
+    /// it before the first run.
+    pub fn hook_fpscr(&mut self, address: u32) -> Result<(), String> {
+        let hook = FpscrHook {
+            chip: &raw const *self.chip,
+            write: self.core.writer(),
+        };
+        let user: *mut c_void = (&raw mut *Box::leak(Box::new(hook))).cast();
+        let at = u64::from(address);
+        // SAFETY: as in `new`; the hook is leaked.
+        unsafe { self.core.hook_code(set_fpscr, user, (at, at)) }.map_err(|fault| fault.to_string())
+    }
+
+    /// Changes FPSCR while the core sleeps, as an interrupt may that does not change it back.
+    pub fn set_fpscr(&self, value: u32) {
+        self.core.set(register::FPSCR, value);
+    }
+
+    /// Runs for so many ns.
+    pub fn run_ns(&mut self, ns: u64) -> Result<(), String> {
+        let end_ns = self.chip.now_ns + ns;
+        loop {
+            if !self.asleep {
+                self.boot()?;
+            }
+            match self.chip.next_event_ns() {
+                Some(at) if at <= end_ns => self.chip.now_ns = self.chip.now_ns.max(at),
+                _ => {
+                    self.chip.now_ns = self.chip.now_ns.max(end_ns);
+                    return Ok(());
+                }
+            }
+            self.chip.advance();
+            while let Some(irq) = self.chip.pending_interrupt().filter(|_| !self.panicked) {
+                if irq == IRQ_TIM2 && self.chip.tick_is_due() && self.hold_ns > 0 {
+                    self.chip.now_ns += std::mem::take(&mut self.hold_ns);
+                    self.chip.advance();
+                }
+                if self.chip.watchdog_bites() {
+                    break;
+                }
+                self.interrupt(irq)?;
+                self.chip.advance();
+            }
+            if self.chip.watchdog_bites() {
+                self.watchdog_resets += 1;
+                self.chip.reset(1 << 29 | 1 << 26);
+                self.asleep = false;
+                self.panicked = false;
+            }
+        }
+    }
+
+    /// Runs for so many ticks of 2 ms.
+    pub fn run_ticks(&mut self, ticks: u64) -> Result<(), String> {
+        self.run_ns(ticks * 2_000_000)
+    }
+
+    /// From the reset vector until the program sleeps.
+    fn boot(&mut self) -> Result<(), String> {
+        self.core.set(register::SP, self.vectors[0]);
+        self.core.set(register::FPSCR, 0);
+        self.go(self.vectors[1], self.waits_at)?;
+        self.asleep = true;
+        Ok(())
+    }
+
+    fn interrupt(&mut self, irq: u32) -> Result<(), String> {
+        // What the core stacks, floating-point registers included: 26 words.
+        let mut saved = [0; 26];
+        let registers = [
+            register::R0,
+            register::R0 + 1,
+            register::R0 + 2,
+            register::R0 + 3,
+            register::R12,
+            register::LR,
+            register::PC,
+            register::XPSR,
+        ];
+        for (k, to) in saved.iter_mut().enumerate() {
+            *to = match k {
+                0..8 => self.core.get(registers[k]),
+                8..24 => self.core.get(register::S0 + k as i32 - 8),
+                24 => self.core.get(register::FPSCR),
+                _ => 0,
+            };
+        }
+        let sp = self.core.get(register::SP);
+        let frame = (sp - 4 * saved.len() as u32) & !7;
+        let at = (frame - RAM) as usize;
+        for (bytes, word) in self.ram.0[at..].chunks_exact_mut(4).zip(saved) {
+            bytes.copy_from_slice(&word.to_le_bytes());
+        }
+        self.core.set(register::SP, frame);
+        self.core.set(register::LR, RETURN | 1);
+        let before = self.chip.instructions;
+        let (spi_before, filled_before) = (self.chip.spi_bytes, self.chip.can.filled);
+        self.chip.instructions_at_mailbox = before;
+        self.go(self.vectors[16 + irq as usize], RETURN)?;
+        if irq == IRQ_TIM2 && self.chip.instructions != before {
+            let upto = match self.chip.instructions_at_mailbox {
+                at if at != before => at,
+                _ => self.chip.instructions,
+            };
+            self.costs.push(Cost {
+                instructions: upto - before,
+                spi_bytes: self.chip.spi_bytes - spi_before,
+                mailboxes: self.chip.can.filled - filled_before,
+            });
+        }
+        if self.panicked {
+            return Ok(());
+        }
+        for (k, word) in saved.into_iter().enumerate() {
+            match k {
+                0..6 => self.core.set(registers[k], word),
+                8..24 => self.core.set(register::S0 + k as i32 - 8, word),
+                24 => self.core.set(register::FPSCR, word),
+                _ => {}
+            }
+        }
+        self.core.set(register::SP, sp);
+        Ok(())
+    }
+
+    /// Runs until `until`, or until the program panics.
+    fn go(&mut self, from: u32, until: u32) -> Result<(), String> {
+        let ran = self.core.run(from, until);
+        let pc = self.core.get(register::PC);
+        match ran {
+            Ok(()) if pc & !1 == until => Ok(()),
+            Ok(()) if pc & !1 == self.panics_at => {
+                self.panicked = true;
+                self.panics += 1;
+                Ok(())
+            }
+            Ok(()) => Err(format!(
+                "the program stopped at {pc:#010x}, not at {until:#010x}"
+            )),
+            Err(fault) => Err(format!("{fault} at {pc:#010x}")),
+        }
+    }
+
+    /// A word of RAM.
+    pub fn word(&self, address: u32) -> u32 {
+        let at = (address - RAM) as usize;
+        self.ram
+            .0
+            .get(at..at + 4)
+            .map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+    }
+
+    /// Bytes of stack that were ever used.
+    pub fn stack_bytes(&self, static_bytes: usize) -> usize {
+        let untouched = self.ram.0[static_bytes..]
+            .iter()
+            .take_while(|&&b| b == PAINT)
+            .count();
+        RAM_BYTES - static_bytes - untouched
+    }
+
+    /// Bytes of flash, to see that the program leaves them alone.
+    pub fn flash(&self) -> &[u8] {
+        &self.flash.0
+    }
+}
+
+/// The one place where the program sleeps.
+fn waits_at(image: &Image) -> Result<u32, String> {
+    let start = image
+        .address("_stext")
+        .or_else(|_| image.address("__stext"))?;
+    let end = image.address("__etext")?;
+    let code = &image.flash[(start - FLASH) as usize..(end - FLASH) as usize];
+    let found: Vec<_> = (0u32..)
+        .zip(code.as_chunks::<2>().0)
+        .filter(|(_, b)| u16::from_le_bytes(**b) == WFI)
+        .collect();
+    match found.as_slice() {
+        [(k, _)] => Ok(start + 2 * k),
+        all => Err(format!("{} places look like WFI, not one", all.len())),
+    }
+}

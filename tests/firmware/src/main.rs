@@ -1,0 +1,134 @@
+//! Runs the stage controller's unmodified image on an emulated STM32F405, with an emulated
+//! converter that plays a log over SPI, and compares what it sends over CAN with what the host
+//! decodes from the log.
+//!
+//! Use: `bench FOLDER LIBRARY TICKS [PART OF A NAME]`, as the script `run` beside this
+//! package does: a folder with images, blobs, log and poses, the library of Unicorn 2.1, the
+//! ticks of the long run (0 for none).
+
+mod adc_model;
+mod bench;
+mod can_model;
+mod checks;
+mod image;
+mod machine;
+mod peripherals;
+mod unicorn;
+
+use adc_model::Part;
+use bench::Bench;
+use can_model::BusState;
+use checks::{Outcome, Report, bus, commands, figures, log, parameters, sensors, timing};
+use std::path::Path;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let args: Vec<_> = std::env::args_os().skip(1).collect();
+    let [folder, library, ticks, filter @ ..] = args.as_slice() else {
+        eprintln!("use: bench FOLDER LIBRARY TICKS [PART OF A NAME]");
+        return ExitCode::from(2);
+    };
+    let bench = match Bench::read(Path::new(folder), library.clone()) {
+        Ok(bench) => bench,
+        Err(failure) => {
+            eprintln!("{failure}");
+            return ExitCode::from(3);
+        }
+    };
+    let Some(ticks) = ticks.to_str().and_then(|text| text.parse().ok()) else {
+        eprintln!("not a number of ticks: {ticks:?}");
+        return ExitCode::from(2);
+    };
+    let filter = filter
+        .first()
+        .map(|text| text.to_string_lossy().into_owned());
+    let mut report = Report::default();
+    run(&bench, ticks, &mut report, &filter.unwrap_or_default());
+    println!("{} passed, {} failed", report.passed, report.failed);
+    ExitCode::from(u8::from(report.failed > 0 || report.passed == 0))
+}
+
+fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
+    let mut check = |name: &str, run: &dyn Fn() -> Outcome| {
+        if name.contains(filter) {
+            report.note(name, run());
+        }
+    };
+    let whole = bench.rows.len() as u64;
+    let parts = [(Part::Ads131m08, "ads131m08"), (Part::Ads8688, "ads8688")];
+    for (part, name) in parts {
+        check(&format!("{name}: flash and RAM"), &|| {
+            figures::flash_and_ram(bench, part, name)
+        });
+        check(&format!("{name}: interrupt to mailbox"), &|| {
+            figures::interrupt_to_mailbox(bench, part, name)
+        });
+        check(
+            &format!("{name}: the whole log gives the host's words"),
+            &|| log::same_words(bench, part, whole, name),
+        );
+        for (fault, case) in sensors::cases(part) {
+            check(&format!("{name}: {fault}"), &|| {
+                sensors::survives(bench, part, &case)
+            });
+        }
+    }
+    for (part, name) in parts {
+        check(&format!("{name}: dead from the start"), &|| {
+            sensors::dead_from_the_start(bench, part)
+        });
+        check(&format!("{name}: reset by itself"), &|| {
+            sensors::reset_by_itself(bench, part)
+        });
+    }
+    check("a debugger reads the last pose", &|| {
+        log::a_debugger_reads_the_last_pose(bench)
+    });
+    check("a tick that comes late", &|| timing::a_late_tick(bench));
+    check("ticks that never come", &|| {
+        timing::ticks_that_never_come(bench)
+    });
+    check("the clock wraps", &|| timing::the_clock_wraps(bench));
+    check("a watchdog reset", &|| timing::a_watchdog_reset(bench));
+    check("overrun ticks do not feed the watchdog", &|| {
+        timing::overrun_ticks_do_not_feed(bench)
+    });
+    check("FPU settings left behind by an interrupt", &|| {
+        timing::fpu_settings_left_behind(bench)
+    });
+    check("FPU settings changed during the decoding", &|| {
+        timing::fpu_settings_changed_during_the_decoding(bench)
+    });
+    check("bus off and back", &|| {
+        bus::goes_and_comes_back(bench, BusState::Off)
+    });
+    check("no other node for a second", &|| {
+        bus::goes_and_comes_back(bench, BusState::Alone)
+    });
+    check("no other node from the start", &|| {
+        bus::alone_from_the_start(bench)
+    });
+    for (name, outcome) in parameters::unusable_kinds(bench) {
+        let outcome = std::cell::Cell::new(Some(outcome));
+        check(&format!("parameters: {name}"), &|| {
+            outcome.take().unwrap_or(Ok(()))
+        });
+    }
+    check("parameters: one sound slot of two", &|| {
+        parameters::one_usable(bench)
+    });
+    check("parameters: the later of two", &|| {
+        parameters::the_later_of_two(bench)
+    });
+    check("command: identify", &|| commands::identify(bench));
+    check("command: re-zero", &|| commands::rezero(bench));
+    check("command: odd ones", &|| commands::odd_commands(bench));
+    check("command: any data length code", &|| {
+        commands::any_length_code(bench)
+    });
+    if ticks > 0 {
+        check("the long run", &|| {
+            log::same_words(bench, Part::Ads131m08, ticks, "long")
+        });
+    }
+}

@@ -1,0 +1,330 @@
+//! The peripherals of an STM32F405, as far as the program uses them. Time is that of the bench:
+//! it passes between interrupts and while bytes cross the SPI, and instructions take none.
+
+use crate::adc_model::{Adc, Part, Row};
+use crate::can_model::CanModel;
+
+/// What the peripherals are in: start and bytes of the range.
+pub const RANGE: (u64, u64) = (0x4000_0000, 0x8_0000);
+/// The same, one word a bit.
+pub const BIT_BAND: (u64, u64) = (0x4200_0000, 0x100_0000);
+/// The core's own peripherals.
+pub const CORE: (u64, u64) = (0xe000_0000, 0x10_0000);
+
+const TIM2: usize = 0x0_0000;
+const IWDG: usize = 0x0_3000;
+const CAN1: usize = 0x0_6400;
+const PWR: usize = 0x0_7000;
+const SPI1: usize = 0x1_3000;
+const GPIOA: usize = 0x2_0000;
+const GPIOB: usize = 0x2_0400;
+const GPIOC: usize = 0x2_0800;
+const RCC: usize = 0x2_3800;
+
+const SELECT_PIN: u32 = 4;
+const SYNC_PIN: u32 = 0;
+const LED_PIN: u32 = 1;
+
+/// Numbers of the interrupts.
+pub const IRQ_CAN1_TX: u32 = 19;
+/// Numbers of the interrupts.
+pub const IRQ_TIM2: u32 = 28;
+
+const US: u64 = 1000;
+/// Nominal frequency of the watchdog's oscillator.
+const LSI_HZ: u64 = 32_000;
+
+/// One of the two alarms of the timer.
+#[derive(Clone, Copy, Default)]
+struct Alarm {
+    at_ns: Option<u64>,
+}
+
+/// All of them.
+pub struct Peripherals {
+    /// Now, ns since the chip got its power.
+    pub now_ns: u64,
+    /// Time of one byte on the SPI, ns.
+    pub spi_byte_ns: u64,
+    /// Bytes that went over the SPI.
+    pub spi_bytes: u64,
+    /// The converter.
+    pub adc: Adc,
+    /// The CAN controller.
+    pub can: CanModel,
+    /// Rows that the converter plays, round and round.
+    pub rows: Vec<Row>,
+    /// What the timer reads when it is started, us: 0 on the chip.
+    pub timer_offset_us: u32,
+    /// When row 0 is played, ns: the first tick.
+    pub first_tick_ns: Option<u64>,
+    /// When the watchdog bites, if it was started.
+    pub watchdog_ns: Option<u64>,
+    /// How often it was fed.
+    pub fed: u64,
+    /// Instructions executed, where they are counted.
+    pub instructions: u64,
+    /// Instructions at the last filling of a mailbox.
+    pub instructions_at_mailbox: u64,
+    /// Whether the LED is on.
+    pub led: bool,
+    /// Value written to FPSCR by a hook, and whether it is armed.
+    pub fpscr_to_write: u32,
+    words: Vec<u32>,
+    core_words: Vec<u32>,
+    reset_flags: u32,
+    alarms: [Alarm; 2],
+    timer_flags: u32,
+    timer_started_ns: Option<u64>,
+    spi_in: u8,
+    spi_full: bool,
+    selected: bool,
+    sync: bool,
+}
+
+impl Peripherals {
+    /// A chip that got its power just now.
+    pub fn new(part: Part, rows: Vec<Row>) -> Self {
+        let mut new = Self {
+            now_ns: 0,
+            spi_byte_ns: match part {
+                Part::Ads131m08 => 381,
+                Part::Ads8688 => 762,
+            },
+            spi_bytes: 0,
+            adc: Adc::new(part),
+            can: CanModel::new(),
+            rows,
+            timer_offset_us: 0,
+            first_tick_ns: None,
+            watchdog_ns: None,
+            fed: 0,
+            instructions: 0,
+            instructions_at_mailbox: 0,
+            led: false,
+            fpscr_to_write: 0,
+            words: Vec::new(),
+            core_words: Vec::new(),
+            reset_flags: 0,
+            alarms: [Alarm::default(); 2],
+            timer_flags: 0,
+            timer_started_ns: None,
+            spi_in: 0,
+            spi_full: false,
+            selected: false,
+            sync: true,
+        };
+        new.reset(1 << 27 | 1 << 26);
+        new
+    }
+
+    /// Resets everything on the chip; `flags` tell why in RCC_CSR. Time, the converter and
+    /// the stage go on.
+    pub fn reset(&mut self, flags: u32) {
+        self.words = vec![0; RANGE.1 as usize / 4];
+        self.core_words = vec![0; CORE.1 as usize / 4];
+        self.core_words[0xef34 / 4] = 0xc000_0000; // FPCCR: ASPEN, LSPEN
+        self.words[RCC / 4] = 0x83;
+        self.reset_flags |= flags;
+        self.alarms = [Alarm::default(); 2];
+        self.timer_flags = 0;
+        self.timer_started_ns = None;
+        self.watchdog_ns = None;
+        let (sent, filled) = (std::mem::take(&mut self.can.sent), self.can.filled);
+        self.can = CanModel::new();
+        (self.can.sent, self.can.filled) = (sent, filled);
+    }
+
+    fn row(&mut self) -> Row {
+        let since = self
+            .now_ns
+            .saturating_sub(self.first_tick_ns.unwrap_or(self.now_ns));
+        let k = (since / (2000 * US)) as usize % self.rows.len().max(1);
+        self.rows.get(k).copied().unwrap_or_default()
+    }
+
+    fn timer_us(&self) -> u32 {
+        let since = self.timer_started_ns.map_or(0, |start| self.now_ns - start);
+        ((since / US) as u32).wrapping_add(self.timer_offset_us)
+    }
+
+    /// When something happens by itself next.
+    pub fn next_event_ns(&self) -> Option<u64> {
+        let alarms = self.alarms.iter().filter_map(|alarm| alarm.at_ns);
+        alarms
+            .chain(self.can.next_event_ns())
+            .chain(self.watchdog_ns)
+            .min()
+    }
+
+    /// Lets happen what is due by now.
+    pub fn advance(&mut self) {
+        let now_ns = self.now_ns;
+        for (k, alarm) in self.alarms.iter_mut().enumerate() {
+            if let Some(at) = alarm.at_ns.filter(|at| *at <= now_ns) {
+                alarm.at_ns = None;
+                self.timer_flags |= 2 << k;
+                if k == 0 {
+                    self.first_tick_ns.get_or_insert(at);
+                }
+            }
+        }
+        self.can.advance(now_ns);
+    }
+
+    /// Whether the watchdog has bitten.
+    pub fn watchdog_bites(&self) -> bool {
+        self.watchdog_ns.is_some_and(|at| at <= self.now_ns)
+    }
+
+    /// Whether a tick's alarm (the first one) is what is pending.
+    pub fn tick_is_due(&self) -> bool {
+        self.timer_flags & 2 != 0
+    }
+
+    /// The interrupt that is taken next.
+    pub fn pending_interrupt(&self) -> Option<u32> {
+        let enabled =
+            |irq: u32| self.core_words[0xe100 / 4 + irq as usize / 32] >> (irq % 32) & 1 == 1;
+        let armed = self.words[(TIM2 + 0x0c) / 4];
+        if self.can.transmit_interrupt() && enabled(IRQ_CAN1_TX) {
+            Some(IRQ_CAN1_TX)
+        } else if self.timer_flags & armed & 6 != 0 && enabled(IRQ_TIM2) {
+            Some(IRQ_TIM2)
+        } else {
+            None
+        }
+    }
+
+    /// A register, by its distance from the start of the range.
+    pub fn read(&mut self, offset: usize) -> u32 {
+        let word = self.words[offset / 4];
+        match offset {
+            o if o == RCC => word | (word & 0x0101_0001) << 1,
+            o if o == RCC + 0x08 => word & !0xc | (word & 3) << 2,
+            o if o == RCC + 0x70 => word | (word & 1) << 1,
+            o if o == RCC + 0x74 => word & 1 | (word & 1) << 1 | self.reset_flags,
+            o if o == PWR + 4 => 1 << 14 | word,
+            o if o == TIM2 + 0x10 => {
+                self.advance();
+                self.timer_flags
+            }
+            o if o == TIM2 + 0x24 => self.timer_us(),
+            o if o == SPI1 + 0x08 => 2 | u32::from(self.spi_full),
+            o if o == SPI1 + 0x0c => {
+                self.spi_full = false;
+                self.spi_in.into()
+            }
+            o if (CAN1..CAN1 + 0x400).contains(&o) => {
+                self.can.advance(self.now_ns);
+                self.can.read(o - CAN1)
+            }
+            o if o == IWDG + 0x0c => 0,
+            _ => word,
+        }
+    }
+
+    /// Writes a register.
+    pub fn write(&mut self, offset: usize, value: u32) {
+        self.words[offset / 4] = value;
+        match offset {
+            o if o == RCC + 0x74 && value & 1 << 24 != 0 => self.reset_flags = 0,
+            o if o == TIM2 && value & 1 != 0 => {
+                self.timer_started_ns.get_or_insert(self.now_ns);
+            }
+            o if o == TIM2 + 0x10 => self.timer_flags &= value,
+            o if o == TIM2 + 0x14 => {
+                self.timer_flags |= value & 6;
+                if value & 2 != 0 {
+                    self.alarms[0].at_ns = None;
+                }
+            }
+            o if o == TIM2 + 0x34 => self.set_alarm(0, value),
+            o if o == TIM2 + 0x38 => self.set_alarm(1, value),
+            o if o == IWDG => self.key(value),
+            o if o == SPI1 + 0x0c => {
+                self.spi_in = self.adc.exchange(value as u8);
+                self.spi_full = true;
+                self.spi_bytes += 1;
+                self.now_ns += self.spi_byte_ns;
+            }
+            o if o == GPIOA + 0x18 || o == GPIOB + 0x18 || o == GPIOC + 0x18 => {
+                self.set_pins(o, value)
+            }
+            o if (CAN1..CAN1 + 0x400).contains(&o) => {
+                let filled = self.can.filled;
+                self.can.write(o - CAN1, value, self.now_ns);
+                if self.can.filled != filled {
+                    self.instructions_at_mailbox = self.instructions;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn set_alarm(&mut self, k: usize, compare: u32) {
+        let left = compare.wrapping_sub(self.timer_us());
+        let start = self.timer_started_ns.unwrap_or(self.now_ns);
+        let us = (self.now_ns - start) / US + u64::from(left);
+        let at_ns = (left > 0).then_some(start + us * US);
+        self.alarms[k] = Alarm { at_ns };
+    }
+
+    fn key(&mut self, key: u32) {
+        let divider = 4u64 << self.words[(IWDG + 4) / 4].min(6);
+        let reload = u64::from(self.words[(IWDG + 8) / 4] & 0xfff) + 1;
+        let period = reload * divider * 1_000_000_000 / LSI_HZ;
+        match key {
+            0xcccc => self.watchdog_ns = Some(self.now_ns + period),
+            0xaaaa => {
+                self.fed += 1;
+                self.watchdog_ns = self.watchdog_ns.map(|_| self.now_ns + period);
+            }
+            _ => {}
+        }
+    }
+
+    fn set_pins(&mut self, register: usize, value: u32) {
+        let level = |pin: u32| match (value >> pin & 1, value >> (16 + pin) & 1) {
+            (1, _) => Some(true),
+            (_, 1) => Some(false),
+            _ => None,
+        };
+        match register {
+            o if o == GPIOA + 0x18 => match level(SELECT_PIN) {
+                Some(false) if !self.selected => {
+                    self.selected = true;
+                    let row = self.row();
+                    self.adc.select(self.now_ns, row);
+                }
+                Some(true) if self.selected => {
+                    self.selected = false;
+                    self.adc.deselect();
+                }
+                _ => {}
+            },
+            o if o == GPIOB + 0x18 => {
+                if let Some(high) = level(SYNC_PIN) {
+                    if high && !self.sync {
+                        let row = self.row();
+                        self.adc.sync(self.now_ns, row);
+                    }
+                    self.sync = high;
+                }
+            }
+            _ => self.led = level(LED_PIN).unwrap_or(self.led),
+        }
+    }
+
+    /// A register of the core.
+    pub fn read_core(&mut self, offset: usize) -> u32 {
+        self.core_words[offset / 4]
+    }
+
+    /// Writes a register of the core.
+    pub fn write_core(&mut self, offset: usize, value: u32) {
+        let enable = (0xe100..0xe120).contains(&offset);
+        let word = &mut self.core_words[offset / 4];
+        *word = if enable { *word | value } else { value };
+    }
+}
