@@ -145,10 +145,10 @@ mod app {
             .slot
             .and_then(|slot| memory.get(slot))
             .and_then(|slot| slots::load(slot));
-        // Settings of the FPU that do not stay as they are put cannot be relied on.
-        let mut fpu = Fpu;
-        fpu.restore();
-        let parameters = if fpu.restore() || !Fpu::defaults_are_sound() {
+        // A warm start may come with any settings; then the arithmetic must be as the host's.
+        Fpu.restore();
+        let sound = runtime::arithmetic::check().is_ok() && Fpu::defaults_are_sound();
+        let parameters = if !sound {
             Parameters::SelfTestFailed
         } else if let Some(loaded) = loaded {
             let loaded: &'static Loaded = cx.local.loaded.insert(loaded);

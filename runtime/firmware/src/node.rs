@@ -9,7 +9,7 @@
 //! | 3 bad parameters | slot * 16 + kind: 1 cut short, 3 no blob at all, 4 newer layout, 5 bad header, 7 wrong check (torn), 8 bad payload, 9 unusable values, 10 another stage's |
 //! | 4 no frames | 3 silent converter (line at 0 or 1), 7 no new codes |
 //! | 5 sensor fault | 1 SPI, 2 pin, 4 wrong part, 5 wrong setting or unexpected reset, 6 wrong check, 8 wrong input, 9 codes that never change; 0x10 + channel: code at a rail (0 to 2 Hall A to C, 3 to 5 gaps 1 to 3) |
-//! | 6 self-test failed | 1: the FPU does not keep its settings |
+//! | 6 self-test failed | 1: arithmetic is not that of the host, or the core would not restore the FPU's settings |
 
 use crate::fpu::FpuSettings;
 use crate::outbox::Outbox;
@@ -33,7 +33,8 @@ pub const REASON_CHANNEL: u8 = 0x10;
 /// Reasons of [`NodeState::Running`] with this bit: the other slot is damaged; below it
 /// [`Refusal::reason`].
 pub const REASON_OTHER_SLOT: u8 = 0x80;
-/// Reason of [`NodeState::SelfTestFailed`]: the FPU would not keep its settings.
+/// Reason of [`NodeState::SelfTestFailed`]: arithmetic is not that of the host, or the core
+/// would not restore the FPU's settings for interrupts.
 pub const REASON_FPU: u8 = 1;
 
 /// The reading of a tick that gave no pose.

@@ -99,6 +99,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("FPU settings changed during the decoding", &|| {
         timing::fpu_settings_changed_during_the_decoding(bench)
     });
+    check("FPU defaults that are wrong", &|| {
+        timing::fpu_defaults_that_are_wrong(bench)
+    });
     check("bus off and back", &|| {
         bus::goes_and_comes_back(bench, BusState::Off)
     });

@@ -4,7 +4,7 @@ use super::log::Stage;
 use super::{Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen};
-use hal_adapters::can::status::flag;
+use hal_adapters::can::status::{NodeState, flag};
 use runtime::Status;
 
 const PART: Part = Part::Ads131m08;
@@ -194,4 +194,29 @@ pub fn the_clock_wraps(bench: &Bench) -> Outcome {
         seen.last_status().map(|s| s.missed_ticks),
         Some(0),
     )
+}
+
+/// A core that would hand wrong settings to interrupts fails its own test: no pose, and said so.
+pub fn fpu_defaults_that_are_wrong(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    const FPDSCR: usize = 0xef3c;
+    machine.chip.write_core(FPDSCR, OTHER_SETTINGS);
+    machine.run_ticks(200)?;
+    let seen = Seen::since_last(&mut machine);
+    equal("words of poses", seen.axes.len(), 0)?;
+    expect(seen.statuses.len() >= 12, || {
+        "too few status frames".to_owned()
+    })?;
+    let failed = (Some(NodeState::SelfTestFailed), 1);
+    let other = seen
+        .statuses
+        .iter()
+        .find(|(_, s)| (s.state, s.reason) != failed);
+    equal(
+        "another state",
+        other.map(|(tick, s)| (*tick, s.state)),
+        None,
+    )?;
+    let resets = (machine.panics, machine.watchdog_resets);
+    equal("panics and watchdog resets", resets, (0, 0))
 }
