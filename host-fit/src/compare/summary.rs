@@ -102,13 +102,14 @@ fn summary(runs: &[Run]) -> Option<Summary> {
 /// The table in Markdown.
 pub fn table(summaries: &[Summary]) -> String {
     let mut text = String::from(
-        "| form | solver | steps | train fitness: median (range) | X rms, um | Y rms, um | Rz rms, urad \
+        "| form | solver | steps | train fitness: median (range) | X rms, um | Y rms, um \
+         | Rz rms, urad \
          | within 1 % of the floor: seeds, evaluations, ms | at the floor (1e-6): seeds, evaluations, ms \
          | us per evaluation |\n\
          |---|---|---|---|---|---|---|---|---|---|\n",
     );
     for s in summaries {
-        let rms = |axis: usize| s.rms[axis].map_or("-".to_owned(), |rms| figure(rms.median));
+        let rms = |axis: usize| s.rms[axis].map_or("-".to_owned(), figures);
         let source = SearchKind::by_name(s.solver).map_or("least squares", SearchKind::source);
         let arrival = |arrival: &Arrival| match (arrival.evaluations, arrival.seconds) {
             (Some(evaluations), Some(seconds)) => format!(
@@ -128,12 +129,10 @@ pub fn table(summaries: &[Summary]) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "| {} | {} | {source} | {} ({} to {}) | {} | {} | {} | {} | {} | {per_evaluation} |",
+            "| {} | {} | {source} | {} | {} | {} | {} | {} | {} | {per_evaluation} |",
             s.form.name(),
             s.solver,
-            figure(s.fitness.median),
-            figure(s.fitness.low),
-            figure(s.fitness.high),
+            figures(s.fitness),
             rms(0),
             rms(1),
             rms(2),
@@ -142,6 +141,12 @@ pub fn table(summaries: &[Summary]) -> String {
         );
     }
     text
+}
+
+/// Median and range.
+fn figures(spread: Spread) -> String {
+    let [median, low, high] = [spread.median, spread.low, spread.high].map(figure);
+    format!("{median} ({low} to {high})")
 }
 
 /// Three to four digits.
