@@ -130,6 +130,18 @@ fn two_clocks_are_joined_and_the_offset_is_found() {
     }
 }
 
+/// Each movement moves one axis, at the same frequency: a run shifted by a whole movement looks
+/// much the same, and a record that ends early must not be taken for one.
+#[test]
+fn a_record_that_ends_early_is_not_shifted_by_a_movement() {
+    let (_folder, mut args) = files(&candump(|n, _| n >= 460), &reference());
+    args.search_s = 1.2;
+    let report = run(&args).expect("imported");
+    let found_us = report.offset.us - OFFSET_US;
+    assert!((-60.0..160.0).contains(&found_us), "{found_us}");
+    assert!(report.join.rows > 455);
+}
+
 #[test]
 fn missing_frames_and_repeated_samples_are_reported_and_leave_gaps() {
     let bus = candump(|n, k| n == 100 && k == 0 || (200..203).contains(&n));
