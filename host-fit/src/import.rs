@@ -154,14 +154,8 @@ fn choose_offset(
             explained: None,
         });
     }
-    let step_us = stage.servo_period_s * 1e6;
-    offset::estimate(
-        &reading.ticks,
-        times_us,
-        &reference.samples,
-        step_us,
-        args.search_s * 1e6,
-    )
+    let search_us = args.search_s * 1e6;
+    offset::estimate(&reading.ticks, times_us, reference, stage, search_us)
 }
 
 #[cfg(test)]

@@ -1,16 +1,19 @@
-//! The offset between the clocks, by the motion that both saw: at the right one the Hall
-//! signals are a linear function of the reference pose, but for what height and tilt change.
+//! The offset between the clocks, by the motion that both saw: at the right one each Hall
+//! signal is what the designed probe would read at the reference pose, times a sensitivity.
 //!
-//! For a trial offset the signals of all ticks are fitted by the reference, linearly, with a
-//! constant for each movement; what the fit leaves over, as a share of the signals' motion, is
-//! smallest at the true offset. A grid of one servo period finds the valley, golden section
-//! its floor.
+//! For a trial offset the signal of each probe is fitted by that prediction, with a factor and
+//! a constant for each movement. A grid of one servo period finds the offset that explains the
+//! most motion; golden section then finds where the least is left over. (A fit by all three
+//! axes of the reference would also explain a run shifted by a whole movement: each movement
+//! moves one axis only, and some matrix turns any axis into any other.)
 
 use super::ImportError;
 use super::bus_log::BusTick;
 use super::join::{At, Cursor};
-use super::reference::Sample;
-use nalgebra::{Matrix3, Vector3};
+use super::reference::{Reference, Sample};
+use crate::log::layout::Quantity;
+use crate::stage::Stage;
+use runtime::model::dot;
 
 /// The offset between the clocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,34 +40,37 @@ const WIDTH_US: f64 = 0.5;
 pub fn estimate(
     ticks: &[BusTick],
     times_us: &[f64],
-    samples: &[Sample],
-    step_us: f64,
+    reference: &Reference,
+    stage: &Stage,
     search_us: f64,
 ) -> Result<Offset, ImportError> {
-    let starts = times_us.first().zip(samples.first());
+    let step_us = stage.servo_period_s * 1e6;
+    let starts = times_us.first().zip(reference.samples.first());
     let centre_us = starts.map_or(0.0, |(bus, reference)| bus - reference.t_us);
+    let predicted = predicted(reference, stage);
     let points: Vec<Point> = ticks
         .iter()
         .zip(times_us)
         .map(|(tick, t_us)| Point {
             t_us: *t_us,
-            signal: Vector3::from(tick.hall.map(f64::from)),
+            signal: tick.hall.map(f64::from),
         })
         .collect();
     let every = points.len().div_ceil(COARSE_TICKS).max(1);
     let coarse: Vec<Point> = points.iter().step_by(every).copied().collect();
-    let trial = |points: &[Point], us: f64| left_over(points, samples, us, 2.0 * step_us);
+    let trial = |points: &[Point], us: f64| explain(points, &predicted, us, 2.0 * step_us);
     let steps = (search_us / step_us).ceil().clamp(1.0, 1e6) as i64;
-    let mut best = (f64::INFINITY, centre_us);
+    let mut best = (f64::NEG_INFINITY, centre_us);
     for k in -steps..=steps {
         let us = centre_us + k as f64 * step_us;
-        let left = trial(&coarse, us);
-        if left < best.0 {
-            best = (left, us);
+        let explained = trial(&coarse, us).explained;
+        if explained > best.0 {
+            best = (explained, us);
         }
     }
-    let us = golden(best.1 - step_us, best.1 + step_us, |us| trial(&points, us));
-    let explained = 1.0 - trial(&points, us);
+    let left_over = |us| 1.0 - trial(&points, us).share();
+    let us = golden(best.1 - step_us, best.1 + step_us, left_over);
+    let explained = trial(&points, us).share();
     if explained.is_nan() || explained < EXPLAINED_MIN {
         return Err(ImportError::NoOffset {
             percent: 100.0 * explained.max(0.0),
@@ -77,50 +83,98 @@ pub fn estimate(
     })
 }
 
+/// The samples with what the designed probes would read, in m, in place of their values.
+fn predicted(reference: &Reference, stage: &Stage) -> Vec<Sample> {
+    let scale = reference
+        .quantities
+        .map(|quantity| stage.log.column(quantity).scale);
+    let plane = stage.designed.geometry([0.0; 3]).plane_rows();
+    let beams = reference.quantities == Quantity::BEAMS;
+    let at = |sample: &Sample| -> [f64; 3] {
+        let [a, b, c] = sample.values;
+        let [x, second, third] = [a * scale[0], b * scale[1], c * scale[2]];
+        let pose = if beams {
+            let rz = ((second - third) / stage.y_baseline_m).atan();
+            [x, 0.5 * (second + third), rz]
+        } else {
+            [x, second, third]
+        };
+        plane.map(|row| dot(&row, pose))
+    };
+    let samples = reference.samples.iter();
+    samples
+        .map(|sample| Sample {
+            values: at(sample),
+            ..*sample
+        })
+        .collect()
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Point {
     t_us: f64,
-    signal: Vector3<f64>,
+    signal: [f64; 3],
 }
 
-/// Sums of one movement.
+/// Sums of one probe over one movement.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     n: f64,
-    s: Vector3<f64>,
-    q: Vector3<f64>,
-    sq: Matrix3<f64>,
-    qq: Matrix3<f64>,
+    s: f64,
+    p: f64,
     ss: f64,
+    sp: f64,
+    pp: f64,
 }
 
 impl Sums {
-    fn add(&mut self, s: Vector3<f64>, q: Vector3<f64>) {
+    fn add(&mut self, s: f64, p: f64) {
         self.n += 1.0;
         self.s += s;
-        self.q += q;
-        self.sq += s * q.transpose();
-        self.qq += q * q.transpose();
-        self.ss += s.norm_squared();
+        self.p += p;
+        self.ss += s * s;
+        self.sp += s * p;
+        self.pp += p * p;
     }
 
-    /// Adds the movement to the whole, its means taken out.
-    fn centre_into(&self, whole: &mut Self) {
-        if self.n > 0.0 {
-            whole.n += self.n;
-            whole.sq += self.sq - self.s * self.q.transpose() / self.n;
-            whole.qq += self.qq - self.q * self.q.transpose() / self.n;
-            whole.ss += self.ss - self.s.norm_squared() / self.n;
+    /// Adds a movement to the whole, its means taken out.
+    fn take_in(&mut self, movement: &Self) {
+        if movement.n > 0.0 {
+            self.n += movement.n;
+            self.ss += movement.ss - movement.s * movement.s / movement.n;
+            self.sp += movement.sp - movement.s * movement.p / movement.n;
+            self.pp += movement.pp - movement.p * movement.p / movement.n;
         }
     }
 }
 
-/// Share of the signals' motion that the reference leaves over at an offset; 1 where fewer
-/// than half of the points have a reference.
-fn left_over(points: &[Point], samples: &[Sample], offset_us: f64, tolerance_us: f64) -> f64 {
-    let mut cursor = Cursor::new(samples);
-    let (mut whole, mut sums) = (Sums::default(), Sums::default());
+/// What the prediction explains of the signals' motion, in codes squared.
+#[derive(Clone, Copy, Debug, Default)]
+struct Explained {
+    explained: f64,
+    motion: f64,
+}
+
+impl Explained {
+    fn share(&self) -> f64 {
+        if self.motion > 0.0 {
+            self.explained / self.motion
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Fits the points that have a reference at an offset.
+fn explain(points: &[Point], predicted: &[Sample], offset_us: f64, tolerance_us: f64) -> Explained {
+    let mut cursor = Cursor::new(predicted);
+    let (mut whole, mut sums) = ([Sums::default(); 3], [Sums::default(); 3]);
     let mut current = None;
+    let take_in = |whole: &mut [Sums; 3], sums: &[Sums; 3]| {
+        for (whole, sums) in whole.iter_mut().zip(sums) {
+            whole.take_in(sums);
+        }
+    };
     for point in points {
         let at = cursor.at(point.t_us - offset_us, tolerance_us);
         let At::Found {
@@ -130,23 +184,24 @@ fn left_over(points: &[Point], samples: &[Sample], offset_us: f64, tolerance_us:
             continue;
         };
         if current != Some(movement) {
-            sums.centre_into(&mut whole);
-            sums = Sums::default();
+            take_in(&mut whole, &sums);
+            sums = Default::default();
             current = Some(movement);
         }
-        sums.add(point.signal, Vector3::from(values));
+        for ((sums, s), p) in sums.iter_mut().zip(point.signal).zip(values) {
+            sums.add(s, p);
+        }
     }
-    sums.centre_into(&mut whole);
-    if whole.n * 2.0 < points.len() as f64 || whole.ss <= 0.0 {
-        return 1.0;
+    take_in(&mut whole, &sums);
+    let mut all = Explained::default();
+    for probe in &whole {
+        all.motion += probe.ss;
+        // A probe that reads against its designed sense explains nothing.
+        if probe.sp > 0.0 && probe.pp > 0.0 {
+            all.explained += probe.sp * probe.sp / probe.pp;
+        }
     }
-    // Axes that do not move have no inverse: the pseudo-inverse leaves them out.
-    let scale = whole.qq.norm() * 1e-12;
-    let Ok(inverse) = whole.qq.pseudo_inverse(scale) else {
-        return 1.0;
-    };
-    let explained = (whole.sq * inverse * whole.sq.transpose()).trace();
-    1.0 - explained / whole.ss
+    all
 }
 
 /// The place of the smallest value between two ends of a valley.

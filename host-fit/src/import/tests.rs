@@ -106,13 +106,13 @@ fn read_log(args: &ImportArgs) -> crate::dataset::Dataset {
 fn two_clocks_are_joined_and_the_offset_is_found() {
     let (_folder, args) = files(&candump(|_, _| false), &reference());
     let report = run(&args).expect("imported");
-    // Receive times lie 35 us after the samples on average (the time frame comes first in
-    // every 16th tick); that belongs to the offset.
+    // The line lies along the earliest receive times, up to 100 us early here; that belongs
+    // to the offset.
     let found_us = report.offset.us - OFFSET_US;
-    assert!((-60.0..160.0).contains(&found_us), "{found_us}");
+    assert!((-160.0..160.0).contains(&found_us), "{found_us}");
     assert!(report.offset.explained.is_some_and(|share| share > 0.999));
     assert_eq!(report.bus.ticks, TICKS as usize);
-    assert!(report.smoothing.max_us < 300.0);
+    assert!(report.smoothing.max_us < 500.0);
     let dataset = read_log(&args);
     assert_eq!(dataset.movements.len(), 3);
     assert!(dataset.rows.len() > 740);
@@ -128,6 +128,18 @@ fn two_clocks_are_joined_and_the_offset_is_found() {
             assert!((have - want).abs() <= 10, "{} {have} {want}", row.t_us);
         }
     }
+}
+
+/// Each movement moves one axis, at the same frequency: a run shifted by a whole movement looks
+/// much the same, and a record that ends early must not be taken for one.
+#[test]
+fn a_record_that_ends_early_is_not_shifted_by_a_movement() {
+    let (_folder, mut args) = files(&candump(|n, _| n >= 460), &reference());
+    args.search_s = 1.2;
+    let report = run(&args).expect("imported");
+    let found_us = report.offset.us - OFFSET_US;
+    assert!((-160.0..160.0).contains(&found_us), "{found_us}");
+    assert!(report.join.rows > 455);
 }
 
 #[test]
