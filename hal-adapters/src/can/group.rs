@@ -37,6 +37,17 @@ impl<const N: usize> GroupTick<N> {
     }
 }
 
+/// How long the source has been silent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Silence {
+    /// No good frame yet.
+    NotYet,
+    /// The last good frame came then, us.
+    Since(u32),
+    /// Too long: told once.
+    Stale,
+}
+
 /// Collects the frames of `N` messages.
 #[derive(Clone, Debug)]
 pub(super) struct Group<const N: usize> {
@@ -47,15 +58,14 @@ pub(super) struct Group<const N: usize> {
     done: Option<u32>,
     is_open: bool,
     pending: GroupTick<N>,
-    last_good_us: Option<u32>,
-    stale: bool,
+    silence: Silence,
     health: BusHealth,
 }
 
-/// Time from `then` to `now`, 0 if the clock stepped back.
-const fn elapsed(now: u32, then: u32) -> u32 {
-    let passed = now.wrapping_sub(then);
-    if passed > u32::MAX / 2 { 0 } else { passed }
+/// Whether `limit_us` passed between `then` and `now`; not if the clock stepped back.
+#[inline(always)]
+const fn is_over(now: u32, then: u32, limit_us: u32) -> bool {
+    now.wrapping_sub(then).wrapping_sub(limit_us) as i32 >= 0
 }
 
 /// Whether tick `a` comes after tick `b`.
@@ -78,8 +88,7 @@ impl<const N: usize> Group<N> {
                 came: 0,
                 payloads: [Payload { short: 0, long: 0 }; N],
             },
-            last_good_us: None,
-            stale: false,
+            silence: Silence::NotYet,
             health: BusHealth {
                 good: 0,
                 wrong_length: 0,
@@ -99,7 +108,7 @@ impl<const N: usize> Group<N> {
     }
 
     pub(super) const fn is_stale(&self) -> bool {
-        self.stale
+        matches!(self.silence, Silence::Stale)
     }
 
     /// The tick whose number ends in `counter` and is nearest to the newest one.
@@ -163,7 +172,7 @@ impl<const N: usize> Group<N> {
     #[inline(always)]
     fn is_due(&mut self, k: usize, counter: u8, now_us: u32) -> bool {
         let tick = if self.is_open {
-            if elapsed(now_us, self.pending.time_us) >= self.timing.assembly_us {
+            if is_over(now_us, self.pending.time_us, self.timing.assembly_us) {
                 return false;
             }
             self.pending.sequence
@@ -178,8 +187,7 @@ impl<const N: usize> Group<N> {
     #[inline(always)]
     const fn is_good(&mut self, now_us: u32) {
         self.health.good = self.health.good.saturating_add(1);
-        self.last_good_us = Some(now_us);
-        self.stale = false;
+        self.silence = Silence::Since(now_us);
     }
 
     /// A frame whose check held, but which is not the one that is due.
@@ -217,7 +225,7 @@ impl<const N: usize> Group<N> {
         let mut over = None;
         if self.is_open {
             // A tick whose time is over takes no more frames: 16 ticks on, its counter returns.
-            let expired = elapsed(now_us, self.pending.time_us) >= self.timing.assembly_us;
+            let expired = is_over(now_us, self.pending.time_us, self.timing.assembly_us);
             let same = self.pending.sequence == tick;
             let older = !same && !is_after(tick, self.pending.sequence);
             if expired || !(same || older) {
@@ -290,17 +298,15 @@ impl<const N: usize> Group<N> {
     /// What the passing of time gives: a tick whose time is over, a source that is stale.
     pub(super) fn poll<T>(&mut self, now_us: u32, make: impl Fn(&GroupTick<N>) -> T) -> Taken<T> {
         let mut taken = Taken::NOTHING;
-        if self.is_open && elapsed(now_us, self.pending.time_us) >= self.timing.assembly_us {
+        if self.is_open && is_over(now_us, self.pending.time_us, self.timing.assembly_us) {
             taken.tick = self.hand_out(make);
         }
-        if let Some(last) = self.last_good_us
-            && !self.stale
+        if let Silence::Since(last) = self.silence
+            && is_over(now_us, last, self.timing.stale_us)
         {
-            let age_us = elapsed(now_us, last);
-            if age_us >= self.timing.stale_us {
-                self.stale = true;
-                taken.fault = Some(self.note(BusFault::Stale { age_us }));
-            }
+            self.silence = Silence::Stale;
+            let age_us = now_us.wrapping_sub(last);
+            taken.fault = Some(self.note(BusFault::Stale { age_us }));
         }
         taken
     }
@@ -310,7 +316,9 @@ impl<const N: usize> Group<N> {
         if self.is_open {
             return Some(self.pending.time_us.wrapping_add(self.timing.assembly_us));
         }
-        let last = self.last_good_us.filter(|_| !self.stale)?;
-        Some(last.wrapping_add(self.timing.stale_us))
+        match self.silence {
+            Silence::Since(last) => Some(last.wrapping_add(self.timing.stale_us)),
+            Silence::NotYet | Silence::Stale => None,
+        }
     }
 }

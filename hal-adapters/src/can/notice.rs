@@ -2,7 +2,7 @@
 
 use super::table::Message;
 
-/// Times in us by which a receiver judges. All are data: nothing here reads a clock.
+/// Times in us by which a receiver judges, below 2^30. All are data: nothing here reads a clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
     /// A tick whose frames are not complete this long after its first one is handed out.
