@@ -107,7 +107,8 @@ impl<'d> Servo<'d> {
     /// what is invalid, counts, and feeds a re-zero in progress.
     ///
     /// A frame whose sequence number is not ahead of the last one's (modulo 2^32, by less
-    /// than half of it) is not new and is not decoded.
+    /// than half of it) is not new and is not decoded. A source that counts anew from a lower
+    /// number is so refused until it has caught up: call [`Servo::forget`] when it restarts.
     pub fn tick(&mut self, frame: &RawFrame) -> Reading {
         let Some(sequence) = self.follow(frame.sequence) else {
             return self.conclude(NOTHING, Status::FRAME_REPEATED);
@@ -162,6 +163,10 @@ impl<'d> Servo<'d> {
     }
 
     /// One servo period in which no frame came: nothing is measured, values are held or zero.
+    ///
+    /// The period takes a sequence number, as in a source that numbers periods: a frame of that
+    /// number that comes after all is late, and is judged repeated. A source that numbers only
+    /// the frames it sends so loses one more frame for each such period.
     pub fn tick_without_frame(&mut self) -> Reading {
         self.health.frames_missed = self.health.frames_missed.saturating_add(1);
         self.last_sequence = self.last_sequence.map(|last| last.wrapping_add(1));

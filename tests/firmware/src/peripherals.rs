@@ -229,8 +229,11 @@ impl Peripherals {
         self.words[offset / 4] = value;
         match offset {
             o if o == RCC + 0x74 && value & 1 << 24 != 0 => self.reset_flags = 0,
-            o if o == TIM2 && value & 1 != 0 => {
-                self.timer_started_ns.get_or_insert(self.now_ns);
+            o if o == TIM2 && value & 1 != 0 && self.timer_started_ns.is_none() => {
+                self.timer_started_ns = Some(self.now_ns);
+                // The counter starts at what the compare registers hold after a reset: both
+                // match, though no alarm was set.
+                self.timer_flags |= 6;
             }
             o if o == TIM2 + 0x10 => self.timer_flags &= value,
             o if o == TIM2 + 0x14 => {
