@@ -124,6 +124,14 @@ pub enum FitError {
     /// The solver found nothing.
     #[error(transparent)]
     Solver(#[from] SolveError),
+    /// The fitted parameters put a row of the log next to a pole of 1/phi.
+    #[error(
+        "the {solver} search ended with a row of the log next to a pole of 1/phi, where nothing can be judged: let it          run longer (--generations, --population), use --project delta or linear, or take the default solver"
+    )]
+    AtPole {
+        /// Name of the solver.
+        solver: &'static str,
+    },
     /// The fitted parameters cannot serve a decoder.
     #[error(
         "the fitted parameters cannot be used: {0}. Check the vertical motion in the log and the search ranges"
@@ -171,8 +179,11 @@ pub fn fit(
     check_motion(dataset, stage, selected.len(), settings.model)?;
     let problem = Problem::new(dataset, &selected, stage, settings.model);
     let solution = solver.solve(&problem, &settings.solver)?;
-    let uncertainty = uncertainty(&problem, &solution.parameters, &solution.at_limit)
-        .ok_or(SolveError::NoUsableStart)?;
+    let uncertainty = uncertainty(&problem, &solution.parameters, &solution.at_limit).ok_or(
+        FitError::AtPole {
+            solver: solver.name(),
+        },
+    )?;
     let calibration = calibration(dataset, stage, settings.model, &solution.parameters);
     let determined = check_determined(
         stage,

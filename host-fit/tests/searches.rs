@@ -126,3 +126,32 @@ fn an_interrupt_keeps_the_best_so_far() {
     assert_eq!(ended.code(), Some(130));
     bench.good("inspect p.bin");
 }
+
+#[test]
+fn arguments_that_do_not_go_together_are_a_matter_of_usage() {
+    bench().bad(
+        "fit log.csv.gz --stage stage.toml --out p.bin --solver shtlbo --model 30",
+        2,
+        &["--project", "model (30)", "use --project delta"],
+    );
+}
+
+#[test]
+fn a_search_that_ends_next_to_a_pole_says_so_and_writes_nothing() {
+    let bench = bench();
+    bench.bad(
+        "fit log.csv.gz --stage stage.toml --out p.bin --solver random --project none --train 200",
+        4,
+        &["random search", "pole of 1/phi", "--generations"],
+    );
+    assert!(!common::exists(&bench.path("p.bin")));
+}
+
+#[test]
+fn compare_refuses_fewer_rows_than_unknowns() {
+    bench().bad(
+        "compare log.csv.gz --stage stage.toml --seeds 1 --train 60",
+        4,
+        &["60 rows cannot determine 189 unknowns"],
+    );
+}

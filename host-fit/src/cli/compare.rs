@@ -5,7 +5,6 @@ use crate::compare::curves::{Course, history_csv, plot, runs_csv};
 use crate::compare::summary::{summaries, table};
 use crate::compare::{Comparison, Run, compare};
 use crate::error::HostError;
-use crate::fit::FitError;
 use crate::interrupt;
 use crate::log::{self, ReadOptions};
 use crate::output::{make_folder, write_atomically};
@@ -50,7 +49,7 @@ pub fn run(args: &CompareArgs) -> Result<(), HostError> {
     if terminal {
         let _ = write!(std::io::stderr(), "\r{:40}\r", "");
     }
-    let runs = compared.map_err(FitError::from)?;
+    let runs = compared?;
     let table = table(&summaries(&runs));
     super::print(&table)?;
     if let Some(folder) = &args.out {

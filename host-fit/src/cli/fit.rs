@@ -2,13 +2,13 @@
 
 use super::args::{BadRowsChoice, FitArgs, Train};
 use crate::error::HostError;
-use crate::fit::{Fit, FitSettings, fit};
+use crate::fit::{Fit, FitError, FitSettings, fit};
 use crate::log::{BadRows, LogReading, ReadOptions};
 use crate::parameters::Parameters;
 use crate::population::default_size;
 use crate::report::json::{Report, of_fit};
 use crate::report::{html, plots, text};
-use crate::solver::SolverOptions;
+use crate::solver::{SolveError, SolverOptions};
 use crate::stage::Stage;
 use crate::{blob_file, interrupt, judge, log, output};
 use std::path::{Path, PathBuf};
@@ -77,6 +77,13 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
         Err(error) if interrupt::requested() => {
             return Err(HostError::Interrupted {
                 kept: format!("no parameter blob was written: {error}"),
+            });
+        }
+        // No fit was tried: the arguments do not go together.
+        Err(FitError::Solver(error @ SolveError::Unsupported { .. })) => {
+            return Err(HostError::Usage {
+                argument: "--project",
+                problem: error.to_string(),
             });
         }
         result => result?,

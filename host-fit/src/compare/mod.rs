@@ -16,7 +16,8 @@ pub mod curves;
 pub mod summary;
 
 use crate::dataset::Dataset;
-use crate::fit::calibration;
+use crate::fit::{FitError, calibration};
+use crate::identify::check_motion;
 use crate::judge::{Zeros, judge};
 use crate::least_squares::starts::LeastSquares;
 use crate::objective::form::Form;
@@ -109,15 +110,18 @@ impl Run {
 /// with what there is, once `interrupt` is set.
 ///
 /// # Errors
-/// See [`SolveError`]: when the least-squares fit, which gives the floor, fails.
+/// [`FitError::Failed`] when the rows cannot determine Model (31), [`FitError::Solver`] when the
+/// least-squares fit, which gives the floor, fails.
 pub fn compare(
     dataset: &Dataset,
     stage: &Stage,
     comparison: &Comparison,
     interrupt: &AtomicBool,
     mut done: impl FnMut(&Run),
-) -> Result<Vec<Run>, SolveError> {
-    let count = comparison.train.unwrap_or(dataset.rows.len());
+) -> Result<Vec<Run>, FitError> {
+    let all = dataset.rows.len();
+    let count = comparison.train.unwrap_or(all).min(all);
+    check_motion(dataset, stage, count, ModelKind::M31)?;
     let draw = |seed| draw_rows(dataset, count, comparison.draw, seed);
     let drawn: Vec<Vec<usize>> = (1..=comparison.seeds).map(draw).collect();
     let problem = |rows: &[usize]| Problem::new(dataset, rows, stage, ModelKind::M31);

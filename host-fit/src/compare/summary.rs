@@ -20,7 +20,8 @@ impl Spread {
     /// Of numbers in any order; `None` of none. NaN ranks last.
     pub fn of(numbers: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = numbers.into_iter().collect();
-        sorted.sort_by(f64::total_cmp);
+        // `total_cmp` alone would put a NaN with its sign bit set, as x86 makes them, first.
+        sorted.sort_by(|a, b| a.is_nan().cmp(&b.is_nan()).then(a.total_cmp(b)));
         let (low, high) = (*sorted.first()?, *sorted.last()?);
         let middle = sorted.len() / 2;
         let median = if sorted.len().is_multiple_of(2) {
@@ -67,8 +68,11 @@ pub struct Summary {
     pub seeds: usize,
     /// Fitness over the rows drawn, um, um, urad.
     pub fitness: Spread,
-    /// rms of X, Y, Rz over all rows, um, um, urad; `None` where no seed could be decoded.
+    /// rms of X, Y, Rz over all rows, um, um, urad, of the seeds that could be decoded; `None`
+    /// where none could.
     pub rms: [Option<Spread>; 3],
+    /// How many seeds found parameters that can serve a decoder.
+    pub decoded: usize,
     /// How many seeds came within 1 % of the floor, and how soon.
     pub arrived: Arrival,
     /// How many came to the floor itself, and how soon.
@@ -93,6 +97,7 @@ fn summary(runs: &[Run]) -> Option<Summary> {
         seeds: runs.len(),
         fitness: Spread::of(runs.iter().map(|run| run.fitness))?,
         rms: [rms(0), rms(1), rms(2)],
+        decoded: runs.iter().filter(|run| run.rms.is_some()).count(),
         arrived: Arrival::of(runs, ARRIVED),
         exact: Arrival::of(runs, EXACT),
         seconds_per_evaluation: Spread::of(runs.iter().map(each))?.median,
@@ -103,10 +108,10 @@ fn summary(runs: &[Run]) -> Option<Summary> {
 pub fn table(summaries: &[Summary]) -> String {
     let mut text = String::from(
         "| form | solver | steps | train fitness: median (range) | X rms, um | Y rms, um \
-         | Rz rms, urad \
+         | Rz rms, urad | decodable \
          | within 1 % of the floor: seeds, evaluations, ms | at the floor (1e-6): seeds, evaluations, ms \
          | us per evaluation |\n\
-         |---|---|---|---|---|---|---|---|---|---|\n",
+         |---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for s in summaries {
         let rms = |axis: usize| s.rms[axis].map_or("-".to_owned(), figures);
@@ -129,13 +134,15 @@ pub fn table(summaries: &[Summary]) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "| {} | {} | {source} | {} | {} | {} | {} | {} | {} | {per_evaluation} |",
+            "| {} | {} | {source} | {} | {} | {} | {} | {} of {} | {} | {} | {per_evaluation} |",
             s.form.name(),
             s.solver,
             figures(s.fitness),
             rms(0),
             rms(1),
             rms(2),
+            s.decoded,
+            s.seeds,
             arrival(&s.arrived),
             arrival(&s.exact),
         );

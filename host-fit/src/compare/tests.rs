@@ -1,6 +1,7 @@
 use super::curves::{Course, history_csv, plot, runs_csv};
 use super::summary::{Spread, summaries, table};
 use super::*;
+use crate::identify::FitFailure;
 use crate::objective::sample;
 
 fn comparison() -> Comparison {
@@ -67,6 +68,42 @@ fn an_interrupt_ends_a_comparison_with_what_there_is() {
 }
 
 #[test]
+fn the_table_counts_the_seeds_whose_errors_it_shows() {
+    let run = |seed, rms| Run {
+        form: Projection::None,
+        solver: "pso",
+        seed,
+        fitness: 9.0,
+        floor: 1.0,
+        evaluations: 400,
+        nan_costs: 0,
+        elapsed_s: 2.0,
+        rms,
+        history: Vec::new(),
+    };
+    let runs = [run(1, None), run(2, Some([2.0, 3.0, 4.0])), run(3, None)];
+    let summaries = summaries(&runs);
+    assert_eq!((summaries[0].decoded, summaries[0].seeds), (1, 3));
+    assert!(table(&summaries).contains("| 4.000 (4.000 to 4.000) | 1 of 3 |"));
+}
+
+#[test]
+fn fewer_rows_than_unknowns_are_refused() {
+    // The floor of such a comparison would be that of noise, or of nothing.
+    let (stage, dataset) = (sample::stage(), sample::dataset(12, 12));
+    let few = Comparison {
+        train: Some(17),
+        ..comparison()
+    };
+    let go_on = AtomicBool::new(false);
+    let refused = compare(&dataset, &stage, &few, &go_on, |_| ());
+    assert!(matches!(
+        refused,
+        Err(FitError::Failed(FitFailure::TooFewRows { rows: 17, .. }))
+    ));
+}
+
+#[test]
 fn arrival_is_the_first_generation_within_one_percent_of_the_floor() {
     let point = |evaluations, best_cost| Checkpoint {
         evaluations,
@@ -103,4 +140,9 @@ fn medians_are_those_of_sorted_numbers() {
     assert_eq!((spread.median, spread.low, spread.high), (2.5, 1.0, 10.0));
     assert_eq!(Spread::of([5.0]).expect("a number").median, 5.0);
     assert_eq!(Spread::of([]), None);
+    for nan in [f64::NAN, -f64::NAN] {
+        let spread = Spread::of([nan, 2.0, 1.0]).expect("numbers");
+        assert_eq!((spread.median, spread.low), (2.0, 1.0));
+        assert!(spread.high.is_nan());
+    }
 }

@@ -35,8 +35,10 @@ pub fn vertical_extent(rows: &[TrainRow]) -> [Range; 3] {
 pub fn cut(slopes: Range, eta: f64, extent: Range) -> Range {
     // eta (1 - SHARE_MIN) + slope v > 0 at both ends of the extent.
     let room = (1.0 - SHARE_MIN) * eta.abs();
-    let low = slopes.low.max(-room / extent.high);
-    let high = slopes.high.min(-room / extent.low);
+    // An extent that ends at zero (all rows on one side) bounds nothing on that side.
+    let end = |v: f64| (v != 0.0).then(|| -room / v);
+    let low = end(extent.high).map_or(slopes.low, |end| slopes.low.max(end));
+    let high = end(extent.low).map_or(slopes.high, |end| slopes.high.min(end));
     if low < high {
         Range { low, high }
     } else {
@@ -62,5 +64,36 @@ impl Smallest {
     #[inline(always)]
     pub fn judge(&self, cost: Lanes) -> Lanes {
         self.0.select_above(SHARE_MIN, cost)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn range(low: f64, high: f64) -> Range {
+        Range { low, high }
+    }
+
+    #[test]
+    fn slopes_are_cut_where_the_share_would_be_a_twentieth() {
+        let both = range(-5000.0, 5000.0);
+        // 0.8 - 0.95 * 0.8 at either end: 0.76 / 250 um, 0.76 / 500 um.
+        let cut_both = cut(both, 0.8, range(-5e-4, 2.5e-4));
+        assert!((cut_both.low + 3040.0).abs() < 1e-9 && (cut_both.high - 1520.0).abs() < 1e-9);
+        assert_eq!(
+            cut(range(-10.0, 20.0), 0.8, range(-5e-4, 2.5e-4)),
+            range(-10.0, 20.0)
+        );
+    }
+
+    #[test]
+    fn a_log_on_one_side_of_zero_cuts_one_side_of_the_slopes() {
+        let both = range(-5000.0, 5000.0);
+        let above = cut(both, 0.8, range(0.0, 2.5e-4));
+        assert!((above.low + 3040.0).abs() < 1e-9 && above.high == 5000.0);
+        let below = cut(both, 0.8, range(-2.5e-4, 0.0));
+        assert!(below.low == -5000.0 && (below.high - 3040.0).abs() < 1e-9);
+        assert_eq!(cut(both, 0.8, range(0.0, 0.0)), both);
     }
 }
