@@ -186,7 +186,10 @@ impl<const N: usize> Group<N> {
     /// Notes that a good frame came.
     #[inline(always)]
     const fn is_good(&mut self, now_us: u32) {
-        self.health.good = self.health.good.saturating_add(1);
+        // As a saturating addition, without writing what stays.
+        if let Some(good) = self.health.good.checked_add(1) {
+            self.health.good = good;
+        }
         self.silence = Silence::Since(now_us);
     }
 
