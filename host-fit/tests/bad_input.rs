@@ -349,6 +349,9 @@ fn wrong_usage_ends_with_status_2() {
         "fit log.csv --stage stage.toml --out ./stage.toml",
         "fit log.csv --stage stage.toml --out p.bin --json p.bin",
         "inspect log.csv --json log.csv",
+        "import bus.log log.csv --stage stage.toml --out log.csv",
+        "import log.csv ifm.csv --stage stage.toml --out ./log.csv",
+        "live --can no-such-bus log.csv --record log.csv",
     ] {
         assert_eq!(bench.run(arguments).status.code(), Some(2), "{arguments}");
     }

@@ -13,6 +13,7 @@ use crate::error::HostError;
 use crate::import::ImportArgs;
 use crate::interrupt;
 use crate::least_squares::starts::LeastSquares;
+use crate::live::LiveArgs;
 use crate::log::{LogReading, ReadOptions, ReferenceUse};
 use crate::output::write_atomically;
 use crate::parameters::Parameters;
@@ -70,7 +71,7 @@ pub fn main() -> ExitCode {
         Command::Eval(args) => eval::run(args),
         Command::Decode(args) => decode::run(args),
         Command::Inspect(args) => inspect::run(args),
-        Command::Live(args) => crate::live::run(args).map_err(HostError::from),
+        Command::Live(args) => live(args),
         Command::Replay(args) => replay(args),
         Command::Export(args) => export::run(args),
         Command::Compare(args) => compare::run(args),
@@ -83,6 +84,12 @@ pub fn main() -> ExitCode {
             ExitCode::from(error.exit_status())
         }
     }
+}
+
+/// Decodes a bus. The record is made anew, so it must not be the blob.
+fn live(args: &LiveArgs) -> Result<(), HostError> {
+    keep_apart(&[args.record.as_deref()], &[&args.params])?;
+    Ok(crate::live::run(args)?)
 }
 
 /// Plays a log onto a bus and says how it went.
@@ -101,6 +108,10 @@ fn replay(args: &ReplayArgs) -> Result<(), HostError> {
 
 /// Joins a record of the bus and a reference, and says how it went.
 fn import(args: &ImportArgs) -> Result<(), HostError> {
+    keep_apart(
+        &[Some(&args.out)],
+        &[&args.bus, &args.reference, &args.stage],
+    )?;
     let report = crate::import::run(args)?;
     print(&format!("{report}wrote {}\n", args.out.display()))
 }

@@ -144,7 +144,11 @@ impl Collector {
         let taken = self.receiver.take(&stamped.frame, stamped.time_us as u32);
         self.restarted |= matches!(
             taken.fault,
-            Some(BusFault::SenderRestarted | BusFault::WrongSequence { .. })
+            Some(
+                BusFault::SenderRestarted
+                    | BusFault::WrongSequence { .. }
+                    | BusFault::TicksLost { .. }
+            )
         );
         if let Some(tick) = taken.tick {
             self.tick(&tick, stamped.time_us);
@@ -170,6 +174,8 @@ impl Collector {
         }
         let before = self.reading.ticks.last().map_or(0, |t| t.sequence);
         let age_us = (now_us as u32).wrapping_sub(raw.time_us);
+        // The record's clock may step back within a tick.
+        let age_us = if age_us > u32::MAX / 2 { 0 } else { age_us };
         self.reading.ticks.push(BusTick {
             sequence: before + u64::from(ahead),
             follows: !core::mem::take(&mut self.restarted),

@@ -33,13 +33,18 @@ fn hall(t_us: f64) -> [i32; 3] {
 
 /// The record of the bus: jitter of up to 200 us, `skip` decides which frames are missing.
 fn candump(skip: impl Fn(u32, usize) -> bool) -> String {
+    candump_numbered(skip, |n| n + 5)
+}
+
+/// As [`candump`], with the sensor node's own numbers of the ticks.
+fn candump_numbered(skip: impl Fn(u32, usize) -> bool, number: impl Fn(u32) -> u32) -> String {
     let mut text = String::new();
     for n in 0..TICKS {
         let t_us = 2_000.0 * f64::from(n) + 300.0;
         let frame = RawFrame {
             hall: hall(t_us),
             capacitive: [100, 101, 99],
-            sequence: n + 5,
+            sequence: number(n),
             time_us: t_us as u32,
         };
         let jitter_us = f64::from(n * 7919 % 201) - 100.0;
@@ -157,6 +162,45 @@ fn missing_frames_and_repeated_samples_are_reported_and_leave_gaps() {
     // Three ticks are gone; the one after them only resumes the sequence.
     assert_eq!((report.bus.gaps, report.bus.ticks_missing), (2, 5));
     assert_eq!(report.join.rows, read_log(&args).rows.len());
+}
+
+#[test]
+fn a_clock_that_steps_back_within_a_tick_moves_no_time() {
+    let bus = candump(|_, _| false);
+    let mut lines: Vec<String> = bus.lines().map(str::to_owned).collect();
+    let at = 300
+        + lines[300..]
+            .iter()
+            .position(|l| l.contains(" 100#"))
+            .expect("a Hall frame");
+    let hall = LogLine::parse(&lines[at]).expect("sound").stamped();
+    let gaps = LogLine::parse(&lines[at + 1]).expect("sound").stamped();
+    let early = LogLine {
+        time_us: hall.time_us - 40,
+        interface: "can0",
+        frame: gaps.frame,
+    };
+    lines[at + 1] = early.to_string();
+    let (_folder, args) = files(&lines.join("\n"), &reference());
+    let report = run(&args).expect("imported");
+    assert!(
+        report.smoothing.max_us < 500.0,
+        "{}",
+        report.smoothing.max_us
+    );
+    assert!(report.join.rows > 740);
+}
+
+/// The node's count is sent modulo 2^20: back to 0 from more than half of that looks like a
+/// jump forward, and here the time frame that tells it is used 16 ticks after the codes are.
+#[test]
+fn a_node_that_starts_again_after_a_long_time_bends_no_line() {
+    let number = |n| if n < 300 { 599_840 + n } else { n - 300 };
+    let (_folder, args) = files(&candump_numbered(|_, _| false, number), &reference());
+    let report = run(&args).expect("imported");
+    let max_us = report.smoothing.max_us;
+    assert!(max_us < 500.0, "{max_us}");
+    assert!(report.join.rows > 735, "{}", report.join.rows);
 }
 
 #[test]
