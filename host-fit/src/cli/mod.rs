@@ -103,7 +103,13 @@ fn replay(args: &ReplayArgs) -> Result<(), HostError> {
         done.elapsed_s,
         done.logged_s / done.elapsed_s,
         done.late_max_s * 1e3
-    ))
+    ))?;
+    if interrupt::requested() {
+        return Err(HostError::Interrupted {
+            kept: "the rows above were sent, the rest of the log was not".to_owned(),
+        });
+    }
+    Ok(())
 }
 
 /// Joins a record of the bus and a reference, and says how it went.
