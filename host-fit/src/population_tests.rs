@@ -88,6 +88,25 @@ fn the_cost_of_a_solution_is_that_of_its_own_parameters_and_zero_deviations() {
 }
 
 #[test]
+fn a_gain_outside_its_box_is_brought_back_with_the_cost_that_it_has_there() {
+    let (mut stage, dataset) = (stage(), dataset(20, 5));
+    // The truth is 0.87.
+    stage.search.eta[0].low = 0.9;
+    let problem = problem(&dataset, &stage, ModelKind::M31);
+    let found = solver("shtlbo")
+        .solve(&problem, &options(Projection::Linear, 300))
+        .expect("a fit");
+    assert_eq!(found.parameters.eta()[0], 0.9);
+    assert!(!found.at_limit.is_empty());
+    let again = crate::objective::sample::fitness_by_the_runtime(
+        &problem,
+        &found.parameters,
+        &found.delta_m,
+    );
+    assert!((again / problem.fitness(found.cost) - 1.0).abs() < 1e-9);
+}
+
+#[test]
 fn a_warm_start_begins_at_the_known_parameters() {
     let (stage, dataset) = (stage(), dataset(20, 5));
     let problem = problem(&dataset, &stage, ModelKind::M31);

@@ -159,3 +159,38 @@ fn p_is_updated_at_the_end_of_each_learning_period() {
     let [a, b, _, _] = course(1);
     assert!(a != P_START && b != a);
 }
+
+/// "Once p updates, ns1, ns2, nf1 and nf2 would be reset" (section 4.2).
+#[test]
+fn an_update_of_p_forgets_what_came_before_it() {
+    let (teacher, learner) = hybrid_scripts();
+    let still = || Script::new(&[0.9, 0.0], &[1.0]);
+    // After the first generation 1.5, 4, 3 and p = 0.65.
+    let second = [
+        (Phase::Teacher, 0, Script::new(&[0.9], &[1.0])), // the teacher itself: fails
+        (Phase::Teacher, 1, Script::new(&[0.9], &[-1.0])), // mutates: 4 - 2.5 = 1.5, kept
+        (Phase::Teacher, 2, uniform(&[0.1, 0.2, 0.0])),   // learns nothing: 3, fails
+        (Phase::Learner, 0, still()),                     // mutates with 1 (1.5): fails
+        (Phase::Learner, 1, still()),                     // mutates with 0 (1.5): fails
+        (Phase::Learner, 2, uniform(&[0.1, 0.0, 0.0])),   // learns nothing: 3, fails
+    ];
+    let first = [(Phase::Teacher, teacher), (Phase::Learner, learner)];
+    let first = first.into_iter().flat_map(|(phase, scripts)| {
+        let keyed = move |(k, script)| ((1, phase, k), script);
+        scripts.into_iter().enumerate().map(keyed)
+    });
+    let second = second.map(|(phase, k, script)| ((2, phase, k), script));
+    let function = Known::new(1, 0.0, 100.0, |x| x[0]);
+    let individuals = START.map(|x| vec![x]);
+    let start = Start {
+        population: 3,
+        individuals: &individuals,
+    };
+    let mut evaluator = Evaluator::new(&function);
+    let scripts = Scripts(first.chain(second).collect());
+    let mut method = Tlbo::new(Variant::Shtlbo, 1, scripts, &mut evaluator, &start);
+    method.generation(1, &mut evaluator);
+    method.generation(2, &mut evaluator);
+    // Of the second generation alone only mutation improved anything.
+    assert_eq!(Method::<Known>::p(&method), Some(0.05));
+}
