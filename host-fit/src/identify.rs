@@ -274,7 +274,8 @@ pub fn check_determined(
         return Ok(());
     }
     let mut remedy = format!(
-        "record independent {}, with larger amplitude or more rows",
+        "record independent {}, with larger amplitude or more rows (or, if --solver named a search, it may have \
+         ended far from the best fit: take the default)",
         remedies.join(", ")
     );
     if uncertainty

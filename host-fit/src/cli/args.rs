@@ -139,7 +139,8 @@ pub struct FitArgs {
     /// Measurement model.
     #[arg(long, value_enum, default_value = "auto")]
     pub model: ModelChoice,
-    /// Solver; see `host-fit fit --help` of this list, or leave the best to the program.
+    /// Solver. The default searches by SHTLBO and finishes by least squares, `lm` is least squares
+    /// alone, the others search only.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(crate::cli::solver_names()), default_value = crate::cli::DEFAULT_SOLVER)]
     pub solver: String,
     /// How much of the problem is solved in closed form.

@@ -7,7 +7,7 @@ use crate::compare::{Comparison, Run, compare};
 use crate::error::HostError;
 use crate::interrupt;
 use crate::log::{self, ReadOptions};
-use crate::output::{make_folder, write_atomically};
+use crate::output::{check_writable, make_folder, write_atomically};
 use crate::search::kind::SearchKind;
 use crate::stage::Stage;
 use std::io::{IsTerminal, Write};
@@ -16,6 +16,10 @@ use std::path::Path;
 /// Compares solvers and prints the table; with a folder, writes table, CSV and plots there.
 pub fn run(args: &CompareArgs) -> Result<(), HostError> {
     super::use_threads(args.threads);
+    if let Some(folder) = &args.out {
+        make_folder(folder)?;
+        check_writable(&folder.join("table.md"))?;
+    }
     let stage = Stage::from_file(&args.stage)?;
     let log = log::read(&args.logs, &stage, &ReadOptions::default())?;
     let interrupted = interrupt::watch();
