@@ -4,15 +4,15 @@
 //! Prints `RESULT key=value` lines, medians of several runs.
 
 use host_fit::fit::{FitSettings, fit};
-use host_fit::least_squares::coordinates::{Coordinates, Gains};
-use host_fit::least_squares::normal::{Point, best_gain};
-use host_fit::least_squares::scatter::{Offset, Q, Ratios, U, mean, regressors, scatter};
-use host_fit::least_squares::starts::LeastSquares;
-use host_fit::log;
+use host_fit::input::log;
+use host_fit::input::stage::Stage;
 use host_fit::problem::Problem;
-use host_fit::solver::{Projection, Solver, SolverOptions};
-use host_fit::stage::Stage;
-use host_fit::train::{Draw, draw_rows};
+use host_fit::problem::draw::{Draw, draw_rows};
+use host_fit::solve::least_squares::coordinates::{Coordinates, Gains};
+use host_fit::solve::least_squares::multistart::LeastSquares;
+use host_fit::solve::least_squares::normal::{Point, best_gain};
+use host_fit::solve::least_squares::scatter::{Offset, Q, Ratios, U, mean, regressors, scatter};
+use host_fit::solve::{Projection, Solver, SolverOptions};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DVector, Dyn, OVector, Owned, U18};
 use runtime::ModelKind;
@@ -131,11 +131,11 @@ fn compare(name: &str, problem: &Problem, runs: usize) {
 }
 
 fn main() {
-    let stage = Stage::from_toml(host_fit::shipped::STAGE_TOML, "stage.toml".as_ref())
+    let stage = Stage::from_toml(host_fit::input::shipped::STAGE_TOML, "stage.toml".as_ref())
         .expect("the shipped stage");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("log.csv.gz");
-    std::fs::write(&path, host_fit::shipped::LOG_GZ).expect("written");
+    std::fs::write(&path, host_fit::input::shipped::LOG_GZ).expect("written");
     let read = || {
         log::read(
             std::slice::from_ref(&path),

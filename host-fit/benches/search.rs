@@ -7,19 +7,19 @@
 //! experiment, its bounds and one individual with its fitness into DIR, for other programs to
 //! be measured on the same problem, and prints what this one does with it.
 
-use host_fit::least_squares::starts::LeastSquares;
-use host_fit::log::{ReadOptions, read, read_bytes};
-use host_fit::objective::delta::DeltaCost;
-use host_fit::objective::form::Form;
-use host_fit::objective::full::FullCost;
-use host_fit::objective::linear::LinearCost;
+use host_fit::input::log::{ReadOptions, read, read_bytes};
+use host_fit::input::stage::Stage;
 use host_fit::problem::Problem;
-use host_fit::search::cost::CostFunction;
-use host_fit::search::kind::{SearchKind, Settings};
-use host_fit::search::run::{Outcome, Start, StopCriteria};
-use host_fit::solver::{Projection, Solver, SolverOptions};
-use host_fit::stage::Stage;
-use host_fit::train::{Draw, draw_rows};
+use host_fit::problem::draw::{Draw, draw_rows};
+use host_fit::solve::least_squares::multistart::LeastSquares;
+use host_fit::solve::objective::delta::DeltaCost;
+use host_fit::solve::objective::form::Form;
+use host_fit::solve::objective::full::FullCost;
+use host_fit::solve::objective::linear::LinearCost;
+use host_fit::solve::search::cost::CostFunction;
+use host_fit::solve::search::kind::{SearchKind, Settings};
+use host_fit::solve::search::run::{Outcome, Start, StopCriteria};
+use host_fit::solve::{Projection, Solver, SolverOptions};
 use runtime::ModelKind;
 use std::error::Error;
 use std::fmt::Write;
@@ -61,7 +61,7 @@ fn time_us(repeats: usize, mut call: impl FnMut()) -> (f64, f64) {
 
 /// An individual inside the middle half of the box.
 fn inside(cost: &impl CostFunction, number: usize) -> Vec<f64> {
-    let place = |(j, range): (usize, &host_fit::stage::Range)| {
+    let place = |(j, range): (usize, &host_fit::input::stage::Range)| {
         let share = 0.25 + 0.5 * ((number * 31 + j * 17) % 97) as f64 / 96.0;
         range.low + share * range.width()
     };
@@ -236,8 +236,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         (stage, reading)
     } else {
         let shipped = Path::new("the log that ships with the program");
-        let stage = Stage::from_toml(host_fit::shipped::STAGE_TOML, shipped)?;
-        let reading = read_bytes(host_fit::shipped::LOG_GZ, shipped, &stage, &options)?;
+        let stage = Stage::from_toml(host_fit::input::shipped::STAGE_TOML, shipped)?;
+        let reading = read_bytes(host_fit::input::shipped::LOG_GZ, shipped, &stage, &options)?;
         (stage, reading)
     };
     // Lives as long as the program.

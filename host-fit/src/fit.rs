@@ -3,16 +3,16 @@
 //! dataset -> rows drawn -> problem -> solver -> standard errors -> parameter set -> judgement.
 //! Nothing is written here.
 
-use crate::dataset::Dataset;
-use crate::identify::{FitFailure, check_described, check_determined, check_motion};
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::judge::identify::{FitFailure, check_described, check_determined, check_motion};
+use crate::judge::statistics::AxisError;
+use crate::judge::uncertainty::{Uncertainty, uncertainty};
 use crate::judge::{Judgement, Zeros, judge};
-use crate::parameters::{ParameterId, Parameters};
 use crate::problem::Problem;
-use crate::solver::{Solution, SolveError, Solver, SolverOptions};
-use crate::stage::Stage;
-use crate::statistics::AxisError;
-use crate::train::{Draw, draw_rows};
-use crate::uncertainty::{Uncertainty, uncertainty};
+use crate::problem::draw::{Draw, draw_rows};
+use crate::problem::parameters::{ParameterId, Parameters};
+use crate::solve::{Solution, SolveError, Solver, SolverOptions};
 use runtime::calibration::Origin;
 use runtime::parameters::{FitRecord, ParameterError, Text};
 use runtime::{Calibration, ModelKind, ParameterSet};

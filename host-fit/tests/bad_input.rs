@@ -127,7 +127,7 @@ fn stage_files_with_missing_or_absurd_values_are_refused() {
     ] {
         let bench = Bench::new();
         bench.write("log.csv", log());
-        let stage = host_fit::shipped::STAGE_TOML;
+        let stage = host_fit::input::shipped::STAGE_TOML;
         assert!(stage.contains(from), "{from}");
         bench.write("stage.toml", stage.replacen(from, to, 1));
         bench.bad(FIT, 3, &parts);

@@ -24,7 +24,7 @@ fn check_errors(errors: &Value) {
 #[test]
 fn fit_eval_decode_and_inspect_agree_on_the_shipped_log() {
     let bench = Bench::new();
-    bench.write("log.csv.gz", host_fit::shipped::LOG_GZ);
+    bench.write("log.csv.gz", host_fit::input::shipped::LOG_GZ);
     bench.good("fit log.csv.gz --stage stage.toml --out p.bin --json fit.json --report report --serial S7 --created 2026-01-02");
     let fit = bench.json("fit.json");
     for (key, value) in [("model", "31"), ("project", "linear"), ("serial", "S7")] {
@@ -66,7 +66,10 @@ fn fit_eval_decode_and_inspect_agree_on_the_shipped_log() {
     );
     let poses = String::from_utf8(bench.read("pose.csv")).expect("text");
     assert_eq!(poses.lines().count(), 57001);
-    assert_eq!(poses.lines().next(), Some(host_fit::pose_file::HEADER));
+    assert_eq!(
+        poses.lines().next(),
+        Some(host_fit::output::pose_file::HEADER)
+    );
 
     bench.good("inspect p.bin --json inspect.json");
     let inspect = bench.json("inspect.json");
@@ -81,7 +84,7 @@ fn fit_eval_decode_and_inspect_agree_on_the_shipped_log() {
 #[test]
 fn blob_bytes_do_not_depend_on_threads_and_follow_the_seed() {
     let bench = Bench::new();
-    bench.write("log.csv.gz", host_fit::shipped::LOG_GZ);
+    bench.write("log.csv.gz", host_fit::input::shipped::LOG_GZ);
     for (out, arguments) in [
         ("one.bin", "--threads 1"),
         ("two.bin", "--threads 2"),

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Bench, stderr, thinned_log, with_cell};
-use host_fit::shipped::STAGE_TOML;
+use host_fit::input::shipped::STAGE_TOML;
 
 fn log() -> String {
     thinned_log(20, |_| true)

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 fn bench() -> Bench {
     let bench = Bench::new();
-    bench.write("log.csv.gz", host_fit::shipped::LOG_GZ);
+    bench.write("log.csv.gz", host_fit::input::shipped::LOG_GZ);
     bench
 }
 

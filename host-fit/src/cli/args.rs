@@ -1,12 +1,12 @@
 //! The command line.
 
 use super::export::ExportArgs;
-use crate::import::ImportArgs;
-use crate::live::LiveArgs;
-use crate::replay::ReplayArgs;
-use crate::search::kind::SearchKind;
-use crate::solver::Projection;
-use crate::train::Draw;
+use crate::bus::import::ImportArgs;
+use crate::bus::live::LiveArgs;
+use crate::bus::replay::ReplayArgs;
+use crate::problem::draw::Draw;
+use crate::solve::Projection;
+use crate::solve::search::kind::SearchKind;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use runtime::ModelKind;

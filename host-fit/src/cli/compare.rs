@@ -1,15 +1,15 @@
 //! `host-fit compare`.
 
 use super::args::{CompareArgs, Train};
+use crate::cli::error::HostError;
 use crate::compare::curves::{Course, history_csv, plot, runs_csv};
 use crate::compare::summary::{summaries, table};
 use crate::compare::{Comparison, Run, compare};
-use crate::error::HostError;
+use crate::input::log::{self, ReadOptions};
+use crate::input::stage::Stage;
 use crate::interrupt;
-use crate::log::{self, ReadOptions};
 use crate::output::{check_writable, make_folder, write_atomically};
-use crate::search::kind::SearchKind;
-use crate::stage::Stage;
+use crate::solve::search::kind::SearchKind;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 

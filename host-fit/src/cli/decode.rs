@@ -1,12 +1,12 @@
 //! `host-fit decode`.
 
 use super::args::DecodeArgs;
-use crate::blob_file;
-use crate::error::HostError;
-use crate::log::{self, ReadOptions};
+use crate::cli::error::HostError;
+use crate::input::log::{self, ReadOptions};
+use crate::input::stage::Stage;
 use crate::output;
-use crate::pose_file::{self, StatusCounts};
-use crate::stage::Stage;
+use crate::output::blob_file;
+use crate::output::pose_file::{self, StatusCounts};
 use runtime::servo::OnInvalid;
 
 /// Decodes a log into a pose file.

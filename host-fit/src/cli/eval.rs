@@ -1,13 +1,13 @@
 //! `host-fit eval`.
 
 use super::args::{DeltaChoice, EvalArgs};
-use crate::blob_file;
-use crate::error::HostError;
+use crate::cli::error::HostError;
+use crate::input::log;
+use crate::input::stage::Stage;
 use crate::judge::{Zeros, judge};
-use crate::log;
+use crate::output::blob_file;
 use crate::report::json::of_eval;
 use crate::report::text;
-use crate::stage::Stage;
 use std::path::PathBuf;
 use std::time::Instant;
 

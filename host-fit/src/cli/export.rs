@@ -1,8 +1,8 @@
 //! `host-fit export`.
 
-use crate::blob_file;
-use crate::error::HostError;
-use crate::export::{ExportFormat, Place, SLOTS, export};
+use crate::cli::error::HostError;
+use crate::output::blob_file;
+use crate::output::export::{ExportFormat, Place, SLOTS, export};
 use crate::output::write_atomically;
 use clap::{Args, ValueEnum};
 use runtime::blob::MAX_BYTES;
@@ -53,7 +53,7 @@ pub fn run(args: &ExportArgs) -> Result<(), HostError> {
     let mut buffer = [0; MAX_BYTES];
     let blob = set
         .to_bytes(&mut buffer)
-        .map_err(crate::export::ExportError::Blob)?;
+        .map_err(crate::output::export::ExportError::Blob)?;
     let place = match (args.address, args.slot) {
         (Some(address), _) => Place::Address(address),
         (None, slot) => Place::Slot(slot.unwrap_or(0)),

@@ -1,16 +1,20 @@
 //! `host-fit fit`.
 
 use super::args::{BadRowsChoice, FitArgs, Train};
-use crate::error::HostError;
+use crate::cli::error::HostError;
 use crate::fit::{Fit, FitError, FitSettings, fit};
-use crate::log::{BadRows, LogReading, ReadOptions};
-use crate::parameters::Parameters;
-use crate::population::default_size;
+use crate::input::log;
+use crate::input::log::{BadRows, LogReading, ReadOptions};
+use crate::input::stage::Stage;
+use crate::interrupt;
+use crate::judge;
+use crate::output;
+use crate::output::blob_file;
+use crate::problem::parameters::Parameters;
 use crate::report::json::{Report, of_fit};
 use crate::report::{html, plots, text};
-use crate::solver::{SolveError, SolverOptions};
-use crate::stage::Stage;
-use crate::{blob_file, interrupt, judge, log, output};
+use crate::solve::search_solver::default_size;
+use crate::solve::{SolveError, SolverOptions};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

@@ -1,10 +1,10 @@
 //! `host-fit inspect`.
 
 use super::args::InspectArgs;
-use crate::blob_file;
-use crate::error::HostError;
+use crate::cli::error::HostError;
 use crate::judge::parameters_of;
-use crate::parameters::COUNT;
+use crate::output::blob_file;
+use crate::problem::parameters::COUNT;
 use crate::report::json::parameters;
 use runtime::ParameterSet;
 use serde_json::json;

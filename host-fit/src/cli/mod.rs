@@ -4,25 +4,26 @@ pub mod args;
 mod compare;
 mod decode;
 mod demo;
+mod error;
 mod eval;
 pub mod export;
 mod fit;
 mod inspect;
 
-use crate::error::HostError;
-use crate::import::ImportArgs;
+use crate::bus::import::ImportArgs;
+use crate::bus::live::LiveArgs;
+use crate::bus::replay::ReplayArgs;
+use crate::cli::error::HostError;
+use crate::input::log::{LogReading, ReadOptions, ReferenceUse};
+use crate::input::stage::Stage;
 use crate::interrupt;
-use crate::least_squares::starts::LeastSquares;
-use crate::live::LiveArgs;
-use crate::log::{LogReading, ReadOptions, ReferenceUse};
 use crate::output::write_atomically;
-use crate::parameters::Parameters;
-use crate::population::{self, PopulationSolver};
-use crate::replay::ReplayArgs;
+use crate::problem::parameters::Parameters;
 use crate::report::json::Circumstances;
-use crate::search::kind::SearchKind;
-use crate::solver::Solver;
-use crate::stage::Stage;
+use crate::solve::Solver;
+use crate::solve::least_squares::multistart::LeastSquares;
+use crate::solve::search::kind::SearchKind;
+use crate::solve::search_solver::{self, PopulationSolver};
 use args::{Cli, Command};
 use clap::Parser;
 use runtime::ParameterSet;
@@ -32,7 +33,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 /// The solver that gives the best result: SHTLBO, finished by least squares.
-pub const DEFAULT_SOLVER: &str = population::FINISHED;
+pub const DEFAULT_SOLVER: &str = search_solver::FINISHED;
 
 /// Names of the solvers.
 pub fn solver_names() -> Vec<&'static str> {
@@ -89,12 +90,12 @@ pub fn main() -> ExitCode {
 /// Decodes a bus. The record is made anew, so it must not be the blob.
 fn live(args: &LiveArgs) -> Result<(), HostError> {
     keep_apart(&[args.record.as_deref()], &[&args.params])?;
-    Ok(crate::live::run(args)?)
+    Ok(crate::bus::live::run(args)?)
 }
 
 /// Plays a log onto a bus and says how it went.
 fn replay(args: &ReplayArgs) -> Result<(), HostError> {
-    let done = crate::replay::run(args)?;
+    let done = crate::bus::replay::run(args)?;
     print(&format!(
         "{} rows in {} frames, {:.3} s of the log in {:.3} s ({:.1} times real time), at most {:.1} ms late\n",
         done.rows,
@@ -118,7 +119,7 @@ fn import(args: &ImportArgs) -> Result<(), HostError> {
         &[Some(&args.out)],
         &[&args.bus, &args.reference, &args.stage],
     )?;
-    let report = crate::import::run(args)?;
+    let report = crate::bus::import::run(args)?;
     print(&format!("{report}wrote {}\n", args.out.display()))
 }
 

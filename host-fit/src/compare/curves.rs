@@ -3,8 +3,8 @@
 use super::summary::Spread;
 use super::{ARRIVED, EXACT, Run};
 use crate::report::plots::PlotError;
-use crate::search::kind::SearchKind;
-use crate::solver::Projection;
+use crate::solve::Projection;
+use crate::solve::search::kind::SearchKind;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use std::fmt::Write;

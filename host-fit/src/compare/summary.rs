@@ -1,8 +1,8 @@
 //! Medians and spreads over the seeds, and the table of a comparison.
 
 use super::{ARRIVED, EXACT, LEAST_SQUARES, Run};
-use crate::search::kind::SearchKind;
-use crate::solver::Projection;
+use crate::solve::Projection;
+use crate::solve::search::kind::SearchKind;
 use std::fmt::Write;
 
 /// Median, smallest and largest of some numbers.

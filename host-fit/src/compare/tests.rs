@@ -1,8 +1,8 @@
 use super::curves::{Course, history_csv, plot, runs_csv};
 use super::summary::{Spread, summaries, table};
 use super::*;
-use crate::identify::FitFailure;
-use crate::objective::sample;
+use crate::judge::identify::FitFailure;
+use crate::solve::objective::sample;
 
 fn comparison() -> Comparison {
     Comparison {

@@ -1,11 +1,11 @@
 //! The machine-readable report of `fit`, `eval` and `inspect`.
 
-use crate::dataset::Dataset;
 use crate::fit::Fit;
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::judge::statistics::PoseError;
 use crate::judge::{Judgement, Zeros};
-use crate::parameters::{COUNT, ParameterId, Parameters};
-use crate::stage::Stage;
-use crate::statistics::PoseError;
+use crate::problem::parameters::{COUNT, ParameterId, Parameters};
 use runtime::ParameterSet;
 use runtime::geometry::ProbeCoordinates;
 use serde::Serialize;
@@ -43,7 +43,7 @@ pub struct Errors {
 impl From<&PoseError> for Errors {
     fn from(error: &PoseError) -> Self {
         let [x, y, rz] = error.axes;
-        let linear = |a: crate::statistics::AxisError| Micrometres {
+        let linear = |a: crate::judge::statistics::AxisError| Micrometres {
             rmse_um: a.rms * 1e6,
             peak_um: a.peak * 1e6,
         };

@@ -1,6 +1,6 @@
 //! Plots of a calibration as SVG.
 
-use crate::dataset::Dataset;
+use crate::input::dataset::Dataset;
 use plotters::prelude::*;
 
 /// Why a plot could not be drawn.

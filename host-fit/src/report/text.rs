@@ -1,7 +1,7 @@
 //! Tables for a terminal.
 
-use crate::parameters::{COUNT, ParameterId, Parameters, Quantity};
-use crate::statistics::PoseError;
+use crate::judge::statistics::PoseError;
+use crate::problem::parameters::{COUNT, ParameterId, Parameters, Quantity};
 use std::fmt::Write;
 
 /// Errors by axis, as Tables 2, 4 and 8 of the paper show them; `paper` stands beside them as

@@ -16,7 +16,7 @@ impl Bench {
         let bench = Self {
             folder: tempfile::tempdir().expect("a folder"),
         };
-        bench.write("stage.toml", host_fit::shipped::STAGE_TOML);
+        bench.write("stage.toml", host_fit::input::shipped::STAGE_TOML);
         bench
     }
 
@@ -106,7 +106,7 @@ pub fn stdout(output: &Output) -> String {
 /// The shipped log as text.
 pub fn shipped_log() -> String {
     let mut text = String::new();
-    flate2::read::GzDecoder::new(host_fit::shipped::LOG_GZ)
+    flate2::read::GzDecoder::new(host_fit::input::shipped::LOG_GZ)
         .read_to_string(&mut text)
         .expect("the shipped log");
     text

@@ -1,9 +1,10 @@
 //! Compares the words of a target with those of the host. See `compare --help`.
 
 use clap::{Parser, Subcommand};
-use host_fit::log::{self, ReadOptions};
-use host_fit::stage::Stage;
-use host_fit::{pose_file, shipped};
+use host_fit::input::log::{self, ReadOptions};
+use host_fit::input::shipped;
+use host_fit::input::stage::Stage;
+use host_fit::output::pose_file;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use runtime::blob::MAX_BYTES;

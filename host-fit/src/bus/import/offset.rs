@@ -1,0 +1,225 @@
+//! The offset between the clocks, by the motion that both saw: at the right one each Hall
+//! signal is what the designed probe would read at the reference pose, times a sensitivity.
+//!
+//! For a trial offset the signal of each probe is fitted by that prediction, with a factor and
+//! a constant for each movement. A grid of one servo period finds the offset that explains the
+//! most motion; golden section then finds where the least is left over. (A fit by all three
+//! axes of the reference would also explain a run shifted by a whole movement: each movement
+//! moves one axis only, and some matrix turns any axis into any other.)
+
+use super::ImportError;
+use super::bus_log::BusTick;
+use super::join::{At, Cursor};
+use super::reference::{Reference, Sample};
+use crate::input::log::layout::Quantity;
+use crate::input::stage::Stage;
+use runtime::model::dot;
+
+/// The offset between the clocks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Offset {
+    /// Time of the bus less time of the reference, us.
+    pub us: f64,
+    /// Share of the Hall signals' motion that the reference explains, if it was estimated.
+    pub explained: Option<f64>,
+}
+
+/// Ticks of the coarse search, at most.
+const COARSE_TICKS: usize = 4_000;
+
+/// Share that must be explained: signals of another run reach a third by chance.
+const EXPLAINED_MIN: f64 = 0.6;
+
+/// Width at which golden section stops, us.
+const WIDTH_US: f64 = 0.5;
+
+/// Finds the offset within `search_us` of where both records start together.
+///
+/// # Errors
+/// [`ImportError::NoOffset`].
+pub fn estimate(
+    ticks: &[BusTick],
+    times_us: &[f64],
+    reference: &Reference,
+    stage: &Stage,
+    search_us: f64,
+) -> Result<Offset, ImportError> {
+    let step_us = stage.servo_period_s * 1e6;
+    let starts = times_us.first().zip(reference.samples.first());
+    let centre_us = starts.map_or(0.0, |(bus, reference)| bus - reference.t_us);
+    let predicted = predicted(reference, stage);
+    let points: Vec<Point> = ticks
+        .iter()
+        .zip(times_us)
+        .map(|(tick, t_us)| Point {
+            t_us: *t_us,
+            signal: tick.hall.map(f64::from),
+        })
+        .collect();
+    let every = points.len().div_ceil(COARSE_TICKS).max(1);
+    let coarse: Vec<Point> = points.iter().step_by(every).copied().collect();
+    let trial = |points: &[Point], us: f64| explain(points, &predicted, us, 2.0 * step_us);
+    let steps = (search_us / step_us).ceil().clamp(1.0, 1e6) as i64;
+    let mut best = (f64::NEG_INFINITY, centre_us);
+    for k in -steps..=steps {
+        let us = centre_us + k as f64 * step_us;
+        let explained = trial(&coarse, us).explained;
+        if explained > best.0 {
+            best = (explained, us);
+        }
+    }
+    let left_over = |us| 1.0 - trial(&points, us).share();
+    let us = golden(best.1 - step_us, best.1 + step_us, left_over);
+    let explained = trial(&points, us).share();
+    if explained.is_nan() || explained < EXPLAINED_MIN {
+        return Err(ImportError::NoOffset {
+            percent: 100.0 * explained.max(0.0),
+            least_percent: 100.0 * EXPLAINED_MIN,
+        });
+    }
+    Ok(Offset {
+        us,
+        explained: Some(explained),
+    })
+}
+
+/// The samples with what the designed probes would read, in m, in place of their values.
+fn predicted(reference: &Reference, stage: &Stage) -> Vec<Sample> {
+    let scale = reference
+        .quantities
+        .map(|quantity| stage.log.column(quantity).scale);
+    let plane = stage.designed.geometry([0.0; 3]).plane_rows();
+    let beams = reference.quantities == Quantity::BEAMS;
+    let at = |sample: &Sample| -> [f64; 3] {
+        let [a, b, c] = sample.values;
+        let [x, second, third] = [a * scale[0], b * scale[1], c * scale[2]];
+        let pose = if beams {
+            let rz = ((second - third) / stage.y_baseline_m).atan();
+            [x, 0.5 * (second + third), rz]
+        } else {
+            [x, second, third]
+        };
+        plane.map(|row| dot(&row, pose))
+    };
+    let samples = reference.samples.iter();
+    samples
+        .map(|sample| Sample {
+            values: at(sample),
+            ..*sample
+        })
+        .collect()
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    t_us: f64,
+    signal: [f64; 3],
+}
+
+/// Sums of one probe over one movement.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    n: f64,
+    s: f64,
+    p: f64,
+    ss: f64,
+    sp: f64,
+    pp: f64,
+}
+
+impl Sums {
+    fn add(&mut self, s: f64, p: f64) {
+        self.n += 1.0;
+        self.s += s;
+        self.p += p;
+        self.ss += s * s;
+        self.sp += s * p;
+        self.pp += p * p;
+    }
+
+    /// Adds a movement to the whole, its means taken out.
+    fn take_in(&mut self, movement: &Self) {
+        if movement.n > 0.0 {
+            self.n += movement.n;
+            self.ss += movement.ss - movement.s * movement.s / movement.n;
+            self.sp += movement.sp - movement.s * movement.p / movement.n;
+            self.pp += movement.pp - movement.p * movement.p / movement.n;
+        }
+    }
+}
+
+/// What the prediction explains of the signals' motion, in codes squared.
+#[derive(Clone, Copy, Debug, Default)]
+struct Explained {
+    explained: f64,
+    motion: f64,
+}
+
+impl Explained {
+    fn share(&self) -> f64 {
+        if self.motion > 0.0 {
+            self.explained / self.motion
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Fits the points that have a reference at an offset.
+fn explain(points: &[Point], predicted: &[Sample], offset_us: f64, tolerance_us: f64) -> Explained {
+    let mut cursor = Cursor::new(predicted);
+    let (mut whole, mut sums) = ([Sums::default(); 3], [Sums::default(); 3]);
+    let mut current = None;
+    let take_in = |whole: &mut [Sums; 3], sums: &[Sums; 3]| {
+        for (whole, sums) in whole.iter_mut().zip(sums) {
+            whole.take_in(sums);
+        }
+    };
+    for point in points {
+        let at = cursor.at(point.t_us - offset_us, tolerance_us);
+        let At::Found {
+            movement, values, ..
+        } = at
+        else {
+            continue;
+        };
+        if current != Some(movement) {
+            take_in(&mut whole, &sums);
+            sums = Default::default();
+            current = Some(movement);
+        }
+        for ((sums, s), p) in sums.iter_mut().zip(point.signal).zip(values) {
+            sums.add(s, p);
+        }
+    }
+    take_in(&mut whole, &sums);
+    let mut all = Explained::default();
+    for probe in &whole {
+        all.motion += probe.ss;
+        // A probe that reads against its designed sense explains nothing.
+        if probe.sp > 0.0 && probe.pp > 0.0 {
+            all.explained += probe.sp * probe.sp / probe.pp;
+        }
+    }
+    all
+}
+
+/// The place of the smallest value between two ends of a valley.
+fn golden(mut low: f64, mut high: f64, value: impl Fn(f64) -> f64) -> f64 {
+    const RATIO: f64 = 0.618_033_988_749_894_9;
+    let mut a = high - RATIO * (high - low);
+    let mut b = low + RATIO * (high - low);
+    let (mut at_a, mut at_b) = (value(a), value(b));
+    while high - low > WIDTH_US {
+        if at_a < at_b {
+            (high, b, at_b) = (b, a, at_a);
+            a = high - RATIO * (high - low);
+            at_a = value(a);
+        } else {
+            (low, a, at_a) = (a, b, at_b);
+            b = low + RATIO * (high - low);
+            at_b = value(b);
+        }
+    }
+    (low + high) / 2.0
+}

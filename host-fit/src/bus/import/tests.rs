@@ -1,0 +1,301 @@
+use super::*;
+use crate::input::log::{self, ReadOptions};
+use hal_adapters::can::{BusFrame, sensor};
+use hal_adapters::candump::{LineError, LogLine};
+use runtime::RawFrame;
+use std::f64::consts::TAU;
+use std::fmt::Write;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Time of the bus less time of the reference, us: the bus counts from 1970.
+const OFFSET_US: f64 = 1_735_270_496_123_456.0;
+const MOVEMENT_US: f64 = 500_000.0;
+const TICKS: u32 = 750;
+
+/// X, Y, Rz at a time of the reference, m, m, rad: three movements, one axis each.
+fn pose(t_us: f64) -> [f64; 3] {
+    let axis = (t_us / MOVEMENT_US).floor() as usize;
+    let angle = TAU * (t_us / MOVEMENT_US).fract();
+    let mut q = [0.0; 3];
+    if let Some(x) = q.get_mut(axis) {
+        *x = 300e-6 * angle.sin();
+    }
+    q
+}
+
+/// What the probes read, in codes; probes as designed.
+fn hall(t_us: f64) -> [i32; 3] {
+    let [x, y, rz] = pose(t_us);
+    let s = [y + 0.1975 * rz, y - 0.1975 * rz, x - 0.36 * rz];
+    s.map(|s| (s / 6.25e-8).round() as i32)
+}
+
+/// The record of the bus: jitter of up to 200 us, `skip` decides which frames are missing.
+fn candump(skip: impl Fn(u32, usize) -> bool) -> String {
+    candump_numbered(skip, |n| n + 5)
+}
+
+/// As [`candump`], with the sensor node's own numbers of the ticks.
+fn candump_numbered(skip: impl Fn(u32, usize) -> bool, number: impl Fn(u32) -> u32) -> String {
+    let mut text = String::new();
+    for n in 0..TICKS {
+        let t_us = 2_000.0 * f64::from(n) + 300.0;
+        let frame = RawFrame {
+            hall: hall(t_us),
+            capacitive: [100, 101, 99],
+            sequence: number(n),
+            time_us: t_us as u32,
+        };
+        let jitter_us = f64::from(n * 7919 % 201) - 100.0;
+        let received_us = (t_us + OFFSET_US + jitter_us) as u64;
+        for (k, coded) in sensor::frames(Layout::Bits16, &frame).enumerate() {
+            if !skip(n, k) {
+                let line = LogLine {
+                    time_us: received_us + 135 * k as u64,
+                    interface: "can0",
+                    frame: BusFrame::from(coded),
+                };
+                writeln!(text, "{line}").expect("a string");
+            }
+        }
+    }
+    text
+}
+
+/// The interferometers' log at 1 kHz, beams in nm.
+fn reference() -> String {
+    let mut text = "movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm\n".to_owned();
+    for k in 0..1_500 {
+        let t_us = 1_000.0 * f64::from(k);
+        let [x, y, rz] = pose(t_us);
+        let half = 0.05 * rz.tan();
+        let [x, y1, y2] = [x, y + half, y - half].map(|m| m * 1e9);
+        let movement = (t_us / MOVEMENT_US) as i64;
+        writeln!(text, "{movement},{t_us},{x:.3},{y1:.3},{y2:.3}").expect("a string");
+    }
+    text
+}
+
+fn files(bus: &str, reference: &str) -> (TempDir, ImportArgs) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("bus.log"), bus).expect("written");
+    std::fs::write(path("ifm.csv"), reference).expect("written");
+    std::fs::write(path("stage.toml"), crate::input::shipped::STAGE_TOML).expect("written");
+    let args = ImportArgs {
+        bus: path("bus.log"),
+        reference: path("ifm.csv"),
+        stage: path("stage.toml"),
+        out: path("log.csv"),
+        tolerance_us: None,
+        offset_us: 0.0,
+        estimate_offset: true,
+        search_s: 0.4,
+        interface: None,
+        layout: LayoutChoice::Auto,
+        skip_bad_lines: false,
+    };
+    (folder, args)
+}
+
+fn read_log(args: &ImportArgs) -> crate::input::dataset::Dataset {
+    let stage = Stage::from_file(&args.stage).expect("the shipped stage");
+    let paths = std::slice::from_ref(&args.out);
+    log::read(paths, &stage, &ReadOptions::default())
+        .expect("a sound log")
+        .dataset
+}
+
+#[test]
+fn two_clocks_are_joined_and_the_offset_is_found() {
+    let (_folder, args) = files(&candump(|_, _| false), &reference());
+    let report = run(&args).expect("imported");
+    // The line lies along the earliest receive times, up to 100 us early here; that belongs
+    // to the offset.
+    let found_us = report.offset.us - OFFSET_US;
+    assert!((-160.0..160.0).contains(&found_us), "{found_us}");
+    assert!(report.offset.explained.is_some_and(|share| share > 0.999));
+    assert_eq!(report.bus.ticks, TICKS as usize);
+    assert!(report.smoothing.max_us < 500.0);
+    let dataset = read_log(&args);
+    assert_eq!(dataset.movements.len(), 3);
+    assert!(dataset.rows.len() > 740);
+    for row in &dataset.rows {
+        let want = pose(row.t_us as f64);
+        // 4 um a ms at most: a line over 1 ms follows the sine to 6 nm.
+        for (have, want) in row.reference.iter().zip(want) {
+            assert!((have - want).abs() < 10e-9, "{} {have} {want}", row.t_us);
+        }
+        let hall = hall(row.t_us as f64);
+        for (have, want) in row.frame.hall().iter().zip(hall) {
+            // 100 us of offset are 0.4 um, 6 codes.
+            assert!((have - want).abs() <= 10, "{} {have} {want}", row.t_us);
+        }
+    }
+}
+
+/// Each movement moves one axis, at the same frequency: a run shifted by a whole movement looks
+/// much the same, and a record that ends early must not be taken for one.
+#[test]
+fn a_record_that_ends_early_is_not_shifted_by_a_movement() {
+    let (_folder, mut args) = files(&candump(|n, _| n >= 460), &reference());
+    args.search_s = 1.2;
+    let report = run(&args).expect("imported");
+    let found_us = report.offset.us - OFFSET_US;
+    assert!((-160.0..160.0).contains(&found_us), "{found_us}");
+    assert!(report.join.rows > 455);
+}
+
+#[test]
+fn missing_frames_and_repeated_samples_are_reported_and_leave_gaps() {
+    let bus = candump(|n, k| n == 100 && k == 0 || (200..203).contains(&n));
+    let line = "0,50000,";
+    let ifm = reference();
+    let at = ifm.find(line).expect("that sample");
+    let row = ifm[at..].lines().next().expect("a line").to_owned();
+    let ifm = ifm.replacen(&row, &format!("{row}\n{row}"), 1);
+    let (_folder, args) = files(&bus, &ifm);
+    let report = run(&args).expect("imported");
+    assert_eq!(report.reference.duplicates, 1);
+    assert_eq!(report.bus.health.incomplete, 1);
+    // Three ticks are gone; the one after them only resumes the sequence.
+    assert_eq!((report.bus.gaps, report.bus.ticks_missing), (2, 5));
+    assert_eq!(report.join.rows, read_log(&args).rows.len());
+}
+
+#[test]
+fn a_clock_that_steps_back_within_a_tick_moves_no_time() {
+    let bus = candump(|_, _| false);
+    let mut lines: Vec<String> = bus.lines().map(str::to_owned).collect();
+    let at = 300
+        + lines[300..]
+            .iter()
+            .position(|l| l.contains(" 100#"))
+            .expect("a Hall frame");
+    let hall = LogLine::parse(&lines[at]).expect("sound").stamped();
+    let gaps = LogLine::parse(&lines[at + 1]).expect("sound").stamped();
+    let early = LogLine {
+        time_us: hall.time_us - 40,
+        interface: "can0",
+        frame: gaps.frame,
+    };
+    lines[at + 1] = early.to_string();
+    let (_folder, args) = files(&lines.join("\n"), &reference());
+    let report = run(&args).expect("imported");
+    assert!(
+        report.smoothing.max_us < 500.0,
+        "{}",
+        report.smoothing.max_us
+    );
+    assert!(report.join.rows > 740);
+}
+
+/// The node's count is sent modulo 2^20: back to 0 from more than half of that looks like a
+/// jump forward, and here the time frame that tells it is used 16 ticks after the codes are.
+#[test]
+fn a_node_that_starts_again_after_a_long_time_bends_no_line() {
+    let number = |n| if n < 300 { 599_840 + n } else { n - 300 };
+    let (_folder, args) = files(&candump_numbered(|_, _| false, number), &reference());
+    let report = run(&args).expect("imported");
+    let max_us = report.smoothing.max_us;
+    assert!(max_us < 500.0, "{max_us}");
+    assert!(report.join.rows > 735, "{}", report.join.rows);
+}
+
+#[test]
+fn a_broken_line_is_refused_with_its_number_or_left_out() {
+    let bus = candump(|_, _| false);
+    let cut = bus.lines().nth(6).expect("a line").len() - 3;
+    let mut lines: Vec<&str> = bus.lines().collect();
+    lines[6] = &lines[6][..cut];
+    let (_folder, mut args) = files(&lines.join("\n"), &reference());
+    let error = run(&args).expect_err("a broken line");
+    assert!(
+        matches!(
+            error,
+            ImportError::BadLine {
+                line: 7,
+                fault: LineError::BadData { column: 30 },
+                ..
+            }
+        ),
+        "{error}"
+    );
+    assert!(!args.out.exists());
+    args.skip_bad_lines = true;
+    let report = run(&args).expect("left out");
+    assert_eq!(report.bus.bad_lines, 1);
+}
+
+#[test]
+fn records_of_different_runs_and_clocks_are_refused() {
+    let still = "movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm\n";
+    let mut other = still.to_owned();
+    for k in 0..1_500 {
+        writeln!(other, "0,{},{},5,{}", k * 1_000, k * 7 % 13, k * 3 % 7).expect("a string");
+    }
+    let (_folder, mut args) = files(&candump(|_, _| false), &other);
+    assert!(matches!(run(&args), Err(ImportError::NoOffset { .. })));
+    args.estimate_offset = false;
+    assert!(matches!(run(&args), Err(ImportError::NoOverlap { .. })));
+}
+
+#[test]
+fn each_fault_of_the_reference_has_its_place() {
+    let refused = |reference: &str| {
+        let (_folder, args) = files(&candump(|_, _| false), reference);
+        run(&args).expect_err(reference).to_string()
+    };
+    let head = "movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm\n";
+    assert!(refused("movement,t_us,ifm_x_nm,ifm_y1_nm\n").contains("no column `ifm_y2_nm`"));
+    assert!(refused("movement,time,ifm_x_nm,ifm_y1_nm,ifm_y2_nm\n").contains("no column `t_us`"));
+    assert!(refused(head).contains("fewer than two rows"));
+    assert!(refused(&format!("{head}0,0,1,2,3\n0,1000,1,x,3\n")).contains("line 3: column 4: `x`"));
+    assert!(refused(&format!("{head}0,0,1,2,3\n0,1000,1,NaN,3\n")).contains("line 3"));
+    assert!(
+        refused(&format!("{head}0,0,1,2,3\n0,1000,1\n"))
+            .contains("line 3: 3 cells where the header has 5")
+    );
+    let backwards = format!("{head}0,0,1,2,3\n0,2000,1,2,3\n0,1000,1,2,3\n");
+    assert!(refused(&backwards).contains("line 4: time runs backwards"));
+}
+
+#[test]
+fn a_record_without_sensor_frames_and_one_of_two_interfaces_are_refused() {
+    let ifm = reference();
+    let (_folder, args) = files("(1.000000) can0 123#00\n", &ifm);
+    assert!(matches!(
+        run(&args),
+        Err(ImportError::NoTicks { frames: 1, .. })
+    ));
+    let two = "(1.000000) can0 123#00\n(1.000000) can1 123#00\n";
+    let (_folder, args) = files(two, &ifm);
+    assert!(matches!(
+        run(&args),
+        Err(ImportError::SeveralInterfaces { line: 2, .. })
+    ));
+    let (_folder, mut args) = files("", &ifm);
+    args.bus = Path::new("/no/such/file").into();
+    assert!(matches!(run(&args), Err(ImportError::Unreadable { .. })));
+}
+
+#[test]
+fn movements_that_start_their_time_anew_follow_each_other() {
+    let mut ifm = String::new();
+    for line in reference().lines() {
+        let Some((movement, rest)) = line.split_once(',') else {
+            continue;
+        };
+        let (time, rest) = rest.split_once(',').expect("cells");
+        let time = match (movement.parse::<i64>(), time.parse::<i64>()) {
+            (Ok(movement), Ok(time)) => (time - movement * 500_000).to_string(),
+            _ => time.to_owned(),
+        };
+        writeln!(ifm, "{movement},{time},{rest}").expect("a string");
+    }
+    let (_folder, args) = files(&candump(|_, _| false), &ifm);
+    let report = run(&args).expect("imported");
+    assert_eq!(report.reference.restarts, 2);
+    assert!(report.join.rows > 740);
+}

@@ -1,0 +1,251 @@
+//! The loop of `live`: the node on an interface, recorded and shown.
+
+use super::display::{Display, Shown};
+use super::node::{Node, NodeSettings};
+use super::record::Record;
+use super::rhythm::{Pace, Rhythm};
+use super::{Bus, BusError, LiveArgs, LiveError};
+use crate::interrupt;
+use crate::output::blob_file;
+use hal_adapters::can::{BusFault, BusFrame, Coded, Layout, StampedFrame, Timing};
+use runtime::{OnInvalid, ParameterSet, Reading};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+/// Longest wait for a frame: how soon Ctrl-C is noticed on a silent bus.
+const WAIT_MAX: Duration = Duration::from_millis(100);
+
+/// How long a frame may wait for a place in the transmit queue: half a servo period.
+const SEND_DEADLINE: Duration = Duration::from_millis(1);
+
+/// Runs until Ctrl-C, the end of the duration, or an error.
+///
+/// # Errors
+/// See [`LiveError`]. An interface that goes down is waited for, not an error.
+pub fn run(args: &LiveArgs) -> Result<(), LiveError> {
+    let set = blob_file::read(&args.params)?;
+    check_serial(&set, args)?;
+    let settings = NodeSettings {
+        layout: layout_of(&set).ok_or_else(|| LiveError::CodesTooWide {
+            path: args.params.clone(),
+        })?,
+        timing: Timing {
+            assembly_us: args.assembly_us,
+            stale_us: args.stale_us,
+        },
+        on_invalid: match args.hold {
+            0 => OnInvalid::Zero,
+            ticks => OnInvalid::Hold { ticks },
+        },
+        vertical_ticks: args.vertical_every,
+    };
+    let bus = Bus::open(&args.can, &Node::messages(settings.layout))?;
+    let record = match &args.record {
+        Some(path) => Some(Record::create(path, &args.can)?),
+        None => None,
+    };
+    let stop = interrupt::watch();
+    let decoder = set.decoder();
+    let mut session = Session {
+        node: Node::new(&decoder, &set.serial, &settings),
+        bus,
+        record,
+        sends: !args.listen_only,
+        display: Display::new(),
+        started: Instant::now(),
+        rhythm: Rhythm::default(),
+        pace: None,
+        last: None,
+        out: Vec::new(),
+        not_sent: 0,
+        is_down: false,
+    };
+    let end = args.duration.map(Duration::from_secs_f64);
+    let ended = session.until(stop, end, args.every);
+    // What was recorded is kept whatever ended the run.
+    let flushed = session.record.as_mut().map_or(Ok(()), Record::flush);
+    session.show();
+    ended.and(flushed)
+}
+
+/// The layout that carries every code that the blob accepts, its converter's rails included.
+fn layout_of(set: &ParameterSet) -> Option<Layout> {
+    let (hall, gaps) = (set.constants.hall_window, set.constants.capacitive_window);
+    let low = hall.low.min(gaps.low).saturating_sub(1);
+    let high = hall.high.max(gaps.high).saturating_add(1);
+    Layout::that_holds(low, high)
+        .or_else(|| Layout::that_holds(low.saturating_add(1), high.saturating_sub(1)))
+}
+
+fn check_serial(set: &ParameterSet, args: &LiveArgs) -> Result<(), LiveError> {
+    match &args.serial {
+        Some(serial) if set.expect_serial(serial).is_err() => Err(LiveError::OtherStage {
+            path: args.params.clone(),
+            found: set.serial.to_string(),
+            expected: serial.clone(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Now, on the clock of the kernel's receive times, us.
+fn now_us() -> u64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    since.map_or(0, |d| u64::try_from(d.as_micros()).unwrap_or(u64::MAX))
+}
+
+struct Session<'d> {
+    node: Node<'d>,
+    bus: Bus,
+    record: Option<Record>,
+    sends: bool,
+    display: Display,
+    started: Instant,
+    rhythm: Rhythm,
+    pace: Option<Pace>,
+    last: Option<Reading>,
+    out: Vec<Coded>,
+    not_sent: u32,
+    is_down: bool,
+}
+
+impl Session<'_> {
+    fn until(
+        &mut self,
+        stop: &AtomicBool,
+        end: Option<Duration>,
+        every_s: f64,
+    ) -> Result<(), LiveError> {
+        let interval = Duration::from_secs_f64(self.display.interval_s(every_s));
+        let mut next_show = interval;
+        while !stop.load(Ordering::Relaxed) {
+            let elapsed = self.started.elapsed();
+            if end.is_some_and(|end| elapsed >= end) {
+                break;
+            }
+            if elapsed >= next_show {
+                next_show = elapsed + interval;
+                self.pace = self.rhythm.pace();
+                self.show();
+            }
+            self.turn()?;
+        }
+        Ok(())
+    }
+
+    /// All frames that are at hand, or the passing of time; then what the node has to say.
+    fn turn(&mut self) -> Result<(), LiveError> {
+        let mut frame = self.receive(Duration::ZERO)?;
+        if frame.is_none() {
+            let patience = self.node.patience_us(now_us());
+            let wait = patience.map_or(WAIT_MAX, |us| Duration::from_micros(us.into()));
+            frame = self.receive(wait.min(WAIT_MAX))?;
+        }
+        if frame.is_none() {
+            // The time is taken before the bus is asked again: what came before it was read.
+            let time_us = now_us();
+            frame = self.receive(Duration::ZERO)?;
+            if frame.is_none() {
+                let step = self.node.poll(time_us, &mut self.out);
+                self.note(step.fault);
+            }
+        }
+        while let Some(stamped) = frame {
+            self.take(&stamped)?;
+            if !self.bus.has_frame() {
+                break;
+            }
+            frame = self.receive(Duration::ZERO)?;
+        }
+        self.publish()
+    }
+
+    fn receive(&mut self, wait: Duration) -> Result<Option<StampedFrame>, LiveError> {
+        match self.bus.receive(wait) {
+            Ok(Some(frame)) => {
+                if self.is_down {
+                    self.is_down = false;
+                    self.display.say("the interface is up again");
+                }
+                Ok(Some(frame))
+            }
+            Ok(None) => Ok(None),
+            Err(error) => self.forgive(error).map(|()| None),
+        }
+    }
+
+    fn take(&mut self, frame: &StampedFrame) -> Result<(), LiveError> {
+        if let Some(record) = &mut self.record {
+            record.frame(frame)?;
+        }
+        let step = self.node.take(frame, &mut self.out);
+        if let Some((raw, reading)) = step.tick {
+            self.rhythm.take(raw.sequence, frame.time_us);
+            self.last = Some(reading);
+        }
+        if let Some(command) = step.command {
+            self.display.say(&format!("request: {command:?}"));
+        }
+        self.note(step.fault);
+        Ok(())
+    }
+
+    fn note(&mut self, fault: Option<BusFault>) {
+        if let Some(fault @ (BusFault::Stale { .. } | BusFault::SenderRestarted)) = fault {
+            self.display.say(&fault.to_string());
+        }
+    }
+
+    /// Sends what the node has to say.
+    fn publish(&mut self) -> Result<(), LiveError> {
+        if self.out.is_empty() || !self.sends || self.is_down {
+            self.out.clear();
+            return Ok(());
+        }
+        let frames: Vec<BusFrame> = self.out.drain(..).map(BusFrame::from).collect();
+        if let Err(error) = self.bus.send(&frames, SEND_DEADLINE) {
+            let count = u32::try_from(frames.len()).unwrap_or(u32::MAX);
+            self.not_sent = self.not_sent.saturating_add(count);
+            return self.forgive(error);
+        }
+        if let Some(record) = &mut self.record {
+            let time_us = now_us();
+            for frame in frames {
+                record.sent(frame, time_us)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// An interface that is down and a queue that is full are waited for; the rest ends the
+    /// run.
+    fn forgive(&mut self, error: BusError) -> Result<(), LiveError> {
+        if error.is_down() {
+            if !self.is_down {
+                self.is_down = true;
+                self.display.say(&format!("{error}; waiting for it"));
+            }
+            std::thread::sleep(Duration::from_millis(1));
+            Ok(())
+        } else if error.is_queue_full() {
+            Ok(())
+        } else {
+            Err(error.into())
+        }
+    }
+
+    fn show(&mut self) {
+        let shown = Shown {
+            elapsed_s: self.started.elapsed().as_secs_f64(),
+            reading: self.last.as_ref(),
+            pace: self.pace,
+            servo: self.node.servo().health(),
+            bus: *self.node.receiver().health(),
+            dropped: self.bus.dropped(),
+            not_sent: self.not_sent,
+            is_stale: self.node.receiver().is_stale(),
+            is_down: self.is_down,
+        };
+        self.display.show(&shown);
+    }
+}

@@ -1,0 +1,5 @@
+//! The stage on a CAN bus: decoded as it comes, played from a log, made into a log.
+
+pub mod import;
+pub mod live;
+pub mod replay;

@@ -1,0 +1,154 @@
+//! Everything that can end a run, with the exit status that it leads to.
+//!
+//! | status | meaning |
+//! |---|---|
+//! | 0 | good |
+//! | 2 | usage: the command line is wrong |
+//! | 3 | bad input: a stage file, log or blob that is refused, an output that can't be written |
+//! | 4 | the fit failed its own checks; no blob was written |
+//! | 130 | interrupted; the best so far was kept |
+//!
+//! Every message says what is wrong, where, and what to do.
+
+use crate::bus::import::ImportError;
+use crate::bus::live::LiveError;
+use crate::bus::replay::ReplayError;
+use crate::fit::FitError;
+use crate::input::log::LogError;
+use crate::input::stage::StageError;
+use crate::output::OutputError;
+use crate::output::blob_file::BlobFileError;
+use crate::output::export::ExportError;
+use crate::output::pose_file::PoseFileError;
+use crate::report::plots::PlotError;
+use std::path::PathBuf;
+
+/// Why a run ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum HostError {
+    /// An argument makes no sense, in a way that the command line's own parser cannot see.
+    #[error("{argument}: {problem}; see --help")]
+    Usage {
+        /// The argument.
+        argument: &'static str,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// `stage.toml` is refused.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// A log is refused.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A pose file is refused.
+    #[error(transparent)]
+    PoseFile(#[from] PoseFileError),
+    /// A parameter blob is refused.
+    #[error(transparent)]
+    Blob(#[from] BlobFileError),
+    /// A blob was made for other scales than the stage file gives.
+    #[error(
+        "{}: {key} is {stage:e}, but the parameter blob was made for {blob:e}: name the stage.toml that the blob was \
+         fitted with", path.display()
+    )]
+    OtherScale {
+        /// The stage file.
+        path: PathBuf,
+        /// The key in it.
+        key: &'static str,
+        /// Its value, m per code.
+        stage: f64,
+        /// That of the blob, m per code.
+        blob: f64,
+    },
+    /// A plot could not be drawn.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    /// A report could not be turned into JSON.
+    #[error("cannot write the figures as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    /// There is no place for temporary files.
+    #[error("cannot make a temporary folder: {0}; name one with --out")]
+    NoTemporaryFolder(std::io::Error),
+    /// Standard output cannot be written.
+    #[error("cannot write to standard output: {0}")]
+    Standard(std::io::Error),
+    /// An output was not written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The fit failed its own checks: nothing was written.
+    #[error("the fit failed its own checks, and no parameter blob was written: {0}")]
+    Fit(#[from] FitError),
+    /// `import` refused its input.
+    #[error(transparent)]
+    Import(#[from] ImportError),
+    /// A blob cannot be exported.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+    /// `live` ended early.
+    #[error(transparent)]
+    Live(#[from] LiveError),
+    /// `replay` ended early.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// The user interrupted the run.
+    #[error("interrupted; {kept}")]
+    Interrupted {
+        /// What was kept.
+        kept: String,
+    },
+}
+
+impl HostError {
+    /// The exit status of a run that ends with this error.
+    pub const fn exit_status(&self) -> u8 {
+        match self {
+            Self::Usage { .. }
+            | Self::Export(ExportError::NoSlot { .. } | ExportError::Unaligned { .. }) => 2,
+            Self::Stage(_)
+            | Self::Log(_)
+            | Self::PoseFile(_)
+            | Self::Blob(_)
+            | Self::OtherScale { .. }
+            | Self::Plot(_)
+            | Self::Json(_)
+            | Self::NoTemporaryFolder(_)
+            | Self::Standard(_)
+            | Self::Import(_)
+            | Self::Export(_)
+            | Self::Live(_)
+            | Self::Replay(_)
+            | Self::Output(_) => 3,
+            Self::Fit(_) => 4,
+            Self::Interrupted { .. } => 130,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::SolveError;
+
+    #[test]
+    fn each_kind_of_end_has_its_exit_status() {
+        let blob = BlobFileError::Unusable {
+            path: "p.bin".into(),
+            cause: runtime::BlobError::Erased,
+        };
+        assert_eq!(HostError::from(blob).exit_status(), 3);
+        assert_eq!(HostError::from(LogError::NoLog).exit_status(), 3);
+        assert_eq!(HostError::from(OutputError::NoName).exit_status(), 3);
+        let usage = HostError::Usage {
+            argument: "--train",
+            problem: "0 rows".to_owned(),
+        };
+        assert_eq!(usage.exit_status(), 2);
+        let fit = FitError::from(SolveError::NoPlanarMotion);
+        assert_eq!(HostError::from(fit).exit_status(), 4);
+        let interrupted = HostError::Interrupted {
+            kept: "nothing was written".to_owned(),
+        };
+        assert_eq!(interrupted.exit_status(), 130);
+    }
+}

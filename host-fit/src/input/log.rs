@@ -1,0 +1,171 @@
+//! Reads logs: CSV or CSV.gz, raw codes and reference, into rows in SI units by movement.
+//!
+//! One row per servo period, a header first. Which column holds what is said in
+//! [`layout`]; cells are separated by commas, semicolons or tabs, lines end in LF or CRLF,
+//! a line that starts with `#` is a comment. A file is taken for gzip by its first bytes,
+//! not by its name.
+//!
+//! Anything wrong is refused with file, line and column ([`LogError`]). Bad cells and
+//! saturated codes can be left out and counted instead ([`BadRows::Skip`]); a log whose
+//! structure is wrong cannot be read by halves.
+
+mod cell;
+mod error;
+mod header;
+pub mod layout;
+mod order;
+mod reader;
+mod rows;
+mod sequence;
+mod skipped;
+mod source;
+mod text;
+mod warning;
+
+pub use cell::CellFault;
+pub use error::{CellPlace, LogError};
+pub use warning::{LogWarning, SkipReason};
+
+use crate::input::dataset::{Dataset, LogSource, Row};
+use crate::input::stage::Stage;
+use sha2::{Digest, Sha256};
+use std::path::Path;
+use text::Text;
+
+/// What to do with a row that has a bad cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BadRows {
+    /// Refuse the log.
+    #[default]
+    Refuse,
+    /// Leave the row out and count it.
+    Skip,
+}
+
+/// What to do with a code at a rail of its converter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SaturatedCodes {
+    /// The row is bad: see [`BadRows`].
+    #[default]
+    Bad,
+    /// The row is kept: the decoder marks it.
+    Keep,
+}
+
+/// Whether a log must hold the interferometers' reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ReferenceUse {
+    /// It must.
+    #[default]
+    Required,
+    /// It is read where it is there; [`crate::input::dataset::LogSource::has_reference`] tells.
+    IfPresent,
+}
+
+/// How to read logs. The default is that of `fit`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// What to do with bad rows.
+    pub bad_rows: BadRows,
+    /// What to do with saturated codes.
+    pub saturated: SaturatedCodes,
+    /// Whether the reference is needed.
+    pub reference: ReferenceUse,
+}
+
+impl ReadOptions {
+    /// For `decode`: saturated rows are kept, a reference is not needed.
+    pub const DECODE: Self = Self {
+        bad_rows: BadRows::Refuse,
+        saturated: SaturatedCodes::Keep,
+        reference: ReferenceUse::IfPresent,
+    };
+}
+
+/// What [`read`] gives.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LogReading {
+    /// The rows of all logs.
+    pub dataset: Dataset,
+    /// What is odd about the logs, in their order.
+    pub warnings: Vec<LogWarning>,
+    /// How many rows were left out; the warnings say why.
+    pub skipped_rows: usize,
+}
+
+/// Reads the logs, in this order, into one dataset.
+///
+/// # Errors
+/// Every variant of [`LogError`]; the first fault of the first bad log.
+pub fn read<P: AsRef<Path>>(
+    paths: &[P],
+    stage: &Stage,
+    options: &ReadOptions,
+) -> Result<LogReading, LogError> {
+    if paths.is_empty() {
+        return Err(LogError::NoLog);
+    }
+    let mut reading = LogReading::default();
+    let mut hash = Sha256::new();
+    for path in paths {
+        let path = path.as_ref();
+        let bytes = source::read(path)?;
+        hash.update(&bytes);
+        append(&mut reading, path, &bytes, stage, options)?;
+    }
+    reading.dataset.sha256 = hash.finalize().into();
+    Ok(reading)
+}
+
+/// Reads one log that is in memory, plain or gzip; `path` is only named in errors.
+///
+/// # Errors
+/// As [`read`], but for opening the file.
+pub fn read_bytes(
+    bytes: &[u8],
+    path: &Path,
+    stage: &Stage,
+    options: &ReadOptions,
+) -> Result<LogReading, LogError> {
+    let bytes = source::unpack(bytes.into(), path)?;
+    let mut reading = LogReading::default();
+    append(&mut reading, path, &bytes, stage, options)?;
+    reading.dataset.sha256 = Sha256::digest(&bytes).into();
+    Ok(reading)
+}
+
+fn append(
+    reading: &mut LogReading,
+    path: &Path,
+    bytes: &[u8],
+    stage: &Stage,
+    options: &ReadOptions,
+) -> Result<(), LogError> {
+    let text = Text::new(path, bytes);
+    let (dataset, warnings) = (&mut reading.dataset, &mut reading.warnings);
+    reading.skipped_rows += reader::append(&text, stage, options, dataset, warnings)?;
+    refuse_repeated_log(&reading.dataset)
+}
+
+/// Refuses the last log if an earlier one holds the same rows.
+fn refuse_repeated_log(dataset: &Dataset) -> Result<(), LogError> {
+    let Some((last, earlier)) = dataset.logs.split_last() else {
+        return Ok(());
+    };
+    let rows = |source: &LogSource| dataset.rows.get(source.rows.clone()).unwrap_or_default();
+    let same = |a: &Row, b: &Row| (a.t_us, a.frame, a.reference) == (b.t_us, b.frame, b.reference);
+    let repeats = |first: &&LogSource| {
+        let (first, last) = (rows(first), rows(last));
+        first.len() == last.len() && first.iter().zip(last).all(|(a, b)| same(a, b))
+    };
+    match earlier.iter().find(repeats) {
+        None => Ok(()),
+        Some(first) => Err(LogError::SameLog {
+            path: last.path.clone(),
+            first: first.path.clone(),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests;

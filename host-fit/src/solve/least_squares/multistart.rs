@@ -1,0 +1,361 @@
+//! The least-squares solver: several starts on few rows, then the finish on all.
+
+use super::coordinates::{Boxed, Coordinates, Gains, parameters_of, point_of};
+use super::descend::{Descent, DescentEnd, descend};
+use super::normal::{Column, Point, best_gain, cost};
+use super::scatter::{Offset, Ratios, scatter};
+use crate::problem::parameters::{ParameterId, Parameters, search_box};
+use crate::problem::zero_deviation::ZeroDeviation;
+use crate::problem::{Group, Problem};
+use crate::solve::{Projection, Solution, SolveError, Solver, SolverOptions};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use runtime::ModelKind;
+use std::time::Instant;
+
+/// Starts besides the designed geometry.
+const RANDOM_STARTS: usize = 7;
+/// Rows on which starts are tried.
+const START_ROWS: usize = 2000;
+/// Tries to draw ratios whose phi stays away from zero over the log.
+const DRAWS_MAX: usize = 200;
+/// Smallest phi / eta of a random start: nearer to a pole the descent would start on a cliff.
+const START_SENSITIVITY_MIN: f64 = 0.3;
+
+/// Damped Gauss-Newton on the problem with everything linear projected out.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LeastSquares;
+
+impl Solver for LeastSquares {
+    fn name(&self) -> &'static str {
+        "lm"
+    }
+
+    fn solve(&self, problem: &Problem, options: &SolverOptions) -> Result<Solution, SolveError> {
+        let starts = starts(&thinned(problem, START_ROWS), options.seed);
+        self.solve_from(&starts, problem, options)
+    }
+}
+
+impl LeastSquares {
+    /// Descends from each of the given parameters and finishes the best on all rows.
+    ///
+    /// # Errors
+    /// See [`SolveError`].
+    pub fn solve_from(
+        &self,
+        starts: &[Parameters],
+        problem: &Problem,
+        options: &SolverOptions,
+    ) -> Result<Solution, SolveError> {
+        let started = Instant::now();
+        let free = free_offsets(problem);
+        let few = thinned(problem, START_ROWS);
+        let few_offsets = free_offsets(&few);
+        let boxed = Boxed {
+            stage: problem.stage,
+            model: problem.model,
+        };
+        // (12) fixes eta, so its gain is not an arbitrary matrix: only the parameters will do.
+        let by_gains = options.projection == Projection::Linear && problem.model != ModelKind::M12;
+        let mut search = Search {
+            problem,
+            offsets: &free,
+            evaluations: 0,
+        };
+        let found = if by_gains {
+            search.by_gains(&few, &few_offsets, starts)?
+        } else {
+            search.by_parameters(&boxed, &few, &few_offsets, starts)?
+        };
+        let mut descent = found.best;
+        let mut parameters = parameters_of(&descent.point).ok_or(SolveError::NoPlanarMotion)?;
+        // A solution outside its box is brought back, for the least cost on the box's edge.
+        let clipped = boxed.clipped(&parameters);
+        if by_gains && clipped != parameters {
+            descent = search
+                .finish(&boxed, boxed.unknowns(&clipped))
+                .ok_or(SolveError::NoUsableStart)?;
+        }
+        if !by_gains || clipped != parameters {
+            parameters = boxed.parameters(&descent.unknowns);
+        }
+        if options.projection == Projection::None && problem.model.has_zero_deviation() {
+            descent.unknowns = boxed.unknowns(&parameters);
+            descent = search.with_clipped_offsets(&boxed, descent);
+            parameters = boxed.parameters(&descent.unknowns);
+        }
+        let zeros = zero_deviations(problem, &parameters, &descent.point);
+        Ok(Solution {
+            delta_m: zeros.iter().map(|zero| zero.delta_m).collect(),
+            parameters,
+            cost: search.cost_with(&descent, &zeros),
+            evaluations: search.evaluations,
+            elapsed: started.elapsed(),
+            stopped: format!(
+                "{}; {} of {} starts agree",
+                match descent.end {
+                    DescentEnd::Converged => "converged",
+                    DescentEnd::Stuck => "no shorter step lowers the cost",
+                    DescentEnd::StepLimit => "step limit",
+                },
+                found.agreeing,
+                found.tried
+            ),
+            at_limit: boxed.at_limit(&parameters),
+        })
+    }
+}
+
+/// The best of several starts, finished on all rows.
+struct Found {
+    best: Descent,
+    agreeing: usize,
+    tried: usize,
+}
+
+struct Search<'p, 'a> {
+    problem: &'p Problem<'a>,
+    offsets: &'p [Offset],
+    evaluations: u64,
+}
+
+impl Search<'_, '_> {
+    fn finish(&mut self, coordinates: &impl Coordinates, from: Column) -> Option<Descent> {
+        let descent = descend(self.problem, self.offsets, coordinates, from)?;
+        self.evaluations += descent.evaluations;
+        Some(descent)
+    }
+
+    fn by_gains(
+        &mut self,
+        few: &Problem,
+        few_offsets: &[Offset],
+        starts: &[Parameters],
+    ) -> Result<Found, SolveError> {
+        let coordinates = Gains {
+            model: self.problem.model,
+        };
+        let mut tried = Vec::new();
+        let mut spanned = false;
+        for start in starts {
+            let Some(ratios) = point_of(start).map(|p| p.ratios) else {
+                continue;
+            };
+            let Some(sums) = scatter(few, &ratios, few_offsets) else {
+                continue;
+            };
+            let Some(gain) = best_gain(&sums) else {
+                continue;
+            };
+            spanned = true;
+            let from = Gains::unknowns(&Point { gain, ratios });
+            tried.extend(descend(few, few_offsets, &coordinates, from));
+        }
+        if !spanned {
+            return Err(SolveError::NoPlanarMotion);
+        }
+        self.best_of(tried, &coordinates)
+    }
+
+    fn by_parameters(
+        &mut self,
+        boxed: &Boxed,
+        few: &Problem,
+        few_offsets: &[Offset],
+        starts: &[Parameters],
+    ) -> Result<Found, SolveError> {
+        let tried = starts
+            .iter()
+            .filter_map(|start| {
+                descend(
+                    few,
+                    few_offsets,
+                    boxed,
+                    boxed.unknowns(&boxed.clipped(start)),
+                )
+            })
+            .collect();
+        self.best_of(tried, boxed)
+    }
+
+    fn best_of(
+        &mut self,
+        tried: Vec<Descent>,
+        coordinates: &impl Coordinates,
+    ) -> Result<Found, SolveError> {
+        self.evaluations += tried.iter().map(|d| d.evaluations).sum::<u64>();
+        let lowest = tried
+            .iter()
+            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+            .ok_or(SolveError::NoUsableStart)?;
+        let agreeing = tried
+            .iter()
+            .filter(|d| d.cost <= lowest.cost * (1.0 + 1e-6))
+            .count();
+        let best = self
+            .finish(coordinates, lowest.unknowns)
+            .ok_or(SolveError::NoUsableStart)?;
+        Ok(Found {
+            best,
+            agreeing,
+            tried: tried.len(),
+        })
+    }
+
+    /// The cost with the zero deviations that are reported: where some were clipped it is more
+    /// than that of the free offsets.
+    fn cost_with(&mut self, descent: &Descent, zeros: &[ZeroDeviation]) -> f64 {
+        if zeros.iter().all(|zero| !zero.clipped) {
+            return descent.cost;
+        }
+        let of = |group: &Group| Offset::Fixed(zeros[group.movement].pose.map(|x| x * 1e6));
+        let offsets: Vec<Offset> = self.problem.groups.iter().map(of).collect();
+        self.evaluations += 1;
+        scatter(self.problem, &descent.point.ratios, &offsets).map_or(descent.cost, |sums| {
+            cost(&sums, &descent.point.gain, self.problem.weights)
+        })
+    }
+
+    /// Zero deviations as unknowns within their range: those that would leave it are fixed at
+    /// its end and the rest fitted again, until none changes. Each of the three of a movement is
+    /// clipped by itself, which is near the best within the range but not it, and no descent: so
+    /// the best of these fits is kept, the first one included.
+    fn with_clipped_offsets(&mut self, boxed: &Boxed, mut descent: Descent) -> Descent {
+        let mut offsets = self.offsets.to_vec();
+        let mut best: Option<(f64, Descent)> = None;
+        for _ in 0..20 {
+            let parameters = boxed.parameters(&descent.unknowns);
+            let zeros = zero_deviations(self.problem, &parameters, &descent.point);
+            let cost = self.cost_with(&descent, &zeros);
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, descent.clone()));
+            }
+            let mut changed = false;
+            for (offset, group) in offsets.iter_mut().zip(&self.problem.groups) {
+                let zero = &zeros[group.movement];
+                if zero.clipped {
+                    let fixed = Offset::Fixed(zero.pose.map(|x| x * 1e6));
+                    changed |= *offset != fixed;
+                    *offset = fixed;
+                }
+            }
+            if !changed {
+                break;
+            }
+            let Some(next) = descend(self.problem, &offsets, boxed, descent.unknowns) else {
+                break;
+            };
+            self.evaluations += next.evaluations;
+            descent = next;
+        }
+        best.map_or(descent, |(_, best)| best)
+    }
+}
+
+/// The offsets that the model leaves free: one for each movement, or none at all.
+fn free_offsets(problem: &Problem) -> Vec<Offset> {
+    let offset = if problem.model.has_zero_deviation() {
+        Offset::Free
+    } else {
+        Offset::Fixed([0.0; 3])
+    };
+    vec![offset; problem.groups.len()]
+}
+
+/// The zero deviation of every movement of the log at a solution; none where the model has none
+/// or the movement no row.
+pub fn zero_deviations(
+    problem: &Problem,
+    parameters: &Parameters,
+    point: &Point,
+) -> Vec<ZeroDeviation> {
+    let mut zeros = vec![ZeroDeviation::NONE; problem.movements];
+    if !problem.model.has_zero_deviation() {
+        return zeros;
+    }
+    for group in &problem.groups {
+        let rows = &problem.rows[group.rows.clone()];
+        let Some(mean) = super::scatter::mean(rows, &point.ratios) else {
+            continue;
+        };
+        let error = std::array::from_fn(|axis| {
+            let decoded: f64 = (0..3).map(|k| point.gain[(axis, k)] * mean[k]).sum();
+            (decoded - mean[super::scatter::Q + axis]) * 1e-6
+        });
+        zeros[group.movement] =
+            ZeroDeviation::of_mean_error(parameters, error, &problem.stage.search.delta_m);
+    }
+    zeros
+}
+
+/// The problem on about `most` of its rows, evenly from each movement.
+pub fn thinned<'a>(problem: &Problem<'a>, most: usize) -> Problem<'a> {
+    let stride = problem.rows.len().div_ceil(most).max(1);
+    let mut few = Problem {
+        rows: Vec::with_capacity(problem.rows.len() / stride + problem.groups.len()),
+        groups: Vec::with_capacity(problem.groups.len()),
+        ..problem.clone_head()
+    };
+    for group in &problem.groups {
+        let from = few.rows.len();
+        few.rows
+            .extend(problem.rows[group.rows.clone()].iter().step_by(stride));
+        few.groups.push(Group {
+            movement: group.movement,
+            rows: from..few.rows.len(),
+        });
+    }
+    few
+}
+
+/// The designed geometry with sensitivities from the middle of their ranges, then random points
+/// of the search box whose phi stays away from zero over the whole log.
+fn starts(problem: &Problem, seed: u64) -> Vec<Parameters> {
+    let stage = problem.stage;
+    let mut designed = Parameters::designed(stage);
+    if problem.model.has_sensitivity() {
+        for (s, range) in designed.sensitivity.iter_mut().zip(&stage.search.eta) {
+            s.eta = 0.5 * (range.low + range.high);
+        }
+    }
+    let mut starts = vec![designed];
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    for _ in 0..DRAWS_MAX {
+        if starts.len() > RANDOM_STARTS {
+            break;
+        }
+        let mut p = designed.to_array();
+        // Near a pole most of the box of Table 5 is useless, so draws are shrunk towards zero.
+        let shrink: f64 = random.random();
+        let ranges = search_box(stage, [0.0; 3]);
+        for (k, (p, range)) in p.iter_mut().zip(ranges).enumerate().skip(3) {
+            let draw: f64 = random.random();
+            if ParameterId::at(k).is_free_in(problem.model) {
+                let value = range.low + draw * range.width();
+                *p = if k < 9 { value } else { value * shrink };
+            }
+        }
+        let ranges = search_box(stage, [p[3], p[4], p[5]]);
+        for k in 0..3 {
+            p[k] = ranges[k].low + random.random::<f64>() * ranges[k].width();
+        }
+        let p = Parameters::from_array(&p);
+        let far = point_of(&p).is_some_and(|point| {
+            smallest_sensitivity(problem, &point.ratios) > START_SENSITIVITY_MIN
+        });
+        if far {
+            starts.push(p);
+        }
+    }
+    starts
+}
+
+/// The smallest phi / eta over the rows.
+fn smallest_sensitivity(problem: &Problem, ratios: &Ratios) -> f64 {
+    problem
+        .rows
+        .iter()
+        .flat_map(|row| ratios.map(|r| 1.0 + (0..3).map(|k| r[k] * row.vertical[k]).sum::<f64>()))
+        .fold(f64::INFINITY, f64::min)
+}

@@ -1,0 +1,160 @@
+//! A small log for tests of the objective: Model (31) with noise of a known seed.
+
+use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
+use crate::input::log::layout::LogLayout;
+use crate::input::stage::{CodeScale, Range, SearchRanges, Stage};
+use crate::problem::Problem;
+use crate::problem::parameters::Parameters;
+use crate::solve::search::random::{Phase, RandomSource, RandomStreams, SeededStreams};
+use runtime::frame::CodeWindow;
+use runtime::geometry::{ProbeCoordinates, ProbeGeometry};
+use runtime::model::{Sensitivity, probe_displacement_m};
+use runtime::{ModelKind, PlanarPose, RawFrame, VerticalPose};
+
+/// The stage of the tests: Tables 1, 3 and 5 of the paper.
+pub fn stage() -> Stage {
+    let range = |low, high| Range { low, high };
+    let arm = range(0.1475, 0.2475);
+    let falling = range(-5000.0, 0.0);
+    let rising = range(0.0, 5000.0);
+    let scale = |m_per_count| CodeScale {
+        m_per_count,
+        window: CodeWindow::between_rails(-32768, 32767).expect("sound"),
+    };
+    Stage {
+        designed: ProbeCoordinates {
+            h1x_m: 0.1975,
+            h1y_m: 0.40,
+            h2x_m: 0.1975,
+            h2y_m: 0.42,
+            h3x_m: 0.1975,
+            h3y_m: 0.36,
+        },
+        hall: scale(6.25e-8),
+        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
+        capacitive: scale(1.5625e-8),
+        y_baseline_m: 0.1,
+        servo_period_s: 0.002,
+        search: SearchRanges {
+            h_m: ProbeCoordinates {
+                h1x_m: arm,
+                h1y_m: range(0.30, 0.50),
+                h2x_m: arm,
+                h2y_m: range(0.32, 0.52),
+                h3x_m: arm,
+                h3y_m: range(0.26, 0.46),
+            },
+            eta: [range(0.78, 0.98), range(0.65, 0.85), range(0.72, 0.92)],
+            theta_rad: range(-0.14, 0.14),
+            a_per_m: [falling; 3],
+            b_per_rad: [falling; 3],
+            c_per_rad: [rising, falling, rising],
+            delta_m: range(-10e-6, 10e-6),
+        },
+        log: LogLayout::default(),
+    }
+}
+
+/// What the sample's stage is really like.
+pub fn truth() -> Parameters {
+    let probe = |eta, a, b, c| Sensitivity {
+        eta,
+        per_z_m: a,
+        per_rx_rad: b,
+        per_ry_rad: c,
+    };
+    Parameters {
+        geometry: ProbeGeometry {
+            lever_arm_m: [0.2, -0.205, -0.35],
+            misalignment_rad: [0.01, -0.02, 0.015],
+        },
+        sensitivity: [
+            probe(0.87, -190.0, -70.0, 15.0),
+            probe(0.70, -160.0, -57.0, -55.0),
+            probe(0.86, -180.0, -63.0, 13.0),
+        ],
+    }
+}
+
+/// A log of `movements` movements of `rows` rows each: planar motion of 300 um and urad, a
+/// vertical pose of its own for each movement that wanders by 0.2 um and urad, a zero deviation
+/// of up to 4 um, noise of 0.5 um.
+pub fn dataset(movements: usize, rows: usize) -> Dataset {
+    let truth = truth();
+    let plane = truth.geometry.plane_rows();
+    let mut dataset = Dataset::default();
+    for movement in 0..movements {
+        let mut random = SeededStreams::new(7).stream(movement, Phase::Start, 0);
+        let mut symmetric = |size: f64| size * (2.0 * random.uniform() - 1.0);
+        let held = [2.5e-4, 5e-4, 5e-4].map(&mut symmetric);
+        let delta = [4e-6; 3].map(&mut symmetric);
+        let start = dataset.rows.len();
+        for _ in 0..rows {
+            let planar = PlanarPose::from_array([3e-4, 5e-4, 3e-4].map(&mut symmetric));
+            let vertical = held.map(|v| v + symmetric(2e-7));
+            let read = probe_displacement_m(
+                &plane,
+                &truth.sensitivity,
+                &planar,
+                &VerticalPose::from_array(vertical),
+                delta,
+            );
+            dataset.rows.push(Row {
+                movement,
+                t_us: 2000 * dataset.rows.len() as i64,
+                frame: LoggedFrame::Codes(RawFrame {
+                    hall: [0; 3],
+                    capacitive: [0; 3],
+                    sequence: 0,
+                    time_us: 0,
+                }),
+                signal_m: read.map(|s| s + symmetric(0.9e-6)),
+                vertical,
+                reference: planar.to_array(),
+            });
+        }
+        dataset.movements.push(Movement {
+            log: 0,
+            index: movement as i64,
+            rows: start..dataset.rows.len(),
+        });
+    }
+    dataset
+}
+
+/// The problem of all rows of a sample.
+pub fn problem<'a>(dataset: &Dataset, stage: &'a Stage, model: ModelKind) -> Problem<'a> {
+    let all: Vec<usize> = (0..dataset.rows.len()).collect();
+    Problem::new(dataset, &all, stage, model)
+}
+
+/// The fitness by the runtime's own model in f64, row by row.
+pub fn fitness_by_the_runtime(
+    problem: &Problem<'_>,
+    parameters: &Parameters,
+    delta_m: &[[f64; 3]],
+) -> f64 {
+    use runtime::geometry::inverse_rows;
+    use runtime::model::{planar_pose, sensitivity_at, zero_pose};
+    let Some(inverse) = inverse_rows(&parameters.geometry.plane_rows()) else {
+        return f64::NAN;
+    };
+    let mut cost = 0.0;
+    for group in &problem.groups {
+        let zero = zero_pose(&inverse, parameters.eta(), delta_m[group.movement]);
+        for row in &problem.rows[group.rows.clone()] {
+            let vertical = VerticalPose::from_array(row.vertical);
+            let phi = parameters
+                .sensitivity
+                .map(|s| sensitivity_at(&s, &vertical));
+            let signal = row.signal_um.map(|s| s * 1e-6);
+            let pose = planar_pose(&inverse, signal, phi, &zero).to_array();
+            let axes = pose.iter().zip(row.reference_um).zip(problem.weights);
+            for ((pose, reference), weight) in axes {
+                let error = pose * 1e6 - reference;
+                cost += weight * error * error;
+            }
+        }
+    }
+    problem.fitness(cost)
+}
