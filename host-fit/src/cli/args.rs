@@ -141,7 +141,7 @@ pub struct FitArgs {
     pub model: ModelChoice,
     /// Solver. The default searches by SHTLBO and finishes by least squares, `lm` is least squares
     /// alone, the others search only.
-    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(crate::cli::solver_names()), default_value = crate::cli::DEFAULT_SOLVER)]
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(crate::cli::solver_names()), default_value = crate::solve::Solver::Finished.name())]
     pub solver: String,
     /// How much of the problem is solved in closed form.
     #[arg(long, value_enum, default_value = "linear")]

@@ -4,8 +4,9 @@ use super::args::{DeltaChoice, EvalArgs};
 use crate::cli::error::HostError;
 use crate::input::log;
 use crate::input::stage::Stage;
-use crate::judge::{Zeros, judge};
+use crate::judge::{Decoded, Zeros};
 use crate::output::blob_file;
+use crate::problem::model::Model;
 use crate::report::json::of_eval;
 use crate::report::text;
 use std::path::PathBuf;
@@ -22,11 +23,11 @@ pub fn run(args: &EvalArgs) -> Result<(), HostError> {
     super::same_scales(&set, &stage, &args.stage)?;
     let log = log::read(&args.logs, &stage, &super::EVAL)?;
     let zeros = match args.delta {
-        None => Zeros::of_model(set.model),
+        None => Zeros::of_model(Model::of(set.model)),
         Some(DeltaChoice::Fit) => Zeros::Refit,
         Some(DeltaChoice::Zero) => Zeros::None,
     };
-    let judgement = judge(&set, &log.dataset, &stage, zeros);
+    let judgement = Decoded::new(&set, &log.dataset).judge(&log.dataset, &stage, zeros);
     let mut circumstances = super::circumstances(&log, &stage, started);
     if judgement.undecoded > 0 {
         circumstances.warnings.push(format!(

@@ -10,11 +10,11 @@ use crate::interrupt;
 use crate::judge;
 use crate::output;
 use crate::output::blob_file;
+use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::report::json::{Report, of_fit};
 use crate::report::{html, plots, text};
-use crate::solve::search_solver::default_size;
-use crate::solve::{SolveError, SolverOptions};
+use crate::solve::{SolveError, Solver, SolverOptions};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -59,25 +59,28 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
         Some(path) => Some(judge::parameters_of(&blob_file::read(path)?)),
         None => None,
     };
-    let solver = super::solver(&args.solver, known)?;
-    let (population, generations) = default_size(args.project);
+    let solver = Solver::by_name(&args.solver).ok_or_else(|| HostError::Usage {
+        argument: "--solver",
+        problem: format!("no solver is called {}", args.solver),
+    })?;
+    let mut options = SolverOptions::new(args.project, args.seed);
+    options.population = args.population.map_or(options.population, |n| n as usize);
+    options.generations = args.generations.map_or(options.generations, |n| n as usize);
+    options.known = known;
+    options.interrupt = Some(interrupt::watch());
     let settings = FitSettings {
-        model: args.model.kind(),
+        model: Model::of(args.model.kind()),
         train: match args.train {
             Train::All => None,
             Train::Rows(rows) => Some(rows),
         },
         draw: args.draw,
-        solver: SolverOptions {
-            projection: args.project,
-            seed: args.seed,
-            population: args.population.map_or(population, |n| n as usize),
-            generations: args.generations.map_or(generations, |n| n as usize),
-        },
+        solver,
+        options,
         serial: args.serial.clone().unwrap_or_default(),
         created: args.created.clone().unwrap_or_default(),
     };
-    let fit = match fit(&log.dataset, &stage, solver.as_ref(), &settings) {
+    let fit = match fit(&log.dataset, &stage, &settings) {
         Err(error) if interrupt::requested() => {
             return Err(HostError::Interrupted {
                 kept: format!("no parameter blob was written: {error}"),
@@ -143,6 +146,7 @@ pub fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
             None
         ),
         text::parameters(
+            fit.model,
             &fit.solution.parameters,
             &Parameters::designed(stage),
             &fit.uncertainty.standard_error,
@@ -159,14 +163,7 @@ pub fn write_report(
     names: &[String],
     folder: &Path,
 ) -> Result<(), HostError> {
-    let mut errors = judge::pose_errors(&fit.set.decoder(), &log.dataset);
-    for (movement, zero) in log.dataset.movements.iter().zip(&fit.judgement.zeros) {
-        for error in errors[movement.rows.clone()].iter_mut().flatten() {
-            for (error, zero) in error.iter_mut().zip(zero.pose) {
-                *error -= zero;
-            }
-        }
-    }
+    let errors = (fit.decoded).errors_less(&fit.judgement.zeros, &log.dataset);
     let plots = [
         (
             "Errors over the log".to_owned(),

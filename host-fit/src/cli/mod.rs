@@ -18,12 +18,8 @@ use crate::input::log::{LogReading, ReadOptions, ReferenceUse};
 use crate::input::stage::Stage;
 use crate::interrupt;
 use crate::output::write_atomically;
-use crate::problem::parameters::Parameters;
 use crate::report::json::Circumstances;
 use crate::solve::Solver;
-use crate::solve::least_squares::multistart::LeastSquares;
-use crate::solve::search::kind::SearchKind;
-use crate::solve::search_solver::{self, PopulationSolver};
 use args::{Cli, Command};
 use clap::Parser;
 use runtime::ParameterSet;
@@ -32,15 +28,9 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// The solver that gives the best result: SHTLBO, finished by least squares.
-pub const DEFAULT_SOLVER: &str = search_solver::FINISHED;
-
-/// Names of the solvers.
+/// Names of the solvers, the default first.
 pub fn solver_names() -> Vec<&'static str> {
-    [DEFAULT_SOLVER, LeastSquares.name()]
-        .into_iter()
-        .chain(SearchKind::NAMES)
-        .collect()
+    Solver::all().map(Solver::name).collect()
 }
 
 /// How `eval` reads: it needs the reference, and the decoder marks saturated codes.
@@ -48,20 +38,6 @@ const EVAL: ReadOptions = ReadOptions {
     reference: ReferenceUse::Required,
     ..ReadOptions::DECODE
 };
-
-/// The solver of a name. A search among them watches for Ctrl-C and begins at `known`.
-fn solver(name: &str, known: Option<Parameters>) -> Result<Box<dyn Solver>, HostError> {
-    if name == LeastSquares.name() {
-        return Ok(Box::new(LeastSquares));
-    }
-    let mut search = PopulationSolver::by_name(name).ok_or_else(|| HostError::Usage {
-        argument: "--solver",
-        problem: format!("no solver is called {name}"),
-    })?;
-    search.interrupt = Some(interrupt::watch());
-    search.known = known;
-    Ok(Box::new(search))
-}
 
 /// Parses the command line, runs the command, prints an error if there is one.
 pub fn main() -> ExitCode {

@@ -67,6 +67,20 @@ pub struct SearchRanges {
     pub delta_m: Range,
 }
 
+impl SearchRanges {
+    /// The ranges of a term for A, B, C, by its key in `stage.toml`.
+    pub fn of(&self, key: &str) -> Option<[Range; 3]> {
+        Some(match key {
+            "eta" => self.eta,
+            "theta_deg" => [self.theta_rad; 3],
+            "a_per_m" => self.a_per_m,
+            "b_per_rad" => self.b_per_rad,
+            "c_per_rad" => self.c_per_rad,
+            _ => return None,
+        })
+    }
+}
+
 /// A stage as `stage.toml` describes it, checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stage {

@@ -25,8 +25,7 @@ pub fn run(args: &DemoArgs) -> Result<(), HostError> {
             temporary.path()
         }
     };
-    let solver = super::solver(super::DEFAULT_SOLVER, None)?;
-    let demo = job::run(folder, solver.as_ref())?;
+    let demo = job::run(folder)?;
     super::print(&as_text(&demo, args.zero_deviations))?;
     let mut end = format!(
         "\nall of this took {:.2} s\n",
@@ -76,6 +75,7 @@ fn as_text(demo: &Demo, zero_deviations: bool) -> String {
         out,
         "Table 7: parameters (lever arms in place of H, which no data can tell apart)\n{}",
         text::parameters(
+            fit.model,
             &fit.solution.parameters,
             &Parameters::designed(&demo.stage),
             &fit.uncertainty.standard_error,

@@ -4,7 +4,7 @@ use super::coordinates::Coordinates;
 use super::normal::{Column, Point, Square, cost, descent, gram};
 use super::scatter::{Offset, Q, Scatter, scatter};
 use crate::problem::Problem;
-use crate::problem::parameters::COUNT;
+use crate::problem::model::COUNT;
 use nalgebra::{Cholesky, Matrix3};
 
 /// Why a descent ended.

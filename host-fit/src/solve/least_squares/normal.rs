@@ -1,11 +1,11 @@
 //! Cost, gradient and curvature of the fit in the coordinates x = (G, r), from the scatter.
 //!
-//! x holds the nine entries of G row by row, then the nine ratios probe by probe. The residual
+//! x holds the nine entries of G row by row, then the ratios probe by probe. The residual
 //! of axis j is e_j = q_j - G_j s', and its derivative with respect to x is -J_j with
 //! J_j = s' at the entries of row j of G, and G_ji u_ik at the ratio r_ik.
 
 use super::scatter::{Q, Ratios, Scatter, U};
-use crate::problem::parameters::COUNT;
+use crate::problem::model::{COUNT, SLOPES_MAX};
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 /// The point (G, r) of a fit.
@@ -13,13 +13,13 @@ use nalgebra::{Matrix3, SMatrix, SVector};
 pub struct Point {
     /// Gain: pose (um, um, urad) per um of corrected signal, G = PM^-1 diag(1/eta).
     pub gain: Matrix3<f64>,
-    /// (a, b, c) / eta of each probe.
+    /// Slopes over eta of each probe.
     pub ratios: Ratios,
 }
 
-/// 18 by 18.
+/// One row and column for each number of x, or for each parameter.
 pub type Square = SMatrix<f64, COUNT, COUNT>;
-/// 18 numbers.
+/// The numbers of x, or the parameters.
 pub type Column = SVector<f64, COUNT>;
 
 /// Column of x, and factors by the axes, of the regressor `z`: the sparse rows of J.
@@ -27,7 +27,7 @@ fn jacobian_factor(gain: &Matrix3<f64>, axis: usize, column: usize) -> Option<(u
     if column < 9 {
         (column / 3 == axis).then_some((column % 3, 1.0))
     } else {
-        let probe = (column - 9) / 3;
+        let probe = (column - 9) / SLOPES_MAX;
         Some((U + column - 9, gain[(axis, probe)]))
     }
 }

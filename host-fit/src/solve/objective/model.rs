@@ -5,8 +5,9 @@
 //! PM^-1 (s / phi - delta / eta) = G (s' - delta) with G = PM^-1 diag(1/eta) and
 //! s' = s / (phi / eta), and three divisions are one division by their product.
 
-use super::lanes::{Lanes, dot, each};
-use crate::problem::TrainRow;
+use super::lanes::{Individuals, Lanes, dot, each};
+use crate::problem::model::Model;
+use crate::problem::{Problem, TrainRow};
 
 /// PM and its inverse (equations 11, 32).
 #[derive(Clone, Copy, Debug)]
@@ -70,24 +71,43 @@ pub fn inverse(m: &[[Lanes; 3]; 3]) -> [[Lanes; 3]; 3] {
     ]
 }
 
+/// (a, b, c, ..) / eta of one probe.
+pub type Ratios<const K: usize> = [Lanes; K];
+
 /// What the rows need to know of the parameters: the gain and the ratios.
 #[derive(Clone, Copy, Debug)]
-pub struct Linearized {
+pub struct Linearized<const K: usize> {
     /// G = PM^-1 diag(1/eta), rows X, Y, Rz.
     pub gain: [[Lanes; 3]; 3],
-    /// (a, b, c) / eta of A, B, C.
-    pub ratios: [[Lanes; 3]; 3],
+    /// The slopes over eta of A, B, C.
+    pub ratios: [Ratios<K>; 3],
 }
 
-impl Linearized {
-    /// Of a plane, eta and slopes: a of A, B, C, then b, then c.
+impl<const K: usize> Linearized<K> {
+    /// Of a plane, and eta and slopes by model: those that it does not fit are 1 and 0. They
+    /// stand in `u` from `eta_at` on: eta of A, B, C, then each slope of A, B, C.
     #[inline(always)]
-    pub fn new(plane: &Plane, eta: [Lanes; 3], slopes: [[Lanes; 3]; 3]) -> Self {
+    pub fn new(
+        plane: &Plane,
+        model: &Model,
+        u: &Individuals<'_>,
+        eta_at: usize,
+    ) -> (Self, [Lanes; 3]) {
+        let eta = if model.fits_gain() {
+            u.three(eta_at)
+        } else {
+            [Lanes::splat(1.0); 3]
+        };
         let per_eta = each(|k| Lanes::splat(1.0) / eta[k]);
-        Self {
-            gain: each(|i| each(|k| plane.inverse[i][k] * per_eta[k])),
-            ratios: each(|k| each(|axis| slopes[axis][k] * per_eta[k])),
+        let mut ratios = [[Lanes::ZERO; K]; 3];
+        for slope in 0..model.fitted_slopes().min(K) {
+            let slopes = u.three(eta_at + 3 + 3 * slope);
+            for probe in 0..3 {
+                ratios[probe][slope] = slopes[probe] * per_eta[probe];
+            }
         }
+        let gain = each(|i| each(|k| plane.inverse[i][k] * per_eta[k]));
+        (Self { gain, ratios }, eta)
     }
 
     /// Decoded pose minus reference, without the zero deviation (equation 31): um, um, urad.
@@ -98,11 +118,23 @@ impl Linearized {
     }
 }
 
-/// phi / eta = 1 + r v of the three probes (equation 33), for ratios r = (a, b, c) / eta.
+/// phi / eta = 1 + r v of the three probes (equation 33), for the slopes' ratios r.
 #[inline(always)]
-pub fn shares(ratios: &[[Lanes; 3]; 3], row: &TrainRow) -> [Lanes; 3] {
-    let [z, rx, ry] = row.vertical;
-    each(|k| ((ratios[k][0] * z + ratios[k][1] * rx) + ratios[k][2] * ry) + 1.0)
+pub fn shares<const K: usize>(ratios: &[Ratios<K>; 3], row: &TrainRow) -> [Lanes; 3] {
+    each(|probe| {
+        let mut sum = ratios[probe][0] * row.slopes[0];
+        for slope in 1..K {
+            sum += ratios[probe][slope] * row.slopes[slope];
+        }
+        sum + 1.0
+    })
+}
+
+/// The weighted fitness of sums of squared errors of X, Y, Rz.
+#[inline(always)]
+pub fn fitness(problem: &Problem<'_>, squares: [Lanes; 3]) -> Lanes {
+    let [x, y, rz] = problem.weights;
+    ((squares[0] * x + squares[1] * y) + squares[2] * rz).map(|sum| problem.fitness(sum))
 }
 
 /// s' = s / (phi / eta) of the three probes, um, with one division for all three.

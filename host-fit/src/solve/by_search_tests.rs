@@ -1,19 +1,20 @@
 use super::*;
+use crate::solve::Solver;
 use crate::solve::objective::sample::{dataset, problem, stage, truth};
 use crate::solve::search::run::StopReason;
+use runtime::ModelKind;
 use std::sync::atomic::AtomicBool;
 
 fn options(projection: Projection, generations: usize) -> SolverOptions {
     SolverOptions {
-        projection,
-        seed: 1,
         population: 30,
         generations,
+        ..SolverOptions::new(projection, 1)
     }
 }
 
-fn solver(name: &str) -> PopulationSolver {
-    PopulationSolver::by_name(name).expect("a known name")
+fn solver(name: &str) -> Solver {
+    Solver::by_name(name).expect("a known name")
 }
 
 #[test]
@@ -21,7 +22,9 @@ fn shtlbo_on_the_linear_form_finds_the_least_squares_optimum() {
     let (stage, dataset) = (stage(), dataset(40, 5));
     let problem = problem(&dataset, &stage, ModelKind::M31);
     let options = options(Projection::Linear, 300);
-    let exact = LeastSquares.solve(&problem, &options).expect("a fit");
+    let exact = Solver::LeastSquares
+        .solve(&problem, &options)
+        .expect("a fit");
     for seed in 1..=3 {
         let options = SolverOptions {
             seed,
@@ -48,13 +51,15 @@ fn the_finish_makes_every_seed_end_at_the_least_squares_optimum() {
     ] {
         let problem = problem(&dataset, &stage, model);
         let options = options(Projection::Linear, 100);
-        let exact = LeastSquares.solve(&problem, &options).expect("a fit");
+        let exact = Solver::LeastSquares
+            .solve(&problem, &options)
+            .expect("a fit");
         for seed in 1..=3 {
             let options = SolverOptions {
                 seed,
                 ..options.clone()
             };
-            let found = solver(FINISHED).solve(&problem, &options).expect("a fit");
+            let found = Solver::Finished.solve(&problem, &options).expect("a fit");
             assert!(
                 (found.cost / exact.cost - 1.0).abs() < 1e-9,
                 "{model:?}, seed {seed}: {} and {}",
@@ -111,11 +116,11 @@ fn a_warm_start_begins_at_the_known_parameters() {
     let (stage, dataset) = (stage(), dataset(20, 5));
     let problem = problem(&dataset, &stage, ModelKind::M31);
     for projection in [Projection::None, Projection::Delta, Projection::Linear] {
-        let mut warm = solver("shtlbo");
-        warm.known = Some(truth());
-        let found = warm
-            .solve(&problem, &options(projection, 1))
-            .expect("a fit");
+        let warm = SolverOptions {
+            known: Some(truth()),
+            ..options(projection, 1)
+        };
+        let found = solver("shtlbo").solve(&problem, &warm).expect("a fit");
         assert!(problem.fitness(found.cost) < 3.0, "{}", projection.name());
         let cold = solver("shtlbo").solve(&problem, &options(projection, 1));
         assert!(cold.is_err() || problem.fitness(cold.expect("a fit").cost) > 4.0);
@@ -127,9 +132,11 @@ fn an_interrupted_search_gives_its_best_so_far_and_says_so() {
     static FLAG: AtomicBool = AtomicBool::new(true);
     let (stage, dataset) = (stage(), dataset(20, 5));
     let problem = problem(&dataset, &stage, ModelKind::M31);
-    let mut interrupted = solver("shtlbo");
-    interrupted.interrupt = Some(&FLAG);
-    let found = interrupted.solve(&problem, &options(Projection::None, 1_000_000));
+    let interrupted = SolverOptions {
+        interrupt: Some(&FLAG),
+        ..options(Projection::None, 1_000_000)
+    };
+    let found = solver("shtlbo").solve(&problem, &interrupted);
     let found = found.expect("the first population has a best");
     assert!(found.stopped.contains(&StopReason::Interrupted.to_string()));
     assert_eq!(found.evaluations, 30);
@@ -142,6 +149,6 @@ fn a_form_without_unknowns_is_refused_with_what_to_do() {
     let refused = solver("shtlbo").solve(&problem, &options(Projection::Linear, 1));
     assert!(matches!(
         refused,
-        Err(SolveError::Unsupported { model: 30, .. })
+        Err(SolveError::Unsupported { model: "30", .. })
     ));
 }
