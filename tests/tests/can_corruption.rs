@@ -4,14 +4,12 @@
 use embedded_can::Frame;
 use hal_adapters::can::e2e::unprotect;
 use hal_adapters::can::{BusFrame, Layout, SensorReceiver, StampedFrame, Timing, sensor};
-use hal_adapters::fault::{Damage, Fault, FaultRates, Faulty, Random};
-use hal_adapters::source::FrameSource;
+use hal_adapters::fault::{Fault, FaultRates, Faulty, Random};
 use runtime::calibration::Origin;
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeGeometry;
 use runtime::model::Sensitivity;
 use runtime::{Calibration, Decoder, ModelKind, PlanarPose, RawFrame, Reading, Status};
-use std::convert::Infallible;
 
 /// A stage near the designed one.
 fn decoder() -> Decoder {
@@ -66,14 +64,13 @@ struct Ticks {
     left: Vec<BusFrame>,
 }
 
-impl FrameSource for Ticks {
-    type Frame = StampedFrame;
-    type Error = Infallible;
+impl Iterator for Ticks {
+    type Item = StampedFrame;
 
-    fn next_frame(&mut self) -> Result<Option<StampedFrame>, Infallible> {
+    fn next(&mut self) -> Option<StampedFrame> {
         if self.left.is_empty() {
             if self.next == self.end {
-                return Ok(None);
+                return None;
             }
             let frames = sensor::frames(Layout::Bits16, &tick(self.next));
             self.left = frames.map(BusFrame::from).collect();
@@ -81,7 +78,8 @@ impl FrameSource for Ticks {
             self.next += 1;
         }
         let time_us = u64::from(self.next) * 2_000;
-        Ok(self.left.pop().map(|frame| StampedFrame { time_us, frame }))
+        let frame = self.left.pop()?;
+        Some(StampedFrame { time_us, frame })
     }
 }
 
@@ -122,7 +120,7 @@ fn run(ticks: u32, rates: FaultRates, damaging: &[Fault], seed: u64) -> Outcome 
         valid_poses: 0,
         wrong_poses: 0,
     };
-    while let Ok(Some(stamped)) = source.next_frame() {
+    for stamped in source.by_ref() {
         out.frames += 1;
         let now_us = stamped.time_us as u32;
         let Some(got) = receiver.take(&stamped.frame, now_us).tick else {

@@ -1,12 +1,12 @@
 //! Requests to the decoding node and its answers, and everything else that comes now and
 //! then: [`Mailbox`] numbers what is sent and checks what is received.
 
-use super::e2e::{Payload, protect, unprotect};
-use super::frame::Coded;
-use super::notice::BusFault;
+use super::e2e::{Payload, protect};
+use super::frame::{Coded, standard};
+use super::notice::{BusFault, open};
 use super::status::{HealthPage, NodeStatus};
-use super::table::{FRAME_BYTES, Message};
-use embedded_can::{Frame, Id};
+use super::table::Message;
+use embedded_can::Frame;
 use runtime::rezero::RezeroRefusal;
 
 /// What a node is asked for.
@@ -266,7 +266,8 @@ impl Told {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mailbox {
     sent: [u8; 5],
-    received: [Option<[u8; FRAME_BYTES]>; 5],
+    /// Counter and payload of the last frame of each message.
+    received: [Option<(u8, Payload)>; 5],
 }
 
 impl Mailbox {
@@ -285,30 +286,17 @@ impl Mailbox {
     /// comes now and then has no rhythm to keep. The last frame again, bit for bit, is: a
     /// program that sends one request and ends must choose another token each time.
     pub fn take<F: Frame>(&mut self, frame: &F) -> Option<Result<Told, BusFault>> {
-        let Id::Standard(id) = frame.id() else {
-            return None;
-        };
+        let (id, data) = standard(frame)?;
         let k = Told::MESSAGES.iter().position(|m| m.id() == id)?;
         let (message, last) = (*Told::MESSAGES.get(k)?, self.received.get_mut(k)?);
-        let data = if frame.is_remote_frame() {
-            &[]
-        } else {
-            frame.data()
+        let opened = match open(message, data) {
+            Ok(opened) => opened,
+            Err(fault) => return Some(Err(fault)),
         };
-        let Some(bytes) = data
-            .first_chunk::<FRAME_BYTES>()
-            .filter(|_| data.len() == FRAME_BYTES)
-        else {
-            let bytes = data.len() as u8;
-            return Some(Err(BusFault::WrongLength { message, bytes }));
-        };
-        let Some((_, payload)) = unprotect(message.spec().key, bytes) else {
-            return Some(Err(BusFault::WrongCheck { message }));
-        };
-        if last.replace(*bytes) == Some(*bytes) {
+        if last.replace(opened) == Some(opened) {
             return Some(Err(BusFault::Repeated { message }));
         }
-        Some(Ok(Told::read(k, payload)))
+        Some(Ok(Told::read(k, opened.1)))
     }
 }
 

@@ -24,6 +24,9 @@
 //! | failed check | WRONGCRC |
 //! | stale ([`super::notice`]) | NONEWDATA |
 
+use super::notice::BusFault;
+use super::table::Message;
+
 /// The 52 bits that a protected frame carries beside check and counter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Payload {
@@ -138,10 +141,17 @@ pub enum Verdict {
 impl Verdict {
     /// Whether the frame's data may be used.
     pub const fn is_used(self) -> bool {
-        matches!(
-            self,
-            Self::First | Self::Next | Self::Lost { .. } | Self::Resumed
-        )
+        !matches!(self, Self::Repeated | Self::WrongSequence { .. })
+    }
+
+    /// What is wrong with a frame of `message` and this verdict, or missing before it.
+    pub const fn fault(self, message: Message) -> Option<BusFault> {
+        match self {
+            Self::First | Self::Next | Self::Resumed => None,
+            Self::Lost { frames } => Some(BusFault::Lost { message, frames }),
+            Self::Repeated => Some(BusFault::Repeated { message }),
+            Self::WrongSequence { ahead } => Some(BusFault::WrongSequence { message, ahead }),
+        }
     }
 }
 

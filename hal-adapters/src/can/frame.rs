@@ -138,6 +138,21 @@ impl Frame for BusFrame {
     }
 }
 
+/// Identifier and data of a standard frame; a remote frame has no data. `None` for an extended
+/// frame: the protocol has none.
+#[inline(always)]
+pub(super) fn standard<F: Frame>(frame: &F) -> Option<(StandardId, &[u8])> {
+    let Id::Standard(id) = frame.id() else {
+        return None;
+    };
+    let data: &[u8] = if frame.is_remote_frame() {
+        &[]
+    } else {
+        frame.data()
+    };
+    Some((id, data))
+}
+
 /// A frame and when it was received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StampedFrame {

@@ -1,6 +1,7 @@
 //! What a receiver notices: faults of frames and of the source, counted.
 
-use super::table::Message;
+use super::e2e::{Payload, unprotect};
+use super::table::{FRAME_BYTES, Message};
 
 /// Times in us by which a receiver judges, below 2^30. All are data: nothing here reads a clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,6 +77,23 @@ pub enum BusFault {
     },
 }
 
+/// Counter and payload of a frame of `message`, from its data.
+///
+/// # Errors
+/// [`BusFault::WrongLength`] and [`BusFault::WrongCheck`].
+#[inline(always)]
+pub(super) fn open(message: Message, data: &[u8]) -> Result<(u8, Payload), BusFault> {
+    match data.first_chunk::<FRAME_BYTES>() {
+        Some(bytes) if data.len() == FRAME_BYTES => {
+            unprotect(message.spec().key, bytes).ok_or(BusFault::WrongCheck { message })
+        }
+        _ => {
+            let bytes = data.len() as u8;
+            Err(BusFault::WrongLength { message, bytes })
+        }
+    }
+}
+
 impl core::fmt::Display for BusFault {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let name = |message: &Message| message.spec().name;
@@ -121,6 +139,19 @@ pub struct BusHealth {
 }
 
 impl BusHealth {
+    /// Nothing counted yet.
+    pub(super) const NONE: Self = Self {
+        good: 0,
+        wrong_length: 0,
+        wrong_check: 0,
+        repeated: 0,
+        wrong_sequence: 0,
+        lost: 0,
+        late: 0,
+        incomplete: 0,
+        stale: 0,
+    };
+
     pub(super) fn count(&mut self, fault: &BusFault) {
         let (field, by) = match fault {
             BusFault::WrongLength { .. } => (&mut self.wrong_length, 1),
@@ -151,4 +182,12 @@ impl<T> Taken<T> {
         tick: None,
         fault: None,
     };
+
+    #[inline(always)]
+    pub(super) fn map<U>(self, f: impl FnOnce(T) -> U) -> Taken<U> {
+        Taken {
+            tick: self.tick.map(f),
+            fault: self.fault,
+        }
+    }
 }

@@ -2,12 +2,12 @@
 //! so a reader sees from every frame alone whether its value may be used, and the bits on the
 //! bus are the bits of the decoder.
 
-use super::e2e::{Payload, Sequence, Verdict, protect, unprotect};
-use super::frame::Coded;
+use super::e2e::{Payload, Sequence, protect};
+use super::frame::{Coded, standard};
 use super::group::{Group, GroupTick};
-use super::notice::{BusFault, BusHealth, Taken, Timing};
-use super::table::{FRAME_BYTES, Message, VERTICAL_TICKS};
-use embedded_can::{Frame, Id};
+use super::notice::{BusFault, BusHealth, Taken, Timing, open};
+use super::table::{Message, VERTICAL_TICKS};
+use embedded_can::Frame;
 use runtime::{PlanarPose, Reading, Status};
 
 /// The planar axes, in the order of the pose.
@@ -117,12 +117,12 @@ pub struct ReceivedAxis {
 /// Receives pose frames.
 #[derive(Clone, Debug)]
 pub struct PoseReceiver {
-    planar: Group<3>,
+    planar: Group,
     sequences: [Sequence; 3],
     vertical: [Option<ReceivedAxis>; 3],
 }
 
-fn received(tick: &GroupTick<3>) -> ReceivedPose {
+fn received(tick: &GroupTick) -> ReceivedPose {
     let lost = Status::PLANAR_INVALID.with(Status::FRAMES_MISSED);
     let [x, y, rz] = [0, 1, 2].map(|k| tick.payload(k));
     let status = match (x, y, rz) {
@@ -148,7 +148,7 @@ impl PoseReceiver {
     /// A receiver that has seen no frame.
     pub const fn new(timing: Timing) -> Self {
         Self {
-            planar: Group::new(timing),
+            planar: Group::new(PLANAR.len(), timing),
             sequences: [Sequence::START; 3],
             vertical: [None; 3],
         }
@@ -156,15 +156,10 @@ impl PoseReceiver {
 
     /// Takes one frame, received at `now_us`. Frames of other messages are ignored.
     pub fn take<F: Frame>(&mut self, frame: &F, now_us: u32) -> Taken<ReceivedPose> {
-        let Id::Standard(id) = frame.id() else {
+        let Some((id, data)) = standard(frame) else {
             return Taken::NOTHING;
         };
         let is = |message: &Message| message.id() == id;
-        let data = if frame.is_remote_frame() {
-            &[]
-        } else {
-            frame.data()
-        };
         let planar = (0usize..).zip(PLANAR).find(|(_, message)| is(message));
         if let Some((k, message)) = planar {
             return self.planar.take(k, message, data, now_us, received);
@@ -178,40 +173,25 @@ impl PoseReceiver {
 
     fn take_vertical(&mut self, k: usize, data: &[u8], time_us: u32) -> Option<BusFault> {
         let (message, sequence) = (*VERTICAL.get(k)?, self.sequences.get_mut(k)?);
-        let fault = match data.first_chunk::<FRAME_BYTES>() {
-            Some(bytes) if data.len() == FRAME_BYTES => {
-                match unprotect(message.spec().key, bytes) {
-                    None => BusFault::WrongCheck { message },
-                    Some((counter, payload)) => match sequence.judge(counter) {
-                        Verdict::Repeated => BusFault::Repeated { message },
-                        Verdict::WrongSequence { ahead } => {
-                            BusFault::WrongSequence { message, ahead }
-                        }
-                        used => {
-                            *self.vertical.get_mut(k)? = Some(ReceivedAxis {
-                                value: f32::from_bits(payload.long),
-                                status: Status::from_bits(payload.short),
-                                time_us,
-                            });
-                            match used {
-                                Verdict::Lost { frames } => BusFault::Lost { message, frames },
-                                _ => return None,
-                            }
-                        }
-                    },
-                }
-            }
-            _ => BusFault::WrongLength {
-                message,
-                bytes: data.len() as u8,
-            },
+        let (counter, payload) = match open(message, data) {
+            Ok(opened) => opened,
+            Err(fault) => return Some(self.planar.note(fault)),
         };
+        let verdict = sequence.judge(counter);
+        if verdict.is_used() {
+            *self.vertical.get_mut(k)? = Some(ReceivedAxis {
+                value: f32::from_bits(payload.long),
+                status: Status::from_bits(payload.short),
+                time_us,
+            });
+        }
+        let fault = verdict.fault(message)?;
         Some(self.planar.note(fault))
     }
 
     /// What the passing of time gives, as [`super::SensorReceiver::poll`].
     pub fn poll(&mut self, now_us: u32) -> Taken<ReceivedPose> {
-        self.planar.poll(now_us, received)
+        self.planar.poll(now_us).map(received)
     }
 
     /// When [`PoseReceiver::poll`] has something to say if no frame comes.

@@ -26,7 +26,7 @@ pub struct Bus {
 impl Bus {
     /// Sets the controller up to join the bus by itself, to come back from bus-off by itself
     /// and to take commands only.
-    pub fn new(instance: stm32f4xx_hal::can::Can<CAN1>) -> Self {
+    pub fn new(instance: board::CanPins) -> Self {
         let mut can = bxcan::Can::builder(instance)
             .set_bit_timing(board::CAN_BIT_TIMING)
             .set_automatic_retransmit(true)

@@ -35,7 +35,6 @@ fn bus(frame: &RawFrame) {
             black_box(receiver.take(&black_box(BusFrame::from(coded)), 1));
         }
         black_box((receiver.poll(2), receiver.deadline_us(), *receiver.health()));
-        black_box(receiver.sensor_time());
     }
     for coded in sender.frames(&black_box(Reading::default())) {
         let frame = black_box(BusFrame::from(coded));
