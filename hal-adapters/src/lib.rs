@@ -5,7 +5,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`source`] | the traits [`FrameSource`] and [`PoseSink`], and a source over a slice |
+//! | [`source`] | the trait [`FrameSource`], and a source over a slice |
 //! | [`adc`] | converters on SPI: codes to raw frames |
 //! | [`can`] | frames, signals and identifiers; coding, protection, assembly of a tick |
 //! | [`candump`] | one line of a `candump -L` log, read and written |
@@ -27,4 +27,4 @@ pub mod record;
 pub mod socketcan;
 pub mod source;
 
-pub use source::{FrameSource, PoseSink};
+pub use source::FrameSource;

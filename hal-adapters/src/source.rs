@@ -1,6 +1,4 @@
-//! Where frames come from and where poses go.
-
-use runtime::Reading;
+//! Where frames come from.
 
 /// Gives one frame after the other: a converter, a bus, a log.
 ///
@@ -21,32 +19,12 @@ pub trait FrameSource {
     fn next_frame(&mut self) -> Result<Option<Self::Frame>, Self::Error>;
 }
 
-/// Takes one reading per servo period: a bus, a file, a control loop.
-pub trait PoseSink {
-    /// The error of the bus or file below, kept whole.
-    type Error;
-
-    /// Takes the reading of one tick.
-    ///
-    /// # Errors
-    /// Whatever the bus or file below reports.
-    fn put_reading(&mut self, reading: &Reading) -> Result<(), Self::Error>;
-}
-
 impl<S: FrameSource + ?Sized> FrameSource for &mut S {
     type Frame = S::Frame;
     type Error = S::Error;
 
     fn next_frame(&mut self) -> Result<Option<Self::Frame>, Self::Error> {
         (**self).next_frame()
-    }
-}
-
-impl<S: PoseSink + ?Sized> PoseSink for &mut S {
-    type Error = S::Error;
-
-    fn put_reading(&mut self, reading: &Reading) -> Result<(), Self::Error> {
-        (**self).put_reading(reading)
     }
 }
 
