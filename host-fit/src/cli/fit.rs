@@ -1,6 +1,6 @@
 //! `host-fit fit`.
 
-use super::args::{BadRowsChoice, FitArgs, Train};
+use super::args::Train;
 use crate::cli::error::HostError;
 use crate::fit::{Fit, FitError, FitSettings, fit};
 use crate::input::log;
@@ -10,16 +10,118 @@ use crate::interrupt;
 use crate::judge;
 use crate::output;
 use crate::output::blob_file;
+use crate::problem::draw::Draw;
 use crate::problem::parameters::Parameters;
+use crate::report::html::{Page, Plot};
 use crate::report::json::{Report, of_fit};
-use crate::report::{html, plots, text};
+use crate::report::{plots, text};
 use crate::solve::search_solver::default_size;
-use crate::solve::{SolveError, SolverOptions};
+use crate::solve::{Projection, SolveError, SolverOptions};
+use clap::builder::PossibleValuesParser;
+use clap::{Args, ValueEnum};
+use runtime::ModelKind;
+use runtime::parameters::Text;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+/// The models on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum ModelChoice {
+    /// The best that this program has: today (31).
+    Auto,
+    /// Geometry only.
+    #[value(name = "12")]
+    M12,
+    /// Geometry and sensitivity.
+    #[value(name = "15")]
+    M15,
+    /// As 15, with a zero deviation for each movement.
+    #[value(name = "30")]
+    M30,
+    /// As 30, with a sensitivity that follows Z, Rx, Ry.
+    #[value(name = "31")]
+    M31,
+}
+
+impl ModelChoice {
+    /// The model that is fitted.
+    const fn kind(self) -> ModelKind {
+        match self {
+            Self::M12 => ModelKind::M12,
+            Self::M15 => ModelKind::M15,
+            Self::M30 => ModelKind::M30,
+            Self::M31 | Self::Auto => ModelKind::M31,
+        }
+    }
+}
+
+fn blob_text(value: &str) -> Result<Text, &'static str> {
+    Text::try_from(value).map_err(|_| "at most 32 bytes fit in the blob")
+}
+
+/// Arguments of `fit`.
+#[derive(Debug, Args)]
+pub(super) struct FitArgs {
+    /// Logs: CSV or CSV.gz, one or more.
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    stage: PathBuf,
+    /// Where to write the parameter blob.
+    #[arg(long, value_name = "params.bin")]
+    out: PathBuf,
+    /// Measurement model.
+    #[arg(long, value_enum, default_value = "auto")]
+    model: ModelChoice,
+    /// Solver. The default searches by SHTLBO and finishes by least squares, `lm` is least squares
+    /// alone, the others search only.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(super::solver_names()), default_value = super::DEFAULT_SOLVER)]
+    solver: String,
+    /// How much of the problem is solved in closed form.
+    #[arg(long, value_enum, default_value = "linear")]
+    project: Projection,
+    /// Rows to fit: `all` or a number.
+    #[arg(long, value_name = "N|all", default_value = "all")]
+    train: Train,
+    /// How rows are drawn.
+    #[arg(long, value_enum, default_value = "stratified")]
+    draw: Draw,
+    /// Individuals of a population: 100 as in the paper, or 16 with --project linear.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=100_000))]
+    population: Option<u32>,
+    /// Generations of a population: 100 as in the paper; with --project linear at most 1000,
+    /// fewer once the fitness hardly falls any more.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    generations: Option<u32>,
+    /// Seed of everything random.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Warm start: a search begins with the parameters of this blob among its population.
+    #[arg(long, value_name = "params.bin")]
+    start: Option<PathBuf>,
+    /// Threads; all cores if not given. The result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Serial number of the stage, for the blob; at most 32 bytes.
+    #[arg(long, value_name = "TEXT", value_parser = blob_text)]
+    serial: Option<Text>,
+    /// Creation time, for the blob, as you want it to read; at most 32 bytes.
+    #[arg(long, value_name = "TIME", value_parser = blob_text)]
+    created: Option<Text>,
+    /// What to do with rows that cannot be used.
+    #[arg(long, value_enum, default_value = "refuse")]
+    bad_rows: BadRows,
+    /// Write a report with plots into this folder.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Write the figures as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
 /// Reads, fits, judges; then writes blob, JSON and report, in this order.
-pub fn run(args: &FitArgs) -> Result<(), HostError> {
+pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let started = Instant::now();
     let inputs: Vec<&Path> = args
         .logs
@@ -38,10 +140,7 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
     interrupt::watch();
     let stage = Stage::from_file(&args.stage)?;
     let options = ReadOptions {
-        bad_rows: match args.bad_rows {
-            BadRowsChoice::Refuse => BadRows::Refuse,
-            BadRowsChoice::Skip => BadRows::Skip,
-        },
+        bad_rows: args.bad_rows,
         ..ReadOptions::default()
     };
     // Before the work, so that no blob is left without the figures that were asked for.
@@ -63,10 +162,7 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
     let (population, generations) = default_size(args.project);
     let settings = FitSettings {
         model: args.model.kind(),
-        train: match args.train {
-            Train::All => None,
-            Train::Rows(rows) => Some(rows),
-        },
+        train: args.train.0,
         draw: args.draw,
         solver: SolverOptions {
             projection: args.project,
@@ -123,7 +219,7 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
 }
 
 /// The figures of a fit for a terminal.
-pub fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
+fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
     format!(
         "Model ({}), {} rows in {} movements, {} fitted, {} skipped; solver {}: {} evaluations in {:.1} ms, {}\n\
          train fitness {:.4}\n\n{}\n{}",
@@ -152,7 +248,7 @@ pub fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
 }
 
 /// Writes `index.html` into a folder, which is made if it is missing.
-pub fn write_report(
+fn write_report(
     report: &Report,
     fit: &Fit,
     log: &LogReading,
@@ -168,17 +264,22 @@ pub fn write_report(
         }
     }
     let plots = [
-        (
-            "Errors over the log".to_owned(),
-            plots::errors_over_rows(report.zeros_in_words, &errors, &log.dataset)?,
-        ),
-        (
-            "Distribution of the errors".to_owned(),
-            plots::distribution("errors in units of their rms", &errors)?,
-        ),
+        Plot {
+            caption: "Errors over the log",
+            svg: plots::errors_over_rows(report.zeros_in_words, &errors, &log.dataset)?,
+        },
+        Plot {
+            caption: "Distribution of the errors",
+            svg: plots::distribution("errors in units of their rms", &errors)?,
+        },
     ];
     output::make_folder(folder)?;
-    let page = html::page(report, names, &plots);
-    output::write_atomically(&folder.join("index.html"), page.as_bytes())?;
+    let page = Page {
+        report,
+        zeros: report.zeros_in_words,
+        logs: names,
+        plots: &plots,
+    };
+    output::write_atomically(&folder.join("index.html"), page.to_html()?.as_bytes())?;
     Ok(())
 }

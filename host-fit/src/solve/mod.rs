@@ -10,7 +10,7 @@ use crate::problem::parameters::{ParameterId, Parameters};
 use std::time::Duration;
 
 /// How much of the problem is solved in closed form.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
     /// Nothing: every zero deviation is an unknown of its own, within its range (the paper).
     None,
