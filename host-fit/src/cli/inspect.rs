@@ -1,17 +1,29 @@
 //! `host-fit inspect`.
 
-use super::args::InspectArgs;
 use crate::cli::error::HostError;
 use crate::judge::parameters_of;
 use crate::output::blob_file;
 use crate::problem::model::{COUNT, Model};
 use crate::report::json::parameters;
+use clap::Args;
 use runtime::ParameterSet;
 use serde_json::json;
 use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub(super) struct InspectArgs {
+    /// The parameter blob.
+    #[arg(value_name = "params.bin")]
+    params: PathBuf,
+    /// Write everything as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
 
 /// Shows every field of a blob.
-pub fn run(args: &InspectArgs) -> Result<(), HostError> {
+pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     super::keep_apart(&[args.json.as_deref()], &[&args.params])?;
     let set = blob_file::read(&args.params)?;
     if let Some(path) = &args.json {

@@ -141,12 +141,8 @@ pub fn compare(
                     return Ok(runs);
                 }
                 let problem = problem(rows);
-                let Some(form) = Form::new(&problem, form).map(|f| (f, form)) else {
-                    continue;
-                };
                 let run = one_search(dataset, &problem, form, search, seed, floor, comparison);
-                done(&run);
-                runs.push(run);
+                runs.extend(run.inspect(&mut done));
             }
         }
     }
@@ -176,15 +172,17 @@ fn least_squares(
     })
 }
 
+/// `None` where the form has no unknowns to search for.
 fn one_search(
     dataset: &Dataset,
     problem: &Problem<'_>,
-    (form, projection): (Form<'_>, Projection),
+    projection: Projection,
     search: SearchKind,
     seed: u64,
     floor: f64,
     comparison: &Comparison,
-) -> Run {
+) -> Option<Run> {
+    let form = Form::new(problem, projection)?;
     let first = form.first_population(comparison.population, seed);
     let settings = Settings {
         seed,
@@ -202,7 +200,7 @@ fn one_search(
     let found = search.minimize(form.cost_function(), &settings, &criteria);
     let elapsed_s = started.elapsed().as_secs_f64();
     let solution = solution_of(problem, &form, &found).ok();
-    Run {
+    Some(Run {
         form: projection,
         solver: search.name(),
         seed,
@@ -213,7 +211,7 @@ fn one_search(
         elapsed_s,
         rms: solution.and_then(|solution| rms_over_all_rows(dataset, problem, &solution)),
         history: found.history,
-    }
+    })
 }
 
 /// Errors over all rows, by the decoder of the target, um, um, urad.

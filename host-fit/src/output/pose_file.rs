@@ -15,7 +15,7 @@ mod read;
 mod summary;
 mod text;
 
-pub use read::{PoseFileError, parse, read};
+pub use read::{PoseFileError, read};
 pub use summary::StatusCounts;
 pub use text::to_text;
 

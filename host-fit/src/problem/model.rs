@@ -16,6 +16,8 @@ pub const COUNT: usize = 3 * (GAIN_TERMS + SLOPES_MAX);
 pub struct Model {
     /// Name on the command line and in reports: the number of its equation in the paper.
     pub name: &'static str,
+    /// What it has, for the help text.
+    pub summary: &'static str,
     /// Its tag in the blob.
     pub kind: ModelKind,
     /// Its terms: the three of the gain, then at most [`SLOPES_MAX`] slopes.
@@ -30,6 +32,7 @@ pub struct Model {
 pub static MODELS: [Model; 4] = [
     Model {
         name: "12",
+        summary: "Geometry only",
         kind: ModelKind::M12,
         terms: &MODEL_31,
         fitted: 2,
@@ -37,6 +40,7 @@ pub static MODELS: [Model; 4] = [
     },
     Model {
         name: "15",
+        summary: "Geometry and sensitivity",
         kind: ModelKind::M15,
         terms: &MODEL_31,
         fitted: 3,
@@ -44,6 +48,7 @@ pub static MODELS: [Model; 4] = [
     },
     Model {
         name: "30",
+        summary: "As 15, with a zero deviation for each movement",
         kind: ModelKind::M30,
         terms: &MODEL_31,
         fitted: 3,
@@ -51,6 +56,7 @@ pub static MODELS: [Model; 4] = [
     },
     Model {
         name: "31",
+        summary: "As 30, with a sensitivity that follows Z, Rx, Ry",
         kind: ModelKind::M31,
         terms: &MODEL_31,
         fitted: 6,

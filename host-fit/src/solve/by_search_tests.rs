@@ -13,9 +13,7 @@ fn options(projection: Projection, generations: usize) -> SolverOptions {
     }
 }
 
-fn solver(name: &str) -> Solver {
-    Solver::by_name(name).expect("a known name")
-}
+const SHTLBO: Solver = Solver::Search(SearchKind::Shtlbo);
 
 #[test]
 fn shtlbo_on_the_linear_form_finds_the_least_squares_optimum() {
@@ -30,7 +28,7 @@ fn shtlbo_on_the_linear_form_finds_the_least_squares_optimum() {
             seed,
             ..options.clone()
         };
-        let found = solver("shtlbo").solve(&problem, &options).expect("a fit");
+        let found = SHTLBO.solve(&problem, &options).expect("a fit");
         assert!((found.cost / exact.cost - 1.0).abs() < 1e-6, "seed {seed}");
         for (have, want) in found.delta_m.iter().zip(&exact.delta_m) {
             for (have, want) in have.iter().zip(want) {
@@ -75,7 +73,7 @@ fn the_cost_of_a_solution_is_that_of_its_own_parameters_and_zero_deviations() {
     let (stage, dataset) = (stage(), dataset(20, 5));
     let problem = problem(&dataset, &stage, ModelKind::M31);
     for projection in [Projection::None, Projection::Delta, Projection::Linear] {
-        let found = solver("tlbo")
+        let found = Solver::Search(SearchKind::Tlbo)
             .solve(&problem, &options(projection, 60))
             .expect("a fit");
         let again = crate::solve::objective::sample::fitness_by_the_runtime(
@@ -98,7 +96,7 @@ fn a_gain_outside_its_box_is_brought_back_with_the_cost_that_it_has_there() {
     // The truth is 0.87.
     stage.search.eta[0].low = 0.9;
     let problem = problem(&dataset, &stage, ModelKind::M31);
-    let found = solver("shtlbo")
+    let found = SHTLBO
         .solve(&problem, &options(Projection::Linear, 300))
         .expect("a fit");
     assert_eq!(found.parameters.eta()[0], 0.9);
@@ -120,9 +118,9 @@ fn a_warm_start_begins_at_the_known_parameters() {
             known: Some(truth()),
             ..options(projection, 1)
         };
-        let found = solver("shtlbo").solve(&problem, &warm).expect("a fit");
+        let found = SHTLBO.solve(&problem, &warm).expect("a fit");
         assert!(problem.fitness(found.cost) < 3.0, "{}", projection.name());
-        let cold = solver("shtlbo").solve(&problem, &options(projection, 1));
+        let cold = SHTLBO.solve(&problem, &options(projection, 1));
         assert!(cold.is_err() || problem.fitness(cold.expect("a fit").cost) > 4.0);
     }
 }
@@ -136,7 +134,7 @@ fn an_interrupted_search_gives_its_best_so_far_and_says_so() {
         interrupt: Some(&FLAG),
         ..options(Projection::None, 1_000_000)
     };
-    let found = solver("shtlbo").solve(&problem, &interrupted);
+    let found = SHTLBO.solve(&problem, &interrupted);
     let found = found.expect("the first population has a best");
     assert!(found.stopped.contains(&StopReason::Interrupted.to_string()));
     assert_eq!(found.evaluations, 30);
@@ -146,7 +144,7 @@ fn an_interrupted_search_gives_its_best_so_far_and_says_so() {
 fn a_form_without_unknowns_is_refused_with_what_to_do() {
     let (stage, dataset) = (stage(), dataset(20, 5));
     let problem = problem(&dataset, &stage, ModelKind::M30);
-    let refused = solver("shtlbo").solve(&problem, &options(Projection::Linear, 1));
+    let refused = SHTLBO.solve(&problem, &options(Projection::Linear, 1));
     assert!(matches!(
         refused,
         Err(SolveError::Unsupported { model: "30", .. })

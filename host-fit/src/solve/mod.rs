@@ -20,7 +20,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// How much of the problem is solved in closed form.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
     /// Nothing: every zero deviation is an unknown of its own, within its range (the paper).
     None,
@@ -55,12 +55,16 @@ pub enum Solver {
 
 impl Solver {
     /// All of them, the default first.
-    pub fn all() -> impl Iterator<Item = Self> {
-        let searches = SearchKind::ALL.into_iter().map(Self::Search);
-        [Self::Finished, Self::LeastSquares]
-            .into_iter()
-            .chain(searches)
-    }
+    pub const ALL: [Self; SearchKind::ALL.len() + 2] = {
+        let mut all = [Self::Finished; SearchKind::ALL.len() + 2];
+        all[1] = Self::LeastSquares;
+        let mut k = 0;
+        while k < SearchKind::ALL.len() {
+            all[k + 2] = Self::Search(SearchKind::ALL[k]);
+            k += 1;
+        }
+        all
+    };
 
     /// The name on the command line and in reports.
     pub const fn name(self) -> &'static str {
@@ -69,11 +73,6 @@ impl Solver {
             Self::LeastSquares => "lm",
             Self::Search(kind) => kind.name(),
         }
-    }
-
-    /// The solver of that name.
-    pub fn by_name(name: &str) -> Option<Self> {
-        Self::all().find(|solver| solver.name() == name)
     }
 
     /// Finds parameters of low cost.

@@ -1,6 +1,6 @@
 //! Lines of a candump log to ticks, by the receiver that a controller has.
 
-use super::{ImportArgs, ImportError, text};
+use super::{ImportError, ImportSettings, text};
 use hal_adapters::can::{BusFault, BusHealth, Layout, SensorReceiver, StampedFrame, Timing};
 use hal_adapters::candump::{LineError, LogLine};
 use runtime::RawFrame;
@@ -60,7 +60,7 @@ const TIMING: Timing = Timing {
 ///
 /// # Errors
 /// `Unreadable`, `BadLine`, `NotText`, `SeveralInterfaces`, `NoTicks`.
-pub fn read(args: &ImportArgs, layout: Layout) -> Result<BusReading, ImportError> {
+pub fn read(args: &ImportSettings, layout: Layout) -> Result<BusReading, ImportError> {
     let path = args.bus.as_path();
     let bytes = text::read(path)?;
     let mut collector = Collector {
@@ -110,7 +110,7 @@ pub fn read(args: &ImportArgs, layout: Layout) -> Result<BusReading, ImportError
 fn chosen(
     interface: &mut Option<String>,
     found: &LogLine<'_>,
-    args: &ImportArgs,
+    args: &ImportSettings,
     path: &Path,
     line: usize,
 ) -> Result<bool, ImportError> {
