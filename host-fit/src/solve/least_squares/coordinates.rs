@@ -14,8 +14,8 @@ use runtime::geometry::{ProbeGeometry, inverse_rows, matrix};
 pub trait Coordinates {
     /// The point (G, r), or `None` where PM is singular or an eta is zero.
     fn point(&self, unknowns: &Column) -> Option<Point>;
-    /// Derivative of x = (G, r) with respect to the unknowns.
-    fn jacobian(&self, unknowns: &Column, point: &Point) -> Square;
+    /// Derivative of x = (G, r) with respect to the unknowns; `None` where these are x itself.
+    fn jacobian(&self, unknowns: &Column, point: &Point) -> Option<Square>;
     /// Which unknowns may change.
     fn free(&self) -> [bool; COUNT];
     /// The nearest unknowns within the box, if there is one.
@@ -52,8 +52,8 @@ impl Coordinates for Gains {
         })
     }
 
-    fn jacobian(&self, _: &Column, _: &Point) -> Square {
-        Square::identity()
+    fn jacobian(&self, _: &Column, _: &Point) -> Option<Square> {
+        None
     }
 
     fn free(&self) -> [bool; COUNT] {
@@ -140,7 +140,7 @@ impl Coordinates for Boxed<'_> {
         point_of(&self.parameters(unknowns))
     }
 
-    fn jacobian(&self, unknowns: &Column, point: &Point) -> Square {
+    fn jacobian(&self, unknowns: &Column, point: &Point) -> Option<Square> {
         let p = self.parameters(unknowns);
         let mut chain = parameter_jacobian(&p, point);
         let theta = p.geometry().misalignment_rad;
@@ -157,7 +157,7 @@ impl Coordinates for Boxed<'_> {
                 chain[(row, k)] = per_arm * ranges[k].width();
             }
         }
-        chain
+        Some(chain)
     }
 
     fn free(&self) -> [bool; COUNT] {

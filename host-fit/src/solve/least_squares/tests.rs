@@ -105,8 +105,8 @@ fn gradient_matches_differences_of_the_cost() {
     };
     let point = boxed.point(&at).expect("regular");
     let sums = scatter(&problem, &point.ratios, &offsets).expect("no pole");
-    let gradient =
-        boxed.jacobian(&at, &point).transpose() * descent(&sums, &point.gain, problem.weights);
+    let gradient = boxed.jacobian(&at, &point).expect("a chain").transpose()
+        * descent(&sums, &point.gain, problem.weights);
     for k in 0..COUNT {
         let step = 1e-4 * at[k].abs().max(0.05);
         let (mut up, mut down) = (at, at);
