@@ -1,5 +1,5 @@
-//! Frames by value: coded ones on their way to any controller, and an owned frame for
-//! replays, wrappers and logs.
+//! Frames by value: [`Coded`], ready for any CAN controller, and [`BusFrame`], for receivers,
+//! logs and replays.
 
 use super::table::Message;
 use embedded_can::{Frame, Id, StandardId};
@@ -7,7 +7,7 @@ use embedded_can::{Frame, Id, StandardId};
 /// A protected frame, ready to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coded {
-    /// Which message.
+    /// The message.
     pub message: Message,
     /// Its eight bytes.
     pub bytes: [u8; 8],

@@ -1,6 +1,21 @@
-//! Pose frames: each axis is the decoder's own `f32` word with the 20 low bits of the status,
-//! so a reader sees from every frame alone whether its value may be used, and the bits on the
-//! bus are the bits of the decoder.
+//! Pose frames. Each frame carries one axis, as the decoder's own `f32` word, and the 20 low
+//! bits of the status. So the bits on the bus are the bits of the decoder, and each frame says
+//! whether its value may be used.
+//!
+//! ```
+//! use hal_adapters::can::{BusFrame, PoseReceiver, PoseSender, Timing};
+//! use runtime::Reading;
+//!
+//! let mut reading = Reading::default();
+//! reading.pose.planar.x_m = 1.5e-6;
+//! let (mut sender, mut receiver) = (PoseSender::default(), PoseReceiver::new(Timing::default()));
+//! let mut received = None;
+//! for frame in sender.frames(&reading) {
+//!     let taken = receiver.take(&BusFrame::from(frame), 300);
+//!     received = received.or(taken.tick);
+//! }
+//! assert_eq!(received.and_then(|pose| pose.valid()), Some(reading.pose.planar));
+//! ```
 
 use super::e2e::{Payload, Sequence, protect};
 use super::frame::{Coded, standard};
@@ -52,8 +67,8 @@ impl Default for PoseSender {
 }
 
 impl PoseSender {
-    /// A sender of each vertical axis in every `vertical_ticks`th tick: 1, 2, 4, 8 or 16;
-    /// any other number is rounded down to one of these (0 counts as 1).
+    /// Sends each vertical axis in every `vertical_ticks`th tick: 1, 2, 4, 8 or 16; any other
+    /// number is rounded down to one of these (0 counts as 1).
     pub const fn new(vertical_ticks: u8) -> Self {
         let ticks = if vertical_ticks > 16 {
             16
@@ -72,7 +87,7 @@ impl PoseSender {
         let every = 1u32 << shift;
         self.tick = tick.wrapping_add(1);
         let (values, status) = (reading.pose.vertical.to_array(), reading.status);
-        // The axes take turns, so that no tick carries all three unless every tick does.
+        // The axes take turns: no tick carries all three unless every tick does.
         let due = (0u32..).zip(VERTICAL.into_iter().zip(values));
         let vertical = due.filter_map(move |(k, (message, value))| {
             let turn = k.wrapping_mul(every) / 3;
@@ -103,7 +118,7 @@ impl ReceivedPose {
     }
 }
 
-/// One vertical axis as it came last.
+/// The last value received of a vertical axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReceivedAxis {
     /// The value, m or rad.
@@ -189,12 +204,12 @@ impl PoseReceiver {
         Some(self.planar.note(fault))
     }
 
-    /// What the passing of time gives, as [`super::SensorReceiver::poll`].
+    /// What the passing of time brings: see [`super::SensorReceiver::poll`].
     pub fn poll(&mut self, now_us: u32) -> Taken<ReceivedPose> {
         self.planar.poll(now_us).map(received)
     }
 
-    /// When [`PoseReceiver::poll`] has something to say if no frame comes.
+    /// When [`PoseReceiver::poll`] will have something to report if no frame comes before.
     pub fn deadline_us(&self) -> Option<u32> {
         self.planar.deadline_us()
     }
@@ -204,7 +219,7 @@ impl PoseReceiver {
         self.planar.is_stale()
     }
 
-    /// Z, Rx, Ry as they came last.
+    /// The last Z, Rx, Ry received.
     pub const fn vertical(&self) -> &[Option<ReceivedAxis>; 3] {
         &self.vertical
     }

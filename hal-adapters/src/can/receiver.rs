@@ -1,9 +1,9 @@
-//! From sensor frames to raw frames: every tick that the bus brings, whole or with the codes
-//! missing that did not come or were not good.
+//! From sensor frames to raw frames: one for every tick of which a frame came. Codes that did
+//! not come, or whose frame was not good, are missing.
 //!
-//! Call [`SensorReceiver::take`] with every frame of the bus and the time at which it came,
-//! and [`SensorReceiver::poll`] when time passes without one: at
-//! [`SensorReceiver::deadline_us`], or every millisecond.
+//! Call [`SensorReceiver::take`] with every frame of the bus and its receive time, and
+//! [`SensorReceiver::poll`] when no frame comes: at [`SensorReceiver::deadline_us`], or every
+//! millisecond.
 //!
 //! ```
 //! use hal_adapters::can::{Layout, BusFrame, SensorReceiver, Timing, sensor};

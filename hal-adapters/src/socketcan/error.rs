@@ -42,7 +42,7 @@ pub enum SocketCanError {
         /// How long the sender waited.
         waited: Duration,
     },
-    /// Anything else, with the kernel's own error.
+    /// Any other error of the kernel.
     Io {
         /// Name of the interface.
         interface: String,

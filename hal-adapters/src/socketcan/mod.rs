@@ -1,5 +1,20 @@
 //! SocketCAN: the frames of a Linux CAN interface, with the kernel's receive times.
 //!
+//! ```no_run
+//! use hal_adapters::can::{Layout, SensorReceiver, Timing};
+//! use hal_adapters::socketcan::SocketCan;
+//! use std::time::Duration;
+//!
+//! let layout = Layout::Bits16;
+//! let mut bus = SocketCan::open("can0", layout.messages())?;
+//! let mut receiver = SensorReceiver::new(layout, Timing::default());
+//! while let Some(stamped) = bus.receive(Duration::from_millis(100))? {
+//!     let taken = receiver.take(&stamped.frame, stamped.time_us as u32);
+//!     println!("{:?}", taken.tick);
+//! }
+//! # Ok::<(), hal_adapters::socketcan::SocketCanError>(())
+//! ```
+//!
 //! The kernel delivers only the messages that were asked for, so foreign traffic costs nothing.
 //! Frames that the kernel dropped because nobody read them in time are counted
 //! ([`SocketCan::dropped`]); the counters of the protocol show that they are missing, too.
