@@ -296,7 +296,7 @@ fn unusable_parameters_are_refused_by_their_reason() {
     };
     let group = "the sensitivities";
     assert_eq!(
-        refused(|set| set.constants.sensitivity[1].per_z_m = f32::NAN),
+        refused(|set| sample::sensitivities(set)[1].per_z_m = f32::NAN),
         ParameterError::NotFinite { group }
     );
     assert!(matches!(

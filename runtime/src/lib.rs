@@ -39,14 +39,12 @@
 //! | phi_A, phi_B, phi_C | sensitivity at a vertical pose | 1 |
 //! | delta_A, delta_B, delta_C | zero deviation | m |
 #![no_std]
-#![deny(unsafe_code)]
+#![forbid(unsafe_code)]
 
 pub mod arithmetic;
 pub mod blob;
 pub mod calibration;
 pub mod capacitive;
-#[allow(unsafe_code)] // a few instructions that compilers don't find; see its text
-mod checks;
 pub mod decoder;
 pub mod frame;
 pub mod geometry;
@@ -64,9 +62,9 @@ pub mod status;
 
 pub use blob::BlobError;
 pub use calibration::Calibration;
-pub use decoder::{Decoder, Reading};
+pub use decoder::{AnyDecoder, Decode, Decoder, Reading};
 pub use frame::RawFrame;
-pub use model::ModelKind;
+pub use model::{LinearModel, Model, ModelKind};
 pub use parameters::ParameterSet;
 pub use pose::{PlanarPose, Pose, VerticalPose};
 pub use servo::{OnInvalid, Servo};

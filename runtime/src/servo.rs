@@ -5,7 +5,7 @@
 //! the frame carries its sequence number, and a period without a frame is told to the servo
 //! by [`Servo::tick_without_frame`].
 
-use crate::decoder::{Decoder, Reading};
+use crate::decoder::{Decode, Reading};
 use crate::frame::RawFrame;
 use crate::pose::{PlanarPose, Pose, VerticalPose};
 use crate::rezero::{RezeroRefusal, RezeroRun, RezeroSettings, RezeroState};
@@ -47,7 +47,7 @@ pub struct Health {
 /// Runs a borrowed decoder from tick to tick.
 #[derive(Clone, Debug)]
 pub struct Servo<'d> {
-    decoder: &'d Decoder,
+    decoder: &'d dyn Decode,
     on_invalid: OnInvalid,
     zero: PlanarPose<f32>,
     last: Pose,
@@ -81,7 +81,7 @@ const NOTHING: Reading = Reading {
 
 impl<'d> Servo<'d> {
     /// A servo with no zero deviation, no pose to hold and all counters zero.
-    pub const fn new(decoder: &'d Decoder, on_invalid: OnInvalid) -> Self {
+    pub const fn new(decoder: &'d dyn Decode, on_invalid: OnInvalid) -> Self {
         Self {
             decoder,
             on_invalid,
@@ -113,9 +113,7 @@ impl<'d> Servo<'d> {
         let Some(sequence) = self.follow(frame.sequence) else {
             return self.conclude(NOTHING, Status::FRAME_REPEATED);
         };
-        let mut reading = Reading::default();
-        self.decoder
-            .decode_into(&frame.hall, &frame.capacitive, &self.zero, &mut reading);
+        let reading = self.decoder.decode(frame, &self.zero);
         if self.run.is_some() {
             self.feed_rezero(&reading);
         }

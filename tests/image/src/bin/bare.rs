@@ -18,7 +18,7 @@ fn main() -> ! {
         && set.expect_serial("HS-0007").is_ok()
     {
         let decoder = set.decoder();
-        let mut servo = Servo::new(&decoder, OnInvalid::Hold { ticks: 3 });
+        let mut servo = Servo::new(&*decoder, OnInvalid::Hold { ticks: 3 });
         servo.start_rezero(RezeroSettings::default());
         loop {
             let frame = black_box(RawFrame {
