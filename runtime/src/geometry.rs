@@ -99,6 +99,27 @@ impl<T: Number> SensingAxes<T> {
     }
 }
 
+impl SensingAxes<f32> {
+    /// The axes that rows of PM hold, and the lever arms in them, m: the inverse of
+    /// [`SensingAxes::plane_rows`].
+    pub const fn of_rows(rows: &[[f32; 3]; 3]) -> (Self, [f32; 3]) {
+        let [[ax, ay, arm_a], [bx, by, arm_b], [cx, cy, arm_c]] = *rows;
+        (Self([[ax, ay], [bx, by], [cx, cy]]), [arm_a, arm_b, arm_c])
+    }
+
+    /// The misalignments of the axes, rad, whatever their lengths: the inverse of
+    /// [`SensingAxes::at`]. By `libm` in `f32` alone; its sine and cosine would take 7 KB of a
+    /// Cortex-M4F's flash, for they use `f64`.
+    pub fn misalignment_rad(&self) -> [f32; 3] {
+        let [a, b, c] = self.0;
+        [
+            libm::atan2f(-a[0], a[1]),
+            libm::atan2f(-b[0], b[1]),
+            libm::atan2f(c[1], c[0]),
+        ]
+    }
+}
+
 impl<T: Copy> ProbeCoordinates<T> {
     /// The two coordinates of each probe: (H1x, H1y), (H2x, H2y), (H3x, H3y), m.
     #[inline(always)]

@@ -37,6 +37,7 @@ struct Tail {
 
 /// Visits the numbers of a set in the order of the blob, row by row, with the name of the
 /// group that each row belongs to.
+#[inline(never)]
 fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut [f32])) {
     // Each field is named, so that none is forgotten.
     let ParameterSet {

@@ -1,5 +1,6 @@
 //! The checks that a parameter set must pass, on the host as on the target.
 
+use crate::geometry::SensingAxes;
 use crate::layout;
 use crate::model::{Probes, Sensitivity, dot};
 use crate::parameters::{ParameterError, ParameterSet};
@@ -103,15 +104,28 @@ impl ParameterSet {
             self.capacitive.vertical_per_m.as_flattened(),
             self.capacitive.m_per_code,
         )?;
-        let plane = self.geometry.plane_rows();
-        for (made, from) in self.plane.as_flattened().iter().zip(plane.as_flattened()) {
-            let follows = (made - from).abs() <= INVERSE_TOLERANCE;
-            if !follows {
-                return Err(ParameterError::Inconsistent { term: "PM" });
-            }
-        }
-        Ok(())
+        let (axes, arms) = SensingAxes::of_rows(&self.plane);
+        let lengths = axes.0.map(|[x, y]| x * x + y * y);
+        check_near(
+            "PM",
+            &axes.misalignment_rad(),
+            &self.geometry.misalignment_rad,
+        )?;
+        check_near("PM", &arms, &self.geometry.lever_arm_m)?;
+        check_near("PM", &lengths, &[1.0; 3])
     }
+}
+
+/// Refuses what differs by more than rounding from what it was made of: m, rad or 1.
+#[inline(never)]
+fn check_near(term: &'static str, made: &[f32; 3], from: &[f32; 3]) -> Result<(), ParameterError> {
+    for (made, from) in made.iter().zip(from) {
+        let follows = (made - from).abs() <= INVERSE_TOLERANCE;
+        if !follows {
+            return Err(ParameterError::Inconsistent { term });
+        }
+    }
+    Ok(())
 }
 
 #[inline(never)]
