@@ -14,6 +14,7 @@ use crate::problem::draw::{Draw, draw_rows};
 use crate::problem::parameters::{ParameterId, Parameters};
 use crate::solve::{Solution, SolveError, Solver, SolverOptions};
 use runtime::calibration::Origin;
+use runtime::model::Probes;
 use runtime::parameters::{FitRecord, ParameterError, Text};
 use runtime::{Calibration, ModelKind, ParameterSet};
 
@@ -326,7 +327,7 @@ pub fn calibration(
     Calibration {
         model,
         geometry: parameters.geometry,
-        sensitivity: parameters.sensitivity,
+        probes: Probes::Linear(parameters.sensitivity),
         hall_m_per_code: stage.hall.m_per_count,
         hall_window: stage.hall.window,
         capacitive_probes_m: stage.capacitive_probes_m,

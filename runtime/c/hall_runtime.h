@@ -13,10 +13,10 @@
 #include <stdlib.h>
 
 // Words of a decoder.
-#define HALL_DECODER_WORDS 53
+#define HALL_DECODER_WORDS 41
 
 // Words of a servo.
-#define HALL_SERVO_WORDS 48
+#define HALL_SERVO_WORDS 49
 
 // In place of a code that could not be read: INT32_MIN.
 #define HALL_MISSING_CODE INT32_MIN

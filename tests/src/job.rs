@@ -130,10 +130,7 @@ pub fn from_words(words: &[u32; PARAMETER_WORDS]) -> (Decoder<LinearModel>, Plan
 }
 
 /// The words of a decoder and a zero deviation, as [`from_words`] reads them.
-pub fn to_words(
-    decoder: &Decoder<LinearModel>,
-    zero: &PlanarPose<f32>,
-) -> [u32; PARAMETER_WORDS] {
+pub fn to_words(decoder: &Decoder<LinearModel>, zero: &PlanarPose<f32>) -> [u32; PARAMETER_WORDS] {
     let c = decoder.constants();
     let [hall, gaps] = [&c.hall_window, &c.capacitive_window];
     let windows = [hall.low, hall.high, gaps.low, gaps.high].map(|code| code as u32);

@@ -29,7 +29,7 @@ pub fn run(args: &DecodeArgs) -> Result<(), HostError> {
         0 => OnInvalid::Zero,
         ticks => OnInvalid::Hold { ticks },
     };
-    let decoded = pose_file::decode(&log.dataset, &set.decoder(), on_invalid);
+    let decoded = pose_file::decode(&log.dataset, &*set.decoder(), on_invalid);
     output::write_atomically(&args.out, &pose_file::to_text(&decoded))?;
     let counts = StatusCounts::of(&decoded);
     let mut summary = format!(

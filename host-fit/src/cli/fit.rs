@@ -159,7 +159,7 @@ pub fn write_report(
     names: &[String],
     folder: &Path,
 ) -> Result<(), HostError> {
-    let mut errors = judge::pose_errors(&fit.set.decoder(), &log.dataset);
+    let mut errors = judge::pose_errors(&*fit.set.decoder(), &log.dataset);
     for (movement, zero) in log.dataset.movements.iter().zip(&fit.judgement.zeros) {
         for error in errors[movement.rows.clone()].iter_mut().flatten() {
             for (error, zero) in error.iter_mut().zip(zero.pose) {

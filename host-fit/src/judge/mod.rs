@@ -12,8 +12,8 @@ use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
 use runtime::geometry::ProbeGeometry;
-use runtime::model::Sensitivity;
-use runtime::{Decoder, ModelKind, ParameterSet, PlanarPose};
+use runtime::model::Probes;
+use runtime::{Decode, ModelKind, ParameterSet, PlanarPose};
 
 /// Which zero deviations are taken off before errors are counted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,18 +72,15 @@ pub fn parameters_of(set: &ParameterSet) -> Parameters {
             lever_arm_m: set.geometry.lever_arm_m.map(f64::from),
             misalignment_rad: set.geometry.misalignment_rad.map(f64::from),
         },
-        sensitivity: set.constants.sensitivity.map(|s| Sensitivity {
-            eta: s.eta.into(),
-            per_z_m: s.per_z_m.into(),
-            per_rx_rad: s.per_rx_rad.into(),
-            per_ry_rad: s.per_ry_rad.into(),
-        }),
+        sensitivity: match set.probes.rounded() {
+            Probes::Linear(probes) => probes,
+        },
     }
 }
 
 /// Pose errors of every row, m, m, rad, with no zero deviation taken off; `None` where the
 /// decoder found bad codes.
-pub fn pose_errors(decoder: &Decoder, dataset: &Dataset) -> Vec<Option<[f64; 3]>> {
+pub fn pose_errors(decoder: &dyn Decode, dataset: &Dataset) -> Vec<Option<[f64; 3]>> {
     let one = |row: &crate::input::dataset::Row| {
         let pose = row
             .frame
@@ -100,7 +97,7 @@ pub fn pose_errors(decoder: &Decoder, dataset: &Dataset) -> Vec<Option<[f64; 3]>
 /// Judges a parameter set on a dataset with reference.
 pub fn judge(set: &ParameterSet, dataset: &Dataset, stage: &Stage, zeros: Zeros) -> Judgement {
     let parameters = parameters_of(set);
-    let errors = pose_errors(&set.decoder(), dataset);
+    let errors = pose_errors(&*set.decoder(), dataset);
     let mut sums = ErrorSums::default();
     let mut undecoded = 0;
     let mut taken_off = Vec::with_capacity(dataset.movements.len());

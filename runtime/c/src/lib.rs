@@ -83,7 +83,7 @@ pub unsafe extern "C" fn hall_servo_start(
         0 => OnInvalid::Zero,
         ticks => OnInvalid::Hold { ticks },
     };
-    servo.write(HallServo::new(Servo::new(decoder.get(), on_invalid)));
+    servo.write(HallServo::new(Servo::new(&**decoder.get(), on_invalid)));
     HallResult::Ok
 }
 

@@ -47,7 +47,7 @@ pub fn run(args: &LiveArgs) -> Result<(), LiveError> {
     let stop = interrupt::watch();
     let decoder = set.decoder();
     let mut session = Session {
-        node: Node::new(&decoder, &set.serial, &settings),
+        node: Node::new(&*decoder, &set.serial, &settings),
         bus,
         record,
         sends: !args.listen_only,

@@ -18,7 +18,9 @@ use runtime::arithmetic::ArithmeticFault;
 use runtime::decoder::{Decoder, DecoderConstants};
 use runtime::frame::CodeWindow;
 use runtime::model::Sensitivity;
-use runtime::{Decode, LinearModel, Model, OnInvalid, PlanarPose, RawFrame, Reading, Servo, VerticalPose};
+use runtime::{
+    Decode, LinearModel, Model, OnInvalid, PlanarPose, RawFrame, Reading, Servo, VerticalPose,
+};
 
 /// Displacements read by the probes.
 #[repr(C)]
