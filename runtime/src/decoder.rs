@@ -175,7 +175,11 @@ impl<M: Model> Decoder<M> {
     pub const fn new(mut constants: DecoderConstants<f32>, probes: [M::Probe<f32>; 3]) -> Self {
         constants.calibrated_vertical = limits(constants.calibrated_vertical);
         constants.calibrated_planar = limits(constants.calibrated_planar);
-        constants.sensitivity_min = limit(constants.sensitivity_min).min(f32::MAX);
+        if constants.sensitivity_min.is_finite() {
+            constants.sensitivity_min = constants.sensitivity_min.abs();
+        } else {
+            constants.sensitivity_min = f32::MAX;
+        }
         Self { constants, probes }
     }
 

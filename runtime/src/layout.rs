@@ -2,9 +2,9 @@
 //! row, then the code windows.
 //!
 //! [`for_each_row`] is the only list of the numbers: writing, reading and the check that they
-//! are finite go through it. A number that is missing there does not compile. The numbers are
-//! read and written by one loop: code derived for each of the nested arrays would read the same
-//! bytes and take three times the flash.
+//! are finite go through it. A number that is missing there does not compile. Numbers and hash
+//! are read by loops: code derived for each of the nested arrays would read the same bytes and
+//! take three times the flash.
 
 use crate::decoder::DecoderConstants;
 use crate::frame::CodeWindow;
@@ -16,24 +16,20 @@ use crate::parameters::{
 use core::slice;
 use serde::{Deserialize, Serialize};
 
-/// What stands before the numbers.
+/// What stands before the hash of the logs.
 #[derive(Serialize, Deserialize)]
 struct Head {
     /// The tag: which model was fitted, and so which coefficients a probe has.
     model: ModelKind,
     serial: Text,
     created: Text,
-    logs_sha256: [u8; 32],
-    rows: u32,
-    train_rows: u32,
 }
 
-/// What stands behind the numbers.
-#[derive(Serialize, Deserialize)]
-struct Tail {
-    hall_window: CodeWindow,
-    capacitive_window: CodeWindow,
-}
+/// What stands between the hash and the numbers: all rows, and those that were fitted.
+type Rows = (u32, u32);
+
+/// What stands behind the numbers: of the Hall and of the capacitive codes.
+type Windows = (CodeWindow, CodeWindow);
 
 /// Visits the numbers of a set in the order of the blob, row by row, with the name of the
 /// group that each row belongs to.
@@ -117,72 +113,74 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
     visit("the smallest sensitivity", slice::from_mut(sensitivity_min));
 }
 
-impl Head {
-    /// A set whose numbers and windows are still to come: zeros, of the model's kind.
-    fn into_set(self) -> ParameterSet {
-        ParameterSet {
-            model: self.model,
-            serial: self.serial,
-            created: self.created,
-            logs_sha256: self.logs_sha256,
-            fit: FitRecord {
-                rows: self.rows,
-                train_rows: self.train_rows,
-                ..FitRecord::default()
-            },
-            geometry: ProbeGeometry::default(),
-            plane: [[0.0; 3]; 3],
-            plane_inverse: [[0.0; 3]; 3],
-            hall: HallInput::default(),
-            capacitive: CapacitiveInput::default(),
-            probes: match self.model {
-                ModelKind::M12 | ModelKind::M15 | ModelKind::M30 | ModelKind::M31 => {
-                    Probes::Linear([Sensitivity::default(); 3])
-                }
-            },
-            constants: DecoderConstants::default(),
-        }
-    }
-}
-
 /// Writes the payload of a set and gives its length; `None` if `room` is too small.
 pub(crate) fn write(set: &ParameterSet, room: &mut [u8]) -> Option<usize> {
     let head = Head {
         model: set.model,
         serial: set.serial.clone(),
         created: set.created.clone(),
-        logs_sha256: set.logs_sha256,
-        rows: set.fit.rows,
-        train_rows: set.fit.train_rows,
     };
-    let tail = Tail {
-        hall_window: set.constants.hall_window,
-        capacitive_window: set.constants.capacitive_window,
-    };
-    let all = room.len();
-    let head_bytes = postcard::to_slice(&head, room).ok()?.len();
-    let mut rest = room.get_mut(head_bytes..)?;
-    let mut fits = true;
+    let rows: Rows = (set.fit.rows, set.fit.train_rows);
+    let windows: Windows = (set.constants.hall_window, set.constants.capacitive_window);
+    let mut out = Out { room, length: 0 };
+    out.put(&head)?;
+    for byte in &set.logs_sha256 {
+        out.put(byte)?;
+    }
+    out.put(&rows)?;
+    let mut fits = Some(());
     for_each_row(&mut set.clone(), &mut |_, row| {
         for number in row {
-            match core::mem::take(&mut rest).split_first_chunk_mut() {
-                Some((bytes, behind)) => {
-                    *bytes = number.to_le_bytes();
-                    rest = behind;
-                }
-                None => fits = false,
-            }
+            fits = fits.and_then(|()| out.put(number));
         }
     });
-    let left = rest.len();
-    let tail_bytes = postcard::to_slice(&tail, rest).ok()?.len();
-    fits.then_some(all - left + tail_bytes)
+    fits?;
+    out.put(&windows)?;
+    Some(out.length)
+}
+
+/// Values in postcard, one behind the other.
+struct Out<'r> {
+    room: &'r mut [u8],
+    length: usize,
+}
+
+impl Out<'_> {
+    fn put(&mut self, value: &impl Serialize) -> Option<()> {
+        let room = self.room.get_mut(self.length..)?;
+        self.length += postcard::to_slice(value, room).ok()?.len();
+        Some(())
+    }
 }
 
 /// Reads a payload, which must end where the set does; `None` if it is none.
 pub(crate) fn read(payload: &[u8]) -> Option<ParameterSet> {
-    let (head, mut rest) = postcard::take_from_bytes::<Head>(payload).ok()?;
-    let mut set = head.into_set();
+    let (head, rest) = postcard::take_from_bytes::<Head>(payload).ok()?;
+    let (&logs_sha256, rest) = rest.split_first_chunk()?;
+    let ((rows, train_rows), mut rest) = postcard::take_from_bytes::<Rows>(rest).ok()?;
+    // Zeros where the numbers go.
+    let mut set = ParameterSet {
+        model: head.model,
+        serial: head.serial,
+        created: head.created,
+        logs_sha256,
+        fit: FitRecord {
+            rows,
+            train_rows,
+            ..FitRecord::default()
+        },
+        geometry: ProbeGeometry::default(),
+        plane: [[0.0; 3]; 3],
+        plane_inverse: [[0.0; 3]; 3],
+        hall: HallInput::default(),
+        capacitive: CapacitiveInput::default(),
+        probes: match head.model {
+            ModelKind::M12 | ModelKind::M15 | ModelKind::M30 | ModelKind::M31 => {
+                Probes::Linear([Sensitivity::default(); 3])
+            }
+        },
+        constants: DecoderConstants::default(),
+    };
     let mut complete = true;
     for_each_row(&mut set, &mut |_, row| {
         for number in row {
@@ -195,9 +193,8 @@ pub(crate) fn read(payload: &[u8]) -> Option<ParameterSet> {
             }
         }
     });
-    let (tail, rest) = postcard::take_from_bytes::<Tail>(rest).ok()?;
-    set.constants.hall_window = tail.hall_window;
-    set.constants.capacitive_window = tail.capacitive_window;
+    let (windows, rest) = postcard::take_from_bytes::<Windows>(rest).ok()?;
+    (set.constants.hall_window, set.constants.capacitive_window) = windows;
     (complete && rest.is_empty()).then_some(set)
 }
 

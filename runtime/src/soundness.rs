@@ -75,9 +75,9 @@ impl ParameterSet {
 
     fn check_inverse(&self) -> Result<(), ParameterError> {
         let mut largest = 0.0f32;
-        for (i, row) in self.plane.iter().enumerate() {
-            for j in 0..3 {
-                let column = self.plane_inverse.map(|row| row[j]);
+        for j in 0..3 {
+            let column = self.plane_inverse.map(|row| row[j]);
+            for (i, row) in self.plane.iter().enumerate() {
                 let off = (dot(row, column) - if i == j { 1.0 } else { 0.0 }).abs();
                 // A sum of overflows is no number, and larger than any.
                 largest = if off <= largest { largest } else { off };
