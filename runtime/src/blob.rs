@@ -172,7 +172,7 @@ impl ParameterSet {
     /// Reads a blob that must fill `bytes` exactly, as in a file, and checks it.
     ///
     /// # Errors
-    /// Every variant but `BufferTooSmall` and `OtherStage`; see [`BlobError`].
+    /// Every variant of [`BlobError`] except `BufferTooSmall` and `OtherStage`.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, BlobError> {
         let length = blob_length(bytes)?;
         if bytes.len() > length {
@@ -188,7 +188,7 @@ impl ParameterSet {
     /// checks it.
     ///
     /// # Errors
-    /// As [`ParameterSet::from_bytes`], but for `TrailingBytes`.
+    /// As [`ParameterSet::from_bytes`], except `TrailingBytes`.
     pub fn from_flash(memory: &[u8]) -> Result<Self, BlobError> {
         let length = blob_length(memory)?;
         let blob = memory.get(..length).ok_or(BlobError::Truncated {

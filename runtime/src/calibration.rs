@@ -11,6 +11,41 @@ use crate::parameters::{
 use crate::real::Number;
 
 /// A calibrated stage: the parameters of one model and the scales that they hold for.
+///
+/// ```
+/// use runtime::calibration::{Calibration, Origin};
+/// use runtime::frame::CodeWindow;
+/// use runtime::geometry::ProbeGeometry;
+/// use runtime::model::{ModelKind, Probes, Sensitivity};
+/// use runtime::parameters::ParameterError;
+///
+/// # fn main() -> Result<(), ParameterError> {
+/// let window = CodeWindow::between_rails(-32768, 32767).expect("a 16-bit converter");
+/// let mut calibration = Calibration {
+///     model: ModelKind::M30,
+///     geometry: ProbeGeometry {
+///         lever_arm_m: [0.2, -0.2, -0.35],
+///         misalignment_rad: [0.01, -0.02, 0.03],
+///     },
+///     probes: Probes::Linear([0.87, 0.70, 0.86].map(Sensitivity::constant)),
+///     hall_m_per_code: 6.25e-8,
+///     hall_window: window,
+///     capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
+///     capacitive_m_per_code: 1.5625e-8,
+///     capacitive_window: window,
+///     calibrated_planar: [550e-6, 550e-6, 350e-6],
+///     calibrated_vertical: [280e-6, 1.2e-3, 1.2e-3],
+///     sensitivity_min: Calibration::SENSITIVITY_MIN,
+/// };
+/// let set = calibration.prepare(&Origin::default())?;
+/// assert_eq!(set.check(), Ok(()));
+///
+/// calibration.sensitivity_min = 0.75; // probe B reads 0.70
+/// let refused = calibration.prepare(&Origin::default());
+/// assert_eq!(refused, Err(ParameterError::PoleInRange { probe: 1 }));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
     /// Which model the parameters belong to. Models that fix a parameter store its value.

@@ -1,6 +1,6 @@
 //! One frame to one reading: the flat tick path.
 //!
-//! [`Decoder::decode`] does the whole arithmetic of a servo period: six codes checked
+//! [`Decode::decode`] does the whole arithmetic of a servo period: six codes checked
 //! against their windows and scaled, vertical pose, the model's sensitivities and planar
 //! pose, checks for finite results and for the calibrated range, status. It has no branch, no
 //! loop, no call and no panic, so the number of its instructions is the same for every input.
@@ -9,8 +9,8 @@
 //! converted to `f32` exactly (up to 24 bits) and never scaled by itself.
 //!
 //! Numbers are compared by the bits of their magnitudes. As integers these are ordered like
-//! the magnitudes, with every NaN above infinity, so one comparison serves limits and NaN, and
-//! takes no flag of the FPU.
+//! the magnitudes, with every NaN above infinity: one comparison finds what is too large and
+//! what is NaN.
 
 use crate::capacitive::vertical_pose;
 use crate::frame::{ChannelFault, CodeWindow, RawFrame};
@@ -21,7 +21,7 @@ use crate::status::Status;
 use core::fmt;
 use core::ops::Deref;
 
-/// What a tick reads beside the coefficients of the probes.
+/// What a tick reads in addition to the coefficients of the probes.
 ///
 /// Made by [`crate::Calibration::constants`] in `f64` and rounded once to `f32`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -53,10 +53,10 @@ pub struct Reading {
     pub status: Status,
 }
 
-/// Decodes frames by one calibration, of whatever model.
+/// Decodes frames by one calibration, whatever its model.
 ///
-/// A [`Decoder`] does this for its own model. Which model a parameter set has is found out
-/// once, when it is loaded; a servo then holds a `&dyn Decode` and no tick chooses.
+/// A [`Decoder`] does this for its own model. The model of a parameter set is looked up once,
+/// when the set is loaded; from then on a servo holds a `&dyn Decode` and no tick chooses.
 pub trait Decode: Sync {
     /// The vertical pose of a frame's capacitive codes and the planar pose of its Hall codes,
     /// less `zero`; invalid fields are 0 and the status says why. Never NaN.
@@ -71,19 +71,37 @@ pub trait Decode: Sync {
         zero: &PlanarPose<f32>,
     ) -> Reading;
 
-    /// The constants beside the probes' coefficients. Their
-    /// [`channel_faults`](DecoderConstants::channel_faults) tell why a code is not decoded.
+    /// The constants that do not depend on the model. Their method
+    /// [`channel_faults`](DecoderConstants::channel_faults) says why codes are not decoded.
     fn constants(&self) -> &DecoderConstants<f32>;
 }
 
-/// Formatting every constant would take more flash than the runtime does.
+/// Without the constants: formatting numbers would take more flash than the runtime does.
 impl fmt::Debug for dyn Decode + '_ {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("decoder")
     }
 }
 
-/// Runs one calibration of the model `M`. Borrow it, decode every servo period.
+/// Decodes frames by one calibration of the model `M`.
+///
+/// ```
+/// use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, VerticalPose};
+/// # use runtime::ParameterSet;
+/// # const BLOB: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/stage.bin"));
+/// # fn main() -> Result<(), runtime::BlobError> {
+/// # let set = ParameterSet::from_bytes(BLOB)?;
+/// let AnyDecoder::Linear(decoder) = set.decoder();
+/// assert_eq!(decoder.probes()[0].eta, 0.87);
+///
+/// // Z by the capacitive codes, or known by other means: the same planar pose.
+/// let frame = RawFrame { hall: [1200, 900, 700], capacitive: [300, -200, 100], sequence: 0, time_us: 0 };
+/// let by_codes = decoder.decode(&frame, &PlanarPose::ZERO);
+/// let by_pose = decoder.decode_at(frame.hall, by_codes.pose.vertical, &PlanarPose::ZERO);
+/// assert_eq!(by_codes, by_pose);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Decoder<M: Model> {
@@ -91,7 +109,7 @@ pub struct Decoder<M: Model> {
     probes: [M::Probe<f32>; 3],
 }
 
-/// The decoder of a parameter set, of whichever model: chosen once, when the set is loaded,
+/// The decoder of a parameter set, whatever its model: chosen once, when the set is loaded,
 /// and borrowed as the [`Decode`] that it derefs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AnyDecoder {
@@ -125,7 +143,7 @@ const fn largest(v: [u32; 3]) -> u32 {
     if larger > v[2] { larger } else { v[2] }
 }
 
-/// Three bits, the first lowest: which of the words lie outside `low..=high`. With one
+/// Which of three words lie outside `low..=high`, as three bits with the first lowest. One
 /// subtraction and one comparison a word, as in [`CodeWindow::contains`].
 #[inline(always)]
 fn outside([a, b, c]: [u32; 3], low: u32, high: u32) -> u32 {
@@ -134,19 +152,24 @@ fn outside([a, b, c]: [u32; 3], low: u32, high: u32) -> u32 {
     outside(c) << 2 | outside(b) << 1 | outside(a)
 }
 
-/// A status bit if the condition holds.
+/// [`outside`] for codes.
 #[inline(always)]
-const fn bit_if(condition: bool, bit: Status) -> u32 {
-    (condition as u32) << bit.bits().trailing_zeros()
+fn outside_window(codes: [i32; 3], window: &CodeWindow) -> u32 {
+    let words = each(codes, i32::cast_unsigned);
+    outside(
+        words,
+        window.low.cast_unsigned(),
+        window.high.cast_unsigned(),
+    )
 }
 
-/// Whether a magnitude is larger than its limit.
+/// Whether any magnitude is larger than its limit.
 #[inline(always)]
 const fn beyond(v: [u32; 3], limits: [u32; 3]) -> bool {
     (v[0] > limits[0]) | (v[1] > limits[1]) | (v[2] > limits[2])
 }
 
-/// `f` of each of three, written out: `array::map` becomes a loop where code is to be small.
+/// `f` of each of three, written out: `array::map` becomes a loop at opt-level "s".
 #[inline(always)]
 fn each<A, B>([a, b, c]: [A; 3], f: impl Fn(A) -> B) -> [B; 3] {
     [f(a), f(b), f(c)]
@@ -170,8 +193,9 @@ const fn limits([a, b, c]: [f32; 3]) -> [f32; 3] {
 }
 
 impl<M: Model> Decoder<M> {
-    /// A decoder with constants that were checked: see [`crate::ParameterSet::decoder`].
-    /// Unchecked ones give no panic and no NaN either, only a status.
+    /// A decoder with these constants. Checked ones come from
+    /// [`ParameterSet::decoder`](crate::ParameterSet::decoder); unchecked ones give no panic
+    /// and no NaN either, only a status.
     pub const fn new(mut constants: DecoderConstants<f32>, probes: [M::Probe<f32>; 3]) -> Self {
         constants.calibrated_vertical = limits(constants.calibrated_vertical);
         constants.calibrated_planar = limits(constants.calibrated_planar);
@@ -204,51 +228,41 @@ impl<M: Model> Decoder<M> {
         let (v, q) = (vertical.to_array(), planar.to_array());
         let (size_v, size_q) = (each(v, magnitude), each(q, magnitude));
 
-        let status = outside(
-            each(hall, |code| code as u32),
-            c.hall_window.low as u32,
-            c.hall_window.high as u32,
-        ) | capacitive_bad << Status::CAPACITIVE_1.bits().trailing_zeros()
-            | outside(each(phi, magnitude), c.sensitivity_min.to_bits(), FINITE)
-                << Status::SENSITIVITY_A.bits().trailing_zeros()
-            | bit_if(largest(size_q) > FINITE, Status::PLANAR_NOT_FINITE)
-            | bit_if(largest(size_v) > FINITE, Status::VERTICAL_NOT_FINITE);
-        let vertical_valid = status & VERTICAL_FAULTS.bits() == 0;
-        let planar_valid = status == 0;
-        let status = status
-            | bit_if(
-                beyond(size_v, each(c.calibrated_vertical, f32::to_bits)),
-                Status::VERTICAL_EXTRAPOLATED,
-            )
-            | bit_if(
-                beyond(size_q, each(c.calibrated_planar, f32::to_bits)),
-                Status::PLANAR_EXTRAPOLATED,
-            )
-            | bit_if(!planar_valid, Status::PLANAR_INVALID)
-            | bit_if(!vertical_valid, Status::VERTICAL_INVALID);
+        let phi_bad = outside(each(phi, magnitude), c.sensitivity_min.to_bits(), FINITE);
+        let faults = (Status::HALL_A.with_next(outside_window(hall, &c.hall_window)))
+            .with(Status::CAPACITIVE_1.with_next(capacitive_bad))
+            .with(Status::SENSITIVITY_A.with_next(phi_bad))
+            .with(Status::PLANAR_NOT_FINITE.when(largest(size_q) > FINITE))
+            .with(Status::VERTICAL_NOT_FINITE.when(largest(size_v) > FINITE));
+        let vertical_valid = !faults.any(VERTICAL_FAULTS);
+        let planar_valid = faults.is_good();
+        let range_v = each(c.calibrated_vertical, f32::to_bits);
+        let range_q = each(c.calibrated_planar, f32::to_bits);
+        let status = faults
+            .with(Status::VERTICAL_EXTRAPOLATED.when(beyond(size_v, range_v)))
+            .with(Status::PLANAR_EXTRAPOLATED.when(beyond(size_q, range_q)))
+            .with(Status::PLANAR_INVALID.when(!planar_valid))
+            .with(Status::VERTICAL_INVALID.when(!vertical_valid));
         Reading {
             pose: Pose {
                 planar: PlanarPose::from_array(zero_unless(planar_valid, q)),
                 vertical: VerticalPose::from_array(zero_unless(vertical_valid, v)),
             },
-            status: Status::from_bits(status),
+            status,
         }
     }
 }
 
-/// What makes Z, Rx, Ry invalid; X, Y, Rz are by any fault.
+/// What makes Z, Rx, Ry invalid. Any fault makes X, Y, Rz invalid.
 const VERTICAL_FAULTS: Status = Status::CAPACITIVE.with(Status::VERTICAL_NOT_FINITE);
 
 impl<M: Model> Decode for Decoder<M> {
     #[inline(always)]
     fn decode(&self, frame: &RawFrame, zero: &PlanarPose<f32>) -> Reading {
         let c = &self.constants;
-        let bad = outside(
-            each(frame.capacitive, |code| code as u32),
-            c.capacitive_window.low as u32,
-            c.capacitive_window.high as u32,
-        );
-        let vertical = vertical_pose(&c.vertical_per_code, each(frame.capacitive, f32::from_code));
+        let bad = outside_window(frame.capacitive, &c.capacitive_window);
+        let gaps = each(frame.capacitive, f32::from_code);
+        let vertical = vertical_pose(&c.vertical_per_code, gaps);
         self.finish(frame.hall, vertical, bad, zero)
     }
 

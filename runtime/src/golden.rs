@@ -91,6 +91,12 @@ fn the_golden_blob_reads_as_the_set_that_it_was_made_of() {
 }
 
 #[test]
+fn the_blob_of_the_examples_is_the_golden_one() {
+    let (golden, n) = golden();
+    assert_eq!(include_bytes!("../examples/stage.bin"), &golden[..n]);
+}
+
+#[test]
 fn the_layout_is_as_documented() {
     let (golden, n) = golden();
     assert_eq!(&golden[..8], b"HALL\x01\x00\x00\x00");

@@ -25,10 +25,10 @@ struct Head {
     created: Text,
 }
 
-/// What stands between the hash and the numbers: all rows, and those that were fitted.
+/// What stands between the hash and the numbers: how many rows there are and were fitted.
 type Rows = (u32, u32);
 
-/// What stands behind the numbers: of the Hall and of the capacitive codes.
+/// What stands after the numbers: the windows of the Hall and of the capacitive codes.
 type Windows = (CodeWindow, CodeWindow);
 
 /// Visits the numbers of a set in the order of the blob, row by row, with the name of the
@@ -139,7 +139,7 @@ pub(crate) fn write(set: &ParameterSet, room: &mut [u8]) -> Option<usize> {
     Some(out.length)
 }
 
-/// Values in postcard, one behind the other.
+/// Values in postcard, one after the other.
 struct Out<'r> {
     room: &'r mut [u8],
     length: usize,

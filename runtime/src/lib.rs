@@ -5,15 +5,17 @@
 //! one way, one type a step:
 //!
 //! ```text
-//! RawFrame --Decoder::decode--> Reading (Pose + Status) --Servo::tick--> Reading, Health
-//!     parameters: ParameterSet::from_bytes, checked once, then borrowed read-only
+//! bytes --ParameterSet::from_bytes--> ParameterSet --decoder--> AnyDecoder, a &dyn Decode
+//!     once, at start: checked, its model chosen, then borrowed read-only
+//! RawFrame --Decode::decode--> Reading (Pose + Status) --Servo::tick--> Reading, Health
+//!     every servo period
 //! ```
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`pose`] | the pose, its frame and its signs (one drawing) |
 //! | [`geometry`] | lever arms, misalignments and the plane matrix PM (equations 11, 32) |
-//! | [`model`] | Models (12), (15), (30) and (31), for `f32` and `f64` |
+//! | [`model`] | what a model is; Models (12), (15), (30) and (31), for `f32` and `f64` |
 //! | [`capacitive`] | three gaps to Z, Rx, Ry and back |
 //! | [`frame`] | codes as the converters gave them, and what makes a code bad |
 //! | [`status`] | the documented bit mask that goes with every pose |
@@ -23,7 +25,7 @@
 //! | [`rezero`] | the zero deviation measured at rest |
 //! | [`parameters`], [`blob`] | the parameter set, and its bytes in flash |
 //! | [`arithmetic`] | the check at start-up that this machine rounds as the host does |
-//! | [`real`] | the operations that a number must have to run the model |
+//! | [`real`] | the operations that a number must have to run a model |
 //!
 //! Symbols of the paper and the names here:
 //!

@@ -12,6 +12,19 @@ pub type Text = String<32>;
 ///
 /// The order of the fields is that of the blob (see [`crate::blob`]), where the code windows
 /// come last and the counts before the numbers.
+///
+/// ```
+/// use runtime::{ParameterSet, PlanarPose, RawFrame};
+/// # const BLOB: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/stage.bin"));
+/// # fn main() -> Result<(), runtime::BlobError> {
+/// let set = ParameterSet::from_bytes(BLOB)?; // or `from_flash`, where padding follows
+/// set.expect_serial("HS-0007")?;
+/// let frame = RawFrame { hall: [1200, 900, 700], capacitive: [300, -200, 100], sequence: 0, time_us: 0 };
+/// let reading = set.decoder().decode(&frame, &PlanarPose::ZERO);
+/// assert!(reading.status.is_good());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterSet {
     /// Which model was fitted.
@@ -36,7 +49,7 @@ pub struct ParameterSet {
     pub capacitive: CapacitiveInput,
     /// The model's coefficients of the probes A, B, C.
     pub probes: Probes<f32>,
-    /// What the tick reads besides: the terms above, combined.
+    /// The other numbers that the tick reads: the terms above, combined.
     pub constants: DecoderConstants<f32>,
 }
 

@@ -8,13 +8,13 @@ pub const HALL_DECODER_WORDS: usize = 41;
 /// Words of a servo.
 pub const HALL_SERVO_WORDS: usize = 49;
 
-/// A decoder, as C sees it. Its contents are nobody's business.
+/// A decoder, as C sees it. Its contents are private.
 #[repr(C)]
 pub struct HallDecoder {
     opaque: [MaybeUninit<u32>; HALL_DECODER_WORDS],
 }
 
-/// A servo, as C sees it. Its contents are nobody's business.
+/// A servo, as C sees it. Its contents are private.
 #[repr(C)]
 pub struct HallServo {
     opaque: [MaybeUninit<u32>; HALL_SERVO_WORDS],

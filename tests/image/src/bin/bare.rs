@@ -1,4 +1,4 @@
-//! What a controller links at the least: a blob loaded from flash, the tick of a servo with
+//! The least that a controller links: a blob loaded from flash, the tick of a servo with
 //! hold and re-zero. Its size is that of the runtime in flash.
 #![no_std]
 #![no_main]

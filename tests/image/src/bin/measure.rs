@@ -125,7 +125,7 @@ extern "C" fn counted_can_pose(reading: &Reading, counter: u32, coded: &mut [Cod
 }
 
 #[cfg(c_reference)]
-#[allow(improper_ctypes)] // repr(C) structs of numbers, but for Status, which is transparent
+#[allow(improper_ctypes)] // repr(C) structs of numbers; Status is transparent
 unsafe extern "C" {
     fn counted_c_kernel(
         c: &Kernel,
@@ -275,7 +275,7 @@ fn touched(work: impl FnOnce()) -> usize {
 #[cfg(target_abi = "eabihf")]
 fn check_with(settings: u32) -> Result<(), ArithmeticFault> {
     let set = |fpscr: u32| {
-        // SAFETY: writes a register of the FPU; not `pure`, so it stays before and behind
+        // SAFETY: writes a register of the FPU; not `pure`, so it stays before and after
         // the check, whose operands pass through memory.
         unsafe { core::arch::asm!("vmsr fpscr, {}", in(reg) fpscr, options(nostack)) }
     };
