@@ -32,7 +32,7 @@ fn decode(
     mut show: impl FnMut(&RawFrame, &Reading),
 ) -> Result<(), Box<dyn Error>> {
     let decoder = ParameterSet::from_bytes(blob)?.decoder();
-    let mut servo = Servo::new(&decoder, OnInvalid::Zero);
+    let mut servo = Servo::new(&*decoder, OnInvalid::Zero);
     let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
     for (number, text) in (1..).zip(log.lines()) {
         let line = LogLine::parse(text).map_err(|e| format!("line {number}: {e}"))?;

@@ -15,6 +15,7 @@ use crate::problem::model::{Model, ParameterId};
 use crate::problem::parameters::Parameters;
 use crate::solve::{Solution, SolveError, Solver, SolverOptions};
 use runtime::calibration::Origin;
+use runtime::model::Probes;
 use runtime::parameters::{FitRecord, ParameterError, Text};
 use runtime::{Calibration, ParameterSet};
 
@@ -319,7 +320,7 @@ pub fn calibration(
     Calibration {
         model: model.kind,
         geometry: parameters.geometry(),
-        sensitivity: parameters.sensitivity(),
+        probes: Probes::Linear(parameters.sensitivity()),
         hall_m_per_code: stage.hall.m_per_count,
         hall_window: stage.hall.window,
         capacitive_probes_m: stage.capacitive_probes_m,

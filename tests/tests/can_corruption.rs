@@ -8,11 +8,11 @@ use hal_adapters::fault::{Fault, FaultRates, Faulty, Random};
 use runtime::calibration::Origin;
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeGeometry;
-use runtime::model::Sensitivity;
-use runtime::{Calibration, Decoder, ModelKind, PlanarPose, RawFrame, Reading, Status};
+use runtime::model::{Probes, Sensitivity};
+use runtime::{AnyDecoder, Calibration, ModelKind, PlanarPose, RawFrame, Reading, Status};
 
 /// A stage near the designed one.
-fn decoder() -> Decoder {
+fn decoder() -> AnyDecoder {
     let window = CodeWindow::between_rails(-32768, 32767).expect("16 bits");
     let probe = |eta| Sensitivity {
         eta,
@@ -26,7 +26,7 @@ fn decoder() -> Decoder {
             lever_arm_m: [0.1975, -0.1975, -0.36],
             misalignment_rad: [0.02, -0.03, 0.01],
         },
-        sensitivity: [probe(0.87), probe(0.70), probe(0.86)],
+        probes: Probes::Linear([probe(0.87), probe(0.70), probe(0.86)]),
         hall_m_per_code: 6.25e-8,
         hall_window: window,
         capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
@@ -126,14 +126,14 @@ fn run(ticks: u32, rates: FaultRates, damaging: &[Fault], seed: u64) -> Outcome 
         let Some(got) = receiver.take(&stamped.frame, now_us).tick else {
             continue;
         };
-        let reading = decoder.decode(got.hall, got.capacitive, &PlanarPose::ZERO);
+        let reading = decoder.decode(&got, &PlanarPose::ZERO);
         if reading.status.any(Status::PLANAR_INVALID) {
             continue;
         }
         out.valid_poses += 1;
         let sent = tick(number(got.hall[0], got.hall[1]));
         let same = (sent.hall, sent.capacitive) == (got.hall, got.capacitive);
-        let want = decoder.decode(sent.hall, sent.capacitive, &PlanarPose::ZERO);
+        let want = decoder.decode(&sent, &PlanarPose::ZERO);
         out.wrong_poses += u32::from(!same || bits(&want) != bits(&reading));
     }
     out.damaged = damaging.iter().map(|f| source.injected(*f)).sum();

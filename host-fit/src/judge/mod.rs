@@ -13,7 +13,7 @@ use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
 use runtime::geometry::ProbeGeometry;
-use runtime::model::Sensitivity;
+use runtime::model::Probes;
 use runtime::{ParameterSet, PlanarPose};
 
 /// Which zero deviations are taken off before errors are counted.
@@ -72,13 +72,9 @@ pub fn parameters_of(set: &ParameterSet) -> Parameters {
         lever_arm_m: set.geometry.lever_arm_m.map(f64::from),
         misalignment_rad: set.geometry.misalignment_rad.map(f64::from),
     };
-    let sensitivity = set.constants.sensitivity.map(|s| Sensitivity {
-        eta: s.eta.into(),
-        per_z_m: s.per_z_m.into(),
-        per_rx_rad: s.per_rx_rad.into(),
-        per_ry_rad: s.per_ry_rad.into(),
-    });
-    Parameters::of_model_31(&geometry, &sensitivity)
+    match set.probes.rounded() {
+        Probes::Linear(sensitivity) => Parameters::of_model_31(&geometry, &sensitivity),
+    }
 }
 
 /// A dataset decoded with one parameter set: to be judged in several ways.
@@ -96,7 +92,7 @@ impl Decoded {
     pub fn new(set: &ParameterSet, dataset: &Dataset) -> Self {
         let decoder = set.decoder();
         let one = |row: &Row| {
-            let reading = row.frame.decode(&decoder, &PlanarPose::ZERO);
+            let reading = row.frame.decode(&*decoder, &PlanarPose::ZERO);
             let pose = reading.planar()?.to_array();
             let error = |axis: usize| f64::from(pose[axis]) - row.reference[axis];
             Some(std::array::from_fn(error))

@@ -107,7 +107,7 @@ mod app {
         } else if let Some(loaded) = loaded {
             let loaded: &'static Loaded = cx.local.loaded.insert(loaded);
             Parameters::Usable {
-                servo: Servo::new(&loaded.decoder, OnInvalid::Zero),
+                servo: Servo::new(&*loaded.decoder, OnInvalid::Zero),
                 serial: &loaded.serial,
                 other_slot: choice.refusal,
             }

@@ -41,7 +41,7 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
     let stop = interrupt::watch();
     let decoder = set.decoder();
     let mut session = Session {
-        node: Node::new(&decoder, &set.serial, &node),
+        node: Node::new(&*decoder, &set.serial, &node),
         bus,
         record,
         sends: !settings.listen_only,

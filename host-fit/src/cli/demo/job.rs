@@ -124,13 +124,14 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
 
     blob_file::write(&blob_path, &model_31.set)?;
     let set = blob_file::read(&blob_path)?;
-    let decoded = pose_file::decode(dataset, &set.decoder(), OnInvalid::Zero);
+    let decoded = pose_file::decode(dataset, &*set.decoder(), OnInvalid::Zero);
     output::write_atomically(&pose_path, &pose_file::to_text(&decoded))?;
     let errors = pose_file_errors(&pose_path, dataset, &stage, &model_31.solution.parameters)?;
     let constants = model_31
         .calibration
         .constants()
         .map_err(crate::fit::FitError::Unusable)?;
+    let probes = model_31.calibration.probes;
     let movements = dataset.movements.iter().zip(&model_31.judgement.zeros);
     Ok(Demo {
         designed,
@@ -143,7 +144,8 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
         decoded: errors,
         f32_difference: crate::judge::precision::largest_difference(
             &constants,
-            &set.decoder(),
+            &probes,
+            &*set.decoder(),
             dataset,
         ),
         reading,

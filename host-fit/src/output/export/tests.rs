@@ -5,7 +5,7 @@ use runtime::blob::MAX_BYTES;
 use runtime::calibration::Origin;
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeGeometry;
-use runtime::model::{ModelKind, Sensitivity};
+use runtime::model::{ModelKind, Probes, Sensitivity};
 use runtime::{Calibration, ParameterSet};
 
 /// Bytes of a slot's sector.
@@ -22,7 +22,7 @@ fn set() -> ParameterSet {
             lever_arm_m: [0.2, -0.19, -0.36],
             misalignment_rad: [0.01, -0.02, 0.03],
         },
-        sensitivity: [0.88, 0.75, 0.82].map(Sensitivity::constant),
+        probes: Probes::Linear([0.88, 0.75, 0.82].map(Sensitivity::constant)),
         hall_m_per_code: 6.25e-8,
         hall_window: window,
         capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
