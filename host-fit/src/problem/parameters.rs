@@ -2,7 +2,7 @@
 
 use super::model::{COUNT, GAIN_TERMS, Model, SLOPES_MAX};
 use crate::input::stage::{Range, Stage};
-use runtime::geometry::ProbeGeometry;
+use runtime::geometry::{ProbeGeometry, SensingAxes};
 use runtime::model::Sensitivity;
 
 /// Where the misalignments start.
@@ -121,18 +121,13 @@ pub fn search_box(
 
 /// The lever arm is linear in its two coordinates: its range is the sum of two intervals.
 fn lever_arm_range(stage: &Stage, probe: usize, misalignment_rad: f64) -> Range {
-    let (sin, cos) = misalignment_rad.sin_cos();
-    let h = &stage.search.h_m;
-    let (x, x_factor, y, y_factor) = match probe {
-        0 => (h.h1x_m, cos, h.h1y_m, sin),
-        1 => (h.h2x_m, -cos, h.h2y_m, sin),
-        _ => (h.h3x_m, sin, h.h3y_m, -cos),
-    };
-    let ends = |range: Range, factor: f64| {
-        let (a, b) = (range.low * factor, range.high * factor);
+    let factors = SensingAxes::at([misalignment_rad; 3]).arm_factors()[probe];
+    let ranges = stage.search.h_m.pairs()[probe];
+    let ends = |k: usize| {
+        let (a, b) = (ranges[k].low * factors[k], ranges[k].high * factors[k]);
         (a.min(b), a.max(b))
     };
-    let ((x_low, x_high), (y_low, y_high)) = (ends(x, x_factor), ends(y, y_factor));
+    let ((x_low, x_high), (y_low, y_high)) = (ends(0), ends(1));
     Range {
         low: x_low + y_low,
         high: x_high + y_high,

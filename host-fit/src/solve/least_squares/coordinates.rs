@@ -8,7 +8,7 @@ use crate::input::stage::{Range, Stage};
 use crate::problem::model::{COUNT, Model, ParameterId, SLOPES_MAX};
 use crate::problem::parameters::{ETA, Parameters, SLOPES, THETA, search_box};
 use nalgebra::{Matrix3, RowVector3};
-use runtime::geometry::{ProbeGeometry, inverse_rows, matrix};
+use runtime::geometry::{ProbeGeometry, SensingAxes, inverse_rows, matrix};
 
 /// Unknowns of a fit and what they mean.
 pub trait Coordinates {
@@ -184,14 +184,11 @@ pub fn parameter_jacobian(p: &Parameters, point: &Point) -> Square {
     let eta = p.eta();
     // PM^-1 = G diag(eta).
     let inverse = Matrix3::from_fn(|i, j| point.gain[(i, j)] * eta[j]);
+    let across = SensingAxes::at(p.geometry().misalignment_rad).across();
     let mut out = Square::zeros();
     for probe in 0..3 {
-        let (sin, cos) = p.geometry().misalignment_rad[probe].sin_cos();
-        let turned = if probe < 2 {
-            RowVector3::new(-cos, -sin, 0.0)
-        } else {
-            RowVector3::new(-sin, cos, 0.0)
-        };
+        let [x, y] = across[probe];
+        let turned = RowVector3::new(x, y, 0.0);
         let turned = turned * point.gain;
         for i in 0..3 {
             for j in 0..3 {
@@ -234,10 +231,12 @@ pub fn parameters_of(point: &Point) -> Option<Parameters> {
         misalignment_rad: [0.0; 3],
     };
     let mut eta = [1.0; 3];
+    let designed = SensingAxes::at([0.0; 3]);
     for probe in 0..3 {
         let [x, y, arm] = m[probe];
-        // The designed direction of the sensing axis has the sign of eta.
-        let (along, across) = if probe < 2 { (y, -x) } else { (x, y) };
+        let part = |[to_x, to_y]: [f64; 2]| x * to_x + y * to_y;
+        // Along the designed direction of the sensing axis, which has the sign of eta.
+        let (along, across) = (part(designed.0[probe]), part(designed.across()[probe]));
         eta[probe] = x.hypot(y).copysign(along);
         geometry.lever_arm_m[probe] = arm / eta[probe];
         geometry.misalignment_rad[probe] = (across / eta[probe]).atan2(along / eta[probe]);

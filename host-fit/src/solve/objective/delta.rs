@@ -10,11 +10,12 @@
 //! unknowns that act on nothing and without what lies beyond the poles ([`super::poles`]).
 
 use super::lanes::{Individuals, LaneCost, Lanes, dot, each};
-use super::model::{Linearized, Plane, Turns, fitness, shares};
+use super::model::{Linearized, Plane, fitness, shares};
 use super::poles::{Smallest, cut, slope_extent};
 use crate::input::stage::Range;
 use crate::problem::Problem;
 use crate::problem::parameters::{ETA, Parameters, SLOPES, THETA, search_box};
+use runtime::geometry::SensingAxes;
 
 /// Root mean square of all pose errors at the best zero deviations within their range.
 #[derive(Clone, Debug)]
@@ -43,8 +44,7 @@ impl<'a> DeltaCost<'a> {
         for (k, bound) in bounds[SLOPES..].iter_mut().enumerate() {
             *bound = cut(*bound, eta[k % 3], extent[k / 3]);
         }
-        let h = &problem.stage.search.h_m;
-        let coordinates = [[h.h1x_m, h.h1y_m], [h.h2x_m, h.h2y_m], [h.h3x_m, h.h3y_m]];
+        let coordinates = problem.stage.search.h_m.pairs();
         Self {
             problem,
             bounds: bounds[..problem.model.free_count()].to_vec(),
@@ -54,10 +54,8 @@ impl<'a> DeltaCost<'a> {
 
     /// Lever arms in m from their places in their ranges.
     #[inline(always)]
-    fn lever_arms_m(&self, places: [Lanes; 3], turns: &Turns) -> [Lanes; 3] {
-        let Turns { sin, cos } = turns;
-        // Factors of the two coordinates in the third column of PM (equation 11).
-        let factors = [[cos[0], sin[0]], [-cos[1], sin[1]], [sin[2], -cos[2]]];
+    fn lever_arms_m(&self, places: [Lanes; 3], axes: &SensingAxes<Lanes>) -> [Lanes; 3] {
+        let factors = axes.arm_factors();
         each(|k| {
             let [x, y] = factors[k];
             let [(x_middle, x_half), (y_middle, y_half)] = self.arms_m[k];
@@ -74,9 +72,9 @@ impl<'a> DeltaCost<'a> {
         for (value, u) in values.iter_mut().zip(individual) {
             *value = *u;
         }
-        let turns = Turns::of([0, 1, 2].map(|k| Lanes::splat(values[THETA + k])));
+        let axes = SensingAxes::at([0, 1, 2].map(|k| Lanes::splat(values[THETA + k])));
         let places = [0, 1, 2].map(|k| Lanes::splat(values[k]));
-        for (value, arm) in values.iter_mut().zip(self.lever_arms_m(places, &turns)) {
+        for (value, arm) in values.iter_mut().zip(self.lever_arms_m(places, &axes)) {
             *value = arm.0[0];
         }
         parameters
@@ -86,8 +84,8 @@ impl<'a> DeltaCost<'a> {
     /// parameters are outside their box.
     pub fn individual(&self, parameters: &Parameters) -> Vec<f64> {
         let values = &parameters.values;
-        let turns = Turns::of([0, 1, 2].map(|k| Lanes::splat(values[THETA + k])));
-        let [low, high] = [0.0, 1.0].map(|t| self.lever_arms_m([Lanes::splat(t); 3], &turns));
+        let axes = SensingAxes::at([0, 1, 2].map(|k| Lanes::splat(values[THETA + k])));
+        let [low, high] = [0.0, 1.0].map(|t| self.lever_arms_m([Lanes::splat(t); 3], &axes));
         let mut individual = values[..self.bounds.len()].to_vec();
         for (k, place) in individual.iter_mut().enumerate().take(3) {
             let (low, high) = (low[k].0[0], high[k].0[0]);
@@ -109,8 +107,8 @@ impl LaneCost for DeltaCost<'_> {
     #[inline(always)]
     fn cost_of_eight<const K: usize>(&self, u: &Individuals<'_>) -> Lanes {
         let model = self.problem.model;
-        let turns = Turns::of(u.three(THETA));
-        let plane = Plane::new(self.lever_arms_m(u.three(0), &turns), &turns);
+        let axes = SensingAxes::at(u.three(THETA));
+        let plane = Plane::new(&axes, self.lever_arms_m(u.three(0), &axes));
         let (linearized, eta) = Linearized::<K>::new(&plane, model, u, ETA);
         let range = self.problem.stage.search.delta_m;
         let (low_um, high_um) = (range.low * 1e6, range.high * 1e6);

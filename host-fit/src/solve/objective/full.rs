@@ -7,11 +7,11 @@
 //! redundant; they are kept because the paper has them.
 
 use super::lanes::{Individuals, LaneCost, Lanes, dot, each};
-use super::model::{Linearized, Plane, Turns, fitness, shares};
+use super::model::{Linearized, Plane, fitness, shares};
 use crate::input::stage::Range;
 use crate::problem::Problem;
 use crate::problem::parameters::{self, Parameters, search_box};
-use runtime::geometry::ProbeCoordinates;
+use runtime::geometry::{ProbeCoordinates, SensingAxes};
 
 /// Where the misalignments start.
 const THETA: usize = 6;
@@ -29,8 +29,7 @@ impl<'a> FullCost<'a> {
     /// The cost of a problem's rows.
     pub fn new(problem: &'a Problem<'a>) -> Self {
         let search = &problem.stage.search;
-        let h = &search.h_m;
-        let mut bounds = vec![h.h1x_m, h.h1y_m, h.h2x_m, h.h2y_m, h.h3x_m, h.h3y_m];
+        let mut bounds = search.h_m.pairs().concat();
         // The lever arms, which these coordinates make, come first in a model.
         let ranges = search_box(problem.stage, problem.model, [0.0; 3]);
         bounds.extend(&ranges[parameters::THETA..problem.model.free_count()]);
@@ -49,14 +48,8 @@ impl<'a> FullCost<'a> {
     /// The parameters of an individual.
     pub fn parameters(&self, individual: &[f64]) -> Parameters {
         let u = |index: usize| individual.get(index).copied().unwrap_or(0.0);
-        let coordinates = ProbeCoordinates {
-            h1x_m: u(0),
-            h1y_m: u(1),
-            h2x_m: u(2),
-            h2y_m: u(3),
-            h3x_m: u(4),
-            h3y_m: u(5),
-        };
+        let pairs = [0, 1, 2].map(|k| [u(2 * k), u(2 * k + 1)]);
+        let coordinates = ProbeCoordinates::from_pairs(pairs);
         let mut parameters = Parameters::designed(self.problem.stage);
         for index in parameters::THETA..self.problem.model.free_count() {
             parameters.values[index] = u(index + 3);
@@ -90,7 +83,7 @@ impl<'a> FullCost<'a> {
             .stage
             .designed
             .nearest_with(&parameters.geometry());
-        let mut individual = vec![h.h1x_m, h.h1y_m, h.h2x_m, h.h2y_m, h.h3x_m, h.h3y_m];
+        let mut individual = h.pairs().concat();
         individual.extend(&parameters.values[parameters::THETA..model.free_count()]);
         if model.has_zero_deviation {
             individual.extend(delta_m.iter().flatten());
@@ -111,15 +104,9 @@ impl LaneCost for FullCost<'_> {
     #[inline(always)]
     fn cost_of_eight<const K: usize>(&self, u: &Individuals<'_>) -> Lanes {
         let model = self.problem.model;
-        let turns = Turns::of(u.three(THETA));
-        let Turns { sin, cos } = &turns;
-        // Third column of PM (equation 11).
-        let lever_arm_m = [
-            u.number(0) * cos[0] + u.number(1) * sin[0],
-            u.number(3) * sin[1] - u.number(2) * cos[1],
-            u.number(4) * sin[2] - u.number(5) * cos[2],
-        ];
-        let plane = Plane::new(lever_arm_m, &turns);
+        let axes = SensingAxes::at(u.three(THETA));
+        let coordinates_m = each(|k| [u.number(2 * k), u.number(2 * k + 1)]);
+        let plane = Plane::new(&axes, axes.lever_arms_m(coordinates_m));
         let (linearized, _) = Linearized::<K>::new(&plane, model, u, ETA);
         let mut sums = [Lanes::ZERO; 3];
         for group in &self.problem.groups {

@@ -9,6 +9,7 @@ use crate::input::stage::Range;
 use crate::problem::Problem;
 use crate::problem::model::SLOPES_MAX;
 use crate::solve::search::cost::CostFunction;
+use runtime::real::Number;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 /// Individuals in one [`Lanes`].
@@ -59,7 +60,7 @@ impl AddAssign for Lanes {
 
 impl Lanes {
     /// Zero for every individual.
-    pub const ZERO: Self = Self([0.0; LANES]);
+    pub const ZERO: Self = Self::splat(0.0);
 
     /// The same number for every individual.
     #[inline(always)]
@@ -116,10 +117,20 @@ impl Lanes {
             }
         })
     }
+}
 
-    /// Sine and cosine of each angle in rad, by `libm`.
+/// The equations of the runtime's geometry run on eight individuals at once.
+impl Number for Lanes {
+    const ZERO: Self = Self::ZERO;
+    const ONE: Self = Self::splat(1.0);
+
     #[inline(always)]
-    pub fn sin_cos(self) -> (Self, Self) {
+    fn from_f64(value: f64) -> Self {
+        Self::splat(value)
+    }
+
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
         let mut both = (Self::ZERO, Self::ZERO);
         for k in 0..LANES {
             (both.0.0[k], both.1.0[k]) = libm::sincos(self.0[k]);

@@ -12,7 +12,7 @@
 //! boxes of lever arms, angles and zero deviations are not enforced here.
 
 use super::lanes::{Individuals, LaneCost, Lanes, dot, each};
-use super::model::{corrected_um, inverse, shares};
+use super::model::{corrected_um, shares};
 use super::poles::{Smallest, cut, slope_extent};
 use crate::input::stage::Range;
 use crate::problem::model::SLOPES_MAX;
@@ -22,6 +22,7 @@ use crate::solve::least_squares::coordinates::parameters_of;
 use crate::solve::least_squares::normal::Point;
 use crate::solve::search::random::{Phase, RandomSource, RandomStreams, SeededStreams};
 use nalgebra::Matrix3;
+use runtime::geometry::inverse_and_determinant;
 
 /// The six products of three numbers with each other: 00, 01, 02, 11, 12, 22.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
@@ -187,7 +188,7 @@ impl Sums {
     #[inline(always)]
     fn gain(&self) -> [[Lanes; 3]; 3] {
         let [aa, ab, ac, bb, bc, cc] = self.signal;
-        let inverse = inverse(&[[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]);
+        let (inverse, _) = inverse_and_determinant(&[[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]);
         each(|axis| each(|k| dot(&inverse[k], self.reference[axis])))
     }
 }

@@ -8,8 +8,10 @@
 use super::lanes::{Individuals, Lanes, dot, each};
 use crate::problem::model::Model;
 use crate::problem::{Problem, TrainRow};
+use runtime::geometry::{SensingAxes, inverse_and_determinant};
 
-/// PM and its inverse (equations 11, 32).
+/// PM and its inverse (equations 11, 32). Where PM is singular the inverse is not finite, and so
+/// neither is the cost.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane {
     /// Rows of PM.
@@ -18,57 +20,14 @@ pub struct Plane {
     pub inverse: [[Lanes; 3]; 3],
 }
 
-/// Sine and cosine of the three misalignments.
-#[derive(Clone, Copy, Debug)]
-pub struct Turns {
-    /// Sines.
-    pub sin: [Lanes; 3],
-    /// Cosines.
-    pub cos: [Lanes; 3],
-}
-
-impl Turns {
-    /// Of misalignments in rad.
-    #[inline(always)]
-    pub fn of(misalignment_rad: [Lanes; 3]) -> Self {
-        let both = each(|k| misalignment_rad[k].sin_cos());
-        Self {
-            sin: each(|k| both[k].0),
-            cos: each(|k| both[k].1),
-        }
-    }
-}
-
 impl Plane {
-    /// PM of lever arms in m and turns. Where PM is singular the inverse is not finite, and so
-    /// neither is the cost.
+    /// PM of sensing axes and lever arms in m.
     #[inline(always)]
-    pub fn new(lever_arm_m: [Lanes; 3], turns: &Turns) -> Self {
-        let Turns { sin, cos } = turns;
-        let rows = [
-            [-sin[0], cos[0], lever_arm_m[0]],
-            [-sin[1], cos[1], lever_arm_m[1]],
-            [cos[2], sin[2], lever_arm_m[2]],
-        ];
-        Self {
-            rows,
-            inverse: inverse(&rows),
-        }
+    pub fn new(axes: &SensingAxes<Lanes>, lever_arm_m: [Lanes; 3]) -> Self {
+        let rows = axes.plane_rows(lever_arm_m);
+        let (inverse, _) = inverse_and_determinant(&rows);
+        Self { rows, inverse }
     }
-}
-
-/// The inverse of a 3x3 matrix by its adjugate.
-#[inline(always)]
-pub fn inverse(m: &[[Lanes; 3]; 3]) -> [[Lanes; 3]; 3] {
-    let [[a, b, c], [d, e, f], [g, h, i]] = *m;
-    let cofactor = [e * i - f * h, f * g - d * i, d * h - e * g];
-    let determinant = (a * cofactor[0] + b * cofactor[1]) + c * cofactor[2];
-    let r = Lanes::splat(1.0) / determinant;
-    [
-        [cofactor[0] * r, (c * h - b * i) * r, (b * f - c * e) * r],
-        [cofactor[1] * r, (a * i - c * g) * r, (c * d - a * f) * r],
-        [cofactor[2] * r, (b * g - a * h) * r, (a * e - b * d) * r],
-    ]
 }
 
 /// (a, b, c, ..) / eta of one probe.
