@@ -31,6 +31,7 @@ def bad_inputs(inputs):
         return text([header, *(line for line in thin[1:] if keep(int(line.split(",")[0])))])
 
     swapped = [{"hall_a_cnt": "hall_c_cnt", "hall_c_cnt": "hall_a_cnt"}.get(n, n) for n in names]
+    blob = f"{IN}/shipped-31.bin"
     packed = gzip.compress(text(thin).encode(), mtime=0)
     logs = {
         "sound": text(thin),
@@ -71,12 +72,13 @@ def bad_inputs(inputs):
         file = f"{name.replace(' ', '-')}.csv"
         (inputs / file).write_bytes(data)
         log = [f"{IN}/{file}", "--stage", f"{IN}/shipped.toml"]
+        decode = ["decode", blob, *log, "--out", "pose.csv"]
         yield Case(f"log, {name}: fit", ["fit", *log, *FIT])
         yield Case(f"log, {name}: fit, skip", ["fit", *log, *FIT, "--bad-rows", "skip"])
         yield Case(f"log, {name}: fit (30)", ["fit", *log, *FIT, "--model", "30"])
-        yield Case(f"log, {name}: eval", ["eval", f"{IN}/shipped-31.bin", *log, "--json", "e.json"])
-        yield Case(f"log, {name}: decode", ["decode", f"{IN}/shipped-31.bin", *log, "--out", "pose.csv"])
-        yield Case(f"log, {name}: decode, hold", ["decode", f"{IN}/shipped-31.bin", *log, "--out", "pose.csv", "--hold", "2"])
+        yield Case(f"log, {name}: eval", ["eval", blob, *log, "--json", "e.json"])
+        yield Case(f"log, {name}: decode", decode)
+        yield Case(f"log, {name}: decode, hold", [*decode, "--hold", "2"])
 
     stages = {
         "negative scale": ("m_per_count = 6.25e-8", "m_per_count = -6.25e-8"),
@@ -93,8 +95,11 @@ def bad_inputs(inputs):
         "not TOML": ("[search]", "[search"),
         "key twice": ("period_s = 0.002", "period_s = 0.002\nperiod_s = 0.002"),
         "unknown column kept": ("[search]", '[log]\nhall_a = "ADC 1"\n\n[search]'),
-        "column renamed": ("[search]", '[log]\nifm_x = { column = "ifm_x_nm", unit = "um" }\n\n[search]'),
-        "column scaled": ("[search]", '[log]\nifm_x = { column = "ifm_x_nm", scale = -1e-9 }\n\n[search]'),
+        "another unit": ("[search]", '[log]\nifm_x = { column = "ifm_x_nm", unit = "um" }\n\n[search]'),
+        "another scale": (
+            "[search]",
+            '[log]\nifm_x = { column = "ifm_x_nm", scale = -1e-9 }\n\n[search]',
+        ),
         "column ignored": ("[search]", '[log]\nignore = ["hall_a_cnt"]\n\n[search]'),
     }
     for name, (old, new) in stages.items():
@@ -104,8 +109,8 @@ def bad_inputs(inputs):
         (inputs / file).write_text(stage.replace(old, new, 1))
         log = [f"{IN}/sound.csv", "--stage", f"{IN}/{file}"]
         yield Case(f"stage, {name}: fit", ["fit", *log, *FIT])
-        yield Case(f"stage, {name}: eval", ["eval", f"{IN}/shipped-31.bin", *log, "--json", "e.json"])
-        yield Case(f"stage, {name}: decode", ["decode", f"{IN}/shipped-31.bin", *log, "--out", "pose.csv"])
+        yield Case(f"stage, {name}: eval", ["eval", blob, *log, "--json", "e.json"])
+        yield Case(f"stage, {name}: decode", ["decode", blob, *log, "--out", "pose.csv"])
 
     flipped = bytearray(good)
     flipped[100] ^= 4
@@ -123,17 +128,20 @@ def bad_inputs(inputs):
     }
     sound = [f"{IN}/sound.csv", "--stage", f"{IN}/shipped.toml"]
     for name, content in damaged.items():
-        blob = f"{IN}/bad-{name.replace(' ', '-')}.bin"
-        (inputs / blob.rsplit("/", 1)[1]).write_bytes(content)
-        yield Case(f"blob, {name}: inspect", ["inspect", blob, "--json", "i.json"])
-        yield Case(f"blob, {name}: eval", ["eval", blob, *sound])
-        yield Case(f"blob, {name}: decode", ["decode", blob, *sound, "--out", "pose.csv"])
-        yield Case(f"blob, {name}: export", ["export", blob, "--slot", "0", "--out", "x.hex"])
-        yield Case(f"blob, {name}: warm start", ["fit", *sound, *FIT, "--start", blob])
-        yield Case(f"blob, {name}: live", ["live", blob, "--can", "no-such-bus"])
+        file = f"bad-{name.replace(' ', '-')}.bin"
+        (inputs / file).write_bytes(content)
+        bad = f"{IN}/{file}"
+        yield Case(f"blob, {name}: inspect", ["inspect", bad, "--json", "i.json"])
+        yield Case(f"blob, {name}: eval", ["eval", bad, *sound])
+        yield Case(f"blob, {name}: decode", ["decode", bad, *sound, "--out", "pose.csv"])
+        yield Case(f"blob, {name}: export", ["export", bad, "--slot", "0", "--out", "x.hex"])
+        yield Case(f"blob, {name}: warm start", ["fit", *sound, *FIT, "--start", bad])
+        yield Case(f"blob, {name}: live", ["live", bad, "--can", "no-such-bus"])
 
-    blob = f"{IN}/shipped-31.bin"
     record = f"{IN}/bus-16.log"
+    import_record = ["import", record, f"{IN}/interferometer.csv", *sound[1:], "--out", "x.csv"]
+    any_bus = ["--can", "no-such-bus"]
+    start_30 = ["--start", f"{IN}/shipped-30.bin", "--solver", "shtlbo"]
     usage = {
         "nothing": [],
         "unknown command": ["calibrate"],
@@ -153,20 +161,20 @@ def bad_inputs(inputs):
         "no such log": ["fit", "nowhere.csv", *sound[1:], *FIT],
         "a folder as log": ["fit", ".", *sound[1:], *FIT],
         "the same log twice": ["fit", sound[0], *sound, *FIT],
-        "search starts from (30)": ["fit", *sound, *FIT, "--start", f"{IN}/shipped-30.bin", "--solver", "shtlbo"],
+        "search starts from (30)": ["fit", *sound, *FIT, *start_30],
         "no output": ["decode", blob, *sound],
-        "another stage": ["live", blob, "--can", "no-such-bus", "--serial", "other"],
-        "no such bus, live": ["live", blob, "--can", "no-such-bus"],
-        "no such bus, replay": ["replay", *sound, "--can", "no-such-bus"],
-        "no rate": ["replay", *sound, "--can", "no-such-bus", "--rate", "0"],
+        "another stage": ["live", blob, *any_bus, "--serial", "other"],
+        "no such bus, live": ["live", blob, *any_bus],
+        "no such bus, replay": ["replay", *sound, *any_bus],
+        "no rate": ["replay", *sound, *any_bus, "--rate", "0"],
         "address not aligned": ["export", blob, "--address", "0x08000001", "--out", "x.hex"],
         "no such slot": ["export", blob, "--slot", "2", "--out", "x.hex"],
-        "slot and address": ["export", blob, "--slot", "0", "--address", "0x08020000", "--out", "x.hex"],
+        "slot and address": ["export", blob, "--slot", "0", "--address", "0", "--out", "x.hex"],
         "compare with no seeds": ["compare", *sound, "--seeds", "0"],
         "import of a log": ["import", sound[0], f"{IN}/interferometer.csv", *sound[1:], "--out", "x.csv"],
         "import without reference": ["import", record, record, *sound[1:], "--out", "x.csv"],
-        "import far off": ["import", record, f"{IN}/interferometer.csv", *sound[1:], "--out", "x.csv", "--offset-us", "900000000"],
-        "import of another bus": ["import", record, f"{IN}/interferometer.csv", *sound[1:], "--out", "x.csv", "--interface", "can7"],
+        "import far off": [*import_record, "--offset-us", "900000000"],
+        "import of another bus": [*import_record, "--interface", "can7"],
     }
     for name, arguments in usage.items():
         yield Case(f"usage, {name}", arguments)

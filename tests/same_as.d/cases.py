@@ -95,7 +95,8 @@ def fits(log):
                 yield fit(f"{projection}, model {model}, shtlbo", *project, *few, *solver)
     if log.shipped:
         yield fit("plain draw", "--draw", "plain", *few)
-        yield fit("as the paper", "--draw", "plain", "--train", "200", "--solver", "shtlbo", "--project", "none")
+        paper = ["--draw", "plain", "--train", "200", "--solver", "shtlbo", "--project", "none"]
+        yield fit("as the paper", *paper)
         yield fit("population", "--population", "30", *few, "--solver", "shtlbo")
         yield fit("warm start", "--start", log.blobs["31"], *few, "--solver", "shtlbo")
         for threads in ("1", "2"):
