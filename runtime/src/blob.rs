@@ -239,15 +239,19 @@ fn blob_length(bytes: &[u8]) -> Result<usize, BlobError> {
     if found != MAGIC {
         return Err(BlobError::BadMagic { found });
     }
-    let version = u16::from_le_bytes([v0, v1]);
-    if version == 0 || version > LAYOUT_VERSION {
-        return Err(BlobError::UnknownVersion {
-            found: version,
-            supported: LAYOUT_VERSION,
-        });
-    }
+    // A further layout is one more arm here; what differs in its payload follows from the
+    // model's tag, in `layout`.
+    let largest = match u16::from_le_bytes([v0, v1]) {
+        1 => MAX_BYTES,
+        found => {
+            return Err(BlobError::UnknownVersion {
+                found,
+                supported: LAYOUT_VERSION,
+            });
+        }
+    };
     let payload_bytes = u32::from_le_bytes([n0, n1, n2, n3]);
-    let most = MAX_BYTES - HEADER_BYTES - CRC_BYTES;
+    let most = largest - HEADER_BYTES - CRC_BYTES;
     match usize::try_from(payload_bytes) {
         Ok(payload) if payload <= most && [r0, r1] == [0, 0] => {
             Ok(HEADER_BYTES + payload + CRC_BYTES)

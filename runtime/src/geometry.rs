@@ -270,6 +270,32 @@ mod tests {
             prop_assert!((product - Matrix3::identity()).abs().max() < 1e-12);
         }
 
+        /// Derivatives by differences: of the axes by the misalignment, of the arms by the coordinates.
+        #[test]
+        fn derivatives_are_those_of_axes_and_arms(t in prop::array::uniform3(-0.14..0.14f64)) {
+            let (axes, step) = (SensingAxes::at(t), 1e-6);
+            let (ahead, back) = (SensingAxes::at(t.map(|t| t + step)), SensingAxes::at(t.map(|t| t - step)));
+            for probe in 0..3 {
+                for part in 0..2 {
+                    let slope = (ahead.0[probe][part] - back.0[probe][part]) / (2.0 * step);
+                    prop_assert!((axes.across()[probe][part] - slope).abs() < 1e-9);
+                    let mut moved = DESIGNED.pairs();
+                    moved[probe][part] += 1.0;
+                    let gain = axes.lever_arms_m(moved)[probe] - axes.lever_arms_m(DESIGNED.pairs())[probe];
+                    prop_assert!((axes.arm_factors()[probe][part] - gain).abs() < 1e-14);
+                }
+            }
+        }
+
+        #[test]
+        fn misalignments_and_arms_can_be_read_from_the_rows_of_pm(t in prop::array::uniform3(-1.5..1.5f32),
+                                                                  arms in prop::array::uniform3(-0.5..0.5f32)) {
+            let rows = SensingAxes::at(t).plane_rows(arms);
+            let (axes, found) = SensingAxes::of_rows(&rows);
+            prop_assert_eq!(found, arms);
+            for (have, want) in axes.misalignment_rad().iter().zip(t) { prop_assert!((have - want).abs() < 3e-7); }
+        }
+
         #[test]
         fn nearest_coordinates_have_the_asked_geometry(t in prop::array::uniform3(-0.14..0.14f64),
                                                        d in prop::array::uniform3(-0.05..0.05f64)) {

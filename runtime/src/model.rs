@@ -115,13 +115,6 @@ impl<T: Real> Probes<T> {
         }
     }
 
-    /// The sensitivities at the zero of the vertical pose.
-    pub fn eta(&self) -> [T; 3] {
-        match self {
-            Self::Linear([a, b, c]) => [a.eta, b.eta, c.eta],
-        }
-    }
-
     /// Each coefficient as another type of number, rounded to the nearest.
     #[must_use]
     pub fn rounded<U: Real>(&self) -> Probes<U> {

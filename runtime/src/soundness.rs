@@ -253,6 +253,21 @@ mod tests {
     }
 
     #[test]
+    fn a_sensing_axis_that_is_no_unit_vector_is_refused() {
+        let term = "PM";
+        let longer = |set: &mut ParameterSet| {
+            set.plane[0] = set.plane[0].map(|x| 2.0 * x);
+            set.geometry.lever_arm_m[0] *= 2.0;
+            for rows in [&mut set.plane_inverse, &mut set.constants.planar_per_code] {
+                for row in rows {
+                    row[0] *= 0.5;
+                }
+            }
+        };
+        assert_eq!(refused(longer), ParameterError::Inconsistent { term });
+    }
+
+    #[test]
     fn scales_limits_and_windows_must_make_sense() {
         let value = "the smallest sensitivity";
         assert_eq!(
