@@ -19,16 +19,12 @@ const PERIOD_US: u32 = 2000;
 
 fn main() -> Result<(), AdcError<Infallible>> {
     run(3, |time_us, frame| {
-        let interface = "can0";
-        let time_us = u64::from(time_us);
-        println!(
-            "{}",
-            LogLine {
-                time_us,
-                interface,
-                frame
-            }
-        );
+        let line = LogLine {
+            time_us: time_us.into(),
+            interface: "can0",
+            frame,
+        };
+        println!("{line}");
     })
 }
 
