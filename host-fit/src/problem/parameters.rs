@@ -175,15 +175,16 @@ impl Parameters {
 /// the six coordinates at the given misalignments, so it moves with them.
 pub fn search_box(stage: &Stage, misalignment_rad: [f64; 3]) -> [Range; COUNT] {
     let search = &stage.search;
+    let term = |key, probe: usize| search.of(key).unwrap_or_default()[probe];
     std::array::from_fn(|index| {
         let ParameterId { quantity, probe } = ParameterId::at(index);
         match quantity {
             Quantity::LeverArm => lever_arm_range(stage, probe, misalignment_rad[probe]),
-            Quantity::Misalignment => search.theta_rad,
-            Quantity::Eta => search.eta[probe],
-            Quantity::PerZ => search.a_per_m[probe],
-            Quantity::PerRx => search.b_per_rad[probe],
-            Quantity::PerRy => search.c_per_rad[probe],
+            Quantity::Misalignment => term("theta_deg", probe),
+            Quantity::Eta => term("eta", probe),
+            Quantity::PerZ => term("a_per_m", probe),
+            Quantity::PerRx => term("b_per_rad", probe),
+            Quantity::PerRy => term("c_per_rad", probe),
         }
     })
 }

@@ -136,7 +136,7 @@ impl PopulationSolver {
 fn middle_of_the_box(problem: &Problem<'_>) -> Parameters {
     let mut middle = Parameters::designed(problem.stage);
     if problem.model.has_sensitivity() {
-        let ranges = problem.stage.search.eta;
+        let ranges = problem.stage.search.of("eta").unwrap_or_default();
         for (sensitivity, range) in middle.sensitivity.iter_mut().zip(ranges) {
             sensitivity.eta = 0.5 * (range.low + range.high);
         }

@@ -103,8 +103,9 @@ impl Boxed<'_> {
     /// The nearest parameters within the box.
     pub fn clipped(&self, parameters: &Parameters) -> Parameters {
         let mut p = parameters.to_array();
-        for theta in &mut p[3..6] {
-            *theta = self.stage.search.theta_rad.clip(*theta);
+        let ranges = self.stage.search.of("theta_deg").unwrap_or_default();
+        for (theta, range) in p[3..6].iter_mut().zip(ranges) {
+            *theta = range.clip(*theta);
         }
         let ranges = search_box(self.stage, [p[3], p[4], p[5]]);
         for (k, (p, range)) in p.iter_mut().zip(ranges).enumerate() {

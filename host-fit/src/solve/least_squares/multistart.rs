@@ -315,7 +315,8 @@ fn starts(problem: &Problem, seed: u64) -> Vec<Parameters> {
     let stage = problem.stage;
     let mut designed = Parameters::designed(stage);
     if problem.model.has_sensitivity() {
-        for (s, range) in designed.sensitivity.iter_mut().zip(&stage.search.eta) {
+        let ranges = stage.search.of("eta").unwrap_or_default();
+        for (s, range) in designed.sensitivity.iter_mut().zip(ranges) {
             s.eta = 0.5 * (range.low + range.high);
         }
     }

@@ -49,7 +49,7 @@ impl<'a> DeltaCost<'a> {
         let extent = vertical_extent(&problem.rows);
         let bound = |(id, range): (ParameterId, Range)| {
             // With the largest eta the pole is farthest away.
-            let eta = problem.stage.search.eta[id.probe];
+            let eta = problem.stage.search.of("eta").unwrap_or_default()[id.probe];
             let eta = eta.high.abs().max(eta.low.abs());
             let range = match id.quantity {
                 Quantity::LeverArm => share,

@@ -43,16 +43,17 @@ impl<'a> FullCost<'a> {
     /// The cost of a problem's rows.
     pub fn new(problem: &'a Problem<'a>) -> Self {
         let search = &problem.stage.search;
+        let term = |key| search.of(key).unwrap_or_default();
         let h = &search.h_m;
         let mut bounds = vec![h.h1x_m, h.h1y_m, h.h2x_m, h.h2y_m, h.h3x_m, h.h3y_m];
-        bounds.extend([search.theta_rad; 3]);
+        bounds.extend(term("theta_deg"));
         if problem.model.has_sensitivity() {
-            bounds.extend(search.eta);
+            bounds.extend(term("eta"));
         }
         if problem.model.has_vertical_terms() {
-            bounds.extend(search.a_per_m);
-            bounds.extend(search.b_per_rad);
-            bounds.extend(search.c_per_rad);
+            bounds.extend(term("a_per_m"));
+            bounds.extend(term("b_per_rad"));
+            bounds.extend(term("c_per_rad"));
         }
         if problem.model.has_zero_deviation() {
             bounds.extend(vec![search.delta_m; 3 * problem.movements]);

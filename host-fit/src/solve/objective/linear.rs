@@ -66,13 +66,14 @@ impl<'a> LinearCost<'a> {
     pub fn new(problem: &'a Problem<'a>) -> Option<Self> {
         let search = &problem.stage.search;
         let extent = vertical_extent(&problem.rows);
+        let [eta, a, b, c] = ["eta", "a_per_m", "b_per_rad", "c_per_rad"]
+            .map(|key| search.of(key).unwrap_or_default());
         let bounds = std::array::from_fn(|index| {
             let (probe, axis) = (index / 3, index % 3);
-            let slopes = [&search.a_per_m, &search.b_per_rad, &search.c_per_rad];
-            let ratios = quotient(slopes[axis][probe], search.eta[probe]);
+            let ratios = quotient([a, b, c][axis][probe], eta[probe]);
             cut(ratios, 1.0, extent[axis])
         });
-        let eta_is_apart = search.eta.iter().all(|eta| eta.low > 0.0 || eta.high < 0.0);
+        let eta_is_apart = eta.iter().all(|eta| eta.low > 0.0 || eta.high < 0.0);
         if !(problem.model.has_vertical_terms() && eta_is_apart) {
             return None;
         }
