@@ -73,7 +73,7 @@ impl<'t> Document<'t> {
             .min_by_key(|name| name.span().start);
         unknown.map_or(Ok(()), |name| {
             let known = known.join(", ");
-            let problem = format!("unknown field, expected one of {known}; {MISSPELT}");
+            let problem = format!("unknown key, expected one of {known}; {MISSPELT}");
             Err(self.refuse(name.span(), problem))
         })
     }
@@ -142,6 +142,7 @@ impl<'t> Document<'t> {
             return self.missing(span, key.trim_start_matches('.'));
         }
         if message.starts_with("unknown field") {
+            let message = message.replace("field", "key");
             return self.refuse(span, format!("{message}; {MISSPELT}"));
         }
         self.wrong_kind(span, message)

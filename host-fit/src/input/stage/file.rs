@@ -161,8 +161,11 @@ fn code_scale(
     let code = |value: &Spanned<i64>| {
         let code = i32::try_from(*value.get_ref()).ok();
         let inside = code.filter(|code| code.unsigned_abs() <= CODE_MAGNITUDE_MAX.unsigned_abs());
-        let problem = "beyond 24 bits; codes of up to 24 bits are decoded exactly, so scale the \
-                       converter's codes down";
+        let problem = format!(
+            "{} is beyond 24 bits; codes of up to {CODE_MAGNITUDE_MAX} are decoded exactly, so \
+             scale the converter's codes down",
+            value.get_ref()
+        );
         inside.ok_or_else(|| document.refuse(value.span(), problem))
     };
     let (low, high) = (code(code_min)?, code(code_max)?);
@@ -173,12 +176,18 @@ fn code_scale(
         );
         document.refuse(code_max.span(), problem)
     })?;
-    let codes = f64::from(window.low.abs().max(window.high.abs()));
-    let (least_m, most_m) = FULL_SCALES_M;
-    let m_per_count =
-        document.within(m_per_count, least_m / codes, most_m / codes, "m per code")?;
+    let scale = document.within(m_per_count, f64::MIN, f64::MAX, "m per code")?;
+    let full_scale_m = scale * f64::from(window.low.abs().max(window.high.abs()));
+    let (least, most) = FULL_SCALES_M;
+    if !(least..=most).contains(&full_scale_m) {
+        let problem = format!(
+            "{scale:e} m per code makes a full scale of {full_scale_m:e} m, outside {least:e} to \
+             {most:e} m; check the scale and its unit (m per code)"
+        );
+        return Err(document.refuse(m_per_count.span(), problem));
+    }
     Ok(CodeScale {
-        m_per_count,
+        m_per_count: scale,
         window,
     })
 }
