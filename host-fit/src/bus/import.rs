@@ -16,7 +16,6 @@ mod error;
 pub mod join;
 pub mod offset;
 pub mod reference;
-mod text;
 pub mod write;
 
 pub use error::ImportError;

@@ -7,19 +7,18 @@
 //!
 //! Anything wrong is refused with file, line and column ([`LogError`]). Bad cells and
 //! saturated codes can be left out and counted instead ([`BadRows::Skip`]); a log whose
-//! structure is wrong cannot be read by halves.
+//! structure is wrong is always refused.
 
-mod cell;
+pub(crate) mod cell;
 mod error;
-mod header;
+pub(crate) mod header;
 pub mod layout;
 mod order;
 mod reader;
 mod rows;
 mod sequence;
 mod skipped;
-mod source;
-mod text;
+pub(crate) mod table;
 mod warning;
 
 pub use cell::CellFault;
@@ -27,10 +26,11 @@ pub use error::{CellPlace, LogError};
 pub use warning::{LogWarning, SkipReason};
 
 use crate::input::dataset::{Dataset, LogSource, Row};
+use crate::input::source;
 use crate::input::stage::Stage;
 use sha2::{Digest, Sha256};
 use std::path::Path;
-use text::Text;
+use table::Table;
 
 /// What to do with a row that has a bad cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -109,7 +109,7 @@ pub fn read<P: AsRef<Path>>(
     let mut hash = Sha256::new();
     for path in paths {
         let path = path.as_ref();
-        let bytes = source::read(path)?;
+        let bytes = source::read_text(path)?;
         hash.update(&bytes);
         append(&mut reading, path, &bytes, stage, options)?;
     }
@@ -120,14 +120,14 @@ pub fn read<P: AsRef<Path>>(
 /// Reads one log that is in memory, plain or gzip; `path` is only named in errors.
 ///
 /// # Errors
-/// As [`read`], but for opening the file.
+/// As [`read`], without those of opening the file.
 pub fn read_bytes(
     bytes: &[u8],
     path: &Path,
     stage: &Stage,
     options: &ReadOptions,
 ) -> Result<LogReading, LogError> {
-    let bytes = source::unpack(bytes.into(), path)?;
+    let bytes = source::unpack_text(bytes.into(), path)?;
     let mut reading = LogReading::default();
     append(&mut reading, path, &bytes, stage, options)?;
     reading.dataset.sha256 = Sha256::digest(&bytes).into();
@@ -141,9 +141,9 @@ fn append(
     stage: &Stage,
     options: &ReadOptions,
 ) -> Result<(), LogError> {
-    let text = Text::new(path, bytes);
+    let table = Table::open(path, bytes)?;
     let (dataset, warnings) = (&mut reading.dataset, &mut reading.warnings);
-    reading.skipped_rows += reader::append(&text, stage, options, dataset, warnings)?;
+    reading.skipped_rows += reader::append(table, stage, options, dataset, warnings)?;
     refuse_repeated_log(&reading.dataset)
 }
 

@@ -3,4 +3,5 @@
 pub mod dataset;
 pub mod log;
 pub mod shipped;
+pub mod source;
 pub mod stage;

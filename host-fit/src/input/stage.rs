@@ -1,20 +1,21 @@
 //! The stage as designed: geometry, scales, and the ranges in which a fit may search.
 
 mod columns;
+mod document;
 mod error;
 mod file;
-mod ranges;
-mod value;
+mod search;
 
-pub use error::{Place, StageError, ValueFault};
+pub use error::{Place, StageError};
 
 use crate::input::log::layout::LogLayout;
 use runtime::capacitive::ProbePositions;
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeCoordinates;
+use std::collections::BTreeMap;
 
 /// A closed interval, in the unit of the field that holds it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Range {
     /// Lower end.
     pub low: f64,
@@ -49,35 +50,35 @@ pub struct CodeScale {
 }
 
 /// Ranges in which a fit may search (Tables 3 and 5 of the paper, and the zero deviation).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SearchRanges {
     /// H1x, H1y, H2x, H2y, H3x, H3y, m.
     pub h_m: ProbeCoordinates<Range>,
-    /// eta of A, B, C.
-    pub eta: [Range; 3],
-    /// theta, the same for all probes, rad.
-    pub theta_rad: Range,
-    /// a of A, B, C, 1/m.
-    pub a_per_m: [Range; 3],
-    /// b of A, B, C, 1/rad.
-    pub b_per_rad: [Range; 3],
-    /// c of A, B, C, 1/rad.
-    pub c_per_rad: [Range; 3],
     /// Zero deviation of a movement, m.
     pub delta_m: Range,
+    terms: BTreeMap<&'static str, [Range; 3]>,
 }
 
 impl SearchRanges {
-    /// The ranges of a term for A, B, C, by its key in `stage.toml`.
+    /// Ranges of the coordinates and of the zero deviation, m; those of the model's terms are
+    /// [`set`](Self::set) one by one.
+    pub const fn new(h_m: ProbeCoordinates<Range>, delta_m: Range) -> Self {
+        Self {
+            h_m,
+            delta_m,
+            terms: BTreeMap::new(),
+        }
+    }
+
+    /// The ranges of a term of the model for the probes A, B, C, by its key in the table
+    /// `[search]`: `eta`, `theta_deg` (in rad here), `a_per_m`, `b_per_rad`, `c_per_rad`.
     pub fn of(&self, key: &str) -> Option<[Range; 3]> {
-        Some(match key {
-            "eta" => self.eta,
-            "theta_deg" => [self.theta_rad; 3],
-            "a_per_m" => self.a_per_m,
-            "b_per_rad" => self.b_per_rad,
-            "c_per_rad" => self.c_per_rad,
-            _ => return None,
-        })
+        self.terms.get(key).copied()
+    }
+
+    /// Sets the ranges of a term for A, B, C, in SI units.
+    pub fn set(&mut self, key: &'static str, ranges: [Range; 3]) {
+        self.terms.insert(key, ranges);
     }
 }
 

@@ -94,7 +94,9 @@ fn the_cost_of_a_solution_is_that_of_its_own_parameters_and_zero_deviations() {
 fn a_gain_outside_its_box_is_brought_back_with_the_cost_that_it_has_there() {
     let (mut stage, dataset) = (stage(), dataset(20, 5));
     // The truth is 0.87.
-    stage.search.eta[0].low = 0.9;
+    let mut eta = stage.search.of("eta").expect("known");
+    eta[0].low = 0.9;
+    stage.search.set("eta", eta);
     let problem = problem(&dataset, &stage, ModelKind::M31);
     let found = SHTLBO
         .solve(&problem, &options(Projection::Linear, 300))

@@ -1,6 +1,7 @@
 //! Lines of a candump log to ticks, by the receiver that a controller has.
 
-use super::{ImportError, ImportSettings, text};
+use super::{ImportError, ImportSettings};
+use crate::input::source;
 use hal_adapters::can::{BusFault, BusHealth, Layout, SensorReceiver, StampedFrame, Timing};
 use hal_adapters::candump::{LineError, LogLine};
 use runtime::RawFrame;
@@ -59,10 +60,10 @@ const TIMING: Timing = Timing {
 /// Reads a record.
 ///
 /// # Errors
-/// `Unreadable`, `BadLine`, `NotText`, `SeveralInterfaces`, `NoTicks`.
+/// `Bus`, `BadLine`, `NotText`, `SeveralInterfaces`, `NoTicks`.
 pub fn read(args: &ImportSettings, layout: Layout) -> Result<BusReading, ImportError> {
     let path = args.bus.as_path();
-    let bytes = text::read(path)?;
+    let bytes = source::read_bytes(path)?;
     let mut collector = Collector {
         receiver: SensorReceiver::new(layout, TIMING),
         reading: BusReading::default(),

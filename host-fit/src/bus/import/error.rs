@@ -1,6 +1,8 @@
 //! Why an import was refused.
 
 use super::reference::Reference;
+use crate::input::log::LogError;
+use crate::input::source::SourceError;
 use crate::input::stage::StageError;
 use crate::output::OutputError;
 use hal_adapters::candump::LineError;
@@ -18,14 +20,9 @@ pub enum ImportError {
         /// What is wrong.
         problem: String,
     },
-    /// A file cannot be read.
-    #[error("cannot read {}: {cause}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        cause: std::io::Error,
-    },
+    /// The record of the bus cannot be read.
+    #[error(transparent)]
+    Bus(#[from] SourceError),
     /// A line of the record is broken.
     #[error("{}, line {line}: {fault}; mend the line, or leave such lines out with --skip-bad-lines", path.display())]
     BadLine {
@@ -70,26 +67,11 @@ pub enum ImportError {
         /// Frames that it holds.
         frames: usize,
     },
-    /// The log of the interferometers lacks a column.
-    #[error("{}: no column `{column}` in the header; name the columns in the table [log] of stage.toml", path.display())]
-    MissingColumn {
-        /// The log.
-        path: PathBuf,
-        /// The column.
-        column: String,
-    },
-    /// A row of it cannot be read.
-    #[error("{}, line {line}: {problem}", path.display())]
-    BadRow {
-        /// The log.
-        path: PathBuf,
-        /// The line, from 1.
-        line: u64,
-        /// What is wrong.
-        problem: String,
-    },
-    /// It holds no rows.
-    #[error("{}: fewer than two rows of reference", path.display())]
+    /// The log of the interferometers cannot be read.
+    #[error(transparent)]
+    Reference(#[from] LogError),
+    /// It holds too few rows.
+    #[error("{}: fewer than two rows of reference; record it again or name another file", path.display())]
     NoReference {
         /// The log.
         path: PathBuf,

@@ -1,9 +1,13 @@
 //! The log of the interferometers.
 
-use super::{ImportError, text};
-use crate::input::log::layout::{Column, Quantity};
+use super::ImportError;
+use crate::input::log::LogError;
+use crate::input::log::cell::{self, CellFault};
+use crate::input::log::header::{Header, Source, UnknownColumns};
+use crate::input::log::layout::Quantity;
+use crate::input::log::table::Table;
+use crate::input::source;
 use crate::input::stage::Stage;
-use csv::StringRecord;
 use std::path::Path;
 
 /// One sample of the reference.
@@ -44,45 +48,41 @@ pub struct ReferenceCounts {
 
 /// Which cells hold what.
 struct Cells {
-    time: (usize, Column),
+    time: Source,
     movement: Option<usize>,
     quantities: [Quantity; 3],
-    values: [usize; 3],
+    values: [Source; 3],
 }
 
-/// Reads a log of the reference.
+/// Reads a log of the reference; columns that the layout does not know are left out.
 ///
 /// # Errors
-/// `Unreadable`, `MissingColumn`, `BadRow`, `NoReference`.
+/// `Reference`, `NoReference`.
 pub fn read(path: &Path, stage: &Stage) -> Result<(Reference, ReferenceCounts), ImportError> {
-    let bytes = text::read(path)?;
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .delimiter(delimiter(bytes))
-        .from_reader(bytes);
-    let header = reader.headers().map_err(|error| bad_csv(path, &error))?;
-    let cells = find(header, path, stage)?;
+    let bytes = source::read_text(path).map_err(LogError::from)?;
+    let mut table = Table::open(path, &bytes)?;
+    let cells = Cells::find(&table, stage)?;
+    let mut samples: Vec<Sample> = Vec::new();
+    let mut row_bytes: Vec<u64> = Vec::new();
+    while table.next_row()? {
+        samples.push(cells.sample(&table)?);
+        row_bytes.push(table.row_byte());
+    }
     let mut counts = ReferenceCounts {
+        rows: samples.len(),
         has_movements: cells.movement.is_some(),
         ..ReferenceCounts::default()
     };
-    let mut samples: Vec<Sample> = Vec::new();
-    let mut lines: Vec<u64> = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|error| bad_csv(path, &error))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let bad = |problem| ImportError::BadRow {
-            path: path.to_owned(),
-            line,
-            problem,
-        };
-        samples.push(sample(&record, &cells).map_err(bad)?);
-        lines.push(line);
-    }
-    counts.rows = samples.len();
-    let samples = in_order(samples, &lines, path, &mut counts)?;
+    let backwards = |row: usize, movement, before_us: f64, t_us: f64| LogError::TimeBackwards {
+        place: table.place(
+            row_bytes.get(row).copied().unwrap_or_default(),
+            cells.time.cell,
+            Some(movement),
+        ),
+        before_us: before_us.round() as i64,
+        t_us: t_us.round() as i64,
+    };
+    let samples = in_order(samples, backwards, &mut counts)?;
     if samples.len() < 2 {
         return Err(ImportError::NoReference {
             path: path.to_owned(),
@@ -98,99 +98,55 @@ pub fn read(path: &Path, stage: &Stage) -> Result<(Reference, ReferenceCounts), 
     ))
 }
 
-fn bad_csv(path: &Path, error: &csv::Error) -> ImportError {
-    ImportError::BadRow {
-        path: path.to_owned(),
-        line: error.position().map_or(1, csv::Position::line),
-        problem: match error.kind() {
-            csv::ErrorKind::Utf8 { .. } => "not text".to_owned(),
-            csv::ErrorKind::UnequalLengths {
-                expected_len, len, ..
-            } => format!("{len} cells where the header has {expected_len}"),
-            _ => error.to_string(),
-        },
+impl Cells {
+    /// The beams, or X, Y, Rz where a beam is missing.
+    fn find(table: &Table<'_>, stage: &Stage) -> Result<Self, LogError> {
+        let header = Header::new(table, &stage.log, UnknownColumns::LeaveOut)?;
+        let [time] = header.all([Quantity::Time])?;
+        let (quantities, values) = match header.all(Quantity::BEAMS) {
+            Ok(values) => (Quantity::BEAMS, values),
+            Err(missing) => (
+                Quantity::PLANAR,
+                header.all(Quantity::PLANAR).map_err(|_| missing)?,
+            ),
+        };
+        Ok(Self {
+            time,
+            movement: header.find(Quantity::Movement),
+            quantities,
+            values,
+        })
     }
-}
 
-/// The separator that the header holds most of: comma, semicolon or tab.
-fn delimiter(bytes: &[u8]) -> u8 {
-    let mut lines = bytes.split(|b| *b == b'\n');
-    let header = lines.find(|line| !line.trim_ascii().is_empty() && !line.starts_with(b"#"));
-    let header = header.unwrap_or_default();
-    let count = |separator: &u8| header.iter().filter(|b| *b == separator).count();
-    // The last of equals wins: a comma, where there is none at all.
-    *[b'\t', b';', b',']
-        .iter()
-        .max_by_key(|s| count(s))
-        .unwrap_or(&b',')
-}
-
-fn find(header: &StringRecord, path: &Path, stage: &Stage) -> Result<Cells, ImportError> {
-    let cell = |q: Quantity| {
-        let name = &stage.log.column(q).name;
-        header.iter().position(|found| found == name)
-    };
-    let missing = |q: Quantity| ImportError::MissingColumn {
-        path: path.to_owned(),
-        column: stage.log.column(q).name.clone(),
-    };
-    let three = |quantities: [Quantity; 3]| {
-        let [a, b, c] = quantities;
-        Some([cell(a)?, cell(b)?, cell(c)?])
-    };
-    let (quantities, values) = match (three(Quantity::BEAMS), three(Quantity::PLANAR)) {
-        (Some(values), _) => (Quantity::BEAMS, values),
-        (None, Some(values)) => (Quantity::PLANAR, values),
-        (None, None) => {
-            let absent = Quantity::BEAMS.into_iter().find(|q| cell(*q).is_none());
-            return Err(missing(absent.unwrap_or(Quantity::BeamX)));
-        }
-    };
-    let time = Quantity::Time;
-    Ok(Cells {
-        time: (
-            cell(time).ok_or_else(|| missing(time))?,
-            stage.log.column(time).clone(),
-        ),
-        movement: cell(Quantity::Movement),
-        quantities,
-        values,
-    })
-}
-
-fn sample(record: &StringRecord, cells: &Cells) -> Result<Sample, String> {
-    let number = |cell: usize| {
-        let text = record.get(cell).unwrap_or_default();
-        match text.parse::<f64>() {
-            Ok(x) if x.is_finite() => Ok(x),
-            _ => Err(format!("column {}: `{text}` is no number", cell + 1)),
-        }
-    };
-    let (time, column) = &cells.time;
-    let movement = match cells.movement {
-        None => 0,
-        Some(cell) => {
-            let text = record.get(cell).unwrap_or_default();
-            text.parse()
-                .map_err(|_| format!("column {}: `{text}` is no movement number", cell + 1))?
-        }
-    };
-    let [a, b, c] = cells.values;
-    Ok(Sample {
-        t_us: number(*time)? * column.scale,
-        movement,
-        values: [number(a)?, number(b)?, number(c)?],
-    })
+    /// The sample in the row in hand.
+    fn sample(&self, table: &Table<'_>) -> Result<Sample, LogError> {
+        let bad = |cell, movement, fault: CellFault| LogError::Cell {
+            place: table.place(table.row_byte(), cell, movement),
+            fault,
+        };
+        let movement = self.movement.map_or(Ok(0), |at| {
+            cell::whole(table.cell(at), "movement numbers").map_err(|fault| bad(at, None, fault))
+        })?;
+        let number = |source: &Source| {
+            let at = source.cell;
+            cell::number(table.cell(at)).map_err(|fault| bad(at, Some(movement), fault))
+        };
+        let [a, b, c] = &self.values;
+        Ok(Sample {
+            t_us: number(&self.time)? * self.time.scale,
+            movement,
+            values: [number(a)?, number(b)?, number(c)?],
+        })
+    }
 }
 
 /// Puts movements that start their time anew one period after the last, leaves repeated times
 /// out, counts gaps, and refuses time that runs backwards.
 fn in_order(
     samples: Vec<Sample>,
-    lines: &[u64],
-    path: &Path,
+    backwards: impl Fn(usize, i64, f64, f64) -> LogError,
     counts: &mut ReferenceCounts,
-) -> Result<Vec<Sample>, ImportError> {
+) -> Result<Vec<Sample>, LogError> {
     let mut steps: Vec<f64> = samples
         .windows(2)
         .filter_map(|pair| match pair {
@@ -206,7 +162,7 @@ fn in_order(
     };
     let mut kept: Vec<Sample> = Vec::with_capacity(samples.len());
     let mut shift_us = 0.0;
-    for (mut sample, line) in samples.into_iter().zip(lines) {
+    for (row, mut sample) in samples.into_iter().enumerate() {
         sample.t_us += shift_us;
         if let Some(before) = kept.last() {
             let new = sample.movement != before.movement;
@@ -221,11 +177,7 @@ fn in_order(
                 continue;
             }
             if sample.t_us < before.t_us {
-                return Err(ImportError::BadRow {
-                    path: path.to_owned(),
-                    line: *line,
-                    problem: "time runs backwards within a movement".to_owned(),
-                });
+                return Err(backwards(row, sample.movement, before.t_us, sample.t_us));
             }
             if !new && sample.t_us - before.t_us > 1.5 * period_us {
                 counts.gaps += 1;

@@ -248,17 +248,71 @@ fn each_fault_of_the_reference_has_its_place() {
         run(&args).expect_err(reference).to_string()
     };
     let head = "movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm\n";
-    assert!(refused("movement,t_us,ifm_x_nm,ifm_y1_nm\n").contains("no column `ifm_y2_nm`"));
-    assert!(refused("movement,time,ifm_x_nm,ifm_y1_nm,ifm_y2_nm\n").contains("no column `t_us`"));
-    assert!(refused(head).contains("fewer than two rows"));
-    assert!(refused(&format!("{head}0,0,1,2,3\n0,1000,1,x,3\n")).contains("line 3: column 4: `x`"));
-    assert!(refused(&format!("{head}0,0,1,2,3\n0,1000,1,NaN,3\n")).contains("line 3"));
-    assert!(
-        refused(&format!("{head}0,0,1,2,3\n0,1000,1\n"))
-            .contains("line 3: 3 cells where the header has 5")
-    );
-    let backwards = format!("{head}0,0,1,2,3\n0,2000,1,2,3\n0,1000,1,2,3\n");
-    assert!(refused(&backwards).contains("line 4: time runs backwards"));
+    let rows = |rows: &str| format!("{head}0,0,1,2,3\n{rows}\n");
+    for (reference, parts) in [
+        (
+            head.replace(",ifm_y2_nm", ""),
+            ["ifm.csv:1: ", "`ifm_y2_nm`"],
+        ),
+        (head.replace("t_us", "time"), ["ifm.csv:1: ", "`t_us`"]),
+        (head.replace("t_us", "ifm_x_nm"), ["ifm.csv:1: ", "repeats"]),
+        (String::new(), ["ifm.csv: ", "empty"]),
+        (
+            "0,0,1,2,3\n".to_owned(),
+            ["ifm.csv:1: ", "not column names"],
+        ),
+        (head.to_owned(), ["ifm.csv: ", "fewer than two rows"]),
+        (
+            rows("# a note\n\n0,1000,1,x,3"),
+            ["ifm.csv:5: column 4 (ifm_y1_nm), movement 0", "\"x\""],
+        ),
+        (rows("0,1000,1,NaN,3"), ["ifm.csv:3: column 4", "NaN"]),
+        (
+            rows("0.5,1000,1,2,3"),
+            ["ifm.csv:3: column 1", "not a whole"],
+        ),
+        (rows("0,1000,1"), ["ifm.csv:3: 3 cells", "the header has 5"]),
+        (
+            rows("0,2000,1,2,3\n0,1000,1,2,3"),
+            [
+                "ifm.csv:4: column 2 (t_us), movement 0",
+                "time runs backwards",
+            ],
+        ),
+    ] {
+        let message = refused(&reference);
+        for part in parts.iter().chain(&["; "]) {
+            assert!(message.contains(part), "{part}: {message}");
+        }
+    }
+}
+
+/// What the same numbers give, however they are written down.
+#[test]
+fn separators_line_ends_comments_gzip_and_further_columns_do_not_matter() {
+    let bus = candump(|_, _| false);
+    let imported = |reference: &[u8]| {
+        let (_folder, args) = files(&bus, "");
+        std::fs::write(&args.reference, reference).expect("written");
+        run(&args).expect("imported");
+        std::fs::read(&args.out).expect("written")
+    };
+    let plain = reference();
+    let want = imported(plain.as_bytes());
+    for same in [
+        plain.replace(',', ";"),
+        plain.replace(',', " ,\t").replace(",\t", ", "),
+        plain.replace('\n', "\r\n"),
+        format!("\u{feff}# made, by; hand\n\n{plain}\n  \n# end"),
+        plain.replace('\n', ",,quality\n"),
+        // The movement's number may come from a program that writes fractions.
+        plain.replace("\n1,", "\n1.0,"),
+    ] {
+        assert!(imported(same.as_bytes()) == want, "{}", &same[..80]);
+    }
+    let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    std::io::Write::write_all(&mut gzip, plain.as_bytes()).expect("in memory");
+    assert!(imported(&gzip.finish().expect("in memory")) == want);
 }
 
 #[test]
@@ -277,7 +331,7 @@ fn a_record_without_sensor_frames_and_one_of_two_interfaces_are_refused() {
     ));
     let (_folder, mut args) = files("", &ifm);
     args.bus = Path::new("/no/such/file").into();
-    assert!(matches!(run(&args), Err(ImportError::Unreadable { .. })));
+    assert!(matches!(run(&args), Err(ImportError::Bus(_))));
 }
 
 #[test]

@@ -99,7 +99,7 @@ pub(super) fn shown(cell: &[u8]) -> String {
 }
 
 /// A finite number.
-pub(super) fn number(cell: &[u8]) -> Result<f64, CellFault> {
+pub(crate) fn number(cell: &[u8]) -> Result<f64, CellFault> {
     let cell = cell.trim_ascii();
     if cell.is_empty() {
         return Err(CellFault::Empty);
@@ -118,7 +118,7 @@ pub(super) fn number(cell: &[u8]) -> Result<f64, CellFault> {
 }
 
 /// A whole number; `12.0` counts as one. `what` says what the column holds.
-pub(super) fn whole(cell: &[u8], what: &'static str) -> Result<i64, CellFault> {
+pub(crate) fn whole(cell: &[u8], what: &'static str) -> Result<i64, CellFault> {
     if let Some(value) = short_integer(cell.trim_ascii()) {
         return Ok(value);
     }

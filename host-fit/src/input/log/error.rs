@@ -1,6 +1,7 @@
 //! Why a log is refused: what, where, and what to do.
 
 use super::cell::CellFault;
+use crate::input::source::SourceError;
 use std::path::PathBuf;
 
 /// One cell of a log.
@@ -41,26 +42,9 @@ pub enum LogError {
     /// No log was named.
     #[error("no log was named; name one or more CSV or CSV.gz files")]
     NoLog,
-    /// There is no such file.
-    #[error("{}: no such file; check the path", path.display())]
-    NotFound {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A folder was named.
-    #[error("{}: is a folder; name the log files in it", path.display())]
-    IsFolder {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// The system refuses to read it.
-    #[error("{}: cannot be read: {source}; check its permissions and the disk", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    /// The file cannot be read, or is no text.
+    #[error(transparent)]
+    Source(#[from] SourceError),
     /// Nothing in it, or only comments and blank lines.
     #[error("{}: the log is empty; record it again or name another file", path.display())]
     Empty {
@@ -92,50 +76,6 @@ pub enum LogError {
         line: usize,
         /// What is there, shortened.
         text: String,
-    },
-    /// Not text.
-    #[error("{}: not a text file (byte {offset}): it looks like {looks_like}", path.display())]
-    Binary {
-        /// The file.
-        path: PathBuf,
-        /// The first byte that no text has, from 0, after decompression.
-        offset: usize,
-        /// What it seems to be, and what to do.
-        looks_like: &'static str,
-    },
-    /// The gzip stream ends too early.
-    #[error("{}: the gzip file is cut short (after {bytes} decompressed bytes); copy or record it again", path.display())]
-    GzipCut {
-        /// The file.
-        path: PathBuf,
-        /// Bytes that could be decompressed.
-        bytes: usize,
-    },
-    /// The gzip stream is damaged, or its checksum fails.
-    #[error("{}: the gzip file is damaged (after {bytes} decompressed bytes: {source}); copy or record it again", path.display())]
-    GzipDamaged {
-        /// The file.
-        path: PathBuf,
-        /// Bytes that could be decompressed.
-        bytes: usize,
-        /// What the decompressor says.
-        source: std::io::Error,
-    },
-    /// Something follows the gzip stream.
-    #[error("{}: {bytes} bytes that are not gzip follow the gzip data; copy the file again, or decompress it and check its end", path.display())]
-    GzipTrailing {
-        /// The file.
-        path: PathBuf,
-        /// How many bytes.
-        bytes: usize,
-    },
-    /// More bytes than any log has.
-    #[error("{}: more than {limit_bytes} bytes of text; split the log", path.display())]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// How many bytes are read at most.
-        limit_bytes: u64,
     },
     /// A column that is needed is not there.
     #[error("{}:{line}: the column `{column}` is missing; record it, or name the column that holds it with `{key} = \"...\"` in the [log] table of stage.toml", path.display())]

@@ -1,19 +1,19 @@
-//! The header of a log: which cell of a row holds what.
+//! The header of a table: which cell of a row holds what.
 
 use super::ReferenceUse;
 use super::cell::shown;
 use super::error::LogError;
 use super::layout::{LogLayout, Quantity};
-use csv::ByteRecord;
+use super::table::Table;
 use std::path::Path;
 
 /// A cell of each row that is read.
 #[derive(Clone, Debug)]
-pub(super) struct Source {
+pub(crate) struct Source {
     /// Which cell, from 0.
-    pub(super) cell: usize,
+    pub(crate) cell: usize,
     /// m, rad or us per unit.
-    pub(super) scale: f64,
+    pub(crate) scale: f64,
 }
 
 /// Where the vertical pose of a log comes from.
@@ -39,8 +39,6 @@ pub(super) enum ReferenceSource {
 /// The columns of one log.
 #[derive(Clone, Debug)]
 pub(super) struct Columns {
-    /// Name of each column.
-    pub(super) names: Vec<String>,
     pub(super) movement: Source,
     pub(super) time: Source,
     pub(super) hall: [Source; 3],
@@ -48,7 +46,17 @@ pub(super) struct Columns {
     pub(super) reference: ReferenceSource,
 }
 
-struct Header<'a> {
+/// What to do with columns that the layout does not know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum UnknownColumns {
+    /// Refuse the table: a misspelt name would be ignored without a word.
+    Refuse,
+    /// Leave them out: an instrument may record more than is asked for.
+    LeaveOut,
+}
+
+/// The cells of a row that hold quantities of the layout.
+pub(crate) struct Header<'a> {
     path: &'a Path,
     line: usize,
     layout: &'a LogLayout,
@@ -56,70 +64,13 @@ struct Header<'a> {
     cells: [Option<usize>; 17],
 }
 
-/// Finds the columns in the header.
+/// Finds the columns of a log.
 pub(super) fn columns(
-    record: &ByteRecord,
-    path: &Path,
-    line: usize,
+    table: &Table<'_>,
     layout: &LogLayout,
     reference: ReferenceUse,
 ) -> Result<Columns, LogError> {
-    let name = |cell: &[u8]| String::from_utf8_lossy(cell.trim_ascii()).into_owned();
-    let names: Vec<String> = record.iter().map(name).collect();
-    let owned = || path.to_path_buf();
-    if names.iter().all(|name| name.parse::<f64>().is_ok()) {
-        return Err(LogError::NoHeader {
-            path: owned(),
-            line,
-        });
-    }
-    if let [one] = names.as_slice() {
-        return Err(LogError::NoSeparator {
-            path: owned(),
-            line,
-            text: shown(one.as_bytes()),
-        });
-    }
-    let mut cells = [None; 17];
-    for (cell, name) in names.iter().enumerate() {
-        if layout.ignores(name) {
-            continue;
-        }
-        let column = cell + 1;
-        if name.is_empty() {
-            return Err(LogError::UnnamedColumn {
-                path: owned(),
-                line,
-                column,
-            });
-        }
-        let Some(quantity) = layout.quantity(name) else {
-            return Err(LogError::UnknownColumn {
-                path: owned(),
-                line,
-                column,
-                name: shown(name.as_bytes()),
-                known: Quantity::ALL
-                    .map(|q| layout.column(q).name.as_str())
-                    .join(", "),
-            });
-        };
-        if let Some(first) = cells[quantity as usize].replace(cell) {
-            return Err(LogError::RepeatedColumn {
-                path: owned(),
-                line,
-                column,
-                first: first + 1,
-                name: name.clone(),
-            });
-        }
-    }
-    let header = Header {
-        path,
-        line,
-        layout,
-        cells,
-    };
+    let header = Header::new(table, layout, UnknownColumns::Refuse)?;
     let [movement] = header.all([Quantity::Movement])?;
     let [time] = header.all([Quantity::Time])?;
     let hall = header.all(Quantity::HALL)?;
@@ -133,7 +84,6 @@ pub(super) fn columns(
         _ => ReferenceSource::Beams(header.all(Quantity::BEAMS)?),
     };
     Ok(Columns {
-        names,
         movement,
         time,
         hall,
@@ -142,13 +92,73 @@ pub(super) fn columns(
     })
 }
 
-impl Header<'_> {
-    fn find(&self, quantity: Quantity) -> Option<usize> {
+impl<'a> Header<'a> {
+    /// Finds the quantities of the layout among the columns.
+    ///
+    /// # Errors
+    /// `UnnamedColumn`, `UnknownColumn`, `RepeatedColumn`.
+    pub(crate) fn new(
+        table: &Table<'a>,
+        layout: &'a LogLayout,
+        unknown: UnknownColumns,
+    ) -> Result<Self, LogError> {
+        let (path, line) = (table.path, table.header_line());
+        let owned = || path.to_path_buf();
+        let mut cells = [None; 17];
+        for (cell, name) in table.names().iter().enumerate() {
+            if layout.ignores(name) {
+                continue;
+            }
+            let column = cell + 1;
+            let Some(quantity) = layout.quantity(name) else {
+                if unknown == UnknownColumns::LeaveOut {
+                    continue;
+                }
+                if name.is_empty() {
+                    return Err(LogError::UnnamedColumn {
+                        path: owned(),
+                        line,
+                        column,
+                    });
+                }
+                return Err(LogError::UnknownColumn {
+                    path: owned(),
+                    line,
+                    column,
+                    name: shown(name.as_bytes()),
+                    known: Quantity::ALL
+                        .map(|q| layout.column(q).name.as_str())
+                        .join(", "),
+                });
+            };
+            if let Some(first) = cells[quantity as usize].replace(cell) {
+                return Err(LogError::RepeatedColumn {
+                    path: owned(),
+                    line,
+                    column,
+                    first: first + 1,
+                    name: name.clone(),
+                });
+            }
+        }
+        Ok(Self {
+            path,
+            line,
+            layout,
+            cells,
+        })
+    }
+
+    /// The cell of a quantity, from 0, if the table has it.
+    pub(crate) fn find(&self, quantity: Quantity) -> Option<usize> {
         self.cells[quantity as usize]
     }
 
     /// The cells of these quantities, or an error that names the first missing one.
-    fn all<const N: usize>(&self, quantities: [Quantity; N]) -> Result<[Source; N], LogError> {
+    pub(crate) fn all<const N: usize>(
+        &self,
+        quantities: [Quantity; N],
+    ) -> Result<[Source; N], LogError> {
         let missing = quantities.into_iter().find(|q| self.find(*q).is_none());
         if let Some(quantity) = missing {
             return Err(LogError::MissingColumn {

@@ -2,7 +2,7 @@
 
 use super::cell::{self, CellFault};
 use super::header::{Columns, ReferenceSource, Source, VerticalSource};
-use super::text::Records;
+use super::table::Table;
 use crate::input::dataset::{LoggedFrame, Row};
 use crate::input::stage::{CodeScale, Stage};
 use runtime::capacitive::{vertical_pose, vertical_rows};
@@ -53,14 +53,14 @@ impl<'a> RowReader<'a> {
     }
 
     /// The number of the movement.
-    pub(super) fn movement(&self, record: &Records<'_>) -> Result<i64, BadCell> {
+    pub(super) fn movement(&self, table: &Table<'_>) -> Result<i64, BadCell> {
         let cell = self.columns.movement.cell;
-        cell::whole(record.cell(cell), "movement numbers").map_err(|fault| BadCell { cell, fault })
+        cell::whole(table.cell(cell), "movement numbers").map_err(|fault| BadCell { cell, fault })
     }
 
     /// The time, us.
-    pub(super) fn t_us(&self, record: &Records<'_>) -> Result<i64, BadCell> {
-        let t_us = scaled(record, &self.columns.time, cell::WHOLE_MAX, "us")?;
+    pub(super) fn t_us(&self, table: &Table<'_>) -> Result<i64, BadCell> {
+        let t_us = scaled(table, &self.columns.time, cell::WHOLE_MAX, "us")?;
         // Within the range that the limit leaves.
         Ok(t_us.round() as i64)
     }
@@ -68,15 +68,15 @@ impl<'a> RowReader<'a> {
     /// The row of slot `movement` at `t_us`; its sequence number is still 0.
     pub(super) fn row(
         &self,
-        record: &Records<'_>,
+        table: &Table<'_>,
         movement: usize,
         t_us: i64,
     ) -> Result<Row, BadCell> {
-        let hall = self.codes(record, &self.columns.hall, self.hall)?;
+        let hall = self.codes(table, &self.columns.hall, self.hall)?;
         let time_us = t_us as u32;
         let (frame, vertical) = match &self.columns.vertical {
             VerticalSource::Codes(sources) => {
-                let capacitive = self.codes(record, sources, self.capacitive)?;
+                let capacitive = self.codes(table, sources, self.capacitive)?;
                 let gaps_m = capacitive.map(|code| f64::from(code) * self.capacitive.m_per_count);
                 let frame = LoggedFrame::Codes(RawFrame {
                     hall,
@@ -88,9 +88,9 @@ impl<'a> RowReader<'a> {
             }
             VerticalSource::Pose([z, rx, ry]) => {
                 let vertical = [
-                    scaled(record, z, self.height_max_m, "m")?,
-                    scaled(record, rx, ROTATION_MAX_RAD, "rad")?,
-                    scaled(record, ry, ROTATION_MAX_RAD, "rad")?,
+                    scaled(table, z, self.height_max_m, "m")?,
+                    scaled(table, rx, ROTATION_MAX_RAD, "rad")?,
+                    scaled(table, ry, ROTATION_MAX_RAD, "rad")?,
                 ];
                 let frame = LoggedFrame::HallCodes {
                     hall,
@@ -107,20 +107,20 @@ impl<'a> RowReader<'a> {
             frame,
             signal_m: hall.map(|code| f64::from(code) * self.hall.m_per_count),
             vertical,
-            reference: self.reference(record)?,
+            reference: self.reference(table)?,
         })
     }
 
     fn codes(
         &self,
-        record: &Records<'_>,
+        table: &Table<'_>,
         sources: &[Source; 3],
         converter: &CodeScale,
     ) -> Result<[i32; 3], BadCell> {
         let one = |source: &Source| {
             let cell = source.cell;
             let bad = |fault| BadCell { cell, fault };
-            let (code, saturated) = cell::code(record.cell(cell), converter).map_err(bad)?;
+            let (code, saturated) = cell::code(table.cell(cell), converter).map_err(bad)?;
             if saturated && !self.keep_saturated {
                 return Err(bad(CellFault::Saturated { code }));
             }
@@ -131,14 +131,14 @@ impl<'a> RowReader<'a> {
     }
 
     /// X, Y, Rz: m, m, rad.
-    fn reference(&self, record: &Records<'_>) -> Result<[f64; 3], BadCell> {
-        let length = |source| scaled(record, source, self.displacement_max_m, "m");
+    fn reference(&self, table: &Table<'_>) -> Result<[f64; 3], BadCell> {
+        let length = |source| scaled(table, source, self.displacement_max_m, "m");
         match &self.columns.reference {
             ReferenceSource::Absent => Ok([0.0; 3]),
             ReferenceSource::Pose([x, y, rz]) => Ok([
                 length(x)?,
                 length(y)?,
-                scaled(record, rz, ROTATION_MAX_RAD, "rad")?,
+                scaled(table, rz, ROTATION_MAX_RAD, "rad")?,
             ]),
             ReferenceSource::Beams([x, y1, y2]) => {
                 let (x, y1, y2) = (length(x)?, length(y1)?, length(y2)?);
@@ -151,12 +151,12 @@ impl<'a> RowReader<'a> {
 }
 
 fn scaled(
-    record: &Records<'_>,
+    table: &Table<'_>,
     source: &Source,
     limit: f64,
     unit: &'static str,
 ) -> Result<f64, BadCell> {
     let cell = source.cell;
-    cell::scaled(record.cell(cell), source.scale, limit, unit)
+    cell::scaled(table.cell(cell), source.scale, limit, unit)
         .map_err(|fault| BadCell { cell, fault })
 }

@@ -6,6 +6,7 @@ mod refuses_files;
 mod skips;
 
 use super::*;
+use crate::input::source::SourceError;
 use crate::input::stage::tests::SOUND;
 use std::io::Write;
 

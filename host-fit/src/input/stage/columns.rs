@@ -12,119 +12,132 @@
 //! ignore = ["temperature", "operator"]             # columns to leave out
 //! ```
 
-use super::error::{StageError, ValueFault};
-use super::value::{Table, Value};
+use super::document::Document;
+use super::error::StageError;
 use crate::input::log::layout::{Column, Kind, LogLayout, Quantity};
+use serde::Deserialize;
+use std::ops::Range;
+use toml::Spanned;
 
 /// Smallest and largest magnitude of a scale given by the user, in SI units per unit.
 const SCALE_MAGNITUDES: (f64, f64) = (1e-15, 1e9);
 
+/// A column with its unit or scale.
+#[derive(Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a column's name in quotes, or { column = \"...\", unit = \"...\" }"
+)]
+struct ColumnTable {
+    column: Spanned<String>,
+    unit: Option<Spanned<String>>,
+    scale: Option<Spanned<f64>>,
+}
+
 /// The layout that the table describes; quantities that it leaves out keep their default.
-pub(super) fn log_layout(table: &Table<'_>) -> Result<LogLayout, StageError> {
-    let mut known: Vec<&str> = Quantity::ALL.iter().map(|q| q.key()).collect();
-    known.push("ignore");
-    table.only(&known)?;
+pub(super) fn log_layout(document: &Document<'_>) -> Result<LogLayout, StageError> {
+    let names = Quantity::ALL.iter().map(|quantity| quantity.key());
+    document.only("log", &names.chain(["ignore"]).collect::<Vec<_>>())?;
     let mut layout = LogLayout::default();
-    let mut mapped = Vec::new();
+    let mut mapped: Vec<(Quantity, Range<usize>)> = Vec::new();
     for quantity in Quantity::ALL {
-        let Some(value) = table.get(quantity.key()) else {
-            continue;
-        };
-        layout.set(quantity, column(&value, quantity)?);
-        mapped.push((quantity, value));
+        if let Some((span, column)) = column(document, quantity)? {
+            layout.set(quantity, column);
+            mapped.push((quantity, span));
+        }
     }
+    let twice = |span: &Range<usize>, column: &str, other: Quantity| {
+        let other = other.key();
+        let problem = format!(
+            "the column \"{column}\" is named twice (also by `{other}`); give each column one use"
+        );
+        document.refuse(span.clone(), problem)
+    };
     // Two keys for one column: at least one of them was mapped here, the other may be a default.
-    for (quantity, value) in &mapped {
+    for (quantity, span) in &mapped {
         let name = &layout.column(*quantity).name;
-        let other = Quantity::ALL
-            .into_iter()
-            .find(|other| other != quantity && layout.column(*other).name == *name);
-        if let Some(other) = other {
-            return Err(value.absurd(ValueFault::ColumnTwice {
-                column: name.clone(),
-                other: other.key(),
-            }));
+        let mut others = Quantity::ALL.into_iter().filter(|other| other != quantity);
+        if let Some(other) = others.find(|other| layout.column(*other).name == *name) {
+            return Err(twice(span, name, other));
         }
     }
-    if let Some(value) = table.get("ignore") {
-        for item in value.list()? {
-            let name = named(&item)?;
-            if let Some(quantity) = mapped
-                .iter()
-                .map(|(q, _)| *q)
-                .find(|q| layout.column(*q).name == name)
-            {
-                return Err(item.absurd(ValueFault::ColumnTwice {
-                    column: name,
-                    other: quantity.key(),
-                }));
-            }
-            layout.ignored.push(name);
+    let ignored: Vec<Spanned<String>> = document.read("log", "ignore")?.unwrap_or_default();
+    for item in &ignored {
+        let name = named(document, item)?;
+        let used = mapped.iter().find(|(q, _)| layout.column(*q).name == name);
+        if let Some((quantity, _)) = used {
+            return Err(twice(&item.span(), &name, *quantity));
         }
+        layout.ignored.push(name);
     }
     Ok(layout)
 }
 
-fn named(value: &Value<'_>) -> Result<String, StageError> {
-    let name = value.text()?.trim();
-    if name.is_empty() {
-        return Err(value.absurd(ValueFault::NoName));
+fn named(document: &Document<'_>, name: &Spanned<String>) -> Result<String, StageError> {
+    match name.get_ref().trim() {
+        "" => Err(document.refuse(
+            name.span(),
+            "the column name is empty; give the name that stands in the log's header",
+        )),
+        name => Ok(name.to_owned()),
     }
-    Ok(name.to_owned())
 }
 
-fn column(value: &Value<'_>, quantity: Quantity) -> Result<Column, StageError> {
-    let kind = quantity.kind();
-    if !value.is_table() {
-        let name = named(value)?;
-        let scale = match kind {
-            Kind::Index | Kind::Code => 1.0,
-            _ => kind
-                .unit_of_name(&name)
-                .ok_or_else(|| no_unit(value, kind, &name))?,
+/// The column that the table names for a quantity, if it does, and where the name stands.
+fn column(
+    document: &Document<'_>,
+    quantity: Quantity,
+) -> Result<Option<(Range<usize>, Column)>, StageError> {
+    let (key, kind) = (quantity.key(), quantity.kind());
+    let entry = if document.is_text("log", key) {
+        let alone = |column| ColumnTable {
+            column,
+            unit: None,
+            scale: None,
         };
-        return Ok(Column { name, scale });
-    }
-    let table = value.table()?;
-    table.only(&["column", "unit", "scale"])?;
-    let name = named(&table.require("column", "the name in the log's header")?)?;
-    let (unit, scale) = (table.get("unit"), table.get("scale"));
-    let what = match kind {
-        Kind::Index => Some("movement numbers"),
-        Kind::Code => Some("codes"),
-        _ => None,
+        document.read("log", key)?.map(alone)
+    } else {
+        document.read("log", key)?
     };
-    if let (Some(what), Some(given)) = (what, unit.as_ref().or(scale.as_ref())) {
-        return Err(given.absurd(ValueFault::NoScaleHere { what }));
-    }
+    let Some(ColumnTable {
+        column,
+        unit,
+        scale,
+    }) = entry
+    else {
+        return Ok(None);
+    };
+    let name = named(document, &column)?;
+    let has_unit = !matches!(kind, Kind::Index | Kind::Code);
+    let known = kind.units();
     let scale = match (unit, scale) {
-        (Some(_), Some(scale)) => return Err(scale.absurd(ValueFault::UnitAndScale)),
-        (Some(unit), None) => {
-            let symbol = unit.text()?;
-            kind.unit(symbol).ok_or_else(|| {
-                unit.absurd(ValueFault::UnknownUnit {
-                    unit: symbol.to_owned(),
-                    known: kind.units(),
-                })
-            })?
-        }
-        (None, Some(scale)) => {
-            let number = scale.number()?;
+        (None, None) if !has_unit => Ok(1.0),
+        (None, None) => kind.unit_of_name(&name).ok_or_else(|| {
+            let example = format!("{{ column = \"{name}\", unit = \"...\" }}");
+            let problem = format!("its unit is unknown; write {example} with one of {known}");
+            document.refuse(column.span(), problem)
+        }),
+        (Some(unit), None) if has_unit => kind.unit(unit.get_ref()).ok_or_else(|| {
+            let problem = format!("unknown unit; use one of {known}, or give `scale`");
+            document.refuse(unit.span(), problem)
+        }),
+        (None, Some(scale)) if has_unit => {
             let (low, high) = SCALE_MAGNITUDES;
-            scale.within(number.abs(), low, high, kind.scale_unit())?;
-            number * kind.per_si()
+            let magnitude = Spanned::new(scale.span(), scale.get_ref().abs());
+            let magnitude = document.within(&magnitude, low, high, kind.scale_unit());
+            magnitude.map(|_| scale.into_inner() * kind.per_si())
         }
-        (None, None) if what.is_some() => 1.0,
-        (None, None) => kind
-            .unit_of_name(&name)
-            .ok_or_else(|| no_unit(value, kind, &name))?,
-    };
-    Ok(Column { name, scale })
-}
-
-fn no_unit(value: &Value<'_>, kind: Kind, name: &str) -> StageError {
-    value.absurd(ValueFault::NoUnit {
-        column: name.to_owned(),
-        known: kind.units(),
-    })
+        (Some(_), Some(scale)) if has_unit => {
+            let problem = "`unit` and `scale` are both given; keep one of them";
+            Err(document.refuse(scale.span(), problem))
+        }
+        (unit, scale) => {
+            let span = unit
+                .map(|unit| unit.span())
+                .or(scale.map(|scale| scale.span()));
+            let problem = "this column holds numbers without a unit; give only its name";
+            Err(document.refuse(span.unwrap_or_default(), problem))
+        }
+    }?;
+    Ok(Some((column.span(), Column { name, scale })))
 }

@@ -1,37 +1,86 @@
 //! Reads `stage.toml` and checks every value of it.
 //!
-//! All keys but those of `[log]` are required, and none but the documented ones are
-//! accepted: a misspelt key would otherwise be ignored without a word.
+//! The derived types say which keys there are and what kind of value each has. All keys but
+//! those of `[log]` are required, and none but the documented ones are accepted: a misspelt
+//! key would otherwise be ignored without a word.
 
-use super::error::{StageError, ValueFault};
-use super::ranges::search_ranges;
-use super::value::{Document, Table, Value};
-use super::{CodeScale, Stage};
+use super::document::{Document, List};
+use super::error::StageError;
+use super::{CodeScale, Stage, columns, search};
 use crate::input::log::layout::LogLayout;
+use crate::input::source;
 use runtime::capacitive::ProbePositions;
 use runtime::frame::{CODE_MAGNITUDE_MAX, CodeWindow};
 use runtime::geometry::ProbeCoordinates;
-use std::io::{ErrorKind, Read};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use std::collections::BTreeMap;
 use std::path::Path;
+use toml::Spanned;
 
 /// Largest stage file that is read: a sound one has a few thousand bytes.
 const BYTES_MAX: u64 = 1 << 20;
 /// Largest distance of a probe from the stage's centre, m: stages of this kind are decimetres.
 pub(super) const COORDINATE_MAX_M: f64 = 10.0;
-/// Smallest full scale of a converter that makes sense, m.
-const FULL_SCALE_MIN_M: f64 = 1e-6;
-/// Largest full scale of a converter that makes sense, m.
-const FULL_SCALE_MAX_M: f64 = 0.1;
+/// Full scales of a converter that make sense, m.
+const FULL_SCALES_M: (f64, f64) = (1e-6, 0.1);
 /// Shortest distance between the two Y beams that makes sense, m.
 const BASELINE_MIN_M: f64 = 1e-3;
-/// Shortest servo period that makes sense, s.
-const PERIOD_MIN_S: f64 = 1e-6;
-/// Longest servo period that makes sense, s.
-const PERIOD_MAX_S: f64 = 10.0;
+/// Servo periods that make sense, s.
+const PERIODS_S: (f64, f64) = (1e-6, 10.0);
 /// Smallest area of the triangle of the capacitive sensors, as a part of its longest side squared.
 const TRIANGLE_MIN: f64 = 1e-3;
 /// Smallest distance along X between the probes A and B, m.
 const SPACING_MIN_M: f64 = 1e-4;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StageFile {
+    hall: Hall,
+    capacitive: Capacitive,
+    interferometer: Interferometer,
+    servo: Servo,
+    /// Read by [`search::ranges`]: its keys depend on the terms of the models.
+    #[serde(rename = "search")]
+    _search: BTreeMap<String, IgnoredAny>,
+    /// Read by [`columns::log_layout`].
+    log: Option<BTreeMap<String, IgnoredAny>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct Hall {
+    h1x_m: Spanned<f64>,
+    h1y_m: Spanned<f64>,
+    h2x_m: Spanned<f64>,
+    h2y_m: Spanned<f64>,
+    h3x_m: Spanned<f64>,
+    h3y_m: Spanned<f64>,
+    m_per_count: Spanned<f64>,
+    code_min: Spanned<i64>,
+    code_max: Spanned<i64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct Capacitive {
+    probes_m: List<List<Spanned<f64>>>,
+    m_per_count: Spanned<f64>,
+    code_min: Spanned<i64>,
+    code_max: Spanned<i64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct Interferometer {
+    y_baseline_m: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct Servo {
+    period_s: Spanned<f64>,
+}
 
 impl Stage {
     /// Reads and checks a `stage.toml`.
@@ -39,28 +88,7 @@ impl Stage {
     /// # Errors
     /// Every variant of [`StageError`]; each names the file and, inside it, line and key.
     pub fn from_file(path: &Path) -> Result<Self, StageError> {
-        let mut bytes = Vec::new();
-        // One byte more than is allowed: a device may have no end.
-        let read = std::fs::File::open(path)
-            .and_then(|file| file.take(BYTES_MAX + 1).read_to_end(&mut bytes));
-        read.map_err(|source| {
-            if source.kind() == ErrorKind::IsADirectory || path.is_dir() {
-                StageError::IsFolder {
-                    path: path.to_path_buf(),
-                }
-            } else {
-                StageError::Unreadable {
-                    path: path.to_path_buf(),
-                    source,
-                }
-            }
-        })?;
-        if bytes.len() as u64 > BYTES_MAX {
-            return Err(StageError::TooLarge {
-                path: path.to_path_buf(),
-                limit_bytes: BYTES_MAX,
-            });
-        }
+        let bytes = source::read_whole(path, BYTES_MAX)?;
         let text = String::from_utf8(bytes).map_err(|error| StageError::NotText {
             path: path.to_path_buf(),
             offset: error.utf8_error().valid_up_to(),
@@ -71,143 +99,120 @@ impl Stage {
     /// Checks the text of a `stage.toml`; `path` is only named in errors.
     ///
     /// # Errors
-    /// As [`Stage::from_file`], but for reading.
+    /// As [`Stage::from_file`], without those of reading.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self, StageError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let document = Document { path, text };
-        let parsed = toml::de::DeTable::parse(text).map_err(|error| StageError::Syntax {
-            place: document.place(error.span().map_or(0, |span| span.start)),
-            message: error.message().to_owned(),
-        })?;
-        let top = Table::top(document, parsed.get_ref());
-        top.only(&[
-            "hall",
-            "capacitive",
-            "interferometer",
-            "servo",
-            "search",
-            "log",
-        ])?;
-        let hall = top.table("hall", "[hall]: probe coordinates and scale of the codes")?;
-        let gaps = top.table("capacitive", "[capacitive]: sensor positions and scale")?;
-        let beams = top.table("interferometer", "[interferometer]: y_baseline_m")?;
-        let servo = top.table("servo", "[servo]: period_s")?;
-        let search = top.table("search", "[search]: the ranges of the fit")?;
-        hall.only(&[
-            "h1x_m",
-            "h1y_m",
-            "h2x_m",
-            "h2y_m",
-            "h3x_m",
-            "h3y_m",
-            "m_per_count",
-            "code_min",
-            "code_max",
-        ])?;
-        gaps.only(&["probes_m", "m_per_count", "code_min", "code_max"])?;
-        beams.only(&["y_baseline_m"])?;
-        servo.only(&["period_s"])?;
-        let designed = designed_probes(&hall)?;
+        let document = &Document::parse(text, path)?;
+        let file: StageFile = document.read_all()?;
+        let (hall, gaps) = (&file.hall, &file.capacitive);
+        let (beams, servo) = (&file.interferometer, &file.servo);
+        let designed = designed_probes(document, hall)?;
+        let scale =
+            |m_per_count, code_min, code_max| code_scale(document, m_per_count, code_min, code_max);
         Ok(Self {
             designed,
-            hall: code_scale(&hall)?,
-            capacitive_probes_m: capacitive_probes(&gaps)?,
-            capacitive: code_scale(&gaps)?,
-            y_baseline_m: beams
-                .require("y_baseline_m", "distance between the Y beams, m")?
-                .positive(BASELINE_MIN_M, COORDINATE_MAX_M, "m")?,
-            servo_period_s: servo.require("period_s", "servo period, s")?.positive(
-                PERIOD_MIN_S,
-                PERIOD_MAX_S,
-                "s",
+            hall: scale(&hall.m_per_count, &hall.code_min, &hall.code_max)?,
+            capacitive_probes_m: capacitive_probes(document, gaps)?,
+            capacitive: scale(&gaps.m_per_count, &gaps.code_min, &gaps.code_max)?,
+            y_baseline_m: document.within(
+                &beams.y_baseline_m,
+                BASELINE_MIN_M,
+                COORDINATE_MAX_M,
+                "m",
             )?,
-            search: search_ranges(&search, &designed)?,
-            log: match top.get("log") {
+            servo_period_s: document.within(&servo.period_s, PERIODS_S.0, PERIODS_S.1, "s")?,
+            search: search::ranges(document, &designed)?,
+            log: match file.log {
                 None => LogLayout::default(),
-                Some(table) => super::columns::log_layout(&table.table()?)?,
+                Some(_) => columns::log_layout(document)?,
             },
         })
     }
 }
 
-fn coordinate(value: &Value<'_>) -> Result<f64, StageError> {
-    value.within(value.number()?, -COORDINATE_MAX_M, COORDINATE_MAX_M, "m")
-}
-
-fn designed_probes(hall: &Table<'_>) -> Result<ProbeCoordinates<f64>, StageError> {
-    let at = |key| coordinate(&hall.require(key, "designed coordinate of a Hall probe, m")?);
+fn designed_probes(
+    document: &Document<'_>,
+    hall: &Hall,
+) -> Result<ProbeCoordinates<f64>, StageError> {
+    let at = |value| document.within(value, -COORDINATE_MAX_M, COORDINATE_MAX_M, "m");
     let probes = ProbeCoordinates {
-        h1x_m: at("h1x_m")?,
-        h1y_m: at("h1y_m")?,
-        h2x_m: at("h2x_m")?,
-        h2y_m: at("h2y_m")?,
-        h3x_m: at("h3x_m")?,
-        h3y_m: at("h3y_m")?,
+        h1x_m: at(&hall.h1x_m)?,
+        h1y_m: at(&hall.h1y_m)?,
+        h2x_m: at(&hall.h2x_m)?,
+        h2y_m: at(&hall.h2y_m)?,
+        h3x_m: at(&hall.h3x_m)?,
+        h3y_m: at(&hall.h3y_m)?,
     };
     // The determinant of the designed PM is the distance of A and B along X.
     if (probes.h1x_m + probes.h2x_m).abs() < SPACING_MIN_M {
-        let x_m = probes.h1x_m;
-        return Err(hall
-            .require("h2x_m", "")?
-            .absurd(ValueFault::ProbesAlike { x_m }));
+        let problem = "A (+h1x_m) and B (-h2x_m) stand at the same x, so Y and Rz cannot be told \
+                       apart; correct one of them";
+        return Err(document.refuse(hall.h2x_m.span(), problem));
     }
     Ok(probes)
 }
 
-fn code_scale(table: &Table<'_>) -> Result<CodeScale, StageError> {
-    let scale = table.require("m_per_count", "displacement per code, m")?;
-    let m_per_count = scale.positive(0.0, f64::MAX, "m per code")?;
-    let code = |key, hint| -> Result<(Value<'_>, i64), StageError> {
-        let value = table.require(key, hint)?;
-        let code = value.integer()?;
-        if code.unsigned_abs() > u64::from(CODE_MAGNITUDE_MAX.unsigned_abs()) {
-            return Err(value.absurd(ValueFault::Beyond24Bits { code }));
-        }
-        Ok((value, code))
+fn code_scale(
+    document: &Document<'_>,
+    m_per_count: &Spanned<f64>,
+    code_min: &Spanned<i64>,
+    code_max: &Spanned<i64>,
+) -> Result<CodeScale, StageError> {
+    let code = |value: &Spanned<i64>| {
+        let code = i32::try_from(*value.get_ref()).ok();
+        let inside = code.filter(|code| code.unsigned_abs() <= CODE_MAGNITUDE_MAX.unsigned_abs());
+        let problem = format!(
+            "{} is beyond 24 bits; codes of up to {CODE_MAGNITUDE_MAX} are decoded exactly, so \
+             scale the converter's codes down",
+            value.get_ref()
+        );
+        inside.ok_or_else(|| document.refuse(value.span(), problem))
     };
-    let (_, code_min) = code("code_min", "smallest code of the converter")?;
-    let (value, code_max) = code("code_max", "largest code of the converter")?;
-    let window = i32::try_from(code_min)
-        .ok()
-        .zip(i32::try_from(code_max).ok())
-        .and_then(|(low, high)| CodeWindow::between_rails(low, high))
-        .ok_or_else(|| value.absurd(ValueFault::NoCodes { code_min, code_max }))?;
-    let full_scale_m = m_per_count * f64::from(window.low.abs().max(window.high.abs()));
-    if !(FULL_SCALE_MIN_M..=FULL_SCALE_MAX_M).contains(&full_scale_m) {
-        return Err(scale.absurd(ValueFault::FullScale {
-            m_per_count,
-            full_scale_m,
-            low_m: FULL_SCALE_MIN_M,
-            high_m: FULL_SCALE_MAX_M,
-        }));
+    let (low, high) = (code(code_min)?, code(code_max)?);
+    let window = CodeWindow::between_rails(low, high).ok_or_else(|| {
+        let problem = format!(
+            "no code lies between code_min = {low} and code_max = {high}; give the converter's \
+             smallest and largest code"
+        );
+        document.refuse(code_max.span(), problem)
+    })?;
+    let scale = document.within(m_per_count, f64::MIN, f64::MAX, "m per code")?;
+    let full_scale_m = scale * f64::from(window.low.abs().max(window.high.abs()));
+    let (least, most) = FULL_SCALES_M;
+    if !(least..=most).contains(&full_scale_m) {
+        let problem = format!(
+            "{scale:e} m per code makes a full scale of {full_scale_m:e} m, outside {least:e} to \
+             {most:e} m; check the scale and its unit (m per code)"
+        );
+        return Err(document.refuse(m_per_count.span(), problem));
     }
     Ok(CodeScale {
-        m_per_count,
+        m_per_count: scale,
         window,
     })
 }
 
-fn capacitive_probes(gaps: &Table<'_>) -> Result<ProbePositions<f64>, StageError> {
-    let value = gaps.require("probes_m", "[[x, y], [x, y], [x, y]] of the sensors, m")?;
+fn capacitive_probes(
+    document: &Document<'_>,
+    gaps: &Capacitive,
+) -> Result<ProbePositions<f64>, StageError> {
+    let pairs: &[_; 3] = document.exactly(&gaps.probes_m)?;
     let mut probes = [[0.0; 2]; 3];
-    for (probe, pair) in probes
-        .iter_mut()
-        .zip(value.items::<3>("a list of three [x, y] pairs in m")?)
-    {
-        for (at, number) in probe.iter_mut().zip(pair.items::<2>("a pair [x, y] in m")?) {
-            *at = coordinate(&number)?;
+    for (probe, pair) in probes.iter_mut().zip(pairs) {
+        let pair: &[_; 2] = document.exactly(pair)?;
+        for (at, value) in probe.iter_mut().zip(pair) {
+            *at = document.within(value, -COORDINATE_MAX_M, COORDINATE_MAX_M, "m")?;
         }
     }
     let [p, q, r] = probes;
     let side = |a: [f64; 2], b: [f64; 2]| [b[0] - a[0], b[1] - a[1]];
     let (u, v, w) = (side(p, q), side(p, r), side(q, r));
-    let longest_squared = [u, v, w]
-        .iter()
-        .map(|[x, y]| x * x + y * y)
-        .fold(0.0, f64::max);
+    let squares = [u, v, w].map(|[x, y]| x * x + y * y);
     let twice_area = (u[0] * v[1] - u[1] * v[0]).abs();
-    if twice_area <= TRIANGLE_MIN * longest_squared {
-        return Err(value.absurd(ValueFault::ProbesInLine));
+    if twice_area <= TRIANGLE_MIN * squares.into_iter().fold(0.0, f64::max) {
+        let problem = "the three sensors stand in one line and define no plane; give the (x, y) of \
+                       three sensors in a triangle";
+        return Err(document.refuse(gaps.probes_m.span(), problem));
     }
     Ok(probes)
 }

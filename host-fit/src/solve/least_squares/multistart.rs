@@ -284,8 +284,9 @@ pub fn middle_of_the_box(problem: &Problem) -> Parameters {
     let mut middle = Parameters::designed(problem.stage);
     if problem.model.fits_gain() {
         let ranges = search_box(problem.stage, problem.model, [0.0; 3]);
-        for k in ETA..SLOPES {
-            middle.values[k] = 0.5 * (ranges[k].low + ranges[k].high);
+        let etas = middle.values[ETA..SLOPES].iter_mut();
+        for (eta, range) in etas.zip(&ranges[ETA..SLOPES]) {
+            *eta = 0.5 * (range.low + range.high);
         }
     }
     middle

@@ -61,6 +61,10 @@ pub fn origin(rows: &[TrainRow], ratios: &Ratios, offset: Offset) -> Option<[f64
 // The same for a constant number of slopes `K`, whose derivatives lie side by side, and room for
 // `W` numbers: loops of constant length take half the time.
 
+#[expect(
+    clippy::needless_range_loop,
+    reason = "a constant number of steps, written as sums are"
+)]
 #[inline(always)]
 fn regressors_of<const K: usize, const W: usize>(
     row: &TrainRow,

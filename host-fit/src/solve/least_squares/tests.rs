@@ -214,7 +214,9 @@ fn optimum_equals_that_of_an_independent_solver_without_projection() {
 #[test]
 fn a_truth_outside_the_box_ends_on_its_edge_and_is_named() {
     let mut narrow = stage();
-    narrow.search.eta[0].high = 0.85;
+    let mut eta = narrow.search.of("eta").expect("known");
+    eta[0].high = 0.85;
+    narrow.search.set("eta", eta);
     let dataset = noisy(7).dataset(&narrow);
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
     let problem = Problem::new(&dataset, &all, &narrow, Model::of(ModelKind::M31));
@@ -238,7 +240,9 @@ fn a_truth_outside_the_box_ends_on_its_edge_and_is_named() {
     assert!(solution.cost < cost(&sums, &point.gain, problem.weights));
 
     let mut high = stage();
-    high.search.eta[2].low = 0.88;
+    let mut eta = high.search.of("eta").expect("known");
+    eta[2].low = 0.88;
+    high.search.set("eta", eta);
     let solution = solve(
         &Problem::new(&dataset, &all, &high, Model::of(ModelKind::M31)),
         Projection::Linear,

@@ -59,10 +59,9 @@ impl<const K: usize> Linearized<K> {
         };
         let per_eta = each(|k| Lanes::splat(1.0) / eta[k]);
         let mut ratios = [[Lanes::ZERO; K]; 3];
-        for slope in 0..model.fitted_slopes().min(K) {
-            let slopes = u.three(eta_at + 3 + 3 * slope);
-            for probe in 0..3 {
-                ratios[probe][slope] = slopes[probe] * per_eta[probe];
+        for (probe, ratios) in ratios.iter_mut().enumerate() {
+            for (slope, ratio) in ratios.iter_mut().enumerate().take(model.fitted_slopes()) {
+                *ratio = u.number(eta_at + 3 + 3 * slope + probe) * per_eta[probe];
             }
         }
         let gain = each(|i| each(|k| plane.inverse[i][k] * per_eta[k]));
@@ -78,6 +77,10 @@ impl<const K: usize> Linearized<K> {
 }
 
 /// phi / eta = 1 + r v of the three probes (equation 33), for the slopes' ratios r.
+#[expect(
+    clippy::needless_range_loop,
+    reason = "a constant number of steps, written as sums are"
+)]
 #[inline(always)]
 pub fn shares<const K: usize>(ratios: &[Ratios<K>; 3], row: &TrainRow) -> [Lanes; 3] {
     each(|probe| {

@@ -18,6 +18,21 @@ pub fn stage() -> Stage {
     let arm = range(0.1475, 0.2475);
     let falling = range(-5000.0, 0.0);
     let rising = range(0.0, 5000.0);
+    let h_m = ProbeCoordinates {
+        h1x_m: arm,
+        h1y_m: range(0.30, 0.50),
+        h2x_m: arm,
+        h2y_m: range(0.32, 0.52),
+        h3x_m: arm,
+        h3y_m: range(0.26, 0.46),
+    };
+    let mut search = SearchRanges::new(h_m, range(-10e-6, 10e-6));
+    let eta = [range(0.78, 0.98), range(0.65, 0.85), range(0.72, 0.92)];
+    search.set("eta", eta);
+    search.set("theta_deg", [range(-0.14, 0.14); 3]);
+    search.set("a_per_m", [falling; 3]);
+    search.set("b_per_rad", [falling; 3]);
+    search.set("c_per_rad", [rising, falling, rising]);
     let scale = |m_per_count| CodeScale {
         m_per_count,
         window: CodeWindow::between_rails(-32768, 32767).expect("sound"),
@@ -36,22 +51,7 @@ pub fn stage() -> Stage {
         capacitive: scale(1.5625e-8),
         y_baseline_m: 0.1,
         servo_period_s: 0.002,
-        search: SearchRanges {
-            h_m: ProbeCoordinates {
-                h1x_m: arm,
-                h1y_m: range(0.30, 0.50),
-                h2x_m: arm,
-                h2y_m: range(0.32, 0.52),
-                h3x_m: arm,
-                h3y_m: range(0.26, 0.46),
-            },
-            eta: [range(0.78, 0.98), range(0.65, 0.85), range(0.72, 0.92)],
-            theta_rad: range(-0.14, 0.14),
-            a_per_m: [falling; 3],
-            b_per_rad: [falling; 3],
-            c_per_rad: [rising, falling, rising],
-            delta_m: range(-10e-6, 10e-6),
-        },
+        search,
         log: LogLayout::default(),
     }
 }

@@ -19,11 +19,14 @@ fn no_log_no_file_and_a_folder() {
     let folder = tempfile::tempdir().expect("a folder");
     let error = read(&[folder.path()]);
     assert!(
-        matches!(&error, LogError::IsFolder { path } if path == folder.path()),
+        matches!(&error, LogError::Source(SourceError::IsFolder { path }) if path == folder.path()),
         "{error}"
     );
     let error = read(&[&folder.path().join("none.csv")]);
-    assert!(matches!(error, LogError::NotFound { .. }), "{error}");
+    assert!(
+        matches!(error, LogError::Source(SourceError::NotFound { .. })),
+        "{error}"
+    );
     assert!(error.to_string().contains("check the path"), "{error}");
 }
 
@@ -49,12 +52,15 @@ fn the_same_log_twice() {
 fn binary_files() {
     let error = refused_file(b"\x7fELF\x02\x01\x01\0\0\0");
     assert!(
-        matches!(error, LogError::Binary { offset: 0, .. }),
+        matches!(
+            error,
+            LogError::Source(SourceError::Binary { offset: 0, .. })
+        ),
         "{error}"
     );
     let error = refused_file(format!("{LOG}\0").as_bytes());
     assert!(
-        matches!(error, LogError::Binary { offset, .. } if offset == LOG.len()),
+        matches!(error, LogError::Source(SourceError::Binary { offset, .. }) if offset == LOG.len()),
         "{error}"
     );
     let utf16: Vec<u8> = LOG.encode_utf16().flat_map(u16::to_le_bytes).collect();
@@ -81,7 +87,10 @@ fn a_gzip_file_of_binary_data_is_unpacked_no_further_than_its_start() {
     let packed = gzip(&[0; 1 << 20]);
     let error = refused_file(&packed[..packed.len() - 9]);
     assert!(
-        matches!(error, LogError::Binary { offset: 0, .. }),
+        matches!(
+            error,
+            LogError::Source(SourceError::Binary { offset: 0, .. })
+        ),
         "{error}"
     );
 }
@@ -90,7 +99,10 @@ fn a_gzip_file_of_binary_data_is_unpacked_no_further_than_its_start() {
 #[test]
 fn a_device_without_end() {
     let error = read(&["/dev/zero"], stage(), &ReadOptions::default()).expect_err("refused");
-    assert!(matches!(error, LogError::Binary { .. }), "{error}");
+    assert!(
+        matches!(error, LogError::Source(SourceError::Binary { .. })),
+        "{error}"
+    );
 }
 
 #[test]
@@ -98,7 +110,10 @@ fn a_gzip_file_cut_anywhere_damaged_or_followed_by_rubbish() {
     let packed = gzip(LOG.as_bytes());
     for end in 2..packed.len() {
         let error = refused_file(&packed[..end]);
-        assert!(matches!(error, LogError::GzipCut { .. }), "{end}: {error}");
+        assert!(
+            matches!(error, LogError::Source(SourceError::GzipCut { .. })),
+            "{end}: {error}"
+        );
     }
     let last = packed.len() - 1;
     for at in [last, last - 4] {
@@ -106,7 +121,7 @@ fn a_gzip_file_cut_anywhere_damaged_or_followed_by_rubbish() {
         wrong[at] ^= 1;
         let error = refused_file(&wrong);
         assert!(
-            matches!(error, LogError::GzipDamaged { .. }),
+            matches!(error, LogError::Source(SourceError::GzipDamaged { .. })),
             "checksum and length: {error}"
         );
     }
@@ -114,12 +129,15 @@ fn a_gzip_file_cut_anywhere_damaged_or_followed_by_rubbish() {
     wrong[3] = 0xe0;
     let error = refused_file(&wrong);
     assert!(
-        matches!(error, LogError::GzipDamaged { .. }),
+        matches!(error, LogError::Source(SourceError::GzipDamaged { .. })),
         "header flags: {error}"
     );
     let error = refused_file(&[packed.as_slice(), b"rubbish"].concat());
     assert!(
-        matches!(error, LogError::GzipTrailing { bytes: 7, .. }),
+        matches!(
+            error,
+            LogError::Source(SourceError::GzipTrailing { bytes: 7, .. })
+        ),
         "{error}"
     );
     let error = refused_file(&gzip(b""));
