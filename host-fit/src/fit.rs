@@ -204,7 +204,7 @@ pub fn fit(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<F
     };
     let decoded = Decoded::new(&set, dataset);
     let judgement = decoded.judge(dataset, stage, Zeros::of_model(model));
-    // First this: a log that the model does not describe determines nothing, but for that reason.
+    // First this: where the model does not describe the log, that is why nothing is determined.
     check_described(dataset, &judgement.errors, model)?;
     determined?;
     let own_zeros = Zeros::Given(&solution.delta_m);

@@ -254,7 +254,7 @@ fn a_length_that_no_blob_has_is_refused() {
     ));
 }
 
-/// With the check made right again, the payload itself must hold the damage off.
+/// With the check made right again, the damage must be found in the payload itself.
 #[test]
 fn a_sealed_payload_of_another_length_is_refused() {
     let (golden, n) = golden();

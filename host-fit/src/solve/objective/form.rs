@@ -70,7 +70,7 @@ impl<'a> Form<'a> {
     }
 
     /// The first individuals of a search, as far as the form has a better idea than uniform
-    /// draws from the box: none but for `linear`.
+    /// draws from the box: only `linear` has one.
     pub fn first_population(&self, count: usize, seed: u64) -> Vec<Vec<f64>> {
         match self {
             Self::Full(_) | Self::Delta(_) => Vec::new(),
