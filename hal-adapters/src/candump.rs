@@ -37,7 +37,7 @@ pub enum LineError {
     },
     /// No `#` after the identifier.
     NoSeparator {
-        /// Where it belongs.
+        /// Where it should be.
         column: usize,
     },
     /// Not pairs of hexadecimal digits, or more than eight.
@@ -88,7 +88,7 @@ impl<'l> LogLine<'l> {
     /// Reads one line, without its line end.
     ///
     /// # Errors
-    /// [`LineError`]; `ErrorFrame` and `FlexibleDataRate` are sound lines of another kind.
+    /// [`LineError`]. `ErrorFrame` and `FlexibleDataRate` are correct lines of another kind.
     pub fn parse(line: &'l str) -> Result<Self, LineError> {
         let column_of = |part: &str| part.as_ptr() as usize - line.as_ptr() as usize + 1;
         let mut parts = line.split_ascii_whitespace();
@@ -141,7 +141,7 @@ fn parse_time(text: &str) -> Option<u64> {
     seconds.checked_mul(1_000_000)?.checked_add(micros)
 }
 
-/// `None` for what is no identifier, an error for an error frame's.
+/// `None` if this is no identifier, an error if it is that of an error frame.
 fn parse_id(text: &str) -> Option<Result<Id, LineError>> {
     if !text.bytes().all(|b| b.is_ascii_hexdigit()) {
         return None;

@@ -1,25 +1,22 @@
-//! A source that drops, repeats, delays and damages what another source gives: for tests of
-//! whatever reads it. The same seed gives the same faults.
+//! Bus frames dropped, repeated, delayed and damaged on the way: for tests of whatever receives
+//! them. The same seed gives the same faults.
 //!
 //! ```
+//! use embedded_can::Frame;
+//! use hal_adapters::can::{BusFrame, Message, StampedFrame};
 //! use hal_adapters::fault::{Fault, FaultRates, Faulty};
-//! use hal_adapters::source::{FrameSource, SliceSource};
-//! # use hal_adapters::can::{BusFrame, StampedFrame, Message};
-//! # use embedded_can::Frame;
-//! # let frame = BusFrame::new(Message::Hall.id(), &[0; 8]).unwrap();
-//! # let frames = [StampedFrame { time_us: 0, frame }; 100];
+//!
+//! let frame = BusFrame::new(Message::Hall.id(), &[0; 8]).unwrap();
+//! let frames = [StampedFrame { time_us: 0, frame }; 100];
 //! let rates = FaultRates::NONE.with(Fault::Drop, 100_000); // one frame in ten
-//! let mut source = Faulty::new(SliceSource::new(&frames), rates, 1);
-//! let mut got = 0;
-//! while source.next_frame().unwrap().is_some() { got += 1; }
-//! assert_eq!(got + source.injected(Fault::Drop), 100);
+//! let mut faulty = Faulty::new(frames.into_iter(), rates, 1);
+//! let got = faulty.by_ref().count() as u32;
+//! assert_eq!(got + faulty.injected(Fault::Drop), 100);
 //! ```
 
+use crate::can::table::TABLE;
 use crate::can::{BusFrame, Message, StampedFrame};
-use crate::source::FrameSource;
 use embedded_can::{Frame, Id, StandardId};
-use runtime::RawFrame;
-use runtime::frame::MISSING_CODE;
 
 /// What can happen to a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,7 +25,7 @@ pub enum Fault {
     Drop,
     /// It comes twice.
     Repeat,
-    /// It changes places with the next one.
+    /// It changes places with the next frame.
     Swap,
     /// It comes after the next 2 to 9 frames.
     Delay,
@@ -71,14 +68,14 @@ impl FaultRates {
         per_million: [0; 9],
     };
 
-    /// Every fault as often.
+    /// Every fault at the same rate.
     pub const fn each(per_million: u32) -> Self {
         Self {
             per_million: [per_million; 9],
         }
     }
 
-    /// These rates with another one for `fault`.
+    /// These rates, with a different one for `fault`.
     #[must_use]
     pub const fn with(mut self, fault: Fault, per_million: u32) -> Self {
         self.per_million[fault as usize] = per_million;
@@ -96,14 +93,6 @@ impl FaultRates {
         }
         None
     }
-}
-
-/// A frame that can be damaged. `random` decides how, all its bits alike.
-pub trait Damage: Clone {
-    /// A damaged copy; only called for faults that change the frame itself (`Flip` to
-    /// `WrongId`).
-    #[must_use]
-    fn damaged(&self, fault: Fault, random: &mut Random) -> Self;
 }
 
 /// Random numbers that depend on the seed alone (SplitMix64).
@@ -150,8 +139,10 @@ impl Random {
     }
 }
 
-impl Damage for BusFrame {
-    fn damaged(&self, fault: Fault, random: &mut Random) -> Self {
+impl BusFrame {
+    /// A damaged copy, as `random` decides. Only `Flip` to `WrongId` change the frame itself.
+    #[must_use]
+    pub fn damaged(&self, fault: Fault, random: &mut Random) -> Self {
         match fault {
             Fault::Flip | Fault::Burst => self.flipped(random.mask(fault)),
             Fault::Noise => self.flipped(random.bits()),
@@ -162,8 +153,8 @@ impl Damage for BusFrame {
             Fault::WrongId => {
                 let ours = Message::from_id(self.id);
                 let other = if random.below(2) == 0 {
-                    let k = random.below(crate::can::table::TABLE.len() as u64) as usize;
-                    crate::can::table::TABLE.get(k).map(|row| row.message.id())
+                    let k = random.below(TABLE.len() as u64) as usize;
+                    TABLE.get(k).map(|row| row.message.id())
                 } else {
                     StandardId::new(random.below(0x800) as u16)
                 };
@@ -175,67 +166,28 @@ impl Damage for BusFrame {
     }
 }
 
-impl Damage for StampedFrame {
-    fn damaged(&self, fault: Fault, random: &mut Random) -> Self {
-        Self {
-            frame: self.frame.damaged(fault, random),
-            ..*self
-        }
-    }
-}
-
-/// Damage to whole ticks: bits of one code (of 16), a code that is missing for a wrong
-/// length, two codes exchanged for a wrong identifier.
-impl Damage for RawFrame {
-    fn damaged(&self, fault: Fault, random: &mut Random) -> Self {
-        let mut damaged = *self;
-        let which = random.below(6);
-        let codes = if which < 3 {
-            &mut damaged.hall
-        } else {
-            &mut damaged.capacitive
-        };
-        let [first, second, third] = codes;
-        let code = match which % 3 {
-            0 => first,
-            1 => second,
-            _ => third,
-        };
-        match fault {
-            Fault::Flip => *code ^= 1 << random.below(16),
-            Fault::Burst => *code ^= (random.mask(fault) % 255 + 1) as i32,
-            Fault::Noise => *code = random.bits() as i16 as i32,
-            Fault::WrongLength => *code = MISSING_CODE,
-            Fault::WrongId => codes.rotate_left(1),
-            Fault::Drop | Fault::Repeat | Fault::Swap | Fault::Delay => {}
-        }
-        damaged
-    }
-}
-
-/// Injects faults into a source.
+/// Injects faults into a stream of frames.
 #[derive(Clone, Debug)]
-pub struct Faulty<S: FrameSource> {
-    source: S,
+pub struct Faulty<I> {
+    frames: I,
     rates: FaultRates,
     random: Random,
-    held: Option<(u8, S::Frame)>,
-    again: Option<S::Frame>,
+    /// A frame that is held back, and the number of frames that still pass it.
+    held: Option<(u8, StampedFrame)>,
+    again: Option<StampedFrame>,
     injected: [u32; 9],
-    last: Option<Fault>,
 }
 
-impl<S: FrameSource<Frame: Damage>> Faulty<S> {
-    /// Wraps a source.
-    pub const fn new(source: S, rates: FaultRates, seed: u64) -> Self {
+impl<I: Iterator<Item = StampedFrame>> Faulty<I> {
+    /// Faults at these rates, drawn by `seed`.
+    pub const fn new(frames: I, rates: FaultRates, seed: u64) -> Self {
         Self {
-            source,
+            frames,
             rates,
             random: Random::new(seed),
             held: None,
             again: None,
             injected: [0; 9],
-            last: None,
         }
     }
 
@@ -244,81 +196,64 @@ impl<S: FrameSource<Frame: Damage>> Faulty<S> {
         self.injected[fault as usize]
     }
 
-    /// The fault that was injected last by the last call of `next_frame`, if any.
-    pub const fn last_fault(&self) -> Option<Fault> {
-        self.last
-    }
-
-    /// The wrapped source.
-    pub fn into_inner(self) -> S {
-        self.source
-    }
-
     /// A frame that is due from an earlier fault.
-    fn due(&mut self) -> Option<S::Frame> {
-        if let Some(frame) = self.again.take() {
-            return Some(frame);
-        }
-        match self.held.take() {
-            Some((0, frame)) => Some(frame),
-            other => {
-                self.held = other;
-                None
-            }
-        }
+    fn due(&mut self) -> Option<StampedFrame> {
+        let held = &mut self.held;
+        let passed = || held.take_if(|(left, _)| *left == 0).map(|(_, frame)| frame);
+        self.again.take().or_else(passed)
     }
 
-    fn inject(&mut self, fault: Fault, frame: S::Frame) -> Option<S::Frame> {
+    fn inject(&mut self, fault: Fault, stamped: StampedFrame) -> Option<StampedFrame> {
         // One frame can be held at a time; a second one passes.
         if matches!(fault, Fault::Swap | Fault::Delay) && self.held.is_some() {
-            return Some(frame);
+            return Some(stamped);
         }
-        self.last = Some(fault);
         let count = &mut self.injected[fault as usize];
         *count = count.saturating_add(1);
         match fault {
             Fault::Drop => None,
             Fault::Repeat => {
-                self.again = Some(frame.clone());
-                Some(frame)
+                self.again = Some(stamped);
+                Some(stamped)
             }
             Fault::Swap => {
-                self.held = Some((1, frame));
+                self.held = Some((1, stamped));
                 None
             }
             Fault::Delay => {
                 let after = 2 + self.random.below(8) as u8;
-                self.held = Some((after, frame));
+                self.held = Some((after, stamped));
                 None
             }
-            _ => Some(frame.damaged(fault, &mut self.random)),
+            _ => Some(StampedFrame {
+                frame: stamped.frame.damaged(fault, &mut self.random),
+                ..stamped
+            }),
         }
     }
 }
 
-impl<S: FrameSource<Frame: Damage>> FrameSource for Faulty<S> {
-    type Frame = S::Frame;
-    type Error = S::Error;
+impl<I: Iterator<Item = StampedFrame>> Iterator for Faulty<I> {
+    type Item = StampedFrame;
 
-    fn next_frame(&mut self) -> Result<Option<S::Frame>, S::Error> {
-        self.last = None;
+    fn next(&mut self) -> Option<StampedFrame> {
         if let Some(frame) = self.due() {
-            return Ok(Some(frame));
+            return Some(frame);
         }
         loop {
-            let Some(frame) = self.source.next_frame()? else {
-                // At the end nothing overtakes a held frame any more.
-                return Ok(self.held.take().map(|(_, frame)| frame));
+            let Some(frame) = self.frames.next() else {
+                // No frame is left that could overtake the one held back.
+                return self.held.take().map(|(_, frame)| frame);
             };
             let frame = match self.rates.draw(self.random.bits()) {
                 Some(fault) => self.inject(fault, frame),
                 None => Some(frame),
             };
-            if let Some(frame) = frame {
+            if frame.is_some() {
                 if let Some((left, _)) = &mut self.held {
                     *left = left.saturating_sub(1);
                 }
-                return Ok(Some(frame));
+                return frame;
             }
         }
     }

@@ -8,13 +8,12 @@ use host_fit::input::log;
 use host_fit::input::stage::Stage;
 use host_fit::problem::Problem;
 use host_fit::problem::draw::{Draw, draw_rows};
-use host_fit::solve::least_squares::coordinates::{Coordinates, Gains};
-use host_fit::solve::least_squares::multistart::LeastSquares;
+use host_fit::problem::model::{Model, SLOPES_MAX};
 use host_fit::solve::least_squares::normal::{Point, best_gain};
 use host_fit::solve::least_squares::scatter::{Offset, Q, Ratios, U, mean, regressors, scatter};
 use host_fit::solve::{Projection, Solver, SolverOptions};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::{DVector, Dyn, OVector, Owned, U18};
+use nalgebra::{DVector, Dyn, Matrix3, OVector, Owned, U18};
 use runtime::ModelKind;
 use std::time::Instant;
 
@@ -39,10 +38,14 @@ struct Crate<'p> {
 
 impl Crate<'_> {
     fn point(&self) -> Point {
-        let gains = Gains {
-            model: ModelKind::M31,
-        };
-        gains.point(&self.x).expect("any gains are a point")
+        let mut ratios = [[0.0; SLOPES_MAX]; 3];
+        for (probe, ratios) in ratios.iter_mut().enumerate() {
+            ratios[..3].copy_from_slice(&self.x.as_slice()[9 + 3 * probe..][..3]);
+        }
+        Point {
+            gain: Matrix3::from_fn(|i, j| self.x[3 * i + j]),
+            ratios,
+        }
     }
 
     /// The centred regressors of every row.
@@ -90,7 +93,8 @@ impl LeastSquaresProblem<f64, Dyn, U18> for Crate<'_> {
                     out[(3 * row + axis, 3 * axis + k)] = z[k];
                 }
                 for k in 0..9 {
-                    out[(3 * row + axis, 9 + k)] = point.gain[(axis, k / 3)] * z[U + k];
+                    out[(3 * row + axis, 9 + k)] =
+                        point.gain[(axis, k / 3)] * z[U + k / 3 * SLOPES_MAX + k % 3];
                 }
             }
         });
@@ -99,25 +103,21 @@ impl LeastSquaresProblem<f64, Dyn, U18> for Crate<'_> {
 }
 
 fn compare(name: &str, problem: &Problem, runs: usize) {
-    let options = SolverOptions {
-        projection: Projection::Linear,
-        seed: 1,
-        population: 0,
-        generations: 0,
-    };
+    let options = SolverOptions::new(Projection::Linear, 1);
     let mut cost = 0.0;
     let ours = median_ms(runs, || {
-        cost = LeastSquares
+        cost = Solver::LeastSquares
             .solve(problem, &options)
             .expect("a solution")
             .cost;
     });
     println!("RESULT least_squares_{name}_ms={ours:.3}");
-    let ratios = [[0.0; 3]; 3];
+    let ratios = [[0.0; SLOPES_MAX]; 3];
     let offsets = vec![Offset::Free; problem.groups.len()];
     let sums = scatter(problem, &ratios, &offsets).expect("no pole");
     let gain = best_gain(&sums).expect("a gain");
-    let x = Gains::unknowns(&Point { gain, ratios });
+    // No slopes to begin with.
+    let x = OVector::<f64, U18>::from_fn(|k, _| if k < 9 { gain[(k / 3, k % 3)] } else { 0.0 });
     let mut theirs_cost = 0.0;
     let theirs = median_ms(runs.min(5), || {
         let (_, report) = LevenbergMarquardt::new().minimize(Crate { problem, x });
@@ -150,32 +150,28 @@ fn main() {
     );
     let dataset = read().dataset;
     let settings = FitSettings {
-        model: ModelKind::M31,
+        model: Model::of(ModelKind::M31),
         train: None,
         draw: Draw::Stratified,
-        solver: SolverOptions {
-            projection: Projection::Linear,
-            seed: 1,
-            population: 0,
-            generations: 0,
-        },
+        solver: Solver::LeastSquares,
+        options: SolverOptions::new(Projection::Linear, 1),
         serial: runtime::parameters::Text::new(),
         created: runtime::parameters::Text::new(),
     };
     let whole = median_ms(9, || {
-        fit(&dataset, &stage, &LeastSquares, &settings).expect("a fit");
+        fit(&dataset, &stage, &settings).expect("a fit");
     });
     println!("RESULT fit_and_judge_57000_rows_ms={whole:.1}");
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
     compare(
         "57000_rows",
-        &Problem::new(&dataset, &all, &stage, ModelKind::M31),
+        &Problem::new(&dataset, &all, &stage, Model::of(ModelKind::M31)),
         9,
     );
     let some = draw_rows(&dataset, 200, Draw::Stratified, 1);
     compare(
         "200_rows",
-        &Problem::new(&dataset, &some, &stage, ModelKind::M31),
+        &Problem::new(&dataset, &some, &stage, Model::of(ModelKind::M31)),
         51,
     );
 }

@@ -11,7 +11,7 @@ use host_fit::input::log::{ReadOptions, read, read_bytes};
 use host_fit::input::stage::Stage;
 use host_fit::problem::Problem;
 use host_fit::problem::draw::{Draw, draw_rows};
-use host_fit::solve::least_squares::multistart::LeastSquares;
+use host_fit::problem::model::Model;
 use host_fit::solve::objective::delta::DeltaCost;
 use host_fit::solve::objective::form::Form;
 use host_fit::solve::objective::full::FullCost;
@@ -147,7 +147,7 @@ fn to_the_floor(name: &str, form: &Form<'_>, floor: f64, share: f64, population:
         let first = form.first_population(population, seed);
         let mut settings = settings(seed, population);
         settings.start.individuals = &first;
-        let found = SearchKind::Shtlbo.minimize(form, &settings, &criteria);
+        let found = SearchKind::Shtlbo.minimize(form.cost_function(), &settings, &criteria);
         times.push(started.elapsed().as_secs_f64() * 1e3);
         evaluations.push(found.evaluations as f64);
         arrived += usize::from(found.cost <= floor * (1.0 + share));
@@ -191,7 +191,8 @@ fn export(folder: &Path, problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
         String::from("movement,s_a_um,s_b_um,s_c_um,z_m,rx_rad,ry_rad,x_um,y_um,rz_urad\n");
     for group in &problem.groups {
         for row in &problem.rows[group.rows.clone()] {
-            let numbers = [row.signal_um, row.vertical, row.reference_um].concat();
+            let [z, rx, ry, _] = row.slopes;
+            let numbers = [row.signal_um, [z, rx, ry], row.reference_um].concat();
             let text: Vec<String> = numbers.iter().map(f64::to_string).collect();
             writeln!(rows, "{},{}", group.movement, text.join(","))?;
         }
@@ -244,7 +245,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let stage: &'static Stage = Box::leak(Box::new(stage));
     let problem = |count, draw, seed| {
         let rows = draw_rows(&reading.dataset, count, draw, seed);
-        Problem::new(&reading.dataset, &rows, stage, ModelKind::M31)
+        Problem::new(&reading.dataset, &rows, stage, Model::of(ModelKind::M31))
     };
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     if let ["--export", folder] = named[..] {
@@ -257,13 +258,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let few = problem(ROWS, Draw::Stratified, 1);
     let all = problem(usize::MAX, Draw::Stratified, 1);
     let linear = LinearCost::new(&few).ok_or("Model (31) has ratios")?;
-    let lm = SolverOptions {
-        projection: Projection::Linear,
-        seed: 1,
-        population: 0,
-        generations: 0,
-    };
-    let floor = few.fitness(LeastSquares.solve(&few, &lm)?.cost);
+    let lm = SolverOptions::new(Projection::Linear, 1);
+    let floor = few.fitness(Solver::LeastSquares.solve(&few, &lm)?.cost);
     one.install(|| {
         objective("none", &FullCost::new(&few));
         objective("delta", &DeltaCost::new(&few));

@@ -8,30 +8,34 @@ use crate::input::stage::Stage;
 use crate::judge::identify::{FitFailure, check_described, check_determined, check_motion};
 use crate::judge::statistics::AxisError;
 use crate::judge::uncertainty::{Uncertainty, uncertainty};
-use crate::judge::{Judgement, Zeros, judge};
+use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::Problem;
 use crate::problem::draw::{Draw, draw_rows};
-use crate::problem::parameters::{ParameterId, Parameters};
+use crate::problem::model::{Model, ParameterId};
+use crate::problem::parameters::Parameters;
 use crate::solve::{Solution, SolveError, Solver, SolverOptions};
 use runtime::calibration::Origin;
+use runtime::model::Probes;
 use runtime::parameters::{FitRecord, ParameterError, Text};
-use runtime::{Calibration, ModelKind, ParameterSet};
+use runtime::{Calibration, ParameterSet};
 
-/// Room around the motion of the log in which the calibration is still vouched for: offsets of
+/// Room around the motion of the log in which the calibration still holds: offsets of
 /// the reference and overshoot are well inside it.
 const RANGE_MARGIN: f64 = 1.1;
 
-/// What the user chose, besides the solver.
-#[derive(Clone, Debug, PartialEq)]
+/// What the user chose.
+#[derive(Clone, Debug)]
 pub struct FitSettings {
     /// The model.
-    pub model: ModelKind,
+    pub model: &'static Model,
     /// Rows to use; all if `None`.
     pub train: Option<usize>,
     /// How they are drawn.
     pub draw: Draw,
+    /// How the problem is solved.
+    pub solver: Solver,
     /// For the solver; its seed also draws the rows.
-    pub solver: SolverOptions,
+    pub options: SolverOptions,
     /// Serial number of the stage, for the blob.
     pub serial: Text,
     /// Creation time, for the blob.
@@ -44,7 +48,7 @@ pub enum FitWarning {
     /// A parameter stands at an end of its search range.
     #[error(
         "{} stands at an end of its search range ({value:.6} {}): widen the range in stage.toml, or check the log",
-        id.name(), id.unit()
+        id.name(), id.term.unit
     )]
     AtLimit {
         /// The parameter.
@@ -140,10 +144,10 @@ pub enum FitError {
 }
 
 /// A calibration with everything that is known about it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Fit {
     /// The model.
-    pub model: ModelKind,
+    pub model: &'static Model,
     /// What the solver found.
     pub solution: Solution,
     /// How well the log determines it.
@@ -156,6 +160,8 @@ pub struct Fit {
     pub train_fitness: f64,
     /// Rows that the fit used.
     pub train_rows: usize,
+    /// All rows, decoded by the target's decoder.
+    pub decoded: Decoded,
     /// Over all rows, by the target's decoder; zero deviations refitted where the model has them.
     pub judgement: Judgement,
     /// The same with the solver's own zero deviations.
@@ -168,57 +174,50 @@ pub struct Fit {
 ///
 /// # Errors
 /// See [`FitError`].
-pub fn fit(
-    dataset: &Dataset,
-    stage: &Stage,
-    solver: &dyn Solver,
-    settings: &FitSettings,
-) -> Result<Fit, FitError> {
+pub fn fit(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<Fit, FitError> {
+    let (model, solver) = (settings.model, settings.solver);
     let count = settings.train.unwrap_or(dataset.rows.len());
-    let selected = draw_rows(dataset, count, settings.draw, settings.solver.seed);
-    check_motion(dataset, stage, selected.len(), settings.model)?;
-    let problem = Problem::new(dataset, &selected, stage, settings.model);
-    let solution = solver.solve(&problem, &settings.solver)?;
-    let uncertainty = uncertainty(&problem, &solution.parameters, &solution.at_limit).ok_or(
-        FitError::AtPole {
-            solver: solver.name(),
-        },
-    )?;
-    let calibration = calibration(dataset, stage, settings.model, &solution.parameters);
-    let determined = check_determined(
-        stage,
-        &solution.parameters,
-        &uncertainty,
-        calibration.calibrated_vertical,
-    );
-    let mut origin = Origin {
+    let selected = draw_rows(dataset, count, settings.draw, settings.options.seed);
+    check_motion(dataset, stage, selected.len(), model)?;
+    let problem = Problem::new(dataset, &selected, stage, model);
+    let solution = solver.solve(&problem, &settings.options)?;
+    let parameters = &solution.parameters;
+    let at_pole = FitError::AtPole {
+        solver: solver.name(),
+    };
+    let uncertainty = uncertainty(&problem, parameters, &solution.at_limit).ok_or(at_pole)?;
+    let calibration = calibration(dataset, stage, model, parameters);
+    let vertical = calibration.calibrated_vertical;
+    let determined = check_determined(&problem, parameters, &uncertainty, vertical);
+    let origin = Origin {
         serial: settings.serial.clone(),
         created: settings.created.clone(),
         logs_sha256: dataset.sha256,
         fit: FitRecord::default(),
     };
-    let unjudged = match calibration.prepare(&origin) {
+    let mut set = match calibration.prepare(&origin) {
         Ok(set) => set,
         Err(error) => {
             determined?;
             return Err(FitError::Unusable(error));
         }
     };
-    let judgement = judge(&unjudged, dataset, stage, Zeros::of_model(settings.model));
+    let decoded = Decoded::new(&set, dataset);
+    let judgement = decoded.judge(dataset, stage, Zeros::of_model(model));
     // First this: a log that the model does not describe determines nothing, but for that reason.
-    check_described(dataset, &judgement.errors, settings.model)?;
+    check_described(dataset, &judgement.errors, model)?;
     determined?;
-    let judgement_solver_zeros = judge(&unjudged, dataset, stage, Zeros::Given(&solution.delta_m));
+    let own_zeros = Zeros::Given(&solution.delta_m);
+    let judgement_solver_zeros = decoded.judge(dataset, stage, own_zeros);
     let axes = judgement.errors.axes;
-    origin.fit = FitRecord {
+    set.fit = FitRecord {
         rows: u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX),
         train_rows: u32::try_from(selected.len()).unwrap_or(u32::MAX),
         rms: axes.map(|a| a.rms as f32),
         peak: axes.map(|a| a.peak as f32),
     };
-    let set = calibration.prepare(&origin).map_err(FitError::Unusable)?;
     Ok(Fit {
-        model: settings.model,
+        model,
         warnings: warnings(dataset, &problem, &solution, &judgement),
         train_fitness: problem.fitness(solution.cost),
         train_rows: selected.len(),
@@ -226,6 +225,7 @@ pub fn fit(
         uncertainty,
         calibration,
         set,
+        decoded,
         judgement,
         judgement_solver_zeros,
     })
@@ -238,17 +238,11 @@ fn warnings(
     judgement: &Judgement,
 ) -> Vec<FitWarning> {
     let mut warnings = Vec::new();
-    let values = solution.parameters.to_array();
-    for (id, value) in ParameterId::all().zip(values) {
-        if solution.at_limit.contains(&id) {
-            warnings.push(FitWarning::AtLimit { id, value });
-        }
+    for &id in &solution.at_limit {
+        let value = solution.parameters.values[id.index];
+        warnings.push(FitWarning::AtLimit { id, value });
     }
-    let vertical = solution
-        .at_limit
-        .iter()
-        .filter(|id| id.quantity.is_vertical())
-        .count();
+    let vertical = solution.at_limit.iter().filter(|id| id.is_slope()).count();
     if vertical > 1 {
         warnings.push(FitWarning::VerticalTermsAtLimit { count: vertical });
     }
@@ -271,7 +265,7 @@ fn warnings(
     let missed: Vec<String> = missed
         .map(|(_, movement)| dataset.movement_name(movement))
         .collect();
-    if problem.model.has_zero_deviation() && !missed.is_empty() {
+    if problem.model.has_zero_deviation && !missed.is_empty() {
         warnings.push(FitWarning::MovementsMissed { movements: missed });
     }
     if judgement.undecoded > 0 {
@@ -307,12 +301,12 @@ fn wild_row(dataset: &Dataset, judgement: &Judgement) -> Option<FitWarning> {
     })
 }
 
-/// The calibration that `parameters` make with the stage's scales, vouched for over the motion
+/// The calibration that `parameters` make with the stage's scales, calibrated over the motion
 /// of the dataset and a tenth more.
 pub fn calibration(
     dataset: &Dataset,
     stage: &Stage,
-    model: ModelKind,
+    model: &Model,
     parameters: &Parameters,
 ) -> Calibration {
     let mut planar = [0.0f64; 3];
@@ -324,9 +318,9 @@ pub fn calibration(
         }
     }
     Calibration {
-        model,
-        geometry: parameters.geometry,
-        sensitivity: parameters.sensitivity,
+        model: model.kind,
+        geometry: parameters.geometry(),
+        probes: Probes::Linear(parameters.sensitivity()),
         hall_m_per_code: stage.hall.m_per_count,
         hall_window: stage.hall.window,
         capacitive_probes_m: stage.capacitive_probes_m,

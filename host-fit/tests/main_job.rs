@@ -78,7 +78,28 @@ fn fit_eval_decode_and_inspect_agree_on_the_shipped_log() {
     assert_eq!(inspect["created"], "2026-01-02");
     close(&inspect["fit"]["errors"]["x"]["rmse_um"], 0.946, 0.02);
     let page = String::from_utf8(bench.read("report/index.html")).expect("text");
-    assert!(page.contains("<svg") && page.contains("S7"));
+    assert!(page.contains("S7"));
+}
+
+#[test]
+fn the_report_page_shows_the_figures_of_the_fit_and_escapes_every_text() {
+    let bench = Bench::new();
+    bench.write("log.csv", thinned_log(20, |_| true));
+    let fit = "fit log.csv --stage stage.toml --out p.bin --solver lm --serial <b>&S";
+    bench.good(&format!("{fit} --report report --json fit.json"));
+    let page = String::from_utf8(bench.read("report/index.html")).expect("text");
+    assert!(page.contains("&lt;b&gt;&amp;S") && !page.contains("<b>&"));
+    assert_eq!(page.matches("<svg ").count(), 2);
+    let figures = bench.json("fit.json");
+    let number = |value: &serde_json::Value| value.as_f64().expect("a number");
+    let y = &figures["errors"]["y"];
+    let (rms, peak) = (number(&y["rmse_um"]), number(&y["peak_um"]));
+    let row = format!("<td>Y</td><td>{rms:.3}</td><td>{peak:.3}</td><td>um</td>");
+    assert!(page.contains(&row), "{row}");
+    let eta = &figures["parameters"]["eta_b"];
+    let (value, error) = (number(&eta["value"]), number(&eta["standard_error"]));
+    let row = format!("<td>eta_b</td><td>{value:.6}</td><td>{error:.2e}</td>");
+    assert!(page.contains(&row), "{row}");
 }
 
 #[test]

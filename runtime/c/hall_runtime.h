@@ -13,10 +13,10 @@
 #include <stdlib.h>
 
 // Words of a decoder.
-#define HALL_DECODER_WORDS 53
+#define HALL_DECODER_WORDS 41
 
 // Words of a servo.
-#define HALL_SERVO_WORDS 48
+#define HALL_SERVO_WORDS 49
 
 // In place of a code that could not be read: INT32_MIN.
 #define HALL_MISSING_CODE INT32_MIN
@@ -105,12 +105,12 @@ typedef uint32_t HallRezero;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// A decoder, as C sees it. Its contents are nobody's business.
+// A decoder, as C sees it. Its contents are private.
 typedef struct {
   uint32_t opaque[HALL_DECODER_WORDS];
 } HallDecoder;
 
-// A servo, as C sees it. Its contents are nobody's business.
+// A servo, as C sees it. Its contents are private.
 typedef struct {
   uint32_t opaque[HALL_SERVO_WORDS];
 } HallServo;
@@ -181,7 +181,7 @@ bool hall_arithmetic_is_sound(void);
 
 // Loads the parameter blob at the start of `memory` (flash, padding may follow), checks it,
 // and makes a decoder of it. `serial` is the serial number of the stage that is expected, or
-// NULL to take that of any. Anything but HALL_RESULT_OK leaves the decoder as it was.
+// NULL to take that of any. Unless the result is HALL_RESULT_OK, the decoder stays as it was.
 //
 // # Safety
 // `memory` points to `length` readable bytes; `serial` is NULL or ends in a zero byte;

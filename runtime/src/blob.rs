@@ -20,7 +20,7 @@
 //! and this version's blobs stay readable. Not promised: that an older decoder reads a
 //! newer layout, or that two layouts of one calibration have the same length.
 
-use crate::layout::Layout;
+use crate::layout;
 use crate::parameters::{ParameterError, ParameterSet};
 use crc::{CRC_32_ISCSI, Crc, NoTable};
 
@@ -155,9 +155,7 @@ impl ParameterSet {
         let bytes = buffer.len();
         let too_small = BlobError::BufferTooSmall { bytes };
         let room = buffer.get_mut(HEADER_BYTES..).ok_or(too_small)?;
-        let payload = postcard::to_slice(&Layout::from(self), room)
-            .map_err(|_| too_small)?
-            .len();
+        let payload = layout::write(self, room).ok_or(too_small)?;
         let payload_bytes = u32::try_from(payload).map_err(|_| too_small)?;
         let header = buffer.first_chunk_mut::<HEADER_BYTES>().ok_or(too_small)?;
         let [m0, m1, m2, m3] = MAGIC;
@@ -174,7 +172,7 @@ impl ParameterSet {
     /// Reads a blob that must fill `bytes` exactly, as in a file, and checks it.
     ///
     /// # Errors
-    /// Every variant but `BufferTooSmall` and `OtherStage`; see [`BlobError`].
+    /// Every variant of [`BlobError`] except `BufferTooSmall` and `OtherStage`.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, BlobError> {
         let length = blob_length(bytes)?;
         if bytes.len() > length {
@@ -190,7 +188,7 @@ impl ParameterSet {
     /// checks it.
     ///
     /// # Errors
-    /// As [`ParameterSet::from_bytes`], but for `TrailingBytes`.
+    /// As [`ParameterSet::from_bytes`], except `TrailingBytes`.
     pub fn from_flash(memory: &[u8]) -> Result<Self, BlobError> {
         let length = blob_length(memory)?;
         let blob = memory.get(..length).ok_or(BlobError::Truncated {
@@ -206,13 +204,8 @@ impl ParameterSet {
             return Err(BlobError::BadCrc { stored, computed });
         }
         let payload = body.get(HEADER_BYTES..).ok_or(BlobError::BadPayload)?;
-        let (layout, rest) =
-            postcard::take_from_bytes::<Layout>(payload).map_err(|_| BlobError::BadPayload)?;
-        if !rest.is_empty() {
-            return Err(BlobError::BadPayload);
-        }
-        (layout.numbers.check_finite()).map_err(BlobError::Parameters)?;
-        let set = Self::from(layout);
+        let mut set = layout::read(payload).ok_or(BlobError::BadPayload)?;
+        layout::check_finite(&mut set).map_err(BlobError::Parameters)?;
         set.check_terms().map_err(BlobError::Parameters)?;
         Ok(set)
     }

@@ -4,21 +4,56 @@ use crate::capacitive::{ProbePositions, vertical_rows};
 use crate::decoder::DecoderConstants;
 use crate::frame::CodeWindow;
 use crate::geometry::{ProbeGeometry, inverse_rows};
-use crate::model::{ModelKind, Sensitivity};
+use crate::model::{ModelKind, Probes};
 use crate::parameters::{
     CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
 };
-use crate::real::Real;
+use crate::real::Number;
 
 /// A calibrated stage: the parameters of one model and the scales that they hold for.
+///
+/// ```
+/// use runtime::calibration::{Calibration, Origin};
+/// use runtime::frame::CodeWindow;
+/// use runtime::geometry::ProbeGeometry;
+/// use runtime::model::{ModelKind, Probes, Sensitivity};
+/// use runtime::parameters::ParameterError;
+///
+/// # fn main() -> Result<(), ParameterError> {
+/// let window = CodeWindow::between_rails(-32768, 32767).expect("a 16-bit converter");
+/// let mut calibration = Calibration {
+///     model: ModelKind::M30,
+///     geometry: ProbeGeometry {
+///         lever_arm_m: [0.2, -0.2, -0.35],
+///         misalignment_rad: [0.01, -0.02, 0.03],
+///     },
+///     probes: Probes::Linear([0.87, 0.70, 0.86].map(Sensitivity::constant)),
+///     hall_m_per_code: 6.25e-8,
+///     hall_window: window,
+///     capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
+///     capacitive_m_per_code: 1.5625e-8,
+///     capacitive_window: window,
+///     calibrated_planar: [550e-6, 550e-6, 350e-6],
+///     calibrated_vertical: [280e-6, 1.2e-3, 1.2e-3],
+///     sensitivity_min: Calibration::SENSITIVITY_MIN,
+/// };
+/// let set = calibration.prepare(&Origin::default())?;
+/// assert_eq!(set.check(), Ok(()));
+///
+/// calibration.sensitivity_min = 0.75; // probe B reads 0.70
+/// let refused = calibration.prepare(&Origin::default());
+/// assert_eq!(refused, Err(ParameterError::PoleInRange { probe: 1 }));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
     /// Which model the parameters belong to. Models that fix a parameter store its value.
     pub model: ModelKind,
     /// Lever arms and misalignments of the probes A, B, C.
     pub geometry: ProbeGeometry<f64>,
-    /// Sensitivities of the probes A, B, C.
-    pub sensitivity: [Sensitivity<f64>; 3],
+    /// The model's coefficients of the probes A, B, C.
+    pub probes: Probes<f64>,
     /// Designed displacement per Hall code, m.
     pub hall_m_per_code: f64,
     /// Hall codes that are decoded.
@@ -29,9 +64,9 @@ pub struct Calibration {
     pub capacitive_m_per_code: f64,
     /// Capacitive codes that are decoded.
     pub capacitive_window: CodeWindow,
-    /// Largest magnitude of X, Y, Rz that the calibration vouches for, m, m, rad.
+    /// Largest magnitude of X, Y, Rz that the calibration covers, m, m, rad.
     pub calibrated_planar: [f64; 3],
-    /// Largest magnitude of Z, Rx, Ry that the calibration vouches for, m, rad, rad.
+    /// Largest magnitude of Z, Rx, Ry that the calibration covers, m, rad, rad.
     pub calibrated_vertical: [f64; 3],
     /// Smallest magnitude of phi that is decoded; [`Calibration::SENSITIVITY_MIN`] if in doubt.
     pub sensitivity_min: f64,
@@ -67,7 +102,6 @@ impl Calibration {
             .ok_or(ParameterError::CapacitiveProbesInLine)?;
         Ok(DecoderConstants {
             vertical_per_code: vertical.map(|row| row.map(|x| x * self.capacitive_m_per_code)),
-            sensitivity: self.sensitivity,
             planar_per_code: inverse.map(|row| row.map(|x| x * self.hall_m_per_code)),
             calibrated_vertical: self.calibrated_vertical,
             calibrated_planar: self.calibrated_planar,
@@ -97,15 +131,16 @@ impl Calibration {
                 lever_arm_m: self.geometry.lever_arm_m.map(round),
                 misalignment_rad: self.geometry.misalignment_rad.map(round),
             },
-            plane: plane.map(|row| row.map(round)),
-            plane_inverse: inverse.map(|row| row.map(round)),
+            plane: rounded_rows(plane),
+            plane_inverse: rounded_rows(inverse),
             hall: HallInput {
                 m_per_code: round(self.hall_m_per_code),
             },
             capacitive: CapacitiveInput {
-                vertical_per_m: vertical.map(|row| row.map(round)),
+                vertical_per_m: rounded_rows(vertical),
                 m_per_code: round(self.capacitive_m_per_code),
             },
+            probes: self.probes.rounded(),
             constants: self.constants()?.rounded(),
         };
         set.check()?;
@@ -117,18 +152,16 @@ fn round(x: f64) -> f32 {
     f32::from_f64(x)
 }
 
+fn rounded_rows(rows: [[f64; 3]; 3]) -> [[f32; 3]; 3] {
+    rows.map(|row| row.map(round))
+}
+
 impl DecoderConstants<f64> {
     /// Each constant rounded to the nearest `f32`.
     pub fn rounded(&self) -> DecoderConstants<f32> {
         DecoderConstants {
-            vertical_per_code: self.vertical_per_code.map(|row| row.map(round)),
-            sensitivity: self.sensitivity.map(|s| Sensitivity {
-                eta: round(s.eta),
-                per_z_m: round(s.per_z_m),
-                per_rx_rad: round(s.per_rx_rad),
-                per_ry_rad: round(s.per_ry_rad),
-            }),
-            planar_per_code: self.planar_per_code.map(|row| row.map(round)),
+            vertical_per_code: rounded_rows(self.vertical_per_code),
+            planar_per_code: rounded_rows(self.planar_per_code),
             calibrated_vertical: self.calibrated_vertical.map(round),
             calibrated_planar: self.calibrated_planar.map(round),
             sensitivity_min: round(self.sensitivity_min),

@@ -5,7 +5,7 @@
 use crate::geometry::inverse_rows;
 use crate::model::dot;
 use crate::pose::VerticalPose;
-use crate::real::Real;
+use crate::real::{Number, Real};
 
 /// Coordinates of the three capacitive probes, (x, y) in m.
 pub type ProbePositions<T> = [[T; 2]; 3];
@@ -18,7 +18,7 @@ pub fn vertical_rows<T: Real>(probes_m: &ProbePositions<T>) -> Option<[[T; 3]; 3
 
 /// The vertical pose of three gap changes (or codes, when the scale is in `rows`).
 #[inline(always)]
-pub fn vertical_pose<T: Real>(rows: &[[T; 3]; 3], gaps: [T; 3]) -> VerticalPose<T> {
+pub fn vertical_pose<T: Number>(rows: &[[T; 3]; 3], gaps: [T; 3]) -> VerticalPose<T> {
     VerticalPose {
         z_m: dot(&rows[0], gaps),
         rx_rad: dot(&rows[1], gaps),
@@ -27,7 +27,7 @@ pub fn vertical_pose<T: Real>(rows: &[[T; 3]; 3], gaps: [T; 3]) -> VerticalPose<
 }
 
 /// The gap changes, in m, that the three probes read at a vertical pose.
-pub fn gaps_m<T: Real>(probes_m: &ProbePositions<T>, vertical: &VerticalPose<T>) -> [T; 3] {
+pub fn gaps_m<T: Number>(probes_m: &ProbePositions<T>, vertical: &VerticalPose<T>) -> [T; 3] {
     probes_m.map(|[x, y]| (vertical.z_m + vertical.rx_rad * y) - vertical.ry_rad * x)
 }
 

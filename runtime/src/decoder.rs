@@ -1,34 +1,34 @@
 //! One frame to one reading: the flat tick path.
 //!
-//! [`Decoder::decode`] does the whole arithmetic of a servo period: six codes checked
-//! against their windows and scaled, vertical pose, three sensitivities, planar pose, checks
-//! for finite results and for the calibrated range, status. It has no branch, no loop, no
-//! call and no panic, so the number of its instructions is the same for every input.
+//! [`Decode::decode`] does the whole arithmetic of a servo period: six codes checked
+//! against their windows and scaled, vertical pose, the model's sensitivities and planar
+//! pose, checks for finite results and for the calibrated range, status. It has no branch, no
+//! loop, no call and no panic, so the number of its instructions is the same for every input.
 //!
 //! The scale of the codes is folded into the constants on the host, in `f64`: a code is
 //! converted to `f32` exactly (up to 24 bits) and never scaled by itself.
+//!
+//! Numbers are compared by the bits of their magnitudes. As integers these are ordered like
+//! the magnitudes, with every NaN above infinity: one comparison finds what is too large and
+//! what is NaN.
 
 use crate::capacitive::vertical_pose;
-use crate::checks::{
-    keep_without, shift_in_any_beyond, shift_in_faulty, shift_in_outside, shift_in_outside_doubled,
-    with_bit_if_any_beyond,
-};
-use crate::frame::{CodeFault, CodeWindow, RawFrame};
-use crate::model::{Sensitivity, planar_pose, sensitivity_at};
+use crate::frame::{ChannelFault, CodeWindow, RawFrame};
+use crate::model::{LinearModel, Model};
 use crate::pose::{PlanarPose, Pose, VerticalPose};
 use crate::real::Real;
 use crate::status::Status;
+use core::fmt;
+use core::ops::Deref;
 
-/// Everything that a tick reads: about 170 bytes, borrowed read-only.
+/// What a tick reads in addition to the coefficients of the probes.
 ///
-/// Made by [`crate::Calibration::prepare`] in `f64` and rounded once to `f32`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Made by [`crate::Calibration::constants`] in `f64` and rounded once to `f32`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct DecoderConstants<T> {
     /// Rows Z, Rx, Ry: m, rad, rad per capacitive code.
     pub vertical_per_code: [[T; 3]; 3],
-    /// Sensitivity of the probes A, B, C (equation 33).
-    pub sensitivity: [Sensitivity<T>; 3],
     /// Rows X, Y, Rz of PM^-1 times m per Hall code: m, m, rad per code of sensitivity one.
     pub planar_per_code: [[T; 3]; 3],
     /// Largest magnitude of Z, Rx, Ry in the calibration, m, rad, rad.
@@ -53,233 +53,237 @@ pub struct Reading {
     pub status: Status,
 }
 
-/// Runs one calibration. Borrow it, call [`Decoder::decode`] every servo period.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C)]
-pub struct Decoder {
-    constants: DecoderConstants<f32>,
-    limits: Limits,
-}
-
-/// Why a code of a frame is not decoded, with the channel it belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ChannelFault {
-    /// A Hall probe, 0 to 2 for A to C.
-    Hall {
-        /// Which probe.
-        probe: u8,
-        /// What is wrong.
-        fault: CodeFault,
-    },
-    /// A capacitive sensor, 0 to 2 for gaps 1 to 3.
-    Capacitive {
-        /// Which gap.
-        gap: u8,
-        /// What is wrong.
-        fault: CodeFault,
-    },
-}
-
-/// The limits of a tick as the words that it compares with, made once from the constants.
+/// Decodes frames by one calibration, whatever its model.
 ///
-/// Magnitudes are compared as the integers that their bits are, doubled to leave out the
-/// sign: these are ordered like the magnitudes, with every NaN above infinity, so no
-/// comparison needs a flag of the FPU. A `room` is what fits above the largest accepted
-/// word: see [`crate::checks`].
+/// A [`Decoder`] does this for its own model. The model of a parameter set is looked up once,
+/// when the set is loaded; from then on a servo holds a `&dyn Decode` and no tick chooses.
+pub trait Decode: Sync {
+    /// The vertical pose of a frame's capacitive codes and the planar pose of its Hall codes,
+    /// less `zero`; invalid fields are 0 and the status says why. Never NaN.
+    fn decode(&self, frame: &RawFrame, zero: &PlanarPose<f32>) -> Reading;
+
+    /// As [`Decode::decode`], with a vertical pose that is known by other means (a log in SI
+    /// columns).
+    fn decode_at(
+        &self,
+        hall: [i32; 3],
+        vertical: VerticalPose<f32>,
+        zero: &PlanarPose<f32>,
+    ) -> Reading;
+
+    /// The constants that do not depend on the model. Their method
+    /// [`channel_faults`](DecoderConstants::channel_faults) says why codes are not decoded.
+    fn constants(&self) -> &DecoderConstants<f32>;
+}
+
+/// Without the constants: formatting numbers would take more flash than the runtime does.
+impl fmt::Debug for dyn Decode + '_ {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("decoder")
+    }
+}
+
+/// Decodes frames by one calibration of the model `M`.
+///
+/// ```
+/// use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, VerticalPose};
+/// # use runtime::ParameterSet;
+/// # const BLOB: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/stage.bin"));
+/// # fn main() -> Result<(), runtime::BlobError> {
+/// # let set = ParameterSet::from_bytes(BLOB)?;
+/// let AnyDecoder::Linear(decoder) = set.decoder();
+/// assert_eq!(decoder.probes()[0].eta, 0.87);
+///
+/// // Z by the capacitive codes, or known by other means: the same planar pose.
+/// let frame = RawFrame { hall: [1200, 900, 700], capacitive: [300, -200, 100], sequence: 0, time_us: 0 };
+/// let by_codes = decoder.decode(&frame, &PlanarPose::ZERO);
+/// let by_pose = decoder.decode_at(frame.hall, by_codes.pose.vertical, &PlanarPose::ZERO);
+/// assert_eq!(by_codes, by_pose);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
-struct Limits {
-    capacitive_low: u32,
-    capacitive_room: u32,
-    vertical_room: [u32; 3],
-    sensitivity_low: u32,
-    sensitivity_room: u32,
-    hall_low: u32,
-    hall_room: u32,
-    planar_room: [u32; 3],
+pub struct Decoder<M: Model> {
+    constants: DecoderConstants<f32>,
+    probes: [M::Probe<f32>; 3],
 }
 
-/// The bits of |x|, those of `largest` at most.
+/// The decoder of a parameter set, whatever its model: chosen once, when the set is loaded,
+/// and borrowed as the [`Decode`] that it derefs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AnyDecoder {
+    /// Of Models (12), (15), (30), (31).
+    Linear(Decoder<LinearModel>),
+}
+
+impl Deref for AnyDecoder {
+    type Target = dyn Decode;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Self::Linear(decoder) => decoder,
+        }
+    }
+}
+
+/// The bits of |x|.
 #[inline(always)]
-const fn magnitude_up_to(x: f32, largest: f32) -> u32 {
-    let (bits, largest) = (x.to_bits() & 0x7fff_ffff, largest.to_bits());
-    if bits > largest { largest } else { bits }
+const fn magnitude(x: f32) -> u32 {
+    x.to_bits() & 0x7fff_ffff
 }
 
-/// What fits above twice the bits of each magnitude. A limit of NaN becomes infinity: NaNs
+/// The largest finite magnitude.
+const FINITE: u32 = f32::MAX.to_bits();
+
+/// The largest of three magnitudes.
+#[inline(always)]
+const fn largest(v: [u32; 3]) -> u32 {
+    let larger = if v[0] > v[1] { v[0] } else { v[1] };
+    if larger > v[2] { larger } else { v[2] }
+}
+
+/// Which of three words lie outside `low..=high`, as three bits with the first lowest. One
+/// subtraction and one comparison a word, as in [`CodeWindow::contains`].
+#[inline(always)]
+fn outside([a, b, c]: [u32; 3], low: u32, high: u32) -> u32 {
+    let span = high.wrapping_sub(low);
+    let outside = |word: u32| u32::from(word.wrapping_sub(low) > span);
+    outside(c) << 2 | outside(b) << 1 | outside(a)
+}
+
+/// [`outside`] for codes.
+#[inline(always)]
+fn outside_window(codes: [i32; 3], window: &CodeWindow) -> u32 {
+    let words = each(codes, i32::cast_unsigned);
+    outside(
+        words,
+        window.low.cast_unsigned(),
+        window.high.cast_unsigned(),
+    )
+}
+
+/// Whether any magnitude is larger than its limit.
+#[inline(always)]
+const fn beyond(v: [u32; 3], limits: [u32; 3]) -> bool {
+    (v[0] > limits[0]) | (v[1] > limits[1]) | (v[2] > limits[2])
+}
+
+/// `f` of each of three, written out: `array::map` becomes a loop at opt-level "s".
+#[inline(always)]
+fn each<A, B>([a, b, c]: [A; 3], f: impl Fn(A) -> B) -> [B; 3] {
+    [f(a), f(b), f(c)]
+}
+
+/// The numbers, or zeros if they are not valid.
+#[inline(always)]
+fn zero_unless(valid: bool, v: [f32; 3]) -> [f32; 3] {
+    let keep = u32::from(valid).wrapping_neg();
+    each(v, |x| f32::from_bits(x.to_bits() & keep))
+}
+
+/// A limit of a range without its sign. Of unchecked constants a NaN becomes infinity: NaNs
 /// differ from machine to machine, so none may be compared with another.
-const fn room(v: &[f32; 3]) -> [u32; 3] {
-    [
-        !(magnitude_up_to(v[0], f32::INFINITY) << 1),
-        !(magnitude_up_to(v[1], f32::INFINITY) << 1),
-        !(magnitude_up_to(v[2], f32::INFINITY) << 1),
-    ]
+const fn limit(x: f32) -> f32 {
+    if x.is_nan() { f32::INFINITY } else { x.abs() }
 }
 
-/// What fits above twice the bits of every finite magnitude: a carry from twice those of an
-/// infinity or a NaN.
-const FINITE_ROOM: u32 = (f32::INFINITY.to_bits() << 1).wrapping_neg();
+const fn limits([a, b, c]: [f32; 3]) -> [f32; 3] {
+    [limit(a), limit(b), limit(c)]
+}
 
-/// All bits that make X, Y, Rz invalid lie below that of the vertical range.
-const FAULTS_FROM_THE_TOP: u32 = Status::VERTICAL_EXTRAPOLATED.bits().leading_zeros() + 1;
-const PLANAR_EXTRAPOLATED_AT: u32 = Status::PLANAR_EXTRAPOLATED.bits().trailing_zeros();
-
-impl Limits {
-    const fn of(c: &DecoderConstants<f32>) -> Self {
-        let low = magnitude_up_to(c.sensitivity_min, f32::MAX);
-        Self {
-            capacitive_low: c.capacitive_window.low as u32,
-            capacitive_room: !c.capacitive_window.span(),
-            vertical_room: room(&c.calibrated_vertical),
-            sensitivity_low: low << 1,
-            sensitivity_room: !((f32::MAX.to_bits() - low) << 1),
-            hall_low: c.hall_window.low as u32,
-            hall_room: !c.hall_window.span(),
-            planar_room: room(&c.calibrated_planar),
+impl<M: Model> Decoder<M> {
+    /// A decoder with these constants. Checked ones come from
+    /// [`ParameterSet::decoder`](crate::ParameterSet::decoder); unchecked ones give no panic
+    /// and no NaN either, only a status.
+    pub const fn new(mut constants: DecoderConstants<f32>, probes: [M::Probe<f32>; 3]) -> Self {
+        constants.calibrated_vertical = limits(constants.calibrated_vertical);
+        constants.calibrated_planar = limits(constants.calibrated_planar);
+        if constants.sensitivity_min.is_finite() {
+            constants.sensitivity_min = constants.sensitivity_min.abs();
+        } else {
+            constants.sensitivity_min = f32::MAX;
         }
-    }
-}
-
-/// The bits of three numbers.
-#[inline(always)]
-const fn bits(v: [f32; 3]) -> [u32; 3] {
-    [v[0].to_bits(), v[1].to_bits(), v[2].to_bits()]
-}
-
-/// Codes as numbers, exactly.
-#[inline(always)]
-fn numbers(codes: &[i32; 3]) -> [f32; 3] {
-    [
-        f32::from_code(codes[0]),
-        f32::from_code(codes[1]),
-        f32::from_code(codes[2]),
-    ]
-}
-
-/// Codes as words.
-#[inline(always)]
-const fn words(codes: &[i32; 3]) -> [u32; 3] {
-    [codes[0] as u32, codes[1] as u32, codes[2] as u32]
-}
-
-impl Decoder {
-    /// A decoder with constants that were checked: see [`crate::ParameterSet::decoder`].
-    /// Unchecked ones give no panic and no NaN either, only a status.
-    pub const fn new(constants: DecoderConstants<f32>) -> Self {
-        Self {
-            constants,
-            limits: Limits::of(&constants),
-        }
+        Self { constants, probes }
     }
 
-    /// The constants.
-    pub const fn constants(&self) -> &DecoderConstants<f32> {
-        &self.constants
+    /// The coefficients of the probes A, B, C.
+    pub const fn probes(&self) -> &[M::Probe<f32>; 3] {
+        &self.probes
     }
 
-    /// The vertical pose of three capacitive codes and the planar pose of three Hall codes,
-    /// less `zero`; invalid fields are 0 and the status says why. Never NaN.
+    /// The checks of a vertical pose, the planar pose at it, and the checks of that.
     #[inline(always)]
-    pub fn decode(&self, hall: [i32; 3], capacitive: [i32; 3], zero: &PlanarPose<f32>) -> Reading {
-        let mut reading = Reading::default();
-        self.decode_into(&hall, &capacitive, zero, &mut reading);
-        reading
-    }
-
-    /// [`Decoder::decode`] with the codes read, and the reading written, where they lie: on a
-    /// core with few registers this saves copies.
-    #[inline(always)]
-    pub fn decode_into(
+    fn finish(
         &self,
-        hall: &[i32; 3],
-        capacitive: &[i32; 3],
+        hall: [i32; 3],
+        vertical: VerticalPose<f32>,
+        capacitive_bad: u32,
         zero: &PlanarPose<f32>,
-        reading: &mut Reading,
-    ) {
-        let limits = &self.limits;
-        let bad = shift_in_outside(
-            0,
-            words(capacitive),
-            limits.capacitive_low,
-            limits.capacitive_room,
-        );
-        let v = vertical_pose(&self.constants.vertical_per_code, numbers(capacitive));
-        self.finish(hall, v, bad, zero, reading);
+    ) -> Reading {
+        let c = &self.constants;
+        let signal = each(hall, f32::from_code);
+        let (phi, planar) =
+            M::planar_pose(&self.probes, &c.planar_per_code, signal, &vertical, zero);
+        let (v, q) = (vertical.to_array(), planar.to_array());
+        let (size_v, size_q) = (each(v, magnitude), each(q, magnitude));
+
+        let phi_bad = outside(each(phi, magnitude), c.sensitivity_min.to_bits(), FINITE);
+        let faults = (Status::HALL_A.with_next(outside_window(hall, &c.hall_window)))
+            .with(Status::CAPACITIVE_1.with_next(capacitive_bad))
+            .with(Status::SENSITIVITY_A.with_next(phi_bad))
+            .with(Status::PLANAR_NOT_FINITE.when(largest(size_q) > FINITE))
+            .with(Status::VERTICAL_NOT_FINITE.when(largest(size_v) > FINITE));
+        let vertical_valid = !faults.any(VERTICAL_FAULTS);
+        let planar_valid = faults.is_good();
+        let range_v = each(c.calibrated_vertical, f32::to_bits);
+        let range_q = each(c.calibrated_planar, f32::to_bits);
+        let status = faults
+            .with(Status::VERTICAL_EXTRAPOLATED.when(beyond(size_v, range_v)))
+            .with(Status::PLANAR_EXTRAPOLATED.when(beyond(size_q, range_q)))
+            .with(Status::PLANAR_INVALID.when(!planar_valid))
+            .with(Status::VERTICAL_INVALID.when(!vertical_valid));
+        Reading {
+            pose: Pose {
+                planar: PlanarPose::from_array(zero_unless(planar_valid, q)),
+                vertical: VerticalPose::from_array(zero_unless(vertical_valid, v)),
+            },
+            status,
+        }
+    }
+}
+
+/// What makes Z, Rx, Ry invalid. Any fault makes X, Y, Rz invalid.
+const VERTICAL_FAULTS: Status = Status::CAPACITIVE.with(Status::VERTICAL_NOT_FINITE);
+
+impl<M: Model> Decode for Decoder<M> {
+    #[inline(always)]
+    fn decode(&self, frame: &RawFrame, zero: &PlanarPose<f32>) -> Reading {
+        let c = &self.constants;
+        let bad = outside_window(frame.capacitive, &c.capacitive_window);
+        let gaps = each(frame.capacitive, f32::from_code);
+        let vertical = vertical_pose(&c.vertical_per_code, gaps);
+        self.finish(frame.hall, vertical, bad, zero)
     }
 
-    /// As [`Decoder::decode`], with a vertical pose that is known by other means (a log
-    /// in SI columns).
-    pub fn decode_at(
+    fn decode_at(
         &self,
         hall: [i32; 3],
         vertical: VerticalPose<f32>,
         zero: &PlanarPose<f32>,
     ) -> Reading {
-        let mut reading = Reading::default();
-        self.finish(&hall, vertical, 0, zero, &mut reading);
-        reading
+        self.finish(hall, vertical, 0, zero)
     }
 
-    /// The checks of a vertical pose, the planar pose at it, and the checks of that.
-    ///
-    /// The bits are shifted in from the highest down, so that those of the single channels
-    /// end where [`Status`] has them without being moved.
-    #[inline(always)]
-    fn finish(
-        &self,
-        hall: &[i32; 3],
-        vertical: VerticalPose<f32>,
-        capacitive_bad: u32,
-        zero: &PlanarPose<f32>,
-        reading: &mut Reading,
-    ) {
-        let (c, limits) = (&self.constants, &self.limits);
-
-        let found = bits([vertical.z_m, vertical.rx_rad, vertical.ry_rad]);
-        let seen = shift_in_any_beyond(capacitive_bad, found, limits.vertical_room);
-        let finite = [FINITE_ROOM, FINITE_ROOM, FINITE_ROOM];
-        let seen = shift_in_any_beyond(seen, found, finite);
-        // Beyond the calibrated range, the second bit, is no fault.
-        let keep = keep_without(seen & !0b10);
-        let invalid = keep.wrapping_add(1);
-        reading.pose.vertical = VerticalPose {
-            z_m: f32::from_bits(found[0] & keep),
-            rx_rad: f32::from_bits(found[1] & keep),
-            ry_rad: f32::from_bits(found[2] & keep),
-        };
-
-        let phi = [
-            sensitivity_at(&c.sensitivity[0], &vertical),
-            sensitivity_at(&c.sensitivity[1], &vertical),
-            sensitivity_at(&c.sensitivity[2], &vertical),
-        ];
-        let (low, room) = (limits.sensitivity_low, limits.sensitivity_room);
-        // Beyond, vertical not finite, and room for planar not finite; then the channels.
-        let status = shift_in_outside_doubled((seen & 0b11) << 1, bits(phi), low, room);
-        let status = (status << 3) | (seen >> 2);
-        let status = shift_in_outside(status, words(hall), limits.hall_low, limits.hall_room);
-        let planar = planar_pose(&c.planar_per_code, numbers(hall), phi, zero);
-
-        let found = bits([planar.x_m, planar.y_m, planar.rz_rad]);
-        let status = with_bit_if_any_beyond::<{ Status::PLANAR_NOT_FINITE.bits() }>(
-            status,
-            found,
-            FINITE_ROOM,
-        );
-        let (top, keep) = shift_in_faulty(invalid, status << FAULTS_FROM_THE_TOP);
-        let top = shift_in_any_beyond(top, found, limits.planar_room);
-        reading.pose.planar = PlanarPose {
-            x_m: f32::from_bits(found[0] & keep),
-            y_m: f32::from_bits(found[1] & keep),
-            rz_rad: f32::from_bits(found[2] & keep),
-        };
-        reading.status = Status::from_bits(status | (top << PLANAR_EXTRAPOLATED_AT));
+    fn constants(&self) -> &DecoderConstants<f32> {
+        &self.constants
     }
+}
 
+impl<T> DecoderConstants<T> {
     /// Every bad code of a frame with its reason, for diagnosis off the tick path.
-    pub fn channel_faults(&self, frame: &RawFrame) -> impl Iterator<Item = ChannelFault> + use<> {
-        let hall_window = self.constants.hall_window;
-        let capacitive_window = self.constants.capacitive_window;
+    pub fn channel_faults(&self, frame: &RawFrame) -> impl Iterator<Item = ChannelFault> + use<T> {
+        let (hall_window, capacitive_window) = (self.hall_window, self.capacitive_window);
         let hall = (0u8..).zip(frame.hall).filter_map(move |(probe, code)| {
             let fault = hall_window.check(code).err()?;
             Some(ChannelFault::Hall { probe, fault })

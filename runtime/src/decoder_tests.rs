@@ -2,24 +2,40 @@
 
 use super::*;
 use crate::calibration::Calibration;
-use crate::frame::MISSING_CODE;
+use crate::frame::{CodeFault, MISSING_CODE};
+use crate::model::Sensitivity;
 use crate::sample;
 
 pub(super) const HALL: [i32; 3] = [1200, 900, 700];
 pub(super) const CAPACITIVE: [i32; 3] = [300, -200, 100];
 
-pub(super) fn decoder() -> Decoder {
-    sample::parameters().decoder()
+type Linear = Decoder<LinearModel>;
+
+pub(super) fn decoder() -> Linear {
+    let AnyDecoder::Linear(decoder) = sample::parameters().decoder();
+    decoder
 }
 
-pub(super) fn changed(change: impl FnOnce(&mut DecoderConstants<f32>)) -> Decoder {
-    let mut constants = *decoder().constants();
-    change(&mut constants);
-    Decoder::new(constants)
+/// The sample's decoder with something changed in its constants or coefficients.
+pub(super) fn changed(
+    change: impl FnOnce(&mut DecoderConstants<f32>, &mut [Sensitivity<f32>; 3]),
+) -> Linear {
+    let (mut constants, mut probes) = (*decoder().constants(), *decoder().probes());
+    change(&mut constants, &mut probes);
+    Decoder::new(constants, probes)
 }
 
-pub(super) fn decode(decoder: &Decoder, hall: [i32; 3], capacitive: [i32; 3]) -> Reading {
-    decoder.decode(hall, capacitive, &PlanarPose::ZERO)
+pub(super) fn frame(hall: [i32; 3], capacitive: [i32; 3]) -> RawFrame {
+    RawFrame {
+        hall,
+        capacitive,
+        sequence: 0,
+        time_us: 0,
+    }
+}
+
+pub(super) fn decode(decoder: &Linear, hall: [i32; 3], capacitive: [i32; 3]) -> Reading {
+    decoder.decode(&frame(hall, capacitive), &PlanarPose::ZERO)
 }
 
 pub(super) fn words(reading: &Reading) -> [u32; 7] {
@@ -91,14 +107,14 @@ fn a_sensitivity_too_near_zero_sets_its_bit_and_takes_x_y_and_rz() {
             f32::INFINITY,
             f32::NEG_INFINITY,
         ] {
-            let decoder = changed(|c| c.sensitivity[probe] = Sensitivity::constant(eta));
+            let decoder = changed(|_, probes| probes[probe] = Sensitivity::constant(eta));
             let status = decode(&decoder, HALL, CAPACITIVE).status;
             let bit = Status::SENSITIVITY_A.bits() << probe;
             assert_eq!(status.bits() & Status::SENSITIVITY.bits(), bit, "eta {eta}");
             assert!(status.any(Status::PLANAR_INVALID) && !status.any(Status::VERTICAL_INVALID));
         }
         for eta in [0.1, -0.1, 1e30] {
-            let decoder = changed(|c| c.sensitivity[probe] = Sensitivity::constant(eta));
+            let decoder = changed(|_, probes| probes[probe] = Sensitivity::constant(eta));
             assert!(
                 !decode(&decoder, HALL, CAPACITIVE)
                     .status
@@ -112,12 +128,12 @@ fn a_sensitivity_too_near_zero_sets_its_bit_and_takes_x_y_and_rz() {
 #[test]
 fn results_that_are_not_finite_are_marked_and_zero() {
     for axis in 0..3 {
-        let decoder = changed(|c| c.planar_per_code[axis][1] = f32::MAX);
+        let decoder = changed(|c, _| c.planar_per_code[axis][1] = f32::MAX);
         let reading = decode(&decoder, HALL, CAPACITIVE);
         assert!(reading.status.any(Status::PLANAR_NOT_FINITE));
         assert_eq!(reading.pose.planar, PlanarPose::ZERO);
         assert!(reading.vertical().is_some());
-        let decoder = changed(|c| c.vertical_per_code[axis][1] = f32::NEG_INFINITY);
+        let decoder = changed(|c, _| c.vertical_per_code[axis][1] = f32::NEG_INFINITY);
         let reading = decode(&decoder, HALL, CAPACITIVE);
         assert!(reading.status.any(Status::VERTICAL_NOT_FINITE));
         assert_eq!(reading.pose, Pose::default());
@@ -127,7 +143,7 @@ fn results_that_are_not_finite_are_marked_and_zero() {
         y_m: f32::NAN,
         rz_rad: 0.0,
     };
-    let reading = decoder().decode(HALL, CAPACITIVE, &zero);
+    let reading = decoder().decode(&frame(HALL, CAPACITIVE), &zero);
     assert!(reading.status.any(Status::PLANAR_NOT_FINITE));
 }
 
@@ -148,7 +164,7 @@ fn a_pose_outside_the_calibrated_range_is_marked_and_given() {
         ] {
             let planar = bit == Status::PLANAR_EXTRAPOLATED;
             let limited = |limit: f32| {
-                changed(|c| {
+                changed(|c, _| {
                     let limits = if planar {
                         &mut c.calibrated_planar
                     } else {
@@ -189,7 +205,7 @@ fn the_zero_deviation_is_taken_off() {
     };
     let plain = decode(&decoder(), HALL, CAPACITIVE).pose.planar.to_array();
     let less = decoder()
-        .decode(HALL, CAPACITIVE, &zero)
+        .decode(&frame(HALL, CAPACITIVE), &zero)
         .pose
         .planar
         .to_array();
@@ -206,7 +222,7 @@ fn channel_faults_name_channel_and_reason() {
         sequence: 0,
         time_us: 0,
     };
-    let mut faults = decoder().channel_faults(&frame);
+    let mut faults = decoder().constants().channel_faults(&frame);
     let fault = CodeFault::Missing;
     assert_eq!(faults.next(), Some(ChannelFault::Hall { probe: 1, fault }));
     let fault = CodeFault::AboveWindow {
@@ -236,12 +252,13 @@ fn f32_follows_f64_over_the_range_of_motion() {
                 let capacitive = [b, c, a].map(|code: i32| code * 4 / 5);
                 let reading = decode(&decoder, hall, capacitive);
                 let v = vertical_pose(&exact.vertical_per_code, capacitive.map(f64::from));
-                let phi = exact.sensitivity.map(|s| sensitivity_at(&s, &v));
                 if !reading.status.is_good() {
                     continue;
                 }
                 let hall = hall.map(f64::from);
-                let q = planar_pose(&exact.planar_per_code, hall, phi, &PlanarPose::ZERO);
+                let rows = &exact.planar_per_code;
+                let zero = PlanarPose::ZERO;
+                let (_, q) = calibration.probes.planar_pose(rows, hall, &v, &zero);
                 let off = |have: f32, want: f64| (f64::from(have) - want).abs();
                 let (p, w) = (reading.pose.planar, reading.pose.vertical);
                 worst_m = worst_m

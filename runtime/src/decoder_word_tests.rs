@@ -1,18 +1,19 @@
 //! The tick beside plain comparisons, over any words as parameters.
 
-use super::tests::{CAPACITIVE, HALL, changed, decode, decoder, words};
+use super::tests::{CAPACITIVE, HALL, changed, decode, decoder, frame, words};
 use super::*;
+use crate::model::{Sensitivity, planar_pose, sensitivity_at};
 
 /// What the table of [`Status`] says, by plain comparisons.
 fn expected(
-    decoder: &Decoder,
+    decoder: &Decoder<LinearModel>,
     hall: [i32; 3],
     capacitive: [i32; 3],
     zero: &PlanarPose<f32>,
 ) -> Reading {
     let c = decoder.constants();
     let v = vertical_pose(&c.vertical_per_code, capacitive.map(|code| code as f32));
-    let phi = c.sensitivity.map(|s| sensitivity_at(&s, &v));
+    let phi = decoder.probes().map(|s| sensitivity_at(&s, &v));
     let q = planar_pose(&c.planar_per_code, hall.map(|code| code as f32), phi, zero);
     let not_finite = |x: &f32| !x.is_finite();
     let beyond = |x: [f32; 3], limits: [f32; 3]| {
@@ -97,7 +98,7 @@ impl Words {
 fn any_words_as_parameters_give_defined_poses() {
     let mut w = Words(0x2545_f491);
     for round in 0..20_000 {
-        let decoder = changed(|c| {
+        let decoder = changed(|c, probes| {
             for _ in 0..1 + round % 5 {
                 match w.next() % 6 {
                     0 => c.vertical_per_code[round % 3] = w.odd3(),
@@ -113,7 +114,7 @@ fn any_words_as_parameters_give_defined_poses() {
                             per_rx_rad,
                             per_ry_rad: w.odd(),
                         };
-                        c.sensitivity[round % 3] = s;
+                        probes[round % 3] = s;
                     }
                 }
             }
@@ -135,7 +136,7 @@ fn any_words_as_parameters_give_defined_poses() {
         };
         let hall = [codes(&mut w), codes(&mut w), codes(&mut w)];
         let capacitive = [codes(&mut w), codes(&mut w), codes(&mut w)];
-        let reading = decoder.decode(hall, capacitive, &zero);
+        let reading = decoder.decode(&frame(hall, capacitive), &zero);
         let want = expected(&decoder, hall, capacitive, &zero);
         assert_eq!(
             words(&reading),

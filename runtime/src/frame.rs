@@ -29,13 +29,32 @@ pub struct RawFrame {
 ///
 /// The narrowest sensible window leaves out the converter's two end codes, since a
 /// saturated converter gives those for every larger signal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(C)]
 pub struct CodeWindow {
     /// Smallest accepted code.
     pub low: i32,
     /// Largest accepted code.
     pub high: i32,
+}
+
+/// A code of a frame that is not decoded: its channel, and why.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChannelFault {
+    /// A Hall probe, 0 to 2 for A to C.
+    Hall {
+        /// Which probe.
+        probe: u8,
+        /// What is wrong.
+        fault: CodeFault,
+    },
+    /// A capacitive sensor, 0 to 2 for gaps 1 to 3.
+    Capacitive {
+        /// Which gap.
+        gap: u8,
+        /// What is wrong.
+        fault: CodeFault,
+    },
 }
 
 /// Why a code is not decoded.

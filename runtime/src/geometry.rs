@@ -1,10 +1,18 @@
 //! Where the Hall probes sit and how they are turned: the plane matrix PM (equations 11, 32).
 //!
+//! A probe at p that senses along the unit vector u reads u . (q + Rz x p) for a motion
+//! q = (X, Y) and a small Rz. So a row of PM is u and the lever arm u_y p_x - u_x p_y. Aligned,
+//! A and B sense +Y and C senses +X; a misalignment turns them counterclockwise.
+//!
 //! The six coordinates enter PM only through three lever arms, its third column. `H1x` and
 //! `H1y` cannot be told apart by any data, nor can the other pairs, so a calibration holds
 //! lever arms and misalignments; coordinates are kept only as designed values.
+//!
+//! Everything here runs on any [`Number`], so that the target's `f32`, the host's `f64` and
+//! the lanes of a SIMD register use the same functions. Sums and products are written out:
+//! closures over arrays are not always inlined, and would then go through memory.
 
-use crate::real::Real;
+use crate::real::{Number, Real};
 use nalgebra::Matrix3;
 
 /// Coordinates of the Hall probes in the stage's frame, with the paper's signs:
@@ -26,7 +34,7 @@ pub struct ProbeCoordinates<T> {
 }
 
 /// Lever arms and misalignments of the probes A, B, C: all that PM depends on.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ProbeGeometry<T> {
     /// Third column of PM: displacement along the sensing axis per rad of Rz, m.
     pub lever_arm_m: [T; 3],
@@ -34,15 +42,113 @@ pub struct ProbeGeometry<T> {
     pub misalignment_rad: [T; 3],
 }
 
-impl<T: Real> ProbeCoordinates<T> {
+/// Unit vectors (x, y) along which the probes A, B, C sense: the rows of PM without the arms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensingAxes<T>(pub [[T; 2]; 3]);
+
+impl<T: Number> SensingAxes<T> {
+    /// The axes at the given misalignments.
+    #[inline(always)]
+    pub fn at(misalignment_rad: [T; 3]) -> Self {
+        let [a, b, c] = misalignment_rad;
+        let ((sin_a, cos_a), (sin_b, cos_b), (sin_c, cos_c)) =
+            (a.sin_cos(), b.sin_cos(), c.sin_cos());
+        Self([[-sin_a, cos_a], [-sin_b, cos_b], [cos_c, sin_c]])
+    }
+
+    /// The derivative of each axis by its misalignment, per rad. It is also the unit vector
+    /// across the axis: the axis turned by a right angle.
+    #[inline(always)]
+    pub fn across(&self) -> [[T; 2]; 3] {
+        let [a, b, c] = self.0;
+        [[-a[1], a[0]], [-b[1], b[0]], [-c[1], c[0]]]
+    }
+
+    /// The derivatives of each lever arm by the two coordinates of its probe, in the order
+    /// and with the signs of [`ProbeCoordinates`]: (H1x, H1y), (H2x, H2y), (H3x, H3y).
+    #[inline(always)]
+    pub fn arm_factors(&self) -> [[T; 2]; 3] {
+        let [a, b, c] = self.0;
+        [[a[1], -a[0]], [-b[1], -b[0]], [c[1], -c[0]]]
+    }
+
+    /// Lever arms of probes at `coordinates_m` (see [`ProbeCoordinates::pairs`]): the third
+    /// column of PM (equation 11), m.
+    #[inline(always)]
+    pub fn lever_arms_m(&self, coordinates_m: [[T; 2]; 3]) -> [T; 3] {
+        let [a, b, c] = self.arm_factors();
+        let [h1, h2, h3] = coordinates_m;
+        [
+            a[0] * h1[0] + a[1] * h1[1],
+            b[0] * h2[0] + b[1] * h2[1],
+            c[0] * h3[0] + c[1] * h3[1],
+        ]
+    }
+
+    /// The rows of PM (equations 11, 32): displacement sensed by A, B, C, in m, per
+    /// (m, m, rad) of (X, Y, Rz).
+    #[inline(always)]
+    pub fn plane_rows(&self, lever_arm_m: [T; 3]) -> [[T; 3]; 3] {
+        let [a, b, c] = self.0;
+        let [arm_a, arm_b, arm_c] = lever_arm_m;
+        [
+            [a[0], a[1], arm_a],
+            [b[0], b[1], arm_b],
+            [c[0], c[1], arm_c],
+        ]
+    }
+}
+
+impl SensingAxes<f32> {
+    /// The axes that rows of PM hold, and the lever arms in them, m: the inverse of
+    /// [`SensingAxes::plane_rows`].
+    pub const fn of_rows(rows: &[[f32; 3]; 3]) -> (Self, [f32; 3]) {
+        let [[ax, ay, arm_a], [bx, by, arm_b], [cx, cy, arm_c]] = *rows;
+        (Self([[ax, ay], [bx, by], [cx, cy]]), [arm_a, arm_b, arm_c])
+    }
+
+    /// The misalignments of the axes, rad, whatever their lengths: the inverse of
+    /// [`SensingAxes::at`]. By `libm` in `f32` alone; its sine and cosine would take 7 KB of a
+    /// Cortex-M4F's flash, for they use `f64`.
+    pub fn misalignment_rad(&self) -> [f32; 3] {
+        let [a, b, c] = self.0;
+        [
+            libm::atan2f(-a[0], a[1]),
+            libm::atan2f(-b[0], b[1]),
+            libm::atan2f(c[1], c[0]),
+        ]
+    }
+}
+
+impl<T: Copy> ProbeCoordinates<T> {
+    /// The two coordinates of each probe: (H1x, H1y), (H2x, H2y), (H3x, H3y), m.
+    #[inline(always)]
+    pub fn pairs(&self) -> [[T; 2]; 3] {
+        [
+            [self.h1x_m, self.h1y_m],
+            [self.h2x_m, self.h2y_m],
+            [self.h3x_m, self.h3y_m],
+        ]
+    }
+
+    /// From the two coordinates of each probe, as [`ProbeCoordinates::pairs`] gives them, m.
+    #[inline(always)]
+    pub fn from_pairs([[h1x_m, h1y_m], [h2x_m, h2y_m], [h3x_m, h3y_m]]: [[T; 2]; 3]) -> Self {
+        Self {
+            h1x_m,
+            h1y_m,
+            h2x_m,
+            h2y_m,
+            h3x_m,
+            h3y_m,
+        }
+    }
+}
+
+impl<T: Number> ProbeCoordinates<T> {
     /// Lever arms at the given misalignments: the third column of PM (equation 11), m.
     pub fn lever_arms_m(&self, misalignment_rad: [T; 3]) -> [T; 3] {
-        let [(sin_a, cos_a), (sin_b, cos_b), (sin_c, cos_c)] = misalignment_rad.map(Real::sin_cos);
-        [
-            self.h1x_m * cos_a + self.h1y_m * sin_a,
-            self.h2y_m * sin_b - self.h2x_m * cos_b,
-            self.h3x_m * sin_c - self.h3y_m * cos_c,
-        ]
+        SensingAxes::at(misalignment_rad).lever_arms_m(self.pairs())
     }
 
     /// The geometry of probes at these coordinates, turned by `misalignment_rad`.
@@ -56,42 +162,26 @@ impl<T: Real> ProbeCoordinates<T> {
     /// The coordinates nearest to these (least sum of squared changes) that have the
     /// given geometry. They are a choice, not a measurement: see the module's text.
     pub fn nearest_with(&self, geometry: &ProbeGeometry<T>) -> Self {
-        let now = self.lever_arms_m(geometry.misalignment_rad);
-        let [(sin_a, cos_a), (sin_b, cos_b), (sin_c, cos_c)] =
-            geometry.misalignment_rad.map(Real::sin_cos);
-        let [d_a, d_b, d_c] = [
-            geometry.lever_arm_m[0] - now[0],
-            geometry.lever_arm_m[1] - now[1],
-            geometry.lever_arm_m[2] - now[2],
-        ];
-        Self {
-            h1x_m: self.h1x_m + d_a * cos_a,
-            h1y_m: self.h1y_m + d_a * sin_a,
-            h2x_m: self.h2x_m - d_b * cos_b,
-            h2y_m: self.h2y_m + d_b * sin_b,
-            h3x_m: self.h3x_m + d_c * sin_c,
-            h3y_m: self.h3y_m - d_c * cos_c,
+        let axes = SensingAxes::at(geometry.misalignment_rad);
+        let (now, factors) = (axes.lever_arms_m(self.pairs()), axes.arm_factors());
+        let mut pairs = self.pairs();
+        for (k, pair) in pairs.iter_mut().enumerate() {
+            // A step along the gradient, which has length one.
+            let step = geometry.lever_arm_m[k] - now[k];
+            *pair = [
+                pair[0] + step * factors[k][0],
+                pair[1] + step * factors[k][1],
+            ];
         }
+        Self::from_pairs(pairs)
     }
 }
 
-impl<T: Real> ProbeGeometry<T> {
+impl<T: Number> ProbeGeometry<T> {
     /// The rows of PM (equations 11, 32): displacement sensed by A, B, C, in m, per
     /// (m, m, rad) of (X, Y, Rz).
     pub fn plane_rows(&self) -> [[T; 3]; 3] {
-        let [(sin_a, cos_a), (sin_b, cos_b), (sin_c, cos_c)] =
-            self.misalignment_rad.map(Real::sin_cos);
-        let [arm_a, arm_b, arm_c] = self.lever_arm_m;
-        [
-            [-sin_a, cos_a, arm_a],
-            [-sin_b, cos_b, arm_b],
-            [cos_c, sin_c, arm_c],
-        ]
-    }
-
-    /// PM as a matrix.
-    pub fn plane_matrix(&self) -> Matrix3<T> {
-        matrix(&self.plane_rows())
+        SensingAxes::at(self.misalignment_rad).plane_rows(self.lever_arm_m)
     }
 }
 
@@ -100,26 +190,30 @@ pub fn matrix<T: Real>(rows: &[[T; 3]; 3]) -> Matrix3<T> {
     Matrix3::from_fn(|row, column| rows[row][column])
 }
 
-/// The inverse of a 3x3 matrix by its adjugate, in a written order; `None` when the
-/// determinant is zero, subnormal or not finite.
-pub fn inverse_rows<T: Real>(m: &[[T; 3]; 3]) -> Option<[[T; 3]; 3]> {
+/// The inverse of a 3x3 matrix by its adjugate, in a written order, and its determinant.
+/// Where that is zero, the inverse is not finite.
+#[inline(always)]
+pub fn inverse_and_determinant<T: Number>(m: &[[T; 3]; 3]) -> ([[T; 3]; 3], T) {
     let [[a, b, c], [d, e, f], [g, h, i]] = *m;
     let cofactor_a = e * i - f * h;
     let cofactor_b = f * g - d * i;
     let cofactor_c = d * h - e * g;
     let determinant = (a * cofactor_a + b * cofactor_b) + c * cofactor_c;
-    let size = determinant.to_f64();
-    if !size.is_finite()
-        || (-f64::from(f32::MIN_POSITIVE)..=f64::from(f32::MIN_POSITIVE)).contains(&size)
-    {
-        return None;
-    }
     let r = T::ONE / determinant;
-    Some([
+    let inverse = [
         [cofactor_a * r, (c * h - b * i) * r, (b * f - c * e) * r],
         [cofactor_b * r, (a * i - c * g) * r, (c * d - a * f) * r],
         [cofactor_c * r, (b * g - a * h) * r, (a * e - b * d) * r],
-    ])
+    ];
+    (inverse, determinant)
+}
+
+/// The inverse of a 3x3 matrix by its adjugate; `None` when the determinant is zero,
+/// subnormal (as `f32`) or not finite.
+pub fn inverse_rows<T: Real>(m: &[[T; 3]; 3]) -> Option<[[T; 3]; 3]> {
+    let (inverse, determinant) = inverse_and_determinant(m);
+    let size = determinant.to_f64().abs();
+    (size.is_finite() && size > f64::from(f32::MIN_POSITIVE)).then_some(inverse)
 }
 
 #[cfg(test)]

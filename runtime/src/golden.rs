@@ -91,6 +91,12 @@ fn the_golden_blob_reads_as_the_set_that_it_was_made_of() {
 }
 
 #[test]
+fn the_blob_of_the_examples_is_the_golden_one() {
+    let (golden, n) = golden();
+    assert_eq!(include_bytes!("../examples/stage.bin"), &golden[..n]);
+}
+
+#[test]
 fn the_layout_is_as_documented() {
     let (golden, n) = golden();
     assert_eq!(&golden[..8], b"HALL\x01\x00\x00\x00");
@@ -296,7 +302,7 @@ fn unusable_parameters_are_refused_by_their_reason() {
     };
     let group = "the sensitivities";
     assert_eq!(
-        refused(|set| set.constants.sensitivity[1].per_z_m = f32::NAN),
+        refused(|set| sample::sensitivities(set)[1].per_z_m = f32::NAN),
         ParameterError::NotFinite { group }
     );
     assert!(matches!(

@@ -1,211 +1,210 @@
 //! The order of a parameter set's values in the blob: text and counts, then all numbers in one
 //! row, then the code windows.
 //!
-//! The numbers are read and written by one loop. Code derived for each of the nested arrays
-//! would read the same bytes and take three times the flash.
+//! [`for_each_row`] is the only list of the numbers: writing, reading and the check that they
+//! are finite go through it. A number that is missing there does not compile. Numbers and hash
+//! are read by loops: code derived for each of the nested arrays would read the same bytes and
+//! take three times the flash.
 
 use crate::decoder::DecoderConstants;
 use crate::frame::CodeWindow;
 use crate::geometry::ProbeGeometry;
-use crate::model::{ModelKind, Sensitivity};
-use crate::parameters::{CapacitiveInput, FitRecord, HallInput, ParameterSet, Text};
-use core::fmt;
-use serde::de::{Error, SeqAccess, Visitor};
-use serde::ser::SerializeTuple;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use crate::model::{ModelKind, Probes, Sensitivity};
+use crate::parameters::{
+    CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
+};
+use core::slice;
+use serde::{Deserialize, Serialize};
 
-/// Numbers of a parameter set.
-const NUMBERS: usize = 78;
-
-/// The groups of numbers in their order, each with the number of the first after it.
-pub(crate) const GROUPS: [(&str, usize); 12] = [
-    ("the fit record", 6),
-    ("the probe geometry", 12),
-    ("PM", 21),
-    ("PM^-1", 30),
-    ("the scale of the Hall codes", 31),
-    ("the capacitive plane matrix", 40),
-    ("the scale of the capacitive codes", 41),
-    ("the vertical constants", 50),
-    ("the sensitivities", 62),
-    ("the planar constants", 71),
-    ("the calibrated range", 77),
-    ("the smallest sensitivity", NUMBERS),
-];
-
-/// All numbers of a set, in a row.
-pub(crate) struct Numbers(pub(crate) [f32; NUMBERS]);
-
-/// A set in the order of the blob.
+/// What stands before the hash of the logs.
 #[derive(Serialize, Deserialize)]
-pub(crate) struct Layout {
+struct Head {
+    /// The tag: which model was fitted, and so which coefficients a probe has.
     model: ModelKind,
     serial: Text,
     created: Text,
-    logs_sha256: [u8; 32],
-    rows: u32,
-    train_rows: u32,
-    pub(crate) numbers: Numbers,
-    hall_window: CodeWindow,
-    capacitive_window: CodeWindow,
 }
 
-impl Serialize for Numbers {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut tuple = serializer.serialize_tuple(NUMBERS)?;
-        for number in &self.0 {
-            tuple.serialize_element(number)?;
-        }
-        tuple.end()
-    }
-}
+/// What stands between the hash and the numbers: how many rows there are and were fitted.
+type Rows = (u32, u32);
 
-impl<'de> Deserialize<'de> for Numbers {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Row;
-        impl<'de> Visitor<'de> for Row {
-            type Value = Numbers;
+/// What stands after the numbers: the windows of the Hall and of the capacitive codes.
+type Windows = (CodeWindow, CodeWindow);
 
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the numbers of a parameter set")
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, mut row: A) -> Result<Numbers, A::Error> {
-                let mut numbers = Numbers([0.0; NUMBERS]);
-                for (found, number) in numbers.0.iter_mut().enumerate() {
-                    *number =
-                        (row.next_element()?).ok_or_else(|| Error::invalid_length(found, &self))?;
+/// Visits the numbers of a set in the order of the blob, row by row, with the name of the
+/// group that each row belongs to.
+#[inline(never)]
+fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut [f32])) {
+    // Each field is named, so that none is forgotten.
+    let ParameterSet {
+        model: _,
+        serial: _,
+        created: _,
+        logs_sha256: _,
+        fit,
+        geometry,
+        plane,
+        plane_inverse,
+        hall: HallInput { m_per_code },
+        capacitive,
+        probes,
+        constants,
+    } = set;
+    let FitRecord {
+        rows: _,
+        train_rows: _,
+        rms,
+        peak,
+    } = fit;
+    visit("the fit record", rms);
+    visit("the fit record", peak);
+    let ProbeGeometry {
+        lever_arm_m,
+        misalignment_rad,
+    } = geometry;
+    visit("the probe geometry", lever_arm_m);
+    visit("the probe geometry", misalignment_rad);
+    visit("PM", plane.as_flattened_mut());
+    visit("PM^-1", plane_inverse.as_flattened_mut());
+    visit("the scale of the Hall codes", slice::from_mut(m_per_code));
+    let CapacitiveInput {
+        vertical_per_m,
+        m_per_code,
+    } = capacitive;
+    visit(
+        "the capacitive plane matrix",
+        vertical_per_m.as_flattened_mut(),
+    );
+    visit(
+        "the scale of the capacitive codes",
+        slice::from_mut(m_per_code),
+    );
+    let DecoderConstants {
+        vertical_per_code,
+        planar_per_code,
+        calibrated_vertical,
+        calibrated_planar,
+        sensitivity_min,
+        hall_window: _,
+        capacitive_window: _,
+    } = constants;
+    visit(
+        "the vertical constants",
+        vertical_per_code.as_flattened_mut(),
+    );
+    match probes {
+        Probes::Linear(probes) => {
+            for Sensitivity {
+                eta,
+                per_z_m,
+                per_rx_rad,
+                per_ry_rad,
+            } in probes
+            {
+                for number in [eta, per_z_m, per_rx_rad, per_ry_rad] {
+                    visit("the sensitivities", slice::from_mut(number));
                 }
-                Ok(numbers)
             }
         }
-        deserializer.deserialize_tuple(NUMBERS, Row)
     }
+    visit("the planar constants", planar_per_code.as_flattened_mut());
+    visit("the calibrated range", calibrated_vertical);
+    visit("the calibrated range", calibrated_planar);
+    visit("the smallest sensitivity", slice::from_mut(sensitivity_min));
 }
 
-impl Numbers {
-    /// The numbers of a set.
-    pub(crate) fn of(set: &ParameterSet) -> Self {
-        let mut numbers = Self([0.0; NUMBERS]);
-        let mut rest = numbers.0.as_mut_slice();
-        let mut put = |from: &[f32]| {
-            let here = core::mem::take(&mut rest);
-            let Some((to, behind)) = here.split_at_mut_checked(from.len()) else {
-                return;
-            };
-            to.copy_from_slice(from);
-            rest = behind;
-        };
-        let c = &set.constants;
-        put(&set.fit.rms);
-        put(&set.fit.peak);
-        put(&set.geometry.lever_arm_m);
-        put(&set.geometry.misalignment_rad);
-        put(set.plane.as_flattened());
-        put(set.plane_inverse.as_flattened());
-        put(&[set.hall.m_per_code]);
-        put(set.capacitive.vertical_per_m.as_flattened());
-        put(&[set.capacitive.m_per_code]);
-        put(c.vertical_per_code.as_flattened());
-        for s in &c.sensitivity {
-            put(&[s.eta, s.per_z_m, s.per_rx_rad, s.per_ry_rad]);
+/// Writes the payload of a set and gives its length; `None` if `room` is too small.
+pub(crate) fn write(set: &ParameterSet, room: &mut [u8]) -> Option<usize> {
+    let head = Head {
+        model: set.model,
+        serial: set.serial.clone(),
+        created: set.created.clone(),
+    };
+    let rows: Rows = (set.fit.rows, set.fit.train_rows);
+    let windows: Windows = (set.constants.hall_window, set.constants.capacitive_window);
+    let mut out = Out { room, length: 0 };
+    out.put(&head)?;
+    for byte in &set.logs_sha256 {
+        out.put(byte)?;
+    }
+    out.put(&rows)?;
+    let mut fits = Some(());
+    for_each_row(&mut set.clone(), &mut |_, row| {
+        for number in row {
+            fits = fits.and_then(|()| out.put(number));
         }
-        put(c.planar_per_code.as_flattened());
-        put(&c.calibrated_vertical);
-        put(&c.calibrated_planar);
-        put(&[c.sensitivity_min]);
-        numbers
+    });
+    fits?;
+    out.put(&windows)?;
+    Some(out.length)
+}
+
+/// Values in postcard, one after the other.
+struct Out<'r> {
+    room: &'r mut [u8],
+    length: usize,
+}
+
+impl Out<'_> {
+    fn put(&mut self, value: &impl Serialize) -> Option<()> {
+        let room = self.room.get_mut(self.length..)?;
+        self.length += postcard::to_slice(value, room).ok()?.len();
+        Some(())
     }
 }
 
-/// The next `N` numbers of a row.
-fn next<const N: usize>(rest: &mut &[f32]) -> [f32; N] {
-    match rest.split_first_chunk() {
-        Some((numbers, behind)) => {
-            *rest = behind;
-            *numbers
+/// Reads a payload, which must end where the set does; `None` if it is none.
+pub(crate) fn read(payload: &[u8]) -> Option<ParameterSet> {
+    let (head, rest) = postcard::take_from_bytes::<Head>(payload).ok()?;
+    let (&logs_sha256, rest) = rest.split_first_chunk()?;
+    let ((rows, train_rows), mut rest) = postcard::take_from_bytes::<Rows>(rest).ok()?;
+    // Zeros where the numbers go.
+    let mut set = ParameterSet {
+        model: head.model,
+        serial: head.serial,
+        created: head.created,
+        logs_sha256,
+        fit: FitRecord {
+            rows,
+            train_rows,
+            ..FitRecord::default()
+        },
+        geometry: ProbeGeometry::default(),
+        plane: [[0.0; 3]; 3],
+        plane_inverse: [[0.0; 3]; 3],
+        hall: HallInput::default(),
+        capacitive: CapacitiveInput::default(),
+        probes: match head.model {
+            ModelKind::M12 | ModelKind::M15 | ModelKind::M30 | ModelKind::M31 => {
+                Probes::Linear([Sensitivity::default(); 3])
+            }
+        },
+        constants: DecoderConstants::default(),
+    };
+    let mut complete = true;
+    for_each_row(&mut set, &mut |_, row| {
+        for number in row {
+            match rest.split_first_chunk() {
+                Some((bytes, behind)) => {
+                    *number = f32::from_le_bytes(*bytes);
+                    rest = behind;
+                }
+                None => complete = false,
+            }
         }
-        None => [0.0; N],
-    }
+    });
+    let (windows, rest) = postcard::take_from_bytes::<Windows>(rest).ok()?;
+    (set.constants.hall_window, set.constants.capacitive_window) = windows;
+    (complete && rest.is_empty()).then_some(set)
 }
 
-fn next_rows(rest: &mut &[f32]) -> [[f32; 3]; 3] {
-    [next(rest), next(rest), next(rest)]
-}
-
-fn next_sensitivity(rest: &mut &[f32]) -> Sensitivity<f32> {
-    let [eta, per_z_m, per_rx_rad, per_ry_rad] = next(rest);
-    Sensitivity {
-        eta,
-        per_z_m,
-        per_rx_rad,
-        per_ry_rad,
-    }
-}
-
-fn next_one(rest: &mut &[f32]) -> f32 {
-    let [number] = next(rest);
-    number
-}
-
-impl From<&ParameterSet> for Layout {
-    fn from(set: &ParameterSet) -> Self {
-        Self {
-            model: set.model,
-            serial: set.serial.clone(),
-            created: set.created.clone(),
-            logs_sha256: set.logs_sha256,
-            rows: set.fit.rows,
-            train_rows: set.fit.train_rows,
-            numbers: Numbers::of(set),
-            hall_window: set.constants.hall_window,
-            capacitive_window: set.constants.capacitive_window,
+/// Refuses a number that is not finite, by the name of its group. The set stays as it is.
+pub(crate) fn check_finite(set: &mut ParameterSet) -> Result<(), ParameterError> {
+    let mut found = Ok(());
+    for_each_row(set, &mut |group, row| {
+        if found.is_ok() && !row.iter().all(|number| number.is_finite()) {
+            found = Err(ParameterError::NotFinite { group });
         }
-    }
-}
-
-impl From<Layout> for ParameterSet {
-    fn from(layout: Layout) -> Self {
-        let rest = &mut layout.numbers.0.as_slice();
-        // Fields are evaluated in the order in which they are written: that of the row.
-        Self {
-            model: layout.model,
-            serial: layout.serial,
-            created: layout.created,
-            logs_sha256: layout.logs_sha256,
-            fit: FitRecord {
-                rows: layout.rows,
-                train_rows: layout.train_rows,
-                rms: next(rest),
-                peak: next(rest),
-            },
-            geometry: ProbeGeometry {
-                lever_arm_m: next(rest),
-                misalignment_rad: next(rest),
-            },
-            plane: next_rows(rest),
-            plane_inverse: next_rows(rest),
-            hall: HallInput {
-                m_per_code: next_one(rest),
-            },
-            capacitive: CapacitiveInput {
-                vertical_per_m: next_rows(rest),
-                m_per_code: next_one(rest),
-            },
-            constants: DecoderConstants {
-                vertical_per_code: next_rows(rest),
-                sensitivity: [
-                    next_sensitivity(rest),
-                    next_sensitivity(rest),
-                    next_sensitivity(rest),
-                ],
-                planar_per_code: next_rows(rest),
-                calibrated_vertical: next(rest),
-                calibrated_planar: next(rest),
-                sensitivity_min: next_one(rest),
-                hall_window: layout.hall_window,
-                capacitive_window: layout.capacitive_window,
-            },
-        }
-    }
+    });
+    found
 }

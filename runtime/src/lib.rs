@@ -5,15 +5,17 @@
 //! one way, one type a step:
 //!
 //! ```text
-//! RawFrame --Decoder::decode--> Reading (Pose + Status) --Servo::tick--> Reading, Health
-//!     parameters: ParameterSet::from_bytes, checked once, then borrowed read-only
+//! bytes --ParameterSet::from_bytes--> ParameterSet --decoder--> AnyDecoder, a &dyn Decode
+//!     once, at start: checked, its model chosen, then borrowed read-only
+//! RawFrame --Decode::decode--> Reading (Pose + Status) --Servo::tick--> Reading, Health
+//!     every servo period
 //! ```
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`pose`] | the pose, its frame and its signs (one drawing) |
 //! | [`geometry`] | lever arms, misalignments and the plane matrix PM (equations 11, 32) |
-//! | [`model`] | Models (12), (15), (30) and (31), for `f32` and `f64` |
+//! | [`model`] | what a model is; Models (12), (15), (30) and (31), for `f32` and `f64` |
 //! | [`capacitive`] | three gaps to Z, Rx, Ry and back |
 //! | [`frame`] | codes as the converters gave them, and what makes a code bad |
 //! | [`status`] | the documented bit mask that goes with every pose |
@@ -23,7 +25,7 @@
 //! | [`rezero`] | the zero deviation measured at rest |
 //! | [`parameters`], [`blob`] | the parameter set, and its bytes in flash |
 //! | [`arithmetic`] | the check at start-up that this machine rounds as the host does |
-//! | [`real`] | the operations that a number must have to run the model |
+//! | [`real`] | the operations that a number must have to run a model |
 //!
 //! Symbols of the paper and the names here:
 //!
@@ -39,14 +41,12 @@
 //! | phi_A, phi_B, phi_C | sensitivity at a vertical pose | 1 |
 //! | delta_A, delta_B, delta_C | zero deviation | m |
 #![no_std]
-#![deny(unsafe_code)]
+#![forbid(unsafe_code)]
 
 pub mod arithmetic;
 pub mod blob;
 pub mod calibration;
 pub mod capacitive;
-#[allow(unsafe_code)] // a few instructions that compilers don't find; see its text
-mod checks;
 pub mod decoder;
 pub mod frame;
 pub mod geometry;
@@ -64,9 +64,9 @@ pub mod status;
 
 pub use blob::BlobError;
 pub use calibration::Calibration;
-pub use decoder::{Decoder, Reading};
+pub use decoder::{AnyDecoder, Decode, Decoder, Reading};
 pub use frame::RawFrame;
-pub use model::ModelKind;
+pub use model::{LinearModel, Model, ModelKind};
 pub use parameters::ParameterSet;
 pub use pose::{PlanarPose, Pose, VerticalPose};
 pub use servo::{OnInvalid, Servo};

@@ -1,4 +1,10 @@
-//! The measurement models of the paper, in one place, for any [`Real`] number.
+//! What a measurement model is, and the models of the paper.
+//!
+//! A [`Model`] is a type: what it knows of a probe, and the planar pose of one tick. The
+//! paper's models are one of them, [`LinearModel`]; another one is another type, which a
+//! [`Decoder`](crate::Decoder) runs without a choice in the tick. Two enums name every model
+//! that a parameter set can hold: [`ModelKind`] says what was fitted, [`Probes`] holds what
+//! was found.
 //!
 //! With s the displacement read by a probe (designed scale), v = (Z, Rx, Ry) the vertical
 //! pose and delta the zero deviation of a movement:
@@ -18,10 +24,32 @@
 //! are the arithmetic of the target, to the bit.
 
 use crate::pose::{PlanarPose, VerticalPose};
-use crate::real::Real;
+use crate::real::{Number, Real};
+use core::fmt::Debug;
 use serde::{Deserialize, Serialize};
 
-/// Which of the paper's models a calibration belongs to.
+/// A measurement model: how three Hall signals and a vertical pose become a planar pose.
+pub trait Model: Copy + Debug + PartialEq + 'static {
+    /// The coefficients of one probe.
+    type Probe<T: Real>: Copy + Debug + PartialEq + Send + Sync;
+
+    /// The sensitivities phi of the probes A, B, C at a vertical pose, and the planar pose
+    /// less `zero`.
+    ///
+    /// `pose_rows` are the rows X, Y, Rz of PM^-1 with the scale of `signal` in them, and
+    /// `zero` is the zero deviation as a pose. To be straight-line code, the same
+    /// instructions for every input: it is the heart of a tick. A phi near zero, or a result
+    /// that is not finite, is the caller's to judge.
+    fn planar_pose<T: Real>(
+        probes: &[Self::Probe<T>; 3],
+        pose_rows: &[[T; 3]; 3],
+        signal: [T; 3],
+        vertical: &VerticalPose<T>,
+        zero: &PlanarPose<T>,
+    ) -> ([T; 3], PlanarPose<T>);
+}
+
+/// Which model was fitted.
 ///
 /// The order is part of the blob's layout: add new kinds at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -63,8 +91,73 @@ impl ModelKind {
     }
 }
 
-/// Sensitivity of one probe and its change with the vertical pose (equation 33).
+/// The coefficients of the three probes, by the model that they belong to.
 #[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Probes<T> {
+    /// Models (12), (15), (30) and (31): see [`LinearModel`].
+    Linear([Sensitivity<T>; 3]),
+}
+
+impl<T: Real> Probes<T> {
+    /// [`Model::planar_pose`] of the model that the coefficients belong to: for tools. A tick
+    /// does not choose its model, see [`crate::decoder::AnyDecoder`].
+    pub fn planar_pose(
+        &self,
+        pose_rows: &[[T; 3]; 3],
+        signal: [T; 3],
+        vertical: &VerticalPose<T>,
+        zero: &PlanarPose<T>,
+    ) -> ([T; 3], PlanarPose<T>) {
+        match self {
+            Self::Linear(probes) => {
+                LinearModel::planar_pose(probes, pose_rows, signal, vertical, zero)
+            }
+        }
+    }
+
+    /// The sensitivities at the zero of the vertical pose.
+    pub fn eta(&self) -> [T; 3] {
+        match self {
+            Self::Linear([a, b, c]) => [a.eta, b.eta, c.eta],
+        }
+    }
+
+    /// Each coefficient as another type of number, rounded to the nearest.
+    #[must_use]
+    pub fn rounded<U: Real>(&self) -> Probes<U> {
+        match self {
+            Self::Linear(probes) => Probes::Linear(probes.map(|probe| probe.rounded())),
+        }
+    }
+}
+
+/// Models (12), (15), (30) and (31): phi is linear in the vertical pose (equation 33), and
+/// the pose is linear in signal / phi.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LinearModel {}
+
+impl Model for LinearModel {
+    type Probe<T: Real> = Sensitivity<T>;
+
+    #[inline(always)]
+    fn planar_pose<T: Real>(
+        probes: &[Sensitivity<T>; 3],
+        pose_rows: &[[T; 3]; 3],
+        signal: [T; 3],
+        vertical: &VerticalPose<T>,
+        zero: &PlanarPose<T>,
+    ) -> ([T; 3], PlanarPose<T>) {
+        let phi = [
+            sensitivity_at(&probes[0], vertical),
+            sensitivity_at(&probes[1], vertical),
+            sensitivity_at(&probes[2], vertical),
+        ];
+        (phi, planar_pose(pose_rows, signal, phi, zero))
+    }
+}
+
+/// Sensitivity of one probe and its change with the vertical pose (equation 33).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct Sensitivity<T> {
     /// eta: sensitivity at the zero of the vertical pose, relative to the designed one.
@@ -77,7 +170,7 @@ pub struct Sensitivity<T> {
     pub per_ry_rad: T,
 }
 
-impl<T: Real> Sensitivity<T> {
+impl<T: Number> Sensitivity<T> {
     /// A sensitivity that does not depend on the vertical pose (Models (15), (30)).
     pub const fn constant(eta: T) -> Self {
         Self {
@@ -89,22 +182,36 @@ impl<T: Real> Sensitivity<T> {
     }
 }
 
+impl<T: Real> Sensitivity<T> {
+    /// Each coefficient as another type of number, rounded to the nearest.
+    #[must_use]
+    pub fn rounded<U: Real>(&self) -> Sensitivity<U> {
+        let round = |x: T| U::from_f64(x.to_f64());
+        Sensitivity {
+            eta: round(self.eta),
+            per_z_m: round(self.per_z_m),
+            per_rx_rad: round(self.per_rx_rad),
+            per_ry_rad: round(self.per_ry_rad),
+        }
+    }
+}
+
 /// The product of a row and a column of three, summed from the left.
 #[inline(always)]
-pub fn dot<T: Real>(row: &[T; 3], column: [T; 3]) -> T {
+pub fn dot<T: Number>(row: &[T; 3], column: [T; 3]) -> T {
     (row[0] * column[0] + row[1] * column[1]) + row[2] * column[2]
 }
 
 /// As [`dot`], less `offset`, which is subtracted from the first product: a core with a
 /// multiply-and-subtract does both in one instruction.
 #[inline(always)]
-pub fn dot_less<T: Real>(row: &[T; 3], column: [T; 3], offset: T) -> T {
+pub fn dot_less<T: Number>(row: &[T; 3], column: [T; 3], offset: T) -> T {
     ((row[0] * column[0] - offset) + row[1] * column[1]) + row[2] * column[2]
 }
 
 /// phi: sensitivity of one probe at a vertical pose (equation 33).
 #[inline(always)]
-pub fn sensitivity_at<T: Real>(probe: &Sensitivity<T>, vertical: &VerticalPose<T>) -> T {
+pub fn sensitivity_at<T: Number>(probe: &Sensitivity<T>, vertical: &VerticalPose<T>) -> T {
     ((probe.eta + probe.per_z_m * vertical.z_m) + probe.per_rx_rad * vertical.rx_rad)
         + probe.per_ry_rad * vertical.ry_rad
 }
@@ -114,7 +221,7 @@ pub fn sensitivity_at<T: Real>(probe: &Sensitivity<T>, vertical: &VerticalPose<T
 ///
 /// `zero` is the zero deviation as a pose, PM^-1 (delta / eta); see [`zero_pose`].
 #[inline(always)]
-pub fn planar_pose<T: Real>(
+pub fn planar_pose<T: Number>(
     pose_rows: &[[T; 3]; 3],
     signal: [T; 3],
     phi: [T; 3],
@@ -130,7 +237,7 @@ pub fn planar_pose<T: Real>(
 
 /// The zero deviation `delta_m` of the probes as a pose: PM^-1 (delta / eta), the last
 /// term of equation 31.
-pub fn zero_pose<T: Real>(
+pub fn zero_pose<T: Number>(
     plane_inverse_rows: &[[T; 3]; 3],
     eta: [T; 3],
     delta_m: [T; 3],
@@ -140,7 +247,7 @@ pub fn zero_pose<T: Real>(
 
 /// The zero deviation delta = eta * (PM o), in m at each probe, of a pose offset o:
 /// the inverse of [`zero_pose`].
-pub fn zero_deviation_m<T: Real>(
+pub fn zero_deviation_m<T: Number>(
     plane_rows: &[[T; 3]; 3],
     eta: [T; 3],
     offset: &PlanarPose<T>,
@@ -155,7 +262,7 @@ pub fn zero_deviation_m<T: Real>(
 
 /// The forward model: the displacement that each probe reads at a pose, in m,
 /// s = phi(v) (PM q + delta / eta). The inverse of Model (31).
-pub fn probe_displacement_m<T: Real>(
+pub fn probe_displacement_m<T: Number>(
     plane_rows: &[[T; 3]; 3],
     sensitivity: &[Sensitivity<T>; 3],
     planar: &PlanarPose<T>,

@@ -1,10 +1,9 @@
 //! The parameter set of one stage, as it lies in the blob, and the checks that it must pass.
 
-use crate::decoder::{Decoder, DecoderConstants};
-use crate::geometry::{ProbeGeometry, matrix};
-use crate::model::ModelKind;
+use crate::decoder::{AnyDecoder, Decoder, DecoderConstants};
+use crate::geometry::ProbeGeometry;
+use crate::model::{ModelKind, Probes};
 use heapless::String;
-use nalgebra::Matrix3;
 
 /// A short text of a parameter set: at most 32 bytes of UTF-8.
 pub type Text = String<32>;
@@ -13,6 +12,19 @@ pub type Text = String<32>;
 ///
 /// The order of the fields is that of the blob (see [`crate::blob`]), where the code windows
 /// come last and the counts before the numbers.
+///
+/// ```
+/// use runtime::{ParameterSet, PlanarPose, RawFrame};
+/// # const BLOB: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/stage.bin"));
+/// # fn main() -> Result<(), runtime::BlobError> {
+/// let set = ParameterSet::from_bytes(BLOB)?; // or `from_flash`, where padding follows
+/// set.expect_serial("HS-0007")?;
+/// let frame = RawFrame { hall: [1200, 900, 700], capacitive: [300, -200, 100], sequence: 0, time_us: 0 };
+/// let reading = set.decoder().decode(&frame, &PlanarPose::ZERO);
+/// assert!(reading.status.is_good());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterSet {
     /// Which model was fitted.
@@ -35,19 +47,21 @@ pub struct ParameterSet {
     pub hall: HallInput,
     /// Scale and geometry of the capacitive codes.
     pub capacitive: CapacitiveInput,
-    /// What the tick reads: the terms above, combined.
+    /// The model's coefficients of the probes A, B, C.
+    pub probes: Probes<f32>,
+    /// The other numbers that the tick reads: the terms above, combined.
     pub constants: DecoderConstants<f32>,
 }
 
 /// How Hall codes become displacements at the designed sensitivity.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HallInput {
     /// Displacement per code, m.
     pub m_per_code: f32,
 }
 
 /// How capacitive codes become the vertical pose.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CapacitiveInput {
     /// Rows Z, Rx, Ry of the plane matrix: m, rad, rad per m of gap change.
     pub vertical_per_m: [[f32; 3]; 3],
@@ -144,25 +158,11 @@ impl core::fmt::Display for ParameterError {
 impl core::error::Error for ParameterError {}
 
 impl ParameterSet {
-    /// A decoder with this set's constants.
-    pub const fn decoder(&self) -> Decoder {
-        Decoder::new(self.constants)
-    }
-
-    /// PM as a matrix.
-    pub fn plane_matrix(&self) -> Matrix3<f32> {
-        matrix(&self.plane)
-    }
-
-    /// PM^-1 as a matrix.
-    pub fn plane_inverse_matrix(&self) -> Matrix3<f32> {
-        matrix(&self.plane_inverse)
-    }
-
-    /// eta of the probes A, B, C.
-    pub const fn eta(&self) -> [f32; 3] {
-        let [a, b, c] = &self.constants.sensitivity;
-        [a.eta, b.eta, c.eta]
+    /// The decoder of this set, of its model.
+    pub const fn decoder(&self) -> AnyDecoder {
+        match self.probes {
+            Probes::Linear(probes) => AnyDecoder::Linear(Decoder::new(self.constants, probes)),
+        }
     }
 }
 
@@ -178,11 +178,11 @@ mod tests {
         set.constants.calibrated_vertical = [250e-6, 0.0, 0.0];
         for (probe, sensitivity) in (0u8..).zip([0, 1, 2]) {
             let mut set = set.clone();
-            let s = &mut set.constants.sensitivity[sensitivity];
+            let s = &mut sample::sensitivities(&mut set)[sensitivity];
             s.eta = 0.85;
             s.per_z_m = 2900.0;
             assert_eq!(set.check(), Ok(()));
-            set.constants.sensitivity[sensitivity].per_z_m = 3100.0;
+            sample::sensitivities(&mut set)[sensitivity].per_z_m = 3100.0;
             assert_eq!(set.check(), Err(ParameterError::PoleInRange { probe }));
         }
     }

@@ -16,8 +16,7 @@
 //! displacement from there. Positions are given for the stage of `stage.toml`: the true
 //! probe positions are what a calibration finds.
 
-use crate::real::Real;
-use nalgebra::Vector3;
+use crate::real::Number;
 
 /// Motion in the plane, by the Hall probes: X and Y in m, Rz in rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -53,7 +52,7 @@ pub struct Pose {
     pub vertical: VerticalPose<f32>,
 }
 
-impl<T: Real> PlanarPose<T> {
+impl<T: Number> PlanarPose<T> {
     /// No displacement.
     pub const ZERO: Self = Self {
         x_m: T::ZERO,
@@ -70,14 +69,9 @@ impl<T: Real> PlanarPose<T> {
     pub fn from_array([x_m, y_m, rz_rad]: [T; 3]) -> Self {
         Self { x_m, y_m, rz_rad }
     }
-
-    /// (X, Y, Rz) as a column vector, in m, m, rad.
-    pub fn to_vector(self) -> Vector3<T> {
-        Vector3::from(self.to_array())
-    }
 }
 
-impl<T: Real> VerticalPose<T> {
+impl<T: Number> VerticalPose<T> {
     /// No displacement.
     pub const ZERO: Self = Self {
         z_m: T::ZERO,
@@ -97,10 +91,5 @@ impl<T: Real> VerticalPose<T> {
             rx_rad,
             ry_rad,
         }
-    }
-
-    /// (Z, Rx, Ry) as a column vector, in m, rad, rad.
-    pub fn to_vector(self) -> Vector3<T> {
-        Vector3::from(self.to_array())
     }
 }

@@ -3,7 +3,7 @@
 use crate::calibration::{Calibration, Origin};
 use crate::frame::CodeWindow;
 use crate::geometry::ProbeGeometry;
-use crate::model::{ModelKind, Sensitivity};
+use crate::model::{ModelKind, Probes, Sensitivity};
 use crate::parameters::{FitRecord, ParameterSet, Text};
 
 /// Codes strictly between the rails of a 16-bit converter.
@@ -26,11 +26,11 @@ pub(crate) fn calibration() -> Calibration {
             lever_arm_m: [0.2, -0.2, -0.35],
             misalignment_rad: [0.01, -0.02, 0.03],
         },
-        sensitivity: [
+        probes: Probes::Linear([
             probe(0.87, -190.0, -70.0, 15.0),
             probe(0.7, -160.0, -57.0, -55.0),
             probe(0.86, -180.0, -63.0, 13.0),
-        ],
+        ]),
         hall_m_per_code: 6.25e-8,
         hall_window: WINDOW,
         capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
@@ -61,4 +61,10 @@ pub(crate) fn origin() -> Origin {
 /// The stage's parameter set.
 pub(crate) fn parameters() -> ParameterSet {
     calibration().prepare(&origin()).expect("a sound stage")
+}
+
+/// The stage's coefficients, to be changed.
+pub(crate) fn sensitivities(set: &mut ParameterSet) -> &mut [Sensitivity<f32>; 3] {
+    let Probes::Linear(probes) = &mut set.probes;
+    probes
 }

@@ -2,10 +2,10 @@
 //! and a re-zero in progress.
 //!
 //! [`Servo::tick`] is what a controller calls every servo period. Time is not read here:
-//! the frame carries its sequence number, and a period without a frame is told to the servo
-//! by [`Servo::tick_without_frame`].
+//! the frame carries its sequence number, and the caller reports a period without a frame by
+//! [`Servo::tick_without_frame`].
 
-use crate::decoder::{Decoder, Reading};
+use crate::decoder::{Decode, Reading};
 use crate::frame::RawFrame;
 use crate::pose::{PlanarPose, Pose, VerticalPose};
 use crate::rezero::{RezeroRefusal, RezeroRun, RezeroSettings, RezeroState};
@@ -44,10 +44,28 @@ pub struct Health {
     pub frames_repeated: u32,
 }
 
-/// Runs a borrowed decoder from tick to tick.
+/// Runs a borrowed decoder, of whatever model, from tick to tick.
+///
+/// ```
+/// use runtime::{OnInvalid, ParameterSet, RawFrame, Servo, Status};
+/// use runtime::frame::MISSING_CODE;
+/// # const BLOB: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/stage.bin"));
+/// # fn main() -> Result<(), runtime::BlobError> {
+/// let decoder = ParameterSet::from_bytes(BLOB)?.decoder();
+/// let mut servo = Servo::new(&*decoder, OnInvalid::Hold { ticks: 2 });
+/// let mut frame = RawFrame { hall: [1200, 900, 700], capacitive: [300, -200, 100], sequence: 1, time_us: 0 };
+/// let good = servo.tick(&frame);
+///
+/// (frame.hall[0], frame.sequence) = (MISSING_CODE, 2);
+/// let held = servo.tick(&frame);
+/// assert!(held.status.any(Status::PLANAR_HELD));
+/// assert_eq!((held.planar(), held.planar_or_held()), (None, good.planar()));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Servo<'d> {
-    decoder: &'d Decoder,
+    decoder: &'d dyn Decode,
     on_invalid: OnInvalid,
     zero: PlanarPose<f32>,
     last: Pose,
@@ -81,7 +99,7 @@ const NOTHING: Reading = Reading {
 
 impl<'d> Servo<'d> {
     /// A servo with no zero deviation, no pose to hold and all counters zero.
-    pub const fn new(decoder: &'d Decoder, on_invalid: OnInvalid) -> Self {
+    pub const fn new(decoder: &'d dyn Decode, on_invalid: OnInvalid) -> Self {
         Self {
             decoder,
             on_invalid,
@@ -107,15 +125,14 @@ impl<'d> Servo<'d> {
     /// what is invalid, counts, and feeds a re-zero in progress.
     ///
     /// A frame whose sequence number is not ahead of the last one's (modulo 2^32, by less
-    /// than half of it) is not new and is not decoded. A source that counts anew from a lower
-    /// number is so refused until it has caught up: call [`Servo::forget`] when it restarts.
+    /// than half of it) is not new and is not decoded. A source that starts to count
+    /// again from a lower number is refused until it has caught up: call [`Servo::forget`] when
+    /// it restarts.
     pub fn tick(&mut self, frame: &RawFrame) -> Reading {
         let Some(sequence) = self.follow(frame.sequence) else {
             return self.conclude(NOTHING, Status::FRAME_REPEATED);
         };
-        let mut reading = Reading::default();
-        self.decoder
-            .decode_into(&frame.hall, &frame.capacitive, &self.zero, &mut reading);
+        let reading = self.decoder.decode(frame, &self.zero);
         if self.run.is_some() {
             self.feed_rezero(&reading);
         }
@@ -166,7 +183,7 @@ impl<'d> Servo<'d> {
     ///
     /// The period takes a sequence number, as in a source that numbers periods: a frame of that
     /// number that comes after all is late, and is judged repeated. A source that numbers only
-    /// the frames it sends so loses one more frame for each such period.
+    /// the frames that it sends loses one more frame for each such period.
     pub fn tick_without_frame(&mut self) -> Reading {
         self.health.frames_missed = self.health.frames_missed.saturating_add(1);
         self.last_sequence = self.last_sequence.map(|last| last.wrapping_add(1));
@@ -227,8 +244,8 @@ impl<'d> Servo<'d> {
         self.last_sequence = None;
     }
 
-    /// Feeds a re-zero in progress with the reading, the zero deviation in use put back. Apart
-    /// from the tick, which so stays short where no re-zero runs.
+    /// Feeds a re-zero in progress with the reading, the zero deviation in use put back. A
+    /// function of its own: the tick stays short while no re-zero runs.
     #[cold]
     #[inline(never)]
     fn feed_rezero(&mut self, reading: &Reading) {

@@ -32,7 +32,7 @@ const HOLD_2: OnInvalid = OnInvalid::Hold { ticks: 2 };
 #[test]
 fn invalid_fields_read_zero_without_hold() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, OnInvalid::Zero);
+    let mut servo = Servo::new(&*decoder, OnInvalid::Zero);
     assert!(servo.tick(&frame(0)).status.is_good());
     let reading = servo.tick(&bad_gap(1));
     assert_eq!(reading.pose, NO_POSE);
@@ -46,7 +46,7 @@ fn invalid_fields_read_zero_without_hold() {
 #[test]
 fn the_last_valid_pose_is_held_for_so_many_ticks_and_no_longer() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, HOLD_2);
+    let mut servo = Servo::new(&*decoder, HOLD_2);
     let good = servo.tick(&frame(0));
     for sequence in 1..=2 {
         let held = servo.tick(&bad_gap(sequence));
@@ -71,7 +71,7 @@ fn the_last_valid_pose_is_held_for_so_many_ticks_and_no_longer() {
 #[test]
 fn only_what_is_invalid_is_held() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, HOLD_2);
+    let mut servo = Servo::new(&*decoder, HOLD_2);
     let good = servo.tick(&frame(0));
     let moved = RawFrame {
         capacitive: [310, -200, 100],
@@ -87,7 +87,7 @@ fn only_what_is_invalid_is_held() {
 #[test]
 fn nothing_is_held_before_a_first_valid_pose() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, HOLD_2);
+    let mut servo = Servo::new(&*decoder, HOLD_2);
     let reading = servo.tick(&bad_gap(0));
     assert_eq!(reading.pose, NO_POSE);
     assert!(
@@ -100,7 +100,7 @@ fn nothing_is_held_before_a_first_valid_pose() {
 #[test]
 fn a_gap_in_the_sequence_is_marked_and_counted() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, HOLD_2);
+    let mut servo = Servo::new(&*decoder, HOLD_2);
     servo.tick(&frame(u32::MAX - 1));
     let reading = servo.tick(&frame(2));
     assert_eq!(reading.status, Status::FRAMES_MISSED);
@@ -112,7 +112,7 @@ fn a_gap_in_the_sequence_is_marked_and_counted() {
 #[test]
 fn a_repeated_or_older_frame_is_not_decoded() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, HOLD_2);
+    let mut servo = Servo::new(&*decoder, HOLD_2);
     let good = servo.tick(&frame(7));
     for (sequence, held) in [(7, true), (5, true), (7, false)] {
         let reading = servo.tick(&frame(sequence));
@@ -127,7 +127,7 @@ fn a_repeated_or_older_frame_is_not_decoded() {
 #[test]
 fn a_period_without_a_frame_holds_and_keeps_the_count_in_step() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, HOLD_2);
+    let mut servo = Servo::new(&*decoder, HOLD_2);
     let good = servo.tick(&frame(0));
     let reading = servo.tick_without_frame();
     assert_eq!(reading.pose, good.pose);
@@ -142,7 +142,7 @@ fn a_period_without_a_frame_holds_and_keeps_the_count_in_step() {
 #[test]
 fn forgetting_drops_pose_and_sequence_and_keeps_zero_and_counters() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, HOLD_2);
+    let mut servo = Servo::new(&*decoder, HOLD_2);
     let zero = PlanarPose {
         x_m: 1e-6,
         y_m: 2e-6,
@@ -164,7 +164,7 @@ fn forgetting_drops_pose_and_sequence_and_keeps_zero_and_counters() {
 #[test]
 fn counters_stay_at_their_largest_value() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, HOLD_2);
+    let mut servo = Servo::new(&*decoder, HOLD_2);
     servo.health = Health {
         ticks: u32::MAX,
         planar_invalid: u32::MAX,
@@ -187,7 +187,7 @@ fn counters_stay_at_their_largest_value() {
 #[test]
 fn a_re_zero_at_rest_is_taken_off_from_then_on() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, OnInvalid::Zero);
+    let mut servo = Servo::new(&*decoder, OnInvalid::Zero);
     let rest = servo.tick(&frame(0)).pose.planar.to_array();
     servo.start_rezero(RezeroSettings {
         ticks: 10,
@@ -224,7 +224,7 @@ fn a_re_zero_at_rest_is_taken_off_from_then_on() {
 #[test]
 fn a_bad_or_missing_frame_refuses_the_re_zero_and_keeps_the_zero_in_use() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, HOLD_2);
+    let mut servo = Servo::new(&*decoder, HOLD_2);
     let zero = PlanarPose {
         x_m: 1e-6,
         y_m: 2e-6,
@@ -260,7 +260,7 @@ fn a_bad_or_missing_frame_refuses_the_re_zero_and_keeps_the_zero_in_use() {
 #[test]
 fn a_zero_that_is_no_number_is_ignored() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&decoder, OnInvalid::Zero);
+    let mut servo = Servo::new(&*decoder, OnInvalid::Zero);
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         assert!(!servo.set_zero(PlanarPose {
             y_m: bad,

@@ -1,7 +1,8 @@
 //! The checks that a parameter set must pass, on the host as on the target.
 
-use crate::layout::{GROUPS, Numbers};
-use crate::model::{Sensitivity, dot};
+use crate::geometry::SensingAxes;
+use crate::layout;
+use crate::model::{Probes, Sensitivity, dot};
 use crate::parameters::{ParameterError, ParameterSet};
 
 /// Largest element of PM PM^-1 - I that the check accepts: 100 times the rounding of `f32`
@@ -20,7 +21,7 @@ impl ParameterSet {
     /// # Errors
     /// The first of these that does not hold.
     pub fn check(&self) -> Result<(), ParameterError> {
-        Numbers::of(self).check_finite()?;
+        layout::check_finite(&mut self.clone())?;
         self.check_terms()
     }
 
@@ -30,7 +31,8 @@ impl ParameterSet {
         self.check_inverse()?;
         self.check_products()?;
         let c = &self.constants;
-        for (probe, s) in (0u8..).zip(&c.sensitivity) {
+        let Probes::Linear(probes) = &self.probes;
+        for (probe, s) in (0u8..).zip(probes) {
             if smallest_sensitivity(s, &c.calibrated_vertical) < c.sensitivity_min {
                 return Err(ParameterError::PoleInRange { probe });
             }
@@ -73,9 +75,9 @@ impl ParameterSet {
 
     fn check_inverse(&self) -> Result<(), ParameterError> {
         let mut largest = 0.0f32;
-        for (i, row) in self.plane.iter().enumerate() {
-            for j in 0..3 {
-                let column = self.plane_inverse.map(|row| row[j]);
+        for j in 0..3 {
+            let column = self.plane_inverse.map(|row| row[j]);
+            for (i, row) in self.plane.iter().enumerate() {
                 let off = (dot(row, column) - if i == j { 1.0 } else { 0.0 }).abs();
                 // A sum of overflows is no number, and larger than any.
                 largest = if off <= largest { largest } else { off };
@@ -102,42 +104,28 @@ impl ParameterSet {
             self.capacitive.vertical_per_m.as_flattened(),
             self.capacitive.m_per_code,
         )?;
-        let geometry = &self.geometry;
-        let parts = geometry.misalignment_rad.iter().zip(&geometry.lever_arm_m);
-        for (k, (row, (&angle, &arm))) in self.plane.iter().zip(parts).enumerate() {
-            let (sin, cos) = sin_cos_series(angle);
-            let from = if k < 2 {
-                [-sin, cos, arm]
-            } else {
-                [cos, sin, arm]
-            };
-            for (made, from) in row.iter().zip(from) {
-                let follows = (made - from).abs() <= INVERSE_TOLERANCE;
-                if !follows {
-                    return Err(ParameterError::Inconsistent { term: "PM" });
-                }
-            }
-        }
-        Ok(())
+        let (axes, arms) = SensingAxes::of_rows(&self.plane);
+        let lengths = axes.0.map(|[x, y]| x * x + y * y);
+        check_near(
+            "PM",
+            &axes.misalignment_rad(),
+            &self.geometry.misalignment_rad,
+        )?;
+        check_near("PM", &arms, &self.geometry.lever_arm_m)?;
+        check_near("PM", &lengths, &[1.0; 3])
     }
 }
 
-impl Numbers {
-    /// Refuses a number that is not finite, by the name of its group.
-    ///
-    /// Apart from its caller, as is [`check_scaled`], so that its loop stays a loop: a blob is
-    /// checked once, and flash is short.
-    #[inline(never)]
-    pub(crate) fn check_finite(&self) -> Result<(), ParameterError> {
-        match self.0.iter().position(|number| !number.is_finite()) {
-            None => Ok(()),
-            Some(at) => {
-                let group = GROUPS.iter().find(|(_, end)| at < *end);
-                let group = group.map_or("a number", |(group, _)| group);
-                Err(ParameterError::NotFinite { group })
-            }
+/// Refuses what differs by more than rounding from what it was made of: m, rad or 1.
+#[inline(never)]
+fn check_near(term: &'static str, made: &[f32; 3], from: &[f32; 3]) -> Result<(), ParameterError> {
+    for (made, from) in made.iter().zip(from) {
+        let follows = (made - from).abs() <= INVERSE_TOLERANCE;
+        if !follows {
+            return Err(ParameterError::Inconsistent { term });
         }
     }
+    Ok(())
 }
 
 #[inline(never)]
@@ -156,21 +144,6 @@ fn check_scaled(
         }
     }
     Ok(())
-}
-
-/// Sine and cosine of an angle in rad by their series, within 1e-6 up to a right angle and
-/// wrong beyond it, where no misalignment lies. That is enough for a check, and a tenth of
-/// the flash that functions for any angle take.
-fn sin_cos_series(angle: f32) -> (f32, f32) {
-    let square = angle * angle;
-    let (mut sin, mut cos) = (1.0, 1.0);
-    let mut k = 12.0;
-    while k > 0.0 {
-        cos = 1.0 - square / (k * (k - 1.0)) * cos;
-        sin = 1.0 - square / (k * (k + 1.0)) * sin;
-        k -= 2.0;
-    }
-    (angle * sin, cos)
 }
 
 /// The smallest |phi| over the box |Z|, |Rx|, |Ry| <= limits, or 0 when phi changes sign.
@@ -194,17 +167,6 @@ mod tests {
     }
 
     #[test]
-    fn the_series_agree_with_sine_and_cosine_up_to_a_right_angle() {
-        for k in -157..=157 {
-            let angle = 0.01 * k as f32;
-            let (sin, cos) = sin_cos_series(angle);
-            let (sin_true, cos_true) = libm::sincos(f64::from(angle));
-            assert!((f64::from(sin) - sin_true).abs() < 1e-6, "{angle}");
-            assert!((f64::from(cos) - cos_true).abs() < 1e-6, "{angle}");
-        }
-    }
-
-    #[test]
     fn a_number_that_is_not_finite_is_refused_by_the_name_of_its_group() {
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             let group = |change: fn(&mut ParameterSet, f32)| match refused(|set| change(set, bad)) {
@@ -218,29 +180,38 @@ mod tests {
             );
             assert_eq!(group(|s, x| s.plane[2][2] = x), "PM");
             assert_eq!(group(|s, x| s.plane_inverse[0][0] = x), "PM^-1");
-            assert_eq!(group(|s, x| s.hall.m_per_code = x), GROUPS[4].0);
+            assert_eq!(
+                group(|s, x| s.hall.m_per_code = x),
+                "the scale of the Hall codes"
+            );
             assert_eq!(
                 group(|s, x| s.capacitive.vertical_per_m[1][1] = x),
-                GROUPS[5].0
+                "the capacitive plane matrix"
             );
-            assert_eq!(group(|s, x| s.capacitive.m_per_code = x), GROUPS[6].0);
+            assert_eq!(
+                group(|s, x| s.capacitive.m_per_code = x),
+                "the scale of the capacitive codes"
+            );
             assert_eq!(
                 group(|s, x| s.constants.vertical_per_code[2][2] = x),
-                GROUPS[7].0
+                "the vertical constants"
             );
             assert_eq!(
-                group(|s, x| s.constants.sensitivity[2].per_ry_rad = x),
-                GROUPS[8].0
+                group(|s, x| sample::sensitivities(s)[2].per_ry_rad = x),
+                "the sensitivities"
             );
             assert_eq!(
                 group(|s, x| s.constants.planar_per_code[0][0] = x),
-                GROUPS[9].0
+                "the planar constants"
             );
             assert_eq!(
                 group(|s, x| s.constants.calibrated_planar[2] = x),
-                GROUPS[10].0
+                "the calibrated range"
             );
-            assert_eq!(group(|s, x| s.constants.sensitivity_min = x), GROUPS[11].0);
+            assert_eq!(
+                group(|s, x| s.constants.sensitivity_min = x),
+                "the smallest sensitivity"
+            );
         }
     }
 
@@ -308,7 +279,7 @@ mod tests {
     #[test]
     fn a_pole_within_the_calibrated_range_is_refused() {
         assert_eq!(
-            refused(|set| set.constants.sensitivity[2].per_z_m = 5000.0),
+            refused(|set| sample::sensitivities(set)[2].per_z_m = 5000.0),
             ParameterError::PoleInRange { probe: 2 }
         );
         assert_eq!(

@@ -119,6 +119,18 @@ impl Status {
         Self(self.0 | other.0)
     }
 
+    /// This bit and the next two, where the three lowest bits of `which` are set.
+    #[inline(always)]
+    pub(crate) const fn with_next(self, which: u32) -> Self {
+        Self(which << self.0.trailing_zeros())
+    }
+
+    /// This bit if the condition holds, without a branch.
+    #[inline(always)]
+    pub(crate) const fn when(self, condition: bool) -> Self {
+        self.with_next(condition as u32)
+    }
+
     /// The names of the bits that are set.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
         Self::NAMES

@@ -10,13 +10,13 @@ typedef struct { int32_t low, high; } window;
 typedef struct { float x, y, rz; } planar;
 typedef struct { float z, rx, ry; } vertical;
 typedef struct {
-    float vertical_per_code[3][3];
-    sensitivity probe[3];
-    float planar_per_code[3][3];
+    float vertical_per_code[3][3], planar_per_code[3][3];
     float calibrated_vertical[3], calibrated_planar[3];
     float sensitivity_min;
     window hall, capacitive;
-} constants;
+    sensitivity probe[3];
+} decoder;
+typedef struct { float planar_per_code[3][3]; sensitivity probe[3]; } kernel;
 typedef struct { int32_t hall[3], capacitive[3]; uint32_t sequence, time_us; } frame;
 typedef struct { planar planar; vertical vertical; uint32_t status; } reading;
 
@@ -30,25 +30,25 @@ static inline float phi_of(const sensitivity *s, const vertical *v)
     return s->eta + s->per_z * v->z + s->per_rx * v->rx + s->per_ry * v->ry;
 }
 
-static inline void pose_of(const constants *c, const float *signal, const float *phi,
+static inline void pose_of(const float (*rows)[3], const float *signal, const float *phi,
                            const planar *zero, planar *pose)
 {
     const float ratio[3] = { signal[0] / phi[0], signal[1] / phi[1], signal[2] / phi[2] };
-    pose->x = dot(c->planar_per_code[0], ratio) - zero->x;
-    pose->y = dot(c->planar_per_code[1], ratio) - zero->y;
-    pose->rz = dot(c->planar_per_code[2], ratio) - zero->rz;
+    pose->x = dot(rows[0], ratio) - zero->x;
+    pose->y = dot(rows[1], ratio) - zero->y;
+    pose->rz = dot(rows[2], ratio) - zero->rz;
 }
 
-void NAME(kernel)(const constants *c, const float *signal, const vertical *v,
+void NAME(kernel)(const kernel *c, const float *signal, const vertical *v,
                   const planar *zero, planar *pose)
 {
     const float phi[3] = { phi_of(&c->probe[0], v), phi_of(&c->probe[1], v), phi_of(&c->probe[2], v) };
-    pose_of(c, signal, phi, zero, pose);
+    pose_of(c->planar_per_code, signal, phi, zero, pose);
 }
 
 static inline bool outside(const window *w, int32_t code) { return code < w->low || code > w->high; }
 
-void NAME(tick)(const constants *c, const frame *f, const planar *zero, reading *out)
+void NAME(tick)(const decoder *c, const frame *f, const planar *zero, reading *out)
 {
     uint32_t status = 0;
     float gap[3], hall[3], phi[3];
@@ -68,7 +68,7 @@ void NAME(tick)(const constants *c, const frame *f, const planar *zero, reading 
         if (!(fabsf(phi[k]) >= c->sensitivity_min) || !isfinite(phi[k])) status |= 1u << (6 + k);
     }
     planar q;
-    pose_of(c, hall, phi, zero, &q);
+    pose_of(c->planar_per_code, hall, phi, zero, &q);
     if (!isfinite(q.x) || !isfinite(q.y) || !isfinite(q.rz)) status |= 1u << 9;
     if (fabsf(q.x) > c->calibrated_planar[0] || fabsf(q.y) > c->calibrated_planar[1]
         || fabsf(q.rz) > c->calibrated_planar[2]) status |= 1u << 12;

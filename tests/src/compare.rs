@@ -2,7 +2,7 @@
 
 use crate::job::{self, ANSWER_WORDS, FRAME_WORDS, HEAD_WORDS, Head, PARAMETER_WORDS};
 use crate::motion::Section;
-use runtime::{BlobError, ParameterSet, RawFrame, Reading, Servo};
+use runtime::{BlobError, Decode, ParameterSet, RawFrame, Reading, Servo};
 
 /// Why a job or its answer is refused.
 #[derive(Debug, thiserror::Error)]
@@ -159,11 +159,7 @@ fn run(
         let words = words::<PARAMETER_WORDS>(&section.parameters);
         let (decoder, zero) = job::from_words(&words.unwrap_or([0; PARAMETER_WORDS]));
         for (tick, frame) in frames {
-            take(
-                tick,
-                frame,
-                decoder.decode(frame.hall, frame.capacitive, &zero),
-            );
+            take(tick, frame, decoder.decode(frame, &zero));
         }
         return Ok(());
     }
@@ -172,7 +168,7 @@ fn run(
         source,
     })?;
     let decoder = set.decoder();
-    let mut servo = Servo::new(&decoder, section.head.on_invalid());
+    let mut servo = Servo::new(&*decoder, section.head.on_invalid());
     for (tick, frame) in frames {
         take(tick, frame, servo.tick(frame));
     }
@@ -249,19 +245,13 @@ mod tests {
     use crate::motion;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
-    use runtime::PlanarPose;
     use runtime::decoder::DecoderConstants;
     use runtime::frame::CodeWindow;
     use runtime::model::Sensitivity;
+    use runtime::{Decoder, LinearModel, PlanarPose};
 
     const CONSTANTS: DecoderConstants<f32> = DecoderConstants {
         vertical_per_code: [[1e-8, 2e-8, 3e-8], [4e-8, -5e-8, 6e-8], [7e-8, 8e-8, -9e-8]],
-        sensitivity: [Sensitivity {
-            eta: 0.8,
-            per_z_m: -190.0,
-            per_rx_rad: -60.0,
-            per_ry_rad: 30.0,
-        }; 3],
         planar_per_code: [[1e-8, 2e-8, 6e-8], [3e-8, 3e-8, 1e-9], [1e-7, -1e-7, 1e-9]],
         calibrated_vertical: [1e-3; 3],
         calibrated_planar: [2e-3; 3],
@@ -276,11 +266,20 @@ mod tests {
         },
     };
 
+    const PROBE: Sensitivity<f32> = Sensitivity {
+        eta: 0.8,
+        per_z_m: -190.0,
+        per_rx_rad: -60.0,
+        per_ry_rad: 30.0,
+    };
+
+    const DECODER: Decoder<LinearModel> = Decoder::new(CONSTANTS, [PROBE; 3]);
+
     /// A job of bare words, and what a target without fault answers.
     fn job() -> (Vec<u8>, Vec<u8>) {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let sound = job::to_words(&CONSTANTS, &PlanarPose::ZERO);
-        let odd = motion::odd_parameters(&mut rng, &CONSTANTS);
+        let sound = job::to_words(&DECODER, &PlanarPose::ZERO);
+        let odd = motion::odd_parameters(&mut rng, &DECODER);
         let sections = [
             motion::of_words(sound, motion::uniform_frames(&mut rng, 300)),
             motion::of_words(odd, motion::wild_frames(&mut rng, 50)),
@@ -302,8 +301,8 @@ mod tests {
             y_m: -2e-6,
             rz_rad: 3e-6,
         };
-        let (decoder, back) = job::from_words(&job::to_words(&CONSTANTS, &zero));
-        assert_eq!((decoder.constants(), back), (&CONSTANTS, zero));
+        let (decoder, back) = job::from_words(&job::to_words(&DECODER, &zero));
+        assert_eq!((decoder, back), (DECODER, zero));
     }
 
     #[test]

@@ -16,7 +16,7 @@
 use runtime::decoder::DecoderConstants;
 use runtime::frame::CodeWindow;
 use runtime::model::Sensitivity;
-use runtime::{Decoder, OnInvalid, PlanarPose, RawFrame, Reading};
+use runtime::{Decode, Decoder, LinearModel, OnInvalid, PlanarPose, RawFrame, Reading};
 
 /// Source: constants and a zero deviation as bare words.
 pub const WORDS: u32 = 1;
@@ -85,7 +85,7 @@ impl Head {
 }
 
 /// A decoder and a zero deviation of bare words, unchecked.
-pub fn from_words(words: &[u32; PARAMETER_WORDS]) -> (Decoder, PlanarPose<f32>) {
+pub fn from_words(words: &[u32; PARAMETER_WORDS]) -> (Decoder<LinearModel>, PlanarPose<f32>) {
     let mut rest = words.iter().copied();
     let mut next = || rest.next().unwrap_or_default();
     let mut three = || {
@@ -114,11 +114,6 @@ pub fn from_words(words: &[u32; PARAMETER_WORDS]) -> (Decoder, PlanarPose<f32>) 
     };
     let constants = DecoderConstants {
         vertical_per_code,
-        sensitivity: [
-            sensitivity(a0, a1, a2, a3),
-            sensitivity(b0, b1, b2, b3),
-            sensitivity(c0, c1, c2, c3),
-        ],
         planar_per_code,
         calibrated_vertical,
         calibrated_planar,
@@ -126,15 +121,21 @@ pub fn from_words(words: &[u32; PARAMETER_WORDS]) -> (Decoder, PlanarPose<f32>) 
         capacitive_window: window(),
         sensitivity_min: f32::from_bits(next()),
     };
-    (Decoder::new(constants), zero)
+    let probes = [
+        sensitivity(a0, a1, a2, a3),
+        sensitivity(b0, b1, b2, b3),
+        sensitivity(c0, c1, c2, c3),
+    ];
+    (Decoder::new(constants, probes), zero)
 }
 
-/// The words of constants and a zero deviation, as [`from_words`] reads them.
-pub fn to_words(c: &DecoderConstants<f32>, zero: &PlanarPose<f32>) -> [u32; PARAMETER_WORDS] {
+/// The words of a decoder and a zero deviation, as [`from_words`] reads them.
+pub fn to_words(decoder: &Decoder<LinearModel>, zero: &PlanarPose<f32>) -> [u32; PARAMETER_WORDS] {
+    let c = decoder.constants();
     let [hall, gaps] = [&c.hall_window, &c.capacitive_window];
     let windows = [hall.low, hall.high, gaps.low, gaps.high].map(|code| code as u32);
-    let probes = c
-        .sensitivity
+    let probes = decoder
+        .probes()
         .map(|s| [s.eta, s.per_z_m, s.per_rx_rad, s.per_ry_rad]);
     let numbers = (c.vertical_per_code.as_flattened().iter())
         .chain(probes.as_flattened())

@@ -3,9 +3,8 @@
 use crate::job::{self, Head, PARAMETER_WORDS};
 use host_fit::input::dataset::{Dataset, LoggedFrame};
 use rand::{Rng, RngExt};
-use runtime::decoder::DecoderConstants;
 use runtime::frame::MISSING_CODE;
-use runtime::{PlanarPose, RawFrame};
+use runtime::{Decoder, LinearModel, PlanarPose, RawFrame};
 
 /// One section: parameters as they lie in the file, and the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -119,7 +118,7 @@ fn odd_word(rng: &mut impl Rng) -> u32 {
 }
 
 /// Sound parameters of which some words, or all, are replaced by odd ones.
-pub fn odd_parameters(rng: &mut impl Rng, sound: &DecoderConstants<f32>) -> [u32; PARAMETER_WORDS] {
+pub fn odd_parameters(rng: &mut impl Rng, sound: &Decoder<LinearModel>) -> [u32; PARAMETER_WORDS] {
     let mut words = job::to_words(sound, &PlanarPose::ZERO);
     let replaced = match rng.random_range(0..4u32) {
         0 => words.len(),

@@ -4,17 +4,15 @@
 use embedded_can::Frame;
 use hal_adapters::can::e2e::unprotect;
 use hal_adapters::can::{BusFrame, Layout, SensorReceiver, StampedFrame, Timing, sensor};
-use hal_adapters::fault::{Damage, Fault, FaultRates, Faulty, Random};
-use hal_adapters::source::FrameSource;
+use hal_adapters::fault::{Fault, FaultRates, Faulty, Random};
 use runtime::calibration::Origin;
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeGeometry;
-use runtime::model::Sensitivity;
-use runtime::{Calibration, Decoder, ModelKind, PlanarPose, RawFrame, Reading, Status};
-use std::convert::Infallible;
+use runtime::model::{Probes, Sensitivity};
+use runtime::{AnyDecoder, Calibration, ModelKind, PlanarPose, RawFrame, Reading, Status};
 
 /// A stage near the designed one.
-fn decoder() -> Decoder {
+fn decoder() -> AnyDecoder {
     let window = CodeWindow::between_rails(-32768, 32767).expect("16 bits");
     let probe = |eta| Sensitivity {
         eta,
@@ -28,7 +26,7 @@ fn decoder() -> Decoder {
             lever_arm_m: [0.1975, -0.1975, -0.36],
             misalignment_rad: [0.02, -0.03, 0.01],
         },
-        sensitivity: [probe(0.87), probe(0.70), probe(0.86)],
+        probes: Probes::Linear([probe(0.87), probe(0.70), probe(0.86)]),
         hall_m_per_code: 6.25e-8,
         hall_window: window,
         capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
@@ -66,14 +64,13 @@ struct Ticks {
     left: Vec<BusFrame>,
 }
 
-impl FrameSource for Ticks {
-    type Frame = StampedFrame;
-    type Error = Infallible;
+impl Iterator for Ticks {
+    type Item = StampedFrame;
 
-    fn next_frame(&mut self) -> Result<Option<StampedFrame>, Infallible> {
+    fn next(&mut self) -> Option<StampedFrame> {
         if self.left.is_empty() {
             if self.next == self.end {
-                return Ok(None);
+                return None;
             }
             let frames = sensor::frames(Layout::Bits16, &tick(self.next));
             self.left = frames.map(BusFrame::from).collect();
@@ -81,7 +78,8 @@ impl FrameSource for Ticks {
             self.next += 1;
         }
         let time_us = u64::from(self.next) * 2_000;
-        Ok(self.left.pop().map(|frame| StampedFrame { time_us, frame }))
+        let frame = self.left.pop()?;
+        Some(StampedFrame { time_us, frame })
     }
 }
 
@@ -122,20 +120,20 @@ fn run(ticks: u32, rates: FaultRates, damaging: &[Fault], seed: u64) -> Outcome 
         valid_poses: 0,
         wrong_poses: 0,
     };
-    while let Ok(Some(stamped)) = source.next_frame() {
+    for stamped in source.by_ref() {
         out.frames += 1;
         let now_us = stamped.time_us as u32;
         let Some(got) = receiver.take(&stamped.frame, now_us).tick else {
             continue;
         };
-        let reading = decoder.decode(got.hall, got.capacitive, &PlanarPose::ZERO);
+        let reading = decoder.decode(&got, &PlanarPose::ZERO);
         if reading.status.any(Status::PLANAR_INVALID) {
             continue;
         }
         out.valid_poses += 1;
         let sent = tick(number(got.hall[0], got.hall[1]));
         let same = (sent.hall, sent.capacitive) == (got.hall, got.capacitive);
-        let want = decoder.decode(sent.hall, sent.capacitive, &PlanarPose::ZERO);
+        let want = decoder.decode(&sent, &PlanarPose::ZERO);
         out.wrong_poses += u32::from(!same || bits(&want) != bits(&reading));
     }
     out.damaged = damaging.iter().map(|f| source.injected(*f)).sum();

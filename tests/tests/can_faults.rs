@@ -3,7 +3,7 @@
 use hal_adapters::can::{
     BusFault, BusFrame, Layout, Message, SensorReceiver, StampedFrame, Timing, sensor,
 };
-use hal_adapters::fault::{Damage, Fault, Random};
+use hal_adapters::fault::{Fault, Random};
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
 
@@ -95,7 +95,7 @@ fn with_fault(
             frames[at].time_us += late;
             frames.sort_by_key(|f| f.time_us);
         }
-        _ => frames[at] = hit.damaged(fault, random),
+        _ => frames[at].frame = hit.frame.damaged(fault, random),
     }
     (frames, hit.time_us)
 }

@@ -10,24 +10,25 @@
 //! | register | address | value after reset | here |
 //! |---|---|---|---|
 //! | ID | 0x00 | 0x28xx | upper byte checked: eight channels |
-//! | STATUS | 0x01 | 0x0500 | in every frame: upper byte 0x01 but for the bit of a resynchronisation, lower byte one ready bit a channel |
-//! | MODE | 0x02 | 0x0510 | 0x0110: the mark of a reset is cleared, so that a later reset shows |
+//! | STATUS | 0x01 | 0x0500 | in every frame: upper byte 0x01, apart from the bit that marks a resynchronisation; lower byte one ready bit per channel |
+//! | MODE | 0x02 | 0x0510 | 0x0110: the reset flag is cleared, so a later reset shows |
 //! | CLOCK | 0x03 | 0xFF0E | channels that are read, oversampling 128, high resolution |
 //!
-//! **Timing.** CLKIN is 8.000 MHz: the modulators run at 4 MHz and a conversion takes 32 us.
-//! The part keeps up to two conversions that were not fetched, so what a tick would read by
-//! itself is older than the tick. A pulse on SYNC/RESET at the trigger empties that store and
-//! starts the sinc3 filters anew: the code that is there [`SETTLE_US`](Ads131m08::SETTLE_US)
-//! later was weighed over the 96 us after the trigger, always the same. (A pulse that comes
-//! in step with the conversions is ignored by the part; 2 ms are 62.5 conversions at 8 MHz, so
-//! none is. At 8.192 MHz they would be 64: don't.) The pulse must be shorter than 2048 periods of
-//! CLKIN, 256 us, or it resets.
+//! **Timing.** CLKIN must be 8.000 MHz: the modulators run at 4 MHz and a conversion takes
+//! 32 us. The part stores up to two conversions that were not read, so a plain read returns
+//! data from before the tick. A pulse on SYNC/RESET at the trigger empties that store and
+//! restarts the sinc3 filters: the code that is ready [`SETTLE_US`](FrameSampler::SETTLE_US)
+//! later is the weighted mean of the 96 us after the trigger, in every tick. (The part ignores
+//! a pulse that coincides with the end of a conversion. At 8 MHz 2 ms are 62.5 conversions, so
+//! that does not happen; at 8.192 MHz they would be 64 and it would.) The pulse must be shorter
+//! than 2048 periods of CLKIN, 256 us; a longer one is a reset.
 //!
-//! **Skew.** None: the channels share one trigger. What is left is a delay common to all six
+//! **Skew.** None: the channels share one trigger. What remains is a delay common to all six
 //! codes, 48 us from the trigger to the middle of the filter: 0.23 um at the fastest motion
-//! of a service log (4.8 mm/s), the same for every axis, and known. It belongs in the time stamp.
+//! of a service log (4.8 mm/s), known and the same for every axis. The time stamp
+//! of a frame does not include it.
 //!
-//! **Range.** +-1.2 V at gain 1, 143 nV a code: +-10.24 V of a Hall amplifier need a divider
+//! **Range.** +-1.2 V at gain 1, 143 nV per code: a Hall amplifier of +-10.24 V needs a divider
 //! by 8.53. The rails are -8388608 and 8388607; declare them as `code_min` and `code_max` of
 //! the stage file and the decoder refuses them.
 
@@ -39,20 +40,11 @@ use embedded_hal::digital::{Error as _, OutputPin};
 use embedded_hal::spi::{MODE_1, Mode, SpiDevice};
 use runtime::RawFrame;
 
-/// SPI mode of the part.
-pub const MODE: Mode = MODE_1;
-/// Fastest SPI clock, Hz.
-pub const SPI_HZ_MAX: u32 = 25_000_000;
-/// The clock that the part must be given, Hz.
-pub const CLKIN_HZ: u32 = 8_000_000;
-
 /// Words of a frame: response, eight codes, check.
 const WORDS: usize = 2 + INPUTS;
 const WORD_BYTES: usize = 3;
-/// Bytes of a frame.
-pub const FRAME_BYTES: usize = WORDS * WORD_BYTES;
 
-/// "CCITT" of the data sheet.
+/// What the data sheet calls CCITT.
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 
 const NULL: u16 = 0x0000;
@@ -70,11 +62,11 @@ const CLOCK: u8 = 0x03;
 
 const ID_MASK: u16 = 0xff00;
 const ID_WANTED: u16 = 0x2800;
-/// 24-bit words, timeout on, no CRC on commands, mark of the reset cleared.
+/// 24-bit words, timeout on, no CRC on commands, reset flag cleared.
 const MODE_WANTED: u16 = 0x0110;
 /// Oversampling 128 (bits 4..2 = 0), high resolution (bits 1..0 = 2).
 const CLOCK_SPEED: u16 = 0x0002;
-/// Everything but the ready bits and F_RESYNC, which every pulse on SYNC sets.
+/// All bits except the ready bits and F_RESYNC, which every pulse on SYNC sets.
 const STATUS_MASK: u16 = 0xbf00;
 /// 24-bit words, nothing locked, no reset, no error.
 const STATUS_WANTED: u16 = 0x0100;
@@ -82,10 +74,10 @@ const STATUS_WANTED: u16 = 0x0100;
 /// A pulse on SYNC lasts 1 to 2047 periods of CLKIN: 0.125 to 256 us.
 const SYNC_US: u32 = 1;
 
-/// Registers are in reach 5 us after a reset.
+/// The registers can be accessed 5 us after a reset.
 const RESET_US: u32 = 10;
 
-/// The part on its bus, with its SYNC/RESET pin.
+/// The part on its bus, with its pin SYNC/RESET.
 #[derive(Debug)]
 pub struct Ads131m08<SPI, SYNC> {
     spi: SPI,
@@ -93,14 +85,14 @@ pub struct Ads131m08<SPI, SYNC> {
     channels: Channels,
 }
 
-/// What a frame carries beside the codes.
+/// What the part sent in one frame.
 struct Frame {
     response: u16,
     codes: [i32; INPUTS],
 }
 
 impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
-    /// A part that is not started yet. `sync` drives SYNC/RESET, which idles high.
+    /// A part that is not started yet; `sync` drives SYNC/RESET.
     pub const fn new(spi: SPI, sync: SYNC, channels: Channels) -> Self {
         Self {
             spi,
@@ -109,12 +101,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
         }
     }
 
-    /// Gives back bus and pin.
-    pub fn release(self) -> (SPI, SYNC) {
-        (self.spi, self.sync)
-    }
-
-    /// One frame: a command with at most one word of data out, the last command's response in.
+    /// One frame: a command and at most one word of data out, the previous command's response in.
     fn exchange(&mut self, command: u16, data: u16) -> Result<Frame, AdcError<SPI::Error>> {
         let mut words = [[0; WORD_BYTES]; WORDS];
         let ([c0, c1], [d0, d1]) = (command.to_be_bytes(), data.to_be_bytes());
@@ -169,13 +156,16 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
 impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
     type Bus = SPI::Error;
 
+    const SPI_MODE: Mode = MODE_1;
+    const SPI_HZ_MAX: u32 = 25_000_000;
+
     /// Three conversions of 32 us for the sinc3 filter, 6 us for the part's own start and
     /// 8 us of margin.
     const SETTLE_US: u32 = 110;
 
     fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
         self.sync.set_high().map_err(|e| AdcError::Pin(e.kind()))?;
-        // What this frame answers belongs to a command before; a damaged one says nothing.
+        // This frame answers an earlier command, so neither its content nor its check matters.
         match self.exchange(RESET, 0) {
             Err(AdcError::Bus(error)) => return Err(AdcError::Bus(error)),
             Ok(_) | Err(_) => delay.delay_us(RESET_US),
@@ -218,13 +208,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
         if ready & read != read {
             return Err(AdcError::NotReady { ready, read });
         }
-        let (hall, capacitive) = self.channels.pick(&frame.codes);
-        Ok(RawFrame {
-            hall,
-            capacitive,
-            sequence,
-            time_us,
-        })
+        Ok(self.channels.frame(&frame.codes, sequence, time_us))
     }
 }
 

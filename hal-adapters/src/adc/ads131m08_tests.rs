@@ -1,8 +1,9 @@
-//! Byte sequences worked out from the data sheet; the checks were computed bit by bit with
-//! polynomial 0x1021 from 0xFFFF, apart from the code under test.
+//! Byte sequences worked out from the data sheet. Their checks are computed here bit by bit,
+//! polynomial 0x1021 from 0xFFFF, independently of the code under test.
 
 extern crate std;
 
+use super::super::testing::Broken;
 use super::*;
 use embedded_hal::spi::ErrorKind;
 use embedded_hal_mock::eh1::delay::NoopDelay;
@@ -47,31 +48,30 @@ fn frame(command: u16, data: u16, back: Vec<u8>) -> Vec<Transaction<u8>> {
     ]
 }
 
+const FRAME_BYTES: usize = WORDS * WORD_BYTES;
 const QUIET: [i32; 8] = [0; 8];
 
 fn try_start(expected: &[Transaction<u8>]) -> Result<(), AdcError<ErrorKind>> {
     let mut pin = PinMock::new(&[PinTransaction::set(State::High)]);
-    let mut adc = Ads131m08::new(Mock::new(expected), pin.clone(), Channels::IN_ORDER);
+    let mut bus = Mock::new(expected);
+    let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
     let result = adc.start(&mut NoopDelay::new());
-    adc.release().0.done();
+    bus.done();
     pin.done();
     result
 }
 
 fn try_sample(back: Vec<u8>) -> Result<RawFrame, AdcError<ErrorKind>> {
     let mut pin = PinMock::new(&[]);
-    let mut adc = Ads131m08::new(
-        Mock::new(&frame(0, 0, back)),
-        pin.clone(),
-        Channels::IN_ORDER,
-    );
+    let mut bus = Mock::new(&frame(0, 0, back));
+    let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
     let result = adc.sample(7, 14_000);
-    adc.release().0.done();
+    bus.done();
     pin.done();
     result
 }
 
-/// Everything that a good start exchanges, each entry one frame.
+/// The frames of a good start, one per entry.
 fn started() -> Vec<Vec<Transaction<u8>>> {
     vec![
         frame(0x0011, 0, answer(0x0500, QUIET)),
@@ -137,7 +137,7 @@ fn a_setting_that_does_not_read_back_is_named() {
     assert_eq!(try_start(&all.concat()), Err(error));
 }
 
-/// Written out whole, so that nothing but this list says what a frame is.
+/// Every byte is written out: this test alone defines what a frame is.
 #[test]
 fn a_good_frame_gives_signed_codes_of_24_bits() {
     #[rustfmt::skip]
@@ -213,24 +213,11 @@ fn a_trigger_is_a_pulse_on_sync() {
         PinTransaction::set(State::Low),
         PinTransaction::set(State::High),
     ]);
-    let mut adc = Ads131m08::new(Mock::new(&[]), pin.clone(), Channels::IN_ORDER);
+    let mut bus = Mock::new(&[]);
+    let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
     assert_eq!(adc.trigger(&mut NoopDelay::new()), Ok(()));
-    adc.release().0.done();
+    bus.done();
     pin.done();
-}
-
-/// A bus that fails.
-struct Broken;
-impl embedded_hal::spi::ErrorType for Broken {
-    type Error = ErrorKind;
-}
-impl SpiDevice for Broken {
-    fn transaction(
-        &mut self,
-        _: &mut [embedded_hal::spi::Operation<'_, u8>],
-    ) -> Result<(), ErrorKind> {
-        Err(ErrorKind::ModeFault)
-    }
 }
 
 #[test]

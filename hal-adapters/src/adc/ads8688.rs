@@ -1,54 +1,51 @@
 //! Texas Instruments ADS8688: eight channels of 16 bits, one after the other (data sheet
 //! SBAS582C).
 //!
-//! SPI mode 1, up to 17 MHz. A frame starts with 16 bits of command; the part's answer follows
-//! them. The part samples one channel as chip select falls and gives its code in the same
-//! frame; which one, the frame before said.
+//! SPI mode 1, up to 17 MHz. A frame starts with 16 bits of command, and the part's answer
+//! follows them. The part samples one channel when chip select falls and returns its code in
+//! the same frame; the previous frame's command selected the channel.
 //!
 //! | command | bits | here |
 //! |---|---|---|
 //! | NO_OP | 0x0000 | next channel of the sequence |
 //! | RST | 0x8500 | registers as after power-up |
 //! | AUTO_RST | 0xA000 | the next frame starts the sequence with its lowest channel |
-//! | write, read | address (7 bits), 1 or 0, value | the value written or read follows |
+//! | write, read | address (7 bits), 1 or 0, value | the answer is the value written or read |
 //!
 //! | register | address | value after reset | here |
 //! |---|---|---|---|
 //! | AUTO_SEQ_EN | 0x01 | 0xFF | channels that are read |
-//! | Channel Power Down | 0x02 | 0x00 | channels that are not |
+//! | Channel Power Down | 0x02 | 0x00 | channels that are not read |
 //! | Feature Select | 0x03 | 0x00 | 0x42: channel and device address follow each code, device address 1 |
 //! | Channel n Input Range | 0x05 + n | 0x00 | 0: +-2.5 times the reference |
 //!
-//! **Check.** The part has neither an identification nor a CRC. Reset values that read back
-//! tell that it is there at start; later each code is followed by its channel (4 bits) and
-//! the device address (2 bits, here 01, so that neither a line at 0 nor one at 1 passes) and
-//! two zeros, which are checked. A flipped bit of the code itself passes: prefer the
-//! [ADS131M08](super::ads131m08) on long cables.
+//! **Check.** The part has neither an identification register nor a CRC. At start, reset
+//! values that read back correctly show that it is there. Later each code is followed by its
+//! channel (4 bits), the device address (2 bits, here 01: a line stuck at 0 or at 1 fails) and
+//! two zeros, and all of these are checked. A flipped bit in the code itself goes unnoticed:
+//! prefer the [ADS131M08](super::ads131m08) on long cables.
 //!
-//! **Timing.** Seven frames of 40 bits: 28 us at 10.5 MHz, and chip select between them. The
-//! sample-to-sample time is that of a frame, 3.8 us and up, above the 2 us that the part asks for.
+//! **Timing.** Seven frames of 40 bits: 28 us at 10.5 MHz, plus chip select between them. From
+//! sample to sample it takes one frame, at least 3.8 us; the part needs 2 us.
 //!
-//! **Skew.** Channels are sampled a frame apart, at about 5 us. Put the three Hall probes
-//! on neighbouring inputs: A to C are 10 us apart, which at the fastest motion of a service log
-//! (4.8 mm/s) is 48 nm, a tenth of the Hall noise; from the first to the last channel 25 us,
-//! at the fastest vertical motion (1.4 mm/s) 34 nm of Z, which changes a sensitivity by
+//! **Skew.** Channels are sampled one frame apart, about 5 us. Put the three Hall probes on
+//! neighbouring inputs: A and C are then 10 us apart, which at the fastest motion of a service
+//! log (4.8 mm/s) is 48 nm, a tenth of the Hall noise. The first and the last channel are 25 us
+//! apart, at the fastest vertical motion (1.4 mm/s) 34 nm of Z; this changes a sensitivity by
 //! 7 parts per million and the planar pose by 5 nm.
 //!
-//! **Range.** +-10.24 V with the internal reference of 4.096 V, 312.5 uV a code, straight binary:
-//! 0 is the lower rail. Codes here are signed, -32768 to 32767, as in `stage.toml`.
+//! **Range.** +-10.24 V with the internal reference of 4.096 V, 312.5 uV per code, straight
+//! binary: 0 is the lower rail. Codes here are signed, -32768 to 32767, as in `stage.toml`.
 
 use super::channels::INPUTS;
 use super::{AdcError, Channels, FrameSampler, silent};
 use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::{Error as _, OutputPin};
 use embedded_hal::spi::{MODE_1, Mode, SpiDevice};
 use runtime::RawFrame;
 
-/// SPI mode of the part.
-pub const MODE: Mode = MODE_1;
-/// Fastest SPI clock, Hz.
-pub const SPI_HZ_MAX: u32 = 17_000_000;
 /// Bytes of a frame: command, code, signature.
-pub const FRAME_BYTES: usize = 5;
+const FRAME_BYTES: usize = 5;
 
 const NO_OP: u16 = 0x0000;
 const RST: u16 = 0x8500;
@@ -68,25 +65,25 @@ const RANGE_10_24_V: u8 = 0;
 /// Straight binary to signed.
 const ZERO_VOLT: i32 = 0x8000;
 
-/// The part on its bus.
+/// The part on its bus, with its pin RST/PD.
 #[derive(Debug)]
-pub struct Ads8688<SPI> {
+pub struct Ads8688<SPI, RST> {
     spi: SPI,
+    reset: RST,
     channels: Channels,
 }
 
-impl<SPI: SpiDevice> Ads8688<SPI> {
-    /// A part that is not started yet.
-    pub const fn new(spi: SPI, channels: Channels) -> Self {
-        Self { spi, channels }
+impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
+    /// A part that is not started yet; `reset` drives RST/PD, which is held high.
+    pub const fn new(spi: SPI, reset: RST, channels: Channels) -> Self {
+        Self {
+            spi,
+            reset,
+            channels,
+        }
     }
 
-    /// Gives back the bus.
-    pub fn release(self) -> SPI {
-        self.spi
-    }
-
-    /// One frame: 16 bits of command out, everything that came meanwhile in.
+    /// One frame: 16 bits of command out, the answer in the bytes behind them.
     fn exchange(&mut self, command: u16) -> Result<[u8; FRAME_BYTES], AdcError<SPI::Error>> {
         let [c0, c1] = command.to_be_bytes();
         let mut bytes = [c0, c1, 0, 0, 0];
@@ -120,13 +117,17 @@ impl<SPI: SpiDevice> Ads8688<SPI> {
     }
 }
 
-impl<SPI: SpiDevice> FrameSampler for Ads8688<SPI> {
+impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
     type Bus = SPI::Error;
 
-    /// Reading is converting.
+    const SPI_MODE: Mode = MODE_1;
+    const SPI_HZ_MAX: u32 = 17_000_000;
+
+    /// The part converts while it is read.
     const SETTLE_US: u32 = 0;
 
     fn start(&mut self, _delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
+        self.reset.set_high().map_err(|e| AdcError::Pin(e.kind()))?;
         self.exchange(RST)?;
         let found = self.read(AUTO_SEQ_EN)?;
         if found != AUTO_SEQ_EN_AT_RESET {
@@ -166,13 +167,7 @@ impl<SPI: SpiDevice> FrameSampler for Ads8688<SPI> {
             }
             *code = i32::from(u16::from_be_bytes([high, low])) - ZERO_VOLT;
         }
-        let (hall, capacitive) = self.channels.pick(&codes);
-        Ok(RawFrame {
-            hall,
-            capacitive,
-            sequence,
-            time_us,
-        })
+        Ok(self.channels.frame(&codes, sequence, time_us))
     }
 }
 

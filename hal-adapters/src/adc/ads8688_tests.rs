@@ -2,14 +2,28 @@
 
 extern crate std;
 
+use super::super::testing::Broken;
 use super::*;
 use embedded_hal::spi::ErrorKind;
 use embedded_hal_mock::eh1::delay::NoopDelay;
+use embedded_hal_mock::eh1::digital::{Mock as PinMock, State, Transaction as PinTransaction};
 use embedded_hal_mock::eh1::spi::{Mock, Transaction};
 use std::vec;
 use std::vec::Vec;
 
-const CHANNELS: Channels = Channels::IN_ORDER;
+/// What `work` gives on a part whose bus carries exactly `expected` and whose pin sees `levels`.
+fn on_part<T>(
+    expected: &[Transaction<u8>],
+    levels: &[PinTransaction],
+    work: impl FnOnce(&mut Ads8688<Mock<u8>, PinMock>) -> T,
+) -> T {
+    let (mut bus, mut pin) = (Mock::new(expected), PinMock::new(levels));
+    let mut adc = Ads8688::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
+    let result = work(&mut adc);
+    bus.done();
+    pin.done();
+    result
+}
 
 fn frame(out: [u8; 2], back: [u8; 3]) -> Vec<Transaction<u8>> {
     let (mut sent, mut read) = (out.to_vec(), vec![0, 0]);
@@ -53,17 +67,12 @@ fn sampled(codes: [[u8; 2]; 6]) -> Vec<Transaction<u8>> {
 const ZERO: [[u8; 2]; 6] = [[0x80, 0]; 6];
 
 fn try_start(expected: Vec<Transaction<u8>>) -> Result<(), AdcError<ErrorKind>> {
-    let mut adc = Ads8688::new(Mock::new(&expected), CHANNELS);
-    let result = adc.start(&mut NoopDelay::new());
-    adc.release().done();
-    result
+    let levels = [PinTransaction::set(State::High)];
+    on_part(&expected, &levels, |adc| adc.start(&mut NoopDelay::new()))
 }
 
 fn try_sample(expected: Vec<Transaction<u8>>) -> Result<RawFrame, AdcError<ErrorKind>> {
-    let mut adc = Ads8688::new(Mock::new(&expected), CHANNELS);
-    let result = adc.sample(7, 14_000);
-    adc.release().done();
-    result
+    on_part(&expected, &[], |adc| adc.sample(7, 14_000))
 }
 
 #[test]
@@ -150,24 +159,12 @@ fn a_line_that_never_moves_is_silent() {
     );
 }
 
-/// A bus that fails.
-struct Broken;
-impl embedded_hal::spi::ErrorType for Broken {
-    type Error = ErrorKind;
-}
-impl SpiDevice for Broken {
-    fn transaction(
-        &mut self,
-        _: &mut [embedded_hal::spi::Operation<'_, u8>],
-    ) -> Result<(), ErrorKind> {
-        Err(ErrorKind::Overrun)
-    }
-}
-
 #[test]
 fn the_error_of_the_bus_is_kept() {
-    let mut adc = Ads8688::new(Broken, CHANNELS);
-    let error = AdcError::Bus(ErrorKind::Overrun);
+    let mut pin = PinMock::new(&[PinTransaction::set(State::High)]);
+    let mut adc = Ads8688::new(Broken, pin.clone(), Channels::IN_ORDER);
+    let error = AdcError::Bus(ErrorKind::ModeFault);
     assert_eq!(adc.start(&mut NoopDelay::new()), Err(error));
     assert_eq!(adc.sample(0, 0), Err(error));
+    pin.done();
 }

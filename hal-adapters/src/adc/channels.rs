@@ -1,9 +1,11 @@
 //! Which input of the converter carries which sensor.
 
-/// Inputs of both parts.
-pub const INPUTS: usize = 8;
+use runtime::RawFrame;
 
-/// The inputs of the six sensors: 0 to 7, no two alike.
+/// Inputs of both parts.
+pub(super) const INPUTS: usize = 8;
+
+/// The inputs of the six sensors: 0 to 7, all different.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Channels {
     hall: [u8; 3],
@@ -39,15 +41,20 @@ impl Channels {
         Some(Self { hall, capacitive })
     }
 
-    /// Bit k set: input k is read.
+    /// The inputs that are read: bit k for input k.
     pub const fn mask(&self) -> u8 {
         let ([a, b, c], [d, e, f]) = (self.hall, self.capacitive);
         1 << a | 1 << b | 1 << c | 1 << d | 1 << e | 1 << f
     }
 
-    /// The codes of Hall probes and gaps out of those of all inputs.
-    pub(super) const fn pick(&self, codes: &[i32; INPUTS]) -> ([i32; 3], [i32; 3]) {
-        // The masks change nothing, and show the compiler that no index is out of range.
+    /// The frame of one period, out of the codes of all inputs.
+    pub(super) const fn frame(
+        &self,
+        codes: &[i32; INPUTS],
+        sequence: u32,
+        time_us: u32,
+    ) -> RawFrame {
+        // Every index is below 8 already: the masks let the compiler drop its check, and the panic.
         const fn three(codes: &[i32; INPUTS], at: [u8; 3]) -> [i32; 3] {
             [
                 codes[(at[0] & 7) as usize],
@@ -55,7 +62,12 @@ impl Channels {
                 codes[(at[2] & 7) as usize],
             ]
         }
-        (three(codes, self.hall), three(codes, self.capacitive))
+        RawFrame {
+            hall: three(codes, self.hall),
+            capacitive: three(codes, self.capacitive),
+            sequence,
+            time_us,
+        }
     }
 }
 
@@ -78,6 +90,13 @@ mod tests {
         let channels = Channels::new([7, 0, 3], [1, 6, 2]).expect("six inputs");
         assert_eq!(channels.mask(), 0b1100_1111);
         let codes = [10, 11, 12, 13, 14, 15, 16, 17];
-        assert_eq!(channels.pick(&codes), ([17, 10, 13], [11, 16, 12]));
+        let frame = channels.frame(&codes, 7, 14_000);
+        let want = RawFrame {
+            hall: [17, 10, 13],
+            capacitive: [11, 16, 12],
+            sequence: 7,
+            time_us: 14_000,
+        };
+        assert_eq!(frame, want);
     }
 }

@@ -3,23 +3,50 @@
 //! | module | part | what it is |
 //! |---|---|---|
 //! | [`ads131m08`] | TI ADS131M08 | eight channels of 24 bits sampled at once, CRC over every frame |
-//! | [`ads8688`] | TI ADS8688 | eight channels of 16 bits one after the other, no CRC |
-//! | [`channels`] | any | which input carries which sensor |
-//! | [`stuck`] | any | codes that never change: a converter that stands still |
+//! | [`ads8688`] | TI ADS8688 | eight channels of 16 bits, sampled one after the other, no CRC |
+//! | [`Channels`] | any | which input carries which sensor |
+//! | [`stuck`] | any | codes that never change: a converter that is frozen |
 //!
-//! Which to take: the first where the stage moves fast or the cable is long. The skew of the
+//! Which to choose: the first where the stage moves fast or the cable is long. The skew of the
 //! second costs 48 nm at the fastest motion of a service log (4.8 mm/s; see [`ads8688`]),
-//! a tenth of the Hall noise, and its frames carry no check but a signature of six bits.
+//! a tenth of the Hall noise, and the only check in its frames is a signature of six bits.
 //!
-//! The drivers own an [`SpiDevice`](embedded_hal::spi::SpiDevice), which owns chip select.
-//! They allocate nothing, have no panic and wait for nothing that may not come: 10 us for a
-//! reset in [`FrameSampler::start`], 1 us for a pulse in [`FrameSampler::trigger`]. No driver crate of either part served: that of the ADS131M08
-//! owns chip select and data-ready pins itself, waits 100 ms at start and offers the last
-//! codes in place of damaged ones; of the ADS8688 there is none.
+//! A driver owns an [`SpiDevice`](embedded_hal::spi::SpiDevice), which owns chip select, and the
+//! part's control pin. It allocates nothing, cannot panic, and its waits are fixed and short:
+//! 10 us for a reset in [`FrameSampler::start`], 1 us for a pulse in [`FrameSampler::trigger`].
+//! No published driver would do: the one for the ADS131M08 drives chip select and data-ready
+//! pins itself, waits 100 ms at start and returns the previous codes in place of damaged ones;
+//! for the ADS8688 there is none.
+//!
+//! ```
+//! use embedded_hal_mock::eh1::{delay::NoopDelay, digital, spi};
+//! use hal_adapters::adc::{Ads8688, Channels, FrameSampler};
+//!
+//! // Mocks in place of a HAL's SPI device and pin: a frame that starts the sequence, then one
+//! // for each of the six inputs, all with code 0x8001 and the input's signature.
+//! let frame = |sent: [u8; 5], read: [u8; 5]| {
+//!     use spi::Transaction as T;
+//!     [T::transaction_start(), T::transfer_in_place(sent.to_vec(), read.to_vec()), T::transaction_end()]
+//! };
+//! let mut expected = frame([0xa0, 0, 0, 0, 0], [0; 5]).to_vec();
+//! for input in 0..6 {
+//!     expected.extend(frame([0; 5], [0, 0, 0x80, 0x01, input << 4 | 0b0100]));
+//! }
+//! let (mut bus, mut pin) = (spi::Mock::new(&expected), digital::Mock::new(&[]));
+//!
+//! let mut converter = Ads8688::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
+//! // Once: converter.start(&mut delay)?; then in every tick:
+//! converter.trigger(&mut NoopDelay::new())?;
+//! let frame = converter.sample(7, 14_000)?;
+//! assert_eq!((frame.hall, frame.capacitive, frame.sequence), ([1; 3], [1; 3], 7));
+//! # bus.done();
+//! # pin.done();
+//! # Ok::<(), hal_adapters::adc::AdcError<embedded_hal::spi::ErrorKind>>(())
+//! ```
 
 pub mod ads131m08;
 pub mod ads8688;
-pub mod channels;
+mod channels;
 pub mod stuck;
 
 pub use ads131m08::Ads131m08;
@@ -28,18 +55,29 @@ pub use channels::Channels;
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital;
+use embedded_hal::spi::Mode;
 use runtime::RawFrame;
 
 /// Samples all six codes of one servo period.
 ///
 /// Call [`trigger`](Self::trigger) on the servo's schedule, and [`sample`](Self::sample)
-/// [`SETTLE_US`](Self::SETTLE_US) later. After an error the next period may be tried as it
-/// is, or after [`start`](Self::start).
+/// [`SETTLE_US`](Self::SETTLE_US) later. After an error the next period can be tried directly,
+/// or after another [`start`](Self::start).
+///
+/// The constants are all that a board needs to know of the part. Drivers are made by
+/// `new(spi, pin, channels)`, `pin` being the part's one control pin, so that a board can name
+/// the part by a type alone.
 pub trait FrameSampler {
     /// The bus's own error.
     type Bus: embedded_hal::spi::Error;
 
-    /// From the trigger until the codes are there, us.
+    /// SPI mode of the part.
+    const SPI_MODE: Mode;
+
+    /// Fastest SPI clock of the part, Hz.
+    const SPI_HZ_MAX: u32;
+
+    /// From the trigger until the codes can be read, us.
     const SETTLE_US: u32;
 
     /// Resets the part, checks what it is, sets it up and reads the settings back.
@@ -48,17 +86,17 @@ pub trait FrameSampler {
     /// See [`AdcError`]; the part may then be in any state, and this may be called again.
     fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<Self::Bus>>;
 
-    /// Starts the conversion of one period, on parts that have a way to.
+    /// Starts the conversion of one period, on parts that can be triggered.
     ///
     /// # Errors
     /// [`AdcError::Pin`].
     fn trigger(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<Self::Bus>>;
 
-    /// Reads the codes of one period. `sequence` and `time_us` go into the frame as they are.
+    /// Reads the codes of one period. `sequence` and `time_us` go into the frame unchanged.
     /// A code at a rail is no error here: the decoder's window refuses it.
     ///
     /// # Errors
-    /// See [`AdcError`]; no code of such a period is to be used.
+    /// See [`AdcError`]; the period then has no codes at all.
     fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<Self::Bus>>;
 }
 
@@ -71,21 +109,21 @@ pub enum AdcError<B> {
     Pin(digital::ErrorKind),
     /// The data line never moved: no power, no clock, a broken wire.
     Silent {
-        /// The byte that was read all along.
+        /// The value of every byte that was read.
         level: u8,
     },
-    /// Another part answers than the one expected, or it was not reset.
+    /// A different part answers, or the right one was not reset.
     WrongId {
         /// What identifies the part that is there.
         found: u16,
         /// What identifies the part that was expected.
         expected: u16,
     },
-    /// A setting does not read back, or was lost since.
+    /// A setting does not read back, or was lost later.
     WrongSetting {
         /// Address of the register.
         register: u8,
-        /// Its value, as far as it is known.
+        /// The value that was read.
         found: u16,
         /// The value that was wanted.
         wanted: u16,
@@ -104,7 +142,7 @@ pub enum AdcError<B> {
         /// Bit k set: input k is read.
         read: u8,
     },
-    /// The code of another input came, or a frame without the part's signature.
+    /// The code of a different input came, or a frame without the part's signature.
     WrongInput {
         /// The signature that came.
         found: u8,
@@ -179,9 +217,27 @@ impl<B: core::fmt::Debug> core::fmt::Display for AdcError<B> {
 
 impl<B: core::fmt::Debug> core::error::Error for AdcError<B> {}
 
-/// The byte that a whole frame consists of, if it does.
+/// The level of a line that never moved: the frame is all 0x00 or all 0xFF.
 fn silent(bytes: &[u8]) -> Option<u8> {
     let first = *bytes.first()?;
     let quiet = first == 0x00 || first == 0xff;
     (quiet && bytes.iter().all(|&b| b == first)).then_some(first)
+}
+
+#[cfg(test)]
+mod testing {
+    use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
+
+    /// A bus that always fails.
+    pub(super) struct Broken;
+
+    impl ErrorType for Broken {
+        type Error = ErrorKind;
+    }
+
+    impl SpiDevice for Broken {
+        fn transaction(&mut self, _: &mut [Operation<'_, u8>]) -> Result<(), ErrorKind> {
+            Err(ErrorKind::ModeFault)
+        }
+    }
 }

@@ -1,11 +1,11 @@
-//! Codes that never change. A converter may freeze and still send sound frames; noise tells
-//! it from a stage at rest: 0.5 um of Hall noise are eight codes of 16 bits, so six codes of
-//! a sound stage stay the same once in about half a million periods.
+//! Codes that never change. A converter can freeze and still send valid frames. Noise tells a
+//! stage at rest from a frozen converter: 0.5 um of Hall noise are eight codes of 16 bits, so
+//! all six codes of a working stage repeat once in about half a million periods.
 
 use super::AdcError;
 use runtime::RawFrame;
 
-/// Periods without any change that are a fault. By noise alone: once in 10^45 periods.
+/// So many periods without any change are a fault. Noise alone does it once in 10^45 periods.
 pub const STUCK_PERIODS: u8 = 8;
 
 /// Watches successive frames.
@@ -25,8 +25,7 @@ impl StuckWatch {
     /// Passes the frame on.
     ///
     /// # Errors
-    /// [`AdcError::Stuck`] from the [`STUCK_PERIODS`]th frame in a row that repeats the codes
-    /// before it, until one changes.
+    /// [`AdcError::Stuck`] from the [`STUCK_PERIODS`]th repetition in a row until a code changes.
     pub fn pass<B>(&mut self, frame: RawFrame) -> Result<RawFrame, AdcError<B>> {
         let codes = (frame.hall, frame.capacitive);
         self.unchanged = if self.last == Some(codes) {

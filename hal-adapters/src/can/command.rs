@@ -1,19 +1,29 @@
-//! Requests to the decoding node and its answers, and everything else that comes now and
-//! then: [`Mailbox`] numbers what is sent and checks what is received.
+//! Requests to the decoding node, its answers, and all other messages that are not sent in every
+//! tick. [`Mailbox`] numbers what is sent and checks what is received.
+//!
+//! ```
+//! use hal_adapters::can::BusFrame;
+//! use hal_adapters::can::command::{Command, Mailbox, Request, Told};
+//!
+//! let request = Told::Command(Command::new(Request::Rezero { ticks: 500 }, 17));
+//! let (mut host, mut node) = (Mailbox::default(), Mailbox::default());
+//! let sent = host.send(&request).map(BusFrame::from).unwrap();
+//! assert_eq!(node.take(&sent), Some(Ok(request)));
+//! ```
 
-use super::e2e::{Payload, protect, unprotect};
-use super::frame::Coded;
-use super::notice::BusFault;
+use super::e2e::{Payload, protect};
+use super::frame::{Coded, standard};
+use super::notice::{BusFault, open};
 use super::status::{HealthPage, NodeStatus};
-use super::table::{FRAME_BYTES, Message};
-use embedded_can::{Frame, Id};
+use super::table::Message;
+use embedded_can::Frame;
 use runtime::rezero::RezeroRefusal;
 
 /// What a node is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Average `ticks` ticks at rest and subtract the mean from then on; 0 for the default
-    /// of [`runtime::rezero::RezeroSettings`].
+    /// Average `ticks` ticks at rest, and subtract the mean from then on; 0 stands for the
+    /// default of [`runtime::rezero::RezeroSettings`].
     Rezero {
         /// Ticks to average.
         ticks: u16,
@@ -23,7 +33,7 @@ pub enum Request {
         /// How long, s.
         seconds: u8,
     },
-    /// Subtract nothing any more.
+    /// Stop subtracting the mean of a re-zero.
     ClearZero,
 }
 
@@ -92,7 +102,7 @@ impl Command {
 pub enum Outcome {
     /// It was done.
     Done = 0,
-    /// It runs; another answer follows.
+    /// It is running; another answer follows.
     Started = 1,
     /// This node does not know it.
     UnknownCommand = 2,
@@ -122,9 +132,7 @@ impl Outcome {
         Self::Drifted,
         Self::Busy,
     ];
-}
 
-impl Outcome {
     /// Outcome and detail of a refused re-zero.
     pub fn of_refusal(refusal: &RezeroRefusal) -> (Self, u32) {
         match *refusal {
@@ -217,10 +225,10 @@ impl IdentityPage {
     }
 }
 
-/// What an occasional frame tells.
+/// The content of an occasional frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Told {
-    /// What the decoding node is doing.
+    /// State of the decoding node.
     Status(NodeStatus),
     /// One of its counters.
     Health(HealthPage),
@@ -266,11 +274,12 @@ impl Told {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mailbox {
     sent: [u8; 5],
-    received: [Option<[u8; FRAME_BYTES]>; 5],
+    /// Counter and payload of the last frame of each message.
+    received: [Option<(u8, Payload)>; 5],
 }
 
 impl Mailbox {
-    /// The frame that tells `what`.
+    /// The frame with this content.
     pub fn send(&mut self, what: &Told) -> Option<Coded> {
         let (k, payload) = what.payload();
         let (message, counter) = (*Told::MESSAGES.get(k)?, self.sent.get_mut(k)?);
@@ -279,36 +288,23 @@ impl Mailbox {
         Some(Coded { message, bytes })
     }
 
-    /// What a frame tells; `None` for a frame of another kind.
+    /// The content of a frame; `None` for a frame of another kind.
     ///
-    /// A gap in the numbers is no fault here, and neither is a sender that starts anew: what
-    /// comes now and then has no rhythm to keep. The last frame again, bit for bit, is: a
-    /// program that sends one request and ends must choose another token each time.
+    /// A gap in the counter is no fault here, and neither is a sender that restarts, since these
+    /// messages have no fixed rate. A frame that equals the last one bit for bit is a fault:
+    /// a program that sends one request and ends must choose a different token each time.
     pub fn take<F: Frame>(&mut self, frame: &F) -> Option<Result<Told, BusFault>> {
-        let Id::Standard(id) = frame.id() else {
-            return None;
-        };
+        let (id, data) = standard(frame)?;
         let k = Told::MESSAGES.iter().position(|m| m.id() == id)?;
         let (message, last) = (*Told::MESSAGES.get(k)?, self.received.get_mut(k)?);
-        let data = if frame.is_remote_frame() {
-            &[]
-        } else {
-            frame.data()
+        let opened = match open(message, data) {
+            Ok(opened) => opened,
+            Err(fault) => return Some(Err(fault)),
         };
-        let Some(bytes) = data
-            .first_chunk::<FRAME_BYTES>()
-            .filter(|_| data.len() == FRAME_BYTES)
-        else {
-            let bytes = data.len() as u8;
-            return Some(Err(BusFault::WrongLength { message, bytes }));
-        };
-        let Some((_, payload)) = unprotect(message.spec().key, bytes) else {
-            return Some(Err(BusFault::WrongCheck { message }));
-        };
-        if last.replace(*bytes) == Some(*bytes) {
+        if last.replace(opened) == Some(opened) {
             return Some(Err(BusFault::Repeated { message }));
         }
-        Some(Ok(Told::read(k, payload)))
+        Some(Ok(Told::read(k, opened.1)))
     }
 }
 

@@ -1,4 +1,5 @@
-//! The `.dbc` file and the tables of `protocol.md`, written from [`TABLE`].
+//! The file `stage.dbc` and the tables of `protocol.md` follow from [`TABLE`]. The tests below
+//! compare them, and write them anew when they run with `UPDATE_PROTOCOL=1`.
 
 use super::PROTOCOL_VERSION;
 use super::e2e::BASE_LIST;
@@ -15,7 +16,7 @@ const PERIOD_MS: u32 = 2;
 ///
 /// # Errors
 /// Only those of `out`.
-pub fn write_dbc(out: &mut impl Write) -> Result {
+pub(super) fn write_dbc(out: &mut impl Write) -> Result {
     writeln!(out, "VERSION \"{PROTOCOL_VERSION}\"\n\nNS_ :\n\nBS_:\n")?;
     out.write_str("BU_:")?;
     for node in Node::ALL {
@@ -109,7 +110,7 @@ fn write_comments(out: &mut impl Write) -> Result {
 ///
 /// # Errors
 /// Only those of `out`.
-pub fn write_tables(out: &mut impl Write) -> Result {
+pub(super) fn write_tables(out: &mut impl Write) -> Result {
     out.write_str("| identifier | message | key | sent by | every | what |\n")?;
     out.write_str("|---|---|---|---|---|---|\n")?;
     for row in &TABLE {

@@ -1,17 +1,17 @@
 //! End-to-end protection after AUTOSAR E2E Profile 2.
 //!
-//! Byte 0 of every frame is a CRC-8 (polynomial 0x2F, start 0xFF, final XOR 0xFF), taken over
+//! Byte 0 of every frame is a CRC-8 (polynomial 0x2F, start 0xFF, final XOR 0xFF), computed over
 //! bytes 1 to 7 and then over one byte that is never sent: the data ID. The low nibble of
-//! byte 1 is a counter that each sent frame of a message raises by one, 0 to 15 and round.
-//! Profile 2 takes the data ID from a list of sixteen, by the counter; every message has a
-//! list of its own, so that a frame under the identifier of another message fails its check.
+//! byte 1 is a counter, which each frame of a message raises by one, from 15 back to 0.
+//! Profile 2 takes the data ID from a list of sixteen, by the counter. Every message has its
+//! own list, so a frame under the identifier of another message fails its check.
 //!
-//! A list cannot be drawn at random: a flipped counter bit also changes the data ID, which
-//! costs the polynomial its guarantee (any three flipped bits), and the check's place before
-//! the data lets three bursts of eight bits through. [`BASE_LIST`] was searched so that, at
-//! every counter, no pattern of up to three flipped bits and no burst of up to eight in the
-//! 64 data bits passes; a test tries all of them. Lists of other messages are the base list
-//! XOR a key, which keeps the property: it depends on differences only.
+//! The list must not be chosen at random. A flipped bit of the counter also changes the data ID,
+//! and the polynomial then no longer finds all patterns of three flipped bits; and because the
+//! check comes before the data, three bursts of eight bits would pass. [`BASE_LIST`] is the
+//! result of a search: at every counter, no pattern of up to three flipped bits and no burst of
+//! up to eight in the 64 data bits passes; a test tries all of them. The list of a message is
+//! the base list XOR its key. This keeps the property, which depends on differences only.
 //!
 //! | here | Profile 2 |
 //! |---|---|
@@ -22,9 +22,12 @@
 //! | [`Verdict::WrongSequence`] | WRONGSEQUENCE |
 //! | [`Verdict::Resumed`] | SYNC, concluded |
 //! | failed check | WRONGCRC |
-//! | stale ([`super::notice`]) | NONEWDATA |
+//! | [`Stale`](BusFault::Stale) | NONEWDATA |
 
-/// The 52 bits that a protected frame carries beside check and counter.
+use super::notice::BusFault;
+use super::table::Message;
+
+/// The 52 bits of a protected frame besides check and counter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Payload {
     /// Bits 12 to 31 of the frame: the high nibble of byte 1, then bytes 2 and 3. The upper
@@ -35,14 +38,14 @@ pub struct Payload {
 }
 
 /// Bits of [`Payload::short`].
-pub const SHORT_BITS: u32 = 20;
+pub(super) const SHORT_BITS: u32 = 20;
 
 /// The data IDs of the message with key 0, by counter. See the module.
 pub const BASE_LIST: [u8; 16] = [
     0, 48, 53, 119, 226, 9, 20, 141, 96, 249, 252, 190, 130, 105, 221, 237,
 ];
 
-/// CRC-8 with polynomial 0x2F, one step of eight bits for each value of the register.
+/// CRC-8 with polynomial 0x2F: the register after eight bits, for each value before them.
 const TABLE: [u8; 256] = {
     let mut table = [0; 256];
     let mut value = 0;
@@ -70,7 +73,7 @@ const fn step(register: u8, byte: u8) -> u8 {
 }
 
 /// The check over bytes 1 to 7 of a frame and a data ID. `low` holds bytes 0 to 3 and `high`
-/// bytes 4 to 7, lowest first: words, since a controller handles them as it does bytes.
+/// bytes 4 to 7, lowest first.
 #[inline(always)]
 const fn check_byte(low: u32, high: u32, data_id: u8) -> u8 {
     let head = step(0xff, (low >> 8) as u8);
@@ -82,7 +85,7 @@ const fn check_byte(low: u32, high: u32, data_id: u8) -> u8 {
 
 /// The data ID of the message with this key at this counter (its low nibble).
 #[inline(always)]
-pub const fn data_id(key: u8, counter: u8) -> u8 {
+const fn data_id(key: u8, counter: u8) -> u8 {
     BASE_LIST[(counter & 0xf) as usize] ^ key
 }
 
@@ -111,7 +114,7 @@ pub const fn unprotect(key: u8, bytes: &[u8; 8]) -> Option<(u8, Payload)> {
     Some((counter, payload))
 }
 
-/// What a frame's counter says, after its check held.
+/// What the counter of a frame with a correct check means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The first frame of this message: used.
@@ -125,39 +128,46 @@ pub enum Verdict {
     },
     /// The counter of the last frame again: not used.
     Repeated,
-    /// Neither the last counter nor one close ahead: a frame that came late, a sender that
-    /// started again, or a longer gap. Not used.
+    /// Any other counter: a frame that came late, a sender that restarted, or a longer gap.
+    /// Not used.
     WrongSequence {
         /// Distance to the last used counter, modulo 16.
         ahead: u8,
     },
-    /// The second of two successive frames after a break of the sequence: used.
+    /// The second of two successive frames after a break in the sequence: used.
     Resumed,
 }
 
 impl Verdict {
     /// Whether the frame's data may be used.
     pub const fn is_used(self) -> bool {
-        matches!(
-            self,
-            Self::First | Self::Next | Self::Lost { .. } | Self::Resumed
-        )
+        !matches!(self, Self::Repeated | Self::WrongSequence { .. })
+    }
+
+    /// What is wrong with a frame of `message` and this verdict, or missing before it.
+    pub const fn fault(self, message: Message) -> Option<BusFault> {
+        match self {
+            Self::First | Self::Next | Self::Resumed => None,
+            Self::Lost { frames } => Some(BusFault::Lost { message, frames }),
+            Self::Repeated => Some(BusFault::Repeated { message }),
+            Self::WrongSequence { ahead } => Some(BusFault::WrongSequence { message, ahead }),
+        }
     }
 }
 
-/// Missing frames in a row that are bridged; more is a wrong sequence.
+/// The most missing frames in a row after which the next is still used.
 pub const LOST_MAX: u8 = 2;
 
-/// The counters of one message, as its receiver knows them.
+/// The counters of one message, at its receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sequence {
-    /// The last one used.
+    /// That of the last frame used.
     last: u8,
-    /// One out of sequence, whose successor may resume.
+    /// That of the last frame out of sequence: its successor is used.
     candidate: u8,
 }
 
-/// In place of a counter that there is not yet.
+/// Stands for no counter.
 const NO_COUNTER: u8 = 0xff;
 
 impl Default for Sequence {
@@ -173,11 +183,11 @@ impl Sequence {
         candidate: NO_COUNTER,
     };
 
-    /// Takes the counter of a frame whose check held if it follows the last one; `false`, and
-    /// no change, if not.
+    /// Notes the counter of a frame with a correct check if it follows the last one; otherwise
+    /// returns `false` and changes nothing.
     #[inline(always)]
     pub(super) const fn follow(&mut self, counter: u8) -> bool {
-        // Where there is no last counter yet, this is never true.
+        // Never true of `NO_COUNTER`.
         let follows = self.last == counter.wrapping_sub(1) & 0xf;
         if follows {
             self.last = counter;
@@ -186,7 +196,7 @@ impl Sequence {
         follows
     }
 
-    /// Judges the counter, 0 to 15, of a frame whose check held.
+    /// Judges the counter, 0 to 15, of a frame with a correct check.
     pub const fn judge(&mut self, counter: u8) -> Verdict {
         if self.follow(counter) {
             return Verdict::Next;

@@ -1,5 +1,5 @@
-//! Frames by value: coded ones on their way to any controller, and an owned frame for
-//! replays, wrappers and logs.
+//! Frames by value: [`Coded`], ready for any CAN controller, and [`BusFrame`], for receivers,
+//! logs and replays.
 
 use super::table::Message;
 use embedded_can::{Frame, Id, StandardId};
@@ -7,7 +7,7 @@ use embedded_can::{Frame, Id, StandardId};
 /// A protected frame, ready to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coded {
-    /// Which message.
+    /// The message.
     pub message: Message,
     /// Its eight bytes.
     pub bytes: [u8; 8],
@@ -136,6 +136,21 @@ impl Frame for BusFrame {
         let length = if self.remote { 0 } else { self.dlc() };
         self.bytes.get(..length).unwrap_or(&self.bytes)
     }
+}
+
+/// Identifier and data of a standard frame; a remote frame has no data. `None` for an extended
+/// frame: the protocol has none.
+#[inline(always)]
+pub(super) fn standard<F: Frame>(frame: &F) -> Option<(StandardId, &[u8])> {
+    let Id::Standard(id) = frame.id() else {
+        return None;
+    };
+    let data: &[u8] = if frame.is_remote_frame() {
+        &[]
+    } else {
+        frame.data()
+    };
+    Some((id, data))
 }
 
 /// A frame and when it was received.

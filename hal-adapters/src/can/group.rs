@@ -1,39 +1,42 @@
-//! Frames of one tick, collected: what [`super::receiver`] and [`super::pose`] share.
+//! The frames of one tick, collected: what [`super::receiver`] and [`super::pose`] share.
 //!
-//! A group is a set of messages that are sent together, each once a tick, with the same
-//! counter. Frames may come in any order within a tick. A tick is handed out as soon as it
-//! is complete, when a frame of a later tick comes, or when its time is over; what is
-//! missing then is missing.
+//! A group is two or three messages that are sent together, each once a tick, with the same
+//! counter. The frames of a tick may come in any order. A tick is handed out when it is
+//! complete, when a frame of a later tick comes, or when its time is over; frames that are
+//! missing then stay missing.
 
-use super::e2e::{Payload, Sequence, Verdict, unprotect};
-use super::notice::{BusFault, BusHealth, Taken, Timing};
-use super::table::{FRAME_BYTES, Message};
+use super::e2e::{Payload, Sequence, Verdict};
+use super::notice::{BusFault, BusHealth, Taken, Timing, open};
+use super::table::Message;
+
+/// The most messages of a group.
+const MESSAGES_MAX: usize = 3;
 
 /// The frames of one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct GroupTick<const N: usize> {
+pub(super) struct GroupTick {
     /// Number of the tick, counted by the receiver.
     pub(super) sequence: u32,
     /// When its first frame came, us.
     pub(super) time_us: u32,
-    /// Bit k is set if frame k of the group came and was good.
-    came: u32,
-    payloads: [Payload; N],
+    /// Bit k is set as long as frame k of the group did not come, or was not good.
+    missing: u32,
+    payloads: [Payload; MESSAGES_MAX],
 }
 
-impl<const N: usize> GroupTick<N> {
-    const ALL: u32 = (1 << N) - 1;
+impl GroupTick {
+    const EMPTY: Self = Self {
+        sequence: 0,
+        time_us: 0,
+        missing: 0,
+        payloads: [Payload { short: 0, long: 0 }; MESSAGES_MAX],
+    };
 
     /// The payload of frame `k`, if it came and was good.
     #[inline(always)]
     pub(super) fn payload(&self, k: usize) -> Option<Payload> {
         let payload = self.payloads.get(k)?;
-        (self.came >> k & 1 == 1).then_some(*payload)
-    }
-
-    #[inline(always)]
-    const fn is_whole(&self) -> bool {
-        self.came == Self::ALL
+        (self.missing >> k & 1 == 0).then_some(*payload)
     }
 }
 
@@ -44,25 +47,29 @@ enum Silence {
     NotYet,
     /// The last good frame came then, us.
     Since(u32),
-    /// Too long: told once.
+    /// Too long. Reported once.
     Stale,
 }
 
-/// Collects the frames of `N` messages.
+/// Collects the frames of a group.
 #[derive(Clone, Debug)]
-pub(super) struct Group<const N: usize> {
+pub(super) struct Group {
     timing: Timing,
-    sequences: [Sequence; N],
+    /// [`GroupTick::missing`] of a tick of which no frame came.
+    all_missing: u32,
+    sequences: [Sequence; MESSAGES_MAX],
     is_started: bool,
     newest: u32,
     done: Option<u32>,
     is_open: bool,
-    pending: GroupTick<N>,
+    pending: GroupTick,
+    /// The last tick that was handed out incomplete.
+    over: GroupTick,
     silence: Silence,
     health: BusHealth,
 }
 
-/// Whether `limit_us` passed between `then` and `now`; not if the clock stepped back.
+/// Whether `limit_us` passed from `then` to `now`; false if the clock stepped back.
 #[inline(always)]
 const fn is_over(now: u32, then: u32, limit_us: u32) -> bool {
     now.wrapping_sub(then).wrapping_sub(limit_us) as i32 >= 0
@@ -73,33 +80,21 @@ const fn is_after(a: u32, b: u32) -> bool {
     a != b && a.wrapping_sub(b) <= u32::MAX / 2
 }
 
-impl<const N: usize> Group<N> {
-    pub(super) const fn new(timing: Timing) -> Self {
+impl Group {
+    /// A group of `messages` messages, two or three.
+    pub(super) const fn new(messages: usize, timing: Timing) -> Self {
         Self {
             timing,
-            sequences: [Sequence::START; N],
+            all_missing: (1 << messages) - 1,
+            sequences: [Sequence::START; MESSAGES_MAX],
             is_started: false,
             newest: 0,
             done: None,
             is_open: false,
-            pending: GroupTick {
-                sequence: 0,
-                time_us: 0,
-                came: 0,
-                payloads: [Payload { short: 0, long: 0 }; N],
-            },
+            pending: GroupTick::EMPTY,
+            over: GroupTick::EMPTY,
             silence: Silence::NotYet,
-            health: BusHealth {
-                good: 0,
-                wrong_length: 0,
-                wrong_check: 0,
-                repeated: 0,
-                wrong_sequence: 0,
-                lost: 0,
-                late: 0,
-                incomplete: 0,
-                stale: 0,
-            },
+            health: BusHealth::NONE,
         }
     }
 
@@ -121,12 +116,14 @@ impl<const N: usize> Group<N> {
         self.newest.wrapping_add((ahead as i32 >> 28) as u32)
     }
 
-    /// Counts `ticks` ticks that no frame told of.
+    /// Counts `ticks` ticks that were lost unnoticed.
     pub(super) const fn skip(&mut self, ticks: u32) {
         self.newest = self.newest.wrapping_add(ticks);
     }
 
     /// Notes a fault of the source and returns it.
+    #[cold]
+    #[inline(never)]
     pub(super) fn note(&mut self, fault: BusFault) -> BusFault {
         self.health.count(&fault);
         fault
@@ -141,36 +138,23 @@ impl<const N: usize> Group<N> {
         message: Message,
         data: &[u8],
         now_us: u32,
-        make: impl Fn(&GroupTick<N>) -> T,
+        make: impl Fn(&GroupTick) -> T,
     ) -> Taken<T> {
-        let bytes = match data.first_chunk::<FRAME_BYTES>() {
-            Some(bytes) if data.len() == FRAME_BYTES => bytes,
-            _ => {
-                let bytes = data.len() as u8;
-                return self.refuse(BusFault::WrongLength { message, bytes });
-            }
-        };
-        let Some((counter, payload)) = unprotect(message.spec().key, bytes) else {
-            return self.refuse(BusFault::WrongCheck { message });
-        };
-        if !self.is_due(k, counter, now_us) {
-            return self.take_odd(k, message, (counter, payload), now_us, make);
+        if let Ok((counter, payload)) = open(message, data)
+            && self.follow(k, counter, now_us)
+        {
+            return Taken {
+                tick: self.take_due(k, payload, now_us).map(make),
+                fault: None,
+            };
         }
-        self.is_good(now_us);
-        if !self.is_open {
-            self.newest = self.newest.wrapping_add(1);
-            self.open(self.newest, now_us);
-        }
-        Taken {
-            tick: self.fill(k, payload, make),
-            fault: None,
-        }
+        self.take_odd(k, message, data, now_us).map(make)
     }
 
-    /// Whether a counter is the one that is due, of a tick that can be taken; if so it is
-    /// noted. Anything else is left to [`Group::take_odd`].
+    /// Whether a frame is the next one of its message and of a tick that still takes frames; if
+    /// so, its counter is noted.
     #[inline(always)]
-    fn is_due(&mut self, k: usize, counter: u8, now_us: u32) -> bool {
+    fn follow(&mut self, k: usize, counter: u8, now_us: u32) -> bool {
         let tick = if self.is_open {
             if is_over(now_us, self.pending.time_us, self.timing.assembly_us) {
                 return false;
@@ -183,60 +167,72 @@ impl<const N: usize> Group<N> {
         fits && self.sequences.get_mut(k).is_some_and(|s| s.follow(counter))
     }
 
+    /// Takes a frame that is due.
+    #[inline(always)]
+    fn take_due(&mut self, k: usize, payload: Payload, now_us: u32) -> Option<&GroupTick> {
+        self.note_good(now_us);
+        if !self.is_open {
+            self.newest = self.newest.wrapping_add(1);
+            self.open(self.newest, now_us);
+        }
+        self.fill(k, payload)
+    }
+
     /// Notes that a good frame came.
     #[inline(always)]
-    const fn is_good(&mut self, now_us: u32) {
-        // As a saturating addition, without writing what stays.
+    const fn note_good(&mut self, now_us: u32) {
+        // Saturates.
         if let Some(good) = self.health.good.checked_add(1) {
             self.health.good = good;
         }
         self.silence = Silence::Since(now_us);
     }
 
-    /// A frame whose check held, but which is not the one that is due.
+    /// Takes any other frame: damaged, out of sequence, of another tick or of an expired one.
     #[cold]
     #[inline(never)]
-    fn take_odd<T>(
+    fn take_odd(
         &mut self,
         k: usize,
         message: Message,
-        (counter, payload): (u8, Payload),
+        data: &[u8],
         now_us: u32,
-        make: impl Fn(&GroupTick<N>) -> T,
-    ) -> Taken<T> {
+    ) -> Taken<&GroupTick> {
+        let (counter, payload) = match open(message, data) {
+            Ok(opened) => opened,
+            Err(fault) => return self.refuse(fault),
+        };
         let Some(sequence) = self.sequences.get_mut(k) else {
             return Taken::NOTHING;
         };
         let verdict = sequence.judge(counter);
-        let fault = match verdict {
-            Verdict::Repeated => return self.refuse(BusFault::Repeated { message }),
-            Verdict::WrongSequence { ahead } => {
-                return self.refuse(BusFault::WrongSequence { message, ahead });
-            }
-            Verdict::Lost { frames } => Some(self.note(BusFault::Lost { message, frames })),
-            Verdict::First | Verdict::Next | Verdict::Resumed => None,
-        };
-        self.is_good(now_us);
+        let fault = verdict.fault(message).map(|fault| self.note(fault));
+        if !verdict.is_used() {
+            return Taken { tick: None, fault };
+        }
+        self.note_good(now_us);
         let mut tick = self.nearest(counter);
         if self.done.is_some_and(|done| !is_after(tick, done)) {
             if verdict != Verdict::Resumed {
                 return self.refuse(BusFault::Late { message });
             }
-            // After a break the sender goes on from anywhere: on with the numbers, never back.
+            // After a break the sender continues with any counter. Numbers of ticks only rise.
             tick = tick.wrapping_add(16);
         }
-        let mut over = None;
+        let mut ends = false;
         if self.is_open {
-            // A tick whose time is over takes no more frames: 16 ticks on, its counter returns.
+            // The counter of an expired tick returns 16 ticks later: such a frame is not its own.
             let expired = is_over(now_us, self.pending.time_us, self.timing.assembly_us);
             let same = self.pending.sequence == tick;
             let older = !same && !is_after(tick, self.pending.sequence);
             if expired || !(same || older) {
-                over = self.hand_out(&make);
+                self.hand_out();
+                ends = true;
             }
             if older || (same && expired) {
                 let fault = Some(self.note(BusFault::Late { message }));
-                return Taken { tick: over, fault };
+                let tick = ends.then_some(&self.over);
+                return Taken { tick, fault };
             }
         }
         self.newest = tick;
@@ -244,12 +240,15 @@ impl<const N: usize> Group<N> {
         if !self.is_open {
             self.open(tick, now_us);
         }
-        // A group has two messages at least, so a tick that was just opened is not whole.
-        let whole = self.fill(k, payload, make);
-        Taken {
-            tick: over.or(whole),
-            fault,
-        }
+        // A group has at least two messages, so a tick that was just opened is not complete, and
+        // at most one tick is handed out.
+        let tick = if ends {
+            self.fill(k, payload);
+            Some(&self.over)
+        } else {
+            self.fill(k, payload)
+        };
+        Taken { tick, fault }
     }
 
     #[inline(always)]
@@ -257,64 +256,59 @@ impl<const N: usize> Group<N> {
         self.is_open = true;
         self.pending.sequence = tick;
         self.pending.time_us = now_us;
-        self.pending.came = 0;
+        self.pending.missing = self.all_missing;
     }
 
-    /// Puts a payload into the open tick, and hands the tick out if it is whole by it.
+    /// Puts a payload into the open tick, and hands the tick out if that completes it.
     #[inline(always)]
-    fn fill<T>(
-        &mut self,
-        k: usize,
-        payload: Payload,
-        make: impl Fn(&GroupTick<N>) -> T,
-    ) -> Option<T> {
+    fn fill(&mut self, k: usize, payload: Payload) -> Option<&GroupTick> {
         if let Some(slot) = self.pending.payloads.get_mut(k) {
             *slot = payload;
         }
-        self.pending.came |= 1 << k;
-        if !self.pending.is_whole() {
+        self.pending.missing &= !(1 << k);
+        if self.pending.missing != 0 {
             return None;
         }
         self.is_open = false;
         self.done = Some(self.pending.sequence);
-        Some(make(&self.pending))
+        Some(&self.pending)
     }
 
-    #[cold]
-    #[inline(never)]
-    fn refuse<T>(&mut self, fault: BusFault) -> Taken<T> {
+    fn refuse(&mut self, fault: BusFault) -> Taken<&GroupTick> {
         Taken {
             tick: None,
             fault: Some(self.note(fault)),
         }
     }
 
-    /// Hands out the pending tick, whole or not.
+    /// Hands out the pending tick, complete or not.
     #[cold]
-    fn hand_out<T>(&mut self, make: impl Fn(&GroupTick<N>) -> T) -> Option<T> {
+    fn hand_out(&mut self) {
         self.is_open = false;
         self.done = Some(self.pending.sequence);
         self.health.incomplete = self.health.incomplete.saturating_add(1);
-        Some(make(&self.pending))
+        self.over = self.pending;
     }
 
-    /// What the passing of time gives: a tick whose time is over, a source that is stale.
-    pub(super) fn poll<T>(&mut self, now_us: u32, make: impl Fn(&GroupTick<N>) -> T) -> Taken<T> {
-        let mut taken = Taken::NOTHING;
-        if self.is_open && is_over(now_us, self.pending.time_us, self.timing.assembly_us) {
-            taken.tick = self.hand_out(make);
-        }
+    /// What the passing of time brings: a tick whose time is over, a source that is stale.
+    pub(super) fn poll(&mut self, now_us: u32) -> Taken<&GroupTick> {
+        let mut fault = None;
         if let Silence::Since(last) = self.silence
             && is_over(now_us, last, self.timing.stale_us)
         {
             self.silence = Silence::Stale;
             let age_us = now_us.wrapping_sub(last);
-            taken.fault = Some(self.note(BusFault::Stale { age_us }));
+            fault = Some(self.note(BusFault::Stale { age_us }));
         }
-        taken
+        let ends = self.is_open && is_over(now_us, self.pending.time_us, self.timing.assembly_us);
+        if ends {
+            self.hand_out();
+        }
+        let tick = ends.then_some(&self.over);
+        Taken { tick, fault }
     }
 
-    /// When [`Group::poll`] has something to say at the latest, if no frame comes.
+    /// When [`Group::poll`] will have something to report if no frame comes before.
     pub(super) fn deadline_us(&self) -> Option<u32> {
         if self.is_open {
             return Some(self.pending.time_us.wrapping_add(self.timing.assembly_us));

@@ -6,29 +6,30 @@ use super::table::{Node, Rate, SLOW_TICKS, TABLE};
 /// Bits from start of frame to the end of the CRC of a standard data frame with eight bytes:
 /// 1 start, 11 identifier, 1 RTR, 1 IDE, 1 reserved, 4 length, 64 data, 15 CRC. Only these
 /// are stuffed.
-pub const STUFFED_PART_BITS: u32 = 1 + 11 + 1 + 1 + 1 + 4 + 64 + 15;
+pub(super) const STUFFED_PART_BITS: u32 = 1 + 11 + 1 + 1 + 1 + 4 + 64 + 15;
 
 /// Bits after the CRC: 1 delimiter, 2 acknowledge, 7 end of frame, 3 between frames.
-pub const FIXED_PART_BITS: u32 = 1 + 2 + 7 + 3;
+pub(super) const FIXED_PART_BITS: u32 = 1 + 2 + 7 + 3;
 
 /// The longest that a frame of eight bytes can be: one stuff bit after the first five equal
 /// bits, and then, since a stuff bit opens the next run, one for every four: 24 of them.
-pub const FRAME_BITS_MAX: u32 = STUFFED_PART_BITS + (STUFFED_PART_BITS - 1) / 4 + FIXED_PART_BITS;
+pub(super) const FRAME_BITS_MAX: u32 =
+    STUFFED_PART_BITS + (STUFFED_PART_BITS - 1) / 4 + FIXED_PART_BITS;
 
 /// What is sent on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Traffic {
+pub(super) struct Traffic {
     /// Ticks per second.
-    pub ticks_per_s: u32,
+    pub(super) ticks_per_s: u32,
     /// How the codes are sent; `None` when the converters are on the decoding node.
-    pub layout: Option<Layout>,
+    pub(super) layout: Option<Layout>,
     /// Every how many ticks each vertical axis is sent; 0 for never.
-    pub vertical_ticks: u8,
+    pub(super) vertical_ticks: u8,
 }
 
 impl Traffic {
     /// Frames in [`SLOW_TICKS`] ticks, requests and answers aside.
-    pub fn frames_in_slow_ticks(&self) -> u32 {
+    pub(super) fn frames_in_slow_ticks(&self) -> u32 {
         let every = |ticks: u8| u32::from(SLOW_TICKS.checked_div(ticks).unwrap_or(0));
         TABLE
             .iter()
@@ -50,7 +51,7 @@ impl Traffic {
 
     /// The largest share of a bus of so many bits per second that the traffic can take: every
     /// frame with the most stuff bits, requests and answers aside.
-    pub fn worst_load(&self, bits_per_s: u32) -> f32 {
+    pub(super) fn worst_load(&self, bits_per_s: u32) -> f32 {
         let bits = self.frames_in_slow_ticks() as f32 * FRAME_BITS_MAX as f32;
         bits * self.ticks_per_s as f32 / f32::from(SLOW_TICKS) / bits_per_s as f32
     }

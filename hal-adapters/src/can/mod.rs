@@ -1,11 +1,13 @@
 #![doc = include_str!("protocol.md")]
 
 pub mod command;
-pub mod dbc;
+#[cfg(test)]
+mod dbc;
 pub mod e2e;
 pub mod frame;
 mod group;
-pub mod load;
+#[cfg(test)]
+mod load;
 pub mod notice;
 pub mod pose;
 pub mod receiver;

@@ -1,20 +1,20 @@
-//! What a receiver notices: faults of frames and of the source, counted.
+//! What a receiver reports: ticks, and faults of frames and of the source, which it counts.
 
-use super::table::Message;
+use super::e2e::{Payload, unprotect};
+use super::table::{FRAME_BYTES, Message};
 
-/// Times in us by which a receiver judges, below 2^30. All are data: nothing here reads a clock.
+/// Time limits of a receiver, us, below 2^30.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
-    /// A tick whose frames are not complete this long after its first one is handed out.
+    /// A tick is handed out this long after its first frame, complete or not.
     pub assembly_us: u32,
-    /// With no good frame for this long the source is stale.
+    /// The source is stale when no good frame came for this long.
     pub stale_us: u32,
 }
 
 impl Default for Timing {
-    /// For a servo period of 2 ms: half a period, and one and a half, so that a source that
-    /// falls silent is called stale within 4 ms by a receiver that is polled every
-    /// millisecond.
+    /// For a servo period of 2 ms: half a period, and one and a half. A receiver that is polled
+    /// every millisecond then reports a silent source within 4 ms.
     fn default() -> Self {
         Self {
             assembly_us: 1_000,
@@ -33,7 +33,7 @@ pub enum BusFault {
         /// Its data length.
         bytes: u8,
     },
-    /// The check fails: damaged, or a frame of another message.
+    /// The check fails: the frame is damaged, or belongs to another message.
     WrongCheck {
         /// Which message.
         message: Message,
@@ -43,7 +43,7 @@ pub enum BusFault {
         /// Which message.
         message: Message,
     },
-    /// The counter neither repeats nor follows: late, or after a long gap.
+    /// The counter neither repeats nor follows the last one: late, or after a long gap.
     WrongSequence {
         /// Which message.
         message: Message,
@@ -57,23 +57,40 @@ pub enum BusFault {
         /// How many.
         frames: u8,
     },
-    /// A good frame of a tick that was already handed out.
+    /// The frame is good, but its tick was handed out before.
     Late {
         /// Which message.
         message: Message,
     },
-    /// Whole ticks are missing in a multiple of 16, as the sensor node's own count shows.
+    /// A multiple of 16 ticks is missing, by the sensor node's own count.
     TicksLost {
         /// How many.
         ticks: u32,
     },
-    /// The sensor node counts its ticks anew: it started again.
+    /// The sensor node restarted: its count of ticks began again.
     SenderRestarted,
     /// No good frame for [`Timing::stale_us`].
     Stale {
         /// Age of the last good frame, us.
         age_us: u32,
     },
+}
+
+/// Counter and payload of a frame of `message`, from its data.
+///
+/// # Errors
+/// [`BusFault::WrongLength`] and [`BusFault::WrongCheck`].
+#[inline(always)]
+pub(super) fn open(message: Message, data: &[u8]) -> Result<(u8, Payload), BusFault> {
+    match data.first_chunk::<FRAME_BYTES>() {
+        Some(bytes) if data.len() == FRAME_BYTES => {
+            unprotect(message.spec().key, bytes).ok_or(BusFault::WrongCheck { message })
+        }
+        _ => {
+            let bytes = data.len() as u8;
+            Err(BusFault::WrongLength { message, bytes })
+        }
+    }
 }
 
 impl core::fmt::Display for BusFault {
@@ -97,7 +114,7 @@ impl core::fmt::Display for BusFault {
     }
 }
 
-/// Counters of a receiver since start; they stay at their largest value.
+/// Counters of a receiver since start. They saturate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BusHealth {
     /// Frames that were used.
@@ -110,17 +127,30 @@ pub struct BusHealth {
     pub repeated: u32,
     /// Frames out of sequence.
     pub wrong_sequence: u32,
-    /// Frames missing by the counters.
+    /// Frames that are missing according to the counters.
     pub lost: u32,
     /// Good frames of a tick that was already handed out.
     pub late: u32,
     /// Ticks handed out with a frame missing.
     pub incomplete: u32,
-    /// Times that the source went stale.
+    /// How often the source went stale.
     pub stale: u32,
 }
 
 impl BusHealth {
+    /// Nothing counted yet.
+    pub(super) const NONE: Self = Self {
+        good: 0,
+        wrong_length: 0,
+        wrong_check: 0,
+        repeated: 0,
+        wrong_sequence: 0,
+        lost: 0,
+        late: 0,
+        incomplete: 0,
+        stale: 0,
+    };
+
     pub(super) fn count(&mut self, fault: &BusFault) {
         let (field, by) = match fault {
             BusFault::WrongLength { .. } => (&mut self.wrong_length, 1),
@@ -151,4 +181,12 @@ impl<T> Taken<T> {
         tick: None,
         fault: None,
     };
+
+    #[inline(always)]
+    pub(super) fn map<U>(self, f: impl FnOnce(T) -> U) -> Taken<U> {
+        Taken {
+            tick: self.tick.map(f),
+            fault: self.fault,
+        }
+    }
 }

@@ -1,13 +1,28 @@
-//! Pose frames: each axis is the decoder's own `f32` word with the 20 low bits of the status,
-//! so a reader sees from every frame alone whether its value may be used, and the bits on the
-//! bus are the bits of the decoder.
+//! Pose frames. Each frame carries one axis, as the decoder's own `f32` word, and the 20 low
+//! bits of the status. So the bits on the bus are the bits of the decoder, and each frame says
+//! whether its value may be used.
+//!
+//! ```
+//! use hal_adapters::can::{BusFrame, PoseReceiver, PoseSender, Timing};
+//! use runtime::Reading;
+//!
+//! let mut reading = Reading::default();
+//! reading.pose.planar.x_m = 1.5e-6;
+//! let (mut sender, mut receiver) = (PoseSender::default(), PoseReceiver::new(Timing::default()));
+//! let mut received = None;
+//! for frame in sender.frames(&reading) {
+//!     let taken = receiver.take(&BusFrame::from(frame), 300);
+//!     received = received.or(taken.tick);
+//! }
+//! assert_eq!(received.and_then(|pose| pose.valid()), Some(reading.pose.planar));
+//! ```
 
-use super::e2e::{Payload, Sequence, Verdict, protect, unprotect};
-use super::frame::Coded;
+use super::e2e::{Payload, Sequence, protect};
+use super::frame::{Coded, standard};
 use super::group::{Group, GroupTick};
-use super::notice::{BusFault, BusHealth, Taken, Timing};
-use super::table::{FRAME_BYTES, Message, VERTICAL_TICKS};
-use embedded_can::{Frame, Id};
+use super::notice::{BusFault, BusHealth, Taken, Timing, open};
+use super::table::{Message, VERTICAL_TICKS};
+use embedded_can::Frame;
 use runtime::{PlanarPose, Reading, Status};
 
 /// The planar axes, in the order of the pose.
@@ -52,8 +67,8 @@ impl Default for PoseSender {
 }
 
 impl PoseSender {
-    /// A sender of each vertical axis in every `vertical_ticks`th tick: 1, 2, 4, 8 or 16;
-    /// any other number is rounded down to one of these (0 counts as 1).
+    /// Sends each vertical axis in every `vertical_ticks`th tick: 1, 2, 4, 8 or 16; any other
+    /// number is rounded down to one of these (0 counts as 1).
     pub const fn new(vertical_ticks: u8) -> Self {
         let ticks = if vertical_ticks > 16 {
             16
@@ -72,7 +87,7 @@ impl PoseSender {
         let every = 1u32 << shift;
         self.tick = tick.wrapping_add(1);
         let (values, status) = (reading.pose.vertical.to_array(), reading.status);
-        // The axes take turns, so that no tick carries all three unless every tick does.
+        // The axes take turns: no tick carries all three unless every tick does.
         let due = (0u32..).zip(VERTICAL.into_iter().zip(values));
         let vertical = due.filter_map(move |(k, (message, value))| {
             let turn = k.wrapping_mul(every) / 3;
@@ -103,7 +118,7 @@ impl ReceivedPose {
     }
 }
 
-/// One vertical axis as it came last.
+/// The last value received of a vertical axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReceivedAxis {
     /// The value, m or rad.
@@ -117,12 +132,12 @@ pub struct ReceivedAxis {
 /// Receives pose frames.
 #[derive(Clone, Debug)]
 pub struct PoseReceiver {
-    planar: Group<3>,
+    planar: Group,
     sequences: [Sequence; 3],
     vertical: [Option<ReceivedAxis>; 3],
 }
 
-fn received(tick: &GroupTick<3>) -> ReceivedPose {
+fn received(tick: &GroupTick) -> ReceivedPose {
     let lost = Status::PLANAR_INVALID.with(Status::FRAMES_MISSED);
     let [x, y, rz] = [0, 1, 2].map(|k| tick.payload(k));
     let status = match (x, y, rz) {
@@ -148,7 +163,7 @@ impl PoseReceiver {
     /// A receiver that has seen no frame.
     pub const fn new(timing: Timing) -> Self {
         Self {
-            planar: Group::new(timing),
+            planar: Group::new(PLANAR.len(), timing),
             sequences: [Sequence::START; 3],
             vertical: [None; 3],
         }
@@ -156,15 +171,10 @@ impl PoseReceiver {
 
     /// Takes one frame, received at `now_us`. Frames of other messages are ignored.
     pub fn take<F: Frame>(&mut self, frame: &F, now_us: u32) -> Taken<ReceivedPose> {
-        let Id::Standard(id) = frame.id() else {
+        let Some((id, data)) = standard(frame) else {
             return Taken::NOTHING;
         };
         let is = |message: &Message| message.id() == id;
-        let data = if frame.is_remote_frame() {
-            &[]
-        } else {
-            frame.data()
-        };
         let planar = (0usize..).zip(PLANAR).find(|(_, message)| is(message));
         if let Some((k, message)) = planar {
             return self.planar.take(k, message, data, now_us, received);
@@ -178,43 +188,28 @@ impl PoseReceiver {
 
     fn take_vertical(&mut self, k: usize, data: &[u8], time_us: u32) -> Option<BusFault> {
         let (message, sequence) = (*VERTICAL.get(k)?, self.sequences.get_mut(k)?);
-        let fault = match data.first_chunk::<FRAME_BYTES>() {
-            Some(bytes) if data.len() == FRAME_BYTES => {
-                match unprotect(message.spec().key, bytes) {
-                    None => BusFault::WrongCheck { message },
-                    Some((counter, payload)) => match sequence.judge(counter) {
-                        Verdict::Repeated => BusFault::Repeated { message },
-                        Verdict::WrongSequence { ahead } => {
-                            BusFault::WrongSequence { message, ahead }
-                        }
-                        used => {
-                            *self.vertical.get_mut(k)? = Some(ReceivedAxis {
-                                value: f32::from_bits(payload.long),
-                                status: Status::from_bits(payload.short),
-                                time_us,
-                            });
-                            match used {
-                                Verdict::Lost { frames } => BusFault::Lost { message, frames },
-                                _ => return None,
-                            }
-                        }
-                    },
-                }
-            }
-            _ => BusFault::WrongLength {
-                message,
-                bytes: data.len() as u8,
-            },
+        let (counter, payload) = match open(message, data) {
+            Ok(opened) => opened,
+            Err(fault) => return Some(self.planar.note(fault)),
         };
+        let verdict = sequence.judge(counter);
+        if verdict.is_used() {
+            *self.vertical.get_mut(k)? = Some(ReceivedAxis {
+                value: f32::from_bits(payload.long),
+                status: Status::from_bits(payload.short),
+                time_us,
+            });
+        }
+        let fault = verdict.fault(message)?;
         Some(self.planar.note(fault))
     }
 
-    /// What the passing of time gives, as [`super::SensorReceiver::poll`].
+    /// What the passing of time brings: see [`super::SensorReceiver::poll`].
     pub fn poll(&mut self, now_us: u32) -> Taken<ReceivedPose> {
-        self.planar.poll(now_us, received)
+        self.planar.poll(now_us).map(received)
     }
 
-    /// When [`PoseReceiver::poll`] has something to say if no frame comes.
+    /// When [`PoseReceiver::poll`] will have something to report if no frame comes before.
     pub fn deadline_us(&self) -> Option<u32> {
         self.planar.deadline_us()
     }
@@ -224,7 +219,7 @@ impl PoseReceiver {
         self.planar.is_stale()
     }
 
-    /// Z, Rx, Ry as they came last.
+    /// The last Z, Rx, Ry received.
     pub const fn vertical(&self) -> &[Option<ReceivedAxis>; 3] {
         &self.vertical
     }

@@ -1,3 +1,4 @@
+use super::super::e2e::unprotect;
 use super::super::frame::BusFrame;
 use super::super::sensor::frames;
 use super::*;
@@ -153,7 +154,6 @@ fn sixteen_lost_ticks_are_told_by_the_time_frame() {
         }
     }
     assert_eq!(lost, 16);
-    assert_eq!(r.sensor_time().map(|t| t.time_us), Some(48 * 2_000));
     // Receiver's numbers again run with the sender's.
     assert_eq!(feed(&mut r, Layout::Bits16, 50).0, Some(raw(50)));
 }

@@ -1,7 +1,7 @@
 //! Sensor frames: the codes of one tick, in one of two layouts.
 //!
-//! Coding needs no state: the counter of each frame is the low nibble of the tick's number,
-//! so a tick that the node skips is seen as lost by every receiver.
+//! Coding needs no state: the counter of each frame is the low nibble of the tick's number. So
+//! every receiver notices a tick that the node skips.
 
 use super::e2e::{Payload, protect};
 use super::frame::Coded;
@@ -50,7 +50,7 @@ const fn fits(code: i32, bits: u32) -> bool {
     code << top >> top == code
 }
 
-/// A code's bits and 1 in place of 0 for a code that is missing or too wide.
+/// The bits of a code, and 0; or 0 bits, and 1 for a code that is missing or too wide.
 #[inline(always)]
 const fn coded(code: i32, bits: u32) -> (u32, u32) {
     if fits(code, bits) {
@@ -118,7 +118,7 @@ const fn frame_of(message: Message, counter: u32, payload: Payload) -> Coded {
 }
 
 /// The two frames of a tick in the 16-bit layout. A code that does not fit is sent as
-/// missing, never cut.
+/// missing, never truncated.
 #[inline(always)]
 pub const fn frames_16(frame: &RawFrame) -> [Coded; 2] {
     [
@@ -133,7 +133,7 @@ pub const fn frames_16(frame: &RawFrame) -> [Coded; 2] {
 
 /// The three frames of a tick in the 24-bit layout; as [`frames_16`].
 #[inline]
-pub const fn frames_24(frame: &RawFrame) -> [Coded; 3] {
+const fn frames_24(frame: &RawFrame) -> [Coded; 3] {
     let ([a, b, c], [g1, g2, g3]) = (frame.hall, frame.capacitive);
     let counter = frame.sequence;
     [
@@ -143,9 +143,9 @@ pub const fn frames_24(frame: &RawFrame) -> [Coded; 3] {
     ]
 }
 
-/// The frame that tells number and time of a tick, in every [`SLOW_TICKS`]th tick, before
-/// the frames with its codes.
-pub const fn time_frame(frame: &RawFrame) -> Option<Coded> {
+/// The frame with number and time of a tick; sent in every [`SLOW_TICKS`]th tick, before the
+/// frames with its codes.
+const fn time_frame(frame: &RawFrame) -> Option<Coded> {
     let slow = SLOW_TICKS as u32;
     if !frame.sequence.is_multiple_of(slow) {
         return None;

@@ -27,11 +27,11 @@ pub struct Signal {
     pub kind: Kind,
     /// Unit; empty for none.
     pub unit: &'static str,
-    /// For a paged signal: the value of the selector with which it is sent.
+    /// The value of the selector with which a paged signal is sent.
     pub page: Option<u8>,
     /// Named values.
     pub values: &'static [(u8, &'static str)],
-    /// What it tells.
+    /// What it means.
     pub what: &'static str,
 }
 

@@ -1,4 +1,4 @@
-//! Slow frames of the decoding node: what it does, and its counters.
+//! The slow frames of the decoding node: its state and its counters.
 
 use super::e2e::Payload;
 use runtime::servo::Health;
@@ -35,7 +35,7 @@ impl NodeState {
     ];
 
     /// From its number, or `None` for a state of a later version.
-    pub fn from_number(number: u8) -> Option<Self> {
+    fn from_number(number: u8) -> Option<Self> {
         Self::ALL.get(usize::from(number)).copied()
     }
 }
@@ -46,7 +46,7 @@ pub mod flag {
     pub const WATCHDOG_RESET: u8 = 1;
     /// The bus was off since start.
     pub const BUS_WAS_OFF: u8 = 1 << 1;
-    /// A re-zero runs.
+    /// A re-zero is running.
     pub const REZERO_RUNS: u8 = 1 << 2;
     /// A re-zero was done.
     pub const REZEROED: u8 = 1 << 3;
@@ -61,7 +61,7 @@ pub mod flag {
 pub struct NodeStatus {
     /// What the node is doing; `None` for a number that this version does not know.
     pub state: Option<NodeState>,
-    /// Detail of the state, by the node; 0 for none.
+    /// Detail of the state, defined by the node; 0 for none.
     pub reason: u8,
     /// Bits of [`flag`].
     pub flags: u8,

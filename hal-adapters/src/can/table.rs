@@ -1,4 +1,4 @@
-//! The one table of frames, signals, units and identifiers. Code, documentation
+//! The one table of messages, identifiers, signals and units. Code, documentation
 //! (`protocol.md`) and the `.dbc` file follow from it.
 
 use super::signals::{self, Signal};
@@ -31,7 +31,7 @@ pub enum Message {
     PoseRx,
     /// Ry with its status.
     PoseRy,
-    /// What the decoding node is doing.
+    /// State of the decoding node.
     NodeStatus,
     /// A request to the decoding node.
     Command,
@@ -73,8 +73,7 @@ impl Node {
 pub enum Rate {
     /// Every so many ticks.
     Ticks(u8),
-    /// Every so many ticks as the sender was set up, from every tick to every 16th; the
-    /// figure is the default.
+    /// Every so many ticks by default; the sender can be set to 1 to 16.
     Decimated(u8),
     /// When asked for.
     OnRequest,
@@ -95,9 +94,9 @@ pub struct Spec {
     pub sender: Node,
     /// When.
     pub rate: Rate,
-    /// What it tells.
+    /// What it carries.
     pub what: &'static str,
-    /// Its signals beside check and counter.
+    /// Its signals besides check and counter.
     pub signals: &'static [Signal],
 }
 
@@ -137,8 +136,8 @@ const VERTICAL: Rate = Rate::Decimated(VERTICAL_TICKS);
 
 /// The table, in the order of [`Message`] and of rising identifier.
 ///
-/// Any two identifiers differ in four bits or more: three flipped bits never turn one message
-/// into another. Every message has eight bytes.
+/// Any two identifiers differ in at least four bits, so three flipped bits never turn one
+/// message into another. Every message has eight bytes.
 #[rustfmt::skip]
 pub const TABLE: [Spec; 17] = [
     row(M::Hall, "Hall", (0x100, 0x0d), (Sensor, EVERY), "Hall codes of 16 bits", &signals::HALL),
@@ -168,7 +167,7 @@ impl Message {
     #[inline(always)]
     pub const fn spec(self) -> &'static Spec {
         const ROWS: &[Spec; TABLE.len()] = &TABLE;
-        // Always true; said so that no bounds check, and so no panic, is left on a target.
+        // Always true. Without this comparison the compiler keeps a bounds check and its panic.
         let place = self as usize;
         if place < ROWS.len() {
             &ROWS[place]

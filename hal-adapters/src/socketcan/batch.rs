@@ -1,5 +1,5 @@
-//! Frames as the kernel's sockets hold them (16 bytes), many of them a call: a call costs
-//! more than a frame.
+//! Frames as the kernel's sockets hold them (16 bytes), many per call: a call costs more than
+//! a frame.
 
 use crate::can::{BusFrame, StampedFrame};
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
@@ -22,7 +22,7 @@ const EXTENDED: u32 = 0x8000_0000;
 const REMOTE: u32 = 0x4000_0000;
 const ERROR: u32 = 0x2000_0000;
 
-/// A frame as a socket takes it.
+/// The bytes of a frame at a socket.
 fn to_wire(frame: &BusFrame) -> [u8; WIRE_BYTES] {
     let id = match frame.id {
         Id::Standard(id) => u32::from(id.as_raw()),
@@ -43,7 +43,7 @@ fn to_wire(frame: &BusFrame) -> [u8; WIRE_BYTES] {
     wire
 }
 
-/// A frame as a socket gives it; `None` for an error of the controller.
+/// The frame of a socket's bytes; `None` for an error of the controller.
 fn from_wire(wire: &[u8; WIRE_BYTES]) -> Option<BusFrame> {
     let [i0, i1, i2, i3, length, _, _, _, data @ ..] = wire;
     let raw = u32::from_ne_bytes([*i0, *i1, *i2, *i3]);
@@ -63,11 +63,11 @@ fn from_wire(wire: &[u8; WIRE_BYTES]) -> Option<BusFrame> {
     }
 }
 
-/// Takes up to [`BATCH`] frames that are there already; gives how many the kernel gave.
+/// Reads up to [`BATCH`] frames without waiting; returns how many the kernel gave.
 pub(super) fn receive(fd: RawFd, into: &mut VecDeque<StampedFrame>) -> Result<usize, Errno> {
     let mut wires = [[0; WIRE_BYTES]; BATCH];
     let mut slices: Vec<_> = wires.iter_mut().map(|w| [IoSliceMut::new(w)]).collect();
-    // Made anew for every call: a call leaves the used length of its control data behind.
+    // New for every call: a call overwrites the length of the control buffer.
     let control = nix::cmsg_space!(TimeSpec);
     let mut headers = MultiHeaders::<()>::preallocate(BATCH, Some(control));
     let got = recvmmsg(
@@ -92,7 +92,7 @@ pub(super) fn receive(fd: RawFd, into: &mut VecDeque<StampedFrame>) -> Result<us
     Ok(count)
 }
 
-/// Hands up to [`BATCH`] frames to the kernel; gives how many it took.
+/// Hands up to [`BATCH`] frames to the kernel; returns how many it took.
 pub(super) fn send(fd: RawFd, frames: &[BusFrame]) -> Result<usize, Errno> {
     let wires: Vec<_> = frames.iter().take(BATCH).map(to_wire).collect();
     let slices: Vec<_> = wires.iter().map(|w| [IoSlice::new(w)]).collect();

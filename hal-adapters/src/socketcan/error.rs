@@ -39,10 +39,10 @@ pub enum SocketCanError {
     QueueFull {
         /// Name of the interface.
         interface: String,
-        /// How long it was waited for.
+        /// How long the sender waited.
         waited: Duration,
     },
-    /// Anything else, with the kernel's own error.
+    /// Any other error of the kernel.
     Io {
         /// Name of the interface.
         interface: String,
@@ -96,7 +96,7 @@ impl core::error::Error for SocketCanError {
     }
 }
 
-/// The error of the protocol for an error of the kernel.
+/// The error that the kernel's error number stands for.
 pub(super) fn sort(interface: &str, action: &'static str, cause: io::Error) -> SocketCanError {
     let interface = interface.to_string();
     match cause.raw_os_error().map(Errno::from_raw) {

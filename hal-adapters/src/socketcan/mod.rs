@@ -1,12 +1,27 @@
 //! SocketCAN: the frames of a Linux CAN interface, with the kernel's receive times.
 //!
-//! The kernel hands over only the messages that were asked for, so foreign traffic costs
-//! nothing. Frames that the kernel had to drop because nobody read them in time are counted
-//! ([`SocketCan::dropped`]); that they are missing shows in the counters of the protocol too.
-//! A full transmit queue (ENOBUFS) is waited for, up to a deadline.
+//! ```no_run
+//! use hal_adapters::can::{Layout, SensorReceiver, Timing};
+//! use hal_adapters::socketcan::SocketCan;
+//! use std::time::Duration;
 //!
-//! An interface that goes down is reported once by [`SocketCanError::Down`]; when it comes up
-//! again the same socket goes on.
+//! let layout = Layout::Bits16;
+//! let mut bus = SocketCan::open("can0", layout.messages())?;
+//! let mut receiver = SensorReceiver::new(layout, Timing::default());
+//! while let Some(stamped) = bus.receive(Duration::from_millis(100))? {
+//!     let taken = receiver.take(&stamped.frame, stamped.time_us as u32);
+//!     println!("{:?}", taken.tick);
+//! }
+//! # Ok::<(), hal_adapters::socketcan::SocketCanError>(())
+//! ```
+//!
+//! The kernel delivers only the messages that were asked for, so foreign traffic costs nothing.
+//! Frames that the kernel dropped because nobody read them in time are counted
+//! ([`SocketCan::dropped`]); the counters of the protocol show that they are missing, too.
+//! Sending waits for a full transmit queue (ENOBUFS), up to a deadline.
+//!
+//! An interface that goes down is reported once by [`SocketCanError::Down`]; when it is up
+//! again, the same socket works on.
 
 mod batch;
 mod error;
@@ -14,7 +29,6 @@ mod error;
 pub use error::SocketCanError;
 
 use crate::can::{BusFrame, Message, StampedFrame};
-use crate::source::FrameSource;
 use error::sort;
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
@@ -26,12 +40,10 @@ use std::string::{String, ToString};
 use std::time::{Duration, Instant};
 use std::vec::Vec;
 
-/// Receive buffer that is asked for: some 10,000 frames. The kernel grants less to ordinary
-/// users.
+/// Receive buffer to ask for: some 10,000 frames. The kernel grants ordinary users less.
 const RECEIVE_BUFFER_BYTES: i32 = 8 << 20;
 
-/// How long to wait before a full transmit queue is tried again: less than two frames take at
-/// 1 Mbit/s.
+/// Pause before a full transmit queue is tried again: less than two frames at 1 Mbit/s.
 const QUEUE_RETRY: Duration = Duration::from_micros(200);
 
 /// Mask of a filter that lets one standard identifier through.
@@ -43,7 +55,7 @@ const SOL_SOCKET: i32 = 1;
 const SO_RCVBUF: i32 = 8;
 const SO_RCVBUFFORCE: i32 = 33;
 const SO_MEMINFO: i32 = 55;
-/// Place of the drop counter in the answer to `SO_MEMINFO`.
+/// Index of the drop counter in the answer to `SO_MEMINFO`.
 const MEMINFO_DROPS: usize = 8;
 
 /// One CAN interface, for receiving and sending.
@@ -51,7 +63,6 @@ const MEMINFO_DROPS: usize = 8;
 pub struct SocketCan {
     socket: CanSocket,
     interface: String,
-    wait: Duration,
     read: VecDeque<StampedFrame>,
 }
 
@@ -59,7 +70,8 @@ impl SocketCan {
     /// Opens an interface and asks the kernel for the frames of `messages` only.
     ///
     /// # Errors
-    /// Every variant but `QueueFull`. An interface that is down opens; the first read tells.
+    /// All variants except `QueueFull`. An interface that is down can be opened; the first read
+    /// reports it.
     pub fn open(interface: &str, messages: &[Message]) -> Result<Self, SocketCanError> {
         let failed = |cause| sort(interface, "open it", cause);
         let addr = CanAddr::from_iface(interface).map_err(|_| SocketCanError::NoSuchInterface {
@@ -79,7 +91,7 @@ impl SocketCan {
             .collect();
         socket.set_filters(&filters).map_err(failed)?;
         socket.set_recv_timestamp(true).map_err(failed)?;
-        // Only a privileged user gets more than the system's limit; a smaller buffer works too.
+        // Only a privileged user gets more than the system's limit; less works, too.
         let buffer = RECEIVE_BUFFER_BYTES;
         let forced = socket.set_socket_option_int(SOL_SOCKET, SO_RCVBUFFORCE, buffer);
         if forced.is_err() {
@@ -89,16 +101,8 @@ impl SocketCan {
         Ok(Self {
             socket,
             interface: interface.to_string(),
-            wait: Duration::ZERO,
             read: VecDeque::with_capacity(batch::BATCH),
         })
-    }
-
-    /// Sets how long [`FrameSource::next_frame`] waits for a frame; at first it does not.
-    #[must_use]
-    pub const fn waiting(mut self, wait: Duration) -> Self {
-        self.wait = wait;
-        self
     }
 
     /// The next frame, waiting for it up to `wait`; `None` if none came.
@@ -115,17 +119,16 @@ impl SocketCan {
         Ok(self.read.pop_front())
     }
 
-    /// Whether a frame was taken from the kernel already, so that the next call of
-    /// [`SocketCan::receive`] costs nothing.
+    /// Whether the next [`SocketCan::receive`] returns a frame without a call to the kernel.
     pub fn has_frame(&self) -> bool {
         !self.read.is_empty()
     }
 
-    /// Takes what the kernel has, up to a batch.
+    /// Reads what the kernel has, up to a batch.
     fn fill(&mut self) -> Result<(), SocketCanError> {
         loop {
             match batch::receive(self.socket.as_raw_fd(), &mut self.read) {
-                // Errors of the controller are no frames of the bus: look on behind them.
+                // Only error frames of the controller: read on.
                 Ok(count) if count > 0 && self.read.is_empty() => {}
                 Ok(_) | Err(Errno::EAGAIN) => return Ok(()),
                 Err(Errno::EINTR) => {}
@@ -134,7 +137,7 @@ impl SocketCan {
         }
     }
 
-    /// Whether there is something to read within `wait`. A signal ends the wait early.
+    /// Waits up to `wait` until there is something to read. A signal ends the wait early.
     fn wait_for_frame(&self, wait: Duration) -> Result<bool, SocketCanError> {
         let mut fds = [PollFd::new(self.socket.as_fd(), PollFlags::POLLIN)];
         match ppoll(&mut fds, Some(TimeSpec::from_duration(wait)), None) {
@@ -152,8 +155,7 @@ impl SocketCan {
         self.send_all(core::slice::from_ref(frame), deadline)
     }
 
-    /// Sends frames in this order; waits up to `deadline` for each batch that finds the
-    /// transmit queue full.
+    /// Sends frames in this order; waits up to `deadline` whenever the transmit queue is full.
     ///
     /// # Errors
     /// As [`SocketCan::send`]; the frames before the one that failed were sent.
@@ -186,8 +188,8 @@ impl SocketCan {
         Ok(())
     }
 
-    /// Frames that the kernel dropped because they were not read in time, since the socket
-    /// was opened; 0 on a kernel that does not tell.
+    /// Frames that the kernel dropped since the socket was opened because they were not read
+    /// in time; 0 if the kernel does not say.
     pub fn dropped(&self) -> u32 {
         let mut answer = [0; 4 * (MEMINFO_DROPS + 1)];
         let length = self
@@ -197,20 +199,5 @@ impl SocketCan {
             (Ok(length), Some(drops)) if length == answer.len() => u32::from_ne_bytes(*drops),
             _ => 0,
         }
-    }
-
-    /// Name of the interface.
-    pub fn interface(&self) -> &str {
-        &self.interface
-    }
-}
-
-impl FrameSource for SocketCan {
-    type Frame = StampedFrame;
-    type Error = SocketCanError;
-
-    /// The next frame; `None` when none came within the time that was set.
-    fn next_frame(&mut self) -> Result<Option<StampedFrame>, SocketCanError> {
-        self.receive(self.wait)
     }
 }

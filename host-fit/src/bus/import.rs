@@ -20,11 +20,9 @@ pub mod write;
 
 pub use error::ImportError;
 
-use crate::bus::replay::LayoutChoice;
 use crate::input::stage::Stage;
 use crate::output::write_atomically;
 use bus_log::{BusCounts, BusReading};
-use clap::Args;
 use clock::Smoothing;
 use hal_adapters::can::Layout;
 use join::JoinCounts;
@@ -32,53 +30,31 @@ use offset::Offset;
 use reference::ReferenceCounts;
 use std::path::PathBuf;
 
-/// Arguments of `import`.
-#[derive(Clone, Debug, Args)]
-pub struct ImportArgs {
-    /// Record of the bus, as `candump -L` or `live --record` writes it.
-    #[arg(value_name = "CANDUMP")]
+/// What is joined, and how.
+#[derive(Clone, Debug)]
+pub struct ImportSettings {
+    /// Record of the bus, as `candump -L` writes it.
     pub bus: PathBuf,
-    /// Log of the interferometers: CSV with time, movement and beams (or pose), in the
-    /// columns that stage.toml names.
-    #[arg(value_name = "REFERENCE")]
+    /// Log of the interferometers.
     pub reference: PathBuf,
-    /// The stage as designed.
-    #[arg(long, value_name = "stage.toml")]
+    /// The stage file.
     pub stage: PathBuf,
     /// Where to write the calibration log.
-    #[arg(long, value_name = "LOG.csv")]
     pub out: PathBuf,
     /// Largest time from a tick to the reference samples before and after it, us; one servo
-    /// period if not given.
-    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    /// period if `None`.
     pub tolerance_us: Option<u32>,
-    /// Time of the bus less time of the reference, us.
-    #[arg(
-        long,
-        value_name = "US",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
+    /// Time of the bus less time of the reference, us; not used with `estimate_offset`.
     pub offset_us: f64,
     /// Find the offset between the clocks by the motion that both saw.
-    #[arg(long, conflicts_with = "offset_us")]
     pub estimate_offset: bool,
     /// How far from "both records start together" the offset is looked for, s.
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        default_value_t = 2.0,
-        requires = "estimate_offset"
-    )]
     pub search_s: f64,
-    /// Only frames of this interface, where the record holds several.
-    #[arg(long, value_name = "IFACE")]
+    /// Only frames of this interface; all frames are of one if `None`.
     pub interface: Option<String>,
-    /// How codes are put into frames.
-    #[arg(long, value_enum, default_value = "auto")]
-    pub layout: LayoutChoice,
+    /// How codes were put into frames; the narrowest that holds them if `None`.
+    pub layout: Option<Layout>,
     /// Leave out lines that cannot be read, and count them.
-    #[arg(long)]
     pub skip_bad_lines: bool,
 }
 
@@ -101,14 +77,14 @@ pub struct ImportReport {
 ///
 /// # Errors
 /// See [`ImportError`]; nothing is written then.
-pub fn run(args: &ImportArgs) -> Result<ImportReport, ImportError> {
-    let stage = Stage::from_file(&args.stage)?;
-    let layout = layout(args, &stage)?;
-    let reading = bus_log::read(args, layout)?;
+pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
+    let stage = Stage::from_file(&settings.stage)?;
+    let layout = layout(settings, &stage)?;
+    let reading = bus_log::read(settings, layout)?;
     let (times_us, smoothing) = clock::sample_times_us(&reading.ticks);
-    let (reference, reference_counts) = reference::read(&args.reference, &stage)?;
-    let offset = choose_offset(args, &stage, &reading, &times_us, &reference)?;
-    let tolerance_us = args
+    let (reference, reference_counts) = reference::read(&settings.reference, &stage)?;
+    let offset = choose_offset(settings, &stage, &reading, &times_us, &reference)?;
+    let tolerance_us = settings
         .tolerance_us
         .map_or(stage.servo_period_s * 1e6, f64::from);
     let reference_times = times_us.iter().map(|t| t - offset.us);
@@ -122,7 +98,7 @@ pub fn run(args: &ImportArgs) -> Result<ImportReport, ImportError> {
         return Err(ImportError::no_overlap(&times_us, &reference, offset.us));
     }
     write_atomically(
-        &args.out,
+        &settings.out,
         write::to_csv(&rows, &reference, &stage).as_bytes(),
     )?;
     Ok(ImportReport {
@@ -134,26 +110,26 @@ pub fn run(args: &ImportArgs) -> Result<ImportReport, ImportError> {
     })
 }
 
-fn layout(args: &ImportArgs, stage: &Stage) -> Result<Layout, ImportError> {
-    crate::bus::replay::choose_layout(args.layout, stage).map_err(|error| ImportError::Layout {
+fn layout(settings: &ImportSettings, stage: &Stage) -> Result<Layout, ImportError> {
+    crate::bus::replay::choose_layout(settings.layout, stage).map_err(|error| ImportError::Layout {
         problem: error.to_string(),
     })
 }
 
 fn choose_offset(
-    args: &ImportArgs,
+    settings: &ImportSettings,
     stage: &Stage,
     reading: &BusReading,
     times_us: &[f64],
     reference: &reference::Reference,
 ) -> Result<Offset, ImportError> {
-    if !args.estimate_offset {
+    if !settings.estimate_offset {
         return Ok(Offset {
-            us: args.offset_us,
+            us: settings.offset_us,
             explained: None,
         });
     }
-    let search_us = args.search_s * 1e6;
+    let search_us = settings.search_s * 1e6;
     offset::estimate(&reading.ticks, times_us, reference, stage, search_us)
 }
 

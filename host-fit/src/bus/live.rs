@@ -1,75 +1,49 @@
 //! `live`: decodes the sensor frames of a CAN bus as they come, with the decoder of the
 //! target, and publishes the pose.
 //!
-//! [`node`] is the decoding node itself, without a bus and without a clock: frames and times
+//! `node` is the decoding node itself, without a bus and without a clock: frames and times
 //! in, frames out. [`run`](run()) puts it on an interface, records and shows it.
 
 mod bus;
 mod display;
-pub mod node;
+mod node;
 mod record;
-pub mod rhythm;
+mod rhythm;
 mod run;
 
 pub(crate) use bus::Bus;
 pub use bus::BusError;
 pub use run::run;
 
-use crate::output::OutputError;
 use crate::output::blob_file::BlobFileError;
-use clap::Args;
+use hal_adapters::can::Timing;
+use runtime::OnInvalid;
 use std::path::PathBuf;
+use std::time::Duration;
 
-/// Arguments of `live`.
-#[derive(Clone, Debug, Args)]
-pub struct LiveArgs {
+/// What is decoded, and how.
+#[derive(Clone, Debug)]
+pub struct LiveSettings {
     /// CAN interface, for instance can0.
-    #[arg(long, value_name = "IFACE")]
-    pub can: String,
+    pub interface: String,
     /// The parameter blob.
-    #[arg(value_name = "params.bin")]
     pub params: PathBuf,
-    /// Refuse a blob of another stage than the one with this serial number.
-    #[arg(long, value_name = "TEXT")]
+    /// Serial number that the blob must have.
     pub serial: Option<String>,
-    /// Record every frame received and sent, as `candump -L` does.
-    #[arg(long, value_name = "FILE")]
+    /// Record every frame received and sent here, as `candump -L` does.
     pub record: Option<PathBuf>,
-    /// Repeat the last valid pose for at most so many ticks where codes are bad.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub hold: u16,
-    /// Send each vertical axis in every so many ticks: 1, 2, 4, 8 or 16.
-    #[arg(long, value_name = "TICKS", default_value_t = 4, value_parser = vertical_ticks)]
-    pub vertical_every: u8,
+    /// What an invalid field reads.
+    pub on_invalid: OnInvalid,
+    /// Every how many ticks each vertical axis is sent: 1, 2, 4, 8 or 16.
+    pub vertical_ticks: u8,
     /// Send nothing: only watch, record and show.
-    #[arg(long)]
     pub listen_only: bool,
-    /// End after so many seconds; without it, on Ctrl-C.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    pub duration: Option<f64>,
-    /// Seconds from line to line where output is no terminal.
-    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
-    pub every: f64,
-    /// Give up a tick whose frames are not all there after so long.
-    #[arg(long, value_name = "US", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub assembly_us: u32,
-    /// Call the sensors stale after so long without a good frame.
-    #[arg(long, value_name = "US", default_value_t = 3_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
-    pub stale_us: u32,
-}
-
-fn vertical_ticks(text: &str) -> Result<u8, String> {
-    match text.parse() {
-        Ok(ticks @ (1 | 2 | 4 | 8 | 16)) => Ok(ticks),
-        _ => Err("expected 1, 2, 4, 8 or 16".into()),
-    }
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(seconds),
-        _ => Err("expected a number of seconds above 0".into()),
-    }
+    /// End after so long; on Ctrl-C if `None`.
+    pub duration: Option<Duration>,
+    /// Time from line to line where output is no terminal.
+    pub every: Duration,
+    /// When ticks are given up and the sensors are stale.
+    pub timing: Timing,
 }
 
 /// Why `live` ended early.
@@ -111,7 +85,4 @@ pub enum LiveError {
         /// What the system says.
         cause: std::io::Error,
     },
-    /// The record's file cannot be made.
-    #[error(transparent)]
-    Output(#[from] OutputError),
 }

@@ -7,7 +7,6 @@ use crate::input::dataset::{Dataset, LoggedFrame};
 use crate::input::log::{self, LogError, ReadOptions};
 use crate::input::stage::{Stage, StageError};
 use crate::interrupt;
-use clap::{Args, ValueEnum};
 use hal_adapters::can::{BusFrame, Layout, sensor};
 use pace::Pacer;
 use runtime::RawFrame;
@@ -15,47 +14,21 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How codes are put into frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum LayoutChoice {
-    /// The narrowest that holds the converters' codes.
-    Auto,
-    /// 16 bits: two frames a tick.
-    #[value(name = "16")]
-    Bits16,
-    /// 24 bits: three frames a tick.
-    #[value(name = "24")]
-    Bits24,
-}
-
-/// Arguments of `replay`.
-#[derive(Clone, Debug, Args)]
-pub struct ReplayArgs {
-    /// The log: CSV or CSV.gz; it needs no reference.
-    #[arg(value_name = "LOG")]
+/// What is played, and how.
+#[derive(Clone, Debug)]
+pub struct ReplaySettings {
+    /// The log; it needs no reference.
     pub log: PathBuf,
-    /// The stage as designed.
-    #[arg(long, value_name = "stage.toml")]
+    /// The stage file.
     pub stage: PathBuf,
     /// CAN interface, for instance can0.
-    #[arg(long, value_name = "IFACE")]
-    pub can: String,
+    pub interface: String,
     /// How many times faster than it was logged.
-    #[arg(long, value_name = "X", default_value = "1", value_parser = rate)]
     pub rate: f64,
-    /// How codes are put into frames.
-    #[arg(long, value_enum, default_value = "auto")]
-    pub layout: LayoutChoice,
+    /// How codes are put into frames; the narrowest that holds them if `None`.
+    pub layout: Option<Layout>,
     /// Stop after so many rows.
-    #[arg(long, value_name = "N")]
     pub rows: Option<usize>,
-}
-
-fn rate(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(rate) if (1e-3..=1e6).contains(&rate) => Ok(rate),
-        _ => Err("expected a number from 0.001 to 1000000".into()),
-    }
 }
 
 /// Why a replay ended early.
@@ -120,36 +93,38 @@ const SEND_DEADLINE: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// See [`ReplayError`].
-pub fn run(args: &ReplayArgs) -> Result<Replayed, ReplayError> {
-    let stage = Stage::from_file(&args.stage)?;
-    let layout = choose_layout(args.layout, &stage)?;
+pub fn run(settings: &ReplaySettings) -> Result<Replayed, ReplayError> {
+    let stage = Stage::from_file(&settings.stage)?;
+    let layout = choose_layout(settings.layout, &stage)?;
     let log = log::read(
-        std::slice::from_ref(&args.log),
+        std::slice::from_ref(&settings.log),
         &stage,
         &ReadOptions::DECODE,
     )?;
     let frames = numbered(&log.dataset).ok_or_else(|| ReplayError::NoCodes {
-        path: args.log.clone(),
+        path: settings.log.clone(),
     })?;
     let frames = frames
-        .get(..args.rows.unwrap_or(usize::MAX))
+        .get(..settings.rows.unwrap_or(usize::MAX))
         .unwrap_or(&frames);
-    let bus = Bus::open(&args.can, &[]).map_err(|cause| ReplayError::Bus { cause, rows: 0 })?;
-    send(frames, layout, args.rate, &bus, interrupt::watch())
+    let bus =
+        Bus::open(&settings.interface, &[]).map_err(|cause| ReplayError::Bus { cause, rows: 0 })?;
+    send(frames, layout, settings.rate, &bus, interrupt::watch())
 }
 
-pub(crate) fn choose_layout(choice: LayoutChoice, stage: &Stage) -> Result<Layout, ReplayError> {
+/// The layout asked for, or the narrowest; refused if it does not hold the codes of the stage.
+pub(super) fn choose_layout(asked: Option<Layout>, stage: &Stage) -> Result<Layout, ReplayError> {
     let (hall, gaps) = (stage.hall.window, stage.capacitive.window);
     // The rails themselves are sent too: the receiver marks them.
     let low = hall.low.min(gaps.low) - 1;
     let high = hall.high.max(gaps.high) + 1;
     let narrowest = Layout::that_holds(low, high);
     let wide = |bits| ReplayError::CodesTooWide { low, high, bits };
-    match (choice, narrowest) {
-        (LayoutChoice::Auto, Some(layout)) => Ok(layout),
-        (LayoutChoice::Bits16, Some(Layout::Bits16)) => Ok(Layout::Bits16),
-        (LayoutChoice::Bits16, _) => Err(wide(16)),
-        (LayoutChoice::Bits24, Some(_)) => Ok(Layout::Bits24),
+    match (asked, narrowest) {
+        (None, Some(layout)) => Ok(layout),
+        (Some(Layout::Bits16), Some(Layout::Bits16)) => Ok(Layout::Bits16),
+        (Some(Layout::Bits16), _) => Err(wide(16)),
+        (Some(Layout::Bits24), Some(_)) => Ok(Layout::Bits24),
         (_, None) => Err(wide(24)),
     }
 }

@@ -1,6 +1,6 @@
 //! `host-fit compare`.
 
-use super::args::{CompareArgs, Train};
+use super::args::Train;
 use crate::cli::error::HostError;
 use crate::compare::curves::{Course, history_csv, plot, runs_csv};
 use crate::compare::summary::{summaries, table};
@@ -9,12 +9,58 @@ use crate::input::log::{self, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
 use crate::output::{check_writable, make_folder, write_atomically};
+use crate::problem::draw::Draw;
+use crate::solve::Projection;
 use crate::solve::search::kind::SearchKind;
+use clap::Args;
 use std::io::{IsTerminal, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub(super) struct CompareArgs {
+    /// Logs: CSV or CSV.gz, one or more.
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    stage: PathBuf,
+    /// Forms of the problem, separated by commas.
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        default_value = "none,delta,linear"
+    )]
+    project: Vec<Projection>,
+    /// Searches, separated by commas; all if not given. Least squares is always there.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', default_values = SearchKind::NAMES, value_enum)]
+    solvers: Vec<SearchKind>,
+    /// Runs of each: seeds 1 to N.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    seeds: u64,
+    /// Rows that each seed draws: `all` or a number.
+    #[arg(long, value_name = "N|all", default_value = "200")]
+    train: Train,
+    /// How rows are drawn.
+    #[arg(long, value_enum, default_value = "stratified")]
+    draw: Draw,
+    /// Evaluations of each run; the paper's are 100 + 100 generations of 200.
+    #[arg(long, value_name = "N", default_value_t = 20_100, value_parser = clap::value_parser!(u32).range(4..=1_000_000_000))]
+    evaluations: u32,
+    /// Individuals of a population.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(4..=100_000))]
+    population: u32,
+    /// Threads; all cores if not given. The results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Write table, runs, histories (CSV) and plots (SVG) into this folder.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
 
 /// Compares solvers and prints the table; with a folder, writes table, CSV and plots there.
-pub fn run(args: &CompareArgs) -> Result<(), HostError> {
+pub(super) fn run(args: &CompareArgs) -> Result<(), HostError> {
     super::use_threads(args.threads);
     if let Some(folder) = &args.out {
         make_folder(folder)?;
@@ -23,15 +69,11 @@ pub fn run(args: &CompareArgs) -> Result<(), HostError> {
     let stage = Stage::from_file(&args.stage)?;
     let log = log::read(&args.logs, &stage, &ReadOptions::default())?;
     let interrupted = interrupt::watch();
-    let by_name = |name: &String| SearchKind::by_name(name);
     let comparison = Comparison {
         forms: args.project.clone(),
-        searches: args.solvers.iter().filter_map(by_name).collect(),
+        searches: args.solvers.clone(),
         seeds: args.seeds,
-        train: match args.train {
-            Train::All => None,
-            Train::Rows(rows) => Some(rows),
-        },
+        train: args.train.0,
         draw: args.draw,
         evaluations: args.evaluations as usize,
         population: args.population as usize,
@@ -39,7 +81,7 @@ pub fn run(args: &CompareArgs) -> Result<(), HostError> {
     let terminal = std::io::stderr().is_terminal();
     let progress = |run: &Run| {
         if terminal {
-            // Nobody is left to tell when standard error is gone.
+            // A closed standard error is no reason to stop.
             let _ = write!(
                 std::io::stderr(),
                 "\r{:<7} {:<14} seed {:<4}",

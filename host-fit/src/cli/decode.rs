@@ -1,16 +1,37 @@
 //! `host-fit decode`.
 
-use super::args::DecodeArgs;
+use super::args::on_invalid;
 use crate::cli::error::HostError;
 use crate::input::log::{self, ReadOptions};
 use crate::input::stage::Stage;
 use crate::output;
 use crate::output::blob_file;
 use crate::output::pose_file::{self, StatusCounts};
-use runtime::servo::OnInvalid;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `decode`.
+#[derive(Debug, Args)]
+pub(super) struct DecodeArgs {
+    /// The parameter blob.
+    #[arg(value_name = "params.bin")]
+    params: PathBuf,
+    /// The log: CSV or CSV.gz; it needs no reference.
+    #[arg(value_name = "LOG")]
+    log: PathBuf,
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    stage: PathBuf,
+    /// Where to write the poses.
+    #[arg(long, value_name = "pose.csv")]
+    out: PathBuf,
+    /// Repeat the last valid pose for at most so many rows where codes are bad.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    hold: u16,
+}
 
 /// Decodes a log into a pose file.
-pub fn run(args: &DecodeArgs) -> Result<(), HostError> {
+pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     let inputs = [
         args.params.as_path(),
         args.log.as_path(),
@@ -25,11 +46,8 @@ pub fn run(args: &DecodeArgs) -> Result<(), HostError> {
         &stage,
         &ReadOptions::DECODE,
     )?;
-    let on_invalid = match args.hold {
-        0 => OnInvalid::Zero,
-        ticks => OnInvalid::Hold { ticks },
-    };
-    let decoded = pose_file::decode(&log.dataset, &set.decoder(), on_invalid);
+    let on_invalid = on_invalid(args.hold);
+    let decoded = pose_file::decode(&log.dataset, &*set.decoder(), on_invalid);
     output::write_atomically(&args.out, &pose_file::to_text(&decoded))?;
     let counts = StatusCounts::of(&decoded);
     let mut summary = format!(

@@ -64,6 +64,9 @@ pub enum HostError {
     /// A plot could not be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
+    /// The page of a report could not be made.
+    #[error("cannot write the report: {0}")]
+    Page(#[from] minijinja::Error),
     /// A report could not be turned into JSON.
     #[error("cannot write the figures as JSON: {0}")]
     Json(#[from] serde_json::Error),
@@ -111,6 +114,7 @@ impl HostError {
             | Self::Blob(_)
             | Self::OtherScale { .. }
             | Self::Plot(_)
+            | Self::Page(_)
             | Self::Json(_)
             | Self::NoTemporaryFolder(_)
             | Self::Standard(_)

@@ -1,18 +1,49 @@
 //! `host-fit eval`.
 
-use super::args::{DeltaChoice, EvalArgs};
 use crate::cli::error::HostError;
+use crate::fit::FitWarning;
 use crate::input::log;
 use crate::input::stage::Stage;
-use crate::judge::{Zeros, judge};
+use crate::judge::{Decoded, Zeros};
 use crate::output::blob_file;
+use crate::problem::model::Model;
 use crate::report::json::of_eval;
 use crate::report::text;
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use std::time::Instant;
 
+/// How `eval` treats zero deviations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum DeltaChoice {
+    /// Refit them for each movement.
+    Fit,
+    /// None: as the target reads without a re-zero.
+    Zero,
+}
+
+/// Arguments of `eval`.
+#[derive(Debug, Args)]
+pub(super) struct EvalArgs {
+    /// The parameter blob.
+    #[arg(value_name = "params.bin")]
+    params: PathBuf,
+    /// Logs: CSV or CSV.gz, one or more.
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    stage: PathBuf,
+    /// Zero deviations; as the blob's model has them if not given: models (12) and (15) have none.
+    #[arg(long, value_enum)]
+    delta: Option<DeltaChoice>,
+    /// Write the figures as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
 /// Judges a blob on logs with reference.
-pub fn run(args: &EvalArgs) -> Result<(), HostError> {
+pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     let started = Instant::now();
     let mut inputs = vec![args.params.as_path(), args.stage.as_path()];
     inputs.extend(args.logs.iter().map(PathBuf::as_path));
@@ -22,17 +53,17 @@ pub fn run(args: &EvalArgs) -> Result<(), HostError> {
     super::same_scales(&set, &stage, &args.stage)?;
     let log = log::read(&args.logs, &stage, &super::EVAL)?;
     let zeros = match args.delta {
-        None => Zeros::of_model(set.model),
+        None => Zeros::of_model(Model::of(set.model)),
         Some(DeltaChoice::Fit) => Zeros::Refit,
         Some(DeltaChoice::Zero) => Zeros::None,
     };
-    let judgement = judge(&set, &log.dataset, &stage, zeros);
+    let judgement = Decoded::new(&set, &log.dataset).judge(&log.dataset, &stage, zeros);
     let mut circumstances = super::circumstances(&log, &stage, started);
     if judgement.undecoded > 0 {
-        circumstances.warnings.push(format!(
-            "{} rows have codes that the decoder refuses; they are not part of the errors",
-            judgement.undecoded
-        ));
+        let undecoded = FitWarning::Undecoded {
+            rows: judgement.undecoded,
+        };
+        circumstances.warnings.push(undecoded.to_string());
     }
     let clipped = judgement.zeros.iter().filter(|zero| zero.clipped).count();
     if clipped > 0 {

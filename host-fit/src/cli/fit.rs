@@ -1,6 +1,6 @@
 //! `host-fit fit`.
 
-use super::args::{BadRowsChoice, FitArgs, Train};
+use super::args::Train;
 use crate::cli::error::HostError;
 use crate::fit::{Fit, FitError, FitSettings, fit};
 use crate::input::log;
@@ -10,16 +10,100 @@ use crate::interrupt;
 use crate::judge;
 use crate::output;
 use crate::output::blob_file;
+use crate::problem::draw::Draw;
+use crate::problem::model::{MODELS, Model};
 use crate::problem::parameters::Parameters;
+use crate::report::html::{Page, Plot};
 use crate::report::json::{Report, of_fit};
-use crate::report::{html, plots, text};
-use crate::solve::search_solver::default_size;
-use crate::solve::{SolveError, SolverOptions};
+use crate::report::{plots, text};
+use crate::solve::{Projection, SolveError, Solver, SolverOptions};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use runtime::ModelKind;
+use runtime::parameters::Text;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+/// The models on the command line, `auto` and those of the table.
+fn models() -> impl TypedValueParser<Value = &'static Model> {
+    let auto = PossibleValue::new("auto").help("The best that this program has: today (31)");
+    let named = MODELS
+        .iter()
+        .map(|model| PossibleValue::new(model.name).help(model.summary));
+    let names: Vec<PossibleValue> = [auto].into_iter().chain(named).collect();
+    PossibleValuesParser::new(names).map(|name| {
+        let named = MODELS.iter().find(|model| model.name == name);
+        named.unwrap_or(Model::of(ModelKind::M31))
+    })
+}
+
+fn blob_text(value: &str) -> Result<Text, &'static str> {
+    Text::try_from(value).map_err(|_| "at most 32 bytes fit in the blob")
+}
+
+/// Arguments of `fit`.
+#[derive(Debug, Args)]
+pub(super) struct FitArgs {
+    /// Logs: CSV or CSV.gz, one or more.
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    stage: PathBuf,
+    /// Where to write the parameter blob.
+    #[arg(long, value_name = "params.bin")]
+    out: PathBuf,
+    /// Measurement model.
+    #[arg(long, value_name = "MODEL", value_parser = models(), default_value = "auto")]
+    model: &'static Model,
+    /// Solver. The default searches by SHTLBO and finishes by least squares, `lm` is least squares
+    /// alone, the others search only.
+    #[arg(long, value_name = "NAME", value_enum, default_value = Solver::Finished.name())]
+    solver: Solver,
+    /// How much of the problem is solved in closed form.
+    #[arg(long, value_enum, default_value = "linear")]
+    project: Projection,
+    /// Rows to fit: `all` or a number.
+    #[arg(long, value_name = "N|all", default_value = "all")]
+    train: Train,
+    /// How rows are drawn.
+    #[arg(long, value_enum, default_value = "stratified")]
+    draw: Draw,
+    /// Individuals of a population: 100 as in the paper, or 16 with --project linear.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=100_000))]
+    population: Option<u32>,
+    /// Generations of a population: 100 as in the paper; with --project linear at most 1000,
+    /// fewer once the fitness hardly falls any more.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    generations: Option<u32>,
+    /// Seed of everything random.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Warm start: a search begins with the parameters of this blob among its population.
+    #[arg(long, value_name = "params.bin")]
+    start: Option<PathBuf>,
+    /// Threads; all cores if not given. The result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Serial number of the stage, for the blob; at most 32 bytes.
+    #[arg(long, value_name = "TEXT", value_parser = blob_text)]
+    serial: Option<Text>,
+    /// Creation time, for the blob, as you want it to read; at most 32 bytes.
+    #[arg(long, value_name = "TIME", value_parser = blob_text)]
+    created: Option<Text>,
+    /// What to do with rows that cannot be used.
+    #[arg(long, value_enum, default_value = "refuse")]
+    bad_rows: BadRows,
+    /// Write a report with plots into this folder.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Write the figures as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
 /// Reads, fits, judges; then writes blob, JSON and report, in this order.
-pub fn run(args: &FitArgs) -> Result<(), HostError> {
+pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let started = Instant::now();
     let inputs: Vec<&Path> = args
         .logs
@@ -38,10 +122,7 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
     interrupt::watch();
     let stage = Stage::from_file(&args.stage)?;
     let options = ReadOptions {
-        bad_rows: match args.bad_rows {
-            BadRowsChoice::Refuse => BadRows::Refuse,
-            BadRowsChoice::Skip => BadRows::Skip,
-        },
+        bad_rows: args.bad_rows,
         ..ReadOptions::default()
     };
     // Before the work, so that no blob is left without the figures that were asked for.
@@ -59,25 +140,21 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
         Some(path) => Some(judge::parameters_of(&blob_file::read(path)?)),
         None => None,
     };
-    let solver = super::solver(&args.solver, known)?;
-    let (population, generations) = default_size(args.project);
+    let mut options = SolverOptions::new(args.project, args.seed);
+    options.population = args.population.map_or(options.population, |n| n as usize);
+    options.generations = args.generations.map_or(options.generations, |n| n as usize);
+    options.known = known;
+    options.interrupt = Some(interrupt::watch());
     let settings = FitSettings {
-        model: args.model.kind(),
-        train: match args.train {
-            Train::All => None,
-            Train::Rows(rows) => Some(rows),
-        },
+        model: args.model,
+        train: args.train.0,
         draw: args.draw,
-        solver: SolverOptions {
-            projection: args.project,
-            seed: args.seed,
-            population: args.population.map_or(population, |n| n as usize),
-            generations: args.generations.map_or(generations, |n| n as usize),
-        },
+        solver: args.solver,
+        options,
         serial: args.serial.clone().unwrap_or_default(),
         created: args.created.clone().unwrap_or_default(),
     };
-    let fit = match fit(&log.dataset, &stage, solver.as_ref(), &settings) {
+    let fit = match fit(&log.dataset, &stage, &settings) {
         Err(error) if interrupt::requested() => {
             return Err(HostError::Interrupted {
                 kept: format!("no parameter blob was written: {error}"),
@@ -95,7 +172,7 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
     let circumstances = super::circumstances(&log, &stage, started);
     let report = of_fit(
         &fit,
-        solver.name(),
+        args.solver.name(),
         args.project.name(),
         args.seed,
         &circumstances,
@@ -123,7 +200,7 @@ pub fn run(args: &FitArgs) -> Result<(), HostError> {
 }
 
 /// The figures of a fit for a terminal.
-pub fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
+fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
     format!(
         "Model ({}), {} rows in {} movements, {} fitted, {} skipped; solver {}: {} evaluations in {:.1} ms, {}\n\
          train fitness {:.4}\n\n{}\n{}",
@@ -143,6 +220,7 @@ pub fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
             None
         ),
         text::parameters(
+            fit.model,
             &fit.solution.parameters,
             &Parameters::designed(stage),
             &fit.uncertainty.standard_error,
@@ -152,33 +230,31 @@ pub fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
 }
 
 /// Writes `index.html` into a folder, which is made if it is missing.
-pub fn write_report(
+fn write_report(
     report: &Report,
     fit: &Fit,
     log: &LogReading,
     names: &[String],
     folder: &Path,
 ) -> Result<(), HostError> {
-    let mut errors = judge::pose_errors(&fit.set.decoder(), &log.dataset);
-    for (movement, zero) in log.dataset.movements.iter().zip(&fit.judgement.zeros) {
-        for error in errors[movement.rows.clone()].iter_mut().flatten() {
-            for (error, zero) in error.iter_mut().zip(zero.pose) {
-                *error -= zero;
-            }
-        }
-    }
+    let errors = (fit.decoded).errors_less(&fit.judgement.zeros, &log.dataset);
     let plots = [
-        (
-            "Errors over the log".to_owned(),
-            plots::errors_over_rows(report.zeros_in_words, &errors, &log.dataset)?,
-        ),
-        (
-            "Distribution of the errors".to_owned(),
-            plots::distribution("errors in units of their rms", &errors)?,
-        ),
+        Plot {
+            caption: "Errors over the log",
+            svg: plots::errors_over_rows(report.zeros_in_words, &errors, &log.dataset)?,
+        },
+        Plot {
+            caption: "Distribution of the errors",
+            svg: plots::distribution("errors in units of their rms", &errors)?,
+        },
     ];
     output::make_folder(folder)?;
-    let page = html::page(report, names, &plots);
-    output::write_atomically(&folder.join("index.html"), page.as_bytes())?;
+    let page = Page {
+        report,
+        zeros: report.zeros_in_words,
+        logs: names,
+        plots: &plots,
+    };
+    output::write_atomically(&folder.join("index.html"), page.to_html()?.as_bytes())?;
     Ok(())
 }

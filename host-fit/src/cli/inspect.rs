@@ -1,17 +1,29 @@
 //! `host-fit inspect`.
 
-use super::args::InspectArgs;
 use crate::cli::error::HostError;
 use crate::judge::parameters_of;
 use crate::output::blob_file;
-use crate::problem::parameters::COUNT;
+use crate::problem::model::{COUNT, Model};
 use crate::report::json::parameters;
+use clap::Args;
 use runtime::ParameterSet;
 use serde_json::json;
 use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub(super) struct InspectArgs {
+    /// The parameter blob.
+    #[arg(value_name = "params.bin")]
+    params: PathBuf,
+    /// Write everything as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
 
 /// Shows every field of a blob.
-pub fn run(args: &InspectArgs) -> Result<(), HostError> {
+pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     super::keep_apart(&[args.json.as_deref()], &[&args.params])?;
     let set = blob_file::read(&args.params)?;
     if let Some(path) = &args.json {
@@ -34,7 +46,7 @@ fn as_json(set: &ParameterSet) -> serde_json::Value {
     let c = &set.constants;
     json!({
         "layout_version": runtime::blob::LAYOUT_VERSION,
-        "model": set.model.equation().to_string(),
+        "model": Model::of(set.model).name,
         "serial": set.serial.as_str(),
         "created": set.created.as_str(),
         "logs_sha256": hex(&set.logs_sha256),
@@ -47,7 +59,7 @@ fn as_json(set: &ParameterSet) -> serde_json::Value {
                 "rz": { "rmse_urad": set.fit.rms[2] * 1e6, "peak_urad": set.fit.peak[2] * 1e6 },
             },
         },
-        "parameters": parameters(&parameters_of(set), &[None; COUNT]),
+        "parameters": parameters(Model::of(set.model), &parameters_of(set), &[None; COUNT]),
         "plane_matrix": set.plane,
         "plane_matrix_inverse": set.plane_inverse,
         "hall_m_per_count": set.hall.m_per_code,
@@ -76,7 +88,7 @@ fn as_text(set: &ParameterSet) -> String {
         }
     };
     let _ = writeln!(out, "layout          {}", runtime::blob::LAYOUT_VERSION);
-    let _ = writeln!(out, "model           ({})", set.model.equation());
+    let _ = writeln!(out, "model           ({})", Model::of(set.model).name);
     let _ = writeln!(out, "serial          {}", or_dash(&set.serial));
     let _ = writeln!(out, "created         {}", or_dash(&set.created));
     let _ = writeln!(out, "logs SHA-256    {}", hex(&set.logs_sha256));
@@ -89,7 +101,7 @@ fn as_text(set: &ParameterSet) -> String {
     let _ = writeln!(out, "rms error       {x:.3} um, {y:.3} um, {rz:.3} urad");
     let [x, y, rz] = set.fit.peak.map(|e| e * 1e6);
     let _ = writeln!(out, "peak error      {x:.3} um, {y:.3} um, {rz:.3} urad");
-    for (name, p) in parameters(&parameters_of(set), &[None; COUNT]) {
+    for (name, p) in parameters(Model::of(set.model), &parameters_of(set), &[None; COUNT]) {
         let _ = writeln!(out, "{name:<15} {:>14.7} {}", p.value, p.unit);
     }
     for (name, rows) in [

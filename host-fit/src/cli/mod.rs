@@ -1,46 +1,66 @@
-//! The commands: arguments, one file a command, and nothing that the library could do.
+//! The command line: what the commands take and print, and with which exit status they end.
+//! One file a command; the work is the library's.
 
-pub mod args;
+mod args;
 mod compare;
 mod decode;
 mod demo;
 mod error;
 mod eval;
-pub mod export;
+mod export;
 mod fit;
+mod import;
 mod inspect;
+mod live;
+mod replay;
 
-use crate::bus::import::ImportArgs;
-use crate::bus::live::LiveArgs;
-use crate::bus::replay::ReplayArgs;
 use crate::cli::error::HostError;
 use crate::input::log::{LogReading, ReadOptions, ReferenceUse};
 use crate::input::stage::Stage;
-use crate::interrupt;
 use crate::output::write_atomically;
-use crate::problem::parameters::Parameters;
 use crate::report::json::Circumstances;
-use crate::solve::Solver;
-use crate::solve::least_squares::multistart::LeastSquares;
-use crate::solve::search::kind::SearchKind;
-use crate::solve::search_solver::{self, PopulationSolver};
-use args::{Cli, Command};
-use clap::Parser;
+use clap::{Parser, Subcommand};
 use runtime::ParameterSet;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// The solver that gives the best result: SHTLBO, finished by least squares.
-pub const DEFAULT_SOLVER: &str = search_solver::FINISHED;
+/// Calibrates the Hall-sensor array of a 6-DOF precision stage from logged data.
+///
+/// Exit status: 0 good; 2 wrong usage; 3 bad input or output; 4 the fit failed its own checks;
+/// 130 interrupted, best so far kept.
+#[derive(Debug, Parser)]
+#[command(name = "host-fit", version, max_term_width = 100)]
+struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    command: Command,
+}
 
-/// Names of the solvers.
-pub fn solver_names() -> Vec<&'static str> {
-    [DEFAULT_SOLVER, LeastSquares.name()]
-        .into_iter()
-        .chain(SearchKind::NAMES)
-        .collect()
+/// The commands.
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run the main job on a log that ships with the program, beside the figures of the paper.
+    Demo(demo::DemoArgs),
+    /// Fit a calibration to one or more logs and write the parameter blob.
+    Fit(Box<fit::FitArgs>),
+    /// Judge a parameter blob on one or more logs with reference.
+    Eval(eval::EvalArgs),
+    /// Decode a log with a parameter blob, by the code that runs on the target.
+    Decode(decode::DecodeArgs),
+    /// Show what a parameter blob holds.
+    Inspect(inspect::InspectArgs),
+    /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
+    Live(live::LiveArgs),
+    /// Play a log onto a CAN bus as the sensor node would send it (Linux).
+    Replay(replay::ReplayArgs),
+    /// Write a parameter blob as the file that a flash tool takes.
+    Export(export::ExportArgs),
+    /// Compare the solvers on one or more logs, over several seeds at equal evaluations.
+    Compare(compare::CompareArgs),
+    /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
+    Import(Box<import::ImportArgs>),
 }
 
 /// How `eval` reads: it needs the reference, and the decoder marks saturated codes.
@@ -49,34 +69,19 @@ const EVAL: ReadOptions = ReadOptions {
     ..ReadOptions::DECODE
 };
 
-/// The solver of a name. A search among them watches for Ctrl-C and begins at `known`.
-fn solver(name: &str, known: Option<Parameters>) -> Result<Box<dyn Solver>, HostError> {
-    if name == LeastSquares.name() {
-        return Ok(Box::new(LeastSquares));
-    }
-    let mut search = PopulationSolver::by_name(name).ok_or_else(|| HostError::Usage {
-        argument: "--solver",
-        problem: format!("no solver is called {name}"),
-    })?;
-    search.interrupt = Some(interrupt::watch());
-    search.known = known;
-    Ok(Box::new(search))
-}
-
 /// Parses the command line, runs the command, prints an error if there is one.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let result = match &cli.command {
-        Command::Demo(args) => demo::run(args),
-        Command::Fit(args) => fit::run(args),
-        Command::Eval(args) => eval::run(args),
-        Command::Decode(args) => decode::run(args),
-        Command::Inspect(args) => inspect::run(args),
-        Command::Live(args) => live(args),
-        Command::Replay(args) => replay(args),
-        Command::Export(args) => export::run(args),
-        Command::Compare(args) => compare::run(args),
-        Command::Import(args) => import(args),
+    let result = match Cli::parse().command {
+        Command::Demo(args) => demo::run(&args),
+        Command::Fit(args) => fit::run(&args),
+        Command::Eval(args) => eval::run(&args),
+        Command::Decode(args) => decode::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Live(args) => live::run(args),
+        Command::Replay(args) => replay::run(args),
+        Command::Export(args) => export::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Import(args) => import::run(*args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -87,43 +92,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Decodes a bus. The record is made anew, so it must not be the blob.
-fn live(args: &LiveArgs) -> Result<(), HostError> {
-    keep_apart(&[args.record.as_deref()], &[&args.params])?;
-    Ok(crate::bus::live::run(args)?)
-}
-
-/// Plays a log onto a bus and says how it went.
-fn replay(args: &ReplayArgs) -> Result<(), HostError> {
-    let done = crate::bus::replay::run(args)?;
-    print(&format!(
-        "{} rows in {} frames, {:.3} s of the log in {:.3} s ({:.1} times real time), at most {:.1} ms late\n",
-        done.rows,
-        done.frames,
-        done.logged_s,
-        done.elapsed_s,
-        done.logged_s / done.elapsed_s,
-        done.late_max_s * 1e3
-    ))?;
-    if interrupt::requested() {
-        return Err(HostError::Interrupted {
-            kept: "the rows above were sent, the rest of the log was not".to_owned(),
-        });
-    }
-    Ok(())
-}
-
-/// Joins a record of the bus and a reference, and says how it went.
-fn import(args: &ImportArgs) -> Result<(), HostError> {
-    keep_apart(
-        &[Some(&args.out)],
-        &[&args.bus, &args.reference, &args.stage],
-    )?;
-    let report = crate::bus::import::run(args)?;
-    print(&format!("{report}wrote {}\n", args.out.display()))
-}
-
-/// Writes to standard output. A reader that has gone away, as `head` does, is no error.
+/// Writes to standard output. A reader that closes the pipe early, as `head` does, is no error.
 fn print(text: &str) -> Result<(), HostError> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -135,7 +104,7 @@ fn print(text: &str) -> Result<(), HostError> {
 /// Writes warnings to standard error.
 fn warn(warnings: &[String]) {
     for warning in warnings {
-        // Nobody is left to tell when standard error is gone.
+        // A closed standard error is no reason to fail.
         let _ = writeln!(std::io::stderr(), "warning: {warning}");
     }
 }

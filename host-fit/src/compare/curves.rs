@@ -2,7 +2,7 @@
 
 use super::summary::Spread;
 use super::{ARRIVED, EXACT, Run};
-use crate::report::plots::PlotError;
+use crate::report::plots::{DrawResult, PlotError, as_svg};
 use crate::solve::Projection;
 use crate::solve::search::kind::SearchKind;
 use plotters::coord::Shift;
@@ -118,15 +118,8 @@ pub fn plot(runs: &[Run], form: Projection, course: Course) -> Result<String, Pl
         Course::Convergence => format!("best fitness over the floor, form {}", form.name()),
         Course::P => format!("p of the hybrids, form {}", form.name()),
     };
-    let mut svg = String::new();
-    draw(&mut svg, &title, runs, form, course).map_err(|cause| PlotError {
-        title,
-        cause: cause.to_string(),
-    })?;
-    Ok(svg)
+    as_svg(&title, |svg| draw(svg, &title, runs, form, course))
 }
-
-type DrawResult = Result<(), Box<dyn std::error::Error>>;
 
 fn draw(
     svg: &mut String,

@@ -19,14 +19,14 @@ use crate::fit::{FitError, calibration};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::identify::check_motion;
-use crate::judge::{Zeros, judge};
+use crate::judge::{Decoded, Zeros};
 use crate::problem::Problem;
 use crate::problem::draw::{Draw, draw_rows};
-use crate::solve::least_squares::multistart::LeastSquares;
+use crate::problem::model::Model;
+use crate::solve::by_search::solution_of;
 use crate::solve::objective::form::Form;
 use crate::solve::search::kind::{SearchKind, Settings};
 use crate::solve::search::run::{Checkpoint, Start, StopCriteria};
-use crate::solve::search_solver::solution_of;
 use crate::solve::{Projection, Solution, SolveError, Solver, SolverOptions};
 use runtime::ModelKind;
 use runtime::calibration::Origin;
@@ -119,12 +119,13 @@ pub fn compare(
     interrupt: &AtomicBool,
     mut done: impl FnMut(&Run),
 ) -> Result<Vec<Run>, FitError> {
+    let model = Model::of(ModelKind::M31);
     let all = dataset.rows.len();
     let count = comparison.train.unwrap_or(all).min(all);
-    check_motion(dataset, stage, count, ModelKind::M31)?;
+    check_motion(dataset, stage, count, model)?;
     let draw = |seed| draw_rows(dataset, count, comparison.draw, seed);
     let drawn: Vec<Vec<usize>> = (1..=comparison.seeds).map(draw).collect();
-    let problem = |rows: &[usize]| Problem::new(dataset, rows, stage, ModelKind::M31);
+    let problem = |rows: &[usize]| Problem::new(dataset, rows, stage, model);
     let mut runs = Vec::new();
     for &form in &comparison.forms {
         let mut floors = Vec::new();
@@ -140,12 +141,8 @@ pub fn compare(
                     return Ok(runs);
                 }
                 let problem = problem(rows);
-                let Some(form) = Form::new(&problem, form).map(|f| (f, form)) else {
-                    continue;
-                };
                 let run = one_search(dataset, &problem, form, search, seed, floor, comparison);
-                done(&run);
-                runs.push(run);
+                runs.extend(run.inspect(&mut done));
             }
         }
     }
@@ -158,13 +155,8 @@ fn least_squares(
     form: Projection,
     seed: u64,
 ) -> Result<Run, SolveError> {
-    let options = SolverOptions {
-        projection: form,
-        seed,
-        population: 0,
-        generations: 0,
-    };
-    let solution = LeastSquares.solve(problem, &options)?;
+    let options = SolverOptions::new(form, seed);
+    let solution = Solver::LeastSquares.solve(problem, &options)?;
     let fitness = problem.fitness(solution.cost);
     Ok(Run {
         form,
@@ -180,15 +172,17 @@ fn least_squares(
     })
 }
 
+/// `None` where the form has no unknowns to search for.
 fn one_search(
     dataset: &Dataset,
     problem: &Problem<'_>,
-    (form, projection): (Form<'_>, Projection),
+    projection: Projection,
     search: SearchKind,
     seed: u64,
     floor: f64,
     comparison: &Comparison,
-) -> Run {
+) -> Option<Run> {
+    let form = Form::new(problem, projection)?;
     let first = form.first_population(comparison.population, seed);
     let settings = Settings {
         seed,
@@ -203,10 +197,10 @@ fn one_search(
         ..StopCriteria::default()
     };
     let started = Instant::now();
-    let found = search.minimize(&form, &settings, &criteria);
+    let found = search.minimize(form.cost_function(), &settings, &criteria);
     let elapsed_s = started.elapsed().as_secs_f64();
     let solution = solution_of(problem, &form, &found).ok();
-    Run {
+    Some(Run {
         form: projection,
         solver: search.name(),
         seed,
@@ -217,7 +211,7 @@ fn one_search(
         elapsed_s,
         rms: solution.and_then(|solution| rms_over_all_rows(dataset, problem, &solution)),
         history: found.history,
-    }
+    })
 }
 
 /// Errors over all rows, by the decoder of the target, um, um, urad.
@@ -228,7 +222,7 @@ fn rms_over_all_rows(
 ) -> Option<[f64; 3]> {
     let calibration = calibration(dataset, problem.stage, problem.model, &solution.parameters);
     let set = calibration.prepare(&Origin::default()).ok()?;
-    let judgement = judge(&set, dataset, problem.stage, Zeros::Refit);
+    let judgement = Decoded::new(&set, dataset).judge(dataset, problem.stage, Zeros::Refit);
     Some(judgement.errors.axes.map(|axis| axis.rms * 1e6))
 }
 

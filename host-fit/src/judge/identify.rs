@@ -4,8 +4,10 @@ use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
 use crate::judge::statistics::PoseError;
 use crate::judge::uncertainty::Uncertainty;
-use crate::problem::parameters::{ParameterId, Parameters, Quantity, search_box};
-use runtime::ModelKind;
+use crate::problem::Problem;
+use crate::problem::model::{Model, ParameterId};
+use crate::problem::parameters::{Parameters, THETA, search_box};
+use crate::problem::terms::Motion;
 use runtime::model::dot;
 
 /// An axis moves when its span is at least this many times its noise from sample to sample: a
@@ -34,27 +36,24 @@ pub enum FitFailure {
         rows: usize,
         /// Unknowns, zero deviations counted.
         unknowns: usize,
-        /// Equation of the model.
-        model: u8,
+        /// Name of the model.
+        model: &'static str,
     },
     /// An axis does not move in the log.
     #[error(
-        "{axis} does not move in the log (span {span_micro:.3} {unit}, noise {noise_micro:.3} {unit}), so {parameters} \
-         cannot be found: {remedy}"
+        "{} does not move in the log (span {span_micro:.3} {unit}, noise {noise_micro:.3} {unit}), so {parameters} \
+         cannot be found: record {}{}",
+        motion.axis(), motion.recording(), without(*motion), unit = motion.micro_unit()
     )]
     NoMotion {
-        /// The axis.
-        axis: &'static str,
+        /// The motion that is missing.
+        motion: Motion,
         /// Peak-to-peak over the log, um or urad.
         span_micro: f64,
         /// Noise from sample to sample, um or urad.
         noise_micro: f64,
-        /// um or urad.
-        unit: &'static str,
         /// The parameters that need the motion.
-        parameters: &'static str,
-        /// What to record.
-        remedy: &'static str,
+        parameters: String,
     },
     /// A Hall probe reads nothing but noise while the stage moves.
     #[error(
@@ -81,56 +80,20 @@ pub enum FitFailure {
     #[error(
         "the fitted model ({model}) is wrong by {error_micro:.1} {unit} rms in {axis} where the motion itself has \
          {motion_micro:.1} {unit} rms: it does not describe this log. Check the column mapping, the order and signs \
-         of the sensors and the scales in stage.toml, and record a log in which the stage moves along {axis}"
+         of the sensors and the scales in stage.toml, and record a log in which the stage moves along {axis}",
+        axis = motion.axis(), unit = motion.micro_unit()
     )]
     NotDescribed {
-        /// Equation of the model.
-        model: u8,
+        /// Name of the model.
+        model: &'static str,
         /// The axis.
-        axis: &'static str,
+        motion: Motion,
         /// rms error, um or urad.
         error_micro: f64,
         /// rms motion, um or urad.
         motion_micro: f64,
-        /// um or urad.
-        unit: &'static str,
     },
 }
-
-/// Axes of the pose: name, unit, the parameters that need their motion, what to record.
-const AXES: [(&str, &str, &str, &str); 6] = [
-    (
-        "X",
-        "um",
-        "the sensitivity of probe C and the misalignments of A and B",
-        "record movements along X",
-    ),
-    (
-        "Y",
-        "um",
-        "the sensitivities of probes A and B and the misalignment of C",
-        "record movements along Y",
-    ),
-    ("Rz", "urad", "the lever arms", "record rotations about Z"),
-    (
-        "Z",
-        "um",
-        "a of the three probes",
-        "record movements at different heights, or fit a model without vertical terms (--model 30)",
-    ),
-    (
-        "Rx",
-        "urad",
-        "b of the three probes",
-        "record movements at different tilts Rx, or fit a model without vertical terms (--model 30)",
-    ),
-    (
-        "Ry",
-        "urad",
-        "c of the three probes",
-        "record movements at different tilts Ry, or fit a model without vertical terms (--model 30)",
-    ),
-];
 
 /// Refuses a log in which an axis that the model needs does not move, or a probe does not see it.
 ///
@@ -141,23 +104,29 @@ pub fn check_motion(
     dataset: &Dataset,
     stage: &Stage,
     train_rows: usize,
-    model: ModelKind,
+    model: &'static Model,
 ) -> Result<(), FitFailure> {
-    let free = ParameterId::all().filter(|id| id.is_free_in(model)).count();
-    let zeros = if model.has_zero_deviation() {
+    let zeros = if model.has_zero_deviation {
         3 * dataset.movements.len()
     } else {
         0
     };
-    if 3 * train_rows <= free + zeros {
+    let unknowns = model.free_count() + zeros;
+    if 3 * train_rows <= unknowns {
         return Err(FitFailure::TooFewRows {
             rows: train_rows,
-            unknowns: free + zeros,
-            model: model.equation(),
+            unknowns,
+            model: model.name,
         });
     }
-    let axes = if model.has_vertical_terms() { 6 } else { 3 };
-    for (axis, &(name, unit, parameters, remedy)) in AXES.iter().enumerate().take(axes) {
+    for (axis, motion) in Motion::ALL.into_iter().enumerate() {
+        let needing = model
+            .free()
+            .filter(|id| id.term.seen_in[id.probe] == motion);
+        let parameters: Vec<String> = needing.map(|id| id.name()).collect();
+        if parameters.is_empty() {
+            continue;
+        }
         let (span, noise) = if axis < 3 {
             span_and_noise(dataset, true, |row| row.reference[axis])
         } else {
@@ -165,16 +134,14 @@ pub fn check_motion(
         };
         if stands_still(span, noise) {
             return Err(FitFailure::NoMotion {
-                axis: name,
+                motion,
                 span_micro: span * 1e6,
                 noise_micro: noise * 1e6,
-                unit,
-                parameters,
-                remedy,
+                parameters: parameters.join(", "),
             });
         }
     }
-    let plane = Parameters::designed(stage).geometry.plane_rows();
+    let plane = Parameters::designed(stage).geometry().plane_rows();
     for (k, probe) in ["A", "B", "C"].into_iter().enumerate() {
         let (span, noise) = span_and_noise(dataset, true, |row| row.signal_m[k]);
         let (moved, _) = span_and_noise(dataset, true, |row| dot(&plane[k], row.reference));
@@ -187,6 +154,16 @@ pub fn check_motion(
         }
     }
     Ok(())
+}
+
+/// The way out where a log has no vertical motion.
+const fn without(motion: Motion) -> &'static str {
+    match motion {
+        Motion::X | Motion::Y | Motion::Rz => "",
+        Motion::Z | Motion::Rx | Motion::Ry => {
+            ", or fit a model without vertical terms (--model 30)"
+        }
+    }
 }
 
 fn stands_still(span: f64, noise: f64) -> bool {
@@ -229,14 +206,14 @@ fn span_and_noise(
 
 /// An error that does no harm, however narrow the search range: one per cent of sensitivity, of
 /// a radian or of a lever arm of a quarter metre: one per cent of a motion.
-fn tolerable(id: ParameterId, vertical_span: [f64; 3]) -> f64 {
+fn tolerable(id: &ParameterId, vertical_span: [f64; 3]) -> f64 {
     const PART: f64 = 0.01;
-    match id.quantity {
-        Quantity::LeverArm => PART * 0.25,
-        Quantity::Misalignment | Quantity::Eta => PART,
-        Quantity::PerZ => PART / vertical_span[0],
-        Quantity::PerRx => PART / vertical_span[1],
-        Quantity::PerRy => PART / vertical_span[2],
+    if id.is_slope() {
+        PART / (id.term.in_phi)(vertical_span).abs()
+    } else if id.index < THETA {
+        PART * 0.25
+    } else {
+        PART
     }
 }
 
@@ -246,28 +223,34 @@ fn tolerable(id: ParameterId, vertical_span: [f64; 3]) -> f64 {
 /// # Errors
 /// [`FitFailure::NotDetermined`] with every such parameter.
 pub fn check_determined(
-    stage: &Stage,
+    problem: &Problem<'_>,
     parameters: &Parameters,
     uncertainty: &Uncertainty,
     vertical_span: [f64; 3],
 ) -> Result<(), FitFailure> {
-    let ranges = search_box(stage, parameters.geometry.misalignment_rad);
+    let misalignment_rad = parameters.geometry().misalignment_rad;
+    let ranges = search_box(problem.stage, problem.model, misalignment_rad);
     let mut what = Vec::new();
     let mut remedies: Vec<&str> = Vec::new();
-    for (k, id) in ParameterId::all().enumerate() {
+    for id in problem.model.free() {
         let open = uncertainty.undetermined.contains(&id);
-        let error = uncertainty.motion_error[k];
-        let useless = ERROR_TO_RANGE_MAX * ranges[k].width();
-        if !open && (error <= useless || error <= tolerable(id, vertical_span)) {
+        let error = uncertainty.motion_error[id.index];
+        let useless = ERROR_TO_RANGE_MAX * ranges[id.index].width();
+        if !open && (error <= useless || error <= tolerable(&id, vertical_span)) {
             continue;
         }
         what.push(if open {
             id.name()
         } else {
-            format!("{} (standard error {error:.3e} {})", id.name(), id.unit())
+            format!(
+                "{} (standard error {error:.3e} {})",
+                id.name(),
+                id.term.unit
+            )
         });
-        if !remedies.contains(&id.seen_in()) {
-            remedies.push(id.seen_in());
+        let remedy = id.term.seen_in[id.probe].recording();
+        if !remedies.contains(&remedy) {
+            remedies.push(remedy);
         }
     }
     if what.is_empty() {
@@ -278,11 +261,7 @@ pub fn check_determined(
          ended far from the best fit: take the default)",
         remedies.join(", ")
     );
-    if uncertainty
-        .undetermined
-        .iter()
-        .any(|id| id.quantity.is_vertical())
-    {
+    if uncertainty.undetermined.iter().any(ParameterId::is_slope) {
         remedy.push_str("; without vertical motion use --model 30");
     }
     Err(FitFailure::NotDetermined {
@@ -298,25 +277,24 @@ pub fn check_determined(
 pub fn check_described(
     dataset: &Dataset,
     errors: &PoseError,
-    model: ModelKind,
+    model: &Model,
 ) -> Result<(), FitFailure> {
     let n = dataset.rows.len().max(1) as f64;
-    for (axis, &(name, unit, ..)) in AXES.iter().enumerate().take(3) {
+    for (axis, motion) in Motion::ALL.into_iter().enumerate().take(3) {
         let squares: f64 = dataset.rows.iter().map(|r| r.reference[axis].powi(2)).sum();
-        let motion = (squares / n).sqrt();
+        let moved = (squares / n).sqrt();
         let error = errors.axes[axis].rms;
-        let most = if model.has_zero_deviation() {
+        let most = if model.has_zero_deviation {
             ERROR_TO_MOTION_MAX
         } else {
             ERROR_TO_MOTION_MAX_BASELINE
         };
-        if error > most * motion {
+        if error > most * moved {
             return Err(FitFailure::NotDescribed {
-                model: model.equation(),
-                axis: name,
+                model: model.name,
+                motion,
                 error_micro: error * 1e6,
-                motion_micro: motion * 1e6,
-                unit,
+                motion_micro: moved * 1e6,
             });
         }
     }

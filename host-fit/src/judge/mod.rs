@@ -5,15 +5,16 @@ pub mod precision;
 pub mod statistics;
 pub mod uncertainty;
 
-use crate::input::dataset::Dataset;
+use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
 use crate::judge::statistics::{ErrorSums, PoseError};
+use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
 use runtime::geometry::ProbeGeometry;
-use runtime::model::Sensitivity;
-use runtime::{Decoder, ModelKind, ParameterSet, PlanarPose};
+use runtime::model::Probes;
+use runtime::{ParameterSet, PlanarPose};
 
 /// Which zero deviations are taken off before errors are counted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,8 +29,8 @@ pub enum Zeros<'z> {
 
 impl Zeros<'_> {
     /// The way to judge a model as it was fitted: refitted where it has zero deviations.
-    pub const fn of_model(model: ModelKind) -> Self {
-        if model.has_zero_deviation() {
+    pub const fn of_model(model: &Model) -> Self {
+        if model.has_zero_deviation {
             Self::Refit
         } else {
             Self::None
@@ -67,66 +68,83 @@ pub struct Judgement {
 
 /// The parameters that a set carries, in `f64`.
 pub fn parameters_of(set: &ParameterSet) -> Parameters {
-    Parameters {
-        geometry: ProbeGeometry {
-            lever_arm_m: set.geometry.lever_arm_m.map(f64::from),
-            misalignment_rad: set.geometry.misalignment_rad.map(f64::from),
-        },
-        sensitivity: set.constants.sensitivity.map(|s| Sensitivity {
-            eta: s.eta.into(),
-            per_z_m: s.per_z_m.into(),
-            per_rx_rad: s.per_rx_rad.into(),
-            per_ry_rad: s.per_ry_rad.into(),
-        }),
+    let geometry = ProbeGeometry {
+        lever_arm_m: set.geometry.lever_arm_m.map(f64::from),
+        misalignment_rad: set.geometry.misalignment_rad.map(f64::from),
+    };
+    match set.probes.rounded() {
+        Probes::Linear(sensitivity) => Parameters::of_model_31(&geometry, &sensitivity),
     }
 }
 
-/// Pose errors of every row, m, m, rad, with no zero deviation taken off; `None` where the
-/// decoder found bad codes.
-pub fn pose_errors(decoder: &Decoder, dataset: &Dataset) -> Vec<Option<[f64; 3]>> {
-    let one = |row: &crate::input::dataset::Row| {
-        let pose = row
-            .frame
-            .decode(decoder, &PlanarPose::ZERO)
-            .planar()?
-            .to_array();
-        Some(std::array::from_fn(|axis| {
-            f64::from(pose[axis]) - row.reference[axis]
-        }))
-    };
-    dataset.rows.par_iter().map(one).collect()
+/// A dataset decoded with one parameter set: to be judged in several ways.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decoded {
+    /// The parameters that the set carries.
+    pub parameters: Parameters,
+    /// Pose errors of every row, m, m, rad, with no zero deviation taken off; `None` where the
+    /// decoder found bad codes.
+    pub errors: Vec<Option<[f64; 3]>>,
 }
 
-/// Judges a parameter set on a dataset with reference.
-pub fn judge(set: &ParameterSet, dataset: &Dataset, stage: &Stage, zeros: Zeros) -> Judgement {
-    let parameters = parameters_of(set);
-    let errors = pose_errors(&set.decoder(), dataset);
-    let mut sums = ErrorSums::default();
-    let mut undecoded = 0;
-    let mut taken_off = Vec::with_capacity(dataset.movements.len());
-    for (index, movement) in dataset.movements.iter().enumerate() {
-        let errors = &errors[movement.rows.clone()];
-        let zero = match zeros {
-            Zeros::None => ZeroDeviation::NONE,
-            Zeros::Refit => mean(errors).map_or(ZeroDeviation::NONE, |mean| {
-                ZeroDeviation::of_mean_error(&parameters, mean, &stage.search.delta_m)
-            }),
-            Zeros::Given(deltas) => deltas.get(index).map_or(ZeroDeviation::NONE, |&delta| {
-                ZeroDeviation::given(&parameters, delta)
-            }),
+impl Decoded {
+    /// Decodes every row of a dataset with reference.
+    pub fn new(set: &ParameterSet, dataset: &Dataset) -> Self {
+        let decoder = set.decoder();
+        let one = |row: &Row| {
+            let reading = row.frame.decode(&*decoder, &PlanarPose::ZERO);
+            let pose = reading.planar()?.to_array();
+            let error = |axis: usize| f64::from(pose[axis]) - row.reference[axis];
+            Some(std::array::from_fn(error))
         };
-        for (row, error) in movement.rows.clone().zip(errors) {
-            match error {
-                Some(error) => sums.add(row, std::array::from_fn(|k| error[k] - zero.pose[k])),
-                None => undecoded += 1,
+        Self {
+            parameters: parameters_of(set),
+            errors: dataset.rows.par_iter().map(one).collect(),
+        }
+    }
+
+    /// The figures with these zero deviations taken off.
+    pub fn judge(&self, dataset: &Dataset, stage: &Stage, zeros: Zeros) -> Judgement {
+        let mut sums = ErrorSums::default();
+        let mut undecoded = 0;
+        let mut taken_off = Vec::with_capacity(dataset.movements.len());
+        for (index, movement) in dataset.movements.iter().enumerate() {
+            let errors = &self.errors[movement.rows.clone()];
+            let zero = match zeros {
+                Zeros::None => ZeroDeviation::NONE,
+                Zeros::Refit => mean(errors).map_or(ZeroDeviation::NONE, |mean| {
+                    ZeroDeviation::of_mean_error(&self.parameters, mean, &stage.search.delta_m)
+                }),
+                Zeros::Given(deltas) => deltas.get(index).map_or(ZeroDeviation::NONE, |&delta| {
+                    ZeroDeviation::given(&self.parameters, delta)
+                }),
+            };
+            for (row, error) in movement.rows.clone().zip(errors) {
+                match error {
+                    Some(error) => sums.add(row, std::array::from_fn(|k| error[k] - zero.pose[k])),
+                    None => undecoded += 1,
+                }
+            }
+            taken_off.push(zero);
+        }
+        Judgement {
+            errors: sums.finish(),
+            zeros: taken_off,
+            undecoded,
+        }
+    }
+
+    /// The errors with the zero deviations of a judgement taken off.
+    pub fn errors_less(&self, zeros: &[ZeroDeviation], dataset: &Dataset) -> Vec<Option<[f64; 3]>> {
+        let mut errors = self.errors.clone();
+        for (movement, zero) in dataset.movements.iter().zip(zeros) {
+            for error in errors[movement.rows.clone()].iter_mut().flatten() {
+                for (error, zero) in error.iter_mut().zip(zero.pose) {
+                    *error -= zero;
+                }
             }
         }
-        taken_off.push(zero);
-    }
-    Judgement {
-        errors: sums.finish(),
-        zeros: taken_off,
-        undecoded,
+        errors
     }
 }
 

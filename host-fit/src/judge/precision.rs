@@ -4,30 +4,28 @@ use crate::input::dataset::Dataset;
 use rayon::prelude::*;
 use runtime::capacitive::vertical_pose;
 use runtime::decoder::DecoderConstants;
-use runtime::model::{planar_pose, sensitivity_at};
+use runtime::model::Probes;
 use runtime::real::Real;
-use runtime::{Decoder, PlanarPose, VerticalPose};
+use runtime::{Decode, PlanarPose, VerticalPose};
 
 /// The planar pose of a row in `f64`, from the same codes and constants that were not rounded.
 pub fn decode_f64(
     constants: &DecoderConstants<f64>,
+    probes: &Probes<f64>,
     hall: [i32; 3],
     vertical: &VerticalPose<f64>,
 ) -> PlanarPose<f64> {
-    let phi = [0, 1, 2].map(|k| sensitivity_at(&constants.sensitivity[k], vertical));
-    planar_pose(
-        &constants.planar_per_code,
-        hall.map(f64::from_code),
-        phi,
-        &PlanarPose::ZERO,
-    )
+    let (rows, signal) = (&constants.planar_per_code, hall.map(f64::from_code));
+    let (_, pose) = probes.planar_pose(rows, signal, vertical, &PlanarPose::ZERO);
+    pose
 }
 
 /// The largest difference of X, Y (m) and Rz (rad) between the target's decoder and `f64`, over
 /// all rows that it decodes.
 pub fn largest_difference(
     constants: &DecoderConstants<f64>,
-    decoder: &Decoder,
+    probes: &Probes<f64>,
+    decoder: &dyn Decode,
     dataset: &Dataset,
 ) -> [f64; 3] {
     let one = |row: &crate::input::dataset::Row| {
@@ -40,7 +38,7 @@ pub fn largest_difference(
             Some(codes) => vertical_pose(&constants.vertical_per_code, codes.map(f64::from_code)),
             None => VerticalPose::from_array(row.vertical),
         };
-        let exact = decode_f64(constants, row.frame.hall(), &vertical).to_array();
+        let exact = decode_f64(constants, probes, row.frame.hall(), &vertical).to_array();
         Some([0, 1, 2].map(|k| (f64::from(words[k]) - exact[k]).abs()))
     };
     let larger = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| a[k].max(b[k]));

@@ -6,7 +6,8 @@
 //! [`BLOCK_S`] within them. Where independence would give the larger figure that one is taken,
 //! so that a chance cancellation within few clusters promises nothing.
 
-use crate::problem::parameters::{COUNT, ParameterId, Parameters};
+use crate::problem::model::{COUNT, ParameterId, SLOPES_MAX};
+use crate::problem::parameters::Parameters;
 use crate::problem::{Problem, TrainRow};
 use crate::solve::least_squares::coordinates::{Boxed, Coordinates, parameter_jacobian, point_of};
 use crate::solve::least_squares::normal::{Column, Point, Square, gram, residual_products};
@@ -43,7 +44,7 @@ pub fn uncertainty(
     held: &[ParameterId],
 ) -> Option<Uncertainty> {
     let point = point_of(parameters)?;
-    let offset = if problem.model.has_zero_deviation() {
+    let offset = if problem.model.has_zero_deviation {
         Offset::Free
     } else {
         Offset::Fixed([0.0; 3])
@@ -61,8 +62,10 @@ pub fn uncertainty(
     let independent = to_parameters(independent_scores(problem, &sums, &point, &weights));
 
     let may_change = coordinates.free();
-    let free: Vec<usize> = (0..COUNT)
-        .filter(|&k| may_change[k] && !held.contains(&ParameterId::at(k)))
+    let ids = problem.model.free();
+    let free: Vec<usize> = ids
+        .filter(|id| may_change[id.index] && !held.contains(id))
+        .map(|id| id.index)
         .collect();
     let (inverse, undetermined) = pseudo_inverse(&curvature, &free);
     // What the fit itself used up: unknowns and zero deviations.
@@ -88,7 +91,9 @@ pub fn uncertainty(
     Some(Uncertainty {
         standard_error,
         motion_error,
-        undetermined: undetermined.into_iter().map(ParameterId::at).collect(),
+        undetermined: (problem.model.free())
+            .filter(|id| undetermined.contains(&id.index))
+            .collect(),
     })
 }
 
@@ -182,7 +187,7 @@ fn score(problem: &Problem, point: &Point, row: &TrainRow, origin: &[f64]) -> Op
         if k < 9 {
             weighted[k / 3] * z[k % 3]
         } else {
-            let probe = (k - 9) / 3;
+            let probe = (k - 9) / SLOPES_MAX;
             let pull: f64 = (0..3)
                 .map(|axis| weighted[axis] * point.gain[(axis, probe)])
                 .sum();
@@ -197,13 +202,13 @@ mod tests {
     use crate::input::log::{ReadOptions, read_bytes};
     use crate::input::shipped::{LOG_GZ, STAGE_TOML};
     use crate::input::stage::Stage;
-    use crate::solve::least_squares::multistart::LeastSquares;
+    use crate::problem::model::Model;
     use crate::solve::{Projection, Solver, SolverOptions};
     use runtime::ModelKind;
 
     /// Sandwich over the 57 movements of the shipped log, computed apart from this program from
     /// differences of the residuals of all rows; for `c_c` the rows-independent figure is larger.
-    const EXPECTED: [f64; COUNT] = [
+    const EXPECTED: [f64; 18] = [
         5.3852e-5, 6.1580e-5, 4.6554e-5, 6.4834e-5, 5.8853e-5, 2.5133e-5, 6.0485e-5, 7.3917e-5,
         4.6547e-5, 0.95172, 1.3032, 0.68427, 0.14024, 0.19391, 0.23914, 0.15327, 0.16378, 0.13738,
     ];
@@ -214,17 +219,15 @@ mod tests {
         let path = "paper.csv.gz".as_ref();
         let log = read_bytes(LOG_GZ, path, &stage, &ReadOptions::default()).expect("sound");
         let rows: Vec<usize> = (0..log.dataset.rows.len()).collect();
-        let problem = Problem::new(&log.dataset, &rows, &stage, ModelKind::M31);
-        let options = SolverOptions {
-            projection: Projection::Linear,
-            seed: 1,
-            population: 0,
-            generations: 0,
-        };
-        let solution = LeastSquares.solve(&problem, &options).expect("a solution");
+        let model = Model::of(ModelKind::M31);
+        let problem = Problem::new(&log.dataset, &rows, &stage, model);
+        let options = SolverOptions::new(Projection::Linear, 1);
+        let solution = Solver::LeastSquares
+            .solve(&problem, &options)
+            .expect("a solution");
         let found = uncertainty(&problem, &solution.parameters, &[]).expect("evaluated");
-        for ((id, found), expected) in ParameterId::all().zip(found.standard_error).zip(EXPECTED) {
-            let found = found.expect("determined");
+        for (id, expected) in model.parameters().zip(EXPECTED) {
+            let found = found.standard_error[id.index].expect("determined");
             assert!(
                 (found - expected).abs() < 1e-3 * expected,
                 "{}: {found:e} {expected:e}",

@@ -4,15 +4,13 @@
 //! |---|---|---|
 //! | `bin` | st-flash, OpenOCD, probe-rs with `--binary-format bin` | given to the tool |
 //! | `hex` | Intel HEX: probe-rs, OpenOCD, vendors' tools | in the file |
-//! | `elf` | probe-rs, OpenOCD, debuggers | in the file |
 //!
 //! Only the bytes of the blob are written: what follows in the sector stays erased, and the
 //! target takes the length from the blob's header.
 
-mod elf;
 mod memory_map;
 
-pub use memory_map::{SLOTS, Slot};
+pub use memory_map::SLOTS;
 
 use runtime::{BlobError, ParameterSet};
 
@@ -23,8 +21,16 @@ pub enum ExportFormat {
     Bin,
     /// Intel HEX.
     Hex,
-    /// ELF with one segment.
-    Elf,
+}
+
+impl ExportFormat {
+    /// Its name, which ends the name of a file.
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::Bin => "bin",
+            Self::Hex => "hex",
+        }
+    }
 }
 
 /// Where the blob goes.
@@ -65,9 +71,6 @@ pub enum ExportError {
     /// The Intel HEX file cannot be made.
     #[error("Intel HEX: {0}")]
     Hex(ihex::WriterError),
-    /// The ELF file cannot be made.
-    #[error("ELF: {0}")]
-    Elf(object::write::Error),
 }
 
 impl Place {
@@ -80,7 +83,7 @@ impl Place {
             Self::Address(address) => Ok(address),
             Self::Slot(slot) => SLOTS
                 .get(usize::from(slot))
-                .map(|found| found.address)
+                .copied()
                 .ok_or(ExportError::NoSlot { slot }),
         }
     }
@@ -107,7 +110,6 @@ pub fn export(blob: &[u8], format: ExportFormat, place: Place) -> Result<Vec<u8>
     match format {
         ExportFormat::Bin => Ok(blob.to_vec()),
         ExportFormat::Hex => hex(blob, address).map_err(ExportError::Hex),
-        ExportFormat::Elf => elf::image(blob, address).map_err(ExportError::Elf),
     }
 }
 

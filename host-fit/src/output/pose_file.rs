@@ -15,12 +15,12 @@ mod read;
 mod summary;
 mod text;
 
-pub use read::{PoseFileError, parse, read};
+pub use read::{PoseFileError, read};
 pub use summary::StatusCounts;
 pub use text::to_text;
 
 use crate::input::dataset::{Dataset, LoggedFrame};
-use runtime::{Decoder, OnInvalid, Reading, Servo};
+use runtime::{Decode, OnInvalid, Reading, Servo};
 
 /// The first line of every pose file.
 pub const HEADER: &str = "movement,t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad,status";
@@ -40,7 +40,7 @@ pub struct PoseRow {
 ///
 /// What is invalid is zero or held, as `on_invalid` says; nothing is held, and no frame is
 /// missed, from one movement to the next.
-pub fn decode(dataset: &Dataset, decoder: &Decoder, on_invalid: OnInvalid) -> Vec<PoseRow> {
+pub fn decode(dataset: &Dataset, decoder: &dyn Decode, on_invalid: OnInvalid) -> Vec<PoseRow> {
     let mut servo = Servo::new(decoder, on_invalid);
     let mut poses = Vec::with_capacity(dataset.rows.len());
     for movement in &dataset.movements {

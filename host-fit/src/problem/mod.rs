@@ -1,23 +1,26 @@
 //! The estimation problem: which rows, which model, which weights, which offsets are free.
 
 pub mod draw;
+pub mod model;
 pub mod parameters;
 pub mod synthetic;
+pub mod terms;
 pub mod zero_deviation;
 
 use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
-use runtime::ModelKind;
+use model::{Model, SLOPES_MAX};
 use std::ops::Range;
 
-/// One row of the problem, in um, um, urad for the fit and m, rad for the vertical pose: so
-/// that residuals and gains are of the order of one.
+/// One row of the problem, in um, um, urad for the fit, so that residuals and gains are of the
+/// order of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrainRow {
     /// Displacement read by the probes A, B, C at the designed scale, um.
     pub signal_um: [f64; 3],
-    /// Z, Rx, Ry: m, rad, rad.
-    pub vertical: [f64; 3],
+    /// What the coefficients of the model's slopes are multiplied with in phi: Z, Rx, Ry (m, rad,
+    /// rad) for Model (31).
+    pub slopes: [f64; SLOPES_MAX],
     /// Reference X, Y, Rz: um, um, urad.
     pub reference_um: [f64; 3],
 }
@@ -37,7 +40,7 @@ pub struct Problem<'a> {
     /// The stage: designed values and search ranges.
     pub stage: &'a Stage,
     /// The model.
-    pub model: ModelKind,
+    pub model: &'static Model,
     /// The rows, those of a movement next to each other.
     pub rows: Vec<TrainRow>,
     /// The movements that have rows.
@@ -50,7 +53,12 @@ pub struct Problem<'a> {
 
 impl<'a> Problem<'a> {
     /// The problem of fitting `model` to the rows `selected` (ascending) of `dataset`.
-    pub fn new(dataset: &Dataset, selected: &[usize], stage: &'a Stage, model: ModelKind) -> Self {
+    pub fn new(
+        dataset: &Dataset,
+        selected: &[usize],
+        stage: &'a Stage,
+        model: &'static Model,
+    ) -> Self {
         let mut groups: Vec<Group> = Vec::new();
         let mut rows = Vec::with_capacity(selected.len());
         for &index in selected {
@@ -63,7 +71,7 @@ impl<'a> Problem<'a> {
                     rows: here..here + 1,
                 }),
             }
-            rows.push(TrainRow::new(row));
+            rows.push(TrainRow::new(row, model));
         }
         Self {
             stage,
@@ -75,11 +83,23 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same problem without rows.
-    pub fn clone_head(&self) -> Self {
+    /// The problem on about `most` of its rows, evenly from each movement.
+    #[must_use]
+    pub fn thinned(&self, most: usize) -> Self {
+        let stride = self.rows.len().div_ceil(most).max(1);
+        let mut rows = Vec::with_capacity(self.rows.len() / stride + self.groups.len());
+        let mut groups = Vec::with_capacity(self.groups.len());
+        for group in &self.groups {
+            let from = rows.len();
+            rows.extend(self.rows[group.rows.clone()].iter().step_by(stride));
+            groups.push(Group {
+                movement: group.movement,
+                rows: from..rows.len(),
+            });
+        }
         Self {
-            rows: Vec::new(),
-            groups: Vec::new(),
+            rows,
+            groups,
             ..*self
         }
     }
@@ -92,10 +112,10 @@ impl<'a> Problem<'a> {
 }
 
 impl TrainRow {
-    fn new(row: &Row) -> Self {
+    fn new(row: &Row, model: &Model) -> Self {
         Self {
             signal_um: row.signal_m.map(|s| s * 1e6),
-            vertical: row.vertical,
+            slopes: model.slopes_at(row.vertical),
             reference_um: row.reference.map(|q| q * 1e6),
         }
     }

@@ -70,7 +70,7 @@ impl Protocol {
     /// The log, as the fit sees it: signals are not rounded to codes, while the frames are.
     pub fn dataset(&self, stage: &Stage) -> Dataset {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let plane = self.truth.geometry.plane_rows();
+        let plane = self.truth.geometry().plane_rows();
         let mut dataset = Dataset::default();
         for (setting, axis) in self
             .settings
@@ -87,7 +87,7 @@ impl Protocol {
                 reference[axis] = AMPLITUDES[axis] * phase.sin();
                 let mut signal_m = probe_displacement_m(
                     &plane,
-                    &self.truth.sensitivity,
+                    &self.truth.sensitivity(),
                     &PlanarPose::from_array(reference),
                     &vertical,
                     delta,

@@ -31,7 +31,7 @@ impl ZeroDeviation {
     /// The zero deviation that takes off a mean pose error (m, m, rad), as far as `range` lets
     /// it. With a singular PM, which no checked calibration has, there is none.
     pub fn of_mean_error(parameters: &Parameters, mean_error: [f64; 3], range: &Range) -> Self {
-        let plane = parameters.geometry.plane_rows();
+        let plane = parameters.geometry().plane_rows();
         let Some(inverse) = inverse_rows(&plane) else {
             return Self::NONE;
         };
@@ -54,7 +54,7 @@ impl ZeroDeviation {
 
     /// A zero deviation that is known, m at the probes.
     pub fn given(parameters: &Parameters, delta_m: [f64; 3]) -> Self {
-        let pose = inverse_rows(&parameters.geometry.plane_rows()).map_or([0.0; 3], |inverse| {
+        let pose = inverse_rows(&parameters.geometry().plane_rows()).map_or([0.0; 3], |inverse| {
             zero_pose(&inverse, parameters.eta(), delta_m).to_array()
         });
         Self {

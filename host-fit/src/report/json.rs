@@ -5,7 +5,8 @@ use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::statistics::PoseError;
 use crate::judge::{Judgement, Zeros};
-use crate::problem::parameters::{COUNT, ParameterId, Parameters};
+use crate::problem::model::{COUNT, Model, ParameterId};
+use crate::problem::parameters::Parameters;
 use runtime::ParameterSet;
 use runtime::geometry::ProbeCoordinates;
 use serde::Serialize;
@@ -103,23 +104,21 @@ impl From<ProbeCoordinates<f64>> for Coordinates {
     }
 }
 
-/// Parameters by name.
+/// The parameters of a model by name, with their standard errors where they are known.
 pub fn parameters(
+    model: &'static Model,
     values: &Parameters,
     standard_error: &[Option<f64>; COUNT],
 ) -> BTreeMap<String, Parameter> {
-    ParameterId::all()
-        .zip(values.to_array())
-        .zip(standard_error)
-        .map(|((id, value), &standard_error)| {
-            let parameter = Parameter {
-                value,
-                unit: id.unit(),
-                standard_error,
-            };
-            (id.name(), parameter)
-        })
-        .collect()
+    let one = |id: ParameterId| {
+        let parameter = Parameter {
+            value: values.values[id.index],
+            unit: id.term.unit,
+            standard_error: standard_error[id.index],
+        };
+        (id.name(), parameter)
+    };
+    model.parameters().map(one).collect()
 }
 
 /// The zero deviation of one movement.
@@ -232,7 +231,7 @@ pub fn of_fit(
     let mut warnings = c.warnings.clone();
     warnings.extend(fit.warnings.iter().map(ToString::to_string));
     Report {
-        model: fit.model.equation().to_string(),
+        model: fit.model.name.to_owned(),
         solver: Some(solver.to_owned()),
         project: Some(project),
         seed: Some(seed),
@@ -249,11 +248,15 @@ pub fn of_fit(
         errors_solver_delta: Some(Errors::from(&fit.judgement_solver_zeros.errors)),
         delta: zeros.name(),
         zeros_in_words: zeros.words(),
-        parameters: parameters(parameters_fitted, &fit.uncertainty.standard_error),
+        parameters: parameters(
+            fit.model,
+            parameters_fitted,
+            &fit.uncertainty.standard_error,
+        ),
         coordinates: c
             .stage
             .designed
-            .nearest_with(&parameters_fitted.geometry)
+            .nearest_with(&parameters_fitted.geometry())
             .into(),
         serial: fit.set.serial.as_str().to_owned(),
         zero_deviations: movement_zeros(&fit.judgement, c.dataset),
@@ -268,9 +271,10 @@ pub fn of_eval(
     zeros: Zeros,
     c: &Circumstances,
 ) -> Report {
+    let model = Model::of(set.model);
     let values = crate::judge::parameters_of(set);
     Report {
-        model: set.model.equation().to_string(),
+        model: model.name.to_owned(),
         solver: None,
         project: None,
         seed: None,
@@ -287,8 +291,8 @@ pub fn of_eval(
         errors_solver_delta: None,
         delta: zeros.name(),
         zeros_in_words: zeros.words(),
-        parameters: parameters(&values, &[None; COUNT]),
-        coordinates: c.stage.designed.nearest_with(&values.geometry).into(),
+        parameters: parameters(model, &values, &[None; COUNT]),
+        coordinates: c.stage.designed.nearest_with(&values.geometry()).into(),
         serial: set.serial.as_str().to_owned(),
         zero_deviations: movement_zeros(judgement, c.dataset),
         warnings: c.warnings.clone(),

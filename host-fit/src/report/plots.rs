@@ -27,15 +27,24 @@ pub fn errors_over_rows(
     errors: &[Option<[f64; 3]>],
     dataset: &Dataset,
 ) -> Result<String, PlotError> {
+    as_svg(title, |svg| draw_errors(svg, title, errors, dataset))
+}
+
+/// What drawing gives: the library has an error type for each backend.
+pub(crate) type DrawResult = Result<(), Box<dyn std::error::Error>>;
+
+/// The SVG that `draw` writes.
+pub(crate) fn as_svg(
+    title: &str,
+    draw: impl FnOnce(&mut String) -> DrawResult,
+) -> Result<String, PlotError> {
     let mut svg = String::new();
-    draw_errors(&mut svg, title, errors, dataset).map_err(|cause| PlotError {
+    draw(&mut svg).map_err(|cause| PlotError {
         title: title.to_owned(),
         cause: cause.to_string(),
     })?;
     Ok(svg)
 }
-
-type DrawResult = Result<(), Box<dyn std::error::Error>>;
 
 fn draw_errors(
     svg: &mut String,
@@ -99,12 +108,7 @@ fn bands(errors: &[Option<[f64; 3]>], axis: usize) -> Vec<(usize, f64, f64)> {
 /// # Errors
 /// [`PlotError`] when the drawing library refuses.
 pub fn distribution(title: &str, errors: &[Option<[f64; 3]>]) -> Result<String, PlotError> {
-    let mut svg = String::new();
-    draw_distribution(&mut svg, title, errors).map_err(|cause| PlotError {
-        title: title.to_owned(),
-        cause: cause.to_string(),
-    })?;
-    Ok(svg)
+    as_svg(title, |svg| draw_distribution(svg, title, errors))
 }
 
 fn draw_distribution(svg: &mut String, title: &str, errors: &[Option<[f64; 3]>]) -> DrawResult {

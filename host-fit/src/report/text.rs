@@ -1,7 +1,8 @@
 //! Tables for a terminal.
 
 use crate::judge::statistics::PoseError;
-use crate::problem::parameters::{COUNT, ParameterId, Parameters, Quantity};
+use crate::problem::model::{COUNT, Model};
+use crate::problem::parameters::{ETA, Parameters, THETA};
 use std::fmt::Write;
 
 /// Errors by axis, as Tables 2, 4 and 8 of the paper show them; `paper` stands beside them as
@@ -38,10 +39,11 @@ pub fn errors(title: &str, error: &PoseError, paper: Option<[(f64, f64); 3]>) ->
 /// Parameters beside the designed ones (Table 7), angles in degrees as the paper prints them;
 /// `paper` holds its values in the same order and units.
 pub fn parameters(
+    model: &'static Model,
     fitted: &Parameters,
     designed: &Parameters,
     standard_error: &[Option<f64>; COUNT],
-    paper: Option<&[f64; COUNT]>,
+    paper: Option<&[f64]>,
 ) -> String {
     let mut out = String::new();
     let beside = if paper.is_some() { "       paper" } else { "" };
@@ -50,27 +52,25 @@ pub fn parameters(
         "  {:<14}{:>13}{:>13}{:>13}  {:<6}{beside}",
         "", "value", "std. error", "designed", "unit"
     );
-    let values = fitted.to_array().into_iter().zip(designed.to_array());
-    for (k, (id, (value, designed))) in ParameterId::all().zip(values).enumerate() {
-        let (scale, unit) = match id.quantity {
-            Quantity::Misalignment => (180.0 / std::f64::consts::PI, "deg"),
-            _ => (1.0, id.unit()),
+    for id in model.parameters() {
+        let k = id.index;
+        let (scale, unit) = if (THETA..ETA).contains(&k) {
+            (180.0 / std::f64::consts::PI, "deg")
+        } else {
+            (1.0, id.term.unit)
         };
         let error =
             standard_error[k].map_or_else(|| "-".to_owned(), |e| format!("{:.2e}", e * scale));
-        let digits = match id.quantity {
-            Quantity::PerZ | Quantity::PerRx | Quantity::PerRy => 3,
-            _ => 6,
-        };
+        let digits = if id.is_slope() { 3 } else { 6 };
         let _ = write!(
             out,
             "  {:<14}{:>13.digits$}{error:>13}{:>13.digits$}  {unit:<6}",
             id.name(),
-            value * scale,
-            designed * scale
+            fitted.values[k] * scale,
+            designed.values[k] * scale
         );
-        if let Some(paper) = paper {
-            let _ = write!(out, "{:>12.4}", paper[k]);
+        if let Some(paper) = paper.and_then(|paper| paper.get(k)) {
+            let _ = write!(out, "{paper:>12.4}");
         }
         out.push('\n');
     }

@@ -1,22 +1,33 @@
-//! What every solver takes and gives.
+//! How a problem is solved: least squares, SHTLBO and its relatives, by one function.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`least_squares`] | damped Gauss-Newton with everything linear projected out |
+//! | [`objective`] | the fitness as a cost function of a search |
+//! | [`search`] | SHTLBO, its ablations and its peers, for any cost function |
+//! | [`by_search`] | a search on the fitness, with or without a least-squares finish |
 
+pub mod by_search;
 pub mod least_squares;
 pub mod objective;
 pub mod search;
-pub mod search_solver;
 
 use crate::problem::Problem;
-use crate::problem::parameters::{ParameterId, Parameters};
-use std::time::Duration;
+use crate::problem::model::ParameterId;
+use crate::problem::parameters::Parameters;
+use search::kind::SearchKind;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
 /// How much of the problem is solved in closed form.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
     /// Nothing: every zero deviation is an unknown of its own, within its range (the paper).
     None,
     /// The zero deviations.
     Delta,
-    /// Everything linear: the gain G and one offset for each movement. Nine unknowns are left.
+    /// Everything linear: the gain G and one offset for each movement. The ratios of the slopes to
+    /// eta are left, nine for Model (31).
     Linear,
 }
 
@@ -31,17 +42,89 @@ impl Projection {
     }
 }
 
+/// A way to find the parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Solver {
+    /// SHTLBO on a few hundred rows, then least squares on all: the best result.
+    Finished,
+    /// Least squares alone, from several starts.
+    LeastSquares,
+    /// A search alone.
+    Search(SearchKind),
+}
+
+impl Solver {
+    /// All of them, the default first.
+    pub const ALL: [Self; SearchKind::ALL.len() + 2] = {
+        let mut all = [Self::Finished; SearchKind::ALL.len() + 2];
+        all[1] = Self::LeastSquares;
+        let mut k = 0;
+        while k < SearchKind::ALL.len() {
+            all[k + 2] = Self::Search(SearchKind::ALL[k]);
+            k += 1;
+        }
+        all
+    };
+
+    /// The name on the command line and in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Finished => "shtlbo-lm",
+            Self::LeastSquares => "lm",
+            Self::Search(kind) => kind.name(),
+        }
+    }
+
+    /// Finds parameters of low cost.
+    ///
+    /// # Errors
+    /// See [`SolveError`].
+    pub fn solve(
+        self,
+        problem: &Problem<'_>,
+        options: &SolverOptions,
+    ) -> Result<Solution, SolveError> {
+        let started = Instant::now();
+        let mut solution = match self {
+            Self::Finished => by_search::solve_finished(problem, options)?,
+            Self::LeastSquares => least_squares::multistart::solve(problem, options)?,
+            Self::Search(kind) => by_search::solve(kind, problem, options)?,
+        };
+        solution.elapsed = started.elapsed();
+        Ok(solution)
+    }
+}
+
 /// What a solver is told besides the problem.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct SolverOptions {
     /// How much is projected out.
     pub projection: Projection,
     /// Seed of everything random.
     pub seed: u64,
-    /// Individuals of a population; ignored by solvers without one.
+    /// Individuals and generations of a population: see [`by_search::default_size`].
     pub population: usize,
-    /// Generations of a population; ignored by solvers without one.
+    /// Generations of a population.
     pub generations: usize,
+    /// Known parameters to start from, such as those of an earlier blob.
+    pub known: Option<Parameters>,
+    /// Set by Ctrl-C: a search then ends and keeps the best so far.
+    pub interrupt: Option<&'static AtomicBool>,
+}
+
+impl SolverOptions {
+    /// The usual size of a population for a form, nothing known, no interrupt.
+    pub const fn new(projection: Projection, seed: u64) -> Self {
+        let (population, generations) = by_search::default_size(projection);
+        Self {
+            projection,
+            seed,
+            population,
+            generations,
+            known: None,
+            interrupt: None,
+        }
+    }
 }
 
 /// What a solver found.
@@ -84,22 +167,11 @@ pub enum SolveError {
     Unsupported {
         /// Name of the solver.
         solver: &'static str,
-        /// Equation of the model.
-        model: u8,
+        /// Name of the model.
+        model: &'static str,
         /// The form asked for.
         projection: &'static str,
         /// What to do instead.
         reason: &'static str,
     },
-}
-
-/// A way to find the parameters.
-pub trait Solver {
-    /// Name on the command line and in reports.
-    fn name(&self) -> &'static str;
-    /// Finds parameters of low cost.
-    ///
-    /// # Errors
-    /// See [`SolveError`].
-    fn solve(&self, problem: &Problem, options: &SolverOptions) -> Result<Solution, SolveError>;
 }

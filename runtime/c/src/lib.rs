@@ -1,8 +1,8 @@
 //! The runtime for a controller written in C: load a blob, tick, read pose and status.
 //!
 //! The header `hall_runtime.h` is made from this file by cbindgen. Nothing allocates: the
-//! caller keeps a [`HallDecoder`] and a [`HallServo`], in static memory as a rule. No function
-//! can panic, none keeps a pointer but [`hall_servo_start`], and a null pointer is refused or
+//! caller keeps a [`HallDecoder`] and a [`HallServo`], usually in static memory. No function
+//! can panic, only [`hall_servo_start`] keeps a pointer, and a null pointer is refused or
 //! ignored. Call the functions of one servo from one context only.
 #![no_std]
 
@@ -17,7 +17,7 @@ pub use storage::{HallDecoder, HallServo};
 pub use types::{HallFrame, HallHealth, HallPlanarPose, HallReading, HallResult, HallRezero};
 
 /// A panic cannot be reached: the tests link every function of the runtime against a panic
-/// handler that does not exist. The language wants one all the same.
+/// handler that does not exist. The language requires one.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     loop {}
@@ -32,7 +32,7 @@ pub extern "C" fn hall_arithmetic_is_sound() -> bool {
 
 /// Loads the parameter blob at the start of `memory` (flash, padding may follow), checks it,
 /// and makes a decoder of it. `serial` is the serial number of the stage that is expected, or
-/// NULL to take that of any. Anything but HALL_RESULT_OK leaves the decoder as it was.
+/// NULL to take that of any. Unless the result is HALL_RESULT_OK, the decoder stays as it was.
 ///
 /// # Safety
 /// `memory` points to `length` readable bytes; `serial` is NULL or ends in a zero byte;
@@ -47,14 +47,14 @@ pub unsafe extern "C" fn hall_load(
     let Some(decoder) = decoder.filter(|_| !memory.is_null()) else {
         return HallResult::NullPointer;
     };
-    // SAFETY: not null, and `length` bytes long by the caller's word.
+    // SAFETY: not null, and `length` bytes long as the caller promises.
     let memory = unsafe { core::slice::from_raw_parts(memory, length) };
     let set = match ParameterSet::from_flash(memory) {
         Ok(set) => set,
         Err(error) => return error.into(),
     };
     if !serial.is_null() {
-        // SAFETY: not null, and ended by a zero byte by the caller's word.
+        // SAFETY: not null, and ended by a zero byte as the caller promises.
         let serial = unsafe { CStr::from_ptr(serial) };
         if serial.to_bytes() != set.serial.as_bytes() {
             return HallResult::OtherStage;
@@ -83,7 +83,7 @@ pub unsafe extern "C" fn hall_servo_start(
         0 => OnInvalid::Zero,
         ticks => OnInvalid::Hold { ticks },
     };
-    servo.write(HallServo::new(Servo::new(decoder.get(), on_invalid)));
+    servo.write(HallServo::new(Servo::new(&**decoder.get(), on_invalid)));
     HallResult::Ok
 }
 

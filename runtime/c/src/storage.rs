@@ -1,27 +1,27 @@
 //! Room for a decoder and a servo, of a size that C knows.
 
 use core::mem::{ManuallyDrop, MaybeUninit, align_of, size_of};
-use runtime::{Decoder, Servo};
+use runtime::{AnyDecoder, Servo};
 
 /// Words of a decoder.
-pub const HALL_DECODER_WORDS: usize = 53;
+pub const HALL_DECODER_WORDS: usize = 41;
 /// Words of a servo.
-pub const HALL_SERVO_WORDS: usize = 48;
+pub const HALL_SERVO_WORDS: usize = 49;
 
-/// A decoder, as C sees it. Its contents are nobody's business.
+/// A decoder, as C sees it. Its contents are private.
 #[repr(C)]
 pub struct HallDecoder {
     opaque: [MaybeUninit<u32>; HALL_DECODER_WORDS],
 }
 
-/// A servo, as C sees it. Its contents are nobody's business.
+/// A servo, as C sees it. Its contents are private.
 #[repr(C)]
 pub struct HallServo {
     opaque: [MaybeUninit<u32>; HALL_SERVO_WORDS],
 }
 
-const _: () = assert!(size_of::<Decoder>() == size_of::<HallDecoder>());
-const _: () = assert!(align_of::<Decoder>() == align_of::<HallDecoder>());
+const _: () = assert!(size_of::<AnyDecoder>() == size_of::<HallDecoder>());
+const _: () = assert!(align_of::<AnyDecoder>() == align_of::<HallDecoder>());
 const _: () = assert!(size_of::<Servo<'static>>() == size_of::<HallServo>());
 const _: () = assert!(align_of::<Servo<'static>>() == align_of::<HallServo>());
 
@@ -42,7 +42,7 @@ macro_rules! room {
     };
 }
 
-room!(HallDecoder, Decoder);
+room!(HallDecoder, AnyDecoder);
 room!(HallServo, Servo<'static>);
 
 impl HallServo {

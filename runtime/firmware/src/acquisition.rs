@@ -1,4 +1,4 @@
-//! A converter through good and bad times: read every tick, started again after faults.
+//! A converter: read in every tick, and started again after faults.
 
 use embedded_hal::delay::DelayNs;
 use hal_adapters::adc::stuck::StuckWatch;
@@ -9,12 +9,12 @@ use runtime::RawFrame;
 /// takes about 130 us of SPI.
 pub const RESTART_TICKS: u16 = 16;
 
-/// A converter and what is known of it.
+/// A converter and its recent faults.
 #[derive(Debug)]
 pub struct Acquisition<A: FrameSampler> {
     converter: A,
     watch: StuckWatch,
-    /// The fault of a trigger, told by the sample that follows it.
+    /// The fault of a trigger: the sample that follows reports it.
     trigger_fault: Option<AdcError<A::Bus>>,
     faults_in_a_row: u16,
     faults: u32,
@@ -37,14 +37,14 @@ impl<A: FrameSampler> Acquisition<A> {
     /// Resets the converter and sets it up.
     ///
     /// # Errors
-    /// Why it could not be. Ticks go on, and it is started again after [`RESTART_TICKS`].
+    /// See [`AdcError`]. Ticks go on, and the converter is started again after [`RESTART_TICKS`].
     pub fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<A::Bus>> {
         self.starts = self.starts.saturating_add(1);
         self.faults_in_a_row = 0;
         self.converter.start(delay)
     }
 
-    /// Starts the conversion of a tick. A fault is told by the sample of this tick.
+    /// Starts the conversion of a tick. The sample of this tick reports a fault.
     pub fn trigger(&mut self, delay: &mut impl DelayNs) {
         self.trigger_fault = self.converter.trigger(delay).err();
     }
@@ -52,8 +52,8 @@ impl<A: FrameSampler> Acquisition<A> {
     /// The codes of a tick.
     ///
     /// # Errors
-    /// Why there are none. After [`RESTART_TICKS`] such ticks in a row the converter is started
-    /// again in place of being read, and gives codes from the next tick on.
+    /// See [`AdcError`]. After [`RESTART_TICKS`] such ticks in a row the converter is started
+    /// again instead of being read, and gives codes from the next tick on.
     pub fn sample(
         &mut self,
         sequence: u32,
@@ -103,14 +103,14 @@ impl<A: FrameSampler> Acquisition<A> {
 mod tests {
     extern crate std;
     use super::*;
-    use embedded_hal::spi::ErrorKind;
+    use embedded_hal::spi::{ErrorKind, MODE_1, Mode};
 
     struct NoDelay;
     impl DelayNs for NoDelay {
         fn delay_ns(&mut self, _: u32) {}
     }
 
-    /// A converter that fails while `broken` says so, and forgets its settings when it does.
+    /// A converter that fails while `broken` is set, and loses its settings then.
     #[derive(Debug, Default)]
     struct Fake {
         broken: bool,
@@ -120,6 +120,8 @@ mod tests {
 
     impl FrameSampler for Fake {
         type Bus = ErrorKind;
+        const SPI_MODE: Mode = MODE_1;
+        const SPI_HZ_MAX: u32 = 25_000_000;
         const SETTLE_US: u32 = 110;
 
         fn start(&mut self, _: &mut impl DelayNs) -> Result<(), AdcError<ErrorKind>> {

@@ -1,4 +1,4 @@
-//! The CAN controller: never waited for, emptied and filled by interrupt.
+//! The CAN controller: emptied by the tick, filled by the tick and by interrupt, never waited for.
 
 use crate::board;
 use bxcan::filter::Mask32;
@@ -24,9 +24,9 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// Sets the controller up to join the bus by itself, to come back from bus-off by itself
-    /// and to take commands only.
-    pub fn new(instance: stm32f4xx_hal::can::Can<CAN1>) -> Self {
+    /// Sets the controller up to join the bus by itself, to recover from bus-off by itself and
+    /// to receive commands only.
+    pub fn new(instance: board::CanPins) -> Self {
         let mut can = bxcan::Can::builder(instance)
             .set_bit_timing(board::CAN_BIT_TIMING)
             .set_automatic_retransmit(true)
@@ -49,8 +49,8 @@ impl Bus {
         }
     }
 
-    /// At the start of a tick: joins the bus if it has come alive, gives up the frames of the
-    /// tick before, notes whether the bus is off.
+    /// At the start of a tick: joins the bus if there is one, discards the frames of the
+    /// previous tick, notes whether the bus is off.
     pub fn start_tick(&mut self) {
         self.joined = self.joined || self.can.enable_non_blocking().is_ok();
         self.outbox.start_tick();
@@ -69,7 +69,7 @@ impl Bus {
         self.was_off = is_off;
     }
 
-    /// Hands the commands that came to the node.
+    /// Passes received commands to the node.
     pub fn receive(&mut self, node: &mut Node<'_>) {
         for _ in 0..COMMANDS_PER_TICK {
             // SAFETY: as in `start_tick`.

@@ -1,16 +1,16 @@
 //! The rounding mode that the decoder's bits depend on.
 //!
 //! FPSCR must be as after a reset: round to nearest, subnormal numbers kept. An interrupt of
-//! some library may change it and not change it back. The core does set it anew for each
-//! interrupt that uses the FPU, but only while FPCCR.ASPEN is set, and from FPDSCR; so these
-//! are checked at start, and FPSCR around each decoding.
+//! some library may change it and not restore it. The core sets it for each interrupt that uses
+//! the FPU, but only while FPCCR.ASPEN is set, and from FPDSCR. So these two are checked at
+//! start, and FPSCR before and after each decoding.
 
 /// AHP, DN, FZ and RMode: what changes results.
 pub const SETTINGS: u32 = 0b1_1111 << 22;
 
-/// Puts the settings back.
+/// Restores the settings.
 pub trait FpuSettings {
-    /// Puts the settings back as after a reset, and says whether they were not.
+    /// Sets them as after a reset, and says whether they were different.
     fn restore(&mut self) -> bool;
 }
 
@@ -23,8 +23,8 @@ impl FpuSettings for Fpu {
     #[inline(always)]
     fn restore(&mut self) -> bool {
         let fpscr: u32;
-        // SAFETY: reads a register of the FPU, which the start-up code has switched on. It may
-        // touch memory as far as the compiler knows, so that no call is moved past it.
+        // SAFETY: reads a register of the FPU, which the start-up code has switched on. The compiler
+        // must assume that it touches memory, so it moves no call past it.
         unsafe {
             core::arch::asm!("vmrs {}, fpscr", out(reg) fpscr, options(nostack, preserves_flags))
         };
@@ -41,7 +41,7 @@ impl FpuSettings for Fpu {
 
 #[cfg(target_os = "none")]
 impl Fpu {
-    /// Whether the core sets FPSCR anew for interrupts, and sets it as after a reset.
+    /// Whether the core sets FPSCR for interrupts, and sets it as after a reset.
     pub fn defaults_are_sound() -> bool {
         const FPCCR: *const u32 = 0xe000_ef34 as *const u32;
         const FPDSCR: *const u32 = 0xe000_ef3c as *const u32;

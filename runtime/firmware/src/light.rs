@@ -1,4 +1,4 @@
-//! What the LED shows, so that a look at the board tells the state.
+//! What the LED shows: the state of the controller at a glance.
 //!
 //! | LED | state |
 //! |---|---|

@@ -1,18 +1,18 @@
 //! The stage controller: every 2 ms it reads three Hall and three capacitive codes over SPI
 //! and sends the pose over CAN.
 //!
-//! Pins, clocks and bit timing: [`board`]. What a tick does: the library `firmware`.
+//! Converter, pins, clocks and bit timing: [`board`]. What a tick does: the library `firmware`.
 //!
-//! - Two interrupts of one priority, so that none interrupts the other and nothing is shared
-//!   that needs a lock. RTIC checks just this at compile time: state moves from `init` into the
+//! - There are two interrupts of the same priority. Neither interrupts the other, so shared
+//!   state needs no lock. RTIC checks this at compile time: state moves from `init` into the
 //!   task that owns it, without `unsafe` and without cells. There are no software tasks and
 //!   no timer queue.
 //! - TIM2 gives the ticks on an absolute schedule. A tick triggers the converter and is
-//!   finished when the codes have settled; nothing is waited for in between.
-//! - The watchdog is fed by a tick that was done before the next one was due, and by nothing
-//!   else. Faults of sensors, parameters and bus are reported, never reset.
-//! - A panic stops everything, and the watchdog resets. None can be reached from a tick: the
-//!   one that the linker keeps there lies behind a check of the length of received frames.
+//!   finished by a second alarm when the codes have settled; it does not wait in between.
+//! - Only a tick that was done before the next one was due feeds the watchdog. Faults of
+//!   sensors, parameters and bus are reported and do not cause a reset.
+//! - A panic stops everything, and the watchdog resets. No tick can reach one: the only panic
+//!   that the linker keeps there is behind a check of the length of received frames.
 #![no_std]
 #![no_main]
 
@@ -21,7 +21,6 @@ mod bus;
 mod flash;
 mod timer;
 
-use core::convert::Infallible;
 use embedded_hal::delay::DelayNs;
 
 /// Short waits by counting cycles of the core.
@@ -46,19 +45,9 @@ fn stop(_: &core::panic::PanicInfo<'_>) -> ! {
     }
 }
 
-/// A pin whose writes cannot fail has no error to tell.
-fn infallible<T>(result: Result<T, Infallible>) -> T {
-    match result {
-        Ok(value) => value,
-        Err(never) => match never {},
-    }
-}
-
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use super::{Cycles, board, bus::Bus, flash, infallible, timer::Clock};
-    use embedded_hal_bus::spi::ExclusiveDevice;
-    use embedded_hal_bus::spi::NoDelay;
+    use super::{Cycles, board, board::Converter, bus::Bus, flash, timer::Clock};
     use firmware::acquisition::Acquisition;
     use firmware::fpu::{Fpu, FpuSettings};
     use firmware::node::{Facts, Node, Parameters, SampleFault};
@@ -67,19 +56,11 @@ mod app {
     use firmware::telemetry::{Counters, Ended, STAGE};
     use hal_adapters::adc::FrameSampler;
     use runtime::{OnInvalid, Servo};
-    use stm32f4xx_hal::can::CanExt;
-    use stm32f4xx_hal::gpio::{Output, PA4, PB0, PC1, PinState, Speed};
+    use stm32f4xx_hal::gpio::PinState;
     use stm32f4xx_hal::pac::TIM2;
     use stm32f4xx_hal::prelude::*;
     use stm32f4xx_hal::rcc::Enable;
-    use stm32f4xx_hal::time::Hertz;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
-
-    type Device = ExclusiveDevice<board::Spi, PA4<Output>, NoDelay>;
-    #[cfg(not(feature = "ads8688"))]
-    type Converter = hal_adapters::adc::Ads131m08<Device, PB0<Output>>;
-    #[cfg(feature = "ads8688")]
-    type Converter = hal_adapters::adc::Ads8688<Device>;
 
     #[shared]
     struct Shared {
@@ -91,16 +72,13 @@ mod app {
     struct Local {
         clock: Clock,
         schedule: Schedule,
-        /// The tick whose codes settle.
+        /// The tick whose codes are still settling.
         open: Option<Tick>,
         acquisition: Acquisition<Converter>,
         node: Node<'static>,
         watchdog: IndependentWatchdog,
-        led: PC1<Output>,
+        led: board::Led,
         overrun_ticks: u32,
-        /// Keeps the pin of the converter's reset at rest where the driver does not own it.
-        #[cfg(feature = "ads8688")]
-        _reset: PB0<Output>,
     }
 
     #[init(local = [loaded: Option<Loaded> = None])]
@@ -111,33 +89,9 @@ mod app {
         STAGE.put_watchdog_reset(watchdog_reset);
 
         let mut rcc = device.RCC.freeze(board::clocks());
-        let gpioa = device.GPIOA.split(&mut rcc);
-        let gpiob = device.GPIOB.split(&mut rcc);
-        let gpioc = device.GPIOC.split(&mut rcc);
-
-        let mut select = gpioa.pa4.into_push_pull_output_in_state(PinState::High);
-        select.set_speed(Speed::VeryHigh);
-        let mut sync = gpiob.pb0.into_push_pull_output_in_state(PinState::High);
-        sync.set_speed(Speed::High);
-        let pins = (
-            Some(gpioa.pa5.into_alternate().speed(Speed::VeryHigh)),
-            Some(gpioa.pa6.into_alternate().speed(Speed::VeryHigh)),
-            Some(gpioa.pa7.into_alternate().speed(Speed::VeryHigh)),
-        );
-        #[cfg(not(feature = "ads8688"))]
-        let mode = hal_adapters::adc::ads131m08::MODE;
-        #[cfg(feature = "ads8688")]
-        let mode = hal_adapters::adc::ads8688::MODE;
-        let spi = device
-            .SPI1
-            .spi(pins, mode, Hertz::from_raw(board::SPI_HZ), &mut rcc);
-        let spi = infallible(ExclusiveDevice::new_no_delay(spi, select));
-        #[cfg(not(feature = "ads8688"))]
-        let converter = Converter::new(spi, sync, board::CHANNELS);
-        #[cfg(feature = "ads8688")]
-        let converter = Converter::new(spi, board::CHANNELS);
-
-        let bus = Bus::new(device.CAN1.can((gpiob.pb9, gpiob.pb8), &mut rcc));
+        let ports = (device.GPIOA, device.GPIOB, device.GPIOC);
+        let parts = board::set_up(ports, device.SPI1, device.CAN1, &mut rcc);
+        let bus = Bus::new(parts.can);
 
         let memory = flash::parameter_slots();
         let choice = slots::choose(memory, board::STAGE_SERIAL);
@@ -145,7 +99,7 @@ mod app {
             .slot
             .and_then(|slot| memory.get(slot))
             .and_then(|slot| slots::load(slot));
-        // A warm start may come with any settings; then the arithmetic must be as the host's.
+        // After a warm start the FPU may have any settings; with these the arithmetic is the host's.
         Fpu.restore();
         let sound = runtime::arithmetic::check().is_ok() && Fpu::defaults_are_sound();
         let parameters = if !sound {
@@ -153,7 +107,7 @@ mod app {
         } else if let Some(loaded) = loaded {
             let loaded: &'static Loaded = cx.local.loaded.insert(loaded);
             Parameters::Usable {
-                servo: Servo::new(&loaded.decoder, OnInvalid::Zero),
+                servo: Servo::new(&*loaded.decoder, OnInvalid::Zero),
                 serial: &loaded.serial,
                 other_slot: choice.refusal,
             }
@@ -162,8 +116,8 @@ mod app {
                 refusal: choice.refusal.unwrap_or(slots::Refusal::NEITHER),
             }
         };
-        let mut acquisition = Acquisition::new(converter);
-        // A converter that is not there yet is started again by the ticks, which tell why.
+        let mut acquisition = Acquisition::new(parts.converter);
+        // If the converter is not there yet, the ticks report why and start it again.
         let _ = acquisition.start(&mut Cycles);
 
         TIM2::enable(&mut rcc);
@@ -171,7 +125,7 @@ mod app {
         let schedule = Schedule::starting(clock.now_us());
         clock.set_tick_alarm(schedule.due_us());
         let mut watchdog = IndependentWatchdog::new(device.IWDG);
-        // Else halting in a debugger would reset.
+        // Otherwise halting in a debugger would reset.
         watchdog.stop_on_debug(&device.DBGMCU, true);
         watchdog.start(board::WATCHDOG_MS.millis());
 
@@ -184,10 +138,8 @@ mod app {
                 acquisition,
                 node: Node::new(parameters, watchdog_reset),
                 watchdog,
-                led: gpioc.pc1.into_push_pull_output(),
+                led: parts.led,
                 overrun_ticks: 0,
-                #[cfg(feature = "ads8688")]
-                _reset: sync,
             },
         )
     }
@@ -199,7 +151,7 @@ mod app {
         }
     }
 
-    /// A tick: its trigger, and its codes once they have settled.
+    /// A tick: the trigger, and, once the codes have settled, the rest.
     #[task(
         binds = TIM2,
         priority = 1,
@@ -226,7 +178,7 @@ mod app {
             let tick = schedule.start_tick(started_us);
             acquisition.trigger(&mut Cycles);
             clock.set_tick_alarm(schedule.due_us());
-            // A tick that is still open is overtaken: it never ends, and feeds no watchdog.
+            // A tick that is still open is abandoned: it never feeds the watchdog.
             if open.replace(tick).is_some() {
                 *overrun_ticks = overrun_ticks.saturating_add(1);
             }
@@ -247,7 +199,7 @@ mod app {
         };
         let sample = sample.map_err(|fault| SampleFault::from(&fault));
         let reading = node.tick(sample, &facts, &mut Fpu, &mut bus.outbox);
-        // Behind the pose, so that its frames find the mailboxes empty.
+        // After the pose, whose frames then find the mailboxes empty.
         bus.receive(node);
         bus.send();
         led.set_state(PinState::from(node.light()));

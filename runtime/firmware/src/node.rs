@@ -377,7 +377,7 @@ impl<'d> Node<'d> {
 }
 
 /// The arithmetic of a tick, in a function of its own: the checks of the FPU's settings stay
-/// before and behind it.
+/// before and after it.
 #[inline(never)]
 fn run(servo: &mut Servo<'_>, sample: &Result<RawFrame, SampleFault>) -> Reading {
     match sample {

@@ -30,7 +30,7 @@ fn loaded() -> &'static Loaded {
 fn node() -> Node<'static> {
     let loaded = loaded();
     let parameters = Parameters::Usable {
-        servo: Servo::new(&loaded.decoder, OnInvalid::Zero),
+        servo: Servo::new(&*loaded.decoder, OnInvalid::Zero),
         serial: &loaded.serial,
         other_slot: None,
     };

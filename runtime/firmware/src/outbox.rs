@@ -6,8 +6,8 @@ use heapless::Deque;
 /// Frames of one tick at most: six of a pose, status or health, an answer and a page.
 pub const CAPACITY: usize = 12;
 
-/// A queue for the frames of one tick. What was not sent before the next tick is worthless,
-/// since newer frames follow: it is thrown away and counted.
+/// A queue for the frames of one tick. Frames that were not sent before the next tick are out of
+/// date: they are discarded and counted.
 #[derive(Debug, Default)]
 pub struct Outbox {
     queue: Deque<Coded, CAPACITY>,
@@ -23,7 +23,7 @@ impl Outbox {
         }
     }
 
-    /// Adds a frame behind the others.
+    /// Adds a frame at the end.
     pub fn push(&mut self, frame: Coded) {
         if self.queue.push_back(frame).is_err() {
             self.count_dropped(1);
@@ -35,12 +35,12 @@ impl Outbox {
         self.queue.front()
     }
 
-    /// Takes the foremost frame out.
+    /// Removes the first frame.
     pub fn pop(&mut self) -> Option<Coded> {
         self.queue.pop_front()
     }
 
-    /// Throws away what is left of the tick before.
+    /// Discards what is left of the previous tick.
     pub fn start_tick(&mut self) {
         self.count_dropped(self.queue.len() as u32);
         self.queue.clear();
@@ -51,7 +51,7 @@ impl Outbox {
         self.dropped
     }
 
-    /// Counts frames that a mailbox gave up.
+    /// Counts frames that a mailbox did not send.
     pub const fn count_dropped(&mut self, frames: u32) {
         self.dropped = self.dropped.saturating_add(frames);
     }

@@ -7,7 +7,7 @@
 
 use runtime::blob::BlobError;
 use runtime::parameters::Text;
-use runtime::{Decoder, ParameterSet};
+use runtime::{AnyDecoder, ParameterSet};
 
 /// Slots there are.
 pub const SLOTS: usize = 2;
@@ -64,7 +64,7 @@ pub struct Choice {
 #[derive(Clone, Debug)]
 pub struct Loaded {
     /// The decoder.
-    pub decoder: Decoder,
+    pub decoder: AnyDecoder,
     /// Serial number of the stage.
     pub serial: Text,
 }

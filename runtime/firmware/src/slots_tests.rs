@@ -4,7 +4,7 @@ use super::*;
 use runtime::calibration::{Calibration, Origin};
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeGeometry;
-use runtime::model::{ModelKind, Sensitivity};
+use runtime::model::{ModelKind, Probes, Sensitivity};
 use std::vec;
 use std::vec::Vec;
 
@@ -21,12 +21,14 @@ pub(crate) fn slot(serial: &str, created: &str) -> Vec<u8> {
             lever_arm_m: [0.19, -0.21, -0.34],
             misalignment_rad: [0.01, -0.02, 0.03],
         },
-        sensitivity: [Sensitivity {
-            eta: 0.8,
-            per_z_m: -190.0,
-            per_rx_rad: -70.0,
-            per_ry_rad: 15.0,
-        }; 3],
+        probes: Probes::Linear(
+            [Sensitivity {
+                eta: 0.8,
+                per_z_m: -190.0,
+                per_rx_rad: -70.0,
+                per_ry_rad: 15.0,
+            }; 3],
+        ),
         hall_m_per_code: 6.25e-8,
         hall_window: WINDOW,
         capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],

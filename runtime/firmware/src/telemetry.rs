@@ -1,13 +1,13 @@
 //! What a debugger reads while the program runs: the static `STAGE`, by its symbol.
 //!
-//! In gdb: `print STAGE`. Poses are the decoder's words as they are: `STAGE.pose` are the bits
-//! of six `float`s, X, Y, Rz, Z, Rx, Ry in m and rad. `updates` is odd while the words change
-//! and even when they belong together.
+//! In gdb: `print STAGE`. `STAGE.pose` holds the decoder's words unchanged: the bits of six
+//! `float`s, X, Y, Rz, Z, Rx, Ry in m and rad. `updates` is odd while the words change and even
+//! when they belong together.
 
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed, Ordering::Release, compiler_fence};
 use runtime::Reading;
 
-/// Counters that the program keeps beside those of the servo.
+/// Counters of the program, besides those of the servo.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Ticks that came late or not at all.
@@ -20,7 +20,7 @@ pub struct Counters {
     pub adc_starts: u32,
     /// Frames handed to a mailbox.
     pub frames_sent: u32,
-    /// Frames thrown away because newer ones followed.
+    /// Frames discarded because newer ones followed.
     pub frames_dropped: u32,
     /// Times the bus was off.
     pub bus_off: u32,
@@ -52,7 +52,7 @@ pub struct Telemetry {
 const ZERO: AtomicU32 = AtomicU32::new(0);
 
 /// The last pose and the counters. The name is the symbol's, so that any debugger finds it.
-// SAFETY: no other symbol of this program is called so.
+// SAFETY: no other symbol of this program has this name.
 #[unsafe(no_mangle)]
 pub static STAGE: Telemetry = Telemetry {
     updates: ZERO,
@@ -69,7 +69,7 @@ pub static STAGE: Telemetry = Telemetry {
     watchdog_reset: ZERO,
 };
 
-/// What a tick ended with.
+/// The result of a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Ended {
     /// Number of the state and its reason, as in the status frame.
@@ -130,7 +130,7 @@ impl Telemetry {
         }
     }
 
-    /// Notes where the last reset came from.
+    /// Notes whether the watchdog caused the last reset.
     pub fn put_watchdog_reset(&self, watchdog: bool) {
         self.watchdog_reset.store(watchdog.into(), Relaxed);
     }

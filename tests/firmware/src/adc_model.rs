@@ -1,6 +1,5 @@
-//! The converters as the controller sees them, after their data sheets: bytes out for bytes
-//! in, registers, a trigger. They play the rows of a log: row k is what the stage does k
-//! periods after the first tick.
+//! Models of the converters, after their data sheets: bytes out for bytes in, registers, a
+//! trigger. They play the rows of a log, row k in the kth period after the first tick.
 
 /// Hall codes A, B, C and capacitive codes 1, 2, 3.
 pub type Row = [i32; 6];
@@ -10,9 +9,9 @@ pub type Row = [i32; 6];
 pub enum AdcFault {
     /// Nothing.
     None,
-    /// The data line reads this byte for ever.
+    /// The data line always reads this byte.
     Line(u8),
-    /// The codes are those of the moment of the fault, for ever.
+    /// The codes stay as they were when the fault began.
     Stuck,
     /// One bit of every frame of codes is wrong.
     FlippedBit,
@@ -77,7 +76,7 @@ impl Adc {
         adc
     }
 
-    /// Everything as after power-up: what a reset or a short loss of power leaves.
+    /// Registers as after power-up: the effect of a reset or of a short loss of power.
     pub fn reset(&mut self) {
         self.registers = [0; 64];
         match self.part {

@@ -218,7 +218,7 @@ impl Seen {
         }
     }
 
-    /// The last state told.
+    /// The last state on the bus.
     pub fn last_status(&self) -> Option<NodeStatus> {
         self.statuses.last().map(|(_, status)| *status)
     }

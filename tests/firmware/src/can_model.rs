@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 
-/// What the bus does.
+/// State of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BusState {
     /// Others listen and acknowledge.
     Good,
-    /// No other node: frames are repeated for ever.
+    /// No other node: frames are repeated without end.
     Alone,
     /// The controller is bus-off.
     Off,
@@ -21,7 +21,7 @@ const FRAME_NS: u64 = 125_000;
 pub struct Sent {
     /// When it was asked for, ns.
     pub asked_ns: u64,
-    /// When it was through, ns.
+    /// When it was sent completely, ns.
     pub done_ns: u64,
     /// Standard identifier.
     pub id: u16,
@@ -48,7 +48,7 @@ pub struct CanModel {
     bus: BusState,
     /// Frames since the last look.
     pub sent: Vec<Sent>,
-    /// Called for when a mailbox is filled: how many were.
+    /// Mailboxes filled since start.
     pub filled: u64,
     plain: [u32; 256],
 }
@@ -113,7 +113,7 @@ impl CanModel {
         self.on_the_wire = first.map(|k| (k, now_ns + FRAME_NS));
     }
 
-    /// When the frame on the wire is through.
+    /// When the frame on the wire ends.
     pub fn next_event_ns(&self) -> Option<u64> {
         self.on_the_wire.map(|(_, at)| at)
     }
@@ -185,7 +185,7 @@ impl CanModel {
             0x08 => {
                 for k in 0..3 {
                     let shift = 8 * k;
-                    // Writing 1 to "request completed" clears all that is told of it.
+                    // Writing 1 to "request completed" clears its other flags, too.
                     if value >> shift & 1 == 1 {
                         self.done &= !(0xf << shift);
                     }

@@ -6,13 +6,13 @@ use crate::peripherals::{BIT_BAND, CORE, IRQ_TIM2, Peripherals, RANGE};
 use crate::unicorn::{Handle, Unicorn, register};
 use std::ffi::{OsStr, c_uint, c_void};
 
-/// Where an interrupt returns to: no program is there.
+/// Return address of interrupts. No program is there.
 const RETURN: u32 = 0x1fff_0000;
 /// What unused RAM is filled with.
 const PAINT: u8 = 0xa5;
 const WFI: u16 = 0xbf30;
 
-/// Memory that the core sees, at an address that its pages like.
+/// Memory of the core, aligned to its pages.
 #[repr(C, align(4096))]
 struct Memory<const N: usize>([u8; N]);
 
@@ -28,7 +28,7 @@ fn memory<const N: usize>(fill: u8) -> Box<Memory<N>> {
     }
 }
 
-/// What an interrupt took.
+/// The cost of an interrupt.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
     /// Instructions up to the last mailbox that it filled, or all if it filled none.
@@ -51,7 +51,7 @@ pub struct Machine {
     waits_at: u32,
     panics_at: u32,
     asleep: bool,
-    /// The program panicked: nothing but the watchdog helps.
+    /// Whether the program panicked. Only the watchdog ends that.
     panicked: bool,
     /// Panics of the program.
     pub panics: u32,
@@ -224,7 +224,7 @@ impl Machine {
         unsafe { self.core.hook_code(set_fpscr, user, (at, at)) }.map_err(|fault| fault.to_string())
     }
 
-    /// Changes FPSCR while the core sleeps, as an interrupt may that does not change it back.
+    /// Changes FPSCR while the core sleeps, like an interrupt that does not restore it.
     pub fn set_fpscr(&self, value: u32) {
         self.core.set(register::FPSCR, value);
     }

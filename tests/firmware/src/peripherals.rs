@@ -4,7 +4,7 @@
 use crate::adc_model::{Adc, Part, Row};
 use crate::can_model::CanModel;
 
-/// What the peripherals are in: start and bytes of the range.
+/// Address range of the peripherals: start and bytes.
 pub const RANGE: (u64, u64) = (0x4000_0000, 0x8_0000);
 /// The same, one word a bit.
 pub const BIT_BAND: (u64, u64) = (0x4200_0000, 0x100_0000);
@@ -52,7 +52,7 @@ pub struct Peripherals {
     pub adc: Adc,
     /// The CAN controller.
     pub can: CanModel,
-    /// Rows that the converter plays, round and round.
+    /// Rows that the converter plays, in a loop.
     pub rows: Vec<Row>,
     /// What the timer reads when it is started, us: 0 on the chip.
     pub timer_offset_us: u32,
@@ -83,7 +83,7 @@ pub struct Peripherals {
 }
 
 impl Peripherals {
-    /// A chip that got its power just now.
+    /// A chip after power-up.
     pub fn new(part: Part, rows: Vec<Row>) -> Self {
         let mut new = Self {
             now_ns: 0,
@@ -148,7 +148,7 @@ impl Peripherals {
         ((since / US) as u32).wrapping_add(self.timer_offset_us)
     }
 
-    /// When something happens by itself next.
+    /// Time of the next event, ns.
     pub fn next_event_ns(&self) -> Option<u64> {
         let alarms = self.alarms.iter().filter_map(|alarm| alarm.at_ns);
         alarms
@@ -157,7 +157,7 @@ impl Peripherals {
             .min()
     }
 
-    /// Lets happen what is due by now.
+    /// Does what is due by now.
     pub fn advance(&mut self) {
         let now_ns = self.now_ns;
         for (k, alarm) in self.alarms.iter_mut().enumerate() {

@@ -1,6 +1,7 @@
 //! Writes parameter blobs that a target must refuse, one for each reason, made of a good one.
 
 use runtime::blob::{CRC_BYTES, LAYOUT_VERSION, MAX_BYTES};
+use runtime::model::Probes;
 use runtime::parameters::Text;
 use runtime::{BlobError, ParameterSet};
 use std::error::Error;
@@ -54,7 +55,10 @@ fn write_all(good: &Path, folder: &Path) -> Result<(), Box<dyn Error>> {
     write("other.bin", &changed(&|set| set.serial = other.clone())?)?;
     write(
         "nan.bin",
-        &changed(&|set| set.constants.sensitivity[1].per_z_m = f32::NAN)?,
+        &changed(&|set| {
+            let Probes::Linear(probes) = &mut set.probes;
+            probes[1].per_z_m = f32::NAN;
+        })?,
     )?;
     write(
         "singular.bin",

@@ -8,7 +8,7 @@ use host_fit::output::pose_file;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use runtime::blob::MAX_BYTES;
-use runtime::{OnInvalid, ParameterSet, PlanarPose};
+use runtime::{AnyDecoder, OnInvalid, ParameterSet, PlanarPose};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -134,6 +134,7 @@ fn make(
     /// Frames that share one set of random parameters.
     const FRAMES_PER_SET: usize = 32;
     let set = read_blob(params)?;
+    let AnyDecoder::Linear(sound) = set.decoder();
     let mut buffer = [0; MAX_BYTES];
     let blob = set.to_bytes(&mut buffer)?;
     let dataset = match log {
@@ -156,13 +157,13 @@ fn make(
         hold,
     ));
     sections.extend((0..parameters / FRAMES_PER_SET).map(|_| {
-        let words = motion::odd_parameters(&mut rng, &set.constants);
+        let words = motion::odd_parameters(&mut rng, &sound);
         let frames = motion::uniform_frames(&mut rng, FRAMES_PER_SET);
         motion::of_words(words, frames)
     }));
     if parameters > 0 {
         let wild = motion::wild_frames(&mut rng, parameters / 8);
-        let sound = tests::job::to_words(&set.constants, &PlanarPose::ZERO);
+        let sound = tests::job::to_words(&sound, &PlanarPose::ZERO);
         sections.push(motion::of_words(sound, wild));
     }
     let ticks: usize = sections.iter().map(|s: &Section| s.frames.len()).sum();
@@ -205,7 +206,7 @@ fn check_poses(
         0 => OnInvalid::Zero,
         ticks => OnInvalid::Hold { ticks },
     };
-    let host = pose_file::decode(&dataset, &set.decoder(), on_invalid);
+    let host = pose_file::decode(&dataset, &*set.decoder(), on_invalid);
     let target = pose_file::read(poses)?;
     if host.len() != target.len() {
         let (rows, lines) = (host.len(), target.len());

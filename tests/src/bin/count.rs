@@ -31,7 +31,7 @@ struct Cli {
 const LIMITS: [(&str, u64, u64, u64); 3] = [
     ("kernel", 77, 96, 3),
     ("kernel_by_value", 77, 96, 3),
-    ("tick", 200, 96, 3),
+    ("tick", 240, 96, 3),
 ];
 
 /// Functions that together make one job, and the most instructions that it may take: the two

@@ -1,6 +1,6 @@
 //! Lines of a candump log to ticks, by the receiver that a controller has.
 
-use super::{ImportArgs, ImportError};
+use super::{ImportError, ImportSettings};
 use crate::input::source;
 use hal_adapters::can::{BusFault, BusHealth, Layout, SensorReceiver, StampedFrame, Timing};
 use hal_adapters::candump::{LineError, LogLine};
@@ -61,7 +61,7 @@ const TIMING: Timing = Timing {
 ///
 /// # Errors
 /// `Bus`, `BadLine`, `NotText`, `SeveralInterfaces`, `NoTicks`.
-pub fn read(args: &ImportArgs, layout: Layout) -> Result<BusReading, ImportError> {
+pub fn read(args: &ImportSettings, layout: Layout) -> Result<BusReading, ImportError> {
     let path = args.bus.as_path();
     let bytes = source::read_bytes(path)?;
     let mut collector = Collector {
@@ -111,7 +111,7 @@ pub fn read(args: &ImportArgs, layout: Layout) -> Result<BusReading, ImportError
 fn chosen(
     interface: &mut Option<String>,
     found: &LogLine<'_>,
-    args: &ImportArgs,
+    args: &ImportSettings,
     path: &Path,
     line: usize,
 ) -> Result<bool, ImportError> {

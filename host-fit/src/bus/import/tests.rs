@@ -77,13 +77,13 @@ fn reference() -> String {
     text
 }
 
-fn files(bus: &str, reference: &str) -> (TempDir, ImportArgs) {
+fn files(bus: &str, reference: &str) -> (TempDir, ImportSettings) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     std::fs::write(path("bus.log"), bus).expect("written");
     std::fs::write(path("ifm.csv"), reference).expect("written");
     std::fs::write(path("stage.toml"), crate::input::shipped::STAGE_TOML).expect("written");
-    let args = ImportArgs {
+    let args = ImportSettings {
         bus: path("bus.log"),
         reference: path("ifm.csv"),
         stage: path("stage.toml"),
@@ -93,13 +93,13 @@ fn files(bus: &str, reference: &str) -> (TempDir, ImportArgs) {
         estimate_offset: true,
         search_s: 0.4,
         interface: None,
-        layout: LayoutChoice::Auto,
+        layout: None,
         skip_bad_lines: false,
     };
     (folder, args)
 }
 
-fn read_log(args: &ImportArgs) -> crate::input::dataset::Dataset {
+fn read_log(args: &ImportSettings) -> crate::input::dataset::Dataset {
     let stage = Stage::from_file(&args.stage).expect("the shipped stage");
     let paths = std::slice::from_ref(&args.out);
     log::read(paths, &stage, &ReadOptions::default())

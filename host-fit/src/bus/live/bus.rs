@@ -11,6 +11,7 @@ pub enum BusError {
     #[error("{0}")]
     SocketCan(#[from] hal_adapters::socketcan::SocketCanError),
     /// This system has no SocketCAN.
+    #[cfg(not(target_os = "linux"))]
     #[error(
         "a CAN bus needs SocketCAN, which only Linux has; on this system use a log of the bus with `import`"
     )]
@@ -57,7 +58,7 @@ impl Bus {
         Ok(self.socket.receive(wait)?)
     }
 
-    /// Whether the next frame is at hand without asking the kernel.
+    /// Whether a frame has been read from the kernel already, and waits here.
     pub(crate) fn has_frame(&self) -> bool {
         self.socket.has_frame()
     }

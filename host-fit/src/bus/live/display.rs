@@ -5,6 +5,7 @@ use hal_adapters::can::BusHealth;
 use runtime::servo::Health;
 use runtime::{Reading, Status};
 use std::io::{IsTerminal, Write};
+use std::time::Duration;
 
 /// Everything that is shown.
 #[derive(Clone, Copy, Debug)]
@@ -35,12 +36,16 @@ impl Display {
         }
     }
 
-    /// Seconds from one display to the next: ten times a second on a terminal.
-    pub(super) const fn interval_s(&self, every_s: f64) -> f64 {
-        if self.in_place { 0.1 } else { every_s }
+    /// Time from one display to the next: ten times a second on a terminal.
+    pub(super) const fn interval(&self, every: Duration) -> Duration {
+        if self.in_place {
+            Duration::from_millis(100)
+        } else {
+            every
+        }
     }
 
-    /// Shows the present state. A reader that has gone away is no reason to stop decoding.
+    /// Shows the present state. A closed standard output is no reason to stop decoding.
     pub(super) fn show(&mut self, shown: &Shown<'_>) {
         let mut out = std::io::stdout().lock();
         if self.in_place {

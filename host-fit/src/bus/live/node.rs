@@ -8,7 +8,7 @@ use hal_adapters::can::{
     Timing,
 };
 use runtime::rezero::{RezeroSettings, RezeroState};
-use runtime::{Decoder, OnInvalid, PlanarPose, RawFrame, Reading, Servo, Status};
+use runtime::{Decode, OnInvalid, PlanarPose, RawFrame, Reading, Servo, Status};
 
 /// How a node is set up.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +54,7 @@ const NO_FRAMES: Status = Status::PLANAR_INVALID
 
 impl<'d> Node<'d> {
     /// A node that has seen nothing; `serial` is what it tells when asked who it is.
-    pub fn new(decoder: &'d Decoder, serial: &'d str, settings: &NodeSettings) -> Self {
+    pub fn new(decoder: &'d dyn Decode, serial: &'d str, settings: &NodeSettings) -> Self {
         Self {
             receiver: SensorReceiver::new(settings.layout, settings.timing),
             servo: Servo::new(decoder, settings.on_invalid),

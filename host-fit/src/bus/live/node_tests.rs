@@ -1,10 +1,10 @@
 use super::*;
 use hal_adapters::can::{BusFrame, PoseReceiver, sensor};
-use runtime::Calibration;
 use runtime::calibration::Origin;
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeGeometry;
-use runtime::model::Sensitivity;
+use runtime::model::{Probes, Sensitivity};
+use runtime::{AnyDecoder, Calibration};
 
 const SETTINGS: NodeSettings = NodeSettings {
     layout: Layout::Bits16,
@@ -16,7 +16,7 @@ const SETTINGS: NodeSettings = NodeSettings {
     vertical_ticks: 4,
 };
 
-fn decoder() -> Decoder {
+fn decoder() -> AnyDecoder {
     let window = CodeWindow::between_rails(-32768, 32767).expect("16 bits");
     let set = Calibration {
         model: runtime::ModelKind::M30,
@@ -24,7 +24,7 @@ fn decoder() -> Decoder {
             lever_arm_m: [0.2, -0.2, -0.36],
             misalignment_rad: [0.0; 3],
         },
-        sensitivity: [Sensitivity::constant(0.9); 3],
+        probes: Probes::Linear([Sensitivity::constant(0.9); 3]),
         hall_m_per_code: 6.25e-8,
         hall_window: window,
         capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
@@ -76,8 +76,8 @@ fn told(node_sent: &[Coded], mailbox: &mut Mailbox) -> Vec<Told> {
 #[test]
 fn the_published_pose_has_the_bits_of_the_decoder() {
     let decoder = decoder();
-    let mut node = Node::new(&decoder, "", &SETTINGS);
-    let mut servo = Servo::new(&decoder, OnInvalid::Zero);
+    let mut node = Node::new(&*decoder, "", &SETTINGS);
+    let mut servo = Servo::new(&*decoder, OnInvalid::Zero);
     let mut receiver = PoseReceiver::new(SETTINGS.timing);
     for sequence in 3..500 {
         let want = servo.tick(&raw(sequence));
@@ -96,7 +96,7 @@ fn the_published_pose_has_the_bits_of_the_decoder() {
 #[test]
 fn a_silent_bus_is_published_as_invalid_until_frames_come_again() {
     let decoder = decoder();
-    let mut node = Node::new(&decoder, "", &SETTINGS);
+    let mut node = Node::new(&*decoder, "", &SETTINGS);
     feed(&mut node, &raw(1));
     let mut out = Vec::new();
     assert_eq!(node.patience_us(4_500), Some(500));
@@ -117,7 +117,7 @@ fn a_silent_bus_is_published_as_invalid_until_frames_come_again() {
 #[test]
 fn a_request_to_identify_is_answered_with_the_serial_number() {
     let decoder = decoder();
-    let mut node = Node::new(&decoder, "stage 7", &SETTINGS);
+    let mut node = Node::new(&*decoder, "stage 7", &SETTINGS);
     let mut host = Mailbox::default();
     let command = Command::new(Request::Identify { seconds: 1 }, 42);
     let frame = host.send(&Told::Command(command)).expect("known");
@@ -167,7 +167,7 @@ fn rezero(
 #[test]
 fn a_re_zero_at_rest_is_started_and_done() {
     let decoder = decoder();
-    let mut node = Node::new(&decoder, "", &SETTINGS);
+    let mut node = Node::new(&*decoder, "", &SETTINGS);
     let outcomes = rezero(&mut node, 50, 1, |_| 400);
     assert_eq!(outcomes, [Some(Outcome::Started), Some(Outcome::Done)]);
     assert!(node.servo().zero().x_m != 0.0);
@@ -176,7 +176,7 @@ fn a_re_zero_at_rest_is_started_and_done() {
 #[test]
 fn a_re_zero_in_motion_is_refused_with_its_reason() {
     let decoder = decoder();
-    let mut node = Node::new(&decoder, "", &SETTINGS);
+    let mut node = Node::new(&*decoder, "", &SETTINGS);
     let outcomes = rezero(&mut node, 50, 1, |k| k * 20);
     assert_eq!(outcomes, [Some(Outcome::Started), Some(Outcome::Moved)]);
     let outcomes = rezero(&mut node, 1, 2, |_| 400);

@@ -4,11 +4,11 @@ use super::display::{Display, Shown};
 use super::node::{Node, NodeSettings};
 use super::record::Record;
 use super::rhythm::{Pace, Rhythm};
-use super::{Bus, BusError, LiveArgs, LiveError};
+use super::{Bus, BusError, LiveError, LiveSettings};
 use crate::interrupt;
 use crate::output::blob_file;
-use hal_adapters::can::{BusFault, BusFrame, Coded, Layout, StampedFrame, Timing};
-use runtime::{OnInvalid, ParameterSet, Reading};
+use hal_adapters::can::{BusFault, BusFrame, Coded, Layout, StampedFrame};
+use runtime::{ParameterSet, Reading};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -22,35 +22,29 @@ const SEND_DEADLINE: Duration = Duration::from_millis(1);
 ///
 /// # Errors
 /// See [`LiveError`]. An interface that goes down is waited for, not an error.
-pub fn run(args: &LiveArgs) -> Result<(), LiveError> {
-    let set = blob_file::read(&args.params)?;
-    check_serial(&set, args)?;
-    let settings = NodeSettings {
+pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
+    let set = blob_file::read(&settings.params)?;
+    check_serial(&set, settings)?;
+    let node = NodeSettings {
         layout: layout_of(&set).ok_or_else(|| LiveError::CodesTooWide {
-            path: args.params.clone(),
+            path: settings.params.clone(),
         })?,
-        timing: Timing {
-            assembly_us: args.assembly_us,
-            stale_us: args.stale_us,
-        },
-        on_invalid: match args.hold {
-            0 => OnInvalid::Zero,
-            ticks => OnInvalid::Hold { ticks },
-        },
-        vertical_ticks: args.vertical_every,
+        timing: settings.timing,
+        on_invalid: settings.on_invalid,
+        vertical_ticks: settings.vertical_ticks,
     };
-    let bus = Bus::open(&args.can, &Node::messages(settings.layout))?;
-    let record = match &args.record {
-        Some(path) => Some(Record::create(path, &args.can)?),
+    let bus = Bus::open(&settings.interface, &Node::messages(node.layout))?;
+    let record = match &settings.record {
+        Some(path) => Some(Record::create(path, &settings.interface)?),
         None => None,
     };
     let stop = interrupt::watch();
     let decoder = set.decoder();
     let mut session = Session {
-        node: Node::new(&decoder, &set.serial, &settings),
+        node: Node::new(&*decoder, &set.serial, &node),
         bus,
         record,
-        sends: !args.listen_only,
+        sends: !settings.listen_only,
         display: Display::new(),
         started: Instant::now(),
         rhythm: Rhythm::default(),
@@ -60,8 +54,7 @@ pub fn run(args: &LiveArgs) -> Result<(), LiveError> {
         not_sent: 0,
         is_down: false,
     };
-    let end = args.duration.map(Duration::from_secs_f64);
-    let ended = session.until(stop, end, args.every);
+    let ended = session.until(stop, settings.duration, settings.every);
     // What was recorded is kept whatever ended the run.
     let flushed = session.record.as_mut().map_or(Ok(()), Record::flush);
     session.show();
@@ -77,10 +70,10 @@ fn layout_of(set: &ParameterSet) -> Option<Layout> {
         .or_else(|| Layout::that_holds(low.saturating_add(1), high.saturating_sub(1)))
 }
 
-fn check_serial(set: &ParameterSet, args: &LiveArgs) -> Result<(), LiveError> {
-    match &args.serial {
+fn check_serial(set: &ParameterSet, settings: &LiveSettings) -> Result<(), LiveError> {
+    match &settings.serial {
         Some(serial) if set.expect_serial(serial).is_err() => Err(LiveError::OtherStage {
-            path: args.params.clone(),
+            path: settings.params.clone(),
             found: set.serial.to_string(),
             expected: serial.clone(),
         }),
@@ -114,9 +107,9 @@ impl Session<'_> {
         &mut self,
         stop: &AtomicBool,
         end: Option<Duration>,
-        every_s: f64,
+        every: Duration,
     ) -> Result<(), LiveError> {
-        let interval = Duration::from_secs_f64(self.display.interval_s(every_s));
+        let interval = self.display.interval(every);
         let mut next_show = interval;
         while !stop.load(Ordering::Relaxed) {
             let elapsed = self.started.elapsed();
@@ -133,7 +126,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// All frames that are at hand, or the passing of time; then what the node has to say.
+    /// Takes all frames that have come, or lets time pass; then sends what the node has to say.
     fn turn(&mut self) -> Result<(), LiveError> {
         let mut frame = self.receive(Duration::ZERO)?;
         if frame.is_none() {
@@ -170,7 +163,7 @@ impl Session<'_> {
                 Ok(Some(frame))
             }
             Ok(None) => Ok(None),
-            Err(error) => self.forgive(error).map(|()| None),
+            Err(error) => self.wait_out(error).map(|()| None),
         }
     }
 
@@ -206,7 +199,7 @@ impl Session<'_> {
         if let Err(error) = self.bus.send(&frames, SEND_DEADLINE) {
             let count = u32::try_from(frames.len()).unwrap_or(u32::MAX);
             self.not_sent = self.not_sent.saturating_add(count);
-            return self.forgive(error);
+            return self.wait_out(error);
         }
         if let Some(record) = &mut self.record {
             let time_us = now_us();
@@ -219,7 +212,7 @@ impl Session<'_> {
 
     /// An interface that is down and a queue that is full are waited for; the rest ends the
     /// run.
-    fn forgive(&mut self, error: BusError) -> Result<(), LiveError> {
+    fn wait_out(&mut self, error: BusError) -> Result<(), LiveError> {
         if error.is_down() {
             if !self.is_down {
                 self.is_down = true;

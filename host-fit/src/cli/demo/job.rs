@@ -7,14 +7,14 @@ use crate::input::log::{self, ReadOptions};
 use crate::input::shipped::{LOG_GZ, STAGE_TOML};
 use crate::input::stage::Stage;
 use crate::judge::statistics::{ErrorSums, PoseError};
-use crate::judge::{Zeros, judge};
+use crate::judge::{Decoded, Zeros};
 use crate::output;
 use crate::output::blob_file;
 use crate::output::pose_file;
 use crate::problem::draw::Draw;
-use crate::problem::parameters::{COUNT, Parameters};
+use crate::problem::model::Model;
+use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
-use crate::solve::search_solver::default_size;
 use crate::solve::{Projection, Solver, SolverOptions};
 use runtime::ModelKind;
 use runtime::calibration::Origin;
@@ -34,7 +34,7 @@ pub const TABLE_4: PaperErrors = [(2.1896, 10.6451), (4.2560, 19.2473), (2.9176,
 pub const TABLE_8: PaperErrors = [(1.3919, 6.6368), (1.5381, 5.9375), (2.3057, 9.6300)];
 
 /// Table 7 in the order of the parameters here: lever arms from its coordinates, degrees.
-pub fn table_7() -> [f64; COUNT] {
+pub fn table_7() -> [f64; 18] {
     let theta_deg = [0.0145, 0.4143, -0.0561];
     let arms = ProbeCoordinates {
         h1x_m: 0.1944,
@@ -96,7 +96,7 @@ fn at_250_um(rows: &[Row]) -> bool {
 ///
 /// # Errors
 /// [`HostError`] when a file cannot be written.
-pub fn run(folder: &Path, solver: &dyn Solver) -> Result<Demo, HostError> {
+pub fn run(folder: &Path) -> Result<Demo, HostError> {
     let [log_path, stage_path, blob_path, pose_path] =
         ["paper.csv.gz", "stage.toml", "params.bin", "pose.csv"].map(|name| folder.join(name));
     output::write_atomically(&log_path, LOG_GZ)?;
@@ -114,21 +114,24 @@ pub fn run(folder: &Path, solver: &dyn Solver) -> Result<Demo, HostError> {
 
     let heights = dataset.only(at_250_um);
     let designed = designed_errors(&heights, &stage)?;
-    let model_30 = fit(&heights, &stage, solver, &settings(ModelKind::M30))?;
-    let model_30_everywhere = judge(&model_30.set, dataset, &stage, Zeros::Refit).errors;
+    let model_30 = fit(&heights, &stage, &settings(ModelKind::M30))?;
+    let model_30_everywhere = Decoded::new(&model_30.set, dataset)
+        .judge(dataset, &stage, Zeros::Refit)
+        .errors;
     let started = Instant::now();
-    let model_31 = fit(dataset, &stage, solver, &settings(ModelKind::M31))?;
+    let model_31 = fit(dataset, &stage, &settings(ModelKind::M31))?;
     let fitting = started.elapsed();
 
     blob_file::write(&blob_path, &model_31.set)?;
     let set = blob_file::read(&blob_path)?;
-    let decoded = pose_file::decode(dataset, &set.decoder(), OnInvalid::Zero);
+    let decoded = pose_file::decode(dataset, &*set.decoder(), OnInvalid::Zero);
     output::write_atomically(&pose_path, &pose_file::to_text(&decoded))?;
     let errors = pose_file_errors(&pose_path, dataset, &stage, &model_31.solution.parameters)?;
     let constants = model_31
         .calibration
         .constants()
         .map_err(crate::fit::FitError::Unusable)?;
+    let probes = model_31.calibration.probes;
     let movements = dataset.movements.iter().zip(&model_31.judgement.zeros);
     Ok(Demo {
         designed,
@@ -141,7 +144,8 @@ pub fn run(folder: &Path, solver: &dyn Solver) -> Result<Demo, HostError> {
         decoded: errors,
         f32_difference: crate::judge::precision::largest_difference(
             &constants,
-            &set.decoder(),
+            &probes,
+            &*set.decoder(),
             dataset,
         ),
         reading,
@@ -152,17 +156,12 @@ pub fn run(folder: &Path, solver: &dyn Solver) -> Result<Demo, HostError> {
 }
 
 fn settings(model: ModelKind) -> FitSettings {
-    let (population, generations) = default_size(Projection::Linear);
     FitSettings {
-        model,
+        model: Model::of(model),
         train: None,
         draw: Draw::Stratified,
-        solver: SolverOptions {
-            projection: Projection::Linear,
-            seed: 1,
-            population,
-            generations,
-        },
+        solver: Solver::Finished,
+        options: SolverOptions::new(Projection::Linear, 1),
         serial: Text::default(),
         created: Text::default(),
     }
@@ -170,11 +169,18 @@ fn settings(model: ModelKind) -> FitSettings {
 
 /// Table 2: Model (15) with the designed parameters, no zero deviation.
 fn designed_errors(dataset: &Dataset, stage: &Stage) -> Result<PoseError, HostError> {
-    let designed = calibration(dataset, stage, ModelKind::M15, &Parameters::designed(stage));
+    let designed = calibration(
+        dataset,
+        stage,
+        Model::of(ModelKind::M15),
+        &Parameters::designed(stage),
+    );
     let set = designed
         .prepare(&Origin::default())
         .map_err(crate::fit::FitError::Unusable)?;
-    Ok(judge(&set, dataset, stage, Zeros::None).errors)
+    Ok(Decoded::new(&set, dataset)
+        .judge(dataset, stage, Zeros::None)
+        .errors)
 }
 
 /// Errors of a pose file on the log it was decoded from, zero deviations refitted.

@@ -2,17 +2,29 @@
 
 mod job;
 
-use super::args::DemoArgs;
 use crate::cli::demo::job::{Demo, TABLE_2, TABLE_4, TABLE_8, table_7};
 use crate::cli::error::HostError;
 use crate::output;
 use crate::problem::parameters::Parameters;
 use crate::report::text;
+use clap::Args;
 use std::fmt::Write;
+use std::path::PathBuf;
 use std::time::Instant;
 
+/// Arguments of `demo`.
+#[derive(Debug, Args)]
+pub(super) struct DemoArgs {
+    /// Where to leave log, stage.toml, params.bin and pose.csv; a temporary folder if not given.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Also print the zero deviation of each movement (Table A1).
+    #[arg(long)]
+    zero_deviations: bool,
+}
+
 /// Runs the demo and prints what the paper prints.
-pub fn run(args: &DemoArgs) -> Result<(), HostError> {
+pub(super) fn run(args: &DemoArgs) -> Result<(), HostError> {
     let started = Instant::now();
     let temporary;
     let folder = match &args.out {
@@ -25,8 +37,7 @@ pub fn run(args: &DemoArgs) -> Result<(), HostError> {
             temporary.path()
         }
     };
-    let solver = super::solver(super::DEFAULT_SOLVER, None)?;
-    let demo = job::run(folder, solver.as_ref())?;
+    let demo = job::run(folder)?;
     super::print(&as_text(&demo, args.zero_deviations))?;
     let mut end = format!(
         "\nall of this took {:.2} s\n",
@@ -76,6 +87,7 @@ fn as_text(demo: &Demo, zero_deviations: bool) -> String {
         out,
         "Table 7: parameters (lever arms in place of H, which no data can tell apart)\n{}",
         text::parameters(
+            fit.model,
             &fit.solution.parameters,
             &Parameters::designed(&demo.stage),
             &fit.uncertainty.standard_error,

@@ -1,27 +1,12 @@
 //! The parameter slots of the project's `memory.x`, read when this is compiled, so that their
 //! addresses stand in one place.
 
-/// A sector of flash that holds parameters and nothing else.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Slot {
-    /// Where it starts.
-    pub address: u32,
-    /// Its bytes.
-    pub bytes: u32,
-}
-
 const MAP: &str = include_str!("../../../../memory.x");
 
-/// The slots 0 and 1.
-pub const SLOTS: [Slot; 2] = [
-    Slot {
-        address: symbol("_parameter_slot_0 = 0x"),
-        bytes: symbol("_parameter_slot_bytes = 0x"),
-    },
-    Slot {
-        address: symbol("_parameter_slot_1 = 0x"),
-        bytes: symbol("_parameter_slot_bytes = 0x"),
-    },
+/// Addresses of the slots 0 and 1.
+pub const SLOTS: [u32; 2] = [
+    symbol("_parameter_slot_0 = 0x"),
+    symbol("_parameter_slot_1 = 0x"),
 ];
 
 /// The hexadecimal number behind some text of the map; a map without it does not compile.

@@ -65,10 +65,7 @@ pub fn read(path: &Path) -> Result<Vec<PoseRow>, PoseFileError> {
 }
 
 /// Reads the text of a pose file; `path` is only named in errors.
-///
-/// # Errors
-/// As [`read`], but for reading.
-pub fn parse(text: &str, path: &Path) -> Result<Vec<PoseRow>, PoseFileError> {
+pub(super) fn parse(text: &str, path: &Path) -> Result<Vec<PoseRow>, PoseFileError> {
     let mut lines = text.lines();
     let header = lines.next().unwrap_or_default();
     if header.trim_end() != HEADER {

@@ -10,29 +10,19 @@ pub struct StatusCounts {
     pub rows: usize,
     /// Rows with status 0.
     pub good: usize,
-    /// Rows whose X, Y, Rz were not measured.
-    pub planar_invalid: usize,
-    /// Rows whose Z, Rx, Ry were not measured.
-    pub vertical_invalid: usize,
-    /// Rows that repeat an earlier value.
-    pub held: usize,
     /// Rows by bit of the status, in the order of [`Status::NAMES`]. Outside the calibrated
     /// range counts only where the pose was measured.
-    pub by_bit: [usize; Status::NAMES.len()],
+    by_bit: [usize; Status::NAMES.len()],
 }
 
 impl StatusCounts {
     /// Counts the rows.
     pub fn of(rows: &[PoseRow]) -> Self {
         let mut counts = Self::default();
-        let held = Status::PLANAR_HELD.with(Status::VERTICAL_HELD);
         for row in rows {
             let status = row.reading.status;
             counts.rows += 1;
             counts.good += usize::from(status.is_good());
-            counts.planar_invalid += usize::from(status.any(Status::PLANAR_INVALID));
-            counts.vertical_invalid += usize::from(status.any(Status::VERTICAL_INVALID));
-            counts.held += usize::from(status.any(held));
             for (count, (bit, _)) in counts.by_bit.iter_mut().zip(&Status::NAMES) {
                 *count += usize::from(status.any(*bit) && means_something(*bit, status));
             }

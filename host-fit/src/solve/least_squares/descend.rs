@@ -4,7 +4,7 @@ use super::coordinates::Coordinates;
 use super::normal::{Column, Point, Square, cost, descent, gram};
 use super::scatter::{Offset, Q, Scatter, scatter};
 use crate::problem::Problem;
-use crate::problem::parameters::COUNT;
+use crate::problem::model::COUNT;
 use nalgebra::{Cholesky, Matrix3};
 
 /// Why a descent ended.
@@ -82,11 +82,12 @@ pub fn descend(
     let mut end = DescentEnd::StepLimit;
     let weights = Matrix3::from_diagonal(&problem.weights.into());
     'steps: for _ in 0..STEPS_MAX {
-        let chain = coordinates.jacobian(&state.unknowns, &state.point);
-        let gradient =
-            chain.transpose() * descent(&state.scatter, &state.point.gain, problem.weights);
-        let curvature =
-            chain.transpose() * gram(&state.scatter, &state.point.gain, &weights) * chain;
+        let mut gradient = descent(&state.scatter, &state.point.gain, problem.weights);
+        let mut curvature = gram(&state.scatter, &state.point.gain, &weights);
+        if let Some(chain) = coordinates.jacobian(&state.unknowns, &state.point) {
+            gradient = chain.transpose() * gradient;
+            curvature = chain.transpose() * curvature * chain;
+        }
         let free = unblocked(coordinates, &state.unknowns, &gradient);
         let enough = state.cost / (problem.rows.len() as f64) * 1e-8 + rounding(&state.scatter);
         loop {

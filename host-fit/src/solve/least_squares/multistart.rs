@@ -4,14 +4,13 @@ use super::coordinates::{Boxed, Coordinates, Gains, parameters_of, point_of};
 use super::descend::{Descent, DescentEnd, descend};
 use super::normal::{Column, Point, best_gain, cost};
 use super::scatter::{Offset, Ratios, scatter};
-use crate::problem::parameters::{ParameterId, Parameters, search_box};
+use crate::problem::parameters::{ETA, Parameters, SLOPES, THETA, search_box};
 use crate::problem::zero_deviation::ZeroDeviation;
-use crate::problem::{Group, Problem};
-use crate::solve::{Projection, Solution, SolveError, Solver, SolverOptions};
+use crate::problem::{Group, Problem, TrainRow};
+use crate::solve::{Projection, Solution, SolveError, SolverOptions};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use runtime::ModelKind;
-use std::time::Instant;
+use std::time::Duration;
 
 /// Starts besides the designed geometry.
 const RANDOM_STARTS: usize = 7;
@@ -22,89 +21,80 @@ const DRAWS_MAX: usize = 200;
 /// Smallest phi / eta of a random start: nearer to a pole the descent would start on a cliff.
 const START_SENSITIVITY_MIN: f64 = 0.3;
 
-/// Damped Gauss-Newton on the problem with everything linear projected out.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct LeastSquares;
-
-impl Solver for LeastSquares {
-    fn name(&self) -> &'static str {
-        "lm"
-    }
-
-    fn solve(&self, problem: &Problem, options: &SolverOptions) -> Result<Solution, SolveError> {
-        let starts = starts(&thinned(problem, START_ROWS), options.seed);
-        self.solve_from(&starts, problem, options)
-    }
+/// Damped Gauss-Newton on the problem with everything linear projected out, from the designed
+/// geometry and some random starts.
+///
+/// # Errors
+/// See [`SolveError`].
+pub fn solve(problem: &Problem, options: &SolverOptions) -> Result<Solution, SolveError> {
+    let starts = starts(&problem.thinned(START_ROWS), options.seed);
+    solve_from(&starts, problem, options)
 }
 
-impl LeastSquares {
-    /// Descends from each of the given parameters and finishes the best on all rows.
-    ///
-    /// # Errors
-    /// See [`SolveError`].
-    pub fn solve_from(
-        &self,
-        starts: &[Parameters],
-        problem: &Problem,
-        options: &SolverOptions,
-    ) -> Result<Solution, SolveError> {
-        let started = Instant::now();
-        let free = free_offsets(problem);
-        let few = thinned(problem, START_ROWS);
-        let few_offsets = free_offsets(&few);
-        let boxed = Boxed {
-            stage: problem.stage,
-            model: problem.model,
-        };
-        // (12) fixes eta, so its gain is not an arbitrary matrix: only the parameters will do.
-        let by_gains = options.projection == Projection::Linear && problem.model != ModelKind::M12;
-        let mut search = Search {
-            problem,
-            offsets: &free,
-            evaluations: 0,
-        };
-        let found = if by_gains {
-            search.by_gains(&few, &few_offsets, starts)?
-        } else {
-            search.by_parameters(&boxed, &few, &few_offsets, starts)?
-        };
-        let mut descent = found.best;
-        let mut parameters = parameters_of(&descent.point).ok_or(SolveError::NoPlanarMotion)?;
-        // A solution outside its box is brought back, for the least cost on the box's edge.
-        let clipped = boxed.clipped(&parameters);
-        if by_gains && clipped != parameters {
-            descent = search
-                .finish(&boxed, boxed.unknowns(&clipped))
-                .ok_or(SolveError::NoUsableStart)?;
-        }
-        if !by_gains || clipped != parameters {
-            parameters = boxed.parameters(&descent.unknowns);
-        }
-        if options.projection == Projection::None && problem.model.has_zero_deviation() {
-            descent.unknowns = boxed.unknowns(&parameters);
-            descent = search.with_clipped_offsets(&boxed, descent);
-            parameters = boxed.parameters(&descent.unknowns);
-        }
-        let zeros = zero_deviations(problem, &parameters, &descent.point);
-        Ok(Solution {
-            delta_m: zeros.iter().map(|zero| zero.delta_m).collect(),
-            parameters,
-            cost: search.cost_with(&descent, &zeros),
-            evaluations: search.evaluations,
-            elapsed: started.elapsed(),
-            stopped: format!(
-                "{}; {} of {} starts agree",
-                match descent.end {
-                    DescentEnd::Converged => "converged",
-                    DescentEnd::Stuck => "no shorter step lowers the cost",
-                    DescentEnd::StepLimit => "step limit",
-                },
-                found.agreeing,
-                found.tried
-            ),
-            at_limit: boxed.at_limit(&parameters),
-        })
+/// Descends from each of the given parameters and finishes the best on all rows.
+///
+/// # Errors
+/// See [`SolveError`].
+pub fn solve_from(
+    starts: &[Parameters],
+    problem: &Problem,
+    options: &SolverOptions,
+) -> Result<Solution, SolveError> {
+    let free = free_offsets(problem);
+    let few = problem.thinned(START_ROWS);
+    let few_offsets = free_offsets(&few);
+    let boxed = Boxed {
+        stage: problem.stage,
+        model: problem.model,
+    };
+    // (12) fixes eta, so its gain is not an arbitrary matrix: only the parameters will do.
+    let by_gains = options.projection == Projection::Linear && problem.model.fits_gain();
+    let mut search = Search {
+        problem,
+        offsets: &free,
+        evaluations: 0,
+    };
+    let found = if by_gains {
+        search.by_gains(&few, &few_offsets, starts)?
+    } else {
+        search.by_parameters(&boxed, &few, &few_offsets, starts)?
+    };
+    let mut descent = found.best;
+    let mut parameters = parameters_of(&descent.point).ok_or(SolveError::NoPlanarMotion)?;
+    // A solution outside its box is brought back, for the least cost on the box's edge.
+    let clipped = boxed.clipped(&parameters);
+    if by_gains && clipped != parameters {
+        descent = search
+            .finish(&boxed, boxed.unknowns(&clipped))
+            .ok_or(SolveError::NoUsableStart)?;
     }
+    if !by_gains || clipped != parameters {
+        parameters = boxed.parameters(&descent.unknowns);
+    }
+    if options.projection == Projection::None && problem.model.has_zero_deviation {
+        descent.unknowns = boxed.unknowns(&parameters);
+        descent = search.with_clipped_offsets(&boxed, descent);
+        parameters = boxed.parameters(&descent.unknowns);
+    }
+    let zeros = zero_deviations(problem, &parameters, &descent.point);
+    Ok(Solution {
+        delta_m: zeros.iter().map(|zero| zero.delta_m).collect(),
+        parameters,
+        cost: search.cost_with(&descent, &zeros),
+        evaluations: search.evaluations,
+        elapsed: Duration::ZERO,
+        stopped: format!(
+            "{}; {} of {} starts agree",
+            match descent.end {
+                DescentEnd::Converged => "converged",
+                DescentEnd::Stuck => "no shorter step lowers the cost",
+                DescentEnd::StepLimit => "step limit",
+            },
+            found.agreeing,
+            found.tried
+        ),
+        at_limit: boxed.at_limit(&parameters),
+    })
 }
 
 /// The best of several starts, finished on all rows.
@@ -255,7 +245,7 @@ impl Search<'_, '_> {
 
 /// The offsets that the model leaves free: one for each movement, or none at all.
 fn free_offsets(problem: &Problem) -> Vec<Offset> {
-    let offset = if problem.model.has_zero_deviation() {
+    let offset = if problem.model.has_zero_deviation {
         Offset::Free
     } else {
         Offset::Fixed([0.0; 3])
@@ -271,7 +261,7 @@ pub fn zero_deviations(
     point: &Point,
 ) -> Vec<ZeroDeviation> {
     let mut zeros = vec![ZeroDeviation::NONE; problem.movements];
-    if !problem.model.has_zero_deviation() {
+    if !problem.model.has_zero_deviation {
         return zeros;
     }
     for group in &problem.groups {
@@ -289,64 +279,50 @@ pub fn zero_deviations(
     zeros
 }
 
-/// The problem on about `most` of its rows, evenly from each movement.
-pub fn thinned<'a>(problem: &Problem<'a>, most: usize) -> Problem<'a> {
-    let stride = problem.rows.len().div_ceil(most).max(1);
-    let mut few = Problem {
-        rows: Vec::with_capacity(problem.rows.len() / stride + problem.groups.len()),
-        groups: Vec::with_capacity(problem.groups.len()),
-        ..problem.clone_head()
-    };
-    for group in &problem.groups {
-        let from = few.rows.len();
-        few.rows
-            .extend(problem.rows[group.rows.clone()].iter().step_by(stride));
-        few.groups.push(Group {
-            movement: group.movement,
-            rows: from..few.rows.len(),
-        });
-    }
-    few
-}
-
-/// The designed geometry with sensitivities from the middle of their ranges, then random points
-/// of the search box whose phi stays away from zero over the whole log.
-fn starts(problem: &Problem, seed: u64) -> Vec<Parameters> {
-    let stage = problem.stage;
-    let mut designed = Parameters::designed(stage);
-    if problem.model.has_sensitivity() {
-        let ranges = stage.search.of("eta").unwrap_or_default();
-        for (s, range) in designed.sensitivity.iter_mut().zip(ranges) {
-            s.eta = 0.5 * (range.low + range.high);
+/// The designed geometry with sensitivities from the middle of their ranges.
+pub fn middle_of_the_box(problem: &Problem) -> Parameters {
+    let mut middle = Parameters::designed(problem.stage);
+    if problem.model.fits_gain() {
+        let ranges = search_box(problem.stage, problem.model, [0.0; 3]);
+        for k in ETA..SLOPES {
+            middle.values[k] = 0.5 * (ranges[k].low + ranges[k].high);
         }
     }
-    let mut starts = vec![designed];
+    middle
+}
+
+/// [`middle_of_the_box`], then random points of the search box whose phi stays away from zero over
+/// the whole log.
+fn starts(problem: &Problem, seed: u64) -> Vec<Parameters> {
+    let stage = problem.stage;
+    let middle = middle_of_the_box(problem);
+    let mut starts = vec![middle];
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     for _ in 0..DRAWS_MAX {
         if starts.len() > RANDOM_STARTS {
             break;
         }
-        let mut p = designed.to_array();
+        let mut start = middle;
+        let p = &mut start.values;
         // Near a pole most of the box of Table 5 is useless, so draws are shrunk towards zero.
         let shrink: f64 = random.random();
-        let ranges = search_box(stage, [0.0; 3]);
-        for (k, (p, range)) in p.iter_mut().zip(ranges).enumerate().skip(3) {
+        let ranges = search_box(stage, problem.model, [0.0; 3]);
+        for id in problem.model.parameters().skip(THETA) {
             let draw: f64 = random.random();
-            if ParameterId::at(k).is_free_in(problem.model) {
-                let value = range.low + draw * range.width();
-                *p = if k < 9 { value } else { value * shrink };
+            if id.index < problem.model.free_count() {
+                let value = ranges[id.index].low + draw * ranges[id.index].width();
+                p[id.index] = if id.is_slope() { value * shrink } else { value };
             }
         }
-        let ranges = search_box(stage, [p[3], p[4], p[5]]);
-        for k in 0..3 {
+        let ranges = search_box(stage, problem.model, [p[3], p[4], p[5]]);
+        for k in 0..THETA {
             p[k] = ranges[k].low + random.random::<f64>() * ranges[k].width();
         }
-        let p = Parameters::from_array(&p);
-        let far = point_of(&p).is_some_and(|point| {
+        let far = point_of(&start).is_some_and(|point| {
             smallest_sensitivity(problem, &point.ratios) > START_SENSITIVITY_MIN
         });
         if far {
-            starts.push(p);
+            starts.push(start);
         }
     }
     starts
@@ -354,9 +330,9 @@ fn starts(problem: &Problem, seed: u64) -> Vec<Parameters> {
 
 /// The smallest phi / eta over the rows.
 fn smallest_sensitivity(problem: &Problem, ratios: &Ratios) -> f64 {
-    problem
-        .rows
-        .iter()
-        .flat_map(|row| ratios.map(|r| 1.0 + (0..3).map(|k| r[k] * row.vertical[k]).sum::<f64>()))
-        .fold(f64::INFINITY, f64::min)
+    let share = |row: &TrainRow| {
+        ratios.map(|r| 1.0 + r.iter().zip(row.slopes).map(|(r, v)| r * v).sum::<f64>())
+    };
+    let shares = problem.rows.iter().flat_map(share);
+    shares.fold(f64::INFINITY, f64::min)
 }

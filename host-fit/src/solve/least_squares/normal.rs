@@ -1,11 +1,11 @@
 //! Cost, gradient and curvature of the fit in the coordinates x = (G, r), from the scatter.
 //!
-//! x holds the nine entries of G row by row, then the nine ratios probe by probe. The residual
+//! x holds the nine entries of G row by row, then the ratios probe by probe. The residual
 //! of axis j is e_j = q_j - G_j s', and its derivative with respect to x is -J_j with
 //! J_j = s' at the entries of row j of G, and G_ji u_ik at the ratio r_ik.
 
 use super::scatter::{Q, Ratios, Scatter, U};
-use crate::problem::parameters::COUNT;
+use crate::problem::model::{COUNT, SLOPES_MAX};
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 /// The point (G, r) of a fit.
@@ -13,44 +13,42 @@ use nalgebra::{Matrix3, SMatrix, SVector};
 pub struct Point {
     /// Gain: pose (um, um, urad) per um of corrected signal, G = PM^-1 diag(1/eta).
     pub gain: Matrix3<f64>,
-    /// (a, b, c) / eta of each probe.
+    /// Slopes over eta of each probe.
     pub ratios: Ratios,
 }
 
-/// 18 by 18.
+/// One row and column for each number of x, or for each parameter.
 pub type Square = SMatrix<f64, COUNT, COUNT>;
-/// 18 numbers.
+/// The numbers of x, or the parameters.
 pub type Column = SVector<f64, COUNT>;
 
-/// Column of x, and factors by the axes, of the regressor `z`: the sparse rows of J.
-fn jacobian_factor(gain: &Matrix3<f64>, axis: usize, column: usize) -> Option<(usize, f64)> {
-    if column < 9 {
-        (column / 3 == axis).then_some((column % 3, 1.0))
-    } else {
-        let probe = (column - 9) / 3;
-        Some((U + column - 9, gain[(axis, probe)]))
-    }
+/// Probe of the ratio at a place of x, and where its derivative stands in the scatter; `None`
+/// for a gain.
+fn ratio(place: usize) -> Option<(usize, usize)> {
+    let ratio = place.checked_sub(9)?;
+    Some((ratio / SLOPES_MAX, U + ratio))
 }
 
 /// Sum over rows of J' W J for a 3 by 3 weight matrix of the axes.
+///
+/// Axis by axis and column by column each row of J has at most one entry in a block, so
+/// the blocks are written out: gain with gain, gain with ratio, ratio with ratio.
 pub fn gram(scatter: &Scatter, gain: &Matrix3<f64>, weight: &Matrix3<f64>) -> Square {
     let mut out = Square::zeros();
+    // W G and G' W G.
+    let weighted = weight * gain;
+    let through = gain.transpose() * weighted;
     for row in 0..COUNT {
         for column in row..COUNT {
-            let mut sum = 0.0;
-            for i in 0..3 {
-                let Some((left, left_factor)) = jacobian_factor(gain, i, row) else {
-                    continue;
-                };
-                for j in 0..3 {
-                    let Some((right, right_factor)) = jacobian_factor(gain, j, column) else {
-                        continue;
-                    };
-                    sum += weight[(i, j)] * left_factor * right_factor * scatter[(left, right)];
-                }
-            }
-            out[(row, column)] = sum;
-            out[(column, row)] = sum;
+            let product = match (ratio(row), ratio(column)) {
+                (None, None) => weight[(row / 3, column / 3)] * scatter[(row % 3, column % 3)],
+                (None, Some((probe, at))) => weighted[(row / 3, probe)] * scatter[(row % 3, at)],
+                (Some((left, i)), Some((right, j))) => through[(left, right)] * scatter[(i, j)],
+                // Ratios stand behind the gains.
+                (Some(_), None) => 0.0,
+            };
+            out[(row, column)] = product;
+            out[(column, row)] = product;
         }
     }
     out
@@ -75,19 +73,21 @@ pub fn cost(scatter: &Scatter, gain: &Matrix3<f64>, weights: [f64; 3]) -> f64 {
 
 /// Sum over rows of J' W e: the direction in which the cost falls, half its gradient.
 pub fn descent(scatter: &Scatter, gain: &Matrix3<f64>, weights: [f64; 3]) -> Column {
-    Column::from_fn(|row, _| {
-        let mut sum = 0.0;
-        for axis in 0..3 {
-            let Some((left, factor)) = jacobian_factor(gain, axis, row) else {
-                continue;
-            };
-            let mut residual = scatter[(left, Q + axis)];
-            for probe in 0..3 {
-                residual -= gain[(axis, probe)] * scatter[(left, probe)];
-            }
-            sum += weights[axis] * factor * residual;
+    // Sum over rows of one number times the weighted residual of an axis.
+    let pull = |number: usize, axis: usize| {
+        let mut residual = scatter[(number, Q + axis)];
+        for probe in 0..3 {
+            residual -= gain[(axis, probe)] * scatter[(number, probe)];
         }
-        sum
+        weights[axis] * residual
+    };
+    Column::from_fn(|place, _| match ratio(place) {
+        None => pull(place % 3, place / 3),
+        Some((probe, at)) => {
+            gain[(0, probe)] * pull(at, 0)
+                + gain[(1, probe)] * pull(at, 1)
+                + gain[(2, probe)] * pull(at, 2)
+        }
     })
 }
 

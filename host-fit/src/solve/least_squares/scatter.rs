@@ -1,25 +1,27 @@
 //! Sums over rows from which every step of the least-squares fit follows.
 //!
-//! With the ratios r = (a, b, c) / eta of each probe given, the pose is linear in the corrected
-//! signals s' = s / (1 + r v): q = G s' - o, with G = PM^-1 diag(1/eta) and one offset o for each
-//! movement. The derivative of s'_i with respect to r_ik is u_ik = -s'_i v_k / (1 + r_i v). So
-//! the products of the 15 numbers (s', u, q), each less its mean over the movement where the
-//! offset is free, hold all that cost, gradient and curvature need: one pass over the rows for
-//! each set of ratios, whatever the number of movements.
+//! With the ratios r = slope / eta of each probe given, the pose is linear in the corrected signals
+//! s' = s / (1 + r v), where v are the factors of the slopes (Z, Rx, Ry for Model (31)):
+//! q = G s' - o, with G = PM^-1 diag(1/eta) and one offset o for each movement. The derivative of
+//! s'_i with respect to r_ik is u_ik = -s'_i v_k / (1 + r_i v). So the products of the numbers
+//! (s', q, u), each less its mean over the movement where the offset is free, hold all that cost,
+//! gradient and curvature need: one pass over the rows for each set of ratios, whatever the number
+//! of movements.
 
-use crate::problem::{Problem, TrainRow};
+use crate::problem::model::SLOPES_MAX;
+use crate::problem::{Group, Problem, TrainRow};
 use nalgebra::SMatrix;
 use rayon::prelude::*;
 
-/// Corrected signals, their derivatives and the reference: 3 + 9 + 3.
-pub const WIDTH: usize = 15;
-/// Where the derivatives start.
-pub const U: usize = 3;
-/// Where the reference starts.
-pub const Q: usize = 12;
+/// Where the reference starts, behind the corrected signals.
+pub const Q: usize = 3;
+/// Where the derivatives start: [`SLOPES_MAX`] for each probe, zero beyond the model's.
+pub const U: usize = 6;
+/// Corrected signals, reference and derivatives.
+pub const WIDTH: usize = U + 3 * SLOPES_MAX;
 
-/// (a, b, c) / eta of the probes A, B, C: 1/m, 1/rad, 1/rad.
-pub type Ratios = [[f64; 3]; 3];
+/// Slopes over eta of the probes A, B, C: (a, b, c) / eta in 1/m, 1/rad, 1/rad for Model (31).
+pub type Ratios = [[f64; SLOPES_MAX]; 3];
 
 /// Rows whose 1 + r v is smaller than this are next to a pole, and so is the candidate.
 const DENOMINATOR_MIN: f64 = 0.05;
@@ -33,36 +35,62 @@ pub enum Offset {
     Fixed([f64; 3]),
 }
 
-/// Products of the 15 numbers, summed over all rows. Symmetric; only the upper triangle is
-/// summed, then mirrored.
+/// Products of the numbers of a row, summed over all rows: symmetric.
 pub type Scatter = SMatrix<f64, WIDTH, WIDTH>;
 
-/// The 15 numbers of one row, or `None` next to a pole of 1 / (1 + r v).
+/// Room for the numbers of a row of any model: a multiple of four, so that loops over it fill
+/// SIMD registers.
+const ROOM: usize = WIDTH.next_multiple_of(4);
+
+/// The numbers of one row, or `None` next to a pole of 1 / (1 + r v).
+pub fn regressors(row: &TrainRow, ratios: &Ratios) -> Option<[f64; ROOM]> {
+    regressors_of::<SLOPES_MAX, ROOM>(row, ratios)
+}
+
+/// The mean of the numbers over some rows, or `None` next to a pole.
+pub fn mean(rows: &[TrainRow], ratios: &Ratios) -> Option<[f64; ROOM]> {
+    mean_of::<SLOPES_MAX, ROOM>(rows, ratios)
+}
+
+/// The origin from which the numbers of a movement count: its means where the offset is free, else
+/// minus the offset for the reference and zero for the rest. `None` next to a pole.
+pub fn origin(rows: &[TrainRow], ratios: &Ratios, offset: Offset) -> Option<[f64; ROOM]> {
+    origin_of::<SLOPES_MAX, ROOM>(rows, ratios, offset)
+}
+
+// The same for a constant number of slopes `K`, whose derivatives lie side by side, and room for
+// `W` numbers: loops of constant length take half the time.
+
 #[inline(always)]
-pub fn regressors(row: &TrainRow, ratios: &Ratios) -> Option<[f64; WIDTH + 1]> {
-    let v = row.vertical;
-    let mut z = [0.0; WIDTH + 1];
+fn regressors_of<const K: usize, const W: usize>(
+    row: &TrainRow,
+    ratios: &Ratios,
+) -> Option<[f64; W]> {
+    let mut z = [0.0; W];
     let mut smallest = f64::INFINITY;
     for probe in 0..3 {
-        let r = ratios[probe];
-        let denominator = 1.0 + (r[0] * v[0] + r[1] * v[1] + r[2] * v[2]);
+        let r = &ratios[probe];
+        let mut share = r[0] * row.slopes[0];
+        for k in 1..K {
+            share += r[k] * row.slopes[k];
+        }
+        let denominator = 1.0 + share;
         smallest = smallest.min(denominator);
         let corrected = row.signal_um[probe] / denominator;
         let slope = -corrected / denominator;
         z[probe] = corrected;
-        for axis in 0..3 {
-            z[U + 3 * probe + axis] = slope * v[axis];
-        }
         z[Q + probe] = row.reference_um[probe];
+        for k in 0..K {
+            z[U + K * probe + k] = slope * row.slopes[k];
+        }
     }
     (smallest > DENOMINATOR_MIN).then_some(z)
 }
 
-/// The mean of the 15 numbers over some rows, or `None` next to a pole.
-pub fn mean(rows: &[TrainRow], ratios: &Ratios) -> Option<[f64; WIDTH + 1]> {
-    let mut sum = [0.0; WIDTH + 1];
+fn mean_of<const K: usize, const W: usize>(rows: &[TrainRow], ratios: &Ratios) -> Option<[f64; W]> {
+    let mut sum = [0.0; W];
     for row in rows {
-        let z = regressors(row, ratios)?;
+        let z = regressors_of::<K, W>(row, ratios)?;
         for (sum, z) in sum.iter_mut().zip(z) {
             *sum += z;
         }
@@ -71,13 +99,15 @@ pub fn mean(rows: &[TrainRow], ratios: &Ratios) -> Option<[f64; WIDTH + 1]> {
     Some(sum.map(|s| s / n))
 }
 
-/// The origin from which the 15 numbers of a movement count: its means where the offset is
-/// free, else minus the offset for the reference and zero for the rest.
-pub fn origin(rows: &[TrainRow], ratios: &Ratios, offset: Offset) -> Option<[f64; WIDTH + 1]> {
+fn origin_of<const K: usize, const W: usize>(
+    rows: &[TrainRow],
+    ratios: &Ratios,
+    offset: Offset,
+) -> Option<[f64; W]> {
     match offset {
-        Offset::Free => mean(rows, ratios),
+        Offset::Free => mean_of::<K, W>(rows, ratios),
         Offset::Fixed(o) => {
-            let mut origin = [0.0; WIDTH + 1];
+            let mut origin = [0.0; W];
             for axis in 0..3 {
                 origin[Q + axis] = -o[axis];
             }
@@ -86,19 +116,20 @@ pub fn origin(rows: &[TrainRow], ratios: &Ratios, offset: Offset) -> Option<[f64
     }
 }
 
-fn group_scatter(
+/// The sums over the rows of one movement; only the upper triangle is right.
+fn group_sums<const K: usize, const W: usize>(
     rows: &[TrainRow],
     ratios: &Ratios,
     offset: Offset,
-) -> Option<[[f64; WIDTH + 1]; WIDTH]> {
-    let origin = origin(rows, ratios, offset)?;
-    let mut sums = [[0.0; WIDTH + 1]; WIDTH];
+) -> Option<[[f64; W]; W]> {
+    let origin = origin_of::<K, W>(rows, ratios, offset)?;
+    let mut sums = [[0.0; W]; W];
     for row in rows {
-        let mut z = regressors(row, ratios)?;
+        let mut z = regressors_of::<K, W>(row, ratios)?;
         for (z, origin) in z.iter_mut().zip(origin) {
             *z -= origin;
         }
-        for (i, sums) in sums.iter_mut().enumerate() {
+        for (i, sums) in sums.iter_mut().enumerate().take(U + 3 * K) {
             let from = i & !3;
             let factor = z[i];
             for (sum, z) in sums[from..].iter_mut().zip(&z[from..]) {
@@ -112,8 +143,20 @@ fn group_scatter(
 /// The scatter of a problem's rows at the given ratios, or `None` when a row is next to a
 /// pole. Movements are summed in their order, so the bytes do not depend on the threads.
 pub fn scatter(problem: &Problem, ratios: &Ratios, offsets: &[Offset]) -> Option<Scatter> {
-    let one = |(group, offset): (&crate::problem::Group, &Offset)| {
-        group_scatter(&problem.rows[group.rows.clone()], ratios, *offset)
+    if problem.model.fitted_slopes() <= 3 {
+        scatter_of::<3, { U + 10 }>(problem, ratios, offsets)
+    } else {
+        scatter_of::<SLOPES_MAX, ROOM>(problem, ratios, offsets)
+    }
+}
+
+fn scatter_of<const K: usize, const W: usize>(
+    problem: &Problem,
+    ratios: &Ratios,
+    offsets: &[Offset],
+) -> Option<Scatter> {
+    let one = |(group, offset): (&Group, &Offset)| {
+        group_sums::<K, W>(&problem.rows[group.rows.clone()], ratios, *offset)
     };
     // Small problems are done before another thread would wake up.
     let groups: Vec<_> = if problem.rows.len() < 4000 {
@@ -121,12 +164,16 @@ pub fn scatter(problem: &Problem, ratios: &Ratios, offsets: &[Offset]) -> Option
     } else {
         problem.groups.par_iter().zip(offsets).map(one).collect()
     };
+    let place = |i: usize| match i.checked_sub(U) {
+        Some(u) => U + u / K * SLOPES_MAX + u % K,
+        None => i,
+    };
     let mut total = Scatter::zeros();
     for group in groups {
         let group = group?;
-        for i in 0..WIDTH {
-            for j in i..WIDTH {
-                total[(i, j)] += group[i][j];
+        for i in 0..U + 3 * K {
+            for j in i..U + 3 * K {
+                total[(place(i), place(j))] += group[i][j];
             }
         }
     }

@@ -2,13 +2,13 @@
 
 use super::coordinates::{Boxed, Coordinates, parameters_of, point_of};
 use super::descend::descend;
-use super::multistart::LeastSquares;
 use super::normal::{Column, cost, descent};
 use super::scatter::{Offset, regressors, scatter};
 use crate::input::shipped::STAGE_TOML;
 use crate::input::stage::Stage;
 use crate::problem::Problem;
-use crate::problem::parameters::{COUNT, Parameters};
+use crate::problem::model::{COUNT, Model};
+use crate::problem::parameters::Parameters;
 use crate::problem::synthetic::Protocol;
 use crate::solve::{Projection, Solution, Solver, SolverOptions};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
@@ -20,20 +20,21 @@ fn stage() -> Stage {
 }
 
 fn truth() -> Parameters {
-    Parameters::from_array(&[
+    from_array([
         0.1944, -0.2150, -0.3290, 0.0005, 0.0077, -0.0010, 0.8671, 0.7049, 0.8632, -188.2, -156.6,
         -178.2, -69.7, -56.8, -63.4, 14.9, -55.1, 12.7,
     ])
 }
 
+fn from_array(first: [f64; 18]) -> Parameters {
+    let mut values = [0.0; COUNT];
+    values[..18].copy_from_slice(&first);
+    Parameters { values }
+}
+
 fn solve(problem: &Problem, projection: Projection) -> Solution {
-    let options = SolverOptions {
-        projection,
-        seed: 1,
-        population: 0,
-        generations: 0,
-    };
-    LeastSquares.solve(problem, &options).expect("a solution")
+    let options = SolverOptions::new(projection, 1);
+    (Solver::LeastSquares.solve(problem, &options)).expect("a solution")
 }
 
 fn noisy(seed: u64) -> Protocol {
@@ -54,14 +55,14 @@ fn truth_is_recovered_from_a_log_without_noise_in_every_form() {
     };
     let dataset = exact.dataset(&stage);
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let problem = Problem::new(&dataset, &all, &stage, ModelKind::M31);
+    let problem = Problem::new(&dataset, &all, &stage, Model::of(ModelKind::M31));
     for projection in [Projection::Linear, Projection::Delta, Projection::None] {
         let solution = solve(&problem, projection);
         for (k, (have, want)) in solution
             .parameters
-            .to_array()
+            .values
             .iter()
-            .zip(truth().to_array())
+            .zip(truth().values)
             .enumerate()
         {
             assert!(
@@ -85,11 +86,11 @@ fn gradient_matches_differences_of_the_cost() {
     let stage = stage();
     let dataset = noisy(3).dataset(&stage);
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let problem = Problem::new(&dataset, &all, &stage, ModelKind::M31);
+    let problem = Problem::new(&dataset, &all, &stage, Model::of(ModelKind::M31));
     let offsets = vec![Offset::Free; problem.groups.len()];
     let boxed = Boxed {
         stage: &stage,
-        model: ModelKind::M31,
+        model: Model::of(ModelKind::M31),
     };
     let mut at = boxed.unknowns(&truth());
     at *= 1.01;
@@ -104,8 +105,8 @@ fn gradient_matches_differences_of_the_cost() {
     };
     let point = boxed.point(&at).expect("regular");
     let sums = scatter(&problem, &point.ratios, &offsets).expect("no pole");
-    let gradient =
-        boxed.jacobian(&at, &point).transpose() * descent(&sums, &point.gain, problem.weights);
+    let gradient = boxed.jacobian(&at, &point).expect("a chain").transpose()
+        * descent(&sums, &point.gain, problem.weights);
     for k in 0..COUNT {
         let step = 1e-4 * at[k].abs().max(0.05);
         let (mut up, mut down) = (at, at);
@@ -129,8 +130,8 @@ struct Plain<'p> {
 
 impl Plain<'_> {
     fn residuals_at(&self, x: &DVector<f64>) -> DVector<f64> {
-        let scaled: [f64; COUNT] = std::array::from_fn(|k| x[k] * truth().to_array()[k]);
-        let point = point_of(&Parameters::from_array(&scaled)).expect("regular");
+        let scaled: [f64; COUNT] = std::array::from_fn(|k| x[k] * truth().values[k]);
+        let point = point_of(&Parameters { values: scaled }).expect("regular");
         let mut out = Vec::new();
         for (index, group) in self.problem.groups.iter().enumerate() {
             for row in &self.problem.rows[group.rows.clone()] {
@@ -186,7 +187,7 @@ fn optimum_equals_that_of_an_independent_solver_without_projection() {
     }
     .dataset(&stage);
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let problem = Problem::new(&dataset, &all, &stage, ModelKind::M31);
+    let problem = Problem::new(&dataset, &all, &stage, Model::of(ModelKind::M31));
     let ours = solve(&problem, Projection::Linear);
     let mut start = DVector::zeros(COUNT + 3 * problem.groups.len());
     start.rows_mut(0, COUNT).fill(1.0);
@@ -200,8 +201,9 @@ fn optimum_equals_that_of_an_independent_solver_without_projection() {
         "{} {theirs} {report:?}",
         ours.cost
     );
-    for (k, ours) in ours.parameters.to_array().iter().enumerate() {
-        let theirs = found.x[k] * truth().to_array()[k];
+    for k in 0..18 {
+        let ours = ours.parameters.values[k];
+        let theirs = found.x[k] * truth().values[k];
         assert!(
             (ours - theirs).abs() < 2e-3 * theirs.abs(),
             "{k}: {ours} {theirs}"
@@ -217,19 +219,19 @@ fn a_truth_outside_the_box_ends_on_its_edge_and_is_named() {
     narrow.search.set("eta", eta);
     let dataset = noisy(7).dataset(&narrow);
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let problem = Problem::new(&dataset, &all, &narrow, ModelKind::M31);
+    let problem = Problem::new(&dataset, &all, &narrow, Model::of(ModelKind::M31));
     let solution = solve(&problem, Projection::Linear);
-    assert!((solution.parameters.sensitivity[0].eta - 0.85).abs() < 1e-12);
+    assert!((solution.parameters.eta()[0] - 0.85).abs() < 1e-12);
     let names: Vec<String> = solution.at_limit.iter().map(|id| id.name()).collect();
     assert_eq!(names, ["eta_a"]);
     // Worse than free, better than the free optimum merely clipped.
     let free = solve(
-        &Problem::new(&dataset, &all, &stage(), ModelKind::M31),
+        &Problem::new(&dataset, &all, &stage(), Model::of(ModelKind::M31)),
         Projection::Linear,
     );
     let boxed = Boxed {
         stage: &narrow,
-        model: ModelKind::M31,
+        model: Model::of(ModelKind::M31),
     };
     let point = point_of(&boxed.clipped(&free.parameters)).expect("regular");
     let offsets = vec![Offset::Free; problem.groups.len()];
@@ -242,7 +244,7 @@ fn a_truth_outside_the_box_ends_on_its_edge_and_is_named() {
     eta[2].low = 0.88;
     high.search.set("eta", eta);
     let solution = solve(
-        &Problem::new(&dataset, &all, &high, ModelKind::M31),
+        &Problem::new(&dataset, &all, &high, Model::of(ModelKind::M31)),
         Projection::Linear,
     );
     let names: Vec<String> = solution.at_limit.iter().map(|id| id.name()).collect();
@@ -256,7 +258,7 @@ fn zero_deviations_beyond_their_range_are_clipped_as_unknowns() {
     tight.search.delta_m.high = 2e-6;
     let dataset = noisy(11).dataset(&tight);
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let problem = Problem::new(&dataset, &all, &tight, ModelKind::M31);
+    let problem = Problem::new(&dataset, &all, &tight, Model::of(ModelKind::M31));
     let solution = solve(&problem, Projection::None);
     assert!(solution.delta_m.iter().flatten().all(|d| d.abs() <= 2e-6));
     // As unknowns of the fit they cost no more than clipped after it, and more than free.
@@ -264,7 +266,7 @@ fn zero_deviations_beyond_their_range_are_clipped_as_unknowns() {
     assert!(afterwards.delta_m.iter().flatten().all(|d| d.abs() <= 2e-6));
     assert!(solution.cost <= afterwards.cost * (1.0 + 1e-6));
     let wide = stage();
-    let free = Problem::new(&dataset, &all, &wide, ModelKind::M31);
+    let free = Problem::new(&dataset, &all, &wide, Model::of(ModelKind::M31));
     assert!(2.0 * solve(&free, Projection::Linear).cost < solution.cost);
 }
 
@@ -273,12 +275,12 @@ fn a_start_next_to_a_pole_is_refused() {
     let stage = stage();
     let dataset = noisy(1).dataset(&stage);
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let problem = Problem::new(&dataset, &all, &stage, ModelKind::M31);
-    let mut pole = truth().to_array();
+    let problem = Problem::new(&dataset, &all, &stage, Model::of(ModelKind::M31));
+    let mut pole = truth().values;
     pole[9] = -0.8671 / 250e-6;
     let boxed = Boxed {
         stage: &stage,
-        model: ModelKind::M31,
+        model: Model::of(ModelKind::M31),
     };
     let offsets = vec![Offset::Free; problem.groups.len()];
     assert!(
@@ -286,7 +288,7 @@ fn a_start_next_to_a_pole_is_refused() {
             &problem,
             &offsets,
             &boxed,
-            boxed.unknowns(&Parameters::from_array(&pole))
+            boxed.unknowns(&Parameters { values: pole })
         )
         .is_none()
     );
@@ -295,8 +297,8 @@ fn a_start_next_to_a_pole_is_refused() {
 #[test]
 fn parameters_and_gains_undo_each_other() {
     let point = point_of(&truth()).expect("regular");
-    let back = parameters_of(&point).expect("regular").to_array();
-    for (have, want) in back.iter().zip(truth().to_array()) {
+    let back = parameters_of(&point).expect("regular").values;
+    for (have, want) in back.iter().zip(truth().values) {
         assert!((have - want).abs() < 1e-12 * want.abs() + 1e-15);
     }
 }
@@ -311,18 +313,19 @@ fn standard_errors_match_the_spread_over_repeated_logs() {
     for seed in 0..logs {
         let dataset = noisy(1000 + seed).dataset(&stage);
         let all: Vec<usize> = (0..dataset.rows.len()).collect();
-        let problem = Problem::new(&dataset, &all, &stage, ModelKind::M31);
+        let problem = Problem::new(&dataset, &all, &stage, Model::of(ModelKind::M31));
         let solution = solve(&problem, Projection::Linear);
         let errors = crate::judge::uncertainty::uncertainty(&problem, &solution.parameters, &[])
             .expect("evaluated");
-        for (k, value) in solution.parameters.to_array().iter().enumerate() {
-            let deviation = value - truth().to_array()[k];
+        for k in 0..18 {
+            let value = solution.parameters.values[k];
+            let deviation = value - truth().values[k];
             sums[k][0] += deviation;
             sums[k][1] += deviation * deviation;
             claimed[k] += errors.standard_error[k].expect("determined") / logs as f64;
         }
     }
-    for k in 0..COUNT {
+    for k in 0..18 {
         let spread = (sums[k][1] / logs as f64).sqrt();
         let ratio = claimed[k] / spread;
         assert!(
@@ -353,18 +356,19 @@ fn lever_arms_on_their_limits_follow_the_misalignments() {
     };
     let dataset = noisy(13).dataset(&fixed);
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let problem = Problem::new(&dataset, &all, &fixed, ModelKind::M31);
+    let problem = Problem::new(&dataset, &all, &fixed, Model::of(ModelKind::M31));
     let solution = solve(&problem, Projection::Linear);
     assert!(solution.at_limit.is_empty(), "{:?}", solution.at_limit);
     let offsets = vec![Offset::Free; problem.groups.len()];
     let cost_at = |theta: [f64; 3]| {
         let mut p = solution.parameters;
-        p.geometry = h.geometry(theta);
+        p.values[..3].copy_from_slice(&h.lever_arms_m(theta));
+        p.values[3..6].copy_from_slice(&theta);
         let point = point_of(&p).expect("regular");
         let sums = scatter(&problem, &point.ratios, &offsets).expect("no pole");
         cost(&sums, &point.gain, problem.weights)
     };
-    let theta = solution.parameters.geometry.misalignment_rad;
+    let theta = solution.parameters.geometry().misalignment_rad;
     assert!((cost_at(theta) / solution.cost - 1.0).abs() < 1e-9);
     for probe in 0..3 {
         for step in [-1e-4, 1e-4] {

@@ -3,7 +3,6 @@
 use super::delta::DeltaCost;
 use super::full::FullCost;
 use super::linear::LinearCost;
-use crate::input::stage::Range;
 use crate::problem::Problem;
 use crate::problem::parameters::Parameters;
 use crate::solve::Projection;
@@ -24,7 +23,7 @@ pub enum Form<'a> {
 
 impl<'a> Form<'a> {
     /// The form of a problem that a projection asks for; `None` where it has no unknowns left
-    /// to search for: `linear` of any model but (31).
+    /// to search for: `linear` of a model without slopes.
     pub fn new(problem: &'a Problem<'a>, projection: Projection) -> Option<Self> {
         match projection {
             Projection::None => Some(Self::Full(FullCost::new(problem))),
@@ -33,7 +32,8 @@ impl<'a> Form<'a> {
         }
     }
 
-    fn cost_function(&self) -> &dyn CostFunction {
+    /// It as a cost function of its own unknowns.
+    pub fn cost_function(&self) -> &dyn CostFunction {
         match self {
             Self::Full(cost) => cost,
             Self::Delta(cost) => cost,
@@ -87,22 +87,4 @@ pub fn best_delta_m(problem: &Problem<'_>, parameters: &Parameters) -> Vec<[f64;
     };
     let zeros = zero_deviations(problem, parameters, &point);
     zeros.iter().map(|zero| zero.delta_m).collect()
-}
-
-impl CostFunction for Form<'_> {
-    fn bounds(&self) -> &[Range] {
-        self.cost_function().bounds()
-    }
-
-    fn cost(&self, individual: &[f64]) -> f64 {
-        self.cost_function().cost(individual)
-    }
-
-    fn costs(&self, individuals: &[f64], costs: &mut [f64]) {
-        self.cost_function().costs(individuals, costs);
-    }
-
-    fn evaluation_ns(&self) -> f64 {
-        self.cost_function().evaluation_ns()
-    }
 }

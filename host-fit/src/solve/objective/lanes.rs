@@ -2,9 +2,14 @@
 //!
 //! The operators are the core ones, lane by lane and in the written order, so an individual's
 //! cost has the same bits whatever its neighbours, its lane and the instruction set. The
-//! compiler turns them into AVX-512, AVX2 or SSE2 inside [`for_each_eight`], which picks the
-//! widest that the machine has.
+//! compiler turns them into AVX-512, AVX2 or SSE2 where a [`LaneCost`] is evaluated, whichever
+//! is the widest that the machine has.
 
+use crate::input::stage::Range;
+use crate::problem::Problem;
+use crate::problem::model::SLOPES_MAX;
+use crate::solve::search::cost::CostFunction;
+use runtime::real::Number;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 /// Individuals in one [`Lanes`].
@@ -55,7 +60,7 @@ impl AddAssign for Lanes {
 
 impl Lanes {
     /// Zero for every individual.
-    pub const ZERO: Self = Self([0.0; LANES]);
+    pub const ZERO: Self = Self::splat(0.0);
 
     /// The same number for every individual.
     #[inline(always)]
@@ -112,10 +117,20 @@ impl Lanes {
             }
         })
     }
+}
 
-    /// Sine and cosine of each angle in rad, by `libm`.
+/// The equations of the runtime's geometry run on eight individuals at once.
+impl Number for Lanes {
+    const ZERO: Self = Self::ZERO;
+    const ONE: Self = Self::splat(1.0);
+
     #[inline(always)]
-    pub fn sin_cos(self) -> (Self, Self) {
+    fn from_f64(value: f64) -> Self {
+        Self::splat(value)
+    }
+
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
         let mut both = (Self::ZERO, Self::ZERO);
         for k in 0..LANES {
             (both.0.0[k], both.1.0[k]) = libm::sincos(self.0[k]);
@@ -170,43 +185,72 @@ impl<'a> Individuals<'a> {
     }
 }
 
-/// A cost that is computed for eight individuals at once.
-pub trait LaneCost {
-    /// Numbers of an individual.
-    fn dimensions(&self) -> usize;
-    /// The costs of eight individuals. To be inlined, so that it is compiled for the
+/// A cost that is computed for eight individuals at once; every such cost is a
+/// [`CostFunction`].
+pub trait LaneCost: Sync {
+    /// The problem whose fitness it is.
+    fn problem(&self) -> &Problem<'_>;
+    /// The box, one interval for each number of an individual.
+    fn box_of_eight(&self) -> &[Range];
+    /// The costs of eight individuals of a model with at most `K` fitted slopes: a constant, so
+    /// that the slopes stay in registers. To be inlined, so that it is compiled for the
     /// instruction set at hand.
-    fn cost_of_eight(&self, individuals: &Individuals<'_>) -> Lanes;
+    fn cost_of_eight<const K: usize>(&self, individuals: &Individuals<'_>) -> Lanes;
 }
 
-/// The costs of `individuals`, eight at a time, with the machine's widest registers.
-pub fn for_each_eight(cost: &impl LaneCost, individuals: &[f64], costs: &mut [f64]) {
-    pulp::Arch::new().dispatch(ForEachEight {
-        cost,
-        individuals,
-        costs,
-    });
+impl<C: LaneCost> CostFunction for C {
+    fn bounds(&self) -> &[Range] {
+        self.box_of_eight()
+    }
+
+    fn cost(&self, individual: &[f64]) -> f64 {
+        let mut cost = [f64::NAN];
+        self.costs(individual, &mut cost);
+        cost[0]
+    }
+
+    /// Eight at a time, with the machine's widest registers.
+    fn costs(&self, individuals: &[f64], costs: &mut [f64]) {
+        let arch = pulp::Arch::new();
+        if self.problem().model.fitted_slopes() <= 3 {
+            arch.dispatch(ForEachEight::<C, 3> {
+                cost: self,
+                individuals,
+                costs,
+            });
+        } else {
+            arch.dispatch(ForEachEight::<C, SLOPES_MAX> {
+                cost: self,
+                individuals,
+                costs,
+            });
+        }
+    }
+
+    fn evaluation_ns(&self) -> f64 {
+        self.problem().rows.len() as f64
+    }
 }
 
-/// The loop of [`for_each_eight`]: a type and not a closure, since closures are not always
-/// inlined into the function that is compiled for the instruction set.
-struct ForEachEight<'a, C> {
+/// The loop over individuals: a type and not a closure, since closures are not always inlined
+/// into the function that is compiled for the instruction set.
+struct ForEachEight<'a, C, const K: usize> {
     cost: &'a C,
     individuals: &'a [f64],
     costs: &'a mut [f64],
 }
 
-impl<C: LaneCost> pulp::WithSimd for ForEachEight<'_, C> {
+impl<C: LaneCost, const K: usize> pulp::WithSimd for ForEachEight<'_, C, K> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let dimensions = self.cost.dimensions();
+        let dimensions = self.cost.box_of_eight().len();
         let each = self.individuals.chunks(LANES * dimensions.max(1));
         for (numbers, costs) in each.zip(self.costs.chunks_mut(LANES)) {
             let eight = self
                 .cost
-                .cost_of_eight(&Individuals::new(numbers, dimensions));
+                .cost_of_eight::<K>(&Individuals::new(numbers, dimensions));
             costs.copy_from_slice(&eight.0[..costs.len()]);
         }
     }

@@ -11,20 +11,18 @@
 //! bounds follow from the ranges of a, b, c and eta and from the poles ([`super::poles`]); the
 //! boxes of lever arms, angles and zero deviations are not enforced here.
 
-use super::lanes::{Individuals, LaneCost, Lanes, dot, each, for_each_eight};
-use super::model::{corrected_um, inverse, shares};
-use super::poles::{Smallest, cut, vertical_extent};
+use super::lanes::{Individuals, LaneCost, Lanes, dot, each};
+use super::model::{corrected_um, shares};
+use super::poles::{Smallest, cut, slope_extent};
 use crate::input::stage::Range;
-use crate::problem::parameters::Parameters;
+use crate::problem::model::SLOPES_MAX;
+use crate::problem::parameters::{ETA, Parameters, SLOPES, search_box};
 use crate::problem::{Problem, TrainRow};
 use crate::solve::least_squares::coordinates::parameters_of;
 use crate::solve::least_squares::normal::Point;
-use crate::solve::search::cost::CostFunction;
 use crate::solve::search::random::{Phase, RandomSource, RandomStreams, SeededStreams};
 use nalgebra::Matrix3;
-
-/// Number of unknowns.
-pub const RATIOS: usize = 9;
+use runtime::geometry::inverse_and_determinant;
 
 /// The six products of three numbers with each other: 00, 01, 02, 11, 12, 22.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
@@ -33,7 +31,7 @@ const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 
 #[derive(Clone, Debug)]
 pub struct LinearCost<'a> {
     problem: &'a Problem<'a>,
-    bounds: [Range; RATIOS],
+    bounds: Vec<Range>,
     /// The rows with the reference less its mean over the movement.
     rows: Vec<TrainRow>,
     /// Sum of the squared centred reference, X, Y, Rz.
@@ -61,22 +59,22 @@ struct Sums {
 }
 
 impl<'a> LinearCost<'a> {
-    /// The cost of a problem's rows, for Model (31); `None` for the other models, which have
-    /// no ratios to search for, and for ranges of eta that contain zero.
+    /// The cost of a problem's rows; `None` for models without slopes, which have no ratios to
+    /// search for, and for ranges of eta that contain zero.
     pub fn new(problem: &'a Problem<'a>) -> Option<Self> {
-        let search = &problem.stage.search;
-        let extent = vertical_extent(&problem.rows);
-        let [eta, a, b, c] = ["eta", "a_per_m", "b_per_rad", "c_per_rad"]
-            .map(|key| search.of(key).unwrap_or_default());
-        let bounds = std::array::from_fn(|index| {
-            let (probe, axis) = (index / 3, index % 3);
-            let ratios = quotient([a, b, c][axis][probe], eta[probe]);
-            cut(ratios, 1.0, extent[axis])
-        });
-        let eta_is_apart = eta.iter().all(|eta| eta.low > 0.0 || eta.high < 0.0);
-        if !(problem.model.has_vertical_terms() && eta_is_apart) {
+        let slopes = problem.model.fitted_slopes();
+        let ranges = search_box(problem.stage, problem.model, [0.0; 3]);
+        let etas = &ranges[ETA..SLOPES];
+        let eta_is_apart = etas.iter().all(|eta| eta.low > 0.0 || eta.high < 0.0);
+        if slopes == 0 || !eta_is_apart {
             return None;
         }
+        let extent = slope_extent(&problem.rows);
+        let bound = |index: usize| {
+            let (probe, slope) = (index / slopes, index % slopes);
+            let ratios = quotient(ranges[SLOPES + 3 * slope + probe], etas[probe]);
+            cut(ratios, 1.0, extent[slope])
+        };
         let mut rows = problem.rows.clone();
         let mut reference_squares = [0.0; 3];
         for group in &problem.groups {
@@ -92,15 +90,21 @@ impl<'a> LinearCost<'a> {
         }
         Some(Self {
             problem,
-            bounds,
+            bounds: (0..3 * slopes).map(bound).collect(),
             rows,
             reference_squares,
         })
     }
 
     #[inline(always)]
-    fn sums(&self, u: &Individuals<'_>) -> Sums {
-        let ratios = each(|k| u.three(3 * k));
+    fn sums<const K: usize>(&self, u: &Individuals<'_>) -> Sums {
+        let slopes = self.problem.model.fitted_slopes();
+        let mut ratios = [[Lanes::ZERO; K]; 3];
+        for (probe, ratios) in ratios.iter_mut().enumerate() {
+            for (slope, ratio) in ratios.iter_mut().enumerate().take(slopes) {
+                *ratio = u.number(slopes * probe + slope);
+            }
+        }
         let mut smallest = Smallest::NONE;
         let mut signal = [Lanes::ZERO; 6];
         let mut reference = [[Lanes::ZERO; 3]; 3];
@@ -134,12 +138,16 @@ impl<'a> LinearCost<'a> {
     /// The parameters at the best gain of an individual, wherever their own ranges are; `None`
     /// where the gain is singular.
     pub fn parameters(&self, individual: &[f64]) -> Option<Parameters> {
-        let ratios: [f64; RATIOS] = individual.try_into().ok()?;
-        let sums = self.sums(&Individuals::new(individual, RATIOS));
+        let slopes = self.problem.model.fitted_slopes();
+        let sums = self.sums::<SLOPES_MAX>(&Individuals::new(individual, self.bounds.len()));
         let gain = sums.gain();
+        let mut ratios = [[0.0; SLOPES_MAX]; 3];
+        for (ratios, found) in ratios.iter_mut().zip(individual.chunks_exact(slopes)) {
+            ratios[..slopes].copy_from_slice(found);
+        }
         parameters_of(&Point {
             gain: Matrix3::from_fn(|i, j| gain[i][j].0[0]),
-            ratios: [0, 1, 2].map(|k| [ratios[3 * k], ratios[3 * k + 1], ratios[3 * k + 2]]),
+            ratios,
         })
     }
 
@@ -166,10 +174,12 @@ impl<'a> LinearCost<'a> {
 
     /// An individual with the ratios of these parameters, for a warm start.
     pub fn individual(&self, parameters: &Parameters) -> Vec<f64> {
-        let ratios = parameters
-            .sensitivity
-            .map(|s| [s.per_z_m, s.per_rx_rad, s.per_ry_rad].map(|slope| slope / s.eta));
-        ratios.concat()
+        let slopes = self.problem.model.fitted_slopes();
+        let of_probe = |(slope, eta): ([f64; SLOPES_MAX], f64)| slope.map(|slope| slope / eta);
+        let ratios = parameters.slopes().into_iter().zip(parameters.eta());
+        ratios
+            .flat_map(|probe| of_probe(probe).into_iter().take(slopes))
+            .collect()
     }
 }
 
@@ -178,19 +188,23 @@ impl Sums {
     #[inline(always)]
     fn gain(&self) -> [[Lanes; 3]; 3] {
         let [aa, ab, ac, bb, bc, cc] = self.signal;
-        let inverse = inverse(&[[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]);
+        let (inverse, _) = inverse_and_determinant(&[[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]);
         each(|axis| each(|k| dot(&inverse[k], self.reference[axis])))
     }
 }
 
 impl LaneCost for LinearCost<'_> {
-    fn dimensions(&self) -> usize {
-        RATIOS
+    fn problem(&self) -> &Problem<'_> {
+        self.problem
+    }
+
+    fn box_of_eight(&self) -> &[Range] {
+        &self.bounds
     }
 
     #[inline(always)]
-    fn cost_of_eight(&self, u: &Individuals<'_>) -> Lanes {
-        let sums = self.sums(u);
+    fn cost_of_eight<const K: usize>(&self, u: &Individuals<'_>) -> Lanes {
+        let sums = self.sums::<K>(u);
         let gain = sums.gain();
         let weights = self.problem.weights;
         let mut total = Lanes::ZERO;
@@ -202,25 +216,5 @@ impl LaneCost for LinearCost<'_> {
         }
         let fitness = total.map(|sum| self.problem.fitness(sum));
         sums.smallest.judge(fitness)
-    }
-}
-
-impl CostFunction for LinearCost<'_> {
-    fn bounds(&self) -> &[Range] {
-        &self.bounds
-    }
-
-    fn cost(&self, individual: &[f64]) -> f64 {
-        let mut cost = [f64::NAN];
-        self.costs(individual, &mut cost);
-        cost[0]
-    }
-
-    fn costs(&self, individuals: &[f64], costs: &mut [f64]) {
-        for_each_eight(self, individuals, costs);
-    }
-
-    fn evaluation_ns(&self) -> f64 {
-        self.problem.rows.len() as f64
     }
 }

@@ -5,10 +5,13 @@
 //! PM^-1 (s / phi - delta / eta) = G (s' - delta) with G = PM^-1 diag(1/eta) and
 //! s' = s / (phi / eta), and three divisions are one division by their product.
 
-use super::lanes::{Lanes, dot, each};
-use crate::problem::TrainRow;
+use super::lanes::{Individuals, Lanes, dot, each};
+use crate::problem::model::Model;
+use crate::problem::{Problem, TrainRow};
+use runtime::geometry::{SensingAxes, inverse_and_determinant};
 
-/// PM and its inverse (equations 11, 32).
+/// PM and its inverse (equations 11, 32). Where PM is singular the inverse is not finite, and so
+/// neither is the cost.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane {
     /// Rows of PM.
@@ -17,77 +20,53 @@ pub struct Plane {
     pub inverse: [[Lanes; 3]; 3],
 }
 
-/// Sine and cosine of the three misalignments.
-#[derive(Clone, Copy, Debug)]
-pub struct Turns {
-    /// Sines.
-    pub sin: [Lanes; 3],
-    /// Cosines.
-    pub cos: [Lanes; 3],
-}
-
-impl Turns {
-    /// Of misalignments in rad.
-    #[inline(always)]
-    pub fn of(misalignment_rad: [Lanes; 3]) -> Self {
-        let both = each(|k| misalignment_rad[k].sin_cos());
-        Self {
-            sin: each(|k| both[k].0),
-            cos: each(|k| both[k].1),
-        }
-    }
-}
-
 impl Plane {
-    /// PM of lever arms in m and turns. Where PM is singular the inverse is not finite, and so
-    /// neither is the cost.
+    /// PM of sensing axes and lever arms in m.
     #[inline(always)]
-    pub fn new(lever_arm_m: [Lanes; 3], turns: &Turns) -> Self {
-        let Turns { sin, cos } = turns;
-        let rows = [
-            [-sin[0], cos[0], lever_arm_m[0]],
-            [-sin[1], cos[1], lever_arm_m[1]],
-            [cos[2], sin[2], lever_arm_m[2]],
-        ];
-        Self {
-            rows,
-            inverse: inverse(&rows),
-        }
+    pub fn new(axes: &SensingAxes<Lanes>, lever_arm_m: [Lanes; 3]) -> Self {
+        let rows = axes.plane_rows(lever_arm_m);
+        let (inverse, _) = inverse_and_determinant(&rows);
+        Self { rows, inverse }
     }
 }
 
-/// The inverse of a 3x3 matrix by its adjugate.
-#[inline(always)]
-pub fn inverse(m: &[[Lanes; 3]; 3]) -> [[Lanes; 3]; 3] {
-    let [[a, b, c], [d, e, f], [g, h, i]] = *m;
-    let cofactor = [e * i - f * h, f * g - d * i, d * h - e * g];
-    let determinant = (a * cofactor[0] + b * cofactor[1]) + c * cofactor[2];
-    let r = Lanes::splat(1.0) / determinant;
-    [
-        [cofactor[0] * r, (c * h - b * i) * r, (b * f - c * e) * r],
-        [cofactor[1] * r, (a * i - c * g) * r, (c * d - a * f) * r],
-        [cofactor[2] * r, (b * g - a * h) * r, (a * e - b * d) * r],
-    ]
-}
+/// (a, b, c, ..) / eta of one probe.
+pub type Ratios<const K: usize> = [Lanes; K];
 
 /// What the rows need to know of the parameters: the gain and the ratios.
 #[derive(Clone, Copy, Debug)]
-pub struct Linearized {
+pub struct Linearized<const K: usize> {
     /// G = PM^-1 diag(1/eta), rows X, Y, Rz.
     pub gain: [[Lanes; 3]; 3],
-    /// (a, b, c) / eta of A, B, C.
-    pub ratios: [[Lanes; 3]; 3],
+    /// The slopes over eta of A, B, C.
+    pub ratios: [Ratios<K>; 3],
 }
 
-impl Linearized {
-    /// Of a plane, eta and slopes: a of A, B, C, then b, then c.
+impl<const K: usize> Linearized<K> {
+    /// Of a plane, and eta and slopes by model: those that it does not fit are 1 and 0. They
+    /// stand in `u` from `eta_at` on: eta of A, B, C, then each slope of A, B, C.
     #[inline(always)]
-    pub fn new(plane: &Plane, eta: [Lanes; 3], slopes: [[Lanes; 3]; 3]) -> Self {
+    pub fn new(
+        plane: &Plane,
+        model: &Model,
+        u: &Individuals<'_>,
+        eta_at: usize,
+    ) -> (Self, [Lanes; 3]) {
+        let eta = if model.fits_gain() {
+            u.three(eta_at)
+        } else {
+            [Lanes::splat(1.0); 3]
+        };
         let per_eta = each(|k| Lanes::splat(1.0) / eta[k]);
-        Self {
-            gain: each(|i| each(|k| plane.inverse[i][k] * per_eta[k])),
-            ratios: each(|k| each(|axis| slopes[axis][k] * per_eta[k])),
+        let mut ratios = [[Lanes::ZERO; K]; 3];
+        for slope in 0..model.fitted_slopes().min(K) {
+            let slopes = u.three(eta_at + 3 + 3 * slope);
+            for probe in 0..3 {
+                ratios[probe][slope] = slopes[probe] * per_eta[probe];
+            }
         }
+        let gain = each(|i| each(|k| plane.inverse[i][k] * per_eta[k]));
+        (Self { gain, ratios }, eta)
     }
 
     /// Decoded pose minus reference, without the zero deviation (equation 31): um, um, urad.
@@ -98,11 +77,23 @@ impl Linearized {
     }
 }
 
-/// phi / eta = 1 + r v of the three probes (equation 33), for ratios r = (a, b, c) / eta.
+/// phi / eta = 1 + r v of the three probes (equation 33), for the slopes' ratios r.
 #[inline(always)]
-pub fn shares(ratios: &[[Lanes; 3]; 3], row: &TrainRow) -> [Lanes; 3] {
-    let [z, rx, ry] = row.vertical;
-    each(|k| ((ratios[k][0] * z + ratios[k][1] * rx) + ratios[k][2] * ry) + 1.0)
+pub fn shares<const K: usize>(ratios: &[Ratios<K>; 3], row: &TrainRow) -> [Lanes; 3] {
+    each(|probe| {
+        let mut sum = ratios[probe][0] * row.slopes[0];
+        for slope in 1..K {
+            sum += ratios[probe][slope] * row.slopes[slope];
+        }
+        sum + 1.0
+    })
+}
+
+/// The weighted fitness of sums of squared errors of X, Y, Rz.
+#[inline(always)]
+pub fn fitness(problem: &Problem<'_>, squares: [Lanes; 3]) -> Lanes {
+    let [x, y, rz] = problem.weights;
+    ((squares[0] * x + squares[1] * y) + squares[2] * rz).map(|sum| problem.fitness(sum))
 }
 
 /// s' = s / (phi / eta) of the three probes, um, with one division for all three.

@@ -11,18 +11,20 @@
 use super::lanes::Lanes;
 use crate::input::stage::Range;
 use crate::problem::TrainRow;
+use crate::problem::model::SLOPES_MAX;
 
 /// Smallest phi / eta of any row: at a twentieth, noise is already twenty times larger.
 pub const SHARE_MIN: f64 = 0.05;
 
-/// Lowest and highest Z, Rx, Ry of some rows, zero included: m, rad, rad.
-pub fn vertical_extent(rows: &[TrainRow]) -> [Range; 3] {
+/// Lowest and highest factor of each slope over some rows, zero included: Z, Rx, Ry in m, rad,
+/// rad for Model (31).
+pub fn slope_extent(rows: &[TrainRow]) -> [Range; SLOPES_MAX] {
     let mut extent = [Range {
         low: 0.0,
         high: 0.0,
-    }; 3];
+    }; SLOPES_MAX];
     for row in rows {
-        for (range, v) in extent.iter_mut().zip(row.vertical) {
+        for (range, v) in extent.iter_mut().zip(row.slopes) {
             range.low = range.low.min(v);
             range.high = range.high.max(v);
         }
@@ -30,7 +32,7 @@ pub fn vertical_extent(rows: &[TrainRow]) -> [Range; 3] {
     extent
 }
 
-/// The part of `slopes` (a, b or c) in which, the other slopes being zero, `eta` + slope v stays
+/// The part of `slopes` (a, b or c) in which, while the other slopes are zero, `eta` + slope v is
 /// above [`SHARE_MIN`] times eta over the extent. A range without such a part stays as it is.
 pub fn cut(slopes: Range, eta: f64, extent: Range) -> Range {
     // eta (1 - SHARE_MIN) + slope v > 0 at both ends of the extent.

@@ -3,8 +3,9 @@
 use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
 use crate::input::log::layout::LogLayout;
 use crate::input::stage::{CodeScale, Range, SearchRanges, Stage};
-use crate::problem::Problem;
+use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
+use crate::problem::{Problem, TrainRow};
 use crate::solve::search::random::{Phase, RandomSource, RandomStreams, SeededStreams};
 use runtime::frame::CodeWindow;
 use runtime::geometry::{ProbeCoordinates, ProbeGeometry};
@@ -63,17 +64,18 @@ pub fn truth() -> Parameters {
         per_rx_rad: b,
         per_ry_rad: c,
     };
-    Parameters {
-        geometry: ProbeGeometry {
-            lever_arm_m: [0.2, -0.205, -0.35],
-            misalignment_rad: [0.01, -0.02, 0.015],
-        },
-        sensitivity: [
+    let geometry = ProbeGeometry {
+        lever_arm_m: [0.2, -0.205, -0.35],
+        misalignment_rad: [0.01, -0.02, 0.015],
+    };
+    Parameters::of_model_31(
+        &geometry,
+        &[
             probe(0.87, -190.0, -70.0, 15.0),
             probe(0.70, -160.0, -57.0, -55.0),
             probe(0.86, -180.0, -63.0, 13.0),
         ],
-    }
+    )
 }
 
 /// A log of `movements` movements of `rows` rows each: planar motion of 300 um and urad, a
@@ -81,7 +83,7 @@ pub fn truth() -> Parameters {
 /// of up to 4 um, noise of 0.5 um.
 pub fn dataset(movements: usize, rows: usize) -> Dataset {
     let truth = truth();
-    let plane = truth.geometry.plane_rows();
+    let plane = truth.geometry().plane_rows();
     let mut dataset = Dataset::default();
     for movement in 0..movements {
         let mut random = SeededStreams::new(7).stream(movement, Phase::Start, 0);
@@ -94,7 +96,7 @@ pub fn dataset(movements: usize, rows: usize) -> Dataset {
             let vertical = held.map(|v| v + symmetric(2e-7));
             let read = probe_displacement_m(
                 &plane,
-                &truth.sensitivity,
+                &truth.sensitivity(),
                 &planar,
                 &VerticalPose::from_array(vertical),
                 delta,
@@ -125,7 +127,7 @@ pub fn dataset(movements: usize, rows: usize) -> Dataset {
 /// The problem of all rows of a sample.
 pub fn problem<'a>(dataset: &Dataset, stage: &'a Stage, model: ModelKind) -> Problem<'a> {
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    Problem::new(dataset, &all, stage, model)
+    Problem::new(dataset, &all, stage, Model::of(model))
 }
 
 /// The fitness by the runtime's own model in f64, row by row.
@@ -136,16 +138,16 @@ pub fn fitness_by_the_runtime(
 ) -> f64 {
     use runtime::geometry::inverse_rows;
     use runtime::model::{planar_pose, sensitivity_at, zero_pose};
-    let Some(inverse) = inverse_rows(&parameters.geometry.plane_rows()) else {
+    let Some(inverse) = inverse_rows(&parameters.geometry().plane_rows()) else {
         return f64::NAN;
     };
     let mut cost = 0.0;
     for group in &problem.groups {
         let zero = zero_pose(&inverse, parameters.eta(), delta_m[group.movement]);
         for row in &problem.rows[group.rows.clone()] {
-            let vertical = VerticalPose::from_array(row.vertical);
+            let vertical = VerticalPose::from_array(vertical(row));
             let phi = parameters
-                .sensitivity
+                .sensitivity()
                 .map(|s| sensitivity_at(&s, &vertical));
             let signal = row.signal_um.map(|s| s * 1e-6);
             let pose = planar_pose(&inverse, signal, phi, &zero).to_array();
@@ -157,4 +159,9 @@ pub fn fitness_by_the_runtime(
         }
     }
     problem.fitness(cost)
+}
+
+/// Z, Rx, Ry of a row: the factors of the slopes of Model (31).
+pub fn vertical(row: &TrainRow) -> [f64; 3] {
+    [row.slopes[0], row.slopes[1], row.slopes[2]]
 }

@@ -5,8 +5,9 @@ use super::full::FullCost;
 use super::lanes::{Individuals, LANES, LaneCost};
 use super::linear::LinearCost;
 use super::poles::SHARE_MIN;
-use super::sample::{dataset, fitness_by_the_runtime, problem, stage, truth};
+use super::sample::{dataset, fitness_by_the_runtime, problem, stage, truth, vertical};
 use crate::input::stage::Range;
+use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
 use crate::problem::{Problem, TrainRow};
@@ -43,15 +44,15 @@ fn assert_close(have: f64, want: f64, relative: f64, what: &str) {
 
 /// The mean pose error of each movement by the runtime's model, and so its zero deviation.
 fn zero_deviations(problem: &Problem<'_>, parameters: &Parameters) -> Vec<ZeroDeviation> {
-    let inverse = inverse_rows(&parameters.geometry.plane_rows()).expect("sound");
+    let inverse = inverse_rows(&parameters.geometry().plane_rows()).expect("sound");
     let mut zeros = vec![ZeroDeviation::NONE; problem.movements];
     for group in &problem.groups {
         let rows = &problem.rows[group.rows.clone()];
         let mut mean = [0.0; 3];
         for row in rows {
-            let vertical = VerticalPose::from_array(row.vertical);
+            let vertical = VerticalPose::from_array(vertical(row));
             let phi = parameters
-                .sensitivity
+                .sensitivity()
                 .map(|s| sensitivity_at(&s, &vertical));
             let signal = row.signal_um.map(|s| s * 1e-6);
             let pose = planar_pose(&inverse, signal, phi, &runtime::PlanarPose::ZERO).to_array();
@@ -68,9 +69,9 @@ fn zero_deviations(problem: &Problem<'_>, parameters: &Parameters) -> Vec<ZeroDe
 /// The smallest phi / eta of all rows by the runtime's model.
 fn smallest_share(problem: &Problem<'_>, parameters: &Parameters) -> f64 {
     let share = |row: &TrainRow| {
-        let vertical = VerticalPose::from_array(row.vertical);
+        let vertical = VerticalPose::from_array(vertical(row));
         let shares = parameters
-            .sensitivity
+            .sensitivity()
             .map(|s| sensitivity_at(&s, &vertical) / s.eta);
         shares[0].min(shares[1]).min(shares[2])
     };
@@ -112,7 +113,7 @@ fn the_delta_form_equals_the_runtimes_model_at_the_best_zero_deviations() {
             let mix = |(near, far): (&f64, &f64)| near + share * (far - near);
             let individual: Vec<f64> = near.iter().zip(&far).map(mix).collect();
             let parameters = cost.parameters(&individual);
-            let zeros = if model.has_zero_deviation() {
+            let zeros = if Model::of(model).has_zero_deviation {
                 zero_deviations(&problem, &parameters)
             } else {
                 vec![ZeroDeviation::NONE; problem.movements]
@@ -162,7 +163,7 @@ fn the_linear_form_equals_the_runtimes_model_at_its_own_gain_and_offsets() {
         assert_close(cost.cost(&individual), by_runtime, 1e-9, "linear form");
         // No other gain does better with these ratios.
         let mut other = parameters;
-        other.geometry.lever_arm_m[number % 3] *= 1.0 + 1e-3;
+        other.values[number % 3] *= 1.0 + 1e-3;
         let zeros = zero_deviations(&unclipped, &other);
         let delta_m: Vec<_> = zeros.iter().map(|zero| zero.delta_m).collect();
         assert!(fitness_by_the_runtime(&problem, &other, &delta_m) > by_runtime);
@@ -180,7 +181,7 @@ fn an_individuals_cost_does_not_depend_on_its_lane_or_on_the_instruction_set() {
         }
         // Compiled for the baseline of the target, without dispatch.
         let first = individuals[..LANES].concat();
-        let plain = cost.cost_of_eight(&Individuals::new(&first, cost.bounds().len()));
+        let plain = cost.cost_of_eight::<3>(&Individuals::new(&first, cost.bounds().len()));
         for (plain, together) in plain.0.iter().zip(&costs) {
             assert_eq!(plain.to_bits(), together.to_bits());
         }
@@ -219,7 +220,7 @@ fn the_forms_have_the_papers_unknowns_and_bounds() {
     let lowest = problem
         .rows
         .iter()
-        .map(|row| row.vertical[2])
+        .map(|row| row.slopes[2])
         .fold(0.0, f64::min);
     assert!(
         5000.0 / 0.72 * -lowest > 1.0,
@@ -227,7 +228,7 @@ fn the_forms_have_the_papers_unknowns_and_bounds() {
     );
     assert_eq!((last.low, last.high), (0.0, -0.95 / lowest));
     let no_ratios = Problem {
-        model: ModelKind::M30,
+        model: Model::of(ModelKind::M30),
         ..problem.clone()
     };
     assert!(LinearCost::new(&no_ratios).is_none());
@@ -238,17 +239,11 @@ fn a_warm_start_gives_back_its_parameters() {
     let (stage, dataset) = (stage(), dataset(6, 4));
     for model in MODELS {
         let problem = problem(&dataset, &stage, model);
-        let mut known = truth();
-        for (k, slopes) in known.sensitivity.iter_mut().enumerate() {
-            let fixed = runtime::model::Sensitivity::constant(1.0);
-            *slopes = match model {
-                ModelKind::M12 => fixed,
-                ModelKind::M31 => truth().sensitivity[k],
-                _ => runtime::model::Sensitivity::constant(slopes.eta),
-            };
-        }
+        let mut known = Parameters::designed(&stage);
+        let fitted = 3 * Model::of(model).fitted;
+        known.values[..fitted].copy_from_slice(&truth().values[..fitted]);
         let same = |back: Parameters| {
-            for (have, want) in back.to_array().iter().zip(known.to_array()) {
+            for (have, want) in back.values.iter().zip(known.values) {
                 assert_close(*have, want, 1e-12, "warm start");
             }
         };
@@ -259,7 +254,7 @@ fn a_warm_start_gives_back_its_parameters() {
         let individual = full.individual(&known, &delta_m);
         same(full.parameters(&individual));
         assert_eq!(individual.len(), full.bounds().len());
-        if model.has_zero_deviation() {
+        if Model::of(model).has_zero_deviation {
             assert_eq!(full.delta_m(&individual), delta_m);
         }
     }
@@ -273,7 +268,7 @@ fn whatever_lies_beyond_a_pole_costs_nan() {
     let sound = cost.individual(&truth());
     assert!(cost.cost(&sound) < 3.0);
     // a / eta of A that leaves the first row a share of 0.06, 0.04, -0.5 of eta.
-    let [z, rx, ry] = problem.rows[0].vertical;
+    let [z, rx, ry] = vertical(&problem.rows[0]);
     let at_share = |share: f64| {
         let mut individual = sound.clone();
         individual[0] = (share - 1.0 - sound[1] * rx - sound[2] * ry) / z;

@@ -1,11 +1,12 @@
 //! The searches by name.
 
+use super::breeding::{Breeding, PopulationSearch};
 use super::cost::{CostFunction, Evaluator};
 use super::peers::cmaes::Covariance;
 use super::peers::de::Differential;
 use super::peers::ga::Genetic;
 use super::peers::pso::Swarm;
-use super::peers::random::RandomSearch;
+use super::peers::random::RandomDraws;
 use super::random::SeededStreams;
 use super::run::{Outcome, Start, StopCriteria, run};
 use super::tlbo::{Tlbo, Variant};
@@ -44,14 +45,12 @@ pub struct Settings<'a> {
     pub seed: u64,
     /// The first population; the paper's Np is 100.
     pub start: Start<'a>,
-    /// p of [`SearchKind::Hybrid`], 0 to 1.
-    pub fixed_p: f64,
     /// Generations from one update of p to the next.
     pub learning_period: usize,
 }
 
 impl Default for Settings<'_> {
-    /// Np = 100, drawn with seed 1; p = 0.5, updated every generation.
+    /// Np = 100, drawn with seed 1; p is updated every generation.
     fn default() -> Self {
         Self {
             seed: 1,
@@ -59,7 +58,6 @@ impl Default for Settings<'_> {
                 population: 100,
                 individuals: &[],
             },
-            fixed_p: 0.5,
             learning_period: 1,
         }
     }
@@ -131,19 +129,6 @@ impl SearchKind {
         }
     }
 
-    /// The variant of TLBO, for those that are one.
-    const fn variant(self, fixed_p: f64) -> Option<Variant> {
-        match self {
-            Self::Shtlbo => Some(Variant::Shtlbo),
-            Self::Tlbo => Some(Variant::Tlbo),
-            Self::Gbtlbo => Some(Variant::Gbtlbo),
-            Self::Mutation => Some(Variant::Mutation),
-            Self::Hybrid => Some(Variant::Hybrid { p: fixed_p }),
-            Self::SuccessRatio => Some(Variant::SuccessRatio),
-            Self::De | Self::Pso | Self::Ga | Self::Cmaes | Self::Random => None,
-        }
-    }
-
     /// Searches for the minimum of `function`. Without any stop criterion it runs until the
     /// interrupt flag is set.
     pub fn minimize<F: CostFunction + ?Sized>(
@@ -152,37 +137,42 @@ impl SearchKind {
         settings: &Settings<'_>,
         criteria: &StopCriteria<'_>,
     ) -> Outcome {
-        let streams = SeededStreams::new(settings.seed);
-        let mut evaluator = Evaluator::new(function);
-        let start = &settings.start;
-        if let Some(variant) = self.variant(settings.fixed_p) {
-            let period = settings.learning_period;
-            let method = Tlbo::new(variant, period, streams, &mut evaluator, start);
-            return run(method, evaluator, criteria);
-        }
+        let tlbo = |variant| {
+            let breeding = Tlbo::new(variant, settings.learning_period);
+            bred(breeding, function, settings, criteria)
+        };
         match self {
-            Self::De => {
-                let method = Differential::new(streams, &mut evaluator, start);
-                run(method, evaluator, criteria)
-            }
-            Self::Pso => {
-                let method = Swarm::new(streams, &mut evaluator, start);
-                run(method, evaluator, criteria)
-            }
-            Self::Ga => {
-                let method = Genetic::new(streams, &mut evaluator, start);
-                run(method, evaluator, criteria)
-            }
+            Self::Shtlbo => tlbo(Variant::Shtlbo),
+            Self::Tlbo => tlbo(Variant::Tlbo),
+            Self::Gbtlbo => tlbo(Variant::Gbtlbo),
+            Self::Mutation => tlbo(Variant::Mutation),
+            Self::Hybrid => tlbo(Variant::Hybrid),
+            Self::SuccessRatio => tlbo(Variant::SuccessRatio),
+            Self::De => bred(Differential, function, settings, criteria),
+            Self::Pso => bred(Swarm::default(), function, settings, criteria),
+            Self::Ga => bred(Genetic, function, settings, criteria),
+            Self::Random => bred(RandomDraws, function, settings, criteria),
             Self::Cmaes => {
-                let method = Covariance::new(streams, &mut evaluator, start);
-                run(method, evaluator, criteria)
-            }
-            _ => {
-                let method = RandomSearch::new(streams, &mut evaluator, start);
+                let streams = SeededStreams::new(settings.seed);
+                let mut evaluator = Evaluator::new(function);
+                let method = Covariance::new(streams, &mut evaluator, &settings.start);
                 run(method, evaluator, criteria)
             }
         }
     }
+}
+
+/// A search with a population.
+fn bred<F: CostFunction + ?Sized>(
+    breeding: impl Breeding,
+    function: &F,
+    settings: &Settings<'_>,
+    criteria: &StopCriteria<'_>,
+) -> Outcome {
+    let streams = SeededStreams::new(settings.seed);
+    let mut evaluator = Evaluator::new(function);
+    let method = PopulationSearch::new(breeding, streams, &mut evaluator, &settings.start);
+    run(method, evaluator, criteria)
 }
 
 #[cfg(test)]

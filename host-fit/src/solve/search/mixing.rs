@@ -28,9 +28,10 @@ pub enum Adaptation {
 }
 
 /// The two kinds of step of a hybrid (equation 26).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kind {
     /// "Eq. (1)", taken when rand < p: the step of TLBO.
+    #[default]
     Learning = 0,
     /// "Eq. (2)", taken otherwise: the mutation.
     Mutation = 1,

@@ -12,10 +12,12 @@
 //! | [`mixing`] | p and its adaptation (equations 25, 27-29) |
 //! | [`tlbo`] | the phases, the hybrids (equations 23, 24, 26), SHTLBO |
 //! | [`population`] | individuals and their costs |
+//! | [`breeding`] | a generation: what all searches with a population share |
 //! | [`run`] | generations, stop criteria, history |
 //! | [`peers`] | DE, PSO, GA, CMA-ES, random draws |
 //! | [`kind`] | all searches by name |
 
+pub mod breeding;
 pub mod cost;
 pub mod kind;
 pub mod mixing;

@@ -35,11 +35,9 @@ impl Population {
         evaluator.breed(individuals, costs, &mut notes, |k, place| {
             if let Some(given) = start.individuals.get(k).filter(|x| x.len() == dimensions) {
                 place.copy_from_slice(given);
-                return;
-            }
-            streams.stream(0, Phase::Start, k).fill_uniform(place);
-            for (x, range) in place.iter_mut().zip(bounds) {
-                *x = range.low + *x * range.width();
+            } else {
+                let mut random = streams.stream(0, Phase::Start, k);
+                random.fill_within(bounds, place);
             }
         });
         population
@@ -67,15 +65,26 @@ impl Population {
         self.costs[k]
     }
 
+    /// All individuals, one after the other.
+    pub fn places(&self) -> &[f64] {
+        &self.individuals
+    }
+
+    /// The index of the best individual, the first of equals.
+    pub fn best_index(&self) -> usize {
+        best_index(&self.costs)
+    }
+
     /// The best individual and its cost; NaN only when all are NaN.
     pub fn best(&self) -> (&[f64], f64) {
-        let k = best_index(&self.costs);
+        let k = self.best_index();
         (self.individual(k), self.cost(k))
     }
 
     /// The mean of all individuals, summed in their order, written to `mean`.
-    pub fn mean_into(&self, mean: &mut [f64]) {
-        mean.fill(0.0);
+    pub fn mean_into(&self, mean: &mut Vec<f64>) {
+        mean.clear();
+        mean.resize(self.dimensions, 0.0);
         if self.dimensions == 0 {
             return;
         }
@@ -90,13 +99,18 @@ impl Population {
         }
     }
 
-    /// Replaces individual k by a candidate that ranks before it; says whether it did.
-    pub fn improve(&mut self, k: usize, candidate: &[f64], cost: f64) -> bool {
-        let better = ranks_before(cost, self.costs[k]);
-        if better {
+    /// Replaces individual k by a candidate that ranks before it.
+    fn improve(&mut self, k: usize, candidate: &[f64], cost: f64) {
+        if ranks_before(cost, self.costs[k]) {
             self.replace(k, candidate, cost);
         }
-        better
+    }
+
+    /// Replaces each individual by its candidate where that ranks before it.
+    pub fn improve_all<T>(&mut self, candidates: &Candidates<T>) {
+        for (k, &cost) in candidates.costs.iter().enumerate() {
+            self.improve(k, candidates.candidate(k), cost);
+        }
     }
 
     /// Replaces individual k.
@@ -129,25 +143,18 @@ pub struct Candidates<T> {
     pub notes: Vec<T>,
 }
 
-impl<T: Clone> Candidates<T> {
+impl<T: Clone + Default> Candidates<T> {
     /// Room for as many as `population` has.
-    pub fn for_population(population: &Population, note: T) -> Self {
+    pub fn for_population(population: &Population) -> Self {
         Self {
             places: vec![0.0; population.size() * population.dimensions()],
             costs: vec![0.0; population.size()],
-            notes: vec![note; population.size()],
+            notes: vec![T::default(); population.size()],
         }
     }
+}
 
-    /// No room.
-    pub const fn empty() -> Self {
-        Self {
-            places: Vec::new(),
-            costs: Vec::new(),
-            notes: Vec::new(),
-        }
-    }
-
+impl<T> Candidates<T> {
     /// Candidate k.
     pub fn candidate(&self, k: usize) -> &[f64] {
         let dimensions = self.places.len() / self.costs.len().max(1);

@@ -7,6 +7,7 @@
 //! the 192 numbers that a candidate needs in well under 1 us. Nothing comes from the operating system.
 
 use super::normal::{normal_of, normals_of};
+use crate::input::stage::Range;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
@@ -29,6 +30,14 @@ pub trait RandomSource {
     fn fill_uniform(&mut self, numbers: &mut [f64]) {
         for number in numbers {
             *number = self.uniform();
+        }
+    }
+
+    /// Fills `place` with uniform numbers from a box, one for each interval.
+    fn fill_within(&mut self, bounds: &[Range], place: &mut [f64]) {
+        self.fill_uniform(place);
+        for (x, range) in place.iter_mut().zip(bounds) {
+            *x = range.low + *x * range.width();
         }
     }
 

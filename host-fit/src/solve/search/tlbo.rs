@@ -22,15 +22,16 @@
 //!
 //! The best student is never lost, so the last teacher is the result.
 
-use super::cost::{CostFunction, Evaluator, ranks_before};
+use super::breeding::{Breeding, Parents};
+use super::cost::ranks_before;
 use super::mixing::{Adaptation, Kind, P_START, Tally};
 use super::operators::{
     learn_from_partner, learn_from_teacher, mutate_about_self, scatter_about_middle,
     teaching_factor,
 };
 use super::population::{Candidates, Population};
-use super::random::{Phase, RandomSource, RandomStreams};
-use super::run::{Method, Start};
+use super::random::{Phase, RandomSource};
+use crate::input::stage::Range;
 
 /// Which relative of TLBO.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,11 +42,8 @@ pub enum Variant {
     Gbtlbo,
     /// The paper's mutation alone (equations 21, 22).
     Mutation,
-    /// TLBO and mutation with a fixed p (equations 23, 24).
-    Hybrid {
-        /// Share of individuals that learn, 0 to 1.
-        p: f64,
-    },
+    /// TLBO and mutation with p fixed at one half (equations 23, 24).
+    Hybrid,
     /// The hybrid with p by the success ratio (equation 25).
     SuccessRatio,
     /// SHTLBO: the hybrid with p by the decline of the cost (equations 27-29).
@@ -64,52 +62,34 @@ enum Step {
 }
 
 /// A search by one of the variants.
-pub struct Tlbo<S> {
+#[derive(Clone, Debug)]
+pub struct Tlbo {
     variant: Variant,
-    streams: S,
     learning_period: usize,
-    population: Population,
+    teacher: usize,
     mean: Vec<f64>,
-    candidates: Candidates<Kind>,
     p: f64,
     tally: Tally,
 }
 
-impl<S: RandomStreams> Tlbo<S> {
-    /// Draws and evaluates the first population. p is updated every `learning_period`
-    /// generations (the default of the program is 1).
-    pub fn new<F: CostFunction + ?Sized>(
-        variant: Variant,
-        learning_period: usize,
-        streams: S,
-        evaluator: &mut Evaluator<'_, F>,
-        start: &Start<'_>,
-    ) -> Self {
-        let population = Population::draw(evaluator, &streams, start);
+impl Tlbo {
+    /// A search that updates p every `learning_period` generations (the default of the program
+    /// is 1).
+    pub fn new(variant: Variant, learning_period: usize) -> Self {
         Self {
             variant,
             learning_period: learning_period.max(1),
-            mean: vec![0.0; population.dimensions()],
-            candidates: Candidates::for_population(&population, Kind::Learning),
-            p: match variant {
-                Variant::Hybrid { p } => p,
-                _ => P_START,
-            },
+            teacher: 0,
+            mean: Vec::new(),
+            p: P_START,
             tally: Tally::default(),
-            population,
-            streams,
         }
     }
 
-    /// The population.
-    pub fn population(&self) -> &Population {
-        &self.population
-    }
-
-    fn adaptation(&self) -> Option<Adaptation> {
+    const fn adaptation(&self) -> Option<Adaptation> {
         match self.variant {
             Variant::Tlbo | Variant::Gbtlbo | Variant::Mutation => None,
-            Variant::Hybrid { .. } => Some(Adaptation::Fixed),
+            Variant::Hybrid => Some(Adaptation::Fixed),
             Variant::SuccessRatio => Some(Adaptation::SuccessRatio),
             Variant::Shtlbo => Some(Adaptation::DeclineRatio),
         }
@@ -117,12 +97,12 @@ impl<S: RandomStreams> Tlbo<S> {
 
     /// The step of one individual: equations 23, 24 and 26 for the hybrids.
     #[inline(always)]
-    fn choose(&self, random: &mut S::Source) -> Step {
+    fn choose(&self, random: &mut impl RandomSource) -> Step {
         match self.variant {
             Variant::Tlbo => Step::Learn,
             Variant::Gbtlbo => Step::Scatter,
             Variant::Mutation => Step::Mutate,
-            Variant::Hybrid { .. } | Variant::SuccessRatio | Variant::Shtlbo => {
+            Variant::Hybrid | Variant::SuccessRatio | Variant::Shtlbo => {
                 if random.uniform() < self.p {
                     Step::Learn
                 } else {
@@ -132,120 +112,77 @@ impl<S: RandomStreams> Tlbo<S> {
         }
     }
 
-    /// Runs one phase: candidates of all individuals, their costs, the better of old and new.
-    fn phase<F: CostFunction + ?Sized>(
-        &mut self,
-        generation: usize,
-        phase: Phase,
-        evaluator: &mut Evaluator<'_, F>,
-    ) {
-        let mut mean = core::mem::take(&mut self.mean);
-        let mut candidates = core::mem::replace(&mut self.candidates, Candidates::empty());
-        self.population.mean_into(&mut mean);
-        let Candidates {
-            places,
-            costs,
-            notes,
-        } = &mut candidates;
-        let teacher = self.population.best().0;
-        evaluator.breed(
-            places,
-            costs,
-            notes,
-            #[inline(always)]
-            |k, new| {
-                let mut random = self.streams.stream(generation, phase, k);
-                let step = self.choose(&mut random);
-                if phase == Phase::Learner {
-                    self.learner_step(k, step, &mut random, new);
-                } else {
-                    self.teacher_step(k, step, teacher, &mean, &mut random, new);
-                }
-                if step == Step::Learn {
-                    Kind::Learning
-                } else {
-                    Kind::Mutation
-                }
-            },
-        );
-        for k in 0..self.population.size() {
-            let (cost, kind) = (candidates.costs[k], candidates.notes[k]);
-            self.tally.count(kind, self.population.cost(k), cost);
-            self.population.improve(k, candidates.candidate(k), cost);
-        }
-        self.mean = mean;
-        self.candidates = candidates;
-    }
-
-    /// Equations 16, 19, 21; `new` holds the random numbers on the way.
+    /// The individual that a step looks at: the teacher, or a partner.
     #[inline(always)]
-    fn teacher_step(
-        &self,
-        k: usize,
-        step: Step,
-        teacher: &[f64],
-        mean: &[f64],
-        random: &mut S::Source,
-        new: &mut [f64],
-    ) {
-        let old = self.population.individual(k);
-        match step {
-            Step::Learn => {
-                let factor = teaching_factor(random.uniform());
-                random.fill_uniform(new);
-                learn_from_teacher(old, teacher, mean, factor, new);
-            }
-            Step::Scatter => {
-                random.fill_normal(new);
-                scatter_about_middle(old, teacher, new);
-            }
-            Step::Mutate => {
-                random.fill_normal(new);
-                mutate_about_self(old, teacher, new);
-            }
+    fn other(&self, parents: &Parents<'_>, random: &mut impl RandomSource) -> usize {
+        if parents.phase != Phase::Learner {
+            return self.teacher;
         }
-    }
-
-    /// Equations 18, 20, 22; `new` holds the random numbers on the way.
-    #[inline(always)]
-    fn learner_step(&self, k: usize, step: Step, random: &mut S::Source, new: &mut [f64]) {
-        let drawn = random.index(self.population.size() - 1);
-        let other = if drawn < k { drawn } else { drawn + 1 };
-        let old = self.population.individual(k);
-        let partner = self.population.individual(other);
-        match step {
-            Step::Learn => {
-                let better = ranks_before(self.population.cost(other), self.population.cost(k));
-                random.fill_uniform(new);
-                learn_from_partner(old, partner, better, new);
-            }
-            Step::Scatter => {
-                random.fill_normal(new);
-                scatter_about_middle(old, partner, new);
-            }
-            Step::Mutate => {
-                random.fill_normal(new);
-                mutate_about_self(old, partner, new);
-            }
-        }
+        let drawn = random.index(parents.population.size() - 1);
+        if drawn < parents.k { drawn } else { drawn + 1 }
     }
 }
 
-impl<S: RandomStreams, F: CostFunction + ?Sized> Method<F> for Tlbo<S> {
-    fn generation(&mut self, number: usize, evaluator: &mut Evaluator<'_, F>) -> bool {
-        self.phase(number, Phase::Teacher, evaluator);
-        self.phase(number, Phase::Learner, evaluator);
+impl Breeding for Tlbo {
+    type Note = Kind;
+
+    const PHASES: &'static [Phase] = &[Phase::Teacher, Phase::Learner];
+
+    fn begin(&mut self, population: &Population) {
+        self.teacher = population.best_index();
+        population.mean_into(&mut self.mean);
+    }
+
+    /// Equations 16, 19, 21 in the teacher phase, 18, 20, 22 in the learner phase; `new` holds
+    /// the random numbers on the way.
+    #[inline(always)]
+    fn make(&self, parents: Parents<'_>, random: &mut impl RandomSource, new: &mut [f64]) -> Kind {
+        let Parents { population, k, .. } = parents;
+        let step = self.choose(random);
+        let other = self.other(&parents, random);
+        let old = population.individual(k);
+        let model = population.individual(other);
+        match step {
+            Step::Learn if parents.phase == Phase::Learner => {
+                let better = ranks_before(population.cost(other), population.cost(k));
+                random.fill_uniform(new);
+                learn_from_partner(old, model, better, new);
+            }
+            Step::Learn => {
+                let factor = teaching_factor(random.uniform());
+                random.fill_uniform(new);
+                learn_from_teacher(old, model, &self.mean, factor, new);
+            }
+            Step::Scatter => {
+                random.fill_normal(new);
+                scatter_about_middle(old, model, new);
+            }
+            Step::Mutate => {
+                random.fill_normal(new);
+                mutate_about_self(old, model, new);
+            }
+        }
+        if step == Step::Learn {
+            Kind::Learning
+        } else {
+            Kind::Mutation
+        }
+    }
+
+    fn select(&mut self, population: &mut Population, students: &Candidates<Kind>, _: &[Range]) {
+        for (k, (&cost, &kind)) in students.costs.iter().zip(&students.notes).enumerate() {
+            self.tally.count(kind, population.cost(k), cost);
+        }
+        population.improve_all(students);
+    }
+
+    fn end(&mut self, generation: usize) {
         if let Some(adaptation) = self.adaptation()
-            && number.is_multiple_of(self.learning_period)
+            && generation.is_multiple_of(self.learning_period)
         {
             self.p = self.tally.next_p(adaptation, self.p);
             self.tally = Tally::default();
         }
-        true
-    }
-
-    fn best(&self) -> (&[f64], f64) {
-        self.population.best()
     }
 
     fn p(&self) -> Option<f64> {

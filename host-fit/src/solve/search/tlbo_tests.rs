@@ -1,8 +1,11 @@
 //! Whole generations against steps worked by hand, with scripted random numbers.
 
 use super::*;
+use crate::solve::search::breeding::PopulationSearch;
+use crate::solve::search::cost::Evaluator;
 use crate::solve::search::cost::known::Known;
 use crate::solve::search::random::script::{Script, Scripts};
+use crate::solve::search::run::{Method, Start};
 
 /// Three students in one dimension, cost = position: teacher 4, mean 8.
 const START: [f64; 3] = [8.0, 4.0, 12.0];
@@ -25,13 +28,8 @@ fn generation(
         individuals: &individuals,
     };
     let mut evaluator = Evaluator::new(&function);
-    let mut method = Tlbo::new(
-        variant,
-        1,
-        Scripts(scripts.collect()),
-        &mut evaluator,
-        &start,
-    );
+    let scripts = Scripts(scripts.collect());
+    let mut method = PopulationSearch::new(Tlbo::new(variant, 1), scripts, &mut evaluator, &start);
     assert!(method.generation(1, &mut evaluator));
     assert_eq!(evaluator.evaluations, 9);
     let population = method.population();
@@ -114,7 +112,7 @@ fn hybrid_scripts() -> ([Script; 3], [Script; 3]) {
 fn hybrids_take_equations_23_and_24_and_differ_only_in_p() {
     // Learning: 3 of 3 improved, declines 3/4 + 1/4 + 1/4. Mutation: 1 of 3, decline 2/3.
     let cases = [
-        (Variant::Hybrid { p: 0.5 }, 0.5),
+        (Variant::Hybrid, 0.5),
         (Variant::SuccessRatio, (3.0 * 3.0) / (1.0 * 3.0 + 3.0 * 3.0)),
         (
             Variant::Shtlbo,
@@ -146,7 +144,8 @@ fn p_is_updated_at_the_end_of_each_learning_period() {
             individuals: &[],
         };
         let streams = SeededStreams::new(8);
-        let mut method = Tlbo::new(Variant::Shtlbo, period, streams, &mut evaluator, &start);
+        let shtlbo = Tlbo::new(Variant::Shtlbo, period);
+        let mut method = PopulationSearch::new(shtlbo, streams, &mut evaluator, &start);
         let mut after = |number| {
             method.generation(number, &mut evaluator);
             Method::<Known>::p(&method).expect("hybrids have a p")
@@ -188,7 +187,8 @@ fn an_update_of_p_forgets_what_came_before_it() {
     };
     let mut evaluator = Evaluator::new(&function);
     let scripts = Scripts(first.chain(second).collect());
-    let mut method = Tlbo::new(Variant::Shtlbo, 1, scripts, &mut evaluator, &start);
+    let shtlbo = Tlbo::new(Variant::Shtlbo, 1);
+    let mut method = PopulationSearch::new(shtlbo, scripts, &mut evaluator, &start);
     method.generation(1, &mut evaluator);
     method.generation(2, &mut evaluator);
     // Of the second generation alone only mutation improved anything.

@@ -64,7 +64,7 @@ pub fn goes_and_comes_back(bench: &Bench, bus: BusState) -> Outcome {
     )
 }
 
-/// A controller that gets its power alone on the bus ticks, and is heard once others come.
+/// A controller that starts alone on the bus runs, and is heard once other nodes are there.
 pub fn alone_from_the_start(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.chip.can.set_bus(BusState::Alone, 0);

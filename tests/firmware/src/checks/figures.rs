@@ -11,7 +11,7 @@ const TEXT_BYTES_MAX: usize = 48 << 10;
 const RAM_BYTES_MAX: usize = 8 << 10;
 /// Cycles of a tick at 168 MHz.
 const TICK_CYCLES: u64 = 336_000;
-/// Cycles that an instruction is taken for: flash at five wait states, loads, branches.
+/// Cycles assumed for an instruction: flash at five wait states, loads, branches.
 const CYCLES_PER_INSTRUCTION: f64 = 2.0;
 
 /// Flash, RAM, and the stack's painted maximum, with faults of all kinds behind it.

@@ -30,7 +30,7 @@ pub fn compare(
     Ok((comparison, all))
 }
 
-/// The words of `ticks` ticks are those of `host-fit decode`, and nothing else is told.
+/// The words of `ticks` ticks are those of `host-fit decode`, and there are no other frames.
 pub fn same_words(bench: &Bench, part: Part, ticks: u64, name: &str) -> Outcome {
     let mut machine = bench.machine(part, [&bench.blob, &[]])?;
     let (comparison, seen) = compare(bench, &mut machine, ticks)?;
@@ -66,7 +66,7 @@ pub fn same_words(bench: &Bench, part: Part, ticks: u64, name: &str) -> Outcome 
     expect(stage.frames_dropped <= 8, || {
         format!("{} frames dropped", stage.frames_dropped)
     })?;
-    // Setting the watchdog up writes its key once too.
+    // Setting the watchdog up writes its key once, too.
     let fed = machine.chip.fed - 1;
     equal("feeds of the watchdog", fed, stage.ticks.into())?;
     equal("state", stage.state, 1)?;
@@ -112,7 +112,7 @@ pub struct Stage {
     pub frames_dropped: u32,
     /// Times the bus was off.
     pub bus_off: u32,
-    /// Ticks with settings of the FPU put back.
+    /// Ticks in which the FPU's settings were restored.
     pub fpu_restored: u32,
     /// Whether the last reset came from the watchdog.
     pub watchdog_reset: u32,

@@ -1,4 +1,4 @@
-//! Every property that is checked, and how it is told.
+//! Every property that is checked, and how results are reported.
 
 pub mod bus;
 pub mod commands;
@@ -23,7 +23,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Tells how a check ended.
+    /// Prints how a check ended.
     pub fn note(&mut self, name: &str, outcome: Outcome) {
         match outcome {
             Ok(()) => {

@@ -16,7 +16,7 @@ fn torn(blob: &[u8]) -> Vec<u8> {
     torn
 }
 
-/// The blob with another layout version, its check made good again.
+/// The blob with another layout version, and the check that belongs to it.
 fn newer(blob: &[u8]) -> Vec<u8> {
     let mut newer = blob.to_vec();
     newer[4] = 9;
@@ -36,7 +36,7 @@ fn foreign(blob: &[u8]) -> Vec<u8> {
     foreign
 }
 
-/// Without usable parameters the controller lives, says why in every status frame and gives
+/// Without usable parameters the controller runs, says why in every status frame and gives
 /// no pose.
 pub fn none_usable(
     bench: &Bench,
@@ -90,7 +90,7 @@ pub fn unusable_kinds(bench: &Bench) -> Vec<(&'static str, Outcome)> {
     ]
 }
 
-/// With one sound slot the controller runs on it, and tells what is wrong with the other.
+/// With one valid slot the controller uses it, and says what is wrong with the other.
 pub fn one_usable(bench: &Bench) -> Outcome {
     let torn = torn(&bench.blob);
     let cases: [([&[u8]; 2], u8); 4] = [
@@ -119,7 +119,7 @@ pub fn one_usable(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// Of two sound slots the later one is used, whichever it is.
+/// Of two valid slots the later one is used, whichever it is.
 pub fn the_later_of_two(bench: &Bench) -> Outcome {
     let run = |slots: [&[u8]; 2]| -> Result<[u32; 6], super::Failure> {
         let mut machine = bench.machine(PART, slots)?;

@@ -1,4 +1,4 @@
-//! Faults of converters, wires and sensors: told, survived, over when they are over.
+//! Faults of converters, wires and sensors: reported, survived, and cleared when they end.
 
 use super::{Outcome, equal, expect};
 use crate::adc_model::{AdcFault, Part};
@@ -25,8 +25,9 @@ pub struct Case {
 
 const NOTHING: Status = Status::PLANAR_INVALID.with(Status::VERTICAL_INVALID);
 
-/// Bits that say nothing of an invalid pose, and that of missed frames.
-const NO_MATTER: u32 = Status::VERTICAL_EXTRAPOLATED
+/// Bits that are not compared: out of range, which means nothing of an invalid pose, and missed
+/// frames.
+const NOT_COMPARED: u32 = Status::VERTICAL_EXTRAPOLATED
     .with(Status::PLANAR_EXTRAPOLATED)
     .with(Status::FRAMES_MISSED)
     .bits();
@@ -112,7 +113,7 @@ pub fn survives(bench: &Bench, part: Part, case: &Case) -> Outcome {
     let planar = shown.iter().filter(|axis| axis.axis < 3);
     let wrong = planar
         .clone()
-        .find(|axis| axis.word != 0 || axis.status & !NO_MATTER != case.status.bits());
+        .find(|axis| axis.word != 0 || axis.status & !NOT_COMPARED != case.status.bits());
     equal(
         "a planar word during the fault",
         wrong.map(|axis| (axis.tick, axis.word, axis.status)),
@@ -174,7 +175,7 @@ fn all_good(machine: &mut Machine, bench: &Bench, first: u64, least: u64) -> Out
     equal("panics and watchdog resets", resets, (0, 0))
 }
 
-/// A converter that is dead when the controller starts, and comes alive later.
+/// A converter that does not answer when the controller starts, and does later.
 pub fn dead_from_the_start(bench: &Bench, part: Part) -> Outcome {
     let mut machine = bench.machine(part, [&bench.blob, &[]])?;
     machine.chip.adc.fault = AdcFault::Line(0xff);

@@ -23,7 +23,7 @@ fn stays_in_step(seen: &Seen, late: usize) -> Outcome {
     equal("ticks out of step", found, late)
 }
 
-/// A tick that comes 0.5 ms late is decoded and counted, and shifts no other.
+/// A tick that comes 0.5 ms late is decoded and counted, and does not shift the others.
 pub fn a_late_tick(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ticks(100)?;
@@ -110,7 +110,7 @@ pub fn a_watchdog_reset(bench: &Bench) -> Outcome {
     equal("STAGE tells of the reset", stage.watchdog_reset, 1)
 }
 
-/// Ticks that all overrun are not taken for sound ones: the watchdog bites.
+/// Ticks that all overrun do not feed the watchdog: it bites.
 pub fn overrun_ticks_do_not_feed(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ticks(100)?;
@@ -129,7 +129,7 @@ pub fn overrun_ticks_do_not_feed(bench: &Bench) -> Outcome {
     })
 }
 
-/// Settings that an interrupt left behind are put back before the decoding, and counted.
+/// Settings that an interrupt left changed are restored before the decoding, and counted.
 pub fn fpu_settings_left_behind(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ticks(100)?;
@@ -196,7 +196,8 @@ pub fn the_clock_wraps(bench: &Bench) -> Outcome {
     )
 }
 
-/// A core that would hand wrong settings to interrupts fails its own test: no pose, and said so.
+/// A core that would give interrupts wrong settings fails the self-test: no pose, and the state
+/// says so.
 pub fn fpu_defaults_that_are_wrong(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     const FPDSCR: usize = 0xef3c;

@@ -1,4 +1,4 @@
-//! What a controller links at the least: a blob loaded from flash, the tick of a servo with
+//! The least that a controller links: a blob loaded from flash, the tick of a servo with
 //! hold and re-zero. Its size is that of the runtime in flash.
 #![no_std]
 #![no_main]
@@ -18,7 +18,7 @@ fn main() -> ! {
         && set.expect_serial("HS-0007").is_ok()
     {
         let decoder = set.decoder();
-        let mut servo = Servo::new(&decoder, OnInvalid::Hold { ticks: 3 });
+        let mut servo = Servo::new(&*decoder, OnInvalid::Hold { ticks: 3 });
         servo.start_rezero(RezeroSettings::default());
         loop {
             let frame = black_box(RawFrame {

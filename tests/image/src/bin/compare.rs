@@ -5,7 +5,7 @@
 use cortex_m_rt::entry;
 use image::job::{self, ANSWER_WORDS, BLOB_WORDS, FRAME_WORDS, HEAD_WORDS, Head, PARAMETER_WORDS};
 use image::semihost::{CONSOLE, Fault, File, exit};
-use runtime::{ParameterSet, Reading, Servo};
+use runtime::{Decode, ParameterSet, Reading, Servo};
 
 /// Frames of one transfer.
 const BATCH: usize = 512;
@@ -61,9 +61,7 @@ fn run() -> Result<(), Stop> {
                 }
                 let (decoder, zero) = job::from_words(&words.map(u32::from_le_bytes));
                 frames(&input, &output, head.frames, |frame| {
-                    let mut reading = Reading::default();
-                    decoder.decode_into(&frame.hall, &frame.capacitive, &zero, &mut reading);
-                    reading
+                    decoder.decode(frame, &zero)
                 })?;
             }
             job::BLOB => {
@@ -75,7 +73,7 @@ fn run() -> Result<(), Stop> {
                 }
                 let set = ParameterSet::from_flash(blob).map_err(|_| Stop::Refused)?;
                 let decoder = set.decoder();
-                let mut servo = Servo::new(&decoder, head.on_invalid());
+                let mut servo = Servo::new(&*decoder, head.on_invalid());
                 frames(&input, &output, head.frames, |frame| servo.tick(frame))?;
             }
             _ => return Err(Stop::NoJob),

@@ -121,7 +121,7 @@ fn main() -> ! {
         exit(false)
     };
     let decoder = set.decoder();
-    let mut servo = Servo::new(&decoder, OnInvalid::Hold { ticks: 2 });
+    let mut servo = Servo::new(&*decoder, OnInvalid::Hold { ticks: 2 });
     for period in 0..PERIODS {
         let reading = match converters(period) {
             Some(frame) => servo.tick(&frame),

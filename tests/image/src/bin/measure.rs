@@ -17,34 +17,41 @@ use image::semihost::{CONSOLE, File, exit};
 use runtime::arithmetic::ArithmeticFault;
 use runtime::decoder::{Decoder, DecoderConstants};
 use runtime::frame::CodeWindow;
-use runtime::model::{Sensitivity, planar_pose, sensitivity_at};
-use runtime::{OnInvalid, PlanarPose, RawFrame, Reading, Servo, VerticalPose};
+use runtime::model::Sensitivity;
+use runtime::{
+    Decode, LinearModel, Model, OnInvalid, PlanarPose, RawFrame, Reading, Servo, VerticalPose,
+};
 
 /// Displacements read by the probes.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct Signal([f32; 3]);
 
+/// What the pose kernel reads of a calibration.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct Kernel {
+    planar_per_code: [[f32; 3]; 3],
+    probes: [Sensitivity<f32>; 3],
+}
+
 /// The pose kernel, Model (31): three sensitivities, three quotients, X, Y, Rz.
 #[inline(always)]
 fn kernel(
-    c: &DecoderConstants<f32>,
+    c: &Kernel,
     signal: &Signal,
     vertical: &VerticalPose<f32>,
     zero: &PlanarPose<f32>,
 ) -> PlanarPose<f32> {
-    let phi = [
-        sensitivity_at(&c.sensitivity[0], vertical),
-        sensitivity_at(&c.sensitivity[1], vertical),
-        sensitivity_at(&c.sensitivity[2], vertical),
-    ];
-    planar_pose(&c.planar_per_code, signal.0, phi, zero)
+    let (_, pose) =
+        LinearModel::planar_pose(&c.probes, &c.planar_per_code, signal.0, vertical, zero);
+    pose
 }
 
 #[unsafe(no_mangle)]
 #[inline(never)]
 extern "C" fn counted_kernel(
-    c: &DecoderConstants<f32>,
+    c: &Kernel,
     signal: &Signal,
     vertical: &VerticalPose<f32>,
     zero: &PlanarPose<f32>,
@@ -56,7 +63,7 @@ extern "C" fn counted_kernel(
 #[unsafe(no_mangle)]
 #[inline(never)]
 extern "C" fn counted_kernel_by_value(
-    c: &DecoderConstants<f32>,
+    c: &Kernel,
     signal: Signal,
     vertical: VerticalPose<f32>,
     zero: PlanarPose<f32>,
@@ -67,12 +74,12 @@ extern "C" fn counted_kernel_by_value(
 #[unsafe(no_mangle)]
 #[inline(never)]
 extern "C" fn counted_tick(
-    decoder: &Decoder,
+    decoder: &Decoder<LinearModel>,
     frame: &RawFrame,
     zero: &PlanarPose<f32>,
     reading: &mut Reading,
 ) {
-    decoder.decode_into(&frame.hall, &frame.capacitive, zero, reading);
+    *reading = decoder.decode(frame, zero);
 }
 
 #[unsafe(no_mangle)]
@@ -118,30 +125,30 @@ extern "C" fn counted_can_pose(reading: &Reading, counter: u32, coded: &mut [Cod
 }
 
 #[cfg(c_reference)]
-#[allow(improper_ctypes)] // repr(C) structs of numbers, but for Status, which is transparent
+#[allow(improper_ctypes)] // repr(C) structs of numbers; Status is transparent
 unsafe extern "C" {
     fn counted_c_kernel(
-        c: &DecoderConstants<f32>,
+        c: &Kernel,
         signal: &Signal,
         vertical: &VerticalPose<f32>,
         zero: &PlanarPose<f32>,
         pose: &mut PlanarPose<f32>,
     );
     fn counted_c_uncontracted_kernel(
-        c: &DecoderConstants<f32>,
+        c: &Kernel,
         signal: &Signal,
         vertical: &VerticalPose<f32>,
         zero: &PlanarPose<f32>,
         pose: &mut PlanarPose<f32>,
     );
     fn counted_c_tick(
-        c: &DecoderConstants<f32>,
+        decoder: &Decoder<LinearModel>,
         frame: &RawFrame,
         zero: &PlanarPose<f32>,
         reading: &mut Reading,
     );
     fn counted_c_uncontracted_tick(
-        c: &DecoderConstants<f32>,
+        decoder: &Decoder<LinearModel>,
         frame: &RawFrame,
         zero: &PlanarPose<f32>,
         reading: &mut Reading,
@@ -175,26 +182,6 @@ const SOUND: DecoderConstants<f32> = DecoderConstants {
         [6.5e-8, 6.5e-8, -1.3e-7],
         [-6.5e-8, 6.5e-8, 0.0],
     ],
-    sensitivity: [
-        Sensitivity {
-            eta: 0.86,
-            per_z_m: -186.0,
-            per_rx_rad: -63.0,
-            per_ry_rad: 36.0,
-        },
-        Sensitivity {
-            eta: 0.70,
-            per_z_m: -164.0,
-            per_rx_rad: -58.0,
-            per_ry_rad: -36.0,
-        },
-        Sensitivity {
-            eta: 0.86,
-            per_z_m: -188.0,
-            per_rx_rad: -62.0,
-            per_ry_rad: 37.0,
-        },
-    ],
     planar_per_code: [
         [5.7e-8, -5.7e-8, 6.2e-8],
         [3.1e-8, 3.1e-8, 1e-10],
@@ -213,6 +200,27 @@ const SOUND: DecoderConstants<f32> = DecoderConstants {
     },
 };
 
+const PROBES: [Sensitivity<f32>; 3] = [
+    Sensitivity {
+        eta: 0.86,
+        per_z_m: -186.0,
+        per_rx_rad: -63.0,
+        per_ry_rad: 36.0,
+    },
+    Sensitivity {
+        eta: 0.70,
+        per_z_m: -164.0,
+        per_rx_rad: -58.0,
+        per_ry_rad: -36.0,
+    },
+    Sensitivity {
+        eta: 0.86,
+        per_z_m: -188.0,
+        per_rx_rad: -62.0,
+        per_ry_rad: 37.0,
+    },
+];
+
 /// A plain pseudo-random sequence (xorshift), for inputs only.
 struct Words(u32);
 
@@ -226,13 +234,13 @@ impl Words {
 }
 
 /// The inputs of one round: codes of 16 bits or of any; sound parameters or any words.
-fn round(words: &mut Words, k: u32) -> (Decoder, PlanarPose<f32>, RawFrame) {
+fn round(words: &mut Words, k: u32) -> (Decoder<LinearModel>, PlanarPose<f32>, RawFrame) {
     let frame = core::array::from_fn::<u32, FRAME_WORDS, _>(|_| match k % 4 {
         3 => words.next(),
         _ => (words.next() as i32 >> 16) as u32,
     });
     let (decoder, zero) = match k % 3 {
-        0 => (Decoder::new(SOUND), PlanarPose::ZERO),
+        0 => (Decoder::new(SOUND, PROBES), PlanarPose::ZERO),
         1 => job::from_words(&core::array::from_fn::<u32, PARAMETER_WORDS, _>(|_| {
             words.next()
         })),
@@ -267,7 +275,7 @@ fn touched(work: impl FnOnce()) -> usize {
 #[cfg(target_abi = "eabihf")]
 fn check_with(settings: u32) -> Result<(), ArithmeticFault> {
     let set = |fpscr: u32| {
-        // SAFETY: writes a register of the FPU; not `pure`, so it stays before and behind
+        // SAFETY: writes a register of the FPU; not `pure`, so it stays before and after
         // the check, whose operands pass through memory.
         unsafe { core::arch::asm!("vmsr fpscr, {}", in(reg) fpscr, options(nostack)) }
     };
@@ -300,32 +308,25 @@ fn main() -> ! {
         let signal = Signal(frame.hall.map(|code| code as f32));
         let vertical = VerticalPose::from_array(frame.capacitive.map(|code| code as f32 * 1e-8));
         let mut pose = PlanarPose::ZERO;
-        counted_kernel(decoder.constants(), &signal, &vertical, &zero, &mut pose);
+        let c = Kernel {
+            planar_per_code: decoder.constants().planar_per_code,
+            probes: *decoder.probes(),
+        };
+        counted_kernel(&c, &signal, &vertical, &zero, &mut pose);
         black_box(&pose);
-        black_box(counted_kernel_by_value(
-            decoder.constants(),
-            signal,
-            vertical,
-            zero,
-        ));
+        black_box(counted_kernel_by_value(&c, signal, vertical, zero));
         counted_tick(&decoder, &frame, &zero, &mut reading);
         black_box(&reading);
         #[cfg(c_reference)]
         // SAFETY: structs of the same layout, as the C file declares them.
         unsafe {
-            counted_c_kernel(decoder.constants(), &signal, &vertical, &zero, &mut pose);
-            counted_c_uncontracted_kernel(
-                decoder.constants(),
-                &signal,
-                &vertical,
-                &zero,
-                &mut pose,
-            );
-            counted_c_tick(decoder.constants(), &frame, &zero, &mut reading);
-            counted_c_uncontracted_tick(decoder.constants(), &frame, &zero, &mut reading);
+            counted_c_kernel(&c, &signal, &vertical, &zero, &mut pose);
+            counted_c_uncontracted_kernel(&c, &signal, &vertical, &zero, &mut pose);
+            counted_c_tick(&decoder, &frame, &zero, &mut reading);
+            counted_c_uncontracted_tick(&decoder, &frame, &zero, &mut reading);
         }
     }
-    let decoder = black_box(Decoder::new(SOUND));
+    let decoder = black_box(Decoder::new(SOUND, PROBES));
     let mut servo = Servo::new(&decoder, OnInvalid::Hold { ticks: 3 });
     let mut frame = RawFrame {
         hall: [900, -800, 700],

@@ -35,7 +35,6 @@ fn bus(frame: &RawFrame) {
             black_box(receiver.take(&black_box(BusFrame::from(coded)), 1));
         }
         black_box((receiver.poll(2), receiver.deadline_us(), *receiver.health()));
-        black_box(receiver.sensor_time());
     }
     for coded in sender.frames(&black_box(Reading::default())) {
         let frame = black_box(BusFrame::from(coded));
@@ -64,7 +63,7 @@ fn main() -> ! {
         let mut buffer = [0; MAX_BYTES];
         let _ = black_box(set.to_bytes(&mut buffer));
         let decoder = black_box(set.decoder());
-        let mut servo = Servo::new(&decoder, black_box(OnInvalid::Hold { ticks: 3 }));
+        let mut servo = Servo::new(&*decoder, black_box(OnInvalid::Hold { ticks: 3 }));
         servo.start_rezero(black_box(RezeroSettings::default()));
         black_box(servo.tick(&frame));
         black_box(servo.tick_without_frame());
@@ -72,7 +71,7 @@ fn main() -> ! {
         black_box(servo.set_zero(black_box(PlanarPose::ZERO)));
         servo.forget();
         black_box((servo.rezero_state(), servo.health(), servo.zero()));
-        black_box(decoder.channel_faults(&frame).count());
+        black_box(decoder.constants().channel_faults(&frame).count());
     }
     bus(&frame);
     loop {

@@ -2,10 +2,11 @@
 //! 1993): tournament of two, extended intermediate crossover, mutation on all scales, and the
 //! best individual always survives.
 
-use crate::solve::search::cost::{CostFunction, Evaluator, ranks_before};
+use crate::input::stage::Range;
+use crate::solve::search::breeding::{Breeding, Parents};
+use crate::solve::search::cost::ranks_before;
 use crate::solve::search::population::{Candidates, Population};
-use crate::solve::search::random::{Phase, RandomSource, RandomStreams};
-use crate::solve::search::run::{Method, Start};
+use crate::solve::search::random::RandomSource;
 
 /// A child lies between its parents or up to this share of their distance beyond.
 const EXTENSION: f64 = 0.25;
@@ -14,29 +15,9 @@ const MUTATION: f64 = 0.1;
 /// Mutations are smaller than that by 2^-0 to 2^-15.
 const SCALES: usize = 16;
 
-/// A search by the genetic algorithm: every generation replaces the whole population but for
-/// its best.
-pub struct Genetic<S> {
-    streams: S,
-    population: Population,
-    candidates: Candidates<()>,
-}
-
-impl<S: RandomStreams> Genetic<S> {
-    /// Draws and evaluates the first population.
-    pub fn new<F: CostFunction + ?Sized>(
-        streams: S,
-        evaluator: &mut Evaluator<'_, F>,
-        start: &Start<'_>,
-    ) -> Self {
-        let population = Population::draw(evaluator, &streams, start);
-        Self {
-            candidates: Candidates::for_population(&population, ()),
-            population,
-            streams,
-        }
-    }
-}
+/// A search by the genetic algorithm: every generation replaces all but the best individual.
+#[derive(Clone, Copy, Debug)]
+pub struct Genetic;
 
 /// The better of two individuals drawn at random.
 fn tournament<'p>(population: &'p Population, random: &mut impl RandomSource) -> &'p [f64] {
@@ -45,44 +26,32 @@ fn tournament<'p>(population: &'p Population, random: &mut impl RandomSource) ->
     population.individual(if better { b } else { a })
 }
 
-impl<S: RandomStreams, F: CostFunction + ?Sized> Method<F> for Genetic<S> {
-    fn generation(&mut self, number: usize, evaluator: &mut Evaluator<'_, F>) -> bool {
-        let bounds = evaluator.function.bounds();
-        let (population, streams) = (&self.population, &self.streams);
-        let Candidates {
-            places,
-            costs,
-            notes,
-        } = &mut self.candidates;
-        evaluator.breed(places, costs, notes, |k, place| {
-            let mut random = streams.stream(number, Phase::Teacher, k);
-            let mother = tournament(population, &mut random);
-            let father = tournament(population, &mut random);
-            let rate = 1.0 / place.len() as f64;
-            for (i, x) in place.iter_mut().enumerate() {
-                let share = (1.0 + 2.0 * EXTENSION) * random.uniform() - EXTENSION;
-                *x = mother[i] + share * (father[i] - mother[i]);
-                if random.uniform() < rate {
-                    let scale = (1u64 << random.index(SCALES)) as f64;
-                    let sign = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
-                    *x += sign * MUTATION * bounds[i].width() / scale;
-                }
+impl Breeding for Genetic {
+    type Note = ();
+
+    fn make(&self, parents: Parents<'_>, random: &mut impl RandomSource, new: &mut [f64]) {
+        let mother = tournament(parents.population, random);
+        let father = tournament(parents.population, random);
+        let rate = 1.0 / new.len() as f64;
+        for (i, x) in new.iter_mut().enumerate() {
+            let share = (1.0 + 2.0 * EXTENSION) * random.uniform() - EXTENSION;
+            *x = mother[i] + share * (father[i] - mother[i]);
+            if random.uniform() < rate {
+                let scale = (1u64 << random.index(SCALES)) as f64;
+                let sign = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
+                *x += sign * MUTATION * parents.bounds[i].width() / scale;
             }
-        });
-        let (best, cost) = self.population.best();
-        let best = best.to_vec();
-        for k in 0..self.population.size() {
-            let child = self.candidates.candidate(k);
-            self.population.replace(k, child, self.candidates.costs[k]);
         }
-        if ranks_before(cost, self.population.best().1) {
-            self.population
-                .replace(self.population.worst_index(), &best, cost);
-        }
-        true
     }
 
-    fn best(&self) -> (&[f64], f64) {
-        self.population.best()
+    fn select(&mut self, population: &mut Population, children: &Candidates<()>, _: &[Range]) {
+        let (best, cost) = population.best();
+        let best = best.to_vec();
+        for (k, &cost) in children.costs.iter().enumerate() {
+            population.replace(k, children.candidate(k), cost);
+        }
+        if ranks_before(cost, population.best().1) {
+            population.replace(population.worst_index(), &best, cost);
+        }
     }
 }

@@ -1,87 +1,61 @@
 //! Particle swarm optimization, global best, with the constants of Clerc and Kennedy (2002).
 
-use crate::solve::search::cost::{CostFunction, Evaluator};
+use crate::input::stage::Range;
+use crate::solve::search::breeding::{Breeding, Parents};
 use crate::solve::search::population::{Candidates, Population};
-use crate::solve::search::random::{Phase, RandomSource, RandomStreams};
-use crate::solve::search::run::{Method, Start};
+use crate::solve::search::random::RandomSource;
 
 /// Share of the velocity that is kept: the constriction factor for 2.05 + 2.05.
 const INERTIA: f64 = 0.729_843_788;
 /// Pull towards the particle's own best and towards the swarm's.
 const PULL: f64 = 1.496_179_765;
 
-/// A particle swarm. Particles start at rest; one that meets a bound loses its velocity
-/// along that axis. The swarm's best is that of the start of a generation.
-pub struct Swarm<S> {
-    streams: S,
-    /// The best position of each particle.
-    bests: Population,
-    /// Where each particle is.
-    particles: Candidates<()>,
-    /// Where each particle was before.
-    previous: Vec<f64>,
+/// A particle swarm. Particles start at rest; one that meets a bound loses its velocity along that
+/// axis. The population holds the best position of each particle; the swarm's best is that of the
+/// start of a generation.
+#[derive(Clone, Debug, Default)]
+pub struct Swarm {
+    /// Where each particle is; empty before the first generation.
+    positions: Vec<f64>,
     /// Velocity of each particle, per generation.
     velocities: Vec<f64>,
+    /// The particle with the best position of all.
+    best: usize,
 }
 
-impl<S: RandomStreams> Swarm<S> {
-    /// Draws and evaluates the first positions.
-    pub fn new<F: CostFunction + ?Sized>(
-        streams: S,
-        evaluator: &mut Evaluator<'_, F>,
-        start: &Start<'_>,
-    ) -> Self {
-        let bests = Population::draw(evaluator, &streams, start);
-        let mut particles = Candidates::for_population(&bests, ());
-        for k in 0..bests.size() {
-            let place = k * bests.dimensions();
-            particles.places[place..][..bests.dimensions()].copy_from_slice(bests.individual(k));
+impl Breeding for Swarm {
+    type Note = ();
+
+    fn begin(&mut self, bests: &Population) {
+        if self.positions.is_empty() {
+            self.positions = bests.places().to_vec();
+            self.velocities = vec![0.0; self.positions.len()];
         }
-        Self {
-            previous: particles.places.clone(),
-            velocities: vec![0.0; particles.places.len()],
-            streams,
-            bests,
-            particles,
+        self.best = bests.best_index();
+    }
+
+    fn make(&self, parents: Parents<'_>, random: &mut impl RandomSource, new: &mut [f64]) {
+        let own_best = parents.population.individual(parents.k);
+        let swarm_best = parents.population.individual(self.best);
+        let particle = parents.k * new.len();
+        let position = &self.positions[particle..][..new.len()];
+        let velocity = &self.velocities[particle..][..new.len()];
+        for (i, new) in new.iter_mut().enumerate() {
+            let x = position[i];
+            let to_own = PULL * random.uniform() * (own_best[i] - x);
+            let to_swarm = PULL * random.uniform() * (swarm_best[i] - x);
+            *new = x + (INERTIA * velocity[i] + to_own + to_swarm);
         }
     }
-}
 
-impl<S: RandomStreams, F: CostFunction + ?Sized> Method<F> for Swarm<S> {
-    fn generation(&mut self, number: usize, evaluator: &mut Evaluator<'_, F>) -> bool {
-        let dimensions = self.bests.dimensions();
-        let swarm_best = self.bests.best().0;
-        let (streams, bests, velocities) = (&self.streams, &self.bests, &self.velocities);
-        let Candidates {
-            places,
-            costs,
-            notes,
-        } = &mut self.particles;
-        self.previous.copy_from_slice(places);
-        evaluator.breed(places, costs, notes, |k, place| {
-            let mut random = streams.stream(number, Phase::Teacher, k);
-            let velocity = &velocities[k * dimensions..][..dimensions];
-            let own_best = bests.individual(k);
-            for (i, x) in place.iter_mut().enumerate() {
-                let to_own = PULL * random.uniform() * (own_best[i] - *x);
-                let to_swarm = PULL * random.uniform() * (swarm_best[i] - *x);
-                *x += INERTIA * velocity[i] + to_own + to_swarm;
-            }
-        });
-        let bounds = evaluator.function.bounds().iter().cycle();
-        let moved = self.particles.places.iter().zip(&self.previous).zip(bounds);
-        for (velocity, ((x, before), range)) in self.velocities.iter_mut().zip(moved) {
+    fn select(&mut self, bests: &mut Population, moved: &Candidates<()>, bounds: &[Range]) {
+        let places = moved.places.iter().zip(&self.positions);
+        let along = places.zip(bounds.iter().cycle());
+        for (velocity, ((x, before), range)) in self.velocities.iter_mut().zip(along) {
             let at_bound = *x <= range.low || *x >= range.high;
             *velocity = if at_bound { 0.0 } else { x - before };
         }
-        for k in 0..self.bests.size() {
-            self.bests
-                .improve(k, self.particles.candidate(k), self.particles.costs[k]);
-        }
-        true
-    }
-
-    fn best(&self) -> (&[f64], f64) {
-        self.bests.best()
+        self.positions.copy_from_slice(&moved.places);
+        bests.improve_all(moved);
     }
 }

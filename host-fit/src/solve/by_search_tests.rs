@@ -1,33 +1,34 @@
 use super::*;
+use crate::solve::Solver;
 use crate::solve::objective::sample::{dataset, problem, stage, truth};
 use crate::solve::search::run::StopReason;
+use runtime::ModelKind;
 use std::sync::atomic::AtomicBool;
 
 fn options(projection: Projection, generations: usize) -> SolverOptions {
     SolverOptions {
-        projection,
-        seed: 1,
         population: 30,
         generations,
+        ..SolverOptions::new(projection, 1)
     }
 }
 
-fn solver(name: &str) -> PopulationSolver {
-    PopulationSolver::by_name(name).expect("a known name")
-}
+const SHTLBO: Solver = Solver::Search(SearchKind::Shtlbo);
 
 #[test]
 fn shtlbo_on_the_linear_form_finds_the_least_squares_optimum() {
     let (stage, dataset) = (stage(), dataset(40, 5));
     let problem = problem(&dataset, &stage, ModelKind::M31);
     let options = options(Projection::Linear, 300);
-    let exact = LeastSquares.solve(&problem, &options).expect("a fit");
+    let exact = Solver::LeastSquares
+        .solve(&problem, &options)
+        .expect("a fit");
     for seed in 1..=3 {
         let options = SolverOptions {
             seed,
             ..options.clone()
         };
-        let found = solver("shtlbo").solve(&problem, &options).expect("a fit");
+        let found = SHTLBO.solve(&problem, &options).expect("a fit");
         assert!((found.cost / exact.cost - 1.0).abs() < 1e-6, "seed {seed}");
         for (have, want) in found.delta_m.iter().zip(&exact.delta_m) {
             for (have, want) in have.iter().zip(want) {
@@ -48,13 +49,15 @@ fn the_finish_makes_every_seed_end_at_the_least_squares_optimum() {
     ] {
         let problem = problem(&dataset, &stage, model);
         let options = options(Projection::Linear, 100);
-        let exact = LeastSquares.solve(&problem, &options).expect("a fit");
+        let exact = Solver::LeastSquares
+            .solve(&problem, &options)
+            .expect("a fit");
         for seed in 1..=3 {
             let options = SolverOptions {
                 seed,
                 ..options.clone()
             };
-            let found = solver(FINISHED).solve(&problem, &options).expect("a fit");
+            let found = Solver::Finished.solve(&problem, &options).expect("a fit");
             assert!(
                 (found.cost / exact.cost - 1.0).abs() < 1e-9,
                 "{model:?}, seed {seed}: {} and {}",
@@ -70,7 +73,7 @@ fn the_cost_of_a_solution_is_that_of_its_own_parameters_and_zero_deviations() {
     let (stage, dataset) = (stage(), dataset(20, 5));
     let problem = problem(&dataset, &stage, ModelKind::M31);
     for projection in [Projection::None, Projection::Delta, Projection::Linear] {
-        let found = solver("tlbo")
+        let found = Solver::Search(SearchKind::Tlbo)
             .solve(&problem, &options(projection, 60))
             .expect("a fit");
         let again = crate::solve::objective::sample::fitness_by_the_runtime(
@@ -95,7 +98,7 @@ fn a_gain_outside_its_box_is_brought_back_with_the_cost_that_it_has_there() {
     eta[0].low = 0.9;
     stage.search.set("eta", eta);
     let problem = problem(&dataset, &stage, ModelKind::M31);
-    let found = solver("shtlbo")
+    let found = SHTLBO
         .solve(&problem, &options(Projection::Linear, 300))
         .expect("a fit");
     assert_eq!(found.parameters.eta()[0], 0.9);
@@ -113,13 +116,13 @@ fn a_warm_start_begins_at_the_known_parameters() {
     let (stage, dataset) = (stage(), dataset(20, 5));
     let problem = problem(&dataset, &stage, ModelKind::M31);
     for projection in [Projection::None, Projection::Delta, Projection::Linear] {
-        let mut warm = solver("shtlbo");
-        warm.known = Some(truth());
-        let found = warm
-            .solve(&problem, &options(projection, 1))
-            .expect("a fit");
+        let warm = SolverOptions {
+            known: Some(truth()),
+            ..options(projection, 1)
+        };
+        let found = SHTLBO.solve(&problem, &warm).expect("a fit");
         assert!(problem.fitness(found.cost) < 3.0, "{}", projection.name());
-        let cold = solver("shtlbo").solve(&problem, &options(projection, 1));
+        let cold = SHTLBO.solve(&problem, &options(projection, 1));
         assert!(cold.is_err() || problem.fitness(cold.expect("a fit").cost) > 4.0);
     }
 }
@@ -129,9 +132,11 @@ fn an_interrupted_search_gives_its_best_so_far_and_says_so() {
     static FLAG: AtomicBool = AtomicBool::new(true);
     let (stage, dataset) = (stage(), dataset(20, 5));
     let problem = problem(&dataset, &stage, ModelKind::M31);
-    let mut interrupted = solver("shtlbo");
-    interrupted.interrupt = Some(&FLAG);
-    let found = interrupted.solve(&problem, &options(Projection::None, 1_000_000));
+    let interrupted = SolverOptions {
+        interrupt: Some(&FLAG),
+        ..options(Projection::None, 1_000_000)
+    };
+    let found = SHTLBO.solve(&problem, &interrupted);
     let found = found.expect("the first population has a best");
     assert!(found.stopped.contains(&StopReason::Interrupted.to_string()));
     assert_eq!(found.evaluations, 30);
@@ -141,9 +146,9 @@ fn an_interrupted_search_gives_its_best_so_far_and_says_so() {
 fn a_form_without_unknowns_is_refused_with_what_to_do() {
     let (stage, dataset) = (stage(), dataset(20, 5));
     let problem = problem(&dataset, &stage, ModelKind::M30);
-    let refused = solver("shtlbo").solve(&problem, &options(Projection::Linear, 1));
+    let refused = SHTLBO.solve(&problem, &options(Projection::Linear, 1));
     assert!(matches!(
         refused,
-        Err(SolveError::Unsupported { model: 30, .. })
+        Err(SolveError::Unsupported { model: "30", .. })
     ));
 }

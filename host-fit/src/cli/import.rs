@@ -1,0 +1,80 @@
+//! `host-fit import`.
+
+use super::args::LayoutChoice;
+use crate::bus::import::{self, ImportSettings};
+use crate::cli::error::HostError;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `import`.
+#[derive(Debug, Args)]
+pub(super) struct ImportArgs {
+    /// Record of the bus, as `candump -L` or `live --record` writes it.
+    #[arg(value_name = "CANDUMP")]
+    bus: PathBuf,
+    /// Log of the interferometers: CSV with time, movement and beams (or pose), in the
+    /// columns that stage.toml names.
+    #[arg(value_name = "REFERENCE")]
+    reference: PathBuf,
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    stage: PathBuf,
+    /// Where to write the calibration log.
+    #[arg(long, value_name = "LOG.csv")]
+    out: PathBuf,
+    /// Largest time from a tick to the reference samples before and after it, us; one servo
+    /// period if not given.
+    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    tolerance_us: Option<u32>,
+    /// Time of the bus less time of the reference, us.
+    #[arg(
+        long,
+        value_name = "US",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    offset_us: f64,
+    /// Find the offset between the clocks by the motion that both saw.
+    #[arg(long, conflicts_with = "offset_us")]
+    estimate_offset: bool,
+    /// How far from "both records start together" the offset is looked for, s.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 2.0,
+        requires = "estimate_offset"
+    )]
+    search_s: f64,
+    /// Only frames of this interface, where the record holds several.
+    #[arg(long, value_name = "IFACE")]
+    interface: Option<String>,
+    /// How codes are put into frames.
+    #[arg(long, value_enum, default_value = "auto")]
+    layout: LayoutChoice,
+    /// Leave out lines that cannot be read, and count them.
+    #[arg(long)]
+    skip_bad_lines: bool,
+}
+
+/// Joins a record of the bus and a reference, and says how it went.
+pub(super) fn run(args: ImportArgs) -> Result<(), HostError> {
+    super::keep_apart(
+        &[Some(&args.out)],
+        &[&args.bus, &args.reference, &args.stage],
+    )?;
+    let settings = ImportSettings {
+        bus: args.bus,
+        reference: args.reference,
+        stage: args.stage,
+        out: args.out,
+        tolerance_us: args.tolerance_us,
+        offset_us: args.offset_us,
+        estimate_offset: args.estimate_offset,
+        search_s: args.search_s,
+        interface: args.interface,
+        layout: args.layout.layout(),
+        skip_bad_lines: args.skip_bad_lines,
+    };
+    let report = import::run(&settings)?;
+    super::print(&format!("{report}wrote {}\n", settings.out.display()))
+}
