@@ -15,7 +15,7 @@ use runtime::geometry::ProbeCoordinates;
 use std::collections::BTreeMap;
 
 /// A closed interval, in the unit of the field that holds it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// Lower end.
     pub low: f64,
