@@ -2,8 +2,8 @@
 //!
 //! The residuals of neighbouring rows are not independent: the interferometers drift. So the
 //! covariance is the sandwich A^-1 M A^-1 with M summed over clusters of rows that may depend on
-//! each other: whole movements where there are at least [`CLUSTERS_MIN`], else blocks of
-//! [`BLOCK_S`] within them. Where independence would give the larger figure that one is taken,
+//! each other: whole movements where there are at least 20, else blocks of
+//! half a second within them. Where independence would give the larger figure that one is taken,
 //! so that a chance cancellation within few clusters promises nothing.
 
 use crate::problem::model::{COUNT, ParameterId, SLOPES_MAX};

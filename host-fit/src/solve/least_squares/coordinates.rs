@@ -18,6 +18,8 @@ pub trait Coordinates {
     fn jacobian(&self, unknowns: &Column, point: &Point) -> Option<Square>;
     /// Which unknowns may change.
     fn free(&self) -> [bool; COUNT];
+    /// The places of the unknowns that the model's terms have, fitted or not.
+    fn places(&self) -> Vec<usize>;
     /// The nearest unknowns within the box, if there is one.
     fn clip(&self, unknowns: Column) -> Column;
 }
@@ -59,6 +61,12 @@ impl Coordinates for Gains {
     fn free(&self) -> [bool; COUNT] {
         let slopes = self.model.fitted_slopes();
         std::array::from_fn(|k| k < 9 || (k - 9) % SLOPES_MAX < slopes)
+    }
+
+    fn places(&self) -> Vec<usize> {
+        let slopes = self.model.slopes().len();
+        let held = |k: &usize| *k < 9 || (k - 9) % SLOPES_MAX < slopes;
+        (0..COUNT).filter(held).collect()
     }
 
     fn clip(&self, unknowns: Column) -> Column {
@@ -164,6 +172,10 @@ impl Coordinates for Boxed<'_> {
         // Away from zero, where both coordinates of a probe count in its lever arm.
         let ranges = self.ranges([0.1; 3]);
         std::array::from_fn(|k| k < self.model.free_count() && ranges[k].width() > 0.0)
+    }
+
+    fn places(&self) -> Vec<usize> {
+        (0..3 * self.model.terms.len()).collect()
     }
 
     fn clip(&self, mut unknowns: Column) -> Column {

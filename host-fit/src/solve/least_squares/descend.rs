@@ -5,7 +5,7 @@ use super::normal::{Column, Point, Square, cost, descent, gram};
 use super::scatter::{Offset, Q, Scatter, scatter};
 use crate::problem::Problem;
 use crate::problem::model::COUNT;
-use nalgebra::{Cholesky, Matrix3};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3};
 
 /// Why a descent ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,6 +81,7 @@ pub fn descend(
     let mut damping = DAMPING_START;
     let mut end = DescentEnd::StepLimit;
     let weights = Matrix3::from_diagonal(&problem.weights.into());
+    let places = coordinates.places();
     'steps: for _ in 0..STEPS_MAX {
         let mut gradient = descent(&state.scatter, &state.point.gain, problem.weights);
         let mut curvature = gram(&state.scatter, &state.point.gain, &weights);
@@ -91,7 +92,7 @@ pub fn descend(
         let free = unblocked(coordinates, &state.unknowns, &gradient);
         let enough = state.cost / (problem.rows.len() as f64) * 1e-8 + rounding(&state.scatter);
         loop {
-            let step = damped_step(&curvature, &gradient, &free, damping);
+            let step = damped_step(&curvature, &gradient, &free, &places, damping);
             let next = coordinates.clip(state.unknowns + step);
             let moved = next - state.unknowns;
             let gain = 2.0 * gradient.dot(&moved) - moved.dot(&(curvature * moved));
@@ -138,11 +139,13 @@ fn unblocked(coordinates: &impl Coordinates, at: &Column, gradient: &Column) -> 
 }
 
 /// Solves (A + damping diag A) step = gradient for the free unknowns, scaled by diag A; others,
-/// and those without any effect on the cost, stay.
+/// and those without any effect on the cost, stay. The matrix holds only the `places` that the
+/// model has.
 fn damped_step(
     curvature: &Square,
     gradient: &Column,
     free: &[bool; COUNT],
+    places: &[usize],
     damping: f64,
 ) -> Column {
     let scale = Column::from_fn(|k, _| {
@@ -153,19 +156,28 @@ fn damped_step(
             0.0
         }
     });
-    let mut scaled = Square::from_fn(|i, j| curvature[(i, j)] * scale[i] * scale[j]);
-    for k in 0..COUNT {
-        scaled[(k, k)] = 1.0 + damping;
-    }
-    let right = gradient.component_mul(&scale);
+    let n = places.len();
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        let (i, j) = (places[i], places[j]);
+        curvature[(i, j)] * scale[i] * scale[j]
+    });
+    let right = DVector::from_fn(n, |i, _| gradient[places[i]] * scale[places[i]]);
+    let spread = |step: &DVector<f64>| {
+        let mut out = Column::zeros();
+        for (&k, step) in places.iter().zip(step) {
+            out[k] = step * scale[k];
+        }
+        out
+    };
     // Where the log leaves a direction open the matrix is singular to rounding: damp it more.
     let mut extra = 0.0;
     for _ in 0..12 {
-        let regular = scaled + Square::identity() * extra;
+        let mut regular = scaled.clone();
+        regular.fill_diagonal(1.0 + damping + extra);
         if let Some(factor) = Cholesky::new(regular) {
-            return factor.solve(&right).component_mul(&scale);
+            return spread(&factor.solve(&right));
         }
         extra = if extra == 0.0 { 1e-12 } else { extra * 10.0 };
     }
-    right.component_mul(&scale)
+    spread(&right)
 }

@@ -29,21 +29,25 @@ fn ratio(place: usize) -> Option<(usize, usize)> {
     Some((ratio / SLOPES_MAX, U + ratio))
 }
 
-/// Sum over rows of J' W J for a 3 by 3 weight matrix of the axes.
-///
-/// Axis by axis and column by column each row of J has at most one entry in a block, so
-/// the blocks are written out: gain with gain, gain with ratio, ratio with ratio.
+/// Sum over rows of J' W J for a 3 by 3 weight matrix of the axes, in blocks: gain with gain, gain
+/// with ratio, ratio with ratio.
 pub fn gram(scatter: &Scatter, gain: &Matrix3<f64>, weight: &Matrix3<f64>) -> Square {
     let mut out = Square::zeros();
-    // W G and G' W G.
-    let weighted = weight * gain;
-    let through = gain.transpose() * weighted;
     for row in 0..COUNT {
         for column in row..COUNT {
             let product = match (ratio(row), ratio(column)) {
                 (None, None) => weight[(row / 3, column / 3)] * scatter[(row % 3, column % 3)],
-                (None, Some((probe, at))) => weighted[(row / 3, probe)] * scatter[(row % 3, at)],
-                (Some((left, i)), Some((right, j))) => through[(left, right)] * scatter[(i, j)],
+                (None, Some((probe, at))) => (0..3).fold(0.0, |sum, axis| {
+                    sum + weight[(row / 3, axis)] * gain[(axis, probe)] * scatter[(row % 3, at)]
+                }),
+                (Some((left, i)), Some((right, j))) => {
+                    let pairs = (0..9).map(|k| (k / 3, k % 3));
+                    // Without correlation between the axes three of nine.
+                    let weighted = pairs.filter(|pair| weight[*pair] != 0.0);
+                    weighted.fold(0.0, |sum, (a, b)| {
+                        sum + weight[(a, b)] * gain[(a, left)] * gain[(b, right)] * scatter[(i, j)]
+                    })
+                }
                 // Ratios stand behind the gains.
                 (Some(_), None) => 0.0,
             };

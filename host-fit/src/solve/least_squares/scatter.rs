@@ -162,23 +162,33 @@ fn scatter_of<const K: usize, const W: usize>(
     let one = |(group, offset): (&Group, &Offset)| {
         group_sums::<K, W>(&problem.rows[group.rows.clone()], ratios, *offset)
     };
-    // Small problems are done before another thread would wake up.
-    let groups: Vec<_> = if problem.rows.len() < 4000 {
-        problem.groups.iter().zip(offsets).map(one).collect()
-    } else {
-        problem.groups.par_iter().zip(offsets).map(one).collect()
+    let mut sums = [[0.0; W]; W];
+    let mut add = |group: &[[f64; W]; W]| {
+        for (sums, group) in sums.iter_mut().zip(group) {
+            for (sum, group) in sums.iter_mut().zip(group) {
+                *sum += group;
+            }
+        }
     };
+    // Small problems are done before another thread would wake up.
+    if problem.rows.len() < 4000 {
+        for group in problem.groups.iter().zip(offsets) {
+            add(&one(group)?);
+        }
+    } else {
+        let each: Vec<_> = problem.groups.par_iter().zip(offsets).map(one).collect();
+        for group in each {
+            add(&group?);
+        }
+    }
     let place = |i: usize| match i.checked_sub(U) {
         Some(u) => U + u / K * SLOPES_MAX + u % K,
         None => i,
     };
     let mut total = Scatter::zeros();
-    for group in groups {
-        let group = group?;
-        for i in 0..U + 3 * K {
-            for j in i..U + 3 * K {
-                total[(place(i), place(j))] += group[i][j];
-            }
+    for i in 0..U + 3 * K {
+        for j in i..U + 3 * K {
+            total[(place(i), place(j))] = sums[i][j];
         }
     }
     for i in 0..WIDTH {
