@@ -2,8 +2,7 @@
 //! sensor node sends 16-bit codes, and prints one line per tick.
 //!
 //! ```sh
-//! cd hal-adapters/examples/data
-//! cargo run -p hal-adapters --example decode_candump -- params.bin bus.log
+//! cargo run -p hal-adapters --example decode_candump -- hal-adapters/examples/data/params.bin hal-adapters/examples/data/bus.log
 //! ```
 
 use hal_adapters::can::{Layout, SensorReceiver, Timing};

@@ -15,7 +15,6 @@ use crate::problem::model::{Model, ParameterId};
 use crate::problem::parameters::Parameters;
 use crate::solve::{Solution, SolveError, Solver, SolverOptions};
 use runtime::calibration::Origin;
-use runtime::model::Probes;
 use runtime::parameters::{FitRecord, ParameterError, Text};
 use runtime::{Calibration, ParameterSet};
 
@@ -79,7 +78,7 @@ pub enum FitWarning {
     },
     /// Several vertical terms stand at an end of their range.
     #[error(
-        "{count} of the nine vertical terms stand at an end of their range: check the order and the signs of the \
+        "{count} of the vertical terms stand at an end of their range: check the order and the signs of the \
          capacitive sensors in the log and in stage.toml"
     )]
     VerticalTermsAtLimit {
@@ -130,11 +129,29 @@ pub enum FitError {
     Solver(#[from] SolveError),
     /// The fitted parameters put a row of the log next to a pole of 1/phi.
     #[error(
-        "the {solver} search ended with a row of the log next to a pole of 1/phi, where nothing can be judged: let it          run longer (--generations, --population), use --project delta or linear, or take the default solver"
+        "the {solver} search ended with a row of the log next to a pole of 1/phi, where nothing can be judged: let it run longer (--generations, --population), use --project delta or linear, or take the default solver"
     )]
     AtPole {
         /// Name of the solver.
         solver: &'static str,
+    },
+    /// The stage file has no range for a parameter that is fitted.
+    #[error(
+        "the table [search] of stage.toml has no range `{key}`, which model ({model}) needs: add it"
+    )]
+    NoRange {
+        /// Its key.
+        key: &'static str,
+        /// Name of the model.
+        model: &'static str,
+    },
+    /// The model has terms that no decoder of this program has.
+    #[error(
+        "no decoder of this program has all terms of model ({model}): it can be fitted, but not judged or used"
+    )]
+    NoDecoder {
+        /// Name of the model.
+        model: &'static str,
     },
     /// The fitted parameters cannot serve a decoder.
     #[error(
@@ -178,6 +195,17 @@ pub fn fit(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<F
     let (model, solver) = (settings.model, settings.solver);
     let count = settings.train.unwrap_or(dataset.rows.len());
     let selected = draw_rows(dataset, count, settings.draw, settings.options.seed);
+    // The lever arms, the first term, take theirs from the coordinates.
+    let ranged = &model.terms[1..model.fitted];
+    if let Some(term) = ranged
+        .iter()
+        .find(|t| stage.search.of(t.range_key).is_none())
+    {
+        return Err(FitError::NoRange {
+            key: term.range_key,
+            model: model.name,
+        });
+    }
     check_motion(dataset, stage, selected.len(), model)?;
     let problem = Problem::new(dataset, &selected, stage, model);
     let solution = solver.solve(&problem, &settings.options)?;
@@ -186,7 +214,7 @@ pub fn fit(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<F
         solver: solver.name(),
     };
     let uncertainty = uncertainty(&problem, parameters, &solution.at_limit).ok_or(at_pole)?;
-    let calibration = calibration(dataset, stage, model, parameters);
+    let calibration = calibration(dataset, stage, model, parameters)?;
     let vertical = calibration.calibrated_vertical;
     let determined = check_determined(&problem, parameters, &uncertainty, vertical);
     let origin = Origin {
@@ -303,12 +331,15 @@ fn wild_row(dataset: &Dataset, judgement: &Judgement) -> Option<FitWarning> {
 
 /// The calibration that `parameters` make with the stage's scales, calibrated over the motion
 /// of the dataset and a tenth more.
+///
+/// # Errors
+/// [`FitError::NoDecoder`].
 pub fn calibration(
     dataset: &Dataset,
     stage: &Stage,
     model: &Model,
     parameters: &Parameters,
-) -> Calibration {
+) -> Result<Calibration, FitError> {
     let mut planar = [0.0f64; 3];
     let mut vertical = [0.0f64; 3];
     for row in &dataset.rows {
@@ -317,10 +348,11 @@ pub fn calibration(
             vertical[axis] = vertical[axis].max(row.vertical[axis].abs());
         }
     }
-    Calibration {
+    let no_decoder = FitError::NoDecoder { model: model.name };
+    Ok(Calibration {
         model: model.kind,
         geometry: parameters.geometry(),
-        probes: Probes::Linear(parameters.sensitivity()),
+        probes: model.probes(parameters).ok_or(no_decoder)?,
         hall_m_per_code: stage.hall.m_per_count,
         hall_window: stage.hall.window,
         capacitive_probes_m: stage.capacitive_probes_m,
@@ -329,5 +361,5 @@ pub fn calibration(
         calibrated_planar: planar.map(|x| x * RANGE_MARGIN),
         calibrated_vertical: vertical.map(|x| x * RANGE_MARGIN),
         sensitivity_min: Calibration::SENSITIVITY_MIN,
-    }
+    })
 }

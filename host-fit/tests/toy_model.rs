@@ -2,14 +2,17 @@
 //! more term in the sensitivity, phi = eta + a Z + b Rx + c Ry + d Z^2.
 //!
 //! Nothing but its table stands here: sizes, objectives, least squares, standard errors, checks
-//! and JSON follow from it.
+//! and JSON follow from it. Its tick, which the runtime does not have, is a type of its own in
+//! `runtime/tests/another_model.rs`; until a decoder has it, `fit` refuses to judge it.
 
+use host_fit::fit::{FitError, FitSettings, fit};
 use host_fit::input::dataset::Dataset;
 use host_fit::input::shipped::STAGE_TOML;
 use host_fit::input::stage::{Range, Stage};
 use host_fit::judge::identify::{FitFailure, check_determined, check_motion};
 use host_fit::judge::uncertainty::uncertainty;
 use host_fit::problem::Problem;
+use host_fit::problem::draw::Draw;
 use host_fit::problem::model::{Model, SLOPES_MAX};
 use host_fit::problem::parameters::Parameters;
 use host_fit::problem::synthetic::Protocol;
@@ -19,6 +22,7 @@ use host_fit::solve::search::kind::SearchKind;
 use host_fit::solve::{Projection, Solver, SolverOptions};
 use runtime::ModelKind;
 use runtime::geometry::ProbeGeometry;
+use runtime::parameters::Text;
 
 const D: Term = Term {
     name: "d",
@@ -185,4 +189,25 @@ fn standard_errors_checks_and_json_know_the_term() {
         message.contains("d_a") && message.contains("heights Z"),
         "{message}"
     );
+}
+
+#[test]
+fn fit_refuses_what_no_decoder_has_and_terms_without_a_range() {
+    let stage = stage();
+    let dataset = log(&stage);
+    let settings = FitSettings {
+        model: &TOY,
+        train: None,
+        draw: Draw::Stratified,
+        solver: Solver::LeastSquares,
+        options: SolverOptions::new(Projection::Linear, 1),
+        serial: Text::new(),
+        created: Text::new(),
+    };
+    let refused = fit(&dataset, &stage, &settings).map(|fit| fit.solution);
+    assert_eq!(refused, Err(FitError::NoDecoder { model: "toy" }));
+    let without = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+    let refused = fit(&dataset, &without, &settings).map(|fit| fit.solution);
+    let key = "d_per_m2";
+    assert_eq!(refused, Err(FitError::NoRange { key, model: "toy" }));
 }

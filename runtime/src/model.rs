@@ -74,21 +74,6 @@ impl ModelKind {
             Self::M31 => 31,
         }
     }
-
-    /// Whether the model fits the sensitivity eta.
-    pub const fn has_sensitivity(self) -> bool {
-        !matches!(self, Self::M12)
-    }
-
-    /// Whether the model gives each movement of a log a zero deviation.
-    pub const fn has_zero_deviation(self) -> bool {
-        matches!(self, Self::M30 | Self::M31)
-    }
-
-    /// Whether the sensitivity follows the vertical pose.
-    pub const fn has_vertical_terms(self) -> bool {
-        matches!(self, Self::M31)
-    }
 }
 
 /// The coefficients of the three probes, by the model that they belong to.

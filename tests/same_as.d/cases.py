@@ -121,7 +121,7 @@ def readers(log):
 
 def exports(blob):
     """export, in its formats and to its places."""
-    for kind in ("bin", "hex", "elf"):
+    for kind in ("bin", "hex"):
         for place in (["--slot", "0"], ["--slot", "1"], ["--address", "0x08020000"]):
             arguments = ["export", blob, "--format", kind, *place, "--out", f"exported.{kind}"]
             yield Case(f"export {kind} {' '.join(place)}", arguments)

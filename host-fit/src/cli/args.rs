@@ -38,7 +38,7 @@ impl ValueEnum for Projection {
             }
             Self::Delta => "The zero deviations",
             Self::Linear => {
-                "Everything linear: the gain G and one offset for each movement. Nine unknowns are left"
+                "Everything linear: the gain G and one offset for each movement. Nine unknowns of model 31 are left"
             }
         };
         Some(PossibleValue::new(self.name()).help(help))

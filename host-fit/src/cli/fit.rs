@@ -7,7 +7,6 @@ use crate::input::log;
 use crate::input::log::{BadRows, LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
-use crate::judge;
 use crate::output;
 use crate::output::blob_file;
 use crate::problem::draw::Draw;
@@ -137,7 +136,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     }
     let log = log::read(&args.logs, &stage, &options)?;
     let known = match &args.start {
-        Some(path) => Some(judge::parameters_of(&blob_file::read(path)?)),
+        Some(path) => Some(Parameters::of_set(&blob_file::read(path)?)),
         None => None,
     };
     let mut options = SolverOptions::new(args.project, args.seed);

@@ -1,9 +1,9 @@
 //! `host-fit inspect`.
 
 use crate::cli::error::HostError;
-use crate::judge::parameters_of;
 use crate::output::blob_file;
 use crate::problem::model::{COUNT, Model};
+use crate::problem::parameters::Parameters;
 use crate::report::json::parameters;
 use clap::Args;
 use runtime::ParameterSet;
@@ -59,7 +59,7 @@ fn as_json(set: &ParameterSet) -> serde_json::Value {
                 "rz": { "rmse_urad": set.fit.rms[2] * 1e6, "peak_urad": set.fit.peak[2] * 1e6 },
             },
         },
-        "parameters": parameters(Model::of(set.model), &parameters_of(set), &[None; COUNT]),
+        "parameters": parameters(Model::of(set.model), &Parameters::of_set(set), &[None; COUNT]),
         "plane_matrix": set.plane,
         "plane_matrix_inverse": set.plane_inverse,
         "hall_m_per_count": set.hall.m_per_code,
@@ -101,7 +101,11 @@ fn as_text(set: &ParameterSet) -> String {
     let _ = writeln!(out, "rms error       {x:.3} um, {y:.3} um, {rz:.3} urad");
     let [x, y, rz] = set.fit.peak.map(|e| e * 1e6);
     let _ = writeln!(out, "peak error      {x:.3} um, {y:.3} um, {rz:.3} urad");
-    for (name, p) in parameters(Model::of(set.model), &parameters_of(set), &[None; COUNT]) {
+    for (name, p) in parameters(
+        Model::of(set.model),
+        &Parameters::of_set(set),
+        &[None; COUNT],
+    ) {
         let _ = writeln!(out, "{name:<15} {:>14.7} {}", p.value, p.unit);
     }
     for (name, rows) in [

@@ -220,7 +220,8 @@ fn rms_over_all_rows(
     problem: &Problem<'_>,
     solution: &Solution,
 ) -> Option<[f64; 3]> {
-    let calibration = calibration(dataset, problem.stage, problem.model, &solution.parameters);
+    let calibration =
+        calibration(dataset, problem.stage, problem.model, &solution.parameters).ok()?;
     let set = calibration.prepare(&Origin::default()).ok()?;
     let judgement = Decoded::new(&set, dataset).judge(dataset, problem.stage, Zeros::Refit);
     Some(judgement.errors.axes.map(|axis| axis.rms * 1e6))

@@ -12,8 +12,6 @@ use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
-use runtime::geometry::ProbeGeometry;
-use runtime::model::Probes;
 use runtime::{ParameterSet, PlanarPose};
 
 /// Which zero deviations are taken off before errors are counted.
@@ -66,17 +64,6 @@ pub struct Judgement {
     pub undecoded: usize,
 }
 
-/// The parameters that a set carries, in `f64`.
-pub fn parameters_of(set: &ParameterSet) -> Parameters {
-    let geometry = ProbeGeometry {
-        lever_arm_m: set.geometry.lever_arm_m.map(f64::from),
-        misalignment_rad: set.geometry.misalignment_rad.map(f64::from),
-    };
-    match set.probes.rounded() {
-        Probes::Linear(sensitivity) => Parameters::of_model_31(&geometry, &sensitivity),
-    }
-}
-
 /// A dataset decoded with one parameter set: to be judged in several ways.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decoded {
@@ -98,7 +85,7 @@ impl Decoded {
             Some(std::array::from_fn(error))
         };
         Self {
-            parameters: parameters_of(set),
+            parameters: Parameters::of_set(set),
             errors: dataset.rows.par_iter().map(one).collect(),
         }
     }

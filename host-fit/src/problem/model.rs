@@ -86,12 +86,6 @@ impl Model {
         self.parameters().take(3 * self.fitted)
     }
 
-    /// The parameter at a place of the order, if the model has it.
-    pub fn parameter(&'static self, index: usize) -> Option<ParameterId> {
-        let term = self.terms.get(index / 3)?;
-        Some(ParameterId::new(index / 3, term, index % 3))
-    }
-
     /// How many parameters it fits, zero deviations not counted.
     pub const fn free_count(&self) -> usize {
         3 * self.fitted

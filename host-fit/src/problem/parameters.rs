@@ -3,7 +3,8 @@
 use super::model::{COUNT, GAIN_TERMS, Model, SLOPES_MAX};
 use crate::input::stage::{Range, Stage};
 use runtime::geometry::{ProbeGeometry, SensingAxes};
-use runtime::model::Sensitivity;
+use runtime::model::{Probes, Sensitivity};
+use runtime::{ModelKind, ParameterSet};
 
 /// Where the misalignments start.
 pub const THETA: usize = 3;
@@ -88,6 +89,33 @@ impl Parameters {
             per_rx_rad: slopes[probe][1],
             per_ry_rad: slopes[probe][2],
         })
+    }
+}
+
+impl Model {
+    /// The coefficients of the probes as the decoder of this model's kind takes them, or `None`
+    /// where the parameters hold more slopes than it has.
+    pub fn probes(&self, parameters: &Parameters) -> Option<Probes<f64>> {
+        let linear = parameters.sensitivity();
+        let same = Parameters::of_model_31(&parameters.geometry(), &linear) == *parameters;
+        match self.kind {
+            ModelKind::M12 | ModelKind::M15 | ModelKind::M30 | ModelKind::M31 => {
+                same.then_some(Probes::Linear(linear))
+            }
+        }
+    }
+}
+
+impl Parameters {
+    /// The parameters that a blob carries, in `f64`.
+    pub fn of_set(set: &ParameterSet) -> Self {
+        let geometry = ProbeGeometry {
+            lever_arm_m: set.geometry.lever_arm_m.map(f64::from),
+            misalignment_rad: set.geometry.misalignment_rad.map(f64::from),
+        };
+        match set.probes.rounded() {
+            Probes::Linear(sensitivity) => Self::of_model_31(&geometry, &sensitivity),
+        }
     }
 }
 

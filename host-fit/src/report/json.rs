@@ -272,7 +272,7 @@ pub fn of_eval(
     c: &Circumstances,
 ) -> Report {
     let model = Model::of(set.model);
-    let values = crate::judge::parameters_of(set);
+    let values = Parameters::of_set(set);
     Report {
         model: model.name.to_owned(),
         solver: None,

@@ -6,7 +6,7 @@ use crate::input::dataset::{Dataset, Row};
 use crate::input::log::{self, ReadOptions};
 use crate::input::shipped::{LOG_GZ, STAGE_TOML};
 use crate::input::stage::Stage;
-use crate::judge::statistics::{ErrorSums, PoseError};
+use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Zeros};
 use crate::output;
 use crate::output::blob_file;
@@ -174,7 +174,7 @@ fn designed_errors(dataset: &Dataset, stage: &Stage) -> Result<PoseError, HostEr
         stage,
         Model::of(ModelKind::M15),
         &Parameters::designed(stage),
-    );
+    )?;
     let set = designed
         .prepare(&Origin::default())
         .map_err(crate::fit::FitError::Unusable)?;
@@ -190,23 +190,14 @@ fn pose_file_errors(
     stage: &Stage,
     parameters: &Parameters,
 ) -> Result<PoseError, HostError> {
+    let error = |(pose, row): (&pose_file::PoseRow, &Row)| {
+        let decoded = pose.reading.planar()?.to_array();
+        Some([0, 1, 2].map(|k| f64::from(decoded[k]) - row.reference[k]))
+    };
     let poses = pose_file::read(path)?;
-    let mut sums = ErrorSums::default();
-    for movement in &dataset.movements {
-        let pairs = movement.rows.clone().zip(&poses[movement.rows.clone()]);
-        let errors: Vec<(usize, [f64; 3])> = pairs
-            .filter_map(|(row, pose)| {
-                let decoded = pose.reading.planar()?.to_array();
-                let reference = dataset.rows[row].reference;
-                Some((row, [0, 1, 2].map(|k| f64::from(decoded[k]) - reference[k])))
-            })
-            .collect();
-        let n = errors.len().max(1) as f64;
-        let mean = [0, 1, 2].map(|k| errors.iter().map(|(_, e)| e[k]).sum::<f64>() / n);
-        let zero = ZeroDeviation::of_mean_error(parameters, mean, &stage.search.delta_m);
-        for (row, error) in errors {
-            sums.add(row, [0, 1, 2].map(|k| error[k] - zero.pose[k]));
-        }
-    }
-    Ok(sums.finish())
+    let decoded = Decoded {
+        parameters: *parameters,
+        errors: poses.iter().zip(&dataset.rows).map(error).collect(),
+    };
+    Ok(decoded.judge(dataset, stage, Zeros::Refit).errors)
 }

@@ -34,6 +34,13 @@ impl<'t> Document<'t> {
 
     /// The whole file.
     pub(super) fn read_all<T: DeserializeOwned>(&self) -> Result<T, StageError> {
+        // serde would take a list for a struct, by the order of its fields.
+        if let DeValue::Table(entries) = self.top.get_ref() {
+            let lists = entries.values().filter(|entry| entry.get_ref().is_array());
+            if let Some(list) = lists.min_by_key(|entry| entry.span().start) {
+                return Err(self.wrong_kind(list.span(), "invalid type: a list, expected a table"));
+            }
+        }
         self.deserialize(&self.top)
     }
 
@@ -141,19 +148,26 @@ impl<'t> Document<'t> {
             let key = format!("{}.{}", self.key(&span), name.trim_matches('`'));
             return self.missing(span, key.trim_start_matches('.'));
         }
-        if message.starts_with("unknown field") {
-            let message = message.replace("field", "key");
-            return self.refuse(span, format!("{message}; {MISSPELT}"));
+        if let Some((_, known)) = message
+            .strip_prefix("unknown field ")
+            .and_then(|m| m.split_once(", "))
+        {
+            return self.refuse(span, format!("unknown key, {known}; {MISSPELT}"));
         }
         self.wrong_kind(span, message)
     }
 
     fn wrong_kind(&self, span: Range<usize>, message: &str) -> StageError {
         let key = self.key(&span);
-        let message = message
+        // What was found quotes the file; what was expected is in serde's words.
+        let (found, expected) = message.split_once(", expected ").unwrap_or((message, ""));
+        let expected = expected
             .replace("f64", "a number")
+            .replace("i128", "a whole number")
             .replace("i64", "a whole number")
-            .replace("a map", "a table");
+            .replace("a map", "a table")
+            .replace("a sequence", "a list");
+        let message = format!("{found}, expected {expected}");
         let remedy = example(&key).map(|example| format!("write it like {example}"));
         let remedy = remedy.unwrap_or_else(|| "write what is expected".to_owned());
         self.refuse(span, format!("{message}; {remedy}"))

@@ -9,13 +9,14 @@
 //! moves with theta. So a box in these unknowns is the box of the paper, without the three
 //! unknowns that act on nothing and without what lies beyond the poles ([`super::poles`]).
 
-use super::lanes::{Individuals, LaneCost, Lanes, dot, each};
+use super::lanes::{Individuals, LaneCost, Lanes, each};
 use super::model::{Linearized, Plane, fitness, shares};
 use super::poles::{Smallest, cut, slope_extent};
 use crate::input::stage::Range;
 use crate::problem::Problem;
 use crate::problem::parameters::{ETA, Parameters, SLOPES, THETA, search_box};
 use runtime::geometry::SensingAxes;
+use runtime::model::dot;
 
 /// Root mean square of all pose errors at the best zero deviations within their range.
 #[derive(Clone, Debug)]

@@ -6,12 +6,13 @@
 //! two coordinates of a probe act through its lever arm alone, so three of the unknowns are
 //! redundant; they are kept because the paper has them.
 
-use super::lanes::{Individuals, LaneCost, Lanes, dot, each};
+use super::lanes::{Individuals, LaneCost, Lanes, each};
 use super::model::{Linearized, Plane, fitness, shares};
 use crate::input::stage::Range;
 use crate::problem::Problem;
 use crate::problem::parameters::{self, Parameters, search_box};
 use runtime::geometry::{ProbeCoordinates, SensingAxes};
+use runtime::model::dot;
 
 /// Where the misalignments start.
 const THETA: usize = 6;

@@ -145,12 +145,6 @@ pub fn each<T>(f: impl Fn(usize) -> T) -> [T; 3] {
     [f(0), f(1), f(2)]
 }
 
-/// A row of three lanes times a column of three, summed from the left.
-#[inline(always)]
-pub fn dot(row: &[Lanes; 3], column: [Lanes; 3]) -> Lanes {
-    (row[0] * column[0] + row[1] * column[1]) + row[2] * column[2]
-}
-
 /// The numbers of up to eight individuals: number j of all of them at once.
 #[derive(Clone, Copy, Debug)]
 pub struct Individuals<'a> {

@@ -11,7 +11,7 @@
 //! bounds follow from the ranges of a, b, c and eta and from the poles ([`super::poles`]); the
 //! boxes of lever arms, angles and zero deviations are not enforced here.
 
-use super::lanes::{Individuals, LaneCost, Lanes, dot, each};
+use super::lanes::{Individuals, LaneCost, Lanes, each};
 use super::model::{corrected_um, shares};
 use super::poles::{Smallest, cut, slope_extent};
 use crate::input::stage::Range;
@@ -23,6 +23,7 @@ use crate::solve::least_squares::normal::Point;
 use crate::solve::search::random::{Phase, RandomSource, RandomStreams, SeededStreams};
 use nalgebra::Matrix3;
 use runtime::geometry::inverse_and_determinant;
+use runtime::model::dot;
 
 /// The six products of three numbers with each other: 00, 01, 02, 11, 12, 22.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];

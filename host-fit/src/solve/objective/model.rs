@@ -5,10 +5,11 @@
 //! PM^-1 (s / phi - delta / eta) = G (s' - delta) with G = PM^-1 diag(1/eta) and
 //! s' = s / (phi / eta), and three divisions are one division by their product.
 
-use super::lanes::{Individuals, Lanes, dot, each};
+use super::lanes::{Individuals, Lanes, each};
 use crate::problem::model::Model;
 use crate::problem::{Problem, TrainRow};
 use runtime::geometry::{SensingAxes, inverse_and_determinant};
+use runtime::model::dot;
 
 /// PM and its inverse (equations 11, 32). Where PM is singular the inverse is not finite, and so
 /// neither is the cost.
