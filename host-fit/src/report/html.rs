@@ -25,7 +25,7 @@ pub struct Page<'a> {
 pub struct Plot {
     /// What stands above it.
     pub caption: &'static str,
-    /// The plot: the one thing that goes into the page as it is.
+    /// The plot, which alone goes into the page without escaping.
     pub svg: String,
 }
 

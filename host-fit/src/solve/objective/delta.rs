@@ -4,10 +4,11 @@
 //! one takes off the movement's mean pose error: delta = eta (PM mean error), clipped to its
 //! range as the full form would hold it there.
 //!
-//! An individual holds the parameters that the model fits, in their usual order and in SI units; but a lever arm is written as its
-//! place in its range, 0 to 1, since the range, the image of the box of two coordinates,
-//! moves with theta. So a box in these unknowns is the box of the paper, without the three
-//! unknowns that act on nothing and without what lies beyond the poles ([`super::poles`]).
+//! An individual holds the parameters that the model fits, in their usual order and in SI units,
+//! with one exception: a lever arm is written as its place in its range, 0 to 1, since the range,
+//! the image of the box of two coordinates, moves with theta. So a box in these unknowns is the
+//! box of the paper, without the three unknowns that act on nothing and without what lies beyond
+//! the poles ([`super::poles`]).
 
 use super::lanes::{Individuals, LaneCost, Lanes, each};
 use super::model::{Linearized, Plane, fitness, shares};

@@ -32,7 +32,7 @@ impl<'a> Form<'a> {
         }
     }
 
-    /// It as a cost function of its own unknowns.
+    /// The form as a cost function of its unknowns.
     pub fn cost_function(&self) -> &dyn CostFunction {
         match self {
             Self::Full(cost) => cost,

@@ -44,8 +44,9 @@ pub struct Linearized<const K: usize> {
 }
 
 impl<const K: usize> Linearized<K> {
-    /// Of a plane, and eta and slopes by model: those that it does not fit are 1 and 0. They
-    /// stand in `u` from `eta_at` on: eta of A, B, C, then each slope of A, B, C.
+    /// The gain and the ratios of a plane with the eta and slopes of individuals, and that eta.
+    /// In `u` they begin at `eta_at`: eta of A, B, C, then each slope of A, B, C. An eta that the
+    /// model does not fit is 1, a slope 0.
     #[inline(always)]
     pub fn new(
         plane: &Plane,
