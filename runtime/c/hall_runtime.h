@@ -13,7 +13,7 @@
 #include <stdlib.h>
 
 // Words of a decoder.
-#define HALL_DECODER_WORDS 41
+#define HALL_DECODER_WORDS 114
 
 // Words of a servo.
 #define HALL_SERVO_WORDS 49

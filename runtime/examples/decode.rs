@@ -19,11 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
 
     let set = ParameterSet::from_bytes(&std::fs::read(path)?)?;
-    println!(
-        "stage {:?}, Model ({})",
-        set.serial.as_str(),
-        set.model.equation()
-    );
+    println!("stage {:?}, {}", set.serial.as_str(), set.model);
     let decoder = set.decoder();
     let frame = RawFrame {
         hall: [a, b, c],

@@ -3,7 +3,7 @@
 //! | offset | bytes | what |
 //! |---|---|---|
 //! | 0 | 4 | magic, `HALL` in ASCII |
-//! | 4 | 2 | layout version, little-endian: 1 |
+//! | 4 | 2 | layout version, little-endian: 1, or 2 for the field model |
 //! | 6 | 2 | reserved: 0 |
 //! | 8 | 4 | payload length n in bytes, little-endian |
 //! | 12 | n | payload: the [`ParameterSet`] in postcard |
@@ -12,28 +12,35 @@
 //! The payload holds the fields in the order of the struct: unsigned integers as varints
 //! (7 bits a byte, lowest first), signed ones zigzagged first, `f32` as four bytes
 //! little-endian, text as a length and its bytes, arrays without a length. `inspect` shows
-//! every field; the golden example in `golden.rs` fixes the bytes.
+//! every field; the golden examples in `golden.rs` fix the bytes. In version 2 each probe has
+//! the 28 numbers of a [`FieldProbe`](crate::model::FieldProbe), and three matrices that follow
+//! from the constants are left out: PM, PM^-1 and the capacitive plane matrix.
 //!
-//! The CRC finds any five flipped bits in a blob of up to [`MAX_BYTES`], and any burst of
-//! up to 32. In a file the length is exact; in flash the header gives the length and the
+//! The CRC finds any five flipped bits, any odd number of them, and any burst of up to 32, in
+//! a blob of up to 659 bytes, and so in all of up to [`MAX_BYTES`]: before the check stand at
+//! most 5,243 bits (P. Koopman, 32-bit CRC zoo, polynomial 0x8f6e37a0: Hamming distance 6 up to
+//! that length; the first four bits that are missed span 5,276). Beyond, up to 2^31 - 33 bits
+//! and so at 1,024 bytes, it would be any three, any odd number and the bursts. In a file the length is exact; in flash the header gives the length and the
 //! rest is padding. A layout that cannot be read by this version gets a new version number,
 //! and this version's blobs stay readable. Not promised: that an older decoder reads a
 //! newer layout, or that two layouts of one calibration have the same length.
 
 use crate::layout;
+use crate::model::Probes;
 use crate::parameters::{ParameterError, ParameterSet};
 use crc::{CRC_32_ISCSI, Crc, NoTable};
 
 /// First bytes of every blob.
 pub const MAGIC: [u8; 4] = *b"HALL";
-/// The layout that this version writes, and the newest that it reads.
-pub const LAYOUT_VERSION: u16 = 1;
+/// The newest layout that this version reads: that of the field model. Models (12) to (31) are
+/// written in layout 1, see [`ParameterSet::layout_version`].
+pub const LAYOUT_VERSION: u16 = 2;
 /// Bytes before the payload.
 pub const HEADER_BYTES: usize = 12;
 /// Bytes of the check after the payload.
 pub const CRC_BYTES: usize = 4;
 /// The largest blob: up to here CRC-32C finds any five flipped bits.
-pub const MAX_BYTES: usize = 512;
+pub const MAX_BYTES: usize = 656;
 
 /// CRC-32C without a table: a blob is read once, at start, and flash is short.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
@@ -147,6 +154,14 @@ impl core::error::Error for BlobError {
 }
 
 impl ParameterSet {
+    /// The version of the layout that this set is written in: 2 with the field model, else 1.
+    pub const fn layout_version(&self) -> u16 {
+        match self.probes {
+            Probes::Linear(_) => 1,
+            Probes::Field(_) => 2,
+        }
+    }
+
     /// Writes the blob into `buffer` ([`MAX_BYTES`] always suffice) and gives its bytes.
     ///
     /// # Errors
@@ -159,7 +174,7 @@ impl ParameterSet {
         let payload_bytes = u32::try_from(payload).map_err(|_| too_small)?;
         let header = buffer.first_chunk_mut::<HEADER_BYTES>().ok_or(too_small)?;
         let [m0, m1, m2, m3] = MAGIC;
-        let [v0, v1] = LAYOUT_VERSION.to_le_bytes();
+        let [v0, v1] = self.layout_version().to_le_bytes();
         let [n0, n1, n2, n3] = payload_bytes.to_le_bytes();
         *header = [m0, m1, m2, m3, v0, v1, 0, 0, n0, n1, n2, n3];
         let end = HEADER_BYTES + payload;
@@ -203,8 +218,13 @@ impl ParameterSet {
         if stored != computed {
             return Err(BlobError::BadCrc { stored, computed });
         }
-        let payload = body.get(HEADER_BYTES..).ok_or(BlobError::BadPayload)?;
+        let (header, payload) =
+            (body.split_at_checked(HEADER_BYTES)).ok_or(BlobError::BadPayload)?;
         let mut set = layout::read(payload).ok_or(BlobError::BadPayload)?;
+        // Each version holds its own models.
+        if header.get(4..6) != Some(&set.layout_version().to_le_bytes()) {
+            return Err(BlobError::BadPayload);
+        }
         layout::check_finite(&mut set).map_err(BlobError::Parameters)?;
         set.check_terms().map_err(BlobError::Parameters)?;
         Ok(set)
@@ -242,7 +262,7 @@ fn blob_length(bytes: &[u8]) -> Result<usize, BlobError> {
     // A further layout is one more arm here; what differs in its payload follows from the
     // model's tag, in `layout`.
     let largest = match u16::from_le_bytes([v0, v1]) {
-        1 => MAX_BYTES,
+        1 | LAYOUT_VERSION => MAX_BYTES,
         found => {
             return Err(BlobError::UnknownVersion {
                 found,

@@ -4,6 +4,7 @@ use crate::capacitive::{ProbePositions, vertical_rows};
 use crate::decoder::DecoderConstants;
 use crate::frame::CodeWindow;
 use crate::geometry::{ProbeGeometry, inverse_rows};
+use crate::layout;
 use crate::model::{ModelKind, Probes};
 use crate::parameters::{
     CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
@@ -52,7 +53,8 @@ pub struct Calibration {
     pub model: ModelKind,
     /// Lever arms and misalignments of the probes A, B, C.
     pub geometry: ProbeGeometry<f64>,
-    /// The model's coefficients of the probes A, B, C.
+    /// The model's coefficients of the probes A, B, C. Those of the field model have
+    /// `hall_m_per_code` and `geometry` in them, see [`FieldProbe`](crate::model::FieldProbe).
     pub probes: Probes<f64>,
     /// Designed displacement per Hall code, m.
     pub hall_m_per_code: f64,
@@ -121,7 +123,7 @@ impl Calibration {
         let inverse = inverse_rows(&plane).ok_or(ParameterError::SingularPlane)?;
         let vertical = vertical_rows(&self.capacitive_probes_m)
             .ok_or(ParameterError::CapacitiveProbesInLine)?;
-        let set = ParameterSet {
+        let mut set = ParameterSet {
             model: self.model,
             serial: origin.serial.clone(),
             created: origin.created.clone(),
@@ -143,6 +145,7 @@ impl Calibration {
             probes: self.probes.rounded(),
             constants: self.constants()?.rounded(),
         };
+        layout::restore(&mut set);
         set.check()?;
         Ok(set)
     }

@@ -14,7 +14,7 @@
 
 use crate::capacitive::vertical_pose;
 use crate::frame::{ChannelFault, CodeWindow, RawFrame};
-use crate::model::{LinearModel, Model};
+use crate::model::{FieldModel, LinearModel, Model};
 use crate::pose::{PlanarPose, Pose, VerticalPose};
 use crate::real::Real;
 use crate::status::Status;
@@ -91,7 +91,9 @@ impl fmt::Debug for dyn Decode + '_ {
 /// # const BLOB: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/stage.bin"));
 /// # fn main() -> Result<(), runtime::BlobError> {
 /// # let set = ParameterSet::from_bytes(BLOB)?;
-/// let AnyDecoder::Linear(decoder) = set.decoder();
+/// let AnyDecoder::Linear(decoder) = set.decoder() else {
+///     panic!("the blob holds Model (31)");
+/// };
 /// assert_eq!(decoder.probes()[0].eta, 0.87);
 ///
 /// // Z by the capacitive codes, or known by other means: the same planar pose.
@@ -111,10 +113,16 @@ pub struct Decoder<M: Model> {
 
 /// The decoder of a parameter set, whatever its model: chosen once, when the set is loaded,
 /// and borrowed as the [`Decode`] that it derefs to.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one, in a static, and no heap"
+)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AnyDecoder {
     /// Of Models (12), (15), (30), (31).
     Linear(Decoder<LinearModel>),
+    /// Of the field model.
+    Field(Decoder<FieldModel>),
 }
 
 impl Deref for AnyDecoder {
@@ -123,6 +131,7 @@ impl Deref for AnyDecoder {
     fn deref(&self) -> &Self::Target {
         match self {
             Self::Linear(decoder) => decoder,
+            Self::Field(decoder) => decoder,
         }
     }
 }

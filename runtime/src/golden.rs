@@ -20,6 +20,21 @@ const GOLDEN: &str = "\
     352c3459 632cb436 80a531f7 cc923952 499d3a52 499d3ae0 2d103ae0 2d103a34 \
     80b739cd cccc3dfd ff03fcff 03fdff03 fcff031a 83985d";
 
+/// The blob of [`sample::field_parameters`].
+const FIELD_GOLDEN: &[u8] = include_bytes!("../examples/field.bin");
+
+/// The golden example of each version, and its length.
+fn goldens() -> [([u8; MAX_BYTES], usize); 2] {
+    let mut field = [0; MAX_BYTES];
+    field[..FIELD_GOLDEN.len()].copy_from_slice(FIELD_GOLDEN);
+    [golden(), (field, FIELD_GOLDEN.len())]
+}
+
+/// The sets that [`goldens`] were made of.
+fn samples() -> [ParameterSet; 2] {
+    [sample::parameters(), sample::field_parameters()]
+}
+
 fn golden() -> ([u8; MAX_BYTES], usize) {
     let mut bytes = [0; MAX_BYTES];
     let digits = || GOLDEN.bytes().filter(u8::is_ascii_hexdigit);
@@ -70,24 +85,23 @@ impl Words {
 }
 
 #[test]
-fn the_golden_blob_is_written_byte_for_byte() {
-    let (golden, n) = golden();
-    let mut buffer = [0; MAX_BYTES];
-    let written = sample::parameters().to_bytes(&mut buffer).map(<[u8]>::len);
-    if written != Ok(n) || buffer[..n] != golden[..n] {
-        let written = written.unwrap_or(0);
-        panic!("{written} bytes: {:02x?}", &buffer[..written]);
+fn the_golden_blobs_are_written_byte_for_byte() {
+    for ((golden, n), set) in goldens().into_iter().zip(samples()) {
+        let mut buffer = [0; MAX_BYTES];
+        let written = set.to_bytes(&mut buffer).map(<[u8]>::len);
+        if written != Ok(n) || buffer[..n] != golden[..n] {
+            let written = written.unwrap_or(0);
+            panic!("{written} bytes: {:02x?}", &buffer[..written]);
+        }
     }
 }
 
 #[test]
-fn the_golden_blob_reads_as_the_set_that_it_was_made_of() {
-    let (golden, n) = golden();
-    assert_eq!(
-        ParameterSet::from_bytes(&golden[..n]),
-        Ok(sample::parameters())
-    );
-    assert_eq!(ParameterSet::from_flash(&golden), Ok(sample::parameters()));
+fn the_golden_blobs_read_as_the_sets_that_they_were_made_of() {
+    for ((golden, n), set) in goldens().into_iter().zip(samples()) {
+        assert_eq!(ParameterSet::from_flash(&golden).as_ref(), Ok(&set));
+        assert_eq!(ParameterSet::from_bytes(&golden[..n]), Ok(set));
+    }
 }
 
 #[test]
@@ -106,84 +120,101 @@ fn the_layout_is_as_documented() {
     assert_eq!(check, crc32c(&golden[..n - 4]));
     // Model (31) is the fourth kind; then the serial number with its length.
     assert_eq!(&golden[12..21], b"\x03\x07HS-0007");
-    assert!(n <= MAX_BYTES);
+    assert_eq!(&FIELD_GOLDEN[..8], b"HALL\x02\x00\x00\x00");
+    // The field model is the fifth kind.
+    assert_eq!(&FIELD_GOLDEN[12..21], b"\x04\x07HS-0007");
+    // Beyond, the CRC misses four flipped bits somewhere.
+    const { assert!(8 * (MAX_BYTES - CRC_BYTES) <= 5243) }
+}
+
+#[test]
+fn a_model_in_the_layout_of_another_is_refused() {
+    for (version, (mut blob, n)) in [2u16, 1].into_iter().zip(goldens()) {
+        blob[4..6].copy_from_slice(&version.to_le_bytes());
+        seal(&mut blob, n - CRC_BYTES);
+        let refused = ParameterSet::from_bytes(&blob[..n]);
+        assert_eq!(refused, Err(BlobError::BadPayload));
+    }
 }
 
 #[test]
 fn the_largest_set_fits_the_largest_blob() {
-    let mut set = sample::parameters();
-    set.serial = Text::try_from("01234567890123456789012345678901").expect("32 bytes");
-    set.created = set.serial.clone();
-    set.fit.rows = u32::MAX;
-    set.fit.train_rows = u32::MAX;
-    set.constants.hall_window.low = -crate::frame::CODE_MAGNITUDE_MAX;
-    set.constants.capacitive_window.high = crate::frame::CODE_MAGNITUDE_MAX;
-    let (blob, n) = blob_of(&set);
-    assert_eq!(ParameterSet::from_bytes(&blob[..n]), Ok(set));
-    let mut short = [0; MAX_BYTES];
-    for room in 0..n {
-        assert_eq!(
-            sample::parameters().to_bytes(&mut short[..room]).is_ok(),
-            room >= golden().1
-        );
+    for (mut set, (_, length)) in samples().into_iter().zip(goldens()) {
+        let mut short = [0; MAX_BYTES];
+        for room in 0..MAX_BYTES {
+            assert_eq!(set.to_bytes(&mut short[..room]).is_ok(), room >= length);
+        }
+        set.serial = Text::try_from("01234567890123456789012345678901").expect("32 bytes");
+        set.created = set.serial.clone();
+        set.fit.rows = u32::MAX;
+        set.fit.train_rows = u32::MAX;
+        let most = crate::frame::CODE_MAGNITUDE_MAX;
+        let window = crate::frame::CodeWindow {
+            low: -most,
+            high: most,
+        };
+        (set.constants.hall_window, set.constants.capacitive_window) = (window, window);
+        let (blob, n) = blob_of(&set);
+        assert_eq!(ParameterSet::from_bytes(&blob[..n]), Ok(set));
     }
 }
 
 #[test]
 fn every_flipped_bit_is_refused() {
-    let (mut blob, n) = golden();
-    for bit in 0..8 * n {
-        blob[bit / 8] ^= 1 << (bit % 8);
-        assert!(ParameterSet::from_bytes(&blob[..n]).is_err(), "bit {bit}");
-        assert!(ParameterSet::from_flash(&blob).is_err(), "bit {bit}");
-        blob[bit / 8] ^= 1 << (bit % 8);
+    for (mut blob, n) in goldens() {
+        for bit in 0..8 * n {
+            blob[bit / 8] ^= 1 << (bit % 8);
+            assert!(ParameterSet::from_bytes(&blob[..n]).is_err(), "bit {bit}");
+            assert!(ParameterSet::from_flash(&blob).is_err(), "bit {bit}");
+            blob[bit / 8] ^= 1 << (bit % 8);
+        }
     }
 }
 
 #[test]
 fn up_to_five_flipped_bits_are_refused() {
-    let (mut blob, n) = golden();
     let mut words = Words(1);
-    for round in 0..3000 {
-        let bits: [usize; 5] = core::array::from_fn(|_| words.below(8 * n));
-        let flips = 2 + round % 4;
-        for bit in &bits[..flips] {
-            blob[bit / 8] ^= 1 << (bit % 8);
-        }
-        // The same bit twice is no flip: only blobs that differ are damaged.
-        if blob[..n] != golden().0[..n] {
-            assert!(ParameterSet::from_flash(&blob).is_err(), "{bits:?}");
-        }
-        for bit in &bits[..flips] {
-            blob[bit / 8] ^= 1 << (bit % 8);
+    for (golden, n) in goldens() {
+        for round in 0..3000 {
+            let mut blob = golden;
+            let bits: [usize; 5] = core::array::from_fn(|_| words.below(8 * n));
+            for bit in &bits[..2 + round % 4] {
+                blob[bit / 8] ^= 1 << (bit % 8);
+            }
+            // The same bit twice is no flip: only blobs that differ are damaged.
+            if blob[..n] != golden[..n] {
+                assert!(ParameterSet::from_flash(&blob).is_err(), "{bits:?}");
+            }
         }
     }
 }
 
 #[test]
 fn every_truncation_is_refused_with_what_is_missing() {
-    let (blob, n) = golden();
-    for found in 0..n {
-        let needed = if found < HEADER_BYTES {
-            HEADER_BYTES
-        } else {
-            n
-        };
-        let truncated = Err(BlobError::Truncated { needed, found });
-        assert_eq!(ParameterSet::from_bytes(&blob[..found]), truncated);
-        assert_eq!(ParameterSet::from_flash(&blob[..found]), truncated);
+    for (blob, n) in goldens() {
+        for found in 0..n {
+            let needed = if found < HEADER_BYTES {
+                HEADER_BYTES
+            } else {
+                n
+            };
+            let truncated = Err(BlobError::Truncated { needed, found });
+            assert_eq!(ParameterSet::from_bytes(&blob[..found]), truncated);
+            assert_eq!(ParameterSet::from_flash(&blob[..found]), truncated);
+        }
     }
 }
 
 #[test]
 fn a_write_that_lost_power_is_refused() {
-    let (blob, n) = golden();
-    for written in 0..n {
-        let mut flash = [0xff; MAX_BYTES];
-        flash[..written].copy_from_slice(&blob[..written]);
-        let refused = ParameterSet::from_flash(&flash);
-        // The last bytes of the check may be 0xFF themselves; then nothing is missing.
-        assert_eq!(refused.is_ok(), flash[..n] == blob[..n], "{written} bytes");
+    for (blob, n) in goldens() {
+        for written in 0..n {
+            let mut flash = [0xff; MAX_BYTES];
+            flash[..written].copy_from_slice(&blob[..written]);
+            let refused = ParameterSet::from_flash(&flash);
+            // The last bytes of the check may be 0xFF themselves; then nothing is missing.
+            assert_eq!(refused.is_ok(), flash[..n] == blob[..n], "{written} bytes");
+        }
     }
 }
 
@@ -257,27 +288,28 @@ fn a_length_that_no_blob_has_is_refused() {
 /// With the check made right again, the damage must be found in the payload itself.
 #[test]
 fn a_sealed_payload_of_another_length_is_refused() {
-    let (golden, n) = golden();
-    for payload in 0..MAX_BYTES - HEADER_BYTES - CRC_BYTES {
-        if HEADER_BYTES + payload + CRC_BYTES == n {
-            continue;
+    for (golden, n) in goldens() {
+        for payload in 0..MAX_BYTES - HEADER_BYTES - CRC_BYTES {
+            if HEADER_BYTES + payload + CRC_BYTES == n {
+                continue;
+            }
+            let mut blob = golden;
+            blob[8..12].copy_from_slice(&(payload as u32).to_le_bytes());
+            seal(&mut blob, HEADER_BYTES + payload);
+            assert_eq!(
+                ParameterSet::from_flash(&blob),
+                Err(BlobError::BadPayload),
+                "{payload}"
+            );
         }
-        let mut blob = golden;
-        blob[8..12].copy_from_slice(&(payload as u32).to_le_bytes());
-        seal(&mut blob, HEADER_BYTES + payload);
-        assert_eq!(
-            ParameterSet::from_flash(&blob),
-            Err(BlobError::BadPayload),
-            "{payload}"
-        );
     }
 }
 
 #[test]
 fn a_sealed_payload_of_noise_gives_no_unsound_set() {
     let mut words = Words(7);
-    for _ in 0..2000 {
-        let (mut blob, n) = golden();
+    for round in 0..4000 {
+        let (mut blob, n) = goldens()[round % 2];
         for _ in 0..1 + words.below(8) {
             let at = HEADER_BYTES + words.below(n - HEADER_BYTES - CRC_BYTES);
             blob[at] = words.below(256) as u8;

@@ -5,11 +5,15 @@
 //! are finite go through it. A number that is missing there does not compile. Numbers and hash
 //! are read by loops: code derived for each of the nested arrays would read the same bytes and
 //! take three times the flash.
+//!
+//! Of the field model's sets three matrices are left out, which follow from the constants of
+//! the tick: [`restore`] puts them back. So the largest blob stays within the length up to
+//! which its CRC finds any five flipped bits.
 
 use crate::decoder::DecoderConstants;
 use crate::frame::CodeWindow;
-use crate::geometry::ProbeGeometry;
-use crate::model::{ModelKind, Probes, Sensitivity};
+use crate::geometry::{ProbeGeometry, inverse_and_determinant};
+use crate::model::{FieldProbe, ModelKind, Probes, Sensitivity, Shape};
 use crate::parameters::{
     CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
 };
@@ -64,17 +68,22 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
     } = geometry;
     visit("the probe geometry", lever_arm_m);
     visit("the probe geometry", misalignment_rad);
-    visit("PM", plane.as_flattened_mut());
-    visit("PM^-1", plane_inverse.as_flattened_mut());
+    let matrices = matches!(probes, Probes::Linear(_));
+    if matrices {
+        visit("PM", plane.as_flattened_mut());
+        visit("PM^-1", plane_inverse.as_flattened_mut());
+    }
     visit("the scale of the Hall codes", slice::from_mut(m_per_code));
     let CapacitiveInput {
         vertical_per_m,
         m_per_code,
     } = capacitive;
-    visit(
-        "the capacitive plane matrix",
-        vertical_per_m.as_flattened_mut(),
-    );
+    if matrices {
+        visit(
+            "the capacitive plane matrix",
+            vertical_per_m.as_flattened_mut(),
+        );
+    }
     visit(
         "the scale of the capacitive codes",
         slice::from_mut(m_per_code),
@@ -94,16 +103,13 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
     );
     match probes {
         Probes::Linear(probes) => {
-            for Sensitivity {
-                eta,
-                per_z_m,
-                per_rx_rad,
-                per_ry_rad,
-            } in probes
-            {
-                for number in [eta, per_z_m, per_rx_rad, per_ry_rad] {
-                    visit("the sensitivities", slice::from_mut(number));
-                }
+            for sensitivity in probes {
+                visit_sensitivity(sensitivity, visit);
+            }
+        }
+        Probes::Field(probes) => {
+            for probe in probes {
+                visit_field_probe(probe, visit);
             }
         }
     }
@@ -111,6 +117,68 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
     visit("the calibrated range", calibrated_vertical);
     visit("the calibrated range", calibrated_planar);
     visit("the smallest sensitivity", slice::from_mut(sensitivity_min));
+}
+
+fn visit_sensitivity(
+    Sensitivity {
+        eta,
+        per_z_m,
+        per_rx_rad,
+        per_ry_rad,
+    }: &mut Sensitivity<f32>,
+    visit: &mut dyn FnMut(&'static str, &mut [f32]),
+) {
+    for number in [eta, per_z_m, per_rx_rad, per_ry_rad] {
+        visit("the sensitivities", slice::from_mut(number));
+    }
+}
+
+fn visit_field_probe(
+    FieldProbe {
+        sensitivity,
+        carry,
+        shape,
+        lateral,
+    }: &mut FieldProbe<f32>,
+    visit: &mut dyn FnMut(&'static str, &mut [f32]),
+) {
+    visit_sensitivity(sensitivity, visit);
+    visit("the field terms", carry);
+    let Shape {
+        u_w_w,
+        u_w,
+        u_z_z,
+        u_u_u,
+        u_u,
+        w_w,
+        w_z,
+        z_z,
+        u_u_w,
+        w_w_w,
+    } = shape;
+    for pair in [u_w_w, u_w, u_z_z, u_u_u, u_u, w_w, w_z, z_z] {
+        visit("the field terms", pair);
+    }
+    for number in [u_u_w, w_w_w] {
+        visit("the field terms", slice::from_mut(number));
+    }
+    visit("the lateral rows", lateral);
+}
+
+/// Puts back the matrices that are not in the blob of a field model: PM^-1 and the capacitive
+/// plane matrix are the constants over the scales of the codes, PM is the inverse of PM^-1. Of
+/// unsound constants they are unsound as well, and refused as such.
+pub(crate) fn restore(set: &mut ParameterSet) {
+    if let Probes::Field(_) = set.probes {
+        let c = &set.constants;
+        set.plane_inverse = over(&c.planar_per_code, set.hall.m_per_code);
+        set.plane = inverse_and_determinant(&set.plane_inverse).0;
+        set.capacitive.vertical_per_m = over(&c.vertical_per_code, set.capacitive.m_per_code);
+    }
+}
+
+fn over(rows: &[[f32; 3]; 3], divisor: f32) -> [[f32; 3]; 3] {
+    rows.map(|row| row.map(|x| x / divisor))
 }
 
 /// Writes the payload of a set and gives its length; `None` if `room` is too small.
@@ -178,6 +246,7 @@ pub(crate) fn read(payload: &[u8]) -> Option<ParameterSet> {
             ModelKind::M12 | ModelKind::M15 | ModelKind::M30 | ModelKind::M31 => {
                 Probes::Linear([Sensitivity::default(); 3])
             }
+            ModelKind::Field => Probes::Field([FieldProbe::default(); 3]),
         },
         constants: DecoderConstants::default(),
     };
@@ -195,6 +264,7 @@ pub(crate) fn read(payload: &[u8]) -> Option<ParameterSet> {
     });
     let (windows, rest) = postcard::take_from_bytes::<Windows>(rest).ok()?;
     (set.constants.hall_window, set.constants.capacitive_window) = windows;
+    restore(&mut set);
     (complete && rest.is_empty()).then_some(set)
 }
 

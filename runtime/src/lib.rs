@@ -66,7 +66,7 @@ pub use blob::BlobError;
 pub use calibration::Calibration;
 pub use decoder::{AnyDecoder, Decode, Decoder, Reading};
 pub use frame::RawFrame;
-pub use model::{LinearModel, Model, ModelKind};
+pub use model::{FieldModel, LinearModel, Model, ModelKind};
 pub use parameters::ParameterSet;
 pub use pose::{PlanarPose, Pose, VerticalPose};
 pub use servo::{OnInvalid, Servo};

@@ -1,30 +1,25 @@
-//! What a measurement model is, and the models of the paper.
+//! What a measurement model is, the models of the paper and the field model.
 //!
 //! A [`Model`] is a type: what it knows of a probe, and the planar pose of one tick. The
-//! paper's models are one of them, [`LinearModel`]; another one is another type, which a
-//! [`Decoder`](crate::Decoder) runs without a choice in the tick. Two enums name every model
-//! that a parameter set can hold: [`ModelKind`] says what was fitted, [`Probes`] holds what
-//! was found.
+//! paper's models are one of them, [`LinearModel`]; what a magnet's field does beside the
+//! centre line is another, [`FieldModel`]. A [`Decoder`](crate::Decoder) runs either without
+//! a choice in the tick. Two enums name every model that a parameter set can hold:
+//! [`ModelKind`] says what was fitted, [`Probes`] holds what was found.
 //!
-//! With s the displacement read by a probe (designed scale), v = (Z, Rx, Ry) the vertical
-//! pose and delta the zero deviation of a movement:
-//!
-//! | model | pose (X, Y, Rz) | equation |
-//! |---|---|---|
-//! | (12) | PM^-1 s | 12 |
-//! | (15) | PM^-1 (s / eta) | 15 |
-//! | (30) | PM^-1 ((s - delta) / eta) | 30 |
-//! | (31) | PM^-1 (s / phi(v) - delta / phi(0)), phi(v) = eta + a Z + b Rx + c Ry | 31, 33 |
-//!
-//! Each is a special case of (31): a = b = c = 0 gives (30), and delta = 0 then gives (15),
-//! and eta = 1 gives (12). So one function decodes them all, and in service, where delta is
-//! zero or what a re-zero measured, the models differ only in their constants.
-//!
-//! Sums are written out in a fixed order: [`dot`], [`sensitivity_at`] and [`planar_pose`]
-//! are the arithmetic of the target, to the bit.
+//! Sums are written out in a fixed order: they are the arithmetic of the target, to the bit.
+
+mod field;
+mod linear;
+
+pub use field::{FieldModel, FieldProbe, Shape};
+pub use linear::{
+    LinearModel, Sensitivity, planar_pose, probe_displacement_m, sensitivity_at, zero_deviation_m,
+    zero_pose,
+};
 
 use crate::pose::{PlanarPose, VerticalPose};
 use crate::real::{Number, Real};
+use core::fmt;
 use core::fmt::Debug;
 use serde::{Deserialize, Serialize};
 
@@ -62,17 +57,19 @@ pub enum ModelKind {
     M30,
     /// Model (31): as (30), with a sensitivity that follows the vertical pose.
     M31,
+    /// The field model: as (31), with what a magnet's field does beside its centre line.
+    Field,
 }
 
-impl ModelKind {
-    /// The number of the model's equation in the paper.
-    pub const fn equation(self) -> u8 {
-        match self {
-            Self::M12 => 12,
-            Self::M15 => 15,
-            Self::M30 => 30,
-            Self::M31 => 31,
-        }
+impl fmt::Display for ModelKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::M12 => "Model (12)",
+            Self::M15 => "Model (15)",
+            Self::M30 => "Model (30)",
+            Self::M31 => "Model (31)",
+            Self::Field => "the field model",
+        })
     }
 }
 
@@ -81,6 +78,8 @@ impl ModelKind {
 pub enum Probes<T> {
     /// Models (12), (15), (30) and (31): see [`LinearModel`].
     Linear([Sensitivity<T>; 3]),
+    /// The field model: see [`FieldModel`].
+    Field([FieldProbe<T>; 3]),
 }
 
 impl<T: Real> Probes<T> {
@@ -97,6 +96,17 @@ impl<T: Real> Probes<T> {
             Self::Linear(probes) => {
                 LinearModel::planar_pose(probes, pose_rows, signal, vertical, zero)
             }
+            Self::Field(probes) => {
+                FieldModel::planar_pose(probes, pose_rows, signal, vertical, zero)
+            }
+        }
+    }
+
+    /// eta, a, b, c of the probes A, B, C.
+    pub const fn sensitivities(&self) -> [&Sensitivity<T>; 3] {
+        match self {
+            Self::Linear([a, b, c]) => [a, b, c],
+            Self::Field([a, b, c]) => [&a.sensitivity, &b.sensitivity, &c.sensitivity],
         }
     }
 
@@ -105,71 +115,7 @@ impl<T: Real> Probes<T> {
     pub fn rounded<U: Real>(&self) -> Probes<U> {
         match self {
             Self::Linear(probes) => Probes::Linear(probes.map(|probe| probe.rounded())),
-        }
-    }
-}
-
-/// Models (12), (15), (30) and (31): phi is linear in the vertical pose (equation 33), and
-/// the pose is linear in signal / phi.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LinearModel {}
-
-impl Model for LinearModel {
-    type Probe<T: Real> = Sensitivity<T>;
-
-    #[inline(always)]
-    fn planar_pose<T: Real>(
-        probes: &[Sensitivity<T>; 3],
-        pose_rows: &[[T; 3]; 3],
-        signal: [T; 3],
-        vertical: &VerticalPose<T>,
-        zero: &PlanarPose<T>,
-    ) -> ([T; 3], PlanarPose<T>) {
-        let phi = [
-            sensitivity_at(&probes[0], vertical),
-            sensitivity_at(&probes[1], vertical),
-            sensitivity_at(&probes[2], vertical),
-        ];
-        (phi, planar_pose(pose_rows, signal, phi, zero))
-    }
-}
-
-/// Sensitivity of one probe and its change with the vertical pose (equation 33).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(C)]
-pub struct Sensitivity<T> {
-    /// eta: sensitivity at the zero of the vertical pose, relative to the designed one.
-    pub eta: T,
-    /// a: its change per m of Z, 1/m.
-    pub per_z_m: T,
-    /// b: its change per rad of Rx, 1/rad.
-    pub per_rx_rad: T,
-    /// c: its change per rad of Ry, 1/rad.
-    pub per_ry_rad: T,
-}
-
-impl<T: Number> Sensitivity<T> {
-    /// A sensitivity that does not depend on the vertical pose (Models (15), (30)).
-    pub const fn constant(eta: T) -> Self {
-        Self {
-            eta,
-            per_z_m: T::ZERO,
-            per_rx_rad: T::ZERO,
-            per_ry_rad: T::ZERO,
-        }
-    }
-}
-
-impl<T: Real> Sensitivity<T> {
-    /// Each coefficient as another type of number, rounded to the nearest.
-    #[must_use]
-    pub fn rounded<U: Real>(&self) -> Sensitivity<U> {
-        let round = |x: T| U::from_f64(x.to_f64());
-        Sensitivity {
-            eta: round(self.eta),
-            per_z_m: round(self.per_z_m),
-            per_rx_rad: round(self.per_rx_rad),
-            per_ry_rad: round(self.per_ry_rad),
+            Self::Field(probes) => Probes::Field(probes.map(|probe| probe.rounded())),
         }
     }
 }
@@ -185,137 +131,4 @@ pub fn dot<T: Number>(row: &[T; 3], column: [T; 3]) -> T {
 #[inline(always)]
 pub fn dot_less<T: Number>(row: &[T; 3], column: [T; 3], offset: T) -> T {
     ((row[0] * column[0] - offset) + row[1] * column[1]) + row[2] * column[2]
-}
-
-/// phi: sensitivity of one probe at a vertical pose (equation 33).
-#[inline(always)]
-pub fn sensitivity_at<T: Number>(probe: &Sensitivity<T>, vertical: &VerticalPose<T>) -> T {
-    ((probe.eta + probe.per_z_m * vertical.z_m) + probe.per_rx_rad * vertical.rx_rad)
-        + probe.per_ry_rad * vertical.ry_rad
-}
-
-/// The planar pose of equations 12, 15, 30 and 31: `pose_rows` (rows X, Y, Rz of PM^-1, with
-/// the scale of `signal` in them) times signal / phi, less `zero`.
-///
-/// `zero` is the zero deviation as a pose, PM^-1 (delta / eta); see [`zero_pose`].
-#[inline(always)]
-pub fn planar_pose<T: Number>(
-    pose_rows: &[[T; 3]; 3],
-    signal: [T; 3],
-    phi: [T; 3],
-    zero: &PlanarPose<T>,
-) -> PlanarPose<T> {
-    let ratio = [signal[0] / phi[0], signal[1] / phi[1], signal[2] / phi[2]];
-    PlanarPose {
-        x_m: dot_less(&pose_rows[0], ratio, zero.x_m),
-        y_m: dot_less(&pose_rows[1], ratio, zero.y_m),
-        rz_rad: dot_less(&pose_rows[2], ratio, zero.rz_rad),
-    }
-}
-
-/// The zero deviation `delta_m` of the probes as a pose: PM^-1 (delta / eta), the last
-/// term of equation 31.
-pub fn zero_pose<T: Number>(
-    plane_inverse_rows: &[[T; 3]; 3],
-    eta: [T; 3],
-    delta_m: [T; 3],
-) -> PlanarPose<T> {
-    planar_pose(plane_inverse_rows, delta_m, eta, &PlanarPose::ZERO)
-}
-
-/// The zero deviation delta = eta * (PM o), in m at each probe, of a pose offset o:
-/// the inverse of [`zero_pose`].
-pub fn zero_deviation_m<T: Number>(
-    plane_rows: &[[T; 3]; 3],
-    eta: [T; 3],
-    offset: &PlanarPose<T>,
-) -> [T; 3] {
-    let offset = offset.to_array();
-    [
-        eta[0] * dot(&plane_rows[0], offset),
-        eta[1] * dot(&plane_rows[1], offset),
-        eta[2] * dot(&plane_rows[2], offset),
-    ]
-}
-
-/// The forward model: the displacement that each probe reads at a pose, in m,
-/// s = phi(v) (PM q + delta / eta). The inverse of Model (31).
-pub fn probe_displacement_m<T: Number>(
-    plane_rows: &[[T; 3]; 3],
-    sensitivity: &[Sensitivity<T>; 3],
-    planar: &PlanarPose<T>,
-    vertical: &VerticalPose<T>,
-    delta_m: [T; 3],
-) -> [T; 3] {
-    let pose = planar.to_array();
-    let read = |k: usize| {
-        let probe = &sensitivity[k];
-        sensitivity_at(probe, vertical) * (dot(&plane_rows[k], pose) + delta_m[k] / probe.eta)
-    };
-    [read(0), read(1), read(2)]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::{ProbeGeometry, inverse_rows};
-    use proptest::prelude::*;
-
-    fn probe(eta: f64, a: f64, b: f64, c: f64) -> Sensitivity<f64> {
-        Sensitivity {
-            eta,
-            per_z_m: a,
-            per_rx_rad: b,
-            per_ry_rad: c,
-        }
-    }
-
-    proptest! {
-        /// Equation 31 undoes the forward model at any pose, sensitivity and zero deviation.
-        #[test]
-        fn decoding_undoes_the_forward_model(
-            q in prop::array::uniform3(-1e-3..1e-3f64),
-            v in prop::array::uniform3(-5e-4..5e-4f64),
-            delta in prop::array::uniform3(-1e-5..1e-5f64),
-            t in prop::array::uniform3(-0.14..0.14f64),
-        ) {
-            let geometry = ProbeGeometry { lever_arm_m: [0.19, -0.21, -0.34], misalignment_rad: t };
-            let plane = geometry.plane_rows();
-            let inverse = inverse_rows(&plane).expect("sound");
-            let probes = [probe(0.87, -190.0, -70.0, 15.0), probe(0.70, -160.0, -57.0, -55.0), probe(0.86, -180.0, -63.0, 13.0)];
-            let vertical = VerticalPose::from_array(v);
-            let s = probe_displacement_m(&plane, &probes, &PlanarPose::from_array(q), &vertical, delta);
-            let phi = [0, 1, 2].map(|k| sensitivity_at(&probes[k], &vertical));
-            let zero = zero_pose(&inverse, probes.map(|p| p.eta), delta);
-            let back = planar_pose(&inverse, s, phi, &zero).to_array();
-            for (have, want) in back.iter().zip(q) { prop_assert!((have - want).abs() < 1e-16); }
-            let deviation = zero_deviation_m(&plane, probes.map(|p| p.eta), &zero);
-            for (have, want) in deviation.iter().zip(delta) { prop_assert!((have - want).abs() < 1e-18); }
-        }
-    }
-
-    /// Worked by hand: aligned probes, arms 0.2, -0.2, -0.4 m, eta 1/2, a Z = 1/2 on probe A.
-    #[test]
-    fn model_31_gives_a_pose_worked_by_hand() {
-        let plane = [[0.0, 1.0, 0.2], [0.0, 1.0, -0.2], [1.0, 0.0, -0.4]];
-        let inverse = inverse_rows(&plane).expect("sound");
-        let vertical = VerticalPose {
-            z_m: 2.5e-4,
-            rx_rad: 0.0,
-            ry_rad: 0.0,
-        };
-        let a = sensitivity_at(&probe(0.5, 2000.0, 7.0, 9.0), &vertical);
-        assert_eq!(a, 1.0);
-        // A reads 40 um at phi 1, B 10 um at phi 1/2 (20 um), C 5 um at phi 1/2 (10 um):
-        // Rz = (40 - 20) um / 0.4 m = 50 urad, Y = 30 um, X = 10 um + 0.4 m * 50 urad = 30 um.
-        let pose = planar_pose::<f64>(
-            &inverse,
-            [40e-6, 10e-6, 5e-6],
-            [1.0, 0.5, 0.5],
-            &PlanarPose::ZERO,
-        );
-        assert!((pose.x_m - 30e-6).abs() < 1e-18);
-        assert!((pose.y_m - 30e-6).abs() < 1e-18);
-        assert!((pose.rz_rad - 50e-6).abs() < 1e-18);
-    }
 }

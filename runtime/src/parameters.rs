@@ -11,7 +11,8 @@ pub type Text = String<32>;
 /// Everything that the decoder needs, and what `inspect` and a later refit need.
 ///
 /// The order of the fields is that of the blob (see [`crate::blob`]), where the code windows
-/// come last and the counts before the numbers.
+/// come last and the counts before the numbers. With the field model, PM, PM^-1 and the
+/// capacitive plane matrix are not in the blob: they are those that the constants give.
 ///
 /// ```
 /// use runtime::{ParameterSet, PlanarPose, RawFrame};
@@ -162,6 +163,7 @@ impl ParameterSet {
     pub const fn decoder(&self) -> AnyDecoder {
         match self.probes {
             Probes::Linear(probes) => AnyDecoder::Linear(Decoder::new(self.constants, probes)),
+            Probes::Field(probes) => AnyDecoder::Field(Decoder::new(self.constants, probes)),
         }
     }
 }

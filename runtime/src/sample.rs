@@ -2,8 +2,8 @@
 
 use crate::calibration::{Calibration, Origin};
 use crate::frame::CodeWindow;
-use crate::geometry::ProbeGeometry;
-use crate::model::{ModelKind, Probes, Sensitivity};
+use crate::geometry::{ProbeGeometry, SensingAxes, inverse_rows};
+use crate::model::{FieldProbe, ModelKind, Probes, Sensitivity, Shape, dot};
 use crate::parameters::{FitRecord, ParameterSet, Text};
 
 /// Codes strictly between the rails of a 16-bit converter.
@@ -65,6 +65,79 @@ pub(crate) fn parameters() -> ParameterSet {
 
 /// The stage's coefficients, to be changed.
 pub(crate) fn sensitivities(set: &mut ParameterSet) -> &mut [Sensitivity<f32>; 3] {
-    let Probes::Linear(probes) = &mut set.probes;
-    probes
+    match &mut set.probes {
+        Probes::Linear(probes) => probes,
+        Probes::Field(_) => panic!("a set of the field model"),
+    }
+}
+
+/// The same stage by the field model: each term a third of the deviation of its prior, with
+/// signs that change, and the probes where their sensitivities put them.
+pub(crate) fn field_calibration() -> Calibration {
+    let linear = calibration();
+    let plane = linear.geometry.plane_rows();
+    let inverse = inverse_rows(&plane).expect("a sound stage");
+    let across = SensingAxes::at(linear.geometry.misalignment_rad).across();
+    let probe = |k: usize, sign: f64| {
+        let sensitivity = *linear.probes.sensitivities()[k];
+        let (a, b, c) = (
+            sensitivity.per_z_m,
+            sensitivity.per_rx_rad,
+            sensitivity.per_ry_rad,
+        );
+        let [x, y] = across[k];
+        let row = [x, y, y * (-c / a) - x * (b / a)];
+        let m = linear.hall_m_per_code;
+        let column = |j: usize| inverse.map(|row| row[j]);
+        FieldProbe {
+            sensitivity,
+            carry: [0.06 * sign / m, -0.022 * sign / m, 0.013 * sign / m],
+            shape: shape(sign / 3.0, m * 1e3, sensitivity.eta),
+            lateral: [0, 1, 2].map(|j| dot(&row, column(j))),
+        }
+    };
+    Calibration {
+        model: ModelKind::Field,
+        probes: Probes::Field([probe(0, 1.0), probe(1, -1.0), probe(2, 1.0)]),
+        ..linear
+    }
+}
+
+/// The deviations of the priors in mm, times `part` and with signs that change, in codes and
+/// for zr.
+fn shape(part: f64, mm: f64, eta: f64) -> Shape<f64> {
+    let square = [part * mm, -part * mm / eta];
+    let cube = [part * mm * mm, -part * mm * mm / eta];
+    let pair = |[first, second]: [f64; 2], unit: [f64; 2]| [first * unit[0], second * unit[1]];
+    let height = 1.0 / (eta * eta);
+    Shape {
+        u_w_w: pair([0.042, 0.018], cube),
+        u_w: pair([0.05, 0.025], square),
+        u_z_z: pair([0.47, 0.92], [part * height, -part * height / eta]),
+        u_u_u: pair([0.0069, 0.054], cube),
+        u_u: pair([0.009, 0.016], square),
+        w_w: pair([0.022, 0.021], square),
+        w_z: pair([0.094, 0.11], [part / eta, -part * height]),
+        z_z: pair(
+            [0.26, 0.53],
+            [part * height / mm, -part * height / (eta * mm)],
+        ),
+        u_u_w: 0.0014 * part * mm * mm,
+        w_w_w: -0.0026 * part * mm * mm,
+    }
+}
+
+/// The parameter set of [`field_calibration`].
+pub(crate) fn field_parameters() -> ParameterSet {
+    field_calibration()
+        .prepare(&origin())
+        .expect("a sound stage")
+}
+
+/// The coefficients of [`field_parameters`], to be changed.
+pub(crate) fn field_probes(set: &mut ParameterSet) -> &mut [FieldProbe<f32>; 3] {
+    match &mut set.probes {
+        Probes::Field(probes) => probes,
+        Probes::Linear(_) => panic!("a set of Model (31)"),
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::geometry::SensingAxes;
 use crate::layout;
-use crate::model::{Probes, Sensitivity, dot};
+use crate::model::{FieldProbe, Probes, Sensitivity, dot};
 use crate::parameters::{ParameterError, ParameterSet};
 
 /// Largest element of PM PM^-1 - I that the check accepts: 100 times the rounding of `f32`
@@ -16,7 +16,7 @@ const PRODUCT_TOLERANCE: f32 = 5e-7;
 impl ParameterSet {
     /// Checks that every number is finite, PM^-1 inverts PM, each precomputed term follows
     /// from its parts, scales and limits are above zero, code windows are sound and no phi
-    /// comes near zero within the calibrated range.
+    /// comes near zero within the calibrated range. Lateral rows must be across the sensing axes.
     ///
     /// # Errors
     /// The first of these that does not hold.
@@ -31,8 +31,7 @@ impl ParameterSet {
         self.check_inverse()?;
         self.check_products()?;
         let c = &self.constants;
-        let Probes::Linear(probes) = &self.probes;
-        for (probe, s) in (0u8..).zip(probes) {
+        for (probe, s) in (0u8..).zip(self.probes.sensitivities()) {
             if smallest_sensitivity(s, &c.calibrated_vertical) < c.sensitivity_min {
                 return Err(ParameterError::PoleInRange { probe });
             }
@@ -112,7 +111,27 @@ impl ParameterSet {
             &self.geometry.misalignment_rad,
         )?;
         check_near("PM", &arms, &self.geometry.lever_arm_m)?;
-        check_near("PM", &lengths, &[1.0; 3])
+        check_near("PM", &lengths, &[1.0; 3])?;
+        match &self.probes {
+            Probes::Linear(_) => Ok(()),
+            Probes::Field(probes) => self.check_lateral(probes, &axes),
+        }
+    }
+
+    /// The lateral rows of a field model, times PM, begin with the unit vectors across the
+    /// sensing axes; the rest is where the probes stand.
+    fn check_lateral(
+        &self,
+        probes: &[FieldProbe<f32>; 3],
+        axes: &SensingAxes<f32>,
+    ) -> Result<(), ParameterError> {
+        for axis in 0..2 {
+            let column = self.plane.map(|row| row[axis]);
+            let made = probes.each_ref().map(|probe| dot(&probe.lateral, column));
+            let across = axes.across().map(|pair| pair[axis]);
+            check_near("the lateral rows", &made, &across)?;
+        }
+        Ok(())
     }
 }
 
@@ -301,5 +320,48 @@ mod tests {
             refused(|set| set.constants.calibrated_vertical[0] = 1.0),
             ParameterError::PoleInRange { probe: 0 }
         );
+    }
+    #[test]
+    fn a_field_model_is_refused_for_what_is_wrong_with_it() {
+        let refused = |change: fn(&mut ParameterSet)| {
+            let mut set = sample::field_parameters();
+            assert_eq!(set.check(), Ok(()));
+            change(&mut set);
+            set.check().expect_err("an unusable set")
+        };
+        let group = "the field terms";
+        assert_eq!(
+            refused(|set| sample::field_probes(set)[1].carry[2] = f32::NAN),
+            ParameterError::NotFinite { group }
+        );
+        assert_eq!(
+            refused(|set| sample::field_probes(set)[2].shape.w_w_w = f32::INFINITY),
+            ParameterError::NotFinite { group }
+        );
+        let group = "the lateral rows";
+        assert_eq!(
+            refused(|set| sample::field_probes(set)[0].lateral[1] = f32::NAN),
+            ParameterError::NotFinite { group }
+        );
+        assert_eq!(
+            refused(|set| sample::field_probes(set)[0].sensitivity.per_z_m = 5000.0),
+            ParameterError::PoleInRange { probe: 0 }
+        );
+        let term = "the lateral rows";
+        for change in [
+            (|set| sample::field_probes(set)[2].lateral[1] += 1e-3) as fn(&mut ParameterSet),
+            |set| sample::field_probes(set).swap(0, 2),
+        ] {
+            assert_eq!(refused(change), ParameterError::Inconsistent { term });
+        }
+        let term = "PM";
+        assert_eq!(
+            refused(|set| set.geometry.lever_arm_m[1] += 1e-4),
+            ParameterError::Inconsistent { term }
+        );
+        assert!(matches!(
+            refused(|set| set.plane = [[f32::NAN; 3]; 3]),
+            ParameterError::NotTheInverse { .. }
+        ));
     }
 }

@@ -8,7 +8,7 @@
 
 static HallDecoder decoder;
 static HallServo servo;
-static uint8_t blob[512];
+static uint8_t blob[656];
 static uint32_t frames[256][7];
 static HallReading readings[256];
 

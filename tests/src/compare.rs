@@ -1,8 +1,8 @@
 //! The host's words of a job, and where the target's differ.
 
-use crate::job::{self, ANSWER_WORDS, FRAME_WORDS, HEAD_WORDS, Head, PARAMETER_WORDS};
+use crate::job::{self, ANSWER_WORDS, Bare, FRAME_WORDS, HEAD_WORDS, Head};
 use crate::motion::Section;
-use runtime::{BlobError, Decode, ParameterSet, RawFrame, Reading, Servo};
+use runtime::{BlobError, Decode, FieldModel, LinearModel, ParameterSet, RawFrame, Reading, Servo};
 
 /// Why a job or its answer is refused.
 #[derive(Debug, thiserror::Error)]
@@ -154,14 +154,16 @@ fn run(
     index: usize,
     mut take: impl FnMut(usize, &RawFrame, Reading),
 ) -> Result<(), JobError> {
-    let frames = section.frames.iter().enumerate();
-    if section.head.source == job::WORDS {
-        let words = words::<PARAMETER_WORDS>(&section.parameters);
-        let (decoder, zero) = job::from_words(&words.unwrap_or([0; PARAMETER_WORDS]));
-        for (tick, frame) in frames {
-            take(tick, frame, decoder.decode(frame, &zero));
+    match section.head.source {
+        job::WORDS => {
+            run_bare::<LinearModel>(section, take);
+            return Ok(());
         }
-        return Ok(());
+        job::FIELD_WORDS => {
+            run_bare::<FieldModel>(section, take);
+            return Ok(());
+        }
+        _ => {}
     }
     let set = ParameterSet::from_flash(&section.parameters).map_err(|source| JobError::Blob {
         section: index,
@@ -169,10 +171,20 @@ fn run(
     })?;
     let decoder = set.decoder();
     let mut servo = Servo::new(&*decoder, section.head.on_invalid());
-    for (tick, frame) in frames {
+    for (tick, frame) in section.frames.iter().enumerate() {
         take(tick, frame, servo.tick(frame));
     }
     Ok(())
+}
+
+/// Ticks by a decoder of bare words.
+fn run_bare<M: Bare>(section: &Section, mut take: impl FnMut(usize, &RawFrame, Reading)) {
+    let (parameters, _) = section.parameters.as_chunks();
+    let words: Vec<u32> = parameters.iter().copied().map(u32::from_le_bytes).collect();
+    let (decoder, zero) = job::from_words::<M>(&words);
+    for (tick, frame) in section.frames.iter().enumerate() {
+        take(tick, frame, decoder.decode(frame, &zero));
+    }
 }
 
 impl Comparison {
@@ -275,14 +287,21 @@ mod tests {
 
     const DECODER: Decoder<LinearModel> = Decoder::new(CONSTANTS, [PROBE; 3]);
 
+    fn field_decoder(rng: &mut ChaCha8Rng) -> Decoder<FieldModel> {
+        let lateral = [[0.1, -0.2, 0.9], [0.0, 0.1, -1.0], [1.0, 0.3, 0.2]];
+        let probes = lateral.map(|lateral| motion::field_probe(rng, &PROBE, lateral));
+        Decoder::new(CONSTANTS, probes)
+    }
+
     /// A job of bare words, and what a target without fault answers.
     fn job() -> (Vec<u8>, Vec<u8>) {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let sound = job::to_words(&DECODER, &PlanarPose::ZERO);
-        let odd = motion::odd_parameters(&mut rng, &DECODER);
+        let field = field_decoder(&mut rng);
+        let frames = motion::uniform_frames(&mut rng, 300);
+        let wild = motion::wild_frames(&mut rng, 50);
         let sections = [
-            motion::of_words(sound, motion::uniform_frames(&mut rng, 300)),
-            motion::of_words(odd, motion::wild_frames(&mut rng, 50)),
+            motion::of_words(&DECODER, frames),
+            motion::of_words(&motion::odd(&mut rng, &field), wild),
         ];
         let mut words = Vec::new();
         for (index, section) in sections.iter().enumerate() {
@@ -301,8 +320,14 @@ mod tests {
             y_m: -2e-6,
             rz_rad: 3e-6,
         };
-        let (decoder, back) = job::from_words(&job::to_words(&DECODER, &zero));
-        assert_eq!((decoder, back), (DECODER, zero));
+        let mut words = Vec::new();
+        job::to_words(&DECODER, &zero, &mut |word| words.push(word));
+        assert_eq!(job::from_words(&words), (DECODER, zero));
+        let field = field_decoder(&mut ChaCha8Rng::seed_from_u64(4));
+        words.clear();
+        job::to_words(&field, &zero, &mut |word| words.push(word));
+        assert_eq!(words.len(), job::PARAMETER_WORDS);
+        assert_eq!(job::from_words(&words), (field, zero));
     }
 
     #[test]

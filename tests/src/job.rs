@@ -5,8 +5,8 @@
 //!
 //! | words | what |
 //! |---|---|
-//! | 4 | source ([`WORDS`] or [`BLOB`]), frames, hold in ticks, bytes of the blob |
-//! | 44, or the blob | the decoder's constants and a zero deviation as bare words, or a blob padded with 0xFF to whole words |
+//! | 4 | source ([`WORDS`], [`FIELD_WORDS`] or [`BLOB`]), frames, hold in ticks, bytes of the blob |
+//! | 44, 116 or the blob | the decoder's constants, a zero deviation and the probes' coefficients as bare words, or a blob padded with 0xFF to whole words |
 //! | 7 a frame | Hall codes A, B, C, capacitive codes 1, 2, 3, sequence number |
 //!
 //! Bare words go straight into a decoder, unchecked: they may be anything. A blob is loaded
@@ -15,17 +15,23 @@
 
 use runtime::decoder::DecoderConstants;
 use runtime::frame::CodeWindow;
-use runtime::model::Sensitivity;
-use runtime::{Decode, Decoder, LinearModel, OnInvalid, PlanarPose, RawFrame, Reading};
+use runtime::model::{FieldProbe, Sensitivity, Shape};
+use runtime::{
+    Decode, Decoder, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, RawFrame, Reading,
+};
 
-/// Source: constants and a zero deviation as bare words.
+/// Source: a decoder of Model (31) and a zero deviation as bare words.
 pub const WORDS: u32 = 1;
 /// Source: a parameter blob.
 pub const BLOB: u32 = 2;
+/// Source: as [`WORDS`], of the field model.
+pub const FIELD_WORDS: u32 = 3;
 /// Words of a section's head.
 pub const HEAD_WORDS: usize = 4;
-/// Words of the constants and of the zero deviation.
-pub const PARAMETER_WORDS: usize = 44;
+/// Bare words of constants, zero deviation and coefficients in the field model.
+pub const PARAMETER_WORDS: usize = 116;
+/// The same in Model (31).
+const LINEAR_PARAMETER_WORDS: usize = 44;
 /// Words of a frame.
 pub const FRAME_WORDS: usize = 7;
 /// Words of an answer: X, Y, Rz, Z, Rx, Ry, status.
@@ -36,7 +42,7 @@ pub const BLOB_WORDS: usize = runtime::blob::MAX_BYTES / 4;
 /// The head of a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Head {
-    /// [`WORDS`] or [`BLOB`].
+    /// [`WORDS`], [`FIELD_WORDS`] or [`BLOB`].
     pub source: u32,
     /// Frames that follow the parameters.
     pub frames: u32,
@@ -65,7 +71,8 @@ impl Head {
     /// Words of the parameters, or `None` for a head that no job has.
     pub fn parameter_words(&self) -> Option<usize> {
         match self.source {
-            WORDS => Some(PARAMETER_WORDS),
+            WORDS => Some(LINEAR_PARAMETER_WORDS),
+            FIELD_WORDS => Some(PARAMETER_WORDS),
             BLOB => {
                 let words = usize::try_from(self.blob_bytes).ok()?.div_ceil(4);
                 (words <= BLOB_WORDS).then_some(words)
@@ -84,75 +91,120 @@ impl Head {
     }
 }
 
-/// A decoder and a zero deviation of bare words, unchecked.
-pub fn from_words(words: &[u32; PARAMETER_WORDS]) -> (Decoder<LinearModel>, PlanarPose<f32>) {
+/// A model whose decoder goes through a job file as bare words.
+pub trait Bare: Model {
+    /// Its source: [`WORDS`] or [`FIELD_WORDS`].
+    const SOURCE: u32;
+    /// A probe's coefficients, each taken from `next`.
+    fn probe(next: &mut impl FnMut() -> f32) -> Self::Probe<f32>;
+    /// Gives each of a probe's coefficients to `put`, in the same order.
+    fn put(probe: &Self::Probe<f32>, put: &mut impl FnMut(f32));
+}
+
+impl Bare for LinearModel {
+    const SOURCE: u32 = WORDS;
+
+    fn probe(next: &mut impl FnMut() -> f32) -> Sensitivity<f32> {
+        Sensitivity {
+            eta: next(),
+            per_z_m: next(),
+            per_rx_rad: next(),
+            per_ry_rad: next(),
+        }
+    }
+
+    fn put(probe: &Sensitivity<f32>, put: &mut impl FnMut(f32)) {
+        put(probe.eta);
+        put(probe.per_z_m);
+        put(probe.per_rx_rad);
+        put(probe.per_ry_rad);
+    }
+}
+
+impl Bare for FieldModel {
+    const SOURCE: u32 = FIELD_WORDS;
+
+    fn probe(next: &mut impl FnMut() -> f32) -> FieldProbe<f32> {
+        FieldProbe {
+            sensitivity: LinearModel::probe(next),
+            carry: [next(), next(), next()],
+            shape: Shape {
+                u_w_w: [next(), next()],
+                u_w: [next(), next()],
+                u_z_z: [next(), next()],
+                u_u_u: [next(), next()],
+                u_u: [next(), next()],
+                w_w: [next(), next()],
+                w_z: [next(), next()],
+                z_z: [next(), next()],
+                u_u_w: next(),
+                w_w_w: next(),
+            },
+            lateral: [next(), next(), next()],
+        }
+    }
+
+    fn put(probe: &FieldProbe<f32>, put: &mut impl FnMut(f32)) {
+        LinearModel::put(&probe.sensitivity, put);
+        let p = &probe.shape;
+        let pairs = [p.u_w_w, p.u_w, p.u_z_z, p.u_u_u, p.u_u, p.w_w, p.w_z, p.z_z];
+        let numbers = (probe.carry.iter())
+            .chain(pairs.as_flattened())
+            .chain([&p.u_u_w, &p.w_w_w])
+            .chain(&probe.lateral);
+        for number in numbers {
+            put(*number);
+        }
+    }
+}
+
+/// A decoder and a zero deviation of bare words, unchecked; words that are missing are 0.
+pub fn from_words<M: Bare>(words: &[u32]) -> (Decoder<M>, PlanarPose<f32>) {
     let mut rest = words.iter().copied();
     let mut next = || rest.next().unwrap_or_default();
-    let mut three = || {
-        [
-            f32::from_bits(next()),
-            f32::from_bits(next()),
-            f32::from_bits(next()),
-        ]
-    };
-    let vertical_per_code = [three(), three(), three()];
-    let [[a0, a1, a2], [a3, b0, b1], [b2, b3, c0], [c1, c2, c3]] =
-        [three(), three(), three(), three()];
-    let sensitivity = |eta, per_z_m, per_rx_rad, per_ry_rad| Sensitivity {
-        eta,
-        per_z_m,
-        per_rx_rad,
-        per_ry_rad,
-    };
-    let planar_per_code = [three(), three(), three()];
-    let calibrated_vertical = three();
-    let calibrated_planar = three();
-    let zero = PlanarPose::from_array(three());
     let mut window = || CodeWindow {
         low: next() as i32,
         high: next() as i32,
     };
+    let (hall_window, capacitive_window) = (window(), window());
+    let mut number = || f32::from_bits(next());
+    let sensitivity_min = number();
+    let mut three = || [number(), number(), number()];
     let constants = DecoderConstants {
-        vertical_per_code,
-        planar_per_code,
-        calibrated_vertical,
-        calibrated_planar,
-        hall_window: window(),
-        capacitive_window: window(),
-        sensitivity_min: f32::from_bits(next()),
+        vertical_per_code: [three(), three(), three()],
+        planar_per_code: [three(), three(), three()],
+        calibrated_vertical: three(),
+        calibrated_planar: three(),
+        sensitivity_min,
+        hall_window,
+        capacitive_window,
     };
-    let probes = [
-        sensitivity(a0, a1, a2, a3),
-        sensitivity(b0, b1, b2, b3),
-        sensitivity(c0, c1, c2, c3),
-    ];
-    (Decoder::new(constants, probes), zero)
+    let zero = PlanarPose::from_array(three());
+    let mut probe = || M::probe(&mut number);
+    (Decoder::new(constants, [probe(), probe(), probe()]), zero)
 }
 
-/// The words of a decoder and a zero deviation, as [`from_words`] reads them.
-pub fn to_words(decoder: &Decoder<LinearModel>, zero: &PlanarPose<f32>) -> [u32; PARAMETER_WORDS] {
+/// Gives `put` the words of a decoder and a zero deviation, as [`from_words`] reads them.
+pub fn to_words<M: Bare>(decoder: &Decoder<M>, zero: &PlanarPose<f32>, put: &mut impl FnMut(u32)) {
     let c = decoder.constants();
     let [hall, gaps] = [&c.hall_window, &c.capacitive_window];
-    let windows = [hall.low, hall.high, gaps.low, gaps.high].map(|code| code as u32);
-    let probes = decoder
-        .probes()
-        .map(|s| [s.eta, s.per_z_m, s.per_rx_rad, s.per_ry_rad]);
+    for code in [hall.low, hall.high, gaps.low, gaps.high] {
+        put(code as u32);
+    }
+    let mut put = |number: f32| put(number.to_bits());
+    put(c.sensitivity_min);
+    let zero = zero.to_array();
     let numbers = (c.vertical_per_code.as_flattened().iter())
-        .chain(probes.as_flattened())
         .chain(c.planar_per_code.as_flattened())
         .chain(&c.calibrated_vertical)
         .chain(&c.calibrated_planar)
-        .map(|number| number.to_bits());
-    let zero = zero.to_array().map(f32::to_bits);
-    let all = numbers
-        .chain(zero)
-        .chain(windows)
-        .chain([c.sensitivity_min.to_bits()]);
-    let mut words = [0; PARAMETER_WORDS];
-    for (word, value) in words.iter_mut().zip(all) {
-        *word = value;
+        .chain(&zero);
+    for number in numbers {
+        put(*number);
     }
-    words
+    for probe in decoder.probes() {
+        M::put(probe, &mut put);
+    }
 }
 
 /// The frame of these words.

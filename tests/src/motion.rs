@@ -1,10 +1,12 @@
 //! Sections of a job: the rows of a log, uniform random codes, random words as parameters.
 
-use crate::job::{self, Head, PARAMETER_WORDS};
+use crate::job::{self, Bare, Head};
 use host_fit::input::dataset::{Dataset, LoggedFrame};
 use rand::{Rng, RngExt};
 use runtime::frame::MISSING_CODE;
-use runtime::{Decoder, LinearModel, PlanarPose, RawFrame};
+use runtime::geometry::SensingAxes;
+use runtime::model::{FieldProbe, Probes, Sensitivity, Shape, dot};
+use runtime::{Decoder, ModelKind, ParameterSet, PlanarPose, RawFrame};
 
 /// One section: parameters as they lie in the file, and the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,15 +53,19 @@ pub fn of_blob(blob: &[u8], frames: Vec<RawFrame>, hold: u16) -> Section {
 }
 
 /// Frames run by a bare decoder with unchecked parameters.
-pub fn of_words(words: [u32; PARAMETER_WORDS], frames: Vec<RawFrame>) -> Section {
+pub fn of_words<M: Bare>(decoder: &Decoder<M>, frames: Vec<RawFrame>) -> Section {
+    let mut parameters = Vec::new();
+    job::to_words(decoder, &PlanarPose::ZERO, &mut |word| {
+        parameters.extend(word.to_le_bytes());
+    });
     Section {
         head: Head {
-            source: job::WORDS,
+            source: M::SOURCE,
             frames: count(&frames),
             hold: 0,
             blob_bytes: 0,
         },
-        parameters: words.map(u32::to_le_bytes).as_flattened().to_vec(),
+        parameters,
         frames,
     }
 }
@@ -117,20 +123,67 @@ fn odd_word(rng: &mut impl Rng) -> u32 {
     sign | number
 }
 
-/// Sound parameters of which some words, or all, are replaced by odd ones.
-pub fn odd_parameters(rng: &mut impl Rng, sound: &Decoder<LinearModel>) -> [u32; PARAMETER_WORDS] {
-    let mut words = job::to_words(sound, &PlanarPose::ZERO);
-    let replaced = match rng.random_range(0..4u32) {
-        0 => words.len(),
-        _ => rng.random_range(1..4),
-    };
-    for k in 0..replaced {
-        let place = if replaced == words.len() {
-            k
-        } else {
-            rng.random_range(0..words.len())
-        };
-        words[place] = odd_word(rng);
+/// A sound decoder of which some words, or all, are replaced by odd ones.
+pub fn odd<M: Bare>(rng: &mut impl Rng, sound: &Decoder<M>) -> Decoder<M> {
+    let mut words = Vec::new();
+    job::to_words(sound, &PlanarPose::ZERO, &mut |word| words.push(word));
+    if rng.random_range(0..4u32) == 0 {
+        words.fill_with(|| odd_word(rng));
+    } else {
+        for _ in 0..rng.random_range(1..4) {
+            let place = rng.random_range(0..words.len());
+            words[place] = odd_word(rng);
+        }
     }
-    words
+    job::from_words(&words).0
+}
+
+/// A probe of the field model with random terms: each adds up to a fiftieth of the signal
+/// where that is largest.
+pub fn field_probe(
+    rng: &mut impl Rng,
+    sensitivity: &Sensitivity<f32>,
+    lateral: [f32; 3],
+) -> FieldProbe<f32> {
+    /// Codes of a displacement of half a millimetre; zr and tilt at the end of their ranges.
+    const FULL: f32 = 8e3;
+    const HEIGHT: f32 = 0.1;
+    const VERTICAL: f32 = 5e-4;
+    let mut part = || FULL / 50.0 * rng.random_range(-1.0..1.0f32);
+    let mut pair = |full: f32| [part() / full, part() / (full * HEIGHT)];
+    FieldProbe {
+        sensitivity: *sensitivity,
+        shape: Shape {
+            u_w_w: pair(FULL * FULL * FULL),
+            u_w: pair(FULL * FULL),
+            u_z_z: pair(FULL * HEIGHT * HEIGHT),
+            u_u_u: pair(FULL * FULL * FULL),
+            u_u: pair(FULL * FULL),
+            w_w: pair(FULL * FULL),
+            w_z: pair(FULL * HEIGHT),
+            z_z: pair(HEIGHT * HEIGHT),
+            u_u_w: part() / (FULL * FULL * FULL),
+            w_w_w: part() / (FULL * FULL * FULL),
+        },
+        carry: [part() / VERTICAL, part() / VERTICAL, part() / VERTICAL],
+        lateral,
+    }
+}
+
+/// The parameter set of Model (31) with random terms of the field model added.
+pub fn with_field_terms(rng: &mut impl Rng, set: &ParameterSet) -> ParameterSet {
+    let (axes, _) = SensingAxes::of_rows(&set.plane);
+    let [a, b, c] = set.probes.sensitivities();
+    let [across_a, across_b, across_c] = axes.across();
+    let probes = [(a, across_a), (b, across_b), (c, across_c)].map(|(sensitivity, [x, y])| {
+        let row = [x, y, rng.random_range(-0.4..0.4)];
+        let column = |k: usize| set.plane_inverse.map(|row| row[k]);
+        let lateral = [0, 1, 2].map(|k| dot(&row, column(k)));
+        field_probe(rng, sensitivity, lateral)
+    });
+    ParameterSet {
+        model: ModelKind::Field,
+        probes: Probes::Field(probes),
+        ..set.clone()
+    }
 }

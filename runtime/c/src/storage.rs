@@ -4,7 +4,7 @@ use core::mem::{ManuallyDrop, MaybeUninit, align_of, size_of};
 use runtime::{AnyDecoder, Servo};
 
 /// Words of a decoder.
-pub const HALL_DECODER_WORDS: usize = 41;
+pub const HALL_DECODER_WORDS: usize = 114;
 /// Words of a servo.
 pub const HALL_SERVO_WORDS: usize = 49;
 

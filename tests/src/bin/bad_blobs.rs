@@ -56,8 +56,9 @@ fn write_all(good: &Path, folder: &Path) -> Result<(), Box<dyn Error>> {
     write(
         "nan.bin",
         &changed(&|set| {
-            let Probes::Linear(probes) = &mut set.probes;
-            probes[1].per_z_m = f32::NAN;
+            if let Probes::Linear(probes) = &mut set.probes {
+                probes[1].per_z_m = f32::NAN;
+            }
         })?,
     )?;
     write(

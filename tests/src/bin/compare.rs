@@ -8,16 +8,18 @@ use host_fit::output::pose_file;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use runtime::blob::MAX_BYTES;
-use runtime::{AnyDecoder, OnInvalid, ParameterSet, PlanarPose};
+use runtime::{AnyDecoder, Decode, Decoder, OnInvalid, ParameterSet};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tests::compare::{Comparison, compare, to_bytes};
+use tests::job::Bare;
 use tests::motion::{self, Section};
 
 /// Compares the words that a target gives with those of the host, bit for bit.
 ///
-/// `make` writes the frames of a log, random codes and random parameters into a job file; an
+/// `make` writes the frames of a log, random codes and random parameters into a job file, for
+/// Model (31) and for the field model; an
 /// image that does the job on the target answers with a file of words; `check` compares them.
 /// `poses` compares a pose file that a controller recorded with the host's decoder.
 #[derive(Parser)]
@@ -30,7 +32,7 @@ struct Cli {
 enum Command {
     /// Write a job file.
     Make {
-        /// The parameter blob.
+        /// The parameter blob of a fit by Model (31); the field model's is made of it.
         params: PathBuf,
         /// The log; the one that ships with the program if not given.
         #[arg(long)]
@@ -41,11 +43,11 @@ enum Command {
         /// Where to write the job.
         #[arg(long)]
         out: PathBuf,
-        /// Ticks of uniform random codes.
-        #[arg(long, default_value_t = 800_000)]
+        /// Ticks of uniform random codes, with Model (31) and again with the field model.
+        #[arg(long, default_value_t = 400_000)]
         codes: usize,
-        /// Ticks with random parameters.
-        #[arg(long, default_value_t = 160_000)]
+        /// Ticks with random parameters, with either model.
+        #[arg(long, default_value_t = 80_000)]
         parameters: usize,
         /// Ticks for which what is invalid is held.
         #[arg(long, default_value_t = 3)]
@@ -131,12 +133,7 @@ fn make(
     hold: u16,
     seed: u64,
 ) -> Result<Vec<u8>, Box<dyn Error>> {
-    /// Frames that share one set of random parameters.
-    const FRAMES_PER_SET: usize = 32;
     let set = read_blob(params)?;
-    let AnyDecoder::Linear(sound) = set.decoder();
-    let mut buffer = [0; MAX_BYTES];
-    let blob = set.to_bytes(&mut buffer)?;
     let dataset = match log {
         Some((log, stage)) => {
             log::read(&[log], &Stage::from_file(stage)?, &ReadOptions::DECODE)?.dataset
@@ -147,29 +144,65 @@ fn make(
             log::read_bytes(shipped::LOG_GZ, name, &stage, &ReadOptions::DECODE)?.dataset
         }
     };
-    let mut sections = motion::of_log(blob, &dataset, hold)
-        .ok_or("the log holds a vertical pose in place of capacitive codes")?;
     let rows = dataset.rows.len();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    sections.push(motion::of_blob(
-        blob,
-        motion::uniform_frames(&mut rng, codes),
-        hold,
-    ));
-    sections.extend((0..parameters / FRAMES_PER_SET).map(|_| {
-        let words = motion::odd_parameters(&mut rng, &sound);
-        let frames = motion::uniform_frames(&mut rng, FRAMES_PER_SET);
-        motion::of_words(words, frames)
-    }));
-    if parameters > 0 {
-        let wild = motion::wild_frames(&mut rng, parameters / 8);
-        let sound = tests::job::to_words(&sound, &PlanarPose::ZERO);
-        sections.push(motion::of_words(sound, wild));
+    let field_set = motion::with_field_terms(&mut rng, &set);
+    let mut sections = Vec::new();
+    for set in [&set, &field_set] {
+        let mut buffer = [0; MAX_BYTES];
+        let blob = set.to_bytes(&mut buffer)?;
+        sections.extend(
+            motion::of_log(blob, &dataset, hold)
+                .ok_or("the log holds a vertical pose in place of capacitive codes")?,
+        );
+        let frames = motion::uniform_frames(&mut rng, codes);
+        sections.push(motion::of_blob(blob, frames, hold));
+        match set.decoder() {
+            AnyDecoder::Linear(sound) => {
+                sections.extend(bare(&mut rng, &sound, parameters, |_| sound));
+            }
+            AnyDecoder::Field(sound) => {
+                let [a, b, c] = *sound.probes();
+                let other = |rng: &mut ChaCha8Rng| {
+                    let probes = [a, b, c]
+                        .map(|probe| motion::field_probe(rng, &probe.sensitivity, probe.lateral));
+                    Decoder::new(*sound.constants(), probes)
+                };
+                sections.extend(bare(&mut rng, &sound, parameters, other));
+            }
+        }
     }
     let ticks: usize = sections.iter().map(|s: &Section| s.frames.len()).sum();
     println!("RESULT job_ticks={ticks}");
     println!("RESULT job_log_rows={rows}");
     Ok(to_bytes(&sections))
+}
+
+/// Ticks with random parameters: sets of odd words, and any codes.
+fn bare<M: Bare>(
+    rng: &mut ChaCha8Rng,
+    sound: &Decoder<M>,
+    ticks: usize,
+    mut other: impl FnMut(&mut ChaCha8Rng) -> Decoder<M>,
+) -> Vec<Section> {
+    /// Frames that share one set of random parameters.
+    const FRAMES_PER_SET: usize = 32;
+    let mut sections = Vec::new();
+    for k in 0..ticks / FRAMES_PER_SET {
+        let decoder = other(rng);
+        let decoder = if k % 2 == 0 {
+            motion::odd(rng, &decoder)
+        } else {
+            decoder
+        };
+        let frames = motion::uniform_frames(rng, FRAMES_PER_SET);
+        sections.push(motion::of_words(&decoder, frames));
+    }
+    if ticks > 0 {
+        let wild = motion::wild_frames(rng, ticks / 8);
+        sections.push(motion::of_words(sound, wild));
+    }
+    sections
 }
 
 fn check(job: &Path, words: &Path) -> Result<bool, Box<dyn Error>> {

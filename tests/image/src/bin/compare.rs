@@ -3,9 +3,11 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use image::job::{self, ANSWER_WORDS, BLOB_WORDS, FRAME_WORDS, HEAD_WORDS, Head, PARAMETER_WORDS};
+use image::job::{
+    self, ANSWER_WORDS, BLOB_WORDS, Bare, FRAME_WORDS, HEAD_WORDS, Head, PARAMETER_WORDS,
+};
 use image::semihost::{CONSOLE, Fault, File, exit};
-use runtime::{Decode, ParameterSet, Reading, Servo};
+use runtime::{Decode, FieldModel, LinearModel, ParameterSet, Reading, Servo};
 
 /// Frames of one transfer.
 const BATCH: usize = 512;
@@ -54,16 +56,8 @@ fn run() -> Result<(), Stop> {
         }
         let head = Head::from_words(head.map(u32::from_le_bytes));
         match head.source {
-            job::WORDS => {
-                let mut words = [[0; 4]; PARAMETER_WORDS];
-                if !input.read(words.as_flattened_mut())? {
-                    return Err(Stop::NoJob);
-                }
-                let (decoder, zero) = job::from_words(&words.map(u32::from_le_bytes));
-                frames(&input, &output, head.frames, |frame| {
-                    decoder.decode(frame, &zero)
-                })?;
-            }
+            job::WORDS => bare::<LinearModel>(&input, &output, &head)?,
+            job::FIELD_WORDS => bare::<FieldModel>(&input, &output, &head)?,
             job::BLOB => {
                 let mut bytes = [0; 4 * BLOB_WORDS];
                 let length = head.parameter_words().ok_or(Stop::NoJob)? * 4;
@@ -79,6 +73,20 @@ fn run() -> Result<(), Stop> {
             _ => return Err(Stop::NoJob),
         }
     }
+}
+
+/// Reads a decoder as bare words and ticks.
+fn bare<M: Bare>(input: &File, output: &File, head: &Head) -> Result<(), Stop> {
+    let mut words = [[0; 4]; PARAMETER_WORDS];
+    let count = head.parameter_words().ok_or(Stop::NoJob)?;
+    let taken = words.get_mut(..count).ok_or(Stop::NoJob)?;
+    if !input.read(taken.as_flattened_mut())? {
+        return Err(Stop::NoJob);
+    }
+    let (decoder, zero) = job::from_words::<M>(&words.map(u32::from_le_bytes));
+    frames(input, output, head.frames, |frame| {
+        decoder.decode(frame, &zero)
+    })
 }
 
 /// Ticks through the frames of one section.

@@ -12,14 +12,15 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use hal_adapters::can::pose::planar_frames;
 use hal_adapters::can::{Coded, Layout, Message, SensorReceiver, Timing, sensor};
-use image::job::{self, FRAME_WORDS, PARAMETER_WORDS};
+use image::job::{self, Bare, FRAME_WORDS, PARAMETER_WORDS};
 use image::semihost::{CONSOLE, File, exit};
 use runtime::arithmetic::ArithmeticFault;
 use runtime::decoder::{Decoder, DecoderConstants};
 use runtime::frame::CodeWindow;
-use runtime::model::Sensitivity;
+use runtime::model::{FieldProbe, Sensitivity, Shape};
 use runtime::{
-    Decode, LinearModel, Model, OnInvalid, PlanarPose, RawFrame, Reading, Servo, VerticalPose,
+    Decode, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, RawFrame, Reading, Servo,
+    VerticalPose,
 };
 
 /// Displacements read by the probes.
@@ -75,6 +76,37 @@ extern "C" fn counted_kernel_by_value(
 #[inline(never)]
 extern "C" fn counted_tick(
     decoder: &Decoder<LinearModel>,
+    frame: &RawFrame,
+    zero: &PlanarPose<f32>,
+    reading: &mut Reading,
+) {
+    *reading = decoder.decode(frame, zero);
+}
+
+/// What the pose kernel of the field model reads of a calibration.
+struct FieldKernel {
+    planar_per_code: [[f32; 3]; 3],
+    probes: [FieldProbe<f32>; 3],
+}
+
+/// The pose kernel of the field model.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn counted_field_kernel(
+    c: &FieldKernel,
+    signal: &Signal,
+    vertical: &VerticalPose<f32>,
+    zero: &PlanarPose<f32>,
+    pose: &mut PlanarPose<f32>,
+) {
+    let rows = &c.planar_per_code;
+    (_, *pose) = FieldModel::planar_pose(&c.probes, rows, signal.0, vertical, zero);
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn counted_field_tick(
+    decoder: &Decoder<FieldModel>,
     frame: &RawFrame,
     zero: &PlanarPose<f32>,
     reading: &mut Reading,
@@ -233,20 +265,53 @@ impl Words {
     }
 }
 
-/// The inputs of one round: codes of 16 bits or of any; sound parameters or any words.
-fn round(words: &mut Words, k: u32) -> (Decoder<LinearModel>, PlanarPose<f32>, RawFrame) {
-    let frame = core::array::from_fn::<u32, FRAME_WORDS, _>(|_| match k % 4 {
-        3 => words.next(),
-        _ => (words.next() as i32 >> 16) as u32,
-    });
-    let (decoder, zero) = match k % 3 {
-        0 => (Decoder::new(SOUND, PROBES), PlanarPose::ZERO),
+/// The probes of [`PROBES`] with terms of the field model, in round numbers.
+const FIELD_PROBES: [FieldProbe<f32>; 3] = {
+    let probe = FieldProbe {
+        sensitivity: PROBES[0],
+        carry: [4e5, -3e5, 2e5],
+        shape: Shape {
+            u_w_w: [5e-11, 1e-10],
+            u_w: [1e-7, -2e-7],
+            u_z_z: [0.1, 0.2],
+            u_u_u: [-1e-11, 4e-11],
+            u_u: [2e-7, 4e-7],
+            w_w: [-3e-7, 5e-7],
+            w_z: [0.01, -0.02],
+            z_z: [900.0, -900.0],
+            u_u_w: 5e-12,
+            w_w_w: -5e-12,
+        },
+        lateral: [0.1, -0.2, 0.9],
+    };
+    let [mut b, mut c] = [probe; 2];
+    (b.sensitivity, c.sensitivity) = (PROBES[1], PROBES[2]);
+    [probe, b, c]
+};
+
+/// Codes of 16 bits, or of any in each fourth round.
+fn codes(words: &mut Words, k: u32) -> RawFrame {
+    job::frame(core::array::from_fn::<u32, FRAME_WORDS, _>(|_| {
+        match k % 4 {
+            3 => words.next(),
+            _ => (words.next() as i32 >> 16) as u32,
+        }
+    }))
+}
+
+/// The decoder of one round: sound parameters, any words, or nothing but NaN.
+fn decoder_of<M: Bare>(
+    words: &mut Words,
+    k: u32,
+    probes: [M::Probe<f32>; 3],
+) -> (Decoder<M>, PlanarPose<f32>) {
+    match k % 3 {
+        0 => (Decoder::new(SOUND, probes), PlanarPose::ZERO),
         1 => job::from_words(&core::array::from_fn::<u32, PARAMETER_WORDS, _>(|_| {
             words.next()
         })),
         _ => job::from_words(&[f32::NAN.to_bits(); PARAMETER_WORDS]),
-    };
-    (decoder, zero, job::frame(frame))
+    }
 }
 
 /// Bytes below the stack pointer that are painted, above those that painting itself uses.
@@ -304,7 +369,8 @@ fn main() -> ! {
     // SAFETY: the loop above, which touches r0 and the flags.
     unsafe { counted_loop_1000() };
     for k in 0..300 {
-        let (decoder, zero, frame) = black_box(round(&mut words, k));
+        let frame = black_box(codes(&mut words, k));
+        let (decoder, zero) = black_box(decoder_of::<LinearModel>(&mut words, k, PROBES));
         let signal = Signal(frame.hall.map(|code| code as f32));
         let vertical = VerticalPose::from_array(frame.capacitive.map(|code| code as f32 * 1e-8));
         let mut pose = PlanarPose::ZERO;
@@ -325,8 +391,18 @@ fn main() -> ! {
             counted_c_tick(&decoder, &frame, &zero, &mut reading);
             counted_c_uncontracted_tick(&decoder, &frame, &zero, &mut reading);
         }
+        let (decoder, zero) = black_box(decoder_of::<FieldModel>(&mut words, k, FIELD_PROBES));
+        let c = FieldKernel {
+            planar_per_code: decoder.constants().planar_per_code,
+            probes: *decoder.probes(),
+        };
+        counted_field_kernel(&c, &signal, &vertical, &zero, &mut pose);
+        black_box(&pose);
+        counted_field_tick(&decoder, &frame, &zero, &mut reading);
+        black_box(&reading);
     }
-    let decoder = black_box(Decoder::new(SOUND, PROBES));
+    let decoder = black_box(Decoder::<LinearModel>::new(SOUND, PROBES));
+    let field = black_box(Decoder::<FieldModel>::new(SOUND, FIELD_PROBES));
     let mut servo = Servo::new(&decoder, OnInvalid::Hold { ticks: 3 });
     let mut frame = RawFrame {
         hall: [900, -800, 700],
@@ -351,7 +427,7 @@ fn main() -> ! {
         receiver.take_data(first.message.id().as_raw(), &first.bytes, 0);
     }
     for k in 1..100 {
-        let (_, _, mut sent) = round(&mut words, 0);
+        let mut sent = codes(&mut words, 0);
         sent.sequence = k;
         counted_can_code(black_box(&sent), &mut coded);
         counted_can_check(&mut receiver, black_box(&coded), 2000 * k, &mut sent);
@@ -361,14 +437,17 @@ fn main() -> ! {
     }
     let base = touched(|| ());
     let tick = touched(|| counted_tick(&decoder, &frame, &PlanarPose::ZERO, &mut reading));
+    let field_tick =
+        touched(|| counted_field_tick(&field, &frame, &PlanarPose::ZERO, &mut reading));
     frame.sequence += 1;
     let servo_tick = touched(|| counted_servo_tick(&mut servo, &frame, &mut reading));
-    let printed = writeln!(console, "RESULT painted_stack_tick={}", tick - base).and_then(|()| {
-        writeln!(
-            console,
-            "RESULT painted_stack_servo_tick={}",
-            servo_tick - base
-        )
+    let stacks = [
+        ("tick", tick),
+        ("field_tick", field_tick),
+        ("servo_tick", servo_tick),
+    ];
+    let printed = stacks.into_iter().try_for_each(|(name, bytes)| {
+        writeln!(console, "RESULT painted_stack_{name}={}", bytes - base)
     });
     let found = wrong_settings_are_found();
     let printed = printed.and_then(|()| writeln!(console, "wrong FPU settings found: {found}"));
