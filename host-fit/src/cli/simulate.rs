@@ -1,0 +1,111 @@
+//! `host-fit simulate`.
+
+use crate::cli::error::HostError;
+use crate::input::stage::Stage;
+use crate::output::{check_writable, write_atomically};
+use crate::simulate::assembly::{Assembly, Magnets};
+use crate::simulate::log_text::{log_csv, truth_csv};
+use crate::simulate::plan_file;
+use crate::simulate::protocol::{Protocol, Run};
+use crate::simulate::recording::record;
+use crate::simulate::sensors::SensorErrors;
+use clap::Args;
+use flate2::{Compression, write::GzEncoder};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `simulate`.
+#[derive(Debug, Args)]
+pub(super) struct SimulateArgs {
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    pub stage: PathBuf,
+    /// Run this trajectory: columns t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad, one row for
+    /// every servo period.
+    #[arg(long, value_name = "run.csv")]
+    pub plan: Option<PathBuf>,
+    /// Run this protocol.
+    #[arg(long, value_enum, conflicts_with = "plan")]
+    pub protocol: Option<Protocol>,
+    /// Which stage, and its noise: an even one has magnets as designed, an odd one imperfect
+    /// magnets.
+    #[arg(long, value_name = "N")]
+    pub seed: u64,
+    /// Where to write the log: CSV, or CSV.gz if the name ends so; `-` for standard output.
+    #[arg(long, value_name = "log.csv", default_value = "-")]
+    pub out: PathBuf,
+    /// Where to write the true poses, likewise.
+    #[arg(long, value_name = "truth.csv")]
+    pub truth: Option<PathBuf>,
+}
+
+/// Writes the log of a simulated stage.
+pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
+    let truth = args.truth.as_deref();
+    let shown = super::is_standard_output(Some(&args.out));
+    if shown && super::is_standard_output(truth) {
+        return Err(HostError::Usage {
+            argument: "--truth",
+            problem: "log and truth cannot both go to standard output; name a file".to_owned(),
+        });
+    }
+    let inputs: Vec<&Path> = [Some(&args.stage), args.plan.as_ref()]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    super::keep_apart(&[Some(&args.out), truth], &inputs)?;
+    for path in [Some(args.out.as_path()), truth].into_iter().flatten() {
+        if !super::is_standard_output(Some(path)) {
+            check_writable(path)?;
+        }
+    }
+    let stage = Stage::from_file(&args.stage)?;
+    let period_s = stage.servo_period_s;
+    let run = match (&args.plan, args.protocol) {
+        (Some(plan), _) => Run::planned(plan_file::read(plan, period_s)?),
+        (None, Some(protocol)) => protocol.run(period_s, args.seed),
+        (None, None) => {
+            return Err(HostError::Usage {
+                argument: "--protocol",
+                problem: "name a protocol, or a trajectory with --plan".to_owned(),
+            });
+        }
+    };
+    let assembly = Assembly::draw(&stage, args.seed);
+    let recording = record(&stage, &assembly, run, &SensorErrors::USUAL, args.seed)?;
+    if let Some(path) = truth {
+        write(path, &truth_csv(&recording))?;
+    }
+    write(&args.out, &log_csv(&recording, &stage))?;
+    if shown || super::is_standard_output(truth) {
+        return Ok(());
+    }
+    let magnets = match Magnets::of_seed(args.seed) {
+        Magnets::AsDesigned => "magnets as designed",
+        Magnets::Imperfect => "imperfect magnets",
+    };
+    super::print(&format!(
+        "wrote {}: {} rows in {} movements of stage {}, {magnets}\n",
+        args.out.display(),
+        recording.rows(),
+        recording.movements.len(),
+        args.seed
+    ))
+}
+
+/// Writes a CSV, compressed if the name ends in `.gz`.
+fn write(path: &Path, csv: &str) -> Result<(), HostError> {
+    if super::is_standard_output(Some(path)) {
+        return super::print(csv);
+    }
+    if path.extension().is_none_or(|extension| extension != "gz") {
+        return Ok(write_atomically(path, csv.as_bytes())?);
+    }
+    let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
+    let packed = gzip.write_all(csv.as_bytes()).and_then(|()| gzip.finish());
+    Ok(write_atomically(
+        path,
+        &packed.map_err(HostError::Standard)?,
+    )?)
+}

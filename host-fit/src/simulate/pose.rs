@@ -1,0 +1,61 @@
+//! Where a rigid stage is: exact rotations, no small angles.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// Position of the stage's centroid and orientation of the stage, both from the initial ones.
+///
+/// Rotations follow one another: Rx about X first, then Ry about Y, then Rz about Z, all axes
+/// those of the framework.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StagePose {
+    /// X, Y, Rz: m, m, rad.
+    pub planar: [f64; 3],
+    /// Z, Rx, Ry: m, rad, rad.
+    pub vertical: [f64; 3],
+}
+
+impl StagePose {
+    /// X, Y, Z of the centroid, m.
+    pub fn position_m(&self) -> Vector3<f64> {
+        Vector3::new(self.planar[0], self.planar[1], self.vertical[0])
+    }
+
+    /// Turns a direction of the stage into the framework.
+    pub fn rotation(&self) -> Matrix3<f64> {
+        rotation([self.vertical[1], self.vertical[2], self.planar[2]])
+    }
+}
+
+/// Rz Ry Rx of the angles Rx, Ry, Rz in rad.
+pub fn rotation([rx, ry, rz]: [f64; 3]) -> Matrix3<f64> {
+    // libm, not the platform's: the same bits everywhere.
+    let (sx, cx) = libm::sincos(rx);
+    let (sy, cy) = libm::sincos(ry);
+    let (sz, cz) = libm::sincos(rz);
+    Matrix3::new(
+        cz * cy,
+        cz * sy * sx - sz * cx,
+        cz * sy * cx + sz * sx,
+        sz * cy,
+        sz * sy * sx + cz * cx,
+        sz * sy * cx - cz * sx,
+        -sy,
+        cy * sx,
+        cy * cx,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Rotation3;
+
+    #[test]
+    fn rotations_follow_the_right_hand_rule_about_x_then_y_then_z() {
+        let about = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
+        let want = about(Vector3::z_axis(), 1.9)
+            * about(Vector3::y_axis(), -0.7)
+            * about(Vector3::x_axis(), 0.3);
+        assert!((rotation([0.3, -0.7, 1.9]) - want.matrix()).amax() < 1e-15);
+    }
+}

@@ -1,0 +1,99 @@
+//! Random numbers that are the same on every machine: ChaCha8, and libm for the logarithm and
+//! the cosine of a normal number.
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
+
+/// What a stream of numbers is for. Streams of one seed are independent of each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u64)]
+pub enum Purpose {
+    /// How a stage came out of the workshop.
+    Assembly = 1,
+    /// The trajectories of a protocol.
+    Motion = 2,
+    /// Noise, drift and resets.
+    Sensors = 3,
+}
+
+/// A stream of random numbers.
+#[derive(Clone, Debug)]
+pub struct Stream(ChaCha8Rng);
+
+impl Stream {
+    /// The stream of a seed for one purpose; `run` tells the runs of one stage apart.
+    pub fn new(seed: u64, purpose: Purpose, run: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(run << 8 | purpose as u64);
+        Self(random)
+    }
+
+    /// A number in [0, 1), all equally likely: 53 bits of one word.
+    pub fn uniform(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
+    }
+
+    /// A number between `low` and `high`, all equally likely.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.uniform()
+    }
+
+    /// A normal number of this standard deviation (Box and Muller).
+    pub fn normal(&mut self, deviation: f64) -> f64 {
+        let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.uniform()));
+        deviation * (radius * libm::cos(TAU * self.uniform()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn streams_differ_by_seed_purpose_and_run() {
+        let mut seen = std::collections::BTreeSet::new();
+        for (seed, run) in (0..10).flat_map(|seed| (0..10).map(move |run| (seed, run))) {
+            for purpose in [Purpose::Assembly, Purpose::Motion, Purpose::Sensors] {
+                seen.insert(Stream::new(seed, purpose, run).uniform().to_bits());
+            }
+        }
+        assert_eq!(seen.len(), 300);
+    }
+
+    /// Known words: a change of the generator would change every simulated log.
+    #[test]
+    fn the_numbers_of_a_seed_never_change() {
+        let mut stream = Stream::new(1, Purpose::Assembly, 0);
+        let have = [
+            stream.uniform(),
+            stream.between(-2.0, 2.0),
+            stream.normal(1.0),
+        ];
+        assert_eq!(
+            have.map(f64::to_bits),
+            [
+                4605848562125536949,
+                13834140881617544066,
+                4607328069846461900
+            ]
+        );
+    }
+
+    #[test]
+    fn normal_numbers_have_mean_zero_and_the_deviation_asked_for() {
+        let mut stream = Stream::new(2, Purpose::Sensors, 0);
+        let n = 100_000;
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for _ in 0..n {
+            let x = stream.normal(3.0);
+            sum += x;
+            squares += x * x;
+        }
+        let (mean, deviation) = (sum / f64::from(n), (squares / f64::from(n)).sqrt());
+        assert!(
+            mean.abs() < 0.04 && (deviation - 3.0).abs() < 0.03,
+            "{mean} {deviation}"
+        );
+    }
+}
