@@ -8,6 +8,7 @@
 //! | [`by_search`] | a search on the fitness, with or without a least-squares finish |
 
 pub mod by_search;
+pub mod field;
 pub mod least_squares;
 pub mod objective;
 pub mod search;

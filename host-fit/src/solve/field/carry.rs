@@ -1,0 +1,183 @@
+//! Whether a log can carry the field model, by the errors that it predicts for service.
+
+use super::parameters::FieldParameters;
+use super::posterior::{PoseUncertainty, Posterior};
+use super::probe::probes;
+use crate::input::stage::Stage;
+use crate::problem::parameters::Parameters;
+use runtime::VerticalPose;
+
+/// Poses over which service is averaged.
+const POSES: usize = 256;
+/// Systematic errors above this part of the noise (variances) are too large, whatever Model (31)
+/// seems to have: a log that determines so little can't tell that either.
+const SYSTEMATIC_MAX: f64 = 1.0;
+/// Systematic errors below this part of the noise (variances) are rounding: one per cent of the
+/// noise floor.
+const ROUNDING: f64 = 0.02;
+
+/// What service over the whole range of a log has to expect: variances of X, Y, Rz (m2, m2,
+/// rad2), means over poses spread evenly in the box of the log's ranges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServiceVariance {
+    /// By the parameters of the field model.
+    pub systematic: [f64; 3],
+    /// By the noise of the probes: the floor.
+    pub noise: [f64; 3],
+    /// Mean squared difference between the poses of Model (31) and of the field model.
+    pub difference: [f64; 3],
+}
+
+/// Which of the two models is better taken, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// Whether it is the field model.
+    pub field: bool,
+    /// What it has to expect in service.
+    pub service: ServiceVariance,
+}
+
+impl ServiceVariance {
+    /// Of the field model with this posterior, and of Model (31). Infinite where the probes cannot
+    /// tell the pose.
+    fn new(
+        parameters: &FieldParameters,
+        posterior: &Posterior,
+        model_31: &FieldParameters,
+        ranges: ([f64; 3], [f64; 3]),
+    ) -> Self {
+        let [systematic, noise, difference] = Self::sums(parameters, posterior, model_31, ranges)
+            .unwrap_or([[f64::INFINITY; 3], [1.0; 3], [0.0; 3]]);
+        let mean = |sum: [f64; 3]| sum.map(|x| x / POSES as f64);
+        Self {
+            systematic: mean(systematic),
+            noise: mean(noise),
+            difference: mean(difference),
+        }
+    }
+
+    fn sums(
+        parameters: &FieldParameters,
+        posterior: &Posterior,
+        model_31: &FieldParameters,
+        (planar_range, vertical_range): ([f64; 3], [f64; 3]),
+    ) -> Option<[[f64; 3]; 3]> {
+        let mut sums = [[0.0; 3]; 3];
+        let constants = model_31.constants(1.0)?;
+        let probes = probes(parameters);
+        for index in 1..=POSES {
+            let place: [f64; 6] = std::array::from_fn(|axis| 2.0 * halton(index, axis) - 1.0);
+            let planar = [0, 1, 2].map(|k| place[k] * planar_range[k]);
+            let vertical = [0, 1, 2].map(|k| place[3 + k] * vertical_range[k]);
+            let PoseUncertainty { systematic, noise } = posterior.at_pose(planar, vertical)?;
+            let signal_m =
+                [0, 1, 2].map(|k| probes[k].signal_mm(planar.map(|x| x * 1e3), vertical) * 1e-3);
+            let decoded = constants
+                .decode(signal_m, &VerticalPose::from_array(vertical))
+                .to_array();
+            for axis in 0..3 {
+                sums[0][axis] += systematic[(axis, axis)];
+                sums[1][axis] += noise[(axis, axis)];
+                sums[2][axis] += (decoded[axis] - planar[axis]) * (decoded[axis] - planar[axis]);
+            }
+        }
+        Some(sums)
+    }
+
+    /// Errors of the field model in service over the noise floor: of X, Y, Rz.
+    pub fn ratios(&self) -> [f64; 3] {
+        [0, 1, 2].map(|k| (1.0 + self.systematic[k] / self.noise[k]).sqrt())
+    }
+
+    /// Errors of Model (31) in service over the noise floor, as far as the field model knows.
+    pub fn ratios_31(&self) -> [f64; 3] {
+        [0, 1, 2].map(|k| (1.0 + self.difference[k] / self.noise[k]).sqrt())
+    }
+
+    // The difference between the models holds the errors of both: where it is all the field
+    // model's, its mean square is the systematic variance. So the field model gains where the
+    // difference is more than twice that.
+
+    fn gains_in(&self, k: usize) -> bool {
+        self.difference[k] > 2.0 * self.systematic[k]
+    }
+
+    /// Whether the field model makes an axis worse than Model (31) has it.
+    fn loses(&self) -> bool {
+        let accepted = |k: usize| {
+            if self.gains_in(k) {
+                SYSTEMATIC_MAX
+            } else {
+                ROUNDING
+            }
+        };
+        (0..3).any(|k| self.systematic[k] > accepted(k) * self.noise[k])
+    }
+
+    /// Whether it makes an axis better.
+    fn gains(&self) -> bool {
+        (0..3).any(|k| self.gains_in(k) && self.difference[k] > ROUNDING * self.noise[k])
+    }
+}
+
+impl Verdict {
+    /// Of a fit beside one of Model (31) to the same rows, over X, Y, Rz and Z, Rx, Ry of the
+    /// largest magnitudes `ranges` (m, rad).
+    pub fn new(
+        parameters: &FieldParameters,
+        posterior: &Posterior,
+        model_31: &Parameters,
+        stage: &Stage,
+        ranges: ([f64; 3], [f64; 3]),
+    ) -> Self {
+        let model_31 = FieldParameters::of_model_31(model_31, stage);
+        let service = ServiceVariance::new(parameters, posterior, &model_31, ranges);
+        Self {
+            field: !service.loses() && service.gains(),
+            service,
+        }
+    }
+
+    /// Whether the log leaves an axis of the field model worse than Model (31).
+    pub fn loses(&self) -> bool {
+        self.service.loses()
+    }
+}
+
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let words = |[x, y, rz]: [f64; 3]| {
+            format!("{x:.2} / {y:.2} / {rz:.2} times the noise floor in X / Y / Rz")
+        };
+        let (field, model_31) = (words(self.service.ratios()), self.service.ratios_31());
+        if self.field {
+            write!(
+                f,
+                "the field model: errors predicted for service are {field}, those of model (31) {}",
+                words(model_31)
+            )
+        } else if self.loses() {
+            write!(
+                f,
+                "model (31): this log leaves the field model with errors of {field} in service, since what a tilt or a \
+                 height adds can't be told from the resets of the reference; record all six axes moving at once"
+            )
+        } else {
+            f.write_str("the field model finds nothing that model (31) lacks")
+        }
+    }
+}
+
+/// The `index`-th place of the axis in an even spread over (0, 1): the radical inverse in the
+/// axis' prime.
+fn halton(index: usize, axis: usize) -> f64 {
+    const PRIMES: [usize; 6] = [2, 3, 5, 7, 11, 13];
+    let base = PRIMES[axis];
+    let (mut rest, mut digit, mut sum) = (index, 1.0, 0.0);
+    while rest > 0 {
+        digit /= base as f64;
+        sum += digit * (rest % base) as f64;
+        rest /= base;
+    }
+    sum
+}

@@ -1,0 +1,264 @@
+//! Maximum a posteriori: damped Gauss-Newton on the Hall residuals, first under white noise, then
+//! whitened by the noise that the residuals show.
+
+use super::blocks::{Block, Rows};
+use super::carry::Verdict;
+use super::noise::{drift_mm, white_mm, white_only};
+use super::parameters::FieldParameters;
+use super::posterior::Posterior;
+use super::probe::probes;
+use super::step::{descent, factor, prior, prior_squares};
+use super::terms::{COUNT, PER_PROBE};
+use super::whiten::{Noise, Normal};
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::problem::parameters::Parameters;
+use nalgebra::{DMatrix, DVector};
+
+/// Steps of one phase.
+const STEPS_MAX: u32 = 20;
+/// Steps of the white phase. A log that can carry the model needs three; one that can't goes on
+/// for long along a valley of E and the offsets, which is not worth the time.
+const STEPS_MAX_WHITE: u32 = 8;
+/// A phase ends when the next step would gain less than this part of a unit of chi-square: a
+/// step of three hundredths of a standard error.
+const GAIN_MIN: f64 = 1e-3;
+/// The white phase is only a start.
+const GAIN_MIN_WHITE: f64 = 1.0;
+const DAMPING_MAX: f64 = 1e8;
+/// Rounds of noise and parameters in turn.
+const NOISE_ROUNDS: u32 = 2;
+
+/// A calibration by the field model with everything that the log says about it.
+#[derive(Clone, Debug)]
+pub struct FieldFit {
+    /// The parameters.
+    pub parameters: FieldParameters,
+    /// How well the log determines them.
+    pub posterior: Posterior,
+    /// The noise of the log.
+    pub noise: Noise,
+    /// Lag of the reference behind the probes, s: positive where it shows an earlier pose.
+    pub lag_s: f64,
+    /// Error of the reference at the end of each movement of the rows used, mm, mm, mrad.
+    pub offsets_mm: Vec<[f64; 3]>,
+    /// The terms of the log-posterior at its maximum.
+    pub score: Score,
+    /// Largest magnitudes of X, Y, Rz (m, m, rad) in the log, each movement's middle taken off.
+    pub planar_range: [f64; 3],
+    /// Largest magnitudes of Z, Rx, Ry in the log: m, rad, rad.
+    pub vertical_range: [f64; 3],
+    /// Whether it is better taken than Model (31).
+    pub verdict: Verdict,
+    /// Gauss-Newton steps.
+    pub iterations: u32,
+}
+
+/// -2 times the log-posterior is the sum of these, but for a constant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Score {
+    /// Sum of squares of the whitened residuals of the blocks: about three times their number.
+    pub chi_squared: f64,
+    /// The logarithm of the determinant of their covariance.
+    pub log_determinant: f64,
+    /// Sum of squares of the parameters in terms of their priors' standard deviations.
+    pub prior: f64,
+    /// Whitened residuals: three for each block, less three for each movement's offset.
+    pub residuals: usize,
+}
+
+/// Why there is no fit.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FieldFitError {
+    /// The log leaves the field model worse than Model (31).
+    #[error("{0}")]
+    NotCarried(Box<Verdict>),
+    /// The log shows nothing of a parameter that has no prior.
+    #[error("the log does not determine {}: no motion in it shows them", parameters.join(", "))]
+    Unseen {
+        /// Their names.
+        parameters: Vec<String>,
+    },
+    /// The normal equations can't be solved.
+    #[error(
+        "the log does not determine the field model: several parameters show only together. Record all six axes \
+         moving at once, each at a frequency of its own"
+    )]
+    Singular,
+    /// No step lowers the cost although the gradient is not zero.
+    #[error(
+        "the fit of the field model stopped after {iterations} steps without reaching its minimum"
+    )]
+    Stuck {
+        /// Steps made.
+        iterations: u32,
+    },
+}
+
+struct State {
+    parameters: FieldParameters,
+    lag_s: f64,
+    offsets_mm: Vec<[f64; 3]>,
+    blocks: Vec<Block>,
+}
+
+/// Fits the field model to the rows `selected` (ascending) of a dataset, from a fit of Model (31).
+///
+/// # Errors
+/// See [`FieldFitError`].
+pub fn fit_field(
+    dataset: &Dataset,
+    selected: &[usize],
+    stage: &Stage,
+    start: &Parameters,
+) -> Result<FieldFit, FieldFitError> {
+    let rows = Rows::new(dataset, selected);
+    let mut search = Search {
+        rows: &rows,
+        iterations: 0,
+    };
+    let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
+    let mut state = search.at(
+        FieldParameters::of_model_31(start, stage),
+        0.0,
+        vec![[0.0; 3]; rows.movements.len()],
+    );
+    let white = |state: &State| {
+        let probes = probes(&state.parameters);
+        white_mm(&rows, &probes, state.lag_s, &state.offsets_mm, least_mm)
+    };
+    let verdict = |state: &State, posterior: &Posterior| {
+        let ranges = (rows.planar_range_mm.map(|x| x * 1e-3), rows.vertical_range);
+        Verdict::new(&state.parameters, posterior, start, stage, ranges)
+    };
+    let mut noise = white_only(white(&state));
+    let mut normal = match search.descend(&mut state, &noise, GAIN_MIN_WHITE, STEPS_MAX_WHITE)? {
+        End::Reached(normal) | End::StepLimit(normal) => normal,
+    };
+    let mut posterior = Posterior::new(covariance(&normal)?, &state.parameters, &noise);
+    // White noise alone makes the errors too small, never too large: what fails here, fails.
+    let early = verdict(&state, &posterior);
+    if early.loses() {
+        return Err(FieldFitError::NotCarried(Box::new(early)));
+    }
+    for _ in 0..NOISE_ROUNDS {
+        let white_mm = white(&state);
+        noise = Noise {
+            white_mm,
+            drift_mm: drift_mm(&rows, &state.blocks, white_mm, &covariance(&normal)?),
+        };
+        let end = search.descend(&mut state, &noise, GAIN_MIN, STEPS_MAX)?;
+        let End::Reached(reached) = end else {
+            let iterations = search.iterations;
+            return Err(FieldFitError::Stuck { iterations });
+        };
+        normal = reached;
+    }
+    posterior = Posterior::new(covariance(&normal)?, &state.parameters, &noise);
+    Ok(FieldFit {
+        verdict: verdict(&state, &posterior),
+        posterior,
+        score: Score {
+            chi_squared: normal.chi_squared(),
+            log_determinant: normal.log_determinant,
+            prior: prior_squares(&state.parameters),
+            residuals: 3 * (rows.blocks.len() - rows.movements.len()),
+        },
+        parameters: state.parameters,
+        noise,
+        lag_s: state.lag_s,
+        offsets_mm: state.offsets_mm,
+        planar_range: rows.planar_range_mm.map(|x| x * 1e-3),
+        vertical_range: rows.vertical_range,
+        iterations: search.iterations,
+    })
+}
+
+/// How a phase ended, with the sums at its end.
+enum End {
+    Reached(Normal),
+    StepLimit(Normal),
+}
+
+struct Search<'r> {
+    rows: &'r Rows,
+    iterations: u32,
+}
+
+impl Search<'_> {
+    fn at(&self, parameters: FieldParameters, lag_s: f64, offsets_mm: Vec<[f64; 3]>) -> State {
+        let blocks = self.rows.evaluate(&probes(&parameters), lag_s, &offsets_mm);
+        State {
+            parameters,
+            lag_s,
+            offsets_mm,
+            blocks,
+        }
+    }
+
+    /// Steps down until the next step would gain less than `gain_min`, at most `steps_max` times.
+    fn descend(
+        &mut self,
+        state: &mut State,
+        noise: &Noise,
+        gain_min: f64,
+        steps_max: u32,
+    ) -> Result<End, FieldFitError> {
+        let mut normal = Normal::new(self.rows, &state.blocks, noise);
+        let mut damping = 0.0;
+        for _ in 0..steps_max {
+            let unseen: Vec<String> = (0..COUNT)
+                .filter(|&k| prior(k).is_none() && normal.curvature(k, k) <= 0.0)
+                .map(super::terms::name)
+                .collect();
+            if !unseen.is_empty() {
+                return Err(FieldFitError::Unseen { parameters: unseen });
+            }
+            let descent = descent(&normal, &state.parameters);
+            let step = factor(&normal, damping)
+                .ok_or(FieldFitError::Singular)?
+                .solve(&descent);
+            let gain = descent.dot(&step);
+            if gain < gain_min && damping == 0.0 {
+                return Ok(End::Reached(normal));
+            }
+            self.iterations += 1;
+            let next = self.after(state, &normal, &step);
+            let next_normal = Normal::new(self.rows, &next.blocks, noise);
+            let cost = |normal: &Normal, state: &State| {
+                normal.chi_squared() + prior_squares(&state.parameters)
+            };
+            // At the end rounding decides: a small rise is none.
+            let rise = cost(&next_normal, &next) - cost(&normal, state);
+            if rise <= GAIN_MIN {
+                (*state, normal) = (next, next_normal);
+                damping = if damping > 1e-6 { damping * 0.1 } else { 0.0 };
+            } else {
+                damping = if damping == 0.0 { 1e-4 } else { damping * 10.0 };
+                if damping > DAMPING_MAX {
+                    break;
+                }
+            }
+        }
+        Ok(End::StepLimit(normal))
+    }
+
+    fn after(&self, state: &State, normal: &Normal, step: &DVector<f64>) -> State {
+        let mut parameters = state.parameters;
+        for (k, change) in step.iter().take(COUNT).enumerate() {
+            parameters.probes[k / PER_PROBE][k % PER_PROBE] += change;
+        }
+        let offsets_mm = normal
+            .offsets_mm(step.as_slice())
+            .zip(&state.offsets_mm)
+            .map(|(change, offset)| [0, 1, 2].map(|k| offset[k] + change[k]))
+            .collect();
+        self.at(parameters, state.lag_s + step[COUNT], offsets_mm)
+    }
+}
+
+fn covariance(normal: &Normal) -> Result<DMatrix<f64>, FieldFitError> {
+    Ok(factor(normal, 0.0)
+        .ok_or(FieldFitError::Singular)?
+        .covariance())
+}

@@ -1,0 +1,29 @@
+//! The field model: maximum a posteriori of its 81 parameters, and what a log tells of them.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`terms`] | the parameters: names, units, prior |
+//! | [`parameters`] | their values, and the decoder's constants |
+//! | [`probe`] | what a probe reads, with derivatives |
+//! | [`blocks`] | rows and their means over a few |
+//! | [`whiten`] | the normal equations under drift |
+//! | [`noise`] | noise from residuals |
+//! | `step` | a step, and the covariance, with the prior |
+//! | [`fit`] | the steps in a row |
+//! | [`posterior`] | covariance of parameters and of a pose |
+//! | [`carry`] | whether the log can carry the model |
+
+pub mod blocks;
+pub mod carry;
+pub mod fit;
+pub mod noise;
+pub mod parameters;
+pub mod posterior;
+pub mod probe;
+#[cfg(test)]
+mod sample;
+mod step;
+pub mod terms;
+#[cfg(test)]
+mod tests;
+pub mod whiten;
