@@ -3,20 +3,23 @@
 //! dataset -> rows drawn -> problem -> solver -> standard errors -> parameter set -> judgement.
 //! Nothing is written here.
 
+mod field;
+
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::identify::{FitFailure, check_described, check_determined, check_motion};
 use crate::judge::statistics::AxisError;
-use crate::judge::uncertainty::{Uncertainty, uncertainty};
+use crate::judge::uncertainty::uncertainty;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::Problem;
 use crate::problem::draw::{Draw, draw_rows};
-use crate::problem::model::{Model, ParameterId};
+use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::Parameters;
+use crate::solve::field::fit::{FieldFit, FieldFitError};
 use crate::solve::{Solution, SolveError, Solver, SolverOptions};
 use runtime::calibration::Origin;
 use runtime::parameters::{FitRecord, ParameterError, Text};
-use runtime::{Calibration, ParameterSet};
+use runtime::{Calibration, ModelKind, ParameterSet};
 
 /// Room around the motion of the log in which the calibration still holds: offsets of
 /// the reference and overshoot are well inside it.
@@ -127,6 +130,9 @@ pub enum FitError {
     /// The solver found nothing.
     #[error(transparent)]
     Solver(#[from] SolveError),
+    /// The field model cannot be fitted to the log, or not so that it serves.
+    #[error("{0}")]
+    Field(#[from] FieldFitError),
     /// The fitted parameters put a row of the log next to a pole of 1/phi.
     #[error(
         "the {solver} search ended with a row of the log next to a pole of 1/phi, where nothing can be judged: let it run longer (--generations, --population), use --project delta or linear, or take the default solver"
@@ -165,10 +171,13 @@ pub enum FitError {
 pub struct Fit {
     /// The model.
     pub model: &'static Model,
-    /// What the solver found.
+    /// What the solver found; of the field model the parameters that Model (31) has too.
     pub solution: Solution,
-    /// How well the log determines it.
-    pub uncertainty: Uncertainty,
+    /// Standard errors of these; `None` as in
+    /// [`Uncertainty`](crate::judge::uncertainty::Uncertainty).
+    pub standard_error: [Option<f64>; COUNT],
+    /// All of a fit of the field model.
+    pub field: Option<FieldFit>,
     /// The calibration in `f64`.
     pub calibration: Calibration,
     /// What goes into the blob.
@@ -207,6 +216,9 @@ pub fn fit(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<F
         });
     }
     check_motion(dataset, stage, selected.len(), model)?;
+    if model.kind == ModelKind::Field {
+        return field::fit(dataset, stage, settings, &selected);
+    }
     let problem = Problem::new(dataset, &selected, stage, model);
     let solution = solver.solve(&problem, &settings.options)?;
     let parameters = &solution.parameters;
@@ -217,45 +229,70 @@ pub fn fit(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<F
     let calibration = calibration(dataset, stage, model, parameters)?;
     let vertical = calibration.calibrated_vertical;
     let determined = check_determined(&problem, parameters, &uncertainty, vertical);
+    let judged = judged(dataset, stage, settings, &calibration, selected.len());
+    if let Err(FitError::Unusable(_)) = judged {
+        determined.clone()?;
+    }
+    // First this: a log that the model does not describe determines nothing, but for that reason.
+    let Judged {
+        set,
+        decoded,
+        judgement,
+    } = judged?;
+    determined?;
+    let own_zeros = Zeros::Given(&solution.delta_m);
+    Ok(Fit {
+        model,
+        warnings: warnings(dataset, &problem, &solution, &judgement),
+        train_fitness: problem.fitness(solution.cost),
+        train_rows: selected.len(),
+        standard_error: uncertainty.standard_error,
+        field: None,
+        judgement_solver_zeros: decoded.judge(dataset, stage, own_zeros),
+        solution,
+        calibration,
+        set,
+        decoded,
+        judgement,
+    })
+}
+
+/// A calibration on all rows, by the target's decoder.
+struct Judged {
+    set: ParameterSet,
+    decoded: Decoded,
+    judgement: Judgement,
+}
+
+/// Judges a calibration, which must describe the dataset.
+fn judged(
+    dataset: &Dataset,
+    stage: &Stage,
+    settings: &FitSettings,
+    calibration: &Calibration,
+    train_rows: usize,
+) -> Result<Judged, FitError> {
     let origin = Origin {
         serial: settings.serial.clone(),
         created: settings.created.clone(),
         logs_sha256: dataset.sha256,
         fit: FitRecord::default(),
     };
-    let mut set = match calibration.prepare(&origin) {
-        Ok(set) => set,
-        Err(error) => {
-            determined?;
-            return Err(FitError::Unusable(error));
-        }
-    };
+    let mut set = calibration.prepare(&origin).map_err(FitError::Unusable)?;
     let decoded = Decoded::new(&set, dataset);
-    let judgement = decoded.judge(dataset, stage, Zeros::of_model(model));
-    // First this: where the model does not describe the log, that is why nothing is determined.
-    check_described(dataset, &judgement.errors, model)?;
-    determined?;
-    let own_zeros = Zeros::Given(&solution.delta_m);
-    let judgement_solver_zeros = decoded.judge(dataset, stage, own_zeros);
+    let judgement = decoded.judge(dataset, stage, Zeros::of_model(settings.model));
+    check_described(dataset, &judgement.errors, settings.model)?;
     let axes = judgement.errors.axes;
     set.fit = FitRecord {
         rows: u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX),
-        train_rows: u32::try_from(selected.len()).unwrap_or(u32::MAX),
+        train_rows: u32::try_from(train_rows).unwrap_or(u32::MAX),
         rms: axes.map(|a| a.rms as f32),
         peak: axes.map(|a| a.peak as f32),
     };
-    Ok(Fit {
-        model,
-        warnings: warnings(dataset, &problem, &solution, &judgement),
-        train_fitness: problem.fitness(solution.cost),
-        train_rows: selected.len(),
-        solution,
-        uncertainty,
-        calibration,
+    Ok(Judged {
         set,
         decoded,
         judgement,
-        judgement_solver_zeros,
     })
 }
 

@@ -8,6 +8,7 @@
 //! | [`interrupt`] | Ctrl-C |
 //! | [`input`] | `stage.toml` and logs to rows in SI units, by movement |
 //! | [`problem`] | what is minimised: rows drawn, parameters, zero deviations |
+//! | [`simulate`] | logs of a stage made of physics, to rehearse a calibration |
 //! | [`solve`] | how: least squares, SHTLBO and its relatives |
 //! | [`judge`] | errors by the target's own decoder, standard errors, what the log leaves open |
 //! | [`fit`] | all of these in a row |
@@ -28,4 +29,5 @@ pub mod judge;
 pub mod output;
 pub mod problem;
 pub mod report;
+pub mod simulate;
 pub mod solve;

@@ -21,6 +21,8 @@ use crate::output::blob_file::BlobFileError;
 use crate::output::export::ExportError;
 use crate::output::pose_file::PoseFileError;
 use crate::report::plots::PlotError;
+use crate::simulate::plan_file::PlanFileError;
+use crate::simulate::recording::RecordError;
 use std::path::PathBuf;
 
 /// Why a run ended early.
@@ -94,6 +96,12 @@ pub enum HostError {
     /// `replay` ended early.
     #[error(transparent)]
     Replay(#[from] ReplayError),
+    /// A planned run is refused.
+    #[error(transparent)]
+    PlanFile(#[from] PlanFileError),
+    /// A run cannot be simulated.
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// The user interrupted the run.
     #[error("interrupted; {kept}")]
     Interrupted {
@@ -122,6 +130,8 @@ impl HostError {
             | Self::Export(_)
             | Self::Live(_)
             | Self::Replay(_)
+            | Self::PlanFile(_)
+            | Self::Record(_)
             | Self::Output(_) => 3,
             Self::Fit(_) => 4,
             Self::Interrupted { .. } => 130,

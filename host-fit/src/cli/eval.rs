@@ -78,8 +78,8 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     }
     if !super::is_standard_output(args.json.as_deref()) {
         super::print(&format!(
-            "Model ({}), {} rows in {} movements\n\n{}",
-            report.model,
+            "{}, {} rows in {} movements\n\n{}",
+            report.model_title,
             report.rows,
             report.movements,
             text::errors(

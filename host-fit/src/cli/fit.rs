@@ -13,7 +13,7 @@ use crate::problem::draw::Draw;
 use crate::problem::model::{MODELS, Model};
 use crate::problem::parameters::Parameters;
 use crate::report::html::{Page, Plot};
-use crate::report::json::{Report, of_fit};
+use crate::report::json::{Choice, Report, of_fit};
 use crate::report::{plots, text};
 use crate::solve::{Projection, SolveError, Solver, SolverOptions};
 use clap::Args;
@@ -23,17 +23,40 @@ use runtime::parameters::Text;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+/// What `--model` says.
+#[derive(Clone, Copy, Debug)]
+struct ModelChoice {
+    model: &'static Model,
+    auto: bool,
+}
+
 /// The models on the command line, `auto` and those of the table.
-fn models() -> impl TypedValueParser<Value = &'static Model> {
-    let auto = PossibleValue::new("auto").help("The best that this program has: today (31)");
+fn models() -> impl TypedValueParser<Value = ModelChoice> {
+    let auto = PossibleValue::new("auto").help("As yet (31), which any log can carry");
     let named = MODELS
         .iter()
         .map(|model| PossibleValue::new(model.name).help(model.summary));
     let names: Vec<PossibleValue> = [auto].into_iter().chain(named).collect();
     PossibleValuesParser::new(names).map(|name| {
         let named = MODELS.iter().find(|model| model.name == name);
-        named.unwrap_or(Model::of(ModelKind::M31))
+        ModelChoice {
+            model: named.unwrap_or(Model::of(ModelKind::M31)),
+            auto: named.is_none(),
+        }
     })
+}
+
+/// Why this model: the sentence of the verdict on a field model, else where the choice comes from.
+fn model_reason(choice: ModelChoice, fit: &Fit) -> String {
+    match &fit.field {
+        Some(field) => field.verdict.to_string(),
+        None if choice.auto => {
+            "model (31): --model auto takes it for every log as yet; where all six axes move at \
+                                once in the log, --model field is better in service"
+                .to_owned()
+        }
+        None => format!("model ({}): --model asks for it", fit.model.name),
+    }
 }
 
 fn blob_text(value: &str) -> Result<Text, &'static str> {
@@ -54,7 +77,7 @@ pub(super) struct FitArgs {
     out: PathBuf,
     /// Measurement model.
     #[arg(long, value_name = "MODEL", value_parser = models(), default_value = "auto")]
-    model: &'static Model,
+    model: ModelChoice,
     /// Solver. The default searches by SHTLBO and finishes by least squares, `lm` is least squares
     /// alone, the others search only.
     #[arg(long, value_name = "NAME", value_enum, default_value = Solver::Finished.name())]
@@ -117,6 +140,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         args.report.as_deref(),
     ];
     super::keep_apart(&outputs, &inputs)?;
+    check_field_arguments(args)?;
     super::use_threads(args.threads);
     interrupt::watch();
     let stage = Stage::from_file(&args.stage)?;
@@ -145,7 +169,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     options.known = known;
     options.interrupt = Some(interrupt::watch());
     let settings = FitSettings {
-        model: args.model,
+        model: args.model.model,
         train: args.train.0,
         draw: args.draw,
         solver: args.solver,
@@ -169,13 +193,17 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         result => result?,
     };
     let circumstances = super::circumstances(&log, &stage, started);
-    let report = of_fit(
-        &fit,
-        args.solver.name(),
-        args.project.name(),
-        args.seed,
-        &circumstances,
-    );
+    let (solver, project) = match fit.field {
+        Some(_) => (Solver::LeastSquares, Projection::Linear),
+        None => (args.solver, args.project),
+    };
+    let choice = Choice {
+        solver: solver.name(),
+        project: project.name(),
+        seed: args.seed,
+        model_reason: model_reason(args.model, &fit),
+    };
+    let report = of_fit(&fit, choice, &circumstances);
     blob_file::write(&args.out, &fit.set)?;
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
@@ -198,12 +226,47 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     Ok(())
 }
 
+/// The field model has one way to be fitted.
+fn check_field_arguments(args: &FitArgs) -> Result<(), HostError> {
+    let refused = |argument, problem: &str| {
+        Err(HostError::Usage {
+            argument,
+            problem: problem.to_owned(),
+        })
+    };
+    if args.model.model.kind != ModelKind::Field {
+        return Ok(());
+    }
+    if args.solver != Solver::Finished {
+        return refused(
+            "--solver",
+            "--model field has a solver of its own; leave --solver out",
+        );
+    }
+    if args.project != Projection::Linear {
+        return refused(
+            "--project",
+            "--model field has a projection of its own; leave --project out",
+        );
+    }
+    Ok(())
+}
+
 /// The figures of a fit for a terminal.
 fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
+    let parameters = text::parameters(
+        fit.model,
+        &fit.solution.parameters,
+        &Parameters::designed(stage),
+        &fit.standard_error,
+        None,
+    );
+    let beyond = fit.field.as_ref().map_or_else(String::new, text::field);
     format!(
-        "Model ({}), {} rows in {} movements, {} fitted, {} skipped; solver {}: {} evaluations in {:.1} ms, {}\n\
-         train fitness {:.4}\n\n{}\n{}",
-        report.model,
+        "{}, {} rows in {} movements, {} fitted, {} skipped; solver {}: {} evaluations in {:.1} ms, {}\n\
+         {}\n\
+         train fitness {:.4}\n\n{}\n{parameters}{beyond}",
+        fit.model.title(),
         report.rows,
         report.movements,
         report.train_rows,
@@ -212,17 +275,11 @@ fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
         fit.solution.evaluations,
         fit.solution.elapsed.as_secs_f64() * 1e3,
         fit.solution.stopped,
+        report.model_reason.as_deref().unwrap_or("-"),
         fit.train_fitness,
         text::errors(
             &format!("errors over all rows, {}", report.zeros_in_words),
             &fit.judgement.errors,
-            None
-        ),
-        text::parameters(
-            fit.model,
-            &fit.solution.parameters,
-            &Parameters::designed(stage),
-            &fit.uncertainty.standard_error,
             None
         ),
     )
@@ -250,6 +307,7 @@ fn write_report(
     output::make_folder(folder)?;
     let page = Page {
         report,
+        title: &report.model_title,
         zeros: report.zeros_in_words,
         logs: names,
         plots: &plots,

@@ -2,9 +2,8 @@
 
 use crate::cli::error::HostError;
 use crate::output::blob_file;
-use crate::problem::model::{COUNT, Model};
-use crate::problem::parameters::Parameters;
-use crate::report::json::parameters;
+use crate::problem::model::Model;
+use crate::report::json::parameters_in;
 use clap::Args;
 use runtime::ParameterSet;
 use serde_json::json;
@@ -45,7 +44,7 @@ fn hex(bytes: &[u8]) -> String {
 fn as_json(set: &ParameterSet) -> serde_json::Value {
     let c = &set.constants;
     json!({
-        "layout_version": runtime::blob::LAYOUT_VERSION,
+        "layout_version": set.layout_version(),
         "model": Model::of(set.model).name,
         "serial": set.serial.as_str(),
         "created": set.created.as_str(),
@@ -59,7 +58,7 @@ fn as_json(set: &ParameterSet) -> serde_json::Value {
                 "rz": { "rmse_urad": set.fit.rms[2] * 1e6, "peak_urad": set.fit.peak[2] * 1e6 },
             },
         },
-        "parameters": parameters(Model::of(set.model), &Parameters::of_set(set), &[None; COUNT]),
+        "parameters": parameters_in(set),
         "plane_matrix": set.plane,
         "plane_matrix_inverse": set.plane_inverse,
         "hall_m_per_count": set.hall.m_per_code,
@@ -87,7 +86,7 @@ fn as_text(set: &ParameterSet) -> String {
             text.to_owned()
         }
     };
-    let _ = writeln!(out, "layout          {}", runtime::blob::LAYOUT_VERSION);
+    let _ = writeln!(out, "layout          {}", set.layout_version());
     let _ = writeln!(out, "model           ({})", Model::of(set.model).name);
     let _ = writeln!(out, "serial          {}", or_dash(&set.serial));
     let _ = writeln!(out, "created         {}", or_dash(&set.created));
@@ -101,11 +100,7 @@ fn as_text(set: &ParameterSet) -> String {
     let _ = writeln!(out, "rms error       {x:.3} um, {y:.3} um, {rz:.3} urad");
     let [x, y, rz] = set.fit.peak.map(|e| e * 1e6);
     let _ = writeln!(out, "peak error      {x:.3} um, {y:.3} um, {rz:.3} urad");
-    for (name, p) in parameters(
-        Model::of(set.model),
-        &Parameters::of_set(set),
-        &[None; COUNT],
-    ) {
+    for (name, p) in parameters_in(set) {
         let _ = writeln!(out, "{name:<15} {:>14.7} {}", p.value, p.unit);
     }
     for (name, rows) in [

@@ -13,6 +13,7 @@ mod import;
 mod inspect;
 mod live;
 mod replay;
+mod simulate;
 
 use crate::cli::error::HostError;
 use crate::input::log::{LogReading, ReadOptions, ReferenceUse};
@@ -61,6 +62,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
     Import(Box<import::ImportArgs>),
+    /// Write the log of a simulated stage, to rehearse a calibration.
+    Simulate(simulate::SimulateArgs),
 }
 
 /// How `eval` reads: it needs the reference, and the decoder marks saturated codes.
@@ -82,6 +85,7 @@ pub fn main() -> ExitCode {
         Command::Export(args) => export::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Import(args) => import::run(*args),
+        Command::Simulate(args) => simulate::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -28,8 +28,8 @@ pub struct Model {
     pub has_zero_deviation: bool,
 }
 
-/// The models of the paper.
-pub static MODELS: [Model; 4] = [
+/// The models of the paper, and the field model.
+pub static MODELS: [Model; 5] = [
     Model {
         name: "12",
         summary: "Geometry only",
@@ -62,6 +62,15 @@ pub static MODELS: [Model; 4] = [
         fitted: 6,
         has_zero_deviation: true,
     },
+    // Its terms here are those that it shares with (31); the rest is in `solve::field`.
+    Model {
+        name: "field",
+        summary: "As 31, with what a magnet's field does beside its centre line; all six axes must move at once",
+        kind: ModelKind::Field,
+        terms: &MODEL_31,
+        fitted: 6,
+        has_zero_deviation: true,
+    },
 ];
 
 impl Model {
@@ -72,7 +81,16 @@ impl Model {
             ModelKind::M15 => 1,
             ModelKind::M30 => 2,
             ModelKind::M31 => 3,
+            ModelKind::Field => 4,
         }]
+    }
+
+    /// How a title names it: `Model (31)`, `Field model`.
+    pub fn title(&self) -> String {
+        match self.kind {
+            ModelKind::Field => "Field model".to_owned(),
+            _ => format!("Model ({})", self.name),
+        }
     }
 
     /// The parameters in the order of every list: each term for A, B, C.

@@ -102,20 +102,22 @@ impl Model {
             ModelKind::M12 | ModelKind::M15 | ModelKind::M30 | ModelKind::M31 => {
                 same.then_some(Probes::Linear(linear))
             }
+            // Its coefficients are no slopes: see `solve::field`.
+            ModelKind::Field => None,
         }
     }
 }
 
 impl Parameters {
-    /// The parameters that a blob carries, in `f64`.
+    /// The parameters that a blob carries, in `f64`: of a field model those that it shares with
+    /// Model (31).
     pub fn of_set(set: &ParameterSet) -> Self {
         let geometry = ProbeGeometry {
             lever_arm_m: set.geometry.lever_arm_m.map(f64::from),
             misalignment_rad: set.geometry.misalignment_rad.map(f64::from),
         };
-        match set.probes.rounded() {
-            Probes::Linear(sensitivity) => Self::of_model_31(&geometry, &sensitivity),
-        }
+        let sensitivity = set.probes.sensitivities().map(Sensitivity::rounded);
+        Self::of_model_31(&geometry, &sensitivity)
     }
 }
 

@@ -12,6 +12,8 @@ use serde::Serialize;
 pub struct Page<'a> {
     /// The figures of a fit.
     pub report: &'a Report,
+    /// Name of the model.
+    pub title: &'a str,
     /// How zero deviations were treated.
     pub zeros: &'a str,
     /// Names of the logs.

@@ -7,6 +7,8 @@ use crate::judge::statistics::PoseError;
 use crate::judge::{Judgement, Zeros};
 use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::Parameters;
+use crate::solve::field::parameters::values_of;
+use crate::solve::field::terms::{self, PER_PROBE};
 use runtime::ParameterSet;
 use runtime::geometry::ProbeCoordinates;
 use serde::Serialize;
@@ -121,6 +123,44 @@ pub fn parameters(
     model.parameters().map(one).collect()
 }
 
+/// All 81 parameters of a field model, A's first, by name, with their standard errors where they
+/// are known.
+pub fn field_parameters(
+    values: &[[f64; PER_PROBE]; 3],
+    standard_error: Option<&[f64; terms::COUNT]>,
+) -> BTreeMap<String, Parameter> {
+    let one = |(k, &value): (usize, &f64)| {
+        let parameter = Parameter {
+            value,
+            unit: terms::TERMS[k % PER_PROBE].unit,
+            standard_error: standard_error.map(|errors| errors[k]),
+        };
+        (terms::name(k), parameter)
+    };
+    values.as_flattened().iter().enumerate().map(one).collect()
+}
+
+/// The parameters that a blob carries, by name.
+pub fn parameters_in(set: &ParameterSet) -> BTreeMap<String, Parameter> {
+    match values_of(set) {
+        Some(values) => field_parameters(&values, None),
+        None => parameters(
+            Model::of(set.model),
+            &Parameters::of_set(set),
+            &[None; COUNT],
+        ),
+    }
+}
+
+/// By how much the reference lags behind the probes.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ReferenceLag {
+    /// Positive where the reference shows an earlier pose, us.
+    pub value_us: f64,
+    /// us; null where the log shows nothing of it.
+    pub standard_error_us: Option<f64>,
+}
+
 /// The zero deviation of one movement.
 #[derive(Clone, Debug, Serialize)]
 pub struct MovementZero {
@@ -139,8 +179,13 @@ pub struct MovementZero {
 /// What `fit` and `eval` both report.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// Equation of the model: "12", "15", "30" or "31".
+    /// Equation of the model: "12", "15", "30" or "31"; "field" for the field model.
     pub model: String,
+    /// The same for a title.
+    #[serde(skip)]
+    pub model_title: String,
+    /// Why this model; null for `eval`.
+    pub model_reason: Option<String>,
     /// Solver; null for `eval`.
     pub solver: Option<String>,
     /// How much was projected out; null for `eval`.
@@ -175,8 +220,10 @@ pub struct Report {
     /// The same for a title.
     #[serde(skip)]
     pub zeros_in_words: &'static str,
-    /// By name: lever_arm, theta, eta, a, b, c of the probes a, b, c.
+    /// By name: lever_arm, theta, eta, a, b, c of the probes a, b, c; of the field model all 81.
     pub parameters: BTreeMap<String, Parameter>,
+    /// Lag of the reference, which the fit of a field model finds; null for other models.
+    pub reference_lag: Option<ReferenceLag>,
     /// H1x .. H3y nearest to the designed ones.
     pub coordinates: Coordinates,
     /// Serial number in the blob.
@@ -218,23 +265,32 @@ fn movement_zeros(judgement: &Judgement, dataset: &Dataset) -> Vec<MovementZero>
         .collect()
 }
 
+/// What led to a fit.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// Name of the solver.
+    pub solver: &'static str,
+    /// How much was projected out.
+    pub project: &'static str,
+    /// Seed.
+    pub seed: u64,
+    /// Why this model.
+    pub model_reason: String,
+}
+
 /// The report of a fit.
-pub fn of_fit(
-    fit: &Fit,
-    solver: &str,
-    project: &'static str,
-    seed: u64,
-    c: &Circumstances,
-) -> Report {
+pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
     let parameters_fitted = &fit.solution.parameters;
     let zeros = Zeros::of_model(fit.model);
     let mut warnings = c.warnings.clone();
     warnings.extend(fit.warnings.iter().map(ToString::to_string));
     Report {
         model: fit.model.name.to_owned(),
-        solver: Some(solver.to_owned()),
-        project: Some(project),
-        seed: Some(seed),
+        model_title: fit.model.title(),
+        model_reason: Some(choice.model_reason),
+        solver: Some(choice.solver.to_owned()),
+        project: Some(choice.project),
+        seed: Some(choice.seed),
         rows: c.dataset.rows.len(),
         train_rows: fit.train_rows,
         movements: c.dataset.movements.len(),
@@ -248,11 +304,17 @@ pub fn of_fit(
         errors_solver_delta: Some(Errors::from(&fit.judgement_solver_zeros.errors)),
         delta: zeros.name(),
         zeros_in_words: zeros.words(),
-        parameters: parameters(
-            fit.model,
-            parameters_fitted,
-            &fit.uncertainty.standard_error,
-        ),
+        parameters: match &fit.field {
+            Some(field) => field_parameters(
+                &field.parameters.probes,
+                Some(&field.posterior.standard_errors()),
+            ),
+            None => parameters(fit.model, parameters_fitted, &fit.standard_error),
+        },
+        reference_lag: fit.field.as_ref().map(|field| ReferenceLag {
+            value_us: field.lag_s * 1e6,
+            standard_error_us: field.posterior.lag_error_s.map(|error| error * 1e6),
+        }),
         coordinates: c
             .stage
             .designed
@@ -275,6 +337,8 @@ pub fn of_eval(
     let values = Parameters::of_set(set);
     Report {
         model: model.name.to_owned(),
+        model_title: model.title(),
+        model_reason: None,
         solver: None,
         project: None,
         seed: None,
@@ -291,7 +355,8 @@ pub fn of_eval(
         errors_solver_delta: None,
         delta: zeros.name(),
         zeros_in_words: zeros.words(),
-        parameters: parameters(model, &values, &[None; COUNT]),
+        parameters: parameters_in(set),
+        reference_lag: None,
         coordinates: c.stage.designed.nearest_with(&values.geometry()).into(),
         serial: set.serial.as_str().to_owned(),
         zero_deviations: movement_zeros(judgement, c.dataset),

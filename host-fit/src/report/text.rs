@@ -3,6 +3,8 @@
 use crate::judge::statistics::PoseError;
 use crate::problem::model::{COUNT, Model};
 use crate::problem::parameters::{ETA, Parameters, THETA};
+use crate::solve::field::fit::FieldFit;
+use crate::solve::field::terms::{BEYOND_MODEL_31, PER_PROBE, TERMS};
 use std::fmt::Write;
 
 /// Errors by axis, as Tables 2, 4 and 8 of the paper show them; `paper` stands beside them as
@@ -74,5 +76,30 @@ pub fn parameters(
         }
         out.push('\n');
     }
+    out
+}
+
+/// What the field model has beyond Model (31): its terms with their standard errors, and the lag
+/// of the reference.
+pub fn field(fit: &FieldFit) -> String {
+    let errors = fit.posterior.standard_errors();
+    let mut out = format!("\n  {:<14}", "field terms");
+    for probe in ["A", "B", "C"] {
+        let _ = write!(out, "{probe:>11}{:>10}", "std. err.");
+    }
+    out.push_str("  unit\n");
+    for (k, term) in TERMS.iter().enumerate().skip(BEYOND_MODEL_31) {
+        let _ = write!(out, "  {:<14}", term.name);
+        for (probe, values) in fit.parameters.probes.iter().enumerate() {
+            let error = errors[probe * PER_PROBE + k];
+            let _ = write!(out, "{:>11.6}{error:>10.1e}", values[k]);
+        }
+        let _ = writeln!(out, "  {}", term.unit);
+    }
+    let _ = write!(out, "\n  lag of the reference {:.1} us", fit.lag_s * 1e6);
+    if let Some(error) = fit.posterior.lag_error_s {
+        let _ = write!(out, ", standard error {:.1} us", error * 1e6);
+    }
+    out.push('\n');
     out
 }

@@ -90,7 +90,7 @@ fn as_text(demo: &Demo, zero_deviations: bool) -> String {
             fit.model,
             &fit.solution.parameters,
             &Parameters::designed(&demo.stage),
-            &fit.uncertainty.standard_error,
+            &fit.standard_error,
             Some(&table_7())
         )
     );
