@@ -3,7 +3,7 @@
 //!
 //! Prints `RESULT key=value` lines, medians of several runs.
 
-use host_fit::fit::{FitSettings, fit};
+use host_fit::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::log;
 use host_fit::input::stage::Stage;
 use host_fit::problem::Problem;
@@ -150,7 +150,7 @@ fn main() {
     );
     let dataset = read().dataset;
     let settings = FitSettings {
-        model: Model::of(ModelKind::M31),
+        model: ModelChoice::Named(Model::of(ModelKind::M31)),
         train: None,
         draw: Draw::Stratified,
         solver: Solver::LeastSquares,

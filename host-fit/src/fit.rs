@@ -3,20 +3,25 @@
 //! dataset -> rows drawn -> problem -> solver -> standard errors -> parameter set -> judgement.
 //! Nothing is written here.
 
+mod compensate;
 mod field;
+mod warning;
+
+pub use compensate::fit_compensated;
+pub use warning::FitWarning;
 
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::identify::{FitFailure, check_described, check_determined, check_motion};
-use crate::judge::statistics::AxisError;
+use crate::judge::lag::{ReferenceLag, reference_lag};
 use crate::judge::uncertainty::uncertainty;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::Problem;
 use crate::problem::draw::{Draw, draw_rows};
-use crate::problem::model::{COUNT, Model, ParameterId};
+use crate::problem::model::{COUNT, Model};
 use crate::problem::parameters::Parameters;
 use crate::solve::field::fit::{FieldFit, FieldFitError};
-use crate::solve::{Solution, SolveError, Solver, SolverOptions};
+use crate::solve::{Projection, Solution, SolveError, Solver, SolverOptions};
 use runtime::calibration::Origin;
 use runtime::parameters::{FitRecord, ParameterError, Text};
 use runtime::{Calibration, ModelKind, ParameterSet};
@@ -25,11 +30,20 @@ use runtime::{Calibration, ModelKind, ParameterSet};
 /// the reference and overshoot are well inside it.
 const RANGE_MARGIN: f64 = 1.1;
 
+/// Which model is fitted.
+#[derive(Clone, Copy, Debug)]
+pub enum ModelChoice {
+    /// The field model where the log can carry it, else Model (31).
+    Auto,
+    /// This one.
+    Named(&'static Model),
+}
+
 /// What the user chose.
 #[derive(Clone, Debug)]
 pub struct FitSettings {
     /// The model.
-    pub model: &'static Model,
+    pub model: ModelChoice,
     /// Rows to use; all if `None`.
     pub train: Option<usize>,
     /// How they are drawn.
@@ -42,83 +56,6 @@ pub struct FitSettings {
     pub serial: Text,
     /// Creation time, for the blob.
     pub created: Text,
-}
-
-/// Something that the user should know of a fit that is good nevertheless.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FitWarning {
-    /// A parameter stands at an end of its search range.
-    #[error(
-        "{} stands at an end of its search range ({value:.6} {}): widen the range in stage.toml, or check the log",
-        id.name(), id.term.unit
-    )]
-    AtLimit {
-        /// The parameter.
-        id: ParameterId,
-        /// Its value, SI.
-        value: f64,
-    },
-    /// Zero deviations were clipped to their range.
-    #[error(
-        "the zero deviation of {count} of {of} movements was clipped to its range: widen search.delta_m in stage.toml if \
-         the interferometers are reset less exactly than that"
-    )]
-    ZeroDeviationClipped {
-        /// Movements with a clipped one.
-        count: usize,
-        /// All movements.
-        of: usize,
-    },
-    /// The draw has no row of some movements.
-    #[error(
-        "the draw of rows misses {} movement(s) ({}): their zero deviation is free, and the solver's own is taken as zero. \
-         Use --draw stratified, or a larger --train",
-        movements.len(), join(movements)
-    )]
-    MovementsMissed {
-        /// Their names, by [`Dataset::movement_name`].
-        movements: Vec<String>,
-    },
-    /// Several vertical terms stand at an end of their range.
-    #[error(
-        "{count} of the vertical terms stand at an end of their range: check the order and the signs of the \
-         capacitive sensors in the log and in stage.toml"
-    )]
-    VerticalTermsAtLimit {
-        /// How many.
-        count: usize,
-    },
-    /// An error is far larger than noise makes it.
-    #[error(
-        "the largest error, {error_micro:.1} {unit} in {axis}, is {ratio:.0} times the rms: see movement {movement} at \
-         t_us = {t_us}. If the row is wrong, take it out of the log and fit again"
-    )]
-    WildRow {
-        /// The axis.
-        axis: &'static str,
-        /// um or urad.
-        unit: &'static str,
-        /// The error, um or urad.
-        error_micro: f64,
-        /// The error over the rms of its axis.
-        ratio: f64,
-        /// The movement, by [`Dataset::movement_name`].
-        movement: String,
-        /// Its time in the log, us.
-        t_us: i64,
-    },
-    /// Rows that the decoder refused count in no error.
-    #[error("{rows} rows have codes that the decoder refuses; they are not part of the errors")]
-    Undecoded {
-        /// How many.
-        rows: usize,
-    },
-}
-
-fn join(names: &[String]) -> String {
-    const SHOWN: usize = 10;
-    let dots = if names.len() > SHOWN { ", ..." } else { "" };
-    names[..names.len().min(SHOWN)].join(", ") + dots
 }
 
 /// Why there is no calibration.
@@ -171,6 +108,8 @@ pub enum FitError {
 pub struct Fit {
     /// The model.
     pub model: &'static Model,
+    /// Why this model, in a line.
+    pub model_reason: String,
     /// What the solver found; of the field model the parameters that Model (31) has too.
     pub solution: Solution,
     /// Standard errors of these; `None` as in
@@ -178,6 +117,9 @@ pub struct Fit {
     pub standard_error: [Option<f64>; COUNT],
     /// All of a fit of the field model.
     pub field: Option<FieldFit>,
+    /// By how much the reference lags behind the probes, fitted with the parameters; `None` where
+    /// nothing in the log shows it.
+    pub lag: Option<ReferenceLag>,
     /// The calibration in `f64`.
     pub calibration: Calibration,
     /// What goes into the blob.
@@ -201,60 +143,156 @@ pub struct Fit {
 /// # Errors
 /// See [`FitError`].
 pub fn fit(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<Fit, FitError> {
-    let (model, solver) = (settings.model, settings.solver);
-    let count = settings.train.unwrap_or(dataset.rows.len());
-    let selected = draw_rows(dataset, count, settings.draw, settings.options.seed);
-    // The lever arms, the first term, take theirs from the coordinates.
-    let ranged = &model.terms[1..model.fitted];
-    if let Some(term) = ranged
-        .iter()
-        .find(|t| stage.search.of(t.range_key).is_none())
-    {
-        return Err(FitError::NoRange {
-            key: term.range_key,
-            model: model.name,
-        });
-    }
-    check_motion(dataset, stage, selected.len(), model)?;
-    if model.kind == ModelKind::Field {
-        return field::fit(dataset, stage, settings, &selected);
-    }
-    let problem = Problem::new(dataset, &selected, stage, model);
-    let solution = solver.solve(&problem, &settings.options)?;
-    let parameters = &solution.parameters;
-    let at_pole = FitError::AtPole {
-        solver: solver.name(),
+    let job = Job::new(dataset, stage, settings);
+    let mut fit = match settings.model {
+        ModelChoice::Auto => job.best()?,
+        ModelChoice::Named(model) => job.of_model(model)?,
     };
-    let uncertainty = uncertainty(&problem, parameters, &solution.at_limit).ok_or(at_pole)?;
-    let calibration = calibration(dataset, stage, model, parameters)?;
-    let vertical = calibration.calibrated_vertical;
-    let determined = check_determined(&problem, parameters, &uncertainty, vertical);
-    let judged = judged(dataset, stage, settings, &calibration, selected.len());
-    if let Err(FitError::Unusable(_)) = judged {
-        determined.clone()?;
+    if let Some(lag) = &fit.lag {
+        fit.warnings
+            .extend(FitWarning::of_lag(lag, stage.servo_period_s));
     }
-    // First this: a log that the model does not describe determines nothing, but for that reason.
-    let Judged {
-        set,
-        decoded,
-        judgement,
-    } = judged?;
-    determined?;
-    let own_zeros = Zeros::Given(&solution.delta_m);
-    Ok(Fit {
-        model,
-        warnings: warnings(dataset, &problem, &solution, &judgement),
-        train_fitness: problem.fitness(solution.cost),
-        train_rows: selected.len(),
-        standard_error: uncertainty.standard_error,
-        field: None,
-        judgement_solver_zeros: decoded.judge(dataset, stage, own_zeros),
-        solution,
-        calibration,
-        set,
-        decoded,
-        judgement,
-    })
+    Ok(fit)
+}
+
+/// What every model of a log is fitted with.
+struct Job<'a> {
+    dataset: &'a Dataset,
+    stage: &'a Stage,
+    settings: &'a FitSettings,
+    /// The rows to use.
+    selected: Vec<usize>,
+}
+
+impl<'a> Job<'a> {
+    fn new(dataset: &'a Dataset, stage: &'a Stage, settings: &'a FitSettings) -> Self {
+        let count = settings.train.unwrap_or(dataset.rows.len());
+        Self {
+            selected: draw_rows(dataset, count, settings.draw, settings.options.seed),
+            dataset,
+            stage,
+            settings,
+        }
+    }
+
+    /// The field model where the log can carry it, else Model (31).
+    fn best(&self) -> Result<Fit, FitError> {
+        let usual = matches!(
+            self.settings.solver,
+            Solver::Finished | Solver::LeastSquares
+        ) && self.settings.options.projection == Projection::Linear;
+        let reason = if usual {
+            match self.of_model(Model::of(ModelKind::Field)) {
+                Ok(fit) if fit.field.as_ref().is_some_and(|field| field.verdict.field) => {
+                    return Ok(fit);
+                }
+                Ok(fit) => fit.model_reason,
+                Err(error) => error.to_string(),
+            }
+        } else {
+            "--solver and --project are for it; the field model has ways of its own".to_owned()
+        };
+        let fit = self.of_model(Model::of(ModelKind::M31))?;
+        Ok(Fit {
+            model_reason: format!("model (31): {reason}"),
+            ..fit
+        })
+    }
+
+    fn of_model(&self, model: &'static Model) -> Result<Fit, FitError> {
+        // The lever arms, the first term, take theirs from the coordinates.
+        let ranged = &model.terms[1..model.fitted];
+        if let Some(term) = ranged
+            .iter()
+            .find(|t| self.stage.search.of(t.range_key).is_none())
+        {
+            return Err(FitError::NoRange {
+                key: term.range_key,
+                model: model.name,
+            });
+        }
+        check_motion(self.dataset, self.stage, self.selected.len(), model)?;
+        match model.kind {
+            ModelKind::Field => self.of_field_model(model),
+            _ => self.of_slopes(model),
+        }
+    }
+
+    /// A model of the paper: slopes of the sensitivity at most.
+    fn of_slopes(&self, model: &'static Model) -> Result<Fit, FitError> {
+        let Self {
+            dataset,
+            stage,
+            settings,
+            selected,
+        } = self;
+        let solver = settings.solver;
+        let problem = Problem::new(dataset, selected, stage, model);
+        let solution = solver.solve(&problem, &settings.options)?;
+        let parameters = &solution.parameters;
+        let at_pole = FitError::AtPole {
+            solver: solver.name(),
+        };
+        let uncertainty = uncertainty(&problem, parameters, &solution.at_limit).ok_or(at_pole)?;
+        let calibration = calibration(dataset, stage, model, parameters)?;
+        let vertical = calibration.calibrated_vertical;
+        let determined = check_determined(&problem, parameters, &uncertainty, vertical);
+        let judged = self.judged(model, &calibration);
+        if let Err(FitError::Unusable(_)) = judged {
+            determined.clone()?;
+        }
+        // First this: a log that the model does not describe determines nothing, but for that reason.
+        let Judged {
+            set,
+            decoded,
+            judgement,
+        } = judged?;
+        determined?;
+        let own_zeros = Zeros::Given(&solution.delta_m);
+        Ok(Fit {
+            model,
+            model_reason: format!("model ({}): --model asks for it", model.name),
+            warnings: warning::warnings(dataset, &problem, &solution, &judgement),
+            train_fitness: problem.fitness(solution.cost),
+            train_rows: selected.len(),
+            standard_error: uncertainty.standard_error,
+            field: None,
+            lag: reference_lag(dataset, selected, stage, model, parameters),
+            judgement_solver_zeros: decoded.judge(dataset, stage, own_zeros),
+            solution,
+            calibration,
+            set,
+            decoded,
+            judgement,
+        })
+    }
+
+    /// Judges a calibration, which must describe the dataset.
+    fn judged(&self, model: &'static Model, calibration: &Calibration) -> Result<Judged, FitError> {
+        let (dataset, settings) = (self.dataset, self.settings);
+        let origin = Origin {
+            serial: settings.serial.clone(),
+            created: settings.created.clone(),
+            logs_sha256: dataset.sha256,
+            fit: FitRecord::default(),
+        };
+        let mut set = calibration.prepare(&origin).map_err(FitError::Unusable)?;
+        let decoded = Decoded::new(&set, dataset);
+        let judgement = decoded.judge(dataset, self.stage, Zeros::of_model(model));
+        check_described(dataset, &judgement.errors, model)?;
+        let axes = judgement.errors.axes;
+        set.fit = FitRecord {
+            rows: u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX),
+            train_rows: u32::try_from(self.selected.len()).unwrap_or(u32::MAX),
+            rms: axes.map(|a| a.rms as f32),
+            peak: axes.map(|a| a.peak as f32),
+        };
+        Ok(Judged {
+            set,
+            decoded,
+            judgement,
+        })
+    }
 }
 
 /// A calibration on all rows, by the target's decoder.
@@ -262,108 +300,6 @@ struct Judged {
     set: ParameterSet,
     decoded: Decoded,
     judgement: Judgement,
-}
-
-/// Judges a calibration, which must describe the dataset.
-fn judged(
-    dataset: &Dataset,
-    stage: &Stage,
-    settings: &FitSettings,
-    calibration: &Calibration,
-    train_rows: usize,
-) -> Result<Judged, FitError> {
-    let origin = Origin {
-        serial: settings.serial.clone(),
-        created: settings.created.clone(),
-        logs_sha256: dataset.sha256,
-        fit: FitRecord::default(),
-    };
-    let mut set = calibration.prepare(&origin).map_err(FitError::Unusable)?;
-    let decoded = Decoded::new(&set, dataset);
-    let judgement = decoded.judge(dataset, stage, Zeros::of_model(settings.model));
-    check_described(dataset, &judgement.errors, settings.model)?;
-    let axes = judgement.errors.axes;
-    set.fit = FitRecord {
-        rows: u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX),
-        train_rows: u32::try_from(train_rows).unwrap_or(u32::MAX),
-        rms: axes.map(|a| a.rms as f32),
-        peak: axes.map(|a| a.peak as f32),
-    };
-    Ok(Judged {
-        set,
-        decoded,
-        judgement,
-    })
-}
-
-fn warnings(
-    dataset: &Dataset,
-    problem: &Problem,
-    solution: &Solution,
-    judgement: &Judgement,
-) -> Vec<FitWarning> {
-    let mut warnings = Vec::new();
-    for &id in &solution.at_limit {
-        let value = solution.parameters.values[id.index];
-        warnings.push(FitWarning::AtLimit { id, value });
-    }
-    let vertical = solution.at_limit.iter().filter(|id| id.is_slope()).count();
-    if vertical > 1 {
-        warnings.push(FitWarning::VerticalTermsAtLimit { count: vertical });
-    }
-    warnings.extend(wild_row(dataset, judgement));
-    let clipped = judgement.zeros.iter().filter(|zero| zero.clipped).count();
-    if clipped > 0 {
-        warnings.push(FitWarning::ZeroDeviationClipped {
-            count: clipped,
-            of: dataset.movements.len(),
-        });
-    }
-    let mut present = vec![false; dataset.movements.len()];
-    for group in &problem.groups {
-        present[group.movement] = true;
-    }
-    let missed = present
-        .iter()
-        .zip(&dataset.movements)
-        .filter(|(present, _)| !**present);
-    let missed: Vec<String> = missed
-        .map(|(_, movement)| dataset.movement_name(movement))
-        .collect();
-    if problem.model.has_zero_deviation && !missed.is_empty() {
-        warnings.push(FitWarning::MovementsMissed { movements: missed });
-    }
-    if judgement.undecoded > 0 {
-        warnings.push(FitWarning::Undecoded {
-            rows: judgement.undecoded,
-        });
-    }
-    warnings
-}
-
-/// In a million rows of noise alone the largest is five times the rms.
-const PEAK_TO_RMS_MAX: f64 = 8.0;
-
-/// The row with the largest error in terms of its axis' rms, if that is too large for noise.
-fn wild_row(dataset: &Dataset, judgement: &Judgement) -> Option<FitWarning> {
-    const AXES: [(&str, &str); 3] = [("X", "um"), ("Y", "um"), ("Rz", "urad")];
-    let axes = AXES.into_iter().zip(judgement.errors.axes);
-    let ((axis, unit), error) = axes.max_by(|(_, a), (_, b)| {
-        let ratio = |e: &AxisError| e.peak / e.rms.max(f64::MIN_POSITIVE);
-        ratio(a).total_cmp(&ratio(b))
-    })?;
-    if error.peak <= PEAK_TO_RMS_MAX * error.rms {
-        return None;
-    }
-    let row = dataset.rows.get(error.peak_row)?;
-    Some(FitWarning::WildRow {
-        axis,
-        unit,
-        error_micro: error.peak * 1e6,
-        ratio: error.peak / error.rms,
-        movement: dataset.movement_name(dataset.movements.get(row.movement)?),
-        t_us: row.t_us,
-    })
 }
 
 /// The calibration that `parameters` make with the stage's scales, calibrated over the motion

@@ -2,14 +2,14 @@
 
 mod common;
 
-use common::{Bench, stdout, thinned_log};
+use common::{Bench, stderr, stdout, thinned_log};
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
-/// A run of 8 s, all six axes at once, with these periods.
+/// A run of 8 s, all six axes at once over the range of service, with these periods.
 fn plan(cycles: [f64; 6]) -> String {
-    const AMPLITUDES: [f64; 6] = [250.0, 400.0, 250.0, 120.0, 240.0, 240.0];
+    const AMPLITUDES: [f64; 6] = [500.0, 800.0, 500.0, 240.0, 480.0, 480.0];
     let mut csv = "t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad\n".to_owned();
     for row in 0..4000 {
         let t_s = f64::from(row) * 0.002;
@@ -77,7 +77,8 @@ fn log_of_truth(bench: &Bench) -> String {
     csv
 }
 
-/// Each axis within 3 % of the floor; Model (31), fitted to the same log, is more than twice off.
+/// Each axis within 6 % of the floor, which is up to 4 % low, since 81 parameters fitted to 8 s of
+/// noise take some of it; Model (31), fitted to the same log, is a tenth or more above it.
 #[test]
 fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
     let bench = bench();
@@ -110,13 +111,8 @@ fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
     }
 
     bench.good("decode p.bin service.csv --stage stage.toml --out pose.csv");
-    bench.good("fit log.csv --stage stage.toml --out p31.bin --json p31.json");
+    bench.good("fit log.csv --stage stage.toml --out p31.bin --model 31");
     bench.good("decode p31.bin service.csv --stage stage.toml --out pose31.csv");
-    assert!(
-        bench.json("p31.json")["model_reason"]
-            .to_string()
-            .contains("--model field")
-    );
     let (field, model_31) = (
         rms_against_truth(&bench, "pose.csv"),
         rms_against_truth(&bench, "pose31.csv"),
@@ -133,16 +129,100 @@ fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
     bench.good("decode own.bin service.csv --stage stage.toml --out own-pose.csv");
     let floor = rms_against_truth(&bench, "own-pose.csv");
     for axis in 0..3 {
-        assert!(field[axis] < 1.03 * floor[axis], "{field:?} {floor:?}");
-        assert!(model_31[axis] > 2.0 * field[axis], "{model_31:?} {field:?}");
+        assert!(field[axis] < 1.06 * floor[axis], "{field:?} {floor:?}");
+        assert!(model_31[axis] > 1.1 * field[axis], "{model_31:?} {field:?}");
         assert!(
             (judged[axis] / field[axis] - 1.0).abs() < 0.2,
             "{judged:?} {field:?}"
         );
     }
 
-    bench.good("export p.bin --format bin --out flash.bin");
+    bench.good("export p.bin --format bin --address 0x08010000 --out flash.bin");
     assert_eq!(bench.read("flash.bin"), bench.read("p.bin"));
+}
+
+/// A log with its reference `rows` rows late.
+fn late(log: &str, rows: usize) -> String {
+    let mut lines = log.lines();
+    let mut out = format!("{}\n", lines.next().expect("a header"));
+    let cells: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    for (before, now) in cells.iter().zip(&cells[rows..]) {
+        assert_eq!(before[0], now[0], "one movement");
+        let row = [&now[..2], &before[2..5], &now[5..]].concat();
+        let _ = writeln!(out, "{}", row.join(","));
+    }
+    out
+}
+
+#[test]
+fn a_late_reference_is_told_by_every_model_and_taken_off_when_asked() {
+    let bench = bench();
+    bench.write("late.csv", late(&bench.text("log.csv"), 3));
+    for model in ["31", "field", "auto"] {
+        let fit =
+            format!("fit late.csv --stage stage.toml --out p.bin --model {model} --json p.json");
+        let told = bench.good(&fit);
+        assert!(
+            stderr(&told).contains("the reference lags behind the probes by "),
+            "{}",
+            stderr(&told)
+        );
+        let lag = |bench: &Bench| {
+            let lag = &bench.json("p.json")["reference_lag"];
+            let number = |key: &str| lag[key].as_f64().expect("a number");
+            (
+                number("value_us"),
+                number("standard_error_us"),
+                lag["compensated"] == true,
+            )
+        };
+        let (value_us, error_us, compensated) = lag(&bench);
+        assert!((value_us - 6000.0).abs() < 200.0, "{value_us} {error_us}");
+        assert!(!compensated);
+        let quiet = bench.good(&format!("{fit} --compensate-lag"));
+        assert!(!stderr(&quiet).contains("probes by"), "{}", stderr(&quiet));
+        let (value_us, error_us, compensated) = lag(&bench);
+        assert!(
+            (value_us - 6000.0).abs() < 4.0 * error_us && compensated,
+            "{value_us} {error_us}"
+        );
+    }
+    let rms = &bench.json("p.json")["errors"]["y"]["rmse_um"];
+    assert!(rms.as_f64() < Some(0.6), "{rms}");
+}
+
+#[test]
+fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
+    let bench = bench();
+    bench.write("paper.csv", thinned_log(20, |_| true));
+    for (log, model, reason) in [
+        (
+            "log.csv",
+            "field",
+            "the field model: errors predicted for service",
+        ),
+        (
+            "paper.csv",
+            "31",
+            "model (31): this log leaves the field model",
+        ),
+    ] {
+        bench.good(&format!(
+            "fit {log} --stage stage.toml --out auto.bin --json auto.json"
+        ));
+        let json = bench.json("auto.json");
+        assert_eq!(json["model"], model);
+        let told = json["model_reason"].as_str().expect("a sentence");
+        assert!(told.starts_with(reason), "{told}");
+        bench.good(&format!(
+            "fit {log} --stage stage.toml --out named.bin --model {model}"
+        ));
+        assert_eq!(bench.read("auto.bin"), bench.read("named.bin"));
+    }
+    bench.good(
+        "fit log.csv --stage stage.toml --out p.bin --solver shtlbo --generations 3 --json p.json",
+    );
+    assert_eq!(bench.json("p.json")["model"], "31");
 }
 
 #[test]

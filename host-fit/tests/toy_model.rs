@@ -5,7 +5,7 @@
 //! and JSON follow from it. Its tick, which the runtime does not have, is a type of its own in
 //! `runtime/tests/another_model.rs`; until a decoder has it, `fit` refuses to judge it.
 
-use host_fit::fit::{FitError, FitSettings, fit};
+use host_fit::fit::{FitError, FitSettings, ModelChoice, fit};
 use host_fit::input::dataset::Dataset;
 use host_fit::input::shipped::STAGE_TOML;
 use host_fit::input::stage::{Range, Stage};
@@ -196,7 +196,7 @@ fn fit_refuses_what_no_decoder_has_and_terms_without_a_range() {
     let stage = stage();
     let dataset = log(&stage);
     let settings = FitSettings {
-        model: &TOY,
+        model: ModelChoice::Named(&TOY),
         train: None,
         draw: Draw::Stratified,
         solver: Solver::LeastSquares,

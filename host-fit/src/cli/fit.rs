@@ -2,7 +2,7 @@
 
 use super::args::Train;
 use crate::cli::error::HostError;
-use crate::fit::{Fit, FitError, FitSettings, fit};
+use crate::fit::{Fit, FitError, FitSettings, ModelChoice, fit, fit_compensated};
 use crate::input::log;
 use crate::input::log::{BadRows, LogReading, ReadOptions};
 use crate::input::stage::Stage;
@@ -10,7 +10,7 @@ use crate::interrupt;
 use crate::output;
 use crate::output::blob_file;
 use crate::problem::draw::Draw;
-use crate::problem::model::{MODELS, Model};
+use crate::problem::model::MODELS;
 use crate::problem::parameters::Parameters;
 use crate::report::html::{Page, Plot};
 use crate::report::json::{Choice, Report, of_fit};
@@ -23,40 +23,18 @@ use runtime::parameters::Text;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// What `--model` says.
-#[derive(Clone, Copy, Debug)]
-struct ModelChoice {
-    model: &'static Model,
-    auto: bool,
-}
-
 /// The models on the command line, `auto` and those of the table.
 fn models() -> impl TypedValueParser<Value = ModelChoice> {
-    let auto = PossibleValue::new("auto").help("As yet (31), which any log can carry");
+    let auto =
+        PossibleValue::new("auto").help("The field model where the log can carry it, else 31");
     let named = MODELS
         .iter()
         .map(|model| PossibleValue::new(model.name).help(model.summary));
     let names: Vec<PossibleValue> = [auto].into_iter().chain(named).collect();
     PossibleValuesParser::new(names).map(|name| {
         let named = MODELS.iter().find(|model| model.name == name);
-        ModelChoice {
-            model: named.unwrap_or(Model::of(ModelKind::M31)),
-            auto: named.is_none(),
-        }
+        named.map_or(ModelChoice::Auto, ModelChoice::Named)
     })
-}
-
-/// Why this model: the sentence of the verdict on a field model, else where the choice comes from.
-fn model_reason(choice: ModelChoice, fit: &Fit) -> String {
-    match &fit.field {
-        Some(field) => field.verdict.to_string(),
-        None if choice.auto => {
-            "model (31): --model auto takes it for every log as yet; where all six axes move at \
-                                once in the log, --model field is better in service"
-                .to_owned()
-        }
-        None => format!("model ({}): --model asks for it", fit.model.name),
-    }
 }
 
 fn blob_text(value: &str) -> Result<Text, &'static str> {
@@ -107,6 +85,9 @@ pub(super) struct FitArgs {
     /// Threads; all cores if not given. The result does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Take the lag of the reference off, as the fit finds it.
+    #[arg(long)]
+    compensate_lag: bool,
     /// Serial number of the stage, for the blob; at most 32 bytes.
     #[arg(long, value_name = "TEXT", value_parser = blob_text)]
     serial: Option<Text>,
@@ -158,7 +139,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     if let Some(folder) = args.report.as_deref().filter(|folder| folder.exists()) {
         output::make_folder(folder)?;
     }
-    let log = log::read(&args.logs, &stage, &options)?;
+    let mut log = log::read(&args.logs, &stage, &options)?;
     let known = match &args.start {
         Some(path) => Some(Parameters::of_set(&blob_file::read(path)?)),
         None => None,
@@ -169,7 +150,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     options.known = known;
     options.interrupt = Some(interrupt::watch());
     let settings = FitSettings {
-        model: args.model.model,
+        model: args.model,
         train: args.train.0,
         draw: args.draw,
         solver: args.solver,
@@ -177,7 +158,15 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         serial: args.serial.clone().unwrap_or_default(),
         created: args.created.clone().unwrap_or_default(),
     };
-    let fit = match fit(&log.dataset, &stage, &settings) {
+    let fitted = if args.compensate_lag {
+        fit_compensated(&log.dataset, &stage, &settings).map(|(fit, compensated)| {
+            log.dataset = compensated;
+            fit
+        })
+    } else {
+        fit(&log.dataset, &stage, &settings)
+    };
+    let fit = match fitted {
         Err(error) if interrupt::requested() => {
             return Err(HostError::Interrupted {
                 kept: format!("no parameter blob was written: {error}"),
@@ -201,7 +190,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         solver: solver.name(),
         project: project.name(),
         seed: args.seed,
-        model_reason: model_reason(args.model, &fit),
+        lag_compensated: args.compensate_lag,
     };
     let report = of_fit(&fit, choice, &circumstances);
     blob_file::write(&args.out, &fit.set)?;
@@ -234,7 +223,7 @@ fn check_field_arguments(args: &FitArgs) -> Result<(), HostError> {
             problem: problem.to_owned(),
         })
     };
-    if args.model.model.kind != ModelKind::Field {
+    if !matches!(args.model, ModelChoice::Named(model) if model.kind == ModelKind::Field) {
         return Ok(());
     }
     if args.solver != Solver::Finished {
@@ -265,7 +254,7 @@ fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
     format!(
         "{}, {} rows in {} movements, {} fitted, {} skipped; solver {}: {} evaluations in {:.1} ms, {}\n\
          {}\n\
-         train fitness {:.4}\n\n{}\n{parameters}{beyond}",
+         train fitness {:.4}\n\n{}\n{parameters}{beyond}\n{}",
         fit.model.title(),
         report.rows,
         report.movements,
@@ -281,6 +270,10 @@ fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
             &format!("errors over all rows, {}", report.zeros_in_words),
             &fit.judgement.errors,
             None
+        ),
+        text::lag(
+            fit.lag,
+            report.reference_lag.is_some_and(|lag| lag.compensated)
         ),
     )
 }

@@ -1,10 +1,10 @@
 //! The main job for the field model: Model (31) by least squares first, then the field model from
 //! there, refused where the log leaves it worse than Model (31).
 
-use super::{Fit, FitError, FitSettings, Judged, calibration, judged, warnings};
-use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
+use super::warning::warnings;
+use super::{Fit, FitError, Job, Judged, calibration};
 use crate::judge::Zeros;
+use crate::judge::lag::ReferenceLag;
 use crate::problem::Problem;
 use crate::problem::model::Model;
 use crate::solve::field::fit::{FieldFitError, fit_field};
@@ -14,69 +14,78 @@ use runtime::parameters::ParameterError;
 use runtime::{Calibration, ModelKind};
 use std::time::Instant;
 
-/// Fits the field model to the rows `selected`, checks and judges.
-pub(super) fn fit(
-    dataset: &Dataset,
-    stage: &Stage,
-    settings: &FitSettings,
-    selected: &[usize],
-) -> Result<Fit, FitError> {
-    let started = Instant::now();
-    let model_31 = Model::of(ModelKind::M31);
-    let problem = Problem::new(dataset, selected, stage, model_31);
-    let start = Solver::LeastSquares.solve(&problem, &settings.options)?;
-    let field = fit_field(dataset, selected, stage, &start.parameters)?;
-    if field.verdict.loses() {
-        let verdict = Box::new(field.verdict);
-        return Err(FieldFitError::NotCarried(verdict).into());
-    }
-    let elapsed = started.elapsed();
-    let parameters = field.parameters.model_31();
-    let constants = field.parameters.constants(stage.hall.m_per_count);
-    let constants = constants.ok_or(FitError::Unusable(ParameterError::SingularPlane))?;
-    let calibration = Calibration {
-        model: settings.model.kind,
-        probes: Probes::Field(constants.probes),
-        ..calibration(dataset, stage, model_31, &parameters)?
-    };
-    let Judged {
-        set,
-        decoded,
-        judgement,
-    } = judged(dataset, stage, settings, &calibration, selected.len())?;
-    // The fit follows the reference's walk; one zero deviation for a movement is that of the
-    // judgement.
-    let errors = decoded.errors_less(&judgement.zeros, dataset);
-    let mut cost = 0.0;
-    for error in selected.iter().filter_map(|&row| errors[row]) {
-        for (error, weight) in error.into_iter().zip(problem.weights) {
-            cost += weight * (error * 1e6) * (error * 1e6);
+impl Job<'_> {
+    /// The field model, refused where it would serve worse than Model (31).
+    pub(super) fn of_field_model(&self, model: &'static Model) -> Result<Fit, FitError> {
+        let Self {
+            dataset,
+            stage,
+            settings,
+            selected,
+        } = self;
+        let started = Instant::now();
+        let model_31 = Model::of(ModelKind::M31);
+        let problem = Problem::new(dataset, selected, stage, model_31);
+        let start = Solver::LeastSquares.solve(&problem, &settings.options)?;
+        let field = fit_field(dataset, selected, stage, &start.parameters)?;
+        if field.verdict.loses() {
+            let verdict = Box::new(field.verdict);
+            return Err(FieldFitError::NotCarried(verdict).into());
         }
+        let elapsed = started.elapsed();
+        let parameters = field.parameters.model_31();
+        let constants = field.parameters.constants(stage.hall.m_per_count);
+        let constants = constants.ok_or(FitError::Unusable(ParameterError::SingularPlane))?;
+        let calibration = Calibration {
+            model: model.kind,
+            probes: Probes::Field(constants.probes),
+            ..calibration(dataset, stage, model_31, &parameters)?
+        };
+        let Judged {
+            set,
+            decoded,
+            judgement,
+        } = self.judged(model, &calibration)?;
+        // The fit follows the reference's walk; one zero deviation for a movement is that of the
+        // judgement.
+        let errors = decoded.errors_less(&judgement.zeros, dataset);
+        let mut cost = 0.0;
+        for error in selected.iter().filter_map(|&row| errors[row]) {
+            for (error, weight) in error.into_iter().zip(problem.weights) {
+                cost += weight * (error * 1e6) * (error * 1e6);
+            }
+        }
+        let solution = Solution {
+            parameters,
+            delta_m: judgement.zeros.iter().map(|zero| zero.delta_m).collect(),
+            cost,
+            evaluations: start.evaluations + u64::from(field.iterations),
+            elapsed,
+            stopped: format!(
+                "maximum a posteriori reached {} steps after model (31)",
+                field.iterations
+            ),
+            at_limit: Vec::new(),
+        };
+        let lag = |standard_error_s| ReferenceLag {
+            value_s: field.lag_s,
+            standard_error_s,
+        };
+        Ok(Fit {
+            model,
+            model_reason: field.verdict.to_string(),
+            warnings: warnings(dataset, &problem, &solution, &judgement),
+            train_fitness: problem.fitness(cost),
+            train_rows: selected.len(),
+            standard_error: field.posterior.standard_errors_31(),
+            lag: field.posterior.lag_error_s.map(lag),
+            judgement_solver_zeros: decoded.judge(dataset, stage, Zeros::Given(&solution.delta_m)),
+            solution,
+            calibration,
+            set,
+            decoded,
+            judgement,
+            field: Some(field),
+        })
     }
-    let solution = Solution {
-        parameters,
-        delta_m: judgement.zeros.iter().map(|zero| zero.delta_m).collect(),
-        cost,
-        evaluations: start.evaluations + u64::from(field.iterations),
-        elapsed,
-        stopped: format!(
-            "maximum a posteriori reached {} steps after model (31)",
-            field.iterations
-        ),
-        at_limit: Vec::new(),
-    };
-    Ok(Fit {
-        model: settings.model,
-        warnings: warnings(dataset, &problem, &solution, &judgement),
-        train_fitness: problem.fitness(cost),
-        train_rows: selected.len(),
-        standard_error: field.posterior.standard_errors_31(),
-        judgement_solver_zeros: decoded.judge(dataset, stage, Zeros::Given(&solution.delta_m)),
-        solution,
-        calibration,
-        set,
-        decoded,
-        judgement,
-        field: Some(field),
-    })
 }

@@ -1,6 +1,7 @@
 //! How good a parameter set is on a log, by the decoder that runs on the target.
 
 pub mod identify;
+pub mod lag;
 pub mod precision;
 pub mod statistics;
 pub mod uncertainty;

@@ -157,8 +157,10 @@ pub fn parameters_in(set: &ParameterSet) -> BTreeMap<String, Parameter> {
 pub struct ReferenceLag {
     /// Positive where the reference shows an earlier pose, us.
     pub value_us: f64,
-    /// us; null where the log shows nothing of it.
-    pub standard_error_us: Option<f64>,
+    /// us.
+    pub standard_error_us: f64,
+    /// Whether it was taken off before the fit.
+    pub compensated: bool,
 }
 
 /// The zero deviation of one movement.
@@ -222,7 +224,7 @@ pub struct Report {
     pub zeros_in_words: &'static str,
     /// By name: lever_arm, theta, eta, a, b, c of the probes a, b, c; of the field model all 81.
     pub parameters: BTreeMap<String, Parameter>,
-    /// Lag of the reference, which the fit of a field model finds; null for other models.
+    /// Lag of the reference; null for `eval` and where no motion shows it.
     pub reference_lag: Option<ReferenceLag>,
     /// H1x .. H3y nearest to the designed ones.
     pub coordinates: Coordinates,
@@ -274,8 +276,8 @@ pub struct Choice {
     pub project: &'static str,
     /// Seed.
     pub seed: u64,
-    /// Why this model.
-    pub model_reason: String,
+    /// Whether the lag of the reference was taken off.
+    pub lag_compensated: bool,
 }
 
 /// The report of a fit.
@@ -287,7 +289,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
     Report {
         model: fit.model.name.to_owned(),
         model_title: fit.model.title(),
-        model_reason: Some(choice.model_reason),
+        model_reason: Some(fit.model_reason.clone()),
         solver: Some(choice.solver.to_owned()),
         project: Some(choice.project),
         seed: Some(choice.seed),
@@ -311,9 +313,10 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
             ),
             None => parameters(fit.model, parameters_fitted, &fit.standard_error),
         },
-        reference_lag: fit.field.as_ref().map(|field| ReferenceLag {
-            value_us: field.lag_s * 1e6,
-            standard_error_us: field.posterior.lag_error_s.map(|error| error * 1e6),
+        reference_lag: fit.lag.map(|lag| ReferenceLag {
+            value_us: lag.value_s * 1e6,
+            standard_error_us: lag.standard_error_s * 1e6,
+            compensated: choice.lag_compensated,
         }),
         coordinates: c
             .stage

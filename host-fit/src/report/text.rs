@@ -1,5 +1,6 @@
 //! Tables for a terminal.
 
+use crate::judge::lag::ReferenceLag;
 use crate::judge::statistics::PoseError;
 use crate::problem::model::{COUNT, Model};
 use crate::problem::parameters::{ETA, Parameters, THETA};
@@ -79,8 +80,7 @@ pub fn parameters(
     out
 }
 
-/// What the field model has beyond Model (31): its terms with their standard errors, and the lag
-/// of the reference.
+/// What the field model has beyond Model (31): its terms with their standard errors.
 pub fn field(fit: &FieldFit) -> String {
     let errors = fit.posterior.standard_errors();
     let mut out = format!("\n  {:<14}", "field terms");
@@ -96,10 +96,15 @@ pub fn field(fit: &FieldFit) -> String {
         }
         let _ = writeln!(out, "  {}", term.unit);
     }
-    let _ = write!(out, "\n  lag of the reference {:.1} us", fit.lag_s * 1e6);
-    if let Some(error) = fit.posterior.lag_error_s {
-        let _ = write!(out, ", standard error {:.1} us", error * 1e6);
-    }
-    out.push('\n');
     out
+}
+
+/// The lag of the reference, which may have been compensated.
+pub fn lag(lag: Option<ReferenceLag>, compensated: bool) -> String {
+    let Some(lag) = lag else {
+        return "lag of the reference: no motion shows it\n".to_owned();
+    };
+    let (value, error) = (lag.value_s * 1e6, lag.standard_error_s * 1e6);
+    let done = if compensated { ", compensated" } else { "" };
+    format!("lag of the reference {value:.1} us, standard error {error:.1} us{done}\n")
 }

@@ -1,7 +1,7 @@
 //! The main job on the log that ships with the program, beside the figures of the paper.
 
 use crate::cli::error::HostError;
-use crate::fit::{Fit, FitSettings, calibration, fit};
+use crate::fit::{Fit, FitSettings, ModelChoice, calibration, fit};
 use crate::input::dataset::{Dataset, Row};
 use crate::input::log::{self, ReadOptions};
 use crate::input::shipped::{LOG_GZ, STAGE_TOML};
@@ -157,7 +157,7 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
 
 fn settings(model: ModelKind) -> FitSettings {
     FitSettings {
-        model: Model::of(model),
+        model: ModelChoice::Named(Model::of(model)),
         train: None,
         draw: Draw::Stratified,
         solver: Solver::Finished,

@@ -159,7 +159,7 @@ impl std::fmt::Display for Verdict {
         } else if self.loses() {
             write!(
                 f,
-                "model (31): this log leaves the field model with errors of {field} in service, since what a tilt or a \
+                "this log leaves the field model with errors of {field} in service, since what a tilt or a \
                  height adds can't be told from the resets of the reference; record all six axes moving at once"
             )
         } else {

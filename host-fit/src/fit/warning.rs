@@ -1,0 +1,182 @@
+//! What a user should know of a fit that is good nevertheless.
+
+use crate::input::dataset::Dataset;
+use crate::judge::Judgement;
+use crate::judge::lag::ReferenceLag;
+use crate::judge::statistics::AxisError;
+use crate::problem::Problem;
+use crate::problem::model::ParameterId;
+use crate::solve::Solution;
+
+/// Something that the user should know of a fit that is good nevertheless.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitWarning {
+    /// A parameter stands at an end of its search range.
+    #[error(
+        "{} stands at an end of its search range ({value:.6} {}): widen the range in stage.toml, or check the log",
+        id.name(), id.term.unit
+    )]
+    AtLimit {
+        /// The parameter.
+        id: ParameterId,
+        /// Its value, SI.
+        value: f64,
+    },
+    /// Zero deviations were clipped to their range.
+    #[error(
+        "the zero deviation of {count} of {of} movements was clipped to its range: widen search.delta_m in stage.toml if \
+         the interferometers are reset less exactly than that"
+    )]
+    ZeroDeviationClipped {
+        /// Movements with a clipped one.
+        count: usize,
+        /// All movements.
+        of: usize,
+    },
+    /// The draw has no row of some movements.
+    #[error(
+        "the draw of rows misses {} movement(s) ({}): their zero deviation is free, and the solver's own is taken as zero. \
+         Use --draw stratified, or a larger --train",
+        movements.len(), join(movements)
+    )]
+    MovementsMissed {
+        /// Their names, by [`Dataset::movement_name`].
+        movements: Vec<String>,
+    },
+    /// Several vertical terms stand at an end of their range.
+    #[error(
+        "{count} of the vertical terms stand at an end of their range: check the order and the signs of the \
+         capacitive sensors in the log and in stage.toml"
+    )]
+    VerticalTermsAtLimit {
+        /// How many.
+        count: usize,
+    },
+    /// An error is far larger than noise makes it.
+    #[error(
+        "the largest error, {error_micro:.1} {unit} in {axis}, is {ratio:.0} times the rms: see movement {movement} at \
+         t_us = {t_us}. If the row is wrong, take it out of the log and fit again"
+    )]
+    WildRow {
+        /// The axis.
+        axis: &'static str,
+        /// um or urad.
+        unit: &'static str,
+        /// The error, um or urad.
+        error_micro: f64,
+        /// The error over the rms of its axis.
+        ratio: f64,
+        /// The movement, by [`Dataset::movement_name`].
+        movement: String,
+        /// Its time in the log, us.
+        t_us: i64,
+    },
+    /// The reference shows an earlier (or later) pose than the probes.
+    #[error(
+        "the reference {} the probes by {:.0} us, {:.2} servo periods: fit with --compensate-lag, or set the delay of the \
+         interferometers", if *lag_s > 0.0 { "lags behind" } else { "is ahead of" }, lag_s.abs() * 1e6, lag_s.abs() / period_s
+    )]
+    ReferenceLags {
+        /// Its lag, s; negative where it is ahead.
+        lag_s: f64,
+        /// Servo period, s.
+        period_s: f64,
+    },
+    /// Rows that the decoder refused count in no error.
+    #[error("{rows} rows have codes that the decoder refuses; they are not part of the errors")]
+    Undecoded {
+        /// How many.
+        rows: usize,
+    },
+}
+
+/// Lag that is worth a warning, in servo periods.
+const LAG_MIN: f64 = 0.1;
+/// The same in standard errors.
+const LAG_ERRORS_MIN: f64 = 3.0;
+
+impl FitWarning {
+    /// Of a lag that is large and beyond doubt.
+    pub(super) fn of_lag(lag: &ReferenceLag, period_s: f64) -> Option<Self> {
+        let lag_s = lag.value_s;
+        let least = (LAG_MIN * period_s).max(LAG_ERRORS_MIN * lag.standard_error_s);
+        (lag_s.abs() > least).then_some(Self::ReferenceLags { lag_s, period_s })
+    }
+}
+
+fn join(names: &[String]) -> String {
+    const SHOWN: usize = 10;
+    let dots = if names.len() > SHOWN { ", ..." } else { "" };
+    names[..names.len().min(SHOWN)].join(", ") + dots
+}
+
+/// All warnings of a fit but that of a lag.
+pub(super) fn warnings(
+    dataset: &Dataset,
+    problem: &Problem,
+    solution: &Solution,
+    judgement: &Judgement,
+) -> Vec<FitWarning> {
+    let mut warnings = Vec::new();
+    for &id in &solution.at_limit {
+        let value = solution.parameters.values[id.index];
+        warnings.push(FitWarning::AtLimit { id, value });
+    }
+    let vertical = solution.at_limit.iter().filter(|id| id.is_slope()).count();
+    if vertical > 1 {
+        warnings.push(FitWarning::VerticalTermsAtLimit { count: vertical });
+    }
+    warnings.extend(wild_row(dataset, judgement));
+    let clipped = judgement.zeros.iter().filter(|zero| zero.clipped).count();
+    if clipped > 0 {
+        warnings.push(FitWarning::ZeroDeviationClipped {
+            count: clipped,
+            of: dataset.movements.len(),
+        });
+    }
+    let mut present = vec![false; dataset.movements.len()];
+    for group in &problem.groups {
+        present[group.movement] = true;
+    }
+    let missed = present
+        .iter()
+        .zip(&dataset.movements)
+        .filter(|(present, _)| !**present);
+    let missed: Vec<String> = missed
+        .map(|(_, movement)| dataset.movement_name(movement))
+        .collect();
+    if problem.model.has_zero_deviation && !missed.is_empty() {
+        warnings.push(FitWarning::MovementsMissed { movements: missed });
+    }
+    if judgement.undecoded > 0 {
+        warnings.push(FitWarning::Undecoded {
+            rows: judgement.undecoded,
+        });
+    }
+    warnings
+}
+
+/// In a million rows of noise alone the largest is five times the rms.
+const PEAK_TO_RMS_MAX: f64 = 8.0;
+
+/// The row with the largest error in terms of its axis' rms, if that is too large for noise.
+fn wild_row(dataset: &Dataset, judgement: &Judgement) -> Option<FitWarning> {
+    const AXES: [(&str, &str); 3] = [("X", "um"), ("Y", "um"), ("Rz", "urad")];
+    let axes = AXES.into_iter().zip(judgement.errors.axes);
+    let ((axis, unit), error) = axes.max_by(|(_, a), (_, b)| {
+        let ratio = |e: &AxisError| e.peak / e.rms.max(f64::MIN_POSITIVE);
+        ratio(a).total_cmp(&ratio(b))
+    })?;
+    if error.peak <= PEAK_TO_RMS_MAX * error.rms {
+        return None;
+    }
+    let row = dataset.rows.get(error.peak_row)?;
+    Some(FitWarning::WildRow {
+        axis,
+        unit,
+        error_micro: error.peak * 1e6,
+        ratio: error.peak / error.rms,
+        movement: dataset.movement_name(dataset.movements.get(row.movement)?),
+        t_us: row.t_us,
+    })
+}
