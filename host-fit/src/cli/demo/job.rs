@@ -1,10 +1,11 @@
 //! The main job on the log that ships with the program, beside the figures of the paper.
 
+use super::service::Service;
 use crate::cli::error::HostError;
 use crate::fit::{Fit, FitSettings, ModelChoice, calibration, fit};
 use crate::input::dataset::{Dataset, Row};
 use crate::input::log::{self, ReadOptions};
-use crate::input::shipped::{LOG_GZ, STAGE_TOML};
+use crate::input::shipped::{LOG_GZ, RUN_GZ, SERVICE_GZ, STAGE_TOML};
 use crate::input::stage::Stage;
 use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Zeros};
@@ -72,6 +73,8 @@ pub struct Demo {
     pub decoded: PoseError,
     /// Largest difference of the target's `f32` from `f64`, m, m, rad.
     pub f32_difference: [f64; 3],
+    /// What calibrations are worth in service.
+    pub(super) service: Service,
     /// Reading the log.
     pub reading: Duration,
     /// Fitting and judging Model (31).
@@ -97,15 +100,34 @@ fn at_250_um(rows: &[Row]) -> bool {
 /// # Errors
 /// [`HostError`] when a file cannot be written.
 pub fn run(folder: &Path) -> Result<Demo, HostError> {
-    let [log_path, stage_path, blob_path, pose_path] =
-        ["paper.csv.gz", "stage.toml", "params.bin", "pose.csv"].map(|name| folder.join(name));
-    output::write_atomically(&log_path, LOG_GZ)?;
-    output::write_atomically(&stage_path, STAGE_TOML.as_bytes())?;
+    let files = [
+        "paper.csv.gz",
+        "run30.csv.gz",
+        "service.csv.gz",
+        "stage.toml",
+        "params.bin",
+        "pose.csv",
+        "field.bin",
+    ]
+    .map(|name| folder.join(name));
+    let [
+        log_path,
+        run_path,
+        service_path,
+        stage_path,
+        blob_path,
+        pose_path,
+        field_path,
+    ] = &files;
+    output::write_atomically(log_path, LOG_GZ)?;
+    output::write_atomically(run_path, RUN_GZ)?;
+    output::write_atomically(service_path, SERVICE_GZ)?;
+    output::write_atomically(stage_path, STAGE_TOML.as_bytes())?;
 
     let started = Instant::now();
-    let stage = Stage::from_file(&stage_path)?;
+    let stage = Stage::from_file(stage_path)?;
     let log = log::read(
-        std::slice::from_ref(&log_path),
+        std::slice::from_ref(log_path),
         &stage,
         &ReadOptions::default(),
     )?;
@@ -122,11 +144,13 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
     let model_31 = fit(dataset, &stage, &settings(ModelKind::M31))?;
     let fitting = started.elapsed();
 
-    blob_file::write(&blob_path, &model_31.set)?;
-    let set = blob_file::read(&blob_path)?;
+    blob_file::write(blob_path, &model_31.set)?;
+    let set = blob_file::read(blob_path)?;
     let decoded = pose_file::decode(dataset, &*set.decoder(), OnInvalid::Zero);
-    output::write_atomically(&pose_path, &pose_file::to_text(&decoded))?;
-    let errors = pose_file_errors(&pose_path, dataset, &stage, &model_31.solution.parameters)?;
+    output::write_atomically(pose_path, &pose_file::to_text(&decoded))?;
+    let errors = pose_file_errors(pose_path, dataset, &stage, &model_31.solution.parameters)?;
+    let service = Service::new(&stage, &set)?;
+    blob_file::write(field_path, &service.field)?;
     let constants = model_31
         .calibration
         .constants()
@@ -150,12 +174,13 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
         ),
         reading,
         fitting,
-        files: vec![log_path, stage_path, blob_path, pose_path],
+        service,
+        files: files.to_vec(),
         stage,
     })
 }
 
-fn settings(model: ModelKind) -> FitSettings {
+pub(super) fn settings(model: ModelKind) -> FitSettings {
     FitSettings {
         model: ModelChoice::Named(Model::of(model)),
         train: None,

@@ -1,6 +1,7 @@
 //! `host-fit demo`.
 
 mod job;
+mod service;
 
 use crate::cli::demo::job::{Demo, TABLE_2, TABLE_4, TABLE_8, table_7};
 use crate::cli::error::HostError;
@@ -15,7 +16,7 @@ use std::time::Instant;
 /// Arguments of `demo`.
 #[derive(Debug, Args)]
 pub(super) struct DemoArgs {
-    /// Where to leave log, stage.toml, params.bin and pose.csv; a temporary folder if not given.
+    /// Where to leave logs, stage.toml, both blobs and pose.csv; a temporary folder if not given.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Also print the zero deviation of each movement (Table A1).
@@ -48,7 +49,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<(), HostError> {
             let _ = writeln!(end, "wrote {}", file.display());
         }
     } else {
-        end.push_str("log, stage.toml, blob and poses are kept with --out DIR\n");
+        end.push_str("logs, stage.toml, blobs and poses are kept with --out DIR\n");
     }
     super::print(&end)
 }
@@ -135,5 +136,6 @@ fn as_text(demo: &Demo, zero_deviations: bool) -> String {
     for warning in &fit.warnings {
         let _ = writeln!(out, "warning: {warning}");
     }
+    let _ = write!(out, "\n{}", demo.service.as_text());
     out
 }
