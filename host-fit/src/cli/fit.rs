@@ -250,7 +250,10 @@ fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
         &fit.standard_error,
         None,
     );
-    let beyond = fit.field.as_ref().map_or_else(String::new, text::field);
+    let beyond = match (&fit.field, &report.field) {
+        (Some(field), Some(report)) => text::field(field) + &report.as_text(),
+        _ => String::new(),
+    };
     format!(
         "{}, {} rows in {} movements, {} fitted, {} skipped; solver {}: {} evaluations in {:.1} ms, {}\n\
          {}\n\

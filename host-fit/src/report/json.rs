@@ -7,6 +7,7 @@ use crate::judge::statistics::PoseError;
 use crate::judge::{Judgement, Zeros};
 use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::Parameters;
+use crate::report::field::FieldReport;
 use crate::solve::field::parameters::values_of;
 use crate::solve::field::terms::{self, PER_PROBE};
 use runtime::ParameterSet;
@@ -224,6 +225,8 @@ pub struct Report {
     pub zeros_in_words: &'static str,
     /// By name: lever_arm, theta, eta, a, b, c of the probes a, b, c; of the field model all 81.
     pub parameters: BTreeMap<String, Parameter>,
+    /// What a fit of the field model says of itself; null for other models and for `eval`.
+    pub field: Option<FieldReport>,
     /// Lag of the reference; null for `eval` and where no motion shows it.
     pub reference_lag: Option<ReferenceLag>,
     /// H1x .. H3y nearest to the designed ones.
@@ -313,6 +316,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
             ),
             None => parameters(fit.model, parameters_fitted, &fit.standard_error),
         },
+        field: fit.field.as_ref().map(FieldReport::new),
         reference_lag: fit.lag.map(|lag| ReferenceLag {
             value_us: lag.value_s * 1e6,
             standard_error_us: lag.standard_error_s * 1e6,
@@ -359,6 +363,7 @@ pub fn of_eval(
         delta: zeros.name(),
         zeros_in_words: zeros.words(),
         parameters: parameters_in(set),
+        field: None,
         reference_lag: None,
         coordinates: c.stage.designed.nearest_with(&values.geometry()).into(),
         serial: set.serial.as_str().to_owned(),
