@@ -8,6 +8,7 @@ mod field;
 mod warning;
 
 pub use compensate::fit_compensated;
+pub use field::field_calibration;
 pub use warning::FitWarning;
 
 use crate::input::dataset::Dataset;

@@ -1,5 +1,6 @@
 //! What several commands take: numbers of rows, the library's own choices by name.
 
+use crate::compare::Case;
 use crate::input::log::BadRows;
 use crate::problem::draw::Draw;
 use crate::solve::search::kind::SearchKind;
@@ -42,6 +43,21 @@ impl ValueEnum for Projection {
             }
         };
         Some(PossibleValue::new(self.name()).help(help))
+    }
+}
+
+impl ValueEnum for Case {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Self::Model31(projection) => projection.to_possible_value(),
+            Self::Field => Some(PossibleValue::new(self.name()).help(
+                "The field model, which the log must carry: nine unknowns are left, the same as with linear",
+            )),
+        }
     }
 }
 

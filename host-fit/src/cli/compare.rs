@@ -4,13 +4,12 @@ use super::args::Train;
 use crate::cli::error::HostError;
 use crate::compare::curves::{Course, history_csv, plot, runs_csv};
 use crate::compare::summary::{summaries, table};
-use crate::compare::{Comparison, Run, compare};
+use crate::compare::{Case, Comparison, Run, compare};
 use crate::input::log::{self, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
 use crate::output::{check_writable, make_folder, write_atomically};
 use crate::problem::draw::Draw;
-use crate::solve::Projection;
 use crate::solve::search::kind::SearchKind;
 use clap::Args;
 use std::io::{IsTerminal, Write};
@@ -32,7 +31,7 @@ pub(super) struct CompareArgs {
         value_delimiter = ',',
         default_value = "none,delta,linear"
     )]
-    project: Vec<Projection>,
+    project: Vec<Case>,
     /// Searches, separated by commas; all if not given. Least squares is always there.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', default_values = SearchKind::NAMES, value_enum)]
     solvers: Vec<SearchKind>,

@@ -1,9 +1,8 @@
 //! Convergence and course of p: every generation as CSV, medians over the seeds as SVG.
 
 use super::summary::Spread;
-use super::{ARRIVED, EXACT, Run};
+use super::{ARRIVED, Case, EXACT, Run};
 use crate::report::plots::{DrawResult, PlotError, as_svg};
-use crate::solve::Projection;
 use crate::solve::search::kind::SearchKind;
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -113,7 +112,7 @@ impl Course {
 ///
 /// # Errors
 /// [`PlotError`] when the drawing library refuses.
-pub fn plot(runs: &[Run], form: Projection, course: Course) -> Result<String, PlotError> {
+pub fn plot(runs: &[Run], form: Case, course: Course) -> Result<String, PlotError> {
     let title = match course {
         Course::Convergence => format!("best fitness over the floor, form {}", form.name()),
         Course::P => format!("p of the hybrids, form {}", form.name()),
@@ -121,13 +120,7 @@ pub fn plot(runs: &[Run], form: Projection, course: Course) -> Result<String, Pl
     as_svg(&title, |svg| draw(svg, &title, runs, form, course))
 }
 
-fn draw(
-    svg: &mut String,
-    title: &str,
-    runs: &[Run],
-    form: Projection,
-    course: Course,
-) -> DrawResult {
+fn draw(svg: &mut String, title: &str, runs: &[Run], form: Case, course: Course) -> DrawResult {
     let most = runs.iter().map(|run| run.evaluations).max().unwrap_or(1);
     let least = runs
         .iter()

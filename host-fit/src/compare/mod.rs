@@ -1,4 +1,5 @@
-//! Every search on every form, over several seeds, at equal numbers of evaluations.
+//! Every search on every form of Model (31), and on the field model, over several seeds, at equal
+//! numbers of evaluations.
 //!
 //! Each seed draws its own rows, as `fit --seed` does, and every solver gets the same rows and the
 //! same first population (CMA-ES has none: it gets the first individual, or the middle). The
@@ -9,10 +10,12 @@
 //!
 //! | module | what it holds |
 //! |---|---|
+//! | `field` | runs on the field model |
 //! | [`summary`] | medians and spreads, the table |
 //! | [`curves`] | convergence and course of p, as CSV and SVG |
 
 pub mod curves;
+mod field;
 pub mod summary;
 
 use crate::fit::{FitError, calibration};
@@ -25,11 +28,12 @@ use crate::problem::draw::{Draw, draw_rows};
 use crate::problem::model::Model;
 use crate::solve::by_search::solution_of;
 use crate::solve::objective::form::Form;
+use crate::solve::search::cost::CostFunction;
 use crate::solve::search::kind::{SearchKind, Settings};
-use crate::solve::search::run::{Checkpoint, Start, StopCriteria};
+use crate::solve::search::run::{Checkpoint, Outcome, Start, StopCriteria};
 use crate::solve::{Projection, Solution, SolveError, Solver, SolverOptions};
-use runtime::ModelKind;
 use runtime::calibration::Origin;
+use runtime::{Calibration, ModelKind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -40,11 +44,39 @@ pub const EXACT: f64 = 5e-7;
 /// Name of the least-squares fit in tables and files.
 pub const LEAST_SQUARES: &str = "lm";
 
+/// What the searches look for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Case {
+    /// Model (31), with so much of it in closed form.
+    Model31(Projection),
+    /// The field model, all but the nine ratios of a, b, c to eta in closed form. Its fitness is
+    /// that of [`FieldCost`](crate::solve::field::search::FieldCost), um of the Hall signals.
+    Field,
+}
+
+impl Case {
+    /// All of them.
+    pub const ALL: [Self; 4] = [
+        Self::Model31(Projection::None),
+        Self::Model31(Projection::Delta),
+        Self::Model31(Projection::Linear),
+        Self::Field,
+    ];
+
+    /// Its name on the command line, in tables and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Model31(projection) => projection.name(),
+            Self::Field => "field",
+        }
+    }
+}
+
 /// What is compared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// The forms of the problem.
-    pub forms: Vec<Projection>,
+    pub forms: Vec<Case>,
     /// The searches.
     pub searches: Vec<SearchKind>,
     /// Seeds 1 to this.
@@ -63,7 +95,7 @@ pub struct Comparison {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
     /// The form.
-    pub form: Projection,
+    pub form: Case,
     /// Name of the solver.
     pub solver: &'static str,
     /// The seed of rows and search.
@@ -130,7 +162,11 @@ pub fn compare(
     for &form in &comparison.forms {
         let mut floors = Vec::new();
         for (seed, rows) in (1..).zip(&drawn) {
-            let run = least_squares(dataset, &problem(rows), form, seed)?;
+            let problem = problem(rows);
+            let run = match form {
+                Case::Model31(form) => least_squares(dataset, &problem, form, seed)?,
+                Case::Field => field::least_squares(dataset, rows, &problem, seed)?,
+            };
             floors.push(run.floor);
             done(&run);
             runs.push(run);
@@ -141,7 +177,16 @@ pub fn compare(
                     return Ok(runs);
                 }
                 let problem = problem(rows);
-                let run = one_search(dataset, &problem, form, search, seed, floor, comparison);
+                let job = Job {
+                    search,
+                    seed,
+                    floor,
+                    comparison,
+                };
+                let run = match form {
+                    Case::Model31(form) => job.of_form(dataset, &problem, form),
+                    Case::Field => job.of_field(dataset, rows, &problem)?,
+                };
                 runs.extend(run.inspect(&mut done));
             }
         }
@@ -159,7 +204,7 @@ fn least_squares(
     let solution = Solver::LeastSquares.solve(problem, &options)?;
     let fitness = problem.fitness(solution.cost);
     Ok(Run {
-        form,
+        form: Case::Model31(form),
         solver: LEAST_SQUARES,
         seed,
         fitness,
@@ -172,46 +217,62 @@ fn least_squares(
     })
 }
 
-/// `None` where the form has no unknowns to search for.
-fn one_search(
-    dataset: &Dataset,
-    problem: &Problem<'_>,
-    projection: Projection,
+/// One search with one seed.
+struct Job<'c> {
     search: SearchKind,
     seed: u64,
     floor: f64,
-    comparison: &Comparison,
-) -> Option<Run> {
-    let form = Form::new(problem, projection)?;
-    let first = form.first_population(comparison.population, seed);
-    let settings = Settings {
-        seed,
-        start: Start {
-            population: comparison.population,
-            individuals: &first,
-        },
-        ..Settings::default()
-    };
-    let criteria = StopCriteria {
-        evaluations: Some(comparison.evaluations),
-        ..StopCriteria::default()
-    };
-    let started = Instant::now();
-    let found = search.minimize(form.cost_function(), &settings, &criteria);
-    let elapsed_s = started.elapsed().as_secs_f64();
-    let solution = solution_of(problem, &form, &found).ok();
-    Some(Run {
-        form: projection,
-        solver: search.name(),
-        seed,
-        fitness: found.cost,
-        floor,
-        evaluations: found.evaluations,
-        nan_costs: found.nan_costs,
-        elapsed_s,
-        rms: solution.and_then(|solution| rms_over_all_rows(dataset, problem, &solution)),
-        history: found.history,
-    })
+    comparison: &'c Comparison,
+}
+
+impl Job<'_> {
+    /// On a form of Model (31); `None` where the form has no unknowns to search for.
+    fn of_form(
+        &self,
+        dataset: &Dataset,
+        problem: &Problem<'_>,
+        projection: Projection,
+    ) -> Option<Run> {
+        let form = Form::new(problem, projection)?;
+        let first = form.first_population(self.comparison.population, self.seed);
+        let (found, run) = self.run(Case::Model31(projection), form.cost_function(), &first);
+        let solution = solution_of(problem, &form, &found).ok();
+        Some(Run {
+            rms: solution.and_then(|solution| rms_over_all_rows(dataset, problem, &solution)),
+            ..run
+        })
+    }
+
+    /// What a search finds, and its run, which nothing has decoded yet.
+    fn run(&self, form: Case, cost: &dyn CostFunction, first: &[Vec<f64>]) -> (Outcome, Run) {
+        let settings = Settings {
+            seed: self.seed,
+            start: Start {
+                population: self.comparison.population,
+                individuals: first,
+            },
+            ..Settings::default()
+        };
+        let criteria = StopCriteria {
+            evaluations: Some(self.comparison.evaluations),
+            ..StopCriteria::default()
+        };
+        let started = Instant::now();
+        let mut found = self.search.minimize(cost, &settings, &criteria);
+        let run = Run {
+            form,
+            solver: self.search.name(),
+            seed: self.seed,
+            fitness: found.cost,
+            floor: self.floor,
+            evaluations: found.evaluations,
+            nan_costs: found.nan_costs,
+            elapsed_s: started.elapsed().as_secs_f64(),
+            rms: None,
+            history: std::mem::take(&mut found.history),
+        };
+        (found, run)
+    }
 }
 
 /// Errors over all rows, by the decoder of the target, um, um, urad.
@@ -222,8 +283,12 @@ fn rms_over_all_rows(
 ) -> Option<[f64; 3]> {
     let calibration =
         calibration(dataset, problem.stage, problem.model, &solution.parameters).ok()?;
+    rms_of(dataset, problem.stage, &calibration)
+}
+
+fn rms_of(dataset: &Dataset, stage: &Stage, calibration: &Calibration) -> Option<[f64; 3]> {
     let set = calibration.prepare(&Origin::default()).ok()?;
-    let judgement = Decoded::new(&set, dataset).judge(dataset, problem.stage, Zeros::Refit);
+    let judgement = Decoded::new(&set, dataset).judge(dataset, stage, Zeros::Refit);
     Some(judgement.errors.axes.map(|axis| axis.rms * 1e6))
 }
 

@@ -1,7 +1,6 @@
 //! Medians and spreads over the seeds, and the table of a comparison.
 
-use super::{ARRIVED, EXACT, LEAST_SQUARES, Run};
-use crate::solve::Projection;
+use super::{ARRIVED, Case, EXACT, LEAST_SQUARES, Run};
 use crate::solve::search::kind::SearchKind;
 use std::fmt::Write;
 
@@ -61,7 +60,7 @@ impl Arrival {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
     /// The form.
-    pub form: Projection,
+    pub form: Case,
     /// Name of the solver.
     pub solver: &'static str,
     /// Seeds.

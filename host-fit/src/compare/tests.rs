@@ -6,7 +6,10 @@ use crate::solve::objective::sample;
 
 fn comparison() -> Comparison {
     Comparison {
-        forms: vec![Projection::None, Projection::Linear],
+        forms: vec![
+            Case::Model31(Projection::None),
+            Case::Model31(Projection::Linear),
+        ],
         searches: vec![SearchKind::Shtlbo, SearchKind::Random],
         seeds: 2,
         train: Some(60),
@@ -35,15 +38,15 @@ fn every_solver_runs_on_every_form_with_every_seed_at_equal_evaluations() {
         let same = |s: &&summary::Summary| s.form == form && s.solver == solver;
         summaries.iter().find(same).expect("a summary")
     };
-    let shtlbo = of(Projection::Linear, "shtlbo");
+    let shtlbo = of(Case::Model31(Projection::Linear), "shtlbo");
     assert_eq!(
         (shtlbo.arrived.seeds, shtlbo.exact.seeds, shtlbo.seeds),
         (2, 2, 2)
     );
     assert!(shtlbo.exact.evaluations > shtlbo.arrived.evaluations);
-    let random = of(Projection::Linear, "random");
+    let random = of(Case::Model31(Projection::Linear), "random");
     assert!(random.arrived.seeds == 0 && random.fitness.median > shtlbo.fitness.median);
-    let floor = of(Projection::Linear, LEAST_SQUARES);
+    let floor = of(Case::Model31(Projection::Linear), LEAST_SQUARES);
     assert!(shtlbo.rms[0].expect("decodes").median < 1.05 * floor.rms[0].expect("decodes").median);
 
     let table = table(&summaries);
@@ -52,9 +55,14 @@ fn every_solver_runs_on_every_form_with_every_seed_at_equal_evaluations() {
     assert_eq!(runs_csv(&runs).lines().count(), 1 + 12);
     let generations: usize = runs.iter().map(|run| run.history.len()).sum();
     assert_eq!(history_csv(&runs).lines().count(), 1 + generations);
-    let convergence = plot(&runs, Projection::Linear, Course::Convergence).expect("a plot");
+    let convergence = plot(
+        &runs,
+        Case::Model31(Projection::Linear),
+        Course::Convergence,
+    )
+    .expect("a plot");
     assert!(convergence.contains("shtlbo") && convergence.contains("random"));
-    let p = plot(&runs, Projection::None, Course::P).expect("a plot");
+    let p = plot(&runs, Case::Model31(Projection::None), Course::P).expect("a plot");
     assert!(p.contains("shtlbo") && !p.contains("random"));
 }
 
@@ -70,7 +78,7 @@ fn an_interrupt_ends_a_comparison_with_what_there_is() {
 #[test]
 fn the_table_counts_the_seeds_whose_errors_it_shows() {
     let run = |seed, rms| Run {
-        form: Projection::None,
+        form: Case::Model31(Projection::None),
         solver: "pso",
         seed,
         fitness: 9.0,
@@ -111,7 +119,7 @@ fn arrival_is_the_first_generation_within_one_percent_of_the_floor() {
         p: None,
     };
     let mut run = Run {
-        form: Projection::None,
+        form: Case::Model31(Projection::None),
         solver: "shtlbo",
         seed: 1,
         fitness: 1.0,

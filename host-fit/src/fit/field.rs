@@ -3,16 +3,38 @@
 
 use super::warning::warnings;
 use super::{Fit, FitError, Job, Judged, calibration};
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
 use crate::judge::Zeros;
 use crate::judge::lag::ReferenceLag;
 use crate::problem::Problem;
 use crate::problem::model::Model;
 use crate::solve::field::fit::{FieldFitError, fit_field};
+use crate::solve::field::parameters::FieldParameters;
 use crate::solve::{Solution, Solver};
 use runtime::model::Probes;
 use runtime::parameters::ParameterError;
 use runtime::{Calibration, ModelKind};
 use std::time::Instant;
+
+/// The calibration that parameters of the field model make: see [`calibration`].
+///
+/// # Errors
+/// [`FitError::Unusable`] where PM is singular.
+pub fn field_calibration(
+    dataset: &Dataset,
+    stage: &Stage,
+    parameters: &FieldParameters,
+) -> Result<Calibration, FitError> {
+    let constants = parameters.constants(stage.hall.m_per_count);
+    let constants = constants.ok_or(FitError::Unusable(ParameterError::SingularPlane))?;
+    let model_31 = Model::of(ModelKind::M31);
+    Ok(Calibration {
+        model: ModelKind::Field,
+        probes: Probes::Field(constants.probes),
+        ..calibration(dataset, stage, model_31, &parameters.model_31())?
+    })
+}
 
 impl Job<'_> {
     /// The field model, refused where it would serve worse than Model (31).
@@ -34,13 +56,7 @@ impl Job<'_> {
         }
         let elapsed = started.elapsed();
         let parameters = field.parameters.model_31();
-        let constants = field.parameters.constants(stage.hall.m_per_count);
-        let constants = constants.ok_or(FitError::Unusable(ParameterError::SingularPlane))?;
-        let calibration = Calibration {
-            model: model.kind,
-            probes: Probes::Field(constants.probes),
-            ..calibration(dataset, stage, model_31, &parameters)?
-        };
+        let calibration = field_calibration(dataset, stage, &field.parameters)?;
         let Judged {
             set,
             decoded,

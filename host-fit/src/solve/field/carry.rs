@@ -159,8 +159,8 @@ impl std::fmt::Display for Verdict {
         } else if self.loses() {
             write!(
                 f,
-                "this log leaves the field model with errors of {field} in service, since what a tilt or a \
-                 height adds can't be told from the resets of the reference; record all six axes moving at once"
+                "this log leaves the field model with errors of {field} in service; record all six axes moving at \
+                 once, and for longer (host-fit plan makes such a run)"
             )
         } else {
             f.write_str("the field model finds nothing that model (31) lacks")

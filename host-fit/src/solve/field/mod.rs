@@ -8,6 +8,7 @@
 //! | [`blocks`] | rows and their means over a few |
 //! | [`whiten`] | the normal equations under drift |
 //! | [`noise`] | noise from residuals |
+//! | [`search`] | the model as the paper's search sees it |
 //! | `step` | a step, and the covariance, with the prior |
 //! | [`fit`] | the steps in a row |
 //! | [`posterior`] | covariance of parameters and of a pose |
@@ -22,6 +23,7 @@ pub mod posterior;
 pub mod probe;
 #[cfg(test)]
 mod sample;
+pub mod search;
 mod step;
 pub mod terms;
 #[cfg(test)]
