@@ -203,7 +203,7 @@ mod tests {
             ..Settings::default()
         };
         let criteria = StopCriteria {
-            evaluations: Some(1200),
+            evaluations: Some(2400),
             ..StopCriteria::default()
         };
         let found = SearchKind::Shtlbo.minimize(&cost, &settings, &criteria);
