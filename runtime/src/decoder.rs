@@ -145,13 +145,6 @@ const fn magnitude(x: f32) -> u32 {
 /// The largest finite magnitude.
 const FINITE: u32 = f32::MAX.to_bits();
 
-/// The largest of three magnitudes.
-#[inline(always)]
-const fn largest(v: [u32; 3]) -> u32 {
-    let larger = if v[0] > v[1] { v[0] } else { v[1] };
-    if larger > v[2] { larger } else { v[2] }
-}
-
 /// Which of three words lie outside `low..=high`, as three bits with the first lowest. One
 /// subtraction and one comparison a word, as in [`CodeWindow::contains`].
 #[inline(always)]
@@ -238,11 +231,12 @@ impl<M: Model> Decoder<M> {
         let (size_v, size_q) = (each(v, magnitude), each(q, magnitude));
 
         let phi_bad = outside(each(phi, magnitude), c.sensitivity_min.to_bits(), FINITE);
+        // Finite or not is asked in two ways: so a tick keeps the fewest values on the stack.
         let faults = (Status::HALL_A.with_next(outside_window(hall, &c.hall_window)))
             .with(Status::CAPACITIVE_1.with_next(capacitive_bad))
             .with(Status::SENSITIVITY_A.with_next(phi_bad))
-            .with(Status::PLANAR_NOT_FINITE.when(largest(size_q) > FINITE))
-            .with(Status::VERTICAL_NOT_FINITE.when(largest(size_v) > FINITE));
+            .with(Status::PLANAR_NOT_FINITE.when(beyond(size_q, [FINITE, FINITE, FINITE])))
+            .with(Status::VERTICAL_NOT_FINITE.when(outside(size_v, 0, FINITE) != 0));
         let vertical_valid = !faults.any(VERTICAL_FAULTS);
         let planar_valid = faults.is_good();
         let range_v = each(c.calibrated_vertical, f32::to_bits);
