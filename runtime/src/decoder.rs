@@ -62,15 +62,6 @@ pub trait Decode: Sync {
     /// less `zero`; invalid fields are 0 and the status says why. Never NaN.
     fn decode(&self, frame: &RawFrame, zero: &PlanarPose<f32>) -> Reading;
 
-    /// As [`Decode::decode`], with a vertical pose that is known by other means (a log in SI
-    /// columns).
-    fn decode_at(
-        &self,
-        hall: [i32; 3],
-        vertical: VerticalPose<f32>,
-        zero: &PlanarPose<f32>,
-    ) -> Reading;
-
     /// The constants that do not depend on the model. Their method
     /// [`channel_faults`](DecoderConstants::channel_faults) says why codes are not decoded.
     fn constants(&self) -> &DecoderConstants<f32>;
@@ -123,6 +114,22 @@ pub enum AnyDecoder {
     Linear(Decoder<LinearModel>),
     /// Of the field model.
     Field(Decoder<FieldModel>),
+}
+
+impl AnyDecoder {
+    /// [`Decoder::decode_at`] of the model that there is. Not a method of [`Decode`]: there it
+    /// would take flash of every controller, which has codes.
+    pub fn decode_at(
+        &self,
+        hall: [i32; 3],
+        vertical: VerticalPose<f32>,
+        zero: &PlanarPose<f32>,
+    ) -> Reading {
+        match self {
+            Self::Linear(decoder) => decoder.decode_at(hall, vertical, zero),
+            Self::Field(decoder) => decoder.decode_at(hall, vertical, zero),
+        }
+    }
 }
 
 impl Deref for AnyDecoder {
@@ -214,6 +221,17 @@ impl<M: Model> Decoder<M> {
         &self.probes
     }
 
+    /// As [`Decode::decode`], with a vertical pose that is known by other means (a log in SI
+    /// columns).
+    pub fn decode_at(
+        &self,
+        hall: [i32; 3],
+        vertical: VerticalPose<f32>,
+        zero: &PlanarPose<f32>,
+    ) -> Reading {
+        self.finish(hall, vertical, 0, zero)
+    }
+
     /// The checks of a vertical pose, the planar pose at it, and the checks of that.
     #[inline(always)]
     fn finish(
@@ -267,15 +285,6 @@ impl<M: Model> Decode for Decoder<M> {
         let gaps = each(frame.capacitive, f32::from_code);
         let vertical = vertical_pose(&c.vertical_per_code, gaps);
         self.finish(frame.hall, vertical, bad, zero)
-    }
-
-    fn decode_at(
-        &self,
-        hall: [i32; 3],
-        vertical: VerticalPose<f32>,
-        zero: &PlanarPose<f32>,
-    ) -> Reading {
-        self.finish(hall, vertical, 0, zero)
     }
 
     fn constants(&self) -> &DecoderConstants<f32> {
