@@ -152,6 +152,14 @@ const fn magnitude(x: f32) -> u32 {
 /// The largest finite magnitude.
 const FINITE: u32 = f32::MAX.to_bits();
 
+/// Whether any of three magnitudes is not finite: its exponent is then full, and one more carries
+/// into the sign.
+#[inline(always)]
+const fn any_not_finite([a, b, c]: [u32; 3]) -> bool {
+    const ONE_MORE: u32 = 1 << 23;
+    ((a + ONE_MORE) | (b + ONE_MORE) | (c + ONE_MORE)) >> 31 != 0
+}
+
 /// Which of three words lie outside `low..=high`, as three bits with the first lowest. One
 /// subtraction and one comparison a word, as in [`CodeWindow::contains`].
 #[inline(always)]
@@ -254,7 +262,7 @@ impl<M: Model> Decoder<M> {
             .with(Status::CAPACITIVE_1.with_next(capacitive_bad))
             .with(Status::SENSITIVITY_A.with_next(phi_bad))
             .with(Status::PLANAR_NOT_FINITE.when(beyond(size_q, [FINITE, FINITE, FINITE])))
-            .with(Status::VERTICAL_NOT_FINITE.when(outside(size_v, 0, FINITE) != 0));
+            .with(Status::VERTICAL_NOT_FINITE.when(any_not_finite(size_v)));
         let vertical_valid = !faults.any(VERTICAL_FAULTS);
         let planar_valid = faults.is_good();
         let range_v = each(c.calibrated_vertical, f32::to_bits);

@@ -161,6 +161,30 @@ impl<T: Real> FieldProbe<T> {
     }
 }
 
+impl FieldProbe<f32> {
+    /// Bounds of the slopes of p by u and by w over |u| <= `u`, |w| <= `w`, |zr| <= `zr`: the
+    /// slopes of a p without minus signs, at the corner of that box.
+    #[inline(never)]
+    pub(crate) fn steepest_slopes(&self, u: f32, w: f32, zr: f32) -> [f32; 2] {
+        let size = |[constant, slope]: [f32; 2]| [constant.abs(), slope.abs()];
+        let p = &self.shape;
+        let corner = Shape {
+            u_w_w: size(p.u_w_w),
+            u_w: size(p.u_w),
+            u_z_z: size(p.u_z_z),
+            u_u_u: size(p.u_u_u),
+            u_u: size(p.u_u),
+            w_w: size(p.w_w),
+            w_z: size(p.w_z),
+            z_z: size(p.z_z),
+            u_u_w: p.u_u_w.abs(),
+            w_w_w: p.w_w_w.abs(),
+        };
+        let Tangent { per_u, per_w, .. } = corner.at(u, w, zr);
+        [per_u, per_w]
+    }
+}
+
 /// zr = a Z + b Rx + c Ry: the change of a probe's sensitivity with the vertical pose.
 #[inline(always)]
 fn change_with<T: Real>(probe: &Sensitivity<T>, vertical: &VerticalPose<T>) -> T {
