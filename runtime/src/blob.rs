@@ -17,13 +17,15 @@
 //! from the constants are left out: PM, PM^-1 and the capacitive plane matrix.
 //!
 //! The CRC finds any five flipped bits, any odd number of them, and any burst of up to 32, in
-//! a blob of up to 659 bytes, and so in all of up to [`MAX_BYTES`]: before the check stand at
-//! most 5,243 bits (P. Koopman, 32-bit CRC zoo, polynomial 0x8f6e37a0: Hamming distance 6 up to
-//! that length; the first four bits that are missed span 5,276). Beyond, up to 2^31 - 33 bits
-//! and so at 1,024 bytes, it would be any three, any odd number and the bursts. In a file the length is exact; in flash the header gives the length and the
-//! rest is padding. A layout that cannot be read by this version gets a new version number,
-//! and this version's blobs stay readable. Not promised: that an older decoder reads a
-//! newer layout, or that two layouts of one calibration have the same length.
+//! every blob: with up to [`MAX_BYTES`] at most 5,216 bits stand before the check, and up to 5,243
+//! its Hamming distance is 6 (P. Koopman, 32-bit CRC zoo, polynomial 0x8f6e37a0; by our own
+//! search, the first four bits that are missed span 5,276). Beyond, and so at 1,024 bytes, it
+//! is 4: any three bits, any odd number and the bursts.
+//!
+//! In a file the length is exact; in flash the header gives the length and the rest is padding. A
+//! layout that cannot be read by this version gets a new version number, and this version's
+//! blobs stay readable. Not promised: that an older decoder reads a newer layout, or that two
+//! layouts of one calibration have the same length.
 
 use crate::layout;
 use crate::model::Probes;
@@ -39,7 +41,7 @@ pub const LAYOUT_VERSION: u16 = 2;
 pub const HEADER_BYTES: usize = 12;
 /// Bytes of the check after the payload.
 pub const CRC_BYTES: usize = 4;
-/// The largest blob: up to here CRC-32C finds any five flipped bits.
+/// The largest blob, within the length up to which CRC-32C finds any five flipped bits.
 pub const MAX_BYTES: usize = 656;
 
 /// CRC-32C without a table: a blob is read once, at start, and flash is short.

@@ -62,15 +62,6 @@ pub trait Decode: Sync {
     /// less `zero`; invalid fields are 0 and the status says why. Never NaN.
     fn decode(&self, frame: &RawFrame, zero: &PlanarPose<f32>) -> Reading;
 
-    /// As [`Decode::decode`], with a vertical pose that is known by other means (a log in SI
-    /// columns).
-    fn decode_at(
-        &self,
-        hall: [i32; 3],
-        vertical: VerticalPose<f32>,
-        zero: &PlanarPose<f32>,
-    ) -> Reading;
-
     /// The constants that do not depend on the model. Their method
     /// [`channel_faults`](DecoderConstants::channel_faults) says why codes are not decoded.
     fn constants(&self) -> &DecoderConstants<f32>;
@@ -125,6 +116,22 @@ pub enum AnyDecoder {
     Field(Decoder<FieldModel>),
 }
 
+impl AnyDecoder {
+    /// [`Decoder::decode_at`] of the model that there is. Not a method of [`Decode`]: there it
+    /// would take flash of every controller, which has codes.
+    pub fn decode_at(
+        &self,
+        hall: [i32; 3],
+        vertical: VerticalPose<f32>,
+        zero: &PlanarPose<f32>,
+    ) -> Reading {
+        match self {
+            Self::Linear(decoder) => decoder.decode_at(hall, vertical, zero),
+            Self::Field(decoder) => decoder.decode_at(hall, vertical, zero),
+        }
+    }
+}
+
 impl Deref for AnyDecoder {
     type Target = dyn Decode;
 
@@ -145,11 +152,12 @@ const fn magnitude(x: f32) -> u32 {
 /// The largest finite magnitude.
 const FINITE: u32 = f32::MAX.to_bits();
 
-/// The largest of three magnitudes.
+/// Whether any of three magnitudes is not finite: its exponent is then full, and one more carries
+/// into the sign.
 #[inline(always)]
-const fn largest(v: [u32; 3]) -> u32 {
-    let larger = if v[0] > v[1] { v[0] } else { v[1] };
-    if larger > v[2] { larger } else { v[2] }
+const fn any_not_finite([a, b, c]: [u32; 3]) -> bool {
+    const ONE_MORE: u32 = 1 << 23;
+    ((a + ONE_MORE) | (b + ONE_MORE) | (c + ONE_MORE)) >> 31 != 0
 }
 
 /// Which of three words lie outside `low..=high`, as three bits with the first lowest. One
@@ -221,6 +229,17 @@ impl<M: Model> Decoder<M> {
         &self.probes
     }
 
+    /// As [`Decode::decode`], with a vertical pose that is known by other means (a log in SI
+    /// columns).
+    pub fn decode_at(
+        &self,
+        hall: [i32; 3],
+        vertical: VerticalPose<f32>,
+        zero: &PlanarPose<f32>,
+    ) -> Reading {
+        self.finish(hall, vertical, 0, zero)
+    }
+
     /// The checks of a vertical pose, the planar pose at it, and the checks of that.
     #[inline(always)]
     fn finish(
@@ -238,11 +257,12 @@ impl<M: Model> Decoder<M> {
         let (size_v, size_q) = (each(v, magnitude), each(q, magnitude));
 
         let phi_bad = outside(each(phi, magnitude), c.sensitivity_min.to_bits(), FINITE);
+        // Finite or not is asked in two ways: so a tick keeps the fewest values on the stack.
         let faults = (Status::HALL_A.with_next(outside_window(hall, &c.hall_window)))
             .with(Status::CAPACITIVE_1.with_next(capacitive_bad))
             .with(Status::SENSITIVITY_A.with_next(phi_bad))
-            .with(Status::PLANAR_NOT_FINITE.when(largest(size_q) > FINITE))
-            .with(Status::VERTICAL_NOT_FINITE.when(largest(size_v) > FINITE));
+            .with(Status::PLANAR_NOT_FINITE.when(beyond(size_q, [FINITE, FINITE, FINITE])))
+            .with(Status::VERTICAL_NOT_FINITE.when(any_not_finite(size_v)));
         let vertical_valid = !faults.any(VERTICAL_FAULTS);
         let planar_valid = faults.is_good();
         let range_v = each(c.calibrated_vertical, f32::to_bits);
@@ -273,15 +293,6 @@ impl<M: Model> Decode for Decoder<M> {
         let gaps = each(frame.capacitive, f32::from_code);
         let vertical = vertical_pose(&c.vertical_per_code, gaps);
         self.finish(frame.hall, vertical, bad, zero)
-    }
-
-    fn decode_at(
-        &self,
-        hall: [i32; 3],
-        vertical: VerticalPose<f32>,
-        zero: &PlanarPose<f32>,
-    ) -> Reading {
-        self.finish(hall, vertical, 0, zero)
     }
 
     fn constants(&self) -> &DecoderConstants<f32> {

@@ -115,6 +115,12 @@ pub enum ParameterError {
         /// Which probe, 0 to 2 for A to C.
         probe: u8,
     },
+    /// A slope of p of the field model may reach 1 within the calibrated range: one reading could
+    /// then stand for two displacements.
+    SteepInRange {
+        /// Which probe, 0 to 2 for A to C.
+        probe: u8,
+    },
     /// A window of accepted codes is empty or reaches beyond 24 bits.
     UnsoundWindow {
         /// Which sensors' window.
@@ -146,6 +152,11 @@ impl core::fmt::Display for ParameterError {
             Self::PoleInRange { probe } => write!(
                 f,
                 "the sensitivity of probe {} comes too near zero within the calibrated range",
+                ["A", "B", "C"].get(usize::from(probe)).unwrap_or(&"?")
+            ),
+            Self::SteepInRange { probe } => write!(
+                f,
+                "the field terms of probe {} are too large for the calibrated range",
                 ["A", "B", "C"].get(usize::from(probe)).unwrap_or(&"?")
             ),
             Self::UnsoundWindow { sensors } => write!(

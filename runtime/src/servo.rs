@@ -129,28 +129,23 @@ impl<'d> Servo<'d> {
     /// again from a lower number is refused until it has caught up: call [`Servo::forget`] when
     /// it restarts.
     pub fn tick(&mut self, frame: &RawFrame) -> Reading {
-        let Some(sequence) = self.follow(frame.sequence) else {
-            return self.conclude(NOTHING, Status::FRAME_REPEATED);
-        };
-        let reading = self.decoder.decode(frame, &self.zero);
-        if self.run.is_some() {
-            self.feed_rezero(&reading);
-        }
-        self.conclude(reading, sequence)
+        let decoder = self.decoder;
+        self.tick_with(frame.sequence, |zero| decoder.decode(frame, zero))
     }
 
-    /// As [`Servo::tick`], with a vertical pose that is known by other means (a log in SI
-    /// columns) in place of capacitive codes.
-    pub fn tick_at(
+    /// As [`Servo::tick`], with what `decode` makes of the period, less the zero deviation that
+    /// it is given: for a vertical pose that is known by other means (a log in SI columns), see
+    /// [`Decoder::decode_at`](crate::Decoder::decode_at).
+    #[inline(always)]
+    pub fn tick_with(
         &mut self,
-        hall: [i32; 3],
-        vertical: VerticalPose<f32>,
         sequence: u32,
+        decode: impl FnOnce(&PlanarPose<f32>) -> Reading,
     ) -> Reading {
         let Some(sequence) = self.follow(sequence) else {
             return self.conclude(NOTHING, Status::FRAME_REPEATED);
         };
-        let reading = self.decoder.decode_at(hall, vertical, &self.zero);
+        let reading = decode(&self.zero);
         if self.run.is_some() {
             self.feed_rezero(&reading);
         }

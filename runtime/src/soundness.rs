@@ -16,7 +16,8 @@ const PRODUCT_TOLERANCE: f32 = 5e-7;
 impl ParameterSet {
     /// Checks that every number is finite, PM^-1 inverts PM, each precomputed term follows
     /// from its parts, scales and limits are above zero, code windows are sound and no phi
-    /// comes near zero within the calibrated range. Lateral rows must be across the sensing axes.
+    /// comes near zero within the calibrated range. Of a field model lateral rows must be across
+    /// the sensing axes, and the slopes of p below 1 in that range.
     ///
     /// # Errors
     /// The first of these that does not hold.
@@ -36,7 +37,10 @@ impl ParameterSet {
                 return Err(ParameterError::PoleInRange { probe });
             }
         }
-        Ok(())
+        match &self.probes {
+            Probes::Linear(_) => Ok(()),
+            Probes::Field(probes) => self.check_slopes(probes),
+        }
     }
 
     fn check_signs(&self) -> Result<(), ParameterError> {
@@ -118,6 +122,30 @@ impl ParameterSet {
         }
     }
 
+    /// Within the calibrated range the terms of a field model change a displacement by less than
+    /// it changes itself.
+    fn check_slopes(&self, probes: &[FieldProbe<f32>; 3]) -> Result<(), ParameterError> {
+        let (planar, vertical) = (
+            &self.constants.calibrated_planar,
+            &self.constants.calibrated_vertical,
+        );
+        let [a, b, c] = &self.plane;
+        for ((index, probe), along) in (0u8..).zip(probes).zip(&self.plane) {
+            let (mut u, mut w) = (0.0, 0.0);
+            for axis in 0..3 {
+                let codes = planar[axis] / self.hall.m_per_code;
+                u += along[axis].abs() * codes;
+                w += dot(&probe.lateral, [a[axis], b[axis], c[axis]]).abs() * codes;
+            }
+            let zr = swing(&probe.sensitivity, vertical);
+            let gentle = |slope: f32| slope < 1.0;
+            if !probe.steepest_slopes(u, w, zr).into_iter().all(gentle) {
+                return Err(ParameterError::SteepInRange { probe: index });
+            }
+        }
+        Ok(())
+    }
+
     /// The lateral rows of a field model, times PM, begin with the unit vectors across the
     /// sensing axes; the rest is where the probes stand.
     fn check_lateral(
@@ -167,10 +195,13 @@ fn check_scaled(
 
 /// The smallest |phi| over the box |Z|, |Rx|, |Ry| <= limits, or 0 when phi changes sign.
 fn smallest_sensitivity(s: &Sensitivity<f32>, limits: &[f32; 3]) -> f32 {
-    let swing = (s.per_z_m.abs() * limits[0] + s.per_rx_rad.abs() * limits[1])
-        + s.per_ry_rad.abs() * limits[2];
-    let smallest = s.eta.abs() - swing;
+    let smallest = s.eta.abs() - swing(s, limits);
     if smallest > 0.0 { smallest } else { 0.0 }
+}
+
+/// The largest |phi - eta| over that box.
+fn swing(s: &Sensitivity<f32>, limits: &[f32; 3]) -> f32 {
+    (s.per_z_m.abs() * limits[0] + s.per_rx_rad.abs() * limits[1]) + s.per_ry_rad.abs() * limits[2]
 }
 
 #[cfg(test)]
@@ -347,6 +378,17 @@ mod tests {
             refused(|set| sample::field_probes(set)[0].sensitivity.per_z_m = 5000.0),
             ParameterError::PoleInRange { probe: 0 }
         );
+        for change in [
+            (|set| sample::field_probes(set)[1].shape.u_w[0] *= 100.0) as fn(&mut ParameterSet),
+            |set| sample::field_probes(set)[1].shape.w_w[0] = -1e-3,
+            |set| sample::field_probes(set)[1].shape.u_z_z[1] = f32::MAX,
+            |set| set.constants.calibrated_planar[1] = 0.05,
+        ] {
+            assert!(matches!(
+                refused(change),
+                ParameterError::SteepInRange { probe: 0 | 1 }
+            ));
+        }
         let term = "the lateral rows";
         for change in [
             (|set| sample::field_probes(set)[2].lateral[1] += 1e-3) as fn(&mut ParameterSet),

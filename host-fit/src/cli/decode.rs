@@ -47,7 +47,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
         &ReadOptions::DECODE,
     )?;
     let on_invalid = on_invalid(args.hold);
-    let decoded = pose_file::decode(&log.dataset, &*set.decoder(), on_invalid);
+    let decoded = pose_file::decode(&log.dataset, &set.decoder(), on_invalid);
     output::write_atomically(&args.out, &pose_file::to_text(&decoded))?;
     let counts = StatusCounts::of(&decoded);
     let mut summary = format!(

@@ -1,6 +1,6 @@
 //! A log as the fit sees it: rows in SI units, grouped by movement.
 
-use runtime::{Decode, PlanarPose, RawFrame, Reading, VerticalPose};
+use runtime::{AnyDecoder, PlanarPose, RawFrame, Reading, VerticalPose};
 use std::path::PathBuf;
 
 /// What one servo period of a log gives the decoder.
@@ -9,7 +9,7 @@ pub enum LoggedFrame {
     /// All six codes, as on the target.
     Codes(RawFrame),
     /// Hall codes, and a vertical pose that the log holds in SI units: there are no
-    /// capacitive codes, so this goes through [`Decode::decode_at`].
+    /// capacitive codes, so this goes through [`AnyDecoder::decode_at`].
     HallCodes {
         /// Hall codes of the probes A, B, C.
         hall: [i32; 3],
@@ -59,7 +59,7 @@ impl LoggedFrame {
     }
 
     /// The reading of the runtime's own decoder, less `zero`.
-    pub fn decode(&self, decoder: &dyn Decode, zero: &PlanarPose<f32>) -> Reading {
+    pub fn decode(&self, decoder: &AnyDecoder, zero: &PlanarPose<f32>) -> Reading {
         match self {
             Self::Codes(frame) => decoder.decode(frame, zero),
             Self::HallCodes { hall, vertical, .. } => decoder.decode_at(*hall, *vertical, zero),

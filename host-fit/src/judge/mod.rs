@@ -80,7 +80,7 @@ impl Decoded {
     pub fn new(set: &ParameterSet, dataset: &Dataset) -> Self {
         let decoder = set.decoder();
         let one = |row: &Row| {
-            let reading = row.frame.decode(&*decoder, &PlanarPose::ZERO);
+            let reading = row.frame.decode(&decoder, &PlanarPose::ZERO);
             let pose = reading.planar()?.to_array();
             let error = |axis: usize| f64::from(pose[axis]) - row.reference[axis];
             Some(std::array::from_fn(error))

@@ -6,7 +6,7 @@ use runtime::capacitive::vertical_pose;
 use runtime::decoder::DecoderConstants;
 use runtime::model::Probes;
 use runtime::real::Real;
-use runtime::{Decode, PlanarPose, VerticalPose};
+use runtime::{AnyDecoder, PlanarPose, VerticalPose};
 
 /// The planar pose of a row in `f64`, from the same codes and constants that were not rounded.
 pub fn decode_f64(
@@ -25,7 +25,7 @@ pub fn decode_f64(
 pub fn largest_difference(
     constants: &DecoderConstants<f64>,
     probes: &Probes<f64>,
-    decoder: &dyn Decode,
+    decoder: &AnyDecoder,
     dataset: &Dataset,
 ) -> [f64; 3] {
     let one = |row: &crate::input::dataset::Row| {

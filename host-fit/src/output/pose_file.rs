@@ -20,7 +20,7 @@ pub use summary::StatusCounts;
 pub use text::to_text;
 
 use crate::input::dataset::{Dataset, LoggedFrame};
-use runtime::{Decode, OnInvalid, Reading, Servo};
+use runtime::{AnyDecoder, OnInvalid, Reading, Servo};
 
 /// The first line of every pose file.
 pub const HEADER: &str = "movement,t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad,status";
@@ -40,8 +40,8 @@ pub struct PoseRow {
 ///
 /// What is invalid is zero or held, as `on_invalid` says; nothing is held, and no frame is
 /// missed, from one movement to the next.
-pub fn decode(dataset: &Dataset, decoder: &dyn Decode, on_invalid: OnInvalid) -> Vec<PoseRow> {
-    let mut servo = Servo::new(decoder, on_invalid);
+pub fn decode(dataset: &Dataset, decoder: &AnyDecoder, on_invalid: OnInvalid) -> Vec<PoseRow> {
+    let mut servo = Servo::new(&**decoder, on_invalid);
     let mut poses = Vec::with_capacity(dataset.rows.len());
     for movement in &dataset.movements {
         servo.forget();
@@ -53,7 +53,7 @@ pub fn decode(dataset: &Dataset, decoder: &dyn Decode, on_invalid: OnInvalid) ->
                     vertical,
                     sequence,
                     ..
-                } => servo.tick_at(*hall, *vertical, *sequence),
+                } => servo.tick_with(*sequence, |zero| decoder.decode_at(*hall, *vertical, zero)),
             };
             poses.push(PoseRow {
                 movement: movement.index,

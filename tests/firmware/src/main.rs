@@ -120,6 +120,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("parameters: one sound slot of two", &|| {
         parameters::one_usable(bench)
     });
+    check("parameters: the field model", &|| {
+        parameters::the_field_model(bench)
+    });
     check("parameters: the later of two", &|| {
         parameters::the_later_of_two(bench)
     });

@@ -239,7 +239,7 @@ fn check_poses(
         0 => OnInvalid::Zero,
         ticks => OnInvalid::Hold { ticks },
     };
-    let host = pose_file::decode(&dataset, &*set.decoder(), on_invalid);
+    let host = pose_file::decode(&dataset, &set.decoder(), on_invalid);
     let target = pose_file::read(poses)?;
     if host.len() != target.len() {
         let (rows, lines) = (host.len(), target.len());

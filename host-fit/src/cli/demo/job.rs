@@ -146,7 +146,7 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
 
     blob_file::write(blob_path, &model_31.set)?;
     let set = blob_file::read(blob_path)?;
-    let decoded = pose_file::decode(dataset, &*set.decoder(), OnInvalid::Zero);
+    let decoded = pose_file::decode(dataset, &set.decoder(), OnInvalid::Zero);
     output::write_atomically(pose_path, &pose_file::to_text(&decoded))?;
     let errors = pose_file_errors(pose_path, dataset, &stage, &model_31.solution.parameters)?;
     let service = Service::new(&stage, &set)?;
@@ -169,7 +169,7 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
         f32_difference: crate::judge::precision::largest_difference(
             &constants,
             &probes,
-            &*set.decoder(),
+            &set.decoder(),
             dataset,
         ),
         reading,

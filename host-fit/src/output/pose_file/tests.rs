@@ -84,7 +84,7 @@ fn a_saturated_row_is_held_for_so_many_ticks_and_never_into_the_next_movement() 
         &[(good, 0), (bad, 1), (bad, 2), (good, 3)],
         &[(bad, 0), (good, 1)],
     ]);
-    let rows = decode(&dataset, &*decoder, OnInvalid::Hold { ticks: 1 });
+    let rows = decode(&dataset, &decoder, OnInvalid::Hold { ticks: 1 });
     let fault = Status::HALL_A.with(Status::PLANAR_INVALID);
     let statuses: Vec<_> = rows.iter().map(|row| row.reading.status).collect();
     assert_eq!(
@@ -118,9 +118,9 @@ fn a_saturated_row_is_held_for_so_many_ticks_and_never_into_the_next_movement() 
 fn without_hold_the_rows_are_the_decoders_own() {
     let decoder = decoder();
     let dataset = dataset(&[&[(-32767, 0), (5, 1), (SATURATED, 2), (32766, 4)]]);
-    let rows = decode(&dataset, &*decoder, OnInvalid::Zero);
+    let rows = decode(&dataset, &decoder, OnInvalid::Zero);
     for (row, pose) in dataset.rows.iter().zip(&rows) {
-        let reading = row.frame.decode(&*decoder, &PlanarPose::ZERO);
+        let reading = row.frame.decode(&decoder, &PlanarPose::ZERO);
         assert_eq!(pose.reading.pose, reading.pose);
         let missed = pose.reading.status.any(Status::FRAMES_MISSED);
         assert_eq!(missed, row.frame.sequence() == 4, "the gap shows");
@@ -133,7 +133,7 @@ fn a_vertical_pose_in_si_units_decodes_like_the_codes_that_it_came_from() {
     let coded = dataset(&[&[(1000, 0), (SATURATED, 1), (2000, 2)]]);
     let mut known = coded.clone();
     for row in &mut known.rows {
-        let vertical = row.frame.decode(&*decoder, &PlanarPose::ZERO).pose.vertical;
+        let vertical = row.frame.decode(&decoder, &PlanarPose::ZERO).pose.vertical;
         row.frame = LoggedFrame::HallCodes {
             hall: row.frame.hall(),
             vertical,
@@ -142,8 +142,8 @@ fn a_vertical_pose_in_si_units_decodes_like_the_codes_that_it_came_from() {
         };
     }
     for on_invalid in [OnInvalid::Zero, OnInvalid::Hold { ticks: 3 }] {
-        let want = decode(&coded, &*decoder, on_invalid);
-        assert_eq!(decode(&known, &*decoder, on_invalid), want);
+        let want = decode(&coded, &decoder, on_invalid);
+        assert_eq!(decode(&known, &decoder, on_invalid), want);
     }
 }
 
@@ -203,7 +203,7 @@ fn every_row_of_the_log_that_ships_with_the_program_is_restored() {
     let logs = [data.join("paper.csv.gz")];
     let reading = crate::input::log::read(&logs, &stage, &crate::input::log::ReadOptions::DECODE)
         .expect("sound");
-    let rows = decode(&reading.dataset, &*decoder(), OnInvalid::Zero);
+    let rows = decode(&reading.dataset, &decoder(), OnInvalid::Zero);
     let text = String::from_utf8(to_text(&rows)).expect("ASCII");
     let read = parse(&text, Path::new("x")).expect("own text");
     assert_eq!(read.len(), 57_000);

@@ -130,8 +130,8 @@ mod tests {
     use crate::solve::field::whiten::UNKNOWNS;
     use runtime::VerticalPose;
 
-    /// A small error of one parameter at a time, decoded, against what is predicted for it; two
-    /// passes of the decoder leave up to some thousandths of its effect.
+    /// A small error of one parameter at a time, decoded, against what is predicted for it; the
+    /// decoder's one step leaves up to some thousandths of its effect.
     #[test]
     fn the_predicted_error_of_a_pose_is_what_the_decoder_makes_of_the_parameters_error() {
         let truth = parameters();

@@ -3,9 +3,11 @@
 use super::log::Stage;
 use super::{Outcome, equal, expect};
 use crate::adc_model::Part;
-use crate::bench::{Bench, Comparison, Seen};
+use crate::bench::{Bench, Comparison, Seen, Words};
 use hal_adapters::can::status::NodeState;
-use runtime::blob::CRC_BYTES;
+use runtime::blob::{CRC_BYTES, MAX_BYTES};
+use runtime::parameters::Text;
+use runtime::{ParameterSet, PlanarPose, RawFrame};
 
 const PART: Part = Part::Ads131m08;
 
@@ -117,6 +119,50 @@ pub fn one_usable(bench: &Bench) -> Outcome {
         )?;
     }
     Ok(())
+}
+
+/// The golden example of the field model, in a stage of its own.
+const FIELD: &[u8] = include_bytes!("../../../../runtime/examples/field.bin");
+
+/// With a blob of the field model the words on the bus are those of the host's decoder.
+pub fn the_field_model(bench: &Bench) -> Outcome {
+    let mut set = ParameterSet::from_bytes(FIELD)?;
+    set.serial = Text::try_from("stage-7").map_err(|_| "the serial")?;
+    let mut buffer = [0; MAX_BYTES];
+    let blob = set.to_bytes(&mut buffer)?;
+    let decoder = set.decoder();
+    let poses: Vec<_> = (bench.rows.iter())
+        .map(|&[a, b, c, g1, g2, g3]| {
+            let frame = RawFrame {
+                hall: [a, b, c],
+                capacitive: [g1, g2, g3],
+                sequence: 0,
+                time_us: 0,
+            };
+            let reading = decoder.decode(&frame, &PlanarPose::ZERO);
+            let [x, y, rz] = reading.pose.planar.to_array();
+            let [z, rx, ry] = reading.pose.vertical.to_array();
+            Words {
+                words: [x, y, rz, z, rx, ry].map(f32::to_bits),
+                status: reading.status.bits(),
+            }
+        })
+        .collect();
+    let mut machine = bench.machine(PART, [blob, &[]])?;
+    machine.run_ticks(1000)?;
+    let seen = Seen::since_last(&mut machine);
+    let mut comparison = Comparison::default();
+    comparison.add(&seen.axes, &poses, 0);
+    println!("RESULT firmware_field_words={}", comparison.words);
+    println!("RESULT firmware_field_differing={}", comparison.differing);
+    equal("words that differ", comparison.differing, 0)?;
+    expect(comparison.planar >= 998, || {
+        format!("only {} poses", comparison.planar)
+    })?;
+    let planar = seen.axes.iter().filter(|axis| axis.axis == 0);
+    expect(planar.filter(|axis| axis.word != 0).count() >= 998, || {
+        "poses that are not valid".to_owned()
+    })
 }
 
 /// Of two valid slots the later one is used, whichever it is.
