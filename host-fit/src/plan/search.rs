@@ -23,9 +23,9 @@ const STEP_S: f64 = 0.04;
 /// Sets that are judged before the best of them goes on.
 const BATCH: usize = 16;
 /// Batches times seconds: a long run takes longer to judge and less choosing.
-const BATCH_SECONDS: f64 = 400.0;
+const BATCH_SECONDS: f64 = 200.0;
 /// Fewest and most batches; the first third are drawn anew.
-const BATCHES: (usize, usize) = (3, 20);
+const BATCHES: (usize, usize) = (3, 10);
 /// Cycles of a set that is good on a stage of the usual limits, in parts of the highest: where the
 /// choice starts.
 const START: [f64; 6] = [0.7, 0.85, 0.75, 1.0, 0.9, 0.55];

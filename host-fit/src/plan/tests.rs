@@ -233,8 +233,8 @@ fn the_forecast_is_what_fits_to_simulated_logs_give() {
         }
     }
     let count = (places.len() * seeds.count()) as f64;
-    for axis in 0..3 {
-        let ratio = (found[axis] / count / forecast.systematic[axis]).sqrt();
+    for (axis, (found, forecast)) in found.iter().zip(forecast.systematic).enumerate() {
+        let ratio = (found / count / forecast).sqrt();
         assert!((0.6..1.7).contains(&ratio), "{axis}: {ratio}");
     }
 }
