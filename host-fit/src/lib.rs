@@ -10,6 +10,7 @@
 //! | [`problem`] | what is minimised: rows drawn, parameters, zero deviations |
 //! | [`simulate`] | logs of a stage made of physics, to rehearse a calibration |
 //! | [`solve`] | how: least squares, SHTLBO and its relatives |
+//! | [`plan`] | the run to make for the field model, and what to expect of it |
 //! | [`judge`] | errors by the target's own decoder, standard errors, what the log leaves open |
 //! | [`fit`] | all of these in a row |
 //! | [`output`] | blobs, pose files and images for flash tools, written whole or not at all |
@@ -27,6 +28,7 @@ pub mod input;
 pub mod interrupt;
 pub mod judge;
 pub mod output;
+pub mod plan;
 pub mod problem;
 pub mod report;
 pub mod simulate;

@@ -5,7 +5,7 @@
 //! | 0 | good |
 //! | 2 | usage: the command line is wrong |
 //! | 3 | bad input: a stage file, log or blob that is refused, an output that can't be written |
-//! | 4 | the fit failed its own checks; no blob was written |
+//! | 4 | the fit failed its own checks, or no run can be planned; nothing was written |
 //! | 130 | interrupted; the best so far was kept |
 //!
 //! Every message says what is wrong, where, and what to do.
@@ -20,6 +20,7 @@ use crate::output::OutputError;
 use crate::output::blob_file::BlobFileError;
 use crate::output::export::ExportError;
 use crate::output::pose_file::PoseFileError;
+use crate::plan::PlanError;
 use crate::report::plots::PlotError;
 use crate::simulate::plan_file::PlanFileError;
 use crate::simulate::recording::RecordError;
@@ -96,6 +97,9 @@ pub enum HostError {
     /// `replay` ended early.
     #[error(transparent)]
     Replay(#[from] ReplayError),
+    /// No run leads to a calibration within the limits: nothing was written.
+    #[error("no run was written: {0}")]
+    Plan(#[from] PlanError),
     /// A planned run is refused.
     #[error(transparent)]
     PlanFile(#[from] PlanFileError),
@@ -133,7 +137,7 @@ impl HostError {
             | Self::PlanFile(_)
             | Self::Record(_)
             | Self::Output(_) => 3,
-            Self::Fit(_) => 4,
+            Self::Fit(_) | Self::Plan(_) => 4,
             Self::Interrupted { .. } => 130,
         }
     }
@@ -160,6 +164,8 @@ mod tests {
         assert_eq!(usage.exit_status(), 2);
         let fit = FitError::from(SolveError::NoPlanarMotion);
         assert_eq!(HostError::from(fit).exit_status(), 4);
+        let plan = PlanError::TooFewFrequencies { seconds: 2.0 };
+        assert_eq!(HostError::from(plan).exit_status(), 4);
         let interrupted = HostError::Interrupted {
             kept: "nothing was written".to_owned(),
         };

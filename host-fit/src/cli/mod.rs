@@ -12,6 +12,7 @@ mod fit;
 mod import;
 mod inspect;
 mod live;
+mod plan;
 mod replay;
 mod simulate;
 
@@ -29,8 +30,8 @@ use std::time::Instant;
 
 /// Calibrates the Hall-sensor array of a 6-DOF precision stage from logged data.
 ///
-/// Exit status: 0 good; 2 wrong usage; 3 bad input or output; 4 the fit failed its own checks;
-/// 130 interrupted, best so far kept.
+/// Exit status: 0 good; 2 wrong usage; 3 bad input or output; 4 the fit failed its own checks, or no
+/// run can be planned; 130 interrupted, best so far kept.
 #[derive(Debug, Parser)]
 #[command(name = "host-fit", version, max_term_width = 100)]
 struct Cli {
@@ -62,6 +63,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
     Import(Box<import::ImportArgs>),
+    /// Plan the run to make for the field model, and tell what to expect of it.
+    Plan(plan::PlanArgs),
     /// Write the log of a simulated stage, to rehearse a calibration.
     Simulate(simulate::SimulateArgs),
 }
@@ -85,6 +88,7 @@ pub fn main() -> ExitCode {
         Command::Export(args) => export::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Import(args) => import::run(*args),
+        Command::Plan(args) => plan::run(&args),
         Command::Simulate(args) => simulate::run(&args),
     };
     match result {

@@ -4,9 +4,11 @@ mod columns;
 mod document;
 mod error;
 mod file;
+mod motion;
 mod search;
 
 pub use error::{Place, StageError};
+pub use motion::{AXES, AxisMotion, Motion};
 
 use crate::input::log::layout::LogLayout;
 use runtime::capacitive::ProbePositions;
@@ -99,6 +101,8 @@ pub struct Stage {
     pub servo_period_s: f64,
     /// Search ranges.
     pub search: SearchRanges,
+    /// How it moves.
+    pub motion: Motion,
     /// Which column of a log holds what.
     pub log: LogLayout,
 }

@@ -37,12 +37,20 @@ impl Page<'_> {
     /// # Errors
     /// [`Error`] when the template names something that is not there.
     pub fn to_html(&self) -> Result<String, Error> {
-        let mut engine = Environment::new();
-        engine.set_undefined_behavior(UndefinedBehavior::Strict);
-        engine.add_filter("scientific", |number: Option<f64>| {
-            number.map_or_else(|| "-".to_owned(), |x| format!("{x:.2e}"))
-        });
-        let template = include_str!("report.html");
-        engine.render_named_str("report.html", template, Serde(self))
+        render("report.html", include_str!("report.html"), self)
     }
+}
+
+/// A template filled in; `name` ends in `.html`, so that every text is escaped.
+pub(super) fn render(
+    name: &str,
+    template: &str,
+    context: &impl Serialize,
+) -> Result<String, Error> {
+    let mut engine = Environment::new();
+    engine.set_undefined_behavior(UndefinedBehavior::Strict);
+    engine.add_filter("scientific", |number: Option<f64>| {
+        number.map_or_else(|| "-".to_owned(), |x| format!("{x:.2e}"))
+    });
+    engine.render_named_str(name, template, Serde(context))
 }

@@ -1,7 +1,9 @@
-//! What a fit or a judgement shows: JSON, text tables, plots, an HTML page.
+//! What a fit, a judgement or a plan shows: JSON, text tables, plots, an HTML page.
 
 pub mod field;
 pub mod html;
 pub mod json;
+pub mod plan;
+pub mod plan_page;
 pub mod plots;
 pub mod text;

@@ -12,6 +12,7 @@
 use super::pose::StagePose;
 use super::protocol::Trajectory;
 use csv::{ReaderBuilder, StringRecord};
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// The columns of a plan.
@@ -137,6 +138,23 @@ pub fn read(path: &Path, servo_period_s: f64) -> Result<Trajectory, PlanFileErro
     Ok(poses)
 }
 
+/// The text of a plan, to 10 pm and prad: differences of neighbouring rows still show the
+/// acceleration.
+pub fn to_csv(poses: &[StagePose], servo_period_s: f64) -> String {
+    let mut text = COLUMNS.join(",") + "\n";
+    text.reserve(80 * poses.len());
+    for (k, pose) in poses.iter().enumerate() {
+        // Writing to memory cannot fail.
+        let _ = write!(text, "{}", (k as f64 * servo_period_s * 1e6).round());
+        for value in pose.planar.iter().chain(&pose.vertical) {
+            // Rounded first, and zero added: never -0.00000.
+            let _ = write!(text, ",{:.5}", (value * 1e11).round() / 1e5 + 0.0);
+        }
+        text.push('\n');
+    }
+    text
+}
+
 /// The pose of a record of seven cells, or the column that is no number.
 fn pose(record: &StringRecord) -> Result<StagePose, usize> {
     let value = |column: usize| match record[column].parse::<f64>() {
@@ -179,6 +197,26 @@ mod tests {
         assert_eq!(poses[0].planar, [1.0, -2.0, 3.0].map(|x| x * 1e-6));
         assert_eq!(poses[0].vertical, [4.0, -5.0, 6.0].map(|x| x * 1e-6));
         assert_eq!(poses[1].planar[2], 0.5e-6);
+    }
+
+    #[test]
+    fn a_plan_reads_back_as_it_was_written() {
+        let pose = StagePose {
+            planar: [1.25e-4, -3e-12, 0.0],
+            vertical: [-2e-4, 7.6e-10, 4.8e-4],
+        };
+        let text = to_csv(&[StagePose::default(), pose, pose], 0.002);
+        assert!(text.contains("\n2000,125.00000,0.00000,"), "{text}");
+        let read = parse(&text).expect("a sound plan");
+        assert_eq!((read.len(), read[0]), (3, StagePose::default()));
+        for (read, pose) in [
+            (read[1].planar, pose.planar),
+            (read[1].vertical, pose.vertical),
+        ] {
+            for axis in 0..3 {
+                assert!((read[axis] - pose[axis]).abs() < 6e-12);
+            }
+        }
     }
 
     #[test]

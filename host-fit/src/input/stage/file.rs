@@ -1,12 +1,12 @@
 //! Reads `stage.toml` and checks every value of it.
 //!
 //! The derived types say which keys there are and what kind of value each has. All keys but
-//! those of `[log]` are required, and none but the documented ones are accepted: a misspelt
+//! those of `[log]` and `[motion]` are required, and none but the documented ones are accepted: a misspelt
 //! key would otherwise be ignored without a word.
 
 use super::document::{Document, List};
 use super::error::StageError;
-use super::{CodeScale, Stage, columns, search};
+use super::{CodeScale, Stage, columns, motion, search};
 use crate::input::log::layout::LogLayout;
 use crate::input::source;
 use runtime::capacitive::ProbePositions;
@@ -43,6 +43,9 @@ struct StageFile {
     /// Read by [`search::ranges`]: its keys depend on the terms of the models.
     #[serde(rename = "search")]
     _search: BTreeMap<String, IgnoredAny>,
+    /// Read by [`motion::motion`].
+    #[serde(rename = "motion")]
+    _motion: Option<BTreeMap<String, IgnoredAny>>,
     /// Read by [`columns::log_layout`].
     log: Option<BTreeMap<String, IgnoredAny>>,
 }
@@ -122,6 +125,7 @@ impl Stage {
             )?,
             servo_period_s: document.within(&servo.period_s, PERIODS_S.0, PERIODS_S.1, "s")?,
             search: search::ranges(document, &designed)?,
+            motion: motion::motion(document)?,
             log: match file.log {
                 None => LogLayout::default(),
                 Some(_) => columns::log_layout(document)?,

@@ -80,6 +80,11 @@ impl Rows {
             movements.push(start..start + chunk.len());
             start += chunk.len();
         }
+        Self::of_movements(rows, movements)
+    }
+
+    /// Rows in time order, and where each movement stands among them.
+    pub fn of_movements(rows: Vec<FieldRow>, movements: Vec<Range<usize>>) -> Self {
         let (planar_range_mm, vertical_range) = ranges(&rows, &movements);
         let most: [f64; 6] = std::array::from_fn(|axis| {
             2.0 * MOTION_MAX

@@ -65,10 +65,7 @@ impl ServiceVariance {
         let mut sums = [[0.0; 3]; 3];
         let constants = model_31.constants(1.0)?;
         let probes = probes(parameters);
-        for index in 1..=POSES {
-            let place: [f64; 6] = std::array::from_fn(|axis| 2.0 * halton(index, axis) - 1.0);
-            let planar = [0, 1, 2].map(|k| place[k] * planar_range[k]);
-            let vertical = [0, 1, 2].map(|k| place[3 + k] * vertical_range[k]);
+        for (planar, vertical) in service_poses((planar_range, vertical_range)) {
             let PoseUncertainty { systematic, noise } = posterior.at_pose(planar, vertical)?;
             let signal_m =
                 [0, 1, 2].map(|k| probes[k].signal_mm(planar.map(|x| x * 1e3), vertical) * 1e-3);
@@ -87,6 +84,13 @@ impl ServiceVariance {
     /// Errors of the field model in service over the noise floor: of X, Y, Rz.
     pub fn ratios(&self) -> [f64; 3] {
         [0, 1, 2].map(|k| (1.0 + self.systematic[k] / self.noise[k]).sqrt())
+    }
+
+    /// The systematic variance over that of the noise, of the axis where it is largest.
+    pub fn worst(&self) -> f64 {
+        (0..3).fold(0.0, |worst, k| {
+            f64::max(worst, self.systematic[k] / self.noise[k])
+        })
     }
 
     /// Errors of Model (31) in service over the noise floor, as far as the field model knows.
@@ -166,6 +170,18 @@ impl std::fmt::Display for Verdict {
             f.write_str("the field model finds nothing that model (31) lacks")
         }
     }
+}
+
+/// Poses (X, Y, Rz and Z, Rx, Ry) spread evenly in the box of these largest magnitudes.
+pub(super) fn service_poses(
+    (planar_range, vertical_range): ([f64; 3], [f64; 3]),
+) -> impl ExactSizeIterator<Item = ([f64; 3], [f64; 3])> {
+    (0..POSES).map(move |index| {
+        let place: [f64; 6] = std::array::from_fn(|axis| 2.0 * halton(index + 1, axis) - 1.0);
+        let planar = [0, 1, 2].map(|k| place[k] * planar_range[k]);
+        let vertical = [0, 1, 2].map(|k| place[3 + k] * vertical_range[k]);
+        (planar, vertical)
+    })
 }
 
 /// The `index`-th place of the axis in an even spread over (0, 1): the radical inverse in the

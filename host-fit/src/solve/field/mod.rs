@@ -13,10 +13,12 @@
 //! | [`fit`] | the steps in a row |
 //! | [`posterior`] | covariance of parameters and of a pose |
 //! | [`carry`] | whether the log can carry the model |
+//! | [`forecast`] | what a log that is not recorded yet will tell |
 
 pub mod blocks;
 pub mod carry;
 pub mod fit;
+pub mod forecast;
 pub mod noise;
 pub mod parameters;
 pub mod posterior;

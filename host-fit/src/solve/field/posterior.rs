@@ -1,7 +1,7 @@
 //! What the log tells of the parameters, and what that means for a pose.
 
 use super::parameters::FieldParameters;
-use super::probe::probes;
+use super::probe::{Probe, probes};
 use super::terms::{CARRY, COUNT, PER_PROBE, name};
 use super::whiten::Noise;
 use crate::problem::model;
@@ -36,6 +36,35 @@ pub struct PoseUncertainty {
     pub systematic: Matrix3<f64>,
     /// By the noise of the probes: new at every tick.
     pub noise: Matrix3<f64>,
+}
+
+/// How errors become errors of a pose in X, Y, Rz: m, m, rad.
+pub(super) struct PoseErrors {
+    /// Per error of each parameter.
+    pub(super) by_parameter: [[f64; COUNT]; 3],
+    /// Per mm of error of each probe's signal.
+    pub(super) by_signal: [[f64; 3]; 3],
+}
+
+impl PoseErrors {
+    /// At the pose `planar` (m, m, rad), `vertical` (m, rad, rad); `None` where the probes can't
+    /// tell it.
+    pub(super) fn new(probes: &[Probe; 3], planar: [f64; 3], vertical: [f64; 3]) -> Option<Self> {
+        let planar_mm = planar.map(|x| x * 1e3);
+        let read = [0, 1, 2].map(|k| probes[k].read(planar_mm, vertical));
+        let inverse = inverse_rows(&read.map(|r| r.by_pose))?;
+        let by_signal = inverse.map(|row| row.map(|x| 1e-3 * x));
+        let by_parameter = by_signal.map(|row| {
+            std::array::from_fn(|k| {
+                let probe = k / PER_PROBE;
+                -row[probe] * read[probe].by_parameter[k % PER_PROBE]
+            })
+        });
+        Some(Self {
+            by_parameter,
+            by_signal,
+        })
+    }
 }
 
 impl Posterior {
@@ -105,17 +134,10 @@ impl Posterior {
     /// What is to be expected of the pose `planar` (m, m, rad) at `vertical` (m, rad, rad);
     /// `None` where the probes can't tell it.
     pub fn at_pose(&self, planar: [f64; 3], vertical: [f64; 3]) -> Option<PoseUncertainty> {
-        let probes = probes(&self.parameters);
-        let planar_mm = planar.map(|x| x * 1e3);
-        let read = [0, 1, 2].map(|k| probes[k].read(planar_mm, vertical));
-        let inverse = inverse_rows(&read.map(|r| r.by_pose))?;
-        let by = |axis: usize, k: usize| {
-            let probe = k / PER_PROBE;
-            -1e-3 * inverse[axis][probe] * read[probe].by_parameter[k % PER_PROBE]
-        };
-        let by_parameter = DMatrix::from_fn(3, COUNT, by);
+        let errors = PoseErrors::new(&probes(&self.parameters), planar, vertical)?;
+        let by_parameter = DMatrix::from_fn(3, COUNT, |axis, k| errors.by_parameter[axis][k]);
         let systematic = &by_parameter * &self.covariance * by_parameter.transpose();
-        let by_white = Matrix3::from_fn(|axis, k| 1e-3 * inverse[axis][k] * self.white_mm[k]);
+        let by_white = Matrix3::from_fn(|axis, k| errors.by_signal[axis][k] * self.white_mm[k]);
         Some(PoseUncertainty {
             systematic: Matrix3::from_fn(|i, j| systematic[(i, j)]),
             noise: by_white * by_white.transpose(),

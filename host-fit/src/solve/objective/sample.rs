@@ -2,7 +2,7 @@
 
 use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
 use crate::input::log::layout::LogLayout;
-use crate::input::stage::{CodeScale, Range, SearchRanges, Stage};
+use crate::input::stage::{CodeScale, Motion, Range, SearchRanges, Stage};
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::{Problem, TrainRow};
@@ -52,6 +52,7 @@ pub fn stage() -> Stage {
         y_baseline_m: 0.1,
         servo_period_s: 0.002,
         search,
+        motion: Motion::default(),
         log: LogLayout::default(),
     }
 }

@@ -1,0 +1,105 @@
+//! `host-fit plan`.
+
+use crate::cli::error::HostError;
+use crate::input::stage::Stage;
+use crate::output::{check_writable, make_folder, write_atomically};
+use crate::plan::plan;
+use crate::report::plan::PlanReport;
+use crate::report::plan_page::PlanPage;
+use crate::simulate::plan_file;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Longest run, s: nothing is gained beyond a few minutes.
+const SECONDS_MAX: f64 = 600.0;
+/// Most rows of a run.
+const ROWS_MAX: f64 = 2e6;
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds <= SECONDS_MAX => Ok(seconds),
+        _ => Err(format!(
+            "expected a number of seconds above 0 and up to {SECONDS_MAX}"
+        )),
+    }
+}
+
+/// Arguments of `plan`.
+#[derive(Debug, Args)]
+pub(super) struct PlanArgs {
+    /// The stage as designed; its optional table [motion] says how it may move.
+    #[arg(long, value_name = "stage.toml")]
+    stage: PathBuf,
+    /// Length of the run; 20 are plenty for a stage of the usual limits.
+    #[arg(long, value_name = "T", value_parser = seconds, allow_negative_numbers = true)]
+    seconds: f64,
+    /// Where to write the trajectory: columns t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad, one row
+    /// for every servo period; `-` for standard output.
+    #[arg(long, value_name = "run.csv")]
+    out: Option<PathBuf>,
+    /// Write a page with plots into this folder.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Write the figures as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Plans; then writes trajectory, JSON and page, in this order.
+pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
+    let (out, json) = (args.out.as_deref(), args.json.as_deref());
+    let shown = [out, json].map(super::is_standard_output);
+    if shown == [true; 2] {
+        return Err(HostError::Usage {
+            argument: "--json",
+            problem: "trajectory and figures cannot both go to standard output; name a file"
+                .to_owned(),
+        });
+    }
+    super::keep_apart(&[out, json, args.report.as_deref()], &[&args.stage])?;
+    for (path, _) in [out, json]
+        .into_iter()
+        .zip(shown)
+        .filter(|(_, shown)| !shown)
+    {
+        path.map_or(Ok(()), check_writable)?;
+    }
+    if let Some(folder) = args.report.as_deref().filter(|folder| folder.exists()) {
+        make_folder(folder)?;
+    }
+    let stage = Stage::from_file(&args.stage)?;
+    if args.seconds / stage.servo_period_s > ROWS_MAX {
+        return Err(HostError::Usage {
+            argument: "--seconds",
+            problem: format!(
+                "a run of {} s has more than {ROWS_MAX} servo periods of {} s; make it shorter",
+                args.seconds, stage.servo_period_s
+            ),
+        });
+    }
+    let plan = plan(&stage, args.seconds)?;
+    let report = PlanReport::new(&plan, &stage);
+    if let Some(path) = out {
+        let trajectory = plan.run.trajectory(stage.servo_period_s);
+        let csv = plan_file::to_csv(&trajectory, stage.servo_period_s);
+        if shown[0] {
+            super::print(&csv)?;
+        } else {
+            write_atomically(path, csv.as_bytes())?;
+        }
+    }
+    if let Some(path) = json {
+        super::write_json(&report, path)?;
+    }
+    if let Some(folder) = &args.report {
+        let page = PlanPage::new(&report, &plan)?.to_html()?;
+        make_folder(folder)?;
+        write_atomically(&folder.join("index.html"), page.as_bytes())?;
+    }
+    if shown.contains(&true) {
+        return Ok(());
+    }
+    super::print(&report.text())?;
+    let wrote = |path: &Path| super::print(&format!("wrote {}\n", path.display()));
+    out.map_or(Ok(()), wrote)
+}

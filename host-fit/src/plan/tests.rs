@@ -1,0 +1,240 @@
+//! Properties of a plan, and what simulated stages make of it.
+
+use super::run::Run;
+use super::*;
+use crate::input::dataset::Dataset;
+use crate::input::shipped::STAGE_TOML;
+use crate::problem::Problem;
+use crate::problem::model::Model;
+use crate::simulate::assembly::Assembly;
+use crate::simulate::pose::StagePose;
+use crate::simulate::protocol;
+use crate::simulate::recording::record;
+use crate::simulate::sensors::SensorErrors;
+use crate::solve::field::fit::{FieldFit, fit_field};
+use crate::solve::{Projection, Solver, SolverOptions};
+use runtime::{ModelKind, VerticalPose};
+use std::sync::LazyLock;
+
+const SECONDS: f64 = 8.0;
+
+static STAGE: LazyLock<Stage> =
+    LazyLock::new(|| Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound"));
+static FORECASTER: LazyLock<Forecaster> = LazyLock::new(|| forecaster(&STAGE).expect("poses"));
+static PLAN: LazyLock<Plan> = LazyLock::new(|| plan(&STAGE, SECONDS).expect("a plan"));
+
+fn six(pose: &StagePose) -> [f64; 6] {
+    let ([x, y, rz], [z, rx, ry]) = (pose.planar, pose.vertical);
+    [x, y, rz, z, rx, ry]
+}
+
+/// Differences of neighbouring rows against the limits, ends and rest before and after included.
+#[track_caller]
+fn assert_within_limits(run: &Run, stage: &Stage) {
+    let period_s = stage.servo_period_s;
+    let mut poses = run.trajectory(period_s);
+    assert_eq!(poses.first(), Some(&StagePose::default()));
+    assert_eq!(six(&poses[poses.len() - 1]), [0.0; 6]);
+    poses.insert(0, StagePose::default());
+    poses.push(StagePose::default());
+    let mut jerk = [0.0f64; 6];
+    let mut before = [0.0; 6];
+    for three in poses.windows(3) {
+        let [a, b, c] = [&three[0], &three[1], &three[2]].map(six);
+        for (axis, limits) in stage.motion.axes.iter().enumerate() {
+            assert!(b[axis].abs() <= limits.amplitude);
+            let speed = (c[axis] - b[axis]) / period_s;
+            assert!(speed.abs() <= limits.speed, "{axis}: {speed}");
+            let acceleration = (c[axis] - 2.0 * b[axis] + a[axis]) / (period_s * period_s);
+            assert!(
+                acceleration.abs() <= 1.0001 * limits.acceleration,
+                "{axis}: {acceleration}"
+            );
+            jerk[axis] = jerk[axis].max((acceleration - before[axis]).abs());
+            before[axis] = acceleration;
+        }
+    }
+    // The acceleration does not jump: it takes many periods to rise.
+    for (jerk, limits) in jerk.iter().zip(&stage.motion.axes) {
+        assert!(*jerk < 0.05 * limits.acceleration, "{jerk}");
+    }
+}
+
+#[test]
+fn a_run_moves_every_axis_fully_within_its_limits_from_rest_to_rest() {
+    let run = &PLAN.run;
+    assert_within_limits(run, &STAGE);
+    let poses = run.trajectory(STAGE.servo_period_s);
+    assert_eq!(poses.len(), 4001);
+    for (axis, limits) in STAGE.motion.axes.iter().enumerate() {
+        let largest = poses
+            .iter()
+            .map(|pose| six(pose)[axis].abs())
+            .fold(0.0, f64::max);
+        assert!(largest > 0.99 * limits.service, "{axis}: {largest}");
+    }
+}
+
+#[test]
+fn the_frequencies_are_distinct() {
+    let cycles = PLAN.run.cycles;
+    for (k, a) in cycles.iter().enumerate() {
+        assert!(
+            cycles[..k].iter().all(|b| (a - b).abs() >= 0.5),
+            "{cycles:?}"
+        );
+    }
+}
+
+/// The fastest run of a stage that must move gently, whose ends have to be longer.
+#[test]
+fn low_limits_make_slow_runs_with_long_ends() {
+    let mut stage = STAGE.clone();
+    for axis in &mut stage.motion.axes {
+        (axis.speed, axis.acceleration) = (axis.speed / 8.0, axis.acceleration / 40.0);
+    }
+    let (seconds, taper_s) = (60.0, 4.0);
+    let fastest = |taper_s: f64| -> [Option<f64>; 6] {
+        let motion = |axis: usize| &stage.motion.axes[axis];
+        let allowed = |axis| search::allowed_cycles(motion(axis), axis, seconds, taper_s);
+        std::array::from_fn(|axis| allowed(axis).last().copied())
+    };
+    assert_eq!(fastest(0.5)[1], None);
+    let run = Run {
+        seconds,
+        taper_s,
+        amplitudes: stage.motion.axes.map(|axis| axis.amplitude),
+        cycles: fastest(taper_s).map(|cycles| cycles.expect("slow enough")),
+    };
+    assert!(
+        run.cycles.iter().all(|cycles| *cycles >= 5.0),
+        "{:?}",
+        run.cycles
+    );
+    assert_within_limits(&run, &stage);
+}
+
+#[test]
+fn the_choice_does_not_depend_on_the_threads() {
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let again = one
+        .expect("a thread")
+        .install(|| plan(&STAGE, SECONDS).expect("a plan"));
+    assert_eq!(again.run, PLAN.run);
+    assert_eq!(again.forecast.service, PLAN.forecast.service);
+}
+
+#[test]
+fn two_axes_at_one_frequency_are_refused() {
+    let mut run = PLAN.run;
+    run.cycles[3] = run.cycles[1];
+    let error = judged(&STAGE, &FORECASTER, run).expect_err("refused");
+    let PlanError::NotDetermined { ratios, .. } = error else {
+        panic!("{error}");
+    };
+    let excess = |ratios: [f64; 3]| ratios.map(|r| r - 1.0).into_iter().fold(0.0, f64::max);
+    let planned = excess(PLAN.forecast.service.ratios());
+    assert!(excess(ratios) > 4.0 * planned, "{ratios:?} {planned}");
+}
+
+#[test]
+fn what_cannot_identify_the_model_is_refused_with_a_remedy() {
+    let says = |run: &Run, parts: &[&str]| {
+        let message = judged(&STAGE, &FORECASTER, *run)
+            .expect_err("refused")
+            .to_string();
+        for part in parts {
+            assert!(message.contains(part), "{message}");
+        }
+    };
+    let mut still = PLAN.run;
+    still.amplitudes[3] = 0.0;
+    says(
+        &still,
+        &["move z as far as in service", "times the noise floor"],
+    );
+    let mut small = PLAN.run;
+    small.amplitudes = small.amplitudes.map(|amplitude| 0.5 * amplitude);
+    says(&small, &["move x, y, rz, z, rx, ry as far as in service"]);
+    let short = Run {
+        seconds: 4.0,
+        cycles: [2.5, 4.0, 3.0, 3.5, 2.0, 1.5],
+        ..PLAN.run
+    };
+    says(
+        &short,
+        &["a run of 4 s does not determine", "make the run longer"],
+    );
+    let error = plan(&STAGE, 2.0).expect_err("refused");
+    assert_eq!(error, PlanError::TooFewFrequencies { seconds: 2.0 });
+    let mut stiff = STAGE.clone();
+    stiff.motion.axes[4].speed = 1e-6;
+    let message = plan(&stiff, SECONDS).expect_err("refused").to_string();
+    assert!(message.contains("can't move rx by 480.0 urad"), "{message}");
+}
+
+fn fitted(dataset: &Dataset) -> FieldFit {
+    let all: Vec<usize> = (0..dataset.rows.len()).collect();
+    let problem = Problem::new(dataset, &all, &STAGE, Model::of(ModelKind::M31));
+    let options = SolverOptions::new(Projection::Linear, 1);
+    let start = Solver::LeastSquares
+        .solve(&problem, &options)
+        .expect("a fit");
+    fit_field(dataset, &all, &STAGE, &start.parameters).expect("a fit")
+}
+
+/// Logs of the run on stages of physics: what their fits say of themselves, and how far they are
+/// off at poses all over the range, against the forecast.
+#[test]
+fn the_forecast_is_what_fits_to_simulated_logs_give() {
+    let forecast = &PLAN.forecast.service;
+    let places: Vec<StagePose> = (0..400)
+        .map(|k| {
+            let at = |axis: usize| {
+                let phase = f64::from(k) * (0.9 + 0.37 * axis as f64);
+                STAGE.motion.axes[axis].service * 0.8 * libm::sin(phase)
+            };
+            StagePose {
+                planar: [at(0), at(1), at(2)],
+                vertical: [at(3), at(4), at(5)],
+            }
+        })
+        .collect();
+    let seeds = 2..=4;
+    let mut found = [0.0; 3];
+    for seed in seeds.clone() {
+        let assembly = Assembly::draw(&STAGE, seed);
+        let recorded = |poses: Vec<StagePose>, errors: &SensorErrors| {
+            let run = protocol::Run::planned(poses);
+            let recording = record(&STAGE, &assembly, run, errors, seed).expect("clear");
+            recording.dataset(&STAGE).expect("a plane")
+        };
+        let trajectory = PLAN.run.trajectory(STAGE.servo_period_s);
+        let fit = fitted(&recorded(trajectory, &SensorErrors::USUAL));
+        let own = &fit.verdict.service;
+        for axis in 0..3 {
+            let ratio = (own.systematic[axis] / own.noise[axis])
+                / (forecast.systematic[axis] / forecast.noise[axis]);
+            assert!((0.6..1.7).contains(&ratio), "seed {seed}, {axis}: {ratio}");
+        }
+        let constants = fit.parameters.constants(1.0).expect("sound");
+        for (row, truth) in recorded(places.clone(), &SensorErrors::NONE)
+            .rows
+            .iter()
+            .zip(&places)
+        {
+            let pose = constants.decode(row.signal_m, &VerticalPose::from_array(row.vertical));
+            for (sum, (x, truth)) in found
+                .iter_mut()
+                .zip(pose.to_array().iter().zip(truth.planar))
+            {
+                *sum += (x - truth) * (x - truth);
+            }
+        }
+    }
+    let count = (places.len() * seeds.count()) as f64;
+    for (axis, (found, forecast)) in found.iter().zip(forecast.systematic).enumerate() {
+        let ratio = (found / count / forecast).sqrt();
+        assert!((0.6..1.7).contains(&ratio), "{axis}: {ratio}");
+    }
+}

@@ -1,0 +1,77 @@
+//! `plan` from the command line: what it writes, and what it refuses.
+
+mod common;
+
+use common::{Bench, stderr, stdout};
+use host_fit::input::shipped::STAGE_TOML;
+
+/// A run that is short enough to be planned fast, rehearsed, and written nowhere else.
+#[test]
+fn a_planned_run_is_written_told_and_can_be_rehearsed() {
+    let bench = Bench::new();
+    let planned = bench.good(
+        "plan --stage stage.toml --seconds 60 --out run.csv --json plan.json --report report",
+    );
+    let told = stdout(&planned);
+    assert!(
+        told.contains("run of 60 s: one movement, 30001 rows"),
+        "{told}"
+    );
+    assert!(told.contains("least determined:") && told.contains("wrote run.csv"));
+    let json = bench.json("plan.json");
+    for axis in ["x", "y", "rz"] {
+        let ratio = json["service"][axis]["ratio"].as_f64().expect("a number");
+        assert!((1.0..1.01).contains(&ratio), "{axis}: {ratio}");
+    }
+    let parameters = json["parameters"].as_object().expect("by name");
+    assert_eq!(parameters.len(), 81);
+    let page = bench.text("report/index.html");
+    assert_eq!(page.matches("<svg").count(), 2);
+    assert!(page.contains("<td>Rz</td><td>500.0</td>"));
+
+    bench.good("simulate --stage stage.toml --plan run.csv --seed 2 --out log.csv");
+    assert_eq!(bench.text("log.csv").lines().count(), 30_002);
+}
+
+#[test]
+fn what_cannot_be_planned_leaves_no_file() {
+    let bench = Bench::new();
+    let plan = "plan --stage stage.toml --out run.csv --json plan.json --report report";
+    bench.bad(
+        &format!("{plan} --seconds 2"),
+        4,
+        &["no run was written", "make it longer"],
+    );
+    for seconds in ["0", "-3", "nan", "inf", "601", "ten"] {
+        bench.bad(
+            &format!("{plan} --seconds {seconds}"),
+            2,
+            &["expected a number of seconds"],
+        );
+    }
+    bench.bad(
+        "plan --stage stage.toml --seconds 20 --out - --json -",
+        2,
+        &["cannot both go to standard output"],
+    );
+    bench.bad(
+        "plan --stage stage.toml --seconds 20 --out stage.toml",
+        2,
+        &["is an input"],
+    );
+    bench.write(
+        "fast.toml",
+        STAGE_TOML.replace("period_s = 0.002", "period_s = 1e-6"),
+    );
+    bench.bad(
+        "plan --stage fast.toml --seconds 20 --out run.csv",
+        2,
+        &["make it shorter"],
+    );
+    let motion = "[motion]\nz = { amplitude_m = 1.0 }\n";
+    bench.write("far.toml", format!("{STAGE_TOML}\n{motion}"));
+    let output = bench.run("plan --stage far.toml --seconds 20 --out run.csv");
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+    assert!(stderr(&output).contains("`motion.z.amplitude_m`: 1 m is outside"));
+    assert!(bench.holds_only(&["fast.toml", "far.toml"]));
+}
