@@ -2,11 +2,12 @@
 
 use super::job::settings;
 use crate::cli::error::HostError;
-use crate::fit::fit;
+use crate::fit::{Fit, FitError, fit};
 use crate::input::dataset::Dataset;
 use crate::input::log::{ReadOptions, read_bytes};
 use crate::input::shipped::{RUN_GZ, SERVICE_GZ};
 use crate::input::stage::Stage;
+use crate::judge::precision::largest_difference;
 use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Zeros};
 use runtime::{ModelKind, ParameterSet};
@@ -21,6 +22,8 @@ pub(super) struct Service {
     lines: Vec<(&'static str, PoseError)>,
     /// The field model as fitted to the run of 30 s.
     pub(super) field: ParameterSet,
+    /// Largest difference of the target's `f32` from `f64` with that, m, m, rad.
+    f32_difference: [f64; 3],
 }
 
 impl Service {
@@ -37,7 +40,14 @@ impl Service {
         let service = read(SERVICE_GZ, "service.csv.gz")?;
         let fitted = |log: &Dataset, model| fit(log, stage, &settings(model));
         let of_run = fitted(&run, ModelKind::M31)?.set;
-        let field = fitted(&run, ModelKind::Field)?.set;
+        let Fit {
+            calibration,
+            set: field,
+            ..
+        } = fitted(&run, ModelKind::Field)?;
+        let constants = calibration.constants().map_err(FitError::Unusable)?;
+        let f32_difference =
+            largest_difference(&constants, &calibration.probes, &field.decoder(), &service);
         let of_service = fitted(&service, ModelKind::Field)?.set;
         let errors = |set| {
             Decoded::new(set, &service)
@@ -56,6 +66,7 @@ impl Service {
                 ("what the noise of the probes leaves", errors(&of_service)),
             ],
             field,
+            f32_difference,
         })
     }
 
@@ -73,6 +84,11 @@ impl Service {
             }
             out.push('\n');
         }
+        let [x, y, rz] = self.f32_difference.map(|d| d * 1e9);
+        let _ = writeln!(
+            out,
+            "f32 against f64 of the field model, largest over these rows: X {x:.3} nm, Y {y:.3} nm, Rz {rz:.3} nrad"
+        );
         out
     }
 }
