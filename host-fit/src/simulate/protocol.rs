@@ -43,6 +43,9 @@ const COMBINED_HZ: [f64; 2] = [0.3, 2.0];
 const COMBINED_MOVEMENTS: usize = 8;
 const COMBINED_S: f64 = 8.0;
 
+/// Numbers of planned runs begin here.
+const PLANNED_FROM: u64 = 256;
+
 impl Protocol {
     /// The run of this protocol for a seed; the paper's is the same for all.
     pub fn run(self, servo_period_s: f64, seed: u64) -> Run {
@@ -64,12 +67,21 @@ impl Protocol {
 }
 
 impl Run {
-    /// A planned run: one movement.
+    /// A planned run: one movement. Its number follows from its poses, so that two plans of one stage
+    /// do not share their noise.
     pub fn planned(trajectory: Trajectory) -> Self {
+        let numbers = trajectory.iter().flat_map(|p| [p.planar, p.vertical]);
+        // FNV-1a by whole words.
+        let hash = numbers
+            .flatten()
+            .fold(0xcbf2_9ce4_8422_2325, |hash: u64, x| {
+                (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3)
+            });
         Self {
             movements: vec![trajectory],
             zeroed_truly: false,
-            number: 3,
+            // The stream of a run has room for 56 bits; the protocols have the first numbers.
+            number: PLANNED_FROM + (hash >> 16),
         }
     }
 }
@@ -149,6 +161,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_plan_has_noise_of_its_own() {
+        let still = |rows: usize| Run::planned(vec![StagePose::default(); rows]).number;
+        let numbers = [still(1), still(2), Protocol::Service.run(0.002, 1).number];
+        assert!(numbers[0] != numbers[1] && numbers[1] != numbers[2]);
+        assert_eq!(still(5), still(5));
+        let mut streams = numbers.map(|n| Stream::new(1, Purpose::Sensors, n).uniform());
+        streams.sort_by(f64::total_cmp);
+        assert!(streams[0] < streams[1] && streams[1] < streams[2]);
     }
 
     #[test]
