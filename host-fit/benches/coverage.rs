@@ -6,10 +6,12 @@
 //! Parameters have a truth only in logs that the field model itself makes; poses have one in logs
 //! of a stage made of physics as well, where the model is not exact.
 
+use host_fit::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::dataset::{Dataset, LogSource, LoggedFrame, Movement, Row};
 use host_fit::input::shipped::STAGE_TOML;
 use host_fit::input::stage::Stage;
 use host_fit::problem::Problem;
+use host_fit::problem::draw::Draw;
 use host_fit::problem::model::Model;
 use host_fit::problem::parameters::Parameters;
 use host_fit::simulate::assembly::Assembly;
@@ -18,11 +20,12 @@ use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
 use host_fit::simulate::random::{Purpose, Stream};
 use host_fit::simulate::recording::record;
 use host_fit::simulate::sensors::SensorErrors;
-use host_fit::solve::field::fit::{FieldFit, FieldFitError, fit_field};
+use host_fit::solve::field::fit::{FieldFit, fit_field};
 use host_fit::solve::field::parameters::FieldParameters;
 use host_fit::solve::field::probe::probes;
 use host_fit::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
 use host_fit::solve::{Projection, Solver, SolverOptions};
+use runtime::parameters::Text;
 use runtime::{ModelKind, RawFrame, VerticalPose};
 use std::error::Error;
 use std::f64::consts::TAU;
@@ -154,17 +157,19 @@ fn model_log(truth: &FieldParameters, run: &Run, random: &mut Stream) -> Dataset
     dataset
 }
 
-/// The fit of Model (31), and of the field model from there.
-fn fit(
-    dataset: &Dataset,
-    stage: &Stage,
-) -> Fallible<(Parameters, Result<FieldFit, FieldFitError>)> {
+/// Model (31) by least squares.
+fn model_31(dataset: &Dataset, stage: &Stage) -> Fallible<Parameters> {
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
     let problem = Problem::new(dataset, &all, stage, Model::of(ModelKind::M31));
     let options = SolverOptions::new(Projection::Linear, 1);
-    let start = Solver::LeastSquares.solve(&problem, &options)?.parameters;
-    let field = fit_field(dataset, &all, stage, &start);
-    Ok((start, field))
+    Ok(Solver::LeastSquares.solve(&problem, &options)?.parameters)
+}
+
+/// The field model.
+fn field(dataset: &Dataset, stage: &Stage) -> Fallible<FieldFit> {
+    let all: Vec<usize> = (0..dataset.rows.len()).collect();
+    let start = model_31(dataset, stage)?;
+    Ok(fit_field(dataset, &all, stage, &start)?)
 }
 
 /// How many of what was counted lay within their intervals.
@@ -249,7 +254,7 @@ fn of_the_model(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Vec<Covera
     for seed in 0..logs {
         let truth = drawn(stage, &mut Stream::new(seed, Purpose::Assembly, 1));
         let random = &mut Stream::new(seed, Purpose::Sensors, 9);
-        let fit = fit(&model_log(&truth, &motion.run(seed), random), stage)?.1?;
+        let fit = field(&model_log(&truth, &motion.run(seed), random), stage)?;
         let errors = fit.posterior.standard_errors();
         let (found, known) = (
             fit.parameters.probes.as_flattened(),
@@ -275,7 +280,7 @@ fn of_physics(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Poses> {
             seed,
         )?;
         let dataset = log.dataset(stage).ok_or("no plane")?;
-        let fit = fit(&dataset, stage)?.1?;
+        let fit = field(&dataset, stage)?;
         let service = Protocol::Service.run(PERIOD_S, seed);
         let mut random = Stream::new(seed, Purpose::Sensors, 9);
         for pose in service
@@ -306,15 +311,23 @@ fn against_model_31(stage: &Stage, motion: Motion, logs: u64) -> Fallible<(f64, 
             &SensorErrors::USUAL,
             seed,
         )?;
-        let (model_31, field) = fit(&log.dataset(stage).ok_or("no plane")?, stage)?;
-        let model_31 = FieldParameters::of_model_31(&model_31, stage);
-        let auto = match field {
-            Ok(field) if field.verdict.field => {
+        let dataset = log.dataset(stage).ok_or("no plane")?;
+        let model_31 = FieldParameters::of_model_31(&model_31(&dataset, stage)?, stage);
+        let settings = FitSettings {
+            model: ModelChoice::Auto,
+            train: None,
+            draw: Draw::Stratified,
+            solver: Solver::LeastSquares,
+            options: SolverOptions::new(Projection::Linear, 1),
+            serial: Text::new(),
+            created: Text::new(),
+        };
+        let auto = match fit(&dataset, stage, &settings)?.field {
+            Some(field) => {
                 taken += 1;
                 field.parameters
             }
-            Ok(_) | Err(FieldFitError::NotCarried(_)) => model_31,
-            Err(error) => return Err(error.into()),
+            None => model_31,
         };
         let run = Protocol::Service.run(PERIOD_S, seed);
         let service = record(stage, &assembly, run, &SensorErrors::USUAL, seed)?;

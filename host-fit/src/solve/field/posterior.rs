@@ -10,7 +10,7 @@ use runtime::geometry::inverse_rows;
 
 /// What the form leaves of a probe's reading in service, rms, mm: mean over simulated stages, each
 /// fitted to 30 s without noise and drift, which leave 16 to 46 nm.
-const FORM_MM: f64 = 25e-6;
+pub(super) const FORM_MM: f64 = 25e-6;
 
 /// The posterior of a fit: normal, with the parameters as its mean.
 #[derive(Clone, Debug, PartialEq)]
