@@ -29,7 +29,7 @@ use runtime::{Calibration, ModelKind, ParameterSet};
 
 /// Room around the motion of the log in which the calibration still holds: offsets of
 /// the reference and overshoot are well inside it.
-const RANGE_MARGIN: f64 = 1.1;
+pub(crate) const RANGE_MARGIN: f64 = 1.1;
 
 /// Which model is fitted.
 #[derive(Clone, Copy, Debug)]

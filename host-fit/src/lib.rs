@@ -13,6 +13,7 @@
 //! | [`plan`] | the run to make for the field model, and what to expect of it |
 //! | [`judge`] | errors by the target's own decoder, standard errors, what the log leaves open |
 //! | [`fit`] | all of these in a row |
+//! | [`recalibrate`] | an old calibration brought up to date by a few seconds of log |
 //! | [`output`] | blobs, pose files and images for flash tools, written whole or not at all |
 //! | [`report`] | JSON, tables, plots, an HTML page |
 //! | [`compare`] | the solvers beside each other |
@@ -30,6 +31,7 @@ pub mod judge;
 pub mod output;
 pub mod plan;
 pub mod problem;
+pub mod recalibrate;
 pub mod report;
 pub mod simulate;
 pub mod solve;

@@ -20,7 +20,9 @@ use crate::output::OutputError;
 use crate::output::blob_file::BlobFileError;
 use crate::output::export::ExportError;
 use crate::output::pose_file::PoseFileError;
+use crate::output::posterior_file::PosteriorFileError;
 use crate::plan::PlanError;
+use crate::recalibrate::RecalibrateError;
 use crate::report::plots::PlotError;
 use crate::simulate::plan_file::PlanFileError;
 use crate::simulate::recording::RecordError;
@@ -85,6 +87,12 @@ pub enum HostError {
     /// The fit failed its own checks: nothing was written.
     #[error("the fit failed its own checks, and no parameter blob was written: {0}")]
     Fit(#[from] FitError),
+    /// The posterior beside a blob is refused.
+    #[error(transparent)]
+    Posterior(#[from] PosteriorFileError),
+    /// A blob was not brought up to date: nothing was written.
+    #[error("the calibration was not brought up to date, and no parameter blob was written: {0}")]
+    Recalibrate(#[from] RecalibrateError),
     /// `import` refused its input.
     #[error(transparent)]
     Import(#[from] ImportError),
@@ -124,6 +132,10 @@ impl HostError {
             | Self::Log(_)
             | Self::PoseFile(_)
             | Self::Blob(_)
+            | Self::Posterior(_)
+            | Self::Recalibrate(
+                RecalibrateError::OtherModel { .. } | RecalibrateError::NothingKnown,
+            )
             | Self::OtherScale { .. }
             | Self::Plot(_)
             | Self::Page(_)
@@ -137,7 +149,7 @@ impl HostError {
             | Self::PlanFile(_)
             | Self::Record(_)
             | Self::Output(_) => 3,
-            Self::Fit(_) | Self::Plan(_) => 4,
+            Self::Fit(_) | Self::Plan(_) | Self::Recalibrate(_) => 4,
             Self::Interrupted { .. } => 130,
         }
     }

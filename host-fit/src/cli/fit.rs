@@ -8,10 +8,11 @@ use crate::input::log::{BadRows, LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
 use crate::output;
-use crate::output::blob_file;
+use crate::output::{blob_file, posterior_file};
 use crate::problem::draw::Draw;
 use crate::problem::model::MODELS;
 use crate::problem::parameters::Parameters;
+use crate::recalibrate::Known;
 use crate::report::html::{Page, Plot};
 use crate::report::json::{Choice, Report, of_fit};
 use crate::report::{plots, text};
@@ -37,7 +38,7 @@ fn models() -> impl TypedValueParser<Value = ModelChoice> {
     })
 }
 
-fn blob_text(value: &str) -> Result<Text, &'static str> {
+pub(super) fn blob_text(value: &str) -> Result<Text, &'static str> {
     Text::try_from(value).map_err(|_| "at most 32 bytes fit in the blob")
 }
 
@@ -193,6 +194,9 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         lag_compensated: args.compensate_lag,
     };
     let report = of_fit(&fit, choice, &circumstances);
+    if let (Some(field), Some(path)) = (&fit.field, posterior_file::beside(&args.out)) {
+        posterior_file::write(&path, &fit.set, &Known::of_fit(field))?;
+    }
     blob_file::write(&args.out, &fit.set)?;
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;

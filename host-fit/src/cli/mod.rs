@@ -13,6 +13,7 @@ mod import;
 mod inspect;
 mod live;
 mod plan;
+mod recalibrate;
 mod replay;
 mod simulate;
 
@@ -65,6 +66,8 @@ enum Command {
     Import(Box<import::ImportArgs>),
     /// Plan the run to make for the field model, and tell what to expect of it.
     Plan(plan::PlanArgs),
+    /// Bring a parameter blob up to date by a few seconds of log.
+    Recalibrate(recalibrate::RecalibrateArgs),
     /// Write the log of a simulated stage, to rehearse a calibration.
     Simulate(simulate::SimulateArgs),
 }
@@ -89,6 +92,7 @@ pub fn main() -> ExitCode {
         Command::Compare(args) => compare::run(&args),
         Command::Import(args) => import::run(*args),
         Command::Plan(args) => plan::run(&args),
+        Command::Recalibrate(args) => recalibrate::run(&args),
         Command::Simulate(args) => simulate::run(&args),
     };
     match result {

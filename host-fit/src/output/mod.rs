@@ -6,6 +6,7 @@
 pub mod blob_file;
 pub mod export;
 pub mod pose_file;
+pub mod posterior_file;
 
 use std::fs::{self, Metadata, OpenOptions};
 use std::io::{ErrorKind, Write};

@@ -93,6 +93,23 @@ impl TrimmedProbe {
         s * (1.0 + s * (k2 + s * k3))
     }
 
+    /// The same later: its signal times `gain`, as temperature and age change magnet and amplifier.
+    #[must_use]
+    pub fn with_gain(mut self, gain: f64) -> Self {
+        self.flux_per_m /= gain;
+        self
+    }
+
+    /// The same after the probe was taken off and put back `moved_m` farther along u, w, v, and
+    /// its amplifier trimmed to zero again.
+    #[must_use]
+    pub fn reseated(mut self, moved_m: Vector3<f64>) -> Self {
+        self.probe.at_rest_m += moved_m;
+        self.probe.position_m += self.probe.mount * moved_m;
+        self.rest_flux = self.probe.flux(&StagePose::default());
+        self
+    }
+
     /// Whether the probe is free of its magnet at a pose.
     pub fn is_clear(&self, pose: &StagePose) -> bool {
         self.probe.in_mount_m(pose).z > self.probe.magnet.half_m.z

@@ -24,7 +24,7 @@ pub struct ServiceVariance {
     pub systematic: [f64; 3],
     /// By the noise of the probes: the floor.
     pub noise: [f64; 3],
-    /// Mean squared difference between the poses of Model (31) and of the field model.
+    /// Mean squared difference between the poses of the other model and of the field model.
     pub difference: [f64; 3],
 }
 
@@ -38,15 +38,16 @@ pub struct Verdict {
 }
 
 impl ServiceVariance {
-    /// Of the field model with this posterior, and of Model (31). Infinite where the probes cannot
-    /// tell the pose.
-    fn new(
+    /// Of the field model with this posterior, and of another one ((31), or an old one), over
+    /// X, Y, Rz and Z, Rx, Ry of the largest magnitudes `ranges` (m, rad). Infinite where the
+    /// probes cannot tell the pose.
+    pub fn new(
         parameters: &FieldParameters,
         posterior: &Posterior,
-        model_31: &FieldParameters,
+        other: &FieldParameters,
         ranges: ([f64; 3], [f64; 3]),
     ) -> Self {
-        let [systematic, noise, difference] = Self::sums(parameters, posterior, model_31, ranges)
+        let [systematic, noise, difference] = Self::sums(parameters, posterior, other, ranges)
             .unwrap_or([[f64::INFINITY; 3], [1.0; 3], [0.0; 3]]);
         let mean = |sum: [f64; 3]| sum.map(|x| x / POSES as f64);
         Self {
@@ -59,11 +60,11 @@ impl ServiceVariance {
     fn sums(
         parameters: &FieldParameters,
         posterior: &Posterior,
-        model_31: &FieldParameters,
+        other: &FieldParameters,
         (planar_range, vertical_range): ([f64; 3], [f64; 3]),
     ) -> Option<[[f64; 3]; 3]> {
         let mut sums = [[0.0; 3]; 3];
-        let constants = model_31.constants(1.0)?;
+        let constants = other.constants(1.0)?;
         let probes = probes(parameters);
         for (planar, vertical) in service_poses((planar_range, vertical_range)) {
             let PoseUncertainty { systematic, noise } = posterior.at_pose(planar, vertical)?;

@@ -3,7 +3,7 @@
 
 use super::blocks::{Block, Rows};
 use super::carry::Verdict;
-use super::noise::{drift_mm, white_mm, white_only};
+use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
 use super::parameters::FieldParameters;
 use super::posterior::Posterior;
 use super::probe::probes;
@@ -141,6 +141,12 @@ pub fn fit_field(
     if early.loses() {
         return Err(FieldFitError::NotCarried(Box::new(early)));
     }
+    // What the parameters took of the drift depends on how much there is of it.
+    let usual = Noise {
+        drift_mm: USUAL_DRIFT_MM,
+        ..noise
+    };
+    normal = Normal::new(&rows, &state.blocks, &usual);
     for _ in 0..NOISE_ROUNDS {
         let white_mm = white(&state);
         noise = Noise {

@@ -3,7 +3,7 @@
 use super::blocks::Rows;
 use super::carry::{ServiceVariance, service_poses};
 use super::parameters::FieldParameters;
-use super::posterior::{PoseErrors, Posterior};
+use super::posterior::{FORM_MM, PoseErrors, Posterior};
 use super::probe::probes;
 use super::step::factor;
 use super::terms::COUNT;
@@ -27,6 +27,8 @@ pub struct Forecaster {
     by_parameters: [Vec<[f64; COUNT]>; 3],
     /// Of X, Y, Rz: variance by the noise of the probes.
     by_noise: [f64; 3],
+    /// By what the form leaves of their readings.
+    by_form: [f64; 3],
 }
 
 impl Forecaster {
@@ -43,6 +45,7 @@ impl Forecaster {
         let share = 1.0 / poses.len() as f64;
         let mut by_parameters = [0; 3].map(|_| vec![[0.0; COUNT]; COUNT]);
         let mut by_noise = [0.0; 3];
+        let mut by_form = [0.0; 3];
         for (planar, vertical) in poses {
             let errors = PoseErrors::new(&probes, planar, vertical)?;
             for (axis, by) in errors.by_parameter.iter().enumerate() {
@@ -53,6 +56,7 @@ impl Forecaster {
                 }
                 for (by, white) in errors.by_signal[axis].iter().zip(noise.white_mm) {
                     by_noise[axis] += share * (by * white) * (by * white);
+                    by_form[axis] += share * (by * FORM_MM) * (by * FORM_MM);
                 }
             }
         }
@@ -61,6 +65,7 @@ impl Forecaster {
             noise: *noise,
             by_parameters,
             by_noise,
+            by_form,
         })
     }
 
@@ -73,8 +78,9 @@ impl Forecaster {
         let normal = Normal::new(rows, &blocks, &self.noise);
         let covariance = factor(&normal, 0.0)?.covariance();
         let posterior = Posterior::new(covariance, &self.parameters, &self.noise);
-        let systematic = self.by_parameters.each_ref().map(|products| {
-            let mut sum = 0.0;
+        let systematic = [0, 1, 2].map(|axis| {
+            let products = &self.by_parameters[axis];
+            let mut sum = self.by_form[axis];
             for (column, products) in posterior.covariance.column_iter().zip(products) {
                 for (covariance, product) in column.iter().zip(products) {
                     sum += covariance * product;

@@ -14,6 +14,7 @@
 //! | [`posterior`] | covariance of parameters and of a pose |
 //! | [`carry`] | whether the log can carry the model |
 //! | [`forecast`] | what a log that is not recorded yet will tell |
+//! | [`update`] | a few seconds of log on top of an old posterior |
 
 pub mod blocks;
 pub mod carry;
@@ -30,4 +31,5 @@ mod step;
 pub mod terms;
 #[cfg(test)]
 mod tests;
+pub mod update;
 pub mod whiten;

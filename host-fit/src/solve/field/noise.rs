@@ -64,40 +64,79 @@ struct Span {
     by_unknown: [[f64; UNKNOWNS]; 3],
 }
 
+/// What the reference of a stage like those at hand walks in a second in X, Y, Rz: mm, mm, mrad.
+pub const USUAL_DRIFT_MM: [f64; 3] = [1e-4; 3];
+/// Standard deviation of the logarithm of a walk, before a log is seen: a factor of two.
+const DRIFT_SPREAD: f64 = 0.7;
+
 /// The reference's walk in X, Y, Rz, per root of a second (mm, mm, mrad): from differences
-/// between means of neighbouring spans of a second, less what white noise makes of them, and with
-/// what the fitted parameters took of them (by their `covariance`) put back.
+/// between means of neighbouring spans of a second, with what the fitted parameters took of them
+/// (by their `covariance`) put back.
+///
+/// A short log has few spans, from which the walk is known within a factor of two. Standard errors
+/// are honest on average with the mean of the walk's variance over all values that the spans
+/// allow, not with the most likely one, which is often zero.
 pub fn drift_mm(
     rows: &Rows,
     blocks: &[Block],
     white_mm: [f64; 3],
     covariance: &DMatrix<f64>,
 ) -> [f64; 3] {
-    let mut squares = [0.0; 3];
-    let mut expected = 0.0;
+    let mut differences = [const { Vec::new() }; 3];
     for movement in &rows.movements {
         let spans = spans(&blocks[movement.clone()], white_mm);
         for pair in spans.windows(2) {
             let (a, b) = (&pair[0], &pair[1]);
-            // Means over neighbouring spans of a walk differ by 2/3 of what it does from the
-            // middle of one to that of the other.
-            expected += (b.time_s - a.time_s) * 2.0 / 3.0;
-            for (axis, sum) in squares.iter_mut().enumerate() {
+            for (axis, differences) in differences.iter_mut().enumerate() {
                 let error = b.error[axis] - a.error[axis];
-                let white = a.white[axis] / a.rows + b.white[axis] / b.rows;
                 let by: [f64; UNKNOWNS] =
                     std::array::from_fn(|j| b.by_unknown[axis][j] - a.by_unknown[axis][j]);
-                *sum += (error * error - white) + quadratic(covariance, &by);
+                differences.push(Difference {
+                    square: error * error + quadratic(covariance, &by),
+                    white: a.white[axis] / a.rows + b.white[axis] / b.rows,
+                    // Means over neighbouring spans of a walk differ by 2/3 of what it does from
+                    // the middle of one to that of the other.
+                    seconds: (b.time_s - a.time_s) * 2.0 / 3.0,
+                });
             }
         }
     }
-    squares.map(|sum| {
-        if expected > 0.0 {
-            (sum.max(0.0) / expected).sqrt()
-        } else {
-            0.0
+    [0, 1, 2].map(|axis| mean_walk(&differences[axis], USUAL_DRIFT_MM[axis]))
+}
+
+/// The difference between two spans.
+struct Difference {
+    square: f64,
+    /// Its variance by white noise.
+    white: f64,
+    /// Over that of a walk in a second.
+    seconds: f64,
+}
+
+/// Root of the mean of a walk's variance in a second over its posterior: normal differences, a
+/// log-normal prior about the `usual` walk.
+fn mean_walk(differences: &[Difference], usual: f64) -> f64 {
+    const STEPS: i32 = 40;
+    const STEP: f64 = 0.125;
+    let at = |step: i32| {
+        let place = STEP * f64::from(step);
+        let walk = usual * libm::exp(DRIFT_SPREAD * place);
+        let mut log = -0.5 * place * place;
+        for d in differences {
+            let variance = d.white + d.seconds * walk * walk;
+            log -= 0.5 * (libm::log(variance) + d.square / variance);
         }
-    })
+        (log, walk * walk)
+    };
+    let places: Vec<(f64, f64)> = (-STEPS..=STEPS).map(at).collect();
+    let highest = places.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (log, variance) in places {
+        let weight = libm::exp(log - highest);
+        sum += weight * variance;
+        weights += weight;
+    }
+    (sum / weights).sqrt()
 }
 
 fn quadratic(covariance: &DMatrix<f64>, by: &[f64; UNKNOWNS]) -> f64 {
@@ -163,5 +202,36 @@ pub fn white_only(white_mm: [f64; 3]) -> Noise {
     Noise {
         white_mm,
         drift_mm: [0.0; 3],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Differences as large as a walk of this size makes them on average.
+    fn differences(count: usize, walk: f64) -> Vec<Difference> {
+        let white = 2e-9;
+        let one = |_| Difference {
+            square: white + walk * walk / 1.5,
+            white,
+            seconds: 1.0 / 1.5,
+        };
+        (0..count).map(one).collect()
+    }
+
+    #[test]
+    fn many_spans_give_the_walk_and_few_an_allowance_for_what_they_leave_open() {
+        for walk in [3e-5, 1e-4, 1e-3] {
+            let found = |count| mean_walk(&differences(count, walk), 1e-4) / walk;
+            let (many, few) = (found(2000), found(7));
+            assert!((0.95..1.05).contains(&many), "{walk}: {many}");
+            // Towards the usual walk.
+            assert!((0.8..2.2).contains(&few), "{walk}: {few}");
+        }
+        // Spans that show no walk don't show that there is none.
+        let still = mean_walk(&differences(7, 0.0), 1e-4);
+        assert!((2e-5..1e-4).contains(&still), "{still}");
+        assert!(mean_walk(&[], 1e-4) > 1e-4);
     }
 }

@@ -57,6 +57,13 @@ impl FieldParameters {
         }
     }
 
+    /// Those that a blob carries; `None` for another model.
+    pub fn of_set(set: &ParameterSet, stage: &Stage) -> Option<Self> {
+        let probes = values_of(set)?;
+        let positions = [0, 1, 2].map(|k| position(&probes[k], stage, k));
+        Some(Self { probes, positions })
+    }
+
     /// Lever arms, misalignments and sensitivities: the part that is Model (31).
     pub fn model_31(&self) -> Parameters {
         Parameters::of_model_31(&self.geometry(), &self.probes.map(|p| sensitivity(&p)))

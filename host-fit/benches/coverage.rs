@@ -1,0 +1,418 @@
+//! How often the truth lies in the 95 % intervals of a fit of the field model, and what the rule
+//! of `--model auto` is worth in service, over simulated logs.
+//!
+//! `cargo bench -p host-fit --bench coverage [-- LOGS]`: about 200 logs by default, minutes.
+//!
+//! Parameters have a truth only in logs that the field model itself makes; poses have one in logs
+//! of a stage made of physics as well, where the model is not exact.
+
+use host_fit::fit::{FitSettings, ModelChoice, fit};
+use host_fit::input::dataset::{Dataset, LogSource, LoggedFrame, Movement, Row};
+use host_fit::input::shipped::STAGE_TOML;
+use host_fit::input::stage::Stage;
+use host_fit::problem::Problem;
+use host_fit::problem::draw::Draw;
+use host_fit::problem::model::Model;
+use host_fit::problem::parameters::Parameters;
+use host_fit::simulate::assembly::Assembly;
+use host_fit::simulate::pose::StagePose;
+use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
+use host_fit::simulate::random::{Purpose, Stream};
+use host_fit::simulate::recording::record;
+use host_fit::simulate::sensors::SensorErrors;
+use host_fit::solve::field::fit::{FieldFit, fit_field};
+use host_fit::solve::field::parameters::FieldParameters;
+use host_fit::solve::field::probe::probes;
+use host_fit::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
+use host_fit::solve::{Projection, Solver, SolverOptions};
+use runtime::parameters::Text;
+use runtime::{ModelKind, RawFrame, VerticalPose};
+use std::error::Error;
+use std::f64::consts::TAU;
+
+type Fallible<T> = Result<T, Box<dyn Error>>;
+
+/// 95 % of normal numbers are within this many standard deviations.
+const WITHIN: f64 = 1.959_964;
+/// Full service motion of X, Y, Rz, Z, Rx, Ry: m and rad.
+const AMPLITUDES: [f64; 6] = [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6];
+const PERIOD_S: f64 = 0.002;
+/// Every this many rows of a service log a pose is judged.
+const POSE_STRIDE: usize = 40;
+
+/// What is run to be fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Motion {
+    EightSeconds,
+    ThirtySeconds,
+    Combined,
+    Paper,
+}
+
+impl Motion {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::EightSeconds => "8 s",
+            Self::ThirtySeconds => "30 s",
+            Self::Combined => "combined",
+            Self::Paper => "paper",
+        }
+    }
+
+    fn run(self, seed: u64) -> Run {
+        match self {
+            Self::EightSeconds => Run::planned(sines(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5])),
+            Self::ThirtySeconds => Run::planned(sines(30.0, [13.0, 17.0, 14.0, 19.0, 16.0, 11.0])),
+            Self::Combined => Protocol::Combined.run(PERIOD_S, seed),
+            Self::Paper => Protocol::Paper.run(PERIOD_S, seed),
+        }
+    }
+}
+
+/// One movement, a sine of its own along each axis, with tapers of half a second.
+fn sines(seconds: f64, cycles: [f64; 6]) -> Trajectory {
+    let pose = |row: u32| {
+        let t_s = f64::from(row) * PERIOD_S;
+        let end = (t_s.min(seconds - t_s) / 0.5).clamp(0.0, 1.0);
+        let taper = end * end * (3.0 - 2.0 * end);
+        let at = |k: usize| {
+            let phase = TAU * cycles[k] * t_s / seconds + 1.7 * k as f64;
+            AMPLITUDES[k] * taper * libm::sin(phase)
+        };
+        StagePose {
+            planar: [at(0), at(1), at(2)],
+            vertical: [at(3), at(4), at(5)],
+        }
+    };
+    (0..(seconds / PERIOD_S).round() as u32).map(pose).collect()
+}
+
+/// Parameters drawn from the prior; those without one near what the stages at hand have.
+fn drawn(stage: &Stage, random: &mut Stream) -> FieldParameters {
+    let start = Parameters::designed(stage);
+    let mut parameters = FieldParameters::of_model_31(&start, stage);
+    // x, y of the probes.
+    let h = &stage.designed;
+    let places = [[h.h1x_m, h.h1y_m], [-h.h2x_m, h.h2y_m], [h.h3x_m, h.h3y_m]];
+    for (values, [x, y]) in parameters.probes.iter_mut().zip(places) {
+        let eta = random.between(0.67, 0.93);
+        let a = eta * random.between(-240.0, -210.0);
+        values[0] += random.normal(2e-3);
+        values[1] = random.normal(5e-3);
+        values[2..6].copy_from_slice(&[eta, a, a * y, -a * x]);
+        for (value, term) in values.iter_mut().zip(TERMS) {
+            if let Some(prior) = term.prior {
+                *value = random.normal(prior);
+            }
+        }
+    }
+    FieldParameters {
+        positions: [host_fit::solve::field::parameters::ProbePosition::FromSlopes; 3],
+        ..parameters
+    }
+}
+
+/// The log of a run as the field model has it: its signals, white noise at the probes, resets and
+/// drift of the reference.
+fn model_log(truth: &FieldParameters, run: &Run, random: &mut Stream) -> Dataset {
+    let errors = SensorErrors::USUAL;
+    let probes = probes(truth);
+    let mut dataset = Dataset::default();
+    for (movement, poses) in run.movements.iter().enumerate() {
+        let start = dataset.rows.len();
+        let mut error = errors.reset.map(|deviation| random.normal(deviation));
+        for (row, pose) in poses.iter().enumerate() {
+            let signal_m = probes.map(|probe| {
+                let read = probe.signal_mm(pose.planar.map(|x| x * 1e3), pose.vertical) * 1e-3;
+                read + random.normal(errors.hall_m)
+            });
+            dataset.rows.push(Row {
+                movement,
+                t_us: (row as f64 * PERIOD_S * 1e6).round() as i64,
+                frame: LoggedFrame::Codes(RawFrame {
+                    hall: [0; 3],
+                    capacitive: [0; 3],
+                    sequence: 0,
+                    time_us: 0,
+                }),
+                signal_m,
+                vertical: pose.vertical,
+                reference: [0, 1, 2].map(|k| pose.planar[k] + error[k]),
+            });
+            for (error, drift) in error.iter_mut().zip(errors.drift_per_root_s) {
+                *error += random.normal(drift * PERIOD_S.sqrt());
+            }
+        }
+        dataset.movements.push(Movement {
+            log: 0,
+            index: movement as i64,
+            rows: start..dataset.rows.len(),
+        });
+    }
+    dataset.logs.push(LogSource {
+        path: "made".into(),
+        rows: 0..dataset.rows.len(),
+        has_reference: true,
+    });
+    dataset
+}
+
+/// Model (31) by least squares.
+fn model_31(dataset: &Dataset, stage: &Stage) -> Fallible<Parameters> {
+    let all: Vec<usize> = (0..dataset.rows.len()).collect();
+    let problem = Problem::new(dataset, &all, stage, Model::of(ModelKind::M31));
+    let options = SolverOptions::new(Projection::Linear, 1);
+    Ok(Solver::LeastSquares.solve(&problem, &options)?.parameters)
+}
+
+/// The field model.
+fn field(dataset: &Dataset, stage: &Stage) -> Fallible<FieldFit> {
+    let all: Vec<usize> = (0..dataset.rows.len()).collect();
+    let start = model_31(dataset, stage)?;
+    Ok(fit_field(dataset, &all, stage, &start)?)
+}
+
+/// How many of what was counted lay within their intervals.
+#[derive(Clone, Copy, Debug, Default)]
+struct Coverage {
+    within: u64,
+    of: u64,
+    squares: f64,
+}
+
+impl Coverage {
+    fn add(&mut self, error: f64, variance: f64) {
+        let ratio = error * error / variance;
+        self.within += u64::from(ratio <= WITHIN * WITHIN);
+        self.of += 1;
+        self.squares += ratio;
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            within: self.within + other.within,
+            of: self.of + other.of,
+            squares: self.squares + other.squares,
+        }
+    }
+
+    /// Per cent within, and the rms error in terms of the standard error.
+    fn words(self) -> String {
+        let of = self.of.max(1) as f64;
+        let percent = 100.0 * self.within as f64 / of;
+        format!("{percent:5.1} % ({:.2})", (self.squares / of).sqrt())
+    }
+}
+
+/// Poses: by the parameters alone, and with the noise of the probes; X, Y, Rz.
+#[derive(Clone, Copy, Debug, Default)]
+struct Poses {
+    systematic: [Coverage; 3],
+    whole: [Coverage; 3],
+}
+
+impl Poses {
+    /// `signals` are without noise and with it, m.
+    fn add(&mut self, fit: &FieldFit, pose: &StagePose, signals_m: [[f64; 3]; 2]) -> Option<()> {
+        let constants = fit.parameters.constants(1.0)?;
+        let expected = fit.posterior.at_pose(pose.planar, pose.vertical)?;
+        let vertical = VerticalPose::from_array(pose.vertical);
+        let [exact, noisy] =
+            signals_m.map(|signal_m| constants.decode(signal_m, &vertical).to_array());
+        for axis in 0..3 {
+            let (systematic, noise) = (
+                expected.systematic[(axis, axis)],
+                expected.noise[(axis, axis)],
+            );
+            self.systematic[axis].add(exact[axis] - pose.planar[axis], systematic);
+            self.whole[axis].add(noisy[axis] - pose.planar[axis], systematic + noise);
+        }
+        Some(())
+    }
+
+    fn and(self, other: Self) -> Self {
+        let sum = |a: [Coverage; 3], b: [Coverage; 3]| [0, 1, 2].map(|k| a[k].and(b[k]));
+        Self {
+            systematic: sum(self.systematic, other.systematic),
+            whole: sum(self.whole, other.whole),
+        }
+    }
+
+    fn print(&self, title: &str) {
+        let all = |axes: [Coverage; 3]| axes[0].and(axes[1]).and(axes[2]).words();
+        println!(
+            "  {title:<34}{}   systematic part alone {}",
+            all(self.whole),
+            all(self.systematic)
+        );
+    }
+}
+
+/// Logs that the field model makes: each parameter.
+fn of_the_model(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Vec<Coverage>> {
+    let mut parameters = vec![Coverage::default(); COUNT];
+    for seed in 0..logs {
+        let truth = drawn(stage, &mut Stream::new(seed, Purpose::Assembly, 1));
+        let random = &mut Stream::new(seed, Purpose::Sensors, 9);
+        let fit = field(&model_log(&truth, &motion.run(seed), random), stage)?;
+        let errors = fit.posterior.standard_errors();
+        let (found, known) = (
+            fit.parameters.probes.as_flattened(),
+            truth.probes.as_flattened(),
+        );
+        for (k, coverage) in parameters.iter_mut().enumerate() {
+            coverage.add(found[k] - known[k], errors[k] * errors[k]);
+        }
+    }
+    Ok(parameters)
+}
+
+/// Logs of stages made of physics: poses.
+fn of_physics(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Poses> {
+    let mut poses = Poses::default();
+    for seed in 0..logs {
+        let assembly = Assembly::draw(stage, seed);
+        let log = record(
+            stage,
+            &assembly,
+            motion.run(seed),
+            &SensorErrors::USUAL,
+            seed,
+        )?;
+        let dataset = log.dataset(stage).ok_or("no plane")?;
+        let fit = field(&dataset, stage)?;
+        let service = Protocol::Service.run(PERIOD_S, seed);
+        let mut random = Stream::new(seed, Purpose::Sensors, 9);
+        for pose in service
+            .movements
+            .iter()
+            .flatten()
+            .skip(POSE_STRIDE / 2)
+            .step_by(POSE_STRIDE)
+        {
+            let exact = assembly.probes.map(|probe| probe.signal_m(pose));
+            let noisy = exact.map(|s| s + random.normal(SensorErrors::USUAL.hall_m));
+            poses.add(&fit, pose, [exact, noisy]);
+        }
+    }
+    Ok(poses)
+}
+
+/// rms errors in service of what `auto` takes over those of Model (31): the largest over stages
+/// and axes, and how often the field model was taken.
+fn against_model_31(stage: &Stage, motion: Motion, logs: u64) -> Fallible<(f64, f64, u64)> {
+    let (mut worst, mut sum, mut taken) = (0.0f64, 0.0, 0);
+    for seed in 0..logs {
+        let assembly = Assembly::draw(stage, seed);
+        let log = record(
+            stage,
+            &assembly,
+            motion.run(seed),
+            &SensorErrors::USUAL,
+            seed,
+        )?;
+        let dataset = log.dataset(stage).ok_or("no plane")?;
+        let model_31 = FieldParameters::of_model_31(&model_31(&dataset, stage)?, stage);
+        let settings = FitSettings {
+            model: ModelChoice::Auto,
+            train: None,
+            draw: Draw::Stratified,
+            solver: Solver::LeastSquares,
+            options: SolverOptions::new(Projection::Linear, 1),
+            serial: Text::new(),
+            created: Text::new(),
+        };
+        let auto = match fit(&dataset, stage, &settings)?.field {
+            Some(field) => {
+                taken += 1;
+                field.parameters
+            }
+            None => model_31,
+        };
+        let run = Protocol::Service.run(PERIOD_S, seed);
+        let service = record(stage, &assembly, run, &SensorErrors::USUAL, seed)?;
+        let dataset = service.dataset(stage).ok_or("no plane")?;
+        let truth = || service.truth.iter().flatten();
+        let squares = |parameters: &FieldParameters| {
+            let constants = parameters.constants(1.0).ok_or("singular")?;
+            let mut squares = [0.0; 3];
+            for (row, pose) in dataset.rows.iter().zip(truth()) {
+                let vertical = VerticalPose::from_array(row.vertical);
+                let decoded = constants.decode(row.signal_m, &vertical).to_array();
+                for axis in 0..3 {
+                    squares[axis] += (decoded[axis] - pose.planar[axis]).powi(2);
+                }
+            }
+            Fallible::Ok(squares)
+        };
+        let (auto, model_31) = (squares(&auto)?, squares(&model_31)?);
+        for axis in 0..3 {
+            let ratio = (auto[axis] / model_31[axis]).sqrt();
+            worst = worst.max(ratio);
+            sum += ratio / (3 * logs) as f64;
+        }
+    }
+    Ok((worst, sum, taken))
+}
+
+fn pooled(each: &[Coverage]) -> Coverage {
+    each.iter().fold(Coverage::default(), |sum, c| sum.and(*c))
+}
+
+fn main() -> Fallible<()> {
+    // Cargo passes `--bench`.
+    let logs = std::env::args().skip(1).find_map(|a| a.parse().ok());
+    let logs: u64 = logs.unwrap_or(200);
+    let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
+    let shares = [
+        (Motion::EightSeconds, logs / 2),
+        (Motion::ThirtySeconds, logs * 3 / 10),
+        (Motion::Combined, logs / 5),
+    ];
+    println!("truth within 95 % intervals (rms error over standard error)");
+    println!("logs made by the field model");
+    let mut parameters = vec![Coverage::default(); COUNT];
+    for (motion, logs) in shares {
+        let of_parameters = of_the_model(&stage, motion, logs)?;
+        let title = format!("{}, {logs} logs: parameters", motion.name());
+        println!("  {title:<34}{}", pooled(&of_parameters).words());
+        for (sum, coverage) in parameters.iter_mut().zip(of_parameters) {
+            *sum = sum.and(coverage);
+        }
+    }
+    for probe in 0..3 {
+        let own = &parameters[probe * PER_PROBE..(probe + 1) * PER_PROBE];
+        for (k, coverage) in own.iter().enumerate() {
+            let name = name(probe * PER_PROBE + k);
+            print!("  {name:<10}{}", coverage.words());
+            if k % 5 == 4 || k + 1 == PER_PROBE {
+                println!();
+            }
+        }
+    }
+    println!("  {:<34}{}", "all: parameters", pooled(&parameters).words());
+    println!("logs of stages made of physics");
+    let mut poses = Poses::default();
+    for (motion, logs) in shares {
+        let of_poses = of_physics(&stage, motion, logs)?;
+        of_poses.print(&format!("{}, {logs} logs: poses", motion.name()));
+        poses = poses.and(of_poses);
+    }
+    poses.print("all: poses");
+
+    println!("rms errors in service of what --model auto takes over those of model (31)");
+    let shares = [
+        (Motion::EightSeconds, logs * 3 / 20),
+        (Motion::ThirtySeconds, logs * 3 / 20),
+        (Motion::Combined, logs / 10),
+        (Motion::Paper, logs / 10),
+    ];
+    for (motion, logs) in shares {
+        let (worst, mean, taken) = against_model_31(&stage, motion, logs)?;
+        println!(
+            "  {:<10}{logs} stages: mean {mean:.3}, worst axis of all {worst:.4}; the field model was taken {taken} times",
+            motion.name()
+        );
+    }
+    Ok(())
+}

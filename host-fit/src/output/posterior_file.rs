@@ -1,0 +1,249 @@
+//! The posterior of a fit as a file beside its blob: the prior of a recalibration.
+//!
+//! `params.bin.posterior` stands beside `params.bin`. All numbers are little-endian.
+//!
+//! | offset | bytes | what |
+//! |---|---|---|
+//! | 0 | 8 | magic, `HALLPOST` in ASCII |
+//! | 8 | 4 | layout version: 1 |
+//! | 12 | 32 | SHA-256 of the blob that it belongs to |
+//! | 44 | 24 | white noise of the probes A, B, C, mm, as `f64` |
+//! | 68 | 24 | walk of the reference in X, Y, Rz in a second, mm, mm, mrad, as `f64` |
+//! | 92 | 8 | chi-square over residuals, as `f64` |
+//! | 100 | 26,568 | covariance of the 81 parameters, the lower triangle row by row, as `f64` |
+//! | 26,668 | 32 | SHA-256 of everything before it |
+
+use crate::output::{OutputError, is_stream, write_atomically};
+use crate::recalibrate::Known;
+use crate::solve::field::terms::COUNT;
+use crate::solve::field::whiten::Noise;
+use nalgebra::{Cholesky, DMatrix};
+use runtime::ParameterSet;
+use sha2::{Digest, Sha256};
+use std::io::{ErrorKind, Read};
+use std::path::{Path, PathBuf};
+
+const MAGIC: [u8; 8] = *b"HALLPOST";
+const VERSION: u32 = 1;
+const HASH_BYTES: usize = 32;
+const HEADER_BYTES: usize = 12 + HASH_BYTES;
+const NUMBERS: usize = 7 + COUNT * (COUNT + 1) / 2;
+const BYTES: usize = HEADER_BYTES + 8 * NUMBERS + HASH_BYTES;
+
+/// Why there is no posterior.
+#[derive(Debug, thiserror::Error)]
+pub enum PosteriorFileError {
+    /// The file is not there.
+    #[error(
+        "{} does not exist: `host-fit fit` writes it beside a blob of the field model. Copy it there, fit again, or \
+         recalibrate gains only (--what gains)", path.display()
+    )]
+    Missing {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file cannot be read.
+    #[error("cannot read {}: {cause}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        cause: std::io::Error,
+    },
+    /// It is no posterior, or a damaged one.
+    #[error("{} is no posterior of this program: {problem}. Copy it again, or fit again", path.display())]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// It was written beside another blob.
+    #[error(
+        "{} belongs to another blob than {}: copy the two together, or fit again; without that file, gains can be found \
+         alone", path.display(), blob.display()
+    )]
+    OtherBlob {
+        /// The file.
+        path: PathBuf,
+        /// The blob.
+        blob: PathBuf,
+    },
+}
+
+/// The file beside a blob; `None` if the blob is a device or a pipe.
+pub fn beside(blob: &Path) -> Option<PathBuf> {
+    if std::fs::metadata(blob).is_ok_and(|metadata| is_stream(blob, &metadata)) {
+        return None;
+    }
+    let mut name = blob.as_os_str().to_owned();
+    name.push(".posterior");
+    Some(name.into())
+}
+
+/// Writes what is known beside the blob of `set`, whole or not at all.
+///
+/// # Errors
+/// [`OutputError`] when the file cannot be written.
+pub fn write(path: &Path, set: &ParameterSet, known: &Known) -> Result<(), OutputError> {
+    let hash = blob_hash(set).map_err(|cause| OutputError::Failed {
+        path: path.to_owned(),
+        source: std::io::Error::other(cause),
+    })?;
+    write_atomically(path, &to_bytes(&hash, known))
+}
+
+/// Reads what is known beside the blob `set`, which was read from `blob`.
+///
+/// # Errors
+/// See [`PosteriorFileError`].
+pub fn read(path: &Path, set: &ParameterSet, blob: &Path) -> Result<Known, PosteriorFileError> {
+    let failed = |cause: std::io::Error| match cause.kind() {
+        ErrorKind::NotFound => PosteriorFileError::Missing {
+            path: path.to_owned(),
+        },
+        _ => PosteriorFileError::Read {
+            path: path.to_owned(),
+            cause,
+        },
+    };
+    let mut bytes = Vec::with_capacity(BYTES + 1);
+    let file = std::fs::File::open(path).map_err(failed)?;
+    file.take(BYTES as u64 + 1)
+        .read_to_end(&mut bytes)
+        .map_err(failed)?;
+    let unusable = |problem| PosteriorFileError::Unusable {
+        path: path.to_owned(),
+        problem,
+    };
+    let (hash, known) = from_bytes(&bytes).map_err(unusable)?;
+    let own = blob_hash(set).map_err(|cause| unusable(cause.to_string()))?;
+    if hash != own {
+        return Err(PosteriorFileError::OtherBlob {
+            path: path.to_owned(),
+            blob: blob.to_owned(),
+        });
+    }
+    Ok(known)
+}
+
+fn blob_hash(set: &ParameterSet) -> Result<[u8; HASH_BYTES], runtime::BlobError> {
+    let mut buffer = [0; runtime::blob::MAX_BYTES];
+    Ok(Sha256::digest(set.to_bytes(&mut buffer)?).into())
+}
+
+fn to_bytes(blob: &[u8; HASH_BYTES], known: &Known) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(BYTES);
+    bytes.extend(MAGIC);
+    bytes.extend(VERSION.to_le_bytes());
+    bytes.extend(blob);
+    let Known {
+        covariance,
+        noise: Noise { white_mm, drift_mm },
+        misfit,
+    } = known;
+    let triangle = (0..COUNT).flat_map(|i| (0..=i).map(move |j| covariance[(i, j)]));
+    let numbers = white_mm.iter().chain(drift_mm).chain([misfit]).copied();
+    for number in numbers.chain(triangle) {
+        bytes.extend(number.to_le_bytes());
+    }
+    let hash = Sha256::digest(&bytes);
+    bytes.extend(hash);
+    bytes
+}
+
+/// The hash of the blob and what is known, or what is wrong.
+fn from_bytes(bytes: &[u8]) -> Result<([u8; HASH_BYTES], Known), String> {
+    if !bytes.starts_with(&MAGIC) {
+        return Err("it does not begin with HALLPOST".to_owned());
+    }
+    let (content, hash) = match bytes.split_last_chunk::<HASH_BYTES>() {
+        Some(parts) if bytes.len() == BYTES => parts,
+        _ => return Err(format!("it has not the {BYTES} bytes that it should have")),
+    };
+    if Sha256::digest(content)[..] != hash[..] {
+        return Err("it is damaged, its check does not fit".to_owned());
+    }
+    let version = &content[MAGIC.len()..][..4];
+    if version != VERSION.to_le_bytes() {
+        return Err(format!("its layout is not {VERSION}"));
+    }
+    let (head, numbers) = content.split_at(HEADER_BYTES);
+    let mut blob = [0; HASH_BYTES];
+    blob.copy_from_slice(&head[HEADER_BYTES - HASH_BYTES..]);
+    let (numbers, _) = numbers.as_chunks::<8>();
+    let numbers: Vec<f64> = numbers.iter().map(|n| f64::from_le_bytes(*n)).collect();
+    let (noise, triangle) = numbers.split_at(7);
+    let covariance = DMatrix::from_fn(COUNT, COUNT, |i, j| {
+        let (row, column) = (i.max(j), i.min(j));
+        triangle[row * (row + 1) / 2 + column]
+    });
+    let known = Known {
+        covariance,
+        noise: Noise {
+            white_mm: [noise[0], noise[1], noise[2]],
+            drift_mm: [noise[3], noise[4], noise[5]],
+        },
+        misfit: noise[6],
+    };
+    let sound = noise.iter().all(|x| *x >= 0.0 && x.is_finite());
+    if !sound || !is_covariance(&known.covariance) {
+        return Err("its numbers are no noise and no covariance".to_owned());
+    }
+    Ok((blob, known))
+}
+
+/// Whether a matrix is one, in the scale in which its diagonal is one.
+fn is_covariance(matrix: &DMatrix<f64>) -> bool {
+    let scale = matrix.diagonal().map(f64::sqrt);
+    let scaled = DMatrix::from_fn(COUNT, COUNT, |i, j| matrix[(i, j)] / (scale[i] * scale[j]));
+    scaled.iter().all(|x| x.is_finite()) && Cholesky::new(scaled).is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known() -> Known {
+        Known {
+            covariance: DMatrix::from_fn(COUNT, COUNT, |i, j| {
+                let size = |k: usize| 1e-6 * (1.0 + k as f64);
+                size(i) * size(j) * if i == j { 1.0 } else { 0.5 }
+            }),
+            noise: Noise {
+                white_mm: [5e-4, 4e-4, 6e-4],
+                drift_mm: [1e-4, 0.0, 2e-4],
+            },
+            misfit: 1.02,
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let bytes = to_bytes(&[7; HASH_BYTES], &known());
+        assert_eq!(bytes.len(), 26_700);
+        assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], known())));
+    }
+
+    #[test]
+    fn what_is_damaged_cut_or_no_covariance_is_refused() {
+        let bytes = to_bytes(&[7; HASH_BYTES], &known());
+        for place in (0..bytes.len()).step_by(997).chain([9, bytes.len() - 1]) {
+            let mut damaged = bytes.clone();
+            damaged[place] ^= 0x10;
+            assert!(from_bytes(&damaged).is_err(), "{place}");
+        }
+        for length in [0, 5, 8, 12, 100, bytes.len() - 1] {
+            assert!(from_bytes(&bytes[..length]).is_err(), "{length}");
+        }
+        assert!(from_bytes(&[bytes.as_slice(), &[0]].concat()).is_err());
+        for value in [f64::NAN, f64::INFINITY, -1.0, 0.0, 1.0] {
+            let mut known = known();
+            known.covariance[(3, 2)] = value;
+            known.covariance[(2, 3)] = value;
+            known.covariance[(2, 2)] = value.min(1e-12);
+            let sound = from_bytes(&to_bytes(&[7; HASH_BYTES], &known));
+            assert!(sound.is_err(), "{value}");
+        }
+    }
+}

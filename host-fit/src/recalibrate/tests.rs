@@ -1,0 +1,191 @@
+//! On a stage made of physics: how far off it is in service after a change, and after what
+//! recalibration makes of a few seconds.
+
+use super::{Change, Known, RecalibrateError, Recalibration, recalibrate};
+use crate::fit::{FitSettings, ModelChoice, fit};
+use crate::input::dataset::Dataset;
+use crate::input::shipped::STAGE_TOML;
+use crate::input::stage::Stage;
+use crate::problem::draw::Draw;
+use crate::problem::model::Model;
+use crate::simulate::assembly::Assembly;
+use crate::simulate::pose::StagePose;
+use crate::simulate::probe::TrimmedProbe;
+use crate::simulate::protocol::{Protocol, Run, Trajectory};
+use crate::simulate::recording::record;
+use crate::simulate::sensors::SensorErrors;
+use crate::solve::field::parameters::FieldParameters;
+use crate::solve::{Projection, Solver, SolverOptions};
+use nalgebra::Vector3;
+use runtime::parameters::Text;
+use runtime::{ModelKind, ParameterSet, VerticalPose};
+use std::f64::consts::TAU;
+
+const SEED: u64 = 2;
+const RUN: [f64; 6] = [5.0, 8.0, 7.0, 6.0, 4.0, 7.5];
+/// Of two seconds.
+const SINE_ALONG_Y: [f64; 6] = [0.0, 4.0, 0.0, 0.0, 0.0, 0.0];
+const ALL_AXES: [f64; 6] = [3.0, 4.0, 5.0, 2.0, 3.5, 2.5];
+
+/// A sine of so many cycles along each axis; an axis of none stands still.
+fn sines(seconds: f64, cycles: [f64; 6]) -> Trajectory {
+    const AMPLITUDES: [f64; 6] = [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6];
+    let pose = |row: u32| {
+        let t_s = f64::from(row) * 0.002;
+        let end = (t_s.min(seconds - t_s) / 0.5).clamp(0.0, 1.0);
+        let taper = end * end * (3.0 - 2.0 * end);
+        let at = |k: usize| {
+            let phase = TAU * cycles[k] * t_s / seconds + 1.7 * k as f64;
+            let moves = if cycles[k] > 0.0 { taper } else { 0.0 };
+            AMPLITUDES[k] * moves * libm::sin(phase)
+        };
+        StagePose {
+            planar: [at(0), at(1), at(2)],
+            vertical: [at(3), at(4), at(5)],
+        }
+    };
+    (0..(seconds * 500.0) as u32).map(pose).collect()
+}
+
+struct Old {
+    stage: Stage,
+    assembly: Assembly,
+    set: ParameterSet,
+    known: Known,
+}
+
+impl Old {
+    /// Fitted to a run of 8 s.
+    fn new() -> Self {
+        let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+        let assembly = Assembly::draw(&stage, SEED);
+        let settings = FitSettings {
+            model: ModelChoice::Named(Model::of(ModelKind::Field)),
+            train: None,
+            draw: Draw::Stratified,
+            solver: Solver::LeastSquares,
+            options: SolverOptions::new(Projection::Linear, 1),
+            serial: Text::new(),
+            created: Text::new(),
+        };
+        let dataset = log(&stage, &assembly, sines(8.0, RUN), SEED);
+        let fit = fit(&dataset, &stage, &settings).expect("a fit");
+        Self {
+            known: Known::of_fit(&fit.field.expect("of the field model")),
+            set: fit.set,
+            stage,
+            assembly,
+        }
+    }
+
+    /// The stage with its probes (A is 0) changed.
+    fn changed(&self, change: impl Fn(usize, TrimmedProbe) -> TrimmedProbe) -> Assembly {
+        Assembly {
+            probes: [0, 1, 2].map(|k| change(k, self.assembly.probes[k])),
+        }
+    }
+
+    fn recalibrated(
+        &self,
+        now: &Assembly,
+        run: (f64, [f64; 6]),
+        change: Change,
+    ) -> Result<Recalibration, RecalibrateError> {
+        let dataset = log(&self.stage, now, sines(run.0, run.1), SEED + 100);
+        let known = Some(&self.known);
+        recalibrate(&self.set, known, &dataset, &self.stage, change, Text::new())
+    }
+
+    /// Errors in service of the changed stage over the noise floor, worst axis: with the old blob
+    /// and with the new one.
+    fn ratios(&self, now: &Assembly, new: &Recalibration) -> [f64; 2] {
+        let service = Protocol::Service.run(0.002, SEED);
+        [&self.set, &new.set].map(|set| {
+            let parameters = FieldParameters::of_set(set, &self.stage).expect("a field model");
+            let constants = parameters.constants(1.0).expect("sound");
+            let mut squares = [0.0; 3];
+            let mut count = 0.0;
+            for pose in service.movements.iter().flatten().step_by(50) {
+                let signal_m = now.probes.map(|probe| probe.signal_m(pose));
+                let vertical = VerticalPose::from_array(pose.vertical);
+                let decoded = constants.decode(signal_m, &vertical).to_array();
+                for axis in 0..3 {
+                    squares[axis] += (decoded[axis] - pose.planar[axis]).powi(2);
+                }
+                count += 1.0;
+            }
+            let ratio = |k: usize| (1.0 + squares[k] / count / new.floor[k].powi(2)).sqrt();
+            ratio(0).max(ratio(1)).max(ratio(2))
+        })
+    }
+}
+
+fn log(stage: &Stage, assembly: &Assembly, poses: Trajectory, seed: u64) -> Dataset {
+    let run = Run::planned(poses);
+    let recording = record(stage, assembly, run, &SensorErrors::USUAL, seed).expect("clear");
+    recording.dataset(stage).expect("a plane")
+}
+
+fn seated(k: usize, probe: TrimmedProbe) -> TrimmedProbe {
+    match k {
+        0 => probe.reseated(Vector3::new(20e-6, 200e-6, 60e-6)),
+        _ => probe,
+    }
+}
+
+#[test]
+fn service_is_back_at_the_noise_floor() {
+    let old = Old::new();
+    let weaker = old.changed(|_, probe| probe.with_gain(0.99));
+    let lower = old.changed(|_, probe| {
+        let probe = probe.with_gain(0.99);
+        probe.reseated(Vector3::new(0.0, 0.0, 20e-6))
+    });
+    let one = old.changed(|k, probe| probe.with_gain([1.0, 0.99, 1.0][k]));
+    let seated = old.changed(seated);
+    for (now, run, change, before, after) in [
+        (&weaker, (2.0, SINE_ALONG_Y), Change::Gain, 7.0, 1.02),
+        (&lower, (2.0, SINE_ALONG_Y), Change::Gain, 9.0, 1.05),
+        (&one, (2.0, ALL_AXES), Change::Gains, 4.0, 1.02),
+        (&seated, (4.0, RUN), Change::All, 3.0, 1.06),
+        (&seated, (8.0, RUN), Change::All, 3.0, 1.02),
+    ] {
+        let new = old.recalibrated(now, run, change);
+        let new = new.unwrap_or_else(|error| panic!("{change:?} {run:?}: {error}"));
+        let [with_old, with_new] = old.ratios(now, &new);
+        assert!(with_old > before, "{change:?} {run:?}: {with_old}");
+        assert!(with_new < after, "{change:?} {run:?}: {with_new}");
+        let predicted = new.after.into_iter().fold(0.0, f64::max);
+        assert!(
+            (with_new - predicted).abs() < 0.03,
+            "{with_new} {predicted}"
+        );
+    }
+}
+
+#[test]
+fn a_log_that_does_not_tell_the_change_is_refused() {
+    let old = Old::new();
+    let one = old.changed(|k, probe| probe.with_gain([1.0, 0.99, 1.0][k]));
+    let seated = old.changed(seated);
+    let not_carried =
+        |error: &RecalibrateError| matches!(error, RecalibrateError::NotCarried { .. });
+    let not_described =
+        |error: &RecalibrateError| matches!(error, RecalibrateError::NotDescribed { .. });
+    type Refusal = fn(&RecalibrateError) -> bool;
+    for (now, run, change, refusal) in [
+        (
+            &one,
+            (2.0, SINE_ALONG_Y),
+            Change::Gains,
+            not_carried as Refusal,
+        ),
+        (&seated, (2.0, ALL_AXES), Change::All, not_carried),
+        (&seated, (8.0, SINE_ALONG_Y), Change::All, not_carried),
+        (&one, (2.0, SINE_ALONG_Y), Change::Gain, not_described),
+        (&seated, (8.0, RUN), Change::Gains, not_described),
+    ] {
+        let refused = old.recalibrated(now, run, change).expect_err("refused");
+        assert!(refusal(&refused), "{change:?} {run:?}: {refused}");
+    }
+}

@@ -1,0 +1,183 @@
+//! An old calibration brought up to date, on a stage made of physics whose codes are scaled as
+//! changed gains scale them.
+
+mod common;
+
+use common::{Bench, exists, stderr};
+use serde_json::Value;
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+const AMPLITUDES: [f64; 6] = [500.0, 800.0, 500.0, 240.0, 480.0, 480.0];
+
+/// A run of these cycles of each axis; an axis of none stands still.
+fn plan(seconds: f64, cycles: [f64; 6]) -> String {
+    let mut csv = "t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad\n".to_owned();
+    let rows = (seconds * 500.0) as u32;
+    for row in 0..rows {
+        let t_s = f64::from(row) * 0.002;
+        let end = (t_s.min(seconds - t_s) / 0.5).clamp(0.0, 1.0);
+        let taper = end * end * (3.0 - 2.0 * end);
+        let _ = write!(csv, "{}", row * 2000);
+        for (axis, amplitude) in AMPLITUDES.into_iter().enumerate() {
+            let moves = if cycles[axis] > 0.0 { amplitude } else { 0.0 };
+            let phase = TAU * cycles[axis] * t_s / seconds + 1.7 * axis as f64;
+            let _ = write!(csv, ",{:.4}", moves * taper * phase.sin());
+        }
+        csv.push('\n');
+    }
+    csv
+}
+
+/// A log whose probes A, B, C read `gains` times as much.
+fn with_gains(log: &str, gains: [f64; 3]) -> String {
+    let mut lines = log.lines();
+    let mut out = lines.next().expect("a header").to_owned() + "\n";
+    for line in lines {
+        let cells: Vec<&str> = line.split(',').collect();
+        let (others, hall) = cells.split_at(cells.len() - 3);
+        out.push_str(&others.join(","));
+        for (code, gain) in hall.iter().zip(gains) {
+            let code: f64 = code.parse().expect("a code");
+            let _ = write!(out, ",{}", (code * gain).round());
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// A fit of 8 s with its posterior, and a sine of 2 s along Y of the same stage.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    bench.write("run.csv", plan(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5]));
+    bench.write("y.csv", plan(2.0, [0.0, 4.0, 0.0, 0.0, 0.0, 0.0]));
+    for (run, log) in [("run", "log"), ("y", "sine")] {
+        bench.good(&format!(
+            "simulate --stage stage.toml --plan {run}.csv --seed 3 --out {log}.csv"
+        ));
+    }
+    bench.good(
+        "fit log.csv --stage stage.toml --out old.bin --model field --serial HS-3 --json fit.json",
+    );
+    bench
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+/// rms of X, Y, Rz over a log, zero deviations refitted, um and urad.
+fn rms(bench: &Bench, blob: &str, log: &str) -> [f64; 3] {
+    bench.good(&format!(
+        "eval {blob} {log} --stage stage.toml --json eval.json"
+    ));
+    let errors = &bench.json("eval.json")["errors"];
+    [
+        number(&errors["x"]["rmse_um"]),
+        number(&errors["y"]["rmse_um"]),
+        number(&errors["rz"]["rmse_urad"]),
+    ]
+}
+
+#[test]
+fn a_common_gain_is_found_from_two_seconds_along_y() {
+    let bench = bench();
+    bench.write("weak.csv", with_gains(&bench.text("sine.csv"), [0.99; 3]));
+    bench.write("later.csv", with_gains(&bench.text("log.csv"), [0.99; 3]));
+    let recalibrate = "recalibrate old.bin weak.csv --stage stage.toml --what gain";
+    bench.good(&format!(
+        "{recalibrate} --out new.bin --created today --json new.json"
+    ));
+    let json = bench.json("new.json");
+    for probe in ["a", "b", "c"] {
+        let gain = &json["gains"][probe];
+        let error = number(&gain["standard_error_percent"]);
+        assert!(error > 0.0 && error < 0.02, "{error}");
+        let change = number(&gain["change_percent"]);
+        assert!((change + 1.0).abs() < 5.0 * error, "{change} {error}");
+    }
+    let service = &json["predicted_service"];
+    let (before, after) = (&service["before"], &service["after"]);
+    for axis in ["x_um", "y_um", "rz_urad"] {
+        let floor = number(&service["floor"][axis]);
+        assert!(number(&before[axis]) > 1.2 * floor, "{axis}");
+        assert!(number(&after[axis]) < 1.02 * floor, "{axis}");
+    }
+    let good = rms(&bench, "old.bin", "log.csv");
+    let (before, after) = (
+        rms(&bench, "old.bin", "later.csv"),
+        rms(&bench, "new.bin", "later.csv"),
+    );
+    assert!(before[1] > 5.0 * good[1], "{before:?} {good:?}");
+    for axis in 0..3 {
+        assert!(after[axis] < 1.02 * good[axis], "{after:?} {good:?}");
+    }
+    bench.good("inspect new.bin --json inspect.json");
+    let inspected = bench.json("inspect.json");
+    assert_eq!(
+        (&inspected["serial"], &inspected["created"]),
+        (&Value::from("HS-3"), &Value::from("today"))
+    );
+
+    // The new posterior carries on: here all parameters, from the new blob.
+    bench.good(
+        "recalibrate new.bin later.csv --stage stage.toml --what all --out all.bin --json all.json",
+    );
+    let change = number(&bench.json("all.json")["gains"]["b"]["change_percent"]);
+    assert!(change.abs() < 0.05, "{change}");
+    // The same without an old posterior: said, and none is written.
+    std::fs::remove_file(bench.path("old.bin.posterior")).expect("there");
+    let alone = bench.good(&format!("{recalibrate} --out alone.bin"));
+    assert!(stderr(&alone).contains("no posterior stands beside"));
+    assert!(!exists(&bench.path("alone.bin.posterior")));
+    let alone = rms(&bench, "alone.bin", "later.csv");
+    assert!(alone[1] < 1.02 * good[1], "{alone:?} {good:?}");
+}
+
+#[test]
+fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
+    let bench = bench();
+    let sine = bench.text("sine.csv");
+    bench.write("weak-a.csv", with_gains(&sine, [0.99, 1.0, 1.0]));
+    let refused = |arguments: &str, status: i32, parts: &[&str]| {
+        let arguments = format!("recalibrate {arguments} --stage stage.toml --out new.bin");
+        bench.bad(&arguments, status, parts);
+        assert!(!exists(&bench.path("new.bin")) && !exists(&bench.path("new.bin.posterior")));
+    };
+    let parts = [
+        "does not tell a gain for each probe",
+        "X, Y and Rz moving at once",
+    ];
+    refused("old.bin sine.csv --what gains", 4, &parts);
+    let parts = ["does not tell a change of all", "six axes moving at once"];
+    refused("old.bin sine.csv --what all", 4, &parts);
+    let parts = ["one gain for all probes does not describe", "--what gains"];
+    refused("old.bin weak-a.csv --what gain", 4, &parts);
+
+    bench.good("fit log.csv --stage stage.toml --out p31.bin --model 31");
+    let parts = ["Model (31)", "--model field"];
+    refused("p31.bin sine.csv --what gain", 3, &parts);
+    let posterior = bench.read("old.bin.posterior");
+    let mut damaged = posterior.clone();
+    damaged[5000] ^= 1;
+    bench.write("old.bin.posterior", &damaged);
+    refused(
+        "old.bin log.csv --what all",
+        3,
+        &["old.bin.posterior", "damaged"],
+    );
+    bench.write("p31.bin.posterior", &posterior);
+    refused(
+        "p31.bin log.csv --what all",
+        3,
+        &["p31.bin.posterior belongs to another blob"],
+    );
+    std::fs::remove_file(bench.path("old.bin.posterior")).expect("there");
+    refused(
+        "old.bin log.csv --what all",
+        3,
+        &["old.bin.posterior does not exist", "--what gains"],
+    );
+    let arguments = "recalibrate old.bin sine.csv --stage stage.toml --what gain --out old.bin";
+    bench.bad(arguments, 2, &["old.bin is an input"]);
+}
