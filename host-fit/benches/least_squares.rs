@@ -5,16 +5,23 @@
 
 use host_fit::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::log;
+use host_fit::input::shipped::RUN_GZ;
 use host_fit::input::stage::Stage;
 use host_fit::problem::Problem;
 use host_fit::problem::draw::{Draw, draw_rows};
 use host_fit::problem::model::{Model, SLOPES_MAX};
+use host_fit::simulate::assembly::Assembly;
+use host_fit::simulate::log_text::log_csv;
+use host_fit::simulate::protocol::Protocol;
+use host_fit::simulate::recording::record;
+use host_fit::simulate::sensors::SensorErrors;
 use host_fit::solve::least_squares::normal::{Point, best_gain};
 use host_fit::solve::least_squares::scatter::{Offset, Q, Ratios, U, mean, regressors, scatter};
 use host_fit::solve::{Projection, Solver, SolverOptions};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DVector, Dyn, Matrix3, OVector, Owned, U18};
 use runtime::ModelKind;
+use std::path::Path;
 use std::time::Instant;
 
 /// Median time of `runs` calls, ms.
@@ -174,4 +181,34 @@ fn main() {
         &Problem::new(&dataset, &some, &stage, Model::of(ModelKind::M31)),
         51,
     );
+    field_model(&stage, folder.path(), &settings);
+}
+
+/// The field model with its covariance, fitted and judged: to the run that ships, and to the paper's
+/// protocol and the combined one of a simulated stage together.
+fn field_model(stage: &Stage, folder: &Path, settings: &FitSettings) {
+    let settings = FitSettings {
+        model: ModelChoice::Named(Model::of(ModelKind::Field)),
+        ..settings.clone()
+    };
+    let run = folder.join("run30.csv.gz");
+    std::fs::write(&run, RUN_GZ).expect("written");
+    let assembly = Assembly::draw(stage, 1);
+    let both = [Protocol::Paper, Protocol::Combined].map(|protocol| {
+        let run = protocol.run(stage.servo_period_s, 1);
+        let recording = record(stage, &assembly, run, &SensorErrors::USUAL, 1).expect("clear");
+        let path = folder.join(format!("{protocol:?}.csv"));
+        std::fs::write(&path, log_csv(&recording, stage)).expect("written");
+        path
+    });
+    for paths in [&[run][..], &both] {
+        let log = log::read(paths, stage, &log::ReadOptions::default()).expect("read");
+        let ms = median_ms(9, || {
+            fit(&log.dataset, stage, &settings).expect("a fit");
+        });
+        println!(
+            "RESULT fit_field_model_{}_rows_ms={ms:.1}",
+            log.dataset.rows.len()
+        );
+    }
 }
