@@ -191,7 +191,7 @@ impl<'a> Job<'a> {
                 Err(error) => error.to_string(),
             }
         } else {
-            "--solver and --project are for it; the field model has ways of its own".to_owned()
+            "--solver and --project choose how models of the paper are fitted; the field model has a way of its own".to_owned()
         };
         let fit = self.of_model(Model::of(ModelKind::M31))?;
         Ok(Fit {

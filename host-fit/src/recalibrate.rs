@@ -31,6 +31,8 @@ const OPEN_MAX_ALL: f64 = 0.21;
 const MISFIT_MAX: f64 = 0.02;
 /// ... and by chance by this many standard deviations.
 const CHANCE_MAX: f64 = 3.0;
+/// The same for the changes in terms of what the prior allows for.
+const FAR_MAX: f64 = 4.0;
 
 /// What is kept of a fit of the field model beside its blob: the prior of a recalibration.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,6 +118,20 @@ pub enum RecalibrateError {
         /// Its limit.
         limit: f64,
     },
+    /// The parameters would have to change further than any probe drifts.
+    #[error(
+        "{} would be one beyond all that probes drift or are moved by (sum of squares {prior:.0} against what the prior \
+         allows for, limit {limit:.0}): check that the log is of this stage, and its columns, order and signs; or fit again",
+        told(*change)
+    )]
+    TooFar {
+        /// What was to be found.
+        change: Change,
+        /// Sum of squares of the changes in terms of what is allowed for.
+        prior: f64,
+        /// Its limit.
+        limit: f64,
+    },
     /// The equations can't be solved.
     #[error(transparent)]
     Unsolved(#[from] FieldFitError),
@@ -139,7 +155,7 @@ const fn recording(change: Change) -> &'static str {
             "X, Y and Rz moving at once, each at a frequency of its own, 2 s; or try --what gain"
         }
         Change::All => {
-            "all six axes moving at once at service amplitude, each at a frequency of its own, 4 s or better 8 s; \
+            "all six axes moving at once at service amplitude, each at a frequency of its own (host-fit plan --seconds 8); \
              or try --what gains"
         }
     }
@@ -249,7 +265,8 @@ pub fn recalibrate(
     })
 }
 
-/// Refuses a log whose residuals the change asked for does not explain.
+/// Refuses a log whose residuals the change asked for does not explain, or not by a change that
+/// probes undergo.
 fn check_described(
     update: &Update,
     known: Option<&Known>,
@@ -265,14 +282,24 @@ fn check_described(
         Change::All => misfit + OPEN_MAX_ALL * 3.0 * update.rows as f64 / count,
     };
     let ratio = update.chi_squared / count;
-    if ratio <= limit {
-        return Ok(());
+    if ratio > limit {
+        return Err(RecalibrateError::NotDescribed {
+            change,
+            ratio,
+            limit,
+        });
     }
-    Err(RecalibrateError::NotDescribed {
-        change,
-        ratio,
-        limit,
-    })
+    // Among thousands of residuals a few wild changes would not show.
+    let changes = update.changes as f64;
+    let far = changes + FAR_MAX * (2.0 * changes).sqrt();
+    if update.prior > far {
+        return Err(RecalibrateError::TooFar {
+            change,
+            prior: update.prior,
+            limit: far,
+        });
+    }
+    Ok(())
 }
 
 /// `old` with other parameters.

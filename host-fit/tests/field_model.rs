@@ -199,7 +199,7 @@ fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
         (
             "log.csv",
             "field",
-            "the field model: errors predicted for service",
+            "the field model: errors predicted over the range",
         ),
         (
             "paper.csv",
@@ -223,6 +223,29 @@ fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
         "fit log.csv --stage stage.toml --out p.bin --solver shtlbo --generations 3 --json p.json",
     );
     assert_eq!(bench.json("p.json")["model"], "31");
+}
+
+#[test]
+fn a_log_of_little_motion_warns_and_one_of_exchanged_probes_is_refused() {
+    let bench = bench();
+    let log = bench.text("log.csv");
+    let exchanged = log.replacen("hall_a_cnt,hall_b_cnt", "hall_b_cnt,hall_a_cnt", 1);
+    bench.write("exchanged.csv", exchanged);
+    bench.bad(
+        "fit exchanged.csv --stage stage.toml --out p.bin --model field",
+        4,
+        &[
+            "lever_arm_a",
+            "far outside its search range",
+            "order and the signs",
+        ],
+    );
+    let stage = bench.text("stage.toml") + "\n[motion]\nrz = { service_rad = 1.2e-3 }\n";
+    bench.write("wide.toml", stage);
+    let told = bench.good("fit log.csv --stage wide.toml --out p.bin --model field");
+    assert!(stderr(&told).contains("moves rz by 5"), "{}", stderr(&told));
+    let told = bench.good("fit log.csv --stage stage.toml --out p.bin --model field");
+    assert_eq!(stderr(&told), "");
 }
 
 #[test]

@@ -79,6 +79,21 @@ fn rms(bench: &Bench, blob: &str, log: &str) -> [f64; 3] {
     ]
 }
 
+/// A log with the sign of Hall probe A turned.
+fn with_a_turned(log: &str) -> String {
+    let mut lines = log.lines();
+    let header = lines.next().expect("a header");
+    let of_a = header.split(',').position(|name| name == "hall_a_cnt");
+    let of_a = of_a.expect("the column of A");
+    let mut out = format!("{header}\n");
+    for line in lines {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        cells[of_a] = (-cells[of_a].parse::<i64>().expect("a code")).to_string();
+        out += &(cells.join(",") + "\n");
+    }
+    out
+}
+
 #[test]
 fn a_common_gain_is_found_from_two_seconds_along_y() {
     let bench = bench();
@@ -166,12 +181,17 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
         3,
         &["old.bin.posterior", "damaged"],
     );
-    bench.write("p31.bin.posterior", &posterior);
+    bench.good("fit log.csv --stage stage.toml --out other.bin --model field --serial OTHER");
+    bench.write("other.bin.posterior", &posterior);
     refused(
-        "p31.bin log.csv --what all",
+        "other.bin log.csv --what all",
         3,
-        &["p31.bin.posterior belongs to another blob"],
+        &["other.bin.posterior belongs to another blob"],
     );
+    bench.write("old.bin.posterior", &posterior);
+    bench.write("turned.csv", with_a_turned(&bench.text("log.csv")));
+    let parts = ["beyond all that probes drift", "columns, order and signs"];
+    refused("old.bin turned.csv --what all", 4, &parts);
     std::fs::remove_file(bench.path("old.bin.posterior")).expect("there");
     refused(
         "old.bin log.csv --what all",

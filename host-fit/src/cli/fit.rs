@@ -116,8 +116,10 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         .chain(&args.start)
         .map(PathBuf::as_path)
         .collect();
+    let posterior = posterior_file::beside(&args.out);
     let outputs = [
         Some(args.out.as_path()),
+        posterior.as_deref(),
         args.json.as_deref(),
         args.report.as_deref(),
     ];
@@ -194,8 +196,8 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         lag_compensated: args.compensate_lag,
     };
     let report = of_fit(&fit, choice, &circumstances);
-    if let (Some(field), Some(path)) = (&fit.field, posterior_file::beside(&args.out)) {
-        posterior_file::write(&path, &fit.set, &Known::of_fit(field))?;
+    if let (Some(field), Some(path)) = (&fit.field, &posterior) {
+        posterior_file::write(path, &fit.set, &Known::of_fit(field))?;
     }
     blob_file::write(&args.out, &fit.set)?;
     if let Some(path) = &args.json {

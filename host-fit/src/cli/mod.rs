@@ -44,7 +44,7 @@ struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run the main job on a log that ships with the program, beside the figures of the paper.
+    /// Run the main job on logs that ship with the program, beside the figures of the paper.
     Demo(demo::DemoArgs),
     /// Fit a calibration to one or more logs and write the parameter blob.
     Fit(Box<fit::FitArgs>),

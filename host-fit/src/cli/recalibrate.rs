@@ -6,14 +6,15 @@ use crate::input::log::{self, LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::output::posterior_file::PosteriorFileError;
 use crate::output::{blob_file, check_writable, posterior_file};
-use crate::recalibrate::{Known, Recalibration, recalibrate};
+use crate::problem::model::Model;
+use crate::recalibrate::{Known, RecalibrateError, Recalibration, recalibrate};
 use crate::report::json::Errors;
 use crate::report::text;
 use crate::solve::field::update::Change;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
-use runtime::ParameterSet;
 use runtime::parameters::Text;
+use runtime::{ModelKind, ParameterSet};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -28,7 +29,7 @@ impl ValueEnum for Change {
             Self::Gain => "One gain for all probes: 2 s of a sine along Y tell it",
             Self::Gains => "A gain for each probe: 2 s of X, Y and Rz moving at once",
             Self::All => {
-                "All parameters, as after a probe was seated anew: 4 to 8 s of all six axes moving at once"
+                "All parameters, as after a probe was seated anew: 8 s of all six axes moving at once"
             }
         };
         Some(PossibleValue::new(self.name()).help(help))
@@ -129,6 +130,10 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     let old = blob_file::read(&args.params)?;
     let stage = Stage::from_file(&args.stage)?;
     super::same_scales(&old, &stage, &args.stage)?;
+    if old.model != ModelKind::Field {
+        let model = Model::of(old.model).title();
+        return Err(RecalibrateError::OtherModel { model }.into());
+    }
     let known = match &old_posterior {
         Some(path) => read_known(path, &old, args)?,
         None => None,

@@ -1,9 +1,11 @@
 //! A fit to a log whose reference lags: the lag is estimated with the parameters, the reference
 //! read later by as much, and so on until nothing of it is left.
 
-use super::{Fit, FitError, FitSettings, fit};
+use super::{Fit, FitError, FitSettings, ModelChoice, fit};
 use crate::input::dataset::{Dataset, Movement, Row};
 use crate::input::stage::Stage;
+use crate::problem::model::Model;
+use runtime::ModelKind;
 
 /// Rounds of fit and compensation: the first leaves a hundredth of a lag of several rows.
 const ROUNDS_MAX: u32 = 4;
@@ -25,7 +27,21 @@ pub fn fit_compensated(
 ) -> Result<(Fit, Dataset), FitError> {
     let mut total_s = 0.0;
     let mut at = dataset.clone();
-    let mut found = fit(&at, stage, settings)?;
+    let mut found = match fit(&at, stage, settings) {
+        // A lag of many rows is more than the field model's fit can follow: Model (31) tells it first.
+        Err(FitError::Field(_)) => {
+            let model = ModelChoice::Named(Model::of(ModelKind::M31));
+            fit(
+                &at,
+                stage,
+                &FitSettings {
+                    model,
+                    ..settings.clone()
+                },
+            )?
+        }
+        found => found?,
+    };
     for _ in 0..ROUNDS_MAX {
         let Some(lag) = found.lag else { break };
         if lag.value_s.abs() < LEFT * lag.standard_error_s {

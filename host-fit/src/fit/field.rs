@@ -1,14 +1,15 @@
 //! The main job for the field model: Model (31) by least squares first, then the field model from
 //! there, refused where the log leaves it worse than Model (31).
 
-use super::warning::warnings;
+use super::warning::{FitWarning, warnings};
 use super::{Fit, FitError, Job, Judged, calibration};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::Zeros;
 use crate::judge::lag::ReferenceLag;
 use crate::problem::Problem;
-use crate::problem::model::Model;
+use crate::problem::model::{Model, ParameterId};
+use crate::problem::parameters::{Parameters, search_box};
 use crate::solve::field::fit::{FieldFitError, fit_field};
 use crate::solve::field::parameters::FieldParameters;
 use crate::solve::{Solution, Solver};
@@ -36,6 +37,37 @@ pub fn field_calibration(
     })
 }
 
+/// The parameters beyond their search ranges, which the prior does not know.
+///
+/// # Errors
+/// [`FieldFitError::FarOff`] for a lever arm, an angle or an eta that is beyond it by more than the
+/// range is wide: the log of sensors in another order or with other signs.
+fn beyond_ranges(
+    stage: &Stage,
+    parameters: &Parameters,
+) -> Result<Vec<ParameterId>, FieldFitError> {
+    let model = Model::of(ModelKind::M31);
+    let ranges = search_box(stage, model, parameters.geometry().misalignment_rad);
+    let mut beyond = Vec::new();
+    for id in model.free() {
+        let (value, range) = (parameters.values[id.index], ranges[id.index]);
+        let distance = (value - range.clip(value)).abs();
+        if !id.is_slope() && distance > range.width() {
+            return Err(FieldFitError::FarOff {
+                parameter: id.name(),
+                value,
+                unit: id.term.unit,
+                low: range.low,
+                high: range.high,
+            });
+        }
+        if distance > 0.0 {
+            beyond.push(id);
+        }
+    }
+    Ok(beyond)
+}
+
 impl Job<'_> {
     /// The field model, refused where it would serve worse than Model (31).
     pub(super) fn of_field_model(&self, model: &'static Model) -> Result<Fit, FitError> {
@@ -56,6 +88,7 @@ impl Job<'_> {
         }
         let elapsed = started.elapsed();
         let parameters = field.parameters.model_31();
+        let at_limit = beyond_ranges(stage, &parameters)?;
         let calibration = field_calibration(dataset, stage, &field.parameters)?;
         let Judged {
             set,
@@ -81,7 +114,7 @@ impl Job<'_> {
                 "maximum a posteriori reached {} steps after model (31)",
                 field.iterations
             ),
-            at_limit: Vec::new(),
+            at_limit,
         };
         let lag = |standard_error_s| ReferenceLag {
             value_s: field.lag_s,
@@ -90,7 +123,14 @@ impl Job<'_> {
         Ok(Fit {
             model,
             model_reason: field.verdict.to_string(),
-            warnings: warnings(dataset, &problem, &solution, &judgement),
+            warnings: warnings(dataset, &problem, &solution, &judgement)
+                .into_iter()
+                .chain(FitWarning::of_ranges(
+                    stage,
+                    field.planar_range,
+                    field.vertical_range,
+                ))
+                .collect(),
             train_fitness: problem.fitness(cost),
             train_rows: selected.len(),
             standard_error: field.posterior.standard_errors_31(),

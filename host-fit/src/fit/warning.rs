@@ -1,6 +1,7 @@
 //! What a user should know of a fit that is good nevertheless.
 
 use crate::input::dataset::Dataset;
+use crate::input::stage::{AXES, Stage};
 use crate::judge::Judgement;
 use crate::judge::lag::ReferenceLag;
 use crate::judge::statistics::AxisError;
@@ -13,7 +14,7 @@ use crate::solve::Solution;
 pub enum FitWarning {
     /// A parameter stands at an end of its search range.
     #[error(
-        "{} stands at an end of its search range ({value:.6} {}): widen the range in stage.toml, or check the log",
+        "{} stands at an end of its search range or beyond ({value:.6} {}): widen the range in stage.toml, or check the log",
         id.name(), id.term.unit
     )]
     AtLimit {
@@ -82,6 +83,21 @@ pub enum FitWarning {
         /// Servo period, s.
         period_s: f64,
     },
+    /// The log of a fit of the field model moves an axis less than half as far as service.
+    #[error(
+        "the log moves {axis} by {moved_micro:.0} {unit} to either side, service by {service_micro:.0} ([motion] in \
+         stage.toml): errors beyond the log's range are larger than predicted; `host-fit plan` makes a run of full range"
+    )]
+    NarrowLog {
+        /// The axis.
+        axis: &'static str,
+        /// um or urad.
+        unit: &'static str,
+        /// How far the log goes, um or urad.
+        moved_micro: f64,
+        /// How far service goes, um or urad.
+        service_micro: f64,
+    },
     /// Rows that the decoder refused count in no error.
     #[error("{rows} rows have codes that the decoder refuses; they are not part of the errors")]
     Undecoded {
@@ -95,7 +111,25 @@ const LAG_MIN: f64 = 0.1;
 /// The same in standard errors.
 const LAG_ERRORS_MIN: f64 = 3.0;
 
+/// A log that moves an axis over less than this part of its range in service is told.
+const RANGE_MIN: f64 = 0.5;
+
 impl FitWarning {
+    /// Of the axes that the log moves (X, Y, Rz and Z, Rx, Ry: largest magnitudes, m, rad) far less
+    /// than service does.
+    pub(super) fn of_ranges(stage: &Stage, planar: [f64; 3], vertical: [f64; 3]) -> Vec<Self> {
+        let moved = planar.into_iter().chain(vertical);
+        let axes = AXES.iter().zip(&stage.motion.axes).zip(moved);
+        axes.filter(|((_, motion), moved)| *moved < RANGE_MIN * motion.service)
+            .map(|(((axis, _), motion), moved)| Self::NarrowLog {
+                axis,
+                unit: if axis.starts_with('r') { "urad" } else { "um" },
+                moved_micro: moved * 1e6,
+                service_micro: motion.service * 1e6,
+            })
+            .collect()
+    }
+
     /// Of a lag that is large and beyond doubt.
     pub(super) fn of_lag(lag: &ReferenceLag, period_s: f64) -> Option<Self> {
         let lag_s = lag.value_s;

@@ -4,13 +4,18 @@ use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
-use crate::solve::field::blocks::Rows;
+use crate::solve::field::blocks::{Block, Rows};
 use crate::solve::field::noise::{drift_mm, white_mm};
 use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::probe::probes;
 use crate::solve::field::terms::{COUNT, PER_PROBE};
 use crate::solve::field::whiten::{Noise, Normal, UNKNOWNS};
 use nalgebra::{Cholesky, DMatrix, DVector};
+use std::ops::Range;
+
+/// For how long a model errs alike, s: its errors go with the motion. What it leaves unexplained
+/// counts as one residual in that time.
+const ALIKE_S: f64 = 0.5;
 
 /// The lag of the reference behind the probes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,14 +67,26 @@ pub fn reference_lag(
     let lag = unknowns.len() - 1;
     let mut unit = DVector::zeros(unknowns.len());
     unit[lag] = 1.0;
-    let variance = factor.solve(&unit)[lag];
+    let by_descent = factor.solve(&unit);
+
     let residuals =
         (3 * rows.blocks.len()).checked_sub(3 * rows.movements.len() + unknowns.len())?;
     let chi_squared = normal.chi_squared() - descent.dot(&step);
-    let unexplained = (chi_squared / residuals.max(1) as f64).max(1.0);
+    let unexplained = (chi_squared / residuals.max(1) as f64 - 1.0).max(0.0);
+    let alike = (ALIKE_S * rows.blocks.len() as f64 / seconds(&rows, &blocks)).max(1.0);
+    let variance = by_descent[lag] * (1.0 + unexplained * alike);
     let found = ReferenceLag {
         value_s: step[lag] * scale(COUNT),
-        standard_error_s: (variance * unexplained).sqrt() * scale(COUNT),
+        standard_error_s: variance.sqrt() * scale(COUNT),
     };
     found.standard_error_s.is_finite().then_some(found)
+}
+
+/// Length of all movements, s.
+fn seconds(rows: &Rows, blocks: &[Block]) -> f64 {
+    let ends = |movement: &Range<usize>| {
+        let of_movement = &blocks[movement.clone()];
+        Some(of_movement.last()?.time_s - of_movement.first()?.time_s)
+    };
+    rows.movements.iter().filter_map(ends).sum()
 }

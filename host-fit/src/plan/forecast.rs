@@ -35,7 +35,7 @@ fn designed(stage: &Stage) -> FieldParameters {
     FieldParameters::of_model_31(&Parameters::of_model_31(&geometry, &sensitivity), stage)
 }
 
-/// What is known of a stage before it is calibrated: see [`designed`], with the noise of the given
+/// What is known of a stage before it is calibrated: as designed, with the noise of the given
 /// logs. `None` where its probes can't tell a pose of its service.
 pub fn forecaster(stage: &Stage) -> Option<Forecaster> {
     let sensors = SensorErrors::USUAL;

@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`run`] | six sines between smooth ends |
-//! | [`forecast`] | what a fit to a run will give |
+//! | [`mod@forecast`] | what a fit to a run will give |
 //! | [`search`] | the choice of the frequencies |
 
 pub mod forecast;

@@ -113,7 +113,7 @@ pub fn read(path: &Path, servo_period_s: f64) -> Result<Trajectory, PlanFileErro
         if poses.is_empty() {
             start_us = t_us.unwrap_or(0);
         }
-        let due_us = start_us + (poses.len() as f64 * period_us).round() as i64;
+        let due_us = i64::saturating_add(start_us, (poses.len() as f64 * period_us).round() as i64);
         if t_us != Some(due_us) {
             return Err(PlanFileError::Time {
                 path: path.to_owned(),

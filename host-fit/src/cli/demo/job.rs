@@ -11,7 +11,7 @@ use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Zeros};
 use crate::output;
 use crate::output::blob_file;
-use crate::output::pose_file;
+use crate::output::{pose_file, posterior_file};
 use crate::problem::draw::Draw;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
@@ -108,6 +108,7 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
         "params.bin",
         "pose.csv",
         "field.bin",
+        "field.bin.posterior",
     ]
     .map(|name| folder.join(name));
     let [
@@ -118,6 +119,7 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
         blob_path,
         pose_path,
         field_path,
+        posterior_path,
     ] = &files;
     output::write_atomically(log_path, LOG_GZ)?;
     output::write_atomically(run_path, RUN_GZ)?;
@@ -150,6 +152,9 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
     output::write_atomically(pose_path, &pose_file::to_text(&decoded))?;
     let errors = pose_file_errors(pose_path, dataset, &stage, &model_31.solution.parameters)?;
     let service = Service::new(&stage, &set)?;
+    if let Some(known) = &service.known {
+        posterior_file::write(posterior_path, &service.field, known)?;
+    }
     blob_file::write(field_path, &service.field)?;
     let constants = model_31
         .calibration

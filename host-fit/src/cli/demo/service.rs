@@ -10,6 +10,7 @@ use crate::input::stage::Stage;
 use crate::judge::precision::largest_difference;
 use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Zeros};
+use crate::recalibrate::Known;
 use runtime::{ModelKind, ParameterSet};
 use std::fmt::Write;
 
@@ -22,6 +23,8 @@ pub(super) struct Service {
     lines: Vec<(&'static str, PoseError)>,
     /// The field model as fitted to the run of 30 s.
     pub(super) field: ParameterSet,
+    /// What is kept beside its blob.
+    pub(super) known: Option<Known>,
     /// Largest difference of the target's `f32` from `f64` with that, m, m, rad.
     f32_difference: [f64; 3],
 }
@@ -43,6 +46,7 @@ impl Service {
         let Fit {
             calibration,
             set: field,
+            field: of_field,
             ..
         } = fitted(&run, ModelKind::Field)?;
         let constants = calibration.constants().map_err(FitError::Unusable)?;
@@ -66,6 +70,7 @@ impl Service {
                 ("what the noise of the probes leaves", errors(&of_service)),
             ],
             field,
+            known: of_field.as_ref().map(Known::of_fit),
             f32_difference,
         })
     }

@@ -158,13 +158,13 @@ impl std::fmt::Display for Verdict {
         if self.field {
             write!(
                 f,
-                "the field model: errors predicted for service are {field}, those of model (31) {}",
+                "the field model: errors predicted over the range of the log are {field}, those of model (31) {}",
                 words(model_31)
             )
         } else if self.loses() {
             write!(
                 f,
-                "this log leaves the field model with errors of {field} in service; record all six axes moving at \
+                "this log leaves the field model with errors of {field}; record all six axes moving at \
                  once, and for longer (host-fit plan makes such a run)"
             )
         } else {

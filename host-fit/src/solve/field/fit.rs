@@ -85,9 +85,27 @@ pub enum FieldFitError {
          moving at once, each at a frequency of its own"
     )]
     Singular,
+    /// A parameter came out far beyond its search range.
+    #[error(
+        "{parameter} would be {value:.4} {unit}, far outside its search range from {low:.4} to {high:.4}: check the columns, \
+         the order and the signs of the sensors in the log and in stage.toml"
+    )]
+    FarOff {
+        /// Its name.
+        parameter: String,
+        /// Its value, SI.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// Lower end of the search range.
+        low: f64,
+        /// Upper end.
+        high: f64,
+    },
     /// No step lowers the cost although the gradient is not zero.
     #[error(
-        "the fit of the field model stopped after {iterations} steps without reaching its minimum"
+        "the fit of the field model did not settle in {iterations} steps: the log shows something that it has no term for, \
+         such as a reference that lags by many rows, two different stages, or an axis that does not move"
     )]
     Stuck {
         /// Steps made.

@@ -123,6 +123,11 @@ pub struct Update {
     /// Sum of squares of the whitened residuals and of x: about [`Update::residuals`] if nothing
     /// else has changed.
     pub chi_squared: f64,
+    /// The part of x in it: at most about the number of its entries if what changed is what the
+    /// prior allows for.
+    pub prior: f64,
+    /// Entries of x.
+    pub changes: usize,
     /// Whitened residuals: three for each block, less three for each movement's offset.
     pub residuals: usize,
     /// Rows behind them.
@@ -192,6 +197,8 @@ pub fn update(
                 parameters,
                 noise,
                 chi_squared: normal.chi_squared() + x.norm_squared(),
+                prior: x.norm_squared(),
+                changes: x.len(),
                 residuals: 3 * (rows.blocks.len() - rows.movements.len()),
                 rows: rows.rows.len(),
                 iterations,

@@ -67,7 +67,9 @@ fn main() -> ! {
         servo.start_rezero(black_box(RezeroSettings::default()));
         black_box(servo.tick(&frame));
         black_box(servo.tick_without_frame());
-        black_box(servo.tick_with(1, |zero| decoder.decode_at(frame.hall, black_box(VerticalPose::ZERO), zero)));
+        black_box(servo.tick_with(1, |zero| {
+            decoder.decode_at(frame.hall, black_box(VerticalPose::ZERO), zero)
+        }));
         black_box(servo.set_zero(black_box(PlanarPose::ZERO)));
         servo.forget();
         black_box((servo.rezero_state(), servo.health(), servo.zero()));
