@@ -179,6 +179,21 @@ fn a_late_reference_is_told_by_every_model_and_taken_off_when_asked() {
         let (value_us, error_us, compensated) = lag(&bench);
         assert!((value_us - 6000.0).abs() < 200.0, "{value_us} {error_us}");
         assert!(!compensated);
+        let json = bench.json("p.json");
+        let found = json["findings"].as_array().expect("a list");
+        let found = found.iter().find(|f| f["code"] == "reference_lag");
+        let found = found.expect("the lag among the findings");
+        assert_eq!(
+            (&found["severity"], &found["unit"]),
+            (&"warn".into(), &"us".into())
+        );
+        let told_us = found["value"].as_f64().expect("a number");
+        assert!((told_us - value_us).abs() < 1e-6, "{told_us} {value_us}");
+        assert!(
+            found["message"]
+                .as_str()
+                .is_some_and(|m| m.contains("--compensate-lag"))
+        );
         let quiet = bench.good(&format!("{fit} --compensate-lag"));
         assert!(!stderr(&quiet).contains("probes by"), "{}", stderr(&quiet));
         let (value_us, error_us, compensated) = lag(&bench);
@@ -214,6 +229,16 @@ fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
         assert_eq!(json["model"], model);
         let told = json["model_reason"].as_str().expect("a sentence");
         assert!(told.starts_with(reason), "{told}");
+        let note = serde_json::json!([{
+            "code": "model_lacks", "severity": "note", "message": told, "channel": null, "movement": null,
+            "value": null, "unit": null,
+        }]);
+        let notes = if model == "31" {
+            note
+        } else {
+            serde_json::json!([])
+        };
+        assert_eq!(json["findings"], notes);
         bench.good(&format!(
             "fit {log} --stage stage.toml --out named.bin --model {model}"
         ));

@@ -8,6 +8,7 @@ use crate::judge::{Judgement, Zeros};
 use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::Parameters;
 use crate::report::field::FieldReport;
+use crate::report::finding::{self, Finding};
 use crate::solve::field::parameters::values_of;
 use crate::solve::field::terms::{self, PER_PROBE};
 use runtime::ParameterSet;
@@ -237,6 +238,8 @@ pub struct Report {
     pub zero_deviations: Vec<MovementZero>,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// What the fit found about the log; none for `eval`.
+    pub findings: Vec<Finding>,
 }
 
 /// What a command knows besides the fit or judgement itself.
@@ -330,6 +333,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         serial: fit.set.serial.as_str().to_owned(),
         zero_deviations: movement_zeros(&fit.judgement, c.dataset),
         warnings,
+        findings: finding::of_fit(fit),
     }
 }
 
@@ -369,5 +373,6 @@ pub fn of_eval(
         serial: set.serial.as_str().to_owned(),
         zero_deviations: movement_zeros(judgement, c.dataset),
         warnings: c.warnings.clone(),
+        findings: Vec::new(),
     }
 }
