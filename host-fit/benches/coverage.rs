@@ -267,19 +267,19 @@ fn of_the_model(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Vec<Covera
     Ok(parameters)
 }
 
+/// The stage of a seed, and its log of a motion.
+fn recorded(stage: &Stage, motion: Motion, seed: u64) -> Fallible<(Assembly, Dataset)> {
+    let assembly = Assembly::draw(stage, seed);
+    let run = motion.run(seed);
+    let log = record(stage, &assembly, run, &SensorErrors::USUAL, seed)?;
+    Ok((assembly, log.dataset(stage).ok_or("no plane")?))
+}
+
 /// Logs of stages made of physics: poses.
 fn of_physics(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Poses> {
     let mut poses = Poses::default();
     for seed in 0..logs {
-        let assembly = Assembly::draw(stage, seed);
-        let log = record(
-            stage,
-            &assembly,
-            motion.run(seed),
-            &SensorErrors::USUAL,
-            seed,
-        )?;
-        let dataset = log.dataset(stage).ok_or("no plane")?;
+        let (assembly, dataset) = recorded(stage, motion, seed)?;
         let fit = field(&dataset, stage)?;
         let service = Protocol::Service.run(PERIOD_S, seed);
         let mut random = Stream::new(seed, Purpose::Sensors, 9);
@@ -303,15 +303,7 @@ fn of_physics(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Poses> {
 fn against_model_31(stage: &Stage, motion: Motion, logs: u64) -> Fallible<(f64, f64, u64)> {
     let (mut worst, mut sum, mut taken) = (0.0f64, 0.0, 0);
     for seed in 0..logs {
-        let assembly = Assembly::draw(stage, seed);
-        let log = record(
-            stage,
-            &assembly,
-            motion.run(seed),
-            &SensorErrors::USUAL,
-            seed,
-        )?;
-        let dataset = log.dataset(stage).ok_or("no plane")?;
+        let (assembly, dataset) = recorded(stage, motion, seed)?;
         let model_31 = FieldParameters::of_model_31(&model_31(&dataset, stage)?, stage);
         let settings = FitSettings {
             model: ModelChoice::Auto,
