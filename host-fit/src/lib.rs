@@ -24,6 +24,7 @@
 pub mod bus;
 pub mod cli;
 pub mod compare;
+pub mod diagnose;
 pub mod fit;
 pub mod input;
 pub mod interrupt;
