@@ -1,3 +1,38 @@
 //! What is wrong with a log, and by how much it can be trusted: between the fit and the blob.
+//!
+//! | module | what it does |
+//! |---|---|
+//! | [`finding`] | a finding: code, severity, place, size |
+//! | [`hypothesis`] | mistakes that labs make, and how to undo each |
+//! | [`causes`] | which of them alone explains a log |
+//! | [`zeros`] | zero deviations beyond their range |
+//! | [`of_fit`] | what a fit says of itself |
 
+pub mod causes;
 pub mod finding;
+pub mod hypothesis;
+pub mod of_fit;
+pub mod zeros;
+
+use crate::fit::{Fit, FitError};
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use finding::{Finding, Severity};
+
+/// Everything that is wrong with a log, the gravest first; `fitted` is what came of the fit to it.
+pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Vec<Finding> {
+    let mut findings = causes::causes(dataset, stage);
+    if let Ok(fit) = fitted {
+        findings.extend(of_fit::findings(fit));
+    }
+    findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
+    findings
+}
+
+/// The messages of those findings that keep a calibration from being written.
+pub fn refusals(findings: &[Finding]) -> Vec<String> {
+    let refused = findings
+        .iter()
+        .filter(|finding| finding.severity == Severity::Refuse);
+    refused.map(|finding| finding.message.clone()).collect()
+}

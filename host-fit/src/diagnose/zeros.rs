@@ -1,0 +1,58 @@
+//! Zero deviations beyond their range.
+
+use super::finding::{Code, Finding, Severity};
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::problem::Problem;
+use crate::problem::parameters::Parameters;
+use crate::solve::least_squares::coordinates::point_of;
+use crate::solve::least_squares::multistart::zero_deviations;
+
+/// Names shown of the movements.
+const SHOWN: usize = 5;
+
+/// The movements whose zero deviation leaves its range in `stage`, by a fit of `problem`, whose stage
+/// has no range for it.
+pub(super) fn clipped(
+    dataset: &Dataset,
+    stage: &Stage,
+    problem: &Problem,
+    parameters: &Parameters,
+) -> Option<Finding> {
+    let range = &stage.search.delta_m;
+    let point = point_of(parameters)?;
+    let zeros = zero_deviations(problem, parameters, &point);
+    let largest = |delta: [f64; 3]| delta.map(f64::abs).into_iter().fold(0.0, f64::max);
+    let beyond: Vec<(String, f64)> = (dataset.movements.iter().zip(&zeros))
+        .filter(|(_, zero)| !zero.delta_m.iter().all(|delta| range.contains(*delta)))
+        .map(|(movement, zero)| (dataset.movement_name(movement), largest(zero.delta_m)))
+        .collect();
+    let (worst, most) = beyond.iter().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let most_um = most * 1e6;
+    let names: Vec<&str> = beyond
+        .iter()
+        .take(SHOWN)
+        .map(|(name, _)| name.as_str())
+        .collect();
+    let dots = if beyond.len() > SHOWN { ", ..." } else { "" };
+    Some(Finding {
+        code: Code::ZeroClipped,
+        severity: Severity::Warn,
+        message: format!(
+            "the zero deviation of {} of {} movements ({}{dots}) leaves its range of {:.0} to {:.0} um, at most by movement \
+             {worst}, {most_um:.1} um at a probe: reset the interferometers nearer to zero before each movement, or widen \
+             search.delta_m in stage.toml to [-{wide}e-6, {wide}e-6]",
+            beyond.len(),
+            dataset.movements.len(),
+            names.join(", "),
+            range.low * 1e6,
+            range.high * 1e6,
+            wide = (1.2 * most_um / 10.0).ceil() * 10.0,
+        ),
+        channel: None,
+        movement: Some(worst.clone()),
+        t_us: None,
+        value: Some(most_um),
+        unit: Some("um"),
+    })
+}
