@@ -5,7 +5,7 @@
 //! | 0 | good |
 //! | 2 | usage: the command line is wrong |
 //! | 3 | bad input: a stage file, log or blob that is refused, an output that can't be written |
-//! | 4 | the fit failed its own checks, or no run can be planned; nothing was written |
+//! | 4 | the fit failed its own checks, a log is refused or not described, or no run can be planned; nothing was written |
 //! | 130 | interrupted; the best so far was kept |
 //!
 //! Every message says what is wrong, where, and what to do.
@@ -87,6 +87,41 @@ pub enum HostError {
     /// The fit failed its own checks: nothing was written.
     #[error("the fit failed its own checks, and no parameter blob was written: {0}")]
     Fit(#[from] FitError),
+    /// The same, with what a diagnosis of the log found.
+    #[error(
+        "the fit failed its own checks, and no parameter blob was written: {error}. {findings}"
+    )]
+    FitDiagnosed {
+        /// Why there is no fit.
+        error: FitError,
+        /// The messages of the findings.
+        findings: String,
+    },
+    /// The calibration would be wrong: nothing was written.
+    #[error("the log is refused: {findings}")]
+    Refused {
+        /// The messages of the findings.
+        findings: String,
+    },
+    /// A blob does not describe a log as well as those that it was fitted to.
+    #[error(
+        "the parameter blob does not describe this log: {error:.2} {unit} rms in {axis}, where it had {own:.2} {unit} in \
+         the logs that it was fitted to, more than {limit} times as much (--limit){cause}"
+    )]
+    BeyondLimit {
+        /// The axis.
+        axis: &'static str,
+        /// um or urad.
+        unit: &'static str,
+        /// rms error, um or urad.
+        error: f64,
+        /// That of the blob's own logs, um or urad.
+        own: f64,
+        /// The largest factor between the two.
+        limit: f64,
+        /// What a diagnosis of the log found, after a full stop.
+        cause: String,
+    },
     /// The posterior beside a blob is refused.
     #[error(transparent)]
     Posterior(#[from] PosteriorFileError),
@@ -149,7 +184,12 @@ impl HostError {
             | Self::PlanFile(_)
             | Self::Record(_)
             | Self::Output(_) => 3,
-            Self::Fit(_) | Self::Plan(_) | Self::Recalibrate(_) => 4,
+            Self::Fit(_)
+            | Self::FitDiagnosed { .. }
+            | Self::Refused { .. }
+            | Self::BeyondLimit { .. }
+            | Self::Plan(_)
+            | Self::Recalibrate(_) => 4,
             Self::Interrupted { .. } => 130,
         }
     }

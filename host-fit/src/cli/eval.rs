@@ -1,15 +1,18 @@
 //! `host-fit eval`.
 
 use crate::cli::error::HostError;
+use crate::diagnose;
+use crate::diagnose::finding::Severity;
 use crate::fit::FitWarning;
 use crate::input::log;
 use crate::input::stage::Stage;
-use crate::judge::{Decoded, Zeros};
+use crate::judge::{Decoded, Judgement, Zeros};
 use crate::output::blob_file;
 use crate::problem::model::Model;
 use crate::report::json::of_eval;
 use crate::report::text;
 use clap::{Args, ValueEnum};
+use runtime::ParameterSet;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -37,9 +40,37 @@ pub(super) struct EvalArgs {
     /// Zero deviations; as the blob's model has them if not given: models (12) and (15) have none.
     #[arg(long, value_enum)]
     delta: Option<DeltaChoice>,
+    /// Largest rms error, in terms of that of the logs that the blob was fitted to.
+    #[arg(long, value_name = "FACTOR", default_value_t = 3.0, value_parser = factor)]
+    limit: f64,
     /// Write the figures as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+}
+
+fn factor(value: &str) -> Result<f64, &'static str> {
+    let number = value.parse().ok();
+    (number.filter(|factor: &f64| factor.is_finite() && *factor > 0.0))
+        .ok_or("a factor above zero is needed")
+}
+
+/// The largest error in terms of the blob's own, if that is beyond the limit; the blob of an exact fit
+/// has none to compare with.
+fn beyond_limit(set: &ParameterSet, judgement: &Judgement, limit: f64) -> Option<HostError> {
+    const AXES: [(&str, &str); 3] = [("X", "um"), ("Y", "um"), ("Rz", "urad")];
+    let ratio = |axis: usize| judgement.errors.axes[axis].rms / f64::from(set.fit.rms[axis]);
+    let worst = (0..3)
+        .filter(|&axis| set.fit.rms[axis] > 0.0)
+        .max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
+    let (axis, unit) = AXES[worst];
+    (ratio(worst) > limit).then(|| HostError::BeyondLimit {
+        axis,
+        unit,
+        error: judgement.errors.axes[worst].rms * 1e6,
+        own: f64::from(set.fit.rms[worst]) * 1e6,
+        limit,
+        cause: String::new(),
+    })
 }
 
 /// Judges a blob on logs with reference.
@@ -72,6 +103,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
             judgement.zeros.len()
         ));
     }
+    circumstances.findings = diagnose::causes::causes(&log.dataset, &stage);
     let report = of_eval(&set, &judgement, zeros, &circumstances);
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
@@ -90,5 +122,16 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         ))?;
     }
     super::warn(&report.warnings);
-    Ok(())
+    let mut beyond = beyond_limit(&set, &judgement, args.limit);
+    if let Some(HostError::BeyondLimit { cause, .. }) = &mut beyond {
+        let found = diagnose::messages(&report.findings, Severity::Warn);
+        *cause = if found.is_empty() {
+            found
+        } else {
+            format!(". {found}")
+        };
+    } else {
+        super::tell(&report.findings, &report.warnings);
+    }
+    beyond.map_or(Ok(()), Err)
 }

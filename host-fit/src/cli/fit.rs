@@ -2,6 +2,8 @@
 
 use super::args::Train;
 use crate::cli::error::HostError;
+use crate::diagnose;
+use crate::diagnose::finding::Severity;
 use crate::fit::{Fit, FitError, FitSettings, ModelChoice, fit, fit_compensated};
 use crate::input::log;
 use crate::input::log::{BadRows, LogReading, ReadOptions};
@@ -14,7 +16,7 @@ use crate::problem::model::MODELS;
 use crate::problem::parameters::Parameters;
 use crate::recalibrate::Known;
 use crate::report::html::{Page, Plot};
-use crate::report::json::{Choice, Report, of_fit};
+use crate::report::json::{Choice, Circumstances, Report, of_fit};
 use crate::report::{plots, text};
 use crate::solve::{Projection, SolveError, Solver, SolverOptions};
 use clap::Args;
@@ -169,6 +171,11 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     } else {
         fit(&log.dataset, &stage, &settings)
     };
+    let findings = if interrupt::requested() {
+        Vec::new()
+    } else {
+        diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
+    };
     let fit = match fitted {
         Err(error) if interrupt::requested() => {
             return Err(HostError::Interrupted {
@@ -182,9 +189,13 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
                 problem: error.to_string(),
             });
         }
-        result => result?,
+        Err(error) => return Err(super::check::failed(error, &findings)),
+        Ok(fit) => fit,
     };
-    let circumstances = super::circumstances(&log, &stage, started);
+    let circumstances = Circumstances {
+        findings,
+        ..super::circumstances(&log, &stage, started)
+    };
     let (solver, project) = match fit.field {
         Some(_) => (Solver::LeastSquares, Projection::Linear),
         None => (args.solver, args.project),
@@ -196,6 +207,16 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         lag_compensated: args.compensate_lag,
     };
     let report = of_fit(&fit, choice, &circumstances);
+    let refused = diagnose::messages(&report.findings, Severity::Refuse);
+    if !refused.is_empty() {
+        if let Some(path) = &args.json {
+            super::write_json(&report, path)?;
+        }
+        super::warn(&report.warnings);
+        return Err(HostError::Refused {
+            findings: format!("{refused}. No parameter blob was written"),
+        });
+    }
     if let (Some(field), Some(path)) = (&fit.field, &posterior) {
         posterior_file::write(path, &fit.set, &Known::of_fit(field))?;
     }
@@ -213,6 +234,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         super::print(&format!("wrote {}\n", args.out.display()))?;
     }
     super::warn(&report.warnings);
+    super::tell(&report.findings, &report.warnings);
     if interrupt::requested() {
         return Err(HostError::Interrupted {
             kept: format!("{} holds the best so far", args.out.display()),

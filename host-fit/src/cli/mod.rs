@@ -2,6 +2,7 @@
 //! One file a command; the work is the library's.
 
 mod args;
+mod check;
 mod compare;
 mod decode;
 mod demo;
@@ -18,6 +19,7 @@ mod replay;
 mod simulate;
 
 use crate::cli::error::HostError;
+use crate::diagnose::finding::{Finding, Severity};
 use crate::input::log::{LogReading, ReadOptions, ReferenceUse};
 use crate::input::stage::Stage;
 use crate::output::write_atomically;
@@ -31,8 +33,8 @@ use std::time::Instant;
 
 /// Calibrates the Hall-sensor array of a 6-DOF precision stage from logged data.
 ///
-/// Exit status: 0 good; 2 wrong usage; 3 bad input or output; 4 the fit failed its own checks, or no
-/// run can be planned; 130 interrupted, best so far kept.
+/// Exit status: 0 good; 2 wrong usage; 3 bad input or output; 4 the fit failed its own checks, a log
+/// is refused or not described, or no run can be planned; 130 interrupted, best so far kept.
 #[derive(Debug, Parser)]
 #[command(name = "host-fit", version, max_term_width = 100)]
 struct Cli {
@@ -48,6 +50,8 @@ enum Command {
     Demo(demo::DemoArgs),
     /// Fit a calibration to one or more logs and write the parameter blob.
     Fit(Box<fit::FitArgs>),
+    /// Tell what is wrong with one or more logs, or with stage.toml; nothing is kept.
+    Check(check::CheckArgs),
     /// Judge a parameter blob on one or more logs with reference.
     Eval(eval::EvalArgs),
     /// Decode a log with a parameter blob, by the code that runs on the target.
@@ -83,6 +87,7 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Demo(args) => demo::run(&args),
         Command::Fit(args) => fit::run(&args),
+        Command::Check(args) => check::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Decode(args) => decode::run(&args),
         Command::Inspect(args) => inspect::run(&args),
@@ -118,6 +123,20 @@ fn warn(warnings: &[String]) {
     for warning in warnings {
         // A closed standard error is no reason to fail.
         let _ = writeln!(std::io::stderr(), "warning: {warning}");
+    }
+}
+
+/// Writes findings to standard error, but for those that `told` holds already and for refusals, which
+/// end the command.
+fn tell(findings: &[Finding], told: &[String]) {
+    for finding in findings {
+        let severity = match finding.severity {
+            Severity::Note => "note",
+            Severity::Warn if !told.contains(&finding.message) => "warning",
+            Severity::Warn | Severity::Refuse => continue,
+        };
+        // A closed standard error is no reason to fail.
+        let _ = writeln!(std::io::stderr(), "{severity}: {}", finding.message);
     }
 }
 
@@ -213,5 +232,6 @@ fn circumstances<'s>(log: &'s LogReading, stage: &'s Stage, started: Instant) ->
         skipped_rows: log.skipped_rows,
         elapsed_s: started.elapsed().as_secs_f64(),
         warnings: log.warnings.iter().map(ToString::to_string).collect(),
+        findings: Vec::new(),
     }
 }

@@ -126,7 +126,10 @@ fn named(
         Some(place) if place > PLACE_MAX_M && plain.within_um <= WORSE_MAX * plain.free_um => {
             "as it is, the sensitivity does not follow the height at the probes".to_owned()
         }
-        _ => format!("as it is, {:.2} um are left", plain.within_um),
+        _ if plain.within_um.is_finite() => {
+            format!("as it is, {:.2} um are left", plain.within_um)
+        }
+        _ => "as it is, not at all".to_owned(),
     };
     let span = if hypothesis.factor.is_some() {
         format!(
@@ -322,7 +325,7 @@ impl<'a> Trials<'a> {
         let options = SolverOptions::new(Projection::Linear, 1);
         let starts = [middle_of_the_box(&within)];
         let rms = |cost: f64| within.fitness(cost);
-        let limited = solve_from(&starts, &within, &options).ok()?;
+        let limited = solve_from(&starts, &within, &options);
         let free = Problem {
             stage: self.unlimited,
             rows: within.rows.clone(),
@@ -331,7 +334,7 @@ impl<'a> Trials<'a> {
         };
         let free = solve_from(&starts, &free, &options).ok()?;
         Some(Trial {
-            within_um: rms(limited.cost),
+            within_um: limited.map_or(f64::INFINITY, |solution| rms(solution.cost)),
             free_um: rms(free.cost),
             place_m: self.place_m(&free.parameters),
             free: free.parameters,

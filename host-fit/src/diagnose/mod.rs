@@ -6,11 +6,13 @@
 //! | [`hypothesis`] | mistakes that labs make, and how to undo each |
 //! | [`causes`] | which of them alone explains a log |
 //! | [`zeros`] | zero deviations beyond their range |
+//! | [`logs`] | logs that contradict each other |
 //! | [`of_fit`] | what a fit says of itself |
 
 pub mod causes;
 pub mod finding;
 pub mod hypothesis;
+pub mod logs;
 pub mod of_fit;
 pub mod zeros;
 
@@ -22,6 +24,7 @@ use finding::{Finding, Severity};
 /// Everything that is wrong with a log, the gravest first; `fitted` is what came of the fit to it.
 pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Vec<Finding> {
     let mut findings = causes::causes(dataset, stage);
+    findings.extend(logs::disagreement(dataset, stage));
     if let Ok(fit) = fitted {
         findings.extend(of_fit::findings(fit));
     }
@@ -29,10 +32,9 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     findings
 }
 
-/// The messages of those findings that keep a calibration from being written.
-pub fn refusals(findings: &[Finding]) -> Vec<String> {
-    let refused = findings
-        .iter()
-        .filter(|finding| finding.severity == Severity::Refuse);
-    refused.map(|finding| finding.message.clone()).collect()
+/// The messages of the findings of at least this severity, one after the other.
+pub fn messages(findings: &[Finding], least: Severity) -> String {
+    let grave = findings.iter().filter(|finding| finding.severity >= least);
+    let messages: Vec<&str> = grave.map(|finding| finding.message.as_str()).collect();
+    messages.join(". ")
 }

@@ -1,5 +1,6 @@
 //! The machine-readable report of `fit`, `eval` and `inspect`.
 
+use crate::diagnose::finding::Finding;
 use crate::fit::Fit;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
@@ -8,7 +9,6 @@ use crate::judge::{Judgement, Zeros};
 use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::Parameters;
 use crate::report::field::FieldReport;
-use crate::report::finding::{self, Finding};
 use crate::solve::field::parameters::values_of;
 use crate::solve::field::terms::{self, PER_PROBE};
 use runtime::ParameterSet;
@@ -238,7 +238,7 @@ pub struct Report {
     pub zero_deviations: Vec<MovementZero>,
     /// What the user should know.
     pub warnings: Vec<String>,
-    /// What the fit found about the log; none for `eval`.
+    /// What a diagnosis of the log found, the gravest first.
     pub findings: Vec<Finding>,
 }
 
@@ -255,6 +255,8 @@ pub struct Circumstances<'a> {
     pub elapsed_s: f64,
     /// Warnings from reading.
     pub warnings: Vec<String>,
+    /// What a diagnosis of the log found, the gravest first.
+    pub findings: Vec<Finding>,
 }
 
 fn movement_zeros(judgement: &Judgement, dataset: &Dataset) -> Vec<MovementZero> {
@@ -333,7 +335,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         serial: fit.set.serial.as_str().to_owned(),
         zero_deviations: movement_zeros(&fit.judgement, c.dataset),
         warnings,
-        findings: finding::of_fit(fit),
+        findings: c.findings.clone(),
     }
 }
 
@@ -373,6 +375,6 @@ pub fn of_eval(
         serial: set.serial.as_str().to_owned(),
         zero_deviations: movement_zeros(judgement, c.dataset),
         warnings: c.warnings.clone(),
-        findings: Vec::new(),
+        findings: c.findings.clone(),
     }
 }

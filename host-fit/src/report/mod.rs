@@ -1,7 +1,6 @@
 //! What a fit, a judgement or a plan shows: JSON, text tables, plots, an HTML page.
 
 pub mod field;
-pub mod finding;
 pub mod html;
 pub mod json;
 pub mod plan;

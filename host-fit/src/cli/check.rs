@@ -1,0 +1,137 @@
+//! `host-fit check`.
+
+use crate::cli::error::HostError;
+use crate::diagnose;
+use crate::diagnose::finding::{Finding, Severity};
+use crate::fit::{FitError, FitSettings, ModelChoice, fit};
+use crate::input::log;
+use crate::input::log::ReadOptions;
+use crate::input::stage::Stage;
+use crate::interrupt;
+use crate::problem::draw::Draw;
+use crate::report::text;
+use crate::solve::{Projection, Solver, SolverOptions};
+use clap::Args;
+use runtime::parameters::Text;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+pub(super) struct CheckArgs {
+    /// Logs: CSV or CSV.gz, one or more.
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// The stage as designed.
+    #[arg(long, value_name = "stage.toml")]
+    stage: PathBuf,
+    /// Write what was found as JSON; `-` for standard output.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// What `check` reports.
+#[derive(Debug, Serialize)]
+struct Checked {
+    rows: usize,
+    movements: usize,
+    skipped_rows: usize,
+    /// Why there is no fit; null if there is one.
+    failure: Option<String>,
+    warnings: Vec<String>,
+    findings: Vec<Finding>,
+}
+
+/// The end of a run whose fit failed, with what the diagnosis found.
+pub(super) fn failed(error: FitError, findings: &[Finding]) -> HostError {
+    let findings = diagnose::messages(findings, Severity::Warn);
+    if findings.is_empty() {
+        HostError::Fit(error)
+    } else {
+        HostError::FitDiagnosed { error, findings }
+    }
+}
+
+/// Reads and fits, keeps nothing, and tells what was found.
+pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
+    let mut inputs = vec![args.stage.as_path()];
+    inputs.extend(args.logs.iter().map(PathBuf::as_path));
+    super::keep_apart(&[args.json.as_deref()], &inputs)?;
+    interrupt::watch();
+    let stage = Stage::from_file(&args.stage)?;
+    let log = log::read(&args.logs, &stage, &ReadOptions::default())?;
+    let mut options = SolverOptions::new(Projection::Linear, 1);
+    options.interrupt = Some(interrupt::watch());
+    let settings = FitSettings {
+        model: ModelChoice::Auto,
+        train: None,
+        draw: Draw::Stratified,
+        solver: Solver::LeastSquares,
+        options,
+        serial: Text::default(),
+        created: Text::default(),
+    };
+    let fitted = fit(&log.dataset, &stage, &settings);
+    if interrupt::requested() {
+        return Err(HostError::Interrupted {
+            kept: "nothing was written".to_owned(),
+        });
+    }
+    let checked = Checked {
+        rows: log.dataset.rows.len(),
+        movements: log.dataset.movements.len(),
+        skipped_rows: log.skipped_rows,
+        failure: fitted.as_ref().err().map(ToString::to_string),
+        warnings: log.warnings.iter().map(ToString::to_string).collect(),
+        findings: diagnose::of_log(&log.dataset, &stage, fitted.as_ref()),
+    };
+    if let Some(path) = &args.json {
+        super::write_json(&checked, path)?;
+    }
+    if !super::is_standard_output(args.json.as_deref()) {
+        super::print(&format!(
+            "{} rows in {} movements\n",
+            checked.rows, checked.movements
+        ))?;
+        if let Ok(fit) = &fitted {
+            super::print(&text::errors(
+                &format!("errors of {}", fit.model.title()),
+                &fit.judgement.errors,
+                None,
+            ))?;
+        }
+        super::print(&as_text(&checked.findings))?;
+    }
+    super::warn(&checked.warnings);
+    if let Err(error) = fitted {
+        return Err(failed(error, &checked.findings));
+    }
+    let findings = diagnose::messages(&checked.findings, Severity::Refuse);
+    if findings.is_empty() {
+        Ok(())
+    } else {
+        Err(HostError::Refused { findings })
+    }
+}
+
+fn as_text(findings: &[Finding]) -> String {
+    if findings
+        .iter()
+        .all(|finding| finding.severity == Severity::Note)
+    {
+        return "nothing is wrong with it\n".to_owned() + &lines(findings);
+    }
+    lines(findings)
+}
+
+fn lines(findings: &[Finding]) -> String {
+    let line = |finding: &Finding| {
+        let severity = match finding.severity {
+            Severity::Note => "note",
+            Severity::Warn => "warning",
+            Severity::Refuse => "refused",
+        };
+        format!("{severity}: {}\n", finding.message)
+    };
+    findings.iter().map(line).collect()
+}
