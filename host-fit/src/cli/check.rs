@@ -2,12 +2,13 @@
 
 use crate::cli::error::HostError;
 use crate::diagnose;
-use crate::diagnose::finding::{Finding, Severity};
+use crate::diagnose::finding::{Code, Finding, Severity};
 use crate::fit::{FitError, FitSettings, ModelChoice, fit};
 use crate::input::log;
 use crate::input::log::ReadOptions;
 use crate::input::stage::Stage;
 use crate::interrupt;
+use crate::judge::identify::FitFailure;
 use crate::problem::draw::Draw;
 use crate::report::text;
 use crate::solve::{Projection, Solver, SolverOptions};
@@ -44,11 +45,16 @@ struct Checked {
 
 /// The end of a run whose fit failed, with what the diagnosis found.
 pub(super) fn failed(error: FitError, findings: &[Finding]) -> HostError {
+    let explained = (findings.iter())
+        .any(|found| found.severity == Severity::Refuse || found.code == Code::ZeroClipped);
     let findings = diagnose::messages(findings, Severity::Warn);
-    if findings.is_empty() {
-        HostError::Fit(error)
-    } else {
-        HostError::FitDiagnosed { error, findings }
+    match error {
+        error if findings.is_empty() => HostError::Fit(error),
+        // Its list of what may be wrong is for those whose cause is not known.
+        FitError::Failed(FitFailure::NotDescribed { .. }) if explained => {
+            HostError::Refused { findings }
+        }
+        error => HostError::FitDiagnosed { error, findings },
     }
 }
 

@@ -98,7 +98,7 @@ pub enum HostError {
         findings: String,
     },
     /// The calibration would be wrong: nothing was written.
-    #[error("the log is refused: {findings}")]
+    #[error("the log is refused, and no parameter blob was written: {findings}")]
     Refused {
         /// The messages of the findings.
         findings: String,

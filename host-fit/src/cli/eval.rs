@@ -12,7 +12,7 @@ use crate::problem::model::Model;
 use crate::report::json::of_eval;
 use crate::report::text;
 use clap::{Args, ValueEnum};
-use runtime::ParameterSet;
+use runtime::{ModelKind, ParameterSet};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -88,7 +88,8 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         Some(DeltaChoice::Fit) => Zeros::Refit,
         Some(DeltaChoice::Zero) => Zeros::None,
     };
-    let judgement = Decoded::new(&set, &log.dataset).judge(&log.dataset, &stage, zeros);
+    let decoded = Decoded::new(&set, &log.dataset);
+    let judgement = decoded.judge(&log.dataset, &stage, zeros);
     let mut circumstances = super::circumstances(&log, &stage, started);
     if judgement.undecoded > 0 {
         let undecoded = FitWarning::Undecoded {
@@ -104,6 +105,8 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         ));
     }
     circumstances.findings = diagnose::causes::causes(&log.dataset, &stage);
+    let out_of_range = diagnose::range::out_of_range(&set, &log.dataset);
+    circumstances.findings.extend(out_of_range);
     let report = of_eval(&set, &judgement, zeros, &circumstances);
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
@@ -122,11 +125,19 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         ))?;
     }
     super::warn(&report.warnings);
-    let mut beyond = beyond_limit(&set, &judgement, args.limit);
+    // As the blob's own errors were counted, whatever --delta says.
+    let own_zeros = Zeros::of_model(Model::of(set.model));
+    let comparable = decoded.judge(&log.dataset, &stage, own_zeros);
+    let mut beyond = beyond_limit(&set, &comparable, args.limit);
     if let Some(HostError::BeyondLimit { cause, .. }) = &mut beyond {
         let found = diagnose::messages(&report.findings, Severity::Warn);
+        let remedy = if set.model == ModelKind::Field {
+            "bring the blob up to date with host-fit recalibrate"
+        } else {
+            "take the field model, from a log in which all six axes move at once"
+        };
         *cause = if found.is_empty() {
-            found
+            format!(". If channels and scales are right, {remedy}")
         } else {
             format!(". {found}")
         };

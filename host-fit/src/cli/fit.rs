@@ -213,9 +213,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
             super::write_json(&report, path)?;
         }
         super::warn(&report.warnings);
-        return Err(HostError::Refused {
-            findings: format!("{refused}. No parameter blob was written"),
-        });
+        return Err(HostError::Refused { findings: refused });
     }
     if let (Some(field), Some(path)) = (&fit.field, &posterior) {
         posterior_file::write(path, &fit.set, &Known::of_fit(field))?;

@@ -7,6 +7,7 @@
 //! | [`causes`] | which of them alone explains a log |
 //! | [`zeros`] | zero deviations beyond their range |
 //! | [`logs`] | logs that contradict each other |
+//! | [`range`] | poses beyond the range of a calibration |
 //! | [`of_fit`] | what a fit says of itself |
 
 pub mod causes;
@@ -14,6 +15,7 @@ pub mod finding;
 pub mod hypothesis;
 pub mod logs;
 pub mod of_fit;
+pub mod range;
 pub mod zeros;
 
 use crate::fit::{Fit, FitError};
@@ -26,7 +28,7 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     let mut findings = causes::causes(dataset, stage);
     findings.extend(logs::disagreement(dataset, stage));
     if let Ok(fit) = fitted {
-        findings.extend(of_fit::findings(fit));
+        findings.extend(of_fit::findings(fit, dataset));
     }
     findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     findings

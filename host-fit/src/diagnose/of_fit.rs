@@ -2,11 +2,18 @@
 
 use super::finding::{Code, Finding, Severity};
 use crate::fit::{Fit, FitWarning};
+use crate::input::dataset::Dataset;
 use runtime::ModelKind;
 
-/// The warnings of a fit, and why it is not the field model.
-pub fn findings(fit: &Fit) -> Vec<Finding> {
+/// Errors beyond this many times their white noise are not the drift of an interferometer.
+const ERROR_TO_NOISE_MAX: f64 = 3.0;
+/// Noise below this, m or rad, is rounding.
+const NOISE_MIN: f64 = 0.05e-6;
+
+/// The warnings of a fit, why it is not the field model, and what it leaves unexplained.
+pub fn findings(fit: &Fit, dataset: &Dataset) -> Vec<Finding> {
     let mut findings: Vec<Finding> = fit.warnings.iter().filter_map(of_warning).collect();
+    findings.extend(unexplained(fit, dataset));
     if fit.model.kind != ModelKind::Field && fit.field.is_none() {
         findings.push(Finding {
             message: fit.model_reason.clone(),
@@ -15,6 +22,44 @@ pub fn findings(fit: &Fit) -> Vec<Finding> {
         });
     }
     findings
+}
+
+/// Errors far above the noise from sample to sample.
+fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
+    const AXES: [(&str, &str, &str); 3] =
+        [("x", "X", "um"), ("y", "Y", "um"), ("rz", "Rz", "urad")];
+    let errors = fit.decoded.errors_less(&fit.judgement.zeros, dataset);
+    let mut squares = [0.0; 3];
+    let mut count = 0.0;
+    for movement in &dataset.movements {
+        for three in errors[movement.rows.clone()].windows(3) {
+            let [Some(before), Some(here), Some(after)] = three else {
+                continue;
+            };
+            for axis in 0..3 {
+                squares[axis] += (before[axis] - 2.0 * here[axis] + after[axis]).powi(2);
+            }
+            count += 6.0;
+        }
+    }
+    let noise = squares.map(|sum: f64| (sum / f64::max(count, 1.0)).sqrt().max(NOISE_MIN));
+    let ratio = |axis: usize| fit.judgement.errors.axes[axis].rms / noise[axis];
+    let worst = (0..3).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
+    let (channel, axis, unit) = AXES[worst];
+    let rms = fit.judgement.errors.axes[worst].rms * 1e6;
+    (ratio(worst) > ERROR_TO_NOISE_MAX).then(|| Finding {
+        message: format!(
+            "{} leaves {rms:.2} {unit} rms in {axis}, {:.1} times the noise from sample to sample: something in the log is not \
+             in the model. With all six axes moving at once take --model field or auto; else see the other findings, and the \
+             errors over the log in the report",
+            fit.model.title(),
+            ratio(worst)
+        ),
+        channel: Some(channel.to_owned()),
+        value: Some(rms),
+        unit: Some(unit),
+        ..finding(Code::ModelLacks)
+    })
 }
 
 /// A warning of a fit; `None` for clipped zero deviations, which [`super::zeros`] names.
