@@ -40,9 +40,10 @@ pub(super) struct EvalArgs {
     /// Zero deviations; as the blob's model has them if not given: models (12) and (15) have none.
     #[arg(long, value_enum)]
     delta: Option<DeltaChoice>,
-    /// Largest rms error, in terms of that of the logs that the blob was fitted to.
-    #[arg(long, value_name = "FACTOR", default_value_t = 3.0, value_parser = factor)]
-    limit: f64,
+    /// Largest rms error, in terms of that of the logs that the blob was fitted to: 3 if not given,
+    /// and 30 for models (12) to (31), whose own logs may not show what they lack.
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    limit: Option<f64>,
     /// Write the figures as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -128,7 +129,8 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     // As the blob's own errors were counted, whatever --delta says.
     let own_zeros = Zeros::of_model(Model::of(set.model));
     let comparable = decoded.judge(&log.dataset, &stage, own_zeros);
-    let mut beyond = beyond_limit(&set, &comparable, args.limit);
+    let usual = if set.model == ModelKind::Field { 3.0 } else { 30.0 };
+    let mut beyond = beyond_limit(&set, &comparable, args.limit.unwrap_or(usual));
     if let Some(HostError::BeyondLimit { cause, .. }) = &mut beyond {
         let found = diagnose::messages(&report.findings, Severity::Warn);
         let remedy = if set.model == ModelKind::Field {

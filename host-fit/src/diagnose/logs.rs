@@ -1,7 +1,8 @@
 //! Whether the logs of one fit are of one stage in one state: each is fitted alone.
 
-use super::causes::{Trial, Trials, unlimited, zeros_free};
 use super::finding::{Code, Finding, Severity};
+use super::trials::{Trial, Trials, unlimited, zeros_free};
+use super::warning;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::identify::check_motion;
@@ -59,18 +60,15 @@ pub fn disagreement(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
         dataset.logs[alone[0].0].path.display()
     );
     Some(Finding {
-        code: Code::LogsDisagree,
         severity: if worst > GAIN_REFUSED {
             Severity::Refuse
         } else {
             Severity::Warn
         },
         message,
-        channel: None,
-        movement: None,
-        t_us: None,
         value: Some(worst * 100.0),
         unit: Some("%"),
+        ..warning(Code::LogsDisagree)
     })
 }
 

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`finding`] | a finding: code, severity, place, size |
 //! | [`hypothesis`] | mistakes that labs make, and how to undo each |
+//! | [`trials`] | how well a log fits with one undone |
 //! | [`causes`] | which of them alone explains a log |
 //! | [`zeros`] | zero deviations beyond their range |
 //! | [`logs`] | logs that contradict each other |
@@ -16,12 +17,13 @@ pub mod hypothesis;
 pub mod logs;
 pub mod of_fit;
 pub mod range;
+pub mod trials;
 pub mod zeros;
 
 use crate::fit::{Fit, FitError};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
-use finding::{Finding, Severity};
+use finding::{Code, Finding, Severity};
 
 /// Everything that is wrong with a log, the gravest first; `fitted` is what came of the fit to it.
 pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Vec<Finding> {
@@ -39,4 +41,18 @@ pub fn messages(findings: &[Finding], least: Severity) -> String {
     let grave = findings.iter().filter(|finding| finding.severity >= least);
     let messages: Vec<&str> = grave.map(|finding| finding.message.as_str()).collect();
     messages.join(". ")
+}
+
+/// A warning without message, place and size.
+const fn warning(code: Code) -> Finding {
+    Finding {
+        code,
+        severity: Severity::Warn,
+        message: String::new(),
+        channel: None,
+        movement: None,
+        t_us: None,
+        value: None,
+        unit: None,
+    }
 }

@@ -1,6 +1,7 @@
 //! What a fit says of itself, as findings.
 
 use super::finding::{Code, Finding, Severity};
+use super::warning;
 use crate::fit::{Fit, FitWarning};
 use crate::input::dataset::Dataset;
 use runtime::ModelKind;
@@ -18,7 +19,7 @@ pub fn findings(fit: &Fit, dataset: &Dataset) -> Vec<Finding> {
         findings.push(Finding {
             message: fit.model_reason.clone(),
             severity: Severity::Note,
-            ..finding(Code::ModelLacks)
+            ..warning(Code::ModelLacks)
         });
     }
     findings
@@ -58,30 +59,30 @@ fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
         channel: Some(channel.to_owned()),
         value: Some(rms),
         unit: Some(unit),
-        ..finding(Code::ModelLacks)
+        ..warning(Code::ModelLacks)
     })
 }
 
 /// A warning of a fit; `None` for clipped zero deviations, which [`super::zeros`] names.
-pub fn of_warning(warning: &FitWarning) -> Option<Finding> {
-    let message = warning.to_string();
-    let found = match warning {
+pub fn of_warning(told: &FitWarning) -> Option<Finding> {
+    let message = told.to_string();
+    let found = match told {
         FitWarning::ZeroDeviationClipped { .. } => return None,
         FitWarning::AtLimit { id, value } => Finding {
             value: Some(*value),
             unit: Some(id.term.unit),
             channel: Some(format!("hall_{}", ["a", "b", "c"][id.probe])),
-            ..finding(Code::TermsAtLimit)
+            ..warning(Code::TermsAtLimit)
         },
         FitWarning::VerticalTermsAtLimit { count } => Finding {
             value: Some(*count as f64),
             unit: Some(""),
-            ..finding(Code::TermsAtLimit)
+            ..warning(Code::TermsAtLimit)
         },
         FitWarning::MovementsMissed { movements } => Finding {
             value: Some(movements.len() as f64),
             unit: Some("movements"),
-            ..finding(Code::RowsMissing)
+            ..warning(Code::RowsMissing)
         },
         FitWarning::WildRow {
             axis,
@@ -96,32 +97,30 @@ pub fn of_warning(warning: &FitWarning) -> Option<Finding> {
             t_us: Some(*t_us),
             value: Some(*error_micro),
             unit: Some(unit),
-            ..finding(Code::Outliers)
+            ..warning(Code::Outliers)
         },
         FitWarning::ReferenceLags { lag_s, .. } => Finding {
             channel: Some("ifm".to_owned()),
             value: Some(lag_s * 1e6),
             unit: Some("us"),
-            ..finding(Code::ReferenceLag)
+            ..warning(Code::ReferenceLag)
+        },
+        FitWarning::NarrowLog {
+            axis,
+            unit,
+            moved_micro,
+            ..
+        } => Finding {
+            channel: Some((*axis).to_owned()),
+            value: Some(*moved_micro),
+            unit: Some(unit),
+            ..warning(Code::OutOfRange)
         },
         FitWarning::Undecoded { rows } => Finding {
             value: Some(*rows as f64),
             unit: Some("rows"),
-            ..finding(Code::Saturated)
+            ..warning(Code::Saturated)
         },
     };
     Some(Finding { message, ..found })
-}
-
-fn finding(code: Code) -> Finding {
-    Finding {
-        code,
-        severity: Severity::Warn,
-        message: String::new(),
-        channel: None,
-        movement: None,
-        t_us: None,
-        value: None,
-        unit: None,
-    }
 }

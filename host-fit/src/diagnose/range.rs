@@ -1,6 +1,7 @@
 //! Poses beyond the range of a calibration.
 
-use super::finding::{Code, Finding, Severity};
+use super::finding::{Code, Finding};
+use super::warning;
 use crate::input::dataset::Dataset;
 use runtime::ParameterSet;
 
@@ -14,17 +15,15 @@ pub fn out_of_range(set: &ParameterSet, dataset: &Dataset) -> Option<Finding> {
     let first = rows.next()?;
     let count = 1 + rows.count();
     Some(Finding {
-        code: Code::OutOfRange,
-        severity: Severity::Warn,
         message: format!(
             "{count} of {} rows are beyond the range of the logs that the parameter blob was fitted to, where it is extrapolated: \
              fit it to logs of the whole range of service",
             dataset.rows.len()
         ),
-        channel: None,
         movement: (dataset.movements.get(first.movement)).map(|m| dataset.movement_name(m)),
         t_us: Some(first.t_us),
         value: Some(count as f64),
         unit: Some("rows"),
+        ..warning(Code::OutOfRange)
     })
 }

@@ -1,6 +1,7 @@
 //! Zero deviations beyond their range.
 
-use super::finding::{Code, Finding, Severity};
+use super::finding::{Code, Finding};
+use super::warning;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::problem::Problem;
@@ -36,8 +37,6 @@ pub(super) fn clipped(
         .collect();
     let dots = if beyond.len() > SHOWN { ", ..." } else { "" };
     Some(Finding {
-        code: Code::ZeroClipped,
-        severity: Severity::Warn,
         message: format!(
             "the zero deviation of {} of {} movements ({}{dots}) leaves its range of {:.0} to {:.0} um, at most by movement \
              {worst}, {most_um:.1} um at a probe: reset the interferometers nearer to zero before each movement, or widen \
@@ -49,10 +48,9 @@ pub(super) fn clipped(
             range.high * 1e6,
             wide = (1.2 * most_um / 10.0).ceil() * 10.0,
         ),
-        channel: None,
         movement: Some(worst.clone()),
-        t_us: None,
         value: Some(most_um),
         unit: Some("um"),
+        ..warning(Code::ZeroClipped)
     })
 }
