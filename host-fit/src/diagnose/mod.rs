@@ -10,6 +10,7 @@
 //! | [`logs`] | logs that contradict each other |
 //! | [`range`] | poses beyond the range of a calibration |
 //! | [`of_fit`] | what a fit says of itself |
+//! | [`signals`] | what the signals tell by themselves |
 
 pub mod causes;
 pub mod finding;
@@ -17,6 +18,7 @@ pub mod hypothesis;
 pub mod logs;
 pub mod of_fit;
 pub mod range;
+pub mod signals;
 pub mod trials;
 pub mod zeros;
 
@@ -29,6 +31,10 @@ use finding::{Code, Finding, Severity};
 pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Vec<Finding> {
     let mut findings = causes::causes(dataset, stage);
     findings.extend(logs::disagreement(dataset, stage));
+    let errors = fitted
+        .ok()
+        .map(|fit| fit.decoded.errors_less(&fit.judgement.zeros, dataset));
+    findings.extend(signals::signal_findings(dataset, stage, errors.as_deref()));
     if let Ok(fit) = fitted {
         findings.extend(of_fit::findings(fit, dataset));
     }

@@ -1,0 +1,236 @@
+//! The signals of one log, channel by channel.
+
+use crate::diagnose::finding::{Code, Finding, Severity};
+use crate::input::dataset::{Dataset, Movement, Row};
+use crate::input::stage::Stage;
+use std::ops::Range;
+
+/// Names of the Hall probes and the beams.
+pub(super) const HALL: [&str; 3] = ["hall_a", "hall_b", "hall_c"];
+pub(super) const BEAMS: [&str; 3] = ["ifm_x", "ifm_y1", "ifm_y2"];
+const CAPACITIVE: [&str; 3] = ["cap_1", "cap_2", "cap_3"];
+
+/// One channel of a log.
+pub(super) struct Channel {
+    pub(super) name: &'static str,
+    /// By row, m.
+    pub(super) values: Vec<f64>,
+    /// m per code; 0 for a beam.
+    pub(super) m_per_code: f64,
+}
+
+/// One log. Rows are numbered from its first.
+pub(super) struct LogSignals<'a> {
+    dataset: &'a Dataset,
+    pub(super) rows: &'a [Row],
+    /// Its movements; their rows are those of the dataset.
+    pub(super) movements: Vec<&'a Movement>,
+    /// Rows of the log between resets and steps of the reference.
+    pub(super) segments: Vec<Range<usize>>,
+    /// Hall A, B, C; X, Y1, Y2; then the gaps where the log has codes.
+    pub(super) channels: Vec<Channel>,
+    /// Whether a row is used by the tests of residuals.
+    pub(super) usable: Vec<bool>,
+    /// Time since the start of the log, s; a movement whose time starts anew follows the one before.
+    pub(super) time_s: Vec<f64>,
+    /// Distance of the Y beams, m.
+    pub(super) baseline_m: f64,
+    /// Median time between rows, s.
+    pub(super) period_s: f64,
+    first: usize,
+}
+
+impl<'a> LogSignals<'a> {
+    pub(super) fn new(dataset: &'a Dataset, stage: &Stage, log: usize) -> Self {
+        let range = dataset.logs[log].rows.clone();
+        let rows = &dataset.rows[range.clone()];
+        let movements: Vec<&Movement> = (dataset.movements.iter())
+            .filter(|movement| movement.log == log)
+            .collect();
+        let segments: Vec<Range<usize>> = (movements.iter())
+            .map(|movement| movement.rows.start - range.start..movement.rows.end - range.start)
+            .collect();
+        let period_s = period_s(rows, &segments, stage.servo_period_s);
+        Self {
+            channels: channels(rows, stage),
+            usable: vec![true; rows.len()],
+            time_s: times_s(rows, &segments, period_s),
+            baseline_m: stage.y_baseline_m,
+            first: range.start,
+            dataset,
+            rows,
+            movements,
+            segments,
+            period_s,
+        }
+    }
+
+    pub(super) const fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Rows of a movement of [`movements`](Self::movements).
+    pub(super) fn rows_of(&self, movement: &Movement) -> Range<usize> {
+        movement.rows.start - self.first..movement.rows.end - self.first
+    }
+
+    /// How many rows last this long, at least one.
+    pub(super) fn rows_in(&self, time_s: f64) -> usize {
+        ((time_s / self.period_s).round() as usize).max(1)
+    }
+
+    pub(super) fn leave_out_undecoded(&mut self, errors: &[Option<[f64; 3]>]) {
+        let errors = errors.get(self.first..).unwrap_or_default();
+        for (usable, error) in self.usable.iter_mut().zip(errors) {
+            *usable &= error.is_some();
+        }
+    }
+
+    /// Begins a new segment at a row.
+    pub(super) fn split_at(&mut self, row: usize) {
+        let found = (self.segments.iter()).position(|s| s.start < row && row < s.end);
+        if let Some(index) = found {
+            let end = self.segments[index].end;
+            self.segments[index].end = row;
+            self.segments.insert(index + 1, row..end);
+        }
+    }
+
+    /// The movement of a row, by name.
+    pub(super) fn movement_name(&self, row: usize) -> String {
+        let movement = &self.dataset.movements[self.rows[row].movement];
+        self.dataset.movement_name(movement)
+    }
+
+    /// "movement 3 at t_us = 4000".
+    pub(super) fn place(&self, row: usize) -> String {
+        let t_us = self.rows[row].t_us;
+        format!("movement {} at t_us = {t_us}", self.movement_name(row))
+    }
+
+    /// The first places of many, in words.
+    pub(super) fn places(&self, rows: &[usize]) -> String {
+        const SHOWN: usize = 3;
+        let shown: Vec<String> = (rows.iter().take(SHOWN)).map(|&r| self.place(r)).collect();
+        let dots = if rows.len() > SHOWN { ", ..." } else { "" };
+        shown.join(", ") + dots
+    }
+
+    /// A warning about the whole log, or several of its movements.
+    pub(super) fn warning(&self, code: Code, message: String) -> Finding {
+        let message = match self.dataset.logs.len() {
+            1 => message,
+            _ => {
+                let log = self.rows.first().map(|row| row.movement);
+                let log = log.map(|movement| self.dataset.movements[movement].log);
+                let path = log.map(|log| self.dataset.logs[log].path.display().to_string());
+                format!("{}: {message}", path.unwrap_or_default())
+            }
+        };
+        Finding {
+            code,
+            severity: Severity::Warn,
+            message,
+            channel: None,
+            movement: None,
+            t_us: None,
+            value: None,
+            unit: None,
+        }
+    }
+
+    /// A warning about a place in the log.
+    pub(super) fn warning_at(&self, code: Code, row: usize, message: String) -> Finding {
+        Finding {
+            movement: Some(self.movement_name(row)),
+            t_us: Some(self.rows[row].t_us),
+            ..self.warning(code, message)
+        }
+    }
+}
+
+fn channels(rows: &[Row], stage: &Stage) -> Vec<Channel> {
+    let half_m = 0.5 * stage.y_baseline_m;
+    let mut channels = Vec::with_capacity(9);
+    for (i, name) in HALL.into_iter().enumerate() {
+        channels.push(Channel {
+            name,
+            values: rows.iter().map(|row| row.signal_m[i]).collect(),
+            m_per_code: stage.hall.m_per_count,
+        });
+    }
+    for (i, name) in BEAMS.into_iter().enumerate() {
+        let beam = |row: &Row| {
+            let [x, y, rz] = row.reference;
+            [x, y + half_m * rz.tan(), y - half_m * rz.tan()][i]
+        };
+        channels.push(Channel {
+            name,
+            values: rows.iter().map(beam).collect(),
+            m_per_code: 0.0,
+        });
+    }
+    let m_per_code = stage.capacitive.m_per_count;
+    for (i, name) in CAPACITIVE.into_iter().enumerate() {
+        let gap = |row: &Row| Some(f64::from(row.frame.capacitive()?[i]) * m_per_code);
+        if let Some(values) = rows.iter().map(gap).collect() {
+            channels.push(Channel {
+                name,
+                values,
+                m_per_code,
+            });
+        }
+    }
+    channels
+}
+
+fn period_s(rows: &[Row], segments: &[Range<usize>], servo_period_s: f64) -> f64 {
+    let steps = (segments.iter()).flat_map(|s| rows[s.clone()].windows(2));
+    let mut steps_us: Vec<i64> = steps.map(|pair| pair[1].t_us - pair[0].t_us).collect();
+    if steps_us.is_empty() {
+        return servo_period_s;
+    }
+    let middle = steps_us.len() / 2;
+    (*steps_us.select_nth_unstable(middle).1 as f64 * 1e-6).max(1e-6)
+}
+
+fn times_s(rows: &[Row], segments: &[Range<usize>], period_s: f64) -> Vec<f64> {
+    let mut times_s: Vec<f64> = Vec::with_capacity(rows.len());
+    for segment in segments {
+        let rows_here = &rows[segment.clone()];
+        let Some(first) = rows_here.first() else {
+            continue;
+        };
+        let start_s = match (times_s.last(), segment.start.checked_sub(1)) {
+            (Some(&before_s), Some(before)) if rows[before].t_us < first.t_us => {
+                before_s + (first.t_us - rows[before].t_us) as f64 * 1e-6
+            }
+            (Some(&before_s), _) => before_s + period_s,
+            (None, _) => 0.0,
+        };
+        times_s.extend((rows_here.iter()).map(|r| start_s + (r.t_us - first.t_us) as f64 * 1e-6));
+    }
+    times_s
+}
+
+/// The median; 0 of nothing.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Standard deviation of normal numbers about zero from their median magnitude.
+pub(super) fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
+    let mut magnitudes: Vec<f64> = values.map(f64::abs).collect();
+    1.4826 * median(&mut magnitudes)
+}
+
+/// Largest less smallest.
+pub(super) fn spread(values: &[f64]) -> f64 {
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    (high - low).max(0.0)
+}
