@@ -8,6 +8,8 @@ use std::ops::Range;
 /// Names of the Hall probes and the beams.
 pub(super) const HALL: [&str; 3] = ["hall_a", "hall_b", "hall_c"];
 pub(super) const BEAMS: [&str; 3] = ["ifm_x", "ifm_y1", "ifm_y2"];
+/// Finer than any interferometer reads.
+const BEAM_GRID_M: f64 = 1e-11;
 const CAPACITIVE: [&str; 3] = ["cap_1", "cap_2", "cap_3"];
 
 /// One channel of a log.
@@ -162,7 +164,9 @@ fn channels(rows: &[Row], stage: &Stage) -> Vec<Channel> {
     for (i, name) in BEAMS.into_iter().enumerate() {
         let beam = |row: &Row| {
             let [x, y, rz] = row.reference;
-            [x, y + half_m * rz.tan(), y - half_m * rz.tan()][i]
+            // Through the pose and back equal beams would differ by rounding.
+            let beam_m = [x, y + half_m * rz.tan(), y - half_m * rz.tan()][i];
+            (beam_m / BEAM_GRID_M).round() * BEAM_GRID_M
         };
         channels.push(Channel {
             name,

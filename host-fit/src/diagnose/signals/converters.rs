@@ -5,7 +5,7 @@ use crate::diagnose::finding::{Code, Finding};
 use std::ops::Range;
 
 /// Equal codes in a row that noise does not give at an extreme.
-const RUN_MIN: usize = 5;
+const RUN_MIN: usize = 8;
 /// Codes by which the signal changes beside a flat top, and within how many rows: a signal that
 /// rests at its extreme is no flat top.
 const EDGE_CODES: f64 = 10.0;

@@ -108,11 +108,13 @@ impl Noise {
         let drift = steps.iter().sum::<f64>() / count;
         let squares: f64 = steps.iter().map(|step| (step - drift).powi(2)).sum();
         let of_white = 2.0 * white_m * white_m / log.rows_in(BLOCK_S) as f64;
-        let variance = squares / (count - 1.0).max(1.0) - of_white;
+        let variance = squares / (count - 1.0).max(1.0);
+        // Noise that is not white leaves less in the means than white noise of its size.
+        let variance_m2 = (variance - of_white).max(0.5 * variance);
         // Means over neighbouring blocks of a walk differ by two thirds of its variance.
         Self {
             white_m,
-            walk_m2_per_s: variance.max(0.0) / (2.0 / 3.0 * BLOCK_S),
+            walk_m2_per_s: variance_m2 / (2.0 / 3.0 * BLOCK_S),
         }
     }
 
@@ -184,6 +186,7 @@ fn of_drifts(
     if drifting.len() > 1 {
         // A Y beam shows in all probes, in a ratio that only it has.
         let size: f64 = drifts.iter().map(|drift| drift.value * drift.value).sum();
+        let mut best = (LEFT_SHARE * LEFT_SHARE * size, None);
         for (beam, name) in BEAMS.into_iter().enumerate() {
             let shape: [f64; 3] = std::array::from_fn(|i| residuals.slope(i, 3 + beam));
             let norm: f64 = shape.iter().map(|s| s * s).sum();
@@ -191,9 +194,12 @@ fn of_drifts(
             let left: f64 = (0..3)
                 .map(|i| (drifts[i].value - along * shape[i]).powi(2))
                 .sum();
-            if left < LEFT_SHARE * LEFT_SHARE * size {
-                return vec![of_drift(log, name, along, "")];
+            if left < best.0 {
+                best = (left, Some(of_drift(log, name, along, "")));
             }
+        }
+        if let Some(beam) = best.1 {
+            return vec![beam];
         }
     }
     let beam = |i: usize| {

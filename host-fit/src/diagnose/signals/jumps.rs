@@ -20,13 +20,6 @@ const BEAM_JUMP_MIN_M: f64 = 0.3e-6;
 /// Steps of a channel that are told one by one.
 const SHOWN: usize = 3;
 
-/// Names outliers and leaves them out; names steps and begins a segment at each.
-pub(super) fn findings(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
-    let mut findings = outliers(log, residuals);
-    findings.extend(steps(log, residuals));
-    findings
-}
-
 /// By how much a channel jumps from the row before to a row, beyond its motion: m.
 fn jump_m(values: &[f64], segment: &Range<usize>, row: usize) -> f64 {
     if row < segment.start + 2 || row + 1 >= segment.end {
@@ -78,7 +71,14 @@ fn jumping(
     most
 }
 
-fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
+/// How far a row is from the mean of its neighbours, m.
+fn off_neighbours_m(values: &[f64], row: usize) -> f64 {
+    let around = [row.saturating_sub(1), (row + 1).min(values.len() - 1)];
+    (values[row] - 0.5 * (values[around[0]] + values[around[1]])).abs()
+}
+
+/// Names rows far outside the noise, by channel, and leaves them out.
+pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     // By row: the residual farthest off, m.
     let mut found: BTreeMap<usize, (f64, usize)> = BTreeMap::new();
     for (probe, values) in residuals.values.iter().enumerate() {
@@ -89,7 +89,7 @@ fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
                     row.saturating_sub(SIDE).max(segment.start)..(row + SIDE + 1).min(segment.end);
                 // Cheap first: most rows are near the mean of their neighbours.
                 let near = [rows.start, rows.end - 1].map(|r| (values[row] - values[r]).abs());
-                if near[0].min(near[1]) < limit_m / 2.0 {
+                if near[0].max(near[1]) < limit_m / 2.0 {
                     continue;
                 }
                 let used = rows.filter(|&r| log.usable[r]);
@@ -107,11 +107,10 @@ fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
         let segment = log.segments.iter().find(|s| s.contains(&row));
         let jump = segment.and_then(|segment| jumping(log, &noise_m, segment, row..row + 2));
         let (channel, size_m) = match jump {
-            Some((channel, ..)) if (3..6).contains(&channel) => (
+            Some((channel, ..)) if channel >= 3 => (
                 channel,
-                off_m / residuals.slope(probe, channel).abs().max(0.1),
+                off_neighbours_m(&log.channels[channel].values, row),
             ),
-            Some((channel, _, jump_m)) if channel >= 6 => (channel, jump_m.abs() / 1.5),
             _ => (probe, off_m),
         };
         let rows = by_channel.entry(log.channels[channel].name).or_default();
@@ -160,7 +159,8 @@ fn shift_m(log: &LogSignals, values: &[f64], segment: &Range<usize>, row: usize)
 /// A step: channel, row, size in m.
 type Step = (usize, usize, f64);
 
-fn steps(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
+/// Names steps, the largest of each channel, and begins a segment at each.
+pub(super) fn steps(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let shifts: [Vec<f64>; 3] = std::array::from_fn(|probe| {
         let values = &residuals.values[probe];
         let mut shifts = vec![0.0; log.len()];

@@ -81,12 +81,14 @@ fn of_log(
             None => return,
         }
     }
-    let jumps = jumps::findings(&mut signals, &residuals);
-    if !jumps.is_empty() {
-        findings.extend(jumps);
-        match Residuals::new(&signals, &units) {
-            Some(again) => residuals = again,
-            None => return,
+    for test in [jumps::outliers, jumps::steps] {
+        let jumps = test(&mut signals, &residuals);
+        if !jumps.is_empty() {
+            findings.extend(jumps);
+            match Residuals::new(&signals, &units) {
+                Some(again) => residuals = again,
+                None => return,
+            }
         }
     }
     findings.extend(spectrum::hum(&signals, &residuals));

@@ -20,6 +20,7 @@ const RIDGE: f64 = 1e-8;
 pub(super) struct Units {
     planar: [f64; 3],
     vertical: [f64; 3],
+    /// Half as much again as it usually is: a jump is no velocity.
     velocity: [f64; 3],
 }
 
@@ -31,6 +32,7 @@ impl Units {
             vertical: [1e-12; 3],
             velocity: [1e-12; 3],
         };
+        let mut speeds: [Vec<f64>; 3] = Default::default();
         for segment in &log.segments {
             for row in segment.clone().filter(|&row| log.usable[row]) {
                 let velocity = velocity(log, segment, row);
@@ -38,8 +40,15 @@ impl Units {
                     let raise = |unit: &mut f64, x: f64| *unit = unit.max(x.abs());
                     raise(&mut units.planar[i], log.rows[row].reference[i]);
                     raise(&mut units.vertical[i], log.rows[row].vertical[i]);
-                    raise(&mut units.velocity[i], velocity[i]);
+                    speeds[i].push(velocity[i].abs());
                 }
+            }
+        }
+        for (unit, speeds) in units.velocity.iter_mut().zip(&mut speeds) {
+            let high = speeds.len() * 19 / 20;
+            if high < speeds.len() {
+                let usual = *speeds.select_nth_unstable_by(high, f64::total_cmp).1;
+                *unit = unit.max(1.5 * usual);
             }
         }
         units
@@ -62,7 +71,7 @@ impl Units {
             count += 1;
         };
         q.iter().chain(&v).for_each(|&x| push(x));
-        (0..3).for_each(|i| push(speed[i] / self.velocity[i]));
+        (0..3).for_each(|i| push((speed[i] / self.velocity[i]).clamp(-1.0, 1.0)));
         for i in 0..3 {
             for j in 0..3 {
                 push(q[i] * v[j]);

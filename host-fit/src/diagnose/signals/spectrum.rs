@@ -20,6 +20,10 @@ const LOWEST_HZ: f64 = 10.0;
 const OF_MOTION: f64 = 8.0;
 /// Amplitude in parts of the noise of a probe from which a line is worth a warning.
 const WARN_MIN: f64 = 0.3;
+/// Amplitude of a sideband in parts of its line, at most.
+const SIDEBAND: f64 = 0.3;
+/// Lines that are told.
+const LINES_MAX: usize = 5;
 
 /// Mean power spectrum over windows with a Hann taper.
 struct Spectrum {
@@ -110,52 +114,39 @@ pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let resolution_hz = 1.0 / (length as f64 * log.period_s);
     let lowest_hz = (OF_MOTION * motion_bin(&raw) as f64 * resolution_hz).max(LOWEST_HZ);
     let lowest = ((lowest_hz / resolution_hz) as usize).max(4);
+    let mut lines: Vec<(usize, usize, f64)> = (lowest..(length / 2).saturating_sub(2))
+        .flat_map(|bin| [0, 1, 2].map(|probe| (bin, probe)))
+        .filter(|&(bin, probe)| left[probe].is_line(bin))
+        .map(|(bin, probe)| (bin, probe, left[probe].amplitude(bin)))
+        .collect();
+    lines.sort_by(|a, b| b.2.total_cmp(&a.2));
+    let mut named: Vec<(&'static str, usize, f64)> = Vec::new();
     let mut findings: Vec<Finding> = Vec::new();
-    let mut named: Vec<(&'static str, usize)> = Vec::new();
-    for bin in lowest..(length / 2).saturating_sub(2) {
-        for probe in 0..3 {
-            if !left[probe].is_line(bin) {
-                continue;
-            }
-            let amplitude_m = left[probe].amplitude(bin);
-            let (name, size_m) = source(&raw, residuals, probe, bin, amplitude_m);
-            if named
-                .iter()
-                .any(|&(other, at)| other == name && at.abs_diff(bin) < 3)
-            {
-                continue;
-            }
-            named.push((name, bin));
-            findings.push(finding(
-                log,
-                &left[probe],
-                bin,
-                name,
-                size_m,
-                residuals.noise_m[probe],
-                amplitude_m,
-            ));
+    for (bin, probe, amplitude_m) in lines {
+        let (name, size_m) = source(&raw, residuals, probe, bin, amplitude_m);
+        // The motion modulates a line: sidebands are no lines of their own.
+        let known = (named.iter()).any(|&(other, at, largest_m)| {
+            let (apart, sideband) = (at.abs_diff(bin), amplitude_m < SIDEBAND * largest_m);
+            (other == name && apart < 3) || (apart < lowest && sideband)
+        });
+        if known || named.len() == LINES_MAX {
+            continue;
         }
+        named.push((name, bin, amplitude_m));
+        let small = amplitude_m < WARN_MIN * residuals.noise_m[probe];
+        let frequency_hz = left[probe].frequency_hz(bin, log.period_s);
+        findings.push(finding(log, name, frequency_hz, size_m, small));
     }
     findings
 }
 
-fn finding(
-    log: &LogSignals,
-    spectrum: &Spectrum,
-    bin: usize,
-    name: &str,
-    size_m: f64,
-    noise_m: f64,
-    amplitude_m: f64,
-) -> Finding {
-    let frequency_hz = spectrum.frequency_hz(bin, log.period_s);
+fn finding(log: &LogSignals, name: &str, frequency_hz: f64, size_m: f64, small: bool) -> Finding {
     let message = format!(
         "{name} hums at {frequency_hz:.1} Hz with an amplitude of {:.2} um: look for mains (50 or 60 Hz and multiples) in \
          its cable and supply, or for a vibration of that part",
         size_m * 1e6,
     );
-    let severity = if amplitude_m < WARN_MIN * noise_m {
+    let severity = if small {
         Severity::Note
     } else {
         Severity::Warn

@@ -14,9 +14,11 @@ const STRETCH: usize = 250;
 /// A movement stands still within this, m.
 const IDLE_M: f64 = 2e-6;
 /// A channel stands still if it moves by less than this share of what it moves elsewhere.
-const STILL_SHARE: f64 = 0.03;
+const STILL_SHARE: f64 = 0.01;
 /// Residual that shows that it should have moved, m.
 const MISSED_M: f64 = 3e-6;
+/// Length of the stretches in which a channel stands still, s.
+const STANDING_S: f64 = 0.5;
 /// Length of a rest after a crash, s, of the stretches it is looked for in, and the share of
 /// the usual speed that the stage has just before it.
 const REST_S: f64 = 0.2;
@@ -62,9 +64,7 @@ pub(super) fn frozen(log: &mut LogSignals) -> Vec<Finding> {
         }
     }
     let findings = of_runs(log, &runs);
-    for row in runs.into_iter().flat_map(|(_, run)| run) {
-        log.usable[row] = false;
-    }
+    leave_out(log, runs.into_iter().map(|(_, run)| run));
     findings
 }
 
@@ -197,31 +197,25 @@ fn sudden_rest(log: &LogSignals, rows: &Range<usize>) -> Option<Range<usize>> {
 pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut left_out: Vec<Range<usize>> = Vec::new();
-    let length = log.rows_in(0.5);
+    let length = log.rows_in(STANDING_S);
     let stretches: Vec<Range<usize>> = (log.segments.iter())
         .flat_map(|s| {
-            (s.start..s.end)
-                .step_by(length)
-                .map(|start| start..(start + length).min(s.end))
+            let end = s.end;
+            (s.clone().step_by(length)).map(move |start| start..(start + length).min(end))
         })
         .filter(|stretch| stretch.len() > length / 2)
         .collect();
-    // A channel that stands still is missed by every probe that it concerns.
-    let missed = |channel: usize, stretch: &Range<usize>| {
-        let concerned = (0..3).filter(|&probe| residuals.slope(probe, channel).abs() > 0.3);
-        let off = concerned.map(|probe| spread(&residuals.values[probe][stretch.clone()]));
-        off.reduce(f64::min).unwrap_or(0.0)
-    };
-    let noise_free_m = 16.0 * residuals.noise_m.iter().copied().fold(0.0, f64::max);
+    let noise_m = residuals.noise_m.iter().copied().fold(0.0, f64::max);
+    let missed_m = MISSED_M + 8.0 * noise_m;
     for (channel, name) in HALL.into_iter().chain(BEAMS).enumerate() {
-        let noise_m = 8.0 * residuals.noise_m.get(channel).copied().unwrap_or(0.0);
         let values = &log.channels[channel].values;
-        let moves = |stretch: &Range<usize>| spread(&values[stretch.clone()]);
-        let most = stretches.iter().map(moves).fold(0.0, f64::max);
+        let range = |stretch: &Range<usize>| usual_spread(&values[stretch.clone()]);
+        let most = stretches.iter().map(range).fold(0.0, f64::max);
+        let noise_m = 4.0 * residuals.noise_m.get(channel).copied().unwrap_or(0.0);
         let stands = |stretch: &&Range<usize>| {
-            moves(stretch) < (STILL_SHARE * most).max(noise_m)
-                && missed(channel, stretch) > 2.0 * MISSED_M + noise_free_m
-                && log.usable[stretch.start]
+            log.usable[stretch.start]
+                && range(stretch) < (STILL_SHARE * most).max(noise_m)
+                && is_missed(log, residuals, channel, stretch, missed_m)
         };
         let still: Vec<&Range<usize>> = stretches.iter().filter(stands).collect();
         let Some(first) = still.first() else {
@@ -236,8 +230,50 @@ pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
         findings.push(stuck(log, &[name], &run));
         left_out.extend(still.into_iter().cloned());
     }
-    for row in left_out.into_iter().flatten() {
-        log.usable[row] = false;
-    }
+    leave_out(log, left_out);
     findings
+}
+
+/// Whether the others say that a channel moves. A probe is missed in its own residual alone; a
+/// beam in those of all probes that it concerns, which move themselves.
+fn is_missed(
+    log: &LogSignals,
+    residuals: &Residuals,
+    channel: usize,
+    stretch: &Range<usize>,
+    missed_m: f64,
+) -> bool {
+    let off_m = |probe: usize| usual_spread(&residuals.values[probe][stretch.clone()]);
+    if channel < 3 {
+        let own_m = off_m(channel);
+        let others_m = (0..3)
+            .filter(|&i| i != channel)
+            .map(off_m)
+            .fold(0.0, f64::max);
+        return own_m > missed_m && others_m < 0.3 * own_m;
+    }
+    let mut concerned = (0..3).filter(|&probe| residuals.slope(probe, channel).abs() > 0.3);
+    concerned.all(|probe| {
+        let moves_m = usual_spread(&log.channels[probe].values[stretch.clone()]);
+        off_m(probe) > missed_m && moves_m > missed_m
+    })
+}
+
+/// Between the ninth part from below and from above: outliers do not count.
+fn usual_spread(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    values.sort_unstable_by(f64::total_cmp);
+    let ninth = values.len() / 9;
+    match (values.get(ninth), values.get(values.len() - 1 - ninth)) {
+        (Some(low), Some(high)) => high - low,
+        _ => 0.0,
+    }
+}
+
+/// Leaves rows out, with those beside them, whose velocity is not that of the motion.
+fn leave_out(log: &mut LogSignals, runs: impl IntoIterator<Item = Range<usize>>) {
+    let rows = log.usable.len();
+    for run in runs {
+        log.usable[run.start.saturating_sub(2)..(run.end + 2).min(rows)].fill(false);
+    }
 }
