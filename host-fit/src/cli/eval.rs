@@ -129,7 +129,11 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     // As the blob's own errors were counted, whatever --delta says.
     let own_zeros = Zeros::of_model(Model::of(set.model));
     let comparable = decoded.judge(&log.dataset, &stage, own_zeros);
-    let usual = if set.model == ModelKind::Field { 3.0 } else { 30.0 };
+    let usual = if set.model == ModelKind::Field {
+        3.0
+    } else {
+        30.0
+    };
     let mut beyond = beyond_limit(&set, &comparable, args.limit.unwrap_or(usual));
     if let Some(HostError::BeyondLimit { cause, .. }) = &mut beyond {
         let found = diagnose::messages(&report.findings, Severity::Warn);

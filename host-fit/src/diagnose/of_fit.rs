@@ -116,17 +116,6 @@ pub fn of_warning(told: &FitWarning) -> Option<Finding> {
             unit: Some(unit),
             ..warning(Code::OutOfRange)
         },
-        FitWarning::NarrowLog {
-            axis,
-            unit,
-            moved_micro,
-            ..
-        } => Finding {
-            channel: Some((*axis).to_owned()),
-            value: Some(*moved_micro),
-            unit: Some(unit),
-            ..finding(Code::OutOfRange)
-        },
         FitWarning::Undecoded { rows } => Finding {
             value: Some(*rows as f64),
             unit: Some("rows"),
