@@ -11,7 +11,6 @@ use host_fit::input::dataset::{Dataset, LogSource, LoggedFrame, Movement, Row};
 use host_fit::input::shipped::STAGE_TOML;
 use host_fit::input::stage::Stage;
 use host_fit::problem::Problem;
-use host_fit::problem::draw::Draw;
 use host_fit::problem::model::Model;
 use host_fit::problem::parameters::Parameters;
 use host_fit::simulate::assembly::Assembly;
@@ -25,7 +24,6 @@ use host_fit::solve::field::parameters::FieldParameters;
 use host_fit::solve::field::probe::probes;
 use host_fit::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
 use host_fit::solve::{Projection, Solver, SolverOptions};
-use runtime::parameters::Text;
 use runtime::{ModelKind, RawFrame, VerticalPose};
 use std::error::Error;
 use std::f64::consts::TAU;
@@ -305,15 +303,7 @@ fn against_model_31(stage: &Stage, motion: Motion, logs: u64) -> Fallible<(f64, 
     for seed in 0..logs {
         let (assembly, dataset) = recorded(stage, motion, seed)?;
         let model_31 = FieldParameters::of_model_31(&model_31(&dataset, stage)?, stage);
-        let settings = FitSettings {
-            model: ModelChoice::Auto,
-            train: None,
-            draw: Draw::Stratified,
-            solver: Solver::LeastSquares,
-            options: SolverOptions::new(Projection::Linear, 1),
-            serial: Text::new(),
-            created: Text::new(),
-        };
+        let settings = FitSettings::new(ModelChoice::Auto);
         let auto = match fit(&dataset, stage, &settings)?.field {
             Some(field) => {
                 taken += 1;

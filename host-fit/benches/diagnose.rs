@@ -10,13 +10,10 @@ use host_fit::input::dataset::{Dataset, LogSource, Movement, Row};
 use host_fit::input::shipped::STAGE_TOML;
 use host_fit::input::stage::Stage;
 use host_fit::plan::plan;
-use host_fit::problem::draw::Draw;
 use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
 use host_fit::simulate::recording::{Recording, Sample, record};
 use host_fit::simulate::sensors::SensorErrors;
-use host_fit::solve::{Projection, Solver, SolverOptions};
-use runtime::parameters::Text;
 use std::path::Path;
 
 /// Clean stages: each makes one of the three kinds of log.
@@ -87,15 +84,7 @@ fn clean(stage: &Stage, planned: &Trajectory) {
     for seed in 1..=CLEAN {
         let recording = recording(stage, planned, seed);
         let dataset = recording.dataset(stage).expect("a plane");
-        let settings = FitSettings {
-            model: ModelChoice::Auto,
-            train: None,
-            draw: Draw::Stratified,
-            solver: Solver::LeastSquares,
-            options: SolverOptions::new(Projection::Linear, 1),
-            serial: Text::default(),
-            created: Text::default(),
-        };
+        let settings = FitSettings::new(ModelChoice::Auto);
         let fitted = fit(&dataset, stage, &settings);
         let found = diagnose::of_log(&dataset, stage, fitted.as_ref());
         let grave: Vec<_> = (found.iter())

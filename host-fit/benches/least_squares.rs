@@ -156,15 +156,7 @@ fn main() {
         median_ms(9, || drop(read()))
     );
     let dataset = read().dataset;
-    let settings = FitSettings {
-        model: ModelChoice::Named(Model::of(ModelKind::M31)),
-        train: None,
-        draw: Draw::Stratified,
-        solver: Solver::LeastSquares,
-        options: SolverOptions::new(Projection::Linear, 1),
-        serial: runtime::parameters::Text::new(),
-        created: runtime::parameters::Text::new(),
-    };
+    let settings = FitSettings::new(ModelChoice::Named(Model::of(ModelKind::M31)));
     let whole = median_ms(9, || {
         fit(&dataset, &stage, &settings).expect("a fit");
     });

@@ -57,6 +57,24 @@ pub struct FitSettings {
     pub serial: Text,
     /// Creation time, for the blob.
     pub created: Text,
+    /// Keep a fit that leaves most of the motion unexplained, which is else refused.
+    pub keep_undescribed: bool,
+}
+
+impl FitSettings {
+    /// All rows by least squares, with seed 1, for a blob without serial number and creation time.
+    pub fn new(model: ModelChoice) -> Self {
+        Self {
+            model,
+            train: None,
+            draw: Draw::Stratified,
+            solver: Solver::LeastSquares,
+            options: SolverOptions::new(Projection::Linear, 1),
+            serial: Text::default(),
+            created: Text::default(),
+            keep_undescribed: false,
+        }
+    }
 }
 
 /// Why there is no calibration.
@@ -280,13 +298,16 @@ impl<'a> Job<'a> {
         let mut set = calibration.prepare(&origin).map_err(FitError::Unusable)?;
         let decoded = Decoded::new(&set, dataset);
         let judgement = decoded.judge(dataset, self.stage, Zeros::of_model(model));
-        check_described(dataset, &judgement.errors, model)?;
+        if !settings.keep_undescribed {
+            check_described(dataset, &judgement.errors, model)?;
+        }
         let axes = judgement.errors.axes;
         set.fit = FitRecord {
             rows: u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX),
             train_rows: u32::try_from(self.selected.len()).unwrap_or(u32::MAX),
             rms: axes.map(|a| a.rms as f32),
             peak: axes.map(|a| a.peak as f32),
+            forced: false,
         };
         Ok(Judged {
             set,

@@ -242,6 +242,7 @@ pub fn recalibrate(
         train_rows: rows,
         rms: axes.map(|a| a.rms as f32),
         peak: axes.map(|a| a.peak as f32),
+        forced: old.fit.forced,
     };
     let gains = update.gains(&old_parameters);
     let before = |k: usize| {

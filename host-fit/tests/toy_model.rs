@@ -12,7 +12,6 @@ use host_fit::input::stage::{Range, Stage};
 use host_fit::judge::identify::{FitFailure, check_determined, check_motion};
 use host_fit::judge::uncertainty::uncertainty;
 use host_fit::problem::Problem;
-use host_fit::problem::draw::Draw;
 use host_fit::problem::model::{Model, SLOPES_MAX};
 use host_fit::problem::parameters::Parameters;
 use host_fit::problem::synthetic::Protocol;
@@ -22,7 +21,6 @@ use host_fit::solve::search::kind::SearchKind;
 use host_fit::solve::{Projection, Solver, SolverOptions};
 use runtime::ModelKind;
 use runtime::geometry::ProbeGeometry;
-use runtime::parameters::Text;
 
 const D: Term = Term {
     name: "d",
@@ -195,15 +193,7 @@ fn standard_errors_checks_and_json_know_the_term() {
 fn fit_refuses_what_no_decoder_has_and_terms_without_a_range() {
     let stage = stage();
     let dataset = log(&stage);
-    let settings = FitSettings {
-        model: ModelChoice::Named(&TOY),
-        train: None,
-        draw: Draw::Stratified,
-        solver: Solver::LeastSquares,
-        options: SolverOptions::new(Projection::Linear, 1),
-        serial: Text::new(),
-        created: Text::new(),
-    };
+    let settings = FitSettings::new(ModelChoice::Named(&TOY));
     let refused = fit(&dataset, &stage, &settings).map(|fit| fit.solution);
     assert_eq!(refused, Err(FitError::NoDecoder { model: "toy" }));
     let without = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");

@@ -4,7 +4,8 @@
 //! |---|---|---|
 //! | 0 | 4 | magic, `HALL` in ASCII |
 //! | 4 | 2 | layout version, little-endian: 1, or 2 for the field model |
-//! | 6 | 2 | reserved: 0 |
+//! | 6 | 1 | 1 if the fit failed its checks and was written all the same, else 0 |
+//! | 7 | 1 | reserved: 0 |
 //! | 8 | 4 | payload length n in bytes, little-endian |
 //! | 12 | n | payload: the [`ParameterSet`] in postcard |
 //! | 12 + n | 4 | CRC-32C (Castagnoli) of everything before it, little-endian |
@@ -178,7 +179,8 @@ impl ParameterSet {
         let [m0, m1, m2, m3] = MAGIC;
         let [v0, v1] = self.layout_version().to_le_bytes();
         let [n0, n1, n2, n3] = payload_bytes.to_le_bytes();
-        *header = [m0, m1, m2, m3, v0, v1, 0, 0, n0, n1, n2, n3];
+        let forced = u8::from(self.fit.forced);
+        *header = [m0, m1, m2, m3, v0, v1, forced, 0, n0, n1, n2, n3];
         let end = HEADER_BYTES + payload;
         let (body, rest) = buffer.split_at_mut_checked(end).ok_or(too_small)?;
         let check = rest.first_chunk_mut::<CRC_BYTES>().ok_or(too_small)?;
@@ -227,6 +229,7 @@ impl ParameterSet {
         if header.get(4..6) != Some(&set.layout_version().to_le_bytes()) {
             return Err(BlobError::BadPayload);
         }
+        set.fit.forced = header.get(6) == Some(&1);
         layout::check_finite(&mut set).map_err(BlobError::Parameters)?;
         set.check_terms().map_err(BlobError::Parameters)?;
         Ok(set)
@@ -256,7 +259,7 @@ fn blob_length(bytes: &[u8]) -> Result<usize, BlobError> {
     if header.iter().all(|&b| b == 0xff) || header.iter().all(|&b| b == 0) {
         return Err(BlobError::Erased);
     }
-    let [m0, m1, m2, m3, v0, v1, r0, r1, n0, n1, n2, n3] = *header;
+    let [m0, m1, m2, m3, v0, v1, forced, reserved, n0, n1, n2, n3] = *header;
     let found = [m0, m1, m2, m3];
     if found != MAGIC {
         return Err(BlobError::BadMagic { found });
@@ -275,7 +278,7 @@ fn blob_length(bytes: &[u8]) -> Result<usize, BlobError> {
     let payload_bytes = u32::from_le_bytes([n0, n1, n2, n3]);
     let most = largest - HEADER_BYTES - CRC_BYTES;
     match usize::try_from(payload_bytes) {
-        Ok(payload) if payload <= most && [r0, r1] == [0, 0] => {
+        Ok(payload) if payload <= most && forced <= 1 && reserved == 0 => {
             Ok(HEADER_BYTES + payload + CRC_BYTES)
         }
         _ => Err(BlobError::BadHeader { payload_bytes }),

@@ -276,13 +276,32 @@ fn a_length_that_no_blob_has_is_refused() {
             Err(BlobError::BadHeader { payload_bytes })
         );
     }
-    let (mut blob, n) = golden();
-    blob[6] = 1;
-    seal(&mut blob, n - CRC_BYTES);
-    assert!(matches!(
-        ParameterSet::from_flash(&blob),
-        Err(BlobError::BadHeader { .. })
-    ));
+    for (offset, byte) in [(6, 2), (7, 1)] {
+        let (mut blob, n) = golden();
+        blob[offset] = byte;
+        seal(&mut blob, n - CRC_BYTES);
+        assert!(matches!(
+            ParameterSet::from_flash(&blob),
+            Err(BlobError::BadHeader { .. })
+        ));
+    }
+}
+
+#[test]
+fn a_forced_blob_says_so_and_is_else_the_same() {
+    for (golden, n) in goldens() {
+        let sound = ParameterSet::from_bytes(&golden[..n]).expect("golden");
+        let mut forced = sound.clone();
+        forced.fit.forced = true;
+        let mut buffer = [0; MAX_BYTES];
+        let blob = forced.to_bytes(&mut buffer).expect("it fits");
+        assert_eq!(ParameterSet::from_bytes(blob), Ok(forced));
+        assert_eq!((blob[6], golden[6]), (1, 0));
+        assert_eq!(
+            blob[HEADER_BYTES..n - CRC_BYTES],
+            golden[HEADER_BYTES..n - CRC_BYTES]
+        );
+    }
 }
 
 /// With the check made right again, the damage must be found in the payload itself.

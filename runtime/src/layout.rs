@@ -59,6 +59,7 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
         train_rows: _,
         rms,
         peak,
+        forced: _,
     } = fit;
     visit("the fit record", rms);
     visit("the fit record", peak);

@@ -81,6 +81,8 @@ pub struct FitRecord {
     pub rms: [f32; 3],
     /// Peak error of X, Y, Rz: m, m, rad.
     pub peak: [f32; 3],
+    /// Whether the fit failed its checks and was written all the same.
+    pub forced: bool,
 }
 
 /// What is wrong with a parameter set.

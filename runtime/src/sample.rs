@@ -54,6 +54,7 @@ pub(crate) fn origin() -> Origin {
             train_rows: 200,
             rms: [0.95e-6, 0.48e-6, 2.3e-6],
             peak: [4e-6, 2e-6, 10e-6],
+            forced: false,
         },
     }
 }

@@ -2,18 +2,17 @@
 
 use crate::cli::error::HostError;
 use crate::diagnose;
-use crate::diagnose::finding::{Code, Finding, Severity};
-use crate::fit::{FitError, FitSettings, ModelChoice, fit};
+use crate::diagnose::finding::{Finding, Severity};
+use crate::diagnose::trusted::{Trusted, trusted};
+use crate::fit::{Fit, FitError, FitSettings, ModelChoice, fit};
 use crate::input::log;
-use crate::input::log::ReadOptions;
+use crate::input::log::{LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
 use crate::judge::identify::FitFailure;
-use crate::problem::draw::Draw;
 use crate::report::text;
-use crate::solve::{Projection, Solver, SolverOptions};
+use crate::solve::{Projection, SolverOptions};
 use clap::Args;
-use runtime::parameters::Text;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -31,9 +30,9 @@ pub(super) struct CheckArgs {
     json: Option<PathBuf>,
 }
 
-/// What `check` reports.
+/// What is said of a log of which no calibration is kept.
 #[derive(Debug, Serialize)]
-struct Checked {
+pub(super) struct Checked {
     rows: usize,
     movements: usize,
     skipped_rows: usize,
@@ -41,12 +40,31 @@ struct Checked {
     failure: Option<String>,
     warnings: Vec<String>,
     findings: Vec<Finding>,
+    /// The inputs whose errors no log shows, with what 1 % costs; empty without a fit.
+    trusted_inputs: Vec<Trusted>,
+}
+
+impl Checked {
+    pub(super) fn new(
+        log: &LogReading,
+        fitted: Result<&Fit, &FitError>,
+        findings: Vec<Finding>,
+    ) -> Self {
+        Self {
+            rows: log.dataset.rows.len(),
+            movements: log.dataset.movements.len(),
+            skipped_rows: log.skipped_rows,
+            failure: fitted.err().map(ToString::to_string),
+            warnings: log.warnings.iter().map(ToString::to_string).collect(),
+            findings,
+            trusted_inputs: fitted.map_or_else(|_| Vec::new(), |fit| trusted(&fit.set)),
+        }
+    }
 }
 
 /// The end of a run whose fit failed, with what the diagnosis found.
 pub(super) fn failed(error: FitError, findings: &[Finding]) -> HostError {
-    let explained = (findings.iter())
-        .any(|found| found.severity == Severity::Refuse || found.code == Code::ZeroClipped);
+    let explained = diagnose::is_explained(findings);
     let findings = diagnose::messages(findings, Severity::Warn);
     match error {
         error if findings.is_empty() => HostError::Fit(error),
@@ -69,13 +87,8 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     let mut options = SolverOptions::new(Projection::Linear, 1);
     options.interrupt = Some(interrupt::watch());
     let settings = FitSettings {
-        model: ModelChoice::Auto,
-        train: None,
-        draw: Draw::Stratified,
-        solver: Solver::LeastSquares,
         options,
-        serial: Text::default(),
-        created: Text::default(),
+        ..FitSettings::new(ModelChoice::Auto)
     };
     let fitted = fit(&log.dataset, &stage, &settings);
     if interrupt::requested() {
@@ -83,14 +96,8 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
             kept: "nothing was written".to_owned(),
         });
     }
-    let checked = Checked {
-        rows: log.dataset.rows.len(),
-        movements: log.dataset.movements.len(),
-        skipped_rows: log.skipped_rows,
-        failure: fitted.as_ref().err().map(ToString::to_string),
-        warnings: log.warnings.iter().map(ToString::to_string).collect(),
-        findings: diagnose::of_log(&log.dataset, &stage, fitted.as_ref()),
-    };
+    let findings = diagnose::of_log(&log.dataset, &stage, fitted.as_ref());
+    let checked = Checked::new(&log, fitted.as_ref(), findings);
     if let Some(path) = &args.json {
         super::write_json(&checked, path)?;
     }
@@ -107,6 +114,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
             ))?;
         }
         super::print(&as_text(&checked.findings))?;
+        super::print(&text::trusted(&checked.trusted_inputs))?;
     }
     super::warn(&checked.warnings);
     if let Err(error) = fitted {

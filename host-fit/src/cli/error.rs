@@ -103,6 +103,12 @@ pub enum HostError {
         /// The messages of the findings.
         findings: String,
     },
+    /// There is a fit, which must not be used or is not as good as was asked for.
+    #[error("{cause}. No parameter blob was written; --force writes one that says so")]
+    NotWritten {
+        /// Why.
+        cause: String,
+    },
     /// A blob does not describe a log as well as those that it was fitted to.
     #[error(
         "the parameter blob does not describe this log: {error:.2} {unit} rms in {axis}, where it had {own:.2} {unit} in \
@@ -187,6 +193,7 @@ impl HostError {
             Self::Fit(_)
             | Self::FitDiagnosed { .. }
             | Self::Refused { .. }
+            | Self::NotWritten { .. }
             | Self::BeyondLimit { .. }
             | Self::Plan(_)
             | Self::Recalibrate(_) => 4,

@@ -105,9 +105,8 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
             judgement.zeros.len()
         ));
     }
-    circumstances.findings = diagnose::causes::causes(&log.dataset, &stage);
-    let out_of_range = diagnose::range::out_of_range(&set, &log.dataset);
-    circumstances.findings.extend(out_of_range);
+    let errors = decoded.errors_less(&judgement.zeros, &log.dataset);
+    circumstances.findings = diagnose::of_judged(&log.dataset, &stage, &set, &errors);
     let report = of_eval(&set, &judgement, zeros, &circumstances);
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
@@ -148,7 +147,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
             format!(". {found}")
         };
     } else {
-        super::tell(&report.findings, &report.warnings);
+        super::tell(&report.findings);
     }
     beyond.map_or(Ok(()), Err)
 }

@@ -1,9 +1,11 @@
 //! `host-fit fit`.
 
 use super::args::Train;
+use super::check::Checked;
+use super::limit::Limits;
 use crate::cli::error::HostError;
 use crate::diagnose;
-use crate::diagnose::finding::Severity;
+use crate::diagnose::finding::{Finding, Severity};
 use crate::fit::{Fit, FitError, FitSettings, ModelChoice, fit, fit_compensated};
 use crate::input::log;
 use crate::input::log::{BadRows, LogReading, ReadOptions};
@@ -100,6 +102,12 @@ pub(super) struct FitArgs {
     /// What to do with rows that cannot be used.
     #[arg(long, value_enum, default_value = "refuse")]
     bad_rows: BadRows,
+    /// Largest rms errors over all rows; beyond, no blob is written.
+    #[arg(long, value_name = "x=1.5um,...")]
+    limit: Option<Limits>,
+    /// Write the blob of a log that is refused, or of a fit beyond --limit; the blob says so.
+    #[arg(long)]
+    force: bool,
     /// Write a report with plots into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
@@ -162,6 +170,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         options,
         serial: args.serial.clone().unwrap_or_default(),
         created: args.created.clone().unwrap_or_default(),
+        keep_undescribed: args.force,
     };
     let fitted = if args.compensate_lag {
         fit_compensated(&log.dataset, &stage, &settings).map(|(fit, compensated)| {
@@ -176,7 +185,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     } else {
         diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
     };
-    let fit = match fitted {
+    let mut fit = match fitted {
         Err(error) if interrupt::requested() => {
             return Err(HostError::Interrupted {
                 kept: format!("no parameter blob was written: {error}"),
@@ -189,9 +198,16 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
                 problem: error.to_string(),
             });
         }
-        Err(error) => return Err(super::check::failed(error, &findings)),
+        Err(error) => {
+            if let Some(path) = &args.json {
+                super::write_json(&Checked::new(&log, Err(&error), findings.clone()), path)?;
+            }
+            return Err(super::check::failed(error, &findings));
+        }
         Ok(fit) => fit,
     };
+    let refusal = refusal(&fit, &findings, args.limit.as_ref());
+    fit.set.fit.forced = refusal.is_some();
     let circumstances = Circumstances {
         findings,
         ..super::circumstances(&log, &stage, started)
@@ -207,13 +223,18 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         lag_compensated: args.compensate_lag,
     };
     let report = of_fit(&fit, choice, &circumstances);
-    let refused = diagnose::messages(&report.findings, Severity::Refuse);
-    if !refused.is_empty() {
-        if let Some(path) = &args.json {
-            super::write_json(&report, path)?;
+    match refusal {
+        Some(cause) if args.force => {
+            super::warn(&[format!("written all the same, as --force asks: {cause}")]);
         }
-        super::warn(&report.warnings);
-        return Err(HostError::Refused { findings: refused });
+        Some(cause) => {
+            if let Some(path) = &args.json {
+                super::write_json(&report, path)?;
+            }
+            super::tell(&report.findings);
+            return Err(HostError::NotWritten { cause });
+        }
+        None => {}
     }
     if let (Some(field), Some(path)) = (&fit.field, &posterior) {
         posterior_file::write(path, &fit.set, &Known::of_fit(field))?;
@@ -231,14 +252,23 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         super::print(&summary(&fit, &report, &stage))?;
         super::print(&format!("wrote {}\n", args.out.display()))?;
     }
-    super::warn(&report.warnings);
-    super::tell(&report.findings, &report.warnings);
+    super::warn(&circumstances.warnings);
+    super::tell(&report.findings);
     if interrupt::requested() {
         return Err(HostError::Interrupted {
             kept: format!("{} holds the best so far", args.out.display()),
         });
     }
     Ok(())
+}
+
+/// Why a fit is not to be written.
+fn refusal(fit: &Fit, findings: &[Finding], limits: Option<&Limits>) -> Option<String> {
+    let refused = diagnose::messages(findings, Severity::Refuse);
+    if refused.is_empty() {
+        return limits?.exceeded(&fit.judgement.errors);
+    }
+    Some(format!("the log is refused: {refused}"))
 }
 
 /// The field model has one way to be fitted.

@@ -52,6 +52,7 @@ fn as_json(set: &ParameterSet) -> serde_json::Value {
         "fit": {
             "rows": set.fit.rows,
             "train_rows": set.fit.train_rows,
+            "forced": set.fit.forced,
             "errors": {
                 "x": { "rmse_um": set.fit.rms[0] * 1e6, "peak_um": set.fit.peak[0] * 1e6 },
                 "y": { "rmse_um": set.fit.rms[1] * 1e6, "peak_um": set.fit.peak[1] * 1e6 },
@@ -96,6 +97,11 @@ fn as_text(set: &ParameterSet) -> String {
         "rows            {} ({} fitted)",
         set.fit.rows, set.fit.train_rows
     );
+    if set.fit.forced {
+        out.push_str(
+            "FORCED          the fit failed its checks and was written all the same (--force)\n",
+        );
+    }
     let [x, y, rz] = set.fit.rms.map(|e| e * 1e6);
     let _ = writeln!(out, "rms error       {x:.3} um, {y:.3} um, {rz:.3} urad");
     let [x, y, rz] = set.fit.peak.map(|e| e * 1e6);

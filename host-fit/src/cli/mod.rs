@@ -12,6 +12,7 @@ mod export;
 mod fit;
 mod import;
 mod inspect;
+mod limit;
 mod live;
 mod plan;
 mod recalibrate;
@@ -126,14 +127,13 @@ fn warn(warnings: &[String]) {
     }
 }
 
-/// Writes findings to standard error, but for those that `told` holds already and for refusals, which
-/// end the command.
-fn tell(findings: &[Finding], told: &[String]) {
+/// Writes findings to standard error; refusals end the command, which tells them.
+fn tell(findings: &[Finding]) {
     for finding in findings {
         let severity = match finding.severity {
             Severity::Note => "note",
-            Severity::Warn if !told.contains(&finding.message) => "warning",
-            Severity::Warn | Severity::Refuse => continue,
+            Severity::Warn => "warning",
+            Severity::Refuse => continue,
         };
         // A closed standard error is no reason to fail.
         let _ = writeln!(std::io::stderr(), "{severity}: {}", finding.message);

@@ -11,6 +11,7 @@
 //! | [`range`] | poses beyond the range of a calibration |
 //! | [`of_fit`] | what a fit says of itself |
 //! | [`signals`] | what the signals tell by themselves |
+//! | [`trusted`] | the inputs that no log can show to be wrong |
 
 pub mod causes;
 pub mod finding;
@@ -20,26 +21,60 @@ pub mod of_fit;
 pub mod range;
 pub mod signals;
 pub mod trials;
+pub mod trusted;
 pub mod zeros;
 
 use crate::fit::{Fit, FitError};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use finding::{Code, Finding, Severity};
+use runtime::ParameterSet;
 
 /// Everything that is wrong with a log, the gravest first; `fitted` is what came of the fit to it.
+///
+/// What follows from a cause that is named is left out: the terms of a fit to a log with exchanged
+/// channels are at their limits, and its errors are large.
 pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Vec<Finding> {
     let mut findings = causes::causes(dataset, stage);
     findings.extend(logs::disagreement(dataset, stage));
-    let errors = fitted
-        .ok()
-        .map(|fit| fit.decoded.errors_less(&fit.judgement.zeros, dataset));
+    let has_cause = is_explained(&findings);
+    let errors = (fitted.ok()).map(|fit| fit.decoded.errors_less(&fit.judgement.zeros, dataset));
     findings.extend(signals::signal_findings(dataset, stage, errors.as_deref()));
     if let Ok(fit) = fitted {
-        findings.extend(of_fit::findings(fit, dataset));
+        let told = fit.warnings.iter().filter_map(of_fit::of_warning);
+        findings.extend(told.filter(|told| !has_cause || told.code != Code::TermsAtLimit));
+        if !has_cause {
+            findings.extend(of_fit::undescribed(fit, dataset));
+        }
+        if findings.is_empty() {
+            findings.extend(of_fit::unexplained(fit, dataset));
+        }
+        findings.extend(of_fit::not_field(fit));
     }
     findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     findings
+}
+
+/// Everything that is wrong with a log that a blob is judged on; `errors` as in
+/// [`signals::signal_findings`].
+pub fn of_judged(
+    dataset: &Dataset,
+    stage: &Stage,
+    set: &ParameterSet,
+    errors: &[Option<[f64; 3]>],
+) -> Vec<Finding> {
+    let mut findings = causes::causes(dataset, stage);
+    findings.extend(signals::signal_findings(dataset, stage, Some(errors)));
+    findings.extend(range::out_of_range(set, dataset));
+    findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
+    findings
+}
+
+/// Whether they name why a log cannot be fitted as it is.
+pub fn is_explained(findings: &[Finding]) -> bool {
+    let explains =
+        |found: &Finding| found.severity == Severity::Refuse || found.code == Code::ZeroClipped;
+    findings.iter().any(explains)
 }
 
 /// The messages of the findings of at least this severity, one after the other.

@@ -4,6 +4,7 @@ use super::finding::{Code, Finding, Severity};
 use super::warning;
 use crate::fit::{Fit, FitWarning};
 use crate::input::dataset::Dataset;
+use crate::judge::identify::check_described;
 use runtime::ModelKind;
 
 /// Errors beyond this many times their white noise are not the drift of an interferometer.
@@ -11,22 +12,27 @@ const ERROR_TO_NOISE_MAX: f64 = 3.0;
 /// Noise below this, m or rad, is rounding.
 const NOISE_MIN: f64 = 0.05e-6;
 
-/// The warnings of a fit, why it is not the field model, and what it leaves unexplained.
-pub fn findings(fit: &Fit, dataset: &Dataset) -> Vec<Finding> {
-    let mut findings: Vec<Finding> = fit.warnings.iter().filter_map(of_warning).collect();
-    findings.extend(unexplained(fit, dataset));
-    if fit.model.kind != ModelKind::Field && fit.field.is_none() {
-        findings.push(Finding {
-            message: fit.model_reason.clone(),
-            severity: Severity::Note,
-            ..warning(Code::ModelLacks)
-        });
-    }
-    findings
+/// Why a fit is not the field model, where nobody asked for another.
+pub(super) fn not_field(fit: &Fit) -> Option<Finding> {
+    (fit.model.kind == ModelKind::M31).then(|| Finding {
+        message: fit.model_reason.clone(),
+        severity: Severity::Note,
+        ..warning(Code::ModelLacks)
+    })
+}
+
+/// A fit that leaves most of the motion unexplained and was kept all the same.
+pub(super) fn undescribed(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
+    let failure = check_described(dataset, &fit.judgement.errors, fit.model).err()?;
+    Some(Finding {
+        message: failure.to_string(),
+        severity: Severity::Refuse,
+        ..warning(Code::ModelLacks)
+    })
 }
 
 /// Errors far above the noise from sample to sample.
-fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
+pub(super) fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     const AXES: [(&str, &str, &str); 3] =
         [("x", "X", "um"), ("y", "Y", "um"), ("rz", "Rz", "urad")];
     let errors = fit.decoded.errors_less(&fit.judgement.zeros, dataset);
@@ -64,7 +70,7 @@ fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
 }
 
 /// A warning of a fit; `None` for clipped zero deviations, which [`super::zeros`] names.
-pub fn of_warning(told: &FitWarning) -> Option<Finding> {
+pub(super) fn of_warning(told: &FitWarning) -> Option<Finding> {
     let message = told.to_string();
     let found = match told {
         FitWarning::ZeroDeviationClipped { .. } => return None,

@@ -105,8 +105,10 @@ impl<'a> Problem<'a> {
     }
 
     /// The fitness of the paper, as this project defines it: the root of the mean over rows and
-    /// axes of the weighted squared error (um, um, urad), from the sum of them.
+    /// axes of the weighted squared error (um, um, urad), from the sum of them. Of an exact fit
+    /// rounding may leave a sum below zero.
     pub fn fitness(&self, cost: f64) -> f64 {
+        let cost = if cost < 0.0 { 0.0 } else { cost };
         (cost / (3.0 * self.rows.len() as f64)).sqrt()
     }
 }

@@ -6,7 +6,6 @@ use crate::fit::{FitSettings, ModelChoice, fit};
 use crate::input::dataset::Dataset;
 use crate::input::shipped::STAGE_TOML;
 use crate::input::stage::Stage;
-use crate::problem::draw::Draw;
 use crate::problem::model::Model;
 use crate::simulate::assembly::Assembly;
 use crate::simulate::pose::StagePose;
@@ -15,7 +14,6 @@ use crate::simulate::protocol::{Protocol, Run, Trajectory};
 use crate::simulate::recording::record;
 use crate::simulate::sensors::SensorErrors;
 use crate::solve::field::parameters::FieldParameters;
-use crate::solve::{Projection, Solver, SolverOptions};
 use nalgebra::Vector3;
 use runtime::parameters::Text;
 use runtime::{ModelKind, ParameterSet, VerticalPose};
@@ -59,15 +57,7 @@ impl Old {
     fn new() -> Self {
         let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
         let assembly = Assembly::draw(&stage, SEED);
-        let settings = FitSettings {
-            model: ModelChoice::Named(Model::of(ModelKind::Field)),
-            train: None,
-            draw: Draw::Stratified,
-            solver: Solver::LeastSquares,
-            options: SolverOptions::new(Projection::Linear, 1),
-            serial: Text::new(),
-            created: Text::new(),
-        };
+        let settings = FitSettings::new(ModelChoice::Named(Model::of(ModelKind::Field)));
         let dataset = log(&stage, &assembly, sines(8.0, RUN), SEED);
         let fit = fit(&dataset, &stage, &settings).expect("a fit");
         Self {

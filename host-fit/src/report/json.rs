@@ -1,6 +1,7 @@
 //! The machine-readable report of `fit`, `eval` and `inspect`.
 
 use crate::diagnose::finding::Finding;
+use crate::diagnose::trusted::{Trusted, trusted};
 use crate::fit::Fit;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
@@ -240,6 +241,8 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// What a diagnosis of the log found, the gravest first.
     pub findings: Vec<Finding>,
+    /// The inputs whose errors no log shows, with what 1 % costs.
+    pub trusted_inputs: Vec<Trusted>,
 }
 
 /// What a command knows besides the fit or judgement itself.
@@ -336,6 +339,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         zero_deviations: movement_zeros(&fit.judgement, c.dataset),
         warnings,
         findings: c.findings.clone(),
+        trusted_inputs: trusted(&fit.set),
     }
 }
 
@@ -376,5 +380,6 @@ pub fn of_eval(
         zero_deviations: movement_zeros(judgement, c.dataset),
         warnings: c.warnings.clone(),
         findings: c.findings.clone(),
+        trusted_inputs: trusted(set),
     }
 }

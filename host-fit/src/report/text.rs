@@ -1,5 +1,6 @@
 //! Tables for a terminal.
 
+use crate::diagnose::trusted::Trusted;
 use crate::judge::lag::ReferenceLag;
 use crate::judge::statistics::PoseError;
 use crate::problem::model::{COUNT, Model};
@@ -107,4 +108,18 @@ pub fn lag(lag: Option<ReferenceLag>, compensated: bool) -> String {
     let (value, error) = (lag.value_s * 1e6, lag.standard_error_s * 1e6);
     let done = if compensated { ", compensated" } else { "" };
     format!("lag of the reference {value:.1} us, standard error {error:.1} us{done}\n")
+}
+
+/// The inputs that no log shows to be wrong, with what an error of 1 % costs.
+pub fn trusted(inputs: &[Trusted]) -> String {
+    let mut out = String::new();
+    if !inputs.is_empty() {
+        out.push_str(
+            "trusted, for no log shows an error in it; 1 % costs at the ends of the range\n",
+        );
+    }
+    for input in inputs {
+        let _ = writeln!(out, "  {}", input.as_text());
+    }
+    out
 }

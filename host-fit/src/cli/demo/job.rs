@@ -12,15 +12,13 @@ use crate::judge::{Decoded, Zeros};
 use crate::output;
 use crate::output::blob_file;
 use crate::output::{pose_file, posterior_file};
-use crate::problem::draw::Draw;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
-use crate::solve::{Projection, Solver, SolverOptions};
+use crate::solve::Solver;
 use runtime::ModelKind;
 use runtime::calibration::Origin;
 use runtime::geometry::ProbeCoordinates;
-use runtime::parameters::Text;
 use runtime::servo::OnInvalid;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -187,13 +185,8 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
 
 pub(super) fn settings(model: ModelKind) -> FitSettings {
     FitSettings {
-        model: ModelChoice::Named(Model::of(model)),
-        train: None,
-        draw: Draw::Stratified,
         solver: Solver::Finished,
-        options: SolverOptions::new(Projection::Linear, 1),
-        serial: Text::default(),
-        created: Text::default(),
+        ..FitSettings::new(ModelChoice::Named(Model::of(model)))
     }
 }
 

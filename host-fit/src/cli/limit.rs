@@ -1,0 +1,120 @@
+//! Quality gates on the rms errors: `--limit x=1.5um,y=1um,rz=4urad`.
+
+use crate::judge::statistics::PoseError;
+use std::str::FromStr;
+
+/// Name, unit in messages and units on the command line of an axis.
+type Axis = (&'static str, &'static str, [(&'static str, f64); 4]);
+
+const LENGTHS: [(&str, f64); 4] = [("nm", 1e-9), ("um", 1e-6), ("mm", 1e-3), ("m", 1.0)];
+const ANGLES: [(&str, f64); 4] = [("nrad", 1e-9), ("urad", 1e-6), ("mrad", 1e-3), ("rad", 1.0)];
+const AXES: [Axis; 3] = [
+    ("x", "um", LENGTHS),
+    ("y", "um", LENGTHS),
+    ("rz", "urad", ANGLES),
+];
+
+/// The largest rms errors of X, Y, Rz that a fit may have: m, m, rad; `None` where any will do.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Limits([Option<f64>; 3]);
+
+impl FromStr for Limits {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let mut limits = Self::default();
+        for part in text.split(',') {
+            let wrong =
+                || format!("`{part}` is no limit: write for instance x=1.5um,y=1um,rz=4urad");
+            let (name, value) = part.split_once('=').ok_or_else(wrong)?;
+            let axis = AXES.iter().position(|(axis, ..)| *axis == name.trim());
+            let axis = axis.ok_or_else(wrong)?;
+            let value = value.trim();
+            let units = AXES[axis].2;
+            // The longest unit that fits: `mm` ends with `m` too.
+            let unit = units.iter().filter(|(unit, _)| value.ends_with(unit));
+            let (unit, si) = unit.max_by_key(|(unit, _)| unit.len()).ok_or_else(wrong)?;
+            let number = value.strip_suffix(unit).unwrap_or(value).trim().parse();
+            let number: f64 = number.map_err(|_| wrong())?;
+            if !(number.is_finite() && number > 0.0) {
+                return Err(format!("`{part}`: a limit above zero is needed"));
+            }
+            if limits.0[axis].replace(number * si).is_some() {
+                return Err(format!("{name} has two limits"));
+            }
+        }
+        Ok(limits)
+    }
+}
+
+impl Limits {
+    /// The axes whose rms error is beyond its limit; `None` if there are none.
+    pub(super) fn exceeded(&self, errors: &PoseError) -> Option<String> {
+        let beyond = (0..3).filter_map(|axis| {
+            let (limit, rms) = (self.0[axis]?, errors.axes[axis].rms);
+            let (name, unit, _) = AXES[axis];
+            (rms > limit).then(|| {
+                format!(
+                    "{name} {:.3} {unit} rms, limit {:.3} {unit}",
+                    rms * 1e6,
+                    limit * 1e6
+                )
+            })
+        });
+        let errors = beyond.collect::<Vec<_>>().join("; ");
+        (!errors.is_empty()).then(|| format!("the errors are beyond --limit: {errors}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::judge::statistics::AxisError;
+
+    #[test]
+    fn limits_are_read_with_their_units() {
+        let read = |text: &str| text.parse::<Limits>().map(|limits| limits.0);
+        assert_eq!(
+            read("x=1.5um, rz = 4 urad"),
+            Ok([Some(1.5 * 1e-6), None, Some(4.0 * 1e-6)])
+        );
+        assert_eq!(read("y=2mm"), Ok([None, Some(2.0 * 1e-3), None]));
+        for wrong in [
+            "",
+            "x",
+            "x=1",
+            "x=um",
+            "z=1um",
+            "rz=1um",
+            "x=-1um",
+            "x=NaNum",
+            "x=1um,x=2um",
+            "x=1um,",
+        ] {
+            assert!(read(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn only_errors_beyond_their_limit_are_told() {
+        let axis = |rms| AxisError {
+            rms,
+            ..AxisError::default()
+        };
+        let errors = PoseError {
+            axes: [axis(1e-6), axis(2e-6), axis(3e-6)],
+            rows: 1,
+        };
+        let exceeded = |text: &str| {
+            let limits: Limits = text.parse().expect("limits");
+            limits.exceeded(&errors)
+        };
+        assert_eq!(exceeded("x=1.1um,y=2.1um,rz=3.1urad"), None);
+        let message = exceeded("x=1.1um,y=1.9um").expect("beyond");
+        assert!(
+            message.contains("y 2.000 um rms, limit 1.900 um"),
+            "{message}"
+        );
+        assert!(!message.contains("x 1.000"), "{message}");
+    }
+}
