@@ -57,8 +57,9 @@ pub struct FitSettings {
     pub serial: Text,
     /// Creation time, for the blob.
     pub created: Text,
-    /// Keep a fit that leaves most of the motion unexplained, which is else refused.
-    pub keep_undescribed: bool,
+    /// Keep a fit that leaves most of the motion unexplained, or whose parameters the log leaves open;
+    /// else there is none.
+    pub force: bool,
 }
 
 impl FitSettings {
@@ -72,7 +73,7 @@ impl FitSettings {
             options: SolverOptions::new(Projection::Linear, 1),
             serial: Text::default(),
             created: Text::default(),
-            keep_undescribed: false,
+            force: false,
         }
     }
 }
@@ -266,7 +267,9 @@ impl<'a> Job<'a> {
             decoded,
             judgement,
         } = judged?;
-        determined?;
+        if !settings.force {
+            determined?;
+        }
         let own_zeros = Zeros::Given(&solution.delta_m);
         Ok(Fit {
             model,
@@ -298,7 +301,7 @@ impl<'a> Job<'a> {
         let mut set = calibration.prepare(&origin).map_err(FitError::Unusable)?;
         let decoded = Decoded::new(&set, dataset);
         let judgement = decoded.judge(dataset, self.stage, Zeros::of_model(model));
-        if !settings.keep_undescribed {
+        if !settings.force {
             check_described(dataset, &judgement.errors, model)?;
         }
         let axes = judgement.errors.axes;

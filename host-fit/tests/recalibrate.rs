@@ -69,7 +69,7 @@ fn number(value: &Value) -> f64 {
 /// rms of X, Y, Rz over a log, zero deviations refitted, um and urad.
 fn rms(bench: &Bench, blob: &str, log: &str) -> [f64; 3] {
     bench.good(&format!(
-        "eval {blob} {log} --stage stage.toml --json eval.json"
+        "eval {blob} {log} --stage stage.toml --limit 100 --json eval.json"
     ));
     let errors = &bench.json("eval.json")["errors"];
     [

@@ -9,7 +9,6 @@ use crate::input::log;
 use crate::input::log::{LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
-use crate::judge::identify::FitFailure;
 use crate::report::text;
 use crate::solve::{Projection, SolverOptions};
 use clap::Args;
@@ -68,10 +67,8 @@ pub(super) fn failed(error: FitError, findings: &[Finding]) -> HostError {
     let findings = diagnose::messages(findings, Severity::Warn);
     match error {
         error if findings.is_empty() => HostError::Fit(error),
-        // Its list of what may be wrong is for those whose cause is not known.
-        FitError::Failed(FitFailure::NotDescribed { .. }) if explained => {
-            HostError::Refused { findings }
-        }
+        // What it says may be wrong is for those whose cause is not known.
+        _ if explained => HostError::Refused { findings },
         error => HostError::FitDiagnosed { error, findings },
     }
 }

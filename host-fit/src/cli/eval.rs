@@ -41,7 +41,7 @@ pub(super) struct EvalArgs {
     #[arg(long, value_enum)]
     delta: Option<DeltaChoice>,
     /// Largest rms error, in terms of that of the logs that the blob was fitted to: 3 if not given,
-    /// and 30 for models (12) to (31), whose own logs may not show what they lack.
+    /// and 10 for models (12) to (31), whose own logs may not show what they lack.
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
     limit: Option<f64>,
     /// Write the figures as JSON; `-` for standard output.
@@ -131,7 +131,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     let usual = if set.model == ModelKind::Field {
         3.0
     } else {
-        30.0
+        10.0
     };
     let mut beyond = beyond_limit(&set, &comparable, args.limit.unwrap_or(usual));
     if let Some(HostError::BeyondLimit { cause, .. }) = &mut beyond {

@@ -170,7 +170,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         options,
         serial: args.serial.clone().unwrap_or_default(),
         created: args.created.clone().unwrap_or_default(),
-        keep_undescribed: args.force,
+        force: args.force,
     };
     let fitted = if args.compensate_lag {
         fit_compensated(&log.dataset, &stage, &settings).map(|(fit, compensated)| {

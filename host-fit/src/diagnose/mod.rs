@@ -45,11 +45,14 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         findings.extend(told.filter(|told| !has_cause || told.code != Code::TermsAtLimit));
         if !has_cause {
             findings.extend(of_fit::undescribed(fit, dataset));
+            findings.extend(of_fit::not_field(fit));
         }
-        if findings.is_empty() {
+        if findings
+            .iter()
+            .all(|found| found.severity == Severity::Note)
+        {
             findings.extend(of_fit::unexplained(fit, dataset));
         }
-        findings.extend(of_fit::not_field(fit));
     }
     findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     findings

@@ -110,7 +110,7 @@ impl<'a> Trials<'a> {
     }
 
     /// How well the log fits with a mistake undone, or as it is. `None` where it cannot be fitted
-    /// at all.
+    /// at all, or with the mistake undone not so that this could be named.
     pub fn of(&self, hypothesis: Option<&Hypothesis>) -> Option<Trial> {
         let within = match hypothesis {
             Some(hypothesis) => hypothesis.applied(&self.within),
@@ -120,6 +120,11 @@ impl<'a> Trials<'a> {
         let starts = [middle_of_the_box(&within)];
         let rms = |cost: f64| within.fitness(cost);
         let limited = solve_from(&starts, &within, &options);
+        let within_um = limited.map_or(f64::INFINITY, |solution| rms(solution.cost));
+        let motion_um = motion_um(&within);
+        if hypothesis.is_some() && within_um > UNEXPLAINED_MAX * motion_um {
+            return None;
+        }
         let free = Problem {
             stage: self.unlimited,
             rows: within.rows.clone(),
@@ -128,11 +133,11 @@ impl<'a> Trials<'a> {
         };
         let free = solve_from(&starts, &free, &options).ok()?;
         Some(Trial {
-            within_um: limited.map_or(f64::INFINITY, |solution| rms(solution.cost)),
+            within_um,
             free_um: rms(free.cost),
             place_m: self.place_m(&free.parameters),
             free: free.parameters,
-            motion_um: motion_um(&within),
+            motion_um,
         })
     }
 
