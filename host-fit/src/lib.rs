@@ -32,6 +32,7 @@ pub mod judge;
 pub mod output;
 pub mod plan;
 pub mod problem;
+pub mod progress;
 pub mod recalibrate;
 pub mod report;
 pub mod simulate;

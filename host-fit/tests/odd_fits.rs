@@ -53,23 +53,6 @@ fn a_range_that_is_narrower_than_the_errors_or_without_width_holds_its_parameter
 }
 
 #[test]
-fn capacitive_sensors_in_the_wrong_order_are_suspected() {
-    let bench = Bench::new();
-    let swapped = log().replacen(
-        "cap1_cnt,cap2_cnt,cap3_cnt",
-        "cap3_cnt,cap2_cnt,cap1_cnt",
-        1,
-    );
-    bench.write("log.csv", swapped);
-    let output = bench.run("fit log.csv --stage stage.toml --out p.bin");
-    assert!(
-        stderr(&output).contains("the capacitive sensors"),
-        "{}",
-        stderr(&output)
-    );
-}
-
-#[test]
 fn a_blob_of_other_scales_is_refused() {
     let bench = Bench::new();
     bench.write("log.csv", log());

@@ -7,6 +7,7 @@ use crate::input::dataset::{Dataset, LoggedFrame};
 use crate::input::log::{self, LogError, ReadOptions};
 use crate::input::stage::{Stage, StageError};
 use crate::interrupt;
+use crate::progress::Progress;
 use hal_adapters::can::{BusFrame, Layout, sensor};
 use pace::Pacer;
 use runtime::RawFrame;
@@ -193,6 +194,7 @@ fn send(
     let pacer = Pacer::new(started, rate);
     let mut batch = Vec::with_capacity(BATCH_ROWS * 4);
     let mut left = frames;
+    let progress = Progress::new("sending", frames.len() as u64);
     while let [first, ..] = left {
         let (now_us, late_s) = pacer.wait_until(first.at_us, stop);
         if stop.load(Ordering::Relaxed) {
@@ -217,6 +219,7 @@ fn send(
         done.frames += batch.len();
         done.rows += now.len();
         left = later;
+        progress.reach(done.rows as u64);
     }
     done.elapsed_s = started.elapsed().as_secs_f64();
     Ok(done)

@@ -1,6 +1,7 @@
 //! `host-fit check`.
 
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::diagnose;
 use crate::diagnose::finding::{Finding, Severity};
 use crate::diagnose::trusted::{Trusted, trusted};
@@ -80,40 +81,43 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     super::keep_apart(&[args.json.as_deref()], &inputs)?;
     interrupt::watch();
     let stage = Stage::from_file(&args.stage)?;
-    let log = log::read(&args.logs, &stage, &ReadOptions::default())?;
+    let log = terminal::timed("reading", || {
+        log::read(&args.logs, &stage, &ReadOptions::default())
+    })?;
     let mut options = SolverOptions::new(Projection::Linear, 1);
     options.interrupt = Some(interrupt::watch());
     let settings = FitSettings {
         options,
         ..FitSettings::new(ModelChoice::Auto)
     };
-    let fitted = fit(&log.dataset, &stage, &settings);
+    let fitted = terminal::timed("fit", || fit(&log.dataset, &stage, &settings));
     if interrupt::requested() {
         return Err(HostError::Interrupted {
             kept: "nothing was written".to_owned(),
         });
     }
-    let findings = diagnose::of_log(&log.dataset, &stage, fitted.as_ref());
+    let findings = terminal::timed("diagnosis", || {
+        diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
+    });
     let checked = Checked::new(&log, fitted.as_ref(), findings);
     if let Some(path) = &args.json {
         super::write_json(&checked, path)?;
     }
-    if !super::is_standard_output(args.json.as_deref()) {
-        super::print(&format!(
-            "{} rows in {} movements\n",
-            checked.rows, checked.movements
+    terminal::print(&format!(
+        "{} rows in {} movements\n",
+        checked.rows, checked.movements
+    ))?;
+    if let Ok(fit) = &fitted {
+        terminal::print(&text::errors(
+            &format!("errors of {}", fit.model.title()),
+            &fit.judgement.errors,
+            None,
         ))?;
-        if let Ok(fit) = &fitted {
-            super::print(&text::errors(
-                &format!("errors of {}", fit.model.title()),
-                &fit.judgement.errors,
-                None,
-            ))?;
-        }
-        super::print(&as_text(&checked.findings))?;
-        super::print(&text::trusted(&checked.trusted_inputs))?;
     }
-    super::warn(&checked.warnings);
+    terminal::print(&as_text(&checked.findings))?;
+    terminal::print(&text::trusted(&checked.trusted_inputs))?;
+    super::wrote([args.json.clone()])?;
+    terminal::warn(&checked.warnings);
     if let Err(error) = fitted {
         return Err(failed(error, &checked.findings));
     }

@@ -2,6 +2,7 @@
 
 use super::args::Train;
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::compare::curves::{Course, history_csv, plot, runs_csv};
 use crate::compare::summary::{summaries, table};
 use crate::compare::{Case, Comparison, Run, compare};
@@ -10,9 +11,9 @@ use crate::input::stage::Stage;
 use crate::interrupt;
 use crate::output::{check_writable, make_folder, write_atomically};
 use crate::problem::draw::Draw;
+use crate::progress::Progress;
 use crate::solve::search::kind::SearchKind;
 use clap::Args;
-use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `compare`.
@@ -66,7 +67,9 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), HostError> {
         check_writable(&folder.join("table.md"))?;
     }
     let stage = Stage::from_file(&args.stage)?;
-    let log = log::read(&args.logs, &stage, &ReadOptions::default())?;
+    let log = terminal::timed("reading", || {
+        log::read(&args.logs, &stage, &ReadOptions::default())
+    })?;
     let interrupted = interrupt::watch();
     let comparison = Comparison {
         forms: args.project.clone(),
@@ -77,26 +80,19 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), HostError> {
         evaluations: args.evaluations as usize,
         population: args.population as usize,
     };
-    let terminal = std::io::stderr().is_terminal();
-    let progress = |run: &Run| {
-        if terminal {
-            // A closed standard error is no reason to stop.
-            let _ = write!(
-                std::io::stderr(),
-                "\r{:<7} {:<14} seed {:<4}",
-                run.form.name(),
-                run.solver,
-                run.seed
-            );
-        }
+    let total =
+        comparison.forms.len() as u64 * comparison.seeds * (1 + comparison.searches.len() as u64);
+    let progress = Progress::new("comparing", total);
+    let mut made = 0;
+    let done = |_: &Run| {
+        made += 1;
+        progress.reach(made);
     };
-    let compared = compare(&log.dataset, &stage, &comparison, interrupted, progress);
-    if terminal {
-        let _ = write!(std::io::stderr(), "\r{:40}\r", "");
-    }
+    let compared = compare(&log.dataset, &stage, &comparison, interrupted, done);
+    drop(progress);
     let runs = compared?;
     let table = table(&summaries(&runs));
-    super::print(&table)?;
+    terminal::print(&table)?;
     if let Some(folder) = &args.out {
         write(folder, &runs, &comparison, &table)?;
     }

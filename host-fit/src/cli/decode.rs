@@ -2,6 +2,7 @@
 
 use super::args::on_invalid;
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::input::log::{self, ReadOptions};
 use crate::input::stage::Stage;
 use crate::output;
@@ -41,14 +42,15 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     let set = blob_file::read(&args.params)?;
     let stage = Stage::from_file(&args.stage)?;
     super::same_scales(&set, &stage, &args.stage)?;
-    let log = log::read(
-        std::slice::from_ref(&args.log),
-        &stage,
-        &ReadOptions::DECODE,
-    )?;
+    let logs = std::slice::from_ref(&args.log);
+    let log = terminal::timed("reading", || log::read(logs, &stage, &ReadOptions::DECODE))?;
     let on_invalid = on_invalid(args.hold);
-    let decoded = pose_file::decode(&log.dataset, &set.decoder(), on_invalid);
-    output::write_atomically(&args.out, &pose_file::to_text(&decoded))?;
+    let decoded = terminal::timed("decoding", || {
+        pose_file::decode(&log.dataset, &set.decoder(), on_invalid)
+    });
+    terminal::timed("writing", || {
+        output::write_atomically(&args.out, &pose_file::to_text(&decoded))
+    })?;
     let counts = StatusCounts::of(&decoded);
     let mut summary = format!(
         "{} rows, {} of them with status 0\n",
@@ -57,9 +59,9 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     for (name, rows) in counts.named() {
         summary.push_str(&format!("  {rows} rows: {name}\n"));
     }
-    super::print(&summary)?;
-    super::print(&format!("wrote {}\n", args.out.display()))?;
+    terminal::print(&summary)?;
+    super::wrote([Some(args.out.clone())])?;
     let warnings: Vec<String> = log.warnings.iter().map(ToString::to_string).collect();
-    super::warn(&warnings);
+    terminal::warn(&warnings);
     Ok(())
 }

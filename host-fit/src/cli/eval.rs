@@ -1,6 +1,7 @@
 //! `host-fit eval`.
 
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::diagnose;
 use crate::diagnose::finding::Severity;
 use crate::fit::FitWarning;
@@ -83,7 +84,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     let set = blob_file::read(&args.params)?;
     let stage = Stage::from_file(&args.stage)?;
     super::same_scales(&set, &stage, &args.stage)?;
-    let log = log::read(&args.logs, &stage, &super::EVAL)?;
+    let log = terminal::timed("reading", || log::read(&args.logs, &stage, &super::EVAL))?;
     let zeros = match args.delta {
         None => Zeros::of_model(Model::of(set.model)),
         Some(DeltaChoice::Fit) => Zeros::Refit,
@@ -106,25 +107,26 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         ));
     }
     let errors = decoded.errors_less(&judgement.zeros, &log.dataset);
-    circumstances.findings = diagnose::of_judged(&log.dataset, &stage, &set, &errors);
+    circumstances.findings = terminal::timed("diagnosis", || {
+        diagnose::of_judged(&log.dataset, &stage, &set, &errors)
+    });
     let report = of_eval(&set, &judgement, zeros, &circumstances);
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
     }
-    if !super::is_standard_output(args.json.as_deref()) {
-        super::print(&format!(
-            "{}, {} rows in {} movements\n\n{}",
-            report.model_title,
-            report.rows,
-            report.movements,
-            text::errors(
-                &format!("errors, {}", report.zeros_in_words),
-                &judgement.errors,
-                None
-            )
-        ))?;
-    }
-    super::warn(&report.warnings);
+    terminal::print(&format!(
+        "{}, {} rows in {} movements\n\n{}",
+        report.model_title,
+        report.rows,
+        report.movements,
+        text::errors(
+            &format!("errors, {}", report.zeros_in_words),
+            &judgement.errors,
+            None
+        )
+    ))?;
+    super::wrote([args.json.clone()])?;
+    terminal::warn(&report.warnings);
     // As the blob's own errors were counted, whatever --delta says.
     let own_zeros = Zeros::of_model(Model::of(set.model));
     let comparable = decoded.judge(&log.dataset, &stage, own_zeros);
@@ -147,7 +149,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
             format!(". {found}")
         };
     } else {
-        super::tell(&report.findings);
+        terminal::tell(&report.findings);
     }
     beyond.map_or(Ok(()), Err)
 }

@@ -1,6 +1,7 @@
 //! `host-fit export`.
 
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::output::blob_file;
 use crate::output::export::{ExportError, ExportFormat, Place, SLOTS, export};
 use crate::output::write_atomically;
@@ -73,7 +74,7 @@ pub(super) fn run(args: &ExportArgs) -> Result<(), HostError> {
     write_atomically(&out, &file)?;
     let slot = SLOTS.iter().position(|slot| *slot == address);
     let slot = slot.map_or(String::new(), |slot| format!(", slot {slot}"));
-    super::print(&format!(
+    terminal::print(&format!(
         "wrote {}: {} bytes for {address:#010x}{slot}\n",
         out.display(),
         blob.len()

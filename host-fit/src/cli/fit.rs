@@ -4,6 +4,7 @@ use super::args::Train;
 use super::check::Checked;
 use super::limit::Limits;
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::diagnose;
 use crate::diagnose::finding::{Finding, Severity};
 use crate::fit::{Fit, FitError, FitSettings, ModelChoice, fit, fit_compensated};
@@ -144,15 +145,13 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     };
     // Before the work, so that no blob is left without the figures that were asked for.
     output::check_writable(&args.out)?;
-    if let Some(path) = &args.json
-        && !super::is_standard_output(Some(path))
-    {
+    if let Some(path) = &args.json {
         output::check_writable(path)?;
     }
     if let Some(folder) = args.report.as_deref().filter(|folder| folder.exists()) {
         output::make_folder(folder)?;
     }
-    let mut log = log::read(&args.logs, &stage, &options)?;
+    let mut log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;
     let known = match &args.start {
         Some(path) => Some(Parameters::of_set(&blob_file::read(path)?)),
         None => None,
@@ -172,18 +171,22 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         created: args.created.clone().unwrap_or_default(),
         force: args.force,
     };
-    let fitted = if args.compensate_lag {
-        fit_compensated(&log.dataset, &stage, &settings).map(|(fit, compensated)| {
-            log.dataset = compensated;
-            fit
-        })
-    } else {
-        fit(&log.dataset, &stage, &settings)
-    };
+    let fitted = terminal::timed("fit", || {
+        if args.compensate_lag {
+            fit_compensated(&log.dataset, &stage, &settings).map(|(fit, compensated)| {
+                log.dataset = compensated;
+                fit
+            })
+        } else {
+            fit(&log.dataset, &stage, &settings)
+        }
+    });
     let findings = if interrupt::requested() {
         Vec::new()
     } else {
-        diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
+        terminal::timed("diagnosis", || {
+            diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
+        })
     };
     let mut fit = match fitted {
         Err(error) if interrupt::requested() => {
@@ -225,13 +228,13 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let report = of_fit(&fit, choice, &circumstances);
     match refusal {
         Some(cause) if args.force => {
-            super::warn(&[format!("written all the same, as --force asks: {cause}")]);
+            terminal::warn(&[format!("written all the same, as --force asks: {cause}")]);
         }
         Some(cause) => {
             if let Some(path) = &args.json {
                 super::write_json(&report, path)?;
             }
-            super::tell(&report.findings);
+            terminal::tell(&report.findings);
             return Err(HostError::NotWritten { cause });
         }
         None => {}
@@ -247,13 +250,12 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         let names: Vec<String> = args.logs.iter().map(|p| p.display().to_string()).collect();
         write_report(&report, &fit, &log, &names, folder)?;
     }
-    // JSON on standard output is for a program: nothing else goes there.
-    if !super::is_standard_output(args.json.as_deref()) {
-        super::print(&summary(&fit, &report, &stage))?;
-        super::print(&format!("wrote {}\n", args.out.display()))?;
-    }
-    super::warn(&circumstances.warnings);
-    super::tell(&report.findings);
+    terminal::print(&summary(&fit, &report, &stage))?;
+    let page = args.report.as_ref().map(|folder| folder.join("index.html"));
+    let beside = posterior.filter(|_| fit.field.is_some());
+    super::wrote([Some(args.out.clone()), beside, args.json.clone(), page])?;
+    terminal::warn(&circumstances.warnings);
+    terminal::tell(&report.findings);
     if interrupt::requested() {
         return Err(HostError::Interrupted {
             kept: format!("{} holds the best so far", args.out.display()),

@@ -3,6 +3,7 @@
 use super::args::LayoutChoice;
 use crate::bus::import::{self, ImportSettings};
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -76,5 +77,5 @@ pub(super) fn run(args: ImportArgs) -> Result<(), HostError> {
         skip_bad_lines: args.skip_bad_lines,
     };
     let report = import::run(&settings)?;
-    super::print(&format!("{report}wrote {}\n", settings.out.display()))
+    terminal::print(&format!("{report}wrote {}\n", settings.out.display()))
 }

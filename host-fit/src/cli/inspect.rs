@@ -1,6 +1,7 @@
 //! `host-fit inspect`.
 
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::output::blob_file;
 use crate::problem::model::Model;
 use crate::report::json::parameters_in;
@@ -27,11 +28,8 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     let set = blob_file::read(&args.params)?;
     if let Some(path) = &args.json {
         super::write_json(&as_json(&set), path)?;
-        if super::is_standard_output(Some(path)) {
-            return Ok(());
-        }
     }
-    super::print(&as_text(&set))
+    terminal::print(&as_text(&set))
 }
 
 fn hex(bytes: &[u8]) -> String {

@@ -17,18 +17,19 @@ mod live;
 mod plan;
 mod recalibrate;
 mod replay;
+mod shell;
 mod simulate;
+mod terminal;
 
 use crate::cli::error::HostError;
-use crate::diagnose::finding::{Finding, Severity};
 use crate::input::log::{LogReading, ReadOptions, ReferenceUse};
 use crate::input::stage::Stage;
-use crate::output::write_atomically;
+use crate::output::{is_standard, write_atomically};
+use crate::progress;
 use crate::report::json::Circumstances;
 use clap::{Parser, Subcommand};
 use runtime::ParameterSet;
-use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -42,6 +43,12 @@ struct Cli {
     /// What to do.
     #[command(subcommand)]
     command: Command,
+    /// Tell errors only.
+    #[arg(short, long, global = true)]
+    quiet: bool,
+    /// Tell how long each step takes.
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    verbose: bool,
 }
 
 /// The commands.
@@ -75,6 +82,10 @@ enum Command {
     Recalibrate(recalibrate::RecalibrateArgs),
     /// Write the log of a simulated stage, to rehearse a calibration.
     Simulate(simulate::SimulateArgs),
+    /// Write the completions of a shell to standard output.
+    Completions(shell::CompletionsArgs),
+    /// Write the manual pages into a folder.
+    Man(shell::ManArgs),
 }
 
 /// How `eval` reads: it needs the reference, and the decoder marks saturated codes.
@@ -85,7 +96,12 @@ const EVAL: ReadOptions = ReadOptions {
 
 /// Parses the command line, runs the command, prints an error if there is one.
 pub fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let cli = Cli::parse();
+    terminal::set_level(i8::from(cli.verbose) - i8::from(cli.quiet));
+    if !cli.quiet {
+        progress::show();
+    }
+    let result = match cli.command {
         Command::Demo(args) => demo::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Check(args) => check::run(&args),
@@ -100,63 +116,35 @@ pub fn main() -> ExitCode {
         Command::Plan(args) => plan::run(&args),
         Command::Recalibrate(args) => recalibrate::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Completions(args) => shell::completions(&args),
+        Command::Man(args) => shell::man(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let _ = writeln!(std::io::stderr(), "host-fit: {error}");
+            terminal::fail(&error);
             ExitCode::from(error.exit_status())
         }
     }
-}
-
-/// Writes to standard output. A reader that closes the pipe early, as `head` does, is no error.
-fn print(text: &str) -> Result<(), HostError> {
-    let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(HostError::Standard(error)),
-        _ => Ok(()),
-    }
-}
-
-/// Writes warnings to standard error.
-fn warn(warnings: &[String]) {
-    for warning in warnings {
-        // A closed standard error is no reason to fail.
-        let _ = writeln!(std::io::stderr(), "warning: {warning}");
-    }
-}
-
-/// Writes findings to standard error; refusals end the command, which tells them.
-fn tell(findings: &[Finding]) {
-    for finding in findings {
-        let severity = match finding.severity {
-            Severity::Note => "note",
-            Severity::Warn => "warning",
-            Severity::Refuse => continue,
-        };
-        // A closed standard error is no reason to fail.
-        let _ = writeln!(std::io::stderr(), "{severity}: {}", finding.message);
-    }
-}
-
-/// Whether a report goes to standard output, where nothing else may then be written.
-fn is_standard_output(path: Option<&Path>) -> bool {
-    path.is_some_and(|path| path.as_os_str() == "-")
 }
 
 /// Writes a report as JSON to a file, or to standard output for `-`.
 fn write_json(report: &impl serde::Serialize, path: &Path) -> Result<(), HostError> {
     let mut text = serde_json::to_string_pretty(report)?;
     text.push('\n');
-    if is_standard_output(Some(path)) {
-        print(&text)
-    } else {
-        Ok(write_atomically(path, text.as_bytes())?)
-    }
+    Ok(write_atomically(path, text.as_bytes())?)
 }
 
-/// Refuses outputs that would replace an input, or each other.
+/// Says which files were written.
+fn wrote(paths: impl IntoIterator<Item = Option<PathBuf>>) -> Result<(), HostError> {
+    for path in paths.into_iter().flatten() {
+        terminal::print(&format!("wrote {}\n", path.display()))?;
+    }
+    Ok(())
+}
+
+/// Refuses outputs that would replace an input, or each other. Where one goes to standard output,
+/// nothing else does from now on.
 fn keep_apart(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<(), HostError> {
     // A file that is not there yet is known by its folder and its name.
     let new = |path: &Path| {
@@ -170,16 +158,25 @@ fn keep_apart(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<(), HostErr
         let there = path.canonicalize().ok().or_else(|| new(path));
         there.unwrap_or_else(|| path.to_owned())
     };
-    let mut taken: Vec<_> = inputs.iter().map(|path| place(path)).collect();
+    // Standard input is not standard output.
+    let files = inputs.iter().filter(|path| !is_standard(path));
+    let mut taken: Vec<_> = files.map(|path| place(path)).collect();
     for output in outputs.iter().flatten() {
         let here = place(output);
-        if taken.contains(&here) && !is_standard_output(Some(output)) {
+        if is_standard(output) {
+            terminal::keep_for_output();
+        }
+        if taken.contains(&here) {
             return Err(HostError::Usage {
                 argument: "output",
-                problem: format!(
-                    "{} is an input or another output of this command; name another file",
-                    output.display()
-                ),
+                problem: if is_standard(output) {
+                    "two outputs cannot both go to standard output; name a file".to_owned()
+                } else {
+                    format!(
+                        "{} is an input or another output of this command; name another file",
+                        output.display()
+                    )
+                },
             });
         }
         taken.push(here);

@@ -1,6 +1,7 @@
 //! `host-fit plan`.
 
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::input::stage::Stage;
 use crate::output::{check_writable, make_folder, write_atomically};
 use crate::plan::plan;
@@ -8,7 +9,7 @@ use crate::report::plan::PlanReport;
 use crate::report::plan_page::PlanPage;
 use crate::simulate::plan_file;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Longest run, s: nothing is gained beyond a few minutes.
 const SECONDS_MAX: f64 = 600.0;
@@ -48,21 +49,9 @@ pub(super) struct PlanArgs {
 /// Plans; then writes trajectory, JSON and page, in this order.
 pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     let (out, json) = (args.out.as_deref(), args.json.as_deref());
-    let shown = [out, json].map(super::is_standard_output);
-    if shown == [true; 2] {
-        return Err(HostError::Usage {
-            argument: "--json",
-            problem: "trajectory and figures cannot both go to standard output; name a file"
-                .to_owned(),
-        });
-    }
     super::keep_apart(&[out, json, args.report.as_deref()], &[&args.stage])?;
-    for (path, _) in [out, json]
-        .into_iter()
-        .zip(shown)
-        .filter(|(_, shown)| !shown)
-    {
-        path.map_or(Ok(()), check_writable)?;
+    for path in [out, json].into_iter().flatten() {
+        check_writable(path)?;
     }
     if let Some(folder) = args.report.as_deref().filter(|folder| folder.exists()) {
         make_folder(folder)?;
@@ -82,11 +71,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     if let Some(path) = out {
         let trajectory = plan.run.trajectory(stage.servo_period_s);
         let csv = plan_file::to_csv(&trajectory, stage.servo_period_s);
-        if shown[0] {
-            super::print(&csv)?;
-        } else {
-            write_atomically(path, csv.as_bytes())?;
-        }
+        write_atomically(path, csv.as_bytes())?;
     }
     if let Some(path) = json {
         super::write_json(&report, path)?;
@@ -96,10 +81,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
         make_folder(folder)?;
         write_atomically(&folder.join("index.html"), page.as_bytes())?;
     }
-    if shown.contains(&true) {
-        return Ok(());
-    }
-    super::print(&report.text())?;
-    let wrote = |path: &Path| super::print(&format!("wrote {}\n", path.display()));
-    out.map_or(Ok(()), wrote)
+    terminal::print(&report.text())?;
+    let page = args.report.as_ref().map(|folder| folder.join("index.html"));
+    super::wrote([args.out.clone(), args.json.clone(), page])
 }

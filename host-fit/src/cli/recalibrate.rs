@@ -1,6 +1,7 @@
 //! `host-fit recalibrate`.
 
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::fit::FitWarning;
 use crate::input::log::{self, LogReading, ReadOptions};
 use crate::input::stage::Stage;
@@ -123,9 +124,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     let outputs = [Some(args.out.as_path()), new_posterior.as_deref(), json];
     super::keep_apart(&outputs, &inputs)?;
     for path in outputs.into_iter().flatten() {
-        if !super::is_standard_output(Some(path)) {
-            check_writable(path)?;
-        }
+        check_writable(path)?;
     }
     let old = blob_file::read(&args.params)?;
     let stage = Stage::from_file(&args.stage)?;
@@ -138,7 +137,9 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         Some(path) => read_known(path, &old, args)?,
         None => None,
     };
-    let log = log::read(&args.logs, &stage, &ReadOptions::default())?;
+    let log = terminal::timed("reading", || {
+        log::read(&args.logs, &stage, &ReadOptions::default())
+    })?;
     let created = args.created.clone().unwrap_or_default();
     let new = recalibrate(
         &old,
@@ -157,11 +158,10 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     if let Some(path) = json {
         super::write_json(&report(args.what, &new, &log, &warnings), path)?;
     }
-    if !super::is_standard_output(json) {
-        super::print(&summary(args.what, &new, &log))?;
-        super::print(&format!("wrote {}\n", args.out.display()))?;
-    }
-    super::warn(&warnings);
+    terminal::print(&summary(args.what, &new, &log))?;
+    let beside = new_posterior.filter(|_| new.known.is_some());
+    super::wrote([Some(args.out.clone()), beside, args.json.clone()])?;
+    terminal::warn(&warnings);
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 use super::args::LayoutChoice;
 use crate::bus::replay::{self, ReplaySettings};
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::interrupt;
 use clap::Args;
 use std::path::PathBuf;
@@ -47,7 +48,7 @@ pub(super) fn run(args: ReplayArgs) -> Result<(), HostError> {
         layout: args.layout.layout(),
         rows: args.rows,
     })?;
-    super::print(&format!(
+    terminal::print(&format!(
         "{} rows in {} frames, {:.3} s of the log in {:.3} s ({:.1} times real time), at most {:.1} ms late\n",
         done.rows,
         done.frames,

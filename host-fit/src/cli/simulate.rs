@@ -1,6 +1,7 @@
 //! `host-fit simulate`.
 
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::input::stage::Stage;
 use crate::output::{check_writable, write_atomically};
 use crate::simulate::assembly::{Assembly, Magnets};
@@ -42,13 +43,6 @@ pub(super) struct SimulateArgs {
 /// Writes the log of a simulated stage.
 pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
     let truth = args.truth.as_deref();
-    let shown = super::is_standard_output(Some(&args.out));
-    if shown && super::is_standard_output(truth) {
-        return Err(HostError::Usage {
-            argument: "--truth",
-            problem: "log and truth cannot both go to standard output; name a file".to_owned(),
-        });
-    }
     let inputs: Vec<&Path> = [Some(&args.stage), args.plan.as_ref()]
         .into_iter()
         .flatten()
@@ -56,9 +50,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
         .collect();
     super::keep_apart(&[Some(&args.out), truth], &inputs)?;
     for path in [Some(args.out.as_path()), truth].into_iter().flatten() {
-        if !super::is_standard_output(Some(path)) {
-            check_writable(path)?;
-        }
+        check_writable(path)?;
     }
     let stage = Stage::from_file(&args.stage)?;
     let period_s = stage.servo_period_s;
@@ -78,14 +70,11 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
         write(path, &truth_csv(&recording))?;
     }
     write(&args.out, &log_csv(&recording, &stage))?;
-    if shown || super::is_standard_output(truth) {
-        return Ok(());
-    }
     let magnets = match Magnets::of_seed(args.seed) {
         Magnets::AsDesigned => "magnets as designed",
         Magnets::Imperfect => "imperfect magnets",
     };
-    super::print(&format!(
+    terminal::print(&format!(
         "wrote {}: {} rows in {} movements of stage {}, {magnets}\n",
         args.out.display(),
         recording.rows(),
@@ -96,9 +85,6 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
 
 /// Writes a CSV, compressed if the name ends in `.gz`.
 fn write(path: &Path, csv: &str) -> Result<(), HostError> {
-    if super::is_standard_output(Some(path)) {
-        return super::print(csv);
-    }
     if path.extension().is_none_or(|extension| extension != "gz") {
         return Ok(write_atomically(path, csv.as_bytes())?);
     }

@@ -1,6 +1,6 @@
 //! The parameter blob as a file.
 
-use crate::output::{OutputError, write_atomically};
+use crate::output::{OutputError, is_standard, write_atomically};
 use runtime::blob::MAX_BYTES;
 use runtime::{BlobError, ParameterSet};
 use std::io::Read;
@@ -41,7 +41,7 @@ const fn remedy(cause: &BlobError) -> &'static str {
     }
 }
 
-/// Reads a blob, whose file must hold exactly that, and checks it.
+/// Reads a blob, whose file must hold exactly that, and checks it; from standard input for `-`.
 ///
 /// # Errors
 /// See [`BlobFileError`].
@@ -51,9 +51,14 @@ pub fn read(path: &Path) -> Result<ParameterSet, BlobFileError> {
         cause,
     };
     let mut bytes = Vec::with_capacity(2 * MAX_BYTES);
-    let file = std::fs::File::open(path).map_err(failed)?;
+    let source: Box<dyn Read> = if is_standard(path) {
+        Box::new(std::io::stdin().lock())
+    } else {
+        Box::new(std::fs::File::open(path).map_err(failed)?)
+    };
     // A wrong file may be huge; what lies behind twice the largest blob changes no verdict.
-    file.take(2 * MAX_BYTES as u64)
+    source
+        .take(2 * MAX_BYTES as u64)
         .read_to_end(&mut bytes)
         .map_err(failed)?;
     ParameterSet::from_bytes(&bytes).map_err(|cause| BlobFileError::Unusable {

@@ -77,11 +77,15 @@ pub enum OutputError {
 }
 
 /// Writes `bytes` to `path`: all of them, or nothing. An existing file is replaced and
-/// keeps its permissions; a link is followed; a device or pipe is written to directly.
+/// keeps its permissions; a link is followed; a device or pipe is written to directly, and so is
+/// standard output for `-`.
 ///
 /// # Errors
 /// Every variant of [`OutputError`].
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    if is_standard(path) {
+        return write_standard(path, bytes);
+    }
     let (target, existing) = resolve(path)?;
     let explain = |source| explain(source, path, &folder_of(&target), bytes.len());
     match existing {
@@ -89,6 +93,22 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
         existing => replace(&target, bytes, existing),
     }
     .map_err(explain)
+}
+
+/// Whether a name means standard output, or standard input: `-`.
+pub fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// A reader that closes the pipe early, as `head` does, is no error.
+fn write_standard(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(source) if source.kind() != ErrorKind::BrokenPipe => {
+            Err(explain(source, path, Path::new("-"), bytes.len()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Makes a folder, with those above it, unless it is there.
@@ -114,6 +134,9 @@ pub fn make_folder(path: &Path) -> Result<(), OutputError> {
 /// # Errors
 /// Every variant of [`OutputError`] but `Full`.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    if is_standard(path) {
+        return Ok(());
+    }
     let (target, existing) = resolve(path)?;
     if existing.is_some_and(|metadata| is_stream(path, &metadata)) {
         return Ok(());

@@ -13,7 +13,7 @@
 //! | 100 | 26,568 | covariance of the 81 parameters, the lower triangle row by row, as `f64` |
 //! | 26,668 | 32 | SHA-256 of everything before it |
 
-use crate::output::{OutputError, is_stream, write_atomically};
+use crate::output::{OutputError, is_standard, is_stream, write_atomically};
 use crate::recalibrate::Known;
 use crate::solve::field::terms::COUNT;
 use crate::solve::field::whiten::Noise;
@@ -71,8 +71,11 @@ pub enum PosteriorFileError {
     },
 }
 
-/// The file beside a blob; `None` if the blob is a device or a pipe.
+/// The file beside a blob; `None` if the blob is a device, a pipe or standard output.
 pub fn beside(blob: &Path) -> Option<PathBuf> {
+    if is_standard(blob) {
+        return None;
+    }
     if std::fs::metadata(blob).is_ok_and(|metadata| is_stream(blob, &metadata)) {
         return None;
     }

@@ -5,6 +5,7 @@ mod service;
 
 use crate::cli::demo::job::{Demo, TABLE_2, TABLE_4, TABLE_8, table_7};
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::output;
 use crate::problem::parameters::Parameters;
 use crate::report::text;
@@ -39,7 +40,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<(), HostError> {
         }
     };
     let demo = job::run(folder)?;
-    super::print(&as_text(&demo, args.zero_deviations))?;
+    terminal::print(&as_text(&demo, args.zero_deviations))?;
     let mut end = format!(
         "\nall of this took {:.2} s\n",
         started.elapsed().as_secs_f64()
@@ -51,7 +52,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<(), HostError> {
     } else {
         end.push_str("logs, stage.toml, blobs and poses are kept with --out DIR\n");
     }
-    super::print(&end)
+    terminal::print(&end)
 }
 
 fn as_text(demo: &Demo, zero_deviations: bool) -> String {

@@ -1,6 +1,7 @@
 //! The loop that all searches share: generations, stop criteria, history, outcome.
 
 use super::cost::{CostFunction, Evaluator};
+use crate::progress::Progress;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The first population.
@@ -117,7 +118,9 @@ pub fn run<F: CostFunction + ?Sized, M: Method<F>>(
     criteria: &StopCriteria<'_>,
 ) -> Outcome {
     let mut history = vec![checkpoint(&method, &evaluator)];
+    let progress = Progress::new("searching", criteria.generations.unwrap_or(0) as u64);
     let reason = loop {
+        progress.reach(history.len() as u64);
         if let Some(reason) = criteria.reached(&history) {
             break reason;
         }

@@ -1,0 +1,84 @@
+//! What goes to the terminal: tables to standard output, notes, warnings and errors to standard error.
+//!
+//! Where standard output carries an output of the command (`--json -`), no table goes there.
+
+use crate::cli::error::HostError;
+use crate::diagnose::finding::{Finding, Severity};
+use anstyle::{AnsiColor, Style};
+use std::fmt::Display;
+use std::io::{ErrorKind, Write};
+use std::sync::atomic::{AtomicBool, AtomicI8, Ordering};
+use std::time::Instant;
+
+/// -1 quiet, 0 as usual, 1 and more for details.
+static LEVEL: AtomicI8 = AtomicI8::new(0);
+/// Whether standard output carries an output.
+static TAKEN: AtomicBool = AtomicBool::new(false);
+
+/// From now on less (-1) or more (1) is told.
+pub(super) fn set_level(level: i8) {
+    LEVEL.store(level, Ordering::Relaxed);
+}
+
+/// From now on standard output is for an output of the command.
+pub(super) fn keep_for_output() {
+    TAKEN.store(true, Ordering::Relaxed);
+}
+
+/// Whether nothing but errors is told.
+pub(super) fn is_quiet() -> bool {
+    LEVEL.load(Ordering::Relaxed) < 0
+}
+
+/// Writes a table to standard output. A reader that closes the pipe early, as `head` does, is no error.
+pub(super) fn print(text: &str) -> Result<(), HostError> {
+    if is_quiet() || TAKEN.load(Ordering::Relaxed) {
+        return Ok(());
+    }
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(HostError::Standard(error)),
+        _ => Ok(()),
+    }
+}
+
+/// Does a step; `--verbose` tells how long it took.
+pub(super) fn timed<T>(step: &str, work: impl FnOnce() -> T) -> T {
+    let started = Instant::now();
+    let done = work();
+    if LEVEL.load(Ordering::Relaxed) > 0 {
+        let text = format!("{:.3} s", started.elapsed().as_secs_f64());
+        line(step, AnsiColor::Cyan, text);
+    }
+    done
+}
+
+/// Writes warnings.
+pub(super) fn warn(warnings: &[String]) {
+    for warning in warnings.iter().filter(|_| !is_quiet()) {
+        line("warning", AnsiColor::Yellow, warning);
+    }
+}
+
+/// Writes findings; refusals end the command, which tells them.
+pub(super) fn tell(findings: &[Finding]) {
+    for finding in findings.iter().filter(|_| !is_quiet()) {
+        match finding.severity {
+            Severity::Note => line("note", AnsiColor::Cyan, &finding.message),
+            Severity::Warn => line("warning", AnsiColor::Yellow, &finding.message),
+            Severity::Refuse => {}
+        }
+    }
+}
+
+/// Writes the error that ends the command.
+pub(super) fn fail(error: &HostError) {
+    line("host-fit", AnsiColor::Red, error);
+}
+
+/// Writes a line to standard error, its start in colour on a terminal. A closed standard error is no
+/// reason to fail.
+fn line(start: &str, color: AnsiColor, text: impl Display) {
+    let style = Style::new().bold().fg_color(Some(color.into()));
+    let _ = writeln!(anstream::stderr(), "{style}{start}:{style:#} {text}");
+}

@@ -1,0 +1,99 @@
+//! What goes to standard output and standard error, and what does not.
+
+mod common;
+
+use common::{Bench, stderr, stdout, thinned_log};
+use std::io::Write;
+use std::process::Stdio;
+
+/// With rows every 40 ms, as the stage file says.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    let stage = bench.text("stage.toml");
+    let slow = stage.replace("period_s = 0.002", "period_s = 0.04");
+    bench.write("stage.toml", slow);
+    bench.write("log.csv", thinned_log(20, |_| true));
+    bench
+}
+
+#[test]
+fn quiet_tells_errors_only() {
+    let bench = bench();
+    let fit = "fit log.csv --stage stage.toml --out p.bin";
+    let told = bench.good(fit);
+    assert!(stdout(&told).contains("wrote p.bin"));
+    assert!(stderr(&told).contains("note: "));
+    let quiet = bench.good(&format!("{fit} --quiet"));
+    assert_eq!((stdout(&quiet), stderr(&quiet)), Default::default());
+    bench.bad("-q inspect absent.bin", 3, &["absent.bin"]);
+    bench.bad(&format!("{fit} -q -v"), 2, &["cannot be used with"]);
+}
+
+#[test]
+fn verbose_tells_the_time_of_each_step() {
+    let bench = bench();
+    let told = bench.good("check log.csv --stage stage.toml -v");
+    for step in ["reading: ", "fit: ", "diagnosis: "] {
+        assert!(stderr(&told).contains(step), "{}", stderr(&told));
+    }
+}
+
+#[test]
+fn a_dash_is_standard_output_for_one_output_and_nothing_else() {
+    let bench = bench();
+    let fit = "fit log.csv --stage stage.toml --out";
+    bench.good(&format!("{fit} p.bin"));
+    let blob = bench.good(&format!("{fit} -"));
+    assert_eq!(blob.stdout, bench.read("p.bin"));
+    assert!(!bench.path("-").exists() && !bench.path("-.posterior").exists());
+    bench.bad(&format!("{fit} - --json -"), 2, &["cannot both go to standard output"]);
+    let json = bench.good(&format!("{fit} q.bin --json -"));
+    assert!(serde_json::from_slice::<serde_json::Value>(&json.stdout).is_ok());
+    bench.good("decode p.bin log.csv --stage stage.toml --out pose.csv");
+    let poses = bench.good("decode p.bin log.csv --stage stage.toml --out -");
+    assert_eq!(poses.stdout, bench.read("pose.csv"));
+}
+
+#[test]
+fn a_blob_is_read_from_standard_input() {
+    let bench = bench();
+    bench.good("fit log.csv --stage stage.toml --out p.bin --serial HS-1");
+    let mut command = bench.command(&["inspect", "-"]);
+    let command = command.stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut child = command.spawn().expect("the program runs");
+    let mut input = child.stdin.take().expect("a pipe");
+    input.write_all(&bench.read("p.bin")).expect("written");
+    drop(input);
+    let output = child.wait_with_output().expect("it ends");
+    assert!(stdout(&output).contains("HS-1"));
+}
+
+#[test]
+fn nothing_is_coloured_or_drawn_where_there_is_no_terminal() {
+    let bench = bench();
+    let told = bench.good("fit log.csv --stage stage.toml --out p.bin --project none");
+    assert!(!(stdout(&told) + &stderr(&told)).contains('\u{1b}'));
+}
+
+#[test]
+fn each_command_has_a_manual_page_and_completions() {
+    let bench = bench();
+    bench.good("man --out man");
+    let help = stdout(&bench.good("--help"));
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let names = commands.take_while(|line| !line.is_empty());
+    let names: Vec<&str> = names
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    assert!(names.len() > 10, "{help}");
+    let script = stdout(&bench.good("completions bash"));
+    for name in names.iter().filter(|name| **name != "help") {
+        let page = bench.text(&format!("man/host-fit-{name}.1"));
+        assert!(page.contains("SYNOPSIS"), "{name}");
+        assert!(
+            script.contains(&format!("host__fit__{name}")) || script.contains(name),
+            "{name}"
+        );
+    }
+    assert!(bench.path("man/host-fit.1").exists());
+}
