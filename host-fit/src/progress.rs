@@ -12,7 +12,7 @@ static IN_USE: AtomicBool = AtomicBool::new(false);
 
 /// What takes less has no bar.
 const SHOWN_AFTER: Duration = Duration::from_secs(1);
-const TEMPLATE: &str = "{msg:<9} {wide_bar} {percent:>3} %  {per_sec:.0}  {eta} left";
+const TEMPLATE: &str = "{msg:<9} {wide_bar} {percent:>3} %  {per_sec}  {eta} left";
 
 /// From now on long work is shown.
 pub fn show() {
