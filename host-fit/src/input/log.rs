@@ -1,24 +1,29 @@
 //! Reads logs: CSV or CSV.gz, raw codes and reference, into rows in SI units by movement.
 //!
-//! One row per servo period, a header first. Which column holds what is said in
-//! [`layout`]; cells are separated by commas, semicolons or tabs, lines end in LF or CRLF,
-//! a line that starts with `#` is a comment. A file is taken for gzip by its first bytes,
-//! not by its name.
+//! One row per servo period below a header. Which column holds what is said in
+//! [`layout`], in which units in [`units`], what else a table may look like at
+//! [`table::Table::open`]; a log without a column for the movement is taken apart in [`split`].
+//! A file is taken for gzip or UTF-16 by its first bytes, not by its name.
 //!
 //! Anything wrong is refused with file, line and column ([`LogError`]). Bad cells and
 //! saturated codes can be left out and counted instead ([`BadRows::Skip`]); a log whose
 //! structure is wrong is always refused.
 
 pub(crate) mod cell;
+mod decimal;
 mod error;
 pub(crate) mod header;
 pub mod layout;
 mod order;
+mod preamble;
 mod reader;
 mod rows;
 mod sequence;
 mod skipped;
+mod split;
 pub(crate) mod table;
+pub(crate) mod time;
+pub(crate) mod units;
 mod warning;
 
 pub use cell::CellFault;
@@ -63,7 +68,7 @@ pub enum ReferenceUse {
 }
 
 /// How to read logs. The default is that of `fit`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReadOptions {
     /// What to do with bad rows.
     pub bad_rows: BadRows,
@@ -71,6 +76,9 @@ pub struct ReadOptions {
     pub saturated: SaturatedCodes,
     /// Whether the reference is needed.
     pub reference: ReferenceUse,
+    /// Length of the movements of logs that have no column for them, s; without it they end at gaps
+    /// alone.
+    pub split_s: Option<f64>,
 }
 
 impl ReadOptions {
@@ -79,6 +87,7 @@ impl ReadOptions {
         bad_rows: BadRows::Refuse,
         saturated: SaturatedCodes::Keep,
         reference: ReferenceUse::IfPresent,
+        split_s: None,
     };
 }
 
@@ -109,9 +118,15 @@ pub fn read<P: AsRef<Path>>(
     let mut hash = Sha256::new();
     for path in paths {
         let path = path.as_ref();
-        let bytes = source::read_text(path)?;
-        hash.update(&bytes);
-        append(&mut reading, path, &bytes, stage, options)?;
+        let text = source::read_text(path)?;
+        hash.update(&text);
+        append(
+            &mut reading,
+            source::shown_name(path),
+            &text,
+            stage,
+            options,
+        )?;
     }
     reading.dataset.sha256 = hash.finalize().into();
     Ok(reading)
@@ -127,21 +142,22 @@ pub fn read_bytes(
     stage: &Stage,
     options: &ReadOptions,
 ) -> Result<LogReading, LogError> {
-    let bytes = source::unpack_text(bytes.into(), path)?;
+    let text = source::unpack_text(bytes.into(), path)?;
     let mut reading = LogReading::default();
-    append(&mut reading, path, &bytes, stage, options)?;
-    reading.dataset.sha256 = Sha256::digest(&bytes).into();
+    append(&mut reading, path, &text, stage, options)?;
+    reading.dataset.sha256 = Sha256::digest(&text).into();
     Ok(reading)
 }
 
 fn append(
     reading: &mut LogReading,
     path: &Path,
-    bytes: &[u8],
+    text: &[u8],
     stage: &Stage,
     options: &ReadOptions,
 ) -> Result<(), LogError> {
-    let table = Table::open(path, bytes)?;
+    let text = source::to_utf8(text, path)?;
+    let table = Table::open(path, &text, &stage.log)?;
     let (dataset, warnings) = (&mut reading.dataset, &mut reading.warnings);
     reading.skipped_rows += reader::append(table, stage, options, dataset, warnings)?;
     refuse_repeated_log(&reading.dataset)

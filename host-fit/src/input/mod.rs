@@ -1,6 +1,8 @@
 //! What a fit starts from: the stage as designed, and its logs as rows in SI units.
 
+mod binary;
 pub mod dataset;
+mod encoding;
 pub mod log;
 pub mod shipped;
 pub mod source;

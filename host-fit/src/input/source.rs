@@ -1,6 +1,7 @@
 //! A file as bytes: opened, decompressed if its first bytes say gzip, and refused when it is
-//! no text where text is needed.
+//! no text where text is needed. `-` is standard input.
 
+use super::{binary, encoding};
 use flate2::bufread::GzDecoder;
 use std::borrow::Cow;
 use std::io::{ErrorKind, Read};
@@ -13,8 +14,8 @@ const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 /// unpacks to more is damaged or hostile.
 const BYTES_MAX: u64 = 2 << 30;
 
-/// How far into a file binary data are looked for.
-const PROBE_BYTES: usize = 64 * 1024;
+/// The name of standard input on the command line, and in messages.
+const STANDARD_INPUT: (&str, &str) = ("-", "standard input");
 
 /// Why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -42,6 +43,9 @@ pub enum SourceError {
         offset: usize,
         looks_like: &'static str,
     },
+    /// Text in UTF-16 with bytes that are no character: where, from 0, after decompression.
+    #[error("{}: the UTF-16 text is damaged (byte {offset}); save it again, as UTF-8", path.display())]
+    Utf16 { path: PathBuf, offset: usize },
     /// The gzip stream ends too early.
     #[error("{}: the gzip file is cut short (after {bytes} decompressed bytes); copy or record it again", path.display())]
     GzipCut { path: PathBuf, bytes: usize },
@@ -57,11 +61,20 @@ pub enum SourceError {
     GzipTrailing { path: PathBuf, bytes: usize },
 }
 
-/// A file of text, plain or gzip. What is plainly no text is refused by its start: a device
-/// or a damaged file may have no end.
+/// What an input is called in messages.
+pub fn shown_name(path: &Path) -> &Path {
+    let (argument, name) = STANDARD_INPUT;
+    match path.as_os_str() == argument {
+        true => Path::new(name),
+        false => path,
+    }
+}
+
+/// A file of text, plain or gzip, as it is encoded. What is plainly no text is refused by its
+/// start: a device or a damaged file may have no end.
 ///
 /// # Errors
-/// Every variant of [`SourceError`].
+/// Every variant of [`SourceError`] but `Utf16`.
 pub fn read_text(path: &Path) -> Result<Vec<u8>, SourceError> {
     let plain = |start: &[u8]| match start {
         _ if start.starts_with(&GZIP_MAGIC) => Ok(()),
@@ -71,7 +84,8 @@ pub fn read_text(path: &Path) -> Result<Vec<u8>, SourceError> {
     unpack_text(raw.into(), path).map(Cow::into_owned)
 }
 
-/// The text of a file that is in memory, plain or gzip; `path` is only named in errors.
+/// The text of a file that is in memory, plain or gzip, as it is encoded; `path` is only named
+/// in errors.
 ///
 /// # Errors
 /// `TooLarge`, `Binary` and those of gzip.
@@ -79,6 +93,19 @@ pub fn unpack_text<'r>(raw: Cow<'r, [u8]>, path: &Path) -> Result<Cow<'r, [u8]>,
     let bytes = unpack(raw, path, |start| refuse_binary(start, path))?;
     refuse_binary(&bytes, path)?;
     Ok(bytes)
+}
+
+/// A text of [`read_text`] in UTF-8, or in another encoding that has ASCII in it.
+///
+/// # Errors
+/// `Utf16`, `Binary`.
+pub fn to_utf8<'t>(text: &'t [u8], path: &Path) -> Result<Cow<'t, [u8]>, SourceError> {
+    let utf8 = encoding::to_utf8(text).map_err(|bytes| SourceError::Utf16 {
+        path: shown_name(path).to_path_buf(),
+        offset: bytes.start,
+    })?;
+    refuse_binary(&utf8, path)?;
+    Ok(utf8)
 }
 
 /// A file of any bytes, plain or gzip.
@@ -104,18 +131,22 @@ fn read_up_to(
     limit_bytes: u64,
     look: impl Fn(&[u8]) -> Result<(), SourceError>,
 ) -> Result<Vec<u8>, SourceError> {
+    let standard = path.as_os_str() == STANDARD_INPUT.0;
     let unreadable = |source: std::io::Error| {
-        let path = path.to_path_buf();
+        let path = shown_name(path).to_path_buf();
         match source.kind() {
             ErrorKind::IsADirectory => SourceError::IsFolder { path },
-            _ if path.is_dir() => SourceError::IsFolder { path },
+            _ if !standard && path.is_dir() => SourceError::IsFolder { path },
             ErrorKind::NotFound => SourceError::NotFound { path },
             _ => SourceError::Unreadable { path, source },
         }
     };
-    let mut file = std::fs::File::open(path).map_err(unreadable)?;
+    let mut file: Box<dyn Read> = match standard {
+        true => Box::new(std::io::stdin().lock()),
+        false => Box::new(std::fs::File::open(path).map_err(unreadable)?),
+    };
     let mut raw = Vec::new();
-    append(&mut file, PROBE_BYTES as u64, &mut raw).map_err(unreadable)?;
+    append(&mut file, binary::PROBE_BYTES as u64, &mut raw).map_err(unreadable)?;
     look(&raw)?;
     append(&mut file, limit_bytes, &mut raw).map_err(unreadable)?;
     refuse_large(&raw, limit_bytes, path)?;
@@ -133,7 +164,7 @@ fn refuse_large(bytes: &[u8], limit_bytes: u64, path: &Path) -> Result<(), Sourc
         return Ok(());
     }
     Err(SourceError::TooLarge {
-        path: path.to_path_buf(),
+        path: shown_name(path).to_path_buf(),
         limit_bytes,
     })
 }
@@ -154,12 +185,12 @@ fn unpack<'r>(
     while !rest.is_empty() {
         if !rest.starts_with(&GZIP_MAGIC) {
             return Err(SourceError::GzipTrailing {
-                path: path.to_path_buf(),
+                path: shown_name(path).to_path_buf(),
                 bytes: rest.len(),
             });
         }
         let mut decoder = GzDecoder::new(rest);
-        let read = append(&mut decoder, PROBE_BYTES as u64, &mut bytes);
+        let read = append(&mut decoder, binary::PROBE_BYTES as u64, &mut bytes);
         if read.is_ok() {
             look(&bytes)?;
         }
@@ -167,7 +198,7 @@ fn unpack<'r>(
         let read = read.and_then(|()| append(&mut decoder, room, &mut bytes));
         refuse_large(&bytes, BYTES_MAX, path)?;
         if let Err(source) = read {
-            let (path, bytes) = (path.to_path_buf(), bytes.len());
+            let (path, bytes) = (shown_name(path).to_path_buf(), bytes.len());
             return Err(match source.kind() {
                 ErrorKind::UnexpectedEof => SourceError::GzipCut { path, bytes },
                 _ => SourceError::GzipDamaged {
@@ -184,24 +215,12 @@ fn unpack<'r>(
 
 /// Refuses what is plainly no text, with a word on what it seems to be.
 fn refuse_binary(bytes: &[u8], path: &Path) -> Result<(), SourceError> {
-    let looks_like = match bytes {
-        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("text in UTF-16; save it as UTF-8"),
-        [b'P', b'K', 3, 4, ..] => Some("a zip archive or spreadsheet; export it as CSV"),
-        [0x28, 0xb5, 0x2f, 0xfd, ..] => Some("zstd data; decompress it first"),
-        [0xfd, b'7', b'z', b'X', b'Z', ..] => Some("xz data; decompress it first"),
-        [b'B', b'Z', b'h', b'1'..=b'9', ..] => Some("bzip2 data; decompress it first"),
-        [0x1f, 0x8b, ..] => Some("gzip inside gzip; decompress it once"),
-        _ => None,
-    };
-    let start = bytes.get(..PROBE_BYTES).unwrap_or(bytes);
-    let control = |b: &u8| matches!(*b, 0..=8 | 14..=31 | 127);
-    let first_control = start.iter().position(control);
-    match (looks_like, first_control) {
-        (None, None) => Ok(()),
-        (looks_like, offset) => Err(SourceError::Binary {
-            path: path.to_path_buf(),
-            offset: offset.unwrap_or(0),
-            looks_like: looks_like.unwrap_or("binary data; name a CSV or CSV.gz log"),
+    match binary::in_text(bytes) {
+        Some((offset, looks_like)) if !encoding::is_utf16(bytes) => Err(SourceError::Binary {
+            path: shown_name(path).to_path_buf(),
+            offset,
+            looks_like,
         }),
+        _ => Ok(()),
     }
 }

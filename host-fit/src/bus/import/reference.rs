@@ -6,6 +6,7 @@ use crate::input::log::cell::{self, CellFault};
 use crate::input::log::header::{Header, Source, UnknownColumns};
 use crate::input::log::layout::Quantity;
 use crate::input::log::table::Table;
+use crate::input::log::time::Clock;
 use crate::input::source;
 use crate::input::stage::Stage;
 use std::path::Path;
@@ -59,13 +60,16 @@ struct Cells {
 /// # Errors
 /// `Reference`, `NoReference`.
 pub fn read(path: &Path, stage: &Stage) -> Result<(Reference, ReferenceCounts), ImportError> {
-    let bytes = source::read_text(path).map_err(LogError::from)?;
-    let mut table = Table::open(path, &bytes)?;
+    let text = source::read_text(path).map_err(LogError::from)?;
+    let path = source::shown_name(path);
+    let text = source::to_utf8(&text, path).map_err(LogError::from)?;
+    let mut table = Table::open(path, &text, &stage.log)?;
     let cells = Cells::find(&table, stage)?;
     let mut samples: Vec<Sample> = Vec::new();
+    let mut clock = Clock::default();
     let mut row_bytes: Vec<u64> = Vec::new();
     while table.next_row()? {
-        samples.push(cells.sample(&table)?);
+        samples.push(cells.sample(&table, &mut clock)?);
         row_bytes.push(table.row_byte());
     }
     let mut counts = ReferenceCounts {
@@ -112,14 +116,14 @@ impl Cells {
         };
         Ok(Self {
             time,
-            movement: header.find(Quantity::Movement),
+            movement: header.find(Quantity::Movement).map(|source| source.cell),
             quantities,
             values,
         })
     }
 
     /// The sample in the row in hand.
-    fn sample(&self, table: &Table<'_>) -> Result<Sample, LogError> {
+    fn sample(&self, table: &Table<'_>, clock: &mut Clock) -> Result<Sample, LogError> {
         let bad = |cell, movement, fault: CellFault| LogError::Cell {
             place: table.place(table.row_byte(), cell, movement),
             fault,
@@ -133,7 +137,9 @@ impl Cells {
         };
         let [a, b, c] = &self.values;
         Ok(Sample {
-            t_us: number(&self.time)? * self.time.scale,
+            t_us: clock
+                .t_us(table.cell(self.time.cell), self.time.scale)
+                .map_err(|fault| bad(self.time.cell, Some(movement), fault))?,
             movement,
             values: [number(a)?, number(b)?, number(c)?],
         })

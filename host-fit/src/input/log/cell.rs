@@ -17,6 +17,14 @@ pub enum CellFault {
         /// What is there, shortened.
         text: String,
     },
+    /// A time that is written in another way than the first of the log.
+    #[error(
+        "\"{text}\" is a time written in another way than the first of the log; write all as numbers, all as dates and times with a zone, or all without"
+    )]
+    OtherTime {
+        /// What is there, shortened.
+        text: String,
+    },
     /// NaN.
     #[error("NaN stands for a missing value; remove the row")]
     Nan,
@@ -75,7 +83,7 @@ fn comma_hint(text: &str) -> &'static str {
         .bytes()
         .all(|b| b.is_ascii_digit() || b",.-+eE".contains(&b));
     if digits && text.contains(',') {
-        " (write a point for the decimal comma)"
+        " (write points for decimal commas, and no commas between thousands)"
     } else {
         ""
     }
@@ -158,7 +166,7 @@ fn short_integer(cell: &[u8]) -> Option<i64> {
 }
 
 /// A number times `scale`, at most `limit` in magnitude.
-pub(super) fn scaled(
+pub(crate) fn scaled(
     cell: &[u8],
     scale: f64,
     limit: f64,
@@ -176,14 +184,34 @@ pub(super) fn scaled(
     }
 }
 
-/// A converter's code, and whether it is at a rail.
-pub(super) fn code(cell: &[u8], converter: &CodeScale) -> Result<(i32, bool), CellFault> {
-    let code = whole(cell, "codes")?;
+/// A converter's code: how far from a whole number the cell is, and whether the code is at a rail.
+pub(super) struct Code {
+    pub(super) code: i32,
+    /// In codes; 0 in a column of codes.
+    pub(super) fraction: f64,
+    pub(super) is_saturated: bool,
+}
+
+/// The code in a cell: a whole number, or the nearest to a voltage of `codes_per_unit` each.
+pub(super) fn code(
+    cell: &[u8],
+    codes_per_unit: f64,
+    converter: &CodeScale,
+) -> Result<Code, CellFault> {
+    let (code, fraction) = match codes_per_unit == 1.0 {
+        true => (whole(cell, "codes")?, 0.0),
+        false => {
+            let exact = scaled(cell, codes_per_unit, WHOLE_MAX, "codes")?;
+            (exact.round() as i64, exact - exact.round())
+        }
+    };
     let (code_min, code_max) = (converter.window.low - 1, converter.window.high + 1);
     match i32::try_from(code) {
-        Ok(inside) if (code_min..=code_max).contains(&inside) => {
-            Ok((inside, !converter.window.contains(inside)))
-        }
+        Ok(inside) if (code_min..=code_max).contains(&inside) => Ok(Code {
+            code: inside,
+            fraction,
+            is_saturated: !converter.window.contains(inside),
+        }),
         _ => Err(CellFault::OutsideConverter {
             code,
             code_min,

@@ -113,8 +113,8 @@ pub enum LogError {
         /// Column of the table, from 1.
         column: usize,
     },
-    /// One name stands twice in the header.
-    #[error("{}:{line}: column {column} repeats the name `{name}` of column {first}; rename or remove one", path.display())]
+    /// Two columns of the header hold the same quantity.
+    #[error("{}:{line}: column {column}, `{name}`, holds the same as column {first}; rename or remove one", path.display())]
     RepeatedColumn {
         /// The file.
         path: PathBuf,
@@ -122,10 +122,60 @@ pub enum LogError {
         line: usize,
         /// Column of the table, from 1.
         column: usize,
-        /// The earlier column of that name.
+        /// The earlier column.
         first: usize,
         /// The name.
         name: String,
+    },
+    /// A column whose unit is not told.
+    #[error("{}:{line}: column {column}, `{name}`, has no unit; write one of {units} into its name, as in `{name} [..]`, or give it with `{key} = {{ column = \"{name}\", unit = \"..\" }}` in the [log] table of stage.toml", path.display())]
+    NoUnit {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// Column of the table, from 1.
+        column: usize,
+        /// Its name, shortened.
+        name: String,
+        /// The units that it may have.
+        units: &'static str,
+        /// Its key in the table `[log]`.
+        key: &'static str,
+    },
+    /// A column of voltages, and how many volts a code has is not known.
+    #[error("{}:{line}: column {column}, `{name}`, is a voltage, and the parameters are for the converter's codes; give its `volts_per_count` (V) in the [{table}] table of stage.toml", path.display())]
+    NoVoltsPerCount {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// Column of the table, from 1.
+        column: usize,
+        /// Its name, shortened.
+        name: String,
+        /// The table of `stage.toml` that describes the converter.
+        table: &'static str,
+    },
+    /// The row of units below the header says another unit than the column's name or `[log]`.
+    #[error("{}:{line}: column {column}, `{name}`, has the unit {below} in the row below the header, and another by its name or the [log] table of stage.toml; correct one of them", path.display())]
+    UnitsDisagree {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// Column of the table, from 1.
+        column: usize,
+        /// Its name, shortened.
+        name: String,
+        /// The unit in the row of units.
+        below: String,
+    },
+    /// `--split` for a log that has a column for the movement.
+    #[error("{}: the log has a column for the movement, so --split does not apply; leave it out", path.display())]
+    SplitWithMovements {
+        /// The file.
+        path: PathBuf,
     },
     /// Two sets of columns hold one thing, such as capacitive codes and `z_m, rx_rad, ry_rad`.
     #[error("{}:{line}: both `{one}` and `{other}` are there and hold the same thing; drop one set with `ignore = [...]` in the [log] table of stage.toml", path.display())]

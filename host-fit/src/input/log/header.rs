@@ -3,16 +3,17 @@
 use super::ReferenceUse;
 use super::cell::shown;
 use super::error::LogError;
-use super::layout::{LogLayout, Quantity};
+use super::layout::{Kind, LogLayout, Meaning, Quantity, UnitFault};
 use super::table::Table;
+use super::time;
 use std::path::Path;
 
 /// A cell of each row that is read.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Source {
     /// Which cell, from 0.
     pub(crate) cell: usize,
-    /// m, rad or us per unit.
+    /// m, rad, us or codes per unit.
     pub(crate) scale: f64,
 }
 
@@ -39,7 +40,8 @@ pub(super) enum ReferenceSource {
 /// The columns of one log.
 #[derive(Clone, Debug)]
 pub(super) struct Columns {
-    pub(super) movement: Source,
+    /// `None` where the movements are to be told by the time.
+    pub(super) movement: Option<Source>,
     pub(super) time: Source,
     pub(super) hall: [Source; 3],
     pub(super) vertical: VerticalSource,
@@ -60,8 +62,8 @@ pub(crate) struct Header<'a> {
     path: &'a Path,
     line: usize,
     layout: &'a LogLayout,
-    /// Cell of each quantity that is there.
-    cells: [Option<usize>; 17],
+    /// Where each quantity is that is there.
+    sources: [Option<Source>; 17],
 }
 
 /// Finds the columns of a log.
@@ -71,7 +73,10 @@ pub(super) fn columns(
     reference: ReferenceUse,
 ) -> Result<Columns, LogError> {
     let header = Header::new(table, layout, UnknownColumns::Refuse)?;
-    let [movement] = header.all([Quantity::Movement])?;
+    let movement = match header.find(Quantity::Movement) {
+        None if !layout.is_mapped(Quantity::Movement) => None,
+        _ => Some(header.all([Quantity::Movement])?[0]),
+    };
     let [time] = header.all([Quantity::Time])?;
     let hall = header.all(Quantity::HALL)?;
     let vertical = match header.one_set(Quantity::GAPS, Quantity::VERTICAL)? {
@@ -96,62 +101,135 @@ impl<'a> Header<'a> {
     /// Finds the quantities of the layout among the columns.
     ///
     /// # Errors
-    /// `UnnamedColumn`, `UnknownColumn`, `RepeatedColumn`.
+    /// `UnnamedColumn`, `UnknownColumn`, `RepeatedColumn`, `NoUnit`, `NoVoltsPerCount`,
+    /// `UnitsDisagree`.
     pub(crate) fn new(
         table: &Table<'a>,
         layout: &'a LogLayout,
         unknown: UnknownColumns,
     ) -> Result<Self, LogError> {
         let (path, line) = (table.path, table.header_line());
-        let owned = || path.to_path_buf();
-        let mut cells = [None; 17];
+        let mut header = Self {
+            path,
+            line,
+            layout,
+            sources: [None; 17],
+        };
         for (cell, name) in table.names().iter().enumerate() {
-            if layout.ignores(name) {
-                continue;
-            }
-            let column = cell + 1;
-            let Some(quantity) = layout.quantity(name) else {
-                if unknown == UnknownColumns::LeaveOut {
-                    continue;
-                }
-                if name.is_empty() {
-                    return Err(LogError::UnnamedColumn {
-                        path: owned(),
-                        line,
-                        column,
-                    });
-                }
-                return Err(LogError::UnknownColumn {
-                    path: owned(),
-                    line,
-                    column,
-                    name: shown(name.as_bytes()),
-                    known: Quantity::ALL
-                        .map(|q| layout.column(q).name.as_str())
-                        .join(", "),
-                });
+            let found = header.source(table, cell, name);
+            let found = match (found, unknown) {
+                (Err(LogError::UnknownColumn { .. }), UnknownColumns::LeaveOut) => None,
+                (Err(LogError::UnnamedColumn { .. }), UnknownColumns::LeaveOut) => None,
+                (Err(LogError::NoUnit { .. }), UnknownColumns::LeaveOut) => None,
+                (found, _) => found?,
             };
-            if let Some(first) = cells[quantity as usize].replace(cell) {
+            let Some((quantity, scale)) = found else {
+                continue;
+            };
+            let earlier = header.sources[quantity as usize].replace(Source { cell, scale });
+            if let Some(first) = earlier {
                 return Err(LogError::RepeatedColumn {
-                    path: owned(),
+                    path: path.to_path_buf(),
                     line,
-                    column,
-                    first: first + 1,
+                    column: cell + 1,
+                    first: first.cell + 1,
                     name: name.clone(),
                 });
             }
         }
-        Ok(Self {
-            path,
-            line,
-            layout,
-            cells,
-        })
+        Ok(header)
     }
 
-    /// The cell of a quantity, from 0, if the table has it.
-    pub(crate) fn find(&self, quantity: Quantity) -> Option<usize> {
-        self.cells[quantity as usize]
+    /// What a column holds, and m, rad, us or codes per unit; `None` if it is to be left out.
+    fn source(
+        &self,
+        table: &Table<'_>,
+        cell: usize,
+        name: &str,
+    ) -> Result<Option<(Quantity, f64)>, LogError> {
+        let (path, line, column) = (self.path.to_path_buf(), self.line, cell + 1);
+        let below = table.unit(cell);
+        let unknown = || match name.is_empty() {
+            true => LogError::UnnamedColumn {
+                path: self.path.to_path_buf(),
+                line,
+                column,
+            },
+            false => LogError::UnknownColumn {
+                path: self.path.to_path_buf(),
+                line,
+                column,
+                name: shown(name.as_bytes()),
+                known: Quantity::ALL
+                    .map(|q| self.layout.column(q).name.as_str())
+                    .join(", "),
+            },
+        };
+        let (quantity, unit) = match self.layout.meaning(name) {
+            Meaning::Ignored => return Ok(None),
+            Meaning::Unknown => return Err(unknown()),
+            Meaning::Exact(quantity) => (quantity, None),
+            Meaning::WithUnit(quantity, unit) => {
+                let kind = quantity.kind();
+                let date = kind == Kind::Time && time::is_date_time(table.first_cell(cell));
+                let fallback = match kind {
+                    Kind::Index | Kind::Code => Some(below),
+                    _ if date => Some("iso"),
+                    _ => (!below.is_empty()).then_some(below),
+                };
+                let unit = unit.or(fallback).ok_or_else(|| LogError::NoUnit {
+                    path: path.clone(),
+                    line,
+                    column,
+                    name: shown(name.as_bytes()),
+                    units: kind.units(),
+                    key: quantity.key(),
+                })?;
+                (quantity, Some(unit))
+            }
+        };
+        let scale = match unit {
+            None => self.layout.column(quantity).scale,
+            Some(unit) => match self.layout.scale(quantity, unit) {
+                Ok(scale) => scale,
+                Err(UnitFault::Unknown) => return Err(unknown()),
+                Err(UnitFault::NoVoltsPerCount) => {
+                    return Err(LogError::NoVoltsPerCount {
+                        path,
+                        line,
+                        column,
+                        name: shown(name.as_bytes()),
+                        table: quantity.table(),
+                    });
+                }
+            },
+        };
+        if self.disagrees(quantity, scale, below) {
+            return Err(LogError::UnitsDisagree {
+                path,
+                line,
+                column,
+                name: shown(name.as_bytes()),
+                below: shown(below.as_bytes()),
+            });
+        }
+        Ok(Some((quantity, scale)))
+    }
+
+    /// Whether the unit below the header is another than that of the column: it is of the
+    /// quantity's kind, and so is the scale of the column that of a unit.
+    fn disagrees(&self, quantity: Quantity, scale: f64, below: &str) -> bool {
+        let kind = quantity.kind();
+        match (kind, kind.unit(below)) {
+            (_, None) => false,
+            (Kind::Code, Some(_)) => self.layout.scale(quantity, below) != Ok(scale),
+            (_, Some(unit)) => unit != scale.abs() && kind.has_unit_of(scale.abs()),
+        }
+    }
+
+    /// Where a quantity is, if the table has it.
+    pub(crate) fn find(&self, quantity: Quantity) -> Option<Source> {
+        self.sources[quantity as usize]
     }
 
     /// The cells of these quantities, or an error that names the first missing one.
@@ -159,8 +237,8 @@ impl<'a> Header<'a> {
         &self,
         quantities: [Quantity; N],
     ) -> Result<[Source; N], LogError> {
-        let missing = quantities.into_iter().find(|q| self.find(*q).is_none());
-        if let Some(quantity) = missing {
+        let missing = |quantity: &Quantity| self.find(*quantity).is_none();
+        if let Some(quantity) = quantities.into_iter().find(missing) {
             return Err(LogError::MissingColumn {
                 path: self.path.to_path_buf(),
                 line: self.line,
@@ -168,11 +246,12 @@ impl<'a> Header<'a> {
                 key: quantity.key(),
             });
         }
-        Ok(quantities.map(|quantity| Source {
-            // Present: checked above.
-            cell: self.find(quantity).unwrap_or(usize::MAX),
-            scale: self.layout.column(quantity).scale,
-        }))
+        // All are there: checked above.
+        let absent = Source {
+            cell: usize::MAX,
+            scale: f64::NAN,
+        };
+        Ok(quantities.map(|quantity| self.find(quantity).unwrap_or(absent)))
     }
 
     /// The first quantity of the set that has columns here, if any has.

@@ -9,6 +9,11 @@
 //! | `cap_1`, `cap_2`, `cap_3` | `cap1_cnt`, `cap2_cnt`, `cap3_cnt` | capacitive codes |
 //! | `z`, `rx`, `ry` | `z_m`, `rx_rad`, `ry_rad` | vertical pose, in place of the codes |
 //! | `hall_a`, `hall_b`, `hall_c` | `hall_a_cnt`, `hall_b_cnt`, `hall_c_cnt` | Hall codes |
+//!
+//! A column that `[log]` leaves to its default is also known by its key or by the default name
+//! with another unit, in any of the spellings of [`super::units`]: `ifm_x [um]`, `X/mm`, `Time (s)`.
+
+use super::units;
 
 /// A quantity that a column can hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +50,7 @@ pub enum Kind {
     Length,
     /// An angle; scales lead to rad.
     Angle,
-    /// A converter's code.
+    /// A converter's code, or the voltage that makes it; scales lead to codes.
     Code,
 }
 
@@ -113,6 +118,15 @@ impl Quantity {
         }
     }
 
+    /// The table of `stage.toml` that describes its converter; empty if it has none.
+    pub(crate) const fn table(self) -> &'static str {
+        match self {
+            Self::HallA | Self::HallB | Self::HallC => "hall",
+            Self::Gap1 | Self::Gap2 | Self::Gap3 => "capacitive",
+            _ => "",
+        }
+    }
+
     /// What its numbers are.
     pub const fn kind(self) -> Kind {
         match self {
@@ -126,78 +140,12 @@ impl Quantity {
     }
 }
 
-const LENGTHS: [(&str, f64); 5] = [
-    ("m", 1.0),
-    ("mm", 1e-3),
-    ("um", 1e-6),
-    ("nm", 1e-9),
-    ("pm", 1e-12),
-];
-const ANGLES: [(&str, f64); 5] = [
-    ("rad", 1.0),
-    ("mrad", 1e-3),
-    ("urad", 1e-6),
-    ("nrad", 1e-9),
-    ("deg", core::f64::consts::PI / 180.0),
-];
-const TIMES_TO_US: [(&str, f64); 4] = [("s", 1e6), ("ms", 1e3), ("us", 1.0), ("ns", 1e-3)];
-
-impl Kind {
-    const fn table(self) -> &'static [(&'static str, f64)] {
-        match self {
-            Self::Length => &LENGTHS,
-            Self::Angle => &ANGLES,
-            Self::Time => &TIMES_TO_US,
-            Self::Index | Self::Code => &[],
-        }
-    }
-
-    /// What one `symbol` is in m, rad or us; `None` if this kind has no such unit.
-    pub fn unit(self, symbol: &str) -> Option<f64> {
-        let found = self.table().iter().find(|(name, _)| *name == symbol)?;
-        Some(found.1)
-    }
-
-    /// The unit that a column's name ends in, as `_nm` in `ifm_x_nm`.
-    pub fn unit_of_name(self, name: &str) -> Option<f64> {
-        self.unit(name.rsplit('_').next()?)
-    }
-
-    /// The units of this kind, for messages.
-    pub const fn units(self) -> &'static str {
-        match self {
-            Self::Length => "m, mm, um, nm, pm",
-            Self::Angle => "rad, mrad, urad, nrad, deg",
-            Self::Time => "s, ms, us, ns",
-            Self::Index | Self::Code => "none",
-        }
-    }
-
-    /// The SI unit in which a `scale` is given.
-    pub const fn scale_unit(self) -> &'static str {
-        match self {
-            Self::Length => "m",
-            Self::Angle => "rad",
-            Self::Time => "s",
-            Self::Index | Self::Code => "",
-        }
-    }
-
-    /// A `scale` in SI units times this leads to m, rad or us.
-    pub const fn per_si(self) -> f64 {
-        match self {
-            Self::Time => 1e6,
-            _ => 1.0,
-        }
-    }
-}
-
 /// The column of one quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     /// Its name in the header.
     pub name: String,
-    /// m, rad or us per unit of the column; 1 for codes and indices.
+    /// m, rad, us or codes per unit of the column; 1 for codes and indices.
     pub scale: f64,
 }
 
@@ -205,8 +153,36 @@ pub struct Column {
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogLayout {
     columns: [Column; 17],
+    /// Whether `[log]` names the column of each quantity.
+    mapped: [bool; 17],
     /// Columns to leave out.
     pub ignored: Vec<String>,
+    /// Voltage of one Hall code, V.
+    pub hall_volts_per_count: Option<f64>,
+    /// Voltage of one capacitive code, V.
+    pub capacitive_volts_per_count: Option<f64>,
+}
+
+/// What a column's name says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Meaning<'n> {
+    /// It is the name of this quantity's column, letter for letter.
+    Exact(Quantity),
+    /// It is that of a quantity which `[log]` does not name, with this unit, if it has one.
+    WithUnit(Quantity, Option<&'n str>),
+    /// It is in `ignore`.
+    Ignored,
+    /// Nothing that is known.
+    Unknown,
+}
+
+/// Why a unit leads nowhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum UnitFault {
+    /// There is no such unit of this kind.
+    Unknown,
+    /// A voltage, and how many volts a code has is not known.
+    NoVoltsPerCount,
 }
 
 impl Default for LogLayout {
@@ -220,7 +196,10 @@ impl Default for LogLayout {
         };
         Self {
             columns: Quantity::ALL.map(column),
+            mapped: [false; 17],
             ignored: Vec::new(),
+            hall_volts_per_count: None,
+            capacitive_volts_per_count: None,
         }
     }
 }
@@ -234,17 +213,48 @@ impl LogLayout {
     /// Names another column for a quantity.
     pub fn set(&mut self, quantity: Quantity, column: Column) {
         self.columns[quantity as usize] = column;
+        self.mapped[quantity as usize] = true;
     }
 
-    /// The quantity whose column has this name, unless the column is to be left out.
-    pub fn quantity(&self, name: &str) -> Option<Quantity> {
-        Quantity::ALL
-            .into_iter()
-            .find(|quantity| self.column(*quantity).name == name)
+    /// Whether the column of this quantity was [`set`](Self::set).
+    pub const fn is_mapped(&self, quantity: Quantity) -> bool {
+        self.mapped[quantity as usize]
     }
 
-    /// Whether the column of this name is to be left out.
-    pub fn ignores(&self, name: &str) -> bool {
-        self.ignored.iter().any(|ignored| ignored == name)
+    /// What a column of this name holds.
+    pub(crate) fn meaning<'n>(&self, name: &'n str) -> Meaning<'n> {
+        if self.ignored.iter().any(|ignored| ignored == name) {
+            return Meaning::Ignored;
+        }
+        let mut all = Quantity::ALL.into_iter();
+        if let Some(exact) = all.find(|quantity| self.column(*quantity).name == name) {
+            return Meaning::Exact(exact);
+        }
+        let (base, unit) = units::split(name);
+        let key = units::key_of(base);
+        let named = |quantity: &Quantity| {
+            let default = units::split(quantity.default_column()).0;
+            !self.is_mapped(*quantity) && (key == quantity.key() || key == default)
+        };
+        let found = Quantity::ALL.into_iter().find(named);
+        found.map_or(Meaning::Unknown, |quantity| {
+            Meaning::WithUnit(quantity, unit)
+        })
+    }
+
+    /// m, rad, us or codes per `symbol` of a quantity.
+    pub(crate) fn scale(&self, quantity: Quantity, symbol: &str) -> Result<f64, UnitFault> {
+        let kind = quantity.kind();
+        if matches!(kind, Kind::Code | Kind::Index) && units::is_count(symbol) {
+            return Ok(1.0);
+        }
+        let unit = kind.unit(symbol).ok_or(UnitFault::Unknown)?;
+        let volts_per_count = match quantity.table() {
+            "" => return Ok(unit),
+            "hall" => self.hall_volts_per_count,
+            _ => self.capacitive_volts_per_count,
+        };
+        let volts_per_count = volts_per_count.ok_or(UnitFault::NoVoltsPerCount)?;
+        Ok(unit / volts_per_count)
     }
 }

@@ -6,11 +6,16 @@ use super::order::{Order, OrderFault};
 use super::rows::{BadCell, RowReader};
 use super::sequence;
 use super::skipped::Skipped;
+use super::split::Steps;
 use super::table::Table;
 use super::warning::LogWarning;
 use super::{BadRows, ReadOptions, SaturatedCodes};
 use crate::input::dataset::{Dataset, LogSource, Movement};
 use crate::input::stage::Stage;
+
+/// Mean distance of voltages from whole codes that passes in silence: those that were computed from
+/// codes and written with few digits stay below it, those of another instrument have 0.25.
+const BETWEEN_CODES: f64 = 0.15;
 
 /// One log on its way into the dataset.
 struct LogReader<'a> {
@@ -22,6 +27,10 @@ struct LogReader<'a> {
     /// Its first movement in the dataset.
     first_movement: usize,
     order: Order,
+    /// Of a log without a column for the movement.
+    steps: Steps,
+    /// How often the time of such a log started again.
+    restarts: i64,
     skipped: Skipped,
 }
 
@@ -35,6 +44,11 @@ pub(super) fn append(
     warnings: &mut Vec<LogWarning>,
 ) -> Result<usize, LogError> {
     let columns = header::columns(&table, &stage.log, options.reference)?;
+    if columns.movement.is_some() && options.split_s.is_some() {
+        return Err(LogError::SplitWithMovements {
+            path: table.path.to_path_buf(),
+        });
+    }
     let (first_row, first_movement) = (dataset.rows.len(), dataset.movements.len());
     let mut reader = LogReader {
         columns: &columns,
@@ -43,15 +57,24 @@ pub(super) fn append(
         log: dataset.logs.len(),
         first_movement,
         order: Order::default(),
+        steps: Steps::default(),
+        restarts: 0,
         skipped: Skipped::default(),
     };
     while table.next_row()? {
         reader.take(&table, dataset)?;
     }
-    let skipped = reader.skipped;
+    let between_codes = reader.rows.mean_between_codes();
+    let (skipped, steps) = (reader.skipped, reader.steps);
     let skipped_rows = skipped.rows();
     if dataset.rows.len() == first_row {
         return Err(skipped.nothing_left(table.path, table.header_line()));
+    }
+    if columns.movement.is_none() {
+        let length_us = options
+            .split_s
+            .map(|seconds| (seconds * 1e6).round() as i64);
+        steps.split(dataset, first_movement, length_us);
     }
     let source = LogSource {
         path: table.path.to_path_buf(),
@@ -63,6 +86,15 @@ pub(super) fn append(
         warnings.push(LogWarning::NoFinalLineBreak {
             path: source.path.clone(),
             line: table.line(table.row_byte()),
+        });
+    }
+    if columns.movement.is_none() {
+        LogWarning::add_movements_by_time(warnings, &source.path, movements.len(), options.split_s);
+    }
+    if between_codes > BETWEEN_CODES {
+        warnings.push(LogWarning::BetweenCodes {
+            path: source.path.clone(),
+            mean: between_codes,
         });
     }
     warnings.extend(skipped.warnings(table.path, movements));
@@ -88,17 +120,21 @@ pub(super) fn append(
 impl LogReader<'_> {
     /// Adds the row in hand to the dataset, or leaves it out.
     fn take(&mut self, table: &Table<'_>, dataset: &mut Dataset) -> Result<(), LogError> {
-        let movement = match self.rows.movement(table) {
+        let named = match self.rows.movement(table) {
             Ok(movement) => movement,
             Err(bad) => return self.bad(bad, None, table),
         };
         let t_us = match self.rows.t_us(table) {
             Ok(t_us) => t_us,
-            Err(bad) => return self.bad(bad, Some(movement), table),
+            Err(bad) => return self.bad(bad, named, table),
         };
+        let movement = named.unwrap_or_else(|| {
+            self.restarts += i64::from(self.steps.take(t_us));
+            self.restarts
+        });
         self.order
             .take(movement, t_us, table.row_byte())
-            .map_err(|fault| self.out_of_order(fault, movement, t_us, table))?;
+            .map_err(|fault| self.out_of_order(fault, named, t_us, table))?;
         let own = dataset.movements.get(self.first_movement..);
         let begins = own
             .and_then(<[_]>::last)
@@ -106,8 +142,11 @@ impl LogReader<'_> {
         let slot = dataset.movements.len() - usize::from(!begins);
         let row = match self.rows.row(table, slot, t_us) {
             Ok(row) => row,
-            Err(bad) => return self.bad(bad, Some(movement), table),
+            Err(bad) => return self.bad(bad, named, table),
         };
+        if named.is_none() {
+            self.steps.keep();
+        }
         let start = dataset.rows.len();
         dataset.rows.push(row);
         match dataset.movements.last_mut() {
@@ -144,12 +183,13 @@ impl LogReader<'_> {
     fn out_of_order(
         &self,
         fault: OrderFault,
-        movement: i64,
+        movement: Option<i64>,
         t_us: i64,
         table: &Table<'_>,
     ) -> LogError {
-        let at = |cell| table.place(table.row_byte(), cell, Some(movement));
-        let (time, index) = (self.columns.time.cell, self.columns.movement.cell);
+        let at = |cell| table.place(table.row_byte(), cell, movement);
+        let time = self.columns.time.cell;
+        let index = self.columns.movement.map_or(time, |source| source.cell);
         match fault {
             OrderFault::Backwards { before_us } => LogError::TimeBackwards {
                 place: at(time),

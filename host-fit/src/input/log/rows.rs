@@ -1,8 +1,9 @@
 //! One row of a log, from cells to SI units.
 
-use super::cell::{self, CellFault};
+use super::cell::{self, CellFault, Code};
 use super::header::{Columns, ReferenceSource, Source, VerticalSource};
 use super::table::Table;
+use super::time::Clock;
 use crate::input::dataset::{LoggedFrame, Row};
 use crate::input::stage::{CodeScale, Stage};
 use runtime::capacitive::{vertical_pose, vertical_rows};
@@ -30,6 +31,9 @@ pub(super) struct RowReader<'a> {
     displacement_max_m: f64,
     height_max_m: f64,
     keep_saturated: bool,
+    clock: Clock,
+    /// Voltages: how many, and the sum of how far they are from whole codes.
+    between_codes: (usize, f64),
 }
 
 fn full_scale_m(scale: &CodeScale) -> f64 {
@@ -49,32 +53,46 @@ impl<'a> RowReader<'a> {
             displacement_max_m: FULL_SCALES * full_scale_m(&stage.hall),
             height_max_m: FULL_SCALES * full_scale_m(&stage.capacitive),
             keep_saturated,
+            clock: Clock::default(),
+            between_codes: (0, 0.0),
         }
     }
 
-    /// The number of the movement.
-    pub(super) fn movement(&self, table: &Table<'_>) -> Result<i64, BadCell> {
-        let cell = self.columns.movement.cell;
-        cell::whole(table.cell(cell), "movement numbers").map_err(|fault| BadCell { cell, fault })
+    /// The number of the movement, if the log has a column for it.
+    pub(super) fn movement(&self, table: &Table<'_>) -> Result<Option<i64>, BadCell> {
+        let Some(Source { cell, .. }) = self.columns.movement else {
+            return Ok(None);
+        };
+        let number = cell::whole(table.cell(cell), "movement numbers");
+        number.map(Some).map_err(|fault| BadCell { cell, fault })
     }
 
     /// The time, us.
-    pub(super) fn t_us(&self, table: &Table<'_>) -> Result<i64, BadCell> {
-        let t_us = scaled(table, &self.columns.time, cell::WHOLE_MAX, "us")?;
+    pub(super) fn t_us(&mut self, table: &Table<'_>) -> Result<i64, BadCell> {
+        let Source { cell, scale } = self.columns.time;
+        let t_us = self.clock.t_us(table.cell(cell), scale);
         // Within the range that the limit leaves.
-        Ok(t_us.round() as i64)
+        t_us.map(|t_us| t_us.round() as i64)
+            .map_err(|fault| BadCell { cell, fault })
+    }
+
+    /// How far voltages were from whole codes, on average; 0 if the log has none.
+    pub(super) fn mean_between_codes(&self) -> f64 {
+        let (cells, sum) = self.between_codes;
+        sum / cells.max(1) as f64
     }
 
     /// The row of slot `movement` at `t_us`; its sequence number is still 0.
     pub(super) fn row(
-        &self,
+        &mut self,
         table: &Table<'_>,
         movement: usize,
         t_us: i64,
     ) -> Result<Row, BadCell> {
         let hall = self.codes(table, &self.columns.hall, self.hall)?;
         let time_us = t_us as u32;
-        let (frame, vertical) = match &self.columns.vertical {
+        let columns = self.columns;
+        let (frame, vertical) = match &columns.vertical {
             VerticalSource::Codes(sources) => {
                 let capacitive = self.codes(table, sources, self.capacitive)?;
                 let gaps_m = capacitive.map(|code| f64::from(code) * self.capacitive.m_per_count);
@@ -112,17 +130,24 @@ impl<'a> RowReader<'a> {
     }
 
     fn codes(
-        &self,
+        &mut self,
         table: &Table<'_>,
         sources: &[Source; 3],
         converter: &CodeScale,
     ) -> Result<[i32; 3], BadCell> {
-        let one = |source: &Source| {
-            let cell = source.cell;
+        let mut one = |&Source { cell, scale }: &Source| {
             let bad = |fault| BadCell { cell, fault };
-            let (code, saturated) = cell::code(table.cell(cell), converter).map_err(bad)?;
-            if saturated && !self.keep_saturated {
+            let Code {
+                code,
+                fraction,
+                is_saturated,
+            } = cell::code(table.cell(cell), scale, converter).map_err(bad)?;
+            if is_saturated && !self.keep_saturated {
                 return Err(bad(CellFault::Saturated { code }));
+            }
+            if scale != 1.0 {
+                self.between_codes.0 += 1;
+                self.between_codes.1 += fraction.abs();
             }
             Ok(code)
         };

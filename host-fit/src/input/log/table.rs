@@ -5,72 +5,97 @@
 //! of `fit` has: which of them are needed is decided in [`super::header`].
 
 use super::cell::shown;
+use super::decimal;
 use super::error::{CellPlace, LogError};
+use super::layout::{LogLayout, Meaning};
+use super::preamble::{self, COMMENT};
+use super::units;
 use crate::input::source::SourceError;
 use csv::ByteRecord;
 use std::path::Path;
 
-/// Starts a comment, as the first byte of a line.
-const COMMENT: u8 = b'#';
 /// Written at the start of UTF-8 files by some programs.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Longest unit in a row of units, in characters, with brackets.
+const UNIT_CHARACTERS: usize = 10;
 
 /// A table, one row in hand at a time.
 pub(crate) struct Table<'a> {
     pub(crate) path: &'a Path,
     bytes: &'a [u8],
     names: Vec<String>,
-    header_line: usize,
+    /// Units of the columns, where a row below the header holds them.
+    units: Vec<String>,
+    header_byte: u64,
+    /// Where the rows begin.
+    rows_byte: u64,
     reader: csv::Reader<&'a [u8]>,
+    decimal_commas: bool,
     row: ByteRecord,
     row_byte: u64,
+    /// Whether the row in hand was read ahead and is still to be taken.
+    ahead: bool,
 }
 
 impl<'a> Table<'a> {
-    /// Reads the header; `path` is only named in errors.
+    /// Finds and reads the header; `bytes` are UTF-8 or at least hold ASCII as such, `path` is only
+    /// named in errors.
     ///
     /// Cells are separated by commas, semicolons or tabs, whichever the header has most;
     /// lines end in LF or CRLF, a line that starts with `#` is a comment, blank lines are
-    /// skipped.
+    /// skipped. Notes may stand above the header, which is told by the names of `layout`, and a
+    /// row of units below it. Numbers may have decimal commas where commas do not separate cells.
     ///
     /// # Errors
     /// `Empty`, `NoHeader`, `NoSeparator`.
-    pub(crate) fn open(path: &'a Path, bytes: &'a [u8]) -> Result<Self, LogError> {
+    pub(crate) fn open(
+        path: &'a Path,
+        bytes: &'a [u8],
+        layout: &LogLayout,
+    ) -> Result<Self, LogError> {
         let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
-        let empty = || LogError::Empty {
-            path: path.to_path_buf(),
+        let is_known = |name: &str| {
+            let meaning = layout.meaning(name);
+            matches!(meaning, Meaning::Exact(_) | Meaning::WithUnit(..))
         };
-        let is_row = |line: &&[u8]| !line.trim_ascii().is_empty() && !line.starts_with(&[COMMENT]);
-        let mut lines = bytes.split(|b| *b == b'\n' || *b == b'\r');
-        let header = lines.find(is_row).ok_or_else(empty)?;
+        let header = preamble::find_header(bytes, is_known).ok_or_else(|| LogError::Empty {
+            path: path.to_path_buf(),
+        })?;
+        let rows = bytes.get(header.end..).unwrap_or_default();
         let reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
-            .comment(Some(COMMENT))
-            .delimiter(separator(header))
-            .from_reader(bytes);
+            // Without line feeds a comment would go on to the end.
+            .comment(bytes.contains(&b'\n').then_some(COMMENT))
+            .delimiter(header.separator)
+            .from_reader(rows);
         let mut table = Self {
             path,
             bytes,
-            names: Vec::new(),
-            header_line: 0,
+            names: header.names,
+            units: Vec::new(),
+            header_byte: header.start as u64,
+            rows_byte: header.end as u64,
             reader,
+            decimal_commas: decimal::has_decimal_commas(rows, header.separator),
             row: ByteRecord::new(),
             row_byte: 0,
+            ahead: false,
         };
-        if !table.advance()? {
-            return Err(empty());
+        table.check_names()?;
+        table.ahead = table.advance()?;
+        if table.ahead && units_row(&table.row) {
+            table.units = table.row.iter().map(preamble::text).collect();
+            table.ahead = false;
+            table.ahead = table.advance()?;
         }
-        table.header_line = table.line(table.row_byte);
-        table.take_names()?;
         Ok(table)
     }
 
-    fn take_names(&mut self) -> Result<(), LogError> {
-        let name = |cell: &[u8]| String::from_utf8_lossy(cell.trim_ascii()).into_owned();
-        self.names = self.row.iter().map(name).collect();
-        let (path, line) = (self.path.to_path_buf(), self.header_line);
-        if self.names.iter().all(|name| name.parse::<f64>().is_ok()) {
+    fn check_names(&self) -> Result<(), LogError> {
+        let (path, line) = (self.path.to_path_buf(), self.header_line());
+        if preamble::is_numeric(&self.names) {
             return Err(LogError::NoHeader { path, line });
         }
         match self.names.as_slice() {
@@ -88,9 +113,27 @@ impl<'a> Table<'a> {
         &self.names
     }
 
+    /// The unit that a row below the header gives for a column, from 0; empty if it gives none.
+    pub(crate) fn unit(&self, column: usize) -> &str {
+        let unit = self.units.get(column).map_or("", String::as_str);
+        let inside = unit
+            .strip_prefix('[')
+            .and_then(|unit| unit.strip_suffix(']'));
+        let inside = inside.or_else(|| unit.strip_prefix('(')?.strip_suffix(')'));
+        inside.unwrap_or(unit)
+    }
+
+    /// A cell of the first row, from 0; empty if there is none, or if it is past.
+    pub(crate) fn first_cell(&self, cell: usize) -> &[u8] {
+        match self.ahead {
+            true => self.cell(cell),
+            false => &[],
+        }
+    }
+
     /// The line of the header, from 1.
-    pub(crate) const fn header_line(&self) -> usize {
-        self.header_line
+    pub(crate) fn header_line(&self) -> usize {
+        self.line_at(usize::try_from(self.header_byte).unwrap_or(usize::MAX))
     }
 
     /// Takes the next row in hand; `false` at the end.
@@ -156,12 +199,20 @@ impl<'a> Table<'a> {
                 b'\n' | b'\r' => at += 1,
                 COMMENT => {
                     let rest = self.bytes.get(at..).unwrap_or_default();
-                    let end = rest.iter().position(|b| *b == b'\n');
-                    at = end.map_or(self.bytes.len(), |end| at + end);
+                    match rest.iter().position(|b| *b == b'\n') {
+                        Some(end) => at += end,
+                        // No comment: see `open`.
+                        None => break,
+                    }
                 }
                 _ => break,
             }
         }
+        self.line_at(at)
+    }
+
+    /// The line of a byte, from 1.
+    fn line_at(&self, at: usize) -> usize {
         let before = self.bytes.get(..at).unwrap_or_default();
         // A lone carriage return ends a line too.
         let breaks = before.iter().enumerate().filter(|(k, b)| match **b {
@@ -181,11 +232,15 @@ impl<'a> Table<'a> {
 
     /// Whether the row in hand is the last, and no line break follows it.
     fn is_open_end(&self) -> bool {
-        self.is_open() && self.reader.position().byte() >= self.bytes.len() as u64
+        let end = self.rows_byte + self.reader.position().byte();
+        self.is_open() && end >= self.bytes.len() as u64
     }
 
     /// Reads the next record that is not blank; `false` at the end.
     fn advance(&mut self) -> Result<bool, LogError> {
+        if std::mem::take(&mut self.ahead) {
+            return Ok(true);
+        }
         loop {
             let more = self.reader.read_byte_record(&mut self.row);
             let more = more.map_err(|error| SourceError::Unreadable {
@@ -197,23 +252,29 @@ impl<'a> Table<'a> {
             }
             let blank = self.row.len() == 1 && self.cell(0).trim_ascii().is_empty();
             if !blank {
-                self.row_byte = self.row.position().map_or(0, csv::Position::byte);
+                let byte = self.row.position().map_or(0, csv::Position::byte);
+                self.row_byte = self.rows_byte + byte;
+                if self.decimal_commas {
+                    self.row = self.row.iter().map(decimal::with_point).collect();
+                }
                 return Ok(true);
             }
         }
     }
 }
 
-/// The separator of the cells: of comma, semicolon and tab, the one that the header has most.
-fn separator(header: &[u8]) -> u8 {
-    let count = |separator: u8| header.iter().filter(|b| **b == separator).count();
-    let mut best = b',';
-    for candidate in [b';', b'\t'] {
-        if count(candidate) > count(best) {
-            best = candidate;
-        }
-    }
-    best
+/// Whether a row holds the units of the columns: no number, at least two units, and nothing as
+/// long as a remark.
+fn units_row(row: &ByteRecord) -> bool {
+    let cells: Vec<String> = row.iter().map(preamble::text).collect();
+    let inside = |cell: &str| cell.trim_matches(['[', ']', '(', ')']).to_owned();
+    let known = |cell: &&String| units::is_known(&inside(cell));
+    let is_number = |cell: &String| cell.parse::<f64>().is_ok();
+    !cells.iter().any(is_number)
+        && cells
+            .iter()
+            .all(|cell| cell.chars().count() <= UNIT_CHARACTERS)
+        && cells.iter().filter(known).count() >= 2
 }
 
 #[cfg(test)]
@@ -224,18 +285,24 @@ mod tests {
     fn a_row_is_placed_at_its_own_line_whatever_stands_above_it() {
         for end in ["\n", "\r\n"] {
             let text = ["# a note", "", "a,b", "# more", "1,2", "", "", "3,4"].join(end);
-            let mut table = Table::open(Path::new("x"), text.as_bytes()).expect("a table");
+            let mut table = Table::open(Path::new("x"), text.as_bytes(), &LogLayout::default())
+                .expect("a table");
             let mut lines = vec![table.header_line()];
             while table.next_row().expect("sound") {
                 lines.push(table.line(table.row_byte()));
             }
             assert_eq!(lines, [3, 5, 8], "{end:?}");
         }
-        // A comment ends only at a line feed, so in a text without any there is nothing else.
-        let text = "# a note\r\ra,b\r1,2".as_bytes();
+        // The last line of a table without line feeds is no comment, and no row.
+        let text = "# a note\r\ra,b\r1,2\r# more\r".as_bytes();
+        let mut table = Table::open(Path::new("x"), text, &LogLayout::default()).expect("a table");
+        assert_eq!(
+            (table.header_line(), table.next_row().ok()),
+            (3, Some(true))
+        );
         assert!(matches!(
-            Table::open(Path::new("x"), text),
-            Err(LogError::Empty { .. })
+            table.next_row(),
+            Err(LogError::CellCount { line: 5, .. })
         ));
     }
 }

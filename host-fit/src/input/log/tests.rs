@@ -1,5 +1,7 @@
 mod accepts;
+mod forms;
 mod fuzz;
+mod movements;
 mod refuses;
 mod refuses_cells;
 mod refuses_files;

@@ -2,7 +2,7 @@
 
 use super::cell::CellFault;
 use super::error::CellPlace;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why rows were left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,6 +11,8 @@ pub enum SkipReason {
     Empty,
     /// A cell that is not a number.
     NotANumber,
+    /// A time written in another way than the first.
+    OtherTime,
     /// NaN or an infinity.
     NotFinite,
     /// A fraction where a whole number belongs.
@@ -29,6 +31,7 @@ impl SkipReason {
         match self {
             Self::Empty => "an empty cell",
             Self::NotANumber => "a cell that is not a number",
+            Self::OtherTime => "a time written in another way than the first",
             Self::NotFinite => "a NaN or an infinity",
             Self::NotWhole => "a fraction where a whole number belongs",
             Self::Absurd => "an absurd number",
@@ -43,6 +46,7 @@ impl From<&CellFault> for SkipReason {
         match fault {
             CellFault::Empty => Self::Empty,
             CellFault::NotANumber { .. } => Self::NotANumber,
+            CellFault::OtherTime { .. } => Self::OtherTime,
             CellFault::Nan | CellFault::Infinite { .. } => Self::NotFinite,
             CellFault::NotWhole { .. } => Self::NotWhole,
             CellFault::Absurd { .. } => Self::Absurd,
@@ -58,6 +62,15 @@ fn and_others(others: usize) -> String {
         0 => String::new(),
         others => format!(" (as have {others} more)"),
     }
+}
+
+/// Where movements begin that no column tells.
+fn beginnings(split_s: Option<f64>) -> String {
+    let gap = super::split::GAP_PERIODS;
+    let every = split_s.map_or(String::new(), |seconds| format!("every {seconds} s, "));
+    format!(
+        "a movement begins {every}after a gap of more than {gap} rows and where the time starts again"
+    )
 }
 
 /// Something that the user should know about a log that was read.
@@ -101,6 +114,26 @@ pub enum LogWarning {
         /// The last line.
         line: usize,
     },
+    /// Logs have no column for the movement: their times told where movements begin.
+    #[error("{}{}: no column for the movement; by the time there are {movements} in all ({}), each with its own zero deviation", path.display(), and_others(*others), beginnings(*split_s))]
+    MovementsByTime {
+        /// The first such file.
+        path: PathBuf,
+        /// How many more there are.
+        others: usize,
+        /// How many movements came out of all of them.
+        movements: usize,
+        /// The length that the user asked for, s.
+        split_s: Option<f64>,
+    },
+    /// Voltages that are no whole codes.
+    #[error("{}: voltages are {mean:.2} codes from whole ones on average, so volts_per_count is wrong, or another instrument recorded them, or they were rounded; check them, as the parameters are for the codes of the stage's converter", path.display())]
+    BetweenCodes {
+        /// The file.
+        path: PathBuf,
+        /// Mean distance, codes.
+        mean: f64,
+    },
     /// The log was sampled at another period than the servo's.
     #[error("{}: rows are {log_us} us apart, but the servo period is {servo_us} us; missed frames are counted by the log's own period", path.display())]
     OtherPeriod {
@@ -111,4 +144,33 @@ pub enum LogWarning {
         /// Servo period of `stage.toml`, us.
         servo_us: f64,
     },
+}
+
+impl LogWarning {
+    /// Counts the movements of one more log without a column for them.
+    pub(super) fn add_movements_by_time(
+        warnings: &mut Vec<Self>,
+        path: &Path,
+        more: usize,
+        split_s: Option<f64>,
+    ) {
+        let counts = warnings.iter_mut().find_map(|warning| match warning {
+            Self::MovementsByTime {
+                others, movements, ..
+            } => Some((others, movements)),
+            _ => None,
+        });
+        match counts {
+            Some((others, movements)) => {
+                *others += 1;
+                *movements += more;
+            }
+            None => warnings.push(Self::MovementsByTime {
+                path: path.to_path_buf(),
+                others: 0,
+                movements: more,
+                split_s,
+            }),
+        }
+    }
 }

@@ -5,16 +5,18 @@
 //! ```toml
 //! [log]
 //! movement = "run"
-//! hall_a = "ADC 1"
+//! hall_b = "ADC 2"
 //! ifm_x = "stage_x_um"                             # the unit is read from the name
 //! ifm_y1 = { column = "Y left", unit = "um" }
 //! ifm_y2 = { column = "Y right", scale = -6.25e-10 }  # m per unit of the column
+//! hall_a = { column = "ADC 1", unit = "V" }         # with `volts_per_count` in [hall]
 //! ignore = ["temperature", "operator"]             # columns to leave out
 //! ```
 
 use super::document::Document;
 use super::error::StageError;
-use crate::input::log::layout::{Column, Kind, LogLayout, Quantity};
+use crate::input::log::layout::{Column, Kind, LogLayout, Quantity, UnitFault};
+use crate::input::log::units;
 use serde::Deserialize;
 use std::ops::Range;
 use toml::Spanned;
@@ -34,14 +36,27 @@ struct ColumnTable {
     scale: Option<Spanned<f64>>,
 }
 
-/// The layout that the table describes; quantities that it leaves out keep their default.
+/// Voltages of one code that make sense, V: a converter of 24 bits over 0.1 V, one of 8 bits over
+/// 1 kV.
+const VOLTS_PER_COUNT: (f64, f64) = (1e-9, 10.0);
+
+/// The layout that the table describes; quantities that it leaves out keep their default, as all
+/// do without the table.
 pub(super) fn log_layout(document: &Document<'_>) -> Result<LogLayout, StageError> {
     let names = Quantity::ALL.iter().map(|quantity| quantity.key());
     document.only("log", &names.chain(["ignore"]).collect::<Vec<_>>())?;
+    let volts = |table: &str| -> Result<Option<f64>, StageError> {
+        let value: Option<Spanned<f64>> = document.read(table, "volts_per_count")?;
+        let (low, high) = VOLTS_PER_COUNT;
+        let volts = value.map(|value| document.within(&value, low, high, "V per code"));
+        volts.transpose()
+    };
     let mut layout = LogLayout::default();
+    layout.hall_volts_per_count = volts("hall")?;
+    layout.capacitive_volts_per_count = volts("capacitive")?;
     let mut mapped: Vec<(Quantity, Range<usize>)> = Vec::new();
     for quantity in Quantity::ALL {
-        if let Some((span, column)) = column(document, quantity)? {
+        if let Some((span, column)) = column(document, &layout, quantity)? {
             layout.set(quantity, column);
             mapped.push((quantity, span));
         }
@@ -86,6 +101,7 @@ fn named(document: &Document<'_>, name: &Spanned<String>) -> Result<String, Stag
 /// The column that the table names for a quantity, if it does, and where the name stands.
 fn column(
     document: &Document<'_>,
+    layout: &LogLayout,
     quantity: Quantity,
 ) -> Result<Option<(Range<usize>, Column)>, StageError> {
     let (key, kind) = (quantity.key(), quantity.kind());
@@ -110,7 +126,25 @@ fn column(
     let name = named(document, &column)?;
     let has_unit = !matches!(kind, Kind::Index | Kind::Code);
     let known = kind.units();
+    let in_volts = |symbol: &str, span| {
+        layout.scale(quantity, symbol).map_err(|fault| {
+            let problem = match fault {
+                UnitFault::NoVoltsPerCount => format!(
+                    "the column is a voltage; give the converter's `volts_per_count` (V) in [{}]",
+                    quantity.table()
+                ),
+                UnitFault::Unknown => format!(
+                    "this column holds codes, numbers without a unit, or one of {known}; correct it"
+                ),
+            };
+            document.refuse(span, problem)
+        })
+    };
     let scale = match (unit, scale) {
+        (None, None) if kind == Kind::Code && kind.unit_of_name(&name).is_some() => {
+            in_volts(units::split(&name).1.unwrap_or(&name), column.span())
+        }
+        (Some(unit), None) if kind == Kind::Code => in_volts(unit.get_ref(), unit.span()),
         (None, None) if !has_unit => Ok(1.0),
         (None, None) => kind.unit_of_name(&name).ok_or_else(|| {
             let example = format!("{{ column = \"{name}\", unit = \"...\" }}");

@@ -1,13 +1,12 @@
 //! Reads `stage.toml` and checks every value of it.
 //!
 //! The derived types say which keys there are and what kind of value each has. All keys but
-//! those of `[log]` and `[motion]` are required, and none but the documented ones are accepted: a misspelt
+//! those of `[log]` and `[motion]` and `volts_per_count` are required, and none but the documented ones are accepted: a misspelt
 //! key would otherwise be ignored without a word.
 
 use super::document::{Document, List};
 use super::error::StageError;
 use super::{CodeScale, Stage, columns, motion, search};
-use crate::input::log::layout::LogLayout;
 use crate::input::source;
 use runtime::capacitive::ProbePositions;
 use runtime::frame::{CODE_MAGNITUDE_MAX, CodeWindow};
@@ -47,7 +46,8 @@ struct StageFile {
     #[serde(rename = "motion")]
     _motion: Option<BTreeMap<String, IgnoredAny>>,
     /// Read by [`columns::log_layout`].
-    log: Option<BTreeMap<String, IgnoredAny>>,
+    #[serde(rename = "log")]
+    _log: Option<BTreeMap<String, IgnoredAny>>,
 }
 
 #[derive(Deserialize)]
@@ -60,6 +60,9 @@ struct Hall {
     h3x_m: Spanned<f64>,
     h3y_m: Spanned<f64>,
     m_per_count: Spanned<f64>,
+    /// Read by [`columns::log_layout`].
+    #[serde(rename = "volts_per_count")]
+    _volts_per_count: Option<IgnoredAny>,
     code_min: Spanned<i64>,
     code_max: Spanned<i64>,
 }
@@ -69,6 +72,9 @@ struct Hall {
 struct Capacitive {
     probes_m: List<List<Spanned<f64>>>,
     m_per_count: Spanned<f64>,
+    /// Read by [`columns::log_layout`].
+    #[serde(rename = "volts_per_count")]
+    _volts_per_count: Option<IgnoredAny>,
     code_min: Spanned<i64>,
     code_max: Spanned<i64>,
 }
@@ -126,10 +132,7 @@ impl Stage {
             servo_period_s: document.within(&servo.period_s, PERIODS_S.0, PERIODS_S.1, "s")?,
             search: search::ranges(document, &designed)?,
             motion: motion::motion(document)?,
-            log: match file.log {
-                None => LogLayout::default(),
-                Some(_) => columns::log_layout(document)?,
-            },
+            log: columns::log_layout(document)?,
         })
     }
 }

@@ -3,7 +3,6 @@ use super::*;
 #[test]
 fn missing_unknown_repeated_and_ambiguous_columns() {
     for (column, key) in [
-        ("movement", "movement"),
         ("t_us", "time"),
         ("cap2_cnt", "cap_2"),
         ("hall_c_cnt", "hall_c"),

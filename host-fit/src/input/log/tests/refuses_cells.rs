@@ -70,8 +70,18 @@ fn text_nan_infinity_and_empty_cells() {
         cell(&spoilt("\n4,2000", "\n,2000"), 6, 1, "movement"),
         CellFault::Empty
     );
-    let semicolons = LOG.replace(',', ";").replace(";161;", ";161,5;");
-    let fault = cell(&semicolons, 3, 3, "ifm_x_nm");
+    // A comma that may stand between thousands, and one beside a point.
+    for (separator, old, new) in [(";", ";7664;", ";7,664;"), ("\t", "\t7664\t", "\t7,5\t")] {
+        let log = LOG.replace(',', separator).replace(old, new);
+        let log = log.replace(
+            &format!("{separator}8700{separator}"),
+            &format!("{separator}8700.5{separator}"),
+        );
+        let fault = cell(&log, 3, 4, "ifm_y1_nm");
+        assert!(fault.to_string().contains("decimal comma"), "{fault}");
+    }
+    let quoted = LOG.replace(",161,", ",\"161,5\",");
+    let fault = cell(&quoted, 3, 3, "ifm_x_nm");
     assert!(fault.to_string().contains("decimal comma"), "{fault}");
 }
 

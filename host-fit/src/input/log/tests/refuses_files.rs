@@ -63,11 +63,36 @@ fn binary_files() {
         matches!(error, LogError::Source(SourceError::Binary { offset, .. }) if offset == LOG.len()),
         "{error}"
     );
-    let utf16: Vec<u8> = LOG.encode_utf16().flat_map(u16::to_le_bytes).collect();
-    let error = refused_file(&[b"\xff\xfe".as_slice(), &utf16].concat());
-    assert!(error.to_string().contains("UTF-16"), "{error}");
-    let error = refused_file(b"PK\x03\x04rest");
-    assert!(error.to_string().contains("export it as CSV"), "{error}");
+    for (bytes, name, remedy) in [
+        (&b"PK\x03\x04rest"[..], ".xlsx", "export it as CSV"),
+        (b"\x93NUMPY\x01\0v\0", ".npy", "CSV"),
+        (
+            b"MATLAB 5.0 MAT-file, Platform: GLNXA64\0\x01IM",
+            ".mat",
+            "writetable",
+        ),
+        (
+            b"MATLAB 7.3 MAT-file, Platform: GLNXA64\0\x02IM",
+            ".mat",
+            "writetable",
+        ),
+        (b"\x89HDF\r\n\x1a\n\0", ".h5", "as CSV"),
+        (b"TDSm\x0e\0\0\0", ".tdms", "export it as CSV"),
+        (b"PAR1\x15\x04", "Parquet", "as CSV"),
+        (
+            b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1",
+            ".xls",
+            "export it as CSV",
+        ),
+    ] {
+        let message = refused_file(bytes).to_string();
+        assert!(
+            message.contains(name) && message.contains(remedy),
+            "{message}"
+        );
+        let message = refused_file(&gzip(bytes)).to_string();
+        assert!(message.contains(name), "{message}");
+    }
     let error = refused_file(&gzip(&gzip(LOG.as_bytes())));
     assert!(error.to_string().contains("gzip inside gzip"), "{error}");
     // Bytes that no text has further on are a bad cell, shown without them.

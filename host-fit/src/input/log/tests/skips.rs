@@ -4,6 +4,7 @@ const SKIP: ReadOptions = ReadOptions {
     bad_rows: BadRows::Skip,
     saturated: SaturatedCodes::Bad,
     reference: ReferenceUse::Required,
+    split_s: None,
 };
 
 fn codes(reading: &LogReading) -> Vec<i32> {

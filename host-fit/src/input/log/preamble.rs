@@ -1,0 +1,144 @@
+//! Where the header of a table stands: instruments write notes above it, some put it in a comment.
+
+use csv::ByteRecord;
+
+/// Starts a comment, as the first byte of a line.
+pub(super) const COMMENT: u8 = b'#';
+
+/// How many lines of notes may stand above the header.
+const LINES_MAX: usize = 200;
+
+/// So many names of columns that are known make a line the header.
+const KNOWN_MIN: usize = 3;
+
+/// The header of a table.
+pub(super) struct HeaderLine {
+    /// Its first byte, from 0.
+    pub(super) start: usize,
+    /// The first byte after it.
+    pub(super) end: usize,
+    /// What separates the cells of the table.
+    pub(super) separator: u8,
+    /// Names of the columns, without white space around them.
+    pub(super) names: Vec<String>,
+}
+
+/// The header: the first line with at least three known names; without one, the line of known
+/// names in the last comment above the rows, as NumPy writes it; without one, the first line that
+/// is neither blank nor a comment. `None` if there is no such line.
+pub(super) fn find_header(bytes: &[u8], is_known: impl Fn(&str) -> bool) -> Option<HeaderLine> {
+    let known = |line: &HeaderLine| line.names.iter().filter(|name| is_known(name)).count();
+    let mut first = None;
+    let mut comment = None;
+    for (start, line) in lines(bytes).take(LINES_MAX) {
+        let end = start + line.len();
+        if let Some(note) = line.strip_prefix(&[COMMENT]) {
+            let line = header_line(note, start, end);
+            let is_header = first.is_none() && known(&line) >= KNOWN_MIN;
+            comment = if is_header { Some(line) } else { comment };
+            continue;
+        }
+        if line.trim_ascii().is_empty() {
+            continue;
+        }
+        let line = header_line(line, start, end);
+        if known(&line) >= KNOWN_MIN {
+            return Some(line);
+        }
+        first.get_or_insert(line);
+    }
+    match &first {
+        Some(row) if !is_numeric(&row.names) => first,
+        _ => comment.or(first),
+    }
+}
+
+/// Whether every name is a number: then the line is a row.
+pub(super) fn is_numeric(names: &[String]) -> bool {
+    names.iter().all(|name| name.parse::<f64>().is_ok())
+}
+
+/// The lines, with their first bytes, without line breaks.
+fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    let mut start = 0;
+    bytes
+        .split(|b| *b == b'\n' || *b == b'\r')
+        .map(move |line| {
+            let here = start;
+            start += line.len() + 1;
+            (here, line)
+        })
+}
+
+fn header_line(line: &[u8], start: usize, end: usize) -> HeaderLine {
+    let separator = separator(line);
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(separator)
+        .from_reader(line);
+    let mut cells = ByteRecord::new();
+    // Reading from memory cannot fail.
+    let _ = reader.read_byte_record(&mut cells);
+    HeaderLine {
+        start,
+        end,
+        separator,
+        names: cells.iter().map(text).collect(),
+    }
+}
+
+/// A cell's text without white space around it. What is not UTF-8 is Latin-1, in which older
+/// programs write the micro sign.
+pub(super) fn text(cell: &[u8]) -> String {
+    let cell = cell.trim_ascii();
+    match core::str::from_utf8(cell) {
+        Ok(text) => text.trim().to_owned(),
+        Err(_) => cell.iter().map(|byte| char::from(*byte)).collect(),
+    }
+}
+
+/// The separator of the cells: of comma, semicolon and tab, the one that the header has most.
+fn separator(header: &[u8]) -> u8 {
+    let count = |separator: u8| header.iter().filter(|b| **b == separator).count();
+    let mut best = b',';
+    for candidate in [b';', b'\t'] {
+        if count(candidate) > count(best) {
+            best = candidate;
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn header(text: &str) -> (usize, Vec<String>) {
+        let is_known = |name: &str| ["a", "b", "c", "d"].contains(&name);
+        let line = find_header(text.as_bytes(), is_known).expect("a header");
+        (text[..line.start].matches('\n').count() + 1, line.names)
+    }
+
+    #[test]
+    fn notes_above_the_header_are_passed_over() {
+        let names = ["a", "b", "c"].map(str::to_owned).to_vec();
+        for (text, line) in [
+            ("a,b,c\n1,2,3", 1),
+            (
+                "Stage 7\nDate;2026-01-02;\"open quote\n\n# note\n a;b ;c\n1;2;3",
+                5,
+            ),
+            ("rate\t500\na\tb\tc\n1\t2\t3", 2),
+            ("# by hand\n# a,b,c\n1,2,3", 2),
+            ("# a,b,c\nrate,500,2\na,b,c\n1,2,3", 3),
+        ] {
+            assert_eq!(header(text), (line, names.clone()), "{text:?}");
+        }
+        // Nothing is known: the first line that is neither blank nor a comment.
+        assert_eq!(header("# note\n\nx,y\n1,2").0, 3);
+        assert_eq!(header("1,2\n3,4").0, 1);
+        assert!(find_header(b"\n# a\n", |_| true).is_none());
+    }
+}
