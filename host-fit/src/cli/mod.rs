@@ -11,6 +11,7 @@ mod eval;
 mod export;
 mod fit;
 mod import;
+mod init;
 mod inspect;
 mod limit;
 mod live;
@@ -76,6 +77,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
     Import(Box<import::ImportArgs>),
+    /// Draft a stage.toml for logs: their columns mapped, and what must be filled in.
+    Init(init::InitArgs),
     /// Plan the run to make for the field model, and tell what to expect of it.
     Plan(plan::PlanArgs),
     /// Bring a parameter blob up to date by a few seconds of log.
@@ -113,6 +116,7 @@ pub fn main() -> ExitCode {
         Command::Export(args) => export::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Import(args) => import::run(*args),
+        Command::Init(args) => init::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Recalibrate(args) => recalibrate::run(&args),
         Command::Simulate(args) => simulate::run(&args),

@@ -12,6 +12,7 @@
 pub(crate) mod cell;
 mod decimal;
 mod error;
+pub(crate) mod guess;
 pub(crate) mod header;
 pub mod layout;
 mod order;
@@ -157,7 +158,7 @@ fn append(
     options: &ReadOptions,
 ) -> Result<(), LogError> {
     let text = source::to_utf8(text, path)?;
-    let table = Table::open(path, &text, &stage.log)?;
+    let table = Table::open(path, &text, |name| stage.log.knows(name))?;
     let (dataset, warnings) = (&mut reading.dataset, &mut reading.warnings);
     reading.skipped_rows += reader::append(table, stage, options, dataset, warnings)?;
     refuse_repeated_log(&reading.dataset)

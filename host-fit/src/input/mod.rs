@@ -2,6 +2,7 @@
 
 mod binary;
 pub mod dataset;
+pub mod draft;
 mod encoding;
 pub mod log;
 pub mod shipped;

@@ -63,7 +63,7 @@ pub fn read(path: &Path, stage: &Stage) -> Result<(Reference, ReferenceCounts), 
     let text = source::read_text(path).map_err(LogError::from)?;
     let path = source::shown_name(path);
     let text = source::to_utf8(&text, path).map_err(LogError::from)?;
-    let mut table = Table::open(path, &text, &stage.log)?;
+    let mut table = Table::open(path, &text, |name| stage.log.knows(name))?;
     let cells = Cells::find(&table, stage)?;
     let mut samples: Vec<Sample> = Vec::new();
     let mut clock = Clock::default();

@@ -96,7 +96,7 @@ pub(super) const WHOLE_MAX: f64 = 9_007_199_254_740_992.0;
 const SHOWN_CHARS: usize = 40;
 
 /// A cell's text for a message: valid UTF-8, no control characters, not too long.
-pub(super) fn shown(cell: &[u8]) -> String {
+pub(crate) fn shown(cell: &[u8]) -> String {
     let text = String::from_utf8_lossy(cell.get(..4 * SHOWN_CHARS).unwrap_or(cell));
     let clean = |c: char| if c.is_control() { '\u{fffd}' } else { c };
     let mut short: String = text.chars().map(clean).take(SHOWN_CHARS).collect();

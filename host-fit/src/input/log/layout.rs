@@ -242,6 +242,12 @@ impl LogLayout {
         })
     }
 
+    /// Whether a column of this name holds a quantity.
+    pub(crate) fn knows(&self, name: &str) -> bool {
+        let meaning = self.meaning(name);
+        matches!(meaning, Meaning::Exact(_) | Meaning::WithUnit(..))
+    }
+
     /// m, rad, us or codes per `symbol` of a quantity.
     pub(crate) fn scale(&self, quantity: Quantity, symbol: &str) -> Result<f64, UnitFault> {
         let kind = quantity.kind();

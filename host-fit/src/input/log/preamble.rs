@@ -1,5 +1,6 @@
 //! Where the header of a table stands: instruments write notes above it, some put it in a comment.
 
+use super::decimal;
 use csv::ByteRecord;
 
 /// Starts a comment, as the first byte of a line.
@@ -24,33 +25,46 @@ pub(super) struct HeaderLine {
 }
 
 /// The header: the first line with at least three known names; without one, the line of known
-/// names in the last comment above the rows, as NumPy writes it; without one, the first line that
-/// is neither blank nor a comment. `None` if there is no such line.
+/// names in the last comment above the rows, as NumPy writes it; without one, the line above the
+/// first row of numbers, or above its row of units, with as many cells; without one, the first line
+/// that is neither blank nor a comment. `None` if there is no such line.
 pub(super) fn find_header(bytes: &[u8], is_known: impl Fn(&str) -> bool) -> Option<HeaderLine> {
     let known = |line: &HeaderLine| line.names.iter().filter(|name| is_known(name)).count();
-    let mut first = None;
+    let mut plain: Vec<HeaderLine> = Vec::new();
     let mut comment = None;
     for (start, line) in lines(bytes).take(LINES_MAX) {
         let end = start + line.len();
         if let Some(note) = line.strip_prefix(&[COMMENT]) {
             let line = header_line(note, start, end);
-            let is_header = first.is_none() && known(&line) >= KNOWN_MIN;
+            let is_header = known(&line) >= KNOWN_MIN && !plain.iter().any(is_row);
             comment = if is_header { Some(line) } else { comment };
-            continue;
+        } else if !line.trim_ascii().is_empty() {
+            let line = header_line(line, start, end);
+            if known(&line) >= KNOWN_MIN {
+                return Some(line);
+            }
+            plain.push(line);
         }
-        if line.trim_ascii().is_empty() {
-            continue;
-        }
-        let line = header_line(line, start, end);
-        if known(&line) >= KNOWN_MIN {
-            return Some(line);
-        }
-        first.get_or_insert(line);
     }
-    match &first {
-        Some(row) if !is_numeric(&row.names) => first,
-        _ => comment.or(first),
-    }
+    let above_rows = || {
+        let row = plain.iter().position(is_row)?;
+        let cells = plain.get(row)?.names.len();
+        let above = plain.get(..row)?.iter().rev();
+        let as_many = above.take_while(|line| line.names.len() == cells).count();
+        (as_many > 0).then_some(row - as_many)
+    };
+    let header = above_rows().unwrap_or(0);
+    comment.or_else(|| plain.into_iter().nth(header))
+}
+
+/// Whether a line is more than half numbers, and has at least two.
+fn is_row(line: &HeaderLine) -> bool {
+    let is_number = |cell: &&String| {
+        let cell = decimal::with_point(cell.as_bytes());
+        core::str::from_utf8(&cell).is_ok_and(|cell| cell.parse::<f64>().is_ok())
+    };
+    let numbers = line.names.iter().filter(is_number).count();
+    numbers >= 2 && 2 * numbers > line.names.len()
 }
 
 /// Whether every name is a number: then the line is a row.
@@ -136,7 +150,12 @@ mod tests {
         ] {
             assert_eq!(header(text), (line, names.clone()), "{text:?}");
         }
-        // Nothing is known: the first line that is neither blank nor a comment.
+        // Nothing is known: the line above the rows, or the first that is no comment.
+        assert_eq!(header("note\nrate;500\nx;y;z\num;um;V\n1;2,5;3").0, 3);
+        assert_eq!(
+            header("note\n\n# note\nx,y,z\n2026-01-02T03:04:05,2,3").0,
+            4
+        );
         assert_eq!(header("# note\n\nx,y\n1,2").0, 3);
         assert_eq!(header("1,2\n3,4").0, 1);
         assert!(find_header(b"\n# a\n", |_| true).is_none());

@@ -7,7 +7,6 @@
 use super::cell::shown;
 use super::decimal;
 use super::error::{CellPlace, LogError};
-use super::layout::{LogLayout, Meaning};
 use super::preamble::{self, COMMENT};
 use super::units;
 use crate::input::source::SourceError;
@@ -44,7 +43,7 @@ impl<'a> Table<'a> {
     ///
     /// Cells are separated by commas, semicolons or tabs, whichever the header has most;
     /// lines end in LF or CRLF, a line that starts with `#` is a comment, blank lines are
-    /// skipped. Notes may stand above the header, which is told by the names of `layout`, and a
+    /// skipped. Notes may stand above the header, which is told by the names of columns that are known, and a
     /// row of units below it. Numbers may have decimal commas where commas do not separate cells.
     ///
     /// # Errors
@@ -52,13 +51,9 @@ impl<'a> Table<'a> {
     pub(crate) fn open(
         path: &'a Path,
         bytes: &'a [u8],
-        layout: &LogLayout,
+        is_known: impl Fn(&str) -> bool,
     ) -> Result<Self, LogError> {
         let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
-        let is_known = |name: &str| {
-            let meaning = layout.meaning(name);
-            matches!(meaning, Meaning::Exact(_) | Meaning::WithUnit(..))
-        };
         let header = preamble::find_header(bytes, is_known).ok_or_else(|| LogError::Empty {
             path: path.to_path_buf(),
         })?;
@@ -285,8 +280,8 @@ mod tests {
     fn a_row_is_placed_at_its_own_line_whatever_stands_above_it() {
         for end in ["\n", "\r\n"] {
             let text = ["# a note", "", "a,b", "# more", "1,2", "", "", "3,4"].join(end);
-            let mut table = Table::open(Path::new("x"), text.as_bytes(), &LogLayout::default())
-                .expect("a table");
+            let mut table =
+                Table::open(Path::new("x"), text.as_bytes(), |_| false).expect("a table");
             let mut lines = vec![table.header_line()];
             while table.next_row().expect("sound") {
                 lines.push(table.line(table.row_byte()));
@@ -295,7 +290,7 @@ mod tests {
         }
         // The last line of a table without line feeds is no comment, and no row.
         let text = "# a note\r\ra,b\r1,2\r# more\r".as_bytes();
-        let mut table = Table::open(Path::new("x"), text, &LogLayout::default()).expect("a table");
+        let mut table = Table::open(Path::new("x"), text, |_| false).expect("a table");
         assert_eq!(
             (table.header_line(), table.next_row().ok()),
             (3, Some(true))

@@ -43,7 +43,7 @@ fn plain(symbol: &str) -> Cow<'_, str> {
 }
 
 /// Whether the symbol stands for no unit.
-pub(super) fn is_count(symbol: &str) -> bool {
+pub(crate) fn is_count(symbol: &str) -> bool {
     COUNTS.contains(&symbol.trim())
 }
 

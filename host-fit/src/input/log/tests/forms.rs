@@ -70,7 +70,7 @@ fn units_stand_in_the_header_in_every_spelling() {
         .replace("t_us", "Time (s)")
         .replace("hall_a_cnt", "Hall A [counts]");
     same_rows(
-        &log.replace("cap1_cnt", "cap 1")
+        log.replace("cap1_cnt", "cap 1")
             .replace("movement", "Movement"),
         stage(),
     );

@@ -11,25 +11,31 @@ fn read_all_ways(bytes: &[u8]) -> Result<(), TestCaseError> {
             ..ReadOptions::default()
         },
     ] {
-        match read_bytes(bytes, Path::new("log"), stage(), &options) {
-            Ok(LogReading { dataset, .. }) => {
-                let covered: usize = dataset.movements.iter().map(|m| m.rows.len()).sum();
-                prop_assert_eq!(covered, dataset.rows.len());
-                for (slot, movement) in dataset.movements.iter().enumerate() {
-                    let rows = &dataset.rows[movement.rows.clone()];
-                    prop_assert!(rows.iter().all(|row| row.movement == slot));
-                    prop_assert!(rows.windows(2).all(|pair| pair[0].t_us < pair[1].t_us));
-                }
-                let finite = |row: &Row| {
-                    [row.signal_m, row.vertical, row.reference]
-                        .concat()
-                        .iter()
-                        .all(|x| x.is_finite())
-                };
-                prop_assert!(dataset.rows.iter().all(finite));
+        check(read_bytes(bytes, Path::new("log"), stage(), &options))?;
+    }
+    Ok(())
+}
+
+/// Movements cover the rows, one after the other, forwards in time, with finite numbers.
+fn check(reading: Result<LogReading, LogError>) -> Result<(), TestCaseError> {
+    match reading {
+        Ok(LogReading { dataset, .. }) => {
+            let covered: usize = dataset.movements.iter().map(|m| m.rows.len()).sum();
+            prop_assert_eq!(covered, dataset.rows.len());
+            for (slot, movement) in dataset.movements.iter().enumerate() {
+                let rows = &dataset.rows[movement.rows.clone()];
+                prop_assert!(rows.iter().all(|row| row.movement == slot));
+                prop_assert!(rows.windows(2).all(|pair| pair[0].t_us < pair[1].t_us));
             }
-            Err(error) => prop_assert!(error.to_string().contains("; "), "{}", error),
+            let finite = |row: &Row| {
+                [row.signal_m, row.vertical, row.reference]
+                    .concat()
+                    .iter()
+                    .all(|x| x.is_finite())
+            };
+            prop_assert!(dataset.rows.iter().all(finite));
         }
+        Err(error) => prop_assert!(error.to_string().contains("; "), "{}", error),
     }
     Ok(())
 }
@@ -47,6 +53,32 @@ proptest! {
         read_all_ways(text.as_bytes())?;
         let header = LOG.lines().next().unwrap_or_default();
         read_all_ways(format!("{header}\n{text}").as_bytes())?;
+    }
+
+    #[test]
+    fn odd_headers_and_rows_of_units_never_panic(
+        names in prop::collection::vec("(ifm_|hall |cap_|time|t|x|y|z|movement|Rz)?[xyabc123]{0,2}(_nm|_V| ?\\[[\u{b5}\u{3bc}unm]{1,2}(m|s|rad|V)\\]|/um|\\(s\\)|[(\\[/\\])])?", 1..13),
+        units in "[-,;munsVrad\u{b5}\\[\\]() ]{0,40}", rows in "[-0-9,;.:TZ\t\n]{0,200}", separator in "[,;\t]",
+    ) {
+        let header = names.join(&separator);
+        read_all_ways(format!("{header}\n{units}\n{rows}\n").as_bytes())?;
+        let bare = LOG.replace("movement,", "");
+        read_all_ways(bare.replacen("t_us", &names[0], 1).as_bytes())?;
+        let utf16: Vec<u8> = format!("{header}\n{rows}").encode_utf16().flat_map(u16::to_le_bytes).collect();
+        read_all_ways(&utf16)?;
+    }
+
+    #[test]
+    fn random_times_without_movements_never_panic(
+        times in prop::collection::vec(prop_oneof!["-?[0-9]{1,4}", "-?[0-9]{1,20}", "2026-0[12]-0[1-9]T0[0-9]:00:0[0-9](\\.[0-9]{1,9})?Z?"], 1..40),
+        split_s in prop::option::of(1e-3..1e6),
+    ) {
+        let rows: String = times.iter().map(|t| format!("{t},0,0,0,0,0,0,1,2,3\n")).collect();
+        let header = LOG.lines().next().unwrap_or_default().replace("movement,", "");
+        for bad_rows in [BadRows::Refuse, BadRows::Skip] {
+            let options = ReadOptions { bad_rows, split_s, ..ReadOptions::default() };
+            check(read_text(&format!("{header}\n{rows}"), &options))?;
+        }
     }
 
     #[test]

@@ -1,0 +1,55 @@
+//! `host-fit init`.
+
+use crate::cli::error::HostError;
+use crate::input::draft::draft;
+use crate::output::{check_writable, write_atomically};
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `init`.
+#[derive(Debug, Args)]
+pub(super) struct InitArgs {
+    /// Logs: CSV or CSV.gz, one or more; `-` for standard input.
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// Where to write the stage file; `-` for standard output.
+    #[arg(long, value_name = "stage.toml", default_value = "stage.toml")]
+    out: PathBuf,
+    /// Replace a file that exists.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Drafts a stage file for logs.
+pub(super) fn run(args: &InitArgs) -> Result<(), HostError> {
+    let inputs: Vec<&Path> = args.logs.iter().map(PathBuf::as_path).collect();
+    super::keep_apart(&[Some(&args.out)], &inputs)?;
+    let shown = super::is_standard_output(Some(&args.out));
+    if !shown && !args.force && args.out.exists() {
+        return Err(HostError::Usage {
+            argument: "--out",
+            problem: format!(
+                "{} exists already; name another file, or replace it with --force",
+                args.out.display()
+            ),
+        });
+    }
+    if !shown {
+        check_writable(&args.out)?;
+    }
+    let draft = draft(&args.logs)?;
+    if shown {
+        return super::print(&draft.text);
+    }
+    write_atomically(&args.out, draft.text.as_bytes())?;
+    let left_out = match draft.ignored.as_slice() {
+        [] => String::new(),
+        names => format!(", left out: {}", names.join(", ")),
+    };
+    super::print(&format!(
+        "{} columns mapped{left_out}\nwrote {}\n{} lines in it are to be filled in: they begin with \"# FILL IN\"\n",
+        draft.mapped,
+        args.out.display(),
+        draft.to_fill_in
+    ))
+}
