@@ -27,6 +27,14 @@ impl FromStr for Train {
     }
 }
 
+/// A length of movements: `--split`.
+pub(super) fn movement_seconds(text: &str) -> Result<f64, &'static str> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (1e-3..=1e6).contains(&seconds) => Ok(seconds),
+        _ => Err("expected a number of seconds from 0.001 to 1000000"),
+    }
+}
+
 impl ValueEnum for Projection {
     fn value_variants<'a>() -> &'a [Self] {
         &[Self::None, Self::Delta, Self::Linear]

@@ -19,12 +19,16 @@ use std::path::{Path, PathBuf};
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub(super) struct CompareArgs {
-    /// Logs: CSV or CSV.gz, one or more.
+    /// Logs: CSV or CSV.gz, one or more; `-` for standard input.
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// The stage as designed.
     #[arg(long, value_name = "stage.toml")]
     stage: PathBuf,
+    /// Logs without a column for the movement: begin one every so many seconds, not only after gaps
+    /// in time.
+    #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
+    split: Option<f64>,
     /// Forms of the problem, separated by commas.
     #[arg(
         long,
@@ -67,9 +71,11 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), HostError> {
         check_writable(&folder.join("table.md"))?;
     }
     let stage = Stage::from_file(&args.stage)?;
-    let log = terminal::timed("reading", || {
-        log::read(&args.logs, &stage, &ReadOptions::default())
-    })?;
+    let options = ReadOptions {
+        split_s: args.split,
+        ..ReadOptions::default()
+    };
+    let log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;
     let interrupted = interrupt::watch();
     let comparison = Comparison {
         forms: args.project.clone(),

@@ -17,7 +17,7 @@ pub(super) struct DecodeArgs {
     /// The parameter blob.
     #[arg(value_name = "params.bin")]
     params: PathBuf,
-    /// The log: CSV or CSV.gz; it needs no reference.
+    /// The log: CSV or CSV.gz, or `-` for standard input; it needs no reference.
     #[arg(value_name = "LOG")]
     log: PathBuf,
     /// The stage as designed.

@@ -5,7 +5,7 @@ use crate::cli::terminal;
 use crate::diagnose;
 use crate::diagnose::finding::Severity;
 use crate::fit::FitWarning;
-use crate::input::log;
+use crate::input::log::{self, ReadOptions};
 use crate::input::stage::Stage;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::output::blob_file;
@@ -32,7 +32,7 @@ pub(super) struct EvalArgs {
     /// The parameter blob.
     #[arg(value_name = "params.bin")]
     params: PathBuf,
-    /// Logs: CSV or CSV.gz, one or more.
+    /// Logs: CSV or CSV.gz, one or more; `-` for standard input.
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// The stage as designed.
@@ -41,6 +41,10 @@ pub(super) struct EvalArgs {
     /// Zero deviations; as the blob's model has them if not given: models (12) and (15) have none.
     #[arg(long, value_enum)]
     delta: Option<DeltaChoice>,
+    /// Logs without a column for the movement: begin one every so many seconds, not only after gaps
+    /// in time.
+    #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
+    split: Option<f64>,
     /// Largest rms error, in terms of that of the logs that the blob was fitted to: 3 if not given,
     /// and 10 for models (12) to (31), whose own logs may not show what they lack.
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
@@ -84,7 +88,11 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     let set = blob_file::read(&args.params)?;
     let stage = Stage::from_file(&args.stage)?;
     super::same_scales(&set, &stage, &args.stage)?;
-    let log = terminal::timed("reading", || log::read(&args.logs, &stage, &super::EVAL))?;
+    let options = ReadOptions {
+        split_s: args.split,
+        ..super::EVAL
+    };
+    let log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;
     let zeros = match args.delta {
         None => Zeros::of_model(Model::of(set.model)),
         Some(DeltaChoice::Fit) => Zeros::Refit,

@@ -50,7 +50,7 @@ pub(super) fn blob_text(value: &str) -> Result<Text, &'static str> {
 /// Arguments of `fit`.
 #[derive(Debug, Args)]
 pub(super) struct FitArgs {
-    /// Logs: CSV or CSV.gz, one or more.
+    /// Logs: CSV or CSV.gz, one or more; `-` for standard input.
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// The stage as designed.
@@ -103,6 +103,10 @@ pub(super) struct FitArgs {
     /// What to do with rows that cannot be used.
     #[arg(long, value_enum, default_value = "refuse")]
     bad_rows: BadRows,
+    /// Logs without a column for the movement: begin one every so many seconds, not only after gaps
+    /// in time.
+    #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
+    split: Option<f64>,
     /// Largest rms errors over all rows; beyond, no blob is written.
     #[arg(long, value_name = "x=1.5um,...")]
     limit: Option<Limits>,
@@ -141,6 +145,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let stage = Stage::from_file(&args.stage)?;
     let options = ReadOptions {
         bad_rows: args.bad_rows,
+        split_s: args.split,
         ..ReadOptions::default()
     };
     // Before the work, so that no blob is left without the figures that were asked for.

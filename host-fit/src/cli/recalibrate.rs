@@ -43,7 +43,7 @@ pub(super) struct RecalibrateArgs {
     /// The blob to bring up to date: of the field model.
     #[arg(value_name = "old.bin")]
     params: PathBuf,
-    /// Logs: CSV or CSV.gz, a few seconds.
+    /// Logs: CSV or CSV.gz, a few seconds; `-` for standard input.
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// The stage as designed.
@@ -55,6 +55,10 @@ pub(super) struct RecalibrateArgs {
     /// Where to write the new blob.
     #[arg(long, value_name = "new.bin")]
     out: PathBuf,
+    /// Logs without a column for the movement: begin one every so many seconds, not only after gaps
+    /// in time.
+    #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
+    split: Option<f64>,
     /// Creation time, for the blob, as you want it to read; at most 32 bytes.
     #[arg(long, value_name = "TIME", value_parser = super::fit::blob_text)]
     created: Option<Text>,
@@ -137,9 +141,11 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         Some(path) => read_known(path, &old, args)?,
         None => None,
     };
-    let log = terminal::timed("reading", || {
-        log::read(&args.logs, &stage, &ReadOptions::default())
-    })?;
+    let options = ReadOptions {
+        split_s: args.split,
+        ..ReadOptions::default()
+    };
+    let log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;
     let created = args.created.clone().unwrap_or_default();
     let new = recalibrate(
         &old,

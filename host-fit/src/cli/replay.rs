@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// Arguments of `replay`.
 #[derive(Debug, Args)]
 pub(super) struct ReplayArgs {
-    /// The log: CSV or CSV.gz; it needs no reference.
+    /// The log: CSV or CSV.gz, or `-` for standard input; it needs no reference.
     #[arg(value_name = "LOG")]
     log: PathBuf,
     /// The stage as designed.
