@@ -1,0 +1,139 @@
+//! Logs as laboratories have them, from the command line: split, read from a pipe, drafted for.
+
+mod common;
+
+use common::{Bench, stdout, thinned_log};
+use std::io::Write;
+use std::process::Stdio;
+
+const MARK: &str = "# FILL IN: ";
+
+/// The shipped log, thinned, as one recording: no column for the movement, time that goes on with a
+/// pause of so many ms between movements.
+fn one_recording(pause_ms: i64) -> String {
+    let log = thinned_log(20, |_| true);
+    let mut lines = log.lines();
+    let header = lines.next().expect("a header");
+    let mut text = header.replace("movement,", "") + "\n";
+    for line in lines {
+        let cells: Vec<&str> = line.splitn(3, ',').collect();
+        let number = |at: usize| cells[at].parse::<i64>().expect("a number");
+        let t_us = number(1) + number(0) * (2_000_000 + pause_ms * 1000);
+        text += &format!("{t_us},{}\n", cells[2]);
+    }
+    text
+}
+
+#[test]
+fn one_long_recording_is_fitted_as_its_movements_are() {
+    let bench = Bench::new();
+    bench.write("log.csv", thinned_log(20, |_| true));
+    bench.write("paused.csv", one_recording(1000));
+    bench.write("whole.csv", one_recording(0));
+    let fit = |log: &str| {
+        let output = bench.good(&format!(
+            "fit {log} --stage stage.toml --out p.bin --json p.json"
+        ));
+        (bench.json("p.json"), common::stderr(&output))
+    };
+    let (want, _) = fit("log.csv");
+    for log in ["paused.csv", "whole.csv --split 2"] {
+        let (have, warnings) = fit(log);
+        assert_eq!(have["errors"], want["errors"], "{log}");
+        assert_eq!(have["movements"], 57, "{log}");
+        assert!(warnings.contains("there are 57 in all"), "{warnings}");
+        bench.good(&format!("eval p.bin {log} --stage stage.toml"));
+    }
+    let refused = "fit log.csv --stage stage.toml --out p.bin --split 2";
+    bench.bad(refused, 3, &["log.csv", "--split does not apply"]);
+    let usage = "fit log.csv --stage stage.toml --out p.bin --split 0";
+    bench.bad(usage, 2, &["--split"]);
+}
+
+#[test]
+fn a_log_comes_by_standard_input_too() {
+    let bench = Bench::new();
+    bench.write("log.csv", thinned_log(20, |_| true));
+    bench.good("fit log.csv --stage stage.toml --out p.bin");
+    bench.good("decode p.bin log.csv --stage stage.toml --out want.csv");
+    let pipe = |log: &[u8], status: i32| {
+        let mut child = bench
+            .command(&[
+                "decode",
+                "p.bin",
+                "-",
+                "--stage",
+                "stage.toml",
+                "--out",
+                "pose.csv",
+            ])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program runs");
+        let mut input = child.stdin.take().expect("a pipe");
+        input.write_all(log).expect("written");
+        drop(input);
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!(
+            output.status.code(),
+            Some(status),
+            "{}",
+            common::stderr(&output)
+        );
+        common::stderr(&output)
+    };
+    pipe(&bench.read("log.csv"), 0);
+    assert_eq!(bench.read("pose.csv"), bench.read("want.csv"));
+    pipe(host_fit::input::shipped::LOG_GZ, 0);
+    let message = pipe(b"movement,t_us,hall_a\n", 3);
+    assert!(message.contains("standard input:1"), "{message}");
+    let message = pipe(b"", 3);
+    assert!(
+        message.contains("standard input: the log is empty"),
+        "{message}"
+    );
+}
+
+#[test]
+fn init_drafts_a_stage_file_that_is_refused_until_it_is_filled_in() {
+    let bench = Bench::new();
+    let log = thinned_log(20, |_| true)
+        .replacen("movement", "Run", 1)
+        .replacen("ifm_x_nm", "Laser X [nm]", 1)
+        .replacen("hall_b_cnt", "Hall 2", 1)
+        .replace('\n', ",21.5\n")
+        .replacen("21.5", "temperature", 1);
+    bench.write("log.csv", log);
+    bench.bad("init log.csv", 2, &["stage.toml exists", "--force"]);
+    let told = stdout(&bench.good("init log.csv --out new.toml"));
+    assert!(
+        told.contains("11 columns mapped, left out: temperature"),
+        "{told}"
+    );
+    let fit = "fit log.csv --stage new.toml --out p.bin";
+    bench.bad(fit, 3, &["new.toml", "`: missing; add it"]);
+    // The examples are those of the stage that made the log.
+    let text = bench.text("new.toml");
+    assert!(text.contains(MARK));
+    bench.write(
+        "new.toml",
+        text.replace(MARK, "")
+            .replace("period_s = 0.04 ", "period_s = 0.002 "),
+    );
+    bench.good(fit);
+    bench.write("old.csv", thinned_log(20, |_| true));
+    bench.good("fit old.csv --stage stage.toml --out old.bin --json old.json");
+    bench.good(&format!("{fit} --json new.json"));
+    assert_eq!(
+        bench.json("new.json")["errors"],
+        bench.json("old.json")["errors"]
+    );
+    let shown = stdout(&bench.good("init log.csv --out -"));
+    assert_eq!(shown, text);
+    bench.good("init log.csv --force");
+    assert_eq!(bench.text("stage.toml"), text);
+    bench.bad("init nowhere.csv --out other.toml", 3, &["nowhere.csv"]);
+    assert!(!common::exists(&bench.path("other.toml")));
+}
