@@ -46,7 +46,11 @@ fn a_dash_is_standard_output_for_one_output_and_nothing_else() {
     let blob = bench.good(&format!("{fit} -"));
     assert_eq!(blob.stdout, bench.read("p.bin"));
     assert!(!bench.path("-").exists() && !bench.path("-.posterior").exists());
-    bench.bad(&format!("{fit} - --json -"), 2, &["cannot both go to standard output"]);
+    bench.bad(
+        &format!("{fit} - --json -"),
+        2,
+        &["cannot both go to standard output"],
+    );
     let json = bench.good(&format!("{fit} q.bin --json -"));
     assert!(serde_json::from_slice::<serde_json::Value>(&json.stdout).is_ok());
     bench.good("decode p.bin log.csv --stage stage.toml --out pose.csv");

@@ -25,6 +25,10 @@ pub(super) struct CheckArgs {
     /// The stage as designed.
     #[arg(long, value_name = "stage.toml")]
     stage: PathBuf,
+    /// Logs without a column for the movement: begin one every so many seconds, not only after gaps
+    /// in time.
+    #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
+    split: Option<f64>,
     /// Write what was found as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -81,9 +85,11 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     super::keep_apart(&[args.json.as_deref()], &inputs)?;
     interrupt::watch();
     let stage = Stage::from_file(&args.stage)?;
-    let log = terminal::timed("reading", || {
-        log::read(&args.logs, &stage, &ReadOptions::default())
-    })?;
+    let options = ReadOptions {
+        split_s: args.split,
+        ..ReadOptions::default()
+    };
+    let log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;
     let mut options = SolverOptions::new(Projection::Linear, 1);
     options.interrupt = Some(interrupt::watch());
     let settings = FitSettings {

@@ -1,8 +1,9 @@
 //! `host-fit init`.
 
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::input::draft::draft;
-use crate::output::{check_writable, write_atomically};
+use crate::output::{check_writable, is_standard, write_atomically};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -24,8 +25,7 @@ pub(super) struct InitArgs {
 pub(super) fn run(args: &InitArgs) -> Result<(), HostError> {
     let inputs: Vec<&Path> = args.logs.iter().map(PathBuf::as_path).collect();
     super::keep_apart(&[Some(&args.out)], &inputs)?;
-    let shown = super::is_standard_output(Some(&args.out));
-    if !shown && !args.force && args.out.exists() {
+    if !is_standard(&args.out) && !args.force && args.out.exists() {
         return Err(HostError::Usage {
             argument: "--out",
             problem: format!(
@@ -34,19 +34,14 @@ pub(super) fn run(args: &InitArgs) -> Result<(), HostError> {
             ),
         });
     }
-    if !shown {
-        check_writable(&args.out)?;
-    }
+    check_writable(&args.out)?;
     let draft = draft(&args.logs)?;
-    if shown {
-        return super::print(&draft.text);
-    }
     write_atomically(&args.out, draft.text.as_bytes())?;
     let left_out = match draft.ignored.as_slice() {
         [] => String::new(),
         names => format!(", left out: {}", names.join(", ")),
     };
-    super::print(&format!(
+    terminal::print(&format!(
         "{} columns mapped{left_out}\nwrote {}\n{} lines in it are to be filled in: they begin with \"# FILL IN\"\n",
         draft.mapped,
         args.out.display(),
