@@ -59,7 +59,7 @@ impl Checked {
             movements: log.dataset.movements.len(),
             skipped_rows: log.skipped_rows,
             failure: fitted.err().map(ToString::to_string),
-            warnings: log.warnings.iter().map(ToString::to_string).collect(),
+            warnings: super::warnings_of(log),
             findings,
             trusted_inputs: fitted.map_or_else(|_| Vec::new(), |fit| trusted(&fit.set)),
         }

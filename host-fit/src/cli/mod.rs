@@ -23,7 +23,7 @@ mod simulate;
 mod terminal;
 
 use crate::cli::error::HostError;
-use crate::input::log::{LogReading, ReadOptions, ReferenceUse};
+use crate::input::log::{LogReading, LogWarning, ReadOptions, ReferenceUse};
 use crate::input::stage::Stage;
 use crate::output::{is_standard, write_atomically};
 use crate::progress;
@@ -225,6 +225,13 @@ fn same_scales(set: &ParameterSet, stage: &Stage, path: &Path) -> Result<(), Hos
     Ok(())
 }
 
+/// The warnings of a log that is diagnosed, which tells of another rate itself.
+fn warnings_of(log: &LogReading) -> Vec<String> {
+    let told = |warning: &&LogWarning| !matches!(warning, LogWarning::OtherPeriod { .. });
+    let warnings = log.warnings.iter().filter(told);
+    warnings.map(ToString::to_string).collect()
+}
+
 /// What the reports say of the logs.
 fn circumstances<'s>(log: &'s LogReading, stage: &'s Stage, started: Instant) -> Circumstances<'s> {
     Circumstances {
@@ -232,7 +239,7 @@ fn circumstances<'s>(log: &'s LogReading, stage: &'s Stage, started: Instant) ->
         dataset: &log.dataset,
         skipped_rows: log.skipped_rows,
         elapsed_s: started.elapsed().as_secs_f64(),
-        warnings: log.warnings.iter().map(ToString::to_string).collect(),
+        warnings: warnings_of(log),
         findings: Vec::new(),
     }
 }
