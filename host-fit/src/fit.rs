@@ -8,10 +8,11 @@ mod field;
 mod warning;
 
 pub use compensate::fit_compensated;
+use field::FirstPhase;
 pub use field::field_calibration;
 pub use warning::FitWarning;
 
-use crate::input::dataset::Dataset;
+use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
 use crate::judge::identify::{FitFailure, check_described, check_determined, check_motion};
 use crate::judge::lag::{ReferenceLag, reference_lag};
@@ -22,10 +23,12 @@ use crate::problem::draw::{Draw, draw_rows};
 use crate::problem::model::{COUNT, Model};
 use crate::problem::parameters::Parameters;
 use crate::solve::field::fit::{FieldFit, FieldFitError};
+use crate::solve::robust::{HALF, Loss};
 use crate::solve::{Projection, Solution, SolveError, Solver, SolverOptions};
 use runtime::calibration::Origin;
 use runtime::parameters::{FitRecord, ParameterError, Text};
 use runtime::{Calibration, ModelKind, ParameterSet};
+use std::cell::OnceCell;
 
 /// Room around the motion of the log in which the calibration still holds: offsets of
 /// the reference and overshoot are well inside it.
@@ -51,6 +54,8 @@ pub struct FitSettings {
     pub draw: Draw,
     /// How the problem is solved.
     pub solver: Solver,
+    /// How much rows count that the model does not explain; a search alone knows no such thing.
+    pub loss: Loss,
     /// For the solver; its seed also draws the rows.
     pub options: SolverOptions,
     /// Serial number of the stage, for the blob.
@@ -63,13 +68,14 @@ pub struct FitSettings {
 }
 
 impl FitSettings {
-    /// All rows by least squares, with seed 1, for a blob without serial number and creation time.
+    /// All rows by robust least squares, with seed 1, for a blob without serial number and creation time.
     pub fn new(model: ModelChoice) -> Self {
         Self {
             model,
             train: None,
             draw: Draw::Stratified,
             solver: Solver::LeastSquares,
+            loss: Loss::Cauchy,
             options: SolverOptions::new(Projection::Linear, 1),
             serial: Text::default(),
             created: Text::default(),
@@ -144,10 +150,12 @@ pub struct Fit {
     pub calibration: Calibration,
     /// What goes into the blob.
     pub set: ParameterSet,
-    /// Fitness over the rows that the fit used, with the solver's own zero deviations.
+    /// Fitness over the rows that the fit used, by their weights, with the solver's own zero deviations.
     pub train_fitness: f64,
     /// Rows that the fit used.
     pub train_rows: usize,
+    /// Those of them that count less than half, as the loss says.
+    pub outlier_rows: usize,
     /// All rows, decoded by the target's decoder.
     pub decoded: Decoded,
     /// Over all rows, by the target's decoder; zero deviations refitted where the model has them.
@@ -182,6 +190,8 @@ struct Job<'a> {
     settings: &'a FitSettings,
     /// The rows to use.
     selected: Vec<usize>,
+    /// See [`Job::first_phase`].
+    first: OnceCell<Result<FirstPhase, FitError>>,
 }
 
 impl<'a> Job<'a> {
@@ -192,6 +202,7 @@ impl<'a> Job<'a> {
             dataset,
             stage,
             settings,
+            first: OnceCell::new(),
         }
     }
 
@@ -238,6 +249,26 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// How much each row counts. All alike for a search alone, which has no weights, and where
+    /// the field model cannot be fitted at all.
+    fn weights(&self) -> Vec<f64> {
+        let alike = || vec![1.0; self.selected.len()];
+        match (self.settings.loss, self.settings.solver) {
+            (Loss::None, _) | (_, Solver::Search(_)) => alike(),
+            _ => self
+                .first_phase()
+                .map_or_else(|_| alike(), |first| first.field.weights.clone()),
+        }
+    }
+
+    /// The rows of the log that are no outliers.
+    fn sound_rows(&self, weights: &[f64]) -> impl Iterator<Item = &Row> {
+        let mut outliers = outliers(&self.selected, weights).peekable();
+        let rows = self.dataset.rows.iter().enumerate();
+        rows.filter(move |(row, _)| outliers.next_if_eq(row).is_none())
+            .map(|(_, row)| row)
+    }
+
     /// A model of the paper: slopes of the sensitivity at most.
     fn of_slopes(&self, model: &'static Model) -> Result<Fit, FitError> {
         let Self {
@@ -245,19 +276,26 @@ impl<'a> Job<'a> {
             stage,
             settings,
             selected,
+            ..
         } = self;
         let solver = settings.solver;
-        let problem = Problem::new(dataset, selected, stage, model);
+        let weights = self.weights();
+        let used = selected.iter().zip(&weights).filter(|(_, w)| **w > 0.0);
+        let (used, used_weights): (Vec<usize>, Vec<f64>) = used.unzip();
+        let mut problem = Problem::new(dataset, &used, stage, model);
+        for (row, weight) in problem.rows.iter_mut().zip(used_weights) {
+            row.weight = weight;
+        }
         let solution = solver.solve(&problem, &settings.options)?;
         let parameters = &solution.parameters;
         let at_pole = FitError::AtPole {
             solver: solver.name(),
         };
         let uncertainty = uncertainty(&problem, parameters, &solution.at_limit).ok_or(at_pole)?;
-        let calibration = calibration(dataset, stage, model, parameters)?;
+        let calibration = calibration(self.sound_rows(&weights), stage, model, parameters)?;
         let vertical = calibration.calibrated_vertical;
         let determined = check_determined(&problem, parameters, &uncertainty, vertical);
-        let judged = self.judged(model, &calibration);
+        let judged = self.judged(model, &calibration, &weights);
         if let Err(FitError::Unusable(_)) = judged {
             determined.clone()?;
         }
@@ -279,7 +317,8 @@ impl<'a> Job<'a> {
             train_rows: selected.len(),
             standard_error: uncertainty.standard_error,
             field: None,
-            lag: reference_lag(dataset, selected, stage, model, parameters),
+            lag: reference_lag(dataset, selected, stage, model, parameters, &weights),
+            outlier_rows: outliers(selected, &weights).count(),
             judgement_solver_zeros: decoded.judge(dataset, stage, own_zeros),
             solution,
             calibration,
@@ -289,8 +328,13 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Judges a calibration, which must describe the dataset.
-    fn judged(&self, model: &'static Model, calibration: &Calibration) -> Result<Judged, FitError> {
+    /// Judges a calibration, which must describe the rows that are no outliers.
+    fn judged(
+        &self,
+        model: &'static Model,
+        calibration: &Calibration,
+        weights: &[f64],
+    ) -> Result<Judged, FitError> {
         let (dataset, settings) = (self.dataset, self.settings);
         let origin = Origin {
             serial: settings.serial.clone(),
@@ -301,8 +345,18 @@ impl<'a> Job<'a> {
         let mut set = calibration.prepare(&origin).map_err(FitError::Unusable)?;
         let decoded = Decoded::new(&set, dataset);
         let judgement = decoded.judge(dataset, self.stage, Zeros::of_model(model));
+        let mut described = judgement.errors;
+        if outliers(&self.selected, weights).next().is_some() {
+            let mut sound = decoded.clone();
+            for row in outliers(&self.selected, weights) {
+                sound.errors[row] = None;
+            }
+            described = sound
+                .judge(dataset, self.stage, Zeros::of_model(model))
+                .errors;
+        }
         if !settings.force {
-            check_described(dataset, &judgement.errors, model)?;
+            check_described(dataset, &described, model)?;
         }
         let axes = judgement.errors.axes;
         set.fit = FitRecord {
@@ -320,6 +374,12 @@ impl<'a> Job<'a> {
     }
 }
 
+/// The rows that count less than half.
+fn outliers(selected: &[usize], weights: &[f64]) -> impl Iterator<Item = usize> {
+    let light = selected.iter().zip(weights).filter(|(_, w)| **w < HALF);
+    light.map(|(&row, _)| row)
+}
+
 /// A calibration on all rows, by the target's decoder.
 struct Judged {
     set: ParameterSet,
@@ -328,19 +388,19 @@ struct Judged {
 }
 
 /// The calibration that `parameters` make with the stage's scales, calibrated over the motion
-/// of the dataset and a tenth more.
+/// of the rows and a tenth more.
 ///
 /// # Errors
 /// [`FitError::NoDecoder`].
-pub fn calibration(
-    dataset: &Dataset,
+pub fn calibration<'r>(
+    rows: impl IntoIterator<Item = &'r Row>,
     stage: &Stage,
     model: &Model,
     parameters: &Parameters,
 ) -> Result<Calibration, FitError> {
     let mut planar = [0.0f64; 3];
     let mut vertical = [0.0f64; 3];
-    for row in &dataset.rows {
+    for row in rows {
         for axis in 0..3 {
             planar[axis] = planar[axis].max(row.reference[axis].abs());
             vertical[axis] = vertical[axis].max(row.vertical[axis].abs());

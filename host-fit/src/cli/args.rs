@@ -3,6 +3,7 @@
 use crate::compare::Case;
 use crate::input::log::BadRows;
 use crate::problem::draw::Draw;
+use crate::solve::robust::Loss;
 use crate::solve::search::kind::SearchKind;
 use crate::solve::{Projection, Solver};
 use clap::ValueEnum;
@@ -86,6 +87,21 @@ impl ValueEnum for Solver {
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(self.name()))
+    }
+}
+
+impl ValueEnum for Loss {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let help = match self {
+            Self::Cauchy => "Hardly at all (the default)",
+            Self::Huber => "As rows at the limit of 6 robust standard deviations do",
+            Self::None => "As any other: plain least squares",
+        };
+        Some(PossibleValue::new(self.name()).help(help))
     }
 }
 

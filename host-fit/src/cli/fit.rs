@@ -21,6 +21,7 @@ use crate::recalibrate::Known;
 use crate::report::html::{Page, Plot};
 use crate::report::json::{Choice, Circumstances, Report, of_fit};
 use crate::report::{plots, text};
+use crate::solve::robust::Loss;
 use crate::solve::{Projection, SolveError, Solver, SolverOptions};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -69,6 +70,9 @@ pub(super) struct FitArgs {
     /// How much of the problem is solved in closed form.
     #[arg(long, value_enum, default_value = "linear")]
     project: Projection,
+    /// How much rows count that the model does not explain.
+    #[arg(long, value_name = "NAME", value_enum)]
+    loss: Option<Loss>,
     /// Rows to fit: `all` or a number.
     #[arg(long, value_name = "N|all", default_value = "all")]
     train: Train,
@@ -140,6 +144,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     ];
     super::keep_apart(&outputs, &inputs)?;
     check_field_arguments(args)?;
+    check_loss(args)?;
     super::use_threads(args.threads);
     interrupt::watch();
     let stage = Stage::from_file(&args.stage)?;
@@ -171,6 +176,10 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         train: args.train.0,
         draw: args.draw,
         solver: args.solver,
+        loss: args.loss.unwrap_or(match args.solver {
+            Solver::Search(_) => Loss::None,
+            Solver::Finished | Solver::LeastSquares => Loss::Cauchy,
+        }),
         options,
         serial: args.serial.clone().unwrap_or_default(),
         created: args.created.clone().unwrap_or_default(),
@@ -228,6 +237,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         solver: solver.name(),
         project: project.name(),
         seed: args.seed,
+        loss: settings.loss.name(),
         lag_compensated: args.compensate_lag,
     };
     let report = of_fit(&fit, choice, &circumstances);
@@ -276,6 +286,20 @@ fn refusal(fit: &Fit, findings: &[Finding], limits: Option<&Limits>) -> Option<S
         return limits?.exceeded(&fit.judgement.errors);
     }
     Some(format!("the log is refused: {refused}"))
+}
+
+/// Only least squares has weights.
+fn check_loss(args: &FitArgs) -> Result<(), HostError> {
+    match (args.solver, args.loss) {
+        (Solver::Search(_), Some(Loss::Huber | Loss::Cauchy)) => Err(HostError::Usage {
+            argument: "--loss",
+            problem: format!(
+                "a search alone counts all rows alike: leave --solver {} out, or take --loss none",
+                args.solver.name()
+            ),
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// The field model has one way to be fitted.

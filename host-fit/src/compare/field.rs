@@ -38,7 +38,7 @@ pub(super) fn least_squares(
     let elapsed_s = started.elapsed().as_secs_f64();
     let cost = cost(dataset, rows, problem)?;
     let fitness = cost.fitness(&fit.parameters.model_31());
-    let calibration = field_calibration(dataset, problem.stage, &fit.parameters)?;
+    let calibration = field_calibration(&dataset.rows, problem.stage, &fit.parameters)?;
     Ok(Run {
         form: Case::Field,
         solver: LEAST_SQUARES,
@@ -66,7 +66,7 @@ impl Job<'_> {
         let (found, run) = self.run(Case::Field, &cost, &first);
         let calibration = cost
             .parameters(&found.best)
-            .map(|parameters| field_calibration(dataset, problem.stage, &parameters));
+            .map(|parameters| field_calibration(&dataset.rows, problem.stage, &parameters));
         Ok(Some(Run {
             rms: calibration
                 .and_then(|calibration| rms_of(dataset, problem.stage, &calibration.ok()?)),

@@ -281,8 +281,13 @@ fn rms_over_all_rows(
     problem: &Problem<'_>,
     solution: &Solution,
 ) -> Option<[f64; 3]> {
-    let calibration =
-        calibration(dataset, problem.stage, problem.model, &solution.parameters).ok()?;
+    let calibration = calibration(
+        &dataset.rows,
+        problem.stage,
+        problem.model,
+        &solution.parameters,
+    )
+    .ok()?;
     rms_of(dataset, problem.stage, &calibration)
 }
 

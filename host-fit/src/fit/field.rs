@@ -3,27 +3,28 @@
 
 use super::warning::{FitWarning, warnings};
 use super::{Fit, FitError, Job, Judged, calibration};
-use crate::input::dataset::Dataset;
+use crate::input::dataset::Row;
 use crate::input::stage::Stage;
 use crate::judge::Zeros;
 use crate::judge::lag::ReferenceLag;
 use crate::problem::Problem;
 use crate::problem::model::{Model, ParameterId};
 use crate::problem::parameters::{Parameters, search_box};
-use crate::solve::field::fit::{FieldFitError, fit_field};
+use crate::solve::field::fit::{FieldFitError, WhiteFit};
 use crate::solve::field::parameters::FieldParameters;
+use crate::solve::robust::{self, Loss};
 use crate::solve::{Solution, Solver};
 use runtime::model::Probes;
 use runtime::parameters::ParameterError;
 use runtime::{Calibration, ModelKind};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The calibration that parameters of the field model make: see [`calibration`].
 ///
 /// # Errors
 /// [`FitError::Unusable`] where PM is singular.
-pub fn field_calibration(
-    dataset: &Dataset,
+pub fn field_calibration<'r>(
+    rows: impl IntoIterator<Item = &'r Row>,
     stage: &Stage,
     parameters: &FieldParameters,
 ) -> Result<Calibration, FitError> {
@@ -33,7 +34,7 @@ pub fn field_calibration(
     Ok(Calibration {
         model: ModelKind::Field,
         probes: Probes::Field(constants.probes),
-        ..calibration(dataset, stage, model_31, &parameters.model_31())?
+        ..calibration(rows, stage, model_31, &parameters.model_31())?
     })
 }
 
@@ -68,47 +69,88 @@ fn beyond_ranges(
     Ok(beyond)
 }
 
+/// The field model under white noise, on which every robust fit rests: its residuals are noise
+/// and what is wrong with the log, where those of Model (31) are mostly what it lacks.
+pub(super) struct FirstPhase {
+    pub(super) field: WhiteFit,
+    evaluations: u64,
+    elapsed: Duration,
+}
+
 impl Job<'_> {
+    /// Model (31) by least squares, then the field model from there.
+    pub(super) fn first_phase(&self) -> Result<&FirstPhase, FitError> {
+        let fitted = || {
+            let started = Instant::now();
+            let (rows, settings) = (&self.selected, self.settings);
+            let problem = Problem::new(self.dataset, rows, self.stage, Model::of(ModelKind::M31));
+            let least_squares = Solver::LeastSquares.solve(&problem, &settings.options);
+            let found = least_squares.map_err(FitError::from).and_then(|start| {
+                let field = WhiteFit::new(self.dataset, rows, self.stage, &start.parameters)?;
+                Ok((start, field))
+            });
+            let (start, field) = match (found, settings.loss) {
+                (found, Loss::None) => found?,
+                (Ok((start, field)), loss) if !field.has_outliers(loss) => (start, field),
+                (_, loss) => {
+                    let start = robust::start(problem, &settings.options)?;
+                    let (from, stage) = (&start.parameters, self.stage);
+                    let field = WhiteFit::robust(self.dataset, rows, stage, from, loss)?;
+                    (start, field)
+                }
+            };
+            Ok(FirstPhase {
+                field,
+                evaluations: start.evaluations,
+                elapsed: started.elapsed(),
+            })
+        };
+        self.first
+            .get_or_init(fitted)
+            .as_ref()
+            .map_err(Clone::clone)
+    }
+
     /// The field model, refused where it would serve worse than Model (31).
     pub(super) fn of_field_model(&self, model: &'static Model) -> Result<Fit, FitError> {
         let Self {
             dataset,
             stage,
-            settings,
             selected,
+            ..
         } = self;
         let started = Instant::now();
-        let model_31 = Model::of(ModelKind::M31);
-        let problem = Problem::new(dataset, selected, stage, model_31);
-        let start = Solver::LeastSquares.solve(&problem, &settings.options)?;
-        let field = fit_field(dataset, selected, stage, &start.parameters)?;
+        let first = self.first_phase()?;
+        let problem = Problem::new(dataset, selected, stage, Model::of(ModelKind::M31));
+        let field = first.field.clone().finish(stage)?;
         if field.verdict.loses() {
             let verdict = Box::new(field.verdict);
             return Err(FieldFitError::NotCarried(verdict).into());
         }
-        let elapsed = started.elapsed();
+        let elapsed = first.elapsed + started.elapsed();
         let parameters = field.parameters.model_31();
         let at_limit = beyond_ranges(stage, &parameters)?;
-        let calibration = field_calibration(dataset, stage, &field.parameters)?;
+        let calibration =
+            field_calibration(self.sound_rows(&field.weights), stage, &field.parameters)?;
         let Judged {
             set,
             decoded,
             judgement,
-        } = self.judged(model, &calibration)?;
+        } = self.judged(model, &calibration, &field.weights)?;
         // The fit follows the reference's walk; one zero deviation for a movement is that of the
         // judgement.
         let errors = decoded.errors_less(&judgement.zeros, dataset);
         let mut cost = 0.0;
-        for error in selected.iter().filter_map(|&row| errors[row]) {
-            for (error, weight) in error.into_iter().zip(problem.weights) {
-                cost += weight * (error * 1e6) * (error * 1e6);
+        for (&row, row_weight) in selected.iter().zip(&field.weights) {
+            for (error, weight) in errors[row].into_iter().flatten().zip(problem.weights) {
+                cost += row_weight * (weight * (error * 1e6) * (error * 1e6));
             }
         }
         let solution = Solution {
             parameters,
             delta_m: judgement.zeros.iter().map(|zero| zero.delta_m).collect(),
             cost,
-            evaluations: start.evaluations + u64::from(field.iterations),
+            evaluations: first.evaluations + u64::from(field.iterations),
             elapsed,
             stopped: format!(
                 "maximum a posteriori reached {} steps after model (31)",
@@ -133,6 +175,7 @@ impl Job<'_> {
                 .collect(),
             train_fitness: problem.fitness(cost),
             train_rows: selected.len(),
+            outlier_rows: super::outliers(selected, &field.weights).count(),
             standard_error: field.posterior.standard_errors_31(),
             lag: field.posterior.lag_error_s.map(lag),
             judgement_solver_zeros: decoded.judge(dataset, stage, Zeros::Given(&solution.delta_m)),

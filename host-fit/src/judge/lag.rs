@@ -26,7 +26,7 @@ pub struct ReferenceLag {
     pub standard_error_s: f64,
 }
 
-/// The lag at the least squares of a model of the paper: one Gauss-Newton step of the lag with all
+/// The lag at the least squares of a model of the paper, with the weights of its rows: one Gauss-Newton step of the lag with all
 /// parameters that the model fits, under white noise and a walk of the reference. What the
 /// model leaves unexplained widens the standard error. `None` where no motion shows the lag.
 pub fn reference_lag(
@@ -35,8 +35,9 @@ pub fn reference_lag(
     stage: &Stage,
     model: &'static Model,
     parameters: &Parameters,
+    weights: &[f64],
 ) -> Option<ReferenceLag> {
-    let rows = Rows::new(dataset, selected);
+    let rows = Rows::weighted(dataset, selected, weights);
     let probes = probes(&FieldParameters::of_model_31(parameters, stage));
     let offsets_mm = vec![[0.0; 3]; rows.movements.len()];
     let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();

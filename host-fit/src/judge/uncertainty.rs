@@ -181,7 +181,7 @@ fn score(problem: &Problem, point: &Point, row: &TrainRow, origin: &[f64]) -> Op
     }
     let weighted: [f64; 3] = std::array::from_fn(|axis| {
         let decoded: f64 = (0..3).map(|k| point.gain[(axis, k)] * z[k]).sum();
-        problem.weights[axis] * (z[Q + axis] - decoded)
+        row.weight * (problem.weights[axis] * (z[Q + axis] - decoded))
     });
     Some(Column::from_fn(|k, _| {
         if k < 9 {

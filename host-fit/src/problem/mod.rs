@@ -23,6 +23,8 @@ pub struct TrainRow {
     pub slopes: [f64; SLOPES_MAX],
     /// Reference X, Y, Rz: um, um, urad.
     pub reference_um: [f64; 3],
+    /// How much its squared errors count in least squares: 1 unless a robust loss says less.
+    pub weight: f64,
 }
 
 /// The rows of one movement within [`Problem::rows`].
@@ -119,6 +121,7 @@ impl TrainRow {
             signal_um: row.signal_m.map(|s| s * 1e6),
             slopes: model.slopes_at(row.vertical),
             reference_um: row.reference.map(|q| q * 1e6),
+            weight: 1.0,
         }
     }
 }

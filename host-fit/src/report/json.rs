@@ -197,6 +197,10 @@ pub struct Report {
     pub project: Option<&'static str>,
     /// Seed; null for `eval`.
     pub seed: Option<u64>,
+    /// The robust loss: "cauchy", "huber" or "none"; null for `eval`.
+    pub loss: Option<&'static str>,
+    /// Rows that count less than half in the fit, as the loss says; null for `eval`.
+    pub outlier_rows: Option<usize>,
     /// Rows of the logs named.
     pub rows: usize,
     /// Rows that the fit used.
@@ -287,6 +291,8 @@ pub struct Choice {
     pub project: &'static str,
     /// Seed.
     pub seed: u64,
+    /// The robust loss.
+    pub loss: &'static str,
     /// Whether the lag of the reference was taken off.
     pub lag_compensated: bool,
 }
@@ -304,6 +310,8 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         solver: Some(choice.solver.to_owned()),
         project: Some(choice.project),
         seed: Some(choice.seed),
+        loss: Some(choice.loss),
+        outlier_rows: Some(fit.outlier_rows),
         rows: c.dataset.rows.len(),
         train_rows: fit.train_rows,
         movements: c.dataset.movements.len(),
@@ -359,6 +367,8 @@ pub fn of_eval(
         solver: None,
         project: None,
         seed: None,
+        loss: None,
+        outlier_rows: None,
         rows: c.dataset.rows.len(),
         train_rows: set.fit.train_rows as usize,
         movements: c.dataset.movements.len(),

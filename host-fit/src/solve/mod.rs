@@ -5,12 +5,14 @@
 //! | [`least_squares`] | damped Gauss-Newton with everything linear projected out |
 //! | [`objective`] | the fitness as a cost function of a search |
 //! | [`search`] | SHTLBO, its ablations and its peers, for any cost function |
+//! | [`robust`] | rows that the model does not explain count less |
 //! | [`by_search`] | a search on the fitness, with or without a least-squares finish |
 
 pub mod by_search;
 pub mod field;
 pub mod least_squares;
 pub mod objective;
+pub mod robust;
 pub mod search;
 
 use crate::problem::Problem;

@@ -7,6 +7,7 @@
 use super::probe::{Probe, Reading};
 use super::terms::PER_PROBE;
 use crate::input::dataset::Dataset;
+use crate::solve::robust::HALF;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -31,6 +32,8 @@ pub struct FieldRow {
     pub reference_mm: [f64; 3],
     /// Its change by time: mm/s, mm/s, mrad/s.
     pub rate_mm_per_s: [f64; 3],
+    /// How much it counts: 1 unless a robust loss says less.
+    pub weight: f64,
 }
 
 /// The rows of a log that a fit uses, by movement and block.
@@ -53,7 +56,7 @@ pub struct Rows {
 pub struct Block {
     /// Mean time of its rows, s.
     pub time_s: f64,
-    /// How many rows.
+    /// How many rows: the sum of their weights.
     pub rows: f64,
     /// Signal less model of A, B, C, mm.
     pub residual_mm: [f64; 3],
@@ -68,15 +71,27 @@ pub struct Block {
 impl Rows {
     /// The rows `selected` (ascending) of a dataset.
     pub fn new(dataset: &Dataset, selected: &[usize]) -> Self {
+        Self::weighted(dataset, selected, &vec![1.0; selected.len()])
+    }
+
+    /// The same with weights. A row without is left out; one below half tells nothing of its
+    /// neighbours' rates.
+    pub fn weighted(dataset: &Dataset, selected: &[usize], weights: &[f64]) -> Self {
+        let mut trusted = vec![true; dataset.rows.len()];
+        for (&k, &weight) in selected.iter().zip(weights) {
+            trusted[k] = weight >= HALF;
+        }
         let rows: Vec<FieldRow> = selected
             .par_iter()
-            .map(|&k| field_row(dataset, k))
+            .zip(weights)
+            .filter(|(_, weight)| **weight > 0.0)
+            .map(|(&k, &weight)| field_row(dataset, k, &trusted, weight))
             .collect();
         let mut movements = Vec::new();
         let mut start = 0;
-        for chunk in
-            selected.chunk_by(|&a, &b| dataset.rows[a].movement == dataset.rows[b].movement)
-        {
+        let used = selected.iter().zip(weights).filter(|(_, w)| **w > 0.0);
+        let movement_of: Vec<usize> = used.map(|(&k, _)| dataset.rows[k].movement).collect();
+        for chunk in movement_of.chunk_by(|a, b| a == b) {
             movements.push(start..start + chunk.len());
             start += chunk.len();
         }
@@ -138,6 +153,24 @@ impl Rows {
             .collect()
     }
 
+    /// Signal less model of every row, mm, as in [`Rows::evaluate`].
+    pub fn residuals_mm(
+        &self,
+        probes: &[Probe; 3],
+        lag_s: f64,
+        offsets_mm: &[[f64; 3]],
+    ) -> Vec<[f64; 3]> {
+        let of_movement = |(range, &offset): (Range<usize>, &[f64; 3])| {
+            let residual = move |row: &FieldRow| {
+                let planar_mm = row.planar_mm(lag_s, offset);
+                [0, 1, 2].map(|k| row.signal_mm[k] - probes[k].signal_mm(planar_mm, row.vertical))
+            };
+            self.rows[range].par_iter().with_min_len(256).map(residual)
+        };
+        let movements: Vec<_> = self.movement_rows().zip(offsets_mm).collect();
+        movements.into_par_iter().flat_map(of_movement).collect()
+    }
+
     /// The value of its movement for each block.
     fn per_block<T: Copy>(&self, by_movement: &[T]) -> Vec<T> {
         let pairs = self.movements.iter().zip(by_movement);
@@ -164,10 +197,11 @@ impl FieldRow {
     }
 }
 
-fn field_row(dataset: &Dataset, index: usize) -> FieldRow {
+fn field_row(dataset: &Dataset, index: usize, trusted: &[bool], weight: f64) -> FieldRow {
     let row = &dataset.rows[index];
     let neighbour = |k: Option<usize>| {
-        let found = k.and_then(|k| dataset.rows.get(k));
+        let found = k.filter(|&k| trusted.get(k) == Some(&true));
+        let found = found.map(|k| &dataset.rows[k]);
         found
             .filter(|other| other.movement == row.movement)
             .unwrap_or(row)
@@ -187,6 +221,7 @@ fn field_row(dataset: &Dataset, index: usize) -> FieldRow {
         vertical: row.vertical,
         reference_mm: row.reference.map(|q| q * 1e3),
         rate_mm_per_s: [rate(0), rate(1), rate(2)],
+        weight,
     }
 }
 
@@ -210,7 +245,7 @@ fn ranges(rows: &[FieldRow], movements: &[Range<usize>]) -> ([f64; 3], [f64; 3])
 fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3]) -> Block {
     let mut sum = Block {
         time_s: 0.0,
-        rows: rows.len() as f64,
+        rows: 0.0,
         residual_mm: [0.0; 3],
         by_pose: [[0.0; 3]; 3],
         by_parameter: [[0.0; PER_PROBE]; 3],
@@ -218,20 +253,22 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3])
     };
     for row in rows {
         let planar_mm = row.planar_mm(lag_s, offset_mm);
-        sum.time_s += row.time_s;
+        sum.rows += row.weight;
+        sum.time_s += row.weight * row.time_s;
         for (k, probe) in probes.iter().enumerate() {
             let Reading {
                 signal_mm,
                 by_pose,
                 by_parameter,
             } = probe.read(planar_mm, row.vertical);
-            sum.residual_mm[k] += row.signal_mm[k] - signal_mm;
+            sum.residual_mm[k] += row.weight * (row.signal_mm[k] - signal_mm);
             for (axis, by) in by_pose.into_iter().enumerate() {
+                let by = row.weight * by;
                 sum.by_pose[k][axis] += by;
                 sum.by_lag[k] += by * row.rate_mm_per_s[axis];
             }
             for (sum, by) in sum.by_parameter[k].iter_mut().zip(by_parameter) {
-                *sum += by;
+                *sum += row.weight * by;
             }
         }
     }

@@ -13,6 +13,7 @@ use super::whiten::{Noise, Normal};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
+use crate::solve::robust::{HALF, Loss};
 use nalgebra::{DMatrix, DVector};
 
 /// Steps of one phase.
@@ -25,6 +26,10 @@ const STEPS_MAX_WHITE: u32 = 8;
 const GAIN_MIN: f64 = 1e-3;
 /// The white phase is only a start.
 const GAIN_MIN_WHITE: f64 = 1.0;
+/// Rounds of weights and fit at most.
+const ROUNDS_MAX: u32 = 40;
+/// Weights that change by less have settled.
+const WEIGHT_SETTLED: f64 = 0.01;
 const DAMPING_MAX: f64 = 1e8;
 /// Rounds of noise and parameters in turn.
 const NOISE_ROUNDS: u32 = 2;
@@ -50,6 +55,8 @@ pub struct FieldFit {
     pub vertical_range: [f64; 3],
     /// Whether it is better taken than Model (31).
     pub verdict: Verdict,
+    /// The weights of the rows used.
+    pub weights: Vec<f64>,
     /// Gauss-Newton steps.
     pub iterations: u32,
 }
@@ -113,6 +120,7 @@ pub enum FieldFitError {
     },
 }
 
+#[derive(Clone, Debug)]
 struct State {
     parameters: FieldParameters,
     lag_s: f64,
@@ -130,72 +138,166 @@ pub fn fit_field(
     stage: &Stage,
     start: &Parameters,
 ) -> Result<FieldFit, FieldFitError> {
-    let rows = Rows::new(dataset, selected);
-    let mut search = Search {
-        rows: &rows,
-        iterations: 0,
-    };
-    let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
-    let mut state = search.at(
-        FieldParameters::of_model_31(start, stage),
-        0.0,
-        vec![[0.0; 3]; rows.movements.len()],
-    );
-    let white = |state: &State| {
-        let probes = probes(&state.parameters);
-        white_mm(&rows, &probes, state.lag_s, &state.offsets_mm, least_mm)
-    };
-    let verdict = |state: &State, posterior: &Posterior| {
-        let ranges = (rows.planar_range_mm.map(|x| x * 1e-3), rows.vertical_range);
-        Verdict::new(&state.parameters, posterior, start, stage, ranges)
-    };
-    let mut noise = white_only(white(&state));
-    let mut normal = match search.descend(&mut state, &noise, GAIN_MIN_WHITE, STEPS_MAX_WHITE)? {
-        End::Reached(normal) | End::StepLimit(normal) => normal,
-    };
-    let mut posterior = Posterior::new(covariance(&normal)?, &state.parameters, &noise);
-    // White noise alone makes the errors too small, never too large: what fails here, fails.
-    let early = verdict(&state, &posterior);
-    if early.loses() {
-        return Err(FieldFitError::NotCarried(Box::new(early)));
-    }
-    // What the parameters took of the drift depends on how much there is of it.
-    let usual = Noise {
-        drift_mm: USUAL_DRIFT_MM,
-        ..noise
-    };
-    normal = Normal::new(&rows, &state.blocks, &usual);
-    for _ in 0..NOISE_ROUNDS {
-        let white_mm = white(&state);
-        noise = Noise {
-            white_mm,
-            drift_mm: drift_mm(&rows, &state.blocks, white_mm, &covariance(&normal)?),
+    WhiteFit::new(dataset, selected, stage, start)?.finish(stage)
+}
+
+/// The first phase of a fit: under white noise, each row with its weight.
+#[derive(Clone, Debug)]
+pub struct WhiteFit {
+    /// How much each of the rows used counts: from 0 to 1.
+    pub weights: Vec<f64>,
+    search: Search,
+    state: State,
+    noise: Noise,
+    normal: Normal,
+    /// Of Model (31).
+    start: Parameters,
+}
+
+impl WhiteFit {
+    /// The first phase of [`fit_field`]: all rows count alike.
+    ///
+    /// # Errors
+    /// See [`FieldFitError`].
+    pub fn new(
+        dataset: &Dataset,
+        selected: &[usize],
+        stage: &Stage,
+        start: &Parameters,
+    ) -> Result<Self, FieldFitError> {
+        let rows = Rows::new(dataset, selected);
+        let mut search = Search {
+            rows,
+            iterations: 0,
         };
-        let end = search.descend(&mut state, &noise, GAIN_MIN, STEPS_MAX)?;
-        let End::Reached(reached) = end else {
-            let iterations = search.iterations;
-            return Err(FieldFitError::Stuck { iterations });
-        };
-        normal = reached;
+        let mut state = search.start(start, stage);
+        let (noise, normal) = search.under_white_noise(&mut state, stage)?;
+        Ok(Self {
+            weights: vec![1.0; selected.len()],
+            search,
+            state,
+            noise,
+            normal,
+            start: *start,
+        })
     }
-    posterior = Posterior::new(covariance(&normal)?, &state.parameters, &noise);
-    Ok(FieldFit {
-        verdict: verdict(&state, &posterior),
-        posterior,
-        score: Score {
-            chi_squared: normal.chi_squared(),
-            log_determinant: normal.log_determinant,
-            prior: prior_squares(&state.parameters),
-            residuals: 3 * (rows.blocks.len() - rows.movements.len()),
-        },
-        parameters: state.parameters,
-        noise,
-        lag_s: state.lag_s,
-        offsets_mm: state.offsets_mm,
-        planar_range: rows.planar_range_mm.map(|x| x * 1e-3),
-        vertical_range: rows.vertical_range,
-        iterations: search.iterations,
-    })
+
+    /// Whether a loss would make rows count less.
+    pub fn has_outliers(&self, loss: Loss) -> bool {
+        let weights = self.search.weights_by(&self.state, loss);
+        weights.iter().any(|weight| *weight < 1.0)
+    }
+
+    /// The same as [`WhiteFit::new`] with weights by a loss, from a start that bad rows don't bend.
+    ///
+    /// # Errors
+    /// See [`FieldFitError`].
+    pub fn robust(
+        dataset: &Dataset,
+        selected: &[usize],
+        stage: &Stage,
+        start: &Parameters,
+        loss: Loss,
+    ) -> Result<Self, FieldFitError> {
+        let rows = Rows::new(dataset, selected);
+        let mut search = Search {
+            rows,
+            iterations: 0,
+        };
+        let mut state = search.start(start, stage);
+        for _ in 0..ROUNDS_MAX {
+            let weights = search.weights_by(&state, loss);
+            let mut pairs = search.weights().into_iter().zip(&weights);
+            if pairs.all(|(a, b)| (a - b).abs() < WEIGHT_SETTLED) {
+                break;
+            }
+            search.rows = Rows::weighted(dataset, selected, &weights);
+            state = search.at(state.parameters, state.lag_s, state.offsets_mm);
+            search.under_white_noise(&mut state, stage)?;
+        }
+        let weights = loss.last(search.weights());
+        // A movement may lose all its rows.
+        let movements = search.rows.movement_rows().zip(&state.offsets_mm);
+        let kept = movements.filter(|(rows, _)| weights[rows.clone()].iter().any(|w| *w > 0.0));
+        let offsets_mm = kept.map(|(_, offset)| *offset).collect();
+        search.rows = Rows::weighted(dataset, selected, &weights);
+        state = search.at(state.parameters, state.lag_s, offsets_mm);
+        let (noise, normal) = search.under_white_noise(&mut state, stage)?;
+        Ok(Self {
+            weights,
+            search,
+            state,
+            noise,
+            normal,
+            start: *start,
+        })
+    }
+
+    /// The rest of [`fit_field`]: under the noise that the residuals show.
+    ///
+    /// # Errors
+    /// See [`FieldFitError`].
+    pub fn finish(self, stage: &Stage) -> Result<FieldFit, FieldFitError> {
+        let Self {
+            mut search,
+            mut state,
+            mut noise,
+            mut normal,
+            start,
+            weights,
+        } = self;
+        let verdict = |rows: &Rows, state: &State, posterior: &Posterior| {
+            let ranges = (rows.planar_range_mm.map(|x| x * 1e-3), rows.vertical_range);
+            Verdict::new(&state.parameters, posterior, &start, stage, ranges)
+        };
+        let mut posterior = Posterior::new(covariance(&normal)?, &state.parameters, &noise);
+        // White noise alone makes the errors too small, never too large: what fails here, fails.
+        let early = verdict(&search.rows, &state, &posterior);
+        if early.loses() {
+            return Err(FieldFitError::NotCarried(Box::new(early)));
+        }
+        // What the parameters took of the drift depends on how much there is of it.
+        let usual = Noise {
+            drift_mm: USUAL_DRIFT_MM,
+            ..noise
+        };
+        normal = Normal::new(&search.rows, &state.blocks, &usual);
+        for _ in 0..NOISE_ROUNDS {
+            let white_mm = search.white_mm(&state, stage);
+            noise = Noise {
+                white_mm,
+                drift_mm: drift_mm(&search.rows, &state.blocks, white_mm, &covariance(&normal)?),
+            };
+            let end = search.descend(&mut state, &noise, GAIN_MIN, STEPS_MAX)?;
+            let End::Reached(reached) = end else {
+                let iterations = search.iterations;
+                return Err(FieldFitError::Stuck { iterations });
+            };
+            normal = reached;
+        }
+        posterior = Posterior::new(covariance(&normal)?, &state.parameters, &noise);
+        let rows = &search.rows;
+        // A block of outliers alone holds no residual.
+        let counted = state.blocks.iter().filter(|block| block.rows >= HALF);
+        Ok(FieldFit {
+            verdict: verdict(rows, &state, &posterior),
+            posterior,
+            score: Score {
+                chi_squared: normal.chi_squared(),
+                log_determinant: normal.log_determinant,
+                prior: prior_squares(&state.parameters),
+                residuals: 3 * counted.count().saturating_sub(rows.movements.len()),
+            },
+            parameters: state.parameters,
+            noise,
+            lag_s: state.lag_s,
+            offsets_mm: state.offsets_mm,
+            planar_range: rows.planar_range_mm.map(|x| x * 1e-3),
+            vertical_range: rows.vertical_range,
+            weights,
+            iterations: search.iterations,
+        })
+    }
 }
 
 /// How a phase ended, with the sums at its end.
@@ -204,12 +306,58 @@ enum End {
     StepLimit(Normal),
 }
 
-struct Search<'r> {
-    rows: &'r Rows,
+#[derive(Clone, Debug)]
+struct Search {
+    rows: Rows,
     iterations: u32,
 }
 
-impl Search<'_> {
+impl Search {
+    fn weights(&self) -> Vec<f64> {
+        self.rows.rows.iter().map(|row| row.weight).collect()
+    }
+
+    fn white_mm(&self, state: &State, stage: &Stage) -> [f64; 3] {
+        let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
+        let probes = probes(&state.parameters);
+        white_mm(
+            &self.rows,
+            &probes,
+            state.lag_s,
+            &state.offsets_mm,
+            least_mm,
+        )
+    }
+
+    fn residuals_mm(&self, state: &State) -> Vec<[f64; 3]> {
+        let probes = probes(&state.parameters);
+        (self.rows).residuals_mm(&probes, state.lag_s, &state.offsets_mm)
+    }
+
+    fn weights_by(&self, state: &State, loss: Loss) -> Vec<f64> {
+        loss.weights(self.residuals_mm(state), self.rows.movement_rows())
+    }
+
+    fn start(&self, model_31: &Parameters, stage: &Stage) -> State {
+        let offsets_mm = vec![[0.0; 3]; self.rows.movements.len()];
+        self.at(
+            FieldParameters::of_model_31(model_31, stage),
+            0.0,
+            offsets_mm,
+        )
+    }
+
+    fn under_white_noise(
+        &mut self,
+        state: &mut State,
+        stage: &Stage,
+    ) -> Result<(Noise, Normal), FieldFitError> {
+        let noise = white_only(self.white_mm(state, stage));
+        match self.descend(state, &noise, GAIN_MIN_WHITE, STEPS_MAX_WHITE)? {
+            End::Reached(normal) | End::StepLimit(normal) => Ok((noise, normal)),
+        }
+    }
+
     fn at(&self, parameters: FieldParameters, lag_s: f64, offsets_mm: Vec<[f64; 3]>) -> State {
         let blocks = self.rows.evaluate(&probes(&parameters), lag_s, &offsets_mm);
         State {
@@ -228,7 +376,7 @@ impl Search<'_> {
         gain_min: f64,
         steps_max: u32,
     ) -> Result<End, FieldFitError> {
-        let mut normal = Normal::new(self.rows, &state.blocks, noise);
+        let mut normal = Normal::new(&self.rows, &state.blocks, noise);
         let mut damping = 0.0;
         for _ in 0..steps_max {
             let unseen: Vec<String> = (0..COUNT)
@@ -248,7 +396,7 @@ impl Search<'_> {
             }
             self.iterations += 1;
             let next = self.after(state, &normal, &step);
-            let next_normal = Normal::new(self.rows, &next.blocks, noise);
+            let next_normal = Normal::new(&self.rows, &next.blocks, noise);
             let cost = |normal: &Normal, state: &State| {
                 normal.chi_squared() + prior_squares(&state.parameters)
             };

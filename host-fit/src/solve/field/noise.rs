@@ -4,8 +4,8 @@ use super::blocks::{Block, Rows};
 use super::probe::Probe;
 use super::terms::{COUNT, PER_PROBE};
 use super::whiten::{Noise, UNKNOWNS};
+use crate::solve::robust::HALF;
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 use runtime::geometry::inverse_rows;
 
 /// Length over which the reference's walk is averaged, s.
@@ -15,6 +15,7 @@ const PART_MIN: f64 = 0.5;
 
 /// White noise of the probes A, B, C, mm: from second differences of the residuals, whose
 /// variance is six times that of the noise, at least `least_mm` (what rounding to codes leaves).
+/// Rows below half weight are left out.
 pub fn white_mm(
     rows: &Rows,
     probes: &[Probe; 3],
@@ -22,32 +23,25 @@ pub fn white_mm(
     offsets_mm: &[[f64; 3]],
     least_mm: f64,
 ) -> [f64; 3] {
-    let movements: Vec<_> = rows.movement_rows().zip(offsets_mm).collect();
-    let of_movement = |(range, offset): &(std::ops::Range<usize>, &[f64; 3])| {
-        let residuals: Vec<[f64; 3]> = rows.rows[range.clone()]
-            .iter()
-            .map(|row| {
-                let planar_mm = row.planar_mm(lag_s, **offset);
-                [0, 1, 2].map(|k| row.signal_mm[k] - probes[k].signal_mm(planar_mm, row.vertical))
-            })
-            .collect();
-        let mut squares = [0.0; 3];
-        for three in residuals.windows(3) {
-            for (k, sum) in squares.iter_mut().enumerate() {
+    let residuals = rows.residuals_mm(probes, lag_s, offsets_mm);
+    let mut squares = [0.0; 3];
+    let mut count: usize = 0;
+    for movement in rows.movement_rows() {
+        let mut of_movement = [0.0; 3];
+        let of_rows = residuals[movement.clone()].windows(3);
+        for (three, rows) in of_rows.zip(rows.rows[movement].windows(3)) {
+            if rows.iter().any(|row| row.weight < HALF) {
+                continue;
+            }
+            for (k, sum) in of_movement.iter_mut().enumerate() {
                 let second = (three[0][k] - 2.0 * three[1][k]) + three[2][k];
                 *sum += second * second;
             }
+            count += 1;
         }
-        (squares, residuals.len().saturating_sub(2))
-    };
-    let found: Vec<([f64; 3], usize)> = movements.par_iter().map(of_movement).collect();
-    let mut squares = [0.0; 3];
-    let mut count = 0;
-    for (of_movement, rows) in found {
         for (sum, x) in squares.iter_mut().zip(of_movement) {
             *sum += x;
         }
-        count += rows;
     }
     squares.map(|sum| (sum / (6.0 * count.max(1) as f64)).sqrt().max(least_mm))
 }

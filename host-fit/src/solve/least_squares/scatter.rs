@@ -35,7 +35,7 @@ pub enum Offset {
     Fixed([f64; 3]),
 }
 
-/// Products of the numbers of a row, summed over all rows: symmetric.
+/// Products of the numbers of a row, summed over all rows by their weights: symmetric.
 pub type Scatter = SMatrix<f64, WIDTH, WIDTH>;
 
 /// Room for the numbers of a row of any model: a multiple of four, so that loops over it fill
@@ -47,7 +47,7 @@ pub fn regressors(row: &TrainRow, ratios: &Ratios) -> Option<[f64; ROOM]> {
     regressors_of::<SLOPES_MAX, ROOM>(row, ratios)
 }
 
-/// The mean of the numbers over some rows, or `None` next to a pole.
+/// The mean of the numbers over some rows by their weights, or `None` next to a pole.
 pub fn mean(rows: &[TrainRow], ratios: &Ratios) -> Option<[f64; ROOM]> {
     mean_of::<SLOPES_MAX, ROOM>(rows, ratios)
 }
@@ -93,13 +93,14 @@ fn regressors_of<const K: usize, const W: usize>(
 
 fn mean_of<const K: usize, const W: usize>(rows: &[TrainRow], ratios: &Ratios) -> Option<[f64; W]> {
     let mut sum = [0.0; W];
+    let mut n = 0.0;
     for row in rows {
         let z = regressors_of::<K, W>(row, ratios)?;
         for (sum, z) in sum.iter_mut().zip(z) {
-            *sum += z;
+            *sum += row.weight * z;
         }
+        n += row.weight;
     }
-    let n = rows.len() as f64;
     Some(sum.map(|s| s / n))
 }
 
@@ -135,7 +136,7 @@ fn group_sums<const K: usize, const W: usize>(
         }
         for (i, sums) in sums.iter_mut().enumerate().take(U + 3 * K) {
             let from = i & !3;
-            let factor = z[i];
+            let factor = row.weight * z[i];
             for (sum, z) in sums[from..].iter_mut().zip(&z[from..]) {
                 *sum += factor * z;
             }

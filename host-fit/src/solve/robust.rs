@@ -1,0 +1,158 @@
+//! Robust losses by weights: rows that the fitted model cannot explain count less.
+//!
+//! A row's residuals, each less the median of its movement, are measured in a robust scale of their
+//! channel, 1.4826 times the median magnitude over the log: the standard deviation if they are
+//! normal. With r the largest of the three and k = 6 the row's weight is 1 up to k, then k / r (Huber)
+//! or (k / r)^2 (the tail of Cauchy's loss). Weights and fit in turn until both settle: iteratively
+//! reweighted least squares.
+//!
+//! Noise alone does not come near k, so every row of a clean log has the weight 1 and
+//! the fit is that of least squares, bit for bit.
+
+use super::least_squares::coordinates::point_of;
+use super::least_squares::multistart;
+use super::least_squares::scatter::{Q, regressors};
+use super::{Solution, SolveError, SolverOptions};
+use crate::problem::Problem;
+use crate::problem::parameters::Parameters;
+use std::ops::Range;
+
+/// From how many robust standard deviations on a row counts less.
+const THRESHOLD: f64 = 6.0;
+/// Below this weight a row is an outlier.
+pub const HALF: f64 = 0.5;
+/// The standard deviation of normal numbers over the median of their magnitudes.
+const PER_MEDIAN: f64 = 1.482_602_218_505_602;
+
+/// How much a row counts that the model does not explain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loss {
+    /// As much as any other: plain least squares.
+    None,
+    /// As if its residual were at the threshold.
+    Huber,
+    /// Less the farther it is off; an outlier not at all.
+    Cauchy,
+}
+
+impl Loss {
+    /// All of them, the default first.
+    pub const ALL: [Self; 3] = [Self::Cauchy, Self::Huber, Self::None];
+
+    /// The name on the command line and in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Huber => "huber",
+            Self::Cauchy => "cauchy",
+        }
+    }
+
+    /// The weights of rows with these residuals in three channels, whatever their unit, by movement:
+    /// above 0, at most 1.
+    pub fn weights(
+        self,
+        residuals: Vec<[f64; 3]>,
+        movements: impl Iterator<Item = Range<usize>>,
+    ) -> Vec<f64> {
+        let weight = |share: f64| match self {
+            Self::None => 1.0,
+            Self::Huber => share,
+            Self::Cauchy => share * share,
+        };
+        let weight = |r| weight(if r > THRESHOLD { THRESHOLD / r } else { 1.0 });
+        deviations(residuals, movements).map(weight).collect()
+    }
+
+    /// The weights that a fit ends with: Cauchy's outliers are left out.
+    pub fn last(self, mut weights: Vec<f64>) -> Vec<f64> {
+        if self == Self::Cauchy {
+            let outliers = weights.iter_mut().filter(|weight| **weight < HALF);
+            outliers.for_each(|weight| *weight = 0.0);
+        }
+        weights
+    }
+}
+
+/// The weights of a fit of least magnitudes: a row pulls as much as any other, however large its
+/// residuals. A stuck movement, which bends a fit of least squares everywhere and so hides, shows
+/// after such a fit.
+fn least_magnitudes(
+    residuals: Vec<[f64; 3]>,
+    movements: impl Iterator<Item = Range<usize>>,
+) -> Vec<f64> {
+    // Those that happen to be near zero must not hold the fit.
+    const NEAR: f64 = 0.5;
+    let weight = |r: f64| NEAR / r.max(NEAR);
+    deviations(residuals, movements).map(weight).collect()
+}
+
+/// The largest of the residuals of each row in robust standard deviations.
+fn deviations(
+    mut residuals: Vec<[f64; 3]>,
+    movements: impl Iterator<Item = Range<usize>>,
+) -> impl Iterator<Item = f64> {
+    let mut scratch = Vec::with_capacity(residuals.len());
+    for movement in movements {
+        let rows = &mut residuals[movement];
+        for k in 0..3 {
+            let middle = median(&mut scratch, rows.iter().map(|row| row[k]));
+            rows.iter_mut().for_each(|row| row[k] -= middle);
+        }
+    }
+    let scale = [0, 1, 2].map(|k| {
+        let magnitudes = residuals.iter().map(|row| row[k].abs());
+        (PER_MEDIAN * median(&mut scratch, magnitudes)).max(f64::MIN_POSITIVE)
+    });
+    residuals.into_iter().map(move |row| {
+        let deviation = |k: usize| row[k].abs() / scale[k];
+        deviation(0).max(deviation(1)).max(deviation(2))
+    })
+}
+
+/// The upper median of some numbers, 0 of none.
+fn median(scratch: &mut Vec<f64>, numbers: impl Iterator<Item = f64>) -> f64 {
+    scratch.clear();
+    scratch.extend(numbers);
+    if scratch.is_empty() {
+        return 0.0;
+    }
+    let middle = scratch.len() / 2;
+    *scratch.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// A fit of about the least magnitudes of the pose errors: a start that bad rows hardly bend.
+///
+/// # Errors
+/// See [`SolveError`].
+pub fn start(mut problem: Problem<'_>, options: &SolverOptions) -> Result<Solution, SolveError> {
+    const ROUNDS: u32 = 15;
+    let mut parameters = multistart::middle_of_the_box(&problem);
+    let mut solution = None;
+    for _ in 0..ROUNDS {
+        let residuals = residuals_um(&problem, &parameters).ok_or(SolveError::NoUsableStart)?;
+        let movements = problem.groups.iter().map(|group| group.rows.clone());
+        let weights = least_magnitudes(residuals, movements);
+        for (row, weight) in problem.rows.iter_mut().zip(weights) {
+            row.weight = weight;
+        }
+        let found = multistart::solve_from(&[parameters], &problem, options)?;
+        parameters = found.parameters;
+        solution = Some(found);
+    }
+    solution.ok_or(SolveError::NoUsableStart)
+}
+
+/// The reference less the decoded pose of every row, with no offset taken off, um, um, urad;
+/// `None` next to a pole.
+fn residuals_um(problem: &Problem<'_>, parameters: &Parameters) -> Option<Vec<[f64; 3]>> {
+    let point = point_of(parameters)?;
+    let residual = |row| {
+        let z = regressors(row, &point.ratios)?;
+        Some([0, 1, 2].map(|axis| {
+            let decoded = (0..3).fold(0.0, |sum, k| sum + point.gain[(axis, k)] * z[k]);
+            z[Q + axis] - decoded
+        }))
+    };
+    problem.rows.iter().map(residual).collect()
+}
