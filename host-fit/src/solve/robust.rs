@@ -64,13 +64,18 @@ impl Loss {
         deviations(residuals, movements).map(weight).collect()
     }
 
-    /// The weights that a fit ends with: Cauchy's outliers are left out.
-    pub fn last(self, mut weights: Vec<f64>) -> Vec<f64> {
-        if self == Self::Cauchy {
-            let outliers = weights.iter_mut().filter(|weight| **weight < HALF);
-            outliers.for_each(|weight| *weight = 0.0);
-        }
-        weights
+    /// The weights that a fit ends with: Cauchy's outliers are left out, and with them rows most of
+    /// whose neighbours are: while a stage is stuck, some poses come out right by chance.
+    pub fn last(self, weights: Vec<f64>) -> Vec<f64> {
+        const BESIDE: usize = 5;
+        let light = |weights: &[f64]| weights.iter().filter(|w| **w < HALF).count();
+        let last = |row: usize| {
+            let beside = row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(weights.len());
+            let among_outliers = light(&weights[beside]) > BESIDE;
+            let left_out = self == Self::Cauchy && (weights[row] < HALF || among_outliers);
+            if left_out { 0.0 } else { weights[row] }
+        };
+        (0..weights.len()).map(last).collect()
     }
 }
 
