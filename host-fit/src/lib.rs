@@ -17,6 +17,7 @@
 //! | [`output`] | blobs, pose files and images for flash tools, written whole or not at all |
 //! | [`report`] | JSON, tables, plots, an HTML page |
 //! | [`compare`] | the solvers beside each other |
+//! | [`diff`] | what changed between two blobs |
 //! | [`bus`] | the stage on a CAN bus: decoded as it comes, played from a log, made into a log |
 //! | [`cli`] | the commands |
 #![forbid(unsafe_code)]
@@ -25,6 +26,7 @@ pub mod bus;
 pub mod cli;
 pub mod compare;
 pub mod diagnose;
+pub mod diff;
 pub mod fit;
 pub mod input;
 pub mod interrupt;

@@ -6,6 +6,7 @@ mod check;
 mod compare;
 mod decode;
 mod demo;
+mod diff;
 mod error;
 mod eval;
 mod export;
@@ -67,6 +68,8 @@ enum Command {
     Decode(decode::DecodeArgs),
     /// Show what a parameter blob holds.
     Inspect(inspect::InspectArgs),
+    /// Show what changed between two parameter blobs, and by how much their poses differ.
+    Diff(diff::DiffArgs),
     /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
     Live(live::LiveArgs),
     /// Play a log onto a CAN bus as the sensor node would send it (Linux).
@@ -111,6 +114,7 @@ pub fn main() -> ExitCode {
         Command::Eval(args) => eval::run(&args),
         Command::Decode(args) => decode::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Diff(args) => diff::run(&args),
         Command::Live(args) => live::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Export(args) => export::run(&args),
