@@ -8,8 +8,13 @@ use crate::input::stage::Stage;
 use crate::output;
 use crate::output::blob_file;
 use crate::output::pose_file::{self, StatusCounts};
+use crate::output::posterior_file::{self, PosteriorFileError};
+use crate::problem::model::Model;
+use crate::solve::field::parameters::FieldParameters;
+use crate::solve::field::posterior::Posterior;
 use clap::Args;
-use std::path::PathBuf;
+use runtime::ParameterSet;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `decode`.
 #[derive(Debug, Args)]
@@ -29,6 +34,10 @@ pub(super) struct DecodeArgs {
     /// Repeat the last valid pose for at most so many rows where codes are bad.
     #[arg(long, value_name = "N", default_value_t = 0)]
     hold: u16,
+    /// Add the standard uncertainty of X, Y, Rz to each line, by parameters and noise: three
+    /// columns. For a blob of the field model with its posterior beside it.
+    #[arg(long)]
+    uncertainty: bool,
 }
 
 /// Decodes a log into a pose file.
@@ -42,6 +51,11 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     let set = blob_file::read(&args.params)?;
     let stage = Stage::from_file(&args.stage)?;
     super::same_scales(&set, &stage, &args.stage)?;
+    let posterior = if args.uncertainty {
+        Some(posterior(&set, &stage, &args.params)?)
+    } else {
+        None
+    };
     let logs = std::slice::from_ref(&args.log);
     let log = terminal::timed("reading", || log::read(logs, &stage, &ReadOptions::DECODE))?;
     let on_invalid = on_invalid(args.hold);
@@ -49,7 +63,14 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
         pose_file::decode(&log.dataset, &set.decoder(), on_invalid)
     });
     terminal::timed("writing", || {
-        output::write_atomically(&args.out, &pose_file::to_text(&decoded))
+        let text = match &posterior {
+            Some(posterior) => {
+                let uncertainties = pose_file::uncertainties(&decoded, posterior);
+                pose_file::with_uncertainties(&decoded, &uncertainties)
+            }
+            None => pose_file::to_text(&decoded),
+        };
+        output::write_atomically(&args.out, &text)
     })?;
     let counts = StatusCounts::of(&decoded);
     let mut summary = format!(
@@ -64,4 +85,22 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     let warnings: Vec<String> = log.warnings.iter().map(ToString::to_string).collect();
     terminal::warn(&warnings);
     Ok(())
+}
+
+/// What is known of a blob's errors, from the file beside it.
+fn posterior(set: &ParameterSet, stage: &Stage, blob: &Path) -> Result<Posterior, HostError> {
+    let parameters = FieldParameters::of_set(set, stage);
+    let parameters = parameters.ok_or_else(|| HostError::NoUncertainty {
+        path: blob.to_owned(),
+        model: Model::of(set.model).name,
+    })?;
+    let path = posterior_file::beside(blob).ok_or_else(|| PosteriorFileError::Missing {
+        path: blob.to_owned(),
+    })?;
+    let known = posterior_file::read(&path, set, blob)?;
+    Ok(Posterior::of_parameters(
+        known.covariance,
+        &parameters,
+        &known.noise,
+    ))
 }

@@ -66,6 +66,17 @@ pub enum HostError {
         /// That of the blob, m per code.
         blob: f64,
     },
+    /// A blob cannot tell the uncertainty of its poses.
+    #[error(
+        "{} is of model ({model}), which does not know its errors in service: they are several times those on the log that \
+         it was fitted to. Fit the field model (--model field), or leave --uncertainty out", path.display()
+    )]
+    NoUncertainty {
+        /// The blob.
+        path: PathBuf,
+        /// Name of its model.
+        model: &'static str,
+    },
     /// A plot could not be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
@@ -178,6 +189,7 @@ impl HostError {
                 RecalibrateError::OtherModel { .. } | RecalibrateError::NothingKnown,
             )
             | Self::OtherScale { .. }
+            | Self::NoUncertainty { .. }
             | Self::Plot(_)
             | Self::Page(_)
             | Self::Json(_)

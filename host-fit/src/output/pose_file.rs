@@ -10,14 +10,19 @@
 //! again, bit for bit, the sign of a zero included. `status` is the bit mask of
 //! [`runtime::status`], in decimal: 0 when all is good. A field that it calls invalid is 0,
 //! or the last valid one if held.
+//!
+//! With uncertainties a line ends with three more fields, `u_x_um,u_y_um,u_rz_urad`: the standard
+//! uncertainty of X, Y, Rz, four significant digits.
 
 mod read;
 mod summary;
 mod text;
+mod uncertainty;
 
 pub use read::{PoseFileError, read};
 pub use summary::StatusCounts;
-pub use text::to_text;
+pub use text::{to_text, with_uncertainties};
+pub use uncertainty::uncertainties;
 
 use crate::input::dataset::{Dataset, LoggedFrame};
 use runtime::{AnyDecoder, OnInvalid, Reading, Servo};

@@ -3,6 +3,9 @@
 use super::{HEADER, PoseRow};
 use std::io::Write;
 
+/// What [`with_uncertainties`] adds to the first line.
+const UNCERTAINTIES: &str = ",u_x_um,u_y_um,u_rz_urad";
+
 /// Significant digits of a field. Nine tell any two `f32` apart, and leave a margin of six
 /// for the rounding of the scale in `f64`.
 const DIGITS: usize = 9;
@@ -15,23 +18,45 @@ pub fn to_text(rows: &[PoseRow]) -> Vec<u8> {
     let mut text = Vec::with_capacity(HEADER.len() + 1 + rows.len() * LINE_BYTES);
     text.extend_from_slice(HEADER.as_bytes());
     text.push(b'\n');
-    let mut scratch = Vec::with_capacity(2 * DIGITS);
     for row in rows {
-        let reading = &row.reading;
-        integer(&mut text, row.movement);
-        text.push(b',');
-        integer(&mut text, row.t_us);
-        let planar = reading.pose.planar.to_array();
-        let vertical = reading.pose.vertical.to_array();
-        for word in planar.into_iter().chain(vertical) {
-            text.push(b',');
-            micro(&mut text, &mut scratch, word);
-        }
-        text.push(b',');
-        integer(&mut text, i64::from(reading.status.bits()));
+        line(&mut text, row);
         text.push(b'\n');
     }
     text
+}
+
+/// The same with the standard uncertainty of X, Y, Rz (m, m, rad) of each row.
+pub fn with_uncertainties(rows: &[PoseRow], uncertainties: &[[f64; 3]]) -> Vec<u8> {
+    let mut text = Vec::with_capacity(HEADER.len() + 1 + rows.len() * 2 * LINE_BYTES);
+    text.extend_from_slice(HEADER.as_bytes());
+    text.extend_from_slice(UNCERTAINTIES.as_bytes());
+    text.push(b'\n');
+    for (row, uncertainty) in rows.iter().zip(uncertainties) {
+        line(&mut text, row);
+        for u in uncertainty {
+            // Writing to memory does not fail.
+            let _ = write!(text, ",{:.3e}", u * 1e6);
+        }
+        text.push(b'\n');
+    }
+    text
+}
+
+/// One line without its end.
+fn line(text: &mut Vec<u8>, row: &PoseRow) {
+    let mut scratch = Vec::with_capacity(2 * DIGITS);
+    let reading = &row.reading;
+    integer(text, row.movement);
+    text.push(b',');
+    integer(text, row.t_us);
+    let planar = reading.pose.planar.to_array();
+    let vertical = reading.pose.vertical.to_array();
+    for word in planar.into_iter().chain(vertical) {
+        text.push(b',');
+        micro(text, &mut scratch, word);
+    }
+    text.push(b',');
+    integer(text, i64::from(reading.status.bits()));
 }
 
 fn integer(text: &mut Vec<u8>, value: i64) {
