@@ -4,10 +4,12 @@
 //! Nothing is written here.
 
 mod compensate;
+mod cross_validation;
 mod field;
 mod warning;
 
 pub use compensate::fit_compensated;
+pub use cross_validation::{CrossValidation, Split, cross_validate};
 use field::FirstPhase;
 pub use field::field_calibration;
 pub use warning::FitWarning;
@@ -141,6 +143,9 @@ pub struct Fit {
     /// Standard errors of these; `None` as in
     /// [`Uncertainty`](crate::judge::uncertainty::Uncertainty).
     pub standard_error: [Option<f64>; COUNT],
+    /// Pairs of parameters whose estimates are correlated by more than
+    /// [`CORRELATION_TOLD`](crate::judge::uncertainty::CORRELATION_TOLD).
+    pub correlations: Vec<(String, String, f64)>,
     /// All of a fit of the field model.
     pub field: Option<FieldFit>,
     /// By how much the reference lags behind the probes, fitted with the parameters; `None` where
@@ -154,8 +159,8 @@ pub struct Fit {
     pub train_fitness: f64,
     /// Rows that the fit used.
     pub train_rows: usize,
-    /// Those of them that count less than half, as the loss says.
-    pub outlier_rows: usize,
+    /// Those of them that count less than half, as the loss says: row numbers, ascending.
+    pub outliers: Vec<usize>,
     /// All rows, decoded by the target's decoder.
     pub decoded: Decoded,
     /// Over all rows, by the target's decoder; zero deviations refitted where the model has them.
@@ -312,13 +317,14 @@ impl<'a> Job<'a> {
         Ok(Fit {
             model,
             model_reason: format!("model ({}): --model asks for it", model.name),
-            warnings: warning::warnings(dataset, &problem, &solution, &judgement),
+            warnings: warning::warnings(dataset, selected, &problem, &solution, &judgement),
             train_fitness: problem.fitness(solution.cost),
             train_rows: selected.len(),
             standard_error: uncertainty.standard_error,
             field: None,
             lag: reference_lag(dataset, selected, stage, model, parameters, &weights),
-            outlier_rows: outliers(selected, &weights).count(),
+            outliers: outliers(selected, &weights).collect(),
+            correlations: uncertainty.correlations,
             judgement_solver_zeros: decoded.judge(dataset, stage, own_zeros),
             solution,
             calibration,

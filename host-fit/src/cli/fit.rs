@@ -7,7 +7,7 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::diagnose;
 use crate::diagnose::finding::{Finding, Severity};
-use crate::fit::{Fit, FitError, FitSettings, ModelChoice, fit, fit_compensated};
+use crate::fit::{Fit, FitError, FitSettings, ModelChoice, cross_validate, fit, fit_compensated};
 use crate::input::log;
 use crate::input::log::{BadRows, LogReading, ReadOptions};
 use crate::input::stage::Stage;
@@ -98,6 +98,9 @@ pub(super) struct FitArgs {
     /// Take the lag of the reference off, as the fit finds it.
     #[arg(long)]
     compensate_lag: bool,
+    /// Tell the errors on rows left out as well: five more fits.
+    #[arg(long)]
+    cross_validate: bool,
     /// Serial number of the stage, for the blob; at most 32 bytes.
     #[arg(long, value_name = "TEXT", value_parser = blob_text)]
     serial: Option<Text>,
@@ -240,7 +243,17 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         loss: settings.loss.name(),
         lag_compensated: args.compensate_lag,
     };
-    let report = of_fit(&fit, choice, &circumstances);
+    let mut report = of_fit(&fit, choice, &circumstances);
+    if args.cross_validate && refusal.is_none() {
+        match cross_validate(&fit, &log.dataset, &stage, &settings) {
+            Ok(found) => report.cross_validation = Some((&found).into()),
+            Err(error) => {
+                let told = format!("no cross-validation: without a fifth of the rows, {error}");
+                terminal::warn(std::slice::from_ref(&told));
+                report.warnings.push(told);
+            }
+        }
+    }
     match refusal {
         Some(cause) if args.force => {
             terminal::warn(&[format!("written all the same, as --force asks: {cause}")]);
@@ -344,7 +357,7 @@ fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
     format!(
         "{}, {} rows in {} movements, {} fitted, {} skipped; solver {}: {} evaluations in {:.1} ms, {}\n\
          {}\n\
-         train fitness {:.4}\n\n{}\n{parameters}{beyond}\n{}",
+         train fitness {:.4}\n\n{}\n{parameters}{beyond}\n{}{}",
         fit.model.title(),
         report.rows,
         report.movements,
@@ -365,6 +378,7 @@ fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
             fit.lag,
             report.reference_lag.is_some_and(|lag| lag.compensated)
         ),
+        text::trust(report),
     )
 }
 

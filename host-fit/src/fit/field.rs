@@ -7,6 +7,7 @@ use crate::input::dataset::Row;
 use crate::input::stage::Stage;
 use crate::judge::Zeros;
 use crate::judge::lag::ReferenceLag;
+use crate::judge::uncertainty::CORRELATION_TOLD;
 use crate::problem::Problem;
 use crate::problem::model::{Model, ParameterId};
 use crate::problem::parameters::{Parameters, search_box};
@@ -165,7 +166,7 @@ impl Job<'_> {
         Ok(Fit {
             model,
             model_reason: field.verdict.to_string(),
-            warnings: warnings(dataset, &problem, &solution, &judgement)
+            warnings: warnings(dataset, selected, &problem, &solution, &judgement)
                 .into_iter()
                 .chain(FitWarning::of_ranges(
                     stage,
@@ -175,7 +176,13 @@ impl Job<'_> {
                 .collect(),
             train_fitness: problem.fitness(cost),
             train_rows: selected.len(),
-            outlier_rows: super::outliers(selected, &field.weights).count(),
+            outliers: super::outliers(selected, &field.weights).collect(),
+            correlations: (field
+                .posterior
+                .strongest_correlations(usize::MAX)
+                .into_iter())
+            .take_while(|(_, _, correlation)| correlation.abs() > CORRELATION_TOLD)
+            .collect(),
             standard_error: field.posterior.standard_errors_31(),
             lag: field.posterior.lag_error_s.map(lag),
             judgement_solver_zeros: decoded.judge(dataset, stage, Zeros::Given(&solution.delta_m)),

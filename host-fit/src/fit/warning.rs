@@ -147,6 +147,7 @@ fn join(names: &[String]) -> String {
 /// All warnings of a fit but that of a lag.
 pub(super) fn warnings(
     dataset: &Dataset,
+    selected: &[usize],
     problem: &Problem,
     solution: &Solution,
     judgement: &Judgement,
@@ -169,8 +170,8 @@ pub(super) fn warnings(
         });
     }
     let mut present = vec![false; dataset.movements.len()];
-    for group in &problem.groups {
-        present[group.movement] = true;
+    for &row in selected {
+        present[dataset.rows[row].movement] = true;
     }
     let missed = present
         .iter()

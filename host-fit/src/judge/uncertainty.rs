@@ -31,7 +31,13 @@ pub struct Uncertainty {
     /// Parameters that the log does not determine: no motion shows them, or only in combination
     /// with others.
     pub undetermined: Vec<ParameterId>,
+    /// Pairs of parameters whose estimates are correlated by more than [`CORRELATION_TOLD`], either
+    /// way, with their correlation.
+    pub correlations: Vec<(String, String, f64)>,
 }
+
+/// Correlations above this are told: the parameters stand in for each other.
+pub const CORRELATION_TOLD: f64 = 0.95;
 
 /// Smallest eigenvalue of the scaled curvature that still counts as information.
 const EIGENVALUE_MIN: f64 = 1e-10;
@@ -88,7 +94,24 @@ pub fn uncertainty(
             standard_error[k] = Some(largest);
         }
     }
+    let covariance = inverse * clustered * inverse;
+    let names: Vec<(usize, String)> = (problem.model.free())
+        .filter(|id| standard_error[id.index].is_some())
+        .map(|id| (id.index, id.name()))
+        .collect();
+    let mut correlations = Vec::new();
+    for (j, (b, name_b)) in names.iter().enumerate() {
+        for (a, name_a) in &names[..j] {
+            let (a, b) = (*a, *b);
+            let product = covariance[(a, a)] * covariance[(b, b)];
+            let correlation = covariance[(a, b)] / product.sqrt();
+            if correlation.abs() > CORRELATION_TOLD {
+                correlations.push((name_a.clone(), name_b.clone(), correlation));
+            }
+        }
+    }
     Some(Uncertainty {
+        correlations,
         standard_error,
         motion_error,
         undetermined: (problem.model.free())

@@ -24,7 +24,7 @@ pub struct ByAxis {
 
 impl ByAxis {
     /// Of X, Y, Rz in SI.
-    fn of_si(axes: [f64; 3]) -> Self {
+    pub(super) fn of_si(axes: [f64; 3]) -> Self {
         let [x_um, y_um, rz_urad] = axes.map(|x| x * 1e6);
         Self {
             x_um,

@@ -2,14 +2,14 @@
 
 use crate::diagnose::finding::Finding;
 use crate::diagnose::trusted::{Trusted, trusted};
-use crate::fit::Fit;
+use crate::fit::{CrossValidation, Fit};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::statistics::PoseError;
 use crate::judge::{Judgement, Zeros};
 use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::Parameters;
-use crate::report::field::FieldReport;
+use crate::report::field::{ByAxis, Correlation, FieldReport};
 use crate::solve::field::parameters::values_of;
 use crate::solve::field::terms::{self, PER_PROBE};
 use runtime::ParameterSet;
@@ -201,6 +201,12 @@ pub struct Report {
     pub loss: Option<&'static str>,
     /// Rows that count less than half in the fit, as the loss says; null for `eval`.
     pub outlier_rows: Option<usize>,
+    /// What the standard errors of the parameters are; null for `eval`.
+    pub standard_errors: Option<&'static str>,
+    /// Pairs of parameters with a correlation above 0.95 or below -0.95.
+    pub correlations: Vec<Correlation>,
+    /// Errors on rows left out; null unless asked for.
+    pub cross_validation: Option<CrossValidated>,
     /// Rows of the logs named.
     pub rows: usize,
     /// Rows that the fit used.
@@ -282,6 +288,30 @@ fn movement_zeros(judgement: &Judgement, dataset: &Dataset) -> Vec<MovementZero>
         .collect()
 }
 
+/// Errors on rows left out.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct CrossValidated {
+    /// How many groups there were.
+    pub groups: usize,
+    /// What rows were left out by: "movements" or "time".
+    pub split: &'static str,
+    /// rms over rows decoded by the fit that had not seen their group; outliers do not count.
+    pub left_out: ByAxis,
+    /// rms over the same rows by the fit to all.
+    pub in_fit: ByAxis,
+}
+
+impl From<&CrossValidation> for CrossValidated {
+    fn from(found: &CrossValidation) -> Self {
+        Self {
+            groups: found.groups,
+            split: found.split.name(),
+            left_out: ByAxis::of_si(found.left_out),
+            in_fit: ByAxis::of_si(found.in_fit),
+        }
+    }
+}
+
 /// What led to a fit.
 #[derive(Clone, Debug)]
 pub struct Choice {
@@ -311,7 +341,22 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         project: Some(choice.project),
         seed: Some(choice.seed),
         loss: Some(choice.loss),
-        outlier_rows: Some(fit.outlier_rows),
+        outlier_rows: Some(fit.outliers.len()),
+        standard_errors: Some(match fit.field {
+            Some(_) => {
+                "posterior: from the curvature under white noise of the probes and a walk of the reference, with the prior"
+            }
+            None => {
+                "sandwich over movements, or blocks of 0.5 s where there are fewer than 20: drift is in it, what the model lacks is not"
+            }
+        }),
+        correlations: (fit.correlations.iter())
+            .map(|(a, b, correlation)| Correlation {
+                parameters: [a.clone(), b.clone()],
+                correlation: *correlation,
+            })
+            .collect(),
+        cross_validation: None,
         rows: c.dataset.rows.len(),
         train_rows: fit.train_rows,
         movements: c.dataset.movements.len(),
@@ -369,6 +414,9 @@ pub fn of_eval(
         seed: None,
         loss: None,
         outlier_rows: None,
+        standard_errors: None,
+        correlations: Vec::new(),
+        cross_validation: None,
         rows: c.dataset.rows.len(),
         train_rows: set.fit.train_rows as usize,
         movements: c.dataset.movements.len(),

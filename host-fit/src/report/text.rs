@@ -5,6 +5,7 @@ use crate::judge::lag::ReferenceLag;
 use crate::judge::statistics::PoseError;
 use crate::problem::model::{COUNT, Model};
 use crate::problem::parameters::{ETA, Parameters, THETA};
+use crate::report::json::Report;
 use crate::solve::field::fit::FieldFit;
 use crate::solve::field::terms::{BEYOND_MODEL_31, PER_PROBE, TERMS};
 use std::fmt::Write;
@@ -96,6 +97,48 @@ pub fn field(fit: &FieldFit) -> String {
             let _ = write!(out, "{:>11.6}{error:>10.1e}", values[k]);
         }
         let _ = writeln!(out, "  {}", term.unit);
+    }
+    out
+}
+
+/// What the standard errors are, correlations, rows that count less, and errors on rows left out.
+pub fn trust(report: &Report) -> String {
+    let mut out = String::new();
+    if let Some(kind) = report.standard_errors {
+        let _ = writeln!(out, "standard errors: {kind}");
+    }
+    let pairs = report.correlations.iter();
+    let pairs = pairs.map(|c| {
+        format!(
+            "{} {} {:+.3}",
+            c.parameters[0], c.parameters[1], c.correlation
+        )
+    });
+    let pairs: Vec<String> = pairs.collect();
+    if !pairs.is_empty() {
+        let _ = writeln!(out, "correlations above 0.95: {}", pairs.join(", "));
+    }
+    if let (Some(rows @ 1..), Some(loss)) = (report.outlier_rows, report.loss) {
+        let _ = writeln!(
+            out,
+            "{rows} rows count less than half (loss {loss}); the errors above are over all rows"
+        );
+    }
+    if let Some(c) = &report.cross_validation {
+        let (out_of, fit) = (c.left_out, c.in_fit);
+        let _ = writeln!(
+            out,
+            "cross-validation, {} groups by {}: rms {:.3} um, {:.3} um, {:.3} urad on rows left out, {:.3} um, {:.3} um, \
+             {:.3} urad in the fit",
+            c.groups,
+            c.split,
+            out_of.x_um,
+            out_of.y_um,
+            out_of.rz_urad,
+            fit.x_um,
+            fit.y_um,
+            fit.rz_urad
+        );
     }
     out
 }
