@@ -1,6 +1,7 @@
 //! `host-fit diff`.
 
 use crate::cli::error::HostError;
+use crate::cli::terminal;
 use crate::diff::{
     AxisDifference, ParameterChange, PoseDifference, parameter_changes, pose_difference,
 };
@@ -52,11 +53,9 @@ pub(super) fn run(args: &DiffArgs) -> Result<(), HostError> {
     if let Some(path) = &args.json {
         super::write_json(&as_json(paths, [&a, &b], &parameters, poses.as_ref()), path)?;
     }
-    if !super::is_standard_output(args.json.as_deref()) {
-        super::print(&as_text(paths, [&a, &b], &parameters, poses.as_ref()))?;
-    }
+    terminal::print(&as_text(paths, [&a, &b], &parameters, poses.as_ref()))?;
     if a.serial != b.serial {
-        super::warn(&[format!(
+        terminal::warn(&[format!(
             "the blobs have other serial numbers: {} and {}",
             or_dash(&a.serial),
             or_dash(&b.serial)

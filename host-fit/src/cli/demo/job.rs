@@ -193,7 +193,7 @@ pub(super) fn settings(model: ModelKind) -> FitSettings {
 /// Table 2: Model (15) with the designed parameters, no zero deviation.
 fn designed_errors(dataset: &Dataset, stage: &Stage) -> Result<PoseError, HostError> {
     let designed = calibration(
-        dataset,
+        &dataset.rows,
         stage,
         Model::of(ModelKind::M15),
         &Parameters::designed(stage),
