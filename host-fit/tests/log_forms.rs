@@ -41,7 +41,7 @@ fn one_long_recording_is_fitted_as_its_movements_are() {
         let (have, warnings) = fit(log);
         assert_eq!(have["errors"], want["errors"], "{log}");
         assert_eq!(have["movements"], 57, "{log}");
-        assert!(warnings.contains("there are 57 in all"), "{warnings}");
+        assert!(warnings.contains("the times tell 57 in all"), "{warnings}");
         bench.good(&format!("eval p.bin {log} --stage stage.toml"));
     }
     let refused = "fit log.csv --stage stage.toml --out p.bin --split 2";

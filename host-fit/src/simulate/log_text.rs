@@ -30,7 +30,9 @@ pub fn log_csv(recording: &Recording, stage: &Stage) -> String {
         for s in samples {
             let time = s.t_us as f64 / us_per_unit;
             let [x, y1, y2] = [0, 1, 2].map(|i| s.beams_nm[i] as f64 * per_nm[i]);
-            let ([g1, g2, g3], [a, b, c]) = (s.capacitive, s.hall);
+            let code = |quantity, code: i32| f64::from(code) / stage.log.column(quantity).scale;
+            let [g1, g2, g3] = [0, 1, 2].map(|i| code(Quantity::GAPS[i], s.capacitive[i]));
+            let [a, b, c] = [0, 1, 2].map(|i| code(Quantity::HALL[i], s.hall[i]));
             let _ = writeln!(
                 text,
                 "{movement},{time},{x},{y1},{y2},{g1},{g2},{g3},{a},{b},{c}"
@@ -110,6 +112,7 @@ mod tests {
         set(Quantity::Movement, "#run, \"no.\"", 1.0);
         set(Quantity::Time, "time_ms", 1e3);
         set(Quantity::BeamX, "ifm_x_um", 1e-6);
+        set(Quantity::HallA, "Hall A [V]", 1.0 / 3.125e-4);
         let csv = log_csv(&recording(), &stage);
         let read = read_bytes(
             csv.as_bytes(),
@@ -120,5 +123,6 @@ mod tests {
         let rows = read.expect("a sound log").dataset.rows;
         assert_eq!((rows.len(), rows[1].t_us), (3, 2000));
         assert!((rows[2].reference[0] - 1e-9).abs() < 1e-20);
+        assert_eq!(rows[2].frame.hall(), [-7, 8, -9]);
     }
 }

@@ -24,7 +24,9 @@ pub fn to_csv(rows: &[JoinedRow], reference: &Reference, stage: &Stage) -> Strin
     for row in rows {
         let time = row.t_us as f64 / us_per_unit;
         let [x, y, z] = row.values;
-        let ([g1, g2, g3], [a, b, c]) = (row.capacitive, row.hall);
+        let code = |quantity, code: i32| f64::from(code) / stage.log.column(quantity).scale;
+        let [g1, g2, g3] = [0, 1, 2].map(|k| code(Quantity::GAPS[k], row.capacitive[k]));
+        let [a, b, c] = [0, 1, 2].map(|k| code(Quantity::HALL[k], row.hall[k]));
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,

@@ -90,7 +90,7 @@ pub enum LogError {
         key: &'static str,
     },
     /// A column that nobody knows.
-    #[error("{}:{line}: column {column}, `{name}`, is unknown; map it, or drop it with `ignore = [\"{name}\"]`, in the [log] table of stage.toml (known columns: {known})", path.display())]
+    #[error("{}:{line}: column {column}, `{name}`, is unknown; map it, or drop it with `ignore = [\"{name}\"]`, in the [log] table of stage.toml, which `host-fit init` drafts (known columns: {known})", path.display())]
     UnknownColumn {
         /// The file.
         path: PathBuf,
@@ -114,7 +114,7 @@ pub enum LogError {
         column: usize,
     },
     /// Two columns of the header hold the same quantity.
-    #[error("{}:{line}: column {column}, `{name}`, holds the same as column {first}; rename or remove one", path.display())]
+    #[error("{}:{line}: column {column}, `{name}`, repeats the quantity of column {first}; rename or remove one", path.display())]
     RepeatedColumn {
         /// The file.
         path: PathBuf,

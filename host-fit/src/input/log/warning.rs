@@ -64,13 +64,19 @@ fn and_others(others: usize) -> String {
     }
 }
 
+/// How many more logs there are.
+fn and_logs(others: usize) -> String {
+    match others {
+        0 => String::new(),
+        others => format!(" and {others} more"),
+    }
+}
+
 /// Where movements begin that no column tells.
 fn beginnings(split_s: Option<f64>) -> String {
     let gap = super::split::GAP_PERIODS;
     let every = split_s.map_or(String::new(), |seconds| format!("every {seconds} s, "));
-    format!(
-        "a movement begins {every}after a gap of more than {gap} rows and where the time starts again"
-    )
+    format!("{every}after a gap of more than {gap} rows and where the time starts again")
 }
 
 /// Something that the user should know about a log that was read.
@@ -115,7 +121,7 @@ pub enum LogWarning {
         line: usize,
     },
     /// Logs have no column for the movement: their times told where movements begin.
-    #[error("{}{}: no column for the movement; by the time there are {movements} in all ({}), each with its own zero deviation", path.display(), and_others(*others), beginnings(*split_s))]
+    #[error("{}{}: no column for the movement; the times tell {movements} in all (one begins {}), each with its own zero deviation", path.display(), and_logs(*others), beginnings(*split_s))]
     MovementsByTime {
         /// The first such file.
         path: PathBuf,

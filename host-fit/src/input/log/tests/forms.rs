@@ -120,7 +120,7 @@ fn units_that_are_missing_unknown_or_of_another_kind_are_refused() {
     let mapped = stage_with("ifm_x = \"laser_nm\"");
     refused_with(&named("ifm_x [nm]"), &mapped, &["`ifm_x [nm]`", "unknown"]);
     let twice = named("ifm_x [nm]").replace("cap1_cnt", "ifm_x_um");
-    let error = refused_with(&twice, stage(), &["same as column 3"]);
+    let error = refused_with(&twice, stage(), &["repeats", "column 3"]);
     assert!(
         matches!(
             error,
