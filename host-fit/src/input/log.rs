@@ -1,8 +1,8 @@
 //! Reads logs: CSV or CSV.gz, raw codes and reference, into rows in SI units by movement.
 //!
 //! One row per servo period below a header. Which column holds what is said in
-//! [`layout`], in which units in [`units`], what else a table may look like at
-//! [`table::Table::open`]; a log without a column for the movement is taken apart in [`split`].
+//! [`layout`], in which units in `units.rs`, what else a table may look like at
+//! `Table::open` in `table.rs`; a log without a column for the movement is taken apart in `split.rs`.
 //! A file is taken for gzip or UTF-16 by its first bytes, not by its name.
 //!
 //! Anything wrong is refused with file, line and column ([`LogError`]). Bad cells and

@@ -11,7 +11,7 @@
 //! | `hall_a`, `hall_b`, `hall_c` | `hall_a_cnt`, `hall_b_cnt`, `hall_c_cnt` | Hall codes |
 //!
 //! A column that `[log]` leaves to its default is also known by its key or by the default name
-//! with another unit, in any of the spellings of [`super::units`]: `ifm_x [um]`, `X/mm`, `Time (s)`.
+//! with another unit, in any of the spellings of `units.rs`: `ifm_x [um]`, `X/mm`, `Time (s)`.
 
 use super::units;
 
