@@ -241,6 +241,15 @@ fn a_log_of_another_gain_is_told_from_the_first() {
         &parts,
     );
     assert!(bench.holds_only(&["first.csv", "second.csv"]));
+    bench.good("fit first.csv second.csv --stage stage.toml --out p.bin --json p.json --force");
+    let json = bench.json("p.json");
+    let logs = json["logs"].as_array().expect("a list");
+    assert_eq!(logs.len(), 2);
+    for (log, name) in logs.iter().zip(["first.csv", "second.csv"]) {
+        assert_eq!(log["path"], name);
+        let x_um = log["errors"]["x"]["rmse_um"].as_f64().expect("a number");
+        assert!((1.0..10.0).contains(&x_um), "{x_um}");
+    }
 }
 
 #[test]

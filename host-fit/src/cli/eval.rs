@@ -118,7 +118,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     circumstances.findings = terminal::timed("diagnosis", || {
         diagnose::of_judged(&log.dataset, &stage, &set, &errors)
     });
-    let report = of_eval(&set, &judgement, zeros, &circumstances);
+    let report = of_eval(&set, &decoded, &judgement, zeros, &circumstances);
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
     }
@@ -131,7 +131,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
             &format!("errors, {}", report.zeros_in_words),
             &judgement.errors,
             None
-        )
+        ) + &report.by_log()
     ))?;
     super::wrote([args.json.clone()])?;
     terminal::warn(&report.warnings);

@@ -373,7 +373,7 @@ fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
             &format!("errors over all rows, {}", report.zeros_in_words),
             &fit.judgement.errors,
             None
-        ),
+        ) + &report.by_log(),
         text::lag(
             fit.lag,
             report.reference_lag.is_some_and(|lag| lag.compensated)

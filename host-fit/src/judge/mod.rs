@@ -6,7 +6,7 @@ pub mod precision;
 pub mod statistics;
 pub mod uncertainty;
 
-use crate::input::dataset::{Dataset, Row};
+use crate::input::dataset::{Dataset, LogSource, Row};
 use crate::input::stage::Stage;
 use crate::judge::statistics::{ErrorSums, PoseError};
 use crate::problem::model::Model;
@@ -134,6 +134,20 @@ impl Decoded {
         }
         errors
     }
+}
+
+/// The errors of each log, of errors by row.
+pub fn errors_by_log(errors: &[Option<[f64; 3]>], dataset: &Dataset) -> Vec<PoseError> {
+    let of_log = |log: &LogSource| {
+        let mut sums = ErrorSums::default();
+        for row in log.rows.clone() {
+            if let Some(error) = errors[row] {
+                sums.add(row, error);
+            }
+        }
+        sums.finish()
+    };
+    dataset.logs.iter().map(of_log).collect()
 }
 
 /// Mean of the errors that there are.

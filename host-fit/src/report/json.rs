@@ -3,10 +3,10 @@
 use crate::diagnose::finding::Finding;
 use crate::diagnose::trusted::{Trusted, trusted};
 use crate::fit::{CrossValidation, Fit};
-use crate::input::dataset::Dataset;
+use crate::input::dataset::{Dataset, LogSource};
 use crate::input::stage::Stage;
 use crate::judge::statistics::PoseError;
-use crate::judge::{Judgement, Zeros};
+use crate::judge::{Decoded, Judgement, Zeros, errors_by_log};
 use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::Parameters;
 use crate::report::field::{ByAxis, Correlation, FieldReport};
@@ -251,8 +251,47 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// What a diagnosis of the log found, the gravest first.
     pub findings: Vec<Finding>,
+    /// The same errors log by log.
+    pub logs: Vec<LogErrors>,
     /// The inputs whose errors no log shows, with what 1 % costs.
     pub trusted_inputs: Vec<Trusted>,
+}
+
+impl Report {
+    /// The rms errors of each of several logs for a terminal, a line each.
+    pub fn by_log(&self) -> String {
+        let line = |log: &LogErrors| {
+            let Errors { x, y, rz } = &log.errors;
+            format!(
+                "  {:>8.3} um {:>8.3} um {:>8.3} urad rms in {}\n",
+                x.rmse_um, y.rmse_um, rz.rmse_urad, log.path
+            )
+        };
+        let several = (self.logs.iter()).filter(|_| self.logs.len() > 1);
+        several.map(line).collect()
+    }
+}
+
+/// The errors of one log.
+#[derive(Clone, Debug, Serialize)]
+pub struct LogErrors {
+    /// The file.
+    pub path: String,
+    /// Its rows.
+    pub rows: usize,
+    /// Over all of them.
+    pub errors: Errors,
+}
+
+fn logs(decoded: &Decoded, judgement: &Judgement, dataset: &Dataset) -> Vec<LogErrors> {
+    let errors = decoded.errors_less(&judgement.zeros, dataset);
+    let errors = errors_by_log(&errors, dataset);
+    let of_log = |(log, errors): (&LogSource, &PoseError)| LogErrors {
+        path: log.path.display().to_string(),
+        rows: log.rows.len(),
+        errors: Errors::from(errors),
+    };
+    dataset.logs.iter().zip(&errors).map(of_log).collect()
 }
 
 /// What a command knows besides the fit or judgement itself.
@@ -392,6 +431,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         zero_deviations: movement_zeros(&fit.judgement, c.dataset),
         warnings,
         findings: c.findings.clone(),
+        logs: logs(&fit.decoded, &fit.judgement, c.dataset),
         trusted_inputs: trusted(&fit.set),
     }
 }
@@ -399,6 +439,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
 /// The report of a judgement of a blob.
 pub fn of_eval(
     set: &ParameterSet,
+    decoded: &Decoded,
     judgement: &Judgement,
     zeros: Zeros,
     c: &Circumstances,
@@ -438,6 +479,7 @@ pub fn of_eval(
         zero_deviations: movement_zeros(judgement, c.dataset),
         warnings: c.warnings.clone(),
         findings: c.findings.clone(),
+        logs: logs(decoded, judgement, c.dataset),
         trusted_inputs: trusted(set),
     }
 }
