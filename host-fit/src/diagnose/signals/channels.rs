@@ -3,6 +3,7 @@
 use crate::diagnose::finding::{Code, Finding, Severity};
 use crate::input::dataset::{Dataset, Movement, Row};
 use crate::input::stage::Stage;
+use runtime::capacitive::vertical_rows;
 use std::ops::Range;
 
 /// Names of the Hall probes and the beams.
@@ -35,6 +36,8 @@ pub(super) struct LogSignals<'a> {
     pub(super) usable: Vec<bool>,
     /// Time since the start of the log, s; a movement whose time starts anew follows the one before.
     pub(super) time_s: Vec<f64>,
+    /// Rows of the matrix that turns gaps (m) into Z, Rx, Ry.
+    pub(super) gap_rows: [[f64; 3]; 3],
     /// Distance of the Y beams, m.
     pub(super) baseline_m: f64,
     /// Median time between rows, s.
@@ -57,6 +60,8 @@ impl<'a> LogSignals<'a> {
             channels: channels(rows, stage),
             usable: vec![true; rows.len()],
             time_s: times_s(rows, &segments, period_s),
+            // A checked stage has its sensors apart.
+            gap_rows: vertical_rows(&stage.capacitive_probes_m).unwrap_or_default(),
             baseline_m: stage.y_baseline_m,
             first: range.start,
             dataset,

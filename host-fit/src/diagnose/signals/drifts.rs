@@ -1,4 +1,4 @@
-//! Drift of a probe and of its gain, beyond the walk of the interferometers.
+//! Drift of a channel and of the gain of a probe, beyond the walk of the interferometers.
 
 use super::channels::{BEAMS, HALL, LogSignals};
 use super::residual::Residuals;
@@ -8,15 +8,20 @@ use std::ops::Range;
 /// Slope in standard errors that is no chance; more where few blocks tell the walk.
 const ERRORS_MIN: f64 = 4.5;
 /// Drift over a movement or the log, whichever is longer, that is worth a warning, m.
-const DRIFT_MIN_M: f64 = 0.3e-6;
+const DRIFT_MIN_M: f64 = 0.5e-6;
 /// Change of a gain over the log that is.
-const GAIN_MIN: f64 = 0.002;
-/// Blocks that tell the walk of the reference, s.
+const GAIN_MIN: f64 = 0.003;
+/// Blocks that tell the walk of the reference, s, and how many at least.
 const BLOCK_S: f64 = 1.0;
-/// Fewest blocks.
 const BLOCKS_MIN: usize = 5;
-/// How much of a drift may be left over where one channel explains it.
-const LEFT_SHARE: f64 = 0.3;
+/// Movements whose offsets show a trend.
+const TREND_MIN: usize = 12;
+/// Ratio of von Neumann below which the offsets are no resets of their own but a walk.
+const WHITE_MIN: f64 = 1.2;
+/// By how much more, in squares of standard errors, a beam explains drifts than one probe.
+const BEAM_MIN: f64 = 9.0;
+/// What is left unexplained by one channel where several drift, in parts of all.
+const LEFT_MAX: f64 = 0.1;
 
 /// A slope and its standard error.
 #[derive(Clone, Copy)]
@@ -25,7 +30,13 @@ struct Slope {
     error: f64,
 }
 
-/// Names probes that drift, beams that do, and probes whose gain does.
+impl Slope {
+    fn in_errors(self) -> f64 {
+        self.value / self.error.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Names channels that drift, and probes whose gain does.
 pub(super) fn findings(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let blocks = blocks(log);
     if blocks.len() < BLOCKS_MIN {
@@ -33,30 +44,33 @@ pub(super) fn findings(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> 
     }
     let limit = ERRORS_MIN * (1.0 + 5.0 / blocks.len() as f64);
     let length_s = log.time_s.last().copied().unwrap_or(0.0);
-    let time = residuals.unexplained(log, &log.time_s);
+    let longest_s = (log.segments.iter())
+        .map(|segment| log.time_s[segment.end - 1] - log.time_s[segment.start])
+        .fold(length_s, f64::max);
     let mut findings = Vec::new();
-    let drifts: [Slope; 3] = std::array::from_fn(|probe| {
-        let signal = log.channels[probe].values.iter().zip(&log.time_s);
+    let mut drifts = Vec::new();
+    for k in 0..3 {
+        let time = residuals.unexplained(log, k, &log.time_s);
+        let signal = log.channels[k].values.iter().zip(&log.time_s);
         let growing: Vec<f64> = signal.map(|(s, t)| s * (t / length_s - 0.5)).collect();
-        let growing = residuals.unexplained(log, &growing);
-        let noise = Noise::new(log, residuals, probe, &blocks);
-        let gain = noise.slope(
-            log,
-            &residuals.values[probe],
-            &less(&growing, &time),
-            &blocks,
-        );
+        let growing = residuals.unexplained(log, k, &growing);
+        let noise = Noise::new(log, residuals, k, &blocks);
+        let values = &residuals.values[k];
+        let gain = noise.slope(log, values, &less(&growing, &time), &blocks);
         if gain.value.abs() > GAIN_MIN.max(limit * gain.error) {
-            findings.push(of_gain(log, probe, gain.value));
+            findings.push(of_gain(log, k, gain.value));
         }
-        noise.slope(
-            log,
-            &residuals.values[probe],
-            &less(&time, &growing),
-            &blocks,
-        )
-    });
-    findings.extend(of_drifts(log, residuals, &drifts, limit));
+        drifts.push(noise.slope(log, values, &less(&time, &growing), &blocks));
+    }
+    let least = DRIFT_MIN_M / longest_s.max(f64::MIN_POSITIVE);
+    let trends = (0..3).map(|k| trend(log, residuals, k)).collect();
+    for slopes in [Some(drifts), trends].into_iter().flatten() {
+        let of = drifting(log, residuals, &slopes, limit, least);
+        if !of.is_empty() {
+            findings.extend(of);
+            break;
+        }
+    }
     findings
 }
 
@@ -94,19 +108,14 @@ impl Noise {
         let white_m = residuals.noise_m[probe];
         let mean =
             |block: &Range<usize>| values[block.clone()].iter().sum::<f64>() / block.len() as f64;
-        let neighbours = blocks.windows(2).filter(|pair| {
-            let split = log
-                .segments
-                .iter()
-                .any(|segment| segment.start == pair[1].start);
-            pair[0].end == pair[1].start && !split
-        });
-        let steps: Vec<f64> = neighbours
+        let starts = |row: usize| log.segments.iter().any(|segment| segment.start == row);
+        let steps: Vec<f64> = (blocks.windows(2))
+            .filter(|pair| pair[0].end == pair[1].start && !starts(pair[1].start))
             .map(|pair| mean(&pair[1]) - mean(&pair[0]))
             .collect();
         let count = steps.len().max(1) as f64;
         let drift = steps.iter().sum::<f64>() / count;
-        let squares: f64 = steps.iter().map(|step| (step - drift).powi(2)).sum();
+        let squares: f64 = steps.iter().map(|step| (step - drift) * (step - drift)).sum();
         let of_white = 2.0 * white_m * white_m / log.rows_in(BLOCK_S) as f64;
         let variance = squares / (count - 1.0).max(1.0);
         // Noise that is not white leaves less in the means than white noise of its size.
@@ -139,18 +148,92 @@ impl Noise {
         }
         let noise =
             self.white_m * self.white_m * length + self.walk_m2_per_s * log.period_s * of_walk;
-        let shown: f64 = (blocks.iter())
-            .map(|block| {
-                let left = block
-                    .clone()
-                    .map(|row| (values[row] - value * over[row]) * over[row]);
-                left.sum::<f64>().powi(2)
-            })
-            .sum();
+        let shown = |block: &Range<usize>| {
+            let left = (block.clone()).map(|row| (values[row] - value * over[row]) * over[row]);
+            let sum: f64 = left.sum();
+            sum * sum
+        };
+        let shown: f64 = blocks.iter().map(shown).sum();
         Slope {
             value,
             error: noise.max(shown).sqrt() / length,
         }
+    }
+}
+
+/// The trend of the offsets of a probe from segment to segment, m/s; `None` where they do not
+/// scatter by themselves.
+fn trend(log: &LogSignals, residuals: &Residuals, probe: usize) -> Option<Slope> {
+    let offsets: Vec<(f64, f64)> = (log.segments.iter())
+        .zip(residuals.offsets_m(probe))
+        .filter(|(segment, _)| log.usable[(*segment).clone()].contains(&true))
+        .map(|(segment, offset_m)| {
+            let ends = log.time_s[segment.start] + log.time_s[segment.end - 1];
+            (0.5 * ends, offset_m)
+        })
+        .collect();
+    let n = offsets.len() as f64;
+    if offsets.len() < TREND_MIN {
+        return None;
+    }
+    let mean = |of: fn(&(f64, f64)) -> f64| offsets.iter().map(of).sum::<f64>() / n;
+    let (mean_s, mean_m) = (mean(|o| o.0), mean(|o| o.1));
+    let (mut tt, mut tm) = (0.0, 0.0);
+    for (t, m) in &offsets {
+        tt += (t - mean_s) * (t - mean_s);
+        tm += (t - mean_s) * (m - mean_m);
+    }
+    let value = tm / tt;
+    let left: Vec<f64> = (offsets.iter())
+        .map(|(t, m)| m - mean_m - value * (t - mean_s))
+        .collect();
+    let squares = product(&left, &left);
+    let steps: f64 = (left.windows(2)).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+    (steps > WHITE_MIN * squares).then(|| Slope {
+        value,
+        error: (squares / (n - 2.0) / tt).sqrt(),
+    })
+}
+
+/// The channels whose drift explains the slopes (m/s) of the probes: one beam, or else probes.
+fn drifting(
+    log: &LogSignals,
+    residuals: &Residuals,
+    slopes: &[Slope],
+    limit: f64,
+    least: f64,
+) -> Vec<Finding> {
+    let clear = |slope: &Slope| slope.value.abs() > least.max(limit * slope.error);
+    if !slopes.iter().any(clear) {
+        return Vec::new();
+    }
+    let all: f64 = slopes.iter().map(|slope| slope.in_errors().powi(2)).sum();
+    let most = slopes.iter().map(|slope| slope.in_errors().powi(2)).fold(0.0, f64::max);
+    let mean = residuals.mean_of_errors(log);
+    let mut best = (most + BEAM_MIN, None);
+    for (beam, name) in BEAMS.into_iter().enumerate() {
+        let shape = mean[3 + beam];
+        let (mut with, mut by) = (0.0, 0.0);
+        for (slope, shape) in slopes.iter().zip(shape) {
+            with += shape * slope.value / (slope.error * slope.error);
+            by += shape * shape / (slope.error * slope.error);
+        }
+        let explained = with * with / by;
+        if explained > best.0 {
+            best = (explained, Some((name, with / by)));
+        }
+    }
+    match best {
+        (explained, Some((name, m_per_s))) if all - explained < (LEFT_MAX * all).max(BEAM_MIN) => {
+            vec![of_drift(log, name, m_per_s, "")]
+        }
+        _ => (0..3)
+            .filter(|&k| clear(&slopes[k]) && slopes[k].in_errors().powi(2) > LEFT_MAX * most)
+            .map(|k| {
+                let same = " (a drift of ifm_x looks the same)";
+                of_drift(log, HALL[k], slopes[k].value, if k == 2 { same } else { "" })
+            })
+            .collect(),
     }
 }
 
@@ -169,54 +252,9 @@ fn of_gain(log: &LogSignals, probe: usize, change: f64) -> Finding {
     }
 }
 
-/// Probes that drift; where one beam explains it better than the probes, that beam.
-fn of_drifts(
-    log: &LogSignals,
-    residuals: &Residuals,
-    drifts: &[Slope; 3],
-    limit: f64,
-) -> Vec<Finding> {
-    let longest_s = (log.segments.iter())
-        .map(|segment| log.time_s[segment.end - 1] - log.time_s[segment.start])
-        .fold(log.time_s.last().copied().unwrap_or(0.0), f64::max);
-    let least = DRIFT_MIN_M / longest_s.max(f64::MIN_POSITIVE);
-    let drifting: Vec<usize> = (0..3)
-        .filter(|&i| drifts[i].value.abs() > least.max(limit * drifts[i].error))
-        .collect();
-    if drifting.len() > 1 {
-        // A Y beam shows in all probes, in a ratio that only it has.
-        let size: f64 = drifts.iter().map(|drift| drift.value * drift.value).sum();
-        let mut best = (LEFT_SHARE * LEFT_SHARE * size, None);
-        for (beam, name) in BEAMS.into_iter().enumerate() {
-            let shape: [f64; 3] = std::array::from_fn(|i| residuals.slope(i, 3 + beam));
-            let norm: f64 = shape.iter().map(|s| s * s).sum();
-            let along = (0..3).map(|i| shape[i] * drifts[i].value).sum::<f64>() / norm;
-            let left: f64 = (0..3)
-                .map(|i| (drifts[i].value - along * shape[i]).powi(2))
-                .sum();
-            if left < best.0 {
-                best = (left, Some(of_drift(log, name, along, "")));
-            }
-        }
-        if let Some(beam) = best.1 {
-            return vec![beam];
-        }
-    }
-    let beam = |i: usize| {
-        if i == 2 {
-            " (a drift of ifm_x looks the same)"
-        } else {
-            ""
-        }
-    };
-    (drifting.into_iter())
-        .map(|i| of_drift(log, HALL[i], drifts[i].value, beam(i)))
-        .collect()
-}
-
 fn of_drift(log: &LogSignals, name: &str, m_per_s: f64, or: &str) -> Finding {
     let message = format!(
-        "{name} drifts by {:+.3} um/s within the movements{or}: let it warm up, and record the log again",
+        "{name} drifts by {:+.3} um/s{or}: let it warm up, and record the log again",
         m_per_s * 1e6,
     );
     Finding {

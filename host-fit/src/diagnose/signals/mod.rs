@@ -8,19 +8,23 @@
 //! | [`converters`] | flat tops |
 //! | [`still`] | channels and movements that stand still |
 //! | [`residual`] | what the motion does not explain of a Hall signal |
-//! | [`jumps`] | outliers and steps, and the channel that jumps |
-//! | [`spectrum`] | hum |
-//! | [`drifts`] | drift of a probe and of its gain |
+//! | [`blame`] | the channel whose error explains that |
+//! | [`outliers`], [`steps`] | rows that jump, signals that stay where they jumped |
+//! | [`spectrum`], [`hum`] | lines of one frequency |
+//! | [`drifts`] | drift of a channel, and of the gain of a probe |
 //!
 //! Each log is tested alone, and what an earlier test names is left out of the later ones. A
 //! channel is named where it alone explains what was found.
 
+mod blame;
 mod channels;
 mod converters;
 mod drifts;
-mod jumps;
+mod hum;
+mod outliers;
 mod residual;
 mod spectrum;
+mod steps;
 mod still;
 mod timing;
 
@@ -28,7 +32,7 @@ use crate::diagnose::finding::Finding;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use channels::LogSignals;
-use residual::{Residuals, Units};
+use residual::Residuals;
 
 /// Fewest rows of a log whose residuals are tested.
 const ROWS_MIN: usize = 1000;
@@ -60,37 +64,32 @@ fn of_log(
     let mut signals = LogSignals::new(dataset, stage, log);
     findings.extend(timing::findings(&signals, stage));
     findings.extend(converters::saturated(&mut signals));
-    findings.extend(still::frozen(&mut signals));
     let has_reference = dataset.logs[log].has_reference;
+    if has_reference {
+        findings.extend(still::idle_and_crashed(&mut signals));
+    }
+    findings.extend(still::frozen(&mut signals, has_reference));
     if !has_reference || signals.len() < ROWS_MIN {
         return;
     }
     if let Some(errors) = errors {
         signals.leave_out_undecoded(errors);
     }
-    findings.extend(still::idle_and_crashed(&signals));
-    let units = Units::of(&signals);
-    let Some(mut residuals) = Residuals::new(&signals, &units) else {
+    let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 3] =
+        [still::standing, outliers::outliers, steps::steps];
+    let Some(mut residuals) = Residuals::new(&signals, stage) else {
         return;
     };
-    let still = still::standing(&mut signals, &residuals);
-    if !still.is_empty() {
-        findings.extend(still);
-        match Residuals::new(&signals, &units) {
-            Some(again) => residuals = again,
-            None => return,
-        }
-    }
-    for test in [jumps::outliers, jumps::steps] {
-        let jumps = test(&mut signals, &residuals);
-        if !jumps.is_empty() {
-            findings.extend(jumps);
-            match Residuals::new(&signals, &units) {
+    for test in tests {
+        let found = test(&mut signals, &residuals);
+        if !found.is_empty() {
+            findings.extend(found);
+            match Residuals::new(&signals, stage) {
                 Some(again) => residuals = again,
                 None => return,
             }
         }
     }
-    findings.extend(spectrum::hum(&signals, &residuals));
+    findings.extend(hum::hum(&signals, &residuals));
     findings.extend(drifts::findings(&signals, &residuals));
 }

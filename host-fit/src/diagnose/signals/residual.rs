@@ -1,97 +1,345 @@
-//! What the motion does not explain of the Hall signals: residuals of a regression on smooth
-//! functions of the reference and of the vertical pose.
+//! What the motion does not explain of the Hall signals: residuals of the field model, fitted to
+//! each probe by itself.
 //!
-//! Any probe over any magnet is described by a polynomial of third order in the pose; the
-//! velocities take up a lag of the reference, and every segment has an offset of its own. No
-//! model of the decoder is needed, and no fit: a fault of one channel stays in its residual.
+//! With an offset of its own in every segment, a probe's 27 parameters depend on no other probe, so
+//! a fault of one probe stays in its residual. Cauchy's weights keep faulty rows from bending the
+//! fit, and the prior of the field model keeps a drift from passing for a shape of the magnet.
 
 use super::channels::{LogSignals, robust_deviation};
+use crate::input::stage::Stage;
+use crate::problem::parameters::Parameters;
+use crate::solve::field::parameters::FieldParameters;
+use crate::solve::field::probe::{Probe, probes};
+use crate::solve::field::terms::{PER_PROBE, TERMS};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use std::ops::Range;
 
-/// Functions: 9 linear ones, 21 squares, 10 cubes of q, 18 of q q V, 18 of q V V.
-const FUNCTIONS: usize = 76;
-/// Rows that the regression uses at most, about: enough for any noise.
-const ROWS_MAX: usize = 30_000;
-/// Weight of the prior that all coefficients are zero, in parts of what the rows say: it decides
-/// where a log does not.
-const RIDGE: f64 = 1e-8;
+/// The parameters of a probe, and a lag of the reference.
+const COLUMNS: usize = PER_PROBE + 1;
+/// Rows that the fit uses at most, about: enough for any noise.
+const ROWS_MAX: usize = 12_000;
+/// Gauss-Newton steps with the probes at their designed places, and at those that the slopes show.
+const STEPS: usize = 4;
+/// Residual that halves the weight of a row, in standard deviations.
+const HALF_WEIGHT: f64 = 3.0;
+/// Weight that holds a parameter without prior, in parts of what the rows say: it decides where a
+/// log does not.
+const RIDGE: f64 = 1e-9;
+/// Noise below this is rounding, mm.
+const NOISE_MIN_MM: f64 = 2e-5;
+/// Residuals beyond this part of the signals are those of a log that is not understood.
+const UNEXPLAINED_MAX: f64 = 0.1;
 
-/// Magnitudes that the arguments of the functions are divided by.
-pub(super) struct Units {
-    planar: [f64; 3],
-    vertical: [f64; 3],
-    /// Half as much again as it usually is: a jump is no velocity.
-    velocity: [f64; 3],
+/// A row as the fit of a probe sees it.
+struct Row {
+    columns: [f64; COLUMNS],
+    /// What an offset of the reference changes, up to its sign.
+    by_offset: f64,
+    /// Signal less model, mm.
+    left_mm: f64,
 }
 
-impl Units {
-    /// The largest magnitudes of the usable rows.
-    pub(super) fn of(log: &LogSignals) -> Self {
-        let mut units = Self {
-            planar: [1e-12; 3],
-            vertical: [1e-12; 3],
-            velocity: [1e-12; 3],
+/// A fit of one probe.
+struct ProbeFit {
+    probe: Probe,
+    lag_s: f64,
+    /// By segment, mm.
+    offsets_mm: Vec<f64>,
+    factor: Cholesky<f64, Dyn>,
+    scales: Vec<f64>,
+}
+
+/// Residuals of the three Hall signals.
+pub(super) struct Residuals {
+    fits: Vec<ProbeFit>,
+    stride: usize,
+    speed_max: [f64; 3],
+    /// By probe and row, m at the designed scale; 0 in rows that are left out.
+    pub(super) values: [Vec<f64>; 3],
+    /// White noise, m.
+    pub(super) noise_m: [f64; 3],
+}
+
+impl Residuals {
+    /// `None` where too few rows are left, or the motion does not explain the signals.
+    pub(super) fn new(log: &LogSignals, stage: &Stage) -> Option<Self> {
+        let mut residuals = Self {
+            fits: Vec::new(),
+            stride: log.len().div_ceil(ROWS_MAX),
+            speed_max: usual_speeds(log),
+            values: Default::default(),
+            noise_m: [0.0; 3],
         };
-        let mut speeds: [Vec<f64>; 3] = Default::default();
-        for segment in &log.segments {
-            for row in segment.clone().filter(|&row| log.usable[row]) {
-                let velocity = velocity(log, segment, row);
-                for i in 0..3 {
-                    let raise = |unit: &mut f64, x: f64| *unit = unit.max(x.abs());
-                    raise(&mut units.planar[i], log.rows[row].reference[i]);
-                    raise(&mut units.vertical[i], log.rows[row].vertical[i]);
-                    speeds[i].push(velocity[i].abs());
-                }
+        let mut parameters = FieldParameters::of_model_31(&Parameters::designed(stage), stage);
+        let mut lags_s = [0.0; 3];
+        for steps in 0..2 * STEPS {
+            if steps == STEPS {
+                let places = FieldParameters::of_model_31(&parameters.model_31(), stage);
+                parameters.positions = places.positions;
+            }
+            residuals.fits.clear();
+            for (k, probe) in probes(&parameters).into_iter().enumerate() {
+                let values = &mut parameters.probes[k];
+                let fit = residuals.step(log, k, probe, values, &mut lags_s[k])?;
+                residuals.fits.push(fit);
             }
         }
-        for (unit, speeds) in units.velocity.iter_mut().zip(&mut speeds) {
-            let high = speeds.len() * 19 / 20;
-            if high < speeds.len() {
-                let usual = *speeds.select_nth_unstable_by(high, f64::total_cmp).1;
-                *unit = unit.max(1.5 * usual);
+        for (k, probe) in probes(&parameters).into_iter().enumerate() {
+            // Offsets and factor at the last parameters; these stay.
+            let (mut values, mut lag_s) = (parameters.probes[k], lags_s[k]);
+            let fit = residuals.step(log, k, probe, &mut values, &mut lag_s)?;
+            residuals.values[k] = residuals.left_m(log, k, &fit);
+            residuals.fits[k] = ProbeFit {
+                lag_s: lags_s[k],
+                ..fit
+            };
+            residuals.noise_m[k] = 1e-3 * white_noise(log, &residuals.values[k], 1e3);
+            let left_m = robust_deviation(residuals.values[k].iter().copied());
+            let moved_m = robust_deviation(signals_less_means(log, k).into_iter());
+            if !(left_m <= UNEXPLAINED_MAX * moved_m) {
+                return None;
             }
         }
-        units
+        Some(residuals)
     }
 
-    fn functions(
+    fn row(
         &self,
         log: &LogSignals,
-        segment: &std::ops::Range<usize>,
+        (k, probe): (usize, &Probe),
+        lag_s: f64,
+        segment: &Range<usize>,
         row: usize,
-    ) -> [f64; FUNCTIONS] {
-        let speed = velocity(log, segment, row);
-        let row = &log.rows[row];
-        let q: [f64; 3] = std::array::from_fn(|i| row.reference[i] / self.planar[i]);
-        let v: [f64; 3] = std::array::from_fn(|i| row.vertical[i] / self.vertical[i]);
-        let mut out = [0.0; FUNCTIONS];
-        let mut count = 0;
-        let mut push = |value: f64| {
-            out[count] = value;
-            count += 1;
-        };
-        q.iter().chain(&v).for_each(|&x| push(x));
-        (0..3).for_each(|i| push((speed[i] / self.velocity[i]).clamp(-1.0, 1.0)));
+    ) -> Row {
+        let speed = self.speed(log, segment, row);
+        let here = &log.rows[row];
+        let planar_mm = [0, 1, 2].map(|i| (here.reference[i] + lag_s * speed[i]) * 1e3);
+        let reading = probe.read(planar_mm, here.vertical);
+        let mut columns = [0.0; COLUMNS];
+        columns[..PER_PROBE].copy_from_slice(&reading.by_parameter);
         for i in 0..3 {
-            for j in 0..3 {
-                push(q[i] * v[j]);
-                for k in j..3 {
-                    push(q[i] * v[j] * v[k]);
+            columns[PER_PROBE] += reading.by_pose[i] * speed[i] * 1e3;
+        }
+        Row {
+            columns,
+            by_offset: libm::hypot(reading.by_pose[0], reading.by_pose[1]),
+            left_mm: log.channels[k].values[row] * 1e3 - reading.signal_mm,
+        }
+    }
+
+    /// Of X, Y, Rz by central differences within a segment, per s; a jump is no speed.
+    fn speed(&self, log: &LogSignals, segment: &Range<usize>, row: usize) -> [f64; 3] {
+        let speed = speed(log, segment, row);
+        [0, 1, 2].map(|i| speed[i].clamp(-self.speed_max[i], self.speed_max[i]))
+    }
+
+    fn used<'s>(
+        &self,
+        log: &'s LogSignals,
+        segment: &Range<usize>,
+    ) -> impl Iterator<Item = usize> + 's {
+        let rows = segment.clone().step_by(self.stride);
+        rows.filter(|&row| log.usable[row])
+    }
+
+    /// One step of Gauss and Newton from `probe`, which is that of `values`.
+    fn step(
+        &self,
+        log: &LogSignals,
+        k: usize,
+        probe: Probe,
+        values: &mut [f64; PER_PROBE],
+        lag_s: &mut f64,
+    ) -> Option<ProbeFit> {
+        let rows: Vec<Vec<Row>> = (log.segments.iter())
+            .map(|segment| {
+                let of = |row| self.row(log, (k, &probe), *lag_s, segment, row);
+                self.used(log, segment).map(of).collect()
+            })
+            .collect();
+        let count: usize = rows.iter().map(Vec::len).sum();
+        if count < 4 * COLUMNS {
+            return None;
+        }
+        // The median of each segment, so that no weights are needed to begin with.
+        let middles: Vec<f64> = (rows.iter())
+            .map(|rows| {
+                let mut offsets: Vec<f64> =
+                    rows.iter().map(|row| row.left_mm / row.by_offset).collect();
+                super::channels::median(&mut offsets)
+            })
+            .collect();
+        let off = |row: &Row, middle: f64| row.left_mm - middle * row.by_offset;
+        let all = rows.iter().zip(&middles);
+        let scale_mm = robust_deviation(
+            all.flat_map(|(rows, &middle)| rows.iter().map(move |row| off(row, middle))),
+        )
+        .max(NOISE_MIN_MM);
+        let noise_mm = white_noise(log, &log.channels[k].values, 1e3).max(NOISE_MIN_MM);
+
+        let mut gram = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
+        let mut right = DVector::<f64>::zeros(COLUMNS);
+        let mut projected = Vec::with_capacity(rows.len());
+        for (rows, &middle) in rows.iter().zip(&middles) {
+            let mut of_columns = [0.0; COLUMNS];
+            let (mut of_left, mut of_offset) = (0.0, f64::MIN_POSITIVE);
+            let weight = |row: &Row| {
+                let deviations = off(row, middle) / (HALF_WEIGHT * scale_mm);
+                1.0 / (1.0 + deviations * deviations)
+            };
+            for row in rows {
+                let weighted = weight(row) * row.by_offset;
+                (of_columns.iter_mut().zip(&row.columns)).for_each(|(sum, f)| *sum += weighted * f);
+                of_left += weighted * row.left_mm;
+                of_offset += weighted * row.by_offset;
+            }
+            let share = of_columns.map(|sum| sum / of_offset);
+            for row in rows {
+                let weight = weight(row);
+                let f: [f64; COLUMNS] =
+                    std::array::from_fn(|i| row.columns[i] - share[i] * row.by_offset);
+                let left = row.left_mm - of_left / of_offset * row.by_offset;
+                for i in 0..COLUMNS {
+                    let weighted = weight * f[i];
+                    right[i] += weighted * left;
+                    for j in 0..=i {
+                        gram[(i, j)] += weighted * f[j];
+                    }
                 }
             }
-            for j in i..3 {
-                push(q[i] * q[j]);
-                push(v[i] * v[j]);
-                (0..3).for_each(|k| push(q[i] * q[j] * v[k]));
-                (j..3).for_each(|k| push(q[i] * q[j] * q[k]));
+            projected.push((share, of_left / of_offset));
+        }
+        let mut pull = [0.0; COLUMNS];
+        for (i, term) in TERMS.iter().enumerate() {
+            if let Some(prior) = term.prior {
+                pull[i] = (noise_mm / prior) * (noise_mm / prior);
+                right[i] -= pull[i] * values[i];
+            }
+        }
+        // A column that stands still within the segments tells nothing.
+        let least = 1e-12 * count as f64;
+        let scales: Vec<f64> = (0..COLUMNS)
+            .map(|i| 1.0 / (gram[(i, i)] + pull[i]).max(least).sqrt())
+            .collect();
+        let scaled = DMatrix::from_fn(COLUMNS, COLUMNS, |i, j| {
+            let (low, high) = (i.min(j), i.max(j));
+            let held = if i == j { pull[i] } else { 0.0 };
+            (gram[(high, low)] + held) * scales[i] * scales[j] + if i == j { RIDGE } else { 0.0 }
+        });
+        let factor = Cholesky::new(scaled)?;
+        let solved = factor.solve(&DVector::from_fn(COLUMNS, |i, _| right[i] * scales[i]));
+        let step: Vec<f64> = (0..COLUMNS).map(|i| solved[i] * scales[i]).collect();
+        if step.iter().any(|x| !x.is_finite()) {
+            return None;
+        }
+        (values.iter_mut().zip(&step)).for_each(|(value, step)| *value += step);
+        let fit = ProbeFit {
+            probe,
+            lag_s: *lag_s,
+            offsets_mm: projected.iter().map(|(_, offset)| *offset).collect(),
+            factor,
+            scales,
+        };
+        *lag_s += step[PER_PROBE];
+        Some(fit)
+    }
+
+    fn left_m(&self, log: &LogSignals, k: usize, fit: &ProbeFit) -> Vec<f64> {
+        let mut values = vec![0.0; log.len()];
+        for (segment, offset_mm) in log.segments.iter().zip(&fit.offsets_mm) {
+            for row in segment.clone().filter(|&row| log.usable[row]) {
+                let here = self.row(log, (k, &fit.probe), fit.lag_s, segment, row);
+                values[row] = (here.left_mm - offset_mm * here.by_offset) * 1e-3;
+            }
+        }
+        values
+    }
+
+    /// What the model does not explain of a change of the signal of a probe, by row, in the unit of
+    /// the change.
+    pub(super) fn unexplained(&self, log: &LogSignals, k: usize, change: &[f64]) -> Vec<f64> {
+        let fit = &self.fits[k];
+        let mut right = DVector::<f64>::zeros(COLUMNS);
+        let mut shares = Vec::with_capacity(log.segments.len());
+        for segment in &log.segments {
+            let of = |row| self.row(log, (k, &fit.probe), fit.lag_s, segment, row);
+            let mut of_columns = [0.0; COLUMNS];
+            let (mut of_change, mut of_offset) = (0.0, f64::MIN_POSITIVE);
+            for row in self.used(log, segment) {
+                let here = of(row);
+                for (i, f) in here.columns.iter().enumerate() {
+                    of_columns[i] += here.by_offset * f;
+                    right[i] += f * change[row];
+                }
+                of_change += here.by_offset * change[row];
+                of_offset += here.by_offset * here.by_offset;
+            }
+            (0..COLUMNS).for_each(|i| right[i] -= of_columns[i] * of_change / of_offset);
+            shares.push((of_columns.map(|sum| sum / of_offset), of_change / of_offset));
+        }
+        let scaled = DVector::from_fn(COLUMNS, |i, _| right[i] * fit.scales[i]);
+        let solved = fit.factor.solve(&scaled);
+        let slopes: [f64; COLUMNS] = std::array::from_fn(|i| solved[i] * fit.scales[i]);
+        let mut out = vec![0.0; log.len()];
+        for (segment, (share, offset)) in log.segments.iter().zip(&shares) {
+            for row in segment.clone().filter(|&row| log.usable[row]) {
+                let here = self.row(log, (k, &fit.probe), fit.lag_s, segment, row);
+                let mut explained = offset * here.by_offset;
+                for i in 0..COLUMNS {
+                    explained += slopes[i] * (here.columns[i] - share[i] * here.by_offset);
+                }
+                out[row] = change[row] - explained;
             }
         }
         out
     }
+
+    /// Offsets of a probe by segment, as displacements at its place, m.
+    pub(super) fn offsets_m(&self, probe: usize) -> impl Iterator<Item = f64> {
+        self.fits[probe].offsets_mm.iter().map(|mm| mm * 1e-3)
+    }
+
+    /// [`of_errors`](Self::of_errors) in the mean of some rows.
+    pub(super) fn mean_of_errors(&self, log: &LogSignals) -> Vec<[f64; 3]> {
+        let mut mean = vec![[0.0; 3]; log.channels.len()];
+        let rows = (0..log.len()).step_by(log.len().div_ceil(1000));
+        let count = rows.len() as f64;
+        for row in rows {
+            for (sums, shown) in mean.iter_mut().zip(self.of_errors(log, row)) {
+                (0..3).for_each(|k| sums[k] += shown[k] / count);
+            }
+        }
+        mean
+    }
+
+    /// How an error of 1 m of each channel of [`LogSignals::channels`] shows in the residuals of
+    /// the three probes at a row, m.
+    pub(super) fn of_errors(&self, log: &LogSignals, row: usize) -> Vec<[f64; 3]> {
+        let here = &log.rows[row];
+        let planar_mm = here.reference.map(|x| x * 1e3);
+        let mut shown = vec![[0.0; 3]; log.channels.len()];
+        for (k, fit) in self.fits.iter().enumerate() {
+            let reading = fit.probe.read(planar_mm, here.vertical);
+            let [x, y, rz] = reading.by_pose;
+            let turn = rz / log.baseline_m;
+            shown[k][k] = 1.0;
+            for (beam, by_beam) in [x, 0.5 * y + turn, 0.5 * y - turn].into_iter().enumerate() {
+                shown[3 + beam][k] = -by_beam;
+            }
+            for gap in 0..shown.len().saturating_sub(6) {
+                const STEP_M: f64 = 1e-6;
+                let moved: [f64; 3] =
+                    std::array::from_fn(|i| here.vertical[i] + STEP_M * log.gap_rows[i][gap]);
+                let signal_mm = fit.probe.signal_mm(planar_mm, moved);
+                shown[6 + gap][k] = -(signal_mm - reading.signal_mm) * 1e-3 / STEP_M;
+            }
+        }
+        shown
+    }
 }
 
-/// Of X, Y, Rz by central differences within a segment, per s.
-fn velocity(log: &LogSignals, segment: &std::ops::Range<usize>, row: usize) -> [f64; 3] {
+/// Per s, by central differences.
+fn speed(log: &LogSignals, segment: &Range<usize>, row: usize) -> [f64; 3] {
     let before = row.saturating_sub(1).max(segment.start);
     let after = (row + 1).min(segment.end - 1);
     let time_s = log.time_s[after] - log.time_s[before];
@@ -101,128 +349,42 @@ fn velocity(log: &LogSignals, segment: &std::ops::Range<usize>, row: usize) -> [
     std::array::from_fn(|i| (log.rows[after].reference[i] - log.rows[before].reference[i]) / time_s)
 }
 
-/// Residuals of the three Hall signals.
-pub(super) struct Residuals<'u> {
-    units: &'u Units,
-    stride: usize,
-    means: Vec<[f64; FUNCTIONS]>,
-    scales: Vec<f64>,
-    factor: Cholesky<f64, Dyn>,
-    /// By probe and row, m at the designed scale; 0 in rows that are left out.
-    pub(super) values: [Vec<f64>; 3],
-    /// White noise, m.
-    pub(super) noise_m: [f64; 3],
-    /// Slopes of the signal of a probe over the beams X, Y1, Y2.
-    pub(super) gains: [[f64; 3]; 3],
+/// Half as much again as all but a twentieth of the rows have.
+fn usual_speeds(log: &LogSignals) -> [f64; 3] {
+    let mut speeds: [Vec<f64>; 3] = Default::default();
+    for segment in &log.segments {
+        for row in segment.clone().filter(|&row| log.usable[row]) {
+            let here = speed(log, segment, row);
+            (0..3).for_each(|i| speeds[i].push(here[i].abs()));
+        }
+    }
+    speeds.map(|mut speeds| {
+        let high = speeds.len() * 19 / 20;
+        if high < speeds.len() {
+            1.5 * *speeds.select_nth_unstable_by(high, f64::total_cmp).1
+        } else {
+            0.0
+        }
+    })
 }
 
-impl<'u> Residuals<'u> {
-    /// `None` where too few rows are left.
-    pub(super) fn new(log: &LogSignals, units: &'u Units) -> Option<Self> {
-        let stride = log.len().div_ceil(ROWS_MAX).max(1);
-        let mut means = Vec::with_capacity(log.segments.len());
-        let mut gram = vec![0.0; FUNCTIONS * FUNCTIONS];
-        let mut count = 0;
-        for segment in &log.segments {
-            let used = || (segment.clone().step_by(stride)).filter(|&row| log.usable[row]);
-            let mut mean = [0.0; FUNCTIONS];
-            let rows = used().count();
-            for row in used() {
-                let f = units.functions(log, segment, row);
-                (0..FUNCTIONS).for_each(|k| mean[k] += f[k] / rows as f64);
-            }
-            for row in used() {
-                let mut f = units.functions(log, segment, row);
-                (0..FUNCTIONS).for_each(|k| f[k] -= mean[k]);
-                for (i, line) in gram.chunks_exact_mut(FUNCTIONS).enumerate() {
-                    let fi = f[i];
-                    (line.iter_mut().zip(&f)).for_each(|(sum, fj)| *sum += fi * fj);
-                }
-            }
-            count += rows;
-            means.push(mean);
-        }
-        if count < 2 * FUNCTIONS {
-            return None;
-        }
-        let gram = DMatrix::from_vec(FUNCTIONS, FUNCTIONS, gram);
-        // A function that stands still within the segments tells nothing.
-        let least = 1e-12 * count as f64;
-        let scales: Vec<f64> = (0..FUNCTIONS)
-            .map(|k| 1.0 / gram[(k, k)].max(least).sqrt())
-            .collect();
-        let scaled = DMatrix::from_fn(FUNCTIONS, FUNCTIONS, |i, j| {
-            gram[(i, j)] * scales[i] * scales[j] + if i == j { RIDGE } else { 0.0 }
-        });
-        let mut residuals = Self {
-            units,
-            stride,
-            means,
-            scales,
-            factor: Cholesky::new(scaled)?,
-            values: Default::default(),
-            noise_m: [0.0; 3],
-            gains: [[0.0; 3]; 3],
+fn signals_less_means(log: &LogSignals, k: usize) -> Vec<f64> {
+    let mut out = Vec::with_capacity(log.len());
+    for segment in &log.segments {
+        let values = || {
+            let rows = segment.clone().filter(|&row| log.usable[row]);
+            rows.map(|row| log.channels[k].values[row])
         };
-        for probe in 0..3 {
-            let (values, slopes) = residuals.solve(log, &log.channels[probe].values);
-            let [x, y, rz] = std::array::from_fn(|i| slopes[i] / units.planar[i]);
-            let turn = rz / log.baseline_m;
-            residuals.gains[probe] = [x, 0.5 * y + turn, 0.5 * y - turn];
-            residuals.noise_m[probe] = white_noise(log, &values);
-            residuals.values[probe] = values;
-        }
-        Some(residuals)
+        let mean = values().sum::<f64>() / values().count().max(1) as f64;
+        out.extend(values().map(|value| value - mean));
     }
-
-    /// What the functions do not explain of a signal, by row.
-    pub(super) fn unexplained(&self, log: &LogSignals, signal: &[f64]) -> Vec<f64> {
-        self.solve(log, signal).0
-    }
-
-    /// How an error of a channel (Hall A, B, C; beam X, Y1, Y2) shows in the residual of a probe.
-    pub(super) fn slope(&self, probe: usize, channel: usize) -> f64 {
-        match channel.checked_sub(3) {
-            None => f64::from(u8::from(probe == channel)),
-            Some(beam) => self.gains[probe].get(beam).map_or(0.0, |gain| -gain),
-        }
-    }
-
-    fn solve(&self, log: &LogSignals, signal: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let mut right = [0.0; FUNCTIONS];
-        for (segment, mean) in log.segments.iter().zip(&self.means) {
-            let used = || (segment.clone().step_by(self.stride)).filter(|&row| log.usable[row]);
-            let rows = used().count().max(1) as f64;
-            let middle = used().map(|row| signal[row]).sum::<f64>() / rows;
-            for row in used() {
-                let f = self.units.functions(log, segment, row);
-                let value = signal[row] - middle;
-                (0..FUNCTIONS).for_each(|k| right[k] += (f[k] - mean[k]) * value);
-            }
-        }
-        let scaled = DVector::from_fn(FUNCTIONS, |k, _| right[k] * self.scales[k]);
-        let solved = self.factor.solve(&scaled);
-        let slopes: Vec<f64> = (0..FUNCTIONS).map(|k| solved[k] * self.scales[k]).collect();
-        let mut values = vec![0.0; log.len()];
-        for segment in &log.segments {
-            let used = || segment.clone().filter(|&row| log.usable[row]);
-            let mut sum = 0.0;
-            for row in used() {
-                let f = self.units.functions(log, segment, row);
-                let explained: f64 = f.iter().zip(&slopes).map(|(f, slope)| f * slope).sum();
-                values[row] = signal[row] - explained;
-                sum += values[row];
-            }
-            let middle = sum / used().count().max(1) as f64;
-            used().for_each(|row| values[row] -= middle);
-        }
-        (values, slopes)
-    }
+    out
 }
 
-/// From differences of neighbours.
-fn white_noise(log: &LogSignals, values: &[f64]) -> f64 {
-    let rows = log.segments.iter().flat_map(|s| s.start + 1..s.end);
-    let used = rows.filter(|&row| log.usable[row] && log.usable[row - 1]);
-    robust_deviation(used.map(|row| values[row] - values[row - 1])) / 2f64.sqrt()
+/// White noise times `scale`, from second differences, which hardly know the motion.
+fn white_noise(log: &LogSignals, values: &[f64], scale: f64) -> f64 {
+    let rows = log.segments.iter().flat_map(|s| s.start + 2..s.end);
+    let used = rows.filter(|&row| (row - 2..=row).all(|row| log.usable[row]));
+    let differences = used.map(|row| values[row] - 2.0 * values[row - 1] + values[row - 2]);
+    robust_deviation(differences) / 6f64.sqrt() * scale
 }

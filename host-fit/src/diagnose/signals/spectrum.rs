@@ -1,92 +1,101 @@
-//! Hum: lines in the spectrum of the residuals.
+//! Mean power spectra of the signals of a log.
 
-use super::channels::{BEAMS, HALL, LogSignals};
-use super::residual::Residuals;
-use crate::diagnose::finding::{Code, Finding, Severity};
+use super::channels::{LogSignals, median};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
-/// Longest and shortest window, s and rows.
-const WINDOW_S: f64 = 2.0;
-const ROWS_MIN: usize = 256;
 /// Bins on each side that tell the level of the noise.
 const SIDE: usize = 20;
 /// How far outside the noise a line is, in standard deviations of a normal number.
 const LINE_MIN: f64 = 6.5;
-/// Below this, and below this many times the frequency of the motion, residuals may hold what no
-/// polynomial describes.
-const LOWEST_HZ: f64 = 10.0;
-const OF_MOTION: f64 = 8.0;
-/// Amplitude in parts of the noise of a probe from which a line is worth a warning.
-const WARN_MIN: f64 = 0.3;
-/// Amplitude of a sideband in parts of its line, at most.
-const SIDEBAND: f64 = 0.3;
-/// Lines that are told.
-const LINES_MAX: usize = 5;
 
-/// Mean power spectrum over windows with a Hann taper.
-struct Spectrum {
+/// The windows of a log: pieces of its segments of equal length.
+pub(super) fn windows(log: &LogSignals, length: usize) -> Vec<Range<usize>> {
+    let of = |segment: &Range<usize>| {
+        let starts = segment.clone().step_by(length);
+        let end = segment.end;
+        starts
+            .map(move |start| start..start + length)
+            .filter(move |w| w.end <= end)
+    };
+    log.segments.iter().flat_map(of).collect()
+}
+
+/// Mean power over windows with a Hann taper.
+pub(super) struct Spectrum {
     power: Vec<f64>,
     windows: usize,
     length: usize,
 }
 
 impl Spectrum {
-    fn new(log: &LogSignals, values: &[f64], length: usize) -> Self {
+    /// All windows have the same length.
+    pub(super) fn new(values: &[f64], windows: &[Range<usize>]) -> Self {
+        let length = windows.first().map_or(2, Range::len);
         let transform = FftPlanner::new().plan_fft_forward(length);
         let taper: Vec<f64> = (0..length)
-            .map(|k| 0.5 - 0.5 * (TAU * k as f64 / length as f64).cos())
+            .map(|k| 0.5 - 0.5 * libm::cos(TAU * k as f64 / length as f64))
             .collect();
         let mut power = vec![0.0; length / 2];
-        let mut windows = 0;
-        for segment in &log.segments {
-            for chunk in values[segment.clone()].chunks_exact(length) {
-                let mean = chunk.iter().sum::<f64>() / length as f64;
-                let mut buffer: Vec<Complex<f64>> = (chunk.iter().zip(&taper))
-                    .map(|(value, taper)| Complex::new((value - mean) * taper, 0.0))
-                    .collect();
-                transform.process(&mut buffer);
-                (power.iter_mut().zip(&buffer)).for_each(|(sum, bin)| *sum += bin.norm_sqr());
-                windows += 1;
-            }
+        for window in windows {
+            let rows = &values[window.clone()];
+            let mean = rows.iter().sum::<f64>() / length as f64;
+            let mut buffer: Vec<Complex<f64>> = (rows.iter().zip(&taper))
+                .map(|(value, taper)| Complex::new((value - mean) * taper, 0.0))
+                .collect();
+            transform.process(&mut buffer);
+            (power.iter_mut().zip(&buffer)).for_each(|(sum, bin)| *sum += bin.norm_sqr());
         }
-        power
-            .iter_mut()
-            .for_each(|sum| *sum /= f64::max(windows as f64, 1.0));
+        let count = windows.len().max(1) as f64;
+        power.iter_mut().for_each(|sum| *sum /= count);
         Self {
             power,
-            windows,
+            windows: windows.len(),
             length,
         }
     }
 
     /// The level of the noise around a bin.
     fn level(&self, bin: usize) -> f64 {
-        let rows = bin.saturating_sub(SIDE).max(3)..(bin + SIDE + 1).min(self.power.len());
-        let mut around: Vec<f64> = rows.map(|k| self.power[k]).collect();
-        let n = self.windows as f64;
+        let bins = bin.saturating_sub(SIDE).max(3)..(bin + SIDE + 1).min(self.power.len());
+        let mut around: Vec<f64> = bins.map(|k| self.power[k]).collect();
+        let n = self.windows.max(1) as f64;
         // The median of chi-squared with 2 n degrees of freedom over its mean.
-        super::channels::median(&mut around) / (1.0 - 1.0 / (9.0 * n)).powi(3)
+        median(&mut around) / (1.0 - 1.0 / (9.0 * n)).powi(3)
     }
 
-    /// Amplitude of a line at a bin: Hann spreads it over three.
-    fn amplitude(&self, bin: usize) -> f64 {
+    /// Amplitude of a line at a bin of at least 1: Hann spreads it over three.
+    pub(super) fn amplitude(&self, bin: usize) -> f64 {
         let level = self.level(bin);
         let excess: f64 = (bin - 1..=bin + 1).map(|k| self.power[k] - level).sum();
         // The sum of squares of the taper is 3/8 of its length.
         (4.0 * excess.max(0.0) / (0.375 * (self.length * self.length) as f64)).sqrt()
     }
 
-    /// Whether a bin is a line: a peak beyond what noise gives.
-    fn is_line(&self, bin: usize) -> bool {
-        let n = self.windows as f64;
+    /// The clearest line from a bin on, and its power in parts of what noise may have; `None` where
+    /// noise explains all.
+    pub(super) fn clearest_line(&self, lowest: usize) -> Option<(usize, f64)> {
+        let n = self.windows.max(1) as f64;
         let limit = (1.0 - 1.0 / (9.0 * n) + LINE_MIN / (3.0 * n.sqrt())).powi(3);
-        let peak = self.power[bin - 1] <= self.power[bin] && self.power[bin] > self.power[bin + 1];
-        peak && self.power[bin] > limit * self.level(bin)
+        let peak =
+            |bin: usize| self.power[bin] >= self.power[bin - 1].max(f64::max(self.power[bin + 1], 0.0));
+        (lowest.max(1)..self.power.len().saturating_sub(2))
+            .filter(|&bin| peak(bin))
+            .map(|bin| (bin, self.power[bin] / (limit * self.level(bin))))
+            .filter(|(_, clear)| *clear > 1.0)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    fn frequency_hz(&self, bin: usize, period_s: f64) -> f64 {
+    /// The highest bin with a considerable part of the power.
+    pub(super) fn highest(&self) -> usize {
+        let most = self.power.iter().copied().fold(0.0, f64::max);
+        self.power.iter().rposition(|&power| power > 1e-3 * most).unwrap_or(0)
+    }
+
+    /// Cycles per row of a line at a bin.
+    pub(super) fn cycles_per_row(&self, bin: usize) -> f64 {
         let level = self.level(bin);
         let (mut sum, mut weighted) = (0.0, 0.0);
         for k in bin - 1..=bin + 1 {
@@ -94,101 +103,47 @@ impl Spectrum {
             sum += excess;
             weighted += excess * k as f64;
         }
-        weighted / sum / (self.length as f64 * period_s)
+        weighted / sum.max(f64::MIN_POSITIVE) / self.length as f64
     }
 }
 
-/// Names the lines above the motion, by channel.
-pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
-    let longest = log.segments.iter().map(|s| s.len()).max().unwrap_or(0);
-    let length = log.rows_in(WINDOW_S).min(longest);
-    if length < ROWS_MIN {
-        return Vec::new();
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::random::{Purpose, Stream};
+
+    fn noise(rows: usize, seed: u64) -> Vec<f64> {
+        let mut random = Stream::new(seed, Purpose::Sensors, 0);
+        (0..rows).map(|_| random.normal(1.0)).collect()
     }
-    let raw: Vec<Spectrum> = (log.channels.iter())
-        .map(|channel| Spectrum::new(log, &channel.values, length))
-        .collect();
-    let left: Vec<Spectrum> = (residuals.values.iter())
-        .map(|values| Spectrum::new(log, values, length))
-        .collect();
-    let resolution_hz = 1.0 / (length as f64 * log.period_s);
-    let lowest_hz = (OF_MOTION * motion_bin(&raw) as f64 * resolution_hz).max(LOWEST_HZ);
-    let lowest = ((lowest_hz / resolution_hz) as usize).max(4);
-    let mut lines: Vec<(usize, usize, f64)> = (lowest..(length / 2).saturating_sub(2))
-        .flat_map(|bin| [0, 1, 2].map(|probe| (bin, probe)))
-        .filter(|&(bin, probe)| left[probe].is_line(bin))
-        .map(|(bin, probe)| (bin, probe, left[probe].amplitude(bin)))
-        .collect();
-    lines.sort_by(|a, b| b.2.total_cmp(&a.2));
-    let mut named: Vec<(&'static str, usize, f64)> = Vec::new();
-    let mut findings: Vec<Finding> = Vec::new();
-    for (bin, probe, amplitude_m) in lines {
-        let (name, size_m) = source(&raw, residuals, probe, bin, amplitude_m);
-        // The motion modulates a line: sidebands are no lines of their own.
-        let known = (named.iter()).any(|&(other, at, largest_m)| {
-            let (apart, sideband) = (at.abs_diff(bin), amplitude_m < SIDEBAND * largest_m);
-            (other == name && apart < 3) || (apart < lowest && sideband)
-        });
-        if known || named.len() == LINES_MAX {
-            continue;
+
+    fn cut(rows: usize, length: usize) -> Vec<Range<usize>> {
+        (0..rows / length).map(|k| k * length..(k + 1) * length).collect()
+    }
+
+    #[test]
+    fn a_line_is_found_at_its_frequency_with_its_amplitude() {
+        let windows = cut(8000, 1000);
+        let mut values = noise(8000, 1);
+        for (k, value) in values.iter_mut().enumerate() {
+            *value += 0.8 * libm::sin(TAU * 0.1004 * k as f64 + 0.3);
         }
-        named.push((name, bin, amplitude_m));
-        let small = amplitude_m < WARN_MIN * residuals.noise_m[probe];
-        let frequency_hz = left[probe].frequency_hz(bin, log.period_s);
-        findings.push(finding(log, name, frequency_hz, size_m, small));
+        let spectrum = Spectrum::new(&values, &windows);
+        let (bin, clear) = spectrum.clearest_line(10).expect("a line");
+        assert!(clear > 5.0, "{clear}");
+        let frequency = spectrum.cycles_per_row(bin);
+        assert!((frequency - 0.1004).abs() < 5e-5, "{frequency}");
+        let amplitude = spectrum.amplitude(bin);
+        assert!((amplitude - 0.8).abs() < 0.06, "{amplitude}");
     }
-    findings
-}
 
-fn finding(log: &LogSignals, name: &str, frequency_hz: f64, size_m: f64, small: bool) -> Finding {
-    let message = format!(
-        "{name} hums at {frequency_hz:.1} Hz with an amplitude of {:.2} um: look for mains (50 or 60 Hz and multiples) in \
-         its cable and supply, or for a vibration of that part",
-        size_m * 1e6,
-    );
-    let severity = if small {
-        Severity::Note
-    } else {
-        Severity::Warn
-    };
-    Finding {
-        severity,
-        channel: Some(name.to_owned()),
-        value: Some(frequency_hz),
-        unit: Some("Hz"),
-        ..log.warning(Code::Hum, message)
-    }
-}
-
-/// The highest bin with a considerable part of the motion.
-fn motion_bin(raw: &[Spectrum]) -> usize {
-    let top = |beam: &Spectrum| {
-        let most = beam.power.iter().copied().fold(0.0, f64::max);
-        beam.power
-            .iter()
-            .rposition(|&power| power > 1e-3 * most)
-            .unwrap_or(0)
-    };
-    raw[3..6].iter().map(top).max().unwrap_or(0)
-}
-
-/// The channel that a line in the residual of a probe comes from, and its amplitude there, m: a
-/// beam that shows it while the probe does not, or else the probe.
-fn source(
-    raw: &[Spectrum],
-    residuals: &Residuals,
-    probe: usize,
-    bin: usize,
-    amplitude_m: f64,
-) -> (&'static str, f64) {
-    let shown_m = raw[probe].amplitude(bin);
-    let beams_m: [f64; 3] = std::array::from_fn(|beam| raw[3 + beam].amplitude(bin));
-    let implied = |beam: usize| residuals.gains[probe][beam].abs() * beams_m[beam];
-    let beam = (0..3).max_by(|a, b| implied(*a).total_cmp(&implied(*b)));
-    match beam {
-        Some(beam) if implied(beam) > 0.5 * amplitude_m && shown_m < 0.5 * amplitude_m => {
-            (BEAMS[beam], beams_m[beam])
+    #[test]
+    fn noise_has_no_lines_however_few_windows_there_are() {
+        for (rows, length) in [(1000, 1000), (3000, 1000), (40_000, 500)] {
+            for seed in 0..10 {
+                let spectrum = Spectrum::new(&noise(rows, seed), &cut(rows, length));
+                assert_eq!(spectrum.clearest_line(5), None, "{rows} {length} {seed}");
+            }
         }
-        _ => (HALL[probe], amplitude_m),
     }
 }

@@ -1,6 +1,6 @@
 //! Channels and movements that stand still.
 
-use super::channels::{BEAMS, HALL, LogSignals, median, spread};
+use super::channels::{Channel, LogSignals, median, spread};
 use super::residual::Residuals;
 use crate::diagnose::finding::{Code, Finding};
 use std::ops::Range;
@@ -9,6 +9,8 @@ use std::ops::Range;
 const CHANCE: f64 = 1e-9;
 /// Fewest equal values in a row that are worth a word.
 const RUN_MIN: usize = 50;
+/// Codes that another gap moves by where one stands still.
+const GAP_CODES: f64 = 20.0;
 /// Rows of a stretch in which the liveliness of a channel is counted.
 const STRETCH: usize = 250;
 /// A movement stands still within this, m.
@@ -17,8 +19,14 @@ const IDLE_M: f64 = 2e-6;
 const STILL_SHARE: f64 = 0.01;
 /// Residual that shows that it should have moved, m.
 const MISSED_M: f64 = 3e-6;
-/// Length of the stretches in which a channel stands still, s.
-const STANDING_S: f64 = 0.5;
+/// Length of the stretches in which a channel stands still, and of the blocks whose means show
+/// what it misses, s.
+const STANDING_S: f64 = 0.25;
+const BLOCK_S: f64 = 0.05;
+/// Power of the residuals that the error of one channel may leave, and the largest part of its
+/// motion that is no step.
+const LEFT_MAX: f64 = 0.2;
+const JUMP_SHARE: f64 = 0.7;
 /// Length of a rest after a crash, s, of the stretches it is looked for in, and the share of
 /// the usual speed that the stage has just before it.
 const REST_S: f64 = 0.2;
@@ -26,30 +34,29 @@ const REST_STRETCH_S: f64 = 0.05;
 const SPEED_SHARE: f64 = 0.3;
 
 /// Channels that repeat one value longer than their own noise lets them; their rows are left out.
-pub(super) fn frozen(log: &mut LogSignals) -> Vec<Finding> {
-    let mut runs: Vec<(&'static str, Range<usize>)> = Vec::new();
+pub(super) fn frozen(log: &mut LogSignals, has_reference: bool) -> Vec<Finding> {
+    let mut runs: Vec<(usize, Range<usize>)> = Vec::new();
     let lively = |values: &[f64]| {
         let changes = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
         changes as f64 / (values.len() - 1) as f64
     };
-    for channel in &log.channels {
+    for (index, channel) in log.channels.iter().enumerate() {
         let mut shares: Vec<f64> = (log.segments.iter())
             .flat_map(|segment| channel.values[segment.clone()].chunks_exact(STRETCH))
             .map(lively)
             .collect();
-        let others_move = || log.channels.iter().any(|other| spread(&other.values) > 0.0);
-        if spread(&channel.values) == 0.0 && log.len() > RUN_MIN && others_move() {
-            runs.push((channel.name, 0..log.len()));
+        if shares.is_empty() || ((3..6).contains(&index) && !has_reference) {
             continue;
         }
-        if shares.is_empty() {
-            continue;
-        }
-        let quarter = shares.len() / 4;
-        let share = *shares.select_nth_unstable_by(quarter, f64::total_cmp).1;
+        let high = shares.len() * 3 / 4;
+        let share = *shares.select_nth_unstable_by(high, f64::total_cmp).1;
         // At a share of one, a single repetition would be beyond chance.
-        let least = (CHANCE.ln() / (-share.min(0.9)).ln_1p()).max(RUN_MIN as f64);
-        let usable = |row: usize| log.usable[row];
+        let chance = (CHANCE.ln() / (-share.min(0.9)).ln_1p()).max(RUN_MIN as f64);
+        let least = match spread(&channel.values) {
+            0.0 => RUN_MIN as f64,
+            _ if share > 0.0 => chance,
+            _ => f64::INFINITY,
+        };
         for segment in &log.segments {
             let mut row = segment.start;
             while row < segment.end {
@@ -57,8 +64,9 @@ pub(super) fn frozen(log: &mut LogSignals) -> Vec<Finding> {
                 while row < segment.end && channel.values[row] == channel.values[start] {
                     row += 1;
                 }
-                if (row - start) as f64 > least && usable(start) {
-                    runs.push((channel.name, start..row));
+                let long = (row - start) as f64 > least;
+                if long && log.usable[start] && others_move(log, index, &(start..row)) {
+                    runs.push((index, start..row));
                 }
             }
         }
@@ -68,19 +76,30 @@ pub(super) fn frozen(log: &mut LogSignals) -> Vec<Finding> {
     findings
 }
 
-/// One finding for a channel, at its longest run; one for all channels that stand still together.
-fn of_runs(log: &LogSignals, runs: &[(&'static str, Range<usize>)]) -> Vec<Finding> {
+/// Whether others move while a channel does not: a beam or gap of coarse steps may well rest. A
+/// probe may not, its noise is many codes.
+fn others_move(log: &LogSignals, channel: usize, run: &Range<usize>) -> bool {
+    let gap_moves = |other: usize| {
+        let gap = &log.channels[other];
+        other != channel && spread(&gap.values[run.clone()]) > GAP_CODES * gap.m_per_code
+    };
+    match channel {
+        0..3 => true,
+        3..6 => hall_motion_m(log, run) > MISSED_M,
+        _ => (6..log.channels.len()).any(gap_moves),
+    }
+}
+
+/// One finding for a channel, at its longest run; one for channels that stand still together.
+fn of_runs(log: &LogSignals, runs: &[(usize, Range<usize>)]) -> Vec<Finding> {
     let mut longest: Vec<(Vec<&'static str>, Range<usize>)> = Vec::new();
-    for channel in &log.channels {
-        let own = runs.iter().filter(|(name, _)| *name == channel.name);
+    for (index, channel) in log.channels.iter().enumerate() {
+        let own = runs.iter().filter(|(of, _)| *of == index);
         let Some((_, run)) = own.max_by_key(|(_, run)| run.len()) else {
             continue;
         };
         let together = |other: &Range<usize>| {
-            let shared = run
-                .end
-                .min(other.end)
-                .saturating_sub(run.start.max(other.start));
+            let shared = (run.end.min(other.end)).saturating_sub(run.start.max(other.start));
             2 * shared > run.len().max(other.len())
         };
         match longest.iter_mut().find(|(_, other)| together(other)) {
@@ -89,33 +108,38 @@ fn of_runs(log: &LogSignals, runs: &[(&'static str, Range<usize>)]) -> Vec<Findi
         }
     }
     (longest.into_iter())
-        .map(|(names, run)| stuck(log, &names, &run))
+        .map(|(names, run)| {
+            let still = |c: &Channel| spread(&c.values[run.clone()]) == 0.0;
+            if log.channels.iter().all(still) {
+                stuck(log, &["every channel"], &run)
+            } else {
+                stuck(log, &names, &run)
+            }
+        })
         .collect()
 }
 
 fn stuck(log: &LogSignals, names: &[&str], run: &Range<usize>) -> Finding {
     let time_s = run.len() as f64 * log.period_s;
-    let who = if names.len() == log.channels.len() {
-        "every channel".to_owned()
-    } else {
-        names.join(", ")
-    };
+    let who = names.join(", ");
     let message = format!(
         "{who} stood still for {time_s:.2} s ({}) while it should have moved or shown its noise: look for a stage that \
          stopped, a cable or a frozen register, and leave these rows out",
         log.place(run.start),
     );
     Finding {
-        channel: (names.len() == 1).then(|| names[0].to_owned()),
+        channel: (log.channels.iter())
+            .find(|channel| names == [channel.name])
+            .map(|channel| channel.name.to_owned()),
         value: Some(time_s),
         unit: Some("s"),
         ..log.warning_at(Code::Stuck, run.start, message)
     }
 }
 
-/// Movements in which nothing moves, and those that end in a sudden rest.
-pub(super) fn idle_and_crashed(log: &LogSignals) -> Vec<Finding> {
-    let mut idle = Vec::new();
+/// Movements in which nothing moves, and those that end in a sudden rest; such rows are left out.
+pub(super) fn idle_and_crashed(log: &mut LogSignals) -> Vec<Finding> {
+    let mut idle_rows = Vec::new();
     let mut crashed = Vec::new();
     for movement in &log.movements {
         let rows = log.rows_of(movement);
@@ -123,11 +147,12 @@ pub(super) fn idle_and_crashed(log: &LogSignals) -> Vec<Finding> {
             continue;
         }
         if motion_m(log, &rows) < IDLE_M && hall_motion_m(log, &rows) < IDLE_M {
-            idle.push(rows.start);
+            idle_rows.push(rows);
         } else if let Some(rest) = sudden_rest(log, &rows) {
             crashed.push(rest);
         }
     }
+    let idle: Vec<usize> = idle_rows.iter().map(|rows| rows.start).collect();
     let mut findings = Vec::new();
     if let Some(&first) = idle.first() {
         let message = format!(
@@ -139,12 +164,12 @@ pub(super) fn idle_and_crashed(log: &LogSignals) -> Vec<Finding> {
         findings.push(log.warning_at(Code::IdleMovement, first, message));
     }
     // Where most movements end so, it is how this stage is driven.
-    if 2 * crashed.len() <= log.movements.len() {
+    if 2 * crashed.len() > log.movements.len().max(2) {
+        crashed.clear();
+    } else {
         findings.extend(crashed.iter().map(|rest| stuck(log, &["the stage"], rest)));
     }
-    for finding in &mut findings {
-        finding.channel = None;
-    }
+    leave_out(log, idle_rows.into_iter().chain(crashed));
     findings
 }
 
@@ -192,71 +217,90 @@ fn sudden_rest(log: &LogSignals, rows: &Range<usize>) -> Option<Range<usize>> {
     (last > SPEED_SHARE * usual).then(|| rows.end - still * length..rows.end)
 }
 
-/// Probes and beams that stand still, noise aside, where the others say that they move; the rows
-/// of such stretches are left out.
+/// Channels that stand still, noise aside, where the others say that they move; the rows of such
+/// runs are left out.
 pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut left_out: Vec<Range<usize>> = Vec::new();
-    let length = log.rows_in(STANDING_S);
-    let stretches: Vec<Range<usize>> = (log.segments.iter())
-        .flat_map(|s| {
-            let end = s.end;
-            (s.clone().step_by(length)).map(move |start| start..(start + length).min(end))
-        })
-        .filter(|stretch| stretch.len() > length / 2)
-        .collect();
     let noise_m = residuals.noise_m.iter().copied().fold(0.0, f64::max);
-    let missed_m = MISSED_M + 8.0 * noise_m;
-    for (channel, name) in HALL.into_iter().chain(BEAMS).enumerate() {
-        let values = &log.channels[channel].values;
-        let range = |stretch: &Range<usize>| usual_spread(&values[stretch.clone()]);
-        let most = stretches.iter().map(range).fold(0.0, f64::max);
-        let noise_m = 4.0 * residuals.noise_m.get(channel).copied().unwrap_or(0.0);
-        let stands = |stretch: &&Range<usize>| {
-            log.usable[stretch.start]
-                && range(stretch) < (STILL_SHARE * most).max(noise_m)
-                && is_missed(log, residuals, channel, stretch, missed_m)
-        };
-        let still: Vec<&Range<usize>> = stretches.iter().filter(stands).collect();
-        let Some(first) = still.first() else {
-            continue;
-        };
-        let mut run = (*first).clone();
-        for next in &still {
-            if next.start == run.end {
-                run.end = next.end;
-            }
+    for (channel, signal) in log.channels.iter().enumerate() {
+        let own_noise_m = residuals.noise_m.get(channel).copied().unwrap_or(0.0);
+        let mut stuck_runs = still_runs(log, &signal.values, 4.0 * own_noise_m);
+        stuck_runs.retain(|run| is_missed(log, residuals, channel, run, MISSED_M + 4.0 * noise_m));
+        if let Some(longest) = stuck_runs.iter().max_by_key(|run| run.len()) {
+            findings.push(stuck(log, &[signal.name], longest));
         }
-        findings.push(stuck(log, &[name], &run));
-        left_out.extend(still.into_iter().cloned());
+        left_out.extend(stuck_runs);
     }
     leave_out(log, left_out);
     findings
 }
 
-/// Whether the others say that a channel moves. A probe is missed in its own residual alone; a
-/// beam in those of all probes that it concerns, which move themselves.
+/// Runs within segments in which a channel hardly moves, of what it moves elsewhere.
+fn still_runs(log: &LogSignals, values: &[f64], noise_m: f64) -> Vec<Range<usize>> {
+    let length = log.rows_in(STANDING_S);
+    let stretches = |segment: &Range<usize>| {
+        let (start, end) = (segment.start, segment.end);
+        let starts = (start..end).step_by(length);
+        let stretches = starts.map(move |start| start..(start + length).min(end));
+        stretches.filter(|stretch| stretch.len() > length / 2).collect::<Vec<_>>()
+    };
+    let range = |stretch: &Range<usize>| usual_spread(&values[stretch.clone()]);
+    let all = || log.segments.iter().flat_map(stretches);
+    let most = all().map(|stretch| range(&stretch)).fold(0.0, f64::max);
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for stretch in all() {
+        let still = range(&stretch) < (STILL_SHARE * most).max(noise_m);
+        if !still || !log.usable[stretch.start] {
+            continue;
+        }
+        let starts_segment = log.segments.iter().any(|s| s.start == stretch.start);
+        match runs.last_mut() {
+            Some(run) if run.end == stretch.start && !starts_segment => run.end = stretch.end,
+            _ => runs.push(stretch),
+        }
+    }
+    runs
+}
+
+/// Whether an error of the channel explains the residuals in a run, and these move like a stage:
+/// noise and hum vanish in means over blocks of rows, and a step is no motion.
 fn is_missed(
     log: &LogSignals,
     residuals: &Residuals,
     channel: usize,
-    stretch: &Range<usize>,
+    run: &Range<usize>,
     missed_m: f64,
 ) -> bool {
-    let off_m = |probe: usize| usual_spread(&residuals.values[probe][stretch.clone()]);
-    if channel < 3 {
-        let own_m = off_m(channel);
-        let others_m = (0..3)
-            .filter(|&i| i != channel)
-            .map(off_m)
-            .fold(0.0, f64::max);
-        return own_m > missed_m && others_m < 0.3 * own_m;
+    let length = log.rows_in(BLOCK_S);
+    let blocks: Vec<Range<usize>> = (run.clone().step_by(length))
+        .map(|start| start..start + length)
+        .filter(|block| block.end <= run.end)
+        .collect();
+    let mean = |values: &[f64], block: &Range<usize>| {
+        values[block.clone()].iter().sum::<f64>() / length as f64
+    };
+    let mut shown: Vec<[f64; 3]> = (blocks.iter())
+        .map(|block| [0, 1, 2].map(|k| mean(&residuals.values[k], block)))
+        .collect();
+    for k in 0..3 {
+        let middle = shown.iter().map(|m| m[k]).sum::<f64>() / shown.len().max(1) as f64;
+        shown.iter_mut().for_each(|m| m[k] -= middle);
     }
-    let mut concerned = (0..3).filter(|&probe| residuals.slope(probe, channel).abs() > 0.3);
-    concerned.all(|probe| {
-        let moves_m = usual_spread(&log.channels[probe].values[stretch.clone()]);
-        off_m(probe) > missed_m && moves_m > missed_m
-    })
+    let (mut all, mut left) = (0.0, 0.0);
+    let mut errors_m = Vec::with_capacity(blocks.len());
+    for (block, shown) in blocks.iter().zip(&shown) {
+        let slopes = residuals.of_errors(log, block.start)[channel];
+        let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
+        let error_m = dot(&slopes, shown) / dot(&slopes, &slopes).max(1e-6);
+        let rest = [0, 1, 2].map(|k| shown[k] - slopes[k] * error_m);
+        all += dot(shown, shown);
+        left += dot(&rest, &rest);
+        errors_m.push(error_m);
+    }
+    let steps = errors_m.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let (jump_m, spread_m) = (steps.fold(0.0, f64::max), usual_spread(&errors_m));
+    left < LEFT_MAX * all && spread_m > missed_m && jump_m < JUMP_SHARE * spread(&errors_m)
 }
 
 /// Between the ninth part from below and from above: outliers do not count.
@@ -264,7 +308,7 @@ fn usual_spread(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
     values.sort_unstable_by(f64::total_cmp);
     let ninth = values.len() / 9;
-    match (values.get(ninth), values.get(values.len() - 1 - ninth)) {
+    match (values.get(ninth), values.get(values.len().saturating_sub(1 + ninth))) {
         (Some(low), Some(high)) => high - low,
         _ => 0.0,
     }
