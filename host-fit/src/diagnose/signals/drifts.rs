@@ -54,15 +54,19 @@ pub(super) fn findings(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> 
         let signal = log.channels[k].values.iter().zip(&log.time_s);
         let growing: Vec<f64> = signal.map(|(s, t)| s * (t / length_s - 0.5)).collect();
         let growing = residuals.unexplained(log, k, &growing);
-        let noise = Noise::new(log, residuals, k, &blocks);
-        let values = &residuals.values[k];
-        let gain = noise.slope(log, values, &less(&growing, &time), &blocks);
+        // Least squares, so that what is left without the drifts is the noise.
+        let values = &residuals.unexplained(log, k, &residuals.values[k]);
+        let (of_time, of_growing) = (less(&time, &growing), less(&growing, &time));
+        let left = less(&less(values, &growing), &of_time);
+        let noise = Noise::new(log, &left, residuals.noise_m[k], &blocks);
+        let gain = noise.slope(log, values, &of_growing, &left, &blocks);
         if gain.value.abs() > GAIN_MIN.max(limit * gain.error) {
             findings.push(of_gain(log, k, gain.value));
         }
-        drifts.push(noise.slope(log, values, &less(&time, &growing), &blocks));
+        drifts.push(noise.slope(log, values, &of_time, &left, &blocks));
     }
     let least = DRIFT_MIN_M / longest_s.max(f64::MIN_POSITIVE);
+    if std::env::var("DBG").is_ok() {for d in &drifts {eprintln!("drift {:.4} +- {:.4} um/s limit {limit:.2} least {:.4}",d.value*1e6,d.error*1e6,least*1e6);} for k in 0..3 {if let Some(d)=trend(log,residuals,k) {eprintln!("trend {:.4} +- {:.4}",d.value*1e6,d.error*1e6)}}}
     let trends = (0..3).map(|k| trend(log, residuals, k)).collect();
     for slopes in [Some(drifts), trends].into_iter().flatten() {
         let of = drifting(log, residuals, &slopes, limit, least);
@@ -102,10 +106,8 @@ struct Noise {
 }
 
 impl Noise {
-    /// The walk from the differences of neighbouring blocks, less their mean, which is drift.
-    fn new(log: &LogSignals, residuals: &Residuals, probe: usize, blocks: &[Range<usize>]) -> Self {
-        let values = &residuals.values[probe];
-        let white_m = residuals.noise_m[probe];
+    /// The walk from the differences of neighbouring blocks of residuals without drift.
+    fn new(log: &LogSignals, values: &[f64], white_m: f64, blocks: &[Range<usize>]) -> Self {
         let mean =
             |block: &Range<usize>| values[block.clone()].iter().sum::<f64>() / block.len() as f64;
         let starts = |row: usize| log.segments.iter().any(|segment| segment.start == row);
@@ -114,10 +116,9 @@ impl Noise {
             .map(|pair| mean(&pair[1]) - mean(&pair[0]))
             .collect();
         let count = steps.len().max(1) as f64;
-        let drift = steps.iter().sum::<f64>() / count;
-        let squares: f64 = steps.iter().map(|step| (step - drift) * (step - drift)).sum();
+        let squares = product(&steps, &steps);
         let of_white = 2.0 * white_m * white_m / log.rows_in(BLOCK_S) as f64;
-        let variance = squares / (count - 1.0).max(1.0);
+        let variance = squares / count;
         // Noise that is not white leaves less in the means than white noise of its size.
         let variance_m2 = (variance - of_white).max(0.5 * variance);
         // Means over neighbouring blocks of a walk differ by two thirds of its variance.
@@ -128,12 +129,13 @@ impl Noise {
     }
 
     /// The slope of a residual over a regressor; its error is that of noise and walk, or what
-    /// the blocks show, whichever is larger.
+    /// the blocks show of the residual without drift, whichever is larger.
     fn slope(
         &self,
         log: &LogSignals,
         values: &[f64],
         over: &[f64],
+        left: &[f64],
         blocks: &[Range<usize>],
     ) -> Slope {
         let length = product(over, over).max(f64::MIN_POSITIVE);
@@ -149,8 +151,7 @@ impl Noise {
         let noise =
             self.white_m * self.white_m * length + self.walk_m2_per_s * log.period_s * of_walk;
         let shown = |block: &Range<usize>| {
-            let left = (block.clone()).map(|row| (values[row] - value * over[row]) * over[row]);
-            let sum: f64 = left.sum();
+            let sum = product(&left[block.clone()], &over[block.clone()]);
             sum * sum
         };
         let shown: f64 = blocks.iter().map(shown).sum();

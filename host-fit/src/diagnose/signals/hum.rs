@@ -21,6 +21,8 @@ const WARN_MIN: f64 = 0.3;
 /// Lines that are told, and their least amplitude in parts of the largest.
 const LINES_MAX: usize = 5;
 const OF_LARGEST: f64 = 0.05;
+/// Bins on each side of a line that hold what is left of it.
+const WIDTH: usize = 5;
 /// What a beam or gap explains of a line in parts of what a probe would, at least, and how far
 /// its own spectrum may be off that, as a factor.
 const EXPLAINED_MIN: f64 = 0.8;
@@ -61,6 +63,7 @@ pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let mut left = residuals.values.clone();
     let mut findings = Vec::new();
     let mut largest_m = 0.0;
+    let mut told: Vec<usize> = Vec::new();
     for _ in 0..2 * LINES_MAX {
         let spectra = left.each_ref().map(|values| Spectrum::new(values, &windows));
         let lines = (0..3).filter_map(|k| Some((k, spectra[k].clearest_line(lowest)?)));
@@ -72,9 +75,10 @@ pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
         let Some(line) = line else { break };
         take_out(log, residuals, &mut left, &windows, cycles_per_row, &line);
         let shown_m = spectra[probe].amplitude(bin);
-        if shown_m < OF_LARGEST * largest_m {
+        if shown_m < OF_LARGEST * largest_m || told.iter().any(|at| at.abs_diff(bin) <= WIDTH) {
             continue;
         }
+        told.push(bin);
         largest_m = shown_m.max(largest_m);
         let severity = if shown_m < WARN_MIN * residuals.noise_m[probe] {
             Severity::Note

@@ -95,7 +95,9 @@ impl Residuals {
             };
             residuals.noise_m[k] = 1e-3 * white_noise(log, &residuals.values[k], 1e3);
             let left_m = robust_deviation(residuals.values[k].iter().copied());
-            let moved_m = robust_deviation(signals_less_means(log, k).into_iter());
+            let moved = signals_less_means(log, k);
+            let squares: f64 = moved.iter().map(|m| m * m).sum();
+            let moved_m = (squares / moved.len().max(1) as f64).sqrt();
             if !(left_m <= UNEXPLAINED_MAX * moved_m) {
                 return None;
             }

@@ -94,16 +94,19 @@ impl Spectrum {
         self.power.iter().rposition(|&power| power > 1e-3 * most).unwrap_or(0)
     }
 
-    /// Cycles per row of a line at a bin.
+    /// Cycles per row of a line at a bin: the ratio of two neighbouring bins of a Hann spectrum tells
+    /// where between them it is.
     pub(super) fn cycles_per_row(&self, bin: usize) -> f64 {
         let level = self.level(bin);
-        let (mut sum, mut weighted) = (0.0, 0.0);
-        for k in bin - 1..=bin + 1 {
-            let excess = (self.power[k] - level).max(0.0).sqrt();
-            sum += excess;
-            weighted += excess * k as f64;
-        }
-        weighted / sum.max(f64::MIN_POSITIVE) / self.length as f64
+        let size = |k: usize| (self.power[k] - level).max(0.0).sqrt();
+        let (neighbour, side) = if self.power[bin + 1] > self.power[bin - 1] {
+            (bin + 1, 1.0)
+        } else {
+            (bin - 1, -1.0)
+        };
+        let ratio = size(neighbour) / size(bin).max(f64::MIN_POSITIVE);
+        let off = ((2.0 * ratio - 1.0) / (1.0 + ratio)).clamp(0.0, 0.5);
+        (bin as f64 + side * off) / self.length as f64
     }
 }
 

@@ -7,11 +7,12 @@ use super::residual::Residuals;
 use crate::diagnose::finding::{Code, Finding};
 use std::ops::Range;
 
-/// Most and fewest rows on each side of a step that tell its size.
-const SIDE: usize = 25;
-const SIDE_MIN: usize = 8;
-/// A shift of means of residuals that is a step, in standard deviations of such shifts.
-const STEP_MIN: f64 = 8.0;
+/// Rows in each of two pieces on each side of a step that tell its size, and how many at least.
+const PIECE: usize = 13;
+const PIECE_MIN: usize = 5;
+const SIDE: usize = 2 * PIECE;
+/// A shift of residuals that is a step, in standard deviations of such shifts.
+const STEP_MIN: f64 = 7.5;
 /// A jump from row to row that is clear in its channel, in standard deviations of such jumps.
 const SEEN_MIN: f64 = 8.0;
 /// Steps of a channel that are told one by one.
@@ -21,7 +22,7 @@ const SHOWN: usize = 3;
 pub(super) fn steps(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let shifts: [Vec<f64>; 3] = std::array::from_fn(|k| shifts_m(log, &residuals.values[k]));
     let usual_m: [f64; 3] = std::array::from_fn(|k| {
-        let white_m = residuals.noise_m[k] * (2.0 / SIDE as f64).sqrt();
+        let white_m = residuals.noise_m[k] * (5.0 / PIECE as f64).sqrt();
         robust_deviation(shifts[k].iter().copied().filter(|shift| *shift != 0.0)).max(white_m)
     });
     let noise_m: Vec<f64> = (log.channels.iter())
@@ -125,8 +126,8 @@ fn jump_m(values: &[f64], segment: &Range<usize>, row: usize) -> Option<f64> {
     Some(step(row) - 0.5 * (step(row - 1) + step(row + 1)))
 }
 
-/// By row, the mean of the residuals of a probe from it on less that before it, m; 0 where rows are
-/// too few.
+/// By row, by how much the residuals of a probe shift there, m: the lines through the two pieces of
+/// each side, drawn on to the row, so that what is smooth is no shift. 0 where rows are too few.
 fn shifts_m(log: &LogSignals, values: &[f64]) -> Vec<f64> {
     let mut shifts = vec![0.0; log.len()];
     for segment in &log.segments {
@@ -137,10 +138,15 @@ fn shifts_m(log: &LogSignals, values: &[f64]) -> Vec<f64> {
             sums.push(sums[sums.len() - 1] + values[row]);
         }
         for (k, &row) in rows.iter().enumerate() {
-            let (before, behind) = (k.min(SIDE), (rows.len() - k).min(SIDE));
-            if before.min(behind) >= SIDE_MIN {
+            let [before, behind] = [k, rows.len() - k].map(|side| (side / 2).min(PIECE));
+            if before.min(behind) >= PIECE_MIN {
                 let mean = |from: usize, to: usize| (sums[to] - sums[from]) / (to - from) as f64;
-                shifts[row] = mean(k, k + behind) - mean(k - before, k);
+                let far = [
+                    mean(k - 2 * before, k - before),
+                    mean(k + behind, k + 2 * behind),
+                ];
+                let near = [mean(k - before, k), mean(k, k + behind)];
+                shifts[row] = 1.5 * (near[1] - near[0]) - 0.5 * (far[1] - far[0]);
             }
         }
     }

@@ -18,11 +18,11 @@ const IDLE_M: f64 = 2e-6;
 /// A channel stands still if it moves by less than this share of what it moves elsewhere.
 const STILL_SHARE: f64 = 0.01;
 /// Residual that shows that it should have moved, m.
-const MISSED_M: f64 = 3e-6;
+const MISSED_M: f64 = 6e-6;
 /// Length of the stretches in which a channel stands still, and of the blocks whose means show
 /// what it misses, s.
 const STANDING_S: f64 = 0.25;
-const BLOCK_S: f64 = 0.05;
+const BLOCK_S: f64 = 0.02;
 /// Power of the residuals that the error of one channel may leave, and the largest part of its
 /// motion that is no step.
 const LEFT_MAX: f64 = 0.2;
@@ -298,8 +298,9 @@ fn is_missed(
         left += dot(&rest, &rest);
         errors_m.push(error_m);
     }
-    let steps = errors_m.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let steps = errors_m.windows(3).map(|three| (three[2] - three[0]).abs());
     let (jump_m, spread_m) = (steps.fold(0.0, f64::max), usual_spread(&errors_m));
+    if std::env::var("DBG").is_ok() {eprintln!("missed? {channel} {run:?} left {left:.3e} all {all:.3e} spread {spread_m:.2e} jump {jump_m:.2e} of {:.2e}",spread(&errors_m));}
     left < LEFT_MAX * all && spread_m > missed_m && jump_m < JUMP_SHARE * spread(&errors_m)
 }
 
