@@ -72,3 +72,27 @@ fn flat_tops(log: &LogSignals, channel: &Channel) -> Vec<Range<usize>> {
     }
     tops
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::diagnose::finding::Code;
+    use crate::diagnose::signals::sample::{only, recording};
+
+    #[test]
+    fn flat_tops_are_named_below_the_end_of_the_converter_too() {
+        let mut recording = recording();
+        let all = recording.movements.iter().flatten();
+        let top = all.map(|sample| sample.hall[1]).max().unwrap_or(0) * 9 / 10;
+        let mut clipped = 0;
+        for sample in recording.movements.iter_mut().flatten() {
+            clipped += usize::from(sample.hall[1] >= top);
+            sample.hall[1] = sample.hall[1].min(top);
+        }
+        let found = only(&recording, Code::Saturated, Some("hall_b"));
+        let told = found.value.expect("rows");
+        assert!(
+            told > 0.8 * clipped as f64 && told <= clipped as f64,
+            "{told} {clipped}"
+        );
+    }
+}

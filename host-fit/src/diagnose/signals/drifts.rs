@@ -6,9 +6,9 @@ use crate::diagnose::finding::{Code, Finding};
 use std::ops::Range;
 
 /// Slope in standard errors that is no chance; more where few blocks tell the walk.
-const ERRORS_MIN: f64 = 4.5;
+const ERRORS_MIN: f64 = 5.0;
 /// Drift over a movement or the log, whichever is longer, that is worth a warning, m.
-const DRIFT_MIN_M: f64 = 0.5e-6;
+const DRIFT_MIN_M: f64 = 2e-6;
 /// Change of a gain over the log that is.
 const GAIN_MIN: f64 = 0.003;
 /// Blocks that tell the walk of the reference, s, and how many at least.
@@ -66,7 +66,6 @@ pub(super) fn findings(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> 
         drifts.push(noise.slope(log, values, &of_time, &left, &blocks));
     }
     let least = DRIFT_MIN_M / longest_s.max(f64::MIN_POSITIVE);
-    if std::env::var("DBG").is_ok() {for d in &drifts {eprintln!("drift {:.4} +- {:.4} um/s limit {limit:.2} least {:.4}",d.value*1e6,d.error*1e6,least*1e6);} for k in 0..3 {if let Some(d)=trend(log,residuals,k) {eprintln!("trend {:.4} +- {:.4}",d.value*1e6,d.error*1e6)}}}
     let trends = (0..3).map(|k| trend(log, residuals, k)).collect();
     for slopes in [Some(drifts), trends].into_iter().flatten() {
         let of = drifting(log, residuals, &slopes, limit, least);
@@ -189,7 +188,9 @@ fn trend(log: &LogSignals, residuals: &Residuals, probe: usize) -> Option<Slope>
         .map(|(t, m)| m - mean_m - value * (t - mean_s))
         .collect();
     let squares = product(&left, &left);
-    let steps: f64 = (left.windows(2)).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+    let steps: f64 = (left.windows(2))
+        .map(|pair| (pair[1] - pair[0]).powi(2))
+        .sum();
     (steps > WHITE_MIN * squares).then(|| Slope {
         value,
         error: (squares / (n - 2.0) / tt).sqrt(),
@@ -209,7 +210,10 @@ fn drifting(
         return Vec::new();
     }
     let all: f64 = slopes.iter().map(|slope| slope.in_errors().powi(2)).sum();
-    let most = slopes.iter().map(|slope| slope.in_errors().powi(2)).fold(0.0, f64::max);
+    let most = slopes
+        .iter()
+        .map(|slope| slope.in_errors().powi(2))
+        .fold(0.0, f64::max);
     let mean = residuals.mean_of_errors(log);
     let mut best = (most + BEAM_MIN, None);
     for (beam, name) in BEAMS.into_iter().enumerate() {
@@ -232,7 +236,12 @@ fn drifting(
             .filter(|&k| clear(&slopes[k]) && slopes[k].in_errors().powi(2) > LEFT_MAX * most)
             .map(|k| {
                 let same = " (a drift of ifm_x looks the same)";
-                of_drift(log, HALL[k], slopes[k].value, if k == 2 { same } else { "" })
+                of_drift(
+                    log,
+                    HALL[k],
+                    slopes[k].value,
+                    if k == 2 { same } else { "" },
+                )
             })
             .collect(),
     }
@@ -263,5 +272,43 @@ fn of_drift(log: &LogSignals, name: &str, m_per_s: f64, or: &str) -> Finding {
         value: Some(m_per_s * 1e6),
         unit: Some("um/s"),
         ..log.warning(Code::Drift, message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample::{PERIOD_S, codes, only, recording};
+    use super::*;
+
+    #[test]
+    fn drift_within_movements_is_named_with_its_speed() {
+        for (channel, name) in [(1, "hall_b"), (4, "ifm_y1")] {
+            let mut recording = recording();
+            for samples in &mut recording.movements {
+                for (k, sample) in samples.iter_mut().enumerate() {
+                    let error_m = 1e-6 * k as f64 * PERIOD_S;
+                    match channel {
+                        0..3 => sample.hall[channel] += codes(error_m),
+                        _ => sample.beams_nm[channel - 3] += (error_m * 1e9) as i64,
+                    }
+                }
+            }
+            let found = only(&recording, Code::Drift, Some(name));
+            let off = found.value.expect("a speed") - 1.0;
+            assert!(off.abs() < 0.25, "{off} um/s");
+        }
+    }
+
+    #[test]
+    fn a_gain_that_falls_is_named_in_percent() {
+        let mut recording = recording();
+        let rows = recording.rows() as f64;
+        for (k, sample) in recording.movements.iter_mut().flatten().enumerate() {
+            let gain = 1.0 - 0.03 * k as f64 / rows;
+            sample.hall[0] = (f64::from(sample.hall[0]) * gain).round() as i32;
+        }
+        let found = only(&recording, Code::GainDrift, Some("hall_a"));
+        let off = found.value.expect("a change") + 3.0;
+        assert!(off.abs() < 0.3, "{off} %");
     }
 }

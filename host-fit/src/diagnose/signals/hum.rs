@@ -65,7 +65,9 @@ pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let mut largest_m = 0.0;
     let mut told: Vec<usize> = Vec::new();
     for _ in 0..2 * LINES_MAX {
-        let spectra = left.each_ref().map(|values| Spectrum::new(values, &windows));
+        let spectra = left
+            .each_ref()
+            .map(|values| Spectrum::new(values, &windows));
         let lines = (0..3).filter_map(|k| Some((k, spectra[k].clearest_line(lowest)?)));
         let Some((probe, (bin, _))) = lines.max_by(|a, b| a.1.1.total_cmp(&b.1.1)) else {
             break;
@@ -155,7 +157,9 @@ fn lines(
             waves_m: Vec::with_capacity(windows.len()),
         })
         .collect();
-    let weight = residuals.noise_m.map(|noise_m| 1.0 / (noise_m * noise_m).max(1e-20));
+    let weight = residuals
+        .noise_m
+        .map(|noise_m| 1.0 / (noise_m * noise_m).max(1e-20));
     for window in windows {
         // By channel: cos cos, cos sin, sin sin, cos residual, sin residual.
         let mut sums = vec![[0.0; 5]; log.channels.len()];
@@ -166,15 +170,23 @@ fn lines(
                 for k in 0..3 {
                     let by = weight[k] * slopes[k] * slopes[k];
                     let with = weight[k] * slopes[k] * left[k][row];
-                    let terms =
-                        [by * cos * cos, by * cos * sin, by * sin * sin, with * cos, with * sin];
+                    let terms = [
+                        by * cos * cos,
+                        by * cos * sin,
+                        by * sin * sin,
+                        with * cos,
+                        with * sin,
+                    ];
                     (0..5).for_each(|i| sums[i] += terms[i]);
                 }
             }
         }
         for (line, [cc, cs, ss, c, s]) in lines.iter_mut().zip(sums) {
             let determinant = (cc * ss - cs * cs).max(f64::MIN_POSITIVE);
-            let waves = [(c * ss - s * cs) / determinant, (s * cc - c * cs) / determinant];
+            let waves = [
+                (c * ss - s * cs) / determinant,
+                (s * cc - c * cs) / determinant,
+            ];
             line.explained += waves[0] * c + waves[1] * s;
             line.waves_m.push(waves);
         }
@@ -196,6 +208,33 @@ fn take_out(
             let error_m = waves_m[0] * cos + waves_m[1] * sin;
             let slopes = residuals.of_errors(log, row)[line.channel];
             (0..3).for_each(|k| left[k][row] -= slopes[k] * error_m);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample::{PERIOD_S, codes, only, recording};
+    use super::*;
+
+    #[test]
+    fn hum_is_named_once_with_its_frequency_and_channel() {
+        for (channel, name, frequency_hz) in
+            [(2, "hall_c", 50.0), (3, "ifm_x", 61.3), (4, "ifm_y1", 50.0)]
+        {
+            let mut recording = recording();
+            for samples in &mut recording.movements {
+                for (k, sample) in samples.iter_mut().enumerate() {
+                    let error_m = 2e-6 * libm::sin(TAU * frequency_hz * k as f64 * PERIOD_S);
+                    match channel {
+                        0..3 => sample.hall[channel] += codes(error_m),
+                        _ => sample.beams_nm[channel - 3] += (error_m * 1e9) as i64,
+                    }
+                }
+            }
+            let found = only(&recording, Code::Hum, Some(name));
+            let off_hz = found.value.expect("a frequency") - frequency_hz;
+            assert!(off_hz.abs() < 0.05, "{off_hz} Hz");
         }
     }
 }

@@ -23,6 +23,8 @@ mod drifts;
 mod hum;
 mod outliers;
 mod residual;
+#[cfg(test)]
+mod sample;
 mod spectrum;
 mod steps;
 mod still;
@@ -75,8 +77,13 @@ fn of_log(
     if let Some(errors) = errors {
         signals.leave_out_undecoded(errors);
     }
-    let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 3] =
-        [still::standing, outliers::outliers, steps::steps];
+    // The second time for steps that a larger one hid.
+    let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 4] = [
+        still::standing,
+        outliers::outliers,
+        steps::steps,
+        steps::steps,
+    ];
     let Some(mut residuals) = Residuals::new(&signals, stage) else {
         return;
     };

@@ -133,10 +133,35 @@ fn off_neighbours_m(
     let behind = (row + 1..segment.end).find(|&r| log.usable[r]);
     match (before, behind) {
         (Some(before), Some(behind)) => {
-            let share = (row - before) as f64 / (behind - before) as f64;
+            let [t0, t, t1] = [before, row, behind].map(|row| log.time_s[row]);
+            let share = (t - t0) / (t1 - t0).max(1e-6);
             Some(values[row] - values[before] - share * (values[behind] - values[before]))
         }
         (Some(one), None) | (None, Some(one)) => Some(values[row] - values[one]),
         (None, None) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::diagnose::finding::Code;
+    use crate::diagnose::signals::sample::{codes, only, recording};
+
+    #[test]
+    fn jumps_are_counted_and_the_channel_named_that_jumps() {
+        for (channel, name) in [(1, "hall_b"), (3, "ifm_x"), (5, "ifm_y2")] {
+            let mut recording = recording();
+            for k in 0..10 {
+                let sample = &mut recording.movements[k % 3][100 + 171 * k];
+                let sign = if k % 2 == 0 { 1 } else { -1 };
+                match channel {
+                    0..3 => sample.hall[channel] += sign * codes(50e-6),
+                    _ => sample.beams_nm[channel - 3] += i64::from(sign) * 50_000,
+                }
+            }
+            let found = only(&recording, Code::Outliers, Some(name));
+            assert_eq!((found.value, found.t_us), (Some(10.0), Some(200_000)));
+            assert_eq!(found.movement.as_deref(), Some("0"));
+        }
     }
 }

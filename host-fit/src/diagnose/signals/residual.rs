@@ -28,7 +28,7 @@ const RIDGE: f64 = 1e-9;
 /// Noise below this is rounding, mm.
 const NOISE_MIN_MM: f64 = 2e-5;
 /// Residuals beyond this part of the signals are those of a log that is not understood.
-const UNEXPLAINED_MAX: f64 = 0.1;
+const UNEXPLAINED_MAX: f64 = 0.3;
 
 /// A row as the fit of a probe sees it.
 struct Row {
@@ -53,7 +53,8 @@ struct ProbeFit {
 pub(super) struct Residuals {
     fits: Vec<ProbeFit>,
     stride: usize,
-    speed_max: [f64; 3],
+    /// Of X, Y, Rz by row, per s.
+    speeds: Vec<[f64; 3]>,
     /// By probe and row, m at the designed scale; 0 in rows that are left out.
     pub(super) values: [Vec<f64>; 3],
     /// White noise, m.
@@ -66,7 +67,7 @@ impl Residuals {
         let mut residuals = Self {
             fits: Vec::new(),
             stride: log.len().div_ceil(ROWS_MAX),
-            speed_max: usual_speeds(log),
+            speeds: speeds(log),
             values: Default::default(),
             noise_m: [0.0; 3],
         };
@@ -105,15 +106,8 @@ impl Residuals {
         Some(residuals)
     }
 
-    fn row(
-        &self,
-        log: &LogSignals,
-        (k, probe): (usize, &Probe),
-        lag_s: f64,
-        segment: &Range<usize>,
-        row: usize,
-    ) -> Row {
-        let speed = self.speed(log, segment, row);
+    fn row(&self, log: &LogSignals, (k, probe): (usize, &Probe), lag_s: f64, row: usize) -> Row {
+        let speed = self.speeds[row];
         let here = &log.rows[row];
         let planar_mm = [0, 1, 2].map(|i| (here.reference[i] + lag_s * speed[i]) * 1e3);
         let reading = probe.read(planar_mm, here.vertical);
@@ -127,12 +121,6 @@ impl Residuals {
             by_offset: libm::hypot(reading.by_pose[0], reading.by_pose[1]),
             left_mm: log.channels[k].values[row] * 1e3 - reading.signal_mm,
         }
-    }
-
-    /// Of X, Y, Rz by central differences within a segment, per s; a jump is no speed.
-    fn speed(&self, log: &LogSignals, segment: &Range<usize>, row: usize) -> [f64; 3] {
-        let speed = speed(log, segment, row);
-        [0, 1, 2].map(|i| speed[i].clamp(-self.speed_max[i], self.speed_max[i]))
     }
 
     fn used<'s>(
@@ -155,7 +143,7 @@ impl Residuals {
     ) -> Option<ProbeFit> {
         let rows: Vec<Vec<Row>> = (log.segments.iter())
             .map(|segment| {
-                let of = |row| self.row(log, (k, &probe), *lag_s, segment, row);
+                let of = |row| self.row(log, (k, &probe), *lag_s, row);
                 self.used(log, segment).map(of).collect()
             })
             .collect();
@@ -179,8 +167,8 @@ impl Residuals {
         .max(NOISE_MIN_MM);
         let noise_mm = white_noise(log, &log.channels[k].values, 1e3).max(NOISE_MIN_MM);
 
-        let mut gram = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
-        let mut right = DVector::<f64>::zeros(COLUMNS);
+        let mut gram = [[0.0; COLUMNS]; COLUMNS];
+        let mut right = [0.0; COLUMNS];
         let mut projected = Vec::with_capacity(rows.len());
         for (rows, &middle) in rows.iter().zip(&middles) {
             let mut of_columns = [0.0; COLUMNS];
@@ -204,9 +192,7 @@ impl Residuals {
                 for i in 0..COLUMNS {
                     let weighted = weight * f[i];
                     right[i] += weighted * left;
-                    for j in 0..=i {
-                        gram[(i, j)] += weighted * f[j];
-                    }
+                    (gram[i].iter_mut().zip(&f)).for_each(|(sum, f)| *sum += weighted * f);
                 }
             }
             projected.push((share, of_left / of_offset));
@@ -221,12 +207,11 @@ impl Residuals {
         // A column that stands still within the segments tells nothing.
         let least = 1e-12 * count as f64;
         let scales: Vec<f64> = (0..COLUMNS)
-            .map(|i| 1.0 / (gram[(i, i)] + pull[i]).max(least).sqrt())
+            .map(|i| 1.0 / (gram[i][i] + pull[i]).max(least).sqrt())
             .collect();
         let scaled = DMatrix::from_fn(COLUMNS, COLUMNS, |i, j| {
-            let (low, high) = (i.min(j), i.max(j));
             let held = if i == j { pull[i] } else { 0.0 };
-            (gram[(high, low)] + held) * scales[i] * scales[j] + if i == j { RIDGE } else { 0.0 }
+            (gram[i][j] + held) * scales[i] * scales[j] + if i == j { RIDGE } else { 0.0 }
         });
         let factor = Cholesky::new(scaled)?;
         let solved = factor.solve(&DVector::from_fn(COLUMNS, |i, _| right[i] * scales[i]));
@@ -250,7 +235,7 @@ impl Residuals {
         let mut values = vec![0.0; log.len()];
         for (segment, offset_mm) in log.segments.iter().zip(&fit.offsets_mm) {
             for row in segment.clone().filter(|&row| log.usable[row]) {
-                let here = self.row(log, (k, &fit.probe), fit.lag_s, segment, row);
+                let here = self.row(log, (k, &fit.probe), fit.lag_s, row);
                 values[row] = (here.left_mm - offset_mm * here.by_offset) * 1e-3;
             }
         }
@@ -261,10 +246,10 @@ impl Residuals {
     /// the change.
     pub(super) fn unexplained(&self, log: &LogSignals, k: usize, change: &[f64]) -> Vec<f64> {
         let fit = &self.fits[k];
-        let mut right = DVector::<f64>::zeros(COLUMNS);
+        let mut right = [0.0; COLUMNS];
         let mut shares = Vec::with_capacity(log.segments.len());
         for segment in &log.segments {
-            let of = |row| self.row(log, (k, &fit.probe), fit.lag_s, segment, row);
+            let of = |row| self.row(log, (k, &fit.probe), fit.lag_s, row);
             let mut of_columns = [0.0; COLUMNS];
             let (mut of_change, mut of_offset) = (0.0, f64::MIN_POSITIVE);
             for row in self.used(log, segment) {
@@ -285,7 +270,7 @@ impl Residuals {
         let mut out = vec![0.0; log.len()];
         for (segment, (share, offset)) in log.segments.iter().zip(&shares) {
             for row in segment.clone().filter(|&row| log.usable[row]) {
-                let here = self.row(log, (k, &fit.probe), fit.lag_s, segment, row);
+                let here = self.row(log, (k, &fit.probe), fit.lag_s, row);
                 let mut explained = offset * here.by_offset;
                 for i in 0..COLUMNS {
                     explained += slopes[i] * (here.columns[i] - share[i] * here.by_offset);
@@ -340,34 +325,29 @@ impl Residuals {
     }
 }
 
-/// Per s, by central differences.
-fn speed(log: &LogSignals, segment: &Range<usize>, row: usize) -> [f64; 3] {
-    let before = row.saturating_sub(1).max(segment.start);
-    let after = (row + 1).min(segment.end - 1);
-    let time_s = log.time_s[after] - log.time_s[before];
-    if time_s <= 0.0 {
-        return [0.0; 3];
-    }
-    std::array::from_fn(|i| (log.rows[after].reference[i] - log.rows[before].reference[i]) / time_s)
-}
-
-/// Half as much again as all but a twentieth of the rows have.
-fn usual_speeds(log: &LogSignals) -> [f64; 3] {
-    let mut speeds: [Vec<f64>; 3] = Default::default();
+/// The middle two of the four slopes around each row of a segment: a jump or a step, which is no
+/// speed, spoils two at most.
+fn speeds(log: &LogSignals) -> Vec<[f64; 3]> {
+    let mut speeds = vec![[0.0; 3]; log.len()];
     for segment in &log.segments {
-        for row in segment.clone().filter(|&row| log.usable[row]) {
-            let here = speed(log, segment, row);
-            (0..3).for_each(|i| speeds[i].push(here[i].abs()));
+        for row in segment.clone() {
+            let first = row.saturating_sub(1).max(segment.start + 1);
+            let ends = first..(row + 3).min(segment.end);
+            speeds[row] = [0, 1, 2].map(|i| {
+                let mut slopes: Vec<f64> = (ends.clone())
+                    .map(|end| {
+                        let moved = log.rows[end].reference[i] - log.rows[end - 1].reference[i];
+                        moved / (log.time_s[end] - log.time_s[end - 1]).max(1e-6)
+                    })
+                    .collect();
+                slopes.sort_unstable_by(f64::total_cmp);
+                let middle = slopes.len().saturating_sub(1) / 2..slopes.len() / 2 + 1;
+                let middle = slopes.get(middle).unwrap_or_default();
+                middle.iter().sum::<f64>() / middle.len().max(1) as f64
+            });
         }
     }
-    speeds.map(|mut speeds| {
-        let high = speeds.len() * 19 / 20;
-        if high < speeds.len() {
-            1.5 * *speeds.select_nth_unstable_by(high, f64::total_cmp).1
-        } else {
-            0.0
-        }
-    })
+    speeds
 }
 
 fn signals_less_means(log: &LogSignals, k: usize) -> Vec<f64> {

@@ -79,8 +79,9 @@ impl Spectrum {
     pub(super) fn clearest_line(&self, lowest: usize) -> Option<(usize, f64)> {
         let n = self.windows.max(1) as f64;
         let limit = (1.0 - 1.0 / (9.0 * n) + LINE_MIN / (3.0 * n.sqrt())).powi(3);
-        let peak =
-            |bin: usize| self.power[bin] >= self.power[bin - 1].max(f64::max(self.power[bin + 1], 0.0));
+        let peak = |bin: usize| {
+            self.power[bin] >= self.power[bin - 1].max(f64::max(self.power[bin + 1], 0.0))
+        };
         (lowest.max(1)..self.power.len().saturating_sub(2))
             .filter(|&bin| peak(bin))
             .map(|bin| (bin, self.power[bin] / (limit * self.level(bin))))
@@ -91,7 +92,10 @@ impl Spectrum {
     /// The highest bin with a considerable part of the power.
     pub(super) fn highest(&self) -> usize {
         let most = self.power.iter().copied().fold(0.0, f64::max);
-        self.power.iter().rposition(|&power| power > 1e-3 * most).unwrap_or(0)
+        self.power
+            .iter()
+            .rposition(|&power| power > 1e-3 * most)
+            .unwrap_or(0)
     }
 
     /// Cycles per row of a line at a bin: the ratio of two neighbouring bins of a Hann spectrum tells
@@ -121,7 +125,9 @@ mod tests {
     }
 
     fn cut(rows: usize, length: usize) -> Vec<Range<usize>> {
-        (0..rows / length).map(|k| k * length..(k + 1) * length).collect()
+        (0..rows / length)
+            .map(|k| k * length..(k + 1) * length)
+            .collect()
     }
 
     #[test]

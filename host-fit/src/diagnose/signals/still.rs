@@ -23,10 +23,11 @@ const MISSED_M: f64 = 6e-6;
 /// what it misses, s.
 const STANDING_S: f64 = 0.25;
 const BLOCK_S: f64 = 0.02;
-/// Power of the residuals that the error of one channel may leave, and the largest part of its
-/// motion that is no step.
-const LEFT_MAX: f64 = 0.2;
-const JUMP_SHARE: f64 = 0.7;
+/// Power of the residuals that the error of one channel may leave, and by how much more than that
+/// of another; the largest part of its own that two levels may explain: that is a step.
+const LEFT_MAX: f64 = 0.45;
+const WORSE_MAX: f64 = 0.1;
+const STEP_SHARE: f64 = 0.93;
 /// Length of a rest after a crash, s, of the stretches it is looked for in, and the share of
 /// the usual speed that the stage has just before it.
 const REST_S: f64 = 0.2;
@@ -243,7 +244,9 @@ fn still_runs(log: &LogSignals, values: &[f64], noise_m: f64) -> Vec<Range<usize
         let (start, end) = (segment.start, segment.end);
         let starts = (start..end).step_by(length);
         let stretches = starts.map(move |start| start..(start + length).min(end));
-        stretches.filter(|stretch| stretch.len() > length / 2).collect::<Vec<_>>()
+        stretches
+            .filter(|stretch| stretch.len() > length / 2)
+            .collect::<Vec<_>>()
     };
     let range = |stretch: &Range<usize>| usual_spread(&values[stretch.clone()]);
     let all = || log.segments.iter().flat_map(stretches);
@@ -264,7 +267,7 @@ fn still_runs(log: &LogSignals, values: &[f64], noise_m: f64) -> Vec<Range<usize
 }
 
 /// Whether an error of the channel explains the residuals in a run, and these move like a stage:
-/// noise and hum vanish in means over blocks of rows, and a step is no motion.
+/// noise, hum and outliers vanish in medians of blocks of rows, and a step is no motion.
 fn is_missed(
     log: &LogSignals,
     residuals: &Residuals,
@@ -277,31 +280,52 @@ fn is_missed(
         .map(|start| start..start + length)
         .filter(|block| block.end <= run.end)
         .collect();
-    let mean = |values: &[f64], block: &Range<usize>| {
-        values[block.clone()].iter().sum::<f64>() / length as f64
-    };
+    let level = |values: &[f64], block: &Range<usize>| median(&mut values[block.clone()].to_vec());
     let mut shown: Vec<[f64; 3]> = (blocks.iter())
-        .map(|block| [0, 1, 2].map(|k| mean(&residuals.values[k], block)))
+        .map(|block| [0, 1, 2].map(|k| level(&residuals.values[k], block)))
         .collect();
     for k in 0..3 {
         let middle = shown.iter().map(|m| m[k]).sum::<f64>() / shown.len().max(1) as f64;
         shown.iter_mut().for_each(|m| m[k] -= middle);
     }
-    let (mut all, mut left) = (0.0, 0.0);
+    let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
+    let mut all = 0.0;
+    let mut left = vec![0.0; log.channels.len()];
     let mut errors_m = Vec::with_capacity(blocks.len());
     for (block, shown) in blocks.iter().zip(&shown) {
-        let slopes = residuals.of_errors(log, block.start)[channel];
-        let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
-        let error_m = dot(&slopes, shown) / dot(&slopes, &slopes).max(1e-6);
-        let rest = [0, 1, 2].map(|k| shown[k] - slopes[k] * error_m);
         all += dot(shown, shown);
-        left += dot(&rest, &rest);
-        errors_m.push(error_m);
+        let of_errors = residuals.of_errors(log, block.start);
+        for (other, slopes) in of_errors.iter().enumerate() {
+            let error_m = dot(slopes, shown) / dot(slopes, slopes).max(1e-6);
+            let rest = [0, 1, 2].map(|k| shown[k] - slopes[k] * error_m);
+            left[other] += dot(&rest, &rest);
+            if other == channel {
+                errors_m.push(error_m);
+            }
+        }
     }
-    let steps = errors_m.windows(3).map(|three| (three[2] - three[0]).abs());
-    let (jump_m, spread_m) = (steps.fold(0.0, f64::max), usual_spread(&errors_m));
-    if std::env::var("DBG").is_ok() {eprintln!("missed? {channel} {run:?} left {left:.3e} all {all:.3e} spread {spread_m:.2e} jump {jump_m:.2e} of {:.2e}",spread(&errors_m));}
-    left < LEFT_MAX * all && spread_m > missed_m && jump_m < JUMP_SHARE * spread(&errors_m)
+    let least = left.iter().copied().fold(f64::INFINITY, f64::min);
+    left[channel] < (LEFT_MAX * all).min(least + WORSE_MAX * all)
+        && usual_spread(&errors_m) > missed_m
+        && two_levels(&errors_m) < STEP_SHARE
+}
+
+/// The part of the variance that the best two levels, one after the other, explain.
+fn two_levels(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let all: f64 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
+    let (mut sum, mut most) = (0.0, 0.0_f64);
+    for (k, x) in values
+        .iter()
+        .enumerate()
+        .take(values.len().saturating_sub(1))
+    {
+        sum += x - mean;
+        let before = (k + 1) as f64;
+        most = most.max(sum * sum * n / (before * (n - before)));
+    }
+    most / all.max(f64::MIN_POSITIVE)
 }
 
 /// Between the ninth part from below and from above: outliers do not count.
@@ -309,7 +333,10 @@ fn usual_spread(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
     values.sort_unstable_by(f64::total_cmp);
     let ninth = values.len() / 9;
-    match (values.get(ninth), values.get(values.len().saturating_sub(1 + ninth))) {
+    match (
+        values.get(ninth),
+        values.get(values.len().saturating_sub(1 + ninth)),
+    ) {
         (Some(low), Some(high)) => high - low,
         _ => 0.0,
     }
@@ -320,5 +347,78 @@ fn leave_out(log: &mut LogSignals, runs: impl IntoIterator<Item = Range<usize>>)
     let rows = log.usable.len();
     for run in runs {
         log.usable[run.start.saturating_sub(2)..(run.end + 2).min(rows)].fill(false);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample::{ROWS, dataset, only, recording, warnings};
+    use super::*;
+    use crate::simulate::random::{Purpose, Stream};
+    use crate::simulate::recording::{Recording, Sample};
+
+    /// Rows that repeat the first of them, with the noise of sensors.
+    fn rest(recording: &mut Recording, movement: usize, rows: Range<usize>) {
+        let mut random = Stream::new(7, Purpose::Sensors, 0);
+        let first = recording.movements[movement][rows.start];
+        for sample in &mut recording.movements[movement][rows] {
+            let mut noise = |deviation: f64| random.normal(deviation).round();
+            *sample = Sample {
+                t_us: sample.t_us,
+                beams_nm: first.beams_nm.map(|nm| nm + noise(5.0) as i64),
+                capacitive: first.capacitive.map(|code| code + noise(0.8) as i32),
+                hall: first.hall.map(|code| code + noise(8.0) as i32),
+            };
+        }
+    }
+
+    #[test]
+    fn a_channel_that_stands_still_is_stuck_with_its_noise_or_without() {
+        let mut random = Stream::new(7, Purpose::Sensors, 0);
+        for (noise, rows) in [(0.0, 700..1400), (1.0, 0..ROWS)] {
+            let mut probe = recording();
+            let held = probe.movements[1][rows.start].hall[2];
+            for sample in &mut probe.movements[1][rows.clone()] {
+                sample.hall[2] = held + random.normal(8.0 * noise).round() as i32;
+            }
+            let mut beam = recording();
+            let held = beam.movements[1][rows.start].beams_nm[0];
+            for sample in &mut beam.movements[1][rows.clone()] {
+                sample.beams_nm[0] = held + random.normal(5.0 * noise).round() as i64;
+            }
+            for (recording, name) in [(probe, "hall_c"), (beam, "ifm_x")] {
+                let found = only(&recording, Code::Stuck, Some(name));
+                assert_eq!(found.movement.as_deref(), Some("1"));
+                assert_eq!(found.t_us, Some(2000 * rows.start as i64));
+            }
+        }
+    }
+
+    #[test]
+    fn a_stage_that_stops_in_a_movement_is_stuck_and_one_that_does_not_start_idle() {
+        let mut crashed = recording();
+        rest(&mut crashed, 1, 1200..ROWS);
+        let found = only(&crashed, Code::Stuck, None);
+        let off_us = found.t_us.expect("a time") - 2_400_000;
+        assert!(off_us.abs() <= 100_000, "{off_us} us");
+        let mut idle = recording();
+        rest(&mut idle, 2, 0..ROWS);
+        let found = only(&idle, Code::IdleMovement, None);
+        assert_eq!(found.movement.as_deref(), Some("2"));
+    }
+
+    #[test]
+    fn a_gap_that_repeats_its_code_while_the_heights_change_is_stuck() {
+        let mut recording = recording();
+        let held = recording.movements[0][500].capacitive[1];
+        for sample in &mut recording.movements[0][500..1500] {
+            sample.capacitive[1] = held;
+        }
+        let found = warnings(&dataset(&recording));
+        let stuck = found.iter().find(|finding| finding.code == Code::Stuck);
+        assert_eq!(
+            stuck.and_then(|finding| finding.channel.as_deref()),
+            Some("cap_2")
+        );
     }
 }

@@ -1,0 +1,61 @@
+//! A small simulated log for the tests of faults.
+
+use super::signal_findings;
+use crate::diagnose::finding::{Code, Finding, Severity};
+use crate::input::dataset::Dataset;
+use crate::simulate::assembly::Assembly;
+use crate::simulate::protocol::Protocol;
+use crate::simulate::recording::{Recording, record};
+use crate::simulate::sensors::SensorErrors;
+use crate::simulate::tests::stage;
+
+/// Rows of each of its movements, and their servo period, s.
+pub(super) const ROWS: usize = 2000;
+pub(super) const PERIOD_S: f64 = 0.002;
+
+/// Three movements of 4 s, all axes moving.
+pub(super) fn recording() -> Recording {
+    let stage = stage();
+    let mut run = Protocol::Combined.run(PERIOD_S, 3);
+    run.movements.truncate(3);
+    (run.movements.iter_mut()).for_each(|poses| poses.truncate(ROWS));
+    let assembly = Assembly::draw(&stage, 3);
+    record(&stage, &assembly, run, &SensorErrors::USUAL, 3).expect("clear")
+}
+
+/// Codes of a Hall channel.
+pub(super) fn codes(error_m: f64) -> i32 {
+    (error_m / stage().hall.m_per_count).round() as i32
+}
+
+pub(super) fn dataset(recording: &Recording) -> Dataset {
+    recording.dataset(&stage()).expect("a triangle")
+}
+
+/// The warnings about a log.
+pub(super) fn warnings(dataset: &Dataset) -> Vec<Finding> {
+    let mut findings = signal_findings(dataset, &stage(), None);
+    findings.retain(|finding| finding.severity > Severity::Note);
+    findings
+}
+
+/// The only warning about a recording, of this code and channel.
+pub(super) fn only(recording: &Recording, code: Code, channel: Option<&str>) -> Finding {
+    let found = warnings(&dataset(recording));
+    let [finding] = &found[..] else {
+        panic!("{found:#?}");
+    };
+    assert_eq!((finding.code, finding.channel.as_deref()), (code, channel));
+    finding.clone()
+}
+
+#[test]
+fn a_sound_log_raises_no_warning_whole_or_thinned() {
+    let recording = recording();
+    assert_eq!(warnings(&dataset(&recording)), []);
+    let mut thinned = recording;
+    for samples in &mut thinned.movements {
+        *samples = samples.iter().step_by(5).copied().collect();
+    }
+    assert_eq!(warnings(&dataset(&thinned)), []);
+}
