@@ -118,8 +118,12 @@ fn off_sides_m(
     };
     let before = off(row.saturating_sub(SIDE).max(segment.start)..row);
     let behind = off(row + 1..(row + 1 + SIDE).min(segment.end));
-    let sides = before.into_iter().chain(behind);
-    sides.min_by(|a, b| a.abs().total_cmp(&b.abs()))
+    match (before, behind) {
+        // On the way from one to the other.
+        (Some(before), Some(behind)) if before * behind < 0.0 => Some(0.0),
+        (Some(before), Some(behind)) if before.abs() > behind.abs() => Some(behind),
+        (before, behind) => before.or(behind),
+    }
 }
 
 /// How far a row is off the line through its usable neighbours, m.

@@ -3,15 +3,20 @@
 use super::signal_findings;
 use crate::diagnose::finding::{Code, Finding, Severity};
 use crate::input::dataset::Dataset;
+use crate::input::shipped::STAGE_TOML;
+use crate::input::stage::Stage;
 use crate::simulate::assembly::Assembly;
 use crate::simulate::protocol::Protocol;
 use crate::simulate::recording::{Recording, record};
 use crate::simulate::sensors::SensorErrors;
-use crate::simulate::tests::stage;
 
 /// Rows of each of its movements, and their servo period, s.
 pub(super) const ROWS: usize = 2000;
 pub(super) const PERIOD_S: f64 = 0.002;
+
+fn stage() -> Stage {
+    Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("a sound stage")
+}
 
 /// Three movements of 4 s, all axes moving.
 pub(super) fn recording() -> Recording {
@@ -29,7 +34,11 @@ pub(super) fn codes(error_m: f64) -> i32 {
 }
 
 pub(super) fn dataset(recording: &Recording) -> Dataset {
-    recording.dataset(&stage()).expect("a triangle")
+    let mut dataset = recording.dataset(&stage()).expect("a triangle");
+    for row in &mut dataset.rows {
+        row.frame = row.frame.with_sequence((row.t_us / 2000) as u32);
+    }
+    dataset
 }
 
 /// The warnings about a log.

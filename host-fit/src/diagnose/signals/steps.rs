@@ -29,13 +29,15 @@ pub(super) fn steps(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding>
         let white_m = residuals.noise_m[k] * (5.0 / PIECE as f64).sqrt();
         robust_deviation(shifts[k].iter().copied().filter(|shift| *shift != 0.0)).max(white_m)
     });
-    let noise_m: Vec<f64> = (log.channels.iter())
+    let signals: &LogSignals = log;
+    let noise_m: Vec<f64> = (signals.channels.iter())
         .map(|channel| {
             let of = |segment: &Range<usize>| {
                 let segment = segment.clone();
-                (segment.clone()).filter_map(move |row| jump_m(log, &channel.values, &segment, row))
+                (segment.clone())
+                    .filter_map(move |row| jump_m(signals, &channel.values, &segment, row))
             };
-            robust_deviation(log.segments.iter().flat_map(of))
+            robust_deviation(signals.segments.iter().flat_map(of))
         })
         .collect();
     let jumps = |segment: &Range<usize>, row: usize, channel: usize| {

@@ -1,7 +1,9 @@
 //! What the diagnosis says of simulated logs: of 200 clean stages how many it warns of, and of logs
-//! with a mistake how many it names.
+//! with a mistake or a fault how many it names.
 //!
 //! Prints a table and `RESULT key=value` lines.
+
+mod signals;
 
 use host_fit::diagnose;
 use host_fit::diagnose::finding::{Code, Finding, Severity};
@@ -76,6 +78,7 @@ fn main() {
         found.into_iter().collect()
     });
     tell("two stages", Code::LogsDisagree, &found.collect::<Vec<_>>());
+    signals::table(&stage, &planned);
 }
 
 /// Findings above a note on clean stages.

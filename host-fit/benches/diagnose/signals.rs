@@ -1,0 +1,224 @@
+//! Faults of the signals, by size: how many of the logs have the fault named with its channel, and
+//! how many other warnings come beside.
+
+use crate::{FAULTY, recording};
+use host_fit::diagnose::finding::{Code, Severity};
+use host_fit::diagnose::signals::signal_findings;
+use host_fit::input::stage::Stage;
+use host_fit::simulate::protocol::Trajectory;
+use host_fit::simulate::recording::{Recording, Sample};
+use std::f64::consts::TAU;
+
+/// Hall A, B, C; X, Y1, Y2; the gaps.
+const CHANNELS: [&str; 9] = [
+    "hall_a", "hall_b", "hall_c", "ifm_x", "ifm_y1", "ifm_y2", "cap_1", "cap_2", "cap_3",
+];
+
+/// A fault of this size in a channel of a recording; the number picks its place.
+type Fault = fn(&mut Faulty, f64);
+
+struct Faulty<'a> {
+    stage: &'a Stage,
+    recording: Recording,
+    channel: usize,
+    place: u64,
+}
+
+impl Faulty<'_> {
+    /// Adds an error (m) to the channel in a sample.
+    fn add(stage: &Stage, channel: usize, sample: &mut Sample, error_m: f64) {
+        let codes = |m_per_count: f64| (error_m / m_per_count).round() as i32;
+        match channel {
+            0..3 => sample.hall[channel] += codes(stage.hall.m_per_count),
+            3..6 => sample.beams_nm[channel - 3] += (error_m * 1e9).round() as i64,
+            _ => sample.capacitive[channel - 6] += codes(stage.capacitive.m_per_count),
+        }
+    }
+
+    /// Adds an error (m) that depends on the time since the start of the log and of the movement, s.
+    fn add_over_time(&mut self, error_m: impl Fn(f64, f64) -> f64) {
+        let mut row = 0;
+        for samples in &mut self.recording.movements {
+            for (k, sample) in samples.iter_mut().enumerate() {
+                let [t, since] = [row, k].map(|k| k as f64 * self.stage.servo_period_s);
+                Self::add(self.stage, self.channel, sample, error_m(t, since));
+                row += 1;
+            }
+        }
+    }
+
+    fn length_s(&self) -> f64 {
+        self.recording.rows() as f64 * self.stage.servo_period_s
+    }
+
+    /// A movement, and a row in its middle half.
+    fn middle(&self) -> (usize, usize) {
+        let movement = self.place as usize * 7 % self.recording.movements.len();
+        let rows = self.recording.movements[movement].len();
+        (movement, rows / 4 + self.place as usize * 131 % (rows / 2))
+    }
+
+    fn jumps(&mut self, count: usize, error_m: f64) {
+        let rows = self.recording.rows();
+        let apart = rows / count;
+        let samples = self.recording.movements.iter_mut().flatten();
+        for (k, sample) in samples.skip(apart / 2).step_by(apart).enumerate() {
+            let sign = if k % 3 == 0 { -1.0 } else { 1.0 };
+            Self::add(self.stage, self.channel, sample, sign * error_m);
+        }
+    }
+}
+
+/// Name, code, channels, sizes, unit.
+const FAULTS: [(&str, Code, &[usize], &[f64], Fault); 10] = [
+    (
+        "step, um",
+        Code::Step,
+        &[0, 2, 3, 4, 5],
+        &[1.0, 2.0, 3.0, 5.0, 10.0],
+        |f, um| {
+            let (movement, row) = f.middle();
+            for sample in &mut f.recording.movements[movement][row..] {
+                Faulty::add(f.stage, f.channel, sample, um * 1e-6);
+            }
+        },
+    ),
+    (
+        "ten jumps, um",
+        Code::Outliers,
+        &[0, 2, 3, 4, 5],
+        &[3.0, 5.0, 50.0],
+        |f, um| {
+            f.jumps(10, um * 1e-6);
+        },
+    ),
+    (
+        "jumps of 1 % of the rows, um",
+        Code::Outliers,
+        &[0, 2, 3, 4, 5],
+        &[50.0],
+        |f, um| {
+            f.jumps(f.recording.rows() / 100, um * 1e-6);
+        },
+    ),
+    (
+        "hum of 50 Hz, um",
+        Code::Hum,
+        &[0, 2, 3, 4, 5],
+        &[0.1, 0.2, 0.5, 1.0, 5.0],
+        |f, um| {
+            f.add_over_time(|t, _| um * 1e-6 * (TAU * 50.0 * t).sin());
+        },
+    ),
+    (
+        "hum of 83.3 Hz, um",
+        Code::Hum,
+        &[0, 2, 3, 4, 5],
+        &[0.5, 5.0],
+        |f, um| {
+            f.add_over_time(|t, _| um * 1e-6 * (TAU * 83.3 * t).sin());
+        },
+    ),
+    (
+        "drift within movements, um/s",
+        Code::Drift,
+        &[0, 1, 2, 4, 5],
+        &[0.1, 0.2, 0.5, 1.0],
+        |f, um| {
+            f.add_over_time(|_, since| um * 1e-6 * since);
+        },
+    ),
+    (
+        "drift over the log, um",
+        Code::Drift,
+        &[0, 1, 2],
+        &[5.0, 10.0, 20.0, 50.0],
+        |f, um| {
+            let length_s = f.length_s();
+            f.add_over_time(|t, _| um * 1e-6 * t / length_s);
+        },
+    ),
+    (
+        "gain of a probe, %",
+        Code::GainDrift,
+        &[0, 1, 2],
+        &[0.3, 0.5, 1.0, 3.0],
+        |f, percent| {
+            let (rows, channel) = (f.recording.rows() as f64, f.channel);
+            for (k, sample) in f.recording.movements.iter_mut().flatten().enumerate() {
+                let gain = 1.0 - percent / 100.0 * k as f64 / rows;
+                sample.hall[channel] = (f64::from(sample.hall[channel]) * gain).round() as i32;
+            }
+        },
+    ),
+    (
+        "channel stuck, s",
+        Code::Stuck,
+        &[0, 2, 3, 4, 5],
+        &[0.2, 0.5, 1.0],
+        |f, seconds| {
+            let (movement, row) = f.middle();
+            let rows = &mut f.recording.movements[movement];
+            let end = rows
+                .len()
+                .min(row + (seconds / f.stage.servo_period_s) as usize);
+            let held = rows[row];
+            for sample in &mut rows[row..end] {
+                match f.channel {
+                    0..3 => sample.hall[f.channel] = held.hall[f.channel],
+                    _ => sample.beams_nm[f.channel - 3] = held.beams_nm[f.channel - 3],
+                }
+            }
+        },
+    ),
+    (
+        "flat tops, % below the peak",
+        Code::Saturated,
+        &[0, 1, 2],
+        &[1.0, 3.0, 10.0],
+        |f, percent| {
+            let channel = f.channel;
+            let all = f.recording.movements.iter().flatten();
+            let peak = all.map(|sample| sample.hall[channel]).max().unwrap_or(0);
+            let top = (f64::from(peak) * (1.0 - percent / 100.0)) as i32;
+            for sample in f.recording.movements.iter_mut().flatten() {
+                sample.hall[channel] = sample.hall[channel].min(top);
+            }
+        },
+    ),
+];
+
+/// Prints a line for each fault and size, and `RESULT` lines.
+pub(crate) fn table(stage: &Stage, planned: &Trajectory) {
+    println!("{:<36}{:>9}{:>9}{:>9}", "fault", "size", "named", "others");
+    for (name, code, channels, sizes, fault) in FAULTS {
+        for &size in sizes {
+            let (mut named, mut others) = (0, 0);
+            for seed in 1..=FAULTY {
+                let channel = channels[seed as usize % channels.len()];
+                let recording = recording(stage, planned, 1000 + seed);
+                let mut faulty = Faulty {
+                    stage,
+                    recording,
+                    channel,
+                    place: seed,
+                };
+                fault(&mut faulty, size);
+                let dataset = faulty.recording.dataset(stage).expect("a plane");
+                let mut found = signal_findings(&dataset, stage, None);
+                found.retain(|finding| finding.severity > Severity::Note);
+                let (right, wrong): (Vec<_>, Vec<_>) = (found.into_iter()).partition(|finding| {
+                    finding.code == code && finding.channel.as_deref() == Some(CHANNELS[channel])
+                });
+                named += usize::from(!right.is_empty());
+                others += wrong.len();
+            }
+            println!("{name:<36}{size:>9}{named:>6}/{FAULTY}{others:>9}");
+            let key = name.replace([' ', ',', '%', '/', '.'], "_");
+            println!(
+                "RESULT named_{key}_{size}={:.3}",
+                named as f64 / FAULTY as f64
+            );
+        }
+    }
+}
