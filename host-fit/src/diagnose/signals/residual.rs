@@ -81,14 +81,14 @@ impl Residuals {
             residuals.fits.clear();
             for (k, probe) in probes(&parameters).into_iter().enumerate() {
                 let values = &mut parameters.probes[k];
-                let fit = residuals.step(log, k, probe, values, &mut lags_s[k])?;
+                let fit = residuals.step(log, k, probe, values, &mut lags_s[k], HALF_WEIGHT)?;
                 residuals.fits.push(fit);
             }
         }
         for (k, probe) in probes(&parameters).into_iter().enumerate() {
-            // Offsets and factor at the last parameters; these stay.
+            // Offsets and factor at the last parameters, which stay, for rows of equal weight.
             let (mut values, mut lag_s) = (parameters.probes[k], lags_s[k]);
-            let fit = residuals.step(log, k, probe, &mut values, &mut lag_s)?;
+            let fit = residuals.step(log, k, probe, &mut values, &mut lag_s, f64::INFINITY)?;
             residuals.values[k] = residuals.left_m(log, k, &fit);
             residuals.fits[k] = ProbeFit {
                 lag_s: lags_s[k],
@@ -132,7 +132,8 @@ impl Residuals {
         rows.filter(|&row| log.usable[row])
     }
 
-    /// One step of Gauss and Newton from `probe`, which is that of `values`.
+    /// One step of Gauss and Newton from `probe`, which is that of `values`; rows `half_weight`
+    /// standard deviations off have half the weight.
     fn step(
         &self,
         log: &LogSignals,
@@ -140,6 +141,7 @@ impl Residuals {
         probe: Probe,
         values: &mut [f64; PER_PROBE],
         lag_s: &mut f64,
+        half_weight: f64,
     ) -> Option<ProbeFit> {
         let rows: Vec<Vec<Row>> = (log.segments.iter())
             .map(|segment| {
@@ -174,7 +176,7 @@ impl Residuals {
             let mut of_columns = [0.0; COLUMNS];
             let (mut of_left, mut of_offset) = (0.0, f64::MIN_POSITIVE);
             let weight = |row: &Row| {
-                let deviations = off(row, middle) / (HALF_WEIGHT * scale_mm);
+                let deviations = off(row, middle) / (half_weight * scale_mm);
                 1.0 / (1.0 + deviations * deviations)
             };
             for row in rows {

@@ -14,7 +14,7 @@ const SIDE: usize = 2 * PIECE;
 /// A shift of residuals that is a step, in standard deviations of such shifts.
 const STEP_MIN: f64 = 7.5;
 /// The same where a beam or gap jumps at that row.
-const SEEN_STEP_MIN: f64 = 4.0;
+const SEEN_STEP_MIN: f64 = 5.0;
 /// A jump from row to row that is clear in its channel, in standard deviations of such jumps.
 const SEEN_MIN: f64 = 8.0;
 /// Steps less clear than this part of the clearest may be what that one bends.
