@@ -282,8 +282,9 @@ mod tests {
 
     #[test]
     fn drift_within_movements_is_named_with_its_speed() {
+        let sound = recording();
         for (channel, name) in [(1, "hall_b"), (4, "ifm_y1")] {
-            let mut recording = recording();
+            let mut recording = sound.clone();
             for samples in &mut recording.movements {
                 for (k, sample) in samples.iter_mut().enumerate() {
                     let error_m = 1e-6 * k as f64 * PERIOD_S;

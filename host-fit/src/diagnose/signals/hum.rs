@@ -219,10 +219,11 @@ mod tests {
 
     #[test]
     fn hum_is_named_once_with_its_frequency_and_channel() {
+        let sound = recording();
         for (channel, name, frequency_hz) in
             [(2, "hall_c", 50.0), (3, "ifm_x", 61.3), (4, "ifm_y1", 50.0)]
         {
-            let mut recording = recording();
+            let mut recording = sound.clone();
             for samples in &mut recording.movements {
                 for (k, sample) in samples.iter_mut().enumerate() {
                     let error_m = 2e-6 * libm::sin(TAU * frequency_hz * k as f64 * PERIOD_S);

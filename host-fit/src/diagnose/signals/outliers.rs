@@ -153,8 +153,9 @@ mod tests {
 
     #[test]
     fn jumps_are_counted_and_the_channel_named_that_jumps() {
+        let sound = recording();
         for (channel, name) in [(1, "hall_b"), (3, "ifm_x"), (5, "ifm_y2")] {
-            let mut recording = recording();
+            let mut recording = sound.clone();
             for k in 0..10 {
                 let sample = &mut recording.movements[k % 3][100 + 171 * k];
                 let sign = if k % 2 == 0 { 1 } else { -1 };

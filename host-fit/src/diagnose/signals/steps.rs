@@ -177,9 +177,10 @@ mod tests {
 
     #[test]
     fn a_step_is_named_with_its_channel_place_and_size() {
+        let sound = recording();
         for (channel, name) in [(0, "hall_a"), (3, "ifm_x"), (4, "ifm_y1")] {
             for size_um in [-10_i32, 4] {
-                let mut recording = recording();
+                let mut recording = sound.clone();
                 for sample in &mut recording.movements[1][1200..] {
                     match channel {
                         0..3 => sample.hall[channel] += codes(f64::from(size_um) * 1e-6),

@@ -374,14 +374,15 @@ mod tests {
 
     #[test]
     fn a_channel_that_stands_still_is_stuck_with_its_noise_or_without() {
+        let sound = recording();
         let mut random = Stream::new(7, Purpose::Sensors, 0);
         for (noise, rows) in [(0.0, 700..1400), (1.0, 0..1000)] {
-            let mut probe = recording();
+            let mut probe = sound.clone();
             let held = probe.movements[1][rows.start].hall[2];
             for sample in &mut probe.movements[1][rows.clone()] {
                 sample.hall[2] = held + random.normal(8.0 * noise).round() as i32;
             }
-            let mut beam = recording();
+            let mut beam = sound.clone();
             let held = beam.movements[1][rows.start].beams_nm[0];
             for sample in &mut beam.movements[1][rows.clone()] {
                 sample.beams_nm[0] = held + random.normal(5.0 * noise).round() as i64;
