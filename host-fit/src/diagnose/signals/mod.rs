@@ -6,7 +6,8 @@
 //! | [`channels`] | the signals of one log by channel |
 //! | [`timing`] | rows missing, uneven times |
 //! | [`converters`] | flat tops |
-//! | [`still`] | channels and movements that stand still |
+//! | [`still`] | channels that repeat one value, movements that stand still |
+//! | [`standing`] | channels that show no more than their noise |
 //! | [`residual`] | what the motion does not explain of a Hall signal |
 //! | [`blame`] | the channel whose error explains that |
 //! | [`outliers`], [`steps`] | rows that jump, signals that stay where they jumped |
@@ -26,6 +27,7 @@ mod residual;
 #[cfg(test)]
 mod sample;
 mod spectrum;
+mod standing;
 mod steps;
 mod still;
 mod timing;
@@ -79,7 +81,7 @@ fn of_log(
     }
     // The second time for steps that a larger one hid.
     let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 4] = [
-        still::standing,
+        standing::standing,
         outliers::outliers,
         steps::steps,
         steps::steps,
