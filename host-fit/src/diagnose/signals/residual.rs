@@ -99,7 +99,8 @@ impl Residuals {
             let moved = signals_less_means(log, k);
             let squares: f64 = moved.iter().map(|m| m * m).sum();
             let moved_m = (squares / moved.len().max(1) as f64).sqrt();
-            if !(left_m <= UNEXPLAINED_MAX * moved_m) {
+            let understood = left_m <= UNEXPLAINED_MAX * moved_m;
+            if !understood {
                 return None;
             }
         }
@@ -113,8 +114,8 @@ impl Residuals {
         let reading = probe.read(planar_mm, here.vertical);
         let mut columns = [0.0; COLUMNS];
         columns[..PER_PROBE].copy_from_slice(&reading.by_parameter);
-        for i in 0..3 {
-            columns[PER_PROBE] += reading.by_pose[i] * speed[i] * 1e3;
+        for (by_axis, speed) in reading.by_pose.iter().zip(speed) {
+            columns[PER_PROBE] += by_axis * speed * 1e3;
         }
         Row {
             columns,
