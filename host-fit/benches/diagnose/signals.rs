@@ -14,9 +14,10 @@ const CHANNELS: [&str; 9] = [
     "hall_a", "hall_b", "hall_c", "ifm_x", "ifm_y1", "ifm_y2", "cap_1", "cap_2", "cap_3",
 ];
 
-/// A fault of this size in a channel of a recording; the number picks its place.
+/// Puts a fault of this size into a recording.
 type Fault = fn(&mut Faulty, f64);
 
+/// A recording, the channel that is at fault, and a number that picks the place.
 struct Faulty<'a> {
     stage: &'a Stage,
     recording: Recording,
@@ -69,8 +70,10 @@ impl Faulty<'_> {
     }
 }
 
-/// Name, code, channels, sizes, unit.
-const FAULTS: [(&str, Code, &[usize], &[f64], Fault); 10] = [
+/// Name, code, channels, sizes.
+type Row = (&'static str, Code, &'static [usize], &'static [f64], Fault);
+
+const FAULTS: [Row; 10] = [
     (
         "step, um",
         Code::Step,
