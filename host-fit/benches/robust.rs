@@ -1,0 +1,157 @@
+//! What bad rows in a log cost in service, by loss: rms of the errors against the truth over those of
+//! the fit to the clean log, the worst of X, Y, Rz.
+//!
+//! `cargo bench -p host-fit --bench robust`: a minute.
+
+use host_fit::fit::{FitSettings, ModelChoice, fit};
+use host_fit::input::dataset::Dataset;
+use host_fit::input::log::{ReadOptions, read_bytes};
+use host_fit::input::shipped::{LOG_GZ, RUN_GZ, SERVICE_GZ, STAGE_TOML};
+use host_fit::input::stage::Stage;
+use host_fit::judge::{Decoded, Zeros};
+use host_fit::problem::draw::Draw;
+use host_fit::problem::model::Model;
+use host_fit::solve::robust::Loss;
+use host_fit::solve::{Projection, Solver, SolverOptions};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use runtime::ModelKind;
+use runtime::parameters::Text;
+use std::error::Error;
+use std::io::Read;
+
+type Fallible<T> = Result<T, Box<dyn Error>>;
+
+/// Columns of the shipped logs.
+const BEAMS: [usize; 3] = [2, 3, 4];
+const HALL: [usize; 3] = [8, 9, 10];
+const NM_PER_UM: i64 = 1000;
+const CODES_PER_UM: i64 = 16;
+
+/// What is wrong with a log.
+const FAULTS: [&str; 7] = [
+    "nothing",
+    "1 % of rows 50 um off, a beam",
+    "1 % of rows 50 um off, a Hall channel",
+    "ten rows 50 um off, a beam",
+    "a fringe step of 10 um in X",
+    "reference stuck for 2 s",
+    "Hall A flat beyond 96 % of its rows",
+];
+
+fn main() -> Fallible<()> {
+    let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
+    let service = read(&unzipped(SERVICE_GZ)?, &stage)?;
+    println!("| log, model | fault | none | huber | cauchy |\n|---|---|---|---|---|");
+    for (name, log, kind) in [
+        ("run of 30 s, field", RUN_GZ, ModelKind::Field),
+        ("paper, (31)", LOG_GZ, ModelKind::M31),
+    ] {
+        let rows = unzipped(log)?;
+        let mut clean = None;
+        for (fault, title) in FAULTS.into_iter().enumerate() {
+            let log = read(&with_fault(&rows, fault), &stage)?;
+            print!("| {name} | {title} |");
+            for loss in [Loss::None, Loss::Huber, Loss::Cauchy] {
+                match rms_in_service(&log, &service, &stage, kind, loss) {
+                    Ok(rms) => {
+                        let clean = clean.get_or_insert(rms);
+                        let worst = (0..3).map(|k| rms[k] / clean[k]).fold(0.0, f64::max);
+                        print!(" {worst:.3} |");
+                    }
+                    Err(_) => print!(" refused |"),
+                }
+            }
+            println!();
+        }
+    }
+    Ok(())
+}
+
+fn rms_in_service(
+    log: &Dataset,
+    service: &Dataset,
+    stage: &Stage,
+    kind: ModelKind,
+    loss: Loss,
+) -> Fallible<[f64; 3]> {
+    let settings = FitSettings {
+        model: ModelChoice::Named(Model::of(kind)),
+        train: None,
+        draw: Draw::Stratified,
+        solver: Solver::Finished,
+        loss,
+        options: SolverOptions::new(Projection::Linear, 1),
+        serial: Text::default(),
+        created: Text::default(),
+    };
+    let fit = fit(log, stage, &settings)?;
+    let judged = Decoded::new(&fit.set, service).judge(service, stage, Zeros::None);
+    Ok(judged.errors.axes.map(|axis| axis.rms))
+}
+
+/// A log with one of the faults, the same at every call.
+fn with_fault(log: &str, fault: usize) -> String {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let (header, rows) = log.split_once('\n').unwrap_or_default();
+    let cells = |row: &str| {
+        row.split(',')
+            .filter_map(|cell| cell.parse().ok())
+            .collect()
+    };
+    let mut rows: Vec<Vec<i64>> = rows.lines().map(cells).collect();
+    let count = rows.len();
+    let jumps = match fault {
+        1 | 2 => count / 100,
+        3 => 10,
+        _ => 0,
+    };
+    for _ in 0..jumps {
+        let (columns, um) = if fault == 2 {
+            (HALL, CODES_PER_UM)
+        } else {
+            (BEAMS, NM_PER_UM)
+        };
+        let jump = if random.random::<bool>() { 50 } else { -50 };
+        rows[random.random_range(0..count)][columns[random.random_range(0..3)]] += jump * um;
+    }
+    // A movement of 2 s, or as long in the middle of a longer one.
+    let middle = count / 2..(count / 2 + 1000).min(count);
+    let (movement, held) = (rows[middle.start][0], rows[middle.start].clone());
+    for row in &mut rows[middle] {
+        match fault {
+            4 if row[0] == movement => row[BEAMS[0]] += 10 * NM_PER_UM,
+            5 if row[0] == movement => row[2..5].copy_from_slice(&held[2..5]),
+            _ => {}
+        }
+    }
+    if fault == 6 {
+        let mut sorted: Vec<i64> = rows.iter().map(|row| row[HALL[0]]).collect();
+        sorted.sort_unstable();
+        let (low, high) = (sorted[count / 50], sorted[count - 1 - count / 50]);
+        for row in &mut rows {
+            row[HALL[0]] = row[HALL[0]].clamp(low, high);
+        }
+    }
+    let line = |row: Vec<i64>| {
+        let cells: Vec<String> = row.iter().map(ToString::to_string).collect();
+        cells.join(",") + "\n"
+    };
+    header.to_owned() + "\n" + &rows.into_iter().map(line).collect::<String>()
+}
+
+fn read(log: &str, stage: &Stage) -> Fallible<Dataset> {
+    let log = read_bytes(
+        log.as_bytes(),
+        "log.csv".as_ref(),
+        stage,
+        &ReadOptions::default(),
+    )?;
+    Ok(log.dataset)
+}
+
+fn unzipped(log: &[u8]) -> Fallible<String> {
+    let mut text = String::new();
+    flate2::read::GzDecoder::new(log).read_to_string(&mut text)?;
+    Ok(text)
+}

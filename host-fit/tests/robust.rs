@@ -1,0 +1,313 @@
+//! Bad rows in a log, and how far a blob can be trusted: losses, cross-validation, uncertainty of
+//! poses, the difference between blobs.
+
+mod common;
+
+use common::{Bench, stdout, thinned_log};
+use host_fit::input::shipped::{RUN_GZ, SERVICE_GZ};
+use std::io::Read;
+
+const HALL_CODES_IN_50_UM: i64 = 800;
+const NM_IN_50_UM: i64 = 50_000;
+
+/// The cells of a log, the header apart.
+fn cells(log: &str) -> (String, Vec<Vec<i64>>) {
+    let (header, rows) = log.split_once('\n').expect("a header");
+    let row = |line: &str| {
+        let cells = line.split(',').map(|cell| cell.parse().expect("a number"));
+        cells.collect()
+    };
+    (header.to_owned(), rows.lines().map(row).collect())
+}
+
+fn text(header: &str, rows: &[Vec<i64>]) -> String {
+    let line = |row: &Vec<i64>| {
+        let cells: Vec<String> = row.iter().map(ToString::to_string).collect();
+        cells.join(",") + "\n"
+    };
+    header.to_owned() + "\n" + &rows.iter().map(line).collect::<String>()
+}
+
+/// One row in a hundred off by 50 um in one of its beams or Hall channels.
+fn with_jumps(log: &str) -> String {
+    let (header, mut rows) = cells(log);
+    for (k, row) in rows.iter_mut().enumerate() {
+        if k % 97 == 13 {
+            let sign = if k / 97 % 2 == 0 { 1 } else { -1 };
+            let (column, jump) = [
+                (2, NM_IN_50_UM),
+                (8, HALL_CODES_IN_50_UM),
+                (3, NM_IN_50_UM),
+                (9, HALL_CODES_IN_50_UM),
+                (4, NM_IN_50_UM),
+                (10, HALL_CODES_IN_50_UM),
+            ][k / 97 % 6];
+            row[column] += sign * jump;
+        }
+    }
+    text(&header, &rows)
+}
+
+/// The reference stands still in `stuck` rows.
+fn with_stuck_reference(log: &str, stuck: impl Fn(usize, i64) -> bool) -> String {
+    let (header, mut rows) = cells(log);
+    let mut held: Option<Vec<i64>> = None;
+    for (k, row) in rows.iter_mut().enumerate() {
+        if stuck(k, row[0]) {
+            let held = held.get_or_insert_with(|| row[2..5].to_vec());
+            row[2..5].copy_from_slice(held);
+        }
+    }
+    text(&header, &rows)
+}
+
+fn unzipped(log: &[u8]) -> String {
+    let mut text = String::new();
+    let mut reader = flate2::read::GzDecoder::new(log);
+    reader.read_to_string(&mut text).expect("the shipped log");
+    text
+}
+
+/// Every other row of the shipped run.
+fn run() -> String {
+    let log = unzipped(RUN_GZ);
+    let rows = log
+        .lines()
+        .enumerate()
+        .filter(|(k, _)| *k == 0 || k % 2 == 1);
+    rows.map(|(_, line)| line.to_owned() + "\n").collect()
+}
+
+/// A folder with the run, a clean blob of it and the service log.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    bench.write("run.csv", run());
+    bench.write("service.csv.gz", SERVICE_GZ);
+    bench.good("fit run.csv --stage stage.toml --out clean.bin --loss none");
+    bench
+}
+
+/// rms of X, Y, Rz of a blob on a log.
+fn rms(bench: &Bench, blob: &str, log: &str) -> [f64; 3] {
+    bench.good(&format!(
+        "eval {blob} {log} --stage stage.toml --json eval.json"
+    ));
+    let errors = &bench.json("eval.json")["errors"];
+    [("x", "rmse_um"), ("y", "rmse_um"), ("rz", "rmse_urad")]
+        .map(|(axis, rms)| errors[axis][rms].as_f64().expect("a number"))
+}
+
+fn assert_as_good(bench: &Bench, blob: &str, clean: &str, log: &str, limit: f64) {
+    let (found, clean) = (rms(bench, blob, log), rms(bench, clean, log));
+    for axis in 0..3 {
+        let ratio = found[axis] / clean[axis];
+        assert!(ratio < limit, "{blob}, {axis}: {found:?} {clean:?}");
+    }
+}
+
+#[test]
+fn a_clean_log_gives_the_same_bytes_with_and_without_a_loss() {
+    let bench = bench();
+    bench.write("paper.csv", thinned_log(20, |_| true));
+    bench.good("fit paper.csv --stage stage.toml --out 31.bin --loss none");
+    for (log, clean) in [("run.csv", "clean.bin"), ("paper.csv", "31.bin")] {
+        for loss in ["", "--loss huber", "--loss cauchy"] {
+            bench.good(&format!(
+                "fit {log} --stage stage.toml --out robust.bin --json fit.json {loss}"
+            ));
+            assert!(
+                bench.read("robust.bin") == bench.read(clean),
+                "{log} {loss}"
+            );
+            assert_eq!(bench.json("fit.json")["outlier_rows"], 0);
+        }
+    }
+}
+
+#[test]
+fn one_row_in_a_hundred_off_by_50_um_costs_nothing_in_service() {
+    let bench = bench();
+    bench.write("jumps.csv", with_jumps(&bench.text("run.csv")));
+    bench.good("fit jumps.csv --stage stage.toml --out robust.bin --json fit.json");
+    let report = bench.json("fit.json");
+    assert_eq!(report["model"], "field");
+    assert_eq!(
+        (&report["loss"], &report["outlier_rows"]),
+        (&"cauchy".into(), &78.into())
+    );
+    assert_as_good(&bench, "robust.bin", "clean.bin", "service.csv.gz", 1.005);
+    // Least squares follows them.
+    bench.good("fit jumps.csv --stage stage.toml --out bent.bin --model field --loss none");
+    let (bent, clean) = (
+        rms(&bench, "bent.bin", "run.csv"),
+        rms(&bench, "clean.bin", "run.csv"),
+    );
+    assert!(
+        (0..3).any(|axis| bent[axis] > 1.05 * clean[axis]),
+        "{bent:?} {clean:?}"
+    );
+}
+
+#[test]
+fn two_stuck_seconds_are_left_out() {
+    let bench = bench();
+    let stuck = |row: usize, _| (3500..4000).contains(&row);
+    bench.write(
+        "stuck.csv",
+        with_stuck_reference(&bench.text("run.csv"), stuck),
+    );
+    bench.good("fit stuck.csv --stage stage.toml --out robust.bin --json fit.json");
+    assert_eq!(bench.json("fit.json")["model"], "field");
+    assert_as_good(&bench, "robust.bin", "clean.bin", "service.csv.gz", 1.01);
+}
+
+#[test]
+fn model_31_forgets_a_stuck_movement_and_jumps() {
+    let bench = Bench::new();
+    let log = thinned_log(20, |_| true);
+    bench.write("clean.csv", &log);
+    bench.write(
+        "stuck.csv",
+        with_stuck_reference(&log, |_, movement| movement == 28),
+    );
+    bench.write("jumps.csv", with_jumps(&log));
+    bench.good("fit clean.csv --stage stage.toml --out clean.bin --model 31");
+    for log in ["stuck", "jumps"] {
+        for (loss, limit) in [("cauchy", 1.005), ("huber", 1.05)] {
+            let fit = format!(
+                "fit {log}.csv --stage stage.toml --out {log}.bin --model 31 --loss {loss}"
+            );
+            bench.good(&fit);
+            assert_as_good(
+                &bench,
+                &format!("{log}.bin"),
+                "clean.bin",
+                "clean.csv",
+                limit,
+            );
+        }
+    }
+}
+
+#[test]
+fn a_search_alone_refuses_a_loss() {
+    let bench = Bench::new();
+    bench.write("log.csv", thinned_log(200, |_| true));
+    let fit = "fit log.csv --stage stage.toml --out p.bin --model 31 --solver shtlbo";
+    bench.bad(&format!("{fit} --loss cauchy"), 2, &["--loss", "shtlbo"]);
+    bench.good(&format!("{fit} --loss none"));
+    bench.good(fit);
+}
+
+#[test]
+fn rows_left_out_are_predicted_about_as_well_as_rows_fitted() {
+    let bench = Bench::new();
+    bench.write("run.csv", run());
+    bench.write("paper.csv", thinned_log(20, |_| true));
+    for (log, split) in [("run.csv", "time"), ("paper.csv", "movements")] {
+        bench.good(&format!(
+            "fit {log} --stage stage.toml --out p.bin --json fit.json --cross-validate"
+        ));
+        let found = &bench.json("fit.json")["cross_validation"];
+        assert_eq!(
+            (&found["split"], &found["groups"]),
+            (&split.into(), &5.into())
+        );
+        for axis in ["x_um", "y_um", "rz_urad"] {
+            let of = |place: &str| found[place][axis].as_f64().expect("a number");
+            let ratio = of("left_out") / of("in_fit");
+            // Rows left out are never predicted better.
+            assert!((1.0..1.1).contains(&ratio), "{log} {axis}: {ratio}");
+        }
+    }
+    let report = bench.json("fit.json");
+    assert!(
+        report["standard_errors"]
+            .as_str()
+            .is_some_and(|s| s.starts_with("sandwich"))
+    );
+    let pairs = report["correlations"].as_array().expect("a list");
+    assert!(
+        pairs
+            .iter()
+            .all(|p| p["correlation"].as_f64().is_some_and(|c| c.abs() > 0.95))
+    );
+}
+
+/// 95 % of the errors against the truth lie within 1.96 standard uncertainties.
+#[test]
+fn poses_come_with_an_uncertainty_that_covers_their_errors() {
+    let bench = bench();
+    let decode = "decode clean.bin service.csv.gz --stage stage.toml";
+    bench.good(&format!("{decode} --out with.csv --uncertainty"));
+    bench.good(&format!("{decode} --out without.csv"));
+    let (with, without) = (bench.text("with.csv"), bench.text("without.csv"));
+    let service = unzipped(SERVICE_GZ);
+    let truth = |line: &str| -> Vec<f64> {
+        let cells = line.split(',').skip(2).take(3);
+        cells.map(|cell| cell.parse().expect("a number")).collect()
+    };
+    let names: Vec<&str> = service
+        .lines()
+        .next()
+        .expect("a header")
+        .split(',')
+        .collect();
+    assert_eq!(names[2..5], ["x_m", "y_m", "rz_rad"]);
+    let (mut rows, mut within) = (0.0, [0.0; 3]);
+    let lines = with.lines().zip(without.lines()).zip(service.lines());
+    for ((with, without), service) in lines.skip(1) {
+        assert!(with.starts_with(without) && with[without.len()..].starts_with(','));
+        let cells: Vec<f64> = with
+            .split(',')
+            .map(|c| c.parse().expect("a number"))
+            .collect();
+        for (axis, truth) in truth(service).into_iter().enumerate() {
+            let error = cells[2 + axis] - truth * 1e6;
+            within[axis] += f64::from(u8::from(error.abs() <= 1.96 * cells[9 + axis]));
+        }
+        rows += 1.0;
+    }
+    for (axis, within) in within.into_iter().enumerate() {
+        let share = within / rows;
+        assert!((0.93..0.97).contains(&share), "{axis}: {share}");
+    }
+    // Model (31) does not know, and neither does a blob without its posterior.
+    bench.good("fit run.csv --stage stage.toml --out 31.bin --model 31");
+    let to = "service.csv.gz --stage stage.toml --out u.csv --uncertainty";
+    bench.bad(
+        &format!("decode 31.bin {to}"),
+        3,
+        &["model (31)", "--model field"],
+    );
+    bench.write("alone.bin", bench.read("clean.bin"));
+    bench.bad(
+        &format!("decode alone.bin {to}"),
+        3,
+        &["alone.bin.posterior"],
+    );
+    assert!(!common::exists(&bench.path("u.csv")));
+}
+
+#[test]
+fn diff_tells_a_change_in_units_in_sigma_and_as_a_pose() {
+    let bench = bench();
+    bench.good("fit run.csv --stage stage.toml --out 31.bin --model 31 --serial S2");
+    bench.good("diff clean.bin clean.bin --json same.json");
+    let same = bench.json("same.json");
+    assert_eq!(same["same_logs"], true);
+    assert_eq!(same["parameters"]["eta_a"]["sigma"], 0.0);
+    assert_eq!(same["pose_difference"]["axes"]["x"]["peak_um"], 0.0);
+    let output = bench.good("diff clean.bin 31.bin --json other.json");
+    assert!(common::stderr(&output).contains("serial"));
+    assert!(stdout(&output).contains("15625 poses"));
+    let other = bench.json("other.json");
+    let eta = &other["parameters"]["eta_a"];
+    let of = |key: &str| eta[key].as_f64().expect("a number");
+    assert!((of("b") - of("a") - of("change")).abs() < 1e-12 && eta["sigma"].is_null());
+    assert!(other["parameters"]["uw2_a"]["b"].is_null());
+    // What Model (31) lacks on this stage: micrometres.
+    let x = other["pose_difference"]["axes"]["x"]["rms_um"].as_f64();
+    assert!(x.is_some_and(|x| (0.5..20.0).contains(&x)), "{x:?}");
+    bench.bad("diff clean.bin stage.toml", 3, &["not a parameter blob"]);
+}
