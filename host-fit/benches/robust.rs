@@ -34,9 +34,9 @@ const FAULTS: [&str; 7] = [
     "1 % of rows 50 um off, a beam",
     "1 % of rows 50 um off, a Hall channel",
     "ten rows 50 um off, a beam",
-    "a fringe step of 10 um in X",
-    "reference stuck for 2 s",
-    "Hall A flat beyond 96 % of its rows",
+    "X off by 10 um, up to 2 s",
+    "reference stuck, up to 2 s",
+    "Hall A flat in 4 % of the rows",
 ];
 
 fn main() -> Fallible<()> {
