@@ -159,6 +159,8 @@ pub struct Fit {
     pub train_fitness: f64,
     /// Rows that the fit used.
     pub train_rows: usize,
+    /// The loss that their weights are by.
+    pub loss: Loss,
     /// Those of them that count less than half, as the loss says: row numbers, ascending.
     pub outliers: Vec<usize>,
     /// All rows, decoded by the target's decoder.
@@ -254,15 +256,16 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// How much each row counts. All alike for a search alone, which has no weights, and where
-    /// the field model cannot be fitted at all.
-    fn weights(&self) -> Vec<f64> {
-        let alike = || vec![1.0; self.selected.len()];
+    /// How much each row counts, and the loss that says so: none for a search alone, which has no
+    /// weights, and where the field model cannot be fitted at all.
+    fn weights(&self) -> (Loss, Vec<f64>) {
+        let alike = || (Loss::None, vec![1.0; self.selected.len()]);
         match (self.settings.loss, self.settings.solver) {
             (Loss::None, _) | (_, Solver::Search(_)) => alike(),
-            _ => self
-                .first_phase()
-                .map_or_else(|_| alike(), |first| first.field.weights.clone()),
+            (loss, _) => match self.first_phase() {
+                Ok(first) => (loss, first.field.weights.clone()),
+                Err(_) => alike(),
+            },
         }
     }
 
@@ -284,7 +287,7 @@ impl<'a> Job<'a> {
             ..
         } = self;
         let solver = settings.solver;
-        let weights = self.weights();
+        let (loss, weights) = self.weights();
         let used = selected.iter().zip(&weights).filter(|(_, w)| **w > 0.0);
         let (used, used_weights): (Vec<usize>, Vec<f64>) = used.unzip();
         let mut problem = Problem::new(dataset, &used, stage, model);
@@ -323,6 +326,7 @@ impl<'a> Job<'a> {
             standard_error: uncertainty.standard_error,
             field: None,
             lag: reference_lag(dataset, selected, stage, model, parameters, &weights),
+            loss,
             outliers: outliers(selected, &weights).collect(),
             correlations: uncertainty.correlations,
             judgement_solver_zeros: decoded.judge(dataset, stage, own_zeros),

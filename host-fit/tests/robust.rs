@@ -136,6 +136,8 @@ fn one_row_in_a_hundred_off_by_50_um_costs_nothing_in_service() {
         (&"cauchy".into(), &78.into())
     );
     assert_as_good(&bench, "robust.bin", "clean.bin", "service.csv.gz", 1.005);
+    bench.good("fit jumps.csv --stage stage.toml --out one.bin --threads 1");
+    assert!(bench.read("one.bin") == bench.read("robust.bin"));
     // Least squares follows them.
     bench.good("fit jumps.csv --stage stage.toml --out bent.bin --model field --loss none");
     let (bent, clean) = (

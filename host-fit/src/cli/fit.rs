@@ -240,7 +240,6 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         solver: solver.name(),
         project: project.name(),
         seed: args.seed,
-        loss: settings.loss.name(),
         lag_compensated: args.compensate_lag,
     };
     let mut report = of_fit(&fit, choice, &circumstances);

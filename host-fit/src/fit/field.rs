@@ -176,6 +176,7 @@ impl Job<'_> {
                 .collect(),
             train_fitness: problem.fitness(cost),
             train_rows: selected.len(),
+            loss: self.settings.loss,
             outliers: super::outliers(selected, &field.weights).collect(),
             correlations: (field
                 .posterior

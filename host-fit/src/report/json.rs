@@ -197,7 +197,8 @@ pub struct Report {
     pub project: Option<&'static str>,
     /// Seed; null for `eval`.
     pub seed: Option<u64>,
-    /// The robust loss: "cauchy", "huber" or "none"; null for `eval`.
+    /// The loss that the weights of the rows are by: "cauchy", "huber" or "none", also where the
+    /// log lets none act; null for `eval`.
     pub loss: Option<&'static str>,
     /// Rows that count less than half in the fit, as the loss says; null for `eval`.
     pub outlier_rows: Option<usize>,
@@ -360,8 +361,6 @@ pub struct Choice {
     pub project: &'static str,
     /// Seed.
     pub seed: u64,
-    /// The robust loss.
-    pub loss: &'static str,
     /// Whether the lag of the reference was taken off.
     pub lag_compensated: bool,
 }
@@ -379,7 +378,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         solver: Some(choice.solver.to_owned()),
         project: Some(choice.project),
         seed: Some(choice.seed),
-        loss: Some(choice.loss),
+        loss: Some(fit.loss.name()),
         outlier_rows: Some(fit.outliers.len()),
         standard_errors: Some(match fit.field {
             Some(_) => {

@@ -118,10 +118,10 @@ pub fn trust(report: &Report) -> String {
     if !pairs.is_empty() {
         let _ = writeln!(out, "correlations above 0.95: {}", pairs.join(", "));
     }
-    if let (Some(rows @ 1..), Some(loss)) = (report.outlier_rows, report.loss) {
+    if let (Some(rows), Some(loss)) = (report.outlier_rows, report.loss) {
         let _ = writeln!(
             out,
-            "{rows} rows count less than half (loss {loss}); the errors above are over all rows"
+            "loss {loss}: {rows} rows count less than half; the errors above are over all rows"
         );
     }
     if let Some(c) = &report.cross_validation {

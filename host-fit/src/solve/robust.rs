@@ -161,3 +161,66 @@ fn residuals_um(problem: &Problem<'_>, parameters: &Parameters) -> Option<Vec<[f
     };
     problem.rows.iter().map(residual).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 1000 rows in two movements, each with an offset of its own: residuals of magnitude 1 to 1.5
+    /// of either sign.
+    fn residuals() -> Vec<[f64; 3]> {
+        let one = |row: usize| {
+            let offset = if row < 500 { 40.0 } else { -70.0 };
+            let sign = if row % 2 == 0 { 1.0 } else { -1.0 };
+            [offset + sign * (1.0 + 0.001 * (row % 500) as f64); 3]
+        };
+        (0..1000).map(one).collect()
+    }
+
+    fn weights(loss: Loss, residuals: &[[f64; 3]]) -> Vec<f64> {
+        loss.weights(residuals.to_vec(), [0..500, 500..1000].into_iter())
+    }
+
+    #[test]
+    fn only_rows_beyond_six_robust_standard_deviations_count_less() {
+        let clean = residuals();
+        for loss in Loss::ALL {
+            assert!(weights(loss, &clean).iter().all(|weight| *weight == 1.0));
+        }
+        // About 1.25 times 1.4826 is a standard deviation.
+        let mut off = clean;
+        off[700][1] += 100.0;
+        let share = THRESHOLD / (100.0 / (1.25 * PER_MEDIAN));
+        for (loss, expected) in [
+            (Loss::None, 1.0),
+            (Loss::Huber, share),
+            (Loss::Cauchy, share * share),
+        ] {
+            let weights = weights(loss, &off);
+            assert!(
+                (weights[700] / expected - 1.0).abs() < 0.05,
+                "{loss:?} {}",
+                weights[700]
+            );
+            assert_eq!(
+                weights.iter().filter(|w| **w < 1.0).count(),
+                usize::from(loss != Loss::None)
+            );
+        }
+    }
+
+    #[test]
+    fn cauchy_ends_without_outliers_and_without_rows_among_them() {
+        let mut weights = vec![1.0; 60];
+        weights[3] = 0.3;
+        weights[20..40].fill(0.1);
+        weights[30] = 1.0;
+        assert_eq!(Loss::Huber.last(weights.clone()), weights);
+        let last = Loss::Cauchy.last(weights);
+        let left_out = (0..60).filter(|&row| last[row] == 0.0);
+        assert_eq!(
+            left_out.collect::<Vec<_>>(),
+            [3].into_iter().chain(20..40).collect::<Vec<_>>()
+        );
+    }
+}
