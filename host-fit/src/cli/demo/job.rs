@@ -186,6 +186,7 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
 pub(super) fn settings(model: ModelKind) -> FitSettings {
     FitSettings {
         solver: Solver::Finished,
+        loss: Loss::None,
         ..FitSettings::new(ModelChoice::Named(Model::of(model)))
     }
 }
