@@ -16,6 +16,7 @@ use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
 use crate::solve::Solver;
+use crate::solve::robust::Loss;
 use runtime::ModelKind;
 use runtime::calibration::Origin;
 use runtime::geometry::ProbeCoordinates;
