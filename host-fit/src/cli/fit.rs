@@ -3,7 +3,7 @@
 use super::args::Train;
 use crate::cli::error::HostError;
 use crate::diagnose;
-use crate::diagnose::finding::Severity;
+use crate::diagnose::finding::{Finding, Severity};
 use crate::fit::{Fit, FitError, FitSettings, ModelChoice, fit, fit_compensated};
 use crate::input::log;
 use crate::input::log::{BadRows, LogReading, ReadOptions};
@@ -15,9 +15,11 @@ use crate::problem::draw::Draw;
 use crate::problem::model::MODELS;
 use crate::problem::parameters::Parameters;
 use crate::recalibrate::Known;
-use crate::report::html::{Page, Plot};
 use crate::report::json::{Choice, Circumstances, Report, of_fit};
-use crate::report::{plots, text};
+use crate::report::page::Source;
+use crate::report::provenance::Provenance;
+use crate::report::text;
+use crate::report::verdict::End;
 use crate::solve::{Projection, SolveError, Solver, SolverOptions};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -189,7 +191,11 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
                 problem: error.to_string(),
             });
         }
-        Err(error) => return Err(super::check::failed(error, &findings)),
+        Err(error) => {
+            let end = End::Failed(&error.to_string());
+            write_report(args, (&log, &stage), &findings, None, end)?;
+            return Err(super::check::failed(error, &findings));
+        }
         Ok(fit) => fit,
     };
     let circumstances = Circumstances {
@@ -212,6 +218,14 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         if let Some(path) = &args.json {
             super::write_json(&report, path)?;
         }
+        let end = End::Failed(&refused);
+        write_report(
+            args,
+            (&log, &stage),
+            &report.findings,
+            Some((&fit, &report)),
+            end,
+        )?;
         super::warn(&report.warnings);
         return Err(HostError::Refused { findings: refused });
     }
@@ -222,10 +236,17 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
     }
-    if let Some(folder) = &args.report {
-        let names: Vec<String> = args.logs.iter().map(|p| p.display().to_string()).collect();
-        write_report(&report, &fit, &log, &names, folder)?;
-    }
+    let end = match interrupt::requested() {
+        true => End::Interrupted,
+        false => End::Written,
+    };
+    write_report(
+        args,
+        (&log, &stage),
+        &report.findings,
+        Some((&fit, &report)),
+        end,
+    )?;
     // JSON on standard output is for a program: nothing else goes there.
     if !super::is_standard_output(args.json.as_deref()) {
         super::print(&summary(&fit, &report, &stage))?;
@@ -307,33 +328,41 @@ fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
     )
 }
 
-/// Writes `index.html` into a folder, which is made if it is missing.
+/// Writes the report, if one is asked for: of a fit with its figures, or of a log that has none.
 fn write_report(
-    report: &Report,
-    fit: &Fit,
-    log: &LogReading,
-    names: &[String],
-    folder: &Path,
+    args: &FitArgs,
+    (log, stage): (&LogReading, &Stage),
+    findings: &[Finding],
+    fit: Option<(&Fit, &Report)>,
+    end: End,
 ) -> Result<(), HostError> {
-    let errors = (fit.decoded).errors_less(&fit.judgement.zeros, &log.dataset);
-    let plots = [
-        Plot {
-            caption: "Errors over the log",
-            svg: plots::errors_over_rows(report.zeros_in_words, &errors, &log.dataset)?,
-        },
-        Plot {
-            caption: "Distribution of the errors",
-            svg: plots::distribution("errors in units of their rms", &errors)?,
-        },
-    ];
-    output::make_folder(folder)?;
-    let page = Page {
-        report,
-        title: &report.model_title,
-        zeros: report.zeros_in_words,
-        logs: names,
-        plots: &plots,
+    let Some(folder) = &args.report else {
+        return Ok(());
     };
-    output::write_atomically(&folder.join("index.html"), page.to_html()?.as_bytes())?;
-    Ok(())
+    let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
+    let mut provenance = Provenance {
+        serial: args.serial.clone().unwrap_or_default().as_str().to_owned(),
+        created: args.created.clone().unwrap_or_default().as_str().to_owned(),
+        seed: args.seed,
+        ..Provenance::new(words)
+    };
+    provenance.add_logs(&log.dataset);
+    provenance.add_file(&args.stage, "stage as designed");
+    if let Some(start) = &args.start {
+        provenance.add_file(start, "parameters to start from");
+    }
+    if !matches!(end, End::Failed(_)) {
+        provenance.add_file(&args.out, "parameter blob, written");
+    }
+    let warnings: Vec<String> = log.warnings.iter().map(ToString::to_string).collect();
+    let source = Source {
+        stage,
+        dataset: &log.dataset,
+        provenance,
+        findings,
+        warnings: &warnings,
+        fit,
+        end,
+    };
+    Ok(source.write(folder)?)
 }

@@ -30,6 +30,9 @@ use crate::input::stage::Stage;
 use channels::LogSignals;
 use residual::{Residuals, Units};
 
+pub(crate) use channels::{period_s, times_s};
+pub(crate) use spectrum::Spectrum;
+
 /// Fewest rows of a log whose residuals are tested.
 const ROWS_MIN: usize = 1000;
 

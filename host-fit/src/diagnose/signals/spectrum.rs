@@ -6,6 +6,7 @@ use crate::diagnose::finding::{Code, Finding, Severity};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Longest and shortest window, s and rows.
 const WINDOW_S: f64 = 2.0;
@@ -26,21 +27,24 @@ const SIDEBAND: f64 = 0.3;
 const LINES_MAX: usize = 5;
 
 /// Mean power spectrum over windows with a Hann taper.
-struct Spectrum {
-    power: Vec<f64>,
-    windows: usize,
+pub(crate) struct Spectrum {
+    /// Mean squared magnitude of the transform, by bin; unit that of the values, squared.
+    pub(crate) power: Vec<f64>,
+    /// Windows that went in.
+    pub(crate) windows: usize,
     length: usize,
 }
 
 impl Spectrum {
-    fn new(log: &LogSignals, values: &[f64], length: usize) -> Self {
+    /// Of the windows of `length` rows that fit into the segments; their means are taken off.
+    pub(crate) fn new(segments: &[Range<usize>], values: &[f64], length: usize) -> Self {
         let transform = FftPlanner::new().plan_fft_forward(length);
         let taper: Vec<f64> = (0..length)
             .map(|k| 0.5 - 0.5 * (TAU * k as f64 / length as f64).cos())
             .collect();
         let mut power = vec![0.0; length / 2];
         let mut windows = 0;
-        for segment in &log.segments {
+        for segment in segments {
             for chunk in values[segment.clone()].chunks_exact(length) {
                 let mean = chunk.iter().sum::<f64>() / length as f64;
                 let mut buffer: Vec<Complex<f64>> = (chunk.iter().zip(&taper))
@@ -106,10 +110,10 @@ pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
         return Vec::new();
     }
     let raw: Vec<Spectrum> = (log.channels.iter())
-        .map(|channel| Spectrum::new(log, &channel.values, length))
+        .map(|channel| Spectrum::new(&log.segments, &channel.values, length))
         .collect();
     let left: Vec<Spectrum> = (residuals.values.iter())
-        .map(|values| Spectrum::new(log, values, length))
+        .map(|values| Spectrum::new(&log.segments, values, length))
         .collect();
     let resolution_hz = 1.0 / (length as f64 * log.period_s);
     let lowest_hz = (OF_MOTION * motion_bin(&raw) as f64 * resolution_hz).max(LOWEST_HZ);
