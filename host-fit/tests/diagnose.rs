@@ -50,11 +50,13 @@ fn is_refused(log: &str, stage: &str, code: &str, parts: &[&str]) {
     bench.write("stage.toml", stage);
     bench.write("log.csv", log);
     bench.bad(
-        "fit log.csv --stage stage.toml --out p.bin --solver lm",
+        "fit log.csv --stage stage.toml --out p.bin --solver lm --report report",
         4,
         parts,
     );
-    assert!(bench.holds_only(&["log.csv"]), "{code}");
+    assert!(bench.holds_only(&["log.csv", "report"]), "{code}");
+    let page = bench.text("report/index.html");
+    assert!(page.contains("Refused") && page.contains(code), "{code}");
     bench.bad("check log.csv --stage stage.toml --json c.json", 4, parts);
     let found = &bench.json("c.json")["findings"][0];
     assert_eq!(

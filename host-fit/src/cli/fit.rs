@@ -192,9 +192,18 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
             });
         }
         Err(error) => {
-            let end = End::Failed(&error.to_string());
-            write_report(args, (&log, &stage), &findings, None, end)?;
-            return Err(super::check::failed(error, &findings));
+            let ended = super::check::failed(error, &findings);
+            let why = match (&ended, findings.first()) {
+                (HostError::Refused { .. }, Some(gravest)) => {
+                    diagnose::messages(&findings, gravest.severity)
+                }
+                (HostError::Fit(error) | HostError::FitDiagnosed { error, .. }, _) => {
+                    error.to_string()
+                }
+                _ => ended.to_string(),
+            };
+            write_report(args, (&log, &stage), &findings, None, End::Failed(&why))?;
+            return Err(ended);
         }
         Ok(fit) => fit,
     };

@@ -1,22 +1,23 @@
 //! Charts as SVG that follow the page they stand in: its colours, light, dark or printed, and its
 //! width. A chart is a stack of panels over the same abscissa.
 
+use super::axis::Axis;
 use super::plots::{DrawResult, PlotError, as_svg};
 use plotters::coord::Shift;
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
+use std::ops::Range;
 
 /// Size in the units of the drawing, of which two are about a pixel: see `style.css`.
 const WIDTH: u32 = 720;
 const PANEL_HEIGHT: u32 = 150;
 const TOP: u32 = 8;
-const BOTTOM: u32 = 62;
+const BOTTOM: u32 = 58;
 const LEFT: u32 = 104;
-const TEXT: u32 = 21;
+const TEXT: u32 = 23;
 
 /// A role, to which the style sheet gives its colour by the value that the drawing has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tone {
+pub(super) enum Tone {
     /// What is shown.
     Data,
     /// A second quantity in the same panel.
@@ -40,7 +41,7 @@ impl Tone {
 
 /// What is drawn into a panel.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Mark {
+pub(super) enum Mark {
     /// A line through points.
     Line(Tone, Vec<(f64, f64)>),
     /// A dot at each point.
@@ -55,7 +56,7 @@ pub enum Mark {
 
 /// How the ordinates of a panel are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
+pub(super) enum Scale {
     /// About zero, to the same distance.
     Symmetric,
     /// From zero up.
@@ -66,28 +67,26 @@ pub enum Scale {
 
 /// One panel.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Panel {
+pub(super) struct Panel {
     /// What stands at its ordinate, with the unit.
-    pub label: String,
+    pub(super) label: String,
     /// Its scale.
-    pub scale: Scale,
+    pub(super) scale: Scale,
     /// What is drawn, the hindmost first.
-    pub marks: Vec<Mark>,
+    pub(super) marks: Vec<Mark>,
 }
 
 /// Panels below each other.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Chart {
+pub(super) struct Chart {
     /// What it shows, for the caption.
-    pub caption: String,
+    pub(super) caption: String,
     /// What stands at the abscissa, with the unit.
-    pub x_label: String,
-    /// Its ends.
-    pub x: (f64, f64),
-    /// Whether it is logarithmic.
-    pub x_logarithmic: bool,
+    pub(super) x_label: String,
+    /// The abscissa.
+    pub(super) x: Axis,
     /// The panels, the topmost first.
-    pub panels: Vec<Panel>,
+    pub(super) panels: Vec<Panel>,
 }
 
 impl Chart {
@@ -95,7 +94,7 @@ impl Chart {
     ///
     /// # Errors
     /// [`PlotError`] when the drawing library refuses.
-    pub fn svg(&self) -> Result<String, PlotError> {
+    pub(super) fn svg(&self) -> Result<String, PlotError> {
         let svg = as_svg(&self.caption, |svg| self.draw(svg))?;
         // Within a page an element needs no name space, and its width is that of its place.
         let size = format!("width=\"{WIDTH}\" height=\"{}\" ", self.height());
@@ -121,28 +120,19 @@ impl Chart {
         Ok(())
     }
 
-    /// An abscissa as it is drawn.
-    fn at(&self, x: f64) -> f64 {
-        if self.x_logarithmic { x.log10() } else { x }
-    }
-
     fn draw_panel(
         &self,
         area: &DrawingArea<SVGBackend<'_>, Shift>,
         panel: &Panel,
         last: bool,
     ) -> DrawResult {
-        let (left, right) = (self.at(self.x.0), self.at(self.x.1));
-        let (bottom, top) = panel.ends();
         let mut chart = ChartBuilder::on(area)
             .margin_top(6)
             .margin_bottom(6)
             .margin_right(24)
             .x_label_area_size(if last { BOTTOM } else { 0 })
             .y_label_area_size(LEFT)
-            .build_cartesian_2d(left..right, bottom..top)?;
-        let x_name = |x: &f64| short(*x, self.x_logarithmic);
-        let y_name = |y: &f64| short(*y, panel.scale == Scale::Logarithmic);
+            .build_cartesian_2d(self.x, panel.axis())?;
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
@@ -150,78 +140,58 @@ impl Chart {
             .axis_style(Tone::Noise.colour())
             .x_labels(if last { 6 } else { 0 })
             .x_desc(if last { self.x_label.as_str() } else { "" })
-            .x_label_formatter(&x_name)
             .y_desc(&panel.label)
             .y_labels(5)
-            .y_label_formatter(&y_name)
             .label_style(("sans-serif", TEXT))
             .axis_desc_style(("sans-serif", TEXT))
             .draw()?;
         for mark in &panel.marks {
-            self.draw_mark(&mut chart, panel, mark)?;
-        }
-        Ok(())
-    }
-
-    fn draw_mark<'a>(
-        &self,
-        chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
-        panel: &Panel,
-        mark: &Mark,
-    ) -> DrawResult {
-        let at = |&(x, y): &(f64, f64)| (self.at(x), panel.at(y));
-        match mark {
-            Mark::Line(tone, points) => {
-                let points: Vec<_> = points.iter().map(at).collect();
-                let style = tone.colour().stroke_width(2);
-                chart.draw_series([PathElement::new(points, style)])?;
-            }
-            Mark::Dots(tone, points) => {
-                let dot = |point| Circle::new(at(point), 4, tone.colour().filled());
-                chart.draw_series(points.iter().map(dot))?;
-            }
-            Mark::Band(tone, ends) => {
-                let lower = ends.iter().map(|&(x, low, _)| at(&(x, low)));
-                let upper = ends.iter().rev().map(|&(x, _, high)| at(&(x, high)));
-                let outline: Vec<_> = lower.chain(upper).collect();
-                chart.draw_series([Polygon::new(outline, tone.colour().mix(0.35))])?;
-            }
-            Mark::Bars(tone, bars) => {
-                let bar = |&(left, right, value): &(f64, f64, f64)| {
-                    Rectangle::new(
-                        [at(&(left, 0.0)), at(&(right, value))],
-                        tone.colour().filled(),
-                    )
-                };
-                chart.draw_series(bars.iter().map(bar))?;
-            }
-            Mark::Borders(tone, places) => {
-                let (bottom, top) = panel.ends();
-                let border = |&x: &f64| {
-                    PathElement::new([(self.at(x), bottom), (self.at(x), top)], tone.colour())
-                };
-                chart.draw_series(places.iter().map(border))?;
-            }
+            draw_mark(&mut chart, mark)?;
         }
         Ok(())
     }
 }
 
-impl Panel {
-    /// An ordinate as it is drawn.
-    fn at(&self, y: f64) -> f64 {
-        match self.scale {
-            Scale::Logarithmic => y.max(f64::MIN_POSITIVE).log10(),
-            Scale::Symmetric | Scale::FromZero => y,
+fn draw_mark<'a>(
+    chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>,
+    mark: &Mark,
+) -> DrawResult {
+    match mark {
+        Mark::Line(tone, points) => {
+            let style = tone.colour().stroke_width(2);
+            chart.draw_series([PathElement::new(points.clone(), style)])?;
+        }
+        Mark::Dots(tone, points) => {
+            let dot = |&point| Circle::new(point, 4, tone.colour().filled());
+            chart.draw_series(points.iter().map(dot))?;
+        }
+        Mark::Band(tone, ends) => {
+            let lower = ends.iter().map(|&(x, low, _)| (x, low));
+            let upper = ends.iter().rev().map(|&(x, _, high)| (x, high));
+            let outline: Vec<_> = lower.chain(upper).collect();
+            chart.draw_series([Polygon::new(outline, tone.colour().mix(0.35))])?;
+        }
+        Mark::Bars(tone, bars) => {
+            let bar = |&(left, right, value): &(f64, f64, f64)| {
+                Rectangle::new([(left, 0.0), (right, value)], tone.colour().filled())
+            };
+            chart.draw_series(bars.iter().map(bar))?;
+        }
+        Mark::Borders(tone, places) => {
+            let Range { start, end } = chart.y_range();
+            let border = |&x: &f64| PathElement::new([(x, start), (x, end)], tone.colour());
+            chart.draw_series(places.iter().map(border))?;
         }
     }
+    Ok(())
+}
 
-    /// The ends of the ordinate as it is drawn, with some room beyond what is shown.
-    fn ends(&self) -> (f64, f64) {
+impl Panel {
+    /// The ordinate, with some room beyond what is shown.
+    fn axis(&self) -> Axis {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         let mut take = |y: f64| {
-            let y = self.at(y);
-            if y.is_finite() {
+            if y.is_finite() && (y > 0.0 || self.scale != Scale::Logarithmic) {
                 (low, high) = (low.min(y), high.max(y));
             }
         };
@@ -240,29 +210,12 @@ impl Panel {
         }
         let largest = high.max(-low).max(1e-6) * 1.08;
         match self.scale {
-            Scale::Symmetric => (-largest, largest),
-            Scale::FromZero => (0.0, largest),
-            Scale::Logarithmic if low <= high => (low - 0.05, (high + 0.05).max(low + 0.3)),
-            Scale::Logarithmic => (0.0, 1.0),
+            Scale::Symmetric => Axis::Linear(-largest, largest),
+            Scale::FromZero => Axis::Linear(0.0, largest),
+            Scale::Logarithmic if low <= high => {
+                Axis::Logarithmic(0.9 * low, (1.1 * high).max(2.0 * low))
+            }
+            Scale::Logarithmic => Axis::Logarithmic(1.0, 10.0),
         }
-    }
-}
-
-/// A number at an axis; of a logarithmic one its power of ten.
-fn short(x: f64, logarithmic: bool) -> String {
-    let x = if logarithmic { 10f64.powf(x) } else { x };
-    let size = x.abs();
-    let digits = match size {
-        _ if size >= 100.0 => 0,
-        _ if size >= 1.0 => 1,
-        _ if size >= 0.01 => 3,
-        _ if size < 1e-9 => return "0".to_owned(),
-        _ => return format!("{x:.0e}"),
-    };
-    let text = format!("{x:.digits$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
     }
 }

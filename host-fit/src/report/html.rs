@@ -31,8 +31,5 @@ pub(super) fn render(
 ) -> Result<String, Error> {
     let mut engine = Environment::new();
     engine.set_undefined_behavior(UndefinedBehavior::Strict);
-    engine.add_filter("scientific", |number: Option<f64>| {
-        number.map_or_else(|| "-".to_owned(), |x| format!("{x:.2e}"))
-    });
     engine.render_named_str(name, template, Serde(context))
 }

@@ -1,5 +1,6 @@
 //! What a fit, a judgement or a plan shows: JSON, text tables, plots, an HTML page.
 
+mod axis;
 mod before_after;
 mod chart;
 pub mod field;

@@ -76,13 +76,14 @@ struct Page<'a> {
     /// Noise of X, Y (um), Rz (urad) from row to row.
     noise: Option<[f64; 3]>,
     before_after: Vec<Figure>,
-    movements: Vec<MovementRow>,
+    movements: Vec<MovementRow<'a>>,
+    /// Whether the model has zero deviations.
+    has_zeros: bool,
     movements_max: usize,
     by_movement: Vec<Figure>,
     residuals: Vec<Figure>,
     search: Vec<Figure>,
     parameters: Vec<ParameterRow>,
-    zeros: Vec<Figure>,
 }
 
 impl Source<'_> {
@@ -126,6 +127,13 @@ impl Source<'_> {
         let warnings = report.map_or(self.warnings, |report| &report.warnings);
         let of_movements = last.map(|last| errors::of_movements(&log, last));
         let of_movements = of_movements.unwrap_or_default();
+        let zeros = report.map_or(&[][..], |report| &report.zero_deviations);
+        let has_zeros = report.is_some_and(|report| report.delta == "fit");
+        let range = stage.search.delta_m;
+        let by_movement = last.map(|_| errors::by_movement(&of_movements));
+        let by_movement = by_movement
+            .into_iter()
+            .chain(has_zeros.then(|| fitting::zero_deviations(zeros, [range.low, range.high])));
         let page = Page {
             style: STYLE,
             provenance: &self.provenance,
@@ -139,9 +147,10 @@ impl Source<'_> {
             stages: stage_rows(&stages),
             noise: noise.map(|noise| noise.map(|noise| noise * 1e6)),
             before_after: figures(over_time(&log, &stages, noise))?,
-            movements: movement_rows(dataset, &of_movements),
+            movements: movement_rows(dataset, &of_movements, zeros),
+            has_zeros,
             movements_max: MOVEMENTS_MAX,
-            by_movement: figures(last.map(|_| errors::by_movement(&of_movements)))?,
+            by_movement: figures(by_movement)?,
             residuals: figures(last.zip(noise).into_iter().flat_map(|(last, noise)| {
                 let against = residuals::against(&log, last, noise);
                 let spectrum = residuals::spectrum(&log, last, noise);
@@ -152,10 +161,6 @@ impl Source<'_> {
             }))?,
             search: figures(fit.and_then(|(fit, _)| fitting::search(&fit.solution.history)))?,
             parameters: report.map_or_else(Vec::new, |report| parameter_rows(report, stage)),
-            zeros: figures(report.filter(|r| r.delta == "fit").map(|report| {
-                let range = stage.search.delta_m;
-                fitting::zero_deviations(&report.zero_deviations, [range.low, range.high])
-            }))?,
         };
         Ok(render("report.html", include_str!("report.html"), &page)?)
     }
@@ -167,3 +172,7 @@ fn over_time(log: &Log, stages: &[Errors], noise: Option<[f64; 3]>) -> Vec<Chart
     let chart = |(k, stage)| errors::over_time(log, stage, noise.filter(|_| k == last));
     stages.iter().enumerate().map(chart).collect()
 }
+
+#[cfg(test)]
+#[path = "page_tests.rs"]
+mod tests;

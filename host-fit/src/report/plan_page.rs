@@ -1,10 +1,12 @@
 //! The page of a planned run: its figures, the trajectory, and the errors along it.
 
+use super::axis::Axis;
 use super::chart::{Chart, Mark, Panel, Scale, Tone};
 use super::html::{PageError, STYLE, render};
 use super::plan::{LABELS, PlanReport};
 use super::plots::PlotError;
 use crate::plan::Plan;
+use crate::problem::terms::shown;
 use serde::Serialize;
 
 /// Points of a line of the trajectory.
@@ -20,6 +22,8 @@ pub struct PlanPage<'a> {
     pub report: &'a PlanReport,
     /// Label, error, floor and ratio of the planar axes.
     pub service: [(&'static str, f64, f64, f64); 3],
+    /// Name of each parameter, its standard error with the unit, and the part of its prior.
+    pub parameters: Vec<(&'a str, f64, &'static str, Option<f64>)>,
     /// Plots of the axes over time, three by three.
     pub trajectory: [String; 2],
     /// Plot of the errors that the parameters leave, over time.
@@ -61,13 +65,17 @@ impl<'a> PlanPage<'a> {
             Chart {
                 caption: caption.to_owned(),
                 x_label: "time, s".to_owned(),
-                x: (0.0, run.seconds),
-                x_logarithmic: false,
+                x: Axis::Linear(0.0, run.seconds),
                 panels: lines.map(panel).into(),
             }
             .svg()
         };
+        let parameters = report.parameters.iter().map(|(name, parameter)| {
+            let (error, unit) = shown(parameter.standard_error, parameter.unit);
+            (name.as_str(), error, unit, parameter.of_prior)
+        });
         Ok(Self {
+            parameters: parameters.collect(),
             style: STYLE,
             report,
             service: report.service_rows(),

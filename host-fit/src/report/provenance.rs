@@ -64,7 +64,10 @@ impl Provenance {
             let rows: usize = movements.clone().map(|m| m.rows.len()).sum();
             self.inputs.push(Input {
                 name: log.path.display().to_string(),
-                what: format!("log, {rows} rows in {} movements", movements.count()),
+                what: match movements.count() {
+                    1 => format!("log, {rows} rows in one movement"),
+                    count => format!("log, {rows} rows in {count} movements"),
+                },
                 sha256: match dataset.logs.len() {
                     1 => hash.clone(),
                     _ => String::new(),

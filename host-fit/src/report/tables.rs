@@ -1,12 +1,13 @@
 //! The tables of a report, with the units and digits that a reader wants.
 
 use super::before_after::Errors;
-use super::json::Report;
+use super::json::{MovementZero, Report};
 use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
 use crate::judge::statistics::PoseError;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
+use crate::problem::terms::shown;
 use crate::solve::field::terms::{BEYOND_MODEL_31, PER_PROBE, name};
 use runtime::ModelKind;
 use serde::Serialize;
@@ -42,9 +43,11 @@ pub(super) fn stage_rows(stages: &[Errors]) -> Vec<StageRow> {
 
 /// One movement.
 #[derive(Clone, Debug, Serialize)]
-pub struct MovementRow {
+pub struct MovementRow<'a> {
     /// Its name.
-    pub name: String,
+    pub name: &'a str,
+    /// Its zero deviation.
+    pub zero: &'a MovementZero,
     /// Its rows.
     pub rows: usize,
     /// Mean of Z (um), Rx, Ry (urad).
@@ -53,19 +56,26 @@ pub struct MovementRow {
     pub axes: [[f64; 2]; 3],
 }
 
-/// The movements with their errors.
-pub(super) fn movement_rows(dataset: &Dataset, errors: &[PoseError]) -> Vec<MovementRow> {
+/// The movements with their errors and zero deviations.
+pub(super) fn movement_rows<'a>(
+    dataset: &Dataset,
+    errors: &[PoseError],
+    zeros: &'a [MovementZero],
+) -> Vec<MovementRow<'a>> {
     let mean = |rows: &[Row], axis: usize| {
         let sum: f64 = rows.iter().map(|row| row.vertical[axis]).sum();
-        sum / rows.len() as f64 * 1e6
+        // Plus zero makes no minus zero.
+        (sum / rows.len() as f64 * 1e6).round() + 0.0
     };
-    let movements = dataset.movements.iter().zip(errors).take(MOVEMENTS_MAX);
+    let movements = dataset.movements.iter().zip(errors).zip(zeros);
     movements
-        .map(|(movement, errors)| MovementRow {
-            name: dataset.movement_name(movement),
+        .take(MOVEMENTS_MAX)
+        .map(|((movement, errors), zero)| MovementRow {
+            name: &zero.movement,
             rows: movement.rows.len(),
             setting: [0, 1, 2].map(|axis| mean(&dataset.rows[movement.rows.clone()], axis)),
             axes: micro(errors),
+            zero,
         })
         .collect()
 }
@@ -98,10 +108,7 @@ pub(super) fn parameter_rows(report: &Report, stage: &Stage) -> Vec<ParameterRow
     let row = |(term, probe): (usize, usize)| {
         let name = name(probe * PER_PROBE + term);
         let parameter = report.parameters.get(&name)?;
-        let (scale, unit) = match parameter.unit {
-            "rad" => (180.0 / std::f64::consts::PI, "deg"),
-            unit => (1.0, unit),
-        };
+        let (scale, unit) = shown(1.0, parameter.unit);
         let value = parameter.value * scale;
         let designed = designed.get(&name).map_or(0.0, |value| value * scale);
         let error = parameter.standard_error.map(|error| error * scale);

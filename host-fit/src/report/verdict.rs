@@ -1,5 +1,6 @@
 //! The verdict of a report: one sentence that says whether the calibration can be used.
 
+use super::field::ByAxis;
 use super::json::{Errors, Report};
 use crate::diagnose::finding::{Finding, Severity};
 use serde::Serialize;
@@ -22,35 +23,34 @@ pub enum End<'a> {
     Written,
     /// With the best so far in the blob; the log was not diagnosed.
     Interrupted,
-    /// Without a blob, for this reason; findings that refuse go before it.
+    /// Without a blob, for this reason.
     Failed(&'a str),
 }
 
 /// X and Y in um, Rz in urad.
 fn three([x, y, rz]: [f64; 3]) -> String {
-    format!("{x:.2} um in X, {y:.2} um in Y and {rz:.2} urad in Rz")
+    format!("{x:.2} um, {y:.2} um, {rz:.2} urad")
 }
 
-fn accuracy(errors: &Errors, noise: [f64; 3], report: &Report) -> String {
-    let Errors { x, y, rz } = errors;
+/// How large the errors are, beside what noise gives, and what is predicted for service.
+fn accuracy(report: &Report, noise: [f64; 3]) -> String {
+    let Errors { x, y, rz } = report.errors;
     let mut words = format!(
-        "errors over all {} rows are {} rms ({} at their peak), where noise from row to row gives {}",
-        report.rows,
+        "errors in X, Y, Rz of {} rms over all {} rows (peaks {}); noise from row to row {}",
         three([x.rmse_um, y.rmse_um, rz.rmse_urad]),
+        report.rows,
         three([x.peak_um, y.peak_um, rz.peak_urad]),
         three(noise.map(|noise| noise * 1e6)),
     );
-    let predicted = report.field.as_ref().and_then(|field| {
-        let mean = |p: &&super::field::PosePrediction| p.place.starts_with("mean");
-        field.pose_uncertainty.iter().find(mean)
-    });
-    if let Some(predicted) = predicted {
-        let of = |by: &super::field::ByAxis| three([by.x_um, by.y_um, by.rz_urad]);
-        words += &format!(
-            "; predicted in service: {} by the parameters, {} by the noise of the probes (standard deviations)",
-            of(&predicted.systematic),
-            of(&predicted.noise)
-        );
+    if let Some(field) = &report.field {
+        let of = |by: ByAxis| three([by.x_um, by.y_um, by.rz_urad]);
+        for predicted in &field.pose_uncertainty {
+            words += &format!(
+                "; {} the parameters add {}",
+                predicted.place,
+                of(predicted.systematic)
+            );
+        }
     }
     words + "."
 }
@@ -58,28 +58,24 @@ fn accuracy(errors: &Errors, noise: [f64; 3], report: &Report) -> String {
 impl Verdict {
     /// Of a run; of its fit the figures, and the noise of its errors from row to row (m, m, rad).
     pub fn new(end: End, findings: &[Finding], fit: Option<(&Report, [f64; 3])>) -> Self {
-        let of = |severity| findings.iter().filter(move |f| f.severity == severity);
-        let sentence = fit.map(|(report, noise)| accuracy(&report.errors, noise, report));
+        let of = |severity| findings.iter().filter(|f| f.severity == severity).count();
+        let sentence = fit.map(|(report, noise)| accuracy(report, noise));
         let verdict = |mark, word: &str| Self {
             mark,
             word: word.to_owned(),
             sentence: sentence.unwrap_or_default(),
         };
-        let refusal = of(Severity::Refuse).next();
-        match (end, refusal, of(Severity::Warn).count()) {
-            (End::Failed(failure), ..) => {
-                let why = refusal.map_or(failure, |finding| &finding.message);
-                Self {
-                    mark: "refuse",
-                    word: "Refused".to_owned(),
-                    sentence: format!("no parameter blob was written: {why}."),
-                }
-            }
+        match (end, of(Severity::Refuse), of(Severity::Warn)) {
+            (End::Failed(why), ..) => Self {
+                mark: "refuse",
+                word: "Refused".to_owned(),
+                sentence: format!("no parameter blob was written: {why}."),
+            },
             (End::Interrupted, ..) => verdict("warn", "Interrupted, the best so far"),
-            (End::Written, Some(_), _) => verdict("refuse", "Written in spite of a refusal"),
-            (End::Written, None, 0) => verdict("good", "Good"),
-            (End::Written, None, 1) => verdict("warn", "Good, with a warning"),
-            (End::Written, None, n) => verdict("warn", &format!("Good, with {n} warnings")),
+            (End::Written, 1.., _) => verdict("refuse", "Written in spite of a refusal"),
+            (End::Written, 0, 0) => verdict("good", "Good"),
+            (End::Written, 0, 1) => verdict("warn", "Good, with a warning"),
+            (End::Written, 0, n) => verdict("warn", &format!("Good, with {n} warnings")),
         }
     }
 }

@@ -2,25 +2,15 @@
 
 use super::{Log, MOVEMENTS_SHOWN, PLANAR};
 use crate::judge::statistics::{ErrorSums, PoseError};
+use crate::report::axis::Axis;
 use crate::report::before_after::Errors;
 use crate::report::chart::{Chart, Mark, Panel, Scale, Tone};
 use crate::report::series::lines;
 
-/// The band of the noise: two standard deviations.
-pub(super) const BAND: f64 = 2.0;
-
-/// The errors of X, Y, Rz over time, with the band of the noise behind those of the fit.
+/// The errors of X, Y, Rz over time, with the band of the noise, if it is given.
 pub(in crate::report) fn over_time(log: &Log, errors: &Errors, noise: Option<[f64; 3]>) -> Chart {
-    let end_s = log.times_s.last().copied().unwrap_or(0.0);
-    let bands = [0, 1, 2].map(|axis| {
-        let half = BAND * noise?[axis] * 1e6;
-        Some(Mark::Band(
-            Tone::Noise,
-            vec![(0.0, -half, half), (end_s, -half, half)],
-        ))
-    });
     let of = |row: usize, axis: usize| Some(errors.by_row[row]?[axis] * 1e6);
-    log.over_time(format!("Errors with {}", errors.title), PLANAR, bands, of)
+    log.over_time(format!("Errors with {}", errors.title), PLANAR, noise, of)
 }
 
 /// rms and peak of each movement.
@@ -52,8 +42,7 @@ pub(in crate::report) fn by_movement(movements: &[PoseError]) -> Chart {
     Chart {
         caption: "rms error of each movement".to_owned(),
         x_label: "movement, in the order of the logs".to_owned(),
-        x: (0.5, movements.len() as f64 + 0.5),
-        x_logarithmic: false,
+        x: Axis::Linear(0.5, movements.len() as f64 + 0.5),
         panels: [0, 1, 2].map(panel).into(),
     }
 }
@@ -110,8 +99,7 @@ pub(in crate::report) fn distribution(errors: &Errors) -> Chart {
     Chart {
         caption: "Density of the errors, and of a normal distribution".to_owned(),
         x_label: "error / rms".to_owned(),
-        x: (-REACH, REACH),
-        x_logarithmic: false,
+        x: Axis::Linear(-REACH, REACH),
         panels: [0, 1, 2].map(panel).into(),
     }
 }

@@ -1,6 +1,7 @@
 //! The course of the search, and the zero deviations.
 
 use super::errors::over_movements;
+use crate::report::axis::Axis;
 use crate::report::chart::{Chart, Mark, Panel, Scale, Tone};
 use crate::report::json::MovementZero;
 use crate::report::series::lines;
@@ -35,8 +36,7 @@ pub(in crate::report) fn search(history: &[Checkpoint]) -> Option<Chart> {
     (last > first).then(|| Chart {
         caption: "Course of the search: best fitness on the rows that it used, and the mutation probability p".to_owned(),
         x_label: "evaluations".to_owned(),
-        x: (first, last),
-        x_logarithmic: false,
+        x: Axis::Linear(first, last),
         panels,
     })
 }
@@ -58,8 +58,7 @@ pub(in crate::report) fn zero_deviations(zeros: &[MovementZero], range_m: [f64; 
     Chart {
         caption: "Zero deviations, and the ends of their range".to_owned(),
         x_label: "movement, in the order of the logs".to_owned(),
-        x: (0.5, end),
-        x_logarithmic: false,
+        x: Axis::Linear(0.5, end),
         panels: [0, 1, 2].map(panel).into(),
     }
 }

@@ -12,11 +12,14 @@ pub(super) mod fitting;
 pub(super) mod residuals;
 pub(super) mod signals;
 
+use super::axis::Axis;
 use super::chart::{Chart, Mark, Panel, Scale, Tone};
 use crate::input::dataset::Dataset;
 
 /// X, Y, Rz as errors are shown.
 const PLANAR: [&str; 3] = ["X, um", "Y, um", "Rz, urad"];
+/// Half the width of the band of the noise, standard deviations.
+const BAND: f64 = 2.0;
 /// Movements up to which their borders and bars can be told apart.
 const MOVEMENTS_SHOWN: usize = 150;
 
@@ -43,29 +46,39 @@ impl Log<'_> {
         &self,
         caption: String,
         labels: [&str; 3],
-        behind: [Option<Mark>; 3],
+        noise: Option<[f64; 3]>,
         of: impl Fn(usize, usize) -> Option<f64>,
     ) -> Chart {
-        let panel = |(k, behind): (usize, Option<Mark>)| {
+        let end_s = self.times_s.last().map_or(self.period_s, |&end_s| end_s);
+        let end_s = end_s.max(self.period_s);
+        let panel = |k: usize| {
             let lines = super::series::lines(&self.times_s, |row| of(row, k));
             let lines = lines.into_iter().map(|line| Mark::Line(Tone::Data, line));
+            let band = noise
+                .into_iter()
+                .flat_map(|noise| noise_band((0.0, end_s), noise[k]));
             Panel {
                 label: labels[k].to_owned(),
                 scale: Scale::Symmetric,
-                marks: behind
-                    .into_iter()
-                    .chain([self.borders()])
+                marks: std::iter::once(self.borders())
                     .chain(lines)
+                    .chain(band)
                     .collect(),
             }
         };
-        let end_s = self.times_s.last().copied().unwrap_or(0.0);
         Chart {
             caption,
             x_label: "time, s".to_owned(),
-            x: (0.0, end_s.max(self.period_s)),
-            x_logarithmic: false,
-            panels: behind.into_iter().enumerate().map(panel).collect(),
+            x: Axis::Linear(0.0, end_s),
+            panels: [0, 1, 2].map(panel).into(),
         }
     }
+}
+
+/// Both ends of the band of the noise (m or rad), in um or urad, between two abscissae.
+fn noise_band((left, right): (f64, f64), noise: f64) -> [Mark; 2] {
+    [-1.0, 1.0].map(|side| {
+        let end = side * BAND * noise * 1e6;
+        Mark::Line(Tone::Second, vec![(left, end), (right, end)])
+    })
 }

@@ -1,9 +1,9 @@
 //! What the fit leaves, against everything that it may depend on, and its spectrum.
 
-use super::errors::BAND;
-use super::{Log, PLANAR};
+use super::{BAND, Log, PLANAR, noise_band};
 use crate::diagnose::signals::Spectrum;
 use crate::input::dataset::Row;
+use crate::report::axis::Axis;
 use crate::report::before_after::Errors;
 use crate::report::chart::{Chart, Mark, Panel, Scale, Tone};
 use crate::report::series::{Bin, bins};
@@ -13,7 +13,7 @@ use std::ops::Range;
 const BINS: usize = 40;
 /// Longest and shortest window of the spectrum, rows.
 const WINDOW_MAX: usize = 4096;
-const WINDOW_MIN: usize = 64;
+const WINDOW_MIN: usize = 32;
 /// Points of a spectrum, evenly over its logarithm.
 const POINTS: f64 = 250.0;
 
@@ -32,7 +32,7 @@ const QUANTITIES: [Quantity; 9] = [
     ("signal C, um", |row| row.signal_m[2] * 1e6),
 ];
 
-/// Mean and standard deviation of the errors against the pose and the signals, over the band of the
+/// Mean and standard deviation of the errors against the pose and the signals, beside the band of the
 /// noise; one chart for each quantity that the log moves.
 pub(in crate::report) fn against(log: &Log, errors: &Errors, noise: [f64; 3]) -> Vec<Chart> {
     let chart = |&(name, of): &Quantity| {
@@ -48,23 +48,22 @@ pub(in crate::report) fn against(log: &Log, errors: &Errors, noise: [f64; 3]) ->
                 .zip(errors)
                 .filter_map(|(x, error)| Some((x, error?)));
             let bins = bins(points, (low, high), BINS);
-            let half = BAND * noise[axis] * 1e6;
+            let marks = vec![
+                Mark::Band(Tone::Data, bins.iter().map(spread).collect()),
+                Mark::Line(Tone::Data, bins.iter().map(Bin::mean).collect()),
+                Mark::Dots(Tone::Data, bins.iter().map(Bin::mean).collect()),
+            ];
+            let band = noise_band((low, high), noise[axis]);
             Panel {
                 label: PLANAR[axis].to_owned(),
                 scale: Scale::Symmetric,
-                marks: vec![
-                    Mark::Band(Tone::Noise, vec![(low, -half, half), (high, -half, half)]),
-                    Mark::Band(Tone::Data, bins.iter().map(spread).collect()),
-                    Mark::Line(Tone::Data, bins.iter().map(Bin::mean).collect()),
-                    Mark::Dots(Tone::Data, bins.iter().map(Bin::mean).collect()),
-                ],
+                marks: marks.into_iter().chain(band).collect(),
             }
         };
         (high > low).then(|| Chart {
             caption: format!("Errors against {}", name.split(',').next().unwrap_or(name)),
             x_label: name.to_owned(),
-            x: (low, high),
-            x_logarithmic: false,
+            x: Axis::Linear(low, high),
             panels: [0, 1, 2].map(panel).into(),
         })
     };
@@ -113,8 +112,7 @@ pub(in crate::report) fn spectrum(log: &Log, errors: &Errors, noise: [f64; 3]) -
     Some(Chart {
         caption: "Amplitude spectral density of the errors, and that of white noise".to_owned(),
         x_label: "frequency, Hz".to_owned(),
-        x: (lowest_hz, highest_hz),
-        x_logarithmic: true,
+        x: Axis::Logarithmic(lowest_hz, highest_hz),
         panels: [0, 1, 2].map(panel).into(),
     })
 }

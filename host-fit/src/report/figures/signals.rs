@@ -8,9 +8,7 @@ pub(in crate::report) fn charts(log: &Log) -> Vec<Chart> {
     let rows = &log.dataset.rows;
     let micro = |x: f64| Some(x * 1e6);
     let chart = |caption: &str, labels, of: &dyn Fn(usize, usize) -> f64| {
-        log.over_time(caption.to_owned(), labels, [None, None, None], |row, k| {
-            micro(of(row, k))
-        })
+        log.over_time(caption.to_owned(), labels, None, |row, k| micro(of(row, k)))
     };
     vec![
         chart(
