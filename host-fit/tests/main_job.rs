@@ -103,7 +103,7 @@ fn the_report_page_shows_the_figures_of_the_fit_and_escapes_every_text() {
     );
     assert!(page.contains(&all), "{all}");
     let eta = &figures["parameters"]["eta_b"];
-    let row = format!("<td>eta_b</td><td>{:.5}", number(&eta["value"]));
+    let row = format!("<td>eta_b</td><td>{:.6}</td>", number(&eta["value"]));
     assert!(page.contains(&row), "{row}");
 }
 

@@ -106,7 +106,10 @@ mod tests {
             let verdict = Verdict::new(End::Written, findings, None);
             (verdict.mark, verdict.word)
         };
-        assert_eq!(verdict(&[note.clone()]), ("good", "Good".to_owned()));
+        assert_eq!(
+            verdict(std::slice::from_ref(&note)),
+            ("good", "Good".to_owned())
+        );
         let one = verdict(&[warn.clone(), note]);
         assert_eq!(one, ("warn", "Good, with a warning".to_owned()));
         assert_eq!(verdict(&[warn.clone(), warn]).1, "Good, with 2 warnings");
