@@ -1,4 +1,4 @@
-//! The axes of charts: linear, or logarithmic with marks at 1, 2 and 5 of each decade.
+//! The axes of charts: linear, or logarithmic with marks at 1, 2 and 5 of each decade where there are few.
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
@@ -48,10 +48,10 @@ impl Ranged for Axis {
             return self.linear().key_points(hint);
         };
         let decades = high.log10() - low.log10();
-        let digits: &[f64] = if decades <= DECADES_MARKED {
-            &[1.0, 2.0, 5.0]
-        } else {
-            &[1.0]
+        let digits: &[f64] = match decades {
+            _ if decades <= 1.0 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0],
+            _ if decades <= DECADES_MARKED => &[1.0, 2.0, 5.0],
+            _ => &[1.0],
         };
         let powers = low.log10().floor() as i32..=high.log10().ceil() as i32;
         powers
@@ -100,6 +100,8 @@ mod tests {
             [0.3, 3.0, 30.0].map(|x| axis.map(&x, (0, 100))),
             [0, 50, 100]
         );
+        let short = Axis::Logarithmic(0.049, 0.11).key_points(BoldPoints(9));
+        assert_eq!(short, [0.05, 0.06, 0.08, 0.1]);
         // What lies below it, such as a zero, stands at its end.
         assert_eq!(axis.map(&0.0, (0, 100)), 0);
         assert_eq!(

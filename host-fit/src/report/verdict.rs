@@ -1,6 +1,6 @@
 //! The verdict of a report: one sentence that says whether the calibration can be used.
 
-use super::field::ByAxis;
+use super::field::PosePrediction;
 use super::json::{Errors, Report};
 use crate::diagnose::finding::{Finding, Severity};
 use serde::Serialize;
@@ -43,14 +43,15 @@ fn accuracy(report: &Report, noise: [f64; 3]) -> String {
         three(noise.map(|noise| noise * 1e6)),
     );
     if let Some(field) = &report.field {
-        let of = |by: ByAxis| three([by.x_um, by.y_um, by.rz_urad]);
-        for predicted in &field.pose_uncertainty {
-            words += &format!(
-                "; {} the parameters add {}",
-                predicted.place,
-                of(predicted.systematic)
-            );
-        }
+        let add = |p: &PosePrediction| {
+            let by = p.systematic;
+            format!("{} ({})", three([by.x_um, by.y_um, by.rz_urad]), p.place)
+        };
+        let all: Vec<String> = field.pose_uncertainty.iter().map(add).collect();
+        words += &format!(
+            "; standard deviation that the parameters add to a pose {}",
+            all.join(", ")
+        );
     }
     words + "."
 }
