@@ -42,9 +42,14 @@ pub(in crate::report) fn by_movement(movements: &[PoseError]) -> Chart {
     Chart {
         caption: "rms error of each movement".to_owned(),
         x_label: "movement, in the order of the logs".to_owned(),
-        x: Axis::Linear(0.5, movements.len() as f64 + 0.5),
+        x: Axis::Linear(0.5, movement_end(movements.len())),
         panels: [0, 1, 2].map(panel).into(),
     }
+}
+
+/// Where an abscissa of movements ends: its marks are whole numbers from ten on.
+pub(super) fn movement_end(count: usize) -> f64 {
+    count.max(10) as f64 + 0.5
 }
 
 /// Bars over the movements from 1, or a line where there are too many.

@@ -1,6 +1,6 @@
 //! The course of the search, and the zero deviations.
 
-use super::errors::over_movements;
+use super::errors::{movement_end, over_movements};
 use crate::report::axis::Axis;
 use crate::report::chart::{Chart, Mark, Panel, Scale, Tone};
 use crate::report::json::MovementZero;
@@ -44,7 +44,7 @@ pub(in crate::report) fn search(history: &[Checkpoint]) -> Option<Chart> {
 /// The zero deviations of the three probes by movement, with the ends of their range (m).
 pub(in crate::report) fn zero_deviations(zeros: &[MovementZero], range_m: [f64; 2]) -> Chart {
     let of = |zero: &MovementZero, probe: usize| [zero.a_um, zero.b_um, zero.c_um][probe];
-    let end = zeros.len() as f64 + 0.5;
+    let end = movement_end(zeros.len());
     let panel = |probe: usize| {
         let [low, high] = range_m.map(|m| m * 1e6);
         let ends = [low, high].map(|um| Mark::Line(Tone::Noise, vec![(0.5, um), (end, um)]));
