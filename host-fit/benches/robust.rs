@@ -9,14 +9,12 @@ use host_fit::input::log::{ReadOptions, read_bytes};
 use host_fit::input::shipped::{LOG_GZ, RUN_GZ, SERVICE_GZ, STAGE_TOML};
 use host_fit::input::stage::Stage;
 use host_fit::judge::{Decoded, Zeros};
-use host_fit::problem::draw::Draw;
 use host_fit::problem::model::Model;
+use host_fit::solve::Solver;
 use host_fit::solve::robust::Loss;
-use host_fit::solve::{Projection, Solver, SolverOptions};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use runtime::ModelKind;
-use runtime::parameters::Text;
 use std::error::Error;
 use std::io::Read;
 
@@ -76,14 +74,9 @@ fn rms_in_service(
     loss: Loss,
 ) -> Fallible<[f64; 3]> {
     let settings = FitSettings {
-        model: ModelChoice::Named(Model::of(kind)),
-        train: None,
-        draw: Draw::Stratified,
         solver: Solver::Finished,
         loss,
-        options: SolverOptions::new(Projection::Linear, 1),
-        serial: Text::default(),
-        created: Text::default(),
+        ..FitSettings::new(ModelChoice::Named(Model::of(kind)))
     };
     let fit = fit(log, stage, &settings)?;
     let judged = Decoded::new(&fit.set, service).judge(service, stage, Zeros::None);

@@ -26,7 +26,7 @@ fn a_planned_run_is_written_told_and_can_be_rehearsed() {
     let parameters = json["parameters"].as_object().expect("by name");
     assert_eq!(parameters.len(), 81);
     let page = bench.text("report/index.html");
-    assert_eq!(page.matches("<svg").count(), 2);
+    assert_eq!(page.matches("<svg").count(), 3);
     assert!(page.contains("<td>Rz</td><td>500.0</td>"));
 
     bench.good("simulate --stage stage.toml --plan run.csv --seed 2 --out log.csv");

@@ -23,6 +23,7 @@ use crate::output::pose_file::PoseFileError;
 use crate::output::posterior_file::PosteriorFileError;
 use crate::plan::PlanError;
 use crate::recalibrate::RecalibrateError;
+use crate::report::html::PageError;
 use crate::report::plots::PlotError;
 use crate::simulate::plan_file::PlanFileError;
 use crate::simulate::recording::RecordError;
@@ -82,7 +83,7 @@ pub enum HostError {
     Plot(#[from] PlotError),
     /// The page of a report could not be made.
     #[error("cannot write the report: {0}")]
-    Page(#[from] minijinja::Error),
+    Page(#[from] PageError),
     /// A report could not be turned into JSON.
     #[error("cannot write the figures as JSON: {0}")]
     Json(#[from] serde_json::Error),

@@ -1,5 +1,6 @@
 //! `host-fit fit`.
 
+use self::told::{summary, write_report};
 use super::args::Train;
 use super::check::Checked;
 use super::limit::Limits;
@@ -9,7 +10,7 @@ use crate::diagnose;
 use crate::diagnose::finding::{Finding, Severity};
 use crate::fit::{Fit, FitError, FitSettings, ModelChoice, cross_validate, fit, fit_compensated};
 use crate::input::log;
-use crate::input::log::{BadRows, LogReading, ReadOptions};
+use crate::input::log::{BadRows, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
 use crate::output;
@@ -18,9 +19,8 @@ use crate::problem::draw::Draw;
 use crate::problem::model::MODELS;
 use crate::problem::parameters::Parameters;
 use crate::recalibrate::Known;
-use crate::report::html::{Page, Plot};
-use crate::report::json::{Choice, Circumstances, Report, of_fit};
-use crate::report::{plots, text};
+use crate::report::json::{Choice, Circumstances, of_fit};
+use crate::report::verdict::End;
 use crate::solve::robust::Loss;
 use crate::solve::{Projection, SolveError, Solver, SolverOptions};
 use clap::Args;
@@ -29,6 +29,8 @@ use runtime::ModelKind;
 use runtime::parameters::Text;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+mod told;
 
 /// The models on the command line, `auto` and those of the table.
 fn models() -> impl TypedValueParser<Value = ModelChoice> {
@@ -222,7 +224,18 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
             if let Some(path) = &args.json {
                 super::write_json(&Checked::new(&log, Err(&error), findings.clone()), path)?;
             }
-            return Err(super::check::failed(error, &findings));
+            let ended = super::check::failed(error, &findings);
+            let why = match (&ended, findings.first()) {
+                (HostError::Refused { .. }, Some(gravest)) => {
+                    diagnose::messages(&findings, gravest.severity)
+                }
+                (HostError::Fit(error) | HostError::FitDiagnosed { error, .. }, _) => {
+                    error.to_string()
+                }
+                _ => ended.to_string(),
+            };
+            write_report(args, (&log, &stage), &findings, None, End::Failed(&why))?;
+            return Err(ended);
         }
         Ok(fit) => fit,
     };
@@ -261,6 +274,9 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
             if let Some(path) = &args.json {
                 super::write_json(&report, path)?;
             }
+            let end = End::Failed(&cause);
+            let found = Some((&fit, &report));
+            write_report(args, (&log, &stage), &report.findings, found, end)?;
             terminal::tell(&report.findings);
             return Err(HostError::NotWritten { cause });
         }
@@ -273,10 +289,12 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
     }
-    if let Some(folder) = &args.report {
-        let names: Vec<String> = args.logs.iter().map(|p| p.display().to_string()).collect();
-        write_report(&report, &fit, &log, &names, folder)?;
-    }
+    let end = match interrupt::requested() {
+        true => End::Interrupted,
+        false => End::Written,
+    };
+    let found = Some((&fit, &report));
+    write_report(args, (&log, &stage), &report.findings, found, end)?;
     terminal::print(&summary(&fit, &report, &stage))?;
     let page = args.report.as_ref().map(|folder| folder.join("index.html"));
     let beside = posterior.filter(|_| fit.field.is_some());
@@ -337,77 +355,5 @@ fn check_field_arguments(args: &FitArgs) -> Result<(), HostError> {
             "--model field has a projection of its own; leave --project out",
         );
     }
-    Ok(())
-}
-
-/// The figures of a fit for a terminal.
-fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
-    let parameters = text::parameters(
-        fit.model,
-        &fit.solution.parameters,
-        &Parameters::designed(stage),
-        &fit.standard_error,
-        None,
-    );
-    let beyond = match (&fit.field, &report.field) {
-        (Some(field), Some(report)) => text::field(field) + &report.as_text(),
-        _ => String::new(),
-    };
-    format!(
-        "{}, {} rows in {} movements, {} fitted, {} skipped; solver {}: {} evaluations in {:.1} ms, {}\n\
-         {}\n\
-         train fitness {:.4}\n\n{}\n{parameters}{beyond}\n{}{}",
-        fit.model.title(),
-        report.rows,
-        report.movements,
-        report.train_rows,
-        report.skipped_rows,
-        report.solver.as_deref().unwrap_or("-"),
-        fit.solution.evaluations,
-        fit.solution.elapsed.as_secs_f64() * 1e3,
-        fit.solution.stopped,
-        report.model_reason.as_deref().unwrap_or("-"),
-        fit.train_fitness,
-        text::errors(
-            &format!("errors over all rows, {}", report.zeros_in_words),
-            &fit.judgement.errors,
-            None
-        ) + &report.by_log(),
-        text::lag(
-            fit.lag,
-            report.reference_lag.is_some_and(|lag| lag.compensated)
-        ),
-        text::trust(report),
-    )
-}
-
-/// Writes `index.html` into a folder, which is made if it is missing.
-fn write_report(
-    report: &Report,
-    fit: &Fit,
-    log: &LogReading,
-    names: &[String],
-    folder: &Path,
-) -> Result<(), HostError> {
-    let errors = (fit.decoded).errors_less(&fit.judgement.zeros, &log.dataset);
-    let plots = [
-        Plot {
-            caption: "Errors over the log",
-            svg: plots::errors_over_rows(report.zeros_in_words, &errors, &log.dataset)?,
-        },
-        Plot {
-            caption: "Distribution of the errors",
-            svg: plots::distribution("errors in units of their rms", &errors)?,
-        },
-    ];
-    output::make_folder(folder)?;
-    let page = Page {
-        report,
-        title: &report.model_title,
-        zeros: report.zeros_in_words,
-        logs: names,
-        plots: &plots,
-    };
-    output::write_atomically(&folder.join("index.html"), page.to_html()?.as_bytes())?;
     Ok(())
 }

@@ -5,6 +5,7 @@ use crate::cli::terminal;
 use crate::output::blob_file;
 use crate::problem::model::Model;
 use crate::report::json::parameters_in;
+use crate::report::provenance::hex;
 use clap::Args;
 use runtime::ParameterSet;
 use serde_json::json;
@@ -30,13 +31,6 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
         super::write_json(&as_json(&set), path)?;
     }
     terminal::print(&as_text(&set))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut out, byte| {
-        let _ = write!(out, "{byte:02x}");
-        out
-    })
 }
 
 fn as_json(set: &ParameterSet) -> serde_json::Value {

@@ -5,6 +5,7 @@ use super::warning;
 use crate::fit::{Fit, FitWarning};
 use crate::input::dataset::Dataset;
 use crate::judge::identify::check_described;
+use crate::judge::statistics::white_noise;
 use runtime::ModelKind;
 
 /// Errors beyond this many times their white noise are not the drift of an interferometer.
@@ -36,20 +37,7 @@ pub(super) fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     const AXES: [(&str, &str, &str); 3] =
         [("x", "X", "um"), ("y", "Y", "um"), ("rz", "Rz", "urad")];
     let errors = fit.decoded.errors_less(&fit.judgement.zeros, dataset);
-    let mut squares = [0.0; 3];
-    let mut count = 0.0;
-    for movement in &dataset.movements {
-        for three in errors[movement.rows.clone()].windows(3) {
-            let [Some(before), Some(here), Some(after)] = three else {
-                continue;
-            };
-            for axis in 0..3 {
-                squares[axis] += (before[axis] - 2.0 * here[axis] + after[axis]).powi(2);
-            }
-            count += 6.0;
-        }
-    }
-    let noise = squares.map(|sum: f64| (sum / f64::max(count, 1.0)).sqrt().max(NOISE_MIN));
+    let noise = white_noise(&errors, &dataset.movements).map(|noise| noise.max(NOISE_MIN));
     let ratio = |axis: usize| fit.judgement.errors.axes[axis].rms / noise[axis];
     let worst = (0..3).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
     let (channel, axis, unit) = AXES[worst];

@@ -152,6 +152,7 @@ impl Job<'_> {
             delta_m: judgement.zeros.iter().map(|zero| zero.delta_m).collect(),
             cost,
             evaluations: first.evaluations + u64::from(field.iterations),
+            history: Vec::new(),
             elapsed,
             stopped: format!(
                 "maximum a posteriori reached {} steps after model (31)",

@@ -7,6 +7,7 @@ use crate::judge::lag::ReferenceLag;
 use crate::judge::statistics::AxisError;
 use crate::problem::Problem;
 use crate::problem::model::ParameterId;
+use crate::problem::terms::shown;
 use crate::solve::Solution;
 
 /// Something that the user should know of a fit that is good nevertheless.
@@ -14,8 +15,8 @@ use crate::solve::Solution;
 pub enum FitWarning {
     /// A parameter stands at an end of its search range.
     #[error(
-        "{} stands at an end of its search range or beyond ({value:.6} {}): widen the range in stage.toml, or check the log",
-        id.name(), id.term.unit
+        "{} stands at an end of its search range or beyond ({:.6} {}): widen the range in stage.toml, or check the log",
+        id.name(), shown(*value, id.term.unit).0, shown(*value, id.term.unit).1
     )]
     AtLimit {
         /// The parameter.

@@ -1,4 +1,6 @@
-//! Errors of decoded poses against the reference: rms and peak by axis.
+//! Errors of decoded poses against the reference: rms and peak by axis, and their noise.
+
+use crate::input::dataset::Movement;
 
 /// rms and peak of one axis, m or rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -62,6 +64,25 @@ impl PoseError {
         let squares: f64 = self.axes.iter().map(|a| (a.rms * 1e6).powi(2)).sum();
         (squares / 3.0).sqrt()
     }
+}
+
+/// The noise of errors from row to row, m, m, rad: the rms of their second differences within the
+/// movements over the root of 6, which neither an offset nor a slow error changes.
+pub fn white_noise(errors: &[Option<[f64; 3]>], movements: &[Movement]) -> [f64; 3] {
+    let mut squares = [0.0; 3];
+    let mut count = 0.0;
+    for movement in movements {
+        for three in errors[movement.rows.clone()].windows(3) {
+            let [Some(before), Some(here), Some(after)] = three else {
+                continue;
+            };
+            for axis in 0..3 {
+                squares[axis] += (before[axis] - 2.0 * here[axis] + after[axis]).powi(2);
+            }
+            count += 6.0;
+        }
+    }
+    squares.map(|sum: f64| (sum / f64::max(count, 1.0)).sqrt())
 }
 
 #[cfg(test)]

@@ -131,3 +131,12 @@ pub const MODEL_31: [Term; 6] = [
         fixed: 0.0,
     },
 ];
+
+/// A value of a term as people read it, with its unit: the misalignments in degrees, as in
+/// `stage.toml`, everything else in SI.
+pub fn shown(value: f64, unit: &'static str) -> (f64, &'static str) {
+    match unit {
+        "rad" => (value.to_degrees(), "deg"),
+        _ => (value, unit),
+    }
+}

@@ -1,47 +1,29 @@
-//! The report of a fit as one HTML file with its plots inside, so that it can be mailed.
-//!
-//! The template is `report.html`; its name makes the engine escape every text.
+//! Pages from templates. A template's name ends in `.html`, so that every text is escaped.
 
-use super::json::Report;
+use super::plots::PlotError;
+use crate::output::OutputError;
 use minijinja::value::Serde;
 use minijinja::{Environment, Error, UndefinedBehavior};
 use serde::Serialize;
 
-/// What the page shows.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Page<'a> {
-    /// The figures of a fit.
-    pub report: &'a Report,
-    /// Name of the model.
-    pub title: &'a str,
-    /// How zero deviations were treated.
-    pub zeros: &'a str,
-    /// Names of the logs.
-    pub logs: &'a [String],
-    /// The plots.
-    pub plots: &'a [Plot],
+/// The style of every page: it stands in the page, which so is complete in one file.
+pub(super) const STYLE: &str = include_str!("style.css");
+
+/// Why there is no page.
+#[derive(Debug, thiserror::Error)]
+pub enum PageError {
+    /// A plot could not be drawn.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    /// The template names something that is not there.
+    #[error("the template of the report: {0}")]
+    Template(#[from] Error),
+    /// The page was not written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }
 
-/// A plot of the page.
-#[derive(Clone, Debug, Serialize)]
-pub struct Plot {
-    /// What stands above it.
-    pub caption: &'static str,
-    /// The plot, which alone goes into the page without escaping.
-    pub svg: String,
-}
-
-impl Page<'_> {
-    /// The page as HTML.
-    ///
-    /// # Errors
-    /// [`Error`] when the template names something that is not there.
-    pub fn to_html(&self) -> Result<String, Error> {
-        render("report.html", include_str!("report.html"), self)
-    }
-}
-
-/// A template filled in; `name` ends in `.html`, so that every text is escaped.
+/// A template filled in.
 pub(super) fn render(
     name: &str,
     template: &str,
@@ -49,8 +31,5 @@ pub(super) fn render(
 ) -> Result<String, Error> {
     let mut engine = Environment::new();
     engine.set_undefined_behavior(UndefinedBehavior::Strict);
-    engine.add_filter("scientific", |number: Option<f64>| {
-        number.map_or_else(|| "-".to_owned(), |x| format!("{x:.2e}"))
-    });
     engine.render_named_str(name, template, Serde(context))
 }

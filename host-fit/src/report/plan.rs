@@ -2,6 +2,7 @@
 
 use crate::input::stage::{AXES, Stage};
 use crate::plan::Plan;
+use crate::problem::terms::shown;
 use crate::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -201,11 +202,12 @@ impl PlanReport {
         );
         for (k, term) in TERMS.iter().enumerate() {
             let _ = write!(out, "  {:<14}", term.name);
+            let (scale, unit) = shown(1.0, term.unit);
             for probe in 0..3 {
                 let error = self.parameters[&name(probe * PER_PROBE + k)].standard_error;
-                let _ = write!(out, "{error:>11.1e}");
+                let _ = write!(out, "{:>11.1e}", error * scale);
             }
-            let _ = writeln!(out, "  {}", term.unit);
+            let _ = writeln!(out, "  {unit}");
         }
         out.push_str("\n  least determined:");
         for (k, name) in self.least_determined.iter().enumerate() {

@@ -4,7 +4,8 @@ use crate::diagnose::trusted::Trusted;
 use crate::judge::lag::ReferenceLag;
 use crate::judge::statistics::PoseError;
 use crate::problem::model::{COUNT, Model};
-use crate::problem::parameters::{ETA, Parameters, THETA};
+use crate::problem::parameters::Parameters;
+use crate::problem::terms::shown;
 use crate::report::json::Report;
 use crate::solve::field::fit::FieldFit;
 use crate::solve::field::terms::{BEYOND_MODEL_31, PER_PROBE, TERMS};
@@ -59,11 +60,7 @@ pub fn parameters(
     );
     for id in model.parameters() {
         let k = id.index;
-        let (scale, unit) = if (THETA..ETA).contains(&k) {
-            (180.0 / std::f64::consts::PI, "deg")
-        } else {
-            (1.0, id.term.unit)
-        };
+        let (scale, unit) = shown(1.0, id.term.unit);
         let error =
             standard_error[k].map_or_else(|| "-".to_owned(), |e| format!("{:.2e}", e * scale));
         let digits = if id.is_slope() { 3 } else { 6 };

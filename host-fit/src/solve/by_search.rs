@@ -90,6 +90,7 @@ pub fn solve_finished(
     starts.push(middle_of_the_box(problem));
     let mut solution = multistart::solve_from(&starts, problem, options)?;
     solution.evaluations += found.evaluations as u64;
+    solution.history = found.history;
     solution.stopped = format!("search: {}; finish: {}", found.reason, solution.stopped);
     Ok(solution)
 }
@@ -157,6 +158,7 @@ pub fn solution_of(
         parameters,
         cost: fitness * fitness * 3.0 * problem.rows.len() as f64,
         evaluations: found.evaluations as u64,
+        history: found.history.clone(),
         elapsed: std::time::Duration::ZERO,
         stopped: format!(
             "{}; {} of {} evaluations had no cost",

@@ -19,6 +19,7 @@ use crate::problem::Problem;
 use crate::problem::model::ParameterId;
 use crate::problem::parameters::Parameters;
 use search::kind::SearchKind;
+use search::run::Checkpoint;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -142,6 +143,8 @@ pub struct Solution {
     pub cost: f64,
     /// Evaluations of the cost.
     pub evaluations: u64,
+    /// The course of the search, the first population and every generation; empty without one.
+    pub history: Vec<Checkpoint>,
     /// Time that the solver took.
     pub elapsed: Duration,
     /// Why it stopped, for the report.

@@ -193,7 +193,8 @@ fn channels(rows: &[Row], stage: &Stage) -> Vec<Channel> {
     channels
 }
 
-fn period_s(rows: &[Row], segments: &[Range<usize>], servo_period_s: f64) -> f64 {
+/// Median time between the rows of the segments, s; that of the servo where there are too few.
+pub(crate) fn period_s(rows: &[Row], segments: &[Range<usize>], servo_period_s: f64) -> f64 {
     let steps = (segments.iter()).flat_map(|s| rows[s.clone()].windows(2));
     let mut steps_us: Vec<i64> = steps.map(|pair| pair[1].t_us - pair[0].t_us).collect();
     if steps_us.is_empty() {
@@ -203,7 +204,8 @@ fn period_s(rows: &[Row], segments: &[Range<usize>], servo_period_s: f64) -> f64
     (*steps_us.select_nth_unstable(middle).1 as f64 * 1e-6).max(1e-6)
 }
 
-fn times_s(rows: &[Row], segments: &[Range<usize>], period_s: f64) -> Vec<f64> {
+/// Time since the first row, s; a movement whose time starts anew follows the one before.
+pub(crate) fn times_s(rows: &[Row], segments: &[Range<usize>], period_s: f64) -> Vec<f64> {
     let mut times_s: Vec<f64> = Vec::with_capacity(rows.len());
     for segment in segments {
         let rows_here = &rows[segment.clone()];

@@ -51,7 +51,7 @@ pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
     if length < ROWS_MIN {
         return Vec::new();
     }
-    let windows = windows(log, length);
+    let windows = windows(&log.segments, length);
     let raw: Vec<Spectrum> = (log.channels.iter())
         .map(|channel| Spectrum::new(&channel.values, &windows))
         .collect();

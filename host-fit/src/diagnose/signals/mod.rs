@@ -38,6 +38,9 @@ use crate::input::stage::Stage;
 use channels::LogSignals;
 use residual::Residuals;
 
+pub(crate) use channels::{period_s, times_s};
+pub(crate) use spectrum::{Spectrum, windows};
+
 /// Fewest rows of a log whose residuals are tested.
 const ROWS_MIN: usize = 1000;
 

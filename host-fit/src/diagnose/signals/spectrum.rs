@@ -1,6 +1,6 @@
 //! Mean power spectra of the signals of a log.
 
-use super::channels::{LogSignals, median};
+use super::channels::median;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
@@ -11,8 +11,8 @@ const SIDE: usize = 20;
 /// How far outside the noise a line is, in standard deviations of a normal number.
 const LINE_MIN: f64 = 6.5;
 
-/// The windows of a log: pieces of its segments of equal length.
-pub(super) fn windows(log: &LogSignals, length: usize) -> Vec<Range<usize>> {
+/// Pieces of segments of equal length.
+pub(crate) fn windows(segments: &[Range<usize>], length: usize) -> Vec<Range<usize>> {
     let of = |segment: &Range<usize>| {
         let starts = segment.clone().step_by(length);
         let end = segment.end;
@@ -20,19 +20,21 @@ pub(super) fn windows(log: &LogSignals, length: usize) -> Vec<Range<usize>> {
             .map(move |start| start..start + length)
             .filter(move |w| w.end <= end)
     };
-    log.segments.iter().flat_map(of).collect()
+    segments.iter().flat_map(of).collect()
 }
 
 /// Mean power over windows with a Hann taper.
-pub(super) struct Spectrum {
-    power: Vec<f64>,
-    windows: usize,
+pub(crate) struct Spectrum {
+    /// Mean squared magnitude of the transform, by bin; unit that of the values, squared.
+    pub(crate) power: Vec<f64>,
+    /// Windows that went in.
+    pub(crate) windows: usize,
     length: usize,
 }
 
 impl Spectrum {
     /// All windows have the same length.
-    pub(super) fn new(values: &[f64], windows: &[Range<usize>]) -> Self {
+    pub(crate) fn new(values: &[f64], windows: &[Range<usize>]) -> Self {
         let length = windows.first().map_or(2, Range::len);
         let transform = FftPlanner::new().plan_fft_forward(length);
         let taper: Vec<f64> = (0..length)

@@ -13,6 +13,7 @@ use super::whiten::{Noise, Normal};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
+use crate::problem::terms::shown;
 use crate::solve::robust::{HALF, Loss};
 use nalgebra::{DMatrix, DVector};
 
@@ -94,8 +95,9 @@ pub enum FieldFitError {
     Singular,
     /// A parameter came out far beyond its search range.
     #[error(
-        "{parameter} would be {value:.4} {unit}, far outside its search range from {low:.4} to {high:.4}: check the columns, \
-         the order and the signs of the sensors in the log and in stage.toml"
+        "{parameter} would be {:.4} {}, far outside its search range from {:.4} to {:.4}: check the columns, \
+         the order and the signs of the sensors in the log and in stage.toml",
+        shown(*value, unit).0, shown(*value, unit).1, shown(*low, unit).0, shown(*high, unit).0
     )]
     FarOff {
         /// Its name.

@@ -82,6 +82,7 @@ pub fn solve_from(
         parameters,
         cost: search.cost_with(&descent, &zeros),
         evaluations: search.evaluations,
+        history: Vec::new(),
         elapsed: Duration::ZERO,
         stopped: format!(
             "{}; {} of {} starts agree",
