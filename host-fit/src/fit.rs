@@ -18,6 +18,7 @@ use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
 use crate::judge::identify::{FitFailure, check_described, check_determined, check_motion};
 use crate::judge::lag::{ReferenceLag, reference_lag};
+use crate::judge::statistics::PoseError;
 use crate::judge::uncertainty::uncertainty;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::Problem;
@@ -167,7 +168,9 @@ pub struct Fit {
     pub decoded: Decoded,
     /// Over all rows, by the target's decoder; zero deviations refitted where the model has them.
     pub judgement: Judgement,
-    /// The same with the solver's own zero deviations.
+    /// Errors over the rows that are no outliers.
+    pub sound: PoseError,
+    /// Over all rows, with the solver's own zero deviations.
     pub judgement_solver_zeros: Judgement,
     /// What the user should know.
     pub warnings: Vec<FitWarning>,
@@ -312,6 +315,7 @@ impl<'a> Job<'a> {
             set,
             decoded,
             judgement,
+            sound,
         } = judged?;
         if !settings.force {
             determined?;
@@ -335,6 +339,7 @@ impl<'a> Job<'a> {
             set,
             decoded,
             judgement,
+            sound,
         })
     }
 
@@ -355,18 +360,17 @@ impl<'a> Job<'a> {
         let mut set = calibration.prepare(&origin).map_err(FitError::Unusable)?;
         let decoded = Decoded::new(&set, dataset);
         let judgement = decoded.judge(dataset, self.stage, Zeros::of_model(model));
-        let mut described = judgement.errors;
+        let mut sound = judgement.errors;
         if outliers(&self.selected, weights).next().is_some() {
-            let mut sound = decoded.clone();
+            let mut without = decoded.clone();
             for row in outliers(&self.selected, weights) {
-                sound.errors[row] = None;
+                without.errors[row] = None;
             }
-            described = sound
-                .judge(dataset, self.stage, Zeros::of_model(model))
-                .errors;
+            let zeros = Zeros::of_model(model);
+            sound = without.judge(dataset, self.stage, zeros).errors;
         }
         if !settings.force {
-            check_described(dataset, &described, model)?;
+            check_described(dataset, &sound, model)?;
         }
         let axes = judgement.errors.axes;
         set.fit = FitRecord {
@@ -380,6 +384,7 @@ impl<'a> Job<'a> {
             set,
             decoded,
             judgement,
+            sound,
         })
     }
 }
@@ -395,6 +400,7 @@ struct Judged {
     set: ParameterSet,
     decoded: Decoded,
     judgement: Judgement,
+    sound: PoseError,
 }
 
 /// The calibration that `parameters` make with the stage's scales, calibrated over the motion

@@ -33,10 +33,13 @@ use runtime::ParameterSet;
 /// Everything that is wrong with a log, the gravest first; `fitted` is what came of the fit to it.
 ///
 /// What follows from a cause that is named is left out: the terms of a fit to a log with exchanged
-/// channels are at their limits, and its errors are large.
+/// channels are at their limits, and its errors are large. Rows that the fit left out of account are
+/// for the tests of the signals alone.
 pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Vec<Finding> {
-    let mut findings = causes::causes(dataset, stage);
-    findings.extend(logs::disagreement(dataset, stage));
+    let outliers = fitted.map_or(&[][..], |fit| &fit.outliers);
+    let sound = dataset.without(outliers);
+    let mut findings = causes::causes(&sound, stage);
+    findings.extend(logs::disagreement(&sound, stage));
     let has_cause = is_explained(&findings);
     let errors = (fitted.ok()).map(|fit| fit.decoded.errors_less(&fit.judgement.zeros, dataset));
     findings.extend(signals::signal_findings(dataset, stage, errors.as_deref()));

@@ -24,7 +24,7 @@ pub(super) fn not_field(fit: &Fit) -> Option<Finding> {
 
 /// A fit that leaves most of the motion unexplained and was kept all the same.
 pub(super) fn undescribed(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
-    let failure = check_described(dataset, &fit.judgement.errors, fit.model).err()?;
+    let failure = check_described(dataset, &fit.sound, fit.model).err()?;
     Some(Finding {
         message: failure.to_string(),
         severity: Severity::Refuse,
@@ -38,10 +38,10 @@ pub(super) fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
         [("x", "X", "um"), ("y", "Y", "um"), ("rz", "Rz", "urad")];
     let errors = fit.decoded.errors_less(&fit.judgement.zeros, dataset);
     let noise = white_noise(&errors, &dataset.movements).map(|noise| noise.max(NOISE_MIN));
-    let ratio = |axis: usize| fit.judgement.errors.axes[axis].rms / noise[axis];
+    let ratio = |axis: usize| fit.sound.axes[axis].rms / noise[axis];
     let worst = (0..3).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
     let (channel, axis, unit) = AXES[worst];
-    let rms = fit.judgement.errors.axes[worst].rms * 1e6;
+    let rms = fit.sound.axes[worst].rms * 1e6;
     (ratio(worst) > ERROR_TO_NOISE_MAX).then(|| Finding {
         message: format!(
             "{} leaves {rms:.2} {unit} rms in {axis}, {:.1} times the noise from sample to sample: something in the log is not \

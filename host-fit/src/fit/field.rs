@@ -137,6 +137,7 @@ impl Job<'_> {
             set,
             decoded,
             judgement,
+            sound,
         } = self.judged(model, &calibration, &field.weights)?;
         // The fit follows the reference's walk; one zero deviation for a movement is that of the
         // judgement.
@@ -193,6 +194,7 @@ impl Job<'_> {
             set,
             decoded,
             judgement,
+            sound,
             field: Some(field),
         })
     }

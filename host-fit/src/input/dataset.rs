@@ -157,4 +157,36 @@ impl Dataset {
         }
         out
     }
+
+    /// All rows but some, given in ascending order; movements that lose all of theirs are left out.
+    /// Logs and hash stay those of the whole.
+    #[must_use]
+    pub fn without(&self, rows: &[usize]) -> Self {
+        let mut left_out = rows.iter().peekable();
+        let mut out = Self {
+            rows: Vec::with_capacity(self.rows.len()),
+            movements: Vec::new(),
+            logs: self.logs.clone(),
+            sha256: self.sha256,
+        };
+        for movement in &self.movements {
+            let (start, number) = (out.rows.len(), out.movements.len());
+            for row in movement.rows.clone() {
+                if left_out.next_if_eq(&&row).is_none() {
+                    out.rows.push(Row {
+                        movement: number,
+                        ..self.rows[row]
+                    });
+                }
+            }
+            let end = out.rows.len();
+            if end > start {
+                out.movements.push(Movement {
+                    rows: start..end,
+                    ..movement.clone()
+                });
+            }
+        }
+        out
+    }
 }
