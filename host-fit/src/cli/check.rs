@@ -3,13 +3,14 @@
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::diagnose;
-use crate::diagnose::finding::{Finding, Severity};
+use crate::diagnose::finding::{Code, Finding, Severity};
 use crate::diagnose::trusted::{Trusted, trusted};
 use crate::fit::{Fit, FitError, FitSettings, ModelChoice, fit};
 use crate::input::log;
 use crate::input::log::{LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
+use crate::judge::identify::FitFailure;
 use crate::report::text;
 use crate::solve::{Projection, SolverOptions};
 use clap::Args;
@@ -68,11 +69,18 @@ impl Checked {
 
 /// The end of a run whose fit failed, with what the diagnosis found.
 pub(super) fn failed(error: FitError, findings: &[Finding]) -> HostError {
-    let explained = diagnose::is_explained(findings);
+    let spoils = |found: &Finding| {
+        let harmless = [Code::TermsAtLimit, Code::Jitter, Code::RowsMissing];
+        found.severity >= Severity::Warn && !harmless.contains(&found.code)
+    };
+    let explained = match &error {
+        // What it says may be wrong is for logs of which nothing is known.
+        FitError::Failed(FitFailure::NotDescribed { .. }) => findings.iter().any(spoils),
+        _ => diagnose::is_explained(findings),
+    };
     let findings = diagnose::messages(findings, Severity::Warn);
     match error {
         error if findings.is_empty() => HostError::Fit(error),
-        // What it says may be wrong is for those whose cause is not known.
         _ if explained => HostError::Refused { findings },
         error => HostError::FitDiagnosed { error, findings },
     }

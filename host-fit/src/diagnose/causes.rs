@@ -13,7 +13,10 @@ use super::trials::{Trial, Trials, unlimited, zeros_free};
 use super::{warning, zeros};
 use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
+use crate::judge::identify::check_motion;
+use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
+use runtime::ModelKind;
 
 /// Scales within this factor of the designed ones are no mistake but tolerances.
 const FACTOR_MIN: f64 = 1.4;
@@ -23,6 +26,11 @@ const FACTOR_OF_UNITS: f64 = 30.0;
 /// What keeps a log from being fitted as it is: the mistake that alone explains it, with severity
 /// [`Severity::Refuse`], or that there is none that does.
 pub fn causes(dataset: &Dataset, stage: &Stage) -> Vec<Finding> {
+    // What does not move shows no mistake.
+    let planar_model = Model::of(ModelKind::M30);
+    if check_motion(dataset, stage, dataset.rows.len(), planar_model).is_err() {
+        return Vec::new();
+    }
     let (zeros_free, unlimited) = (zeros_free(stage), unlimited(stage));
     let trials = Trials::new(dataset, stage, &zeros_free, &unlimited);
     let Some(plain) = trials.of(None) else {
@@ -51,7 +59,8 @@ pub fn causes(dataset: &Dataset, stage: &Stage) -> Vec<Finding> {
         several => Some(Finding {
             severity: Severity::Refuse,
             message: format!(
-                "the log does not fit as it is ({:.2} um rms within the search ranges, {:.2} um without them), and fits if {}:                  it cannot tell which. {WIRES_AND_STAGE}",
+                "the log does not fit as it is ({:.2} um rms within the search ranges, {:.2} um without them), and fits if {}: \
+                 it cannot tell which. {WIRES_AND_STAGE}",
                 plain.within_um,
                 plain.free_um,
                 several
@@ -117,11 +126,13 @@ fn named(
 fn unexplained(plain: &Trial) -> Option<Finding> {
     let message = if !plain.is_within() {
         format!(
-            "within the search ranges of stage.toml the log fits to {:.2} um rms, without them to {:.2} um, and no single              mistake with channels, signs or scales explains it: check the designed values and the ranges in stage.toml",
+            "within the search ranges of stage.toml the log fits to {:.2} um rms, without them to {:.2} um, and no single \
+             mistake with channels, signs or scales explains it: check the designed values and the ranges in stage.toml",
             plain.within_um, plain.free_um
         )
     } else if !plain.is_in_place() {
-        "the sensitivity of a probe does not follow the height at the place where stage.toml has it, and no single mistake          with the capacitive sensors explains it: check their order, signs and places, and the coordinates of the probes"
+        "the sensitivity of a probe does not follow the height at the place where stage.toml has it, and no single mistake \
+         with the capacitive sensors explains it: check their order, signs and places, and the coordinates of the probes"
             .to_owned()
     } else {
         return None;

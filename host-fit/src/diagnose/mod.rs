@@ -6,6 +6,7 @@
 //! | [`hypothesis`] | mistakes that labs make, and how to undo each |
 //! | [`trials`] | how well a log fits with one undone |
 //! | [`causes`] | which of them alone explains a log |
+//! | `consequences` | what is not told beside its cause |
 //! | [`zeros`] | zero deviations beyond their range |
 //! | [`logs`] | logs that contradict each other |
 //! | [`range`] | poses beyond the range of a calibration |
@@ -14,6 +15,7 @@
 //! | [`trusted`] | the inputs that no log can show to be wrong |
 
 pub mod causes;
+mod consequences;
 pub mod finding;
 pub mod hypothesis;
 pub mod logs;
@@ -32,21 +34,17 @@ use runtime::ParameterSet;
 
 /// Everything that is wrong with a log, the gravest first; `fitted` is what came of the fit to it.
 ///
-/// What follows from a cause that is named is left out: the terms of a fit to a log with exchanged
-/// channels are at their limits, and its errors are large. Rows that the fit left out of account are
-/// for the tests of the signals alone.
+/// Rows that the fit left out of account are for the tests of the signals alone.
 pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Vec<Finding> {
     let outliers = fitted.map_or(&[][..], |fit| &fit.outliers);
     let sound = dataset.without(outliers);
     let mut findings = causes::causes(&sound, stage);
     findings.extend(logs::disagreement(&sound, stage));
-    let has_cause = is_explained(&findings);
     let errors = (fitted.ok()).map(|fit| fit.decoded.errors_less(&fit.judgement.zeros, dataset));
     findings.extend(signals::signal_findings(dataset, stage, errors.as_deref()));
     if let Ok(fit) = fitted {
-        let told = fit.warnings.iter().filter_map(of_fit::of_warning);
-        findings.extend(told.filter(|told| !has_cause || told.code != Code::TermsAtLimit));
-        if !has_cause {
+        findings.extend(fit.warnings.iter().filter_map(of_fit::of_warning));
+        if !is_explained(&findings) {
             findings.extend(of_fit::undescribed(fit, dataset));
             findings.extend(of_fit::not_field(fit));
         }
@@ -57,8 +55,7 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
             findings.extend(of_fit::unexplained(fit, dataset));
         }
     }
-    findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
-    findings
+    in_order(findings)
 }
 
 /// Everything that is wrong with a log that a blob is judged on; `errors` as in
@@ -72,6 +69,12 @@ pub fn of_judged(
     let mut findings = causes::causes(dataset, stage);
     findings.extend(signals::signal_findings(dataset, stage, Some(errors)));
     findings.extend(range::out_of_range(set, dataset));
+    in_order(findings)
+}
+
+/// Causes without their consequences, the gravest first.
+fn in_order(findings: Vec<Finding>) -> Vec<Finding> {
+    let mut findings = consequences::without(findings);
     findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     findings
 }

@@ -83,8 +83,13 @@ fn finding(log: &LogSignals, name: &str, outliers: &[(usize, f64)]) -> Finding {
     let largest_m = (outliers.iter()).fold(0.0, |most: f64, (_, size_m)| most.max(size_m.abs()));
     let rows: Vec<usize> = outliers.iter().map(|(row, _)| *row).collect();
     let message = format!(
-        "{} rows of {name} are far outside the noise, by up to {:.1} um: {}. Take them out of the log, or fit without them",
-        rows.len(),
+        "{} of {name} far outside the noise, by up to {:.1} um: {}. A fit with --loss cauchy, the default, leaves \
+         them out of account; look for lost pulses, sparks and bits",
+        if rows.len() == 1 {
+            "1 row".to_owned()
+        } else {
+            format!("{} rows", rows.len())
+        },
         largest_m * 1e6,
         log.places(&rows),
     );
