@@ -6,12 +6,14 @@
 mod compensate;
 mod cross_validation;
 mod field;
+mod settings;
 mod warning;
 
 pub use compensate::fit_compensated;
 pub use cross_validation::{CrossValidation, Split, cross_validate};
 use field::FirstPhase;
 pub use field::field_calibration;
+pub use settings::{FitSettings, ModelChoice};
 pub use warning::FitWarning;
 
 use crate::input::dataset::{Dataset, Row};
@@ -22,70 +24,21 @@ use crate::judge::statistics::PoseError;
 use crate::judge::uncertainty::uncertainty;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::Problem;
-use crate::problem::draw::{Draw, draw_rows};
+use crate::problem::draw::draw_rows;
 use crate::problem::model::{COUNT, Model};
 use crate::problem::parameters::Parameters;
-use crate::solve::field::fit::{FieldFit, FieldFitError};
+use crate::solve::field::error::FieldFitError;
+use crate::solve::field::fit::FieldFit;
 use crate::solve::robust::{HALF, Loss};
-use crate::solve::{Projection, Solution, SolveError, Solver, SolverOptions};
+use crate::solve::{Projection, Solution, SolveError, Solver};
 use runtime::calibration::Origin;
-use runtime::parameters::{FitRecord, ParameterError, Text};
+use runtime::parameters::{FitRecord, ParameterError};
 use runtime::{Calibration, ModelKind, ParameterSet};
 use std::cell::OnceCell;
 
 /// Room around the motion of the log in which the calibration still holds: offsets of
 /// the reference and overshoot are well inside it.
 pub(crate) const RANGE_MARGIN: f64 = 1.1;
-
-/// Which model is fitted.
-#[derive(Clone, Copy, Debug)]
-pub enum ModelChoice {
-    /// The field model where the log can carry it, else Model (31).
-    Auto,
-    /// This one.
-    Named(&'static Model),
-}
-
-/// What the user chose.
-#[derive(Clone, Debug)]
-pub struct FitSettings {
-    /// The model.
-    pub model: ModelChoice,
-    /// Rows to use; all if `None`.
-    pub train: Option<usize>,
-    /// How they are drawn.
-    pub draw: Draw,
-    /// How the problem is solved.
-    pub solver: Solver,
-    /// How much rows count that the model does not explain; a search alone knows no such thing.
-    pub loss: Loss,
-    /// For the solver; its seed also draws the rows.
-    pub options: SolverOptions,
-    /// Serial number of the stage, for the blob.
-    pub serial: Text,
-    /// Creation time, for the blob.
-    pub created: Text,
-    /// Keep a fit that leaves most of the motion unexplained, or whose parameters the log leaves open;
-    /// else there is none.
-    pub force: bool,
-}
-
-impl FitSettings {
-    /// All rows by robust least squares, with seed 1, for a blob without serial number and creation time.
-    pub fn new(model: ModelChoice) -> Self {
-        Self {
-            model,
-            train: None,
-            draw: Draw::Stratified,
-            solver: Solver::LeastSquares,
-            loss: Loss::Cauchy,
-            options: SolverOptions::new(Projection::Linear, 1),
-            serial: Text::default(),
-            created: Text::default(),
-            force: false,
-        }
-    }
-}
 
 /// Why there is no calibration.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

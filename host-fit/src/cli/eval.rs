@@ -10,6 +10,7 @@ use crate::input::stage::Stage;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::output::blob_file;
 use crate::problem::model::Model;
+use crate::report::errors;
 use crate::report::json::of_eval;
 use crate::report::text;
 use clap::{Args, ValueEnum};
@@ -131,7 +132,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
             &format!("errors, {}", report.zeros_in_words),
             &judgement.errors,
             None
-        ) + &report.by_log()
+        ) + &errors::as_text(&report.logs)
     ))?;
     super::wrote([args.json.clone()])?;
     terminal::warn(&report.warnings);

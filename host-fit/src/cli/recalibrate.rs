@@ -9,7 +9,7 @@ use crate::output::posterior_file::PosteriorFileError;
 use crate::output::{blob_file, check_writable, posterior_file};
 use crate::problem::model::Model;
 use crate::recalibrate::{Known, RecalibrateError, Recalibration, recalibrate};
-use crate::report::json::Errors;
+use crate::report::errors::Errors;
 use crate::report::text;
 use crate::solve::field::update::Change;
 use clap::builder::PossibleValue;

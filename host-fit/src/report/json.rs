@@ -3,12 +3,12 @@
 use crate::diagnose::finding::Finding;
 use crate::diagnose::trusted::{Trusted, trusted};
 use crate::fit::{CrossValidation, Fit};
-use crate::input::dataset::{Dataset, LogSource};
+use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
-use crate::judge::statistics::PoseError;
-use crate::judge::{Decoded, Judgement, Zeros, errors_by_log};
+use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::Parameters;
+use crate::report::errors::{Errors, LogErrors, by_log};
 use crate::report::field::{ByAxis, Correlation, FieldReport};
 use crate::solve::field::parameters::values_of;
 use crate::solve::field::terms::{self, PER_PROBE};
@@ -16,53 +16,6 @@ use runtime::ParameterSet;
 use runtime::geometry::ProbeCoordinates;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// rms and peak of a displacement.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Micrometres {
-    /// um.
-    pub rmse_um: f64,
-    /// um.
-    pub peak_um: f64,
-}
-
-/// rms and peak of a rotation.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Microradians {
-    /// urad.
-    pub rmse_urad: f64,
-    /// urad.
-    pub peak_urad: f64,
-}
-
-/// Errors of the three planar axes.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Errors {
-    /// X.
-    pub x: Micrometres,
-    /// Y.
-    pub y: Micrometres,
-    /// Rz.
-    pub rz: Microradians,
-}
-
-impl From<&PoseError> for Errors {
-    fn from(error: &PoseError) -> Self {
-        let [x, y, rz] = error.axes;
-        let linear = |a: crate::judge::statistics::AxisError| Micrometres {
-            rmse_um: a.rms * 1e6,
-            peak_um: a.peak * 1e6,
-        };
-        Self {
-            x: linear(x),
-            y: linear(y),
-            rz: Microradians {
-                rmse_urad: rz.rms * 1e6,
-                peak_urad: rz.peak * 1e6,
-            },
-        }
-    }
-}
 
 /// One parameter.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -258,43 +211,6 @@ pub struct Report {
     pub trusted_inputs: Vec<Trusted>,
 }
 
-impl Report {
-    /// The rms errors of each of several logs for a terminal, a line each.
-    pub fn by_log(&self) -> String {
-        let line = |log: &LogErrors| {
-            let Errors { x, y, rz } = &log.errors;
-            format!(
-                "  {:>8.3} um {:>8.3} um {:>8.3} urad rms in {}\n",
-                x.rmse_um, y.rmse_um, rz.rmse_urad, log.path
-            )
-        };
-        let several = (self.logs.iter()).filter(|_| self.logs.len() > 1);
-        several.map(line).collect()
-    }
-}
-
-/// The errors of one log.
-#[derive(Clone, Debug, Serialize)]
-pub struct LogErrors {
-    /// The file.
-    pub path: String,
-    /// Its rows.
-    pub rows: usize,
-    /// Over all of them.
-    pub errors: Errors,
-}
-
-fn logs(decoded: &Decoded, judgement: &Judgement, dataset: &Dataset) -> Vec<LogErrors> {
-    let errors = decoded.errors_less(&judgement.zeros, dataset);
-    let errors = errors_by_log(&errors, dataset);
-    let of_log = |(log, errors): (&LogSource, &PoseError)| LogErrors {
-        path: log.path.display().to_string(),
-        rows: log.rows.len(),
-        errors: Errors::from(errors),
-    };
-    dataset.logs.iter().zip(&errors).map(of_log).collect()
-}
-
 /// What a command knows besides the fit or judgement itself.
 #[derive(Clone, Debug)]
 pub struct Circumstances<'a> {
@@ -430,7 +346,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         zero_deviations: movement_zeros(&fit.judgement, c.dataset),
         warnings,
         findings: c.findings.clone(),
-        logs: logs(&fit.decoded, &fit.judgement, c.dataset),
+        logs: by_log(&fit.decoded, &fit.judgement, c.dataset),
         trusted_inputs: trusted(&fit.set),
     }
 }
@@ -478,7 +394,7 @@ pub fn of_eval(
         zero_deviations: movement_zeros(judgement, c.dataset),
         warnings: c.warnings.clone(),
         findings: c.findings.clone(),
-        logs: logs(decoded, judgement, c.dataset),
+        logs: by_log(decoded, judgement, c.dataset),
         trusted_inputs: trusted(set),
     }
 }

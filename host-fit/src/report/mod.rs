@@ -3,6 +3,7 @@
 mod axis;
 mod before_after;
 mod chart;
+pub mod errors;
 pub mod field;
 mod figures;
 pub mod html;

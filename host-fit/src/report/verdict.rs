@@ -1,7 +1,8 @@
 //! The verdict of a report: one sentence that says whether the calibration can be used.
 
+use super::errors::Errors;
 use super::field::PosePrediction;
-use super::json::{Errors, Report};
+use super::json::Report;
 use crate::diagnose::finding::{Finding, Severity};
 use serde::Serialize;
 

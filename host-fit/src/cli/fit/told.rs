@@ -7,6 +7,7 @@ use crate::fit::Fit;
 use crate::input::log::LogReading;
 use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
+use crate::report::errors;
 use crate::report::json::Report;
 use crate::report::page::Source;
 use crate::report::provenance::Provenance;
@@ -45,7 +46,7 @@ pub(super) fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
             &format!("errors over all rows, {}", report.zeros_in_words),
             &fit.judgement.errors,
             None
-        ) + &report.by_log(),
+        ) + &errors::as_text(&report.logs),
         text::lag(
             fit.lag,
             report.reference_lag.is_some_and(|lag| lag.compensated)

@@ -3,6 +3,7 @@
 
 use super::blocks::{Block, Rows};
 use super::carry::Verdict;
+use super::error::FieldFitError;
 use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
 use super::parameters::FieldParameters;
 use super::posterior::Posterior;
@@ -13,7 +14,6 @@ use super::whiten::{Noise, Normal};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
-use crate::problem::terms::shown;
 use crate::solve::robust::{HALF, Loss};
 use nalgebra::{DMatrix, DVector};
 
@@ -73,53 +73,6 @@ pub struct Score {
     pub prior: f64,
     /// Whitened residuals: three for each block, less three for each movement's offset.
     pub residuals: usize,
-}
-
-/// Why there is no fit.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FieldFitError {
-    /// The log leaves the field model worse than Model (31).
-    #[error("{0}")]
-    NotCarried(Box<Verdict>),
-    /// The log shows nothing of a parameter that has no prior.
-    #[error("the log does not determine {}: no motion in it shows them", parameters.join(", "))]
-    Unseen {
-        /// Their names.
-        parameters: Vec<String>,
-    },
-    /// The normal equations can't be solved.
-    #[error(
-        "the log does not determine the field model: several parameters show only together. Record all six axes \
-         moving at once, each at a frequency of its own"
-    )]
-    Singular,
-    /// A parameter came out far beyond its search range.
-    #[error(
-        "{parameter} would be {:.4} {}, far outside its search range from {:.4} to {:.4}: check the columns, \
-         the order and the signs of the sensors in the log and in stage.toml",
-        shown(*value, unit).0, shown(*value, unit).1, shown(*low, unit).0, shown(*high, unit).0
-    )]
-    FarOff {
-        /// Its name.
-        parameter: String,
-        /// Its value, SI.
-        value: f64,
-        /// Its unit.
-        unit: &'static str,
-        /// Lower end of the search range.
-        low: f64,
-        /// Upper end.
-        high: f64,
-    },
-    /// No step lowers the cost although the gradient is not zero.
-    #[error(
-        "the fit of the field model did not settle in {iterations} steps: the log shows something that it has no term for, \
-         such as a reference that lags by many rows, two different stages, or an axis that does not move"
-    )]
-    Stuck {
-        /// Steps made.
-        iterations: u32,
-    },
 }
 
 #[derive(Clone, Debug)]

@@ -18,6 +18,7 @@
 
 pub mod blocks;
 pub mod carry;
+pub mod error;
 pub mod fit;
 pub mod forecast;
 pub mod noise;

@@ -1,6 +1,7 @@
 //! The whole fit on logs whose truth is known.
 
-use super::fit::{FieldFit, FieldFitError, fit_field};
+use super::error::FieldFitError;
+use super::fit::{FieldFit, fit_field};
 use super::parameters::FieldParameters;
 use super::sample::{Run, parameters, stage};
 use super::terms::{COUNT, name};

@@ -6,7 +6,7 @@
 //! an old posterior. The lag of the reference is an unknown of every log.
 
 use super::blocks::Rows;
-use super::fit::FieldFitError;
+use super::error::FieldFitError;
 use super::noise::white_mm;
 use super::parameters::FieldParameters;
 use super::posterior::Posterior;
