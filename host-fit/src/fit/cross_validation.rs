@@ -1,7 +1,7 @@
 //! Cross-validation: how well a fit predicts rows that it has not seen.
 
 use super::{Fit, FitError, FitSettings, Job};
-use crate::input::dataset::Dataset;
+use crate::input::dataset::{Dataset, Movement};
 use crate::input::stage::Stage;
 use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Zeros};
@@ -12,9 +12,10 @@ const GROUPS: usize = 5;
 /// What rows are left out by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Split {
-    /// Whole movements: every fifth, or each where there are fewer than five.
+    /// Whole movements, every fifth.
     Movements,
-    /// Fifths of the only movement, one after the other.
+    /// Fifths of each movement, one after the other: where one of the movements holds a fifth of the rows
+    /// or more, and may be all that tells some parameters.
     Time,
 }
 
@@ -42,8 +43,8 @@ pub struct CrossValidation {
     pub in_fit: [f64; 3],
 }
 
-/// Fits without each group of rows in turn. Each movement is in one group, so that what its rows
-/// have in common, such as the walk of the reference, cannot pass for knowledge.
+/// Fits without each group of rows in turn. A group holds whole movements, or long parts of them,
+/// so that what neighbours have in common, such as the walk of the reference, cannot pass for knowledge.
 ///
 /// # Errors
 /// See [`FitError`]: of the first group without which there is no fit.
@@ -53,14 +54,20 @@ pub fn cross_validate(
     stage: &Stage,
     settings: &FitSettings,
 ) -> Result<CrossValidation, FitError> {
-    let movements = dataset.movements.len();
-    let (split, groups) = match movements {
-        0 | 1 => (Split::Time, GROUPS),
-        _ => (Split::Movements, movements.min(GROUPS)),
+    let rows_of = |movement: &Movement| movement.rows.len();
+    let longest = dataset.movements.iter().map(rows_of).max().unwrap_or(0);
+    let split = if longest * GROUPS >= dataset.rows.len() {
+        Split::Time
+    } else {
+        Split::Movements
     };
-    let group_of = |row: usize| match split {
-        Split::Movements => dataset.rows[row].movement % groups,
-        Split::Time => row * groups / dataset.rows.len(),
+    let group_of = |row: usize| {
+        let movement = dataset.rows[row].movement;
+        let rows = &dataset.movements[movement].rows;
+        match split {
+            Split::Movements => movement % GROUPS,
+            Split::Time => (row - rows.start) * GROUPS / rows.len(),
+        }
     };
     let zeros = Zeros::of_model(fit.model);
     let of_group = |decoded: &Decoded, group: usize| {
@@ -73,7 +80,7 @@ pub fn cross_validate(
         left_out.judge(dataset, stage, zeros).errors
     };
     let (mut left_out, mut in_fit) = (Vec::new(), Vec::new());
-    for group in 0..groups {
+    for group in 0..GROUPS {
         let mut job = Job::new(dataset, stage, settings);
         job.selected.retain(|&row| group_of(row) != group);
         let without = job.of_model(fit.model)?;
@@ -82,7 +89,7 @@ pub fn cross_validate(
     }
     Ok(CrossValidation {
         split,
-        groups,
+        groups: GROUPS,
         left_out: rms(&left_out),
         in_fit: rms(&in_fit),
     })

@@ -101,6 +101,8 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
         "Amplitude spectral density",
         "mutation probability p",
         "Zero deviations, and the ends",
+        "interferometer.y_baseline_m",
+        "Standard errors: sandwich",
         "prefers-color-scheme: dark",
         "table-header-group",
     ] {
