@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | 0 | 4 | magic, `HALL` in ASCII |
 //! | 4 | 2 | layout version, little-endian: 1, or 2 for the field model |
-//! | 6 | 1 | 1 if the fit failed its checks and was written all the same, else 0 |
+//! | 6 | 1 | 1 if the fit was refused and written all the same, else 0 |
 //! | 7 | 1 | reserved: 0 |
 //! | 8 | 4 | payload length n in bytes, little-endian |
 //! | 12 | n | payload: the [`ParameterSet`] in postcard |

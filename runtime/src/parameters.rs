@@ -81,7 +81,7 @@ pub struct FitRecord {
     pub rms: [f32; 3],
     /// Peak error of X, Y, Rz: m, m, rad.
     pub peak: [f32; 3],
-    /// Whether the fit failed its checks and was written all the same.
+    /// Whether the log was refused, or the fit beyond the limits asked for, and written all the same.
     pub forced: bool,
 }
 

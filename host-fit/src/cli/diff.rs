@@ -7,6 +7,7 @@ use crate::diff::{
 };
 use crate::output::{blob_file, posterior_file};
 use crate::problem::model::Model;
+use crate::problem::terms::shown;
 use crate::solve::field::terms::{COUNT, name};
 use clap::Args;
 use runtime::{ModelKind, ParameterSet};
@@ -174,18 +175,20 @@ fn as_text(
         "", "a", "b", "change", "sigma"
     );
     for (name, change) in parameters {
-        let shown = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.7}"));
-        let moved = change.a.zip(change.b).map(|(a, b)| b - a);
+        let (per_si, unit) = shown(1.0, change.unit);
+        let [a, b] = [change.a, change.b].map(|x| x.map(|x| x * per_si));
+        let number = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.7}"));
+        let moved = a.zip(b).map(|(a, b)| b - a);
         let _ = writeln!(
             out,
             "{name:<14}{:>15}{:>15}{:>13}{:>8}  {}",
-            shown(change.a),
-            shown(change.b),
+            number(a),
+            number(b),
             moved.map_or_else(|| "-".to_owned(), |x| format!("{x:+.3e}")),
             change
                 .sigma
                 .map_or_else(|| "-".to_owned(), |x| format!("{x:+.1}")),
-            change.unit
+            unit
         );
     }
     let Some(d) = poses else {

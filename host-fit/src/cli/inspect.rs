@@ -4,6 +4,7 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::blob_file;
 use crate::problem::model::Model;
+use crate::problem::terms::shown;
 use crate::report::json::parameters_in;
 use crate::report::provenance::hex;
 use clap::Args;
@@ -91,7 +92,7 @@ fn as_text(set: &ParameterSet) -> String {
     );
     if set.fit.forced {
         out.push_str(
-            "FORCED          the fit failed its checks and was written all the same (--force)\n",
+            "FORCED          the log was refused, or the errors beyond --limit: written all the same (--force)\n",
         );
     }
     let [x, y, rz] = set.fit.rms.map(|e| e * 1e6);
@@ -99,7 +100,8 @@ fn as_text(set: &ParameterSet) -> String {
     let [x, y, rz] = set.fit.peak.map(|e| e * 1e6);
     let _ = writeln!(out, "peak error      {x:.3} um, {y:.3} um, {rz:.3} urad");
     for (name, p) in parameters_in(set) {
-        let _ = writeln!(out, "{name:<15} {:>14.7} {}", p.value, p.unit);
+        let (value, unit) = shown(p.value, p.unit);
+        let _ = writeln!(out, "{name:<15} {value:>14.7} {unit}");
     }
     for (name, rows) in [
         ("PM", &set.plane),

@@ -108,7 +108,7 @@ fn named(
     Finding {
         severity: Severity::Refuse,
         message: format!(
-            "the log fits if {} ({:.2} um rms; {as_it_is}{span}): {}",
+            "the log fits if {} ({:.2} um rms by Model (31); {as_it_is}{span}): {}",
             hypothesis.cure, trial.within_um, hypothesis.remedy
         ),
         channel: hypothesis.channel.clone(),

@@ -31,6 +31,10 @@ fn is_consequence(found: &Finding, cause: &Finding) -> bool {
             Code::ZeroClipped => same_movement,
             // A wild row of the pose, not rows of a channel.
             Code::Outliers => of_axis,
+            // Where a channel stops and goes on, others seem to jump.
+            Code::Step => {
+                cause.code == Code::Stuck && same_movement && found.channel != cause.channel
+            }
             _ => false,
         },
         Code::Outliers => cause.unit == Some("rows") && found.code == Code::Outliers && of_axis,

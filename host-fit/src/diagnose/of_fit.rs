@@ -9,7 +9,7 @@ use crate::judge::statistics::white_noise;
 use runtime::ModelKind;
 
 /// Errors beyond this many times their white noise are not the drift of an interferometer.
-const ERROR_TO_NOISE_MAX: f64 = 3.0;
+pub const ERROR_TO_NOISE_MAX: f64 = 3.0;
 /// Noise below this, m or rad, is rounding.
 const NOISE_MIN: f64 = 0.05e-6;
 

@@ -9,6 +9,8 @@ use crate::problem::parameters::Parameters;
 use crate::solve::least_squares::coordinates::point_of;
 use crate::solve::least_squares::multistart::zero_deviations;
 
+/// How far beyond its range a zero deviation is worth a warning, in parts of the range's width.
+const BEYOND_MIN: f64 = 0.1;
 /// Names shown of the movements.
 const SHOWN: usize = 5;
 
@@ -23,9 +25,10 @@ pub(super) fn clipped(
     let range = &stage.search.delta_m;
     let point = point_of(parameters)?;
     let zeros = zero_deviations(problem, parameters, &point);
+    let beyond = |delta: f64| (delta - range.clip(delta)).abs() - BEYOND_MIN * range.width();
     let largest = |delta: [f64; 3]| delta.map(f64::abs).into_iter().fold(0.0, f64::max);
     let beyond: Vec<(String, f64)> = (dataset.movements.iter().zip(&zeros))
-        .filter(|(_, zero)| !zero.delta_m.iter().all(|delta| range.contains(*delta)))
+        .filter(|(_, zero)| zero.delta_m.iter().any(|delta| beyond(*delta) > 0.0))
         .map(|(movement, zero)| (dataset.movement_name(movement), largest(zero.delta_m)))
         .collect();
     let (worst, most) = beyond.iter().max_by(|(_, a), (_, b)| a.total_cmp(b))?;

@@ -66,7 +66,7 @@ struct Page<'a> {
     verdict: Verdict,
     findings: &'a [Finding],
     /// Those that are no finding.
-    warnings: Vec<&'a String>,
+    warnings: &'a [String],
     report: Option<&'a Report>,
     /// Name of the model, and how zero deviations were treated.
     model: &'a str,
@@ -123,8 +123,6 @@ impl Source<'_> {
         let last = fit.and(stages.last());
         let noise = last.map(|last| white_noise(&last.by_row, &dataset.movements));
         let report = fit.map(|(_, report)| report);
-        let told = |warning: &&String| !self.findings.iter().any(|f| f.message == **warning);
-        let warnings = report.map_or(self.warnings, |report| &report.warnings);
         let of_movements = last.map(|last| errors::of_movements(&log, last));
         let of_movements = of_movements.unwrap_or_default();
         let zeros = report.map_or(&[][..], |report| &report.zero_deviations);
@@ -139,7 +137,7 @@ impl Source<'_> {
             provenance: &self.provenance,
             verdict: Verdict::new(self.end, self.findings, report.zip(noise)),
             findings: self.findings,
-            warnings: warnings.iter().filter(told).collect(),
+            warnings: self.warnings,
             report,
             model: report.map_or("", |report| &report.model_title),
             zeros_in_words: report.map_or("", |report| report.zeros_in_words),

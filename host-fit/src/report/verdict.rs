@@ -4,6 +4,7 @@ use super::errors::Errors;
 use super::field::PosePrediction;
 use super::json::Report;
 use crate::diagnose::finding::{Finding, Severity};
+use crate::diagnose::of_fit::ERROR_TO_NOISE_MAX;
 use serde::Serialize;
 
 /// What the reader is told first.
@@ -76,8 +77,25 @@ impl Verdict {
             (End::Interrupted, ..) => verdict("warn", "Interrupted, the best so far"),
             (End::Written, 1.., _) => verdict("refuse", "Written in spite of a refusal"),
             (End::Written, 0, 0) => verdict("good", "Good"),
-            (End::Written, 0, 1) => verdict("warn", "Good, with a warning"),
-            (End::Written, 0, n) => verdict("warn", &format!("Good, with {n} warnings")),
+            (End::Written, 0, n) => {
+                // A wrong log may still give a good fit, which the errors show.
+                let beyond = |(report, noise): (&Report, [f64; 3])| {
+                    let Errors { x, y, rz } = report.errors;
+                    let rms = [x.rmse_um, y.rmse_um, rz.rmse_urad];
+                    (0..3).any(|axis| rms[axis] > ERROR_TO_NOISE_MAX * noise[axis] * 1e6)
+                };
+                let word = if fit.is_some_and(beyond) {
+                    "Doubtful"
+                } else {
+                    "Good"
+                };
+                let warnings = if n == 1 {
+                    "a warning".to_owned()
+                } else {
+                    format!("{n} warnings")
+                };
+                verdict("warn", &format!("{word}, with {warnings}"))
+            }
         }
     }
 }

@@ -81,7 +81,7 @@ pub(super) fn write_report(
     if !matches!(end, End::Failed(_)) {
         provenance.add_file(&args.out, "parameter blob, written");
     }
-    let warnings: Vec<String> = log.warnings.iter().map(ToString::to_string).collect();
+    let warnings = crate::cli::warnings_of(log);
     let source = Source {
         stage,
         dataset: &log.dataset,

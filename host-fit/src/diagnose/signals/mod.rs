@@ -3,16 +3,16 @@
 //!
 //! | module | what it does |
 //! |---|---|
-//! | [`channels`] | the signals of one log by channel |
-//! | [`timing`] | rows missing, uneven times |
-//! | [`converters`] | flat tops |
-//! | [`still`] | channels that repeat one value, movements that stand still |
-//! | [`standing`] | channels that show no more than their noise |
-//! | [`residual`] | what the motion does not explain of a Hall signal |
-//! | [`blame`] | the channel whose error explains that |
-//! | [`outliers`], [`steps`] | rows that jump, signals that stay where they jumped |
-//! | [`spectrum`], [`hum`] | lines of one frequency |
-//! | [`drifts`] | drift of a channel, and of the gain of a probe |
+//! | `channels` | the signals of one log by channel |
+//! | `timing` | rows missing, uneven times |
+//! | `converters` | flat tops |
+//! | `still` | channels that repeat one value, movements that stand still |
+//! | `standing` | channels that show no more than their noise |
+//! | `residual` | what the motion does not explain of a Hall signal |
+//! | `blame` | the channel whose error explains that |
+//! | `outliers`, `steps` | rows that jump, signals that stay where they jumped |
+//! | `spectrum`, `hum` | lines of one frequency |
+//! | `drifts` | drift of a channel, and of the gain of a probe |
 //!
 //! Each log is tested alone, and what an earlier test names is left out of the later ones. A
 //! channel is named where it alone explains what was found.

@@ -2,6 +2,7 @@
 //! is wrong where it stands and which key it is.
 
 use super::error::{Place, StageError};
+use crate::input::draft::MARK;
 use crate::input::shipped::STAGE_TOML;
 use serde::de::DeserializeOwned;
 use std::ops::Range;
@@ -175,7 +176,14 @@ impl<'t> Document<'t> {
 
     fn missing(&self, table: Range<usize>, key: &str) -> StageError {
         let example = example(key).map(|example| format!(", for instance {example}"));
-        let problem = format!("missing; add it{}", example.unwrap_or_default());
+        let example = example.unwrap_or_default();
+        let problem = match self.text.matches(MARK).count() {
+            0 => format!("missing; add it{example}"),
+            lines => format!(
+                "missing; fill in the {lines} lines that begin with `{}`{example}",
+                MARK.trim()
+            ),
+        };
         self.error(table.start, key.to_owned(), problem)
     }
 

@@ -117,21 +117,22 @@ pub(in crate::report) fn spectrum(log: &Log, errors: &Errors, noise: [f64; 3]) -
     })
 }
 
-/// The highest of the points that stand together on a logarithmic axis.
+/// The root mean square of the points that stand together on a logarithmic axis, at their middle.
 fn thinned(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
-    let mut out: Vec<(f64, f64)> = Vec::new();
+    let mut groups: Vec<(f64, f64, f64)> = Vec::new();
     let place = |x: f64| (x.log10() * POINTS / 4.0).floor();
-    for point in points {
-        match out.last_mut() {
-            Some(last) if place(last.0) == place(point.0) => {
-                if point.1 > last.1 {
-                    *last = point;
-                }
+    for (x, y) in points {
+        match groups.last_mut() {
+            Some((sum, squares, count)) if place(*sum / *count) == place(x) => {
+                *sum += x;
+                *squares += y * y;
+                *count += 1.0;
             }
-            _ => out.push(point),
+            _ => groups.push((x, y * y, 1.0)),
         }
     }
-    out
+    let mean = |(sum, squares, count): (f64, f64, f64)| (sum / count, (squares / count).sqrt());
+    groups.into_iter().map(mean).collect()
 }
 
 #[cfg(test)]
@@ -139,9 +140,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_thinned_spectrum_keeps_its_lines() {
-        let points = (1..4096).map(|k| (f64::from(k), if k == 3000 { 9.0 } else { 1.0 }));
-        let thin = thinned(points);
-        assert!(thin.len() < POINTS as usize && thin.contains(&(3000.0, 9.0)));
+    fn a_thinned_spectrum_keeps_its_level_and_shows_its_lines() {
+        let points =
+            |line: f64| (1..4096).map(move |k| (f64::from(k), if k == 3000 { line } else { 1.0 }));
+        let flat = thinned(points(1.0));
+        assert!(flat.len() < POINTS as usize && flat.iter().all(|(_, y)| (y - 1.0).abs() < 1e-12));
+        let line = thinned(points(90.0));
+        let (x, y) = line
+            .into_iter()
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .expect("points");
+        assert!((x - 3000.0).abs() < 30.0 && y > 5.0, "{x} {y}");
     }
 }
