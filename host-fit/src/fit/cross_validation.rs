@@ -5,6 +5,7 @@ use crate::input::dataset::{Dataset, Movement};
 use crate::input::stage::Stage;
 use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Zeros};
+use crate::progress::Progress;
 
 /// Groups that rows are left out by.
 const GROUPS: usize = 5;
@@ -80,7 +81,9 @@ pub fn cross_validate(
         left_out.judge(dataset, stage, zeros).errors
     };
     let (mut left_out, mut in_fit) = (Vec::new(), Vec::new());
+    let progress = Progress::new("leaving out", GROUPS as u64);
     for group in 0..GROUPS {
+        progress.reach(group as u64);
         let mut job = Job::new(dataset, stage, settings);
         job.selected.retain(|&row| group_of(row) != group);
         let without = job.of_model(fit.model)?;

@@ -25,6 +25,7 @@ pub use text::{to_text, with_uncertainties};
 pub use uncertainty::uncertainties;
 
 use crate::input::dataset::{Dataset, LoggedFrame};
+use crate::progress::Progress;
 use runtime::{AnyDecoder, OnInvalid, Reading, Servo};
 
 /// The first line of every pose file.
@@ -48,7 +49,9 @@ pub struct PoseRow {
 pub fn decode(dataset: &Dataset, decoder: &AnyDecoder, on_invalid: OnInvalid) -> Vec<PoseRow> {
     let mut servo = Servo::new(&**decoder, on_invalid);
     let mut poses = Vec::with_capacity(dataset.rows.len());
+    let progress = Progress::new("decoding", dataset.rows.len() as u64);
     for movement in &dataset.movements {
+        progress.reach(movement.rows.start as u64);
         servo.forget();
         for row in dataset.rows.get(movement.rows.clone()).unwrap_or_default() {
             let reading = match &row.frame {

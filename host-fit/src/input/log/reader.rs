@@ -12,10 +12,14 @@ use super::warning::LogWarning;
 use super::{BadRows, ReadOptions, SaturatedCodes};
 use crate::input::dataset::{Dataset, LogSource, Movement};
 use crate::input::stage::Stage;
+use crate::progress::Progress;
 
 /// Mean distance of voltages from whole codes that passes in silence: those that were computed from
 /// codes and written with few digits stay below it, those of another instrument have 0.25.
 const BETWEEN_CODES: f64 = 0.15;
+
+/// Rows from one step of the progress to the next.
+const ROWS_A_STEP: usize = 4096;
 
 /// One log on its way into the dataset.
 struct LogReader<'a> {
@@ -61,9 +65,14 @@ pub(super) fn append(
         restarts: 0,
         skipped: Skipped::default(),
     };
+    let progress = Progress::new("reading", table.bytes());
     while table.next_row()? {
         reader.take(&table, dataset)?;
+        if dataset.rows.len().is_multiple_of(ROWS_A_STEP) {
+            progress.reach(table.row_byte());
+        }
     }
+    drop(progress);
     let between_codes = reader.rows.mean_between_codes();
     let (skipped, steps) = (reader.skipped, reader.steps);
     let skipped_rows = skipped.rows();

@@ -172,6 +172,11 @@ impl<'a> Table<'a> {
         self.row_byte
     }
 
+    /// The length of the whole text.
+    pub(crate) const fn bytes(&self) -> u64 {
+        self.bytes.len() as u64
+    }
+
     /// A cell of the row that starts at `byte`, for messages.
     pub(crate) fn place(&self, byte: u64, cell: usize, movement: Option<i64>) -> Box<CellPlace> {
         Box::new(CellPlace {
