@@ -1,8 +1,6 @@
 //! Bad input: an exit status, a message that says where and what to do, and nothing written.
 
-mod common;
-
-use common::{Bench, thinned_log, with_cell};
+use crate::common::{Bench, thinned_log, with_cell};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::io::Write;
@@ -181,7 +179,7 @@ fn an_output_that_cannot_be_written_is_refused_and_the_old_one_stays() {
     for output in ["--json no/such/p.json", "--report file"] {
         let arguments = format!("fit log.csv --stage stage.toml --out p.bin {output}");
         bench.bad(&arguments, 3, &["folder"]);
-        assert!(!common::exists(&bench.path("p.bin")), "{output}");
+        assert!(!crate::common::exists(&bench.path("p.bin")), "{output}");
     }
     let twice = "fit log.csv --stage stage.toml --out p.bin --json ./p.bin";
     bench.bad(twice, 2, &["another output"]);

@@ -1,6 +1,4 @@
 //! Runs the program in a folder of its own, on logs made from the one that ships with it.
-#![allow(dead_code, reason = "each test program uses its own part")]
-#![allow(missing_docs, reason = "not a library")]
 
 use std::io::Read;
 use std::path::{Path, PathBuf};

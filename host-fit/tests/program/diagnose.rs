@@ -1,8 +1,6 @@
 //! What the program says of logs with mistakes that labs make, and that it writes no blob of them.
 
-mod common;
-
-use common::{Bench, stderr, stdout, thinned_log};
+use crate::common::{Bench, stderr, stdout, thinned_log};
 use host_fit::input::shipped::STAGE_TOML;
 
 /// Every fiftieth row of the shipped log.

@@ -1,8 +1,6 @@
 //! The field model from the log to the pose file, on a stage made of physics.
 
-mod common;
-
-use common::{Bench, stderr, stdout, thinned_log};
+use crate::common::{Bench, stderr, stdout, thinned_log};
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fmt::Write;

@@ -1,8 +1,6 @@
 //! Logs as laboratories have them, from the command line: split, read from a pipe, drafted for.
 
-mod common;
-
-use common::{Bench, stdout, thinned_log};
+use crate::common::{Bench, stdout, thinned_log};
 use std::io::Write;
 use std::process::Stdio;
 
@@ -34,7 +32,7 @@ fn one_long_recording_is_fitted_as_its_movements_are() {
         let output = bench.good(&format!(
             "fit {log} --stage stage.toml --out p.bin --json p.json"
         ));
-        (bench.json("p.json"), common::stderr(&output))
+        (bench.json("p.json"), crate::common::stderr(&output))
     };
     let (want, _) = fit("log.csv");
     for log in ["paused.csv", "whole.csv --split 2"] {
@@ -80,9 +78,9 @@ fn a_log_comes_by_standard_input_too() {
             output.status.code(),
             Some(status),
             "{}",
-            common::stderr(&output)
+            crate::common::stderr(&output)
         );
-        common::stderr(&output)
+        crate::common::stderr(&output)
     };
     pipe(&bench.read("log.csv"), 0);
     assert_eq!(bench.read("pose.csv"), bench.read("want.csv"));
@@ -135,5 +133,5 @@ fn init_drafts_a_stage_file_that_is_refused_until_it_is_filled_in() {
     bench.good("init log.csv --force");
     assert_eq!(bench.text("stage.toml"), text);
     bench.bad("init nowhere.csv --out other.toml", 3, &["nowhere.csv"]);
-    assert!(!common::exists(&bench.path("other.toml")));
+    assert!(!crate::common::exists(&bench.path("other.toml")));
 }

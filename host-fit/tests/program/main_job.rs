@@ -1,8 +1,6 @@
 //! The main job through the command line, on the log that ships with the program.
 
-mod common;
-
-use common::{Bench, shipped_log, stdout, thinned_log};
+use crate::common::{Bench, shipped_log, stdout, thinned_log};
 use serde_json::Value;
 
 fn close(value: &Value, expected: f64, part: f64) {
@@ -266,7 +264,10 @@ fn demo_prints_the_tables_of_the_paper_beside_ours() {
         assert!(text.contains(part), "{part}");
     }
     for file in ["params.bin", "pose.csv", "paper.csv.gz", "stage.toml"] {
-        assert!(common::exists(&bench.path("demo").join(file)), "{file}");
+        assert!(
+            crate::common::exists(&bench.path("demo").join(file)),
+            "{file}"
+        );
     }
     let nanometres: Vec<f64> = text
         .lines()
@@ -279,7 +280,7 @@ fn demo_prints_the_tables_of_the_paper_beside_ours() {
         nanometres[0] <= 0.25 && nanometres[1] <= 0.25 && nanometres[2] <= 1.0,
         "{nanometres:?}"
     );
-    assert!(common::exists(&bench.path("stage.toml")));
+    assert!(crate::common::exists(&bench.path("stage.toml")));
 }
 
 #[test]

@@ -1,8 +1,6 @@
 //! Fits that succeed, with something that the user must be told.
 
-mod common;
-
-use common::{Bench, stderr, thinned_log, with_cell};
+use crate::common::{Bench, stderr, thinned_log, with_cell};
 use host_fit::input::shipped::STAGE_TOML;
 
 fn log() -> String {

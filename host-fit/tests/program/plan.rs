@@ -1,8 +1,6 @@
 //! `plan` from the command line: what it writes, and what it refuses.
 
-mod common;
-
-use common::{Bench, stderr, stdout};
+use crate::common::{Bench, stderr, stdout};
 use host_fit::input::shipped::STAGE_TOML;
 
 /// A run that is short enough to be planned fast, rehearsed, and written nowhere else.

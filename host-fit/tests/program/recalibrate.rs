@@ -1,9 +1,7 @@
 //! An old calibration brought up to date, on a stage made of physics whose codes are scaled as
 //! changed gains scale them.
 
-mod common;
-
-use common::{Bench, exists, stderr};
+use crate::common::{Bench, exists, stderr};
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fmt::Write;

@@ -1,9 +1,7 @@
 //! Bad rows in a log, and how far a blob can be trusted: losses, cross-validation, uncertainty of
 //! poses, the difference between blobs.
 
-mod common;
-
-use common::{Bench, stdout, thinned_log};
+use crate::common::{Bench, stdout, thinned_log};
 use host_fit::input::shipped::{RUN_GZ, SERVICE_GZ};
 use std::io::Read;
 
@@ -288,7 +286,7 @@ fn poses_come_with_an_uncertainty_that_covers_their_errors() {
         3,
         &["alone.bin.posterior"],
     );
-    assert!(!common::exists(&bench.path("u.csv")));
+    assert!(!crate::common::exists(&bench.path("u.csv")));
 }
 
 #[test]
@@ -301,7 +299,7 @@ fn diff_tells_a_change_in_units_in_sigma_and_as_a_pose() {
     assert_eq!(same["parameters"]["eta_a"]["sigma"], 0.0);
     assert_eq!(same["pose_difference"]["axes"]["x"]["peak_um"], 0.0);
     let output = bench.good("diff clean.bin 31.bin --json other.json");
-    assert!(common::stderr(&output).contains("serial"));
+    assert!(crate::common::stderr(&output).contains("serial"));
     assert!(stdout(&output).contains("15625 poses"));
     let other = bench.json("other.json");
     let eta = &other["parameters"]["eta_a"];

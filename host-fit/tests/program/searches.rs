@@ -1,8 +1,6 @@
 //! The population searches through the command line, on the log that ships with the program.
 
-mod common;
-
-use common::Bench;
+use crate::common::Bench;
 use serde_json::Value;
 
 fn bench() -> Bench {
@@ -87,7 +85,7 @@ fn compare_prints_its_table_and_writes_curves() {
         "compare log.csv.gz --stage stage.toml --project delta,linear --solvers shtlbo,de --seeds 2 \
          --evaluations 3000 --population 30 --out report",
     );
-    let table = common::stdout(&printed);
+    let table = crate::common::stdout(&printed);
     assert_eq!(table.lines().count(), 2 + 2 * 3);
     for row in ["| delta | lm |", "| delta | shtlbo |", "| linear | de |"] {
         assert!(table.contains(row), "{row}");
@@ -144,7 +142,7 @@ fn a_search_that_ends_next_to_a_pole_says_so_and_writes_nothing() {
         4,
         &["random search", "pole of 1/phi", "--generations"],
     );
-    assert!(!common::exists(&bench.path("p.bin")));
+    assert!(!crate::common::exists(&bench.path("p.bin")));
 }
 
 #[test]

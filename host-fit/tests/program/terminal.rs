@@ -1,8 +1,6 @@
 //! What goes to standard output and standard error, and what does not.
 
-mod common;
-
-use common::{Bench, stderr, stdout, thinned_log};
+use crate::common::{Bench, stderr, stdout, thinned_log};
 use std::io::Write;
 use std::process::Stdio;
 

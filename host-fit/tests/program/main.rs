@@ -1,0 +1,16 @@
+//! The program from the command line, in one test program: linking one for each file would take longer
+//! than all the tests.
+#![allow(missing_docs, reason = "not a library")]
+
+mod bad_input;
+mod common;
+mod diagnose;
+mod field_model;
+mod log_forms;
+mod main_job;
+mod odd_fits;
+mod plan;
+mod recalibrate;
+mod robust;
+mod searches;
+mod terminal;
