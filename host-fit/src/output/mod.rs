@@ -174,7 +174,8 @@ fn resolve(path: &Path) -> Result<(PathBuf, Option<Metadata>), OutputError> {
 /// Whether `path` is something to write to, not to replace: a device, a pipe, or the
 /// standard output under its name in the file system, which a shell may have led to a file.
 fn is_stream(path: &Path, metadata: &Metadata) -> bool {
-    let named_stream = cfg!(unix) && (path.starts_with("/dev") || path.starts_with("/proc"));
+    let names = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc/self/fd"];
+    let named_stream = cfg!(unix) && names.iter().any(|name| path.starts_with(name));
     named_stream || !metadata.is_file()
 }
 

@@ -105,3 +105,15 @@ fn a_device_is_written_to_and_a_full_one_says_so() {
         "{error}"
     );
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_below_dev_is_replaced_like_any_other() {
+    let Ok(folder) = tempfile::tempdir_in("/dev/shm") else {
+        return; // A system without it.
+    };
+    let file = folder.path().join("params.bin");
+    write_atomically(&file, b"old").expect("written");
+    write_atomically(&file, b"new").expect("replaced");
+    assert_eq!(fs::read(&file).expect("readable"), b"new");
+}
