@@ -19,6 +19,7 @@ use crate::problem::draw::Draw;
 use crate::problem::model::MODELS;
 use crate::problem::parameters::Parameters;
 use crate::recalibrate::Known;
+use crate::report;
 use crate::report::json::{Choice, Circumstances, of_fit};
 use crate::report::verdict::End;
 use crate::solve::robust::Loss;
@@ -141,11 +142,12 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         .map(PathBuf::as_path)
         .collect();
     let posterior = posterior_file::beside(&args.out);
+    let page = args.report.as_deref().map(report::page_in);
     let outputs = [
         Some(args.out.as_path()),
         posterior.as_deref(),
         args.json.as_deref(),
-        args.report.as_deref(),
+        page.as_deref(),
     ];
     super::keep_apart(&outputs, &inputs)?;
     check_field_arguments(args)?;
@@ -296,7 +298,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let found = Some((&fit, &report));
     write_report(args, (&log, &stage), &report.findings, found, end)?;
     terminal::print(&summary(&fit, &report, &stage))?;
-    let page = args.report.as_ref().map(|folder| folder.join("index.html"));
+    let page = args.report.as_deref().map(report::page_in);
     let beside = posterior.filter(|_| fit.field.is_some());
     super::wrote([Some(args.out.clone()), beside, args.json.clone(), page])?;
     terminal::warn(&circumstances.warnings);

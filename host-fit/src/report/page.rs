@@ -96,7 +96,7 @@ impl Source<'_> {
         let page = self.html()?;
         output::make_folder(folder)?;
         Ok(output::write_atomically(
-            &folder.join("index.html"),
+            &super::page_in(folder),
             page.as_bytes(),
         )?)
     }
