@@ -151,3 +151,42 @@ impl TrainRow {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::dataset::Movement;
+    use crate::input::shipped::STAGE_TOML;
+    use runtime::ModelKind;
+
+    #[test]
+    fn thinning_leaves_rows_to_every_movement_that_moves() {
+        let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+        let truth = parameters::Parameters::designed(&stage);
+        let mut dataset = synthetic::Protocol::exact(truth, 20).dataset(&stage);
+        // A stage that was left standing for ten times as long as all movements took.
+        let moving = dataset.rows.len();
+        dataset.rows.resize(11 * moving, dataset.rows[0]);
+        for row in &mut dataset.rows[moving..] {
+            row.movement = dataset.movements.len();
+        }
+        dataset.movements.push(Movement {
+            log: 0,
+            index: 57,
+            rows: moving..11 * moving,
+        });
+        let all: Vec<usize> = (0..dataset.rows.len()).collect();
+        let problem = Problem::new(&dataset, &all, &stage, Model::of(ModelKind::M31));
+        let sizes = |most| -> Vec<usize> {
+            let thinned = problem.thinned(most);
+            thinned
+                .groups
+                .iter()
+                .map(|group| group.rows.len())
+                .collect()
+        };
+        // 2,000 rows are enough for all of the 57 that move; 100 are not, and are exceeded.
+        assert_eq!(sizes(2000), [vec![20; 57], vec![2]].concat());
+        assert_eq!(sizes(100), [vec![7; 57], vec![2]].concat());
+    }
+}
