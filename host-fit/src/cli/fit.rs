@@ -1,6 +1,6 @@
 //! `host-fit fit`.
 
-use self::told::{summary, write_report};
+use self::told::{add_report, summary};
 use super::args::Train;
 use super::check::Checked;
 use super::limit::Limits;
@@ -14,7 +14,7 @@ use crate::input::log::{BadRows, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
 use crate::output;
-use crate::output::{blob_file, posterior_file};
+use crate::output::{Outputs, blob_file, posterior_file};
 use crate::problem::draw::Draw;
 use crate::problem::model::MODELS;
 use crate::problem::parameters::Parameters;
@@ -223,8 +223,10 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
             });
         }
         Err(error) => {
+            let mut outputs = Outputs::default();
             if let Some(path) = &args.json {
-                super::write_json(&Checked::new(&log, Err(&error), findings.clone()), path)?;
+                let checked = Checked::new(&log, Err(&error), findings.clone());
+                outputs.add(path, super::json(&checked)?.as_bytes())?;
             }
             let ended = super::check::failed(error, &findings);
             let why = match (&ended, findings.first()) {
@@ -236,7 +238,9 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
                 }
                 _ => ended.to_string(),
             };
-            write_report(args, (&log, &stage), &findings, None, End::Failed(&why))?;
+            let end = (End::Failed(&why), &[][..]);
+            add_report(&mut outputs, args, (&log, &stage), &findings, None, end)?;
+            outputs.commit()?;
             return Err(ended);
         }
         Ok(fit) => fit,
@@ -268,35 +272,46 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
             }
         }
     }
+    let mut outputs = Outputs::default();
+    if let Some(path) = &args.json {
+        outputs.add(path, super::json(&report)?.as_bytes())?;
+    }
+    let found = Some((&fit, &report));
     match refusal {
         Some(cause) if args.force => {
             terminal::warn(&[format!("written all the same, as --force asks: {cause}")]);
         }
         Some(cause) => {
-            if let Some(path) = &args.json {
-                super::write_json(&report, path)?;
-            }
-            let end = End::Failed(&cause);
-            let found = Some((&fit, &report));
-            write_report(args, (&log, &stage), &report.findings, found, end)?;
+            let end = (End::Failed(&cause), &[][..]);
+            let findings = &report.findings;
+            add_report(&mut outputs, args, (&log, &stage), findings, found, end)?;
+            outputs.commit()?;
             terminal::tell(&report.findings);
             return Err(HostError::NotWritten { cause });
         }
         None => {}
     }
-    if let (Some(field), Some(path)) = (&fit.field, &posterior) {
-        posterior_file::write(path, &fit.set, &Known::of_fit(field))?;
-    }
-    blob_file::write(&args.out, &fit.set)?;
-    if let Some(path) = &args.json {
-        super::write_json(&report, path)?;
-    }
     let end = match interrupt::requested() {
         true => End::Interrupted,
         false => End::Written,
     };
-    let found = Some((&fit, &report));
-    write_report(args, (&log, &stage), &report.findings, found, end)?;
+    let blob = blob_file::to_bytes(&args.out, &fit.set)?;
+    let findings = &report.findings;
+    add_report(
+        &mut outputs,
+        args,
+        (&log, &stage),
+        findings,
+        found,
+        (end, &blob),
+    )?;
+    if let (Some(field), Some(path)) = (&fit.field, &posterior) {
+        let known = posterior_file::to_bytes(path, &fit.set, &Known::of_fit(field))?;
+        outputs.add(path, &known)?;
+    }
+    // The blob last: it is what the stage takes.
+    outputs.add(&args.out, &blob)?;
+    outputs.commit()?;
     terminal::print(&summary(&fit, &report, &stage))?;
     let page = args.report.as_deref().map(report::page_in);
     let beside = posterior.filter(|_| fit.field.is_some());

@@ -138,9 +138,14 @@ pub fn main() -> ExitCode {
 
 /// Writes a report as JSON to a file, or to standard output for `-`.
 fn write_json(report: &impl serde::Serialize, path: &Path) -> Result<(), HostError> {
+    Ok(write_atomically(path, json(report)?.as_bytes())?)
+}
+
+/// A report as JSON.
+fn json(report: &impl serde::Serialize) -> Result<String, HostError> {
     let mut text = serde_json::to_string_pretty(report)?;
     text.push('\n');
-    Ok(write_atomically(path, text.as_bytes())?)
+    Ok(text)
 }
 
 /// Says which files were written.

@@ -3,7 +3,7 @@
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::input::stage::Stage;
-use crate::output::{check_writable, make_folder, write_atomically};
+use crate::output::{Outputs, check_writable, make_folder};
 use crate::plan::plan;
 use crate::report;
 use crate::report::plan::PlanReport;
@@ -70,20 +70,21 @@ pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     }
     let plan = plan(&stage, args.seconds)?;
     let figures = PlanReport::new(&plan, &stage);
+    let mut outputs = Outputs::default();
     if let Some(path) = out {
         let trajectory = plan.run.trajectory(stage.servo_period_s);
         let csv = plan_file::to_csv(&trajectory, stage.servo_period_s);
-        write_atomically(path, csv.as_bytes())?;
+        outputs.add(path, csv.as_bytes())?;
     }
     if let Some(path) = json {
-        super::write_json(&figures, path)?;
+        outputs.add(path, super::json(&figures)?.as_bytes())?;
     }
-    if let Some(folder) = &args.report {
+    if let (Some(folder), Some(path)) = (&args.report, &page) {
         let page = PlanPage::new(&figures, &plan)?.to_html()?;
         make_folder(folder)?;
-        write_atomically(&report::page_in(folder), page.as_bytes())?;
+        outputs.add(path, page.as_bytes())?;
     }
+    outputs.commit()?;
     terminal::print(&figures.text())?;
-    let page = args.report.as_deref().map(report::page_in);
     super::wrote([args.out.clone(), args.json.clone(), page])
 }

@@ -391,3 +391,15 @@ fn no_output_takes_the_place_of_an_input() {
     std::fs::write(bench.path("stage.toml"), [&stage[..], b"# mine\n"].concat()).expect("written");
     taken("demo --out .");
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_leaves_the_others_as_they_were() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    bench.write("p.bin", "the blob before");
+    let fit = "fit log.csv --stage stage.toml --model 31 --out p.bin --json /dev/full";
+    bench.bad(fit, 3, &["/dev/full", "no room"]);
+    assert_eq!(bench.text("p.bin"), "the blob before");
+    assert!(bench.holds_only(&["log.csv", "p.bin"]));
+}

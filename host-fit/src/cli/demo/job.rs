@@ -164,7 +164,8 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
     let errors = pose_file_errors(pose_path, dataset, &stage, &model_31.solution.parameters)?;
     let service = Service::new(&stage, &set)?;
     if let Some(known) = &service.known {
-        posterior_file::write(posterior_path, &service.field, known)?;
+        let bytes = posterior_file::to_bytes(posterior_path, &service.field, known)?;
+        output::write_atomically(posterior_path, &bytes)?;
     }
     blob_file::write(field_path, &service.field)?;
     let constants = model_31
