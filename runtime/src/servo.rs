@@ -206,6 +206,12 @@ impl<'d> Servo<'d> {
         }
     }
 
+    /// Gives up a re-zero that runs; the zero deviation in use stays.
+    pub const fn cancel_rezero(&mut self) {
+        self.run = None;
+        self.rezero = RezeroState::Idle;
+    }
+
     /// Where the re-zero stands.
     pub const fn rezero_state(&self) -> RezeroState {
         self.rezero
