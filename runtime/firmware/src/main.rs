@@ -55,6 +55,7 @@ mod app {
     use firmware::slots::{self, Loaded};
     use firmware::telemetry::{Counters, Ended, STAGE};
     use hal_adapters::adc::FrameSampler;
+    use hal_adapters::can::Layout;
     use runtime::{OnInvalid, Servo};
     use stm32f4xx_hal::gpio::PinState;
     use stm32f4xx_hal::pac::TIM2;
@@ -136,7 +137,12 @@ mod app {
                 schedule,
                 open: None,
                 acquisition,
-                node: Node::new(parameters, watchdog_reset),
+                node: Node::new(
+                    parameters,
+                    watchdog_reset,
+                    Layout::for_bits(Converter::CODE_BITS),
+                )
+                .recording(cfg!(feature = "record")),
                 watchdog,
                 led: parts.led,
                 overrun_ticks: 0,
@@ -196,6 +202,7 @@ mod app {
         let facts = Facts {
             missed_ticks: schedule.missed(),
             bus_off: bus.bus_off(),
+            ..Facts::default()
         };
         let sample = sample.map_err(|fault| SampleFault::from(&fault));
         let reading = node.tick(sample, &facts, &mut Fpu, &mut bus.outbox);
