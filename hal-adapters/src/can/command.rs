@@ -118,10 +118,16 @@ pub enum Outcome {
     Drifted = 7,
     /// Another request is still running.
     Busy = 8,
+    /// The servo is on: declare it off first.
+    ServoOn = 9,
+    /// The stage stands too far from its zero; the detail is the axis, 0 to 5 for X, Y, Rz, Z, Rx, Ry.
+    OutOfBounds = 10,
+    /// A tick lay outside the calibrated range; the detail is its status.
+    Extrapolated = 11,
 }
 
 impl Outcome {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 12] = [
         Self::Done,
         Self::Started,
         Self::UnknownCommand,
@@ -131,6 +137,9 @@ impl Outcome {
         Self::Moved,
         Self::Drifted,
         Self::Busy,
+        Self::ServoOn,
+        Self::OutOfBounds,
+        Self::Extrapolated,
     ];
 
     /// Outcome and detail of a refused re-zero.
@@ -140,6 +149,8 @@ impl Outcome {
             RezeroRefusal::NoPose { status } => (Self::NoPose, status.bits()),
             RezeroRefusal::Moved { axis, .. } => (Self::Moved, u32::from(axis)),
             RezeroRefusal::Drifted { axis, .. } => (Self::Drifted, u32::from(axis)),
+            RezeroRefusal::OutOfBounds { axis, .. } => (Self::OutOfBounds, u32::from(axis)),
+            RezeroRefusal::Extrapolated { status } => (Self::Extrapolated, status.bits()),
         }
     }
 }
