@@ -197,7 +197,8 @@ mod app {
         }
         let Some(tick) = open.take() else { return };
 
-        let sample = acquisition.sample(tick.sequence, tick.started_us, &mut Cycles);
+        let sampled_us = tick.started_us.wrapping_add(Converter::SAMPLE_US);
+        let sample = acquisition.sample(tick.sequence, sampled_us, &mut Cycles);
         bus.start_tick();
         let facts = Facts {
             missed_ticks: schedule.missed(),
