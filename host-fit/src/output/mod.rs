@@ -9,7 +9,7 @@ pub mod pose_file;
 pub mod posterior_file;
 
 use std::fs::{self, Metadata, OpenOptions};
-use std::io::{ErrorKind, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// Why an output was not written. The target is as it was before.
@@ -93,6 +93,92 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
         existing => replace(&target, bytes, existing),
     }
     .map_err(explain)
+}
+
+/// An output that grows as long as a run takes. It takes the place of its target when it is
+/// [finished](Self::finish), and is gone if it never is. A device or pipe is written to directly, and so is standard output
+/// for `-`.
+#[derive(Debug)]
+pub struct GrowingFile {
+    path: PathBuf,
+    target: PathBuf,
+    existing: Option<Metadata>,
+    file: BufWriter<Sink>,
+}
+
+#[derive(Debug)]
+enum Sink {
+    Whole(tempfile::NamedTempFile),
+    Stream(fs::File),
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match self {
+            Self::Whole(file) => file.write(bytes),
+            Self::Stream(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        match self {
+            Self::Whole(file) => file.flush(),
+            Self::Stream(file) => file.flush(),
+        }
+    }
+}
+
+impl GrowingFile {
+    /// An empty output.
+    ///
+    /// # Errors
+    /// Every variant of [`OutputError`] but `Full`.
+    pub fn create(path: &Path) -> Result<Self, OutputError> {
+        let path = if is_standard(path) {
+            Path::new("/dev/stdout")
+        } else {
+            path
+        };
+        let (target, existing) = resolve(path)?;
+        let folder = folder_of(&target);
+        let is_stream = existing.as_ref().is_some_and(|it| is_stream(path, it));
+        let sink = if is_stream {
+            OpenOptions::new().append(true).open(path).map(Sink::Stream)
+        } else {
+            temporary(&folder).map(Sink::Whole)
+        };
+        let sink = sink.map_err(|source| explain(source, path, &folder, 0))?;
+        Ok(Self {
+            path: path.to_path_buf(),
+            target,
+            existing,
+            file: BufWriter::new(sink),
+        })
+    }
+
+    /// Writes a line.
+    ///
+    /// # Errors
+    /// `Full`, `Failed`.
+    pub fn line(&mut self, text: impl std::fmt::Display) -> Result<(), OutputError> {
+        writeln!(self.file, "{text}")
+            .map_err(|source| explain(source, &self.path, &folder_of(&self.target), 0))
+    }
+
+    /// Puts it in the place of its target.
+    ///
+    /// # Errors
+    /// `Full`, `NotPermitted`, `Failed`.
+    pub fn finish(self) -> Result<(), OutputError> {
+        let folder = folder_of(&self.target);
+        let sink = self.file.into_inner().map_err(|error| error.into_error());
+        let put = |sink| match sink {
+            Sink::Whole(file) => put(file, &self.target, self.existing),
+            Sink::Stream(mut file) => file.flush(),
+        };
+        sink.and_then(put)
+            .map_err(|source| explain(source, &self.path, &folder, 0))
+    }
 }
 
 /// Whether a name means standard output, or standard input: `-`.
@@ -209,9 +295,18 @@ fn temporary(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
 
 /// Puts a new file in the place of `target`.
 fn replace(target: &Path, bytes: &[u8], existing: Option<Metadata>) -> std::io::Result<()> {
-    let folder = folder_of(target);
-    let mut file = temporary(&folder)?;
+    let mut file = temporary(&folder_of(target))?;
     file.as_file_mut().write_all(bytes)?;
+    put(file, target, existing)
+}
+
+/// Puts a file that is complete in the place of `target`.
+fn put(
+    file: tempfile::NamedTempFile,
+    target: &Path,
+    existing: Option<Metadata>,
+) -> std::io::Result<()> {
+    let folder = folder_of(target);
     if let Some(metadata) = existing {
         file.as_file().set_permissions(metadata.permissions())?;
     }
