@@ -16,7 +16,7 @@
 #define HALL_DECODER_WORDS 114
 
 // Words of a servo.
-#define HALL_SERVO_WORDS 49
+#define HALL_SERVO_WORDS 56
 
 // In place of a code that could not be read: INT32_MIN.
 #define HALL_MISSING_CODE INT32_MIN
@@ -38,6 +38,9 @@
 
 // The frame repeats an earlier sequence number.
 #define HALL_STATUS_FRAME_REPEATED (1 << 18)
+
+// A zero deviation is subtracted from X, Y, Rz. No fault.
+#define HALL_STATUS_ZERO_SET (1 << 19)
 
 // What became of a call. 32 bits wide, whatever a compiler makes of enums.
 enum HallResult
@@ -88,7 +91,7 @@ enum HallRezero
   HALL_REZERO_RUNNING = 1,
   // It ended, and the zero deviation is in use.
   HALL_REZERO_DONE = 2,
-  // Refused: fewer than two ticks were asked for.
+  // Refused: fewer than 250 ticks were asked for.
   HALL_REZERO_TOO_SHORT = 3,
   // Refused: a tick gave no planar pose.
   HALL_REZERO_NO_POSE = 4,
@@ -96,6 +99,10 @@ enum HallRezero
   HALL_REZERO_MOVED = 5,
   // Refused: the pose drifted.
   HALL_REZERO_DRIFTED = 6,
+  // Refused: the stage stands too far from its zero, or is lifted or tilted.
+  HALL_REZERO_OUT_OF_BOUNDS = 7,
+  // Refused: a pose lies outside the calibrated range.
+  HALL_REZERO_EXTRAPOLATED = 8,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -127,7 +134,8 @@ typedef struct {
   uint32_t time_us;
 } HallFrame;
 
-// A pose and what is wrong with it: status 0 is all good. Invalid fields are 0 unless held.
+// A pose and what is wrong with it: all is good when the status is 0, or HALL_STATUS_ZERO_SET
+// alone. Invalid fields are 0 unless held.
 typedef struct {
   // Displacement along X, m.
   float x_m;
@@ -208,7 +216,8 @@ void hall_tick_without_frame(HallServo *servo, HallReading *reading);
 // Forgets the pose to hold and the sequence; zero deviation and counters stay.
 void hall_forget(HallServo *servo);
 
-// Starts to average at rest, over `ticks` ticks with the default limits of movement.
+// Starts to average at rest, over `ticks` ticks (250 or more) with the default limits of
+// movement and of the zero deviation.
 void hall_rezero_start(HallServo *servo, uint16_t ticks);
 
 // Where the re-zero stands.

@@ -19,13 +19,21 @@
 //! | Feature Select | 0x03 | 0x00 | 0x42: channel and device address follow each code, device address 1 |
 //! | Channel n Input Range | 0x05 + n | 0x00 | 0: +-2.5 times the reference |
 //!
+//! **Power-up.** The internal reference needs 15 ms until codes are right (table 6.5 and section
+//! PWR_DN), and the part does not tell. A start cannot know whether the power has just come, so that
+//! samples are [`NotReady`](AdcError::NotReady) for [`REFERENCE_US`] after every start. RST/PD is
+//! held high: low for 40 to 100 ns it is a reset, for more than 400 ns it switches the part off,
+//! reference included.
+//!
 //! **Check.** The part has neither an identification register nor a CRC. At start, reset
 //! values that read back correctly show that it is there. Later each code is followed by its
 //! channel (4 bits), the device address (2 bits, here 01: a line stuck at 0 or at 1 fails) and
 //! two zeros, and all of these are checked. A flipped bit in the code itself goes unnoticed:
-//! prefer the [ADS131M08](super::ads131m08) on long cables.
+//! prefer the [ADS131M08](super::ads131m08) on long cables. After the codes each tick reads one
+//! register back: all of them in turn, in 22 ms. (It comes last because only the AUTO_RST of the
+//! next tick starts the sequence again.)
 //!
-//! **Timing.** Seven frames of 40 bits: 28 us at 10.5 MHz, plus chip select between them. From
+//! **Timing.** Eight frames of 40 bits: 31 us at 10.5 MHz, plus chip select between them. From
 //! sample to sample it takes one frame, at least 3.8 us; the part needs 2 us.
 //!
 //! **Skew.** Channels are sampled one frame apart, about 5 us. Put the three Hall probes on
@@ -35,7 +43,9 @@
 //! 7 parts per million and the planar pose by 5 nm.
 //!
 //! **Range.** +-10.24 V with the internal reference of 4.096 V, 312.5 uV per code, straight
-//! binary: 0 is the lower rail. Codes here are signed, -32768 to 32767, as in `stage.toml`.
+//! binary: 0 is the lower rail. Codes here are signed, -32768 to 32767, as in `stage.toml`. The
+//! inputs have 1 MOhm: one that is not connected reads about 0, see the wiring table of the firmware
+//! for the resistor that makes it read a rail.
 
 use super::channels::INPUTS;
 use super::{AdcError, Channels, FrameSampler, silent};
@@ -56,11 +66,15 @@ const AUTO_SEQ_EN_AT_RESET: u8 = 0xff;
 const POWER_DOWN: u8 = 0x02;
 const FEATURES: u8 = 0x03;
 const RANGE_0: u8 = 0x05;
+const LAST_REGISTER: u8 = 0x0c;
 
 /// Bits 7..6: device address 1. Bits 2..0: code, channel and device address on SDO.
 const FEATURES_WANTED: u8 = 0x42;
 const DEVICE_SIGNATURE: u8 = 0b01_00;
 const RANGE_10_24_V: u8 = 0;
+
+/// 15 ms for the reference with 22 uF, and 9 ms of margin.
+pub const REFERENCE_US: u32 = 24_000;
 
 /// Straight binary to signed.
 const ZERO_VOLT: i32 = 0x8000;
@@ -71,6 +85,19 @@ pub struct Ads8688<SPI, RST> {
     spi: SPI,
     reset: RST,
     channels: Channels,
+    /// Register that the next tick reads back.
+    turn: u8,
+    reference: Reference,
+}
+
+/// Whether codes can be right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reference {
+    /// The part was started and not sampled since.
+    Started,
+    /// First sampled at this time, us.
+    SettlingSince(u32),
+    Settled,
 }
 
 impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
@@ -80,6 +107,8 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
             spi,
             reset,
             channels,
+            turn: AUTO_SEQ_EN,
+            reference: Reference::Started,
         }
     }
 
@@ -102,10 +131,19 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
         Ok(value)
     }
 
-    /// Writes a register and reads it back.
-    fn set(&mut self, register: u8, wanted: u8) -> Result<(), AdcError<SPI::Error>> {
-        self.exchange(u16::from(register) << 9 | 1 << 8 | u16::from(wanted))?;
-        let found = self.read(register)?;
+    /// The value that a register must have: 0x01 to 0x0c.
+    const fn wanted(&self, register: u8) -> u8 {
+        match register {
+            AUTO_SEQ_EN => self.channels.mask(),
+            POWER_DOWN => !self.channels.mask(),
+            FEATURES => FEATURES_WANTED,
+            _ => RANGE_10_24_V,
+        }
+    }
+
+    /// Reads a register and compares it.
+    fn check(&mut self, register: u8) -> Result<(), AdcError<SPI::Error>> {
+        let (found, wanted) = (self.read(register)?, self.wanted(register));
         if found != wanted {
             return Err(AdcError::WrongSetting {
                 register,
@@ -114,6 +152,25 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
             });
         }
         Ok(())
+    }
+
+    /// Writes a register and reads it back.
+    fn set(&mut self, register: u8) -> Result<(), AdcError<SPI::Error>> {
+        let value = u16::from(self.wanted(register));
+        self.exchange(u16::from(register) << 9 | 1 << 8 | value)?;
+        self.check(register)
+    }
+
+    /// Whether the reference has settled at `now_us`.
+    const fn settled(&mut self, now_us: u32) -> bool {
+        self.reference = match self.reference {
+            Reference::Started => Reference::SettlingSince(now_us),
+            Reference::SettlingSince(us) if now_us.wrapping_sub(us) < REFERENCE_US => {
+                Reference::SettlingSince(us)
+            }
+            Reference::SettlingSince(_) | Reference::Settled => Reference::Settled,
+        };
+        matches!(self.reference, Reference::Settled)
     }
 }
 
@@ -126,7 +183,14 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
     /// The part converts while it is read.
     const SETTLE_US: u32 = 0;
 
+    /// The second of three neighbouring Hall probes: two frames after the trigger.
+    const SAMPLE_US: u32 = 10;
+
+    const CODE_BITS: u32 = 16;
+
     fn start(&mut self, _delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
+        self.reference = Reference::Started;
+        self.turn = AUTO_SEQ_EN;
         self.reset.set_high().map_err(|e| AdcError::Pin(e.kind()))?;
         self.exchange(RST)?;
         let found = self.read(AUTO_SEQ_EN)?;
@@ -136,12 +200,12 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
                 expected: AUTO_SEQ_EN_AT_RESET.into(),
             });
         }
+        for register in [AUTO_SEQ_EN, POWER_DOWN, FEATURES] {
+            self.set(register)?;
+        }
         let read = self.channels.mask();
-        self.set(AUTO_SEQ_EN, read)?;
-        self.set(POWER_DOWN, !read)?;
-        self.set(FEATURES, FEATURES_WANTED)?;
         for input in (0..8).filter(|input| read & 1 << input != 0) {
-            self.set(RANGE_0 + input, RANGE_10_24_V)?;
+            self.set(RANGE_0 + input)?;
         }
         Ok(())
     }
@@ -166,6 +230,16 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
                 });
             }
             *code = i32::from(u16::from_be_bytes([high, low])) - ZERO_VOLT;
+        }
+        let register = self.turn;
+        self.turn = match register {
+            LAST_REGISTER.. => AUTO_SEQ_EN,
+            FEATURES => RANGE_0,
+            _ => register + 1,
+        };
+        self.check(register)?;
+        if !self.settled(time_us) {
+            return Err(AdcError::NotReady { ready: 0, read });
         }
         Ok(self.channels.frame(&codes, sequence, time_us))
     }

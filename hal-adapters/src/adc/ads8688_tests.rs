@@ -71,8 +71,73 @@ fn try_start(expected: Vec<Transaction<u8>>) -> Result<(), AdcError<ErrorKind>> 
     on_part(&expected, &levels, |adc| adc.start(&mut NoopDelay::new()))
 }
 
+/// What a part gives whose reference has settled.
 fn try_sample(expected: Vec<Transaction<u8>>) -> Result<RawFrame, AdcError<ErrorKind>> {
-    on_part(&expected, &[], |adc| adc.sample(7, 14_000))
+    on_part(&expected, &[], |adc| {
+        adc.reference = Reference::Settled;
+        adc.sample(7, 14_000)
+    })
+}
+
+/// Codes, and the register that is read back after them.
+fn tick(register: u8, value: u8) -> Vec<Transaction<u8>> {
+    [sampled(ZERO), frame([register << 1, 0], [value, 0, 0])].concat()
+}
+
+#[test]
+fn codes_count_from_24_ms_after_the_first_sample_of_a_start() {
+    let ticks = [tick(0x01, 0x3f), tick(0x02, 0xc0), tick(0x03, 0x42)];
+    let all = [started(), ticks.concat(), started(), tick(0x01, 0x3f)].concat();
+    let levels = [
+        PinTransaction::set(State::High),
+        PinTransaction::set(State::High),
+    ];
+    on_part(&all, &levels, |adc| {
+        let not_ready = Err(AdcError::NotReady {
+            ready: 0,
+            read: 0x3f,
+        });
+        let first = u32::MAX - 10_000; // The timer wraps in between.
+        assert_eq!(adc.start(&mut NoopDelay::new()), Ok(()));
+        assert_eq!(adc.sample(0, first), not_ready);
+        assert_eq!(adc.sample(1, first.wrapping_add(23_999)), not_ready);
+        assert!(adc.sample(2, first.wrapping_add(24_000)).is_ok());
+        assert_eq!(adc.start(&mut NoopDelay::new()), Ok(()));
+        assert_eq!(adc.sample(3, first.wrapping_add(26_000)), not_ready);
+    });
+}
+
+#[test]
+fn every_register_is_read_back_in_turn() {
+    let wanted = [
+        (0x01, 0x3f),
+        (0x02, 0xc0),
+        (0x03, 0x42),
+        (0x05, 0),
+        (0x06, 0),
+        (0x07, 0),
+        (0x08, 0),
+        (0x09, 0),
+        (0x0a, 0),
+        (0x0b, 0),
+        (0x0c, 0),
+    ];
+    for (wrong, (register, value)) in wanted.into_iter().enumerate() {
+        let good = wanted.iter().cycle().take(11 + wrong);
+        let mut all: Vec<_> = good.flat_map(|(r, v)| tick(*r, *v)).collect();
+        all.extend(tick(register, value ^ 1));
+        on_part(&all, &[], |adc| {
+            adc.reference = Reference::Settled;
+            assert!((0..11 + wrong).all(|_| adc.sample(0, 0).is_ok()));
+            let (found, wanted) = (u16::from(value ^ 1), u16::from(value));
+            let error = AdcError::WrongSetting {
+                register,
+                found,
+                wanted,
+            };
+            assert_eq!(adc.sample(0, 0), Err(error));
+        });
+    }
 }
 
 #[test]
@@ -96,7 +161,8 @@ fn codes_are_signed_around_half_scale_and_rails_stay_rails() {
         sequence: 7,
         time_us: 14_000,
     };
-    assert_eq!(try_sample(sampled(codes)), Ok(want));
+    let all = [sampled(codes), frame([0x02, 0], [0x3f, 0, 0])].concat();
+    assert_eq!(try_sample(all), Ok(want));
 }
 
 #[test]

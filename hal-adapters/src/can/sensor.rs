@@ -31,6 +31,15 @@ impl Layout {
         }
     }
 
+    /// The layout for a converter of so many bits.
+    pub const fn for_bits(code_bits: u32) -> Self {
+        if code_bits <= 16 {
+            Self::Bits16
+        } else {
+            Self::Bits24
+        }
+    }
+
     /// The narrowest layout that holds every code from `low` to `high`, or `None` if 24 bits
     /// are too few.
     pub const fn that_holds(low: i32, high: i32) -> Option<Self> {

@@ -11,6 +11,7 @@ use clap::builder::PossibleValue;
 use hal_adapters::can::Layout;
 use runtime::OnInvalid;
 use std::str::FromStr;
+use std::time::Duration;
 
 /// How many rows are fitted: a number, or `None` for `all`.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +26,14 @@ impl FromStr for Train {
             (_, Ok(rows)) if rows > 0 => Ok(Self(Some(rows))),
             _ => Err("expected `all` or a number of rows, 1 or more"),
         }
+    }
+}
+
+/// How long a bus is watched.
+pub(super) fn seconds(text: &str) -> Result<Duration, &'static str> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(Duration::from_secs_f64(seconds)),
+        _ => Err("expected a number of seconds above 0"),
     }
 }
 

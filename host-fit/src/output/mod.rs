@@ -5,6 +5,7 @@
 
 pub mod blob_file;
 pub mod export;
+pub mod growing_file;
 pub mod pose_file;
 pub mod posterior_file;
 
@@ -286,11 +287,16 @@ fn written(
 ) -> std::io::Result<tempfile::NamedTempFile> {
     let mut file = temporary(folder)?;
     file.as_file_mut().write_all(bytes)?;
+    complete(&file, existing)?;
+    Ok(file)
+}
+
+/// Gives a file the permissions of the one that it replaces, and waits until it is on the disk.
+fn complete(file: &tempfile::NamedTempFile, existing: Option<Metadata>) -> std::io::Result<()> {
     if let Some(metadata) = existing {
         file.as_file().set_permissions(metadata.permissions())?;
     }
-    file.as_file().sync_all()?;
-    Ok(file)
+    file.as_file().sync_all()
 }
 
 /// Puts a new file in the place of `target`.

@@ -118,7 +118,8 @@ pub extern "C" fn hall_forget(servo: Option<&mut HallServo>) {
     }
 }
 
-/// Starts to average at rest, over `ticks` ticks with the default limits of movement.
+/// Starts to average at rest, over `ticks` ticks (250 or more) with the default limits of
+/// movement and of the zero deviation.
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_rezero_start(servo: Option<&mut HallServo>, ticks: u16) {
     if let Some(servo) = servo {
@@ -141,6 +142,8 @@ pub extern "C" fn hall_rezero_state(servo: Option<&HallServo>) -> HallRezero {
             RezeroRefusal::NoPose { .. } => HallRezero::NoPose,
             RezeroRefusal::Moved { .. } => HallRezero::Moved,
             RezeroRefusal::Drifted { .. } => HallRezero::Drifted,
+            RezeroRefusal::OutOfBounds { .. } => HallRezero::OutOfBounds,
+            RezeroRefusal::Extrapolated { .. } => HallRezero::Extrapolated,
         },
     }
 }

@@ -6,7 +6,7 @@ use runtime::{AnyDecoder, Servo};
 /// Words of a decoder.
 pub const HALL_DECODER_WORDS: usize = 114;
 /// Words of a servo.
-pub const HALL_SERVO_WORDS: usize = 49;
+pub const HALL_SERVO_WORDS: usize = 56;
 
 /// A decoder, as C sees it. Its contents are private.
 #[repr(C)]

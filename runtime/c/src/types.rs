@@ -44,7 +44,7 @@ pub enum HallRezero {
     Running = 1,
     /// It ended, and the zero deviation is in use.
     Done = 2,
-    /// Refused: fewer than two ticks were asked for.
+    /// Refused: fewer than 250 ticks were asked for.
     TooShort = 3,
     /// Refused: a tick gave no planar pose.
     NoPose = 4,
@@ -52,6 +52,10 @@ pub enum HallRezero {
     Moved = 5,
     /// Refused: the pose drifted.
     Drifted = 6,
+    /// Refused: the stage stands too far from its zero, or is lifted or tilted.
+    OutOfBounds = 7,
+    /// Refused: a pose lies outside the calibrated range.
+    Extrapolated = 8,
 }
 
 /// The codes of one servo period.
@@ -80,7 +84,8 @@ pub struct HallPlanarPose {
     pub rz_rad: f32,
 }
 
-/// A pose and what is wrong with it: status 0 is all good. Invalid fields are 0 unless held.
+/// A pose and what is wrong with it: all is good when the status is 0, or HALL_STATUS_ZERO_SET
+/// alone. Invalid fields are 0 unless held.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct HallReading {
@@ -112,6 +117,8 @@ pub const HALL_STATUS_VERTICAL_HELD: u32 = 1 << 16;
 pub const HALL_STATUS_FRAMES_MISSED: u32 = 1 << 17;
 /// The frame repeats an earlier sequence number.
 pub const HALL_STATUS_FRAME_REPEATED: u32 = 1 << 18;
+/// A zero deviation is subtracted from X, Y, Rz. No fault.
+pub const HALL_STATUS_ZERO_SET: u32 = 1 << 19;
 
 const _: () = assert!(HALL_STATUS_PLANAR_INVALID == runtime::Status::PLANAR_INVALID.bits());
 const _: () = assert!(HALL_STATUS_VERTICAL_INVALID == runtime::Status::VERTICAL_INVALID.bits());
@@ -119,6 +126,7 @@ const _: () = assert!(HALL_STATUS_PLANAR_HELD == runtime::Status::PLANAR_HELD.bi
 const _: () = assert!(HALL_STATUS_VERTICAL_HELD == runtime::Status::VERTICAL_HELD.bits());
 const _: () = assert!(HALL_STATUS_FRAMES_MISSED == runtime::Status::FRAMES_MISSED.bits());
 const _: () = assert!(HALL_STATUS_FRAME_REPEATED == runtime::Status::FRAME_REPEATED.bits());
+const _: () = assert!(HALL_STATUS_ZERO_SET == runtime::Status::ZERO_SET.bits());
 const _: () = assert!(HALL_MISSING_CODE == runtime::frame::MISSING_CODE);
 
 /// Counters since start. They stay at their largest value.

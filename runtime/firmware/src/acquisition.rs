@@ -26,7 +26,7 @@ impl<A: FrameSampler> Acquisition<A> {
     pub const fn new(converter: A) -> Self {
         Self {
             converter,
-            watch: StuckWatch::NEW,
+            watch: StuckWatch::new(A::CODE_BITS),
             trigger_fault: None,
             faults_in_a_row: 0,
             faults: 0,
@@ -123,6 +123,8 @@ mod tests {
         const SPI_MODE: Mode = MODE_1;
         const SPI_HZ_MAX: u32 = 25_000_000;
         const SETTLE_US: u32 = 110;
+        const SAMPLE_US: u32 = 60;
+        const CODE_BITS: u32 = 16;
 
         fn start(&mut self, _: &mut impl DelayNs) -> Result<(), AdcError<ErrorKind>> {
             self.set_up = !self.broken;
@@ -143,8 +145,8 @@ mod tests {
             }
             self.code += 1;
             Ok(RawFrame {
-                hall: [self.code, 0, 0],
-                capacitive: [0; 3],
+                hall: [self.code; 3],
+                capacitive: [self.code; 3],
                 sequence,
                 time_us,
             })

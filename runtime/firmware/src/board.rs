@@ -52,10 +52,16 @@ pub fn clocks() -> Config {
         .pclk2(Hertz::from_raw(BUS_2_HZ))
 }
 
-/// SPI clock: the fastest that the converter allows. SPI divides its bus clock by a power of two.
+/// What the board allows: data come up to 20 ns after the edge that shifts them (ADS131M08, 3 V)
+/// and must be there 6.5 ns (F405) before the edge that samples them, half a period later. 10.5 MHz
+/// leaves 21 ns for wires and buffers, 21 MHz would be 3 ns too fast.
+const SPI_HZ_MAX: u32 = 12_000_000;
+
+/// SPI clock: the fastest that board and converter allow. SPI divides its bus clock by a power of
+/// two.
 const SPI_HZ: u32 = {
     let mut hz = BUS_2_HZ / 2;
-    while hz > Converter::SPI_HZ_MAX {
+    while hz > Converter::SPI_HZ_MAX || hz > SPI_HZ_MAX {
         hz /= 2;
     }
     hz

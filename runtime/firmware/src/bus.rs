@@ -91,7 +91,7 @@ impl Bus {
         if !self.joined {
             return;
         }
-        while let Some(coded) = self.outbox.front() {
+        while let Some(coded) = self.outbox.front(self.can.is_transmitter_idle()) {
             if let Some(frame) = coded.to_frame::<Frame>() {
                 match self.can.transmit(&frame) {
                     Err(_) => return,

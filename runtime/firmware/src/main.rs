@@ -55,6 +55,7 @@ mod app {
     use firmware::slots::{self, Loaded};
     use firmware::telemetry::{Counters, Ended, STAGE};
     use hal_adapters::adc::FrameSampler;
+    use hal_adapters::can::Layout;
     use runtime::{OnInvalid, Servo};
     use stm32f4xx_hal::gpio::PinState;
     use stm32f4xx_hal::pac::TIM2;
@@ -136,7 +137,12 @@ mod app {
                 schedule,
                 open: None,
                 acquisition,
-                node: Node::new(parameters, watchdog_reset),
+                node: Node::new(
+                    parameters,
+                    watchdog_reset,
+                    Layout::for_bits(Converter::CODE_BITS),
+                )
+                .recording(cfg!(feature = "record")),
                 watchdog,
                 led: parts.led,
                 overrun_ticks: 0,
@@ -191,11 +197,13 @@ mod app {
         }
         let Some(tick) = open.take() else { return };
 
-        let sample = acquisition.sample(tick.sequence, tick.started_us, &mut Cycles);
+        let sampled_us = tick.started_us.wrapping_add(Converter::SAMPLE_US);
+        let sample = acquisition.sample(tick.sequence, sampled_us, &mut Cycles);
         bus.start_tick();
         let facts = Facts {
             missed_ticks: schedule.missed(),
             bus_off: bus.bus_off(),
+            ..Facts::default()
         };
         let sample = sample.map_err(|fault| SampleFault::from(&fault));
         let reading = node.tick(sample, &facts, &mut Fpu, &mut bus.outbox);
