@@ -37,8 +37,8 @@
 //! most 37 us, 1.2 us per byte): they are then the mean, weighted by the sinc3 filter, of the 96 us
 //! up to 192 us, or 203 us, after the trigger: the middle is
 //! [`SAMPLE_US`](FrameSampler::SAMPLE_US) = 144 us, or 155 us, after it. A part that drops the
-//! newest conversion, or needs the fourth frame, is one or two conversions of 32 us later: 0.15 or
-//! 0.3 um at the fastest motion of a service log (4.8 mm/s).
+//! newest conversion, or needs the fourth frame, is a conversion of 32 us later: 0.15 um at the
+//! fastest motion of a service log (4.8 mm/s). Whichever it is, it is the same in every tick.
 //!
 //! The pulse must be shorter than 2048 periods of CLKIN, 256 us; a longer one is a reset. The part
 //! ignores a pulse that coincides with the end of a conversion, which then is settled anyway. At

@@ -179,3 +179,6 @@ impl Adc {
         }
     }
 }
+
+#[cfg(test)]
+mod driver_tests;

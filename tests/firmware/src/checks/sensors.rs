@@ -18,6 +18,28 @@ const LASTS: u64 = 300;
 /// The converter is started again after so many ticks without codes.
 const RESTART: u64 = 16;
 
+/// What happens to a converter.
+#[derive(Clone, Copy)]
+enum Event {
+    Fault(AdcFault),
+    /// Bits of a register change by themselves.
+    Flip {
+        register: u8,
+        bits: u16,
+    },
+    PowerLoss,
+}
+
+impl Event {
+    fn happen(self, adc: &mut Adc, now_ns: u64) {
+        match self {
+            Self::Fault(fault) => adc.fault = fault,
+            Self::Flip { register, bits } => adc.flip(register, bits, now_ns),
+            Self::PowerLoss => adc.power_up(now_ns),
+        }
+    }
+}
+
 /// How long a fault lasts.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Lasts {
@@ -32,7 +54,7 @@ enum Lasts {
 /// What a fault must look like from the bus.
 pub struct Case {
     name: String,
-    begin: Box<dyn Fn(&mut Adc, u64)>,
+    event: Event,
     lasts: Lasts,
     /// States and reasons in the status frames, any of these.
     told: Vec<(NodeState, u8)>,
@@ -69,7 +91,7 @@ impl Case {
     fn of(name: &str, fault: AdcFault, told: &[(NodeState, u8)], part: Part) -> Self {
         Self {
             name: name.to_owned(),
-            begin: Box::new(move |adc, _| adc.fault = fault),
+            event: Event::Fault(fault),
             lasts: Lasts::Long,
             told: told.to_vec(),
             within: 1,
@@ -87,7 +109,7 @@ impl Case {
             NOT_READY,
         ];
         Self {
-            begin: Box::new(move |adc, now_ns| adc.flip(register, bits, now_ns)),
+            event: Event::Flip { register, bits },
             lasts: Lasts::UntilStarted,
             ..Self::of(name, AdcFault::None, &told, part)
         }
@@ -166,7 +188,7 @@ pub fn cases(part: Part) -> Vec<Case> {
         });
     }
     all.push(Case {
-        begin: Box::new(|adc, now_ns| adc.power_up(now_ns)),
+        event: Event::PowerLoss,
         lasts: Lasts::UntilStarted,
         told: vec![fault(5), fault(8), NOT_READY],
         ..Case::of("a short loss of power", AdcFault::None, &[], part)
@@ -245,7 +267,7 @@ pub fn survives(bench: &Bench, part: Part, case: &Case) -> Outcome {
     })?;
 
     let now_ns = machine.chip.now_ns;
-    (case.begin)(&mut machine.chip.adc, now_ns);
+    case.event.happen(&mut machine.chip.adc, now_ns);
     let lasts = match case.lasts {
         Lasts::Long => LASTS,
         Lasts::OneTick | Lasts::UntilStarted => 1,
