@@ -127,7 +127,7 @@ fn an_ads131m08_is_sampled_where_its_driver_says() {
             for instant in instants_us(Part::Ads131m08, variant, byte_ns, AN_ADS131M08) {
                 let late = instant - nominal;
                 let place = format!("{variant:?}, {byte_ns} ns a byte: {late} us late");
-                let plain = !variant.late_pop && !(variant.gated && variant.wait == 300);
+                let plain = !(variant.late_pop || variant.gated && variant.wait == 300);
                 let latest = match byte_ns {
                     ..=1200 if plain => 12.0,
                     ..=1200 => 44.0,
