@@ -374,7 +374,7 @@ pub fn every_variant(bench: &Bench) -> Outcome {
         for spi_byte_ns in [762, 1000, 1800] {
             let mut machine = bench.machine(Part::Ads131m08, [&bench.blob, &[]])?;
             machine.chip.adc.set_variant(variant);
-            machine.chip.spi_byte_ns = spi_byte_ns;
+            machine.chip.spi_byte_ns = Some(spi_byte_ns);
             machine.run_ticks(TICKS)?;
             let seen = Seen::since_last(&mut machine);
             let mut good = Comparison::default();
