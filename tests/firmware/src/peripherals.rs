@@ -1,7 +1,7 @@
 //! The peripherals of an STM32F405, as far as the program uses them. Time is that of the bench:
 //! it passes between interrupts and while bytes cross the SPI, and instructions take none.
 
-use crate::adc_model::{Adc, Part, Row};
+use crate::adc_model::{Adc, Input, Part, Row};
 use crate::can_model::CanModel;
 
 /// Address range of the peripherals: start and bytes.
@@ -31,6 +31,13 @@ pub const IRQ_CAN1_TX: u32 = 19;
 pub const IRQ_TIM2: u32 = 28;
 
 const US: u64 = 1000;
+/// From the supply until the program runs: the chip's own reset and its crystal. The converter
+/// has the same supply.
+const BOOT_NS: u64 = 2_500_000;
+/// Clock of the bus that SPI1 is on.
+const BUS_2_HZ: u64 = 84_000_000;
+/// What the program takes between two bytes, ns.
+const SPI_GAP_NS: u64 = 150;
 /// Nominal frequency of the watchdog's oscillator.
 const LSI_HZ: u64 = 32_000;
 
@@ -44,16 +51,14 @@ struct Alarm {
 pub struct Peripherals {
     /// Now, ns since the chip got its power.
     pub now_ns: u64,
-    /// Time of one byte on the SPI, ns.
-    pub spi_byte_ns: u64,
+    /// Time of one byte on the SPI in place of what its registers say, ns.
+    pub spi_byte_ns: Option<u64>,
     /// Bytes that went over the SPI.
     pub spi_bytes: u64,
     /// The converter.
     pub adc: Adc,
     /// The CAN controller.
     pub can: CanModel,
-    /// Rows that the converter plays, in a loop.
-    pub rows: Vec<Row>,
     /// What the timer reads when it is started, us: 0 on the chip.
     pub timer_offset_us: u32,
     /// When row 0 is played, ns: the first tick.
@@ -79,22 +84,17 @@ pub struct Peripherals {
     spi_in: u8,
     spi_full: bool,
     selected: bool,
-    sync: bool,
 }
 
 impl Peripherals {
     /// A chip after power-up.
     pub fn new(part: Part, rows: Vec<Row>) -> Self {
         let mut new = Self {
-            now_ns: 0,
-            spi_byte_ns: match part {
-                Part::Ads131m08 => 381,
-                Part::Ads8688 => 762,
-            },
+            now_ns: BOOT_NS,
+            spi_byte_ns: None,
             spi_bytes: 0,
-            adc: Adc::new(part),
+            adc: Adc::new(part, Input::held(rows)),
             can: CanModel::new(),
-            rows,
             timer_offset_us: 0,
             first_tick_ns: None,
             watchdog_ns: None,
@@ -112,7 +112,6 @@ impl Peripherals {
             spi_in: 0,
             spi_full: false,
             selected: false,
-            sync: true,
         };
         new.reset(1 << 27 | 1 << 26);
         new
@@ -133,14 +132,6 @@ impl Peripherals {
         let (sent, filled) = (std::mem::take(&mut self.can.sent), self.can.filled);
         self.can = CanModel::new();
         (self.can.sent, self.can.filled) = (sent, filled);
-    }
-
-    fn row(&mut self) -> Row {
-        let since = self
-            .now_ns
-            .saturating_sub(self.first_tick_ns.unwrap_or(self.now_ns));
-        let k = (since / (2000 * US)) as usize % self.rows.len().max(1);
-        self.rows.get(k).copied().unwrap_or_default()
     }
 
     fn timer_us(&self) -> u32 {
@@ -165,7 +156,8 @@ impl Peripherals {
                 alarm.at_ns = None;
                 self.timer_flags |= 2 << k;
                 if k == 0 {
-                    self.first_tick_ns.get_or_insert(at);
+                    let first_ns = *self.first_tick_ns.get_or_insert(at);
+                    self.adc.input.start_ns = Some(first_ns);
                 }
             }
         }
@@ -246,10 +238,14 @@ impl Peripherals {
             o if o == TIM2 + 0x38 => self.set_alarm(1, value),
             o if o == IWDG => self.key(value),
             o if o == SPI1 + 0x0c => {
-                self.spi_in = self.adc.exchange(value as u8);
+                let byte = self.adc.exchange(value as u8);
+                // Both converters need mode 1: in another one bits are shifted.
+                let mode_1 = self.words[SPI1 / 4] & 3 == 1;
+                self.spi_in = if mode_1 { byte } else { byte >> 1 };
                 self.spi_full = true;
                 self.spi_bytes += 1;
-                self.now_ns += self.spi_byte_ns;
+                let bits_ns = 8 * 1_000_000_000 / self.spi_hz();
+                self.now_ns += self.spi_byte_ns.unwrap_or(bits_ns + SPI_GAP_NS);
             }
             o if o == GPIOA + 0x18 || o == GPIOB + 0x18 || o == GPIOC + 0x18 => {
                 self.set_pins(o, value)
@@ -263,6 +259,11 @@ impl Peripherals {
             }
             _ => {}
         }
+    }
+
+    /// Clock of SPI1, Hz.
+    pub fn spi_hz(&self) -> u64 {
+        BUS_2_HZ >> (1 + (self.words[SPI1 / 4] >> 3 & 7))
     }
 
     fn set_alarm(&mut self, k: usize, compare: u32) {
@@ -297,22 +298,17 @@ impl Peripherals {
             o if o == GPIOA + 0x18 => match level(SELECT_PIN) {
                 Some(false) if !self.selected => {
                     self.selected = true;
-                    let row = self.row();
-                    self.adc.select(self.now_ns, row);
+                    self.adc.select(self.now_ns);
                 }
                 Some(true) if self.selected => {
                     self.selected = false;
-                    self.adc.deselect();
+                    self.adc.deselect(self.now_ns);
                 }
                 _ => {}
             },
             o if o == GPIOB + 0x18 => {
                 if let Some(high) = level(SYNC_PIN) {
-                    if high && !self.sync {
-                        let row = self.row();
-                        self.adc.sync(self.now_ns, row);
-                    }
-                    self.sync = high;
+                    self.adc.control(high, self.now_ns);
                 }
             }
             _ => self.led = level(LED_PIN).unwrap_or(self.led),
