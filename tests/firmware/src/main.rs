@@ -128,6 +128,14 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     });
     check("command: identify", &|| commands::identify(bench));
     check("command: re-zero", &|| commands::rezero(bench));
+    check("command: re-zero refused", &|| {
+        commands::rezero_refused(bench)
+    });
+    for (part, name) in parts {
+        check(&format!("command: record, {name}"), &|| {
+            commands::record(bench, part)
+        });
+    }
     check("command: odd ones", &|| commands::odd_commands(bench));
     check("command: any data length code", &|| {
         commands::any_length_code(bench)
