@@ -125,8 +125,8 @@ pub fn rezero(bench: &Bench) -> Outcome {
     )?;
     equal(
         "flag",
-        flags(&seen) & (flag::REZEROED | flag::REZERO_RUNS),
-        flag::REZEROED,
+        flags(&seen) & (flag::ZERO_SET | flag::REZERO_RUNS),
+        flag::ZERO_SET,
     )?;
     expect(x(&seen).abs() < 0.5e-6, || {
         format!("X is {:e} after", x(&seen))
