@@ -10,10 +10,12 @@ mod adc_model;
 mod bench;
 mod can_model;
 mod checks;
+mod clock_model;
 mod image;
 mod machine;
 mod peripherals;
 mod unicorn;
+mod watchdog_model;
 
 use adc_model::Part;
 use bench::Bench;
