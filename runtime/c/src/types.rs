@@ -3,6 +3,35 @@
 use runtime::servo::Health;
 use runtime::{PlanarPose, RawFrame, Reading};
 
+/// Major version of the library that this header belongs to.
+pub const HALL_RUNTIME_VERSION_MAJOR: u32 = 0;
+/// Minor version.
+pub const HALL_RUNTIME_VERSION_MINOR: u32 = 1;
+/// Patch version.
+pub const HALL_RUNTIME_VERSION_PATCH: u32 = 0;
+/// The version as one number that can be compared: major << 16, minor << 8, patch.
+pub const HALL_RUNTIME_VERSION: u32 = (HALL_RUNTIME_VERSION_MAJOR << 16)
+    | (HALL_RUNTIME_VERSION_MINOR << 8)
+    | HALL_RUNTIME_VERSION_PATCH;
+
+const _: () = {
+    const fn is(number: u32, text: &str) -> bool {
+        matches!(u32::from_str_radix(text, 10), Ok(written) if written == number)
+    }
+    assert!(is(
+        HALL_RUNTIME_VERSION_MAJOR,
+        env!("CARGO_PKG_VERSION_MAJOR")
+    ));
+    assert!(is(
+        HALL_RUNTIME_VERSION_MINOR,
+        env!("CARGO_PKG_VERSION_MINOR")
+    ));
+    assert!(is(
+        HALL_RUNTIME_VERSION_PATCH,
+        env!("CARGO_PKG_VERSION_PATCH")
+    ));
+};
+
 /// In place of a code that could not be read: INT32_MIN.
 pub const HALL_MISSING_CODE: i32 = i32::MIN;
 
@@ -32,6 +61,10 @@ pub enum HallResult {
     UnusableParameters = 9,
     /// The blob belongs to another stage than the one expected.
     OtherStage = 10,
+    /// The decoder was never loaded.
+    NotLoaded = 11,
+    /// The servo was never started.
+    NotStarted = 12,
 }
 
 /// Where a re-zero stands.
@@ -163,6 +196,19 @@ impl HallPlanarPose {
         x_m: 0.0,
         y_m: 0.0,
         rz_rad: 0.0,
+    };
+}
+
+impl HallReading {
+    /// Nothing was measured.
+    pub(crate) const INVALID: Self = Self {
+        x_m: 0.0,
+        y_m: 0.0,
+        rz_rad: 0.0,
+        z_m: 0.0,
+        rx_rad: 0.0,
+        ry_rad: 0.0,
+        status: HALL_STATUS_PLANAR_INVALID | HALL_STATUS_VERTICAL_INVALID,
     };
 }
 
