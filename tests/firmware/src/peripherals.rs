@@ -93,7 +93,7 @@ pub struct Peripherals {
     /// Whether the program has asked for a reset.
     pub reset_asked: bool,
     /// What a hook changes once.
-    pub inject: Option<Injected>,
+    pub inject: Vec<Injected>,
     /// Ends a run of the core.
     pub stop_run: Option<Stop>,
     /// Instructions executed, where they are counted.
@@ -138,7 +138,7 @@ impl Peripherals {
             pulled_up: [true; 2],
             servo_on: false,
             reset_asked: false,
-            inject: None,
+            inject: Vec::new(),
             stop_run: None,
             instructions: 0,
             instructions_at_mailbox: 0,
@@ -226,7 +226,12 @@ impl Peripherals {
         self.watchdog.bites_ns().is_some_and(|at| at <= self.now_ns)
     }
 
-    /// Whether the core stands or starts anew, and executes nothing more.
+    /// The crystal stops.
+    pub fn stop_crystal(&mut self) {
+        self.clocks.stop_crystal(self.now_ns);
+    }
+
+    /// Whether the chip is reset, and the program executes nothing more.
     pub fn stops(&self) -> bool {
         self.reset_asked || self.watchdog_bites()
     }

@@ -118,6 +118,8 @@ pub struct Stage {
     pub fpu_restored: u32,
     /// Whether the last reset came from the watchdog.
     pub watchdog_reset: u32,
+    /// Pages 6 to 11 of the health frames.
+    pub board: [u32; 6],
 }
 
 impl Stage {
@@ -139,6 +141,7 @@ impl Stage {
             bus_off: word(19),
             fpu_restored: word(20),
             watchdog_reset: word(23),
+            board: [24, 25, 26, 27, 28, 29].map(word),
         })
     }
 
