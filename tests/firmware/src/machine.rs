@@ -58,6 +58,8 @@ fn fill_with_noise(ram: &mut [u8]) {
 pub struct Cost {
     /// Instructions up to the last mailbox that it filled, or all if it filled none.
     pub instructions: u64,
+    /// All instructions.
+    pub all_instructions: u64,
     /// Bytes over the SPI.
     pub spi_bytes: u64,
     /// Mailboxes filled.
@@ -406,6 +408,7 @@ impl Machine {
             };
             self.costs.push(Cost {
                 instructions: upto - before,
+                all_instructions: self.chip.instructions - before,
                 spi_bytes: self.chip.spi_bytes - spi_before,
                 mailboxes: self.chip.can.filled - filled_before,
             });
