@@ -87,7 +87,7 @@ pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
     let tolerance_us = settings
         .tolerance_us
         .map_or(stage.servo_period_s * 1e6, f64::from);
-    let reference_times = times_us.iter().map(|t| t - offset.us);
+    let reference_times = times_us.iter().map(|t| offset.on_reference_us(*t));
     let (rows, join) = join::join(
         &reading.ticks,
         reference_times,
@@ -126,6 +126,8 @@ fn choose_offset(
     if !settings.estimate_offset {
         return Ok(Offset {
             us: settings.offset_us,
+            rate: 0.0,
+            middle_us: 0.0,
             explained: None,
         });
     }
@@ -136,3 +138,7 @@ fn choose_offset(
 #[cfg(test)]
 #[path = "import/tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "import/controller_tests.rs"]
+mod controller_tests;

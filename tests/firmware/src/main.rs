@@ -10,15 +10,17 @@ mod adc_model;
 mod bench;
 mod can_model;
 mod checks;
+mod clock_model;
 mod image;
 mod machine;
 mod peripherals;
 mod unicorn;
+mod watchdog_model;
 
 use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
-use checks::{Outcome, Report, bus, commands, figures, log, parameters, sensors, timing};
+use checks::{Outcome, Report, bus, commands, figures, log, parameters, sensors, start, timing};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -111,6 +113,26 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("no other node from the start", &|| {
         bus::alone_from_the_start(bench)
     });
+    check("start: crystal absent", &|| start::no_crystal(bench));
+    check("start: crystal lost while running", &|| {
+        start::crystal_lost(bench)
+    });
+    check("start: PLL does not lock to the crystal", &|| {
+        start::pll_without_lock(bench)
+    });
+    check("start: PLL dead", &|| start::pll_dead(bench));
+    check("start: CAN dead", &|| start::can_dead(bench));
+    check("start: the board", &|| start::the_board(bench));
+    match start::crashes(bench) {
+        Ok(crashes) => {
+            for (fault, inject, told) in crashes {
+                check(&format!("crash: {fault}"), &|| {
+                    start::crash(bench, fault, &inject, &told)
+                });
+            }
+        }
+        Err(failure) => check("crash", &|| Err(failure.to_string().into())),
+    }
     for (name, outcome) in parameters::unusable_kinds(bench) {
         let outcome = std::cell::Cell::new(Some(outcome));
         check(&format!("parameters: {name}"), &|| {
@@ -128,6 +150,14 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     });
     check("command: identify", &|| commands::identify(bench));
     check("command: re-zero", &|| commands::rezero(bench));
+    check("command: re-zero refused", &|| {
+        commands::rezero_refused(bench)
+    });
+    for (part, name) in parts {
+        check(&format!("command: record, {name}"), &|| {
+            commands::record(bench, part)
+        });
+    }
     check("command: odd ones", &|| commands::odd_commands(bench));
     check("command: any data length code", &|| {
         commands::any_length_code(bench)

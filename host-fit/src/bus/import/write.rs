@@ -89,7 +89,9 @@ impl Display for ImportReport {
         match self.offset.explained {
             Some(share) => writeln!(
                 f,
-                ", estimated: the reference explains {:.2} % of the Hall signals' motion",
+                " in the middle of the record; the clock of the bus runs faster by {:.2} parts in a million; both \
+                 estimated: the reference explains {:.2} % of the Hall signals' motion",
+                1e6 * self.offset.rate,
                 100.0 * share
             )?,
             None => f.write_str(", as given\n")?,

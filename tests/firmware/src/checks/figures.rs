@@ -24,7 +24,7 @@ pub fn flash_and_ram(bench: &Bench, part: Part, name: &str) -> Outcome {
     machine.run_ticks(200)?;
     machine.chip.adc.fault = crate::adc_model::AdcFault::Line(0);
     machine.run_ticks(200)?;
-    let stack = machine.stack_bytes(image.static_bytes);
+    let stack = machine.stack_bytes();
     let ram = image.static_bytes + stack;
     println!("RESULT firmware_{name}_text_bytes={}", image.text_bytes);
     println!("RESULT firmware_{name}_static_bytes={}", image.static_bytes);
