@@ -124,7 +124,7 @@ mod app {
         };
         let mut node = Node::new(
             parameters,
-            before.watchdog,
+            before.by_fault,
             Layout::for_bits(Converter::CODE_BITS),
         )
         .recording(cfg!(feature = "record"));

@@ -122,6 +122,7 @@ pub struct Node<'d> {
     ticks: u32,
     state: (NodeState, u8),
     fpu_restored: u32,
+    board_checks: u32,
 }
 
 impl<'d> Node<'d> {
@@ -136,6 +137,7 @@ impl<'d> Node<'d> {
             ticks: 0,
             state: (NodeState::Starting, 0),
             fpu_restored: 0,
+            board_checks: 0,
         }
     }
 
@@ -181,7 +183,12 @@ impl<'d> Node<'d> {
 
     /// Whether the LED is to be on.
     pub const fn light(&self) -> bool {
-        crate::light::is_on(self.state.0, self.service.is_identifying(), self.ticks)
+        crate::light::is_on(
+            self.state.0,
+            self.board_checks,
+            self.service.is_identifying(),
+            self.ticks,
+        )
     }
 
     /// One tick: decodes the codes and puts the frames that are due into the outbox.
@@ -194,6 +201,7 @@ impl<'d> Node<'d> {
     ) -> Reading {
         let reading = self.decode(&sample, fpu);
         self.state = self.state_of(&sample, &reading);
+        self.board_checks = facts.board.board_checks;
         if let Parameters::Usable { .. } = self.parameters {
             self.send_pose(&reading, sample.as_ref().ok(), outbox);
         }

@@ -8,7 +8,7 @@ use crate::fault;
 use crate::wait::Stopwatch;
 use firmware::node::Node;
 use firmware::retained::{FaultKind, KeptZero, Retained, Step};
-use hal_adapters::can::status::BoardFacts;
+use hal_adapters::can::status::{BoardFacts, board_check as check};
 use runtime::PlanarPose;
 use stm32f4xx_hal::pac::{FLASH, RCC};
 use stm32f4xx_hal::prelude::*;
@@ -17,16 +17,6 @@ use stm32f4xx_hal::rcc::Rcc;
 /// Longest time that the crystal may take, us: typically 2 ms (DS8626, HSE oscillator
 /// characteristics), and less than the shortest period of the watchdog.
 const CRYSTAL_US: u32 = 8000;
-
-/// Bits of [`BoardFacts::board_checks`].
-mod check {
-    pub const NO_PULL_UP_ON_SELECT: u32 = 1;
-    pub const NO_PULL_UP_ON_CONTROL: u32 = 1 << 1;
-    pub const BROWN_OUT_LOW: u32 = 1 << 2;
-    pub const INTERNAL_OSCILLATOR: u32 = 1 << 3;
-    pub const CAN_NOT_STARTED: u32 = 1 << 4;
-    pub const ZERO_LOST: u32 = 1 << 5;
-}
 
 /// What the start-up found.
 pub struct Found {
@@ -44,6 +34,8 @@ pub struct Found {
 pub struct Before {
     /// Whether the watchdog caused this start.
     pub watchdog: bool,
+    /// Whether the watchdog or the program itself did, on a fault.
+    pub by_fault: bool,
     /// The record that survived, or an empty one.
     record: Retained,
     /// Whether there should have been a record, and there was none.
@@ -65,6 +57,7 @@ impl Before {
         fault::retain(&record);
         Self {
             watchdog,
+            by_fault: watchdog || cause.sftrstf().bit_is_set(),
             record,
             lost: found.is_none() && !power_on,
         }

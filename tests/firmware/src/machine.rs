@@ -58,6 +58,8 @@ fn fill_with_noise(ram: &mut [u8]) {
 pub struct Cost {
     /// Instructions up to the last mailbox that it filled, or all if it filled none.
     pub instructions: u64,
+    /// All instructions.
+    pub all_instructions: u64,
     /// Bytes over the SPI.
     pub spi_bytes: u64,
     /// Mailboxes filled.
@@ -166,8 +168,11 @@ extern "C" fn jump(handle: Handle, _: u64, _: u32, user: *mut c_void) {
         let hook = &*user.cast::<JumpHook>();
         (hook, &mut *hook.chip)
     };
-    if let Some(Injected { register, value }) = chip.inject.take() {
-        let mut value = value;
+    for Injected {
+        register,
+        mut value,
+    } in std::mem::take(&mut chip.inject)
+    {
         // SAFETY: the registers that are changed have 32 bits.
         unsafe { (hook.write)(handle, register, (&raw mut value).cast()) };
     }
@@ -343,6 +348,10 @@ impl Machine {
                 self.boot()?;
                 continue;
             }
+            if self.chip.clocks.interrupts() && self.chip.now_ns <= end_ns {
+                self.interrupt(NMI)?;
+                continue;
+            }
             match self.chip.next_event_ns() {
                 Some(at) if at <= end_ns => self.chip.now_ns = self.chip.now_ns.max(at),
                 _ => {
@@ -351,7 +360,8 @@ impl Machine {
                 }
             }
             self.chip.advance();
-            while let Some(irq) = self.chip.pending_interrupt() {
+            let stands = self.chip.clocks.stands(self.chip.now_ns);
+            while let Some(irq) = self.chip.pending_interrupt().filter(|_| !stands) {
                 if irq == IRQ_TIM2 && self.chip.tick_is_due() && self.hold_ns > 0 {
                     self.chip.now_ns += std::mem::take(&mut self.hold_ns);
                     self.chip.advance();
@@ -361,9 +371,6 @@ impl Machine {
                 }
                 self.interrupt(16 + irq)?;
                 self.chip.advance();
-            }
-            if self.chip.clocks.interrupts() && !self.chip.stops() {
-                self.interrupt(NMI)?;
             }
         }
     }
@@ -401,6 +408,7 @@ impl Machine {
             };
             self.costs.push(Cost {
                 instructions: upto - before,
+                all_instructions: self.chip.instructions - before,
                 spi_bytes: self.chip.spi_bytes - spi_before,
                 mailboxes: self.chip.can.filled - filled_before,
             });

@@ -20,7 +20,7 @@ mod watchdog_model;
 use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
-use checks::{Outcome, Report, bus, commands, figures, log, parameters, sensors, timing};
+use checks::{Outcome, Report, bus, commands, figures, log, parameters, sensors, start, timing};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -69,8 +69,8 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
             &format!("{name}: the whole log gives the host's words"),
             &|| log::same_words(bench, part, whole, name),
         );
-        for (fault, case) in sensors::cases(part) {
-            check(&format!("{name}: {fault}"), &|| {
+        for case in sensors::cases(part) {
+            check(&format!("{name}: {}", case.name()), &|| {
                 sensors::survives(bench, part, &case)
             });
         }
@@ -79,10 +79,10 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
         check(&format!("{name}: dead from the start"), &|| {
             sensors::dead_from_the_start(bench, part)
         });
-        check(&format!("{name}: reset by itself"), &|| {
-            sensors::reset_by_itself(bench, part)
-        });
     }
+    check("ads131m08: whatever its sheet leaves open", &|| {
+        sensors::every_variant(bench)
+    });
     check("a debugger reads the last pose", &|| {
         log::a_debugger_reads_the_last_pose(bench)
     });
@@ -113,6 +113,26 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("no other node from the start", &|| {
         bus::alone_from_the_start(bench)
     });
+    check("start: crystal absent", &|| start::no_crystal(bench));
+    check("start: crystal lost while running", &|| {
+        start::crystal_lost(bench)
+    });
+    check("start: PLL does not lock to the crystal", &|| {
+        start::pll_without_lock(bench)
+    });
+    check("start: PLL dead", &|| start::pll_dead(bench));
+    check("start: CAN dead", &|| start::can_dead(bench));
+    check("start: the board", &|| start::the_board(bench));
+    match start::crashes(bench) {
+        Ok(crashes) => {
+            for (fault, inject, told) in crashes {
+                check(&format!("crash: {fault}"), &|| {
+                    start::crash(bench, fault, &inject, &told)
+                });
+            }
+        }
+        Err(failure) => check("crash", &|| Err(failure.to_string().into())),
+    }
     for (name, outcome) in parameters::unusable_kinds(bench) {
         let outcome = std::cell::Cell::new(Some(outcome));
         check(&format!("parameters: {name}"), &|| {

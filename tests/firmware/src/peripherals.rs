@@ -1,7 +1,7 @@
 //! The peripherals of an STM32F405, as far as the program uses them. Time is that of the bench:
 //! it passes between interrupts and while bytes cross the SPI, and instructions take none.
 
-use crate::adc_model::{Adc, Part, Row};
+use crate::adc_model::{Adc, Input, Part, Row};
 use crate::can_model::CanModel;
 use crate::clock_model::{Clocks, Pll};
 use crate::machine::Injected;
@@ -41,6 +41,11 @@ pub const IRQ_TIM2: u32 = 28;
 const SERVO_PIN: u32 = 1;
 
 const US: u64 = 1000;
+/// From the supply until the program runs: the chip's own reset, at least (DS8626, tRSTTEMPO). The
+/// converter has the same supply.
+const BOOT_NS: u64 = 500_000;
+/// A byte at 10.5 MHz, and what the program takes between two.
+pub const SPI_BYTE_NS: u64 = 762 + 150;
 /// Time of a read of a register that a program polls: loops that wait take time.
 const POLL_NS: u64 = US;
 
@@ -74,8 +79,6 @@ pub struct Peripherals {
     pub adc: Adc,
     /// The CAN controller.
     pub can: CanModel,
-    /// Rows that the converter plays, in a loop.
-    pub rows: Vec<Row>,
     /// What the timer reads when it is started, us: 0 on the chip.
     pub timer_offset_us: u32,
     /// When row 0 is played, ns: the first tick.
@@ -93,7 +96,7 @@ pub struct Peripherals {
     /// Whether the program has asked for a reset.
     pub reset_asked: bool,
     /// What a hook changes once.
-    pub inject: Option<Injected>,
+    pub inject: Vec<Injected>,
     /// Ends a run of the core.
     pub stop_run: Option<Stop>,
     /// Instructions executed, where they are counted.
@@ -113,22 +116,17 @@ pub struct Peripherals {
     spi_in: u8,
     spi_full: bool,
     selected: bool,
-    sync: bool,
 }
 
 impl Peripherals {
     /// A chip after power-up.
     pub fn new(part: Part, rows: Vec<Row>) -> Self {
         let mut new = Self {
-            now_ns: 0,
-            spi_byte_ns: match part {
-                Part::Ads131m08 => 381,
-                Part::Ads8688 => 762,
-            },
+            now_ns: BOOT_NS,
+            spi_byte_ns: SPI_BYTE_NS,
             spi_bytes: 0,
-            adc: Adc::new(part),
+            adc: Adc::new(part, Input::held(rows)),
             can: CanModel::new(),
-            rows,
             timer_offset_us: 0,
             first_tick_ns: None,
             watchdog: Watchdog::new(),
@@ -138,7 +136,7 @@ impl Peripherals {
             pulled_up: [true; 2],
             servo_on: false,
             reset_asked: false,
-            inject: None,
+            inject: Vec::new(),
             stop_run: None,
             instructions: 0,
             instructions_at_mailbox: 0,
@@ -153,7 +151,6 @@ impl Peripherals {
             spi_in: 0,
             spi_full: false,
             selected: false,
-            sync: true,
         };
         new.reset(cause::POWER_ON);
         new
@@ -183,14 +180,6 @@ impl Peripherals {
         self.can.set_bus(bus, self.now_ns);
     }
 
-    fn row(&mut self) -> Row {
-        let since = self
-            .now_ns
-            .saturating_sub(self.first_tick_ns.unwrap_or(self.now_ns));
-        let k = (since / (2000 * US)) as usize % self.rows.len().max(1);
-        self.rows.get(k).copied().unwrap_or_default()
-    }
-
     fn timer_us(&self) -> u32 {
         let since = self.timer_started_ns.map_or(0, |start| self.now_ns - start);
         ((since / US) as u32).wrapping_add(self.timer_offset_us)
@@ -213,7 +202,8 @@ impl Peripherals {
                 alarm.at_ns = None;
                 self.timer_flags |= 2 << k;
                 if k == 0 {
-                    self.first_tick_ns.get_or_insert(at);
+                    let first_ns = *self.first_tick_ns.get_or_insert(at);
+                    self.adc.input.start_ns = Some(first_ns);
                 }
             }
         }
@@ -226,7 +216,12 @@ impl Peripherals {
         self.watchdog.bites_ns().is_some_and(|at| at <= self.now_ns)
     }
 
-    /// Whether the core stands or starts anew, and executes nothing more.
+    /// The crystal stops.
+    pub fn stop_crystal(&mut self) {
+        self.clocks.stop_crystal(self.now_ns);
+    }
+
+    /// Whether the chip is reset, and the program executes nothing more.
     pub fn stops(&self) -> bool {
         self.reset_asked || self.watchdog_bites()
     }
@@ -354,22 +349,17 @@ impl Peripherals {
             o if o == GPIOA + 0x18 => match level(SELECT_PIN) {
                 Some(false) if !self.selected => {
                     self.selected = true;
-                    let row = self.row();
-                    self.adc.select(self.now_ns, row);
+                    self.adc.select(self.now_ns);
                 }
                 Some(true) if self.selected => {
                     self.selected = false;
-                    self.adc.deselect();
+                    self.adc.deselect(self.now_ns);
                 }
                 _ => {}
             },
             o if o == GPIOB + 0x18 => {
                 if let Some(high) = level(SYNC_PIN) {
-                    if high && !self.sync {
-                        let row = self.row();
-                        self.adc.sync(self.now_ns, row);
-                    }
-                    self.sync = high;
+                    self.adc.control(high, self.now_ns);
                 }
             }
             _ => self.led = level(LED_PIN).unwrap_or(self.led),

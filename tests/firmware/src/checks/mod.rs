@@ -6,6 +6,7 @@ pub mod figures;
 pub mod log;
 pub mod parameters;
 pub mod sensors;
+pub mod start;
 pub mod timing;
 
 /// Why a check failed.
