@@ -6,7 +6,7 @@
 //! | lines of `candump -L` to ticks, by the receiver of the bus | [`bus_log`] |
 //! | receive times to sample times: the node samples evenly, the bus delivers unevenly | [`clock`] |
 //! | the interferometers' CSV | [`reference`](mod@reference) |
-//! | the offset between the clocks, where asked for | [`offset`] |
+//! | offset between the clocks and difference in speed, where asked for | [`offset`] |
 //! | reference between its samples, at the times of the ticks | [`join`] |
 //! | the log | [`write`](mod@write) |
 
@@ -46,7 +46,7 @@ pub struct ImportSettings {
     pub tolerance_us: Option<u32>,
     /// Time of the bus less time of the reference, us; not used with `estimate_offset`.
     pub offset_us: f64,
-    /// Find the offset between the clocks by the motion that both saw.
+    /// Find the offset between the clocks, and how much faster one runs, by the motion that both saw.
     pub estimate_offset: bool,
     /// How far from "both records start together" the offset is looked for, s.
     pub search_s: f64,

@@ -34,7 +34,7 @@ pub enum ImportError {
         fault: LineError,
     },
     /// A line is no text.
-    #[error("{}, line {line}: not text; name a log that `candump -L` or `live --record` wrote", path.display())]
+    #[error("{}, line {line}: not text; name a log that `record`, `live --record` or `candump -L` wrote", path.display())]
     NotText {
         /// The record.
         path: PathBuf,
