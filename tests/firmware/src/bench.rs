@@ -94,7 +94,8 @@ fn columns(header: &str, names: [&str; 6]) -> Result<[usize; 6], String> {
     Ok(at)
 }
 
-fn rows(text: &str) -> Result<Vec<Row>, Failure> {
+/// The codes of a log.
+pub fn rows(text: &str) -> Result<Vec<Row>, Failure> {
     let mut lines = text.lines();
     let names = [
         "hall_a_cnt",

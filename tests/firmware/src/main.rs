@@ -2,9 +2,12 @@
 //! converter that plays a log over SPI, and compares what it sends over CAN with what the host
 //! decodes from the log.
 //!
-//! Use: `bench FOLDER LIBRARY TICKS [PART OF A NAME]`, as the script `run` beside this
-//! package does: a folder with images, blobs, log and poses, the library of Unicorn 2.1, the
-//! ticks of the long run (0 for none).
+//! Use, as the scripts beside this package do:
+//!
+//! - `bench FOLDER LIBRARY TICKS [PART OF A NAME]`: a folder with images, blobs, log and poses, the
+//!   library of Unicorn 2.1, the ticks of the long run (0 for none).
+//! - `bench FOLDER LIBRARY record PART LOG BUS REFERENCE` and
+//!   `bench FOLDER LIBRARY judge PART LOG STAGE BLOB DIRECT`: see [`rehearsal`].
 
 mod adc_model;
 mod bench;
@@ -14,6 +17,7 @@ mod clock_model;
 mod image;
 mod machine;
 mod peripherals;
+mod rehearsal;
 mod unicorn;
 mod watchdog_model;
 
@@ -21,6 +25,7 @@ use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
 use checks::{Outcome, Report, bus, commands, figures, log, parameters, sensors, start, timing};
+use std::ffi::{OsStr, OsString};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -37,6 +42,11 @@ fn main() -> ExitCode {
             return ExitCode::from(3);
         }
     };
+    if let Some(outcome) = rehearse(&bench, ticks, filter) {
+        let mut report = Report::default();
+        report.note(&ticks.to_string_lossy(), outcome);
+        return ExitCode::from(u8::from(report.failed > 0));
+    }
     let Some(ticks) = ticks.to_str().and_then(|text| text.parse().ok()) else {
         eprintln!("not a number of ticks: {ticks:?}");
         return ExitCode::from(2);
@@ -48,6 +58,24 @@ fn main() -> ExitCode {
     run(&bench, ticks, &mut report, &filter.unwrap_or_default());
     println!("{} passed, {} failed", report.passed, report.failed);
     ExitCode::from(u8::from(report.failed > 0 || report.passed == 0))
+}
+
+/// A step of the rehearsal, if one is asked for.
+fn rehearse(bench: &Bench, step: &OsStr, arguments: &[OsString]) -> Option<Outcome> {
+    let (part, files) = arguments.split_first()?;
+    let parts = [(Part::Ads131m08, "ads131m08"), (Part::Ads8688, "ads8688")];
+    let part = parts.into_iter().find(|(_, name)| part == *name)?;
+    let files: Vec<_> = files.iter().map(Path::new).collect();
+    match (step.to_str()?, files.as_slice()) {
+        ("record", [log, bus, reference]) => {
+            Some(rehearsal::record(bench, part.0, log, bus, reference))
+        }
+        ("judge", [log, stage, blob, direct]) => {
+            let (log, blobs) = ((*log, *stage), (*blob, *direct));
+            Some(rehearsal::judge(bench, part, log, blobs))
+        }
+        _ => None,
+    }
 }
 
 fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {

@@ -187,6 +187,12 @@ impl Peripherals {
         ((since / US) as u32).wrapping_add(self.timer_offset_us)
     }
 
+    /// What the timer showed when the input's first row was there, us.
+    pub fn motion_start_us(&self) -> Option<u32> {
+        let since = self.adc.input.start_ns? - self.timer_started_ns?;
+        Some(((since / US) as u32).wrapping_add(self.timer_offset_us))
+    }
+
     /// Time of the next event, ns.
     pub fn next_event_ns(&self) -> Option<u64> {
         let alarms = self.alarms.iter().filter_map(|alarm| alarm.at_ns);
@@ -205,7 +211,7 @@ impl Peripherals {
                 self.timer_flags |= 2 << k;
                 if k == 0 {
                     let first_ns = *self.first_tick_ns.get_or_insert(at);
-                    self.adc.input.start_ns = Some(first_ns);
+                    self.adc.input.start(first_ns);
                 }
             }
         }

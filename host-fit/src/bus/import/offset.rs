@@ -1,21 +1,19 @@
-//! The offset between the clocks and how much faster one runs, by the motion that both saw: at
-//! the right ones each Hall signal is what the designed probe would read at the reference pose,
-//! times a sensitivity.
+//! The offset between the clocks and how much faster one runs, by the motion that both saw.
 //!
-//! For a trial offset the signal of each probe is fitted by that prediction, with a factor and
-//! a constant for each movement. A grid of one servo period finds the offset that explains the
-//! most motion; golden section then finds where the least is left over. (A fit by all three
-//! axes of the reference would also explain a run shifted by a whole movement: each movement
-//! moves one axis only, and some matrix turns any axis into any other.)
+//! A grid of one servo period finds the offset: at the right one each Hall signal is about what the
+//! designed probe would read at the reference pose, times a sensitivity. For a trial the signal
+//! of each probe is fitted by that prediction, with a factor and a constant for each movement. (A
+//! fit by all three axes of the reference would also explain a run shifted by a whole movement:
+//! each movement moves one axis only, and some matrix turns any axis into any other.)
 //!
-//! Two crystals differ by some 50 parts in a million, 6 ms over two minutes, so a second grid
-//! tries rates about the best offset, and golden section refines both in turn. The offset is
-//! that in the middle of the record, where the rate does not act.
+//! [`refine`](super::refine) then finds offset and rate to a few microseconds. The offset is that in
+//! the middle of the record, where the rate does not act.
 
 use super::ImportError;
 use super::bus_log::BusTick;
 use super::join::{At, Cursor};
 use super::reference::{Reference, Sample};
+use super::refine::refine;
 use crate::input::log::layout::Quantity;
 use crate::input::stage::Stage;
 use runtime::model::dot;
@@ -40,23 +38,11 @@ impl Offset {
     }
 }
 
-/// Largest rate that is tried: two crystals of 100 parts in a million each.
-const RATE_MAX: f64 = 200e-6;
-
-/// Offsets of the second grid to either side of the best one, in servo periods.
-const NEAR: i32 = 4;
-
-/// Rounds of golden section: offset and rate, each in turn.
-const ROUNDS: usize = 3;
-
 /// Ticks of the coarse search, at most.
 const COARSE_TICKS: usize = 4_000;
 
 /// Share that must be explained: signals of another run reach a third by chance.
 const EXPLAINED_MIN: f64 = 0.6;
-
-/// Width at which golden section stops, us.
-const WIDTH_US: f64 = 0.5;
 
 /// Finds the offset within `search_us` of where both records start together.
 ///
@@ -79,45 +65,25 @@ pub fn estimate(
         .map(|(tick, t_us)| Point {
             t_us: *t_us,
             signal: tick.hall.map(f64::from),
+            gaps: tick.capacitive.map(f64::from),
         })
         .collect();
     let every = points.len().div_ceil(COARSE_TICKS).max(1);
     let coarse: Vec<Point> = points.iter().step_by(every).copied().collect();
     let ends = times_us.first().zip(times_us.last());
-    let (middle_us, half_us) = ends.map_or((0.0, 0.0), |(first, last)| {
-        ((first + last) / 2.0, (last - first) / 2.0)
-    });
-    let at = |us, rate| Offset {
+    let middle_us = ends.map_or(0.0, |(first, last)| (first + last) / 2.0);
+    let at = |us| Offset {
         us,
-        rate,
+        rate: 0.0,
         middle_us,
         explained: None,
     };
     let trial =
         |points: &[Point], offset: &Offset| explain(points, &predicted, offset, 2.0 * step_us);
     let steps = (search_us / step_us).ceil().clamp(1.0, 1e6) as i64;
-    let offsets = (-steps..=steps).map(|k| at(centre_us + k as f64 * step_us, 0.0));
-    let best =
-        most(offsets, |offset| trial(&coarse, offset).explained).unwrap_or(at(centre_us, 0.0));
-    // A step of the rate moves the ends of the record by one step of the offset.
-    let rate_step = step_us / half_us.max(step_us);
-    let rates = (RATE_MAX / rate_step).floor().min(1e4) as i32;
-    let near = (-rates..=rates).flat_map(|r| {
-        let rate = f64::from(r) * rate_step;
-        (-NEAR..=NEAR).map(move |k| at(best.us + f64::from(k) * step_us, rate))
-    });
-    let mut best = most(near, |offset| trial(&coarse, offset).explained).unwrap_or(best);
-    let left_over = |offset: &Offset| 1.0 - trial(&points, offset).share();
-    for _ in 0..ROUNDS {
-        let Offset { us, rate, .. } = best;
-        best.us = golden((us - step_us, us + step_us), WIDTH_US, |us| {
-            left_over(&at(us, rate))
-        });
-        let width = WIDTH_US * rate_step / step_us;
-        best.rate = golden((rate - rate_step, rate + rate_step), width, |rate| {
-            left_over(&at(best.us, rate))
-        });
-    }
+    let offsets = (-steps..=steps).map(|k| at(centre_us + k as f64 * step_us));
+    let found = most(offsets, |offset| trial(&coarse, offset).explained).unwrap_or(at(centre_us));
+    let mut best = refine(&points, &predicted, found, step_us).unwrap_or(found);
     let explained = trial(&points, &best).share();
     if explained.is_nan() || explained < EXPLAINED_MIN {
         return Err(ImportError::NoOffset {
@@ -168,10 +134,12 @@ fn predicted(reference: &Reference, stage: &Stage) -> Vec<Sample> {
         .collect()
 }
 
+/// The codes of a tick, at its time by the clock of the bus.
 #[derive(Clone, Copy, Debug)]
-struct Point {
-    t_us: f64,
-    signal: [f64; 3],
+pub(super) struct Point {
+    pub(super) t_us: f64,
+    pub(super) signal: [f64; 3],
+    pub(super) gaps: [f64; 3],
 }
 
 /// Sums of one probe over one movement.
@@ -265,24 +233,4 @@ fn explain(
         }
     }
     all
-}
-
-/// The place of the smallest value between two ends of a valley, to within `width`.
-fn golden((mut low, mut high): (f64, f64), width: f64, value: impl Fn(f64) -> f64) -> f64 {
-    const RATIO: f64 = 0.618_033_988_749_894_9;
-    let mut a = high - RATIO * (high - low);
-    let mut b = low + RATIO * (high - low);
-    let (mut at_a, mut at_b) = (value(a), value(b));
-    while high - low > width {
-        if at_a < at_b {
-            (high, b, at_b) = (b, a, at_a);
-            a = high - RATIO * (high - low);
-            at_a = value(a);
-        } else {
-            (low, a, at_a) = (a, b, at_b);
-            b = low + RATIO * (high - low);
-            at_b = value(b);
-        }
-    }
-    (low + high) / 2.0
 }

@@ -11,7 +11,9 @@ pub struct Input {
     rows: Vec<Row>,
     period_ns: u64,
     moves: bool,
-    /// When row 0 is there: the first tick, once it has come, ns.
+    /// From the first tick until row 0 is there, ns.
+    after_ns: u64,
+    /// When row 0 is there, once the first tick has come, ns.
     pub start_ns: Option<u64>,
 }
 
@@ -23,20 +25,26 @@ impl Input {
             rows,
             period_ns: PERIOD_NS,
             moves: false,
+            after_ns: 0,
             start_ns: None,
         }
     }
 
-    /// A motion, linear from row to row, `period_us` apart; the first row before its start and
-    /// the last one after its end.
-    #[allow(dead_code, reason = "for the loop of record, fit and decode")]
-    pub fn moving(rows: Vec<Row>, period_us: u64) -> Self {
+    /// A motion, linear from row to row, `period_us` apart, that starts so long after the first
+    /// tick; the first row before its start and the last one after its end.
+    pub fn moving(rows: Vec<Row>, period_us: u64, after_us: u64) -> Self {
         Self {
             rows,
             period_ns: period_us * 1000,
             moves: true,
+            after_ns: after_us * 1000,
             start_ns: None,
         }
+    }
+
+    /// The first tick has come.
+    pub fn start(&mut self, first_tick_ns: u64) {
+        self.start_ns.get_or_insert(first_tick_ns + self.after_ns);
     }
 
     /// The row that was there without a change from `from_ns` to `to_ns`.
@@ -87,7 +95,7 @@ mod tests {
     fn held_rows_change_at_the_ticks() {
         let mut input = Input::held(ROWS.to_vec());
         assert_eq!(input.constant(0, 999), Some(ROWS[0]));
-        input.start_ns = Some(1000);
+        input.start(1000);
         assert_eq!(input.constant(1000, 2_000_999), Some(ROWS[0]));
         assert_eq!(input.constant(2_000_999, 2_001_000), None);
         assert_eq!(input.constant(2_001_000, 4_000_999), Some(ROWS[1]));
@@ -96,8 +104,8 @@ mod tests {
 
     #[test]
     fn a_motion_is_linear_from_row_to_row_and_ends_with_the_last() {
-        let mut input = Input::moving(ROWS.to_vec(), 2000);
-        input.start_ns = Some(1000);
+        let mut input = Input::moving(ROWS.to_vec(), 2000, 1);
+        input.start(0);
         assert_eq!(input.at(0), [0.0; 6]);
         assert_eq!(input.at(501_000), [25.0, 50.0, -25.0, 0.0, 0.25, 0.5]);
         assert_eq!(input.at(9_000_000), ROWS[1].map(f64::from));
