@@ -151,12 +151,24 @@ impl Default for Ads131m08 {
     }
 }
 
-/// CRC-16 (CCITT) of the sheet.
+/// CRC-16 (CCITT) of the sheet, a byte at a time.
 fn crc(bytes: impl IntoIterator<Item = u8>) -> u16 {
+    const TABLE: [u16; 256] = {
+        let mut table = [0; 256];
+        let mut k = 0;
+        while k < 256 {
+            let (mut crc, mut bit) = ((k as u16) << 8, 0);
+            while bit < 8 {
+                crc = crc << 1 ^ if crc >> 15 == 1 { 0x1021 } else { 0 };
+                bit += 1;
+            }
+            table[k] = crc;
+            k += 1;
+        }
+        table
+    };
     bytes.into_iter().fold(0xffff, |crc, byte| {
-        (0..8).fold(crc ^ u16::from(byte) << 8, |c, _| {
-            c << 1 ^ if c >> 15 == 1 { 0x1021 } else { 0 }
-        })
+        crc << 8 ^ TABLE[usize::from((crc >> 8) as u8 ^ byte)]
     })
 }
 
@@ -225,6 +237,11 @@ impl Ads131m08 {
 
     /// Stores what was converted by now.
     fn advance(&mut self, now_ns: u64) {
+        let ended = now_ns.saturating_sub(self.from_ns) / (self.osr() * T_MOD_NS);
+        if self.clocked && self.store.len() == 2 && self.conversions >= 3 {
+            // Of all that a full store is offered it keeps one of the last two at most.
+            self.conversions = self.conversions.max(ended.saturating_sub(2));
+        }
         while self.clocked && self.next_end_ns() <= now_ns {
             let conversion = Conversion {
                 end_ns: self.next_end_ns(),
