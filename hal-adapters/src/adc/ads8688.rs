@@ -19,9 +19,9 @@
 //! | Feature Select | 0x03 | 0x00 | 0x43: channel, device address and input range follow each code, device address 1 |
 //! | Channel n Input Range | 0x05 + n | 0x00 | 0: +-2.5 times the reference |
 //!
-//! **Power-up.** The internal reference needs 15 ms until codes are right (table 6.5 and section
-//! PWR_DN), and the part does not tell. A start cannot know whether the power has just come, so that
-//! samples are [`NotReady`](AdcError::NotReady) for [`REFERENCE_US`] after every start. RST/PD is
+//! **Power-up.** The internal reference needs 15 ms until codes are right, and the part does not
+//! tell. A start cannot know whether the power has just come: samples are
+//! [`NotReady`](AdcError::NotReady) for [`REFERENCE_US`] after every start. RST/PD is
 //! held high: low for 40 to 100 ns it is a reset, for more than 400 ns it switches the part off,
 //! reference included.
 //!
