@@ -46,8 +46,9 @@
 //!
 //! **Checks.** Each frame has a CRC, and besides codes the three of a tick carry
 //! - the STATUS: a reset, a locked interface, a register that changed (REG_CRC_EN makes the part
-//!   compare its registers' CRC every 94 us), and whether SYNC arrived. Two ticks in a row
-//!   without a resynchronisation mean that its wire is broken;
+//!   compare its registers' CRC every 94 us; a change in the 0.2 ms before the codes are read is
+//!   told a tick later), and whether SYNC arrived. Two ticks in a row without a resynchronisation
+//!   mean that its wire is broken;
 //! - one register, read back and compared: all of 0x02 to 0x30 in turn, in 94 ms.
 //!
 //! The trigger after a failed start leaves SYNC/RESET low for one period: a reset that also helps

@@ -6,11 +6,10 @@
 //! global chop, standby, current detection, LOCK, the CRC of commands, t_REGACQ (waits of the
 //! program take no time here). Unknown commands are answered as NULL, like invalid ones.
 
+use super::filter::{Conversion, Filter, T_MOD_NS};
 use super::{Input, Row};
 use std::collections::VecDeque;
 
-/// Period of the modulators, ns.
-const T_MOD_NS: u64 = 250;
 /// Period of CLKIN, ns.
 const T_CLKIN_NS: u64 = 125;
 /// t_POR: from the supply until commands are taken, ns.
@@ -83,17 +82,6 @@ impl Variant {
     }
 }
 
-/// A conversion: when it ended, and what its filter saw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Conversion {
-    end_ns: u64,
-    /// The filter has no data from before.
-    from_ns: u64,
-    /// By the fast-settling filter.
-    fast: bool,
-    osr: u64,
-}
-
 /// The part.
 pub struct Ads131m08 {
     /// What silicon does where the sheet is silent.
@@ -119,7 +107,7 @@ pub struct Ads131m08 {
     listens: bool,
     received: Vec<u8>,
     reply: Vec<u8>,
-    weights: (u64, Vec<f64>),
+    filter: Filter,
 }
 
 impl Default for Ads131m08 {
@@ -144,7 +132,7 @@ impl Default for Ads131m08 {
             listens: false,
             received: Vec::new(),
             reply: Vec::new(),
-            weights: (0, Vec::new()),
+            filter: Filter::default(),
         };
         new.power_up(0);
         new
@@ -170,18 +158,6 @@ fn crc(bytes: impl IntoIterator<Item = u8>) -> u16 {
     bytes.into_iter().fold(0xffff, |crc, byte| {
         crc << 8 ^ TABLE[usize::from((crc >> 8) as u8 ^ byte)]
     })
-}
-
-/// Weights of a sinc3 filter, the newest sample first: three boxes convolved.
-fn sinc3(osr: u64) -> Vec<f64> {
-    let n = osr as usize;
-    let convolve = |a: &[f64]| -> Vec<f64> {
-        let at = |k: usize| a.get(k).copied().unwrap_or(0.0);
-        (0..a.len() + n - 1)
-            .map(|k| (k.saturating_sub(n - 1)..=k).map(at).sum::<f64>() / n as f64)
-            .collect()
-    };
-    convolve(&convolve(&vec![1.0 / n as f64; n]))
 }
 
 impl Ads131m08 {
@@ -295,45 +271,6 @@ impl Ads131m08 {
         now_ns < self.ready_ns || low >= RESET_CLKIN * T_CLKIN_NS
     }
 
-    /// The code of a conversion: the mean over the window of its filter.
-    fn convert(&mut self, conversion: Conversion, input: &Input) -> Row {
-        let Conversion {
-            end_ns,
-            from_ns,
-            fast,
-            osr,
-        } = conversion;
-        if self.weights.0 != osr {
-            self.weights = (osr, sinc3(osr));
-        }
-        let box_weights;
-        let weights = if fast {
-            box_weights = vec![1.0 / osr as f64; osr as usize];
-            &box_weights
-        } else {
-            &self.weights.1
-        };
-        let window_ns = weights.len() as u64 * T_MOD_NS;
-        if end_ns >= from_ns + window_ns
-            && let Some(row) = input.constant(end_ns - window_ns, end_ns - 1)
-        {
-            return row;
-        }
-        let mut sum = [0.0; 6];
-        for (k, weight) in (0u64..).zip(weights) {
-            let Some(at_ns) = end_ns.checked_sub((k + 1) * T_MOD_NS) else {
-                break;
-            };
-            if at_ns < from_ns {
-                break;
-            }
-            for (sum, code) in sum.iter_mut().zip(input.at(at_ns)) {
-                *sum += weight * code;
-            }
-        }
-        sum.map(|code| (code.round() as i32).clamp(-0x80_0000, 0x7f_ffff))
-    }
-
     /// CRC of the registers 0x02 to 0x30.
     fn registers_crc(&self) -> u16 {
         let covered = &self.registers[MODE..=LAST];
@@ -388,7 +325,7 @@ impl Ads131m08 {
         });
         self.shown = self.store.front().copied();
         if let Some(conversion) = self.shown {
-            self.codes = self.convert(conversion, input);
+            self.codes = self.filter.codes(conversion, input);
             if !self.variant.late_pop {
                 self.store.pop_front();
             }
