@@ -19,7 +19,7 @@ mod unicorn;
 use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
-use checks::{Outcome, Report, bus, commands, figures, log, parameters, sensors, timing};
+use checks::{Outcome, Report, bus, commands, figures, log, motion, parameters, sensors, timing};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -79,6 +79,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
             sensors::dead_from_the_start(bench, part)
         });
     }
+    check("ads131m08: a pose is of its instant", &|| {
+        motion::a_pose_is_of_its_instant(bench)
+    });
     check("ads131m08: a register changes at any time", &|| {
         sensors::a_register_changes_at_any_time(bench)
     });
