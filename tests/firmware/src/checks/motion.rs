@@ -6,10 +6,10 @@ use crate::bench::{Bench, Seen};
 
 const PERIOD_US: f64 = 2000.0;
 const TICKS: u64 = 10_000;
-/// From the trigger to the middle of what the driver of the ADS131M08 reads, and the time by which
-/// the modelled part starts after SYNC. (An ADS8688 is 12 us late: too little of a step of the log
+/// From the trigger to the middle of what the driver of the ADS131M08 reads: its 150 us stand for 144
+/// and 155 us, and the modelled part is one of 155 us. (An ADS8688 is 12 us late: too little of a step of the log
 /// to show in codes of 16 bits.)
-const SAMPLE_US: f64 = 144.0 + 11.0;
+const SAMPLE_US: f64 = 155.0;
 
 /// The inputs move from row to row of the log: the lag behind the row of the tick that fits the
 /// poses X, Y and Rz best is what the driver says.
