@@ -28,10 +28,10 @@
 //! **Check.** The part has neither an identification register nor a CRC. At start, reset
 //! values that read back correctly show that it is there. Later each code is followed by its
 //! channel (4 bits), the device address (2 bits, here 01: a line stuck at 0 or at 1 fails) and
-//! its input range (3 bits), and all of these are checked. A flipped bit in the code itself goes unnoticed:
-//! prefer the [ADS131M08](super::ads131m08) on long cables. After the codes each tick reads one
-//! register back: all of them in turn, in 22 ms. (It comes last because only the AUTO_RST of the
-//! next tick starts the sequence again.)
+//! its input range (3 bits), and all of these are checked. A flipped bit in the code itself goes
+//! unnoticed: prefer the [ADS131M08](super::ads131m08) on long cables. After the codes each tick
+//! reads one register back: all of them in turn, in 22 ms. (It comes last because only the AUTO_RST
+//! of the next tick starts the sequence again.)
 //!
 //! **Timing.** Eight frames of 48 bits: 37 us at 10.5 MHz, 50 us with the gaps between bytes. From
 //! sample to sample it takes one frame, about 6 us; the part needs 2 us.
@@ -44,8 +44,8 @@
 //!
 //! **Range.** +-10.24 V with the internal reference of 4.096 V, 312.5 uV per code, straight
 //! binary: 0 is the lower rail. Codes here are signed, -32768 to 32767, as in `stage.toml`. The
-//! inputs have 1 MOhm: one that is not connected reads about 0, see the wiring table of the firmware
-//! for the resistor that makes it read a rail.
+//! inputs have 1 MOhm: one that is not connected reads a code like any other, see the wiring table of
+//! the firmware for the resistor that makes it read a rail.
 
 use super::channels::INPUTS;
 use super::{AdcError, Channels, FrameSampler, silent};
