@@ -1,6 +1,7 @@
 //! Runs the stage controller's unmodified image on an emulated STM32F405, with an emulated
 //! converter that plays a log over SPI, and compares what it sends over CAN with what the host
-//! decodes from the log.
+//! decodes from the log. A line `FAULT part | fault | ticks | poses` says after how many ticks a
+//! fault was told, and how many valid poses were wrong until then.
 //!
 //! Use, as the scripts beside this package do:
 //!
@@ -24,7 +25,9 @@ mod watchdog_model;
 use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
-use checks::{Outcome, Report, bus, commands, figures, log, parameters, sensors, start, timing};
+use checks::{
+    Outcome, Report, bus, commands, figures, log, motion, parameters, sensors, start, timing,
+};
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 use std::process::ExitCode;
@@ -108,6 +111,12 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
             sensors::dead_from_the_start(bench, part)
         });
     }
+    check("ads131m08: a pose is of its instant", &|| {
+        motion::a_pose_is_of_its_instant(bench)
+    });
+    check("ads131m08: a register changes at any time", &|| {
+        sensors::a_register_changes_at_any_time(bench)
+    });
     check("ads131m08: whatever its sheet leaves open", &|| {
         sensors::every_variant(bench)
     });

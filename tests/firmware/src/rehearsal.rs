@@ -41,8 +41,8 @@ fn moving(
     let ticks = codes.len() as u64;
     let mut machine = bench.machine_playing(part, slots, Vec::new())?;
     let middle_us = match part {
-        Part::Ads131m08 => 144,
-        Part::Ads8688 => 10,
+        Part::Ads131m08 => 150,
+        Part::Ads8688 => 12,
     };
     machine.chip.adc.input = Input::moving(codes, PERIOD_US, middle_us);
     Ok((machine, ticks))
