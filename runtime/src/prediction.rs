@@ -10,8 +10,9 @@
 //!
 //! An age costs speed times age: at 4.8 mm/s 1.4 um for 0.3 ms. The slope over eight poses adds
 //! 1.3 % to white noise at an age of 0.3 ms and 4 % at 1 ms (poses 2 ms apart); the difference
-//! of the last two would add 16 % and 58 %. In exchange the velocity is that of 7 ms ago: under
-//! an acceleration of 75 mm/s^2 it is 0.5 mm/s late, 0.16 um for 0.3 ms.
+//! of the last two would add 16 % and 58 %. In exchange the velocity is that of 7 ms ago: at the
+//! 57 mm/s^2 that go with 4.8 mm/s it is 0.4 mm/s late, 0.12 um for 0.3 ms. What is left of the
+//! error in service stands in the README.
 
 use crate::decoder::Reading;
 use crate::frame::RawFrame;
