@@ -344,7 +344,7 @@ impl Machine {
         }
         let end_ns = self.chip.now_ns + ns;
         loop {
-            if self.chip.now_ns <= end_ns && self.reset_if_due() {
+            if self.chip.now_ns <= end_ns && (self.reset_if_due() || !self.asleep) {
                 self.boot()?;
                 continue;
             }
@@ -352,14 +352,6 @@ impl Machine {
                 self.interrupt(NMI)?;
                 continue;
             }
-            match self.chip.next_event_ns() {
-                Some(at) if at <= end_ns => self.chip.now_ns = self.chip.now_ns.max(at),
-                _ => {
-                    self.chip.now_ns = self.chip.now_ns.max(end_ns);
-                    return Ok(());
-                }
-            }
-            self.chip.advance();
             let stands = self.chip.clocks.stands(self.chip.now_ns);
             while let Some(irq) = self.chip.pending_interrupt().filter(|_| !stands) {
                 if irq == IRQ_TIM2 && self.chip.tick_is_due() && self.hold_ns > 0 {
@@ -372,6 +364,19 @@ impl Machine {
                 self.interrupt(16 + irq)?;
                 self.chip.advance();
             }
+            if self.chip.stops() && self.chip.now_ns <= end_ns {
+                continue;
+            }
+            match self.chip.next_event_ns() {
+                Some(at) if at.max(self.chip.now_ns) <= end_ns => {
+                    self.chip.now_ns = self.chip.now_ns.max(at)
+                }
+                _ => {
+                    self.chip.now_ns = self.chip.now_ns.max(end_ns);
+                    return Ok(());
+                }
+            }
+            self.chip.advance();
         }
     }
 
@@ -473,6 +478,19 @@ impl Machine {
             )),
             Err(fault) => Err(format!("{fault} at {pc:#010x}")),
         }
+    }
+
+    /// Flips a bit of RAM.
+    pub fn flip(&mut self, address: u32, bit: u32) {
+        if let Some(byte) = self.ram.0.get_mut((address - RAM + bit / 8) as usize) {
+            *byte ^= 1 << (bit % 8);
+        }
+    }
+
+    /// Writes to flash, as a debugger does while the core stands.
+    pub fn write_flash(&mut self, address: u32, bytes: &[u8]) {
+        let at = (address - FLASH) as usize;
+        self.flash.0[at..at + bytes.len()].copy_from_slice(bytes);
     }
 
     /// A word of RAM.

@@ -20,7 +20,9 @@ mod watchdog_model;
 use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
-use checks::{Outcome, Report, bus, commands, figures, log, parameters, sensors, start, timing};
+use checks::{
+    Outcome, Report, bus, commands, figures, log, parameters, sensors, start, timing, zero,
+};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -113,6 +115,20 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("no other node from the start", &|| {
         bus::alone_from_the_start(bench)
     });
+    check("bus off for less than a tick", &|| {
+        bus::off_for_less_than_a_tick(bench)
+    });
+    check("aborted on the wire: completed", &|| {
+        bus::aborted_on_the_wire(bench, false)
+    });
+    check("aborted on the wire: failed", &|| {
+        bus::aborted_on_the_wire(bench, true)
+    });
+    check("zero: over a watchdog reset", &|| {
+        zero::over_a_watchdog_reset(bench)
+    });
+    check("zero: over power-on", &|| zero::over_power_on(bench));
+    check("zero: lost", &|| zero::lost(bench));
     check("start: crystal absent", &|| start::no_crystal(bench));
     check("start: crystal lost while running", &|| {
         start::crystal_lost(bench)
@@ -125,9 +141,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("start: the board", &|| start::the_board(bench));
     match start::crashes(bench) {
         Ok(crashes) => {
-            for (fault, inject, told) in crashes {
-                check(&format!("crash: {fault}"), &|| {
-                    start::crash(bench, fault, &inject, &told)
+            for crash in crashes {
+                check(&format!("crash: {}", crash.fault), &|| {
+                    start::crash(bench, &crash)
                 });
             }
         }

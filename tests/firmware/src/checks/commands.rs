@@ -15,7 +15,7 @@ const PART: Part = Part::Ads131m08;
 const ADS131M08_SAMPLE_US: u32 = 144;
 const ADS8688_SAMPLE_US: u32 = 10;
 
-fn ask(
+pub(super) fn ask(
     machine: &mut Machine,
     request: Request,
     token: u8,
@@ -78,7 +78,7 @@ pub fn identify(bench: &Bench) -> Outcome {
 }
 
 /// Rows of a stage at rest, with the noise of a few codes around one row.
-fn at_rest(rest: [i32; 6]) -> Vec<Row> {
+pub(super) fn at_rest(rest: [i32; 6]) -> Vec<Row> {
     let noise = |k: usize, c: usize| (k as i32 * 7 + c as i32 * 3) % 5 - 2;
     (0..1000)
         .map(|k| core::array::from_fn(|c| rest[c] + noise(k, c)))
@@ -86,7 +86,7 @@ fn at_rest(rest: [i32; 6]) -> Vec<Row> {
 }
 
 /// Asks for one thing after the other; each must be answered at once, and so.
-fn answers(machine: &mut Machine, asked: &[(Request, u8, Ended)]) -> Outcome {
+pub(super) fn answers(machine: &mut Machine, asked: &[(Request, u8, Ended)]) -> Outcome {
     for (request, token, outcome) in asked {
         let seen = ask(machine, *request, *token, 10)?;
         let what = format!("answer to {request:?}");
@@ -95,8 +95,8 @@ fn answers(machine: &mut Machine, asked: &[(Request, u8, Ended)]) -> Outcome {
     Ok(())
 }
 
-const REZERO: Request = Request::Rezero { ticks: 400 };
-const SERVO_OFF: Request = Request::ServoOff { seconds: 3 };
+pub(super) const REZERO: Request = Request::Rezero { ticks: 400 };
+pub(super) const SERVO_OFF: Request = Request::ServoOff { seconds: 3 };
 
 /// A stage that is not at rest at its zero is not re-zeroed, and told why.
 pub fn rezero_refused(bench: &Bench) -> Outcome {

@@ -49,7 +49,7 @@ pub fn first_state(seen: &Seen, flags: u8) -> Option<u64> {
     first.map(|(tick, _)| *tick)
 }
 
-fn page(seen: &Seen, number: u8) -> Option<u32> {
+pub fn page(seen: &Seen, number: u8) -> Option<u32> {
     let mut pages = seen.health.iter().rev();
     pages
         .find(|page| page.page == number)
@@ -198,12 +198,12 @@ pub fn the_board(bench: &Bench) -> Outcome {
 }
 
 /// A program that crashes tells after the reset how and where.
-pub fn crash(bench: &Bench, fault: &str, inject: &[Injected], wanted: &Told) -> Outcome {
+pub fn crash(bench: &Bench, wanted: &Crash) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.hook_injection(bench.image(PART).address(TICK)?)?;
     machine.run_ticks(100)?;
     Seen::since_last(&mut machine);
-    machine.chip.inject = inject.to_vec();
+    machine.chip.inject.clone_from(&wanted.inject);
     machine.run_ticks(500)?;
     let seen = Seen::since_last(&mut machine);
     let [kind, address, detail] = fault_told(&seen).ok_or("no fault is told")?;
@@ -218,68 +218,63 @@ pub fn crash(bench: &Bench, fault: &str, inject: &[Injected], wanted: &Told) -> 
     equal("resets", (machine.panics, machine.watchdog_resets), (1, 0))?;
     expect(valid(&seen.axes) > 1800, || "too few poses".to_owned())?;
     let told = first_state(&seen, flag::WATCHDOG_RESET);
-    row(bench, fault, 100, told, &seen.axes)
+    row(bench, wanted.fault, 100, told, &seen.axes)
 }
 
-/// What is told of a crash.
-pub struct Told {
+/// A crash, and what is told of it.
+pub struct Crash {
+    /// Its name.
+    pub fault: &'static str,
+    inject: Vec<Injected>,
     kind: u32,
     address: std::ops::Range<u32>,
     detail: Option<u32>,
 }
 
 /// The crashes.
-pub fn crashes(bench: &Bench) -> Result<Vec<(&'static str, Vec<Injected>, Told)>, Failure> {
+pub fn crashes(bench: &Bench) -> Result<Vec<Crash>, Failure> {
     let image = bench.image(PART);
     let set = |register, value| Injected { register, value };
     let tick = image.address(TICK)?;
     let stack = crate::image::RAM;
     let mut crashes = vec![
-        (
-            "hard fault: a pointer to nowhere",
-            vec![set(register::R0, NOWHERE)],
-            Told {
-                kind: 2,
-                address: tick..tick + 0x400,
-                detail: None,
-            },
-        ),
-        (
-            "hard fault: a jump to nowhere",
-            vec![set(register::PC, NOWHERE | 1)],
-            Told {
-                kind: 2,
-                address: NOWHERE..NOWHERE + 2,
-                detail: None,
-            },
-        ),
-        (
-            "stack overflow",
-            vec![set(register::SP, stack + 8)],
-            Told {
-                kind: 3,
-                address: stack - 0x1000..stack,
-                detail: None,
-            },
-        ),
+        Crash {
+            fault: "hard fault: a pointer to nowhere",
+            inject: vec![set(register::R0, NOWHERE)],
+            kind: 2,
+            address: tick..tick + 0x400,
+            detail: None,
+        },
+        Crash {
+            fault: "hard fault: a jump to nowhere",
+            inject: vec![set(register::PC, NOWHERE | 1)],
+            kind: 2,
+            address: NOWHERE..NOWHERE + 2,
+            detail: None,
+        },
+        Crash {
+            fault: "stack overflow",
+            inject: vec![set(register::SP, stack + 8)],
+            kind: 3,
+            address: stack - 0x1000..stack,
+            detail: None,
+        },
     ];
     // A program from which the linker removed every panic has no such function.
     if let Ok(panic) = image.address("9panicking9panic_fmt") {
         // The message is not looked at. The place that it came from is any words of flash here.
         let place = image.address("_stext")?;
-        crashes.push((
-            "panic",
-            vec![
+        crashes.push(Crash {
+            fault: "panic",
+            inject: vec![
                 set(register::R0, place),
                 set(register::R0 + 1, place),
                 set(register::PC, panic | 1),
             ],
-            Told {
-                kind: 1,
-                address: place..place + 1,
-                detail: Some(image.word(place + 8)),
-            },
-        ));
+            kind: 1,
+            address: place..place + 1,
+            detail: Some(image.word(place + 8)),
+        });
     }
     Ok(crashes)
 }
