@@ -12,7 +12,9 @@ use hal_adapters::can::{
 };
 use runtime::blob::MAX_BYTES;
 use runtime::rezero::RezeroSettings;
-use runtime::{OnInvalid, ParameterSet, PlanarPose, RawFrame, Reading, Servo, VerticalPose};
+use runtime::{
+    OnInvalid, ParameterSet, PlanarPose, Predictor, RawFrame, Reading, Servo, VerticalPose,
+};
 
 extern crate image;
 
@@ -76,7 +78,10 @@ fn main() -> ! {
         let decoder = black_box(set.decoder());
         let mut servo = Servo::new(&*decoder, black_box(OnInvalid::Hold { ticks: 3 }));
         servo.start_rezero(black_box(RezeroSettings::default()));
-        black_box(servo.tick(&frame));
+        let reading = black_box(servo.tick(&frame));
+        let mut predictor = black_box(Predictor::new(4_000));
+        predictor.take(&servo, &frame, &reading);
+        black_box(predictor.pose_at(black_box(2_300)));
         black_box(servo.tick_without_frame());
         black_box(servo.tick_with(1, |zero| {
             decoder.decode_at(frame.hall, black_box(VerticalPose::ZERO), zero)
