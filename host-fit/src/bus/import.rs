@@ -52,7 +52,7 @@ pub struct ImportSettings {
     pub search_s: f64,
     /// Only frames of this interface; all frames are of one if `None`.
     pub interface: Option<String>,
-    /// How codes were put into frames; the narrowest that holds them if `None`.
+    /// How codes were put into frames; as the first frame with codes shows if `None`.
     pub layout: Option<Layout>,
     /// Leave out lines that cannot be read, and count them.
     pub skip_bad_lines: bool,
@@ -79,8 +79,7 @@ pub struct ImportReport {
 /// See [`ImportError`]; nothing is written then.
 pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
     let stage = Stage::from_file(&settings.stage)?;
-    let layout = layout(settings, &stage)?;
-    let reading = bus_log::read(settings, layout)?;
+    let reading = bus_log::read(settings)?;
     let (times_us, smoothing) = clock::sample_times_us(&reading.ticks);
     let (reference, reference_counts) = reference::read(&settings.reference, &stage)?;
     let offset = choose_offset(settings, &stage, &reading, &times_us, &reference)?;
@@ -107,12 +106,6 @@ pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
         reference: reference_counts,
         offset,
         join,
-    })
-}
-
-fn layout(settings: &ImportSettings, stage: &Stage) -> Result<Layout, ImportError> {
-    crate::bus::replay::choose_layout(settings.layout, stage).map_err(|error| ImportError::Layout {
-        problem: error.to_string(),
     })
 }
 
