@@ -8,6 +8,8 @@ use std::ffi::{OsStr, c_uint, c_void};
 
 /// Return address of interrupts. No program is there.
 const RETURN: u32 = 0x1fff_0000;
+/// Between that and RAM: accesses do nothing, unless the memory protection makes them faults.
+const BELOW_RAM: (u64, u64) = (0x1fff_1000, 0xf000);
 /// What unused RAM is filled with.
 const PAINT: u8 = 0xa5;
 const WFI: u16 = 0xbf30;
@@ -96,6 +98,27 @@ extern "C" fn read(handle: Handle, offset: u64, _: c_uint, user: *mut c_void) ->
     let word = chip.read(offset as usize & !3);
     stop_if_it_stops(handle, chip);
     u64::from(word >> (8 * (offset & 3)))
+}
+
+extern "C" fn read_below_ram(handle: Handle, offset: u64, _: c_uint, user: *mut c_void) -> u64 {
+    fault_if_protected(handle, offset, user);
+    0
+}
+
+extern "C" fn write_below_ram(handle: Handle, offset: u64, _: c_uint, _: u64, user: *mut c_void) {
+    fault_if_protected(handle, offset, user);
+}
+
+fn fault_if_protected(handle: Handle, offset: u64, user: *mut c_void) {
+    // SAFETY: as in `read`.
+    let chip = unsafe { &mut *user.cast::<Peripherals>() };
+    if let Some(stop) = chip.stop_run
+        && chip.is_protected((BELOW_RAM.0 + offset) as u32)
+    {
+        chip.memory_fault = true;
+        // SAFETY: as in `stop_if_it_stops`.
+        unsafe { stop(handle) };
+    }
 }
 
 /// Ends the run once the core executes nothing more.
@@ -249,6 +272,7 @@ impl Machine {
             core.map_io(RANGE, read, write, user)?;
             core.map_io(BIT_BAND, read_bit, write_bit, user)?;
             core.map_io(CORE, read_core, write_core, user)?;
+            core.map_io(BELOW_RAM, read_below_ram, write_below_ram, user)?;
         }
         chip.stop_run = Some(core.stopper());
         let mut vectors = [0; 48];
@@ -458,11 +482,12 @@ impl Machine {
         saved
     }
 
-    /// Runs until `until` or until the chip is reset. An access to what is not there leads into
-    /// the handler of hard faults.
+    /// Runs until `until` or until the chip is reset. An access to what is not there or is protected
+    /// leads into the handler of hard faults.
     fn go(&mut self, from: u32, until: u32) -> Result<(), String> {
         let mut ran = self.core.run(from, until);
-        if ran.is_err() && !self.chip.stops() {
+        let protected = std::mem::take(&mut self.chip.memory_fault);
+        if (ran.is_err() || protected) && !self.chip.stops() {
             const CFSR: usize = 0xed28;
             const PRECISERR: u32 = 1 << 9;
             self.chip.write_core(CFSR, PRECISERR);
