@@ -13,6 +13,12 @@ const BELOW_RAM: (u64, u64) = (0x1fff_1000, 0xf000);
 /// What unused RAM is filled with.
 const PAINT: u8 = 0xa5;
 const WFI: u16 = 0xbf30;
+/// The core's register of faults, and bits of it (PM0214): a precise bus error; an access that the
+/// memory protection forbids, and then the stacking, too.
+const CFSR: usize = 0xed28;
+const PRECISE: u32 = 1 << 9;
+/// See [`PRECISE`].
+pub const ACCESS_AND_STACKING: u32 = 1 << 1 | 1 << 4;
 /// Numbers of exceptions in the vector table.
 const NMI: u32 = 2;
 const HARD_FAULT: usize = 3;
@@ -488,9 +494,14 @@ impl Machine {
         let mut ran = self.core.run(from, until);
         let protected = std::mem::take(&mut self.chip.memory_fault);
         if (ran.is_err() || protected) && !self.chip.stops() {
-            const CFSR: usize = 0xed28;
-            const PRECISERR: u32 = 1 << 9;
-            self.chip.write_core(CFSR, PRECISERR);
+            self.chip.write_core(
+                CFSR,
+                if protected {
+                    ACCESS_AND_STACKING
+                } else {
+                    PRECISE
+                },
+            );
             self.stack_registers();
             ran = self.core.run(self.vectors[HARD_FAULT], RETURN);
         }

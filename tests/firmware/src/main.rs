@@ -130,6 +130,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("zero: over power-on", &|| zero::over_power_on(bench));
     check("zero: lost", &|| zero::lost(bench));
     check("start: crystal absent", &|| start::no_crystal(bench));
+    check("start: silent after bus-off", &|| {
+        start::silent_after_bus_off(bench)
+    });
     check("start: crystal lost while running", &|| {
         start::crystal_lost(bench)
     });
