@@ -48,8 +48,10 @@ const US: u64 = 1000;
 /// From the supply until the program runs: the chip's own reset, at least (DS8626, tRSTTEMPO). The
 /// converter has the same supply.
 const BOOT_NS: u64 = 500_000;
-/// A byte at 10.5 MHz, and what the program takes between two.
-pub const SPI_BYTE_NS: u64 = 762 + 150;
+/// Clock of the bus that SPI1 is on.
+const BUS_2_HZ: u64 = 84_000_000;
+/// What the program takes between two bytes, ns.
+const SPI_GAP_NS: u64 = 150;
 /// Time of a read of a register that a program polls: loops that wait take time.
 const POLL_NS: u64 = US;
 
@@ -75,8 +77,8 @@ struct Alarm {
 pub struct Peripherals {
     /// Now, ns since the chip got its power.
     pub now_ns: u64,
-    /// Time of one byte on the SPI, ns.
-    pub spi_byte_ns: u64,
+    /// Time of one byte on the SPI in place of what its registers say, ns.
+    pub spi_byte_ns: Option<u64>,
     /// Bytes that went over the SPI.
     pub spi_bytes: u64,
     /// The converter.
@@ -129,7 +131,7 @@ impl Peripherals {
     pub fn new(part: Part, rows: Vec<Row>) -> Self {
         let mut new = Self {
             now_ns: BOOT_NS,
-            spi_byte_ns: SPI_BYTE_NS,
+            spi_byte_ns: None,
             spi_bytes: 0,
             adc: Adc::new(part, Input::held(rows)),
             can: CanModel::new(),
@@ -324,10 +326,14 @@ impl Peripherals {
                 self.watchdog.write(o - IWDG, value, self.now_ns)
             }
             o if o == SPI1 + 0x0c => {
-                self.spi_in = self.adc.exchange(value as u8);
+                let byte = self.adc.exchange(value as u8);
+                // Both converters need mode 1: in another one bits are shifted.
+                let mode_1 = self.words[SPI1 / 4] & 3 == 1;
+                self.spi_in = if mode_1 { byte } else { byte >> 1 };
                 self.spi_full = true;
                 self.spi_bytes += 1;
-                self.now_ns += self.spi_byte_ns;
+                let bits_ns = 8 * 1_000_000_000 / self.spi_hz();
+                self.now_ns += self.spi_byte_ns.unwrap_or(bits_ns + SPI_GAP_NS);
             }
             o if o == GPIOA + 0x18 || o == GPIOB + 0x18 || o == GPIOC + 0x18 => {
                 self.set_pins(o, value)
@@ -341,6 +347,11 @@ impl Peripherals {
             }
             _ => {}
         }
+    }
+
+    /// Clock of SPI1, Hz.
+    pub fn spi_hz(&self) -> u64 {
+        BUS_2_HZ >> (1 + (self.words[SPI1 / 4] >> 3 & 7))
     }
 
     fn set_alarm(&mut self, k: usize, compare: u32) {
