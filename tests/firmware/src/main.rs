@@ -183,6 +183,10 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
         check(&format!("command: record, {name}"), &|| {
             commands::record(bench, part)
         });
+        check(
+            &format!("command: order and age of frames, {name}"),
+            &|| commands::order_and_age(bench, part, name),
+        );
     }
     check("command: odd ones", &|| commands::odd_commands(bench));
     check("command: any data length code", &|| {
