@@ -347,6 +347,11 @@ impl Machine {
         self.reset(cause::POWER_ON);
     }
 
+    /// Pulls the pin NRST low.
+    pub fn reset_by_pin(&mut self) {
+        self.reset(cause::PIN);
+    }
+
     fn reset(&mut self, cause: u32) {
         self.chip.reset(cause);
         self.asleep = false;

@@ -134,6 +134,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("zero: over a watchdog reset", &|| {
         zero::over_a_watchdog_reset(bench)
     });
+    check("zero: over a reset by the pin", &|| {
+        zero::over_a_reset_by_pin(bench)
+    });
     check("zero: over power-on", &|| zero::over_power_on(bench));
     check("zero: lost", &|| zero::lost(bench));
     check("start: crystal absent", &|| start::no_crystal(bench));

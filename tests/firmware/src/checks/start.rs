@@ -39,7 +39,10 @@ pub fn wrong_valid(bench: &Bench, axes: &[Axis]) -> usize {
 pub fn row(bench: &Bench, fault: &str, at: u64, told: Option<u64>, axes: &[Axis]) -> Outcome {
     let told = told.ok_or("it was never told")?;
     let wrong = wrong_valid(bench, axes);
-    println!("FAULT {fault} | {} | {wrong}", told.saturating_sub(at));
+    println!(
+        "FAULT   controller | {fault} | {} | {wrong}",
+        told.saturating_sub(at)
+    );
     equal("valid poses that are wrong", wrong, 0)
 }
 
@@ -185,7 +188,10 @@ pub fn pll_dead(bench: &Bench) -> Outcome {
     machine.run_ticks(200)?;
     expect(machine.watchdog_resets > 10, || "no resets".to_owned())?;
     let seen = Seen::since_last(&mut machine);
-    println!("FAULT PLL dead | no frame at all | {}", seen.axes.len());
+    println!(
+        "FAULT   controller | PLL dead | no frame at all | {}",
+        seen.axes.len()
+    );
     equal("words on the bus", seen.axes.len(), 0)
 }
 
@@ -205,7 +211,9 @@ pub fn can_dead(bench: &Bench) -> Outcome {
     let resets = (machine.panics, machine.watchdog_resets);
     equal("resets", resets, (0, 0))?;
     let frames = Seen::since_last(&mut machine).axes.len();
-    println!("FAULT CAN does not start | told by the light from tick 1 on | {frames}");
+    println!(
+        "FAULT   controller | CAN does not start | told by the light from tick 1 on | {frames}"
+    );
     equal("words on the bus", frames, 0)
 }
 
