@@ -35,8 +35,8 @@
 //! second frame begins after the next conversion has ended (192 or 203 us: frames of at least 21 us;
 //! 22.9 us at 10.5 MHz without gaps) and the third one before two more have (256 us: frames of at
 //! most 37 us, 1.2 us per byte): they are then the mean, weighted by the sinc3 filter, of the 96 us
-//! up to 192 us, or 203 us, after the trigger: the middle is
-//! [`SAMPLE_US`](FrameSampler::SAMPLE_US) = 144 us, or 155 us, after it. A part that drops the
+//! up to 192 us, or 203 us, after the trigger. The middle is 144 or 155 us after it;
+//! [`SAMPLE_US`](FrameSampler::SAMPLE_US) = 150 us is within 6 us of both. A part that drops the
 //! newest conversion, or needs the fourth frame, is a conversion of 32 us later: 0.15 um at the
 //! fastest motion of a service log (4.8 mm/s). Whichever it is, it is the same in every tick.
 //!
@@ -46,8 +46,9 @@
 //!
 //! **Checks.** Each frame has a CRC, and besides codes the three of a tick carry
 //! - the STATUS: a reset, a locked interface, a register that changed (REG_CRC_EN makes the part
-//!   compare its registers' CRC every 94 us), and whether SYNC arrived. Two ticks in a row
-//!   without a resynchronisation mean that its wire is broken;
+//!   compare its registers' CRC every 94 us; a change in the 0.2 ms before the codes are read is
+//!   told a tick later), and whether SYNC arrived. Two ticks in a row without a resynchronisation
+//!   mean that its wire is broken;
 //! - one register, read back and compared: all of 0x02 to 0x30 in turn, in 94 ms.
 //!
 //! The trigger after a failed start leaves SYNC/RESET low for one period: a reset that also helps
@@ -275,8 +276,9 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
     /// conversion.
     const SETTLE_US: u32 = 182;
 
-    /// The middle of the 96 us before 192 us, when the conversion ends that is read.
-    const SAMPLE_US: u32 = 144;
+    /// The middle of the 96 us before 192 or 203 us, when the conversion ends that is read: 144 or
+    /// 155 us.
+    const SAMPLE_US: u32 = 150;
 
     const CODE_BITS: u32 = 24;
 

@@ -19,19 +19,19 @@
 //! | Feature Select | 0x03 | 0x00 | 0x43: channel, device address and input range follow each code, device address 1 |
 //! | Channel n Input Range | 0x05 + n | 0x00 | 0: +-2.5 times the reference |
 //!
-//! **Power-up.** The internal reference needs 15 ms until codes are right (table 6.5 and section
-//! PWR_DN), and the part does not tell. A start cannot know whether the power has just come, so that
-//! samples are [`NotReady`](AdcError::NotReady) for [`REFERENCE_US`] after every start. RST/PD is
+//! **Power-up.** The internal reference needs 15 ms until codes are right, and the part does not
+//! tell. A start cannot know whether the power has just come: samples are
+//! [`NotReady`](AdcError::NotReady) for [`REFERENCE_US`] after every start. RST/PD is
 //! held high: low for 40 to 100 ns it is a reset, for more than 400 ns it switches the part off,
 //! reference included.
 //!
 //! **Check.** The part has neither an identification register nor a CRC. At start, reset
 //! values that read back correctly show that it is there. Later each code is followed by its
 //! channel (4 bits), the device address (2 bits, here 01: a line stuck at 0 or at 1 fails) and
-//! its input range (3 bits), and all of these are checked. A flipped bit in the code itself goes unnoticed:
-//! prefer the [ADS131M08](super::ads131m08) on long cables. After the codes each tick reads one
-//! register back: all of them in turn, in 22 ms. (It comes last because only the AUTO_RST of the
-//! next tick starts the sequence again.)
+//! its input range (3 bits), and all of these are checked. A flipped bit in the code itself goes
+//! unnoticed: prefer the [ADS131M08](super::ads131m08) on long cables. After the codes each tick
+//! reads one register back: all of them in turn, in 22 ms. (It comes last because only the AUTO_RST
+//! of the next tick starts the sequence again.)
 //!
 //! **Timing.** Eight frames of 48 bits: 37 us at 10.5 MHz, 50 us with the gaps between bytes. From
 //! sample to sample it takes one frame, about 6 us; the part needs 2 us.
@@ -44,8 +44,8 @@
 //!
 //! **Range.** +-10.24 V with the internal reference of 4.096 V, 312.5 uV per code, straight
 //! binary: 0 is the lower rail. Codes here are signed, -32768 to 32767, as in `stage.toml`. The
-//! inputs have 1 MOhm: one that is not connected reads about 0, see the wiring table of the firmware
-//! for the resistor that makes it read a rail.
+//! inputs have 1 MOhm: one that is not connected reads a code like any other, see the wiring table of
+//! the firmware for the resistor that makes it read a rail.
 
 use super::channels::INPUTS;
 use super::{AdcError, Channels, FrameSampler, silent};

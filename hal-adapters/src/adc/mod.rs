@@ -105,7 +105,8 @@ pub trait FrameSampler {
     /// [`AdcError::Pin`].
     fn trigger(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<Self::Bus>>;
 
-    /// Reads the codes of one period. `sequence` and `time_us` go into the frame unchanged.
+    /// Reads the codes of one period. `sequence` and `time_us` go into the frame unchanged: the
+    /// time of the trigger plus [`SAMPLE_US`](Self::SAMPLE_US).
     /// A code at a rail is no error here: the decoder's window refuses it.
     ///
     /// # Errors

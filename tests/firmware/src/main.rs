@@ -1,6 +1,7 @@
 //! Runs the stage controller's unmodified image on an emulated STM32F405, with an emulated
 //! converter that plays a log over SPI, and compares what it sends over CAN with what the host
-//! decodes from the log.
+//! decodes from the log. A line `FAULT part | fault | ticks | poses` says after how many ticks a
+//! fault was told, and how many valid poses were wrong until then.
 //!
 //! Use: `bench FOLDER LIBRARY TICKS [PART OF A NAME]`, as the script `run` beside this
 //! package does: a folder with images, blobs, log and poses, the library of Unicorn 2.1, the
@@ -21,7 +22,7 @@ use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
 use checks::{
-    Outcome, Report, bus, commands, figures, log, parameters, sensors, start, timing, zero,
+    Outcome, Report, bus, commands, figures, log, motion, parameters, sensors, start, timing, zero,
 };
 use std::path::Path;
 use std::process::ExitCode;
@@ -82,6 +83,12 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
             sensors::dead_from_the_start(bench, part)
         });
     }
+    check("ads131m08: a pose is of its instant", &|| {
+        motion::a_pose_is_of_its_instant(bench)
+    });
+    check("ads131m08: a register changes at any time", &|| {
+        sensors::a_register_changes_at_any_time(bench)
+    });
     check("ads131m08: whatever its sheet leaves open", &|| {
         sensors::every_variant(bench)
     });
@@ -127,9 +134,15 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("zero: over a watchdog reset", &|| {
         zero::over_a_watchdog_reset(bench)
     });
+    check("zero: over a reset by the pin", &|| {
+        zero::over_a_reset_by_pin(bench)
+    });
     check("zero: over power-on", &|| zero::over_power_on(bench));
     check("zero: lost", &|| zero::lost(bench));
     check("start: crystal absent", &|| start::no_crystal(bench));
+    check("start: silent after bus-off", &|| {
+        start::silent_after_bus_off(bench)
+    });
     check("start: crystal lost while running", &|| {
         start::crystal_lost(bench)
     });

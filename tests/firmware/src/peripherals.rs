@@ -28,6 +28,10 @@ const OPTCR: usize = 0x2_3c14;
 /// The core's system timer, and the register by which a program resets it.
 const SYSTICK: usize = 0xe010;
 const AIRCR: usize = 0xed0c;
+/// Memory protection: control, base and attributes of the region that was written last.
+const MPU_CTRL: usize = 0xed94;
+const MPU_RBAR: usize = 0xed9c;
+const MPU_RASR: usize = 0xeda0;
 
 const SELECT_PIN: u32 = 4;
 const SYNC_PIN: u32 = 0;
@@ -44,8 +48,10 @@ const US: u64 = 1000;
 /// From the supply until the program runs: the chip's own reset, at least (DS8626, tRSTTEMPO). The
 /// converter has the same supply.
 const BOOT_NS: u64 = 500_000;
-/// A byte at 10.5 MHz, and what the program takes between two.
-pub const SPI_BYTE_NS: u64 = 762 + 150;
+/// Clock of the bus that SPI1 is on.
+const BUS_2_HZ: u64 = 84_000_000;
+/// What the program takes between two bytes, ns.
+const SPI_GAP_NS: u64 = 150;
 /// Time of a read of a register that a program polls: loops that wait take time.
 const POLL_NS: u64 = US;
 
@@ -71,8 +77,8 @@ struct Alarm {
 pub struct Peripherals {
     /// Now, ns since the chip got its power.
     pub now_ns: u64,
-    /// Time of one byte on the SPI, ns.
-    pub spi_byte_ns: u64,
+    /// Time of one byte on the SPI in place of what its registers say, ns.
+    pub spi_byte_ns: Option<u64>,
     /// Bytes that went over the SPI.
     pub spi_bytes: u64,
     /// The converter.
@@ -93,6 +99,8 @@ pub struct Peripherals {
     pub pulled_up: [bool; 2],
     /// Whether the service pin is pulled low: the servo is on.
     pub servo_on: bool,
+    /// Whether the program accessed memory that is protected.
+    pub memory_fault: bool,
     /// Whether the program has asked for a reset.
     pub reset_asked: bool,
     /// What a hook changes once.
@@ -123,7 +131,7 @@ impl Peripherals {
     pub fn new(part: Part, rows: Vec<Row>) -> Self {
         let mut new = Self {
             now_ns: BOOT_NS,
-            spi_byte_ns: SPI_BYTE_NS,
+            spi_byte_ns: None,
             spi_bytes: 0,
             adc: Adc::new(part, Input::held(rows)),
             can: CanModel::new(),
@@ -135,6 +143,7 @@ impl Peripherals {
             option_bytes: 0x0fff_aae1,
             pulled_up: [true; 2],
             servo_on: false,
+            memory_fault: false,
             reset_asked: false,
             inject: Vec::new(),
             stop_run: None,
@@ -219,6 +228,17 @@ impl Peripherals {
     /// The crystal stops.
     pub fn stop_crystal(&mut self) {
         self.clocks.stop_crystal(self.now_ns);
+    }
+
+    /// Whether the memory protection forbids an access (PM0214, MPU): one region without
+    /// access, over the map of the core.
+    pub fn is_protected(&self, address: u32) -> bool {
+        let word = |offset: usize| self.core_words[offset / 4];
+        let (control, attributes) = (word(MPU_CTRL), word(MPU_RASR));
+        let is_on = control & 0b101 == 0b101 && attributes & 1 == 1;
+        let no_access = attributes >> 24 & 0b111 == 0;
+        let bytes_log2 = (attributes >> 1 & 0x1f) + 1;
+        is_on && no_access && (address ^ word(MPU_RBAR)) >> bytes_log2 == 0
     }
 
     /// Whether the chip is reset, and the program executes nothing more.
@@ -306,10 +326,14 @@ impl Peripherals {
                 self.watchdog.write(o - IWDG, value, self.now_ns)
             }
             o if o == SPI1 + 0x0c => {
-                self.spi_in = self.adc.exchange(value as u8);
+                let byte = self.adc.exchange(value as u8);
+                // Both converters need mode 1: in another one bits are shifted.
+                let mode_1 = self.words[SPI1 / 4] & 3 == 1;
+                self.spi_in = if mode_1 { byte } else { byte >> 1 };
                 self.spi_full = true;
                 self.spi_bytes += 1;
-                self.now_ns += self.spi_byte_ns;
+                let bits_ns = 8 * 1_000_000_000 / self.spi_hz();
+                self.now_ns += self.spi_byte_ns.unwrap_or(bits_ns + SPI_GAP_NS);
             }
             o if o == GPIOA + 0x18 || o == GPIOB + 0x18 || o == GPIOC + 0x18 => {
                 self.set_pins(o, value)
@@ -323,6 +347,11 @@ impl Peripherals {
             }
             _ => {}
         }
+    }
+
+    /// Clock of SPI1, Hz.
+    pub fn spi_hz(&self) -> u64 {
+        BUS_2_HZ >> (1 + (self.words[SPI1 / 4] >> 3 & 7))
     }
 
     fn set_alarm(&mut self, k: usize, compare: u32) {

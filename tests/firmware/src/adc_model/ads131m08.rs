@@ -6,11 +6,10 @@
 //! global chop, standby, current detection, LOCK, the CRC of commands, t_REGACQ (waits of the
 //! program take no time here). Unknown commands are answered as NULL, like invalid ones.
 
+use super::filter::{Conversion, Filter, T_MOD_NS};
 use super::{Input, Row};
 use std::collections::VecDeque;
 
-/// Period of the modulators, ns.
-const T_MOD_NS: u64 = 250;
 /// Period of CLKIN, ns.
 const T_CLKIN_NS: u64 = 125;
 /// t_POR: from the supply until commands are taken, ns.
@@ -83,17 +82,6 @@ impl Variant {
     }
 }
 
-/// A conversion: when it ended, and what its filter saw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Conversion {
-    end_ns: u64,
-    /// The filter has no data from before.
-    from_ns: u64,
-    /// By the fast-settling filter.
-    fast: bool,
-    osr: u64,
-}
-
 /// The part.
 pub struct Ads131m08 {
     /// What silicon does where the sheet is silent.
@@ -119,7 +107,7 @@ pub struct Ads131m08 {
     listens: bool,
     received: Vec<u8>,
     reply: Vec<u8>,
-    weights: (u64, Vec<f64>),
+    filter: Filter,
 }
 
 impl Default for Ads131m08 {
@@ -144,32 +132,32 @@ impl Default for Ads131m08 {
             listens: false,
             received: Vec::new(),
             reply: Vec::new(),
-            weights: (0, Vec::new()),
+            filter: Filter::default(),
         };
         new.power_up(0);
         new
     }
 }
 
-/// CRC-16 (CCITT) of the sheet.
+/// CRC-16 (CCITT) of the sheet, a byte at a time.
 fn crc(bytes: impl IntoIterator<Item = u8>) -> u16 {
-    bytes.into_iter().fold(0xffff, |crc, byte| {
-        (0..8).fold(crc ^ u16::from(byte) << 8, |c, _| {
-            c << 1 ^ if c >> 15 == 1 { 0x1021 } else { 0 }
-        })
-    })
-}
-
-/// Weights of a sinc3 filter, the newest sample first: three boxes convolved.
-fn sinc3(osr: u64) -> Vec<f64> {
-    let n = osr as usize;
-    let convolve = |a: &[f64]| -> Vec<f64> {
-        let at = |k: usize| a.get(k).copied().unwrap_or(0.0);
-        (0..a.len() + n - 1)
-            .map(|k| (k.saturating_sub(n - 1)..=k).map(at).sum::<f64>() / n as f64)
-            .collect()
+    const TABLE: [u16; 256] = {
+        let mut table = [0; 256];
+        let mut k = 0;
+        while k < 256 {
+            let (mut crc, mut bit) = ((k as u16) << 8, 0);
+            while bit < 8 {
+                crc = crc << 1 ^ if crc >> 15 == 1 { 0x1021 } else { 0 };
+                bit += 1;
+            }
+            table[k] = crc;
+            k += 1;
+        }
+        table
     };
-    convolve(&convolve(&vec![1.0 / n as f64; n]))
+    bytes.into_iter().fold(0xffff, |crc, byte| {
+        crc << 8 ^ TABLE[usize::from((crc >> 8) as u8 ^ byte)]
+    })
 }
 
 impl Ads131m08 {
@@ -225,6 +213,11 @@ impl Ads131m08 {
 
     /// Stores what was converted by now.
     fn advance(&mut self, now_ns: u64) {
+        let ended = now_ns.saturating_sub(self.from_ns) / (self.osr() * T_MOD_NS);
+        if self.clocked && self.store.len() == 2 && self.conversions >= 3 {
+            // Of all that a full store is offered it keeps one of the last two at most.
+            self.conversions = self.conversions.max(ended.saturating_sub(2));
+        }
         while self.clocked && self.next_end_ns() <= now_ns {
             let conversion = Conversion {
                 end_ns: self.next_end_ns(),
@@ -276,45 +269,6 @@ impl Ads131m08 {
     fn is_in_reset(&self, now_ns: u64) -> bool {
         let low = self.low_since_ns.map_or(0, |since| now_ns - since);
         now_ns < self.ready_ns || low >= RESET_CLKIN * T_CLKIN_NS
-    }
-
-    /// The code of a conversion: the mean over the window of its filter.
-    fn convert(&mut self, conversion: Conversion, input: &Input) -> Row {
-        let Conversion {
-            end_ns,
-            from_ns,
-            fast,
-            osr,
-        } = conversion;
-        if self.weights.0 != osr {
-            self.weights = (osr, sinc3(osr));
-        }
-        let box_weights;
-        let weights = if fast {
-            box_weights = vec![1.0 / osr as f64; osr as usize];
-            &box_weights
-        } else {
-            &self.weights.1
-        };
-        let window_ns = weights.len() as u64 * T_MOD_NS;
-        if end_ns >= from_ns + window_ns
-            && let Some(row) = input.constant(end_ns - window_ns, end_ns - 1)
-        {
-            return row;
-        }
-        let mut sum = [0.0; 6];
-        for (k, weight) in (0u64..).zip(weights) {
-            let Some(at_ns) = end_ns.checked_sub((k + 1) * T_MOD_NS) else {
-                break;
-            };
-            if at_ns < from_ns {
-                break;
-            }
-            for (sum, code) in sum.iter_mut().zip(input.at(at_ns)) {
-                *sum += weight * code;
-            }
-        }
-        sum.map(|code| (code.round() as i32).clamp(-0x80_0000, 0x7f_ffff))
     }
 
     /// CRC of the registers 0x02 to 0x30.
@@ -371,7 +325,7 @@ impl Ads131m08 {
         });
         self.shown = self.store.front().copied();
         if let Some(conversion) = self.shown {
-            self.codes = self.convert(conversion, input);
+            self.codes = self.filter.codes(conversion, input);
             if !self.variant.late_pop {
                 self.store.pop_front();
             }

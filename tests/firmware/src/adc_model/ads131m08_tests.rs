@@ -210,25 +210,3 @@ fn a_register_that_changes_is_flagged_once() {
 fn the_check_is_that_of_the_standard() {
     assert_eq!(crc(*b"123456789"), 0x29b1);
 }
-
-/// Equation 6: a straight motion is delayed by half the filter's length.
-#[test]
-fn a_motion_is_seen_as_it_was_48_us_before_the_conversion_ended() {
-    let mut input = Input::moving(vec![[0; 6], [2_000_000; 6]], 2000);
-    input.start_ns = Some(0);
-    let mut part = Ads131m08::default();
-    let conversion = Conversion {
-        end_ns: 1_000_000,
-        from_ns: 0,
-        fast: false,
-        osr: 128,
-    };
-    let late_ns = 1_000_000 - part.convert(conversion, &input)[0];
-    // 382 samples of 250 ns, the newest one 250 ns old: 47.875 us.
-    assert_eq!(late_ns, 47_875);
-    // A whole period of the data rate is a notch.
-    let weights = sinc3(128);
-    let wave = |k: usize| (k as f64 * std::f64::consts::TAU / 128.0).cos();
-    let gain: f64 = weights.iter().enumerate().map(|(k, w)| w * wave(k)).sum();
-    assert!(gain.abs() < 1e-12 && (weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-}

@@ -29,7 +29,6 @@ impl Input {
 
     /// A motion, linear from row to row, `period_us` apart; the first row before its start and
     /// the last one after its end.
-    #[allow(dead_code, reason = "for the loop of record, fit and decode")]
     pub fn moving(rows: Vec<Row>, period_us: u64) -> Self {
         Self {
             rows,

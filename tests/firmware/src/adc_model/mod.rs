@@ -3,6 +3,7 @@
 
 pub mod ads131m08;
 pub mod ads8688;
+mod filter;
 pub mod input;
 
 use ads131m08::{Ads131m08, Variant};

@@ -12,8 +12,8 @@ const TEXT_BYTES_MAX: usize = 48 << 10;
 const RAM_BYTES_MAX: usize = 8 << 10;
 /// An interrupt may block for a tenth of a period, us.
 const BLOCKED_US_MAX: f64 = 200.0;
-/// A byte at 10.5 MHz, us.
-const SPI_BYTE_US: f64 = 8.0 / 10.5;
+/// The fastest clock at which data reach the core in time.
+const SPI_HZ_MAX: u64 = 10_500_000;
 /// Cycles assumed for an instruction: flash at five wait states, loads, branches.
 const CYCLES_PER_INSTRUCTION: f64 = 2.0;
 
@@ -73,7 +73,10 @@ pub fn interrupt_to_mailbox(bench: &Bench, part: Part, name: &str) -> Outcome {
     equal("bytes over the SPI", spi_bytes, wanted)?;
 
     // Instructions between two bytes are counted, so that the bytes themselves take their bits.
-    let spi_us = spi_bytes as f64 * SPI_BYTE_US;
+    let spi_hz = machine.chip.spi_hz();
+    expect(spi_hz <= SPI_HZ_MAX, || format!("SPI at {spi_hz} Hz"))?;
+    let spi_byte_us = 8e6 / spi_hz as f64;
+    let spi_us = spi_bytes as f64 * spi_byte_us;
     let us = |instructions: u64| instructions as f64 * CYCLES_PER_INSTRUCTION / 168.0;
     let counts = codes.iter().map(|cost| cost.instructions);
     let most = counts.clone().max().unwrap_or(u64::MAX);
@@ -85,7 +88,7 @@ pub fn interrupt_to_mailbox(bench: &Bench, part: Part, name: &str) -> Outcome {
     let now_ns = machine.chip.now_ns;
     machine.chip.adc.power_up(now_ns);
     machine.run_ticks(20)?;
-    let longest = |cost: &Cost| us(cost.all_instructions) + cost.spi_bytes as f64 * SPI_BYTE_US;
+    let longest = |cost: &Cost| us(cost.all_instructions) + cost.spi_bytes as f64 * spi_byte_us;
     let starts = machine.costs[before..].iter().map(longest);
     let start_us = starts.fold(0.0, f64::max);
     let (to_mailbox_us, blocked_us) = (us(most) + spi_us, us(blocked.unwrap_or(0)) + spi_us);
@@ -96,6 +99,7 @@ pub fn interrupt_to_mailbox(bench: &Bench, part: Part, name: &str) -> Outcome {
             counts.min().unwrap_or(0).to_string(),
         ),
         ("instructions_of_trigger_max", trigger.to_string()),
+        ("spi_hz", spi_hz.to_string()),
         ("spi_bytes_per_tick", spi_bytes.to_string()),
         ("spi_us_per_tick", format!("{spi_us:.1}")),
         ("us_to_mailbox_estimate", format!("{to_mailbox_us:.1}")),

@@ -4,6 +4,7 @@ pub mod bus;
 pub mod commands;
 pub mod figures;
 pub mod log;
+pub mod motion;
 pub mod parameters;
 pub mod sensors;
 pub mod start;

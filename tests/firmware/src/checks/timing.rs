@@ -4,7 +4,6 @@ use super::log::Stage;
 use super::{Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen};
-use crate::peripherals::SPI_BYTE_NS;
 use hal_adapters::can::status::{NodeState, flag};
 use runtime::Status;
 
@@ -116,12 +115,12 @@ pub fn overrun_ticks_do_not_feed(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ticks(100)?;
     // An SPI so slow that the codes of a tick take 2.4 ms.
-    machine.chip.spi_byte_ns = 80_000;
+    machine.chip.spi_byte_ns = Some(80_000);
     machine.run_ticks(30)?;
     expect(machine.watchdog_resets >= 1, || {
         "the watchdog was fed".to_owned()
     })?;
-    machine.chip.spi_byte_ns = SPI_BYTE_NS;
+    machine.chip.spi_byte_ns = None;
     machine.run_ticks(1000)?;
     let after = Seen::since_last(&mut machine);
     let good = after.axes.iter().filter(|a| a.status == 0).count();

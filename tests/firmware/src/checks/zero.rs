@@ -61,11 +61,27 @@ pub fn over_a_watchdog_reset(bench: &Bench) -> Outcome {
     let told = first_state(&seen, flag::WATCHDOG_RESET).ok_or("it was never told")?;
     let (valid, near) = near_zero(&seen);
     println!(
-        "FAULT watchdog reset with a zero set | {} | {}",
+        "FAULT   controller | watchdog reset with a zero set | {} | {}",
         told - at,
         valid - near
     );
     Ok(())
+}
+
+/// A reset by the pin is no fault; the zero stays.
+pub fn over_a_reset_by_pin(bench: &Bench) -> Outcome {
+    let mut machine = re_zeroed(bench)?;
+    machine.reset_by_pin();
+    machine.run_ticks(300)?;
+    let seen = Seen::since_last(&mut machine);
+    expect_zero(&seen, true)?;
+    equal(
+        "flag of a fault",
+        first_state(&seen, flag::WATCHDOG_RESET),
+        None,
+    )?;
+    let told = [6, 9, 11].map(|number| page(&seen, number));
+    equal("faults and checks", told, [Some(0); 3])
 }
 
 /// Power-on: no zero, and none is missed.
@@ -101,7 +117,7 @@ pub fn lost(bench: &Bench) -> Outcome {
         expect_zero(&seen, false)?;
         equal("checks", page(&seen, 11), Some(board_check::ZERO_LOST))?;
         let (_, near) = near_zero(&seen);
-        println!("FAULT {fault} | in the first state | {near}");
+        println!("FAULT   controller | {fault} | in the first state | {near}");
     }
     Ok(())
 }
