@@ -42,7 +42,8 @@ impl NodeState {
 
 /// Flags of [`NodeStatus`], as bits.
 pub mod flag {
-    /// The last reset came from the watchdog.
+    /// The last reset came from the watchdog, or from the program on a fault: see page 6 of the
+    /// health frames.
     pub const WATCHDOG_RESET: u8 = 1;
     /// The bus was off since start.
     pub const BUS_WAS_OFF: u8 = 1 << 1;

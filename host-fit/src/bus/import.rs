@@ -21,7 +21,6 @@ pub mod write;
 
 pub use error::ImportError;
 
-use crate::bus::replay::{ReplayError, choose_layout};
 use crate::input::stage::Stage;
 use crate::output::write_atomically;
 use bus_log::{BusCounts, BusReading};
@@ -54,7 +53,7 @@ pub struct ImportSettings {
     pub search_s: f64,
     /// Only frames of this interface; all frames are of one if `None`.
     pub interface: Option<String>,
-    /// How codes were put into frames; the narrowest that holds them if `None`.
+    /// How codes were put into frames; as the first frame with codes shows if `None`.
     pub layout: Option<Layout>,
     /// Leave out lines that cannot be read, and count them.
     pub skip_bad_lines: bool,
@@ -81,7 +80,7 @@ pub struct ImportReport {
 /// See [`ImportError`]; nothing is written then.
 pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
     let stage = Stage::from_file(&settings.stage)?;
-    let reading = read_bus(settings, &stage)?;
+    let reading = bus_log::read(settings)?;
     let (times_us, smoothing) = clock::sample_times_us(&reading.ticks);
     let (reference, reference_counts) = reference::read(&settings.reference, &stage)?;
     let offset = choose_offset(settings, &stage, &reading, &times_us, &reference)?;
@@ -109,24 +108,6 @@ pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
         offset,
         join,
     })
-}
-
-/// Reads the record in the layout asked for; else in the narrowest that holds the codes of the
-/// stage, or in the other one if there is no tick in that: a converter of 24 bits may serve a
-/// stage whose codes are narrow.
-fn read_bus(settings: &ImportSettings, stage: &Stage) -> Result<BusReading, ImportError> {
-    let refused = |error: ReplayError| ImportError::Layout {
-        problem: error.to_string(),
-    };
-    let layout = choose_layout(settings.layout, stage).map_err(refused)?;
-    match bus_log::read(settings, layout) {
-        Err(ImportError::NoTicks { .. })
-            if settings.layout.is_none() && layout == Layout::Bits16 =>
-        {
-            bus_log::read(settings, Layout::Bits24)
-        }
-        read => read,
-    }
 }
 
 fn choose_offset(

@@ -50,7 +50,7 @@ pub(super) struct ImportArgs {
     /// Only frames of this interface, where the record holds several.
     #[arg(long, value_name = "IFACE")]
     interface: Option<String>,
-    /// How codes are put into frames.
+    /// How codes are put into frames; auto: as the first frame with codes shows.
     #[arg(long, value_enum, default_value = "auto")]
     layout: LayoutChoice,
     /// Leave out lines that cannot be read, and count them.

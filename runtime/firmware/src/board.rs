@@ -88,10 +88,12 @@ pub struct BitTiming {
 /// internal oscillator at 71 % with the most.
 ///
 /// With n = 14 quanta a bit, each node's clock may differ from the nominal one by s / 20 n and by
-/// p / 2 (13 n - p) at most, s the jump and p the shorter of the phase segments (Bosch, CAN 2.0,
-/// section 9; both nodes differ the other way). That is 0.36 % with s = 1, p = 2, and 1.1 % with
-/// s = p = 4, or 2.2 % beside a node with a crystal. The internal oscillator keeps 1 % at 25 degC,
-/// and 4 % from -10 to 85 degC (DS8626): it does in a laboratory, and else see `Bus::new`.
+/// p / 2 (13 n - p) at most, s the jump and p the shorter of the phase segments (F. Hartwich and A.
+/// Bassemir, The Configuration of the CAN Bit Timing, 6th iCC, 1999; both nodes may differ, in
+/// opposite directions). That is 0.36 % with s = 1, p = 2, and 1.1 % with s = p = 4, or 2.2 %
+/// beside a node with a crystal. The internal oscillator keeps 1 % at 25 degC, and 4 % from -10 to
+/// 85 degC (DS8626, HSI oscillator characteristics): in a laboratory that is enough. Elsewhere it
+/// may not be; see `Bus::new`.
 pub const fn can_bit_timing(crystal: bool) -> BitTiming {
     let (segment_1, segment_2, jump) = if crystal { (11, 2, 1) } else { (9, 4, 4) };
     BitTiming {

@@ -191,7 +191,7 @@ impl Bus {
             // SAFETY: bits that the controller defines; zeros change nothing.
             self.can.tsr().write(|w| unsafe { w.bits(completed) });
         }
-        status / EMPTY & ALL_EMPTY
+        (status / EMPTY) & ALL_EMPTY
     }
 }
 

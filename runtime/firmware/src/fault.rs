@@ -3,7 +3,7 @@
 
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
-use cortex_m::peripheral::SCB;
+use cortex_m::peripheral::{MPU, SCB};
 use firmware::retained::{FaultKind, Retained, Step, WORDS};
 use stm32f4xx_hal::pac::RCC;
 
@@ -62,6 +62,27 @@ fn panic(info: &PanicInfo<'_>) -> ! {
         address,
         at.map_or(0, |place| place.line()),
     )
+}
+
+/// Makes every access to the 1 MiB below the stack a fault. Of what lies there, system memory and
+/// reserved addresses, the manual does not say that a write faults.
+pub fn guard_stack(mpu: &mut MPU) {
+    const BYTES_LOG2: u32 = 20;
+    const NO_ACCESS: u32 = 0;
+    const ENABLE: u32 = 1;
+    /// Elsewhere the map of the core holds.
+    const DEFAULT_MAP: u32 = 1 << 2;
+    let below = (&raw const _stack_end as u32).wrapping_sub(1 << BYTES_LOG2);
+    // SAFETY: the program uses nothing in this region, and the rest of the map stays as it is.
+    unsafe {
+        mpu.rnr.write(0);
+        mpu.rbar.write(below);
+        mpu.rasr
+            .write(NO_ACCESS << 24 | (BYTES_LOG2 - 1) << 1 | ENABLE);
+        mpu.ctrl.write(DEFAULT_MAP | ENABLE);
+    }
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
 }
 
 /// The crystal stopped: the core runs on its internal oscillator, slower than all else assumes.

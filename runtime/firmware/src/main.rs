@@ -83,7 +83,8 @@ mod app {
     }
 
     #[init(local = [loaded: Option<Loaded> = None])]
-    fn init(cx: init::Context) -> (Shared, Local) {
+    fn init(mut cx: init::Context) -> (Shared, Local) {
+        fault::guard_stack(&mut cx.core.MPU);
         let device = cx.device;
         let mut stopwatch = Stopwatch::new(cx.core.SYST);
         let before = Before::take(&device.RCC);

@@ -75,12 +75,12 @@ fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Told> {
 }
 
 #[test]
-fn pose_frames_come_lowest_priority_first_so_that_all_find_a_mailbox() {
+fn pose_frames_come_first_in_the_order_of_their_identifiers() {
     let mut node = node();
     for k in 0..32 {
         let frames = tick(&mut node, Ok(frame(k)));
         let planar: Vec<_> = frames.iter().take(3).map(|coded| coded.message).collect();
-        assert_eq!(planar, [Message::PoseRz, Message::PoseY, Message::PoseX]);
+        assert_eq!(planar, [Message::PoseX, Message::PoseY, Message::PoseRz]);
     }
 }
 
@@ -267,10 +267,9 @@ fn a_program_built_to_record_does_so_from_the_first_tick() {
     let messages: Vec<_> = frames.iter().map(|coded| coded.message).collect();
     use Message as M;
     let want = [
-        // Groups are given in reverse; see the outbox.
-        [M::PoseRz, M::PoseY, M::PoseX].as_slice(),
+        [M::PoseX, M::PoseY, M::PoseRz].as_slice(),
         &[M::PoseTime, M::PoseZ, M::SensorTime],
-        &[M::Capacitive23At24, M::HallCCapacitive1At24, M::HallAb24],
+        &[M::HallAb24, M::HallCCapacitive1At24, M::Capacitive23At24],
         &[M::NodeStatus],
     ];
     assert_eq!(messages, want.concat());

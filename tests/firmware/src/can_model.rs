@@ -65,6 +65,10 @@ pub struct CanModel {
     interrupts: u32,
     /// ERRI.
     latched: bool,
+    /// The time up to which it has advanced.
+    advanced_ns: u64,
+    /// Until when other nodes hold the bus with frames of higher priority.
+    busy_until_ns: u64,
     /// When it ceases to be bus-off; `None`: never.
     off_until: Option<Option<u64>>,
     mailboxes: [Mailbox; 3],
@@ -93,6 +97,8 @@ impl CanModel {
             acknowledges: true,
             interrupts: 0,
             latched: false,
+            advanced_ns: 0,
+            busy_until_ns: 0,
             off_until: None,
             mailboxes: [Mailbox::default(); 3],
             done: 0,
@@ -128,6 +134,19 @@ impl CanModel {
     pub fn blip(&mut self, now_ns: u64, ns: u64) {
         self.fail();
         self.go_off(Some(now_ns + ns));
+    }
+
+    /// Other nodes hold the bus until then.
+    pub fn occupy(&mut self, until_ns: u64) {
+        self.busy_until_ns = until_ns;
+    }
+
+    /// The frame on the wire is destroyed by an error, and says whether there was one.
+    pub fn destroy(&mut self, now_ns: u64) -> bool {
+        let was_there = self.on_the_wire.is_some();
+        self.fail();
+        self.arbitrate(now_ns);
+        was_there
     }
 
     fn go_off(&mut self, until: Option<u64>) {
@@ -171,7 +190,8 @@ impl CanModel {
     }
 
     fn takes_part(&self, now_ns: u64) -> bool {
-        self.joins_ns.is_some_and(|at| at <= now_ns) && self.off_until.is_none()
+        let joined = self.joins_ns.is_some_and(|at| at <= now_ns);
+        joined && self.busy_until_ns <= now_ns && self.off_until.is_none()
     }
 
     /// Starts the pending frame of the highest priority if the wire is free.
@@ -188,7 +208,8 @@ impl CanModel {
     pub fn next_event_ns(&self) -> Option<u64> {
         let ends = self.on_the_wire.map(|(_, at)| at);
         let waits = self.mailboxes.iter().any(|mailbox| mailbox.pending) && ends.is_none();
-        let joins = self.joins_ns.filter(|_| waits && self.off_until.is_none());
+        let joins = self.joins_ns.map(|at| at.max(self.busy_until_ns));
+        let joins = joins.filter(|_| waits && self.off_until.is_none());
         let recovers = self.off_until.flatten();
         [ends, joins, recovers].into_iter().flatten().min()
     }
@@ -199,9 +220,11 @@ impl CanModel {
             self.off_until = None;
             self.arbitrate(at);
         }
-        if let Some(at) = self.joins_ns.filter(|at| *at <= now_ns) {
-            self.arbitrate(at);
+        let joins = self.joins_ns.map(|at| at.max(self.busy_until_ns));
+        if let Some(at) = joins.filter(|at| *at <= now_ns) {
+            self.arbitrate(at.max(self.advanced_ns));
         }
+        self.advanced_ns = now_ns;
         while let Some((k, at)) = self.on_the_wire.filter(|(_, at)| *at <= now_ns) {
             self.on_the_wire = None;
             if self.bus == BusState::Alone {
@@ -258,7 +281,7 @@ impl CanModel {
     fn status(&self, now_ns: u64) -> u32 {
         let on = |bit, is| if is { bit } else { 0 };
         let stands = self.acknowledges && self.mcr & SLEEP == 0;
-        let stands = stands && !self.joins_ns.is_some_and(|at| at <= now_ns);
+        let stands = stands && self.joins_ns.is_none_or(|at| at > now_ns);
         0xc00
             | on(INIT_ACK, stands)
             | on(SLEEP_ACK, self.mcr & SLEEP != 0)

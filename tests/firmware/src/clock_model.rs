@@ -133,7 +133,7 @@ impl Clocks {
             0x08 => self.cfgr = value & !0xc,
             _ => {
                 let kept = if value & CSS_CLEAR == 0 { CSS_FLAG } else { 0 };
-                self.cir = self.cir & kept;
+                self.cir &= kept;
             }
         }
     }

@@ -8,9 +8,17 @@ use std::ffi::{OsStr, c_uint, c_void};
 
 /// Return address of interrupts. No program is there.
 const RETURN: u32 = 0x1fff_0000;
+/// Between that and RAM: accesses do nothing, unless the memory protection makes them faults.
+const BELOW_RAM: (u64, u64) = (0x1fff_1000, 0xf000);
 /// What unused RAM is filled with.
 const PAINT: u8 = 0xa5;
 const WFI: u16 = 0xbf30;
+/// The core's register of faults, and bits of it (PM0214): a precise bus error; an access that the
+/// memory protection forbids, and then the stacking, too.
+const CFSR: usize = 0xed28;
+const PRECISE: u32 = 1 << 9;
+/// See [`PRECISE`].
+pub const ACCESS_AND_STACKING: u32 = 1 << 1 | 1 << 4;
 /// Numbers of exceptions in the vector table.
 const NMI: u32 = 2;
 const HARD_FAULT: usize = 3;
@@ -96,6 +104,27 @@ extern "C" fn read(handle: Handle, offset: u64, _: c_uint, user: *mut c_void) ->
     let word = chip.read(offset as usize & !3);
     stop_if_it_stops(handle, chip);
     u64::from(word >> (8 * (offset & 3)))
+}
+
+extern "C" fn read_below_ram(handle: Handle, offset: u64, _: c_uint, user: *mut c_void) -> u64 {
+    fault_if_protected(handle, offset, user);
+    0
+}
+
+extern "C" fn write_below_ram(handle: Handle, offset: u64, _: c_uint, _: u64, user: *mut c_void) {
+    fault_if_protected(handle, offset, user);
+}
+
+fn fault_if_protected(handle: Handle, offset: u64, user: *mut c_void) {
+    // SAFETY: as in `read`.
+    let chip = unsafe { &mut *user.cast::<Peripherals>() };
+    if let Some(stop) = chip.stop_run
+        && chip.is_protected((BELOW_RAM.0 + offset) as u32)
+    {
+        chip.memory_fault = true;
+        // SAFETY: as in `stop_if_it_stops`.
+        unsafe { stop(handle) };
+    }
 }
 
 /// Ends the run once the core executes nothing more.
@@ -249,6 +278,7 @@ impl Machine {
             core.map_io(RANGE, read, write, user)?;
             core.map_io(BIT_BAND, read_bit, write_bit, user)?;
             core.map_io(CORE, read_core, write_core, user)?;
+            core.map_io(BELOW_RAM, read_below_ram, write_below_ram, user)?;
         }
         chip.stop_run = Some(core.stopper());
         let mut vectors = [0; 48];
@@ -317,6 +347,11 @@ impl Machine {
         self.reset(cause::POWER_ON);
     }
 
+    /// Pulls the pin NRST low.
+    pub fn reset_by_pin(&mut self) {
+        self.reset(cause::PIN);
+    }
+
     fn reset(&mut self, cause: u32) {
         self.chip.reset(cause);
         self.asleep = false;
@@ -344,7 +379,7 @@ impl Machine {
         }
         let end_ns = self.chip.now_ns + ns;
         loop {
-            if self.chip.now_ns <= end_ns && self.reset_if_due() {
+            if self.chip.now_ns <= end_ns && (self.reset_if_due() || !self.asleep) {
                 self.boot()?;
                 continue;
             }
@@ -352,14 +387,6 @@ impl Machine {
                 self.interrupt(NMI)?;
                 continue;
             }
-            match self.chip.next_event_ns() {
-                Some(at) if at <= end_ns => self.chip.now_ns = self.chip.now_ns.max(at),
-                _ => {
-                    self.chip.now_ns = self.chip.now_ns.max(end_ns);
-                    return Ok(());
-                }
-            }
-            self.chip.advance();
             let stands = self.chip.clocks.stands(self.chip.now_ns);
             while let Some(irq) = self.chip.pending_interrupt().filter(|_| !stands) {
                 if irq == IRQ_TIM2 && self.chip.tick_is_due() && self.hold_ns > 0 {
@@ -372,6 +399,19 @@ impl Machine {
                 self.interrupt(16 + irq)?;
                 self.chip.advance();
             }
+            if self.chip.stops() && self.chip.now_ns <= end_ns {
+                continue;
+            }
+            match self.chip.next_event_ns() {
+                Some(at) if at.max(self.chip.now_ns) <= end_ns => {
+                    self.chip.now_ns = self.chip.now_ns.max(at)
+                }
+                _ => {
+                    self.chip.now_ns = self.chip.now_ns.max(end_ns);
+                    return Ok(());
+                }
+            }
+            self.chip.advance();
         }
     }
 
@@ -453,14 +493,20 @@ impl Machine {
         saved
     }
 
-    /// Runs until `until` or until the chip is reset. An access to what is not there leads into
-    /// the handler of hard faults.
+    /// Runs until `until` or until the chip is reset. An access to what is not there or is protected
+    /// leads into the handler of hard faults.
     fn go(&mut self, from: u32, until: u32) -> Result<(), String> {
         let mut ran = self.core.run(from, until);
-        if ran.is_err() && !self.chip.stops() {
-            const CFSR: usize = 0xed28;
-            const PRECISERR: u32 = 1 << 9;
-            self.chip.write_core(CFSR, PRECISERR);
+        let protected = std::mem::take(&mut self.chip.memory_fault);
+        if (ran.is_err() || protected) && !self.chip.stops() {
+            self.chip.write_core(
+                CFSR,
+                if protected {
+                    ACCESS_AND_STACKING
+                } else {
+                    PRECISE
+                },
+            );
             self.stack_registers();
             ran = self.core.run(self.vectors[HARD_FAULT], RETURN);
         }
@@ -473,6 +519,19 @@ impl Machine {
             )),
             Err(fault) => Err(format!("{fault} at {pc:#010x}")),
         }
+    }
+
+    /// Flips a bit of RAM.
+    pub fn flip(&mut self, address: u32, bit: u32) {
+        if let Some(byte) = self.ram.0.get_mut((address - RAM + bit / 8) as usize) {
+            *byte ^= 1 << (bit % 8);
+        }
+    }
+
+    /// Writes to flash, as a debugger does while the core stands.
+    pub fn write_flash(&mut self, address: u32, bytes: &[u8]) {
+        let at = (address - FLASH) as usize;
+        self.flash.0[at..at + bytes.len()].copy_from_slice(bytes);
     }
 
     /// A word of RAM.

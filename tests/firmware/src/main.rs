@@ -26,7 +26,7 @@ use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
 use checks::{
-    Outcome, Report, bus, commands, figures, log, motion, parameters, sensors, start, timing,
+    Outcome, Report, bus, commands, figures, log, motion, parameters, sensors, start, timing, zero,
 };
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -150,7 +150,27 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("no other node from the start", &|| {
         bus::alone_from_the_start(bench)
     });
+    check("bus off for less than a tick", &|| {
+        bus::off_for_less_than_a_tick(bench)
+    });
+    check("aborted on the wire: completed", &|| {
+        bus::aborted_on_the_wire(bench, false)
+    });
+    check("aborted on the wire: failed", &|| {
+        bus::aborted_on_the_wire(bench, true)
+    });
+    check("zero: over a watchdog reset", &|| {
+        zero::over_a_watchdog_reset(bench)
+    });
+    check("zero: over a reset by the pin", &|| {
+        zero::over_a_reset_by_pin(bench)
+    });
+    check("zero: over power-on", &|| zero::over_power_on(bench));
+    check("zero: lost", &|| zero::lost(bench));
     check("start: crystal absent", &|| start::no_crystal(bench));
+    check("start: silent after bus-off", &|| {
+        start::silent_after_bus_off(bench)
+    });
     check("start: crystal lost while running", &|| {
         start::crystal_lost(bench)
     });
@@ -162,9 +182,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("start: the board", &|| start::the_board(bench));
     match start::crashes(bench) {
         Ok(crashes) => {
-            for (fault, inject, told) in crashes {
-                check(&format!("crash: {fault}"), &|| {
-                    start::crash(bench, fault, &inject, &told)
+            for crash in crashes {
+                check(&format!("crash: {}", crash.fault), &|| {
+                    start::crash(bench, &crash)
                 });
             }
         }
@@ -186,6 +206,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
         parameters::the_later_of_two(bench)
     });
     check("command: identify", &|| commands::identify(bench));
+    check("command: answers outlive a failing bus", &|| {
+        commands::answers_outlive_a_failing_bus(bench)
+    });
     check("command: re-zero", &|| commands::rezero(bench));
     check("command: re-zero refused", &|| {
         commands::rezero_refused(bench)
@@ -194,6 +217,10 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
         check(&format!("command: record, {name}"), &|| {
             commands::record(bench, part)
         });
+        check(
+            &format!("command: order and age of frames, {name}"),
+            &|| commands::order_and_age(bench, part, name),
+        );
     }
     check("command: odd ones", &|| commands::odd_commands(bench));
     check("command: any data length code", &|| {

@@ -28,6 +28,10 @@ const OPTCR: usize = 0x2_3c14;
 /// The core's system timer, and the register by which a program resets it.
 const SYSTICK: usize = 0xe010;
 const AIRCR: usize = 0xed0c;
+/// Memory protection: control, base and attributes of the region that was written last.
+const MPU_CTRL: usize = 0xed94;
+const MPU_RBAR: usize = 0xed9c;
+const MPU_RASR: usize = 0xeda0;
 
 const SELECT_PIN: u32 = 4;
 const SYNC_PIN: u32 = 0;
@@ -95,6 +99,8 @@ pub struct Peripherals {
     pub pulled_up: [bool; 2],
     /// Whether the service pin is pulled low: the servo is on.
     pub servo_on: bool,
+    /// Whether the program accessed memory that is protected.
+    pub memory_fault: bool,
     /// Whether the program has asked for a reset.
     pub reset_asked: bool,
     /// What a hook changes once.
@@ -137,6 +143,7 @@ impl Peripherals {
             option_bytes: 0x0fff_aae1,
             pulled_up: [true; 2],
             servo_on: false,
+            memory_fault: false,
             reset_asked: false,
             inject: Vec::new(),
             stop_run: None,
@@ -227,6 +234,17 @@ impl Peripherals {
     /// The crystal stops.
     pub fn stop_crystal(&mut self) {
         self.clocks.stop_crystal(self.now_ns);
+    }
+
+    /// Whether the memory protection forbids an access (PM0214, MPU): one region without
+    /// access, over the map of the core.
+    pub fn is_protected(&self, address: u32) -> bool {
+        let word = |offset: usize| self.core_words[offset / 4];
+        let (control, attributes) = (word(MPU_CTRL), word(MPU_RASR));
+        let is_on = control & 0b101 == 0b101 && attributes & 1 == 1;
+        let no_access = attributes >> 24 & 0b111 == 0;
+        let bytes_log2 = (attributes >> 1 & 0x1f) + 1;
+        is_on && no_access && (address ^ word(MPU_RBAR)) >> bytes_log2 == 0
     }
 
     /// Whether the chip is reset, and the program executes nothing more.

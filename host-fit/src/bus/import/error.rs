@@ -14,12 +14,6 @@ pub enum ImportError {
     /// The stage file is refused.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// The codes of the stage do not fit.
-    #[error("{problem}")]
-    Layout {
-        /// What is wrong.
-        problem: String,
-    },
     /// The record of the bus cannot be read.
     #[error(transparent)]
     Bus(#[from] SourceError),

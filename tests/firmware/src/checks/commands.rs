@@ -3,15 +3,20 @@
 use super::{Outcome, equal, expect};
 use crate::adc_model::{Part, Row};
 use crate::bench::{Bench, Seen, command};
+use crate::can_model::BusState;
 use crate::machine::Machine;
+use embedded_can::{Id, StandardId};
 use hal_adapters::can::command::{Outcome as Ended, Request};
 use hal_adapters::can::status::flag;
-use hal_adapters::can::{Layout, SensorReceiver, Timing};
+use hal_adapters::can::{Layout, Message as M, SensorReceiver, Timing};
 use runtime::RawFrame;
 
 const PART: Part = Part::Ads131m08;
+/// From the trigger to the middle of what is sampled, by the drivers' documentation, us.
+const ADS131M08_SAMPLE_US: u32 = 144;
+const ADS8688_SAMPLE_US: u32 = 10;
 
-fn ask(
+pub(super) fn ask(
     machine: &mut Machine,
     request: Request,
     token: u8,
@@ -73,8 +78,30 @@ pub fn identify(bench: &Bench) -> Outcome {
     )
 }
 
+/// An answer and a serial number outlive a bus on which nobody listens; old poses do not.
+pub fn answers_outlive_a_failing_bus(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(50)?;
+    let (id, bytes) = command(Request::Identify { seconds: 1 }, 1, 1);
+    machine.chip.can.receive(id, bytes);
+    let now_ns = machine.chip.now_ns;
+    machine.chip.can.set_bus(BusState::Alone, now_ns);
+    machine.run_ticks(100)?;
+    Seen::since_last(&mut machine);
+    let now_ns = machine.chip.now_ns;
+    machine.chip.can.set_bus(BusState::Good, now_ns);
+    machine.run_ticks(20)?;
+    let seen = Seen::since_last(&mut machine);
+    equal("answer", ended(&seen, 1), vec![Some(Ended::Done)])?;
+    equal("bytes of text", seen.identity.len(), 36)?;
+    let first = seen.axes.first().map_or(0, |axis| axis.tick);
+    expect(first >= 148, || {
+        format!("a pose of tick {first} was sent late")
+    })
+}
+
 /// Rows of a stage at rest, with the noise of a few codes around one row.
-fn at_rest(rest: [i32; 6]) -> Vec<Row> {
+pub(super) fn at_rest(rest: [i32; 6]) -> Vec<Row> {
     let noise = |k: usize, c: usize| (k as i32 * 7 + c as i32 * 3) % 5 - 2;
     (0..1000)
         .map(|k| core::array::from_fn(|c| rest[c] + noise(k, c)))
@@ -82,7 +109,7 @@ fn at_rest(rest: [i32; 6]) -> Vec<Row> {
 }
 
 /// Asks for one thing after the other; each must be answered at once, and so.
-fn answers(machine: &mut Machine, asked: &[(Request, u8, Ended)]) -> Outcome {
+pub(super) fn answers(machine: &mut Machine, asked: &[(Request, u8, Ended)]) -> Outcome {
     for (request, token, outcome) in asked {
         let seen = ask(machine, *request, *token, 10)?;
         let what = format!("answer to {request:?}");
@@ -91,8 +118,8 @@ fn answers(machine: &mut Machine, asked: &[(Request, u8, Ended)]) -> Outcome {
     Ok(())
 }
 
-const REZERO: Request = Request::Rezero { ticks: 400 };
-const SERVO_OFF: Request = Request::ServoOff { seconds: 3 };
+pub(super) const REZERO: Request = Request::Rezero { ticks: 400 };
+pub(super) const SERVO_OFF: Request = Request::ServoOff { seconds: 3 };
 
 /// A stage that is not at rest at its zero is not re-zeroed, and told why.
 pub fn rezero_refused(bench: &Bench) -> Outcome {
@@ -188,6 +215,13 @@ pub fn rezero(bench: &Bench) -> Outcome {
         format!("X is {:e} once cleared", x(&seen))
     })?;
 
+    // The service pin overrules the declaration.
+    machine.chip.servo_on = true;
+    machine.run_ticks(1)?;
+    answers(&mut machine, &[(REZERO, 11, Ended::ServoOn)])?;
+    machine.chip.servo_on = false;
+    machine.run_ticks(1)?;
+
     // A servo that goes on during a re-zero ends it.
     let on = Request::ServoOff { seconds: 0 };
     answers(&mut machine, &[(REZERO, 9, Ended::Started)])?;
@@ -245,6 +279,63 @@ pub fn record(bench: &Bench, part: Part) -> Outcome {
         equal("codes afterwards", seen.codes.len(), 0)?;
     }
     Ok(())
+}
+
+/// What one tick sends, in the order of sending: X, Y, Rz, what else belongs to the pose, the
+/// codes; and how old each is then.
+pub fn order_and_age(bench: &Bench, part: Part, name: &str) -> Outcome {
+    let mut machine = bench.machine(part, [&bench.blob, &[]])?;
+    machine.run_ticks(50)?;
+    ask(&mut machine, Request::Record { on: true }, 1, 20)?;
+    ask(&mut machine, Request::Identify { seconds: 1 }, 2, 0)?;
+    machine.chip.can.sent.clear();
+    machine.run_ticks(320)?;
+    let first_ns = machine.chip.first_tick_ns.ok_or("no tick")?;
+    let sampled_us = match part {
+        Part::Ads131m08 => ADS131M08_SAMPLE_US,
+        Part::Ads8688 => ADS8688_SAMPLE_US,
+    };
+    let groups = [
+        &[M::PoseX, M::PoseY, M::PoseRz][..],
+        &[M::PoseTime],
+        &[M::PoseZ, M::PoseRx, M::PoseRy],
+        &[M::SensorTime],
+        Layout::Bits16.messages(),
+        Layout::Bits24.messages(),
+        &[M::NodeStatus, M::Health],
+        &[M::Answer, M::Identity],
+    ];
+    let places: Vec<M> = groups.concat();
+    let mut ages: Vec<Option<(u64, u64)>> = vec![None; places.len()];
+    let mut last = (0, 0);
+    for sent in &machine.chip.can.sent {
+        let id = StandardId::new(sent.id).map(Id::Standard);
+        let message = id.and_then(M::from_id).ok_or("a foreign frame")?;
+        let place = places.iter().position(|m| *m == message);
+        let place = place.ok_or("a message that nobody asked for")?;
+        let tick = (sent.asked_ns - first_ns) / 2_000_000;
+        // An answer and the pages of a serial number wait behind all others.
+        expect((tick, place) > last, || {
+            format!(
+                "{message:?} comes after {:?} in tick {tick}",
+                places[last.1]
+            )
+        })?;
+        last = (tick, place);
+        let since_us = (sent.done_ns - first_ns) / 1000 - 2_000 * tick;
+        let age_us = since_us - u64::from(sampled_us);
+        let (least, most) = ages[place].get_or_insert((age_us, age_us));
+        (*least, *most) = (age_us.min(*least), age_us.max(*most));
+    }
+    for (message, age) in places.iter().zip(&ages) {
+        if let Some((least, most)) = age {
+            let key = format!("RESULT firmware_{name}_age_at_end_of_{message:?}_us");
+            println!("{key}={least}..{most}");
+        }
+    }
+    let oldest = ages.iter().flatten().map(|(_, most)| *most).max();
+    let oldest_us = oldest.ok_or("no frames")?;
+    expect(oldest_us < 2_000, || format!("a frame of {oldest_us} us"))
 }
 
 /// Commands without parameters, unknown ones, damaged ones and repeated ones.
