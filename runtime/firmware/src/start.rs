@@ -54,10 +54,11 @@ impl Before {
         if watchdog {
             record.note(FaultKind::Watchdog, 0, 0);
         }
+        let by_fault = core::mem::take(&mut record.crashed);
         fault::retain(&record);
         Self {
             watchdog,
-            by_fault: watchdog || cause.sftrstf().bit_is_set(),
+            by_fault,
             record,
             lost: found.is_none() && !power_on,
         }
