@@ -98,6 +98,19 @@ pub struct Retained {
 }
 
 impl Retained {
+    /// In place of a record that is damaged: whether a zero deviation was set is not known, so
+    /// it is not a number, which [`crate::node::Node::restore_zero`] does not take.
+    pub fn damaged() -> Self {
+        let zero = PlanarPose {
+            x_m: f32::NAN,
+            ..PlanarPose::ZERO
+        };
+        Self {
+            zero: KeptZero { blob: 0, zero },
+            ..Self::default()
+        }
+    }
+
     /// Notes a fault in the step that runs.
     pub const fn note(&mut self, kind: FaultKind, address: u32, detail: u32) {
         self.fault = Fault {
