@@ -178,6 +178,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
         parameters::the_later_of_two(bench)
     });
     check("command: identify", &|| commands::identify(bench));
+    check("command: answers outlive a failing bus", &|| {
+        commands::answers_outlive_a_failing_bus(bench)
+    });
     check("command: re-zero", &|| commands::rezero(bench));
     check("command: re-zero refused", &|| {
         commands::rezero_refused(bench)

@@ -3,6 +3,7 @@
 use super::{Outcome, equal, expect};
 use crate::adc_model::{Part, Row};
 use crate::bench::{Bench, Seen, command};
+use crate::can_model::BusState;
 use crate::machine::Machine;
 use embedded_can::{Id, StandardId};
 use hal_adapters::can::command::{Outcome as Ended, Request};
@@ -75,6 +76,28 @@ pub fn identify(bench: &Bench) -> Outcome {
         flags(&Seen::since_last(&mut machine)) & flag::IDENTIFYING,
         0,
     )
+}
+
+/// An answer and a serial number outlive a bus on which nobody listens; old poses do not.
+pub fn answers_outlive_a_failing_bus(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(50)?;
+    let (id, bytes) = command(Request::Identify { seconds: 1 }, 1, 1);
+    machine.chip.can.receive(id, bytes);
+    let now_ns = machine.chip.now_ns;
+    machine.chip.can.set_bus(BusState::Alone, now_ns);
+    machine.run_ticks(100)?;
+    Seen::since_last(&mut machine);
+    let now_ns = machine.chip.now_ns;
+    machine.chip.can.set_bus(BusState::Good, now_ns);
+    machine.run_ticks(20)?;
+    let seen = Seen::since_last(&mut machine);
+    equal("answer", ended(&seen, 1), vec![Some(Ended::Done)])?;
+    equal("bytes of text", seen.identity.len(), 36)?;
+    let first = seen.axes.first().map_or(0, |axis| axis.tick);
+    expect(first >= 148, || {
+        format!("a pose of tick {first} was sent late")
+    })
 }
 
 /// Rows of a stage at rest, with the noise of a few codes around one row.
