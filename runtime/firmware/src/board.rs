@@ -122,7 +122,8 @@ pub struct Parts {
     pub pulled_up: PulledUp,
 }
 
-/// Whether lines that must be high before the program drives them are pulled up.
+/// Whether lines that must be high before the program drives them are pulled up: by 10 kOhm or
+/// less, against an internal resistor of 30 kOhm at least.
 #[derive(Clone, Copy)]
 pub struct PulledUp {
     /// Chip select.

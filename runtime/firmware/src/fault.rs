@@ -37,7 +37,7 @@ pub fn retain(record: &Retained) {
 
 /// Changes it.
 pub fn update(change: impl FnOnce(&mut Retained)) {
-    let mut record = retained().unwrap_or_default();
+    let mut record = retained().unwrap_or_else(Retained::damaged);
     change(&mut record);
     retain(&record);
 }

@@ -12,7 +12,8 @@
 //! - Only a tick that was done before the next one was due feeds the watchdog. Faults of
 //!   sensors, parameters and bus are reported and do not cause a reset.
 //! - A panic, a fault of the core, a stack that overflows and a crystal that stops are noted in
-//!   RAM that a reset leaves alone, and reset. The next start tells them.
+//!   RAM that a reset leaves alone, and reset. The next start tells them. No tick can reach a
+//!   panic: those that the linker keeps are in the HAL's set-up of the clocks.
 #![no_std]
 #![no_main]
 

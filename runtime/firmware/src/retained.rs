@@ -12,6 +12,8 @@ pub const WORDS: usize = 10;
 
 /// Marks a record of this layout.
 const MAGIC: u32 = 0x5354_4731;
+/// Bit of the first word besides the step.
+const CRASHED_BIT: u32 = 8;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
 /// What the program was doing.
@@ -89,11 +91,26 @@ pub struct Retained {
     pub fault: Fault,
     /// Resets by faults since power-on. Saturates.
     pub faults: u32,
+    /// Whether the last fault is the cause of this start.
+    pub crashed: bool,
     /// The zero deviation; that of an unmoved stage is zero.
     pub zero: KeptZero,
 }
 
 impl Retained {
+    /// In place of a record that is damaged: whether a zero deviation was set is not known, so
+    /// it is not a number, which [`crate::node::Node::restore_zero`] does not take.
+    pub fn damaged() -> Self {
+        let zero = PlanarPose {
+            x_m: f32::NAN,
+            ..PlanarPose::ZERO
+        };
+        Self {
+            zero: KeptZero { blob: 0, zero },
+            ..Self::default()
+        }
+    }
+
     /// Notes a fault in the step that runs.
     pub const fn note(&mut self, kind: FaultKind, address: u32, detail: u32) {
         self.fault = Fault {
@@ -102,13 +119,14 @@ impl Retained {
             detail,
         };
         self.faults = self.faults.saturating_add(1);
+        self.crashed = true;
     }
 
     /// The words, the check last.
     pub fn to_words(&self) -> [u32; WORDS] {
         let zero = self.zero.zero;
         let content = [
-            MAGIC ^ self.step as u32,
+            MAGIC ^ (self.step as u32 | (self.crashed as u32) << CRASHED_BIT),
             self.fault.kind_and_step,
             self.fault.address,
             self.fault.detail,
@@ -125,8 +143,19 @@ impl Retained {
     /// The record of these words, if its check is right.
     pub fn from_words(words: &[u32; WORDS]) -> Option<Self> {
         let [content @ .., stored] = words;
-        let [step, kind_and_step, address, detail, faults, blob, x, y, rz] = *content;
-        let step = *Step::ALL.get((step ^ MAGIC) as usize)?;
+        let [
+            state,
+            kind_and_step,
+            address,
+            detail,
+            faults,
+            blob,
+            x,
+            y,
+            rz,
+        ] = *content;
+        let state = state ^ MAGIC;
+        let step = *Step::ALL.get((state & !(1 << CRASHED_BIT)) as usize)?;
         (check(content) == *stored).then_some(Self {
             step,
             fault: Fault {
@@ -135,6 +164,7 @@ impl Retained {
                 detail,
             },
             faults,
+            crashed: state >> CRASHED_BIT & 1 == 1,
             zero: KeptZero {
                 blob,
                 zero: PlanarPose {
@@ -197,6 +227,7 @@ mod tests {
         let record = record();
         assert_eq!(record.fault.kind_and_step, 0x0502);
         assert_eq!((record.fault.address, record.faults), (0x0800_c124, 4));
+        assert!(record.crashed);
     }
 
     #[test]

@@ -36,10 +36,8 @@ pub struct Before {
     pub watchdog: bool,
     /// Whether the watchdog or the program itself did, on a fault.
     pub by_fault: bool,
-    /// The record that survived, or an empty one.
+    /// The record that survived; after power-on an empty one.
     record: Retained,
-    /// Whether there should have been a record, and there was none.
-    lost: bool,
 }
 
 impl Before {
@@ -49,17 +47,20 @@ impl Before {
         rcc.csr().modify(|_, w| w.rmvf().set_bit());
         let power_on = cause.borrstf().bit_is_set() || cause.porrstf().bit_is_set();
         let watchdog = cause.wdgrstf().bit_is_set();
-        let found = if power_on { None } else { fault::retained() };
-        let mut record = found.unwrap_or_default();
+        let mut record = if power_on {
+            Retained::default()
+        } else {
+            fault::retained().unwrap_or_else(Retained::damaged)
+        };
         if watchdog {
             record.note(FaultKind::Watchdog, 0, 0);
         }
+        let by_fault = core::mem::take(&mut record.crashed);
         fault::retain(&record);
         Self {
             watchdog,
-            by_fault: watchdog || cause.sftrstf().bit_is_set(),
+            by_fault,
             record,
-            lost: found.is_none() && !power_on,
         }
     }
 
@@ -109,9 +110,6 @@ impl Before {
     /// may have been lost.
     pub fn restore_zero(&self, node: &mut Node<'_>, blob: u32) -> bool {
         let KeptZero { blob: of, zero } = self.record.zero;
-        if zero == PlanarPose::ZERO {
-            return self.lost;
-        }
         if of == blob {
             node.restore_zero(zero);
         }
