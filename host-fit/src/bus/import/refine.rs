@@ -42,12 +42,12 @@ pub(super) fn refine(
 ) -> Option<Offset> {
     let ends = points.first().zip(points.last())?;
     let half_us = (ends.1.t_us - ends.0.t_us) / 2.0;
-    let scale = scales(points, predicted);
+    let scales = Scales::of(points, predicted);
     let mut offset = start;
     let mut stretch_us = FIRST_STRETCH_US / 2.0;
     loop {
         for _ in 0..STEPS {
-            let sums = Sums::over(points, predicted, &scale, &offset, (stretch_us, step_us));
+            let sums = Sums::over(points, predicted, &scales, &offset, (stretch_us, step_us));
             let step = sums.step(offset.rate * 1e6)?;
             offset.us += step.x;
             offset.rate += step.y * 1e-6;
@@ -61,20 +61,38 @@ pub(super) fn refine(
     (moved_us <= 2.0 * step_us && offset.rate.abs() <= RATE_MAX).then_some(offset)
 }
 
-/// The largest magnitude of each coordinate.
-fn scales(points: &[Point], predicted: &[Sample]) -> [f64; COORDINATES] {
-    let mut scale = [f64::MIN_POSITIVE; COORDINATES];
-    for sample in predicted {
-        for (scale, value) in scale.iter_mut().zip(sample.values) {
-            *scale = scale.max(value.abs());
+/// Middle and half of the range of each coordinate, which bring it into -1 to 1.
+struct Scales {
+    middle: [f64; COORDINATES],
+    half: [f64; COORDINATES],
+}
+
+impl Scales {
+    fn of(points: &[Point], predicted: &[Sample]) -> Self {
+        let mut low = [f64::INFINITY; COORDINATES];
+        let mut high = [f64::NEG_INFINITY; COORDINATES];
+        let mut take = |first: usize, values: [f64; 3]| {
+            for (k, value) in (first..).zip(values) {
+                low[k] = low[k].min(value);
+                high[k] = high[k].max(value);
+            }
+        };
+        predicted.iter().for_each(|sample| take(0, sample.values));
+        points.iter().for_each(|point| take(3, point.gaps));
+        Self {
+            middle: std::array::from_fn(|k| (low[k] + high[k]) / 2.0),
+            half: std::array::from_fn(|k| (high[k] - low[k]) / 2.0),
         }
     }
-    for point in points {
-        for (scale, value) in scale[3..].iter_mut().zip(point.gaps) {
-            *scale = scale.max(value.abs());
-        }
+
+    /// The coordinates of a row; 0 where one never changes.
+    fn apply(&self, [a, b, c]: [f64; 3], [d, e, f]: [f64; 3]) -> [f64; COORDINATES] {
+        let values = [a, b, c, d, e, f];
+        std::array::from_fn(|k| match self.half[k] > 0.0 {
+            true => (values[k] - self.middle[k]) / self.half[k],
+            false => 0.0,
+        })
     }
-    scale
 }
 
 /// Normal equations of one probe, zero deviations of the movements taken out.
@@ -101,7 +119,7 @@ impl Sums {
     fn over(
         points: &[Point],
         predicted: &[Sample],
-        scale: &[f64; COORDINATES],
+        scales: &Scales,
         offset: &Offset,
         (stretch_us, step_us): (f64, f64),
     ) -> Self {
@@ -141,16 +159,11 @@ impl Sums {
                     probe.take_out(&std::mem::replace(means, none()));
                 }
             }
-            let [a, b, c] = here.1;
-            let [d, e, f] = point.gaps;
-            let mut x = [a, b, c, d, e, f];
-            for (x, scale) in x.iter_mut().zip(scale) {
-                *x /= scale;
-            }
+            let x = scales.apply(here.1, point.gaps);
             let since = (point.t_us - offset.middle_us) * 1e-6;
             for (k, (probe, means)) in probes.iter_mut().zip(&mut means).enumerate() {
                 // In units of the coordinate per us: the step is in us.
-                let speed = (after.1[k] - before.1[k]) / (step_us * scale[k]);
+                let speed = (after.1[k] - before.1[k]) / (step_us * scales.half[k]);
                 let columns = columns(&x, k, speed, since);
                 probe.square.ger(1.0, &columns, &columns, 1.0);
                 probe.product.axpy(point.signal[k], &columns, 1.0);
@@ -217,7 +230,7 @@ impl Probe {
         }
         let left = self.signal_square - self.product.rows(0, TERMS).dot(&by_terms);
         let variance = left.max(f64::MIN_POSITIVE) / self.rows.max(1.0);
-        let eta = by_terms[own];
+        let eta = self.product[own] / self.square[(own, own)];
         Some((square * (eta * eta / variance), product * (eta / variance)))
     }
 }
