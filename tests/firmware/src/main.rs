@@ -9,6 +9,7 @@
 
 mod adc_model;
 mod bench;
+mod callbacks;
 mod can_model;
 mod checks;
 mod clock_model;
