@@ -1,6 +1,6 @@
 //! One tick of the stage controller: codes in, frames out; and what it is asked for.
 //!
-//! State and reason of the status frame (every 16 ticks):
+//! State and reason of the status frame (every 16 ticks, and at once after the bus was off):
 //!
 //! | state | reason |
 //! |---|---|
@@ -123,6 +123,8 @@ pub struct Node<'d> {
     state: (NodeState, u8),
     fpu_restored: u32,
     board_checks: u32,
+    /// Times the bus was off that a state has told.
+    bus_off_told: u32,
 }
 
 impl<'d> Node<'d> {
@@ -138,6 +140,7 @@ impl<'d> Node<'d> {
             state: (NodeState::Starting, 0),
             fpu_restored: 0,
             board_checks: 0,
+            bus_off_told: 0,
         }
     }
 
@@ -213,8 +216,10 @@ impl<'d> Node<'d> {
         let servo = servo_of(&mut self.parameters);
         let answer = self.service.tick(servo, facts.servo_off_pin);
         let page = self.service.identity_page(self.serial());
+        let was_off = core::mem::replace(&mut self.bus_off_told, facts.bus_off) != facts.bus_off;
         let due = match self.ticks % u32::from(SLOW_TICKS) {
             0 => Some(Told::Status(self.status(facts))),
+            _ if was_off => Some(Told::Status(self.status(facts))),
             8 => {
                 let number = self.ticks / u32::from(SLOW_TICKS);
                 let page = HealthPage::of(&self.health(), Some(&facts.board), number);

@@ -98,6 +98,26 @@ fn every_sixteenth_tick_tells_the_state_and_half_way_a_counter() {
 }
 
 #[test]
+fn a_bus_that_was_off_is_told_at_once() {
+    let mut node = node();
+    tick(&mut node, Ok(frame(0)));
+    let facts = Facts {
+        bus_off: 1,
+        ..Facts::default()
+    };
+    let mut states = |k| {
+        let mut outbox = Outbox::new();
+        node.tick(Ok(frame(k)), &facts, &mut Disturbed::default(), &mut outbox);
+        let frames: Vec<_> = core::iter::from_fn(|| outbox.pop()).collect();
+        let told = told(&frames);
+        told.iter()
+            .filter(|t| matches!(t, Told::Status(s) if s.bus_off == 1))
+            .count()
+    };
+    assert_eq!([1, 2, 3].map(&mut states), [1, 0, 0]);
+}
+
+#[test]
 fn a_fault_of_the_converter_is_a_state_and_an_invalid_pose() {
     let mut node = node();
     tick(&mut node, Ok(frame(0)));

@@ -73,6 +73,23 @@ pub struct Fault {
     pub detail: u32,
 }
 
+impl Fault {
+    const fn new(kind: FaultKind, step: Step, address: u32, detail: u32) -> Self {
+        Self {
+            kind_and_step: kind as u32 | (step as u32) << 8,
+            address,
+            detail,
+        }
+    }
+
+    /// Whether the crystal stopped, or the PLL never locked to it, where only the watchdog ends
+    /// the wait.
+    pub fn is_of_the_crystal(&self) -> bool {
+        let hung = Self::new(FaultKind::Watchdog, Step::Clocks, 0, 0);
+        *self == hung || self.kind_and_step & 0xff == FaultKind::ClockFailed as u32
+    }
+}
+
 /// A zero deviation and the blob that it was measured with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct KeptZero {
@@ -113,11 +130,7 @@ impl Retained {
 
     /// Notes a fault in the step that runs.
     pub const fn note(&mut self, kind: FaultKind, address: u32, detail: u32) {
-        self.fault = Fault {
-            kind_and_step: kind as u32 | (self.step as u32) << 8,
-            address,
-            detail,
-        };
+        self.fault = Fault::new(kind, self.step, address, detail);
         self.faults = self.faults.saturating_add(1);
         self.crashed = true;
     }
@@ -228,6 +241,16 @@ mod tests {
         assert_eq!(record.fault.kind_and_step, 0x0502);
         assert_eq!((record.fault.address, record.faults), (0x0800_c124, 4));
         assert!(record.crashed);
+    }
+
+    #[test]
+    fn the_crystal_is_blamed_for_its_own_faults_only() {
+        let of = |kind, step| Fault::new(kind, step, 0, 0).is_of_the_crystal();
+        assert!(of(FaultKind::Watchdog, Step::Clocks));
+        assert!(of(FaultKind::ClockFailed, Step::Ticking));
+        assert!(!of(FaultKind::Watchdog, Step::InternalClock));
+        assert!(!of(FaultKind::Watchdog, Step::Ticking));
+        assert!(!of(FaultKind::HardFault, Step::Clocks));
     }
 
     #[test]

@@ -65,11 +65,11 @@ impl Before {
     }
 
     /// Sets up the clocks: by the crystal, or by the internal oscillator if the crystal does not
-    /// start or the PLL did not lock to it. Says whether it is the crystal.
+    /// start, the PLL did not lock to it, or it stopped. Says whether it is the crystal.
     pub fn clocks(&self, rcc: RCC, stopwatch: &mut Stopwatch) -> (Rcc, bool) {
-        let hung = self.watchdog && self.record.step == Step::Clocks;
+        let failed = self.by_fault && self.record.fault.is_of_the_crystal();
         fault::begin(Step::Clocks);
-        let crystal = !hung && {
+        let crystal = !failed && {
             rcc.cr().modify(|_, w| w.hseon().set_bit());
             let ready = || rcc.cr().read().hserdy().bit_is_set();
             stopwatch.until(INTERNAL_MHZ, CRYSTAL_US, ready)

@@ -12,6 +12,7 @@
 
 mod adc_model;
 mod bench;
+mod callbacks;
 mod can_model;
 mod checks;
 mod clock_model;

@@ -2,9 +2,9 @@
 //! it passes between interrupts and while bytes cross the SPI, and instructions take none.
 
 use crate::adc_model::{Adc, Input, Part, Row};
+use crate::callbacks::Injected;
 use crate::can_model::CanModel;
 use crate::clock_model::{Clocks, Pll};
-use crate::machine::Injected;
 use crate::unicorn::Stop;
 use crate::watchdog_model::Watchdog;
 

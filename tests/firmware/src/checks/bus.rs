@@ -1,7 +1,7 @@
 //! A bus that fails.
 
 use super::log::Stage;
-use super::start::{first_state, row};
+use super::start::{first_state, row, tick_now};
 use super::{Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen};
@@ -105,13 +105,14 @@ pub fn off_for_less_than_a_tick(bench: &Bench) -> Outcome {
         Some(0),
     )?;
     let now_ns = machine.chip.now_ns;
+    let at = tick_now(&machine);
     machine.chip.can.blip(now_ns, 3 * MS / 10);
     machine.run_ticks(40)?;
     let seen = Seen::since_last(&mut machine);
     let status = seen.last_status().ok_or("no status frame")?;
     equal("times the bus was off", status.bus_off, 1)?;
     let told = first_state(&seen, flag::BUS_WAS_OFF);
-    row(bench, "bus off for 0.3 ms", 100, told, &seen.axes)
+    row(bench, "bus off for 0.3 ms", at, told, &seen.axes)
 }
 
 /// A frame that is on the wire when its tick is over is sent once or, if it fails then, not at all,

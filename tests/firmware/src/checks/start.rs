@@ -6,9 +6,10 @@ use super::log::Stage;
 use super::{Failure, Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Axis, Bench, Seen};
+use crate::callbacks::Injected;
 use crate::can_model::BusState;
 use crate::clock_model::Pll;
-use crate::machine::{ACCESS_AND_STACKING, Injected, Machine};
+use crate::machine::{ACCESS_AND_STACKING, Machine};
 use crate::unicorn::register;
 use hal_adapters::can::status::{board_check, flag};
 use runtime::Status;
@@ -44,6 +45,12 @@ pub fn row(bench: &Bench, fault: &str, at: u64, told: Option<u64>, axes: &[Axis]
         told.saturating_sub(at)
     );
     equal("valid poses that are wrong", wrong, 0)
+}
+
+/// The tick that runs.
+pub fn tick_now(machine: &Machine) -> u64 {
+    let first_ns = machine.chip.first_tick_ns.unwrap_or(machine.chip.now_ns);
+    (machine.chip.now_ns - first_ns) / 2_000_000
 }
 
 /// The tick of the first state with all of these flags.
@@ -146,6 +153,7 @@ pub fn crystal_lost(bench: &Bench) -> Outcome {
         first_state(&before, flag::INTERNAL_OSCILLATOR),
         None,
     )?;
+    let at = tick_now(&machine);
     machine.chip.stop_crystal();
     machine.run_ticks(500)?;
     let seen = Seen::since_last(&mut machine);
@@ -154,7 +162,7 @@ pub fn crystal_lost(bench: &Bench) -> Outcome {
     equal("resets", (machine.panics, machine.watchdog_resets), (1, 0))?;
     expect(valid(&seen.axes) > 1800, || "too few poses".to_owned())?;
     let told = first_state(&seen, flag::INTERNAL_OSCILLATOR | flag::WATCHDOG_RESET);
-    row(bench, "crystal lost while running", 100, told, &seen.axes)
+    row(bench, "crystal lost while running", at, told, &seen.axes)
 }
 
 /// The PLL does not lock to the crystal: the watchdog resets once, and the internal oscillator
@@ -252,6 +260,7 @@ pub fn crash(bench: &Bench, wanted: &Crash) -> Outcome {
     machine.hook_injection(bench.image(PART).address(TICK)?)?;
     machine.run_ticks(100)?;
     Seen::since_last(&mut machine);
+    let at = tick_now(&machine);
     machine.chip.inject.clone_from(&wanted.inject);
     machine.run_ticks(500)?;
     let seen = Seen::since_last(&mut machine);
@@ -267,7 +276,7 @@ pub fn crash(bench: &Bench, wanted: &Crash) -> Outcome {
     equal("resets", (machine.panics, machine.watchdog_resets), (1, 0))?;
     expect(valid(&seen.axes) > 1800, || "too few poses".to_owned())?;
     let told = first_state(&seen, flag::WATCHDOG_RESET);
-    row(bench, wanted.fault, 100, told, &seen.axes)
+    row(bench, wanted.fault, at, told, &seen.axes)
 }
 
 /// A crash, and what is told of it.

@@ -1,7 +1,7 @@
 //! The zero deviation over resets: kept by the controller that measured it, and by no other.
 
 use super::commands::{REZERO, SERVO_OFF, answers, ask, at_rest};
-use super::start::{first_state, page};
+use super::start::{first_state, page, tick_now};
 use super::{Failure, Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Seen};
@@ -50,8 +50,7 @@ fn re_zeroed(bench: &Bench) -> Result<Machine, Failure> {
 /// A reset by the watchdog: the first pose after it has the zero subtracted.
 pub fn over_a_watchdog_reset(bench: &Bench) -> Outcome {
     let mut machine = re_zeroed(bench)?;
-    let first_ns = machine.chip.first_tick_ns.unwrap_or(0);
-    let at = (machine.chip.now_ns - first_ns) / (2 * MS);
+    let at = tick_now(&machine);
     machine.hold_ns = 25 * MS;
     machine.run_ticks(300)?;
     equal("resets", machine.watchdog_resets, 1)?;
