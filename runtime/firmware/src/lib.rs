@@ -10,6 +10,7 @@
 //! | [`schedule`] | ticks at multiples of 2 ms, and those that were missed |
 //! | [`acquisition`] | a converter that is started, read, and started again after faults |
 //! | [`slots`] | which of the two parameter slots is used, and what is wrong with the other |
+//! | [`store`] | parameters in flash that are replaced without ever being absent |
 //! | [`node`] | one tick: decode, report, obey |
 //! | [`light`] | what the LED shows |
 //! | [`outbox`] | frames that wait for a mailbox |
@@ -28,5 +29,6 @@ pub mod node;
 pub mod outbox;
 pub mod schedule;
 pub mod slots;
+pub mod store;
 #[allow(unsafe_code)] // a symbol name that a debugger finds; see its text
 pub mod telemetry;
