@@ -92,6 +92,7 @@ mod flash;
 mod flash_model;
 mod journal;
 mod record;
+pub mod transfer;
 mod writing;
 
 pub use blobs::Stored;
@@ -410,3 +411,5 @@ mod cut_tests;
 mod fuzz_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod transfer_tests;
