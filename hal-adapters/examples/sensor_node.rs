@@ -9,6 +9,7 @@
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::spi::{self, Operation, SpiDevice};
+use hal_adapters::adc::ads8688::REFERENCE_US;
 use hal_adapters::adc::{AdcError, Ads8688, Channels, FrameSampler};
 use hal_adapters::can::{BusFrame, Layout, sensor};
 use hal_adapters::candump::LogLine;
@@ -28,16 +29,20 @@ fn main() -> Result<(), AdcError<Infallible>> {
     })
 }
 
-/// Samples and sends so many ticks.
+/// Samples and sends so many ticks, once the converter's reference has settled.
 fn run(ticks: u32, mut send: impl FnMut(u32, BusFrame)) -> Result<(), AdcError<Infallible>> {
     let mut converter = Ads8688::new(Part::default(), Pin, Channels::IN_ORDER);
     converter.start(&mut Sleep)?;
-    for sequence in 0..ticks {
+    let settled = REFERENCE_US / PERIOD_US;
+    for sequence in 0..settled + ticks {
         // A real node is woken by a timer, on an absolute schedule.
-        let time_us = sequence * PERIOD_US;
+        let time_us = sequence * PERIOD_US + Ads8688::<Part, Pin>::SAMPLE_US;
         converter.trigger(&mut Sleep)?;
         Sleep.delay_us(Ads8688::<Part, Pin>::SETTLE_US);
-        let frame = converter.sample(sequence, time_us)?;
+        let frame = match converter.sample(sequence, time_us) {
+            Err(AdcError::NotReady { .. }) if sequence < settled => continue,
+            sampled => sampled?,
+        };
         for coded in sensor::frames(Layout::Bits16, &frame) {
             // On a controller: `coded.to_frame()` gives the frame type of its driver.
             send(time_us, BusFrame::from(coded));
@@ -65,7 +70,7 @@ impl Part {
             0x00 => {
                 let code = 0x8000 + 100 * u16::from(self.next_input);
                 let [high, low] = code.to_be_bytes();
-                answer.copy_from_slice(&[high, low, self.next_input << 4 | 0b0100]);
+                answer[..3].copy_from_slice(&[high, low, self.next_input << 4 | 0b0100]);
                 self.next_input += 1;
             }
             _ => {

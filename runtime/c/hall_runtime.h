@@ -12,11 +12,33 @@
 #include <stdint.h>
 #include <stdlib.h>
 
+// On what must not be ignored, where the compiler knows how to say it.
+#if (defined(__cplusplus) && __cplusplus >= 201703L) \
+  || (defined(__STDC_VERSION__) && __STDC_VERSION__ >= 202311L)
+#define HALL_NODISCARD [[nodiscard]]
+#elif defined(__GNUC__)
+#define HALL_NODISCARD __attribute__((warn_unused_result))
+#else
+#define HALL_NODISCARD
+#endif
+
 // Words of a decoder.
 #define HALL_DECODER_WORDS 114
 
 // Words of a servo.
-#define HALL_SERVO_WORDS 49
+#define HALL_SERVO_WORDS 56
+
+// Major version of the library that this header belongs to.
+#define HALL_RUNTIME_VERSION_MAJOR 0
+
+// Minor version.
+#define HALL_RUNTIME_VERSION_MINOR 1
+
+// Patch version.
+#define HALL_RUNTIME_VERSION_PATCH 0
+
+// The version as one number that can be compared: major << 16, minor << 8, patch.
+#define HALL_RUNTIME_VERSION (((HALL_RUNTIME_VERSION_MAJOR << 16) | (HALL_RUNTIME_VERSION_MINOR << 8)) | HALL_RUNTIME_VERSION_PATCH)
 
 // In place of a code that could not be read: INT32_MIN.
 #define HALL_MISSING_CODE INT32_MIN
@@ -38,6 +60,9 @@
 
 // The frame repeats an earlier sequence number.
 #define HALL_STATUS_FRAME_REPEATED (1 << 18)
+
+// A zero deviation is subtracted from X, Y, Rz. No fault.
+#define HALL_STATUS_ZERO_SET (1 << 19)
 
 // What became of a call. 32 bits wide, whatever a compiler makes of enums.
 enum HallResult
@@ -67,6 +92,10 @@ enum HallResult
   HALL_RESULT_UNUSABLE_PARAMETERS = 9,
   // The blob belongs to another stage than the one expected.
   HALL_RESULT_OTHER_STAGE = 10,
+  // The decoder was never loaded.
+  HALL_RESULT_NOT_LOADED = 11,
+  // The servo was never started.
+  HALL_RESULT_NOT_STARTED = 12,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -88,7 +117,7 @@ enum HallRezero
   HALL_REZERO_RUNNING = 1,
   // It ended, and the zero deviation is in use.
   HALL_REZERO_DONE = 2,
-  // Refused: fewer than two ticks were asked for.
+  // Refused: fewer than 250 ticks were asked for.
   HALL_REZERO_TOO_SHORT = 3,
   // Refused: a tick gave no planar pose.
   HALL_REZERO_NO_POSE = 4,
@@ -96,6 +125,10 @@ enum HallRezero
   HALL_REZERO_MOVED = 5,
   // Refused: the pose drifted.
   HALL_REZERO_DRIFTED = 6,
+  // Refused: the stage stands too far from its zero, or is lifted or tilted.
+  HALL_REZERO_OUT_OF_BOUNDS = 7,
+  // Refused: a pose lies outside the calibrated range.
+  HALL_REZERO_EXTRAPOLATED = 8,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -107,11 +140,13 @@ typedef uint32_t HallRezero;
 
 // A decoder, as C sees it. Its contents are private.
 typedef struct {
+  uint32_t mark;
   uint32_t opaque[HALL_DECODER_WORDS];
 } HallDecoder;
 
 // A servo, as C sees it. Its contents are private.
 typedef struct {
+  uint32_t mark;
   uint32_t opaque[HALL_SERVO_WORDS];
 } HallServo;
 
@@ -127,7 +162,8 @@ typedef struct {
   uint32_t time_us;
 } HallFrame;
 
-// A pose and what is wrong with it: status 0 is all good. Invalid fields are 0 unless held.
+// A pose and what is wrong with it: all is good when the status is 0, or HALL_STATUS_ZERO_SET
+// alone. Invalid fields are 0 unless held.
 typedef struct {
   // Displacement along X, m.
   float x_m;
@@ -177,7 +213,7 @@ extern "C" {
 
 // Whether floating-point arithmetic is set as after a reset, so that poses are, bit for bit,
 // those that the host computed. Check it once, before the first tick.
-bool hall_arithmetic_is_sound(void);
+HALL_NODISCARD bool hall_arithmetic_is_sound(void);
 
 // Loads the parameter blob at the start of `memory` (flash, padding may follow), checks it,
 // and makes a decoder of it. `serial` is the serial number of the stage that is expected, or
@@ -186,42 +222,51 @@ bool hall_arithmetic_is_sound(void);
 // # Safety
 // `memory` points to `length` readable bytes; `serial` is NULL or ends in a zero byte;
 // `decoder` is NULL or points to a HallDecoder that no servo uses.
+HALL_NODISCARD
 HallResult hall_load(const uint8_t *memory,
                      size_t length,
                      const char *serial,
                      HallDecoder *decoder);
 
 // Starts a servo: no zero deviation, nothing to hold, all counters zero. What is invalid is
-// held for `hold_ticks` ticks in a row, and zero after that.
+// held for `hold_ticks` ticks in a row, and zero after that. Unless the result is
+// HALL_RESULT_OK, the servo stays as it was.
 //
 // # Safety
-// `decoder` was filled by hall_load and stays as it is, and where it is, for as long as the
-// servo is used.
-HallResult hall_servo_start(HallServo *servo, const HallDecoder *decoder, uint16_t hold_ticks);
+// `decoder` is NULL, or memory that was zero before hall_load filled it or failed to; once it is
+// filled, it stays as it is, and where it is, for as long as the servo is used.
+HALL_NODISCARD
+HallResult hall_servo_start(HallServo *servo,
+                            const HallDecoder *decoder,
+                            uint16_t hold_ticks);
 
-// One servo period: decodes the frame into `reading`.
-void hall_tick(HallServo *servo, const HallFrame *frame, HallReading *reading);
+// One servo period: decodes the frame into `reading`. Unless the result is HALL_RESULT_OK, all
+// six fields of the reading are 0 and marked invalid.
+HallResult hall_tick(HallServo *servo, const HallFrame *frame, HallReading *reading);
 
-// One servo period in which no frame came: values are held or zero.
-void hall_tick_without_frame(HallServo *servo, HallReading *reading);
+// One servo period in which no frame came: values are held or zero. Unless the result is
+// HALL_RESULT_OK, all six fields of the reading are 0 and marked invalid.
+HallResult hall_tick_without_frame(HallServo *servo, HallReading *reading);
 
 // Forgets the pose to hold and the sequence; zero deviation and counters stay.
-void hall_forget(HallServo *servo);
+HallResult hall_forget(HallServo *servo);
 
-// Starts to average at rest, over `ticks` ticks with the default limits of movement.
-void hall_rezero_start(HallServo *servo, uint16_t ticks);
+// Starts to average at rest, over `ticks` ticks (250 or more) with the default limits of
+// movement and of the zero deviation; hall_rezero_state tells how it goes.
+HallResult hall_rezero_start(HallServo *servo, uint16_t ticks);
 
-// Where the re-zero stands.
+// Where the re-zero stands; idle for a null pointer or a servo that was never started.
 HallRezero hall_rezero_state(const HallServo *servo);
 
-// The zero deviation that is subtracted, as a pose; zeros for a null pointer.
+// The zero deviation that is subtracted, as a pose; zeros for a null pointer or a servo that was
+// never started.
 HallPlanarPose hall_zero(const HallServo *servo);
 
 // Subtracts a zero deviation that is known, for instance from before a restart. One that is
-// not finite is ignored and `false` returned.
-bool hall_set_zero(HallServo *servo, HallPlanarPose zero);
+// not finite, a null pointer and a servo that was never started are ignored and `false` returned.
+HALL_NODISCARD bool hall_set_zero(HallServo *servo, HallPlanarPose zero);
 
-// The counters; zeros for a null pointer.
+// The counters; zeros for a null pointer or a servo that was never started.
 HallHealth hall_health(const HallServo *servo);
 
 #ifdef __cplusplus

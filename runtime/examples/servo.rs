@@ -8,11 +8,11 @@ use runtime::rezero::RezeroSettings;
 use runtime::{OnInvalid, ParameterSet, RawFrame, Servo};
 use std::error::Error;
 
-/// Stands for the converters: a stage at rest, and one Hall code lost in period 15.
+/// Stands for the converters: a stage at rest near its zero, and one Hall code lost in period 255.
 fn converters(period: u32) -> RawFrame {
-    let hall_b = if period == 15 { MISSING_CODE } else { 900 };
+    let hall_b = if period == 255 { MISSING_CODE } else { 90 };
     RawFrame {
-        hall: [1200, hall_b, 700],
+        hall: [120, hall_b, 70],
         capacitive: [300, -200, 100],
         sequence: period,
         time_us: 2000 * period,
@@ -27,14 +27,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut servo = Servo::new(&*decoder, OnInvalid::Hold { ticks: 3 });
 
     // Every period.
-    for period in 0..20 {
+    for period in 0..260 {
         if period == 2 {
             servo.start_rezero(RezeroSettings {
-                ticks: 10,
+                ticks: RezeroSettings::TICKS_MIN,
                 ..RezeroSettings::default()
             });
         }
         let reading = servo.tick(&converters(period));
+        if (3..250).contains(&period) {
+            continue;
+        }
         match reading.planar_or_held() {
             Some(q) => println!(
                 "{period:2}: X {:8.3} um, status {}",

@@ -264,7 +264,7 @@ impl<M: Model> Decoder<M> {
             .with(Status::PLANAR_NOT_FINITE.when(beyond(size_q, [FINITE, FINITE, FINITE])))
             .with(Status::VERTICAL_NOT_FINITE.when(any_not_finite(size_v)));
         let vertical_valid = !faults.any(VERTICAL_FAULTS);
-        let planar_valid = faults.is_good();
+        let planar_valid = faults.bits() == 0;
         let range_v = each(c.calibrated_vertical, f32::to_bits);
         let range_q = each(c.calibrated_planar, f32::to_bits);
         let status = faults

@@ -68,6 +68,8 @@ pub struct Servo<'d> {
     decoder: &'d dyn Decode,
     on_invalid: OnInvalid,
     zero: PlanarPose<f32>,
+    /// [`Status::ZERO_SET`] while `zero` is not zero.
+    zero_status: Status,
     last: Pose,
     planar_holds_left: u16,
     vertical_holds_left: u16,
@@ -104,6 +106,7 @@ impl<'d> Servo<'d> {
             decoder,
             on_invalid,
             zero: NO_POSE.planar,
+            zero_status: Status::GOOD,
             last: NO_POSE,
             planar_holds_left: 0,
             vertical_holds_left: 0,
@@ -146,10 +149,11 @@ impl<'d> Servo<'d> {
             return self.conclude(NOTHING, Status::FRAME_REPEATED);
         };
         let reading = decode(&self.zero);
+        let reading = self.conclude(reading, sequence);
         if self.run.is_some() {
             self.feed_rezero(&reading);
         }
-        self.conclude(reading, sequence)
+        reading
     }
 
     /// Takes note of a frame's sequence number: what it says about missed frames, or `None`
@@ -206,6 +210,12 @@ impl<'d> Servo<'d> {
         }
     }
 
+    /// Gives up a re-zero that runs; the zero deviation in use stays.
+    pub const fn cancel_rezero(&mut self) {
+        self.run = None;
+        self.rezero = RezeroState::Idle;
+    }
+
     /// Where the re-zero stands.
     pub const fn rezero_state(&self) -> RezeroState {
         self.rezero
@@ -216,14 +226,22 @@ impl<'d> Servo<'d> {
         self.zero
     }
 
-    /// Subtracts a zero deviation that is known, for instance from before a restart. One
-    /// that is not finite is ignored and `false` returned.
+    /// Subtracts a zero deviation that is known, for instance from before a restart, and forgets
+    /// X, Y, Rz to hold. One that is not finite is ignored and `false` returned.
     pub fn set_zero(&mut self, zero: PlanarPose<f32>) -> bool {
         let finite = zero.to_array().iter().all(|x| x.is_finite());
         if finite {
-            self.zero = zero;
+            self.subtract(zero);
         }
         finite
+    }
+
+    /// Subtracts `zero` from the next tick on. A pose to hold has the old one subtracted: it is
+    /// forgotten.
+    fn subtract(&mut self, zero: PlanarPose<f32>) {
+        self.planar_holds_left = 0;
+        self.zero = zero;
+        self.zero_status = Status::ZERO_SET.when(zero != NO_POSE.planar);
     }
 
     /// The counters.
@@ -253,7 +271,7 @@ impl<'d> Servo<'d> {
         match self.rezero {
             RezeroState::Running { .. } => {}
             RezeroState::Done { zero } => {
-                self.zero = zero;
+                self.subtract(zero);
                 self.run = None;
             }
             RezeroState::Idle | RezeroState::Refused(_) => self.run = None,
@@ -262,7 +280,7 @@ impl<'d> Servo<'d> {
 
     /// Holds or zeroes what is invalid, and counts.
     fn conclude(&mut self, mut reading: Reading, sequence: Status) -> Reading {
-        reading.status = reading.status.with(sequence);
+        reading.status = reading.status.with(sequence).with(self.zero_status);
         let hold = match self.on_invalid {
             OnInvalid::Zero => 0,
             OnInvalid::Hold { ticks } => ticks,

@@ -184,41 +184,94 @@ fn counters_stay_at_their_largest_value() {
     assert_eq!(servo.health(), full);
 }
 
+/// A frame of a stage some um from its zero.
+fn near_zero(sequence: u32) -> RawFrame {
+    RawFrame {
+        hall: [120, 90, 70],
+        ..frame(sequence)
+    }
+}
+
 #[test]
 fn a_re_zero_at_rest_is_taken_off_from_then_on() {
     let decoder = sample::parameters().decoder();
     let mut servo = Servo::new(&*decoder, OnInvalid::Zero);
-    let rest = servo.tick(&frame(0)).pose.planar.to_array();
-    servo.start_rezero(RezeroSettings {
-        ticks: 10,
+    let rest = servo.tick(&near_zero(0)).pose.planar.to_array();
+    let settings = RezeroSettings {
+        ticks: 250,
         ..RezeroSettings::default()
-    });
-    for sequence in 1..=10 {
+    };
+    servo.start_rezero(settings);
+    for sequence in 1..=250 {
         assert!(
-            matches!(servo.rezero_state(), RezeroState::Running { ticks_left } if u32::from(ticks_left) == 11 - sequence)
+            matches!(servo.rezero_state(), RezeroState::Running { ticks_left } if u32::from(ticks_left) == 251 - sequence)
         );
-        servo.tick(&frame(sequence));
+        assert_eq!(servo.tick(&near_zero(sequence)).status, Status::GOOD);
     }
     assert!(matches!(servo.rezero_state(), RezeroState::Done { .. }));
-    let after = servo.tick(&frame(11)).pose.planar.to_array();
+    let reading = servo.tick(&near_zero(251));
+    assert_eq!(reading.status, Status::ZERO_SET);
+    let after = reading.pose.planar.to_array();
     for ((rest, after), zero) in rest.into_iter().zip(after).zip(servo.zero().to_array()) {
         assert!(
-            rest.abs() > 1e-6 && after.abs() < 1e-11,
+            rest.abs() > 1e-7 && after.abs() < 1e-11,
             "{rest:e} {after:e}"
         );
         assert!((rest - zero).abs() < 1e-11);
     }
     // A second run measures from the pose without the zero, not from what is left of it.
     let before = servo.zero();
-    servo.start_rezero(RezeroSettings {
-        ticks: 2,
-        ..RezeroSettings::default()
-    });
-    servo.tick(&frame(12));
-    servo.tick(&frame(13));
+    servo.start_rezero(settings);
+    for sequence in 252..502 {
+        servo.tick(&near_zero(sequence));
+    }
+    assert!(matches!(servo.rezero_state(), RezeroState::Done { .. }));
     for (before, again) in before.to_array().into_iter().zip(servo.zero().to_array()) {
         assert!((before - again).abs() < 1e-11);
     }
+}
+
+#[test]
+fn every_reading_tells_whether_a_zero_deviation_is_subtracted() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&*decoder, HOLD_2);
+    let zero = PlanarPose {
+        rz_rad: 1e-9,
+        ..PlanarPose::ZERO
+    };
+    for (pose, told) in [
+        (PlanarPose::ZERO, false),
+        (zero, true),
+        (PlanarPose::ZERO, false),
+    ] {
+        assert!(servo.set_zero(pose));
+        servo.forget();
+        let readings = [
+            servo.tick(&frame(0)),
+            servo.tick(&frame(0)),
+            servo.tick(&bad_hall(1)),
+            servo.tick(&bad_gap(2)),
+            servo.tick_without_frame(),
+        ];
+        assert!(readings[0].status.is_good());
+        for reading in readings {
+            assert_eq!(reading.status.any(Status::ZERO_SET), told);
+        }
+    }
+}
+
+#[test]
+fn a_pose_less_another_zero_deviation_is_not_held() {
+    let decoder = sample::parameters().decoder();
+    let mut servo = Servo::new(&*decoder, HOLD_2);
+    servo.tick(&frame(0));
+    servo.set_zero(PlanarPose {
+        x_m: 1e-6,
+        ..PlanarPose::ZERO
+    });
+    let reading = servo.tick(&bad_gap(1));
+    assert_eq!(reading.planar_or_held(), None);
+    assert!(reading.status.any(Status::VERTICAL_HELD));
 }
 
 #[test]
@@ -247,12 +300,12 @@ fn a_bad_or_missing_frame_refuses_the_re_zero_and_keeps_the_zero_in_use() {
         })
     ));
     servo.start_rezero(RezeroSettings {
-        ticks: 1,
+        ticks: 249,
         ..RezeroSettings::default()
     });
     assert_eq!(
         servo.rezero_state(),
-        RezeroState::Refused(RezeroRefusal::TooShort { ticks: 1 })
+        RezeroState::Refused(RezeroRefusal::TooShort { ticks: 249 })
     );
     assert_eq!(servo.zero(), zero);
 }

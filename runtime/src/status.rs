@@ -1,4 +1,4 @@
-//! What is wrong with a reading: a bit mask, 0 when all is good.
+//! What is wrong with a reading: a bit mask. All is good when no bit is set, or bit 19 alone.
 //!
 //! | bit | value | meaning | effect |
 //! |---|---|---|---|
@@ -15,6 +15,7 @@
 //! | 16 | 65536 | Z, Rx, Ry are the last valid ones, repeated | |
 //! | 17 | 131072 | one or more servo periods had no frame before this one | |
 //! | 18 | 262144 | the frame repeats an earlier sequence number: nothing new | all six invalid |
+//! | 19 | 524288 | a zero deviation is subtracted from X, Y, Rz | none: no fault |
 //!
 //! Bits 11 and 12 mean something only while bits 14 and 13 are clear.
 
@@ -58,9 +59,11 @@ impl Status {
     pub const FRAMES_MISSED: Self = Self(1 << 17);
     /// The frame is not new.
     pub const FRAME_REPEATED: Self = Self(1 << 18);
+    /// A zero deviation is subtracted from X, Y, Rz. No fault.
+    pub const ZERO_SET: Self = Self(1 << 19);
 
     /// Every bit with its name, lowest first, for reports.
-    pub const NAMES: [(Self, &'static str); 19] = [
+    pub const NAMES: [(Self, &'static str); 20] = [
         (Self(1), "Hall code A bad"),
         (Self(1 << 1), "Hall code B bad"),
         (Self(1 << 2), "Hall code C bad"),
@@ -86,6 +89,7 @@ impl Status {
         (Self::VERTICAL_HELD, "vertical pose held"),
         (Self::FRAMES_MISSED, "frames missed"),
         (Self::FRAME_REPEATED, "frame repeated"),
+        (Self::ZERO_SET, "zero deviation subtracted"),
     ];
 
     /// The mask as a number, as it is sent and logged.
@@ -100,10 +104,10 @@ impl Status {
         Self(bits)
     }
 
-    /// Whether nothing at all is wrong.
+    /// Whether nothing at all is wrong: no bit is set but [`Status::ZERO_SET`].
     #[inline(always)]
     pub const fn is_good(self) -> bool {
-        self.0 == 0
+        self.0 & !Self::ZERO_SET.0 == 0
     }
 
     /// Whether any bit of `other` is set.
@@ -153,5 +157,12 @@ mod tests {
             .iter()
             .fold(Status::GOOD, |sum, (bit, _)| sum.with(*bit));
         assert_eq!(all.names().count(), Status::NAMES.len());
+    }
+    #[test]
+    fn only_a_zero_deviation_is_no_fault() {
+        for (bit, name) in Status::NAMES {
+            assert_eq!(bit.is_good(), bit == Status::ZERO_SET, "{name}");
+            assert!(!bit.with(Status::HALL_A).is_good());
+        }
     }
 }

@@ -39,7 +39,8 @@ int main(void)
             return 3;
         if (hall_load(blob, length, NULL, &decoder) != HALL_RESULT_OK)
             return 4;
-        hall_servo_start(&servo, &decoder, (uint16_t)head[2]);
+        if (hall_servo_start(&servo, &decoder, (uint16_t)head[2]) != HALL_RESULT_OK)
+            return 7;
         for (uint32_t left = head[1]; left > 0;) {
             uint32_t now = left < 256 ? left : 256;
             if (!all(read, job, frames, now * sizeof frames[0]))

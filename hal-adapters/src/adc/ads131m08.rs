@@ -10,27 +10,58 @@
 //! | register | address | value after reset | here |
 //! |---|---|---|---|
 //! | ID | 0x00 | 0x28xx | upper byte checked: eight channels |
-//! | STATUS | 0x01 | 0x0500 | in every frame: upper byte 0x01, apart from the bit that marks a resynchronisation; lower byte one ready bit per channel |
-//! | MODE | 0x02 | 0x0510 | 0x0110: the reset flag is cleared, so a later reset shows |
+//! | STATUS | 0x01 | 0x0500 | twice a tick: upper byte 0x01, apart from the bit that marks a resynchronisation; lower byte one ready bit per channel |
+//! | MODE | 0x02 | 0x0510 | 0x2110: the reset flag is cleared, so a later reset shows; the part checks its registers |
 //! | CLOCK | 0x03 | 0xFF0E | channels that are read, oversampling 128, high resolution |
+//! | the others | 0x04 to 0x30 | | as after reset |
 //!
-//! **Timing.** CLKIN must be 8.000 MHz: the modulators run at 4 MHz and a conversion takes
-//! 32 us. The part stores up to two conversions that were not read, so a plain read returns
-//! data from before the tick. A pulse on SYNC/RESET at the trigger empties that store and
-//! restarts the sinc3 filters: the code that is ready [`SETTLE_US`](FrameSampler::SETTLE_US)
-//! later is the weighted mean of the 96 us after the trigger, in every tick. (The part ignores
-//! a pulse that coincides with the end of a conversion. At 8 MHz 2 ms are 62.5 conversions, so
-//! that does not happen; at 8.192 MHz they would be 64 and it would.) The pulse must be shorter
-//! than 2048 periods of CLKIN, 256 us; a longer one is a reset.
+//! **Which conversion is read.** CLKIN must be 8.000 MHz: the modulators run at 4 MHz and a
+//! conversion takes 32 us. Settled data need three conversions after the filters restart: at
+//! 96 to 171 us, by the shortest and the longest reading of sections 8.3.7.1 and 8.4.2. The part
+//! does not hold back data that are not settled; it stores two conversions and sends the older
+//! one first; what it drops when a third one comes, and whether conversions end at multiples of
+//! 32 us after SYNC or 11 us (44 modulator periods) later, is not said. So a tick does not rely on
+//! any of this:
 //!
-//! **Skew.** None: the channels share one trigger. What remains is a delay common to all six
-//! codes, 48 us from the trigger to the middle of the filter: 0.23 um at the fastest motion
-//! of a service log (4.8 mm/s), known and the same for every axis. The time stamp
-//! of a frame does not include it.
+//! 1. A pulse on SYNC/RESET at the trigger restarts the filters of all channels.
+//! 2. [`SETTLE_US`](FrameSampler::SETTLE_US) = 182 us later everything that the part converts is
+//!    settled (11 us of margin), and no conversion ends within 10 us.
+//! 3. Three frames follow. The first two remove what is stored, which is at most two conversions.
+//!    The third one then carries a conversion that ended after the first frame began. If there
+//!    is none yet, its ready bits say so, and a fourth frame is read: it begins at least 68 us
+//!    after the first, and two conversions have ended by then.
+//!
+//! The codes are settled in any case, whatever the speed of the SPI. Their age is known if the
+//! second frame begins after the next conversion has ended (192 or 203 us: frames of at least 21 us;
+//! 22.9 us at 10.5 MHz without gaps) and the third one before two more have (256 us: frames of at
+//! most 37 us, 1.2 us per byte): they are then the mean, weighted by the sinc3 filter, of the 96 us
+//! up to 192 us, or 203 us, after the trigger. The middle is 144 or 155 us after it;
+//! [`SAMPLE_US`](FrameSampler::SAMPLE_US) = 150 us is within 6 us of both. A part that drops the
+//! newest conversion, or needs the fourth frame, is a conversion of 32 us later: 0.15 um at the
+//! fastest motion of a service log (4.8 mm/s). Whichever it is, it is the same in every tick.
+//!
+//! The pulse must be shorter than 2048 periods of CLKIN, 256 us; a longer one is a reset. The part
+//! ignores a pulse that coincides with the end of a conversion, which then is settled anyway. At
+//! 8 MHz 2 ms are 62.5 conversions, so that only a tick that comes late can meet one.
+//!
+//! **Checks.** Each frame has a CRC, and besides codes the three of a tick carry
+//! - the STATUS: a reset, a locked interface, a register that changed (REG_CRC_EN makes the part
+//!   compare its registers' CRC every 94 us; a change in the 0.2 ms before the codes are read is
+//!   told a tick later), and whether SYNC arrived. Two ticks in a row without a resynchronisation
+//!   mean that its wire is broken;
+//! - one register, read back and compared: all of 0x02 to 0x30 in turn, in 94 ms.
+//!
+//! The trigger after a failed start leaves SYNC/RESET low for one period: a reset that also helps
+//! a part that ignores commands because its interface is locked or its word length changed. After
+//! power-up the part ignores the SPI for 250 us (typical): a start in that time fails, too.
+//!
+//! **Skew.** None: the channels share one trigger.
 //!
 //! **Range.** +-1.2 V at gain 1, 143 nV per code: a Hall amplifier of +-10.24 V needs a divider
 //! by 8.53. The rails are -8388608 and 8388607; declare them as `code_min` and `code_max` of
-//! the stage file and the decoder refuses them.
+//! the stage file and the decoder refuses them. An input that is not connected reads about 0, which
+//! is a code like any other: see the wiring table of the firmware for the resistor that makes it
+//! read a rail.
 
 use super::channels::INPUTS;
 use super::{AdcError, Channels, FrameSampler, silent};
@@ -53,28 +84,39 @@ const RESET: u16 = 0x0011;
 const RESET_DONE: u16 = 0xff28;
 const READ: u16 = 0xa000;
 const WRITE: u16 = 0x6000;
-const WRITTEN: u16 = 0x4000;
 
 const ID: u8 = 0x00;
 const STATUS: u8 = 0x01;
 const MODE_REGISTER: u8 = 0x02;
 const CLOCK: u8 = 0x03;
+const CFG: u8 = 0x06;
+const GAIN_0: u8 = 0x0c;
+/// From each channel's gain register to the next one's.
+const CHANNEL_REGISTERS: u8 = 5;
+const LAST_REGISTER: u8 = 0x30;
 
 const ID_MASK: u16 = 0xff00;
 const ID_WANTED: u16 = 0x2800;
-/// 24-bit words, timeout on, no CRC on commands, reset flag cleared.
-const MODE_WANTED: u16 = 0x0110;
+/// CRC of the registers on, 24-bit words, timeout on, no CRC on commands, reset flag cleared.
+const MODE_WANTED: u16 = 0x2110;
+/// Chopping off: value after reset.
+const CFG_WANTED: u16 = 0x0600;
+/// Gain correction 1, upper 16 bits: value after reset.
+const GAIN_WANTED: u16 = 0x8000;
 /// Oversampling 128 (bits 4..2 = 0), high resolution (bits 1..0 = 2).
 const CLOCK_SPEED: u16 = 0x0002;
 /// All bits except the ready bits and F_RESYNC, which every pulse on SYNC sets.
 const STATUS_MASK: u16 = 0xbf00;
-/// 24-bit words, nothing locked, no reset, no error.
+/// 24-bit words, nothing locked, no reset, no register changed, no error.
 const STATUS_WANTED: u16 = 0x0100;
+const F_RESYNC: u16 = 0x4000;
+/// So many ticks in a row without a resynchronisation are a fault.
+const UNSYNCED_TICKS: u8 = 2;
 
 /// A pulse on SYNC lasts 1 to 2047 periods of CLKIN: 0.125 to 256 us.
 const SYNC_US: u32 = 1;
 
-/// The registers can be accessed 5 us after a reset.
+/// The registers can be accessed 5 us (typical) after a reset.
 const RESET_US: u32 = 10;
 
 /// The part on its bus, with its pin SYNC/RESET.
@@ -83,6 +125,12 @@ pub struct Ads131m08<SPI, SYNC> {
     spi: SPI,
     sync: SYNC,
     channels: Channels,
+    /// Register that the next tick reads back.
+    turn: u8,
+    /// Whether the next response is the STATUS: the last tick was read to its end.
+    status_is_next: bool,
+    unsynced_ticks: u8,
+    start_failed: bool,
 }
 
 /// What the part sent in one frame.
@@ -98,6 +146,10 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
             spi,
             sync,
             channels,
+            turn: MODE_REGISTER,
+            status_is_next: false,
+            unsynced_ticks: 0,
+            start_failed: false,
         }
     }
 
@@ -131,26 +183,87 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
         Ok(frame)
     }
 
-    /// Sends a command and fetches its response with the next frame.
-    fn ask(&mut self, command: u16, data: u16) -> Result<u16, AdcError<SPI::Error>> {
-        self.exchange(command, data)?;
-        Ok(self.exchange(NULL, 0)?.response)
+    /// The value that a register must have: 0x02 to 0x30.
+    const fn wanted(&self, register: u8) -> u16 {
+        match register {
+            MODE_REGISTER => MODE_WANTED,
+            CLOCK => (self.channels.mask() as u16) << 8 | CLOCK_SPEED,
+            CFG => CFG_WANTED,
+            GAIN_0.. if (register - GAIN_0).is_multiple_of(CHANNEL_REGISTERS) => GAIN_WANTED,
+            _ => 0,
+        }
     }
 
-    /// Writes a register and reads it back.
-    fn set(&mut self, register: u8, wanted: u16) -> Result<(), AdcError<SPI::Error>> {
-        let address = u16::from(register) << 7;
-        let written = self.ask(WRITE | address, wanted)?;
-        let found = self.ask(READ | address, 0)?;
-        if written != WRITTEN | address || found != wanted {
-            return Err(AdcError::WrongSetting {
-                register,
-                found,
-                wanted,
-            });
+    fn try_start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
+        self.sync.set_high().map_err(|e| AdcError::Pin(e.kind()))?;
+        // This frame answers an earlier command, so neither its content nor its check matters.
+        match self.exchange(RESET, 0) {
+            Err(AdcError::Bus(error)) => return Err(AdcError::Bus(error)),
+            Ok(_) | Err(_) => delay.delay_us(RESET_US),
+        }
+        // Each frame answers the one before it.
+        let (read, write) = (|r: u8| READ | address(r), |r: u8| WRITE | address(r));
+        let found = self.exchange(read(ID), 0)?.response;
+        check_id(found, u16::MAX, RESET_DONE)?;
+        let found = self.exchange(write(CLOCK), self.wanted(CLOCK))?.response;
+        check_id(found, ID_MASK, ID_WANTED)?;
+        self.exchange(write(MODE_REGISTER), MODE_WANTED)?;
+        self.exchange(read(CLOCK), 0)?;
+        let found = self.exchange(read(MODE_REGISTER), 0)?.response;
+        compare(CLOCK, found, self.wanted(CLOCK))?;
+        let found = self.exchange(NULL, 0)?.response;
+        compare(MODE_REGISTER, found, MODE_WANTED)
+    }
+
+    /// Whether the responses of a tick, `None` if it was none, tell of a resynchronisation.
+    fn count_unsynced(&mut self, responses: [Option<u16>; 2]) -> Result<(), AdcError<SPI::Error>> {
+        let synced = responses.into_iter().flatten().any(|r| r & F_RESYNC != 0);
+        self.unsynced_ticks = if synced {
+            0
+        } else {
+            self.unsynced_ticks.saturating_add(1)
+        };
+        if self.unsynced_ticks >= UNSYNCED_TICKS {
+            return Err(AdcError::NoSync);
         }
         Ok(())
     }
+}
+
+/// Where commands have the address of a register.
+const fn address(register: u8) -> u16 {
+    (register as u16) << 7
+}
+
+fn check_id<B>(found: u16, mask: u16, expected: u16) -> Result<(), AdcError<B>> {
+    if found & mask == expected {
+        Ok(())
+    } else {
+        Err(AdcError::WrongId { found, expected })
+    }
+}
+
+/// Compares what a register has with what it must have.
+fn compare<B>(register: u8, found: u16, wanted: u16) -> Result<(), AdcError<B>> {
+    if found == wanted {
+        return Ok(());
+    }
+    Err(AdcError::WrongSetting {
+        register,
+        found,
+        wanted,
+    })
+}
+
+fn check_status<B>(found: u16) -> Result<(), AdcError<B>> {
+    if found & STATUS_MASK == STATUS_WANTED {
+        return Ok(());
+    }
+    Err(AdcError::WrongSetting {
+        register: STATUS,
+        found,
+        wanted: STATUS_WANTED,
+    })
 }
 
 impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
@@ -159,55 +272,63 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
     const SPI_MODE: Mode = MODE_1;
     const SPI_HZ_MAX: u32 = 25_000_000;
 
-    /// Three conversions of 32 us for the sinc3 filter, 6 us for the part's own start and
-    /// 8 us of margin.
-    const SETTLE_US: u32 = 110;
+    /// Later than 171 us, the longest that the filters may take, and 10 us from the end of any
+    /// conversion.
+    const SETTLE_US: u32 = 182;
+
+    /// The middle of the 96 us before 192 or 203 us, when the conversion ends that is read: 144 or
+    /// 155 us.
+    const SAMPLE_US: u32 = 150;
+
+    const CODE_BITS: u32 = 24;
 
     fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
-        self.sync.set_high().map_err(|e| AdcError::Pin(e.kind()))?;
-        // This frame answers an earlier command, so neither its content nor its check matters.
-        match self.exchange(RESET, 0) {
-            Err(AdcError::Bus(error)) => return Err(AdcError::Bus(error)),
-            Ok(_) | Err(_) => delay.delay_us(RESET_US),
-        }
-        let response = self.exchange(READ | u16::from(ID) << 7, 0)?.response;
-        if response != RESET_DONE {
-            return Err(AdcError::WrongId {
-                found: response,
-                expected: RESET_DONE,
-            });
-        }
-        let found = self.exchange(NULL, 0)?.response;
-        if found & ID_MASK != ID_WANTED {
-            return Err(AdcError::WrongId {
-                found,
-                expected: ID_WANTED,
-            });
-        }
-        self.set(CLOCK, u16::from(self.channels.mask()) << 8 | CLOCK_SPEED)?;
-        self.set(MODE_REGISTER, MODE_WANTED)
+        // What was set raises the flag of changed registers: the next STATUS is not looked at.
+        self.status_is_next = false;
+        self.turn = MODE_REGISTER;
+        let result = self.try_start(delay);
+        self.start_failed = result.is_err();
+        result
     }
 
     fn trigger(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
         self.sync.set_low().map_err(|e| AdcError::Pin(e.kind()))?;
+        if core::mem::take(&mut self.start_failed) {
+            return Ok(());
+        }
         delay.delay_us(SYNC_US);
         self.sync.set_high().map_err(|e| AdcError::Pin(e.kind()))
     }
 
     fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<SPI::Error>> {
-        let frame = self.exchange(NULL, 0)?;
-        if frame.response & STATUS_MASK != STATUS_WANTED {
-            return Err(AdcError::WrongSetting {
-                register: STATUS,
-                found: frame.response,
-                wanted: STATUS_WANTED,
-            });
+        let (register, read) = (self.turn, self.channels.mask());
+        self.turn = if register < LAST_REGISTER {
+            register + 1
+        } else {
+            MODE_REGISTER
+        };
+        let status_is_first = core::mem::take(&mut self.status_is_next);
+        let is_ready = |frame: &Frame| frame.response as u8 & read == read;
+
+        let first = self.exchange(READ | address(register), 0)?.response;
+        let found = self.exchange(NULL, 0)?.response;
+        let mut frame = self.exchange(NULL, 0)?;
+        if !is_ready(&frame) {
+            frame = self.exchange(NULL, 0)?;
         }
-        let [_, ready] = frame.response.to_be_bytes();
-        let read = self.channels.mask();
-        if ready & read != read {
+        self.status_is_next = true;
+
+        let first = status_is_first.then_some(first);
+        if let Some(status) = first {
+            check_status(status)?;
+        }
+        check_status(frame.response)?;
+        compare(register, found, self.wanted(register))?;
+        if !is_ready(&frame) {
+            let ready = frame.response as u8;
             return Err(AdcError::NotReady { ready, read });
         }
+        self.count_unsynced([first, Some(frame.response)])?;
         Ok(self.channels.frame(&frame.codes, sequence, time_us))
     }
 }

@@ -61,13 +61,32 @@ fn try_start(expected: &[Transaction<u8>]) -> Result<(), AdcError<ErrorKind>> {
     result
 }
 
-fn try_sample(back: Vec<u8>) -> Result<RawFrame, AdcError<ErrorKind>> {
+/// What ticks give whose frames are `expected`.
+fn ticks<const N: usize>(
+    expected: &[Transaction<u8>],
+) -> [Result<RawFrame, AdcError<ErrorKind>>; N] {
     let mut pin = PinMock::new(&[]);
-    let mut bus = Mock::new(&frame(0, 0, back));
+    let mut bus = Mock::new(expected);
     let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
-    let result = adc.sample(7, 14_000);
+    let results = [(); N].map(|()| adc.sample(7, 14_000));
     bus.done();
     pin.done();
+    results
+}
+
+/// The frames of a tick that reads `register` back: the STATUS, the register, the STATUS again.
+fn tick(status: u16, register: u16, found: u16, back: Vec<u8>) -> Vec<Transaction<u8>> {
+    [
+        frame(0xa000 | register << 7, 0, answer(status, QUIET)),
+        frame(0, 0, answer(found, QUIET)),
+        frame(0, 0, back),
+    ]
+    .concat()
+}
+
+/// The first tick after a start, in which the first frame answers something else.
+fn try_sample(back: Vec<u8>) -> Result<RawFrame, AdcError<ErrorKind>> {
+    let [result] = ticks(&tick(0x2110, 0x02, 0x2110, back));
     result
 }
 
@@ -76,15 +95,11 @@ fn started() -> Vec<Vec<Transaction<u8>>> {
     vec![
         frame(0x0011, 0, answer(0x0500, QUIET)),
         frame(0xa000, 0, answer(0xff28, QUIET)),
-        frame(0x0000, 0, answer(0x2804, QUIET)),
-        frame(0x6180, 0x3f02, answer(0x0500, QUIET)),
-        frame(0x0000, 0, answer(0x4180, QUIET)),
-        frame(0xa180, 0, answer(0x0500, QUIET)),
-        frame(0x0000, 0, answer(0x3f02, QUIET)),
-        frame(0x6100, 0x0110, answer(0x0500, QUIET)),
-        frame(0x0000, 0, answer(0x4100, QUIET)),
-        frame(0xa100, 0, answer(0x0100, QUIET)),
-        frame(0x0000, 0, answer(0x0110, QUIET)),
+        frame(0x6180, 0x3f02, answer(0x2804, QUIET)),
+        frame(0x6100, 0x2110, answer(0x4180, QUIET)),
+        frame(0xa180, 0, answer(0x4100, QUIET)),
+        frame(0xa100, 0, answer(0x3f02, QUIET)),
+        frame(0x0000, 0, answer(0x2110, QUIET)),
     ]
 }
 
@@ -117,7 +132,7 @@ fn a_part_that_does_not_confirm_its_reset_or_has_other_channels_is_refused() {
     );
 
     let mut all = started()[..3].to_vec();
-    all[2] = frame(0x0000, 0, answer(0x2401, QUIET));
+    all[2] = frame(0x6180, 0x3f02, answer(0x2401, QUIET));
     let (found, expected) = (0x2401, 0x2800);
     assert_eq!(
         try_start(&all.concat()),
@@ -127,14 +142,17 @@ fn a_part_that_does_not_confirm_its_reset_or_has_other_channels_is_refused() {
 
 #[test]
 fn a_setting_that_does_not_read_back_is_named() {
-    let mut all = started()[..7].to_vec();
-    all[6] = frame(0x0000, 0, answer(0xff0e, QUIET));
-    let error = AdcError::WrongSetting {
-        register: 0x03,
-        found: 0xff0e,
-        wanted: 0x3f02,
-    };
-    assert_eq!(try_start(&all.concat()), Err(error));
+    for (read, register, found, wanted) in [(5, 0x03, 0xff0e, 0x3f02), (6, 0x02, 0x0510, 0x2110)] {
+        let mut all = started()[..=read].to_vec();
+        let (command, data) = [(0xa100, 0), (0, 0)][read - 5];
+        all[read] = frame(command, data, answer(found, QUIET));
+        let error = AdcError::WrongSetting {
+            register,
+            found,
+            wanted,
+        };
+        assert_eq!(try_start(&all.concat()), Err(error));
+    }
 }
 
 /// Every byte is written out: this test alone defines what a frame is.
@@ -181,30 +199,125 @@ fn every_flipped_bit_of_a_frame_is_noticed() {
 #[test]
 fn a_line_that_never_moves_is_silent() {
     for level in [0x00, 0xff] {
-        let result = try_sample(vec![level; FRAME_BYTES]);
-        assert_eq!(result, Err(AdcError::Silent { level }));
+        let first = frame(0xa100, 0, vec![level; FRAME_BYTES]);
+        assert_eq!(ticks(&first), [Err(AdcError::Silent { level })]);
     }
 }
 
 #[test]
-fn a_part_that_was_reset_or_locked_meanwhile_is_not_read() {
-    for found in [0x053f, 0x813f, 0x113f, 0x033f] {
+fn a_part_that_was_reset_locked_or_changed_meanwhile_is_not_read() {
+    for found in [0x053f, 0x813f, 0x113f, 0x033f, 0x213f] {
         let error = AdcError::WrongSetting {
             register: 0x01,
             found,
             wanted: 0x0100,
         };
         assert_eq!(try_sample(answer(found, QUIET)), Err(error));
+        // In the first frame of a tick, too, unless the one before it was not read to its end.
+        let good = || answer(0x413f, QUIET);
+        let both = [
+            tick(0, 0x02, 0x2110, good()),
+            tick(found, 0x03, 0x3f02, good()),
+        ];
+        assert_eq!(ticks::<2>(&both.concat())[1], Err(error));
     }
 }
 
 #[test]
-fn codes_that_are_not_new_are_not_read() {
+fn a_conversion_that_is_not_there_yet_gets_one_more_frame() {
+    let (late, new) = (answer(0x011f, QUIET), answer(0x013f, [5; 8]));
+    let mut all = tick(0, 0x02, 0x2110, late.clone());
+    all.extend(frame(0, 0, new));
+    let [result] = ticks(&all);
+    assert_eq!(result.map(|frame| frame.hall), Ok([5; 3]));
+
+    let mut all = tick(0, 0x02, 0x2110, late.clone());
+    all.extend(frame(0, 0, late));
     let (ready, read) = (0x1f, 0x3f);
-    assert_eq!(
-        try_sample(answer(0x011f, QUIET)),
-        Err(AdcError::NotReady { ready, read })
+    assert_eq!(ticks(&all), [Err(AdcError::NotReady { ready, read })]);
+}
+
+/// The values after a reset are those of the data sheet's table 8-12.
+#[test]
+fn every_register_is_read_back_in_turn() {
+    let at_reset = |register: u16| match register {
+        0x02 => 0x2110,
+        0x03 => 0x3f02,
+        0x06 => 0x0600,
+        0x0c | 0x11 | 0x16 | 0x1b | 0x20 | 0x25 | 0x2a | 0x2f => 0x8000,
+        _ => 0,
+    };
+    let good = |k: u16| {
+        let register = 0x02 + k % 47;
+        let status = if k == 0 { 0 } else { 0x413f };
+        tick(status, register, at_reset(register), answer(0x013f, QUIET))
+    };
+    assert!(
+        ticks::<95>(&(0..95).flat_map(good).collect::<Vec<_>>())
+            .iter()
+            .all(Result::is_ok)
     );
+    for wrong in 0..47 {
+        let mut all: Vec<_> = (0..wrong).flat_map(good).collect();
+        let (register, wanted) = (0x02 + wrong, at_reset(0x02 + wrong));
+        let status = if wrong == 0 { 0 } else { 0x413f };
+        let found = wanted ^ 1 << (wrong % 16);
+        all.extend(tick(status, register, found, answer(0x013f, QUIET)));
+        let mut bus = Mock::new(&all);
+        let mut pin = PinMock::new(&[]);
+        let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
+        assert!((0..wrong).all(|_| adc.sample(0, 0).is_ok()));
+        let register = register as u8;
+        assert_eq!(
+            adc.sample(0, 0),
+            Err(AdcError::WrongSetting {
+                register,
+                found,
+                wanted
+            })
+        );
+        bus.done();
+        pin.done();
+    }
+}
+
+#[test]
+fn a_second_tick_without_resynchronisation_means_a_broken_wire() {
+    let good = || answer(0x013f, QUIET);
+    let all = [
+        tick(0, 0x02, 0x2110, answer(0x413f, QUIET)),
+        tick(0x013f, 0x03, 0x3f02, good()),
+        tick(0x413f, 0x04, 0, good()),
+        tick(0x013f, 0x05, 0, good()),
+        tick(0x013f, 0x06, 0x0600, good()),
+        tick(0x413f, 0x07, 0, good()),
+    ];
+    let told = ticks::<6>(&all.concat()).map(|tick| tick.err());
+    let lost = Some(AdcError::NoSync);
+    assert_eq!(told, [None, None, None, None, lost, None]);
+}
+
+#[test]
+fn a_start_that_fails_is_followed_by_a_reset_that_lasts_a_period() {
+    let mut all = frame(0x0011, 0, answer(0, QUIET));
+    all.extend(frame(0xa000, 0, answer(0x0011, QUIET)));
+    all.extend(started().concat());
+    let mut bus = Mock::new(&all);
+    let (low, high) = (
+        PinTransaction::set(State::Low),
+        PinTransaction::set(State::High),
+    );
+    let starts = [high.clone(), low.clone(), low.clone(), high.clone()];
+    let mut pin = PinMock::new(&[&starts[..], &[high.clone(), low, high]].concat());
+    let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
+    let mut delay = NoopDelay::new();
+    assert!(adc.start(&mut delay).is_err());
+    assert_eq!(adc.trigger(&mut delay), Ok(()));
+    assert_eq!(adc.trigger(&mut delay), Ok(()));
+    assert_eq!(adc.start(&mut delay), Ok(()));
+    assert_eq!(adc.trigger(&mut delay), Ok(()));
+    bus.done();
+    pin.done();
 }
 
 #[test]

@@ -26,9 +26,14 @@ fn on_part<T>(
 }
 
 fn frame(out: [u8; 2], back: [u8; 3]) -> Vec<Transaction<u8>> {
+    frame_of_41_bits(out, back, 0)
+}
+
+fn frame_of_41_bits(out: [u8; 2], back: [u8; 3], last: u8) -> Vec<Transaction<u8>> {
     let (mut sent, mut read) = (out.to_vec(), vec![0, 0]);
-    sent.extend([0; 3]);
+    sent.extend([0; 4]);
     read.extend(back);
+    read.push(last);
     vec![
         Transaction::transaction_start(),
         Transaction::transfer_in_place(sent, read),
@@ -47,7 +52,7 @@ fn started() -> Vec<Transaction<u8>> {
     all.extend(frame([0x02, 0x00], [0xff, 0, 0]));
     all.extend(written(0x01, 0x3f));
     all.extend(written(0x02, 0xc0));
-    all.extend(written(0x03, 0x42));
+    all.extend(written(0x03, 0x43));
     (0x05..=0x0a).for_each(|range| all.extend(written(range, 0)));
     all
 }
@@ -71,8 +76,73 @@ fn try_start(expected: Vec<Transaction<u8>>) -> Result<(), AdcError<ErrorKind>> 
     on_part(&expected, &levels, |adc| adc.start(&mut NoopDelay::new()))
 }
 
+/// What a part gives whose reference has settled.
 fn try_sample(expected: Vec<Transaction<u8>>) -> Result<RawFrame, AdcError<ErrorKind>> {
-    on_part(&expected, &[], |adc| adc.sample(7, 14_000))
+    on_part(&expected, &[], |adc| {
+        adc.reference = Reference::Settled;
+        adc.sample(7, 14_000)
+    })
+}
+
+/// Codes, and the register that is read back after them.
+fn tick(register: u8, value: u8) -> Vec<Transaction<u8>> {
+    [sampled(ZERO), frame([register << 1, 0], [value, 0, 0])].concat()
+}
+
+#[test]
+fn codes_count_from_24_ms_after_the_first_sample_of_a_start() {
+    let ticks = [tick(0x01, 0x3f), tick(0x02, 0xc0), tick(0x03, 0x43)];
+    let all = [started(), ticks.concat(), started(), tick(0x01, 0x3f)].concat();
+    let levels = [
+        PinTransaction::set(State::High),
+        PinTransaction::set(State::High),
+    ];
+    on_part(&all, &levels, |adc| {
+        let not_ready = Err(AdcError::NotReady {
+            ready: 0,
+            read: 0x3f,
+        });
+        let first = u32::MAX - 10_000; // The timer wraps in between.
+        assert_eq!(adc.start(&mut NoopDelay::new()), Ok(()));
+        assert_eq!(adc.sample(0, first), not_ready);
+        assert_eq!(adc.sample(1, first.wrapping_add(23_999)), not_ready);
+        assert!(adc.sample(2, first.wrapping_add(24_000)).is_ok());
+        assert_eq!(adc.start(&mut NoopDelay::new()), Ok(()));
+        assert_eq!(adc.sample(3, first.wrapping_add(26_000)), not_ready);
+    });
+}
+
+#[test]
+fn every_register_is_read_back_in_turn() {
+    let wanted = [
+        (0x01, 0x3f),
+        (0x02, 0xc0),
+        (0x03, 0x43),
+        (0x05, 0),
+        (0x06, 0),
+        (0x07, 0),
+        (0x08, 0),
+        (0x09, 0),
+        (0x0a, 0),
+        (0x0b, 0),
+        (0x0c, 0),
+    ];
+    for (wrong, (register, value)) in wanted.into_iter().enumerate() {
+        let good = wanted.iter().cycle().take(11 + wrong);
+        let mut all: Vec<_> = good.flat_map(|(r, v)| tick(*r, *v)).collect();
+        all.extend(tick(register, value ^ 1));
+        on_part(&all, &[], |adc| {
+            adc.reference = Reference::Settled;
+            assert!((0..11 + wrong).all(|_| adc.sample(0, 0).is_ok()));
+            let (found, wanted) = (u16::from(value ^ 1), u16::from(value));
+            let error = AdcError::WrongSetting {
+                register,
+                found,
+                wanted,
+            };
+            assert_eq!(adc.sample(0, 0), Err(error));
+        });
+    }
 }
 
 #[test]
@@ -96,7 +166,8 @@ fn codes_are_signed_around_half_scale_and_rails_stay_rails() {
         sequence: 7,
         time_us: 14_000,
     };
-    assert_eq!(try_sample(sampled(codes)), Ok(want));
+    let all = [sampled(codes), frame([0x02, 0], [0x3f, 0, 0])].concat();
+    assert_eq!(try_sample(all), Ok(want));
 }
 
 #[test]
@@ -122,7 +193,7 @@ fn a_setting_that_does_not_read_back_is_named() {
 
 #[test]
 fn a_code_of_another_channel_or_device_is_refused() {
-    for found in [0x24, 0x10, 0x18, 0x15] {
+    for found in [0x24, 0x10, 0x18, 0x1c] {
         let mut all = sampled(ZERO);
         let wrong = frame([0, 0], [0x80, 0, found]);
         all.truncate(6);
@@ -136,15 +207,31 @@ fn a_code_of_another_channel_or_device_is_refused() {
 }
 
 #[test]
+fn a_code_of_another_range_is_refused() {
+    // The range is the last three of 41 bits.
+    for (range, signature, last) in [(1, 0x14, 0x80), (2, 0x15, 0), (6, 0x17, 0)] {
+        let mut all = sampled(ZERO);
+        all.truncate(6);
+        all.extend(frame_of_41_bits([0, 0], [0x80, 0, signature], last));
+        let error = AdcError::WrongSetting {
+            register: 0x06,
+            found: range,
+            wanted: 0,
+        };
+        assert_eq!(try_sample(all), Err(error));
+    }
+}
+
+#[test]
 fn a_line_that_never_moves_is_silent() {
     let mut low = frame([0xa0, 0x00], [0, 0, 0]);
     low.extend(frame([0, 0], [0, 0, 0]));
     assert_eq!(try_sample(low), Err(AdcError::Silent { level: 0 }));
     let high = |out: u8| {
-        let sent = vec![out, 0, 0, 0, 0];
+        let sent = vec![out, 0, 0, 0, 0, 0];
         let all = [
             Transaction::transaction_start(),
-            Transaction::transfer_in_place(sent, vec![0xff; 5]),
+            Transaction::transfer_in_place(sent, vec![0xff; 6]),
             Transaction::transaction_end(),
         ];
         all.to_vec()

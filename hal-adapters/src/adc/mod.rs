@@ -5,10 +5,10 @@
 //! | [`ads131m08`] | TI ADS131M08 | eight channels of 24 bits sampled at once, CRC over every frame |
 //! | [`ads8688`] | TI ADS8688 | eight channels of 16 bits, sampled one after the other, no CRC |
 //! | [`Channels`] | any | which input carries which sensor |
-//! | [`stuck`] | any | codes that never change: a converter that is frozen |
+//! | [`stuck`] | any | codes that never change: a converter or a sensor that is frozen |
 //!
 //! Which to choose: the first where the stage moves fast or the cable is long. The skew of the
-//! second costs 48 nm at the fastest motion of a service log (4.8 mm/s; see [`ads8688`]),
+//! second costs 58 nm at the fastest motion of a service log (4.8 mm/s; see [`ads8688`]),
 //! a tenth of the Hall noise, and the only check in its frames is a signature of six bits.
 //!
 //! A driver owns an [`SpiDevice`](embedded_hal::spi::SpiDevice), which owns chip select, and the
@@ -23,22 +23,29 @@
 //! use hal_adapters::adc::{Ads8688, Channels, FrameSampler};
 //!
 //! // Mocks in place of a HAL's SPI device and pin: a frame that starts the sequence, then one
-//! // for each of the six inputs, all with code 0x8001 and the input's signature.
-//! let frame = |sent: [u8; 5], read: [u8; 5]| {
+//! // for each of the six inputs, all with code 0x8001 and the input's signature, then a register.
+//! let frame = |sent: [u8; 6], read: [u8; 6]| {
 //!     use spi::Transaction as T;
 //!     [T::transaction_start(), T::transfer_in_place(sent.to_vec(), read.to_vec()), T::transaction_end()]
 //! };
-//! let mut expected = frame([0xa0, 0, 0, 0, 0], [0; 5]).to_vec();
-//! for input in 0..6 {
-//!     expected.extend(frame([0; 5], [0, 0, 0x80, 0x01, input << 4 | 0b0100]));
-//! }
+//! let tick = |register: u8, value: u8| {
+//!     let mut frames = frame([0xa0, 0, 0, 0, 0, 0], [0; 6]).to_vec();
+//!     for input in 0..6 {
+//!         frames.extend(frame([0; 6], [0, 0, 0x80, 0x01, input << 4 | 0b0100, 0]));
+//!     }
+//!     frames.extend(frame([register << 1, 0, 0, 0, 0, 0], [0, 0, value, 0, 0, 0]));
+//!     frames
+//! };
+//! let expected = [tick(0x01, 0x3f), tick(0x02, 0xc0)].concat();
 //! let (mut bus, mut pin) = (spi::Mock::new(&expected), digital::Mock::new(&[]));
 //!
 //! let mut converter = Ads8688::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
 //! // Once: converter.start(&mut delay)?; then in every tick:
 //! converter.trigger(&mut NoopDelay::new())?;
-//! let frame = converter.sample(7, 14_000)?;
-//! assert_eq!((frame.hall, frame.capacitive, frame.sequence), ([1; 3], [1; 3], 7));
+//! // This part's reference needs 24 ms: until then there are no codes.
+//! assert!(converter.sample(0, 0).is_err());
+//! let frame = converter.sample(12, 24_000)?;
+//! assert_eq!((frame.hall, frame.capacitive, frame.sequence), ([1; 3], [1; 3], 12));
 //! # bus.done();
 //! # pin.done();
 //! # Ok::<(), hal_adapters::adc::AdcError<embedded_hal::spi::ErrorKind>>(())
@@ -80,6 +87,12 @@ pub trait FrameSampler {
     /// From the trigger until the codes can be read, us.
     const SETTLE_US: u32;
 
+    /// From the trigger to the middle of what is sampled, us.
+    const SAMPLE_US: u32;
+
+    /// Bits of a code: 16 or 24.
+    const CODE_BITS: u32;
+
     /// Resets the part, checks what it is, sets it up and reads the settings back.
     ///
     /// # Errors
@@ -92,7 +105,8 @@ pub trait FrameSampler {
     /// [`AdcError::Pin`].
     fn trigger(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<Self::Bus>>;
 
-    /// Reads the codes of one period. `sequence` and `time_us` go into the frame unchanged.
+    /// Reads the codes of one period. `sequence` and `time_us` go into the frame unchanged: the
+    /// time of the trigger plus [`SAMPLE_US`](Self::SAMPLE_US).
     /// A code at a rail is no error here: the decoder's window refuses it.
     ///
     /// # Errors
@@ -149,15 +163,20 @@ pub enum AdcError<B> {
         /// The signature that was expected.
         expected: u8,
     },
-    /// All six codes stayed the same for too long.
+    /// The codes of a sensor stayed the same for too long.
     Stuck {
+        /// The first such sensor: 0 to 2 Hall probes A to C, 3 to 5 gaps 1 to 3.
+        channel: u8,
         /// For how many periods.
         periods: u8,
     },
+    /// The trigger does not reach the part: the time of its samples is unknown.
+    NoSync,
 }
 
 impl<B> AdcError<B> {
-    /// A number for status frames, the same in every version: 1 for the first variant.
+    /// A number for status frames, the same in every version: 1 for the first variant. 9 meant
+    /// all six sensors stuck; a stuck sensor is 0x20 + its channel.
     pub const fn number(&self) -> u8 {
         match self {
             Self::Bus(_) => 1,
@@ -168,7 +187,8 @@ impl<B> AdcError<B> {
             Self::WrongCheck { .. } => 6,
             Self::NotReady { .. } => 7,
             Self::WrongInput { .. } => 8,
-            Self::Stuck { .. } => 9,
+            Self::NoSync => 10,
+            Self::Stuck { channel, .. } => 0x20 + *channel,
         }
     }
 }
@@ -210,7 +230,13 @@ impl<B: core::fmt::Debug> core::fmt::Display for AdcError<B> {
                     "a frame signed {found:#08b} came where {expected:#08b} belongs"
                 )
             }
-            Self::Stuck { periods } => write!(f, "all codes the same for {periods} periods"),
+            Self::Stuck { channel, periods } => {
+                write!(
+                    f,
+                    "codes of sensor {channel} the same for {periods} periods"
+                )
+            }
+            Self::NoSync => write!(f, "the trigger does not reach the converter"),
         }
     }
 }

@@ -35,6 +35,16 @@ pub enum Request {
     },
     /// Stop subtracting the mean of a re-zero.
     ClearZero,
+    /// Send the codes of every tick, or stop to.
+    Record {
+        /// Whether from now on they are sent.
+        on: bool,
+    },
+    /// The servo is off, and stays off for so many seconds: the stage may be re-zeroed.
+    ServoOff {
+        /// For how long, s; 0 says that the servo is on.
+        seconds: u8,
+    },
 }
 
 /// A request with the token that its answer will carry.
@@ -55,6 +65,8 @@ impl Command {
             Request::Rezero { .. } => 1,
             Request::Identify { .. } => 2,
             Request::ClearZero => 3,
+            Request::Record { .. } => 4,
+            Request::ServoOff { .. } => 5,
         };
         Self {
             request: Some(request),
@@ -67,7 +79,8 @@ impl Command {
     pub const fn payload(&self) -> Payload {
         let long = match self.request {
             Some(Request::Rezero { ticks }) => ticks as u32,
-            Some(Request::Identify { seconds }) => seconds as u32,
+            Some(Request::Identify { seconds } | Request::ServoOff { seconds }) => seconds as u32,
+            Some(Request::Record { on }) => on as u32,
             Some(Request::ClearZero) | None => 0,
         };
         Payload {
@@ -79,13 +92,14 @@ impl Command {
     /// From the 52 bits of a frame.
     pub fn from_payload(p: Payload) -> Self {
         let number = (p.short & 0xf) as u8;
-        let ticks = u16::try_from(p.long);
+        let ticks = u16::try_from(p.long).ok();
+        let seconds = u8::try_from(p.long).ok();
         let request = match (number, p.long) {
-            (1, _) => ticks.ok().map(|ticks| Request::Rezero { ticks }),
-            (2, seconds) => u8::try_from(seconds)
-                .ok()
-                .map(|seconds| Request::Identify { seconds }),
+            (1, _) => ticks.map(|ticks| Request::Rezero { ticks }),
+            (2, _) => seconds.map(|seconds| Request::Identify { seconds }),
             (3, 0) => Some(Request::ClearZero),
+            (4, 0 | 1) => Some(Request::Record { on: p.long == 1 }),
+            (5, _) => seconds.map(|seconds| Request::ServoOff { seconds }),
             _ => None,
         };
         Self {
@@ -118,10 +132,16 @@ pub enum Outcome {
     Drifted = 7,
     /// Another request is still running.
     Busy = 8,
+    /// The servo is on, or was not declared off.
+    ServoOn = 9,
+    /// The zero would lie too far away; the detail is the axis.
+    OutOfBounds = 10,
+    /// A pose lay outside the calibrated range; the detail is its status.
+    Extrapolated = 11,
 }
 
 impl Outcome {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 12] = [
         Self::Done,
         Self::Started,
         Self::UnknownCommand,
@@ -131,6 +151,9 @@ impl Outcome {
         Self::Moved,
         Self::Drifted,
         Self::Busy,
+        Self::ServoOn,
+        Self::OutOfBounds,
+        Self::Extrapolated,
     ];
 
     /// Outcome and detail of a refused re-zero.
@@ -140,6 +163,8 @@ impl Outcome {
             RezeroRefusal::NoPose { status } => (Self::NoPose, status.bits()),
             RezeroRefusal::Moved { axis, .. } => (Self::Moved, u32::from(axis)),
             RezeroRefusal::Drifted { axis, .. } => (Self::Drifted, u32::from(axis)),
+            RezeroRefusal::OutOfBounds { axis, .. } => (Self::OutOfBounds, u32::from(axis)),
+            RezeroRefusal::Extrapolated { status } => (Self::Extrapolated, status.bits()),
         }
     }
 }

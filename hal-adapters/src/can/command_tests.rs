@@ -19,6 +19,8 @@ fn an_argument_that_does_not_fit_is_an_unknown_request() {
     assert_eq!(read(1, 65536), None);
     assert_eq!(read(2, 256), None);
     assert_eq!(read(3, 1), None);
+    assert_eq!(read(4, 2), None);
+    assert_eq!(read(5, 256), None);
     assert_eq!(read(9, 0), None);
     assert_eq!(read(2, 255), Some(Request::Identify { seconds: 255 }));
 }
@@ -62,9 +64,24 @@ fn a_mailbox_reads_what_another_sent_and_refuses_a_repeat() {
     assert_eq!(node.take(&again.resized(7)), Some(Err(fault)));
 }
 
+#[test]
+fn every_request_comes_back_as_sent() {
+    for request in [
+        Request::Rezero { ticks: 65535 },
+        Request::Identify { seconds: 255 },
+        Request::ClearZero,
+        Request::Record { on: true },
+        Request::Record { on: false },
+        Request::ServoOff { seconds: 255 },
+    ] {
+        let sent = Command::new(request, 7);
+        assert_eq!(Command::from_payload(sent.payload()), sent);
+    }
+}
+
 proptest! {
     #[test]
-    fn answers_come_back_as_sent(number in 0u8..16, token: u8, outcome in 0usize..9, detail: u32) {
+    fn answers_come_back_as_sent(number in 0u8..16, token: u8, outcome in 0usize..12, detail: u32) {
         let sent = Answer { number, token, outcome: Some(Outcome::ALL[outcome]), detail };
         prop_assert_eq!(Answer::from_payload(sent.payload()), sent);
     }

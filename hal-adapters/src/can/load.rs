@@ -73,16 +73,16 @@ mod tests {
             layout,
             vertical_ticks,
         };
-        // In 16 ticks: 2 x 16 codes, 1 time, 3 x 16 planar, 3 x 4 vertical, status, health.
+        // In 16 ticks: 2 x 16 codes, 1 time, 3 x 16 planar, 3 x 4 vertical, 1 time, status, health.
         let usual = traffic(Some(Layout::Bits16), 4);
-        assert_eq!(usual.frames_in_slow_ticks(), 32 + 1 + 48 + 12 + 2);
-        assert!((usual.worst_load(1_000_000) - 0.400_78).abs() < 1e-5);
+        assert_eq!(usual.frames_in_slow_ticks(), 32 + 1 + 48 + 12 + 3);
+        assert!((usual.worst_load(1_000_000) - 0.405).abs() < 1e-5);
         // On half the rate the vertical pose goes to every 16th tick.
         let slow = traffic(Some(Layout::Bits16), 16);
-        assert!((slow.worst_load(500_000) - 0.725_63).abs() < 1e-5);
+        assert!((slow.worst_load(500_000) - 0.734_06).abs() < 1e-5);
         let wide = traffic(Some(Layout::Bits24), 16);
-        assert_eq!(wide.frames_in_slow_ticks(), 48 + 1 + 48 + 3 + 2);
+        assert_eq!(wide.frames_in_slow_ticks(), 48 + 1 + 48 + 3 + 3);
         assert!(wide.worst_load(500_000) < 0.87);
-        assert_eq!(traffic(None, 0).frames_in_slow_ticks(), 48 + 2);
+        assert_eq!(traffic(None, 0).frames_in_slow_ticks(), 48 + 3);
     }
 }

@@ -12,6 +12,7 @@ pub mod notice;
 pub mod pose;
 pub mod receiver;
 pub mod sensor;
+pub mod service;
 pub mod signals;
 pub mod status;
 pub mod table;
@@ -21,6 +22,7 @@ pub use notice::{BusFault, BusHealth, Taken, Timing};
 pub use pose::{PoseReceiver, PoseSender};
 pub use receiver::SensorReceiver;
 pub use sensor::Layout;
+pub use service::Service;
 pub use table::Message;
 
 /// Version of this protocol, as [`Message::NodeStatus`] tells it.

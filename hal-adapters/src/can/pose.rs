@@ -4,26 +4,29 @@
 //!
 //! ```
 //! use hal_adapters::can::{BusFrame, PoseReceiver, PoseSender, Timing};
-//! use runtime::Reading;
+//! use runtime::{RawFrame, Reading};
 //!
-//! let mut reading = Reading::default();
+//! let codes = RawFrame { hall: [1, 2, 3], capacitive: [4, 5, 6], sequence: 7, time_us: 14_000 };
+//! let mut reading = Reading::default(); // in its place what the decoder made of the codes
 //! reading.pose.planar.x_m = 1.5e-6;
 //! let (mut sender, mut receiver) = (PoseSender::default(), PoseReceiver::new(Timing::default()));
 //! let mut received = None;
-//! for frame in sender.frames(&reading) {
+//! for frame in sender.frames(&reading, Some(&codes)) {
 //!     let taken = receiver.take(&BusFrame::from(frame), 300);
 //!     received = received.or(taken.tick);
 //! }
-//! assert_eq!(received.and_then(|pose| pose.valid()), Some(reading.pose.planar));
+//! let pose = received.expect("three axes came");
+//! assert_eq!(pose.valid(), Some(reading.pose.planar));
+//! assert_eq!(receiver.sampled_us(&pose, 2_000), Some(14_000));
 //! ```
 
 use super::e2e::{Payload, Sequence, protect};
 use super::frame::{Coded, standard};
 use super::group::{Group, GroupTick};
 use super::notice::{BusFault, BusHealth, Taken, Timing, open};
-use super::table::{Message, VERTICAL_TICKS};
+use super::table::{Message, SLOW_TICKS, VERTICAL_TICKS};
 use embedded_can::Frame;
-use runtime::{PlanarPose, Reading, Status};
+use runtime::{PlanarPose, RawFrame, Reading, Status};
 
 /// The planar axes, in the order of the pose.
 const PLANAR: [Message; 3] = [Message::PoseX, Message::PoseY, Message::PoseRz];
@@ -50,6 +53,19 @@ pub const fn planar_frames(reading: &Reading, counter: u32) -> [Coded; 3] {
         axis_frame(Message::PoseY, counter, p.y_m, status),
         axis_frame(Message::PoseRz, counter, p.rz_rad, status),
     ]
+}
+
+/// The frame with number and time of a tick.
+const fn time_frame(sampled: &RawFrame, counter: u32) -> Coded {
+    let payload = Payload {
+        short: sampled.sequence,
+        long: sampled.time_us,
+    };
+    let message = Message::PoseTime;
+    Coded {
+        message,
+        bytes: protect(message.spec().key, counter as u8, payload),
+    }
 }
 
 /// Numbers the pose frames of one node and decides when the vertical axes are sent.
@@ -81,8 +97,14 @@ impl PoseSender {
         }
     }
 
-    /// The frames of one tick: X, Y, Rz, and the vertical axes that are due.
-    pub fn frames(&mut self, reading: &Reading) -> impl Iterator<Item = Coded> + use<> {
+    /// The frames of one tick: X, Y, Rz; in every [`SLOW_TICKS`]th tick, together with X, Y and
+    /// Rz of counter 0, number and time of `sampled`; and the vertical axes that are due.
+    /// `sampled` are the codes that were decoded; a tick without codes has no time.
+    pub fn frames(
+        &mut self,
+        reading: &Reading,
+        sampled: Option<&RawFrame>,
+    ) -> impl Iterator<Item = Coded> + use<> {
         let (tick, shift) = (self.tick, self.vertical_shift & 0xf);
         let every = 1u32 << shift;
         self.tick = tick.wrapping_add(1);
@@ -93,7 +115,14 @@ impl PoseSender {
             let turn = k.wrapping_mul(every) / 3;
             (tick & (every - 1) == turn).then(|| axis_frame(message, tick >> shift, value, status))
         });
-        planar_frames(reading, tick).into_iter().chain(vertical)
+        let slow = u32::from(SLOW_TICKS);
+        let time = sampled
+            .filter(|_| tick.is_multiple_of(slow))
+            .map(|sampled| time_frame(sampled, tick / slow));
+        planar_frames(reading, tick)
+            .into_iter()
+            .chain(time)
+            .chain(vertical)
     }
 }
 
@@ -129,10 +158,21 @@ pub struct ReceivedAxis {
     pub time_us: u32,
 }
 
+/// A tick whose time is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Dated {
+    /// Number of the tick, counted by the receiver.
+    sequence: u32,
+    /// When its codes were sampled, us of the node's clock.
+    time_us: u32,
+}
+
 /// Receives pose frames.
 #[derive(Clone, Debug)]
 pub struct PoseReceiver {
     planar: Group,
+    clock: Sequence,
+    dated: Option<Dated>,
     sequences: [Sequence; 3],
     vertical: [Option<ReceivedAxis>; 3],
 }
@@ -164,6 +204,8 @@ impl PoseReceiver {
     pub const fn new(timing: Timing) -> Self {
         Self {
             planar: Group::new(PLANAR.len(), timing),
+            clock: Sequence::START,
+            dated: None,
             sequences: [Sequence::START; 3],
             vertical: [None; 3],
         }
@@ -177,13 +219,49 @@ impl PoseReceiver {
         let is = |message: &Message| message.id() == id;
         let planar = (0usize..).zip(PLANAR).find(|(_, message)| is(message));
         if let Some((k, message)) = planar {
-            return self.planar.take(k, message, data, now_us, received);
+            let taken = self.planar.take(k, message, data, now_us, received);
+            let missed = |pose: &ReceivedPose| pose.status.any(Status::FRAMES_MISSED);
+            if taken.tick.as_ref().is_some_and(missed) {
+                self.dated = None;
+            }
+            return taken;
+        }
+        if is(&Message::PoseTime) {
+            let fault = self.take_time(data);
+            return Taken { tick: None, fault };
         }
         let fault = VERTICAL
             .iter()
             .position(is)
             .and_then(|k| self.take_vertical(k, data, now_us));
         Taken { tick: None, fault }
+    }
+
+    fn take_time(&mut self, data: &[u8]) -> Option<BusFault> {
+        let message = Message::PoseTime;
+        let (counter, payload) = match open(message, data) {
+            Ok(opened) => opened,
+            Err(fault) => return Some(self.planar.note(fault)),
+        };
+        let verdict = self.clock.judge(counter);
+        if verdict.is_used() {
+            self.dated = Some(Dated {
+                sequence: self.planar.nearest(0),
+                time_us: payload.long,
+            });
+        }
+        let fault = verdict.fault(message)?;
+        Some(self.planar.note(fault))
+    }
+
+    /// When the codes of a pose were sampled, us of the node's clock, which wraps: the last time
+    /// that it told, and one servo period for each tick since. `None` before the first time
+    /// frame and, after a tick that the node missed, until the next one: the node does not
+    /// number the ticks that it missed.
+    pub fn sampled_us(&self, pose: &ReceivedPose, period_us: u32) -> Option<u32> {
+        let dated = self.dated?;
+        let ticks = pose.sequence.wrapping_sub(dated.sequence);
+        Some(dated.time_us.wrapping_add(ticks.wrapping_mul(period_us)))
     }
 
     fn take_vertical(&mut self, k: usize, data: &[u8], time_us: u32) -> Option<BusFault> {

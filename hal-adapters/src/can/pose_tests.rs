@@ -33,7 +33,7 @@ fn the_words_of_the_decoder_come_back_to_the_bit() {
     let (mut sender, mut receiver) = (PoseSender::default(), PoseReceiver::new(Timing::default()));
     for k in 0..100 {
         let mut got = None;
-        for frame in sender.frames(&reading(k)) {
+        for frame in sender.frames(&reading(k), None) {
             let taken = receiver.take(&BusFrame::from(frame), u32::from(k) * 2_000);
             assert_eq!(taken.fault, None);
             got = got.or(taken.tick);
@@ -82,7 +82,7 @@ fn every_vertical_axis_is_sent_at_its_rate_and_numbered_without_a_gap() {
         let mut receiver = PoseReceiver::new(Timing::default());
         let mut sent = 0;
         for k in 0..64 {
-            let frames = sender.frames(&reading(k));
+            let frames = sender.frames(&reading(k), None);
             for frame in frames.skip(3) {
                 sent += 1;
                 let taken = receiver.take(&BusFrame::from(frame), 0);
@@ -91,4 +91,55 @@ fn every_vertical_axis_is_sent_at_its_rate_and_numbered_without_a_gap() {
         }
         assert_eq!(sent, 3 * 64 / every, "{asked}");
     }
+}
+
+fn codes(sequence: u32, time_us: u32) -> RawFrame {
+    RawFrame {
+        hall: [0; 3],
+        capacitive: [0; 3],
+        sequence,
+        time_us,
+    }
+}
+
+#[test]
+fn poses_between_two_time_frames_are_dated_by_their_numbers() {
+    let (mut sender, mut receiver) = (PoseSender::default(), PoseReceiver::new(Timing::default()));
+    let (mut undated, mut time_frames) = (0, 0);
+    for k in 0..100u16 {
+        // The node misses three ticks before its 40th, and tells so in the status.
+        let number = u32::from(k) + if k >= 40 { 3 } else { 0 };
+        let time_us = (u32::MAX - 50_000).wrapping_add(2_000 * number);
+        let mut reading = reading(k);
+        if k == 40 {
+            reading.status = Status::FRAMES_MISSED;
+        }
+        let mut pose = None;
+        for frame in sender.frames(&reading, Some(&codes(number, time_us))) {
+            time_frames += u32::from(frame.message == Message::PoseTime);
+            pose = pose.or(receiver.take(&BusFrame::from(frame), time_us).tick);
+        }
+        let pose = pose.expect("three axes came");
+        match receiver.sampled_us(&pose, 2_000) {
+            Some(dated_us) => assert_eq!(dated_us, time_us, "{k}"),
+            None => undated += 1,
+        }
+    }
+    assert_eq!(time_frames, 7);
+    // From the 40th to the 47th: the 48th comes with a time frame.
+    assert_eq!(undated, 8);
+}
+
+#[test]
+fn a_time_frame_worked_by_hand() {
+    let frame = time_frame(&codes(0x12_3456, 0x0102_0304), 0x15);
+    // Counter 5, the 20 low bits of the number, the time, low byte first.
+    assert_eq!(frame.bytes[1..], [0x65, 0x45, 0x23, 4, 3, 2, 1]);
+    assert_eq!(
+        PoseSender::default()
+            .frames(&reading(0), None)
+            .filter(|c| c.message == Message::PoseTime)
+            .count(),
+        0
+    );
 }

@@ -124,22 +124,27 @@ pub(super) const CAPACITIVE_23_24: [Signal; 3] = [
     code("Capacitive3", 40, 24),
 ];
 
-pub(super) const SENSOR_TIME: [Signal; 2] = [
-    signal(
-        "Sequence",
-        (12, 20),
-        U,
-        "",
-        "number of the tick, modulo 2^20",
-    ),
-    signal(
-        "Time",
-        (32, 32),
-        U,
-        "us",
-        "when its codes were sampled, wrapping",
-    ),
-];
+const fn tick_time() -> [Signal; 2] {
+    [
+        signal(
+            "Sequence",
+            (12, 20),
+            U,
+            "",
+            "number of the tick, modulo 2^20",
+        ),
+        signal(
+            "Time",
+            (32, 32),
+            U,
+            "us",
+            "when its codes were sampled, wrapping",
+        ),
+    ]
+}
+
+pub(super) const SENSOR_TIME: [Signal; 2] = tick_time();
+pub(super) const POSE_TIME: [Signal; 2] = tick_time();
 
 const fn axis(name: &'static str, unit: &'static str) -> [Signal; 2] {
     [
@@ -174,19 +179,25 @@ pub(super) const NODE_STATUS: [Signal; 6] = [
         &[(0, "starting"), (1, "running"), (2, "no parameters"), (3, "bad parameters"), (4, "no frames"), (5, "sensor fault"), (6, "self-test failed")],
     ),
     signal("Reason", (16, 8), U, "", "detail of the state, by the node; 0 for none"),
-    signal("Flags", (24, 8), U, "", "1 watchdog reset, 2 bus was off, 4 re-zero runs, 8 re-zeroed, 16 re-zero refused, 32 identifying"),
+    signal("Flags", (24, 8), U, "", "1 reset by the watchdog or on a fault, 2 bus was off, 4 re-zero runs, 8 a zero deviation is subtracted, 16 re-zero refused, 32 identifying, 64 core on its internal oscillator, 128 recording"),
     signal("MissedTicks", (32, 16), U, "", "ticks that came late or not at all; stays at 65535"),
     signal("BusOff", (48, 8), U, "", "times the bus was off; stays at 255"),
     signal("Version", (56, 8), U, "", "version of this protocol"),
 ];
 
-pub(super) const COMMANDS: &[(u8, &str)] = &[(1, "re-zero"), (2, "identify"), (3, "clear zero")];
+pub(super) const COMMANDS: &[(u8, &str)] = &[
+    (1, "re-zero"),
+    (2, "identify"),
+    (3, "clear zero"),
+    (4, "record"),
+    (5, "servo off"),
+];
 
 #[rustfmt::skip]
 pub(super) const COMMAND: [Signal; 3] = [
     named(signal("Command", (12, 4), U, "", "what is asked for"), COMMANDS),
     signal("Token", (16, 8), U, "", "chosen by the sender, another each time; returned in the answer"),
-    signal("Argument", (32, 32), U, "", "re-zero: ticks to average, 0 for the default; identify: s to blink; else 0"),
+    signal("Argument", (32, 32), U, "", "re-zero: ticks to average, 0 for the default; identify: s to blink; record: 1 on, 0 off; servo off: s, 0 for servo on; else 0"),
 ];
 
 #[rustfmt::skip]
@@ -195,13 +206,14 @@ pub(super) const ANSWER: [Signal; 4] = [
     signal("Token", (16, 8), U, "", "the token of the request"),
     named(
         signal("Outcome", (24, 8), U, "", "how it ended"),
-        &[(0, "done"), (1, "started"), (2, "unknown command"), (3, "no parameters"), (4, "too short"), (5, "no pose"), (6, "stage moved"), (7, "stage drifted"), (8, "busy")],
+        &[(0, "done"), (1, "started"), (2, "unknown command"), (3, "no parameters"), (4, "too short"), (5, "no pose"), (6, "stage moved"), (7, "stage drifted"), (8, "busy"), (9, "servo on: declare it off first"), (10, "out of bounds"), (11, "extrapolated")],
     ),
-    signal("Detail", (32, 32), U, "", "stage moved or drifted: axis, 0 to 2 for X, Y, Rz; no pose: status; else 0"),
+    signal("Detail", (32, 32), U, "", "stage moved, drifted or out of bounds: axis, 0 to 5 for X, Y, Rz, Z, Rx, Ry; no pose or extrapolated: status; else 0"),
 ];
 
-pub(super) const HEALTH: [Signal; 7] = [
-    signal("Page", (12, 4), Selector, "", "which counter"),
+#[rustfmt::skip]
+pub(super) const HEALTH: [Signal; 13] = [
+    signal("Page", (12, 4), Selector, "", "which counter, or which fact of the board"),
     paged(0, "Ticks", "ticks, with and without a frame"),
     paged(1, "PlanarInvalid", "ticks whose planar pose was invalid"),
     paged(
@@ -212,6 +224,12 @@ pub(super) const HEALTH: [Signal; 7] = [
     paged(3, "Held", "ticks in which a value was held"),
     paged(4, "FramesMissed", "servo periods without a frame"),
     paged(5, "FramesRepeated", "frames that were not new"),
+    paged(6, "LastFault", "last fault since power-on: bits 0 to 7: 0 none, 1 panic, 2 hard fault, 3 stack overflow, 4 clock failed, 5 watchdog; bits 8 to 15: step of the start-up, 0 when ticking"),
+    paged(7, "FaultAddress", "program counter of that fault"),
+    paged(8, "FaultDetail", "CFSR of that fault, or what its kind needs"),
+    paged(9, "Faults", "resets by faults since power-on"),
+    paged(10, "OptionBytes", "the word FLASH_OPTCR"),
+    paged(11, "BoardChecks", "bits: 0 no pull-up on chip select, 1 none on SYNC or RST, 2 brown-out level below 2.7 V, 3 internal oscillator, 4 CAN did not start, 5 retained zero lost"),
 ];
 
 pub(super) const IDENTITY: [Signal; 3] = [

@@ -42,18 +42,23 @@ impl NodeState {
 
 /// Flags of [`NodeStatus`], as bits.
 pub mod flag {
-    /// The last reset came from the watchdog.
+    /// The last reset came from the watchdog, or from the program on a fault: see page 6 of the
+    /// health frames.
     pub const WATCHDOG_RESET: u8 = 1;
     /// The bus was off since start.
     pub const BUS_WAS_OFF: u8 = 1 << 1;
     /// A re-zero is running.
     pub const REZERO_RUNS: u8 = 1 << 2;
-    /// A re-zero was done.
-    pub const REZEROED: u8 = 1 << 3;
+    /// A zero deviation is subtracted now.
+    pub const ZERO_SET: u8 = 1 << 3;
     /// The last re-zero was refused.
     pub const REZERO_REFUSED: u8 = 1 << 4;
     /// The node shows where it is.
     pub const IDENTIFYING: u8 = 1 << 5;
+    /// The core runs on its internal oscillator.
+    pub const INTERNAL_OSCILLATOR: u8 = 1 << 6;
+    /// The codes of every tick are sent.
+    pub const RECORDING: u8 = 1 << 7;
 }
 
 /// A frame of [`super::Message::NodeStatus`].
@@ -102,30 +107,75 @@ impl NodeStatus {
     }
 }
 
-/// One counter of [`runtime::servo::Health`], with its page.
+/// What a controller tells of its start and of its board: pages 6 to 11, in this order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BoardFacts {
+    /// The last fault that caused a reset since power-on. Bits 0 to 7: 0 none, 1 panic, 2 hard
+    /// fault, 3 stack overflow, 4 clock failed, 5 watchdog. Bits 8 to 15: the step of the
+    /// start-up that was running, 0 when ticking.
+    pub last_fault: u32,
+    /// Program counter of that fault.
+    pub fault_address: u32,
+    /// CFSR of that fault, or what its kind needs.
+    pub fault_detail: u32,
+    /// Resets by faults since power-on.
+    pub faults: u32,
+    /// The word FLASH_OPTCR.
+    pub option_bytes: u32,
+    /// Bits of [`board_check`].
+    pub board_checks: u32,
+}
+
+/// Bits of [`BoardFacts::board_checks`].
+pub mod board_check {
+    /// Chip select has no pull-up on the board.
+    pub const NO_PULL_UP_ON_SELECT: u32 = 1;
+    /// SYNC/RESET or RST/PD has no pull-up on the board.
+    pub const NO_PULL_UP_ON_CONTROL: u32 = 1 << 1;
+    /// The brown-out level is below 2.7 V.
+    pub const BROWN_OUT_LOW: u32 = 1 << 2;
+    /// The core runs on its internal oscillator: the crystal did not start, or the PLL did not lock
+    /// to it.
+    pub const INTERNAL_OSCILLATOR: u32 = 1 << 3;
+    /// The CAN controller did not start.
+    pub const CAN_NOT_STARTED: u32 = 1 << 4;
+    /// A zero deviation that was kept is lost: its record is damaged, or of another blob.
+    pub const ZERO_LOST: u32 = 1 << 5;
+}
+
+/// One counter of [`runtime::servo::Health`], or one of [`BoardFacts`], with its page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HealthPage {
-    /// Which counter, 0 to 5 in the order of the struct.
+    /// Which: 0 to 5 in the order of the counters, 6 to 11 in that of the facts.
     pub page: u8,
     /// Its value.
     pub value: u32,
 }
 
 impl HealthPage {
-    /// Pages there are.
-    pub const PAGES: u8 = 6;
-
-    /// Page `number` modulo [`HealthPage::PAGES`].
-    pub const fn of(health: &Health, number: u32) -> Self {
-        let page = (number % Self::PAGES as u32) as u8;
-        let value = match page {
-            0 => health.ticks,
-            1 => health.planar_invalid,
-            2 => health.vertical_invalid,
-            3 => health.held,
-            4 => health.frames_missed,
-            _ => health.frames_repeated,
+    /// Page `number`, modulo the pages there are: the counters, and the facts of a node that has
+    /// a board.
+    pub const fn of(health: &Health, board: Option<&BoardFacts>, number: u32) -> Self {
+        let counters = [
+            health.ticks,
+            health.planar_invalid,
+            health.vertical_invalid,
+            health.held,
+            health.frames_missed,
+            health.frames_repeated,
+        ];
+        let pages = if board.is_some() { 12 } else { 6 };
+        let page = number % pages;
+        let value = match (page, board) {
+            (6, Some(board)) => board.last_fault,
+            (7, Some(board)) => board.fault_address,
+            (8, Some(board)) => board.fault_detail,
+            (9, Some(board)) => board.faults,
+            (10, Some(board)) => board.option_bytes,
+            (11, Some(board)) => board.board_checks,
+            (page, _) => counters[(page % 6) as usize],
         };
+        let page = page as u8;
         Self { page, value }
     }
 
@@ -175,6 +225,33 @@ mod tests {
             assert_eq!(state as u8, number);
         }
         assert_eq!(NodeState::from_number(7), None);
+    }
+
+    #[test]
+    fn pages_follow_the_order_of_the_counters_and_of_the_facts() {
+        let health = Health {
+            ticks: 100,
+            planar_invalid: 101,
+            vertical_invalid: 102,
+            held: 103,
+            frames_missed: 104,
+            frames_repeated: 105,
+        };
+        let board = BoardFacts {
+            last_fault: 106,
+            fault_address: 107,
+            fault_detail: 108,
+            faults: 109,
+            option_bytes: 110,
+            board_checks: 111,
+        };
+        for number in 0..24 {
+            let page = HealthPage::of(&health, Some(&board), number);
+            let want = number % 12;
+            assert_eq!((u32::from(page.page), page.value), (want, 100 + want));
+            let page = HealthPage::of(&health, None, number);
+            assert_eq!(u32::from(page.page), number % 6);
+        }
     }
 
     proptest! {

@@ -41,6 +41,8 @@ pub enum Message {
     Health,
     /// Serial number of the stage, six characters a page.
     Identity,
+    /// Number and time of the tick whose pose was just sent.
+    PoseTime,
 }
 
 /// Who sends a message.
@@ -123,8 +125,8 @@ const fn row(
 use Message as M;
 use Node::{Decoder, Host, Sensor};
 
-/// Ticks between two frames of [`Message::SensorTime`], [`Message::NodeStatus`] and
-/// [`Message::Health`].
+/// Ticks between two frames of [`Message::SensorTime`], [`Message::PoseTime`],
+/// [`Message::NodeStatus`] and [`Message::Health`].
 pub const SLOW_TICKS: u8 = 16;
 
 /// Default of the vertical pose: each axis in every fourth tick.
@@ -139,7 +141,7 @@ const VERTICAL: Rate = Rate::Decimated(VERTICAL_TICKS);
 /// Any two identifiers differ in at least four bits, so three flipped bits never turn one
 /// message into another. Every message has eight bytes.
 #[rustfmt::skip]
-pub const TABLE: [Spec; 17] = [
+pub const TABLE: [Spec; 18] = [
     row(M::Hall, "Hall", (0x100, 0x0d), (Sensor, EVERY), "Hall codes of 16 bits", &signals::HALL),
     row(M::Capacitive, "Capacitive", (0x10f, 0x1a), (Sensor, EVERY), "capacitive codes of 16 bits", &signals::CAPACITIVE),
     row(M::HallAb24, "HallAb24", (0x133, 0x27), (Sensor, EVERY), "second layout: Hall codes A and B of up to 24 bits", &signals::HALL_AB_24),
@@ -157,6 +159,7 @@ pub const TABLE: [Spec; 17] = [
     row(M::Answer, "Answer", (0x1f0, 0xc3), (Decoder, Rate::OnRequest), "how a request ended", &signals::ANSWER),
     row(M::Health, "Health", (0x1ff, 0xd0), (Decoder, SLOW), "counters since start, one a frame", &signals::HEALTH),
     row(M::Identity, "Identity", (0x203, 0xdd), (Decoder, Rate::OnRequest), "serial number of the stage, six characters a page", &signals::IDENTITY),
+    row(M::PoseTime, "PoseTime", (0x20c, 0xea), (Decoder, SLOW), "number and time of the tick whose X, Y, Rz came before it", &signals::POSE_TIME),
 ];
 
 /// Bytes of every message.

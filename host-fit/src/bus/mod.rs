@@ -1,5 +1,6 @@
-//! The stage on a CAN bus: decoded as it comes, played from a log, made into a log.
+//! The stage on a CAN bus: decoded as it comes, recorded, played from a log, made into a log.
 
 pub mod import;
 pub mod live;
+pub mod recorder;
 pub mod replay;

@@ -11,6 +11,7 @@ use clap::builder::PossibleValue;
 use hal_adapters::can::Layout;
 use runtime::OnInvalid;
 use std::str::FromStr;
+use std::time::Duration;
 
 /// How many rows are fitted: a number, or `None` for `all`.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +26,14 @@ impl FromStr for Train {
             (_, Ok(rows)) if rows > 0 => Ok(Self(Some(rows))),
             _ => Err("expected `all` or a number of rows, 1 or more"),
         }
+    }
+}
+
+/// How long a bus is watched.
+pub(super) fn seconds(text: &str) -> Result<Duration, &'static str> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(Duration::from_secs_f64(seconds)),
+        _ => Err("expected a number of seconds above 0"),
     }
 }
 
@@ -141,7 +150,7 @@ impl ValueEnum for BadRows {
 /// How codes are put into frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum LayoutChoice {
-    /// The narrowest that holds the converters' codes.
+    /// As the converters' codes, or the record, need it.
     Auto,
     /// 16 bits: two frames a tick.
     #[value(name = "16")]
@@ -152,7 +161,7 @@ pub(super) enum LayoutChoice {
 }
 
 impl LayoutChoice {
-    /// The layout; `None` for the narrowest that holds the codes.
+    /// The layout; `None` for the one that is needed.
     pub(super) const fn layout(self) -> Option<Layout> {
         match self {
             Self::Auto => None,

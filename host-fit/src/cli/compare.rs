@@ -16,6 +16,10 @@ use crate::solve::search::kind::SearchKind;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
+const TABLE: &str = "table.md";
+const RUNS: &str = "runs.csv";
+const HISTORY: &str = "history.csv";
+
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub(super) struct CompareArgs {
@@ -67,8 +71,16 @@ pub(super) struct CompareArgs {
 pub(super) fn run(args: &CompareArgs) -> Result<(), HostError> {
     super::use_threads(args.threads);
     if let Some(folder) = &args.out {
+        let names = args.project.iter().flat_map(|form| {
+            [Course::Convergence, Course::P].map(|course| plot_name(course, *form))
+        });
+        let tables = [TABLE, RUNS, HISTORY].map(str::to_owned);
+        let files: Vec<_> = names.chain(tables).map(|name| folder.join(name)).collect();
+        let outputs: Vec<_> = files.iter().map(|file| Some(file.as_path())).collect();
+        let inputs = args.logs.iter().chain([&args.stage]);
+        super::keep_apart(&outputs, &inputs.map(PathBuf::as_path).collect::<Vec<_>>())?;
         make_folder(folder)?;
-        check_writable(&folder.join("table.md"))?;
+        check_writable(&folder.join(TABLE))?;
     }
     let stage = Stage::from_file(&args.stage)?;
     let options = ReadOptions {
@@ -118,14 +130,21 @@ fn write(
 ) -> Result<(), HostError> {
     make_folder(folder)?;
     let file = |name: &str, text: &str| write_atomically(&folder.join(name), text.as_bytes());
-    file("table.md", table)?;
-    file("runs.csv", &runs_csv(runs))?;
-    file("history.csv", &history_csv(runs))?;
+    file(TABLE, table)?;
+    file(RUNS, &runs_csv(runs))?;
+    file(HISTORY, &history_csv(runs))?;
     for &form in &comparison.forms {
-        for (course, name) in [(Course::Convergence, "convergence"), (Course::P, "p")] {
-            let svg = plot(runs, form, course)?;
-            file(&format!("{name}-{}.svg", form.name()), &svg)?;
+        for course in [Course::Convergence, Course::P] {
+            file(&plot_name(course, form), &plot(runs, form, course)?)?;
         }
     }
     Ok(())
+}
+
+fn plot_name(course: Course, form: Case) -> String {
+    let course = match course {
+        Course::Convergence => "convergence",
+        Course::P => "p",
+    };
+    format!("{course}-{}.svg", form.name())
 }

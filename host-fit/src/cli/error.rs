@@ -12,6 +12,7 @@
 
 use crate::bus::import::ImportError;
 use crate::bus::live::LiveError;
+use crate::bus::recorder::RecorderError;
 use crate::bus::replay::ReplayError;
 use crate::fit::FitError;
 use crate::input::log::LogError;
@@ -155,6 +156,9 @@ pub enum HostError {
     /// `live` ended early.
     #[error(transparent)]
     Live(#[from] LiveError),
+    /// There is no record of the bus, or none to calibrate by.
+    #[error(transparent)]
+    Recorder(#[from] RecorderError),
     /// `replay` ended early.
     #[error(transparent)]
     Replay(#[from] ReplayError),
@@ -199,6 +203,7 @@ impl HostError {
             | Self::Import(_)
             | Self::Export(_)
             | Self::Live(_)
+            | Self::Recorder(_)
             | Self::Replay(_)
             | Self::PlanFile(_)
             | Self::Record(_)

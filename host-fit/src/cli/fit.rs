@@ -1,6 +1,6 @@
 //! `host-fit fit`.
 
-use self::told::{summary, write_report};
+use self::told::{add_report, summary};
 use super::args::Train;
 use super::check::Checked;
 use super::limit::Limits;
@@ -14,11 +14,12 @@ use crate::input::log::{BadRows, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
 use crate::output;
-use crate::output::{blob_file, posterior_file};
+use crate::output::{Outputs, blob_file, posterior_file};
 use crate::problem::draw::Draw;
 use crate::problem::model::MODELS;
 use crate::problem::parameters::Parameters;
 use crate::recalibrate::Known;
+use crate::report;
 use crate::report::json::{Choice, Circumstances, of_fit};
 use crate::report::verdict::End;
 use crate::solve::robust::Loss;
@@ -141,11 +142,12 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         .map(PathBuf::as_path)
         .collect();
     let posterior = posterior_file::beside(&args.out);
+    let page = args.report.as_deref().map(report::page_in);
     let outputs = [
         Some(args.out.as_path()),
         posterior.as_deref(),
         args.json.as_deref(),
-        args.report.as_deref(),
+        page.as_deref(),
     ];
     super::keep_apart(&outputs, &inputs)?;
     check_field_arguments(args)?;
@@ -221,8 +223,10 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
             });
         }
         Err(error) => {
+            let mut outputs = Outputs::default();
             if let Some(path) = &args.json {
-                super::write_json(&Checked::new(&log, Err(&error), findings.clone()), path)?;
+                let checked = Checked::new(&log, Err(&error), findings.clone());
+                outputs.add(path, super::json(&checked)?.as_bytes())?;
             }
             let ended = super::check::failed(error, &findings);
             let why = match (&ended, findings.first()) {
@@ -234,7 +238,9 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
                 }
                 _ => ended.to_string(),
             };
-            write_report(args, (&log, &stage), &findings, None, End::Failed(&why))?;
+            let end = (End::Failed(&why), &[][..]);
+            add_report(&mut outputs, args, (&log, &stage), &findings, None, end)?;
+            outputs.commit()?;
             return Err(ended);
         }
         Ok(fit) => fit,
@@ -266,37 +272,48 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
             }
         }
     }
+    let mut outputs = Outputs::default();
+    if let Some(path) = &args.json {
+        outputs.add(path, super::json(&report)?.as_bytes())?;
+    }
+    let found = Some((&fit, &report));
     match refusal {
         Some(cause) if args.force => {
             terminal::warn(&[format!("written all the same, as --force asks: {cause}")]);
         }
         Some(cause) => {
-            if let Some(path) = &args.json {
-                super::write_json(&report, path)?;
-            }
-            let end = End::Failed(&cause);
-            let found = Some((&fit, &report));
-            write_report(args, (&log, &stage), &report.findings, found, end)?;
+            let end = (End::Failed(&cause), &[][..]);
+            let findings = &report.findings;
+            add_report(&mut outputs, args, (&log, &stage), findings, found, end)?;
+            outputs.commit()?;
             terminal::tell(&report.findings);
             return Err(HostError::NotWritten { cause });
         }
         None => {}
     }
-    if let (Some(field), Some(path)) = (&fit.field, &posterior) {
-        posterior_file::write(path, &fit.set, &Known::of_fit(field))?;
-    }
-    blob_file::write(&args.out, &fit.set)?;
-    if let Some(path) = &args.json {
-        super::write_json(&report, path)?;
-    }
     let end = match interrupt::requested() {
         true => End::Interrupted,
         false => End::Written,
     };
-    let found = Some((&fit, &report));
-    write_report(args, (&log, &stage), &report.findings, found, end)?;
+    let blob = blob_file::to_bytes(&args.out, &fit.set)?;
+    let findings = &report.findings;
+    add_report(
+        &mut outputs,
+        args,
+        (&log, &stage),
+        findings,
+        found,
+        (end, &blob),
+    )?;
+    if let (Some(field), Some(path)) = (&fit.field, &posterior) {
+        let known = posterior_file::to_bytes(path, &fit.set, &Known::of_fit(field))?;
+        outputs.add(path, &known)?;
+    }
+    // The blob last: it is what the stage takes.
+    outputs.add(&args.out, &blob)?;
+    outputs.commit()?;
     terminal::print(&summary(&fit, &report, &stage))?;
-    let page = args.report.as_ref().map(|folder| folder.join("index.html"));
+    let page = args.report.as_deref().map(report::page_in);
     let beside = posterior.filter(|_| fit.field.is_some());
     super::wrote([Some(args.out.clone()), beside, args.json.clone(), page])?;
     terminal::warn(&circumstances.warnings);

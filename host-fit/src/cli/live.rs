@@ -1,6 +1,6 @@
 //! `host-fit live`.
 
-use super::args::on_invalid;
+use super::args::{on_invalid, seconds};
 use crate::bus::live::{self, LiveSettings};
 use crate::cli::error::HostError;
 use clap::Args;
@@ -50,13 +50,6 @@ fn vertical_ticks(text: &str) -> Result<u8, &'static str> {
     match text.parse() {
         Ok(ticks @ (1 | 2 | 4 | 8 | 16)) => Ok(ticks),
         _ => Err("expected 1, 2, 4, 8 or 16"),
-    }
-}
-
-fn seconds(text: &str) -> Result<Duration, &'static str> {
-    match text.parse::<f64>() {
-        Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(Duration::from_secs_f64(seconds)),
-        _ => Err("expected a number of seconds above 0"),
     }
 }
 

@@ -18,6 +18,7 @@ mod limit;
 mod live;
 mod plan;
 mod recalibrate;
+mod record;
 mod replay;
 mod shell;
 mod simulate;
@@ -72,6 +73,8 @@ enum Command {
     Diff(diff::DiffArgs),
     /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
     Live(live::LiveArgs),
+    /// Record the codes of a controller's own converter from a CAN bus, for a calibration (Linux).
+    Record(record::RecordArgs),
     /// Play a log onto a CAN bus as the sensor node would send it (Linux).
     Replay(replay::ReplayArgs),
     /// Write a parameter blob as the file that a flash tool takes.
@@ -116,6 +119,7 @@ pub fn main() -> ExitCode {
         Command::Inspect(args) => inspect::run(&args),
         Command::Diff(args) => diff::run(&args),
         Command::Live(args) => live::run(args),
+        Command::Record(args) => record::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Export(args) => export::run(&args),
         Command::Compare(args) => compare::run(&args),
@@ -138,9 +142,14 @@ pub fn main() -> ExitCode {
 
 /// Writes a report as JSON to a file, or to standard output for `-`.
 fn write_json(report: &impl serde::Serialize, path: &Path) -> Result<(), HostError> {
+    Ok(write_atomically(path, json(report)?.as_bytes())?)
+}
+
+/// A report as JSON.
+fn json(report: &impl serde::Serialize) -> Result<String, HostError> {
     let mut text = serde_json::to_string_pretty(report)?;
     text.push('\n');
-    Ok(write_atomically(path, text.as_bytes())?)
+    Ok(text)
 }
 
 /// Says which files were written.

@@ -3,8 +3,9 @@
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::input::stage::Stage;
-use crate::output::{check_writable, make_folder, write_atomically};
+use crate::output::{Outputs, check_writable, make_folder};
 use crate::plan::plan;
+use crate::report;
 use crate::report::plan::PlanReport;
 use crate::report::plan_page::PlanPage;
 use crate::simulate::plan_file;
@@ -49,7 +50,8 @@ pub(super) struct PlanArgs {
 /// Plans; then writes trajectory, JSON and page, in this order.
 pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     let (out, json) = (args.out.as_deref(), args.json.as_deref());
-    super::keep_apart(&[out, json, args.report.as_deref()], &[&args.stage])?;
+    let page = args.report.as_deref().map(report::page_in);
+    super::keep_apart(&[out, json, page.as_deref()], &[&args.stage])?;
     for path in [out, json].into_iter().flatten() {
         check_writable(path)?;
     }
@@ -67,21 +69,22 @@ pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
         });
     }
     let plan = plan(&stage, args.seconds)?;
-    let report = PlanReport::new(&plan, &stage);
+    let figures = PlanReport::new(&plan, &stage);
+    let mut outputs = Outputs::default();
     if let Some(path) = out {
         let trajectory = plan.run.trajectory(stage.servo_period_s);
         let csv = plan_file::to_csv(&trajectory, stage.servo_period_s);
-        write_atomically(path, csv.as_bytes())?;
+        outputs.add(path, csv.as_bytes())?;
     }
     if let Some(path) = json {
-        super::write_json(&report, path)?;
+        outputs.add(path, super::json(&figures)?.as_bytes())?;
     }
-    if let Some(folder) = &args.report {
-        let page = PlanPage::new(&report, &plan)?.to_html()?;
+    if let (Some(folder), Some(path)) = (&args.report, &page) {
+        let page = PlanPage::new(&figures, &plan)?.to_html()?;
         make_folder(folder)?;
-        write_atomically(&folder.join("index.html"), page.as_bytes())?;
+        outputs.add(path, page.as_bytes())?;
     }
-    terminal::print(&report.text())?;
-    let page = args.report.as_ref().map(|folder| folder.join("index.html"));
+    outputs.commit()?;
+    terminal::print(&figures.text())?;
     super::wrote([args.out.clone(), args.json.clone(), page])
 }

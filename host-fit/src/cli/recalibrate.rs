@@ -6,7 +6,7 @@ use crate::fit::FitWarning;
 use crate::input::log::{self, LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::output::posterior_file::PosteriorFileError;
-use crate::output::{blob_file, check_writable, posterior_file};
+use crate::output::{Outputs, blob_file, check_writable, posterior_file};
 use crate::problem::model::Model;
 use crate::recalibrate::{Known, RecalibrateError, Recalibration, recalibrate};
 use crate::report::errors::Errors;
@@ -155,15 +155,18 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         args.what,
         created,
     )?;
-    // The blob last: it is what the stage takes, and a posterior without its blob is refused.
-    if let (Some(known), Some(path)) = (&new.known, &new_posterior) {
-        posterior_file::write(path, &new.set, known)?;
-    }
-    blob_file::write(&args.out, &new.set)?;
     let warnings = warnings(&log, &new);
+    let mut outputs = Outputs::default();
     if let Some(path) = json {
-        super::write_json(&report(args.what, &new, &log, &warnings), path)?;
+        let report = report(args.what, &new, &log, &warnings);
+        outputs.add(path, super::json(&report)?.as_bytes())?;
     }
+    if let (Some(known), Some(path)) = (&new.known, &new_posterior) {
+        outputs.add(path, &posterior_file::to_bytes(path, &new.set, known)?)?;
+    }
+    // The blob last: it is what the stage takes, and a posterior without its blob is refused.
+    outputs.add(&args.out, &blob_file::to_bytes(&args.out, &new.set)?)?;
+    outputs.commit()?;
     terminal::print(&summary(args.what, &new, &log))?;
     let beside = new_posterior.filter(|_| new.known.is_some());
     super::wrote([Some(args.out.clone()), beside, args.json.clone()])?;

@@ -72,9 +72,17 @@ pub fn read(path: &Path) -> Result<ParameterSet, BlobFileError> {
 /// # Errors
 /// [`OutputError`] when the file cannot be written.
 pub fn write(path: &Path, set: &ParameterSet) -> Result<(), OutputError> {
+    write_atomically(path, &to_bytes(path, set)?)
+}
+
+/// The blob of a set, to be written to `path`.
+///
+/// # Errors
+/// [`OutputError::Failed`], which no set that [`write`] would take leads to.
+pub fn to_bytes(path: &Path, set: &ParameterSet) -> Result<Vec<u8>, OutputError> {
     let mut buffer = [0; MAX_BYTES];
     match set.to_bytes(&mut buffer) {
-        Ok(bytes) => write_atomically(path, bytes),
+        Ok(bytes) => Ok(bytes.to_vec()),
         // The buffer has the size that every blob fits into.
         Err(cause) => Err(OutputError::Failed {
             path: path.to_owned(),

@@ -5,6 +5,7 @@
 
 pub mod blob_file;
 pub mod export;
+pub mod growing_file;
 pub mod pose_file;
 pub mod posterior_file;
 
@@ -83,16 +84,86 @@ pub enum OutputError {
 /// # Errors
 /// Every variant of [`OutputError`].
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    if is_standard(path) {
-        return write_standard(path, bytes);
+    let mut outputs = Outputs::default();
+    outputs.add(path, bytes)?;
+    outputs.commit()
+}
+
+/// The outputs of one command: all are written, or none. Dropped, it leaves nothing behind.
+#[derive(Default)]
+pub struct Outputs {
+    staged: Vec<Staged>,
+}
+
+/// An output on its way.
+enum Staged {
+    /// What cannot be replaced, as the user named it, and its bytes.
+    Stream(PathBuf, Vec<u8>),
+    /// A new file beside its target, with all bytes on the disk.
+    File {
+        named: PathBuf,
+        target: PathBuf,
+        file: tempfile::NamedTempFile,
+    },
+}
+
+impl Outputs {
+    /// Writes the bytes of `path` beside it, as [`write_atomically`] does before its last step.
+    ///
+    /// # Errors
+    /// Every variant of [`OutputError`].
+    pub fn add(&mut self, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+        let named = path.to_path_buf();
+        if is_standard(path) {
+            self.staged.push(Staged::Stream(named, bytes.to_vec()));
+            return Ok(());
+        }
+        let (target, existing) = resolve(path)?;
+        if existing
+            .as_ref()
+            .is_some_and(|metadata| is_stream(path, metadata))
+        {
+            self.staged.push(Staged::Stream(named, bytes.to_vec()));
+            return Ok(());
+        }
+        let folder = folder_of(&target);
+        let file = written(&folder, bytes, existing)
+            .map_err(|source| explain(source, path, &folder, bytes.len()))?;
+        self.staged.push(Staged::File {
+            named,
+            target,
+            file,
+        });
+        Ok(())
     }
-    let (target, existing) = resolve(path)?;
-    let explain = |source| explain(source, path, &folder_of(&target), bytes.len());
-    match existing {
-        Some(metadata) if is_stream(path, &metadata) => write_through(path, bytes),
-        existing => replace(&target, bytes, existing),
+
+    /// Puts everything in its place, in the order in which it was added; streams first, since only
+    /// they can still be full.
+    ///
+    /// # Errors
+    /// Every variant of [`OutputError`].
+    pub fn commit(self) -> Result<(), OutputError> {
+        for staged in &self.staged {
+            match staged {
+                Staged::Stream(path, bytes) if is_standard(path) => write_standard(path, bytes)?,
+                Staged::Stream(path, bytes) => write_through(path, bytes)
+                    .map_err(|source| explain(source, path, &folder_of(path), bytes.len()))?,
+                Staged::File { .. } => {}
+            }
+        }
+        for staged in self.staged {
+            if let Staged::File {
+                named,
+                target,
+                file,
+            } = staged
+            {
+                persist(file, &target)
+                    .map_err(|source| explain(source, &named, &folder_of(&target), 0))?;
+            }
+        }
+        Ok(())
     }
-    .map_err(explain)
 }
 
 /// Whether a name means standard output, or standard input: `-`.
@@ -174,7 +245,8 @@ fn resolve(path: &Path) -> Result<(PathBuf, Option<Metadata>), OutputError> {
 /// Whether `path` is something to write to, not to replace: a device, a pipe, or the
 /// standard output under its name in the file system, which a shell may have led to a file.
 fn is_stream(path: &Path, metadata: &Metadata) -> bool {
-    let named_stream = cfg!(unix) && (path.starts_with("/dev") || path.starts_with("/proc"));
+    let names = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc/self/fd"];
+    let named_stream = cfg!(unix) && names.iter().any(|name| path.starts_with(name));
     named_stream || !metadata.is_file()
 }
 
@@ -207,20 +279,33 @@ fn temporary(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
         .map_err(|error| std::io::Error::from(error.kind()))
 }
 
-/// Puts a new file in the place of `target`.
-fn replace(target: &Path, bytes: &[u8], existing: Option<Metadata>) -> std::io::Result<()> {
-    let folder = folder_of(target);
-    let mut file = temporary(&folder)?;
+/// A new file in `folder` with these bytes, on the disk.
+fn written(
+    folder: &Path,
+    bytes: &[u8],
+    existing: Option<Metadata>,
+) -> std::io::Result<tempfile::NamedTempFile> {
+    let mut file = temporary(folder)?;
     file.as_file_mut().write_all(bytes)?;
+    complete(&file, existing)?;
+    Ok(file)
+}
+
+/// Gives a file the permissions of the one that it replaces, and waits until it is on the disk.
+fn complete(file: &tempfile::NamedTempFile, existing: Option<Metadata>) -> std::io::Result<()> {
     if let Some(metadata) = existing {
         file.as_file().set_permissions(metadata.permissions())?;
     }
-    file.as_file().sync_all()?;
+    file.as_file().sync_all()
+}
+
+/// Puts a new file in the place of `target`.
+fn persist(file: tempfile::NamedTempFile, target: &Path) -> std::io::Result<()> {
     file.persist(target).map_err(|error| error.error)?;
     // The name is on the disk too once its folder is. Not every file system can do it, and
     // the file itself is safe already.
     #[cfg(unix)]
-    let _ = fs::File::open(&folder).and_then(|folder| folder.sync_all());
+    let _ = fs::File::open(folder_of(target)).and_then(|folder| folder.sync_all());
     Ok(())
 }
 

@@ -13,7 +13,7 @@
 //! | 100 | 26,568 | covariance of the 81 parameters, the lower triangle row by row, as `f64` |
 //! | 26,668 | 32 | SHA-256 of everything before it |
 
-use crate::output::{OutputError, is_standard, is_stream, write_atomically};
+use crate::output::{OutputError, is_standard, is_stream};
 use crate::recalibrate::Known;
 use crate::solve::field::terms::COUNT;
 use crate::solve::field::whiten::Noise;
@@ -84,16 +84,16 @@ pub fn beside(blob: &Path) -> Option<PathBuf> {
     Some(name.into())
 }
 
-/// Writes what is known beside the blob of `set`, whole or not at all.
+/// What is known beside the blob of `set`, as bytes of the file `path`.
 ///
 /// # Errors
-/// [`OutputError`] when the file cannot be written.
-pub fn write(path: &Path, set: &ParameterSet, known: &Known) -> Result<(), OutputError> {
+/// [`OutputError::Failed`] where the set makes no blob.
+pub fn to_bytes(path: &Path, set: &ParameterSet, known: &Known) -> Result<Vec<u8>, OutputError> {
     let hash = blob_hash(set).map_err(|cause| OutputError::Failed {
         path: path.to_owned(),
         source: std::io::Error::other(cause),
     })?;
-    write_atomically(path, &to_bytes(&hash, known))
+    Ok(encode(&hash, known))
 }
 
 /// Reads what is known beside the blob `set`, which was read from `blob`.
@@ -135,7 +135,7 @@ fn blob_hash(set: &ParameterSet) -> Result<[u8; HASH_BYTES], runtime::BlobError>
     Ok(Sha256::digest(set.to_bytes(&mut buffer)?).into())
 }
 
-fn to_bytes(blob: &[u8; HASH_BYTES], known: &Known) -> Vec<u8> {
+fn encode(blob: &[u8; HASH_BYTES], known: &Known) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(BYTES);
     bytes.extend(MAGIC);
     bytes.extend(VERSION.to_le_bytes());
@@ -223,14 +223,14 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read() {
-        let bytes = to_bytes(&[7; HASH_BYTES], &known());
+        let bytes = encode(&[7; HASH_BYTES], &known());
         assert_eq!(bytes.len(), 26_700);
         assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], known())));
     }
 
     #[test]
     fn what_is_damaged_cut_or_no_covariance_is_refused() {
-        let bytes = to_bytes(&[7; HASH_BYTES], &known());
+        let bytes = encode(&[7; HASH_BYTES], &known());
         for place in (0..bytes.len()).step_by(997).chain([9, bytes.len() - 1]) {
             let mut damaged = bytes.clone();
             damaged[place] ^= 0x10;
@@ -245,7 +245,7 @@ mod tests {
             known.covariance[(3, 2)] = value;
             known.covariance[(2, 3)] = value;
             known.covariance[(2, 2)] = value.min(1e-12);
-            let sound = from_bytes(&to_bytes(&[7; HASH_BYTES], &known));
+            let sound = from_bytes(&encode(&[7; HASH_BYTES], &known));
             assert!(sound.is_err(), "{value}");
         }
     }

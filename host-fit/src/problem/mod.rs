@@ -12,6 +12,13 @@ use crate::input::stage::Stage;
 use model::{Model, SLOPES_MAX};
 use std::ops::Range;
 
+/// Rows that a thinned problem takes of a movement at least, if it moves.
+const MOVING_ROWS_MIN: usize = 8;
+/// Rows that a thinned problem takes of a movement that stands still.
+const IDLE_ROWS: usize = 2;
+/// A movement of less than this share of the largest one stands still.
+const IDLE_SHARE: f64 = 0.01;
+
 /// One row of the problem, in um, um, urad for the fit, so that residuals and gains are of the
 /// order of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,14 +92,21 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The problem on about `most` of its rows, evenly from each movement.
+    /// The problem on about `most` of its rows: the same number from each movement that moves,
+    /// evenly, and at least [`MOVING_ROWS_MIN`], since fewer rows would say little beside the zero
+    /// deviation that they share; [`IDLE_ROWS`] from each that does not.
     #[must_use]
     pub fn thinned(&self, most: usize) -> Self {
-        let stride = self.rows.len().div_ceil(most).max(1);
-        let mut rows = Vec::with_capacity(self.rows.len() / stride + self.groups.len());
+        let moved: Vec<f64> = self.groups.iter().map(|group| self.moved(group)).collect();
+        let idle = IDLE_SHARE * moved.iter().copied().fold(0.0, f64::max);
+        let moving = moved.iter().filter(|moved| **moved > idle).count();
+        let quota = (most / moving.max(1)).max(MOVING_ROWS_MIN);
+        let mut rows = Vec::with_capacity(most);
         let mut groups = Vec::with_capacity(self.groups.len());
-        for group in &self.groups {
+        for (group, moved) in self.groups.iter().zip(&moved) {
             let from = rows.len();
+            let rows_wanted = if *moved > idle { quota } else { IDLE_ROWS };
+            let stride = group.rows.len().div_ceil(rows_wanted).max(1);
             rows.extend(self.rows[group.rows.clone()].iter().step_by(stride));
             groups.push(Group {
                 movement: group.movement,
@@ -104,6 +118,18 @@ impl<'a> Problem<'a> {
             groups,
             ..*self
         }
+    }
+
+    /// How far a movement moves: the largest range of X, Y (um) and Rz (urad) by the reference.
+    fn moved(&self, group: &Group) -> f64 {
+        let rows = &self.rows[group.rows.clone()];
+        let range = |axis: usize| {
+            let values = rows.iter().map(|row| row.reference_um[axis]);
+            let bounds = (f64::INFINITY, f64::NEG_INFINITY);
+            let (low, high) = values.fold(bounds, |(low, high), x| (low.min(x), high.max(x)));
+            high - low
+        };
+        (0..3).map(range).fold(0.0, f64::max)
     }
 
     /// The fitness of the paper, as this project defines it: the root of the mean over rows and
@@ -123,5 +149,44 @@ impl TrainRow {
             reference_um: row.reference.map(|q| q * 1e6),
             weight: 1.0,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::dataset::Movement;
+    use crate::input::shipped::STAGE_TOML;
+    use runtime::ModelKind;
+
+    #[test]
+    fn thinning_leaves_rows_to_every_movement_that_moves() {
+        let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+        let truth = parameters::Parameters::designed(&stage);
+        let mut dataset = synthetic::Protocol::exact(truth, 20).dataset(&stage);
+        // A stage that was left standing for ten times as long as all movements took.
+        let moving = dataset.rows.len();
+        dataset.rows.resize(11 * moving, dataset.rows[0]);
+        for row in &mut dataset.rows[moving..] {
+            row.movement = dataset.movements.len();
+        }
+        dataset.movements.push(Movement {
+            log: 0,
+            index: 57,
+            rows: moving..11 * moving,
+        });
+        let all: Vec<usize> = (0..dataset.rows.len()).collect();
+        let problem = Problem::new(&dataset, &all, &stage, Model::of(ModelKind::M31));
+        let sizes = |most| -> Vec<usize> {
+            let thinned = problem.thinned(most);
+            thinned
+                .groups
+                .iter()
+                .map(|group| group.rows.len())
+                .collect()
+        };
+        // 2,000 rows are enough for all of the 57 that move; 100 are not, and are exceeded.
+        assert_eq!(sizes(2000), [vec![20; 57], vec![2]].concat());
+        assert_eq!(sizes(100), [vec![7; 57], vec![2]].concat());
     }
 }

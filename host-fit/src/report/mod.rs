@@ -17,3 +17,10 @@ mod series;
 mod tables;
 pub mod text;
 pub mod verdict;
+
+use std::path::{Path, PathBuf};
+
+/// The one file of a report in `folder`.
+pub fn page_in(folder: &Path) -> PathBuf {
+    folder.join("index.html")
+}

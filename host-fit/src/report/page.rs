@@ -17,9 +17,7 @@ use crate::fit::Fit;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::statistics::white_noise;
-use crate::output;
 use serde::Serialize;
-use std::path::Path;
 
 /// What a report is made of.
 #[derive(Clone, Debug)]
@@ -87,20 +85,6 @@ struct Page<'a> {
 }
 
 impl Source<'_> {
-    /// Writes `index.html` into a folder, which is made if it is missing. The same source gives the
-    /// same bytes.
-    ///
-    /// # Errors
-    /// [`PageError`] when the page cannot be drawn or written.
-    pub fn write(&self, folder: &Path) -> Result<(), PageError> {
-        let page = self.html()?;
-        output::make_folder(folder)?;
-        Ok(output::write_atomically(
-            &folder.join("index.html"),
-            page.as_bytes(),
-        )?)
-    }
-
     /// The page.
     ///
     /// # Errors

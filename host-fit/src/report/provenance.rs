@@ -48,12 +48,17 @@ impl Provenance {
     /// Adds a file by its bytes; nothing where it cannot be read any more.
     pub fn add_file(&mut self, path: &Path, what: &str) {
         if let Ok(bytes) = std::fs::read(path) {
-            self.inputs.push(Input {
-                name: path.display().to_string(),
-                what: what.to_owned(),
-                sha256: hex(&Sha256::digest(bytes)),
-            });
+            self.add_bytes(path, &bytes, what);
         }
+    }
+
+    /// Adds a file with these bytes.
+    pub fn add_bytes(&mut self, path: &Path, bytes: &[u8], what: &str) {
+        self.inputs.push(Input {
+            name: path.display().to_string(),
+            what: what.to_owned(),
+            sha256: hex(&Sha256::digest(bytes)),
+        });
     }
 
     /// Adds the logs. They have one hash, which the blob holds too.

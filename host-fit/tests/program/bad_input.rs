@@ -369,3 +369,37 @@ fn wrong_usage_ends_with_status_2() {
     ]);
     assert_eq!(long.status.code(), Some(2));
 }
+
+#[test]
+fn no_output_takes_the_place_of_an_input() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    for folder in ["r", "c"] {
+        std::fs::create_dir(bench.path(folder)).expect("a folder");
+    }
+    for file in ["r/index.html", "c/runs.csv"] {
+        bench.write(file, log());
+    }
+    let taken = |command: &str| bench.bad(command, 2, &["name another"]);
+    taken("fit r/index.html --stage stage.toml --out p.bin --report r");
+    taken("fit log.csv --stage stage.toml --out r/index.html --report r");
+    taken("fit log.csv --stage stage.toml --out p.bin --json r/index.html --report r");
+    taken("compare c/runs.csv --stage stage.toml --out c --seeds 1 --evaluations 100");
+    bench.write("c/table.md", "");
+    taken("compare log.csv --stage c/table.md --out c --seeds 1 --evaluations 100");
+    let stage = std::fs::read(bench.path("stage.toml")).expect("there");
+    std::fs::write(bench.path("stage.toml"), [&stage[..], b"# mine\n"].concat()).expect("written");
+    taken("demo --out .");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_leaves_the_others_as_they_were() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    bench.write("p.bin", "the blob before");
+    let fit = "fit log.csv --stage stage.toml --model 31 --out p.bin --json /dev/full";
+    bench.bad(fit, 3, &["/dev/full", "no room"]);
+    assert_eq!(bench.text("p.bin"), "the blob before");
+    assert!(bench.holds_only(&["log.csv", "p.bin"]));
+}

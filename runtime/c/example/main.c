@@ -10,6 +10,10 @@
 #include "hall_runtime.h"
 #include <stdio.h>
 
+#if HALL_RUNTIME_VERSION < 0x000100
+#error "needs hall_runtime 0.1.0"
+#endif
+
 /* memory.x gives these; their addresses are the values. */
 extern const uint8_t _parameter_slot_0[], _parameter_slot_bytes[];
 
@@ -37,7 +41,9 @@ int main(void)
         printf("parameters refused: %u\n", (unsigned)loaded);
         return (int)loaded;
     }
-    hall_servo_start(&servo, &decoder, 2);
+    HallResult started = hall_servo_start(&servo, &decoder, 2);
+    if (started != HALL_RESULT_OK)
+        return (int)started;
     for (uint32_t period = 0; period < 10; period++) {
         HallFrame frame;
         HallReading reading;

@@ -2,8 +2,9 @@
 //!
 //! The header `hall_runtime.h` is made from this file by cbindgen. Nothing allocates: the
 //! caller keeps a [`HallDecoder`] and a [`HallServo`], usually in static memory. No function
-//! can panic, only [`hall_servo_start`] keeps a pointer, and a null pointer is refused or
-//! ignored. Call the functions of one servo from one context only.
+//! can panic, only [`hall_servo_start`] keeps a pointer. A null pointer is refused, and so is a
+//! decoder that was never loaded or a servo that was never started: keep both in static memory,
+//! which is zero until they are filled. Call the functions of one servo from one context only.
 #![no_std]
 
 mod storage;
@@ -12,9 +13,12 @@ mod types;
 use core::ffi::{CStr, c_char};
 use core::mem::MaybeUninit;
 use runtime::rezero::{RezeroRefusal, RezeroSettings, RezeroState};
-use runtime::{BlobError, OnInvalid, ParameterSet, Servo};
+use runtime::{BlobError, OnInvalid, ParameterSet, Reading, Servo};
 pub use storage::{HallDecoder, HallServo};
-pub use types::{HallFrame, HallHealth, HallPlanarPose, HallReading, HallResult, HallRezero};
+pub use types::{
+    HALL_RUNTIME_VERSION, HallFrame, HallHealth, HallPlanarPose, HallReading, HallResult,
+    HallRezero,
+};
 
 /// A panic cannot be reached: the tests link every function of the runtime against a panic
 /// handler that does not exist. The language requires one.
@@ -25,6 +29,7 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 
 /// Whether floating-point arithmetic is set as after a reset, so that poses are, bit for bit,
 /// those that the host computed. Check it once, before the first tick.
+#[must_use]
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_arithmetic_is_sound() -> bool {
     runtime::arithmetic::check().is_ok()
@@ -37,6 +42,7 @@ pub extern "C" fn hall_arithmetic_is_sound() -> bool {
 /// # Safety
 /// `memory` points to `length` readable bytes; `serial` is NULL or ends in a zero byte;
 /// `decoder` is NULL or points to a HallDecoder that no servo uses.
+#[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hall_load(
     memory: *const u8,
@@ -65,11 +71,13 @@ pub unsafe extern "C" fn hall_load(
 }
 
 /// Starts a servo: no zero deviation, nothing to hold, all counters zero. What is invalid is
-/// held for `hold_ticks` ticks in a row, and zero after that.
+/// held for `hold_ticks` ticks in a row, and zero after that. Unless the result is
+/// HALL_RESULT_OK, the servo stays as it was.
 ///
 /// # Safety
-/// `decoder` was filled by hall_load and stays as it is, and where it is, for as long as the
-/// servo is used.
+/// `decoder` is NULL, or memory that was zero before hall_load filled it or failed to; once it is
+/// filled, it stays as it is, and where it is, for as long as the servo is used.
+#[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hall_servo_start(
     servo: Option<&mut MaybeUninit<HallServo>>,
@@ -79,60 +87,62 @@ pub unsafe extern "C" fn hall_servo_start(
     let (Some(servo), Some(decoder)) = (servo, decoder) else {
         return HallResult::NullPointer;
     };
+    let Some(decoder) = decoder.get() else {
+        return HallResult::NotLoaded;
+    };
     let on_invalid = match hold_ticks {
         0 => OnInvalid::Zero,
         ticks => OnInvalid::Hold { ticks },
     };
-    servo.write(HallServo::new(Servo::new(&**decoder.get(), on_invalid)));
+    servo.write(HallServo::new(Servo::new(&**decoder, on_invalid)));
     HallResult::Ok
 }
 
-/// One servo period: decodes the frame into `reading`.
+/// One servo period: decodes the frame into `reading`. Unless the result is HALL_RESULT_OK, all
+/// six fields of the reading are 0 and marked invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_tick(
     servo: Option<&mut HallServo>,
     frame: Option<&HallFrame>,
     reading: Option<&mut MaybeUninit<HallReading>>,
-) {
-    if let (Some(servo), Some(frame), Some(reading)) = (servo, frame, reading) {
-        reading.write(servo.get_mut().tick(&frame.raw()).into());
-    }
+) -> HallResult {
+    tick(servo, reading, |servo| {
+        Ok(servo.tick(&frame.ok_or(HallResult::NullPointer)?.raw()))
+    })
 }
 
-/// One servo period in which no frame came: values are held or zero.
+/// One servo period in which no frame came: values are held or zero. Unless the result is
+/// HALL_RESULT_OK, all six fields of the reading are 0 and marked invalid.
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_tick_without_frame(
     servo: Option<&mut HallServo>,
     reading: Option<&mut MaybeUninit<HallReading>>,
-) {
-    if let (Some(servo), Some(reading)) = (servo, reading) {
-        reading.write(servo.get_mut().tick_without_frame().into());
-    }
+) -> HallResult {
+    tick(servo, reading, |servo| Ok(servo.tick_without_frame()))
 }
 
 /// Forgets the pose to hold and the sequence; zero deviation and counters stay.
 #[unsafe(no_mangle)]
-pub extern "C" fn hall_forget(servo: Option<&mut HallServo>) {
-    if let Some(servo) = servo {
-        servo.get_mut().forget();
-    }
+pub extern "C" fn hall_forget(servo: Option<&mut HallServo>) -> HallResult {
+    result(started(servo).map(Servo::forget))
 }
 
-/// Starts to average at rest, over `ticks` ticks with the default limits of movement.
+/// Starts to average at rest, over `ticks` ticks (250 or more) with the default limits of
+/// movement and of the zero deviation; hall_rezero_state tells how it goes.
 #[unsafe(no_mangle)]
-pub extern "C" fn hall_rezero_start(servo: Option<&mut HallServo>, ticks: u16) {
-    if let Some(servo) = servo {
-        servo.get_mut().start_rezero(RezeroSettings {
+pub extern "C" fn hall_rezero_start(servo: Option<&mut HallServo>, ticks: u16) -> HallResult {
+    result(started(servo).map(|servo| {
+        servo.start_rezero(RezeroSettings {
             ticks,
             ..RezeroSettings::default()
         });
-    }
+    }))
 }
 
-/// Where the re-zero stands.
+/// Where the re-zero stands; idle for a null pointer or a servo that was never started.
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_rezero_state(servo: Option<&HallServo>) -> HallRezero {
-    match servo.map(|servo| servo.get().rezero_state()) {
+    match running(servo).map(Servo::rezero_state) {
         None | Some(RezeroState::Idle) => HallRezero::Idle,
         Some(RezeroState::Running { .. }) => HallRezero::Running,
         Some(RezeroState::Done { .. }) => HallRezero::Done,
@@ -141,30 +151,68 @@ pub extern "C" fn hall_rezero_state(servo: Option<&HallServo>) -> HallRezero {
             RezeroRefusal::NoPose { .. } => HallRezero::NoPose,
             RezeroRefusal::Moved { .. } => HallRezero::Moved,
             RezeroRefusal::Drifted { .. } => HallRezero::Drifted,
+            RezeroRefusal::OutOfBounds { .. } => HallRezero::OutOfBounds,
+            RezeroRefusal::Extrapolated { .. } => HallRezero::Extrapolated,
         },
     }
 }
 
-/// The zero deviation that is subtracted, as a pose; zeros for a null pointer.
+/// The zero deviation that is subtracted, as a pose; zeros for a null pointer or a servo that was
+/// never started.
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_zero(servo: Option<&HallServo>) -> HallPlanarPose {
-    servo.map_or(HallPlanarPose::ZERO, |servo| servo.get().zero().into())
+    running(servo).map_or(HallPlanarPose::ZERO, |servo| servo.zero().into())
 }
 
 /// Subtracts a zero deviation that is known, for instance from before a restart. One that is
-/// not finite is ignored and `false` returned.
+/// not finite, a null pointer and a servo that was never started are ignored and `false` returned.
+#[must_use]
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_set_zero(servo: Option<&mut HallServo>, zero: HallPlanarPose) -> bool {
-    servo.is_some_and(|servo| servo.get_mut().set_zero(zero.into()))
+    started(servo).is_ok_and(|servo| servo.set_zero(zero.into()))
 }
 
-/// The counters; zeros for a null pointer.
+/// The counters; zeros for a null pointer or a servo that was never started.
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_health(servo: Option<&HallServo>) -> HallHealth {
-    servo
-        .map(|servo| servo.get().health())
-        .unwrap_or_default()
-        .into()
+    running(servo).map(Servo::health).unwrap_or_default().into()
+}
+
+/// The servo that C points to, if it was started.
+fn running(servo: Option<&HallServo>) -> Option<&Servo<'static>> {
+    servo?.get()
+}
+
+/// The servo that C points to, or why there is none.
+fn started(servo: Option<&mut HallServo>) -> Result<&mut Servo<'static>, HallResult> {
+    let servo = servo.ok_or(HallResult::NullPointer)?;
+    servo.get_mut().ok_or(HallResult::NotStarted)
+}
+
+fn result(done: Result<(), HallResult>) -> HallResult {
+    done.err().unwrap_or(HallResult::Ok)
+}
+
+/// Ticks into the room that C has for the reading, which is written in any case.
+#[inline(always)]
+fn tick(
+    servo: Option<&mut HallServo>,
+    reading: Option<&mut MaybeUninit<HallReading>>,
+    tick: impl FnOnce(&mut Servo<'static>) -> Result<Reading, HallResult>,
+) -> HallResult {
+    let Some(reading) = reading else {
+        return HallResult::NullPointer;
+    };
+    match started(servo).and_then(tick) {
+        Ok(ticked) => {
+            reading.write(ticked.into());
+            HallResult::Ok
+        }
+        Err(refused) => {
+            reading.write(HallReading::INVALID);
+            refused
+        }
+    }
 }
 
 impl From<BlobError> for HallResult {

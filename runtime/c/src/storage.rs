@@ -6,48 +6,55 @@ use runtime::{AnyDecoder, Servo};
 /// Words of a decoder.
 pub const HALL_DECODER_WORDS: usize = 114;
 /// Words of a servo.
-pub const HALL_SERVO_WORDS: usize = 49;
+pub const HALL_SERVO_WORDS: usize = 56;
 
 /// A decoder, as C sees it. Its contents are private.
 #[repr(C)]
 pub struct HallDecoder {
+    mark: u32,
     opaque: [MaybeUninit<u32>; HALL_DECODER_WORDS],
 }
 
 /// A servo, as C sees it. Its contents are private.
 #[repr(C)]
 pub struct HallServo {
+    mark: u32,
     opaque: [MaybeUninit<u32>; HALL_SERVO_WORDS],
 }
 
-const _: () = assert!(size_of::<AnyDecoder>() == size_of::<HallDecoder>());
-const _: () = assert!(align_of::<AnyDecoder>() == align_of::<HallDecoder>());
-const _: () = assert!(size_of::<Servo<'static>>() == size_of::<HallServo>());
-const _: () = assert!(align_of::<Servo<'static>>() == align_of::<HallServo>());
-
-/// Gives a type its room, whose size and alignment are asserted to be its own above.
+/// Lets a room be filled with its content and marked as filled. A room of C may never have been
+/// filled: then its words are zero, or arbitrary, and equal the mark with a chance of 2^-32.
 macro_rules! room {
-    ($room:ty, $content:ty) => {
+    ($room:ident, $words:expr, $content:ty, $mark:expr) => {
+        const _: () = assert!(size_of::<$content>() == 4 * $words);
+        const _: () = assert!(align_of::<$content>() == align_of::<$room>());
+
         impl $room {
             pub(crate) fn new(content: $content) -> Self {
-                // SAFETY: same size and alignment, and words that need not be set.
-                unsafe { core::mem::transmute_copy(&ManuallyDrop::new(content)) }
+                Self {
+                    mark: $mark,
+                    // SAFETY: same size and alignment, and words that need not be set.
+                    opaque: unsafe { core::mem::transmute_copy(&ManuallyDrop::new(content)) },
+                }
             }
 
-            pub(crate) const fn get(&self) -> &$content {
-                // SAFETY: a room is only made by `new`, from a content.
-                unsafe { &*core::ptr::from_ref(self).cast() }
+            /// What is in the room, if `new` filled it.
+            pub(crate) fn get(&self) -> Option<&$content> {
+                // SAFETY: the mark is set by `new` only, together with a content.
+                (self.mark == $mark).then(|| unsafe { &*(&raw const self.opaque).cast() })
             }
         }
     };
 }
 
-room!(HallDecoder, AnyDecoder);
-room!(HallServo, Servo<'static>);
+room!(HallDecoder, HALL_DECODER_WORDS, AnyDecoder, 0x9c3e_51d7);
+room!(HallServo, HALL_SERVO_WORDS, Servo<'static>, 0x6ab4_e825);
 
 impl HallServo {
-    pub(crate) const fn get_mut(&mut self) -> &mut Servo<'static> {
+    /// As `get`, to be changed.
+    pub(crate) fn get_mut(&mut self) -> Option<&mut Servo<'static>> {
+        self.get()?;
         // SAFETY: as in `get`; the borrow is unique.
-        unsafe { &mut *core::ptr::from_mut(self).cast() }
+        Some(unsafe { &mut *(&raw mut self.opaque).cast() })
     }
 }

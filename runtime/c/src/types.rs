@@ -3,6 +3,35 @@
 use runtime::servo::Health;
 use runtime::{PlanarPose, RawFrame, Reading};
 
+/// Major version of the library that this header belongs to.
+pub const HALL_RUNTIME_VERSION_MAJOR: u32 = 0;
+/// Minor version.
+pub const HALL_RUNTIME_VERSION_MINOR: u32 = 1;
+/// Patch version.
+pub const HALL_RUNTIME_VERSION_PATCH: u32 = 0;
+/// The version as one number that can be compared: major << 16, minor << 8, patch.
+pub const HALL_RUNTIME_VERSION: u32 = (HALL_RUNTIME_VERSION_MAJOR << 16)
+    | (HALL_RUNTIME_VERSION_MINOR << 8)
+    | HALL_RUNTIME_VERSION_PATCH;
+
+const _: () = {
+    const fn is(number: u32, text: &str) -> bool {
+        matches!(u32::from_str_radix(text, 10), Ok(written) if written == number)
+    }
+    assert!(is(
+        HALL_RUNTIME_VERSION_MAJOR,
+        env!("CARGO_PKG_VERSION_MAJOR")
+    ));
+    assert!(is(
+        HALL_RUNTIME_VERSION_MINOR,
+        env!("CARGO_PKG_VERSION_MINOR")
+    ));
+    assert!(is(
+        HALL_RUNTIME_VERSION_PATCH,
+        env!("CARGO_PKG_VERSION_PATCH")
+    ));
+};
+
 /// In place of a code that could not be read: INT32_MIN.
 pub const HALL_MISSING_CODE: i32 = i32::MIN;
 
@@ -32,6 +61,10 @@ pub enum HallResult {
     UnusableParameters = 9,
     /// The blob belongs to another stage than the one expected.
     OtherStage = 10,
+    /// The decoder was never loaded.
+    NotLoaded = 11,
+    /// The servo was never started.
+    NotStarted = 12,
 }
 
 /// Where a re-zero stands.
@@ -44,7 +77,7 @@ pub enum HallRezero {
     Running = 1,
     /// It ended, and the zero deviation is in use.
     Done = 2,
-    /// Refused: fewer than two ticks were asked for.
+    /// Refused: fewer than 250 ticks were asked for.
     TooShort = 3,
     /// Refused: a tick gave no planar pose.
     NoPose = 4,
@@ -52,6 +85,10 @@ pub enum HallRezero {
     Moved = 5,
     /// Refused: the pose drifted.
     Drifted = 6,
+    /// Refused: the stage stands too far from its zero, or is lifted or tilted.
+    OutOfBounds = 7,
+    /// Refused: a pose lies outside the calibrated range.
+    Extrapolated = 8,
 }
 
 /// The codes of one servo period.
@@ -80,7 +117,8 @@ pub struct HallPlanarPose {
     pub rz_rad: f32,
 }
 
-/// A pose and what is wrong with it: status 0 is all good. Invalid fields are 0 unless held.
+/// A pose and what is wrong with it: all is good when the status is 0, or HALL_STATUS_ZERO_SET
+/// alone. Invalid fields are 0 unless held.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct HallReading {
@@ -112,6 +150,8 @@ pub const HALL_STATUS_VERTICAL_HELD: u32 = 1 << 16;
 pub const HALL_STATUS_FRAMES_MISSED: u32 = 1 << 17;
 /// The frame repeats an earlier sequence number.
 pub const HALL_STATUS_FRAME_REPEATED: u32 = 1 << 18;
+/// A zero deviation is subtracted from X, Y, Rz. No fault.
+pub const HALL_STATUS_ZERO_SET: u32 = 1 << 19;
 
 const _: () = assert!(HALL_STATUS_PLANAR_INVALID == runtime::Status::PLANAR_INVALID.bits());
 const _: () = assert!(HALL_STATUS_VERTICAL_INVALID == runtime::Status::VERTICAL_INVALID.bits());
@@ -119,6 +159,7 @@ const _: () = assert!(HALL_STATUS_PLANAR_HELD == runtime::Status::PLANAR_HELD.bi
 const _: () = assert!(HALL_STATUS_VERTICAL_HELD == runtime::Status::VERTICAL_HELD.bits());
 const _: () = assert!(HALL_STATUS_FRAMES_MISSED == runtime::Status::FRAMES_MISSED.bits());
 const _: () = assert!(HALL_STATUS_FRAME_REPEATED == runtime::Status::FRAME_REPEATED.bits());
+const _: () = assert!(HALL_STATUS_ZERO_SET == runtime::Status::ZERO_SET.bits());
 const _: () = assert!(HALL_MISSING_CODE == runtime::frame::MISSING_CODE);
 
 /// Counters since start. They stay at their largest value.
@@ -155,6 +196,19 @@ impl HallPlanarPose {
         x_m: 0.0,
         y_m: 0.0,
         rz_rad: 0.0,
+    };
+}
+
+impl HallReading {
+    /// Nothing was measured.
+    pub(crate) const INVALID: Self = Self {
+        x_m: 0.0,
+        y_m: 0.0,
+        rz_rad: 0.0,
+        z_m: 0.0,
+        rx_rad: 0.0,
+        ry_rad: 0.0,
+        status: HALL_STATUS_PLANAR_INVALID | HALL_STATUS_VERTICAL_INVALID,
     };
 }
 

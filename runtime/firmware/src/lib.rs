@@ -15,6 +15,7 @@
 //! | [`light`] | what the LED shows |
 //! | [`outbox`] | frames that wait for a mailbox |
 //! | [`telemetry`] | what a debugger reads |
+//! | [`retained`] | what survives a reset: the last fault, the zero deviation |
 //! | [`fpu`] | the rounding mode that the decoder relies on |
 //!
 //! The program around it is `main.rs`; pins, clocks and bit timing are in `board.rs`.
@@ -27,6 +28,7 @@ pub mod fpu;
 pub mod light;
 pub mod node;
 pub mod outbox;
+pub mod retained;
 pub mod schedule;
 pub mod slots;
 pub mod store;

@@ -1,6 +1,6 @@
 //! One tick of the stage controller: codes in, frames out; and what it is asked for.
 //!
-//! State and reason of the status frame (every 16 ticks):
+//! State and reason of the status frame (every 16 ticks, and at once after the bus was off):
 //!
 //! | state | reason |
 //! |---|---|
@@ -16,11 +16,11 @@ use crate::outbox::Outbox;
 use crate::slots::Refusal;
 use embedded_can::Frame;
 use hal_adapters::adc::AdcError;
-use hal_adapters::can::command::{Answer, Command, IdentityPage, Mailbox, Outcome, Request, Told};
+use hal_adapters::can::command::Told;
+pub use hal_adapters::can::status::BoardFacts;
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus, flag};
-use hal_adapters::can::table::SLOW_TICKS;
-use hal_adapters::can::{PROTOCOL_VERSION, PoseSender};
-use runtime::rezero::{RezeroSettings, RezeroState};
+use hal_adapters::can::table::{Message, SLOW_TICKS};
+use hal_adapters::can::{Layout, PROTOCOL_VERSION, PoseSender, Service, sensor};
 use runtime::servo::Health;
 use runtime::{PlanarPose, RawFrame, Reading, Servo, Status};
 
@@ -54,13 +54,19 @@ const NOTHING: Reading = Reading {
     status: Status::PLANAR_INVALID.with(Status::VERTICAL_INVALID),
 };
 
-/// What the rest of the program tells in the status frame.
+/// What the rest of the program and the board tell the node in each tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Facts {
     /// Ticks that came late or not at all.
     pub missed_ticks: u32,
     /// Times the bus was off.
     pub bus_off: u32,
+    /// Whether the service pin says that the servo is off; `None`: this board has no such pin.
+    pub servo_off_pin: Option<bool>,
+    /// Whether the core runs on its internal oscillator.
+    pub internal_oscillator: bool,
+    /// What the start-up found.
+    pub board: BoardFacts,
 }
 
 /// A fault of the converter in one byte, and whether it gave nothing at all.
@@ -109,33 +115,57 @@ pub enum Parameters<'d> {
 pub struct Node<'d> {
     parameters: Parameters<'d>,
     watchdog_reset: bool,
+    /// How codes are put into frames.
+    layout: Layout,
     sender: PoseSender,
-    mailbox: Mailbox,
+    service: Service,
     ticks: u32,
     state: (NodeState, u8),
     fpu_restored: u32,
-    /// Token of the re-zero that runs.
-    rezero: Option<u8>,
-    rezero_flags: u8,
-    identify_ticks: u32,
-    identity_page: u8,
+    board_checks: u32,
+    /// Times the bus was off that a state has told.
+    bus_off_told: u32,
 }
 
 impl<'d> Node<'d> {
-    /// A node before its first tick.
-    pub fn new(parameters: Parameters<'d>, watchdog_reset: bool) -> Self {
+    /// A node before its first tick; `layout` holds the codes of its converter.
+    pub fn new(parameters: Parameters<'d>, watchdog_reset: bool, layout: Layout) -> Self {
         Self {
             parameters,
             watchdog_reset,
+            layout,
             sender: PoseSender::default(),
-            mailbox: Mailbox::default(),
+            service: Service::new(TICKS_PER_SECOND),
             ticks: 0,
             state: (NodeState::Starting, 0),
             fpu_restored: 0,
-            rezero: None,
-            rezero_flags: 0,
-            identify_ticks: 0,
-            identity_page: IdentityPage::PAGES,
+            board_checks: 0,
+            bus_off_told: 0,
+        }
+    }
+
+    /// Sends codes from the start, as if asked for.
+    #[must_use]
+    pub fn recording(self, is_on: bool) -> Self {
+        Self {
+            service: self.service.recording(is_on),
+            ..self
+        }
+    }
+
+    /// The zero deviation that is subtracted, as a pose.
+    pub const fn zero(&self) -> PlanarPose<f32> {
+        match self.servo() {
+            Some(servo) => servo.zero(),
+            None => PlanarPose::ZERO,
+        }
+    }
+
+    /// Subtracts a zero deviation that was kept over a reset. Without parameters, or if it is
+    /// not finite, nothing happens.
+    pub fn restore_zero(&mut self, zero: PlanarPose<f32>) {
+        if let Some(servo) = servo_of(&mut self.parameters) {
+            servo.set_zero(zero);
         }
     }
 
@@ -156,7 +186,12 @@ impl<'d> Node<'d> {
 
     /// Whether the LED is to be on.
     pub const fn light(&self) -> bool {
-        crate::light::is_on(self.state.0, self.identify_ticks > 0, self.ticks)
+        crate::light::is_on(
+            self.state.0,
+            self.board_checks,
+            self.service.is_identifying(),
+            self.ticks,
+        )
     }
 
     /// One tick: decodes the codes and puts the frames that are due into the outbox.
@@ -169,36 +204,65 @@ impl<'d> Node<'d> {
     ) -> Reading {
         let reading = self.decode(&sample, fpu);
         self.state = self.state_of(&sample, &reading);
+        self.board_checks = facts.board.board_checks;
         if let Parameters::Usable { .. } = self.parameters {
-            // The controller takes a frame only before frames of lower priority: Rz, Y, X
-            // fill its three mailboxes at once, X, Y, Rz would wait for each other.
-            let mut frames = self.sender.frames(&reading);
-            if let (Some(x), Some(y), Some(rz)) = (frames.next(), frames.next(), frames.next()) {
-                [rz, y, x].into_iter().for_each(|frame| outbox.push(frame));
-            }
-            frames.for_each(|frame| outbox.push(frame));
+            self.send_pose(&reading, sample.as_ref().ok(), outbox);
         }
-        self.follow_rezero(outbox);
-        self.follow_identify(outbox);
-        match self.ticks % u32::from(SLOW_TICKS) {
-            0 => self.tell(&Told::Status(self.status(facts)), outbox),
+        if let Ok(frame) = &sample
+            && self.service.is_recording()
+        {
+            self.send_codes(frame, outbox);
+        }
+        let servo = servo_of(&mut self.parameters);
+        let answer = self.service.tick(servo, facts.servo_off_pin);
+        let page = self.service.identity_page(self.serial());
+        let was_off = core::mem::replace(&mut self.bus_off_told, facts.bus_off) != facts.bus_off;
+        let due = match self.ticks % u32::from(SLOW_TICKS) {
+            0 => Some(Told::Status(self.status(facts))),
+            _ if was_off => Some(Told::Status(self.status(facts))),
             8 => {
-                let page = self.ticks / u32::from(SLOW_TICKS);
-                self.tell(&Told::Health(HealthPage::of(&self.health(), page)), outbox);
+                let number = self.ticks / u32::from(SLOW_TICKS);
+                let page = HealthPage::of(&self.health(), Some(&facts.board), number);
+                Some(Told::Health(page))
             }
-            _ => {}
-        }
+            _ => None,
+        };
+        let told = due.and_then(|told| self.service.tell(&told));
+        let frames = answer.into_iter().chain(page).chain(told);
+        frames.for_each(|frame| outbox.push(frame));
         self.ticks = self.ticks.wrapping_add(1);
         reading
     }
 
     /// Takes a frame that came over the bus, and answers if it is a command.
     pub fn take<F: Frame>(&mut self, frame: &F, outbox: &mut Outbox) {
-        let Some(Ok(Told::Command(command))) = self.mailbox.take(frame) else {
-            return;
-        };
-        let (outcome, detail) = self.obey(&command);
-        self.answer(command.number, command.token, outcome, detail, outbox);
+        let servo = servo_of(&mut self.parameters);
+        if let Some(Ok(answered)) = self.service.take(frame, servo)
+            && let Some(answer) = answered.answer
+        {
+            outbox.push(answer);
+        }
+    }
+
+    fn send_pose(&mut self, reading: &Reading, sampled: Option<&RawFrame>, outbox: &mut Outbox) {
+        let mut frames = self.sender.frames(reading, sampled);
+        if let (Some(x), Some(y), Some(rz)) = (frames.next(), frames.next(), frames.next()) {
+            outbox.push_group(&[x, y, rz]);
+        }
+        frames.for_each(|frame| outbox.push(frame));
+    }
+
+    /// After the pose: whoever controls by it does not wait for the record.
+    fn send_codes(&self, frame: &RawFrame, outbox: &mut Outbox) {
+        let mut frames = sensor::frames(self.layout, frame).peekable();
+        if let Some(time) = frames.next_if(|frame| frame.message == Message::SensorTime) {
+            outbox.push(time);
+        }
+        match (frames.next(), frames.next(), frames.next()) {
+            (Some(a), Some(b), Some(c)) => outbox.push_group(&[a, b, c]),
+            (Some(a), Some(b), None) => outbox.push_group(&[a, b]),
+            _ => {}
+        }
     }
 
     fn decode(
@@ -255,9 +319,8 @@ impl<'d> Node<'d> {
             reason,
             flags: on(flag::WATCHDOG_RESET, self.watchdog_reset)
                 | on(flag::BUS_WAS_OFF, facts.bus_off > 0)
-                | on(flag::REZERO_RUNS, self.rezero.is_some())
-                | on(flag::IDENTIFYING, self.identify_ticks > 0)
-                | self.rezero_flags,
+                | on(flag::INTERNAL_OSCILLATOR, facts.internal_oscillator)
+                | self.service.flags(self.servo()),
             missed_ticks: u16::try_from(facts.missed_ticks).unwrap_or(u16::MAX),
             bus_off: u8::try_from(facts.bus_off).unwrap_or(u8::MAX),
             version: PROTOCOL_VERSION,
@@ -265,9 +328,9 @@ impl<'d> Node<'d> {
     }
 
     fn health(&self) -> Health {
-        match &self.parameters {
-            Parameters::Usable { servo, .. } => servo.health(),
-            Parameters::None { .. } | Parameters::SelfTestFailed => Health {
+        match self.servo() {
+            Some(servo) => servo.health(),
+            None => Health {
                 ticks: self.ticks,
                 planar_invalid: self.ticks,
                 vertical_invalid: self.ticks,
@@ -276,103 +339,26 @@ impl<'d> Node<'d> {
         }
     }
 
-    fn obey(&mut self, command: &Command) -> (Outcome, u32) {
-        let Parameters::Usable { servo, .. } = &mut self.parameters else {
-            return match command.request {
-                Some(Request::Identify { seconds }) => self.identify(seconds),
-                Some(_) => (Outcome::NoParameters, 0),
-                None => (Outcome::UnknownCommand, 0),
-            };
-        };
-        match command.request {
-            None => (Outcome::UnknownCommand, 0),
-            Some(Request::Identify { seconds }) => self.identify(seconds),
-            Some(_) if self.rezero.is_some() => (Outcome::Busy, 0),
-            Some(Request::ClearZero) => {
-                servo.set_zero(PlanarPose::ZERO);
-                self.rezero_flags = 0;
-                (Outcome::Done, 0)
-            }
-            Some(Request::Rezero { ticks }) => {
-                let mut settings = RezeroSettings::default();
-                if ticks > 0 {
-                    settings.ticks = ticks;
-                }
-                servo.start_rezero(settings);
-                if let RezeroState::Refused(refusal) = servo.rezero_state() {
-                    self.rezero_flags |= flag::REZERO_REFUSED;
-                    return Outcome::of_refusal(&refusal);
-                }
-                self.rezero = Some(command.token);
-                self.rezero_flags &= !flag::REZERO_REFUSED;
-                (Outcome::Started, 0)
-            }
+    const fn servo(&self) -> Option<&Servo<'d>> {
+        match &self.parameters {
+            Parameters::Usable { servo, .. } => Some(servo),
+            Parameters::None { .. } | Parameters::SelfTestFailed => None,
         }
     }
 
-    fn identify(&mut self, seconds: u8) -> (Outcome, u32) {
-        self.identify_ticks = u32::from(seconds) * TICKS_PER_SECOND;
-        self.identity_page = 0;
-        (Outcome::Done, 0)
-    }
-
-    /// Answers once the re-zero that runs has ended.
-    fn follow_rezero(&mut self, outbox: &mut Outbox) {
-        let (Some(token), Parameters::Usable { servo, .. }) = (self.rezero, &self.parameters)
-        else {
-            return;
-        };
-        let (outcome, detail) = match servo.rezero_state() {
-            RezeroState::Running { .. } | RezeroState::Idle => return,
-            RezeroState::Done { .. } => {
-                self.rezero_flags |= flag::REZEROED;
-                (Outcome::Done, 0)
-            }
-            RezeroState::Refused(refusal) => {
-                self.rezero_flags |= flag::REZERO_REFUSED;
-                Outcome::of_refusal(&refusal)
-            }
-        };
-        self.rezero = None;
-        let number = Command::new(Request::Rezero { ticks: 0 }, token).number;
-        self.answer(number, token, outcome, detail, outbox);
-    }
-
-    /// Sends one page of the serial number a tick.
-    fn follow_identify(&mut self, outbox: &mut Outbox) {
-        self.identify_ticks = self.identify_ticks.saturating_sub(1);
-        if self.identity_page < IdentityPage::PAGES {
-            let serial = match &self.parameters {
-                Parameters::Usable { serial, .. } => serial,
-                Parameters::None { .. } | Parameters::SelfTestFailed => "",
-            };
-            let page = IdentityPage::of(serial, self.identity_page);
-            self.identity_page += 1;
-            self.tell(&Told::Identity(page), outbox);
+    fn serial(&self) -> &'d str {
+        match self.parameters {
+            Parameters::Usable { serial, .. } => serial,
+            Parameters::None { .. } | Parameters::SelfTestFailed => "",
         }
     }
+}
 
-    fn answer(
-        &mut self,
-        number: u8,
-        token: u8,
-        outcome: Outcome,
-        detail: u32,
-        outbox: &mut Outbox,
-    ) {
-        let answer = Answer {
-            number,
-            token,
-            outcome: Some(outcome),
-            detail,
-        };
-        self.tell(&Told::Answer(answer), outbox);
-    }
-
-    fn tell(&mut self, what: &Told, outbox: &mut Outbox) {
-        if let Some(frame) = self.mailbox.send(what) {
-            outbox.push(frame);
-        }
+/// The servo, where there are parameters.
+const fn servo_of<'p, 'd>(parameters: &'p mut Parameters<'d>) -> Option<&'p mut Servo<'d>> {
+    match parameters {
+        Parameters::Usable { servo, .. } => Some(servo),
+        Parameters::None { .. } | Parameters::SelfTestFailed => None,
     }
 }
 

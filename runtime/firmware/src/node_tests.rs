@@ -2,8 +2,8 @@ extern crate std;
 
 use super::*;
 use crate::slots::{Loaded, load};
-use hal_adapters::can::command::Outcome;
-use hal_adapters::can::{BusFrame, Message};
+use hal_adapters::can::command::{Command, Mailbox, Outcome, Request};
+use hal_adapters::can::{BusFrame, SensorReceiver, Timing};
 use runtime::OnInvalid;
 use std::boxed::Box;
 use std::vec::Vec;
@@ -34,7 +34,7 @@ fn node() -> Node<'static> {
         serial: &loaded.serial,
         other_slot: None,
     };
-    Node::new(parameters, false)
+    Node::new(parameters, false, Layout::Bits24)
 }
 
 fn frame(sequence: u32) -> RawFrame {
@@ -70,18 +70,17 @@ fn told(frames: &[hal_adapters::can::Coded]) -> Vec<Told> {
 fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Told> {
     let coded = Mailbox::default().send(&Told::Command(Command::new(request, token)));
     let mut outbox = Outbox::new();
-    node.mailbox = Mailbox::default(); // each command comes from a sender that starts anew
     node.take(&BusFrame::from(coded.expect("a command")), &mut outbox);
     told(&core::iter::from_fn(|| outbox.pop()).collect::<Vec<_>>())
 }
 
 #[test]
-fn pose_frames_come_lowest_priority_first_so_that_all_find_a_mailbox() {
+fn pose_frames_come_first_in_the_order_of_their_identifiers() {
     let mut node = node();
     for k in 0..32 {
         let frames = tick(&mut node, Ok(frame(k)));
         let planar: Vec<_> = frames.iter().take(3).map(|coded| coded.message).collect();
-        assert_eq!(planar, [Message::PoseRz, Message::PoseY, Message::PoseX]);
+        assert_eq!(planar, [Message::PoseX, Message::PoseY, Message::PoseRz]);
     }
 }
 
@@ -96,6 +95,26 @@ fn every_sixteenth_tick_tells_the_state_and_half_way_a_counter() {
         let health = told.iter().any(|t| matches!(t, Told::Health(_)));
         assert_eq!((status, health), (k % 16 == 0, k % 16 == 8), "{k}");
     }
+}
+
+#[test]
+fn a_bus_that_was_off_is_told_at_once() {
+    let mut node = node();
+    tick(&mut node, Ok(frame(0)));
+    let facts = Facts {
+        bus_off: 1,
+        ..Facts::default()
+    };
+    let mut states = |k| {
+        let mut outbox = Outbox::new();
+        node.tick(Ok(frame(k)), &facts, &mut Disturbed::default(), &mut outbox);
+        let frames: Vec<_> = core::iter::from_fn(|| outbox.pop()).collect();
+        let told = told(&frames);
+        told.iter()
+            .filter(|t| matches!(t, Told::Status(s) if s.bus_off == 1))
+            .count()
+    };
+    assert_eq!([1, 2, 3].map(&mut states), [1, 0, 0]);
 }
 
 #[test]
@@ -130,7 +149,7 @@ fn without_parameters_there_are_states_but_no_poses() {
         reason: 7,
         erased: false,
     };
-    let mut node = Node::new(Parameters::None { refusal }, true);
+    let mut node = Node::new(Parameters::None { refusal }, true, Layout::Bits16);
     for k in 0..32 {
         let frames = tick(&mut node, Ok(frame(k)));
         assert!(
@@ -175,33 +194,105 @@ fn a_pose_decoded_under_other_fpu_settings_is_withdrawn() {
 }
 
 #[test]
-fn a_rezero_answers_twice_and_refuses_others_meanwhile() {
+fn a_re_zero_needs_the_servo_off_and_its_answer_comes_in_the_tick_that_ends_it() {
     let mut node = node();
     tick(&mut node, Ok(frame(0)));
-    let outcome = |told: &[Told]| match told {
-        [Told::Answer(answer)] => answer.outcome,
-        _ => None,
+    let mut token = 0;
+    let mut asked = |node: &mut Node<'_>, request| {
+        token += 1;
+        match ask(node, request, token)[..] {
+            [Told::Answer(answer)] => answer.outcome,
+            _ => None,
+        }
     };
-    let first = ask(&mut node, Request::Rezero { ticks: 4 }, 1);
-    assert_eq!(outcome(&first), Some(Outcome::Started));
-    assert_eq!(
-        outcome(&ask(&mut node, Request::ClearZero, 2)),
-        Some(Outcome::Busy)
-    );
-    let answers: Vec<_> = (1..8)
-        .flat_map(|k| told(&tick(&mut node, Ok(frame(k)))))
-        .collect();
-    assert_eq!(outcome(&answers), Some(Outcome::Done));
-    assert_eq!(node.rezero_flags, flag::REZEROED);
-    assert_eq!(
-        outcome(&ask(&mut node, Request::ClearZero, 3)),
-        Some(Outcome::Done)
-    );
-    assert_eq!(node.rezero_flags, 0);
-    assert_eq!(
-        outcome(&ask(&mut node, Request::Rezero { ticks: 1 }, 4)),
-        Some(Outcome::TooShort)
-    );
+    let rezero = Request::Rezero { ticks: 300 };
+    assert_eq!(asked(&mut node, rezero), Some(Outcome::ServoOn));
+    let off = Request::ServoOff { seconds: 2 };
+    assert_eq!(asked(&mut node, off), Some(Outcome::Done));
+    assert_eq!(asked(&mut node, rezero), Some(Outcome::Started));
+    let answers = (1..=400).flat_map(|k| {
+        let told = told(&tick(&mut node, Ok(frame(k))));
+        let answers = told.into_iter().filter(|t| matches!(t, Told::Answer(_)));
+        answers.map(move |answer| (k, answer)).collect::<Vec<_>>()
+    });
+    let answers: Vec<_> = answers.collect();
+    assert!(matches!(answers[..], [(300, Told::Answer(a))] if a.outcome == Some(Outcome::Done)));
+    assert_ne!(node.zero(), PlanarPose::ZERO);
+}
+
+#[test]
+fn a_zero_that_is_restored_is_subtracted_and_told() {
+    let mut node = node();
+    let zero = PlanarPose {
+        x_m: 3e-6,
+        ..PlanarPose::ZERO
+    };
+    node.restore_zero(zero);
+    assert_eq!(node.zero(), zero);
+    let frames = tick(&mut node, Ok(frame(0)));
+    let status = told(&frames).into_iter().find_map(|told| match told {
+        Told::Status(status) => Some(status),
+        _ => None,
+    });
+    assert_eq!(status.map(|status| status.flags), Some(flag::ZERO_SET));
+}
+
+/// Codes as wide as the converter's, with a tick that the schedule missed and one that the
+/// converter failed.
+#[test]
+fn a_record_holds_the_codes_of_every_tick_and_shows_those_without_as_gaps() {
+    for (parameters, layout) in [(true, Layout::Bits24), (false, Layout::Bits16)] {
+        let mut node = if parameters {
+            node()
+        } else {
+            let refusal = Refusal::NEITHER;
+            Node::new(Parameters::None { refusal }, false, layout)
+        };
+        let width = if parameters { 1_000 } else { 1 };
+        let codes = |sequence: u32| RawFrame {
+            hall: [-5 * width, 8 * width, sequence as i32 * width],
+            ..frame(sequence)
+        };
+        let is_code = |coded: &hal_adapters::can::Coded| layout.messages().contains(&coded.message);
+        assert!(!tick(&mut node, Ok(codes(0))).iter().any(is_code));
+        ask(&mut node, Request::Record { on: true }, 1);
+        let mut receiver = SensorReceiver::new(layout, Timing::default());
+        let mut got = Vec::new();
+        for sequence in (1..100).filter(|s| *s != 40) {
+            let sample = if sequence == 70 {
+                Err(SampleFault::from(&AdcError::Bus(())))
+            } else {
+                Ok(codes(sequence))
+            };
+            for coded in tick(&mut node, sample) {
+                let taken = receiver.take(&BusFrame::from(coded), sequence * 2_000);
+                got.extend(taken.tick);
+            }
+        }
+        let want: Vec<_> = (1..100).filter(|s| ![40, 70].contains(s)).collect();
+        assert_eq!(got.len(), want.len());
+        for (got, sequence) in got.iter().zip(want) {
+            assert_eq!(got.hall, codes(sequence).hall);
+            assert_eq!(got.sequence & 0xf, sequence & 0xf);
+        }
+        ask(&mut node, Request::Record { on: false }, 2);
+        assert!(!tick(&mut node, Ok(codes(100))).iter().any(is_code));
+    }
+}
+
+#[test]
+fn a_program_built_to_record_does_so_from_the_first_tick() {
+    let mut node = node().recording(true);
+    let frames = tick(&mut node, Ok(frame(0)));
+    let messages: Vec<_> = frames.iter().map(|coded| coded.message).collect();
+    use Message as M;
+    let want = [
+        [M::PoseX, M::PoseY, M::PoseRz].as_slice(),
+        &[M::PoseTime, M::PoseZ, M::SensorTime],
+        &[M::HallAb24, M::HallCCapacitive1At24, M::Capacitive23At24],
+        &[M::NodeStatus],
+    ];
+    assert_eq!(messages, want.concat());
 }
 
 #[test]
@@ -212,5 +303,5 @@ fn a_remote_frame_or_a_foreign_one_is_no_command() {
     node.take(&remote, &mut outbox);
     let foreign = BusFrame::new(embedded_can::StandardId::MAX, &[0; 8]).expect("eight bytes");
     node.take(&foreign, &mut outbox);
-    assert_eq!(outbox.front(), None);
+    assert_eq!(outbox.front(true), None);
 }

@@ -1,16 +1,28 @@
 //! Frames that wait for a mailbox of the CAN controller.
+//!
+//! Of what waits in its three mailboxes the controller sends the lowest identifier first, and of
+//! two frames with the same identifier not always the older. The outbox keeps both from doing
+//! harm: the mailboxes hold one frame, or one group, at a time. A group is up to three frames
+//! with rising identifiers; the next frame is given when all mailboxes are empty. So frames
+//! leave in the order in which they were pushed.
 
-use hal_adapters::can::Coded;
+use hal_adapters::can::{Coded, Message};
 use heapless::Deque;
 
-/// Frames of one tick at most: six of a pose, status or health, an answer and a page.
-pub const CAPACITY: usize = 12;
+/// Frames of one tick at most: X, Y, Rz, their time, a vertical axis, three of codes, their
+/// time, a state or a counter.
+const FRESH_MAX: usize = 10;
+/// Answers to the commands of a few ticks, and the six pages of a serial number.
+const LASTING_MAX: usize = 14;
 
-/// A queue for the frames of one tick. Frames that were not sent before the next tick are out of
-/// date: they are discarded and counted.
+/// A queue in two parts. Poses, codes, states and counters are out of date in the next tick,
+/// which discards and counts them; answers and the serial number, which are sent only once,
+/// wait as long as it takes.
 #[derive(Debug, Default)]
 pub struct Outbox {
-    queue: Deque<Coded, CAPACITY>,
+    /// Frames of this tick, and whether each may join the one before in the mailboxes.
+    fresh: Deque<(Coded, bool), FRESH_MAX>,
+    lasting: Deque<Coded, LASTING_MAX>,
     dropped: u32,
 }
 
@@ -18,32 +30,56 @@ impl Outbox {
     /// An empty box.
     pub const fn new() -> Self {
         Self {
-            queue: Deque::new(),
+            fresh: Deque::new(),
+            lasting: Deque::new(),
             dropped: 0,
         }
     }
 
+    /// Whether a frame is still worth sending after its tick.
+    pub const fn is_lasting(message: Message) -> bool {
+        matches!(message, Message::Answer | Message::Identity)
+    }
+
     /// Adds a frame at the end.
     pub fn push(&mut self, frame: Coded) {
-        if self.queue.push_back(frame).is_err() {
-            self.count_dropped(1);
+        let full = if Self::is_lasting(frame.message) {
+            self.lasting.push_back(frame).is_err()
+        } else {
+            self.fresh.push_back((frame, false)).is_err()
+        };
+        self.count_dropped(u32::from(full));
+    }
+
+    /// Adds a group at the end: up to three frames of this tick with rising identifiers.
+    pub fn push_group(&mut self, frames: &[Coded]) {
+        let mut joins = false;
+        for frame in frames {
+            let full = self.fresh.push_back((*frame, joins)).is_err();
+            self.count_dropped(u32::from(full));
+            joins = true;
         }
     }
 
-    /// The frame to be sent next; it stays until [`Self::pop`].
-    pub fn front(&self) -> Option<&Coded> {
-        self.queue.front()
+    /// The frame to be put into a mailbox next, if any may be now; it stays until [`Self::pop`].
+    /// `all_empty` is whether no mailbox holds a frame.
+    pub fn front(&self, all_empty: bool) -> Option<&Coded> {
+        match self.fresh.front() {
+            Some((frame, joins)) => (all_empty || *joins).then_some(frame),
+            None => self.lasting.front().filter(|_| all_empty),
+        }
     }
 
-    /// Removes the first frame.
+    /// Removes the frame that [`Self::front`] gave.
     pub fn pop(&mut self) -> Option<Coded> {
-        self.queue.pop_front()
+        let fresh = self.fresh.pop_front().map(|(frame, _)| frame);
+        fresh.or_else(|| self.lasting.pop_front())
     }
 
-    /// Discards what is left of the previous tick.
+    /// Discards what is out of date of the previous tick.
     pub fn start_tick(&mut self) {
-        self.count_dropped(self.queue.len() as u32);
-        self.queue.clear();
+        self.count_dropped(self.fresh.len() as u32);
+        self.fresh.clear();
     }
 
     /// Frames that were never sent. Saturates.
@@ -59,22 +95,87 @@ impl Outbox {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use hal_adapters::can::Message;
+    extern crate std;
 
-    const FRAME: Coded = Coded {
-        message: Message::PoseX,
-        bytes: [0; 8],
-    };
+    use super::*;
+    use std::vec::Vec;
+
+    const fn frame(message: Message) -> Coded {
+        Coded {
+            message,
+            bytes: [0; 8],
+        }
+    }
 
     #[test]
     fn frames_left_over_and_frames_too_many_are_counted() {
         let mut outbox = Outbox::new();
-        (0..CAPACITY + 2).for_each(|_| outbox.push(FRAME));
+        (0..FRESH_MAX + 2).for_each(|_| outbox.push(frame(Message::PoseX)));
         assert_eq!(outbox.dropped(), 2);
-        assert_eq!(outbox.pop(), Some(FRAME));
+        assert_eq!(outbox.pop(), Some(frame(Message::PoseX)));
         outbox.start_tick();
-        assert_eq!(outbox.dropped(), 2 + CAPACITY as u32 - 1);
-        assert_eq!(outbox.front(), None);
+        assert_eq!(outbox.dropped(), 2 + FRESH_MAX as u32 - 1);
+        assert_eq!(outbox.front(true), None);
+    }
+
+    #[test]
+    fn answers_and_the_serial_number_outlive_their_tick_and_let_the_next_pose_pass() {
+        let mut outbox = Outbox::new();
+        for message in [
+            Message::PoseX,
+            Message::Answer,
+            Message::NodeStatus,
+            Message::Identity,
+        ] {
+            outbox.push(frame(message));
+        }
+        outbox.start_tick();
+        assert_eq!(outbox.dropped(), 2);
+        outbox.push(frame(Message::PoseX));
+        let left: Vec<_> = core::iter::from_fn(|| outbox.pop())
+            .map(|frame| frame.message)
+            .collect();
+        assert_eq!(left, [Message::PoseX, Message::Answer, Message::Identity]);
+    }
+
+    /// Three mailboxes as in the reference manual: the lowest identifier leaves first; among
+    /// equal ones that in the lowest mailbox.
+    #[test]
+    fn three_mailboxes_never_hold_two_frames_of_a_message_and_keep_the_order() {
+        let group = [Message::PoseX, Message::PoseY, Message::PoseRz].map(frame);
+        let codes = [Message::Hall, Message::Capacitive].map(frame);
+        let answers = (0..3).map(|k| Coded {
+            bytes: [k; 8],
+            ..frame(Message::Answer)
+        });
+        let mut outbox = Outbox::new();
+        answers.clone().for_each(|answer| outbox.push(answer));
+        outbox.push_group(&group);
+        outbox.push(frame(Message::PoseTime));
+        outbox.push_group(&codes);
+        outbox.push(frame(Message::NodeStatus));
+        let want: Vec<_> = group
+            .into_iter()
+            .chain([frame(Message::PoseTime)])
+            .chain(codes)
+            .chain([frame(Message::NodeStatus)])
+            .chain(answers)
+            .collect();
+        let (mut mailboxes, mut sent) = ([None::<Coded>; 3], Vec::new());
+        loop {
+            while let Some(next) = outbox.front(mailboxes.iter().all(Option::is_none)) {
+                let waits = |message| mailboxes.iter().flatten().any(|f| f.message == message);
+                assert!(!waits(next.message), "{:?} waits twice", next.message);
+                let free = mailboxes.iter_mut().find(|mailbox| mailbox.is_none());
+                *free.expect("a free mailbox") = outbox.pop();
+            }
+            let waiting = mailboxes.iter_mut().filter(|mailbox| mailbox.is_some());
+            let first = waiting.min_by_key(|mailbox| mailbox.map(|f| f.message.spec().id));
+            match first.and_then(Option::take) {
+                Some(frame) => sent.push(frame),
+                None => break,
+            }
+        }
+        assert_eq!(sent, want);
     }
 }

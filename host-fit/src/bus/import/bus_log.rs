@@ -2,7 +2,9 @@
 
 use super::{ImportError, ImportSettings};
 use crate::input::source;
-use hal_adapters::can::{BusFault, BusHealth, Layout, SensorReceiver, StampedFrame, Timing};
+use hal_adapters::can::{
+    BusFault, BusHealth, Layout, Message, SensorReceiver, StampedFrame, Timing,
+};
 use hal_adapters::candump::{LineError, LogLine};
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
@@ -61,15 +63,11 @@ const TIMING: Timing = Timing {
 ///
 /// # Errors
 /// `Bus`, `BadLine`, `NotText`, `SeveralInterfaces`, `NoTicks`.
-pub fn read(args: &ImportSettings, layout: Layout) -> Result<BusReading, ImportError> {
+pub fn read(args: &ImportSettings) -> Result<BusReading, ImportError> {
     let path = args.bus.as_path();
     let bytes = source::read_bytes(path)?;
-    let mut collector = Collector {
-        receiver: SensorReceiver::new(layout, TIMING),
-        reading: BusReading::default(),
-        last: None,
-        restarted: false,
-    };
+    let mut collector = Collector::new(args.layout);
+    let mut reading = BusReading::default();
     let mut interface = args.interface.clone();
     for (line, bytes) in (1..).zip(bytes.split(|b| *b == b'\n')) {
         let bytes = bytes.trim_ascii();
@@ -88,13 +86,13 @@ pub fn read(args: &ImportSettings, layout: Layout) -> Result<BusReading, ImportE
         match parsed {
             Ok(found) => {
                 if chosen(&mut interface, &found, args, path, line)? {
-                    collector.take(&found.stamped());
+                    reading.ticks.extend(collector.take(&found.stamped()));
                 }
             }
             Err(LineError::ErrorFrame | LineError::FlexibleDataRate) => {
-                collector.reading.counts.other_lines += 1;
+                reading.counts.other_lines += 1;
             }
-            Err(_) if args.skip_bad_lines => collector.reading.counts.bad_lines += 1,
+            Err(_) if args.skip_bad_lines => reading.counts.bad_lines += 1,
             Err(fault) => {
                 return Err(ImportError::BadLine {
                     path: path.to_owned(),
@@ -104,7 +102,18 @@ pub fn read(args: &ImportSettings, layout: Layout) -> Result<BusReading, ImportE
             }
         }
     }
-    collector.finish(path)
+    reading.counts = BusCounts {
+        bad_lines: reading.counts.bad_lines,
+        other_lines: reading.counts.other_lines,
+        ..collector.counts()
+    };
+    if reading.ticks.is_empty() {
+        return Err(ImportError::NoTicks {
+            path: path.to_owned(),
+            frames: reading.counts.frames,
+        });
+    }
+    Ok(reading)
 }
 
 /// Whether a frame belongs to the interface that is read; the first one's, if none was named.
@@ -131,18 +140,37 @@ fn chosen(
     Ok(true)
 }
 
-struct Collector {
-    receiver: SensorReceiver,
-    reading: BusReading,
-    last: Option<u32>,
+/// Frames to whole ticks, counted.
+#[derive(Clone, Debug, Default)]
+pub(in crate::bus) struct Collector {
+    layout: Option<Layout>,
+    receiver: Option<SensorReceiver>,
+    counts: BusCounts,
+    /// Number of the last whole tick, by the receiver and in the record.
+    last: Option<(u32, u64)>,
     restarted: bool,
 }
 
 impl Collector {
-    fn take(&mut self, stamped: &StampedFrame) {
-        self.reading.counts.frames += 1;
+    /// Takes the layout from the first frame with codes if it is not given.
+    pub(in crate::bus) fn new(layout: Option<Layout>) -> Self {
+        Self {
+            layout,
+            ..Self::default()
+        }
+    }
+
+    /// Takes a frame; gives the tick that it completes.
+    pub(in crate::bus) fn take(&mut self, stamped: &StampedFrame) -> Option<BusTick> {
+        self.counts.frames += 1;
+        if self.layout.is_none() {
+            self.layout = Message::from_id(stamped.frame.id).and_then(Layout::carrying);
+        }
+        let layout = self.layout?;
+        let new = || SensorReceiver::new(layout, TIMING);
+        let receiver = self.receiver.get_or_insert_with(new);
         // The receiver's times wrap after 71 minutes.
-        let taken = self.receiver.take(&stamped.frame, stamped.time_us as u32);
+        let taken = receiver.take(&stamped.frame, stamped.time_us as u32);
         self.restarted |= matches!(
             taken.fault,
             Some(
@@ -151,49 +179,47 @@ impl Collector {
                     | BusFault::TicksLost { .. }
             )
         );
-        if let Some(tick) = taken.tick {
-            self.tick(&tick, stamped.time_us);
-        }
+        self.tick(&taken.tick?, stamped.time_us)
     }
 
-    fn tick(&mut self, raw: &RawFrame, now_us: u64) {
-        let whole = !raw
-            .hall
-            .iter()
-            .chain(&raw.capacitive)
-            .any(|c| *c == MISSING_CODE);
-        if !whole {
-            return;
+    fn tick(&mut self, raw: &RawFrame, now_us: u64) -> Option<BusTick> {
+        let codes = raw.hall.iter().chain(&raw.capacitive);
+        if codes.clone().any(|c| *c == MISSING_CODE) {
+            return None;
         }
-        let ahead = self.last.map_or(0, |last| raw.sequence.wrapping_sub(last));
-        self.last = Some(raw.sequence);
-        let counts = &mut self.reading.counts;
-        counts.ticks += 1;
+        let (ahead, before) = self.last.map_or((0, 0), |(last, before)| {
+            (raw.sequence.wrapping_sub(last), before)
+        });
+        let sequence = before + u64::from(ahead);
+        self.last = Some((raw.sequence, sequence));
+        self.counts.ticks += 1;
         if ahead > 1 {
-            counts.gaps += 1;
-            counts.ticks_missing += u64::from(ahead - 1);
+            self.counts.gaps += 1;
+            self.counts.ticks_missing += u64::from(ahead - 1);
         }
-        let before = self.reading.ticks.last().map_or(0, |t| t.sequence);
         let age_us = (now_us as u32).wrapping_sub(raw.time_us);
         // The record's clock may step back within a tick.
         let age_us = if age_us > u32::MAX / 2 { 0 } else { age_us };
-        self.reading.ticks.push(BusTick {
-            sequence: before + u64::from(ahead),
+        Some(BusTick {
+            sequence,
             follows: !core::mem::take(&mut self.restarted),
             received_us: now_us.saturating_sub(age_us.into()),
             hall: raw.hall,
             capacitive: raw.capacitive,
-        });
+        })
     }
 
-    fn finish(mut self, path: &Path) -> Result<BusReading, ImportError> {
-        self.reading.counts.health = *self.receiver.health();
-        if self.reading.ticks.is_empty() {
-            return Err(ImportError::NoTicks {
-                path: path.to_owned(),
-                frames: self.reading.counts.frames,
-            });
+    /// What came so far.
+    pub(in crate::bus) fn counts(&self) -> BusCounts {
+        let health = self.receiver.as_ref().map(SensorReceiver::health);
+        BusCounts {
+            health: health.copied().unwrap_or_default(),
+            ..self.counts
         }
-        Ok(self.reading)
+    }
+
+    /// How codes come, once some have.
+    pub(in crate::bus) const fn layout(&self) -> Option<Layout> {
+        self.layout
     }
 }

@@ -1,14 +1,18 @@
 //! The decoding node, without a bus and without a clock: frames and times in, frames out.
 
-use hal_adapters::can::command::{Answer, Command, IdentityPage, Mailbox, Outcome, Request, Told};
-use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus, flag};
+use hal_adapters::can::command::{Command, Told};
+use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus};
 use hal_adapters::can::table::SLOW_TICKS;
 use hal_adapters::can::{
-    BusFault, Coded, Layout, Message, PROTOCOL_VERSION, PoseSender, SensorReceiver, StampedFrame,
-    Timing,
+    BusFault, Coded, Layout, Message, PROTOCOL_VERSION, PoseSender, SensorReceiver, Service,
+    StampedFrame, Timing,
 };
-use runtime::rezero::{RezeroSettings, RezeroState};
-use runtime::{Decode, OnInvalid, PlanarPose, RawFrame, Reading, Servo, Status};
+use runtime::{Decode, OnInvalid, RawFrame, Reading, Servo, Status};
+
+/// Ticks of a second: while the sensors are silent the node publishes at this rate.
+const TICKS_PER_S: u32 = 1_000_000 / SILENT_US;
+/// Time from pose to pose while the sensors are silent, us.
+const SILENT_US: u32 = 2_000;
 
 /// How a node is set up.
 #[derive(Clone, Copy, Debug)]
@@ -40,11 +44,9 @@ pub struct Node<'d> {
     receiver: SensorReceiver,
     servo: Servo<'d>,
     poses: PoseSender,
-    mailbox: Mailbox,
+    service: Service,
     serial: &'d str,
     ticks: u32,
-    rezero: Option<Command>,
-    flags: u8,
 }
 
 /// The reading that is published while no frames come.
@@ -59,11 +61,9 @@ impl<'d> Node<'d> {
             receiver: SensorReceiver::new(settings.layout, settings.timing),
             servo: Servo::new(decoder, settings.on_invalid),
             poses: PoseSender::new(settings.vertical_ticks),
-            mailbox: Mailbox::default(),
+            service: Service::new(TICKS_PER_S),
             serial,
             ticks: 0,
-            rezero: None,
-            flags: 0,
         }
     }
 
@@ -76,11 +76,15 @@ impl<'d> Node<'d> {
 
     /// Takes one frame; what is to be sent is added to `out`.
     pub fn take(&mut self, frame: &StampedFrame, out: &mut Vec<Coded>) -> Step {
-        match self.mailbox.take(&frame.frame) {
-            Some(Ok(Told::Command(command))) => {
-                self.obey(command, out);
+        match self.service.take(&frame.frame, Some(&mut self.servo)) {
+            Some(Ok(answered)) => {
+                out.extend(answered.answer);
+                // A controller spreads the pages over ticks, for its three mailboxes.
+                out.extend(core::iter::from_fn(|| {
+                    self.service.identity_page(self.serial)
+                }));
                 return Step {
-                    command: Some(command),
+                    command: Some(answered.command),
                     ..Step::default()
                 };
             }
@@ -90,7 +94,7 @@ impl<'d> Node<'d> {
                     ..Step::default()
                 };
             }
-            Some(Ok(_)) | None => {}
+            None => {}
         }
         // The receiver's times wrap after 71 minutes, as those of a controller do.
         let taken = self.receiver.take(&frame.frame, frame.time_us as u32);
@@ -105,7 +109,7 @@ impl<'d> Node<'d> {
                 status: NO_FRAMES,
                 ..Reading::default()
             };
-            self.publish(&reading, out);
+            self.publish(&reading, None, out);
         }
         self.step(taken.tick, taken.fault, out)
     }
@@ -114,7 +118,7 @@ impl<'d> Node<'d> {
     /// before the first frame.
     pub fn patience_us(&self, time_us: u64) -> Option<u32> {
         if self.receiver.is_stale() {
-            return Some(2_000);
+            return Some(SILENT_US);
         }
         let left = self.receiver.deadline_us()?.wrapping_sub(time_us as u32);
         Some(if left > u32::MAX / 2 { 0 } else { left })
@@ -128,8 +132,7 @@ impl<'d> Node<'d> {
     ) -> Step {
         let tick = tick.map(|frame| {
             let reading = self.servo.tick(&frame);
-            self.publish(&reading, out);
-            self.answer_rezero(out);
+            self.publish(&reading, Some(&frame), out);
             (frame, reading)
         });
         Step {
@@ -139,24 +142,21 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// Pose frames, and every sixteenth time state and a counter.
-    fn publish(&mut self, reading: &Reading, out: &mut Vec<Coded>) {
-        out.extend(self.poses.frames(reading));
+    /// Pose frames, every sixteenth time state and a counter, and the answer that is due.
+    fn publish(&mut self, reading: &Reading, sampled: Option<&RawFrame>, out: &mut Vec<Coded>) {
+        out.extend(self.poses.frames(reading, sampled));
         if self.ticks.is_multiple_of(u32::from(SLOW_TICKS)) {
             let round = self.ticks / u32::from(SLOW_TICKS);
             let status = Told::Status(self.status());
-            let health = Told::Health(HealthPage::of(&self.servo.health(), round));
-            out.extend([status, health].iter().filter_map(|t| self.mailbox.send(t)));
+            let health = Told::Health(HealthPage::of(&self.servo.health(), None, round));
+            out.extend([status, health].iter().filter_map(|t| self.service.tell(t)));
         }
+        // A computer has no service pin.
+        out.extend(self.service.tick(Some(&mut self.servo), None));
         self.ticks = self.ticks.wrapping_add(1);
     }
 
     fn status(&self) -> NodeStatus {
-        let running = if self.rezero.is_some() {
-            flag::REZERO_RUNS
-        } else {
-            0
-        };
         let missed = self.servo.health().frames_missed;
         NodeStatus {
             state: Some(if self.receiver.is_stale() {
@@ -165,69 +165,10 @@ impl<'d> Node<'d> {
                 NodeState::Running
             }),
             reason: 0,
-            flags: self.flags | running,
+            flags: self.service.flags(Some(&self.servo)),
             missed_ticks: u16::try_from(missed).unwrap_or(u16::MAX),
             bus_off: 0,
             version: PROTOCOL_VERSION,
-        }
-    }
-
-    fn obey(&mut self, command: Command, out: &mut Vec<Coded>) {
-        let outcome = match command.request {
-            None => Outcome::UnknownCommand,
-            Some(Request::Rezero { .. }) if self.rezero.is_some() => Outcome::Busy,
-            Some(Request::Rezero { ticks }) => {
-                let mut settings = RezeroSettings::default();
-                if ticks != 0 {
-                    settings.ticks = ticks;
-                }
-                self.rezero = Some(command);
-                self.servo.start_rezero(settings);
-                if matches!(self.servo.rezero_state(), RezeroState::Refused(_)) {
-                    return self.answer_rezero(out);
-                }
-                Outcome::Started
-            }
-            Some(Request::Identify { .. }) => {
-                let pages = (0..IdentityPage::PAGES).map(|p| IdentityPage::of(self.serial, p));
-                let told: Vec<Told> = pages.map(Told::Identity).collect();
-                out.extend(told.iter().filter_map(|t| self.mailbox.send(t)));
-                Outcome::Done
-            }
-            Some(Request::ClearZero) => {
-                self.servo.set_zero(PlanarPose::ZERO);
-                self.flags &= !flag::REZEROED;
-                Outcome::Done
-            }
-        };
-        self.answer(command, outcome, 0, out);
-    }
-
-    fn answer(&mut self, to: Command, outcome: Outcome, detail: u32, out: &mut Vec<Coded>) {
-        let answer = Told::Answer(Answer {
-            number: to.number,
-            token: to.token,
-            outcome: Some(outcome),
-            detail,
-        });
-        out.extend(self.mailbox.send(&answer));
-    }
-
-    /// Answers the request for a re-zero that has just ended.
-    fn answer_rezero(&mut self, out: &mut Vec<Coded>) {
-        let (outcome, detail) = match (self.rezero, self.servo.rezero_state()) {
-            (None, _) | (_, RezeroState::Idle | RezeroState::Running { .. }) => return,
-            (_, RezeroState::Done { .. }) => {
-                self.flags = (self.flags | flag::REZEROED) & !flag::REZERO_REFUSED;
-                (Outcome::Done, 0)
-            }
-            (_, RezeroState::Refused(refusal)) => {
-                self.flags |= flag::REZERO_REFUSED;
-                Outcome::of_refusal(&refusal)
-            }
-        };
-        if let Some(command) = self.rezero.take() {
-            self.answer(command, outcome, detail, out);
         }
     }
 

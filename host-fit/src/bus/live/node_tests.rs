@@ -1,10 +1,11 @@
 use super::*;
+use hal_adapters::can::command::{Mailbox, Outcome, Request};
 use hal_adapters::can::{BusFrame, PoseReceiver, sensor};
 use runtime::calibration::Origin;
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeGeometry;
 use runtime::model::{Probes, Sensitivity};
-use runtime::{AnyDecoder, Calibration};
+use runtime::{AnyDecoder, Calibration, PlanarPose};
 
 const SETTINGS: NodeSettings = NodeSettings {
     layout: Layout::Bits16,
@@ -137,48 +138,39 @@ fn a_request_to_identify_is_answered_with_the_serial_number() {
     assert_eq!(outcome, Some((42, Some(Outcome::Done))));
 }
 
-/// Asks for a re-zero, feeds ticks, gives every outcome that was answered.
-fn rezero(
-    node: &mut Node<'_>,
-    ticks: u16,
-    token: u8,
-    at: impl Fn(u32) -> u32,
-) -> Vec<Option<Outcome>> {
-    let mut host = Mailbox::default();
-    let command = Command::new(Request::Rezero { ticks }, token);
-    let frame = host.send(&Told::Command(command)).expect("known");
-    let mut out = Vec::new();
-    node.take(&stamped(frame, 0), &mut out);
-    for k in 1..60 {
-        let frame = RawFrame {
-            sequence: k,
-            time_us: k * 2_000,
-            ..raw(at(k))
+/// Commands are the service's, whose tests are its own: this one holds that the node uses it.
+#[test]
+fn a_re_zero_at_rest_is_done_while_the_servo_is_off() {
+    let decoder = decoder();
+    let mut node = Node::new(&*decoder, "", &SETTINGS);
+    let (mut host, mut out) = (Mailbox::default(), Vec::new());
+    for (token, request) in (1..).zip([
+        Request::Rezero { ticks: 250 },
+        Request::ServoOff { seconds: 1 },
+        Request::Rezero { ticks: 250 },
+    ]) {
+        let command = Told::Command(Command::new(request, token));
+        let frame = host.send(&command).expect("known");
+        node.take(&stamped(frame, 0), &mut out);
+    }
+    for sequence in 1..260 {
+        let rest = RawFrame {
+            hall: [400, -100, 200],
+            ..raw(sequence)
         };
-        out.extend(feed(node, &frame));
+        out.extend(feed(&mut node, &rest));
     }
     let outcome = |told| match told {
-        Told::Answer(answer) => answer.outcome,
+        Told::Answer(answer) => answer.outcome.map(|outcome| (answer.token, outcome)),
         other => panic!("{other:?}"),
     };
-    told(&out, &mut host).into_iter().map(outcome).collect()
-}
-
-#[test]
-fn a_re_zero_at_rest_is_started_and_done() {
-    let decoder = decoder();
-    let mut node = Node::new(&*decoder, "", &SETTINGS);
-    let outcomes = rezero(&mut node, 50, 1, |_| 400);
-    assert_eq!(outcomes, [Some(Outcome::Started), Some(Outcome::Done)]);
+    let outcomes: Vec<_> = told(&out, &mut host).into_iter().map(outcome).collect();
+    let want = [
+        (1, Outcome::ServoOn),
+        (2, Outcome::Done),
+        (3, Outcome::Started),
+        (3, Outcome::Done),
+    ];
+    assert_eq!(outcomes, want.map(Some));
     assert!(node.servo().zero().x_m != 0.0);
-}
-
-#[test]
-fn a_re_zero_in_motion_is_refused_with_its_reason() {
-    let decoder = decoder();
-    let mut node = Node::new(&*decoder, "", &SETTINGS);
-    let outcomes = rezero(&mut node, 50, 1, |k| k * 20);
-    assert_eq!(outcomes, [Some(Outcome::Started), Some(Outcome::Moved)]);
-    let outcomes = rezero(&mut node, 1, 2, |_| 400);
-    assert_eq!(outcomes, [Some(Outcome::TooShort)]);
 }

@@ -21,6 +21,7 @@ use runtime::ModelKind;
 use runtime::calibration::Origin;
 use runtime::geometry::ProbeCoordinates;
 use runtime::servo::OnInvalid;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -97,7 +98,8 @@ fn at_250_um(rows: &[Row]) -> bool {
 /// Runs the demo in `folder`, which must exist; log, stage, blob and poses are left there.
 ///
 /// # Errors
-/// [`HostError`] when a file cannot be written.
+/// [`HostError`] when a file cannot be written, or one of these names is there that is not of an
+/// earlier demo: its stage file tells.
 pub fn run(folder: &Path) -> Result<Demo, HostError> {
     let files = [
         "paper.csv.gz",
@@ -120,6 +122,16 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
         field_path,
         posterior_path,
     ] = &files;
+    let of_a_demo = fs::read(stage_path).is_ok_and(|text| text == STAGE_TOML.as_bytes());
+    if let Some(file) = files.iter().find(|file| file.exists() && !of_a_demo) {
+        return Err(HostError::Usage {
+            argument: "--out",
+            problem: format!(
+                "{} is there already and is not of this demo; name another folder",
+                file.display()
+            ),
+        });
+    }
     output::write_atomically(log_path, LOG_GZ)?;
     output::write_atomically(run_path, RUN_GZ)?;
     output::write_atomically(service_path, SERVICE_GZ)?;
@@ -152,7 +164,8 @@ pub fn run(folder: &Path) -> Result<Demo, HostError> {
     let errors = pose_file_errors(pose_path, dataset, &stage, &model_31.solution.parameters)?;
     let service = Service::new(&stage, &set)?;
     if let Some(known) = &service.known {
-        posterior_file::write(posterior_path, &service.field, known)?;
+        let bytes = posterior_file::to_bytes(posterior_path, &service.field, known)?;
+        output::write_atomically(posterior_path, &bytes)?;
     }
     blob_file::write(field_path, &service.field)?;
     let constants = model_31

@@ -6,10 +6,12 @@ use crate::diagnose::finding::Finding;
 use crate::fit::Fit;
 use crate::input::log::LogReading;
 use crate::input::stage::Stage;
+use crate::output::{Outputs, make_folder};
 use crate::problem::parameters::Parameters;
 use crate::report::errors;
 use crate::report::json::Report;
 use crate::report::page::Source;
+use crate::report::page_in;
 use crate::report::provenance::Provenance;
 use crate::report::text;
 use crate::report::verdict::End;
@@ -55,13 +57,15 @@ pub(super) fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
     )
 }
 
-/// Writes the report, if one is asked for: of a fit with its figures, or of a log that has none.
-pub(super) fn write_report(
+/// Adds the report to the outputs, if one is asked for: of a fit with its figures and its blob, or
+/// of a log that has none.
+pub(super) fn add_report(
+    outputs: &mut Outputs,
     args: &FitArgs,
     (log, stage): (&LogReading, &Stage),
     findings: &[Finding],
     fit: Option<(&Fit, &Report)>,
-    end: End,
+    (end, blob): (End, &[u8]),
 ) -> Result<(), HostError> {
     let Some(folder) = &args.report else {
         return Ok(());
@@ -79,7 +83,7 @@ pub(super) fn write_report(
         provenance.add_file(start, "parameters to start from");
     }
     if !matches!(end, End::Failed(_)) {
-        provenance.add_file(&args.out, "parameter blob, written");
+        provenance.add_bytes(&args.out, blob, "parameter blob, written");
     }
     let warnings = crate::cli::warnings_of(log);
     let source = Source {
@@ -91,5 +95,7 @@ pub(super) fn write_report(
         fit,
         end,
     };
-    Ok(source.write(folder)?)
+    let page = source.html()?;
+    make_folder(folder)?;
+    Ok(outputs.add(&page_in(folder), page.as_bytes())?)
 }

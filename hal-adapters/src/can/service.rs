@@ -1,0 +1,233 @@
+//! What a decoding node does on request, whatever it runs on: [`Service`] takes commands, obeys
+//! them, and has their answers sent.
+//!
+//! A zero that is set or cleared moves the pose at once, and with it a stage whose servo is on.
+//! So both are refused unless the servo was declared off ([`Request::ServoOff`]; the
+//! declaration ends by itself) and the board's service pin, where there is one, agrees. This
+//! guards against mistakes, not against malice: whoever can send on the bus can declare.
+//!
+//! ```
+//! use hal_adapters::can::BusFrame;
+//! use hal_adapters::can::command::{Command, Mailbox, Outcome, Request, Told};
+//! use hal_adapters::can::service::Service;
+//!
+//! let (mut host, mut node) = (Mailbox::default(), Service::new(500));
+//! let record = Told::Command(Command::new(Request::Record { on: true }, 17));
+//! let frame = BusFrame::from(host.send(&record).expect("a command"));
+//! let answered = node.take(&frame, None).expect("a command").expect("a sound one");
+//! assert!(node.is_recording());
+//! let answer = host.take(&BusFrame::from(answered.answer.expect("an answer")));
+//! assert!(matches!(answer, Some(Ok(Told::Answer(a))) if a.outcome == Some(Outcome::Done)));
+//! ```
+
+use super::command::{Answer, Command, IdentityPage, Mailbox, Outcome, Request, Told};
+use super::frame::Coded;
+use super::notice::BusFault;
+use super::status::flag;
+use embedded_can::Frame;
+use runtime::rezero::{RezeroSettings, RezeroState};
+use runtime::{PlanarPose, Servo};
+
+/// A command that came, and its answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answered {
+    /// What was asked for.
+    pub command: Command,
+    /// The answer, to be sent.
+    pub answer: Option<Coded>,
+}
+
+/// Obeys commands. It counts time in ticks, and needs [`Service::tick`] in every one.
+#[derive(Clone, Debug)]
+pub struct Service {
+    ticks_per_s: u32,
+    mailbox: Mailbox,
+    /// Token of the re-zero that runs.
+    rezero: Option<u8>,
+    was_refused: bool,
+    /// Ticks for which the servo is still declared off.
+    servo_off_ticks: u32,
+    /// Whether the service pin says that the servo is off; `None` without such a pin.
+    servo_off_pin: Option<bool>,
+    identify_ticks: u32,
+    /// The next page of the serial number to be sent.
+    page: u8,
+    is_recording: bool,
+}
+
+impl Service {
+    /// Before the first command; `ticks_per_s` is the servo's rate.
+    pub fn new(ticks_per_s: u32) -> Self {
+        Self {
+            ticks_per_s,
+            mailbox: Mailbox::default(),
+            rezero: None,
+            was_refused: false,
+            servo_off_ticks: 0,
+            servo_off_pin: None,
+            identify_ticks: 0,
+            page: IdentityPage::PAGES,
+            is_recording: false,
+        }
+    }
+
+    /// Sends codes from the start, as if asked for.
+    #[must_use]
+    pub const fn recording(mut self, is_on: bool) -> Self {
+        self.is_recording = is_on;
+        self
+    }
+
+    /// Takes a frame that came over the bus, and obeys it if it is a command. `servo` is `None`
+    /// for a node without parameters. `None` for a frame that is no command.
+    ///
+    /// # Errors
+    /// The command's frame is damaged or repeated: not obeyed, not answered.
+    pub fn take<F: Frame>(
+        &mut self,
+        frame: &F,
+        servo: Option<&mut Servo<'_>>,
+    ) -> Option<Result<Answered, BusFault>> {
+        match self.mailbox.take(frame)? {
+            Ok(Told::Command(command)) => {
+                let (outcome, detail) = self.obey(&command, servo);
+                let answer = self.answer(command.number, command.token, outcome, detail);
+                Some(Ok(Answered { command, answer }))
+            }
+            Ok(_) => None,
+            Err(fault) => Some(Err(fault)),
+        }
+    }
+
+    /// One tick, after the servo's own: the declaration and the blinking run on, and a re-zero
+    /// that has ended is answered. `servo_off_pin` is whether the service pin says that the
+    /// servo is off, `None` without such a pin.
+    pub fn tick(
+        &mut self,
+        servo: Option<&mut Servo<'_>>,
+        servo_off_pin: Option<bool>,
+    ) -> Option<Coded> {
+        self.identify_ticks = self.identify_ticks.saturating_sub(1);
+        self.servo_off_ticks = self.servo_off_ticks.saturating_sub(1);
+        self.servo_off_pin = servo_off_pin;
+        let (token, servo) = (self.rezero?, servo?);
+        let (outcome, detail) = match servo.rezero_state() {
+            RezeroState::Running { .. } if self.servo_is_off() => return None,
+            RezeroState::Running { .. } | RezeroState::Idle => {
+                servo.cancel_rezero();
+                (Outcome::ServoOn, 0)
+            }
+            RezeroState::Done { .. } => (Outcome::Done, 0),
+            RezeroState::Refused(refusal) => Outcome::of_refusal(&refusal),
+        };
+        self.rezero = None;
+        self.was_refused = outcome != Outcome::Done;
+        let number = Command::new(Request::Rezero { ticks: 0 }, token).number;
+        self.answer(number, token, outcome, detail)
+    }
+
+    /// The next page of the serial number, while one is due: a controller sends one in every
+    /// tick.
+    pub fn identity_page(&mut self, serial: &str) -> Option<Coded> {
+        if self.page >= IdentityPage::PAGES {
+            return None;
+        }
+        let page = IdentityPage::of(serial, self.page);
+        self.page += 1;
+        self.tell(&Told::Identity(page))
+    }
+
+    /// The frame with a state or a counter, numbered.
+    pub fn tell(&mut self, what: &Told) -> Option<Coded> {
+        self.mailbox.send(what)
+    }
+
+    /// The bits of [`flag`] that follow from commands.
+    pub fn flags(&self, servo: Option<&Servo<'_>>) -> u8 {
+        let on = |bit, is| if is { bit } else { 0 };
+        let zero = servo.map_or(PlanarPose::ZERO, Servo::zero);
+        on(flag::REZERO_RUNS, self.rezero.is_some())
+            | on(flag::ZERO_SET, zero != PlanarPose::ZERO)
+            | on(flag::REZERO_REFUSED, self.was_refused)
+            | on(flag::IDENTIFYING, self.is_identifying())
+            | on(flag::RECORDING, self.is_recording)
+    }
+
+    /// Whether the node is to show where it is.
+    pub const fn is_identifying(&self) -> bool {
+        self.identify_ticks > 0
+    }
+
+    /// Whether the codes of every tick are to be sent.
+    pub const fn is_recording(&self) -> bool {
+        self.is_recording
+    }
+
+    /// Whether the zero may be changed.
+    const fn servo_is_off(&self) -> bool {
+        self.servo_off_ticks > 0 && !matches!(self.servo_off_pin, Some(false))
+    }
+
+    fn obey(&mut self, command: &Command, servo: Option<&mut Servo<'_>>) -> (Outcome, u32) {
+        let Some(request) = command.request else {
+            return (Outcome::UnknownCommand, 0);
+        };
+        match (request, servo) {
+            (Request::Identify { seconds }, _) => {
+                self.identify_ticks = self.ticks_of(seconds);
+                self.page = 0;
+            }
+            (Request::Record { on }, _) => self.is_recording = on,
+            (Request::ServoOff { seconds }, _) => self.servo_off_ticks = self.ticks_of(seconds),
+            (Request::Rezero { .. } | Request::ClearZero, None) => {
+                return (Outcome::NoParameters, 0);
+            }
+            (Request::Rezero { .. } | Request::ClearZero, _) if self.rezero.is_some() => {
+                return (Outcome::Busy, 0);
+            }
+            (Request::Rezero { .. } | Request::ClearZero, _) if !self.servo_is_off() => {
+                return (Outcome::ServoOn, 0);
+            }
+            (Request::ClearZero, Some(servo)) => {
+                servo.set_zero(PlanarPose::ZERO);
+                self.was_refused = false;
+            }
+            (Request::Rezero { ticks }, Some(servo)) => {
+                return self.start_rezero(ticks, command.token, servo);
+            }
+        }
+        (Outcome::Done, 0)
+    }
+
+    fn start_rezero(&mut self, ticks: u16, token: u8, servo: &mut Servo<'_>) -> (Outcome, u32) {
+        let mut settings = RezeroSettings::default();
+        if ticks > 0 {
+            settings.ticks = ticks;
+        }
+        servo.start_rezero(settings);
+        if let RezeroState::Refused(refusal) = servo.rezero_state() {
+            self.was_refused = true;
+            return Outcome::of_refusal(&refusal);
+        }
+        self.rezero = Some(token);
+        self.was_refused = false;
+        (Outcome::Started, 0)
+    }
+
+    const fn ticks_of(&self, seconds: u8) -> u32 {
+        (seconds as u32).saturating_mul(self.ticks_per_s)
+    }
+
+    fn answer(&mut self, number: u8, token: u8, outcome: Outcome, detail: u32) -> Option<Coded> {
+        self.tell(&Told::Answer(Answer {
+            number,
+            token,
+            outcome: Some(outcome),
+            detail,
+        }))
+    }
+}
+
+#[cfg(test)]
+#[path = "service_tests.rs"]
+mod tests;

@@ -1,0 +1,233 @@
+extern crate std;
+
+use super::super::frame::BusFrame;
+use super::*;
+use crate::can::Message;
+use runtime::calibration::Origin;
+use runtime::frame::CodeWindow;
+use runtime::geometry::ProbeGeometry;
+use runtime::model::{Probes, Sensitivity};
+use runtime::{AnyDecoder, Calibration, ModelKind, OnInvalid, RawFrame};
+use std::vec::Vec;
+
+const TICKS_PER_S: u32 = 500;
+
+fn decoder() -> AnyDecoder {
+    let window = CodeWindow::between_rails(-32768, 32767).expect("16 bits");
+    let set = Calibration {
+        model: ModelKind::M30,
+        geometry: ProbeGeometry {
+            lever_arm_m: [0.2, -0.2, -0.36],
+            misalignment_rad: [0.0; 3],
+        },
+        probes: Probes::Linear([Sensitivity::constant(0.9); 3]),
+        hall_m_per_code: 6.25e-8,
+        hall_window: window,
+        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
+        capacitive_m_per_code: 1.5625e-8,
+        capacitive_window: window,
+        calibrated_planar: [1e-3; 3],
+        calibrated_vertical: [1e-3; 3],
+        sensitivity_min: Calibration::SENSITIVITY_MIN,
+    };
+    let set = set.prepare(&Origin::default());
+    set.expect("a sound stage").decoder()
+}
+
+/// A node with a servo, and a host that commands it.
+struct Stage<'d> {
+    servo: Servo<'d>,
+    service: Service,
+    host: Mailbox,
+    sequence: u32,
+    pin: Option<bool>,
+}
+
+impl<'d> Stage<'d> {
+    fn new(decoder: &'d AnyDecoder) -> Self {
+        Self {
+            servo: Servo::new(&**decoder, OnInvalid::Zero),
+            service: Service::new(TICKS_PER_S),
+            host: Mailbox::default(),
+            sequence: 0,
+            pin: None,
+        }
+    }
+
+    fn ask(&mut self, request: Request, token: u8) -> Outcome {
+        let command = Told::Command(Command::new(request, token));
+        let frame = BusFrame::from(self.host.send(&command).expect("a command"));
+        let taken = self.service.take(&frame, Some(&mut self.servo));
+        let answered = taken.expect("a command").expect("a sound one");
+        self.read(answered.answer.expect("an answer"), token)
+    }
+
+    fn read(&mut self, answer: Coded, token: u8) -> Outcome {
+        match self.host.take(&BusFrame::from(answer)) {
+            Some(Ok(Told::Answer(a))) if a.token == token => a.outcome.expect("a known one"),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Ticks at rest, a few um off; the answer that comes, of this token.
+    fn rest(&mut self, ticks: u32, token: u8) -> Option<Outcome> {
+        let mut outcome = None;
+        for _ in 0..ticks {
+            self.sequence += 1;
+            let frame = RawFrame {
+                hall: [100, -50, 70],
+                capacitive: [10, 20, 30],
+                sequence: self.sequence,
+                time_us: 0,
+            };
+            self.servo.tick(&frame);
+            if let Some(answer) = self.service.tick(Some(&mut self.servo), self.pin) {
+                assert_eq!(outcome, None);
+                outcome = Some(self.read(answer, token));
+            }
+        }
+        outcome
+    }
+
+    fn flags(&self) -> u8 {
+        self.service.flags(Some(&self.servo))
+    }
+}
+
+const REZERO: Request = Request::Rezero { ticks: 0 };
+
+#[test]
+fn the_zero_changes_only_while_the_servo_is_declared_off() {
+    let decoder = decoder();
+    let mut stage = Stage::new(&decoder);
+    assert_eq!(stage.ask(REZERO, 1), Outcome::ServoOn);
+    assert_eq!(
+        stage.ask(Request::ServoOff { seconds: 3 }, 2),
+        Outcome::Done
+    );
+    assert_eq!(stage.ask(REZERO, 3), Outcome::Started);
+    assert_eq!(stage.flags(), flag::REZERO_RUNS);
+    assert_eq!(stage.ask(REZERO, 4), Outcome::Busy);
+    assert_eq!(stage.ask(Request::ClearZero, 5), Outcome::Busy);
+    assert_eq!(stage.rest(600, 3), Some(Outcome::Done));
+    assert_eq!(stage.flags(), flag::ZERO_SET);
+    let zero = stage.servo.zero();
+    // The declaration ends three seconds after it was made.
+    assert_eq!(stage.rest(899, 0), None);
+    assert!(stage.service.servo_is_off());
+    stage.rest(1, 0);
+    assert_eq!(stage.ask(Request::ClearZero, 6), Outcome::ServoOn);
+    assert_eq!(stage.servo.zero(), zero);
+    assert_eq!(
+        stage.ask(Request::ServoOff { seconds: 1 }, 7),
+        Outcome::Done
+    );
+    assert_eq!(stage.ask(Request::ClearZero, 8), Outcome::Done);
+    assert_eq!(stage.flags(), 0);
+    assert_eq!(
+        stage.ask(Request::ServoOff { seconds: 0 }, 9),
+        Outcome::Done
+    );
+    assert_eq!(stage.ask(REZERO, 10), Outcome::ServoOn);
+}
+
+#[test]
+fn a_service_pin_that_says_on_overrules_the_declaration() {
+    let decoder = decoder();
+    let mut stage = Stage::new(&decoder);
+    stage.ask(Request::ServoOff { seconds: 9 }, 1);
+    for (pin, outcome) in [
+        (Some(false), Outcome::ServoOn),
+        (None, Outcome::Started),
+        (Some(true), Outcome::Busy),
+    ] {
+        stage.pin = pin;
+        assert_eq!(stage.rest(1, 0), None);
+        assert_eq!(stage.ask(REZERO, 2), outcome, "{pin:?}");
+    }
+}
+
+#[test]
+fn a_servo_that_goes_on_ends_a_re_zero_and_leaves_the_zero() {
+    let decoder = decoder();
+    let on: [fn(&mut Stage<'_>); 2] = [
+        |stage| {
+            assert_eq!(
+                stage.ask(Request::ServoOff { seconds: 0 }, 3),
+                Outcome::Done
+            )
+        },
+        |stage| stage.pin = Some(false),
+    ];
+    for go_on in on {
+        let mut stage = Stage::new(&decoder);
+        stage.ask(Request::ServoOff { seconds: 9 }, 1);
+        stage.ask(REZERO, 2);
+        assert_eq!(stage.rest(100, 0), None);
+        go_on(&mut stage);
+        assert_eq!(stage.rest(1, 2), Some(Outcome::ServoOn));
+        assert_eq!(stage.flags(), flag::REZERO_REFUSED);
+        assert_eq!(stage.rest(1000, 0), None);
+        assert_eq!(stage.servo.zero(), PlanarPose::ZERO);
+    }
+}
+
+#[test]
+fn a_re_zero_that_is_too_short_is_refused_at_once() {
+    let decoder = decoder();
+    let mut stage = Stage::new(&decoder);
+    stage.ask(Request::ServoOff { seconds: 1 }, 1);
+    assert_eq!(
+        stage.ask(Request::Rezero { ticks: 1 }, 2),
+        Outcome::TooShort
+    );
+    assert_eq!(stage.flags(), flag::REZERO_REFUSED);
+    assert_eq!(stage.ask(REZERO, 3), Outcome::Started);
+}
+
+#[test]
+fn a_node_without_parameters_records_and_identifies_and_has_no_zero() {
+    let (mut service, mut host) = (Service::new(TICKS_PER_S), Mailbox::default());
+    let mut outcomes = Vec::new();
+    for (token, request) in (1..).zip([
+        Request::Record { on: true },
+        Request::Identify { seconds: 1 },
+        Request::ServoOff { seconds: 1 },
+        REZERO,
+        Request::ClearZero,
+    ]) {
+        let command = Told::Command(Command::new(request, token));
+        let frame = BusFrame::from(host.send(&command).expect("a command"));
+        let answered = service
+            .take(&frame, None)
+            .expect("a command")
+            .expect("sound");
+        let answer = BusFrame::from(answered.answer.expect("an answer"));
+        match host.take(&answer) {
+            Some(Ok(Told::Answer(answer))) => outcomes.extend(answer.outcome),
+            other => panic!("{other:?}"),
+        }
+    }
+    use Outcome::{Done, NoParameters};
+    assert_eq!(outcomes, [Done, Done, Done, NoParameters, NoParameters]);
+    assert_eq!(service.flags(None), flag::RECORDING | flag::IDENTIFYING);
+    let pages: Vec<_> = core::iter::from_fn(|| service.identity_page("")).collect();
+    assert_eq!(pages.len(), usize::from(IdentityPage::PAGES));
+    assert!(pages.iter().all(|page| page.message == Message::Identity));
+    (0..TICKS_PER_S).for_each(|_| assert_eq!(service.tick(None, None), None));
+    assert_eq!(service.flags(None), flag::RECORDING);
+}
+
+#[test]
+fn a_repeated_command_is_neither_obeyed_nor_answered() {
+    let (mut service, mut host) = (Service::new(TICKS_PER_S), Mailbox::default());
+    let command = Told::Command(Command::new(Request::Record { on: true }, 1));
+    let frame = BusFrame::from(host.send(&command).expect("a command"));
+    assert!(matches!(service.take(&frame, None), Some(Ok(_))));
+    assert!(matches!(
+        service.take(&frame, None),
+        Some(Err(BusFault::Repeated { .. }))
+    ));
+    let foreign = BusFrame::new(embedded_can::StandardId::MAX, &[0; 8]).expect("eight bytes");
+    assert_eq!(service.take(&foreign, None), None);
+}

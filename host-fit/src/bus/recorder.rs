@@ -1,0 +1,93 @@
+//! `record`: asks a controller for the codes of its own converter, and records the bus, in the
+//! form of `candump -L`, until told to stop. No parameters are needed: the first calibration
+//! has none.
+
+mod run;
+mod watch;
+
+pub use run::run;
+pub use watch::Watch;
+
+use super::live::BusError;
+use crate::output::OutputError;
+use hal_adapters::can::command::Outcome;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// What is recorded, and for how long.
+#[derive(Clone, Debug)]
+pub struct RecorderSettings {
+    /// CAN interface, for instance can0.
+    pub interface: String,
+    /// Where to write the record.
+    pub out: PathBuf,
+    /// End after so long; on Ctrl-C if `None`.
+    pub duration: Option<Duration>,
+    /// Show on standard error, if that is a terminal, how it goes.
+    pub shows: bool,
+}
+
+/// A record.
+#[derive(Clone, Debug)]
+pub struct Recorded {
+    /// What it holds.
+    pub watch: Watch,
+    /// Whether the controller has confirmed that it sends no more codes.
+    pub is_stopped: bool,
+}
+
+/// More missing ticks than one in so many spoil a record: `check` warns of such a log.
+pub const MISSING_ONE_IN: u64 = 1_000;
+
+/// Why there is no record, or none to calibrate by.
+#[derive(Debug, thiserror::Error)]
+pub enum RecorderError {
+    /// The bus cannot be used.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The record cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// Nobody answers.
+    #[error(
+        "no controller on `{interface}` answered the request to send its codes within {waited_ms} ms; is it on, and is \
+         the interface set to its bit rate (`ip -details link show {interface}`)? Where a sensor node sends the codes \
+         and none is asked for, record with `candump -L`. Nothing was written"
+    )]
+    NoAnswer {
+        /// The interface.
+        interface: String,
+        /// How long an answer was waited for, ms.
+        waited_ms: u128,
+    },
+    /// It refuses.
+    #[error("the controller refuses to send its codes: {}; its program may be too old to record. Nothing was written", outcome.map_or("an answer that this version does not know".to_owned(), |outcome| format!("{outcome:?}")))]
+    Refused {
+        /// Its answer.
+        outcome: Option<Outcome>,
+    },
+    /// It agreed, and no codes came.
+    #[error(
+        "the controller agreed to send its codes, but none came in {seconds:.1} s: {state}. Nothing was written"
+    )]
+    NoCodes {
+        /// How long was recorded, s.
+        seconds: f64,
+        /// What the controller says of itself.
+        state: String,
+    },
+    /// Too many ticks are missing.
+    #[error(
+        "{missing} of {ticks} ticks are missing, more than one in {MISSING_ONE_IN}: {cause}. The record is kept in {}", path.display()
+    )]
+    TicksLost {
+        /// Ticks that are missing.
+        missing: u64,
+        /// Ticks that came, and those.
+        ticks: u64,
+        /// Where they may have been lost.
+        cause: String,
+        /// The record.
+        path: PathBuf,
+    },
+}

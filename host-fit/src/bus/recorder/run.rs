@@ -1,0 +1,198 @@
+//! The controller asked, the bus recorded, the controller asked again.
+
+use super::{MISSING_ONE_IN, Recorded, RecorderError, RecorderSettings, Watch};
+use crate::bus::live::{Bus, BusError};
+use crate::interrupt;
+use crate::output::growing_file::GrowingFile;
+use hal_adapters::can::command::{Answer, Command, Mailbox, Outcome, Request, Told};
+use hal_adapters::can::table::TABLE;
+use hal_adapters::can::{BusFrame, Message, StampedFrame};
+use hal_adapters::candump::LogLine;
+use std::io::{IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+/// Longest wait for a frame: how soon Ctrl-C is noticed on a silent bus.
+const WAIT_MAX: Duration = Duration::from_millis(50);
+/// How long an answer is waited for before the request is repeated.
+const PATIENCE: Duration = Duration::from_millis(300);
+/// How often a controller is asked.
+const ATTEMPTS: u8 = 4;
+/// Time from display to display.
+const SHOWN_EVERY: Duration = Duration::from_millis(200);
+
+/// Records until Ctrl-C or the end of the duration.
+///
+/// # Errors
+/// See [`RecorderError`]. Nothing is written unless codes came.
+pub fn run(settings: &RecorderSettings) -> Result<Recorded, RecorderError> {
+    let messages: Vec<Message> = TABLE.iter().map(|row| row.message).collect();
+    let mut session = Session {
+        settings,
+        bus: Bus::open(&settings.interface, &messages)?,
+        file: GrowingFile::create(&settings.out)?,
+        watch: Watch::default(),
+        mailbox: Mailbox::default(),
+        // A node ignores a request that equals the last one: another token for each program.
+        token: now_us() as u8,
+        started: Instant::now(),
+        shown: None,
+    };
+    let stop = interrupt::watch();
+    session.ask(true)?;
+    let recorded = session.record(stop);
+    let stopped = session.ask(false);
+    recorded?;
+    let is_stopped = match stopped {
+        Ok(()) => true,
+        // The codes are in the file: a controller that does not stop to send them spoils nothing.
+        Err(RecorderError::NoAnswer { .. } | RecorderError::Refused { .. }) => false,
+        Err(error) => return Err(error),
+    };
+    let watch = session.finish()?;
+    Ok(Recorded { watch, is_stopped })
+}
+
+fn now_us() -> u64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    since.map_or(0, |d| u64::try_from(d.as_micros()).unwrap_or(u64::MAX))
+}
+
+struct Session<'s> {
+    settings: &'s RecorderSettings,
+    bus: Bus,
+    file: GrowingFile,
+    watch: Watch,
+    mailbox: Mailbox,
+    token: u8,
+    started: Instant,
+    shown: Option<Instant>,
+}
+
+impl Session<'_> {
+    /// Asks for codes, or for an end of them, and waits for the answer.
+    fn ask(&mut self, on: bool) -> Result<(), RecorderError> {
+        for _ in 0..ATTEMPTS {
+            self.token = self.token.wrapping_add(1);
+            let command = Command::new(Request::Record { on }, self.token);
+            if let Some(coded) = self.mailbox.send(&Told::Command(command)) {
+                self.send(BusFrame::from(coded))?;
+            }
+            let asked = Instant::now();
+            while let Some(left) = PATIENCE.checked_sub(asked.elapsed()) {
+                match self.turn(left)? {
+                    Some(Told::Answer(answer)) if is_for(&answer, &command) => {
+                        return match answer.outcome {
+                            Some(Outcome::Done) => Ok(()),
+                            outcome => Err(RecorderError::Refused { outcome }),
+                        };
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Err(RecorderError::NoAnswer {
+            interface: self.settings.interface.clone(),
+            waited_ms: (PATIENCE * ATTEMPTS.into()).as_millis(),
+        })
+    }
+
+    fn record(&mut self, stop: &AtomicBool) -> Result<(), RecorderError> {
+        let started = Instant::now();
+        while !stop.load(Ordering::Relaxed) {
+            let left = match self.settings.duration {
+                None => WAIT_MAX,
+                Some(duration) => match duration.checked_sub(started.elapsed()) {
+                    None => break,
+                    Some(left) => left,
+                },
+            };
+            self.turn(left)?;
+            self.show();
+        }
+        Ok(())
+    }
+
+    /// Records the next frame, waiting for it no longer than `wait`; gives what it tells.
+    fn turn(&mut self, wait: Duration) -> Result<Option<Told>, RecorderError> {
+        let stamped = match self.bus.receive(wait.min(WAIT_MAX)) {
+            Ok(Some(stamped)) => stamped,
+            Ok(None) => return Ok(None),
+            Err(error) => return self.wait_out(error).map(|()| None),
+        };
+        self.write(&stamped)?;
+        Ok(self.watch.take(&stamped))
+    }
+
+    fn send(&mut self, frame: BusFrame) -> Result<(), RecorderError> {
+        match self.bus.send(&[frame], PATIENCE) {
+            Ok(()) => self.write(&StampedFrame {
+                time_us: now_us(),
+                frame,
+            }),
+            Err(error) => self.wait_out(error),
+        }
+    }
+
+    fn write(&mut self, stamped: &StampedFrame) -> Result<(), RecorderError> {
+        self.file.line(LogLine {
+            time_us: stamped.time_us,
+            interface: &self.settings.interface,
+            frame: stamped.frame,
+        })?;
+        Ok(())
+    }
+
+    /// An interface that is down and a queue that is full may pass; the ticks that are lost
+    /// then are counted.
+    fn wait_out(&self, error: BusError) -> Result<(), RecorderError> {
+        if !error.is_down() && !error.is_queue_full() {
+            return Err(error.into());
+        }
+        std::thread::sleep(Duration::from_millis(1));
+        Ok(())
+    }
+
+    /// One line that stays in place; a closed standard error is no reason to end.
+    fn show(&mut self) {
+        let mut out = std::io::stderr().lock();
+        let due = self.shown.is_none_or(|last| last.elapsed() >= SHOWN_EVERY);
+        if self.settings.shows && due && out.is_terminal() {
+            self.shown = Some(Instant::now());
+            let seconds = self.started.elapsed().as_secs_f64();
+            let _ = write!(out, "\r\x1b[2K{seconds:.1} s: {}", self.watch);
+            let _ = out.flush();
+        }
+    }
+
+    fn finish(self) -> Result<Watch, RecorderError> {
+        if self.shown.is_some() {
+            let _ = write!(std::io::stderr(), "\r\x1b[2K");
+        }
+        let counts = self.watch.counts();
+        if counts.ticks == 0 {
+            return Err(RecorderError::NoCodes {
+                seconds: self.started.elapsed().as_secs_f64(),
+                state: self.watch.state(),
+            });
+        }
+        self.file.finish()?;
+        let (missing, came) = (counts.ticks_missing, counts.ticks as u64);
+        if missing * MISSING_ONE_IN > missing + came {
+            return Err(RecorderError::TicksLost {
+                missing,
+                ticks: missing + came,
+                cause: match self.bus.dropped() {
+                    0 => self.watch.state(),
+                    frames => format!("this computer was too busy and dropped {frames} frames"),
+                },
+                path: self.settings.out.clone(),
+            });
+        }
+        Ok(self.watch)
+    }
+}
+
+fn is_for(answer: &Answer, command: &Command) -> bool {
+    (answer.number, answer.token) == (command.number, command.token)
+}

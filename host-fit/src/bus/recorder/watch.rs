@@ -1,0 +1,140 @@
+//! What a record holds so far.
+
+use crate::bus::import::bus_log::{BusCounts, Collector};
+use hal_adapters::can::command::{Mailbox, Told};
+use hal_adapters::can::status::{NodeState, NodeStatus};
+use hal_adapters::can::{Layout, StampedFrame};
+
+/// Watches the frames that are recorded: ticks of codes, and what the controller tells.
+#[derive(Clone, Debug, Default)]
+pub struct Watch {
+    collector: Collector,
+    mailbox: Mailbox,
+    status: Option<NodeStatus>,
+}
+
+impl Watch {
+    /// Takes a frame; gives what it tells, other than codes and poses.
+    pub fn take(&mut self, stamped: &StampedFrame) -> Option<Told> {
+        self.collector.take(stamped);
+        let told = self.mailbox.take(&stamped.frame)?.ok()?;
+        if let Told::Status(status) = told {
+            self.status = Some(status);
+        }
+        Some(told)
+    }
+
+    /// How codes come, once some have.
+    pub const fn layout(&self) -> Option<Layout> {
+        self.collector.layout()
+    }
+
+    /// Frames, ticks, gaps and faults of the codes.
+    pub fn counts(&self) -> BusCounts {
+        self.collector.counts()
+    }
+
+    /// What the controller says of itself.
+    pub fn state(&self) -> String {
+        let Some(status) = self.status else {
+            return "it does not tell its state".to_owned();
+        };
+        let reason = status.reason;
+        match status.state {
+            Some(NodeState::Running) => "it decodes".to_owned(),
+            Some(NodeState::NoParameters) => "it has no parameters yet".to_owned(),
+            Some(NodeState::BadParameters) => {
+                format!("its parameters are refused (reason {reason:#x})")
+            }
+            Some(NodeState::NoFrames) => {
+                format!("it gets no codes from its converter (reason {reason:#x})")
+            }
+            Some(NodeState::SensorFault) => {
+                format!("a sensor or the converter is faulty (reason {reason:#x})")
+            }
+            Some(NodeState::SelfTestFailed) => "it failed its own test".to_owned(),
+            Some(NodeState::Starting) => "it is starting".to_owned(),
+            None => "its state is one that this version does not know".to_owned(),
+        }
+    }
+}
+
+impl std::fmt::Display for Watch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let counts = self.counts();
+        let width = match self.layout() {
+            None => "no codes".to_owned(),
+            Some(Layout::Bits16) => format!("{} ticks of 16-bit codes", counts.ticks),
+            Some(Layout::Bits24) => format!("{} ticks of 24-bit codes", counts.ticks),
+        };
+        let health = &counts.health;
+        write!(
+            f,
+            "{width}, {} missing in {} gaps; {} frames, {} damaged, {} out of sequence; {}",
+            counts.ticks_missing,
+            counts.gaps,
+            counts.frames,
+            health.wrong_check + health.wrong_length,
+            health.wrong_sequence + health.late + health.repeated,
+            self.state()
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hal_adapters::can::{BusFrame, Coded, sensor};
+    use runtime::RawFrame;
+
+    fn stamped(coded: Coded, sequence: u32) -> StampedFrame {
+        StampedFrame {
+            time_us: 2_000 * u64::from(sequence),
+            frame: BusFrame::from(coded),
+        }
+    }
+
+    #[test]
+    fn ticks_and_gaps_of_either_layout_are_counted() {
+        for layout in [Layout::Bits16, Layout::Bits24] {
+            let mut watch = Watch::default();
+            for sequence in (0..100).filter(|s| !(20..22).contains(s) && *s != 50) {
+                let frame = RawFrame {
+                    hall: [1, 2, sequence as i32],
+                    capacitive: [3; 3],
+                    sequence,
+                    time_us: 0,
+                };
+                for coded in sensor::frames(layout, &frame) {
+                    assert_eq!(watch.take(&stamped(coded, sequence)), None);
+                }
+            }
+            assert_eq!(watch.layout(), Some(layout));
+            let counts = watch.counts();
+            assert_eq!(
+                (counts.ticks, counts.gaps, counts.ticks_missing),
+                (97, 2, 3)
+            );
+        }
+    }
+
+    #[test]
+    fn the_state_is_that_of_the_last_status() {
+        let (mut watch, mut node) = (Watch::default(), Mailbox::default());
+        assert_eq!(watch.state(), "it does not tell its state");
+        let status = Told::Status(NodeStatus {
+            state: Some(NodeState::NoFrames),
+            reason: 3,
+            flags: 0,
+            missed_ticks: 0,
+            bus_off: 0,
+            version: 1,
+        });
+        let frame = node.send(&status).expect("a status");
+        assert_eq!(watch.take(&stamped(frame, 0)), Some(status));
+        assert_eq!(
+            watch.state(),
+            "it gets no codes from its converter (reason 0x3)"
+        );
+    }
+}

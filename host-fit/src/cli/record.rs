@@ -1,0 +1,40 @@
+//! `host-fit record`.
+
+use super::args::seconds;
+use crate::bus::recorder::{self, RecorderSettings};
+use crate::cli::error::HostError;
+use crate::cli::terminal;
+use clap::Args;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Arguments of `record`.
+#[derive(Debug, Args)]
+pub(super) struct RecordArgs {
+    /// CAN interface, for instance can0.
+    #[arg(value_name = "IFACE")]
+    can: String,
+    /// Where to write the record, as `candump -L` does: for `import`.
+    #[arg(long, value_name = "BUS.log")]
+    out: PathBuf,
+    /// End after so many seconds; without it, on Ctrl-C.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    seconds: Option<Duration>,
+}
+
+/// Records, and says what the record holds.
+pub(super) fn run(args: RecordArgs) -> Result<(), HostError> {
+    super::keep_apart(&[Some(&args.out)], &[])?;
+    let settings = RecorderSettings {
+        interface: args.can,
+        out: args.out,
+        duration: args.seconds,
+        shows: !terminal::is_quiet(),
+    };
+    let recorded = recorder::run(&settings)?;
+    if !recorded.is_stopped {
+        terminal::warn(&["the controller did not confirm that it sends no more codes".to_owned()]);
+    }
+    let (watch, path) = (recorded.watch, settings.out.display());
+    terminal::print(&format!("recorded {watch}\nwrote {path}\n"))
+}
