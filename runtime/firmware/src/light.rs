@@ -3,7 +3,7 @@
 //! | LED | state |
 //! |---|---|
 //! | one flash a second | decoding |
-//! | two flashes a second | no parameters, or bad ones |
+//! | two flashes a second | no parameters, bad ones, or new ones that are coming |
 //! | three flashes a second | no codes from the converter, or a sensor fault |
 //! | steadily on | the controller failed its own test |
 //! | blinking fast, on as long as off | asked to show where it is |
@@ -27,7 +27,7 @@ pub const fn is_on(state: NodeState, identifying: bool, tick: u32) -> bool {
         NodeState::Starting => return false,
         NodeState::SelfTestFailed => return true,
         NodeState::Running => 1,
-        NodeState::NoParameters | NodeState::BadParameters => 2,
+        NodeState::NoParameters | NodeState::BadParameters | NodeState::Updating => 2,
         NodeState::NoFrames | NodeState::SensorFault => 3,
     };
     let slot = (tick % SECOND) / FLASH;

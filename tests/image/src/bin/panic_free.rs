@@ -7,6 +7,8 @@
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use hal_adapters::can::command::{Command, IdentityPage, Mailbox, Request, Told};
+use hal_adapters::can::service::{Service, Updates};
+use hal_adapters::can::update::{Change, Identity, Receiver, Running, Store, Written};
 use hal_adapters::can::{
     BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Timing, sensor,
 };
@@ -36,7 +38,7 @@ fn bus(frame: &RawFrame) {
         }
         black_box((receiver.poll(2), receiver.deadline_us(), *receiver.health()));
     }
-    for coded in sender.frames(&black_box(Reading::default())) {
+    for coded in sender.frames(&black_box(Reading::default()), Some(frame)) {
         let frame = black_box(BusFrame::from(coded));
         black_box((poses.take(&frame, 1), mailbox.take(&frame)));
     }
@@ -47,6 +49,53 @@ fn bus(frame: &RawFrame) {
         let told = Told::Identity(IdentityPage::of(black_box("HS-0007"), page));
         black_box(mailbox.send(&told));
     }
+}
+
+/// A store that has nothing and keeps nothing.
+struct Nowhere;
+
+impl Store for Nowhere {
+    fn running(&self) -> Option<Running<'_>> {
+        black_box(None)
+    }
+
+    fn newest_sequence(&self) -> u32 {
+        black_box(0)
+    }
+
+    fn has_room(&self) -> bool {
+        black_box(true)
+    }
+
+    fn has_previous(&self) -> bool {
+        black_box(true)
+    }
+
+    fn write(&mut self, sequence: u32, change: Change<'_>) -> Written {
+        black_box((sequence, change));
+        black_box(Written::Done)
+    }
+}
+
+/// An update over the bus.
+#[inline(never)]
+fn update(frame: &BusFrame) {
+    let identity = Identity {
+        serial: black_box(Some("HS-0007")),
+        key: black_box(Some([0; 16])),
+        program_version: 1,
+        program_hash: 2,
+    };
+    let (mut service, mut receiver) = (Service::new(500), Receiver::new(identity, 500));
+    let store = &mut Nowhere;
+    let updates = Updates {
+        receiver: &mut receiver,
+        store,
+        nonce: black_box(Some([0; 4])),
+    };
+    black_box(service.take_updating(frame, None, Some(updates)));
+    black_box(receiver.tick(service.servo_is_off(), store));
+    black_box((receiver.is_updating(), receiver.wants_reset()));
 }
 
 #[entry]
@@ -76,6 +125,7 @@ fn main() -> ! {
         black_box(decoder.constants().channel_faults(&frame).count());
     }
     bus(&frame);
+    update(&black_box(BusFrame::from(sensor::frames_16(&frame)[0])));
     loop {
         cortex_m::asm::wfi();
     }
