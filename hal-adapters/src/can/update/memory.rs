@@ -91,6 +91,7 @@ impl Store for MemoryStore {
             slot: 0,
             sequence: record.sequence,
             blob: record.blob(),
+            serial: &set.serial,
             created: &set.created,
             rms: set.fit.rms,
             peak: set.fit.peak,

@@ -4,7 +4,7 @@ use super::authentication::{Authenticator, Key, Nonce};
 use super::request::{UpdateData, UpdateRequest};
 use super::staging::{Staging, word_of};
 use super::store::{Change, Store, Written};
-use super::tell::{of_running, page};
+use super::tell::{of_running, page, word_of_text};
 use crate::can::command::{Answer, Outcome};
 use runtime::ParameterSet;
 use runtime::blob::{BlobError, MAX_BYTES};
@@ -327,6 +327,11 @@ impl<'s> Receiver<'s> {
             page::PROGRAM_HASH => self.identity.program_hash,
             page::LAST_UPDATE => needs_key | ended,
             page::NEWEST => store.newest_sequence(),
+            page::SERIAL..page::COUNT => {
+                let running = store.running().map(|running| running.serial);
+                let serial = self.identity.serial.or(running).unwrap_or_default();
+                word_of_text(serial, number - page::SERIAL)
+            }
             _ => return (Outcome::UnknownCommand, 0),
         };
         (Outcome::Done, value)

@@ -450,6 +450,8 @@ fn every_page_tells_what_runs() {
         .collect();
     let text = set.created.as_bytes();
     assert!(created.starts_with(text) && created[text.len()..].iter().all(|&byte| byte == 0));
+    let serial = u32::from_le_bytes(*b"HS-0");
+    assert_eq!(tell(&mut bench, page::SERIAL).1, serial);
     assert_eq!(tell(&mut bench, page::COUNT), (Outcome::UnknownCommand, 0));
     let read: Vec<u8> = (0..OLD.len().div_ceil(4))
         .flat_map(|index| {

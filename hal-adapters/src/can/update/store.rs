@@ -9,6 +9,8 @@ pub struct Running<'r> {
     pub sequence: u32,
     /// The blob, byte for byte.
     pub blob: &'r [u8],
+    /// Serial number of its stage, as the blob tells.
+    pub serial: &'r str,
     /// When it was made, as the blob tells.
     pub created: &'r str,
     /// rms error of X, Y, Rz of its fit: m, m, rad.

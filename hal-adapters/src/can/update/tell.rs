@@ -30,8 +30,15 @@ pub mod page {
     /// The highest sequence number in the store: above that of the running record if one waits
     /// for a reset.
     pub const NEWEST: u8 = 21;
+    /// Serial number of the stage: eight pages of four bytes of UTF-8, 0 after the end.
+    pub const SERIAL: u8 = 22;
     /// How many there are.
-    pub const COUNT: u8 = 22;
+    pub const COUNT: u8 = 30;
+}
+
+/// Four bytes of a text, 0 after its end.
+pub(super) fn word_of_text(text: &str, index: u8) -> u32 {
+    word_of(text.as_bytes(), index.into()).unwrap_or(0)
 }
 
 /// A page that follows from the store; `None` without a running record.
@@ -52,10 +59,7 @@ pub(super) fn of_running(number: u8, store: &dyn Store) -> Option<u32> {
             Some(u32::from_le_bytes(*crc))
         }
         page::LENGTH => u32::try_from(running.blob.len()).ok(),
-        page::CREATED..page::RMS => {
-            let k = usize::from(number - page::CREATED);
-            Some(word_of(running.created.as_bytes(), k).unwrap_or(0))
-        }
+        page::CREATED..page::RMS => Some(word_of_text(running.created, number - page::CREATED)),
         page::RMS..page::PEAK => number_of(running.rms, page::RMS),
         _ => number_of(running.peak, page::PEAK),
     }
