@@ -104,6 +104,25 @@ pub enum BlobError {
     },
 }
 
+impl BlobError {
+    /// Its number on the bus and in the state of a node: 1 to 11 in the order of the variants.
+    pub const fn number(&self) -> u8 {
+        match self {
+            Self::Truncated { .. } => 1,
+            Self::Erased => 2,
+            Self::BadMagic { .. } => 3,
+            Self::UnknownVersion { .. } => 4,
+            Self::BadHeader { .. } => 5,
+            Self::TrailingBytes { .. } => 6,
+            Self::BadCrc { .. } => 7,
+            Self::BadPayload => 8,
+            Self::Parameters(_) => 9,
+            Self::OtherStage => 10,
+            Self::BufferTooSmall { .. } => 11,
+        }
+    }
+}
+
 impl core::fmt::Display for BlobError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match *self {

@@ -43,6 +43,8 @@ pub enum Message {
     Identity,
     /// Number and time of the tick whose pose was just sent.
     PoseTime,
+    /// A word of new parameters.
+    UpdateData,
 }
 
 /// Who sends a message.
@@ -141,7 +143,7 @@ const VERTICAL: Rate = Rate::Decimated(VERTICAL_TICKS);
 /// Any two identifiers differ in at least four bits, so three flipped bits never turn one
 /// message into another. Every message has eight bytes.
 #[rustfmt::skip]
-pub const TABLE: [Spec; 18] = [
+pub const TABLE: [Spec; 19] = [
     row(M::Hall, "Hall", (0x100, 0x0d), (Sensor, EVERY), "Hall codes of 16 bits", &signals::HALL),
     row(M::Capacitive, "Capacitive", (0x10f, 0x1a), (Sensor, EVERY), "capacitive codes of 16 bits", &signals::CAPACITIVE),
     row(M::HallAb24, "HallAb24", (0x133, 0x27), (Sensor, EVERY), "second layout: Hall codes A and B of up to 24 bits", &signals::HALL_AB_24),
@@ -160,6 +162,7 @@ pub const TABLE: [Spec; 18] = [
     row(M::Health, "Health", (0x1ff, 0xd0), (Decoder, SLOW), "counters since start, one a frame", &signals::HEALTH),
     row(M::Identity, "Identity", (0x203, 0xdd), (Decoder, Rate::OnRequest), "serial number of the stage, six characters a page", &signals::IDENTITY),
     row(M::PoseTime, "PoseTime", (0x20c, 0xea), (Decoder, SLOW), "number and time of the tick whose X, Y, Rz came before it", &signals::POSE_TIME),
+    row(M::UpdateData, "UpdateData", (0x230, 0xf7), (Host, Rate::OnRequest), "a word of new parameters, or of the tag that authorises them", &signals::UPDATE_DATA),
 ];
 
 /// Bytes of every message.

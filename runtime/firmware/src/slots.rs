@@ -30,21 +30,8 @@ impl Refusal {
     };
 
     fn of(slot: u8, error: &BlobError) -> Self {
-        let kind = match error {
-            BlobError::Truncated { .. } => 1,
-            BlobError::Erased => 2,
-            BlobError::BadMagic { .. } => 3,
-            BlobError::UnknownVersion { .. } => 4,
-            BlobError::BadHeader { .. } => 5,
-            BlobError::TrailingBytes { .. } => 6,
-            BlobError::BadCrc { .. } => 7,
-            BlobError::BadPayload => 8,
-            BlobError::Parameters(_) => 9,
-            BlobError::OtherStage => 10,
-            BlobError::BufferTooSmall { .. } => 11,
-        };
         Self {
-            reason: slot << 4 | kind,
+            reason: slot << 4 | error.number(),
             erased: matches!(error, BlobError::Erased),
         }
     }
