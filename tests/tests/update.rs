@@ -342,7 +342,12 @@ fn activated_parameters_run_are_told_and_read_back() {
     assert_eq!(running.created, set.created.as_str());
     assert_eq!(identity.program_version, [1, 2, 3]);
     // The same again is not sent, and the record before comes back on demand.
-    let again = world.update(plan(NEW)).expect("nothing to do");
+    let again = Plan {
+        key: None,
+        declares_servo_off: false,
+        ..plan(NEW)
+    };
+    let again = world.update(again).expect("nothing to do");
     assert_eq!((again.sequence, again.is_active), (None, true));
     let back = world.update(Plan {
         activates: true,

@@ -190,14 +190,11 @@ impl Updater {
             let (expected, found) = (expected.clone(), identity.serial);
             return self.fail(UpdateError::OtherStage { expected, found });
         }
-        if identity.needs_key && self.plan.key.is_none() {
-            return self.fail(UpdateError::KeyNeeded);
-        }
         let running = identity.running.as_ref();
         let is_there = running.is_some_and(|running| {
             running.sequence == identity.newest_sequence && running.are(&self.plan.blob)
         });
-        let newest = identity.newest_sequence;
+        let (newest, needs_key) = (identity.newest_sequence, identity.needs_key);
         let sent = self.sequence;
         self.before.get_or_insert(identity);
         if is_there {
@@ -205,6 +202,9 @@ impl Updater {
             self.stored = (newest == sent && self.restarts > 0).then_some(sent);
             self.is_active = true;
             return self.close();
+        }
+        if needs_key && self.plan.key.is_none() {
+            return self.fail(UpdateError::KeyNeeded);
         }
         let Some(sequence) = newest.checked_add(1) else {
             return self.fail(UpdateError::NumbersUsedUp);
