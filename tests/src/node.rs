@@ -94,6 +94,11 @@ impl Node {
         }))
     }
 
+    /// Whether a transfer is open.
+    pub const fn is_updating(&self) -> bool {
+        self.receiver.is_updating()
+    }
+
     /// Whether it asked to be reset.
     pub const fn wants_reset(&self) -> bool {
         self.receiver.wants_reset()

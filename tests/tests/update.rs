@@ -1,7 +1,8 @@
 //! A host and a node on one bus, in memory: the host's own dialog against the adapters' own
 //! receiver, with a lossy bus, two hosts, resets, and a recording played again.
 
-use hal_adapters::can::update::{Key, Store};
+use hal_adapters::can::command::{Command, Mailbox, Request, Told};
+use hal_adapters::can::update::{Key, Store, UpdateData, UpdateRequest};
 use hal_adapters::can::{BusFrame, Coded};
 use hal_adapters::fault::{Fault, Random};
 use host_fit::bus::update::{
@@ -304,6 +305,41 @@ fn of_two_hosts_at_once_one_wins_or_both_in_turn() {
 }
 
 #[test]
+fn a_host_that_finds_another_at_it_gives_up_and_does_not_end_its_transfer() {
+    let mut world = World::new(None, &[], 1);
+    let command = |request, token| Told::Command(Command::new(request, token));
+    let mut other = Mailbox::default();
+    let begin = Request::Update(UpdateRequest::Begin { bytes: 500 });
+    let mut send = |world: &mut World, told| {
+        let coded = other.send(&told).expect("a known message");
+        world.to_node.send(world.now_us, BusFrame::from(coded));
+    };
+    send(&mut world, command(Request::ServoOff { seconds: 255 }, 3));
+    send(&mut world, command(begin, 200));
+    let mut host = Dialog::new(Updater::new(plan(NEW)), 1);
+    let mut next_us = 0;
+    while !host.is_over() {
+        for frame in world.slot() {
+            host.take(&frame, world.now_us);
+        }
+        let polled = host.poll(world.now_us);
+        if let Some(coded) = polled {
+            world.to_node.send(world.now_us, BusFrame::from(coded));
+        } else if world.now_us >= next_us {
+            next_us = world.now_us + 1_000_000;
+            let (token, index, word) = (200, 1, 2);
+            send(
+                &mut world,
+                Told::UpdateData(UpdateData { token, index, word }),
+            );
+        }
+    }
+    assert_eq!(host.into_job().result(), Err(UpdateError::Busy));
+    assert!(world.node.is_updating());
+    assert_eq!(world.node.store.writes(), 0);
+}
+
+#[test]
 fn a_reset_at_any_moment_leaves_the_old_or_the_new_and_the_update_goes_on() {
     for at_ms in (0..450).step_by(7) {
         let mut world = World::new(Some(KEY), &[], 5);
@@ -342,7 +378,12 @@ fn activated_parameters_run_are_told_and_read_back() {
     assert_eq!(running.created, set.created.as_str());
     assert_eq!(identity.program_version, [1, 2, 3]);
     // The same again is not sent, and the record before comes back on demand.
-    let again = world.update(plan(NEW)).expect("nothing to do");
+    let again = Plan {
+        key: None,
+        declares_servo_off: false,
+        ..plan(NEW)
+    };
+    let again = world.update(again).expect("nothing to do");
     assert_eq!((again.sequence, again.is_active), (None, true));
     let back = world.update(Plan {
         activates: true,

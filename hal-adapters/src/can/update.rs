@@ -23,12 +23,13 @@
 //! A transfer of length 0 has no words but those of the tag; its commit goes back to the record
 //! before the newest.
 //!
-//! Who may: where the node has a key, whoever sends the right tag ([`Authenticator`]): AES-CMAC over the
-//! transfer's nonce, the sequence number, the length and the blob. The nonce is drawn for each
-//! transfer, and each transfer ends with its first wrong tag, so that a recording of an update is worth
-//! nothing and a tag can be guessed once per transfer. Where the node has no key, whoever can
-//! send on the bus may: the check of a frame shows damage, not who sent it. Requests that store
-//! nothing are never authenticated, and so an open bus can always be used to hold the stage up.
+//! Who may: where the node has a key, whoever sends the right tag ([`Authenticator`]): AES-CMAC over
+//! the transfer's nonce, the blob, the sequence number and the length. A nonce is drawn for each
+//! transfer, and a transfer ends with its first wrong tag: a recording of an update is worth nothing,
+//! and each guess takes a transfer. Where the node has no key, whoever can send on the bus may:
+//! the check of a frame shows damage, not who sent it. What stores nothing needs no key: whoever can
+//! send can declare the servo off, keep a transfer open and reset the node, but not change its
+//! parameters.
 
 mod authentication;
 mod memory;

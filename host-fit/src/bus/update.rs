@@ -6,15 +6,17 @@
 
 mod dialog;
 mod identity;
+mod plan;
 mod read_back;
 mod run;
 mod updater;
 
 pub use dialog::{Dialog, Job, SPACING_US, Wish};
 pub use identity::{Identifier, Identity, RunningParameters};
+pub use plan::{Plan, Updated};
 pub use read_back::BlobReader;
 pub use run::{identify, read_back, update};
-pub use updater::{Plan, Updated, Updater};
+pub use updater::Updater;
 
 use super::live::BusError;
 use hal_adapters::can::command::Outcome;

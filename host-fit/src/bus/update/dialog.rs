@@ -235,3 +235,7 @@ impl<J: Job> Dialog<J> {
         self.mailbox.send(told)
     }
 }
+
+#[cfg(test)]
+#[path = "dialog_tests.rs"]
+mod tests;

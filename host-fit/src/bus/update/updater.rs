@@ -3,12 +3,13 @@
 use super::UpdateError;
 use super::dialog::{Job, TRANSFER_TOKEN, Wish};
 use super::identity::{Identity, Pages};
+use super::plan::{Plan, Updated};
 use hal_adapters::can::command::{Outcome, Request};
-use hal_adapters::can::update::{Key, TAG_INDEX, UpdateData, UpdateRequest, page, tag, word_of};
+use hal_adapters::can::update::{TAG_INDEX, UpdateData, UpdateRequest, page, tag, word_of};
 use std::collections::VecDeque;
 
 /// How long the servo is declared off: longer than an update takes, on a bad bus too.
-const SERVO_OFF_S: u8 = 60;
+const SERVO_OFF_S: u8 = 30;
 /// Pause before a node is asked again whether another host is done, us.
 const BUSY_US: u64 = 500_000;
 /// How often: longer than a node waits for a silent host.
@@ -21,37 +22,6 @@ const VERIFIED_MAX: u32 = 1_000;
 const RESET_US: u64 = 20_000;
 /// How often: 5 s.
 const RESET_MAX: u32 = 250;
-
-/// What is to be done.
-#[derive(Clone, Debug)]
-pub struct Plan {
-    /// The blob, which the caller has checked; empty to go back to the record before the newest.
-    pub blob: Vec<u8>,
-    /// Serial number of the stage that it belongs to; `None` for any.
-    pub serial: Option<String>,
-    /// The stage's key.
-    pub key: Option<Key>,
-    /// Declare the servo off for the time of the update.
-    pub declares_servo_off: bool,
-    /// Reset the node at the end, so that it runs the new parameters.
-    pub activates: bool,
-    /// Token of the first transfer; two programs need different ones.
-    pub token: u8,
-}
-
-/// What was done.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Updated {
-    /// The node before.
-    pub before: Identity,
-    /// Sequence number of the record; `None`: the node ran these parameters already, and nothing
-    /// was sent.
-    pub sequence: Option<u32>,
-    /// Whether the node has been reset and runs them.
-    pub is_active: bool,
-    /// Words that had to be sent again, and transfers that had to be begun anew.
-    pub repeated: (u32, u32),
-}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
@@ -190,14 +160,11 @@ impl Updater {
             let (expected, found) = (expected.clone(), identity.serial);
             return self.fail(UpdateError::OtherStage { expected, found });
         }
-        if identity.needs_key && self.plan.key.is_none() {
-            return self.fail(UpdateError::KeyNeeded);
-        }
         let running = identity.running.as_ref();
         let is_there = running.is_some_and(|running| {
             running.sequence == identity.newest_sequence && running.are(&self.plan.blob)
         });
-        let newest = identity.newest_sequence;
+        let (newest, needs_key) = (identity.newest_sequence, identity.needs_key);
         let sent = self.sequence;
         self.before.get_or_insert(identity);
         if is_there {
@@ -205,6 +172,9 @@ impl Updater {
             self.stored = (newest == sent && self.restarts > 0).then_some(sent);
             self.is_active = true;
             return self.close();
+        }
+        if needs_key && self.plan.key.is_none() {
+            return self.fail(UpdateError::KeyNeeded);
         }
         let Some(sequence) = newest.checked_add(1) else {
             return self.fail(UpdateError::NumbersUsedUp);
@@ -330,7 +300,11 @@ impl Updater {
                 self.restart(UpdateError::ServoOn { declared: true });
             }
             Outcome::ServoOn => self.fail(UpdateError::ServoOn { declared: false }),
-            Outcome::Busy => self.fail(UpdateError::Busy),
+            Outcome::Busy => {
+                // To declare the servo on would end the other host's transfer; it will do so.
+                self.is_declared = false;
+                self.fail(UpdateError::Busy);
+            }
             Outcome::NoRoom => self.fail(UpdateError::NoRoom),
             Outcome::NotAuthorised => self.restart(UpdateError::NotAuthorised),
             Outcome::StoreFailed => {
