@@ -92,7 +92,6 @@ mod flash;
 mod flash_model;
 mod journal;
 mod record;
-pub mod transfer;
 mod writing;
 
 pub use blobs::Stored;
@@ -411,5 +410,3 @@ mod cut_tests;
 mod fuzz_tests;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod transfer_tests;
