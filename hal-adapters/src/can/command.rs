@@ -339,7 +339,7 @@ impl Mailbox {
     pub fn send(&mut self, what: &Told) -> Option<Coded> {
         let (k, payload) = what.payload();
         let (message, counter) = (*Told::MESSAGES.get(k)?, self.sent.get_mut(k)?);
-        let bytes = protect(message.spec().key, *counter, payload);
+        let bytes = protect(message.key(), *counter, payload);
         *counter = counter.wrapping_add(1);
         Some(Coded { message, bytes })
     }

@@ -168,6 +168,28 @@ pub const TABLE: [Spec; 19] = [
 /// Bytes of every message.
 pub const FRAME_BYTES: usize = 8;
 
+/// What a node needs of a row. Where only this is used, the texts stay out of the program.
+#[derive(Clone, Copy)]
+struct OnTheWire {
+    message: Message,
+    id: u16,
+    key: u8,
+}
+
+const ON_THE_WIRE: [OnTheWire; TABLE.len()] = {
+    let (message, id, key) = (Message::Hall, 0, 0);
+    let mut rows = [OnTheWire { message, id, key }; TABLE.len()];
+    let mut k = 0;
+    while k < rows.len() {
+        let Spec {
+            message, id, key, ..
+        } = TABLE[k];
+        rows[k] = OnTheWire { message, id, key };
+        k += 1;
+    }
+    rows
+};
+
 impl Message {
     /// Its row of the table.
     #[inline(always)]
@@ -182,10 +204,28 @@ impl Message {
         }
     }
 
+    #[inline(always)]
+    const fn on_the_wire(self) -> &'static OnTheWire {
+        const ROWS: &[OnTheWire; TABLE.len()] = &ON_THE_WIRE;
+        // As in `spec`.
+        let place = self as usize;
+        if place < ROWS.len() {
+            &ROWS[place]
+        } else {
+            &ROWS[0]
+        }
+    }
+
+    /// Key of its data ID list; see [`super::e2e`].
+    #[inline(always)]
+    pub const fn key(self) -> u8 {
+        self.on_the_wire().key
+    }
+
     /// Its identifier.
     #[inline(always)]
     pub const fn id(self) -> StandardId {
-        match StandardId::new(self.spec().id) {
+        match StandardId::new(self.on_the_wire().id) {
             Some(id) => id,
             None => StandardId::MAX,
         }
@@ -194,7 +234,7 @@ impl Message {
     /// The message with this identifier, if it is one of ours.
     pub fn from_id(id: Id) -> Option<Self> {
         let Id::Standard(id) = id else { return None };
-        TABLE
+        ON_THE_WIRE
             .iter()
             .find(|row| row.id == id.as_raw())
             .map(|row| row.message)
@@ -210,6 +250,7 @@ mod tests {
         for (k, row) in TABLE.iter().enumerate() {
             assert_eq!(row.message as usize, k);
             assert_eq!(row.message.id().as_raw(), row.id);
+            assert_eq!(row.message.key(), row.key);
             assert_eq!(
                 Message::from_id(Id::Standard(row.message.id())),
                 Some(row.message)

@@ -357,7 +357,8 @@ fn check(blob: &[u8], serial: Option<&str>) -> Result<(), BlobError> {
     if blob.is_empty() {
         return Ok(());
     }
-    let set = ParameterSet::from_bytes(blob)?;
+    let read = ParameterSet::from_bytes(blob);
+    let set = read.as_ref().map_err(|error| *error)?;
     match serial {
         Some(serial) => set.expect_serial(serial),
         None => Ok(()),
