@@ -243,15 +243,17 @@ impl ParameterSet {
         }
         let (header, payload) =
             (body.split_at_checked(HEADER_BYTES)).ok_or(BlobError::BadPayload)?;
-        let mut set = layout::read(payload).ok_or(BlobError::BadPayload)?;
+        // Changed where it was read: a copy on the stack of a controller is 700 bytes.
+        let mut read = layout::read(payload);
+        let set = read.as_mut().ok_or(BlobError::BadPayload)?;
         // Each version holds its own models.
         if header.get(4..6) != Some(&set.layout_version().to_le_bytes()) {
             return Err(BlobError::BadPayload);
         }
         set.fit.forced = header.get(6) == Some(&1);
-        layout::check_finite(&mut set).map_err(BlobError::Parameters)?;
+        layout::check_finite(set).map_err(BlobError::Parameters)?;
         set.check_terms().map_err(BlobError::Parameters)?;
-        Ok(set)
+        read.ok_or(BlobError::BadPayload)
     }
 
     /// Refuses a set of another stage than `serial`.
