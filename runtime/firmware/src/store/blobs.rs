@@ -49,11 +49,10 @@ pub(super) struct Label {
 /// the stack at once.
 #[inline(never)]
 pub(super) fn checked(blob: &[u8], serial: Option<&str>) -> Result<Label, BlobError> {
-    let set = ParameterSet::from_bytes(blob)?;
+    let read = ParameterSet::from_bytes(blob);
+    let set = read.as_ref().map_err(|error| *error)?;
     serial.map_or(Ok(()), |serial| set.expect_serial(serial))?;
-    let ParameterSet {
-        serial, created, ..
-    } = set;
+    let (serial, created) = (set.serial.clone(), set.created.clone());
     Ok(Label { serial, created })
 }
 

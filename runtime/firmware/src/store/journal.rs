@@ -46,7 +46,7 @@ impl Place {
 }
 
 /// Whether the sector holds a journal.
-pub(super) fn is_journal(bytes: &[u8]) -> bool {
+pub fn is_journal(bytes: &[u8]) -> bool {
     word_of(bytes, 0) == JOURNAL
 }
 

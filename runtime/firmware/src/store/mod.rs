@@ -96,13 +96,14 @@ mod writing;
 
 pub use blobs::Stored;
 pub use flash::{Flash, FlashFault, SECTOR_BYTES, SECTOR_WORDS, Sector, WriteFault};
+pub use journal::is_journal;
 pub use record::Record;
 pub use writing::{Step, Writing};
 
 use blobs::{checked, plain, plain_by_age, stored, unusable};
 use journal::Place;
 use record::{MAX_UNITS, UNIT_BYTES, View};
-use runtime::blob::BlobError;
+use runtime::blob::{BlobError, MAGIC};
 
 /// Records before the newest one that are looked at for a good blob that differs.
 const PREVIOUS_TRIED: usize = 8;
@@ -158,15 +159,19 @@ pub struct Store {
 impl Store {
     /// At start-up: settles what was interrupted, chooses a record, and erases a sector if neither
     /// has room for a record of the largest size. With a `serial`, blobs of other stages are
-    /// refused.
+    /// refused. A plain blob is erased only where there is another to run: one of another stage or
+    /// of a newer layout may be right for another program.
     ///
     /// After a fault of the flash ([`Store::fault`]) the store is read as it is, and nothing is
     /// written until the next start.
     pub fn start(flash: &mut impl Flash, serial: Option<&'static str>) -> Self {
         let mut fault = journal::settle(flash).err();
         let mut store = Self::read(flash, serial);
-        if fault.is_none() && store.place_for(flash, MAX_UNITS).is_none() {
-            fault = journal::renew(flash, store.active.other()).err();
+        if fault.is_none()
+            && store.place_for(flash, MAX_UNITS).is_none()
+            && let Some(spare) = store.spare(flash)
+        {
+            fault = journal::renew(flash, spare).err();
             store = Self::read(flash, serial);
         }
         store.writable = fault.is_none();
@@ -219,6 +224,25 @@ impl Store {
         }
         store.newest = newest;
         store
+    }
+
+    /// Whether a record of any size can be written.
+    pub fn has_room(&self, flash: &impl Flash) -> bool {
+        self.writable && self.place_for(flash, MAX_UNITS).is_some()
+    }
+
+    /// The sector that a start may erase.
+    fn spare(&self, flash: &impl Flash) -> Option<Sector> {
+        if self.newest.is_some() || self.latest > 0 {
+            return Some(self.active.other());
+        }
+        let is = |wanted: fn(&[u8]) -> bool| {
+            Sector::ALL
+                .into_iter()
+                .find(|sector| wanted(flash.bytes(*sector)))
+        };
+        is(|bytes| bytes.iter().all(|byte| *byte == 0xff))
+            .or_else(|| is(|bytes| !bytes.starts_with(&MAGIC)))
     }
 
     /// The blob that the next start will use.

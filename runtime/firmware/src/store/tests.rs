@@ -285,7 +285,9 @@ fn a_word_that_is_stuck_is_told_wherever_it_is() {
         );
     }
     // The sector's own words, and one that is not erased.
-    empty.load(Sector::First, &[0; SECTOR_BYTES]);
+    for sector in Sector::ALL {
+        empty.load(sector, &[0; SECTOR_BYTES]);
+    }
     for word in [0, 1, 500] {
         let mut flash = empty.clone();
         flash.stuck = Some((Sector::First, word));
