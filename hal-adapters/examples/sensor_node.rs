@@ -70,7 +70,7 @@ impl Part {
             0x00 => {
                 let code = 0x8000 + 100 * u16::from(self.next_input);
                 let [high, low] = code.to_be_bytes();
-                answer.copy_from_slice(&[high, low, self.next_input << 4 | 0b0100]);
+                answer[..3].copy_from_slice(&[high, low, self.next_input << 4 | 0b0100]);
                 self.next_input += 1;
             }
             _ => {

@@ -23,6 +23,7 @@
 //! | [`decoder`] | one frame to one reading: the flat tick path |
 //! | [`servo`] | what lasts from tick to tick: hold, sequence, counters, re-zero |
 //! | [`rezero`] | the zero deviation measured at rest |
+//! | [`prediction`] | the pose at a later time than that of the sample |
 //! | [`parameters`], [`blob`] | the parameter set, and its bytes in flash |
 //! | [`arithmetic`] | the check at start-up that this machine rounds as the host does |
 //! | [`real`] | the operations that a number must have to run a model |
@@ -54,6 +55,7 @@ mod layout;
 pub mod model;
 pub mod parameters;
 pub mod pose;
+pub mod prediction;
 pub mod real;
 pub mod rezero;
 #[cfg(test)]
@@ -69,5 +71,6 @@ pub use frame::RawFrame;
 pub use model::{FieldModel, LinearModel, Model, ModelKind};
 pub use parameters::ParameterSet;
 pub use pose::{PlanarPose, Pose, VerticalPose};
+pub use prediction::Predictor;
 pub use servo::{OnInvalid, Servo};
 pub use status::Status;

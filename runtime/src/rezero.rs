@@ -164,8 +164,11 @@ impl RezeroRun {
             });
         }
         let vertical = reading.pose.vertical.to_array();
-        if let Some(refusal) = out_of_bounds(3, vertical, self.settings.vertical_max) {
-            return RezeroState::Refused(refusal);
+        if let Some((axis, value)) = beyond(vertical, self.settings.vertical_max) {
+            return RezeroState::Refused(RezeroRefusal::OutOfBounds {
+                axis: axis + 3,
+                value,
+            });
         }
         let pose = pose.to_array();
         if self.taken == 0 {
@@ -187,8 +190,13 @@ impl RezeroRun {
             *high = if d > *high { d } else { *high };
         }
         self.taken = self.taken.saturating_add(1);
-        if let Some(refusal) = self.moved() {
-            return RezeroState::Refused(refusal);
+        let spread = [
+            self.high[0] - self.low[0],
+            self.high[1] - self.low[1],
+            self.high[2] - self.low[2],
+        ];
+        if let Some((axis, spread)) = beyond(spread, self.settings.spread_max) {
+            return RezeroState::Refused(RezeroRefusal::Moved { axis, spread });
         }
         let all = self.half.saturating_mul(2);
         if self.taken < all {
@@ -200,28 +208,16 @@ impl RezeroRun {
         }
     }
 
-    fn moved(&self) -> Option<RezeroRefusal> {
-        let limits = self.settings.spread_max;
-        (0u8..)
-            .zip(self.low.iter().zip(&self.high).zip(limits))
-            .find_map(|(axis, ((low, high), limit))| {
-                let spread = high - low;
-                (spread > limit).then_some(RezeroRefusal::Moved { axis, spread })
-            })
-    }
-
     fn finish(&self) -> RezeroState {
-        let (n, limits) = (f32::from(self.half), self.settings.drift_max);
+        let n = f32::from(self.half);
         let (early, late) = (self.sum_first_half, self.sum_second_half);
         let drift = [
             (late[0] - early[0]) / n,
             (late[1] - early[1]) / n,
             (late[2] - early[2]) / n,
         ];
-        for (axis, (drift, limit)) in (0u8..).zip(drift.into_iter().zip(limits)) {
-            if drift.abs() > limit {
-                return RezeroState::Refused(RezeroRefusal::Drifted { axis, drift });
-            }
+        if let Some((axis, drift)) = beyond(drift, self.settings.drift_max) {
+            return RezeroState::Refused(RezeroRefusal::Drifted { axis, drift });
         }
         let all = n + n;
         let zero = [
@@ -229,11 +225,11 @@ impl RezeroRun {
             self.first[1] + (early[1] + late[1]) / all,
             self.first[2] + (early[2] + late[2]) / all,
         ];
-        match out_of_bounds(0, zero, self.settings.zero_max) {
-            Some(refusal) => RezeroState::Refused(refusal),
-            None => RezeroState::Done {
-                zero: PlanarPose::from_array(zero),
-            },
+        if let Some((axis, value)) = beyond(zero, self.settings.zero_max) {
+            return RezeroState::Refused(RezeroRefusal::OutOfBounds { axis, value });
+        }
+        RezeroState::Done {
+            zero: PlanarPose::from_array(zero),
         }
     }
 }
@@ -241,14 +237,13 @@ impl RezeroRun {
 /// Either half of the pose lies outside the calibrated range.
 const EXTRAPOLATED: Status = Status::PLANAR_EXTRAPOLATED.with(Status::VERTICAL_EXTRAPOLATED);
 
-/// The first of three values that is larger than its limit; `first_axis` is the axis of the
-/// first value.
-fn out_of_bounds(first_axis: u8, values: [f32; 3], limits: [f32; 3]) -> Option<RezeroRefusal> {
-    (first_axis..)
+/// The first of three values whose magnitude is above its limit, and which it is. Not inlined:
+/// it is called four times, off the tick path.
+#[inline(never)]
+fn beyond(values: [f32; 3], limits: [f32; 3]) -> Option<(u8, f32)> {
+    (0u8..)
         .zip(values.into_iter().zip(limits))
-        .find_map(|(axis, (value, limit))| {
-            (value.abs() > limit).then_some(RezeroRefusal::OutOfBounds { axis, value })
-        })
+        .find_map(|(axis, (value, limit))| (value.abs() > limit).then_some((axis, value)))
 }
 
 #[cfg(test)]

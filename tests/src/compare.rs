@@ -1,6 +1,6 @@
 //! The host's words of a job, and where the target's differ.
 
-use crate::job::{self, ANSWER_WORDS, Bare, FRAME_WORDS, HEAD_WORDS, Head};
+use crate::job::{self, ANSWER_WORDS, Bare, FRAME_WORDS, HEAD_WORDS, Head, PredictingServo};
 use crate::motion::Section;
 use runtime::{BlobError, Decode, FieldModel, LinearModel, ParameterSet, RawFrame, Reading, Servo};
 
@@ -171,8 +171,13 @@ fn run(
     })?;
     let decoder = set.decoder();
     let mut servo = Servo::new(&*decoder, section.head.on_invalid());
+    let mut predicting = PredictingServo::new(servo.clone());
     for (tick, frame) in section.frames.iter().enumerate() {
-        take(tick, frame, servo.tick(frame));
+        let reading = match section.head.source {
+            job::PREDICTED => predicting.tick(frame),
+            _ => servo.tick(frame),
+        };
+        take(tick, frame, reading);
     }
     Ok(())
 }

@@ -5,19 +5,21 @@
 //!
 //! | words | what |
 //! |---|---|
-//! | 4 | source ([`WORDS`], [`FIELD_WORDS`] or [`BLOB`]), frames, hold in ticks, bytes of the blob |
+//! | 4 | source ([`WORDS`], [`FIELD_WORDS`], [`BLOB`] or [`PREDICTED`]), frames, hold in ticks, bytes of the blob |
 //! | 44, 116 or the blob | the decoder's constants, a zero deviation and the probes' coefficients as bare words, or a blob padded with 0xFF to whole words |
 //! | 7 a frame | Hall codes A, B, C, capacitive codes 1, 2, 3, sequence number |
 //!
 //! Bare words go straight into a decoder, unchecked: they may be anything. A blob is loaded
-//! as from flash and run by a servo. This file is compiled into the host's tool and into the
+//! as from flash and run by a servo; in a section of [`PREDICTED`] X, Y, Rz are those of a
+//! [`Predictor`]. This file is compiled into the host's tool and into the
 //! image, so it uses `core` only.
 
 use runtime::decoder::DecoderConstants;
 use runtime::frame::CodeWindow;
 use runtime::model::{FieldProbe, Sensitivity, Shape};
 use runtime::{
-    Decode, Decoder, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, RawFrame, Reading,
+    Decode, Decoder, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, Predictor, RawFrame,
+    Reading, Servo,
 };
 
 /// Source: a decoder of Model (31) and a zero deviation as bare words.
@@ -26,6 +28,8 @@ pub const WORDS: u32 = 1;
 pub const BLOB: u32 = 2;
 /// Source: as [`WORDS`], of the field model.
 pub const FIELD_WORDS: u32 = 3;
+/// Source: as [`BLOB`], with X, Y, Rz predicted by [`PredictingServo`].
+pub const PREDICTED: u32 = 4;
 /// Words of a section's head.
 pub const HEAD_WORDS: usize = 4;
 /// Bare words of constants, zero deviation and coefficients in the field model.
@@ -42,7 +46,7 @@ pub const BLOB_WORDS: usize = runtime::blob::MAX_BYTES / 4;
 /// The head of a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Head {
-    /// [`WORDS`], [`FIELD_WORDS`] or [`BLOB`].
+    /// [`WORDS`], [`FIELD_WORDS`], [`BLOB`] or [`PREDICTED`].
     pub source: u32,
     /// Frames that follow the parameters.
     pub frames: u32,
@@ -73,7 +77,7 @@ impl Head {
         match self.source {
             WORDS => Some(LINEAR_PARAMETER_WORDS),
             FIELD_WORDS => Some(PARAMETER_WORDS),
-            BLOB => {
+            BLOB | PREDICTED => {
                 let words = usize::try_from(self.blob_bytes).ok()?.div_ceil(4);
                 (words <= BLOB_WORDS).then_some(words)
             }
@@ -88,6 +92,36 @@ impl Head {
             Ok(ticks) => OnInvalid::Hold { ticks },
             Err(_) => OnInvalid::Hold { ticks: u16::MAX },
         }
+    }
+}
+
+/// A servo whose X, Y, Rz are predicted, from frames whose times its sequence numbers give.
+pub struct PredictingServo<'d> {
+    servo: Servo<'d>,
+    predictor: Predictor,
+}
+
+impl<'d> PredictingServo<'d> {
+    /// With the servo that decodes.
+    pub const fn new(servo: Servo<'d>) -> Self {
+        Self {
+            servo,
+            predictor: Predictor::new(4_000),
+        }
+    }
+
+    /// The reading with X, Y, Rz predicted to an age of 0 to 4.5 ms, and zero where there is no
+    /// prediction.
+    pub fn tick(&mut self, frame: &RawFrame) -> Reading {
+        // Every 2 ms with some jitter; the time wraps after 32 periods.
+        let k = frame.sequence;
+        let time_us = (k.wrapping_mul(2_000) | (k.wrapping_mul(k) & 15)).wrapping_sub(64_000);
+        let frame = RawFrame { time_us, ..*frame };
+        let mut reading = self.servo.tick(&frame);
+        self.predictor.take(&self.servo, &frame, &reading);
+        let at_us = time_us.wrapping_add(k.wrapping_mul(193) % 4_500);
+        reading.pose.planar = self.predictor.pose_at(at_us).unwrap_or(PlanarPose::ZERO);
+        reading
     }
 }
 

@@ -52,6 +52,12 @@ pub fn of_blob(blob: &[u8], frames: Vec<RawFrame>, hold: u16) -> Section {
     }
 }
 
+/// A section of a blob with X, Y, Rz predicted.
+pub fn predicted(mut section: Section) -> Section {
+    section.head.source = job::PREDICTED;
+    section
+}
+
 /// Frames run by a bare decoder with unchecked parameters.
 pub fn of_words<M: Bare>(decoder: &Decoder<M>, frames: Vec<RawFrame>) -> Section {
     let mut parameters = Vec::new();

@@ -35,10 +35,10 @@
 //! second frame begins after the next conversion has ended (192 or 203 us: frames of at least 21 us;
 //! 22.9 us at 10.5 MHz without gaps) and the third one before two more have (256 us: frames of at
 //! most 37 us, 1.2 us per byte): they are then the mean, weighted by the sinc3 filter, of the 96 us
-//! up to 192 us, or 203 us, after the trigger: the middle is
-//! [`SAMPLE_US`](FrameSampler::SAMPLE_US) = 144 us, or 155 us, after it. A part that drops the
-//! newest conversion, or needs the fourth frame, is one or two conversions of 32 us later: 0.15 or
-//! 0.3 um at the fastest motion of a service log (4.8 mm/s).
+//! up to 192 us, or 203 us, after the trigger. The middle is 144 or 155 us after it;
+//! [`SAMPLE_US`](FrameSampler::SAMPLE_US) = 150 us is within 6 us of both. A part that drops the
+//! newest conversion, or needs the fourth frame, is a conversion of 32 us later: 0.15 um at the
+//! fastest motion of a service log (4.8 mm/s). Whichever it is, it is the same in every tick.
 //!
 //! The pulse must be shorter than 2048 periods of CLKIN, 256 us; a longer one is a reset. The part
 //! ignores a pulse that coincides with the end of a conversion, which then is settled anyway. At
@@ -46,8 +46,9 @@
 //!
 //! **Checks.** Each frame has a CRC, and besides codes the three of a tick carry
 //! - the STATUS: a reset, a locked interface, a register that changed (REG_CRC_EN makes the part
-//!   compare its registers' CRC every 94 us), and whether SYNC arrived. Two ticks in a row
-//!   without a resynchronisation mean that its wire is broken;
+//!   compare its registers' CRC every 94 us; a change in the 0.2 ms before the codes are read is
+//!   told a tick later), and whether SYNC arrived. Two ticks in a row without a resynchronisation
+//!   mean that its wire is broken;
 //! - one register, read back and compared: all of 0x02 to 0x30 in turn, in 94 ms.
 //!
 //! The trigger after a failed start leaves SYNC/RESET low for one period: a reset that also helps
@@ -83,7 +84,6 @@ const RESET: u16 = 0x0011;
 const RESET_DONE: u16 = 0xff28;
 const READ: u16 = 0xa000;
 const WRITE: u16 = 0x6000;
-const WRITTEN: u16 = 0x4000;
 
 const ID: u8 = 0x00;
 const STATUS: u8 = 0x01;
@@ -183,12 +183,6 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
         Ok(frame)
     }
 
-    /// Sends a command and fetches its response with the next frame.
-    fn ask(&mut self, command: u16, data: u16) -> Result<u16, AdcError<SPI::Error>> {
-        self.exchange(command, data)?;
-        Ok(self.exchange(NULL, 0)?.response)
-    }
-
     /// The value that a register must have: 0x02 to 0x30.
     const fn wanted(&self, register: u8) -> u16 {
         match register {
@@ -200,17 +194,6 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
         }
     }
 
-    /// Writes a register and reads it back.
-    fn set(&mut self, register: u8) -> Result<(), AdcError<SPI::Error>> {
-        let (address, wanted) = (u16::from(register) << 7, self.wanted(register));
-        let written = self.ask(WRITE | address, wanted)?;
-        let found = self.ask(READ | address, 0)?;
-        if written != WRITTEN | address {
-            return wrong_setting(register, found, wanted);
-        }
-        compare(register, found, wanted)
-    }
-
     fn try_start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
         self.sync.set_high().map_err(|e| AdcError::Pin(e.kind()))?;
         // This frame answers an earlier command, so neither its content nor its check matters.
@@ -218,22 +201,18 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
             Err(AdcError::Bus(error)) => return Err(AdcError::Bus(error)),
             Ok(_) | Err(_) => delay.delay_us(RESET_US),
         }
-        let response = self.exchange(READ | u16::from(ID) << 7, 0)?.response;
-        if response != RESET_DONE {
-            return Err(AdcError::WrongId {
-                found: response,
-                expected: RESET_DONE,
-            });
-        }
+        // Each frame answers the one before it.
+        let (read, write) = (|r: u8| READ | address(r), |r: u8| WRITE | address(r));
+        let found = self.exchange(read(ID), 0)?.response;
+        check_id(found, u16::MAX, RESET_DONE)?;
+        let found = self.exchange(write(CLOCK), self.wanted(CLOCK))?.response;
+        check_id(found, ID_MASK, ID_WANTED)?;
+        self.exchange(write(MODE_REGISTER), MODE_WANTED)?;
+        self.exchange(read(CLOCK), 0)?;
+        let found = self.exchange(read(MODE_REGISTER), 0)?.response;
+        compare(CLOCK, found, self.wanted(CLOCK))?;
         let found = self.exchange(NULL, 0)?.response;
-        if found & ID_MASK != ID_WANTED {
-            return Err(AdcError::WrongId {
-                found,
-                expected: ID_WANTED,
-            });
-        }
-        self.set(CLOCK)?;
-        self.set(MODE_REGISTER)
+        compare(MODE_REGISTER, found, MODE_WANTED)
     }
 
     /// Whether the responses of a tick, `None` if it was none, tell of a resynchronisation.
@@ -251,16 +230,24 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
     }
 }
 
-/// Compares what a register has with what it must have.
-fn compare<B>(register: u8, found: u16, wanted: u16) -> Result<(), AdcError<B>> {
-    if found == wanted {
+/// Where commands have the address of a register.
+const fn address(register: u8) -> u16 {
+    (register as u16) << 7
+}
+
+fn check_id<B>(found: u16, mask: u16, expected: u16) -> Result<(), AdcError<B>> {
+    if found & mask == expected {
         Ok(())
     } else {
-        wrong_setting(register, found, wanted)
+        Err(AdcError::WrongId { found, expected })
     }
 }
 
-const fn wrong_setting<B>(register: u8, found: u16, wanted: u16) -> Result<(), AdcError<B>> {
+/// Compares what a register has with what it must have.
+fn compare<B>(register: u8, found: u16, wanted: u16) -> Result<(), AdcError<B>> {
+    if found == wanted {
+        return Ok(());
+    }
     Err(AdcError::WrongSetting {
         register,
         found,
@@ -270,10 +257,13 @@ const fn wrong_setting<B>(register: u8, found: u16, wanted: u16) -> Result<(), A
 
 fn check_status<B>(found: u16) -> Result<(), AdcError<B>> {
     if found & STATUS_MASK == STATUS_WANTED {
-        Ok(())
-    } else {
-        wrong_setting(STATUS, found, STATUS_WANTED)
+        return Ok(());
     }
+    Err(AdcError::WrongSetting {
+        register: STATUS,
+        found,
+        wanted: STATUS_WANTED,
+    })
 }
 
 impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
@@ -286,8 +276,9 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
     /// conversion.
     const SETTLE_US: u32 = 182;
 
-    /// The middle of the 96 us before 192 us, when the conversion ends that is read.
-    const SAMPLE_US: u32 = 144;
+    /// The middle of the 96 us before 192 or 203 us, when the conversion ends that is read: 144 or
+    /// 155 us.
+    const SAMPLE_US: u32 = 150;
 
     const CODE_BITS: u32 = 24;
 
@@ -319,7 +310,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
         let status_is_first = core::mem::take(&mut self.status_is_next);
         let is_ready = |frame: &Frame| frame.response as u8 & read == read;
 
-        let first = self.exchange(READ | u16::from(register) << 7, 0)?.response;
+        let first = self.exchange(READ | address(register), 0)?.response;
         let found = self.exchange(NULL, 0)?.response;
         let mut frame = self.exchange(NULL, 0)?;
         if !is_ready(&frame) {

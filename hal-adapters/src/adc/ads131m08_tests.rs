@@ -95,14 +95,10 @@ fn started() -> Vec<Vec<Transaction<u8>>> {
     vec![
         frame(0x0011, 0, answer(0x0500, QUIET)),
         frame(0xa000, 0, answer(0xff28, QUIET)),
-        frame(0x0000, 0, answer(0x2804, QUIET)),
-        frame(0x6180, 0x3f02, answer(0x0500, QUIET)),
-        frame(0x0000, 0, answer(0x4180, QUIET)),
-        frame(0xa180, 0, answer(0x0500, QUIET)),
-        frame(0x0000, 0, answer(0x3f02, QUIET)),
-        frame(0x6100, 0x2110, answer(0x0500, QUIET)),
-        frame(0x0000, 0, answer(0x4100, QUIET)),
-        frame(0xa100, 0, answer(0x0100, QUIET)),
+        frame(0x6180, 0x3f02, answer(0x2804, QUIET)),
+        frame(0x6100, 0x2110, answer(0x4180, QUIET)),
+        frame(0xa180, 0, answer(0x4100, QUIET)),
+        frame(0xa100, 0, answer(0x3f02, QUIET)),
         frame(0x0000, 0, answer(0x2110, QUIET)),
     ]
 }
@@ -136,7 +132,7 @@ fn a_part_that_does_not_confirm_its_reset_or_has_other_channels_is_refused() {
     );
 
     let mut all = started()[..3].to_vec();
-    all[2] = frame(0x0000, 0, answer(0x2401, QUIET));
+    all[2] = frame(0x6180, 0x3f02, answer(0x2401, QUIET));
     let (found, expected) = (0x2401, 0x2800);
     assert_eq!(
         try_start(&all.concat()),
@@ -146,14 +142,17 @@ fn a_part_that_does_not_confirm_its_reset_or_has_other_channels_is_refused() {
 
 #[test]
 fn a_setting_that_does_not_read_back_is_named() {
-    let mut all = started()[..7].to_vec();
-    all[6] = frame(0x0000, 0, answer(0xff0e, QUIET));
-    let error = AdcError::WrongSetting {
-        register: 0x03,
-        found: 0xff0e,
-        wanted: 0x3f02,
-    };
-    assert_eq!(try_start(&all.concat()), Err(error));
+    for (read, register, found, wanted) in [(5, 0x03, 0xff0e, 0x3f02), (6, 0x02, 0x0510, 0x2110)] {
+        let mut all = started()[..=read].to_vec();
+        let (command, data) = [(0xa100, 0), (0, 0)][read - 5];
+        all[read] = frame(command, data, answer(found, QUIET));
+        let error = AdcError::WrongSetting {
+            register,
+            found,
+            wanted,
+        };
+        assert_eq!(try_start(&all.concat()), Err(error));
+    }
 }
 
 /// Every byte is written out: this test alone defines what a frame is.

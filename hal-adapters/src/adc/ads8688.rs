@@ -16,36 +16,36 @@
 //! |---|---|---|---|
 //! | AUTO_SEQ_EN | 0x01 | 0xFF | channels that are read |
 //! | Channel Power Down | 0x02 | 0x00 | channels that are not read |
-//! | Feature Select | 0x03 | 0x00 | 0x42: channel and device address follow each code, device address 1 |
+//! | Feature Select | 0x03 | 0x00 | 0x43: channel, device address and input range follow each code, device address 1 |
 //! | Channel n Input Range | 0x05 + n | 0x00 | 0: +-2.5 times the reference |
 //!
-//! **Power-up.** The internal reference needs 15 ms until codes are right (table 6.5 and section
-//! PWR_DN), and the part does not tell. A start cannot know whether the power has just come, so that
-//! samples are [`NotReady`](AdcError::NotReady) for [`REFERENCE_US`] after every start. RST/PD is
+//! **Power-up.** The internal reference needs 15 ms until codes are right, and the part does not
+//! tell. A start cannot know whether the power has just come: samples are
+//! [`NotReady`](AdcError::NotReady) for [`REFERENCE_US`] after every start. RST/PD is
 //! held high: low for 40 to 100 ns it is a reset, for more than 400 ns it switches the part off,
 //! reference included.
 //!
 //! **Check.** The part has neither an identification register nor a CRC. At start, reset
 //! values that read back correctly show that it is there. Later each code is followed by its
 //! channel (4 bits), the device address (2 bits, here 01: a line stuck at 0 or at 1 fails) and
-//! two zeros, and all of these are checked. A flipped bit in the code itself goes unnoticed:
-//! prefer the [ADS131M08](super::ads131m08) on long cables. After the codes each tick reads one
-//! register back: all of them in turn, in 22 ms. (It comes last because only the AUTO_RST of the
-//! next tick starts the sequence again.)
+//! its input range (3 bits), and all of these are checked. A flipped bit in the code itself goes
+//! unnoticed: prefer the [ADS131M08](super::ads131m08) on long cables. After the codes each tick
+//! reads one register back: all of them in turn, in 22 ms. (It comes last because only the AUTO_RST
+//! of the next tick starts the sequence again.)
 //!
-//! **Timing.** Eight frames of 40 bits: 31 us at 10.5 MHz, plus chip select between them. From
-//! sample to sample it takes one frame, at least 3.8 us; the part needs 2 us.
+//! **Timing.** Eight frames of 48 bits: 37 us at 10.5 MHz, 50 us with the gaps between bytes. From
+//! sample to sample it takes one frame, about 6 us; the part needs 2 us.
 //!
-//! **Skew.** Channels are sampled one frame apart, about 5 us. Put the three Hall probes on
-//! neighbouring inputs: A and C are then 10 us apart, which at the fastest motion of a service
-//! log (4.8 mm/s) is 48 nm, a tenth of the Hall noise. The first and the last channel are 25 us
-//! apart, at the fastest vertical motion (1.4 mm/s) 34 nm of Z; this changes a sensitivity by
-//! 7 parts per million and the planar pose by 5 nm.
+//! **Skew.** Channels are sampled one frame apart, about 6 us. Put the three Hall probes on
+//! neighbouring inputs: A and C are then 12 us apart, which at the fastest motion of a service
+//! log (4.8 mm/s) is 58 nm, a tenth of the Hall noise. The first and the last channel are 30 us
+//! apart, at the fastest vertical motion (1.4 mm/s) 42 nm of Z; this changes a sensitivity by
+//! 8 parts per million and the planar pose by 6 nm.
 //!
 //! **Range.** +-10.24 V with the internal reference of 4.096 V, 312.5 uV per code, straight
 //! binary: 0 is the lower rail. Codes here are signed, -32768 to 32767, as in `stage.toml`. The
-//! inputs have 1 MOhm: one that is not connected reads about 0, see the wiring table of the firmware
-//! for the resistor that makes it read a rail.
+//! inputs have 1 MOhm: one that is not connected reads a code like any other, see the wiring table of
+//! the firmware for the resistor that makes it read a rail.
 
 use super::channels::INPUTS;
 use super::{AdcError, Channels, FrameSampler, silent};
@@ -54,8 +54,8 @@ use embedded_hal::digital::{Error as _, OutputPin};
 use embedded_hal::spi::{MODE_1, Mode, SpiDevice};
 use runtime::RawFrame;
 
-/// Bytes of a frame: command, code, signature.
-const FRAME_BYTES: usize = 5;
+/// Bytes of a frame: command, code, signature and range, of which the last bit is in the sixth.
+const FRAME_BYTES: usize = 6;
 
 const NO_OP: u16 = 0x0000;
 const RST: u16 = 0x8500;
@@ -68,9 +68,10 @@ const FEATURES: u8 = 0x03;
 const RANGE_0: u8 = 0x05;
 const LAST_REGISTER: u8 = 0x0c;
 
-/// Bits 7..6: device address 1. Bits 2..0: code, channel and device address on SDO.
-const FEATURES_WANTED: u8 = 0x42;
+/// Bits 7..6: device address 1. Bits 2..0: code, channel, device address and range on SDO.
+const FEATURES_WANTED: u8 = 0x43;
 const DEVICE_SIGNATURE: u8 = 0b01_00;
+const SIGNATURE_MASK: u8 = 0b1111_1100;
 const RANGE_10_24_V: u8 = 0;
 
 /// 15 ms for the reference with 22 uF, and 9 ms of margin.
@@ -115,7 +116,7 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
     /// One frame: 16 bits of command out, the answer in the bytes behind them.
     fn exchange(&mut self, command: u16) -> Result<[u8; FRAME_BYTES], AdcError<SPI::Error>> {
         let [c0, c1] = command.to_be_bytes();
-        let mut bytes = [c0, c1, 0, 0, 0];
+        let mut bytes = [c0, c1, 0, 0, 0, 0];
         self.spi
             .transfer_in_place(&mut bytes)
             .map_err(AdcError::Bus)?;
@@ -127,7 +128,7 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
         if bytes == [0xff; FRAME_BYTES] {
             return Err(AdcError::Silent { level: 0xff });
         }
-        let [_, _, value, _, _] = bytes;
+        let [_, _, value, ..] = bytes;
         Ok(value)
     }
 
@@ -143,15 +144,7 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
 
     /// Reads a register and compares it.
     fn check(&mut self, register: u8) -> Result<(), AdcError<SPI::Error>> {
-        let (found, wanted) = (self.read(register)?, self.wanted(register));
-        if found != wanted {
-            return Err(AdcError::WrongSetting {
-                register,
-                found: found.into(),
-                wanted: wanted.into(),
-            });
-        }
-        Ok(())
+        compare(register, self.read(register)?, self.wanted(register))
     }
 
     /// Writes a register and reads it back.
@@ -174,6 +167,18 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
     }
 }
 
+/// Compares what a register has with what it must have.
+fn compare<B>(register: u8, found: u8, wanted: u8) -> Result<(), AdcError<B>> {
+    if found == wanted {
+        return Ok(());
+    }
+    Err(AdcError::WrongSetting {
+        register,
+        found: found.into(),
+        wanted: wanted.into(),
+    })
+}
+
 impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
     type Bus = SPI::Error;
 
@@ -184,7 +189,7 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
     const SETTLE_US: u32 = 0;
 
     /// The second of three neighbouring Hall probes: two frames after the trigger.
-    const SAMPLE_US: u32 = 10;
+    const SAMPLE_US: u32 = 12;
 
     const CODE_BITS: u32 = 16;
 
@@ -221,14 +226,16 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
         let slots = (0u8..).zip(codes.iter_mut());
         for (input, code) in slots.filter(|(input, _)| read & 1 << input != 0) {
             let bytes = self.exchange(NO_OP)?;
-            let [_, _, high, low, found] = bytes;
-            let expected = input << 4 | DEVICE_SIGNATURE;
+            let [_, _, high, low, signature, last] = bytes;
+            let (found, expected) = (signature & SIGNATURE_MASK, input << 4 | DEVICE_SIGNATURE);
             if found != expected {
                 return Err(match silent(&bytes) {
                     Some(level) => AdcError::Silent { level },
                     None => AdcError::WrongInput { found, expected },
                 });
             }
+            let range = (signature & !SIGNATURE_MASK) << 1 | last >> 7;
+            compare(RANGE_0 + input, range, RANGE_10_24_V)?;
             *code = i32::from(u16::from_be_bytes([high, low])) - ZERO_VOLT;
         }
         let register = self.turn;

@@ -26,9 +26,14 @@ fn on_part<T>(
 }
 
 fn frame(out: [u8; 2], back: [u8; 3]) -> Vec<Transaction<u8>> {
+    frame_of_41_bits(out, back, 0)
+}
+
+fn frame_of_41_bits(out: [u8; 2], back: [u8; 3], last: u8) -> Vec<Transaction<u8>> {
     let (mut sent, mut read) = (out.to_vec(), vec![0, 0]);
-    sent.extend([0; 3]);
+    sent.extend([0; 4]);
     read.extend(back);
+    read.push(last);
     vec![
         Transaction::transaction_start(),
         Transaction::transfer_in_place(sent, read),
@@ -47,7 +52,7 @@ fn started() -> Vec<Transaction<u8>> {
     all.extend(frame([0x02, 0x00], [0xff, 0, 0]));
     all.extend(written(0x01, 0x3f));
     all.extend(written(0x02, 0xc0));
-    all.extend(written(0x03, 0x42));
+    all.extend(written(0x03, 0x43));
     (0x05..=0x0a).for_each(|range| all.extend(written(range, 0)));
     all
 }
@@ -86,7 +91,7 @@ fn tick(register: u8, value: u8) -> Vec<Transaction<u8>> {
 
 #[test]
 fn codes_count_from_24_ms_after_the_first_sample_of_a_start() {
-    let ticks = [tick(0x01, 0x3f), tick(0x02, 0xc0), tick(0x03, 0x42)];
+    let ticks = [tick(0x01, 0x3f), tick(0x02, 0xc0), tick(0x03, 0x43)];
     let all = [started(), ticks.concat(), started(), tick(0x01, 0x3f)].concat();
     let levels = [
         PinTransaction::set(State::High),
@@ -112,7 +117,7 @@ fn every_register_is_read_back_in_turn() {
     let wanted = [
         (0x01, 0x3f),
         (0x02, 0xc0),
-        (0x03, 0x42),
+        (0x03, 0x43),
         (0x05, 0),
         (0x06, 0),
         (0x07, 0),
@@ -188,7 +193,7 @@ fn a_setting_that_does_not_read_back_is_named() {
 
 #[test]
 fn a_code_of_another_channel_or_device_is_refused() {
-    for found in [0x24, 0x10, 0x18, 0x15] {
+    for found in [0x24, 0x10, 0x18, 0x1c] {
         let mut all = sampled(ZERO);
         let wrong = frame([0, 0], [0x80, 0, found]);
         all.truncate(6);
@@ -202,15 +207,31 @@ fn a_code_of_another_channel_or_device_is_refused() {
 }
 
 #[test]
+fn a_code_of_another_range_is_refused() {
+    // The range is the last three of 41 bits.
+    for (range, signature, last) in [(1, 0x14, 0x80), (2, 0x15, 0), (6, 0x17, 0)] {
+        let mut all = sampled(ZERO);
+        all.truncate(6);
+        all.extend(frame_of_41_bits([0, 0], [0x80, 0, signature], last));
+        let error = AdcError::WrongSetting {
+            register: 0x06,
+            found: range,
+            wanted: 0,
+        };
+        assert_eq!(try_sample(all), Err(error));
+    }
+}
+
+#[test]
 fn a_line_that_never_moves_is_silent() {
     let mut low = frame([0xa0, 0x00], [0, 0, 0]);
     low.extend(frame([0, 0], [0, 0, 0]));
     assert_eq!(try_sample(low), Err(AdcError::Silent { level: 0 }));
     let high = |out: u8| {
-        let sent = vec![out, 0, 0, 0, 0];
+        let sent = vec![out, 0, 0, 0, 0, 0];
         let all = [
             Transaction::transaction_start(),
-            Transaction::transfer_in_place(sent, vec![0xff; 5]),
+            Transaction::transfer_in_place(sent, vec![0xff; 6]),
             Transaction::transaction_end(),
         ];
         all.to_vec()

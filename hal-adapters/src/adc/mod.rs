@@ -8,7 +8,7 @@
 //! | [`stuck`] | any | codes that never change: a converter or a sensor that is frozen |
 //!
 //! Which to choose: the first where the stage moves fast or the cable is long. The skew of the
-//! second costs 48 nm at the fastest motion of a service log (4.8 mm/s; see [`ads8688`]),
+//! second costs 58 nm at the fastest motion of a service log (4.8 mm/s; see [`ads8688`]),
 //! a tenth of the Hall noise, and the only check in its frames is a signature of six bits.
 //!
 //! A driver owns an [`SpiDevice`](embedded_hal::spi::SpiDevice), which owns chip select, and the
@@ -24,16 +24,16 @@
 //!
 //! // Mocks in place of a HAL's SPI device and pin: a frame that starts the sequence, then one
 //! // for each of the six inputs, all with code 0x8001 and the input's signature, then a register.
-//! let frame = |sent: [u8; 5], read: [u8; 5]| {
+//! let frame = |sent: [u8; 6], read: [u8; 6]| {
 //!     use spi::Transaction as T;
 //!     [T::transaction_start(), T::transfer_in_place(sent.to_vec(), read.to_vec()), T::transaction_end()]
 //! };
 //! let tick = |register: u8, value: u8| {
-//!     let mut frames = frame([0xa0, 0, 0, 0, 0], [0; 5]).to_vec();
+//!     let mut frames = frame([0xa0, 0, 0, 0, 0, 0], [0; 6]).to_vec();
 //!     for input in 0..6 {
-//!         frames.extend(frame([0; 5], [0, 0, 0x80, 0x01, input << 4 | 0b0100]));
+//!         frames.extend(frame([0; 6], [0, 0, 0x80, 0x01, input << 4 | 0b0100, 0]));
 //!     }
-//!     frames.extend(frame([register << 1, 0, 0, 0, 0], [0, 0, value, 0, 0]));
+//!     frames.extend(frame([register << 1, 0, 0, 0, 0, 0], [0, 0, value, 0, 0, 0]));
 //!     frames
 //! };
 //! let expected = [tick(0x01, 0x3f), tick(0x02, 0xc0)].concat();
@@ -105,7 +105,8 @@ pub trait FrameSampler {
     /// [`AdcError::Pin`].
     fn trigger(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<Self::Bus>>;
 
-    /// Reads the codes of one period. `sequence` and `time_us` go into the frame unchanged.
+    /// Reads the codes of one period. `sequence` and `time_us` go into the frame unchanged: the
+    /// time of the trigger plus [`SAMPLE_US`](Self::SAMPLE_US).
     /// A code at a rail is no error here: the decoder's window refuses it.
     ///
     /// # Errors

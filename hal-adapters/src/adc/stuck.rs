@@ -2,18 +2,16 @@
 //! frames, and an amplifier can stop. Noise tells a stage at rest from that.
 //!
 //! Each sensor is watched by itself. Its limit follows from the chance that noise alone repeats a
-//! code: a run of n repetitions needs n + 1 codes on one value, which for noise of standard
-//! deviation s (in codes) and a mean in the middle of a code has the probability q^(n+1), with
-//! q = erf(0.5 / (s sqrt 2)), and a year has 1.6e10 periods.
+//! code while the stage is at rest for a year, 1.6e10 periods:
 //!
-//! | sensor | noise at rest in the logs of three stages, 16 bits | repetitions, longest run of 171,000 rows | limit | false alarms a year, stage never moving |
+//! | sensor | noise at rest, in the logs of three stages | repetitions, longest run in 171,000 rows | limit | false alarms a year, all three sensors |
 //! |---|---|---|---|---|
-//! | Hall probe | 12 codes | 2.4 %, 3 | 8 periods, 16 ms | 0.03 |
-//! | gap | 0.83 codes | 34 %, 14 | 32 periods, 64 ms | 0.2 |
+//! | Hall probe | 12 codes of 16 bits | 2.4 %, 3 | 8 periods, 16 ms | 0.02 |
+//! | gap | 0.83 codes of 16 bits | 34 %, 14 | 32 periods, 64 ms | 0.1 |
 //!
-//! Codes of 24 bits repeat far less; the limits are the same, which is on the safe side. A code at
-//! a rail does not count as a repetition: the decoder's window refuses that sensor at once, and the
-//! others can still be good.
+//! 7 and 30 periods would do with exactly this noise; the limits allow for 35 % and 7 % less of it.
+//! Codes of 24 bits repeat far less; the limits are the same. A code at a rail does not count as a
+//! repetition: the decoder's window refuses that sensor at once, and the others can still be good.
 
 use super::AdcError;
 use runtime::RawFrame;
@@ -77,7 +75,42 @@ impl StuckWatch {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
     use super::*;
+    use std::vec::Vec;
+
+    /// Runs of `periods` repetitions a year that normal noise gives three sensors at rest, whose
+    /// mean is where codes repeat most: in the middle of a code.
+    fn false_alarms_a_year(deviation_codes: f64, periods: u8) -> f64 {
+        const STEPS: i32 = 100;
+        let density = |x: f64| {
+            let z = x / deviation_codes;
+            (-z * z / 2.0).exp() / (deviation_codes * std::f64::consts::TAU.sqrt())
+        };
+        let chance = |code: i32| {
+            let at = |k: i32| f64::from(code) - 0.5 + (f64::from(k) + 0.5) / f64::from(STEPS);
+            (0..STEPS).map(|k| density(at(k))).sum::<f64>() / f64::from(STEPS)
+        };
+        let chances: Vec<_> = (-100..=100).map(chance).collect();
+        let run = |q: &f64| q.powi(i32::from(periods) + 1) * (1.0 - q);
+        3.0 * 500.0 * 3600.0 * 24.0 * 365.0 * chances.iter().map(run).sum::<f64>()
+    }
+
+    #[test]
+    fn noise_alone_is_a_fault_less_than_once_a_year() {
+        let (hall, gap) = (12.0, 0.83);
+        for (deviation, limit, least) in [(hall, HALL_PERIODS, 7), (gap, GAP_PERIODS, 30)] {
+            let noted = if deviation == hall { 0.02 } else { 0.1 };
+            let found = false_alarms_a_year(deviation, limit);
+            assert!((found / noted - 1.0).abs() < 0.3, "{found}");
+            assert!(false_alarms_a_year(deviation, least) < 1.0);
+            assert!(false_alarms_a_year(deviation, least - 1) > 1.0);
+            let quieter = deviation * if deviation == hall { 0.65 } else { 0.93 };
+            let found = false_alarms_a_year(quieter, limit);
+            assert!(found < 1.0, "{found}");
+        }
+    }
 
     fn frame(codes: [i32; 6], sequence: u32) -> RawFrame {
         let [a, b, c, d, e, f] = codes;

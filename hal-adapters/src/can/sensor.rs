@@ -31,6 +31,12 @@ impl Layout {
         }
     }
 
+    /// The layout that a message with codes belongs to; `None` for a message without.
+    pub fn carrying(message: Message) -> Option<Self> {
+        let has = |layout: &Self| layout.messages().contains(&message);
+        [Self::Bits16, Self::Bits24].into_iter().find(has)
+    }
+
     /// The layout for a converter of so many bits.
     pub const fn for_bits(code_bits: u32) -> Self {
         if code_bits <= 16 {
@@ -235,6 +241,12 @@ mod tests {
         assert_eq!(Layout::that_holds(-32768, 32767), Some(Layout::Bits16));
         assert_eq!(Layout::that_holds(-32769, 0), Some(Layout::Bits24));
         assert_eq!(Layout::that_holds(0, 1 << 23), None);
+        for layout in [Layout::Bits16, Layout::Bits24] {
+            for message in layout.messages() {
+                assert_eq!(Layout::carrying(*message), Some(layout));
+            }
+        }
+        assert_eq!(Layout::carrying(Message::SensorTime), None);
     }
 
     proptest! {

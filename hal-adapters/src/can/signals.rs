@@ -179,7 +179,7 @@ pub(super) const NODE_STATUS: [Signal; 6] = [
         &[(0, "starting"), (1, "running"), (2, "no parameters"), (3, "bad parameters"), (4, "no frames"), (5, "sensor fault"), (6, "self-test failed"), (7, "updating")],
     ),
     signal("Reason", (16, 8), U, "", "detail of the state, by the node; 0 for none"),
-    signal("Flags", (24, 8), U, "", "1 watchdog reset, 2 bus was off, 4 re-zero runs, 8 a zero deviation is subtracted, 16 re-zero refused, 32 identifying, 64 core on its internal oscillator, 128 recording"),
+    signal("Flags", (24, 8), U, "", "1 reset by the watchdog or on a fault, 2 bus was off, 4 re-zero runs, 8 a zero deviation is subtracted, 16 re-zero refused, 32 identifying, 64 core on its internal oscillator, 128 recording"),
     signal("MissedTicks", (32, 16), U, "", "ticks that came late or not at all; stays at 65535"),
     signal("BusOff", (48, 8), U, "", "times the bus was off; stays at 255"),
     signal("Version", (56, 8), U, "", "version of this protocol"),

@@ -45,7 +45,8 @@ impl NodeState {
 
 /// Flags of [`NodeStatus`], as bits.
 pub mod flag {
-    /// The last reset came from the watchdog.
+    /// The last reset came from the watchdog, or from the program on a fault: see page 6 of the
+    /// health frames.
     pub const WATCHDOG_RESET: u8 = 1;
     /// The bus was off since start.
     pub const BUS_WAS_OFF: u8 = 1 << 1;
@@ -124,9 +125,25 @@ pub struct BoardFacts {
     pub faults: u32,
     /// The word FLASH_OPTCR.
     pub option_bytes: u32,
-    /// Bits: 0 no pull-up on chip select, 1 none on SYNC or RST, 2 brown-out level below 2.7 V,
-    /// 3 internal oscillator, 4 CAN did not start, 5 a zero that was kept is lost.
+    /// Bits of [`board_check`].
     pub board_checks: u32,
+}
+
+/// Bits of [`BoardFacts::board_checks`].
+pub mod board_check {
+    /// Chip select has no pull-up on the board.
+    pub const NO_PULL_UP_ON_SELECT: u32 = 1;
+    /// SYNC/RESET or RST/PD has no pull-up on the board.
+    pub const NO_PULL_UP_ON_CONTROL: u32 = 1 << 1;
+    /// The brown-out level is below 2.7 V.
+    pub const BROWN_OUT_LOW: u32 = 1 << 2;
+    /// The core runs on its internal oscillator: the crystal did not start, or the PLL did not lock
+    /// to it.
+    pub const INTERNAL_OSCILLATOR: u32 = 1 << 3;
+    /// The CAN controller did not start.
+    pub const CAN_NOT_STARTED: u32 = 1 << 4;
+    /// A zero deviation that was kept is lost: its record is damaged, or of another blob.
+    pub const ZERO_LOST: u32 = 1 << 5;
 }
 
 /// One counter of [`runtime::servo::Health`], or one of [`BoardFacts`], with its page.

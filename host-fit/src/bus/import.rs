@@ -6,7 +6,7 @@
 //! | lines of `candump -L` to ticks, by the receiver of the bus | [`bus_log`] |
 //! | receive times to sample times: the node samples evenly, the bus delivers unevenly | [`clock`] |
 //! | the interferometers' CSV | [`reference`](mod@reference) |
-//! | the offset between the clocks, where asked for | [`offset`] |
+//! | offset between the clocks and difference in speed, where asked for | [`offset`] |
 //! | reference between its samples, at the times of the ticks | [`join`] |
 //! | the log | [`write`](mod@write) |
 
@@ -16,6 +16,7 @@ mod error;
 pub mod join;
 pub mod offset;
 pub mod reference;
+mod refine;
 pub mod write;
 
 pub use error::ImportError;
@@ -46,13 +47,13 @@ pub struct ImportSettings {
     pub tolerance_us: Option<u32>,
     /// Time of the bus less time of the reference, us; not used with `estimate_offset`.
     pub offset_us: f64,
-    /// Find the offset between the clocks by the motion that both saw.
+    /// Find the offset between the clocks, and how much faster one runs, by the motion that both saw.
     pub estimate_offset: bool,
     /// How far from "both records start together" the offset is looked for, s.
     pub search_s: f64,
     /// Only frames of this interface; all frames are of one if `None`.
     pub interface: Option<String>,
-    /// How codes were put into frames; the narrowest that holds them if `None`.
+    /// How codes were put into frames; as the first frame with codes shows if `None`.
     pub layout: Option<Layout>,
     /// Leave out lines that cannot be read, and count them.
     pub skip_bad_lines: bool,
@@ -79,15 +80,14 @@ pub struct ImportReport {
 /// See [`ImportError`]; nothing is written then.
 pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
     let stage = Stage::from_file(&settings.stage)?;
-    let layout = layout(settings, &stage)?;
-    let reading = bus_log::read(settings, layout)?;
+    let reading = bus_log::read(settings)?;
     let (times_us, smoothing) = clock::sample_times_us(&reading.ticks);
     let (reference, reference_counts) = reference::read(&settings.reference, &stage)?;
     let offset = choose_offset(settings, &stage, &reading, &times_us, &reference)?;
     let tolerance_us = settings
         .tolerance_us
         .map_or(stage.servo_period_s * 1e6, f64::from);
-    let reference_times = times_us.iter().map(|t| t - offset.us);
+    let reference_times = times_us.iter().map(|t| offset.on_reference_us(*t));
     let (rows, join) = join::join(
         &reading.ticks,
         reference_times,
@@ -110,12 +110,6 @@ pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
     })
 }
 
-fn layout(settings: &ImportSettings, stage: &Stage) -> Result<Layout, ImportError> {
-    crate::bus::replay::choose_layout(settings.layout, stage).map_err(|error| ImportError::Layout {
-        problem: error.to_string(),
-    })
-}
-
 fn choose_offset(
     settings: &ImportSettings,
     stage: &Stage,
@@ -126,6 +120,8 @@ fn choose_offset(
     if !settings.estimate_offset {
         return Ok(Offset {
             us: settings.offset_us,
+            rate: 0.0,
+            middle_us: 0.0,
             explained: None,
         });
     }
@@ -136,3 +132,7 @@ fn choose_offset(
 #[cfg(test)]
 #[path = "import/tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "import/controller_tests.rs"]
+mod controller_tests;

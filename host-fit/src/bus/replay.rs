@@ -114,7 +114,7 @@ pub fn run(settings: &ReplaySettings) -> Result<Replayed, ReplayError> {
 }
 
 /// The layout asked for, or the narrowest; refused if it does not hold the codes of the stage.
-pub(super) fn choose_layout(asked: Option<Layout>, stage: &Stage) -> Result<Layout, ReplayError> {
+fn choose_layout(asked: Option<Layout>, stage: &Stage) -> Result<Layout, ReplayError> {
     let (hall, gaps) = (stage.hall.window, stage.capacitive.window);
     // The rails themselves are sent too: the receiver marks them.
     let low = hall.low.min(gaps.low) - 1;

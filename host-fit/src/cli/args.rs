@@ -150,7 +150,7 @@ impl ValueEnum for BadRows {
 /// How codes are put into frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum LayoutChoice {
-    /// The narrowest that holds the converters' codes.
+    /// As the converters' codes, or the record, need it.
     Auto,
     /// 16 bits: two frames a tick.
     #[value(name = "16")]
@@ -161,7 +161,7 @@ pub(super) enum LayoutChoice {
 }
 
 impl LayoutChoice {
-    /// The layout; `None` for the narrowest that holds the codes.
+    /// The layout; `None` for the one that is needed.
     pub(super) const fn layout(self) -> Option<Layout> {
         match self {
             Self::Auto => None,

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Arguments of `import`.
 #[derive(Debug, Args)]
 pub(super) struct ImportArgs {
-    /// Record of the bus, as `candump -L` or `live --record` writes it.
+    /// Record of the bus, as `record`, `live --record` or `candump -L` writes it.
     #[arg(value_name = "CANDUMP")]
     bus: PathBuf,
     /// Log of the interferometers: CSV with time, movement and beams (or pose), in the
@@ -35,7 +35,8 @@ pub(super) struct ImportArgs {
         allow_negative_numbers = true
     )]
     offset_us: f64,
-    /// Find the offset between the clocks by the motion that both saw.
+    /// Find the offset between the clocks, and how much faster one runs, by the motion that both
+    /// saw.
     #[arg(long, conflicts_with = "offset_us")]
     estimate_offset: bool,
     /// How far from "both records start together" the offset is looked for, s.
@@ -43,18 +44,27 @@ pub(super) struct ImportArgs {
         long,
         value_name = "SECONDS",
         default_value_t = 2.0,
+        value_parser = search_seconds,
         requires = "estimate_offset"
     )]
     search_s: f64,
     /// Only frames of this interface, where the record holds several.
     #[arg(long, value_name = "IFACE")]
     interface: Option<String>,
-    /// How codes are put into frames.
+    /// How codes are put into frames; auto: as the first frame with codes shows.
     #[arg(long, value_enum, default_value = "auto")]
     layout: LayoutChoice,
     /// Leave out lines that cannot be read, and count them.
     #[arg(long)]
     skip_bad_lines: bool,
+}
+
+/// Further than an hour apart, two records are dated by hand: `--offset-us`.
+fn search_seconds(text: &str) -> Result<f64, &'static str> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=3600.0).contains(&seconds) => Ok(seconds),
+        _ => Err("expected a number of seconds from 0 to 3600"),
+    }
 }
 
 /// Joins a record of the bus and a reference, and says how it went.

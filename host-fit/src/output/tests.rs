@@ -1,3 +1,4 @@
+use super::growing_file::GrowingFile;
 use super::*;
 
 fn names(folder: &Path) -> Vec<String> {
@@ -116,4 +117,24 @@ fn a_file_below_dev_is_replaced_like_any_other() {
     write_atomically(&file, b"old").expect("written");
     write_atomically(&file, b"new").expect("replaced");
     assert_eq!(fs::read(&file).expect("readable"), b"new");
+}
+
+#[test]
+fn a_growing_file_takes_its_place_when_it_is_finished_and_leaves_nothing_if_it_is_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("bus.log");
+    fs::write(&path, b"old").expect("written");
+    let mut given_up = GrowingFile::create(&path).expect("writable");
+    given_up.line("lost").expect("written");
+    drop(given_up);
+    assert_eq!(fs::read(&path).expect("readable"), b"old");
+    let mut file = GrowingFile::create(&path).expect("writable");
+    (0..10_000).for_each(|k| file.line(k).expect("written"));
+    assert_eq!(fs::read(&path).expect("readable"), b"old");
+    file.finish().expect("finished");
+    let text = fs::read_to_string(&path).expect("readable");
+    assert_eq!(text.lines().count(), 10_000);
+    assert_eq!(names(folder.path()), ["bus.log"]);
+    let missing = GrowingFile::create(&folder.path().join("missing/bus.log"));
+    assert!(matches!(missing, Err(OutputError::NoFolder { .. })));
 }

@@ -6,7 +6,7 @@ use hal_adapters::adc::{AdcError, FrameSampler};
 use runtime::RawFrame;
 
 /// Ticks in a row without codes after which the converter is started again: 32 ms. A start
-/// takes about 130 us of SPI.
+/// takes up to 210 bytes of SPI, about 0.2 ms.
 pub const RESTART_TICKS: u16 = 16;
 
 /// A converter and its recent faults.
@@ -52,8 +52,9 @@ impl<A: FrameSampler> Acquisition<A> {
     /// The codes of a tick.
     ///
     /// # Errors
-    /// See [`AdcError`]. After [`RESTART_TICKS`] such ticks in a row the converter is started
-    /// again instead of being read, and gives codes from the next tick on.
+    /// See [`AdcError`]. After [`RESTART_TICKS`] such ticks in a row, or one with a setting that
+    /// was lost, the converter is started again instead of being read, and can give codes from the
+    /// next tick on.
     pub fn sample(
         &mut self,
         sequence: u32,
@@ -94,8 +95,12 @@ impl<A: FrameSampler> Acquisition<A> {
             let (ready, read) = (0, 0);
             return Err(AdcError::NotReady { ready, read });
         }
-        let frame = self.converter.sample(sequence, time_us)?;
-        self.watch.pass(frame)
+        let sampled = self.converter.sample(sequence, time_us);
+        // The next samples would be wrong, and a part can tell of it only once.
+        if let Err(AdcError::WrongSetting { .. }) = sampled {
+            self.faults_in_a_row = RESTART_TICKS;
+        }
+        self.watch.pass(sampled?)
     }
 }
 
@@ -115,6 +120,8 @@ mod tests {
     struct Fake {
         broken: bool,
         set_up: bool,
+        /// Tells once that a setting is lost.
+        loses_setting: bool,
         code: i32,
     }
 
@@ -139,6 +146,14 @@ mod tests {
         }
 
         fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<ErrorKind>> {
+            if core::mem::take(&mut self.loses_setting) {
+                let (register, found, wanted) = (3, 0, 1);
+                return Err(AdcError::WrongSetting {
+                    register,
+                    found,
+                    wanted,
+                });
+            }
             self.set_up &= !self.broken;
             if !self.set_up {
                 return Err(AdcError::Silent { level: 0 });
@@ -151,6 +166,16 @@ mod tests {
                 time_us,
             })
         }
+    }
+
+    #[test]
+    fn a_converter_that_loses_a_setting_is_started_in_the_next_tick() {
+        let mut adc = Acquisition::new(Fake::default());
+        assert_eq!(adc.start(&mut NoDelay), Ok(()));
+        adc.converter.loses_setting = true;
+        let told = [(); 4].map(|()| adc.sample(0, 0, &mut NoDelay).map_err(|e| e.number()));
+        assert_eq!(told.map(|t| t.err()), [Some(5), Some(7), None, None]);
+        assert_eq!(adc.starts(), 2);
     }
 
     #[test]

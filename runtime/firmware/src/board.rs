@@ -5,11 +5,10 @@
 use core::convert::Infallible;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use hal_adapters::adc::{Channels, FrameSampler};
-use stm32f4xx_hal::can::CanExt;
-use stm32f4xx_hal::gpio::{Output, PA4, PB0, PC1, PinState, Speed};
+use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0, PB1, PC1, PinState, Pull, Speed};
 use stm32f4xx_hal::pac::{CAN1, GPIOA, GPIOB, GPIOC, SPI1};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::rcc::{Config, Rcc};
+use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
 use stm32f4xx_hal::time::Hertz;
 
 /// The converter: any part with a driver that implements [`FrameSampler`].
@@ -28,13 +27,13 @@ pub type SpiDevice = ExclusiveDevice<stm32f4xx_hal::spi::Spi<SPI1>, PA4<Output>,
 pub type ControlPin = PB0<Output>;
 /// The LED, on when high.
 pub type Led = PC1<Output>;
-/// The CAN controller.
-pub type Can = bxcan::Can<CanPins>;
-/// The CAN controller's registers with its pins.
-pub type CanPins = stm32f4xx_hal::can::Can<CAN1>;
+/// Says whether the servo is on: low if it is. Pulled up, so that it may be left open.
+pub type ServoPin = PB1<Input>;
 
-/// Frequency of the crystal. CAN needs a crystal: the internal oscillator is too inexact.
+/// Frequency of the crystal.
 const CRYSTAL_HZ: u32 = 8_000_000;
+/// Frequency of the core after a reset, MHz: that of the internal oscillator.
+pub const INTERNAL_MHZ: u32 = 16;
 /// Frequency of the core.
 pub const CORE_HZ: u32 = 168_000_000;
 /// Clock of the first peripheral bus.
@@ -44,9 +43,15 @@ const BUS_2_HZ: u32 = CORE_HZ / 2;
 /// Clock of the timers on the first peripheral bus: twice that bus.
 pub const TIMER_HZ: u32 = 2 * BUS_1_HZ;
 
-/// 168 MHz from the crystal; 42 MHz and 84 MHz on the peripheral buses.
-pub fn clocks() -> Config {
-    Config::hse(Hertz::from_raw(CRYSTAL_HZ))
+/// 168 MHz from the crystal or from the internal oscillator; 42 MHz and 84 MHz on the peripheral
+/// buses.
+pub fn clocks(crystal: bool) -> Config {
+    let source = if crystal {
+        Config::hse(Hertz::from_raw(CRYSTAL_HZ))
+    } else {
+        Config::hsi()
+    };
+    source
         .sysclk(Hertz::from_raw(CORE_HZ))
         .pclk1(Hertz::from_raw(BUS_1_HZ))
         .pclk2(Hertz::from_raw(BUS_2_HZ))
@@ -67,12 +72,37 @@ const SPI_HZ: u32 = {
     hz
 };
 
-/// 1 Mbit/s from 42 MHz: 42 = 3 * (1 + 11 + 2), sampled at 86 %. One quantum of resynchronisation.
-pub const CAN_BIT_TIMING: u32 = (2 - 1) << 20 | (11 - 1) << 16 | (3 - 1);
+/// Division of a bit into quanta of the clock of the first peripheral bus.
+pub struct BitTiming {
+    /// Periods of that clock in a quantum.
+    pub prescaler: u16,
+    /// Quanta before the sample, besides the first.
+    pub segment_1: u8,
+    /// Quanta after the sample.
+    pub segment_2: u8,
+    /// Quanta by which a bit is lengthened or shortened at most, to follow other nodes.
+    pub jump: u8,
+}
 
-/// The watchdog resets this long after the last tick that was done on schedule, ms. That is ten
-/// ticks by the nominal clock of the watchdog, 7 to 19 by its tolerance.
-pub const WATCHDOG_MS: u32 = 20;
+/// 1 Mbit/s: 42 = 3 * 14. By the crystal sampled at 86 % with the least resynchronisation; by the
+/// internal oscillator at 71 % with the most.
+///
+/// With n = 14 quanta a bit, each node's clock may differ from the nominal one by s / 20 n and by
+/// p / 2 (13 n - p) at most, s the jump and p the shorter of the phase segments (F. Hartwich and A.
+/// Bassemir, The Configuration of the CAN Bit Timing, 6th iCC, 1999; both nodes may differ, in
+/// opposite directions). That is 0.36 % with s = 1, p = 2, and 1.1 % with s = p = 4, or 2.2 %
+/// beside a node with a crystal. The internal oscillator keeps 1 % at 25 degC, and 4 % from -10 to
+/// 85 degC (DS8626, HSI oscillator characteristics): in a laboratory that is enough. Elsewhere it
+/// may not be; see `Bus::new`.
+pub const fn can_bit_timing(crystal: bool) -> BitTiming {
+    let (segment_1, segment_2, jump) = if crystal { (11, 2, 1) } else { (9, 4, 4) };
+    BitTiming {
+        prescaler: 3,
+        segment_1,
+        segment_2,
+        jump,
+    }
+}
 
 /// The stage that this controller belongs to, if the program was built with `STAGE_SERIAL` in
 /// the environment: blobs of other stages are refused.
@@ -82,11 +112,28 @@ pub const STAGE_SERIAL: Option<&str> = option_env!("STAGE_SERIAL");
 pub struct Parts {
     /// The converter, not started yet.
     pub converter: Converter,
-    /// The CAN controller, not set up yet.
-    pub can: CanPins,
+    /// The CAN controller, switched on but not set up yet.
+    pub can: CAN1,
     /// The LED.
     pub led: Led,
+    /// Whether the servo is on.
+    pub servo: ServoPin,
+    /// Which lines to the converter are pulled up.
+    pub pulled_up: PulledUp,
 }
+
+/// Whether lines that must be high before the program drives them are pulled up: by 10 kOhm or
+/// less, against an internal resistor of 30 kOhm at least.
+#[derive(Clone, Copy)]
+pub struct PulledUp {
+    /// Chip select.
+    pub select: bool,
+    /// SYNC/RESET or RST/PD.
+    pub control: bool,
+}
+
+/// Time for a line to follow the internal resistor of 30 to 50 kOhm, us: three times that of 50 pF.
+const PULL_US: u32 = 8;
 
 /// Sets the pins up.
 pub fn set_up(
@@ -96,21 +143,41 @@ pub fn set_up(
     rcc: &mut Rcc,
 ) -> Parts {
     let (gpioa, gpiob, gpioc) = (gpioa.split(rcc), gpiob.split(rcc), gpioc.split(rcc));
-    let mut select = gpioa.pa4.into_push_pull_output_in_state(PinState::High);
+    let (select, control) = (
+        gpioa.pa4.into_pull_down_input(),
+        gpiob.pb0.into_pull_down_input(),
+    );
+    cortex_m::asm::delay(PULL_US * (CORE_HZ / 1_000_000));
+    let pulled_up = PulledUp {
+        select: select.is_high(),
+        control: control.is_high(),
+    };
+    let mut select = select.into_push_pull_output_in_state(PinState::High);
     select.set_speed(Speed::VeryHigh);
-    let mut control = gpiob.pb0.into_push_pull_output_in_state(PinState::High);
+    let mut control = control.into_push_pull_output_in_state(PinState::High);
     control.set_speed(Speed::High);
+    // A converter that is not selected leaves its output open.
     let pins = (
         Some(gpioa.pa5.into_alternate().speed(Speed::VeryHigh)),
-        Some(gpioa.pa6.into_alternate().speed(Speed::VeryHigh)),
+        Some(gpioa.pa6.into_alternate().internal_resistor(Pull::Up)),
         Some(gpioa.pa7.into_alternate().speed(Speed::VeryHigh)),
     );
     let spi = spi1.spi(pins, Converter::SPI_MODE, Hertz::from_raw(SPI_HZ), rcc);
     let spi = infallible(ExclusiveDevice::new_no_delay(spi, select));
+    // Without a transceiver the bus looks idle.
+    gpiob
+        .pb8
+        .into_alternate::<9>()
+        .set_internal_resistor(Pull::Up);
+    gpiob.pb9.into_alternate::<9>();
+    CAN1::enable(rcc);
+    CAN1::reset(rcc);
     Parts {
         converter: Converter::new(spi, control, CHANNELS),
-        can: can1.can((gpiob.pb9, gpiob.pb8), rcc),
+        can: can1,
         led: gpioc.pc1.into_push_pull_output(),
+        servo: gpiob.pb1.into_pull_up_input(),
+        pulled_up,
     }
 }
 

@@ -1,21 +1,34 @@
 //! The CAN controller: emptied by the tick, filled by the tick and by interrupt, never waited for.
+//!
+//! Frames that are out of date after their tick are then taken back from the mailboxes, too. One
+//! that is on the wire at that moment is completed or fails, but is not repeated; its mailbox
+//! is empty only afterwards, and the outbox gives no further frame before (see there).
 
 use crate::board;
-use bxcan::filter::Mask32;
-use bxcan::{Fifo, Frame, Interrupt, Mailbox, StandardId};
+use crate::wait::Stopwatch;
+use embedded_can::{Frame, Id, StandardId};
 use firmware::node::Node;
 use firmware::outbox::Outbox;
-use hal_adapters::can::Message;
+use hal_adapters::can::{BusFrame, Coded, Message};
 use stm32f4xx_hal::pac::CAN1;
+use stm32f4xx_hal::pac::can1::TX;
 
 /// Commands taken in one tick at most; the controller's own store holds three.
 const COMMANDS_PER_TICK: u8 = 3;
+/// Longest wait for the controller to stand still, us. It takes a few bits.
+const INIT_US: u32 = 1000;
+/// Bits of TSR for mailbox 0; those of the next ones follow after eight bits each.
+const REQUEST_COMPLETED: u32 = 1;
+const SENT: u32 = 1 << 1;
+const ABORT: u32 = 1 << 7;
+/// Bit of TSR: mailbox 0 is empty; those of the next ones follow.
+const EMPTY: u32 = 1 << 26;
+const ALL_EMPTY: u32 = 0b111;
 
 /// The controller and what waits for it.
 pub struct Bus {
-    can: board::Can,
-    /// Whether the controller has seen eleven recessive bits and takes part in the bus.
-    joined: bool,
+    can: CAN1,
+    started: bool,
     was_off: bool,
     bus_off: u32,
     sent: u32,
@@ -24,24 +37,36 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// Sets the controller up to join the bus by itself, to recover from bus-off by itself and
-    /// to receive commands only.
-    pub fn new(instance: board::CanPins) -> Self {
-        let mut can = bxcan::Can::builder(instance)
-            .set_bit_timing(board::CAN_BIT_TIMING)
-            .set_automatic_retransmit(true)
-            .leave_disabled();
-        if let Some(id) = StandardId::new(Message::Command.spec().id) {
-            let mut commands = Mask32::frames_with_std_id(id, StandardId::MAX);
-            commands.data_frames_only();
-            can.modify_filters()
-                .clear()
-                .enable_bank(0, Fifo::Fifo0, commands);
+    /// Sets the controller up to join the bus by itself and to receive commands only. The
+    /// controller must have been switched on and reset.
+    ///
+    /// By a crystal it recovers from bus-off by itself. The internal oscillator may be too inexact
+    /// for a bus: then the controller's errors end in bus-off, and it stays silent.
+    pub fn new(can: CAN1, crystal: bool, stopwatch: &mut Stopwatch) -> Self {
+        can.mcr()
+            .modify(|_, w| w.sleep().clear_bit().inrq().set_bit());
+        let started = stopwatch.until(board::CORE_HZ / 1_000_000, INIT_US, || {
+            let state = can.msr().read();
+            state.inak().bit_is_set() && state.slak().bit_is_clear()
+        });
+        if started {
+            let timing = board::can_bit_timing(crystal);
+            // SAFETY: `board` keeps within the fields' bits.
+            can.btr().write(|w| unsafe {
+                w.brp().bits(timing.prescaler - 1);
+                w.ts1().bits(timing.segment_1 - 1);
+                w.ts2().bits(timing.segment_2 - 1);
+                w.sjw().bits(timing.jump - 1)
+            });
+            receive_commands_only(&can);
+            // BOFIE lets ERRI latch a bus-off; ERRIE, which would make it an interrupt, is off.
+            can.ier().write(|w| w.tmeie().set_bit().bofie().set_bit());
+            can.mcr()
+                .modify(|_, w| w.abom().bit(crystal).inrq().clear_bit());
         }
-        can.enable_interrupt(Interrupt::TransmitMailboxEmpty);
         Self {
             can,
-            joined: false,
+            started,
             was_off: false,
             bus_off: 0,
             sent: 0,
@@ -49,21 +74,36 @@ impl Bus {
         }
     }
 
-    /// At the start of a tick: joins the bus if there is one, discards the frames of the
-    /// previous tick, notes whether the bus is off.
+    /// Whether the controller could be set up.
+    pub const fn started(&self) -> bool {
+        self.started
+    }
+
+    /// At the start of a tick: discards what is out of date, also in the mailboxes, and
+    /// notes whether the bus was off.
     pub fn start_tick(&mut self) {
-        self.joined = self.joined || self.can.enable_non_blocking().is_ok();
         self.outbox.start_tick();
-        if !self.can.is_transmitter_idle() {
-            for mailbox in [Mailbox::Mailbox0, Mailbox::Mailbox1, Mailbox::Mailbox2] {
-                if self.can.abort(mailbox) {
-                    self.outbox.count_dropped(1);
-                }
+        if !self.started {
+            return;
+        }
+        let mut aborts = 0;
+        for (k, mailbox) in self.pending() {
+            let id = StandardId::new(mailbox.tir().read().stid().bits());
+            let message = id.and_then(|id| Message::from_id(Id::Standard(id)));
+            if !message.is_some_and(Outbox::is_lasting) {
+                aborts |= ABORT << (8 * k);
             }
         }
-        // SAFETY: reading a status register changes nothing, and `bxcan` has no way to.
-        let is_off = unsafe { (*CAN1::PTR).esr().read().boff().bit_is_set() };
-        if is_off && !self.was_off {
+        // SAFETY: bits that the controller defines; zeros change nothing.
+        self.can.tsr().write(|w| unsafe { w.bits(aborts) });
+
+        // A bus that is off again after less than a tick is seen by the latch alone.
+        let latched = self.can.msr().read().erri().bit_is_set();
+        if latched {
+            self.can.msr().write(|w| w.erri().set_bit());
+        }
+        let is_off = self.can.esr().read().boff().bit_is_set();
+        if (latched || is_off) && !self.was_off {
             self.bus_off = self.bus_off.saturating_add(1);
         }
         self.was_off = is_off;
@@ -72,33 +112,45 @@ impl Bus {
     /// Passes received commands to the node.
     pub fn receive(&mut self, node: &mut Node<'_>) {
         for _ in 0..COMMANDS_PER_TICK {
-            // SAFETY: as in `start_tick`.
-            let length = unsafe { (*CAN1::PTR).rx(0).rdtr().read().dlc().bits() };
-            match self.can.receive() {
-                // A data length code of 9 to 15 also means eight bytes, by the standard.
-                // `bxcan` panics on the first look into such a frame; no command is one.
-                Ok(_) if length > 8 => {}
-                Ok(frame) => node.take(&frame, &mut self.outbox),
-                Err(nb::Error::WouldBlock) => return,
-                Err(nb::Error::Other(_)) => {} // An overrun: a command was lost, unanswered.
+            let store = self.can.rf0r().read();
+            let Some(received) = self.can.rx_iter().next() else {
+                return;
+            };
+            // The controller is still about to put the next frame where it can be read.
+            if !self.started || store.fmp().bits() == 0 || store.rfom().bit_is_set() {
+                return;
+            }
+            let id = StandardId::new(received.rir().read().stid().bits());
+            let length = usize::from(received.rdtr().read().dlc().bits());
+            let (low, high) = (received.rdlr().read().bits(), received.rdhr().read().bits());
+            self.can.rf0r().write(|w| w.rfom().release());
+            let bytes = (u64::from(high) << 32 | u64::from(low)).to_le_bytes();
+            // A length code of 9 to 15 also means eight bytes, by the standard; no command is so.
+            let frame = match (id, bytes.get(..length)) {
+                (Some(id), Some(data)) => BusFrame::new(id, data),
+                _ => None,
+            };
+            if let Some(frame) = frame {
+                node.take(&frame, &mut self.outbox);
             }
         }
     }
 
     /// Fills the mailboxes. From a tick, and whenever one has become empty.
     pub fn send(&mut self) {
-        self.can.clear_tx_interrupt();
-        if !self.joined {
-            return;
-        }
-        while let Some(coded) = self.outbox.front(self.can.is_transmitter_idle()) {
-            if let Some(frame) = coded.to_frame::<Frame>() {
-                match self.can.transmit(&frame) {
-                    Err(_) => return,
-                    Ok(status) if status.dequeued_frame().is_some() => self.outbox.count_dropped(1),
-                    Ok(_) => {}
-                }
+        loop {
+            let empty = self.take_completed();
+            let state = self.can.msr().read();
+            if !self.started || state.inak().bit_is_set() || state.slak().bit_is_set() {
+                return;
             }
+            let Some(frame) = self.outbox.front(empty == ALL_EMPTY) else {
+                return;
+            };
+            let Some(mailbox) = self.can.tx_iter().nth(empty.trailing_zeros() as usize) else {
+                return;
+            };
+            fill(mailbox, frame);
             self.outbox.pop();
             self.sent = self.sent.wrapping_add(1);
         }
@@ -113,4 +165,72 @@ impl Bus {
     pub const fn bus_off(&self) -> u32 {
         self.bus_off
     }
+
+    /// The mailboxes that are not empty.
+    fn pending(&self) -> impl Iterator<Item = (u32, &TX)> {
+        let status = self.can.tsr().read().bits();
+        (0..)
+            .zip(self.can.tx_iter())
+            .filter(move |(k, _)| status & EMPTY << k == 0)
+    }
+
+    /// Notes which requests are completed, which ends their interrupt. Gives the empty mailboxes as
+    /// bits 0 to 2.
+    fn take_completed(&mut self) -> u32 {
+        let status = self.can.tsr().read().bits();
+        let mut completed = 0;
+        for shift in [0, 8, 16] {
+            if status & REQUEST_COMPLETED << shift != 0 {
+                completed |= REQUEST_COMPLETED << shift;
+                // Only a request that was aborted ends without a frame.
+                let lost = status & SENT << shift == 0;
+                self.outbox.count_dropped(u32::from(lost));
+            }
+        }
+        if completed != 0 {
+            // SAFETY: bits that the controller defines; zeros change nothing.
+            self.can.tsr().write(|w| unsafe { w.bits(completed) });
+        }
+        (status / EMPTY) & ALL_EMPTY
+    }
+}
+
+/// Lets data frames of the command's identifier into the first store, and no others.
+fn receive_commands_only(can: &CAN1) {
+    const ALL: u32 = 0x7ff << 21;
+    /// Extended identifier; remote frame.
+    const KINDS: u32 = 0b11 << 1;
+    let id = u32::from(Message::Command.id().as_raw()) << 21;
+    can.fmr().modify(|_, w| w.finit().set_bit());
+    can.fa1r().write(|w| w.fact0().clear_bit());
+    can.fm1r().write(|w| w.fbm0().clear_bit());
+    can.fs1r().write(|w| w.fsc0().set_bit());
+    can.ffa1r().write(|w| w.ffa0().clear_bit());
+    if let Some(bank) = can.fb_iter().next() {
+        // SAFETY: identifier and mask of one filter of 32 bits.
+        bank.fr1().write(|w| unsafe { w.bits(id) });
+        // SAFETY: as above.
+        bank.fr2().write(|w| unsafe { w.bits(ALL | KINDS) });
+    }
+    can.fa1r().write(|w| w.fact0().set_bit());
+    can.fmr().modify(|_, w| w.finit().clear_bit());
+}
+
+fn fill(mailbox: &TX, frame: &Coded) {
+    let [a, b, c, d, e, f, g, h] = frame.bytes;
+    let (low, high) = (
+        u32::from_le_bytes([a, b, c, d]),
+        u32::from_le_bytes([e, f, g, h]),
+    );
+    // SAFETY: eight bytes, and any bits as data.
+    unsafe {
+        mailbox.tdtr().write(|w| w.dlc().bits(8));
+        mailbox.tdlr().write(|w| w.bits(low));
+        mailbox.tdhr().write(|w| w.bits(high));
+    }
+    let id = frame.message.id().as_raw();
+    // SAFETY: a standard identifier has the field's eleven bits.
+    mailbox
+        .tir()
+        .write(|w| unsafe { w.stid().bits(id).txrq().set_bit() });
 }

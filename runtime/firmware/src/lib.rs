@@ -1,7 +1,7 @@
 //! What the stage controller does, apart from the chip that it does it on.
 //!
 //! ```text
-//! timer --Schedule--> trigger --110 us--> Acquisition --RawFrame--> Node --frames--> Outbox --> CAN
+//! timer --Schedule--> trigger --182 us--> Acquisition --RawFrame--> Node --frames--> Outbox --> CAN
 //!                                          CAN commands --> Node          Telemetry <-- Node
 //! ```
 //!
@@ -14,6 +14,7 @@
 //! | [`light`] | what the LED shows |
 //! | [`outbox`] | frames that wait for a mailbox |
 //! | [`telemetry`] | what a debugger reads |
+//! | [`retained`] | what survives a reset: the last fault, the zero deviation |
 //! | [`fpu`] | the rounding mode that the decoder relies on |
 //!
 //! The program around it is `main.rs`; pins, clocks and bit timing are in `board.rs`.
@@ -26,6 +27,7 @@ pub mod fpu;
 pub mod light;
 pub mod node;
 pub mod outbox;
+pub mod retained;
 pub mod schedule;
 pub mod slots;
 #[allow(unsafe_code)] // a symbol name that a debugger finds; see its text

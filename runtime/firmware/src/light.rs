@@ -3,13 +3,15 @@
 //! | LED | state |
 //! |---|---|
 //! | one flash a second | decoding |
+//! | four flashes a second | decoding, on the internal oscillator |
+//! | five flashes a second | decoding, but the CAN controller did not start |
 //! | two flashes a second | no parameters, bad ones, or new ones that are coming |
 //! | three flashes a second | no codes from the converter, or a sensor fault |
 //! | steadily on | the controller failed its own test |
 //! | blinking fast, on as long as off | asked to show where it is |
 //! | off | no power, or between reset and the first tick |
 
-use hal_adapters::can::status::NodeState;
+use hal_adapters::can::status::{NodeState, board_check};
 
 /// Ticks of a second.
 const SECOND: u32 = 500;
@@ -18,14 +20,16 @@ const FLASH: u32 = 50;
 /// Ticks of half a period while identifying: 62 ms.
 const FAST: u32 = 31;
 
-/// Whether the LED is on in this tick.
-pub const fn is_on(state: NodeState, identifying: bool, tick: u32) -> bool {
+/// Whether the LED is on in this tick. `board_checks` are the bits of [`board_check`].
+pub const fn is_on(state: NodeState, board_checks: u32, identifying: bool, tick: u32) -> bool {
     if identifying {
         return (tick / FAST).is_multiple_of(2);
     }
     let flashes = match state {
         NodeState::Starting => return false,
         NodeState::SelfTestFailed => return true,
+        NodeState::Running if board_checks & board_check::CAN_NOT_STARTED != 0 => 5,
+        NodeState::Running if board_checks & board_check::INTERNAL_OSCILLATOR != 0 => 4,
         NodeState::Running => 1,
         NodeState::NoParameters | NodeState::BadParameters | NodeState::Updating => 2,
         NodeState::NoFrames | NodeState::SensorFault => 3,
@@ -40,16 +44,23 @@ mod tests {
 
     #[test]
     fn each_state_has_its_number_of_flashes() {
-        let flashes = |state, identifying| {
-            let on = |tick| is_on(state, identifying, tick);
+        let flashes = |state, checks, identifying| {
+            let on = |tick| is_on(state, checks, identifying, tick);
             (1..=SECOND)
                 .filter(|&tick| on(tick) && !on(tick - 1))
                 .count()
         };
-        assert_eq!(flashes(NodeState::Running, false), 1);
-        assert_eq!(flashes(NodeState::BadParameters, false), 2);
-        assert_eq!(flashes(NodeState::SensorFault, false), 3);
-        assert_eq!(flashes(NodeState::SelfTestFailed, false), 0);
-        assert!(flashes(NodeState::Running, true) >= 8);
+        assert_eq!(flashes(NodeState::Running, 0, false), 1);
+        assert_eq!(flashes(NodeState::BadParameters, 0, false), 2);
+        assert_eq!(flashes(NodeState::SensorFault, 0, false), 3);
+        let (internal, no_can) = (
+            board_check::INTERNAL_OSCILLATOR,
+            board_check::CAN_NOT_STARTED,
+        );
+        assert_eq!(flashes(NodeState::Running, internal, false), 4);
+        assert_eq!(flashes(NodeState::Running, internal | no_can, false), 5);
+        assert_eq!(flashes(NodeState::SensorFault, internal, false), 3);
+        assert_eq!(flashes(NodeState::SelfTestFailed, 0, false), 0);
+        assert!(flashes(NodeState::Running, 0, true) >= 8);
     }
 }

@@ -11,15 +11,20 @@
 //!   finished by a second alarm when the codes have settled; it does not wait in between.
 //! - Only a tick that was done before the next one was due feeds the watchdog. Faults of
 //!   sensors, parameters and bus are reported and do not cause a reset.
-//! - A panic stops everything, and the watchdog resets. No tick can reach one: the only panic
-//!   that the linker keeps there is behind a check of the length of received frames.
+//! - A panic, a fault of the core, a stack that overflows and a crystal that stops are noted in
+//!   RAM that a reset leaves alone, and reset. The next start tells them. No tick can reach a
+//!   panic: those that the linker keeps are in the HAL's set-up of the clocks.
 #![no_std]
 #![no_main]
 
 mod board;
 mod bus;
+mod fault;
 mod flash;
+mod start;
 mod timer;
+mod wait;
+mod watchdog;
 
 use embedded_hal::delay::DelayNs;
 
@@ -37,20 +42,15 @@ impl DelayNs for Cycles {
     }
 }
 
-#[panic_handler]
-fn stop(_: &core::panic::PanicInfo<'_>) -> ! {
-    cortex_m::interrupt::disable();
-    loop {
-        cortex_m::asm::nop();
-    }
-}
-
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use super::{Cycles, board, board::Converter, bus::Bus, flash, timer::Clock};
+    use super::start::{Before, Found, ZeroKeeper};
+    use super::{Cycles, board, board::Converter, bus::Bus, fault, flash, timer::Clock};
+    use super::{wait::Stopwatch, watchdog::Watchdog};
     use firmware::acquisition::Acquisition;
     use firmware::fpu::{Fpu, FpuSettings};
     use firmware::node::{Facts, Node, Parameters, SampleFault};
+    use firmware::retained::Step;
     use firmware::schedule::{Schedule, Tick};
     use firmware::slots::{self, Loaded};
     use firmware::telemetry::{Counters, Ended, STAGE};
@@ -59,9 +59,7 @@ mod app {
     use runtime::{OnInvalid, Servo};
     use stm32f4xx_hal::gpio::PinState;
     use stm32f4xx_hal::pac::TIM2;
-    use stm32f4xx_hal::prelude::*;
     use stm32f4xx_hal::rcc::Enable;
-    use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
     #[shared]
     struct Shared {
@@ -77,29 +75,38 @@ mod app {
         open: Option<Tick>,
         acquisition: Acquisition<Converter>,
         node: Node<'static>,
-        watchdog: IndependentWatchdog,
+        facts: Facts,
+        zero: ZeroKeeper,
+        watchdog: Watchdog,
         led: board::Led,
+        servo: board::ServoPin,
         overrun_ticks: u32,
     }
 
     #[init(local = [loaded: Option<Loaded> = None])]
-    fn init(cx: init::Context) -> (Shared, Local) {
+    fn init(mut cx: init::Context) -> (Shared, Local) {
+        fault::guard_stack(&mut cx.core.MPU);
         let device = cx.device;
-        let watchdog_reset = device.RCC.csr().read().wdgrstf().bit_is_set();
-        device.RCC.csr().modify(|_, w| w.rmvf().set_bit());
-        STAGE.put_watchdog_reset(watchdog_reset);
+        let mut stopwatch = Stopwatch::new(cx.core.SYST);
+        let before = Before::take(&device.RCC);
+        let mut watchdog = Watchdog::start(device.IWDG, &device.DBGMCU, &mut stopwatch);
+        let (mut rcc, crystal) = before.clocks(device.RCC, &mut stopwatch);
 
-        let mut rcc = device.RCC.freeze(board::clocks());
+        watchdog.feed();
+        fault::begin(Step::Peripherals);
         let ports = (device.GPIOA, device.GPIOB, device.GPIOC);
         let parts = board::set_up(ports, device.SPI1, device.CAN1, &mut rcc);
-        let bus = Bus::new(parts.can);
+        let bus = Bus::new(parts.can, crystal, &mut stopwatch);
 
+        watchdog.feed();
+        fault::begin(Step::Parameters);
         let memory = flash::parameter_slots();
         let choice = slots::choose(memory, board::STAGE_SERIAL);
         let loaded = choice
             .slot
             .and_then(|slot| memory.get(slot))
             .and_then(|slot| slots::load(slot));
+        let blob = loaded.as_ref().map_or(0, |loaded| loaded.crc);
         // After a warm start the FPU may have any settings; with these the arithmetic is the host's.
         Fpu.restore();
         let sound = runtime::arithmetic::check().is_ok() && Fpu::defaults_are_sound();
@@ -117,18 +124,37 @@ mod app {
                 refusal: choice.refusal.unwrap_or(slots::Refusal::NEITHER),
             }
         };
+        let mut node = Node::new(
+            parameters,
+            before.by_fault,
+            Layout::for_bits(Converter::CODE_BITS),
+        )
+        .recording(cfg!(feature = "record"));
+        let zero_lost = before.restore_zero(&mut node, blob);
+        let zero = ZeroKeeper::new(blob, node.zero());
+
+        watchdog.feed();
+        fault::begin(Step::Converter);
         let mut acquisition = Acquisition::new(parts.converter);
         // If the converter is not there yet, the ticks report why and start it again.
         let _ = acquisition.start(&mut Cycles);
 
+        let board = before.board_facts(
+            &device.FLASH,
+            &Found {
+                pulled_up: parts.pulled_up,
+                crystal,
+                can_started: bus.started(),
+                zero_lost,
+            },
+        );
+        STAGE.put_start(before.watchdog, &board);
         TIM2::enable(&mut rcc);
         let mut clock = Clock::new(device.TIM2);
         let schedule = Schedule::starting(clock.now_us());
         clock.set_tick_alarm(schedule.due_us());
-        let mut watchdog = IndependentWatchdog::new(device.IWDG);
-        // Otherwise halting in a debugger would reset.
-        watchdog.stop_on_debug(&device.DBGMCU, true);
-        watchdog.start(board::WATCHDOG_MS.millis());
+        watchdog.feed();
+        fault::begin(Step::Ticking);
 
         (
             Shared { bus },
@@ -137,14 +163,16 @@ mod app {
                 schedule,
                 open: None,
                 acquisition,
-                node: Node::new(
-                    parameters,
-                    watchdog_reset,
-                    Layout::for_bits(Converter::CODE_BITS),
-                )
-                .recording(cfg!(feature = "record")),
+                node,
+                facts: Facts {
+                    internal_oscillator: !crystal,
+                    board,
+                    ..Facts::default()
+                },
+                zero,
                 watchdog,
                 led: parts.led,
+                servo: parts.servo,
                 overrun_ticks: 0,
             },
         )
@@ -161,7 +189,9 @@ mod app {
     #[task(
         binds = TIM2,
         priority = 1,
-        local = [clock, schedule, open, acquisition, node, watchdog, led, overrun_ticks],
+        local = [
+            clock, schedule, open, acquisition, node, facts, zero, watchdog, led, servo, overrun_ticks
+        ],
         shared = [bus]
     )]
     fn tick(cx: tick::Context) {
@@ -171,8 +201,11 @@ mod app {
             open,
             acquisition,
             node,
+            facts,
+            zero,
             watchdog,
             led,
+            servo,
             overrun_ticks,
             ..
         } = cx.local;
@@ -200,17 +233,16 @@ mod app {
         let sampled_us = tick.started_us.wrapping_add(Converter::SAMPLE_US);
         let sample = acquisition.sample(tick.sequence, sampled_us, &mut Cycles);
         bus.start_tick();
-        let facts = Facts {
-            missed_ticks: schedule.missed(),
-            bus_off: bus.bus_off(),
-            ..Facts::default()
-        };
+        facts.missed_ticks = schedule.missed();
+        facts.bus_off = bus.bus_off();
+        facts.servo_off_pin = Some(servo.is_high());
         let sample = sample.map_err(|fault| SampleFault::from(&fault));
-        let reading = node.tick(sample, &facts, &mut Fpu, &mut bus.outbox);
+        let reading = node.tick(sample, facts, &mut Fpu, &mut bus.outbox);
         // After the pose, whose frames then find the mailboxes empty.
         bus.receive(node);
         bus.send();
         led.set_state(PinState::from(node.light()));
+        zero.keep(node.zero());
 
         let (state, reason) = node.state();
         STAGE.put(&Ended {

@@ -1,6 +1,6 @@
 //! One tick of the stage controller: codes in, frames out; and what it is asked for.
 //!
-//! State and reason of the status frame (every 16 ticks):
+//! State and reason of the status frame (every 16 ticks, and at once after the bus was off):
 //!
 //! | state | reason |
 //! |---|---|
@@ -8,7 +8,7 @@
 //! | 2 no parameters | 2: both slots are erased |
 //! | 3 bad parameters | slot * 16 + kind: 1 cut short, 3 no blob at all, 4 newer layout, 5 bad header, 7 wrong check (torn), 8 bad payload, 9 unusable values, 10 another stage's |
 //! | 4 no frames | 3 silent converter (line at 0 or 1), 7 no new codes |
-//! | 5 sensor fault | 1 SPI, 2 pin, 4 wrong part, 5 wrong setting or unexpected reset, 6 wrong check, 8 wrong input, 9 codes that never change; 0x10 + channel: code at a rail (0 to 2 Hall A to C, 3 to 5 gaps 1 to 3) |
+//! | 5 sensor fault | 1 SPI, 2 pin, 4 wrong part, 5 wrong setting or unexpected reset, 6 wrong check, 8 wrong input, 10 SYNC does not arrive; 0x10 + channel: code at a rail, 0x20 + channel: code that never changes (0 to 2 Hall A to C, 3 to 5 gaps 1 to 3) |
 //! | 6 self-test failed | 1: arithmetic is not that of the host, or the core would not restore the FPU's settings |
 
 use crate::fpu::FpuSettings;
@@ -122,6 +122,9 @@ pub struct Node<'d> {
     ticks: u32,
     state: (NodeState, u8),
     fpu_restored: u32,
+    board_checks: u32,
+    /// Times the bus was off that a state has told.
+    bus_off_told: u32,
 }
 
 impl<'d> Node<'d> {
@@ -136,6 +139,8 @@ impl<'d> Node<'d> {
             ticks: 0,
             state: (NodeState::Starting, 0),
             fpu_restored: 0,
+            board_checks: 0,
+            bus_off_told: 0,
         }
     }
 
@@ -181,7 +186,12 @@ impl<'d> Node<'d> {
 
     /// Whether the LED is to be on.
     pub const fn light(&self) -> bool {
-        crate::light::is_on(self.state.0, self.service.is_identifying(), self.ticks)
+        crate::light::is_on(
+            self.state.0,
+            self.board_checks,
+            self.service.is_identifying(),
+            self.ticks,
+        )
     }
 
     /// One tick: decodes the codes and puts the frames that are due into the outbox.
@@ -194,6 +204,7 @@ impl<'d> Node<'d> {
     ) -> Reading {
         let reading = self.decode(&sample, fpu);
         self.state = self.state_of(&sample, &reading);
+        self.board_checks = facts.board.board_checks;
         if let Parameters::Usable { .. } = self.parameters {
             self.send_pose(&reading, sample.as_ref().ok(), outbox);
         }
@@ -205,8 +216,10 @@ impl<'d> Node<'d> {
         let servo = servo_of(&mut self.parameters);
         let answer = self.service.tick(servo, facts.servo_off_pin);
         let page = self.service.identity_page(self.serial());
+        let was_off = core::mem::replace(&mut self.bus_off_told, facts.bus_off) != facts.bus_off;
         let due = match self.ticks % u32::from(SLOW_TICKS) {
             0 => Some(Told::Status(self.status(facts))),
+            _ if was_off => Some(Told::Status(self.status(facts))),
             8 => {
                 let number = self.ticks / u32::from(SLOW_TICKS);
                 let page = HealthPage::of(&self.health(), Some(&facts.board), number);

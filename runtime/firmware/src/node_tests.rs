@@ -75,12 +75,12 @@ fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Told> {
 }
 
 #[test]
-fn pose_frames_come_lowest_priority_first_so_that_all_find_a_mailbox() {
+fn pose_frames_come_first_in_the_order_of_their_identifiers() {
     let mut node = node();
     for k in 0..32 {
         let frames = tick(&mut node, Ok(frame(k)));
         let planar: Vec<_> = frames.iter().take(3).map(|coded| coded.message).collect();
-        assert_eq!(planar, [Message::PoseRz, Message::PoseY, Message::PoseX]);
+        assert_eq!(planar, [Message::PoseX, Message::PoseY, Message::PoseRz]);
     }
 }
 
@@ -95,6 +95,26 @@ fn every_sixteenth_tick_tells_the_state_and_half_way_a_counter() {
         let health = told.iter().any(|t| matches!(t, Told::Health(_)));
         assert_eq!((status, health), (k % 16 == 0, k % 16 == 8), "{k}");
     }
+}
+
+#[test]
+fn a_bus_that_was_off_is_told_at_once() {
+    let mut node = node();
+    tick(&mut node, Ok(frame(0)));
+    let facts = Facts {
+        bus_off: 1,
+        ..Facts::default()
+    };
+    let mut states = |k| {
+        let mut outbox = Outbox::new();
+        node.tick(Ok(frame(k)), &facts, &mut Disturbed::default(), &mut outbox);
+        let frames: Vec<_> = core::iter::from_fn(|| outbox.pop()).collect();
+        let told = told(&frames);
+        told.iter()
+            .filter(|t| matches!(t, Told::Status(s) if s.bus_off == 1))
+            .count()
+    };
+    assert_eq!([1, 2, 3].map(&mut states), [1, 0, 0]);
 }
 
 #[test]
@@ -267,10 +287,9 @@ fn a_program_built_to_record_does_so_from_the_first_tick() {
     let messages: Vec<_> = frames.iter().map(|coded| coded.message).collect();
     use Message as M;
     let want = [
-        // Groups are given in reverse; see the outbox.
-        [M::PoseRz, M::PoseY, M::PoseX].as_slice(),
+        [M::PoseX, M::PoseY, M::PoseRz].as_slice(),
         &[M::PoseTime, M::PoseZ, M::SensorTime],
-        &[M::Capacitive23At24, M::HallCCapacitive1At24, M::HallAb24],
+        &[M::HallAb24, M::HallCCapacitive1At24, M::Capacitive23At24],
         &[M::NodeStatus],
     ];
     assert_eq!(messages, want.concat());

@@ -3,8 +3,8 @@
 //! Of what waits in its three mailboxes the controller sends the lowest identifier first, and of
 //! two frames with the same identifier not always the older. The outbox keeps both from doing
 //! harm: the mailboxes hold one frame, or one group, at a time. A group is up to three frames
-//! of different messages that may leave in any order; the next frame is given when all mailboxes
-//! are empty. So groups and single frames leave in the order in which they were pushed.
+//! with rising identifiers; the next frame is given when all mailboxes are empty. So frames
+//! leave in the order in which they were pushed.
 
 use hal_adapters::can::{Coded, Message};
 use heapless::Deque;
@@ -51,12 +51,10 @@ impl Outbox {
         self.count_dropped(u32::from(full));
     }
 
-    /// Adds a group at the end: up to three frames of this tick with rising identifiers, as
-    /// they will leave. They are given in reverse, for drivers that take a frame only before
-    /// those of higher identifiers.
+    /// Adds a group at the end: up to three frames of this tick with rising identifiers.
     pub fn push_group(&mut self, frames: &[Coded]) {
         let mut joins = false;
-        for frame in frames.iter().rev() {
+        for frame in frames {
             let full = self.fresh.push_back((*frame, joins)).is_err();
             self.count_dropped(u32::from(full));
             joins = true;

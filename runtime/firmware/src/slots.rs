@@ -5,7 +5,7 @@
 //! a tie slot 0. So a new calibration may be flashed into the slot that is not in use, and a
 //! slot that is torn by a power failure leaves the other one to run on.
 
-use runtime::blob::BlobError;
+use runtime::blob::{BlobError, HEADER_BYTES};
 use runtime::parameters::Text;
 use runtime::{AnyDecoder, ParameterSet};
 
@@ -54,6 +54,8 @@ pub struct Loaded {
     pub decoder: AnyDecoder,
     /// Serial number of the stage.
     pub serial: Text,
+    /// CRC of the blob.
+    pub crc: u32,
 }
 
 /// Looks at both slots. With a `serial`, blobs of other stages are refused.
@@ -94,7 +96,16 @@ pub fn load(memory: &[u8]) -> Option<Loaded> {
     Some(Loaded {
         decoder: set.decoder(),
         serial: set.serial,
+        crc: stored_crc(memory)?,
     })
+}
+
+/// The CRC at the end of a sound blob.
+fn stored_crc(memory: &[u8]) -> Option<u32> {
+    let (header, rest) = memory.split_first_chunk::<HEADER_BYTES>()?;
+    let payload_bytes = u32::from_le_bytes(*header.last_chunk()?);
+    let stored = rest.get(payload_bytes as usize..)?.first_chunk()?;
+    Some(u32::from_le_bytes(*stored))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! when they belong together.
 
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed, Ordering::Release, compiler_fence};
+use hal_adapters::can::status::BoardFacts;
 use runtime::Reading;
 
 /// Counters of the program, besides those of the servo.
@@ -46,6 +47,9 @@ pub struct Telemetry {
     longest_us: AtomicU32,
     /// 1 if the last reset came from the watchdog.
     watchdog_reset: AtomicU32,
+    /// Last fault, its address and detail, resets by faults, FLASH_OPTCR, checks of the board: pages
+    /// 6 to 11 of the health frames.
+    board: [AtomicU32; 6],
 }
 
 #[allow(clippy::declare_interior_mutable_const)] // only to fill arrays
@@ -67,6 +71,7 @@ pub static STAGE: Telemetry = Telemetry {
     last_us: ZERO,
     longest_us: ZERO,
     watchdog_reset: ZERO,
+    board: [ZERO; 6],
 };
 
 /// The result of a tick.
@@ -130,8 +135,19 @@ impl Telemetry {
         }
     }
 
-    /// Notes whether the watchdog caused the last reset.
-    pub fn put_watchdog_reset(&self, watchdog: bool) {
+    /// Notes whether the watchdog caused the last reset, and what is told of the board.
+    pub fn put_start(&self, watchdog: bool, facts: &BoardFacts) {
         self.watchdog_reset.store(watchdog.into(), Relaxed);
+        let words = [
+            facts.last_fault,
+            facts.fault_address,
+            facts.fault_detail,
+            facts.faults,
+            facts.option_bytes,
+            facts.board_checks,
+        ];
+        for (to, from) in self.board.iter().zip(words) {
+            to.store(from, Relaxed);
+        }
     }
 }

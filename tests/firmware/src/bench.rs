@@ -5,11 +5,11 @@ use crate::adc_model::{Part, Row};
 use crate::can_model::Sent;
 use crate::image::Image;
 use crate::machine::Machine;
-use embedded_can::{Id, StandardId};
-use hal_adapters::can::Message;
+use embedded_can::{Frame, Id, StandardId};
 use hal_adapters::can::command::{Answer, Command, IdentityPage, Request};
 use hal_adapters::can::e2e::{protect, unprotect};
 use hal_adapters::can::status::{HealthPage, NodeStatus};
+use hal_adapters::can::{BusFrame, Message};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -94,7 +94,8 @@ fn columns(header: &str, names: [&str; 6]) -> Result<[usize; 6], String> {
     Ok(at)
 }
 
-fn rows(text: &str) -> Result<Vec<Row>, Failure> {
+/// The codes of a log.
+pub fn rows(text: &str) -> Result<Vec<Row>, Failure> {
     let mut lines = text.lines();
     let names = [
         "hall_a_cnt",
@@ -161,6 +162,10 @@ pub struct Seen {
     pub health: Vec<HealthPage>,
     /// Text of the identity pages.
     pub identity: Vec<u8>,
+    /// Number and time of ticks, us, by the controller.
+    pub times: Vec<(u32, u32)>,
+    /// Frames of codes, and when they were sent completely, ns.
+    pub codes: Vec<(u64, BusFrame)>,
     /// Frames whose check fails or that are none of the protocol's.
     pub damaged: usize,
 }
@@ -204,6 +209,17 @@ impl Seen {
             Message::Identity => {
                 self.identity
                     .extend(IdentityPage::from_payload(payload).text);
+            }
+            Message::PoseTime | Message::SensorTime => {
+                self.times.push((payload.short, payload.long));
+            }
+            Message::Hall
+            | Message::Capacitive
+            | Message::HallAb24
+            | Message::HallCCapacitive1At24
+            | Message::Capacitive23At24 => {
+                let frame = BusFrame::new(message.id(), &sent.bytes);
+                self.codes.extend(frame.map(|frame| (sent.done_ns, frame)));
             }
             _ => match AXES.iter().position(|axis| *axis == message) {
                 Some(axis) => self.axes.push(Axis {

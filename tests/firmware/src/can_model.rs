@@ -1,4 +1,5 @@
-//! bxCAN, as far as the controller uses it: three mailboxes, one receive store, bus states.
+//! bxCAN, as far as the controller uses it, from RM0090 section 32: three mailboxes, one receive
+//! store, bus states.
 
 use std::collections::VecDeque;
 
@@ -9,12 +10,28 @@ pub enum BusState {
     Good,
     /// No other node: frames are repeated without end.
     Alone,
-    /// The controller is bus-off.
+    /// A short circuit: the controller is bus-off.
     Off,
 }
 
 /// Time of one frame at 1 Mbit/s: 111 bits and a few stuffed ones.
 const FRAME_NS: u64 = 125_000;
+/// Eleven recessive bits: the controller takes part in the bus after so many.
+const JOIN_NS: u64 = 11_000;
+/// A controller that recovers is bus-off for 128 times eleven recessive bits.
+const RECOVERY_NS: u64 = 128 * JOIN_NS;
+
+/// Bits of MCR.
+const INIT: u32 = 1;
+const SLEEP: u32 = 1 << 1;
+const RECOVER: u32 = 1 << 6;
+/// Bits of MSR.
+const INIT_ACK: u32 = 1;
+const SLEEP_ACK: u32 = 1 << 1;
+const ERROR_LATCH: u32 = 1 << 2;
+/// Bits of IER.
+const TX_INTERRUPT: u32 = 1;
+const LATCH_OFF: u32 = 1 << 10;
 
 /// A frame that went over the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,13 +50,27 @@ pub struct Sent {
 struct Mailbox {
     registers: [u32; 4],
     pending: bool,
+    /// It is on the wire and will not be repeated.
+    aborted: bool,
     asked_ns: u64,
 }
 
 /// The controller.
 pub struct CanModel {
     mcr: u32,
+    /// When it takes part in the bus, once it was asked to.
+    joins_ns: Option<u64>,
+    /// Whether it ever acknowledges that it stands still.
+    pub acknowledges: bool,
     interrupts: u32,
+    /// ERRI.
+    latched: bool,
+    /// The time up to which it has advanced.
+    advanced_ns: u64,
+    /// Until when other nodes hold the bus with frames of higher priority.
+    busy_until_ns: u64,
+    /// When it ceases to be bus-off; `None`: never.
+    off_until: Option<Option<u64>>,
     mailboxes: [Mailbox; 3],
     done: u32,
     on_the_wire: Option<(usize, u64)>,
@@ -62,7 +93,13 @@ impl CanModel {
         plain[0x200 / 4] = 0x2a1c_0e01;
         Self {
             mcr: 0x0001_0002,
+            joins_ns: None,
+            acknowledges: true,
             interrupts: 0,
+            latched: false,
+            advanced_ns: 0,
+            busy_until_ns: 0,
+            off_until: None,
             mailboxes: [Mailbox::default(); 3],
             done: 0,
             on_the_wire: None,
@@ -74,11 +111,64 @@ impl CanModel {
         }
     }
 
-    /// Changes what the bus does from `now_ns` on.
+    /// Changes what the bus does from `now_ns` on. What is on the wire is destroyed.
     pub fn set_bus(&mut self, bus: BusState, now_ns: u64) {
+        self.fail();
+        match bus {
+            BusState::Off => self.go_off(None),
+            _ if self.bus == BusState::Off && self.mcr & RECOVER != 0 => {
+                self.off_until = Some(Some(now_ns + RECOVERY_NS));
+            }
+            _ => {}
+        }
         self.bus = bus;
-        self.on_the_wire = None;
         self.arbitrate(now_ns);
+    }
+
+    /// What the bus does.
+    pub const fn bus(&self) -> BusState {
+        self.bus
+    }
+
+    /// The controller is bus-off from `now_ns` for so long, shorter than the standard has it.
+    pub fn blip(&mut self, now_ns: u64, ns: u64) {
+        self.fail();
+        self.go_off(Some(now_ns + ns));
+    }
+
+    /// Other nodes hold the bus until then.
+    pub fn occupy(&mut self, until_ns: u64) {
+        self.busy_until_ns = until_ns;
+    }
+
+    /// The frame on the wire is destroyed by an error, and says whether there was one.
+    pub fn destroy(&mut self, now_ns: u64) -> bool {
+        let was_there = self.on_the_wire.is_some();
+        self.fail();
+        self.arbitrate(now_ns);
+        was_there
+    }
+
+    fn go_off(&mut self, until: Option<u64>) {
+        self.off_until = Some(until);
+        self.latched |= self.interrupts & LATCH_OFF != 0;
+    }
+
+    /// The frame on the wire fails.
+    fn fail(&mut self) {
+        if let Some((k, _)) = self.on_the_wire.take()
+            && self.mailboxes[k].aborted
+        {
+            self.complete(k, false);
+        }
+    }
+
+    fn complete(&mut self, k: usize, sent: bool) {
+        let mailbox = &mut self.mailboxes[k];
+        mailbox.pending = false;
+        mailbox.aborted = false;
+        mailbox.registers[0] &= !TXRQ;
+        self.done |= (1 | u32::from(sent) << 1) << (8 * k);
     }
 
     /// A frame from another node.
@@ -99,13 +189,14 @@ impl CanModel {
         }
     }
 
-    fn takes_part(&self) -> bool {
-        self.mcr & 3 == 0 && self.bus != BusState::Off
+    fn takes_part(&self, now_ns: u64) -> bool {
+        let joined = self.joins_ns.is_some_and(|at| at <= now_ns);
+        joined && self.busy_until_ns <= now_ns && self.off_until.is_none()
     }
 
     /// Starts the pending frame of the highest priority if the wire is free.
     fn arbitrate(&mut self, now_ns: u64) {
-        if self.on_the_wire.is_some() || !self.takes_part() || self.bus == BusState::Alone {
+        if self.on_the_wire.is_some() || !self.takes_part(now_ns) {
             return;
         }
         let pending = (0..3).filter(|&k| self.mailboxes[k].pending);
@@ -113,50 +204,70 @@ impl CanModel {
         self.on_the_wire = first.map(|k| (k, now_ns + FRAME_NS));
     }
 
-    /// When the frame on the wire ends.
+    /// When the next thing happens by itself.
     pub fn next_event_ns(&self) -> Option<u64> {
-        self.on_the_wire.map(|(_, at)| at)
+        let ends = self.on_the_wire.map(|(_, at)| at);
+        let waits = self.mailboxes.iter().any(|mailbox| mailbox.pending) && ends.is_none();
+        let joins = self.joins_ns.map(|at| at.max(self.busy_until_ns));
+        let joins = joins.filter(|_| waits && self.off_until.is_none());
+        let recovers = self.off_until.flatten();
+        [ends, joins, recovers].into_iter().flatten().min()
     }
 
     /// Lets time pass.
     pub fn advance(&mut self, now_ns: u64) {
+        if let Some(at) = self.off_until.flatten().filter(|at| *at <= now_ns) {
+            self.off_until = None;
+            self.arbitrate(at);
+        }
+        let joins = self.joins_ns.map(|at| at.max(self.busy_until_ns));
+        if let Some(at) = joins.filter(|at| *at <= now_ns) {
+            self.arbitrate(at.max(self.advanced_ns));
+        }
+        self.advanced_ns = now_ns;
         while let Some((k, at)) = self.on_the_wire.filter(|(_, at)| *at <= now_ns) {
-            let mailbox = &mut self.mailboxes[k];
-            mailbox.pending = false;
-            mailbox.registers[0] &= !TXRQ;
-            let ([a, b, c, d], [e, f, g, h]) = (
-                mailbox.registers[2].to_le_bytes(),
-                mailbox.registers[3].to_le_bytes(),
-            );
-            self.sent.push(Sent {
-                asked_ns: mailbox.asked_ns,
-                done_ns: at,
-                id: (mailbox.registers[0] >> 21) as u16,
-                bytes: [a, b, c, d, e, f, g, h],
-            });
-            self.done |= 0b11 << (8 * k);
             self.on_the_wire = None;
+            if self.bus == BusState::Alone {
+                // Nobody acknowledged it: it is repeated, unless it was aborted.
+                if self.mailboxes[k].aborted {
+                    self.complete(k, false);
+                }
+            } else {
+                let Mailbox {
+                    registers: [id, _, low, high],
+                    asked_ns,
+                    ..
+                } = self.mailboxes[k];
+                let bytes = (u64::from(high) << 32 | u64::from(low)).to_le_bytes();
+                self.sent.push(Sent {
+                    asked_ns,
+                    done_ns: at,
+                    id: (id >> 21) as u16,
+                    bytes,
+                });
+                self.complete(k, true);
+            }
             self.arbitrate(at);
         }
     }
 
     /// Whether the transmit interrupt is pending.
     pub fn transmit_interrupt(&self) -> bool {
-        self.interrupts & 1 != 0 && self.done & 0x01_01_01 != 0
+        self.interrupts & TX_INTERRUPT != 0 && self.done & 0x01_01_01 != 0
     }
 
     /// A register.
-    pub fn read(&mut self, offset: usize) -> u32 {
+    pub fn read(&mut self, offset: usize, now_ns: u64) -> u32 {
         match offset {
             0x00 => self.mcr,
-            0x04 => 0xc00 | (self.mcr & 1) | if self.mcr & 3 == 2 { 2 } else { 0 },
+            0x04 => self.status(now_ns),
             0x08 => self.transmit_status(),
             0x0c => self.received.len() as u32,
             0x14 => self.interrupts,
-            0x18 => match self.bus {
-                BusState::Good => 0,
-                BusState::Alone => 128 << 16 | 0b11,
-                BusState::Off => 0b111,
+            0x18 => match (self.bus, self.off_until) {
+                (_, Some(_)) => 0b111,
+                (BusState::Alone, _) => 128 << 16 | 0b11,
+                _ => 0,
             },
             0x180..0x1b0 => self.mailboxes[(offset - 0x180) / 16].registers[offset % 16 / 4],
             0x1b0..0x1c0 => self
@@ -165,6 +276,16 @@ impl CanModel {
                 .map_or(0, |frame| frame[offset % 16 / 4]),
             _ => self.plain[offset / 4 % 256],
         }
+    }
+
+    fn status(&self, now_ns: u64) -> u32 {
+        let on = |bit, is| if is { bit } else { 0 };
+        let stands = self.acknowledges && self.mcr & SLEEP == 0;
+        let stands = stands && self.joins_ns.is_none_or(|at| at > now_ns);
+        0xc00
+            | on(INIT_ACK, stands)
+            | on(SLEEP_ACK, self.mcr & SLEEP != 0)
+            | on(ERROR_LATCH, self.latched)
     }
 
     fn transmit_status(&self) -> u32 {
@@ -180,8 +301,11 @@ impl CanModel {
         match offset {
             0x00 => {
                 self.mcr = value;
+                let joins = self.acknowledges && value & (INIT | SLEEP) == 0;
+                self.joins_ns = joins.then(|| self.joins_ns.unwrap_or(now_ns + JOIN_NS));
                 self.arbitrate(now_ns);
             }
+            0x04 => self.latched &= value & ERROR_LATCH == 0,
             0x08 => {
                 for k in 0..3 {
                     let shift = 8 * k;
@@ -190,11 +314,11 @@ impl CanModel {
                         self.done &= !(0xf << shift);
                     }
                     if value >> (shift + 7) & 1 == 1 && self.mailboxes[k].pending {
-                        self.mailboxes[k].pending = false;
-                        self.mailboxes[k].registers[0] &= !TXRQ;
-                        self.done |= 1 << shift;
+                        // What is on the wire is completed or fails first.
                         if self.on_the_wire.is_some_and(|(at, _)| at == k) {
-                            self.on_the_wire = None;
+                            self.mailboxes[k].aborted = true;
+                        } else {
+                            self.complete(k, false);
                         }
                     }
                 }
@@ -205,11 +329,17 @@ impl CanModel {
             }
             0x14 => self.interrupts = value,
             0x180..0x1b0 => {
-                let mailbox = &mut self.mailboxes[(offset - 0x180) / 16];
+                let k = (offset - 0x180) / 16;
+                let mailbox = &mut self.mailboxes[k];
+                // A pending mailbox cannot be written.
+                if mailbox.pending {
+                    return;
+                }
                 mailbox.registers[offset % 16 / 4] = value;
                 if offset.is_multiple_of(16) && value & TXRQ != 0 {
                     mailbox.pending = true;
                     mailbox.asked_ns = now_ns;
+                    self.done &= !(0xf << (8 * k));
                     self.filled += 1;
                     self.arbitrate(now_ns);
                 }

@@ -21,6 +21,8 @@ pub struct Image {
     pub text_bytes: usize,
     /// Bytes of RAM that its statics take.
     pub static_bytes: usize,
+    /// Bytes of RAM below its statics, where the stack lies.
+    pub stack_bytes: usize,
     symbols: Vec<(String, u32)>,
 }
 
@@ -57,11 +59,16 @@ impl Image {
             .symbols()
             .filter_map(|s| Some((s.name().ok()?.to_owned(), s.address() as u32)))
             .collect();
-        let static_bytes = (static_end - RAM) as usize;
+        let mut static_start = RAM;
+        if let Some(symbol) = file.symbols().find(|s| s.name() == Ok("_stack_start")) {
+            static_start = symbol.address() as u32;
+        }
+        let static_bytes = static_end.saturating_sub(static_start) as usize;
         Ok(Self {
             flash,
             text_bytes,
             static_bytes,
+            stack_bytes: (static_start - RAM) as usize,
             symbols,
         })
     }

@@ -1,16 +1,40 @@
 //! The chip: core, memory, peripherals, interrupts.
 
 use crate::adc_model::{Part, Row};
+use crate::callbacks::{
+    BELOW_RAM, FpscrHook, JumpHook, count, jump, read, read_below_ram, read_bit, read_core,
+    set_fpscr, write, write_below_ram, write_bit, write_core,
+};
 use crate::image::{FLASH, FLASH_BYTES, Image, RAM, RAM_BYTES};
-use crate::peripherals::{BIT_BAND, CORE, IRQ_TIM2, Peripherals, RANGE};
-use crate::unicorn::{Handle, Unicorn, register};
-use std::ffi::{OsStr, c_uint, c_void};
+use crate::peripherals::{BIT_BAND, CORE, IRQ_TIM2, Peripherals, RANGE, cause};
+use crate::unicorn::{Unicorn, register};
+use std::ffi::{OsStr, c_void};
 
 /// Return address of interrupts. No program is there.
 const RETURN: u32 = 0x1fff_0000;
 /// What unused RAM is filled with.
 const PAINT: u8 = 0xa5;
 const WFI: u16 = 0xbf30;
+/// The core's register of faults, and bits of it (PM0214): a precise bus error; an access that the
+/// memory protection forbids, and then the stacking, too.
+const CFSR: usize = 0xed28;
+const PRECISE: u32 = 1 << 9;
+/// See [`PRECISE`].
+pub const ACCESS_AND_STACKING: u32 = 1 << 1 | 1 << 4;
+/// Numbers of exceptions in the vector table.
+const NMI: u32 = 2;
+const HARD_FAULT: usize = 3;
+/// The integer registers that the core stacks, in this order.
+const STACKED: [i32; 8] = [
+    register::R0,
+    register::R0 + 1,
+    register::R0 + 2,
+    register::R0 + 3,
+    register::R12,
+    register::LR,
+    register::PC,
+    register::XPSR,
+];
 
 /// Memory of the core, aligned to its pages.
 #[repr(C, align(4096))]
@@ -28,11 +52,24 @@ fn memory<const N: usize>(fill: u8) -> Box<Memory<N>> {
     }
 }
 
+/// What RAM holds after power-on.
+fn fill_with_noise(ram: &mut [u8]) {
+    let mut state = 0x2545_f491u32;
+    for byte in ram {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        *byte = state as u8;
+    }
+}
+
 /// The cost of an interrupt.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
     /// Instructions up to the last mailbox that it filled, or all if it filled none.
     pub instructions: u64,
+    /// All instructions.
+    pub all_instructions: u64,
     /// Bytes over the SPI.
     pub spi_bytes: u64,
     /// Mailboxes filled.
@@ -49,11 +86,11 @@ pub struct Machine {
     _returns: Box<Memory<4096>>,
     vectors: [u32; 48],
     waits_at: u32,
-    panics_at: u32,
+    /// Bytes of RAM below the statics, where the stack lies.
+    stack_bytes: usize,
     asleep: bool,
-    /// Whether the program panicked. Only the watchdog ends that.
-    panicked: bool,
-    /// Panics of the program.
+    started: bool,
+    /// Resets that the program asked for, after a panic, another fault or a lost crystal.
     pub panics: u32,
     /// Time by which the next tick's interrupt is held back, ns.
     pub hold_ns: u64,
@@ -61,86 +98,6 @@ pub struct Machine {
     pub watchdog_resets: u32,
     /// What each interrupt of the timer took, where instructions are counted.
     pub costs: Vec<Cost>,
-}
-
-extern "C" fn read(_: Handle, offset: u64, _: c_uint, user: *mut c_void) -> u64 {
-    // SAFETY: `user` is the `Peripherals` that `Machine` keeps in its box.
-    let chip = unsafe { &mut *user.cast::<Peripherals>() };
-    u64::from(chip.read(offset as usize & !3) >> (8 * (offset & 3)))
-}
-
-extern "C" fn write(_: Handle, offset: u64, bytes: c_uint, value: u64, user: *mut c_void) {
-    // SAFETY: as in `read`.
-    let chip = unsafe { &mut *user.cast::<Peripherals>() };
-    let value = value as u32 & (u32::MAX >> (32 - 8 * bytes.min(4)));
-    // The converter's and the watchdog's data registers are written in parts of words.
-    chip.write(offset as usize & !3, value << (8 * (offset & 3)));
-}
-
-extern "C" fn read_bit(_: Handle, offset: u64, _: c_uint, user: *mut c_void) -> u64 {
-    // SAFETY: as in `read`.
-    let chip = unsafe { &mut *user.cast::<Peripherals>() };
-    let (at, bit) = (offset as usize / 32, offset / 4 % 8 + 8 * (offset / 32 % 4));
-    u64::from(chip.read(at & !3) >> bit & 1)
-}
-
-extern "C" fn write_bit(_: Handle, offset: u64, _: c_uint, value: u64, user: *mut c_void) {
-    // SAFETY: as in `read`.
-    let chip = unsafe { &mut *user.cast::<Peripherals>() };
-    let (at, bit) = (
-        (offset as usize / 32) & !3,
-        offset / 4 % 8 + 8 * (offset / 32 % 4),
-    );
-    let word = chip.read(at) & !(1 << bit) | (value as u32 & 1) << bit;
-    chip.write(at, word);
-}
-
-extern "C" fn read_core(_: Handle, offset: u64, _: c_uint, user: *mut c_void) -> u64 {
-    // SAFETY: as in `read`.
-    let chip = unsafe { &mut *user.cast::<Peripherals>() };
-    u64::from(chip.read_core(offset as usize & !3) >> (8 * (offset & 3)))
-}
-
-extern "C" fn write_core(_: Handle, offset: u64, bytes: c_uint, value: u64, user: *mut c_void) {
-    // SAFETY: as in `read`.
-    let chip = unsafe { &mut *user.cast::<Peripherals>() };
-    let (shift, mask) = (8 * (offset & 3), u32::MAX >> (32 - 8 * bytes.min(4)));
-    let at = offset as usize & !3;
-    let enables = (0xe100..0xe120).contains(&at);
-    let kept = if enables {
-        0
-    } else {
-        chip.read_core(at) & !(mask << shift)
-    };
-    chip.write_core(at, kept | (value as u32 & mask) << shift);
-}
-
-extern "C" fn stop(handle: Handle, _: u64, _: u32, user: *mut c_void) {
-    // SAFETY: `user` is the function of the library that ends a run, kept for ever.
-    unsafe { (*user.cast::<crate::unicorn::Stop>())(handle) };
-}
-
-extern "C" fn count(_: Handle, _: u64, _: u32, user: *mut c_void) {
-    // SAFETY: as in `read`.
-    unsafe { (*user.cast::<Peripherals>()).instructions += 1 };
-}
-
-extern "C" fn set_fpscr(handle: Handle, _: u64, _: u32, user: *mut c_void) {
-    // SAFETY: `user` is a `FpscrHook` that is never freed.
-    let hook = unsafe { &*user.cast::<FpscrHook>() };
-    // SAFETY: the chip lives as long as the emulator that calls this.
-    let chip = unsafe { &*hook.chip };
-    if chip.fpscr_to_write != 0 {
-        let mut value = chip.fpscr_to_write;
-        // SAFETY: FPSCR has 32 bits.
-        unsafe { (hook.write)(handle, register::FPSCR, (&raw mut value).cast()) };
-    }
-}
-
-/// What a hook needs to change FPSCR.
-struct FpscrHook {
-    chip: *const Peripherals,
-    write: unsafe extern "C" fn(Handle, i32, *mut c_void) -> i32,
 }
 
 impl Machine {
@@ -163,6 +120,7 @@ impl Machine {
             flash.0[at..at + slot.len()].copy_from_slice(slot);
         }
         let mut ram = memory::<RAM_BYTES>(PAINT);
+        fill_with_noise(&mut ram.0[image.stack_bytes..]);
         let mut returns = memory::<4096>(0);
         let mut chip = Box::new(Peripherals::new(part, rows));
         let user: *mut c_void = (&raw mut *chip).cast();
@@ -175,13 +133,9 @@ impl Machine {
             core.map_io(RANGE, read, write, user)?;
             core.map_io(BIT_BAND, read_bit, write_bit, user)?;
             core.map_io(CORE, read_core, write_core, user)?;
+            core.map_io(BELOW_RAM, read_below_ram, write_below_ram, user)?;
         }
-        let panics_at = image.address("9panic_fmt")?;
-        let stopper: &'static crate::unicorn::Stop = Box::leak(Box::new(core.stopper()));
-        let user: *mut c_void = std::ptr::from_ref(stopper).cast_mut().cast();
-        let at = u64::from(panics_at);
-        // SAFETY: the pointer to the function is leaked.
-        unsafe { core.hook_code(stop, user, (at, at))? };
+        chip.stop_run = Some(core.stopper());
         let mut vectors = [0; 48];
         for (k, vector) in vectors.iter_mut().enumerate() {
             *vector = image.word(FLASH + 4 * k as u32);
@@ -194,9 +148,9 @@ impl Machine {
             _returns: returns,
             vectors,
             waits_at: waits_at(image)?,
-            panics_at,
+            stack_bytes: image.stack_bytes,
             asleep: false,
-            panicked: false,
+            started: false,
             panics: 0,
             hold_ns: 0,
             watchdog_resets: 0,
@@ -229,38 +183,90 @@ impl Machine {
         self.core.set(register::FPSCR, value);
     }
 
-    /// Runs for so many ns.
+    /// Changes a register of the core, once `chip.inject` says which, when the core comes to
+    /// `address`. Call it before the first run.
+    pub fn hook_injection(&mut self, address: u32) -> Result<(), String> {
+        let hook = JumpHook {
+            chip: &raw mut *self.chip,
+            write: self.core.writer(),
+        };
+        let user: *mut c_void = (&raw mut *Box::leak(Box::new(hook))).cast();
+        let at = u64::from(address);
+        // SAFETY: as in `new`; the hook is leaked.
+        unsafe { self.core.hook_code(jump, user, (at, at)) }.map_err(|fault| fault.to_string())
+    }
+
+    /// Takes the power away and gives it back: RAM holds noise then.
+    pub fn power_cycle(&mut self) {
+        fill_with_noise(&mut self.ram.0[self.stack_bytes..]);
+        self.reset(cause::POWER_ON);
+    }
+
+    /// Pulls the pin NRST low.
+    pub fn reset_by_pin(&mut self) {
+        self.reset(cause::PIN);
+    }
+
+    fn reset(&mut self, cause: u32) {
+        self.chip.reset(cause);
+        self.asleep = false;
+    }
+
+    /// Resets if the watchdog bit or the program asked for it, and says whether.
+    fn reset_if_due(&mut self) -> bool {
+        if self.chip.watchdog_bites() {
+            self.watchdog_resets += 1;
+            self.reset(cause::WATCHDOG);
+        } else if self.chip.reset_asked {
+            self.panics += 1;
+            self.reset(cause::SOFTWARE);
+        } else {
+            return false;
+        }
+        true
+    }
+
+    /// Runs for so many ns. The start-up after power-on comes on top.
     pub fn run_ns(&mut self, ns: u64) -> Result<(), String> {
+        if !self.started {
+            self.started = true;
+            self.boot()?;
+        }
         let end_ns = self.chip.now_ns + ns;
         loop {
-            if !self.asleep {
+            if self.chip.now_ns <= end_ns && (self.reset_if_due() || !self.asleep) {
                 self.boot()?;
+                continue;
+            }
+            if self.chip.clocks.interrupts() && self.chip.now_ns <= end_ns {
+                self.interrupt(NMI)?;
+                continue;
+            }
+            let stands = self.chip.clocks.stands(self.chip.now_ns);
+            while let Some(irq) = self.chip.pending_interrupt().filter(|_| !stands) {
+                if irq == IRQ_TIM2 && self.chip.tick_is_due() && self.hold_ns > 0 {
+                    self.chip.now_ns += std::mem::take(&mut self.hold_ns);
+                    self.chip.advance();
+                }
+                if self.chip.stops() {
+                    break;
+                }
+                self.interrupt(16 + irq)?;
+                self.chip.advance();
+            }
+            if self.chip.stops() && self.chip.now_ns <= end_ns {
+                continue;
             }
             match self.chip.next_event_ns() {
-                Some(at) if at <= end_ns => self.chip.now_ns = self.chip.now_ns.max(at),
+                Some(at) if at.max(self.chip.now_ns) <= end_ns => {
+                    self.chip.now_ns = self.chip.now_ns.max(at)
+                }
                 _ => {
                     self.chip.now_ns = self.chip.now_ns.max(end_ns);
                     return Ok(());
                 }
             }
             self.chip.advance();
-            while let Some(irq) = self.chip.pending_interrupt().filter(|_| !self.panicked) {
-                if irq == IRQ_TIM2 && self.chip.tick_is_due() && self.hold_ns > 0 {
-                    self.chip.now_ns += std::mem::take(&mut self.hold_ns);
-                    self.chip.advance();
-                }
-                if self.chip.watchdog_bites() {
-                    break;
-                }
-                self.interrupt(irq)?;
-                self.chip.advance();
-            }
-            if self.chip.watchdog_bites() {
-                self.watchdog_resets += 1;
-                self.chip.reset(1 << 29 | 1 << 26);
-                self.asleep = false;
-                self.panicked = false;
-            }
         }
     }
 
@@ -269,65 +275,45 @@ impl Machine {
         self.run_ns(ticks * 2_000_000)
     }
 
-    /// From the reset vector until the program sleeps.
+    /// From the reset vector until the program sleeps or the chip is reset.
     fn boot(&mut self) -> Result<(), String> {
-        self.core.set(register::SP, self.vectors[0]);
-        self.core.set(register::FPSCR, 0);
-        self.go(self.vectors[1], self.waits_at)?;
-        self.asleep = true;
+        if !self.asleep {
+            self.core.set(register::SP, self.vectors[0]);
+            self.core.set(register::FPSCR, 0);
+            self.go(self.vectors[1], self.waits_at)?;
+            self.asleep = true;
+        }
         Ok(())
     }
 
-    fn interrupt(&mut self, irq: u32) -> Result<(), String> {
-        // What the core stacks, floating-point registers included: 26 words.
-        let mut saved = [0; 26];
-        let registers = [
-            register::R0,
-            register::R0 + 1,
-            register::R0 + 2,
-            register::R0 + 3,
-            register::R12,
-            register::LR,
-            register::PC,
-            register::XPSR,
-        ];
-        for (k, to) in saved.iter_mut().enumerate() {
-            *to = match k {
-                0..8 => self.core.get(registers[k]),
-                8..24 => self.core.get(register::S0 + k as i32 - 8),
-                24 => self.core.get(register::FPSCR),
-                _ => 0,
-            };
-        }
+    /// An exception, by its number in the vector table: the core stacks its registers, runs the
+    /// handler and takes them back.
+    fn interrupt(&mut self, exception: u32) -> Result<(), String> {
         let sp = self.core.get(register::SP);
-        let frame = (sp - 4 * saved.len() as u32) & !7;
-        let at = (frame - RAM) as usize;
-        for (bytes, word) in self.ram.0[at..].chunks_exact_mut(4).zip(saved) {
-            bytes.copy_from_slice(&word.to_le_bytes());
-        }
-        self.core.set(register::SP, frame);
-        self.core.set(register::LR, RETURN | 1);
+        let saved = self.stack_registers();
+        let is_tick = exception == 16 + IRQ_TIM2;
         let before = self.chip.instructions;
         let (spi_before, filled_before) = (self.chip.spi_bytes, self.chip.can.filled);
         self.chip.instructions_at_mailbox = before;
-        self.go(self.vectors[16 + irq as usize], RETURN)?;
-        if irq == IRQ_TIM2 && self.chip.instructions != before {
+        self.go(self.vectors[exception as usize], RETURN)?;
+        if is_tick && self.chip.instructions != before {
             let upto = match self.chip.instructions_at_mailbox {
                 at if at != before => at,
                 _ => self.chip.instructions,
             };
             self.costs.push(Cost {
                 instructions: upto - before,
+                all_instructions: self.chip.instructions - before,
                 spi_bytes: self.chip.spi_bytes - spi_before,
                 mailboxes: self.chip.can.filled - filled_before,
             });
         }
-        if self.panicked {
+        if self.chip.stops() {
             return Ok(());
         }
         for (k, word) in saved.into_iter().enumerate() {
             match k {
-                0..6 => self.core.set(registers[k], word),
+                0..6 => self.core.set(STACKED[k], word),
                 8..24 => self.core.set(register::S0 + k as i32 - 8, word),
                 24 => self.core.set(register::FPSCR, word),
                 _ => {}
@@ -337,22 +323,70 @@ impl Machine {
         Ok(())
     }
 
-    /// Runs until `until`, or until the program panics.
+    /// What the core does before a handler: it stacks 26 words, floating-point registers included.
+    /// Where there is no RAM nothing is stacked (ARM DDI 0403, STKERR).
+    fn stack_registers(&mut self) -> [u32; 26] {
+        let mut saved = [0; 26];
+        for (k, to) in saved.iter_mut().enumerate() {
+            *to = match k {
+                0..8 => self.core.get(STACKED[k]),
+                8..24 => self.core.get(register::S0 + k as i32 - 8),
+                24 => self.core.get(register::FPSCR),
+                _ => 0,
+            };
+        }
+        let sp = self.core.get(register::SP);
+        let frame = sp.wrapping_sub(4 * saved.len() as u32) & !7;
+        let at = frame.wrapping_sub(RAM) as usize;
+        if let Some(ram) = self.ram.0.get_mut(at..at.saturating_add(4 * saved.len())) {
+            for (bytes, word) in ram.chunks_exact_mut(4).zip(saved) {
+                bytes.copy_from_slice(&word.to_le_bytes());
+            }
+        }
+        self.core.set(register::SP, frame);
+        self.core.set(register::LR, RETURN | 1);
+        saved
+    }
+
+    /// Runs until `until` or until the chip is reset. An access to what is not there or is protected
+    /// leads into the handler of hard faults.
     fn go(&mut self, from: u32, until: u32) -> Result<(), String> {
-        let ran = self.core.run(from, until);
+        let mut ran = self.core.run(from, until);
+        let protected = std::mem::take(&mut self.chip.memory_fault);
+        if (ran.is_err() || protected) && !self.chip.stops() {
+            self.chip.write_core(
+                CFSR,
+                if protected {
+                    ACCESS_AND_STACKING
+                } else {
+                    PRECISE
+                },
+            );
+            self.stack_registers();
+            ran = self.core.run(self.vectors[HARD_FAULT], RETURN);
+        }
         let pc = self.core.get(register::PC);
         match ran {
+            _ if self.chip.stops() => Ok(()),
             Ok(()) if pc & !1 == until => Ok(()),
-            Ok(()) if pc & !1 == self.panics_at => {
-                self.panicked = true;
-                self.panics += 1;
-                Ok(())
-            }
             Ok(()) => Err(format!(
                 "the program stopped at {pc:#010x}, not at {until:#010x}"
             )),
             Err(fault) => Err(format!("{fault} at {pc:#010x}")),
         }
+    }
+
+    /// Flips a bit of RAM.
+    pub fn flip(&mut self, address: u32, bit: u32) {
+        if let Some(byte) = self.ram.0.get_mut((address - RAM + bit / 8) as usize) {
+            *byte ^= 1 << (bit % 8);
+        }
+    }
+
+    /// Writes to flash, as a debugger does while the core stands.
+    pub fn write_flash(&mut self, address: u32, bytes: &[u8]) {
+        let at = (address - FLASH) as usize;
+        self.flash.0[at..at + bytes.len()].copy_from_slice(bytes);
     }
 
     /// A word of RAM.
@@ -365,12 +399,10 @@ impl Machine {
     }
 
     /// Bytes of stack that were ever used.
-    pub fn stack_bytes(&self, static_bytes: usize) -> usize {
-        let untouched = self.ram.0[static_bytes..]
-            .iter()
-            .take_while(|&&b| b == PAINT)
-            .count();
-        RAM_BYTES - static_bytes - untouched
+    pub fn stack_bytes(&self) -> usize {
+        let stack = &self.ram.0[..self.stack_bytes];
+        let untouched = stack.iter().take_while(|&&b| b == PAINT).count();
+        stack.len() - untouched
     }
 
     /// Bytes of flash, to see that the program leaves them alone.

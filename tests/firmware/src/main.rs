@@ -1,24 +1,35 @@
 //! Runs the stage controller's unmodified image on an emulated STM32F405, with an emulated
 //! converter that plays a log over SPI, and compares what it sends over CAN with what the host
-//! decodes from the log.
+//! decodes from the log. A line `FAULT part | fault | ticks | poses` says after how many ticks a
+//! fault was told, and how many valid poses were wrong until then.
 //!
-//! Use: `bench FOLDER LIBRARY TICKS [PART OF A NAME]`, as the script `run` beside this
-//! package does: a folder with images, blobs, log and poses, the library of Unicorn 2.1, the
-//! ticks of the long run (0 for none).
+//! Use, as the scripts beside this package do:
+//!
+//! - `bench FOLDER LIBRARY TICKS [PART OF A NAME]`: a folder with images, blobs, log and poses, the
+//!   library of Unicorn 2.1, the ticks of the long run (0 for none).
+//! - `bench FOLDER LIBRARY record PART LOG BUS REFERENCE` and
+//!   `bench FOLDER LIBRARY judge PART LOG STAGE BLOB DIRECT`: see [`rehearsal`].
 
 mod adc_model;
 mod bench;
+mod callbacks;
 mod can_model;
 mod checks;
+mod clock_model;
 mod image;
 mod machine;
 mod peripherals;
+mod rehearsal;
 mod unicorn;
+mod watchdog_model;
 
 use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
-use checks::{Outcome, Report, bus, commands, figures, log, parameters, sensors, timing};
+use checks::{
+    Outcome, Report, bus, commands, figures, log, motion, parameters, sensors, start, timing, zero,
+};
+use std::ffi::{OsStr, OsString};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -35,6 +46,11 @@ fn main() -> ExitCode {
             return ExitCode::from(3);
         }
     };
+    if let Some(outcome) = rehearse(&bench, ticks, filter) {
+        let mut report = Report::default();
+        report.note(&ticks.to_string_lossy(), outcome);
+        return ExitCode::from(u8::from(report.failed > 0));
+    }
     let Some(ticks) = ticks.to_str().and_then(|text| text.parse().ok()) else {
         eprintln!("not a number of ticks: {ticks:?}");
         return ExitCode::from(2);
@@ -46,6 +62,24 @@ fn main() -> ExitCode {
     run(&bench, ticks, &mut report, &filter.unwrap_or_default());
     println!("{} passed, {} failed", report.passed, report.failed);
     ExitCode::from(u8::from(report.failed > 0 || report.passed == 0))
+}
+
+/// A step of the rehearsal, if one is asked for.
+fn rehearse(bench: &Bench, step: &OsStr, arguments: &[OsString]) -> Option<Outcome> {
+    let (part, files) = arguments.split_first()?;
+    let parts = [(Part::Ads131m08, "ads131m08"), (Part::Ads8688, "ads8688")];
+    let part = parts.into_iter().find(|(_, name)| part == *name)?;
+    let files: Vec<_> = files.iter().map(Path::new).collect();
+    match (step.to_str()?, files.as_slice()) {
+        ("record", [log, bus, reference]) => {
+            Some(rehearsal::record(bench, part.0, log, bus, reference))
+        }
+        ("judge", [log, stage, blob, direct]) => {
+            let (log, blobs) = ((*log, *stage), (*blob, *direct));
+            Some(rehearsal::judge(bench, part, log, blobs))
+        }
+        _ => None,
+    }
 }
 
 fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
@@ -67,8 +101,8 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
             &format!("{name}: the whole log gives the host's words"),
             &|| log::same_words(bench, part, whole, name),
         );
-        for (fault, case) in sensors::cases(part) {
-            check(&format!("{name}: {fault}"), &|| {
+        for case in sensors::cases(part) {
+            check(&format!("{name}: {}", case.name()), &|| {
                 sensors::survives(bench, part, &case)
             });
         }
@@ -77,10 +111,16 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
         check(&format!("{name}: dead from the start"), &|| {
             sensors::dead_from_the_start(bench, part)
         });
-        check(&format!("{name}: reset by itself"), &|| {
-            sensors::reset_by_itself(bench, part)
-        });
     }
+    check("ads131m08: a pose is of its instant", &|| {
+        motion::a_pose_is_of_its_instant(bench)
+    });
+    check("ads131m08: a register changes at any time", &|| {
+        sensors::a_register_changes_at_any_time(bench)
+    });
+    check("ads131m08: whatever its sheet leaves open", &|| {
+        sensors::every_variant(bench)
+    });
     check("a debugger reads the last pose", &|| {
         log::a_debugger_reads_the_last_pose(bench)
     });
@@ -111,6 +151,46 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("no other node from the start", &|| {
         bus::alone_from_the_start(bench)
     });
+    check("bus off for less than a tick", &|| {
+        bus::off_for_less_than_a_tick(bench)
+    });
+    check("aborted on the wire: completed", &|| {
+        bus::aborted_on_the_wire(bench, false)
+    });
+    check("aborted on the wire: failed", &|| {
+        bus::aborted_on_the_wire(bench, true)
+    });
+    check("zero: over a watchdog reset", &|| {
+        zero::over_a_watchdog_reset(bench)
+    });
+    check("zero: over a reset by the pin", &|| {
+        zero::over_a_reset_by_pin(bench)
+    });
+    check("zero: over power-on", &|| zero::over_power_on(bench));
+    check("zero: lost", &|| zero::lost(bench));
+    check("start: crystal absent", &|| start::no_crystal(bench));
+    check("start: silent after bus-off", &|| {
+        start::silent_after_bus_off(bench)
+    });
+    check("start: crystal lost while running", &|| {
+        start::crystal_lost(bench)
+    });
+    check("start: PLL does not lock to the crystal", &|| {
+        start::pll_without_lock(bench)
+    });
+    check("start: PLL dead", &|| start::pll_dead(bench));
+    check("start: CAN dead", &|| start::can_dead(bench));
+    check("start: the board", &|| start::the_board(bench));
+    match start::crashes(bench) {
+        Ok(crashes) => {
+            for crash in crashes {
+                check(&format!("crash: {}", crash.fault), &|| {
+                    start::crash(bench, &crash)
+                });
+            }
+        }
+        Err(failure) => check("crash", &|| Err(failure.to_string().into())),
+    }
     for (name, outcome) in parameters::unusable_kinds(bench) {
         let outcome = std::cell::Cell::new(Some(outcome));
         check(&format!("parameters: {name}"), &|| {
@@ -127,7 +207,22 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
         parameters::the_later_of_two(bench)
     });
     check("command: identify", &|| commands::identify(bench));
+    check("command: answers outlive a failing bus", &|| {
+        commands::answers_outlive_a_failing_bus(bench)
+    });
     check("command: re-zero", &|| commands::rezero(bench));
+    check("command: re-zero refused", &|| {
+        commands::rezero_refused(bench)
+    });
+    for (part, name) in parts {
+        check(&format!("command: record, {name}"), &|| {
+            commands::record(bench, part)
+        });
+        check(
+            &format!("command: order and age of frames, {name}"),
+            &|| commands::order_and_age(bench, part, name),
+        );
+    }
     check("command: odd ones", &|| commands::odd_commands(bench));
     check("command: any data length code", &|| {
         commands::any_length_code(bench)

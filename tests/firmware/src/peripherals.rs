@@ -1,8 +1,12 @@
 //! The peripherals of an STM32F405, as far as the program uses them. Time is that of the bench:
 //! it passes between interrupts and while bytes cross the SPI, and instructions take none.
 
-use crate::adc_model::{Adc, Part, Row};
+use crate::adc_model::{Adc, Input, Part, Row};
+use crate::callbacks::Injected;
 use crate::can_model::CanModel;
+use crate::clock_model::{Clocks, Pll};
+use crate::unicorn::Stop;
+use crate::watchdog_model::Watchdog;
 
 /// Address range of the peripherals: start and bytes.
 pub const RANGE: (u64, u64) = (0x4000_0000, 0x8_0000);
@@ -20,6 +24,14 @@ const GPIOA: usize = 0x2_0000;
 const GPIOB: usize = 0x2_0400;
 const GPIOC: usize = 0x2_0800;
 const RCC: usize = 0x2_3800;
+const OPTCR: usize = 0x2_3c14;
+/// The core's system timer, and the register by which a program resets it.
+const SYSTICK: usize = 0xe010;
+const AIRCR: usize = 0xed0c;
+/// Memory protection: control, base and attributes of the region that was written last.
+const MPU_CTRL: usize = 0xed94;
+const MPU_RBAR: usize = 0xed9c;
+const MPU_RASR: usize = 0xeda0;
 
 const SELECT_PIN: u32 = 4;
 const SYNC_PIN: u32 = 0;
@@ -30,9 +42,30 @@ pub const IRQ_CAN1_TX: u32 = 19;
 /// Numbers of the interrupts.
 pub const IRQ_TIM2: u32 = 28;
 
+const SERVO_PIN: u32 = 1;
+
 const US: u64 = 1000;
-/// Nominal frequency of the watchdog's oscillator.
-const LSI_HZ: u64 = 32_000;
+/// From the supply until the program runs: the chip's own reset, at least (DS8626, tRSTTEMPO). The
+/// converter has the same supply.
+const BOOT_NS: u64 = 500_000;
+/// Clock of the bus that SPI1 is on.
+const BUS_2_HZ: u64 = 84_000_000;
+/// What the program takes between two bytes, ns.
+const SPI_GAP_NS: u64 = 150;
+/// Time of a read of a register that a program polls: loops that wait take time.
+const POLL_NS: u64 = US;
+
+/// Flags of RCC_CSR.
+pub mod cause {
+    /// The pin NRST, which every reset pulls low.
+    pub const PIN: u32 = 1 << 26;
+    /// Power-on, with the brown-out flag.
+    pub const POWER_ON: u32 = 1 << 27 | 1 << 25 | PIN;
+    /// The program.
+    pub const SOFTWARE: u32 = 1 << 28 | PIN;
+    /// The watchdog.
+    pub const WATCHDOG: u32 = 1 << 29 | PIN;
+}
 
 /// One of the two alarms of the timer.
 #[derive(Clone, Copy, Default)]
@@ -44,24 +77,36 @@ struct Alarm {
 pub struct Peripherals {
     /// Now, ns since the chip got its power.
     pub now_ns: u64,
-    /// Time of one byte on the SPI, ns.
-    pub spi_byte_ns: u64,
+    /// Time of one byte on the SPI in place of what its registers say, ns.
+    pub spi_byte_ns: Option<u64>,
     /// Bytes that went over the SPI.
     pub spi_bytes: u64,
     /// The converter.
     pub adc: Adc,
     /// The CAN controller.
     pub can: CanModel,
-    /// Rows that the converter plays, in a loop.
-    pub rows: Vec<Row>,
     /// What the timer reads when it is started, us: 0 on the chip.
     pub timer_offset_us: u32,
     /// When row 0 is played, ns: the first tick.
     pub first_tick_ns: Option<u64>,
-    /// When the watchdog bites, if it was started.
-    pub watchdog_ns: Option<u64>,
-    /// How often it was fed.
-    pub fed: u64,
+    /// The watchdog.
+    pub watchdog: Watchdog,
+    /// Oscillators and PLL.
+    pub clocks: Clocks,
+    /// FLASH_OPTCR: the option bytes.
+    pub option_bytes: u32,
+    /// Whether chip select and the control pin have pull-ups on the board.
+    pub pulled_up: [bool; 2],
+    /// Whether the service pin is pulled low: the servo is on.
+    pub servo_on: bool,
+    /// Whether the program accessed memory that is protected.
+    pub memory_fault: bool,
+    /// Whether the program has asked for a reset.
+    pub reset_asked: bool,
+    /// What a hook changes once.
+    pub inject: Vec<Injected>,
+    /// Ends a run of the core.
+    pub stop_run: Option<Stop>,
     /// Instructions executed, where they are counted.
     pub instructions: u64,
     /// Instructions at the last filling of a mailbox.
@@ -79,26 +124,29 @@ pub struct Peripherals {
     spi_in: u8,
     spi_full: bool,
     selected: bool,
-    sync: bool,
 }
 
 impl Peripherals {
     /// A chip after power-up.
     pub fn new(part: Part, rows: Vec<Row>) -> Self {
         let mut new = Self {
-            now_ns: 0,
-            spi_byte_ns: match part {
-                Part::Ads131m08 => 381,
-                Part::Ads8688 => 762,
-            },
+            now_ns: BOOT_NS,
+            spi_byte_ns: None,
             spi_bytes: 0,
-            adc: Adc::new(part),
+            adc: Adc::new(part, Input::held(rows)),
             can: CanModel::new(),
-            rows,
             timer_offset_us: 0,
             first_tick_ns: None,
-            watchdog_ns: None,
-            fed: 0,
+            watchdog: Watchdog::new(),
+            clocks: Clocks::new(true, Pll::Sound),
+            // As delivered, but with the highest brown-out level.
+            option_bytes: 0x0fff_aae1,
+            pulled_up: [true; 2],
+            servo_on: false,
+            memory_fault: false,
+            reset_asked: false,
+            inject: Vec::new(),
+            stop_run: None,
             instructions: 0,
             instructions_at_mailbox: 0,
             led: false,
@@ -112,9 +160,8 @@ impl Peripherals {
             spi_in: 0,
             spi_full: false,
             selected: false,
-            sync: true,
         };
-        new.reset(1 << 27 | 1 << 26);
+        new.reset(cause::POWER_ON);
         new
     }
 
@@ -124,23 +171,22 @@ impl Peripherals {
         self.words = vec![0; RANGE.1 as usize / 4];
         self.core_words = vec![0; CORE.1 as usize / 4];
         self.core_words[0xef34 / 4] = 0xc000_0000; // FPCCR: ASPEN, LSPEN
-        self.words[RCC / 4] = 0x83;
+        self.clocks = Clocks::new(self.clocks.crystal, self.clocks.pll);
+        self.reset_asked = false;
         self.reset_flags |= flags;
         self.alarms = [Alarm::default(); 2];
         self.timer_flags = 0;
         self.timer_started_ns = None;
-        self.watchdog_ns = None;
+        let fed = self.watchdog.fed;
+        self.watchdog = Watchdog::new();
+        self.watchdog.fed = fed;
+        let acknowledges = self.can.acknowledges;
+        let bus = self.can.bus();
         let (sent, filled) = (std::mem::take(&mut self.can.sent), self.can.filled);
         self.can = CanModel::new();
         (self.can.sent, self.can.filled) = (sent, filled);
-    }
-
-    fn row(&mut self) -> Row {
-        let since = self
-            .now_ns
-            .saturating_sub(self.first_tick_ns.unwrap_or(self.now_ns));
-        let k = (since / (2000 * US)) as usize % self.rows.len().max(1);
-        self.rows.get(k).copied().unwrap_or_default()
+        self.can.acknowledges = acknowledges;
+        self.can.set_bus(bus, self.now_ns);
     }
 
     fn timer_us(&self) -> u32 {
@@ -148,12 +194,18 @@ impl Peripherals {
         ((since / US) as u32).wrapping_add(self.timer_offset_us)
     }
 
+    /// What the timer showed when the input's first row was there, us.
+    pub fn motion_start_us(&self) -> Option<u32> {
+        let since = self.adc.input.start_ns? - self.timer_started_ns?;
+        Some(((since / US) as u32).wrapping_add(self.timer_offset_us))
+    }
+
     /// Time of the next event, ns.
     pub fn next_event_ns(&self) -> Option<u64> {
         let alarms = self.alarms.iter().filter_map(|alarm| alarm.at_ns);
         alarms
             .chain(self.can.next_event_ns())
-            .chain(self.watchdog_ns)
+            .chain(self.watchdog.bites_ns())
             .min()
     }
 
@@ -165,16 +217,39 @@ impl Peripherals {
                 alarm.at_ns = None;
                 self.timer_flags |= 2 << k;
                 if k == 0 {
-                    self.first_tick_ns.get_or_insert(at);
+                    let first_ns = *self.first_tick_ns.get_or_insert(at);
+                    self.adc.input.start(first_ns);
                 }
             }
         }
         self.can.advance(now_ns);
+        self.watchdog.advance(now_ns);
     }
 
     /// Whether the watchdog has bitten.
     pub fn watchdog_bites(&self) -> bool {
-        self.watchdog_ns.is_some_and(|at| at <= self.now_ns)
+        self.watchdog.bites_ns().is_some_and(|at| at <= self.now_ns)
+    }
+
+    /// The crystal stops.
+    pub fn stop_crystal(&mut self) {
+        self.clocks.stop_crystal(self.now_ns);
+    }
+
+    /// Whether the memory protection forbids an access (PM0214, MPU): one region without
+    /// access, over the map of the core.
+    pub fn is_protected(&self, address: u32) -> bool {
+        let word = |offset: usize| self.core_words[offset / 4];
+        let (control, attributes) = (word(MPU_CTRL), word(MPU_RASR));
+        let is_on = control & 0b101 == 0b101 && attributes & 1 == 1;
+        let no_access = attributes >> 24 & 0b111 == 0;
+        let bytes_log2 = (attributes >> 1 & 0x1f) + 1;
+        is_on && no_access && (address ^ word(MPU_RBAR)) >> bytes_log2 == 0
+    }
+
+    /// Whether the chip is reset, and the program executes nothing more.
+    pub fn stops(&self) -> bool {
+        self.reset_asked || self.watchdog_bites()
     }
 
     /// Whether a tick's alarm (the first one) is what is pending.
@@ -200,11 +275,19 @@ impl Peripherals {
     pub fn read(&mut self, offset: usize) -> u32 {
         let word = self.words[offset / 4];
         match offset {
-            o if o == RCC => word | (word & 0x0101_0001) << 1,
-            o if o == RCC + 0x08 => word & !0xc | (word & 3) << 2,
+            o if (RCC..RCC + 0x10).contains(&o) => {
+                self.now_ns += POLL_NS;
+                self.clocks.read(o - RCC, self.now_ns)
+            }
             o if o == RCC + 0x70 => word | (word & 1) << 1,
             o if o == RCC + 0x74 => word & 1 | (word & 1) << 1 | self.reset_flags,
             o if o == PWR + 4 => 1 << 14 | word,
+            o if o == OPTCR => self.option_bytes,
+            o if o == GPIOA + 0x10 => self.level(GPIOA, SELECT_PIN, self.pulled_up[0]),
+            o if o == GPIOB + 0x10 => {
+                self.level(GPIOB, SYNC_PIN, self.pulled_up[1])
+                    | self.level(GPIOB, SERVO_PIN, false) & u32::from(!self.servo_on) << SERVO_PIN
+            }
             o if o == TIM2 + 0x10 => {
                 self.advance();
                 self.timer_flags
@@ -217,9 +300,9 @@ impl Peripherals {
             }
             o if (CAN1..CAN1 + 0x400).contains(&o) => {
                 self.can.advance(self.now_ns);
-                self.can.read(o - CAN1)
+                self.can.read(o - CAN1, self.now_ns)
             }
-            o if o == IWDG + 0x0c => 0,
+            o if (IWDG..IWDG + 0x10).contains(&o) => self.watchdog.read(o - IWDG, self.now_ns),
             _ => word,
         }
     }
@@ -244,12 +327,19 @@ impl Peripherals {
             }
             o if o == TIM2 + 0x34 => self.set_alarm(0, value),
             o if o == TIM2 + 0x38 => self.set_alarm(1, value),
-            o if o == IWDG => self.key(value),
+            o if (RCC..RCC + 0x10).contains(&o) => self.clocks.write(o - RCC, value, self.now_ns),
+            o if (IWDG..IWDG + 0x10).contains(&o) => {
+                self.watchdog.write(o - IWDG, value, self.now_ns)
+            }
             o if o == SPI1 + 0x0c => {
-                self.spi_in = self.adc.exchange(value as u8);
+                let byte = self.adc.exchange(value as u8);
+                // Both converters need mode 1: in another one bits are shifted.
+                let mode_1 = self.words[SPI1 / 4] & 3 == 1;
+                self.spi_in = if mode_1 { byte } else { byte >> 1 };
                 self.spi_full = true;
                 self.spi_bytes += 1;
-                self.now_ns += self.spi_byte_ns;
+                let bits_ns = 8 * 1_000_000_000 / self.spi_hz();
+                self.now_ns += self.spi_byte_ns.unwrap_or(bits_ns + SPI_GAP_NS);
             }
             o if o == GPIOA + 0x18 || o == GPIOB + 0x18 || o == GPIOC + 0x18 => {
                 self.set_pins(o, value)
@@ -265,6 +355,11 @@ impl Peripherals {
         }
     }
 
+    /// Clock of SPI1, Hz.
+    pub fn spi_hz(&self) -> u64 {
+        BUS_2_HZ >> (1 + (self.words[SPI1 / 4] >> 3 & 7))
+    }
+
     fn set_alarm(&mut self, k: usize, compare: u32) {
         let left = compare.wrapping_sub(self.timer_us());
         let start = self.timer_started_ns.unwrap_or(self.now_ns);
@@ -273,18 +368,10 @@ impl Peripherals {
         self.alarms[k] = Alarm { at_ns };
     }
 
-    fn key(&mut self, key: u32) {
-        let divider = 4u64 << self.words[(IWDG + 4) / 4].min(6);
-        let reload = u64::from(self.words[(IWDG + 8) / 4] & 0xfff) + 1;
-        let period = reload * divider * 1_000_000_000 / LSI_HZ;
-        match key {
-            0xcccc => self.watchdog_ns = Some(self.now_ns + period),
-            0xaaaa => {
-                self.fed += 1;
-                self.watchdog_ns = self.watchdog_ns.map(|_| self.now_ns + period);
-            }
-            _ => {}
-        }
+    /// The bit of an input, by its resistor on the board and the one inside.
+    fn level(&self, port: usize, pin: u32, pulled_up: bool) -> u32 {
+        let inside = self.words[(port + 0x0c) / 4] >> (2 * pin) & 3;
+        u32::from(pulled_up || inside == 1) << pin
     }
 
     fn set_pins(&mut self, register: usize, value: u32) {
@@ -297,22 +384,17 @@ impl Peripherals {
             o if o == GPIOA + 0x18 => match level(SELECT_PIN) {
                 Some(false) if !self.selected => {
                     self.selected = true;
-                    let row = self.row();
-                    self.adc.select(self.now_ns, row);
+                    self.adc.select(self.now_ns);
                 }
                 Some(true) if self.selected => {
                     self.selected = false;
-                    self.adc.deselect();
+                    self.adc.deselect(self.now_ns);
                 }
                 _ => {}
             },
             o if o == GPIOB + 0x18 => {
                 if let Some(high) = level(SYNC_PIN) {
-                    if high && !self.sync {
-                        let row = self.row();
-                        self.adc.sync(self.now_ns, row);
-                    }
-                    self.sync = high;
+                    self.adc.control(high, self.now_ns);
                 }
             }
             _ => self.led = level(LED_PIN).unwrap_or(self.led),
@@ -321,11 +403,21 @@ impl Peripherals {
 
     /// A register of the core.
     pub fn read_core(&mut self, offset: usize) -> u32 {
+        if (SYSTICK..SYSTICK + 0xc).contains(&offset) {
+            self.now_ns += POLL_NS;
+            return self.clocks.read_timer(offset - SYSTICK, self.now_ns);
+        }
         self.core_words[offset / 4]
     }
 
     /// Writes a register of the core.
     pub fn write_core(&mut self, offset: usize, value: u32) {
+        if (SYSTICK..SYSTICK + 0xc).contains(&offset) {
+            self.clocks
+                .write_timer(offset - SYSTICK, value, self.now_ns);
+        }
+        // The key and SYSRESETREQ.
+        self.reset_asked |= offset == AIRCR && value & 0xffff_0004 == 0x05fa_0004;
         let enable = (0xe100..0xe120).contains(&offset);
         let word = &mut self.core_words[offset / 4];
         *word = if enable { *word | value } else { value };

@@ -46,7 +46,7 @@ enum Command {
         /// Ticks of uniform random codes, with Model (31) and again with the field model.
         #[arg(long, default_value_t = 400_000)]
         codes: usize,
-        /// Ticks with random parameters, with either model.
+        /// Ticks with random parameters, with either model; 0 leaves out the predicted poses, too.
         #[arg(long, default_value_t = 80_000)]
         parameters: usize,
         /// Ticks for which what is invalid is held.
@@ -151,12 +151,18 @@ fn make(
     for set in [&set, &field_set] {
         let mut buffer = [0; MAX_BYTES];
         let blob = set.to_bytes(&mut buffer)?;
-        sections.extend(
-            motion::of_log(blob, &dataset, hold)
-                .ok_or("the log holds a vertical pose in place of capacitive codes")?,
-        );
-        let frames = motion::uniform_frames(&mut rng, codes);
-        sections.push(motion::of_blob(blob, frames, hold));
+        let logged = motion::of_log(blob, &dataset, hold)
+            .ok_or("the log holds a vertical pose in place of capacitive codes")?;
+        let mut uniform = |ticks| {
+            let frames = motion::uniform_frames(&mut rng, ticks);
+            motion::of_blob(blob, frames, hold)
+        };
+        sections.extend(logged.iter().cloned());
+        sections.push(uniform(codes));
+        if parameters > 0 {
+            sections.extend(logged.into_iter().map(motion::predicted));
+            sections.push(motion::predicted(uniform(codes / 8)));
+        }
         match set.decoder() {
             AnyDecoder::Linear(sound) => {
                 sections.extend(bare(&mut rng, &sound, parameters, |_| sound));

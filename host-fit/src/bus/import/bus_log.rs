@@ -2,7 +2,9 @@
 
 use super::{ImportError, ImportSettings};
 use crate::input::source;
-use hal_adapters::can::{BusFault, BusHealth, Layout, SensorReceiver, StampedFrame, Timing};
+use hal_adapters::can::{
+    BusFault, BusHealth, Layout, Message, SensorReceiver, StampedFrame, Timing,
+};
 use hal_adapters::candump::{LineError, LogLine};
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
@@ -61,10 +63,10 @@ const TIMING: Timing = Timing {
 ///
 /// # Errors
 /// `Bus`, `BadLine`, `NotText`, `SeveralInterfaces`, `NoTicks`.
-pub fn read(args: &ImportSettings, layout: Layout) -> Result<BusReading, ImportError> {
+pub fn read(args: &ImportSettings) -> Result<BusReading, ImportError> {
     let path = args.bus.as_path();
     let bytes = source::read_bytes(path)?;
-    let mut collector = Collector::new(layout);
+    let mut collector = Collector::new(args.layout);
     let mut reading = BusReading::default();
     let mut interface = args.interface.clone();
     for (line, bytes) in (1..).zip(bytes.split(|b| *b == b'\n')) {
@@ -139,9 +141,10 @@ fn chosen(
 }
 
 /// Frames to whole ticks, counted.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(in crate::bus) struct Collector {
-    receiver: SensorReceiver,
+    layout: Option<Layout>,
+    receiver: Option<SensorReceiver>,
     counts: BusCounts,
     /// Number of the last whole tick, by the receiver and in the record.
     last: Option<(u32, u64)>,
@@ -149,20 +152,25 @@ pub(in crate::bus) struct Collector {
 }
 
 impl Collector {
-    pub(in crate::bus) fn new(layout: Layout) -> Self {
+    /// Takes the layout from the first frame with codes if it is not given.
+    pub(in crate::bus) fn new(layout: Option<Layout>) -> Self {
         Self {
-            receiver: SensorReceiver::new(layout, TIMING),
-            counts: BusCounts::default(),
-            last: None,
-            restarted: false,
+            layout,
+            ..Self::default()
         }
     }
 
     /// Takes a frame; gives the tick that it completes.
     pub(in crate::bus) fn take(&mut self, stamped: &StampedFrame) -> Option<BusTick> {
         self.counts.frames += 1;
+        if self.layout.is_none() {
+            self.layout = Message::from_id(stamped.frame.id).and_then(Layout::carrying);
+        }
+        let layout = self.layout?;
+        let new = || SensorReceiver::new(layout, TIMING);
+        let receiver = self.receiver.get_or_insert_with(new);
         // The receiver's times wrap after 71 minutes.
-        let taken = self.receiver.take(&stamped.frame, stamped.time_us as u32);
+        let taken = receiver.take(&stamped.frame, stamped.time_us as u32);
         self.restarted |= matches!(
             taken.fault,
             Some(
@@ -202,10 +210,16 @@ impl Collector {
     }
 
     /// What came so far.
-    pub(in crate::bus) const fn counts(&self) -> BusCounts {
+    pub(in crate::bus) fn counts(&self) -> BusCounts {
+        let health = self.receiver.as_ref().map(SensorReceiver::health);
         BusCounts {
-            health: *self.receiver.health(),
+            health: health.copied().unwrap_or_default(),
             ..self.counts
         }
+    }
+
+    /// How codes come, once some have.
+    pub(in crate::bus) const fn layout(&self) -> Option<Layout> {
+        self.layout
     }
 }

@@ -14,12 +14,6 @@ pub enum ImportError {
     /// The stage file is refused.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// The codes of the stage do not fit.
-    #[error("{problem}")]
-    Layout {
-        /// What is wrong.
-        problem: String,
-    },
     /// The record of the bus cannot be read.
     #[error(transparent)]
     Bus(#[from] SourceError),
@@ -34,7 +28,7 @@ pub enum ImportError {
         fault: LineError,
     },
     /// A line is no text.
-    #[error("{}, line {line}: not text; name a log that `candump -L` or `live --record` wrote", path.display())]
+    #[error("{}, line {line}: not text; name a log that `record`, `live --record` or `candump -L` wrote", path.display())]
     NotText {
         /// The record.
         path: PathBuf,

@@ -1,16 +1,19 @@
-//! The offset between the clocks, by the motion that both saw: at the right one each Hall
-//! signal is what the designed probe would read at the reference pose, times a sensitivity.
+//! The offset between the clocks and how much faster one runs, by the motion that both saw.
 //!
-//! For a trial offset the signal of each probe is fitted by that prediction, with a factor and
-//! a constant for each movement. A grid of one servo period finds the offset that explains the
-//! most motion; golden section then finds where the least is left over. (A fit by all three
-//! axes of the reference would also explain a run shifted by a whole movement: each movement
-//! moves one axis only, and some matrix turns any axis into any other.)
+//! A grid of one servo period finds the offset: at the right one each Hall signal is about what the
+//! designed probe would read at the reference pose, times a sensitivity. For a trial the signal
+//! of each probe is fitted by that prediction, with a factor and a constant for each movement. (A
+//! fit by all three axes of the reference would also explain a run shifted by a whole movement:
+//! each movement moves one axis only, and some matrix turns any axis into any other.)
+//!
+//! `refine` then finds offset and rate to a few microseconds. The offset is that in
+//! the middle of the record, where the rate does not act.
 
 use super::ImportError;
 use super::bus_log::BusTick;
 use super::join::{At, Cursor};
 use super::reference::{Reference, Sample};
+use super::refine::refine;
 use crate::input::log::layout::Quantity;
 use crate::input::stage::Stage;
 use runtime::model::dot;
@@ -18,10 +21,21 @@ use runtime::model::dot;
 /// The offset between the clocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Offset {
-    /// Time of the bus less time of the reference, us.
+    /// Time of the bus less time of the reference in the middle of the record, us.
     pub us: f64,
+    /// How much faster the clock of the bus runs, as a part of one.
+    pub rate: f64,
+    /// The middle of the record, us on the clock of the bus.
+    pub middle_us: f64,
     /// Share of the Hall signals' motion that the reference explains, if it was estimated.
     pub explained: Option<f64>,
+}
+
+impl Offset {
+    /// A time of the bus on the clock of the reference, us.
+    pub fn on_reference_us(&self, bus_us: f64) -> f64 {
+        bus_us - self.us - self.rate * (bus_us - self.middle_us)
+    }
 }
 
 /// Ticks of the coarse search, at most.
@@ -29,9 +43,6 @@ const COARSE_TICKS: usize = 4_000;
 
 /// Share that must be explained: signals of another run reach a third by chance.
 const EXPLAINED_MIN: f64 = 0.6;
-
-/// Width at which golden section stops, us.
-const WIDTH_US: f64 = 0.5;
 
 /// Finds the offset within `search_us` of where both records start together.
 ///
@@ -54,33 +65,46 @@ pub fn estimate(
         .map(|(tick, t_us)| Point {
             t_us: *t_us,
             signal: tick.hall.map(f64::from),
+            gaps: tick.capacitive.map(f64::from),
         })
         .collect();
     let every = points.len().div_ceil(COARSE_TICKS).max(1);
     let coarse: Vec<Point> = points.iter().step_by(every).copied().collect();
-    let trial = |points: &[Point], us: f64| explain(points, &predicted, us, 2.0 * step_us);
+    let ends = times_us.first().zip(times_us.last());
+    let middle_us = ends.map_or(0.0, |(first, last)| (first + last) / 2.0);
+    let at = |us| Offset {
+        us,
+        rate: 0.0,
+        middle_us,
+        explained: None,
+    };
+    let trial =
+        |points: &[Point], offset: &Offset| explain(points, &predicted, offset, 2.0 * step_us);
     let steps = (search_us / step_us).ceil().clamp(1.0, 1e6) as i64;
-    let mut best = (f64::NEG_INFINITY, centre_us);
-    for k in -steps..=steps {
-        let us = centre_us + k as f64 * step_us;
-        let explained = trial(&coarse, us).explained;
-        if explained > best.0 {
-            best = (explained, us);
-        }
-    }
-    let left_over = |us| 1.0 - trial(&points, us).share();
-    let us = golden(best.1 - step_us, best.1 + step_us, left_over);
-    let explained = trial(&points, us).share();
+    let offsets = (-steps..=steps).map(|k| at(centre_us + k as f64 * step_us));
+    let found = most(offsets, |offset| trial(&coarse, offset).explained).unwrap_or(at(centre_us));
+    let mut best = refine(&points, &predicted, found, step_us).unwrap_or(found);
+    let explained = trial(&points, &best).share();
     if explained.is_nan() || explained < EXPLAINED_MIN {
         return Err(ImportError::NoOffset {
             percent: 100.0 * explained.max(0.0),
             least_percent: 100.0 * EXPLAINED_MIN,
         });
     }
-    Ok(Offset {
-        us,
-        explained: Some(explained),
-    })
+    best.explained = Some(explained);
+    Ok(best)
+}
+
+/// The one with the largest value, the first of equals.
+fn most(offsets: impl Iterator<Item = Offset>, value: impl Fn(&Offset) -> f64) -> Option<Offset> {
+    let mut best = None;
+    for offset in offsets {
+        let value = value(&offset);
+        if best.is_none_or(|(most, _)| value > most) {
+            best = Some((value, offset));
+        }
+    }
+    best.map(|(_, offset)| offset)
 }
 
 /// The samples with what the designed probes would read, in m, in place of their values.
@@ -110,10 +134,12 @@ fn predicted(reference: &Reference, stage: &Stage) -> Vec<Sample> {
         .collect()
 }
 
+/// The codes of a tick, at its time by the clock of the bus.
 #[derive(Clone, Copy, Debug)]
-struct Point {
-    t_us: f64,
-    signal: [f64; 3],
+pub(super) struct Point {
+    pub(super) t_us: f64,
+    pub(super) signal: [f64; 3],
+    pub(super) gaps: [f64; 3],
 }
 
 /// Sums of one probe over one movement.
@@ -166,7 +192,12 @@ impl Explained {
 }
 
 /// Fits the points that have a reference at an offset.
-fn explain(points: &[Point], predicted: &[Sample], offset_us: f64, tolerance_us: f64) -> Explained {
+fn explain(
+    points: &[Point],
+    predicted: &[Sample],
+    offset: &Offset,
+    tolerance_us: f64,
+) -> Explained {
     let mut cursor = Cursor::new(predicted);
     let (mut whole, mut sums) = ([Sums::default(); 3], [Sums::default(); 3]);
     let mut current = None;
@@ -176,7 +207,7 @@ fn explain(points: &[Point], predicted: &[Sample], offset_us: f64, tolerance_us:
         }
     };
     for point in points {
-        let at = cursor.at(point.t_us - offset_us, tolerance_us);
+        let at = cursor.at(offset.on_reference_us(point.t_us), tolerance_us);
         let At::Found {
             movement, values, ..
         } = at
@@ -202,24 +233,4 @@ fn explain(points: &[Point], predicted: &[Sample], offset_us: f64, tolerance_us:
         }
     }
     all
-}
-
-/// The place of the smallest value between two ends of a valley.
-fn golden(mut low: f64, mut high: f64, value: impl Fn(f64) -> f64) -> f64 {
-    const RATIO: f64 = 0.618_033_988_749_894_9;
-    let mut a = high - RATIO * (high - low);
-    let mut b = low + RATIO * (high - low);
-    let (mut at_a, mut at_b) = (value(a), value(b));
-    while high - low > WIDTH_US {
-        if at_a < at_b {
-            (high, b, at_b) = (b, a, at_a);
-            a = high - RATIO * (high - low);
-            at_a = value(a);
-        } else {
-            (low, a, at_a) = (a, b, at_b);
-            b = low + RATIO * (high - low);
-            at_b = value(b);
-        }
-    }
-    (low + high) / 2.0
 }

@@ -89,7 +89,14 @@ impl Display for ImportReport {
         match self.offset.explained {
             Some(share) => writeln!(
                 f,
-                ", estimated: the reference explains {:.2} % of the Hall signals' motion",
+                " in the middle of the record; the clock of the bus runs {} by {:.2} parts in a million; both estimated: \
+                 the reference explains {:.2} % of the Hall signals' motion",
+                if self.offset.rate < 0.0 {
+                    "slower"
+                } else {
+                    "faster"
+                },
+                1e6 * self.offset.rate.abs(),
                 100.0 * share
             )?,
             None => f.write_str(", as given\n")?,

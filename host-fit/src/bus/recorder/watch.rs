@@ -3,13 +3,12 @@
 use crate::bus::import::bus_log::{BusCounts, Collector};
 use hal_adapters::can::command::{Mailbox, Told};
 use hal_adapters::can::status::{NodeState, NodeStatus};
-use hal_adapters::can::{Layout, Message, StampedFrame};
+use hal_adapters::can::{Layout, StampedFrame};
 
 /// Watches the frames that are recorded: ticks of codes, and what the controller tells.
 #[derive(Clone, Debug, Default)]
 pub struct Watch {
-    frames: u64,
-    collector: Option<(Layout, Collector)>,
+    collector: Collector,
     mailbox: Mailbox,
     status: Option<NodeStatus>,
 }
@@ -17,17 +16,7 @@ pub struct Watch {
 impl Watch {
     /// Takes a frame; gives what it tells, other than codes and poses.
     pub fn take(&mut self, stamped: &StampedFrame) -> Option<Told> {
-        self.frames += 1;
-        if self.collector.is_none() {
-            // The first frame with codes shows how they are laid out.
-            let message = Message::from_id(stamped.frame.id);
-            let carries = |layout: &Layout| message.is_some_and(|m| layout.messages().contains(&m));
-            let found = [Layout::Bits16, Layout::Bits24].into_iter().find(carries);
-            self.collector = found.map(|layout| (layout, Collector::new(layout)));
-        }
-        if let Some((_, collector)) = &mut self.collector {
-            collector.take(stamped);
-        }
+        self.collector.take(stamped);
         let told = self.mailbox.take(&stamped.frame)?.ok()?;
         if let Told::Status(status) = told {
             self.status = Some(status);
@@ -35,20 +24,14 @@ impl Watch {
         Some(told)
     }
 
-    /// Frames of any kind.
-    pub const fn frames(&self) -> u64 {
-        self.frames
-    }
-
     /// How codes come, once some have.
-    pub fn layout(&self) -> Option<Layout> {
-        self.collector.as_ref().map(|(layout, _)| *layout)
+    pub const fn layout(&self) -> Option<Layout> {
+        self.collector.layout()
     }
 
-    /// Ticks, gaps and faults of the codes.
+    /// Frames, ticks, gaps and faults of the codes.
     pub fn counts(&self) -> BusCounts {
-        let collector = self.collector.as_ref();
-        collector.map_or_else(BusCounts::default, |(_, collector)| collector.counts())
+        self.collector.counts()
     }
 
     /// What the controller says of itself.
@@ -91,7 +74,7 @@ impl std::fmt::Display for Watch {
             "{width}, {} missing in {} gaps; {} frames, {} damaged, {} out of sequence; {}",
             counts.ticks_missing,
             counts.gaps,
-            self.frames,
+            counts.frames,
             health.wrong_check + health.wrong_length,
             health.wrong_sequence + health.late + health.repeated,
             self.state()

@@ -124,7 +124,7 @@ impl SearchKind {
             Self::De => "DE/rand/1/bin",
             Self::Pso => "global best",
             Self::Ga => "breeder GA",
-            Self::Cmaes => "cmaes crate",
+            Self::Cmaes => "tutorial of 2016",
             Self::Random => "uniform draws",
         }
     }

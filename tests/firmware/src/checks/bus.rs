@@ -1,6 +1,7 @@
 //! A bus that fails.
 
 use super::log::Stage;
+use super::start::{first_state, row, tick_now};
 use super::{Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen};
@@ -8,6 +9,7 @@ use crate::can_model::BusState;
 use hal_adapters::can::status::flag;
 
 const PART: Part = Part::Ads131m08;
+const MS: u64 = 1_000_000;
 
 /// The bus goes away and comes back. The ticks go on; old poses are never sent late.
 pub fn goes_and_comes_back(bench: &Bench, bus: BusState) -> Outcome {
@@ -89,4 +91,65 @@ pub fn alone_from_the_start(bench: &Bench) -> Outcome {
         (machine.panics, machine.watchdog_resets),
         (0, 0),
     )
+}
+
+/// A bus that is off for 0.3 ms, between two ticks, is counted.
+pub fn off_for_less_than_a_tick(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ns(200 * MS + 7 * MS / 10)?;
+    equal(
+        "times the bus was off before",
+        Seen::since_last(&mut machine)
+            .last_status()
+            .map(|s| s.bus_off),
+        Some(0),
+    )?;
+    let now_ns = machine.chip.now_ns;
+    let at = tick_now(&machine);
+    machine.chip.can.blip(now_ns, 3 * MS / 10);
+    machine.run_ticks(40)?;
+    let seen = Seen::since_last(&mut machine);
+    let status = seen.last_status().ok_or("no status frame")?;
+    equal("times the bus was off", status.bus_off, 1)?;
+    let told = first_state(&seen, flag::BUS_WAS_OFF);
+    row(bench, "bus off for 0.3 ms", at, told, &seen.axes)
+}
+
+/// A frame that is on the wire when its tick is over is sent once or, if it fails then, not at all,
+/// and no newer one overtakes it.
+pub fn aborted_on_the_wire(bench: &Bench, fails: bool) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(100)?;
+    Seen::since_last(&mut machine);
+    let dropped_before = Stage::read(&machine, bench, PART)?.frames_dropped;
+    // Other nodes hold the bus from this tick's frames on until just before those of the next.
+    let free_ns = machine.chip.now_ns + 2 * MS + 18 * MS / 100;
+    machine.chip.can.occupy(free_ns);
+    machine.run_ns(free_ns + MS / 10 - machine.chip.now_ns)?;
+    if fails {
+        let now_ns = machine.chip.now_ns;
+        expect(machine.chip.can.destroy(now_ns), || {
+            "nothing was on the wire".to_owned()
+        })?;
+    }
+    machine.run_ticks(10)?;
+    let sent = machine.chip.can.sent.clone();
+    let seen = Seen::since_last(&mut machine);
+    let x = seen.axes.iter().filter(|axis| axis.axis == 0);
+    let ticks: Vec<_> = x.map(|axis| axis.tick).collect();
+    let first = if fails { 100 } else { 99 };
+    let count = ticks.len() as u64;
+    equal(
+        "ticks whose X was sent",
+        ticks,
+        (first..first + count).collect(),
+    )?;
+    expect(count >= 9, || format!("only {count} poses"))?;
+    let in_order = sent.is_sorted_by_key(|frame| frame.asked_ns);
+    expect(in_order, || "a frame overtook an older one".to_owned())?;
+    let mut comparison = Comparison::default();
+    comparison.add(&seen.axes, &bench.poses, 0);
+    equal("words that differ", comparison.differing, 0)?;
+    let dropped = Stage::read(&machine, bench, PART)?.frames_dropped - dropped_before;
+    expect(dropped >= 2, || format!("{dropped} frames dropped"))
 }

@@ -1,15 +1,22 @@
 //! Commands over the bus.
 
 use super::{Outcome, equal, expect};
-use crate::adc_model::Part;
+use crate::adc_model::{Part, Row};
 use crate::bench::{Bench, Seen, command};
+use crate::can_model::BusState;
 use crate::machine::Machine;
+use embedded_can::{Id, StandardId};
 use hal_adapters::can::command::{Outcome as Ended, Request};
 use hal_adapters::can::status::flag;
+use hal_adapters::can::{Layout, Message as M, SensorReceiver, Timing};
+use runtime::RawFrame;
 
 const PART: Part = Part::Ads131m08;
+/// From the trigger to the middle of what is sampled, by the drivers' documentation, us.
+const ADS131M08_SAMPLE_US: u32 = 144;
+const ADS8688_SAMPLE_US: u32 = 10;
 
-fn ask(
+pub(super) fn ask(
     machine: &mut Machine,
     request: Request,
     token: u8,
@@ -71,16 +78,58 @@ pub fn identify(bench: &Bench) -> Outcome {
     )
 }
 
-/// Re-zero on a moving stage is refused with its axis; at rest it is done, and the pose is
-/// zero from then on until the zero is cleared.
-pub fn rezero(bench: &Bench) -> Outcome {
+/// An answer and a serial number outlive a bus on which nobody listens; old poses do not.
+pub fn answers_outlive_a_failing_bus(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ticks(50)?;
+    let (id, bytes) = command(Request::Identify { seconds: 1 }, 1, 1);
+    machine.chip.can.receive(id, bytes);
+    let now_ns = machine.chip.now_ns;
+    machine.chip.can.set_bus(BusState::Alone, now_ns);
+    machine.run_ticks(100)?;
     Seen::since_last(&mut machine);
-    let seen = ask(&mut machine, Request::Rezero { ticks: 200 }, 1, 260)?;
+    let now_ns = machine.chip.now_ns;
+    machine.chip.can.set_bus(BusState::Good, now_ns);
+    machine.run_ticks(20)?;
+    let seen = Seen::since_last(&mut machine);
+    equal("answer", ended(&seen, 1), vec![Some(Ended::Done)])?;
+    equal("bytes of text", seen.identity.len(), 36)?;
+    let first = seen.axes.first().map_or(0, |axis| axis.tick);
+    expect(first >= 148, || {
+        format!("a pose of tick {first} was sent late")
+    })
+}
+
+/// Rows of a stage at rest, with the noise of a few codes around one row.
+pub(super) fn at_rest(rest: [i32; 6]) -> Vec<Row> {
+    let noise = |k: usize, c: usize| (k as i32 * 7 + c as i32 * 3) % 5 - 2;
+    (0..1000)
+        .map(|k| core::array::from_fn(|c| rest[c] + noise(k, c)))
+        .collect()
+}
+
+/// Asks for one thing after the other; each must be answered at once, and so.
+pub(super) fn answers(machine: &mut Machine, asked: &[(Request, u8, Ended)]) -> Outcome {
+    for (request, token, outcome) in asked {
+        let seen = ask(machine, *request, *token, 10)?;
+        let what = format!("answer to {request:?}");
+        equal(&what, ended(&seen, *token), vec![Some(*outcome)])?;
+    }
+    Ok(())
+}
+
+pub(super) const REZERO: Request = Request::Rezero { ticks: 400 };
+pub(super) const SERVO_OFF: Request = Request::ServoOff { seconds: 3 };
+
+/// A stage that is not at rest at its zero is not re-zeroed, and told why.
+pub fn rezero_refused(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(50)?;
+    answers(&mut machine, &[(SERVO_OFF, 1, Ended::Done)])?;
+    let seen = ask(&mut machine, REZERO, 2, 460)?;
     equal(
         "answers while moving",
-        ended(&seen, 1),
+        ended(&seen, 2),
         vec![Some(Ended::Started), Some(Ended::Moved)],
     )?;
     equal(
@@ -88,13 +137,27 @@ pub fn rezero(bench: &Bench) -> Outcome {
         flags(&seen) & flag::REZERO_REFUSED,
         flag::REZERO_REFUSED,
     )?;
+    let short = Request::Rezero { ticks: 200 };
+    answers(&mut machine, &[(short, 3, Ended::TooShort)])?;
 
-    // A stage at rest, a few um off: the noise of a few codes around one row.
-    let rest = [100, -50, 70, 10, 20, -30];
-    let noise = |k: usize, c: usize| (k as i32 * 7 + c as i32 * 3) % 5 - 2;
-    let rows = (0..1000)
-        .map(|k| core::array::from_fn(|c| rest[c] + noise(k, c)))
-        .collect();
+    // At rest, 0.9 mm off, in range of the calibration or not.
+    let far = at_rest([14_000, 14_000, 0, 10, 20, -30]);
+    let mut machine = bench.machine_playing(PART, [&bench.blob, &[]], far)?;
+    machine.run_ticks(50)?;
+    answers(&mut machine, &[(SERVO_OFF, 1, Ended::Done)])?;
+    let seen = ask(&mut machine, REZERO, 2, 460)?;
+    let outcomes = ended(&seen, 2);
+    let refused = [Some(Ended::OutOfBounds), Some(Ended::Extrapolated)];
+    expect(
+        outcomes.len() == 2 && refused.contains(&outcomes[1]),
+        || format!("answers far from the zero are {outcomes:?}"),
+    )
+}
+
+/// With the servo off and the stage at rest a re-zero is done, and the pose is zero from then on
+/// until the zero is cleared; with the servo on neither is.
+pub fn rezero(bench: &Bench) -> Outcome {
+    let rows = at_rest([100, -50, 70, 10, 20, -30]);
     let mut machine = bench.machine_playing(PART, [&bench.blob, &[]], rows)?;
     machine.run_ticks(50)?;
     let x = |seen: &Seen| {
@@ -103,39 +166,176 @@ pub fn rezero(bench: &Bench) -> Outcome {
     };
     let before = x(&Seen::since_last(&mut machine));
     expect(before.abs() > 2e-6, || format!("X is {before:e} before"))?;
-    let seen = ask(&mut machine, Request::Rezero { ticks: 400 }, 2, 200)?;
-    equal(
-        "answers while it runs",
-        ended(&seen, 2),
-        vec![Some(Ended::Started)],
+    answers(
+        &mut machine,
+        &[
+            (REZERO, 1, Ended::ServoOn),
+            (Request::ClearZero, 2, Ended::ServoOn),
+            (SERVO_OFF, 3, Ended::Done),
+            (REZERO, 4, Ended::Started),
+            (Request::ClearZero, 5, Ended::Busy),
+        ],
     )?;
+    machine.run_ticks(100)?;
+    let seen = Seen::since_last(&mut machine);
     equal("flag", flags(&seen) & flag::REZERO_RUNS, flag::REZERO_RUNS)?;
-    let seen = ask(&mut machine, Request::ClearZero, 3, 20)?;
-    equal(
-        "answer while busy",
-        ended(&seen, 3),
-        vec![Some(Ended::Busy)],
-    )?;
-    machine.run_ticks(250)?;
+    machine.run_ticks(350)?;
     let seen = Seen::since_last(&mut machine);
     equal(
         "answer at the end",
-        ended(&seen, 2),
+        ended(&seen, 4),
         vec![Some(Ended::Done)],
     )?;
     equal(
         "flag",
-        flags(&seen) & (flag::REZEROED | flag::REZERO_RUNS),
-        flag::REZEROED,
+        flags(&seen) & (flag::ZERO_SET | flag::REZERO_RUNS),
+        flag::ZERO_SET,
     )?;
-    expect(x(&seen).abs() < 0.5e-6, || {
-        format!("X is {:e} after", x(&seen))
-    })?;
-    let seen = ask(&mut machine, Request::ClearZero, 4, 40)?;
-    equal("answer", ended(&seen, 4), vec![Some(Ended::Done)])?;
+    let is_zero = |seen: &Seen| {
+        let x = x(seen);
+        expect(x.abs() < 0.5e-6, || format!("X is {x:e} after"))
+    };
+    is_zero(&seen)?;
+
+    // The declaration has ended three seconds after it was made.
+    machine.run_ticks(1200)?;
+    answers(&mut machine, &[(Request::ClearZero, 6, Ended::ServoOn)])?;
+    machine.run_ticks(20)?;
+    is_zero(&Seen::since_last(&mut machine))?;
+    answers(
+        &mut machine,
+        &[
+            (SERVO_OFF, 7, Ended::Done),
+            (Request::ClearZero, 8, Ended::Done),
+        ],
+    )?;
+    machine.run_ticks(20)?;
+    let seen = Seen::since_last(&mut machine);
     expect((x(&seen) - before).abs() < 1e-6, || {
         format!("X is {:e} once cleared", x(&seen))
-    })
+    })?;
+
+    // The service pin overrules the declaration.
+    machine.chip.servo_on = true;
+    machine.run_ticks(1)?;
+    answers(&mut machine, &[(REZERO, 11, Ended::ServoOn)])?;
+    machine.chip.servo_on = false;
+    machine.run_ticks(1)?;
+
+    // A servo that goes on during a re-zero ends it.
+    let on = Request::ServoOff { seconds: 0 };
+    answers(&mut machine, &[(REZERO, 9, Ended::Started)])?;
+    machine.run_ticks(100)?;
+    let seen = ask(&mut machine, on, 10, 10)?;
+    equal("answer", ended(&seen, 9), vec![Some(Ended::ServoOn)])
+}
+
+/// Record mode: every tick's codes, after the pose, with parameters and without, until told to
+/// stop.
+pub fn record(bench: &Bench, part: Part) -> Outcome {
+    let layout = match part {
+        Part::Ads131m08 => Layout::Bits24,
+        Part::Ads8688 => Layout::Bits16,
+    };
+    for blob in [bench.blob.as_slice(), &[]] {
+        let mut machine = bench.machine(part, [blob, &[]])?;
+        machine.run_ticks(50)?;
+        let seen = Seen::since_last(&mut machine);
+        equal("codes that nobody asked for", seen.codes.len(), 0)?;
+        let seen = ask(&mut machine, Request::Record { on: true }, 1, 800)?;
+        equal("answer", ended(&seen, 1), vec![Some(Ended::Done)])?;
+        equal("flag", flags(&seen) & flag::RECORDING, flag::RECORDING)?;
+        let mut receiver = SensorReceiver::new(layout, Timing::default());
+        let mut ticks: Vec<RawFrame> = Vec::new();
+        for (done_ns, frame) in &seen.codes {
+            ticks.extend(receiver.take(frame, (done_ns / 1000) as u32).tick);
+        }
+        equal(
+            "faults",
+            receiver.health().lost + receiver.health().incomplete,
+            0,
+        )?;
+        expect(ticks.len() >= 797, || format!("{} ticks", ticks.len()))?;
+        let codes = |tick: &RawFrame| -> Row {
+            let ([a, b, c], [d, e, f]) = (tick.hall, tick.capacitive);
+            [a, b, c, d, e, f]
+        };
+        // Which tick is the first to be recorded, its codes tell.
+        let first = ticks.first().map(codes).ok_or("no ticks")?;
+        let at = (50..60).find(|k| bench.rows[*k] == first);
+        let rows = &bench.rows[at.ok_or("other codes than the converter's")?..];
+        let differ = ticks
+            .iter()
+            .zip(rows)
+            .filter(|(tick, row)| codes(tick) != **row);
+        equal("ticks whose codes differ", differ.count(), 0)?;
+        let words = seen.axes.iter().filter(|axis| axis.axis < 3).count();
+        let planar = if blob.is_empty() { 0 } else { 3 * 799 };
+        expect(words >= planar, || format!("{words} words of poses"))?;
+        let seen = ask(&mut machine, Request::Record { on: false }, 2, 20)?;
+        equal("answer", ended(&seen, 2), vec![Some(Ended::Done)])?;
+        machine.run_ticks(20)?;
+        let seen = Seen::since_last(&mut machine);
+        equal("codes afterwards", seen.codes.len(), 0)?;
+    }
+    Ok(())
+}
+
+/// What one tick sends, in the order of sending: X, Y, Rz, what else belongs to the pose, the
+/// codes; and how old each is then.
+pub fn order_and_age(bench: &Bench, part: Part, name: &str) -> Outcome {
+    let mut machine = bench.machine(part, [&bench.blob, &[]])?;
+    machine.run_ticks(50)?;
+    ask(&mut machine, Request::Record { on: true }, 1, 20)?;
+    ask(&mut machine, Request::Identify { seconds: 1 }, 2, 0)?;
+    machine.chip.can.sent.clear();
+    machine.run_ticks(320)?;
+    let first_ns = machine.chip.first_tick_ns.ok_or("no tick")?;
+    let sampled_us = match part {
+        Part::Ads131m08 => ADS131M08_SAMPLE_US,
+        Part::Ads8688 => ADS8688_SAMPLE_US,
+    };
+    let groups = [
+        &[M::PoseX, M::PoseY, M::PoseRz][..],
+        &[M::PoseTime],
+        &[M::PoseZ, M::PoseRx, M::PoseRy],
+        &[M::SensorTime],
+        Layout::Bits16.messages(),
+        Layout::Bits24.messages(),
+        &[M::NodeStatus, M::Health],
+        &[M::Answer, M::Identity],
+    ];
+    let places: Vec<M> = groups.concat();
+    let mut ages: Vec<Option<(u64, u64)>> = vec![None; places.len()];
+    let mut last = (0, 0);
+    for sent in &machine.chip.can.sent {
+        let id = StandardId::new(sent.id).map(Id::Standard);
+        let message = id.and_then(M::from_id).ok_or("a foreign frame")?;
+        let place = places.iter().position(|m| *m == message);
+        let place = place.ok_or("a message that nobody asked for")?;
+        let tick = (sent.asked_ns - first_ns) / 2_000_000;
+        // An answer and the pages of a serial number wait behind all others.
+        expect((tick, place) > last, || {
+            format!(
+                "{message:?} comes after {:?} in tick {tick}",
+                places[last.1]
+            )
+        })?;
+        last = (tick, place);
+        let since_us = (sent.done_ns - first_ns) / 1000 - 2_000 * tick;
+        let age_us = since_us - u64::from(sampled_us);
+        let (least, most) = ages[place].get_or_insert((age_us, age_us));
+        (*least, *most) = (age_us.min(*least), age_us.max(*most));
+    }
+    for (message, age) in places.iter().zip(&ages) {
+        if let Some((least, most)) = age {
+            let key = format!("RESULT firmware_{name}_age_at_end_of_{message:?}_us");
+            println!("{key}={least}..{most}");
+        }
+    }
+    let oldest = ages.iter().flatten().map(|(_, most)| *most).max();
+    let oldest_us = oldest.ok_or("no frames")?;
+    expect(oldest_us < 2_000, || format!("a frame of {oldest_us} us"))
 }
 
 /// Commands without parameters, unknown ones, damaged ones and repeated ones.
@@ -158,7 +358,7 @@ pub fn odd_commands(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ticks(50)?;
     Seen::since_last(&mut machine);
-    let (id, mut bytes) = command(Request::ClearZero, 9, 1);
+    let (id, mut bytes) = command(Request::ServoOff { seconds: 1 }, 9, 1);
     machine.chip.can.receive(id, bytes);
     machine.chip.can.receive(id, bytes);
     bytes[3] ^= 1;

@@ -4,9 +4,12 @@ pub mod bus;
 pub mod commands;
 pub mod figures;
 pub mod log;
+pub mod motion;
 pub mod parameters;
 pub mod sensors;
+pub mod start;
 pub mod timing;
+pub mod zero;
 
 /// Why a check failed.
 pub type Failure = Box<dyn std::error::Error>;

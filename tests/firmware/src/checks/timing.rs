@@ -16,10 +16,10 @@ fn flags(seen: &Seen) -> u8 {
     seen.last_status().map_or(0, |status| status.flags)
 }
 
-/// All ticks but these few send X within 0.2 ms of when they were due.
+/// All ticks but these few send X within 0.4 ms of when they were due.
 fn stays_in_step(seen: &Seen, late: usize) -> Outcome {
     let x = seen.axes.iter().filter(|axis| axis.axis == 0);
-    let found = x.filter(|axis| axis.into_tick_us > 200).count();
+    let found = x.filter(|axis| axis.into_tick_us > 400).count();
     equal("ticks out of step", found, late)
 }
 
@@ -115,12 +115,12 @@ pub fn overrun_ticks_do_not_feed(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ticks(100)?;
     // An SPI so slow that the codes of a tick take 2.4 ms.
-    machine.chip.spi_byte_ns = 80_000;
+    machine.chip.spi_byte_ns = Some(80_000);
     machine.run_ticks(30)?;
     expect(machine.watchdog_resets >= 1, || {
         "the watchdog was fed".to_owned()
     })?;
-    machine.chip.spi_byte_ns = 381;
+    machine.chip.spi_byte_ns = None;
     machine.run_ticks(1000)?;
     let after = Seen::since_last(&mut machine);
     let good = after.axes.iter().filter(|a| a.status == 0).count();

@@ -5,6 +5,7 @@
 use cortex_m_rt::entry;
 use image::job::{
     self, ANSWER_WORDS, BLOB_WORDS, Bare, FRAME_WORDS, HEAD_WORDS, Head, PARAMETER_WORDS,
+    PredictingServo,
 };
 use image::semihost::{CONSOLE, Fault, File, exit};
 use runtime::{Decode, FieldModel, LinearModel, ParameterSet, Reading, Servo};
@@ -58,7 +59,7 @@ fn run() -> Result<(), Stop> {
         match head.source {
             job::WORDS => bare::<LinearModel>(&input, &output, &head)?,
             job::FIELD_WORDS => bare::<FieldModel>(&input, &output, &head)?,
-            job::BLOB => {
+            job::BLOB | job::PREDICTED => {
                 let mut bytes = [0; 4 * BLOB_WORDS];
                 let length = head.parameter_words().ok_or(Stop::NoJob)? * 4;
                 let blob = bytes.get_mut(..length).ok_or(Stop::NoJob)?;
@@ -68,7 +69,11 @@ fn run() -> Result<(), Stop> {
                 let set = ParameterSet::from_flash(blob).map_err(|_| Stop::Refused)?;
                 let decoder = set.decoder();
                 let mut servo = Servo::new(&*decoder, head.on_invalid());
-                frames(&input, &output, head.frames, |frame| servo.tick(frame))?;
+                let mut predicting = PredictingServo::new(servo.clone());
+                frames(&input, &output, head.frames, |frame| match head.source {
+                    job::PREDICTED => predicting.tick(frame),
+                    _ => servo.tick(frame),
+                })?;
             }
             _ => return Err(Stop::NoJob),
         }

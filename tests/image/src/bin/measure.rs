@@ -19,8 +19,8 @@ use runtime::decoder::{Decoder, DecoderConstants};
 use runtime::frame::CodeWindow;
 use runtime::model::{FieldProbe, Sensitivity, Shape};
 use runtime::{
-    Decode, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, RawFrame, Reading, Servo,
-    VerticalPose,
+    Decode, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, Predictor, RawFrame, Reading,
+    Servo, VerticalPose,
 };
 
 /// Displacements read by the probes.
@@ -118,6 +118,19 @@ fn counted_field_tick(
 #[inline(never)]
 extern "C" fn counted_servo_tick(servo: &mut Servo<'_>, frame: &RawFrame, reading: &mut Reading) {
     *reading = servo.tick(frame);
+}
+
+/// What a prediction adds to a servo's tick: the pose taken, and one predicted.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn counted_prediction(
+    predictor: &mut Predictor,
+    servo: &Servo<'_>,
+    frame: &RawFrame,
+    reading: &Reading,
+) -> Option<PlanarPose<f32>> {
+    predictor.take(servo, frame, reading);
+    predictor.pose_at(frame.time_us.wrapping_add(300))
 }
 
 /// Codes the two bus frames of a tick (16-bit layout).
@@ -404,6 +417,7 @@ fn main() -> ! {
     let decoder = black_box(Decoder::<LinearModel>::new(SOUND, PROBES));
     let field = black_box(Decoder::<FieldModel>::new(SOUND, FIELD_PROBES));
     let mut servo = Servo::new(&decoder, OnInvalid::Hold { ticks: 3 });
+    let mut predictor = Predictor::new(4_000);
     let mut frame = RawFrame {
         hall: [900, -800, 700],
         capacitive: [50, 60, 70],
@@ -413,8 +427,9 @@ fn main() -> ! {
     for k in 0..100 {
         frame.sequence += 1 + u32::from(k % 7 == 0);
         frame.hall[0] = if k % 5 == 0 { i32::MIN } else { 900 };
+        frame.time_us += 2_000;
         counted_servo_tick(&mut servo, black_box(&frame), &mut reading);
-        black_box(&reading);
+        black_box(counted_prediction(&mut predictor, &servo, &frame, &reading));
     }
     let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
     let mut coded = sensor::frames_16(&frame);

@@ -6,15 +6,17 @@
 
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use hal_adapters::can::command::{Command, IdentityPage, Mailbox, Request, Told};
-use hal_adapters::can::service::{Service, Updates};
+use hal_adapters::can::command::{Command, Mailbox, Request, Told};
+use hal_adapters::can::service::Updates;
 use hal_adapters::can::update::{Change, Identity, Receiver, Running, Store, Written};
 use hal_adapters::can::{
-    BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Timing, sensor,
+    BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing, sensor,
 };
 use runtime::blob::MAX_BYTES;
 use runtime::rezero::RezeroSettings;
-use runtime::{OnInvalid, ParameterSet, PlanarPose, RawFrame, Reading, Servo, VerticalPose};
+use runtime::{
+    OnInvalid, ParameterSet, PlanarPose, Predictor, RawFrame, Reading, Servo, VerticalPose,
+};
 
 extern crate image;
 
@@ -25,7 +27,7 @@ const FRAME: RawFrame = RawFrame {
     time_us: 0,
 };
 
-/// The bus: coding, checking, assembly, requests and answers.
+/// The bus: coding, checking, assembly.
 #[inline(never)]
 fn bus(frame: &RawFrame) {
     let mut poses = PoseReceiver::new(Timing::default());
@@ -40,15 +42,26 @@ fn bus(frame: &RawFrame) {
     }
     for coded in sender.frames(&black_box(Reading::default()), Some(frame)) {
         let frame = black_box(BusFrame::from(coded));
-        black_box((poses.take(&frame, 1), mailbox.take(&frame)));
+        let taken = poses.take(&frame, 1);
+        black_box(taken.tick.map(|pose| poses.sampled_us(&pose, 2_000)));
+        black_box(mailbox.take(&frame));
     }
     black_box((poses.poll(2), *poses.vertical()));
+}
+
+/// Requests and answers.
+#[inline(never)]
+fn commands(servo: &mut Servo<'_>) {
+    let mut mailbox = Mailbox::default();
     let command = Command::new(black_box(Request::Rezero { ticks: 500 }), 1);
-    black_box(mailbox.send(&black_box(Told::Command(command))));
-    for page in 0..IdentityPage::PAGES {
-        let told = Told::Identity(IdentityPage::of(black_box("HS-0007"), page));
-        black_box(mailbox.send(&told));
+    let sent = mailbox.send(&black_box(Told::Command(command)));
+    let mut service = black_box(Service::new(500).recording(true));
+    if let Some(coded) = sent {
+        black_box(service.take(&black_box(BusFrame::from(coded)), Some(servo)));
     }
+    black_box(service.tick(Some(servo), black_box(Some(true))));
+    black_box(service.identity_page(black_box("HS-0007")));
+    black_box(service.flags(Some(servo)));
 }
 
 /// A store that has nothing and keeps nothing.
@@ -114,13 +127,17 @@ fn main() -> ! {
         let decoder = black_box(set.decoder());
         let mut servo = Servo::new(&*decoder, black_box(OnInvalid::Hold { ticks: 3 }));
         servo.start_rezero(black_box(RezeroSettings::default()));
-        black_box(servo.tick(&frame));
+        let reading = black_box(servo.tick(&frame));
+        let mut predictor = black_box(Predictor::new(4_000));
+        predictor.take(&servo, &frame, &reading);
+        black_box(predictor.pose_at(black_box(2_300)));
         black_box(servo.tick_without_frame());
         black_box(servo.tick_with(1, |zero| {
             decoder.decode_at(frame.hall, black_box(VerticalPose::ZERO), zero)
         }));
         black_box(servo.set_zero(black_box(PlanarPose::ZERO)));
         servo.forget();
+        commands(&mut servo);
         black_box((servo.rezero_state(), servo.health(), servo.zero()));
         black_box(decoder.constants().channel_faults(&frame).count());
     }

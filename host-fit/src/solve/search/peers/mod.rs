@@ -1,10 +1,10 @@
 //! Well-known searches to compare with: random draws, differential evolution, particle swarm,
 //! genetic algorithm, CMA-ES.
 //!
-//! CMA-ES comes from the `cmaes` crate. The other four are written here, in their textbook form:
-//! no crate that we found evaluates candidates a population at a time (in SIMD lanes and on all
-//! cores, as TLBO's are), gives each individual a random stream of its own (the same path at any
-//! thread count) and ranks NaN worst, and without that the comparison would not be fair.
+//! All are written here, in their textbook form: no crate that we found evaluates candidates a
+//! population at a time (in SIMD lanes and on all cores, as TLBO's are), gives each individual a
+//! random stream of its own (the same path at any thread count) and ranks NaN worst, and without
+//! that the comparison would not be fair.
 
 pub mod cmaes;
 pub mod de;

@@ -1,0 +1,123 @@
+//! A record as the stage controller sends it with its own converter: poses, codes of 24 bits and
+//! times on one bus, over two minutes, by clocks that differ.
+
+use super::*;
+use crate::input::log::{self, ReadOptions};
+use hal_adapters::can::{BusFrame, Coded, PoseSender, sensor};
+use hal_adapters::candump::LogLine;
+use runtime::{RawFrame, Reading};
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+const TICKS: u32 = 57_000;
+const MOVEMENT_S: f64 = 2.0;
+/// Codes of the 24-bit converter: 256 for one of 16 bits.
+const M_PER_CODE: f64 = 6.25e-8 / 256.0;
+
+/// X, Y, Rz at a time, m, m, rad: one axis a movement, in turn, at 1.5 Hz.
+fn pose(t_s: f64) -> [f64; 3] {
+    let axis = (t_s / MOVEMENT_S).floor() as usize % 3;
+    let mut q = [0.0; 3];
+    q[axis] = 300e-6 * (TAU * 1.5 * t_s).sin();
+    q
+}
+
+fn hall(t_s: f64) -> [i32; 3] {
+    let [x, y, rz] = pose(t_s);
+    let s = [y + 0.1975 * rz, y - 0.1975 * rz, x - 0.36 * rz];
+    s.map(|s| (s / M_PER_CODE).round() as i32)
+}
+
+/// The record by a computer whose clock is the true one: the controller's runs faster by
+/// `fast`, and each frame comes after those before it.
+fn candump(fast: f64) -> String {
+    let mut text = String::new();
+    let mut poses = PoseSender::default();
+    for n in 0..TICKS {
+        let t_s = 0.002 * f64::from(n) / (1.0 + fast) + 0.0003;
+        let codes = RawFrame {
+            hall: hall(t_s),
+            capacitive: [100, 101, 99],
+            sequence: n + 70,
+            time_us: 2_000 * n,
+        };
+        let pose: Vec<Coded> = poses.frames(&Reading::default(), Some(&codes)).collect();
+        let frames = pose
+            .into_iter()
+            .chain(sensor::frames(Layout::Bits24, &codes));
+        let late_us = f64::from(n * 7919 % 101);
+        for (k, coded) in (1u32..).zip(frames) {
+            let line = LogLine {
+                time_us: (1e6 * t_s + 150.0 + late_us + 125.0 * f64::from(k)) as u64,
+                interface: "can0",
+                frame: BusFrame::from(coded),
+            };
+            writeln!(text, "{line}").expect("a string");
+        }
+    }
+    text
+}
+
+/// The interferometers' log at 1 kHz by a clock that runs faster by `fast`.
+fn reference(fast: f64) -> String {
+    let mut text = "movement,t_us,x_m,y_m,rz_rad\n".to_owned();
+    for k in 0..2 * TICKS {
+        let t_us = 1_000.0 * f64::from(k);
+        let t_s = 1e-6 * t_us / (1.0 + fast);
+        let [x, y, rz] = pose(t_s);
+        let movement = (t_s / MOVEMENT_S) as i64;
+        writeln!(text, "{movement},{t_us},{x:.12},{y:.12},{rz:.12}").expect("a string");
+    }
+    text
+}
+
+/// Largest distance from the codes to those of the reference beside them, m; and the report.
+fn imported(controller: f64, interferometer: f64) -> (f64, ImportReport) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    let stage = crate::input::shipped::STAGE_TOML
+        .replace("m_per_count = 6.25e-8 ", "m_per_count = 2.44140625e-10 ")
+        .replace("m_per_count = 1.5625e-8 ", "m_per_count = 6.103515625e-11 ")
+        .replace("-32768", "-8388608")
+        .replace("32767", "8388607");
+    std::fs::write(path("bus.log"), candump(controller)).expect("written");
+    std::fs::write(path("ifm.csv"), reference(interferometer)).expect("written");
+    std::fs::write(path("stage.toml"), stage).expect("written");
+    let settings = ImportSettings {
+        bus: path("bus.log"),
+        reference: path("ifm.csv"),
+        stage: path("stage.toml"),
+        out: path("log.csv"),
+        tolerance_us: None,
+        offset_us: 0.0,
+        estimate_offset: true,
+        search_s: 0.1,
+        interface: None,
+        layout: None,
+        skip_bad_lines: false,
+    };
+    let report = run(&settings).expect("imported");
+    let stage = Stage::from_file(&settings.stage).expect("sound");
+    let read = log::read(&[settings.out], &stage, &ReadOptions::default());
+    let rows = read.expect("a sound log").dataset.rows;
+    let distance = rows.iter().flat_map(|row| {
+        let [x, y, rz] = row.reference;
+        let s = [y + 0.1975 * rz, y - 0.1975 * rz, x - 0.36 * rz];
+        let signals = row.frame.hall().map(|code| f64::from(code) * M_PER_CODE);
+        s.into_iter().zip(signals).map(|(s, code)| (s - code).abs())
+    });
+    (distance.fold(0.0, f64::max), report)
+}
+
+#[test]
+fn clocks_that_differ_by_50_parts_in_a_million_are_followed_over_two_minutes() {
+    for (controller, interferometer) in [(50e-6, 0.0), (-50e-6, 50e-6), (0.0, -50e-6)] {
+        let (distance_m, report) = imported(controller, interferometer);
+        assert_eq!(report.bus.ticks, TICKS as usize);
+        assert!(report.join.rows > 56_900, "{:?}", report.join);
+        let rate = report.offset.rate + interferometer;
+        assert!(rate.abs() < 0.2e-6, "{rate}");
+        // At 2.8 mm/s: 10 us are 28 nm.
+        assert!(distance_m < 40e-9, "{distance_m}");
+    }
+}

@@ -1,0 +1,130 @@
+//! What is done on a fault: it is noted in RAM that a reset leaves alone, and the core is reset.
+//! The next start tells it, see [`firmware::retained`].
+
+use core::mem::MaybeUninit;
+use core::panic::PanicInfo;
+use cortex_m::peripheral::{MPU, SCB};
+use firmware::retained::{FaultKind, Retained, Step, WORDS};
+use stm32f4xx_hal::pac::RCC;
+
+/// The start-up code neither clears nor sets it.
+#[unsafe(link_section = ".uninit.RETAINED")]
+static mut RETAINED: MaybeUninit<[u32; WORDS]> = MaybeUninit::uninit();
+
+/// The record that is in RAM, if its check is right.
+pub fn retained() -> Option<Retained> {
+    let mut words = [0; WORDS];
+    for (k, word) in words.iter_mut().enumerate() {
+        // SAFETY: within the array, whose bits are valid words whatever they are; the only code
+        // that interrupts another access does not return to it.
+        *word = unsafe { (&raw const RETAINED).cast::<u32>().add(k).read_volatile() };
+    }
+    Retained::from_words(&words)
+}
+
+/// Replaces it.
+pub fn retain(record: &Retained) {
+    for (k, word) in record.to_words().into_iter().enumerate() {
+        // SAFETY: as in `retained`.
+        unsafe {
+            (&raw mut RETAINED)
+                .cast::<u32>()
+                .add(k)
+                .write_volatile(word)
+        };
+    }
+}
+
+/// Changes it.
+pub fn update(change: impl FnOnce(&mut Retained)) {
+    let mut record = retained().unwrap_or_else(Retained::damaged);
+    change(&mut record);
+    retain(&record);
+}
+
+/// Notes that a step of the start-up begins.
+pub fn begin(step: Step) {
+    update(|record| record.step = step);
+}
+
+fn reset_by(kind: FaultKind, address: u32, detail: u32) -> ! {
+    update(|record| record.note(kind, address, detail));
+    SCB::sys_reset()
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    cortex_m::interrupt::disable();
+    let at = info.location();
+    let address = at.map_or(0, |place| core::ptr::from_ref(place) as u32);
+    reset_by(
+        FaultKind::Panic,
+        address,
+        at.map_or(0, |place| place.line()),
+    )
+}
+
+/// Makes every access to the 1 MiB below the stack a fault. Of what lies there, system memory and
+/// reserved addresses, the manual does not say that a write faults.
+pub fn guard_stack(mpu: &mut MPU) {
+    const BYTES_LOG2: u32 = 20;
+    const NO_ACCESS: u32 = 0;
+    const ENABLE: u32 = 1;
+    /// Elsewhere the map of the core holds.
+    const DEFAULT_MAP: u32 = 1 << 2;
+    let below = (&raw const _stack_end as u32).wrapping_sub(1 << BYTES_LOG2);
+    // SAFETY: the program uses nothing in this region, and the rest of the map stays as it is.
+    unsafe {
+        mpu.rnr.write(0);
+        mpu.rbar.write(below);
+        mpu.rasr
+            .write(NO_ACCESS << 24 | (BYTES_LOG2 - 1) << 1 | ENABLE);
+        mpu.ctrl.write(DEFAULT_MAP | ENABLE);
+    }
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
+/// The crystal stopped: the core runs on its internal oscillator, slower than all else assumes.
+#[cortex_m_rt::exception]
+unsafe fn NonMaskableInt() {
+    // SAFETY: this handler does not return to what it interrupts.
+    let rcc = unsafe { &*RCC::PTR };
+    // Otherwise the interrupt would come again at once after the reset.
+    rcc.cir().modify(|_, w| w.cssc().set_bit());
+    reset_by(FaultKind::ClockFailed, 0, 0)
+}
+
+/// The stack pointer may be anywhere: puts it back before anything else and passes its value on.
+#[unsafe(naked)]
+#[unsafe(no_mangle)]
+unsafe extern "C" fn HardFault() -> ! {
+    core::arch::naked_asm!(
+        "mrs r0, msp",
+        "movw r1, #:lower16:_stack_start",
+        "movt r1, #:upper16:_stack_start",
+        "msr msp, r1",
+        "b {handler}",
+        handler = sym hard_fault,
+    )
+}
+
+unsafe extern "C" {
+    static _stack_end: u32;
+    static _stack_start: u32;
+}
+
+/// `frame` is where the core stacked R0 to R3, R12, LR, PC and xPSR, if there was RAM.
+extern "C" fn hard_fault(frame: u32) -> ! {
+    const PC: u32 = 6 * 4;
+    const FRAME_BYTES: u32 = 8 * 4;
+    let (end, start) = (&raw const _stack_end as u32, &raw const _stack_start as u32);
+    // SAFETY: reading this register changes nothing.
+    let cfsr = unsafe { (*SCB::PTR).cfsr.read() };
+    if (end..=start - FRAME_BYTES).contains(&frame) {
+        // SAFETY: within the stack, aligned by the core.
+        let pc = unsafe { ((frame + PC) as *const u32).read_volatile() };
+        reset_by(FaultKind::HardFault, pc, cfsr)
+    }
+    reset_by(FaultKind::StackOverflow, frame, cfsr)
+}

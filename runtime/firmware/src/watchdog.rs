@@ -1,0 +1,48 @@
+//! The independent watchdog. It has an oscillator of its own and, once started, stops only with
+//! the power. (The HAL writes its period before it starts the oscillator and does not wait until
+//! the period is taken over: the first one would be 16 s.)
+
+use crate::board::INTERNAL_MHZ;
+use crate::wait::Stopwatch;
+use stm32f4xx_hal::pac::{DBGMCU, IWDG};
+
+/// The watchdog resets this long after it was last fed, ms. That is ten ticks by the nominal
+/// clock of its oscillator, 32 kHz; 13.6 to 37.6 ms by its range, 17 to 47 kHz.
+pub const PERIOD_MS: u16 = 20;
+
+/// Counts a ms at a divider of 8: 32 kHz / 8 / 1000.
+const COUNTS_PER_MS: u16 = 4;
+/// Five periods of the slowest oscillator take 0.3 ms; its start-up takes 0.04 ms.
+const UPDATE_US: u32 = 1000;
+
+/// The watchdog.
+pub struct Watchdog {
+    registers: IWDG,
+}
+
+impl Watchdog {
+    /// Starts it, before the clocks are set up. It stands while a debugger halts the core.
+    pub fn start(registers: IWDG, debug: &DBGMCU, stopwatch: &mut Stopwatch) -> Self {
+        debug.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
+        // From now on 512 ms, the period after a reset.
+        registers.kr().write(|w| w.key().start());
+        registers.kr().write(|w| w.key().unlock());
+        registers.pr().write(|w| w.pr().divide_by8());
+        registers
+            .rlr()
+            .write(|w| w.rl().set(PERIOD_MS * COUNTS_PER_MS - 1));
+        // If the oscillator does not take them over, there is no watchdog, and nothing more to do.
+        stopwatch.until(INTERNAL_MHZ, UPDATE_US, || {
+            let busy = registers.sr().read();
+            busy.pvu().bit_is_clear() && busy.rvu().bit_is_clear()
+        });
+        let mut watchdog = Self { registers };
+        watchdog.feed();
+        watchdog
+    }
+
+    /// Starts its period anew.
+    pub fn feed(&mut self) {
+        self.registers.kr().write(|w| w.key().feed());
+    }
+}

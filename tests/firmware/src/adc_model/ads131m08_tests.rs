@@ -1,0 +1,212 @@
+//! The tables and texts of the data sheet, one test each.
+
+use super::*;
+
+const T_0: u64 = 10_000_000;
+const CONSTANT: Row = [60_000, -60_000, 1, 0, -1, 600];
+
+fn input() -> Input {
+    Input::held(vec![CONSTANT])
+}
+
+/// A part at its data rate of 32 us, that was read to its end before `T_0`.
+fn running(variant: Variant) -> Ads131m08 {
+    let mut part = Ads131m08 {
+        variant,
+        ..Default::default()
+    };
+    frame(&mut part, T_0 - 500_000, 0x6180, 0xff02);
+    for _ in 0..3 {
+        frame(&mut part, T_0 - 500_000, 0, 0);
+    }
+    part
+}
+
+/// A whole frame: response and codes.
+fn frame(part: &mut Ads131m08, now_ns: u64, command: u16, data: u16) -> (u16, [i32; 8]) {
+    let sent = [command.to_be_bytes(), data.to_be_bytes()];
+    let mut out = vec![sent[0][0], sent[0][1], 0, sent[1][0], sent[1][1]];
+    out.resize(30, 0);
+    part.select(now_ns, &input(), |codes| codes, false);
+    let read: Vec<_> = out.into_iter().map(|byte| part.exchange(byte)).collect();
+    part.deselect(now_ns);
+    let word =
+        |k: usize| i32::from_be_bytes([read[3 * k], read[3 * k + 1], read[3 * k + 2], 0]) >> 8;
+    let sum = u16::from_be_bytes([read[27], read[28]]);
+    assert!(!part.listens || sum == crc(read[..27].iter().copied()));
+    ((word(0) >> 8) as u16, core::array::from_fn(|k| word(k + 1)))
+}
+
+fn pulse(part: &mut Ads131m08, now_ns: u64) {
+    part.sync(false, now_ns);
+    part.sync(true, now_ns + T_CLKIN_NS);
+}
+
+#[test]
+fn the_first_conversion_ends_when_table_8_3_says() {
+    let table = [(0, 856), (1, 1112), (2, 1624), (3, 2648)];
+    for (osr, t_clkin) in table {
+        let mut part = running(Variant {
+            wait: INITIAL_WAIT,
+            ..Variant::PLAIN
+        });
+        frame(&mut part, T_0 - 1000, 0x6180, 0xff02 | osr << 2);
+        pulse(&mut part, T_0);
+        assert_eq!(part.next_end_ns() - T_0, t_clkin * T_CLKIN_NS);
+    }
+}
+
+/// Table 8-8, and 8.3.7.1.1: two conversions of the fast-settling filter, then sinc3.
+#[test]
+fn after_a_reset_the_codes_are_settled_from_the_first_one_on() {
+    let mut part = Ads131m08::default();
+    let powered = POWER_ON_NS;
+    let (settle_1, settle_3) = (powered + 1324 * T_MOD_NS, powered + 3372 * T_MOD_NS);
+    assert_eq!(part.next_end_ns(), settle_1);
+    for n in 0..3 {
+        let end = settle_1 + n * 1024 * T_MOD_NS;
+        assert_eq!(frame(&mut part, end - 1, 0, 0).0 & 0xff, 0);
+        let (status, codes) = frame(&mut part, end, 0, 0);
+        assert_eq!((status & 0xff, &codes[..6]), (0xff, &CONSTANT[..]));
+        let fast = part.shown.map(|conversion| conversion.fast);
+        assert_eq!(fast, Some(n < 2));
+    }
+    assert_eq!(part.shown.map(|c| c.end_ns), Some(settle_3));
+}
+
+#[test]
+fn after_a_resynchronisation_two_conversions_are_not_settled_and_not_held_back() {
+    for wait in [0, 44, INITIAL_WAIT] {
+        let mut part = running(Variant {
+            wait,
+            ..Variant::PLAIN
+        });
+        pulse(&mut part, T_0);
+        let codes = [1, 2, 3, 4].map(|n| {
+            let end = T_0 + (wait + 128 * n) * T_MOD_NS;
+            assert_eq!(frame(&mut part, end - 1, 0, 0).0 & 0xff, 0);
+            frame(&mut part, end, 0, 0).1[0]
+        });
+        // The thirds of a sinc3 filter weigh 1/6, 4/6 and 1/6.
+        assert!((codes[0] - 10_000).abs() < 300, "{codes:?}");
+        assert!((codes[1] - 50_000).abs() < 300, "{codes:?}");
+        assert_eq!(codes[2..], [60_000; 2]);
+    }
+}
+
+/// 8.5.1.9.1: flags stay until both samples are read; SYNC empties the store.
+#[test]
+fn after_a_pause_the_store_holds_two_conversions() {
+    for store in [Store::KeepsOldest, Store::KeepsNewest, Store::ReplacesLast] {
+        for late_pop in [false, true] {
+            let variant = Variant {
+                store,
+                late_pop,
+                ..Variant::PLAIN
+            };
+            let mut part = running(variant);
+            let ready = |part: &mut _| frame(part, T_0, 0, 0).0 & 0xff;
+            assert_eq!([(); 3].map(|()| ready(&mut part)), [0xff, 0xff, 0]);
+            let first = T_0 - 500_000 + 32_000;
+            let last = T_0 - 500_000 + 15 * 32_000;
+            let mut part = running(variant);
+            let ends = [(); 2].map(|()| {
+                frame(&mut part, T_0, 0, 0);
+                part.shown.map(|conversion| conversion.end_ns)
+            });
+            let want = match store {
+                Store::KeepsOldest => [first, first + 32_000],
+                Store::KeepsNewest => [last - 32_000, last],
+                Store::ReplacesLast => [first, last],
+            };
+            assert_eq!(ends, want.map(Some));
+            let mut part = running(variant);
+            pulse(&mut part, T_0 + 5000);
+            assert_eq!(frame(&mut part, T_0 + 6000, 0, 0).0, 0x4500);
+        }
+    }
+}
+
+/// "Synchronization": an edge at the end of a conversion does nothing; t_w(RSL) is a reset.
+#[test]
+fn a_pulse_synchronises_unless_it_is_aligned_and_resets_if_it_is_long() {
+    let mut part = running(Variant::PLAIN);
+    let aligned = T_0 - 500_000 + 20 * 32_000;
+    pulse(&mut part, aligned);
+    assert!(!part.resynchronised);
+    pulse(&mut part, aligned + 16_000);
+    assert!(part.resynchronised);
+    assert_eq!(frame(&mut part, aligned + 17_000, 0, 0).0, 0x4500);
+    assert_eq!(frame(&mut part, aligned + 17_000, 0, 0).0, 0x0500);
+
+    part.sync(false, T_0 + 1_000_000);
+    part.sync(true, T_0 + 1_000_000 + 2047 * T_CLKIN_NS);
+    assert_eq!(part.registers[CLOCK], 0xff02);
+    part.sync(false, T_0 + 2_000_000);
+    assert_eq!(frame(&mut part, T_0 + 2_300_000, 0, 0).0, 0);
+    part.sync(true, T_0 + 2_300_000);
+    assert_eq!(part.registers[CLOCK], 0xff0e);
+}
+
+/// Table 8-12.
+#[test]
+fn registers_have_their_values_after_a_reset() {
+    let mut part = running(Variant::PLAIN);
+    frame(&mut part, T_0, 0x0011, 0);
+    frame(&mut part, T_0, 0xa000, 0);
+    let mut read = |register: u16| {
+        frame(&mut part, T_0, 0xa000 | register << 7, 0);
+        frame(&mut part, T_0, 0, 0).0
+    };
+    assert_eq!(read(0x00) & 0xff00, 0x2800);
+    assert_eq!(read(0x01) & 0xff00, 0x0500);
+    for register in 0x02..=0x30 {
+        let want = match register {
+            0x02 => 0x0510,
+            0x03 => 0xff0e,
+            0x06 => 0x0600,
+            0x0c | 0x11 | 0x16 | 0x1b | 0x20 | 0x25 | 0x2a | 0x2f => 0x8000,
+            _ => 0,
+        };
+        assert_eq!(read(register), want, "{register:#x}");
+    }
+}
+
+/// Table 8-11, and "RESET Command".
+#[test]
+fn commands_are_answered_in_the_next_frame_and_not_before_power_is_good() {
+    let mut part = Ads131m08::default();
+    assert_eq!(frame(&mut part, POWER_ON_NS - 1, 0x6180, 0x3f02).0, 0);
+    assert_eq!(frame(&mut part, POWER_ON_NS, 0xa180, 0).0, 0x0500);
+    assert_eq!(frame(&mut part, POWER_ON_NS, 0x6180, 0x3f02).0, 0xff0e);
+    assert_eq!(frame(&mut part, POWER_ON_NS, 0xa180, 0).0, 0x4180);
+    // A short frame does not reset.
+    part.select(T_0, &input(), |codes| codes, false);
+    for byte in [0x00, 0x11, 0] {
+        part.exchange(byte);
+    }
+    part.deselect(T_0);
+    assert_eq!(frame(&mut part, T_0, 0x0011, 0).0, 0x0011);
+    assert_eq!(part.registers[CLOCK], 0xff0e);
+    assert_eq!(frame(&mut part, T_0, 0, 0).0, 0xff28);
+}
+
+/// 8.3.13: a write raises the flag, too; a STATUS clears it.
+#[test]
+fn a_register_that_changes_is_flagged_once() {
+    let mut part = running(Variant::PLAIN);
+    frame(&mut part, T_0, 0x6100, 0x2110);
+    let flag = |part: &mut _, after_ns| frame(part, T_0 + after_ns, 0, 0).0 & 0x2000 != 0;
+    assert!(!flag(&mut part, 1000) && !flag(&mut part, 2000));
+    assert!(flag(&mut part, 200_000));
+    assert!(!flag(&mut part, 900_000));
+    part.flip(0x04, 1, T_0 + 1_000_000);
+    assert!(flag(&mut part, 1_200_000));
+    assert!(!flag(&mut part, 2_000_000));
+    assert_eq!(part.registers[REGMAP_CRC], part.registers_crc());
+}
+
+#[test]
+fn the_check_is_that_of_the_standard() {
+    assert_eq!(crc(*b"123456789"), 0x29b1);
+}
