@@ -147,7 +147,7 @@ pub enum Outcome {
     NotAuthorised = 12,
     /// The blob is refused; the detail is [`runtime::BlobError::number`].
     BadContent = 13,
-    /// The sequence number is not above those in the store; the detail is the least that is.
+    /// The sequence number is not the one that follows those in the store: the detail.
     WrongSequence = 14,
     /// The store has no room before the next reset.
     NoRoom = 15,

@@ -2,7 +2,7 @@
 //! runs, over the bus. The protocol is that of [`hal_adapters::can::update`].
 //!
 //! Each is a [`Job`], which says step by step what it wants; a [`Dialog`] has its requests answered,
-//! without a bus and without a clock: frames and times in, frames out. [`run`] puts it on an interface.
+//! without a bus and without a clock: frames and times in, frames out. The functions put it on an interface.
 
 mod dialog;
 mod identity;

@@ -44,6 +44,7 @@ pub(super) struct ImportArgs {
         long,
         value_name = "SECONDS",
         default_value_t = 2.0,
+        value_parser = search_seconds,
         requires = "estimate_offset"
     )]
     search_s: f64,
@@ -56,6 +57,14 @@ pub(super) struct ImportArgs {
     /// Leave out lines that cannot be read, and count them.
     #[arg(long)]
     skip_bad_lines: bool,
+}
+
+/// Further than an hour apart, two records are dated by hand: `--offset-us`.
+fn search_seconds(text: &str) -> Result<f64, &'static str> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=3600.0).contains(&seconds) => Ok(seconds),
+        _ => Err("expected a number of seconds from 0 to 3600"),
+    }
 }
 
 /// Joins a record of the bus and a reference, and says how it went.

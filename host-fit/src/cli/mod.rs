@@ -76,7 +76,7 @@ enum Command {
     Diff(diff::DiffArgs),
     /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
     Live(live::LiveArgs),
-    /// Record the codes of a controller's own converter from a CAN bus, for a calibration (Linux).
+    /// Record the codes of a controller's own converter from a CAN bus (Linux).
     Record(record::RecordArgs),
     /// Tell which controller is on a CAN bus, and which parameters it runs (Linux).
     Identify(identify::IdentifyArgs),

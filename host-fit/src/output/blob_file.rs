@@ -78,7 +78,7 @@ pub fn write(path: &Path, set: &ParameterSet) -> Result<(), OutputError> {
 /// The blob of a set, to be written to `path`.
 ///
 /// # Errors
-/// [`OutputError::Failed`], which no set that [`write`] would take leads to.
+/// [`OutputError::Failed`], which no set that [`write()`] would take leads to.
 pub fn to_bytes(path: &Path, set: &ParameterSet) -> Result<Vec<u8>, OutputError> {
     let mut buffer = [0; MAX_BYTES];
     match set.to_bytes(&mut buffer) {

@@ -93,8 +93,8 @@ impl<'a> Problem<'a> {
     }
 
     /// The problem on about `most` of its rows: the same number from each movement that moves,
-    /// evenly, and at least [`MOVING_ROWS_MIN`], since fewer rows would say little beside the zero
-    /// deviation that they share; [`IDLE_ROWS`] from each that does not.
+    /// evenly, and at least eight, since fewer rows would say little beside the zero deviation that
+    /// they share; two from each that does not.
     #[must_use]
     pub fn thinned(&self, most: usize) -> Self {
         let moved: Vec<f64> = self.groups.iter().map(|group| self.moved(group)).collect();

@@ -257,9 +257,10 @@ impl<'s> Receiver<'s> {
         if let Some(index) = self.staging.missing(transfer.bytes, key.is_some()) {
             return (Outcome::Incomplete, index.into());
         }
-        let newest = store.newest_sequence();
-        if sequence <= newest {
-            return (Outcome::WrongSequence, newest.saturating_add(1));
+        // Of two transfers that were made for the same store only one is stored.
+        let due = store.newest_sequence().checked_add(1);
+        if due != Some(sequence) {
+            return (Outcome::WrongSequence, due.unwrap_or(u32::MAX));
         }
         transfer.sequence = sequence;
         transfer.stage = match (key, transfer.nonce) {

@@ -53,7 +53,7 @@ impl Store for Watched {
     }
 
     fn write(&mut self, sequence: u32, change: Change<'_>) -> Written {
-        assert!(sequence > self.newest_sequence());
+        assert_eq!(sequence, self.newest_sequence() + 1);
         match change {
             Change::Blob(blob) => {
                 let set = ParameterSet::from_bytes(blob).expect("a sound blob");
@@ -253,8 +253,9 @@ fn a_wrong_tag_a_second_guess_and_data_after_the_verification_store_nothing() {
     assert_eq!(bench.update(verify(4), 7), refused);
     assert_eq!(bench.update(commit(4), 7), refused);
     // The tag of one sequence number is none of another.
-    bench.transfer(8, NEW, 4);
-    assert_eq!(bench.update(verify(5), 8), STARTED);
+    bench.transfer(8, NEW, 5);
+    assert_eq!(bench.update(verify(5), 8), (Outcome::WrongSequence, 4));
+    assert_eq!(bench.update(verify(4), 8), STARTED);
     bench.ends(VERIFY, 8, refused);
     // A verified transfer takes no more data.
     bench.transfer(9, NEW, 4);

@@ -18,7 +18,7 @@ pub enum UpdateRequest {
     },
     /// Checks what was transferred.
     Verify {
-        /// Sequence number that the new record will have: above every one in the store.
+        /// Sequence number that the new record will have: one above the highest in the store.
         sequence: u32,
     },
     /// Stores what was verified.

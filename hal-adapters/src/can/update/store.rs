@@ -55,6 +55,6 @@ pub trait Store {
 
     /// Writes a part of a change, as long as fits between two ticks. It is called in every tick with
     /// the same arguments until it gives something other than [`Written::InProgress`], and then
-    /// not again for this change. `sequence` is above [`Store::newest_sequence`].
+    /// not again for this change. `sequence` is one above [`Store::newest_sequence`].
     fn write(&mut self, sequence: u32, change: Change<'_>) -> Written;
 }

@@ -6,7 +6,7 @@
 //! fit by all three axes of the reference would also explain a run shifted by a whole movement:
 //! each movement moves one axis only, and some matrix turns any axis into any other.)
 //!
-//! [`refine`](super::refine) then finds offset and rate to a few microseconds. The offset is that in
+//! `refine` then finds offset and rate to a few microseconds. The offset is that in
 //! the middle of the record, where the rate does not act.
 
 use super::ImportError;
