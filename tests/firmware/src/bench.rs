@@ -199,7 +199,8 @@ impl Seen {
         seen
     }
 
-    fn take(&mut self, sent: &Sent, first_ns: u64) {
+    /// Takes one frame.
+    pub fn take(&mut self, sent: &Sent, first_ns: u64) {
         let since_ns = sent.asked_ns.saturating_sub(first_ns);
         let tick = since_ns / 2_000_000;
         let id = StandardId::new(sent.id).map(Id::Standard);

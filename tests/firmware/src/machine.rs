@@ -95,6 +95,8 @@ pub struct Machine {
     started: bool,
     /// Resets that the program asked for, after a panic, another fault or a lost crystal.
     pub panics: u32,
+    /// Times the power was lost in an operation of the flash.
+    pub power_cuts: u32,
     /// Time by which the next tick's interrupt is held back, ns.
     pub hold_ns: u64,
     /// Resets by the watchdog.
@@ -161,6 +163,7 @@ impl Machine {
             asleep: false,
             started: false,
             panics: 0,
+            power_cuts: 0,
             hold_ns: 0,
             watchdog_resets: 0,
             costs: Vec::new(),
@@ -224,6 +227,7 @@ impl Machine {
     /// Resets if the watchdog bit or the program asked for it, and says whether.
     fn reset_if_due(&mut self) -> bool {
         if std::mem::take(&mut self.chip.flash.power_lost) {
+            self.power_cuts += 1;
             self.power_cycle();
         } else if self.chip.watchdog_bites() {
             self.watchdog_resets += 1;

@@ -11,7 +11,7 @@ use crate::machine::Cost;
 /// Flash that the program may take, bytes.
 const TEXT_BYTES_MAX: usize = 56 << 10;
 /// RAM that statics and stack may take, bytes.
-const RAM_BYTES_MAX: usize = 9 << 10;
+pub const RAM_BYTES_MAX: usize = 9 << 10;
 /// An interrupt may block for a tenth of a period, us.
 const BLOCKED_US_MAX: f64 = 200.0;
 /// The fastest clock at which data reach the core in time.
