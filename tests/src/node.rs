@@ -71,7 +71,8 @@ impl Node {
     /// One tick; gives the answer to a request that has ended.
     pub fn tick(&mut self) -> Option<Coded> {
         // There is no servo, whose re-zero could end.
-        let _ = self.service.tick(None, None);
+        self.service.before_tick(None, None);
+        let _ = self.service.tick(None);
         let servo_is_off = self.service.servo_is_off();
         let answer = self.receiver.tick(servo_is_off, &mut self.store)?;
         self.service.tell(&Told::Answer(answer))

@@ -216,7 +216,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
     }
 
     /// Whether the responses of a tick, `None` if it was none, tell of a resynchronisation.
-    fn count_unsynced(&mut self, responses: [Option<u16>; 2]) -> Result<(), AdcError<SPI::Error>> {
+    fn count_unsynced(&mut self, responses: [Option<u16>; 3]) -> Result<(), AdcError<SPI::Error>> {
         let synced = responses.into_iter().flatten().any(|r| r & F_RESYNC != 0);
         self.unsynced_ticks = if synced {
             0
@@ -313,22 +313,27 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
         let first = self.exchange(READ | address(register), 0)?.response;
         let found = self.exchange(NULL, 0)?.response;
         let mut frame = self.exchange(NULL, 0)?;
+        // What a status tells is told once: that of a frame without codes counts, too.
+        let third = frame.response;
         if !is_ready(&frame) {
             frame = self.exchange(NULL, 0)?;
         }
         self.status_is_next = true;
 
-        let first = status_is_first.then_some(first);
-        if let Some(status) = first {
+        let statuses = [
+            status_is_first.then_some(first),
+            Some(third),
+            Some(frame.response),
+        ];
+        for status in statuses.into_iter().flatten() {
             check_status(status)?;
         }
-        check_status(frame.response)?;
         compare(register, found, self.wanted(register))?;
         if !is_ready(&frame) {
             let ready = frame.response as u8;
             return Err(AdcError::NotReady { ready, read });
         }
-        self.count_unsynced([first, Some(frame.response)])?;
+        self.count_unsynced(statuses)?;
         Ok(self.channels.frame(&frame.codes, sequence, time_us))
     }
 }

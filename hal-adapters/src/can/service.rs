@@ -137,24 +137,28 @@ impl Service {
         }
     }
 
+    /// Before the servo's own tick, which may end a re-zero and move the pose: one that runs is
+    /// given up if the servo is not off. `servo_off_pin` is whether the service pin says that it
+    /// is, `None` without such a pin.
+    pub fn before_tick(&mut self, servo: Option<&mut Servo<'_>>, servo_off_pin: Option<bool>) {
+        self.servo_off_pin = servo_off_pin;
+        if let Some(servo) = servo
+            && self.rezero.is_some()
+            && !self.servo_is_off()
+        {
+            servo.cancel_rezero();
+        }
+    }
+
     /// One tick, after the servo's own: the declaration and the blinking run on, and a re-zero
-    /// that has ended is answered. `servo_off_pin` is whether the service pin says that the
-    /// servo is off, `None` without such a pin.
-    pub fn tick(
-        &mut self,
-        servo: Option<&mut Servo<'_>>,
-        servo_off_pin: Option<bool>,
-    ) -> Option<Coded> {
+    /// that has ended is answered.
+    pub fn tick(&mut self, servo: Option<&Servo<'_>>) -> Option<Coded> {
         self.identify_ticks = self.identify_ticks.saturating_sub(1);
         self.servo_off_ticks = self.servo_off_ticks.saturating_sub(1);
-        self.servo_off_pin = servo_off_pin;
         let (token, servo) = (self.rezero?, servo?);
         let (outcome, detail) = match servo.rezero_state() {
-            RezeroState::Running { .. } if self.servo_is_off() => return None,
-            RezeroState::Running { .. } | RezeroState::Idle => {
-                servo.cancel_rezero();
-                (Outcome::ServoOn, 0)
-            }
+            RezeroState::Running { .. } => return None,
+            RezeroState::Idle => (Outcome::ServoOn, 0),
             RezeroState::Done { .. } => (Outcome::Done, 0),
             RezeroState::Refused(refusal) => Outcome::of_refusal(&refusal),
         };

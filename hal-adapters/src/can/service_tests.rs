@@ -80,8 +80,9 @@ impl<'d> Stage<'d> {
                 sequence: self.sequence,
                 time_us: 0,
             };
+            self.service.before_tick(Some(&mut self.servo), self.pin);
             self.servo.tick(&frame);
-            if let Some(answer) = self.service.tick(Some(&mut self.servo), self.pin) {
+            if let Some(answer) = self.service.tick(Some(&self.servo)) {
                 assert_eq!(outcome, None);
                 outcome = Some(self.read(answer, token));
             }
@@ -159,11 +160,12 @@ fn a_servo_that_goes_on_ends_a_re_zero_and_leaves_the_zero() {
         },
         |stage| stage.pin = Some(false),
     ];
-    for go_on in on {
+    // In the middle, and before the tick that would end it.
+    for (go_on, ticks) in on.into_iter().zip([100, 499]) {
         let mut stage = Stage::new(&decoder);
         stage.ask(Request::ServoOff { seconds: 9 }, 1);
         stage.ask(REZERO, 2);
-        assert_eq!(stage.rest(100, 0), None);
+        assert_eq!(stage.rest(ticks, 0), None);
         go_on(&mut stage);
         assert_eq!(stage.rest(1, 2), Some(Outcome::ServoOn));
         assert_eq!(stage.flags(), flag::REZERO_REFUSED);
@@ -214,7 +216,7 @@ fn a_node_without_parameters_records_and_identifies_and_has_no_zero() {
     let pages: Vec<_> = core::iter::from_fn(|| service.identity_page("")).collect();
     assert_eq!(pages.len(), usize::from(IdentityPage::PAGES));
     assert!(pages.iter().all(|page| page.message == Message::Identity));
-    (0..TICKS_PER_S).for_each(|_| assert_eq!(service.tick(None, None), None));
+    (0..TICKS_PER_S).for_each(|_| assert_eq!(service.tick(None), None));
     assert_eq!(service.flags(None), flag::RECORDING);
 }
 

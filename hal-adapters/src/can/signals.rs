@@ -233,7 +233,7 @@ pub(super) const HEALTH: [Signal; 13] = [
     paged(4, "FramesMissed", "servo periods without a frame"),
     paged(5, "FramesRepeated", "frames that were not new"),
     paged(6, "LastFault", "last fault since power-on: bits 0 to 7: 0 none, 1 panic, 2 hard fault, 3 stack overflow, 4 clock failed, 5 watchdog; bits 8 to 15: step of the start-up, 0 when ticking"),
-    paged(7, "FaultAddress", "program counter of that fault"),
+    paged(7, "FaultAddress", "where: program counter; of a panic its place in flash, of a stack overflow the stack pointer"),
     paged(8, "FaultDetail", "CFSR of that fault, or what its kind needs"),
     paged(9, "Faults", "resets by faults since power-on"),
     paged(10, "OptionBytes", "the word FLASH_OPTCR"),

@@ -140,7 +140,7 @@ pub mod board_check {
     /// The core runs on its internal oscillator: the crystal did not start, or the PLL did not lock
     /// to it.
     pub const INTERNAL_OSCILLATOR: u32 = 1 << 3;
-    /// The CAN controller did not start.
+    /// The CAN controller did not start, or takes no part in the bus for half a second.
     pub const CAN_NOT_STARTED: u32 = 1 << 4;
     /// A zero deviation that was kept is lost: its record is damaged, or of another blob.
     pub const ZERO_LOST: u32 = 1 << 5;

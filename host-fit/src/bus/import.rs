@@ -82,6 +82,10 @@ pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
     let stage = Stage::from_file(&settings.stage)?;
     let reading = bus_log::read(settings)?;
     let (times_us, smoothing) = clock::sample_times_us(&reading.ticks);
+    if smoothing.rms_us > stage.servo_period_s * 1e6 {
+        let rms_us = smoothing.rms_us;
+        return Err(ImportError::UnevenTimes { rms_us });
+    }
     let (reference, reference_counts) = reference::read(&settings.reference, &stage)?;
     let offset = choose_offset(settings, &stage, &reading, &times_us, &reference)?;
     let tolerance_us = settings

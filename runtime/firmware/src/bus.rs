@@ -19,6 +19,9 @@ use stm32f4xx_hal::pac::can1::TX;
 const COMMANDS_PER_TICK: u8 = 3;
 /// Longest wait for the controller to stand still, us. It takes a few bits.
 const INIT_US: u32 = 1000;
+/// Ticks after which a controller that does not take part in the bus is told: half a second. It
+/// waits for eleven recessive bits, which never come while RX is held low.
+const APART_TICKS: u16 = 250;
 /// Bits of TSR for mailbox 0; those of the next ones follow after eight bits each.
 const REQUEST_COMPLETED: u32 = 1;
 const SENT: u32 = 1 << 1;
@@ -31,6 +34,8 @@ const ALL_EMPTY: u32 = 0b111;
 pub struct Bus {
     can: CAN1,
     started: bool,
+    /// Ticks in a row in which the controller took no part in the bus.
+    apart_ticks: u16,
     was_off: bool,
     bus_off: u32,
     sent: u32,
@@ -69,6 +74,7 @@ impl Bus {
         Self {
             can,
             started,
+            apart_ticks: 0,
             was_off: false,
             bus_off: 0,
             sent: 0,
@@ -76,9 +82,9 @@ impl Bus {
         }
     }
 
-    /// Whether the controller could be set up.
-    pub const fn started(&self) -> bool {
-        self.started
+    /// Whether the controller was set up, and has not been apart from the bus for long.
+    pub const fn takes_part(&self) -> bool {
+        self.started && self.apart_ticks < APART_TICKS
     }
 
     /// At the start of a tick: discards what is out of date, also in the mailboxes, and
@@ -100,7 +106,8 @@ impl Bus {
         self.can.tsr().write(|w| unsafe { w.bits(aborts) });
 
         // A bus that is off again after less than a tick is seen by the latch alone.
-        let latched = self.can.msr().read().erri().bit_is_set();
+        let state = self.can.msr().read();
+        let latched = state.erri().bit_is_set();
         if latched {
             self.can.msr().write(|w| w.erri().set_bit());
         }
@@ -109,6 +116,10 @@ impl Bus {
             self.bus_off = self.bus_off.saturating_add(1);
         }
         self.was_off = is_off;
+        self.apart_ticks = match is_off || state.inak().bit_is_set() {
+            true => self.apart_ticks.saturating_add(1),
+            false => 0,
+        };
     }
 
     /// Whether everything has left, or was taken back.

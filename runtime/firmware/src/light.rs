@@ -3,8 +3,8 @@
 //! | LED | state |
 //! |---|---|
 //! | one flash a second | decoding |
-//! | four flashes a second | decoding, on the internal oscillator |
-//! | five flashes a second | decoding, but the CAN controller did not start |
+//! | four flashes a second | as one or two flashes, on the internal oscillator |
+//! | five flashes a second | as one or two flashes, but CAN takes no part in the bus |
 //! | two flashes a second | no parameters, bad ones, or new ones that are coming |
 //! | three flashes a second | no codes from the converter, or a sensor fault |
 //! | steadily on | the controller failed its own test |
@@ -28,11 +28,11 @@ pub const fn is_on(state: NodeState, board_checks: u32, identifying: bool, tick:
     let flashes = match state {
         NodeState::Starting => return false,
         NodeState::SelfTestFailed => return true,
-        NodeState::Running if board_checks & board_check::CAN_NOT_STARTED != 0 => 5,
-        NodeState::Running if board_checks & board_check::INTERNAL_OSCILLATOR != 0 => 4,
-        NodeState::Running => 1,
-        NodeState::NoParameters | NodeState::BadParameters | NodeState::Updating => 2,
         NodeState::NoFrames | NodeState::SensorFault => 3,
+        _ if board_checks & board_check::CAN_NOT_STARTED != 0 => 5,
+        _ if board_checks & board_check::INTERNAL_OSCILLATOR != 0 => 4,
+        NodeState::NoParameters | NodeState::BadParameters | NodeState::Updating => 2,
+        NodeState::Running => 1,
     };
     let slot = (tick % SECOND) / FLASH;
     slot.is_multiple_of(2) && slot / 2 < flashes
@@ -59,6 +59,8 @@ mod tests {
         );
         assert_eq!(flashes(NodeState::Running, internal, false), 4);
         assert_eq!(flashes(NodeState::Running, internal | no_can, false), 5);
+        assert_eq!(flashes(NodeState::NoParameters, internal, false), 4);
+        assert_eq!(flashes(NodeState::NoParameters, no_can, false), 5);
         assert_eq!(flashes(NodeState::SensorFault, internal, false), 3);
         assert_eq!(flashes(NodeState::SelfTestFailed, 0, false), 0);
         assert!(flashes(NodeState::Running, 0, true) >= 8);

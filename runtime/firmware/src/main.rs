@@ -156,7 +156,7 @@ mod app {
         };
         let node = node(cx.local.node_place, parameters, before.by_fault, identity);
         let zero_lost = before.restore_zero(node, blob);
-        let zero = ZeroKeeper::new(blob, node.zero());
+        let zero = ZeroKeeper::new(node.decodes().then_some(blob), node.zero());
 
         watchdog.feed();
         fault::begin(Step::Converter);
@@ -169,7 +169,7 @@ mod app {
             &Found {
                 pulled_up: parts.pulled_up,
                 crystal,
-                can_started: bus.started(),
+                can_started: bus.takes_part(),
                 zero_lost,
             },
         );
@@ -287,6 +287,7 @@ mod app {
         }
         facts.missed_ticks = schedule.missed();
         facts.bus_off = bus.bus_off();
+        facts.note_bus(bus.takes_part());
         facts.servo_off_pin = Some(servo.is_high());
         let sample = sample.map_err(|fault| SampleFault::from(&fault));
         let reading = node.tick(sample, facts, &mut Fpu, &mut bus.outbox);

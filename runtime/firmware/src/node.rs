@@ -20,7 +20,7 @@ use hal_adapters::adc::AdcError;
 use hal_adapters::can::command::Told;
 use hal_adapters::can::service::Updates;
 pub use hal_adapters::can::status::BoardFacts;
-use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus, flag};
+use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus, board_check, flag};
 use hal_adapters::can::table::{Message, SLOW_TICKS};
 use hal_adapters::can::update::{Identity, Nonce, Receiver, Store};
 use hal_adapters::can::{Layout, PROTOCOL_VERSION, PoseSender, Service, sensor};
@@ -70,6 +70,16 @@ pub struct Facts {
     pub internal_oscillator: bool,
     /// What the start-up found.
     pub board: BoardFacts,
+}
+
+impl Facts {
+    /// Notes whether the CAN controller takes part in the bus.
+    pub const fn note_bus(&mut self, takes_part: bool) {
+        self.board.board_checks &= !board_check::CAN_NOT_STARTED;
+        if !takes_part {
+            self.board.board_checks |= board_check::CAN_NOT_STARTED;
+        }
+    }
 }
 
 /// A fault of the converter in one byte, and whether it gave nothing at all.
@@ -179,6 +189,11 @@ impl<'d> Node<'d> {
         }
     }
 
+    /// Whether there are parameters to decode with.
+    pub const fn decodes(&self) -> bool {
+        self.servo().is_some()
+    }
+
     /// State and reason after the last tick.
     pub const fn state(&self) -> (NodeState, u8) {
         self.state
@@ -212,6 +227,8 @@ impl<'d> Node<'d> {
         fpu: &mut impl FpuSettings,
         outbox: &mut Outbox,
     ) -> Reading {
+        let servo = servo_of(&mut self.parameters);
+        self.service.before_tick(servo, facts.servo_off_pin);
         let reading = self.decode(&sample, fpu);
         self.state = self.state_of(&sample, &reading);
         self.board_checks = facts.board.board_checks;
@@ -224,7 +241,7 @@ impl<'d> Node<'d> {
             self.send_codes(frame, outbox);
         }
         let servo = servo_of(&mut self.parameters);
-        let answer = self.service.tick(servo, facts.servo_off_pin);
+        let answer = self.service.tick(servo.as_deref());
         let page = self.service.identity_page(self.serial());
         let was_off = core::mem::replace(&mut self.bus_off_told, facts.bus_off) != facts.bus_off;
         let due = match self.ticks % u32::from(SLOW_TICKS) {

@@ -144,10 +144,16 @@ pub struct ZeroKeeper {
 }
 
 impl ZeroKeeper {
-    /// Keeps zero deviations of the blob of this CRC.
-    pub fn new(blob: u32, zero: PlanarPose<f32>) -> Self {
-        let kept = KeptZero { blob, zero };
-        fault::update(|record| record.zero = kept);
+    /// Keeps zero deviations of the blob of this CRC; without one, what was kept stays for a
+    /// later start.
+    pub fn new(blob: Option<u32>, zero: PlanarPose<f32>) -> Self {
+        let kept = KeptZero {
+            blob: blob.unwrap_or_default(),
+            zero,
+        };
+        if blob.is_some() {
+            fault::update(|record| record.zero = kept);
+        }
         Self { kept }
     }
 

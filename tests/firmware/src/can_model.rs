@@ -62,6 +62,9 @@ pub struct CanModel {
     joins_ns: Option<u64>,
     /// Whether it ever acknowledges that it stands still.
     pub acknowledges: bool,
+    /// Whether the receive line is held low: the eleven recessive bits that the controller joins
+    /// the bus after never come (RM0090 32.4.1).
+    pub held_low: bool,
     interrupts: u32,
     /// ERRI.
     latched: bool,
@@ -95,6 +98,7 @@ impl CanModel {
             mcr: 0x0001_0002,
             joins_ns: None,
             acknowledges: true,
+            held_low: false,
             interrupts: 0,
             latched: false,
             advanced_ns: 0,
@@ -315,7 +319,7 @@ impl CanModel {
         match offset {
             0x00 => {
                 self.mcr = value;
-                let joins = self.acknowledges && value & (INIT | SLEEP) == 0;
+                let joins = self.acknowledges && !self.held_low && value & (INIT | SLEEP) == 0;
                 self.joins_ns = joins.then(|| self.joins_ns.unwrap_or(now_ns + JOIN_NS));
                 self.arbitrate(now_ns);
             }

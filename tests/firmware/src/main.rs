@@ -183,6 +183,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     });
     check("start: PLL dead", &|| start::pll_dead(bench));
     check("start: CAN dead", &|| start::can_dead(bench));
+    check("start: CAN receive line low", &|| {
+        start::receive_line_low(bench)
+    });
     check("start: the board", &|| start::the_board(bench));
     match start::crashes(bench) {
         Ok(crashes) => {

@@ -162,7 +162,8 @@ impl Bench {
     fn ticks(&mut self, ticks: u32) -> Vec<Answer> {
         let mut answers = Vec::new();
         for _ in 0..ticks {
-            assert_eq!(self.service.tick(None, None), None);
+            self.service.before_tick(None, None);
+            assert_eq!(self.service.tick(None), None);
             let servo_is_off = self.service.servo_is_off();
             answers.extend(self.receiver.tick(servo_is_off, &mut self.store));
         }

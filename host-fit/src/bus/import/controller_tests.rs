@@ -73,6 +73,10 @@ fn reference(fast: f64) -> String {
 
 /// Largest distance from the codes to those of the reference beside them, m; and the report.
 fn imported(controller: f64, interferometer: f64) -> (f64, ImportReport) {
+    try_import(controller, interferometer).expect("imported")
+}
+
+fn try_import(controller: f64, interferometer: f64) -> Result<(f64, ImportReport), ImportError> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     let stage = crate::input::shipped::STAGE_TOML
@@ -96,7 +100,7 @@ fn imported(controller: f64, interferometer: f64) -> (f64, ImportReport) {
         layout: None,
         skip_bad_lines: false,
     };
-    let report = run(&settings).expect("imported");
+    let report = run(&settings)?;
     let stage = Stage::from_file(&settings.stage).expect("sound");
     let read = log::read(&[settings.out], &stage, &ReadOptions::default());
     let rows = read.expect("a sound log").dataset.rows;
@@ -106,7 +110,7 @@ fn imported(controller: f64, interferometer: f64) -> (f64, ImportReport) {
         let signals = row.frame.hall().map(|code| f64::from(code) * M_PER_CODE);
         s.into_iter().zip(signals).map(|(s, code)| (s - code).abs())
     });
-    (distance.fold(0.0, f64::max), report)
+    Ok((distance.fold(0.0, f64::max), report))
 }
 
 #[test]
@@ -120,4 +124,13 @@ fn clocks_that_differ_by_50_parts_in_a_million_are_followed_over_two_minutes() {
         // At 2.8 mm/s: 10 us are 28 nm.
         assert!(distance_m < 40e-9, "{distance_m}");
     }
+}
+
+#[test]
+fn clocks_too_far_apart_in_speed_are_refused() {
+    let refused = try_import(0.0, 1000e-6).expect_err("refused");
+    assert!(
+        matches!(refused, ImportError::UnsteadyClocks { .. }),
+        "{refused}"
+    );
 }

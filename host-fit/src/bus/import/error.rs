@@ -92,6 +92,25 @@ pub enum ImportError {
         /// Share that is asked for.
         least_percent: f64,
     },
+    /// The clocks do not run evenly against each other.
+    #[error(
+        "no steady offset between the clocks makes the reference agree with the Hall signals: they differ in speed by more \
+         than {most_ppm} parts in a million, or one of them was set during the record; turn its adjustment off (NTP), and \
+         record again, or give --offset-us"
+    )]
+    UnsteadyClocks {
+        /// The largest difference that is looked for, parts in a million.
+        most_ppm: f64,
+    },
+    /// Frames were received too unevenly to tell when their codes were sampled.
+    #[error(
+        "the receive times of the ticks are {rms_us:.0} us (rms) off an even course, more than a servo period: the clock of \
+         the recording computer was set during the record, or it could not keep up; record again"
+    )]
+    UnevenTimes {
+        /// Standard deviation about the course, us.
+        rms_us: f64,
+    },
     /// The log cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),

@@ -13,7 +13,7 @@ use super::ImportError;
 use super::bus_log::BusTick;
 use super::join::{At, Cursor};
 use super::reference::{Reference, Sample};
-use super::refine::refine;
+use super::refine::{RATE_MAX, refine};
 use crate::input::log::layout::Quantity;
 use crate::input::stage::Stage;
 use runtime::model::dot;
@@ -47,7 +47,7 @@ const EXPLAINED_MIN: f64 = 0.6;
 /// Finds the offset within `search_us` of where both records start together.
 ///
 /// # Errors
-/// [`ImportError::NoOffset`].
+/// [`ImportError::NoOffset`], [`ImportError::UnsteadyClocks`].
 pub fn estimate(
     ticks: &[BusTick],
     times_us: &[f64],
@@ -83,13 +83,18 @@ pub fn estimate(
     let steps = (search_us / step_us).ceil().clamp(1.0, 1e6) as i64;
     let offsets = (-steps..=steps).map(|k| at(centre_us + k as f64 * step_us));
     let found = most(offsets, |offset| trial(&coarse, offset).explained).unwrap_or(at(centre_us));
-    let mut best = refine(&points, &predicted, found, step_us).unwrap_or(found);
+    let refined = refine(&points, &predicted, found, step_us);
+    let mut best = refined.unwrap_or(found);
     let explained = trial(&points, &best).share();
     if explained.is_nan() || explained < EXPLAINED_MIN {
         return Err(ImportError::NoOffset {
             percent: 100.0 * explained.max(0.0),
             least_percent: 100.0 * EXPLAINED_MIN,
         });
+    }
+    if refined.is_none() {
+        let most_ppm = RATE_MAX * 1e6;
+        return Err(ImportError::UnsteadyClocks { most_ppm });
     }
     best.explained = Some(explained);
     Ok(best)

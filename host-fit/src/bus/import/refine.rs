@@ -24,7 +24,7 @@ const COLUMNS: usize = TERMS + 2;
 /// Standard deviation of how two crystals differ, where nothing else is known, parts in a million.
 const RATE_PRIOR_PPM: f64 = 50.0;
 /// Crystals differ by less; more means that the two records do not belong together.
-const RATE_MAX: f64 = 500e-6;
+pub(super) const RATE_MAX: f64 = 500e-6;
 /// Added to each term's square, as a share: what a record does not move stays near 0.
 const RIDGE: f64 = 1e-9;
 /// Steps for one stretch of the record.

@@ -131,6 +131,8 @@ impl<'d> Node<'d> {
         out: &mut Vec<Coded>,
     ) -> Step {
         let tick = tick.map(|frame| {
+            // A computer has no service pin.
+            self.service.before_tick(Some(&mut self.servo), None);
             let reading = self.servo.tick(&frame);
             self.publish(&reading, Some(&frame), out);
             (frame, reading)
@@ -151,8 +153,7 @@ impl<'d> Node<'d> {
             let health = Told::Health(HealthPage::of(&self.servo.health(), None, round));
             out.extend([status, health].iter().filter_map(|t| self.service.tell(t)));
         }
-        // A computer has no service pin.
-        out.extend(self.service.tick(Some(&mut self.servo), None));
+        out.extend(self.service.tick(Some(&self.servo)));
         self.ticks = self.ticks.wrapping_add(1);
     }
 

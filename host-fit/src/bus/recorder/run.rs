@@ -18,6 +18,8 @@ const WAIT_MAX: Duration = Duration::from_millis(50);
 const PATIENCE: Duration = Duration::from_millis(300);
 /// How often a controller is asked.
 const ATTEMPTS: u8 = 4;
+/// How long codes may stay away before they are asked for again.
+const SILENCE: Duration = Duration::from_secs(1);
 /// Time from display to display.
 const SHOWN_EVERY: Duration = Duration::from_millis(200);
 
@@ -41,15 +43,23 @@ pub fn run(settings: &RecorderSettings) -> Result<Recorded, RecorderError> {
     let stop = interrupt::watch();
     session.ask(true)?;
     let recorded = session.record(stop);
+    let end_us = now_us();
     let stopped = session.ask(false);
-    recorded?;
+    if let Err(error) = recorded {
+        // What came is kept.
+        let _ = session.finish(end_us);
+        return Err(error);
+    }
     let is_stopped = match stopped {
         Ok(()) => true,
         // The codes are in the file: a controller that does not stop to send them spoils nothing.
         Err(RecorderError::NoAnswer { .. } | RecorderError::Refused { .. }) => false,
-        Err(error) => return Err(error),
+        Err(error) => {
+            let _ = session.finish(end_us);
+            return Err(error);
+        }
     };
-    let watch = session.finish()?;
+    let watch = session.finish(end_us)?;
     Ok(Recorded { watch, is_stopped })
 }
 
@@ -99,6 +109,7 @@ impl Session<'_> {
 
     fn record(&mut self, stop: &AtomicBool) -> Result<(), RecorderError> {
         let started = Instant::now();
+        let mut asked = started;
         while !stop.load(Ordering::Relaxed) {
             let left = match self.settings.duration {
                 None => WAIT_MAX,
@@ -109,6 +120,15 @@ impl Session<'_> {
             };
             self.turn(left)?;
             self.show();
+            // A controller that was reset sends no codes until it is asked again.
+            if asked.elapsed() > SILENCE && self.watch.missing_at_the_end(now_us()) > 0 {
+                match self.ask(true) {
+                    Ok(())
+                    | Err(RecorderError::NoAnswer { .. } | RecorderError::Refused { .. }) => {}
+                    Err(error) => return Err(error),
+                }
+                asked = Instant::now();
+            }
         }
         Ok(())
     }
@@ -165,7 +185,7 @@ impl Session<'_> {
         }
     }
 
-    fn finish(self) -> Result<Watch, RecorderError> {
+    fn finish(self, end_us: u64) -> Result<Watch, RecorderError> {
         if self.shown.is_some() {
             let _ = write!(std::io::stderr(), "\r\x1b[2K");
         }
@@ -177,7 +197,8 @@ impl Session<'_> {
             });
         }
         self.file.finish()?;
-        let (missing, came) = (counts.ticks_missing, counts.ticks as u64);
+        let missing = counts.ticks_missing + self.watch.missing_at_the_end(end_us);
+        let came = counts.ticks as u64;
         if missing * MISSING_ONE_IN > missing + came {
             return Err(RecorderError::TicksLost {
                 missing,

@@ -11,17 +11,39 @@ pub struct Watch {
     collector: Collector,
     mailbox: Mailbox,
     status: Option<NodeStatus>,
+    /// When the first and the last tick of codes came, us.
+    first_us: Option<u64>,
+    last_us: u64,
 }
+
+/// Codes that stay away for longer are missing, us.
+const SILENT_US: u64 = 100_000;
 
 impl Watch {
     /// Takes a frame; gives what it tells, other than codes and poses.
     pub fn take(&mut self, stamped: &StampedFrame) -> Option<Told> {
+        let before = self.counts().ticks;
         self.collector.take(stamped);
+        if self.counts().ticks > before {
+            self.first_us.get_or_insert(stamped.time_us);
+            self.last_us = stamped.time_us;
+        }
         let told = self.mailbox.take(&stamped.frame)?.ok()?;
         if let Told::Status(status) = told {
             self.status = Some(status);
         }
         Some(told)
+    }
+
+    /// Ticks that did not come between the last one and `end_us`, if that is long ago: codes that
+    /// stop leave no gap between ticks.
+    pub fn missing_at_the_end(&self, end_us: u64) -> u64 {
+        let silent_us = end_us.saturating_sub(self.last_us);
+        let Some(first_us) = self.first_us.filter(|_| silent_us > SILENT_US) else {
+            return 0;
+        };
+        let ticks = self.counts().ticks as u64;
+        silent_us * ticks / self.last_us.saturating_sub(first_us).max(1)
     }
 
     /// How codes come, once some have.

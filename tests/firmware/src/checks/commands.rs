@@ -13,8 +13,8 @@ use runtime::RawFrame;
 
 const PART: Part = Part::Ads131m08;
 /// From the trigger to the middle of what is sampled, by the drivers' documentation, us.
-const ADS131M08_SAMPLE_US: u32 = 144;
-const ADS8688_SAMPLE_US: u32 = 10;
+const ADS131M08_SAMPLE_US: u32 = 150;
+const ADS8688_SAMPLE_US: u32 = 12;
 
 pub(super) fn ask(
     machine: &mut Machine,

@@ -225,6 +225,22 @@ pub fn can_dead(bench: &Bench) -> Outcome {
     equal("words on the bus", frames, 0)
 }
 
+/// A receive line that is held low keeps the controller from the bus: the light tells, also
+/// without parameters.
+pub fn receive_line_low(bench: &Bench) -> Outcome {
+    for (slot, flash) in [(&bench.blob[..], 1), (&[], 2)] {
+        let mut machine = bench.machine(PART, [slot, &[]])?;
+        equal("flashes before", flashes(&mut machine)?, flash)?;
+        let mut machine = bench.machine(PART, [slot, &[]])?;
+        machine.chip.can.held_low = true;
+        machine.run_ticks(500)?;
+        equal("flashes", flashes(&mut machine)?, 5)?;
+        equal("words", Seen::since_last(&mut machine).axes.len(), 0)?;
+    }
+    println!("FAULT   controller | CAN receive line low | told by the light after 0.5 s | 0");
+    Ok(())
+}
+
 /// Pull-ups and option bytes of the board are told.
 pub fn the_board(bench: &Bench) -> Outcome {
     let cases = [

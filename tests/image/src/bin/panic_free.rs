@@ -59,7 +59,8 @@ fn commands(servo: &mut Servo<'_>) {
     if let Some(coded) = sent {
         black_box(service.take(&black_box(BusFrame::from(coded)), Some(servo)));
     }
-    black_box(service.tick(Some(servo), black_box(Some(true))));
+    service.before_tick(Some(servo), black_box(Some(true)));
+    black_box(service.tick(Some(servo)));
     black_box(service.identity_page(black_box("HS-0007")));
     black_box(service.flags(Some(servo)));
 }
