@@ -4,6 +4,7 @@ fn main() {
     println!("cargo:rustc-link-search={manifest}/../..");
     println!("cargo:rerun-if-changed=../../memory.x");
     println!("cargo:rerun-if-env-changed=STAGE_SERIAL");
+    println!("cargo:rerun-if-env-changed=STAGE_KEY");
     if std::env::var("CARGO_CFG_TARGET_OS").is_ok_and(|os| os == "none") {
         println!("cargo:rustc-link-arg-bins=-Tlink.x");
     }

@@ -104,6 +104,25 @@ pub enum BlobError {
     },
 }
 
+impl BlobError {
+    /// Its number on the bus and in the state of a node: 1 to 11 in the order of the variants.
+    pub const fn number(&self) -> u8 {
+        match self {
+            Self::Truncated { .. } => 1,
+            Self::Erased => 2,
+            Self::BadMagic { .. } => 3,
+            Self::UnknownVersion { .. } => 4,
+            Self::BadHeader { .. } => 5,
+            Self::TrailingBytes { .. } => 6,
+            Self::BadCrc { .. } => 7,
+            Self::BadPayload => 8,
+            Self::Parameters(_) => 9,
+            Self::OtherStage => 10,
+            Self::BufferTooSmall { .. } => 11,
+        }
+    }
+}
+
 impl core::fmt::Display for BlobError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match *self {
@@ -224,15 +243,17 @@ impl ParameterSet {
         }
         let (header, payload) =
             (body.split_at_checked(HEADER_BYTES)).ok_or(BlobError::BadPayload)?;
-        let mut set = layout::read(payload).ok_or(BlobError::BadPayload)?;
+        // Changed where it was read: a copy on the stack of a controller is 700 bytes.
+        let mut read = layout::read(payload);
+        let set = read.as_mut().ok_or(BlobError::BadPayload)?;
         // Each version holds its own models.
         if header.get(4..6) != Some(&set.layout_version().to_le_bytes()) {
             return Err(BlobError::BadPayload);
         }
         set.fit.forced = header.get(6) == Some(&1);
-        layout::check_finite(&mut set).map_err(BlobError::Parameters)?;
+        layout::check_finite(set).map_err(BlobError::Parameters)?;
         set.check_terms().map_err(BlobError::Parameters)?;
-        Ok(set)
+        read.ok_or(BlobError::BadPayload)
     }
 
     /// Refuses a set of another stage than `serial`.

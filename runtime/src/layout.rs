@@ -222,7 +222,9 @@ impl Out<'_> {
     }
 }
 
-/// Reads a payload, which must end where the set does; `None` if it is none.
+/// Reads a payload, which must end where the set does; `None` if it is none. In a function of its
+/// own, what it needs leaves the stack before the checks.
+#[inline(never)]
 pub(crate) fn read(payload: &[u8]) -> Option<ParameterSet> {
     let (head, rest) = postcard::take_from_bytes::<Head>(payload).ok()?;
     let (&logs_sha256, rest) = rest.split_first_chunk()?;

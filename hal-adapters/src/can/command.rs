@@ -16,6 +16,7 @@ use super::frame::{Coded, standard};
 use super::notice::{BusFault, open};
 use super::status::{HealthPage, NodeStatus};
 use super::table::Message;
+use super::update::{UpdateData, UpdateRequest};
 use embedded_can::Frame;
 use runtime::rezero::RezeroRefusal;
 
@@ -45,6 +46,8 @@ pub enum Request {
         /// For how long, s; 0 says that the servo is on.
         seconds: u8,
     },
+    /// About the parameters.
+    Update(UpdateRequest),
 }
 
 /// A request with the token that its answer will carry.
@@ -54,7 +57,7 @@ pub struct Command {
     pub request: Option<Request>,
     /// Number of the command in the frame, 0 to 15.
     pub number: u8,
-    /// Chosen by the sender.
+    /// Chosen by the sender: another each time, but for the requests of one transfer of an update.
     pub token: u8,
 }
 
@@ -67,6 +70,7 @@ impl Command {
             Request::ClearZero => 3,
             Request::Record { .. } => 4,
             Request::ServoOff { .. } => 5,
+            Request::Update(request) => request.number(),
         };
         Self {
             request: Some(request),
@@ -81,6 +85,7 @@ impl Command {
             Some(Request::Rezero { ticks }) => ticks as u32,
             Some(Request::Identify { seconds } | Request::ServoOff { seconds }) => seconds as u32,
             Some(Request::Record { on }) => on as u32,
+            Some(Request::Update(request)) => request.argument(),
             Some(Request::ClearZero) | None => 0,
         };
         Payload {
@@ -100,7 +105,7 @@ impl Command {
             (3, 0) => Some(Request::ClearZero),
             (4, 0 | 1) => Some(Request::Record { on: p.long == 1 }),
             (5, _) => seconds.map(|seconds| Request::ServoOff { seconds }),
-            _ => None,
+            _ => UpdateRequest::from_frame(number, p.long).map(Request::Update),
         };
         Self {
             request,
@@ -138,10 +143,24 @@ pub enum Outcome {
     OutOfBounds = 10,
     /// A pose lay outside the calibrated range; the detail is its status.
     Extrapolated = 11,
+    /// The tag is not that of the stage's key, or nothing was verified.
+    NotAuthorised = 12,
+    /// The blob is refused; the detail is [`runtime::BlobError::number`].
+    BadContent = 13,
+    /// The sequence number is not the one that follows those in the store: the detail.
+    WrongSequence = 14,
+    /// The store has no room before the next reset.
+    NoRoom = 15,
+    /// Words are missing; the detail is the index of the first.
+    Incomplete = 16,
+    /// The store could not write; the records before stand.
+    StoreFailed = 17,
+    /// No transfer is open with this token: never begun, aborted, or nothing came for 5 s.
+    NoTransfer = 18,
 }
 
 impl Outcome {
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 19] = [
         Self::Done,
         Self::Started,
         Self::UnknownCommand,
@@ -154,6 +173,13 @@ impl Outcome {
         Self::ServoOn,
         Self::OutOfBounds,
         Self::Extrapolated,
+        Self::NotAuthorised,
+        Self::BadContent,
+        Self::WrongSequence,
+        Self::NoRoom,
+        Self::Incomplete,
+        Self::StoreFailed,
+        Self::NoTransfer,
     ];
 
     /// Outcome and detail of a refused re-zero.
@@ -263,15 +289,18 @@ pub enum Told {
     Answer(Answer),
     /// A page of the serial number.
     Identity(IdentityPage),
+    /// A word of an update.
+    UpdateData(UpdateData),
 }
 
 impl Told {
-    const MESSAGES: [Message; 5] = [
+    const MESSAGES: [Message; 6] = [
         Message::NodeStatus,
         Message::Health,
         Message::Command,
         Message::Answer,
         Message::Identity,
+        Message::UpdateData,
     ];
 
     fn payload(&self) -> (usize, Payload) {
@@ -281,6 +310,7 @@ impl Told {
             Self::Command(x) => (2, x.payload()),
             Self::Answer(x) => (3, x.payload()),
             Self::Identity(x) => (4, x.payload()),
+            Self::UpdateData(x) => (5, x.payload()),
         }
     }
 
@@ -290,7 +320,8 @@ impl Told {
             1 => Self::Health(HealthPage::from_payload(p)),
             2 => Self::Command(Command::from_payload(p)),
             3 => Self::Answer(Answer::from_payload(p)),
-            _ => Self::Identity(IdentityPage::from_payload(p)),
+            4 => Self::Identity(IdentityPage::from_payload(p)),
+            _ => Self::UpdateData(UpdateData::from_payload(p)),
         }
     }
 }
@@ -298,9 +329,9 @@ impl Told {
 /// Numbers and checks the occasional frames of one node.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mailbox {
-    sent: [u8; 5],
+    sent: [u8; 6],
     /// Counter and payload of the last frame of each message.
-    received: [Option<(u8, Payload)>; 5],
+    received: [Option<(u8, Payload)>; 6],
 }
 
 impl Mailbox {
@@ -308,7 +339,7 @@ impl Mailbox {
     pub fn send(&mut self, what: &Told) -> Option<Coded> {
         let (k, payload) = what.payload();
         let (message, counter) = (*Told::MESSAGES.get(k)?, self.sent.get_mut(k)?);
-        let bytes = protect(message.spec().key, *counter, payload);
+        let bytes = protect(message.key(), *counter, payload);
         *counter = counter.wrapping_add(1);
         Some(Coded { message, bytes })
     }

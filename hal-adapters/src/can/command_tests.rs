@@ -21,7 +21,11 @@ fn an_argument_that_does_not_fit_is_an_unknown_request() {
     assert_eq!(read(3, 1), None);
     assert_eq!(read(4, 2), None);
     assert_eq!(read(5, 256), None);
-    assert_eq!(read(9, 0), None);
+    assert_eq!(read(6, 4), None);
+    assert_eq!(read(7, 65536), None);
+    assert_eq!(read(10, 1), None);
+    assert_eq!(read(12, 0), None);
+    assert_eq!(read(15, 0), None);
     assert_eq!(read(2, 255), Some(Request::Identify { seconds: 255 }));
 }
 
@@ -73,6 +77,14 @@ fn every_request_comes_back_as_sent() {
         Request::Record { on: true },
         Request::Record { on: false },
         Request::ServoOff { seconds: 255 },
+        Request::Update(UpdateRequest::Challenge { part: 3 }),
+        Request::Update(UpdateRequest::Begin { bytes: 656 }),
+        Request::Update(UpdateRequest::Verify { sequence: u32::MAX }),
+        Request::Update(UpdateRequest::Commit { sequence: 7 }),
+        Request::Update(UpdateRequest::Abort),
+        Request::Update(UpdateRequest::Activate),
+        Request::Update(UpdateRequest::ReadBack { index: 163 }),
+        Request::Update(UpdateRequest::Tell { page: 21 }),
     ] {
         let sent = Command::new(request, 7);
         assert_eq!(Command::from_payload(sent.payload()), sent);
@@ -81,7 +93,7 @@ fn every_request_comes_back_as_sent() {
 
 proptest! {
     #[test]
-    fn answers_come_back_as_sent(number in 0u8..16, token: u8, outcome in 0usize..12, detail: u32) {
+    fn answers_come_back_as_sent(number in 0u8..16, token: u8, outcome in 0usize..Outcome::ALL.len(), detail: u32) {
         let sent = Answer { number, token, outcome: Some(Outcome::ALL[outcome]), detail };
         prop_assert_eq!(Answer::from_payload(sent.payload()), sent);
     }

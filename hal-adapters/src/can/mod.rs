@@ -16,6 +16,7 @@ pub mod service;
 pub mod signals;
 pub mod status;
 pub mod table;
+pub mod update;
 
 pub use frame::{BusFrame, Coded, StampedFrame};
 pub use notice::{BusFault, BusHealth, Taken, Timing};

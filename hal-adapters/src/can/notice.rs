@@ -84,7 +84,7 @@ pub enum BusFault {
 pub(super) fn open(message: Message, data: &[u8]) -> Result<(u8, Payload), BusFault> {
     match data.first_chunk::<FRAME_BYTES>() {
         Some(bytes) if data.len() == FRAME_BYTES => {
-            unprotect(message.spec().key, bytes).ok_or(BusFault::WrongCheck { message })
+            unprotect(message.key(), bytes).ok_or(BusFault::WrongCheck { message })
         }
         _ => {
             let bytes = data.len() as u8;

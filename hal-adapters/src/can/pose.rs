@@ -40,7 +40,7 @@ const fn axis_frame(message: Message, counter: u32, value: f32, status: Status) 
     };
     Coded {
         message,
-        bytes: protect(message.spec().key, counter as u8, payload),
+        bytes: protect(message.key(), counter as u8, payload),
     }
 }
 
@@ -64,7 +64,7 @@ const fn time_frame(sampled: &RawFrame, counter: u32) -> Coded {
     let message = Message::PoseTime;
     Coded {
         message,
-        bytes: protect(message.spec().key, counter as u8, payload),
+        bytes: protect(message.key(), counter as u8, payload),
     }
 }
 

@@ -128,7 +128,7 @@ pub(super) const fn read_two(p: Payload) -> [i32; 2] {
 const fn frame_of(message: Message, counter: u32, payload: Payload) -> Coded {
     Coded {
         message,
-        bytes: protect(message.spec().key, counter as u8, payload),
+        bytes: protect(message.key(), counter as u8, payload),
     }
 }
 
@@ -257,7 +257,7 @@ mod tests {
                 let half = 1i64 << (bits - 1);
                 if (-half..half).contains(&i64::from(code)) { code } else { MISSING_CODE }
             };
-            let payload = |c: Coded| unprotect(c.message.spec().key, &c.bytes).expect("sound").1;
+            let payload = |c: Coded| unprotect(c.message.key(), &c.bytes).expect("sound").1;
             let [h, g] = frames_16(&frame).map(payload).map(read_three);
             prop_assert_eq!(h, frame.hall.map(|c| want(c, 16)));
             prop_assert_eq!(g, frame.capacitive.map(|c| want(c, 16)));

@@ -24,6 +24,7 @@ use super::command::{Answer, Command, IdentityPage, Mailbox, Outcome, Request, T
 use super::frame::Coded;
 use super::notice::BusFault;
 use super::status::flag;
+use super::update::{Nonce, Receiver, Store, Surroundings};
 use embedded_can::Frame;
 use runtime::rezero::{RezeroSettings, RezeroState};
 use runtime::{PlanarPose, Servo};
@@ -35,6 +36,16 @@ pub struct Answered {
     pub command: Command,
     /// The answer, to be sent.
     pub answer: Option<Coded>,
+}
+
+/// What takes new parameters over the bus.
+pub struct Updates<'u, 's> {
+    /// The node's side of an update.
+    pub receiver: &'u mut Receiver<'s>,
+    /// Keeps the records.
+    pub store: &'u mut dyn Store,
+    /// See [`Surroundings::nonce`].
+    pub nonce: Option<Nonce>,
 }
 
 /// Obeys commands. It counts time in ticks, and needs [`Service::tick`] in every one.
@@ -78,8 +89,7 @@ impl Service {
         self
     }
 
-    /// Takes a frame that came over the bus, and obeys it if it is a command. `servo` is `None`
-    /// for a node without parameters. `None` for a frame that is no command.
+    /// As [`Service::take_updating`], of a node that takes no parameters over the bus.
     ///
     /// # Errors
     /// The command's frame is damaged or repeated: not obeyed, not answered.
@@ -88,11 +98,39 @@ impl Service {
         frame: &F,
         servo: Option<&mut Servo<'_>>,
     ) -> Option<Result<Answered, BusFault>> {
+        self.take_updating(frame, servo, None)
+    }
+
+    /// Takes a frame that came over the bus, and obeys it if it is a command. `servo` is `None`
+    /// for a node without parameters. `None` for a frame that is no command.
+    ///
+    /// # Errors
+    /// The command's frame is damaged or repeated: not obeyed, not answered.
+    pub fn take_updating<F: Frame>(
+        &mut self,
+        frame: &F,
+        servo: Option<&mut Servo<'_>>,
+        updates: Option<Updates<'_, '_>>,
+    ) -> Option<Result<Answered, BusFault>> {
         match self.mailbox.take(frame)? {
             Ok(Told::Command(command)) => {
-                let (outcome, detail) = self.obey(&command, servo);
+                let (outcome, detail) = match (command.request, updates) {
+                    (Some(Request::Update(request)), Some(updates)) => {
+                        let around = Surroundings {
+                            servo_is_off: self.servo_is_off(),
+                            store: updates.store,
+                            nonce: updates.nonce,
+                        };
+                        updates.receiver.obey(command.token, request, around)
+                    }
+                    _ => self.obey(&command, servo),
+                };
                 let answer = self.answer(command.number, command.token, outcome, detail);
                 Some(Ok(Answered { command, answer }))
+            }
+            Ok(Told::UpdateData(data)) => {
+                updates?.receiver.take(&data);
+                None
             }
             Ok(_) => None,
             Err(fault) => Some(Err(fault)),
@@ -167,8 +205,8 @@ impl Service {
         self.is_recording
     }
 
-    /// Whether the zero may be changed.
-    const fn servo_is_off(&self) -> bool {
+    /// Whether the zero and the parameters may be changed.
+    pub const fn servo_is_off(&self) -> bool {
         self.servo_off_ticks > 0 && !matches!(self.servo_off_pin, Some(false))
     }
 
@@ -181,6 +219,7 @@ impl Service {
                 self.identify_ticks = self.ticks_of(seconds);
                 self.page = 0;
             }
+            (Request::Update(_), _) => return (Outcome::UnknownCommand, 0),
             (Request::Record { on }, _) => self.is_recording = on,
             (Request::ServoOff { seconds }, _) => self.servo_off_ticks = self.ticks_of(seconds),
             (Request::Rezero { .. } | Request::ClearZero, None) => {

@@ -176,7 +176,7 @@ pub(super) const POSE_RY: [Signal; 2] = axis("Ry", "rad");
 pub(super) const NODE_STATUS: [Signal; 6] = [
     named(
         signal("State", (12, 4), U, "", "what the node is doing"),
-        &[(0, "starting"), (1, "running"), (2, "no parameters"), (3, "bad parameters"), (4, "no frames"), (5, "sensor fault"), (6, "self-test failed")],
+        &[(0, "starting"), (1, "running"), (2, "no parameters"), (3, "bad parameters"), (4, "no frames"), (5, "sensor fault"), (6, "self-test failed"), (7, "updating")],
     ),
     signal("Reason", (16, 8), U, "", "detail of the state, by the node; 0 for none"),
     signal("Flags", (24, 8), U, "", "1 reset by the watchdog or on a fault, 2 bus was off, 4 re-zero runs, 8 a zero deviation is subtracted, 16 re-zero refused, 32 identifying, 64 core on its internal oscillator, 128 recording"),
@@ -191,13 +191,21 @@ pub(super) const COMMANDS: &[(u8, &str)] = &[
     (3, "clear zero"),
     (4, "record"),
     (5, "servo off"),
+    (6, "challenge"),
+    (7, "begin update"),
+    (8, "verify update"),
+    (9, "commit update"),
+    (10, "abort update"),
+    (11, "activate"),
+    (13, "read back"),
+    (14, "tell"),
 ];
 
 #[rustfmt::skip]
 pub(super) const COMMAND: [Signal; 3] = [
     named(signal("Command", (12, 4), U, "", "what is asked for"), COMMANDS),
-    signal("Token", (16, 8), U, "", "chosen by the sender, another each time; returned in the answer"),
-    signal("Argument", (32, 32), U, "", "re-zero: ticks to average, 0 for the default; identify: s to blink; record: 1 on, 0 off; servo off: s, 0 for servo on; else 0"),
+    signal("Token", (16, 8), U, "", "chosen by the sender, another each time; returned in the answer; verify, commit and abort update: that of begin update"),
+    signal("Argument", (32, 32), U, "", "re-zero: ticks to average, 0 for the default; identify: s to blink; record: 1 on, 0 off; servo off: s, 0 for servo on; challenge: word of the nonce, 0 to 3; begin update: length in bytes, 0 to go back; verify and commit update: sequence number; read back: index of the word; tell: page; else 0"),
 ];
 
 #[rustfmt::skip]
@@ -206,9 +214,9 @@ pub(super) const ANSWER: [Signal; 4] = [
     signal("Token", (16, 8), U, "", "the token of the request"),
     named(
         signal("Outcome", (24, 8), U, "", "how it ended"),
-        &[(0, "done"), (1, "started"), (2, "unknown command"), (3, "no parameters"), (4, "too short"), (5, "no pose"), (6, "stage moved"), (7, "stage drifted"), (8, "busy"), (9, "servo on: declare it off first"), (10, "out of bounds"), (11, "extrapolated")],
+        &[(0, "done"), (1, "started"), (2, "unknown command"), (3, "no parameters"), (4, "too short"), (5, "no pose"), (6, "stage moved"), (7, "stage drifted"), (8, "busy"), (9, "servo on: declare it off first"), (10, "out of bounds"), (11, "extrapolated"), (12, "not authorised"), (13, "bad content"), (14, "wrong sequence number"), (15, "no room: restart first"), (16, "incomplete"), (17, "store failed"), (18, "no transfer")],
     ),
-    signal("Detail", (32, 32), U, "", "stage moved, drifted or out of bounds: axis, 0 to 5 for X, Y, Rz, Z, Rx, Ry; no pose or extrapolated: status; else 0"),
+    signal("Detail", (32, 32), U, "", "stage moved, drifted or out of bounds: axis, 0 to 5 for X, Y, Rz, Z, Rx, Ry; no pose or extrapolated: status; bad content: kind, as in the node's reason; wrong sequence number: the one that is taken; incomplete: the first missing index; challenge, read back, tell: the word asked for; else 0"),
 ];
 
 #[rustfmt::skip]
@@ -230,6 +238,24 @@ pub(super) const HEALTH: [Signal; 13] = [
     paged(9, "Faults", "resets by faults since power-on"),
     paged(10, "OptionBytes", "the word FLASH_OPTCR"),
     paged(11, "BoardChecks", "bits: 0 no pull-up on chip select, 1 none on SYNC or RST, 2 brown-out level below 2.7 V, 3 internal oscillator, 4 CAN did not start, 5 retained zero lost"),
+];
+
+pub(super) const UPDATE_DATA: [Signal; 3] = [
+    signal("Token", (12, 8), U, "", "token of the update"),
+    signal(
+        "Index",
+        (20, 8),
+        U,
+        "",
+        "which word: of the blob from 0, of the tag from 240",
+    ),
+    signal(
+        "Word",
+        (32, 32),
+        U,
+        "",
+        "four bytes, the first in bits 32 to 39",
+    ),
 ];
 
 pub(super) const IDENTITY: [Signal; 3] = [

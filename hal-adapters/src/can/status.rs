@@ -21,10 +21,12 @@ pub enum NodeState {
     SensorFault = 5,
     /// The node failed its own test at start: no pose.
     SelfTestFailed = 6,
+    /// New parameters are being received or stored: no pose.
+    Updating = 7,
 }
 
 impl NodeState {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::Starting,
         Self::Running,
         Self::NoParameters,
@@ -32,6 +34,7 @@ impl NodeState {
         Self::NoFrames,
         Self::SensorFault,
         Self::SelfTestFailed,
+        Self::Updating,
     ];
 
     /// From its number, or `None` for a state of a later version.
@@ -224,7 +227,7 @@ mod tests {
         for (number, state) in (0u8..).zip(NodeState::ALL) {
             assert_eq!(state as u8, number);
         }
-        assert_eq!(NodeState::from_number(7), None);
+        assert_eq!(NodeState::from_number(8), None);
     }
 
     #[test]

@@ -43,6 +43,8 @@ pub enum Message {
     Identity,
     /// Number and time of the tick whose pose was just sent.
     PoseTime,
+    /// A word of new parameters.
+    UpdateData,
 }
 
 /// Who sends a message.
@@ -141,7 +143,7 @@ const VERTICAL: Rate = Rate::Decimated(VERTICAL_TICKS);
 /// Any two identifiers differ in at least four bits, so three flipped bits never turn one
 /// message into another. Every message has eight bytes.
 #[rustfmt::skip]
-pub const TABLE: [Spec; 18] = [
+pub const TABLE: [Spec; 19] = [
     row(M::Hall, "Hall", (0x100, 0x0d), (Sensor, EVERY), "Hall codes of 16 bits", &signals::HALL),
     row(M::Capacitive, "Capacitive", (0x10f, 0x1a), (Sensor, EVERY), "capacitive codes of 16 bits", &signals::CAPACITIVE),
     row(M::HallAb24, "HallAb24", (0x133, 0x27), (Sensor, EVERY), "second layout: Hall codes A and B of up to 24 bits", &signals::HALL_AB_24),
@@ -160,10 +162,33 @@ pub const TABLE: [Spec; 18] = [
     row(M::Health, "Health", (0x1ff, 0xd0), (Decoder, SLOW), "counters since start, one a frame", &signals::HEALTH),
     row(M::Identity, "Identity", (0x203, 0xdd), (Decoder, Rate::OnRequest), "serial number of the stage, six characters a page", &signals::IDENTITY),
     row(M::PoseTime, "PoseTime", (0x20c, 0xea), (Decoder, SLOW), "number and time of the tick whose X, Y, Rz came before it", &signals::POSE_TIME),
+    row(M::UpdateData, "UpdateData", (0x230, 0xf7), (Host, Rate::OnRequest), "a word of new parameters, or of the tag that authorises them", &signals::UPDATE_DATA),
 ];
 
 /// Bytes of every message.
 pub const FRAME_BYTES: usize = 8;
+
+/// What a node needs of a row. Where only this is used, the texts stay out of the program.
+#[derive(Clone, Copy)]
+struct OnTheWire {
+    message: Message,
+    id: u16,
+    key: u8,
+}
+
+const ON_THE_WIRE: [OnTheWire; TABLE.len()] = {
+    let (message, id, key) = (Message::Hall, 0, 0);
+    let mut rows = [OnTheWire { message, id, key }; TABLE.len()];
+    let mut k = 0;
+    while k < rows.len() {
+        let Spec {
+            message, id, key, ..
+        } = TABLE[k];
+        rows[k] = OnTheWire { message, id, key };
+        k += 1;
+    }
+    rows
+};
 
 impl Message {
     /// Its row of the table.
@@ -179,10 +204,28 @@ impl Message {
         }
     }
 
+    #[inline(always)]
+    const fn on_the_wire(self) -> &'static OnTheWire {
+        const ROWS: &[OnTheWire; TABLE.len()] = &ON_THE_WIRE;
+        // As in `spec`.
+        let place = self as usize;
+        if place < ROWS.len() {
+            &ROWS[place]
+        } else {
+            &ROWS[0]
+        }
+    }
+
+    /// Key of its data ID list; see [`super::e2e`].
+    #[inline(always)]
+    pub const fn key(self) -> u8 {
+        self.on_the_wire().key
+    }
+
     /// Its identifier.
     #[inline(always)]
     pub const fn id(self) -> StandardId {
-        match StandardId::new(self.spec().id) {
+        match StandardId::new(self.on_the_wire().id) {
             Some(id) => id,
             None => StandardId::MAX,
         }
@@ -191,7 +234,7 @@ impl Message {
     /// The message with this identifier, if it is one of ours.
     pub fn from_id(id: Id) -> Option<Self> {
         let Id::Standard(id) = id else { return None };
-        TABLE
+        ON_THE_WIRE
             .iter()
             .find(|row| row.id == id.as_raw())
             .map(|row| row.message)
@@ -207,6 +250,7 @@ mod tests {
         for (k, row) in TABLE.iter().enumerate() {
             assert_eq!(row.message as usize, k);
             assert_eq!(row.message.id().as_raw(), row.id);
+            assert_eq!(row.message.key(), row.key);
             assert_eq!(
                 Message::from_id(Id::Standard(row.message.id())),
                 Some(row.message)

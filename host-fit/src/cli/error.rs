@@ -14,6 +14,7 @@ use crate::bus::import::ImportError;
 use crate::bus::live::LiveError;
 use crate::bus::recorder::RecorderError;
 use crate::bus::replay::ReplayError;
+use crate::bus::update::{UpdateError, UpdateRunError};
 use crate::fit::FitError;
 use crate::input::log::LogError;
 use crate::input::stage::StageError;
@@ -162,6 +163,17 @@ pub enum HostError {
     /// `replay` ended early.
     #[error(transparent)]
     Replay(#[from] ReplayError),
+    /// A controller was not identified, updated or read.
+    #[error(transparent)]
+    Update(#[from] UpdateRunError),
+    /// A key is refused.
+    #[error("{}: {problem}; name the file with the key of this stage", path.display())]
+    Key {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, without showing it.
+        problem: String,
+    },
     /// No run leads to a calibration within the limits: nothing was written.
     #[error("no run was written: {0}")]
     Plan(#[from] PlanError),
@@ -183,6 +195,11 @@ impl HostError {
     /// The exit status of a run that ends with this error.
     pub const fn exit_status(&self) -> u8 {
         match self {
+            Self::Update(UpdateRunError::Dialog {
+                cause: UpdateError::Interrupted,
+                ..
+            })
+            | Self::Interrupted { .. } => 130,
             Self::Usage { .. }
             | Self::Export(ExportError::NoSlot { .. } | ExportError::Unaligned { .. }) => 2,
             Self::Stage(_)
@@ -205,6 +222,8 @@ impl HostError {
             | Self::Live(_)
             | Self::Recorder(_)
             | Self::Replay(_)
+            | Self::Update(_)
+            | Self::Key { .. }
             | Self::PlanFile(_)
             | Self::Record(_)
             | Self::Output(_) => 3,
@@ -215,7 +234,6 @@ impl HostError {
             | Self::BeyondLimit { .. }
             | Self::Plan(_)
             | Self::Recalibrate(_) => 4,
-            Self::Interrupted { .. } => 130,
         }
     }
 }

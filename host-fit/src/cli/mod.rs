@@ -11,18 +11,21 @@ mod error;
 mod eval;
 mod export;
 mod fit;
+mod identify;
 mod import;
 mod init;
 mod inspect;
 mod limit;
 mod live;
 mod plan;
+mod read_back;
 mod recalibrate;
 mod record;
 mod replay;
 mod shell;
 mod simulate;
 mod terminal;
+mod update;
 
 use crate::cli::error::HostError;
 use crate::input::log::{LogReading, LogWarning, ReadOptions, ReferenceUse};
@@ -75,6 +78,12 @@ enum Command {
     Live(live::LiveArgs),
     /// Record the codes of a controller's own converter from a CAN bus (Linux).
     Record(record::RecordArgs),
+    /// Tell which controller is on a CAN bus, and which parameters it runs (Linux).
+    Identify(identify::IdentifyArgs),
+    /// Store new parameters in a controller over a CAN bus (Linux).
+    Update(update::UpdateArgs),
+    /// Write the parameters that a controller runs as a parameter blob (Linux).
+    ReadBack(read_back::ReadBackArgs),
     /// Play a log onto a CAN bus as the sensor node would send it (Linux).
     Replay(replay::ReplayArgs),
     /// Write a parameter blob as the file that a flash tool takes.
@@ -120,6 +129,9 @@ pub fn main() -> ExitCode {
         Command::Diff(args) => diff::run(&args),
         Command::Live(args) => live::run(args),
         Command::Record(args) => record::run(args),
+        Command::Identify(args) => identify::run(&args),
+        Command::Update(args) => update::run(args),
+        Command::ReadBack(args) => read_back::run(&args),
         Command::Replay(args) => replay::run(args),
         Command::Export(args) => export::run(&args),
         Command::Compare(args) => compare::run(&args),

@@ -5,6 +5,7 @@
 use core::convert::Infallible;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use hal_adapters::adc::{Channels, FrameSampler};
+use hal_adapters::can::update::Key;
 use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0, PB1, PC1, PinState, Pull, Speed};
 use stm32f4xx_hal::pac::{CAN1, GPIOA, GPIOB, GPIOC, SPI1};
 use stm32f4xx_hal::prelude::*;
@@ -107,6 +108,33 @@ pub const fn can_bit_timing(crystal: bool) -> BitTiming {
 /// The stage that this controller belongs to, if the program was built with `STAGE_SERIAL` in
 /// the environment: blobs of other stages are refused.
 pub const STAGE_SERIAL: Option<&str> = option_env!("STAGE_SERIAL");
+
+/// The key of the stage, if the program was built with `STAGE_KEY` in the environment: 32
+/// hexadecimal digits. Without one, whoever can send on the bus may replace the parameters.
+pub const STAGE_KEY: Option<Key> = match option_env!("STAGE_KEY") {
+    Some(digits) => Some(key(digits)),
+    None => None,
+};
+
+const fn key(digits: &str) -> Key {
+    assert!(digits.len() == 32, "STAGE_KEY needs 32 hexadecimal digits");
+    match u128::from_str_radix(digits, 16) {
+        Ok(number) => number.to_be_bytes(),
+        Err(_) => panic!("STAGE_KEY needs 32 hexadecimal digits"),
+    }
+}
+
+/// Major, minor and patch of the program's version in bits 16 to 23, 8 to 15, 0 to 7.
+pub const PROGRAM_VERSION: u32 = number(env!("CARGO_PKG_VERSION_MAJOR")) << 16
+    | number(env!("CARGO_PKG_VERSION_MINOR")) << 8
+    | number(env!("CARGO_PKG_VERSION_PATCH"));
+
+const fn number(text: &str) -> u32 {
+    match u32::from_str_radix(text, 10) {
+        Ok(number) => number,
+        Err(_) => 0,
+    }
+}
 
 /// What hangs on the pins.
 pub struct Parts {

@@ -5,10 +5,12 @@
 //! is empty only afterwards, and the outbox gives no further frame before (see there).
 
 use crate::board;
+use crate::random::Random;
 use crate::wait::Stopwatch;
 use embedded_can::{Frame, Id, StandardId};
 use firmware::node::Node;
 use firmware::outbox::Outbox;
+use hal_adapters::can::update::Store;
 use hal_adapters::can::{BusFrame, Coded, Message};
 use stm32f4xx_hal::pac::CAN1;
 use stm32f4xx_hal::pac::can1::TX;
@@ -120,15 +122,20 @@ impl Bus {
         };
     }
 
-    /// Passes received commands to the node.
-    pub fn receive(&mut self, node: &mut Node<'_>) {
+    /// Whether everything has left, or was taken back.
+    pub fn is_idle(&self) -> bool {
+        self.outbox.is_empty() && self.pending().next().is_none()
+    }
+
+    /// Passes received commands and words of new parameters to the node.
+    pub fn receive(&mut self, node: &mut Node<'_>, store: &mut dyn Store, random: &mut Random) {
         for _ in 0..COMMANDS_PER_TICK {
-            let store = self.can.rf0r().read();
+            let waiting = self.can.rf0r().read();
             let Some(received) = self.can.rx_iter().next() else {
                 return;
             };
             // The controller is still about to put the next frame where it can be read.
-            if !self.started || store.fmp().bits() == 0 || store.rfom().bit_is_set() {
+            if !self.started || waiting.fmp().bits() == 0 || waiting.rfom().bit_is_set() {
                 return;
             }
             let id = StandardId::new(received.rir().read().stid().bits());
@@ -142,7 +149,7 @@ impl Bus {
                 _ => None,
             };
             if let Some(frame) = frame {
-                node.take(&frame, &mut self.outbox);
+                node.take(&frame, &mut self.outbox, store, random.nonce());
             }
         }
     }
@@ -206,22 +213,23 @@ impl Bus {
     }
 }
 
-/// Lets data frames of the command's identifier into the first store, and no others.
+/// Lets data frames of two identifiers into the first store, and no others: the command's and that
+/// of new parameters.
 fn receive_commands_only(can: &CAN1) {
-    const ALL: u32 = 0x7ff << 21;
-    /// Extended identifier; remote frame.
-    const KINDS: u32 = 0b11 << 1;
-    let id = u32::from(Message::Command.id().as_raw()) << 21;
+    // Extended identifiers and remote frames have bits that are 0 in these words.
+    let [command, data] = [Message::Command, Message::UpdateData]
+        .map(|message| u32::from(message.id().as_raw()) << 21);
     can.fmr().modify(|_, w| w.finit().set_bit());
     can.fa1r().write(|w| w.fact0().clear_bit());
-    can.fm1r().write(|w| w.fbm0().clear_bit());
+    // A list of two identifiers of 32 bits.
+    can.fm1r().write(|w| w.fbm0().set_bit());
     can.fs1r().write(|w| w.fsc0().set_bit());
     can.ffa1r().write(|w| w.ffa0().clear_bit());
     if let Some(bank) = can.fb_iter().next() {
-        // SAFETY: identifier and mask of one filter of 32 bits.
-        bank.fr1().write(|w| unsafe { w.bits(id) });
+        // SAFETY: two identifiers of one filter of 32 bits.
+        bank.fr1().write(|w| unsafe { w.bits(command) });
         // SAFETY: as above.
-        bank.fr2().write(|w| unsafe { w.bits(ALL | KINDS) });
+        bank.fr2().write(|w| unsafe { w.bits(data) });
     }
     can.fa1r().write(|w| w.fact0().set_bit());
     can.fmr().modify(|_, w| w.finit().clear_bit());

@@ -9,7 +9,9 @@
 //! |---|---|
 //! | [`schedule`] | ticks at multiples of 2 ms, and those that were missed |
 //! | [`acquisition`] | a converter that is started, read, and started again after faults |
-//! | [`slots`] | which of the two parameter slots is used, and what is wrong with the other |
+//! | [`slots`] | what is told of the two parameter slots, and what a sound blob gives |
+//! | [`store`] | parameters in flash that are replaced without ever being absent |
+//! | [`records`] | which parameters run, and new ones that come over the bus |
 //! | [`node`] | one tick: decode, report, obey |
 //! | [`light`] | what the LED shows |
 //! | [`outbox`] | frames that wait for a mailbox |
@@ -27,8 +29,10 @@ pub mod fpu;
 pub mod light;
 pub mod node;
 pub mod outbox;
+pub mod records;
 pub mod retained;
 pub mod schedule;
 pub mod slots;
+pub mod store;
 #[allow(unsafe_code)] // a symbol name that a debugger finds; see its text
 pub mod telemetry;

@@ -21,6 +21,7 @@ mod board;
 mod bus;
 mod fault;
 mod flash;
+mod random;
 mod start;
 mod timer;
 mod wait;
@@ -44,22 +45,32 @@ impl DelayNs for Cycles {
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use super::start::{Before, Found, ZeroKeeper};
+    use super::start::{Before, Found, OptionBytes, ZeroKeeper};
     use super::{Cycles, board, board::Converter, bus::Bus, fault, flash, timer::Clock};
-    use super::{wait::Stopwatch, watchdog::Watchdog};
+    use super::{random::Random, wait::Stopwatch, watchdog::Watchdog};
+    use cortex_m::peripheral::SCB;
     use firmware::acquisition::Acquisition;
     use firmware::fpu::{Fpu, FpuSettings};
     use firmware::node::{Facts, Node, Parameters, SampleFault};
-    use firmware::retained::Step;
+    use firmware::records::Records;
+    use firmware::retained::{Retained, Step};
     use firmware::schedule::{Schedule, Tick};
-    use firmware::slots::{self, Loaded};
+    use firmware::slots::{Loaded, Refusal};
+    use firmware::store::Record;
     use firmware::telemetry::{Counters, Ended, STAGE};
     use hal_adapters::adc::FrameSampler;
     use hal_adapters::can::Layout;
+    use hal_adapters::can::update::Identity;
     use runtime::{OnInvalid, Servo};
     use stm32f4xx_hal::gpio::PinState;
     use stm32f4xx_hal::pac::TIM2;
     use stm32f4xx_hal::rcc::Enable;
+
+    const CORE_MHZ: u32 = board::CORE_HZ / 1_000_000;
+    /// After so many ticks, 1 s, parameters are not blamed for a fault.
+    const PROVEN_TICKS: u32 = 500;
+    /// Where no other node acknowledges the answers, a reset waits no longer.
+    const RESET_TICKS_MAX: u32 = 100;
 
     #[shared]
     struct Shared {
@@ -74,16 +85,24 @@ mod app {
         /// The tick whose codes are still settling.
         open: Option<Tick>,
         acquisition: Acquisition<Converter>,
-        node: Node<'static>,
+        node: &'static mut Node<'static>,
         facts: Facts,
         zero: ZeroKeeper,
+        records: Records<flash::Sectors>,
+        random: Random,
+        /// Ticks for which a reset has waited until the answers have left.
+        reset_waits: u32,
         watchdog: Watchdog,
         led: board::Led,
         servo: board::ServoPin,
         overrun_ticks: u32,
     }
 
-    #[init(local = [loaded: Option<Loaded> = None])]
+    #[init(local = [
+        loaded: Option<Loaded> = None,
+        node_place: Option<Node<'static>> = None,
+        record: Record = Record::EMPTY,
+    ])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         fault::guard_stack(&mut cx.core.MPU);
         let device = cx.device;
@@ -97,40 +116,46 @@ mod app {
         let ports = (device.GPIOA, device.GPIOB, device.GPIOC);
         let parts = board::set_up(ports, device.SPI1, device.CAN1, &mut rcc);
         let bus = Bus::new(parts.can, crystal, &mut stopwatch);
+        let random = Random::new(device.RNG, &mut rcc);
 
         watchdog.feed();
         fault::begin(Step::Parameters);
-        let memory = flash::parameter_slots();
-        let choice = slots::choose(memory, board::STAGE_SERIAL);
-        let loaded = choice
-            .slot
-            .and_then(|slot| memory.get(slot))
-            .and_then(|slot| slots::load(slot));
-        let blob = loaded.as_ref().map_or(0, |loaded| loaded.crc);
+        // A sector may be erased, and the core stands meanwhile.
+        watchdog.set_period(CORE_MHZ, true, &mut stopwatch);
+        let options = OptionBytes::read(&device.FLASH);
+        let sectors = flash::Sectors::new(device.FLASH);
+        let (record, is_faulty) = (cx.local.record, before.blames_parameters);
+        let (mut records, found) = Records::start(sectors, record, board::STAGE_SERIAL, is_faulty);
+        let program_hash = flash::program_crc();
+        let loaded = found
+            .blob
+            .and_then(|blob| records.load(blob, cx.local.loaded));
+        watchdog.set_period(CORE_MHZ, false, &mut stopwatch);
+        let blob = loaded.map_or(0, |loaded| loaded.crc);
         // After a warm start the FPU may have any settings; with these the arithmetic is the host's.
         Fpu.restore();
         let sound = runtime::arithmetic::check().is_ok() && Fpu::defaults_are_sound();
         let parameters = if !sound {
             Parameters::SelfTestFailed
         } else if let Some(loaded) = loaded {
-            let loaded: &'static Loaded = cx.local.loaded.insert(loaded);
             Parameters::Usable {
                 servo: Servo::new(&*loaded.decoder, OnInvalid::Zero),
                 serial: &loaded.serial,
-                other_slot: choice.refusal,
+                other_slot: found.refusal,
             }
         } else {
             Parameters::None {
-                refusal: choice.refusal.unwrap_or(slots::Refusal::NEITHER),
+                refusal: found.refusal.unwrap_or(Refusal::NEITHER),
             }
         };
-        let mut node = Node::new(
-            parameters,
-            before.by_fault,
-            Layout::for_bits(Converter::CODE_BITS),
-        )
-        .recording(cfg!(feature = "record"));
-        let zero_lost = before.restore_zero(&mut node, blob);
+        let identity = Identity {
+            serial: board::STAGE_SERIAL,
+            key: board::STAGE_KEY,
+            program_version: board::PROGRAM_VERSION,
+            program_hash,
+        };
+        let node = node(cx.local.node_place, parameters, before.by_fault, identity);
+        let zero_lost = before.restore_zero(node, blob);
         let zero = ZeroKeeper::new(node.decodes().then_some(blob), node.zero());
 
         watchdog.feed();
@@ -140,7 +165,7 @@ mod app {
         let _ = acquisition.start(&mut Cycles);
 
         let board = before.board_facts(
-            &device.FLASH,
+            options,
             &Found {
                 pulled_up: parts.pulled_up,
                 crystal,
@@ -170,12 +195,29 @@ mod app {
                     ..Facts::default()
                 },
                 zero,
+                records,
+                random,
+                reset_waits: 0,
                 watchdog,
                 led: parts.led,
                 servo: parts.servo,
                 overrun_ticks: 0,
             },
         )
+    }
+
+    /// Puts the node where it stays. In a function of its own, what that takes of the stack is not
+    /// there while the parameters are read.
+    #[inline(never)]
+    fn node(
+        place: &'static mut Option<Node<'static>>,
+        parameters: Parameters<'static>,
+        by_fault: bool,
+        identity: Identity<'static>,
+    ) -> &'static mut Node<'static> {
+        let layout = Layout::for_bits(Converter::CODE_BITS);
+        let node = Node::new(parameters, by_fault, layout, identity);
+        place.insert(node.recording(cfg!(feature = "record")))
     }
 
     #[idle]
@@ -190,7 +232,8 @@ mod app {
         binds = TIM2,
         priority = 1,
         local = [
-            clock, schedule, open, acquisition, node, facts, zero, watchdog, led, servo, overrun_ticks
+            clock, schedule, open, acquisition, node, facts, zero, records, random, reset_waits,
+            watchdog, led, servo, overrun_ticks
         ],
         shared = [bus]
     )]
@@ -203,6 +246,9 @@ mod app {
             node,
             facts,
             zero,
+            records,
+            random,
+            reset_waits,
             watchdog,
             led,
             servo,
@@ -233,6 +279,12 @@ mod app {
         let sampled_us = tick.started_us.wrapping_add(Converter::SAMPLE_US);
         let sample = acquisition.sample(tick.sequence, sampled_us, &mut Cycles);
         bus.start_tick();
+        if node.wants_reset() {
+            *reset_waits += 1;
+            if bus.is_idle() || *reset_waits > RESET_TICKS_MAX {
+                SCB::sys_reset();
+            }
+        }
         facts.missed_ticks = schedule.missed();
         facts.bus_off = bus.bus_off();
         facts.note_bus(bus.takes_part());
@@ -240,10 +292,15 @@ mod app {
         let sample = sample.map_err(|fault| SampleFault::from(&fault));
         let reading = node.tick(sample, facts, &mut Fpu, &mut bus.outbox);
         // After the pose, whose frames then find the mailboxes empty.
-        bus.receive(node);
+        bus.receive(node, records, random);
         bus.send();
         led.set_state(PinState::from(node.light()));
         zero.keep(node.zero());
+        if node.ticks() == PROVEN_TICKS {
+            fault::update(Retained::prove);
+        }
+        node.update(&mut bus.outbox, records);
+        bus.send();
 
         let (state, reason) = node.state();
         STAGE.put(&Ended {

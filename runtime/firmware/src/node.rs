@@ -4,12 +4,13 @@
 //!
 //! | state | reason |
 //! |---|---|
-//! | 1 running | 0; or 0x80 + reason of the other slot, if that is damaged |
+//! | 1 running | 0; or 0x80 + reason of parameters that do not run: of a slot, if that is damaged; 12: those that are passed over, as they made the program fault twice; 13: the flash cannot be written |
 //! | 2 no parameters | 2: both slots are erased |
-//! | 3 bad parameters | slot * 16 + kind: 1 cut short, 3 no blob at all, 4 newer layout, 5 bad header, 7 wrong check (torn), 8 bad payload, 9 unusable values, 10 another stage's |
+//! | 3 bad parameters | slot * 16 + kind: 1 cut short, 3 no blob at all, 4 newer layout, 5 bad header, 7 wrong check (torn), 8 bad payload, 9 unusable values, 10 another stage's; 12 made the program fault twice: tried again after power-on |
 //! | 4 no frames | 3 silent converter (line at 0 or 1), 7 no new codes |
 //! | 5 sensor fault | 1 SPI, 2 pin, 4 wrong part, 5 wrong setting or unexpected reset, 6 wrong check, 8 wrong input, 10 SYNC does not arrive; 0x10 + channel: code at a rail, 0x20 + channel: code that never changes (0 to 2 Hall A to C, 3 to 5 gaps 1 to 3) |
 //! | 6 self-test failed | 1: arithmetic is not that of the host, or the core would not restore the FPU's settings |
+//! | 7 updating | 0: new parameters are coming or being stored, and every pose is invalid |
 
 use crate::fpu::FpuSettings;
 use crate::outbox::Outbox;
@@ -17,9 +18,11 @@ use crate::slots::Refusal;
 use embedded_can::Frame;
 use hal_adapters::adc::AdcError;
 use hal_adapters::can::command::Told;
+use hal_adapters::can::service::Updates;
 pub use hal_adapters::can::status::BoardFacts;
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus, board_check, flag};
 use hal_adapters::can::table::{Message, SLOW_TICKS};
+use hal_adapters::can::update::{Identity, Nonce, Receiver, Store};
 use hal_adapters::can::{Layout, PROTOCOL_VERSION, PoseSender, Service, sensor};
 use runtime::servo::Health;
 use runtime::{PlanarPose, RawFrame, Reading, Servo, Status};
@@ -108,7 +111,7 @@ pub enum Parameters<'d> {
         servo: Servo<'d>,
         /// Serial number of the stage.
         serial: &'d str,
-        /// What is wrong with the slot that is not used.
+        /// What is wrong with parameters that are not used.
         other_slot: Option<Refusal>,
     },
     /// There are none, or none that are sound.
@@ -129,6 +132,7 @@ pub struct Node<'d> {
     layout: Layout,
     sender: PoseSender,
     service: Service,
+    receiver: Receiver<'d>,
     ticks: u32,
     state: (NodeState, u8),
     fpu_restored: u32,
@@ -139,13 +143,19 @@ pub struct Node<'d> {
 
 impl<'d> Node<'d> {
     /// A node before its first tick; `layout` holds the codes of its converter.
-    pub fn new(parameters: Parameters<'d>, watchdog_reset: bool, layout: Layout) -> Self {
+    pub fn new(
+        parameters: Parameters<'d>,
+        watchdog_reset: bool,
+        layout: Layout,
+        identity: Identity<'d>,
+    ) -> Self {
         Self {
             parameters,
             watchdog_reset,
             layout,
             sender: PoseSender::default(),
             service: Service::new(TICKS_PER_SECOND),
+            receiver: Receiver::new(identity, TICKS_PER_SECOND),
             ticks: 0,
             state: (NodeState::Starting, 0),
             fpu_restored: 0,
@@ -251,14 +261,38 @@ impl<'d> Node<'d> {
         reading
     }
 
-    /// Takes a frame that came over the bus, and answers if it is a command.
-    pub fn take<F: Frame>(&mut self, frame: &F, outbox: &mut Outbox) {
+    /// Takes a frame that came over the bus, and answers if it is a command. `nonce` is a fresh
+    /// random number, if there is a source of any.
+    pub fn take<F: Frame>(
+        &mut self,
+        frame: &F,
+        outbox: &mut Outbox,
+        store: &mut dyn Store,
+        nonce: Option<Nonce>,
+    ) {
         let servo = servo_of(&mut self.parameters);
-        if let Some(Ok(answered)) = self.service.take(frame, servo)
+        let updates = Updates {
+            receiver: &mut self.receiver,
+            store,
+            nonce,
+        };
+        if let Some(Ok(answered)) = self.service.take_updating(frame, servo, Some(updates))
             && let Some(answer) = answered.answer
         {
             outbox.push(answer);
         }
+    }
+
+    /// A step of an update, if one runs: at the end of a tick, as it may take 0.2 ms and more.
+    pub fn update(&mut self, outbox: &mut Outbox, store: &mut dyn Store) {
+        let answer = self.receiver.tick(self.service.servo_is_off(), store);
+        let told = answer.and_then(|answer| self.service.tell(&Told::Answer(answer)));
+        told.into_iter().for_each(|frame| outbox.push(frame));
+    }
+
+    /// Whether the controller is to be reset, once its answers have left.
+    pub const fn wants_reset(&self) -> bool {
+        self.receiver.wants_reset()
     }
 
     fn send_pose(&mut self, reading: &Reading, sampled: Option<&RawFrame>, outbox: &mut Outbox) {
@@ -297,7 +331,11 @@ impl<'d> Node<'d> {
             self.fpu_restored = self.fpu_restored.saturating_add(1);
         }
         // Whatever was computed under other settings is not what the host would compute.
-        if changed_meanwhile { NOTHING } else { reading }
+        if changed_meanwhile || self.receiver.is_updating() {
+            NOTHING
+        } else {
+            reading
+        }
     }
 
     fn state_of(
@@ -307,6 +345,7 @@ impl<'d> Node<'d> {
     ) -> (NodeState, u8) {
         let other_slot = match &self.parameters {
             Parameters::SelfTestFailed => return (NodeState::SelfTestFailed, REASON_FPU),
+            _ if self.receiver.is_updating() => return (NodeState::Updating, 0),
             Parameters::None { refusal } if refusal.erased => {
                 return (NodeState::NoParameters, refusal.reason);
             }

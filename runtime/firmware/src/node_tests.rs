@@ -3,6 +3,7 @@ extern crate std;
 use super::*;
 use crate::slots::{Loaded, load};
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request};
+use hal_adapters::can::update::MemoryStore;
 use hal_adapters::can::{BusFrame, SensorReceiver, Timing};
 use runtime::OnInvalid;
 use std::boxed::Box;
@@ -34,7 +35,18 @@ fn node() -> Node<'static> {
         serial: &loaded.serial,
         other_slot: None,
     };
-    Node::new(parameters, false, Layout::Bits24)
+    Node::new(parameters, false, Layout::Bits24, IDENTITY)
+}
+
+const IDENTITY: Identity<'_> = Identity {
+    serial: None,
+    key: None,
+    program_version: 1,
+    program_hash: 2,
+};
+
+fn take(node: &mut Node<'_>, frame: &impl Frame, outbox: &mut Outbox) {
+    node.take(frame, outbox, &mut MemoryStore::default(), None);
 }
 
 fn frame(sequence: u32) -> RawFrame {
@@ -70,7 +82,11 @@ fn told(frames: &[hal_adapters::can::Coded]) -> Vec<Told> {
 fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Told> {
     let coded = Mailbox::default().send(&Told::Command(Command::new(request, token)));
     let mut outbox = Outbox::new();
-    node.take(&BusFrame::from(coded.expect("a command")), &mut outbox);
+    take(
+        node,
+        &BusFrame::from(coded.expect("a command")),
+        &mut outbox,
+    );
     told(&core::iter::from_fn(|| outbox.pop()).collect::<Vec<_>>())
 }
 
@@ -149,7 +165,7 @@ fn without_parameters_there_are_states_but_no_poses() {
         reason: 7,
         erased: false,
     };
-    let mut node = Node::new(Parameters::None { refusal }, true, Layout::Bits16);
+    let mut node = Node::new(Parameters::None { refusal }, true, Layout::Bits16, IDENTITY);
     for k in 0..32 {
         let frames = tick(&mut node, Ok(frame(k)));
         assert!(
@@ -246,7 +262,7 @@ fn a_record_holds_the_codes_of_every_tick_and_shows_those_without_as_gaps() {
             node()
         } else {
             let refusal = Refusal::NEITHER;
-            Node::new(Parameters::None { refusal }, false, layout)
+            Node::new(Parameters::None { refusal }, false, layout, IDENTITY)
         };
         let width = if parameters { 1_000 } else { 1 };
         let codes = |sequence: u32| RawFrame {
@@ -300,8 +316,8 @@ fn a_remote_frame_or_a_foreign_one_is_no_command() {
     let mut node = node();
     let mut outbox = Outbox::new();
     let remote = BusFrame::new_remote(Message::Command.id(), 8).expect("eight bytes");
-    node.take(&remote, &mut outbox);
+    take(&mut node, &remote, &mut outbox);
     let foreign = BusFrame::new(embedded_can::StandardId::MAX, &[0; 8]).expect("eight bytes");
-    node.take(&foreign, &mut outbox);
+    take(&mut node, &foreign, &mut outbox);
     assert_eq!(outbox.front(true), None);
 }

@@ -70,6 +70,11 @@ impl Outbox {
         }
     }
 
+    /// Whether nothing waits.
+    pub fn is_empty(&self) -> bool {
+        self.front(true).is_none()
+    }
+
     /// Removes the frame that [`Self::front`] gave.
     pub fn pop(&mut self) -> Option<Coded> {
         let fresh = self.fresh.pop_front().map(|(frame, _)| frame);

@@ -12,8 +12,12 @@ pub const WORDS: usize = 10;
 
 /// Marks a record of this layout.
 const MAGIC: u32 = 0x5354_4731;
-/// Bit of the first word besides the step.
+/// Bits of the first word besides the step.
 const CRASHED_BIT: u32 = 8;
+const PROVEN_BIT: u32 = 9;
+const EARLY_SHIFT: u32 = 16;
+/// After so many early faults in a row the parameters are blamed.
+const EARLY_MAX: u8 = 2;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
 /// What the program was doing.
@@ -110,6 +114,11 @@ pub struct Retained {
     pub faults: u32,
     /// Whether the last fault is the cause of this start.
     pub crashed: bool,
+    /// Faults in a row that came while the parameters were read, or in the first ticks with them.
+    /// Saturates.
+    pub early_faults: u8,
+    /// Whether the ticks since this start are enough to say that the parameters are not at fault.
+    pub proven: bool,
     /// The zero deviation; that of an unmoved stage is zero.
     pub zero: KeptZero,
 }
@@ -133,13 +142,42 @@ impl Retained {
         self.fault = Fault::new(kind, self.step, address, detail);
         self.faults = self.faults.saturating_add(1);
         self.crashed = true;
+        let by_core = matches!(
+            kind,
+            FaultKind::Panic | FaultKind::HardFault | FaultKind::StackOverflow
+        );
+        let early = match self.step {
+            Step::Parameters => by_core || matches!(kind, FaultKind::Watchdog),
+            Step::Ticking => by_core && !self.proven,
+            _ => false,
+        };
+        if early {
+            self.early_faults = self.early_faults.saturating_add(1);
+        }
+    }
+
+    /// Whether the parameters made the program fault twice in a row at its start. Asked once in
+    /// a start: the next parameters begin anew.
+    pub fn blames_parameters(&mut self) -> bool {
+        self.proven = false;
+        self.early_faults >= EARLY_MAX
+    }
+
+    /// The program has run long enough with its parameters.
+    pub const fn prove(&mut self) {
+        self.proven = true;
+        self.early_faults = 0;
     }
 
     /// The words, the check last.
     pub fn to_words(&self) -> [u32; WORDS] {
         let zero = self.zero.zero;
         let content = [
-            MAGIC ^ (self.step as u32 | (self.crashed as u32) << CRASHED_BIT),
+            MAGIC
+                ^ (self.step as u32
+                    | (self.crashed as u32) << CRASHED_BIT
+                    | (self.proven as u32) << PROVEN_BIT
+                    | (self.early_faults as u32) << EARLY_SHIFT),
             self.fault.kind_and_step,
             self.fault.address,
             self.fault.detail,
@@ -168,7 +206,7 @@ impl Retained {
             rz,
         ] = *content;
         let state = state ^ MAGIC;
-        let step = *Step::ALL.get((state & !(1 << CRASHED_BIT)) as usize)?;
+        let step = *Step::ALL.get(usize::from(state as u8))?;
         (check(content) == *stored).then_some(Self {
             step,
             fault: Fault {
@@ -178,6 +216,8 @@ impl Retained {
             },
             faults,
             crashed: state >> CRASHED_BIT & 1 == 1,
+            proven: state >> PROVEN_BIT & 1 == 1,
+            early_faults: (state >> EARLY_SHIFT) as u8,
             zero: KeptZero {
                 blob,
                 zero: PlanarPose {
@@ -206,6 +246,8 @@ mod tests {
         let mut record = Retained {
             step: Step::Converter,
             faults: 3,
+            early_faults: 1,
+            proven: true,
             zero: KeptZero {
                 blob: 0x1234_5678,
                 zero: PlanarPose {
@@ -241,6 +283,28 @@ mod tests {
         assert_eq!(record.fault.kind_and_step, 0x0502);
         assert_eq!((record.fault.address, record.faults), (0x0800_c124, 4));
         assert!(record.crashed);
+    }
+
+    #[test]
+    fn parameters_are_blamed_for_two_faults_in_a_row_at_their_start() {
+        let mut record = Retained::default();
+        let mut fault = |kind, step, proves| {
+            record.step = step;
+            if proves {
+                record.prove();
+            }
+            record.note(kind, 0, 0);
+            record.blames_parameters()
+        };
+        assert!(!fault(FaultKind::HardFault, Step::Ticking, true));
+        assert!(!fault(FaultKind::Watchdog, Step::Clocks, false));
+        assert!(!fault(FaultKind::Panic, Step::Ticking, false));
+        assert!(!fault(FaultKind::Watchdog, Step::Ticking, false));
+        assert!(!fault(FaultKind::HardFault, Step::Converter, false));
+        assert!(!fault(FaultKind::HardFault, Step::Ticking, true));
+        assert!(!fault(FaultKind::Watchdog, Step::Parameters, false));
+        assert!(fault(FaultKind::StackOverflow, Step::Ticking, false));
+        assert!(!fault(FaultKind::Panic, Step::Ticking, true));
     }
 
     #[test]

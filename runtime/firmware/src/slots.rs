@@ -1,19 +1,17 @@
-//! The two parameter slots in flash, and which of them is used.
-//!
-//! Each slot holds a blob of [`runtime::blob`] or nothing. Of two sound ones the later by its
-//! text `created` is used (dates as `2026-11-21` or `2026-11-21T10:00:00Z` sort by time), on
-//! a tie slot 0. So a new calibration may be flashed into the slot that is not in use, and a
-//! slot that is torn by a power failure leaves the other one to run on.
+//! What is told of the two parameter slots, and what a sound blob gives. Which blob is used is
+//! decided by [`crate::store`].
 
+use crate::store::is_journal;
 use runtime::blob::{BlobError, HEADER_BYTES};
-use runtime::parameters::Text;
+use runtime::parameters::{FitRecord, Text};
 use runtime::{AnyDecoder, ParameterSet};
 
 /// Slots there are.
 pub const SLOTS: usize = 2;
 
 /// A slot that is not used, in one byte for the status frame: the number of the slot in
-/// bits 4 to 6 and the kind of its fault, 1 to 11 in the order of [`BlobError`], below.
+/// bits 4 to 6 and the kind of its fault, 1 to 11 in the order of [`BlobError`], below; or one of
+/// the kinds of [`Refusal::PASSED_OVER`] and [`Refusal::NOT_WRITTEN`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Refusal {
     /// The byte.
@@ -29,35 +27,24 @@ impl Refusal {
         erased: true,
     };
 
-    fn of(slot: u8, error: &BlobError) -> Self {
-        let kind = match error {
-            BlobError::Truncated { .. } => 1,
-            BlobError::Erased => 2,
-            BlobError::BadMagic { .. } => 3,
-            BlobError::UnknownVersion { .. } => 4,
-            BlobError::BadHeader { .. } => 5,
-            BlobError::TrailingBytes { .. } => 6,
-            BlobError::BadCrc { .. } => 7,
-            BlobError::BadPayload => 8,
-            BlobError::Parameters(_) => 9,
-            BlobError::OtherStage => 10,
-            BlobError::BufferTooSmall { .. } => 11,
-        };
+    /// The newest blob made the program fault twice in a row: the one before it runs, or none.
+    pub const PASSED_OVER: Self = Self {
+        reason: 12,
+        erased: false,
+    };
+
+    /// The flash could not be written or erased: until the next start no parameters are stored.
+    pub const NOT_WRITTEN: Self = Self {
+        reason: 13,
+        erased: false,
+    };
+
+    pub(crate) fn of(slot: u8, error: &BlobError) -> Self {
         Self {
-            reason: slot << 4 | kind,
+            reason: slot << 4 | error.number(),
             erased: matches!(error, BlobError::Erased),
         }
     }
-}
-
-/// Which slot to use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Choice {
-    /// Its number, if any is sound.
-    pub slot: Option<usize>,
-    /// The worst that is wrong with a slot: of damaged and empty ones a damaged one, slot 0
-    /// first. `None` if both are sound.
-    pub refusal: Option<Refusal>,
 }
 
 /// What a sound slot gives.
@@ -67,48 +54,46 @@ pub struct Loaded {
     pub decoder: AnyDecoder,
     /// Serial number of the stage.
     pub serial: Text,
+    /// When it was made.
+    pub created: Text,
+    /// The errors of its fit.
+    pub fit: FitRecord,
     /// CRC of the blob.
     pub crc: u32,
 }
 
-/// Looks at both slots. With a `serial`, blobs of other stages are refused.
-pub fn choose(slots: [&[u8]; SLOTS], serial: Option<&str>) -> Choice {
-    let [first, second] = slots.map(|memory| created(memory, serial));
-    let refusals = [
-        first.as_ref().err().map(|e| Refusal::of(0, e)),
-        second.as_ref().err().map(|e| Refusal::of(1, e)),
-    ];
-    let refusal = match refusals {
-        [Some(a), Some(b)] if a.erased && !b.erased => Some(b),
-        [a, b] => a.or(b),
-    };
-    let slot = match (first, second) {
-        (Ok(a), Ok(b)) if b.as_str() > a.as_str() => Some(1),
-        (Ok(_), _) => Some(0),
-        (Err(_), Ok(_)) => Some(1),
-        (Err(_), Err(_)) => None,
-    };
-    Choice { slot, refusal }
+/// The worst that is wrong with the plain contents of the slots, slot 0 first: `None` for an erased
+/// slot, a sound blob, and a journal. With a `serial`, blobs of other stages are refused.
+pub fn refusal(slots: [&[u8]; SLOTS], serial: Option<&str>) -> Option<Refusal> {
+    let [first, second] = slots.map(|memory| error(memory, serial));
+    let first = first.map(|error| Refusal::of(0, &error));
+    first.or_else(|| second.map(|error| Refusal::of(1, &error)))
 }
 
-/// When the blob of a slot was made. A parameter set has 700 bytes and is read at start only:
-/// in functions of their own, these leave the stack at once.
+/// A parameter set has 700 bytes and is read at start only: in functions of their own, these leave
+/// the stack at once.
 #[inline(never)]
-fn created(memory: &[u8], serial: Option<&str>) -> Result<Text, BlobError> {
-    let set = ParameterSet::from_flash(memory)?;
-    if let Some(serial) = serial {
-        set.expect_serial(serial)?;
+fn error(memory: &[u8], serial: Option<&str>) -> Option<BlobError> {
+    if is_journal(memory) {
+        return None;
     }
-    Ok(set.created)
+    match &ParameterSet::from_flash(memory) {
+        Err(BlobError::Erased) => None,
+        Err(error) => Some(*error),
+        Ok(set) => set.expect_serial(serial?).err(),
+    }
 }
 
-/// Reads a slot that [`choose`] found sound.
+/// Reads a sound blob, with what follows it or without.
 #[inline(never)]
 pub fn load(memory: &[u8]) -> Option<Loaded> {
-    let set = ParameterSet::from_flash(memory).ok()?;
+    let read = ParameterSet::from_flash(memory);
+    let set = read.as_ref().ok()?;
     Some(Loaded {
         decoder: set.decoder(),
-        serial: set.serial,
+        serial: set.serial.clone(),
+        created: set.created.clone(),
+        fit: set.fit,
         crc: stored_crc(memory)?,
     })
 }

@@ -51,54 +51,26 @@ pub(crate) fn slot(serial: &str, created: &str) -> Vec<u8> {
 }
 
 #[test]
-fn the_later_of_two_sound_slots_is_used_and_slot_0_on_a_tie() {
-    let (old, new) = (slot("7", "2026-01-31"), slot("7", "2026-11-21"));
-    let chosen = |slots| choose(slots, Some("7"));
-    assert_eq!(
-        chosen([&old, &new]),
-        Choice {
-            slot: Some(1),
-            refusal: None
-        }
-    );
-    assert_eq!(
-        chosen([&new, &old]),
-        Choice {
-            slot: Some(0),
-            refusal: None
-        }
-    );
-    assert_eq!(chosen([&new, &new]).slot, Some(0));
-}
-
-#[test]
-fn a_damaged_slot_leaves_the_other_and_is_told() {
+fn a_damaged_slot_is_told_and_an_erased_one_is_not() {
     let (good, erased) = (slot("7", ""), vec![0xff; 1024]);
     let mut torn = good.clone();
     torn[200..].fill(0xff);
-    let told = |slots| {
-        let choice = choose(slots, None);
-        (
-            choice.slot,
-            choice
-                .refusal
-                .map(|refusal| (refusal.reason, refusal.erased)),
-        )
-    };
-    assert_eq!(told([&torn, &good]), (Some(1), Some((0x07, false))));
-    assert_eq!(told([&good, &torn]), (Some(0), Some((0x17, false))));
-    assert_eq!(told([&good, &erased]), (Some(0), Some((0x12, true))));
-    assert_eq!(told([&erased, &torn]), (None, Some((0x17, false))));
-    assert_eq!(told([&erased, &erased]), (None, Some((0x02, true))));
+    let mut journal = erased.clone();
+    journal[..4].copy_from_slice(b"HJNL");
+    let told = |slots| refusal(slots, None).map(|refusal| (refusal.reason, refusal.erased));
+    assert_eq!(told([&torn, &good]), Some((0x07, false)));
+    assert_eq!(told([&good, &torn]), Some((0x17, false)));
+    assert_eq!(told([&erased, &torn]), Some((0x17, false)));
+    assert_eq!(told([&good, &erased]), None);
+    assert_eq!(told([&journal, &erased]), None);
 }
 
 #[test]
 fn a_blob_of_another_stage_is_refused_only_if_the_stage_is_known() {
-    let slots: [&[u8]; 2] = [&slot("8", ""), &[]];
-    assert_eq!(choose(slots, None).slot, Some(0));
-    let refused = choose(slots, Some("7"));
-    assert_eq!(refused.slot, None);
-    assert_eq!(refused.refusal.map(|refusal| refusal.reason), Some(0x0a));
+    let slots: [&[u8]; 2] = [&slot("8", ""), &[0xff; 16]];
+    assert_eq!(refusal(slots, None), None);
+    let told = refusal(slots, Some("7")).map(|refusal| refusal.reason);
+    assert_eq!(told, Some(0x0a));
     let loaded = load(slots[0]).expect("a sound slot");
     assert_eq!(loaded.serial.as_str(), "8");
 }

@@ -30,12 +30,33 @@ pub struct Found {
     pub zero_lost: bool,
 }
 
+/// FLASH_OPTCR as it was read.
+#[derive(Clone, Copy)]
+pub struct OptionBytes {
+    word: u32,
+    brown_out_low: bool,
+}
+
+impl OptionBytes {
+    /// Reads it.
+    pub fn read(flash: &FLASH) -> Self {
+        let options = flash.optcr().read();
+        Self {
+            word: options.bits(),
+            // 0 is the highest level, 2.7 V.
+            brown_out_low: options.bor_lev().bits() != 0,
+        }
+    }
+}
+
 /// What was before this start.
 pub struct Before {
     /// Whether the watchdog caused this start.
     pub watchdog: bool,
     /// Whether the watchdog or the program itself did, on a fault.
     pub by_fault: bool,
+    /// Whether the parameters made the program fault twice in a row.
+    pub blames_parameters: bool,
     /// The record that survived; after power-on an empty one.
     record: Retained,
 }
@@ -56,10 +77,12 @@ impl Before {
             record.note(FaultKind::Watchdog, 0, 0);
         }
         let by_fault = core::mem::take(&mut record.crashed);
+        let blames_parameters = record.blames_parameters();
         fault::retain(&record);
         Self {
             watchdog,
             by_fault,
+            blames_parameters,
             record,
         }
     }
@@ -87,19 +110,17 @@ impl Before {
     }
 
     /// What the health frames tell of the board and of the last fault.
-    pub fn board_facts(&self, flash: &FLASH, found: &Found) -> BoardFacts {
-        let options = flash.optcr().read();
+    pub fn board_facts(&self, options: OptionBytes, found: &Found) -> BoardFacts {
         let on = |bit, is| if is { bit } else { 0 };
         BoardFacts {
             last_fault: self.record.fault.kind_and_step,
             fault_address: self.record.fault.address,
             fault_detail: self.record.fault.detail,
             faults: self.record.faults,
-            option_bytes: options.bits(),
+            option_bytes: options.word,
             board_checks: on(check::NO_PULL_UP_ON_SELECT, !found.pulled_up.select)
                 | on(check::NO_PULL_UP_ON_CONTROL, !found.pulled_up.control)
-                // 0 is the highest level, 2.7 V.
-                | on(check::BROWN_OUT_LOW, options.bor_lev().bits() != 0)
+                | on(check::BROWN_OUT_LOW, options.brown_out_low)
                 | on(check::INTERNAL_OSCILLATOR, !found.crystal)
                 | on(check::CAN_NOT_STARTED, !found.can_started)
                 | on(check::ZERO_LOST, found.zero_lost),

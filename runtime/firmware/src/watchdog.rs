@@ -10,6 +10,9 @@ use stm32f4xx_hal::pac::{DBGMCU, IWDG};
 /// clock of its oscillator, 32 kHz; 13.6 to 37.6 ms by its range, 17 to 47 kHz.
 pub const PERIOD_MS: u16 = 20;
 
+/// While a sector may be erased, which takes 500 ms at most: 2 s by the nominal clock, 1.36 s at
+/// least.
+const LONG_COUNTS: u16 = 1000;
 /// Counts a ms at a divider of 8: 32 kHz / 8 / 1000.
 const COUNTS_PER_MS: u16 = 4;
 /// Five periods of the slowest oscillator take 0.3 ms; its start-up takes 0.04 ms.
@@ -26,19 +29,32 @@ impl Watchdog {
         debug.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
         // From now on 512 ms, the period after a reset.
         registers.kr().write(|w| w.key().start());
+        let mut watchdog = Self { registers };
+        watchdog.set_period(INTERNAL_MHZ, false, stopwatch);
+        watchdog
+    }
+
+    /// Sets its period: [`PERIOD_MS`], or long enough for an erase of flash.
+    pub fn set_period(&mut self, core_mhz: u32, is_long: bool, stopwatch: &mut Stopwatch) {
+        let registers = &self.registers;
         registers.kr().write(|w| w.key().unlock());
-        registers.pr().write(|w| w.pr().divide_by8());
-        registers
-            .rlr()
-            .write(|w| w.rl().set(PERIOD_MS * COUNTS_PER_MS - 1));
+        if is_long {
+            registers.pr().write(|w| w.pr().divide_by64());
+        } else {
+            registers.pr().write(|w| w.pr().divide_by8());
+        }
+        let counts = if is_long {
+            LONG_COUNTS
+        } else {
+            PERIOD_MS * COUNTS_PER_MS - 1
+        };
+        registers.rlr().write(|w| w.rl().set(counts));
         // If the oscillator does not take them over, there is no watchdog, and nothing more to do.
-        stopwatch.until(INTERNAL_MHZ, UPDATE_US, || {
+        stopwatch.until(core_mhz, UPDATE_US, || {
             let busy = registers.sr().read();
             busy.pvu().bit_is_clear() && busy.rvu().bit_is_clear()
         });
-        let mut watchdog = Self { registers };
-        watchdog.feed();
-        watchdog
+        self.feed();
     }
 
     /// Starts its period anew.

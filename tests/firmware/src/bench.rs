@@ -42,6 +42,9 @@ pub struct Bench {
 
 type Failure = Box<dyn std::error::Error>;
 
+/// The start of an erased sector that is ready for records.
+const JOURNAL: &[u8] = b"HJNLSEAL";
+
 impl Bench {
     /// Reads what lies in `folder`.
     pub fn read(folder: &Path, library: OsString) -> Result<Self, Failure> {
@@ -74,13 +77,19 @@ impl Bench {
         self.machine_playing(part, slots, self.rows.clone())
     }
 
-    /// A controller whose converter plays these rows.
+    /// A controller whose converter plays these rows. An empty slot beside a full one is an empty
+    /// journal, as the first start with it leaves it.
     pub fn machine_playing(
         &self,
         part: Part,
         slots: [&[u8]; 2],
         rows: Vec<Row>,
     ) -> Result<Machine, Failure> {
+        let slots = match slots {
+            [first, []] if !first.is_empty() => [first, JOURNAL],
+            [[], second] if !second.is_empty() => [JOURNAL, second],
+            both => both,
+        };
         Machine::new(&self.library, self.image(part), part, rows, slots)
     }
 }
@@ -190,7 +199,8 @@ impl Seen {
         seen
     }
 
-    fn take(&mut self, sent: &Sent, first_ns: u64) {
+    /// Takes one frame.
+    pub fn take(&mut self, sent: &Sent, first_ns: u64) {
         let since_ns = sent.asked_ns.saturating_sub(first_ns);
         let tick = since_ns / 2_000_000;
         let id = StandardId::new(sent.id).map(Id::Standard);

@@ -2,6 +2,7 @@
 //! addresses of the program.
 
 use crate::peripherals::Peripherals;
+use crate::random_model;
 use crate::unicorn::{Handle, Register, register};
 use std::ffi::{c_uint, c_void};
 
@@ -56,12 +57,54 @@ fn stop_if_it_stops(handle: Handle, chip: &Peripherals) {
 }
 
 /// Writes a register of a peripheral.
-pub extern "C" fn write(_: Handle, offset: u64, bytes: c_uint, value: u64, user: *mut c_void) {
+pub extern "C" fn write(handle: Handle, offset: u64, bytes: c_uint, value: u64, user: *mut c_void) {
     // SAFETY: as in `read`.
     let chip = unsafe { &mut *user.cast::<Peripherals>() };
     let value = value as u32 & (u32::MAX >> (32 - 8 * bytes.min(4)));
     // The converter's and the watchdog's data registers are written in parts of words.
     chip.write(offset as usize & !3, value << (8 * (offset & 3)));
+    stop_if_it_stops(handle, chip);
+}
+
+/// A register of the generator of random numbers.
+pub extern "C" fn read_random(_: Handle, offset: u64, _: c_uint, user: *mut c_void) -> u64 {
+    // SAFETY: as in `read`.
+    let chip = unsafe { &mut *user.cast::<Peripherals>() };
+    chip.read_random((offset as usize).wrapping_sub(random_model::FIRST))
+        .into()
+}
+
+/// Writes one of them.
+pub extern "C" fn write_random(_: Handle, offset: u64, _: c_uint, value: u64, user: *mut c_void) {
+    // SAFETY: as in `read`.
+    let chip = unsafe { &mut *user.cast::<Peripherals>() };
+    chip.write_random(
+        (offset as usize).wrapping_sub(random_model::FIRST),
+        value as u32,
+    );
+}
+
+/// The parameter sectors.
+pub extern "C" fn read_flash(_: Handle, offset: u64, bytes: c_uint, user: *mut c_void) -> u64 {
+    // SAFETY: as in `read`.
+    let chip = unsafe { &*user.cast::<Peripherals>() };
+    chip.flash.read(offset as usize, bytes as usize)
+}
+
+/// A write to the parameter sectors.
+pub extern "C" fn write_flash(
+    handle: Handle,
+    offset: u64,
+    bytes: c_uint,
+    value: u64,
+    user: *mut c_void,
+) {
+    // SAFETY: as in `read`.
+    let chip = unsafe { &mut *user.cast::<Peripherals>() };
+    let now_ns = chip.now_ns;
+    chip.flash
+        .write(offset as usize, bytes as usize, value as u32, now_ns);
+    stop_if_it_stops(handle, chip);
 }
 
 /// A bit of a register, by its own word.

@@ -183,7 +183,7 @@ impl CanModel {
     /// A frame from another node, with any data length code: 9 to 15 mean eight bytes too.
     pub fn receive_coded(&mut self, id: u16, length_code: u8, bytes: [u8; 8]) {
         let [a, b, c, d, e, f, g, h] = bytes;
-        if self.received.len() < 3 {
+        if self.received.len() < 3 && self.passes(u32::from(id) << 21) {
             let (low, high) = (
                 u32::from_le_bytes([a, b, c, d]),
                 u32::from_le_bytes([e, f, g, h]),
@@ -191,6 +191,20 @@ impl CanModel {
             self.received
                 .push_back([u32::from(id) << 21, length_code.into(), low, high]);
         }
+    }
+
+    /// Whether the first filter lets a data frame into the first store: its identifier in a filter
+    /// of 32 bits, as one of a list of two or by a mask.
+    fn passes(&self, identifier: u32) -> bool {
+        let [control, list, wide, store, active] =
+            [0x200, 0x204, 0x20c, 0x214, 0x21c].map(|at| self.plain[at / 4] & 1 == 1);
+        let [first, second] = [0x240, 0x244].map(|at| self.plain[at / 4]);
+        let matches = if list {
+            identifier == first || identifier == second
+        } else {
+            (identifier ^ first) & second == 0
+        };
+        !control && wide && !store && active && matches
     }
 
     fn takes_part(&self, now_ns: u64) -> bool {

@@ -3,10 +3,13 @@
 use crate::adc_model::{Part, Row};
 use crate::callbacks::{
     BELOW_RAM, FpscrHook, JumpHook, count, jump, read, read_below_ram, read_bit, read_core,
-    set_fpscr, write, write_below_ram, write_bit, write_core,
+    read_flash, read_random, set_fpscr, write, write_below_ram, write_bit, write_core, write_flash,
+    write_random,
 };
+use crate::flash_model::{BYTES, FIRST};
 use crate::image::{FLASH, FLASH_BYTES, Image, RAM, RAM_BYTES};
 use crate::peripherals::{BIT_BAND, CORE, IRQ_TIM2, Peripherals, RANGE, cause};
+use crate::random_model;
 use crate::unicorn::{Unicorn, register};
 use std::ffi::{OsStr, c_void};
 
@@ -92,6 +95,8 @@ pub struct Machine {
     started: bool,
     /// Resets that the program asked for, after a panic, another fault or a lost crystal.
     pub panics: u32,
+    /// Times the power was lost in an operation of the flash.
+    pub power_cuts: u32,
     /// Time by which the next tick's interrupt is held back, ns.
     pub hold_ns: u64,
     /// Resets by the watchdog.
@@ -112,27 +117,33 @@ impl Machine {
         let core = Unicorn::open(library)?;
         let mut flash = memory::<FLASH_BYTES>(0xff);
         flash.0.copy_from_slice(&image.flash);
-        for (slot, name) in slots
-            .into_iter()
-            .zip(["_parameter_slot_0", "_parameter_slot_1"])
-        {
-            let at = (image.address(name)? - FLASH) as usize;
-            flash.0[at..at + slot.len()].copy_from_slice(slot);
-        }
         let mut ram = memory::<RAM_BYTES>(PAINT);
         fill_with_noise(&mut ram.0[image.stack_bytes..]);
         let mut returns = memory::<4096>(0);
         let mut chip = Box::new(Peripherals::new(part, rows));
+        for (slot, name) in slots
+            .into_iter()
+            .zip(["_parameter_slot_0", "_parameter_slot_1"])
+        {
+            let at = (image.address(name)? - FIRST) as usize;
+            chip.flash.bytes[at..at + slot.len()].copy_from_slice(slot);
+        }
+        let (before, behind) = ((FIRST - FLASH) as usize, (FIRST - FLASH) as usize + BYTES);
         let user: *mut c_void = (&raw mut *chip).cast();
         // SAFETY: flash, RAM and chip are boxes that the machine keeps as long as the core,
         // and that are touched only between two runs of it.
         unsafe {
-            core.map_memory(FLASH.into(), flash.0.as_mut_ptr(), FLASH_BYTES)?;
+            let memory = flash.0.as_mut_ptr();
+            core.map_memory(FLASH.into(), memory, before)?;
+            let (from, rest) = (u64::from(FLASH) + behind as u64, FLASH_BYTES - behind);
+            core.map_memory(from, memory.add(behind), rest)?;
+            core.map_io((FIRST.into(), BYTES as u64), read_flash, write_flash, user)?;
             core.map_memory(RAM.into(), ram.0.as_mut_ptr(), RAM_BYTES)?;
             core.map_memory(RETURN.into(), returns.0.as_mut_ptr(), 4096)?;
             core.map_io(RANGE, read, write, user)?;
             core.map_io(BIT_BAND, read_bit, write_bit, user)?;
             core.map_io(CORE, read_core, write_core, user)?;
+            core.map_io(random_model::PAGE, read_random, write_random, user)?;
             core.map_io(BELOW_RAM, read_below_ram, write_below_ram, user)?;
         }
         chip.stop_run = Some(core.stopper());
@@ -152,6 +163,7 @@ impl Machine {
             asleep: false,
             started: false,
             panics: 0,
+            power_cuts: 0,
             hold_ns: 0,
             watchdog_resets: 0,
             costs: Vec::new(),
@@ -214,7 +226,10 @@ impl Machine {
 
     /// Resets if the watchdog bit or the program asked for it, and says whether.
     fn reset_if_due(&mut self) -> bool {
-        if self.chip.watchdog_bites() {
+        if std::mem::take(&mut self.chip.flash.power_lost) {
+            self.power_cuts += 1;
+            self.power_cycle();
+        } else if self.chip.watchdog_bites() {
             self.watchdog_resets += 1;
             self.reset(cause::WATCHDOG);
         } else if self.chip.reset_asked {
@@ -383,10 +398,10 @@ impl Machine {
         }
     }
 
-    /// Writes to flash, as a debugger does while the core stands.
+    /// Writes to the parameter sectors, as a debugger does while the core stands.
     pub fn write_flash(&mut self, address: u32, bytes: &[u8]) {
-        let at = (address - FLASH) as usize;
-        self.flash.0[at..at + bytes.len()].copy_from_slice(bytes);
+        let at = (address - FIRST) as usize;
+        self.chip.flash.bytes[at..at + bytes.len()].copy_from_slice(bytes);
     }
 
     /// A word of RAM.
@@ -405,7 +420,7 @@ impl Machine {
         stack.len() - untouched
     }
 
-    /// Bytes of flash, to see that the program leaves them alone.
+    /// Bytes of flash, to see that the program leaves the rest of them alone.
     pub fn flash(&self) -> &[u8] {
         &self.flash.0
     }

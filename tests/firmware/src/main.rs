@@ -16,9 +16,11 @@ mod callbacks;
 mod can_model;
 mod checks;
 mod clock_model;
+mod flash_model;
 mod image;
 mod machine;
 mod peripherals;
+mod random_model;
 mod rehearsal;
 mod unicorn;
 mod watchdog_model;
@@ -27,7 +29,8 @@ use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
 use checks::{
-    Outcome, Report, bus, commands, figures, log, motion, parameters, sensors, start, timing, zero,
+    Outcome, Report, bus, commands, figures, log, motion, parameters, sensors, start, timing,
+    update, zero,
 };
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -226,6 +229,21 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
             &|| commands::order_and_age(bench, part, name),
         );
     }
+    check("update: new parameters over the bus", &|| {
+        update::new_parameters(bench)
+    });
+    check("update: refused, and nothing is written", &|| {
+        update::refused(bench)
+    });
+    check("update: a cut of the power leaves old or new", &|| {
+        update::power_cuts(bench)
+    });
+    check("update: parameters that crash are passed over", &|| {
+        update::parameters_that_crash(bench)
+    });
+    check("update: a sector is erased at the start", &|| {
+        update::erase_at_the_start(bench)
+    });
     check("command: odd ones", &|| commands::odd_commands(bench));
     check("command: any data length code", &|| {
         commands::any_length_code(bench)

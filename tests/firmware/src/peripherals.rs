@@ -5,6 +5,8 @@ use crate::adc_model::{Adc, Input, Part, Row};
 use crate::callbacks::Injected;
 use crate::can_model::CanModel;
 use crate::clock_model::{Clocks, Pll};
+use crate::flash_model::FlashModel;
+use crate::random_model::RandomModel;
 use crate::unicorn::Stop;
 use crate::watchdog_model::Watchdog;
 
@@ -24,7 +26,9 @@ const GPIOA: usize = 0x2_0000;
 const GPIOB: usize = 0x2_0400;
 const GPIOC: usize = 0x2_0800;
 const RCC: usize = 0x2_3800;
-const OPTCR: usize = 0x2_3c14;
+const FLASH: usize = 0x2_3c00;
+const OPTCR: usize = FLASH + 0x14;
+const AHB2ENR: usize = RCC + 0x34;
 /// The core's system timer, and the register by which a program resets it.
 const SYSTICK: usize = 0xe010;
 const AIRCR: usize = 0xed0c;
@@ -93,6 +97,10 @@ pub struct Peripherals {
     pub watchdog: Watchdog,
     /// Oscillators and PLL.
     pub clocks: Clocks,
+    /// The parameter sectors and how they are written.
+    pub flash: FlashModel,
+    /// Whether the generator of random numbers gives any.
+    pub random: RandomModel,
     /// FLASH_OPTCR: the option bytes.
     pub option_bytes: u32,
     /// Whether chip select and the control pin have pull-ups on the board.
@@ -139,6 +147,8 @@ impl Peripherals {
             first_tick_ns: None,
             watchdog: Watchdog::new(),
             clocks: Clocks::new(true, Pll::Sound),
+            flash: FlashModel::new(),
+            random: RandomModel::new(),
             // As delivered, but with the highest brown-out level.
             option_bytes: 0x0fff_aae1,
             pulled_up: [true; 2],
@@ -173,6 +183,8 @@ impl Peripherals {
         self.core_words[0xef34 / 4] = 0xc000_0000; // FPCCR: ASPEN, LSPEN
         self.clocks = Clocks::new(self.clocks.crystal, self.clocks.pll);
         self.reset_asked = false;
+        self.flash.reset();
+        self.random.on = false;
         self.reset_flags |= flags;
         self.alarms = [Alarm::default(); 2];
         self.timer_flags = 0;
@@ -249,7 +261,7 @@ impl Peripherals {
 
     /// Whether the chip is reset, and the program executes nothing more.
     pub fn stops(&self) -> bool {
-        self.reset_asked || self.watchdog_bites()
+        self.reset_asked || self.flash.power_lost || self.watchdog_bites()
     }
 
     /// Whether a tick's alarm (the first one) is what is pending.
@@ -283,6 +295,9 @@ impl Peripherals {
             o if o == RCC + 0x74 => word & 1 | (word & 1) << 1 | self.reset_flags,
             o if o == PWR + 4 => 1 << 14 | word,
             o if o == OPTCR => self.option_bytes,
+            o if (FLASH + 4..OPTCR).contains(&o) => {
+                self.flash.read_register(o - FLASH, &mut self.now_ns)
+            }
             o if o == GPIOA + 0x10 => self.level(GPIOA, SELECT_PIN, self.pulled_up[0]),
             o if o == GPIOB + 0x10 => {
                 self.level(GPIOB, SYNC_PIN, self.pulled_up[1])
@@ -327,6 +342,9 @@ impl Peripherals {
             }
             o if o == TIM2 + 0x34 => self.set_alarm(0, value),
             o if o == TIM2 + 0x38 => self.set_alarm(1, value),
+            o if (FLASH..OPTCR).contains(&o) => {
+                self.flash.write_register(o - FLASH, value, self.now_ns)
+            }
             o if (RCC..RCC + 0x10).contains(&o) => self.clocks.write(o - RCC, value, self.now_ns),
             o if (IWDG..IWDG + 0x10).contains(&o) => {
                 self.watchdog.write(o - IWDG, value, self.now_ns)
@@ -352,6 +370,19 @@ impl Peripherals {
                 }
             }
             _ => {}
+        }
+    }
+
+    /// A register of the generator of random numbers.
+    pub fn read_random(&mut self, offset: usize) -> u32 {
+        self.now_ns += POLL_NS;
+        self.random.read(offset)
+    }
+
+    /// Writes a register of the generator, which takes nothing without its clock.
+    pub fn write_random(&mut self, offset: usize, value: u32) {
+        if self.words[AHB2ENR / 4] & 1 << 6 != 0 {
+            self.random.write(offset, value);
         }
     }
 

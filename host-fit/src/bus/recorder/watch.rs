@@ -75,6 +75,7 @@ impl Watch {
                 format!("a sensor or the converter is faulty (reason {reason:#x})")
             }
             Some(NodeState::SelfTestFailed) => "it failed its own test".to_owned(),
+            Some(NodeState::Updating) => "it is getting new parameters".to_owned(),
             Some(NodeState::Starting) => "it is starting".to_owned(),
             None => "its state is one that this version does not know".to_owned(),
         }

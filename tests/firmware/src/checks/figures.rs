@@ -4,12 +4,14 @@ use super::sensors::ticks_to_settle;
 use super::{Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Seen};
+use crate::flash_model::{BYTES, FIRST};
+use crate::image::FLASH;
 use crate::machine::Cost;
 
 /// Flash that the program may take, bytes.
-const TEXT_BYTES_MAX: usize = 48 << 10;
+const TEXT_BYTES_MAX: usize = 56 << 10;
 /// RAM that statics and stack may take, bytes.
-const RAM_BYTES_MAX: usize = 8 << 10;
+pub const RAM_BYTES_MAX: usize = 9 << 10;
 /// An interrupt may block for a tenth of a period, us.
 const BLOCKED_US_MAX: f64 = 200.0;
 /// The fastest clock at which data reach the core in time.
@@ -34,16 +36,13 @@ pub fn flash_and_ram(bench: &Bench, part: Part, name: &str) -> Outcome {
         format!("{} bytes of flash", image.text_bytes)
     })?;
     expect(ram <= RAM_BYTES_MAX, || format!("{ram} bytes of RAM"))?;
-    // No instruction of the program ends up where parameters lie, and it never writes flash.
-    let same = machine
-        .flash()
-        .iter()
-        .zip(&image.flash)
-        .filter(|(a, b)| a != b)
-        .count();
-    expect(same <= 2 * bench.blob.len(), || {
-        format!("{same} bytes of flash changed")
-    })
+    // No instruction of the program ends up where parameters lie, and it writes nowhere else.
+    let bytes = machine.flash().iter().zip(&image.flash);
+    let changed = bytes.filter(|(a, b)| a != b).count();
+    equal("bytes of flash that changed", changed, 0)?;
+    let slots = &image.flash[(FIRST - FLASH) as usize..][..BYTES];
+    let used = slots.iter().filter(|byte| **byte != 0xff).count();
+    equal("bytes of the program in the slots", used, 0)
 }
 
 /// Instructions and time from the interrupt to the third mailbox, over all ticks of a run, and how

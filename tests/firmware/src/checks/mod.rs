@@ -9,6 +9,7 @@ pub mod parameters;
 pub mod sensors;
 pub mod start;
 pub mod timing;
+pub mod update;
 pub mod zero;
 
 /// Why a check failed.

@@ -122,16 +122,12 @@ pub fn one_usable(bench: &Bench) -> Outcome {
 }
 
 /// The golden example of the field model, in a stage of its own.
-const FIELD: &[u8] = include_bytes!("../../../../runtime/examples/field.bin");
+pub(super) const FIELD: &[u8] = include_bytes!("../../../../runtime/examples/field.bin");
 
-/// With a blob of the field model the words on the bus are those of the host's decoder.
-pub fn the_field_model(bench: &Bench) -> Outcome {
-    let mut set = ParameterSet::from_bytes(FIELD)?;
-    set.serial = Text::try_from("stage-7").map_err(|_| "the serial")?;
-    let mut buffer = [0; MAX_BYTES];
-    let blob = set.to_bytes(&mut buffer)?;
+/// What the host's decoder makes of the log with these parameters.
+pub(super) fn poses_of(bench: &Bench, set: &ParameterSet) -> Vec<Words> {
     let decoder = set.decoder();
-    let poses: Vec<_> = (bench.rows.iter())
+    (bench.rows.iter())
         .map(|&[a, b, c, g1, g2, g3]| {
             let frame = RawFrame {
                 hall: [a, b, c],
@@ -147,7 +143,16 @@ pub fn the_field_model(bench: &Bench) -> Outcome {
                 status: reading.status.bits(),
             }
         })
-        .collect();
+        .collect()
+}
+
+/// With a blob of the field model the words on the bus are those of the host's decoder.
+pub fn the_field_model(bench: &Bench) -> Outcome {
+    let mut set = ParameterSet::from_bytes(FIELD)?;
+    set.serial = Text::try_from("stage-7").map_err(|_| "the serial")?;
+    let mut buffer = [0; MAX_BYTES];
+    let blob = set.to_bytes(&mut buffer)?;
+    let poses = poses_of(bench, &set);
     let mut machine = bench.machine(PART, [blob, &[]])?;
     machine.run_ticks(1000)?;
     let seen = Seen::since_last(&mut machine);

@@ -18,7 +18,7 @@ const PART: Part = Part::Ads131m08;
 /// Where there is no memory and no peripheral.
 const NOWHERE: u32 = 0x6000_0000;
 /// The function of the tick's arithmetic, where faults are put in.
-const TICK: &str = "firmware4node3run";
+pub const TICK: &str = "firmware4node3run";
 
 /// Words that were sent as valid and are those of neither their tick nor the one before, whose
 /// codes a tick after a reset may still have.

@@ -7,6 +7,8 @@
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use hal_adapters::can::command::{Command, Mailbox, Request, Told};
+use hal_adapters::can::service::Updates;
+use hal_adapters::can::update::{Change, Identity, Receiver, Running, Store, Written};
 use hal_adapters::can::{
     BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing, sensor,
 };
@@ -63,6 +65,53 @@ fn commands(servo: &mut Servo<'_>) {
     black_box(service.flags(Some(servo)));
 }
 
+/// A store that has nothing and keeps nothing.
+struct Nowhere;
+
+impl Store for Nowhere {
+    fn running(&self) -> Option<Running<'_>> {
+        black_box(None)
+    }
+
+    fn newest_sequence(&self) -> u32 {
+        black_box(0)
+    }
+
+    fn has_room(&self) -> bool {
+        black_box(true)
+    }
+
+    fn has_previous(&self) -> bool {
+        black_box(true)
+    }
+
+    fn write(&mut self, sequence: u32, change: Change<'_>) -> Written {
+        black_box((sequence, change));
+        black_box(Written::Done)
+    }
+}
+
+/// An update over the bus.
+#[inline(never)]
+fn update(frame: &BusFrame) {
+    let identity = Identity {
+        serial: black_box(Some("HS-0007")),
+        key: black_box(Some([0; 16])),
+        program_version: 1,
+        program_hash: 2,
+    };
+    let (mut service, mut receiver) = (Service::new(500), Receiver::new(identity, 500));
+    let store = &mut Nowhere;
+    let updates = Updates {
+        receiver: &mut receiver,
+        store,
+        nonce: black_box(Some([0; 4])),
+    };
+    black_box(service.take_updating(frame, None, Some(updates)));
+    black_box(receiver.tick(service.servo_is_off(), store));
+    black_box((receiver.is_updating(), receiver.wants_reset()));
+}
+
 #[entry]
 fn main() -> ! {
     let memory = black_box([0xff_u8; MAX_BYTES]);
@@ -94,6 +143,7 @@ fn main() -> ! {
         black_box(decoder.constants().channel_faults(&frame).count());
     }
     bus(&frame);
+    update(&black_box(BusFrame::from(sensor::frames_16(&frame)[0])));
     loop {
         cortex_m::asm::wfi();
     }

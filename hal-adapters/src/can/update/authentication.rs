@@ -1,0 +1,177 @@
+//! Who may change the parameters: whoever knows the key of the stage.
+//!
+//! The tag is AES-CMAC (NIST SP 800-38B, RFC 4493) over whole blocks of 16 bytes: a domain, the
+//! nonce, the blob padded with zeros, and a last block of sequence number, length in bytes and two
+//! zeros. Numbers are words of 32 bits, lowest byte first. The construction stands here, on the
+//! block cipher of a library: over whole blocks it is a few lines, and they cannot panic.
+
+use aes::Aes128Enc;
+use aes::cipher::{BlockCipherEncrypt, KeyInit};
+
+/// A key of AES-128, one for each stage.
+pub type Key = [u8; 16];
+
+/// A number used once: random, drawn by the node for each transfer.
+pub type Nonce = [u32; 4];
+
+/// Bytes of a tag: all that AES-CMAC gives.
+pub const TAG_BYTES: usize = BLOCK;
+
+/// Bytes of a block of AES.
+pub(super) const BLOCK: usize = 16;
+
+/// First block under every tag, so that a tag made with the same key for anything else is none of
+/// these.
+const DOMAIN: [u8; BLOCK] = *b"hall-parameters1";
+
+/// A tag that is computed piece by piece. The round keys, 352 bytes, are made anew for each.
+#[derive(Clone)]
+pub struct Authenticator {
+    key: Key,
+    chain: u128,
+}
+
+impl Authenticator {
+    /// Before the first byte of a blob.
+    pub fn new(key: &Key, nonce: &Nonce) -> Self {
+        let head = [u128::from_le_bytes(DOMAIN), in_one_block(*nonce)];
+        let (key, chain) = (*key, 0);
+        let mut new = Self { key, chain };
+        new.blocks(head.into_iter());
+        new
+    }
+
+    /// The next bytes of the blob: whole blocks, or the last bytes.
+    pub fn update(&mut self, piece: &[u8]) {
+        self.blocks(piece.chunks(BLOCK).map(|bytes| {
+            let mut block = [0; BLOCK];
+            for (to, from) in block.iter_mut().zip(bytes) {
+                *to = *from;
+            }
+            u128::from_le_bytes(block)
+        }));
+    }
+
+    /// Blocks before the last.
+    fn blocks(&mut self, blocks: impl Iterator<Item = u128>) {
+        let cipher = Aes128Enc::new(&self.key.into());
+        for block in blocks {
+            self.chain = encrypt(&cipher, self.chain ^ block);
+        }
+    }
+
+    /// The tag, once all bytes of the blob went in.
+    pub fn tag(&self, sequence: u32, bytes: u32) -> [u8; TAG_BYTES] {
+        self.last(in_one_block([sequence, bytes, 0, 0]))
+    }
+
+    /// The tag that ends with this block, which is whole.
+    fn last(&self, block: u128) -> [u8; TAG_BYTES] {
+        let cipher = Aes128Enc::new(&self.key.into());
+        // The subkey K1 is E(0) times x in GF(2^128), most significant bit first.
+        let zero = encrypt(&cipher, 0).swap_bytes();
+        let reduction = if zero >> 127 == 1 { 0x87 } else { 0 };
+        let k1 = (zero << 1 ^ reduction).swap_bytes();
+        encrypt(&cipher, self.chain ^ block ^ k1).to_le_bytes()
+    }
+
+    /// Whether `tag` is the tag, in a time that does not depend on where they differ.
+    pub fn agrees(&self, sequence: u32, bytes: u32, tag: &[u8; TAG_BYTES]) -> bool {
+        u128::from_le_bytes(self.tag(sequence, bytes)) ^ u128::from_le_bytes(*tag) == 0
+    }
+}
+
+fn encrypt(cipher: &Aes128Enc, block: u128) -> u128 {
+    let mut bytes = block.to_le_bytes().into();
+    cipher.encrypt_block(&mut bytes);
+    u128::from_le_bytes(bytes.into())
+}
+
+const fn in_one_block([a, b, c, d]: [u32; 4]) -> u128 {
+    (d as u128) << 96 | (c as u128) << 64 | (b as u128) << 32 | a as u128
+}
+
+impl core::fmt::Debug for Authenticator {
+    /// Nothing that follows from the key.
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("Authenticator")
+    }
+}
+
+/// The tag that a host sends with a blob.
+pub fn tag(key: &Key, nonce: &Nonce, sequence: u32, blob: &[u8]) -> [u8; TAG_BYTES] {
+    let bytes = u32::try_from(blob.len()).unwrap_or(u32::MAX);
+    let mut authenticator = Authenticator::new(key, nonce);
+    authenticator.update(blob);
+    authenticator.tag(sequence, bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use cmac::{Cmac, Mac};
+
+    /// RFC 4493, section 4: the key, and the tags of 16 and 64 bytes.
+    #[test]
+    fn the_cmac_is_that_of_rfc_4493() {
+        let key: Key = 0x2b7e_1516_28ae_d2a6_abf7_1588_09cf_4f3c_u128.to_be_bytes();
+        let message = [
+            0x6bc1_bee2_2e40_9f96_e93d_7e11_7393_172a_u128,
+            0xae2d_8a57_1e03_ac9c_9eb7_6fac_45af_8e51,
+            0x30c8_1c46_a35c_e411_e5fb_c119_1a0a_52ef,
+            0xf69f_2445_df4f_9b17_ad2b_417b_e66c_3710,
+        ];
+        for (blocks, want) in [
+            (1, 0x070a_16b4_6b4d_4144_f79b_dd9d_d04a_287c_u128),
+            (4, 0x51f0_bebf_7e3b_9d92_fc49_7417_7936_3cfe),
+        ] {
+            let mut mac = Authenticator { key, chain: 0 };
+            let (last, before) = message[..blocks].split_last().expect("one block at least");
+            mac.blocks(before.iter().map(|block| block.swap_bytes()));
+            assert_eq!(mac.last(last.swap_bytes()), want.to_be_bytes());
+        }
+    }
+
+    #[test]
+    fn it_is_that_of_another_implementation_for_any_length() {
+        for bytes in 0..200_u32 {
+            let key = [bytes as u8 ^ 0x5a; 16];
+            let nonce = [bytes, 0x8000_0001, !bytes, 7];
+            let blob: std::vec::Vec<u8> = (0..bytes).map(|k| (k * 37) as u8).collect();
+            let mut padded = blob.clone();
+            padded.resize(blob.len().next_multiple_of(BLOCK), 0);
+            let mut other = Cmac::<aes::Aes128>::new(&key.into());
+            other.update(b"hall-parameters1");
+            nonce
+                .iter()
+                .for_each(|word| other.update(&word.to_le_bytes()));
+            other.update(&padded);
+            for word in [bytes + 1, bytes, 0, 0] {
+                other.update(&word.to_le_bytes());
+            }
+            let want: [u8; 16] = other.finalize().into_bytes().into();
+            assert_eq!(tag(&key, &nonce, bytes + 1, &blob), want);
+        }
+    }
+
+    #[test]
+    fn every_input_changes_the_tag_and_pieces_do_not() {
+        let (key, nonce, blob) = ([7; 16], [1, 2, 3, 4], [5; 100]);
+        let want = tag(&key, &nonce, 9, &blob);
+        let mut pieces = Authenticator::new(&key, &nonce);
+        blob.chunks(32).for_each(|piece| pieces.update(piece));
+        assert!(pieces.agrees(9, 100, &want));
+        for bit in 0..128 {
+            let wrong = u128::from_le_bytes(want) ^ 1 << bit;
+            assert!(!pieces.agrees(9, 100, &wrong.to_le_bytes()));
+        }
+        assert_ne!(tag(&[8; 16], &nonce, 9, &blob), want);
+        assert_ne!(tag(&key, &[1, 2, 3, 5], 9, &blob), want);
+        assert_ne!(tag(&key, &nonce, 10, &blob), want);
+        assert_ne!(tag(&key, &nonce, 9, &blob[..99]), want);
+        // Of equal blocks, too, the length is part of it.
+        assert_ne!(tag(&key, &nonce, 9, &[0; 3]), tag(&key, &nonce, 9, &[0; 4]));
+    }
+}

@@ -1,0 +1,119 @@
+//! What a host asks of a node about its parameters, and the frames that carry a blob.
+
+use super::super::e2e::Payload;
+
+/// A request about the parameters: commands 6 to 14.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UpdateRequest {
+    /// A word of the open transfer's nonce: the detail of the answer.
+    Challenge {
+        /// Which, 0 to 3.
+        part: u8,
+    },
+    /// Opens a transfer, whose token this command's becomes.
+    Begin {
+        /// Length of the blob, 1 to [`runtime::blob::MAX_BYTES`]; 0 for no blob: the commit then
+        /// goes back to the record before the newest.
+        bytes: u16,
+    },
+    /// Checks what was transferred.
+    Verify {
+        /// Sequence number that the new record will have: one above the highest in the store.
+        sequence: u32,
+    },
+    /// Stores what was verified.
+    Commit {
+        /// The same number as in [`UpdateRequest::Verify`].
+        sequence: u32,
+    },
+    /// Closes the transfer; nothing is stored.
+    Abort,
+    /// Resets the node, which then runs the newest record.
+    Activate,
+    /// A word of the blob that runs: the detail of the answer.
+    ReadBack {
+        /// Which, from 0; the last is padded with zeros.
+        index: u8,
+    },
+    /// A fact of the node: the detail of the answer.
+    Tell {
+        /// Which; see [`super::page`].
+        page: u8,
+    },
+}
+
+impl UpdateRequest {
+    /// Number of the command in the frame.
+    pub const fn number(&self) -> u8 {
+        match self {
+            Self::Challenge { .. } => 6,
+            Self::Begin { .. } => 7,
+            Self::Verify { .. } => 8,
+            Self::Commit { .. } => 9,
+            Self::Abort => 10,
+            Self::Activate => 11,
+            Self::ReadBack { .. } => 13,
+            Self::Tell { .. } => 14,
+        }
+    }
+
+    /// The argument in the frame.
+    pub const fn argument(&self) -> u32 {
+        match *self {
+            Self::Challenge { part: byte }
+            | Self::ReadBack { index: byte }
+            | Self::Tell { page: byte } => byte as u32,
+            Self::Begin { bytes } => bytes as u32,
+            Self::Verify { sequence } | Self::Commit { sequence } => sequence,
+            Self::Abort | Self::Activate => 0,
+        }
+    }
+
+    /// From number and argument of a frame.
+    pub fn from_frame(number: u8, argument: u32) -> Option<Self> {
+        let byte = u8::try_from(argument).ok();
+        match (number, argument) {
+            (6, 0..4) => byte.map(|part| Self::Challenge { part }),
+            (7, _) => u16::try_from(argument)
+                .ok()
+                .map(|bytes| Self::Begin { bytes }),
+            (8, sequence) => Some(Self::Verify { sequence }),
+            (9, sequence) => Some(Self::Commit { sequence }),
+            (10, 0) => Some(Self::Abort),
+            (11, 0) => Some(Self::Activate),
+            (13, _) => byte.map(|index| Self::ReadBack { index }),
+            (14, _) => byte.map(|page| Self::Tell { page }),
+            _ => None,
+        }
+    }
+}
+
+/// A frame of [`super::super::Message::UpdateData`]: one word of a transfer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UpdateData {
+    /// Token of the transfer.
+    pub token: u8,
+    /// Which word: of the blob from 0, of the tag from [`super::TAG_INDEX`].
+    pub index: u8,
+    /// Four bytes, lowest first.
+    pub word: u32,
+}
+
+impl UpdateData {
+    /// The 52 bits of the frame.
+    pub const fn payload(&self) -> Payload {
+        Payload {
+            short: (self.index as u32) << 8 | self.token as u32,
+            long: self.word,
+        }
+    }
+
+    /// From the 52 bits of a frame.
+    pub const fn from_payload(p: Payload) -> Self {
+        Self {
+            token: p.short as u8,
+            index: (p.short >> 8) as u8,
+            word: p.long,
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! `identify`, `update`, `read-back`: who a node is, new parameters for it, and the parameters that it
+//! runs, over the bus. The protocol is that of [`hal_adapters::can::update`].
+//!
+//! Each is a [`Job`], which says step by step what it wants; a [`Dialog`] has its requests answered,
+//! without a bus and without a clock: frames and times in, frames out. The functions put it on an interface.
+
+mod dialog;
+mod identity;
+mod plan;
+mod read_back;
+mod run;
+mod updater;
+
+pub use dialog::{Dialog, Job, SPACING_US, Wish};
+pub use identity::{Identifier, Identity, RunningParameters};
+pub use plan::{Plan, Updated};
+pub use read_back::BlobReader;
+pub use run::{identify, read_back, update};
+pub use updater::Updater;
+
+use super::live::BusError;
+use hal_adapters::can::command::Outcome;
+use runtime::BlobError;
+
+/// Why a node was not identified, updated or read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum UpdateError {
+    /// Nobody answers.
+    #[error(
+        "no controller answered for 3 s; is it on, and is the interface set to its bit rate (`ip -details link show`)?"
+    )]
+    NoAnswer,
+    /// The node answers, but does not know these requests.
+    #[error(
+        "the controller does not tell what it runs: its program is too old for updates over the bus, or it is `host-fit \
+         live`. Flash a newer program, and parameters with `host-fit export` and a probe"
+    )]
+    TellsNothing,
+    /// An answer that makes no sense here.
+    #[error("the controller gave an answer that was not expected: {}", outcome.map_or("one that this version does not know".to_owned(), |outcome| format!("{outcome:?}")))]
+    Unexpected {
+        /// The answer.
+        outcome: Option<Outcome>,
+    },
+    /// The blob is that of another stage, or another stage is there.
+    #[error(
+        "the controller is that of the stage `{found}`, not `{expected}`; nothing was sent to it. Name the blob of this \
+         stage, or connect the other one"
+    )]
+    OtherStage {
+        /// Serial number of the blob, or the one asked for.
+        expected: String,
+        /// That of the node.
+        found: String,
+    },
+    /// The node wants a tag.
+    #[error(
+        "the controller takes new parameters only with the key of its stage: name it with --key FILE"
+    )]
+    KeyNeeded,
+    /// The servo is on, as far as the node knows.
+    #[error("{}", match declared {
+        false => "the servo may be on: switch it off, and say so with --servo-off, which declares it for the time of the update",
+        true => "the controller says that the servo is on: switch it off, look at its service pin, and let no other computer declare it on",
+    })]
+    ServoOn {
+        /// Whether it was declared off.
+        declared: bool,
+    },
+    /// Another host is at it.
+    #[error(
+        "another computer is updating this controller, and has not ended for 7 s; try again when it is done"
+    )]
+    Busy,
+    /// The tag is wrong.
+    #[error(
+        "the controller refuses the update as not authorised: the key is not that of this stage"
+    )]
+    NotAuthorised,
+    /// The node refuses the blob.
+    #[error("the controller refuses the parameters: {}", match kind {
+        4 => "their layout is too new for its program; update that first",
+        7 => "they came over damaged four times; look at the bus and its termination",
+        10 => "they belong to another stage",
+        _ => "its program does not take them; update it, or fit again",
+    })]
+    BadContent {
+        /// See [`BlobError::number`].
+        kind: u32,
+    },
+    /// Another host has stored records meanwhile.
+    #[error(
+        "another computer has stored newer parameters meanwhile (the next number is {least}); look at them with `host-fit \
+         identify`, and try again"
+    )]
+    Overtaken {
+        /// The least sequence number that the node takes.
+        least: u32,
+    },
+    /// No number is left.
+    #[error(
+        "the controller's records have used up all sequence numbers: erase its store with a probe"
+    )]
+    NumbersUsedUp,
+    /// The store is full until the next start.
+    #[error(
+        "the controller's store is full until its next start, which makes room: restart it, and try again"
+    )]
+    NoRoom,
+    /// The flash could not be written.
+    #[error(
+        "the controller could not write its flash, and keeps the parameters that it has; restart it and try again. If it \
+         fails again the flash is worn out"
+    )]
+    StoreFailed,
+    /// There is nothing to go back to.
+    #[error("the controller keeps no parameters from before the newest")]
+    NoPrevious,
+    /// Too much is lost.
+    #[error(
+        "the controller lost the update again and again; look at the bus, its termination and its load"
+    )]
+    Lossy,
+    /// No answer to the commit.
+    #[error(
+        "the controller stopped to answer while it stored the parameters: see with `host-fit identify` which it has. It \
+         has the old or the new ones, never a mixture"
+    )]
+    Unknown,
+    /// The new parameters do not run.
+    #[error(
+        "the parameters are stored as number {sequence}, but the controller does not run them after its reset; see `host-fit identify`"
+    )]
+    NotActive {
+        /// Their sequence number.
+        sequence: u32,
+    },
+    /// There is no blob to read.
+    #[error("the controller runs no parameters: there is nothing to read back")]
+    NothingRuns,
+    /// What was read back is not sound.
+    #[error("what the controller gave is no sound parameter blob: {cause}; try again")]
+    ReadBack {
+        /// What is wrong with it.
+        cause: BlobError,
+    },
+    /// What was read back is not what the node said it runs.
+    #[error("the controller's parameters changed while they were read: try again")]
+    Changed,
+    /// Ctrl-C.
+    #[error("interrupted; the controller keeps the parameters that it has")]
+    Interrupted,
+}
+
+/// Why a command that talks to a node ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum UpdateRunError {
+    /// The bus cannot be used.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The node, or the dialog with it.
+    #[error("{interface}: {cause}")]
+    Dialog {
+        /// The interface.
+        interface: String,
+        /// What is wrong.
+        cause: UpdateError,
+    },
+}

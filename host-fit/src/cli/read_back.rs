@@ -1,0 +1,30 @@
+//! `host-fit read-back`.
+
+use super::identify;
+use crate::bus::update;
+use crate::cli::error::HostError;
+use crate::cli::terminal;
+use crate::output::write_atomically;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `read-back`.
+#[derive(Debug, Args)]
+pub(super) struct ReadBackArgs {
+    /// CAN interface, for instance can0.
+    #[arg(long, value_name = "IFACE")]
+    can: String,
+    /// Where to write the parameter blob; `-` for standard output.
+    #[arg(long, value_name = "params.bin")]
+    out: PathBuf,
+}
+
+/// Writes the parameters that a controller runs, as a blob, bit for bit.
+pub(super) fn run(args: &ReadBackArgs) -> Result<(), HostError> {
+    super::keep_apart(&[Some(&args.out)], &[])?;
+    let (identity, blob) = update::read_back(&args.can)?;
+    write_atomically(&args.out, &blob)?;
+    let parameters = identify::parameters(identity.running.as_ref());
+    terminal::print(&format!("{}: runs {parameters}\n", identity.serial))?;
+    super::wrote([Some(args.out.clone())])
+}

@@ -1,0 +1,169 @@
+//! The parameters that the controller keeps in flash: which it runs, and new ones that come over
+//! the bus.
+
+use crate::slots::{self, Loaded, Refusal};
+use crate::store::{Flash, Record, Sector, Step, Store, Stored, Writing};
+use hal_adapters::can::update::{self, Change, Running, Written};
+
+/// Words that are programmed in one tick: 0.2 ms at most on an STM32F405 (DS8626, flash memory
+/// programming), in which the core stands.
+const WORDS_PER_TICK: usize = 2;
+
+/// The store with its flash.
+#[derive(Debug)]
+pub struct Records<F> {
+    flash: F,
+    store: Store,
+    running: Option<(Stored, &'static Loaded)>,
+    record: &'static mut Record,
+    writing: Option<Writing>,
+}
+
+/// What the start-up found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Found {
+    /// The blob to run, if there is one.
+    pub blob: Option<Stored>,
+    /// The worst that is to be told.
+    pub refusal: Option<Refusal>,
+}
+
+impl<F: Flash> Records<F> {
+    /// At start-up: looks at both sectors, settles what was interrupted, erases one if there is no
+    /// room for an update (500 ms at most, on an STM32F405). `is_faulty` is whether the newest blob
+    /// made the program fault twice: then the one before it is used, from now on. If there is none
+    /// before it, no blob is used, and the next power-on tries again. `record` is the room in which
+    /// records are put together.
+    pub fn start(
+        mut flash: F,
+        record: &'static mut Record,
+        serial: Option<&'static str>,
+        is_faulty: bool,
+    ) -> (Self, Found) {
+        let plain = slots::refusal(Sector::ALL.map(|s| flash.bytes(s).as_slice()), serial);
+        let store = Store::start(&mut flash, serial);
+        let mut records = Self {
+            flash,
+            store,
+            running: None,
+            record,
+            writing: None,
+        };
+        let newest = records.store.newest();
+        if is_faulty && records.store.previous().is_some() {
+            records.pass_over();
+        }
+        let used = records.store.newest();
+        let blob = used.filter(|_| !is_faulty || used != newest);
+        let refusal = records.refusal(is_faulty && newest.is_some()).or(plain);
+        (records, Found { blob, refusal })
+    }
+
+    fn refusal(&self, is_passed_over: bool) -> Option<Refusal> {
+        if is_passed_over || self.store.passed_over().is_some() {
+            return Some(Refusal::PASSED_OVER);
+        }
+        if self.store.fault().is_some() {
+            return Some(Refusal::NOT_WRITTEN);
+        }
+        let rejected = self.store.rejected().filter(|blob| blob.sequence > 0)?;
+        Some(Refusal::of(rejected.sector as u8, &rejected.error))
+    }
+
+    fn pass_over(&mut self) {
+        if self.store.pass_over(&self.flash, self.record).is_err() {
+            return;
+        }
+        let Ok(mut writing) = self.store.begin(&self.flash, self.record) else {
+            return;
+        };
+        for _ in 0..writing.words() {
+            if writing.step(&mut self.flash, self.record).is_err() {
+                return;
+            }
+        }
+        self.store.finish(&self.flash, &writing);
+    }
+
+    /// Reads a blob that [`Records::start`] found, which runs from now on.
+    #[inline(never)]
+    pub fn load(
+        &mut self,
+        blob: Stored,
+        place: &'static mut Option<Loaded>,
+    ) -> Option<&'static Loaded> {
+        let loaded: &'static Loaded = place.insert(slots::load(blob.blob(&self.flash))?);
+        self.running = Some((blob, loaded));
+        Some(loaded)
+    }
+
+    /// Puts the record together and begins to write it.
+    fn begin(&mut self, sequence: u32, change: Change<'_>) -> Option<Writing> {
+        let Self {
+            flash,
+            store,
+            record,
+            ..
+        } = self;
+        match change {
+            Change::Blob(blob) => {
+                record.room().get_mut(..blob.len())?.copy_from_slice(blob);
+                store.update(record, blob.len(), sequence).ok()?;
+            }
+            Change::Previous if store.due() == Some(sequence) => {
+                store.go_back(flash, record).ok()?;
+            }
+            Change::Previous => return None,
+        }
+        store.begin(flash, record).ok()
+    }
+}
+
+impl<F: Flash> update::Store for Records<F> {
+    fn running(&self) -> Option<Running<'_>> {
+        let (stored, loaded) = self.running.as_ref()?;
+        Some(Running {
+            slot: stored.sector as u8,
+            sequence: stored.sequence,
+            blob: stored.blob(&self.flash),
+            serial: &loaded.serial,
+            created: &loaded.created,
+            rms: loaded.fit.rms,
+            peak: loaded.fit.peak,
+        })
+    }
+
+    fn newest_sequence(&self) -> u32 {
+        self.store.due().map_or(u32::MAX, |due| due - 1)
+    }
+
+    fn has_room(&self) -> bool {
+        self.store.has_room(&self.flash)
+    }
+
+    fn has_previous(&self) -> bool {
+        self.store.previous().is_some()
+    }
+
+    fn write(&mut self, sequence: u32, change: Change<'_>) -> Written {
+        let Some(mut writing) = self.writing.take() else {
+            self.writing = self.begin(sequence, change);
+            return match self.writing {
+                Some(_) => Written::InProgress,
+                None => Written::Failed,
+            };
+        };
+        for _ in 0..WORDS_PER_TICK {
+            match writing.step(&mut self.flash, self.record) {
+                Ok(Step::More) => {}
+                Ok(Step::Done) => {
+                    self.store.finish(&self.flash, &writing);
+                    return Written::Done;
+                }
+                Err(_) => return Written::Failed,
+            }
+        }
+        self.writing = Some(writing);
+        Written::InProgress
+    }
+}

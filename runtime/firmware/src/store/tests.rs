@@ -1,0 +1,304 @@
+//! What the store promises without cuts of the power.
+
+extern crate std;
+
+use super::flash::BLANK;
+use super::flash_model::FlashModel;
+use super::record::units;
+use super::*;
+use runtime::ParameterSet;
+use runtime::blob::MAX_BYTES;
+use runtime::parameters::Text;
+use std::vec::Vec;
+use std::{format, println};
+
+pub(super) const SERIAL: Option<&str> = Some("HS-0007");
+
+/// A blob of the stage, in turn of both layouts and of another length.
+pub(super) fn blob(number: usize) -> Vec<u8> {
+    let sample: &[u8] = if number % 3 == 2 {
+        include_bytes!("../../../examples/field.bin")
+    } else {
+        include_bytes!("../../../examples/stage.bin")
+    };
+    let mut set = ParameterSet::from_bytes(sample).expect("the example");
+    set.created = Text::try_from(format!("{number}").as_str()).expect("short");
+    let mut buffer = [0; MAX_BYTES];
+    set.to_bytes(&mut buffer).expect("it fits").to_vec()
+}
+
+/// A record with this blob, as due.
+pub(super) fn record(store: &Store, blob: &[u8]) -> Result<Record, Refused> {
+    let mut record = Record::EMPTY;
+    record.room()[..blob.len()].copy_from_slice(blob);
+    store.update(&mut record, blob.len(), store.due().expect("not all"))?;
+    Ok(record)
+}
+
+/// Writes a record to its end.
+pub(super) fn write(
+    store: &mut Store,
+    flash: &mut FlashModel,
+    record: &Record,
+) -> Result<(), Refused> {
+    let mut writing = store.begin(flash, record)?;
+    for _ in 0..writing.words() {
+        if writing
+            .step(flash, record)
+            .map_err(|_| Refused::Unsettled)?
+            == Step::Done
+        {
+            store.finish(flash, &writing);
+            return Ok(());
+        }
+    }
+    panic!("more steps than words")
+}
+
+pub(super) fn update(
+    store: &mut Store,
+    flash: &mut FlashModel,
+    blob: &[u8],
+) -> Result<(), Refused> {
+    let record = record(store, blob)?;
+    write(store, flash, &record)
+}
+
+/// The blob that a start finds.
+pub(super) fn found(store: &Store, flash: &FlashModel) -> Option<Vec<u8>> {
+    store.newest().map(|stored| stored.blob(flash).to_vec())
+}
+
+#[test]
+fn what_was_written_is_found_at_the_next_start_and_the_one_before_too() {
+    let mut flash = FlashModel::erased();
+    let mut store = Store::start(&mut flash, SERIAL);
+    assert_eq!((store.newest(), store.due()), (None, Some(1)));
+    for number in 0..100 {
+        if update(&mut store, &mut flash, &blob(number)) == Err(Refused::NoRoom) {
+            store = Store::start(&mut flash, SERIAL);
+            assert_eq!(update(&mut store, &mut flash, &blob(number)), Ok(()));
+        }
+        let again = Store::start(&mut flash, SERIAL);
+        for store in [&store, &again] {
+            assert_eq!(found(store, &flash), Some(blob(number)));
+            let previous = store.previous().map(|stored| stored.blob(&flash).to_vec());
+            assert_eq!(previous, number.checked_sub(1).map(blob));
+            assert_eq!(store.due(), Some(number as u32 + 2));
+        }
+    }
+}
+
+#[test]
+fn updates_of_one_erase_are_as_many_as_documented() {
+    let updates = |bytes| (journal::SECTOR_UNITS - 1) / units(bytes);
+    assert_eq!([379, 407, 587, MAX_BYTES].map(updates), [36, 31, 23, 21]);
+}
+
+#[test]
+fn ten_thousand_updates_erase_as_often_as_sectors_are_filled() {
+    let erases = |number: fn(usize) -> usize| {
+        let mut flash = FlashModel::erased();
+        let mut store = Store::start(&mut flash, SERIAL);
+        for update_number in 0..10_000 {
+            let blob = blob(number(update_number));
+            if update(&mut store, &mut flash, &blob) == Err(Refused::NoRoom) {
+                store = Store::start(&mut flash, SERIAL);
+                assert_eq!(update(&mut store, &mut flash, &blob), Ok(()));
+            }
+        }
+        println!("RESULT updates=10000 erases={:?}", flash.erases);
+        flash.erases
+    };
+    // Model (31) alone: 31 updates an erase; the field model alone: 25.
+    assert_eq!(erases(|number| number - number % 3), [162, 161]);
+    assert_eq!(erases(|number| number - number % 3 + 2), [200, 200]);
+}
+
+#[test]
+fn only_the_sequence_number_that_is_due_is_written() {
+    let mut flash = FlashModel::erased();
+    let mut store = Store::start(&mut flash, SERIAL);
+    let [one, other] = [1, 2].map(|number| record(&store, &blob(number)).expect("due"));
+    assert_eq!(write(&mut store, &mut flash, &one), Ok(()));
+    for late in [&other, &one] {
+        let refused = Err(Refused::Sequence { due: 2 });
+        assert_eq!(store.begin(&flash, late).map(|_| ()), refused);
+    }
+    for sequence in [0, 1, 3, u32::MAX] {
+        let mut record = Record::EMPTY;
+        let bytes = blob(1).len();
+        record.room()[..bytes].copy_from_slice(&blob(1));
+        let refused = Err(Refused::Sequence { due: 2 });
+        assert_eq!(store.update(&mut record, bytes, sequence), refused);
+    }
+    assert_eq!(found(&store, &flash), Some(blob(1)));
+}
+
+#[test]
+fn an_unsound_or_foreign_blob_becomes_no_record() {
+    let mut flash = FlashModel::erased();
+    let store = Store::start(&mut flash, SERIAL);
+    let mut damaged = blob(1);
+    damaged[50] ^= 1;
+    assert!(matches!(
+        record(&store, &damaged),
+        Err(Refused::Blob(BlobError::BadCrc { .. }))
+    ));
+    let foreign = Store::start(&mut flash, Some("HS-0008"));
+    let refused = record(&foreign, &blob(1)).map(|_| ());
+    assert_eq!(refused, Err(Refused::Blob(BlobError::OtherStage)));
+    let short = &blob(1)[..40];
+    assert!(matches!(
+        record(&store, short),
+        Err(Refused::Blob(BlobError::Truncated { .. }))
+    ));
+}
+
+#[test]
+fn a_record_of_another_stage_is_told_and_the_one_before_it_used() {
+    let mut flash = FlashModel::erased();
+    let mut store = Store::start(&mut flash, SERIAL);
+    for number in 0..3 {
+        assert_eq!(update(&mut store, &mut flash, &blob(number)), Ok(()));
+    }
+    let other = Store::start(&mut flash, Some("HS-0008"));
+    assert_eq!((other.newest(), other.due()), (None, Some(4)));
+    let rejected = other.rejected().expect("three");
+    assert_eq!(
+        (rejected.sequence, rejected.error),
+        (3, BlobError::OtherStage)
+    );
+}
+
+#[test]
+fn plain_blobs_are_read_as_the_slots_were_and_are_older_than_any_record() {
+    for (created, chosen) in [([1, 2], 1), ([2, 1], 0), ([1, 1], 0)] {
+        let mut flash = FlashModel::erased();
+        for (sector, number) in Sector::ALL.into_iter().zip(created) {
+            flash.load(sector, &blob(number));
+        }
+        let store = Store::read(&flash, SERIAL);
+        let newest = store.newest().expect("two");
+        assert_eq!((newest.sequence, newest.sector), (0, Sector::ALL[chosen]));
+        assert_eq!(found(&store, &flash), Some(blob(created[chosen])));
+        let previous = store.previous().map(|stored| stored.sector);
+        assert_eq!(
+            previous,
+            Some(Sector::ALL[1 - chosen]).filter(|_| created[0] != created[1])
+        );
+        // The other one is erased, and what is written there counts, though made earlier.
+        let mut store = Store::start(&mut flash, SERIAL);
+        assert_eq!(flash.erases.iter().sum::<usize>(), 1);
+        assert_eq!(update(&mut store, &mut flash, &blob(0)), Ok(()));
+        let store = Store::start(&mut flash, SERIAL);
+        assert_eq!(found(&store, &flash), Some(blob(0)));
+        let previous = store.previous().map(|stored| stored.blob(&flash).to_vec());
+        assert_eq!(previous, Some(blob(created[chosen])));
+    }
+}
+
+#[test]
+fn going_back_can_be_undone_and_what_was_passed_over_never_comes_back() {
+    let mut flash = FlashModel::erased();
+    let mut store = Store::start(&mut flash, SERIAL);
+    for number in 0..4 {
+        assert_eq!(update(&mut store, &mut flash, &blob(number)), Ok(()));
+    }
+    let mut record = Record::EMPTY;
+    for expected in [2, 3, 2, 3] {
+        assert_eq!(store.go_back(&flash, &mut record), Ok(()));
+        assert_eq!(write(&mut store, &mut flash, &record), Ok(()));
+        assert_eq!(found(&store, &flash), Some(blob(expected)));
+        store = Store::start(&mut flash, SERIAL);
+        assert_eq!(found(&store, &flash), Some(blob(expected)));
+    }
+    // 8 holds blob 3; passing it over falls back to 7 with blob 2, whose own predecessor is 6
+    // with blob 3 again: another record, that made no fault.
+    assert_eq!(store.pass_over(&flash, &mut record), Ok(()));
+    assert_eq!(write(&mut store, &mut flash, &record), Ok(()));
+    let store = Store::start(&mut flash, SERIAL);
+    assert_eq!(
+        (found(&store, &flash), store.passed_over()),
+        (Some(blob(2)), Some(8))
+    );
+    assert_eq!(store.previous().map(|stored| stored.sequence), Some(6));
+}
+
+#[test]
+fn a_write_that_was_not_finished_bars_others_until_the_next_start() {
+    let mut flash = FlashModel::erased();
+    let mut store = Store::start(&mut flash, SERIAL);
+    let record = record(&store, &blob(1)).expect("due");
+    let mut writing = store.begin(&flash, &record).expect("room");
+    assert_eq!(writing.step(&mut flash, &record), Ok(Step::More));
+    assert_eq!(
+        store.begin(&flash, &record).map(|_| ()),
+        Err(Refused::Unsettled)
+    );
+    store.finish(&flash, &writing);
+    assert_eq!(
+        store.begin(&flash, &record).map(|_| ()),
+        Err(Refused::Unsettled)
+    );
+    let mut store = Store::start(&mut flash, SERIAL);
+    assert_eq!(write(&mut store, &mut flash, &record), Ok(()));
+}
+
+#[test]
+fn a_word_that_does_not_hold_is_told_and_nothing_is_committed() {
+    let mut flash = FlashModel::erased();
+    let mut store = Store::start(&mut flash, SERIAL);
+    let record = record(&store, &blob(1)).expect("due");
+    let mut writing = store.begin(&flash, &record).expect("room");
+    for _ in 0..30 {
+        assert_eq!(writing.step(&mut flash, &record), Ok(Step::More));
+    }
+    // Some other program's fault: a word ahead is not blank, and one behind has changed.
+    let mut ahead = (flash.clone(), Writing { ..writing });
+    ahead.0.program(Sector::First, 16 + 40, 0).expect("on");
+    flash.program(Sector::First, 16 + 20, 0).expect("on");
+    for (flash, writing) in [(&mut ahead.0, &mut ahead.1), (&mut flash, &mut writing)] {
+        let fault = (0..200).find_map(|_| writing.step(flash, &record).err());
+        assert!(matches!(fault, Some(WriteFault::ReadsOtherwise { .. })));
+        assert_eq!(Store::start(flash, SERIAL).newest(), None);
+    }
+}
+
+#[test]
+fn a_word_that_is_stuck_is_told_wherever_it_is() {
+    let (mut sound, mut empty) = (FlashModel::erased(), FlashModel::erased());
+    let store = Store::start(&mut sound, SERIAL);
+    let record = record(&store, &blob(1)).expect("due");
+    let words = UNIT_BYTES / 4..UNIT_BYTES / 4 + record.body_words() + 2;
+    for word in words {
+        let mut flash = sound.clone();
+        let mut store = Store::start(&mut flash, SERIAL);
+        flash.stuck = Some((Sector::First, word));
+        let written = write(&mut store, &mut flash, &record);
+        // A word that stays blank does no harm where it should.
+        let blank = record.word(word - UNIT_BYTES / 4) == BLANK;
+        assert_eq!(
+            written.is_ok(),
+            blank && word < UNIT_BYTES / 4 + record.body_words(),
+            "{word}"
+        );
+    }
+    // The sector's own words, and one that is not erased.
+    for sector in Sector::ALL {
+        empty.load(sector, &[0; SECTOR_BYTES]);
+    }
+    for word in [0, 1, 500] {
+        let mut flash = empty.clone();
+        flash.stuck = Some((Sector::First, word));
+        let mut store = Store::start(&mut flash, SERIAL);
+        assert!(
+            matches!(store.fault(), Some(WriteFault::ReadsOtherwise { .. })),
+            "{word}"
+        );
+        assert_eq!(
+            store.begin(&flash, &record).map(|_| ()),
+            Err(Refused::Unsettled)
+        );
+    }
+}

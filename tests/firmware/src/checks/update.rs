@@ -1,0 +1,324 @@
+//! New parameters over the bus: the host's own dialog against the program, its flash, and cuts of
+//! the power.
+
+use super::commands::{SERVO_OFF, answers};
+use super::log::Stage;
+use super::parameters::{FIELD, poses_of};
+use super::start::TICK;
+use super::{Failure, Outcome, equal, expect};
+use crate::adc_model::Part;
+use crate::bench::{Bench, Comparison, Seen, Words};
+use crate::callbacks::Injected;
+use crate::flash_model::Cut;
+use crate::machine::Machine;
+use crate::unicorn::register;
+use embedded_can::{Frame, StandardId};
+use hal_adapters::can::command::{Outcome as Ended, Request};
+use hal_adapters::can::status::NodeState;
+use hal_adapters::can::update::{Key, UpdateRequest};
+use hal_adapters::can::{BusFrame, Coded};
+use host_fit::bus::update::{BlobReader, Dialog, Job, Plan, UpdateError, Updated, Updater};
+use runtime::blob::MAX_BYTES;
+use runtime::parameters::Text;
+use runtime::{ParameterSet, Status};
+
+/// The program for the ADS131M08 is built with this key, the other one without any.
+const PART: Part = Part::Ads131m08;
+const KEY: Key = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+/// Between two looks at the bus.
+const STEP_NS: u64 = 250_000;
+const S: u64 = 1_000_000_000;
+/// An update may take so long, s.
+const UPDATE_S_MAX: f64 = 1.0;
+/// Operations of the flash at which the power is cut, three times each.
+const CUTS: u64 = 12;
+
+fn plan(blob: &[u8], token: u8) -> Plan {
+    Plan {
+        blob: blob.to_vec(),
+        serial: Some("stage-7".to_owned()),
+        key: Some(KEY),
+        declares_servo_off: true,
+        activates: false,
+        token,
+    }
+}
+
+/// Runs until a dialog is over or the power is lost; what was on the bus meanwhile.
+fn talk<J: Job>(machine: &mut Machine, job: J, token: u8) -> Result<(J, Seen), Failure> {
+    let (mut dialog, mut seen) = (Dialog::new(job, token), Seen::default());
+    let until_ns = machine.chip.now_ns + 30 * S;
+    let cuts = machine.power_cuts;
+    while !dialog.is_over() && machine.power_cuts == cuts {
+        expect(machine.chip.now_ns < until_ns, || {
+            "it does not end".to_owned()
+        })?;
+        let now_us = machine.chip.now_ns / 1000;
+        if let Some(Coded { message, bytes }) = dialog.poll(now_us) {
+            machine.chip.can.receive(message.spec().id, bytes);
+        }
+        machine.run_ns(STEP_NS)?;
+        let first_ns = machine.chip.first_tick_ns.unwrap_or(0);
+        for sent in std::mem::take(&mut machine.chip.can.sent) {
+            seen.take(&sent, first_ns);
+            let id = StandardId::new(sent.id).ok_or("an identifier")?;
+            if let Some(frame) = BusFrame::new(id, &sent.bytes) {
+                dialog.take(&frame, sent.done_ns / 1000);
+            }
+        }
+    }
+    Ok((dialog.into_job(), seen))
+}
+
+fn update(
+    machine: &mut Machine,
+    plan: Plan,
+) -> Result<(Result<Updated, UpdateError>, Seen), Failure> {
+    let token = plan.token;
+    let (job, seen) = talk(machine, Updater::new(plan), token)?;
+    Ok((job.result(), seen))
+}
+
+/// The blob that runs, read over the bus.
+fn running(machine: &mut Machine) -> Result<Vec<u8>, Failure> {
+    let (job, _) = talk(machine, BlobReader::default(), 90)?;
+    Ok(job.result()?.1)
+}
+
+/// The next start with what is in flash now: its words are those of the host.
+fn starts_with(bench: &Bench, machine: &Machine, poses: &[Words]) -> Outcome {
+    let mut next = bench.machine(PART, [&[], &[]])?;
+    next.chip.flash.bytes.clone_from(&machine.chip.flash.bytes);
+    next.run_ticks(200)?;
+    let mut comparison = Comparison::default();
+    comparison.add(&Seen::since_last(&mut next).axes, poses, 0);
+    equal("words that differ", comparison.differing, 0)?;
+    expect(comparison.planar >= 198, || {
+        format!("only {} poses", comparison.planar)
+    })
+}
+
+/// The field model's example as one of this stage, with the longest text of its time.
+fn large() -> Result<Vec<u8>, Failure> {
+    let mut set = ParameterSet::from_bytes(FIELD)?;
+    set.serial = Text::try_from("stage-7").map_err(|_| "the serial")?;
+    set.created = Text::try_from("2026-11-22T10:00:00.000000+00:00").map_err(|_| "the time")?;
+    let mut buffer = [0; MAX_BYTES];
+    Ok(set.to_bytes(&mut buffer)?.to_vec())
+}
+
+/// An update: in time, no tick missed, poses invalid meanwhile and "updating" told; the next start
+/// runs it. Another one is activated at once; and back to the one before.
+pub fn new_parameters(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(100)?;
+    Seen::since_last(&mut machine);
+    let large = large()?;
+    let from_ns = machine.chip.now_ns;
+    let (updated, seen) = update(&mut machine, plan(&large, 1))?;
+    let updated = updated?;
+    let s = (machine.chip.now_ns - from_ns) as f64 / 1e9;
+    println!("RESULT firmware_update_bytes={}", large.len());
+    println!("RESULT firmware_update_s={s:.3}");
+    equal("sequence number", updated.sequence, Some(1))?;
+    equal("sent again", updated.repeated, (0, 0))?;
+    equal("key needed", updated.before.needs_key, true)?;
+    expect(s <= UPDATE_S_MAX, || format!("{s} s"))?;
+    let stage = Stage::read(&machine, bench, PART)?;
+    println!("RESULT firmware_update_missed_ticks={}", stage.missed_ticks);
+    let ticks = (stage.missed_ticks, stage.overrun_ticks);
+    equal("ticks missed and overrun", ticks, (0, 0))?;
+    equal("erases", machine.chip.flash.erases, 0)?;
+    let invalid = seen
+        .axes
+        .iter()
+        .filter(|axis| axis.axis == 0 && axis.status & Status::PLANAR_INVALID.bits() != 0);
+    expect(invalid.count() > 150, || "poses were valid".to_owned())?;
+    let mut states = seen.statuses.iter().map(|(_, status)| status.state);
+    expect(
+        states.any(|state| state == Some(NodeState::Updating)),
+        || "updating was not told".to_owned(),
+    )?;
+    equal("running", running(&mut machine)?, bench.blob.clone())?;
+    starts_with(
+        bench,
+        &machine,
+        &poses_of(bench, &ParameterSet::from_bytes(&large)?),
+    )?;
+
+    let activates = |plan: Plan| Plan {
+        activates: true,
+        ..plan
+    };
+    let (updated, _) = update(&mut machine, activates(plan(&bench.later, 2)))?;
+    let updated = updated?;
+    equal(
+        "second",
+        (updated.sequence, updated.is_active),
+        (Some(2), true),
+    )?;
+    equal("running", running(&mut machine)?, bench.later.clone())?;
+    let (updated, _) = update(&mut machine, activates(plan(&[], 3)))?;
+    let updated = updated?;
+    equal(
+        "back",
+        (updated.sequence, updated.is_active),
+        (Some(3), true),
+    )?;
+    equal("running", running(&mut machine)?, large)?;
+    let resets = (machine.panics, machine.watchdog_resets);
+    equal("resets asked for, and by the watchdog", resets, (2, 0))?;
+    let (statics, stack) = (bench.image(PART).static_bytes, machine.stack_bytes());
+    println!("RESULT firmware_update_ram_bytes={}", statics + stack);
+    expect(statics + stack <= super::figures::RAM_BYTES_MAX, || {
+        format!("{statics} + {stack} bytes of RAM")
+    })
+}
+
+/// A wrong key, no key, a generator of random numbers that is broken, the service pin, another
+/// stage's blob, a stale sequence number.
+pub fn refused(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(100)?;
+    let (updated, _) = update(&mut machine, plan(&bench.later, 1))?;
+    updated?;
+    let operations = machine.chip.flash.operations;
+    let wrong_key = Plan {
+        key: Some([0; 16]),
+        ..plan(&bench.blob, 2)
+    };
+    let (refused, _) = update(&mut machine, wrong_key)?;
+    expect(matches!(refused, Err(UpdateError::NotAuthorised)), || {
+        format!("with a wrong key: {refused:?}")
+    })?;
+    machine.chip.servo_on = true;
+    let (refused, _) = update(&mut machine, plan(&bench.blob, 3))?;
+    expect(matches!(refused, Err(UpdateError::ServoOn { .. })), || {
+        format!("with the servo on: {refused:?}")
+    })?;
+    machine.chip.servo_on = false;
+    machine.run_ticks(2)?;
+    let request = Request::Update;
+    answers(
+        &mut machine,
+        &[
+            (
+                request(UpdateRequest::Begin { bytes: 0 }),
+                100,
+                Ended::ServoOn,
+            ),
+            (SERVO_OFF, 101, Ended::Done),
+            (request(UpdateRequest::Begin { bytes: 1 }), 102, Ended::Done),
+            (request(UpdateRequest::Begin { bytes: 1 }), 103, Ended::Busy),
+            (
+                request(UpdateRequest::Commit { sequence: 2 }),
+                102,
+                Ended::NotAuthorised,
+            ),
+            (request(UpdateRequest::Abort), 102, Ended::Done),
+        ],
+    )?;
+    machine.chip.random.broken = true;
+    let (refused, _) = update(&mut machine, plan(&bench.blob, 4))?;
+    expect(refused.is_err(), || "without random numbers".to_owned())?;
+    machine.chip.random.broken = false;
+    equal("operations", machine.chip.flash.operations, operations)?;
+    let (updated, _) = update(&mut machine, plan(&bench.blob, 5))?;
+    equal("once all is well", updated?.sequence, Some(2))
+}
+
+/// Cuts of the power before, inside and after operations of an update: after it the old or the new
+/// blob runs, and the new one for certain once the update was answered.
+pub fn power_cuts(bench: &Bench) -> Outcome {
+    let ready = || -> Result<Machine, Failure> {
+        let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+        machine.run_ticks(20)?;
+        Ok(machine)
+    };
+    let mut machine = ready()?;
+    let before = machine.chip.flash.operations;
+    update(&mut machine, plan(&bench.later, 1))?.0?;
+    let whole = machine.chip.flash.operations - before;
+    expect(whole > 100, || format!("{whole} operations"))?;
+    // The first words, some between, and the last ones: check, commit word, seal.
+    let last = whole - CUTS / 2..whole;
+    let places = (0..CUTS / 2).map(|k| k * k * whole / 40).chain(last);
+    let (mut cuts, mut old, mut new) = (0, 0, 0);
+    for (seed, place) in (1..).zip(places) {
+        for cut in [Cut::Before, Cut::Inside, Cut::After] {
+            let mut machine = ready()?;
+            machine.chip.flash.cut = Some((before + place, cut, seed * 0x9e37_79b9));
+            let token = 1;
+            let (_, _) = talk(&mut machine, Updater::new(plan(&bench.later, token)), token)?;
+            expect(machine.power_cuts == 1, || format!("no cut at {place}"))?;
+            machine.run_ticks(20)?;
+            let found = running(&mut machine)?;
+            cuts += 1;
+            old += u32::from(found == bench.blob);
+            new += u32::from(found == bench.later);
+            expect(found == bench.blob || found == bench.later, || {
+                format!("another blob after a cut {cut:?} {place}")
+            })?;
+            let is_over = place + 1 == whole && cut == Cut::After;
+            expect(!is_over || found == bench.later, || {
+                "the new one is lost".to_owned()
+            })?;
+            // Another update is possible at once.
+            let (updated, _) = update(&mut machine, plan(&large()?, 7))?;
+            expect(updated?.sequence.is_some(), || {
+                "no update after it".to_owned()
+            })?;
+        }
+    }
+    println!("RESULT firmware_update_cuts={cuts} old={old} new={new} lost=0");
+    expect(old > 0 && new > 0, || "all cuts ended alike".to_owned())
+}
+
+/// Parameters that make the program fault twice at its start: those before them run, and it is
+/// told.
+pub fn parameters_that_crash(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.hook_injection(bench.image(PART).address(TICK)?)?;
+    machine.run_ticks(20)?;
+    let activates = Plan {
+        activates: true,
+        ..plan(&bench.later, 1)
+    };
+    let (updated, _) = update(&mut machine, activates)?;
+    equal("active", updated?.is_active, true)?;
+    for resets in [2, 3] {
+        let value = 0x6000_0000;
+        let register = register::R0;
+        machine.chip.inject = vec![Injected { register, value }];
+        machine.run_ticks(10)?;
+        equal("resets", machine.panics, resets)?;
+    }
+    Seen::since_last(&mut machine);
+    machine.run_ticks(40)?;
+    let seen = Seen::since_last(&mut machine);
+    let status = seen.last_status().ok_or("no state")?;
+    let told = (status.state, status.reason);
+    equal("state", told, (Some(NodeState::Running), 0x80 | 12))?;
+    equal("running", running(&mut machine)?, bench.blob.clone())?;
+    machine.power_cycle();
+    equal("after power-on", running(&mut machine)?, bench.blob.clone())
+}
+
+/// A sector with anything in it is erased at the first start beside a plain blob; the watchdog runs
+/// and does not bite, and the next start erases nothing.
+pub fn erase_at_the_start(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[0x5a; 4096]])?;
+    machine.run_ticks(50)?;
+    equal("erases", machine.chip.flash.erases, 1)?;
+    expect(machine.chip.first_tick_ns > Some(S / 2), || {
+        "an erase that takes no time".to_owned()
+    })?;
+    machine.power_cycle();
+    machine.run_ticks(50)?;
+    equal("erases", machine.chip.flash.erases, 1)?;
+    equal("bites", (machine.panics, machine.watchdog_resets), (0, 0))?;
+    starts_with(bench, &machine, &bench.poses)?;
+    update(&mut machine, plan(&bench.later, 1))?.0?;
+    let later = ParameterSet::from_bytes(&bench.later)?;
+    starts_with(bench, &machine, &poses_of(bench, &later))
+}

@@ -1,0 +1,60 @@
+//! The random number generator, from RM0090 section 24: ready at once, unless it has a fault.
+
+/// Bits of RNG_SR: a number is there; the clock or the seed is wrong, and was.
+const READY: u32 = 1;
+const SEED: u32 = 1 << 6 | 1 << 2;
+
+/// Where its registers are: start and bytes of their page, and the first of them.
+pub const PAGE: (u64, u64) = (0x5006_0000, 0x1000);
+/// See [`PAGE`].
+pub const FIRST: usize = 0x800;
+
+/// The generator.
+pub struct RandomModel {
+    /// Whether it is switched on.
+    pub on: bool,
+    /// Whether the seed is wrong from now on.
+    pub broken: bool,
+    state: u32,
+    latched: bool,
+}
+
+impl RandomModel {
+    /// A sound one.
+    pub const fn new() -> Self {
+        Self {
+            on: false,
+            broken: false,
+            state: 0x1234_5678,
+            latched: false,
+        }
+    }
+
+    /// A register.
+    pub const fn read(&mut self, offset: usize) -> u32 {
+        match offset {
+            4 if !self.on => 0,
+            4 if self.broken || self.latched => {
+                self.latched = true;
+                SEED
+            }
+            4 => READY,
+            8 if self.on => {
+                self.state ^= self.state << 13;
+                self.state ^= self.state >> 17;
+                self.state ^= self.state << 5;
+                self.state
+            }
+            _ => 0,
+        }
+    }
+
+    /// Writes a register: a latched error is cleared by writing 0.
+    pub const fn write(&mut self, offset: usize, value: u32) {
+        match offset {
+            0 => self.on = value & 4 != 0,
+            4 => self.latched &= value & 1 << 6 != 0,
+            _ => {}
+        }
+    }
+}
