@@ -18,7 +18,7 @@ const WAIT_MAX: Duration = Duration::from_millis(50);
 const PATIENCE: Duration = Duration::from_millis(300);
 /// How often a controller is asked.
 const ATTEMPTS: u8 = 4;
-/// How long codes may stay away before they are asked for again.
+/// Time from request to request for codes that stay away.
 const SILENCE: Duration = Duration::from_secs(1);
 /// Time from display to display.
 const SHOWN_EVERY: Duration = Duration::from_millis(200);

@@ -16,8 +16,8 @@ pub struct Watch {
     last_us: u64,
 }
 
-/// Codes that stay away for longer are missing, us.
-const SILENT_US: u64 = 100_000;
+/// Codes that stay away for longer are missing, us. A record may end a little after them.
+const SILENT_US: u64 = 1_000_000;
 
 impl Watch {
     /// Takes a frame; gives what it tells, other than codes and poses.
