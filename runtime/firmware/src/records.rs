@@ -16,6 +16,8 @@ pub struct Records<F> {
     store: Store,
     running: Option<(Stored, &'static Loaded)>,
     record: &'static mut Record,
+    /// Whether the record is put together.
+    is_ready: bool,
     writing: Option<Writing>,
 }
 
@@ -47,6 +49,7 @@ impl<F: Flash> Records<F> {
             store,
             running: None,
             record,
+            is_ready: false,
             writing: None,
         };
         let newest = records.store.newest();
@@ -97,25 +100,25 @@ impl<F: Flash> Records<F> {
         Some(loaded)
     }
 
-    /// Puts the record together and begins to write it.
-    fn begin(&mut self, sequence: u32, change: Change<'_>) -> Option<Writing> {
-        let Self {
-            flash,
-            store,
-            record,
-            ..
-        } = self;
+    /// Puts the record together: in a tick of its own, as is [`Records::begin`].
+    fn make(&mut self, sequence: u32, change: Change<'_>) -> Option<()> {
+        let (store, record) = (&self.store, &mut *self.record);
         match change {
             Change::Blob(blob) => {
                 record.room().get_mut(..blob.len())?.copy_from_slice(blob);
-                store.update(record, blob.len(), sequence).ok()?;
+                store.update(record, blob.len(), sequence).ok()
             }
             Change::Previous if store.due() == Some(sequence) => {
-                store.go_back(flash, record).ok()?;
+                store.go_back(&self.flash, record).ok()
             }
-            Change::Previous => return None,
+            Change::Previous => None,
         }
-        store.begin(flash, record).ok()
+    }
+
+    /// Begins to write it.
+    fn begin(&mut self) -> Option<()> {
+        self.writing = Some(self.store.begin(&self.flash, self.record).ok()?);
+        Some(())
     }
 }
 
@@ -147,9 +150,15 @@ impl<F: Flash> update::Store for Records<F> {
 
     fn write(&mut self, sequence: u32, change: Change<'_>) -> Written {
         let Some(mut writing) = self.writing.take() else {
-            self.writing = self.begin(sequence, change);
-            return match self.writing {
-                Some(_) => Written::InProgress,
+            let is_begun = core::mem::replace(&mut self.is_ready, false);
+            let done = if is_begun {
+                self.begin()
+            } else {
+                self.make(sequence, change)
+            };
+            self.is_ready = !is_begun && done.is_some();
+            return match done {
+                Some(()) => Written::InProgress,
                 None => Written::Failed,
             };
         };

@@ -103,6 +103,14 @@ pub(super) fn is_passed_over(flash: &impl Flash, sequence: u32) -> bool {
     })
 }
 
+/// Whether a unit reads as erased. By words: all of a sector is looked at in one tick.
+fn is_blank(unit: &[u8]) -> bool {
+    let words = unit.as_chunks::<16>().0;
+    words
+        .iter()
+        .all(|word| u128::from_le_bytes(*word) == u128::MAX)
+}
+
 /// Where a record of so many units can be written.
 ///
 /// Behind a record that is whole, the next unit. Behind anything else the interrupted operation
@@ -117,7 +125,7 @@ pub(super) fn free_unit(flash: &impl Flash, sector: Sector, units: usize) -> Opt
     }
     let used = bytes
         .chunks_exact(UNIT_BYTES)
-        .rposition(|unit| unit != [0xff; UNIT_BYTES])?;
+        .rposition(|unit| !is_blank(unit))?;
     let first = Place::new(0, sector, 0).index;
     let last = (first..first + SECTOR_UNITS)
         .rev()
@@ -184,4 +192,4 @@ pub(super) fn renew(flash: &mut impl Flash, sector: Sector) -> Result<(), WriteF
     sealed(flash, sector, 0, JOURNAL)
 }
 
-const _: () = assert!(SECTOR_BYTES.is_multiple_of(UNIT_BYTES));
+const _: () = assert!(SECTOR_BYTES.is_multiple_of(UNIT_BYTES) && UNIT_BYTES.is_multiple_of(16));

@@ -17,7 +17,7 @@ const BLOCKED_US_MAX: f64 = 200.0;
 /// The fastest clock at which data reach the core in time.
 const SPI_HZ_MAX: u64 = 10_500_000;
 /// Cycles assumed for an instruction: flash at five wait states, loads, branches.
-const CYCLES_PER_INSTRUCTION: f64 = 2.0;
+pub const CYCLES_PER_INSTRUCTION: f64 = 2.0;
 
 /// Flash, RAM, and the stack's painted maximum, with faults of all kinds behind it.
 pub fn flash_and_ram(bench: &Bench, part: Part, name: &str) -> Outcome {

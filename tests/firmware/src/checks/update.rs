@@ -2,6 +2,7 @@
 //! the power.
 
 use super::commands::{SERVO_OFF, answers};
+use super::figures::CYCLES_PER_INSTRUCTION;
 use super::log::Stage;
 use super::parameters::{FIELD, poses_of};
 use super::start::TICK;
@@ -30,6 +31,10 @@ const STEP_NS: u64 = 250_000;
 const S: u64 = 1_000_000_000;
 /// An update may take so long, s.
 const UPDATE_S_MAX: f64 = 1.0;
+/// Two words of flash in a tick, at the longest.
+const FLASH_US: f64 = 200.0;
+/// What a tick has after its codes were read.
+const TICK_US_MAX: f64 = 1700.0;
 /// Operations of the flash at which the power is cut, three times each.
 const CUTS: u64 = 12;
 
@@ -111,6 +116,7 @@ fn large() -> Result<Vec<u8>, Failure> {
 /// runs it. Another one is activated at once; and back to the one before.
 pub fn new_parameters(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.count_instructions()?;
     machine.run_ticks(100)?;
     Seen::since_last(&mut machine);
     let large = large()?;
@@ -129,6 +135,11 @@ pub fn new_parameters(bench: &Bench) -> Outcome {
     let ticks = (stage.missed_ticks, stage.overrun_ticks);
     equal("ticks missed and overrun", ticks, (0, 0))?;
     equal("erases", machine.chip.flash.erases, 0)?;
+    // Instructions take no time in the emulator: the longest tick, with its words of flash.
+    let instructions = machine.costs.iter().map(|cost| cost.all_instructions);
+    let us = instructions.max().unwrap_or(0) as f64 * CYCLES_PER_INSTRUCTION / 168.0 + FLASH_US;
+    println!("RESULT firmware_update_longest_tick_us_estimate={us:.0}");
+    expect(us < TICK_US_MAX, || format!("a tick of {us:.0} us"))?;
     let invalid = seen
         .axes
         .iter()
