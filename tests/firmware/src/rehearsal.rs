@@ -53,7 +53,9 @@ fn moving(
 pub fn record(bench: &Bench, part: Part, log: &Path, bus: &Path, reference: &Path) -> Outcome {
     let text = std::fs::read_to_string(log)?;
     let (mut machine, ticks) = moving(bench, part, [&[], &[]], &text)?;
-    for (on, ticks) in [(true, ticks - TICKS_APART), (false, TICKS_APART)] {
+    // A request before the controller has joined the bus is lost.
+    machine.run_ticks(TICKS_APART)?;
+    for (on, ticks) in [(true, ticks - 2 * TICKS_APART), (false, TICKS_APART)] {
         let token = u8::from(on);
         let (id, bytes) = command(Request::Record { on }, token, token);
         machine.chip.can.receive(id, bytes);
