@@ -158,9 +158,13 @@ impl Retained {
 
     /// Whether the parameters made the program fault twice in a row at its start. Asked once in
     /// a start: the next parameters begin anew.
-    pub fn blames_parameters(&mut self) -> bool {
+    pub const fn blames_parameters(&mut self) -> bool {
         self.proven = false;
-        self.early_faults >= EARLY_MAX
+        let blamed = self.early_faults >= EARLY_MAX;
+        if blamed {
+            self.early_faults = 0;
+        }
+        blamed
     }
 
     /// The program has run long enough with its parameters.
@@ -304,6 +308,9 @@ mod tests {
         assert!(!fault(FaultKind::HardFault, Step::Ticking, true));
         assert!(!fault(FaultKind::Watchdog, Step::Parameters, false));
         assert!(fault(FaultKind::StackOverflow, Step::Ticking, false));
+        // Those that are used in their place begin anew.
+        assert!(!fault(FaultKind::Panic, Step::Ticking, false));
+        assert!(fault(FaultKind::Panic, Step::Ticking, false));
         assert!(!fault(FaultKind::Panic, Step::Ticking, true));
     }
 
