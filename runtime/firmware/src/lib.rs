@@ -16,6 +16,7 @@
 //! | [`light`] | what the LED shows |
 //! | [`outbox`] | frames that wait for a mailbox |
 //! | [`telemetry`] | what a debugger reads |
+//! | [`start_up`] | what is known of the run that a reset ended |
 //! | [`retained`] | what survives a reset: the last fault, the zero deviation |
 //! | [`fpu`] | the rounding mode that the decoder relies on |
 //!
@@ -33,6 +34,7 @@ pub mod records;
 pub mod retained;
 pub mod schedule;
 pub mod slots;
+pub mod start_up;
 pub mod store;
 #[allow(unsafe_code)] // a symbol name that a debugger finds; see its text
 pub mod telemetry;

@@ -45,7 +45,7 @@ impl DelayNs for Cycles {
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use super::start::{Before, Found, OptionBytes, ZeroKeeper};
+    use super::start::{self, Found, OptionBytes, ZeroKeeper};
     use super::{Cycles, board, board::Converter, bus::Bus, fault, flash, timer::Clock};
     use super::{random::Random, wait::Stopwatch, watchdog::Watchdog};
     use cortex_m::peripheral::SCB;
@@ -55,13 +55,13 @@ mod app {
     use firmware::records::Records;
     use firmware::retained::{Retained, Step};
     use firmware::schedule::{Schedule, Tick};
-    use firmware::slots::{Loaded, Refusal};
+    use firmware::slots::Loaded;
+    use firmware::start_up::Cause;
     use firmware::store::Record;
     use firmware::telemetry::{Counters, Ended, STAGE};
     use hal_adapters::adc::FrameSampler;
     use hal_adapters::can::Layout;
     use hal_adapters::can::update::Identity;
-    use runtime::{OnInvalid, Servo};
     use stm32f4xx_hal::gpio::PinState;
     use stm32f4xx_hal::pac::TIM2;
     use stm32f4xx_hal::rcc::Enable;
@@ -107,9 +107,9 @@ mod app {
         fault::guard_stack(&mut cx.core.MPU);
         let device = cx.device;
         let mut stopwatch = Stopwatch::new(cx.core.SYST);
-        let before = Before::take(&device.RCC);
+        let before = start::before(&device.RCC);
         let mut watchdog = Watchdog::start(device.IWDG, &device.DBGMCU, &mut stopwatch);
-        let (mut rcc, crystal) = before.clocks(device.RCC, &mut stopwatch);
+        let (mut rcc, crystal) = start::clocks(&before, device.RCC, &mut stopwatch);
 
         watchdog.feed();
         fault::begin(Step::Peripherals);
@@ -135,19 +135,7 @@ mod app {
         // After a warm start the FPU may have any settings; with these the arithmetic is the host's.
         Fpu.restore();
         let sound = runtime::arithmetic::check().is_ok() && Fpu::defaults_are_sound();
-        let parameters = if !sound {
-            Parameters::SelfTestFailed
-        } else if let Some(loaded) = loaded {
-            Parameters::Usable {
-                servo: Servo::new(&*loaded.decoder, OnInvalid::Zero),
-                serial: &loaded.serial,
-                other_slot: found.refusal,
-            }
-        } else {
-            Parameters::None {
-                refusal: found.refusal.unwrap_or(Refusal::NEITHER),
-            }
-        };
+        let parameters = Parameters::at_start(loaded, found.refusal, sound);
         let identity = Identity {
             serial: board::STAGE_SERIAL,
             key: board::STAGE_KEY,
@@ -164,7 +152,8 @@ mod app {
         // If the converter is not there yet, the ticks report why and start it again.
         let _ = acquisition.start(&mut Cycles);
 
-        let board = before.board_facts(
+        let board = start::board_facts(
+            &before,
             options,
             &Found {
                 pulled_up: parts.pulled_up,
@@ -173,7 +162,7 @@ mod app {
                 zero_lost,
             },
         );
-        STAGE.put_start(before.watchdog, &board);
+        STAGE.put_start(before.cause == Cause::Watchdog, &board);
         TIM2::enable(&mut rcc);
         let mut clock = Clock::new(device.TIM2);
         let schedule = Schedule::starting(clock.now_us());

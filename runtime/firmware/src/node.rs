@@ -1,22 +1,14 @@
 //! One tick of the stage controller: codes in, frames out; and what it is asked for.
-//!
-//! State and reason of the status frame (every 16 ticks, and at once after the bus was off):
-//!
-//! | state | reason |
-//! |---|---|
-//! | 1 running | 0; or 0x80 + reason of parameters that do not run: of a slot, if that is damaged; 12: those that are passed over, as they made the program fault twice; 13: the flash cannot be written |
-//! | 2 no parameters | 2: both slots are erased |
-//! | 3 bad parameters | slot * 16 + kind: 1 cut short, 3 no blob at all, 4 newer layout, 5 bad header, 7 wrong check (torn), 8 bad payload, 9 unusable values, 10 another stage's; 12 made the program fault twice: tried again after power-on |
-//! | 4 no frames | 3 silent converter (line at 0 or 1), 7 no new codes |
-//! | 5 sensor fault | 1 SPI, 2 pin, 4 wrong part, 5 wrong setting or unexpected reset, 6 wrong check, 8 wrong input, 10 SYNC does not arrive; 0x10 + channel: code at a rail, 0x20 + channel: code that never changes (0 to 2 Hall A to C, 3 to 5 gaps 1 to 3) |
-//! | 6 self-test failed | 1: arithmetic is not that of the host, or the core would not restore the FPU's settings |
-//! | 7 updating | 0: new parameters are coming or being stored, and every pose is invalid |
+
+mod parameters;
+mod state;
+
+pub use parameters::Parameters;
+pub use state::{REASON_CHANNEL, REASON_FPU, REASON_OTHER_SLOT, SampleFault};
 
 use crate::fpu::FpuSettings;
 use crate::outbox::Outbox;
-use crate::slots::Refusal;
 use embedded_can::Frame;
-use hal_adapters::adc::AdcError;
 use hal_adapters::can::command::Told;
 use hal_adapters::can::service::Updates;
 pub use hal_adapters::can::status::BoardFacts;
@@ -26,19 +18,10 @@ use hal_adapters::can::update::{Identity, Nonce, Receiver, Store};
 use hal_adapters::can::{Layout, PROTOCOL_VERSION, PoseSender, Service, sensor};
 use runtime::servo::Health;
 use runtime::{PlanarPose, RawFrame, Reading, Servo, Status};
+use state::state_of;
 
 /// Ticks of a second.
 const TICKS_PER_SECOND: u32 = 1_000_000 / crate::schedule::PERIOD_US;
-
-/// Reasons of [`NodeState::SensorFault`] from here on: a code at a rail or implausible, with
-/// its channel (0 to 2 Hall A to C, 3 to 5 gaps 1 to 3). Below: [`AdcError::number`].
-pub const REASON_CHANNEL: u8 = 0x10;
-/// Reasons of [`NodeState::Running`] with this bit: the other slot is damaged; below it
-/// [`Refusal::reason`].
-pub const REASON_OTHER_SLOT: u8 = 0x80;
-/// Reason of [`NodeState::SelfTestFailed`]: arithmetic is not that of the host, or the core
-/// would not restore the FPU's settings for interrupts.
-pub const REASON_FPU: u8 = 1;
 
 /// The reading of a tick that gave no pose.
 const NOTHING: Reading = Reading {
@@ -80,47 +63,6 @@ impl Facts {
             self.board.board_checks |= board_check::CAN_NOT_STARTED;
         }
     }
-}
-
-/// A fault of the converter in one byte, and whether it gave nothing at all.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SampleFault {
-    reason: u8,
-    silent: bool,
-}
-
-impl<B> From<&AdcError<B>> for SampleFault {
-    fn from(error: &AdcError<B>) -> Self {
-        Self {
-            reason: error.number(),
-            silent: matches!(error, AdcError::Silent { .. } | AdcError::NotReady { .. }),
-        }
-    }
-}
-
-/// Why a node decodes or does not.
-#[derive(Clone, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "there is one, in a static, and no heap"
-)]
-pub enum Parameters<'d> {
-    /// There are parameters.
-    Usable {
-        /// Runs their decoder.
-        servo: Servo<'d>,
-        /// Serial number of the stage.
-        serial: &'d str,
-        /// What is wrong with parameters that are not used.
-        other_slot: Option<Refusal>,
-    },
-    /// There are none, or none that are sound.
-    None {
-        /// What is wrong with the slots.
-        refusal: Refusal,
-    },
-    /// The controller failed its own test and must not decode.
-    SelfTestFailed,
 }
 
 /// The stage controller, apart from its chip.
@@ -175,7 +117,7 @@ impl<'d> Node<'d> {
 
     /// The zero deviation that is subtracted, as a pose.
     pub const fn zero(&self) -> PlanarPose<f32> {
-        match self.servo() {
+        match self.parameters.servo() {
             Some(servo) => servo.zero(),
             None => PlanarPose::ZERO,
         }
@@ -184,14 +126,14 @@ impl<'d> Node<'d> {
     /// Subtracts a zero deviation that was kept over a reset. Without parameters, or if it is
     /// not finite, nothing happens.
     pub fn restore_zero(&mut self, zero: PlanarPose<f32>) {
-        if let Some(servo) = servo_of(&mut self.parameters) {
+        if let Some(servo) = self.parameters.servo_mut() {
             servo.set_zero(zero);
         }
     }
 
     /// Whether there are parameters to decode with.
     pub const fn decodes(&self) -> bool {
-        self.servo().is_some()
+        self.parameters.servo().is_some()
     }
 
     /// State and reason after the last tick.
@@ -227,12 +169,13 @@ impl<'d> Node<'d> {
         fpu: &mut impl FpuSettings,
         outbox: &mut Outbox,
     ) -> Reading {
-        let servo = servo_of(&mut self.parameters);
+        let servo = self.parameters.servo_mut();
         self.service.before_tick(servo, facts.servo_off_pin);
         let reading = self.decode(&sample, fpu);
-        self.state = self.state_of(&sample, &reading);
+        let is_updating = self.receiver.is_updating();
+        self.state = state_of(&self.parameters, is_updating, &sample, &reading);
         self.board_checks = facts.board.board_checks;
-        if let Parameters::Usable { .. } = self.parameters {
+        if self.decodes() {
             self.send_pose(&reading, sample.as_ref().ok(), outbox);
         }
         if let Ok(frame) = &sample
@@ -240,9 +183,9 @@ impl<'d> Node<'d> {
         {
             self.send_codes(frame, outbox);
         }
-        let servo = servo_of(&mut self.parameters);
+        let servo = self.parameters.servo_mut();
         let answer = self.service.tick(servo.as_deref());
-        let page = self.service.identity_page(self.serial());
+        let page = self.service.identity_page(self.parameters.serial());
         let was_off = core::mem::replace(&mut self.bus_off_told, facts.bus_off) != facts.bus_off;
         let due = match self.ticks % u32::from(SLOW_TICKS) {
             0 => Some(Told::Status(self.status(facts))),
@@ -270,7 +213,7 @@ impl<'d> Node<'d> {
         store: &mut dyn Store,
         nonce: Option<Nonce>,
     ) {
-        let servo = servo_of(&mut self.parameters);
+        let servo = self.parameters.servo_mut();
         let updates = Updates {
             receiver: &mut self.receiver,
             store,
@@ -321,7 +264,7 @@ impl<'d> Node<'d> {
         sample: &Result<RawFrame, SampleFault>,
         fpu: &mut impl FpuSettings,
     ) -> Reading {
-        let Parameters::Usable { servo, .. } = &mut self.parameters else {
+        let Some(servo) = self.parameters.servo_mut() else {
             return NOTHING;
         };
         let changed_before = fpu.restore();
@@ -338,35 +281,6 @@ impl<'d> Node<'d> {
         }
     }
 
-    fn state_of(
-        &self,
-        sample: &Result<RawFrame, SampleFault>,
-        reading: &Reading,
-    ) -> (NodeState, u8) {
-        let other_slot = match &self.parameters {
-            Parameters::SelfTestFailed => return (NodeState::SelfTestFailed, REASON_FPU),
-            _ if self.receiver.is_updating() => return (NodeState::Updating, 0),
-            Parameters::None { refusal } if refusal.erased => {
-                return (NodeState::NoParameters, refusal.reason);
-            }
-            Parameters::None { refusal } => return (NodeState::BadParameters, refusal.reason),
-            Parameters::Usable { other_slot, .. } => other_slot.filter(|slot| !slot.erased),
-        };
-        let bad_codes = reading.status.bits() & Status::HALL.with(Status::CAPACITIVE).bits();
-        match sample {
-            Err(fault) if fault.silent => (NodeState::NoFrames, fault.reason),
-            Err(fault) => (NodeState::SensorFault, fault.reason),
-            Ok(_) if bad_codes != 0 => {
-                let channel = bad_codes.trailing_zeros() as u8;
-                (NodeState::SensorFault, REASON_CHANNEL + channel)
-            }
-            Ok(_) => {
-                let reason = other_slot.map_or(0, |slot| REASON_OTHER_SLOT | slot.reason);
-                (NodeState::Running, reason)
-            }
-        }
-    }
-
     fn status(&self, facts: &Facts) -> NodeStatus {
         let on = |bit, is| if is { bit } else { 0 };
         let (state, reason) = self.state;
@@ -376,7 +290,7 @@ impl<'d> Node<'d> {
             flags: on(flag::WATCHDOG_RESET, self.watchdog_reset)
                 | on(flag::BUS_WAS_OFF, facts.bus_off > 0)
                 | on(flag::INTERNAL_OSCILLATOR, facts.internal_oscillator)
-                | self.service.flags(self.servo()),
+                | self.service.flags(self.parameters.servo()),
             missed_ticks: u16::try_from(facts.missed_ticks).unwrap_or(u16::MAX),
             bus_off: u8::try_from(facts.bus_off).unwrap_or(u8::MAX),
             version: PROTOCOL_VERSION,
@@ -384,7 +298,7 @@ impl<'d> Node<'d> {
     }
 
     fn health(&self) -> Health {
-        match self.servo() {
+        match self.parameters.servo() {
             Some(servo) => servo.health(),
             None => Health {
                 ticks: self.ticks,
@@ -393,28 +307,6 @@ impl<'d> Node<'d> {
                 ..Health::default()
             },
         }
-    }
-
-    const fn servo(&self) -> Option<&Servo<'d>> {
-        match &self.parameters {
-            Parameters::Usable { servo, .. } => Some(servo),
-            Parameters::None { .. } | Parameters::SelfTestFailed => None,
-        }
-    }
-
-    fn serial(&self) -> &'d str {
-        match self.parameters {
-            Parameters::Usable { serial, .. } => serial,
-            Parameters::None { .. } | Parameters::SelfTestFailed => "",
-        }
-    }
-}
-
-/// The servo, where there are parameters.
-const fn servo_of<'p, 'd>(parameters: &'p mut Parameters<'d>) -> Option<&'p mut Servo<'d>> {
-    match parameters {
-        Parameters::Usable { servo, .. } => Some(servo),
-        Parameters::None { .. } | Parameters::SelfTestFailed => None,
     }
 }
 

@@ -1,11 +1,12 @@
 extern crate std;
 
 use super::*;
-use crate::slots::{Loaded, load};
+use crate::slots::{Loaded, Refusal, load};
+use hal_adapters::adc::AdcError;
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request};
 use hal_adapters::can::update::MemoryStore;
 use hal_adapters::can::{BusFrame, SensorReceiver, Timing};
-use runtime::OnInvalid;
+use runtime::{OnInvalid, Servo};
 use std::boxed::Box;
 use std::vec::Vec;
 

@@ -6,8 +6,8 @@
 use crate::board::{self, INTERNAL_MHZ};
 use crate::fault;
 use crate::wait::Stopwatch;
-use firmware::node::Node;
-use firmware::retained::{FaultKind, KeptZero, Retained, Step};
+use firmware::retained::{KeptZero, Step};
+use firmware::start_up::{Before, Cause};
 use hal_adapters::can::status::{BoardFacts, board_check as check};
 use runtime::PlanarPose;
 use stm32f4xx_hal::pac::{FLASH, RCC};
@@ -49,92 +49,59 @@ impl OptionBytes {
     }
 }
 
-/// What was before this start.
-pub struct Before {
-    /// Whether the watchdog caused this start.
-    pub watchdog: bool,
-    /// Whether the watchdog or the program itself did, on a fault.
-    pub by_fault: bool,
-    /// Whether the parameters made the program fault twice in a row.
-    pub blames_parameters: bool,
-    /// The record that survived; after power-on an empty one.
-    record: Retained,
+/// Reads and clears the cause of the reset; what was before it.
+pub fn before(rcc: &RCC) -> Before {
+    let flags = rcc.csr().read();
+    rcc.csr().modify(|_, w| w.rmvf().set_bit());
+    let cause = if flags.borrstf().bit_is_set() || flags.porrstf().bit_is_set() {
+        Cause::PowerOn
+    } else if flags.wdgrstf().bit_is_set() {
+        Cause::Watchdog
+    } else {
+        Cause::Reset
+    };
+    let before = Before::of(cause, fault::retained());
+    fault::retain(&before.record);
+    before
 }
 
-impl Before {
-    /// Reads and clears the cause of the reset, and notes a reset by the watchdog.
-    pub fn take(rcc: &RCC) -> Self {
-        let cause = rcc.csr().read();
-        rcc.csr().modify(|_, w| w.rmvf().set_bit());
-        let power_on = cause.borrstf().bit_is_set() || cause.porrstf().bit_is_set();
-        let watchdog = cause.wdgrstf().bit_is_set();
-        let mut record = if power_on {
-            Retained::default()
-        } else {
-            fault::retained().unwrap_or_else(Retained::damaged)
-        };
-        if watchdog {
-            record.note(FaultKind::Watchdog, 0, 0);
-        }
-        let by_fault = core::mem::take(&mut record.crashed);
-        let blames_parameters = record.blames_parameters();
-        fault::retain(&record);
-        Self {
-            watchdog,
-            by_fault,
-            blames_parameters,
-            record,
-        }
+/// Sets up the clocks: by the crystal, or by the internal oscillator if the crystal does not
+/// start, the PLL did not lock to it, or it stopped. Says whether it is the crystal.
+pub fn clocks(before: &Before, rcc: RCC, stopwatch: &mut Stopwatch) -> (Rcc, bool) {
+    let failed = before.by_fault && before.record.fault.is_of_the_crystal();
+    fault::begin(Step::Clocks);
+    let crystal = !failed && {
+        rcc.cr().modify(|_, w| w.hseon().set_bit());
+        let ready = || rcc.cr().read().hserdy().bit_is_set();
+        stopwatch.until(INTERNAL_MHZ, CRYSTAL_US, ready)
+    };
+    if !crystal {
+        rcc.cr().modify(|_, w| w.hseon().clear_bit());
+        fault::begin(Step::InternalClock);
     }
-
-    /// Sets up the clocks: by the crystal, or by the internal oscillator if the crystal does not
-    /// start, the PLL did not lock to it, or it stopped. Says whether it is the crystal.
-    pub fn clocks(&self, rcc: RCC, stopwatch: &mut Stopwatch) -> (Rcc, bool) {
-        let failed = self.by_fault && self.record.fault.is_of_the_crystal();
-        fault::begin(Step::Clocks);
-        let crystal = !failed && {
-            rcc.cr().modify(|_, w| w.hseon().set_bit());
-            let ready = || rcc.cr().read().hserdy().bit_is_set();
-            stopwatch.until(INTERNAL_MHZ, CRYSTAL_US, ready)
-        };
-        if !crystal {
-            rcc.cr().modify(|_, w| w.hseon().clear_bit());
-            fault::begin(Step::InternalClock);
-        }
-        let rcc = rcc.freeze(board::clocks(crystal));
-        if crystal {
-            // If it stops later, the core gets an interrupt.
-            rcc.cr().modify(|_, w| w.csson().set_bit());
-        }
-        (rcc, crystal)
+    let rcc = rcc.freeze(board::clocks(crystal));
+    if crystal {
+        // If it stops later, the core gets an interrupt.
+        rcc.cr().modify(|_, w| w.csson().set_bit());
     }
+    (rcc, crystal)
+}
 
-    /// What the health frames tell of the board and of the last fault.
-    pub fn board_facts(&self, options: OptionBytes, found: &Found) -> BoardFacts {
-        let on = |bit, is| if is { bit } else { 0 };
-        BoardFacts {
-            last_fault: self.record.fault.kind_and_step,
-            fault_address: self.record.fault.address,
-            fault_detail: self.record.fault.detail,
-            faults: self.record.faults,
-            option_bytes: options.word,
-            board_checks: on(check::NO_PULL_UP_ON_SELECT, !found.pulled_up.select)
-                | on(check::NO_PULL_UP_ON_CONTROL, !found.pulled_up.control)
-                | on(check::BROWN_OUT_LOW, options.brown_out_low)
-                | on(check::INTERNAL_OSCILLATOR, !found.crystal)
-                | on(check::CAN_NOT_STARTED, !found.can_started)
-                | on(check::ZERO_LOST, found.zero_lost),
-        }
-    }
-
-    /// Restores the zero deviation if it was measured with the blob of this CRC. Says whether one
-    /// may have been lost.
-    pub fn restore_zero(&self, node: &mut Node<'_>, blob: u32) -> bool {
-        let KeptZero { blob: of, zero } = self.record.zero;
-        if of == blob {
-            node.restore_zero(zero);
-        }
-        node.zero() != zero
+/// What the health frames tell of the board and of the last fault.
+pub fn board_facts(before: &Before, options: OptionBytes, found: &Found) -> BoardFacts {
+    let on = |bit, is| if is { bit } else { 0 };
+    BoardFacts {
+        last_fault: before.record.fault.kind_and_step,
+        fault_address: before.record.fault.address,
+        fault_detail: before.record.fault.detail,
+        faults: before.record.faults,
+        option_bytes: options.word,
+        board_checks: on(check::NO_PULL_UP_ON_SELECT, !found.pulled_up.select)
+            | on(check::NO_PULL_UP_ON_CONTROL, !found.pulled_up.control)
+            | on(check::BROWN_OUT_LOW, options.brown_out_low)
+            | on(check::INTERNAL_OSCILLATOR, !found.crystal)
+            | on(check::CAN_NOT_STARTED, !found.can_started)
+            | on(check::ZERO_LOST, found.zero_lost),
     }
 }
 

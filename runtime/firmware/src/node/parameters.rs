@@ -1,0 +1,71 @@
+//! Why a node decodes or does not.
+
+use crate::slots::{Loaded, Refusal};
+use runtime::{OnInvalid, Servo};
+
+/// Why a node decodes or does not.
+#[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one, in a static, and no heap"
+)]
+pub enum Parameters<'d> {
+    /// There are parameters.
+    Usable {
+        /// Runs their decoder.
+        servo: Servo<'d>,
+        /// Serial number of the stage.
+        serial: &'d str,
+        /// What is wrong with parameters that are not used.
+        other_slot: Option<Refusal>,
+    },
+    /// There are none, or none that are sound.
+    None {
+        /// What is wrong with the slots.
+        refusal: Refusal,
+    },
+    /// The controller failed its own test and must not decode.
+    SelfTestFailed,
+}
+
+impl<'d> Parameters<'d> {
+    /// At start-up: what was loaded and what is wrong with the rest. Without `is_sound`, whether
+    /// the arithmetic is that of the host, nothing is decoded.
+    pub fn at_start(loaded: Option<&'d Loaded>, refusal: Option<Refusal>, is_sound: bool) -> Self {
+        match loaded {
+            _ if !is_sound => Self::SelfTestFailed,
+            Some(loaded) => Self::Usable {
+                servo: Servo::new(&*loaded.decoder, OnInvalid::Zero),
+                serial: &loaded.serial,
+                other_slot: refusal,
+            },
+            None => Self::None {
+                refusal: refusal.unwrap_or(Refusal::NEITHER),
+            },
+        }
+    }
+
+    /// The servo, where there are parameters.
+    pub(super) const fn servo(&self) -> Option<&Servo<'d>> {
+        match self {
+            Self::Usable { servo, .. } => Some(servo),
+            Self::None { .. } | Self::SelfTestFailed => None,
+        }
+    }
+
+    /// The same, to be changed.
+    pub(super) const fn servo_mut(&mut self) -> Option<&mut Servo<'d>> {
+        match self {
+            Self::Usable { servo, .. } => Some(servo),
+            Self::None { .. } | Self::SelfTestFailed => None,
+        }
+    }
+
+    /// Serial number of the stage; empty without parameters.
+    pub(super) const fn serial(&self) -> &'d str {
+        match self {
+            Self::Usable { serial, .. } => serial,
+            Self::None { .. } | Self::SelfTestFailed => "",
+        }
+    }
+}
