@@ -66,6 +66,20 @@ pub trait Flash {
     fn erase(&mut self, sector: Sector) -> Result<(), FlashFault>;
 }
 
+impl<F: Flash> Flash for &mut F {
+    fn bytes(&self, sector: Sector) -> &[u8; SECTOR_BYTES] {
+        (**self).bytes(sector)
+    }
+
+    fn program(&mut self, sector: Sector, word: usize, value: u32) -> Result<(), FlashFault> {
+        (**self).program(sector, word, value)
+    }
+
+    fn erase(&mut self, sector: Sector) -> Result<(), FlashFault> {
+        (**self).erase(sector)
+    }
+}
+
 /// Why a word or sector does not hold what was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WriteFault {

@@ -24,31 +24,42 @@ use std::vec::Vec;
 
 /// Where in an operation the power fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Cut {
+pub enum Cut {
+    /// Nothing has changed.
     Before,
+    /// Some bits have.
     Inside,
     /// The operation is complete, and the caller is not told.
     After,
 }
 
 impl Cut {
-    pub(super) const ALL: [Self; 3] = [Self::Before, Self::Inside, Self::After];
+    /// Each.
+    pub const ALL: [Self; 3] = [Self::Before, Self::Inside, Self::After];
 }
 
 /// Random words by a seed (SplitMix64, Steele et al. 2014).
 #[derive(Clone, Debug)]
-pub(super) struct Words(pub(super) u64);
+pub struct Words(
+    /// The seed.
+    pub u64,
+);
 
 impl Words {
-    pub(super) fn next(&mut self) -> u32 {
+    /// The next word.
+    pub fn draw(&mut self) -> u32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((z ^ (z >> 31)) >> 32) as u32
     }
 
-    pub(super) fn below(&mut self, n: u32) -> u32 {
-        self.next() % n
+    /// The next number from 0 to `n` - 1.
+    ///
+    /// # Panics
+    /// If `n` is 0.
+    pub fn below(&mut self, n: u32) -> u32 {
+        self.draw() % n
     }
 
     /// A word in which each bit is 1 with the probability `eighths` / 8.
@@ -57,8 +68,8 @@ impl Words {
             return u32::MAX;
         }
         (0..3).fold(0, |word, digit| match eighths >> digit & 1 {
-            1 => word | self.next(),
-            _ => word & self.next(),
+            1 => word | self.draw(),
+            _ => word & self.draw(),
         })
     }
 }
@@ -73,27 +84,30 @@ struct Weak {
     eighths: u32,
 }
 
+/// Two sectors, with what a cut of the power leaves in them. Two are equal if they read the same.
 #[derive(Clone, Debug)]
-pub(super) struct FlashModel {
+pub struct FlashModel {
     bytes: [Box<[u8; SECTOR_BYTES]>; 2],
     weak: Vec<Weak>,
     words: Words,
     /// Whether weak bits read anew after each start.
     unstable: bool,
     /// Operations since the last start.
-    pub(super) operations: usize,
+    pub operations: usize,
     cut: Option<(usize, Cut)>,
     off: bool,
     /// Erases of each sector.
-    pub(super) erases: [usize; 2],
+    pub erases: [usize; 2],
     /// A word that neither programming nor an erase changes, without an error.
-    pub(super) stuck: Option<(Sector, usize)>,
+    pub stuck: Option<(Sector, usize)>,
 }
 
 const OFF: FlashFault = FlashFault { status: 0 };
 
 impl FlashModel {
-    pub(super) fn erased() -> Self {
+    /// Both sectors as they come from the factory.
+    #[must_use]
+    pub fn erased() -> Self {
         let sector = || {
             vec![0xff; SECTOR_BYTES]
                 .into_boxed_slice()
@@ -114,26 +128,29 @@ impl FlashModel {
     }
 
     /// Contents as a probe writes them.
-    pub(super) fn load(&mut self, sector: Sector, contents: &[u8]) {
+    ///
+    /// # Panics
+    /// If they are longer than a sector.
+    pub fn load(&mut self, sector: Sector, contents: &[u8]) {
         let bytes = &mut self.bytes[sector as usize];
         bytes.fill(0xff);
         bytes[..contents.len()].copy_from_slice(contents);
     }
 
     /// Another course of chance; with odd seeds weak bits read anew after each start.
-    pub(super) fn seed(&mut self, seed: u64) {
+    pub fn seed(&mut self, seed: u64) {
         self.words = Words(seed);
         self.unstable = seed % 2 == 1;
     }
 
     /// Cuts the power at this operation from now on, counted from 0.
-    pub(super) fn cut_at(&mut self, operation: usize, cut: Cut) {
+    pub fn cut_at(&mut self, operation: usize, cut: Cut) {
         self.operations = 0;
         self.cut = Some((operation, cut));
     }
 
     /// The power comes back.
-    pub(super) fn power_on(&mut self) {
+    pub fn power_on(&mut self) {
         (self.off, self.cut, self.operations) = (false, None, 0);
         if self.unstable {
             for index in 0..self.weak.len() {
@@ -146,7 +163,7 @@ impl FlashModel {
     }
 
     /// Whether the power has failed since the last start.
-    pub(super) const fn is_off(&self) -> bool {
+    pub const fn is_off(&self) -> bool {
         self.off
     }
 

@@ -153,7 +153,7 @@ proptest! {
         let mut flash = FlashModel::erased();
         let mut words = Words(seed);
         for sector in Sector::ALL {
-            let mut contents: Vec<u8> = (0..SECTOR_BYTES).map(|_| words.next() as u8).collect();
+            let mut contents: Vec<u8> = (0..SECTOR_BYTES).map(|_| words.draw() as u8).collect();
             if head {
                 contents[..8].copy_from_slice(b"HJNLSEAL");
             }

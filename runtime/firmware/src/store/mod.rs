@@ -88,8 +88,8 @@
 
 mod blobs;
 mod flash;
-#[cfg(test)]
-mod flash_model;
+#[cfg(any(test, feature = "flash-model"))]
+pub mod flash_model;
 mod journal;
 mod record;
 mod writing;
