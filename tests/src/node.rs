@@ -1,120 +1,172 @@
-//! A node that takes new parameters over the bus: the adapters' own code, with a store in RAM.
+//! The stage controller on this machine: the firmware's own start, node, records and outbox, over
+//! two sectors of flash in RAM. In place of the chip there are a clock that others advance, codes
+//! that are made up, and random numbers by a seed.
 
-use hal_adapters::can::command::Told;
-use hal_adapters::can::service::Updates;
-use hal_adapters::can::status::{NodeState, NodeStatus};
-use hal_adapters::can::update::{Identity, Key, MemoryStore, Receiver};
-use hal_adapters::can::{BusFrame, Coded, Service};
+use firmware::fpu::FpuSettings;
+use firmware::node::{Facts, Node as Ticking, Parameters};
+use firmware::outbox::Outbox;
+use firmware::records::Records;
+use firmware::retained::{Retained, WORDS};
+use firmware::schedule::PERIOD_US;
+use firmware::start_up::{Before, Cause, PROVEN_TICKS};
+use firmware::store::flash_model::FlashModel;
+use firmware::store::{Record, Store};
+use hal_adapters::can::status::NodeState;
+use hal_adapters::can::update::{Identity, Key, Store as _};
+use hal_adapters::can::{BusFrame, Coded, Layout};
 use hal_adapters::fault::Random;
-use runtime::BlobError;
+use runtime::RawFrame;
 
-/// Ticks of a second.
-pub const TICKS_PER_S: u32 = 500;
+/// Frames that a tick takes from the bus at most.
+pub const TAKEN_PER_TICK: usize = 3;
 
-/// A controller, as far as its parameters are concerned.
+/// A controller.
 pub struct Node {
     serial: &'static str,
     key: Option<Key>,
-    service: Service,
-    receiver: Receiver<'static>,
-    /// What it keeps over a reset.
-    pub store: MemoryStore,
-    /// Stands for the random number generator of a controller.
+    ticking: Ticking<'static>,
+    records: Records<FlashModel>,
+    /// What a reset leaves in RAM.
+    retained: [u32; WORDS],
+    outbox: Outbox,
     random: Random,
     resets: u32,
 }
 
-fn receiver(serial: &'static str, key: Option<Key>) -> Receiver<'static> {
+/// This machine's FPU, which nothing changes.
+struct Unchanged;
+
+impl FpuSettings for Unchanged {
+    fn restore(&mut self) -> bool {
+        false
+    }
+}
+
+impl Node {
+    /// A controller of the stage `serial` with this flash, after power-on.
+    pub fn new(serial: &'static str, key: Option<Key>, flash: FlashModel, seed: u64) -> Self {
+        let before = Before::of(Cause::PowerOn, None);
+        let (ticking, records) = start(flash, (serial, key), &before);
+        Self {
+            serial,
+            key,
+            ticking,
+            records,
+            retained: before.record.to_words(),
+            outbox: Outbox::new(),
+            random: Random::new(seed),
+            resets: 0,
+        }
+    }
+
+    /// One tick: decodes codes, takes frames of the bus, and does a step of an update.
+    pub fn tick(&mut self, received: impl IntoIterator<Item = BusFrame>) {
+        self.outbox.start_tick();
+        let sample = Ok(codes(self.ticking.ticks()));
+        let facts = Facts::default();
+        (self.ticking).tick(sample, &facts, &mut Unchanged, &mut self.outbox);
+        for frame in received.into_iter().take(TAKEN_PER_TICK) {
+            let nonce = [(); 4].map(|()| self.random.bits() as u32);
+            (self.ticking).take(&frame, &mut self.outbox, &mut self.records, Some(nonce));
+        }
+        if self.ticking.ticks() == PROVEN_TICKS {
+            let mut record = Retained::from_words(&self.retained).unwrap_or_default();
+            record.prove();
+            self.retained = record.to_words();
+        }
+        (self.ticking).update(&mut self.outbox, &mut self.records);
+    }
+
+    /// The next frame for the bus.
+    pub fn send(&mut self) -> Option<Coded> {
+        self.outbox.pop()
+    }
+
+    /// Whether it waits for a reset, and its answers have left.
+    pub fn is_to_be_reset(&self) -> bool {
+        self.ticking.wants_reset() && self.outbox.is_empty()
+    }
+
+    /// A reset that the program asked for: flash and retained RAM are kept, and all else is as the
+    /// start-up makes it.
+    pub fn reset(&mut self) {
+        self.start(Cause::Reset);
+    }
+
+    /// The power goes and comes back: only the flash is kept.
+    pub fn power_cycle(&mut self) {
+        self.start(Cause::PowerOn);
+    }
+
+    fn start(&mut self, cause: Cause) {
+        let before = Before::of(cause, Retained::from_words(&self.retained));
+        let mut flash = self.flash().clone();
+        flash.power_on();
+        (self.ticking, self.records) = start(flash, (self.serial, self.key), &before);
+        self.retained = before.record.to_words();
+        self.outbox = Outbox::new();
+        self.resets += 1;
+    }
+
+    /// Starts so far, without the first.
+    pub const fn resets(&self) -> u32 {
+        self.resets
+    }
+
+    /// Its flash.
+    pub const fn flash(&self) -> &FlashModel {
+        self.records.flash()
+    }
+
+    /// The blob that the next start would run.
+    pub fn newest(&self) -> Option<&[u8]> {
+        let newest = Store::read(self.flash(), Some(self.serial)).newest()?;
+        Some(newest.blob(self.flash()))
+    }
+
+    /// Records that were written: the sequence number of the newest one; 0 for a plain blob.
+    pub fn records(&self) -> u32 {
+        self.records.newest_sequence()
+    }
+
+    /// Whether a transfer is open.
+    pub fn is_updating(&self) -> bool {
+        self.ticking.state().0 == NodeState::Updating
+    }
+}
+
+/// What the firmware's `init` does, as far as it is not about the chip. What the controller has as
+/// statics is leaked: some 3 kB a start.
+fn start(
+    flash: FlashModel,
+    (serial, key): (&'static str, Option<Key>),
+    before: &Before,
+) -> (Ticking<'static>, Records<FlashModel>) {
+    let record = Box::leak(Box::new(Record::EMPTY));
+    let is_faulty = before.blames_parameters;
+    let (mut records, found) = Records::start(flash, record, Some(serial), is_faulty);
+    let place = Box::leak(Box::new(None));
+    let loaded = found.blob.and_then(|blob| records.load(blob, place));
+    let is_sound = runtime::arithmetic::check().is_ok();
+    let parameters = Parameters::at_start(loaded, found.refusal, is_sound);
     let identity = Identity {
         serial: Some(serial),
         key,
         program_version: 0x00_01_02_03,
         program_hash: 0xfeed_beef,
     };
-    Receiver::new(identity, TICKS_PER_S)
+    let mut node = Ticking::new(parameters, before.by_fault, Layout::Bits24, identity);
+    before.restore_zero(&mut node, loaded.map_or(0, |loaded| loaded.crc));
+    (node, records)
 }
 
-impl Node {
-    /// A node of the stage `serial` that runs a blob, as record `sequence`.
-    ///
-    /// # Errors
-    /// The blob is not sound.
-    pub fn new(
-        serial: &'static str,
-        key: Option<Key>,
-        (sequence, blob): (u32, &[u8]),
-        seed: u64,
-    ) -> Result<Self, BlobError> {
-        Ok(Self {
-            serial,
-            key,
-            service: Service::new(TICKS_PER_S),
-            receiver: receiver(serial, key),
-            store: MemoryStore::holding(sequence, blob)?,
-            random: Random::new(seed),
-            resets: 0,
-        })
-    }
-
-    /// Takes a frame of the bus; gives the answer.
-    pub fn take(&mut self, frame: &BusFrame) -> Option<Coded> {
-        let nonce = [(); 4].map(|()| self.random.bits() as u32);
-        let updates = Updates {
-            receiver: &mut self.receiver,
-            store: &mut self.store,
-            nonce: Some(nonce),
-        };
-        let taken = self.service.take_updating(frame, None, Some(updates))?;
-        taken.ok()?.answer
-    }
-
-    /// One tick; gives the answer to a request that has ended.
-    pub fn tick(&mut self) -> Option<Coded> {
-        // There is no servo, whose re-zero could end.
-        self.service.before_tick(None, None);
-        let _ = self.service.tick(None);
-        let servo_is_off = self.service.servo_is_off();
-        let answer = self.receiver.tick(servo_is_off, &mut self.store)?;
-        self.service.tell(&Told::Answer(answer))
-    }
-
-    /// The frame with its state.
-    pub fn status(&mut self) -> Option<Coded> {
-        let state = if self.receiver.is_updating() {
-            NodeState::Updating
-        } else {
-            NodeState::Running
-        };
-        self.service.tell(&Told::Status(NodeStatus {
-            state: Some(state),
-            reason: 0,
-            flags: self.service.flags(None),
-            missed_ticks: 0,
-            bus_off: 0,
-            version: hal_adapters::can::PROTOCOL_VERSION,
-        }))
-    }
-
-    /// Whether a transfer is open.
-    pub const fn is_updating(&self) -> bool {
-        self.receiver.is_updating()
-    }
-
-    /// Whether it asked to be reset.
-    pub const fn wants_reset(&self) -> bool {
-        self.receiver.wants_reset()
-    }
-
-    /// A reset: only the store is kept.
-    pub fn reset(&mut self) {
-        self.store.reset();
-        self.service = Service::new(TICKS_PER_S);
-        self.receiver = receiver(self.serial, self.key);
-        self.resets += 1;
-    }
-
-    /// Resets so far.
-    pub const fn resets(&self) -> u32 {
-        self.resets
+/// Plausible codes, and no two ticks with the same.
+fn codes(tick: u32) -> RawFrame {
+    let change = (tick % 100) as i32;
+    RawFrame {
+        hall: [100_000 + change, 200_000 - change, 300_000 + change],
+        capacitive: [1_000 + change, 2_000 + change, 3_000 - change],
+        sequence: tick,
+        time_us: tick.wrapping_mul(PERIOD_US),
     }
 }

@@ -1,9 +1,11 @@
-//! A host and a node on one bus, in memory: the host's own dialog against the adapters' own
-//! receiver, with a lossy bus, two hosts, resets, and a recording played again.
+//! A host and a node on one bus, in memory: the host's own dialog against the firmware's own
+//! node, with a lossy bus, two hosts, resets, and a recording played again.
 
+use firmware::store::Sector;
+use firmware::store::flash_model::{Cut, FlashModel};
+use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Command, Mailbox, Request, Told};
-use hal_adapters::can::update::{Key, Store, UpdateData, UpdateRequest};
-use hal_adapters::can::{BusFrame, Coded};
+use hal_adapters::can::update::{Key, UpdateData, UpdateRequest};
 use hal_adapters::fault::{Fault, Random};
 use host_fit::bus::update::{
     BlobReader, Dialog, Identifier, Job, Plan, UpdateError, Updated, Updater,
@@ -11,7 +13,7 @@ use host_fit::bus::update::{
 use runtime::ParameterSet;
 use runtime::blob::MAX_BYTES;
 use std::collections::VecDeque;
-use tests::node::Node;
+use tests::node::{Node, TAKEN_PER_TICK};
 
 const OLD: &[u8] = include_bytes!("../../runtime/examples/stage.bin");
 const NEW: &[u8] = include_bytes!("../../runtime/examples/field.bin");
@@ -21,10 +23,6 @@ const KEY: Key = *b"a key for a test";
 /// The longest frame at 1 Mbit/s, us.
 const SLOT_US: u64 = 135;
 const TICK_US: u64 = 2_000;
-/// Of ten slots so many are the node's own: codes and poses, 24-bit codes and every axis included.
-const BUSY_SLOTS: u64 = 6;
-/// What the receive store of a controller holds.
-const FIFO: usize = 3;
 /// A node is deaf for so long after a reset, us.
 const START_US: u64 = 500_000;
 
@@ -81,10 +79,16 @@ impl Channel {
     }
 }
 
+/// A controller that a probe has given this blob.
+fn node(serial: &'static str, key: Option<Key>, blob: &[u8], seed: u64) -> Node {
+    let mut flash = FlashModel::erased();
+    flash.load(Sector::First, blob);
+    Node::new(serial, key, flash, seed)
+}
+
 struct World {
     node: Node,
     fifo: VecDeque<BusFrame>,
-    outbox: VecDeque<Coded>,
     deaf_until_us: u64,
     to_node: Channel,
     to_hosts: Channel,
@@ -94,14 +98,15 @@ struct World {
     overruns: u32,
     /// The node is reset at these times.
     resets_us: Vec<u64>,
+    /// What was in flash after each cut of the power.
+    after_cuts: Vec<Vec<u8>>,
 }
 
 impl World {
     fn new(key: Option<Key>, faults: &[(Fault, u64)], seed: u64) -> Self {
         Self {
-            node: Node::new(SERIAL, key, (3, OLD), seed).expect("a sound example"),
+            node: node(SERIAL, key, OLD, seed),
             fifo: VecDeque::new(),
-            outbox: VecDeque::new(),
             deaf_until_us: 0,
             to_node: Channel::new(faults, seed ^ 0x5555),
             to_hosts: Channel::new(faults, seed ^ 0xaaaa),
@@ -109,6 +114,7 @@ impl World {
             recording: Vec::new(),
             overruns: 0,
             resets_us: Vec::new(),
+            after_cuts: Vec::new(),
         }
     }
 
@@ -118,30 +124,31 @@ impl World {
         self.now_us += SLOT_US;
         let is_deaf = self.now_us < self.deaf_until_us;
         for frame in self.to_node.arrived(self.now_us) {
-            if !is_deaf && self.fifo.len() < FIFO {
+            if !is_deaf && self.fifo.len() < TAKEN_PER_TICK {
                 self.fifo.push_back(frame);
             } else {
                 self.overruns += u32::from(!is_deaf);
             }
         }
         if self.now_us / TICK_US > tick_before && !is_deaf {
-            while let Some(frame) = self.fifo.pop_front() {
-                self.outbox.extend(self.node.take(&frame));
-            }
-            self.outbox.extend(self.node.tick());
+            self.node.tick(self.fifo.drain(..));
         }
         let is_due = self.resets_us.first().is_some_and(|at| *at <= self.now_us);
-        if is_due || self.node.wants_reset() && self.outbox.is_empty() {
+        let is_off = self.node.flash().is_off();
+        if is_due || is_off || self.node.is_to_be_reset() {
             if is_due {
                 self.resets_us.remove(0);
             }
-            self.node.reset();
+            if is_off {
+                self.node.power_cycle();
+                self.after_cuts.push(self.newest().to_vec());
+            } else {
+                self.node.reset();
+            }
             self.fifo.clear();
-            self.outbox.clear();
             self.deaf_until_us = self.now_us + START_US;
         }
-        let is_free = self.now_us / SLOT_US % 10 >= BUSY_SLOTS;
-        if is_free && let Some(coded) = self.outbox.pop_front() {
+        if !is_deaf && let Some(coded) = self.node.send() {
             self.to_hosts.send(self.now_us, BusFrame::from(coded));
         }
         self.to_hosts.arrived(self.now_us)
@@ -180,8 +187,13 @@ impl World {
     }
 
     fn newest(&self) -> &[u8] {
-        self.node.store.newest().expect("there is one")
+        self.node.newest().expect("there is one")
     }
+}
+
+fn command(host: &mut Mailbox, request: Request, token: u8) -> BusFrame {
+    let told = Told::Command(Command::new(request, token));
+    BusFrame::from(host.send(&told).expect("a known message"))
 }
 
 fn plan(blob: &[u8]) -> Plan {
@@ -195,10 +207,10 @@ fn plan(blob: &[u8]) -> Plan {
     }
 }
 
-/// The largest blob that a fit writes: the field model, with texts of full length.
-fn largest() -> Vec<u8> {
+/// The largest blob that a fit writes for this stage: the field model, with a full time.
+fn largest_of(serial: &str) -> Vec<u8> {
     let mut set = ParameterSet::from_bytes(NEW).expect("a sound example");
-    set.serial = "S".repeat(32).as_str().try_into().expect("32 bytes");
+    set.serial = serial.try_into().expect("32 bytes");
     set.created = "2026-11-22T10:00:00.000000+00:00"
         .try_into()
         .expect("32 bytes");
@@ -208,11 +220,15 @@ fn largest() -> Vec<u8> {
 
 #[test]
 fn the_largest_blob_takes_less_than_a_second_on_a_loaded_bus() {
-    let blob = largest();
+    let blob = largest_of(&"S".repeat(32));
     for key in [None, Some(KEY)] {
         let serial: &'static str = "S".repeat(32).leak();
         let mut world = World::new(key, &[], 1);
-        world.node = Node::new(serial, key, (0, &blob), 1).expect("sound");
+        world.node = node(serial, key, &blob, 1);
+        world.to_node.send(
+            0,
+            command(&mut Mailbox::default(), Request::Record { on: true }, 3),
+        );
         let mut newer = ParameterSet::from_bytes(&blob).expect("sound");
         newer.fit.rows += 1;
         let mut buffer = [0; MAX_BYTES];
@@ -259,7 +275,7 @@ fn on_a_bad_bus(rate: u64) -> [u32; 2] {
             match world.update(plan(NEW)) {
                 Ok(updated) => {
                     assert_eq!(world.newest(), NEW, "{fault:?} {seed}");
-                    assert_eq!(updated.sequence, Some(4), "{fault:?} {seed}");
+                    assert_eq!(updated.sequence, Some(1), "{fault:?} {seed}");
                     ends[0] += 1;
                 }
                 Err(error) => {
@@ -310,7 +326,7 @@ fn of_two_hosts_at_once_one_wins_or_both_in_turn() {
         assert!(token == 9 || !stored.is_empty(), "{results:?}");
         let newest = world.newest();
         assert!(newest == NEW || newest == other || stored.is_empty());
-        assert_eq!(world.node.store.writes() as usize, stored.len());
+        assert_eq!(world.node.records() as usize, stored.len());
         assert!(stored.len() < 2 || stored[0] != stored[1], "{stored:?}");
     }
 }
@@ -318,15 +334,12 @@ fn of_two_hosts_at_once_one_wins_or_both_in_turn() {
 #[test]
 fn a_host_that_finds_another_at_it_gives_up_and_does_not_end_its_transfer() {
     let mut world = World::new(None, &[], 1);
-    let command = |request, token| Told::Command(Command::new(request, token));
     let mut other = Mailbox::default();
+    let off = command(&mut other, Request::ServoOff { seconds: 255 }, 3);
     let begin = Request::Update(UpdateRequest::Begin { bytes: 500 });
-    let mut send = |world: &mut World, told| {
-        let coded = other.send(&told).expect("a known message");
-        world.to_node.send(world.now_us, BusFrame::from(coded));
-    };
-    send(&mut world, command(Request::ServoOff { seconds: 255 }, 3));
-    send(&mut world, command(begin, 200));
+    let begin = command(&mut other, begin, 200);
+    world.to_node.send(0, off);
+    world.to_node.send(0, begin);
     let mut host = Dialog::new(Updater::new(plan(NEW)), 1);
     let mut next_us = 0;
     while !host.is_over() {
@@ -339,15 +352,14 @@ fn a_host_that_finds_another_at_it_gives_up_and_does_not_end_its_transfer() {
         } else if world.now_us >= next_us {
             next_us = world.now_us + 1_000_000;
             let (token, index, word) = (200, 1, 2);
-            send(
-                &mut world,
-                Told::UpdateData(UpdateData { token, index, word }),
-            );
+            let data = Told::UpdateData(UpdateData { token, index, word });
+            let data = BusFrame::from(other.send(&data).expect("a known message"));
+            world.to_node.send(world.now_us, data);
         }
     }
     assert_eq!(host.into_job().result(), Err(UpdateError::Busy));
     assert!(world.node.is_updating());
-    assert_eq!(world.node.store.writes(), 0);
+    assert_eq!(world.node.records(), 0);
 }
 
 #[test]
@@ -358,8 +370,41 @@ fn a_reset_at_any_moment_leaves_the_old_or_the_new_and_the_update_goes_on() {
         let result = world.update(plan(NEW));
         assert!(result.is_ok(), "{at_ms}: {result:?}");
         assert_eq!(world.newest(), NEW, "{at_ms}");
-        assert_eq!(world.node.store.writes(), 1, "{at_ms}");
+        assert_eq!(world.node.records(), 1, "{at_ms}");
     }
+}
+
+#[test]
+fn a_cut_of_the_power_in_any_operation_leaves_the_old_or_the_new_and_the_update_goes_on() {
+    let mut whole = World::new(Some(KEY), &[], 5);
+    let in_the_start = whole.node.flash().operations;
+    assert!(whole.update(plan(NEW)).is_ok());
+    let operations = whole.node.flash().operations;
+    let (mut old, mut new) = (0, 0);
+    for (at, cut) in (0..operations).flat_map(|at| Cut::ALL.map(|cut| (at, cut))) {
+        // Of odd seeds, what was cut reads anew after each start.
+        let seed = at as u64;
+        let mut flash = FlashModel::erased();
+        flash.load(Sector::First, OLD);
+        flash.seed(seed);
+        flash.cut_at(at, cut);
+        let mut world = World::new(Some(KEY), &[], seed);
+        world.node = Node::new(SERIAL, Some(KEY), flash, seed);
+        let result = world.update(plan(NEW));
+        assert!(result.is_ok(), "{at} {cut:?}: {result:?}");
+        assert_eq!(world.newest(), NEW, "{at} {cut:?}");
+        match &world.after_cuts[..] {
+            [blob] if blob == OLD => old += 1,
+            [blob] if blob == NEW => new += 1,
+            _ => panic!("{at} {cut:?} left something else"),
+        }
+    }
+    println!(
+        "RESULT update_cuts={} in_the_start={} old={old} new={new}",
+        old + new,
+        3 * in_the_start
+    );
+    assert!(old > 3 * in_the_start && new > 0);
 }
 
 #[test]
@@ -372,7 +417,7 @@ fn activated_parameters_run_are_told_and_read_back() {
     let updated = updated.expect("it is taken");
     assert!(updated.is_active && world.node.resets() == 1);
     let before = updated.before.running.expect("it ran");
-    assert!(before.are(OLD) && before.sequence == 3);
+    assert!(before.are(OLD) && before.sequence == 0);
     let mut hosts = [Dialog::new(BlobReader::default(), 30)];
     world.run(&mut hosts);
     let [host] = hosts;
@@ -384,7 +429,7 @@ fn activated_parameters_run_are_told_and_read_back() {
         (identity.serial.as_str(), identity.needs_key),
         (SERIAL, true)
     );
-    assert_eq!((running.sequence, identity.newest_sequence), (4, 4));
+    assert_eq!((running.sequence, identity.newest_sequence), (1, 1));
     assert_eq!((running.rms, running.peak), (set.fit.rms, set.fit.peak));
     assert_eq!(running.created, set.created.as_str());
     assert_eq!(identity.program_version, [1, 2, 3]);
@@ -400,13 +445,13 @@ fn activated_parameters_run_are_told_and_read_back() {
         activates: true,
         ..plan(&[])
     });
-    assert_eq!(back.expect("there is one").sequence, Some(5));
+    assert_eq!(back.expect("there is one").sequence, Some(2));
     assert_eq!(world.newest(), OLD);
     let mut hosts = [Dialog::new(Identifier::default(), 60)];
     world.run(&mut hosts);
     let [host] = hosts;
     let running = host.into_job().result().expect("it answers").running;
-    assert!(running.is_some_and(|running| running.are(OLD) && running.sequence == 5));
+    assert!(running.is_some_and(|running| running.are(OLD) && running.sequence == 2));
 }
 
 #[test]
@@ -448,8 +493,7 @@ fn what_is_refused_is_refused_by_its_reason_and_nothing_is_written() {
     ] {
         let mut world = World::new(Some(KEY), &[], 3);
         assert_eq!(world.update(plan), Err(want));
-        assert_eq!(world.node.store.writes(), 0);
-        assert_eq!(world.node.store.newest_sequence(), 3);
+        assert_eq!(world.node.records(), 0);
     }
     // Nobody is there.
     let mut world = World::new(None, &[(Fault::Drop, 1_000_000)], 3);
@@ -476,7 +520,7 @@ fn an_interrupted_update_closes_its_transfer() {
         world.run(&mut hosts);
         let [host] = hosts;
         assert_eq!(host.into_job().result(), Err(UpdateError::Interrupted));
-        assert_eq!(world.node.store.writes(), 0);
+        assert_eq!(world.node.records(), 0);
         // Another may begin at once, and the servo is on again.
         let on = Plan {
             declares_servo_off: false,
@@ -515,7 +559,7 @@ fn a_recording_of_a_good_update_stores_nothing_when_it_is_played_again() {
                 world.slot();
             }
             (0..10_000).for_each(|_| drop(world.slot()));
-            assert_eq!(world.node.store.writes(), 1);
+            assert_eq!(world.node.records(), 1);
             assert_eq!(world.newest(), NEW);
         }
     }

@@ -56,7 +56,7 @@ mod app {
     use firmware::retained::{Retained, Step};
     use firmware::schedule::{Schedule, Tick};
     use firmware::slots::Loaded;
-    use firmware::start_up::Cause;
+    use firmware::start_up::{Cause, PROVEN_TICKS};
     use firmware::store::Record;
     use firmware::telemetry::{Counters, Ended, STAGE};
     use hal_adapters::adc::FrameSampler;
@@ -67,8 +67,6 @@ mod app {
     use stm32f4xx_hal::rcc::Enable;
 
     const CORE_MHZ: u32 = board::CORE_HZ / 1_000_000;
-    /// After so many ticks, 1 s, parameters are not blamed for a fault.
-    const PROVEN_TICKS: u32 = 500;
     /// Where no other node acknowledges the answers, a reset waits no longer.
     const RESET_TICKS_MAX: u32 = 100;
 

@@ -62,6 +62,11 @@ impl<F: Flash> Records<F> {
         (records, Found { blob, refusal })
     }
 
+    /// The flash as it is now.
+    pub const fn flash(&self) -> &F {
+        &self.flash
+    }
+
     fn refusal(&self, is_passed_over: bool) -> Option<Refusal> {
         if is_passed_over || self.store.passed_over().is_some() {
             return Some(Refusal::PASSED_OVER);

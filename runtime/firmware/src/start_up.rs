@@ -3,6 +3,9 @@
 use crate::node::Node;
 use crate::retained::{FaultKind, KeptZero, Retained};
 
+/// After so many ticks, 1 s, parameters are not blamed for a fault.
+pub const PROVEN_TICKS: u32 = 500;
+
 /// The cause of this start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {

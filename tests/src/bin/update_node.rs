@@ -1,17 +1,23 @@
-//! A node that takes new parameters over a CAN interface, until it is killed: for `tests/vcan`.
+//! The stage controller's program without its chip, on a CAN interface until it is killed: for
+//! `tests/vcan`. Its poses are of codes that are made up.
 //!
 //!     update_node INTERFACE params.bin SERIAL [KEY]
 //!
-//! `KEY`: 32 hexadecimal digits. Every record is lost when it ends.
+//! `KEY`: 32 hexadecimal digits. `params.bin` lies in its first slot as a probe flashes it; its flash is lost when it
+//! ends.
 
-use hal_adapters::can::{BusFrame, Coded, Message};
+use firmware::schedule::PERIOD_US;
+use firmware::store::Sector;
+use firmware::store::flash_model::FlashModel;
+use hal_adapters::can::{BusFrame, Message};
 use hal_adapters::socketcan::SocketCan;
+use std::collections::VecDeque;
 use std::error::Error;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
-use tests::node::{Node, TICKS_PER_S};
+use tests::node::{Node, TAKEN_PER_TICK};
 
-const TICK: Duration = Duration::from_micros(1_000_000 / TICKS_PER_S as u64);
+const TICK: Duration = Duration::from_micros(PERIOD_US as u64);
 /// How long it is deaf after a reset.
 const START: Duration = Duration::from_millis(200);
 const SEND_DEADLINE: Duration = Duration::from_millis(20);
@@ -47,33 +53,29 @@ fn run(
     serial: &'static str,
     key: Option<[u8; 16]>,
 ) -> Result<(), Box<dyn Error>> {
-    let blob = std::fs::read(params)?;
-    let seed = u64::from(std::process::id());
-    let mut node = Node::new(serial, key, (1, &blob), seed)?;
+    let mut flash = FlashModel::erased();
+    flash.load(Sector::First, &std::fs::read(params)?);
+    let mut node = Node::new(serial, key, flash, u64::from(std::process::id()));
     let mut bus = SocketCan::open(interface, &[Message::Command, Message::UpdateData])?;
-    let send = |bus: &SocketCan, coded: Option<Coded>| match coded {
-        Some(coded) => bus.send(&BusFrame::from(coded), SEND_DEADLINE),
-        None => Ok(()),
-    };
     println!("ready");
+    let mut received = VecDeque::new();
     let mut next = Instant::now() + TICK;
-    for tick in 0u64.. {
+    loop {
         while let Some(wait) = next.checked_duration_since(Instant::now()) {
-            if let Some(stamped) = bus.receive(wait)? {
-                send(&bus, node.take(&stamped.frame))?;
-            }
+            received.extend(bus.receive(wait)?.map(|stamped| stamped.frame));
         }
         next += TICK;
-        send(&bus, node.tick())?;
-        if tick.is_multiple_of(16) {
-            send(&bus, node.status())?;
+        let taken = received.len().min(TAKEN_PER_TICK);
+        node.tick(received.drain(..taken));
+        while let Some(coded) = node.send() {
+            bus.send(&BusFrame::from(coded), SEND_DEADLINE)?;
         }
-        if node.wants_reset() {
+        if node.is_to_be_reset() {
             node.reset();
             std::thread::sleep(START);
+            received.clear();
             while bus.receive(Duration::ZERO)?.is_some() {}
             next = Instant::now() + TICK;
         }
     }
-    Ok(())
 }
