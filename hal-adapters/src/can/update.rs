@@ -32,6 +32,7 @@
 //! parameters.
 
 mod authentication;
+#[cfg(test)]
 mod memory;
 mod receiver;
 mod request;
@@ -40,7 +41,8 @@ mod store;
 mod tell;
 
 pub use authentication::{Authenticator, Key, Nonce, TAG_BYTES, tag};
-pub use memory::MemoryStore;
+#[cfg(test)]
+use memory::MemoryStore;
 pub use receiver::{Identity, Receiver, Surroundings};
 pub use request::{UpdateData, UpdateRequest};
 pub use staging::{TAG_INDEX, word_of};

@@ -1,10 +1,12 @@
 extern crate std;
 
 use super::*;
+use crate::records::Records;
 use crate::slots::{Loaded, Refusal, load};
+use crate::store::Record;
+use crate::store::flash_model::FlashModel;
 use hal_adapters::adc::AdcError;
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request};
-use hal_adapters::can::update::MemoryStore;
 use hal_adapters::can::{BusFrame, SensorReceiver, Timing};
 use runtime::{OnInvalid, Servo};
 use std::boxed::Box;
@@ -47,7 +49,9 @@ const IDENTITY: Identity<'_> = Identity {
 };
 
 fn take(node: &mut Node<'_>, frame: &impl Frame, outbox: &mut Outbox) {
-    node.take(frame, outbox, &mut MemoryStore::default(), None);
+    let record = Box::leak(Box::new(Record::EMPTY));
+    let (mut records, _) = Records::start(FlashModel::erased(), record, None, false);
+    node.take(frame, outbox, &mut records, None);
 }
 
 fn frame(sequence: u32) -> RawFrame {

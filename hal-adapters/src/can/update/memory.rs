@@ -1,4 +1,4 @@
-//! A store in RAM: for tests of whatever updates a node, and for nodes that are rehearsals.
+//! A store in RAM, for the tests of the receiver.
 
 use super::store::{Change, Running, Store, Written};
 use runtime::blob::MAX_BYTES;
@@ -71,11 +71,6 @@ impl MemoryStore {
     /// The newest blob.
     pub fn newest(&self) -> Option<&[u8]> {
         self.newest.as_ref().map(Record::blob)
-    }
-
-    /// What the running blob holds.
-    pub fn running_set(&self) -> Option<&ParameterSet> {
-        self.running.as_ref().map(|(_, set)| set)
     }
 
     /// Records written since the store was made.
