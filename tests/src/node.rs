@@ -160,12 +160,12 @@ fn start(
     (node, records)
 }
 
-/// Plausible codes, and no two ticks with the same.
+/// Codes that 16-bit converters may give, and no two ticks in a row with the same.
 fn codes(tick: u32) -> RawFrame {
     let change = (tick % 100) as i32;
     RawFrame {
-        hall: [100_000 + change, 200_000 - change, 300_000 + change],
-        capacitive: [1_000 + change, 2_000 + change, 3_000 - change],
+        hall: [1_000 + change, 2_000 - change, change],
+        capacitive: [change, -change, 10 + change],
         sequence: tick,
         time_us: tick.wrapping_mul(PERIOD_US),
     }
