@@ -59,11 +59,15 @@ impl Node {
         }
     }
 
-    /// One tick: decodes codes, takes frames of the bus, and does a step of an update.
-    pub fn tick(&mut self, received: impl IntoIterator<Item = BusFrame>) {
+    /// One tick, of which so many before it were missed: decodes codes, takes frames of the bus,
+    /// and does a step of an update.
+    pub fn tick(&mut self, missed_ticks: u32, received: impl IntoIterator<Item = BusFrame>) {
         self.outbox.start_tick();
         let sample = Ok(codes(self.ticking.ticks()));
-        let facts = Facts::default();
+        let facts = Facts {
+            missed_ticks,
+            ..Facts::default()
+        };
         (self.ticking).tick(sample, &facts, &mut Unchanged, &mut self.outbox);
         for frame in received.into_iter().take(TAKEN_PER_TICK) {
             let nonce = [(); 4].map(|()| self.random.bits() as u32);

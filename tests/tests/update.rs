@@ -131,7 +131,7 @@ impl World {
             }
         }
         if self.now_us / TICK_US > tick_before && !is_deaf {
-            self.node.tick(self.fifo.drain(..));
+            self.node.tick(0, self.fifo.drain(..));
         }
         let is_due = self.resets_us.first().is_some_and(|at| *at <= self.now_us);
         let is_off = self.node.flash().is_off();

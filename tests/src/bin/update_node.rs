@@ -6,7 +6,7 @@
 //! `KEY`: 32 hexadecimal digits. `params.bin` lies in its first slot as a probe flashes it; its flash is lost when it
 //! ends.
 
-use firmware::schedule::PERIOD_US;
+use firmware::schedule::Schedule;
 use firmware::store::Sector;
 use firmware::store::flash_model::FlashModel;
 use hal_adapters::can::{BusFrame, Message};
@@ -17,7 +17,6 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use tests::node::{Node, TAKEN_PER_TICK};
 
-const TICK: Duration = Duration::from_micros(PERIOD_US as u64);
 /// How long it is deaf after a reset.
 const START: Duration = Duration::from_millis(200);
 const SEND_DEADLINE: Duration = Duration::from_millis(20);
@@ -58,15 +57,24 @@ fn run(
     let mut node = Node::new(serial, key, flash, u64::from(std::process::id()));
     let mut bus = SocketCan::open(interface, &[Message::Command, Message::UpdateData])?;
     println!("ready");
+    let started = Instant::now();
+    let now_us = || started.elapsed().as_micros() as u32;
     let mut received = VecDeque::new();
-    let mut next = Instant::now() + TICK;
+    let mut schedule = Schedule::starting(now_us());
     loop {
-        while let Some(wait) = next.checked_duration_since(Instant::now()) {
-            received.extend(bus.receive(wait)?.map(|stamped| stamped.frame));
+        // However late it is on a busy machine, the bus is looked at.
+        loop {
+            let left_us = schedule.due_us().wrapping_sub(now_us()).cast_signed();
+            let left_us = left_us.max(0).cast_unsigned();
+            match bus.receive(Duration::from_micros(left_us.into()))? {
+                Some(stamped) => received.push_back(stamped.frame),
+                None if left_us == 0 => break,
+                None => {}
+            }
         }
-        next += TICK;
+        schedule.start_tick(now_us());
         let taken = received.len().min(TAKEN_PER_TICK);
-        node.tick(received.drain(..taken));
+        node.tick(schedule.missed(), received.drain(..taken));
         while let Some(coded) = node.send() {
             bus.send(&BusFrame::from(coded), SEND_DEADLINE)?;
         }
@@ -75,7 +83,7 @@ fn run(
             std::thread::sleep(START);
             received.clear();
             while bus.receive(Duration::ZERO)?.is_some() {}
-            next = Instant::now() + TICK;
+            schedule = Schedule::starting(now_us());
         }
     }
 }
