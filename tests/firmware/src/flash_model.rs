@@ -3,6 +3,8 @@
 //! a sector raises them. While the flash is busy the core stands, because the program lies in
 //! it. A power cut in an operation leaves random bits between what was and what was to be.
 
+use std::collections::VecDeque;
+
 /// Start of sector 1.
 pub const FIRST: u32 = 0x0800_4000;
 /// Bytes of both sectors.
@@ -41,6 +43,31 @@ pub enum Cut {
     After,
 }
 
+impl Cut {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Before, Self::Inside, Self::After];
+}
+
+/// A cut of the power.
+#[derive(Clone, Copy, Debug)]
+pub struct PowerCut {
+    /// In which operation, counted from 0: from now on, or since the cut before.
+    pub at: u64,
+    /// Where in it.
+    pub place: Cut,
+    /// The course of chance.
+    pub seed: u32,
+}
+
+/// What an operation that fails tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failing {
+    /// An error in FLASH_SR.
+    Told,
+    /// Nothing.
+    Silent,
+}
+
 /// The two sectors and the registers.
 pub struct FlashModel {
     /// What the sectors hold.
@@ -49,12 +76,14 @@ pub struct FlashModel {
     pub operations: u64,
     /// Sectors erased.
     pub erases: u64,
-    /// The operation at which the power fails, counted from 0, and the course of chance.
-    pub cut: Option<(u64, Cut, u32)>,
+    /// Where the power fails.
+    cuts: VecDeque<PowerCut>,
+    /// Operations before those that the next of them counts.
+    counted: u64,
     /// Whether it has failed.
     pub power_lost: bool,
-    /// Whether every operation ends with an error.
-    pub broken: bool,
+    /// From which operation on nothing changes any more, and how the program can know.
+    pub fails: Option<(u64, Failing)>,
     control: u32,
     status: u32,
     keys: usize,
@@ -70,15 +99,22 @@ impl FlashModel {
             bytes: vec![0xff; BYTES],
             operations: 0,
             erases: 0,
-            cut: None,
+            cuts: VecDeque::new(),
+            counted: 0,
             power_lost: false,
-            broken: false,
+            fails: None,
             control: LOCK,
             status: 0,
             keys: 0,
             shut: false,
             busy_until_ns: 0,
         }
+    }
+
+    /// Cuts the power, one time after the other.
+    pub fn cut_at(&mut self, cuts: &[PowerCut]) {
+        self.cuts = cuts.iter().copied().collect();
+        self.counted = self.operations;
     }
 
     /// The registers as after a reset.
@@ -157,22 +193,32 @@ impl FlashModel {
     fn operate(&mut self, offset: usize, bytes: usize, wanted: impl Fn(u8, usize) -> u8) {
         let number = self.operations;
         self.operations += 1;
-        if self.broken {
-            self.status |= PROTECTED;
+        if let Some((from, failing)) = self.fails
+            && number >= from
+        {
+            self.status |= if failing == Failing::Told {
+                PROTECTED
+            } else {
+                0
+            };
             return;
         }
-        let cut = self.cut.filter(|(at, ..)| *at == number);
-        self.power_lost |= cut.is_some();
-        let mut chance = cut.map_or(0, |(_, _, seed)| seed | 1);
+        let counted = number - self.counted;
+        let cut = self.cuts.pop_front_if(|cut| cut.at == counted);
+        if cut.is_some() {
+            self.power_lost = true;
+            self.counted = self.operations;
+        }
+        let mut chance = cut.map_or(0, |cut| cut.seed | 1);
         for k in offset..offset + bytes {
             let (old, new) = (self.bytes[k], wanted(self.bytes[k], k - offset));
             chance ^= chance << 13;
             chance ^= chance >> 17;
             chance ^= chance << 5;
-            let done = match cut {
-                Some((_, Cut::Before, _)) => 0,
-                Some((_, Cut::Inside, _)) => (chance >> 8) as u8,
-                Some((_, Cut::After, _)) | None => 0xff,
+            let done = match cut.map(|cut| cut.place) {
+                Some(Cut::Before) => 0,
+                Some(Cut::Inside) => (chance >> 8) as u8,
+                Some(Cut::After) | None => 0xff,
             };
             self.bytes[k] = old & !done | new & done;
         }
@@ -228,7 +274,8 @@ mod tests {
             let mut flash = FlashModel::new();
             open(&mut flash);
             flash.write_register(CR, WORD, 0);
-            flash.cut = Some((0, Cut::Inside, seed));
+            let (at, place) = (0, Cut::Inside);
+            flash.cut_at(&[PowerCut { at, place, seed }]);
             flash.write(0, 4, 0xffff_0000, 0);
             assert!(flash.power_lost);
             assert_eq!(flash.read(2, 2), 0xffff);

@@ -29,8 +29,8 @@ use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
 use checks::{
-    Outcome, Report, bus, commands, figures, log, motion, parameters, sensors, start, timing,
-    update, zero,
+    Outcome, Report, bus, commands, figures, log, motion, parameters, power_cuts, sensors, start,
+    timing, update, zero,
 };
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -235,8 +235,17 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("update: refused, and nothing is written", &|| {
         update::refused(bench)
     });
+    check("update: flash that fails", &|| {
+        update::flash_that_fails(bench)
+    });
     check("update: a cut of the power leaves old or new", &|| {
-        update::power_cuts(bench)
+        power_cuts::in_an_update(bench)
+    });
+    check("update: a cut in the erase at the start", &|| {
+        power_cuts::in_an_erase(bench)
+    });
+    check("update: a cut while parameters are passed over", &|| {
+        power_cuts::in_a_pass_over(bench)
     });
     check("update: parameters that crash are passed over", &|| {
         update::parameters_that_crash(bench)

@@ -1,5 +1,4 @@
-//! New parameters over the bus: the host's own dialog against the program, its flash, and cuts of
-//! the power.
+//! New parameters over the bus: the host's own dialog against the program and its flash.
 
 use super::commands::{SERVO_OFF, answers};
 use super::figures::CYCLES_PER_INSTRUCTION;
@@ -10,13 +9,13 @@ use super::{Failure, Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen, Words};
 use crate::callbacks::Injected;
-use crate::flash_model::Cut;
+use crate::flash_model::Failing;
 use crate::machine::Machine;
 use crate::unicorn::register;
 use embedded_can::{Frame, StandardId};
-use hal_adapters::can::command::{Outcome as Ended, Request};
+use hal_adapters::can::command::{Mailbox, Outcome as Ended, Request, Told};
 use hal_adapters::can::status::NodeState;
-use hal_adapters::can::update::{Key, UpdateRequest};
+use hal_adapters::can::update::{Key, TAG_INDEX, UpdateData, UpdateRequest};
 use hal_adapters::can::{BusFrame, Coded};
 use host_fit::bus::update::{BlobReader, Dialog, Job, Plan, UpdateError, Updated, Updater};
 use runtime::blob::MAX_BYTES;
@@ -35,10 +34,8 @@ const UPDATE_S_MAX: f64 = 1.0;
 const FLASH_US: f64 = 200.0;
 /// What a tick has after its codes were read.
 const TICK_US_MAX: f64 = 1700.0;
-/// Operations of the flash at which the power is cut, three times each.
-const CUTS: u64 = 12;
 
-fn plan(blob: &[u8], token: u8) -> Plan {
+pub(super) fn plan(blob: &[u8], token: u8) -> Plan {
     Plan {
         blob: blob.to_vec(),
         serial: Some("stage-7".to_owned()),
@@ -50,7 +47,7 @@ fn plan(blob: &[u8], token: u8) -> Plan {
 }
 
 /// Runs until a dialog is over or the power is lost; what was on the bus meanwhile.
-fn talk<J: Job>(machine: &mut Machine, job: J, token: u8) -> Result<(J, Seen), Failure> {
+pub(super) fn talk<J: Job>(machine: &mut Machine, job: J, token: u8) -> Result<(J, Seen), Failure> {
     let (mut dialog, mut seen) = (Dialog::new(job, token), Seen::default());
     let until_ns = machine.chip.now_ns + 30 * S;
     let cuts = machine.power_cuts;
@@ -75,7 +72,7 @@ fn talk<J: Job>(machine: &mut Machine, job: J, token: u8) -> Result<(J, Seen), F
     Ok((dialog.into_job(), seen))
 }
 
-fn update(
+pub(super) fn update(
     machine: &mut Machine,
     plan: Plan,
 ) -> Result<(Result<Updated, UpdateError>, Seen), Failure> {
@@ -85,7 +82,7 @@ fn update(
 }
 
 /// The blob that runs, read over the bus.
-fn running(machine: &mut Machine) -> Result<Vec<u8>, Failure> {
+pub(super) fn running(machine: &mut Machine) -> Result<Vec<u8>, Failure> {
     let (job, _) = talk(machine, BlobReader::default(), 90)?;
     Ok(job.result()?.1)
 }
@@ -104,7 +101,7 @@ fn starts_with(bench: &Bench, machine: &Machine, poses: &[Words]) -> Outcome {
 }
 
 /// The field model's example as one of this stage, with the longest text of its time.
-fn large() -> Result<Vec<u8>, Failure> {
+pub(super) fn large() -> Result<Vec<u8>, Failure> {
     let mut set = ParameterSet::from_bytes(FIELD)?;
     set.serial = Text::try_from("stage-7").map_err(|_| "the serial")?;
     set.created = Text::try_from("2026-11-22T10:00:00.000000+00:00").map_err(|_| "the time")?;
@@ -186,22 +183,30 @@ pub fn new_parameters(bench: &Bench) -> Outcome {
     })
 }
 
-/// A wrong key, no key, a generator of random numbers that is broken, the service pin, another
-/// stage's blob, a stale sequence number.
+/// A wrong key, no key, another stage's blob, the service pin, a stale sequence number, a generator
+/// of random numbers that is broken.
 pub fn refused(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ticks(100)?;
     let (updated, _) = update(&mut machine, plan(&bench.later, 1))?;
     updated?;
     let operations = machine.chip.flash.operations;
-    let wrong_key = Plan {
-        key: Some([0; 16]),
+    let with_key = |key| Plan {
+        key,
         ..plan(&bench.blob, 2)
     };
-    let (refused, _) = update(&mut machine, wrong_key)?;
-    expect(matches!(refused, Err(UpdateError::NotAuthorised)), || {
-        format!("with a wrong key: {refused:?}")
-    })?;
+    let other_stage = Plan {
+        serial: None,
+        ..plan(&bench.other, 2)
+    };
+    for (plan, want) in [
+        (with_key(Some([0; 16])), UpdateError::NotAuthorised),
+        (with_key(None), UpdateError::KeyNeeded),
+        (other_stage, UpdateError::BadContent { kind: 10 }),
+    ] {
+        let (refused, _) = update(&mut machine, plan)?;
+        equal("the end", refused, Err(want))?;
+    }
     machine.chip.servo_on = true;
     let (refused, _) = update(&mut machine, plan(&bench.blob, 3))?;
     expect(matches!(refused, Err(UpdateError::ServoOn { .. })), || {
@@ -227,7 +232,22 @@ pub fn refused(bench: &Bench) -> Outcome {
                 Ended::NotAuthorised,
             ),
             (request(UpdateRequest::Abort), 102, Ended::Done),
+            (request(UpdateRequest::Begin { bytes: 0 }), 104, Ended::Done),
         ],
+    )?;
+    let mut host = Mailbox::default();
+    for index in TAG_INDEX..TAG_INDEX + 4 {
+        let (token, word) = (104, 0);
+        let data = host.send(&Told::UpdateData(UpdateData { token, index, word }));
+        let Coded { message, bytes } = data.ok_or("a word")?;
+        machine.chip.can.receive(message.spec().id, bytes);
+        machine.run_ticks(1)?;
+    }
+    let stale = request(UpdateRequest::Verify { sequence: 1 });
+    answers(&mut machine, &[(stale, 104, Ended::WrongSequence)])?;
+    answers(
+        &mut machine,
+        &[(request(UpdateRequest::Abort), 104, Ended::Done)],
     )?;
     machine.chip.random.broken = true;
     let (refused, _) = update(&mut machine, plan(&bench.blob, 4))?;
@@ -238,56 +258,38 @@ pub fn refused(bench: &Bench) -> Outcome {
     equal("once all is well", updated?.sequence, Some(2))
 }
 
-/// Cuts of the power before, inside and after operations of an update: after it the old or the new
-/// blob runs, and the new one for certain once the update was answered.
-pub fn power_cuts(bench: &Bench) -> Outcome {
-    let ready = || -> Result<Machine, Failure> {
+/// Flash of which the first or a later word does not change, and tells so or does not: the update
+/// ends with that, before and after the next start the old parameters run, and a start with sound
+/// flash takes new ones.
+pub fn flash_that_fails(bench: &Bench) -> Outcome {
+    for (word, failing) in [
+        (0, Failing::Told),
+        (0, Failing::Silent),
+        (50, Failing::Told),
+        (50, Failing::Silent),
+    ] {
         let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
         machine.run_ticks(20)?;
-        Ok(machine)
-    };
-    let mut machine = ready()?;
-    let before = machine.chip.flash.operations;
-    update(&mut machine, plan(&bench.later, 1))?.0?;
-    let whole = machine.chip.flash.operations - before;
-    expect(whole > 100, || format!("{whole} operations"))?;
-    // The first words, some between, and the last ones: check, commit word, seal.
-    let last = whole - CUTS / 2..whole;
-    let places = (0..CUTS / 2).map(|k| k * k * whole / 40).chain(last);
-    let (mut cuts, mut old, mut new) = (0, 0, 0);
-    for (seed, place) in (1..).zip(places) {
-        for cut in [Cut::Before, Cut::Inside, Cut::After] {
-            let mut machine = ready()?;
-            machine.chip.flash.cut = Some((before + place, cut, seed * 0x9e37_79b9));
-            let token = 1;
-            let (_, _) = talk(&mut machine, Updater::new(plan(&bench.later, token)), token)?;
-            expect(machine.power_cuts == 1, || format!("no cut at {place}"))?;
-            machine.run_ticks(20)?;
-            let found = running(&mut machine)?;
-            cuts += 1;
-            old += u32::from(found == bench.blob);
-            new += u32::from(found == bench.later);
-            expect(found == bench.blob || found == bench.later, || {
-                format!("another blob after a cut {cut:?} {place}")
-            })?;
-            let is_over = place + 1 == whole && cut == Cut::After;
-            expect(!is_over || found == bench.later, || {
-                "the new one is lost".to_owned()
-            })?;
-            // Another update is possible at once.
-            let (updated, _) = update(&mut machine, plan(&large()?, 7))?;
-            expect(updated?.sequence.is_some(), || {
-                "no update after it".to_owned()
-            })?;
-        }
+        let from = machine.chip.flash.operations + word;
+        machine.chip.flash.fails = Some((from, failing));
+        let (ended, _) = update(&mut machine, plan(&bench.later, 1))?;
+        equal("the end", ended, Err(UpdateError::StoreFailed))?;
+        equal("running", running(&mut machine)?, bench.blob.clone())?;
+        machine.reset_by_pin();
+        machine.run_ticks(40)?;
+        equal("running", running(&mut machine)?, bench.blob.clone())?;
+        machine.chip.flash.fails = None;
+        machine.power_cycle();
+        machine.run_ticks(20)?;
+        update(&mut machine, plan(&bench.later, 2))?.0?;
+        let later = ParameterSet::from_bytes(&bench.later)?;
+        starts_with(bench, &machine, &poses_of(bench, &later))?;
     }
-    println!("RESULT firmware_update_cuts={cuts} old={old} new={new} lost=0");
-    expect(old > 0 && new > 0, || "all cuts ended alike".to_owned())
+    Ok(())
 }
 
-/// Parameters that make the program fault twice at its start: those before them run, and it is
-/// told.
-pub fn parameters_that_crash(bench: &Bench) -> Outcome {
+/// A controller that has just begun to run [`Bench::later`] in place of [`Bench::blob`].
+pub(super) fn about_to_crash(bench: &Bench) -> Result<Machine, Failure> {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.hook_injection(bench.image(PART).address(TICK)?)?;
     machine.run_ticks(20)?;
@@ -297,11 +299,22 @@ pub fn parameters_that_crash(bench: &Bench) -> Outcome {
     };
     let (updated, _) = update(&mut machine, activates)?;
     equal("active", updated?.is_active, true)?;
+    Ok(machine)
+}
+
+/// The next tick reads where nothing is.
+pub(super) fn crash(machine: &mut Machine) -> Outcome {
+    let (register, value) = (register::R0, 0x6000_0000);
+    machine.chip.inject = vec![Injected { register, value }];
+    Ok(machine.run_ticks(10)?)
+}
+
+/// Parameters that make the program fault twice at its start: those before them run, and it is
+/// told.
+pub fn parameters_that_crash(bench: &Bench) -> Outcome {
+    let mut machine = about_to_crash(bench)?;
     for resets in [2, 3] {
-        let value = 0x6000_0000;
-        let register = register::R0;
-        machine.chip.inject = vec![Injected { register, value }];
-        machine.run_ticks(10)?;
+        crash(&mut machine)?;
         equal("resets", machine.panics, resets)?;
     }
     Seen::since_last(&mut machine);
