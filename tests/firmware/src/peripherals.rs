@@ -1,6 +1,8 @@
 //! The peripherals of an STM32F405, as far as the program uses them. Time is that of the bench:
 //! it passes between interrupts and while bytes cross the SPI, and instructions take none.
 
+mod registers;
+
 use crate::adc_model::{Adc, Input, Part, Row};
 use crate::callbacks::Injected;
 use crate::can_model::CanModel;
@@ -9,6 +11,7 @@ use crate::flash_model::FlashModel;
 use crate::random_model::RandomModel;
 use crate::unicorn::Stop;
 use crate::watchdog_model::Watchdog;
+use registers::{MPU_CTRL, MPU_RASR, MPU_RBAR, TIM2};
 
 /// Address range of the peripherals: start and bytes.
 pub const RANGE: (u64, u64) = (0x4000_0000, 0x8_0000);
@@ -17,48 +20,15 @@ pub const BIT_BAND: (u64, u64) = (0x4200_0000, 0x100_0000);
 /// The core's own peripherals.
 pub const CORE: (u64, u64) = (0xe000_0000, 0x10_0000);
 
-const TIM2: usize = 0x0_0000;
-const IWDG: usize = 0x0_3000;
-const CAN1: usize = 0x0_6400;
-const PWR: usize = 0x0_7000;
-const SPI1: usize = 0x1_3000;
-const GPIOA: usize = 0x2_0000;
-const GPIOB: usize = 0x2_0400;
-const GPIOC: usize = 0x2_0800;
-const RCC: usize = 0x2_3800;
-const FLASH: usize = 0x2_3c00;
-const OPTCR: usize = FLASH + 0x14;
-const AHB2ENR: usize = RCC + 0x34;
-/// The core's system timer, and the register by which a program resets it.
-const SYSTICK: usize = 0xe010;
-const AIRCR: usize = 0xed0c;
-/// Memory protection: control, base and attributes of the region that was written last.
-const MPU_CTRL: usize = 0xed94;
-const MPU_RBAR: usize = 0xed9c;
-const MPU_RASR: usize = 0xeda0;
-
-const SELECT_PIN: u32 = 4;
-const SYNC_PIN: u32 = 0;
-const LED_PIN: u32 = 1;
-
 /// Numbers of the interrupts.
 pub const IRQ_CAN1_TX: u32 = 19;
 /// Numbers of the interrupts.
 pub const IRQ_TIM2: u32 = 28;
 
-const SERVO_PIN: u32 = 1;
-
 const US: u64 = 1000;
 /// From the supply until the program runs: the chip's own reset, at least (DS8626, tRSTTEMPO). The
 /// converter has the same supply.
 const BOOT_NS: u64 = 500_000;
-/// Clock of the bus that SPI1 is on.
-const BUS_2_HZ: u64 = 84_000_000;
-/// What the program takes between two bytes, ns.
-const SPI_GAP_NS: u64 = 150;
-/// Time of a read of a register that a program polls: loops that wait take time.
-const POLL_NS: u64 = US;
-
 /// Flags of RCC_CSR.
 pub mod cause {
     /// The pin NRST, which every reset pulls low.
@@ -281,176 +251,5 @@ impl Peripherals {
         } else {
             None
         }
-    }
-
-    /// A register, by its distance from the start of the range.
-    pub fn read(&mut self, offset: usize) -> u32 {
-        let word = self.words[offset / 4];
-        match offset {
-            o if (RCC..RCC + 0x10).contains(&o) => {
-                self.now_ns += POLL_NS;
-                self.clocks.read(o - RCC, self.now_ns)
-            }
-            o if o == RCC + 0x70 => word | (word & 1) << 1,
-            o if o == RCC + 0x74 => word & 1 | (word & 1) << 1 | self.reset_flags,
-            o if o == PWR + 4 => 1 << 14 | word,
-            o if o == OPTCR => self.option_bytes,
-            o if (FLASH + 4..OPTCR).contains(&o) => {
-                self.flash.read_register(o - FLASH, &mut self.now_ns)
-            }
-            o if o == GPIOA + 0x10 => self.level(GPIOA, SELECT_PIN, self.pulled_up[0]),
-            o if o == GPIOB + 0x10 => {
-                self.level(GPIOB, SYNC_PIN, self.pulled_up[1])
-                    | self.level(GPIOB, SERVO_PIN, false) & u32::from(!self.servo_on) << SERVO_PIN
-            }
-            o if o == TIM2 + 0x10 => {
-                self.advance();
-                self.timer_flags
-            }
-            o if o == TIM2 + 0x24 => self.timer_us(),
-            o if o == SPI1 + 0x08 => 2 | u32::from(self.spi_full),
-            o if o == SPI1 + 0x0c => {
-                self.spi_full = false;
-                self.spi_in.into()
-            }
-            o if (CAN1..CAN1 + 0x400).contains(&o) => {
-                self.can.advance(self.now_ns);
-                self.can.read(o - CAN1, self.now_ns)
-            }
-            o if (IWDG..IWDG + 0x10).contains(&o) => self.watchdog.read(o - IWDG, self.now_ns),
-            _ => word,
-        }
-    }
-
-    /// Writes a register.
-    pub fn write(&mut self, offset: usize, value: u32) {
-        self.words[offset / 4] = value;
-        match offset {
-            o if o == RCC + 0x74 && value & 1 << 24 != 0 => self.reset_flags = 0,
-            o if o == TIM2 && value & 1 != 0 && self.timer_started_ns.is_none() => {
-                self.timer_started_ns = Some(self.now_ns);
-                // The counter starts at what the compare registers hold after a reset: both
-                // match, though no alarm was set.
-                self.timer_flags |= 6;
-            }
-            o if o == TIM2 + 0x10 => self.timer_flags &= value,
-            o if o == TIM2 + 0x14 => {
-                self.timer_flags |= value & 6;
-                if value & 2 != 0 {
-                    self.alarms[0].at_ns = None;
-                }
-            }
-            o if o == TIM2 + 0x34 => self.set_alarm(0, value),
-            o if o == TIM2 + 0x38 => self.set_alarm(1, value),
-            o if (FLASH..OPTCR).contains(&o) => {
-                self.flash.write_register(o - FLASH, value, self.now_ns)
-            }
-            o if (RCC..RCC + 0x10).contains(&o) => self.clocks.write(o - RCC, value, self.now_ns),
-            o if (IWDG..IWDG + 0x10).contains(&o) => {
-                self.watchdog.write(o - IWDG, value, self.now_ns)
-            }
-            o if o == SPI1 + 0x0c => {
-                let byte = self.adc.exchange(value as u8);
-                // Both converters need mode 1: in another one bits are shifted.
-                let mode_1 = self.words[SPI1 / 4] & 3 == 1;
-                self.spi_in = if mode_1 { byte } else { byte >> 1 };
-                self.spi_full = true;
-                self.spi_bytes += 1;
-                let bits_ns = 8 * 1_000_000_000 / self.spi_hz();
-                self.now_ns += self.spi_byte_ns.unwrap_or(bits_ns + SPI_GAP_NS);
-            }
-            o if o == GPIOA + 0x18 || o == GPIOB + 0x18 || o == GPIOC + 0x18 => {
-                self.set_pins(o, value)
-            }
-            o if (CAN1..CAN1 + 0x400).contains(&o) => {
-                let filled = self.can.filled;
-                self.can.write(o - CAN1, value, self.now_ns);
-                if self.can.filled != filled {
-                    self.instructions_at_mailbox = self.instructions;
-                }
-            }
-            _ => {}
-        }
-    }
-
-    /// A register of the generator of random numbers.
-    pub fn read_random(&mut self, offset: usize) -> u32 {
-        self.now_ns += POLL_NS;
-        self.random.read(offset)
-    }
-
-    /// Writes a register of the generator, which takes nothing without its clock.
-    pub fn write_random(&mut self, offset: usize, value: u32) {
-        if self.words[AHB2ENR / 4] & 1 << 6 != 0 {
-            self.random.write(offset, value);
-        }
-    }
-
-    /// Clock of SPI1, Hz.
-    pub fn spi_hz(&self) -> u64 {
-        BUS_2_HZ >> (1 + (self.words[SPI1 / 4] >> 3 & 7))
-    }
-
-    fn set_alarm(&mut self, k: usize, compare: u32) {
-        let left = compare.wrapping_sub(self.timer_us());
-        let start = self.timer_started_ns.unwrap_or(self.now_ns);
-        let us = (self.now_ns - start) / US + u64::from(left);
-        let at_ns = (left > 0).then_some(start + us * US);
-        self.alarms[k] = Alarm { at_ns };
-    }
-
-    /// The bit of an input, by its resistor on the board and the one inside.
-    fn level(&self, port: usize, pin: u32, pulled_up: bool) -> u32 {
-        let inside = self.words[(port + 0x0c) / 4] >> (2 * pin) & 3;
-        u32::from(pulled_up || inside == 1) << pin
-    }
-
-    fn set_pins(&mut self, register: usize, value: u32) {
-        let level = |pin: u32| match (value >> pin & 1, value >> (16 + pin) & 1) {
-            (1, _) => Some(true),
-            (_, 1) => Some(false),
-            _ => None,
-        };
-        match register {
-            o if o == GPIOA + 0x18 => match level(SELECT_PIN) {
-                Some(false) if !self.selected => {
-                    self.selected = true;
-                    self.adc.select(self.now_ns);
-                }
-                Some(true) if self.selected => {
-                    self.selected = false;
-                    self.adc.deselect(self.now_ns);
-                }
-                _ => {}
-            },
-            o if o == GPIOB + 0x18 => {
-                if let Some(high) = level(SYNC_PIN) {
-                    self.adc.control(high, self.now_ns);
-                }
-            }
-            _ => self.led = level(LED_PIN).unwrap_or(self.led),
-        }
-    }
-
-    /// A register of the core.
-    pub fn read_core(&mut self, offset: usize) -> u32 {
-        if (SYSTICK..SYSTICK + 0xc).contains(&offset) {
-            self.now_ns += POLL_NS;
-            return self.clocks.read_timer(offset - SYSTICK, self.now_ns);
-        }
-        self.core_words[offset / 4]
-    }
-
-    /// Writes a register of the core.
-    pub fn write_core(&mut self, offset: usize, value: u32) {
-        if (SYSTICK..SYSTICK + 0xc).contains(&offset) {
-            self.clocks
-                .write_timer(offset - SYSTICK, value, self.now_ns);
-        }
-        // The key and SYSRESETREQ.
-        self.reset_asked |= offset == AIRCR && value & 0xffff_0004 == 0x05fa_0004;
-        let enable = (0xe100..0xe120).contains(&offset);
-        let word = &mut self.core_words[offset / 4];
-        *word = if enable { *word | value } else { value };
     }
 }

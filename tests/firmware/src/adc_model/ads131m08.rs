@@ -6,6 +6,10 @@
 //! global chop, standby, current detection, LOCK, the CRC of commands, t_REGACQ (waits of the
 //! program take no time here). Unknown commands are answered as NULL, like invalid ones.
 
+mod variant;
+
+pub use variant::{Store, Variant};
+
 use super::filter::{Conversion, Filter, T_MOD_NS};
 use super::{Input, Row};
 use std::collections::VecDeque;
@@ -29,58 +33,6 @@ const LAST: usize = 0x30;
 const REGMAP_CRC: usize = 0x3e;
 
 const REG_CRC_EN: u16 = 1 << 13;
-
-/// What the store does with a third conversion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Store {
-    /// It is lost.
-    KeepsOldest,
-    /// The first one is lost.
-    KeepsNewest,
-    /// The second one is lost.
-    ReplacesLast,
-}
-
-/// What the data sheet leaves open.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Variant {
-    /// What a full store does.
-    pub store: Store,
-    /// A conversion leaves the store when its frame ends, and not when it begins.
-    pub late_pop: bool,
-    /// Conversions that are not settled are held back.
-    pub gated: bool,
-    /// From a resynchronisation until the filters take data, in periods of the modulators.
-    pub wait: u64,
-}
-
-impl Variant {
-    /// What the text of the sheet says most plainly.
-    pub const PLAIN: Self = Self {
-        store: Store::KeepsOldest,
-        late_pop: false,
-        gated: false,
-        wait: 44,
-    };
-
-    /// All that are plausible: 44 is the offset in table 8-3 and equation 9, 300 the wait after
-    /// a reset.
-    pub fn all() -> impl Iterator<Item = Self> {
-        let stores = [Store::KeepsOldest, Store::KeepsNewest, Store::ReplacesLast];
-        stores.into_iter().flat_map(|store| {
-            [false, true].into_iter().flat_map(move |late_pop| {
-                [false, true].into_iter().flat_map(move |gated| {
-                    [0, 44, INITIAL_WAIT].into_iter().map(move |wait| Self {
-                        store,
-                        late_pop,
-                        gated,
-                        wait,
-                    })
-                })
-            })
-        })
-    }
-}
 
 /// The part.
 pub struct Ads131m08 {
