@@ -125,7 +125,7 @@ mod app {
         let options = OptionBytes::read(&device.FLASH);
         let sectors = flash::Sectors::new(device.FLASH);
         let (record, is_faulty) = (cx.local.record, before.blames_parameters);
-        let (mut records, found) = Records::start(sectors, record, board::STAGE_SERIAL, is_faulty);
+        let (mut records, found) = Records::start(sectors, record, board::stage_serial(), is_faulty);
         let program_hash = flash::program_crc();
         let loaded = found
             .blob
@@ -149,8 +149,8 @@ mod app {
             }
         };
         let identity = Identity {
-            serial: board::STAGE_SERIAL,
-            key: board::STAGE_KEY,
+            serial: board::stage_serial(),
+            key: board::stage_key(),
             program_version: board::PROGRAM_VERSION,
             program_hash,
         };
