@@ -53,7 +53,7 @@ mod app {
     use firmware::fpu::{Fpu, FpuSettings};
     use firmware::node::{Facts, Node, Parameters, SampleFault};
     use firmware::records::Records;
-    use firmware::retained::{Retained, Step};
+    use firmware::retained::{Blamed, Retained, Step};
     use firmware::schedule::{Schedule, Tick};
     use firmware::slots::{Loaded, Refusal};
     use firmware::store::Record;
@@ -124,8 +124,9 @@ mod app {
         watchdog.set_period(CORE_MHZ, true, &mut stopwatch);
         let options = OptionBytes::read(&device.FLASH);
         let sectors = flash::Sectors::new(device.FLASH);
-        let (record, is_faulty) = (cx.local.record, before.blames_parameters);
-        let (mut records, found) = Records::start(sectors, record, board::stage_serial(), is_faulty);
+        let is_faulty = before.blames == Some(Blamed::Newest);
+        let check = before.check(board::stage_serial());
+        let (mut records, found) = Records::start(sectors, cx.local.record, check, is_faulty);
         let program_hash = flash::program_crc();
         let loaded = found
             .blob

@@ -7,7 +7,8 @@ use crate::board::{self, INTERNAL_MHZ};
 use crate::fault;
 use crate::wait::Stopwatch;
 use firmware::node::Node;
-use firmware::retained::{FaultKind, KeptZero, Retained, Step};
+use firmware::retained::{Blamed, FaultKind, KeptZero, Retained, Step};
+use firmware::store::Check;
 use hal_adapters::can::status::{BoardFacts, board_check as check};
 use runtime::PlanarPose;
 use stm32f4xx_hal::pac::{FLASH, RCC};
@@ -55,8 +56,8 @@ pub struct Before {
     pub watchdog: bool,
     /// Whether the watchdog or the program itself did, on a fault.
     pub by_fault: bool,
-    /// Whether the parameters made the program fault twice in a row.
-    pub blames_parameters: bool,
+    /// The parameters that made the program fault twice in a row.
+    pub blames: Option<Blamed>,
     /// The record that survived; after power-on an empty one.
     record: Retained,
 }
@@ -77,12 +78,12 @@ impl Before {
             record.note(FaultKind::Watchdog, 0, 0);
         }
         let by_fault = core::mem::take(&mut record.crashed);
-        let blames_parameters = record.blames_parameters();
+        let blames = record.blames();
         fault::retain(&record);
         Self {
             watchdog,
             by_fault,
-            blames_parameters,
+            blames,
             record,
         }
     }
@@ -124,6 +125,19 @@ impl Before {
                 | on(check::INTERNAL_OSCILLATOR, !found.crystal)
                 | on(check::CAN_NOT_STARTED, !found.can_started)
                 | on(check::ZERO_LOST, found.zero_lost),
+        }
+    }
+
+    /// What blobs are checked for at start-up; a fault in a check is blamed on its blob.
+    pub const fn check(&self, serial: Option<&'static str>) -> Check {
+        let suspect = match self.blames {
+            Some(Blamed::Blob { crc }) => Some(crc),
+            _ => None,
+        };
+        Check {
+            serial,
+            suspect,
+            note: |crc| fault::update(|record| record.checked_blob = crc.unwrap_or(0)),
         }
     }
 

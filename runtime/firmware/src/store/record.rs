@@ -174,11 +174,6 @@ impl<'f> View<'f> {
         self.bytes.get(HEADER_BYTES..end).unwrap_or_default()
     }
 
-    /// Whether it only says that another is passed over.
-    pub(super) const fn is_void(&self) -> bool {
-        self.blob_bytes == 0
-    }
-
     pub(super) const fn units(&self) -> usize {
         units(self.blob_bytes)
     }

@@ -2,13 +2,13 @@
 
 extern crate std;
 
-use super::flash::BLANK;
 use super::flash_model::FlashModel;
 use super::record::units;
 use super::*;
 use runtime::ParameterSet;
 use runtime::blob::MAX_BYTES;
 use runtime::parameters::Text;
+use std::cell::Cell;
 use std::vec::Vec;
 use std::{format, println};
 
@@ -226,79 +226,61 @@ fn going_back_can_be_undone_and_what_was_passed_over_never_comes_back() {
 }
 
 #[test]
-fn a_write_that_was_not_finished_bars_others_until_the_next_start() {
+fn any_number_of_equal_records_leaves_the_blob_before_in_reach() {
     let mut flash = FlashModel::erased();
     let mut store = Store::start(&mut flash, SERIAL);
-    let record = record(&store, &blob(1)).expect("due");
-    let mut writing = store.begin(&flash, &record).expect("room");
-    assert_eq!(writing.step(&mut flash, &record), Ok(Step::More));
-    assert_eq!(
-        store.begin(&flash, &record).map(|_| ()),
-        Err(Refused::Unsettled)
-    );
-    store.finish(&flash, &writing);
-    assert_eq!(
-        store.begin(&flash, &record).map(|_| ()),
-        Err(Refused::Unsettled)
-    );
-    let mut store = Store::start(&mut flash, SERIAL);
-    assert_eq!(write(&mut store, &mut flash, &record), Ok(()));
-}
-
-#[test]
-fn a_word_that_does_not_hold_is_told_and_nothing_is_committed() {
-    let mut flash = FlashModel::erased();
-    let mut store = Store::start(&mut flash, SERIAL);
-    let record = record(&store, &blob(1)).expect("due");
-    let mut writing = store.begin(&flash, &record).expect("room");
-    for _ in 0..30 {
-        assert_eq!(writing.step(&mut flash, &record), Ok(Step::More));
-    }
-    // Some other program's fault: a word ahead is not blank, and one behind has changed.
-    let mut ahead = (flash.clone(), Writing { ..writing });
-    ahead.0.program(Sector::First, 16 + 40, 0).expect("on");
-    flash.program(Sector::First, 16 + 20, 0).expect("on");
-    for (flash, writing) in [(&mut ahead.0, &mut ahead.1), (&mut flash, &mut writing)] {
-        let fault = (0..200).find_map(|_| writing.step(flash, &record).err());
-        assert!(matches!(fault, Some(WriteFault::ReadsOtherwise { .. })));
-        assert_eq!(Store::start(flash, SERIAL).newest(), None);
+    assert_eq!(update(&mut store, &mut flash, &blob(0)), Ok(()));
+    for _ in 0..28 {
+        assert_eq!(update(&mut store, &mut flash, &blob(1)), Ok(()));
+        let again = Store::start(&mut flash, SERIAL);
+        for store in [&store, &again] {
+            let previous = store.previous().map(|stored| stored.blob(&flash).to_vec());
+            assert_eq!(previous, Some(blob(0)));
+        }
     }
 }
 
 #[test]
-fn a_word_that_is_stuck_is_told_wherever_it_is() {
-    let (mut sound, mut empty) = (FlashModel::erased(), FlashModel::erased());
-    let store = Store::start(&mut sound, SERIAL);
-    let record = record(&store, &blob(1)).expect("due");
-    let words = UNIT_BYTES / 4..UNIT_BYTES / 4 + record.body_words() + 2;
-    for word in words {
-        let mut flash = sound.clone();
+fn a_blob_whose_check_faults_is_not_read_again_and_is_passed_over() {
+    let crc = |number| stored_crc(&blob(number));
+    for (faulty, expected) in [(2, 1), (1, 2)] {
+        let mut flash = FlashModel::erased();
         let mut store = Store::start(&mut flash, SERIAL);
-        flash.stuck = Some((Sector::First, word));
-        let written = write(&mut store, &mut flash, &record);
-        // A word that stays blank does no harm where it should.
-        let blank = record.word(word - UNIT_BYTES / 4) == BLANK;
-        assert_eq!(
-            written.is_ok(),
-            blank && word < UNIT_BYTES / 4 + record.body_words(),
-            "{word}"
-        );
+        for number in 0..3 {
+            assert_eq!(update(&mut store, &mut flash, &blob(number)), Ok(()));
+        }
+        let mut check = Check::from(SERIAL);
+        check.suspect = crc(faulty);
+        let mut store = Store::start(&mut flash, check);
+        assert_eq!(found(&store, &flash), Some(blob(expected)));
+        let mut record = Record::EMPTY;
+        assert_eq!(store.pass_over(&flash, &mut record), Ok(()));
+        assert_eq!(write(&mut store, &mut flash, &record), Ok(()));
+        // From now on nobody reads it.
+        check.suspect = None;
+        check.note = |crc| assert_ne!(crc, stored_crc(&blob(READ.with(Cell::get))));
+        READ.set(faulty);
+        let store = Store::start(&mut flash, check);
+        assert_eq!(found(&store, &flash), Some(blob(expected)));
+        assert_eq!(store.previous().map(|stored| stored.sequence), Some(1));
     }
-    // The sector's own words, and one that is not erased.
-    for sector in Sector::ALL {
-        empty.load(sector, &[0; SECTOR_BYTES]);
-    }
-    for word in [0, 1, 500] {
-        let mut flash = empty.clone();
-        flash.stuck = Some((Sector::First, word));
-        let mut store = Store::start(&mut flash, SERIAL);
-        assert!(
-            matches!(store.fault(), Some(WriteFault::ReadsOtherwise { .. })),
-            "{word}"
-        );
-        assert_eq!(
-            store.begin(&flash, &record).map(|_| ()),
-            Err(Refused::Unsettled)
-        );
-    }
+    // One that is nowhere changes nothing.
+    let mut flash = FlashModel::erased();
+    flash.load(Sector::First, &blob(0));
+    let mut check = Check::from(SERIAL);
+    check.suspect = crc(3);
+    let store = Store::start(&mut flash, check);
+    let mut record = Record::EMPTY;
+    let refused = store.pass_over(&flash, &mut record);
+    assert_eq!(refused, Err(Refused::NoPrevious));
+    // A plain one is passed over as number 0.
+    check.suspect = crc(0);
+    let store = Store::read(&flash, check);
+    assert_eq!(store.newest(), None);
+    assert_eq!(store.sequence_of(&flash, crc(0).expect("sound")), Some(0));
+}
+
+std::thread_local! {
+    /// The number of the blob that must not be read.
+    static READ: Cell<usize> = const { Cell::new(0) };
 }
