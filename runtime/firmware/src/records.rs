@@ -2,7 +2,7 @@
 //! the bus.
 
 use crate::slots::{self, Loaded, Refusal};
-use crate::store::{Check, Flash, Record, Sector, Step, Store, Stored, Writing};
+use crate::store::{self, Check, Flash, Record, Sector, Step, Store, Stored, Writing};
 use hal_adapters::can::update::{self, Change, Running, Written};
 
 /// Words that are programmed in one tick: 0.2 ms at most on an STM32F405 (DS8626, flash memory
@@ -44,7 +44,7 @@ impl<F: Flash> Records<F> {
         is_faulty: bool,
     ) -> (Self, Found) {
         let check = check.into();
-        let plain = slots::refusal(Sector::ALL.map(|s| flash.bytes(s).as_slice()), &check);
+        let plain = slots::refusal(Sector::ALL.map(|s| store::readable(&flash, s)), &check);
         let store = Store::start(&mut flash, check);
         let mut records = Self {
             flash,
@@ -179,3 +179,7 @@ impl<F: Flash> update::Store for Records<F> {
         Written::InProgress
     }
 }
+
+#[cfg(test)]
+#[path = "records_tests.rs"]
+mod tests;

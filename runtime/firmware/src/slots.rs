@@ -63,7 +63,7 @@ pub struct Loaded {
 }
 
 /// The worst that is wrong with the plain contents of the slots, slot 0 first: `None` for an erased
-/// slot, a sound blob, and a journal.
+/// slot, a sound blob, a journal, and a slot of no bytes.
 pub fn refusal(slots: [&[u8]; SLOTS], check: &Check) -> Option<Refusal> {
     let [first, second] = slots.map(|memory| error(memory, check));
     let first = first.map(|error| Refusal::of(0, &error));
@@ -74,7 +74,7 @@ pub fn refusal(slots: [&[u8]; SLOTS], check: &Check) -> Option<Refusal> {
 /// the stack at once.
 #[inline(never)]
 fn error(memory: &[u8], check: &Check) -> Option<BlobError> {
-    if is_journal(memory) {
+    if memory.is_empty() || is_journal(memory) {
         return None;
     }
     let read = check.guard(memory, || {

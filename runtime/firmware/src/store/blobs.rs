@@ -66,13 +66,23 @@ pub(super) fn unusable(view: &View<'_>, check: &Check) -> Option<BlobError> {
     }
 }
 
+/// What is to be read of a sector: all, or nothing if it begins with a plain blob that a record passes
+/// over.
+pub fn readable(flash: &impl Flash, sector: Sector) -> &[u8] {
+    let memory = flash.bytes(sector);
+    if memory.starts_with(&MAGIC) && journal::is_passed_over(flash, 0, memory) {
+        return &[];
+    }
+    memory
+}
+
 /// The plain blob of a sector that begins with one, and when it was made.
 pub(super) fn plain(
     flash: &impl Flash,
     sector: Sector,
     check: &Check,
 ) -> Option<Result<(Stored, Text), BlobError>> {
-    let memory = flash.bytes(sector);
+    let memory = readable(flash, sector);
     if !memory.starts_with(&MAGIC) {
         return None;
     }

@@ -1,6 +1,6 @@
 //! How a new record comes about.
 
-use super::blobs::{Stored, checked, stored};
+use super::blobs::{Stored, checked, stored, stored_crc};
 use super::journal::Place;
 use super::record::{Record, UNIT_BYTES, View};
 use super::{Flash, Refused, Store, Writing};
@@ -43,14 +43,13 @@ impl Store {
     /// # Errors
     /// [`Refused::NoPrevious`], [`Refused::Blob`], [`Refused::Sequence`].
     pub fn pass_over(&self, flash: &impl Flash, record: &mut Record) -> Result<(), Refused> {
-        let faulty = match self.check.suspect {
-            Some(crc) => self.sequence_of(flash, crc),
-            None => self.newest.map(|newest| newest.sequence),
+        let fallback = self.fallback().ok_or(Refused::NoPrevious)?;
+        let of_newest = || {
+            self.newest
+                .and_then(|newest| stored_crc(newest.blob(flash)))
         };
-        match (self.fallback(), faulty) {
-            (Some(fallback), Some(_)) => self.copy(flash, fallback, faulty, record),
-            _ => Err(Refused::NoPrevious),
-        }
+        let faulty = self.check.suspect.or_else(of_newest);
+        self.copy(flash, fallback, faulty, record)
     }
 
     /// Begins to write a record. Nothing else may be written until [`Store::finish`].

@@ -1,6 +1,6 @@
 //! Which blob is used, and which one before it.
 
-use super::blobs::{Stored, plain, plain_by_age, stored, stored_crc, unusable};
+use super::blobs::{Stored, plain, plain_by_age, stored, unusable};
 use super::journal::{self, Place};
 use super::{Check, Flash, Rejected, Sector, Store};
 use runtime::blob::{BlobError, MAGIC};
@@ -75,7 +75,7 @@ impl Store {
             // What was passed over is not even read.
             let good = stored(flash, place).filter(|other| {
                 other.blob(flash) != blob
-                    && !journal::is_passed_over(flash, place.sequence)
+                    && !journal::is_passed_over(flash, place.sequence, other.blob(flash))
                     && journal::view(flash, place)
                         .is_some_and(|view| unusable(&view, &self.check).is_none())
             });
@@ -83,32 +83,11 @@ impl Store {
                 return good;
             }
         }
-        if journal::is_passed_over(flash, 0) {
-            return None;
-        }
         let plain = plain_by_age(flash, &self.check);
         plain
             .into_iter()
             .flatten()
             .find(|plain| plain.blob(flash) != blob)
-    }
-
-    /// The latest record, 0 for a plain blob, whose blob has this CRC and was not passed over.
-    pub(super) fn sequence_of(&self, flash: &impl Flash, crc: u32) -> Option<u32> {
-        let is_it = |blob: &[u8], sequence| {
-            stored_crc(blob) == Some(crc) && !journal::is_passed_over(flash, sequence)
-        };
-        let mut bound = None;
-        for _ in 0..journal::UNITS {
-            bound = journal::highest_committed(flash, bound);
-            let Some(place) = bound else { break };
-            if journal::view(flash, place).is_some_and(|view| is_it(view.blob(), place.sequence)) {
-                return Some(place.sequence);
-            }
-        }
-        (Sector::ALL.into_iter())
-            .any(|sector| is_it(flash.bytes(sector), 0))
-            .then_some(0)
     }
 
     /// The sectors that a start may erase, in the order in which it tries.

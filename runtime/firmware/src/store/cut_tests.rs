@@ -227,7 +227,7 @@ fn after_any_cut_of_an_update_the_old_blob_is_found_or_the_new_one() {
         cuts += cut_everywhere(&Scenario::new(name, flash, action, [old, Some(100)]));
     }
     println!("RESULT cuts_of_updates={cuts}");
-    assert_eq!(cuts, 61_772);
+    assert_eq!(cuts, 162_993);
 }
 
 #[test]
@@ -242,7 +242,7 @@ fn going_back_and_passing_over_survive_any_cut() {
         cuts += cut_everywhere(&Scenario::new(name, flash, action, found));
     }
     println!("RESULT cuts_of_going_back={cuts}");
-    assert_eq!(cuts, 21_063);
+    assert_eq!(cuts, 16_420);
 }
 
 /// Updates, going back and starts in a long row, each cut or not.

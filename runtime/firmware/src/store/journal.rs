@@ -1,6 +1,7 @@
 //! The journal in a sector: where records are, where the next one goes, and what an interrupted
 //! operation left.
 
+use super::blobs::stored_crc;
 use super::flash::{self, Flash, SECTOR_BYTES, Sector, WriteFault, word_of};
 use super::record::{COMMIT, MAX_UNITS, SEAL, UNIT_BYTES, VOIDED, View};
 
@@ -94,13 +95,17 @@ pub(super) fn highest_committed(flash: &impl Flash, bound: Option<Place>) -> Opt
     None
 }
 
-/// Whether a committed record passes over the one with this sequence number.
+/// Whether a committed record passes over a blob that is in an older one, of this sequence number; 0
+/// for a plain blob.
 #[inline(never)]
-pub(super) fn is_passed_over(flash: &impl Flash, sequence: u32) -> bool {
-    (0..UNITS).any(|index| {
-        marked_at(flash, index)
-            .is_some_and(|(_, view)| view.passed_over() == Some(sequence) && view.is_sound())
-    })
+pub(super) fn is_passed_over(flash: &impl Flash, sequence: u32, blob: &[u8]) -> bool {
+    let crc = stored_crc(blob);
+    crc.is_some()
+        && (0..UNITS).any(|index| {
+            marked_at(flash, index).is_some_and(|(place, view)| {
+                view.passed_over() == crc && place.sequence > sequence && view.is_sound()
+            })
+        })
 }
 
 /// Whether a unit reads as erased. By words: all of a sector is looked at in one tick.

@@ -27,7 +27,7 @@
 //! |---|---|---|
 //! | 0 | 4 | magic, `HREC` |
 //! | 4 | 4 | sequence number, 1 to 2^32 - 2 |
-//! | 8 | 4 | sequence number that this record passes over, 0 for plain blobs; 2^32 - 1: none |
+//! | 8 | 4 | CRC of a blob that this record passes over wherever it is in an older one; 2^32 - 1: none |
 //! | 12 | 4 | length n of the blob in bytes |
 //! | 16 | 32 | serial number of the stage, filled up with zeros |
 //! | 48 | n | blob |
@@ -59,7 +59,7 @@
 //!   ([`Refused::NoRoom`]) until the next start.
 //!
 //! Going back is a new record with a copy of the blob before. Passing over a record that made
-//! the program fault is a new record too, which names the other one; where there is no blob to
+//! the program fault is a new record too, which names that blob; where there is no blob to
 //! go back to, nothing is written: the fault may have had another cause. A mark in the old record would be a single word that decides alone: if the power fails
 //! while it is programmed, it may read as set after one start and as not set after the next. A
 //! new record is protected as an update is, one proof serves all three, and going back can be
@@ -96,7 +96,7 @@ mod journal;
 mod record;
 mod writing;
 
-pub use blobs::Stored;
+pub use blobs::{Stored, readable};
 pub use check::Check;
 pub use flash::{Flash, FlashFault, SECTOR_BYTES, SECTOR_WORDS, Sector, WriteFault};
 pub use journal::is_journal;
@@ -203,7 +203,7 @@ impl Store {
         self.previous
     }
 
-    /// The sequence number of the record that the newest one passes over, if it does.
+    /// The CRC of the blob that the newest record passes over, if it does.
     pub const fn passed_over(&self) -> Option<u32> {
         self.passed_over
     }
@@ -241,4 +241,4 @@ mod fault_tests;
 #[cfg(test)]
 mod fuzz_tests;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
