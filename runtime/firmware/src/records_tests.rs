@@ -218,6 +218,11 @@ fn a_blob_whose_check_faults_is_passed_over_and_never_read_again() {
             let (mut records, ..) = start(&mut flash, false);
             let again = blob(faulty);
             assert_eq!(store(&mut records, Change::Blob(&again)), Written::Done);
+            let (mut records, running, _) = start(&mut flash, false);
+            assert_eq!(running.as_ref(), Some(&again));
+            assert_eq!(store(&mut records, Change::Blob(&blob(3))), Written::Done);
+            let (mut records, ..) = start(&mut flash, false);
+            assert_eq!(store(&mut records, Change::Previous), Written::Done);
             assert_eq!(start(&mut flash, false).1, Some(again));
         }
     }

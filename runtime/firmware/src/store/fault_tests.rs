@@ -80,6 +80,55 @@ fn a_worn_word_costs_one_update_at_most_wherever_it_is() {
     }
 }
 
+/// Flash that reports an error of one operation, which it has done all the same.
+struct Reporting<'f> {
+    flash: &'f mut FlashModel,
+    at: usize,
+}
+
+impl Flash for Reporting<'_> {
+    fn bytes(&self, sector: Sector) -> &[u8; SECTOR_BYTES] {
+        self.flash.bytes(sector)
+    }
+
+    fn program(&mut self, sector: Sector, word: usize, value: u32) -> Result<(), FlashFault> {
+        self.flash.program(sector, word, value)?;
+        match self.flash.operations - 1 == self.at {
+            true => Err(FlashFault { status: 1 << 7 }),
+            false => Ok(()),
+        }
+    }
+
+    fn erase(&mut self, sector: Sector) -> Result<(), FlashFault> {
+        self.flash.erase(sector)
+    }
+}
+
+#[test]
+fn after_an_error_of_the_flash_the_record_does_not_count_though_it_is_whole() {
+    let mut sound = FlashModel::erased();
+    let mut store = Store::start(&mut sound, SERIAL);
+    assert_eq!(update(&mut store, &mut sound, &blob(0)), Ok(()));
+    let record = record(&store, &blob(1)).expect("due");
+    for at in 0..record.body_words() + 1 {
+        let mut flash = sound.clone();
+        let mut store = Store::start(&mut flash, SERIAL);
+        flash.power_on();
+        let mut writing = store.begin(&flash, &record).expect("room");
+        let mut reporting = Reporting {
+            flash: &mut flash,
+            at,
+        };
+        let step = (0..=at).find_map(|_| writing.step(&mut reporting, &record).err());
+        assert!(matches!(step, Some(WriteFault::Flash { .. })), "{at}");
+        let mut store = Store::start(&mut flash, SERIAL);
+        assert_eq!(found(&store, &flash), Some(blob(0)), "{at}");
+        assert_eq!(update(&mut store, &mut flash, &blob(2)), Ok(()), "{at}");
+        let store = Store::start(&mut flash, SERIAL);
+        assert_eq!(found(&store, &flash), Some(blob(2)), "{at}");
+    }
+}
+
 #[test]
 fn a_worn_commit_word_that_reads_again_is_older_than_what_was_written_since() {
     let mut flash = FlashModel::erased();
