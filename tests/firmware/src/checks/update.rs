@@ -24,6 +24,8 @@ use runtime::parameters::Text;
 use runtime::{ParameterSet, Status};
 
 /// The program for the ADS131M08 is built with this key, the other one without any.
+/// The check of a blob at the start.
+const CHECK: &str = "store5blobs7checked";
 const PART: Part = Part::Ads131m08;
 const KEY: Key = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 /// Between two looks at the bus.
@@ -304,15 +306,37 @@ pub fn parameters_that_crash(bench: &Bench) -> Outcome {
         machine.run_ticks(10)?;
         equal("resets", machine.panics, resets)?;
     }
-    Seen::since_last(&mut machine);
+    are_passed_over(bench, &mut machine)
+}
+
+/// Parameters whose check at the start makes the program fault twice.
+pub fn parameters_whose_check_crashes(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.hook_injection(bench.image(PART).address(CHECK)?)?;
+    machine.run_ticks(20)?;
+    update(&mut machine, plan(&bench.later, 1))?.0?;
+    for resets in [1, 2] {
+        let value = 0x6000_0000;
+        let register = register::R0;
+        machine.chip.inject = vec![Injected { register, value }];
+        machine.reset_by_pin();
+        machine.run_ticks(10)?;
+        equal("resets", machine.panics, resets)?;
+    }
+    are_passed_over(bench, &mut machine)
+}
+
+/// The parameters before them run, it is told, and it stays so.
+fn are_passed_over(bench: &Bench, machine: &mut Machine) -> Outcome {
+    Seen::since_last(machine);
     machine.run_ticks(40)?;
-    let seen = Seen::since_last(&mut machine);
+    let seen = Seen::since_last(machine);
     let status = seen.last_status().ok_or("no state")?;
     let told = (status.state, status.reason);
     equal("state", told, (Some(NodeState::Running), 0x80 | 12))?;
-    equal("running", running(&mut machine)?, bench.blob.clone())?;
+    equal("running", running(machine)?, bench.blob.clone())?;
     machine.power_cycle();
-    equal("after power-on", running(&mut machine)?, bench.blob.clone())
+    equal("after power-on", running(machine)?, bench.blob.clone())
 }
 
 /// A sector with anything in it is erased at the first start beside a plain blob; the watchdog runs
