@@ -55,15 +55,23 @@
 //!   interrupted updates in a row (each takes up to 23 of the 255 units); after one and the
 //!   same blob was written so often that it fills the sector.
 //! - [`Store::start`] alone erases, and only if neither sector has room for the largest record.
-//!   There is always room for one update after it. When there is none left, updates are refused
-//!   ([`Refused::NoRoom`]) until the next start.
+//!   There is always room for one update after it, unless no sector may be erased or none can
+//!   ([`Store::is_writable`]). When there is none left, updates are refused ([`Refused::NoRoom`])
+//!   until the next start.
 //!
-//! Going back is a new record with a copy of the blob before. Passing over a record that made
-//! the program fault is a new record too, which names that blob; where there is no blob to
-//! go back to, nothing is written: the fault may have had another cause. A mark in the old record would be a single word that decides alone: if the power fails
-//! while it is programmed, it may read as set after one start and as not set after the next. A
-//! new record is protected as an update is, one proof serves all three, and going back can be
-//! undone.
+//! Going back is a new record with a copy of the blob before. Passing over a blob that made the
+//! program fault is a new record too, with a copy of the one that runs in its place; where there
+//! is no other, nothing is written, because the fault may have had another cause. A mark in the old
+//! record would be a single word that decides alone: if the power fails while it is programmed,
+//! it may read as set after one start and as not set after the next. A new record is protected
+//! as an update is, one proof serves all three, and going back can be undone.
+//!
+//! # Worn words
+//!
+//! A word that does not program costs the update that meets it, and no more: the next start leaves
+//! its place out, or its sector if it is one of the first two words and the newest blob is in the
+//! other. A commit word that takes neither its value nor zero may count at one start and not at the
+//! next, until the next record, which has a higher number. A seal that does not hold does no harm.
 //!
 //! # Bits that change after an interrupted operation
 //!
