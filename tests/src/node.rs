@@ -147,8 +147,9 @@ fn start(
     before: &Before,
 ) -> (Ticking<'static>, Records<FlashModel>) {
     let record = Box::leak(Box::new(Record::EMPTY));
-    let is_faulty = before.blames_parameters;
-    let (mut records, found) = Records::start(flash, record, Some(serial), is_faulty);
+    // No check of a blob faults here, whose CRC the next start had to know.
+    let check = before.check(Some(serial), |_| ());
+    let (mut records, found) = Records::start(flash, record, check, before.blames_newest());
     let place = Box::leak(Box::new(None));
     let loaded = found.blob.and_then(|blob| records.load(blob, place));
     let is_sound = runtime::arithmetic::check().is_ok();

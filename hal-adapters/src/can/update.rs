@@ -5,7 +5,8 @@
 //! ServoOff {seconds}          ->     the servo is off: Done
 //! Tell {page}, ReadBack {k}   ->     who it is, what it runs
 //! Begin {bytes}               ->     a transfer is open, under the token of this command; the pose
-//!                                    is invalid until it ends. Done, ServoOn, Busy, NoRoom
+//!                                    is invalid until it ends. Done, ServoOn, Busy, NoRoom,
+//!                                    StoreFailed
 //! Challenge {0 to 3}          ->     the nonce of this transfer
 //! UpdateData, any order       ->     kept in RAM; the tag from index 240, where the node has a key
 //! Verify {sequence}           ->     Incomplete {first missing index}: send it and ask again;

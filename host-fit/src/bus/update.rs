@@ -109,8 +109,9 @@ pub enum UpdateError {
     NoRoom,
     /// The flash could not be written.
     #[error(
-        "the controller could not write its flash, and keeps the parameters that it has; restart it and try again. If it \
-         fails again the flash is worn out"
+        "the controller could not write its flash, and goes on with the parameters that it runs; restart it, look at them \
+         with `host-fit identify`, and try again. If it fails again, the flash is worn out, or both slots hold blobs that a \
+         probe has flashed and the program does not take: erase one of them with the probe"
     )]
     StoreFailed,
     /// There is nothing to go back to.

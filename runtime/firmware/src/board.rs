@@ -105,16 +105,59 @@ pub const fn can_bit_timing(crystal: bool) -> BitTiming {
     }
 }
 
+/// Longest serial number, as in [`runtime::parameters::Text`].
+const TEXT_BYTES: usize = 32;
+
+/// What differs from stage to stage. In `.data`, which the program's hash leaves out: programs that
+/// differ in nothing else have the same, and it tells nothing of the key.
+struct Stage {
+    /// Filled up with zeros.
+    serial: [u8; TEXT_BYTES],
+    key: Key,
+}
+
+#[unsafe(link_section = ".data.STAGE")]
+static STAGE: Stage = Stage {
+    serial: match option_env!("STAGE_SERIAL") {
+        Some(serial) => padded(serial),
+        None => [0; TEXT_BYTES],
+    },
+    key: match option_env!("STAGE_KEY") {
+        Some(digits) => key(digits),
+        None => [0; 16],
+    },
+};
+
+/// Read as if it could be anything, so that no part of it is copied into the program.
+fn stage() -> &'static Stage {
+    core::hint::black_box(&STAGE)
+}
+
 /// The stage that this controller belongs to, if the program was built with `STAGE_SERIAL` in
 /// the environment: blobs of other stages are refused.
-pub const STAGE_SERIAL: Option<&str> = option_env!("STAGE_SERIAL");
+pub fn stage_serial() -> Option<&'static str> {
+    let serial = stage().serial.split(|byte| *byte == 0).next()?;
+    core::str::from_utf8(serial)
+        .ok()
+        .filter(|serial| !serial.is_empty())
+}
 
 /// The key of the stage, if the program was built with `STAGE_KEY` in the environment: 32
 /// hexadecimal digits. Without one, whoever can send on the bus may replace the parameters.
-pub const STAGE_KEY: Option<Key> = match option_env!("STAGE_KEY") {
-    Some(digits) => Some(key(digits)),
-    None => None,
-};
+pub fn stage_key() -> Option<Key> {
+    option_env!("STAGE_KEY").map(|_| stage().key)
+}
+
+const fn padded(serial: &str) -> [u8; TEXT_BYTES] {
+    let mut bytes = [0; TEXT_BYTES];
+    assert!(serial.len() <= TEXT_BYTES, "STAGE_SERIAL is too long");
+    let mut k = 0;
+    while k < serial.len() {
+        bytes[k] = serial.as_bytes()[k];
+        k += 1;
+    }
+    bytes
+}
 
 const fn key(digits: &str) -> Key {
     assert!(digits.len() == 32, "STAGE_KEY needs 32 hexadecimal digits");

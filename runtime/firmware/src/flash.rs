@@ -27,7 +27,7 @@ const BUSY: u32 = 1 << 16;
 const WORD_LOOKS: u32 = 10_000;
 const SECTOR_LOOKS: u32 = 42_000_000;
 
-/// CRC-32C of the program's instructions and constants.
+/// CRC-32C of the program's instructions and constants: the same for every stage.
 pub fn program_crc() -> u32 {
     let (start, end) = (&raw const __stext, &raw const __erodata);
     // SAFETY: the linker puts `.text` and `.rodata` between these symbols, one after the other,
@@ -78,6 +78,13 @@ impl Sectors {
             w.pg().clear_bit().ser().clear_bit();
             w.lock().set_bit()
         });
+        // A write to flash changes the data cache as well, and an erase does not (section 3.6.4):
+        // what is read back is to come from flash. The cache is reset only while it is off
+        // (section 3.5.2).
+        registers.acr().modify(|_, w| w.dcen().clear_bit());
+        registers.acr().modify(|_, w| w.dcrst().set_bit());
+        registers.acr().modify(|_, w| w.dcrst().clear_bit());
+        registers.acr().modify(|_, w| w.dcen().set_bit());
         match status & (BUSY | ERRORS) {
             0 => Ok(()),
             status => Err(FlashFault { status }),
@@ -112,7 +119,7 @@ impl Flash for Sectors {
 
     fn erase(&mut self, sector: Sector) -> Result<(), FlashFault> {
         let number = 1 + sector as u8;
-        let erased = self.operate(|registers| {
+        self.operate(|registers| {
             // SAFETY: the numbers of the two sectors, 1 and 2 (table 5).
             registers.cr().modify(|_, w| unsafe {
                 w.psize().psize32().ser().set_bit();
@@ -120,14 +127,6 @@ impl Flash for Sectors {
             });
             registers.cr().modify(|_, w| w.strt().set_bit());
             SECTOR_LOOKS
-        });
-        // The data cache may hold what was there before; it may be reset only while it is off
-        // (section 3.5.2).
-        let control = self.registers.acr();
-        control.modify(|_, w| w.dcen().clear_bit());
-        control.modify(|_, w| w.dcrst().set_bit());
-        control.modify(|_, w| w.dcrst().clear_bit());
-        control.modify(|_, w| w.dcen().set_bit());
-        erased
+        })
     }
 }

@@ -122,8 +122,11 @@ mod app {
         watchdog.set_period(CORE_MHZ, true, &mut stopwatch);
         let options = OptionBytes::read(&device.FLASH);
         let sectors = flash::Sectors::new(device.FLASH);
-        let (record, is_faulty) = (cx.local.record, before.blames_parameters);
-        let (mut records, found) = Records::start(sectors, record, board::STAGE_SERIAL, is_faulty);
+        let is_faulty = before.blames_newest();
+        let check = before.check(board::stage_serial(), |crc| {
+            fault::update(|record| record.checked_blob = crc.unwrap_or(0));
+        });
+        let (mut records, found) = Records::start(sectors, cx.local.record, check, is_faulty);
         let program_hash = flash::program_crc();
         let loaded = found
             .blob
@@ -135,8 +138,8 @@ mod app {
         let sound = runtime::arithmetic::check().is_ok() && Fpu::defaults_are_sound();
         let parameters = Parameters::at_start(loaded, found.refusal, sound);
         let identity = Identity {
-            serial: board::STAGE_SERIAL,
-            key: board::STAGE_KEY,
+            serial: board::stage_serial(),
+            key: board::stage_key(),
             program_version: board::PROGRAM_VERSION,
             program_hash,
         };

@@ -50,7 +50,7 @@ const IDENTITY: Identity<'_> = Identity {
 
 fn take(node: &mut Node<'_>, frame: &impl Frame, outbox: &mut Outbox) {
     let record = Box::leak(Box::new(Record::EMPTY));
-    let (mut records, _) = Records::start(FlashModel::erased(), record, None, false);
+    let (mut records, _) = Records::start(FlashModel::erased(), record, None::<&str>, false);
     node.take(frame, outbox, &mut records, None);
 }
 

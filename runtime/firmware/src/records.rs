@@ -2,7 +2,7 @@
 //! the bus.
 
 use crate::slots::{self, Loaded, Refusal};
-use crate::store::{Flash, Record, Sector, Step, Store, Stored, Writing};
+use crate::store::{self, Check, Flash, Record, Sector, Step, Store, Stored, Writing};
 use hal_adapters::can::update::{self, Change, Running, Written};
 
 /// Words that are programmed in one tick: 0.2 ms at most on an STM32F405 (DS8626, flash memory
@@ -33,17 +33,19 @@ pub struct Found {
 impl<F: Flash> Records<F> {
     /// At start-up: looks at both sectors, settles what was interrupted, erases one if there is no
     /// room for an update (500 ms at most, on an STM32F405). `is_faulty` is whether the newest blob
-    /// made the program fault twice: then the one before it is used, from now on. If there is none
-    /// before it, no blob is used, and the next power-on tries again. `record` is the room in which
-    /// records are put together.
+    /// made the program fault twice, [`Check::suspect`] a blob whose check did. Then another one is
+    /// used, from now on if that can be written, else until the next start. If there is no other,
+    /// none is used, and the next start tries again. `record` is the room in which records are put
+    /// together.
     pub fn start(
         mut flash: F,
         record: &'static mut Record,
-        serial: Option<&'static str>,
+        check: impl Into<Check>,
         is_faulty: bool,
     ) -> (Self, Found) {
-        let plain = slots::refusal(Sector::ALL.map(|s| flash.bytes(s).as_slice()), serial);
-        let store = Store::start(&mut flash, serial);
+        let check = check.into();
+        let plain = slots::refusal(Sector::ALL.map(|s| store::readable(&flash, s)), &check);
+        let store = Store::start(&mut flash, check);
         let mut records = Self {
             flash,
             store,
@@ -52,13 +54,14 @@ impl<F: Flash> Records<F> {
             is_ready: false,
             writing: None,
         };
-        let newest = records.store.newest();
-        if is_faulty && records.store.previous().is_some() {
-            records.pass_over();
-        }
-        let used = records.store.newest();
-        let blob = used.filter(|_| !is_faulty || used != newest);
-        let refusal = records.refusal(is_faulty && newest.is_some()).or(plain);
+        let has_faulted = check.suspect.is_some() || is_faulty && records.store.newest().is_some();
+        let blob = if has_faulted {
+            let fallback = records.store.fallback();
+            records.pass_over().or(fallback)
+        } else {
+            records.store.newest()
+        };
+        let refusal = records.refusal(has_faulted).or(plain);
         (records, Found { blob, refusal })
     }
 
@@ -67,8 +70,8 @@ impl<F: Flash> Records<F> {
         &self.flash
     }
 
-    fn refusal(&self, is_passed_over: bool) -> Option<Refusal> {
-        if is_passed_over || self.store.passed_over().is_some() {
+    fn refusal(&self, has_faulted: bool) -> Option<Refusal> {
+        if has_faulted || self.store.passed_over().is_some() {
             return Some(Refusal::PASSED_OVER);
         }
         if self.store.fault().is_some() {
@@ -78,19 +81,15 @@ impl<F: Flash> Records<F> {
         Some(Refusal::of(rejected.sector as u8, &rejected.error))
     }
 
-    fn pass_over(&mut self) {
-        if self.store.pass_over(&self.flash, self.record).is_err() {
-            return;
-        }
-        let Ok(mut writing) = self.store.begin(&self.flash, self.record) else {
-            return;
-        };
+    /// The record that is written for it, with what runs in its place.
+    fn pass_over(&mut self) -> Option<Stored> {
+        self.store.pass_over(&self.flash, self.record).ok()?;
+        let mut writing = self.store.begin(&self.flash, self.record).ok()?;
         for _ in 0..writing.words() {
-            if writing.step(&mut self.flash, self.record).is_err() {
-                return;
-            }
+            writing.step(&mut self.flash, self.record).ok()?;
         }
         self.store.finish(&self.flash, &writing);
+        self.store.newest()
     }
 
     /// Reads a blob that [`Records::start`] found, which runs from now on.
@@ -145,6 +144,10 @@ impl<F: Flash> update::Store for Records<F> {
         self.store.due().map_or(u32::MAX, |due| due - 1)
     }
 
+    fn is_writable(&self) -> bool {
+        self.store.is_writable()
+    }
+
     fn has_room(&self) -> bool {
         self.store.has_room(&self.flash)
     }
@@ -181,3 +184,7 @@ impl<F: Flash> update::Store for Records<F> {
         Written::InProgress
     }
 }
+
+#[cfg(test)]
+#[path = "records_tests.rs"]
+mod tests;

@@ -8,10 +8,10 @@ use crc::{CRC_32_ISCSI, Crc, NoTable};
 use runtime::PlanarPose;
 
 /// Words of the record with its check.
-pub const WORDS: usize = 10;
+pub const WORDS: usize = 11;
 
 /// Marks a record of this layout.
-const MAGIC: u32 = 0x5354_4731;
+const MAGIC: u32 = 0x5354_4732;
 /// Bits of the first word besides the step.
 const CRASHED_BIT: u32 = 8;
 const PROVEN_BIT: u32 = 9;
@@ -66,6 +66,18 @@ pub enum FaultKind {
     Watchdog = 5,
 }
 
+/// Parameters that made the program fault twice in a row at its start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blamed {
+    /// Those that it used.
+    Newest,
+    /// Those that it had begun to check.
+    Blob {
+        /// CRC of the blob.
+        crc: u32,
+    },
+}
+
 /// The last fault, as words.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Fault {
@@ -117,6 +129,8 @@ pub struct Retained {
     /// Faults in a row that came while the parameters were read, or in the first ticks with them.
     /// Saturates.
     pub early_faults: u8,
+    /// CRC of the blob that is being checked; 0: none.
+    pub checked_blob: u32,
     /// Whether the ticks since this start are enough to say that the parameters are not at fault.
     pub proven: bool,
     /// The zero deviation; that of an unmoved stage is zero.
@@ -156,15 +170,19 @@ impl Retained {
         }
     }
 
-    /// Whether the parameters made the program fault twice in a row at its start. Asked once in
-    /// a start: the next parameters begin anew.
-    pub const fn blames_parameters(&mut self) -> bool {
+    /// What made the program fault twice in a row at its start. Asked once in a start: the next
+    /// parameters begin anew.
+    pub const fn blames(&mut self) -> Option<Blamed> {
         self.proven = false;
-        let blamed = self.early_faults >= EARLY_MAX;
-        if blamed {
-            self.early_faults = 0;
+        let checked = core::mem::replace(&mut self.checked_blob, 0);
+        if self.early_faults < EARLY_MAX {
+            return None;
         }
-        blamed
+        self.early_faults = 0;
+        Some(match checked {
+            0 => Blamed::Newest,
+            crc => Blamed::Blob { crc },
+        })
     }
 
     /// The program has run long enough with its parameters.
@@ -186,13 +204,14 @@ impl Retained {
             self.fault.address,
             self.fault.detail,
             self.faults,
+            self.checked_blob,
             self.zero.blob,
             zero.x_m.to_bits(),
             zero.y_m.to_bits(),
             zero.rz_rad.to_bits(),
         ];
-        let [a, b, c, d, e, f, g, h, i] = content;
-        [a, b, c, d, e, f, g, h, i, check(&content)]
+        let [a, b, c, d, e, f, g, h, i, j] = content;
+        [a, b, c, d, e, f, g, h, i, j, check(&content)]
     }
 
     /// The record of these words, if its check is right.
@@ -204,6 +223,7 @@ impl Retained {
             address,
             detail,
             faults,
+            checked_blob,
             blob,
             x,
             y,
@@ -219,6 +239,7 @@ impl Retained {
                 detail,
             },
             faults,
+            checked_blob,
             crashed: state >> CRASHED_BIT & 1 == 1,
             proven: state >> PROVEN_BIT & 1 == 1,
             early_faults: (state >> EARLY_SHIFT) as u8,
@@ -251,6 +272,7 @@ mod tests {
             step: Step::Converter,
             faults: 3,
             early_faults: 1,
+            checked_blob: 0x89ab_cdef,
             proven: true,
             zero: KeptZero {
                 blob: 0x1234_5678,
@@ -298,7 +320,7 @@ mod tests {
                 record.prove();
             }
             record.note(kind, 0, 0);
-            record.blames_parameters()
+            record.blames().is_some()
         };
         assert!(!fault(FaultKind::HardFault, Step::Ticking, true));
         assert!(!fault(FaultKind::Watchdog, Step::Clocks, false));
@@ -312,6 +334,24 @@ mod tests {
         assert!(!fault(FaultKind::Panic, Step::Ticking, false));
         assert!(fault(FaultKind::Panic, Step::Ticking, false));
         assert!(!fault(FaultKind::Panic, Step::Ticking, true));
+    }
+
+    #[test]
+    fn a_blob_is_blamed_if_the_second_fault_came_while_it_was_checked() {
+        let mut record = Retained::default();
+        for (first, second, blamed) in [
+            (7, 7, Blamed::Blob { crc: 7 }),
+            (0, 7, Blamed::Blob { crc: 7 }),
+            (7, 0, Blamed::Newest),
+        ] {
+            for (checked, expected) in [(first, None), (second, Some(blamed))] {
+                record.step = Step::Parameters;
+                record.checked_blob = checked;
+                record.note(FaultKind::HardFault, 0, 0);
+                assert_eq!(record.blames(), expected);
+                assert_eq!(record.checked_blob, 0);
+            }
+        }
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! What is told of the two parameter slots, and what a sound blob gives. Which blob is used is
 //! decided by [`crate::store`].
 
-use crate::store::is_journal;
-use runtime::blob::{BlobError, HEADER_BYTES};
+use crate::store::{Check, is_journal, stored_crc};
+use runtime::blob::BlobError;
 use runtime::parameters::{FitRecord, Text};
 use runtime::{AnyDecoder, ParameterSet};
 
@@ -63,9 +63,9 @@ pub struct Loaded {
 }
 
 /// The worst that is wrong with the plain contents of the slots, slot 0 first: `None` for an erased
-/// slot, a sound blob, and a journal. With a `serial`, blobs of other stages are refused.
-pub fn refusal(slots: [&[u8]; SLOTS], serial: Option<&str>) -> Option<Refusal> {
-    let [first, second] = slots.map(|memory| error(memory, serial));
+/// slot, a sound blob, a journal, and a slot of no bytes.
+pub fn refusal(slots: [&[u8]; SLOTS], check: &Check) -> Option<Refusal> {
+    let [first, second] = slots.map(|memory| error(memory, check));
     let first = first.map(|error| Refusal::of(0, &error));
     first.or_else(|| second.map(|error| Refusal::of(1, &error)))
 }
@@ -73,15 +73,14 @@ pub fn refusal(slots: [&[u8]; SLOTS], serial: Option<&str>) -> Option<Refusal> {
 /// A parameter set has 700 bytes and is read at start only: in functions of their own, these leave
 /// the stack at once.
 #[inline(never)]
-fn error(memory: &[u8], serial: Option<&str>) -> Option<BlobError> {
-    if is_journal(memory) {
+fn error(memory: &[u8], check: &Check) -> Option<BlobError> {
+    if memory.is_empty() || is_journal(memory) {
         return None;
     }
-    match &ParameterSet::from_flash(memory) {
-        Err(BlobError::Erased) => None,
-        Err(error) => Some(*error),
-        Ok(set) => set.expect_serial(serial?).err(),
-    }
+    let read = check.guard(memory, || {
+        check.is_of_stage(ParameterSet::from_flash(memory).as_ref().map_err(|e| *e)?)
+    });
+    read.err().filter(|error| *error != BlobError::Erased)
 }
 
 /// Reads a sound blob, with what follows it or without.
@@ -96,14 +95,6 @@ pub fn load(memory: &[u8]) -> Option<Loaded> {
         fit: set.fit,
         crc: stored_crc(memory)?,
     })
-}
-
-/// The CRC at the end of a sound blob.
-fn stored_crc(memory: &[u8]) -> Option<u32> {
-    let (header, rest) = memory.split_first_chunk::<HEADER_BYTES>()?;
-    let payload_bytes = u32::from_le_bytes(*header.last_chunk()?);
-    let stored = rest.get(payload_bytes as usize..)?.first_chunk()?;
-    Some(u32::from_le_bytes(*stored))
 }
 
 #[cfg(test)]

@@ -57,7 +57,7 @@ fn a_damaged_slot_is_told_and_an_erased_one_is_not() {
     torn[200..].fill(0xff);
     let mut journal = erased.clone();
     journal[..4].copy_from_slice(b"HJNL");
-    let told = |slots| refusal(slots, None).map(|refusal| (refusal.reason, refusal.erased));
+    let told = |slots| refusal(slots, &None.into()).map(|refusal| (refusal.reason, refusal.erased));
     assert_eq!(told([&torn, &good]), Some((0x07, false)));
     assert_eq!(told([&good, &torn]), Some((0x17, false)));
     assert_eq!(told([&erased, &torn]), Some((0x17, false)));
@@ -68,8 +68,8 @@ fn a_damaged_slot_is_told_and_an_erased_one_is_not() {
 #[test]
 fn a_blob_of_another_stage_is_refused_only_if_the_stage_is_known() {
     let slots: [&[u8]; 2] = [&slot("8", ""), &[0xff; 16]];
-    assert_eq!(refusal(slots, None), None);
-    let told = refusal(slots, Some("7")).map(|refusal| refusal.reason);
+    assert_eq!(refusal(slots, &None.into()), None);
+    let told = refusal(slots, &Some("7").into()).map(|refusal| refusal.reason);
     assert_eq!(told, Some(0x0a));
     let loaded = load(slots[0]).expect("a sound slot");
     assert_eq!(loaded.serial.as_str(), "8");

@@ -1,7 +1,8 @@
 //! The start-up, apart from the chip: what is known of the run that a reset ended.
 
 use crate::node::Node;
-use crate::retained::{FaultKind, KeptZero, Retained};
+use crate::retained::{Blamed, FaultKind, KeptZero, Retained};
+use crate::store::Check;
 
 /// After so many ticks, 1 s, parameters are not blamed for a fault.
 pub const PROVEN_TICKS: u32 = 500;
@@ -24,8 +25,8 @@ pub struct Before {
     pub cause: Cause,
     /// Whether the watchdog or the program itself caused it, on a fault.
     pub by_fault: bool,
-    /// Whether the parameters made the program fault twice in a row.
-    pub blames_parameters: bool,
+    /// The parameters that made the program fault twice in a row.
+    pub blames: Option<Blamed>,
     /// The record that survived; after power-on an empty one. It is to be retained again.
     pub record: Retained,
 }
@@ -41,12 +42,31 @@ impl Before {
             record.note(FaultKind::Watchdog, 0, 0);
         }
         let by_fault = core::mem::take(&mut record.crashed);
-        let blames_parameters = record.blames_parameters();
+        let blames = record.blames();
         Self {
             cause,
             by_fault,
-            blames_parameters,
+            blames,
             record,
+        }
+    }
+
+    /// Whether the parameters that it used are to blame.
+    pub fn blames_newest(&self) -> bool {
+        self.blames == Some(Blamed::Newest)
+    }
+
+    /// What blobs are checked for at start-up; a fault in a check is blamed on its blob, whose CRC
+    /// goes to `note`.
+    pub const fn check(&self, serial: Option<&'static str>, note: fn(Option<u32>)) -> Check {
+        let suspect = match self.blames {
+            Some(Blamed::Blob { crc }) => Some(crc),
+            Some(Blamed::Newest) | None => None,
+        };
+        Check {
+            serial,
+            suspect,
+            note,
         }
     }
 
@@ -71,7 +91,7 @@ mod tests {
         kept.note(FaultKind::HardFault, 1, 2);
         let before = Before::of(Cause::PowerOn, Some(kept));
         assert_eq!(before.record, Retained::default());
-        assert!(!before.by_fault && !before.blames_parameters);
+        assert!(!before.by_fault && before.blames.is_none());
     }
 
     #[test]

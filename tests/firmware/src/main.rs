@@ -250,6 +250,10 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("update: parameters that crash are passed over", &|| {
         update::parameters_that_crash(bench)
     });
+    check(
+        "update: parameters whose check crashes are passed over",
+        &|| update::parameters_whose_check_crashes(bench),
+    );
     check("update: a sector is erased at the start", &|| {
         update::erase_at_the_start(bench)
     });

@@ -225,6 +225,9 @@ impl<'s> Receiver<'s> {
         if bytes == 0 && !around.store.has_previous() {
             return (Outcome::NoParameters, 0);
         }
+        if !around.store.is_writable() {
+            return (Outcome::StoreFailed, 0);
+        }
         if !around.store.has_room() {
             return (Outcome::NoRoom, 0);
         }

@@ -44,6 +44,10 @@ impl Store for Watched {
         self.inner.newest_sequence()
     }
 
+    fn is_writable(&self) -> bool {
+        !self.fails
+    }
+
     fn has_room(&self) -> bool {
         self.room
     }
@@ -334,6 +338,8 @@ fn a_damaged_blob_and_one_of_another_stage_are_refused_by_kind() {
     assert_eq!(bench.update(back, 7), (Outcome::NoParameters, 0));
     bench.store.room = false;
     assert_eq!(bench.update(BEGIN, 7), (Outcome::NoRoom, 0));
+    bench.store.fails = true;
+    assert_eq!(bench.update(BEGIN, 7), (Outcome::StoreFailed, 0));
 }
 
 #[test]

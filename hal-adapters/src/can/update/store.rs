@@ -47,6 +47,11 @@ pub trait Store {
     /// The highest sequence number of any committed record; 0 if there is none.
     fn newest_sequence(&self) -> u32;
 
+    /// Whether records can be written before the next start. If not, that start may try again.
+    fn is_writable(&self) -> bool {
+        true
+    }
+
     /// Whether a record of any size fits without an erase.
     fn has_room(&self) -> bool;
 

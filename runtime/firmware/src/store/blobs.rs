@@ -1,5 +1,6 @@
 //! The blobs that the sectors hold: in records, and plain as a probe flashes them.
 
+use super::check::Check;
 use super::flash::{Flash, Sector, word_of};
 use super::journal::{self, Place};
 use super::record::{UNIT_BYTES, View};
@@ -26,10 +27,10 @@ impl Stored {
     }
 }
 
-/// The blob of a record, if it has one.
+/// The blob of a record.
 #[inline(never)]
 pub(super) fn stored(flash: &impl Flash, place: Place) -> Option<Stored> {
-    let view = journal::view(flash, place).filter(|view| !view.is_void())?;
+    let view = journal::view(flash, place)?;
     let (offset, bytes) = view.blob_range();
     Some(Stored {
         sequence: place.sequence,
@@ -48,33 +49,40 @@ pub(super) struct Label {
 /// The full check of a blob. A parameter set has 700 bytes: in a function of its own, it leaves
 /// the stack at once.
 #[inline(never)]
-pub(super) fn checked(blob: &[u8], serial: Option<&str>) -> Result<Label, BlobError> {
+pub(super) fn checked(blob: &[u8], check: &Check) -> Result<Label, BlobError> {
     let read = ParameterSet::from_bytes(blob);
     let set = read.as_ref().map_err(|error| *error)?;
-    serial.map_or(Ok(()), |serial| set.expect_serial(serial))?;
+    check.is_of_stage(set)?;
     let (serial, created) = (set.serial.clone(), set.created.clone());
     Ok(Label { serial, created })
 }
 
 /// Why a committed record cannot be used.
 #[inline(never)]
-pub(super) fn unusable(view: &View<'_>, serial: Option<&str>) -> Option<BlobError> {
-    if view.is_void() {
-        return None;
-    }
-    match checked(view.blob(), serial) {
+pub(super) fn unusable(view: &View<'_>, check: &Check) -> Option<BlobError> {
+    match check.guard(view.blob(), || checked(view.blob(), check)) {
         Ok(label) => (!view.is_of(&label.serial)).then_some(BlobError::OtherStage),
         Err(error) => Some(error),
     }
+}
+
+/// What is to be read of a sector: all, or nothing if it begins with a plain blob that a record passes
+/// over.
+pub fn readable(flash: &impl Flash, sector: Sector) -> &[u8] {
+    let memory = flash.bytes(sector);
+    if memory.starts_with(&MAGIC) && journal::is_passed_over(flash, 0, memory) {
+        return &[];
+    }
+    memory
 }
 
 /// The plain blob of a sector that begins with one, and when it was made.
 pub(super) fn plain(
     flash: &impl Flash,
     sector: Sector,
-    serial: Option<&str>,
+    check: &Check,
 ) -> Option<Result<(Stored, Text), BlobError>> {
-    let memory = flash.bytes(sector);
+    let memory = readable(flash, sector);
     if !memory.starts_with(&MAGIC) {
         return None;
     }
@@ -87,13 +95,15 @@ pub(super) fn plain(
         offset: 0,
         bytes,
     };
-    Some(checked(stored.blob(flash), serial).map(|label| (stored, label.created)))
+    let blob = stored.blob(flash);
+    let label = check.guard(blob, || checked(blob, check));
+    Some(label.map(|label| (stored, label.created)))
 }
 
 /// The sound plain blobs, the later first.
 #[inline(never)]
-pub(super) fn plain_by_age(flash: &impl Flash, serial: Option<&str>) -> [Option<Stored>; 2] {
-    let blobs = Sector::ALL.map(|sector| plain(flash, sector, serial).and_then(Result::ok));
+pub(super) fn plain_by_age(flash: &impl Flash, check: &Check) -> [Option<Stored>; 2] {
+    let blobs = Sector::ALL.map(|sector| plain(flash, sector, check).and_then(Result::ok));
     match blobs {
         [Some((first, a)), Some((second, b))] if b.as_str() > a.as_str() => {
             [Some(second), Some(first)]
@@ -101,4 +111,12 @@ pub(super) fn plain_by_age(flash: &impl Flash, serial: Option<&str>) -> [Option<
         [None, second] => [second.map(|(stored, _)| stored), None],
         [first, second] => [first, second].map(|blob| blob.map(|(stored, _)| stored)),
     }
+}
+
+/// The CRC at the end of a blob, by the length in its header.
+pub(crate) fn stored_crc(memory: &[u8]) -> Option<u32> {
+    let (header, rest) = memory.split_first_chunk::<HEADER_BYTES>()?;
+    let payload_bytes = u32::from_le_bytes(*header.last_chunk()?);
+    let stored = rest.get(payload_bytes as usize..)?.first_chunk()?;
+    Some(u32::from_le_bytes(*stored))
 }

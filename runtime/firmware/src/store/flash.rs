@@ -46,8 +46,9 @@ pub struct FlashFault {
 /// An implementation for the STM32F405 sets PSIZE to x32, which needs at least 2.7 V
 /// (RM0090 rev. 21, table 13), clears the error bits before and looks at them after each
 /// operation, and waits for BSY a bounded time. An erase takes up to 500 ms, and the core stands
-/// still meanwhile if it runs from flash: the watchdog's period must be longer. After an erase
-/// the data cache holds what was there before, and must be reset (section 3.6.4).
+/// still meanwhile if it runs from flash: the watchdog's period must be longer. After each
+/// operation it resets the data cache: that holds what was there before an erase, and what a
+/// word was to become (section 3.6.4), while what is read back is to come from flash.
 pub trait Flash {
     /// The bytes of a sector, as they read now.
     fn bytes(&self, sector: Sector) -> &[u8; SECTOR_BYTES];

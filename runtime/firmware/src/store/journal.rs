@@ -1,6 +1,7 @@
 //! The journal in a sector: where records are, where the next one goes, and what an interrupted
 //! operation left.
 
+use super::blobs::stored_crc;
 use super::flash::{self, Flash, SECTOR_BYTES, Sector, WriteFault, word_of};
 use super::record::{COMMIT, MAX_UNITS, SEAL, UNIT_BYTES, VOIDED, View};
 
@@ -94,13 +95,17 @@ pub(super) fn highest_committed(flash: &impl Flash, bound: Option<Place>) -> Opt
     None
 }
 
-/// Whether a committed record passes over the one with this sequence number.
+/// Whether a committed record passes over a blob that is in an older one, of this sequence number; 0
+/// for a plain blob.
 #[inline(never)]
-pub(super) fn is_passed_over(flash: &impl Flash, sequence: u32) -> bool {
-    (0..UNITS).any(|index| {
-        marked_at(flash, index)
-            .is_some_and(|(_, view)| view.passed_over() == Some(sequence) && view.is_sound())
-    })
+pub(super) fn is_passed_over(flash: &impl Flash, sequence: u32, blob: &[u8]) -> bool {
+    let crc = stored_crc(blob);
+    crc.is_some()
+        && (0..UNITS).any(|index| {
+            marked_at(flash, index).is_some_and(|(place, view)| {
+                view.passed_over() == crc && place.sequence > sequence && view.is_sound()
+            })
+        })
 }
 
 /// Whether a unit reads as erased. By words: all of a sector is looked at in one tick.
@@ -139,21 +144,27 @@ pub(super) fn free_unit(flash: &impl Flash, sector: Sector, units: usize) -> Opt
     (free + units <= SECTOR_UNITS).then_some(free)
 }
 
-/// Makes final, after power-on, what an interrupted operation may have left undecided.
+/// Makes final, after power-on, what an interrupted operation may have left undecided. Gives the
+/// highest sequence number of a whole record whose commit word could not be made final; 0: none.
 ///
 /// A bit that was being programmed when the power failed may read as 0 now and as 1 the next
 /// time. So a word that decides (the sector's first, a record's commit word) is followed by a
 /// seal that is written once that word was programmed to the end. Where the seal is
 /// missing, the word is programmed again and then sealed, if it reads right; else it is
 /// programmed to all zeros, which nothing can undo.
+///
+/// A worn word ends nothing. A sector whose seal does not hold is not written into. A commit word
+/// without a seal is programmed again at every start, and what is written later lies behind its
+/// record and has a higher number.
 #[inline(never)]
-pub(super) fn settle(flash: &mut impl Flash) -> Result<(), WriteFault> {
+pub(super) fn settle(flash: &mut impl Flash) -> u32 {
     for sector in Sector::ALL {
         let bytes = flash.bytes(sector);
         if is_journal(bytes) && word_of(bytes, 1) != SEAL {
-            sealed(flash, sector, 0, JOURNAL)?;
+            let _ = sealed(flash, sector, 0, JOURNAL);
         }
     }
+    let mut undecided = 0;
     for index in 0..UNITS {
         let Some((place, view)) = record_at(flash, index) else {
             continue;
@@ -161,14 +172,18 @@ pub(super) fn settle(flash: &mut impl Flash) -> Result<(), WriteFault> {
         if view.commit() == VOIDED || view.is_sealed() || !view.is_sound() {
             continue;
         }
+        let (sector, sequence) = (place.sector(), place.sequence);
         let word = place.unit() * UNIT_BYTES / 4 + view.body_words();
-        if view.commit() == COMMIT {
-            sealed(flash, place.sector(), word, COMMIT)?;
+        let is_final = if view.commit() == COMMIT {
+            sealed(flash, sector, word, COMMIT)
         } else {
-            flash::program(flash, place.sector(), word, VOIDED)?;
+            flash::program(flash, sector, word, VOIDED)
+        };
+        if is_final.is_err() {
+            undecided = undecided.max(sequence);
         }
     }
-    Ok(())
+    undecided
 }
 
 /// Programs a word and, after it, its seal.

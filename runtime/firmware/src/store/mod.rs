@@ -27,8 +27,8 @@
 //! |---|---|---|
 //! | 0 | 4 | magic, `HREC` |
 //! | 4 | 4 | sequence number, 1 to 2^32 - 2 |
-//! | 8 | 4 | sequence number that this record passes over, 0 for plain blobs; 2^32 - 1: none |
-//! | 12 | 4 | length n of the blob in bytes; 0: no blob, the record only passes over another |
+//! | 8 | 4 | CRC of a blob that this record passes over wherever it is in an older one; 2^32 - 1: none |
+//! | 12 | 4 | length n of the blob in bytes |
 //! | 16 | 32 | serial number of the stage, filled up with zeros |
 //! | 48 | n | blob |
 //! | 48 + n | 0 to 3 | 0xFF, up to a whole word: N = n rounded up |
@@ -55,16 +55,23 @@
 //!   interrupted updates in a row (each takes up to 23 of the 255 units); after one and the
 //!   same blob was written so often that it fills the sector.
 //! - [`Store::start`] alone erases, and only if neither sector has room for the largest record.
-//!   There is always room for one update after it. When there is none left, updates are refused
-//!   ([`Refused::NoRoom`]) until the next start.
+//!   There is always room for one update after it, unless no sector may be erased or none can
+//!   ([`Store::is_writable`]). When there is none left, updates are refused ([`Refused::NoRoom`])
+//!   until the next start.
 //!
-//! Going back is a new record with a copy of the blob before. Passing over a record that made
-//! the program fault is a new record too, which names the other one; where there is no blob to
-//! go back to, it has none, and the controller starts without parameters and can be given new
-//! ones. A mark in the old record would be a single word that decides alone: if the power fails
-//! while it is programmed, it may read as set after one start and as not set after the next. A
-//! new record is protected as an update is, one proof serves all three, and going back can be
-//! undone.
+//! Going back is a new record with a copy of the blob before. Passing over a blob that made the
+//! program fault is a new record too, with a copy of the one that runs in its place; where there
+//! is no other, nothing is written, because the fault may have had another cause. A mark in the old
+//! record would be a single word that decides alone: if the power fails while it is programmed,
+//! it may read as set after one start and as not set after the next. A new record is protected
+//! as an update is, one proof serves all three, and going back can be undone.
+//!
+//! # Worn words
+//!
+//! A word that does not program costs the update that meets it, and no more: the next start leaves
+//! its place out, or its sector if it is one of the first two words and the newest blob is in the
+//! other. A commit word that takes neither its value nor zero may count at one start and not at the
+//! next, until the next record, which has a higher number. A seal that does not hold does no harm.
 //!
 //! # Bits that change after an interrupted operation
 //!
@@ -87,6 +94,9 @@
 //! where the next one begins.
 
 mod blobs;
+mod change;
+mod check;
+mod choice;
 mod flash;
 #[cfg(any(test, feature = "flash-model"))]
 pub mod flash_model;
@@ -94,19 +104,17 @@ mod journal;
 mod record;
 mod writing;
 
-pub use blobs::Stored;
+pub use blobs::{Stored, readable};
+pub use check::Check;
 pub use flash::{Flash, FlashFault, SECTOR_BYTES, SECTOR_WORDS, Sector, WriteFault};
 pub use journal::is_journal;
 pub use record::Record;
 pub use writing::{Step, Writing};
 
-use blobs::{checked, plain, plain_by_age, stored, unusable};
-use journal::Place;
-use record::{MAX_UNITS, UNIT_BYTES, View};
-use runtime::blob::{BlobError, MAGIC};
+pub(crate) use blobs::stored_crc;
 
-/// Records before the newest one that are looked at for a good blob that differs.
-const PREVIOUS_TRIED: usize = 8;
+use record::MAX_UNITS;
+use runtime::blob::BlobError;
 
 /// A blob that would be used if it passed its check.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,19 +139,17 @@ pub enum Refused {
     },
     /// No room: the next start makes some.
     NoRoom,
-    /// A write was begun and not finished, or the flash failed at start-up: nothing is written
+    /// A write was begun and not finished, or the start found no place to write: nothing is written
     /// until the next start.
     Unsettled,
     /// There is no blob before the newest one that differs from it.
     NoPrevious,
-    /// There is no blob that could be passed over.
-    NothingToPassOver,
 }
 
 /// What the two sectors hold, and what the next start will use.
 #[derive(Debug)]
 pub struct Store {
-    serial: Option<&'static str>,
+    check: Check,
     newest: Option<Stored>,
     previous: Option<Stored>,
     passed_over: Option<u32>,
@@ -158,91 +164,40 @@ pub struct Store {
 
 impl Store {
     /// At start-up: settles what was interrupted, chooses a record, and erases a sector if neither
-    /// has room for a record of the largest size. With a `serial`, blobs of other stages are
-    /// refused. A plain blob is erased only where there is another to run: one of another stage or
+    /// has room for a record of the largest size. `check` may be the serial number of the stage
+    /// alone. A plain blob is erased only where there is another to run: one of another stage or
     /// of a newer layout may be right for another program.
     ///
-    /// After a fault of the flash ([`Store::fault`]) the store is read as it is, and nothing is
+    /// Where no room can be made ([`Store::fault`]) the store is read as it is, and nothing is
     /// written until the next start.
-    pub fn start(flash: &mut impl Flash, serial: Option<&'static str>) -> Self {
-        let mut fault = journal::settle(flash).err();
-        let mut store = Self::read(flash, serial);
-        if fault.is_none()
-            && store.place_for(flash, MAX_UNITS).is_none()
-            && let Some(spare) = store.spare(flash)
-        {
-            fault = journal::renew(flash, spare).err();
-            store = Self::read(flash, serial);
-        }
-        store.writable = fault.is_none();
-        store.fault = fault;
-        store
-    }
-
-    /// Looks at the sectors as they are and writes nothing: [`Store::begin`] then refuses.
-    pub fn read(flash: &impl Flash, serial: Option<&'static str>) -> Self {
-        let mut store = Self {
-            serial,
-            newest: None,
-            previous: None,
-            passed_over: None,
-            rejected: None,
-            latest: 0,
-            active: Sector::Second,
-            writable: false,
-            fault: None,
-        };
-        let highest = journal::highest_committed(flash, None);
-        if let Some(place) = highest {
-            (store.latest, store.active) = (place.sequence, place.sector());
-        }
-        let mut place = highest;
-        for _ in 0..journal::UNITS {
-            let Some((found, view)) = place.and_then(|at| Some((at, journal::view(flash, at)?)))
-            else {
+    pub fn start(flash: &mut impl Flash, check: impl Into<Check>) -> Self {
+        let check = check.into();
+        let undecided = journal::settle(flash);
+        let mut store = Self::read(flash, check);
+        let spares = store.spares(flash);
+        for spare in spares.into_iter().flatten() {
+            if store.place_for(flash, MAX_UNITS).is_some() {
                 break;
-            };
-            let Some(error) = unusable(&view, serial) else {
-                store.active = found.sector();
-                store.passed_over = view.passed_over();
-                store.newest = stored(flash, found);
-                store.previous = store.before(flash, found);
-                return store;
-            };
-            store.reject(found.sequence, found.sector(), error);
-            place = journal::highest_committed(flash, place);
-        }
-        for sector in Sector::ALL {
-            if let Some(Err(error)) = plain(flash, sector, serial) {
-                store.reject(0, sector, error);
+            }
+            match journal::renew(flash, spare) {
+                Ok(()) => store = Self::read(flash, check),
+                Err(fault) => store.fault = Some(fault),
             }
         }
-        let [newest, other] = plain_by_age(flash, serial);
-        if let Some(newest) = newest {
-            store.active = newest.sector;
-            store.previous = other.filter(|other| other.blob(flash) != newest.blob(flash));
-        }
-        store.newest = newest;
+        store.latest = store.latest.max(undecided);
+        store.writable = store.place_for(flash, MAX_UNITS).is_some();
+        store.fault = store.fault.filter(|_| !store.writable);
         store
     }
 
-    /// Whether a record of any size can be written.
-    pub fn has_room(&self, flash: &impl Flash) -> bool {
-        self.writable && self.place_for(flash, MAX_UNITS).is_some()
+    /// Whether records are written at all before the next start.
+    pub const fn is_writable(&self) -> bool {
+        self.writable
     }
 
-    /// The sector that a start may erase.
-    fn spare(&self, flash: &impl Flash) -> Option<Sector> {
-        if self.newest.is_some() || self.latest > 0 {
-            return Some(self.active.other());
-        }
-        let is = |wanted: fn(&[u8]) -> bool| {
-            Sector::ALL
-                .into_iter()
-                .find(|sector| wanted(flash.bytes(*sector)))
-        };
-        is(|bytes| bytes.iter().all(|byte| *byte == 0xff))
-            .or_else(|| is(|bytes| !bytes.starts_with(&MAGIC)))
+    /// Whether there is room for a record of any size.
+    pub fn has_room(&self, flash: &impl Flash) -> bool {
+        self.place_for(flash, MAX_UNITS).is_some()
     }
 
     /// The blob that the next start will use.
@@ -251,12 +206,12 @@ impl Store {
     }
 
     /// The blob before, if it is still there: the latest one that differs and was not passed
-    /// over. After [`Store::pass_over`] it is known from the next start on.
+    /// over.
     pub const fn previous(&self) -> Option<Stored> {
         self.previous
     }
 
-    /// The sequence number of the record that the newest one passes over, if it does.
+    /// The CRC of the blob that the newest record passes over, if it does.
     pub const fn passed_over(&self) -> Option<u32> {
         self.passed_over
     }
@@ -266,7 +221,7 @@ impl Store {
         self.rejected
     }
 
-    /// What start-up could not write or erase.
+    /// Why nothing can be written, if start-up tried to make room.
     pub const fn fault(&self) -> Option<WriteFault> {
         self.fault
     }
@@ -279,158 +234,19 @@ impl Store {
         }
     }
 
-    /// Makes a record of the blob of `bytes` bytes in the record's room, after its full check. The
-    /// sequence number must be the one that is due: of two that were made for the same store
-    /// only one is written.
-    ///
-    /// # Errors
-    /// [`Refused::Blob`], [`Refused::Sequence`].
-    pub fn update(&self, record: &mut Record, bytes: usize, sequence: u32) -> Result<(), Refused> {
-        if self.due() != Some(sequence) {
-            return Err(self.not_due());
-        }
-        let serial = checked(record.staged(bytes), self.serial)
-            .map_err(Refused::Blob)?
-            .serial;
-        record.close(sequence, None, &serial, bytes);
-        Ok(())
-    }
-
-    /// Makes a record that goes back to [`Store::previous`].
-    ///
-    /// # Errors
-    /// [`Refused::NoPrevious`], [`Refused::Blob`], [`Refused::Sequence`].
-    pub fn go_back(&self, flash: &impl Flash, record: &mut Record) -> Result<(), Refused> {
-        let previous = self.previous.ok_or(Refused::NoPrevious)?;
-        self.copy(flash, previous, None, record)
-    }
-
-    /// Makes a record that passes over [`Store::newest`], because it made the program fault: with
-    /// a copy of [`Store::previous`], or without a blob if there is none.
-    ///
-    /// # Errors
-    /// [`Refused::NothingToPassOver`], [`Refused::Blob`], [`Refused::Sequence`].
-    pub fn pass_over(&self, flash: &impl Flash, record: &mut Record) -> Result<(), Refused> {
-        let newest = self.newest.ok_or(Refused::NothingToPassOver)?;
-        if let Some(previous) = self.previous {
-            return self.copy(flash, previous, Some(newest.sequence), record);
-        }
-        let sequence = self.due().ok_or(self.not_due())?;
-        let serial = self.serial.unwrap_or_default();
-        record.close(sequence, Some(newest.sequence), serial, 0);
-        Ok(())
-    }
-
-    /// Begins to write a record. Nothing else may be written until [`Store::finish`].
-    ///
-    /// # Errors
-    /// [`Refused::Unsettled`], [`Refused::NoRoom`], [`Refused::Sequence`].
-    pub fn begin(&mut self, flash: &impl Flash, record: &Record) -> Result<Writing, Refused> {
-        if self.due() != Some(record.sequence()) {
-            return Err(self.not_due());
-        }
-        if !self.writable {
-            return Err(Refused::Unsettled);
-        }
-        let (sector, unit) = (self.place_for(flash, record.units())).ok_or(Refused::NoRoom)?;
-        self.writable = false;
-        Ok(Writing::new(sector, unit, record))
-    }
-
-    /// Takes note of a record that was written. One that was not written to its end leaves the
-    /// store as it is until the next start.
-    pub fn finish(&mut self, flash: &impl Flash, writing: &Writing) {
-        let unit = writing.first * 4 / UNIT_BYTES;
-        let sector = writing.sector;
-        let view = View::at(flash.bytes(sector), unit);
-        let Some(view) = view.filter(|_| writing.next == writing.words()) else {
-            return;
-        };
-        let sequence = view.sequence();
-        let place = Place::new(sequence, sector, unit);
-        let newest = stored(flash, place);
-        let blob = newest.map_or(&[][..], |newest| newest.blob(flash));
-        self.passed_over = view.passed_over();
-        if self.passed_over.is_some() {
-            self.previous = None;
-        } else if let Some(old) = self.newest.filter(|old| old.blob(flash) != blob) {
-            self.previous = Some(old);
-        }
-        self.newest = newest;
-        (self.latest, self.active) = (sequence, sector);
-        self.writable = true;
-    }
-
-    fn not_due(&self) -> Refused {
-        let due = self.due().unwrap_or(u32::MAX);
-        Refused::Sequence { due }
-    }
-
-    fn reject(&mut self, sequence: u32, sector: Sector, error: BlobError) {
-        self.rejected.get_or_insert(Rejected {
-            sequence,
-            sector,
-            error,
-        });
-    }
-
     /// Where so many units go: the active sector first.
     fn place_for(&self, flash: &impl Flash, units: usize) -> Option<(Sector, usize)> {
         [self.active, self.active.other()]
             .into_iter()
             .find_map(|sector| Some((sector, journal::free_unit(flash, sector, units)?)))
     }
-
-    fn copy(
-        &self,
-        flash: &impl Flash,
-        from: Stored,
-        passed_over: Option<u32>,
-        record: &mut Record,
-    ) -> Result<(), Refused> {
-        let sequence = self.due().ok_or(self.not_due())?;
-        let blob = from.blob(flash);
-        if let Some(room) = record.room().get_mut(..blob.len()) {
-            room.copy_from_slice(blob);
-        }
-        let serial = checked(record.staged(from.bytes), self.serial)
-            .map_err(Refused::Blob)?
-            .serial;
-        record.close(sequence, passed_over, &serial, from.bytes);
-        Ok(())
-    }
-
-    /// The latest good blob before the record `newest` that differs from its blob and was not
-    /// passed over; none behind a record without a blob.
-    #[inline(never)]
-    fn before(&self, flash: &impl Flash, newest: Place) -> Option<Stored> {
-        let blob = stored(flash, newest)?.blob(flash);
-        let mut bound = newest;
-        for _ in 0..PREVIOUS_TRIED {
-            let Some(place) = journal::highest_committed(flash, Some(bound)) else {
-                break;
-            };
-            bound = place;
-            let good = stored(flash, place).filter(|other| {
-                other.blob(flash) != blob
-                    && journal::view(flash, place)
-                        .is_some_and(|view| unusable(&view, self.serial).is_none())
-                    && !journal::is_passed_over(flash, place.sequence)
-            });
-            if good.is_some() {
-                return good;
-            }
-        }
-        plain_by_age(flash, self.serial)
-            .into_iter()
-            .flatten()
-            .find(|plain| plain.blob(flash) != blob && !journal::is_passed_over(flash, 0))
-    }
 }
 
 #[cfg(test)]
 mod cut_tests;
 #[cfg(test)]
+mod fault_tests;
+#[cfg(test)]
 mod fuzz_tests;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

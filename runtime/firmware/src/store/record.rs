@@ -12,7 +12,7 @@ pub(super) const COMMIT: u32 = u32::from_le_bytes(*b"COMT");
 pub(super) const SEAL: u32 = u32::from_le_bytes(*b"SEAL");
 /// A commit word that can no longer become [`COMMIT`].
 pub(super) const VOIDED: u32 = 0;
-/// No record is passed over.
+/// No blob is passed over.
 const NONE: u32 = BLANK;
 
 /// Bytes before the blob.
@@ -159,9 +159,9 @@ impl<'f> View<'f> {
         word_of(self.bytes, 1)
     }
 
-    /// The sequence number of the record that this one passes over.
+    /// The CRC of the blob that this record passes over.
     pub(super) fn passed_over(&self) -> Option<u32> {
-        Some(word_of(self.bytes, 2)).filter(|&sequence| sequence != NONE)
+        Some(word_of(self.bytes, 2)).filter(|&crc| crc != NONE)
     }
 
     /// Offset of the blob from the start of the record, and its length in bytes.
@@ -172,11 +172,6 @@ impl<'f> View<'f> {
     pub(super) fn blob(&self) -> &'f [u8] {
         let end = HEADER_BYTES + self.blob_bytes;
         self.bytes.get(HEADER_BYTES..end).unwrap_or_default()
-    }
-
-    /// Whether it only says that another is passed over.
-    pub(super) const fn is_void(&self) -> bool {
-        self.blob_bytes == 0
     }
 
     pub(super) const fn units(&self) -> usize {

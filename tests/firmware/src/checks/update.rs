@@ -25,6 +25,8 @@ use runtime::{ParameterSet, Status};
 /// The program for the ADS131M08 is built with this key, the other one without any.
 const PART: Part = Part::Ads131m08;
 const KEY: Key = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+/// Reads a plain blob at the start.
+const CHECK: &str = "10from_flash";
 /// Between two looks at the bus.
 const STEP_NS: u64 = 250_000;
 const S: u64 = 1_000_000_000;
@@ -302,7 +304,7 @@ pub(super) fn about_to_crash(bench: &Bench) -> Result<Machine, Failure> {
     Ok(machine)
 }
 
-/// The next tick reads where nothing is.
+/// What [`Machine::hook_injection`] named reads where nothing is, in the next ticks.
 pub(super) fn crash(machine: &mut Machine) -> Outcome {
     let (register, value) = (register::R0, 0x6000_0000);
     machine.chip.inject = vec![Injected { register, value }];
@@ -317,15 +319,34 @@ pub fn parameters_that_crash(bench: &Bench) -> Outcome {
         crash(&mut machine)?;
         equal("resets", machine.panics, resets)?;
     }
-    Seen::since_last(&mut machine);
+    are_passed_over(&mut machine, &bench.blob)
+}
+
+/// Parameters whose check at the start makes the program fault twice, though they are not the newest.
+pub fn parameters_whose_check_crashes(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.hook_injection(bench.image(PART).address(CHECK)?)?;
+    machine.run_ticks(20)?;
+    update(&mut machine, plan(&bench.later, 1))?.0?;
+    for resets in [1, 2] {
+        machine.reset_by_pin();
+        crash(&mut machine)?;
+        equal("resets", machine.panics, resets)?;
+    }
+    are_passed_over(&mut machine, &bench.later)
+}
+
+/// Others run in their place, it is told, and it stays so.
+fn are_passed_over(machine: &mut Machine, others: &[u8]) -> Outcome {
+    Seen::since_last(machine);
     machine.run_ticks(40)?;
-    let seen = Seen::since_last(&mut machine);
+    let seen = Seen::since_last(machine);
     let status = seen.last_status().ok_or("no state")?;
     let told = (status.state, status.reason);
     equal("state", told, (Some(NodeState::Running), 0x80 | 12))?;
-    equal("running", running(&mut machine)?, bench.blob.clone())?;
+    equal("running", running(machine)?, others.to_vec())?;
     machine.power_cycle();
-    equal("after power-on", running(&mut machine)?, bench.blob.clone())
+    equal("after power-on", running(machine)?, others.to_vec())
 }
 
 /// A sector with anything in it is erased at the first start beside a plain blob; the watchdog runs
