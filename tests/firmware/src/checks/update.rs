@@ -18,7 +18,7 @@ use hal_adapters::can::command::{Outcome as Ended, Request};
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{Key, UpdateRequest};
 use hal_adapters::can::{BusFrame, Coded};
-use host_fit::bus::update::{BlobReader, Dialog, Job, Plan, UpdateError, Updated, Updater};
+use host_fit::bus::update::{BlobReader, Dialog, Job, Plan, UpdateError, Updated, Updater, Wanted};
 use runtime::blob::MAX_BYTES;
 use runtime::parameters::Text;
 use runtime::{ParameterSet, Status};
@@ -40,7 +40,10 @@ const CUTS: u64 = 12;
 
 fn plan(blob: &[u8], token: u8) -> Plan {
     Plan {
-        blob: blob.to_vec(),
+        wanted: match blob {
+            [] => Wanted::Previous,
+            blob => Wanted::Blob(blob.to_vec()),
+        },
         serial: Some("stage-7".to_owned()),
         key: Some(KEY),
         declares_servo_off: true,
@@ -213,14 +216,10 @@ pub fn refused(bench: &Bench) -> Outcome {
     answers(
         &mut machine,
         &[
-            (
-                request(UpdateRequest::Begin { bytes: 0 }),
-                100,
-                Ended::ServoOn,
-            ),
+            (request(UpdateRequest::begin(0, 0)), 100, Ended::ServoOn),
             (SERVO_OFF, 101, Ended::Done),
-            (request(UpdateRequest::Begin { bytes: 1 }), 102, Ended::Done),
-            (request(UpdateRequest::Begin { bytes: 1 }), 103, Ended::Busy),
+            (request(UpdateRequest::begin(1, 0)), 102, Ended::Done),
+            (request(UpdateRequest::begin(1, 0)), 103, Ended::Busy),
             (
                 request(UpdateRequest::Commit { sequence: 2 }),
                 102,
@@ -231,7 +230,9 @@ pub fn refused(bench: &Bench) -> Outcome {
     )?;
     machine.chip.random.broken = true;
     let (refused, _) = update(&mut machine, plan(&bench.blob, 4))?;
-    expect(refused.is_err(), || "without random numbers".to_owned())?;
+    expect(matches!(refused, Err(UpdateError::NoRandomNumber)), || {
+        format!("without random numbers: {refused:?}")
+    })?;
     machine.chip.random.broken = false;
     equal("operations", machine.chip.flash.operations, operations)?;
     let (updated, _) = update(&mut machine, plan(&bench.blob, 5))?;
