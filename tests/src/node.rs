@@ -22,7 +22,7 @@ pub const TAKEN_PER_TICK: usize = 3;
 
 /// A controller.
 pub struct Node {
-    serial: &'static str,
+    serial: Option<&'static str>,
     key: Option<Key>,
     ticking: Ticking<'static>,
     records: Records<FlashModel>,
@@ -43,8 +43,14 @@ impl FpuSettings for Unchanged {
 }
 
 impl Node {
-    /// A controller of the stage `serial` with this flash, after power-on.
-    pub fn new(serial: &'static str, key: Option<Key>, flash: FlashModel, seed: u64) -> Self {
+    /// A controller of the stage `serial`, if its program knows that, with this flash, after
+    /// power-on.
+    pub fn new(
+        serial: Option<&'static str>,
+        key: Option<Key>,
+        flash: FlashModel,
+        seed: u64,
+    ) -> Self {
         let before = Before::of(Cause::PowerOn, None);
         let (ticking, records) = start(flash, (serial, key), &before);
         Self {
@@ -124,7 +130,7 @@ impl Node {
 
     /// The blob that the next start would run.
     pub fn newest(&self) -> Option<&[u8]> {
-        let newest = Store::read(self.flash(), Some(self.serial)).newest()?;
+        let newest = Store::read(self.flash(), self.serial).newest()?;
         Some(newest.blob(self.flash()))
     }
 
@@ -143,19 +149,19 @@ impl Node {
 /// statics is leaked: some 3 kB a start.
 fn start(
     flash: FlashModel,
-    (serial, key): (&'static str, Option<Key>),
+    (serial, key): (Option<&'static str>, Option<Key>),
     before: &Before,
 ) -> (Ticking<'static>, Records<FlashModel>) {
     let record = Box::leak(Box::new(Record::EMPTY));
     // No check of a blob faults here, whose CRC the next start had to know.
-    let check = before.check(Some(serial), |_| ());
+    let check = before.check(serial, |_| ());
     let (mut records, found) = Records::start(flash, record, check, before.blames_newest());
     let place = Box::leak(Box::new(None));
     let loaded = found.blob.and_then(|blob| records.load(blob, place));
     let is_sound = runtime::arithmetic::check().is_ok();
     let parameters = Parameters::at_start(loaded, found.refusal, is_sound);
     let identity = Identity {
-        serial: Some(serial),
+        serial,
         key,
         program_version: 0x00_01_02_03,
         program_hash: 0xfeed_beef,

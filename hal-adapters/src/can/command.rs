@@ -157,10 +157,12 @@ pub enum Outcome {
     StoreFailed = 17,
     /// No transfer is open with this token: never begun, aborted, or nothing came for 5 s.
     NoTransfer = 18,
+    /// The node's random number generator gives none, so that nothing can be authorised.
+    NoRandomNumber = 19,
 }
 
 impl Outcome {
-    const ALL: [Self; 19] = [
+    const ALL: [Self; 20] = [
         Self::Done,
         Self::Started,
         Self::UnknownCommand,
@@ -180,6 +182,7 @@ impl Outcome {
         Self::Incomplete,
         Self::StoreFailed,
         Self::NoTransfer,
+        Self::NoRandomNumber,
     ];
 
     /// Outcome and detail of a refused re-zero.

@@ -78,7 +78,7 @@ fn every_request_comes_back_as_sent() {
         Request::Record { on: false },
         Request::ServoOff { seconds: 255 },
         Request::Update(UpdateRequest::Challenge { part: 3 }),
-        Request::Update(UpdateRequest::Begin { bytes: 656 }),
+        Request::Update(UpdateRequest::begin(656, 0x89ab_cdef)),
         Request::Update(UpdateRequest::Verify { sequence: u32::MAX }),
         Request::Update(UpdateRequest::Commit { sequence: 7 }),
         Request::Update(UpdateRequest::Abort),

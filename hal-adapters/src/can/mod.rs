@@ -27,4 +27,4 @@ pub use service::Service;
 pub use table::Message;
 
 /// Version of this protocol, as [`Message::NodeStatus`] tells it.
-pub const PROTOCOL_VERSION: u8 = 1;
+pub const PROTOCOL_VERSION: u8 = 2;

@@ -214,7 +214,7 @@ pub(super) const ANSWER: [Signal; 4] = [
     signal("Token", (16, 8), U, "", "the token of the request"),
     named(
         signal("Outcome", (24, 8), U, "", "how it ended"),
-        &[(0, "done"), (1, "started"), (2, "unknown command"), (3, "no parameters"), (4, "too short"), (5, "no pose"), (6, "stage moved"), (7, "stage drifted"), (8, "busy"), (9, "servo on: declare it off first"), (10, "out of bounds"), (11, "extrapolated"), (12, "not authorised"), (13, "bad content"), (14, "wrong sequence number"), (15, "no room: restart first"), (16, "incomplete"), (17, "store failed"), (18, "no transfer")],
+        &[(0, "done"), (1, "started"), (2, "unknown command"), (3, "no parameters"), (4, "too short"), (5, "no pose"), (6, "stage moved"), (7, "stage drifted"), (8, "busy"), (9, "servo on: declare it off first"), (10, "out of bounds"), (11, "extrapolated"), (12, "not authorised"), (13, "bad content"), (14, "wrong sequence number"), (15, "no room: restart first"), (16, "incomplete"), (17, "store failed"), (18, "no transfer"), (19, "no random number")],
     ),
     signal("Detail", (32, 32), U, "", "stage moved, drifted or out of bounds: axis, 0 to 5 for X, Y, Rz, Z, Rx, Ry; no pose or extrapolated: status; bad content: kind, as in the node's reason; wrong sequence number: the one that is taken; incomplete: the first missing index; challenge, read back, tell: the word asked for; else 0"),
 ];

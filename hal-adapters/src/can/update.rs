@@ -4,14 +4,16 @@
 //! host                               node
 //! ServoOff {seconds}          ->     the servo is off: Done
 //! Tell {page}, ReadBack {k}   ->     who it is, what it runs
-//! Begin {bytes}               ->     a transfer is open, under the token of this command; the pose
-//!                                    is invalid until it ends. Done, ServoOn, Busy, NoRoom,
-//!                                    StoreFailed
+//! Begin {bytes, check}        ->     a transfer is open, under the token of this command; the pose
+//!                                    is invalid until it ends. Done {bytes, check}, ServoOn, Busy,
+//!                                    NoRoom, StoreFailed, NoRandomNumber
 //! Challenge {0 to 3}          ->     the nonce of this transfer
 //! UpdateData, any order       ->     kept in RAM; the tag from index 240, where the node has a key
 //! Verify {sequence}           ->     Incomplete {first missing index}: send it and ask again;
-//!                                    WrongSequence; Started, then Done, NotAuthorised, BadContent
-//! Commit {sequence}           ->     Started, and once the record is read back Done, or StoreFailed
+//!                                    WrongSequence; Started, then Done {CRC}, NotAuthorised,
+//!                                    BadContent
+//! Commit {sequence}           ->     Started, and once the record is read back Done {CRC}, or
+//!                                    StoreFailed
 //! Activate                    ->     Done, and a reset: the newest record runs
 //! ```
 //!
@@ -22,10 +24,15 @@
 //! three frames, and is emptied every 2 ms.
 //!
 //! A transfer of length 0 has no words but those of the tag; its commit goes back to the record
-//! before the newest.
+//! before the newest, if that is the one whose check it began with.
+//!
+//! Two hosts may choose the same token. So `Begin` names the low half of the blob's CRC-32C, and
+//! opens no transfer while one of another blob is open; and `Done` names what was begun, verified
+//! or stored: a host that finds another blob's there begins anew under another token. Whoever lost
+//! the answer to a commit asks which record runs from the next reset on ([`page::NEXT`]).
 //!
 //! Who may: where the node has a key, whoever sends the right tag ([`Authenticator`]): AES-CMAC over
-//! the transfer's nonce, the blob, the sequence number and the length. A nonce is drawn for each
+//! the transfer's nonce, the blob, the sequence number, the length and the CRC-32C. A nonce is drawn for each
 //! transfer, and a transfer ends with its first wrong tag: a recording of an update is worth nothing,
 //! and each guess takes a transfer. Where the node has no key, whoever can send on the bus may:
 //! the check of a frame shows damage, not who sent it. What stores nothing needs no key: whoever can
@@ -44,8 +51,8 @@ mod tell;
 pub use authentication::{Authenticator, Key, Nonce, TAG_BYTES, tag};
 #[cfg(test)]
 use memory::MemoryStore;
-pub use receiver::{Identity, Receiver, Surroundings};
+pub use receiver::{Receiver, Surroundings};
 pub use request::{UpdateData, UpdateRequest};
-pub use staging::{TAG_INDEX, word_of};
-pub use store::{Change, Running, Store, Written};
-pub use tell::page;
+pub use staging::{TAG_INDEX, crc_of, word_of};
+pub use store::{Change, Kept, Running, Store, Written};
+pub use tell::{Identity, page};

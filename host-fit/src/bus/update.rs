@@ -5,7 +5,9 @@
 //! without a bus and without a clock: frames and times in, frames out. The functions put it on an interface.
 
 mod dialog;
+mod goal;
 mod identity;
+mod outgoing;
 mod plan;
 mod read_back;
 mod run;
@@ -13,7 +15,7 @@ mod updater;
 
 pub use dialog::{Dialog, Job, SPACING_US, Wish};
 pub use identity::{Identifier, Identity, RunningParameters};
-pub use plan::{Plan, Updated};
+pub use plan::{Plan, Updated, Wanted};
 pub use read_back::BlobReader;
 pub use run::{identify, read_back, update};
 pub use updater::Updater;
@@ -53,6 +55,15 @@ pub enum UpdateError {
         /// That of the node.
         found: String,
     },
+    /// A serial number was asked for, and the node tells none.
+    #[error(
+        "the controller tells no serial number, so it may not be that of the stage `{expected}`; nothing was sent to it. \
+         Leave out --serial if it is"
+    )]
+    NoSerial {
+        /// The one asked for.
+        expected: String,
+    },
     /// The node wants a tag.
     #[error(
         "the controller takes new parameters only with the key of its stage: name it with --key FILE"
@@ -61,7 +72,8 @@ pub enum UpdateError {
     /// The servo is on, as far as the node knows.
     #[error("{}", match declared {
         false => "the servo may be on: switch it off, and say so with --servo-off, which declares it for the time of the update",
-        true => "the controller says that the servo is on: switch it off, look at its service pin, and let no other computer declare it on",
+        true => "the controller does not take the servo for off: it has restarted, its service pin says on, or another \
+                 computer has declared it on. Nothing was stored. Look at the stage; once the servo is off, try again",
     })]
     ServoOn {
         /// Whether it was declared off.
@@ -72,6 +84,12 @@ pub enum UpdateError {
         "another computer is updating this controller, and has not ended for 7 s; try again when it is done"
     )]
     Busy,
+    /// Nothing can be authorised.
+    #[error(
+        "the controller's random number generator gives no numbers, so that it cannot authorise anything; restart it. If \
+         that does not help, the generator or its clock is broken"
+    )]
+    NoRandomNumber,
     /// The tag is wrong.
     #[error(
         "the controller refuses the update as not authorised: the key is not that of this stage"
@@ -114,6 +132,9 @@ pub enum UpdateError {
          probe has flashed and the program does not take: erase one of them with the probe"
     )]
     StoreFailed,
+    /// There are no parameters to activate.
+    #[error("the controller keeps no parameters that it could run")]
+    NothingKept,
     /// There is nothing to go back to.
     #[error("the controller keeps no parameters from before the newest")]
     NoPrevious,
@@ -128,6 +149,15 @@ pub enum UpdateError {
          has the old or the new ones, never a mixture"
     )]
     Unknown,
+    /// The new parameters are stored, but the node was not reset.
+    #[error(
+        "the parameters are stored as number {sequence} and run from the next start on; they were not activated, because \
+         the servo may be on again. Once it is off, use `host-fit update --servo-off --activate`"
+    )]
+    NotActivated {
+        /// Their sequence number.
+        sequence: u32,
+    },
     /// The new parameters do not run.
     #[error(
         "the parameters are stored as number {sequence}, but the controller does not run them after its reset; see `host-fit identify`"

@@ -4,6 +4,7 @@ use crate::bus::update::{self, Identity, RunningParameters};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use clap::Args;
+use hal_adapters::can::update::Kept;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -51,11 +52,17 @@ fn as_json(identity: &Identity) -> Value {
         "serial": identity.serial,
         "running": running,
         "newest_sequence": identity.newest_sequence,
+        "next": identity.next.map(kept),
+        "previous": identity.previous.map(kept),
         "program_version": version(identity),
         "program_hash": format!("{:08x}", identity.program_hash),
         "needs_key": identity.needs_key,
         "last_update": identity.last_update,
     })
+}
+
+fn kept(record: Kept) -> Value {
+    json!({ "sequence": record.sequence, "crc32c": format!("{:08x}", record.crc) })
 }
 
 fn version(identity: &Identity) -> String {
@@ -106,9 +113,22 @@ fn as_text(identity: &Identity) -> String {
         let (bytes, slot) = (running.bytes, running.slot);
         lines.push(("stored", format!("{bytes} bytes in sector {slot}{forced}")));
     }
-    if identity.newest_sequence > running.map_or(0, |running| running.sequence) {
-        let newest = identity.newest_sequence;
-        lines.push(("waiting", format!("number {newest}, for a reset")));
+    let in_force = |record: &Kept| running.is_some_and(|r| r.sequence == record.sequence);
+    if let Some(Kept { sequence, crc }) = identity.next.filter(|record| !in_force(record)) {
+        lines.push((
+            "waiting",
+            format!("number {sequence}, check {crc:08x}, for a reset"),
+        ));
+    }
+    let (newest, next) = (identity.newest_sequence, identity.next);
+    if newest > next.map_or(0, |record| record.sequence) {
+        lines.push((
+            "refused",
+            format!("number {newest} is not used: damaged, of another stage, or passed over"),
+        ));
+    }
+    if let Some(Kept { sequence, crc }) = identity.previous {
+        lines.push(("before", format!("number {sequence}, check {crc:08x}")));
     }
     let hash = identity.program_hash;
     lines.push(("program", format!("{}, hash {hash:08x}", version(identity))));

@@ -1,7 +1,7 @@
 //! `host-fit update`.
 
 use super::identify;
-use crate::bus::update::{self, Plan};
+use crate::bus::update::{self, Plan, Updated, Wanted};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::blob_file;
@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 /// Arguments of `update`.
 #[derive(Debug, Args)]
 pub(super) struct UpdateArgs {
-    /// The parameter blob.
-    #[arg(value_name = "params.bin", required_unless_present = "previous")]
+    /// The parameter blob; with --activate it may be left out: what the controller keeps is activated.
+    #[arg(value_name = "params.bin", required_unless_present_any = ["previous", "activate"])]
     params: Option<PathBuf>,
     /// CAN interface, for instance can0.
     #[arg(long, value_name = "IFACE")]
@@ -21,7 +21,8 @@ pub(super) struct UpdateArgs {
     /// The key of the stage: a file with 32 hexadecimal digits.
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
-    /// Update only the controller of the stage with this serial number; without it, of the blob's.
+    /// Update only a controller that tells this serial number; without it, not one that tells another
+    /// than the blob.
     #[arg(long, value_name = "TEXT")]
     serial: Option<String>,
     /// Declare that the servo is off, for the time of the update. Switch it off first.
@@ -39,50 +40,23 @@ pub(super) struct UpdateArgs {
 /// Stores new parameters in a controller, and says what it had and has.
 pub(super) fn run(args: UpdateArgs) -> Result<(), HostError> {
     let key = args.key.as_deref().map(read_key).transpose()?;
-    let (blob, serial) = match &args.params {
-        None => (Vec::new(), args.serial),
-        Some(path) => {
-            let set = blob_file::read(path)?;
-            let blob = blob_file::to_bytes(path, &set)?;
-            let own = Some(set.serial.to_string()).filter(|serial| !serial.is_empty());
-            if let (Some(asked), Some(own)) = (&args.serial, &own)
-                && asked != own
-            {
-                return Err(HostError::Usage {
-                    argument: "--serial",
-                    problem: format!(
-                        "{} belongs to the stage `{own}`, not `{asked}`",
-                        path.display()
-                    ),
-                });
-            }
-            (blob, args.serial.or(own))
-        }
+    let wanted = match &args.params {
+        Some(path) => Wanted::Blob(read_blob(path, args.serial.as_deref())?),
+        None if args.previous => Wanted::Previous,
+        None => Wanted::Newest,
     };
     let updated = update::update(
         &args.can,
         Plan {
-            blob,
-            serial,
+            wanted,
+            serial: args.serial,
             key,
             declares_servo_off: args.servo_off,
             activates: args.activate,
             token: 0,
         },
     )?;
-    let before = identify::parameters(updated.before.running.as_ref());
-    let serial = updated.before.serial;
-    terminal::print(&match (updated.sequence, updated.is_active) {
-        (None, _) => {
-            format!("{serial}: runs these parameters already ({before}); nothing was sent\n")
-        }
-        (Some(sequence), true) => {
-            format!("{serial}: had {before}\n{serial}: runs number {sequence}\n")
-        }
-        (Some(sequence), false) => format!(
-            "{serial}: runs {before}\n{serial}: stored number {sequence}, which runs from the next start on\n"
-        ),
-    })?;
+    terminal::print(&as_text(&updated))?;
     let (words, transfers) = updated.repeated;
     if words + transfers > 0 {
         terminal::warn(&[format!(
@@ -91,6 +65,43 @@ pub(super) fn run(args: UpdateArgs) -> Result<(), HostError> {
         )]);
     }
     Ok(())
+}
+
+/// The blob, if it is that of the stage that was asked for.
+fn read_blob(path: &Path, asked: Option<&str>) -> Result<Vec<u8>, HostError> {
+    let set = blob_file::read(path)?;
+    let own = set.serial.as_str();
+    match asked {
+        Some(asked) if !own.is_empty() && asked != own => Err(HostError::Usage {
+            argument: "--serial",
+            problem: format!(
+                "{} belongs to the stage `{own}`, not `{asked}`",
+                path.display()
+            ),
+        }),
+        _ => Ok(blob_file::to_bytes(path, &set)?),
+    }
+}
+
+/// What the controller had and has.
+fn as_text(updated: &Updated) -> String {
+    let had = updated.before.running.as_ref();
+    let before = identify::parameters(had);
+    let (serial, record) = (&updated.before.serial, updated.record);
+    let ran = had.is_some_and(|running| running.sequence == record);
+    match (updated.sequence, updated.is_active) {
+        (None, true) if ran => {
+            format!("{serial}: runs these parameters already ({before}); nothing was sent\n")
+        }
+        (_, true) => format!("{serial}: had {before}\n{serial}: runs number {record}\n"),
+        (None, false) => format!(
+            "{serial}: runs {before}\n{serial}: keeps these parameters already, as number {record}, which runs from the \
+             next start on, or at once with --activate; nothing was sent\n"
+        ),
+        (Some(_), false) => format!(
+            "{serial}: runs {before}\n{serial}: stored number {record}, which runs from the next start on\n"
+        ),
+    }
 }
 
 /// A key file: 32 hexadecimal digits.

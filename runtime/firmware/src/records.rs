@@ -3,7 +3,7 @@
 
 use crate::slots::{self, Loaded, Refusal};
 use crate::store::{self, Check, Flash, Record, Sector, Step, Store, Stored, Writing};
-use hal_adapters::can::update::{self, Change, Running, Written};
+use hal_adapters::can::update::{self, Change, Kept, Running, Written, crc_of};
 
 /// Words that are programmed in one tick: 0.2 ms at most on an STM32F405 (DS8626, flash memory
 /// programming), in which the core stands.
@@ -119,6 +119,15 @@ impl<F: Flash> Records<F> {
         }
     }
 
+    fn kept(&self, stored: Option<Stored>) -> Option<Kept> {
+        let stored = stored?;
+        let crc = crc_of(stored.blob(&self.flash))?;
+        Some(Kept {
+            sequence: stored.sequence,
+            crc,
+        })
+    }
+
     /// Begins to write it.
     fn begin(&mut self) -> Option<()> {
         self.writing = Some(self.store.begin(&self.flash, self.record).ok()?);
@@ -140,6 +149,14 @@ impl<F: Flash> update::Store for Records<F> {
         })
     }
 
+    fn newest(&self) -> Option<Kept> {
+        self.kept(self.store.newest())
+    }
+
+    fn previous(&self) -> Option<Kept> {
+        self.kept(self.store.previous())
+    }
+
     fn newest_sequence(&self) -> u32 {
         self.store.due().map_or(u32::MAX, |due| due - 1)
     }
@@ -150,10 +167,6 @@ impl<F: Flash> update::Store for Records<F> {
 
     fn has_room(&self) -> bool {
         self.store.has_room(&self.flash)
-    }
-
-    fn has_previous(&self) -> bool {
-        self.store.previous().is_some()
     }
 
     fn write(&mut self, sequence: u32, change: Change<'_>) -> Written {

@@ -54,7 +54,7 @@ fn run(
 ) -> Result<(), Box<dyn Error>> {
     let mut flash = FlashModel::erased();
     flash.load(Sector::First, &std::fs::read(params)?);
-    let mut node = Node::new(serial, key, flash, u64::from(std::process::id()));
+    let mut node = Node::new(Some(serial), key, flash, u64::from(std::process::id()));
     let mut bus = SocketCan::open(interface, &[Message::Command, Message::UpdateData])?;
     println!("ready");
     let started = Instant::now();

@@ -1,8 +1,9 @@
 //! Who may change the parameters: whoever knows the key of the stage.
 //!
 //! The tag is AES-CMAC (NIST SP 800-38B, RFC 4493) over whole blocks of 16 bytes: a domain, the
-//! nonce, the blob padded with zeros, and a last block of sequence number, length in bytes and two
-//! zeros. Numbers are words of 32 bits, lowest byte first. The construction stands here, on the
+//! nonce, the blob padded with zeros, and a last block of sequence number, length in bytes, the
+//! blob's CRC-32C (without a blob, that of the record to go back to) and a zero. Numbers are words
+//! of 32 bits, lowest byte first. The construction stands here, on the
 //! block cipher of a library: over whole blocks it is a few lines, and they cannot panic.
 
 use aes::Aes128Enc;
@@ -61,8 +62,8 @@ impl Authenticator {
     }
 
     /// The tag, once all bytes of the blob went in.
-    pub fn tag(&self, sequence: u32, bytes: u32) -> [u8; TAG_BYTES] {
-        self.last(in_one_block([sequence, bytes, 0, 0]))
+    pub fn tag(&self, sequence: u32, bytes: u32, crc: u32) -> [u8; TAG_BYTES] {
+        self.last(in_one_block([sequence, bytes, crc, 0]))
     }
 
     /// The tag that ends with this block, which is whole.
@@ -76,8 +77,9 @@ impl Authenticator {
     }
 
     /// Whether `tag` is the tag, in a time that does not depend on where they differ.
-    pub fn agrees(&self, sequence: u32, bytes: u32, tag: &[u8; TAG_BYTES]) -> bool {
-        u128::from_le_bytes(self.tag(sequence, bytes)) ^ u128::from_le_bytes(*tag) == 0
+    pub fn agrees(&self, (sequence, bytes, crc): (u32, u32, u32), tag: &[u8; TAG_BYTES]) -> bool {
+        let own = self.tag(sequence, bytes, crc);
+        u128::from_le_bytes(own) ^ u128::from_le_bytes(*tag) == 0
     }
 }
 
@@ -98,12 +100,13 @@ impl core::fmt::Debug for Authenticator {
     }
 }
 
-/// The tag that a host sends with a blob.
-pub fn tag(key: &Key, nonce: &Nonce, sequence: u32, blob: &[u8]) -> [u8; TAG_BYTES] {
+/// The tag that a host sends with a blob, or without one to go back; `crc` is that of the blob
+/// that will run.
+pub fn tag(key: &Key, nonce: &Nonce, sequence: u32, blob: &[u8], crc: u32) -> [u8; TAG_BYTES] {
     let bytes = u32::try_from(blob.len()).unwrap_or(u32::MAX);
     let mut authenticator = Authenticator::new(key, nonce);
     authenticator.update(blob);
-    authenticator.tag(sequence, bytes)
+    authenticator.tag(sequence, bytes, crc)
 }
 
 #[cfg(test)]
@@ -148,30 +151,32 @@ mod tests {
                 .iter()
                 .for_each(|word| other.update(&word.to_le_bytes()));
             other.update(&padded);
-            for word in [bytes + 1, bytes, 0, 0] {
+            for word in [bytes + 1, bytes, !bytes, 0] {
                 other.update(&word.to_le_bytes());
             }
             let want: [u8; 16] = other.finalize().into_bytes().into();
-            assert_eq!(tag(&key, &nonce, bytes + 1, &blob), want);
+            assert_eq!(tag(&key, &nonce, bytes + 1, &blob, !bytes), want);
         }
     }
 
     #[test]
     fn every_input_changes_the_tag_and_pieces_do_not() {
         let (key, nonce, blob) = ([7; 16], [1, 2, 3, 4], [5; 100]);
-        let want = tag(&key, &nonce, 9, &blob);
+        let want = tag(&key, &nonce, 9, &blob, 6);
         let mut pieces = Authenticator::new(&key, &nonce);
         blob.chunks(32).for_each(|piece| pieces.update(piece));
-        assert!(pieces.agrees(9, 100, &want));
+        assert!(pieces.agrees((9, 100, 6), &want));
         for bit in 0..128 {
             let wrong = u128::from_le_bytes(want) ^ 1 << bit;
-            assert!(!pieces.agrees(9, 100, &wrong.to_le_bytes()));
+            assert!(!pieces.agrees((9, 100, 6), &wrong.to_le_bytes()));
         }
-        assert_ne!(tag(&[8; 16], &nonce, 9, &blob), want);
-        assert_ne!(tag(&key, &[1, 2, 3, 5], 9, &blob), want);
-        assert_ne!(tag(&key, &nonce, 10, &blob), want);
-        assert_ne!(tag(&key, &nonce, 9, &blob[..99]), want);
+        assert_ne!(tag(&[8; 16], &nonce, 9, &blob, 6), want);
+        assert_ne!(tag(&key, &[1, 2, 3, 5], 9, &blob, 6), want);
+        assert_ne!(tag(&key, &nonce, 10, &blob, 6), want);
+        assert_ne!(tag(&key, &nonce, 9, &blob[..99], 6), want);
+        assert_ne!(tag(&key, &nonce, 9, &blob, 7), want);
         // Of equal blocks, too, the length is part of it.
-        assert_ne!(tag(&key, &nonce, 9, &[0; 3]), tag(&key, &nonce, 9, &[0; 4]));
+        let of_zeros = |bytes| tag(&key, &nonce, 9, &[0; 4][..bytes], 6);
+        assert_ne!(of_zeros(3), of_zeros(4));
     }
 }

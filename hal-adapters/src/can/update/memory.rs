@@ -1,6 +1,7 @@
 //! A store in RAM, for the tests of the receiver.
 
-use super::store::{Change, Running, Store, Written};
+use super::staging::crc_of;
+use super::store::{Change, Kept, Running, Store, Written};
 use runtime::blob::MAX_BYTES;
 use runtime::{BlobError, ParameterSet};
 
@@ -30,6 +31,11 @@ impl Record {
 
     fn blob(&self) -> &[u8] {
         self.bytes.get(..self.length).unwrap_or_default()
+    }
+
+    fn kept(&self) -> Option<Kept> {
+        let (sequence, crc) = (self.sequence, crc_of(self.blob())?);
+        Some(Kept { sequence, crc })
     }
 }
 
@@ -69,7 +75,7 @@ impl MemoryStore {
     }
 
     /// The newest blob.
-    pub fn newest(&self) -> Option<&[u8]> {
+    pub fn newest_blob(&self) -> Option<&[u8]> {
         self.newest.as_ref().map(Record::blob)
     }
 
@@ -93,16 +99,20 @@ impl Store for MemoryStore {
         })
     }
 
+    fn newest(&self) -> Option<Kept> {
+        self.newest.as_ref()?.kept()
+    }
+
+    fn previous(&self) -> Option<Kept> {
+        self.previous.as_ref()?.kept()
+    }
+
     fn newest_sequence(&self) -> u32 {
         self.newest.as_ref().map_or(0, |record| record.sequence)
     }
 
     fn has_room(&self) -> bool {
         true
-    }
-
-    fn has_previous(&self) -> bool {
-        self.previous.is_some()
     }
 
     fn write(&mut self, sequence: u32, change: Change<'_>) -> Written {

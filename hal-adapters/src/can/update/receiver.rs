@@ -1,33 +1,20 @@
 //! A node's side of an update.
 
-use super::authentication::{Authenticator, Key, Nonce};
+use super::authentication::{Authenticator, Nonce};
 use super::request::{UpdateData, UpdateRequest};
-use super::staging::{Staging, word_of};
+use super::staging::{Staging, crc_of, word_of};
 use super::store::{Change, Store, Written};
-use super::tell::{of_running, page, word_of_text};
+use super::tell::{Identity, tell};
 use crate::can::command::{Answer, Outcome};
 use runtime::ParameterSet;
 use runtime::blob::{BlobError, MAX_BYTES};
 
 /// A transfer to which nothing came for so long is closed, s.
 const IDLE_S: u32 = 5;
+/// [`BlobError::number`] of a wrong check.
+const WRONG_CHECK: u32 = 7;
 /// Bytes of a blob that are authenticated in one tick: four blocks of AES.
 const BYTES_PER_TICK: usize = 64;
-/// In the page [`page::LAST_UPDATE`]: there was none.
-const NONE_YET: u32 = 0xff;
-
-/// What a node knows of itself.
-#[derive(Clone, Copy, Debug)]
-pub struct Identity<'s> {
-    /// The stage's serial number: a blob of another one is refused. `None`: any is taken.
-    pub serial: Option<&'s str>,
-    /// The stage's key; `None`: whoever can send on the bus may update.
-    pub key: Option<Key>,
-    /// Version of the program; see [`page::PROGRAM_VERSION`].
-    pub program_version: u32,
-    /// Hash of the program.
-    pub program_hash: u32,
-}
 
 /// What a request meets: the servo, the store, and a random number.
 pub struct Surroundings<'u> {
@@ -35,8 +22,8 @@ pub struct Surroundings<'u> {
     pub servo_is_off: bool,
     /// Keeps the records.
     pub store: &'u mut dyn Store,
-    /// A fresh random number, for a transfer that begins; `None` if there is no source of any,
-    /// and then nothing can be authorised.
+    /// A fresh random number, for a transfer that begins; `None` if there is no source of any:
+    /// a node with a key then refuses the transfer.
     pub nonce: Option<Nonce>,
 }
 
@@ -61,9 +48,13 @@ struct Transfer {
     token: u8,
     /// Length of the blob, 0 for going back.
     bytes: usize,
-    nonce: Option<Nonce>,
+    /// The low half of its CRC-32C, as it was begun.
+    check: u16,
+    nonce: Nonce,
     /// The sequence number that [`UpdateRequest::Verify`] named.
     sequence: u32,
+    /// The CRC-32C, once every word is there.
+    crc: u32,
     idle_ticks: u32,
     stage: Stage,
 }
@@ -104,6 +95,10 @@ impl<'s> Receiver<'s> {
         self.wants_reset
     }
 
+    const fn is_verified(&self) -> bool {
+        matches!(&self.transfer, Some(transfer) if matches!(transfer.stage, Stage::Verified))
+    }
+
     /// Takes a word. Words of other transfers, and of one that is being checked or stored, are ignored.
     pub fn take(&mut self, data: &UpdateData) {
         if let Some(transfer) = &mut self.transfer
@@ -124,7 +119,10 @@ impl<'s> Receiver<'s> {
         around: Surroundings<'_>,
     ) -> (Outcome, u32) {
         match request {
-            UpdateRequest::Tell { page } => self.tell(page, around.store),
+            UpdateRequest::Tell { page } => {
+                let ended = self.ended.map(|(_, outcome, _)| outcome);
+                tell(page, &self.identity, ended, around.store)
+            }
             UpdateRequest::ReadBack { index } => {
                 let running = around.store.running();
                 let word = running.map(|running| word_of(running.blob, index.into()));
@@ -135,14 +133,20 @@ impl<'s> Receiver<'s> {
                 }
             }
             UpdateRequest::Challenge { part } => {
-                let transfer = self.transfer.as_ref();
-                let nonce = transfer.and_then(|transfer| transfer.nonce);
+                let nonce = self.transfer.as_ref().map(|transfer| transfer.nonce);
                 let word = nonce.and_then(|nonce| nonce.get(usize::from(part)).copied());
                 word.map_or((Outcome::NoTransfer, 0), |word| (Outcome::Done, word))
             }
             UpdateRequest::Abort => self.abort(token),
+            // Once it is being stored or has ended, nothing begins: this only asks again.
+            UpdateRequest::Commit { sequence } if !self.is_verified() => {
+                self.commit(token, sequence)
+            }
             _ if !around.servo_is_off => (Outcome::ServoOn, 0),
-            UpdateRequest::Begin { bytes } => self.begin(token, bytes.into(), around),
+            UpdateRequest::Begin { bytes, check } => {
+                let refusal = self.begin(token, bytes.into(), check, around).err();
+                refusal.unwrap_or((Outcome::Done, request.argument()))
+            }
             UpdateRequest::Verify { sequence } => self.verify(token, sequence, around.store),
             UpdateRequest::Commit { sequence } => self.commit(token, sequence),
             UpdateRequest::Activate if self.is_updating() => (Outcome::Busy, 0),
@@ -165,7 +169,7 @@ impl<'s> Receiver<'s> {
                 };
                 match store.write(transfer.sequence, change) {
                     Written::InProgress => return None,
-                    Written::Done => (Outcome::Done, 0),
+                    Written::Done => (Outcome::Done, transfer.crc),
                     Written::Failed => (Outcome::StoreFailed, 0),
                 }
             }
@@ -178,8 +182,8 @@ impl<'s> Receiver<'s> {
                     *done += piece.len();
                     return None;
                 }
-                let bytes = transfer.bytes as u32;
-                if authenticator.agrees(transfer.sequence, bytes, &self.staging.tag()) {
+                let last = (transfer.sequence, transfer.bytes as u32, transfer.crc);
+                if authenticator.agrees(last, &self.staging.tag()) {
                     transfer.stage = Stage::Checking;
                     return None;
                 }
@@ -189,7 +193,8 @@ impl<'s> Receiver<'s> {
                 Ok(()) => {
                     transfer.stage = Stage::Verified;
                     transfer.idle_ticks = 0;
-                    return Some(answer(VERIFY, transfer.token, (Outcome::Done, 0)));
+                    let end = (Outcome::Done, transfer.crc);
+                    return Some(answer(VERIFY, transfer.token, end));
                 }
                 Err(error) => (Outcome::BadContent, error.number().into()),
             },
@@ -209,39 +214,59 @@ impl<'s> Receiver<'s> {
         number.map(|number| answer(number, token, end))
     }
 
-    fn begin(&mut self, token: u8, bytes: usize, around: Surroundings<'_>) -> (Outcome, u32) {
+    fn begin(
+        &mut self,
+        token: u8,
+        bytes: usize,
+        check: u16,
+        around: Surroundings<'_>,
+    ) -> Result<(), (Outcome, u32)> {
         if let Some(transfer) = &mut self.transfer {
-            let same = transfer.token == token && transfer.bytes == bytes;
+            let named = (transfer.token, transfer.bytes, transfer.check);
+            let same = named == (token, bytes, check);
             // The answer to the first of two equal requests may have been lost.
             return if same && matches!(transfer.stage, Stage::Receiving) {
-                (Outcome::Done, 0)
+                Ok(())
             } else {
-                (Outcome::Busy, 0)
+                Err((Outcome::Busy, 0))
             };
         }
         if bytes > MAX_BYTES {
-            return (Outcome::BadContent, 0);
+            return Err((Outcome::BadContent, 0));
         }
-        if bytes == 0 && !around.store.has_previous() {
-            return (Outcome::NoParameters, 0);
+        if bytes == 0 {
+            match around.store.previous() {
+                None => return Err((Outcome::NoParameters, 0)),
+                Some(kept) if kept.crc as u16 != check => {
+                    let due = due(around.store).unwrap_or(u32::MAX);
+                    return Err((Outcome::WrongSequence, due));
+                }
+                Some(_) => {}
+            }
         }
         if !around.store.is_writable() {
-            return (Outcome::StoreFailed, 0);
+            return Err((Outcome::StoreFailed, 0));
         }
         if !around.store.has_room() {
-            return (Outcome::NoRoom, 0);
+            return Err((Outcome::NoRoom, 0));
         }
+        let nonce = match (self.identity.key, around.nonce) {
+            (Some(_), None) => return Err((Outcome::NoRandomNumber, 0)),
+            (_, nonce) => nonce.unwrap_or_default(),
+        };
         self.staging.clear();
         self.ended = None;
         self.transfer = Some(Transfer {
             token,
             bytes,
-            nonce: around.nonce,
+            check,
+            nonce,
             sequence: 0,
+            crc: 0,
             idle_ticks: 0,
             stage: Stage::Receiving,
         });
-        (Outcome::Done, 0)
+        Ok(())
     }
 
     fn verify(&mut self, token: u8, sequence: u32, store: &dyn Store) -> (Outcome, u32) {
@@ -252,7 +277,7 @@ impl<'s> Receiver<'s> {
             Stage::Receiving => {}
             _ if transfer.sequence != sequence => return (Outcome::Busy, 0),
             Stage::Authenticating(..) | Stage::Checking => return (Outcome::Started, 0),
-            Stage::Verified => return (Outcome::Done, 0),
+            Stage::Verified => return (Outcome::Done, transfer.crc),
             Stage::Storing => return (Outcome::Busy, 0),
         }
         transfer.idle_ticks = 0;
@@ -261,18 +286,23 @@ impl<'s> Receiver<'s> {
             return (Outcome::Incomplete, index.into());
         }
         // Of two transfers that were made for the same store only one is stored.
-        let due = store.newest_sequence().checked_add(1);
+        let due = due(store);
         if due != Some(sequence) {
             return (Outcome::WrongSequence, due.unwrap_or(u32::MAX));
         }
-        transfer.sequence = sequence;
-        transfer.stage = match (key, transfer.nonce) {
-            (None, _) => Stage::Checking,
-            (Some(key), Some(nonce)) => Stage::Authenticating(Authenticator::new(&key, &nonce), 0),
-            (Some(_), None) => {
-                self.end(token, (Outcome::NotAuthorised, 0));
-                return (Outcome::NotAuthorised, 0);
-            }
+        let crc = match transfer.bytes {
+            0 => store.previous().map(|kept| kept.crc),
+            bytes => crc_of(self.staging.blob(bytes)),
+        };
+        let Some(crc) = crc.filter(|crc| *crc as u16 == transfer.check) else {
+            let end = (Outcome::BadContent, WRONG_CHECK);
+            self.end(token, end);
+            return end;
+        };
+        (transfer.sequence, transfer.crc) = (sequence, crc);
+        transfer.stage = match key {
+            None => Stage::Checking,
+            Some(key) => Stage::Authenticating(Authenticator::new(&key, &transfer.nonce), 0),
         };
         (Outcome::Started, 0)
     }
@@ -316,30 +346,6 @@ impl<'s> Receiver<'s> {
         self.transfer = None;
         self.ended = Some((token, outcome, detail));
     }
-
-    fn tell(&self, number: u8, store: &dyn Store) -> (Outcome, u32) {
-        let needs_key = u32::from(self.identity.key.is_some()) << 8;
-        let ended = self
-            .ended
-            .map_or(NONE_YET, |(_, outcome, _)| outcome as u32);
-        let value = match number {
-            0..page::PROGRAM_VERSION => match of_running(number, store) {
-                Some(value) => value,
-                None => return (Outcome::NoParameters, 0),
-            },
-            page::PROGRAM_VERSION => self.identity.program_version,
-            page::PROGRAM_HASH => self.identity.program_hash,
-            page::LAST_UPDATE => needs_key | ended,
-            page::NEWEST => store.newest_sequence(),
-            page::SERIAL..page::COUNT => {
-                let running = store.running().map(|running| running.serial);
-                let serial = self.identity.serial.or(running).unwrap_or_default();
-                word_of_text(serial, number - page::SERIAL)
-            }
-            _ => return (Outcome::UnknownCommand, 0),
-        };
-        (Outcome::Done, value)
-    }
 }
 
 const VERIFY: u8 = UpdateRequest::Verify { sequence: 0 }.number();
@@ -352,6 +358,11 @@ const fn answer(number: u8, token: u8, (outcome, detail): (Outcome, u32)) -> Ans
         outcome: Some(outcome),
         detail,
     }
+}
+
+/// The sequence number of the next record; `None` once all are used up.
+fn due(store: &dyn Store) -> Option<u32> {
+    store.newest_sequence().checked_add(1)
 }
 
 /// Whether a blob is sound and that of the stage; an empty one asks for nothing. A parameter set

@@ -15,6 +15,9 @@ pub enum UpdateRequest {
         /// Length of the blob, 1 to [`runtime::blob::MAX_BYTES`]; 0 for no blob: the commit then
         /// goes back to the record before the newest.
         bytes: u16,
+        /// The low half of its CRC-32C, or of that of the record to go back to: another one is
+        /// not stored.
+        check: u16,
     },
     /// Checks what was transferred.
     Verify {
@@ -43,6 +46,14 @@ pub enum UpdateRequest {
 }
 
 impl UpdateRequest {
+    /// Opens a transfer of `bytes` bytes whose CRC-32C is `crc`.
+    pub const fn begin(bytes: usize, crc: u32) -> Self {
+        Self::Begin {
+            bytes: bytes as u16,
+            check: crc as u16,
+        }
+    }
+
     /// Number of the command in the frame.
     pub const fn number(&self) -> u8 {
         match self {
@@ -63,7 +74,7 @@ impl UpdateRequest {
             Self::Challenge { part: byte }
             | Self::ReadBack { index: byte }
             | Self::Tell { page: byte } => byte as u32,
-            Self::Begin { bytes } => bytes as u32,
+            Self::Begin { bytes, check } => (check as u32) << 16 | bytes as u32,
             Self::Verify { sequence } | Self::Commit { sequence } => sequence,
             Self::Abort | Self::Activate => 0,
         }
@@ -74,9 +85,10 @@ impl UpdateRequest {
         let byte = u8::try_from(argument).ok();
         match (number, argument) {
             (6, 0..4) => byte.map(|part| Self::Challenge { part }),
-            (7, _) => u16::try_from(argument)
-                .ok()
-                .map(|bytes| Self::Begin { bytes }),
+            (7, _) => Some(Self::Begin {
+                bytes: argument as u16,
+                check: (argument >> 16) as u16,
+            }),
             (8, sequence) => Some(Self::Verify { sequence }),
             (9, sequence) => Some(Self::Commit { sequence }),
             (10, 0) => Some(Self::Abort),

@@ -1,7 +1,7 @@
 //! A blob and its tag in RAM, as they come.
 
 use super::authentication::TAG_BYTES;
-use runtime::blob::MAX_BYTES;
+use runtime::blob::{CRC_BYTES, MAX_BYTES};
 
 /// Bytes of a word.
 pub(super) const WORD: usize = 4;
@@ -81,6 +81,13 @@ impl Staging {
             .first_chunk()
             .unwrap_or(&[0; TAG_BYTES])
     }
+}
+
+/// The CRC-32C that a blob carries as its last bytes.
+pub fn crc_of(blob: &[u8]) -> Option<u32> {
+    blob.last_chunk::<CRC_BYTES>()
+        .copied()
+        .map(u32::from_le_bytes)
 }
 
 /// A word of `bytes`, the last one padded with zeros.

@@ -19,6 +19,15 @@ pub struct Running<'r> {
     pub peak: [f32; 3],
 }
 
+/// A record in the store.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// Its sequence number; 0 for a blob that a probe has flashed.
+    pub sequence: u32,
+    /// The CRC-32C of its blob.
+    pub crc: u32,
+}
+
 /// What is to be stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change<'b> {
@@ -44,7 +53,14 @@ pub trait Store {
     /// The record that runs, if there is one.
     fn running(&self) -> Option<Running<'_>>;
 
-    /// The highest sequence number of any committed record; 0 if there is none.
+    /// The record that runs from the next reset on.
+    fn newest(&self) -> Option<Kept>;
+
+    /// The record to which [`Change::Previous`] goes back.
+    fn previous(&self) -> Option<Kept>;
+
+    /// The highest sequence number of any committed record, of one that is refused too; 0 if
+    /// there is none.
     fn newest_sequence(&self) -> u32;
 
     /// Whether records can be written before the next start. If not, that start may try again.
@@ -54,9 +70,6 @@ pub trait Store {
 
     /// Whether a record of any size fits without an erase.
     fn has_room(&self) -> bool;
-
-    /// Whether there is a record to go back to.
-    fn has_previous(&self) -> bool;
 
     /// Writes a part of a change, as long as fits between two ticks. It is called in every tick with
     /// the same arguments until it gives something other than [`Written::InProgress`], and then

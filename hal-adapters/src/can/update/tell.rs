@@ -1,8 +1,25 @@
 //! Who the node is: the pages of [`super::UpdateRequest::Tell`].
 
-use super::staging::word_of;
-use super::store::Store;
-use runtime::blob::CRC_BYTES;
+use super::authentication::Key;
+use super::staging::{crc_of, word_of};
+use super::store::{Kept, Store};
+use crate::can::command::Outcome;
+
+/// In the page [`page::LAST_UPDATE`]: there was none.
+const NONE_YET: u32 = 0xff;
+
+/// What a node knows of itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Identity<'s> {
+    /// The stage's serial number: a blob of another one is refused. `None`: any is taken.
+    pub serial: Option<&'s str>,
+    /// The stage's key; `None`: whoever can send on the bus may update.
+    pub key: Option<Key>,
+    /// Version of the program; see [`page::PROGRAM_VERSION`].
+    pub program_version: u32,
+    /// Hash of the program.
+    pub program_hash: u32,
+}
 
 /// Numbers of the pages. Those up to [`page::PEAK`] are of the record that runs.
 pub mod page {
@@ -27,22 +44,53 @@ pub mod page {
     /// Bits 0 to 7: how the last transfer since the reset ended, a number of
     /// [`Outcome`](crate::can::command::Outcome), 255 for none; bit 8: a key is needed.
     pub const LAST_UPDATE: u8 = 20;
-    /// The highest sequence number in the store: above that of the running record if one waits
-    /// for a reset.
+    /// The highest sequence number in the store: above that of [`NEXT`] if the newest record is
+    /// refused.
     pub const NEWEST: u8 = 21;
     /// Serial number of the stage: eight pages of four bytes of UTF-8, 0 after the end.
     pub const SERIAL: u8 = 22;
+    /// Sequence number of the record that runs from the next reset on, and the check of its blob,
+    /// CRC-32C: two pages.
+    pub const NEXT: u8 = 30;
+    /// The same of the record to which a transfer of length 0 goes back: two pages.
+    pub const PREVIOUS: u8 = 32;
     /// How many there are.
-    pub const COUNT: u8 = 30;
+    pub const COUNT: u8 = 34;
+}
+
+/// The answer to [`super::UpdateRequest::Tell`]; `ended` is how the last transfer ended.
+pub(super) fn tell(
+    number: u8,
+    identity: &Identity<'_>,
+    ended: Option<Outcome>,
+    store: &dyn Store,
+) -> (Outcome, u32) {
+    let needs_key = u32::from(identity.key.is_some()) << 8;
+    let value = match number {
+        0..page::PROGRAM_VERSION => of_running(number, store),
+        page::PROGRAM_VERSION => Some(identity.program_version),
+        page::PROGRAM_HASH => Some(identity.program_hash),
+        page::LAST_UPDATE => Some(needs_key | ended.map_or(NONE_YET, |ended| ended as u32)),
+        page::NEWEST => Some(store.newest_sequence()),
+        page::SERIAL..page::NEXT => {
+            let running = store.running().map(|running| running.serial);
+            let serial = identity.serial.or(running).unwrap_or_default();
+            Some(word_of_text(serial, number - page::SERIAL))
+        }
+        page::NEXT..page::PREVIOUS => of_kept(store.newest(), number - page::NEXT),
+        page::PREVIOUS..page::COUNT => of_kept(store.previous(), number - page::PREVIOUS),
+        _ => return (Outcome::UnknownCommand, 0),
+    };
+    value.map_or((Outcome::NoParameters, 0), |value| (Outcome::Done, value))
 }
 
 /// Four bytes of a text, 0 after its end.
-pub(super) fn word_of_text(text: &str, index: u8) -> u32 {
+fn word_of_text(text: &str, index: u8) -> u32 {
     word_of(text.as_bytes(), index.into()).unwrap_or(0)
 }
 
 /// A page that follows from the store; `None` without a running record.
-pub(super) fn of_running(number: u8, store: &dyn Store) -> Option<u32> {
+fn of_running(number: u8, store: &dyn Store) -> Option<u32> {
     let running = store.running()?;
     let number_of = |values: [f32; 3], first: u8| {
         let k = usize::from(number.checked_sub(first)?);
@@ -54,13 +102,16 @@ pub(super) fn of_running(number: u8, store: &dyn Store) -> Option<u32> {
             Some(u32::from(forced) << 8 | u32::from(running.slot))
         }
         page::SEQUENCE => Some(running.sequence),
-        page::CRC => {
-            let crc = running.blob.last_chunk::<CRC_BYTES>()?;
-            Some(u32::from_le_bytes(*crc))
-        }
+        page::CRC => crc_of(running.blob),
         page::LENGTH => u32::try_from(running.blob.len()).ok(),
         page::CREATED..page::RMS => Some(word_of_text(running.created, number - page::CREATED)),
         page::RMS..page::PEAK => number_of(running.rms, page::RMS),
         _ => number_of(running.peak, page::PEAK),
     }
+}
+
+/// A page of a record in the store: its sequence number, or from 1 on its check.
+fn of_kept(kept: Option<Kept>, page: u8) -> Option<u32> {
+    let kept = kept?;
+    Some(if page == 0 { kept.sequence } else { kept.crc })
 }

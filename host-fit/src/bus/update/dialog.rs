@@ -75,6 +75,8 @@ pub struct Dialog<J> {
     job: J,
     mailbox: Mailbox,
     token: u8,
+    /// The last command of another host.
+    heard: Option<Command>,
     state: State,
     /// When the next frame may leave, us.
     free_us: u64,
@@ -88,6 +90,7 @@ impl<J: Job> Dialog<J> {
             job,
             mailbox: Mailbox::default(),
             token,
+            heard: None,
             state: State::Free,
             free_us: 0,
         }
@@ -170,6 +173,10 @@ impl<J: Job> Dialog<J> {
 
     /// Takes a frame of the bus.
     pub fn take(&mut self, frame: &BusFrame, now_us: u64) {
+        let told = self.mailbox.take(frame);
+        if let Some(Ok(Told::Command(other))) = told {
+            self.heard = Some(other);
+        }
         let State::Asking {
             command,
             request,
@@ -179,19 +186,27 @@ impl<J: Job> Dialog<J> {
         else {
             return;
         };
-        let is_ours = |number, token| (number, token) == (command.number, command.token);
-        match self.mailbox.take(frame) {
-            Some(Ok(Told::Answer(answer))) if is_ours(answer.number, answer.token) => {
+        match told {
+            Some(Ok(Told::Answer(answer)))
+                if (answer.number, answer.token) == (command.number, command.token) =>
+            {
                 self.answered(request, command, started, &answer, now_us);
             }
-            // Another host asks under the same token: the answer could be either's. Ask anew.
-            Some(Ok(Told::Command(other)))
-                if is_ours(other.number, other.token) && command.token < TRANSFER_TOKEN =>
+            // The answer could be that of the other host: ask anew.
+            Some(Ok(Told::Command(_)))
+                if command.token < TRANSFER_TOKEN && self.is_taken(&command) =>
             {
                 self.ask(request, None);
             }
             _ => {}
         }
+    }
+
+    /// Whether another host asked for something else of this kind last, under the same token.
+    fn is_taken(&self, command: &Command) -> bool {
+        let name = |command: &Command| (command.number, command.token);
+        let heard = self.heard.filter(|other| name(other) == name(command));
+        heard.is_some_and(|other| other.request != command.request)
     }
 
     fn answered(
@@ -217,17 +232,25 @@ impl<J: Job> Dialog<J> {
     }
 
     fn ask(&mut self, request: Request, transfer: Option<u8>) {
-        let token = transfer.unwrap_or_else(|| {
-            self.token = self.token.wrapping_add(1) & !TRANSFER_TOKEN;
-            self.token
-        });
+        let mut command = Command::new(request, transfer.unwrap_or_default());
+        if transfer.is_none() {
+            command.token = self.next_token();
+            if self.is_taken(&command) {
+                command.token = self.next_token();
+            }
+        }
         self.state = State::Asking {
-            command: Command::new(request, token),
+            command,
             request,
             until_us: 0,
             attempts: ATTEMPTS,
             started: 0,
         };
+    }
+
+    const fn next_token(&mut self) -> u8 {
+        self.token = self.token.wrapping_add(1) & !TRANSFER_TOKEN;
+        self.token
     }
 
     fn send(&mut self, now_us: u64, told: &Told) -> Option<Coded> {

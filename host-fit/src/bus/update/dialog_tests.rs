@@ -101,13 +101,28 @@ fn nobody_is_waited_for_longer_than_three_seconds() {
 }
 
 #[test]
-fn where_another_host_asks_under_the_same_token_it_is_asked_anew() {
+fn where_another_host_asks_for_something_else_under_the_same_token_it_is_asked_anew() {
+    let another = Request::Update(UpdateRequest::Tell { page: 4 });
     let (mut dialog, mut node) = (Dialog::new(Three::default(), 8), Mailbox::default());
+    let mut host = Mailbox::default();
+    let mut hears = |dialog: &mut Dialog<Three>, request, token| {
+        let told = Told::Command(Command::new(request, token));
+        dialog.take(&BusFrame::from(host.send(&told).expect("it")), 500);
+    };
+    // While it waits, and before it asks.
     let asked = command(dialog.poll(0));
-    let other = Mailbox::default().send(&Told::Command(asked)).expect("it");
-    dialog.take(&BusFrame::from(other), 500);
+    hears(&mut dialog, another, asked.token);
     dialog.take(&answer(&mut node, asked, Outcome::Done), 600);
     assert_eq!(dialog.job().answers, []);
+    hears(&mut dialog, another, 11);
     let anew = command(dialog.poll(1_000));
     assert_eq!((anew.request, anew.token), (asked.request, 10));
+    let mut dialog = Dialog::new(Three::default(), 8);
+    hears(&mut dialog, another, 9);
+    let asked = command(dialog.poll(0));
+    assert_eq!(asked.token, 10);
+    // What both ask for has one answer.
+    hears(&mut dialog, TELL, asked.token);
+    dialog.take(&answer(&mut node, asked, Outcome::Done), 600);
+    assert_eq!(dialog.job().answers.len(), 1);
 }

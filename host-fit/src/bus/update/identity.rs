@@ -3,7 +3,7 @@
 use super::UpdateError;
 use super::dialog::{Job, Wish};
 use hal_adapters::can::command::{Outcome, Request};
-use hal_adapters::can::update::{UpdateRequest, page};
+use hal_adapters::can::update::{Kept, UpdateRequest, crc_of, page};
 
 /// What a node tells of itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,8 +12,13 @@ pub struct Identity {
     pub serial: String,
     /// The parameters that it runs, if any.
     pub running: Option<RunningParameters>,
-    /// The highest sequence number of any record in its store; 0 if there is none.
+    /// The highest sequence number of any record in its store, of one that is refused too; 0 if
+    /// there is none.
     pub newest_sequence: u32,
+    /// The record that runs from its next reset on, if there is one.
+    pub next: Option<Kept>,
+    /// The record before, to which it can go back.
+    pub previous: Option<Kept>,
     /// Version of its program: major, minor, patch.
     pub program_version: [u8; 3],
     /// Hash of its program.
@@ -48,8 +53,7 @@ pub struct RunningParameters {
 impl RunningParameters {
     /// Whether these are the parameters of `blob`, by length and check.
     pub fn are(&self, blob: &[u8]) -> bool {
-        let crc = blob.last_chunk().copied().map(u32::from_le_bytes);
-        (Some(self.crc), self.bytes as usize) == (crc, blob.len())
+        (Some(self.crc), self.bytes as usize) == (crc_of(blob), blob.len())
     }
 }
 
@@ -108,6 +112,11 @@ impl Pages {
         })
     }
 
+    fn kept(&self, first: u8) -> Option<Kept> {
+        let (sequence, crc) = (self.word(first)?, self.word(first + 1)?);
+        Some(Kept { sequence, crc })
+    }
+
     /// All pages together.
     pub(super) fn identity(&self) -> Identity {
         let [patch, minor, major, _] = self
@@ -120,6 +129,8 @@ impl Pages {
             serial: self.text(page::SERIAL),
             running: self.running(),
             newest_sequence: self.word(page::NEWEST).unwrap_or_default(),
+            next: self.kept(page::NEXT),
+            previous: self.kept(page::PREVIOUS),
             program_version: [major, minor, patch],
             program_hash: self.word(page::PROGRAM_HASH).unwrap_or_default(),
             needs_key: last >> 8 & 1 == 1,

@@ -17,7 +17,7 @@ use hal_adapters::can::command::{Mailbox, Outcome as Ended, Request, Told};
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{Key, TAG_INDEX, UpdateData, UpdateRequest};
 use hal_adapters::can::{BusFrame, Coded};
-use host_fit::bus::update::{BlobReader, Dialog, Job, Plan, UpdateError, Updated, Updater};
+use host_fit::bus::update::{BlobReader, Dialog, Job, Plan, UpdateError, Updated, Updater, Wanted};
 use runtime::blob::MAX_BYTES;
 use runtime::parameters::Text;
 use runtime::{ParameterSet, Status};
@@ -39,7 +39,10 @@ const TICK_US_MAX: f64 = 1700.0;
 
 pub(super) fn plan(blob: &[u8], token: u8) -> Plan {
     Plan {
-        blob: blob.to_vec(),
+        wanted: match blob {
+            [] => Wanted::Previous,
+            blob => Wanted::Blob(blob.to_vec()),
+        },
         serial: Some("stage-7".to_owned()),
         key: Some(KEY),
         declares_servo_off: true,
@@ -201,10 +204,11 @@ pub fn refused(bench: &Bench) -> Outcome {
         serial: None,
         ..plan(&bench.other, 2)
     };
+    let [expected, found] = ["stage-8", "stage-7"].map(str::to_owned);
     for (plan, want) in [
         (with_key(Some([0; 16])), UpdateError::NotAuthorised),
         (with_key(None), UpdateError::KeyNeeded),
-        (other_stage, UpdateError::BadContent { kind: 10 }),
+        (other_stage, UpdateError::OtherStage { expected, found }),
     ] {
         let (refused, _) = update(&mut machine, plan)?;
         equal("the end", refused, Err(want))?;
@@ -220,25 +224,21 @@ pub fn refused(bench: &Bench) -> Outcome {
     answers(
         &mut machine,
         &[
-            (
-                request(UpdateRequest::Begin { bytes: 0 }),
-                100,
-                Ended::ServoOn,
-            ),
+            (request(UpdateRequest::begin(0, 0)), 100, Ended::ServoOn),
             (SERVO_OFF, 101, Ended::Done),
-            (request(UpdateRequest::Begin { bytes: 1 }), 102, Ended::Done),
-            (request(UpdateRequest::Begin { bytes: 1 }), 103, Ended::Busy),
+            (request(UpdateRequest::begin(1, 0)), 102, Ended::Done),
+            (request(UpdateRequest::begin(1, 0)), 103, Ended::Busy),
             (
                 request(UpdateRequest::Commit { sequence: 2 }),
                 102,
                 Ended::NotAuthorised,
             ),
             (request(UpdateRequest::Abort), 102, Ended::Done),
-            (request(UpdateRequest::Begin { bytes: 0 }), 104, Ended::Done),
+            (request(UpdateRequest::begin(1, 0)), 104, Ended::Done),
         ],
     )?;
     let mut host = Mailbox::default();
-    for index in TAG_INDEX..TAG_INDEX + 4 {
+    for index in (TAG_INDEX..TAG_INDEX + 4).chain([0]) {
         let (token, word) = (104, 0);
         let data = host.send(&Told::UpdateData(UpdateData { token, index, word }));
         let Coded { message, bytes } = data.ok_or("a word")?;
@@ -253,7 +253,9 @@ pub fn refused(bench: &Bench) -> Outcome {
     )?;
     machine.chip.random.broken = true;
     let (refused, _) = update(&mut machine, plan(&bench.blob, 4))?;
-    expect(refused.is_err(), || "without random numbers".to_owned())?;
+    expect(matches!(refused, Err(UpdateError::NoRandomNumber)), || {
+        format!("without random numbers: {refused:?}")
+    })?;
     machine.chip.random.broken = false;
     equal("operations", machine.chip.flash.operations, operations)?;
     let (updated, _) = update(&mut machine, plan(&bench.blob, 5))?;

@@ -8,7 +8,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use hal_adapters::can::command::{Command, Mailbox, Request, Told};
 use hal_adapters::can::service::Updates;
-use hal_adapters::can::update::{Change, Identity, Receiver, Running, Store, Written};
+use hal_adapters::can::update::{Change, Identity, Kept, Receiver, Running, Store, Written};
 use hal_adapters::can::{
     BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing, sensor,
 };
@@ -73,15 +73,19 @@ impl Store for Nowhere {
         black_box(None)
     }
 
+    fn newest(&self) -> Option<Kept> {
+        black_box(None)
+    }
+
+    fn previous(&self) -> Option<Kept> {
+        black_box(None)
+    }
+
     fn newest_sequence(&self) -> u32 {
         black_box(0)
     }
 
     fn has_room(&self) -> bool {
-        black_box(true)
-    }
-
-    fn has_previous(&self) -> bool {
         black_box(true)
     }
 

@@ -1,0 +1,306 @@
+//! One host: how long it takes, a bad bus, resets, what is told and refused.
+
+use super::world::{World, flashed};
+use super::{KEY, NEW, OLD, SERIAL, back, plan};
+use firmware::store::flash_model::FlashModel;
+use hal_adapters::can::BusFrame;
+use hal_adapters::can::command::{Command, Mailbox, Outcome, Request, Told};
+use hal_adapters::can::update::{Kept, UpdateRequest, crc_of};
+use hal_adapters::fault::Fault;
+use host_fit::bus::update::{
+    BlobReader, Dialog, Identifier, Plan, UpdateError, Updated, Updater, Wanted,
+};
+use runtime::ParameterSet;
+use runtime::blob::MAX_BYTES;
+use tests::node::Node;
+
+/// The largest blob that a fit writes: the field model, with texts of full length.
+fn largest() -> Vec<u8> {
+    let mut set = ParameterSet::from_bytes(NEW).expect("a sound example");
+    set.serial = "S".repeat(32).as_str().try_into().expect("32 bytes");
+    set.created = "2026-11-22T10:00:00.000000+00:00"
+        .try_into()
+        .expect("32 bytes");
+    let mut buffer = [0; MAX_BYTES];
+    set.to_bytes(&mut buffer).expect("it fits").to_vec()
+}
+
+#[test]
+fn the_largest_blob_takes_less_than_a_second_on_a_loaded_bus() {
+    let blob = largest();
+    for key in [None, Some(KEY)] {
+        let serial: &'static str = "S".repeat(32).leak();
+        let mut world = World::new(key, &[], 1);
+        world.node = Node::new(Some(serial), key, flashed(&blob), 1);
+        let record = Command::new(Request::Record { on: true }, 3);
+        let record = Mailbox::default().send(&Told::Command(record));
+        let record = BusFrame::from(record.expect("a known message"));
+        world.to_node.send(0, record);
+        let mut newer = ParameterSet::from_bytes(&blob).expect("sound");
+        newer.fit.rows += 1;
+        let mut buffer = [0; MAX_BYTES];
+        let newer = newer.to_bytes(&mut buffer).expect("it fits");
+        let job = Plan {
+            serial: Some(serial.to_owned()),
+            ..plan(newer)
+        };
+        let updated = world.update(job).expect("it is taken");
+        assert_eq!(updated.sequence, Some(1));
+        assert_eq!(updated.repeated, (0, 0));
+        assert_eq!(world.newest(), newer);
+        println!(
+            "RESULT update_bytes={} key={} update_us={} frames={} overruns={}",
+            newer.len(),
+            key.is_some(),
+            world.now_us,
+            world.recording.len(),
+            world.overruns
+        );
+        assert!(world.now_us <= 1_000_000);
+        assert_eq!(world.overruns, 0);
+    }
+}
+
+#[test]
+fn on_a_bad_bus_the_update_ends_with_the_blob_bit_for_bit_or_a_refusal() {
+    for (rate, least) in [(50_000, 108), (400_000, 108), (950_000, 0)] {
+        let ends = on_a_bad_bus(rate);
+        println!(
+            "RESULT bad_bus_per_million={rate} updated={} refused={}",
+            ends[0], ends[1]
+        );
+        assert!(ends[0] >= least, "{ends:?}");
+    }
+}
+
+/// Twelve updates for each fault, at so many per million frames: how many were stored and refused.
+fn on_a_bad_bus(rate: u64) -> [u32; 2] {
+    let mut ends = [0; 2];
+    for fault in Fault::ALL {
+        for seed in 0..12 {
+            let mut world = World::new(Some(KEY), &[(fault, rate)], seed);
+            match world.update(plan(NEW)) {
+                Ok(updated) => {
+                    assert_eq!(world.newest(), NEW, "{fault:?} {seed}");
+                    assert_eq!(updated.sequence, Some(1), "{fault:?} {seed}");
+                    ends[0] += 1;
+                }
+                Err(error) => {
+                    println!("{fault:?} {seed}: {error}");
+                    let newest = world.newest();
+                    assert!(newest == NEW || newest == OLD, "{fault:?} {seed}");
+                    ends[1] += 1;
+                }
+            }
+        }
+    }
+    ends
+}
+
+#[test]
+fn a_reset_at_any_moment_leaves_the_old_or_the_new_and_says_which() {
+    let (mut stored, mut refused) = (0, 0);
+    for at_ms in (0..450).step_by(7) {
+        let mut world = World::new(Some(KEY), &[], 5);
+        world.resets_us = vec![at_ms * 1_000];
+        match world.update(plan(NEW)) {
+            Ok(updated) => {
+                stored += 1;
+                assert_eq!(
+                    (updated.sequence, world.newest()),
+                    (Some(1), NEW),
+                    "{at_ms}"
+                );
+            }
+            Err(error) => {
+                refused += 1;
+                // After a restart of the machine the servo may be on: it is not declared off again.
+                assert_eq!(error, UpdateError::ServoOn { declared: true }, "{at_ms}");
+                assert_eq!(world.newest(), OLD, "{at_ms}");
+                assert!(world.update(plan(NEW)).is_ok(), "{at_ms}");
+            }
+        }
+        assert_eq!(world.node.records(), 1, "{at_ms}");
+    }
+    assert!(stored > 10 && refused > 10, "{stored} {refused}");
+}
+
+#[test]
+fn activated_parameters_run_are_told_and_read_back() {
+    let mut world = World::new(Some(KEY), &[(Fault::Drop, 20_000)], 8);
+    let updated = world.update(Plan {
+        activates: true,
+        ..plan(NEW)
+    });
+    let updated = updated.expect("it is taken");
+    assert!(updated.is_active && world.node.resets() == 1);
+    let before = updated.before.running.expect("it ran");
+    assert!(before.are(OLD) && before.sequence == 0);
+    let mut hosts = [Dialog::new(BlobReader::default(), 30)];
+    world.run(&mut hosts);
+    let [host] = hosts;
+    let (identity, blob) = host.into_job().result().expect("it runs");
+    assert_eq!(blob, NEW);
+    let (set, running) = (ParameterSet::from_bytes(NEW), identity.running);
+    let (set, running) = (set.expect("sound"), running.expect("it runs"));
+    assert_eq!(
+        (identity.serial.as_str(), identity.needs_key),
+        (SERIAL, true)
+    );
+    assert_eq!((running.sequence, identity.newest_sequence), (1, 1));
+    assert_eq!((running.rms, running.peak), (set.fit.rms, set.fit.peak));
+    assert_eq!(running.created, set.created.as_str());
+    assert_eq!(identity.program_version, [1, 2, 3]);
+    // The same again is not sent, and the record before comes back on demand.
+    let again = Plan {
+        key: None,
+        declares_servo_off: false,
+        ..plan(NEW)
+    };
+    let again = world.update(again).expect("nothing to do");
+    assert_eq!((again.sequence, again.is_active), (None, true));
+    let back = world.update(Plan {
+        activates: true,
+        ..back()
+    });
+    assert_eq!(back.expect("there is one").sequence, Some(2));
+    assert_eq!(world.newest(), OLD);
+    let mut hosts = [Dialog::new(Identifier::default(), 60)];
+    world.run(&mut hosts);
+    let [host] = hosts;
+    let running = host.into_job().result().expect("it answers").running;
+    assert!(running.is_some_and(|running| running.are(OLD) && running.sequence == 2));
+}
+
+#[test]
+fn what_waits_for_a_reset_is_not_sent_again_and_activated_alone() {
+    let mut world = World::new(Some(KEY), &[], 12);
+    let kept = |updated: Updated| (updated.sequence, updated.record, updated.is_active);
+    let alone = Plan {
+        wanted: Wanted::Newest,
+        key: None,
+        activates: true,
+        ..plan(&[])
+    };
+    let updated = world.update(alone.clone()).expect("nothing to do");
+    assert_eq!((kept(updated), world.node.resets()), ((None, 0, true), 0));
+    let updated = world.update(plan(NEW)).expect("it is taken");
+    assert_eq!(kept(updated), (Some(1), 1, false));
+    let updated = world.update(plan(NEW)).expect("nothing to do");
+    assert_eq!(kept(updated), (None, 1, false));
+    let mut hosts = [Dialog::new(Identifier::default(), 60)];
+    world.run(&mut hosts);
+    let [host] = hosts;
+    let identity = host.into_job().result().expect("it answers");
+    let told = |record: Option<Kept>| record.map(|record| (record.sequence, record.crc));
+    assert_eq!(told(identity.next), Some((1, crc_of(NEW).expect("a blob"))));
+    assert_eq!(
+        told(identity.previous),
+        Some((0, crc_of(OLD).expect("a blob")))
+    );
+    let on = Plan {
+        declares_servo_off: false,
+        ..alone.clone()
+    };
+    let refused = world.update(on);
+    assert_eq!(refused, Err(UpdateError::ServoOn { declared: false }));
+    // The answer is lost: the node has restarted, and is asked what it runs.
+    const ACTIVATE: u8 = UpdateRequest::Activate.number();
+    world.loses = |answer| answer.number == ACTIVATE && answer.outcome == Some(Outcome::Done);
+    let updated = world.update(alone).expect("it waits");
+    assert_eq!((kept(updated), world.node.resets()), ((None, 1, true), 1));
+    assert_eq!(world.node.records(), 1);
+}
+
+#[test]
+fn what_is_refused_is_refused_by_its_reason_and_nothing_is_written() {
+    let of_another = ParameterSet {
+        serial: "HS-0008".try_into().expect("short"),
+        ..ParameterSet::from_bytes(NEW).expect("sound")
+    };
+    let mut buffer = [0; MAX_BYTES];
+    let of_another = of_another.to_bytes(&mut buffer).expect("it fits");
+    let on = Plan {
+        declares_servo_off: false,
+        ..plan(NEW)
+    };
+    let no_key = Plan {
+        key: None,
+        ..plan(NEW)
+    };
+    let wrong_key = Plan {
+        key: Some([0; 16]),
+        ..plan(NEW)
+    };
+    let asked = Plan {
+        serial: Some("HS-0008".to_owned()),
+        ..plan(NEW)
+    };
+    let unnamed = Plan {
+        serial: None,
+        ..plan(of_another)
+    };
+    let (expected, found) = ("HS-0008".to_owned(), SERIAL.to_owned());
+    let other_stage = UpdateError::OtherStage { expected, found };
+    for (plan, want) in [
+        (on, UpdateError::ServoOn { declared: false }),
+        (no_key, UpdateError::KeyNeeded),
+        (wrong_key, UpdateError::NotAuthorised),
+        (asked, other_stage.clone()),
+        (unnamed, other_stage),
+        (back(), UpdateError::NoPrevious),
+    ] {
+        let mut world = World::new(Some(KEY), &[], 3);
+        assert_eq!(world.update(plan), Err(want));
+        assert_eq!(world.node.records(), 0);
+    }
+    // A node that tells no serial number is not taken for the one that was asked for.
+    let mut world = World::new(None, &[], 3);
+    world.node = Node::new(None, None, FlashModel::erased(), 3);
+    let expected = SERIAL.to_owned();
+    assert_eq!(
+        world.update(plan(NEW)),
+        Err(UpdateError::NoSerial { expected })
+    );
+    assert_eq!(world.node.records(), 0);
+    // Nobody is there.
+    let mut world = World::new(None, &[(Fault::Drop, 1_000_000)], 3);
+    assert_eq!(world.update(plan(NEW)), Err(UpdateError::NoAnswer));
+}
+
+#[test]
+fn an_interrupted_update_closes_its_transfer() {
+    for after in [10, 60, 100, 180] {
+        let mut world = World::new(Some(KEY), &[], 3);
+        let mut host = Dialog::new(Updater::new(plan(NEW)), 1);
+        let mut frames = 0;
+        while frames < after {
+            for frame in world.slot() {
+                host.take(&frame, world.now_us);
+            }
+            if let Some(coded) = host.poll(world.now_us) {
+                world.to_node.send(world.now_us, BusFrame::from(coded));
+                frames += 1;
+            }
+        }
+        host.interrupt();
+        let mut hosts = [host];
+        world.run(&mut hosts);
+        let [host] = hosts;
+        assert_eq!(host.into_job().result(), Err(UpdateError::Interrupted));
+        assert_eq!(world.node.records(), 0);
+        // Another may begin at once, and the servo is on again.
+        let on = Plan {
+            declares_servo_off: false,
+            token: 50,
+            ..plan(NEW)
+        };
+        assert_eq!(
+            world.update(on),
+            Err(UpdateError::ServoOn { declared: false })
+        );
+        let at_us = world.now_us;
+        assert!(world.update(plan(NEW)).is_ok());
+        assert!(world.now_us - at_us < 1_000_000);
+    }
+}
