@@ -141,3 +141,48 @@ fn as_text(identity: &Identity) -> String {
     let line = |(name, text): (&str, String)| format!("{name:<12} {text}\n");
     lines.into_iter().map(line).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_waits_for_a_reset_and_what_is_not_used_are_told_apart() {
+        let kept = |sequence| Some(Kept { sequence, crc: 7 });
+        let told = |next, newest_sequence| {
+            let running = RunningParameters {
+                slot: 0,
+                forced: false,
+                sequence: 3,
+                crc: 7,
+                bytes: 500,
+                created: String::new(),
+                rms: [0.0; 3],
+                peak: [0.0; 3],
+            };
+            as_text(&Identity {
+                serial: "HS-0007".to_owned(),
+                running: Some(running),
+                newest_sequence,
+                next,
+                previous: kept(2),
+                program_version: [0; 3],
+                program_hash: 0,
+                needs_key: true,
+                last_update: None,
+            })
+        };
+        let has = |text: &str, name| text.lines().any(|line| line.starts_with(name));
+        for (next, newest, waits, is_unused) in [
+            (kept(3), 3, false, false),
+            (kept(4), 4, true, false),
+            (kept(3), 4, false, true),
+            (kept(4), 5, true, true),
+        ] {
+            let text = told(next, newest);
+            assert_eq!(has(&text, "waiting"), waits, "{text}");
+            assert_eq!(has(&text, "refused"), is_unused, "{text}");
+            assert!(has(&text, "before"), "{text}");
+        }
+    }
+}

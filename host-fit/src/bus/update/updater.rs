@@ -150,7 +150,8 @@ impl Updater {
     fn close(&mut self) {
         self.go(if self.is_open {
             Phase::Abort
-        } else if self.servo_off == ServoOff::Declared {
+        } else if matches!(self.servo_off, ServoOff::Declared | ServoOff::Lost) {
+            // Where a service pin says on, the node still has the declaration.
             Phase::ServoOn
         } else {
             Phase::Over

@@ -269,7 +269,7 @@ impl Job for Updater {
             (Phase::Commit, _) => self.restart(UpdateError::Unknown),
             (_, record) => {
                 self.is_open = false;
-                self.servo_off = ServoOff::Lost;
+                self.servo_off = ServoOff::Left;
                 self.fail(match record {
                     _ if self.is_committing => UpdateError::Unknown,
                     Some(sequence) => UpdateError::NotActive { sequence },
