@@ -8,3 +8,5 @@ pub mod log;
 pub mod shipped;
 pub mod source;
 pub mod stage;
+pub(crate) mod text;
+mod unpack;
