@@ -13,7 +13,7 @@ mod temporary;
 
 pub use place::{Place, is_standard_output};
 
-use place::end_of_links;
+use place::{end_of_links, names_standard_output};
 use temporary::{sweep, temporary};
 
 use std::fs::{self, Metadata, OpenOptions};
@@ -127,7 +127,7 @@ impl Outputs {
     /// Every variant of [`OutputError`].
     pub fn add(&mut self, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
         let named = path.to_path_buf();
-        if is_standard(path) {
+        if names_standard_output(path) {
             self.staged.push(Staged::Stream(named, bytes.to_vec()));
             return Ok(());
         }
@@ -158,7 +158,9 @@ impl Outputs {
     pub fn commit(self) -> Result<(), OutputError> {
         for staged in &self.staged {
             match staged {
-                Staged::Stream(path, bytes) if is_standard(path) => write_standard(path, bytes)?,
+                Staged::Stream(path, bytes) if names_standard_output(path) => {
+                    write_standard(path, bytes)?;
+                }
                 Staged::Stream(path, bytes) => write_through(path, bytes)
                     .map_err(|source| explain(source, path, &folder_of(path), bytes.len()))?,
                 Staged::File { .. } => {}
@@ -218,7 +220,7 @@ pub fn make_folder(path: &Path) -> Result<(), OutputError> {
 /// # Errors
 /// Every variant of [`OutputError`] but `Full`.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
-    if is_standard(path) {
+    if names_standard_output(path) {
         return Ok(());
     }
     let (target, existing) = resolve(path)?;
@@ -263,7 +265,7 @@ fn resolve(path: &Path) -> Result<(PathBuf, Option<Metadata>), OutputError> {
 }
 
 /// Whether `path` is something to write to, not to replace: a device, a pipe, or the
-/// standard output under its name in the file system, which a shell may have led to a file.
+/// standard streams under their names in the file system, which a shell may have led to files.
 fn is_stream(path: &Path, metadata: &Metadata) -> bool {
     let names = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc/self/fd"];
     let named_stream = cfg!(unix) && names.iter().any(|name| path.starts_with(name));

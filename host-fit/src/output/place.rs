@@ -48,12 +48,21 @@ fn inode(_metadata: &Metadata) -> Option<(u64, u64)> {
     None
 }
 
-/// Whether an output by this name goes to standard output: `-`, or one of its names in the file
-/// system.
+/// Whether an output by this name goes to standard output.
 pub fn is_standard_output(path: &Path) -> bool {
     let there = |path: &Path| fs::metadata(path).ok().as_ref().and_then(inode);
     let standard = || there(Path::new("/dev/stdout"));
-    super::is_standard(path) || there(path).is_some_and(|inode| standard() == Some(inode))
+    names_standard_output(path) || there(path).is_some_and(|inode| standard() == Some(inode))
+}
+
+/// Whether this is a name of standard output, which then is not opened anew: that waits forever for a
+/// pipe that nobody reads.
+pub(super) fn names_standard_output(path: &Path) -> bool {
+    let name = path.to_str();
+    matches!(
+        name,
+        Some("-" | "/dev/stdout" | "/dev/fd/1" | "/proc/self/fd/1")
+    )
 }
 
 /// The name at the end of the links that a name leads along; nothing need be there.

@@ -1,8 +1,10 @@
 //! A record: what came is in the file, whatever ends the run.
 
-use super::{OutputError, end_of_links, explain, folder_of, is_standard, is_stream, resolve};
+use super::{
+    OutputError, end_of_links, explain, folder_of, is_stream, names_standard_output, resolve,
+};
 use std::fs::{File, OpenOptions};
-use std::io::{Seek, Write};
+use std::io::{Seek, SeekFrom, Stdout, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -17,14 +19,29 @@ const UNWRITTEN_BYTES: usize = 64 * 1024;
 #[derive(Debug)]
 pub struct RecordFile {
     path: PathBuf,
-    file: File,
-    /// Whether there is a file that can be cut and removed.
-    is_file: bool,
+    sink: Sink,
     /// Lines that are not in the file yet.
     unwritten: Vec<u8>,
     since: Instant,
     /// Bytes of the lines in the file.
     written: u64,
+}
+
+#[derive(Debug)]
+enum Sink {
+    /// A file of its own, which can be cut and removed.
+    New(File),
+    Device(File),
+    Standard(Stdout),
+}
+
+impl Sink {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        match self {
+            Self::New(file) | Self::Device(file) => file.write_all(bytes),
+            Self::Standard(out) => out.write_all(bytes).and_then(|()| out.flush()),
+        }
+    }
 }
 
 impl RecordFile {
@@ -33,28 +50,33 @@ impl RecordFile {
     /// # Errors
     /// [`OutputError::Exists`] for a file that is there, and those of a place that cannot be written.
     pub fn create(path: &Path) -> Result<Self, OutputError> {
-        let path = if is_standard(path) {
-            Path::new("/dev/stdout")
+        let sink = if names_standard_output(path) {
+            Sink::Standard(std::io::stdout())
         } else {
-            path
-        };
-        let (target, existing) = resolve(path)?;
-        let is_stream = existing.as_ref().is_some_and(|it| is_stream(path, it));
-        if existing.is_some() && !is_stream {
-            return Err(OutputError::Exists {
-                path: path.to_path_buf(),
-            });
-        }
-        let mut options = OpenOptions::new();
-        let file = if is_stream {
-            options.append(true).open(path)
-        } else {
-            options.write(true).create_new(true).open(&target)
+            let (target, existing) = resolve(path)?;
+            let opened = match existing {
+                None => {
+                    let mut new = OpenOptions::new();
+                    new.write(true)
+                        .create_new(true)
+                        .open(&target)
+                        .map(Sink::New)
+                }
+                Some(metadata) if is_stream(path, &metadata) => {
+                    let device = OpenOptions::new().append(true).open(path);
+                    device.map(Sink::Device)
+                }
+                Some(_) => {
+                    return Err(OutputError::Exists {
+                        path: path.to_path_buf(),
+                    });
+                }
+            };
+            opened.map_err(|source| explain(source, path, &folder_of(&target), 0))?
         };
         Ok(Self {
-            file: file.map_err(|source| explain(source, path, &folder_of(&target), 0))?,
             path: path.to_path_buf(),
-            is_file: !is_stream,
+            sink,
             unwritten: Vec::with_capacity(UNWRITTEN_BYTES),
             since: Instant::now(),
             written: 0,
@@ -95,13 +117,15 @@ impl RecordFile {
     /// are gone.
     pub fn flush(&mut self) -> Result<(), OutputError> {
         let bytes = self.unwritten.len();
-        let written = self.file.write_all(&self.unwritten);
-        if written.is_err() && self.is_file {
-            // What cannot be cut off is a line that no reader takes.
-            let _ = self.file.set_len(self.written);
-            let _ = self.file.seek(std::io::SeekFrom::Start(self.written));
-        } else {
-            self.written += bytes as u64;
+        let written = self.sink.write(&self.unwritten);
+        match (&written, &mut self.sink) {
+            (Ok(()), _) => self.written += bytes as u64,
+            (Err(_), Sink::New(file)) => {
+                // A part of a line that cannot be cut off is one that `import` names.
+                let _ = file.set_len(self.written);
+                let _ = file.seek(SeekFrom::Start(self.written));
+            }
+            (Err(_), _) => {}
         }
         self.unwritten.clear();
         written.map_err(|source| explain(source, &self.path, &folder_of(&self.path), bytes))
@@ -113,16 +137,17 @@ impl RecordFile {
     /// As [`flush`](Self::flush).
     pub fn finish(&mut self) -> Result<(), OutputError> {
         self.flush()?;
-        if !self.is_file {
-            return Ok(());
+        match &self.sink {
+            Sink::New(file) => file
+                .sync_all()
+                .map_err(|source| explain(source, &self.path, &folder_of(&self.path), 0)),
+            Sink::Device(_) | Sink::Standard(_) => Ok(()),
         }
-        let synced = self.file.sync_all();
-        synced.map_err(|source| explain(source, &self.path, &folder_of(&self.path), 0))
     }
 
     /// Removes the file.
     pub fn discard(self) {
-        if self.is_file {
+        if let Sink::New(_) = self.sink {
             let _ = std::fs::remove_file(end_of_links(&self.path));
         }
     }
