@@ -12,6 +12,7 @@
 pub(crate) mod cell;
 mod decimal;
 mod error;
+mod gathered;
 pub(crate) mod guess;
 pub(crate) mod header;
 pub mod layout;
@@ -31,9 +32,10 @@ pub use cell::CellFault;
 pub use error::{CellPlace, LogError};
 pub use warning::{LogWarning, SkipReason};
 
-use crate::input::dataset::{Dataset, LogSource, Row};
+use crate::input::dataset::{Dataset, FIT_ROWS_MAX, LogSource};
 use crate::input::source;
 use crate::input::stage::Stage;
+use gathered::Gathered;
 use sha2::{Digest, Sha256};
 use std::path::Path;
 use table::Table;
@@ -68,7 +70,7 @@ pub enum ReferenceUse {
     IfPresent,
 }
 
-/// How to read logs. The default is that of `fit`.
+/// How to read logs. The default refuses what is wrong, needs the reference and holds all rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReadOptions {
     /// What to do with bad rows.
@@ -80,15 +82,28 @@ pub struct ReadOptions {
     /// Length of the movements of logs that have no column for them, s; without it they end at gaps
     /// alone.
     pub split_s: Option<f64>,
+    /// Most rows that are held; of more the dataset is an excerpt, and the whole is held compactly
+    /// beside it. All are held if `None`.
+    pub rows_max: Option<usize>,
 }
 
 impl ReadOptions {
+    /// For `fit`: of a long log an excerpt.
+    pub const FIT: Self = Self {
+        bad_rows: BadRows::Refuse,
+        saturated: SaturatedCodes::Bad,
+        reference: ReferenceUse::Required,
+        split_s: None,
+        rows_max: Some(FIT_ROWS_MAX),
+    };
+
     /// For `decode`: saturated rows are kept, a reference is not needed.
     pub const DECODE: Self = Self {
         bad_rows: BadRows::Refuse,
         saturated: SaturatedCodes::Keep,
         reference: ReferenceUse::IfPresent,
         split_s: None,
+        rows_max: None,
     };
 }
 
@@ -116,20 +131,21 @@ pub fn read<P: AsRef<Path>>(
         return Err(LogError::NoLog);
     }
     let mut reading = LogReading::default();
+    let mut gathered = Gathered::new(stage, options.rows_max);
     let mut hash = Sha256::new();
     for path in paths {
         let path = path.as_ref();
         let text = source::read_text(path)?;
         hash.update(&text);
         append(
-            &mut reading,
+            (&mut reading, &mut gathered),
             source::shown_name(path),
             &text,
             stage,
             options,
         )?;
     }
-    reading.dataset.sha256 = hash.finalize().into();
+    reading.dataset = gathered.into_dataset(hash.finalize().into(), &mut reading.warnings);
     Ok(reading)
 }
 
@@ -145,13 +161,15 @@ pub fn read_bytes(
 ) -> Result<LogReading, LogError> {
     let text = source::unpack_text(bytes.into(), path)?;
     let mut reading = LogReading::default();
-    append(&mut reading, path, &text, stage, options)?;
-    reading.dataset.sha256 = Sha256::digest(&text).into();
+    let mut gathered = Gathered::new(stage, options.rows_max);
+    append((&mut reading, &mut gathered), path, &text, stage, options)?;
+    let sha256 = Sha256::digest(&text).into();
+    reading.dataset = gathered.into_dataset(sha256, &mut reading.warnings);
     Ok(reading)
 }
 
 fn append(
-    reading: &mut LogReading,
+    (reading, gathered): (&mut LogReading, &mut Gathered),
     path: &Path,
     text: &[u8],
     stage: &Stage,
@@ -159,21 +177,19 @@ fn append(
 ) -> Result<(), LogError> {
     let text = source::to_utf8(text, path)?;
     let table = Table::open(path, &text, |name| stage.log.knows(name))?;
-    let (dataset, warnings) = (&mut reading.dataset, &mut reading.warnings);
-    reading.skipped_rows += reader::append(table, stage, options, dataset, warnings)?;
-    refuse_repeated_log(&reading.dataset)
+    let warnings = &mut reading.warnings;
+    reading.skipped_rows += reader::append(table, stage, options, gathered, warnings)?;
+    refuse_repeated_log(gathered)
 }
 
 /// Refuses the last log if an earlier one holds the same rows.
-fn refuse_repeated_log(dataset: &Dataset) -> Result<(), LogError> {
-    let Some((last, earlier)) = dataset.logs.split_last() else {
+fn refuse_repeated_log(gathered: &Gathered) -> Result<(), LogError> {
+    let Some((last, earlier)) = gathered.logs.split_last() else {
         return Ok(());
     };
-    let rows = |source: &LogSource| dataset.rows.get(source.rows.clone()).unwrap_or_default();
-    let same = |a: &Row, b: &Row| (a.t_us, a.frame, a.reference) == (b.t_us, b.frame, b.reference);
+    let samples = |source: &LogSource| gathered.samples_of(source.rows.clone());
     let repeats = |first: &&LogSource| {
-        let (first, last) = (rows(first), rows(last));
-        first.len() == last.len() && first.iter().zip(last).all(|(a, b)| same(a, b))
+        first.rows.len() == last.rows.len() && samples(first).eq(samples(last))
     };
     match earlier.iter().find(repeats) {
         None => Ok(()),

@@ -8,3 +8,4 @@ pub mod log;
 pub mod shipped;
 pub mod source;
 pub mod stage;
+pub mod whole;

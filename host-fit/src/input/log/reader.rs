@@ -1,16 +1,16 @@
 //! One log into the dataset: header, rows in order, bad rows refused or left out.
 
 use super::error::LogError;
+use super::gathered::Gathered;
 use super::header::{self, Columns, ReferenceSource};
 use super::order::{Order, OrderFault};
 use super::rows::{BadCell, RowReader};
-use super::sequence;
 use super::skipped::Skipped;
 use super::split::Steps;
 use super::table::Table;
 use super::warning::LogWarning;
 use super::{BadRows, ReadOptions, SaturatedCodes};
-use crate::input::dataset::{Dataset, LogSource, Movement};
+use crate::input::dataset::{LogSource, Movement};
 use crate::input::stage::Stage;
 use crate::progress::Progress;
 
@@ -21,14 +21,14 @@ const BETWEEN_CODES: f64 = 0.15;
 /// Rows from one step of the progress to the next.
 const ROWS_A_STEP: usize = 4096;
 
-/// One log on its way into the dataset.
+/// One log on its way to the rows of all.
 struct LogReader<'a> {
     columns: &'a Columns,
     rows: RowReader<'a>,
     bad_rows: BadRows,
     /// Which log this is.
     log: usize,
-    /// Its first movement in the dataset.
+    /// Its first movement among those of all logs.
     first_movement: usize,
     order: Order,
     /// Of a log without a column for the movement.
@@ -38,13 +38,13 @@ struct LogReader<'a> {
     skipped: Skipped,
 }
 
-/// Adds the log to `dataset`; what is odd about it goes to `warnings`. Gives the number of
+/// Adds the log to `gathered`; what is odd about it goes to `warnings`. Gives the number of
 /// rows that were left out.
 pub(super) fn append(
     mut table: Table<'_>,
     stage: &Stage,
     options: &ReadOptions,
-    dataset: &mut Dataset,
+    gathered: &mut Gathered,
     warnings: &mut Vec<LogWarning>,
 ) -> Result<usize, LogError> {
     let columns = header::columns(&table, &stage.log, options.reference)?;
@@ -53,12 +53,12 @@ pub(super) fn append(
             path: table.path.to_path_buf(),
         });
     }
-    let (first_row, first_movement) = (dataset.rows.len(), dataset.movements.len());
+    let (first_row, first_movement) = (gathered.len(), gathered.movements.len());
     let mut reader = LogReader {
         columns: &columns,
         rows: RowReader::new(&columns, stage, options.saturated == SaturatedCodes::Keep),
         bad_rows: options.bad_rows,
-        log: dataset.logs.len(),
+        log: gathered.logs.len(),
         first_movement,
         order: Order::default(),
         steps: Steps::default(),
@@ -67,8 +67,8 @@ pub(super) fn append(
     };
     let progress = Progress::new("reading", table.bytes());
     while table.next_row()? {
-        reader.take(&table, dataset)?;
-        if dataset.rows.len().is_multiple_of(ROWS_A_STEP) {
+        reader.take(&table, gathered)?;
+        if gathered.len().is_multiple_of(ROWS_A_STEP) {
             progress.reach(table.row_byte());
         }
     }
@@ -76,21 +76,21 @@ pub(super) fn append(
     let between_codes = reader.rows.mean_between_codes();
     let (skipped, steps) = (reader.skipped, reader.steps);
     let skipped_rows = skipped.rows();
-    if dataset.rows.len() == first_row {
+    if gathered.len() == first_row {
         return Err(skipped.nothing_left(table.path, table.header_line()));
     }
     if columns.movement.is_none() {
         let length_us = options
             .split_s
             .map(|seconds| (seconds * 1e6).round() as i64);
-        steps.split(dataset, first_movement, length_us);
+        steps.split(gathered, first_movement, length_us);
     }
     let source = LogSource {
         path: table.path.to_path_buf(),
-        rows: first_row..dataset.rows.len(),
+        rows: first_row..gathered.len(),
         has_reference: !matches!(columns.reference, ReferenceSource::Absent),
     };
-    let movements = dataset.movements.get(first_movement..).unwrap_or_default();
+    let movements = gathered.movements.get(first_movement..).unwrap_or_default();
     if table.is_open() {
         warnings.push(LogWarning::NoFinalLineBreak {
             path: source.path.clone(),
@@ -115,20 +115,13 @@ pub(super) fn append(
             others: single.count(),
         });
     }
-    sequence::number(
-        &mut dataset.rows,
-        movements,
-        &source,
-        stage.servo_period_s,
-        warnings,
-    );
-    dataset.logs.push(source);
+    gathered.end(source, first_movement, warnings);
     Ok(skipped_rows)
 }
 
 impl LogReader<'_> {
-    /// Adds the row in hand to the dataset, or leaves it out.
-    fn take(&mut self, table: &Table<'_>, dataset: &mut Dataset) -> Result<(), LogError> {
+    /// Adds the row in hand, or leaves it out.
+    fn take(&mut self, table: &Table<'_>, gathered: &mut Gathered) -> Result<(), LogError> {
         let named = match self.rows.movement(table) {
             Ok(movement) => movement,
             Err(bad) => return self.bad(bad, None, table),
@@ -144,11 +137,11 @@ impl LogReader<'_> {
         self.order
             .take(movement, t_us, table.row_byte())
             .map_err(|fault| self.out_of_order(fault, named, t_us, table))?;
-        let own = dataset.movements.get(self.first_movement..);
+        let own = gathered.movements.get(self.first_movement..);
         let begins = own
             .and_then(<[_]>::last)
             .is_none_or(|last| last.index != movement);
-        let slot = dataset.movements.len() - usize::from(!begins);
+        let slot = gathered.movements.len() - usize::from(!begins);
         let row = match self.rows.row(table, slot, t_us) {
             Ok(row) => row,
             Err(bad) => return self.bad(bad, named, table),
@@ -156,11 +149,11 @@ impl LogReader<'_> {
         if named.is_none() {
             self.steps.keep();
         }
-        let start = dataset.rows.len();
-        dataset.rows.push(row);
-        match dataset.movements.last_mut() {
+        let start = gathered.len();
+        gathered.push(row);
+        match gathered.movements.last_mut() {
             Some(last) if !begins => last.rows.end = start + 1,
-            _ => dataset.movements.push(Movement {
+            _ => gathered.movements.push(Movement {
                 log: self.log,
                 index: movement,
                 rows: start..start + 1,

@@ -4,7 +4,8 @@
 //! [`GAP_PERIODS`] of the log's own periods (its median step), or, where the user asks for it,
 //! after a given time.
 
-use crate::input::dataset::{Dataset, Movement};
+use super::gathered::Gathered;
+use crate::input::dataset::Movement;
 
 /// Longest gap within a movement, in periods of the log: longer than what a busy computer loses
 /// now and then, shorter than it takes to reset an interferometer.
@@ -61,11 +62,11 @@ impl Steps {
     /// movements that the times tell, of at most `length_us` each.
     pub(super) fn split(
         self,
-        dataset: &mut Dataset,
+        gathered: &mut Gathered,
         first_movement: usize,
         length_us: Option<i64>,
     ) {
-        let Some(first) = dataset.movements.get(first_movement) else {
+        let Some(first) = gathered.movements.get(first_movement) else {
             return;
         };
         let (log, first_row) = (first.log, first.rows.start);
@@ -76,25 +77,27 @@ impl Steps {
             false => *known.select_nth_unstable(middle).1,
         };
         let gap_us = period_us.saturating_mul(GAP_PERIODS);
-        dataset.movements.truncate(first_movement);
+        let mut movements: Vec<Movement> = Vec::new();
         let mut start_us = 0;
-        let rows = dataset.rows.get_mut(first_row..).unwrap_or_default();
-        for ((at, row), step) in (first_row..).zip(rows).zip(self.steps_us) {
+        let samples = gathered.samples_of(first_row..gathered.len());
+        for ((at, sample), step) in (first_row..).zip(samples).zip(self.steps_us) {
             // Half a period early is on time: steps jitter.
-            let ends = |length_us| row.t_us - start_us >= length_us - period_us / 2;
+            let ends = |length_us| sample.t_us - start_us >= length_us - period_us / 2;
             let begins = step.is_none_or(|step| step > gap_us) || length_us.is_some_and(ends);
-            match dataset.movements.last_mut() {
-                Some(last) if !begins && last.log == log => last.rows.end = at + 1,
+            match movements.last_mut() {
+                Some(last) if !begins => last.rows.end = at + 1,
                 _ => {
-                    start_us = row.t_us;
-                    dataset.movements.push(Movement {
+                    start_us = sample.t_us;
+                    movements.push(Movement {
                         log,
-                        index: (dataset.movements.len() - first_movement) as i64,
+                        index: movements.len() as i64,
                         rows: at..at + 1,
                     });
                 }
             }
-            row.movement = dataset.movements.len() - 1;
         }
+        gathered.movements.truncate(first_movement);
+        gathered.movements.extend(movements);
+        gathered.name_movements(first_movement..gathered.movements.len());
     }
 }
