@@ -10,3 +10,4 @@ pub mod source;
 pub mod stage;
 pub(crate) mod text;
 mod unpack;
+pub mod whole;

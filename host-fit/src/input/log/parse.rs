@@ -7,7 +7,7 @@ use super::error::LogError;
 use super::rows::{BadCell, BetweenCodes, RowReader};
 use super::table::{Head, pointed};
 use super::time::Clock;
-use crate::input::dataset::Row;
+use crate::input::whole::chunk::Sample;
 
 /// A row of a log, with what is asked for of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +63,7 @@ pub(super) fn parse<T>(
     head: &Head,
     mut reader: RowReader<'_>,
     bad_rows: BadRows,
-    make: impl Fn(&Row) -> T,
+    make: impl Fn(&Sample) -> T,
 ) -> Parsed<T> {
     let mut rows = Vec::with_capacity(block.text.len() / ROW_BYTES);
     let (mut bad_found, mut open_line, mut fault) = (Vec::new(), None, None);
@@ -86,11 +86,11 @@ pub(super) fn parse<T>(
             movement = reader.movement(&cells)?;
             let time_us = reader.t_us(&cells)?;
             t_us = Some(time_us);
-            let row = reader.row(&cells, time_us)?;
+            let sample = reader.sample(&cells, time_us)?;
             Ok(LogRow {
                 movement: movement.unwrap_or(0),
                 t_us: time_us,
-                item: make(&row),
+                item: make(&sample),
                 sequence: 0,
                 begins: false,
                 line: (line - block.line) as u32,

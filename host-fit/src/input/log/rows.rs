@@ -1,13 +1,11 @@
-//! One row of a log, from cells to SI units.
+//! One row of a log, from cells to codes and SI units.
 
 use super::cell::{self, CellFault, Code};
 use super::header::{Columns, ReferenceSource, Source, VerticalSource};
 use super::line::Line;
 use super::time::Clock;
-use crate::input::dataset::{LoggedFrame, Row};
 use crate::input::stage::{CodeScale, Stage};
-use runtime::capacitive::{vertical_pose, vertical_rows};
-use runtime::{RawFrame, VerticalPose};
+use crate::input::whole::chunk::{Sample, SampledVertical};
 
 /// Largest sensible rotation, rad: the models are linear in rotations.
 const ROTATION_MAX_RAD: f64 = 0.1;
@@ -27,7 +25,6 @@ pub(super) struct RowReader<'a> {
     columns: &'a Columns,
     hall: &'a CodeScale,
     capacitive: &'a CodeScale,
-    vertical_rows: [[f64; 3]; 3],
     y_baseline_m: f64,
     displacement_max_m: f64,
     height_max_m: f64,
@@ -69,8 +66,6 @@ impl<'a> RowReader<'a> {
             columns,
             hall: &stage.hall,
             capacitive: &stage.capacitive,
-            // A checked stage has its sensors in a triangle.
-            vertical_rows: vertical_rows(&stage.capacitive_probes_m).unwrap_or_default(),
             y_baseline_m: stage.y_baseline_m,
             displacement_max_m: FULL_SCALES * full_scale_m(&stage.hall),
             height_max_m: FULL_SCALES * full_scale_m(&stage.capacitive),
@@ -98,43 +93,24 @@ impl<'a> RowReader<'a> {
             .map_err(|fault| BadCell { cell, fault })
     }
 
-    /// The row at `t_us`; its movement and its sequence number are still 0.
-    pub(super) fn row(&mut self, line: &Line<'_>, t_us: i64) -> Result<Row, BadCell> {
+    /// The sample of a row at `t_us`.
+    #[inline]
+    pub(super) fn sample(&mut self, line: &Line<'_>, t_us: i64) -> Result<Sample, BadCell> {
         let hall = self.codes(line, &self.columns.hall, self.hall)?;
-        let time_us = t_us as u32;
         let columns = self.columns;
-        let (frame, vertical) = match &columns.vertical {
+        let vertical = match &columns.vertical {
             VerticalSource::Codes(sources) => {
-                let capacitive = self.codes(line, sources, self.capacitive)?;
-                let gaps_m = capacitive.map(|code| f64::from(code) * self.capacitive.m_per_count);
-                let frame = LoggedFrame::Codes(RawFrame {
-                    hall,
-                    capacitive,
-                    sequence: 0,
-                    time_us,
-                });
-                (frame, vertical_pose(&self.vertical_rows, gaps_m).to_array())
+                SampledVertical::Codes(self.codes(line, sources, self.capacitive)?)
             }
-            VerticalSource::Pose([z, rx, ry]) => {
-                let vertical = [
-                    scaled(line, z, self.height_max_m, "m")?,
-                    scaled(line, rx, ROTATION_MAX_RAD, "rad")?,
-                    scaled(line, ry, ROTATION_MAX_RAD, "rad")?,
-                ];
-                let frame = LoggedFrame::HallCodes {
-                    hall,
-                    vertical: VerticalPose::from_array(vertical.map(|x| x as f32)),
-                    sequence: 0,
-                    time_us,
-                };
-                (frame, vertical)
-            }
+            VerticalSource::Pose([z, rx, ry]) => SampledVertical::Pose([
+                scaled(line, z, self.height_max_m, "m")?,
+                scaled(line, rx, ROTATION_MAX_RAD, "rad")?,
+                scaled(line, ry, ROTATION_MAX_RAD, "rad")?,
+            ]),
         };
-        Ok(Row {
-            movement: 0,
+        Ok(Sample {
             t_us,
-            frame,
-            signal_m: hall.map(|code| f64::from(code) * self.hall.m_per_count),
+            hall,
             vertical,
             reference: self.reference(line)?,
         })

@@ -1,6 +1,7 @@
 //! Numbers the servo periods of a log by time, so that a gap shows as frames missed.
 
 use super::warning::LogWarning;
+use crate::input::dataset::{Movement, Row};
 use std::path::Path;
 
 /// Largest relative difference of the log's period from the servo's that passes in silence.
@@ -58,5 +59,29 @@ impl Numbering {
             log_us: self.period_us as i64,
             servo_us: self.servo_us,
         })
+    }
+}
+
+/// Numbers the rows of these movements of one log.
+pub(super) fn number<'m>(
+    rows: &mut [Row],
+    movements: impl Iterator<Item = &'m Movement> + Clone,
+    servo_period_s: f64,
+) {
+    let mut steps_us: Vec<i64> = Vec::with_capacity(rows.len());
+    for movement in movements.clone() {
+        let rows = rows.get(movement.rows.clone()).unwrap_or_default();
+        steps_us.extend(rows.windows(2).filter_map(|pair| match pair {
+            [before, row] => Some(row.t_us - before.t_us),
+            _ => None,
+        }));
+    }
+    let mut numbering = Numbering::new(steps_us, servo_period_s);
+    for movement in movements {
+        let rows = rows.get_mut(movement.rows.clone()).unwrap_or_default();
+        for (at, row) in rows.iter_mut().enumerate() {
+            let sequence = numbering.number(row.t_us, at == 0);
+            row.frame = row.frame.with_sequence(sequence);
+        }
     }
 }

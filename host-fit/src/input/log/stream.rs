@@ -10,9 +10,9 @@ use super::stitch::Stitcher;
 use super::table::Head;
 use super::warning::LogWarning;
 use super::{ReadOptions, SaturatedCodes};
-use crate::input::dataset::Row;
 use crate::input::stage::Stage;
 use crate::input::text::TextReader;
+use crate::input::whole::chunk::Sample;
 use crate::progress::Progress;
 use rayon::prelude::*;
 use sha2::Sha256;
@@ -49,8 +49,7 @@ pub struct LogEnd {
 }
 
 /// Reads a log from its start to its end: `make` tells what is wanted of each row, on any core, and
-/// `take` gets it row after row. In what `make` sees, movement and sequence number are 0. `what` is
-/// being done, for the progress.
+/// `take` gets it row after row. `what` is being done, for the progress.
 ///
 /// Memory does not grow with the log, other than by some bytes for each movement.
 ///
@@ -62,7 +61,7 @@ pub fn stream<T: Send, E: From<LogError>>(
     what: &'static str,
     stage: &Stage,
     options: &ReadOptions,
-    make: impl Fn(&Row) -> T + Sync,
+    make: impl Fn(&Sample) -> T + Sync,
     take: impl FnMut(Batch<T>) -> Result<(), E>,
 ) -> Result<LogEnd, E> {
     let text = TextReader::open(path).map_err(LogError::from)?;
@@ -75,7 +74,7 @@ pub(super) fn stream_text<T: Send, E: From<LogError>>(
     what: &'static str,
     stage: &Stage,
     options: &ReadOptions,
-    make: impl Fn(&Row) -> T + Sync,
+    make: impl Fn(&Sample) -> T + Sync,
     mut take: impl FnMut(Batch<T>) -> Result<(), E>,
 ) -> Result<LogEnd, E> {
     let path = text.path().to_path_buf();

@@ -160,6 +160,18 @@ pub enum LogWarning {
         /// Servo period of `stage.toml`, us.
         servo_us: f64,
     },
+    /// There are more rows than a fit needs.
+    #[error(
+        "fit and diagnosis use {taken} of {rows} rows, in {runs} runs taken where the motion tells most; the errors of the fit are over all rows"
+    )]
+    Excerpt {
+        /// Rows of the logs.
+        rows: usize,
+        /// Rows of the excerpt.
+        taken: usize,
+        /// Runs of rows that follow each other.
+        runs: usize,
+    },
 }
 
 impl LogWarning {
