@@ -31,9 +31,17 @@ fuzz_target!(|data: &[u8]| {
         (codes(window.high, window.low), codes(gaps.high, gaps.low)),
         ([i32::MIN; 3], [i32::MAX; 3]),
     ] {
-        let frame = RawFrame { hall, capacitive, sequence: 0, time_us: 0 };
+        let frame = RawFrame {
+            hall,
+            capacitive,
+            sequence: 0,
+            time_us: 0,
+        };
         let reading = decoder.decode(&frame, &PlanarPose::ZERO);
-        let (q, v) = (reading.pose.planar.to_array(), reading.pose.vertical.to_array());
+        let (q, v) = (
+            reading.pose.planar.to_array(),
+            reading.pose.vertical.to_array(),
+        );
         assert!(q.iter().chain(&v).all(|x| x.is_finite()));
         assert!(reading.planar().is_some() || q == [0.0; 3]);
         assert!(reading.vertical().is_some() || v == [0.0; 3]);

@@ -8,7 +8,10 @@ use std::sync::LazyLock;
 
 static FOLDER: LazyLock<Folder> = LazyLock::new(|| {
     let folder = Folder::new();
-    folder.write("reference", include_bytes!("../../seeds/reference/beams.csv"));
+    folder.write(
+        "reference",
+        include_bytes!("../../seeds/reference/beams.csv"),
+    );
     folder
 });
 

@@ -16,8 +16,14 @@ fn run(command: &str, output: &str) -> bool {
 
 fuzz_target!(|log: &[u8]| {
     FOLDER.write("log", log);
-    run("fit @log --stage @stage.toml --out @fit.bin --model 30 --solver lm --bad-rows skip --threads 1", "fit.bin");
-    if run("decode @params.bin @log --stage @stage.toml --out @pose.csv --hold 3", "pose.csv") {
+    run(
+        "fit @log --stage @stage.toml --out @fit.bin --model 30 --solver lm --bad-rows skip --threads 1",
+        "fit.bin",
+    );
+    if run(
+        "decode @params.bin @log --stage @stage.toml --out @pose.csv --hold 3",
+        "pose.csv",
+    ) {
         run("eval @params.bin @log --stage @stage.toml", "");
     }
 });

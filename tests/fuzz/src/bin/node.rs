@@ -6,7 +6,9 @@
 use fuzz::PARAMS;
 use fuzz::bus::{Numbers, Step, steps};
 use hal_adapters::can::command::{Mailbox, Request};
-use hal_adapters::can::{BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing};
+use hal_adapters::can::{
+    BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing,
+};
 use libfuzzer_sys::fuzz_target;
 use runtime::{OnInvalid, ParameterSet, Predictor, Reading, Servo};
 use std::sync::LazyLock;
@@ -15,16 +17,33 @@ static SET: LazyLock<ParameterSet> =
     LazyLock::new(|| ParameterSet::from_bytes(PARAMS).expect("the blob of the examples"));
 
 fn is_sound(reading: &Reading) {
-    let (q, v) = (reading.pose.planar.to_array(), reading.pose.vertical.to_array());
+    let (q, v) = (
+        reading.pose.planar.to_array(),
+        reading.pose.vertical.to_array(),
+    );
     assert!(q.iter().chain(&v).all(|x| x.is_finite()), "{reading:?}");
-    assert!(reading.planar_or_held().is_some() || q == [0.0; 3], "{reading:?}");
+    assert!(
+        reading.planar_or_held().is_some() || q == [0.0; 3],
+        "{reading:?}"
+    );
 }
 
 fuzz_target!(|data: &[u8]| {
-    let Some((&form, data)) = data.split_first() else { return };
+    let Some((&form, data)) = data.split_first() else {
+        return;
+    };
     let decoder = SET.decoder();
-    let layout = if form & 1 == 0 { Layout::Bits16 } else { Layout::Bits24 };
-    let mut servo = Servo::new(&*decoder, OnInvalid::Hold { ticks: u16::from(form >> 1) });
+    let layout = if form & 1 == 0 {
+        Layout::Bits16
+    } else {
+        Layout::Bits24
+    };
+    let mut servo = Servo::new(
+        &*decoder,
+        OnInvalid::Hold {
+            ticks: u16::from(form >> 1),
+        },
+    );
     let mut sensors = SensorReceiver::new(layout, Timing::default());
     let mut poses = PoseReceiver::new(Timing::default());
     let (mut sender, mut service) = (PoseSender::default(), Service::new(500));

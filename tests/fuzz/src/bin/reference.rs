@@ -9,7 +9,10 @@ use std::sync::LazyLock;
 
 static FOLDER: LazyLock<Folder> = LazyLock::new(|| {
     let folder = Folder::new();
-    folder.write("bus", include_bytes!("../../../../hal-adapters/examples/data/bus.log"));
+    folder.write(
+        "bus",
+        include_bytes!("../../../../hal-adapters/examples/data/bus.log"),
+    );
     folder
 });
 

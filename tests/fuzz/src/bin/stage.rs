@@ -20,7 +20,10 @@ fuzz_target!(|text: &str| {
         Err(error) => {
             let message = error.to_string();
             assert!(message.starts_with("stage.toml:"), "{message}");
-            assert!(message.contains([';', ',']) || message.contains("TOML"), "{message}");
+            assert!(
+                message.contains([';', ',']) || message.contains("TOML"),
+                "{message}"
+            );
         }
     }
 });

@@ -56,11 +56,19 @@ impl Bench {
             }
             2 => (a..=a.saturating_add(b)).for_each(|index| {
                 let word = word_of(&NEW, index.into()).unwrap_or_default();
-                let data = UpdateData { token: 0, index, word };
+                let data = UpdateData {
+                    token: 0,
+                    index,
+                    word,
+                };
                 self.take(Message::UpdateData, data.payload());
             }),
             3 => {
-                let data = UpdateData { token, index: a, word: u32::from(b) };
+                let data = UpdateData {
+                    token,
+                    index: a,
+                    word: u32::from(b),
+                };
                 self.take(Message::UpdateData, data.payload());
             }
             4 => self.ask(ask(UpdateRequest::Verify { sequence }), token),
@@ -70,7 +78,12 @@ impl Bench {
             8 => self.ask(ask(UpdateRequest::Challenge { part: a }), token),
             9 => self.ask(ask(UpdateRequest::ReadBack { index: a }), token),
             10 => self.ask(ask(UpdateRequest::Tell { page: a }), token),
-            11 => self.ask(ask(UpdateRequest::Begin { bytes: u16::from_le_bytes([a, b]) }), 0),
+            11 => self.ask(
+                ask(UpdateRequest::Begin {
+                    bytes: u16::from_le_bytes([a, b]),
+                }),
+                0,
+            ),
             12 => {
                 let frame = BusFrame::new(Message::Command.id(), &[kind, a, b, 0, a, b, 0, kind]);
                 self.node.take(&frame.expect("eight bytes"));
@@ -89,17 +102,25 @@ impl Bench {
 }
 
 fuzz_target!(|data: &[u8]| {
-    let Some((&form, data)) = data.split_first() else { return };
+    let Some((&form, data)) = data.split_first() else {
+        return;
+    };
     let key = (form & 1 == 1).then_some([7; 16]);
     let node = Node::new("HS-0007", key, (SEQUENCE, PARAMS), u64::from(form));
-    let mut bench = Bench { node: node.expect("sound"), numbers: Numbers::default() };
+    let mut bench = Bench {
+        node: node.expect("sound"),
+        numbers: Numbers::default(),
+    };
     let mut newest = SEQUENCE;
     for step in data.as_chunks().0 {
         bench.step(*step);
         let store = &bench.node.store;
         let blob = store.newest().expect("there was one from the start");
         assert!(blob == PARAMS || blob == NEW.as_slice());
-        assert!(key.is_none() || store.writes() == 0, "stored without the key");
+        assert!(
+            key.is_none() || store.writes() == 0,
+            "stored without the key"
+        );
         assert!(store.newest_sequence() - newest <= 1);
         newest = store.newest_sequence();
         assert!(bench.node.status().is_some());
