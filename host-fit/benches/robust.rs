@@ -13,7 +13,7 @@ use host_fit::problem::model::Model;
 use host_fit::solve::Solver;
 use host_fit::solve::robust::Loss;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::rngs::ChaCha8Rng;
 use runtime::ModelKind;
 use std::error::Error;
 use std::io::Read;

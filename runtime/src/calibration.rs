@@ -10,6 +10,7 @@ use crate::parameters::{
     CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
 };
 use crate::real::Number;
+use core::f64::consts::TAU;
 
 /// A calibrated stage: the parameters of one model and the scales that they hold for.
 ///
@@ -96,11 +97,13 @@ impl Calibration {
     ///
     /// # Errors
     /// [`ParameterError::SingularPlane`] when PM has no inverse,
-    /// [`ParameterError::CapacitiveProbesInLine`] when the three gaps define no plane.
+    /// [`ParameterError::CapacitiveProbesInLine`] when the three gaps define no plane, or one that
+    /// the largest codes turn by more than a whole turn.
     pub fn constants(&self) -> Result<DecoderConstants<f64>, ParameterError> {
         let plane = self.geometry.plane_rows();
         let inverse = inverse_rows(&plane).ok_or(ParameterError::SingularPlane)?;
         let vertical = vertical_rows(&self.capacitive_probes_m)
+            .filter(|rows| self.largest_tilt_rad(rows) <= TAU)
             .ok_or(ParameterError::CapacitiveProbesInLine)?;
         Ok(DecoderConstants {
             vertical_per_code: vertical.map(|row| row.map(|x| x * self.capacitive_m_per_code)),
@@ -111,6 +114,14 @@ impl Calibration {
             hall_window: self.hall_window,
             capacitive_window: self.capacitive_window,
         })
+    }
+
+    /// The largest Rx or Ry that codes within the window stand for, rad.
+    fn largest_tilt_rad(&self, [_, rx, ry]: &[[f64; 3]; 3]) -> f64 {
+        let window = &self.capacitive_window;
+        let code = f64::from(window.low.unsigned_abs().max(window.high.unsigned_abs()));
+        let per_m = |[a, b, c]: &[f64; 3]| (a.abs() + b.abs()) + c.abs();
+        per_m(rx).max(per_m(ry)) * (self.capacitive_m_per_code * code)
     }
 
     /// The parameter set for the target: everything computed in `f64`, rounded once to `f32`,

@@ -85,6 +85,10 @@ pub struct FitRecord {
     pub forced: bool,
 }
 
+/// The largest range that a calibration may cover, m or rad. Every model takes rotations for small,
+/// and a pose without a status lies within the range: it never has a larger rotation.
+pub const RANGE_MAX: f32 = 1.0;
+
 /// What is wrong with a parameter set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ParameterError {
@@ -95,7 +99,8 @@ pub enum ParameterError {
     },
     /// PM has no inverse: two probes sense the same motion.
     SingularPlane,
-    /// The three capacitive sensors stand in one line and define no plane.
+    /// The three capacitive sensors stand in one line, or so near each other that their largest
+    /// codes stand for more than a whole turn: they define no plane.
     CapacitiveProbesInLine,
     /// The stored PM^-1 is not the inverse of the stored PM.
     NotTheInverse {
@@ -111,6 +116,11 @@ pub enum ParameterError {
     NotPositive {
         /// Which value.
         value: &'static str,
+    },
+    /// The calibrated range reaches beyond [`RANGE_MAX`].
+    LargeRange {
+        /// How far, m or rad.
+        reach: f32,
     },
     /// phi comes nearer to zero than `sensitivity_min` within the calibrated vertical range.
     PoleInRange {
@@ -138,7 +148,7 @@ impl core::fmt::Display for ParameterError {
                 f.write_str("the plane matrix PM has no inverse: two probes sense the same motion")
             }
             Self::CapacitiveProbesInLine => {
-                f.write_str("the three capacitive sensors stand in one line and define no plane")
+                f.write_str("the three capacitive sensors stand in one line, or nearer to each other than their gaps, and define no plane")
             }
             Self::NotTheInverse { largest } => write!(
                 f,
@@ -151,6 +161,10 @@ impl core::fmt::Display for ParameterError {
                 )
             }
             Self::NotPositive { value } => write!(f, "{value} must be above zero"),
+            Self::LargeRange { reach } => write!(
+                f,
+                "the calibrated range reaches {reach:e} m or rad, more than {RANGE_MAX}"
+            ),
             Self::PoleInRange { probe } => write!(
                 f,
                 "the sensitivity of probe {} comes too near zero within the calibrated range",

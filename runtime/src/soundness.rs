@@ -3,7 +3,7 @@
 use crate::geometry::SensingAxes;
 use crate::layout;
 use crate::model::{FieldProbe, Probes, Sensitivity, dot};
-use crate::parameters::{ParameterError, ParameterSet};
+use crate::parameters::{ParameterError, ParameterSet, RANGE_MAX};
 
 /// Largest element of PM PM^-1 - I that the check accepts: 100 times the rounding of `f32`
 /// for lever arms of decimetres.
@@ -15,8 +15,8 @@ const PRODUCT_TOLERANCE: f32 = 5e-7;
 
 impl ParameterSet {
     /// Checks that every number is finite, PM^-1 inverts PM, each precomputed term follows
-    /// from its parts, scales and limits are above zero, code windows are sound and no phi
-    /// comes near zero within the calibrated range. Of a field model lateral rows must be across
+    /// from its parts, scales and limits are above zero, ranges at most [`RANGE_MAX`], code windows
+    /// sound, and no phi comes near zero within the calibrated range. Of a field model lateral rows must be across
     /// the sensing axes, and the slopes of p below 1 in that range.
     ///
     /// # Errors
@@ -63,6 +63,9 @@ impl ParameterSet {
                 return Err(ParameterError::NotPositive {
                     value: "a calibrated range",
                 });
+            }
+            if *limit > RANGE_MAX {
+                return Err(ParameterError::LargeRange { reach: *limit });
             }
         }
         for (sensors, window) in [

@@ -1,6 +1,7 @@
 //! Tests of what is refused of a parameter set.
 
 use super::*;
+use crate::Calibration;
 use crate::frame::CodeWindow;
 use crate::sample;
 
@@ -133,6 +134,44 @@ fn scales_limits_and_windows_must_make_sense() {
         refused(|set| set.constants.capacitive_window = CodeWindow { low: 5, high: 4 }),
         ParameterError::UnsoundWindow { sensors }
     );
+}
+
+#[test]
+fn no_pose_without_a_status_has_a_large_rotation() {
+    for change in [
+        (|set, rad| set.constants.calibrated_vertical[1] = rad) as fn(&mut ParameterSet, f32),
+        |set, rad| set.constants.calibrated_vertical[2] = rad,
+        |set, rad| set.constants.calibrated_planar[2] = rad,
+    ] {
+        // Without a change of the sensitivity by the tilt there is no pole.
+        let reaching = |rad| {
+            let mut set = sample::parameters();
+            for s in sample::sensitivities(&mut set) {
+                (s.per_rx_rad, s.per_ry_rad) = (0.0, 0.0);
+            }
+            change(&mut set, rad);
+            set.check()
+        };
+        assert_eq!(reaching(1.0), Ok(()));
+        let reach = 1.001;
+        assert_eq!(reaching(reach), Err(ParameterError::LargeRange { reach }));
+    }
+}
+
+#[test]
+fn gaps_that_stand_nearer_to_each_other_than_they_measure_are_refused() {
+    let at = |distance_m| Calibration {
+        capacitive_probes_m: [[0.0, 0.0], [distance_m, 0.0], [0.0, distance_m]],
+        ..sample::calibration()
+    };
+    // Codes of 0.5 mm.
+    assert!(at(1e-3).prepare(&sample::origin()).is_ok());
+    for distance_m in [1e-9, 1e-6, 1e-4] {
+        assert_eq!(
+            at(distance_m).prepare(&sample::origin()),
+            Err(ParameterError::CapacitiveProbesInLine)
+        );
+    }
 }
 
 #[test]

@@ -261,7 +261,7 @@ mod tests {
     use super::*;
     use crate::motion;
     use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
+    use rand::rngs::ChaCha8Rng;
     use runtime::decoder::DecoderConstants;
     use runtime::frame::CodeWindow;
     use runtime::model::Sensitivity;

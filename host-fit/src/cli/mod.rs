@@ -35,6 +35,7 @@ use crate::progress;
 use crate::report::json::Circumstances;
 use clap::{Parser, Subcommand};
 use runtime::ParameterSet;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -114,7 +115,16 @@ const EVAL: ReadOptions = ReadOptions {
 
 /// Parses the command line, runs the command, prints an error if there is one.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    run(Cli::parse())
+}
+
+/// As [`main`], of these arguments, the name of the program first: for programs that run commands
+/// in their own process. Wrong usage is not explained.
+pub fn main_of(arguments: &[&OsStr]) -> ExitCode {
+    Cli::try_parse_from(arguments).map_or_else(|_| ExitCode::from(2), run)
+}
+
+fn run(cli: Cli) -> ExitCode {
     terminal::set_level(i8::from(cli.verbose) - i8::from(cli.quiet));
     if !cli.quiet {
         progress::show();

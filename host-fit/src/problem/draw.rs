@@ -3,7 +3,7 @@
 use crate::input::dataset::Dataset;
 use rand::seq::index;
 use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::rngs::ChaCha8Rng;
 
 /// How rows are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

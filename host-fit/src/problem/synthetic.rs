@@ -5,7 +5,7 @@ use crate::input::dataset::{Dataset, LogSource, LoggedFrame, Movement, Row};
 use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::rngs::ChaCha8Rng;
 use runtime::capacitive::gaps_m;
 use runtime::model::probe_displacement_m;
 use runtime::{PlanarPose, RawFrame, VerticalPose};

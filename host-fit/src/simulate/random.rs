@@ -2,7 +2,7 @@
 //! the cosine of a normal number.
 
 use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::rngs::ChaCha8Rng;
 use std::f64::consts::TAU;
 
 /// What a stream of numbers is for. Streams of one seed are independent of each other.
@@ -18,7 +18,7 @@ pub enum Purpose {
 }
 
 /// A stream of random numbers.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Stream(ChaCha8Rng);
 
 impl Stream {

@@ -6,7 +6,7 @@ use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
 use host_fit::output::pose_file;
 use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
+use rand::rngs::ChaCha8Rng;
 use runtime::blob::MAX_BYTES;
 use runtime::{AnyDecoder, Decode, Decoder, OnInvalid, ParameterSet};
 use std::error::Error;

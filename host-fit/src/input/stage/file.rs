@@ -8,12 +8,13 @@ use super::document::{Document, List};
 use super::error::StageError;
 use super::{CodeScale, Stage, columns, motion, search};
 use crate::input::source;
-use runtime::capacitive::ProbePositions;
+use runtime::capacitive::{ProbePositions, vertical_rows};
 use runtime::frame::{CODE_MAGNITUDE_MAX, CodeWindow};
 use runtime::geometry::ProbeCoordinates;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::path::Path;
 use toml::Spanned;
 
@@ -118,11 +119,12 @@ impl Stage {
         let designed = designed_probes(document, hall)?;
         let scale =
             |m_per_count, code_min, code_max| code_scale(document, m_per_count, code_min, code_max);
+        let capacitive = scale(&gaps.m_per_count, &gaps.code_min, &gaps.code_max)?;
         Ok(Self {
             designed,
             hall: scale(&hall.m_per_count, &hall.code_min, &hall.code_max)?,
-            capacitive_probes_m: capacitive_probes(document, gaps)?,
-            capacitive: scale(&gaps.m_per_count, &gaps.code_min, &gaps.code_max)?,
+            capacitive_probes_m: capacitive_probes(document, gaps, &capacitive)?,
+            capacitive,
             y_baseline_m: document.within(
                 &beams.y_baseline_m,
                 BASELINE_MIN_M,
@@ -202,6 +204,7 @@ fn code_scale(
 fn capacitive_probes(
     document: &Document<'_>,
     gaps: &Capacitive,
+    scale: &CodeScale,
 ) -> Result<ProbePositions<f64>, StageError> {
     let pairs: &[_; 3] = document.exactly(&gaps.probes_m)?;
     let mut probes = [[0.0; 2]; 3];
@@ -219,6 +222,19 @@ fn capacitive_probes(
     if twice_area <= TRIANGLE_MIN * squares.into_iter().fold(0.0, f64::max) {
         let problem = "the three sensors stand in one line and define no plane; give the (x, y) of \
                        three sensors in a triangle";
+        return Err(document.refuse(gaps.probes_m.span(), problem));
+    }
+    let code = scale.window.low.abs().max(scale.window.high.abs());
+    let full_scale_m = scale.m_per_count * f64::from(code);
+    let rotation_rad = |row: [f64; 3]| row.iter().map(|x| x.abs()).sum::<f64>() * full_scale_m;
+    let [_, rx, ry] = vertical_rows(&probes).unwrap_or([[f64::INFINITY; 3]; 3]);
+    let largest_rad = rotation_rad(rx).max(rotation_rad(ry));
+    if largest_rad > TAU {
+        let problem = format!(
+            "the sensors stand so near each other that codes of {full_scale_m:e} m mean a rotation \
+             of {largest_rad:.3e} rad, and rotations are to be small; check the places (m) and \
+             m_per_count"
+        );
         return Err(document.refuse(gaps.probes_m.span(), problem));
     }
     Ok(probes)

@@ -174,6 +174,7 @@ fn what_is_wrong_is_named_with_its_place_its_key_and_a_remedy() {
         ("[0.0, -0.12]", "[0.0, 0.00001]", 14, 12, "capacitive.probes_m", "one line"),
         ("[-0.12, 0.0]", "[0.12, 0.0]", 14, 12, "capacitive.probes_m", "one line"),
         ("[-0.12, 0.0]", "[-12, 0.0]", 14, 27, "capacitive.probes_m[1][0]", "-12 m is outside"),
+        ("[[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]]", "[[0.0, 0.0], [1e-9, 0.0], [0.0, 1e-9]]", 14, 12, "capacitive.probes_m", "1.024e6 rad"),
         ("h2x_m = 0.1975", "h2x_m = -0.1975", 5, 9, "hall.h2x_m", "the same x"),
         // Ranges that are reversed, out of bounds, or exclude the design.
         ("[0.65, 0.85]", "[0.85, 0.65]", 33, 9, "search.eta_b", "reversed"),

@@ -7,7 +7,7 @@ use crate::input::dataset::{Dataset, LogSource, LoggedFrame, Movement, Row};
 use crate::input::shipped::STAGE_TOML;
 use crate::input::stage::Stage;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::rngs::ChaCha8Rng;
 use runtime::RawFrame;
 use std::f64::consts::TAU;
 

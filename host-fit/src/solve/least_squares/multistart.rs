@@ -9,7 +9,7 @@ use crate::problem::zero_deviation::ZeroDeviation;
 use crate::problem::{Group, Problem, TrainRow};
 use crate::solve::{Projection, Solution, SolveError, SolverOptions};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::rngs::ChaCha8Rng;
 use std::time::Duration;
 
 /// Starts besides the designed geometry.

@@ -2,14 +2,14 @@
 //!
 //! The stream's seed is a hash of (seed of the run, generation, phase, individual), so what
 //! an individual draws does not depend on who was worked on before it or on which thread.
-//! The generator is xoshiro256++ (`rand_xoshiro`): its words are the same on every platform
+//! The generator is xoshiro256++: its words are the same on every platform
 //! and for every version of the crate, it starts from a 64-bit seed in a few ns, and it gives
 //! the 192 numbers that a candidate needs in well under 1 us. Nothing comes from the operating system.
 
 use super::normal::{normal_of, normals_of};
 use crate::input::stage::Range;
-use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{Rng, SeedableRng};
 
 /// What an operator draws from. Tests script it.
 pub trait RandomSource {

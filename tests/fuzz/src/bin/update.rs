@@ -1,0 +1,128 @@
+//! Frames into a node that takes new parameters: only a whole blob that was sent is ever stored,
+//! and without the key none.
+
+#![no_main]
+
+use embedded_can::Frame;
+use fuzz::PARAMS;
+use fuzz::bus::Numbers;
+use hal_adapters::can::command::{Command, Request};
+use hal_adapters::can::e2e::Payload;
+use hal_adapters::can::update::{Store, UpdateData, UpdateRequest, word_of};
+use hal_adapters::can::{BusFrame, Message};
+use libfuzzer_sys::fuzz_target;
+use runtime::ParameterSet;
+use runtime::blob::MAX_BYTES;
+use runtime::parameters::Text;
+use std::sync::LazyLock;
+use tests::node::Node;
+
+/// Sequence number of the record that the node begins with.
+const SEQUENCE: u32 = 3;
+
+/// What is sent: other parameters of the same stage.
+static NEW: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let mut set = ParameterSet::from_bytes(PARAMS).expect("the blob of the examples");
+    set.created = Text::try_from("later").expect("short");
+    let mut buffer = [0; MAX_BYTES];
+    set.to_bytes(&mut buffer).expect("room enough").to_vec()
+});
+
+/// A node, and how the frames to it are numbered.
+struct Bench {
+    node: Node,
+    numbers: Numbers,
+}
+
+impl Bench {
+    fn take(&mut self, message: Message, payload: Payload) {
+        let frame = self.numbers.frame(message, payload);
+        self.node.take(&frame);
+    }
+
+    fn ask(&mut self, request: Request, token: u8) {
+        self.take(Message::Command, Command::new(request, token).payload());
+    }
+
+    fn step(&mut self, [kind, a, b]: [u8; 3]) {
+        // Two tokens, two numbers: what no one sends belongs to the target `node`.
+        let (token, sequence) = (b & 1, SEQUENCE + u32::from(a & 3));
+        let ask = |request| Request::Update(request);
+        match kind % 16 {
+            0 => self.ask(Request::ServoOff { seconds: a }, token),
+            1 => {
+                let bytes = if a == 0 { 0 } else { NEW.len() as u16 };
+                self.ask(ask(UpdateRequest::Begin { bytes }), token);
+            }
+            2 => (a..=a.saturating_add(b)).for_each(|index| {
+                let word = word_of(&NEW, index.into()).unwrap_or_default();
+                let data = UpdateData {
+                    token: 0,
+                    index,
+                    word,
+                };
+                self.take(Message::UpdateData, data.payload());
+            }),
+            3 => {
+                let data = UpdateData {
+                    token,
+                    index: a,
+                    word: u32::from(b),
+                };
+                self.take(Message::UpdateData, data.payload());
+            }
+            4 => self.ask(ask(UpdateRequest::Verify { sequence }), token),
+            5 => self.ask(ask(UpdateRequest::Commit { sequence }), token),
+            6 => self.ask(ask(UpdateRequest::Abort), token),
+            7 => self.ask(ask(UpdateRequest::Activate), token),
+            8 => self.ask(ask(UpdateRequest::Challenge { part: a }), token),
+            9 => self.ask(ask(UpdateRequest::ReadBack { index: a }), token),
+            10 => self.ask(ask(UpdateRequest::Tell { page: a }), token),
+            11 => self.ask(
+                ask(UpdateRequest::Begin {
+                    bytes: u16::from_le_bytes([a, b]),
+                }),
+                0,
+            ),
+            12 => {
+                let frame = BusFrame::new(Message::Command.id(), &[kind, a, b, 0, a, b, 0, kind]);
+                self.node.take(&frame.expect("eight bytes"));
+            }
+            13 => self.node.reset(),
+            _ => {
+                for _ in 0..a {
+                    let _ = self.node.tick();
+                }
+            }
+        }
+        if self.node.wants_reset() {
+            self.node.reset();
+        }
+    }
+}
+
+fuzz_target!(|data: &[u8]| {
+    let Some((&form, data)) = data.split_first() else {
+        return;
+    };
+    let key = (form & 1 == 1).then_some([7; 16]);
+    let node = Node::new("HS-0007", key, (SEQUENCE, PARAMS), u64::from(form));
+    let mut bench = Bench {
+        node: node.expect("sound"),
+        numbers: Numbers::default(),
+    };
+    let mut newest = SEQUENCE;
+    for step in data.as_chunks().0 {
+        bench.step(*step);
+        let store = &bench.node.store;
+        let blob = store.newest().expect("there was one from the start");
+        assert!(blob == PARAMS || blob == NEW.as_slice());
+        assert!(
+            key.is_none() || store.writes() == 0,
+            "stored without the key"
+        );
+        assert!(store.newest_sequence() - newest <= 1);
+        newest = store.newest_sequence();
+        assert!(bench.node.status().is_some());
+    }
+});
