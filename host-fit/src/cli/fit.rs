@@ -159,7 +159,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let options = ReadOptions {
         bad_rows: args.bad_rows,
         split_s: args.split,
-        ..ReadOptions::default()
+        ..ReadOptions::FIT
     };
     // Before the work, so that no blob is left without the figures that were asked for.
     output::check_writable(&args.out)?;
@@ -336,7 +336,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
 fn refusal(fit: &Fit, findings: &[Finding], limits: Option<&Limits>) -> Option<String> {
     let refused = diagnose::messages(findings, Severity::Refuse);
     if refused.is_empty() {
-        return limits?.exceeded(&fit.judgement.errors);
+        return limits?.exceeded(fit.errors());
     }
     Some(format!("the log is refused: {refused}"))
 }

@@ -110,6 +110,17 @@ pub(super) fn of_warning(told: &FitWarning) -> Option<Finding> {
             unit: Some(unit),
             ..warning(Code::OutOfRange)
         },
+        FitWarning::RestDiffers {
+            axis,
+            unit,
+            all_micro,
+            ..
+        } => Finding {
+            channel: Some(axis.to_lowercase()),
+            value: Some(*all_micro),
+            unit: Some(unit),
+            ..warning(Code::ModelLacks)
+        },
         FitWarning::Undecoded { rows } => Finding {
             value: Some(*rows as f64),
             unit: Some("rows"),

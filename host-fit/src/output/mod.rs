@@ -9,6 +9,7 @@ mod place;
 pub mod pose_file;
 pub mod posterior_file;
 pub mod record_file;
+pub mod streamed_file;
 mod temporary;
 
 pub use place::{Place, is_standard_output};

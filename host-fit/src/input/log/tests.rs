@@ -8,6 +8,7 @@ mod refuses_files;
 mod skips;
 
 use super::*;
+use crate::input::dataset::Row;
 use crate::input::source::SourceError;
 use crate::input::stage::tests::SOUND;
 use std::io::Write;
