@@ -118,6 +118,8 @@ pub(super) struct FitArgs {
     /// in time.
     #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
     split: Option<f64>,
+    #[command(flatten)]
+    memory: super::args::Memory,
     /// Largest rms errors over all rows; beyond, no blob is written.
     #[arg(long, value_name = "x=1.5um,...")]
     limit: Option<Limits>,
@@ -159,6 +161,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let options = ReadOptions {
         bad_rows: args.bad_rows,
         split_s: args.split,
+        memory_bytes: args.memory.limit_bytes(),
         ..ReadOptions::FIT
     };
     // Before the work, so that no blob is left without the figures that were asked for.
