@@ -97,7 +97,7 @@ impl RecordFile {
         if self.unwritten.is_empty() {
             self.since = Instant::now();
         }
-        // Memory is never full.
+        // Into memory, which does not fail.
         let _ = writeln!(self.unwritten, "{text}");
         if self.unwritten.len() >= UNWRITTEN_BYTES {
             self.flush()?;
