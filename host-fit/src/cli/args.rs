@@ -2,12 +2,13 @@
 
 use crate::compare::Case;
 use crate::input::log::BadRows;
+use crate::input::memory::half_of_the_machine;
 use crate::problem::draw::Draw;
 use crate::solve::robust::Loss;
 use crate::solve::search::kind::SearchKind;
 use crate::solve::{Projection, Solver};
-use clap::ValueEnum;
 use clap::builder::PossibleValue;
+use clap::{Args, ValueEnum};
 use hal_adapters::can::Layout;
 use runtime::OnInvalid;
 use std::str::FromStr;
@@ -26,6 +27,41 @@ impl FromStr for Train {
             (_, Ok(rows)) if rows > 0 => Ok(Self(Some(rows))),
             _ => Err("expected `all` or a number of rows, 1 or more"),
         }
+    }
+}
+
+/// How much memory logs may take.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct Memory {
+    /// Refuse logs that take more memory than this, as 500MB or 2GiB; half of this machine's if not
+    /// given.
+    #[arg(long = "memory", value_name = "SIZE", value_parser = bytes)]
+    memory_bytes: Option<u64>,
+}
+
+impl Memory {
+    /// The limit, bytes; `None` where neither the user nor the system names one.
+    pub(super) fn limit_bytes(self) -> Option<u64> {
+        self.memory_bytes.or_else(half_of_the_machine)
+    }
+}
+
+/// A number of bytes with its unit.
+fn bytes(text: &str) -> Result<u64, &'static str> {
+    const UNITS: [(&str, f64); 7] = [
+        ("kB", 1e3),
+        ("MB", 1e6),
+        ("GB", 1e9),
+        ("KiB", 1024.0),
+        ("MiB", 1_048_576.0),
+        ("GiB", 1_073_741_824.0),
+        ("B", 1.0),
+    ];
+    let with_unit = |(unit, bytes): &(&str, f64)| Some((text.strip_suffix(unit)?, *bytes));
+    let (number, unit) = UNITS.iter().find_map(with_unit).unwrap_or((text, 1.0));
+    match number.trim().parse::<f64>().map(|number| number * unit) {
+        Ok(bytes) if (1.0..1e18).contains(&bytes) => Ok(bytes as u64),
+        _ => Err("expected a size, as 500MB or 2GiB"),
     }
 }
 

@@ -30,6 +30,8 @@ pub(super) struct CheckArgs {
     /// in time.
     #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
     split: Option<f64>,
+    #[command(flatten)]
+    memory: super::args::Memory,
     /// Write what was found as JSON; `-` for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -95,6 +97,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     let stage = Stage::from_file(&args.stage)?;
     let options = ReadOptions {
         split_s: args.split,
+        memory_bytes: args.memory.limit_bytes(),
         ..ReadOptions::FIT
     };
     let log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;

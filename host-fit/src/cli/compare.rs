@@ -33,6 +33,8 @@ pub(super) struct CompareArgs {
     /// in time.
     #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
     split: Option<f64>,
+    #[command(flatten)]
+    memory: super::args::Memory,
     /// Forms of the problem, separated by commas.
     #[arg(
         long,
@@ -85,6 +87,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), HostError> {
     let stage = Stage::from_file(&args.stage)?;
     let options = ReadOptions {
         split_s: args.split,
+        memory_bytes: args.memory.limit_bytes(),
         ..ReadOptions::default()
     };
     let log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;

@@ -118,6 +118,8 @@ pub(super) struct FitArgs {
     /// in time.
     #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
     split: Option<f64>,
+    #[command(flatten)]
+    memory: super::args::Memory,
     /// Largest rms errors over all rows; beyond, no blob is written.
     #[arg(long, value_name = "x=1.5um,...")]
     limit: Option<Limits>,
@@ -159,6 +161,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let options = ReadOptions {
         bad_rows: args.bad_rows,
         split_s: args.split,
+        memory_bytes: args.memory.limit_bytes(),
         ..ReadOptions::FIT
     };
     // Before the work, so that no blob is left without the figures that were asked for.
@@ -247,9 +250,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let refusal = refusal(&fit, &findings, args.limit.as_ref()).or_else(unfinished);
     if let (Some(cause), true, false) = (&refusal, is_interrupted, args.force) {
         return Err(HostError::Interrupted {
-            kept: format!(
-                "nothing was written: {cause}; let it run longer, or take it with --force"
-            ),
+            kept: format!("nothing was written: {cause}. --force writes it all the same"),
         });
     }
     fit.set.fit.forced = refusal.is_some();
@@ -346,7 +347,7 @@ fn unfinished(fit: &Fit, log: &LogReading) -> Option<String> {
     let found = of_fit::unexplained(fit, &log.dataset)?;
     let (rms, unit) = (found.value?, found.unit?);
     Some(format!(
-        "the best so far has errors of {rms:.1} {unit} rms, more than {} times the noise from sample to sample",
+        "the best so far has errors of {rms:.1} {unit} rms, more than {} times the noise from sample to sample: let it run longer",
         of_fit::ERROR_TO_NOISE_MAX
     ))
 }

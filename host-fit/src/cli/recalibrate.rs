@@ -59,6 +59,8 @@ pub(super) struct RecalibrateArgs {
     /// in time.
     #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
     split: Option<f64>,
+    #[command(flatten)]
+    memory: super::args::Memory,
     /// Creation time, for the blob, as you want it to read; at most 32 bytes.
     #[arg(long, value_name = "TIME", value_parser = super::fit::blob_text)]
     created: Option<Text>,
@@ -143,6 +145,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     };
     let options = ReadOptions {
         split_s: args.split,
+        memory_bytes: args.memory.limit_bytes(),
         ..ReadOptions::default()
     };
     let log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;

@@ -92,6 +92,8 @@ pub struct ReadOptions {
     /// Most rows that are held; of more the dataset is an excerpt, and the whole is held compactly
     /// beside it. All are held if `None`.
     pub rows_max: Option<usize>,
+    /// Most memory that what is held of the logs may take, bytes; any if `None`.
+    pub memory_bytes: Option<u64>,
 }
 
 impl ReadOptions {
@@ -102,6 +104,7 @@ impl ReadOptions {
         reference: ReferenceUse::Required,
         split_s: None,
         rows_max: Some(FIT_ROWS_MAX),
+        memory_bytes: None,
     };
 
     /// For `decode`: saturated rows are kept, a reference is not needed.
@@ -111,6 +114,7 @@ impl ReadOptions {
         reference: ReferenceUse::IfPresent,
         split_s: None,
         rows_max: None,
+        memory_bytes: None,
     };
 }
 

@@ -5,6 +5,7 @@ pub mod dataset;
 pub mod draft;
 mod encoding;
 pub mod log;
+pub mod memory;
 pub mod shipped;
 pub mod source;
 pub mod stage;

@@ -22,6 +22,12 @@ impl Samples {
         self.ends.last().copied().unwrap_or(0)
     }
 
+    /// The memory that they take, bytes, where the last chunk is like the others.
+    pub fn bytes(&self) -> u64 {
+        let row = self.chunks.last().map_or(0, Chunk::row_bytes);
+        (self.chunks.capacity() * size_of::<Chunk>() + self.len() * row) as u64
+    }
+
     /// Whether there are none.
     pub const fn is_empty(&self) -> bool {
         self.ends.is_empty()

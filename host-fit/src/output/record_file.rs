@@ -4,7 +4,7 @@ use super::{
     OutputError, end_of_links, explain, folder_of, is_stream, names_standard_output, resolve,
 };
 use std::fs::{File, OpenOptions};
-use std::io::{Seek, SeekFrom, Stdout, Write};
+use std::io::{Stdout, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -25,6 +25,8 @@ pub struct RecordFile {
     since: Instant,
     /// Bytes of the lines in the file.
     written: u64,
+    /// Whether a line is lost, so that none may follow.
+    has_ended: bool,
 }
 
 #[derive(Debug)]
@@ -80,18 +82,22 @@ impl RecordFile {
             unwritten: Vec::with_capacity(UNWRITTEN_BYTES),
             since: Instant::now(),
             written: 0,
+            has_ended: false,
         })
     }
 
-    /// Adds a line.
+    /// Adds a line, unless one before it is lost.
     ///
     /// # Errors
     /// As [`flush`](Self::flush).
     pub fn line(&mut self, text: impl std::fmt::Display) -> Result<(), OutputError> {
+        if self.has_ended {
+            return Ok(());
+        }
         if self.unwritten.is_empty() {
             self.since = Instant::now();
         }
-        // Memory is never full.
+        // Into memory, which does not fail.
         let _ = writeln!(self.unwritten, "{text}");
         if self.unwritten.len() >= UNWRITTEN_BYTES {
             self.flush()?;
@@ -113,21 +119,26 @@ impl RecordFile {
     /// Writes all lines that have come.
     ///
     /// # Errors
-    /// `Full`, `Failed`: then the file ends with the last line that is whole, and those not written
-    /// are gone.
+    /// `Full`, `Failed`: then the file ends with the last line that is whole, those not written are
+    /// gone, and so are all that follow.
     pub fn flush(&mut self) -> Result<(), OutputError> {
         let bytes = self.unwritten.len();
         let written = self.sink.write(&self.unwritten);
         match (&written, &mut self.sink) {
             (Ok(()), _) => self.written += bytes as u64,
             (Err(_), Sink::New(file)) => {
-                // A part of a line that cannot be cut off is one that `import` names.
+                // What there was room for, to the end of its last line.
+                let length = file.metadata().map_or(0, |metadata| metadata.len());
+                let room = usize::try_from(length.saturating_sub(self.written)).unwrap_or(0);
+                let fits = self.unwritten.get(..room).unwrap_or_default();
+                let whole = fits.iter().rposition(|byte| *byte == b'\n');
+                self.written += whole.map_or(0, |end| end as u64 + 1);
                 let _ = file.set_len(self.written);
-                let _ = file.seek(SeekFrom::Start(self.written));
             }
             (Err(_), _) => {}
         }
         self.unwritten.clear();
+        self.has_ended |= written.is_err();
         written.map_err(|source| explain(source, &self.path, &folder_of(&self.path), bytes))
     }
 

@@ -293,6 +293,31 @@ fn swapped_sensor_columns_end_with_status_4() {
 }
 
 #[test]
+fn a_log_beyond_the_memory_that_it_may_take_is_refused_with_the_figure() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    let parts = ["log.csv", "MB of memory", "--memory"];
+    bench.bad(&format!("{FIT} --memory 100kB"), 3, &parts);
+    assert!(bench.holds_only(&["log.csv"]));
+    bench.good("check log.csv --stage stage.toml --memory 0.5GiB");
+    for size in ["0", "inf", "nan", "1e400", "-1MB", "2 horses"] {
+        let size = format!("--memory={size}");
+        let wrong = bench.run_args(&["check", "log.csv", "--stage", "stage.toml", &size]);
+        assert_eq!(wrong.status.code(), Some(2), "{size}");
+    }
+}
+
+#[test]
+fn an_offset_is_looked_for_within_an_hour() {
+    let bench = Bench::new();
+    for seconds in ["inf", "nan", "1e400", "3601", "-1"] {
+        let search = format!("--search-s={seconds}");
+        let import = "import bus.log log.csv --stage stage.toml --out x.csv --estimate-offset";
+        bench.bad(&format!("{import} {search}"), 2, &["from 0 to 3600"]);
+    }
+}
+
+#[test]
 fn a_movement_with_one_row_is_a_warning() {
     let bench = Bench::new();
     let log = log() + "99,0,0,0,0,1,2,3,10,20,30\n";

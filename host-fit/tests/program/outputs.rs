@@ -1,6 +1,6 @@
 //! Outputs: whole or not at all, never in the place of an input, and nothing but them on standard output.
 
-use crate::common::{Bench, stderr, stdout, thinned_log};
+use crate::common::{Bench, stderr, stdout, thinned_log, with_cell};
 use host_fit::output::blob_file;
 use std::process::Stdio;
 
@@ -134,7 +134,7 @@ fn a_reader_that_has_seen_enough_is_no_error() {
 #[test]
 fn text_from_a_file_forges_no_line() {
     let bench = Bench::new();
-    let forged = log().replacen("hall_b_cnt", "\"hall_b\nwarning: forged\u{1b}[2J\"", 1);
+    let forged = with_cell(&log(), 4, "ifm_x_nm", "1\u{202e}warning: forged");
     bench.write("log.csv", forged);
     let told = stderr(&bench.run("fit log.csv --stage stage.toml --out p.bin"));
     let stage = bench.text("stage.toml") + "\"a\\nwarning: forged\\u001B[2J\" = 1\n";
@@ -148,8 +148,8 @@ fn text_from_a_file_forges_no_line() {
     let shown = stdout(&bench.good("inspect q.bin"));
     let compared = stdout(&bench.good("diff q.bin q.bin"));
     for text in [told, of_stage, shown, compared] {
-        assert!(text.contains("\\nwarning: forged"), "{text}");
-        assert!(!text.contains('\u{1b}'), "{text}");
+        assert!(text.contains("warning: forged"), "{text}");
+        assert!(!text.contains(['\u{1b}', '\u{202e}']), "{text}");
         assert!(
             !text.lines().any(|line| line.starts_with("warning: f")),
             "{text}"

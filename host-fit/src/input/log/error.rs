@@ -87,6 +87,21 @@ pub enum LogError {
         /// Most columns that are read.
         limit: usize,
     },
+    /// The logs do not fit into the memory that they may take.
+    #[error(
+        "{}: with {rows} rows the logs take {} MB of memory, more than the {} MB that they may (--memory; half of this \
+         machine's if not given): name a part of them, or raise --memory", path.display(), bytes.div_ceil(1_000_000), limit_bytes / 1_000_000
+    )]
+    TooLarge {
+        /// The log that was read.
+        path: PathBuf,
+        /// Rows of all logs so far.
+        rows: usize,
+        /// What they take.
+        bytes: u64,
+        /// What they may.
+        limit_bytes: u64,
+    },
     /// A line longer than any log has.
     #[error("{}:{line}: the line is longer than {limit_bytes} bytes, the most that is read; name a log with a row in each line", path.display())]
     LineTooLong {

@@ -44,6 +44,13 @@ impl Gathered {
         self.rows.len() + self.samples.len()
     }
 
+    /// The memory that they take, bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        let rows = self.rows.capacity() * size_of::<Row>();
+        let movements = self.movements.capacity() * size_of::<Movement>();
+        (rows + movements) as u64 + self.samples.bytes()
+    }
+
     /// Adds the next row of a log that comes after those in `logs`.
     pub(super) fn push(&mut self, row: &LogRow<Sample>) {
         let at = self.len();

@@ -18,6 +18,7 @@ pub(super) fn append(
     options: &ReadOptions,
 ) -> Result<Option<Sha256>, LogError> {
     let first_row = gathered.len();
+    let path = text.path().to_path_buf();
     let end = stream_text(
         text,
         "reading",
@@ -28,7 +29,15 @@ pub(super) fn append(
             for row in batch.blocks.iter().flatten() {
                 gathered.push(row);
             }
-            Ok::<(), LogError>(())
+            match options.memory_bytes {
+                Some(limit_bytes) if gathered.bytes() > limit_bytes => Err(LogError::TooLarge {
+                    path: path.clone(),
+                    rows: gathered.len(),
+                    bytes: gathered.bytes(),
+                    limit_bytes,
+                }),
+                _ => Ok(()),
+            }
         },
     )?;
     let LogEnd {

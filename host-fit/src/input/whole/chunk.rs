@@ -193,6 +193,25 @@ impl Chunk {
         self.reference.len()
     }
 
+    /// The memory that each of its rows takes, bytes.
+    pub const fn row_bytes(&self) -> usize {
+        const fn of(codes: &Codes) -> usize {
+            match codes {
+                Codes::Of24Bits(_) => 9,
+                Codes::Of32Bits(_) => 12,
+            }
+        }
+        let time = match self.times {
+            Times::Near { .. } => 4,
+            Times::Far(_) => 8,
+        };
+        let vertical = match &self.vertical {
+            Vertical::Codes(codes) => of(codes),
+            Vertical::Pose(_) => 24,
+        };
+        time + of(&self.hall) + vertical + size_of::<[f64; 3]>()
+    }
+
     /// The row `k`, from 0 to less than the length.
     pub fn at(&self, k: usize) -> Sample {
         Sample {

@@ -6,6 +6,7 @@ const SKIP: ReadOptions = ReadOptions {
     reference: ReferenceUse::Required,
     split_s: None,
     rows_max: None,
+    memory_bytes: None,
 };
 
 fn codes(reading: &LogReading) -> Vec<i32> {

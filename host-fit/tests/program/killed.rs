@@ -1,0 +1,313 @@
+//! Every command that writes, killed at any time, on a full disk, and beside another: each output is the old
+//! one or the new one, whole.
+//!
+//! ```sh
+//! KILLS=1000 cargo test -p host-fit --test program -- killed --nocapture
+//! ```
+
+use crate::common::{Bench, stderr, thinned_log};
+use hal_adapters::can::{BusFrame, Layout, sensor};
+use hal_adapters::candump::LogLine;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use runtime::RawFrame;
+use std::fmt::Write;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+/// Kills where nothing else is asked for.
+const KILLS: u64 = 60;
+const SEED: u64 = 14;
+/// What stands in the place of each output before.
+const OLD: &[u8] = b"what was there before";
+
+/// A command, and what it writes.
+struct Job {
+    arguments: &'static str,
+    outputs: &'static [&'static str],
+}
+
+const JOBS: &[Job] = &[
+    Job {
+        arguments: "fit log.csv --stage stage.toml --out o.bin --json o.json --report o",
+        outputs: &["o.json", "o/index.html", "o.bin"],
+    },
+    Job {
+        arguments: "fit run.csv.gz --stage stage.toml --model field --out o.bin",
+        outputs: &["o.bin.posterior", "o.bin"],
+    },
+    Job {
+        arguments: "recalibrate field.bin run.csv.gz --stage stage.toml --what all --out o.bin --json o.json",
+        outputs: &["o.json", "o.bin.posterior", "o.bin"],
+    },
+    Job {
+        arguments: "decode p.bin log.csv --stage stage.toml --out o.csv",
+        outputs: &["o.csv"],
+    },
+    Job {
+        arguments: "eval p.bin log.csv --stage stage.toml --json o.json",
+        outputs: &["o.json"],
+    },
+    Job {
+        arguments: "check log.csv --stage stage.toml --json o.json",
+        outputs: &["o.json"],
+    },
+    Job {
+        arguments: "import bus.log ifm.csv --stage stage.toml --out o.csv",
+        outputs: &["o.csv"],
+    },
+    Job {
+        arguments: "inspect p.bin --json o.json",
+        outputs: &["o.json"],
+    },
+    Job {
+        arguments: "diff p.bin field.bin --json o.json",
+        outputs: &["o.json"],
+    },
+    Job {
+        arguments: "export p.bin --format hex --slot 0 --out o.hex",
+        outputs: &["o.hex"],
+    },
+    Job {
+        arguments: "init log.csv --out o.toml --force",
+        outputs: &["o.toml"],
+    },
+    Job {
+        arguments: "plan --stage stage.toml --seconds 8 --out o.csv",
+        outputs: &["o.csv"],
+    },
+    Job {
+        arguments: "simulate --stage stage.toml --protocol service --seed 1 --out o.csv --truth o.truth",
+        outputs: &["o.csv", "o.truth"],
+    },
+    Job {
+        arguments: "compare log.csv --stage stage.toml --seeds 1 --evaluations 400 --project linear --out o",
+        outputs: &["o/table.md", "o/runs.csv", "o/history.csv"],
+    },
+    Job {
+        arguments: "man --out o",
+        outputs: &["o/host-fit.1", "o/host-fit-fit.1"],
+    },
+    Job {
+        arguments: "demo --out d",
+        outputs: &["d/params.bin", "d/pose.csv", "d/field.bin"],
+    },
+];
+
+/// A record of the bus, and the interferometers beside it: one movement of 1.5 s.
+fn records() -> (String, String) {
+    let mut bus = String::new();
+    let mut reference = "movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm\n".to_owned();
+    for tick in 0..750 {
+        let time_us = 2_000 * tick;
+        let frame = RawFrame {
+            hall: [100, 200, 300].map(|code| code + tick as i32),
+            capacitive: [100, 101, 99],
+            sequence: tick,
+            time_us,
+        };
+        for coded in sensor::frames(Layout::Bits16, &frame) {
+            let line = LogLine {
+                time_us: time_us.into(),
+                interface: "can0",
+                frame: BusFrame::from(coded),
+            };
+            writeln!(bus, "{line}").expect("a string");
+        }
+        writeln!(reference, "0,{time_us},{tick},5,6").expect("a string");
+    }
+    (bus, reference)
+}
+
+/// Every input, and every output as it was before.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    bench.write("log.csv", thinned_log(20, |_| true));
+    bench.write("run.csv.gz", host_fit::input::shipped::RUN_GZ);
+    let (bus, reference) = records();
+    bench.write("bus.log", bus);
+    bench.write("ifm.csv", reference);
+    std::fs::create_dir(bench.path("o")).expect("a folder");
+    bench.good("demo --out d");
+    bench.good("fit log.csv --stage stage.toml --out p.bin");
+    bench.good("fit run.csv.gz --stage stage.toml --model field --out field.bin");
+    bench
+}
+
+impl Job {
+    fn restore(&self, bench: &Bench) {
+        for output in self.outputs {
+            bench.write(output, OLD);
+        }
+    }
+
+    fn start(&self, bench: &Bench) -> std::process::Child {
+        let mut command = bench.command(&self.arguments.split(' ').collect::<Vec<_>>());
+        command.stdout(Stdio::null()).stderr(Stdio::null());
+        command.spawn().expect("the program runs")
+    }
+
+    /// Runs it to its end; gives its time.
+    fn finish(&self, bench: &Bench) -> Duration {
+        let started = Instant::now();
+        let status = self.start(bench).wait().expect("it ends");
+        assert_eq!(status.code(), Some(0), "{}", self.arguments);
+        started.elapsed()
+    }
+
+    /// How many outputs are old, and how many are new and whole.
+    fn judge(&self, bench: &Bench, whole: &[Vec<u8>]) -> (u64, u64) {
+        let (mut old, mut new) = (0, 0);
+        for (output, whole) in self.outputs.iter().zip(whole) {
+            let found = bench.read(output);
+            if found == OLD {
+                old += 1;
+                continue;
+            }
+            // Some hold the time that the run took.
+            let lines = |bytes: &[u8]| bytes.iter().filter(|byte| **byte == b'\n').count();
+            let is_whole = match *output {
+                output if output.ends_with(".json") => {
+                    serde_json::from_slice::<serde_json::Value>(&found).is_ok()
+                }
+                "o/table.md" | "o/runs.csv" => {
+                    found.ends_with(b"\n") && lines(&found) == lines(whole)
+                }
+                _ => found == *whole,
+            };
+            assert!(is_whole, "{output} of {} is not whole", self.arguments);
+            new += 1;
+        }
+        (old, new)
+    }
+}
+
+/// New files on their way, in the folder and those in it.
+fn left_behind(bench: &Bench) -> usize {
+    let folders = [".", "o", "d"].map(|folder| bench.path(folder));
+    let entries = folders
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(folder).expect("listed"));
+    let names = entries.map(|entry| entry.expect("an entry").file_name());
+    names
+        .filter(|name| name.to_string_lossy().starts_with(".host-fit-"))
+        .count()
+}
+
+#[test]
+fn a_killed_command_leaves_each_output_old_or_new_and_the_next_one_sweeps() {
+    let kills = std::env::var("KILLS").map_or(KILLS, |kills| kills.parse().expect("a number"));
+    let bench = bench();
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
+    let (mut ended, mut old, mut new, mut left) = (0, 0, 0, 0);
+    for (k, job) in JOBS.iter().enumerate() {
+        job.restore(&bench);
+        let time = job.finish(&bench);
+        let whole: Vec<_> = job
+            .outputs
+            .iter()
+            .map(|output| bench.read(output))
+            .collect();
+        for _ in (k as u64..kills).step_by(JOBS.len()) {
+            job.restore(&bench);
+            let mut running = job.start(&bench);
+            // One in two near the end, where it writes.
+            let [when, late] =
+                [0; 2].map(|_: u32| f64::from(random.next_u32()) / f64::from(u32::MAX));
+            let share = if late < 0.5 {
+                1.1 * when
+            } else {
+                0.7 + 0.4 * when
+            };
+            std::thread::sleep(time.mul_f64(share));
+            running.kill().expect("killed or ended");
+            let status = running.wait().expect("it ends");
+            ended += u64::from(status.code() == Some(0));
+            let (of_old, of_new) = job.judge(&bench, &whole);
+            (old, new) = (old + of_old, new + of_new);
+            left += left_behind(&bench);
+        }
+        job.restore(&bench);
+        job.finish(&bench);
+        assert_eq!(left_behind(&bench), 0, "{}", job.arguments);
+    }
+    println!(
+        "RESULT kills={kills} ended_before={ended} outputs_old={old} outputs_new={new} outputs_broken=0 swept={left}"
+    );
+}
+
+/// A shell whose files cannot grow beyond so many blocks of 512 bytes, as on a full disk.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_leaves_every_output_of_a_command_as_it_was() {
+    let bench = bench();
+    let mut full = 0;
+    // The last three write many files one after the other: each is whole.
+    let one_by_one = JOBS.len() - 3;
+    for (k, job) in JOBS.iter().enumerate() {
+        job.restore(&bench);
+        job.finish(&bench);
+        let whole: Vec<_> = job
+            .outputs
+            .iter()
+            .map(|output| bench.read(output))
+            .collect();
+        let mut blocks: Vec<_> = whole.iter().map(|bytes| (bytes.len() - 1) / 512).collect();
+        blocks.push(0);
+        for blocks in blocks {
+            job.restore(&bench);
+            let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
+            let mut limited = std::process::Command::new("sh");
+            limited.args(["-c", &script, env!("CARGO_BIN_EXE_host-fit")]);
+            limited
+                .args(job.arguments.split(' '))
+                .current_dir(bench.path("."));
+            let output = limited.output().expect("sh runs");
+            let told = stderr(&output);
+            assert_eq!(output.status.code(), Some(3), "{}: {told}", job.arguments);
+            assert!(told.contains("no room"), "{}: {told}", job.arguments);
+            let (old, new) = job.judge(&bench, &whole);
+            if k < one_by_one {
+                assert_eq!(new, 0, "{} with {blocks} blocks", job.arguments);
+            }
+            full += old;
+        }
+        assert_eq!(left_behind(&bench), 0, "{}", job.arguments);
+    }
+    println!("RESULT full_disk outputs_old={full} outputs_broken=0");
+}
+
+#[test]
+fn of_two_writers_of_an_output_one_wins_whole() {
+    let bench = bench();
+    let fit = |serial: &str| {
+        let arguments = format!("fit log.csv --stage stage.toml --out o.bin --serial {serial}");
+        bench.command(&arguments.split(' ').collect::<Vec<_>>())
+    };
+    let whole = ["one", "two"].map(|serial| {
+        assert!(
+            fit(serial)
+                .output()
+                .expect("the program runs")
+                .status
+                .success()
+        );
+        bench.read("o.bin")
+    });
+    let mut won = [0, 0];
+    for _ in 0..10 {
+        let start = |serial| {
+            let mut command = fit(serial);
+            command.stdout(Stdio::null()).stderr(Stdio::null());
+            command.spawn().expect("the program runs")
+        };
+        for mut running in ["one", "two"].map(start) {
+            assert!(running.wait().expect("it ends").success());
+        }
+        let found = bench.read("o.bin");
+        let winner = whole.iter().position(|whole| *whole == found);
+        won[winner.expect("one of the two, whole")] += 1;
+        assert_eq!(left_behind(&bench), 0);
+    }
+    println!("RESULT two_writers won={won:?} broken=0");
+}
