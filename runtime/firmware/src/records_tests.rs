@@ -71,13 +71,13 @@ fn what_was_stored_runs_at_the_next_start_and_so_does_what_it_went_back_to() {
     let mut flash = FlashModel::erased();
     let (records, running, reason) = start(&mut flash, false);
     assert_eq!((running, reason), (None, 0));
-    assert!(!update::Store::has_previous(&records));
+    assert!(update::Store::previous(&records).is_none());
     for number in 0..3 {
         let (mut records, ..) = start(&mut flash, false);
         let new = blob(number);
         assert_eq!(store(&mut records, Change::Blob(&new)), Written::Done);
         assert_eq!(update::Store::newest_sequence(&records), number as u32 + 1);
-        assert_eq!(update::Store::has_previous(&records), number > 0);
+        assert_eq!(update::Store::previous(&records).is_some(), number > 0);
         assert_eq!(start(&mut flash, false).1, Some(new));
     }
     let (mut records, ..) = start(&mut flash, false);
@@ -111,13 +111,13 @@ fn a_faulty_blob_is_passed_over_for_good() {
         let (records, running, reason) = start(&mut flash, is_faulty);
         assert_eq!((running, reason), (Some(blob(1)), 12));
         assert_eq!(update::Store::newest_sequence(&records), 4);
-        assert_eq!(update::Store::has_previous(&records), has_previous);
+        assert_eq!(update::Store::previous(&records).is_some(), has_previous);
     }
     // The one before it faults, too.
     assert_eq!(start(&mut flash, true).1, Some(blob(0)));
     let (records, running, reason) = start(&mut flash, false);
     assert_eq!((running, reason), (Some(blob(0)), 12));
-    assert!(!update::Store::has_previous(&records));
+    assert!(update::Store::previous(&records).is_none());
 }
 
 #[test]

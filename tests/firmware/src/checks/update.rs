@@ -224,6 +224,7 @@ pub fn refused(bench: &Bench) -> Outcome {
     answers(
         &mut machine,
         &[
+            (Request::ServoOff { seconds: 0 }, 99, Ended::Done),
             (request(UpdateRequest::begin(0, 0)), 100, Ended::ServoOn),
             (SERVO_OFF, 101, Ended::Done),
             (request(UpdateRequest::begin(1, 0)), 102, Ended::Done),
