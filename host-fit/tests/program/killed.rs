@@ -8,8 +8,8 @@
 use crate::common::{Bench, stderr, thinned_log};
 use hal_adapters::can::{BusFrame, Layout, sensor};
 use hal_adapters::candump::LogLine;
-use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use rand::rngs::ChaCha8Rng;
+use rand::{Rng, SeedableRng};
 use runtime::RawFrame;
 use std::fmt::Write;
 use std::process::Stdio;
@@ -198,7 +198,7 @@ fn left_behind(bench: &Bench) -> usize {
 fn a_killed_command_leaves_each_output_old_or_new_and_the_next_one_sweeps() {
     let kills = std::env::var("KILLS").map_or(KILLS, |kills| kills.parse().expect("a number"));
     let bench = bench();
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
+    let mut random = ChaCha8Rng::seed_from_u64(SEED);
     let (mut ended, mut old, mut new, mut left) = (0, 0, 0, 0);
     for (k, job) in JOBS.iter().enumerate() {
         job.restore(&bench);
