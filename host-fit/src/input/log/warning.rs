@@ -151,7 +151,7 @@ pub enum LogWarning {
         servo_us: f64,
     },
     /// There are more rows than a fit needs.
-    #[error("fit and diagnosis use {taken} of {rows} rows, in {runs} runs taken where the motion tells most; the errors of the fit are over all rows")]
+    #[error("fit and diagnosis use {taken} of {rows} rows, in {runs} runs spread over all that moves; the errors of the fit are over all rows")]
     Excerpt {
         /// Rows of the logs.
         rows: usize,
