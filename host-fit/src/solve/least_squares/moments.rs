@@ -148,18 +148,6 @@ impl Moments {
         Some(std::array::from_fn(|k| mean[k]))
     }
 
-    /// The smallest 1 + r v over the rows.
-    pub fn smallest_sensitivity(&self, ratios: &Ratios) -> f64 {
-        let of = |pose: &Pose| {
-            let each = ratios.iter().map(|r| {
-                let change = (0..K).map(|k| r[k] * pose.at[k] - (r[k] * pose.deviation[k]).abs());
-                1.0 + change.sum::<f64>()
-            });
-            each.fold(f64::INFINITY, f64::min)
-        };
-        self.poses.iter().map(of).fold(f64::INFINITY, f64::min)
-    }
-
     /// Whether what is left out does not matter at these ratios.
     pub fn hold(&self, ratios: &Ratios) -> bool {
         let left_out = |pose: &Pose| {

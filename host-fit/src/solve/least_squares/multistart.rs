@@ -29,15 +29,8 @@ const START_SENSITIVITY_MIN: f64 = 0.3;
 /// # Errors
 /// See [`SolveError`].
 pub fn solve(problem: &Problem, options: &SolverOptions) -> Result<Solution, SolveError> {
-    let moments = Moments::new(problem);
-    let starts = match &moments {
-        Some(moments) => starts(problem, options.seed, |r| moments.smallest_sensitivity(r)),
-        None => {
-            let few = problem.thinned(START_ROWS);
-            starts(problem, options.seed, |r| smallest_sensitivity(&few, r))
-        }
-    };
-    descend_from(&starts, problem, moments.as_ref(), options)
+    let few = problem.thinned(START_ROWS);
+    descend_from(&starts(&few, options.seed), (problem, &few), true, options)
 }
 
 /// Descends from each of the given parameters and finishes the best on all rows.
@@ -49,21 +42,24 @@ pub fn solve_from(
     problem: &Problem,
     options: &SolverOptions,
 ) -> Result<Solution, SolveError> {
-    descend_from(starts, problem, Moments::new(problem).as_ref(), options)
+    let few = problem.thinned(START_ROWS);
+    descend_from(starts, (problem, &few), true, options)
 }
 
+/// Descends on few rows, and on all of them from the best end; by moments if that is asked for, and the
+/// log has such.
 fn descend_from(
     starts: &[Parameters],
-    problem: &Problem,
-    moments: Option<&Moments>,
+    (problem, few): (&Problem, &Problem),
+    by_moments: bool,
     options: &SolverOptions,
 ) -> Result<Solution, SolveError> {
     let free = free_offsets(problem);
-    // With moments all rows cost less than few without.
-    let thinned = moments.is_none().then(|| problem.thinned(START_ROWS));
+    let moments = |problem: &Problem| by_moments.then(|| Moments::new(problem)).flatten();
+    let (of_all, of_few) = (moments(problem), moments(few));
     let few = Sums {
-        problem: thinned.as_ref().unwrap_or(problem),
-        moments,
+        problem: few,
+        moments: of_few.as_ref(),
     };
     let few_offsets = free_offsets(few.problem);
     let boxed = Boxed {
@@ -73,7 +69,10 @@ fn descend_from(
     // (12) fixes eta, so its gain is not an arbitrary matrix: only the parameters will do.
     let by_gains = options.projection == Projection::Linear && problem.model.fits_gain();
     let mut search = Search {
-        sums: Sums { problem, moments },
+        sums: Sums {
+            problem,
+            moments: of_all.as_ref(),
+        },
         offsets: &free,
         evaluations: 0,
     };
@@ -99,8 +98,8 @@ fn descend_from(
         descent = search.with_clipped_offsets(&boxed, descent);
         parameters = boxed.parameters(&descent.unknowns);
     }
-    if moments.is_some_and(|moments| !moments.hold(&descent.point.ratios)) {
-        return descend_from(&[parameters], problem, None, options);
+    if of_all.as_ref().is_some_and(|moments| !moments.hold(&descent.point.ratios)) {
+        return descend_from(starts, (problem, few.problem), false, options);
     }
     let zeros = zero_deviations_by(search.sums, &parameters, &descent.point);
     Ok(Solution {
@@ -320,11 +319,7 @@ pub fn middle_of_the_box(problem: &Problem) -> Parameters {
 
 /// [`middle_of_the_box`], then random points of the search box whose phi stays away from zero over
 /// the whole log.
-fn starts(
-    problem: &Problem,
-    seed: u64,
-    smallest_sensitivity: impl Fn(&Ratios) -> f64,
-) -> Vec<Parameters> {
+fn starts(problem: &Problem, seed: u64) -> Vec<Parameters> {
     let stage = problem.stage;
     let middle = middle_of_the_box(problem);
     let mut starts = vec![middle];
@@ -350,7 +345,7 @@ fn starts(
             p[k] = ranges[k].low + random.random::<f64>() * ranges[k].width();
         }
         let far = point_of(&start).is_some_and(|point| {
-            smallest_sensitivity(&point.ratios) > START_SENSITIVITY_MIN
+            smallest_sensitivity(problem, &point.ratios) > START_SENSITIVITY_MIN
         });
         if far {
             starts.push(start);
