@@ -33,7 +33,7 @@ pub(super) fn undescribed(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
 }
 
 /// Errors far above the noise from sample to sample.
-pub(super) fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
+pub fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     const AXES: [(&str, &str, &str); 3] =
         [("x", "X", "um"), ("y", "Y", "um"), ("rz", "Rz", "urad")];
     let errors = fit.decoded.errors_less(&fit.judgement.zeros, dataset);

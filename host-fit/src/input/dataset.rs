@@ -114,41 +114,22 @@ impl Scales {
 
     /// The row of a sample in a movement of a dataset; its sequence number is still 0.
     pub fn row(&self, movement: usize, sample: &Sample) -> Row {
-        let &Sample {
-            t_us,
-            hall,
-            vertical,
-            reference,
-        } = sample;
-        let (sequence, time_us) = (0, t_us as u32);
-        let (frame, vertical) = match vertical {
+        let vertical = match sample.vertical {
             SampledVertical::Codes(capacitive) => {
                 let gaps_m = capacitive.map(|code| f64::from(code) * self.capacitive_m_per_code);
-                let frame = LoggedFrame::Codes(RawFrame {
-                    hall,
-                    capacitive,
-                    sequence,
-                    time_us,
-                });
-                (frame, vertical_pose(&self.vertical_rows, gaps_m).to_array())
+                vertical_pose(&self.vertical_rows, gaps_m).to_array()
             }
-            SampledVertical::Pose(vertical) => {
-                let frame = LoggedFrame::HallCodes {
-                    hall,
-                    vertical: VerticalPose::from_array(vertical.map(|x| x as f32)),
-                    sequence,
-                    time_us,
-                };
-                (frame, vertical)
-            }
+            SampledVertical::Pose(vertical) => vertical,
         };
         Row {
             movement,
-            t_us,
-            frame,
-            signal_m: hall.map(|code| f64::from(code) * self.hall_m_per_code),
+            t_us: sample.t_us,
+            frame: sample.frame(),
+            signal_m: sample
+                .hall
+                .map(|code| f64::from(code) * self.hall_m_per_code),
             vertical,
-            reference,
+            reference: sample.reference,
         }
     }
 }

@@ -2,27 +2,33 @@
 //!
 //! One row per servo period below a header. Which column holds what is said in
 //! [`layout`], in which units in `units.rs`, what else a table may look like at
-//! `Table::open` in `table.rs`; a log without a column for the movement is taken apart in `split.rs`.
+//! `Head::read` in `table.rs`; a log without a column for the movement is taken apart in `split.rs`.
 //! A file is taken for gzip or UTF-16 by its first bytes, not by its name.
 //!
 //! Anything wrong is refused with file, line and column ([`LogError`]). Bad cells and
 //! saturated codes can be left out and counted instead ([`BadRows::Skip`]); a log whose
 //! structure is wrong is always refused.
 
+mod blocks;
 pub(crate) mod cell;
+mod cursor;
 mod decimal;
 mod error;
 mod gathered;
 pub(crate) mod guess;
 pub(crate) mod header;
 pub mod layout;
+mod line;
 mod order;
+mod parse;
 mod preamble;
 mod reader;
 mod rows;
 mod sequence;
 mod skipped;
 mod split;
+mod stitch;
+mod stream;
 pub(crate) mod table;
 pub(crate) mod time;
 pub(crate) mod units;
@@ -30,15 +36,16 @@ mod warning;
 
 pub use cell::CellFault;
 pub use error::{CellPlace, LogError};
+pub use parse::LogRow;
+pub use stream::{Batch, LogEnd, stream};
 pub use warning::{LogWarning, SkipReason};
 
 use crate::input::dataset::{Dataset, FIT_ROWS_MAX, LogSource};
-use crate::input::source;
 use crate::input::stage::Stage;
+use crate::input::text::TextReader;
 use gathered::Gathered;
 use sha2::{Digest, Sha256};
 use std::path::Path;
-use table::Table;
 
 /// What to do with a row that has a bad cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -134,16 +141,10 @@ pub fn read<P: AsRef<Path>>(
     let mut gathered = Gathered::new(stage, options.rows_max);
     let mut hash = Sha256::new();
     for path in paths {
-        let path = path.as_ref();
-        let text = source::read_text(path)?;
-        hash.update(&text);
-        append(
-            (&mut reading, &mut gathered),
-            source::shown_name(path),
-            &text,
-            stage,
-            options,
-        )?;
+        let text = TextReader::open(path.as_ref())?.with_hash(hash);
+        let all = (&mut reading, &mut gathered);
+        hash = reader::append(all, text, stage, options)?.unwrap_or_default();
+        refuse_repeated_log(&gathered)?;
     }
     reading.dataset = gathered.into_dataset(hash.finalize().into(), &mut reading.warnings);
     Ok(reading)
@@ -159,27 +160,13 @@ pub fn read_bytes(
     stage: &Stage,
     options: &ReadOptions,
 ) -> Result<LogReading, LogError> {
-    let text = source::unpack_text(bytes.into(), path)?;
+    let text = TextReader::of_bytes(bytes, path)?.with_hash(Sha256::new());
     let mut reading = LogReading::default();
     let mut gathered = Gathered::new(stage, options.rows_max);
-    append((&mut reading, &mut gathered), path, &text, stage, options)?;
-    let sha256 = Sha256::digest(&text).into();
-    reading.dataset = gathered.into_dataset(sha256, &mut reading.warnings);
+    let all = (&mut reading, &mut gathered);
+    let hash = reader::append(all, text, stage, options)?.unwrap_or_default();
+    reading.dataset = gathered.into_dataset(hash.finalize().into(), &mut reading.warnings);
     Ok(reading)
-}
-
-fn append(
-    (reading, gathered): (&mut LogReading, &mut Gathered),
-    path: &Path,
-    text: &[u8],
-    stage: &Stage,
-    options: &ReadOptions,
-) -> Result<(), LogError> {
-    let text = source::to_utf8(text, path)?;
-    let table = Table::open(path, &text, |name| stage.log.knows(name))?;
-    let warnings = &mut reading.warnings;
-    reading.skipped_rows += reader::append(table, stage, options, gathered, warnings)?;
-    refuse_repeated_log(gathered)
 }
 
 /// Refuses the last log if an earlier one holds the same rows.

@@ -142,9 +142,8 @@ impl WholeJudgement {
 fn pieces(whole: &Whole, decoder: &AnyDecoder, rows: Range<usize>) -> Vec<(usize, Sums)> {
     let all = whole.movements();
     let first = all.partition_point(|movement| movement.rows.end <= rows.start);
-    let here = |movement: &Movement| {
-        movement.rows.start.max(rows.start)..movement.rows.end.min(rows.end)
-    };
+    let here =
+        |movement: &Movement| movement.rows.start.max(rows.start)..movement.rows.end.min(rows.end);
     (all[first..].iter().zip(first..))
         .take_while(|(movement, _)| movement.rows.start < rows.end)
         .map(|(movement, number)| {

@@ -9,6 +9,7 @@ use crate::input::log::table::Table;
 use crate::input::log::time::Clock;
 use crate::input::source;
 use crate::input::stage::Stage;
+use crate::input::text::TextReader;
 use std::path::Path;
 
 /// One sample of the reference.
@@ -60,17 +61,16 @@ struct Cells {
 /// # Errors
 /// `Reference`, `NoReference`.
 pub fn read(path: &Path, stage: &Stage) -> Result<(Reference, ReferenceCounts), ImportError> {
-    let text = source::read_text(path).map_err(LogError::from)?;
+    let text = TextReader::open(path).map_err(LogError::from)?;
     let path = source::shown_name(path);
-    let text = source::to_utf8(&text, path).map_err(LogError::from)?;
-    let mut table = Table::open(path, &text, |name| stage.log.knows(name))?;
+    let mut table = Table::open(text, |name| stage.log.knows(name))?;
     let cells = Cells::find(&table, stage)?;
     let mut samples: Vec<Sample> = Vec::new();
     let mut clock = Clock::default();
-    let mut row_bytes: Vec<u64> = Vec::new();
+    let mut row_lines: Vec<usize> = Vec::new();
     while table.next_row()? {
         samples.push(cells.sample(&table, &mut clock)?);
-        row_bytes.push(table.row_byte());
+        row_lines.push(table.row_line());
     }
     let mut counts = ReferenceCounts {
         rows: samples.len(),
@@ -78,8 +78,8 @@ pub fn read(path: &Path, stage: &Stage) -> Result<(Reference, ReferenceCounts), 
         ..ReferenceCounts::default()
     };
     let backwards = |row: usize, movement, before_us: f64, t_us: f64| LogError::TimeBackwards {
-        place: table.place(
-            row_bytes.get(row).copied().unwrap_or_default(),
+        place: table.head.place(
+            row_lines.get(row).copied().unwrap_or_default(),
             cells.time.cell,
             Some(movement),
         ),
@@ -105,7 +105,7 @@ pub fn read(path: &Path, stage: &Stage) -> Result<(Reference, ReferenceCounts), 
 impl Cells {
     /// The beams, or X, Y, Rz where a beam is missing.
     fn find(table: &Table<'_>, stage: &Stage) -> Result<Self, LogError> {
-        let header = Header::new(table, &stage.log, UnknownColumns::LeaveOut)?;
+        let header = Header::new(&table.head, &stage.log, UnknownColumns::LeaveOut)?;
         let [time] = header.all([Quantity::Time])?;
         let (quantities, values) = match header.all(Quantity::BEAMS) {
             Ok(values) => (Quantity::BEAMS, values),
@@ -125,7 +125,7 @@ impl Cells {
     /// The sample in the row in hand.
     fn sample(&self, table: &Table<'_>, clock: &mut Clock) -> Result<Sample, LogError> {
         let bad = |cell, movement, fault: CellFault| LogError::Cell {
-            place: table.place(table.row_byte(), cell, movement),
+            place: table.head.place(table.row_line(), cell, movement),
             fault,
         };
         let movement = self.movement.map_or(Ok(0), |at| {

@@ -17,6 +17,14 @@ pub enum CellFault {
         /// What is there, shortened.
         text: String,
     },
+    /// A decimal point in a table whose first rows have decimal commas.
+    #[error(
+        "\"{text}\" has a decimal point, where the first rows of the log have decimal commas; write all numbers alike, without marks between thousands"
+    )]
+    DecimalPoint {
+        /// What is there, shortened.
+        text: String,
+    },
     /// A time that is written in another way than the first of the log.
     #[error(
         "\"{text}\" is a time written in another way than the first of the log; write all as numbers, all as dates and times with a zone, or all without"

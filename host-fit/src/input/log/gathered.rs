@@ -1,5 +1,6 @@
 //! Rows of logs as they are read: as they are, or as samples once there are too many.
 
+use super::parse::LogRow;
 use super::sequence;
 use super::warning::LogWarning;
 use crate::input::dataset::{Dataset, LogSource, Movement, Row, Scales};
@@ -43,13 +44,26 @@ impl Gathered {
         self.rows.len() + self.samples.len()
     }
 
-    /// Adds a row.
-    pub(super) fn push(&mut self, row: Row) {
+    /// Adds the next row of a log that comes after those in `logs`.
+    pub(super) fn push(&mut self, row: &LogRow<Sample>) {
+        let at = self.len();
+        match self.movements.last_mut() {
+            Some(last) if !row.begins => last.rows.end = at + 1,
+            _ => self.movements.push(Movement {
+                log: self.logs.len(),
+                index: row.movement,
+                rows: at..at + 1,
+            }),
+        }
         if !self.samples.is_empty() {
-            self.samples.push(&Sample::of(&row));
+            self.samples.push(&row.item);
             return;
         }
-        self.rows.push(row);
+        let whole = self.scales.row(self.movements.len() - 1, &row.item);
+        self.rows.push(Row {
+            frame: whole.frame.with_sequence(row.sequence),
+            ..whole
+        });
         if self.rows_max.is_some_and(|most| self.rows.len() > most) {
             for row in std::mem::take(&mut self.rows) {
                 self.samples.push(&Sample::of(&row));
@@ -63,37 +77,8 @@ impl Gathered {
         held.iter().map(Sample::of).chain(self.samples.of(rows))
     }
 
-    /// Tells the rows of these movements which one they belong to.
-    pub(super) fn name_movements(&mut self, movements: Range<usize>) {
-        for movement in movements {
-            let rows = self.movements[movement].rows.clone();
-            for row in self.rows.get_mut(rows).unwrap_or_default() {
-                row.movement = movement;
-            }
-        }
-    }
-
-    /// Ends a log: its movements are those from `first_movement` on.
-    pub(super) fn end(
-        &mut self,
-        source: LogSource,
-        first_movement: usize,
-        warnings: &mut Vec<LogWarning>,
-    ) {
-        let movements = self.movements.get(first_movement..).unwrap_or_default();
-        if self.samples.is_empty() {
-            let period_s = self.servo_period_s;
-            sequence::number(&mut self.rows, movements, &source, period_s, warnings);
-        }
-        self.logs.push(source);
-    }
-
     /// What a fit takes: all rows, or an excerpt, which is told.
-    pub(super) fn into_dataset(
-        self,
-        sha256: [u8; 32],
-        warnings: &mut Vec<LogWarning>,
-    ) -> Dataset {
+    pub(super) fn into_dataset(self, sha256: [u8; 32], warnings: &mut Vec<LogWarning>) -> Dataset {
         let Self {
             scales,
             servo_period_s,
@@ -114,21 +99,13 @@ impl Gathered {
         };
         let whole = Arc::new(Whole::new(scales, samples, movements, logs));
         let mut dataset = whole.excerpt(rows_max / EXCERPT_PART, sha256);
-        let mut odd = Vec::new();
-        for (log, source) in dataset.logs.iter().enumerate() {
-            let of_log = |movement: &&Movement| movement.log == log;
-            let movements: Vec<Movement> =
-                dataset.movements.iter().filter(of_log).cloned().collect();
-            sequence::number(
-                &mut dataset.rows,
-                &movements,
-                source,
-                servo_period_s,
-                &mut odd,
-            );
+        for log in 0..dataset.logs.len() {
+            let of_log = dataset
+                .movements
+                .iter()
+                .filter(|movement| movement.log == log);
+            sequence::number(&mut dataset.rows, of_log, servo_period_s);
         }
-        odd.retain(|warning| !warnings.contains(warning));
-        warnings.extend(odd);
         warnings.push(LogWarning::Excerpt {
             rows: whole.rows(),
             taken: dataset.rows.len(),

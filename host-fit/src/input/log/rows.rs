@@ -1,10 +1,9 @@
-//! One row of a log, from cells to SI units.
+//! One row of a log, from cells to codes and SI units.
 
 use super::cell::{self, CellFault, Code};
 use super::header::{Columns, ReferenceSource, Source, VerticalSource};
-use super::table::Table;
+use super::line::Line;
 use super::time::Clock;
-use crate::input::dataset::{Row, Scales};
 use crate::input::stage::{CodeScale, Stage};
 use crate::input::whole::chunk::{Sample, SampledVertical};
 
@@ -21,18 +20,39 @@ pub(super) struct BadCell {
 }
 
 /// Turns the records of one log into rows.
+#[derive(Clone)]
 pub(super) struct RowReader<'a> {
     columns: &'a Columns,
     hall: &'a CodeScale,
     capacitive: &'a CodeScale,
-    scales: Scales,
     y_baseline_m: f64,
     displacement_max_m: f64,
     height_max_m: f64,
     keep_saturated: bool,
-    clock: Clock,
-    /// Voltages: how many, and the sum of how far they are from whole codes.
-    between_codes: (usize, f64),
+    pub(super) clock: Clock,
+    pub(super) between_codes: BetweenCodes,
+}
+
+/// How far voltages are from whole codes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct BetweenCodes {
+    cells: usize,
+    sum: f64,
+}
+
+impl BetweenCodes {
+    /// With those of another part of the log.
+    pub(super) fn and(self, other: Self) -> Self {
+        Self {
+            cells: self.cells + other.cells,
+            sum: self.sum + other.sum,
+        }
+    }
+
+    /// On average; 0 if the log has none.
+    pub(super) fn mean(self) -> f64 {
+        self.sum / self.cells.max(1) as f64
+    }
 }
 
 fn full_scale_m(scale: &CodeScale) -> f64 {
@@ -46,71 +66,59 @@ impl<'a> RowReader<'a> {
             columns,
             hall: &stage.hall,
             capacitive: &stage.capacitive,
-            scales: Scales::of(stage),
             y_baseline_m: stage.y_baseline_m,
             displacement_max_m: FULL_SCALES * full_scale_m(&stage.hall),
             height_max_m: FULL_SCALES * full_scale_m(&stage.capacitive),
             keep_saturated,
             clock: Clock::default(),
-            between_codes: (0, 0.0),
+            between_codes: BetweenCodes::default(),
         }
     }
 
     /// The number of the movement, if the log has a column for it.
-    pub(super) fn movement(&self, table: &Table<'_>) -> Result<Option<i64>, BadCell> {
+    pub(super) fn movement(&self, line: &Line<'_>) -> Result<Option<i64>, BadCell> {
         let Some(Source { cell, .. }) = self.columns.movement else {
             return Ok(None);
         };
-        let number = cell::whole(table.cell(cell), "movement numbers");
+        let number = cell::whole(line.cell(cell), "movement numbers");
         number.map(Some).map_err(|fault| BadCell { cell, fault })
     }
 
     /// The time, us.
-    pub(super) fn t_us(&mut self, table: &Table<'_>) -> Result<i64, BadCell> {
+    pub(super) fn t_us(&mut self, line: &Line<'_>) -> Result<i64, BadCell> {
         let Source { cell, scale } = self.columns.time;
-        let t_us = self.clock.t_us(table.cell(cell), scale);
+        let t_us = self.clock.t_us(line.cell(cell), scale);
         // Within the range that the limit leaves.
         t_us.map(|t_us| t_us.round() as i64)
             .map_err(|fault| BadCell { cell, fault })
     }
 
-    /// How far voltages were from whole codes, on average; 0 if the log has none.
-    pub(super) fn mean_between_codes(&self) -> f64 {
-        let (cells, sum) = self.between_codes;
-        sum / cells.max(1) as f64
-    }
-
-    /// The row of slot `movement` at `t_us`; its sequence number is still 0.
-    pub(super) fn row(
-        &mut self,
-        table: &Table<'_>,
-        movement: usize,
-        t_us: i64,
-    ) -> Result<Row, BadCell> {
-        let hall = self.codes(table, &self.columns.hall, self.hall)?;
+    /// The sample of a row at `t_us`.
+    #[inline]
+    pub(super) fn sample(&mut self, line: &Line<'_>, t_us: i64) -> Result<Sample, BadCell> {
+        let hall = self.codes(line, &self.columns.hall, self.hall)?;
         let columns = self.columns;
         let vertical = match &columns.vertical {
             VerticalSource::Codes(sources) => {
-                SampledVertical::Codes(self.codes(table, sources, self.capacitive)?)
+                SampledVertical::Codes(self.codes(line, sources, self.capacitive)?)
             }
             VerticalSource::Pose([z, rx, ry]) => SampledVertical::Pose([
-                scaled(table, z, self.height_max_m, "m")?,
-                scaled(table, rx, ROTATION_MAX_RAD, "rad")?,
-                scaled(table, ry, ROTATION_MAX_RAD, "rad")?,
+                scaled(line, z, self.height_max_m, "m")?,
+                scaled(line, rx, ROTATION_MAX_RAD, "rad")?,
+                scaled(line, ry, ROTATION_MAX_RAD, "rad")?,
             ]),
         };
-        let sample = Sample {
+        Ok(Sample {
             t_us,
             hall,
             vertical,
-            reference: self.reference(table)?,
-        };
-        Ok(self.scales.row(movement, &sample))
+            reference: self.reference(line)?,
+        })
     }
 
     fn codes(
         &mut self,
-        table: &Table<'_>,
+        line: &Line<'_>,
         sources: &[Source; 3],
         converter: &CodeScale,
     ) -> Result<[i32; 3], BadCell> {
@@ -120,13 +128,13 @@ impl<'a> RowReader<'a> {
                 code,
                 fraction,
                 is_saturated,
-            } = cell::code(table.cell(cell), scale, converter).map_err(bad)?;
+            } = cell::code(line.cell(cell), scale, converter).map_err(bad)?;
             if is_saturated && !self.keep_saturated {
                 return Err(bad(CellFault::Saturated { code }));
             }
             if scale != 1.0 {
-                self.between_codes.0 += 1;
-                self.between_codes.1 += fraction.abs();
+                self.between_codes.cells += 1;
+                self.between_codes.sum += fraction.abs();
             }
             Ok(code)
         };
@@ -135,14 +143,14 @@ impl<'a> RowReader<'a> {
     }
 
     /// X, Y, Rz: m, m, rad.
-    fn reference(&self, table: &Table<'_>) -> Result<[f64; 3], BadCell> {
-        let length = |source| scaled(table, source, self.displacement_max_m, "m");
+    fn reference(&self, line: &Line<'_>) -> Result<[f64; 3], BadCell> {
+        let length = |source| scaled(line, source, self.displacement_max_m, "m");
         match &self.columns.reference {
             ReferenceSource::Absent => Ok([0.0; 3]),
             ReferenceSource::Pose([x, y, rz]) => Ok([
                 length(x)?,
                 length(y)?,
-                scaled(table, rz, ROTATION_MAX_RAD, "rad")?,
+                scaled(line, rz, ROTATION_MAX_RAD, "rad")?,
             ]),
             ReferenceSource::Beams([x, y1, y2]) => {
                 let (x, y1, y2) = (length(x)?, length(y1)?, length(y2)?);
@@ -155,12 +163,12 @@ impl<'a> RowReader<'a> {
 }
 
 fn scaled(
-    table: &Table<'_>,
+    line: &Line<'_>,
     source: &Source,
     limit: f64,
     unit: &'static str,
 ) -> Result<f64, BadCell> {
     let cell = source.cell;
-    cell::scaled(table.cell(cell), source.scale, limit, unit)
+    cell::scaled(line.cell(cell), source.scale, limit, unit)
         .map_err(|fault| BadCell { cell, fault })
 }

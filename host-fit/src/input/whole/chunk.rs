@@ -2,6 +2,7 @@
 //! at most and the log holds those of the gaps.
 
 use crate::input::dataset::{LoggedFrame, Row};
+use runtime::{RawFrame, VerticalPose};
 
 /// Codes of three converters, in as few bytes as those of the chunk need.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,6 +104,26 @@ pub enum SampledVertical {
 }
 
 impl Sample {
+    /// What the decoder takes; its sequence number is still 0.
+    #[inline]
+    pub fn frame(&self) -> LoggedFrame {
+        let (hall, sequence, time_us) = (self.hall, 0, self.t_us as u32);
+        match self.vertical {
+            SampledVertical::Codes(capacitive) => LoggedFrame::Codes(RawFrame {
+                hall,
+                capacitive,
+                sequence,
+                time_us,
+            }),
+            SampledVertical::Pose(vertical) => LoggedFrame::HallCodes {
+                hall,
+                vertical: VerticalPose::from_array(vertical.map(|x| x as f32)),
+                sequence,
+                time_us,
+            },
+        }
+    }
+
     /// What a row was made of.
     pub const fn of(row: &Row) -> Self {
         Self {

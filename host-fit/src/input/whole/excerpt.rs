@@ -84,7 +84,10 @@ impl Whole {
             (products.sum(), self.moved(run))
         };
         let told: Vec<(f64, f64)> = runs.par_iter().map(told).collect();
-        let idle = IDLE_SHARE * told.iter().fold(0.0, |most: f64, (_, moved)| most.max(*moved));
+        let idle = IDLE_SHARE
+            * told
+                .iter()
+                .fold(0.0, |most: f64, (_, moved)| most.max(*moved));
         let moving = told.iter().filter(|(_, moved)| *moved >= idle).count();
         let rare = RARE * COUNT as f64 / moving.max(1) as f64;
         let chance = |&(leverage, moved): &(f64, f64)| match moved >= idle {
@@ -92,7 +95,10 @@ impl Whole {
             false => 0.0,
         };
         let chances: Vec<f64> = told.iter().map(chance).collect();
-        let rows = runs.iter().zip(&chances).map(|(run, c)| c * run.rows.len() as f64);
+        let rows = runs
+            .iter()
+            .zip(&chances)
+            .map(|(run, c)| c * run.rows.len() as f64);
         let step = rows.sum::<f64>() / most.max(1) as f64;
         let (mut sum, mut next) = (0.0, 0.5 * step);
         let taken = runs.into_iter().zip(chances).filter(|(_, chance)| {

@@ -61,7 +61,13 @@ fn samples_come_back_as_they_were() {
     let mut samples = Samples::default();
     all.iter().for_each(|sample| samples.push(sample));
     assert_eq!(samples.len(), all.len());
-    for rows in [0..15_000, 4_090..4_100, 11_990..12_010, 7..7, 14_999..15_001] {
+    for rows in [
+        0..15_000,
+        4_090..4_100,
+        11_990..12_010,
+        7..7,
+        14_999..15_001,
+    ] {
         let wanted = all[rows.start..rows.end.min(all.len())].iter().copied();
         assert!(samples.of(rows.clone()).eq(wanted), "{rows:?}");
     }
@@ -122,7 +128,9 @@ fn an_excerpt_takes_the_rare_motion_and_not_the_rest() {
     // Twenty times as long at rest, before all the motion.
     let rest = dataset.rows[0];
     let at_rest = 20 * moving;
-    dataset.rows.splice(0..0, std::iter::repeat_n(rest, at_rest));
+    dataset
+        .rows
+        .splice(0..0, std::iter::repeat_n(rest, at_rest));
     for movement in &mut dataset.movements {
         movement.rows = movement.rows.start + at_rest..movement.rows.end + at_rest;
     }

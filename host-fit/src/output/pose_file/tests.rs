@@ -151,7 +151,7 @@ fn a_vertical_pose_in_si_units_decodes_like_the_codes_that_it_came_from() {
 fn fields_are_positional_where_that_is_short() {
     let written = |word: f32| {
         let mut text = Vec::new();
-        micro(&mut text, &mut Vec::new(), word);
+        micro(&mut text, word);
         String::from_utf8(text).expect("ASCII")
     };
     assert_eq!(written(0.0), "0");
