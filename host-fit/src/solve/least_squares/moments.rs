@@ -11,7 +11,8 @@
 //! are linear in the numbers b = (s, q, s d) of a row, which no ratio is part of. So their products,
 //! each less its mean over the movement, are summed once, in one matrix for all movements at
 //! the same vertical pose; for given ratios a product with a small matrix on either side gives
-//! the scatter. What is left out is (r d)^2: 1e-10 of the signal at 12 nm of capacitive noise.
+//! the scatter. What is left out is of second order in d: a few 1e-9 of the sums at 12 nm of
+//! capacitive noise, a tenth of the rounding of a parameter to f32.
 
 use super::scatter::{DENOMINATOR_MIN, Offset, Q, Ratios, Scatter, U};
 use crate::problem::model::SLOPES_MAX;
@@ -396,7 +397,7 @@ mod tests {
             for j in 0..want.ncols() {
                 let scale = (want[(i, i)] * want[(j, j)]).sqrt();
                 let off = (have[(i, j)] - want[(i, j)]).abs();
-                assert!(off <= 1e-9 * scale, "{i} {j} {off} {scale}");
+                assert!(off <= 2e-8 * scale, "{i} {j} {off} {scale}");
             }
         }
         problem.rows[77].slopes[1] += 1e-5;
