@@ -31,13 +31,17 @@ use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use finding::{Code, Finding, Severity};
 use runtime::ParameterSet;
+use std::borrow::Cow;
 
 /// Everything that is wrong with a log, the gravest first; `fitted` is what came of the fit to it.
 ///
 /// Rows that the fit left out of account are for the tests of the signals alone.
 pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Vec<Finding> {
     let outliers = fitted.map_or(&[][..], |fit| &fit.outliers);
-    let sound = dataset.without(outliers);
+    let sound = match outliers {
+        [] => Cow::Borrowed(dataset),
+        outliers => Cow::Owned(dataset.without(outliers)),
+    };
     let errors = (fitted.ok()).map(|fit| fit.decoded.errors_less(&fit.judgement.zeros, dataset));
     let of_models = || {
         let mut findings = causes::causes(&sound, stage);
