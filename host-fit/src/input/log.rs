@@ -18,7 +18,7 @@ pub mod layout;
 mod order;
 mod preamble;
 mod reader;
-mod rows;
+pub(crate) mod rows;
 mod sequence;
 mod skipped;
 mod split;

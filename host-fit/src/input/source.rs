@@ -8,7 +8,7 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// First bytes of every gzip file.
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+pub(crate) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// Largest log that is read, in decompressed bytes: twenty hours at 2 ms. A file that
 /// unpacks to more is damaged or hostile.
@@ -131,26 +131,41 @@ fn read_up_to(
     limit_bytes: u64,
     look: impl Fn(&[u8]) -> Result<(), SourceError>,
 ) -> Result<Vec<u8>, SourceError> {
-    let standard = path.as_os_str() == STANDARD_INPUT.0;
-    let unreadable = |source: std::io::Error| {
-        let path = shown_name(path).to_path_buf();
-        match source.kind() {
-            ErrorKind::IsADirectory => SourceError::IsFolder { path },
-            _ if !standard && path.is_dir() => SourceError::IsFolder { path },
-            ErrorKind::NotFound => SourceError::NotFound { path },
-            _ => SourceError::Unreadable { path, source },
-        }
-    };
+    let standard = is_standard(path);
+    let unreadable = |error| unreadable(path, error);
     let mut file: Box<dyn Read> = match standard {
         true => Box::new(std::io::stdin().lock()),
         false => Box::new(std::fs::File::open(path).map_err(unreadable)?),
     };
-    let mut raw = Vec::new();
-    append(&mut file, binary::PROBE_BYTES as u64, &mut raw).map_err(unreadable)?;
+    let mut raw = probe(&mut file).map_err(unreadable)?;
     look(&raw)?;
     append(&mut file, limit_bytes, &mut raw).map_err(unreadable)?;
     refuse_large(&raw, limit_bytes, path)?;
     Ok(raw)
+}
+
+/// Whether a name means standard input.
+pub(crate) fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == STANDARD_INPUT.0
+}
+
+/// The start of an input, by which it is told whether it is text.
+pub(crate) fn probe(source: &mut impl Read) -> std::io::Result<Vec<u8>> {
+    let mut start = Vec::new();
+    append(source, binary::PROBE_BYTES as u64, &mut start)?;
+    Ok(start)
+}
+
+/// What the system says of a file, in the user's terms.
+pub(crate) fn unreadable(path: &Path, source: std::io::Error) -> SourceError {
+    let standard = is_standard(path);
+    let path = shown_name(path).to_path_buf();
+    match source.kind() {
+        ErrorKind::IsADirectory => SourceError::IsFolder { path },
+        _ if !standard && path.is_dir() => SourceError::IsFolder { path },
+        ErrorKind::NotFound => SourceError::NotFound { path },
+        _ => SourceError::Unreadable { path, source },
+    }
 }
 
 /// Appends what `source` holds, stopping soon after `limit` bytes.
@@ -214,7 +229,7 @@ fn unpack<'r>(
 }
 
 /// Refuses what is plainly no text, with a word on what it seems to be.
-fn refuse_binary(bytes: &[u8], path: &Path) -> Result<(), SourceError> {
+pub(crate) fn refuse_binary(bytes: &[u8], path: &Path) -> Result<(), SourceError> {
     match binary::in_text(bytes) {
         Some((offset, looks_like)) if !encoding::is_utf16(bytes) => Err(SourceError::Binary {
             path: shown_name(path).to_path_buf(),

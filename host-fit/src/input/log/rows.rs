@@ -10,7 +10,7 @@ use runtime::capacitive::{vertical_pose, vertical_rows};
 use runtime::{RawFrame, VerticalPose};
 
 /// Largest sensible rotation, rad: the models are linear in rotations.
-const ROTATION_MAX_RAD: f64 = 0.1;
+pub(crate) const ROTATION_MAX_RAD: f64 = 0.1;
 /// Largest sensible displacement, in full scales of the sensor that follows it: no sensor
 /// that is worth reading has a quarter of its designed sensitivity.
 const FULL_SCALES: f64 = 4.0;
@@ -36,6 +36,11 @@ pub(super) struct RowReader<'a> {
     between_codes: (usize, f64),
 }
 
+/// Largest displacement that a log may hold, m.
+pub(crate) fn displacement_max_m(stage: &Stage) -> f64 {
+    FULL_SCALES * full_scale_m(&stage.hall)
+}
+
 fn full_scale_m(scale: &CodeScale) -> f64 {
     let codes = scale.window.low.abs().max(scale.window.high.abs());
     scale.m_per_count * f64::from(codes)
@@ -50,7 +55,7 @@ impl<'a> RowReader<'a> {
             // A checked stage has its sensors in a triangle.
             vertical_rows: vertical_rows(&stage.capacitive_probes_m).unwrap_or_default(),
             y_baseline_m: stage.y_baseline_m,
-            displacement_max_m: FULL_SCALES * full_scale_m(&stage.hall),
+            displacement_max_m: displacement_max_m(stage),
             height_max_m: FULL_SCALES * full_scale_m(&stage.capacitive),
             keep_saturated,
             clock: Clock::default(),

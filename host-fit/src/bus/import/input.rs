@@ -1,0 +1,194 @@
+//! An input of text, plain or gzip, read line by line from its start as often as it is needed.
+
+use crate::input::source::{self, GZIP_MAGIC, SourceError};
+use crate::progress::Progress;
+use flate2::bufread::MultiGzDecoder;
+use std::fs::File;
+use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+/// Most bytes that are kept of an input that comes only once, such as a pipe: two days of bus.
+const SPOOL_BYTES_MAX: u64 = 16 << 30;
+
+/// Bytes that are read at a time.
+const BUFFER_BYTES: usize = 1 << 18;
+
+/// A file or a pipe, `-` for standard input.
+#[derive(Debug)]
+pub(super) struct Input {
+    path: PathBuf,
+    /// What came out of a pipe.
+    spooled: Option<File>,
+}
+
+impl Input {
+    /// What cannot be read `again` is copied to a temporary file if it must be.
+    ///
+    /// # Errors
+    /// Every variant of [`SourceError`] but `Utf16`.
+    pub(super) fn new(path: &Path, again: bool) -> Result<Self, SourceError> {
+        let path = path.to_path_buf();
+        let is_file = std::fs::metadata(&path).is_ok_and(|found| !is_pipe(&found));
+        let mut input = Self {
+            path,
+            spooled: None,
+        };
+        if again && (!is_file || source::is_standard(&input.path)) {
+            let spooled = input.spool()?;
+            input.spooled = Some(spooled);
+        }
+        Ok(input)
+    }
+
+    fn spool(&self) -> Result<File, SourceError> {
+        let unreadable = |error| self.unreadable(error);
+        let mut from = self.raw()?;
+        let start = source::probe(&mut from).map_err(unreadable)?;
+        if !start.starts_with(&GZIP_MAGIC) {
+            source::refuse_binary(&start, &self.path)?;
+        }
+        let mut copy = tempfile::tempfile().map_err(unreadable)?;
+        copy.write_all(&start).map_err(unreadable)?;
+        let copied = std::io::copy(&mut from.take(SPOOL_BYTES_MAX), &mut copy);
+        if copied.map_err(unreadable)? == SPOOL_BYTES_MAX {
+            return Err(SourceError::TooLarge {
+                path: source::shown_name(&self.path).to_path_buf(),
+                limit_bytes: SPOOL_BYTES_MAX,
+            });
+        }
+        Ok(copy)
+    }
+
+    /// The text from its start, with a bar that says `what` is done. What is plainly no text is
+    /// refused by its start: a device may have no end.
+    ///
+    /// # Errors
+    /// Every variant of [`SourceError`] but `Utf16`.
+    pub(super) fn open(&self, what: &'static str) -> Result<TextReader, SourceError> {
+        let raw = self.raw()?;
+        let length = std::fs::metadata(&self.path).map_or(0, |found| found.len());
+        let mut raw = Metered {
+            raw,
+            progress: (length > 0).then(|| Progress::new(what, length)),
+            bytes: 0,
+        };
+        let unreadable = |error| self.unreadable(error);
+        let start = source::probe(&mut raw).map_err(unreadable)?;
+        let is_gzip = start.starts_with(&GZIP_MAGIC);
+        let raw = BufReader::with_capacity(BUFFER_BYTES, std::io::Cursor::new(start).chain(raw));
+        let mut text = TextReader {
+            path: self.path.clone(),
+            text: match is_gzip {
+                false => Box::new(raw),
+                true => Box::new(BufReader::with_capacity(
+                    BUFFER_BYTES,
+                    MultiGzDecoder::new(raw),
+                )),
+            },
+            is_gzip,
+            bytes: 0,
+        };
+        let start = match text.text.fill_buf() {
+            Ok(start) => source::refuse_binary(start, &self.path).map(|()| None)?,
+            Err(error) => Some(error),
+        };
+        start.map_or(Ok(()), |error| Err(text.fault(error)))?;
+        Ok(text)
+    }
+
+    /// The bytes as they come.
+    fn raw(&self) -> Result<Box<dyn Read>, SourceError> {
+        let unreadable = |error| self.unreadable(error);
+        if let Some(spooled) = &self.spooled {
+            let mut copy = spooled.try_clone().map_err(unreadable)?;
+            copy.rewind().map_err(unreadable)?;
+            return Ok(Box::new(copy));
+        }
+        match source::is_standard(&self.path) {
+            true => Ok(Box::new(std::io::stdin())),
+            false => Ok(Box::new(File::open(&self.path).map_err(unreadable)?)),
+        }
+    }
+
+    fn unreadable(&self, error: std::io::Error) -> SourceError {
+        source::unreadable(&self.path, error)
+    }
+}
+
+/// Whether a second reader would not find what the first one has read.
+fn is_pipe(found: &std::fs::Metadata) -> bool {
+    !found.is_file() && !found.is_dir()
+}
+
+/// Tells how far reading is.
+struct Metered {
+    raw: Box<dyn Read>,
+    progress: Option<Progress>,
+    bytes: u64,
+}
+
+impl Read for Metered {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let read = self.raw.read(buffer)?;
+        self.bytes += read as u64;
+        if let Some(progress) = &self.progress {
+            progress.reach(self.bytes);
+        }
+        Ok(read)
+    }
+}
+
+/// Text on its way in.
+pub(super) struct TextReader {
+    path: PathBuf,
+    text: Box<dyn BufRead>,
+    is_gzip: bool,
+    bytes: usize,
+}
+
+/// A line of an input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Line {
+    /// It is whole.
+    Whole,
+    /// It is longer than asked for; what is left of it comes next.
+    Long,
+    /// There is none.
+    End,
+}
+
+impl TextReader {
+    /// Puts the next line, of at most `bytes_max`, into `line`, with its end.
+    ///
+    /// # Errors
+    /// `Unreadable`, `GzipCut`, `GzipDamaged`.
+    pub(super) fn line(
+        &mut self,
+        line: &mut Vec<u8>,
+        bytes_max: usize,
+    ) -> Result<Line, SourceError> {
+        line.clear();
+        let mut limited = (&mut self.text).take(bytes_max as u64);
+        let read = limited.read_until(b'\n', line);
+        self.bytes += read.map_err(|error| self.fault(error))?;
+        Ok(match line.last() {
+            None => Line::End,
+            Some(b'\n') => Line::Whole,
+            Some(_) if line.len() == bytes_max => Line::Long,
+            Some(_) => Line::Whole,
+        })
+    }
+
+    fn fault(&self, source: std::io::Error) -> SourceError {
+        let (path, bytes) = (source::shown_name(&self.path).to_path_buf(), self.bytes);
+        match source.kind() {
+            ErrorKind::UnexpectedEof if self.is_gzip => SourceError::GzipCut { path, bytes },
+            _ if self.is_gzip => SourceError::GzipDamaged {
+                path,
+                bytes,
+                source,
+            },
+            _ => source::unreadable(&path, source),
+        }
+    }
+}
