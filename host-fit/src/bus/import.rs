@@ -90,7 +90,7 @@ pub struct ImportReport {
 pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
     let stage = Stage::from_file(&settings.stage)?;
     let bus = Input::new(&settings.bus, settings.estimate_offset)?;
-    let reference = ReferenceInput::new(&settings.reference, &stage)?;
+    let reference = ReferenceInput::new(&settings.reference, settings.estimate_offset, &stage)?;
     let offset = match settings.estimate_offset {
         true => estimate(settings, &stage, &bus, &reference)?,
         false => Offset {
@@ -163,3 +163,7 @@ mod tests;
 #[cfg(test)]
 #[path = "import/controller_tests.rs"]
 mod controller_tests;
+
+#[cfg(test)]
+#[path = "import/hostile_tests.rs"]
+mod hostile_tests;

@@ -144,6 +144,11 @@ fn read_up_to(
     Ok(raw)
 }
 
+/// Whether a text that starts like this is UTF-16.
+pub(crate) fn is_utf16(start: &[u8]) -> bool {
+    encoding::is_utf16(start)
+}
+
 /// Whether a name means standard input.
 pub(crate) fn is_standard(path: &Path) -> bool {
     path.as_os_str() == STANDARD_INPUT.0

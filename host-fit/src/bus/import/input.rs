@@ -1,5 +1,7 @@
 //! An input of text, plain or gzip, read line by line from its start as often as it is needed.
 
+use super::ImportError;
+use crate::input::log::LogError;
 use crate::input::source::{self, GZIP_MAGIC, SourceError};
 use crate::progress::Progress;
 use flate2::bufread::MultiGzDecoder;
@@ -9,6 +11,12 @@ use std::path::{Path, PathBuf};
 
 /// Most bytes that are kept of an input that comes only once, such as a pipe: two days of bus.
 const SPOOL_BYTES_MAX: u64 = 16 << 30;
+
+/// Most bytes of UTF-16, which is turned into UTF-8 as a whole.
+const UTF16_BYTES_MAX: u64 = 1 << 30;
+
+/// Longest line of a block, in bytes.
+const LINE_BYTES_MAX: usize = 1 << 20;
 
 /// Bytes that are read at a time.
 const BUFFER_BYTES: usize = 1 << 18;
@@ -51,10 +59,7 @@ impl Input {
         copy.write_all(&start).map_err(unreadable)?;
         let copied = std::io::copy(&mut from.take(SPOOL_BYTES_MAX), &mut copy);
         if copied.map_err(unreadable)? == SPOOL_BYTES_MAX {
-            return Err(SourceError::TooLarge {
-                path: source::shown_name(&self.path).to_path_buf(),
-                limit_bytes: SPOOL_BYTES_MAX,
-            });
+            return Err(self.too_large(SPOOL_BYTES_MAX));
         }
         Ok(copy)
     }
@@ -86,13 +91,30 @@ impl Input {
                 )),
             },
             is_gzip,
+            line_end: b'\n',
             bytes: 0,
         };
-        let start = match text.text.fill_buf() {
-            Ok(start) => source::refuse_binary(start, &self.path).map(|()| None)?,
-            Err(error) => Some(error),
-        };
-        start.map_or(Ok(()), |error| Err(text.fault(error)))?;
+        match text.text.fill_buf() {
+            Ok(start) if source::is_utf16(start) => {
+                let mut bytes = Vec::new();
+                let read = (&mut text.text)
+                    .take(UTF16_BYTES_MAX)
+                    .read_to_end(&mut bytes);
+                if read.map_err(|error| text.fault(error))? as u64 == UTF16_BYTES_MAX {
+                    return Err(self.too_large(UTF16_BYTES_MAX));
+                }
+                let utf8 = source::to_utf8(&bytes, &self.path)?.into_owned();
+                text.text = Box::new(std::io::Cursor::new(utf8));
+            }
+            Ok(start) => source::refuse_binary(start, &self.path)?,
+            Err(error) => return Err(text.fault(error)),
+        }
+        if let Ok(start) = text.text.fill_buf()
+            && !start.contains(&b'\n')
+            && start.contains(&b'\r')
+        {
+            text.line_end = b'\r';
+        }
         Ok(text)
     }
 
@@ -107,6 +129,13 @@ impl Input {
         match source::is_standard(&self.path) {
             true => Ok(Box::new(std::io::stdin())),
             false => Ok(Box::new(File::open(&self.path).map_err(unreadable)?)),
+        }
+    }
+
+    fn too_large(&self, limit_bytes: u64) -> SourceError {
+        SourceError::TooLarge {
+            path: source::shown_name(&self.path).to_path_buf(),
+            limit_bytes,
         }
     }
 
@@ -143,6 +172,8 @@ pub(super) struct TextReader {
     path: PathBuf,
     text: Box<dyn BufRead>,
     is_gzip: bool,
+    /// A line feed, or a carriage return where there are no line feeds.
+    line_end: u8,
     bytes: usize,
 }
 
@@ -169,14 +200,40 @@ impl TextReader {
     ) -> Result<Line, SourceError> {
         line.clear();
         let mut limited = (&mut self.text).take(bytes_max as u64);
-        let read = limited.read_until(b'\n', line);
+        let read = limited.read_until(self.line_end, line);
         self.bytes += read.map_err(|error| self.fault(error))?;
         Ok(match line.last() {
             None => Line::End,
-            Some(b'\n') => Line::Whole,
+            Some(end) if *end == self.line_end => Line::Whole,
             Some(_) if line.len() == bytes_max => Line::Long,
             Some(_) => Line::Whole,
         })
+    }
+
+    /// Appends whole lines to `block` until it has so many bytes; `false` if there are none.
+    ///
+    /// # Errors
+    /// `LongLine`, `Unreadable`, `GzipCut`, `GzipDamaged`.
+    pub(super) fn block(&mut self, block: &mut Vec<u8>, bytes: usize) -> Result<bool, ImportError> {
+        let mut line = Vec::new();
+        let before = block.len();
+        while block.len() < bytes {
+            match self
+                .line(&mut line, LINE_BYTES_MAX)
+                .map_err(LogError::from)?
+            {
+                Line::End => break,
+                Line::Whole => block.extend_from_slice(&line),
+                Line::Long => {
+                    return Err(ImportError::LongLine {
+                        path: source::shown_name(&self.path).to_path_buf(),
+                        byte: self.bytes - line.len(),
+                        most: LINE_BYTES_MAX,
+                    });
+                }
+            }
+        }
+        Ok(block.len() > before)
     }
 
     fn fault(&self, source: std::io::Error) -> SourceError {

@@ -270,3 +270,17 @@ pub enum LogError {
         first: Box<LogError>,
     },
 }
+
+impl LogError {
+    /// The same so many lines further below, for a fault in a part of a file.
+    pub(crate) fn below(mut self, lines: usize) -> Self {
+        match &mut self {
+            Self::CellCount { line, .. } | Self::CutLine { line, .. } => *line += lines,
+            Self::Cell { place, .. }
+            | Self::TimeBackwards { place, .. }
+            | Self::MovementReturns { place, .. } => place.line += lines,
+            _ => {}
+        }
+        self
+    }
+}

@@ -14,7 +14,7 @@ use csv::ByteRecord;
 use std::path::Path;
 
 /// Written at the start of UTF-8 files by some programs.
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Longest unit in a row of units, in characters, with brackets.
 const UNIT_CHARACTERS: usize = 10;
@@ -101,6 +101,16 @@ impl<'a> Table<'a> {
             }),
             _ => Ok(()),
         }
+    }
+
+    /// Whether its numbers have decimal commas.
+    pub(crate) const fn has_decimal_commas(&self) -> bool {
+        self.decimal_commas
+    }
+
+    /// For a part of a text whose other parts tell that.
+    pub(crate) const fn set_decimal_commas(&mut self, known: bool) {
+        self.decimal_commas |= known;
     }
 
     /// Names of the columns, without white space around them.
