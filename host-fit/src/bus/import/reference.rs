@@ -134,11 +134,15 @@ impl<'s> ReferenceReader<'s> {
         let mut clock = Clock::default();
         let rows = cells.rows(&mut table, &mut clock)?;
         let header_bytes = rows.first().map_or(start.len(), |(_, byte)| *byte as usize);
+        let mut header = start.get(..header_bytes).unwrap_or_default().to_vec();
+        if !header.ends_with(b"\n") && !header.ends_with(b"\r") {
+            header.push(b'\n');
+        }
         let mut reader = Self {
             path,
             stage,
             text,
-            header: start.get(..header_bytes).unwrap_or_default().to_vec(),
+            header,
             decimal_commas: table.has_decimal_commas(),
             lines: 0,
             counts: ReferenceCounts {
