@@ -18,10 +18,13 @@ pub use warning::FitWarning;
 
 use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
-use crate::judge::identify::{FitFailure, check_described, check_determined, check_motion};
+use crate::judge::identify::{
+    FitFailure, check_described, check_determined, check_explained, check_motion,
+};
 use crate::judge::lag::{ReferenceLag, reference_lag};
 use crate::judge::statistics::PoseError;
 use crate::judge::uncertainty::uncertainty;
+use crate::judge::whole::WholeJudgement;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::Problem;
 use crate::problem::draw::draw_rows;
@@ -125,6 +128,8 @@ pub struct Fit {
     pub sound: PoseError,
     /// Over all rows, with the solver's own zero deviations.
     pub judgement_solver_zeros: Judgement,
+    /// Of a dataset that is an excerpt: errors over all rows of the logs, which the blob records.
+    pub whole: Option<WholeJudgement>,
     /// What the user should know.
     pub warnings: Vec<FitWarning>,
 }
@@ -143,7 +148,45 @@ pub fn fit(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<F
         fit.warnings
             .extend(FitWarning::of_lag(lag, stage.servo_period_s));
     }
+    fit.judge_whole(dataset, stage, settings)?;
     Ok(fit)
+}
+
+impl Fit {
+    /// The errors over all rows of the logs, if the dataset is an excerpt: those that count.
+    pub fn errors(&self) -> &PoseError {
+        match &self.whole {
+            Some(whole) => &whole.errors,
+            None => &self.judgement.errors,
+        }
+    }
+
+    /// Judges the fit of an excerpt on all rows.
+    fn judge_whole(
+        &mut self,
+        dataset: &Dataset,
+        stage: &Stage,
+        settings: &FitSettings,
+    ) -> Result<(), FitError> {
+        let Some(whole) = &dataset.whole else {
+            return Ok(());
+        };
+        let judged = WholeJudgement::new(&self.set, whole, stage, Zeros::of_model(self.model));
+        if !settings.force {
+            check_explained(judged.motion, &judged.errors, self.model)?;
+        }
+        let axes = judged.errors.axes;
+        self.set.fit = FitRecord {
+            rows: u32::try_from(whole.rows()).unwrap_or(u32::MAX),
+            rms: axes.map(|a| a.rms as f32),
+            peak: axes.map(|a| a.peak as f32),
+            ..self.set.fit
+        };
+        self.warnings
+            .extend(FitWarning::of_rest(&self.judgement.errors, &judged.errors));
+        self.whole = Some(judged);
+        Ok(())
+    }
 }
 
 /// What every model of a log is fitted with.
@@ -293,6 +336,7 @@ impl<'a> Job<'a> {
             decoded,
             judgement,
             sound,
+            whole: None,
         })
     }
 

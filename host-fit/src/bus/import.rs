@@ -26,7 +26,7 @@ pub mod write;
 pub use error::ImportError;
 
 use crate::input::stage::Stage;
-use crate::output::growing_file::GrowingFile;
+use crate::output::streamed_file::StreamedFile;
 use bus_log::BusCounts;
 use bus_reader::BusReader;
 use clock::{EvenTicks, Smoothing};
@@ -120,6 +120,9 @@ fn estimate(
     offset::estimate(&survey, reference, stage, search_us)
 }
 
+/// Bytes of the log that are written at a time, about.
+const TEXT_BYTES: usize = 1 << 16;
+
 /// Joins the two and writes the log.
 fn write(
     settings: &ImportSettings,
@@ -132,20 +135,25 @@ fn write(
     let tolerance_us = settings
         .tolerance_us
         .map_or(stage.servo_period_s * 1e6, f64::from);
-    let reference = reference.reader("importing")?;
+    let reference = reference.reader()?;
     let format = LogFormat::new(reference.quantities, stage);
     let mut join = Join::new(reference, tolerance_us)?;
-    let mut log = GrowingFile::create(&settings.out)?;
-    log.line(format.header())?;
+    let mut log = StreamedFile::create(&settings.out)?;
+    let mut text = format.header();
     while let Some((tick, t_us)) = ticks.next_tick()? {
         let period_us = ticks.smoothing().period_us;
         if let Some(row) = join.take(&tick, offset.on_reference_us(t_us), period_us)? {
-            log.line(format.row(&row))?;
+            format.append(&row, &mut text);
+            if text.len() > TEXT_BYTES {
+                log.write(text.as_bytes())?;
+                text.clear();
+            }
         }
     }
     let (bus, smoothing) = ticks.finish(settings, stage)?;
     let (join, reference) = join.finish()?;
     join.check()?;
+    log.write(text.as_bytes())?;
     log.finish()?;
     Ok(ImportReport {
         bus,

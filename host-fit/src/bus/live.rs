@@ -7,7 +7,6 @@
 mod bus;
 mod display;
 mod node;
-mod record;
 mod rhythm;
 mod run;
 
@@ -15,6 +14,7 @@ pub(crate) use bus::Bus;
 pub use bus::BusError;
 pub use run::run;
 
+use crate::output::OutputError;
 use crate::output::blob_file::BlobFileError;
 use hal_adapters::can::Timing;
 use runtime::OnInvalid;
@@ -30,7 +30,7 @@ pub struct LiveSettings {
     pub params: PathBuf,
     /// Serial number that the blob must have.
     pub serial: Option<String>,
-    /// Record every frame received and sent here, as `candump -L` does.
+    /// Record every frame received and sent here, as `candump -L` does; a file that is not there yet.
     pub record: Option<PathBuf>,
     /// What an invalid field reads.
     pub on_invalid: OnInvalid,
@@ -77,12 +77,15 @@ pub enum LiveError {
     /// The bus cannot be used.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The record cannot be written.
-    #[error("cannot record to {}: {cause}; the frames before it are kept", path.display())]
-    Record {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        cause: std::io::Error,
+    /// The record cannot be begun.
+    #[error("cannot record to {0}")]
+    NoRecord(OutputError),
+    /// The record ended before the run: it was decoded to its end all the same.
+    #[error("the record is not whole: {source}. It ends with the frames of {after_s:.0} s")]
+    RecordEnded {
+        /// Why.
+        source: OutputError,
+        /// Time from the start of the run to the end of the record, s.
+        after_s: f64,
     },
 }

@@ -19,7 +19,7 @@ use std::time::Duration;
 pub struct RecorderSettings {
     /// CAN interface, for instance can0.
     pub interface: String,
-    /// Where to write the record.
+    /// Where to write the record; a file that is not there yet.
     pub out: PathBuf,
     /// End after so long; on Ctrl-C if `None`.
     pub duration: Option<Duration>,
@@ -45,9 +45,12 @@ pub enum RecorderError {
     /// The bus cannot be used.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The record cannot be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
+    /// The record cannot be begun.
+    #[error("cannot record to {0}")]
+    NoRecord(OutputError),
+    /// The record ended before its time; what came before is kept.
+    #[error("the record is not whole: {0}. It ends with the last frame that there was room for")]
+    RecordEnded(#[from] OutputError),
     /// Nobody answers.
     #[error(
         "no controller on `{interface}` answered the request to send its codes within {waited_ms} ms; is it on, and is \

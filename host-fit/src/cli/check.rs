@@ -56,8 +56,8 @@ impl Checked {
         findings: Vec<Finding>,
     ) -> Self {
         Self {
-            rows: log.dataset.rows.len(),
-            movements: log.dataset.movements.len(),
+            rows: log.dataset.named().0,
+            movements: log.dataset.named().1,
             skipped_rows: log.skipped_rows,
             failure: fitted.err().map(ToString::to_string),
             warnings: super::warnings_of(log),
@@ -95,7 +95,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     let stage = Stage::from_file(&args.stage)?;
     let options = ReadOptions {
         split_s: args.split,
-        ..ReadOptions::default()
+        ..ReadOptions::FIT
     };
     let log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;
     let mut options = SolverOptions::new(Projection::Linear, 1);
@@ -124,7 +124,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     if let Ok(fit) = &fitted {
         terminal::print(&text::errors(
             &format!("errors of {}", fit.model.title()),
-            &fit.judgement.errors,
+            fit.errors(),
             None,
         ))?;
     }

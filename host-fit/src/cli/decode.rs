@@ -3,16 +3,15 @@
 use super::args::on_invalid;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::input::log::{self, ReadOptions};
 use crate::input::stage::Stage;
-use crate::output;
 use crate::output::blob_file;
-use crate::output::pose_file::{self, StatusCounts};
+use crate::output::pose_file::{self, DecodeSettings, PoseFormat};
 use crate::output::posterior_file::{self, PosteriorFileError};
+use crate::output::streamed_file::StreamedFile;
 use crate::problem::model::Model;
 use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::posterior::Posterior;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use runtime::ParameterSet;
 use std::path::{Path, PathBuf};
 
@@ -38,6 +37,27 @@ pub(super) struct DecodeArgs {
     /// columns. For a blob of the field model with its posterior beside it.
     #[arg(long)]
     uncertainty: bool,
+    /// How poses are written.
+    #[arg(long, value_enum, default_value = "csv")]
+    format: FormatChoice,
+}
+
+/// How `decode` writes poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum FormatChoice {
+    /// Text.
+    Csv,
+    /// A structured array for numpy.load, in SI units, the decoder's words bit for bit.
+    Npy,
+}
+
+impl FormatChoice {
+    const fn format(self) -> PoseFormat {
+        match self {
+            Self::Csv => PoseFormat::Csv,
+            Self::Npy => PoseFormat::Npy,
+        }
+    }
 }
 
 /// Decodes a log into a pose file.
@@ -56,23 +76,21 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     } else {
         None
     };
-    let logs = std::slice::from_ref(&args.log);
-    let log = terminal::timed("reading", || log::read(logs, &stage, &ReadOptions::DECODE))?;
-    let on_invalid = on_invalid(args.hold);
-    let decoded = terminal::timed("decoding", || {
-        pose_file::decode(&log.dataset, &set.decoder(), on_invalid)
-    });
-    terminal::timed("writing", || {
-        let text = match &posterior {
-            Some(posterior) => {
-                let uncertainties = pose_file::uncertainties(&decoded, posterior);
-                pose_file::with_uncertainties(&decoded, &uncertainties)
-            }
-            None => pose_file::to_text(&decoded),
-        };
-        output::write_atomically(&args.out, &text)
-    })?;
-    let counts = StatusCounts::of(&decoded);
+    let out = StreamedFile::create(&args.out)?;
+    if args.format == FormatChoice::Npy && !out.is_file() {
+        return Err(HostError::Usage {
+            argument: "--format npy",
+            problem: "the number of rows stands at the start of the array, so that it cannot be written to a pipe or device: name a file".to_owned(),
+        });
+    }
+    let settings = DecodeSettings {
+        decoder: &set.decoder(),
+        on_invalid: on_invalid(args.hold),
+        posterior: posterior.as_ref(),
+        format: args.format.format(),
+    };
+    let decode = || pose_file::decode_log::<HostError>(&args.log, &stage, &settings, out);
+    let (counts, log) = terminal::timed("decoding", decode)?;
     let mut summary = format!(
         "{} rows, {} of them with status 0\n",
         counts.rows, counts.good

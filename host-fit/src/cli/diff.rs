@@ -1,5 +1,6 @@
 //! `host-fit diff`.
 
+use super::inspect::{errors, micro, or_dash};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::diff::{
@@ -78,10 +79,6 @@ fn standard_errors(set: &ParameterSet, blob: &Path) -> Result<BTreeMap<String, f
     Ok((0..COUNT).map(error).collect())
 }
 
-fn or_dash(text: &str) -> &str {
-    if text.is_empty() { "-" } else { text }
-}
-
 fn as_json(
     paths: [&Path; 2],
     sets: [&ParameterSet; 2],
@@ -93,7 +90,7 @@ fn as_json(
         let errors: serde_json::Map<String, Value> = (0..3)
             .map(|axis| {
                 let (name, unit) = AXES[axis];
-                let (rms, peak) = (set.fit.rms[axis] * 1e6, set.fit.peak[axis] * 1e6);
+                let (rms, peak) = (micro(set.fit.rms[axis]), micro(set.fit.peak[axis]));
                 let figures = json!({ format!("rmse_{unit}"): rms, format!("peak_{unit}"): peak });
                 (name.to_owned(), figures)
             })
@@ -151,19 +148,15 @@ fn as_text(
     let mut line = |title: &str, of: &dyn Fn(usize) -> String| {
         let _ = writeln!(out, "{title:<18}{:<34}  {}", of(0), of(1));
     };
-    let micro = |words: [f32; 3]| {
-        let [x, y, rz] = words.map(|e| e * 1e6);
-        format!("{x:.3} um, {y:.3} um, {rz:.3} urad")
-    };
-    line("", &|k| paths[k].display().to_string());
+    line("", &|k| or_dash(&paths[k].to_string_lossy()));
     line("model", &|k| format!("({})", Model::of(sets[k].model).name));
-    line("serial", &|k| or_dash(&sets[k].serial).to_owned());
-    line("created", &|k| or_dash(&sets[k].created).to_owned());
+    line("serial", &|k| or_dash(&sets[k].serial));
+    line("created", &|k| or_dash(&sets[k].created));
     line("rows (fitted)", &|k| {
         format!("{} ({})", sets[k].fit.rows, sets[k].fit.train_rows)
     });
-    line("rms X, Y, Rz", &|k| micro(sets[k].fit.rms));
-    line("peak X, Y, Rz", &|k| micro(sets[k].fit.peak));
+    line("rms X, Y, Rz", &|k| errors(sets[k].fit.rms));
+    line("peak X, Y, Rz", &|k| errors(sets[k].fit.peak));
     let same = if sets[0].logs_sha256 == sets[1].logs_sha256 {
         "the same logs"
     } else {

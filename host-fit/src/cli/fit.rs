@@ -8,9 +8,10 @@ use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::diagnose;
 use crate::diagnose::finding::{Finding, Severity};
+use crate::diagnose::of_fit;
 use crate::fit::{Fit, FitError, FitSettings, ModelChoice, cross_validate, fit, fit_compensated};
 use crate::input::log;
-use crate::input::log::{BadRows, ReadOptions};
+use crate::input::log::{BadRows, LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
 use crate::output;
@@ -157,7 +158,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let options = ReadOptions {
         bad_rows: args.bad_rows,
         split_s: args.split,
-        ..ReadOptions::default()
+        ..ReadOptions::FIT
     };
     // Before the work, so that no blob is left without the figures that were asked for.
     output::check_writable(&args.out)?;
@@ -201,19 +202,16 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
             fit(&log.dataset, &stage, &settings)
         }
     });
-    let findings = if interrupt::requested() {
-        Vec::new()
-    } else {
-        terminal::timed("diagnosis", || {
-            diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
-        })
-    };
+    let is_interrupted = interrupt::requested();
+    if let (Err(error), true) = (&fitted, is_interrupted) {
+        return Err(HostError::Interrupted {
+            kept: format!("nothing was written: {error}"),
+        });
+    }
+    let findings = terminal::timed("diagnosis", || {
+        diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
+    });
     let mut fit = match fitted {
-        Err(error) if interrupt::requested() => {
-            return Err(HostError::Interrupted {
-                kept: format!("no parameter blob was written: {error}"),
-            });
-        }
         // No fit was tried: the arguments do not go together.
         Err(FitError::Solver(error @ SolveError::Unsupported { .. })) => {
             return Err(HostError::Usage {
@@ -244,7 +242,15 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         }
         Ok(fit) => fit,
     };
-    let refusal = refusal(&fit, &findings, args.limit.as_ref());
+    let unfinished = || is_interrupted.then(|| unfinished(&fit, &log)).flatten();
+    let refusal = refusal(&fit, &findings, args.limit.as_ref()).or_else(unfinished);
+    if let (Some(cause), true, false) = (&refusal, is_interrupted, args.force) {
+        return Err(HostError::Interrupted {
+            kept: format!(
+                "nothing was written: {cause}; let it run longer, or take it with --force"
+            ),
+        });
+    }
     fit.set.fit.forced = refusal.is_some();
     let circumstances = Circumstances {
         findings,
@@ -329,9 +335,19 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
 fn refusal(fit: &Fit, findings: &[Finding], limits: Option<&Limits>) -> Option<String> {
     let refused = diagnose::messages(findings, Severity::Refuse);
     if refused.is_empty() {
-        return limits?.exceeded(&fit.judgement.errors);
+        return limits?.exceeded(fit.errors());
     }
     Some(format!("the log is refused: {refused}"))
+}
+
+/// Why a search that was interrupted is not to be written: a finished one leaves little but noise.
+fn unfinished(fit: &Fit, log: &LogReading) -> Option<String> {
+    let found = of_fit::unexplained(fit, &log.dataset)?;
+    let (rms, unit) = (found.value?, found.unit?);
+    Some(format!(
+        "the best so far has errors of {rms:.1} {unit} rms, more than {} times the noise from sample to sample",
+        of_fit::ERROR_TO_NOISE_MAX
+    ))
 }
 
 /// Only least squares has weights.

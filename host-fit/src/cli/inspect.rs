@@ -34,6 +34,27 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     terminal::print(&as_text(&set))
 }
 
+/// A text of a blob, in a line of its own.
+pub(super) fn or_dash(text: &str) -> String {
+    match text {
+        "" => "-".to_owned(),
+        text => terminal::plain(text, "").into_owned(),
+    }
+}
+
+/// Errors of a fit in X, Y, Rz (m, m, rad), as a line.
+pub(super) fn errors(errors: [f32; 3]) -> String {
+    let shown = |e: Option<f64>| e.map_or_else(|| "unknown".to_owned(), |e| format!("{e:.3}"));
+    let [x, y, rz] = errors.map(micro).map(shown);
+    format!("{x} um, {y} um, {rz} urad")
+}
+
+/// An error of a fit in um or urad. None is below zero, or 1 m or more, which the blob of another
+/// program may hold.
+pub(super) fn micro(error: f32) -> Option<f64> {
+    (0.0..1.0).contains(&error).then(|| f64::from(error) * 1e6)
+}
+
 fn as_json(set: &ParameterSet) -> serde_json::Value {
     let c = &set.constants;
     json!({
@@ -47,9 +68,9 @@ fn as_json(set: &ParameterSet) -> serde_json::Value {
             "train_rows": set.fit.train_rows,
             "forced": set.fit.forced,
             "errors": {
-                "x": { "rmse_um": set.fit.rms[0] * 1e6, "peak_um": set.fit.peak[0] * 1e6 },
-                "y": { "rmse_um": set.fit.rms[1] * 1e6, "peak_um": set.fit.peak[1] * 1e6 },
-                "rz": { "rmse_urad": set.fit.rms[2] * 1e6, "peak_urad": set.fit.peak[2] * 1e6 },
+                "x": { "rmse_um": micro(set.fit.rms[0]), "peak_um": micro(set.fit.peak[0]) },
+                "y": { "rmse_um": micro(set.fit.rms[1]), "peak_um": micro(set.fit.peak[1]) },
+                "rz": { "rmse_urad": micro(set.fit.rms[2]), "peak_urad": micro(set.fit.peak[2]) },
             },
         },
         "parameters": parameters_in(set),
@@ -73,13 +94,6 @@ fn as_json(set: &ParameterSet) -> serde_json::Value {
 fn as_text(set: &ParameterSet) -> String {
     let c = &set.constants;
     let mut out = String::new();
-    let or_dash = |text: &str| {
-        if text.is_empty() {
-            "-".to_owned()
-        } else {
-            text.to_owned()
-        }
-    };
     let _ = writeln!(out, "layout          {}", set.layout_version());
     let _ = writeln!(out, "model           ({})", Model::of(set.model).name);
     let _ = writeln!(out, "serial          {}", or_dash(&set.serial));
@@ -95,10 +109,8 @@ fn as_text(set: &ParameterSet) -> String {
             "FORCED          the log was refused, or the errors beyond --limit: written all the same (--force)\n",
         );
     }
-    let [x, y, rz] = set.fit.rms.map(|e| e * 1e6);
-    let _ = writeln!(out, "rms error       {x:.3} um, {y:.3} um, {rz:.3} urad");
-    let [x, y, rz] = set.fit.peak.map(|e| e * 1e6);
-    let _ = writeln!(out, "peak error      {x:.3} um, {y:.3} um, {rz:.3} urad");
+    let _ = writeln!(out, "rms error       {}", errors(set.fit.rms));
+    let _ = writeln!(out, "peak error      {}", errors(set.fit.peak));
     for (name, p) in parameters_in(set) {
         let (value, unit) = shown(p.value, p.unit);
         let _ = writeln!(out, "{name:<15} {value:>14.7} {unit}");

@@ -20,7 +20,7 @@ pub(super) struct LiveArgs {
     /// Refuse a blob of another stage than the one with this serial number.
     #[arg(long, value_name = "TEXT")]
     serial: Option<String>,
-    /// Record every frame received and sent, as `candump -L` does.
+    /// Record every frame received and sent, as `candump -L` does, in a new file.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Repeat the last valid pose for at most so many ticks where codes are bad.
@@ -53,7 +53,7 @@ fn vertical_ticks(text: &str) -> Result<u8, &'static str> {
     }
 }
 
-/// Decodes a bus. The record is made anew, so it must not be the blob.
+/// Decodes a bus.
 pub(super) fn run(args: LiveArgs) -> Result<(), HostError> {
     super::keep_apart(&[args.record.as_deref()], &[&args.params])?;
     live::run(&LiveSettings {

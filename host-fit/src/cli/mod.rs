@@ -31,7 +31,7 @@ mod update;
 use crate::cli::error::HostError;
 use crate::input::log::{LogReading, LogWarning, ReadOptions, ReferenceUse};
 use crate::input::stage::Stage;
-use crate::output::{is_standard, write_atomically};
+use crate::output::{Place, is_standard, is_standard_output, write_atomically};
 use crate::progress;
 use crate::report::json::Circumstances;
 use clap::{Parser, Subcommand};
@@ -151,6 +151,8 @@ pub fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
+        // Who reads standard output, as `head` does, has seen enough.
+        Err(error) if terminal::is_closed(&error) => ExitCode::SUCCESS,
         Err(error) => {
             terminal::fail(&error);
             ExitCode::from(error.exit_status())
@@ -178,27 +180,18 @@ fn wrote(paths: impl IntoIterator<Item = Option<PathBuf>>) -> Result<(), HostErr
     Ok(())
 }
 
-/// Refuses outputs that would replace an input, or each other. Where one goes to standard output,
-/// nothing else does from now on.
+/// Refuses outputs that are an input, or each other, by whatever name. Where one goes to standard
+/// output, nothing else does from now on.
 fn keep_apart(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<(), HostError> {
-    // A file that is not there yet is known by its folder and its name.
-    let new = |path: &Path| {
-        let folder = match path.parent()? {
-            parent if parent.as_os_str().is_empty() => Path::new("."),
-            parent => parent,
-        };
-        Some(folder.canonicalize().ok()?.join(path.file_name()?))
-    };
-    let place = |path: &Path| {
-        let there = path.canonicalize().ok().or_else(|| new(path));
-        there.unwrap_or_else(|| path.to_owned())
-    };
     // Standard input is not standard output.
     let files = inputs.iter().filter(|path| !is_standard(path));
-    let mut taken: Vec<_> = files.map(|path| place(path)).collect();
+    let mut taken: Vec<_> = files.map(|path| Place::of(path)).collect();
     for output in outputs.iter().flatten() {
-        let here = place(output);
-        if is_standard(output) {
+        let here = match is_standard(output) {
+            true => Place::of(Path::new("/dev/stdout")),
+            false => Place::of(output),
+        };
+        if is_standard_output(output) {
             terminal::keep_for_output();
         }
         if taken.contains(&here) {

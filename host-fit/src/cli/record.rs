@@ -14,7 +14,7 @@ pub(super) struct RecordArgs {
     /// CAN interface, for instance can0.
     #[arg(value_name = "IFACE")]
     can: String,
-    /// Where to write the record, as `candump -L` does: for `import`.
+    /// Where to write the record, as `candump -L` does, for `import`: a new file.
     #[arg(long, value_name = "BUS.log")]
     out: PathBuf,
     /// End after so many seconds; without it, on Ctrl-C.

@@ -1,10 +1,13 @@
 //! What goes to the terminal: tables to standard output, notes, warnings and errors to standard error.
 //!
-//! Where standard output carries an output of the command (`--json -`), no table goes there.
+//! Where standard output carries an output of the command (`--json -`), tables go to standard error.
+//! Nothing that a file holds moves the cursor or begins a line here: see [`plain`].
 
 use crate::cli::error::HostError;
 use crate::diagnose::finding::{Finding, Severity};
 use anstyle::{AnsiColor, Style};
+use std::borrow::Cow;
+use std::error::Error;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::sync::atomic::{AtomicBool, AtomicI8, Ordering};
@@ -32,7 +35,12 @@ pub(super) fn is_quiet() -> bool {
 
 /// Writes a table to standard output. A reader that closes the pipe early, as `head` does, is no error.
 pub(super) fn print(text: &str) -> Result<(), HostError> {
-    if is_quiet() || TAKEN.load(Ordering::Relaxed) {
+    if is_quiet() {
+        return Ok(());
+    }
+    let text = plain(text, "\n");
+    if TAKEN.load(Ordering::Relaxed) {
+        let _ = std::io::stderr().write_all(text.as_bytes());
         return Ok(());
     }
     let mut out = std::io::stdout().lock();
@@ -40,6 +48,37 @@ pub(super) fn print(text: &str) -> Result<(), HostError> {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(HostError::Standard(error)),
         _ => Ok(()),
     }
+}
+
+/// Whether an error says no more than that the reader of an output on standard output has closed it.
+pub(super) fn is_closed(error: &HostError) -> bool {
+    let mut causes = std::iter::successors(error.source(), |&cause| cause.source());
+    let is_closed = |cause: &(dyn Error + 'static)| {
+        let cause = cause.downcast_ref::<std::io::Error>();
+        cause.is_some_and(|cause| cause.kind() == ErrorKind::BrokenPipe)
+    };
+    TAKEN.load(Ordering::Relaxed) && causes.any(is_closed)
+}
+
+/// Text with its control characters escaped, those of `kept` excepted, and those that reorder what
+/// stands beside them: a name, cell or serial number of a file shows as it is and forges no line.
+pub(super) fn plain<'t>(text: &'t str, kept: &str) -> Cow<'t, str> {
+    let harmful = |c: char| {
+        let moves = c.is_control()
+            || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{2028}' | '\u{2029}');
+        moves && !kept.contains(c)
+    };
+    if !text.contains(harmful) {
+        return Cow::Borrowed(text);
+    }
+    let mut plain = String::with_capacity(text.len());
+    for c in text.chars() {
+        match harmful(c) {
+            true => plain.extend(c.escape_default()),
+            false => plain.push(c),
+        }
+    }
+    Cow::Owned(plain)
 }
 
 /// Does a step; `--verbose` tells how long it took.
@@ -80,5 +119,7 @@ pub(super) fn fail(error: &HostError) {
 /// reason to fail.
 fn line(start: &str, color: AnsiColor, text: impl Display) {
     let style = Style::new().bold().fg_color(Some(color.into()));
+    let text = text.to_string();
+    let text = plain(&text, "");
     let _ = writeln!(anstream::stderr(), "{style}{start}:{style:#} {text}");
 }

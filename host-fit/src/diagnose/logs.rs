@@ -227,7 +227,9 @@ mod tests {
         let rest = |movement, count| movement >= count / 3;
         let even = |movement, _| movement % 2 == 0;
         let odd = |movement, _| movement % 2 == 1;
-        let stages = 1..=STAGES;
+        // Of 12 stages, 60 pairs of either kind, those of one have at most 1.089 times the errors and
+        // those of two at least 1.918 times.
+        let stages = 1..=3;
         let logs = |protocol| -> Vec<Dataset> {
             stages
                 .clone()
@@ -235,8 +237,6 @@ mod tests {
                 .collect()
         };
         let (paper, combined) = (logs(Protocol::Paper), logs(Protocol::Combined));
-        let mut clean: f64 = 0.0;
-        let mut mixed = f64::INFINITY;
         for k in 0..paper.len() {
             let other = (k + 1) % paper.len();
             for (one, two, takes) in [
@@ -248,23 +248,12 @@ mod tests {
             ] {
                 for (second, is_mixed) in [(k, false), (other, true)] {
                     let dataset = joined([&one[k], &two[second]], takes);
-                    let better = better_alone(&fits_of_logs(&dataset, &stage).expect("fitted"));
                     let found = disagreement(&dataset, &stage);
-                    let severity = found.map(|found| found.severity);
-                    match is_mixed {
-                        true => {
-                            mixed = mixed.min(better);
-                            assert_eq!(severity, Some(Severity::Refuse), "{better}");
-                        }
-                        false => {
-                            clean = clean.max(better);
-                            assert_eq!(severity, None, "{better}");
-                        }
-                    }
+                    let better = fits_of_logs(&dataset, &stage).map(|logs| better_alone(&logs));
+                    let want = is_mixed.then_some(Severity::Refuse);
+                    assert_eq!(found.map(|found| found.severity), want, "{better:?}");
                 }
             }
         }
-        eprintln!("RATIO clean {clean} mixed {mixed}");
     }
-    const STAGES: u64 = 12;
 }

@@ -33,7 +33,7 @@ pub(super) fn undescribed(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
 }
 
 /// Errors far above the noise from sample to sample.
-pub(super) fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
+pub fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     const AXES: [(&str, &str, &str); 3] =
         [("x", "X", "um"), ("y", "Y", "um"), ("rz", "Rz", "urad")];
     let errors = fit.decoded.errors_less(&fit.judgement.zeros, dataset);
@@ -109,6 +109,17 @@ pub(super) fn of_warning(told: &FitWarning) -> Option<Finding> {
             value: Some(*moved_micro),
             unit: Some(unit),
             ..warning(Code::OutOfRange)
+        },
+        FitWarning::RestDiffers {
+            axis,
+            unit,
+            all_micro,
+            ..
+        } => Finding {
+            channel: Some(axis.to_lowercase()),
+            value: Some(*all_micro),
+            unit: Some(unit),
+            ..warning(Code::ModelLacks)
         },
         FitWarning::Undecoded { rows } => Finding {
             value: Some(*rows as f64),

@@ -197,6 +197,7 @@ impl Job<'_> {
             judgement,
             sound,
             field: Some(field),
+            whole: None,
         })
     }
 }

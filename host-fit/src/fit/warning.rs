@@ -4,7 +4,7 @@ use crate::input::dataset::Dataset;
 use crate::input::stage::{AXES, Stage};
 use crate::judge::Judgement;
 use crate::judge::lag::ReferenceLag;
-use crate::judge::statistics::AxisError;
+use crate::judge::statistics::{AxisError, PoseError};
 use crate::problem::Problem;
 use crate::problem::model::ParameterId;
 use crate::problem::terms::shown;
@@ -99,6 +99,21 @@ pub enum FitWarning {
         /// How far service goes, um or urad.
         service_micro: f64,
     },
+    /// Rows of a long log that were not fitted have other errors than those that were.
+    #[error(
+        "over all rows the error in {axis} is {all_micro:.2} {unit} rms, over those that were fitted {fitted_micro:.2}: a \
+         movement so long that the reference drifts, or a fault elsewhere in the log; run `host-fit check` on parts of it"
+    )]
+    RestDiffers {
+        /// The axis.
+        axis: &'static str,
+        /// um or urad.
+        unit: &'static str,
+        /// rms over all rows, um or urad.
+        all_micro: f64,
+        /// rms over the rows that were fitted, um or urad.
+        fitted_micro: f64,
+    },
     /// Rows that the decoder refused count in no error.
     #[error("{rows} rows have codes that the decoder refuses; they are not part of the errors")]
     Undecoded {
@@ -115,7 +130,22 @@ const LAG_ERRORS_MIN: f64 = 3.0;
 /// A log that moves an axis over less than this part of its range in service is told.
 const RANGE_MIN: f64 = 0.5;
 
+/// Errors over all rows that are this many times those over an excerpt are told.
+const REST_MAX: f64 = 1.5;
+
 impl FitWarning {
+    /// Of the axis in which errors over all rows are farthest above those over the excerpt fitted.
+    pub(super) fn of_rest(fitted: &PoseError, all: &PoseError) -> Option<Self> {
+        let ratio = |axis: usize| all.axes[axis].rms / fitted.axes[axis].rms;
+        let worst = (0..3).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
+        (ratio(worst) > REST_MAX).then(|| Self::RestDiffers {
+            axis: ["X", "Y", "Rz"][worst],
+            unit: ["um", "um", "urad"][worst],
+            all_micro: all.axes[worst].rms * 1e6,
+            fitted_micro: fitted.axes[worst].rms * 1e6,
+        })
+    }
+
     /// Of the axes that the log moves (X, Y, Rz and Z, Rx, Ry: largest magnitudes, m, rad) far less
     /// than service does.
     pub(super) fn of_ranges(stage: &Stage, planar: [f64; 3], vertical: [f64; 3]) -> Vec<Self> {

@@ -1,7 +1,16 @@
 //! A log as the fit sees it: rows in SI units, grouped by movement.
 
+use super::stage::Stage;
+use super::whole::Whole;
+use super::whole::chunk::{Sample, SampledVertical};
+use runtime::capacitive::{vertical_pose, vertical_rows};
 use runtime::{AnyDecoder, PlanarPose, RawFrame, Reading, VerticalPose};
 use std::path::PathBuf;
+use std::sync::Arc;
+
+/// The most rows that a fit works on. Of longer logs it takes runs of rows that tell most of the
+/// motion: what more rows would add to a calibration is far below the noise of a pose.
+pub const FIT_ROWS_MAX: usize = 250_000;
 
 /// What one servo period of a log gives the decoder.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,6 +93,47 @@ pub struct Row {
     pub reference: [f64; 3],
 }
 
+/// What turns codes into rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scales {
+    hall_m_per_code: f64,
+    capacitive_m_per_code: f64,
+    vertical_rows: [[f64; 3]; 3],
+}
+
+impl Scales {
+    /// The scales of a stage.
+    pub fn of(stage: &Stage) -> Self {
+        Self {
+            hall_m_per_code: stage.hall.m_per_count,
+            capacitive_m_per_code: stage.capacitive.m_per_count,
+            // A checked stage has its sensors in a triangle.
+            vertical_rows: vertical_rows(&stage.capacitive_probes_m).unwrap_or_default(),
+        }
+    }
+
+    /// The row of a sample in a movement of a dataset; its sequence number is still 0.
+    pub fn row(&self, movement: usize, sample: &Sample) -> Row {
+        let vertical = match sample.vertical {
+            SampledVertical::Codes(capacitive) => {
+                let gaps_m = capacitive.map(|code| f64::from(code) * self.capacitive_m_per_code);
+                vertical_pose(&self.vertical_rows, gaps_m).to_array()
+            }
+            SampledVertical::Pose(vertical) => vertical,
+        };
+        Row {
+            movement,
+            t_us: sample.t_us,
+            frame: sample.frame(),
+            signal_m: sample
+                .hall
+                .map(|code| f64::from(code) * self.hall_m_per_code),
+            vertical,
+            reference: sample.reference,
+        }
+    }
+}
+
 /// One movement of one log: between its start and its end the interferometers were not reset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Movement {
@@ -117,9 +167,19 @@ pub struct Dataset {
     pub logs: Vec<LogSource>,
     /// SHA-256 of the decompressed logs, one after the other.
     pub sha256: [u8; 32],
+    /// All rows of logs of which those above are an excerpt; `None` where they are all.
+    pub whole: Option<Arc<Whole>>,
 }
 
 impl Dataset {
+    /// Rows and movements of the logs named, those included that are not in an excerpt.
+    pub fn named(&self) -> (usize, usize) {
+        match &self.whole {
+            Some(whole) => (whole.rows(), whole.movements().len()),
+            None => (self.rows.len(), self.movements.len()),
+        }
+    }
+
     /// How to name a movement: its number, after the name of its log where there are several.
     pub fn movement_name(&self, movement: &Movement) -> String {
         match self.logs.get(movement.log) {
@@ -139,6 +199,7 @@ impl Dataset {
             movements: Vec::new(),
             logs: self.logs.clone(),
             sha256: self.sha256,
+            whole: None,
         };
         for movement in &self.movements {
             let rows = &self.rows[movement.rows.clone()];
@@ -168,6 +229,7 @@ impl Dataset {
             movements: Vec::new(),
             logs: self.logs.clone(),
             sha256: self.sha256,
+            whole: None,
         };
         for movement in &self.movements {
             let (start, number) = (out.rows.len(), out.movements.len());

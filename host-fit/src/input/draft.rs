@@ -8,11 +8,12 @@ use super::log::LogError;
 use super::log::cell;
 use super::log::guess::guess;
 use super::log::layout::{Kind, Quantity};
-use super::log::table::Table;
+use super::log::table::{Head, Table};
 use super::log::time::{self, Clock};
 use super::log::units;
 use super::shipped::STAGE_TOML;
 use super::source;
+use super::text::TextReader;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -54,12 +55,10 @@ pub fn draft<P: AsRef<Path>>(logs: &[P]) -> Result<Draft, LogError> {
     let mut columns: Vec<LogColumn> = Vec::new();
     let mut period_s = None;
     for path in logs {
-        let text = source::read_text(path.as_ref())?;
-        let path = source::shown_name(path.as_ref());
-        let text = source::to_utf8(&text, path)?;
-        let mut table = Table::open(path, &text, |name| guess(name).is_some())?;
-        for cell in 0..table.names().len() {
-            let column = LogColumn::of(&table, cell);
+        let text = TextReader::open(path.as_ref())?;
+        let mut table = Table::open(text, |name| guess(name).is_some())?;
+        for cell in 0..table.head.names.len() {
+            let column = LogColumn::of(&table.head, cell);
             let is_new = columns.iter().all(|known| known.name != column.name);
             if is_new && !column.name.is_empty() {
                 columns.push(column);
@@ -83,8 +82,8 @@ pub fn draft<P: AsRef<Path>>(logs: &[P]) -> Result<Draft, LogError> {
 }
 
 impl LogColumn {
-    fn of(table: &Table<'_>, cell: usize) -> Self {
-        let name = table.names().get(cell).cloned().unwrap_or_default();
+    fn of(table: &Head, cell: usize) -> Self {
+        let name = table.names.get(cell).cloned().unwrap_or_default();
         let quantity = guess(&name);
         let named = units::split(&name).1.map(str::to_owned);
         let in_name = named.is_some();
@@ -133,10 +132,10 @@ fn settle(columns: &mut [LogColumn]) {
 /// The median time between rows, s; `None` if the log does not tell it.
 fn period(table: &mut Table<'_>) -> Result<Option<f64>, LogError> {
     let is_time = |name: &String| guess(name) == Some(Quantity::Time);
-    let Some(cell) = table.names().iter().position(is_time) else {
+    let Some(cell) = table.head.names.iter().position(is_time) else {
         return Ok(None);
     };
-    let column = LogColumn::of(table, cell);
+    let column = LogColumn::of(&table.head, cell);
     let Some(scale) = column.unit.and_then(|unit| Kind::Time.unit(&unit)) else {
         return Ok(None);
     };

@@ -1,6 +1,5 @@
 //! Text in UTF-16, as spreadsheets and instruments under Windows save it, turned into UTF-8.
 
-use std::borrow::Cow;
 use std::ops::Range;
 
 /// The first bytes of UTF-16, and whether the low byte of a character comes first.
@@ -25,59 +24,98 @@ fn byte_order(bytes: &[u8]) -> Option<(bool, usize)> {
     (pairs.iter().all(|pair| high_first(pair))).then_some((false, 0))
 }
 
-/// Whether a text that starts like this is UTF-16.
-pub(super) fn is_utf16(start: &[u8]) -> bool {
-    byte_order(start).is_some()
+/// Decodes UTF-16 piece by piece.
+#[derive(Debug)]
+pub(super) struct Utf16 {
+    low_first: bool,
+    /// Bytes that were taken, with the mark.
+    taken: usize,
+    /// Bytes of the last piece that are half a character.
+    rest: Vec<u8>,
 }
 
-/// The text as UTF-8 where it is UTF-16, with either order of bytes, and as it is where it is
-/// not.
-///
-/// # Errors
-/// The first bytes that are no character, from 0.
-pub(super) fn to_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, Range<usize>> {
-    let Some((low_first, mark)) = byte_order(bytes) else {
-        return Ok(bytes.into());
-    };
-    let (pairs, rest) = bytes.get(mark..).unwrap_or_default().as_chunks::<2>();
-    if !rest.is_empty() {
-        return Err(bytes.len() - rest.len()..bytes.len());
+impl Utf16 {
+    /// For a text that starts like this, if that is UTF-16, and how many bytes its mark has.
+    pub(super) fn of_start(start: &[u8]) -> Option<(Self, usize)> {
+        let (low_first, mark) = byte_order(start)?;
+        let decoder = Self {
+            low_first,
+            taken: mark,
+            rest: Vec::new(),
+        };
+        Some((decoder, mark))
     }
-    let unit = |pair: &[u8; 2]| match low_first {
-        true => u16::from_le_bytes(*pair),
-        false => u16::from_be_bytes(*pair),
-    };
-    let mut text = String::with_capacity(pairs.len());
-    let mut units = 0;
-    for character in char::decode_utf16(pairs.iter().map(unit)) {
-        let at = mark + 2 * units;
-        let character = character.map_err(|_| at..at + 2)?;
-        units += character.len_utf16();
-        text.push(character);
+
+    /// Appends the next piece to `text` as UTF-8; `is_last` tells that nothing follows.
+    ///
+    /// # Errors
+    /// The first bytes that are no character, from 0.
+    pub(super) fn append(
+        &mut self,
+        piece: &[u8],
+        is_last: bool,
+        text: &mut Vec<u8>,
+    ) -> Result<(), Range<usize>> {
+        self.rest.extend_from_slice(piece);
+        let bytes = std::mem::take(&mut self.rest);
+        let (pairs, odd) = bytes.as_chunks::<2>();
+        let unit = |pair: &[u8; 2]| match self.low_first {
+            true => u16::from_le_bytes(*pair),
+            false => u16::from_be_bytes(*pair),
+        };
+        let first_half = |pair: &&[u8; 2]| (0xd800..0xdc00).contains(&unit(pair));
+        let half = pairs.last().filter(first_half).filter(|_| !is_last);
+        let whole = pairs.len() - usize::from(half.is_some());
+        if is_last && !odd.is_empty() {
+            let end = self.taken + bytes.len();
+            return Err(end - odd.len()..end);
+        }
+        let pairs = pairs.get(..whole).unwrap_or_default();
+        for character in char::decode_utf16(pairs.iter().map(unit)) {
+            let character = character.map_err(|_| self.taken..self.taken + 2)?;
+            self.taken += 2 * character.len_utf16();
+            text.extend_from_slice(character.encode_utf8(&mut [0; 4]).as_bytes());
+        }
+        self.rest = bytes.get(2 * whole..).unwrap_or_default().to_vec();
+        Ok(())
     }
-    Ok(text.into_bytes().into())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// The text in pieces of so many bytes; `None` if it is not UTF-16.
+    fn decoded(bytes: &[u8], piece: usize) -> Option<Result<Vec<u8>, Range<usize>>> {
+        let (mut decoder, mark) = Utf16::of_start(bytes)?;
+        let mut text = Vec::new();
+        for piece in bytes[mark..].chunks(piece) {
+            if let Err(place) = decoder.append(piece, false, &mut text) {
+                return Some(Err(place));
+            }
+        }
+        let end = decoder.append(&[], true, &mut text);
+        Some(end.map(|()| text))
+    }
+
     #[test]
     fn utf_16_of_either_order_with_and_without_a_mark_becomes_utf_8() {
         let text = "ifm_x [\u{b5}m]\t\u{3bc}rad\r\n\u{1f600}";
         let little: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
         let big: Vec<u8> = text.encode_utf16().flat_map(u16::to_be_bytes).collect();
+        let want = Some(Ok(text.as_bytes().to_vec()));
         for (mark, bytes) in [([0xff, 0xfe], &little), ([0xfe, 0xff], &big)] {
-            assert!(is_utf16(bytes));
-            assert_eq!(to_utf8(bytes).as_deref(), Ok(text.as_bytes()));
-            let marked = [&mark[..], bytes].concat();
-            assert_eq!(to_utf8(&marked).as_deref(), Ok(text.as_bytes()));
-            assert_eq!(to_utf8(&marked[..marked.len() - 1]), Err(38..39));
-            assert_eq!(to_utf8(&marked[..marked.len() - 2]), Err(36..38));
+            for piece in [1, 2, 3, 5, 1000] {
+                assert_eq!(decoded(bytes, piece), want);
+                let marked = [&mark[..], bytes].concat();
+                assert_eq!(decoded(&marked, piece), want);
+                let cut = |bytes: usize| decoded(&marked[..marked.len() - bytes], piece);
+                assert_eq!(cut(1), Some(Err(38..39)));
+                assert_eq!(cut(2), Some(Err(36..38)));
+            }
         }
         for other in [text, "", "a", "0,1,2,3,4,5,6,7,8,9"] {
-            assert!(!is_utf16(other.as_bytes()));
-            assert_eq!(to_utf8(other.as_bytes()).as_deref(), Ok(other.as_bytes()));
+            assert_eq!(decoded(other.as_bytes(), 7), None);
         }
     }
 }

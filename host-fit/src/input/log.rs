@@ -2,26 +2,33 @@
 //!
 //! One row per servo period below a header. Which column holds what is said in
 //! [`layout`], in which units in `units.rs`, what else a table may look like at
-//! `Table::open` in `table.rs`; a log without a column for the movement is taken apart in `split.rs`.
+//! `Head::read` in `table.rs`; a log without a column for the movement is taken apart in `split.rs`.
 //! A file is taken for gzip or UTF-16 by its first bytes, not by its name.
 //!
 //! Anything wrong is refused with file, line and column ([`LogError`]). Bad cells and
 //! saturated codes can be left out and counted instead ([`BadRows::Skip`]); a log whose
 //! structure is wrong is always refused.
 
+mod blocks;
 pub(crate) mod cell;
+mod cursor;
 mod decimal;
 mod error;
+mod gathered;
 pub(crate) mod guess;
 pub(crate) mod header;
 pub mod layout;
+mod line;
 mod order;
+mod parse;
 mod preamble;
 mod reader;
 pub(crate) mod rows;
 mod sequence;
 mod skipped;
 mod split;
+mod stitch;
+mod stream;
 pub(crate) mod table;
 pub(crate) mod time;
 pub(crate) mod units;
@@ -29,14 +36,16 @@ mod warning;
 
 pub use cell::CellFault;
 pub use error::{CellPlace, LogError};
+pub use parse::LogRow;
+pub use stream::{Batch, LogEnd, stream};
 pub use warning::{LogWarning, SkipReason};
 
-use crate::input::dataset::{Dataset, LogSource, Row};
-use crate::input::source;
+use crate::input::dataset::{Dataset, FIT_ROWS_MAX, LogSource};
 use crate::input::stage::Stage;
+use crate::input::text::TextReader;
+use gathered::Gathered;
 use sha2::{Digest, Sha256};
 use std::path::Path;
-use table::Table;
 
 /// What to do with a row that has a bad cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,7 +77,7 @@ pub enum ReferenceUse {
     IfPresent,
 }
 
-/// How to read logs. The default is that of `fit`.
+/// How to read logs. The default refuses what is wrong, needs the reference and holds all rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReadOptions {
     /// What to do with bad rows.
@@ -80,15 +89,28 @@ pub struct ReadOptions {
     /// Length of the movements of logs that have no column for them, s; without it they end at gaps
     /// alone.
     pub split_s: Option<f64>,
+    /// Most rows that are held; of more the dataset is an excerpt, and the whole is held compactly
+    /// beside it. All are held if `None`.
+    pub rows_max: Option<usize>,
 }
 
 impl ReadOptions {
+    /// For `fit`: of a long log an excerpt.
+    pub const FIT: Self = Self {
+        bad_rows: BadRows::Refuse,
+        saturated: SaturatedCodes::Bad,
+        reference: ReferenceUse::Required,
+        split_s: None,
+        rows_max: Some(FIT_ROWS_MAX),
+    };
+
     /// For `decode`: saturated rows are kept, a reference is not needed.
     pub const DECODE: Self = Self {
         bad_rows: BadRows::Refuse,
         saturated: SaturatedCodes::Keep,
         reference: ReferenceUse::IfPresent,
         split_s: None,
+        rows_max: None,
     };
 }
 
@@ -116,20 +138,15 @@ pub fn read<P: AsRef<Path>>(
         return Err(LogError::NoLog);
     }
     let mut reading = LogReading::default();
+    let mut gathered = Gathered::new(stage, options.rows_max);
     let mut hash = Sha256::new();
     for path in paths {
-        let path = path.as_ref();
-        let text = source::read_text(path)?;
-        hash.update(&text);
-        append(
-            &mut reading,
-            source::shown_name(path),
-            &text,
-            stage,
-            options,
-        )?;
+        let text = TextReader::open(path.as_ref())?.with_hash(hash);
+        let all = (&mut reading, &mut gathered);
+        hash = reader::append(all, text, stage, options)?.unwrap_or_default();
+        refuse_repeated_log(&gathered)?;
     }
-    reading.dataset.sha256 = hash.finalize().into();
+    reading.dataset = gathered.into_dataset(hash.finalize().into(), &mut reading.warnings);
     Ok(reading)
 }
 
@@ -143,37 +160,23 @@ pub fn read_bytes(
     stage: &Stage,
     options: &ReadOptions,
 ) -> Result<LogReading, LogError> {
-    let text = source::unpack_text(bytes.into(), path)?;
+    let text = TextReader::of_bytes(bytes, path)?.with_hash(Sha256::new());
     let mut reading = LogReading::default();
-    append(&mut reading, path, &text, stage, options)?;
-    reading.dataset.sha256 = Sha256::digest(&text).into();
+    let mut gathered = Gathered::new(stage, options.rows_max);
+    let all = (&mut reading, &mut gathered);
+    let hash = reader::append(all, text, stage, options)?.unwrap_or_default();
+    reading.dataset = gathered.into_dataset(hash.finalize().into(), &mut reading.warnings);
     Ok(reading)
 }
 
-fn append(
-    reading: &mut LogReading,
-    path: &Path,
-    text: &[u8],
-    stage: &Stage,
-    options: &ReadOptions,
-) -> Result<(), LogError> {
-    let text = source::to_utf8(text, path)?;
-    let table = Table::open(path, &text, |name| stage.log.knows(name))?;
-    let (dataset, warnings) = (&mut reading.dataset, &mut reading.warnings);
-    reading.skipped_rows += reader::append(table, stage, options, dataset, warnings)?;
-    refuse_repeated_log(&reading.dataset)
-}
-
 /// Refuses the last log if an earlier one holds the same rows.
-fn refuse_repeated_log(dataset: &Dataset) -> Result<(), LogError> {
-    let Some((last, earlier)) = dataset.logs.split_last() else {
+fn refuse_repeated_log(gathered: &Gathered) -> Result<(), LogError> {
+    let Some((last, earlier)) = gathered.logs.split_last() else {
         return Ok(());
     };
-    let rows = |source: &LogSource| dataset.rows.get(source.rows.clone()).unwrap_or_default();
-    let same = |a: &Row, b: &Row| (a.t_us, a.frame, a.reference) == (b.t_us, b.frame, b.reference);
+    let samples = |source: &LogSource| gathered.samples_of(source.rows.clone());
     let repeats = |first: &&LogSource| {
-        let (first, last) = (rows(first), rows(last));
-        first.len() == last.len() && first.iter().zip(last).all(|(a, b)| same(a, b))
+        first.rows.len() == last.rows.len() && samples(first).eq(samples(last))
     };
     match earlier.iter().find(repeats) {
         None => Ok(()),

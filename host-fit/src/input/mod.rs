@@ -8,3 +8,6 @@ pub mod log;
 pub mod shipped;
 pub mod source;
 pub mod stage;
+pub(crate) mod text;
+mod unpack;
+pub mod whole;

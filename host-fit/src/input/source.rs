@@ -1,17 +1,11 @@
-//! A file as bytes: opened, decompressed if its first bytes say gzip, and refused when it is
-//! no text where text is needed. `-` is standard input.
+//! A file as bytes, read whole or piece by piece. `-` is standard input.
 
-use super::{binary, encoding};
-use flate2::bufread::GzDecoder;
-use std::borrow::Cow;
-use std::io::{ErrorKind, Read};
+use super::unpack::Unpacked;
+use std::io::{Cursor, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-/// First bytes of every gzip file.
-pub(crate) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
-
-/// Largest log that is read, in decompressed bytes: twenty hours at 2 ms. A file that
-/// unpacks to more is damaged or hostile.
+/// Largest file that is read whole, in decompressed bytes. A file that unpacks to more is damaged
+/// or hostile.
 const BYTES_MAX: u64 = 2 << 30;
 
 /// The name of standard input on the command line, and in messages.
@@ -70,51 +64,16 @@ pub fn shown_name(path: &Path) -> &Path {
     }
 }
 
-/// A file of text, plain or gzip, as it is encoded. What is plainly no text is refused by its
-/// start: a device or a damaged file may have no end.
-///
-/// # Errors
-/// Every variant of [`SourceError`] but `Utf16`.
-pub fn read_text(path: &Path) -> Result<Vec<u8>, SourceError> {
-    let plain = |start: &[u8]| match start {
-        _ if start.starts_with(&GZIP_MAGIC) => Ok(()),
-        _ => refuse_binary(start, path),
-    };
-    let raw = read_up_to(path, BYTES_MAX, plain)?;
-    unpack_text(raw.into(), path).map(Cow::into_owned)
-}
-
-/// The text of a file that is in memory, plain or gzip, as it is encoded; `path` is only named
-/// in errors.
-///
-/// # Errors
-/// `TooLarge`, `Binary` and those of gzip.
-pub fn unpack_text<'r>(raw: Cow<'r, [u8]>, path: &Path) -> Result<Cow<'r, [u8]>, SourceError> {
-    let bytes = unpack(raw, path, |start| refuse_binary(start, path))?;
-    refuse_binary(&bytes, path)?;
-    Ok(bytes)
-}
-
-/// A text of [`read_text`] in UTF-8, or in another encoding that has ASCII in it.
-///
-/// # Errors
-/// `Utf16`, `Binary`.
-pub fn to_utf8<'t>(text: &'t [u8], path: &Path) -> Result<Cow<'t, [u8]>, SourceError> {
-    let utf8 = encoding::to_utf8(text).map_err(|bytes| SourceError::Utf16 {
-        path: shown_name(path).to_path_buf(),
-        offset: bytes.start,
-    })?;
-    refuse_binary(&utf8, path)?;
-    Ok(utf8)
-}
-
 /// A file of any bytes, plain or gzip.
 ///
 /// # Errors
-/// Every variant of [`SourceError`] but `Binary`.
+/// Every variant of [`SourceError`] but `Binary` and `Utf16`.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, SourceError> {
-    let raw = read_whole(path, BYTES_MAX)?;
-    unpack(raw.into(), path, |_| Ok(())).map(Cow::into_owned)
+    let mut bytes = Vec::new();
+    let unpacked = Unpacked::open(path)?.take(BYTES_MAX + 1);
+    read_to_end(unpacked, &mut bytes, path)?;
+    refuse_large(&bytes, BYTES_MAX, path)?;
+    Ok(bytes)
 }
 
 /// A file of at most `limit_bytes`, as it is.
@@ -122,61 +81,26 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, SourceError> {
 /// # Errors
 /// `NotFound`, `IsFolder`, `Unreadable`, `TooLarge`.
 pub fn read_whole(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, SourceError> {
-    read_up_to(path, limit_bytes, |_| Ok(()))
+    let mut bytes = Vec::new();
+    let raw = Raw::open(path)?.take(limit_bytes.saturating_add(1));
+    read_to_end(raw, &mut bytes, path)?;
+    refuse_large(&bytes, limit_bytes, path)?;
+    Ok(bytes)
 }
 
-/// Reads a file whose start `look` does not refuse.
-fn read_up_to(
+/// Appends all that is left of a source of this module; `path` is named where memory is out.
+pub(super) fn read_to_end(
+    mut source: impl Read,
+    bytes: &mut Vec<u8>,
     path: &Path,
-    limit_bytes: u64,
-    look: impl Fn(&[u8]) -> Result<(), SourceError>,
-) -> Result<Vec<u8>, SourceError> {
-    let standard = is_standard(path);
-    let unreadable = |error| unreadable(path, error);
-    let mut file: Box<dyn Read> = match standard {
-        true => Box::new(std::io::stdin().lock()),
-        false => Box::new(std::fs::File::open(path).map_err(unreadable)?),
-    };
-    let mut raw = probe(&mut file).map_err(unreadable)?;
-    look(&raw)?;
-    append(&mut file, limit_bytes, &mut raw).map_err(unreadable)?;
-    refuse_large(&raw, limit_bytes, path)?;
-    Ok(raw)
-}
-
-/// Whether a text that starts like this is UTF-16.
-pub(crate) fn is_utf16(start: &[u8]) -> bool {
-    encoding::is_utf16(start)
-}
-
-/// Whether a name means standard input.
-pub(crate) fn is_standard(path: &Path) -> bool {
-    path.as_os_str() == STANDARD_INPUT.0
-}
-
-/// The start of an input, by which it is told whether it is text.
-pub(crate) fn probe(source: &mut impl Read) -> std::io::Result<Vec<u8>> {
-    let mut start = Vec::new();
-    append(source, binary::PROBE_BYTES as u64, &mut start)?;
-    Ok(start)
-}
-
-/// What the system says of a file, in the user's terms.
-pub(crate) fn unreadable(path: &Path, source: std::io::Error) -> SourceError {
-    let standard = is_standard(path);
-    let path = shown_name(path).to_path_buf();
-    match source.kind() {
-        ErrorKind::IsADirectory => SourceError::IsFolder { path },
-        _ if !standard && path.is_dir() => SourceError::IsFolder { path },
-        ErrorKind::NotFound => SourceError::NotFound { path },
-        _ => SourceError::Unreadable { path, source },
-    }
-}
-
-/// Appends what `source` holds, stopping soon after `limit` bytes.
-fn append(source: &mut impl Read, limit: u64, bytes: &mut Vec<u8>) -> std::io::Result<()> {
-    source.take(limit.saturating_add(1)).read_to_end(bytes)?;
-    Ok(())
+) -> Result<(), SourceError> {
+    let read = source.read_to_end(bytes).map(|_| ());
+    // Sources of this module wrap errors of their own.
+    read.map_err(|error| {
+        let path = shown_name(path).to_path_buf();
+        let unreadable = |source| SourceError::Unreadable { path, source };
+        error.downcast().unwrap_or_else(unreadable)
+    })
 }
 
 fn refuse_large(bytes: &[u8], limit_bytes: u64, path: &Path) -> Result<(), SourceError> {
@@ -189,58 +113,82 @@ fn refuse_large(bytes: &[u8], limit_bytes: u64, path: &Path) -> Result<(), Sourc
     })
 }
 
-/// Decompresses `raw` if its first bytes say gzip: all members, one after the other, no
-/// further than a start that `look` refuses.
-fn unpack<'r>(
-    raw: Cow<'r, [u8]>,
-    path: &Path,
-    look: impl Fn(&[u8]) -> Result<(), SourceError>,
-) -> Result<Cow<'r, [u8]>, SourceError> {
-    refuse_large(&raw, BYTES_MAX, path)?;
-    if !raw.starts_with(&GZIP_MAGIC) {
-        return Ok(raw);
-    }
-    let mut bytes = Vec::with_capacity(raw.len().saturating_mul(4));
-    let mut rest: &[u8] = &raw;
-    while !rest.is_empty() {
-        if !rest.starts_with(&GZIP_MAGIC) {
-            return Err(SourceError::GzipTrailing {
-                path: shown_name(path).to_path_buf(),
-                bytes: rest.len(),
-            });
-        }
-        let mut decoder = GzDecoder::new(rest);
-        let read = append(&mut decoder, binary::PROBE_BYTES as u64, &mut bytes);
-        if read.is_ok() {
-            look(&bytes)?;
-        }
-        let room = BYTES_MAX.saturating_sub(bytes.len() as u64);
-        let read = read.and_then(|()| append(&mut decoder, room, &mut bytes));
-        refuse_large(&bytes, BYTES_MAX, path)?;
-        if let Err(source) = read {
-            let (path, bytes) = (shown_name(path).to_path_buf(), bytes.len());
-            return Err(match source.kind() {
-                ErrorKind::UnexpectedEof => SourceError::GzipCut { path, bytes },
-                _ => SourceError::GzipDamaged {
-                    path,
-                    bytes,
-                    source,
-                },
-            });
-        }
-        rest = decoder.into_inner();
-    }
-    Ok(Cow::Owned(bytes))
+/// The bytes of a file as they are, counted. Errors of reading are [`SourceError`]s inside.
+pub(super) struct Raw<'a> {
+    path: PathBuf,
+    file: Box<dyn Read + Send + 'a>,
+    /// Bytes that were read.
+    pub(super) read: u64,
+    /// Bytes of the file; 0 where that is not known.
+    pub(super) total: u64,
 }
 
-/// Refuses what is plainly no text, with a word on what it seems to be.
-pub(crate) fn refuse_binary(bytes: &[u8], path: &Path) -> Result<(), SourceError> {
-    match binary::in_text(bytes) {
-        Some((offset, looks_like)) if !encoding::is_utf16(bytes) => Err(SourceError::Binary {
-            path: shown_name(path).to_path_buf(),
-            offset,
-            looks_like,
-        }),
-        _ => Ok(()),
+impl<'a> Raw<'a> {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// `NotFound`, `IsFolder`, `Unreadable`.
+    pub(super) fn open(path: &Path) -> Result<Self, SourceError> {
+        let shown = shown_name(path).to_path_buf();
+        if path.as_os_str() == STANDARD_INPUT.0 {
+            return Ok(Self {
+                path: shown,
+                file: Box::new(std::io::stdin()),
+                read: 0,
+                total: 0,
+            });
+        }
+        let file = std::fs::File::open(path).map_err(|source| refused(&shown, source))?;
+        Ok(Self {
+            path: shown,
+            total: file.metadata().map_or(0, |metadata| metadata.len()),
+            file: Box::new(file),
+            read: 0,
+        })
+    }
+
+    /// What a reader gives; `path` is only named in errors.
+    pub(super) fn of_reader(reader: impl Read + Send + 'a, path: &Path) -> Self {
+        Self {
+            path: path.to_path_buf(),
+            file: Box::new(reader),
+            read: 0,
+            total: 0,
+        }
+    }
+
+    /// With bytes that were taken from its start put back.
+    pub(super) fn preceded_by(self, start: Vec<u8>) -> Self {
+        Self {
+            file: Box::new(Cursor::new(start).chain(self.file)),
+            read: 0,
+            ..self
+        }
+    }
+}
+
+impl Read for Raw<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        loop {
+            match self.file.read(bytes) {
+                Ok(read) => {
+                    self.read += read as u64;
+                    return Ok(read);
+                }
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(std::io::Error::other(refused(&self.path, error))),
+            }
+        }
+    }
+}
+
+/// What the system says of a file, in the user's terms.
+pub(crate) fn refused(path: &Path, source: std::io::Error) -> SourceError {
+    let path = path.to_path_buf();
+    match source.kind() {
+        ErrorKind::NotFound => SourceError::NotFound { path },
+        ErrorKind::IsADirectory => SourceError::IsFolder { path },
+        _ if path.is_dir() => SourceError::IsFolder { path },
+        _ => SourceError::Unreadable { path, source },
     }
 }

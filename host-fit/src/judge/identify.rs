@@ -280,9 +280,24 @@ pub fn check_described(
     model: &Model,
 ) -> Result<(), FitFailure> {
     let n = dataset.rows.len().max(1) as f64;
-    for (axis, motion) in Motion::ALL.into_iter().enumerate().take(3) {
+    let moved = [0, 1, 2].map(|axis| {
         let squares: f64 = dataset.rows.iter().map(|r| r.reference[axis].powi(2)).sum();
-        let moved = (squares / n).sqrt();
+        (squares / n).sqrt()
+    });
+    check_explained(moved, errors, model)
+}
+
+/// The same from the root mean square of the reference: m, m, rad.
+///
+/// # Errors
+/// [`FitFailure::NotDescribed`] for the first such axis.
+pub fn check_explained(
+    moved: [f64; 3],
+    errors: &PoseError,
+    model: &Model,
+) -> Result<(), FitFailure> {
+    for (axis, motion) in Motion::ALL.into_iter().enumerate().take(3) {
+        let moved = moved[axis];
         let error = errors.axes[axis].rms;
         let most = if model.has_zero_deviation {
             ERROR_TO_MOTION_MAX

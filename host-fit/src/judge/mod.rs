@@ -5,6 +5,7 @@ pub mod lag;
 pub mod precision;
 pub mod statistics;
 pub mod uncertainty;
+pub mod whole;
 
 use crate::input::dataset::{Dataset, LogSource, Row};
 use crate::input::stage::Stage;

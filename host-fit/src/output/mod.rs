@@ -5,9 +5,17 @@
 
 pub mod blob_file;
 pub mod export;
-pub mod growing_file;
+mod place;
 pub mod pose_file;
 pub mod posterior_file;
+pub mod record_file;
+pub mod streamed_file;
+mod temporary;
+
+pub use place::{Place, is_standard_output};
+
+use place::{end_of_links, names_standard_output};
+use temporary::{sweep, temporary};
 
 use std::fs::{self, Metadata, OpenOptions};
 use std::io::{ErrorKind, Write};
@@ -40,6 +48,12 @@ pub enum OutputError {
         path: PathBuf,
         /// What should be its folder.
         folder: PathBuf,
+    },
+    /// A record is there, which is not replaced.
+    #[error("{}: is there already, and a record is never replaced; name another file, or move it away", path.display())]
+    Exists {
+        /// The target.
+        path: PathBuf,
     },
     /// The target exists and must not be written.
     #[error("{}: the file is read-only; make it writable or name another", path.display())]
@@ -114,7 +128,7 @@ impl Outputs {
     /// Every variant of [`OutputError`].
     pub fn add(&mut self, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
         let named = path.to_path_buf();
-        if is_standard(path) {
+        if names_standard_output(path) {
             self.staged.push(Staged::Stream(named, bytes.to_vec()));
             return Ok(());
         }
@@ -145,7 +159,9 @@ impl Outputs {
     pub fn commit(self) -> Result<(), OutputError> {
         for staged in &self.staged {
             match staged {
-                Staged::Stream(path, bytes) if is_standard(path) => write_standard(path, bytes)?,
+                Staged::Stream(path, bytes) if names_standard_output(path) => {
+                    write_standard(path, bytes)?;
+                }
                 Staged::Stream(path, bytes) => write_through(path, bytes)
                     .map_err(|source| explain(source, path, &folder_of(path), bytes.len()))?,
                 Staged::File { .. } => {}
@@ -205,7 +221,7 @@ pub fn make_folder(path: &Path) -> Result<(), OutputError> {
 /// # Errors
 /// Every variant of [`OutputError`] but `Full`.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
-    if is_standard(path) {
+    if names_standard_output(path) {
         return Ok(());
     }
     let (target, existing) = resolve(path)?;
@@ -238,12 +254,19 @@ fn resolve(path: &Path) -> Result<(PathBuf, Option<Metadata>), OutputError> {
         Err(_) if path.file_name().is_none() || ends_in_separator(path) => {
             Err(OutputError::IsFolder { path: named() })
         }
-        Err(_) => Ok((named(), None)),
+        Err(source) => match end_of_links(path) {
+            // Links in a circle.
+            end if end.is_symlink() => Err(OutputError::Failed {
+                path: named(),
+                source,
+            }),
+            end => Ok((end, None)),
+        },
     }
 }
 
 /// Whether `path` is something to write to, not to replace: a device, a pipe, or the
-/// standard output under its name in the file system, which a shell may have led to a file.
+/// standard streams under their names in the file system, which a shell may have led to files.
 fn is_stream(path: &Path, metadata: &Metadata) -> bool {
     let names = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc/self/fd"];
     let named_stream = cfg!(unix) && names.iter().any(|name| path.starts_with(name));
@@ -263,28 +286,13 @@ fn folder_of(target: &Path) -> PathBuf {
     }
 }
 
-/// A new file in `folder` with the permissions of any new file; removed unless persisted.
-fn temporary(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".host-fit-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // Less the user's umask.
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    // Without the temporary name, which means nothing to the user.
-    builder
-        .tempfile_in(folder)
-        .map_err(|error| std::io::Error::from(error.kind()))
-}
-
 /// A new file in `folder` with these bytes, on the disk.
 fn written(
     folder: &Path,
     bytes: &[u8],
     existing: Option<Metadata>,
 ) -> std::io::Result<tempfile::NamedTempFile> {
+    sweep(folder);
     let mut file = temporary(folder)?;
     file.as_file_mut().write_all(bytes)?;
     complete(&file, existing)?;

@@ -13,16 +13,20 @@
 //!
 //! With uncertainties a line ends with three more fields, `u_x_um,u_y_um,u_rz_urad`: the standard
 //! uncertainty of X, Y, Rz, four significant digits.
+//!
+//! [`PoseFormat::Npy`] is the same in binary: see `npy.rs`.
 
+mod npy;
 mod read;
+mod stream;
 mod summary;
 mod text;
 mod uncertainty;
 
 pub use read::{PoseFileError, read};
+pub use stream::{DecodeSettings, PoseFormat, decode_log};
 pub use summary::StatusCounts;
-pub use text::{to_text, with_uncertainties};
-pub use uncertainty::uncertainties;
+pub use text::to_text;
 
 use crate::input::dataset::{Dataset, LoggedFrame};
 use crate::progress::Progress;

@@ -1,4 +1,4 @@
-use super::growing_file::GrowingFile;
+use super::record_file::RecordFile;
 use super::*;
 
 fn names(folder: &Path) -> Vec<String> {
@@ -120,21 +120,72 @@ fn a_file_below_dev_is_replaced_like_any_other() {
 }
 
 #[test]
-fn a_growing_file_takes_its_place_when_it_is_finished_and_leaves_nothing_if_it_is_not() {
+fn a_record_is_in_its_file_before_it_is_finished_and_never_replaces_one() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("bus.log");
-    fs::write(&path, b"old").expect("written");
-    let mut given_up = GrowingFile::create(&path).expect("writable");
-    given_up.line("lost").expect("written");
-    drop(given_up);
-    assert_eq!(fs::read(&path).expect("readable"), b"old");
-    let mut file = GrowingFile::create(&path).expect("writable");
-    (0..10_000).for_each(|k| file.line(k).expect("written"));
-    assert_eq!(fs::read(&path).expect("readable"), b"old");
-    file.finish().expect("finished");
-    let text = fs::read_to_string(&path).expect("readable");
-    assert_eq!(text.lines().count(), 10_000);
-    assert_eq!(names(folder.path()), ["bus.log"]);
-    let missing = GrowingFile::create(&folder.path().join("missing/bus.log"));
+    let lines = |path: &Path| {
+        let text = fs::read_to_string(path).expect("readable");
+        assert!(text.is_empty() || text.ends_with('\n'), "{text}");
+        text.lines().count()
+    };
+    let mut record = RecordFile::create(&path).expect("writable");
+    (0..20_000).for_each(|k| record.line(k).expect("written"));
+    assert!((10_000..20_000).contains(&lines(&path)), "most are there");
+    record.flush().expect("written");
+    assert_eq!(lines(&path), 20_000);
+    drop(record);
+    let again = RecordFile::create(&path);
+    assert!(matches!(again, Err(OutputError::Exists { .. })));
+    assert_eq!(lines(&path), 20_000);
+    let missing = RecordFile::create(&folder.path().join("missing/bus.log"));
     assert!(matches!(missing, Err(OutputError::NoFolder { .. })));
+    let other = RecordFile::create(&folder.path().join("other.log")).expect("writable");
+    other.discard();
+    assert_eq!(names(folder.path()), ["bus.log"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_to_a_file_that_is_not_there_makes_that_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    let link = |to: &str, name: &str| std::os::unix::fs::symlink(to, at(name)).expect("linked");
+    fs::create_dir(at("there")).expect("a folder");
+    link("second", "first");
+    link("there/params.bin", "second");
+    write_atomically(&at("first"), b"new").expect("written");
+    assert_eq!(fs::read(at("there/params.bin")).expect("readable"), b"new");
+    assert_eq!(fs::read(at("first")).expect("readable"), b"new");
+    link("there/bus.log", "record");
+    RecordFile::create(&at("record")).expect("writable");
+    assert!(at("there/bus.log").is_file());
+    link("circle", "circle");
+    let error = write_atomically(&at("circle"), b"new").expect_err("refused");
+    assert!(matches!(error, OutputError::Failed { .. }), "{error}");
+    assert!(at("circle").is_symlink());
+}
+
+#[cfg(unix)]
+#[test]
+fn files_of_killed_programs_are_swept_and_those_of_running_ones_are_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let left = folder.path().join(".host-fit-killed");
+    fs::write(&left, b"half").expect("written");
+    let running = super::temporary(folder.path()).expect("a file");
+    write_atomically(&folder.path().join("params.bin"), b"new").expect("written");
+    assert!(!left.exists());
+    assert!(running.path().exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn two_names_of_a_file_are_one_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("file"), b"").expect("written");
+    fs::hard_link(at("file"), at("hard")).expect("linked");
+    std::os::unix::fs::symlink(at("new"), at("soft")).expect("linked");
+    assert!(Place::of(&at("file")) == Place::of(&at("hard")));
+    assert!(Place::of(&at("soft")) == Place::of(&at("new")));
+    assert!(Place::of(&at("file")) != Place::of(&at("new")));
 }

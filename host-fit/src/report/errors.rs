@@ -70,13 +70,19 @@ pub(super) fn by_log(
     dataset: &Dataset,
 ) -> Vec<LogErrors> {
     let errors = decoded.errors_less(&judgement.zeros, dataset);
-    let errors = errors_by_log(&errors, dataset);
+    of_logs(dataset, &errors_by_log(&errors, dataset))
+}
+
+/// The errors of each log as they are given.
+pub(super) fn of_logs(dataset: &Dataset, errors: &[PoseError]) -> Vec<LogErrors> {
+    let logs = dataset.whole.as_ref().map(|whole| whole.logs());
     let of_log = |(log, errors): (&LogSource, &PoseError)| LogErrors {
         path: log.path.display().to_string(),
         rows: log.rows.len(),
         errors: Errors::from(errors),
     };
-    dataset.logs.iter().zip(&errors).map(of_log).collect()
+    let logs = logs.unwrap_or(&dataset.logs);
+    logs.iter().zip(errors).map(of_log).collect()
 }
 
 /// The rms errors of each of several logs for a terminal, a line each.

@@ -8,7 +8,7 @@ use crate::input::stage::Stage;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::Parameters;
-use crate::report::errors::{Errors, LogErrors, by_log};
+use crate::report::errors::{Errors, LogErrors, by_log, of_logs};
 use crate::report::field::{ByAxis, Correlation, FieldReport};
 use crate::solve::field::parameters::values_of;
 use crate::solve::field::terms::{self, PER_PROBE};
@@ -163,7 +163,7 @@ pub struct Report {
     pub cross_validation: Option<CrossValidated>,
     /// Rows of the logs named.
     pub rows: usize,
-    /// Rows that the fit used.
+    /// Rows that the fit used: of a long log those of an excerpt at most.
     pub train_rows: usize,
     /// Movements of the logs named.
     pub movements: usize,
@@ -182,7 +182,8 @@ pub struct Report {
     pub train_fitness: f64,
     /// Over all rows of the logs named; zero deviations refitted unless `delta` says zero.
     pub errors: Errors,
-    /// Over the same rows with the solver's own zero deviations; null where there are none.
+    /// Over the same rows with the solver's own zero deviations; null where there are none, and for
+    /// a long log, of which only an excerpt has them.
     pub errors_solver_delta: Option<Errors>,
     /// How zero deviations were treated: "fit" or "zero".
     pub delta: &'static str,
@@ -199,7 +200,7 @@ pub struct Report {
     pub coordinates: Coordinates,
     /// Serial number in the blob.
     pub serial: String,
-    /// Zero deviation of each movement.
+    /// Zero deviation of each movement; of an excerpt that of each run.
     pub zero_deviations: Vec<MovementZero>,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -311,17 +312,19 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
             })
             .collect(),
         cross_validation: None,
-        rows: c.dataset.rows.len(),
+        rows: c.dataset.named().0,
         train_rows: fit.train_rows,
-        movements: c.dataset.movements.len(),
+        movements: c.dataset.named().1,
         skipped_rows: c.skipped_rows,
         evaluations: Some(fit.solution.evaluations),
         elapsed_s: c.elapsed_s,
         solver_s: Some(fit.solution.elapsed.as_secs_f64()),
         stopped: Some(fit.solution.stopped.clone()),
         train_fitness: fit.train_fitness,
-        errors: Errors::from(&fit.judgement.errors),
-        errors_solver_delta: Some(Errors::from(&fit.judgement_solver_zeros.errors)),
+        errors: Errors::from(fit.errors()),
+        // An excerpt has no zero deviations of the movements as they are.
+        errors_solver_delta: (fit.whole.is_none())
+            .then(|| Errors::from(&fit.judgement_solver_zeros.errors)),
         delta: zeros.name(),
         zeros_in_words: zeros.words(),
         parameters: match &fit.field {
@@ -346,7 +349,10 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         zero_deviations: movement_zeros(&fit.judgement, c.dataset),
         warnings,
         findings: c.findings.clone(),
-        logs: by_log(&fit.decoded, &fit.judgement, c.dataset),
+        logs: match &fit.whole {
+            Some(whole) => of_logs(c.dataset, &whole.logs),
+            None => by_log(&fit.decoded, &fit.judgement, c.dataset),
+        },
         trusted_inputs: trusted(&fit.set),
     }
 }

@@ -166,35 +166,6 @@ fn damaged_blobs_are_refused_by_every_command_that_reads_one() {
 }
 
 #[test]
-fn an_output_that_cannot_be_written_is_refused_and_the_old_one_stays() {
-    let bench = Bench::new();
-    bench.write("log.csv", log());
-    bench.bad(
-        "fit log.csv --stage stage.toml --out no/such/p.bin",
-        3,
-        &["no/such"],
-    );
-    // None of the outputs is written when one of them cannot be.
-    bench.write("file", "");
-    for output in ["--json no/such/p.json", "--report file"] {
-        let arguments = format!("fit log.csv --stage stage.toml --out p.bin {output}");
-        bench.bad(&arguments, 3, &["folder"]);
-        assert!(!crate::common::exists(&bench.path("p.bin")), "{output}");
-    }
-    let twice = "fit log.csv --stage stage.toml --out p.bin --json ./p.bin";
-    bench.bad(twice, 2, &["another output"]);
-    std::fs::create_dir(bench.path("p.bin")).expect("a folder");
-    bench.bad("fit log.csv --stage stage.toml --out p.bin", 3, &["p.bin"]);
-    bench.write("old.bin", "old");
-    bench.bad(
-        "fit nowhere.csv --stage stage.toml --out old.bin",
-        3,
-        &["nowhere.csv"],
-    );
-    assert_eq!(bench.read("old.bin"), b"old");
-}
-
-#[test]
 fn saturated_codes_are_refused_or_skipped_by_fit_and_marked_by_decode() {
     let bench = Bench::new();
     let saturated = with_cell(
@@ -368,38 +339,4 @@ fn wrong_usage_ends_with_status_2() {
         &serial,
     ]);
     assert_eq!(long.status.code(), Some(2));
-}
-
-#[test]
-fn no_output_takes_the_place_of_an_input() {
-    let bench = Bench::new();
-    bench.write("log.csv", log());
-    for folder in ["r", "c"] {
-        std::fs::create_dir(bench.path(folder)).expect("a folder");
-    }
-    for file in ["r/index.html", "c/runs.csv"] {
-        bench.write(file, log());
-    }
-    let taken = |command: &str| bench.bad(command, 2, &["name another"]);
-    taken("fit r/index.html --stage stage.toml --out p.bin --report r");
-    taken("fit log.csv --stage stage.toml --out r/index.html --report r");
-    taken("fit log.csv --stage stage.toml --out p.bin --json r/index.html --report r");
-    taken("compare c/runs.csv --stage stage.toml --out c --seeds 1 --evaluations 100");
-    bench.write("c/table.md", "");
-    taken("compare log.csv --stage c/table.md --out c --seeds 1 --evaluations 100");
-    let stage = std::fs::read(bench.path("stage.toml")).expect("there");
-    std::fs::write(bench.path("stage.toml"), [&stage[..], b"# mine\n"].concat()).expect("written");
-    taken("demo --out .");
-}
-
-#[cfg(target_os = "linux")]
-#[test]
-fn an_output_that_cannot_be_written_leaves_the_others_as_they_were() {
-    let bench = Bench::new();
-    bench.write("log.csv", log());
-    bench.write("p.bin", "the blob before");
-    let fit = "fit log.csv --stage stage.toml --model 31 --out p.bin --json /dev/full";
-    bench.bad(fit, 3, &["/dev/full", "no room"]);
-    assert_eq!(bench.text("p.bin"), "the blob before");
-    assert!(bench.holds_only(&["log.csv", "p.bin"]));
 }

@@ -9,6 +9,7 @@ mod field_model;
 mod log_forms;
 mod main_job;
 mod odd_fits;
+mod outputs;
 mod plan;
 mod recalibrate;
 mod robust;

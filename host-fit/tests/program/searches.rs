@@ -1,6 +1,6 @@
 //! The population searches through the command line, on the log that ships with the program.
 
-use crate::common::Bench;
+use crate::common::{Bench, stderr};
 use serde_json::Value;
 
 fn bench() -> Bench {
@@ -101,17 +101,16 @@ fn compare_prints_its_table_and_writes_curves() {
     assert!(bench.text("report/history.csv").lines().count() > 8 * 50);
 }
 
-/// Ctrl-C ends a search that would take hours, with status 130 and a usable blob.
+/// Runs a search that would take hours, and presses Ctrl-C after three seconds.
 #[cfg(unix)]
-#[test]
-fn an_interrupt_keeps_the_best_so_far() {
-    let bench = bench();
-    let fit = "fit log.csv.gz --stage stage.toml --out p.bin --solver shtlbo --project delta \
-               --train 200 --generations 10000000";
-    let mut running = bench
+fn interrupted(bench: &Bench, options: &str) -> std::process::Output {
+    let fit = format!(
+        "fit log.csv.gz --stage stage.toml --out p.bin --solver shtlbo --generations 10000000 {options}"
+    );
+    let running = bench
         .command(&fit.split_whitespace().collect::<Vec<_>>())
         .stdout(std::process::Stdio::null())
-        .stderr(std::process::Stdio::null())
+        .stderr(std::process::Stdio::piped())
         .spawn()
         .expect("host-fit starts");
     let id = running.id().to_string();
@@ -120,9 +119,28 @@ fn an_interrupt_keeps_the_best_so_far() {
         .args(["-INT", &id])
         .status();
     assert!(sent.expect("kill runs").success());
-    let ended = running.wait().expect("host-fit ends");
-    assert_eq!(ended.code(), Some(130));
+    let ended = running.wait_with_output().expect("host-fit ends");
+    assert_eq!(ended.status.code(), Some(130));
+    ended
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_the_best_so_far() {
+    let bench = bench();
+    interrupted(&bench, "--project linear --population 100 --train 200");
     bench.good("inspect p.bin");
+}
+
+/// However far it has come: such a search is far from its end for a minute.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_nothing_that_has_errors_far_above_the_noise() {
+    let bench = bench();
+    bench.write("p.bin", "the blob before");
+    let told = stderr(&interrupted(&bench, "--project delta --population 2000"));
+    assert!(told.contains("nothing was written"), "{told}");
+    assert_eq!(bench.text("p.bin"), "the blob before");
 }
 
 #[test]

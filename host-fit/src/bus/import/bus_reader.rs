@@ -1,22 +1,18 @@
 //! Lines of a candump log to ticks.
 
 use super::bus_log::{BusCounts, BusTick, Collector};
-use super::input::{Input, Line, TextReader};
+use super::input::{Input, LINE_BYTES_MAX, Line, Lines};
 use super::{ImportError, ImportSettings};
 use crate::input::log::layout::Quantity;
 use crate::input::stage::{CodeScale, Stage};
 use hal_adapters::candump::{LineError, LogLine};
 use std::path::Path;
 
-/// Longest line, in bytes: a frame, with spaces to align it, has a hundred.
-const LINE_BYTES_MAX: usize = 4096;
-
 /// A record of the bus, read tick by tick.
 pub(super) struct BusReader<'s> {
     settings: &'s ImportSettings,
     stage: &'s Stage,
-    text: TextReader,
-    bytes: Vec<u8>,
+    lines: Lines,
     /// The line in hand, from 1.
     line: usize,
     interface: Option<String>,
@@ -41,8 +37,7 @@ impl<'s> BusReader<'s> {
         Ok(Self {
             settings,
             stage,
-            text: input.open(what)?,
-            bytes: Vec::new(),
+            lines: Lines::new(input.open()?, what),
             line: 0,
             interface: settings.interface.clone(),
             collector: Collector::new(settings.layout),
@@ -57,12 +52,52 @@ impl<'s> BusReader<'s> {
     /// `Bus`, `BadLine`, `NotText`, `SeveralInterfaces`, `OutsideConverter`, `ClockBackwards`.
     pub(super) fn next_tick(&mut self) -> Result<Option<BusTick>, ImportError> {
         loop {
-            let read = self.text.line(&mut self.bytes, LINE_BYTES_MAX)?;
             self.line += 1;
-            let tick = match read {
-                Line::End => return Ok(None),
-                Line::Long => self.long_line()?,
-                Line::Whole => self.take_line()?,
+            let parsed = match self.lines.next()? {
+                None => return Ok(None),
+                Some(Line::Long) => Err(LineError::Trailing {
+                    column: LINE_BYTES_MAX,
+                }),
+                Some(Line::Whole(line)) => {
+                    let line = line.trim_ascii();
+                    if line.is_empty() {
+                        continue;
+                    }
+                    match std::str::from_utf8(line) {
+                        Ok(text) => LogLine::parse(text),
+                        Err(_) if self.settings.skip_bad_lines => Err(LineError::BadTime),
+                        Err(_) => {
+                            return Err(ImportError::NotText {
+                                path: self.settings.bus.clone(),
+                                line: self.line,
+                            });
+                        }
+                    }
+                }
+            };
+            let tick = match parsed {
+                Ok(found) => {
+                    let interface = &mut self.interface;
+                    match chosen(interface, &found, self.settings, self.line)? {
+                        true => self.collector.take(&found.stamped()),
+                        false => None,
+                    }
+                }
+                Err(LineError::ErrorFrame | LineError::FlexibleDataRate) => {
+                    self.counts.other_lines += 1;
+                    None
+                }
+                Err(_) if self.settings.skip_bad_lines => {
+                    self.counts.bad_lines += 1;
+                    None
+                }
+                Err(fault) => {
+                    return Err(ImportError::BadLine {
+                        path: self.settings.bus.clone(),
+                        line: self.line,
+                        fault,
+                    });
+                }
             };
             if let Some(tick) = tick
                 && self.is_sound(&tick)?
@@ -84,55 +119,6 @@ impl<'s> BusReader<'s> {
 
     fn path(&self) -> &Path {
         &self.settings.bus
-    }
-
-    fn take_line(&mut self) -> Result<Option<BusTick>, ImportError> {
-        let bytes = self.bytes.trim_ascii();
-        if bytes.is_empty() {
-            return Ok(None);
-        }
-        let not_text = || ImportError::NotText {
-            path: self.path().to_path_buf(),
-            line: self.line,
-        };
-        let parsed = match std::str::from_utf8(bytes) {
-            Ok(text) => LogLine::parse(text),
-            Err(_) if self.settings.skip_bad_lines => Err(LineError::BadTime),
-            Err(_) => return Err(not_text()),
-        };
-        match parsed {
-            Ok(found) => {
-                let stamped = found.stamped();
-                let is_chosen = chosen(&mut self.interface, &found, self.settings, self.line)?;
-                Ok(is_chosen.then(|| self.collector.take(&stamped)).flatten())
-            }
-            Err(LineError::ErrorFrame | LineError::FlexibleDataRate) => {
-                self.counts.other_lines += 1;
-                Ok(None)
-            }
-            Err(fault) => self.bad_line(fault).map(|()| None),
-        }
-    }
-
-    /// Skips what is left of a line that is no frame.
-    fn long_line(&mut self) -> Result<Option<BusTick>, ImportError> {
-        self.bad_line(LineError::Trailing {
-            column: LINE_BYTES_MAX,
-        })?;
-        while self.text.line(&mut self.bytes, LINE_BYTES_MAX)? == Line::Long {}
-        Ok(None)
-    }
-
-    fn bad_line(&mut self, fault: LineError) -> Result<(), ImportError> {
-        if self.settings.skip_bad_lines {
-            self.counts.bad_lines += 1;
-            return Ok(());
-        }
-        Err(ImportError::BadLine {
-            path: self.path().to_path_buf(),
-            line: self.line,
-            fault,
-        })
     }
 
     /// Whether a tick belongs into a log; those with a code at a rail are counted.

@@ -105,16 +105,6 @@ pub enum ImportError {
         /// The log.
         path: PathBuf,
     },
-    /// A line is longer than any row.
-    #[error("{}: no line break within {most} bytes after byte {byte}; name a CSV log", path.display())]
-    LongLine {
-        /// The log.
-        path: PathBuf,
-        /// Where the line starts, from 0, after decompression.
-        byte: usize,
-        /// The most bytes that a line may have.
-        most: usize,
-    },
     /// It has more movements than any run.
     #[error(
         "{place}: more than {most} movements; name the column of the movement's number in the [log] table of stage.toml"

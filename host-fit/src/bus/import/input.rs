@@ -1,25 +1,17 @@
-//! An input of text, plain or gzip, read line by line from its start as often as it is needed.
+//! An input of text, plain or gzip, read from its start as often as it is needed, and its lines.
 
-use super::ImportError;
-use crate::input::log::LogError;
-use crate::input::source::{self, GZIP_MAGIC, SourceError};
+use crate::input::source::{self, SourceError};
+use crate::input::text::TextReader;
 use crate::progress::Progress;
-use flate2::bufread::MultiGzDecoder;
 use std::fs::File;
-use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, Write};
+use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// Most bytes that are kept of an input that comes only once, such as a pipe: two days of bus.
+/// Most bytes that are kept of an input that comes only once, such as a pipe: days of bus.
 const SPOOL_BYTES_MAX: u64 = 16 << 30;
 
-/// Most bytes of UTF-16, which is turned into UTF-8 as a whole.
-const UTF16_BYTES_MAX: u64 = 1 << 30;
-
-/// Longest line of a block, in bytes.
-const LINE_BYTES_MAX: usize = 1 << 20;
-
 /// Bytes that are read at a time.
-const BUFFER_BYTES: usize = 1 << 18;
+const PIECE_BYTES: usize = 1 << 17;
 
 /// A file or a pipe, `-` for standard input.
 #[derive(Debug)]
@@ -33,219 +25,129 @@ impl Input {
     /// What cannot be read `again` is copied to a temporary file if it must be.
     ///
     /// # Errors
-    /// Every variant of [`SourceError`] but `Utf16`.
+    /// Those of reading, and `TooLarge`.
     pub(super) fn new(path: &Path, again: bool) -> Result<Self, SourceError> {
-        let path = path.to_path_buf();
-        let is_file = std::fs::metadata(&path).is_ok_and(|found| !is_pipe(&found));
-        let mut input = Self {
-            path,
-            spooled: None,
-        };
-        if again && (!is_file || source::is_standard(&input.path)) {
-            let spooled = input.spool()?;
-            input.spooled = Some(spooled);
-        }
-        Ok(input)
-    }
-
-    fn spool(&self) -> Result<File, SourceError> {
-        let unreadable = |error| self.unreadable(error);
-        let mut from = self.raw()?;
-        let start = source::probe(&mut from).map_err(unreadable)?;
-        if !start.starts_with(&GZIP_MAGIC) {
-            source::refuse_binary(&start, &self.path)?;
-        }
-        let mut copy = tempfile::tempfile().map_err(unreadable)?;
-        copy.write_all(&start).map_err(unreadable)?;
-        let copied = std::io::copy(&mut from.take(SPOOL_BYTES_MAX), &mut copy);
-        if copied.map_err(unreadable)? == SPOOL_BYTES_MAX {
-            return Err(self.too_large(SPOOL_BYTES_MAX));
-        }
-        Ok(copy)
-    }
-
-    /// The text from its start, with a bar that says `what` is done. What is plainly no text is
-    /// refused by its start: a device may have no end.
-    ///
-    /// # Errors
-    /// Every variant of [`SourceError`] but `Utf16`.
-    pub(super) fn open(&self, what: &'static str) -> Result<TextReader, SourceError> {
-        let raw = self.raw()?;
-        let length = std::fs::metadata(&self.path).map_or(0, |found| found.len());
-        let mut raw = Metered {
-            raw,
-            progress: (length > 0).then(|| Progress::new(what, length)),
-            bytes: 0,
-        };
-        let unreadable = |error| self.unreadable(error);
-        let start = source::probe(&mut raw).map_err(unreadable)?;
-        let is_gzip = start.starts_with(&GZIP_MAGIC);
-        let raw = BufReader::with_capacity(BUFFER_BYTES, std::io::Cursor::new(start).chain(raw));
-        let mut text = TextReader {
-            path: self.path.clone(),
-            text: match is_gzip {
-                false => Box::new(raw),
-                true => Box::new(BufReader::with_capacity(
-                    BUFFER_BYTES,
-                    MultiGzDecoder::new(raw),
-                )),
+        let is_file = std::fs::metadata(path).is_ok_and(|found| found.is_file());
+        Ok(Self {
+            path: path.to_path_buf(),
+            spooled: match again && !is_file {
+                true => Some(spooled(path)?),
+                false => None,
             },
-            is_gzip,
-            line_end: b'\n',
-            bytes: 0,
-        };
-        match text.text.fill_buf() {
-            Ok(start) if source::is_utf16(start) => {
-                let mut bytes = Vec::new();
-                let read = (&mut text.text)
-                    .take(UTF16_BYTES_MAX)
-                    .read_to_end(&mut bytes);
-                if read.map_err(|error| text.fault(error))? as u64 == UTF16_BYTES_MAX {
-                    return Err(self.too_large(UTF16_BYTES_MAX));
-                }
-                let utf8 = source::to_utf8(&bytes, &self.path)?.into_owned();
-                text.text = Box::new(std::io::Cursor::new(utf8));
-            }
-            Ok(start) => source::refuse_binary(start, &self.path)?,
-            Err(error) => return Err(text.fault(error)),
-        }
-        if let Ok(start) = text.text.fill_buf()
-            && !start.contains(&b'\n')
-            && start.contains(&b'\r')
-        {
-            text.line_end = b'\r';
-        }
-        Ok(text)
-    }
-
-    /// The bytes as they come.
-    fn raw(&self) -> Result<Box<dyn Read>, SourceError> {
-        let unreadable = |error| self.unreadable(error);
-        if let Some(spooled) = &self.spooled {
-            let mut copy = spooled.try_clone().map_err(unreadable)?;
-            copy.rewind().map_err(unreadable)?;
-            return Ok(Box::new(copy));
-        }
-        match source::is_standard(&self.path) {
-            true => Ok(Box::new(std::io::stdin())),
-            false => Ok(Box::new(File::open(&self.path).map_err(unreadable)?)),
-        }
-    }
-
-    fn too_large(&self, limit_bytes: u64) -> SourceError {
-        SourceError::TooLarge {
-            path: source::shown_name(&self.path).to_path_buf(),
-            limit_bytes,
-        }
-    }
-
-    fn unreadable(&self, error: std::io::Error) -> SourceError {
-        source::unreadable(&self.path, error)
-    }
-}
-
-/// Whether a second reader would not find what the first one has read.
-fn is_pipe(found: &std::fs::Metadata) -> bool {
-    !found.is_file() && !found.is_dir()
-}
-
-/// Tells how far reading is.
-struct Metered {
-    raw: Box<dyn Read>,
-    progress: Option<Progress>,
-    bytes: u64,
-}
-
-impl Read for Metered {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        let read = self.raw.read(buffer)?;
-        self.bytes += read as u64;
-        if let Some(progress) = &self.progress {
-            progress.reach(self.bytes);
-        }
-        Ok(read)
-    }
-}
-
-/// Text on its way in.
-pub(super) struct TextReader {
-    path: PathBuf,
-    text: Box<dyn BufRead>,
-    is_gzip: bool,
-    /// A line feed, or a carriage return where there are no line feeds.
-    line_end: u8,
-    bytes: usize,
-}
-
-/// A line of an input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Line {
-    /// It is whole.
-    Whole,
-    /// It is longer than asked for; what is left of it comes next.
-    Long,
-    /// There is none.
-    End,
-}
-
-impl TextReader {
-    /// Puts the next line, of at most `bytes_max`, into `line`, with its end.
-    ///
-    /// # Errors
-    /// `Unreadable`, `GzipCut`, `GzipDamaged`.
-    pub(super) fn line(
-        &mut self,
-        line: &mut Vec<u8>,
-        bytes_max: usize,
-    ) -> Result<Line, SourceError> {
-        line.clear();
-        let mut limited = (&mut self.text).take(bytes_max as u64);
-        let read = limited.read_until(self.line_end, line);
-        self.bytes += read.map_err(|error| self.fault(error))?;
-        Ok(match line.last() {
-            None => Line::End,
-            Some(end) if *end == self.line_end => Line::Whole,
-            Some(_) if line.len() == bytes_max => Line::Long,
-            Some(_) => Line::Whole,
         })
     }
 
-    /// Appends whole lines to `block` until it has so many bytes; `false` if there are none.
+    /// The text from its start.
     ///
     /// # Errors
-    /// `LongLine`, `Unreadable`, `GzipCut`, `GzipDamaged`.
-    pub(super) fn block(&mut self, block: &mut Vec<u8>, bytes: usize) -> Result<bool, ImportError> {
-        let mut line = Vec::new();
-        let before = block.len();
-        while block.len() < bytes {
-            match self
-                .line(&mut line, LINE_BYTES_MAX)
-                .map_err(LogError::from)?
-            {
-                Line::End => break,
-                Line::Whole => block.extend_from_slice(&line),
-                Line::Long => {
-                    return Err(ImportError::LongLine {
-                        path: source::shown_name(&self.path).to_path_buf(),
-                        byte: self.bytes - line.len(),
-                        most: LINE_BYTES_MAX,
-                    });
-                }
-            }
+    /// Those of reading.
+    pub(super) fn open(&self) -> Result<TextReader<'static>, SourceError> {
+        let Some(spooled) = &self.spooled else {
+            return TextReader::open(&self.path);
+        };
+        let copy = spooled.try_clone().and_then(|mut copy| {
+            copy.rewind()?;
+            Ok(copy)
+        });
+        let path = source::shown_name(&self.path);
+        let copy = copy.map_err(|source| source::refused(path, source))?;
+        TextReader::of_reader(copy, path)
+    }
+}
+
+/// All of a text that comes only once, in a temporary file without a name.
+fn spooled(path: &Path) -> Result<File, SourceError> {
+    let mut text = TextReader::open(path)?;
+    let refused = |source| source::refused(source::shown_name(path), source);
+    let mut copy = tempfile::tempfile().map_err(refused)?;
+    let (mut piece, mut bytes) = (Vec::new(), 0);
+    while text.append(&mut piece, PIECE_BYTES)? {
+        copy.write_all(&piece).map_err(refused)?;
+        bytes += piece.len() as u64;
+        piece.clear();
+        if bytes > SPOOL_BYTES_MAX {
+            return Err(SourceError::TooLarge {
+                path: source::shown_name(path).to_path_buf(),
+                limit_bytes: SPOOL_BYTES_MAX,
+            });
         }
-        Ok(block.len() > before)
+    }
+    Ok(copy)
+}
+
+/// The lines of a text, with a bar of how far reading is.
+pub(super) struct Lines {
+    text: TextReader<'static>,
+    progress: Progress,
+    piece: Vec<u8>,
+    /// Where the next line starts.
+    at: usize,
+    is_whole: bool,
+}
+
+/// A line of a text, without its end.
+pub(super) enum Line<'l> {
+    /// It is whole.
+    Whole(&'l [u8]),
+    /// It is longer than it may be, and left out.
+    Long,
+}
+
+/// Longest line, in bytes: a frame, with spaces to align it, has a hundred.
+pub(super) const LINE_BYTES_MAX: usize = 4096;
+
+impl Lines {
+    /// Of a text; `what` is being done.
+    pub(super) fn new(text: TextReader<'static>, what: &'static str) -> Self {
+        Self {
+            progress: Progress::new(what, text.progress().1),
+            text,
+            piece: Vec::new(),
+            at: 0,
+            is_whole: false,
+        }
     }
 
-    fn fault(&self, source: std::io::Error) -> SourceError {
-        let (path, bytes) = (source::shown_name(&self.path).to_path_buf(), self.bytes);
-        match source.kind() {
-            ErrorKind::UnexpectedEof if self.is_gzip => SourceError::GzipCut { path, bytes },
-            _ if self.is_gzip => SourceError::GzipDamaged {
-                path,
-                bytes,
-                source,
-            },
-            _ => source::unreadable(&path, source),
+    /// The next line; `None` at the end.
+    ///
+    /// # Errors
+    /// Those of reading.
+    pub(super) fn next(&mut self) -> Result<Option<Line<'_>>, SourceError> {
+        let mut is_long = false;
+        loop {
+            let rest = self.piece.get(self.at..).unwrap_or_default();
+            let end = rest.iter().position(|byte| *byte == b'\n');
+            is_long |= end.unwrap_or(rest.len()) > LINE_BYTES_MAX;
+            let start = self.at;
+            match end {
+                Some(length) => {
+                    self.at += length + 1;
+                    let line = self.piece.get(start..start + length).unwrap_or_default();
+                    return Ok(Some(if is_long {
+                        Line::Long
+                    } else {
+                        Line::Whole(line)
+                    }));
+                }
+                None if self.is_whole => {
+                    let is_over = rest.is_empty() && !is_long;
+                    self.at = self.piece.len();
+                    let line = self.piece.get(start..).unwrap_or_default();
+                    return Ok(match (is_over, is_long) {
+                        (true, _) => None,
+                        (_, true) => Some(Line::Long),
+                        _ => Some(Line::Whole(line)),
+                    });
+                }
+                None => {
+                    // Nothing of a line that is too long is needed.
+                    let done = if is_long { self.piece.len() } else { start };
+                    self.piece.drain(..done);
+                    self.at = 0;
+                    self.is_whole = !self.text.append(&mut self.piece, PIECE_BYTES)?;
+                    self.progress.reach(self.text.progress().0);
+                }
+            }
         }
     }
 }

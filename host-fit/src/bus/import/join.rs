@@ -153,8 +153,8 @@ fn between(before: Option<&Sample>, after: Option<&Sample>, t_us: f64, tolerance
 const GAP_TICKS: f64 = 10.0;
 
 /// Joins ticks with a reference as both are read.
-pub(super) struct Join<'t> {
-    reference: ReferenceReader<'t>,
+pub(super) struct Join {
+    reference: ReferenceReader,
     tolerance_us: f64,
     before: Option<Sample>,
     after: Option<Sample>,
@@ -163,13 +163,13 @@ pub(super) struct Join<'t> {
     counts: JoinCounts,
 }
 
-impl<'t> Join<'t> {
+impl Join {
     /// Reads the reference from where it is.
     ///
     /// # Errors
     /// Those of [`ReferenceReader::next_sample`].
     pub(super) fn new(
-        mut reference: ReferenceReader<'t>,
+        mut reference: ReferenceReader,
         tolerance_us: f64,
     ) -> Result<Self, ImportError> {
         let after = reference.next_sample()?;

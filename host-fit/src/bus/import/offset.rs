@@ -181,7 +181,7 @@ fn most(offsets: impl Iterator<Item = Offset>, value: impl Fn(&Offset) -> f64) -
 impl ReferenceInput<'_> {
     /// The time of the first sample, us.
     fn first_us(&self) -> Result<f64, ImportError> {
-        let mut reader = self.reader("reading")?;
+        let mut reader = self.reader()?;
         Ok(reader.next_sample()?.map_or(0.0, |sample| sample.t_us))
     }
 
@@ -193,7 +193,7 @@ impl ReferenceInput<'_> {
         windows: &[[f64; 2]],
         spacing_us: f64,
     ) -> Result<Vec<Sample>, ImportError> {
-        let mut reader = self.reader("clocks")?;
+        let mut reader = self.reader()?;
         let whole_us: f64 = windows.iter().map(|[start, end]| end - start).sum();
         let spacing_us = spacing_us.max(whole_us / SAMPLES);
         let mut samples = collect(&mut reader, windows, spacing_us)?;

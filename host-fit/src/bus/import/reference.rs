@@ -1,16 +1,16 @@
 //! The log of the interferometers.
 
 use super::ImportError;
-use super::input::{Input, TextReader};
+use super::input::Input;
 use crate::input::log::LogError;
 use crate::input::log::cell::{self, CellFault};
 use crate::input::log::header::{Header, Source, UnknownColumns};
 use crate::input::log::layout::{Kind, Quantity};
 use crate::input::log::rows::{ROTATION_MAX_RAD, displacement_max_m};
-use crate::input::log::table::{BYTE_ORDER_MARK, Table};
+use crate::input::log::table::Table;
 use crate::input::log::time::Clock;
-use crate::input::source;
 use crate::input::stage::Stage;
+use crate::input::text::TextReader;
 use std::collections::{HashMap, VecDeque};
 use std::path::Path;
 
@@ -58,12 +58,14 @@ struct Value {
     unit: &'static str,
 }
 
+/// Rows by which the time from row to row is told: the first ones.
+const PERIOD_ROWS: usize = 10_000;
+
 /// Movements that a log may have: a day of them, half a second each.
 const MOVEMENTS_MAX: usize = 200_000;
 
 /// A log of the reference that is read as often as it is needed.
 pub(super) struct ReferenceInput<'s> {
-    path: &'s Path,
     input: Input,
     stage: &'s Stage,
 }
@@ -73,93 +75,63 @@ impl<'s> ReferenceInput<'s> {
     ///
     /// # Errors
     /// `Reference`.
-    pub(super) fn new(path: &'s Path, again: bool, stage: &'s Stage) -> Result<Self, ImportError> {
+    pub(super) fn new(path: &Path, again: bool, stage: &'s Stage) -> Result<Self, ImportError> {
         let input = Input::new(path, again).map_err(LogError::from)?;
-        let path = source::shown_name(path);
-        Ok(Self { path, input, stage })
+        Ok(Self { input, stage })
     }
 
-    /// Reads from the start, with a bar that says `what` is done; columns that the layout does not
-    /// know are left out.
+    /// Reads from the start; columns that the layout does not know are left out.
     ///
     /// # Errors
     /// `Reference`.
-    pub(super) fn reader(&self, what: &'static str) -> Result<ReferenceReader<'_>, ImportError> {
-        let text = self.input.open(what).map_err(LogError::from)?;
-        ReferenceReader::open(text, self.path, self.stage)
+    pub(super) fn reader(&self) -> Result<ReferenceReader, ImportError> {
+        let text = self.input.open().map_err(LogError::from)?;
+        ReferenceReader::open(text, self.stage)
     }
 }
 
-/// Bytes of a block of rows, about: a thousand rows and more; a few in tests.
-const BLOCK_BYTES: usize = if cfg!(test) { 1 << 9 } else { 1 << 17 };
-
-/// Bytes in which the header and the first rows are found.
-const START_BYTES: usize = if cfg!(test) { 1 << 10 } else { 1 << 20 };
-
-/// A log of the reference, read sample by sample, a block of rows at a time.
-pub(super) struct ReferenceReader<'s> {
-    path: &'s Path,
-    stage: &'s Stage,
-    text: TextReader,
-    /// All above the first row, which stands above every block.
-    header: Vec<u8>,
-    decimal_commas: bool,
-    /// Line breaks before the block in hand.
-    lines: usize,
+/// A log of the reference, read sample by sample.
+pub(super) struct ReferenceReader {
+    table: Table<'static>,
     cells: Cells,
     /// What the three values are.
     pub(super) quantities: [Quantity; 3],
     clock: Clock,
+    /// Rows that were read to tell the period, and their lines.
+    ahead: VecDeque<(Sample, usize)>,
     period_us: f64,
     shift_us: f64,
     before: Option<Sample>,
     /// The line at which each movement was left.
     left: HashMap<i64, usize>,
-    ready: VecDeque<Sample>,
     counts: ReferenceCounts,
 }
 
-/// A sample as it stands, and where its row starts in the block.
-type Row = (Sample, u64);
-
-impl<'s> ReferenceReader<'s> {
-    fn open(mut text: TextReader, path: &'s Path, stage: &'s Stage) -> Result<Self, ImportError> {
-        let mut start = Vec::new();
-        text.block(&mut start, START_BYTES)?;
-        if start.starts_with(BYTE_ORDER_MARK) {
-            start.drain(..BYTE_ORDER_MARK.len());
-        }
-        let mut table = Table::open(path, &start, |name| stage.log.knows(name))?;
+impl ReferenceReader {
+    fn open(text: TextReader<'static>, stage: &Stage) -> Result<Self, ImportError> {
+        let table = Table::open(text, |name| stage.log.knows(name))?;
         let (quantities, cells) = Cells::find(&table, stage)?;
-        let mut clock = Clock::default();
-        let rows = cells.rows(&mut table, &mut clock)?;
-        let header_bytes = rows.first().map_or(start.len(), |(_, byte)| *byte as usize);
-        let mut header = start.get(..header_bytes).unwrap_or_default().to_vec();
-        if !header.ends_with(b"\n") && !header.ends_with(b"\r") {
-            header.push(b'\n');
-        }
         let mut reader = Self {
-            path,
-            stage,
-            text,
-            header,
-            decimal_commas: table.has_decimal_commas(),
-            lines: 0,
             counts: ReferenceCounts {
                 has_movements: cells.movement.is_some(),
                 ..ReferenceCounts::default()
             },
+            table,
             cells,
             quantities,
-            clock,
-            period_us: period_us(&rows),
+            clock: Clock::default(),
+            ahead: VecDeque::new(),
+            period_us: 0.0,
             shift_us: 0.0,
             before: None,
             left: HashMap::new(),
-            ready: VecDeque::new(),
         };
-        reader.in_order(&table, &rows, 0)?;
-        reader.lines = line_breaks(&start);
+        while reader.ahead.len() < PERIOD_ROWS
+            && let Some(row) = reader.row()?
+        {
+            reader.ahead.push_back(row);
+        }
+        reader.period_us = period_us(reader.ahead.make_contiguous());
         Ok(reader)
     }
 
@@ -170,17 +142,47 @@ impl<'s> ReferenceReader<'s> {
     /// `Reference` for cells, time that runs backwards and movements that return; `NoReference`;
     /// `TooManyMovements`.
     pub(super) fn next_sample(&mut self) -> Result<Option<Sample>, ImportError> {
-        while self.ready.is_empty() {
-            if !self.next_block()? {
+        loop {
+            let row = match self.ahead.pop_front() {
+                Some(row) => Some(row),
+                None => self.row()?,
+            };
+            let Some((mut sample, line)) = row else {
                 return match self.counts.rows - self.counts.duplicates {
                     0 | 1 => Err(ImportError::NoReference {
-                        path: self.path.to_path_buf(),
+                        path: self.table.head.path.clone(),
                     }),
                     _ => Ok(None),
                 };
+            };
+            self.counts.rows += 1;
+            sample.t_us += self.shift_us;
+            if let Some(before) = self.before {
+                let begins = sample.movement != before.movement;
+                if begins {
+                    self.begin(&before, &sample, line)?;
+                }
+                if begins && sample.t_us <= before.t_us {
+                    let anew_us = before.t_us + self.period_us - sample.t_us;
+                    self.shift_us += anew_us;
+                    sample.t_us += anew_us;
+                    self.counts.restarts += 1;
+                    self.check_time(&sample, line)?;
+                }
+                if sample.t_us == before.t_us {
+                    self.counts.duplicates += 1;
+                    continue;
+                }
+                if sample.t_us < before.t_us {
+                    return Err(self.backwards(&before, &sample, line).into());
+                }
+                if !begins && sample.t_us - before.t_us > 1.5 * self.period_us {
+                    self.counts.gaps += 1;
+                }
             }
+            self.before = Some(sample);
+            return Ok(Some(sample));
         }
-        Ok(self.ready.pop_front())
     }
 
     /// What the log held as far as it was read.
@@ -188,112 +190,60 @@ impl<'s> ReferenceReader<'s> {
         self.counts
     }
 
-    /// Reads a block of rows; `false` at the end.
-    fn next_block(&mut self) -> Result<bool, ImportError> {
-        let mut block = self.header.clone();
-        if !self
-            .text
-            .block(&mut block, self.header.len() + BLOCK_BYTES)?
-        {
-            return Ok(false);
+    /// The next row as it stands, and its line.
+    fn row(&mut self) -> Result<Option<(Sample, usize)>, LogError> {
+        if !self.table.next_row()? {
+            return Ok(None);
         }
-        let above = self.lines - line_breaks(&self.header);
-        self.lines = above + line_breaks(&block);
-        self.take_block(&block, above)
-            .map_err(|error| match error {
-                ImportError::Reference(error) => error.below(above).into(),
-                ImportError::TooManyMovements { mut place, most } => {
-                    place.line += above;
-                    ImportError::TooManyMovements { place, most }
-                }
-                error => error,
-            })?;
-        Ok(true)
+        let sample = self.cells.sample(&self.table, &mut self.clock)?;
+        Ok(Some((sample, self.table.row_line())))
     }
 
-    fn take_block(&mut self, block: &[u8], above: usize) -> Result<(), ImportError> {
-        let mut table = Table::open(self.path, block, |name| self.stage.log.knows(name))?;
-        table.set_decimal_commas(self.decimal_commas);
-        let rows = self.cells.rows(&mut table, &mut self.clock)?;
-        self.in_order(&table, &rows, above)
-    }
-
-    /// Takes rows of a block that stands so many lines below its place in `table`.
-    fn in_order(
-        &mut self,
-        table: &Table<'_>,
-        rows: &[Row],
-        above: usize,
-    ) -> Result<(), ImportError> {
-        for (sample, byte) in rows {
-            let mut sample = *sample;
-            self.counts.rows += 1;
-            sample.t_us += self.shift_us;
-            let place = |cell| table.place(*byte, cell, Some(sample.movement));
-            if let Some(before) = self.before {
-                let begins = sample.movement != before.movement;
-                if begins {
-                    let cell = self.cells.movement.unwrap_or_default();
-                    if let Some(&left_line) = self.left.get(&sample.movement) {
-                        let place = place(cell);
-                        return Err(LogError::MovementReturns { place, left_line }.into());
-                    }
-                    if self.left.len() == MOVEMENTS_MAX {
-                        return Err(ImportError::TooManyMovements {
-                            place: place(cell),
-                            most: MOVEMENTS_MAX,
-                        });
-                    }
-                    self.left.insert(before.movement, above + table.line(*byte));
-                }
-                if begins && sample.t_us <= before.t_us {
-                    let anew_us = before.t_us + self.period_us - sample.t_us;
-                    self.shift_us += anew_us;
-                    sample.t_us += anew_us;
-                    self.counts.restarts += 1;
-                }
-                if sample.t_us == before.t_us {
-                    self.counts.duplicates += 1;
-                    continue;
-                }
-                let cell = self.cells.time.cell;
-                if sample.t_us < before.t_us {
-                    return Err(LogError::TimeBackwards {
-                        place: place(cell),
-                        before_us: before.t_us.round() as i64,
-                        t_us: sample.t_us.round() as i64,
-                    }
-                    .into());
-                }
-                // A time that grew by those of the movements before must still be one.
-                if sample.t_us > cell::WHOLE_MAX {
-                    let fault = CellFault::Absurd {
-                        value: sample.t_us,
-                        limit: cell::WHOLE_MAX,
-                        unit: "us",
-                    };
-                    let place = place(cell);
-                    return Err(LogError::Cell { place, fault }.into());
-                }
-                if !begins && sample.t_us - before.t_us > 1.5 * self.period_us {
-                    self.counts.gaps += 1;
-                }
-            }
-            self.before = Some(sample);
-            self.ready.push_back(sample);
+    /// Another movement begins in this line; it must be new.
+    fn begin(&mut self, before: &Sample, sample: &Sample, line: usize) -> Result<(), ImportError> {
+        let place = || {
+            let cell = self.cells.movement.unwrap_or_default();
+            self.table.head.place(line, cell, Some(sample.movement))
+        };
+        if let Some(left) = self.left.get(&sample.movement) {
+            let left_line = *left;
+            let place = place();
+            return Err(LogError::MovementReturns { place, left_line }.into());
         }
+        if self.left.len() == MOVEMENTS_MAX {
+            return Err(ImportError::TooManyMovements {
+                place: place(),
+                most: MOVEMENTS_MAX,
+            });
+        }
+        self.left.insert(before.movement, line);
         Ok(())
     }
-}
 
-/// Line breaks in a text; a lone carriage return is one too.
-fn line_breaks(text: &[u8]) -> usize {
-    let is_break = |(k, byte): (usize, &u8)| match *byte {
-        b'\n' => true,
-        b'\r' => text.get(k + 1) != Some(&b'\n'),
-        _ => false,
-    };
-    text.iter().enumerate().filter(|at| is_break(*at)).count()
+    /// A time that grew by those of the movements before must still be one.
+    fn check_time(&self, sample: &Sample, line: usize) -> Result<(), LogError> {
+        if sample.t_us <= cell::WHOLE_MAX {
+            return Ok(());
+        }
+        let cell = self.cells.time.cell;
+        Err(LogError::Cell {
+            place: self.table.head.place(line, cell, Some(sample.movement)),
+            fault: CellFault::Absurd {
+                value: sample.t_us,
+                limit: cell::WHOLE_MAX,
+                unit: "us",
+            },
+        })
+    }
+
+    fn backwards(&self, before: &Sample, sample: &Sample, line: usize) -> LogError {
+        let cell = self.cells.time.cell;
+        LogError::TimeBackwards {
+            place: self.table.head.place(line, cell, Some(sample.movement)),
+            before_us: before.t_us.round() as i64,
+            t_us: sample.t_us.round() as i64,
+        }
+    }
 }
 
 /// Keeps the samples within these times, which ascend, `spacing_us` apart or more.
@@ -301,7 +251,7 @@ fn line_breaks(text: &[u8]) -> usize {
 /// # Errors
 /// Those of [`ReferenceReader::next_sample`].
 pub(super) fn collect(
-    reader: &mut ReferenceReader<'_>,
+    reader: &mut ReferenceReader,
     windows: &[[f64; 2]],
     spacing_us: f64,
 ) -> Result<Vec<Sample>, ImportError> {
@@ -321,8 +271,8 @@ pub(super) fn collect(
 }
 
 /// The usual time from row to row, us; 0 if no movement has two.
-fn period_us(rows: &[Row]) -> f64 {
-    let step = |pair: &[Row]| match pair {
+fn period_us(rows: &[(Sample, usize)]) -> f64 {
+    let step = |pair: &[(Sample, usize)]| match pair {
         [(a, _), (b, _)] if a.movement == b.movement && b.t_us > a.t_us => Some(b.t_us - a.t_us),
         _ => None,
     };
@@ -337,7 +287,7 @@ fn period_us(rows: &[Row]) -> f64 {
 impl Cells {
     /// The beams, or X, Y, Rz where the log has those.
     fn find(table: &Table<'_>, stage: &Stage) -> Result<([Quantity; 3], Self), LogError> {
-        let header = Header::new(table, &stage.log, UnknownColumns::LeaveOut)?;
+        let header = Header::new(&table.head, &stage.log, UnknownColumns::LeaveOut)?;
         let [time] = header.all([Quantity::Time])?;
         let quantities = match header.one_set(Quantity::BEAMS, Quantity::PLANAR)? {
             Some(Quantity::X | Quantity::Y | Quantity::Rz) => Quantity::PLANAR,
@@ -365,19 +315,10 @@ impl Cells {
         Ok((quantities, cells))
     }
 
-    /// The samples of all rows of a table, and where each row starts.
-    fn rows(&self, table: &mut Table<'_>, clock: &mut Clock) -> Result<Vec<Row>, LogError> {
-        let mut rows = Vec::new();
-        while table.next_row()? {
-            rows.push((self.sample(table, clock)?, table.row_byte()));
-        }
-        Ok(rows)
-    }
-
     /// The sample in the row in hand.
     fn sample(&self, table: &Table<'_>, clock: &mut Clock) -> Result<Sample, LogError> {
         let bad = |cell, movement, fault: CellFault| LogError::Cell {
-            place: table.place(table.row_byte(), cell, movement),
+            place: table.head.place(table.row_line(), cell, movement),
             fault,
         };
         let movement = self.movement.map_or(Ok(0), |at| {

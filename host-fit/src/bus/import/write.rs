@@ -4,7 +4,7 @@ use super::ImportReport;
 use super::join::JoinedRow;
 use crate::input::log::layout::Quantity;
 use crate::input::stage::Stage;
-use std::fmt::{self, Display, Formatter, Result as FmtResult};
+use std::fmt::{Display, Formatter, Result as FmtResult, Write};
 
 /// How a log is written: in the columns and units that the stage names.
 pub(super) struct LogFormat {
@@ -34,12 +34,12 @@ impl LogFormat {
     }
 
     /// The first line.
-    pub(super) fn header(&self) -> &str {
-        &self.header
+    pub(super) fn header(&self) -> String {
+        format!("{}\n", self.header)
     }
 
-    /// The line of a row.
-    pub(super) fn row(&self, row: &JoinedRow) -> impl Display {
+    /// Appends the line of a row.
+    pub(super) fn append(&self, row: &JoinedRow, text: &mut String) {
         let (movement, time) = (row.movement, row.t_us as f64 / self.us_per_unit);
         let [x, y, z] = row.values;
         let [gaps, hall] = self.codes_per_unit;
@@ -48,12 +48,11 @@ impl LogFormat {
         };
         let [g1, g2, g3] = in_units(row.capacitive, gaps);
         let [a, b, c] = in_units(row.hall, hall);
-        fmt::from_fn(move |f| {
-            write!(
-                f,
-                "{movement},{time},{x},{y},{z},{g1},{g2},{g3},{a},{b},{c}"
-            )
-        })
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{movement},{time},{x},{y},{z},{g1},{g2},{g3},{a},{b},{c}"
+        );
     }
 }
 

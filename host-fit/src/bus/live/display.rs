@@ -21,17 +21,22 @@ pub(super) struct Shown<'s> {
     pub(super) is_down: bool,
 }
 
-/// Shows on standard output.
+/// Shows on standard output, or on standard error where that carries the record.
 #[derive(Debug)]
 pub(super) struct Display {
+    on_stderr: bool,
     in_place: bool,
     lines_up: usize,
 }
 
 impl Display {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(on_stderr: bool) -> Self {
         Self {
-            in_place: std::io::stdout().is_terminal(),
+            on_stderr,
+            in_place: match on_stderr {
+                true => std::io::stderr().is_terminal(),
+                false => std::io::stdout().is_terminal(),
+            },
             lines_up: 0,
         }
     }
@@ -47,7 +52,10 @@ impl Display {
 
     /// Shows the present state. A closed standard output is no reason to stop decoding.
     pub(super) fn show(&mut self, shown: &Shown<'_>) {
-        let mut out = std::io::stdout().lock();
+        let mut out: Box<dyn Write> = match self.on_stderr {
+            true => Box::new(std::io::stderr().lock()),
+            false => Box::new(std::io::stdout().lock()),
+        };
         if self.in_place {
             let lines = block(shown);
             let up = match self.lines_up {

@@ -2,12 +2,13 @@
 
 use super::display::{Display, Shown};
 use super::node::{Node, NodeSettings};
-use super::record::Record;
 use super::rhythm::{Pace, Rhythm};
 use super::{Bus, BusError, LiveError, LiveSettings};
 use crate::interrupt;
-use crate::output::blob_file;
+use crate::output::record_file::RecordFile;
+use crate::output::{OutputError, blob_file, is_standard_output};
 use hal_adapters::can::{BusFault, BusFrame, Coded, Layout, StampedFrame};
+use hal_adapters::candump::LogLine;
 use runtime::{ParameterSet, Reading};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
@@ -35,7 +36,7 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
     };
     let bus = Bus::open(&settings.interface, &Node::messages(node.layout))?;
     let record = match &settings.record {
-        Some(path) => Some(Record::create(path, &settings.interface)?),
+        Some(path) => Some(RecordFile::create(path).map_err(LiveError::NoRecord)?),
         None => None,
     };
     let stop = interrupt::watch();
@@ -43,9 +44,11 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
     let mut session = Session {
         node: Node::new(&*decoder, &set.serial, &node),
         bus,
+        interface: &settings.interface,
         record,
+        record_ended: None,
         sends: !settings.listen_only,
-        display: Display::new(),
+        display: Display::new(settings.record.as_deref().is_some_and(is_standard_output)),
         started: Instant::now(),
         rhythm: Rhythm::default(),
         pace: None,
@@ -56,9 +59,13 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
     };
     let ended = session.until(stop, settings.duration, settings.every);
     // What was recorded is kept whatever ended the run.
-    let flushed = session.record.as_mut().map_or(Ok(()), Record::flush);
+    session.write(RecordFile::finish);
     session.show();
-    ended.and(flushed)
+    ended?;
+    match session.record_ended {
+        None => Ok(()),
+        Some(ended) => Err(ended),
+    }
 }
 
 /// The layout that carries every code that the blob accepts, its converter's rails included.
@@ -90,7 +97,9 @@ fn now_us() -> u64 {
 struct Session<'d> {
     node: Node<'d>,
     bus: Bus,
-    record: Option<Record>,
+    interface: &'d str,
+    record: Option<RecordFile>,
+    record_ended: Option<LiveError>,
     sends: bool,
     display: Display,
     started: Instant,
@@ -122,6 +131,7 @@ impl Session<'_> {
                 self.show();
             }
             self.turn()?;
+            self.write(RecordFile::keep_up);
         }
         Ok(())
     }
@@ -144,7 +154,7 @@ impl Session<'_> {
             }
         }
         while let Some(stamped) = frame {
-            self.take(&stamped)?;
+            self.take(&stamped);
             if !self.bus.has_frame() {
                 break;
             }
@@ -167,10 +177,8 @@ impl Session<'_> {
         }
     }
 
-    fn take(&mut self, frame: &StampedFrame) -> Result<(), LiveError> {
-        if let Some(record) = &mut self.record {
-            record.frame(frame)?;
-        }
+    fn take(&mut self, frame: &StampedFrame) {
+        self.record(frame);
         let step = self.node.take(frame, &mut self.out);
         if let Some((raw, reading)) = step.tick {
             self.rhythm.take(raw.sequence, frame.time_us);
@@ -180,7 +188,31 @@ impl Session<'_> {
             self.display.say(&format!("request: {command:?}"));
         }
         self.note(step.fault);
-        Ok(())
+    }
+
+    fn record(&mut self, stamped: &StampedFrame) {
+        let line = LogLine {
+            time_us: stamped.time_us,
+            interface: self.interface,
+            frame: stamped.frame,
+        };
+        self.write(|record| record.line(line));
+    }
+
+    /// A record that cannot be written ends; decoding goes on.
+    fn write(&mut self, work: impl FnOnce(&mut RecordFile) -> Result<(), OutputError>) {
+        let Some(record) = &mut self.record else {
+            return;
+        };
+        if let Err(source) = work(record) {
+            let ended = LiveError::RecordEnded {
+                source,
+                after_s: self.started.elapsed().as_secs_f64(),
+            };
+            self.display.say(&format!("{ended}; decoding goes on"));
+            self.record = None;
+            self.record_ended = Some(ended);
+        }
     }
 
     fn note(&mut self, fault: Option<BusFault>) {
@@ -201,11 +233,9 @@ impl Session<'_> {
             self.not_sent = self.not_sent.saturating_add(count);
             return self.wait_out(error);
         }
-        if let Some(record) = &mut self.record {
-            let time_us = now_us();
-            for frame in frames {
-                record.sent(frame, time_us)?;
-            }
+        let time_us = now_us();
+        for frame in frames {
+            self.record(&StampedFrame { time_us, frame });
         }
         Ok(())
     }

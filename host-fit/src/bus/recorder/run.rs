@@ -3,7 +3,7 @@
 use super::{MISSING_ONE_IN, Recorded, RecorderError, RecorderSettings, Watch};
 use crate::bus::live::{Bus, BusError};
 use crate::interrupt;
-use crate::output::growing_file::GrowingFile;
+use crate::output::record_file::RecordFile;
 use hal_adapters::can::command::{Answer, Command, Mailbox, Outcome, Request, Told};
 use hal_adapters::can::table::TABLE;
 use hal_adapters::can::{BusFrame, Message, StampedFrame};
@@ -32,7 +32,7 @@ pub fn run(settings: &RecorderSettings) -> Result<Recorded, RecorderError> {
     let mut session = Session {
         settings,
         bus: Bus::open(&settings.interface, &messages)?,
-        file: GrowingFile::create(&settings.out)?,
+        file: RecordFile::create(&settings.out).map_err(RecorderError::NoRecord)?,
         watch: Watch::default(),
         mailbox: Mailbox::default(),
         // A node ignores a request that equals the last one: another token for each program.
@@ -41,7 +41,10 @@ pub fn run(settings: &RecorderSettings) -> Result<Recorded, RecorderError> {
         shown: None,
     };
     let stop = interrupt::watch();
-    session.ask(true)?;
+    if let Err(error) = session.ask(true) {
+        session.file.discard();
+        return Err(error);
+    }
     let recorded = session.record(stop);
     let end_us = now_us();
     let stopped = session.ask(false);
@@ -71,7 +74,7 @@ fn now_us() -> u64 {
 struct Session<'s> {
     settings: &'s RecorderSettings,
     bus: Bus,
-    file: GrowingFile,
+    file: RecordFile,
     watch: Watch,
     mailbox: Mailbox,
     token: u8,
@@ -119,6 +122,7 @@ impl Session<'_> {
                 },
             };
             self.turn(left)?;
+            self.file.keep_up()?;
             self.show();
             // A controller that was reset sends no codes until it is asked again.
             if asked.elapsed() > SILENCE && self.watch.missing_at_the_end(now_us()) > 0 {
@@ -185,12 +189,13 @@ impl Session<'_> {
         }
     }
 
-    fn finish(self, end_us: u64) -> Result<Watch, RecorderError> {
+    fn finish(mut self, end_us: u64) -> Result<Watch, RecorderError> {
         if self.shown.is_some() {
             let _ = write!(std::io::stderr(), "\r\x1b[2K");
         }
         let counts = self.watch.counts();
         if counts.ticks == 0 {
+            self.file.discard();
             return Err(RecorderError::NoCodes {
                 seconds: self.started.elapsed().as_secs_f64(),
                 state: self.watch.state(),

@@ -46,7 +46,7 @@ pub(super) fn summary(fit: &Fit, report: &Report, stage: &Stage) -> String {
         fit.train_fitness,
         text::errors(
             &format!("errors over all rows, {}", report.zeros_in_words),
-            &fit.judgement.errors,
+            fit.errors(),
             None
         ) + &errors::as_text(&report.logs),
         text::lag(

@@ -56,7 +56,7 @@ fn digits(number: &[u8]) -> &[u8] {
 }
 
 /// Whether a cell has digits, and nothing but what a number may have.
-fn is_number(cell: &[u8]) -> bool {
+pub(super) fn is_number(cell: &[u8]) -> bool {
     let cell = cell.trim_ascii();
     let part = |b: &u8| b.is_ascii_digit() || b",.+-eE".contains(b);
     cell.iter().all(part) && cell.iter().any(u8::is_ascii_digit)

@@ -77,6 +77,36 @@ pub enum LogError {
         /// What is there, shortened.
         text: String,
     },
+    /// More columns than any log has.
+    #[error("{}:{line}: the header has more than {limit} columns; name another file, or leave out the columns that are not needed", path.display())]
+    TooManyColumns {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// Most columns that are read.
+        limit: usize,
+    },
+    /// A line longer than any log has.
+    #[error("{}:{line}: the line is longer than {limit_bytes} bytes, the most that is read; name a log with a row in each line", path.display())]
+    LineTooLong {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: usize,
+        /// Length of the longest line that is read.
+        limit_bytes: usize,
+    },
+    /// More movements than any log has.
+    #[error("{}:{line}: more than {limit} movements, the most that a log may have; check the movement column, or split the log", path.display())]
+    TooManyMovements {
+        /// The file.
+        path: PathBuf,
+        /// The line of the first row of the movement too many.
+        line: usize,
+        /// Most movements of a log.
+        limit: usize,
+    },
     /// A column that is needed is not there.
     #[error("{}:{line}: the column `{column}` is missing; record it, or name the column that holds it with `{key} = \"...\"` in the [log] table of stage.toml", path.display())]
     MissingColumn {
@@ -269,18 +299,4 @@ pub enum LogError {
         /// What is wrong with the first of them.
         first: Box<LogError>,
     },
-}
-
-impl LogError {
-    /// The same so many lines further below, for a fault in a part of a file.
-    pub(crate) fn below(mut self, lines: usize) -> Self {
-        match &mut self {
-            Self::CellCount { line, .. } | Self::CutLine { line, .. } => *line += lines,
-            Self::Cell { place, .. }
-            | Self::TimeBackwards { place, .. }
-            | Self::MovementReturns { place, .. } => place.line += lines,
-            _ => {}
-        }
-        self
-    }
 }

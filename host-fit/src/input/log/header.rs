@@ -4,7 +4,7 @@ use super::ReferenceUse;
 use super::cell::shown;
 use super::error::LogError;
 use super::layout::{Kind, LogLayout, Meaning, Quantity, UnitFault};
-use super::table::Table;
+use super::table::Head;
 use super::time;
 use std::path::Path;
 
@@ -68,7 +68,7 @@ pub(crate) struct Header<'a> {
 
 /// Finds the columns of a log.
 pub(super) fn columns(
-    table: &Table<'_>,
+    table: &Head,
     layout: &LogLayout,
     reference: ReferenceUse,
 ) -> Result<Columns, LogError> {
@@ -104,18 +104,18 @@ impl<'a> Header<'a> {
     /// `UnnamedColumn`, `UnknownColumn`, `RepeatedColumn`, `NoUnit`, `NoVoltsPerCount`,
     /// `UnitsDisagree`.
     pub(crate) fn new(
-        table: &Table<'a>,
+        table: &'a Head,
         layout: &'a LogLayout,
         unknown: UnknownColumns,
     ) -> Result<Self, LogError> {
-        let (path, line) = (table.path, table.header_line());
+        let (path, line) = (table.path.as_path(), table.line);
         let mut header = Self {
             path,
             line,
             layout,
             sources: [None; 17],
         };
-        for (cell, name) in table.names().iter().enumerate() {
+        for (cell, name) in table.names.iter().enumerate() {
             let found = header.source(table, cell, name);
             let found = match (found, unknown) {
                 (Err(LogError::UnknownColumn { .. }), UnknownColumns::LeaveOut) => None,
@@ -143,7 +143,7 @@ impl<'a> Header<'a> {
     /// What a column holds, and m, rad, us or codes per unit; `None` if it is to be left out.
     fn source(
         &self,
-        table: &Table<'_>,
+        table: &Head,
         cell: usize,
         name: &str,
     ) -> Result<Option<(Quantity, f64)>, LogError> {

@@ -2,6 +2,9 @@
 
 use std::collections::HashMap;
 
+/// Most movements of a log: more than a week of the shortest, in little memory.
+pub(super) const MOVEMENTS_MAX: usize = 1 << 19;
+
 /// What is wrong with the place of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum OrderFault {
@@ -9,20 +12,28 @@ pub(super) enum OrderFault {
     Backwards { before_us: i64 },
     /// Same movement and time as the row above.
     Repeated,
-    /// The movement was left at this byte and comes back.
-    Returns { left_byte: u64 },
+    /// The movement was left at this line and comes back.
+    Returns { left_line: usize },
+    /// A movement more than [`MOVEMENTS_MAX`].
+    TooMany,
 }
 
 /// Follows the rows of one log.
 #[derive(Debug, Default)]
 pub(super) struct Order {
     current: Option<(i64, i64)>,
-    left: HashMap<i64, u64>,
+    /// The line at which each movement was left.
+    left: HashMap<i64, usize>,
 }
 
 impl Order {
-    /// Takes the next row, which starts at `byte`; tells whether a movement begins.
-    pub(super) fn take(&mut self, movement: i64, t_us: i64, byte: u64) -> Result<bool, OrderFault> {
+    /// Takes the next row, in this line; tells whether a movement begins.
+    pub(super) fn take(
+        &mut self,
+        movement: i64,
+        t_us: i64,
+        line: usize,
+    ) -> Result<bool, OrderFault> {
         let begins = match self.current {
             Some((current, before_us)) if current == movement => {
                 if t_us < before_us {
@@ -34,9 +45,12 @@ impl Order {
                 false
             }
             Some((current, _)) => {
-                self.left.insert(current, byte);
-                if let Some(&left_byte) = self.left.get(&movement) {
-                    return Err(OrderFault::Returns { left_byte });
+                self.left.insert(current, line);
+                if let Some(&left_line) = self.left.get(&movement) {
+                    return Err(OrderFault::Returns { left_line });
+                }
+                if self.left.len() >= MOVEMENTS_MAX {
+                    return Err(OrderFault::TooMany);
                 }
                 true
             }
@@ -64,7 +78,7 @@ mod tests {
         assert_eq!(order.take(1, 0, 4), Ok(true));
         assert_eq!(
             order.take(3, 12, 5),
-            Err(OrderFault::Returns { left_byte: 4 })
+            Err(OrderFault::Returns { left_line: 4 })
         );
     }
 }

@@ -1,7 +1,8 @@
 //! Where the header of a table stands: instruments write notes above it, some put it in a comment.
 
 use super::decimal;
-use csv::ByteRecord;
+use super::line::{Dialect, Splitter};
+use super::table::COLUMNS_MAX;
 
 /// Starts a comment, as the first byte of a line.
 pub(super) const COMMENT: u8 = b'#';
@@ -14,8 +15,8 @@ const KNOWN_MIN: usize = 3;
 
 /// The header of a table.
 pub(super) struct HeaderLine {
-    /// Its first byte, from 0.
-    pub(super) start: usize,
+    /// Its line, from 1.
+    pub(super) line: usize,
     /// The first byte after it.
     pub(super) end: usize,
     /// What separates the cells of the table.
@@ -32,14 +33,13 @@ pub(super) fn find_header(bytes: &[u8], is_known: impl Fn(&str) -> bool) -> Opti
     let known = |line: &HeaderLine| line.names.iter().filter(|name| is_known(name)).count();
     let mut plain: Vec<HeaderLine> = Vec::new();
     let mut comment = None;
-    for (start, line) in lines(bytes).take(LINES_MAX) {
-        let end = start + line.len();
-        if let Some(note) = line.strip_prefix(&[COMMENT]) {
-            let line = header_line(note, start, end);
+    for Found { text, line, end } in lines(bytes).take(LINES_MAX) {
+        if let Some(note) = text.strip_prefix(&[COMMENT]) {
+            let line = header_line(note, line, end);
             let is_header = known(&line) >= KNOWN_MIN && !plain.iter().any(is_row);
             comment = if is_header { Some(line) } else { comment };
-        } else if !line.trim_ascii().is_empty() {
-            let line = header_line(line, start, end);
+        } else if !text.trim_ascii().is_empty() {
+            let line = header_line(text, line, end);
             if known(&line) >= KNOWN_MIN {
                 return Some(line);
             }
@@ -72,33 +72,44 @@ pub(super) fn is_numeric(names: &[String]) -> bool {
     names.iter().all(|name| name.parse::<f64>().is_ok())
 }
 
-/// The lines, with their first bytes, without line breaks.
-fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
-    let mut start = 0;
+/// A line without its break.
+struct Found<'a> {
+    text: &'a [u8],
+    /// Its number, from 1.
+    line: usize,
+    /// The first byte after it.
+    end: usize,
+}
+
+/// The lines; one between the carriage return and the line feed of a line break is empty.
+fn lines(bytes: &[u8]) -> impl Iterator<Item = Found<'_>> {
+    let (mut start, mut line) = (0, 1);
     bytes
         .split(|b| *b == b'\n' || *b == b'\r')
-        .map(move |line| {
-            let here = start;
-            start += line.len() + 1;
-            (here, line)
+        .map(move |text| {
+            let end = start + text.len();
+            let found = Found { text, line, end };
+            let is_half = bytes.get(end..end + 2) == Some(b"\r\n");
+            (start, line) = (end + 1, line + usize::from(!is_half));
+            found
         })
 }
 
-fn header_line(line: &[u8], start: usize, end: usize) -> HeaderLine {
-    let separator = separator(line);
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .delimiter(separator)
-        .from_reader(line);
-    let mut cells = ByteRecord::new();
-    // Reading from memory cannot fail.
-    let _ = reader.read_byte_record(&mut cells);
+fn header_line(text: &[u8], line: usize, end: usize) -> HeaderLine {
+    let separator = separator(text);
+    let dialect = Dialect {
+        separator,
+        decimal_commas: false,
+    };
+    let mut splitter = Splitter::default();
+    let (cells, _) = splitter.split(text, dialect);
+    // One too many is enough to refuse it.
+    let cells = (0..cells.len().min(COLUMNS_MAX + 1)).map(|cell| cells.cell(cell));
     HeaderLine {
-        start,
+        line,
         end,
         separator,
-        names: cells.iter().map(text).collect(),
+        names: cells.map(self::text).collect(),
     }
 }
 
@@ -132,7 +143,7 @@ mod tests {
     fn header(text: &str) -> (usize, Vec<String>) {
         let is_known = |name: &str| ["a", "b", "c", "d"].contains(&name);
         let line = find_header(text.as_bytes(), is_known).expect("a header");
-        (text[..line.start].matches('\n').count() + 1, line.names)
+        (line.line, line.names)
     }
 
     #[test]

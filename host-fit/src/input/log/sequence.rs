@@ -1,63 +1,87 @@
 //! Numbers the servo periods of a log by time, so that a gap shows as frames missed.
 
 use super::warning::LogWarning;
-use crate::input::dataset::{LogSource, Movement, Row};
+use crate::input::dataset::{Movement, Row};
+use std::path::Path;
 
 /// Largest relative difference of the log's period from the servo's that passes in silence.
 const PERIOD_TOLERANCE: f64 = 0.1;
 
-/// Sets the sequence number of every row of one log: 0 at the start of each movement, then
-/// by the time since the row before, in periods, at least 1.
+/// Gives every row of one log its sequence number: 0 at the start of each movement, then by the
+/// time since the row before, in periods, at least 1.
 ///
-/// The period is the median time between rows: a log that keeps every tenth sample has no
+/// The period is the median time between the first rows: a log that keeps every tenth sample has no
 /// missing frames, only another period, which gives a warning.
-pub(super) fn number(
+#[derive(Debug)]
+pub(super) struct Numbering {
+    pub(super) period_us: f64,
+    servo_us: f64,
+    /// Sequence number and time of the row before.
+    before: (u32, i64),
+}
+
+impl Numbering {
+    /// For a log whose first rows have these times between rows of one movement.
+    pub(super) fn new(mut steps_us: Vec<i64>, servo_period_s: f64) -> Self {
+        let servo_us = servo_period_s * 1e6;
+        let middle = steps_us.len() / 2;
+        Self {
+            period_us: match steps_us.is_empty() {
+                true => servo_us,
+                false => *steps_us.select_nth_unstable(middle).1 as f64,
+            },
+            servo_us,
+            before: (0, 0),
+        }
+    }
+
+    /// The number of the next row.
+    pub(super) fn number(&mut self, t_us: i64, begins: bool) -> u32 {
+        let (before, before_us) = self.before;
+        let number = match begins {
+            true => 0,
+            false => {
+                let periods = ((t_us - before_us) as f64 / self.period_us).round();
+                // Within half the range of u32, which the servo counts as ahead.
+                let periods = periods.clamp(1.0, f64::from(i32::MAX)) as u32;
+                before.wrapping_add(periods)
+            }
+        };
+        self.before = (number, t_us);
+        number
+    }
+
+    /// That the log was sampled at another period than the servo's.
+    pub(super) fn warning(&self, path: &Path) -> Option<LogWarning> {
+        let off_us = (self.period_us - self.servo_us).abs();
+        (off_us > PERIOD_TOLERANCE * self.servo_us).then(|| LogWarning::OtherPeriod {
+            path: path.to_path_buf(),
+            log_us: self.period_us as i64,
+            servo_us: self.servo_us,
+        })
+    }
+}
+
+/// Numbers the rows of these movements of one log.
+pub(super) fn number<'m>(
     rows: &mut [Row],
-    movements: &[Movement],
-    source: &LogSource,
+    movements: impl Iterator<Item = &'m Movement> + Clone,
     servo_period_s: f64,
-    warnings: &mut Vec<LogWarning>,
 ) {
-    let slices = |movement: &Movement| movement.rows.clone();
     let mut steps_us: Vec<i64> = Vec::with_capacity(rows.len());
-    for movement in movements {
-        let slice = rows.get(slices(movement)).unwrap_or_default();
-        steps_us.extend(slice.windows(2).filter_map(|pair| match pair {
+    for movement in movements.clone() {
+        let rows = rows.get(movement.rows.clone()).unwrap_or_default();
+        steps_us.extend(rows.windows(2).filter_map(|pair| match pair {
             [before, row] => Some(row.t_us - before.t_us),
             _ => None,
         }));
     }
-    let servo_us = servo_period_s * 1e6;
-    let middle = steps_us.len() / 2;
-    let period_us = if steps_us.is_empty() {
-        servo_us
-    } else {
-        let log_us = *steps_us.select_nth_unstable(middle).1;
-        let period_us = log_us as f64;
-        if (period_us - servo_us).abs() > PERIOD_TOLERANCE * servo_us {
-            warnings.push(LogWarning::OtherPeriod {
-                path: source.path.clone(),
-                log_us,
-                servo_us,
-            });
-        }
-        period_us
-    };
+    let mut numbering = Numbering::new(steps_us, servo_period_s);
     for movement in movements {
-        let slice = rows.get_mut(slices(movement)).unwrap_or_default();
-        let mut before: Option<(u32, i64)> = None;
-        for row in slice {
-            let sequence = match before {
-                None => 0,
-                Some((sequence, t_us)) => {
-                    let periods = ((row.t_us - t_us) as f64 / period_us).round();
-                    // Within half the range of u32, which the servo counts as ahead.
-                    let periods = periods.clamp(1.0, f64::from(i32::MAX)) as u32;
-                    sequence.wrapping_add(periods)
-                }
-            };
+        let rows = rows.get_mut(movement.rows.clone()).unwrap_or_default();
+        for (at, row) in rows.iter_mut().enumerate() {
+            let sequence = numbering.number(row.t_us, at == 0);
             row.frame = row.frame.with_sequence(sequence);
-            before = Some((sequence, row.t_us));
         }
     }
 }

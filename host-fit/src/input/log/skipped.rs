@@ -3,15 +3,19 @@
 use super::cell::CellFault;
 use super::error::{CellPlace, LogError};
 use super::warning::{LogWarning, SkipReason};
-use crate::input::dataset::Movement;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+
+/// So many movements of which nothing is left are told one by one.
+const MOVEMENTS_TOLD: usize = 10;
 
 /// The rows of one log that were left out.
 #[derive(Debug, Default)]
 pub(super) struct Skipped {
     reasons: Vec<(SkipReason, usize, Box<CellPlace>)>,
     by_movement: BTreeMap<i64, usize>,
+    /// Movements that have rows which are kept.
+    kept: BTreeSet<i64>,
     first: Option<(CellFault, Box<CellPlace>)>,
 }
 
@@ -58,8 +62,13 @@ impl Skipped {
         }
     }
 
-    /// Warnings, given the movements of the log that have rows.
-    pub(super) fn warnings(self, path: &Path, kept: &[Movement]) -> Vec<LogWarning> {
+    /// A movement has a row that is kept.
+    pub(super) fn keep(&mut self, movement: i64) {
+        self.kept.insert(movement);
+    }
+
+    /// What the user should know.
+    pub(super) fn warnings(self, path: &Path) -> Vec<LogWarning> {
         let skipped =
             self.reasons
                 .into_iter()
@@ -68,16 +77,23 @@ impl Skipped {
                     rows,
                     first,
                 });
-        let kept: BTreeSet<i64> = kept.iter().map(|kept| kept.index).collect();
-        let lost = self
-            .by_movement
-            .into_iter()
-            .filter(|(movement, _)| !kept.contains(movement))
-            .map(|(movement, rows)| LogWarning::MovementSkipped {
+        let mut warnings: Vec<LogWarning> = skipped.collect();
+        let is_lost = |(movement, _): &(i64, usize)| !self.kept.contains(movement);
+        let mut lost = self.by_movement.into_iter().filter(is_lost);
+        let told = lost.by_ref().take(MOVEMENTS_TOLD);
+        warnings.extend(told.map(|(movement, rows)| LogWarning::MovementSkipped {
+            path: path.to_path_buf(),
+            movement,
+            rows,
+        }));
+        let (movements, rows) = lost.fold((0, 0), |(n, sum), (_, rows)| (n + 1, sum + rows));
+        if movements > 0 {
+            warnings.push(LogWarning::MovementsSkipped {
                 path: path.to_path_buf(),
-                movement,
+                movements,
                 rows,
             });
-        skipped.chain(lost).collect()
+        }
+        warnings
     }
 }

@@ -4,8 +4,6 @@
 //! [`GAP_PERIODS`] of the log's own periods (its median step), or, where the user asks for it,
 //! after a given time.
 
-use crate::input::dataset::{Dataset, Movement};
-
 /// Longest gap within a movement, in periods of the log: longer than what a busy computer loses
 /// now and then, shorter than it takes to reset an interferometer.
 pub(super) const GAP_PERIODS: i64 = 10;
@@ -14,13 +12,12 @@ pub(super) const GAP_PERIODS: i64 = 10;
 /// of order.
 pub(super) const ROWS_MIN: usize = 10;
 
-/// Where the movements of a log may begin, row by row.
+/// The times of a log, row by row.
 #[derive(Debug, Default)]
 pub(super) struct Steps {
-    /// Times before the rows of the log that were kept: the longest step since the row kept before,
-    /// with rows that were left out in between, us; `None` where the time starts again.
-    steps_us: Vec<Option<i64>>,
+    /// The longest step since the row kept before, with rows that were left out in between.
     longest_us: i64,
+    /// Whether the time started again since then.
     restarts: bool,
     /// Times of the first and the last row, kept or not, since the time last started.
     span_us: Option<(i64, i64)>,
@@ -49,52 +46,55 @@ impl Steps {
         restarts
     }
 
-    /// The row in hand is kept.
-    pub(super) fn keep(&mut self) {
+    /// The row in hand is kept: the longest step since the row kept before, us; `None` where the
+    /// time started again.
+    pub(super) fn keep(&mut self) -> Option<i64> {
         let step = (!self.restarts).then_some(self.longest_us);
-        self.steps_us.push(step);
         self.longest_us = 0;
         self.restarts = false;
+        step
+    }
+}
+
+/// Tells where movements begin.
+#[derive(Debug)]
+pub(super) struct Cuts {
+    period_us: i64,
+    /// Length of the movements, where the user asks for one.
+    length_us: Option<i64>,
+    /// The time of the first row of the movement, once there is one.
+    start_us: Option<i64>,
+}
+
+impl Cuts {
+    /// For a log whose first rows were kept with these steps.
+    pub(super) fn new(steps_us: impl Iterator<Item = Option<i64>>, length_us: Option<i64>) -> Self {
+        let mut known: Vec<i64> = steps_us.flatten().skip(1).collect();
+        let middle = known.len() / 2;
+        Self {
+            period_us: match known.is_empty() {
+                true => i64::MAX,
+                false => *known.select_nth_unstable(middle).1,
+            },
+            length_us,
+            start_us: None,
+        }
     }
 
-    /// Puts the rows of a log, which so far are movements from `first_movement` on, into the
-    /// movements that the times tell, of at most `length_us` each.
-    pub(super) fn split(
-        self,
-        dataset: &mut Dataset,
-        first_movement: usize,
-        length_us: Option<i64>,
-    ) {
-        let Some(first) = dataset.movements.get(first_movement) else {
-            return;
-        };
-        let (log, first_row) = (first.log, first.rows.start);
-        let mut known: Vec<i64> = self.steps_us.iter().flatten().copied().skip(1).collect();
-        let middle = known.len() / 2;
-        let period_us = match known.is_empty() {
-            true => i64::MAX,
-            false => *known.select_nth_unstable(middle).1,
-        };
-        let gap_us = period_us.saturating_mul(GAP_PERIODS);
-        dataset.movements.truncate(first_movement);
-        let mut start_us = 0;
-        let rows = dataset.rows.get_mut(first_row..).unwrap_or_default();
-        for ((at, row), step) in (first_row..).zip(rows).zip(self.steps_us) {
-            // Half a period early is on time: steps jitter.
-            let ends = |length_us| row.t_us - start_us >= length_us - period_us / 2;
-            let begins = step.is_none_or(|step| step > gap_us) || length_us.is_some_and(ends);
-            match dataset.movements.last_mut() {
-                Some(last) if !begins && last.log == log => last.rows.end = at + 1,
-                _ => {
-                    start_us = row.t_us;
-                    dataset.movements.push(Movement {
-                        log,
-                        index: (dataset.movements.len() - first_movement) as i64,
-                        rows: at..at + 1,
-                    });
-                }
+    /// Whether a movement begins with the next row.
+    pub(super) fn begins(&mut self, t_us: i64, step_us: Option<i64>) -> bool {
+        let gap_us = self.period_us.saturating_mul(GAP_PERIODS);
+        let begins = match (self.start_us, step_us) {
+            (None, _) | (_, None) => true,
+            (Some(start_us), Some(step_us)) => {
+                // Half a period early is on time: steps jitter.
+                let ends = |length_us| t_us - start_us >= length_us - self.period_us / 2;
+                step_us > gap_us || self.length_us.is_some_and(ends)
             }
-            row.movement = dataset.movements.len() - 1;
+        };
+        if begins {
+            self.start_us = Some(t_us);
         }
+        begins
     }
 }

@@ -1,6 +1,7 @@
 mod accepts;
 mod forms;
 mod fuzz;
+mod long;
 mod movements;
 mod refuses;
 mod refuses_cells;
@@ -8,6 +9,7 @@ mod refuses_files;
 mod skips;
 
 use super::*;
+use crate::input::dataset::Row;
 use crate::input::source::SourceError;
 use crate::input::stage::tests::SOUND;
 use std::io::Write;

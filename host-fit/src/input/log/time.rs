@@ -9,7 +9,7 @@ static PARSER: DateTimeParser = DateTimeParser::new();
 
 /// How a cell writes the time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Form {
+pub(super) enum Form {
     Number,
     /// Date and time with an offset from UTC, or `Z`.
     Zoned,
@@ -18,9 +18,9 @@ enum Form {
 }
 
 /// Reads the times of one log.
-#[derive(Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Clock {
-    form: Option<Form>,
+    pub(super) form: Option<Form>,
 }
 
 impl Clock {

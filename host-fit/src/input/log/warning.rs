@@ -2,7 +2,7 @@
 
 use super::cell::CellFault;
 use super::error::CellPlace;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Why rows were left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +45,7 @@ impl From<&CellFault> for SkipReason {
     fn from(fault: &CellFault) -> Self {
         match fault {
             CellFault::Empty => Self::Empty,
-            CellFault::NotANumber { .. } => Self::NotANumber,
+            CellFault::NotANumber { .. } | CellFault::DecimalPoint { .. } => Self::NotANumber,
             CellFault::OtherTime { .. } => Self::OtherTime,
             CellFault::Nan | CellFault::Infinite { .. } => Self::NotFinite,
             CellFault::NotWhole { .. } => Self::NotWhole,
@@ -102,6 +102,16 @@ pub enum LogWarning {
         /// Its rows.
         rows: usize,
     },
+    /// Further movements of which all rows were left out.
+    #[error("{}: and {movements} more movements are left out: all their rows ({rows}) are bad; record the log again", path.display())]
+    MovementsSkipped {
+        /// The file.
+        path: PathBuf,
+        /// How many movements.
+        movements: usize,
+        /// Their rows.
+        rows: usize,
+    },
     /// A movement with one row: its zero deviation takes up all that the row could tell.
     #[error("{}: movement {first} has one row{}, which tells the fit nothing: its zero deviation fits it exactly; check the movement column", path.display(), and_others(*others))]
     SingleRow {
@@ -150,33 +160,44 @@ pub enum LogWarning {
         /// Servo period of `stage.toml`, us.
         servo_us: f64,
     },
+    /// There are more rows than a fit needs.
+    #[error(
+        "fit and diagnosis use {taken} of {rows} rows, in {runs} runs taken where the motion tells most; the errors of the fit are over all rows"
+    )]
+    Excerpt {
+        /// Rows of the logs.
+        rows: usize,
+        /// Rows of the excerpt.
+        taken: usize,
+        /// Runs of rows that follow each other.
+        runs: usize,
+    },
 }
 
 impl LogWarning {
-    /// Counts the movements of one more log without a column for them.
-    pub(super) fn add_movements_by_time(
-        warnings: &mut Vec<Self>,
-        path: &Path,
-        more: usize,
-        split_s: Option<f64>,
-    ) {
-        let counts = warnings.iter_mut().find_map(|warning| match warning {
-            Self::MovementsByTime {
-                others, movements, ..
-            } => Some((others, movements)),
-            _ => None,
-        });
-        match counts {
-            Some((others, movements)) => {
-                *others += 1;
-                *movements += more;
+    /// Adds the warnings of one more log; logs without a column for the movement share one.
+    pub(super) fn add(warnings: &mut Vec<Self>, more: Vec<Self>) {
+        for warning in more {
+            let Self::MovementsByTime {
+                movements: more, ..
+            } = warning
+            else {
+                warnings.push(warning);
+                continue;
+            };
+            let counts = warnings.iter_mut().find_map(|known| match known {
+                Self::MovementsByTime {
+                    others, movements, ..
+                } => Some((others, movements)),
+                _ => None,
+            });
+            match counts {
+                Some((others, movements)) => {
+                    *others += 1;
+                    *movements += more;
+                }
+                None => warnings.push(warning),
             }
-            None => warnings.push(Self::MovementsByTime {
-                path: path.to_path_buf(),
-                others: 0,
-                movements: more,
-                split_s,
-            }),
         }
     }
 }

@@ -20,14 +20,21 @@ impl StatusCounts {
     pub fn of(rows: &[PoseRow]) -> Self {
         let mut counts = Self::default();
         for row in rows {
-            let status = row.reading.status;
-            counts.rows += 1;
-            counts.good += usize::from(status.is_good());
-            for (count, (bit, _)) in counts.by_bit.iter_mut().zip(&Status::NAMES) {
-                *count += usize::from(status.any(*bit) && means_something(*bit, status));
-            }
+            counts.add(row.reading.status);
         }
         counts
+    }
+
+    /// Counts one more row.
+    pub fn add(&mut self, status: Status) {
+        self.rows += 1;
+        if status.is_good() {
+            self.good += 1;
+            return;
+        }
+        for (count, (bit, _)) in self.by_bit.iter_mut().zip(&Status::NAMES) {
+            *count += usize::from(status.any(*bit) && means_something(*bit, status));
+        }
     }
 
     /// The bits that occur, with their names and how many rows have them.

@@ -5,6 +5,7 @@ const SKIP: ReadOptions = ReadOptions {
     saturated: SaturatedCodes::Bad,
     reference: ReferenceUse::Required,
     split_s: None,
+    rows_max: None,
 };
 
 fn codes(reading: &LogReading) -> Vec<i32> {

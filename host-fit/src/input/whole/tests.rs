@@ -1,0 +1,189 @@
+use super::chunk::SampledVertical;
+use super::*;
+use crate::input::dataset::Dataset;
+use crate::input::log::{LogWarning, ReadOptions, read_bytes};
+use crate::input::shipped::{LOG_GZ, STAGE_TOML};
+use crate::input::stage::Stage;
+use crate::judge::whole::WholeJudgement;
+use crate::judge::{Decoded, Zeros};
+use crate::problem::parameters::Parameters;
+use crate::problem::synthetic;
+use std::path::Path;
+use std::sync::Arc;
+
+fn stage() -> Stage {
+    Stage::from_toml(STAGE_TOML, Path::new("stage.toml")).expect("sound")
+}
+
+/// The log that ships, of which more than `rows_max` rows are not held.
+fn shipped(rows_max: Option<usize>) -> (Dataset, Vec<LogWarning>) {
+    let options = ReadOptions {
+        rows_max,
+        ..ReadOptions::FIT
+    };
+    let reading = read_bytes(LOG_GZ, Path::new("log.csv.gz"), &stage(), &options).expect("sound");
+    (reading.dataset, reading.warnings)
+}
+
+fn whole_of(dataset: &Dataset) -> Arc<Whole> {
+    let mut samples = Samples::default();
+    for row in &dataset.rows {
+        samples.push(&Sample::of(row));
+    }
+    let (movements, logs) = (dataset.movements.clone(), dataset.logs.clone());
+    Arc::new(Whole::new(Scales::of(&stage()), samples, movements, logs))
+}
+
+#[test]
+fn samples_come_back_as_they_were() {
+    let rail = |k: i64| (k as i32).wrapping_mul(1_234_567);
+    let sample = |k: i64| {
+        // Codes of 16, then of 32 bits; times that start again, then a year apart.
+        let code = |part: i64| match k {
+            0..9_000 => rail(k + part) >> 16,
+            _ => rail(k + part),
+        };
+        let pose = |part: i64| 1e-4 * (k + part) as f64;
+        Sample {
+            t_us: match k {
+                0..5_000 => 2_000 * (k % 1_000),
+                _ => k * 31_557_600_000_000,
+            },
+            hall: [0, 1, 2].map(code),
+            vertical: match k {
+                0..12_000 => SampledVertical::Codes([3, 4, 5].map(code)),
+                _ => SampledVertical::Pose([3, 4, 5].map(pose)),
+            },
+            reference: [6, 7, 8].map(pose),
+        }
+    };
+    let all: Vec<Sample> = (0..15_000).map(sample).collect();
+    let mut samples = Samples::default();
+    all.iter().for_each(|sample| samples.push(sample));
+    assert_eq!(samples.len(), all.len());
+    for rows in [
+        0..15_000,
+        4_090..4_100,
+        11_990..12_010,
+        7..7,
+        14_999..15_001,
+    ] {
+        let wanted = all[rows.start..rows.end.min(all.len())].iter().copied();
+        assert!(samples.of(rows.clone()).eq(wanted), "{rows:?}");
+    }
+}
+
+#[test]
+fn a_row_of_codes_takes_46_bytes() {
+    let (dataset, _) = shipped(Some(50_000));
+    let whole = dataset.whole.expect("an excerpt");
+    let bytes: usize = whole.samples.chunks.iter().map(Chunk::bytes).sum();
+    assert_eq!(bytes, 46 * whole.rows());
+}
+
+#[test]
+fn an_excerpt_holds_rows_of_the_log_in_runs() {
+    let (all, quiet) = shipped(Some(57_000));
+    assert!(all.whole.is_none() && quiet.is_empty());
+    let (excerpt, warnings) = shipped(Some(56_999));
+    assert_eq!(excerpt.named(), (57_000, 57));
+    assert_eq!(excerpt.sha256, all.sha256);
+    let taken = excerpt.rows.len();
+    assert!((12_000..=13_000).contains(&taken), "{taken}");
+    let told = LogWarning::Excerpt {
+        rows: 57_000,
+        taken,
+        runs: excerpt.movements.len(),
+    };
+    assert_eq!(warnings, [told]);
+    assert_eq!(excerpt.logs[0].rows, 0..taken);
+    for (number, run) in excerpt.movements.iter().enumerate() {
+        let of_log = &all.movements[run.index as usize];
+        let rows = &excerpt.rows[run.rows.clone()];
+        let first = all.rows[of_log.rows.clone()]
+            .iter()
+            .position(|row| row.t_us == rows[0].t_us)
+            .expect("a row of the movement");
+        let begin = of_log.rows.start + first;
+        for (have, want) in rows.iter().zip(&all.rows[begin..begin + rows.len()]) {
+            let sequence = want.frame.sequence() - first as u32;
+            let frame = want.frame.with_sequence(sequence);
+            let movement = number;
+            let want = Row {
+                movement,
+                frame,
+                ..*want
+            };
+            assert_eq!(*have, want);
+        }
+    }
+}
+
+#[test]
+fn an_excerpt_takes_the_rare_motion_and_not_the_rest() {
+    let stage = stage();
+    let truth = Parameters::designed(&stage);
+    let mut dataset = synthetic::Protocol::exact(truth, 100).dataset(&stage);
+    let moving = dataset.rows.len();
+    // Twenty times as long at rest, before all the motion.
+    let rest = dataset.rows[0];
+    let at_rest = 20 * moving;
+    dataset
+        .rows
+        .splice(0..0, std::iter::repeat_n(rest, at_rest));
+    for movement in &mut dataset.movements {
+        movement.rows = movement.rows.start + at_rest..movement.rows.end + at_rest;
+    }
+    dataset.movements.insert(
+        0,
+        Movement {
+            log: 0,
+            index: -1,
+            rows: 0..at_rest,
+        },
+    );
+    dataset.logs[0].rows = 0..dataset.rows.len();
+    let excerpt = whole_of(&dataset).excerpt(4_000, [0; 32]);
+    let rest = excerpt.movements.iter().filter(|run| run.index == -1);
+    assert_eq!(rest.count(), 0);
+    let motions = excerpt.movements.len();
+    assert!((39..=41).contains(&motions), "{motions}");
+}
+
+#[test]
+fn a_whole_log_is_judged_as_its_rows_are() {
+    let (dataset, _) = shipped(None);
+    let stage = stage();
+    let model = crate::problem::model::Model::of(runtime::ModelKind::M31);
+    let settings = crate::fit::FitSettings::new(crate::fit::ModelChoice::Named(model));
+    let fit = crate::fit::fit(&dataset, &stage, &settings).expect("a fit");
+    for zeros in [Zeros::Refit, Zeros::None] {
+        let decoded = Decoded::new(&fit.set, &dataset);
+        let want = decoded.judge(&dataset, &stage, zeros).errors;
+        let have = WholeJudgement::new(&fit.set, &whole_of(&dataset), &stage, zeros);
+        assert_eq!(have.errors.rows, want.rows);
+        assert_eq!(have.logs, [have.errors]);
+        for (have, want) in have.errors.axes.iter().zip(want.axes) {
+            assert!((have.rms / want.rms - 1.0).abs() < 1e-9);
+            assert!((have.peak / want.peak - 1.0).abs() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn a_fit_to_an_excerpt_is_as_good_as_one_to_all_rows() {
+    let stage = stage();
+    let model = crate::problem::model::Model::of(runtime::ModelKind::M31);
+    let settings = crate::fit::FitSettings::new(crate::fit::ModelChoice::Named(model));
+    let fitted = |rows_max| {
+        let (dataset, _) = shipped(rows_max);
+        crate::fit::fit(&dataset, &stage, &settings).expect("a fit")
+    };
+    let (all, excerpt) = (fitted(None), fitted(Some(50_000)));
+    assert_eq!(excerpt.set.fit.rows, 57_000);
+    assert!(excerpt.train_rows < 14_000);
+    for (all, excerpt) in all.errors().axes.iter().zip(excerpt.errors().axes) {
+        let ratio = excerpt.rms / all.rms;
+        assert!((1.0..1.003).contains(&ratio), "{ratio}");
+    }
+}

@@ -1,0 +1,76 @@
+//! Which file a name means.
+
+use super::folder_of;
+use std::fs::{self, Metadata};
+use std::path::{Path, PathBuf};
+
+/// As many links as Linux follows.
+const LINKS_MAX: usize = 40;
+
+/// A file, whether it is there or not: names that lead to the same file have the same place, hard
+/// links included.
+#[derive(Clone, Debug)]
+pub struct Place {
+    path: PathBuf,
+    /// Device and number on it of a file that is there.
+    inode: Option<(u64, u64)>,
+}
+
+impl Place {
+    /// The place that a name leads to.
+    pub fn of(path: &Path) -> Self {
+        let end = end_of_links(path);
+        // A file that is not there yet is known by its folder and its name.
+        let new = || Some(folder_of(&end).canonicalize().ok()?.join(end.file_name()?));
+        let there = path.canonicalize().ok().or_else(new);
+        Self {
+            path: there.unwrap_or_else(|| path.to_owned()),
+            inode: fs::metadata(path).ok().as_ref().and_then(inode),
+        }
+    }
+}
+
+impl PartialEq for Place {
+    fn eq(&self, other: &Self) -> bool {
+        self.path == other.path || (self.inode.is_some() && self.inode == other.inode)
+    }
+}
+
+#[cfg(unix)]
+fn inode(metadata: &Metadata) -> Option<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt;
+    Some((metadata.dev(), metadata.ino()))
+}
+
+/// Other systems do not tell.
+#[cfg(not(unix))]
+fn inode(_metadata: &Metadata) -> Option<(u64, u64)> {
+    None
+}
+
+/// Whether an output by this name goes to standard output.
+pub fn is_standard_output(path: &Path) -> bool {
+    let there = |path: &Path| fs::metadata(path).ok().as_ref().and_then(inode);
+    let standard = || there(Path::new("/dev/stdout"));
+    names_standard_output(path) || there(path).is_some_and(|inode| standard() == Some(inode))
+}
+
+/// Whether this is a name of standard output, which then is not opened anew: that waits forever for a
+/// pipe that nobody reads.
+pub(super) fn names_standard_output(path: &Path) -> bool {
+    let name = path.to_str();
+    matches!(
+        name,
+        Some("-" | "/dev/stdout" | "/dev/fd/1" | "/proc/self/fd/1")
+    )
+}
+
+/// The name at the end of the links that a name leads along; nothing need be there.
+pub(super) fn end_of_links(path: &Path) -> PathBuf {
+    let mut end = path.to_path_buf();
+    for _ in 0..LINKS_MAX {
+        let Ok(next) = fs::read_link(&end) else { break };
+        end = folder_of(&end).join(next);
+    }
+    end
+}

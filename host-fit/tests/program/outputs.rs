@@ -1,0 +1,177 @@
+//! Outputs: whole or not at all, never in the place of an input, and nothing but them on standard output.
+
+use crate::common::{Bench, stderr, stdout, thinned_log};
+use host_fit::output::blob_file;
+use std::process::Stdio;
+
+fn log() -> String {
+    thinned_log(20, |_| true)
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_refused_and_the_old_one_stays() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    bench.bad(
+        "fit log.csv --stage stage.toml --out no/such/p.bin",
+        3,
+        &["no/such"],
+    );
+    // None of the outputs is written when one of them cannot be.
+    bench.write("file", "");
+    for output in ["--json no/such/p.json", "--report file"] {
+        let arguments = format!("fit log.csv --stage stage.toml --out p.bin {output}");
+        bench.bad(&arguments, 3, &["folder"]);
+        assert!(!crate::common::exists(&bench.path("p.bin")), "{output}");
+    }
+    let twice = "fit log.csv --stage stage.toml --out p.bin --json ./p.bin";
+    bench.bad(twice, 2, &["another output"]);
+    std::fs::create_dir(bench.path("p.bin")).expect("a folder");
+    bench.bad("fit log.csv --stage stage.toml --out p.bin", 3, &["p.bin"]);
+    bench.write("old.bin", "old");
+    bench.bad(
+        "fit nowhere.csv --stage stage.toml --out old.bin",
+        3,
+        &["nowhere.csv"],
+    );
+    assert_eq!(bench.read("old.bin"), b"old");
+}
+
+#[test]
+fn no_output_takes_the_place_of_an_input() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    for folder in ["r", "c"] {
+        std::fs::create_dir(bench.path(folder)).expect("a folder");
+    }
+    for file in ["r/index.html", "c/runs.csv"] {
+        bench.write(file, log());
+    }
+    let taken = |command: &str| bench.bad(command, 2, &["name another"]);
+    taken("fit r/index.html --stage stage.toml --out p.bin --report r");
+    taken("fit log.csv --stage stage.toml --out r/index.html --report r");
+    taken("fit log.csv --stage stage.toml --out p.bin --json r/index.html --report r");
+    taken("compare c/runs.csv --stage stage.toml --out c --seeds 1 --evaluations 100");
+    bench.write("c/table.md", "");
+    taken("compare log.csv --stage c/table.md --out c --seeds 1 --evaluations 100");
+    let stage = std::fs::read(bench.path("stage.toml")).expect("there");
+    std::fs::write(bench.path("stage.toml"), [&stage[..], b"# mine\n"].concat()).expect("written");
+    taken("demo --out .");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_leaves_the_others_as_they_were() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    bench.write("p.bin", "the blob before");
+    let fit = "fit log.csv --stage stage.toml --model 31 --out p.bin --json /dev/full";
+    bench.bad(fit, 3, &["/dev/full", "no room"]);
+    assert_eq!(bench.text("p.bin"), "the blob before");
+    assert!(bench.holds_only(&["log.csv", "p.bin"]));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_output_that_is_an_input_by_another_name_is_refused() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    std::fs::hard_link(bench.path("log.csv"), bench.path("hard")).expect("linked");
+    std::os::unix::fs::symlink("new.bin", bench.path("soft")).expect("linked");
+    for command in [
+        "live hard --can no-such-bus --record log.csv",
+        "fit log.csv --stage stage.toml --out hard",
+        "fit log.csv --stage stage.toml --out soft --json new.bin",
+        "fit log.csv --stage stage.toml --out - --json /dev/stdout",
+    ] {
+        bench.bad(command, 2, &["another"]);
+    }
+    assert_eq!(bench.text("log.csv"), log());
+}
+
+#[cfg(unix)]
+#[test]
+fn standard_output_carries_an_output_alone_by_whatever_name() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    bench.good("fit log.csv --stage stage.toml --out p.bin");
+    bench.good("decode p.bin log.csv --stage stage.toml --out pose.csv");
+    for name in ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"] {
+        let decoded = bench.good(&format!(
+            "decode p.bin log.csv --stage stage.toml --out {name}"
+        ));
+        assert_eq!(stdout(&decoded), bench.text("pose.csv"), "{name}");
+        assert!(stderr(&decoded).contains("rows, "), "{name}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_has_seen_enough_is_no_error() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    bench.good("fit log.csv --stage stage.toml --out p.bin");
+    for command in [
+        "decode p.bin log.csv --stage stage.toml --out /dev/stdout",
+        "decode p.bin log.csv --stage stage.toml --out -",
+        "inspect p.bin",
+        "completions bash",
+        "--help",
+    ] {
+        let mut command = bench.command(&command.split(' ').collect::<Vec<_>>());
+        let mut child = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program runs");
+        drop(child.stdout.take());
+        let ended = child.wait_with_output().expect("it ends");
+        assert_eq!(ended.status.code(), Some(0), "{command:?}");
+        assert!(!stderr(&ended).contains("host-fit: "), "{}", stderr(&ended));
+    }
+}
+
+#[test]
+fn text_from_a_file_forges_no_line() {
+    let bench = Bench::new();
+    let forged = log().replacen("hall_b_cnt", "\"hall_b\nwarning: forged\u{1b}[2J\"", 1);
+    bench.write("log.csv", forged);
+    let told = stderr(&bench.run("fit log.csv --stage stage.toml --out p.bin"));
+    let stage = bench.text("stage.toml") + "\"a\\nwarning: forged\\u001B[2J\" = 1\n";
+    bench.write("odd.toml", stage);
+    let of_stage = stderr(&bench.run("check log.csv --stage odd.toml"));
+    bench.write("log.csv", log());
+    bench.good("fit log.csv --stage stage.toml --out p.bin");
+    let mut set = blob_file::read(&bench.path("p.bin")).expect("a blob");
+    set.serial = "a\nwarning: forged\u{1b}[2J".try_into().expect("short");
+    blob_file::write(&bench.path("q.bin"), &set).expect("written");
+    let shown = stdout(&bench.good("inspect q.bin"));
+    let compared = stdout(&bench.good("diff q.bin q.bin"));
+    for text in [told, of_stage, shown, compared] {
+        assert!(text.contains("\\nwarning: forged"), "{text}");
+        assert!(!text.contains('\u{1b}'), "{text}");
+        assert!(
+            !text.lines().any(|line| line.starts_with("warning: f")),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn errors_of_a_fit_that_cannot_be_are_unknown() {
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    bench.good("fit log.csv --stage stage.toml --out p.bin");
+    let mut set = blob_file::read(&bench.path("p.bin")).expect("a blob");
+    set.fit.rms = [3e38, -1e-6, 1e-6];
+    blob_file::write(&bench.path("p.bin"), &set).expect("written");
+    let shown = stdout(&bench.good("inspect p.bin --json p.json"));
+    assert!(
+        shown.contains("rms error       unknown um, unknown um, 1.000 urad"),
+        "{shown}"
+    );
+    let errors = &bench.json("p.json")["fit"]["errors"];
+    assert!(errors["x"]["rmse_um"].is_null() && errors["y"]["rmse_um"].is_null());
+    let compared = stdout(&bench.good("diff p.bin p.bin"));
+    assert!(!compared.contains("inf"), "{compared}");
+}
