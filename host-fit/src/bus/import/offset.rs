@@ -60,8 +60,8 @@ const EXPLAINED_MIN: f64 = 0.6;
 /// How far the rate that two minutes tell may be wrong, as a part of one.
 const RATE_ERROR_MAX: f64 = 5e-6;
 
-/// Servo periods by which a coarse offset may be wrong, and what the speed of the motion is taken
-/// from.
+/// Servo periods of the reference that are read before and after the points: a coarse offset may be
+/// wrong by some of them.
 const MARGIN_PERIODS: f64 = 20.0;
 
 /// Finds the offset within `search_us` of where both records start together.
