@@ -9,6 +9,10 @@ pub const EXIT_STATUS: u8 = 130;
 
 /// From now on Ctrl-C sets the flag that this returns.
 pub fn watch() -> &'static AtomicBool {
+    // The handler needs a thread. Where none can be started it would take Ctrl-C and do nothing.
+    if std::thread::Builder::new().spawn(|| ()).is_err() {
+        return &INTERRUPTED;
+    }
     // Fails only where a handler is set already: then that one stays in charge.
     let _ = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {

@@ -3,33 +3,41 @@
 //!
 //! | step | module |
 //! |---|---|
-//! | lines of `candump -L` to ticks, by the receiver of the bus | [`bus_log`] |
+//! | lines of text, from a file as often as needed | `input` |
+//! | lines of `candump -L` to ticks, by the receiver of the bus | `bus_reader`, [`bus_log`] |
 //! | receive times to sample times: the node samples evenly, the bus delivers unevenly | [`clock`] |
 //! | the interferometers' CSV | [`reference`](mod@reference) |
-//! | offset between the clocks and difference in speed, where asked for | [`offset`] |
+//! | offset between the clocks and difference in speed, where asked for | `survey`, [`offset`], `refine` |
 //! | reference between its samples, at the times of the ticks | [`join`] |
 //! | the log | [`write`](mod@write) |
 
 pub mod bus_log;
+mod bus_reader;
 pub mod clock;
 mod error;
+mod input;
 pub mod join;
 pub mod offset;
 pub mod reference;
 mod refine;
+mod survey;
 pub mod write;
 
 pub use error::ImportError;
 
 use crate::input::stage::Stage;
-use crate::output::write_atomically;
-use bus_log::{BusCounts, BusReading};
-use clock::Smoothing;
+use crate::output::streamed_file::StreamedFile;
+use bus_log::BusCounts;
+use bus_reader::BusReader;
+use clock::{EvenTicks, Smoothing};
 use hal_adapters::can::Layout;
-use join::JoinCounts;
+use input::Input;
+use join::{Join, JoinCounts};
 use offset::Offset;
-use reference::ReferenceCounts;
+use reference::{ReferenceCounts, ReferenceInput};
 use std::path::PathBuf;
+use survey::Survey;
+use write::LogFormat;
 
 /// What is joined, and how.
 #[derive(Clone, Debug)]
@@ -74,63 +82,86 @@ pub struct ImportReport {
     pub join: JoinCounts,
 }
 
-/// Reads both records, joins them and writes the log.
+/// Reads both records, joins them and writes the log. Each is read from its start as often as
+/// it is needed and never held as a whole; a pipe is copied to a temporary file for that.
 ///
 /// # Errors
 /// See [`ImportError`]; nothing is written then.
 pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
     let stage = Stage::from_file(&settings.stage)?;
-    let reading = bus_log::read(settings)?;
-    let (times_us, smoothing) = clock::sample_times_us(&reading.ticks);
-    if smoothing.rms_us > stage.servo_period_s * 1e6 {
-        let rms_us = smoothing.rms_us;
-        return Err(ImportError::UnevenTimes { rms_us });
-    }
-    let (reference, reference_counts) = reference::read(&settings.reference, &stage)?;
-    let offset = choose_offset(settings, &stage, &reading, &times_us, &reference)?;
-    let tolerance_us = settings
-        .tolerance_us
-        .map_or(stage.servo_period_s * 1e6, f64::from);
-    let reference_times = times_us.iter().map(|t| offset.on_reference_us(*t));
-    let (rows, join) = join::join(
-        &reading.ticks,
-        reference_times,
-        &reference.samples,
-        tolerance_us,
-    );
-    if rows.is_empty() {
-        return Err(ImportError::no_overlap(&times_us, &reference, offset.us));
-    }
-    write_atomically(
-        &settings.out,
-        write::to_csv(&rows, &reference, &stage).as_bytes(),
-    )?;
-    Ok(ImportReport {
-        bus: reading.counts,
-        smoothing,
-        reference: reference_counts,
-        offset,
-        join,
-    })
-}
-
-fn choose_offset(
-    settings: &ImportSettings,
-    stage: &Stage,
-    reading: &BusReading,
-    times_us: &[f64],
-    reference: &reference::Reference,
-) -> Result<Offset, ImportError> {
-    if !settings.estimate_offset {
-        return Ok(Offset {
+    let bus = Input::new(&settings.bus, settings.estimate_offset)?;
+    let reference = ReferenceInput::new(&settings.reference, settings.estimate_offset, &stage)?;
+    let offset = match settings.estimate_offset {
+        true => estimate(settings, &stage, &bus, &reference)?,
+        false => Offset {
             us: settings.offset_us,
             rate: 0.0,
             middle_us: 0.0,
             explained: None,
-        });
+        },
+    };
+    write(settings, &stage, &bus, &reference, offset)
+}
+
+fn estimate(
+    settings: &ImportSettings,
+    stage: &Stage,
+    bus: &Input,
+    reference: &ReferenceInput<'_>,
+) -> Result<Offset, ImportError> {
+    let mut ticks = EvenTicks::new(BusReader::open(bus, "clocks", settings, stage)?);
+    let mut survey = Survey::default();
+    while let Some(timed) = ticks.next_tick()? {
+        survey.take(&timed);
     }
+    survey.end();
+    ticks.finish(settings, stage)?;
     let search_us = settings.search_s * 1e6;
-    offset::estimate(&reading.ticks, times_us, reference, stage, search_us)
+    offset::estimate(&survey, reference, stage, search_us)
+}
+
+/// Bytes of the log that are written at a time, about.
+const TEXT_BYTES: usize = 1 << 16;
+
+/// Joins the two and writes the log.
+fn write(
+    settings: &ImportSettings,
+    stage: &Stage,
+    bus: &Input,
+    reference: &ReferenceInput<'_>,
+    offset: Offset,
+) -> Result<ImportReport, ImportError> {
+    let mut ticks = EvenTicks::new(BusReader::open(bus, "importing", settings, stage)?);
+    let tolerance_us = settings
+        .tolerance_us
+        .map_or(stage.servo_period_s * 1e6, f64::from);
+    let reference = reference.reader()?;
+    let format = LogFormat::new(reference.quantities, stage);
+    let mut join = Join::new(reference, tolerance_us)?;
+    let mut log = StreamedFile::create(&settings.out)?;
+    let mut text = format.header();
+    while let Some((tick, t_us)) = ticks.next_tick()? {
+        let period_us = ticks.smoothing().period_us;
+        if let Some(row) = join.take(&tick, offset.on_reference_us(t_us), period_us)? {
+            format.append(&row, &mut text);
+            if text.len() > TEXT_BYTES {
+                log.write(text.as_bytes())?;
+                text.clear();
+            }
+        }
+    }
+    let (bus, smoothing) = ticks.finish(settings, stage)?;
+    let (join, reference) = join.finish()?;
+    join.check()?;
+    log.write(text.as_bytes())?;
+    log.finish()?;
+    Ok(ImportReport {
+        bus,
+        smoothing,
+        reference,
+        offset,
+        join,
+    })
 }
 
 #[cfg(test)]
@@ -140,3 +171,7 @@ mod tests;
 #[cfg(test)]
 #[path = "import/controller_tests.rs"]
 mod controller_tests;
+
+#[cfg(test)]
+#[path = "import/hostile_tests.rs"]
+mod hostile_tests;

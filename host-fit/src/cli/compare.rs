@@ -63,7 +63,7 @@ pub(super) struct CompareArgs {
     population: u32,
     /// Threads; all cores if not given. The results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
+    pub(super) threads: Option<u16>,
     /// Write table, runs, histories (CSV) and plots (SVG) into this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -71,7 +71,6 @@ pub(super) struct CompareArgs {
 
 /// Compares solvers and prints the table; with a folder, writes table, CSV and plots there.
 pub(super) fn run(args: &CompareArgs) -> Result<(), HostError> {
-    super::use_threads(args.threads);
     if let Some(folder) = &args.out {
         let names = args.project.iter().flat_map(|form| {
             [Course::Convergence, Course::P].map(|course| plot_name(course, *form))

@@ -98,7 +98,7 @@ pub(super) struct FitArgs {
     start: Option<PathBuf>,
     /// Threads; all cores if not given. The result does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
+    pub(super) threads: Option<u16>,
     /// Take the lag of the reference off, as the fit finds it.
     #[arg(long)]
     compensate_lag: bool,
@@ -155,7 +155,6 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     super::keep_apart(&outputs, &inputs)?;
     check_field_arguments(args)?;
     check_loss(args)?;
-    super::use_threads(args.threads);
     interrupt::watch();
     let stage = Stage::from_file(&args.stage)?;
     let options = ReadOptions {

@@ -25,6 +25,7 @@ mod replay;
 mod shell;
 mod simulate;
 mod terminal;
+mod threads;
 mod update;
 
 use crate::cli::error::HostError;
@@ -129,6 +130,11 @@ fn run(cli: Cli) -> ExitCode {
     if !cli.quiet {
         progress::show();
     }
+    threads::start(match &cli.command {
+        Command::Fit(args) => args.threads,
+        Command::Compare(args) => args.threads,
+        _ => None,
+    });
     let result = match cli.command {
         Command::Demo(args) => demo::run(&args),
         Command::Fit(args) => fit::run(&args),
@@ -214,16 +220,6 @@ fn keep_apart(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<(), HostErr
         taken.push(here);
     }
     Ok(())
-}
-
-/// Limits the threads of everything that follows. The results do not depend on it.
-fn use_threads(threads: Option<u16>) {
-    if let Some(threads) = threads {
-        // Fails only if the pool exists already, which no command makes before this.
-        let _ = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.into())
-            .build_global();
-    }
 }
 
 /// Refuses a blob that was made for other scales than `stage.toml` gives.

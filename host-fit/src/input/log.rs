@@ -23,7 +23,7 @@ mod order;
 mod parse;
 mod preamble;
 mod reader;
-mod rows;
+pub(crate) mod rows;
 mod sequence;
 mod skipped;
 mod split;

@@ -183,7 +183,7 @@ impl Read for Raw<'_> {
 }
 
 /// What the system says of a file, in the user's terms.
-fn refused(path: &Path, source: std::io::Error) -> SourceError {
+pub(crate) fn refused(path: &Path, source: std::io::Error) -> SourceError {
     let path = path.to_path_buf();
     match source.kind() {
         ErrorKind::NotFound => SourceError::NotFound { path },

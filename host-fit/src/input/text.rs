@@ -39,7 +39,18 @@ impl<'a> TextReader<'a> {
     /// # Errors
     /// `Binary`, and those of gzip.
     pub(crate) fn of_bytes(bytes: &'a [u8], path: &Path) -> Result<Self, SourceError> {
-        Self::new(Unpacked::of_raw(Raw::of_reader(bytes, path), path)?, path)
+        Self::of_reader(bytes, path)
+    }
+
+    /// The text that a reader gives, plain or gzip; `path` is only named in errors.
+    ///
+    /// # Errors
+    /// `Binary`, `Unreadable`, and those of gzip.
+    pub(crate) fn of_reader(
+        reader: impl Read + Send + 'a,
+        path: &Path,
+    ) -> Result<Self, SourceError> {
+        Self::new(Unpacked::of_raw(Raw::of_reader(reader, path), path)?, path)
     }
 
     fn new(mut unpacked: Unpacked<'a>, path: &Path) -> Result<Self, SourceError> {

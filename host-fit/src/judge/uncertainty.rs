@@ -10,7 +10,9 @@ use crate::problem::model::{COUNT, ParameterId, SLOPES_MAX};
 use crate::problem::parameters::Parameters;
 use crate::problem::{Problem, TrainRow};
 use crate::solve::least_squares::coordinates::{Boxed, Coordinates, parameter_jacobian, point_of};
-use crate::solve::least_squares::normal::{Column, Point, Square, gram, residual_products};
+use crate::solve::least_squares::normal::{
+    Column, Point, Square, cost, descent, gram, residual_products,
+};
 use crate::solve::least_squares::scatter::{Offset, Q, Scatter, U, origin, regressors, scatter};
 use nalgebra::{Matrix3, SymmetricEigen};
 
@@ -118,6 +120,21 @@ pub fn uncertainty(
             .filter(|id| undetermined.contains(&id.index))
             .collect(),
     })
+}
+
+/// The weighted sum of squared errors of these rows at a solution, um^2, and by how much parameters
+/// of their own would lower it, to first order: by the step of Gauss and Newton, in which what the
+/// rows do not determine stays as it is. `None` as for [`uncertainty`].
+pub fn own_fit(problem: &Problem, parameters: &Parameters) -> Option<(f64, f64)> {
+    let point = point_of(parameters)?;
+    let offsets = vec![Offset::Free; problem.groups.len()];
+    let sums = scatter(problem, &point.ratios, &offsets)?;
+    let weights = Matrix3::from_diagonal(&problem.weights.into());
+    let all: Vec<usize> = (0..COUNT).collect();
+    let (inverse, _) = pseudo_inverse(&gram(&sums, &point.gain, &weights), &all);
+    let descent = descent(&sums, &point.gain, problem.weights);
+    let fall = (descent.transpose() * inverse * descent)[0];
+    Some((cost(&sums, &point.gain, problem.weights), fall))
 }
 
 /// The inverse of the curvature over the free parameters, without the directions that hold no

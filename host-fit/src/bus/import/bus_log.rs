@@ -1,14 +1,10 @@
-//! Lines of a candump log to ticks, by the receiver that a controller has.
+//! Frames of a bus to ticks, by the receiver that a controller has.
 
-use super::{ImportError, ImportSettings};
-use crate::input::source;
 use hal_adapters::can::{
     BusFault, BusHealth, Layout, Message, SensorReceiver, StampedFrame, Timing,
 };
-use hal_adapters::candump::{LineError, LogLine};
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
-use std::path::Path;
 
 /// A whole tick of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +32,8 @@ pub struct BusCounts {
     pub other_lines: usize,
     /// Whole ticks.
     pub ticks: usize,
+    /// Whole ticks that were left out because a code is at a rail of its converter.
+    pub saturated: usize,
     /// Ticks missing between them, those that were not whole included.
     pub ticks_missing: u64,
     /// Places where ticks are missing.
@@ -44,101 +42,11 @@ pub struct BusCounts {
     pub health: BusHealth,
 }
 
-/// The ticks of a record.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct BusReading {
-    /// Whole ticks, in order.
-    pub ticks: Vec<BusTick>,
-    /// What else there was.
-    pub counts: BusCounts,
-}
-
 /// A recorded tick may have been delayed as a whole: what is missing shows by the counters.
 const TIMING: Timing = Timing {
     assembly_us: 20_000,
     stale_us: u32::MAX / 4,
 };
-
-/// Reads a record.
-///
-/// # Errors
-/// `Bus`, `BadLine`, `NotText`, `SeveralInterfaces`, `NoTicks`.
-pub fn read(args: &ImportSettings) -> Result<BusReading, ImportError> {
-    let path = args.bus.as_path();
-    let bytes = source::read_bytes(path)?;
-    let mut collector = Collector::new(args.layout);
-    let mut reading = BusReading::default();
-    let mut interface = args.interface.clone();
-    for (line, bytes) in (1..).zip(bytes.split(|b| *b == b'\n')) {
-        let bytes = bytes.trim_ascii();
-        if bytes.is_empty() {
-            continue;
-        }
-        let not_text = |_| ImportError::NotText {
-            path: path.to_owned(),
-            line,
-        };
-        let parsed = match std::str::from_utf8(bytes) {
-            Ok(text) => LogLine::parse(text),
-            Err(_) if args.skip_bad_lines => Err(LineError::BadTime),
-            Err(error) => return Err(not_text(error)),
-        };
-        match parsed {
-            Ok(found) => {
-                if chosen(&mut interface, &found, args, path, line)? {
-                    reading.ticks.extend(collector.take(&found.stamped()));
-                }
-            }
-            Err(LineError::ErrorFrame | LineError::FlexibleDataRate) => {
-                reading.counts.other_lines += 1;
-            }
-            Err(_) if args.skip_bad_lines => reading.counts.bad_lines += 1,
-            Err(fault) => {
-                return Err(ImportError::BadLine {
-                    path: path.to_owned(),
-                    line,
-                    fault,
-                });
-            }
-        }
-    }
-    reading.counts = BusCounts {
-        bad_lines: reading.counts.bad_lines,
-        other_lines: reading.counts.other_lines,
-        ..collector.counts()
-    };
-    if reading.ticks.is_empty() {
-        return Err(ImportError::NoTicks {
-            path: path.to_owned(),
-            frames: reading.counts.frames,
-        });
-    }
-    Ok(reading)
-}
-
-/// Whether a frame belongs to the interface that is read; the first one's, if none was named.
-fn chosen(
-    interface: &mut Option<String>,
-    found: &LogLine<'_>,
-    args: &ImportSettings,
-    path: &Path,
-    line: usize,
-) -> Result<bool, ImportError> {
-    match interface {
-        None => *interface = Some(found.interface.to_owned()),
-        Some(name) if name == found.interface => {}
-        Some(_) if args.interface.is_some() => return Ok(false),
-        Some(name) => {
-            return Err(ImportError::SeveralInterfaces {
-                path: path.to_owned(),
-                line,
-                interface: name.clone(),
-                other: found.interface.to_owned(),
-            });
-        }
-    }
-    Ok(true)
-}
 
 /// Frames to whole ticks, counted.
 #[derive(Clone, Debug, Default)]

@@ -2,7 +2,11 @@
 //! the receiving computer deliver with jitter. A straight line through the receive times over
 //! the numbers of the ticks takes the jitter out and keeps the clocks' difference in speed.
 
-use super::bus_log::BusTick;
+use super::bus_log::{BusCounts, BusTick};
+use super::bus_reader::BusReader;
+use super::{ImportError, ImportSettings};
+use crate::input::stage::Stage;
+use std::collections::VecDeque;
 
 /// Ticks of one stretch of line, at most: over a minute at 500 Hz, in which two crystals drift
 /// apart by no more than they differ in speed.
@@ -27,33 +31,142 @@ pub struct Smoothing {
     pub max_us: f64,
 }
 
-/// The sample time of every tick on the clock of the receive times, us since 1970 or whatever
-/// the record counts from, and how far the receive times were from it. They lie later than
-/// the true ones by about the shortest time that a frame takes.
-pub fn sample_times_us(ticks: &[BusTick]) -> (Vec<f64>, Smoothing) {
-    let mut times = Vec::with_capacity(ticks.len());
-    let mut smoothing = Smoothing::default();
-    let mut squares = 0.0;
-    for stretch in ticks.chunk_by(|_, next| next.follows) {
+/// A tick and its sample time on the clock of the receive times, us since 1970 or whatever the
+/// record counts from. It lies later than the true one by about the shortest time that a frame
+/// takes.
+pub(super) type TimedTick = (BusTick, f64);
+
+/// Turns receive times to sample times, a stretch of line at a time.
+#[derive(Debug, Default)]
+pub(super) struct Smoother {
+    /// The ticks of the stretch that has no line yet.
+    stretch: Vec<BusTick>,
+    timed: VecDeque<TimedTick>,
+    ticks: usize,
+    squares: f64,
+    smoothing: Smoothing,
+}
+
+impl Smoother {
+    /// Takes the next tick of the record.
+    pub(super) fn take(&mut self, tick: BusTick) {
+        if !tick.follows {
+            self.end();
+        }
+        self.stretch.push(tick);
+        if self.stretch.len() >= 2 * STRETCH_TICKS {
+            let rest = self.stretch.split_off(STRETCH_TICKS);
+            let full = std::mem::replace(&mut self.stretch, rest);
+            self.part(&full);
+        }
+    }
+
+    /// No tick follows on those that were taken.
+    pub(super) fn end(&mut self) {
+        let stretch = std::mem::take(&mut self.stretch);
         // Equal parts, so that none is too short for a line.
         let parts = stretch.len().div_ceil(STRETCH_TICKS).max(1);
         for part in stretch.chunks(stretch.len().div_ceil(parts).max(1)) {
-            let line = Line::through(part);
-            if smoothing.stretches == 0 {
-                smoothing.period_us = line.slope;
+            self.part(part);
+        }
+    }
+
+    /// The next tick whose time is known.
+    pub(super) fn next(&mut self) -> Option<TimedTick> {
+        self.timed.pop_front()
+    }
+
+    /// How even the receive times were so far.
+    pub(super) fn smoothing(&self) -> Smoothing {
+        Smoothing {
+            rms_us: (self.squares / self.ticks.max(1) as f64).sqrt(),
+            ..self.smoothing
+        }
+    }
+
+    fn part(&mut self, part: &[BusTick]) {
+        let line = Line::through(part);
+        if self.smoothing.stretches == 0 {
+            self.smoothing.period_us = line.slope;
+        }
+        self.smoothing.stretches += 1;
+        self.ticks += part.len();
+        for tick in part {
+            let time = line.at(tick);
+            let distance = tick.received_us as f64 - time;
+            self.squares += distance * distance;
+            self.smoothing.max_us = self.smoothing.max_us.max(distance.abs());
+            self.timed.push_back((*tick, time));
+        }
+    }
+}
+
+/// A record of the bus, tick by tick, with the times of the samples.
+pub(super) struct EvenTicks<'s> {
+    reader: BusReader<'s>,
+    smoother: Smoother,
+    is_read: bool,
+}
+
+impl<'s> EvenTicks<'s> {
+    pub(super) fn new(reader: BusReader<'s>) -> Self {
+        Self {
+            reader,
+            smoother: Smoother::default(),
+            is_read: false,
+        }
+    }
+
+    /// The next tick; `None` at the end.
+    ///
+    /// # Errors
+    /// Those of [`BusReader::next_tick`].
+    pub(super) fn next_tick(&mut self) -> Result<Option<TimedTick>, ImportError> {
+        loop {
+            if let Some(timed) = self.smoother.next() {
+                return Ok(Some(timed));
             }
-            smoothing.stretches += 1;
-            for tick in part {
-                let time = line.at(tick);
-                let distance = tick.received_us as f64 - time;
-                squares += distance * distance;
-                smoothing.max_us = smoothing.max_us.max(distance.abs());
-                times.push(time);
+            if self.is_read {
+                return Ok(None);
+            }
+            match self.reader.next_tick()? {
+                Some(tick) => self.smoother.take(tick),
+                None => {
+                    self.is_read = true;
+                    self.smoother.end();
+                }
             }
         }
     }
-    smoothing.rms_us = (squares / ticks.len().max(1) as f64).sqrt();
-    (times, smoothing)
+
+    /// How even the receive times were so far.
+    pub(super) fn smoothing(&self) -> Smoothing {
+        self.smoother.smoothing()
+    }
+
+    /// What the record held, and how even its times were.
+    ///
+    /// # Errors
+    /// `NoTicks`, and `UnevenTimes` if receive times are a servo period off their lines.
+    pub(super) fn finish(
+        &self,
+        settings: &ImportSettings,
+        stage: &Stage,
+    ) -> Result<(BusCounts, Smoothing), ImportError> {
+        let (counts, smoothing) = (self.reader.counts(), self.smoothing());
+        if smoothing.stretches == 0 {
+            return Err(ImportError::NoTicks {
+                path: settings.bus.clone(),
+                frames: counts.frames,
+                saturated: counts.saturated,
+            });
+        }
+        let rms_us = smoothing.rms_us;
+        if rms_us > stage.servo_period_s * 1e6 {
+            return Err(ImportError::UnevenTimes { rms_us });
+        }
+        Ok((counts, smoothing))
+    }
 }
 
 struct Line {
@@ -115,6 +228,14 @@ impl Line {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn sample_times_us(ticks: &[BusTick]) -> (Vec<f64>, Smoothing) {
+        let mut smoother = Smoother::default();
+        ticks.iter().for_each(|tick| smoother.take(*tick));
+        smoother.end();
+        let times = std::iter::from_fn(|| smoother.next()).map(|(_, time)| time);
+        (times.collect(), smoother.smoothing())
+    }
 
     fn tick(sequence: u64, received_us: u64) -> BusTick {
         BusTick {

@@ -1,7 +1,6 @@
 //! Why an import was refused.
 
-use super::reference::Reference;
-use crate::input::log::LogError;
+use crate::input::log::{CellPlace, LogError};
 use crate::input::source::SourceError;
 use crate::input::stage::StageError;
 use crate::output::OutputError;
@@ -52,7 +51,7 @@ pub enum ImportError {
     },
     /// The record holds no whole tick.
     #[error(
-        "{}: no whole tick of sensor frames among {frames} frames; is it the right record, layout and interface?",
+        "{}: no whole tick among {frames} frames ({saturated} have a code at a rail of its converter); is it the right record, layout and interface?",
         path.display()
     )]
     NoTicks {
@@ -60,6 +59,42 @@ pub enum ImportError {
         path: PathBuf,
         /// Frames that it holds.
         frames: usize,
+        /// Whole ticks that were left out for a code at a rail.
+        saturated: usize,
+    },
+    /// A code is beyond the range of the converter.
+    #[error(
+        "{}, line {line}: the code {code} of {sensor} is outside the converter's range {code_min} to {code_max}; is it the \
+         right record and --layout? Then correct code_min and code_max in stage.toml",
+        path.display()
+    )]
+    OutsideConverter {
+        /// The record.
+        path: PathBuf,
+        /// The line that completes the tick, from 1.
+        line: usize,
+        /// The sensor's key in stage.toml.
+        sensor: &'static str,
+        /// The code.
+        code: i32,
+        /// Smallest code of the converter.
+        code_min: i32,
+        /// Largest code of the converter.
+        code_max: i32,
+    },
+    /// The clock of the record was set back, or another record begins.
+    #[error(
+        "{}, line {line}: the time goes back by {back_s:.6} s; import each record by itself if there are several in the file, \
+         and if the clock was set, turn its adjustment off (NTP) and record again",
+        path.display()
+    )]
+    ClockBackwards {
+        /// The record.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// By how much, s.
+        back_s: f64,
     },
     /// The log of the interferometers cannot be read.
     #[error(transparent)]
@@ -69,6 +104,39 @@ pub enum ImportError {
     NoReference {
         /// The log.
         path: PathBuf,
+    },
+    /// It has more movements than any run.
+    #[error(
+        "{place}: more than {most} movements; name the column of the movement's number in the [log] table of stage.toml"
+    )]
+    TooManyMovements {
+        /// The cell of the movement.
+        place: Box<CellPlace>,
+        /// The most there may be.
+        most: usize,
+    },
+    /// Most of the two do not belong together.
+    #[error(
+        "most of the two records do not belong together: {rows} of {ticks} ticks have a reference, which covers {covered_s:.1} s of \
+         the reference's {reference_s:.1} s ({outside} ticks are outside its time, {between_movements} between movements, {too_far} \
+         further than the tolerance from a sample). Name records of one run, check the offset, cut what one has more than \
+         the other, or give a larger --tolerance-us"
+    )]
+    Unpaired {
+        /// Ticks with a reference.
+        rows: usize,
+        /// Ticks.
+        ticks: usize,
+        /// For how much of the reference there are rows, s.
+        covered_s: f64,
+        /// How long its movements are together, s.
+        reference_s: f64,
+        /// Ticks before, after and at times of others.
+        outside: usize,
+        /// Ticks between movements.
+        between_movements: usize,
+        /// Ticks too far from a sample.
+        too_far: usize,
     },
     /// The two have no time in common.
     #[error(
@@ -114,21 +182,4 @@ pub enum ImportError {
     /// The log cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
-}
-
-impl ImportError {
-    pub(super) fn no_overlap(times_us: &[f64], reference: &Reference, offset_us: f64) -> Self {
-        let ends = |first: Option<f64>, last: Option<f64>| {
-            [first, last].map(|t| t.unwrap_or(f64::NAN).round())
-        };
-        let shifted = |t: Option<&f64>| t.map(|t| t - offset_us);
-        let samples = &reference.samples;
-        Self::NoOverlap {
-            bus_us: ends(shifted(times_us.first()), shifted(times_us.last())),
-            reference_us: ends(
-                samples.first().map(|s| s.t_us),
-                samples.last().map(|s| s.t_us),
-            ),
-        }
-    }
 }

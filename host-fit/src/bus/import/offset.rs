@@ -10,10 +10,10 @@
 //! the middle of the record, where the rate does not act.
 
 use super::ImportError;
-use super::bus_log::BusTick;
 use super::join::{At, Cursor};
-use super::reference::{Reference, Sample};
-use super::refine::{RATE_MAX, refine};
+use super::reference::{ReferenceInput, Sample, collect};
+use super::refine::{FIRST_STRETCH_US, RATE_MAX, refine};
+use super::survey::{Point, Survey};
 use crate::input::log::layout::Quantity;
 use crate::input::stage::Stage;
 use runtime::model::dot;
@@ -27,8 +27,9 @@ pub struct Offset {
     pub rate: f64,
     /// The middle of the record, us on the clock of the bus.
     pub middle_us: f64,
-    /// Share of the Hall signals' motion that the reference explains, if it was estimated.
-    pub explained: Option<f64>,
+    /// Share of the Hall signals' motion that the reference explains, and over how many ticks, if
+    /// it was estimated.
+    pub explained: Option<(f64, usize)>,
 }
 
 impl Offset {
@@ -36,68 +37,133 @@ impl Offset {
     pub fn on_reference_us(&self, bus_us: f64) -> f64 {
         bus_us - self.us - self.rate * (bus_us - self.middle_us)
     }
+
+    /// The same, told by the offset at another time of the bus.
+    fn in_the_middle(self, middle_us: f64) -> Self {
+        Self {
+            us: self.us + self.rate * (middle_us - self.middle_us),
+            middle_us,
+            ..self
+        }
+    }
 }
 
 /// Ticks of the coarse search, at most.
 const COARSE_TICKS: usize = 4_000;
 
+/// Samples of the reference that are held at a time, about.
+const SAMPLES: f64 = 200_000.0;
+
 /// Share that must be explained: signals of another run reach a third by chance.
 const EXPLAINED_MIN: f64 = 0.6;
 
+/// How far the rate that two minutes tell may be wrong, as a part of one.
+const RATE_ERROR_MAX: f64 = 5e-6;
+
+/// Servo periods of the reference that are read before and after the points: a coarse offset may be
+/// wrong by some of them.
+const MARGIN_PERIODS: f64 = 20.0;
+
 /// Finds the offset within `search_us` of where both records start together.
 ///
+/// A record that is longer than the liveliest two minutes of the [`Survey`] is followed from
+/// there to its ends by the survey's blocks. The reference is read anew for each step, and held
+/// only where and as densely as the step needs it.
+///
 /// # Errors
-/// [`ImportError::NoOffset`], [`ImportError::UnsteadyClocks`].
-pub fn estimate(
-    ticks: &[BusTick],
-    times_us: &[f64],
-    reference: &Reference,
+/// `NoOffset`, `UnsteadyClocks`, and those of the reference.
+pub(super) fn estimate(
+    survey: &Survey,
+    reference: &ReferenceInput<'_>,
     stage: &Stage,
     search_us: f64,
 ) -> Result<Offset, ImportError> {
     let step_us = stage.servo_period_s * 1e6;
-    let starts = times_us.first().zip(reference.samples.first());
-    let centre_us = starts.map_or(0.0, |(bus, reference)| bus - reference.t_us);
-    let predicted = predicted(reference, stage);
-    let points: Vec<Point> = ticks
-        .iter()
-        .zip(times_us)
-        .map(|(tick, t_us)| Point {
-            t_us: *t_us,
-            signal: tick.hall.map(f64::from),
-            gaps: tick.capacitive.map(f64::from),
-        })
-        .collect();
-    let every = points.len().div_ceil(COARSE_TICKS).max(1);
-    let coarse: Vec<Point> = points.iter().step_by(every).copied().collect();
-    let ends = times_us.first().zip(times_us.last());
-    let middle_us = ends.map_or(0.0, |(first, last)| (first + last) / 2.0);
+    let window = survey.liveliest();
+    let found = coarse(survey, reference, stage, search_us)?;
+    let predicted = |points: &[Point], offset: &Offset| {
+        let windows = windows(points, offset, step_us);
+        reference.predicted(stage, &windows, step_us / 4.0)
+    };
+    let samples = predicted(window, &found)?;
+    let refined = refine(window, &samples, found, step_us, FIRST_STRETCH_US);
+    let check = |points: &[Point], samples: &[Sample], offset: &Offset| {
+        let explained = explain(points, samples, offset, 2.0 * step_us);
+        let share = explained.share();
+        if share.is_nan() || share < EXPLAINED_MIN {
+            return Err(ImportError::NoOffset {
+                percent: 100.0 * share.max(0.0),
+                least_percent: 100.0 * EXPLAINED_MIN,
+            });
+        }
+        Ok(Some((share, explained.ticks)))
+    };
+    let unsteady = || ImportError::UnsteadyClocks {
+        most_ppm: RATE_MAX * 1e6,
+    };
+    let explained = check(window, &samples, &refined.unwrap_or(found))?;
+    let mut best = Offset {
+        explained,
+        ..refined.ok_or_else(unsteady)?
+    };
+    if survey.is_longer() {
+        let points = survey.blocks();
+        let samples = predicted(&points, &best)?;
+        let refined = refine(&points, &samples, best, step_us, 4.0 * FIRST_STRETCH_US);
+        let refined = refined.ok_or_else(unsteady)?;
+        best = Offset {
+            explained: check(&points, &samples, &refined)?,
+            ..refined
+        };
+    }
+    Ok(best.in_the_middle(survey.middle_us()))
+}
+
+/// The offset on a grid of one servo period.
+fn coarse(
+    survey: &Survey,
+    reference: &ReferenceInput<'_>,
+    stage: &Stage,
+    search_us: f64,
+) -> Result<Offset, ImportError> {
+    let step_us = stage.servo_period_s * 1e6;
+    let window = survey.liveliest();
+    let every = window.len().div_ceil(COARSE_TICKS).max(1);
+    let points: Vec<Point> = window.iter().step_by(every).copied().collect();
+    let ends = points.first().zip(points.last());
+    let [first_us, last_us] = ends.map_or([0.0; 2], |(first, last)| [first.t_us, last.t_us]);
+    let centre_us = survey.first_us() - reference.first_us()?;
     let at = |us| Offset {
         us,
         rate: 0.0,
-        middle_us,
+        middle_us: (first_us + last_us) / 2.0,
         explained: None,
     };
-    let trial =
-        |points: &[Point], offset: &Offset| explain(points, &predicted, offset, 2.0 * step_us);
+    let span = [first_us, last_us].map(|t_us| t_us - centre_us);
+    let span = [span[0] - search_us - step_us, span[1] + search_us + step_us];
+    let spacing_us = step_us.max((span[1] - span[0]) / SAMPLES);
+    let samples = reference.predicted(stage, &[span], spacing_us)?;
+    let tolerance_us = 2.0 * step_us.max(spacing_us);
     let steps = (search_us / step_us).ceil().clamp(1.0, 1e6) as i64;
     let offsets = (-steps..=steps).map(|k| at(centre_us + k as f64 * step_us));
-    let found = most(offsets, |offset| trial(&coarse, offset).explained).unwrap_or(at(centre_us));
-    let refined = refine(&points, &predicted, found, step_us);
-    let mut best = refined.unwrap_or(found);
-    let explained = trial(&points, &best).share();
-    if explained.is_nan() || explained < EXPLAINED_MIN {
-        return Err(ImportError::NoOffset {
-            percent: 100.0 * explained.max(0.0),
-            least_percent: 100.0 * EXPLAINED_MIN,
-        });
+    let trial = |offset: &Offset| explain(&points, &samples, offset, tolerance_us).explained;
+    Ok(most(offsets, trial).unwrap_or(at(centre_us)))
+}
+
+/// The times of the reference around these points, ascending.
+fn windows(points: &[Point], offset: &Offset, step_us: f64) -> Vec<[f64; 2]> {
+    let mut windows: Vec<[f64; 2]> = Vec::new();
+    for point in points {
+        let t_us = offset.on_reference_us(point.t_us);
+        let since_us = (point.t_us - offset.middle_us).abs();
+        let margin_us = MARGIN_PERIODS * step_us + RATE_ERROR_MAX * since_us;
+        let window = [t_us - margin_us, t_us + margin_us];
+        match windows.last_mut() {
+            Some(last) if window[0] <= last[1] => last[1] = last[1].max(window[1]),
+            _ => windows.push(window),
+        }
     }
-    if refined.is_none() {
-        let most_ppm = RATE_MAX * 1e6;
-        return Err(ImportError::UnsteadyClocks { most_ppm });
-    }
-    best.explained = Some(explained);
-    Ok(best)
+    windows
 }
 
 /// The one with the largest value, the first of equals.
@@ -112,39 +178,42 @@ fn most(offsets: impl Iterator<Item = Offset>, value: impl Fn(&Offset) -> f64) -
     best.map(|(_, offset)| offset)
 }
 
-/// The samples with what the designed probes would read, in m, in place of their values.
-fn predicted(reference: &Reference, stage: &Stage) -> Vec<Sample> {
-    let scale = reference
-        .quantities
-        .map(|quantity| stage.log.column(quantity).scale);
-    let plane = stage.designed.geometry([0.0; 3]).plane_rows();
-    let beams = reference.quantities == Quantity::BEAMS;
-    let at = |sample: &Sample| -> [f64; 3] {
-        let [a, b, c] = sample.values;
-        let [x, second, third] = [a * scale[0], b * scale[1], c * scale[2]];
-        let pose = if beams {
-            let rz = ((second - third) / stage.y_baseline_m).atan();
-            [x, 0.5 * (second + third), rz]
-        } else {
-            [x, second, third]
-        };
-        plane.map(|row| dot(&row, pose))
-    };
-    let samples = reference.samples.iter();
-    samples
-        .map(|sample| Sample {
-            values: at(sample),
-            ..*sample
-        })
-        .collect()
-}
+impl ReferenceInput<'_> {
+    /// The time of the first sample, us.
+    fn first_us(&self) -> Result<f64, ImportError> {
+        let mut reader = self.reader()?;
+        Ok(reader.next_sample()?.map_or(0.0, |sample| sample.t_us))
+    }
 
-/// The codes of a tick, at its time by the clock of the bus.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Point {
-    pub(super) t_us: f64,
-    pub(super) signal: [f64; 3],
-    pub(super) gaps: [f64; 3],
+    /// The samples within these times, with what the designed probes would read, in m, in place
+    /// of their values; at least `spacing_us` apart, and further where they would be too many.
+    fn predicted(
+        &self,
+        stage: &Stage,
+        windows: &[[f64; 2]],
+        spacing_us: f64,
+    ) -> Result<Vec<Sample>, ImportError> {
+        let mut reader = self.reader()?;
+        let whole_us: f64 = windows.iter().map(|[start, end]| end - start).sum();
+        let spacing_us = spacing_us.max(whole_us / SAMPLES);
+        let mut samples = collect(&mut reader, windows, spacing_us)?;
+        let quantities = reader.quantities;
+        let scale = quantities.map(|quantity| stage.log.column(quantity).scale);
+        let plane = stage.designed.geometry([0.0; 3]).plane_rows();
+        let beams = quantities == Quantity::BEAMS;
+        for sample in &mut samples {
+            let [a, b, c] = sample.values;
+            let [x, second, third] = [a * scale[0], b * scale[1], c * scale[2]];
+            let pose = if beams {
+                let rz = ((second - third) / stage.y_baseline_m).atan();
+                [x, 0.5 * (second + third), rz]
+            } else {
+                [x, second, third]
+            };
+            sample.values = plane.map(|row| dot(&row, pose));
+        }
+        Ok(samples)
+    }
 }
 
 /// Sums of one probe over one movement.
@@ -184,6 +253,7 @@ impl Sums {
 struct Explained {
     explained: f64,
     motion: f64,
+    ticks: usize,
 }
 
 impl Explained {
@@ -203,7 +273,11 @@ fn explain(
     offset: &Offset,
     tolerance_us: f64,
 ) -> Explained {
-    let mut cursor = Cursor::new(predicted);
+    let first_us = points
+        .first()
+        .map_or(0.0, |p| offset.on_reference_us(p.t_us));
+    let mut cursor = Cursor::from(predicted, first_us);
+    let mut ticks = 0;
     let (mut whole, mut sums) = ([Sums::default(); 3], [Sums::default(); 3]);
     let mut current = None;
     let take_in = |whole: &mut [Sums; 3], sums: &[Sums; 3]| {
@@ -224,12 +298,16 @@ fn explain(
             sums = Default::default();
             current = Some(movement);
         }
+        ticks += 1;
         for ((sums, s), p) in sums.iter_mut().zip(point.signal).zip(values) {
             sums.add(s, p);
         }
     }
     take_in(&mut whole, &sums);
-    let mut all = Explained::default();
+    let mut all = Explained {
+        ticks,
+        ..Explained::default()
+    };
     for probe in &whole {
         all.motion += probe.ss;
         // A probe that reads against its designed sense explains nothing.

@@ -9,8 +9,9 @@
 //! coefficients are solved for and forgotten.
 
 use super::join::{At, Cursor};
-use super::offset::{Offset, Point};
+use super::offset::Offset;
 use super::reference::Sample;
+use super::survey::Point;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 /// Coordinates: what each designed probe would read of the reference, and three gaps.
@@ -29,22 +30,23 @@ pub(super) const RATE_MAX: f64 = 500e-6;
 const RIDGE: f64 = 1e-9;
 /// Steps for one stretch of the record.
 const STEPS: usize = 4;
-/// The first stretch, about the middle of the record: a wrong rate has moved little in it, us.
-const FIRST_STRETCH_US: f64 = 60e6;
+/// The first stretch, about the middle of the points: a wrong rate has moved little in it, us.
+pub(super) const FIRST_STRETCH_US: f64 = 60e6;
 
 /// The offset and rate that leave the least of the signals, from an offset within a few servo
-/// periods. `None` where the record does not say: nothing moves, or a step leads away.
+/// periods in a first stretch about its middle. `None` where the record does not say: nothing moves, or a step leads away.
 pub(super) fn refine(
     points: &[Point],
     predicted: &[Sample],
     start: Offset,
     step_us: f64,
+    first_stretch_us: f64,
 ) -> Option<Offset> {
     let ends = points.first().zip(points.last())?;
-    let half_us = (ends.1.t_us - ends.0.t_us) / 2.0;
+    let half_us = (ends.1.t_us - start.middle_us).max(start.middle_us - ends.0.t_us);
     let scales = Scales::of(points, predicted);
     let mut offset = start;
-    let mut stretch_us = FIRST_STRETCH_US / 2.0;
+    let mut stretch_us = first_stretch_us / 2.0;
     loop {
         for _ in 0..STEPS {
             let sums = Sums::over(points, predicted, &scales, &offset, (stretch_us, step_us));

@@ -2,39 +2,58 @@
 
 use super::ImportReport;
 use super::join::JoinedRow;
-use super::reference::Reference;
 use crate::input::log::layout::Quantity;
 use crate::input::stage::Stage;
 use std::fmt::{Display, Formatter, Result as FmtResult, Write};
 
-/// The log as CSV, in the columns and units that the stage names.
-pub fn to_csv(rows: &[JoinedRow], reference: &Reference, stage: &Stage) -> String {
-    let quantities = [Quantity::Movement, Quantity::Time]
-        .into_iter()
-        .chain(reference.quantities)
-        .chain(Quantity::GAPS)
-        .chain(Quantity::HALL);
-    let names: Vec<String> = quantities
-        .map(|q| quoted(&stage.log.column(q).name))
-        .collect();
-    let us_per_unit = stage.log.column(Quantity::Time).scale;
-    let mut text = String::with_capacity(64 * rows.len());
-    text.push_str(&names.join(","));
-    text.push('\n');
-    for row in rows {
-        let time = row.t_us as f64 / us_per_unit;
+/// How a log is written: in the columns and units that the stage names.
+pub(super) struct LogFormat {
+    header: String,
+    us_per_unit: f64,
+    /// Codes per unit of the columns of gaps and Hall sensors.
+    codes_per_unit: [[f64; 3]; 2],
+}
+
+impl LogFormat {
+    /// With a reference of these three quantities.
+    pub(super) fn new(reference: [Quantity; 3], stage: &Stage) -> Self {
+        let quantities = [Quantity::Movement, Quantity::Time]
+            .into_iter()
+            .chain(reference)
+            .chain(Quantity::GAPS)
+            .chain(Quantity::HALL);
+        let names: Vec<String> = quantities
+            .map(|q| quoted(&stage.log.column(q).name))
+            .collect();
+        let scale = |quantity: Quantity| stage.log.column(quantity).scale;
+        Self {
+            header: names.join(","),
+            us_per_unit: scale(Quantity::Time),
+            codes_per_unit: [Quantity::GAPS, Quantity::HALL].map(|set| set.map(scale)),
+        }
+    }
+
+    /// The first line.
+    pub(super) fn header(&self) -> String {
+        format!("{}\n", self.header)
+    }
+
+    /// Appends the line of a row.
+    pub(super) fn append(&self, row: &JoinedRow, text: &mut String) {
+        let (movement, time) = (row.movement, row.t_us as f64 / self.us_per_unit);
         let [x, y, z] = row.values;
-        let code = |quantity, code: i32| f64::from(code) / stage.log.column(quantity).scale;
-        let [g1, g2, g3] = [0, 1, 2].map(|k| code(Quantity::GAPS[k], row.capacitive[k]));
-        let [a, b, c] = [0, 1, 2].map(|k| code(Quantity::HALL[k], row.hall[k]));
+        let [gaps, hall] = self.codes_per_unit;
+        let in_units = |codes: [i32; 3], per_unit: [f64; 3]| {
+            [0, 1, 2].map(|k| f64::from(codes[k]) / per_unit[k])
+        };
+        let [g1, g2, g3] = in_units(row.capacitive, gaps);
+        let [a, b, c] = in_units(row.hall, hall);
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "{},{time},{x},{y},{z},{g1},{g2},{g3},{a},{b},{c}",
-            row.movement
+            "{movement},{time},{x},{y},{z},{g1},{g2},{g3},{a},{b},{c}"
         );
     }
-    text
 }
 
 /// A column's name as a CSV cell.
@@ -51,8 +70,15 @@ impl Display for ImportReport {
         let (bus, health) = (&self.bus, &self.bus.health);
         writeln!(
             f,
-            "bus: {} frames, {} whole ticks, {} missing in {} gaps; {} lines left out, {} of another kind",
-            bus.frames, bus.ticks, bus.ticks_missing, bus.gaps, bus.bad_lines, bus.other_lines
+            "bus: {} frames, {} whole ticks, {} missing in {} gaps; {} lines left out, {} of another kind; {} ticks left out, \
+             a code at a rail of its converter",
+            bus.frames,
+            bus.ticks,
+            bus.ticks_missing,
+            bus.gaps,
+            bus.bad_lines,
+            bus.other_lines,
+            bus.saturated
         )?;
         writeln!(
             f,
@@ -87,10 +113,10 @@ impl Display for ImportReport {
         )?;
         write!(f, "offset of the clocks: {:.1} us", self.offset.us)?;
         match self.offset.explained {
-            Some(share) => writeln!(
+            Some((share, ticks)) => writeln!(
                 f,
                 " in the middle of the record; the clock of the bus runs {} by {:.2} parts in a million; both estimated: \
-                 the reference explains {:.2} % of the Hall signals' motion",
+                 the reference explains {:.2} % of the Hall signals' motion in {ticks} ticks",
                 if self.offset.rate < 0.0 {
                     "slower"
                 } else {
@@ -104,9 +130,16 @@ impl Display for ImportReport {
         let join = &self.join;
         writeln!(
             f,
-            "joined: {} rows; left out: {} ticks outside the reference, {} between movements, {} further than the \
-             tolerance from a sample; nearest sample at most {:.1} us away",
-            join.rows, join.outside, join.between_movements, join.too_far, join.nearest_max_us
+            "joined: {} rows of {} ticks, for {:.1} s of the reference's {:.1} s; left out: {} ticks outside the reference, {} \
+             between movements, {} further than the tolerance from a sample; nearest sample at most {:.1} us away",
+            join.rows,
+            join.ticks,
+            join.covered_s,
+            join.reference_s,
+            join.outside,
+            join.between_movements,
+            join.too_far,
+            join.nearest_max_us
         )
     }
 }

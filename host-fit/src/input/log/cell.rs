@@ -98,7 +98,7 @@ fn comma_hint(text: &str) -> &'static str {
 }
 
 /// Largest index or time that is kept exactly on its way through `f64`.
-pub(super) const WHOLE_MAX: f64 = 9_007_199_254_740_992.0;
+pub(crate) const WHOLE_MAX: f64 = 9_007_199_254_740_992.0;
 
 /// How much of a bad cell an error shows, in characters.
 const SHOWN_CHARS: usize = 40;

@@ -255,7 +255,7 @@ impl<'a> Header<'a> {
     }
 
     /// The first quantity of the set that has columns here, if any has.
-    fn one_set(
+    pub(crate) fn one_set(
         &self,
         one: [Quantity; 3],
         other: [Quantity; 3],

@@ -8,7 +8,7 @@ use crate::input::stage::{CodeScale, Stage};
 use crate::input::whole::chunk::{Sample, SampledVertical};
 
 /// Largest sensible rotation, rad: the models are linear in rotations.
-const ROTATION_MAX_RAD: f64 = 0.1;
+pub(crate) const ROTATION_MAX_RAD: f64 = 0.1;
 /// Largest sensible displacement, in full scales of the sensor that follows it: no sensor
 /// that is worth reading has a quarter of its designed sensitivity.
 const FULL_SCALES: f64 = 4.0;
@@ -55,6 +55,11 @@ impl BetweenCodes {
     }
 }
 
+/// Largest displacement that a log may hold, m.
+pub(crate) fn displacement_max_m(stage: &Stage) -> f64 {
+    FULL_SCALES * full_scale_m(&stage.hall)
+}
+
 fn full_scale_m(scale: &CodeScale) -> f64 {
     let codes = scale.window.low.abs().max(scale.window.high.abs());
     scale.m_per_count * f64::from(codes)
@@ -67,7 +72,7 @@ impl<'a> RowReader<'a> {
             hall: &stage.hall,
             capacitive: &stage.capacitive,
             y_baseline_m: stage.y_baseline_m,
-            displacement_max_m: FULL_SCALES * full_scale_m(&stage.hall),
+            displacement_max_m: displacement_max_m(stage),
             height_max_m: FULL_SCALES * full_scale_m(&stage.capacitive),
             keep_saturated,
             clock: Clock::default(),
