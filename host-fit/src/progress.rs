@@ -24,9 +24,10 @@ pub fn show() {
 pub struct Progress(Option<ProgressBar>);
 
 impl Progress {
-    /// Of `total` steps, whatever these are; `what` is being done.
+    /// Of `total` steps, whatever these are; `what` is being done. Without a bar where the total is
+    /// not known, which is 0.
     pub fn new(what: &'static str, total: u64) -> Self {
-        if !WANTED.load(Ordering::Relaxed) || IN_USE.swap(true, Ordering::Relaxed) {
+        if total == 0 || !WANTED.load(Ordering::Relaxed) || IN_USE.swap(true, Ordering::Relaxed) {
             return Self(None);
         }
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());

@@ -3,15 +3,16 @@
 mod pace;
 
 use crate::bus::live::{Bus, BusError};
-use crate::input::dataset::{Dataset, LoggedFrame};
-use crate::input::log::{self, LogError, ReadOptions};
+use crate::input::log::{self, Batch, LogError, LogRow, ReadOptions};
 use crate::input::stage::{Stage, StageError};
+use crate::input::whole::chunk::{Sample, SampledVertical};
 use crate::interrupt;
+use crate::output::is_standard;
 use crate::progress::Progress;
 use hal_adapters::can::{BusFrame, Layout, sensor};
 use pace::Pacer;
 use runtime::RawFrame;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -90,27 +91,113 @@ const BATCH_ROWS: usize = 20;
 /// How long a frame may wait for a place in the transmit queue.
 const SEND_DEADLINE: Duration = Duration::from_secs(1);
 
-/// Plays the log; ends early, without an error, on Ctrl-C.
+/// Plays the log, which is checked as a whole before the first frame is sent, unless it comes from
+/// standard input; ends early, without an error, on Ctrl-C. Memory does not grow with the log.
 ///
 /// # Errors
 /// See [`ReplayError`].
 pub fn run(settings: &ReplaySettings) -> Result<Replayed, ReplayError> {
     let stage = Stage::from_file(&settings.stage)?;
     let layout = choose_layout(settings.layout, &stage)?;
-    let log = log::read(
-        std::slice::from_ref(&settings.log),
-        &stage,
-        &ReadOptions::DECODE,
-    )?;
-    let frames = numbered(&log.dataset).ok_or_else(|| ReplayError::NoCodes {
-        path: settings.log.clone(),
-    })?;
-    let frames = frames
-        .get(..settings.rows.unwrap_or(usize::MAX))
-        .unwrap_or(&frames);
+    let most = settings.rows.unwrap_or(usize::MAX);
+    let rows = match is_standard(&settings.log) {
+        true => 0,
+        false => rows_of(&settings.log, &stage)?.min(most),
+    };
     let bus =
         Bus::open(&settings.interface, &[]).map_err(|cause| ReplayError::Bus { cause, rows: 0 })?;
-    send(frames, layout, settings.rate, &bus, interrupt::watch())
+    let mut player = Player {
+        layout,
+        bus,
+        stop: interrupt::watch(),
+        pacer: Pacer::new(Instant::now(), settings.rate),
+        done: Replayed::default(),
+        frames: Vec::with_capacity(BATCH_ROWS * 4),
+    };
+    let progress = Progress::new("sending", rows as u64);
+    let mut timeline = Timeline::default();
+    let played = frames_of(&settings.log, "reading", &stage, |batch| {
+        timeline.period_us = batch.period_us as u64;
+        for rows in &batch.blocks {
+            let left = most - player.done.rows;
+            let due: Vec<Due> = rows
+                .iter()
+                .take(left)
+                .map(|row| timeline.due(row))
+                .collect();
+            let is_over = player.play(&due)? || rows.len() >= left;
+            progress.reach(player.done.rows as u64);
+            if is_over {
+                return Err(Stopped::Early);
+            }
+        }
+        Ok(())
+    });
+    match played {
+        Err(Stopped::Fault(fault)) => Err(fault),
+        Ok(()) | Err(Stopped::Early) => {
+            player.done.elapsed_s = player.pacer.elapsed_s();
+            Ok(player.done)
+        }
+    }
+}
+
+/// Why a log was not read to its end.
+enum Stopped {
+    Fault(ReplayError),
+    /// Enough was sent, or the user wants no more.
+    Early,
+}
+
+impl From<LogError> for Stopped {
+    fn from(fault: LogError) -> Self {
+        Self::Fault(fault.into())
+    }
+}
+
+/// How many rows a log has that can be played.
+fn rows_of(log: &Path, stage: &Stage) -> Result<usize, ReplayError> {
+    let mut rows = 0;
+    let counted = frames_of(log, "checking", stage, |batch| {
+        rows += batch.blocks.iter().map(Vec::len).sum::<usize>();
+        Ok(())
+    });
+    match counted {
+        Err(Stopped::Fault(fault)) => Err(fault),
+        _ => Ok(rows),
+    }
+}
+
+/// Gives away the frames of a log.
+fn frames_of(
+    log: &Path,
+    what: &'static str,
+    stage: &Stage,
+    mut take: impl FnMut(Batch<RawFrame>) -> Result<(), Stopped>,
+) -> Result<(), Stopped> {
+    let no_codes = AtomicBool::new(false);
+    let frame = |sample: &Sample| RawFrame {
+        hall: sample.hall,
+        capacitive: match sample.vertical {
+            SampledVertical::Codes(codes) => codes,
+            SampledVertical::Pose(_) => {
+                no_codes.store(true, Ordering::Relaxed);
+                [0; 3]
+            }
+        },
+        sequence: 0,
+        time_us: sample.t_us as u32,
+    };
+    let options = &ReadOptions::DECODE;
+    log::stream(log, what, stage, options, frame, |batch| {
+        match no_codes.load(Ordering::Relaxed) {
+            true => Err(Stopped::Fault(ReplayError::NoCodes {
+                path: log.to_path_buf(),
+            })),
+            false => take(batch),
+        }
+    })?;
+    Ok(())
 }
 
 /// The layout asked for, or the narrowest; refused if it does not hold the codes of the stage.
@@ -138,91 +225,85 @@ struct Due {
 }
 
 /// The frames of a log numbered in one row, movement after movement: gaps within a movement
-/// stay, those between movements close to one period. `None` if a row has no codes.
-fn numbered(dataset: &Dataset) -> Option<Vec<Due>> {
-    let mut all: Vec<Due> = Vec::with_capacity(dataset.rows.len());
-    let period_us = typical_step_us(dataset);
-    for movement in &dataset.movements {
-        let rows = dataset.rows.get(movement.rows.clone()).unwrap_or_default();
-        let first_us = rows.first().map_or(0, |row| row.t_us);
-        let (start_us, start) = all.last().map_or((0, 0), |last| {
-            (last.at_us + period_us, last.frame.sequence.wrapping_add(1))
-        });
-        for row in rows {
-            let LoggedFrame::Codes(frame) = &row.frame else {
-                return None;
-            };
-            let since_us = row.t_us.saturating_sub(first_us);
-            all.push(Due {
-                at_us: start_us.saturating_add(u64::try_from(since_us).unwrap_or(0)),
-                frame: RawFrame {
-                    sequence: start.wrapping_add(frame.sequence),
-                    ..*frame
-                },
+/// stay, those between movements close to one period.
+#[derive(Debug, Default)]
+struct Timeline {
+    /// The time from row to row, us.
+    period_us: u64,
+    last: Option<Due>,
+    /// When the movement starts, us, and the number of its first frame.
+    start: (u64, u32),
+    /// The time of its first row in the log, us.
+    first_us: i64,
+}
+
+impl Timeline {
+    /// When the next row is due, and as what.
+    fn due(&mut self, row: &LogRow<RawFrame>) -> Due {
+        if row.begins {
+            self.first_us = row.t_us;
+            self.start = self.last.map_or((0, 0), |last| {
+                let at_us = last.at_us.saturating_add(self.period_us);
+                (at_us, last.frame.sequence.wrapping_add(1))
             });
         }
+        let (start_us, start) = self.start;
+        let since_us = row.t_us.saturating_sub(self.first_us);
+        let due = Due {
+            at_us: start_us.saturating_add(u64::try_from(since_us).unwrap_or(0)),
+            frame: RawFrame {
+                sequence: start.wrapping_add(row.sequence),
+                ..row.item
+            },
+        };
+        self.last = Some(due);
+        due
     }
-    Some(all)
 }
 
-/// The median time from row to row within movements, us.
-fn typical_step_us(dataset: &Dataset) -> u64 {
-    let mut steps: Vec<i64> = Vec::with_capacity(dataset.rows.len());
-    for movement in &dataset.movements {
-        let rows = dataset.rows.get(movement.rows.clone()).unwrap_or_default();
-        steps.extend(rows.windows(2).filter_map(|pair| match pair {
-            [a, b] => Some(b.t_us - a.t_us),
-            _ => None,
-        }));
-    }
-    if steps.is_empty() {
-        return 0;
-    }
-    let middle = steps.len() / 2;
-    u64::try_from(*steps.select_nth_unstable(middle).1).unwrap_or(0)
-}
-
-fn send(
-    frames: &[Due],
+/// Sends frames when they are due.
+struct Player<'a> {
     layout: Layout,
-    rate: f64,
-    bus: &Bus,
-    stop: &AtomicBool,
-) -> Result<Replayed, ReplayError> {
-    let mut done = Replayed::default();
-    let started = Instant::now();
-    let pacer = Pacer::new(started, rate);
-    let mut batch = Vec::with_capacity(BATCH_ROWS * 4);
-    let mut left = frames;
-    let progress = Progress::new("sending", frames.len() as u64);
-    while let [first, ..] = left {
-        let (now_us, late_s) = pacer.wait_until(first.at_us, stop);
-        if stop.load(Ordering::Relaxed) {
-            break;
+    bus: Bus,
+    stop: &'a AtomicBool,
+    pacer: Pacer,
+    done: Replayed,
+    frames: Vec<BusFrame>,
+}
+
+impl Player<'_> {
+    /// Sends these rows; tells whether the user wants no more.
+    fn play(&mut self, rows: &[Due]) -> Result<bool, Stopped> {
+        let mut left = rows;
+        while let [first, ..] = left {
+            let (now_us, late_s) = self.pacer.wait_until(first.at_us, self.stop);
+            if self.stop.load(Ordering::Relaxed) {
+                return Ok(true);
+            }
+            self.done.late_max_s = self.done.late_max_s.max(late_s);
+            // Everything that is due by now goes to the kernel in one call.
+            let due = left
+                .iter()
+                .take(BATCH_ROWS)
+                .take_while(|d| d.at_us <= now_us);
+            let due = due.count().max(1);
+            let (now, later) = left.split_at_checked(due).unwrap_or((left, &[]));
+            self.frames.clear();
+            for due in now {
+                let frames = sensor::frames(self.layout, &due.frame);
+                self.frames.extend(frames.map(BusFrame::from));
+                self.done.logged_s = due.at_us as f64 * 1e-6;
+            }
+            let rows = self.done.rows;
+            self.bus
+                .send(&self.frames, SEND_DEADLINE)
+                .map_err(|cause| Stopped::Fault(ReplayError::Bus { cause, rows }))?;
+            self.done.frames += self.frames.len();
+            self.done.rows += now.len();
+            left = later;
         }
-        done.late_max_s = done.late_max_s.max(late_s);
-        // Everything that is due by now goes to the kernel in one call.
-        let due = left
-            .iter()
-            .take(BATCH_ROWS)
-            .take_while(|d| d.at_us <= now_us);
-        let due = due.count().max(1);
-        let (now, later) = left.split_at_checked(due).unwrap_or((left, &[]));
-        batch.clear();
-        for due in now {
-            batch.extend(sensor::frames(layout, &due.frame).map(BusFrame::from));
-            done.logged_s = due.at_us as f64 * 1e-6;
-        }
-        let rows = done.rows;
-        bus.send(&batch, SEND_DEADLINE)
-            .map_err(|cause| ReplayError::Bus { cause, rows })?;
-        done.frames += batch.len();
-        done.rows += now.len();
-        left = later;
-        progress.reach(done.rows as u64);
+        Ok(false)
     }
-    done.elapsed_s = started.elapsed().as_secs_f64();
-    Ok(done)
 }
 
 #[cfg(test)]

@@ -1,58 +1,55 @@
 use super::*;
-use crate::input::dataset::{Movement, Row};
+use crate::input::shipped::STAGE_TOML;
 
-fn row(t_us: i64, sequence: u32) -> Row {
-    Row {
-        movement: 0,
-        t_us,
-        frame: LoggedFrame::Codes(RawFrame {
-            hall: [1, 2, 3],
-            capacitive: [4, 5, 6],
-            sequence,
-            time_us: t_us as u32,
-        }),
-        signal_m: [0.0; 3],
-        vertical: [0.0; 3],
-        reference: [0.0; 3],
-    }
+/// A log of rows at these times, us, by movement.
+fn log(movements: &[&[i64]], header: &str) -> tempfile::NamedTempFile {
+    let file = tempfile::NamedTempFile::new().expect("a file");
+    let rows = (0..).zip(movements).flat_map(|(movement, times)| {
+        let row = move |t_us: &i64| format!("{movement},{t_us},0,0,0,1,2,3\n");
+        times.iter().map(row)
+    });
+    let text = format!("movement,t_us,{header}\n{}", rows.collect::<String>());
+    std::fs::write(file.path(), text).expect("written");
+    file
 }
 
-fn dataset(movements: &[&[(i64, u32)]]) -> Dataset {
-    let mut dataset = Dataset::default();
-    for (index, rows) in (0i64..).zip(movements) {
-        let start = dataset.rows.len();
-        dataset.rows.extend(rows.iter().map(|(t, s)| row(*t, *s)));
-        dataset.movements.push(Movement {
-            log: 0,
-            index,
-            rows: start..dataset.rows.len(),
-        });
-    }
-    dataset
+fn stage() -> Stage {
+    Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")
 }
+
+const CODES: &str = "cap1_cnt,cap2_cnt,cap3_cnt,hall_a_cnt,hall_b_cnt,hall_c_cnt";
 
 #[test]
 fn movements_follow_each_other_one_period_apart_and_gaps_within_them_stay() {
-    let dataset = dataset(&[
-        &[(500, 0), (2_500, 1), (8_500, 4)],
-        &[(900_000, 0), (902_000, 1)],
-    ]);
-    let frames = numbered(&dataset).expect("codes");
-    let due: Vec<_> = frames.iter().map(|d| (d.at_us, d.frame.sequence)).collect();
-    assert_eq!(
-        due,
-        [(0, 0), (2_000, 1), (8_000, 4), (10_000, 5), (12_000, 6)]
-    );
+    let log = log(&[&[500, 2_500, 4_500, 10_500], &[900_000, 902_000]], CODES);
+    let (mut timeline, mut due) = (Timeline::default(), Vec::new());
+    let read = frames_of(log.path(), "reading", &stage(), |batch| {
+        timeline.period_us = batch.period_us as u64;
+        let rows = batch.blocks.iter().flatten();
+        due.extend(rows.map(|row| timeline.due(row)));
+        Ok(())
+    });
+    assert!(read.is_ok());
+    let times: Vec<_> = due.iter().map(|d| (d.at_us, d.frame.sequence)).collect();
+    let want = [
+        (0, 0),
+        (2_000, 1),
+        (4_000, 2),
+        (10_000, 5),
+        (12_000, 6),
+        (14_000, 7),
+    ];
+    assert_eq!(times, want);
+    assert_eq!(due[0].frame.hall, [1, 2, 3]);
+    assert_eq!(rows_of(log.path(), &stage()).ok(), Some(6));
 }
 
 #[test]
 fn a_log_without_capacitive_codes_cannot_be_played() {
-    let mut dataset = dataset(&[&[(0, 0)]]);
-    dataset.rows[0].frame = LoggedFrame::HallCodes {
-        hall: [0; 3],
-        vertical: runtime::VerticalPose::default(),
-        sequence: 0,
-        time_us: 0,
-    };
-    assert_eq!(numbered(&dataset), None);
+    let log = log(
+        &[&[0]],
+        &CODES.replace("cap1_cnt,cap2_cnt,cap3_cnt", "z_m,rx_rad,ry_rad"),
+    );
+    let refused = rows_of(log.path(), &stage());
+    assert!(matches!(refused, Err(ReplayError::NoCodes { .. })));
 }

@@ -71,7 +71,7 @@ pub fn shown_name(path: &Path) -> &Path {
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, SourceError> {
     let mut bytes = Vec::new();
     let unpacked = Unpacked::open(path)?.take(BYTES_MAX + 1);
-    read_to_end(unpacked, &mut bytes)?;
+    read_to_end(unpacked, &mut bytes, path)?;
     refuse_large(&bytes, BYTES_MAX, path)?;
     Ok(bytes)
 }
@@ -83,23 +83,24 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, SourceError> {
 pub fn read_whole(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, SourceError> {
     let mut bytes = Vec::new();
     let raw = Raw::open(path)?.take(limit_bytes.saturating_add(1));
-    read_to_end(raw, &mut bytes)?;
+    read_to_end(raw, &mut bytes, path)?;
     refuse_large(&bytes, limit_bytes, path)?;
     Ok(bytes)
 }
 
-/// Appends all that is left of a source of this module.
-pub(super) fn read_to_end(mut source: impl Read, bytes: &mut Vec<u8>) -> Result<(), SourceError> {
-    match source.read_to_end(bytes) {
-        Ok(_) => Ok(()),
-        // Sources of this module wrap their own errors.
-        Err(error) => Err(error
-            .downcast()
-            .unwrap_or_else(|source| SourceError::Unreadable {
-                path: PathBuf::new(),
-                source,
-            })),
-    }
+/// Appends all that is left of a source of this module; `path` is named where memory is out.
+pub(super) fn read_to_end(
+    mut source: impl Read,
+    bytes: &mut Vec<u8>,
+    path: &Path,
+) -> Result<(), SourceError> {
+    let read = source.read_to_end(bytes).map(|_| ());
+    // Sources of this module wrap errors of their own.
+    read.map_err(|error| {
+        let path = shown_name(path).to_path_buf();
+        let unreadable = |source| SourceError::Unreadable { path, source };
+        error.downcast().unwrap_or_else(unreadable)
+    })
 }
 
 fn refuse_large(bytes: &[u8], limit_bytes: u64, path: &Path) -> Result<(), SourceError> {
@@ -146,13 +147,13 @@ impl<'a> Raw<'a> {
         })
     }
 
-    /// Bytes in memory; `path` is only named in errors.
-    pub(super) fn of_bytes(bytes: &'a [u8], path: &Path) -> Self {
+    /// What a reader gives; `path` is only named in errors.
+    pub(super) fn of_reader(reader: impl Read + Send + 'a, path: &Path) -> Self {
         Self {
             path: path.to_path_buf(),
-            file: Box::new(bytes),
+            file: Box::new(reader),
             read: 0,
-            total: bytes.len() as u64,
+            total: 0,
         }
     }
 

@@ -39,13 +39,13 @@ impl<'a> TextReader<'a> {
     /// # Errors
     /// `Binary`, and those of gzip.
     pub(crate) fn of_bytes(bytes: &'a [u8], path: &Path) -> Result<Self, SourceError> {
-        Self::new(Unpacked::of_raw(Raw::of_bytes(bytes, path), path)?, path)
+        Self::new(Unpacked::of_raw(Raw::of_reader(bytes, path), path)?, path)
     }
 
     fn new(mut unpacked: Unpacked<'a>, path: &Path) -> Result<Self, SourceError> {
         let mut start = Vec::new();
         let probe = (&mut unpacked).take(binary::PROBE_BYTES as u64);
-        source::read_to_end(probe, &mut start)?;
+        source::read_to_end(probe, &mut start, path)?;
         let (utf16, mark) = Utf16::of_start(&start).unzip();
         if utf16.is_none() {
             refuse_binary(&start, path)?;
@@ -94,7 +94,10 @@ impl<'a> TextReader<'a> {
                 text.extend_from_slice(&start);
                 (first, mark) = (true, mark_bytes);
             }
-            None => source::read_to_end((&mut self.unpacked).take(bytes as u64), text)?,
+            None => {
+                let piece = (&mut self.unpacked).take(bytes as u64);
+                source::read_to_end(piece, text, &self.path)?;
+            }
         }
         let piece = text.get(at..).unwrap_or_default();
         let is_last = piece.is_empty();

@@ -47,7 +47,7 @@ impl<'a> Unpacked<'a> {
         let path = path.to_path_buf();
         // The first two bytes, which a pipe may give one at a time.
         let mut start = Vec::new();
-        source::read_to_end((&mut raw).take(GZIP_MAGIC.len() as u64), &mut start)?;
+        source::read_to_end((&mut raw).take(GZIP_MAGIC.len() as u64), &mut start, &path)?;
         let is_gzip = start == GZIP_MAGIC;
         let whole = BufReader::with_capacity(BUFFER_BYTES, raw.preceded_by(start));
         let source = match is_gzip {
@@ -127,6 +127,39 @@ impl Read for Unpacked<'_> {
                 }
                 Err(error) => return Err(self.damaged(error)),
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    /// Has no more to give.
+    struct Failing(ErrorKind);
+
+    impl Read for Failing {
+        fn read(&mut self, _: &mut [u8]) -> std::io::Result<usize> {
+            Err(self.0.into())
+        }
+    }
+
+    #[test]
+    fn a_fault_of_the_system_is_not_told_as_one_of_the_gzip_data() {
+        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::none());
+        encoder.write_all(&[b'a'; 1000]).expect("in memory");
+        let packed = encoder.finish().expect("in memory");
+        for kind in [ErrorKind::OutOfMemory, ErrorKind::PermissionDenied] {
+            let half = packed[..500].chain(Failing(kind));
+            let raw = Raw::of_reader(half, Path::new("log"));
+            let unpacked = Unpacked::of_raw(raw, Path::new("log")).expect("gzip");
+            let error = source::read_to_end(unpacked, &mut Vec::new(), Path::new("log"));
+            let is_kind = |error: SourceError| match error {
+                SourceError::Unreadable { source, .. } => source.kind() == kind,
+                _ => false,
+            };
+            assert!(error.is_err_and(is_kind));
         }
     }
 }

@@ -19,6 +19,11 @@ impl Pacer {
         Self { started, rate }
     }
 
+    /// Time since the start, s.
+    pub(super) fn elapsed_s(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+
     /// Waits until `at_us` of the log is due, or until `stop`. Gives the time of the log that
     /// is due by then, us, and how late `at_us` is, s.
     pub(super) fn wait_until(&self, at_us: u64, stop: &AtomicBool) -> (u64, f64) {

@@ -200,15 +200,19 @@ pub(super) struct Code {
     pub(super) is_saturated: bool,
 }
 
-/// The code in a cell: a whole number, or the nearest to a voltage of `codes_per_unit` each.
+/// The code in a cell: a whole number, which may be known, or the nearest to a voltage of
+/// `codes_per_unit` each.
+#[inline]
 pub(super) fn code(
+    known: Option<i64>,
     cell: &[u8],
     codes_per_unit: f64,
     converter: &CodeScale,
 ) -> Result<Code, CellFault> {
-    let (code, fraction) = match codes_per_unit == 1.0 {
-        true => (whole(cell, "codes")?, 0.0),
-        false => {
+    let (code, fraction) = match (codes_per_unit == 1.0, known) {
+        (true, Some(code)) => (code, 0.0),
+        (true, None) => (whole(cell, "codes")?, 0.0),
+        (false, _) => {
             let exact = scaled(cell, codes_per_unit, WHOLE_MAX, "codes")?;
             (exact.round() as i64, exact - exact.round())
         }

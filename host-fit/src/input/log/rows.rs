@@ -3,7 +3,7 @@
 use super::cell::{self, CellFault, Code};
 use super::header::{Columns, ReferenceSource, Source, VerticalSource};
 use super::line::Line;
-use super::time::Clock;
+use super::time::{Clock, Form};
 use crate::input::stage::{CodeScale, Stage};
 use crate::input::whole::chunk::{Sample, SampledVertical};
 
@@ -80,6 +80,9 @@ impl<'a> RowReader<'a> {
         let Some(Source { cell, .. }) = self.columns.movement else {
             return Ok(None);
         };
+        if let Some(number) = line.integer(cell) {
+            return Ok(Some(number));
+        }
         let number = cell::whole(line.cell(cell), "movement numbers");
         number.map(Some).map_err(|fault| BadCell { cell, fault })
     }
@@ -87,6 +90,11 @@ impl<'a> RowReader<'a> {
     /// The time, us.
     pub(super) fn t_us(&mut self, line: &Line<'_>) -> Result<i64, BadCell> {
         let Source { cell, scale } = self.columns.time;
+        if let (Some(number), 1.0, Some(Form::Number)) =
+            (line.integer(cell), scale, self.clock.form)
+        {
+            return Ok(number);
+        }
         let t_us = self.clock.t_us(line.cell(cell), scale);
         // Within the range that the limit leaves.
         t_us.map(|t_us| t_us.round() as i64)
@@ -128,7 +136,7 @@ impl<'a> RowReader<'a> {
                 code,
                 fraction,
                 is_saturated,
-            } = cell::code(line.cell(cell), scale, converter).map_err(bad)?;
+            } = cell::code(line.integer(cell), line.cell(cell), scale, converter).map_err(bad)?;
             if is_saturated && !self.keep_saturated {
                 return Err(bad(CellFault::Saturated { code }));
             }
@@ -168,7 +176,12 @@ fn scaled(
     limit: f64,
     unit: &'static str,
 ) -> Result<f64, BadCell> {
-    let cell = source.cell;
-    cell::scaled(line.cell(cell), source.scale, limit, unit)
-        .map_err(|fault| BadCell { cell, fault })
+    let Source { cell, scale } = *source;
+    if let Some(number) = line.integer(cell) {
+        let value = number as f64 * scale;
+        if value.abs() <= limit {
+            return Ok(value);
+        }
+    }
+    cell::scaled(line.cell(cell), scale, limit, unit).map_err(|fault| BadCell { cell, fault })
 }

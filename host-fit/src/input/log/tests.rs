@@ -1,6 +1,7 @@
 mod accepts;
 mod forms;
 mod fuzz;
+mod long;
 mod movements;
 mod refuses;
 mod refuses_cells;

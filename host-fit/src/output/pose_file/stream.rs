@@ -44,6 +44,7 @@ impl DecodeSettings<'_> {
     fn written(&self, rows: &[LogRow<Reading>]) -> Vec<u8> {
         let row_bytes = text::LINE_BYTES.max(npy::RECORD_BYTES);
         let mut bytes = Vec::with_capacity(rows.len() * row_bytes);
+        let mut line = text::Line::default();
         for row in rows {
             let known = self.posterior;
             let uncertainty = known.map(|known| uncertainty::uncertainty(&row.item, known));
@@ -53,7 +54,7 @@ impl DecodeSettings<'_> {
                 reading: row.item,
             };
             match self.format {
-                PoseFormat::Csv => text::line(&mut bytes, &row, uncertainty),
+                PoseFormat::Csv => bytes.extend_from_slice(line.of(&row, uncertainty)),
                 PoseFormat::Npy => npy::record(&mut bytes, &row, uncertainty),
             }
         }

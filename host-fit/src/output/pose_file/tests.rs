@@ -1,5 +1,4 @@
 use super::read::parse;
-use super::text::micro;
 use super::*;
 use crate::input::dataset::{Movement, Row};
 use proptest::prelude::*;
@@ -150,9 +149,11 @@ fn a_vertical_pose_in_si_units_decodes_like_the_codes_that_it_came_from() {
 #[test]
 fn fields_are_positional_where_that_is_short() {
     let written = |word: f32| {
-        let mut text = Vec::new();
-        micro(&mut text, word);
-        String::from_utf8(text).expect("ASCII")
+        let [x, y, z] = [word, 0.0, 0.0].map(f32::to_bits);
+        let text = to_text(&[row([x, y, z, 0, 0, 0], 0, 0, 0)]);
+        let text = String::from_utf8(text).expect("ASCII");
+        let cell = text.lines().nth(1).and_then(|line| line.split(',').nth(2));
+        cell.expect("a cell").to_owned()
     };
     assert_eq!(written(0.0), "0");
     assert_eq!(written(-0.0), "-0");
@@ -188,6 +189,64 @@ fn words(row: &PoseRow) -> Vec<u32> {
         .into_iter()
         .chain(pose.vertical.to_array());
     all.map(f32::to_bits).collect()
+}
+
+/// The log that ships with the program, decoded into a file: its bytes and the counts.
+fn decoded_file(on_invalid: OnInvalid, format: PoseFormat) -> (Vec<u8>, StatusCounts) {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
+    let stage = crate::input::stage::Stage::from_file(&data.join("stage.toml")).expect("sound");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("pose");
+    let out = crate::output::streamed_file::StreamedFile::create(&path).expect("writable");
+    let settings = DecodeSettings {
+        decoder: &decoder(),
+        on_invalid,
+        posterior: None,
+        format,
+    };
+    let log = data.join("paper.csv.gz");
+    let decoded = decode_log::<Box<dyn std::error::Error>>(&log, &stage, &settings, out);
+    let (counts, end) = decoded.expect("sound");
+    assert_eq!((end.skipped_rows, end.warnings), (0, Vec::new()));
+    (std::fs::read(&path).expect("written"), counts)
+}
+
+#[test]
+fn a_log_is_decoded_piece_by_piece_as_it_is_in_memory() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
+    let stage = crate::input::stage::Stage::from_file(&data.join("stage.toml")).expect("sound");
+    let logs = [data.join("paper.csv.gz")];
+    let reading = crate::input::log::read(&logs, &stage, &crate::input::log::ReadOptions::DECODE)
+        .expect("sound");
+    for on_invalid in [OnInvalid::Zero, OnInvalid::Hold { ticks: 2 }] {
+        let rows = decode(&reading.dataset, &decoder(), on_invalid);
+        let (text, counts) = decoded_file(on_invalid, PoseFormat::Csv);
+        assert!(text == to_text(&rows));
+        assert_eq!(counts, StatusCounts::of(&rows));
+        let (array, _) = decoded_file(on_invalid, PoseFormat::Npy);
+        let header = npy::header(rows.len(), false);
+        assert_eq!(header.len() % 64, 0);
+        let (start, records) = array.split_at(header.len());
+        assert!(start == header && start.starts_with(b"\x93NUMPY\x01\x00"));
+        assert_eq!(
+            usize::from(start[8]) + 256 * usize::from(start[9]) + 10,
+            start.len()
+        );
+        assert!(String::from_utf8_lossy(start).contains("'shape': (57000,)"));
+        let (records, rest) = records.as_chunks::<44>();
+        assert_eq!((records.len(), rest.len()), (rows.len(), 0));
+        for (record, row) in records.iter().zip(&rows) {
+            let ([movement, t_us], _) = record[..16].as_chunks::<8>() else {
+                panic!("two numbers of 8 bytes");
+            };
+            assert_eq!(i64::from_le_bytes(*movement), row.movement);
+            assert_eq!(i64::from_le_bytes(*t_us), row.t_us);
+            let (found, _) = record[16..].as_chunks::<4>();
+            let found: Vec<u32> = found.iter().map(|word| u32::from_le_bytes(*word)).collect();
+            assert_eq!(found[..6], words(row));
+            assert_eq!(found[6], row.reading.status.bits());
+        }
+    }
 }
 
 /// Finite words: any of them, and those of a stage's range more often.

@@ -1,7 +1,6 @@
 //! Poses as text.
 
 use super::{HEADER, PoseRow};
-use std::io::Write;
 
 /// What uncertainties add to the first line.
 const UNCERTAINTIES: &str = ",u_x_um,u_y_um,u_rz_urad";
@@ -13,12 +12,16 @@ const DIGITS: usize = 9;
 /// Bytes of a typical line, for the buffer.
 pub(super) const LINE_BYTES: usize = 96;
 
+/// The longest line: two `i64`, six fields, the status and three uncertainties.
+const LINE_MAX: usize = 2 * 20 + 6 * 16 + 10 + 3 * 12 + 12;
+
 /// The pose file of these rows.
 pub fn to_text(rows: &[PoseRow]) -> Vec<u8> {
     let mut text = header(false);
     text.reserve(rows.len() * LINE_BYTES);
+    let mut line = Line::default();
     for row in rows {
-        line(&mut text, row, None);
+        text.extend_from_slice(line.of(row, None));
     }
     text
 }
@@ -33,55 +36,137 @@ pub(super) fn header(with_uncertainties: bool) -> Vec<u8> {
     format!("{HEADER}{uncertainties}\n").into_bytes()
 }
 
-/// Adds the line of a row, with the standard uncertainty of X, Y, Rz (m, m, rad) if there is one.
-pub(super) fn line(text: &mut Vec<u8>, row: &PoseRow, uncertainty: Option<[f64; 3]>) {
-    let mut integers = itoa::Buffer::new();
-    let reading = &row.reading;
-    text.extend_from_slice(integers.format(row.movement).as_bytes());
-    text.push(b',');
-    text.extend_from_slice(integers.format(row.t_us).as_bytes());
-    let planar = reading.pose.planar.to_array();
-    let vertical = reading.pose.vertical.to_array();
-    for word in planar.into_iter().chain(vertical) {
-        text.push(b',');
-        micro(text, word);
-    }
-    text.push(b',');
-    text.extend_from_slice(integers.format(reading.status.bits()).as_bytes());
-    for u in uncertainty.iter().flatten() {
-        // Writing to memory does not fail.
-        let _ = write!(text, ",{:.3e}", u * 1e6);
-    }
-    text.push(b'\n');
+/// A line that is written. Fields are stored 16 bytes at a time, so there is room for as many more.
+#[derive(Debug)]
+pub(super) struct Line {
+    bytes: [u8; LINE_MAX + 16],
+    length: usize,
 }
 
-/// A word in m or rad as um or urad.
-pub(super) fn micro(text: &mut Vec<u8>, word: f32) {
-    let micro = f64::from(word) * 1e6;
-    if micro == 0.0 {
-        text.extend_from_slice(if word.is_sign_negative() { b"-0" } else { b"0" });
-        return;
+impl Default for Line {
+    fn default() -> Self {
+        Self {
+            bytes: [0; LINE_MAX + 16],
+            length: 0,
+        }
     }
-    let (number, exponent) = match digits(micro.abs()) {
-        Some(found) => found,
-        None => match digits_of_any(micro.abs()) {
-            Some(found) => found,
-            // Not a finite number: the decoder never gives one.
-            None => {
-                let _ = write!(text, "{micro}");
-                return;
+}
+
+impl Line {
+    /// The line of a row, with the standard uncertainty of X, Y, Rz (m, m, rad) if there is one.
+    pub(super) fn of(&mut self, row: &PoseRow, uncertainty: Option<[f64; 3]>) -> &[u8] {
+        self.length = 0;
+        let reading = &row.reading;
+        self.integer(row.movement);
+        self.push(b',');
+        self.integer(row.t_us);
+        let planar = reading.pose.planar.to_array();
+        let vertical = reading.pose.vertical.to_array();
+        for word in planar.into_iter().chain(vertical) {
+            self.push(b',');
+            self.micro(word);
+        }
+        self.push(b',');
+        self.integer(reading.status.bits());
+        for u in uncertainty.iter().flatten() {
+            self.extend(format!(",{:.3e}", u * 1e6).as_bytes());
+        }
+        self.push(b'\n');
+        self.bytes.get(..self.length).unwrap_or_default()
+    }
+
+    #[inline]
+    fn push(&mut self, byte: u8) {
+        if let Some(next) = self.bytes.get_mut(self.length) {
+            *next = byte;
+            self.length += 1;
+        }
+    }
+
+    #[inline]
+    fn extend(&mut self, bytes: &[u8]) {
+        let end = self.length + bytes.len();
+        if let Some(next) = self.bytes.get_mut(self.length..end) {
+            next.copy_from_slice(bytes);
+            self.length = end;
+        }
+    }
+
+    /// Stores 16 bytes, the lowest first, so many bytes further on; the length stays.
+    #[inline]
+    fn store(&mut self, after: usize, bytes: u128) {
+        let rest = self.bytes.get_mut(self.length + after..);
+        if let Some(next) = rest.and_then(|rest| rest.first_chunk_mut()) {
+            *next = bytes.to_le_bytes();
+        }
+    }
+
+    fn integer(&mut self, value: impl itoa::Integer) {
+        self.extend(itoa::Buffer::new().format(value).as_bytes());
+    }
+
+    /// A word in m or rad as um or urad.
+    #[inline]
+    fn micro(&mut self, word: f32) {
+        let micro = (f64::from(word) * 1e6).abs();
+        self.store(0, u128::from(b'-'));
+        self.length += usize::from(word.is_sign_negative());
+        match digits(micro) {
+            Some((number, exponent)) => self.number(number, exponent),
+            None => self.rare(micro),
+        }
+    }
+
+    /// Nine digits times a power of ten, positional while that is short.
+    #[inline]
+    fn number(&mut self, number: u32, exponent: i32) {
+        let (digits, kept) = ascii(number);
+        match exponent {
+            // Without branches, which would often be guessed wrong: four zeros before the digits, as
+            // many of them skipped as the number does not need, and then a point in its place.
+            -4..=8 => {
+                let (below, whole) = (exponent.min(0).unsigned_abs(), exponent.max(0) as usize + 1);
+                let zeros = u128::from(u32::from_le_bytes(*b"0000"));
+                let digits = (digits << 32 | zeros) >> (8 * (4 - below));
+                let kept = kept + below as usize;
+                self.store(0, digits);
+                self.store(whole, (digits >> (8 * whole)) << 8 | u128::from(b'.'));
+                self.length += if kept > whole { kept + 1 } else { whole };
             }
-        },
-    };
-    if micro < 0.0 {
-        text.push(b'-');
+            _ => {
+                self.store(0, digits);
+                self.store(1, (digits >> 8) << 8 | u128::from(b'.'));
+                self.length += if kept > 1 { kept + 1 } else { 1 };
+                self.extend(format!("e{exponent}").as_bytes());
+            }
+        }
     }
-    let mut integers = itoa::Buffer::new();
-    let number = integers.format(number).as_bytes();
-    let kept = number.len() - number.iter().rev().take_while(|b| **b == b'0').count();
-    if let Some((first, rest)) = number.get(..kept).and_then(<[u8]>::split_first) {
-        positional_or_exponent(text, *first, rest, exponent);
+
+    /// Zero, and what is very small or very large.
+    #[cold]
+    fn rare(&mut self, micro: f64) {
+        match digits_of_any(micro) {
+            Some((0, _)) => self.push(b'0'),
+            Some((number, exponent)) => self.number(number, exponent),
+            // Not a finite number: the decoder never gives one.
+            None => self.extend(micro.to_string().as_bytes()),
+        }
     }
+}
+
+/// Nine digits as text, the first in the lowest byte, and how many there are without the zeros at
+/// the end.
+const fn ascii(number: u32) -> (u128, usize) {
+    let (first, eight) = (number / 100_000_000, number % 100_000_000);
+    // Two numbers of four digits, then four of two, then eight of one, beside each other.
+    let fours = (eight / 10_000) as u64 | ((eight % 10_000) as u64) << 32;
+    let hundreds = ((fours * 10_486) >> 20) & 0x0000_007f_0000_007f;
+    let twos = hundreds | (fours - 100 * hundreds) << 16;
+    let tens = ((twos * 103) >> 10) & 0x000f_000f_000f_000f;
+    let ones = tens | (twos - 10 * tens) << 8;
+    let kept = DIGITS - ones.leading_zeros() as usize / 8;
+    let digits = (ones | 0x3030_3030_3030_3030) as u128;
+    (digits << 8 | (first + b'0' as u32) as u128, kept)
 }
 
 /// Powers of ten from 1e-4 to 1e9.
@@ -102,18 +187,23 @@ const TENS: [u64; 13] = {
 
 /// Nine digits, the first not 0, and the exponent of the first: those of `{:.8e}`, rounded to the
 /// nearest, ties to even. `None` outside 1e-4 to 1e9.
+#[inline]
 fn digits(value: f64) -> Option<(u32, i32)> {
-    let above = POWERS.partition_point(|power| *power <= value);
-    let (1..=13, exponent) = (above, above as i32 - 5) else {
+    if !(1e-4..1e9).contains(&value) {
         return None;
-    };
+    }
     // value = mantissa / 2^shift, with a shift from 23 to 66; times 10^(8 - exponent) that has 93
     // bits at most.
     let bits = value.to_bits();
     let mantissa = (bits & ((1 << 52) - 1)) | 1 << 52;
-    let shift = 1075 - (bits >> 52) as u32;
-    let ten_to = *TENS.get((8 - exponent) as usize)?;
-    let scaled = u128::from(mantissa) * u128::from(ten_to);
+    let binary_exponent = (bits >> 52) as i32 - 1023;
+    let shift = (52 - binary_exponent) as u32;
+    // By the binary exponent times the logarithm of 2, the exponent or one less.
+    let low = (binary_exponent * 1233) >> 12;
+    let above = POWERS.get((low + 5) as usize)?;
+    let exponent = low + i32::from(value >= *above);
+    let ten_to = TENS.get((8 - exponent) as usize)?;
+    let scaled = u128::from(mantissa) * u128::from(*ten_to);
     let whole = (scaled >> shift) as u32;
     let (rest, half) = (scaled & ((1 << shift) - 1), 1 << (shift - 1));
     let up = rest > half || (rest == half && whole % 2 == 1);
@@ -131,37 +221,6 @@ fn digits_of_any(value: f64) -> Option<(u32, i32)> {
     Some((number, exponent.parse().ok()?))
 }
 
-/// Writes d.ddd times 10^exponent, positional while that is short.
-fn positional_or_exponent(text: &mut Vec<u8>, first: u8, rest: &[u8], exponent: i32) {
-    match usize::try_from(exponent) {
-        Ok(whole) if whole < DIGITS => {
-            text.push(first);
-            let (digits, fraction) = rest.split_at(whole.min(rest.len()));
-            text.extend_from_slice(digits);
-            text.extend(core::iter::repeat_n(b'0', whole - digits.len()));
-            if !fraction.is_empty() {
-                text.push(b'.');
-                text.extend_from_slice(fraction);
-            }
-        }
-        Err(_) if exponent >= -4 => {
-            text.extend_from_slice(b"0.");
-            let zeros = exponent.unsigned_abs().saturating_sub(1);
-            text.extend(core::iter::repeat_n(b'0', zeros as usize));
-            text.push(first);
-            text.extend_from_slice(rest);
-        }
-        _ => {
-            text.push(first);
-            if !rest.is_empty() {
-                text.push(b'.');
-                text.extend_from_slice(rest);
-            }
-            let _ = write!(text, "e{exponent}");
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -177,13 +236,16 @@ mod tests {
     #[test]
     fn digits_by_integers_are_those_of_the_standard_library() {
         // Around every power of ten, ties, and words of all magnitudes.
+        assert_eq!(digits_of_any(0.0), Some((0, 0)));
         for power in POWERS {
             let bits = power.to_bits();
             (bits - 200..bits + 200).for_each(|bits| same(f64::from_bits(bits)));
         }
         for k in 0..2000 {
             let odd = f64::from(2 * k + 1);
-            [2.0, 4.0, 8.0, 16.0].map(|part| same(1e8 + odd / part));
+            [2.0, 4.0, 8.0, 16.0]
+                .into_iter()
+                .for_each(|part| same(1e8 + odd / part));
             same(123_456_000.0 + odd / 2.0);
             same((1e7 + odd / 4.0).next_up());
         }
@@ -194,6 +256,19 @@ mod tests {
         assert_eq!(digits(999_999_999.6), Some((100_000_000, 9)));
         assert_eq!(digits(9.99e-5), None);
         assert_eq!(digits(1e9), None);
+    }
+
+    #[test]
+    fn nine_digits_as_text_are_those_of_the_standard_library() {
+        let same = |number: u32| {
+            let (text, kept) = ascii(number);
+            let want = number.to_string();
+            assert_eq!(&text.to_le_bytes()[..DIGITS], want.as_bytes());
+            assert_eq!(kept, want.trim_end_matches('0').len());
+        };
+        (100_000_000..1_000_000_000).step_by(9973).for_each(same);
+        (0..10_000).for_each(|k| same(500_000_000 + k));
+        (0..10_000).for_each(|k| same(500_000_000 + 10_000 * k));
     }
 
     proptest! {
