@@ -128,7 +128,11 @@ fn interrupted(bench: &Bench, options: &str) -> std::process::Output {
 #[test]
 fn an_interrupt_keeps_the_best_so_far() {
     let bench = bench();
-    interrupted(&bench, "--project linear --population 100 --train 200");
+    // Good within a second, and at its end after ten.
+    interrupted(
+        &bench,
+        "--project linear --population 20000 --train 200 --threads 1",
+    );
     bench.good("inspect p.bin");
 }
 
