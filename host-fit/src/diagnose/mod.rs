@@ -31,17 +31,26 @@ use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use finding::{Code, Finding, Severity};
 use runtime::ParameterSet;
+use std::borrow::Cow;
 
 /// Everything that is wrong with a log, the gravest first; `fitted` is what came of the fit to it.
 ///
 /// Rows that the fit left out of account are for the tests of the signals alone.
 pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Vec<Finding> {
     let outliers = fitted.map_or(&[][..], |fit| &fit.outliers);
-    let sound = dataset.without(outliers);
-    let mut findings = causes::causes(&sound, stage);
-    findings.extend(logs::disagreement(&sound, stage));
+    let sound = match outliers {
+        [] => Cow::Borrowed(dataset),
+        outliers => Cow::Owned(dataset.without(outliers)),
+    };
     let errors = (fitted.ok()).map(|fit| fit.decoded.errors_less(&fit.judgement.zeros, dataset));
-    findings.extend(signals::signal_findings(dataset, stage, errors.as_deref()));
+    let of_models = || {
+        let mut findings = causes::causes(&sound, stage);
+        findings.extend(logs::disagreement(&sound, stage));
+        findings
+    };
+    let of_signals = || signals::signal_findings(dataset, stage, errors.as_deref());
+    let (mut findings, more) = rayon::join(of_models, of_signals);
+    findings.extend(more);
     if let Ok(fit) = fitted {
         findings.extend(fit.warnings.iter().filter_map(of_fit::of_warning));
         if !is_explained(&findings) {

@@ -122,14 +122,16 @@ impl<'a> Problem<'a> {
 
     /// How far a movement moves: the largest range of X, Y (um) and Rz (urad) by the reference.
     fn moved(&self, group: &Group) -> f64 {
-        let rows = &self.rows[group.rows.clone()];
-        let range = |axis: usize| {
-            let values = rows.iter().map(|row| row.reference_um[axis]);
-            let bounds = (f64::INFINITY, f64::NEG_INFINITY);
-            let (low, high) = values.fold(bounds, |(low, high), x| (low.min(x), high.max(x)));
-            high - low
-        };
-        (0..3).map(range).fold(0.0, f64::max)
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for row in &self.rows[group.rows.clone()] {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(row.reference_um[axis]);
+                high[axis] = high[axis].max(row.reference_um[axis]);
+            }
+        }
+        (0..3)
+            .map(|axis| high[axis] - low[axis])
+            .fold(0.0, f64::max)
     }
 
     /// The fitness of the paper, as this project defines it: the root of the mean over rows and

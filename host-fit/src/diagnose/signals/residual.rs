@@ -12,6 +12,7 @@ use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::probe::{Probe, probes};
 use crate::solve::field::terms::{PER_PROBE, TERMS};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// The parameters of a probe, and a lag of the reference.
@@ -78,31 +79,35 @@ impl Residuals {
                 let places = FieldParameters::of_model_31(&parameters.model_31(), stage);
                 parameters.positions = places.positions;
             }
-            residuals.fits.clear();
-            for (k, probe) in probes(&parameters).into_iter().enumerate() {
-                let values = &mut parameters.probes[k];
-                let fit = residuals.step(log, k, probe, values, &mut lags_s[k], HALF_WEIGHT)?;
-                residuals.fits.push(fit);
-            }
+            let here = probes(&parameters).into_par_iter().enumerate();
+            let unknowns = parameters.probes.par_iter_mut().zip(&mut lags_s);
+            let fits: Option<Vec<ProbeFit>> = (here.zip(unknowns))
+                .map(|((k, probe), (values, lag_s))| {
+                    residuals.step(log, k, probe, values, lag_s, HALF_WEIGHT)
+                })
+                .collect();
+            residuals.fits = fits?;
         }
-        for (k, probe) in probes(&parameters).into_iter().enumerate() {
+        let last = |(k, probe): (usize, Probe)| {
             // Offsets and factor at the last parameters, which stay, for rows of equal weight.
             let (mut values, mut lag_s) = (parameters.probes[k], lags_s[k]);
             let fit = residuals.step(log, k, probe, &mut values, &mut lag_s, f64::INFINITY)?;
-            residuals.values[k] = residuals.left_m(log, k, &fit);
-            residuals.fits[k] = ProbeFit {
-                lag_s: lags_s[k],
-                ..fit
-            };
-            residuals.noise_m[k] = 1e-3 * white_noise(log, &residuals.values[k], 1e3);
-            let left_m = robust_deviation(residuals.values[k].iter().copied());
+            let left = residuals.left_m(log, k, &fit);
+            let noise_m = 1e-3 * white_noise(log, &left, 1e3);
+            let left_m = robust_deviation(left.iter().copied());
             let moved = signals_less_means(log, k);
             let squares: f64 = moved.iter().map(|m| m * m).sum();
             let moved_m = (squares / moved.len().max(1) as f64).sqrt();
             let understood = left_m <= UNEXPLAINED_MAX * moved_m;
-            if !understood {
-                return None;
-            }
+            let lag_s = lags_s[k];
+            understood.then_some((ProbeFit { lag_s, ..fit }, left, noise_m))
+        };
+        let probes = probes(&parameters).into_par_iter().enumerate();
+        let found: Option<Vec<_>> = probes.map(last).collect();
+        for (k, (fit, left, noise_m)) in found?.into_iter().enumerate() {
+            residuals.fits[k] = fit;
+            residuals.values[k] = left;
+            residuals.noise_m[k] = noise_m;
         }
         Some(residuals)
     }
@@ -195,7 +200,9 @@ impl Residuals {
                 for i in 0..COLUMNS {
                     let weighted = weight * f[i];
                     right[i] += weighted * left;
-                    (gram[i].iter_mut().zip(&f)).for_each(|(sum, f)| *sum += weighted * f);
+                    // Cholesky reads no more than the lower triangle; whole SIMD registers of it.
+                    let row = gram[i].iter_mut().zip(&f).take((i + 1).next_multiple_of(4));
+                    row.for_each(|(sum, f)| *sum += weighted * f);
                 }
             }
             projected.push((share, of_left / of_offset));

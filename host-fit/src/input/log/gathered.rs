@@ -10,7 +10,9 @@ use crate::input::whole::{Samples, Whole};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Of so many rows that may be held, an excerpt takes one.
+/// An excerpt takes one of so many rows, ...
+const EXCERPT_OF: usize = 32;
+/// ... but at least this part of the rows that may be held, and at most all of those.
 const EXCERPT_PART: usize = 4;
 
 /// The logs read so far.
@@ -98,7 +100,8 @@ impl Gathered {
             };
         };
         let whole = Arc::new(Whole::new(scales, samples, movements, logs));
-        let mut dataset = whole.excerpt(rows_max / EXCERPT_PART, sha256);
+        let most = (whole.rows() / EXCERPT_OF).clamp(rows_max / EXCERPT_PART, rows_max);
+        let mut dataset = whole.excerpt(most, sha256);
         for log in 0..dataset.logs.len() {
             let of_log = dataset
                 .movements

@@ -89,7 +89,7 @@ fn an_excerpt_holds_rows_of_the_log_in_runs() {
     assert_eq!(excerpt.named(), (57_000, 57));
     assert_eq!(excerpt.sha256, all.sha256);
     let taken = excerpt.rows.len();
-    assert!((12_000..=13_000).contains(&taken), "{taken}");
+    assert!((13_500..=14_500).contains(&taken), "{taken}");
     let told = LogWarning::Excerpt {
         rows: 57_000,
         taken,
@@ -181,9 +181,9 @@ fn a_fit_to_an_excerpt_is_as_good_as_one_to_all_rows() {
     };
     let (all, excerpt) = (fitted(None), fitted(Some(50_000)));
     assert_eq!(excerpt.set.fit.rows, 57_000);
-    assert!(excerpt.train_rows < 14_000);
+    assert!(excerpt.train_rows < 13_000);
     for (all, excerpt) in all.errors().axes.iter().zip(excerpt.errors().axes) {
         let ratio = excerpt.rms / all.rms;
-        assert!((1.0..1.003).contains(&ratio), "{ratio}");
+        assert!((1.0..1.005).contains(&ratio), "{ratio}");
     }
 }

@@ -1,8 +1,9 @@
 //! Damped Gauss-Newton (Levenberg-Marquardt) within a box, on the sums of `scatter`.
 
 use super::coordinates::Coordinates;
+use super::moments::Moments;
 use super::normal::{Column, Point, Square, cost, descent, gram};
-use super::scatter::{Offset, Q, Scatter, scatter};
+use super::scatter::{Offset, Q, Ratios, Scatter, scatter};
 use crate::problem::Problem;
 use crate::problem::model::COUNT;
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3};
@@ -46,15 +47,34 @@ struct State {
     cost: f64,
 }
 
+/// The rows that a descent is on.
+#[derive(Clone, Copy, Debug)]
+pub struct Sums<'p, 'a> {
+    /// The rows themselves.
+    pub problem: &'p Problem<'a>,
+    /// Their moments, where the log has such.
+    pub moments: Option<&'p Moments>,
+}
+
+impl Sums<'_, '_> {
+    /// The scatter at the given ratios, `None` next to a pole.
+    pub fn scatter(&self, ratios: &Ratios, offsets: &[Offset]) -> Option<Scatter> {
+        match self.moments {
+            Some(moments) => moments.scatter(ratios, offsets),
+            None => scatter(self.problem, ratios, offsets),
+        }
+    }
+}
+
 fn evaluate(
-    problem: &Problem,
+    sums: Sums,
     offsets: &[Offset],
     coordinates: &impl Coordinates,
     unknowns: Column,
 ) -> Option<State> {
     let point = coordinates.point(&unknowns)?;
-    let scatter = scatter(problem, &point.ratios, offsets)?;
-    let cost = cost(&scatter, &point.gain, problem.weights);
+    let scatter = sums.scatter(&point.ratios, offsets)?;
+    let cost = cost(&scatter, &point.gain, sums.problem.weights);
     cost.is_finite().then_some(State {
         unknowns,
         point,
@@ -71,12 +91,13 @@ fn rounding(scatter: &Scatter) -> f64 {
 /// Descends from `start` (clipped to the box). `None` when the start itself cannot be
 /// evaluated: a singular geometry, or a row next to a pole.
 pub fn descend(
-    problem: &Problem,
+    sums: Sums,
     offsets: &[Offset],
     coordinates: &impl Coordinates,
     start: Column,
 ) -> Option<Descent> {
-    let mut state = evaluate(problem, offsets, coordinates, coordinates.clip(start))?;
+    let problem = sums.problem;
+    let mut state = evaluate(sums, offsets, coordinates, coordinates.clip(start))?;
     let mut evaluations = 1;
     let mut damping = DAMPING_START;
     let mut end = DescentEnd::StepLimit;
@@ -101,7 +122,7 @@ pub fn descend(
                 break 'steps;
             }
             evaluations += 1;
-            match evaluate(problem, offsets, coordinates, next) {
+            match evaluate(sums, offsets, coordinates, next) {
                 Some(next) if next.cost < state.cost => {
                     state = next;
                     damping = (damping * 0.1).max(1e-14);

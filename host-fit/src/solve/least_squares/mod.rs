@@ -3,6 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`scatter`] | one pass over the rows: the sums that everything else needs |
+//! | [`moments`] | the same sums for any ratios, where the vertical pose stands still within each movement |
 //! | [`normal`] | cost, gradient and curvature in x = (G, r) |
 //! | [`coordinates`] | x itself, or the 18 parameters in their box |
 //! | [`descend`] | the damped Gauss-Newton steps |
@@ -13,6 +14,7 @@
 
 pub mod coordinates;
 pub mod descend;
+pub mod moments;
 pub mod multistart;
 pub mod normal;
 pub mod scatter;

@@ -1,15 +1,17 @@
 //! The least-squares solver: several starts on few rows, then the finish on all.
 
 use super::coordinates::{Boxed, Coordinates, Gains, parameters_of, point_of};
-use super::descend::{Descent, DescentEnd, descend};
+use super::descend::{Descent, DescentEnd, Sums, descend};
+use super::moments::Moments;
 use super::normal::{Column, Point, best_gain, cost};
-use super::scatter::{Offset, Ratios, scatter};
+use super::scatter::{Offset, Q, Ratios, U};
 use crate::problem::parameters::{ETA, Parameters, SLOPES, THETA, search_box};
 use crate::problem::zero_deviation::ZeroDeviation;
 use crate::problem::{Group, Problem, TrainRow};
 use crate::solve::{Projection, Solution, SolveError, SolverOptions};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use std::time::Duration;
 
 /// Starts besides the designed geometry.
@@ -27,8 +29,8 @@ const START_SENSITIVITY_MIN: f64 = 0.3;
 /// # Errors
 /// See [`SolveError`].
 pub fn solve(problem: &Problem, options: &SolverOptions) -> Result<Solution, SolveError> {
-    let starts = starts(&problem.thinned(START_ROWS), options.seed);
-    solve_from(&starts, problem, options)
+    let few = problem.thinned(START_ROWS);
+    descend_from(&starts(&few, options.seed), (problem, &few), true, options)
 }
 
 /// Descends from each of the given parameters and finishes the best on all rows.
@@ -40,9 +42,26 @@ pub fn solve_from(
     problem: &Problem,
     options: &SolverOptions,
 ) -> Result<Solution, SolveError> {
-    let free = free_offsets(problem);
     let few = problem.thinned(START_ROWS);
-    let few_offsets = free_offsets(&few);
+    descend_from(starts, (problem, &few), true, options)
+}
+
+/// Descends on few rows, and on all of them from the best end; by moments if that is asked for, and the
+/// log has such.
+fn descend_from(
+    starts: &[Parameters],
+    (problem, few): (&Problem, &Problem),
+    by_moments: bool,
+    options: &SolverOptions,
+) -> Result<Solution, SolveError> {
+    let free = free_offsets(problem);
+    let moments = |problem: &Problem| by_moments.then(|| Moments::new(problem)).flatten();
+    let (of_all, of_few) = (moments(problem), moments(few));
+    let few = Sums {
+        problem: few,
+        moments: of_few.as_ref(),
+    };
+    let few_offsets = free_offsets(few.problem);
     let boxed = Boxed {
         stage: problem.stage,
         model: problem.model,
@@ -50,14 +69,17 @@ pub fn solve_from(
     // (12) fixes eta, so its gain is not an arbitrary matrix: only the parameters will do.
     let by_gains = options.projection == Projection::Linear && problem.model.fits_gain();
     let mut search = Search {
-        problem,
+        sums: Sums {
+            problem,
+            moments: of_all.as_ref(),
+        },
         offsets: &free,
         evaluations: 0,
     };
     let found = if by_gains {
-        search.by_gains(&few, &few_offsets, starts)?
+        search.by_gains(few, &few_offsets, starts)?
     } else {
-        search.by_parameters(&boxed, &few, &few_offsets, starts)?
+        search.by_parameters(&boxed, few, &few_offsets, starts)?
     };
     let mut descent = found.best;
     let mut parameters = parameters_of(&descent.point).ok_or(SolveError::NoPlanarMotion)?;
@@ -76,7 +98,13 @@ pub fn solve_from(
         descent = search.with_clipped_offsets(&boxed, descent);
         parameters = boxed.parameters(&descent.unknowns);
     }
-    let zeros = zero_deviations(problem, &parameters, &descent.point);
+    if of_all
+        .as_ref()
+        .is_some_and(|moments| !moments.hold(&descent.point.ratios))
+    {
+        return descend_from(starts, (problem, few.problem), false, options);
+    }
+    let zeros = zero_deviations_by(search.sums, &parameters, &descent.point);
     Ok(Solution {
         delta_m: zeros.iter().map(|zero| zero.delta_m).collect(),
         parameters,
@@ -106,43 +134,36 @@ struct Found {
 }
 
 struct Search<'p, 'a> {
-    problem: &'p Problem<'a>,
+    sums: Sums<'p, 'a>,
     offsets: &'p [Offset],
     evaluations: u64,
 }
 
 impl Search<'_, '_> {
     fn finish(&mut self, coordinates: &impl Coordinates, from: Column) -> Option<Descent> {
-        let descent = descend(self.problem, self.offsets, coordinates, from)?;
+        let descent = descend(self.sums, self.offsets, coordinates, from)?;
         self.evaluations += descent.evaluations;
         Some(descent)
     }
 
     fn by_gains(
         &mut self,
-        few: &Problem,
+        few: Sums,
         few_offsets: &[Offset],
         starts: &[Parameters],
     ) -> Result<Found, SolveError> {
         let coordinates = Gains {
-            model: self.problem.model,
+            model: self.sums.problem.model,
         };
-        let mut tried = Vec::new();
-        let mut spanned = false;
-        for start in starts {
-            let Some(ratios) = point_of(start).map(|p| p.ratios) else {
-                continue;
-            };
-            let Some(sums) = scatter(few, &ratios, few_offsets) else {
-                continue;
-            };
-            let Some(gain) = best_gain(&sums) else {
-                continue;
-            };
-            spanned = true;
+        let from = |start: &Parameters| {
+            let ratios = point_of(start)?.ratios;
+            let gain = best_gain(&few.scatter(&ratios, few_offsets)?)?;
             let from = Gains::unknowns(&Point { gain, ratios });
-            tried.extend(descend(few, few_offsets, &coordinates, from));
-        }
+            Some(descend(few, few_offsets, &coordinates, from))
+        };
+        let found: Vec<Option<Descent>> = starts.par_iter().filter_map(from).collect();
+        let spanned = !found.is_empty();
+        let tried: Vec<Descent> = found.into_iter().flatten().collect();
         if !spanned {
             return Err(SolveError::NoPlanarMotion);
         }
@@ -152,21 +173,15 @@ impl Search<'_, '_> {
     fn by_parameters(
         &mut self,
         boxed: &Boxed,
-        few: &Problem,
+        few: Sums,
         few_offsets: &[Offset],
         starts: &[Parameters],
     ) -> Result<Found, SolveError> {
-        let tried = starts
-            .iter()
-            .filter_map(|start| {
-                descend(
-                    few,
-                    few_offsets,
-                    boxed,
-                    boxed.unknowns(&boxed.clipped(start)),
-                )
-            })
-            .collect();
+        let from = |start: &Parameters| {
+            let from = boxed.unknowns(&boxed.clipped(start));
+            descend(few, few_offsets, boxed, from)
+        };
+        let tried = starts.par_iter().filter_map(from).collect();
         self.best_of(tried, boxed)
     }
 
@@ -200,11 +215,13 @@ impl Search<'_, '_> {
         if zeros.iter().all(|zero| !zero.clipped) {
             return descent.cost;
         }
+        let problem = self.sums.problem;
         let of = |group: &Group| Offset::Fixed(zeros[group.movement].pose.map(|x| x * 1e6));
-        let offsets: Vec<Offset> = self.problem.groups.iter().map(of).collect();
+        let offsets: Vec<Offset> = problem.groups.iter().map(of).collect();
         self.evaluations += 1;
-        scatter(self.problem, &descent.point.ratios, &offsets).map_or(descent.cost, |sums| {
-            cost(&sums, &descent.point.gain, self.problem.weights)
+        let scatter = self.sums.scatter(&descent.point.ratios, &offsets);
+        scatter.map_or(descent.cost, |scatter| {
+            cost(&scatter, &descent.point.gain, problem.weights)
         })
     }
 
@@ -217,13 +234,13 @@ impl Search<'_, '_> {
         let mut best: Option<(f64, Descent)> = None;
         for _ in 0..20 {
             let parameters = boxed.parameters(&descent.unknowns);
-            let zeros = zero_deviations(self.problem, &parameters, &descent.point);
+            let zeros = zero_deviations_by(self.sums, &parameters, &descent.point);
             let cost = self.cost_with(&descent, &zeros);
             if best.as_ref().is_none_or(|(least, _)| cost < *least) {
                 best = Some((cost, descent.clone()));
             }
             let mut changed = false;
-            for (offset, group) in offsets.iter_mut().zip(&self.problem.groups) {
+            for (offset, group) in offsets.iter_mut().zip(&self.sums.problem.groups) {
                 let zero = &zeros[group.movement];
                 if zero.clipped {
                     let fixed = Offset::Fixed(zero.pose.map(|x| x * 1e6));
@@ -234,7 +251,7 @@ impl Search<'_, '_> {
             if !changed {
                 break;
             }
-            let Some(next) = descend(self.problem, &offsets, boxed, descent.unknowns) else {
+            let Some(next) = descend(self.sums, &offsets, boxed, descent.unknowns) else {
                 break;
             };
             self.evaluations += next.evaluations;
@@ -261,18 +278,28 @@ pub fn zero_deviations(
     parameters: &Parameters,
     point: &Point,
 ) -> Vec<ZeroDeviation> {
+    let moments = None;
+    zero_deviations_by(Sums { problem, moments }, parameters, point)
+}
+
+fn zero_deviations_by(sums: Sums, parameters: &Parameters, point: &Point) -> Vec<ZeroDeviation> {
+    let problem = sums.problem;
     let mut zeros = vec![ZeroDeviation::NONE; problem.movements];
     if !problem.model.has_zero_deviation {
         return zeros;
     }
-    for group in &problem.groups {
-        let rows = &problem.rows[group.rows.clone()];
-        let Some(mean) = super::scatter::mean(rows, &point.ratios) else {
+    for (number, group) in problem.groups.iter().enumerate() {
+        let mean: Option<[f64; U]> = match sums.moments {
+            Some(moments) => moments.mean(number, &point.ratios),
+            None => super::scatter::mean(&problem.rows[group.rows.clone()], &point.ratios)
+                .map(|mean| std::array::from_fn(|k| mean[k])),
+        };
+        let Some(mean) = mean else {
             continue;
         };
         let error = std::array::from_fn(|axis| {
             let decoded: f64 = (0..3).map(|k| point.gain[(axis, k)] * mean[k]).sum();
-            (decoded - mean[super::scatter::Q + axis]) * 1e-6
+            (decoded - mean[Q + axis]) * 1e-6
         });
         zeros[group.movement] =
             ZeroDeviation::of_mean_error(parameters, error, &problem.stage.search.delta_m);

@@ -11,6 +11,7 @@
 use crate::problem::model::SLOPES_MAX;
 use crate::problem::{Group, Problem, TrainRow};
 use nalgebra::SMatrix;
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Where the reference starts, behind the corrected signals.
@@ -24,7 +25,7 @@ pub const WIDTH: usize = U + 3 * SLOPES_MAX;
 pub type Ratios = [[f64; SLOPES_MAX]; 3];
 
 /// Rows whose 1 + r v is smaller than this are next to a pole, and so is the candidate.
-const DENOMINATOR_MIN: f64 = 0.05;
+pub(super) const DENOMINATOR_MIN: f64 = 0.05;
 
 /// The offset of one movement.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,6 +92,7 @@ fn regressors_of<const K: usize, const W: usize>(
     (smallest > DENOMINATOR_MIN).then_some(z)
 }
 
+#[inline(always)]
 fn mean_of<const K: usize, const W: usize>(rows: &[TrainRow], ratios: &Ratios) -> Option<[f64; W]> {
     let mut sum = [0.0; W];
     let mut n = 0.0;
@@ -104,6 +106,7 @@ fn mean_of<const K: usize, const W: usize>(rows: &[TrainRow], ratios: &Ratios) -
     Some(sum.map(|s| s / n))
 }
 
+#[inline(always)]
 fn origin_of<const K: usize, const W: usize>(
     rows: &[TrainRow],
     ratios: &Ratios,
@@ -121,28 +124,37 @@ fn origin_of<const K: usize, const W: usize>(
     }
 }
 
-/// The sums over the rows of one movement; only the upper triangle is right.
-fn group_sums<const K: usize, const W: usize>(
-    rows: &[TrainRow],
-    ratios: &Ratios,
+/// The sums over the rows of one movement, with the machine's widest registers; only the upper
+/// triangle is right. A type and not a closure, since closures are not always inlined into the
+/// function that is compiled for the instruction set.
+struct GroupSums<'a, const K: usize, const W: usize> {
+    rows: &'a [TrainRow],
+    ratios: &'a Ratios,
     offset: Offset,
-) -> Option<[[f64; W]; W]> {
-    let origin = origin_of::<K, W>(rows, ratios, offset)?;
-    let mut sums = [[0.0; W]; W];
-    for row in rows {
-        let mut z = regressors_of::<K, W>(row, ratios)?;
-        for (z, origin) in z.iter_mut().zip(origin) {
-            *z -= origin;
-        }
-        for (i, sums) in sums.iter_mut().enumerate().take(U + 3 * K) {
-            let from = i & !3;
-            let factor = row.weight * z[i];
-            for (sum, z) in sums[from..].iter_mut().zip(&z[from..]) {
-                *sum += factor * z;
+}
+
+impl<const K: usize, const W: usize> WithSimd for GroupSums<'_, K, W> {
+    type Output = Option<[[f64; W]; W]>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let origin = origin_of::<K, W>(self.rows, self.ratios, self.offset)?;
+        let mut sums = [[0.0; W]; W];
+        for row in self.rows {
+            let mut z = regressors_of::<K, W>(row, self.ratios)?;
+            for (z, origin) in z.iter_mut().zip(origin) {
+                *z -= origin;
+            }
+            for (i, sums) in sums.iter_mut().enumerate().take(U + 3 * K) {
+                let from = i & !3;
+                let factor = row.weight * z[i];
+                for (sum, z) in sums[from..].iter_mut().zip(&z[from..]) {
+                    *sum += factor * z;
+                }
             }
         }
+        Some(sums)
     }
-    Some(sums)
 }
 
 /// The scatter of a problem's rows at the given ratios, or `None` when a row is next to a
@@ -161,7 +173,11 @@ fn scatter_of<const K: usize, const W: usize>(
     offsets: &[Offset],
 ) -> Option<Scatter> {
     let one = |(group, offset): (&Group, &Offset)| {
-        group_sums::<K, W>(&problem.rows[group.rows.clone()], ratios, *offset)
+        pulp::Arch::new().dispatch(GroupSums::<K, W> {
+            rows: &problem.rows[group.rows.clone()],
+            ratios,
+            offset: *offset,
+        })
     };
     let mut sums = [[0.0; W]; W];
     let mut add = |group: &[[f64; W]; W]| {

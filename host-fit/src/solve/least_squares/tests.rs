@@ -1,7 +1,7 @@
 //! The least-squares fit against known truth, an independent crate, and its own derivatives.
 
 use super::coordinates::{Boxed, Coordinates, parameters_of, point_of};
-use super::descend::descend;
+use super::descend::{Sums, descend};
 use super::normal::{Column, cost, descent};
 use super::scatter::{Offset, regressors, scatter};
 use crate::input::shipped::STAGE_TOML;
@@ -285,7 +285,10 @@ fn a_start_next_to_a_pole_is_refused() {
     let offsets = vec![Offset::Free; problem.groups.len()];
     assert!(
         descend(
-            &problem,
+            Sums {
+                problem: &problem,
+                moments: None
+            },
             &offsets,
             &boxed,
             boxed.unknowns(&Parameters { values: pole })
