@@ -37,12 +37,18 @@ pub(super) struct Stitcher<'a, T> {
     between_codes: BetweenCodes,
     pub(super) clock: Clock,
     open_line: Option<usize>,
-    /// Rows that wait until the period is known, by block, with their steps if the times tell where
-    /// movements begin.
-    waiting: Vec<(Vec<LogRow<T>>, Vec<Option<i64>>)>,
+    /// Rows that wait until the period is known.
+    waiting: Vec<Waiting<T>>,
     waiting_rows: usize,
     periods: Option<Periods>,
     movements: Movements,
+}
+
+/// The rows of a block.
+struct Waiting<T> {
+    rows: Vec<LogRow<T>>,
+    /// Their steps, if the times tell where movements begin: see [`Steps::keep`].
+    steps: Vec<Option<i64>>,
 }
 
 /// What the first rows of a log tell of the others.
@@ -111,7 +117,7 @@ impl<'a, T> Stitcher<'a, T> {
         numbering.map_or(self.servo_period_s * 1e6, |numbering| numbering.period_us)
     }
 
-    /// Takes the next block; `give` gets rows that are ready.
+    /// Takes the next block; rows that are ready are added to `ready`.
     ///
     /// # Errors
     /// The first fault of the block.
@@ -161,7 +167,7 @@ impl<'a, T> Stitcher<'a, T> {
             return Err(fault);
         }
         self.waiting_rows += rows.len();
-        self.waiting.push((rows, steps));
+        self.waiting.push(Waiting { rows, steps });
         if self.periods.is_some() || self.waiting_rows >= PERIOD_ROWS {
             self.give(ready);
         }
@@ -257,7 +263,7 @@ impl<'a, T> Stitcher<'a, T> {
         let Some(periods) = &mut self.periods else {
             return;
         };
-        for (mut rows, steps) in waiting {
+        for Waiting { mut rows, steps } in waiting {
             let mut steps = steps.into_iter();
             for row in &mut rows {
                 if let Some(cuts) = &mut periods.cuts {
@@ -275,19 +281,19 @@ impl<'a, T> Stitcher<'a, T> {
     }
 
     /// What the rows that wait, the first of the log, tell of the others.
-    fn first_periods(&self, waiting: &[(Vec<LogRow<T>>, Vec<Option<i64>>)]) -> Periods {
+    fn first_periods(&self, waiting: &[Waiting<T>]) -> Periods {
         let by_time = self.columns.movement.is_none();
         let length_us = (self.options.split_s).map(|seconds| (seconds * 1e6).round() as i64);
         let cuts = || {
-            let steps = waiting.iter().flat_map(|(_, steps)| steps.iter().copied());
+            let steps = waiting.iter().flat_map(|block| block.steps.iter().copied());
             Cuts::new(steps, length_us)
         };
         let mut trial = by_time.then(cuts);
         let mut steps_us: Vec<i64> = Vec::with_capacity(self.waiting_rows);
         let mut before_us = 0;
-        for (rows, steps) in waiting {
-            let mut steps = steps.iter().copied();
-            for row in rows {
+        for block in waiting {
+            let mut steps = block.steps.iter().copied();
+            for row in &block.rows {
                 let begins = match &mut trial {
                     Some(cuts) => cuts.begins(row.t_us, steps.next().flatten()),
                     None => row.begins,
