@@ -1,9 +1,9 @@
 //! Which rows a fit uses: all, or a draw of N by the seed.
 
 use crate::input::dataset::Dataset;
+use rand::rngs::ChaCha8Rng;
 use rand::seq::index;
 use rand::{Rng, SeedableRng};
-use rand::rngs::ChaCha8Rng;
 
 /// How rows are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

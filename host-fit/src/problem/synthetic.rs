@@ -4,8 +4,8 @@
 use crate::input::dataset::{Dataset, LogSource, LoggedFrame, Movement, Row};
 use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
-use rand::{Rng, RngExt, SeedableRng};
 use rand::rngs::ChaCha8Rng;
+use rand::{Rng, RngExt, SeedableRng};
 use runtime::capacitive::gaps_m;
 use runtime::model::probe_displacement_m;
 use runtime::{PlanarPose, RawFrame, VerticalPose};

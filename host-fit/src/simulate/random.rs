@@ -1,8 +1,8 @@
 //! Random numbers that are the same on every machine: ChaCha8, and libm for the logarithm and
 //! the cosine of a normal number.
 
-use rand::{Rng, SeedableRng};
 use rand::rngs::ChaCha8Rng;
+use rand::{Rng, SeedableRng};
 use std::f64::consts::TAU;
 
 /// What a stream of numbers is for. Streams of one seed are independent of each other.

@@ -6,8 +6,8 @@ use super::terms::{PER_PROBE, SHAPES, TERMS};
 use crate::input::dataset::{Dataset, LogSource, LoggedFrame, Movement, Row};
 use crate::input::shipped::STAGE_TOML;
 use crate::input::stage::Stage;
-use rand::{RngExt, SeedableRng};
 use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use runtime::RawFrame;
 use std::f64::consts::TAU;
 

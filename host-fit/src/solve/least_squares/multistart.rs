@@ -8,8 +8,8 @@ use crate::problem::parameters::{ETA, Parameters, SLOPES, THETA, search_box};
 use crate::problem::zero_deviation::ZeroDeviation;
 use crate::problem::{Group, Problem, TrainRow};
 use crate::solve::{Projection, Solution, SolveError, SolverOptions};
-use rand::{RngExt, SeedableRng};
 use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use std::time::Duration;
 
 /// Starts besides the designed geometry.
