@@ -4,6 +4,7 @@ use super::args::on_invalid;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::input::stage::Stage;
+use crate::interrupt;
 use crate::output::blob_file;
 use crate::output::pose_file::{self, DecodeSettings, PoseFormat};
 use crate::output::posterior_file::{self, PosteriorFileError};
@@ -14,6 +15,7 @@ use crate::solve::field::posterior::Posterior;
 use clap::{Args, ValueEnum};
 use runtime::ParameterSet;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 /// Arguments of `decode`.
 #[derive(Debug, Args)]
@@ -89,7 +91,14 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
         posterior: posterior.as_ref(),
         format: args.format.format(),
     };
-    let decode = || pose_file::decode_log::<HostError>(&args.log, &stage, &settings, out);
+    let stop = interrupt::watch();
+    let go_on = || match stop.load(Ordering::Relaxed) {
+        false => Ok(()),
+        true => Err(HostError::Interrupted {
+            kept: "no pose file was written".to_owned(),
+        }),
+    };
+    let decode = || pose_file::decode_log(&args.log, &stage, &settings, out, go_on);
     let (counts, log) = terminal::timed("decoding", decode)?;
     let mut summary = format!(
         "{} rows, {} of them with status 0\n",

@@ -5,9 +5,12 @@ use crate::cli::terminal;
 use crate::diagnose;
 use crate::diagnose::finding::Severity;
 use crate::fit::FitWarning;
+use crate::input::dataset::FIT_ROWS_MAX;
 use crate::input::log::{self, ReadOptions};
 use crate::input::stage::Stage;
-use crate::judge::{Decoded, Judgement, Zeros};
+use crate::judge::statistics::PoseError;
+use crate::judge::whole::WholeJudgement;
+use crate::judge::{Decoded, Zeros};
 use crate::output::blob_file;
 use crate::problem::model::Model;
 use crate::report::errors;
@@ -63,9 +66,9 @@ fn factor(value: &str) -> Result<f64, &'static str> {
 
 /// The largest error in terms of the blob's own, if that is beyond the limit; the blob of an exact fit
 /// has none to compare with.
-fn beyond_limit(set: &ParameterSet, judgement: &Judgement, limit: f64) -> Option<HostError> {
+fn beyond_limit(set: &ParameterSet, errors: &PoseError, limit: f64) -> Option<HostError> {
     const AXES: [(&str, &str); 3] = [("X", "um"), ("Y", "um"), ("Rz", "urad")];
-    let ratio = |axis: usize| judgement.errors.axes[axis].rms / f64::from(set.fit.rms[axis]);
+    let ratio = |axis: usize| errors.axes[axis].rms / f64::from(set.fit.rms[axis]);
     let worst = (0..3)
         .filter(|&axis| set.fit.rms[axis] > 0.0)
         .max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
@@ -73,7 +76,7 @@ fn beyond_limit(set: &ParameterSet, judgement: &Judgement, limit: f64) -> Option
     (ratio(worst) > limit).then(|| HostError::BeyondLimit {
         axis,
         unit,
-        error: judgement.errors.axes[worst].rms * 1e6,
+        error: errors.axes[worst].rms * 1e6,
         own: f64::from(set.fit.rms[worst]) * 1e6,
         limit,
         cause: String::new(),
@@ -91,6 +94,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     super::same_scales(&set, &stage, &args.stage)?;
     let options = ReadOptions {
         split_s: args.split,
+        rows_max: Some(FIT_ROWS_MAX),
         ..super::EVAL
     };
     let log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;
@@ -101,11 +105,17 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     };
     let decoded = Decoded::new(&set, &log.dataset);
     let judgement = decoded.judge(&log.dataset, &stage, zeros);
+    // Of a long log the rows above are an excerpt, which the diagnosis looks at; errors are those of
+    // all rows.
+    let judge_whole = |zeros| {
+        let whole = log.dataset.whole.as_ref()?;
+        Some(WholeJudgement::new(&set, whole, &stage, zeros))
+    };
+    let whole = judge_whole(zeros);
+    let undecoded = (whole.as_ref()).map_or(judgement.undecoded, |whole| whole.undecoded);
     let mut circumstances = super::circumstances(&log, &stage, started);
-    if judgement.undecoded > 0 {
-        let undecoded = FitWarning::Undecoded {
-            rows: judgement.undecoded,
-        };
+    if undecoded > 0 {
+        let undecoded = FitWarning::Undecoded { rows: undecoded };
         circumstances.warnings.push(undecoded.to_string());
     }
     let clipped = judgement.zeros.iter().filter(|zero| zero.clipped).count();
@@ -119,7 +129,14 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     circumstances.findings = terminal::timed("diagnosis", || {
         diagnose::of_judged(&log.dataset, &stage, &set, &errors)
     });
-    let report = of_eval(&set, &decoded, &judgement, zeros, &circumstances);
+    let report = of_eval(
+        &set,
+        &decoded,
+        &judgement,
+        whole.as_ref(),
+        zeros,
+        &circumstances,
+    );
     if let Some(path) = &args.json {
         super::write_json(&report, path)?;
     }
@@ -130,7 +147,9 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         report.movements,
         text::errors(
             &format!("errors, {}", report.zeros_in_words),
-            &judgement.errors,
+            whole
+                .as_ref()
+                .map_or(&judgement.errors, |whole| &whole.errors),
             None
         ) + &errors::as_text(&report.logs)
     ))?;
@@ -138,7 +157,10 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     terminal::warn(&report.warnings);
     // As the blob's own errors were counted, whatever --delta says.
     let own_zeros = Zeros::of_model(Model::of(set.model));
-    let comparable = decoded.judge(&log.dataset, &stage, own_zeros);
+    let comparable = match judge_whole(own_zeros) {
+        Some(whole) => whole.errors,
+        None => decoded.judge(&log.dataset, &stage, own_zeros).errors,
+    };
     let usual = if set.model == ModelKind::Field {
         3.0
     } else {

@@ -5,6 +5,7 @@ use crate::diagnose::trusted::{Trusted, trusted};
 use crate::fit::{CrossValidation, Fit};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
+use crate::judge::whole::WholeJudgement;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::Parameters;
@@ -362,11 +363,13 @@ pub fn of_eval(
     set: &ParameterSet,
     decoded: &Decoded,
     judgement: &Judgement,
+    whole: Option<&WholeJudgement>,
     zeros: Zeros,
     c: &Circumstances,
 ) -> Report {
     let model = Model::of(set.model);
     let values = Parameters::of_set(set);
+    let errors = whole.map_or(&judgement.errors, |whole| &whole.errors);
     Report {
         model: model.name.to_owned(),
         model_title: model.title(),
@@ -379,16 +382,16 @@ pub fn of_eval(
         standard_errors: None,
         correlations: Vec::new(),
         cross_validation: None,
-        rows: c.dataset.rows.len(),
+        rows: c.dataset.named().0,
         train_rows: set.fit.train_rows as usize,
-        movements: c.dataset.movements.len(),
+        movements: c.dataset.named().1,
         skipped_rows: c.skipped_rows,
         evaluations: None,
         elapsed_s: c.elapsed_s,
         solver_s: None,
         stopped: None,
-        train_fitness: judgement.errors.fitness(),
-        errors: Errors::from(&judgement.errors),
+        train_fitness: errors.fitness(),
+        errors: Errors::from(errors),
         errors_solver_delta: None,
         delta: zeros.name(),
         zeros_in_words: zeros.words(),
@@ -400,7 +403,10 @@ pub fn of_eval(
         zero_deviations: movement_zeros(judgement, c.dataset),
         warnings: c.warnings.clone(),
         findings: c.findings.clone(),
-        logs: by_log(decoded, judgement, c.dataset),
+        logs: match whole {
+            Some(whole) => of_logs(c.dataset, &whole.logs),
+            None => by_log(decoded, judgement, c.dataset),
+        },
         trusted_inputs: trusted(set),
     }
 }

@@ -102,6 +102,9 @@ fn standard_output_carries_an_output_alone_by_whatever_name() {
         ));
         assert_eq!(stdout(&decoded), bench.text("pose.csv"), "{name}");
         assert!(stderr(&decoded).contains("rows, "), "{name}");
+        // The header of an array holds the number of rows.
+        let array = format!("decode p.bin log.csv --stage stage.toml --format npy --out {name}");
+        bench.bad(&array, 2, &["--format npy", "name a file"]);
     }
 }
 

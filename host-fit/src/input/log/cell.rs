@@ -135,9 +135,6 @@ pub(crate) fn number(cell: &[u8]) -> Result<f64, CellFault> {
 
 /// A whole number; `12.0` counts as one. `what` says what the column holds.
 pub(crate) fn whole(cell: &[u8], what: &'static str) -> Result<i64, CellFault> {
-    if let Some(value) = short_integer(cell.trim_ascii()) {
-        return Ok(value);
-    }
     let value = number(cell)?;
     if value.abs() > WHOLE_MAX {
         return Err(CellFault::Absurd {
@@ -153,26 +150,6 @@ pub(crate) fn whole(cell: &[u8], what: &'static str) -> Result<i64, CellFault> {
     Ok(value as i64)
 }
 
-/// An integer of up to 15 digits, which covers every sound cell of a log.
-fn short_integer(cell: &[u8]) -> Option<i64> {
-    let (negative, digits) = match cell {
-        [b'-', digits @ ..] => (true, digits),
-        digits => (false, digits),
-    };
-    if digits.is_empty() || digits.len() > 15 {
-        return None;
-    }
-    let mut value = 0i64;
-    for digit in digits {
-        let digit = digit.wrapping_sub(b'0');
-        if digit > 9 {
-            return None;
-        }
-        value = value * 10 + i64::from(digit);
-    }
-    Some(if negative { -value } else { value })
-}
-
 /// A number times `scale`, at most `limit` in magnitude.
 pub(crate) fn scaled(
     cell: &[u8],
@@ -180,11 +157,7 @@ pub(crate) fn scaled(
     limit: f64,
     unit: &'static str,
 ) -> Result<f64, CellFault> {
-    let raw = match short_integer(cell.trim_ascii()) {
-        Some(value) => value as f64,
-        None => number(cell)?,
-    };
-    let value = raw * scale;
+    let value = number(cell)? * scale;
     if value.abs() <= limit {
         Ok(value)
     } else {

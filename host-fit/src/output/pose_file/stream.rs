@@ -63,16 +63,17 @@ impl DecodeSettings<'_> {
 }
 
 /// Decodes a log into `out`, as [`decode`](super::decode) does: how many rows have which status,
-/// and what is odd about the log.
+/// and what is odd about the log. `go_on` is asked now and then and can end it.
 ///
 /// # Errors
-/// Those of the log, when the rows above its first fault are done, and those of the output, which
-/// then is as it was before. A pipe keeps what was written to it.
+/// Those of the log, when the rows above its first fault are done, of `go_on` and of the output,
+/// which then is as it was before. A pipe keeps what was written to it.
 pub fn decode_log<E: From<LogError> + From<OutputError>>(
     log: &Path,
     stage: &Stage,
     settings: &DecodeSettings<'_>,
     mut out: StreamedFile,
+    go_on: impl Fn() -> Result<(), E>,
 ) -> Result<(StatusCounts, LogEnd), E> {
     let decoder = settings.decoder;
     let mut servo = Servo::new(&**decoder, settings.on_invalid);
@@ -86,6 +87,7 @@ pub fn decode_log<E: From<LogError> + From<OutputError>>(
         &ReadOptions::DECODE,
         |sample| sample.frame().decode(decoder, &PlanarPose::ZERO),
         |batch| {
+            go_on()?;
             let mut blocks = batch.blocks;
             for row in blocks.iter_mut().flatten() {
                 if row.begins {

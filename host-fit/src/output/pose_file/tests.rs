@@ -205,7 +205,7 @@ fn decoded_file(on_invalid: OnInvalid, format: PoseFormat) -> (Vec<u8>, StatusCo
         format,
     };
     let log = data.join("paper.csv.gz");
-    let decoded = decode_log::<Box<dyn std::error::Error>>(&log, &stage, &settings, out);
+    let decoded = decode_log::<Box<dyn std::error::Error>>(&log, &stage, &settings, out, || Ok(()));
     let (counts, end) = decoded.expect("sound");
     assert_eq!((end.skipped_rows, end.warnings), (0, Vec::new()));
     (std::fs::read(&path).expect("written"), counts)

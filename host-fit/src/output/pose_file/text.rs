@@ -111,6 +111,9 @@ impl Line {
         let micro = (f64::from(word) * 1e6).abs();
         self.store(0, u128::from(b'-'));
         self.length += usize::from(word.is_sign_negative());
+        if micro == 0.0 {
+            return self.push(b'0');
+        }
         match digits(micro) {
             Some((number, exponent)) => self.number(number, exponent),
             None => self.rare(micro),
@@ -137,16 +140,16 @@ impl Line {
                 self.store(0, digits);
                 self.store(1, (digits >> 8) << 8 | u128::from(b'.'));
                 self.length += if kept > 1 { kept + 1 } else { 1 };
-                self.extend(format!("e{exponent}").as_bytes());
+                self.push(b'e');
+                self.integer(exponent);
             }
         }
     }
 
-    /// Zero, and what is very small or very large.
+    /// What is very small or very large.
     #[cold]
     fn rare(&mut self, micro: f64) {
         match digits_of_any(micro) {
-            Some((0, _)) => self.push(b'0'),
             Some((number, exponent)) => self.number(number, exponent),
             // Not a finite number: the decoder never gives one.
             None => self.extend(micro.to_string().as_bytes()),
@@ -169,16 +172,20 @@ const fn ascii(number: u32) -> (u128, usize) {
     (digits << 8 | (first + b'0' as u32) as u128, kept)
 }
 
-/// Powers of ten from 1e-4 to 1e9.
-const POWERS: [f64; 14] = [
-    1e-4, 1e-3, 1e-2, 1e-1, 1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9,
+/// The smallest value that [`digits`] takes.
+const SMALLEST: f64 = 1e-12;
+
+/// Powers of ten from that to 1e9.
+const POWERS: [f64; 22] = [
+    1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e0, 1e1, 1e2, 1e3,
+    1e4, 1e5, 1e6, 1e7, 1e8, 1e9,
 ];
 
-/// Powers of ten from 1 to 1e12.
-const TENS: [u64; 13] = {
-    let mut tens = [1; 13];
+/// Powers of ten from 1 to 1e20.
+const TENS: [u128; 21] = {
+    let mut tens = [1; 21];
     let mut k = 1;
-    while k < 13 {
+    while k < tens.len() {
         tens[k] = 10 * tens[k - 1];
         k += 1;
     }
@@ -186,13 +193,13 @@ const TENS: [u64; 13] = {
 };
 
 /// Nine digits, the first not 0, and the exponent of the first: those of `{:.8e}`, rounded to the
-/// nearest, ties to even. `None` outside 1e-4 to 1e9.
+/// nearest, ties to even. `None` outside 1e-12 to 1e9.
 #[inline]
 fn digits(value: f64) -> Option<(u32, i32)> {
-    if !(1e-4..1e9).contains(&value) {
+    if !(SMALLEST..1e9).contains(&value) {
         return None;
     }
-    // value = mantissa / 2^shift, with a shift from 23 to 66; times 10^(8 - exponent) that has 93
+    // value = mantissa / 2^shift, with a shift from 23 to 92; times 10^(8 - exponent) that has 120
     // bits at most.
     let bits = value.to_bits();
     let mantissa = (bits & ((1 << 52) - 1)) | 1 << 52;
@@ -200,10 +207,10 @@ fn digits(value: f64) -> Option<(u32, i32)> {
     let shift = (52 - binary_exponent) as u32;
     // By the binary exponent times the logarithm of 2, the exponent or one less.
     let low = (binary_exponent * 1233) >> 12;
-    let above = POWERS.get((low + 5) as usize)?;
+    let above = POWERS.get((low + 13) as usize)?;
     let exponent = low + i32::from(value >= *above);
     let ten_to = TENS.get((8 - exponent) as usize)?;
-    let scaled = u128::from(mantissa) * u128::from(*ten_to);
+    let scaled = u128::from(mantissa) * ten_to;
     let whole = (scaled >> shift) as u32;
     let (rest, half) = (scaled & ((1 << shift) - 1), 1 << (shift - 1));
     let up = rest > half || (rest == half && whole % 2 == 1);
@@ -236,7 +243,6 @@ mod tests {
     #[test]
     fn digits_by_integers_are_those_of_the_standard_library() {
         // Around every power of ten, ties, and words of all magnitudes.
-        assert_eq!(digits_of_any(0.0), Some((0, 0)));
         for power in POWERS {
             let bits = power.to_bits();
             (bits - 200..bits + 200).for_each(|bits| same(f64::from_bits(bits)));
@@ -254,7 +260,7 @@ mod tests {
         }
         assert_eq!(digits(100_000_000.5), Some((100_000_000, 8)));
         assert_eq!(digits(999_999_999.6), Some((100_000_000, 9)));
-        assert_eq!(digits(9.99e-5), None);
+        assert_eq!(digits(9.99e-13), None);
         assert_eq!(digits(1e9), None);
     }
 
@@ -275,8 +281,8 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
 
         #[test]
-        fn digits_of_any_value_are_those_of_the_standard_library(value in 1e-5..2e9, small in 1e-5..1e2) {
-            for value in [value, small] {
+        fn digits_of_any_value_are_those_of_the_standard_library(value in 1e-5..2e9, power in -13..1i32) {
+            for value in [value, value * 1e-9 * 10f64.powi(power)] {
                 if let Some(found) = digits(value) {
                     prop_assert_eq!(Some(found), digits_of_any(value));
                 }
