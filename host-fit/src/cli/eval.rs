@@ -49,6 +49,8 @@ pub(super) struct EvalArgs {
     /// in time.
     #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
     split: Option<f64>,
+    #[command(flatten)]
+    memory: super::args::Memory,
     /// Largest rms error, in terms of that of the logs that the blob was fitted to: 3 if not given,
     /// and 10 for models (12) to (31), whose own logs may not show what they lack.
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
@@ -94,6 +96,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     super::same_scales(&set, &stage, &args.stage)?;
     let options = ReadOptions {
         split_s: args.split,
+        memory_bytes: args.memory.limit_bytes(),
         rows_max: Some(FIT_ROWS_MAX),
         ..super::EVAL
     };
