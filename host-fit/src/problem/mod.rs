@@ -129,7 +129,9 @@ impl<'a> Problem<'a> {
                 high[axis] = high[axis].max(row.reference_um[axis]);
             }
         }
-        (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max)
+        (0..3)
+            .map(|axis| high[axis] - low[axis])
+            .fold(0.0, f64::max)
     }
 
     /// The fitness of the paper, as this project defines it: the root of the mean over rows and

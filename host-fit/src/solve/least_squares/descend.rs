@@ -1,8 +1,8 @@
 //! Damped Gauss-Newton (Levenberg-Marquardt) within a box, on the sums of `scatter`.
 
 use super::coordinates::Coordinates;
-use super::normal::{Column, Point, Square, cost, descent, gram};
 use super::moments::Moments;
+use super::normal::{Column, Point, Square, cost, descent, gram};
 use super::scatter::{Offset, Q, Ratios, Scatter, scatter};
 use crate::problem::Problem;
 use crate::problem::model::COUNT;

@@ -222,8 +222,8 @@ impl WithSimd for OfMovement<'_> {
                 *mean += row.weight * b;
             }
             weight += row.weight;
-            for k in 0..K {
-                deviation[k] = deviation[k].max((row.slopes[k] - self.at[k]).abs());
+            for ((most, slope), at) in deviation.iter_mut().zip(row.slopes).zip(self.at) {
+                *most = most.max((slope - at).abs());
             }
         }
         let mean = mean.map(|sum| sum / weight);
@@ -272,9 +272,9 @@ impl Basis {
         for (basis, r) in basis.iter_mut().zip(ratios) {
             let mut denominator = 1.0;
             let mut nearer = 0.0;
-            for k in 0..K {
-                denominator += r[k] * pose.at[k];
-                nearer += (r[k] * pose.deviation[k]).abs();
+            for ((r, at), deviation) in r.iter().zip(pose.at).zip(pose.deviation) {
+                denominator += r * at;
+                nearer += (r * deviation).abs();
             }
             if denominator - nearer <= DENOMINATOR_MIN {
                 return None;
@@ -372,7 +372,9 @@ mod tests {
     fn moments_give_the_scatter_of_the_rows_wherever_the_tilt_stands_still() {
         let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
         let mut truth = Parameters::designed(&stage);
-        let slopes = [-150.0, -130.0, -170.0, -52.0, -55.0, -47.0, 26.0, -26.0, 24.0];
+        let slopes = [
+            -150.0, -130.0, -170.0, -52.0, -55.0, -47.0, 26.0, -26.0, 24.0,
+        ];
         truth.values[9..18].copy_from_slice(&slopes);
         let dataset = Protocol::exact(truth, 60).dataset(&stage);
         let all: Vec<usize> = (0..dataset.rows.len()).collect();

@@ -98,7 +98,10 @@ fn descend_from(
         descent = search.with_clipped_offsets(&boxed, descent);
         parameters = boxed.parameters(&descent.unknowns);
     }
-    if of_all.as_ref().is_some_and(|moments| !moments.hold(&descent.point.ratios)) {
+    if of_all
+        .as_ref()
+        .is_some_and(|moments| !moments.hold(&descent.point.ratios))
+    {
         return descend_from(starts, (problem, few.problem), false, options);
     }
     let zeros = zero_deviations_by(search.sums, &parameters, &descent.point);
