@@ -36,11 +36,11 @@ impl Samples {
     /// Adds one.
     pub fn push(&mut self, sample: &Sample) {
         let end = self.len() + 1;
-        if let (Some(chunk), Some(last)) = (self.chunks.last_mut(), self.ends.last_mut()) {
-            if chunk.push(sample) {
-                *last = end;
-                return;
-            }
+        if let (Some(chunk), Some(last)) = (self.chunks.last_mut(), self.ends.last_mut())
+            && chunk.push(sample)
+        {
+            *last = end;
+            return;
         }
         self.chunks.push(Chunk::new(sample));
         self.ends.push(end);

@@ -222,8 +222,8 @@ impl WithSimd for OfMovement<'_> {
                 *mean += row.weight * b;
             }
             weight += row.weight;
-            for k in 0..K {
-                deviation[k] = deviation[k].max((row.slopes[k] - self.at[k]).abs());
+            for ((most, slope), at) in deviation.iter_mut().zip(row.slopes).zip(self.at) {
+                *most = most.max((slope - at).abs());
             }
         }
         let mean = mean.map(|sum| sum / weight);
@@ -272,9 +272,9 @@ impl Basis {
         for (basis, r) in basis.iter_mut().zip(ratios) {
             let mut denominator = 1.0;
             let mut nearer = 0.0;
-            for k in 0..K {
-                denominator += r[k] * pose.at[k];
-                nearer += (r[k] * pose.deviation[k]).abs();
+            for ((r, at), deviation) in r.iter().zip(pose.at).zip(pose.deviation) {
+                denominator += r * at;
+                nearer += (r * deviation).abs();
             }
             if denominator - nearer <= DENOMINATOR_MIN {
                 return None;
