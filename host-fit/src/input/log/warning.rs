@@ -162,8 +162,7 @@ pub enum LogWarning {
     },
     /// There are more rows than a fit needs.
     #[error(
-        "fit and diagnosis use {taken} of {rows} rows, in {runs} runs spread over all that moves; the errors of the fit are over \
-         all rows"
+        "fit and diagnosis use {taken} of {rows} rows, in {runs} runs spread over all that moves; errors are over all rows"
     )]
     Excerpt {
         /// Rows of the logs.
