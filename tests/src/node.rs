@@ -8,6 +8,7 @@ use firmware::outbox::Outbox;
 use firmware::records::Records;
 use firmware::retained::{Retained, WORDS};
 use firmware::schedule::PERIOD_US;
+use firmware::slots::Loaded;
 use firmware::start_up::{Before, Cause, PROVEN_TICKS};
 use firmware::store::flash_model::FlashModel;
 use firmware::store::{Record, Store};
@@ -16,6 +17,7 @@ use hal_adapters::can::update::{Identity, Key, Store as _};
 use hal_adapters::can::{BusFrame, Coded, Layout};
 use hal_adapters::fault::Random;
 use runtime::RawFrame;
+use std::ptr::NonNull;
 
 /// Frames that a tick takes from the bus at most.
 pub const TAKEN_PER_TICK: usize = 3;
@@ -26,6 +28,8 @@ pub struct Node {
     key: Option<Key>,
     ticking: Ticking<'static>,
     records: Records<FlashModel>,
+    // Below what borrows from it: fields are dropped in this order.
+    statics: Statics,
     /// What a reset leaves in RAM.
     retained: [u32; WORDS],
     outbox: Outbox,
@@ -52,12 +56,13 @@ impl Node {
         seed: u64,
     ) -> Self {
         let before = Before::of(Cause::PowerOn, None);
-        let (ticking, records) = start(flash, (serial, key), &before);
+        let (ticking, records, statics) = start(flash, (serial, key), &before);
         Self {
             serial,
             key,
             ticking,
             records,
+            statics,
             retained: before.record.to_words(),
             outbox: Outbox::new(),
             random: Random::new(seed),
@@ -112,7 +117,9 @@ impl Node {
         let before = Before::of(cause, Retained::from_words(&self.retained));
         let mut flash = self.flash().clone();
         flash.power_on();
-        (self.ticking, self.records) = start(flash, (self.serial, self.key), &before);
+        let statics;
+        (self.ticking, self.records, statics) = start(flash, (self.serial, self.key), &before);
+        self.statics = statics;
         self.retained = before.record.to_words();
         self.outbox = Outbox::new();
         self.resets += 1;
@@ -145,18 +152,38 @@ impl Node {
     }
 }
 
-/// What the firmware's `init` does, as far as it is not about the chip. What the controller has as
-/// statics is leaked: some 3 kB a start.
+/// What the controller has as statics, for one start.
+struct Statics {
+    record: NonNull<Record>,
+    place: NonNull<Option<Loaded>>,
+}
+
+impl Drop for Statics {
+    fn drop(&mut self) {
+        // SAFETY: both are boxes of `start`, which gave their only references to the node and the
+        // records that it made. `Node` drops or replaces those first, and hands out neither.
+        unsafe {
+            drop(Box::from_raw(self.record.as_ptr()));
+            drop(Box::from_raw(self.place.as_ptr()));
+        }
+    }
+}
+
+/// What the firmware's `init` does, as far as it is not about the chip.
 fn start(
     flash: FlashModel,
     (serial, key): (Option<&'static str>, Option<Key>),
     before: &Before,
-) -> (Ticking<'static>, Records<FlashModel>) {
+) -> (Ticking<'static>, Records<FlashModel>, Statics) {
     let record = Box::leak(Box::new(Record::EMPTY));
+    let place = Box::leak(Box::new(None));
+    let statics = Statics {
+        record: NonNull::from(&mut *record),
+        place: NonNull::from(&mut *place),
+    };
     // No check of a blob faults here, whose CRC the next start had to know.
     let check = before.check(serial, |_| ());
     let (mut records, found) = Records::start(flash, record, check, before.blames_newest());
-    let place = Box::leak(Box::new(None));
     let loaded = found.blob.and_then(|blob| records.load(blob, place));
     let is_sound = runtime::arithmetic::check().is_ok();
     let parameters = Parameters::at_start(loaded, found.refusal, is_sound);
@@ -168,7 +195,7 @@ fn start(
     };
     let mut node = Ticking::new(parameters, before.by_fault, Layout::Bits24, identity);
     before.restore_zero(&mut node, loaded.map_or(0, |loaded| loaded.crc));
-    (node, records)
+    (node, records, statics)
 }
 
 /// Codes that 16-bit converters may give, and no two ticks in a row with the same.

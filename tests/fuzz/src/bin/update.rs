@@ -4,21 +4,20 @@
 #![no_main]
 
 use embedded_can::Frame;
+use firmware::store::Sector;
+use firmware::store::flash_model::FlashModel;
 use fuzz::PARAMS;
 use fuzz::bus::Numbers;
 use hal_adapters::can::command::{Command, Request};
 use hal_adapters::can::e2e::Payload;
-use hal_adapters::can::update::{Store, UpdateData, UpdateRequest, word_of};
+use hal_adapters::can::update::{UpdateData, UpdateRequest, crc_of, word_of};
 use hal_adapters::can::{BusFrame, Message};
 use libfuzzer_sys::fuzz_target;
 use runtime::ParameterSet;
 use runtime::blob::MAX_BYTES;
 use runtime::parameters::Text;
 use std::sync::LazyLock;
-use tests::node::Node;
-
-/// Sequence number of the record that the node begins with.
-const SEQUENCE: u32 = 3;
+use tests::node::{Node, TAKEN_PER_TICK};
 
 /// What is sent: other parameters of the same stage.
 static NEW: LazyLock<Vec<u8>> = LazyLock::new(|| {
@@ -32,12 +31,26 @@ static NEW: LazyLock<Vec<u8>> = LazyLock::new(|| {
 struct Bench {
     node: Node,
     numbers: Numbers,
+    /// Frames that the next tick takes.
+    waiting: Vec<BusFrame>,
 }
 
 impl Bench {
     fn take(&mut self, message: Message, payload: Payload) {
         let frame = self.numbers.frame(message, payload);
-        self.node.take(&frame);
+        self.receive(frame);
+    }
+
+    fn receive(&mut self, frame: BusFrame) {
+        self.waiting.push(frame);
+        if self.waiting.len() == TAKEN_PER_TICK {
+            self.tick();
+        }
+    }
+
+    fn tick(&mut self) {
+        self.node.tick(0, self.waiting.drain(..));
+        while self.node.send().is_some() {}
     }
 
     fn ask(&mut self, request: Request, token: u8) {
@@ -46,13 +59,18 @@ impl Bench {
 
     fn step(&mut self, [kind, a, b]: [u8; 3]) {
         // Two tokens, two numbers: what no one sends belongs to the target `node`.
-        let (token, sequence) = (b & 1, SEQUENCE + u32::from(a & 3));
+        let (token, sequence) = (b & 1, u32::from(a & 3));
         let ask = |request| Request::Update(request);
         match kind % 16 {
             0 => self.ask(Request::ServoOff { seconds: a }, token),
             1 => {
-                let bytes = if a == 0 { 0 } else { NEW.len() as u16 };
-                self.ask(ask(UpdateRequest::Begin { bytes }), token);
+                // Anew, or back to what was there before anything new.
+                let (bytes, blob) = match a {
+                    0 => (0, PARAMS),
+                    _ => (NEW.len(), &NEW[..]),
+                };
+                let crc = crc_of(blob).expect("longer than a CRC");
+                self.ask(ask(UpdateRequest::begin(bytes, crc)), token);
             }
             2 => (a..=a.saturating_add(b)).for_each(|index| {
                 let word = word_of(&NEW, index.into()).unwrap_or_default();
@@ -81,21 +99,19 @@ impl Bench {
             11 => self.ask(
                 ask(UpdateRequest::Begin {
                     bytes: u16::from_le_bytes([a, b]),
+                    check: u16::from_le_bytes([b, a]),
                 }),
                 0,
             ),
             12 => {
                 let frame = BusFrame::new(Message::Command.id(), &[kind, a, b, 0, a, b, 0, kind]);
-                self.node.take(&frame.expect("eight bytes"));
+                self.receive(frame.expect("eight bytes"));
             }
             13 => self.node.reset(),
-            _ => {
-                for _ in 0..a {
-                    let _ = self.node.tick();
-                }
-            }
+            _ => (0..a).for_each(|_| self.tick()),
         }
-        if self.node.wants_reset() {
+        self.tick();
+        if self.node.is_to_be_reset() {
             self.node.reset();
         }
     }
@@ -106,23 +122,24 @@ fuzz_target!(|data: &[u8]| {
         return;
     };
     let key = (form & 1 == 1).then_some([7; 16]);
-    let node = Node::new("HS-0007", key, (SEQUENCE, PARAMS), u64::from(form));
+    let mut flash = FlashModel::erased();
+    flash.load(Sector::First, PARAMS);
     let mut bench = Bench {
-        node: node.expect("sound"),
+        node: Node::new(Some("HS-0007"), key, flash, u64::from(form)),
         numbers: Numbers::default(),
+        waiting: Vec::new(),
     };
-    let mut newest = SEQUENCE;
+    let mut records = 0;
     for step in data.as_chunks().0 {
         bench.step(*step);
-        let store = &bench.node.store;
-        let blob = store.newest().expect("there was one from the start");
-        assert!(blob == PARAMS || blob == NEW.as_slice());
-        assert!(
-            key.is_none() || store.writes() == 0,
-            "stored without the key"
-        );
-        assert!(store.newest_sequence() - newest <= 1);
-        newest = store.newest_sequence();
-        assert!(bench.node.status().is_some());
+        let now = bench.node.records();
+        assert!(now == records || now == records + 1);
+        assert!(key.is_none() || now == 0, "stored without the key");
+        if now != records {
+            records = now;
+            let blob = bench.node.newest();
+            assert!(blob.is_some_and(|blob| blob == PARAMS || blob == NEW.as_slice()));
+        }
     }
+    assert!(bench.node.newest().is_some());
 });
