@@ -1,6 +1,6 @@
 //! What changed between two parameter blobs: parameters, and the pose that the same codes give.
 
-use crate::report::json::{Parameter, parameters_in};
+use crate::report::parameters::{Parameter, parameters_in};
 use nalgebra::Matrix3;
 use runtime::{ParameterSet, PlanarPose, RawFrame};
 use std::collections::BTreeMap;

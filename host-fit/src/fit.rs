@@ -5,12 +5,14 @@
 
 mod compensate;
 mod cross_validation;
+mod error;
 mod field;
 mod settings;
 mod warning;
 
 pub use compensate::fit_compensated;
 pub use cross_validation::{CrossValidation, Split, cross_validate};
+pub use error::FitError;
 use field::FirstPhase;
 pub use field::field_calibration;
 pub use settings::{FitSettings, ModelChoice};
@@ -18,9 +20,7 @@ pub use warning::FitWarning;
 
 use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
-use crate::judge::identify::{
-    FitFailure, check_described, check_determined, check_explained, check_motion,
-};
+use crate::judge::identify::{check_described, check_determined, check_explained, check_motion};
 use crate::judge::lag::{ReferenceLag, reference_lag};
 use crate::judge::statistics::PoseError;
 use crate::judge::uncertainty::uncertainty;
@@ -30,63 +30,17 @@ use crate::problem::Problem;
 use crate::problem::draw::draw_rows;
 use crate::problem::model::{COUNT, Model};
 use crate::problem::parameters::Parameters;
-use crate::solve::field::error::FieldFitError;
 use crate::solve::field::fit::FieldFit;
 use crate::solve::robust::{HALF, Loss};
-use crate::solve::{Projection, Solution, SolveError, Solver};
+use crate::solve::{Projection, Solution, Solver};
 use runtime::calibration::Origin;
-use runtime::parameters::{FitRecord, ParameterError};
+use runtime::parameters::FitRecord;
 use runtime::{Calibration, ModelKind, ParameterSet};
 use std::cell::OnceCell;
 
 /// Room around the motion of the log in which the calibration still holds: offsets of
 /// the reference and overshoot are well inside it.
 pub(crate) const RANGE_MARGIN: f64 = 1.1;
-
-/// Why there is no calibration.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FitError {
-    /// The log cannot determine the model, or the model does not describe the log.
-    #[error(transparent)]
-    Failed(#[from] FitFailure),
-    /// The solver found nothing.
-    #[error(transparent)]
-    Solver(#[from] SolveError),
-    /// The field model cannot be fitted to the log, or not so that it serves.
-    #[error("{0}")]
-    Field(#[from] FieldFitError),
-    /// The fitted parameters put a row of the log next to a pole of 1/phi.
-    #[error(
-        "the {solver} search ended with a row of the log next to a pole of 1/phi, where nothing can be judged: let it run longer (--generations, --population), use --project delta or linear, or take the default solver"
-    )]
-    AtPole {
-        /// Name of the solver.
-        solver: &'static str,
-    },
-    /// The stage file has no range for a parameter that is fitted.
-    #[error(
-        "the table [search] of stage.toml has no range `{key}`, which model ({model}) needs: add it"
-    )]
-    NoRange {
-        /// Its key.
-        key: &'static str,
-        /// Name of the model.
-        model: &'static str,
-    },
-    /// The model has terms that no decoder of this program has.
-    #[error(
-        "no decoder of this program has all terms of model ({model}): it can be fitted, but not judged or used"
-    )]
-    NoDecoder {
-        /// Name of the model.
-        model: &'static str,
-    },
-    /// The fitted parameters cannot serve a decoder.
-    #[error(
-        "the fitted parameters cannot be used: {0}. Check the vertical motion in the log and the search ranges"
-    )]
-    Unusable(ParameterError),
-}
 
 /// A calibration with everything that is known about it.
 #[derive(Clone, Debug)]

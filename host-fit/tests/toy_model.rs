@@ -16,7 +16,7 @@ use host_fit::problem::model::{Model, SLOPES_MAX};
 use host_fit::problem::parameters::Parameters;
 use host_fit::problem::synthetic::Protocol;
 use host_fit::problem::terms::{MODEL_31, Motion, Term};
-use host_fit::report::json::parameters;
+use host_fit::report::parameters::parameters;
 use host_fit::solve::search::kind::SearchKind;
 use host_fit::solve::{Projection, Solver, SolverOptions};
 use runtime::ModelKind;

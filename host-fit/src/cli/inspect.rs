@@ -5,7 +5,7 @@ use crate::cli::terminal;
 use crate::output::blob_file;
 use crate::problem::model::Model;
 use crate::problem::terms::shown;
-use crate::report::json::parameters_in;
+use crate::report::parameters::parameters_in;
 use crate::report::provenance::hex;
 use clap::Args;
 use runtime::ParameterSet;

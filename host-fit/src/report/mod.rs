@@ -9,6 +9,7 @@ mod figures;
 pub mod html;
 pub mod json;
 pub mod page;
+pub mod parameters;
 pub mod plan;
 pub mod plan_page;
 pub mod plots;
