@@ -6,7 +6,7 @@ use firmware::fpu::FpuSettings;
 use firmware::node::{Facts, Node as Ticking, Parameters};
 use firmware::outbox::Outbox;
 use firmware::records::Records;
-use firmware::retained::{Retained, WORDS};
+use firmware::retained::{FaultKind, Retained, Step, WORDS};
 use firmware::schedule::PERIOD_US;
 use firmware::slots::Loaded;
 use firmware::start_up::{Before, Cause, PROVEN_TICKS};
@@ -105,6 +105,15 @@ impl Node {
     /// A reset that the program asked for: flash and retained RAM are kept, and all else is as the
     /// start-up makes it.
     pub fn reset(&mut self) {
+        self.start(Cause::Reset);
+    }
+
+    /// The program panics in a tick: its parameters are blamed for it, unless they are proven.
+    pub fn fault(&mut self) {
+        let mut record = Retained::from_words(&self.retained).unwrap_or_default();
+        record.step = Step::Ticking;
+        record.note(FaultKind::Panic, 0, 0);
+        self.retained = record.to_words();
         self.start(Cause::Reset);
     }
 

@@ -153,7 +153,8 @@ pub enum Outcome {
     NoRoom = 15,
     /// Words are missing; the detail is the index of the first.
     Incomplete = 16,
-    /// The store could not write; the records before stand.
+    /// The store could not write. What runs goes on; what runs from the next start on is the record
+    /// before, or the new one if the failure came after the word that makes it count: that start tells.
     StoreFailed = 17,
     /// No transfer is open with this token: never begun, aborted, or nothing came for 5 s.
     NoTransfer = 18,

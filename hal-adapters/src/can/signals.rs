@@ -205,7 +205,7 @@ pub(super) const COMMANDS: &[(u8, &str)] = &[
 pub(super) const COMMAND: [Signal; 3] = [
     named(signal("Command", (12, 4), U, "", "what is asked for"), COMMANDS),
     signal("Token", (16, 8), U, "", "chosen by the sender, another each time; returned in the answer; verify, commit and abort update: that of begin update"),
-    signal("Argument", (32, 32), U, "", "re-zero: ticks to average, 0 for the default; identify: s to blink; record: 1 on, 0 off; servo off: s, 0 for servo on; challenge: word of the nonce, 0 to 3; begin update: length in bytes, 0 to go back; verify and commit update: sequence number; read back: index of the word; tell: page; else 0"),
+    signal("Argument", (32, 32), U, "", "re-zero: ticks to average, 0 for the default; identify: s to blink; record: 1 on, 0 off; servo off: s, 0 for servo on; challenge: word of the nonce, 0 to 3; begin update: length in bytes (0 to go back) in bits 0 to 15, low half of the blob's CRC-32C in bits 16 to 31; verify and commit update: sequence number; read back: index of the word; tell: page; else 0"),
 ];
 
 #[rustfmt::skip]
@@ -216,7 +216,7 @@ pub(super) const ANSWER: [Signal; 4] = [
         signal("Outcome", (24, 8), U, "", "how it ended"),
         &[(0, "done"), (1, "started"), (2, "unknown command"), (3, "no parameters"), (4, "too short"), (5, "no pose"), (6, "stage moved"), (7, "stage drifted"), (8, "busy"), (9, "servo on: declare it off first"), (10, "out of bounds"), (11, "extrapolated"), (12, "not authorised"), (13, "bad content"), (14, "wrong sequence number"), (15, "no room: restart first"), (16, "incomplete"), (17, "store failed"), (18, "no transfer"), (19, "no random number")],
     ),
-    signal("Detail", (32, 32), U, "", "stage moved, drifted or out of bounds: axis, 0 to 5 for X, Y, Rz, Z, Rx, Ry; no pose or extrapolated: status; bad content: kind, as in the node's reason; wrong sequence number: the one that is taken; incomplete: the first missing index; challenge, read back, tell: the word asked for; else 0"),
+    signal("Detail", (32, 32), U, "", "stage moved, drifted or out of bounds: axis, 0 to 5 for X, Y, Rz, Z, Rx, Ry; no pose or extrapolated: status; bad content: kind, as in the node's reason; wrong sequence number: the one that is taken; incomplete: the first missing index; done: begin update: its argument, verify and commit update: the blob's CRC-32C, challenge, read back, tell: the word asked for; else 0"),
 ];
 
 #[rustfmt::skip]

@@ -6,7 +6,9 @@
 //! Tell {page}, ReadBack {k}   ->     who it is, what it runs
 //! Begin {bytes, check}        ->     a transfer is open, under the token of this command; the pose
 //!                                    is invalid until it ends. Done {bytes, check}, ServoOn, Busy,
-//!                                    NoRoom, StoreFailed, NoRandomNumber
+//!                                    BadContent (too long), NoParameters (nothing to go back to),
+//!                                    WrongSequence (another record to go back to), NoRoom,
+//!                                    StoreFailed, NoRandomNumber
 //! Challenge {0 to 3}          ->     the nonce of this transfer
 //! UpdateData, any order       ->     kept in RAM; the tag from index 240, where the node has a key
 //! Verify {sequence}           ->     Incomplete {first missing index}: send it and ask again;

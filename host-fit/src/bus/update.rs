@@ -72,8 +72,9 @@ pub enum UpdateError {
     /// The servo is on, as far as the node knows.
     #[error("{}", match declared {
         false => "the servo may be on: switch it off, and say so with --servo-off, which declares it for the time of the update",
-        true => "the controller does not take the servo for off: it has restarted, its service pin says on, or another \
-                 computer has declared it on. Nothing was stored. Look at the stage; once the servo is off, try again",
+        true => "the controller does not take the servo for off: it has restarted, its service pin says on, another \
+                 computer has declared it on, or 30 s ran out. Nothing was stored. Look at the stage; once the servo is off, \
+                 try again",
     })]
     ServoOn {
         /// Whether it was declared off.
@@ -152,7 +153,7 @@ pub enum UpdateError {
     /// The new parameters are stored, but the node was not reset.
     #[error(
         "the parameters are stored as number {sequence} and run from the next start on; they were not activated, because \
-         the servo may be on again. Once it is off, use `host-fit update --servo-off --activate`"
+         the servo may be on again, or another computer is updating. Once it is off and the other one done, use `host-fit update --servo-off --activate`"
     )]
     NotActivated {
         /// Their sequence number.
@@ -160,9 +161,19 @@ pub enum UpdateError {
     },
     /// The new parameters do not run.
     #[error(
-        "the parameters are stored as number {sequence}, but the controller does not run them after its reset; see `host-fit identify`"
+        "the parameters are stored as number {sequence}, but the controller does not run them after its reset, or has \
+         passed them over because they made its program fail: see `host-fit identify`"
     )]
     NotActive {
+        /// Their sequence number.
+        sequence: u32,
+    },
+    /// The new parameters are stored, and then nobody answered.
+    #[error(
+        "the parameters are stored as number {sequence}, and the controller has not answered for 3 s since: is it on? See \
+         what it runs with `host-fit identify`"
+    )]
+    Silent {
         /// Their sequence number.
         sequence: u32,
     },

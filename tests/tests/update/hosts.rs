@@ -6,7 +6,7 @@ use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request, Told};
 use hal_adapters::can::update::{UpdateData, UpdateRequest};
 use hal_adapters::fault::Fault;
-use host_fit::bus::update::{Dialog, Plan, UpdateError, Updater};
+use host_fit::bus::update::{Dialog, Plan, UpdateError, Updated, Updater};
 
 #[test]
 fn of_two_hosts_at_once_one_wins_and_the_other_is_told() {
@@ -150,7 +150,6 @@ fn with_three(seed: u64) -> (World, Vec<u8>) {
 #[test]
 fn a_lost_answer_to_a_commit_is_settled_by_asking_what_the_node_keeps() {
     let (mut world, _) = with_three(1);
-    const COMMIT: u8 = UpdateRequest::Commit { sequence: 0 }.number();
     world.loses = |answer| answer.number == COMMIT && answer.outcome == Some(Outcome::Done);
     let updated = world.update(back()).expect("it is stored");
     assert_eq!((updated.sequence, updated.record), (Some(3), 3));
@@ -160,6 +159,158 @@ fn a_lost_answer_to_a_commit_is_settled_by_asking_what_the_node_keeps() {
     let updated = world.update(plan(&third)).expect("it is stored");
     assert_eq!(updated.sequence, Some(4));
     assert_eq!((world.newest(), world.node.records()), (&third[..], 4));
+}
+
+/// An update, and what another host asks for once its record is stored; `before` it begins, that host
+/// asks for this.
+fn beside(
+    world: &mut World,
+    plan: Plan,
+    before: Option<Request>,
+    then: (Request, u8),
+) -> Result<Updated, UpdateError> {
+    let mut other = Mailbox::default();
+    let mut send = |world: &mut World, request, token| {
+        let told = Told::Command(Command::new(request, token));
+        let coded = other.send(&told).expect("a known message");
+        world.to_node.send(world.now_us, BusFrame::from(coded));
+    };
+    if let Some(request) = before {
+        send(world, request, 3);
+        (0..100).for_each(|_| drop(world.slot()));
+    }
+    let mut then = Some(then);
+    let records = world.node.records();
+    let mut host = Dialog::new(Updater::new(plan), 1);
+    while !host.is_over() {
+        for frame in world.slot() {
+            host.take(&frame, world.now_us);
+        }
+        if world.node.records() > records
+            && let Some((request, token)) = then.take()
+        {
+            send(world, request, token);
+        }
+        if let Some(coded) = host.poll(world.now_us) {
+            world.to_node.send(world.now_us, BusFrame::from(coded));
+        }
+    }
+    host.into_job().result()
+}
+
+const ACTIVATE: u8 = UpdateRequest::Activate.number();
+const COMMIT: u8 = UpdateRequest::Commit { sequence: 0 }.number();
+
+fn begin() -> (Request, u8) {
+    (Request::Update(UpdateRequest::begin(500, 0)), 200)
+}
+
+#[test]
+fn a_commit_of_which_the_answer_is_lost_is_no_failure_where_another_host_begins() {
+    let mut world = World::new(Some(KEY), &[], 6);
+    world.loses = |answer| answer.number == COMMIT && answer.outcome == Some(Outcome::Done);
+    let updated = beside(&mut world, plan(NEW), None, begin()).expect("it is stored");
+    assert_eq!((updated.sequence, world.newest()), (Some(1), NEW));
+    // The other one's transfer is left alone.
+    assert!(world.node.is_updating());
+}
+
+#[test]
+fn what_is_stored_is_activated_once_another_host_is_done() {
+    let mut world = World::new(Some(KEY), &[], 6);
+    let activating = Plan {
+        activates: true,
+        ..plan(NEW)
+    };
+    let updated = beside(&mut world, activating, None, begin()).expect("it runs");
+    assert_eq!((updated.sequence, updated.is_active), (Some(1), true));
+    assert_eq!(world.node.resets(), 1);
+}
+
+#[test]
+fn what_is_stored_and_not_activated_is_told_as_stored() {
+    let on_the_word_of_another = Plan {
+        activates: true,
+        declares_servo_off: false,
+        ..plan(NEW)
+    };
+    let off = |seconds| Request::ServoOff { seconds };
+    let mut world = World::new(Some(KEY), &[], 6);
+    let (before, then) = (Some(off(255)), (off(0), 4));
+    let refused = beside(&mut world, on_the_word_of_another.clone(), before, then);
+    assert_eq!(refused, Err(UpdateError::NotActivated { sequence: 1 }));
+    // The answer is lost, and the declaration with the reset: the parameters run.
+    let mut world = World::new(Some(KEY), &[], 6);
+    world.loses = |answer| answer.number == ACTIVATE && answer.outcome == Some(Outcome::Done);
+    let then = (off(255), 4);
+    let updated = beside(&mut world, on_the_word_of_another, before, then).expect("it runs");
+    assert_eq!((updated.sequence, updated.is_active), (Some(1), true));
+}
+
+#[test]
+fn where_nobody_answers_after_the_commit_it_is_told_as_stored() {
+    let mut world = World::new(Some(KEY), &[], 6);
+    world.loses = |answer| answer.number == ACTIVATE;
+    let activating = Plan {
+        activates: true,
+        ..plan(NEW)
+    };
+    let silent = Err(UpdateError::Silent { sequence: 1 });
+    assert_eq!(world.update(activating), silent);
+}
+
+#[test]
+fn after_an_update_that_waited_for_another_host_the_servo_is_on_again() {
+    let mut world = World::new(Some(KEY), &[], 6);
+    let mut other = Mailbox::default();
+    for (request, token) in [(Request::ServoOff { seconds: 255 }, 3), begin()] {
+        let told = Told::Command(Command::new(request, token));
+        let coded = other.send(&told).expect("a known message");
+        world.to_node.send(world.now_us, BusFrame::from(coded));
+        (0..100).for_each(|_| drop(world.slot()));
+    }
+    assert!(world.node.is_updating());
+    let updated = world.update(plan(NEW)).expect("it is stored");
+    assert_eq!(updated.sequence, Some(1));
+    let on = Plan {
+        declares_servo_off: false,
+        token: 50,
+        ..back()
+    };
+    let refused = world.update(on);
+    assert_eq!(refused, Err(UpdateError::ServoOn { declared: false }));
+}
+
+#[test]
+fn parameters_that_fault_after_their_first_look_are_not_told_as_running() {
+    let mut world = World::new(Some(KEY), &[], 6);
+    let activating = Plan {
+        activates: true,
+        ..plan(NEW)
+    };
+    let mut host = Dialog::new(Updater::new(activating), 1);
+    let mut faults_us = Vec::new();
+    while !host.is_over() {
+        for frame in world.slot() {
+            host.take(&frame, world.now_us);
+        }
+        if world.node.resets() == 1 && faults_us.is_empty() {
+            // Just before they count as proven, twice.
+            faults_us = vec![world.now_us + 1_400_000, world.now_us + 2_800_000];
+        }
+        if faults_us
+            .iter()
+            .any(|at| world.now_us / SLOT_US == at / SLOT_US)
+        {
+            world.fault();
+        }
+        if let Some(coded) = host.poll(world.now_us) {
+            world.to_node.send(world.now_us, BusFrame::from(coded));
+        }
+    }
+    assert_eq!((world.node.resets(), world.newest()), (3, OLD));
+    let (result, sequence) = (host.into_job().result(), 1);
+    assert_eq!(result, Err(UpdateError::NotActive { sequence }));
 }
 
 #[test]

@@ -155,6 +155,13 @@ impl World {
         self.to_hosts.arrived(self.now_us)
     }
 
+    /// The program faults, and is deaf until its next start.
+    pub fn fault(&mut self) {
+        self.node.fault();
+        self.fifo.clear();
+        self.deaf_until_us = self.now_us + START_US;
+    }
+
     /// Runs dialogs to their ends; two hosts hear each other.
     pub fn run<J: Job>(&mut self, hosts: &mut [Dialog<J>]) {
         let until_us = self.now_us + 120_000_000;

@@ -33,6 +33,8 @@ struct Watched {
     expected: Vec<Vec<u8>>,
     /// The CRC-32C that the last verification told.
     verified: Option<u32>,
+    /// Whether the test notes every verification: nothing is written without one.
+    notes_verified: bool,
     went_back: bool,
     room: bool,
     fails: bool,
@@ -74,6 +76,7 @@ impl Store for Watched {
             }
             Change::Previous => self.previous().map(|kept| kept.crc),
         };
+        assert!(self.verified.is_some() || !self.notes_verified);
         assert!(crc.is_some() && self.verified.is_none_or(|verified| crc == Some(verified)));
         self.went_back = change == Change::Previous;
         if self.fails {
@@ -98,6 +101,7 @@ impl Bench {
                 inner: MemoryStore::holding(3, OLD).expect("a sound example"),
                 expected: [NEW.to_vec()].to_vec(),
                 verified: None,
+                notes_verified: false,
                 went_back: false,
                 room: true,
                 fails: false,

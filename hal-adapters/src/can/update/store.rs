@@ -44,7 +44,8 @@ pub enum Written {
     InProgress,
     /// The record is whole, committed and read back.
     Done,
-    /// It could not be written: the records before it stand.
+    /// It could not be written. The next start settles whether the record counts; until then the one
+    /// before is the newest.
     Failed,
 }
 

@@ -62,23 +62,36 @@ impl RunningParameters {
 pub(super) struct Pages {
     /// `None`: the node has no parameters, and so no such page.
     words: Vec<Option<u32>>,
+    /// Whether the number of the next record was the same after its check was told.
+    is_settled: bool,
 }
 
 impl Pages {
     /// What to ask for next; `None` once every page is there.
     pub(super) fn next(&self) -> Option<Request> {
-        let page = u8::try_from(self.words.len()).ok()?;
+        let page = match u8::try_from(self.words.len()).ok()? {
+            // Between the two pages another host may have stored a record.
+            page::PREVIOUS if !self.is_settled => page::NEXT,
+            page => page,
+        };
         (page < page::COUNT).then_some(Request::Update(UpdateRequest::Tell { page }))
     }
 
     /// Takes the answer to the last request.
     pub(super) fn take(&mut self, outcome: Option<Outcome>, word: u32) -> Result<(), UpdateError> {
-        self.words.push(match outcome {
+        let word = match outcome {
             Some(Outcome::Done) => Some(word),
             Some(Outcome::NoParameters) => None,
             Some(Outcome::UnknownCommand) => return Err(UpdateError::TellsNothing),
             outcome => return Err(UpdateError::Unexpected { outcome }),
-        });
+        };
+        if self.words.len() != usize::from(page::PREVIOUS) || self.is_settled {
+            self.words.push(word);
+        } else if word == self.word(page::NEXT) {
+            self.is_settled = true;
+        } else {
+            self.words.clear();
+        }
         Ok(())
     }
 
@@ -180,5 +193,33 @@ impl Job for Identifier {
 
     fn interrupt(&mut self) -> bool {
         self.failure.replace(UpdateError::Interrupted).is_none()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_the_next_record_changes_between_its_pages_all_are_asked_anew() {
+        let (mut pages, mut asked) = (Pages::default(), 0);
+        let told = |page, asked| match page {
+            // Another host stores number 8 once the number was told.
+            page::NEXT if asked <= 31 => 7,
+            page::NEXT => 8,
+            page if page == page::NEXT + 1 => 0x88,
+            page => page.into(),
+        };
+        while let Some(request) = pages.next() {
+            asked += 1;
+            let Request::Update(UpdateRequest::Tell { page }) = request else {
+                panic!("{request:?}");
+            };
+            let taken = pages.take(Some(Outcome::Done), told(page, asked));
+            assert_eq!(taken, Ok(()));
+        }
+        let (sequence, crc) = (8, 0x88);
+        assert_eq!(pages.identity().next, Some(Kept { sequence, crc }));
+        assert_eq!(asked, 33 + 35);
     }
 }

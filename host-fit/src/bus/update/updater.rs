@@ -11,6 +11,13 @@ use super::plan::{Plan, Updated};
 
 /// How often a transfer that came to nothing, damaged or forgotten, is begun anew.
 const RESTARTS_MAX: u32 = 3;
+/// Pause before a node is asked again whether another host is done, us.
+const BUSY_US: u64 = 500_000;
+/// How often: longer than a node waits for a silent host.
+const BUSY_MAX: u32 = 14;
+/// Pause between the two looks at what a node runs after its reset, us. Parameters that make it
+/// fault in their first 500 ticks, twice, are passed over by then.
+const PROVEN_US: u64 = 2_500_000;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
@@ -42,6 +49,8 @@ enum ServoOff {
     Left,
     /// The node takes the servo for on all the same.
     Lost,
+    /// Not declared by this host, and the node takes the servo for on.
+    Missing,
 }
 
 /// Updates a node: who is there, the servo declared off, the blob transferred, verified and
@@ -64,6 +73,10 @@ pub struct Updater {
     /// Whether it was stored by this update.
     is_stored: bool,
     is_active: bool,
+    /// Whether the node was asked to reset itself.
+    has_activated: bool,
+    /// Whether it ran the new parameters when it was first asked.
+    has_run: bool,
     pause_us: Option<u64>,
     /// How often the phase was tried.
     tries: u32,
@@ -88,6 +101,8 @@ impl Updater {
             record: None,
             is_stored: false,
             is_active: false,
+            has_activated: false,
+            has_run: false,
             pause_us: None,
             tries: 0,
             busy: 0,
@@ -165,6 +180,30 @@ impl Updater {
         self.go(Phase::Identify);
     }
 
+    /// Another host is at it: asks again later, unless that was done often enough.
+    fn wait_for_another(&mut self, error: UpdateError) {
+        self.leave_servo_off();
+        if self.busy == BUSY_MAX {
+            return self.fail(error);
+        }
+        self.busy += 1;
+        self.ask_again();
+        self.pause_us = Some(BUSY_US);
+    }
+
+    /// The node runs what is wanted. New parameters may still make it fault: they count as running
+    /// if they do when it could have faulted twice.
+    fn runs(&mut self) {
+        if self.has_activated && !self.has_run {
+            self.has_run = true;
+            self.go(Phase::Restarted);
+            self.pause_us = Some(PROVEN_US);
+        } else {
+            self.is_active = true;
+            self.close();
+        }
+    }
+
     /// The transfer came to nothing: once more from the start, unless that was tried often enough.
     fn restart(&mut self, error: UpdateError) {
         self.is_open = false;
@@ -211,8 +250,9 @@ impl Updater {
             Ok(Found::Record { sequence, runs }) => {
                 self.record = Some(sequence);
                 self.is_stored |= was_committing && sequence == self.wanted().0;
-                self.is_active = runs;
-                if runs || !self.plan.activates {
+                if runs {
+                    self.runs();
+                } else if !self.plan.activates {
                     self.close();
                 } else {
                     self.go_with_servo_off(Phase::Activate);
@@ -227,7 +267,12 @@ impl Updater {
 
     fn go_with_servo_off(&mut self, phase: Phase) {
         match (self.servo_off, self.record) {
-            (ServoOff::Lost, Some(sequence)) => self.fail(UpdateError::NotActivated { sequence }),
+            (ServoOff::Missing, _) if !self.is_stored => {
+                self.fail(UpdateError::ServoOn { declared: false });
+            }
+            (ServoOff::Lost | ServoOff::Missing, Some(sequence)) => {
+                self.fail(UpdateError::NotActivated { sequence });
+            }
             (ServoOff::Lost, None) => self.fail(UpdateError::ServoOn { declared: true }),
             (ServoOff::NotDeclared, _) if self.plan.declares_servo_off => self.go(Phase::ServoOff),
             _ => self.go(phase),

@@ -1,6 +1,6 @@
 //! New parameters over the bus: the host's own dialog against the program and its flash.
 
-use super::commands::{SERVO_OFF, answers};
+use super::commands::{SERVO_OFF, answers, ask};
 use super::figures::CYCLES_PER_INSTRUCTION;
 use super::log::Stage;
 use super::parameters::{FIELD, poses_of};
@@ -17,7 +17,9 @@ use hal_adapters::can::command::{Mailbox, Outcome as Ended, Request, Told};
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{Key, TAG_INDEX, UpdateData, UpdateRequest};
 use hal_adapters::can::{BusFrame, Coded};
-use host_fit::bus::update::{BlobReader, Dialog, Job, Plan, UpdateError, Updated, Updater, Wanted};
+use host_fit::bus::update::{
+    BlobReader, Dialog, Identifier, Job, Plan, UpdateError, Updated, Updater, Wanted,
+};
 use runtime::blob::MAX_BYTES;
 use runtime::parameters::Text;
 use runtime::{ParameterSet, Status};
@@ -252,6 +254,19 @@ pub fn refused(bench: &Bench) -> Outcome {
         &mut machine,
         &[(request(UpdateRequest::Abort), 104, Ended::Done)],
     )?;
+    let mut words = Vec::new();
+    for token in [106, 108] {
+        let begin = request(UpdateRequest::begin(1, 0));
+        answers(&mut machine, &[(begin, token, Ended::Done)])?;
+        let challenge = request(UpdateRequest::Challenge { part: 0 });
+        let seen = ask(&mut machine, challenge, token + 1, 10)?;
+        words.extend(seen.answers.iter().map(|(_, answer)| answer.detail));
+        let abort = request(UpdateRequest::Abort);
+        answers(&mut machine, &[(abort, token, Ended::Done)])?;
+    }
+    expect(matches!(words[..], [one, two] if one != two), || {
+        format!("two transfers have the nonces {words:x?}")
+    })?;
     machine.chip.random.broken = true;
     let (refused, _) = update(&mut machine, plan(&bench.blob, 4))?;
     expect(matches!(refused, Err(UpdateError::NoRandomNumber)), || {
@@ -298,12 +313,17 @@ pub(super) fn about_to_crash(bench: &Bench) -> Result<Machine, Failure> {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.hook_injection(bench.image(PART).address(TICK)?)?;
     machine.run_ticks(20)?;
-    let activates = Plan {
-        activates: true,
-        ..plan(&bench.later, 1)
-    };
-    let (updated, _) = update(&mut machine, activates)?;
-    equal("active", updated?.is_active, true)?;
+    update(&mut machine, plan(&bench.later, 1))?.0?;
+    // Not by the host, which waits until they are proven.
+    let activate = Request::Update(UpdateRequest::Activate);
+    let asked = [(SERVO_OFF, 97, Ended::Done), (activate, 98, Ended::Done)];
+    answers(&mut machine, &asked)?;
+    machine.run_ticks(10)?;
+    let (job, _) = talk(&mut machine, Identifier::default(), 90)?;
+    let runs = job.result()?.running;
+    expect(runs.is_some_and(|runs| runs.are(&bench.later)), || {
+        "the new ones do not run".to_owned()
+    })?;
     Ok(machine)
 }
 

@@ -8,10 +8,6 @@ use hal_adapters::can::update::{TAG_INDEX, UpdateRequest, page};
 
 /// How long the servo is declared off: longer than an update takes, on a bad bus too.
 const SERVO_OFF_S: u8 = 30;
-/// Pause before a node is asked again whether another host is done, us.
-const BUSY_US: u64 = 500_000;
-/// How often: longer than a node waits for a silent host.
-const BUSY_MAX: u32 = 14;
 /// How often one transfer is verified: each time names a word that was lost.
 const VERIFIED_MAX: u32 = 1_000;
 /// Pause before a node is asked again whether it runs the new parameters, us.
@@ -59,12 +55,7 @@ impl Updater {
                     self.fill();
                 }
             }
-            Outcome::Busy if self.busy < BUSY_MAX => {
-                self.busy += 1;
-                self.leave_servo_off();
-                self.ask_again();
-                self.pause_us = Some(BUSY_US);
-            }
+            Outcome::Busy => self.wait_for_another(UpdateError::Busy),
             Outcome::NoParameters => self.fail(UpdateError::NoPrevious),
             outcome => self.refused(outcome, detail),
         }
@@ -104,6 +95,10 @@ impl Updater {
         self.is_committing = false;
         self.is_stored = true;
         self.record = Some(self.wanted().0);
+        if self.servo_off == ServoOff::Left {
+            // The other host that was at it is done.
+            self.servo_off = ServoOff::Declared;
+        }
         if self.plan.activates {
             self.go(Phase::Activate);
         } else {
@@ -125,9 +120,8 @@ impl Updater {
     }
 
     fn compared(&mut self, outcome: Outcome, detail: u32) {
-        self.is_active = (outcome, detail) == (Outcome::Done, self.wanted().1);
-        if self.is_active {
-            return self.close();
+        if (outcome, detail) == (Outcome::Done, self.wanted().1) {
+            return self.runs();
         }
         let sequence = self.record.unwrap_or_default();
         self.fail(UpdateError::NotActive { sequence });
@@ -136,15 +130,22 @@ impl Updater {
     /// What any request of a transfer may be answered with.
     fn refused(&mut self, outcome: Outcome, detail: u32) {
         match outcome {
-            Outcome::ServoOn if self.servo_off == ServoOff::NotDeclared => {
-                self.fail(UpdateError::ServoOn { declared: false });
-            }
             // The answer to what was asked before may be lost: the node tells what came of it.
             Outcome::ServoOn => {
-                self.servo_off = ServoOff::Lost;
+                self.servo_off = match self.servo_off {
+                    ServoOff::NotDeclared | ServoOff::Missing => ServoOff::Missing,
+                    _ => ServoOff::Lost,
+                };
                 self.ask_again();
             }
-            Outcome::Busy => self.fail(UpdateError::Busy),
+            Outcome::Busy if self.is_committing => {
+                self.leave_servo_off();
+                self.ask_again();
+            }
+            Outcome::Busy => self.wait_for_another(match self.record {
+                Some(sequence) => UpdateError::NotActivated { sequence },
+                None => UpdateError::Busy,
+            }),
             Outcome::NoRoom => self.fail(UpdateError::NoRoom),
             Outcome::NoRandomNumber => self.fail(UpdateError::NoRandomNumber),
             Outcome::NotAuthorised => self.restart(UpdateError::NotAuthorised),
@@ -208,6 +209,7 @@ impl Job for Updater {
         let Some(outcome) = outcome else {
             return self.fail(UpdateError::Unexpected { outcome });
         };
+        self.has_activated |= self.phase == Phase::Activate;
         match (self.phase, outcome) {
             (Phase::ServoOff, _) => {
                 self.servo_off = ServoOff::Declared;
@@ -272,7 +274,7 @@ impl Job for Updater {
                 self.servo_off = ServoOff::Left;
                 self.fail(match record {
                     _ if self.is_committing => UpdateError::Unknown,
-                    Some(sequence) => UpdateError::NotActive { sequence },
+                    Some(sequence) => UpdateError::Silent { sequence },
                     None => UpdateError::NoAnswer,
                 });
             }
