@@ -83,6 +83,7 @@ impl Node {
             let mut record = Retained::from_words(&self.retained).unwrap_or_default();
             record.prove();
             self.retained = record.to_words();
+            self.records.prove();
         }
         (self.ticking).update(&mut self.outbox, &mut self.records);
     }

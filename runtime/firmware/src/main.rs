@@ -288,6 +288,7 @@ mod app {
         zero.keep(node.zero());
         if node.ticks() == PROVEN_TICKS {
             fault::update(Retained::prove);
+            records.prove();
         }
         node.update(&mut bus.outbox, records);
         bus.send();
