@@ -158,8 +158,9 @@ fn start(
     let check = before.check(serial, |_| ());
     let (mut records, found) = Records::start(flash, record, check, before.blames_newest());
     let place = Box::leak(Box::new(None));
-    let loaded = found.blob.and_then(|blob| records.load(blob, place));
     let is_sound = runtime::arithmetic::check().is_ok();
+    let runs = found.blob.filter(|_| is_sound);
+    let loaded = runs.and_then(|blob| records.load(blob, place));
     let parameters = Parameters::at_start(loaded, found.refusal, is_sound);
     let identity = Identity {
         serial,
