@@ -46,15 +46,8 @@ impl<F: Flash> Records<F> {
         is_faulty: bool,
     ) -> (Self, Found) {
         let mut check = check.into();
-        // As long as the plain blobs are there: the start may erase one.
-        let plain = |flash: &F, check: &Check, with_blobs_only: bool| {
-            let memory = |sector| match store::readable(flash, sector) {
-                memory if with_blobs_only && !memory.starts_with(&MAGIC) => &[],
-                memory => memory,
-            };
-            slots::refusal(Sector::ALL.map(memory), check)
-        };
-        let damaged = plain(&flash, &check, true);
+        // The start may erase a blob, and may renew what is neither a blob nor a journal.
+        let damaged = plain(&flash, &check, |memory| memory.starts_with(&MAGIC));
         let newest = is_faulty
             .then(|| Store::read(&flash, check))
             .and_then(|store| Some((store.newest()?, store.passed_over().is_some())));
@@ -78,7 +71,7 @@ impl<F: Flash> Records<F> {
         };
         let has_faulted = check.suspect.is_some() || is_last;
         let refusal = (records.refusal(has_faulted).or(damaged))
-            .or_else(|| plain(&records.flash, &check, false));
+            .or_else(|| plain(&records.flash, &check, |_| true));
         (records, Found { blob, refusal })
     }
 
@@ -159,6 +152,17 @@ impl<F: Flash> Records<F> {
         self.writing = Some(self.store.begin(&self.flash, self.record).ok()?);
         Some(())
     }
+}
+
+/// What is wrong with the plain contents of the sectors that are looked at.
+#[inline(never)]
+fn plain(flash: &impl Flash, check: &Check, is_looked_at: fn(&[u8]) -> bool) -> Option<Refusal> {
+    let memory =
+        |sector| Some(store::readable(flash, sector)).filter(|memory| is_looked_at(memory));
+    slots::refusal(
+        Sector::ALL.map(|sector| memory(sector).unwrap_or_default()),
+        check,
+    )
 }
 
 impl<F: Flash> update::Store for Records<F> {

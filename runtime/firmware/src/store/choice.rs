@@ -7,6 +7,7 @@ use runtime::blob::{BlobError, MAGIC};
 
 impl Store {
     /// Looks at the sectors as they are and writes nothing: [`Store::begin`] then refuses.
+    #[inline(never)]
     pub fn read(flash: &impl Flash, check: impl Into<Check>) -> Self {
         let mut store = Self {
             check: check.into(),

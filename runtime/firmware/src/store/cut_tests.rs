@@ -16,7 +16,7 @@ const SEEDS: u64 = 64;
 enum Action {
     Update(Vec<u8>),
     GoBack,
-    PassOver,
+    PassOver(Vec<u8>),
     Prove,
 }
 
@@ -125,13 +125,17 @@ fn plain(blobs: &[(Sector, usize)]) -> FlashModel {
 
 /// Starts, does the action, and says whether its end was told.
 fn run(flash: &mut FlashModel, action: &Action) -> bool {
-    let mut store = Store::start(flash, SERIAL);
+    let mut check = Check::from(SERIAL);
+    if let Action::PassOver(blob) = action {
+        check.suspect = stored_crc(blob);
+    }
+    let mut store = Store::start(flash, check);
     store.prove(flash);
     let mut record = Record::EMPTY;
     let made = match action {
         Action::Update(blob) => return update(&mut store, flash, blob).is_ok(),
         Action::GoBack => store.go_back(flash, &mut record),
-        Action::PassOver => store.pass_over(flash, &mut record),
+        Action::PassOver(_) => store.pass_over(flash, &mut record),
         Action::Prove => return !flash.is_off(),
     };
     made.and_then(|()| write(&mut store, flash, &record))
@@ -239,7 +243,7 @@ fn going_back_and_passing_over_survive_any_cut() {
     let mut cuts = 0;
     for (name, action) in [
         ("going back", Action::GoBack),
-        ("passing over", Action::PassOver),
+        ("passing over", Action::PassOver(blob(2))),
     ] {
         let found = [Some(2), Some(1)];
         let flash = journal(3);

@@ -57,7 +57,9 @@
 //!   start erases the other sector, and the blob before is lost if it was there: of two plain
 //!   blobs, which each count as a full sector; after some eleven interrupted updates in a row
 //!   (each takes up to 23 of the 255 units); after one and the same blob was written so often
-//!   that it fills the sector. It is not lost before the newest has run ([`Store::prove`]).
+//!   that it fills the sector. It is not lost before the newest has run ([`Store::prove`]). If the newest makes the
+//!   program fault instead, the blob before runs in its place after every start, and no record
+//!   says so, for there is no room: only a probe makes some.
 //! - [`Store::start`] alone erases, and only if neither sector has room for the largest record.
 //!   There is always room for one update after it, unless no sector may be erased or none can
 //!   ([`Store::is_writable`]), or the newest blob has yet to run. When there is none left,
@@ -185,7 +187,7 @@ impl Store {
             if store.place_for(flash, MAX_UNITS).is_some() {
                 break;
             }
-            if store.is_fallback(flash, spare) {
+            if store.is_kept(flash, spare) {
                 store.writable = true;
                 break;
             }
@@ -245,6 +247,7 @@ impl Store {
     }
 
     /// Where so many units go: the active sector first.
+    #[inline(never)]
     fn place_for(&self, flash: &impl Flash, units: usize) -> Option<(Sector, usize)> {
         [self.active, self.active.other()]
             .into_iter()

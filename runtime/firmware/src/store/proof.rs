@@ -31,21 +31,28 @@ fn is_proven(flash: &impl Flash, blob: Stored) -> bool {
 }
 
 impl Store {
-    /// Whether a sector holds the blob before the newest, and the newest is not known to have run.
+    /// Whether a sector holds the blob before the newest, and the newest is not known to have run; or
+    /// the blob that is suspected, in place of which the newest runs.
     #[inline(never)]
-    pub(super) fn is_fallback(&self, flash: &impl Flash, sector: Sector) -> bool {
-        // What a start falls back to has run before.
-        self.check.suspect.is_none()
-            && (self.previous).is_some_and(|previous| previous.sector == sector)
+    pub(super) fn is_kept(&self, flash: &impl Flash, sector: Sector) -> bool {
+        if self.check.suspect.is_some() {
+            // After a cut of the power, when nobody suspects it any more, the first word of that
+            // sector might read as it was at one start and not at the next.
+            let of_suspect = |blob: super::Rejected| blob.sector == sector;
+            return self.newest.is_some() && self.rejected.is_some_and(of_suspect);
+        }
+        (self.previous).is_some_and(|previous| previous.sector == sector)
             && (self.newest).is_some_and(|newest| !is_proven(flash, newest))
     }
 
     /// Takes note that [`Store::newest`] has run long enough to be proven. Programs one word, two if
     /// the first is worn, and only if the next start could otherwise make no room.
     pub fn prove(&self, flash: &mut impl Flash) {
-        let Some(newest) = self.newest else { return };
+        let Some(newest) = self.newest.filter(|_| self.check.suspect.is_none()) else {
+            return;
+        };
         let sector = newest.sector;
-        if self.place_for(flash, MAX_UNITS).is_some() || !self.is_fallback(flash, sector.other()) {
+        if self.place_for(flash, MAX_UNITS).is_some() || !self.is_kept(flash, sector.other()) {
             return;
         }
         let crc = stored_crc(newest.blob(flash)).unwrap_or(BLANK);

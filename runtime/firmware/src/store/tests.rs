@@ -259,6 +259,13 @@ fn going_back_can_be_undone_and_what_was_passed_over_never_comes_back() {
         assert_eq!(found(&store, &flash), Some(blob(expected)));
     }
     // 4, 6 and 8 hold blob 3; passing it over falls back to 7 with blob 2. 2 holds blob 1.
+    assert_eq!(
+        store.pass_over(&flash, &mut record),
+        Err(Refused::NoPrevious)
+    );
+    let mut check = Check::from(SERIAL);
+    check.suspect = stored_crc(&blob(3));
+    let mut store = Store::start(&mut flash, check);
     assert_eq!(store.pass_over(&flash, &mut record), Ok(()));
     assert_eq!(write(&mut store, &mut flash, &record), Ok(()));
     let store = Store::start(&mut flash, SERIAL);
