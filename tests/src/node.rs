@@ -88,6 +88,7 @@ impl Node {
             let mut record = Retained::from_words(&self.retained).unwrap_or_default();
             record.prove();
             self.retained = record.to_words();
+            self.records.prove();
         }
         (self.ticking).update(&mut self.outbox, &mut self.records);
     }
@@ -193,8 +194,9 @@ fn start(
     // No check of a blob faults here, whose CRC the next start had to know.
     let check = before.check(serial, |_| ());
     let (mut records, found) = Records::start(flash, record, check, before.blames_newest());
-    let loaded = found.blob.and_then(|blob| records.load(blob, place));
     let is_sound = runtime::arithmetic::check().is_ok();
+    let runs = found.blob.filter(|_| is_sound);
+    let loaded = runs.and_then(|blob| records.load(blob, place));
     let parameters = Parameters::at_start(loaded, found.refusal, is_sound);
     let identity = Identity {
         serial,

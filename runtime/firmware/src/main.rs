@@ -128,14 +128,14 @@ mod app {
         });
         let (mut records, found) = Records::start(sectors, cx.local.record, check, is_faulty);
         let program_hash = flash::program_crc();
-        let loaded = found
-            .blob
-            .and_then(|blob| records.load(blob, cx.local.loaded));
-        watchdog.set_period(CORE_MHZ, false, &mut stopwatch);
-        let blob = loaded.map_or(0, |loaded| loaded.crc);
         // After a warm start the FPU may have any settings; with these the arithmetic is the host's.
         Fpu.restore();
         let sound = runtime::arithmetic::check().is_ok() && Fpu::defaults_are_sound();
+        // What does not decode does not run.
+        let runs = found.blob.filter(|_| sound);
+        let loaded = runs.and_then(|blob| records.load(blob, cx.local.loaded));
+        watchdog.set_period(CORE_MHZ, false, &mut stopwatch);
+        let blob = loaded.map_or(0, |loaded| loaded.crc);
         let parameters = Parameters::at_start(loaded, found.refusal, sound);
         let identity = Identity {
             serial: board::stage_serial(),
@@ -288,6 +288,7 @@ mod app {
         zero.keep(node.zero());
         if node.ticks() == PROVEN_TICKS {
             fault::update(Retained::prove);
+            records.prove();
         }
         node.update(&mut bus.outbox, records);
         bus.send();

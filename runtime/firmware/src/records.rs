@@ -4,6 +4,7 @@
 use crate::slots::{self, Loaded, Refusal};
 use crate::store::{self, Check, Flash, Record, Sector, Step, Store, Stored, Writing};
 use hal_adapters::can::update::{self, Change, Kept, Running, Written, crc_of};
+use runtime::blob::MAGIC;
 
 /// Words that are programmed in one tick: 0.2 ms at most on an STM32F405 (DS8626, flash memory
 /// programming), in which the core stands.
@@ -35,6 +36,7 @@ impl<F: Flash> Records<F> {
     /// room for an update (500 ms at most, on an STM32F405). `is_faulty` is whether the newest blob
     /// made the program fault twice, [`Check::suspect`] a blob whose check did. Then another one is
     /// used, from now on if that can be written, else until the next start. If there is no other,
+    /// or the newest record itself passes over another, whose faults then had another cause,
     /// none is used, and the next start tries again. `record` is the room in which records are put
     /// together.
     pub fn start(
@@ -43,8 +45,16 @@ impl<F: Flash> Records<F> {
         check: impl Into<Check>,
         is_faulty: bool,
     ) -> (Self, Found) {
-        let check = check.into();
-        let plain = slots::refusal(Sector::ALL.map(|s| store::readable(&flash, s)), &check);
+        let mut check = check.into();
+        // The start may erase a blob, and may renew what is neither a blob nor a journal.
+        let damaged = plain(&flash, &check, |memory| memory.starts_with(&MAGIC));
+        let newest = is_faulty
+            .then(|| Store::read(&flash, check))
+            .and_then(|store| Some((store.newest()?, store.passed_over().is_some())));
+        let is_last = newest.is_some_and(|(_, passes_over)| passes_over);
+        if let Some((newest, false)) = newest {
+            check.suspect = crc_of(newest.blob(&flash));
+        }
         let store = Store::start(&mut flash, check);
         let mut records = Self {
             flash,
@@ -54,14 +64,14 @@ impl<F: Flash> Records<F> {
             is_ready: false,
             writing: None,
         };
-        let has_faulted = check.suspect.is_some() || is_faulty && records.store.newest().is_some();
-        let blob = if has_faulted {
-            let fallback = records.store.fallback();
-            records.pass_over().or(fallback)
-        } else {
-            records.store.newest()
+        let blob = match (check.suspect, is_last) {
+            (Some(_), _) => records.pass_over().or(records.store.newest()),
+            (None, true) => None,
+            (None, false) => records.store.newest(),
         };
-        let refusal = records.refusal(has_faulted).or(plain);
+        let has_faulted = check.suspect.is_some() || is_last;
+        let refusal = (records.refusal(has_faulted).or(damaged))
+            .or_else(|| plain(&records.flash, &check, |_| true));
         (records, Found { blob, refusal })
     }
 
@@ -104,6 +114,15 @@ impl<F: Flash> Records<F> {
         Some(loaded)
     }
 
+    /// What runs has run long enough to be proven: the next start may erase what was before it. One
+    /// word of flash at most, two if one is worn.
+    pub fn prove(&mut self) {
+        let running = self.running.as_ref().map(|(stored, _)| *stored);
+        if running == self.store.newest() {
+            self.store.prove(&mut self.flash);
+        }
+    }
+
     /// Puts the record together: in a tick of its own, as is [`Records::begin`].
     fn make(&mut self, sequence: u32, change: Change<'_>) -> Option<()> {
         let (store, record) = (&self.store, &mut *self.record);
@@ -133,6 +152,17 @@ impl<F: Flash> Records<F> {
         self.writing = Some(self.store.begin(&self.flash, self.record).ok()?);
         Some(())
     }
+}
+
+/// What is wrong with the plain contents of the sectors that are looked at.
+#[inline(never)]
+fn plain(flash: &impl Flash, check: &Check, is_looked_at: fn(&[u8]) -> bool) -> Option<Refusal> {
+    let memory =
+        |sector| Some(store::readable(flash, sector)).filter(|memory| is_looked_at(memory));
+    slots::refusal(
+        Sector::ALL.map(|sector| memory(sector).unwrap_or_default()),
+        check,
+    )
 }
 
 impl<F: Flash> update::Store for Records<F> {

@@ -113,11 +113,6 @@ fn a_faulty_blob_is_passed_over_for_good() {
         assert_eq!(update::Store::newest_sequence(&records), 4);
         assert_eq!(update::Store::previous(&records).is_some(), has_previous);
     }
-    // The one before it faults, too.
-    assert_eq!(start(&mut flash, true).1, Some(blob(0)));
-    let (records, running, reason) = start(&mut flash, false);
-    assert_eq!((running, reason), (Some(blob(0)), 12));
-    assert!(update::Store::previous(&records).is_none());
 }
 
 #[test]
@@ -134,6 +129,69 @@ fn where_there_is_no_other_nothing_runs_until_the_next_start_tries_again() {
     let (_, running, reason) = start(&mut flash, false);
     assert_eq!((running, reason), (Some(blob(0)), 0));
     assert_eq!(start(&mut FlashModel::erased(), true).2, 0);
+}
+
+#[test]
+fn of_two_plain_blobs_the_older_runs_if_the_newer_faults_before_it_has_run() {
+    for proven in [false, true] {
+        let mut flash = FlashModel::erased();
+        flash.load(Sector::First, &blob(1));
+        flash.load(Sector::Second, &blob(2));
+        let (mut records, running, _) = start(&mut flash, false);
+        assert_eq!(running, Some(blob(2)));
+        assert!(update::Store::is_writable(&records));
+        assert!(!update::Store::has_room(&records));
+        if proven {
+            records.prove();
+            let (records, running, _) = start(&mut flash, false);
+            assert_eq!(running, Some(blob(2)));
+            assert!(update::Store::has_room(&records));
+            continue;
+        }
+        // Without room to write it, after every start.
+        let before = flash.clone();
+        for _ in 0..2 {
+            let (mut records, running, reason) = start(&mut flash, true);
+            assert_eq!((running, reason), (Some(blob(1)), 12));
+            assert!(!update::Store::has_room(&records));
+            records.prove();
+            assert_eq!(start(&mut flash, false).1, Some(blob(2)));
+        }
+        assert_eq!(flash, before);
+    }
+}
+
+#[test]
+fn a_blob_that_was_passed_over_does_not_come_back_in_place_of_another() {
+    let mut flash = holding(2);
+    assert_eq!(start(&mut flash, true).1, Some(blob(0)));
+    let mut check = Check::from(SERIAL);
+    check.suspect = crc(0);
+    let (_, running, reason) = start_with(&mut flash, check, false);
+    assert_eq!((running, reason), (None, 12));
+}
+
+#[test]
+fn after_one_was_passed_over_a_fault_of_the_next_changes_nothing() {
+    let mut flash = holding(3);
+    assert_eq!(start(&mut flash, true).1, Some(blob(1)));
+    let before = flash.clone();
+    let (records, running, reason) = start(&mut flash, true);
+    assert_eq!((running, reason), (None, 12));
+    assert!(update::Store::is_writable(&records));
+    assert_eq!(start(&mut flash, false).1, Some(blob(1)));
+    assert_eq!(flash, before);
+}
+
+#[test]
+fn a_sector_that_the_start_has_renewed_is_not_told_as_damaged() {
+    let mut flash = FlashModel::erased();
+    flash.load(Sector::First, &blob(0));
+    flash.load(Sector::Second, &[0x5a; 4096]);
+    for _ in 0..2 {
+        let (_, running, reason) = start(&mut flash, false);
+        assert_eq!((running, reason), (Some(blob(0)), 0));
+    }
 }
 
 #[test]

@@ -160,6 +160,8 @@ impl Retained {
             kind,
             FaultKind::Panic | FaultKind::HardFault | FaultKind::StackOverflow
         );
+        // Late ticks are the converter's or the bus's: decoding takes a bounded number of steps,
+        // whatever the parameters are. Blamed for them, sound parameters would be passed over.
         let early = match self.step {
             Step::Parameters => by_core || matches!(kind, FaultKind::Watchdog),
             Step::Ticking => by_core && !self.proven,

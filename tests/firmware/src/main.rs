@@ -235,6 +235,12 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("update: refused, and nothing is written", &|| {
         update::refused(bench)
     });
+    check("update: no random number twice", &|| {
+        update::no_nonce_twice(bench)
+    });
+    check("update: two blobs of a probe", &|| {
+        update::two_plain_blobs(bench)
+    });
     check("update: flash that fails", &|| {
         update::flash_that_fails(bench)
     });

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | 1 running | 0; or 0x80 + reason of parameters that do not run: of a slot, if that is damaged; 12: those that are passed over, as they made the program fault twice; 13: the flash cannot be written |
 //! | 2 no parameters | 2: both slots are erased |
-//! | 3 bad parameters | slot * 16 + kind: 1 cut short, 3 no blob at all, 4 newer layout, 5 bad header, 7 wrong check (torn), 8 bad payload, 9 unusable values, 10 another stage's; 12 made the program fault twice, and there are no others: tried again at the next start |
+//! | 3 bad parameters | slot * 16 + kind: 1 cut short, 3 no blob at all, 4 newer layout, 5 bad header, 7 wrong check (torn), 8 bad payload, 9 unusable values, 10 another stage's; 12 made the program fault twice, and there are no others, or they ran in place of others that did: tried again at the next start |
 //! | 4 no frames | 3 silent converter (line at 0 or 1), 7 no new codes |
 //! | 5 sensor fault | 1 SPI, 2 pin, 4 wrong part, 5 wrong setting or unexpected reset, 6 wrong check, 8 wrong input, 10 SYNC does not arrive; 0x10 + channel: code at a rail, 0x20 + channel: code that never changes (0 to 2 Hall A to C, 3 to 5 gaps 1 to 3) |
 //! | 6 self-test failed | 1: arithmetic is not that of the host, or the core would not restore the FPU's settings |

@@ -1,6 +1,6 @@
 //! How a new record comes about.
 
-use super::blobs::{Stored, checked, stored, stored_crc};
+use super::blobs::{Stored, checked, stored};
 use super::journal::Place;
 use super::record::{Record, UNIT_BYTES, View};
 use super::{Flash, Refused, Store, Writing};
@@ -28,28 +28,16 @@ impl Store {
         self.copy(flash, previous, None, record)
     }
 
-    /// What runs in place of the blob that made the program fault: [`Store::newest`] if that was
-    /// [`super::Check::suspect`], else [`Store::previous`].
-    pub const fn fallback(&self) -> Option<Stored> {
-        match self.check.suspect {
-            Some(_) => self.newest,
-            None => self.previous,
-        }
-    }
-
-    /// Makes a record with a copy of [`Store::fallback`] that passes over the blob that made the
-    /// program fault.
+    /// Makes a record with a copy of [`Store::newest`] that passes over [`super::Check::suspect`], the
+    /// blob that made the program fault.
     ///
     /// # Errors
     /// [`Refused::NoPrevious`], [`Refused::Blob`], [`Refused::Sequence`].
     pub fn pass_over(&self, flash: &impl Flash, record: &mut Record) -> Result<(), Refused> {
-        let fallback = self.fallback().ok_or(Refused::NoPrevious)?;
-        let of_newest = || {
-            self.newest
-                .and_then(|newest| stored_crc(newest.blob(flash)))
+        let (Some(newest), Some(suspect)) = (self.newest, self.check.suspect) else {
+            return Err(Refused::NoPrevious);
         };
-        let faulty = self.check.suspect.or_else(of_newest);
-        self.copy(flash, fallback, faulty, record)
+        self.copy(flash, newest, Some(suspect), record)
     }
 
     /// Begins to write a record. Nothing else may be written until [`Store::finish`].

@@ -7,6 +7,7 @@ use runtime::blob::{BlobError, MAGIC};
 
 impl Store {
     /// Looks at the sectors as they are and writes nothing: [`Store::begin`] then refuses.
+    #[inline(never)]
     pub fn read(flash: &impl Flash, check: impl Into<Check>) -> Self {
         let mut store = Self {
             check: check.into(),
@@ -29,6 +30,13 @@ impl Store {
             else {
                 break;
             };
+            // In place of a suspect, nothing that was passed over before it.
+            if store.check.suspect.is_some()
+                && journal::is_passed_over(flash, found.sequence, view.blob())
+            {
+                place = journal::highest_committed(flash, place);
+                continue;
+            }
             let Some(error) = unusable(&view, &store.check) else {
                 store.active = found.sector();
                 store.passed_over = view.passed_over();
@@ -92,14 +100,18 @@ impl Store {
 
     /// The sectors that a start may erase, in the order in which it tries.
     pub(super) fn spares(&self, flash: &impl Flash) -> [Option<Sector>; 2] {
-        if self.newest.is_some() || self.latest > 0 {
+        if self.newest.is_some() {
             return [Some(self.active.other()), None];
+        }
+        let holds_no_blob = |sector: &Sector| !flash.bytes(*sector).starts_with(&MAGIC);
+        if self.latest > 0 {
+            return [Some(self.active.other()).filter(holds_no_blob), None];
         }
         let is_erased = |sector| flash.bytes(sector).iter().all(|byte| *byte == 0xff);
         let mut order = Sector::ALL;
         if !is_erased(Sector::First) && is_erased(Sector::Second) {
             order.reverse();
         }
-        order.map(|sector| Some(sector).filter(|_| !flash.bytes(sector).starts_with(&MAGIC)))
+        order.map(|sector| Some(sector).filter(holds_no_blob))
     }
 }

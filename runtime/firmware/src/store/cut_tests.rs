@@ -16,7 +16,8 @@ const SEEDS: u64 = 64;
 enum Action {
     Update(Vec<u8>),
     GoBack,
-    PassOver,
+    PassOver(Vec<u8>),
+    Prove,
 }
 
 /// A flash before the action, and what its start finds: before and afterwards.
@@ -124,12 +125,18 @@ fn plain(blobs: &[(Sector, usize)]) -> FlashModel {
 
 /// Starts, does the action, and says whether its end was told.
 fn run(flash: &mut FlashModel, action: &Action) -> bool {
-    let mut store = Store::start(flash, SERIAL);
+    let mut check = Check::from(SERIAL);
+    if let Action::PassOver(blob) = action {
+        check.suspect = stored_crc(blob);
+    }
+    let mut store = Store::start(flash, check);
+    store.prove(flash);
     let mut record = Record::EMPTY;
     let made = match action {
         Action::Update(blob) => return update(&mut store, flash, blob).is_ok(),
         Action::GoBack => store.go_back(flash, &mut record),
-        Action::PassOver => store.pass_over(flash, &mut record),
+        Action::PassOver(_) => store.pass_over(flash, &mut record),
+        Action::Prove => return !flash.is_off(),
     };
     made.and_then(|()| write(&mut store, flash, &record))
         .is_ok()
@@ -142,6 +149,7 @@ fn verify(mut flash: FlashModel, scenario: &Scenario, told: bool, case: &Case) -
     let store = Store::start(&mut flash, SERIAL);
     let operations = flash.operations;
     let first = found(&store, &flash);
+    store.prove(&mut flash);
     assert!(
         first == scenario.new || !told && first == scenario.old,
         "{case:?}"
@@ -207,7 +215,8 @@ fn cut_from(first: usize, scenario: &Scenario) -> usize {
 fn after_any_cut_of_an_update_the_old_blob_is_found_or_the_new_one() {
     let (full, count) = full();
     let (nearly_full, nearly) = nearly_full();
-    let plain_2 = plain(&[(Sector::First, 1), (Sector::Second, 2)]);
+    let mut plain_2 = plain(&[(Sector::First, 1), (Sector::Second, 2)]);
+    Store::start(&mut plain_2, SERIAL).prove(&mut plain_2);
     let states = [
         ("empty store", FlashModel::erased(), None),
         ("a plain blob", plain(&[(Sector::Second, 1)]), Some(1)),
@@ -234,7 +243,7 @@ fn going_back_and_passing_over_survive_any_cut() {
     let mut cuts = 0;
     for (name, action) in [
         ("going back", Action::GoBack),
-        ("passing over", Action::PassOver),
+        ("passing over", Action::PassOver(blob(2))),
     ] {
         let found = [Some(2), Some(1)];
         let flash = journal(3);
@@ -242,6 +251,23 @@ fn going_back_and_passing_over_survive_any_cut() {
     }
     println!("RESULT cuts_of_going_back={cuts}");
     assert_eq!(cuts, 16_417);
+}
+
+/// Of two plain blobs, and of a journal that one and the same blob fills: the erase of the blob before
+/// waits until the newest has run.
+#[test]
+fn proving_the_newest_blob_survives_any_cut() {
+    let mut journal = plain(&[(Sector::First, 0)]);
+    let mut store = Store::start(&mut journal, SERIAL);
+    while update(&mut store, &mut journal, &blob(1)).is_ok() {}
+    let two = plain(&[(Sector::First, 0), (Sector::Second, 1)]);
+    let mut cuts = 0;
+    for (name, flash) in [("two plain blobs that run", two), ("one blob", journal)] {
+        let found = [Some(1), Some(1)];
+        cuts += cut_from(0, &Scenario::new(name, flash, Action::Prove, found));
+    }
+    println!("RESULT cuts_of_proving={cuts}");
+    assert_eq!(cuts, 2_104);
 }
 
 /// Updates, going back and starts in a long row, each cut or not.

@@ -179,6 +179,18 @@ fn a_sector_that_cannot_be_renewed_leaves_the_other_one() {
 }
 
 #[test]
+fn beside_records_that_are_refused_no_plain_blob_is_erased() {
+    let mut flash = FlashModel::erased();
+    flash.load(Sector::First, &blob(0));
+    let mut store = Store::start(&mut flash, SERIAL);
+    while update(&mut store, &mut flash, &blob(1)).is_ok() {}
+    let before = flash.clone();
+    let store = Store::start(&mut flash, Some("HS-0008"));
+    assert_eq!((store.newest(), store.is_writable()), (None, false));
+    assert_eq!(flash, before);
+}
+
+#[test]
 fn two_plain_blobs_that_are_refused_are_not_erased_and_nothing_can_be_written() {
     let mut flash = FlashModel::erased();
     for sector in Sector::ALL {

@@ -43,21 +43,27 @@
 //! A sector that begins with a plain blob (`HALL`), as a probe flashes it, is read as well. It
 //! is older than any record, so whoever flashes a blob with a probe must erase a journal in the
 //! other sector. Of two plain blobs the one with the later text `created` is newer, on a tie
-//! the one in the first sector, as [`crate::slots`] chooses. Such a sector is never written
-//! into, only erased.
+//! the one in the first sector, as [`crate::slots`] chooses. No record is ever written into such a
+//! sector: it is only erased.
+//!
+//! One of 14 words may hold the CRC of a blob in the same sector that has run for a second: words 2 to
+//! 15, or the last ones of a sector with a plain blob. It is written if the sector is full and the
+//! blob before is in the other one.
 //!
 //! # What survives
 //!
 //! - *The newest blob*: always. Its sector is not erased.
-//! - *The blob before*, for going back: until the sector with the newest one is full. Then the
-//!   next start erases the other sector, and the blob before is lost if it was there: at the
-//!   first start with two plain blobs, which each count as a full sector; after some eleven
-//!   interrupted updates in a row (each takes up to 23 of the 255 units); after one and the
-//!   same blob was written so often that it fills the sector.
+//! - *The blob before*, for going back: until the sector with the newest one is full. Then a
+//!   start erases the other sector, and the blob before is lost if it was there: of two plain
+//!   blobs, which each count as a full sector; after some eleven interrupted updates in a row
+//!   (each takes up to 23 of the 255 units); after one and the same blob was written so often
+//!   that it fills the sector. It is not lost before the newest has run ([`Store::prove`]). If the newest makes the
+//!   program fault instead, the blob before runs in its place after every start, and no record
+//!   says so, for there is no room: only a probe makes some.
 //! - [`Store::start`] alone erases, and only if neither sector has room for the largest record.
 //!   There is always room for one update after it, unless no sector may be erased or none can
-//!   ([`Store::is_writable`]). When there is none left, updates are refused ([`Refused::NoRoom`])
-//!   until the next start.
+//!   ([`Store::is_writable`]), or the newest blob has yet to run. When there is none left,
+//!   updates are refused ([`Refused::NoRoom`]) until the next start.
 //!
 //! Going back is a new record with a copy of the blob before. Passing over a blob that made the
 //! program fault is a new record too, with a copy of the one that runs in its place; where there
@@ -101,6 +107,7 @@ mod flash;
 #[cfg(any(test, feature = "flash-model"))]
 pub mod flash_model;
 mod journal;
+mod proof;
 mod record;
 mod writing;
 
@@ -166,7 +173,8 @@ impl Store {
     /// At start-up: settles what was interrupted, chooses a record, and erases a sector if neither
     /// has room for a record of the largest size. `check` may be the serial number of the stage
     /// alone. A plain blob is erased only where there is another to run: one of another stage or
-    /// of a newer layout may be right for another program.
+    /// of a newer layout may be right for another program. The blob before the newest is erased
+    /// only if the newest has run.
     ///
     /// Where no room can be made ([`Store::fault`]) the store is read as it is, and nothing is
     /// written until the next start.
@@ -179,13 +187,17 @@ impl Store {
             if store.place_for(flash, MAX_UNITS).is_some() {
                 break;
             }
+            if store.is_kept(flash, spare) {
+                store.writable = true;
+                break;
+            }
             match journal::renew(flash, spare) {
                 Ok(()) => store = Self::read(flash, check),
                 Err(fault) => store.fault = Some(fault),
             }
         }
         store.latest = store.latest.max(undecided);
-        store.writable = store.place_for(flash, MAX_UNITS).is_some();
+        store.writable |= store.place_for(flash, MAX_UNITS).is_some();
         store.fault = store.fault.filter(|_| !store.writable);
         store
     }
@@ -235,6 +247,7 @@ impl Store {
     }
 
     /// Where so many units go: the active sector first.
+    #[inline(never)]
     fn place_for(&self, flash: &impl Flash, units: usize) -> Option<(Sector, usize)> {
         [self.active, self.active.other()]
             .into_iter()

@@ -2,7 +2,7 @@
 
 extern crate std;
 
-use super::flash_model::FlashModel;
+use super::flash_model::{Cut, FlashModel};
 use super::record::units;
 use super::*;
 use runtime::ParameterSet;
@@ -186,7 +186,18 @@ fn plain_blobs_are_read_as_the_slots_were_and_are_older_than_any_record() {
             previous,
             Some(Sector::ALL[1 - chosen]).filter(|_| created[0] != created[1])
         );
-        // The other one is erased, and what is written there counts, though made earlier.
+        // The other one is erased, if it is the same or once this one has run, and what is written
+        // there counts, though made earlier.
+        let before = flash.clone();
+        for _ in 0..3 {
+            let mut store = Store::start(&mut flash, SERIAL);
+            if created[0] != created[1] {
+                assert_eq!(flash, before);
+                let refused = update(&mut store, &mut flash, &blob(0));
+                assert_eq!(refused, Err(Refused::NoRoom));
+            }
+        }
+        Store::start(&mut flash, SERIAL).prove(&mut flash);
         let mut store = Store::start(&mut flash, SERIAL);
         assert_eq!(flash.erases.iter().sum::<usize>(), 1);
         assert_eq!(update(&mut store, &mut flash, &blob(0)), Ok(()));
@@ -194,6 +205,41 @@ fn plain_blobs_are_read_as_the_slots_were_and_are_older_than_any_record() {
         assert_eq!(found(&store, &flash), Some(blob(0)));
         let previous = store.previous().map(|stored| stored.blob(&flash).to_vec());
         assert_eq!(previous, Some(blob(created[chosen])));
+    }
+}
+
+#[test]
+fn the_blob_before_is_not_erased_until_the_newest_has_run() {
+    let mut flash = FlashModel::erased();
+    flash.load(Sector::First, &blob(0));
+    let mut store = Store::start(&mut flash, SERIAL);
+    let written = (0..100).take_while(|_| update(&mut store, &mut flash, &blob(1)).is_ok());
+    assert_eq!(written.count(), 36);
+    for stuck in [None, Some((Sector::Second, 2))] {
+        let mut flash = flash.clone();
+        flash.stuck = stuck;
+        let before = flash.clone();
+        for _ in 0..3 {
+            let mut store = Store::start(&mut flash, SERIAL);
+            let previous = store.previous().map(|stored| stored.blob(&flash).to_vec());
+            assert_eq!(previous, Some(blob(0)));
+            let refused = update(&mut store, &mut flash, &blob(2));
+            assert_eq!((refused, store.fault()), (Err(Refused::NoRoom), None));
+        }
+        assert_eq!(flash, before);
+        flash.cut_at(0, Cut::Inside);
+        Store::start(&mut flash, SERIAL).prove(&mut flash);
+        for _ in 0..2 {
+            flash.power_on();
+            Store::start(&mut flash, SERIAL).prove(&mut flash);
+        }
+        let mut store = Store::start(&mut flash, SERIAL);
+        assert_eq!((found(&store, &flash), flash.erases[0]), (Some(blob(1)), 1));
+        assert_eq!(update(&mut store, &mut flash, &blob(2)), Ok(()));
+        // Where there is room, nothing is written.
+        let before = flash.clone();
+        Store::start(&mut flash, SERIAL).prove(&mut flash);
+        assert_eq!(flash, before);
     }
 }
 
@@ -213,6 +259,13 @@ fn going_back_can_be_undone_and_what_was_passed_over_never_comes_back() {
         assert_eq!(found(&store, &flash), Some(blob(expected)));
     }
     // 4, 6 and 8 hold blob 3; passing it over falls back to 7 with blob 2. 2 holds blob 1.
+    assert_eq!(
+        store.pass_over(&flash, &mut record),
+        Err(Refused::NoPrevious)
+    );
+    let mut check = Check::from(SERIAL);
+    check.suspect = stored_crc(&blob(3));
+    let mut store = Store::start(&mut flash, check);
     assert_eq!(store.pass_over(&flash, &mut record), Ok(()));
     assert_eq!(write(&mut store, &mut flash, &record), Ok(()));
     let store = Store::start(&mut flash, SERIAL);

@@ -1,10 +1,12 @@
 //! Ticks that come late, a watchdog that bites, settings of the FPU that change.
 
 use super::log::Stage;
+use super::update::talk;
 use super::{Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen};
 use hal_adapters::can::status::{NodeState, flag};
+use host_fit::bus::update::{BlobReader, UpdateError};
 use runtime::Status;
 
 const PART: Part = Part::Ads131m08;
@@ -218,6 +220,10 @@ pub fn fpu_defaults_that_are_wrong(bench: &Bench) -> Outcome {
         other.map(|(tick, s)| (*tick, s.state)),
         None,
     )?;
+    // Nor are there any parameters that run.
+    let (read, _) = talk(&mut machine, BlobReader::default(), 90)?;
+    let read = read.result().map(|(_, blob)| blob);
+    equal("running", read, Err(UpdateError::NothingRuns))?;
     let resets = (machine.panics, machine.watchdog_resets);
     equal("panics and watchdog resets", resets, (0, 0))
 }

@@ -278,6 +278,54 @@ pub fn refused(bench: &Bench) -> Outcome {
     equal("once all is well", updated?.sequence, Some(2))
 }
 
+/// Every transfer has a random number of its own: what was proven for one proves nothing for another.
+pub fn no_nonce_twice(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(20)?;
+    answers(&mut machine, &[(SERVO_OFF, 99, Ended::Done)])?;
+    let mut nonces: Vec<[u32; 4]> = Vec::new();
+    for token in 100..104 {
+        let begin = Request::Update(UpdateRequest::begin(1, 0));
+        answers(&mut machine, &[(begin, token, Ended::Done)])?;
+        let mut nonce = [0; 4];
+        for (part, word) in (0..).zip(&mut nonce) {
+            let challenge = Request::Update(UpdateRequest::Challenge { part });
+            let seen = ask(&mut machine, challenge, token, 10)?;
+            let told = seen.answers.iter().find(|(_, told)| told.token == token);
+            let (_, told) = told.ok_or("no answer")?;
+            equal("answer", told.outcome, Some(Ended::Done))?;
+            *word = told.detail;
+        }
+        expect(
+            nonces.iter().flatten().all(|word| !nonce.contains(word)),
+            || format!("{nonce:x?} after {nonces:x?}"),
+        )?;
+        nonces.push(nonce);
+        let abort = Request::Update(UpdateRequest::Abort);
+        answers(&mut machine, &[(abort, token, Ended::Done)])?;
+    }
+    Ok(())
+}
+
+/// Of two plain blobs the older one is erased at a start, but not before the newer one has run for a
+/// second.
+pub fn two_plain_blobs(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &bench.later])?;
+    machine.run_ticks(400)?;
+    machine.power_cycle();
+    machine.run_ticks(600)?;
+    equal("erases", machine.chip.flash.erases, 0)?;
+    equal("running", running(&mut machine)?, bench.later.clone())?;
+    let (refused, _) = update(&mut machine, plan(&bench.blob, 1))?;
+    equal("the end", refused, Err(UpdateError::NoRoom))?;
+    machine.power_cycle();
+    machine.run_ticks(50)?;
+    equal("erases", machine.chip.flash.erases, 1)?;
+    equal("running", running(&mut machine)?, bench.later.clone())?;
+    update(&mut machine, plan(&bench.blob, 2))?.0?;
+    starts_with(bench, &machine, &bench.poses)
+}
+
 /// Flash of which the first or a later word does not change, and tells so or does not: the update
 /// ends with that, before and after the next start the old parameters run, and a start with sound
 /// flash takes new ones.
