@@ -123,7 +123,7 @@ pub enum UpdateError {
     NumbersUsedUp,
     /// The store is full until the next start.
     #[error(
-        "the controller's store is full until its next start, which makes room: restart it, and try again"
+        "the controller's store is full until its next start, which makes room once the newest parameters have run for a second: restart it, and try again"
     )]
     NoRoom,
     /// The flash could not be written.

@@ -254,19 +254,6 @@ pub fn refused(bench: &Bench) -> Outcome {
         &mut machine,
         &[(request(UpdateRequest::Abort), 104, Ended::Done)],
     )?;
-    let mut words = Vec::new();
-    for token in [106, 108] {
-        let begin = request(UpdateRequest::begin(1, 0));
-        answers(&mut machine, &[(begin, token, Ended::Done)])?;
-        let challenge = request(UpdateRequest::Challenge { part: 0 });
-        let seen = ask(&mut machine, challenge, token + 1, 10)?;
-        words.extend(seen.answers.iter().map(|(_, answer)| answer.detail));
-        let abort = request(UpdateRequest::Abort);
-        answers(&mut machine, &[(abort, token, Ended::Done)])?;
-    }
-    expect(matches!(words[..], [one, two] if one != two), || {
-        format!("two transfers have the nonces {words:x?}")
-    })?;
     machine.chip.random.broken = true;
     let (refused, _) = update(&mut machine, plan(&bench.blob, 4))?;
     expect(matches!(refused, Err(UpdateError::NoRandomNumber)), || {
