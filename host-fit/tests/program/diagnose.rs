@@ -230,7 +230,7 @@ fn a_log_of_another_gain_is_told_from_the_first() {
         changed(&log, &halls, |_, code| (code * 103 + 50).div_euclid(100)),
     );
     let parts = [
-        "first.csv alone to",
+        "second.csv fits to",
         "in second.csv differs by +3.0, +3.0, +3.0 %",
     ];
     bench.bad(
