@@ -100,9 +100,11 @@ pub fn run(settings: &ReplaySettings) -> Result<Replayed, ReplayError> {
     let stage = Stage::from_file(&settings.stage)?;
     let layout = choose_layout(settings.layout, &stage)?;
     let most = settings.rows.unwrap_or(usize::MAX);
-    let rows = match is_standard(&settings.log) {
-        true => 0,
-        false => rows_of(&settings.log, &stage)?.min(most),
+    // A pipe can be read once only.
+    let rows = match std::fs::metadata(&settings.log) {
+        Ok(file) if !file.is_file() => 0,
+        _ if is_standard(&settings.log) => 0,
+        _ => rows_of(&settings.log, &stage)?.min(most),
     };
     let bus =
         Bus::open(&settings.interface, &[]).map_err(|cause| ReplayError::Bus { cause, rows: 0 })?;

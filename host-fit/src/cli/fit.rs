@@ -161,6 +161,8 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         bad_rows: args.bad_rows,
         split_s: args.split,
         memory_bytes: args.memory.limit_bytes(),
+        // With the lag taken off all rows are other rows.
+        rows_max: ReadOptions::FIT.rows_max.filter(|_| !args.compensate_lag),
         ..ReadOptions::FIT
     };
     // Before the work, so that no blob is left without the figures that were asked for.

@@ -33,11 +33,11 @@ pub fn disagreement(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
         return None;
     }
     let mut message = "the logs do not agree".to_owned();
-    for (source, log) in dataset.logs.iter().zip(&logs) {
+    for log in &logs {
         let _ = write!(
             message,
             ", {} fits to {:.2} um rms together with the others and to {:.2} um alone",
-            source.path.display(),
+            dataset.logs[log.log].path.display(),
             log.together_um,
             log.alone_um
         );
@@ -115,6 +115,7 @@ fn gain_difference(dataset: &Dataset, stage: &Stage) -> Option<Gains> {
 
 /// How well Model (31) describes one log: rms over X, Y, Rz (um, um, urad).
 struct LogFit {
+    log: usize,
     rows: f64,
     /// With the parameters of the fit to all logs.
     together_um: f64,
@@ -134,12 +135,15 @@ fn fits_of_logs(dataset: &Dataset, stage: &Stage) -> Option<Vec<LogFit>> {
         });
         let (cost, fall) = own_fit(&problem, &together)?;
         Some(LogFit {
+            log,
             rows: problem.rows.len() as f64,
             together_um: problem.fitness(cost),
             alone_um: problem.fitness(cost - fall),
         })
     };
-    (0..dataset.logs.len()).map(fit).collect()
+    // Of a log in which nothing moves an excerpt has no rows.
+    let has_rows = |log: &usize| !dataset.logs[*log].rows.is_empty();
+    (0..dataset.logs.len()).filter(has_rows).map(fit).collect()
 }
 
 /// The groups of some movements.

@@ -21,6 +21,8 @@ pub(super) struct BusReader<'s> {
     counts: BusCounts,
     /// When the tick before was received, us.
     before_us: Option<u64>,
+    /// Whether the next tick follows on those before, if it says so.
+    follows: bool,
 }
 
 impl<'s> BusReader<'s> {
@@ -43,6 +45,7 @@ impl<'s> BusReader<'s> {
             collector: Collector::new(settings.layout),
             counts: BusCounts::default(),
             before_us: None,
+            follows: true,
         })
     }
 
@@ -99,10 +102,13 @@ impl<'s> BusReader<'s> {
                     });
                 }
             };
-            if let Some(tick) = tick
-                && self.is_sound(&tick)?
-            {
-                return Ok(Some(tick));
+            if let Some(mut tick) = tick {
+                // What a tick that is left out does not follow on, the next one does not either.
+                tick.follows &= core::mem::replace(&mut self.follows, true);
+                if self.is_sound(&tick)? {
+                    return Ok(Some(tick));
+                }
+                self.follows = tick.follows;
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use super::cell::CellFault;
 use super::error::{CellPlace, LogError};
+use super::order::MOVEMENTS_MAX;
 use super::warning::{LogWarning, SkipReason};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -27,7 +28,10 @@ impl Skipped {
         movement: Option<i64>,
         place: impl FnOnce() -> Box<CellPlace>,
     ) {
-        if let Some(movement) = movement {
+        // A hostile log has a new number in each row.
+        if let Some(movement) = movement
+            && (self.by_movement.len() < MOVEMENTS_MAX || self.by_movement.contains_key(&movement))
+        {
             *self.by_movement.entry(movement).or_default() += 1;
         }
         let reason = SkipReason::from(&fault);

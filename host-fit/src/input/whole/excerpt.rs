@@ -1,13 +1,15 @@
 //! The rows of a long log that a fit works on: runs of rows that follow each other, because the
 //! reference drifts from row to row, taken where they tell most.
 //!
-//! Every run that moves the stage has the same chance, so that the excerpt is like the log; one in
-//! which nothing moves has none. A run that tells of what others do not, such as the only one that
+//! Every run that moves the stage in any axis has the same chance, so that the excerpt is like the
+//! log; one in which nothing moves has none. A run that tells of what others do not, such as the only one that
 //! tilts the stage, is told by its leverage, the trace of S_run S^-1: S_run holds the products of
 //! the regressors of Model (31), s and s v with v = (Z, Rx, Ry), less their means over the run,
 //! and S is the sum over all runs. Its chance grows with its leverage where that is far above the
-//! mean. Runs are taken at equal steps of the sum of their chances (systematic sampling): they
-//! are spread over the log, and nothing is random.
+//! mean. One run is taken in each of equal steps of the sum of their chances, at a place within the
+//! step that differs from step to step: the runs are spread over the log, a protocol that repeats
+//! is met in all its phases, and nothing is random. A log of which nothing was taken that way gives
+//! a few of its runs all the same.
 
 use super::Whole;
 use crate::input::dataset::{Dataset, Movement, Row};
@@ -24,8 +26,14 @@ const LOOKED_AT: usize = 50;
 const COUNT: usize = 12;
 /// What is added to the diagonal of S, in parts of it: for directions that the log leaves open.
 const RIDGE: f64 = 1e-9;
-/// A run of less than this share of the largest motion stands still.
-const IDLE_SHARE: f64 = 0.01;
+/// A run in which X, Y and Z move less, m, and Rz, Rx and Ry, rad, stands still.
+const IDLE_M: f64 = 2e-6;
+const IDLE_RAD: f64 = 20e-6;
+/// How far the place within a step moves from step to step, in steps: by the golden ratio the
+/// places of any number of steps are spread evenly.
+const GOLDEN: f64 = 0.618_033_988_749_894_8;
+/// Runs of a log of which no other was taken, at most.
+const FEW: usize = 8;
 /// Leverage, in terms of the mean of the runs that move, from which on a run is likelier to be taken.
 const RARE: f64 = 4.0;
 /// Runs whose products are summed one after the other.
@@ -81,16 +89,15 @@ impl Whole {
         let inverse = Cholesky::new(total).map_or_else(Products::zeros, |factor| factor.inverse());
         let told = |run: &Run| {
             let products = self.products(run).component_mul(&inverse);
-            (products.sum(), self.moved(run))
+            (products.sum(), self.moves(run))
         };
-        let told: Vec<(f64, f64)> = runs.par_iter().map(told).collect();
-        let idle = IDLE_SHARE
-            * told
-                .iter()
-                .fold(0.0, |most: f64, (_, moved)| most.max(*moved));
-        let moving = told.iter().filter(|(_, moved)| *moved >= idle).count();
+        let mut told: Vec<(f64, bool)> = runs.par_iter().map(told).collect();
+        if told.iter().all(|(_, moves)| !moves) {
+            told.iter_mut().for_each(|(_, moves)| *moves = true);
+        }
+        let moving = told.iter().filter(|(_, moves)| *moves).count();
         let rare = RARE * COUNT as f64 / moving.max(1) as f64;
-        let chance = |&(leverage, moved): &(f64, f64)| match moved >= idle {
+        let chance = |&(leverage, moves): &(f64, bool)| match moves {
             true => f64::max(leverage / rare, 1.0),
             false => 0.0,
         };
@@ -100,26 +107,45 @@ impl Whole {
             .zip(&chances)
             .map(|(run, c)| c * run.rows.len() as f64);
         let step = rows.sum::<f64>() / most.max(1) as f64;
-        let (mut sum, mut next) = (0.0, 0.5 * step);
-        let taken = runs.into_iter().zip(chances).filter(|(_, chance)| {
+        let place = |k: usize| step * (k as f64 + (k as f64 * GOLDEN + 0.5).fract());
+        let (mut sum, mut next) = (0.0, 0);
+        let take = |chance: &f64| {
             sum += chance;
-            let taken = sum > next;
-            while sum > next {
-                next += step;
+            let before = next;
+            while sum > place(next) {
+                next += 1;
             }
-            taken
-        });
-        taken.map(|(run, _)| run).collect()
+            next > before
+        };
+        let mut taken: Vec<bool> = chances.iter().map(take).collect();
+        for log in 0..self.logs.len() {
+            let of_log = |k: &usize| self.movements[runs[*k].movement].log == log;
+            let of_log: Vec<usize> = (0..runs.len()).filter(of_log).collect();
+            let moving: Vec<usize> = of_log.iter().copied().filter(|k| told[*k].1).collect();
+            if !of_log.iter().any(|k| taken[*k]) {
+                let stride = moving.len().div_ceil(FEW).max(1);
+                moving
+                    .into_iter()
+                    .step_by(stride)
+                    .for_each(|k| taken[k] = true);
+            }
+        }
+        let chosen = runs.into_iter().zip(taken).filter(|(_, taken)| *taken);
+        chosen.map(|(run, _)| run).collect()
     }
 
-    /// How far a run moves: the largest range of X, Y, Rz by the reference, m, rad.
-    fn moved(&self, run: &Run) -> f64 {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    /// Whether a run moves in any of the six axes.
+    fn moves(&self, run: &Run) -> bool {
+        const IDLE: [f64; 6] = [IDLE_M, IDLE_M, IDLE_RAD, IDLE_M, IDLE_RAD, IDLE_RAD];
+        let (mut low, mut high) = ([f64::INFINITY; 6], [f64::NEG_INFINITY; 6]);
         for row in self.looked_at(run) {
-            low = std::array::from_fn(|k| low[k].min(row.reference[k]));
-            high = std::array::from_fn(|k| high[k].max(row.reference[k]));
+            let ([x, y, rz], [z, rx, ry]) = (row.reference, row.vertical);
+            for (k, value) in [x, y, rz, z, rx, ry].into_iter().enumerate() {
+                low[k] = low[k].min(value);
+                high[k] = high[k].max(value);
+            }
         }
-        (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max)
+        (0..6).any(|k| high[k] - low[k] >= IDLE[k])
     }
 
     fn looked_at(&self, run: &Run) -> impl Iterator<Item = Row> {

@@ -1,6 +1,6 @@
 use super::chunk::SampledVertical;
 use super::*;
-use crate::input::dataset::Dataset;
+use crate::input::dataset::{Dataset, LoggedFrame};
 use crate::input::log::{LogWarning, ReadOptions, read_bytes};
 use crate::input::shipped::{LOG_GZ, STAGE_TOML};
 use crate::input::stage::Stage;
@@ -8,6 +8,7 @@ use crate::judge::whole::WholeJudgement;
 use crate::judge::{Decoded, Zeros};
 use crate::problem::parameters::Parameters;
 use crate::problem::synthetic;
+use runtime::VerticalPose;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -147,7 +148,118 @@ fn an_excerpt_takes_the_rare_motion_and_not_the_rest() {
     let rest = excerpt.movements.iter().filter(|run| run.index == -1);
     assert_eq!(rest.count(), 0);
     let motions = excerpt.movements.len();
-    assert!((39..=41).contains(&motions), "{motions}");
+    // Two places may lie in one run where every other run is taken.
+    assert!((33..=41).contains(&motions), "{motions}");
+}
+
+/// Movements of 20 rows, whose rows `row` gives by movement and row.
+fn movements(count: usize, row: impl Fn(usize, usize, Row) -> Row) -> Dataset {
+    let truth = Parameters::designed(&stage());
+    let mut dataset = synthetic::Protocol::exact(truth, 100).dataset(&stage());
+    let rows: Vec<Row> = dataset.rows[..20].to_vec();
+    dataset.rows.clear();
+    dataset.movements.clear();
+    for movement in 0..count {
+        let start = dataset.rows.len();
+        let of_movement = (rows.iter().enumerate()).map(|(k, first)| row(movement, k, *first));
+        dataset.rows.extend(of_movement);
+        dataset.movements.push(Movement {
+            log: 0,
+            index: movement as i64,
+            rows: start..start + rows.len(),
+        });
+    }
+    dataset.logs[0].rows = 0..dataset.rows.len();
+    dataset
+}
+
+/// How many runs of an excerpt each kind of movement gives, which repeat in turn.
+fn kinds<const N: usize>(excerpt: &Dataset) -> [usize; N] {
+    let mut counts = [0; N];
+    for run in &excerpt.movements {
+        counts[run.index as usize % N] += 1;
+    }
+    counts
+}
+
+#[test]
+fn an_excerpt_meets_a_protocol_that_repeats_in_all_its_phases() {
+    let all_move = |_, k: usize, row| Row {
+        reference: [1e-5 * k as f64, 0.0, 0.0],
+        ..row
+    };
+    let whole = whole_of(&movements(4_096, all_move));
+    for part in [8, 16, 32] {
+        let excerpt = whole.excerpt(whole.rows() / part, [0; 32]);
+        let runs = 4_096 / part;
+        assert!(excerpt.movements.len().abs_diff(runs) <= 1);
+        for count in kinds::<8>(&excerpt) {
+            assert!((runs / 12..=runs / 6).contains(&count), "{part}: {count}");
+        }
+    }
+}
+
+#[test]
+fn small_motions_are_taken_beside_large_ones_of_other_axes_and_faults() {
+    let reference = |movement: usize, k: usize| match (movement, movement % 4) {
+        // A beam that slipped.
+        (77, _) => [0.0, 0.0, 4e-3 * k as f64],
+        (_, 0) => [2e-6 * k as f64, 0.0, 0.0],
+        (_, 1) => [0.0, 0.0, 2.5e-4 * k as f64],
+        _ => [0.0; 3],
+    };
+    let moved = |movement: usize, k: usize, row: Row| Row {
+        reference: reference(movement, k),
+        frame: LoggedFrame::HallCodes {
+            hall: [0; 3],
+            // Every fourth only lifts the stage.
+            vertical: VerticalPose {
+                z_m: if movement % 4 == 2 {
+                    1e-6 * k as f32
+                } else {
+                    0.0
+                },
+                rx_rad: 0.0,
+                ry_rad: 0.0,
+            },
+            sequence: 0,
+            time_us: 0,
+        },
+        vertical: [
+            if movement % 4 == 2 {
+                1e-6 * k as f64
+            } else {
+                0.0
+            },
+            0.0,
+            0.0,
+        ],
+        ..row
+    };
+    let excerpt = whole_of(&movements(1_000, moved)).excerpt(2_000, [0; 32]);
+    let [x, rz, z, idle] = kinds::<4>(&excerpt);
+    assert_eq!(idle, 0);
+    for count in [x, rz, z] {
+        assert!((28..=40).contains(&count), "{x} {rz} {z}");
+    }
+}
+
+#[test]
+fn a_short_log_beside_a_long_one_has_rows_in_the_excerpt() {
+    let all_move = |_, k: usize, row| Row {
+        reference: [1e-5 * k as f64, 0.0, 0.0],
+        ..row
+    };
+    let mut dataset = movements(1_000, all_move);
+    dataset.logs.push(dataset.logs[0].clone());
+    (dataset.logs[0].rows, dataset.logs[1].rows) = (0..19_940, 19_940..20_000);
+    for movement in &mut dataset.movements[997..] {
+        movement.log = 1;
+    }
+    let excerpt = whole_of(&dataset).excerpt(100, [0; 32]);
+    let of_second = excerpt.movements.iter().filter(|run| run.log == 1);
+    assert_eq!(of_second.count(), 3);
+    assert_eq!(excerpt.logs[1].rows.len(), 60);
 }
 
 #[test]
@@ -184,6 +296,7 @@ fn a_fit_to_an_excerpt_is_as_good_as_one_to_all_rows() {
     assert!(excerpt.train_rows < 13_000);
     for (all, excerpt) in all.errors().axes.iter().zip(excerpt.errors().axes) {
         let ratio = excerpt.rms / all.rms;
-        assert!((1.0..1.005).contains(&ratio), "{ratio}");
+        // By 25 runs of 114; an excerpt in service has 125 at least.
+        assert!((1.0..1.05).contains(&ratio), "{ratio}");
     }
 }

@@ -32,6 +32,9 @@ const STILL: f64 = 2e-6;
 /// the rounding of a parameter to f32.
 const LEFT_OUT_MAX: f64 = 1e-7;
 
+/// Vertical poses at most: each takes 3 kB, and is compared with those of all movements.
+const POSES_MAX: usize = 1_000;
+
 type Numbers = [f64; W];
 type Products = [Numbers; W];
 
@@ -65,8 +68,8 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// `None` where a movement does not stand still in Z, Rx and Ry, or the model has other
-    /// slopes too.
+    /// `None` where a movement does not stand still in Z, Rx and Ry, the movements do so at too many
+    /// places, or the model has other slopes too.
     pub fn new(problem: &Problem<'_>) -> Option<Self> {
         if problem.model.fitted_slopes() > K {
             return None;
@@ -81,6 +84,9 @@ impl Moments {
             let near = |pose: &Pose| (0..K).all(|k| (pose.at[k] - middle[k]).abs() <= 0.5 * STILL);
             pose_of.push(poses.iter().position(near).unwrap_or(poses.len()));
             if pose_of.last() == Some(&poses.len()) {
+                if poses.len() == POSES_MAX {
+                    return None;
+                }
                 poses.push(Pose {
                     at: middle,
                     deviation: [0.0; K],
