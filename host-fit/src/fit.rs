@@ -138,6 +138,13 @@ impl Fit {
         };
         self.warnings
             .extend(FitWarning::of_rest(&self.judgement.errors, &judged.errors));
+        // Of all rows, where those of the excerpt were counted.
+        let counts_rows = |warning: &FitWarning| matches!(warning, FitWarning::Undecoded { .. });
+        self.warnings.retain(|warning| !counts_rows(warning));
+        if judged.undecoded > 0 {
+            let rows = judged.undecoded;
+            self.warnings.push(FitWarning::Undecoded { rows });
+        }
         self.whole = Some(judged);
         Ok(())
     }
