@@ -29,8 +29,8 @@ use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
 use checks::{
-    Outcome, Report, bus, commands, figures, log, motion, parameters, power_cuts, sensors, start,
-    timing, update, zero,
+    Outcome, Report, bus, commands, figures, log, motion, parameters, passed_over, power_cuts,
+    sensors, start, timing, update, zero,
 };
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -254,11 +254,11 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
         power_cuts::in_a_pass_over(bench)
     });
     check("update: parameters that crash are passed over", &|| {
-        update::parameters_that_crash(bench)
+        passed_over::parameters_that_crash(bench)
     });
     check(
         "update: parameters whose check crashes are passed over",
-        &|| update::parameters_whose_check_crashes(bench),
+        &|| passed_over::parameters_whose_check_crashes(bench),
     );
     check("update: a sector is erased at the start", &|| {
         update::erase_at_the_start(bench)

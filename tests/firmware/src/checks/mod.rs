@@ -6,6 +6,7 @@ pub mod figures;
 pub mod log;
 pub mod motion;
 pub mod parameters;
+pub mod passed_over;
 pub mod power_cuts;
 pub mod sensors;
 pub mod start;

@@ -2,7 +2,8 @@
 //! a start, in the record that passes over parameters that crash, and in the start that settles
 //! what a cut has left. Afterwards the old or the new blob runs, and another update is possible.
 
-use super::update::{about_to_crash, crash, large, plan, running, talk, update};
+use super::passed_over::{about_to_crash, crash};
+use super::update::{large, plan, running, talk, update};
 use super::{Failure, Outcome, expect};
 use crate::adc_model::Part;
 use crate::bench::Bench;

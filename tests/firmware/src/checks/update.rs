@@ -4,31 +4,24 @@ use super::commands::{SERVO_OFF, answers, ask};
 use super::figures::CYCLES_PER_INSTRUCTION;
 use super::log::Stage;
 use super::parameters::{FIELD, poses_of};
-use super::start::TICK;
 use super::{Failure, Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen, Words};
-use crate::callbacks::Injected;
 use crate::flash_model::Failing;
 use crate::machine::Machine;
-use crate::unicorn::register;
 use embedded_can::{Frame, StandardId};
 use hal_adapters::can::command::{Mailbox, Outcome as Ended, Request, Told};
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{Key, TAG_INDEX, UpdateData, UpdateRequest};
 use hal_adapters::can::{BusFrame, Coded};
-use host_fit::bus::update::{
-    BlobReader, Dialog, Identifier, Job, Plan, UpdateError, Updated, Updater, Wanted,
-};
+use host_fit::bus::update::{BlobReader, Dialog, Job, Plan, UpdateError, Updated, Updater, Wanted};
 use runtime::blob::MAX_BYTES;
 use runtime::parameters::Text;
 use runtime::{ParameterSet, Status};
 
 /// The program for the ADS131M08 is built with this key, the other one without any.
-const PART: Part = Part::Ads131m08;
+pub(super) const PART: Part = Part::Ads131m08;
 const KEY: Key = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-/// Reads a plain blob at the start.
-const CHECK: &str = "10from_flash";
 /// Between two looks at the bus.
 const STEP_NS: u64 = 250_000;
 const S: u64 = 1_000_000_000;
@@ -341,70 +334,6 @@ pub fn flash_that_fails(bench: &Bench) -> Outcome {
         starts_with(bench, &machine, &poses_of(bench, &later))?;
     }
     Ok(())
-}
-
-/// A controller that has just begun to run [`Bench::later`] in place of [`Bench::blob`].
-pub(super) fn about_to_crash(bench: &Bench) -> Result<Machine, Failure> {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.hook_injection(bench.image(PART).address(TICK)?)?;
-    machine.run_ticks(20)?;
-    update(&mut machine, plan(&bench.later, 1))?.0?;
-    // Not by the host, which waits until they are proven.
-    let activate = Request::Update(UpdateRequest::Activate);
-    let asked = [(SERVO_OFF, 97, Ended::Done), (activate, 98, Ended::Done)];
-    answers(&mut machine, &asked)?;
-    machine.run_ticks(10)?;
-    let (job, _) = talk(&mut machine, Identifier::default(), 90)?;
-    let runs = job.result()?.running;
-    expect(runs.is_some_and(|runs| runs.are(&bench.later)), || {
-        "the new ones do not run".to_owned()
-    })?;
-    Ok(machine)
-}
-
-/// What [`Machine::hook_injection`] named reads where nothing is, in the next ticks.
-pub(super) fn crash(machine: &mut Machine) -> Outcome {
-    let (register, value) = (register::R0, 0x6000_0000);
-    machine.chip.inject = vec![Injected { register, value }];
-    Ok(machine.run_ticks(10)?)
-}
-
-/// Parameters that make the program fault twice at its start: those before them run, and it is
-/// told.
-pub fn parameters_that_crash(bench: &Bench) -> Outcome {
-    let mut machine = about_to_crash(bench)?;
-    for resets in [2, 3] {
-        crash(&mut machine)?;
-        equal("resets", machine.panics, resets)?;
-    }
-    are_passed_over(&mut machine, &bench.blob)
-}
-
-/// Parameters whose check at the start makes the program fault twice, though they are not the newest.
-pub fn parameters_whose_check_crashes(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.hook_injection(bench.image(PART).address(CHECK)?)?;
-    machine.run_ticks(20)?;
-    update(&mut machine, plan(&bench.later, 1))?.0?;
-    for resets in [1, 2] {
-        machine.reset_by_pin();
-        crash(&mut machine)?;
-        equal("resets", machine.panics, resets)?;
-    }
-    are_passed_over(&mut machine, &bench.later)
-}
-
-/// Others run in their place, it is told, and it stays so.
-fn are_passed_over(machine: &mut Machine, others: &[u8]) -> Outcome {
-    Seen::since_last(machine);
-    machine.run_ticks(40)?;
-    let seen = Seen::since_last(machine);
-    let status = seen.last_status().ok_or("no state")?;
-    let told = (status.state, status.reason);
-    equal("state", told, (Some(NodeState::Running), 0x80 | 12))?;
-    equal("running", running(machine)?, others.to_vec())?;
-    machine.power_cycle();
-    equal("after power-on", running(machine)?, others.to_vec())
 }
 
 /// A sector with anything in it is erased at the first start beside a plain blob; the watchdog runs
