@@ -193,33 +193,46 @@ fn wrote(paths: impl IntoIterator<Item = Option<PathBuf>>) -> Result<(), HostErr
 /// Refuses outputs that are an input, or each other, by whatever name. Where one goes to standard
 /// output, nothing else does from now on.
 fn keep_apart(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<(), HostError> {
-    // Standard input is not standard output.
-    let files = inputs.iter().filter(|path| !is_standard(path));
-    let mut taken: Vec<_> = files.map(|path| Place::of(path)).collect();
+    let inputs: Vec<Place> = inputs
+        .iter()
+        .filter_map(|path| place_of_input(path))
+        .collect();
+    let mut taken: Vec<Place> = Vec::new();
     for output in outputs.iter().flatten() {
-        let here = match is_standard(output) {
-            true => Place::of(Path::new("/dev/stdout")),
-            false => Place::of(output),
+        let (name, here) = match is_standard(output) {
+            true => (
+                "standard output".into(),
+                Place::of(Path::new("/dev/stdout")),
+            ),
+            false => (output.to_string_lossy(), Place::of(output)),
         };
         if is_standard_output(output) {
             terminal::keep_for_output();
         }
-        if taken.contains(&here) {
-            return Err(HostError::Usage {
-                argument: "output",
-                problem: if is_standard(output) {
-                    "two outputs cannot both go to standard output; name a file".to_owned()
-                } else {
-                    format!(
-                        "{} is an input or another output of this command; name another file",
-                        output.display()
-                    )
-                },
-            });
-        }
-        taken.push(here);
+        let what = if inputs.contains(&here) {
+            "an input"
+        } else if taken.contains(&here) {
+            "another output"
+        } else {
+            taken.push(here);
+            continue;
+        };
+        return Err(HostError::Usage {
+            argument: "output",
+            problem: format!("{name} is {what} of this command; name another file"),
+        });
     }
     Ok(())
+}
+
+/// The file that an input is read from, also where the shell opened it as standard input; of a
+/// pipe or a terminal there is none.
+fn place_of_input(path: &Path) -> Option<Place> {
+    let standard = Path::new("/dev/stdin");
+    match is_standard(path) {
+        true => (standard.metadata().ok()?.is_file()).then(|| Place::of(standard)),
+        false => Some(Place::of(path)),
+    }
 }
 
 /// Refuses a blob that was made for other scales than `stage.toml` gives.

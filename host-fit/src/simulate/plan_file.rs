@@ -11,6 +11,7 @@
 
 use super::pose::StagePose;
 use super::protocol::Trajectory;
+use crate::input::source::{self, SourceError};
 use csv::{ReaderBuilder, StringRecord};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -20,13 +21,22 @@ pub const COLUMNS: [&str; 7] = [
     "t_us", "x_um", "y_um", "rz_urad", "z_um", "rx_urad", "ry_urad",
 ];
 
+/// Bytes of a plan at most: 80 a row, as [`to_csv`] writes it, for more than an hour.
+const BYTES_MAX: u64 = 160_000_000;
+
+/// Characters of what was found in a message, at most.
+const FOUND_MAX: usize = 80;
+
 /// Largest sensible value, um or urad: ten times what such a stage moves.
 const VALUE_MAX: f64 = 1e4;
 
 /// Why a plan is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanFileError {
-    /// It cannot be read, or is no CSV.
+    /// It cannot be read, or is too large.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// It is no CSV.
     #[error("{}: {source}; name a plan as `host-fit plan` writes it", path.display())]
     Unreadable {
         /// The file.
@@ -91,16 +101,18 @@ pub fn read(path: &Path, servo_period_s: f64) -> Result<Trajectory, PlanFileErro
         path: path.to_owned(),
         source,
     };
+    let bytes = source::read_whole(path, BYTES_MAX)?;
     let mut reader = ReaderBuilder::new()
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(unreadable)?;
+        .from_reader(bytes.as_slice());
     let header = reader.headers().map_err(unreadable)?;
     if header.iter().ne(COLUMNS) {
         return Err(PlanFileError::Columns {
             path: path.to_owned(),
-            found: header.iter().collect::<Vec<_>>().join(","),
+            found: (header.iter().collect::<Vec<_>>().join(",").chars())
+                .take(FOUND_MAX)
+                .collect(),
         });
     }
     let period_us = servo_period_s * 1e6;
@@ -118,7 +130,7 @@ pub fn read(path: &Path, servo_period_s: f64) -> Result<Trajectory, PlanFileErro
             return Err(PlanFileError::Time {
                 path: path.to_owned(),
                 line,
-                text: record[0].to_owned(),
+                text: record[0].chars().take(FOUND_MAX).collect(),
                 due_us,
                 period_us,
             });
@@ -127,7 +139,7 @@ pub fn read(path: &Path, servo_period_s: f64) -> Result<Trajectory, PlanFileErro
             path: path.to_owned(),
             line,
             column: COLUMNS[column],
-            text: record[column].to_owned(),
+            text: record[column].chars().take(FOUND_MAX).collect(),
         })?);
     }
     if poses.is_empty() {
@@ -250,6 +262,10 @@ mod tests {
                 "line 2, column ry_urad: \"20000\"",
             ),
             (format!("{h}\n0,1,2,3\n"), "line: 2"),
+            (
+                format!("{h}{}\n", " ".repeat(BYTES_MAX as usize)),
+                "run.csv: more than 160000000 bytes",
+            ),
         ] {
             let message = parse(&text).expect_err("refused");
             assert!(message.contains(says), "{message}\ndoes not say\n{says}");

@@ -91,6 +91,37 @@ fn an_output_that_is_an_input_by_another_name_is_refused() {
 
 #[cfg(unix)]
 #[test]
+fn a_file_that_is_standard_input_is_no_output() {
+    use std::fs::{File, OpenOptions};
+    let bench = Bench::new();
+    bench.write("log.csv", log());
+    let log_file = || OpenOptions::new().append(true).open(bench.path("log.csv"));
+    for (command, output) in [
+        ("fit - --stage stage.toml --out log.csv", None),
+        ("check - --stage stage.toml --json log.csv", None),
+        (
+            "decode p.bin - --stage stage.toml --out -",
+            Some(log_file()),
+        ),
+    ] {
+        let arguments: Vec<&str> = command.split(' ').collect();
+        let mut program = bench.command(&arguments);
+        program.stdin(File::open(bench.path("log.csv")).expect("there"));
+        if let Some(output) = output {
+            program.stdout(output.expect("there"));
+        }
+        let refused = program.output().expect("runs");
+        assert_eq!(refused.status.code(), Some(2), "{command}");
+        assert!(
+            stderr(&refused).contains("an input of this command"),
+            "{command}"
+        );
+        assert_eq!(bench.text("log.csv"), log());
+    }
+}
+
+#[cfg(unix)]
+#[test]
 fn standard_output_carries_an_output_alone_by_whatever_name() {
     let bench = Bench::new();
     bench.write("log.csv", log());
