@@ -47,7 +47,7 @@ enum Event {
     Late(u32),
     /// Another zero deviation from this tick on.
     Zero(PlanarPose<f32>),
-    /// The source was restarted, and the servo is told.
+    /// The source was restarted, and the servo is told; the first tick passes without a frame.
     Restart(u32),
 }
 
@@ -107,7 +107,7 @@ impl Account {
     /// frame, if there was a new one.
     fn check(&mut self, event: Event, reading: &Reading, decoded: Option<Reading>) {
         let mut status = match event {
-            Event::Sound | Event::Zero(_) | Event::Restart(_) => Status::GOOD,
+            Event::Sound | Event::Zero(_) => Status::GOOD,
             Event::Bad { channel, .. } if channel < 3 => {
                 Status::from_bits(1 << channel).with(Status::PLANAR_INVALID)
             }
@@ -115,7 +115,7 @@ impl Account {
             Event::FarPlanar => Status::PLANAR_EXTRAPOLATED,
             Event::FarVertical => Status::VERTICAL_EXTRAPOLATED,
             Event::Gap(_) => Status::FRAMES_MISSED,
-            Event::NoFrame => Status::FRAMES_MISSED.with(INVALID),
+            Event::NoFrame | Event::Restart(_) => Status::FRAMES_MISSED.with(INVALID),
             Event::Late(_) => Status::FRAME_REPEATED.with(INVALID),
         };
         // What an implausible code decodes to says nothing: it may be anything.
@@ -131,7 +131,9 @@ impl Account {
         health.ticks += 1;
         match event {
             Event::Gap(lost) => health.frames_missed = health.frames_missed.saturating_add(lost),
-            Event::NoFrame => health.frames_missed = health.frames_missed.saturating_add(1),
+            Event::NoFrame | Event::Restart(_) => {
+                health.frames_missed = health.frames_missed.saturating_add(1);
+            }
             Event::Late(_) => health.frames_repeated += 1,
             _ => {}
         }
@@ -235,7 +237,9 @@ fn soak(blob: &[u8], ticks: u32, seed: u64) {
             Event::Restart(anew) => {
                 servo.forget();
                 account.holds_left = [0; 2];
-                (sequence, frame.sequence) = (anew, anew);
+                sequence = anew;
+                account.check(event, &servo.tick_without_frame(), None);
+                continue;
             }
         }
         let decoded = decoder.decode(&frame, &account.zero);

@@ -27,71 +27,60 @@ struct Job {
     outputs: &'static [&'static str],
 }
 
+const fn job(arguments: &'static str, outputs: &'static [&'static str]) -> Job {
+    Job { arguments, outputs }
+}
+
 const JOBS: &[Job] = &[
-    Job {
-        arguments: "fit log.csv --stage stage.toml --out o.bin --json o.json --report o",
-        outputs: &["o.json", "o/index.html", "o.bin"],
-    },
-    Job {
-        arguments: "fit run.csv.gz --stage stage.toml --model field --out o.bin",
-        outputs: &["o.bin.posterior", "o.bin"],
-    },
-    Job {
-        arguments: "recalibrate field.bin run.csv.gz --stage stage.toml --what all --out o.bin --json o.json",
-        outputs: &["o.json", "o.bin.posterior", "o.bin"],
-    },
-    Job {
-        arguments: "decode p.bin log.csv --stage stage.toml --out o.csv",
-        outputs: &["o.csv"],
-    },
-    Job {
-        arguments: "eval p.bin log.csv --stage stage.toml --json o.json",
-        outputs: &["o.json"],
-    },
-    Job {
-        arguments: "check log.csv --stage stage.toml --json o.json",
-        outputs: &["o.json"],
-    },
-    Job {
-        arguments: "import bus.log ifm.csv --stage stage.toml --out o.csv",
-        outputs: &["o.csv"],
-    },
-    Job {
-        arguments: "inspect p.bin --json o.json",
-        outputs: &["o.json"],
-    },
-    Job {
-        arguments: "diff p.bin field.bin --json o.json",
-        outputs: &["o.json"],
-    },
-    Job {
-        arguments: "export p.bin --format hex --slot 0 --out o.hex",
-        outputs: &["o.hex"],
-    },
-    Job {
-        arguments: "init log.csv --out o.toml --force",
-        outputs: &["o.toml"],
-    },
-    Job {
-        arguments: "plan --stage stage.toml --seconds 8 --out o.csv",
-        outputs: &["o.csv"],
-    },
-    Job {
-        arguments: "simulate --stage stage.toml --protocol service --seed 1 --out o.csv --truth o.truth",
-        outputs: &["o.csv", "o.truth"],
-    },
-    Job {
-        arguments: "compare log.csv --stage stage.toml --seeds 1 --evaluations 400 --project linear --out o",
-        outputs: &["o/table.md", "o/runs.csv", "o/history.csv"],
-    },
-    Job {
-        arguments: "man --out o",
-        outputs: &["o/host-fit.1", "o/host-fit-fit.1"],
-    },
-    Job {
-        arguments: "demo --out d",
-        outputs: &["d/params.bin", "d/pose.csv", "d/field.bin"],
-    },
+    job(
+        "fit log.csv --stage stage.toml --out o.bin --json o.json --report o",
+        &["o.json", "o/index.html", "o.bin"],
+    ),
+    job(
+        "fit run.csv.gz --stage stage.toml --model field --out o.bin",
+        &["o.bin.posterior", "o.bin"],
+    ),
+    job(
+        "recalibrate field.bin run.csv.gz --stage stage.toml --what all --out o.bin --json o.json",
+        &["o.json", "o.bin.posterior", "o.bin"],
+    ),
+    job(
+        "decode p.bin log.csv --stage stage.toml --out o.csv",
+        &["o.csv"],
+    ),
+    job(
+        "eval p.bin log.csv --stage stage.toml --json o.json",
+        &["o.json"],
+    ),
+    job(
+        "check log.csv --stage stage.toml --json o.json",
+        &["o.json"],
+    ),
+    job(
+        "import bus.log ifm.csv --stage stage.toml --out o.csv",
+        &["o.csv"],
+    ),
+    job("inspect p.bin --json o.json", &["o.json"]),
+    job("diff p.bin field.bin --json o.json", &["o.json"]),
+    job("export p.bin --format hex --slot 0 --out o.hex", &["o.hex"]),
+    job("init log.csv --out o.toml --force", &["o.toml"]),
+    job(
+        "plan --stage stage.toml --seconds 8 --out o.csv",
+        &["o.csv"],
+    ),
+    job(
+        "simulate --stage stage.toml --protocol service --seed 1 --out o.csv --truth o.truth",
+        &["o.csv", "o.truth"],
+    ),
+    job(
+        "compare log.csv --stage stage.toml --seeds 1 --evaluations 400 --project linear --out o",
+        &["o/table.md", "o/runs.csv", "o/history.csv"],
+    ),
+    job("man --out o", &["o/host-fit.1", "o/host-fit-fit.1"]),
+    job(
+        "demo --out d",
+        &["d/params.bin", "d/pose.csv", "d/field.bin"],
+    ),
 ];
 
 /// A record of the bus, and the interferometers beside it: one movement of 1.5 s.
@@ -147,12 +136,20 @@ impl Job {
         command.spawn().expect("the program runs")
     }
 
-    /// Runs it to its end; gives its time.
-    fn finish(&self, bench: &Bench) -> Duration {
+    /// Runs it to its end; gives its time and the new outputs.
+    fn finish(&self, bench: &Bench) -> (Duration, Vec<Vec<u8>>) {
+        self.restore(bench);
         let started = Instant::now();
         let status = self.start(bench).wait().expect("it ends");
         assert_eq!(status.code(), Some(0), "{}", self.arguments);
-        started.elapsed()
+        let time = started.elapsed();
+        (
+            time,
+            self.outputs
+                .iter()
+                .map(|output| bench.read(output))
+                .collect(),
+        )
     }
 
     /// How many outputs are old, and how many are new and whole.
@@ -201,13 +198,7 @@ fn a_killed_command_leaves_each_output_old_or_new_and_the_next_one_sweeps() {
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     let (mut ended, mut old, mut new, mut left) = (0, 0, 0, 0);
     for (k, job) in JOBS.iter().enumerate() {
-        job.restore(&bench);
-        let time = job.finish(&bench);
-        let whole: Vec<_> = job
-            .outputs
-            .iter()
-            .map(|output| bench.read(output))
-            .collect();
+        let (time, whole) = job.finish(&bench);
         for _ in (k as u64..kills).step_by(JOBS.len()) {
             job.restore(&bench);
             let mut running = job.start(&bench);
@@ -227,7 +218,6 @@ fn a_killed_command_leaves_each_output_old_or_new_and_the_next_one_sweeps() {
             (old, new) = (old + of_old, new + of_new);
             left += left_behind(&bench);
         }
-        job.restore(&bench);
         job.finish(&bench);
         assert_eq!(left_behind(&bench), 0, "{}", job.arguments);
     }
@@ -245,13 +235,7 @@ fn a_full_disk_leaves_every_output_of_a_command_as_it_was() {
     // The last three write many files one after the other: each is whole.
     let one_by_one = JOBS.len() - 3;
     for (k, job) in JOBS.iter().enumerate() {
-        job.restore(&bench);
-        job.finish(&bench);
-        let whole: Vec<_> = job
-            .outputs
-            .iter()
-            .map(|output| bench.read(output))
-            .collect();
+        let (_, whole) = job.finish(&bench);
         let mut blocks: Vec<_> = whole.iter().map(|bytes| (bytes.len() - 1) / 512).collect();
         blocks.push(0);
         for blocks in blocks {
