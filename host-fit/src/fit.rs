@@ -30,6 +30,7 @@ use crate::problem::Problem;
 use crate::problem::draw::draw_rows;
 use crate::problem::model::{COUNT, Model};
 use crate::problem::parameters::Parameters;
+use crate::solve::field::blocks::Rows;
 use crate::solve::field::fit::FieldFit;
 use crate::solve::robust::{HALF, Loss};
 use crate::solve::{Projection, Solution, Solver};
@@ -37,6 +38,7 @@ use runtime::calibration::Origin;
 use runtime::parameters::FitRecord;
 use runtime::{Calibration, ModelKind, ParameterSet};
 use std::cell::OnceCell;
+use std::sync::Arc;
 
 /// Room around the motion of the log in which the calibration still holds: offsets of
 /// the reference and overshoot are well inside it.
@@ -229,6 +231,15 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// The rows used as the field model sees them, with these weights: those of its first phase
+    /// where it has the same.
+    fn field_rows(&self, weights: &[f64]) -> Arc<Rows> {
+        match self.first.get() {
+            Some(Ok(first)) if first.field.weights == weights => Arc::clone(first.field.rows()),
+            _ => Arc::new(Rows::weighted(self.dataset, &self.selected, weights)),
+        }
+    }
+
     /// The rows of the log that are no outliers.
     fn sound_rows(&self, weights: &[f64]) -> impl Iterator<Item = &Row> {
         let mut outliers = outliers(&self.selected, weights).peekable();
@@ -278,15 +289,19 @@ impl<'a> Job<'a> {
             determined?;
         }
         let own_zeros = Zeros::Given(&solution.delta_m);
+        let warnings = warning::warnings(dataset, selected, &problem, &solution, &judgement);
+        let train_fitness = problem.fitness(solution.cost);
+        // Room for what the lag takes.
+        drop(problem);
         Ok(Fit {
             model,
             model_reason: format!("model ({}): --model asks for it", model.name),
-            warnings: warning::warnings(dataset, selected, &problem, &solution, &judgement),
-            train_fitness: problem.fitness(solution.cost),
+            warnings,
+            train_fitness,
             train_rows: selected.len(),
             standard_error: uncertainty.standard_error,
             field: None,
-            lag: reference_lag(dataset, selected, stage, model, parameters, &weights),
+            lag: reference_lag(&self.field_rows(&weights), stage, model, parameters),
             loss,
             outliers: outliers(selected, &weights).collect(),
             correlations: uncertainty.correlations,

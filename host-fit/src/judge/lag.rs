@@ -1,6 +1,5 @@
 //! How far the reference lags behind the probes, estimated together with the parameters.
 
-use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
@@ -26,29 +25,27 @@ pub struct ReferenceLag {
     pub standard_error_s: f64,
 }
 
-/// The lag at the least squares of a model of the paper, with the weights of its rows: one Gauss-Newton step of the lag with all
+/// The lag at the least squares of a model of the paper, by its rows with their weights: one
+/// Gauss-Newton step of the lag with all
 /// parameters that the model fits, under white noise and a walk of the reference. What the
 /// model leaves unexplained widens the standard error. `None` where no motion shows the lag.
 pub fn reference_lag(
-    dataset: &Dataset,
-    selected: &[usize],
+    rows: &Rows,
     stage: &Stage,
     model: &'static Model,
     parameters: &Parameters,
-    weights: &[f64],
 ) -> Option<ReferenceLag> {
-    let rows = Rows::weighted(dataset, selected, weights);
     let probes = probes(&FieldParameters::of_model_31(parameters, stage));
     let offsets_mm = vec![[0.0; 3]; rows.movements.len()];
     let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
-    let white_mm = white_mm(&rows, &probes, 0.0, &offsets_mm, least_mm);
+    let white_mm = white_mm(rows, &probes, 0.0, &offsets_mm, least_mm);
     let blocks = rows.evaluate(&probes, 0.0, &offsets_mm);
     let unknown = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
     let noise = Noise {
-        drift_mm: drift_mm(&rows, &blocks, white_mm, &unknown),
+        drift_mm: drift_mm(rows, &blocks, white_mm, &unknown),
         white_mm,
     };
-    let normal = Normal::new(&rows, &blocks, &noise);
+    let normal = Normal::new(rows, &blocks, &noise);
 
     // The first terms of a probe are those of Model (31), in its order.
     let place = |index: usize| index % 3 * PER_PROBE + index / 3;
@@ -74,7 +71,7 @@ pub fn reference_lag(
         (3 * rows.blocks.len()).checked_sub(3 * rows.movements.len() + unknowns.len())?;
     let chi_squared = normal.chi_squared() - descent.dot(&step);
     let unexplained = (chi_squared / residuals.max(1) as f64 - 1.0).max(0.0);
-    let alike = (ALIKE_S * rows.blocks.len() as f64 / seconds(&rows, &blocks)).max(1.0);
+    let alike = (ALIKE_S * rows.blocks.len() as f64 / seconds(rows, &blocks)).max(1.0);
     let variance = by_descent[lag] * (1.0 + unexplained * alike);
     let found = ReferenceLag {
         value_s: step[lag] * scale(COUNT),

@@ -17,7 +17,14 @@ pub struct StreamedFile {
     target: PathBuf,
     existing: Option<Metadata>,
     sink: Sink,
+    /// So far the disk was asked to begin with what was written, bytes.
+    begun: u64,
 }
+
+/// So many bytes are given to the disk while the next are written: else all of them would wait for
+/// the end.
+#[cfg(target_os = "linux")]
+const WAITING_MAX: u64 = 4 << 20;
 
 #[derive(Debug)]
 enum Sink {
@@ -39,6 +46,7 @@ impl StreamedFile {
                 path: named,
                 existing: None,
                 sink: Sink::Standard(std::io::stdout()),
+                begun: 0,
             });
         }
         let (target, existing) = resolve(path)?;
@@ -55,6 +63,7 @@ impl StreamedFile {
             path: named,
             target,
             existing,
+            begun: 0,
         })
     }
 
@@ -69,7 +78,9 @@ impl StreamedFile {
     /// `Full`, `Failed`.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), OutputError> {
         let written = match &mut self.sink {
-            Sink::Whole(file) => file.write_all(bytes),
+            Sink::Whole(file) => {
+                (file.write_all(bytes)).map(|()| begin(file.as_file_mut(), &mut self.begun))
+            }
             Sink::Device(file) => file.write_all(bytes),
             Sink::Standard(out) => out.write_all(bytes),
         };
@@ -109,3 +120,18 @@ impl StreamedFile {
         explain(source, &self.path, &folder_of(&self.target), bytes)
     }
 }
+
+/// Asks the disk to begin with what was written since the last time, if it is much; the end tells
+/// whether it could.
+#[cfg(target_os = "linux")]
+fn begin(file: &mut fs::File, begun: &mut u64) {
+    let end = file.stream_position().unwrap_or_default();
+    if end.saturating_sub(*begun) >= WAITING_MAX {
+        // So Linux takes it that these bytes are no longer wanted in memory.
+        let _ = rustix::fs::fadvise(file, *begun, None, rustix::fs::Advice::DontNeed);
+        *begun = end;
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn begin(_: &mut fs::File, _: &mut u64) {}

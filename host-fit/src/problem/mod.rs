@@ -10,6 +10,7 @@ pub mod zero_deviation;
 use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
 use model::{Model, SLOPES_MAX};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rows that a thinned problem takes of a movement at least, if it moves.
@@ -97,7 +98,8 @@ impl<'a> Problem<'a> {
     /// they share; two from each that does not.
     #[must_use]
     pub fn thinned(&self, most: usize) -> Self {
-        let moved: Vec<f64> = self.groups.iter().map(|group| self.moved(group)).collect();
+        let moved = self.groups.par_iter().map(|group| self.moved(group));
+        let moved: Vec<f64> = moved.collect();
         let idle = IDLE_SHARE * moved.iter().copied().fold(0.0, f64::max);
         let moving = moved.iter().filter(|moved| **moved > idle).count();
         let quota = (most / moving.max(1)).max(MOVING_ROWS_MIN);

@@ -166,8 +166,14 @@ impl<'a, T> Stitcher<'a, T> {
         if let Some(fault) = fault {
             return Err(fault);
         }
-        self.waiting_rows += rows.len();
-        self.waiting.push(Waiting { rows, steps });
+        if self.periods.is_none() {
+            // Long comments between few rows would hold much memory for nothing.
+            rows.shrink_to_fit();
+        }
+        if !rows.is_empty() {
+            self.waiting_rows += rows.len();
+            self.waiting.push(Waiting { rows, steps });
+        }
         if self.periods.is_some() || self.waiting_rows >= PERIOD_ROWS {
             self.give(ready);
         }
@@ -274,9 +280,7 @@ impl<'a, T> Stitcher<'a, T> {
                 row.sequence = periods.numbering.number(row.t_us, row.begins);
                 self.movements.take(row.movement, row.begins);
             }
-            if !rows.is_empty() {
-                ready.push(rows);
-            }
+            ready.push(rows);
         }
     }
 

@@ -16,6 +16,7 @@ use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
 use crate::solve::robust::{HALF, Loss};
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// Steps of one phase.
 const STEPS_MAX: u32 = 20;
@@ -122,7 +123,7 @@ impl WhiteFit {
     ) -> Result<Self, FieldFitError> {
         let rows = Rows::new(dataset, selected);
         let mut search = Search {
-            rows,
+            rows: rows.into(),
             iterations: 0,
         };
         let mut state = search.start(start, stage);
@@ -135,6 +136,11 @@ impl WhiteFit {
             normal,
             start: *start,
         })
+    }
+
+    /// The rows used, with their weights.
+    pub fn rows(&self) -> &Arc<Rows> {
+        &self.search.rows
     }
 
     /// Whether a loss would make rows count less.
@@ -156,7 +162,7 @@ impl WhiteFit {
     ) -> Result<Self, FieldFitError> {
         let rows = Rows::new(dataset, selected);
         let mut search = Search {
-            rows,
+            rows: rows.into(),
             iterations: 0,
         };
         let mut state = search.start(start, stage);
@@ -166,7 +172,7 @@ impl WhiteFit {
             if pairs.all(|(a, b)| (a - b).abs() < WEIGHT_SETTLED) {
                 break;
             }
-            search.rows = Rows::weighted(dataset, selected, &weights);
+            search.rows = Rows::weighted(dataset, selected, &weights).into();
             state = search.at(state.parameters, state.lag_s, state.offsets_mm);
             search.under_white_noise(&mut state, stage)?;
         }
@@ -175,7 +181,7 @@ impl WhiteFit {
         let movements = search.rows.movement_rows().zip(&state.offsets_mm);
         let kept = movements.filter(|(rows, _)| weights[rows.clone()].iter().any(|w| *w > 0.0));
         let offsets_mm = kept.map(|(_, offset)| *offset).collect();
-        search.rows = Rows::weighted(dataset, selected, &weights);
+        search.rows = Rows::weighted(dataset, selected, &weights).into();
         state = search.at(state.parameters, state.lag_s, offsets_mm);
         let (noise, normal) = search.under_white_noise(&mut state, stage)?;
         Ok(Self {
@@ -263,7 +269,7 @@ enum End {
 
 #[derive(Clone, Debug)]
 struct Search {
-    rows: Rows,
+    rows: Arc<Rows>,
     iterations: u32,
 }
 

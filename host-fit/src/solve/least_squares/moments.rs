@@ -24,7 +24,9 @@ use rayon::prelude::*;
 /// Slopes of a model that this is for.
 const K: usize = 3;
 /// The numbers of a row, s of the three probes, q, then s d by probe, with room for whole SIMD registers.
-const W: usize = (U + 3 * K).next_multiple_of(4);
+const W: usize = (U + 3 * K).next_multiple_of(8);
+/// Rows of which the products are added up in registers.
+const BLOCK: usize = 8;
 /// The vertical pose stands still if no row of a movement is farther from its mean than this, m or
 /// rad: sensors' noise, and not the servo's steps.
 const STILL: f64 = 2e-6;
@@ -214,43 +216,69 @@ impl OfMovement<'_> {
     }
 }
 
+/// Numbers of some rows and their products, aligned to the widest SIMD registers.
+#[repr(C, align(64))]
+struct Work {
+    products: Products,
+    numbers: [Numbers; BLOCK],
+    /// The numbers times the weight of the row; 0 beyond the last row.
+    weighted: [Numbers; BLOCK],
+}
+
 impl WithSimd for OfMovement<'_> {
     type Output = MovementSums;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> MovementSums {
+    fn with_simd<S: Simd>(self, simd: S) -> MovementSums {
+        // About the first row, near which the means are, and then about the means.
+        let origin = self.rows.first().map_or([0.0; W], |row| self.numbers(row));
         let mut weight = 0.0;
-        let mut mean = [0.0; W];
+        let mut sum = [0.0; W];
         let mut deviation = [0.0f64; K];
-        for row in self.rows {
-            let b = self.numbers(row);
-            for (mean, b) in mean.iter_mut().zip(b) {
-                *mean += row.weight * b;
+        let mut work = Work {
+            products: [[0.0; W]; W],
+            numbers: [[0.0; W]; BLOCK],
+            weighted: [[0.0; W]; BLOCK],
+        };
+        for rows in self.rows.chunks(BLOCK) {
+            work.weighted = [[0.0; W]; BLOCK];
+            for (at, row) in rows.iter().enumerate() {
+                let mut b = self.numbers(row);
+                for (b, origin) in b.iter_mut().zip(origin) {
+                    *b -= origin;
+                }
+                work.numbers[at] = b;
+                work.weighted[at] = b.map(|b| row.weight * b);
+                for (sum, b) in sum.iter_mut().zip(work.weighted[at]) {
+                    *sum += b;
+                }
+                weight += row.weight;
+                for ((most, slope), at) in deviation.iter_mut().zip(row.slopes).zip(self.at) {
+                    *most = most.max((slope - at).abs());
+                }
             }
-            weight += row.weight;
-            for ((most, slope), at) in deviation.iter_mut().zip(row.slopes).zip(self.at) {
-                *most = most.max((slope - at).abs());
+            // In whole registers, from the one with the diagonal on.
+            for (i, products) in work.products.iter_mut().enumerate() {
+                let (sums, _) = S::as_mut_simd_f64s(products);
+                for (j, sum) in sums.iter_mut().enumerate().skip(i / S::F64_LANES) {
+                    for (b, weighted) in work.numbers.iter().zip(&work.weighted) {
+                        let (b, _) = S::as_simd_f64s(b);
+                        let product = simd.mul_f64s(simd.splat_f64s(weighted[i]), b[j]);
+                        *sum = simd.add_f64s(*sum, product);
+                    }
+                }
             }
         }
-        let mean = mean.map(|sum| sum / weight);
-        let mut products = [[0.0; W]; W];
-        for row in self.rows {
-            let mut b = self.numbers(row);
-            for (b, mean) in b.iter_mut().zip(mean) {
-                *b -= mean;
-            }
-            for (i, products) in products.iter_mut().enumerate() {
-                let from = i & !3;
-                let factor = row.weight * b[i];
-                for (sum, b) in products[from..].iter_mut().zip(&b[from..]) {
-                    *sum += factor * b;
-                }
+        let mean = sum.map(|sum| sum / weight);
+        for (products, mean_i) in work.products.iter_mut().zip(mean) {
+            for (product, mean_j) in products.iter_mut().zip(mean) {
+                *product -= weight * mean_i * mean_j;
             }
         }
         MovementSums {
             weight,
-            mean,
-            products,
+            mean: std::array::from_fn(|k| origin[k] + mean[k]),
+            products: work.products,
             deviation,
         }
     }

@@ -5,6 +5,7 @@ use super::descend::{Descent, DescentEnd, Sums, descend};
 use super::moments::Moments;
 use super::normal::{Column, Point, best_gain, cost};
 use super::scatter::{Offset, Q, Ratios, U};
+use crate::problem::model::SLOPES_MAX;
 use crate::problem::parameters::{ETA, Parameters, SLOPES, THETA, search_box};
 use crate::problem::zero_deviation::ZeroDeviation;
 use crate::problem::{Group, Problem, TrainRow};
@@ -347,9 +348,7 @@ fn starts(problem: &Problem, seed: u64) -> Vec<Parameters> {
         for k in 0..THETA {
             p[k] = ranges[k].low + random.random::<f64>() * ranges[k].width();
         }
-        let far = point_of(&start).is_some_and(|point| {
-            smallest_sensitivity(problem, &point.ratios) > START_SENSITIVITY_MIN
-        });
+        let far = point_of(&start).is_some_and(|point| is_far_from_poles(problem, &point.ratios));
         if far {
             starts.push(start);
         }
@@ -357,11 +356,14 @@ fn starts(problem: &Problem, seed: u64) -> Vec<Parameters> {
     starts
 }
 
-/// The smallest phi / eta over the rows.
-fn smallest_sensitivity(problem: &Problem, ratios: &Ratios) -> f64 {
-    let share = |row: &TrainRow| {
-        ratios.map(|r| 1.0 + r.iter().zip(row.slopes).map(|(r, v)| r * v).sum::<f64>())
+/// Whether phi / eta stays above [`START_SENSITIVITY_MIN`] over all rows.
+fn is_far_from_poles(problem: &Problem, ratios: &Ratios) -> bool {
+    let share = |r: &[f64; SLOPES_MAX], row: &TrainRow| {
+        1.0 + r.iter().zip(row.slopes).map(|(r, v)| r * v).sum::<f64>()
     };
-    let shares = problem.rows.iter().flat_map(share);
-    shares.fold(f64::INFINITY, f64::min)
+    let is_far = |row: &TrainRow| {
+        let mut shares = ratios.iter().map(|r| share(r, row));
+        shares.all(|share| share > START_SENSITIVITY_MIN)
+    };
+    problem.rows.iter().all(is_far)
 }
