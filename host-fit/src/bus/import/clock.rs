@@ -15,13 +15,17 @@ const STRETCH_TICKS: usize = 30_000;
 /// Ticks of one stretch of line, at least: few may all have come late.
 const STRETCH_TICKS_MIN: usize = 125;
 
-/// Ticks of which one, at least, must have been received on time: a second at 500 Hz.
-const LATE_TICKS_MAX: usize = 500;
+/// Ticks of which one, at least, must have been received on time: half a second at 500 Hz.
+const LATE_TICKS_MAX: usize = 250;
+
+/// How far these may be off their line, as a part of a servo period: an adapter that fetches frames
+/// every millisecond drifts by that against the ticks.
+const OFF_PERIODS_MAX: f64 = 0.75;
 
 /// Weight of a time above the line, against 1 of one below.
 const LATE_WEIGHT: f64 = 0.01;
 
-/// Times further above the line pull it no harder, us: a second that was received late must not bend a minute.
+/// Times further above the line pull it no harder, us: a stall must not bend it.
 const LATE_PULL_US: f64 = 2_000.0;
 
 /// How much the clocks' difference in speed may change from one line to the next, as a part of one.
@@ -41,8 +45,9 @@ pub struct Smoothing {
     pub rms_us: f64,
     /// Largest distance of a receive time from its line, us.
     pub max_us: f64,
-    /// Largest distance of the earliest of 500 successive ticks from their line, and of two
-    /// successive lines from each other, us: how well the lines tell the times.
+    /// Largest distance of the earliest of 250 successive ticks from their line, of those of the next
+    /// 250 from them, and of two successive lines from each other, us: how well the lines tell the
+    /// times.
     pub off_us: f64,
     /// Where that is, s after the first tick with a time.
     pub off_at_s: f64,
@@ -127,6 +132,7 @@ impl Smoother {
             self.note((apart_us - RATE_CHANGE_MAX * lost_us).max(0.0), first);
         }
         let blocks = part.len().div_ceil(LATE_TICKS_MAX);
+        let mut before_us = None;
         for block in part.chunks(part.len().div_ceil(blocks)) {
             let mut earliest_us = f64::INFINITY;
             for tick in block {
@@ -137,7 +143,10 @@ impl Smoother {
                 earliest_us = earliest_us.min(distance);
                 self.timed.push_back((*tick, time));
             }
-            self.note(earliest_us.abs(), block.first().unwrap_or(first));
+            // A line may lie across a step of the clock.
+            let step_us = earliest_us - before_us.replace(earliest_us).unwrap_or(earliest_us);
+            let off_us = earliest_us.abs().max(step_us.abs());
+            self.note(off_us, block.first().unwrap_or(first));
         }
     }
 
@@ -197,7 +206,7 @@ impl<'s> EvenTicks<'s> {
     /// What the record held, and how even its times were.
     ///
     /// # Errors
-    /// `NoTicks`, and `UnevenTimes` if those of a second are all a servo period off their line.
+    /// `NoTicks`, and `UnevenTimes` if those of half a second are all off their line.
     pub(super) fn finish(
         &self,
         settings: &ImportSettings,
@@ -212,7 +221,7 @@ impl<'s> EvenTicks<'s> {
                 ticks: counts.ticks,
             });
         }
-        if smoothing.off_us > stage.servo_period_s * 1e6 {
+        if smoothing.off_us > OFF_PERIODS_MAX * stage.servo_period_s * 1e6 {
             return Err(ImportError::UnevenTimes {
                 off_us: smoothing.off_us,
                 at_s: smoothing.off_at_s,

@@ -176,12 +176,12 @@ pub enum ImportError {
     },
     /// Frames were received too unevenly to tell when their codes were sampled.
     #[error(
-        "{at_s:.1} s after the first tick, every tick for a second was received {off_us:.0} us off the even course of the others, more \
-         than a servo period: the clock of the recording computer was set during the record (turn its adjustment off, NTP), or it \
-         could not keep up for so long; record again"
+        "about {at_s:.1} s after the first tick the receive times leave the even course of the others by {off_us:.0} us, for half a \
+         second or more: the clock of the recording computer was set during the record (turn its adjustment off, NTP), or it could \
+         not keep up for so long; record again"
     )]
     UnevenTimes {
-        /// The smallest distance of these ticks from the course, us.
+        /// The smallest distance of those ticks from the course, us.
         off_us: f64,
         /// When, s after the first tick.
         at_s: f64,

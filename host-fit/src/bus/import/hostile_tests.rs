@@ -94,7 +94,7 @@ fn what_import_writes_every_reader_of_logs_accepts() {
         }
     }
     // The mutations leave some whole and damage some.
-    assert!((100..350).contains(&imported), "{imported}");
+    assert!((80..350).contains(&imported), "{imported}");
 }
 
 #[test]

@@ -162,19 +162,22 @@ impl Numbering {
 
     /// Numbers the ticks before a mark.
     fn number_until(&mut self, mark: &Mark) {
+        let agrees = |start: &Mark| {
+            mark.follows
+                && mark.counted.checked_sub(start.counted) == Some(mark.sequence - start.sequence)
+        };
+        let Some(start) = self.mark.filter(agrees) else {
+            // Ticks were lost unseen before or after any of these, the last one included.
+            self.leave_out(self.waiting.len() as u64);
+            self.waiting.clear();
+            self.follows &= mark.follows;
+            return;
+        };
         let split = self
             .waiting
             .partition_point(|tick| tick.sequence < mark.counted);
         let rest = self.waiting.split_off(split);
         let before = std::mem::replace(&mut self.waiting, rest);
-        let Some(start) = self.mark.filter(|start| {
-            mark.follows
-                && mark.counted.checked_sub(start.counted) == Some(mark.sequence - start.sequence)
-        }) else {
-            self.leave_out(before.len() as u64);
-            self.follows &= mark.follows;
-            return;
-        };
         for tick in before {
             let sequence = start.sequence + (tick.sequence - start.counted);
             let follows = std::mem::replace(&mut self.follows, true);
@@ -222,4 +225,85 @@ impl Mark {
 const fn first_after(before: u64, counter: u64) -> u64 {
     let ahead = (counter + COUNTERS - before % COUNTERS) % COUNTERS;
     before + if ahead == 0 { COUNTERS } else { ahead }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tick(sequence: u64) -> BusTick {
+        BusTick {
+            sequence,
+            follows: true,
+            received_us: 0,
+            hall: [sequence as i32; 3],
+            capacitive: [0; 3],
+            is_saturated: false,
+        }
+    }
+
+    fn time_frame(number: u64) -> TickTime {
+        TickTime {
+            sequence: number as u32 & 0xf_ffff,
+            time_us: (2_000 * number) as u32,
+        }
+    }
+
+    /// The ticks of a record in which those of `lost` are missing; the receiver may refuse as many
+    /// after them.
+    fn numbered(lost: std::ops::Range<u64>, refused: u64, late: bool) -> (Vec<BusTick>, u64) {
+        let mut numbering = Numbering::new(2_000.0);
+        let first = NUMBERS - 100;
+        for n in (first..first + 700).filter(|n| !lost.contains(&(n - first))) {
+            let is_refused = (lost.end..lost.end + refused).contains(&(n - first));
+            let is_time = n.is_multiple_of(16);
+            if is_time && !late {
+                numbering.take_time(time_frame(n));
+            }
+            if !is_refused {
+                numbering.take(tick(n));
+            }
+            if is_time && late {
+                numbering.take_time(time_frame(n));
+            }
+        }
+        numbering.end();
+        let ticks = std::iter::from_fn(|| numbering.next()).collect();
+        (ticks, numbering.counts().missing)
+    }
+
+    #[test]
+    fn no_loss_of_ticks_gives_a_tick_another_number() {
+        for count in 0..130 {
+            for start in 190..222 {
+                for (refused, late) in [(0, false), (1, false), (2, true)] {
+                    let (ticks, missing) = numbered(start..start + count, refused, late);
+                    let offset = ticks[0].hall[0] - ticks[0].sequence as i32;
+                    let what = format!("{count} from {start} on, {refused} refused");
+                    assert!(ticks.len() as u64 + count > 630, "{what}: {}", ticks.len());
+                    for tick in &ticks {
+                        assert_eq!(tick.hall[0] - tick.sequence as i32, offset, "{what}");
+                    }
+                    assert!(ticks.iter().skip(1).all(|tick| tick.follows), "{what}");
+                    assert!(missing <= count + refused, "{what}: {missing}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_node_that_starts_again_counts_anew() {
+        let mut numbering = Numbering::new(2_000.0);
+        for n in (600_000..600_100).chain(0..100) {
+            if n % 16 == 0 {
+                numbering.take_time(time_frame(n));
+            }
+            numbering.take(tick(n));
+        }
+        numbering.end();
+        let ticks: Vec<_> = std::iter::from_fn(|| numbering.next()).collect();
+        let breaks = ticks.iter().filter(|tick| !tick.follows).count();
+        // The first tick of each run.
+        assert_eq!((breaks, ticks.len()), (2, 192));
+    }
 }

@@ -95,8 +95,8 @@ impl Display for ImportReport {
         let times = &self.smoothing;
         writeln!(
             f,
-            "  {:.3} us a tick; receive times {:.1} us rms and at most {:.1} us from even ones, in {} stretches; the earliest of each second at \
-             most {:.1} us",
+            "  {:.3} us a tick; receive times {:.1} us rms and at most {:.1} us from even ones, in {} stretches; the earliest of each half second \
+             at most {:.1} us",
             times.period_us, times.rms_us, times.max_us, times.stretches, times.off_us
         )?;
         let reference = &self.reference;
