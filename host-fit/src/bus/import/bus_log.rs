@@ -7,7 +7,7 @@ use runtime::frame::MISSING_CODE;
 /// A whole tick of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusTick {
-    /// Its number, lost ticks counted as far as they show.
+    /// Its number, lost ticks counted as far as the counters show them.
     pub sequence: u64,
     /// Whether the sensor node counted on since the tick before.
     pub follows: bool,
@@ -34,8 +34,8 @@ pub struct BusCounts {
     pub ticks: usize,
     /// Whole ticks that were left out because a code is at a rail of its converter.
     pub saturated: usize,
-    /// Whole ticks that were left out because lost ticks around them, of an unknown number up to the
-    /// next time frame, leave their own number open.
+    /// Whole ticks that were left out because their number is not certain: no time frame came on
+    /// both sides of them, or 16 ticks or more were lost between the two.
     pub unnumbered: u64,
     /// Ticks missing between them, those that were not whole included.
     pub ticks_missing: u64,

@@ -51,7 +51,7 @@ pub struct Smoothing {
     pub off_us: f64,
     /// Where that is, s after the first tick with a time.
     pub off_at_s: f64,
-    /// Ticks left out because the sensor node started again soon after them, and before.
+    /// Ticks left out because the sensor node started again before there were 125.
     pub untimed: usize,
 }
 
