@@ -165,7 +165,12 @@ struct Dated {
     sequence: u32,
     /// When its codes were sampled, us of the node's clock.
     time_us: u32,
+    /// When its time frame came, us.
+    received_us: u32,
 }
+
+/// How many periods late a pose or a time frame may come: half of a counter's range.
+const LATE_PERIODS_MAX: u32 = 8;
 
 /// Receives pose frames.
 #[derive(Clone, Debug)]
@@ -227,7 +232,7 @@ impl PoseReceiver {
             return taken;
         }
         if is(&Message::PoseTime) {
-            let fault = self.take_time(data);
+            let fault = self.take_time(data, now_us);
             return Taken { tick: None, fault };
         }
         let fault = VERTICAL
@@ -237,7 +242,7 @@ impl PoseReceiver {
         Taken { tick: None, fault }
     }
 
-    fn take_time(&mut self, data: &[u8]) -> Option<BusFault> {
+    fn take_time(&mut self, data: &[u8], now_us: u32) -> Option<BusFault> {
         let message = Message::PoseTime;
         let (counter, payload) = match open(message, data) {
             Ok(opened) => opened,
@@ -248,6 +253,7 @@ impl PoseReceiver {
             self.dated = Some(Dated {
                 sequence: self.planar.nearest(0),
                 time_us: payload.long,
+                received_us: now_us,
             });
         }
         let fault = verdict.fault(message)?;
@@ -257,11 +263,16 @@ impl PoseReceiver {
     /// When the codes of a pose were sampled, us of the node's clock, which wraps: the last time
     /// that it told, and one servo period for each tick since. `None` before the first time
     /// frame and, after a tick that the node missed, until the next one: the node does not
-    /// number the ticks that it missed.
+    /// number the ticks that it missed. `None`, too, where the receive times do not bear the
+    /// numbers out: a loss of 16 ticks does not show in the counters.
     pub fn sampled_us(&self, pose: &ReceivedPose, period_us: u32) -> Option<u32> {
         let dated = self.dated?;
         let ticks = pose.sequence.wrapping_sub(dated.sequence);
-        Some(dated.time_us.wrapping_add(ticks.wrapping_mul(period_us)))
+        let since_us = ticks.wrapping_mul(period_us);
+        let received_us = pose.time_us.wrapping_sub(dated.received_us);
+        let apart_us = (received_us.wrapping_sub(since_us) as i32).unsigned_abs();
+        (apart_us < period_us.saturating_mul(LATE_PERIODS_MAX))
+            .then(|| dated.time_us.wrapping_add(since_us))
     }
 
     fn take_vertical(&mut self, k: usize, data: &[u8], time_us: u32) -> Option<BusFault> {

@@ -130,6 +130,45 @@ fn poses_between_two_time_frames_are_dated_by_their_numbers() {
     assert_eq!(undated, 8);
 }
 
+/// A host that loses frames: the counters of 15 to 18 ticks look like 0 to 2, and a time frame may
+/// come whose poses were lost.
+#[test]
+fn a_pose_after_any_loss_has_its_own_time_or_none() {
+    for lost in 0..100u16 {
+        for start in 40..56u16 {
+            let mut sender = PoseSender::default();
+            let mut receiver = PoseReceiver::new(Timing::default());
+            let mut dated = 0;
+            for k in 0..200u16 {
+                let time_us = 2_000 * u32::from(k);
+                let late_us = u32::from(k) * 7919 % 3_000;
+                let is_lost = (start..start + lost).contains(&k);
+                for frame in sender.frames(&reading(k), Some(&codes(k.into(), time_us))) {
+                    // The last time frame of the loss gets through.
+                    let last_time = frame.message == Message::PoseTime && k + 16 >= start + lost;
+                    if is_lost && !last_time {
+                        continue;
+                    }
+                    let taken = receiver.take(&BusFrame::from(frame), time_us + late_us);
+                    let Some(pose) = taken.tick.filter(|pose| pose.valid().is_some()) else {
+                        continue;
+                    };
+                    // X tells the tick.
+                    let number = (pose.pose.x_m / 1.3e-7).round() as u32;
+                    if let Some(sampled_us) = receiver.sampled_us(&pose, 2_000) {
+                        assert_eq!(sampled_us, 2_000 * number, "{lost} from {start} on");
+                        dated += 1;
+                    }
+                }
+            }
+            assert!(
+                dated + u32::from(lost) > 140,
+                "{lost} from {start} on: {dated}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_time_frame_worked_by_hand() {
     let frame = time_frame(&codes(0x12_3456, 0x0102_0304), 0x15);

@@ -4,8 +4,10 @@
 //! every receiver notices a tick that the node skips.
 
 use super::e2e::{Payload, protect};
-use super::frame::Coded;
+use super::frame::{Coded, standard};
+use super::notice::open;
 use super::table::{Message, SLOW_TICKS};
+use embedded_can::Frame;
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
 
@@ -176,6 +178,28 @@ const fn time_frame(frame: &RawFrame) -> Option<Coded> {
     ))
 }
 
+/// Number and time of a tick, as [`Message::SensorTime`] tells them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TickTime {
+    /// The number that the sensor node gave it, modulo 2^20.
+    pub sequence: u32,
+    /// When its codes were sampled by the node's clock, us, wrapping.
+    pub time_us: u32,
+}
+
+/// What a time frame tells; `None` for any other frame and for a damaged one.
+pub fn read_time<F: Frame>(frame: &F) -> Option<TickTime> {
+    let (id, data) = standard(frame)?;
+    if id != Message::SensorTime.id() {
+        return None;
+    }
+    let (_, payload) = open(Message::SensorTime, data).ok()?;
+    Some(TickTime {
+        sequence: payload.short,
+        time_us: payload.long,
+    })
+}
+
 /// Every frame of a tick in the order in which it is sent.
 pub fn frames(layout: Layout, frame: &RawFrame) -> impl Iterator<Item = Coded> + use<> {
     let codes = match layout {
@@ -193,6 +217,7 @@ pub fn frames(layout: Layout, frame: &RawFrame) -> impl Iterator<Item = Coded> +
 #[cfg(test)]
 mod tests {
     use super::super::e2e::unprotect;
+    use super::super::frame::BusFrame;
     use super::*;
     use proptest::prelude::*;
 
@@ -231,6 +256,14 @@ mod tests {
         // Counter 4 of this message's own frames, sequence 0x12340, time 7.
         let bytes = sent.expect("a sixteenth tick").bytes;
         assert_eq!(bytes[1..], [0x04, 0x34, 0x12, 7, 0, 0, 0]);
+        let sent = sent.map(BusFrame::from).expect("a sixteenth tick");
+        let told = TickTime {
+            sequence: 0x1_2340,
+            time_us: 7,
+        };
+        assert_eq!(read_time(&sent), Some(told));
+        assert_eq!(read_time(&sent.flipped(1)), None);
+        assert_eq!(read_time(&BusFrame::from(frames_16(&FRAME)[0])), None);
         assert_eq!(time_frame(&at(0x1_2341)), None);
         assert_eq!(frames(Layout::Bits16, &at(0)).count(), 3);
         assert_eq!(frames(Layout::Bits24, &at(1)).count(), 3);

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | lines of text, from a file as often as needed | `input` |
 //! | lines of `candump -L` to ticks, by the receiver of the bus | `bus_reader`, [`bus_log`] |
+//! | numbers of the ticks by the node's own count, so that no lost tick shifts the others | `numbering` |
 //! | receive times to sample times: the node samples evenly, the bus delivers unevenly | [`clock`] |
 //! | the interferometers' CSV | [`reference`](mod@reference) |
 //! | offset between the clocks and difference in speed, where asked for | `survey`, [`offset`], `refine` |
@@ -17,6 +18,7 @@ pub mod clock;
 mod error;
 mod input;
 pub mod join;
+mod numbering;
 pub mod offset;
 pub mod reference;
 mod refine;
@@ -175,3 +177,7 @@ mod controller_tests;
 #[cfg(test)]
 #[path = "import/hostile_tests.rs"]
 mod hostile_tests;
+
+#[cfg(test)]
+#[path = "import/loss_tests.rs"]
+mod loss_tests;

@@ -1,17 +1,15 @@
 //! Frames of a bus to ticks, by the receiver that a controller has.
 
-use hal_adapters::can::{
-    BusFault, BusHealth, Layout, Message, SensorReceiver, StampedFrame, Timing,
-};
+use hal_adapters::can::{BusHealth, Layout, Message, SensorReceiver, StampedFrame, Timing};
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
 
 /// A whole tick of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusTick {
-    /// Its number, lost ticks counted.
+    /// Its number, lost ticks counted as far as the counters show them.
     pub sequence: u64,
-    /// Whether the sensor node counted on from the tick before.
+    /// Whether the sensor node counted on since the tick before.
     pub follows: bool,
     /// When its first frame was received, us.
     pub received_us: u64,
@@ -19,6 +17,8 @@ pub struct BusTick {
     pub hall: [i32; 3],
     /// Capacitive codes 1, 2, 3.
     pub capacitive: [i32; 3],
+    /// Whether a code is at a rail of its converter.
+    pub is_saturated: bool,
 }
 
 /// What a record held.
@@ -34,6 +34,9 @@ pub struct BusCounts {
     pub ticks: usize,
     /// Whole ticks that were left out because a code is at a rail of its converter.
     pub saturated: usize,
+    /// Whole ticks that were left out because their number is not certain: no time frame came on
+    /// both sides of them, or 16 ticks or more were lost between the two.
+    pub unnumbered: u64,
     /// Ticks missing between them, those that were not whole included.
     pub ticks_missing: u64,
     /// Places where ticks are missing.
@@ -56,7 +59,6 @@ pub(in crate::bus) struct Collector {
     counts: BusCounts,
     /// Number of the last whole tick, by the receiver and in the record.
     last: Option<(u32, u64)>,
-    restarted: bool,
 }
 
 impl Collector {
@@ -79,14 +81,6 @@ impl Collector {
         let receiver = self.receiver.get_or_insert_with(new);
         // The receiver's times wrap after 71 minutes.
         let taken = receiver.take(&stamped.frame, stamped.time_us as u32);
-        self.restarted |= matches!(
-            taken.fault,
-            Some(
-                BusFault::SenderRestarted
-                    | BusFault::WrongSequence { .. }
-                    | BusFault::TicksLost { .. }
-            )
-        );
         self.tick(&taken.tick?, stamped.time_us)
     }
 
@@ -95,9 +89,8 @@ impl Collector {
         if codes.clone().any(|c| *c == MISSING_CODE) {
             return None;
         }
-        let (ahead, before) = self.last.map_or((0, 0), |(last, before)| {
-            (raw.sequence.wrapping_sub(last), before)
-        });
+        let (last, before) = self.last.unwrap_or((raw.sequence, u64::from(raw.sequence)));
+        let ahead = raw.sequence.wrapping_sub(last);
         let sequence = before + u64::from(ahead);
         self.last = Some((raw.sequence, sequence));
         self.counts.ticks += 1;
@@ -110,10 +103,11 @@ impl Collector {
         let age_us = if age_us > u32::MAX / 2 { 0 } else { age_us };
         Some(BusTick {
             sequence,
-            follows: !core::mem::take(&mut self.restarted),
+            follows: true,
             received_us: now_us.saturating_sub(age_us.into()),
             hall: raw.hall,
             capacitive: raw.capacitive,
+            is_saturated: false,
         })
     }
 

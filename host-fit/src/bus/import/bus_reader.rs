@@ -2,11 +2,13 @@
 
 use super::bus_log::{BusCounts, BusTick, Collector};
 use super::input::{Input, LINE_BYTES_MAX, Line, Lines};
+use super::numbering::Numbering;
 use super::{ImportError, ImportSettings};
 use crate::input::log::layout::Quantity;
 use crate::input::stage::{CodeScale, Stage};
+use hal_adapters::can::StampedFrame;
+use hal_adapters::can::sensor::read_time;
 use hal_adapters::candump::{LineError, LogLine};
-use std::path::Path;
 
 /// A record of the bus, read tick by tick.
 pub(super) struct BusReader<'s> {
@@ -17,12 +19,12 @@ pub(super) struct BusReader<'s> {
     line: usize,
     interface: Option<String>,
     collector: Collector,
-    /// Those that the collector does not know.
+    numbering: Numbering,
+    is_read: bool,
+    /// Those that the collector and the numbering do not know.
     counts: BusCounts,
-    /// When the tick before was received, us.
-    before_us: Option<u64>,
-    /// Whether the next tick follows on those before, if it says so.
-    follows: bool,
+    /// When the frame before was received, us.
+    before_us: u64,
 }
 
 impl<'s> BusReader<'s> {
@@ -43,103 +45,120 @@ impl<'s> BusReader<'s> {
             line: 0,
             interface: settings.interface.clone(),
             collector: Collector::new(settings.layout),
+            numbering: Numbering::new(stage.servo_period_s * 1e6),
+            is_read: false,
             counts: BusCounts::default(),
-            before_us: None,
-            follows: true,
+            before_us: 0,
         })
     }
 
-    /// The next whole tick, its codes within the converters' ranges and after the one before.
+    /// The next whole tick that has its number by the sensor node's count, its codes between the
+    /// rails of the converters.
     ///
     /// # Errors
     /// `Bus`, `BadLine`, `NotText`, `SeveralInterfaces`, `OutsideConverter`, `ClockBackwards`.
     pub(super) fn next_tick(&mut self) -> Result<Option<BusTick>, ImportError> {
         loop {
-            self.line += 1;
-            let parsed = match self.lines.next()? {
-                None => return Ok(None),
-                Some(Line::Long) => Err(LineError::Trailing {
-                    column: LINE_BYTES_MAX,
-                }),
-                Some(Line::Whole(line)) => {
-                    let line = line.trim_ascii();
-                    if line.is_empty() {
-                        continue;
-                    }
-                    match std::str::from_utf8(line) {
-                        Ok(text) => LogLine::parse(text),
-                        Err(_) if self.settings.skip_bad_lines => Err(LineError::BadTime),
-                        Err(_) => {
-                            return Err(ImportError::NotText {
-                                path: self.settings.bus.clone(),
-                                line: self.line,
-                            });
-                        }
-                    }
-                }
-            };
-            let tick = match parsed {
-                Ok(found) => {
-                    let interface = &mut self.interface;
-                    match chosen(interface, &found, self.settings, self.line)? {
-                        true => self.collector.take(&found.stamped()),
-                        false => None,
-                    }
-                }
-                Err(LineError::ErrorFrame | LineError::FlexibleDataRate) => {
-                    self.counts.other_lines += 1;
-                    None
-                }
-                Err(_) if self.settings.skip_bad_lines => {
-                    self.counts.bad_lines += 1;
-                    None
-                }
-                Err(fault) => {
-                    return Err(ImportError::BadLine {
-                        path: self.settings.bus.clone(),
-                        line: self.line,
-                        fault,
-                    });
-                }
-            };
-            if let Some(mut tick) = tick {
-                // What a tick that is left out does not follow on, the next one does not either.
-                tick.follows &= core::mem::replace(&mut self.follows, true);
-                if self.is_sound(&tick)? {
+            while let Some(tick) = self.numbering.next() {
+                if !tick.is_saturated {
                     return Ok(Some(tick));
                 }
-                self.follows = tick.follows;
             }
+            if self.is_read {
+                return Ok(None);
+            }
+            self.read_line()?;
         }
+    }
+
+    fn read_line(&mut self) -> Result<(), ImportError> {
+        self.line += 1;
+        let parsed = match self.lines.next()? {
+            None => {
+                self.is_read = true;
+                self.numbering.end();
+                return Ok(());
+            }
+            Some(Line::Long) => Err(LineError::Trailing {
+                column: LINE_BYTES_MAX,
+            }),
+            Some(Line::Whole(line)) => {
+                let line = line.trim_ascii();
+                if line.is_empty() {
+                    return Ok(());
+                }
+                match std::str::from_utf8(line) {
+                    Ok(text) => LogLine::parse(text),
+                    Err(_) if self.settings.skip_bad_lines => Err(LineError::BadTime),
+                    Err(_) => {
+                        return Err(ImportError::NotText {
+                            path: self.settings.bus.clone(),
+                            line: self.line,
+                        });
+                    }
+                }
+            }
+        };
+        let frame = match parsed {
+            Ok(found) => match chosen(&mut self.interface, &found, self.settings, self.line)? {
+                true => Some(found.stamped()),
+                false => None,
+            },
+            Err(LineError::ErrorFrame | LineError::FlexibleDataRate) => {
+                self.counts.other_lines += 1;
+                None
+            }
+            Err(_) if self.settings.skip_bad_lines => {
+                self.counts.bad_lines += 1;
+                None
+            }
+            Err(fault) => {
+                return Err(ImportError::BadLine {
+                    path: self.settings.bus.clone(),
+                    line: self.line,
+                    fault,
+                });
+            }
+        };
+        frame.map_or(Ok(()), |stamped| self.take(&stamped))
+    }
+
+    fn take(&mut self, stamped: &StampedFrame) -> Result<(), ImportError> {
+        let back_us = self.before_us.saturating_sub(stamped.time_us);
+        if back_us as f64 > self.stage.servo_period_s * 1e6 {
+            return Err(ImportError::ClockBackwards {
+                path: self.settings.bus.clone(),
+                line: self.line,
+                back_s: back_us as f64 * 1e-6,
+            });
+        }
+        self.before_us = stamped.time_us;
+        if let Some(mut tick) = self.collector.take(stamped) {
+            tick.is_saturated = self.is_saturated(&tick)?;
+            self.counts.saturated += usize::from(tick.is_saturated);
+            self.numbering.take(tick);
+        } else if let Some(time) = read_time(&stamped.frame) {
+            self.numbering.take_time(time);
+        }
+        Ok(())
     }
 
     /// What the record held as far as it was read.
     pub(super) fn counts(&self) -> BusCounts {
+        let numbered = self.numbering.counts();
         BusCounts {
             bad_lines: self.counts.bad_lines,
             other_lines: self.counts.other_lines,
             saturated: self.counts.saturated,
+            unnumbered: numbered.unnumbered,
+            ticks_missing: numbered.missing,
+            gaps: numbered.gaps,
             ..self.collector.counts()
         }
     }
 
-    fn path(&self) -> &Path {
-        &self.settings.bus
-    }
-
-    /// Whether a tick belongs into a log; those with a code at a rail are counted.
-    fn is_sound(&mut self, tick: &BusTick) -> Result<bool, ImportError> {
-        let step_us = (self.stage.servo_period_s * 1e6) as u64;
-        if let Some(before_us) = self.before_us
-            && tick.received_us.saturating_add(step_us) < before_us
-        {
-            return Err(ImportError::ClockBackwards {
-                path: self.path().to_path_buf(),
-                line: self.line,
-                back_s: (before_us - tick.received_us) as f64 * 1e-6,
-            });
-        }
-        self.before_us = Some(tick.received_us);
+    /// Whether a tick has a code at a rail of its converter.
+    fn is_saturated(&self, tick: &BusTick) -> Result<bool, ImportError> {
         let mut is_sound = true;
         let sensors = [
             (&self.stage.hall, Quantity::HALL, tick.hall),
@@ -150,8 +169,7 @@ impl<'s> BusReader<'s> {
                 is_sound &= self.is_inside(converter, quantity, code)?;
             }
         }
-        self.counts.saturated += usize::from(!is_sound);
-        Ok(is_sound)
+        Ok(!is_sound)
     }
 
     /// Whether a code is between the rails of its converter.
@@ -166,7 +184,7 @@ impl<'s> BusReader<'s> {
             return Ok(converter.window.contains(code));
         }
         Err(ImportError::OutsideConverter {
-            path: self.path().to_path_buf(),
+            path: self.settings.bus.clone(),
             line: self.line,
             sensor: quantity.key(),
             code,

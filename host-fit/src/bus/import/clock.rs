@@ -12,8 +12,24 @@ use std::collections::VecDeque;
 /// apart by no more than they differ in speed.
 const STRETCH_TICKS: usize = 30_000;
 
+/// Ticks of one stretch of line, at least: few may all have come late.
+const STRETCH_TICKS_MIN: usize = 125;
+
+/// Ticks of which one, at least, must have been received on time: half a second at 500 Hz.
+const LATE_TICKS_MAX: usize = 250;
+
+/// How far these may be off their line, as a part of a servo period: an adapter that fetches frames
+/// every millisecond drifts by that against the ticks.
+const OFF_PERIODS_MAX: f64 = 0.75;
+
 /// Weight of a time above the line, against 1 of one below.
 const LATE_WEIGHT: f64 = 0.01;
+
+/// Times further above the line pull it no harder, us: a stall must not bend it.
+const LATE_PULL_US: f64 = 2_000.0;
+
+/// How much the clocks' difference in speed may change from one line to the next, as a part of one.
+const RATE_CHANGE_MAX: f64 = 1e-4;
 
 /// Rounds of the weighted fit: it settles within a dozen.
 const ROUNDS: usize = 20;
@@ -29,6 +45,14 @@ pub struct Smoothing {
     pub rms_us: f64,
     /// Largest distance of a receive time from its line, us.
     pub max_us: f64,
+    /// Largest distance of the earliest of 250 successive ticks from their line, of those of the next
+    /// 250 from them, and of two successive lines from each other, us: how well the lines tell the
+    /// times.
+    pub off_us: f64,
+    /// Where that is, s after the first tick with a time.
+    pub off_at_s: f64,
+    /// Ticks left out because the sensor node started again before there were 125.
+    pub untimed: usize,
 }
 
 /// A tick and its sample time on the clock of the receive times, us since 1970 or whatever the
@@ -41,6 +65,9 @@ pub(super) type TimedTick = (BusTick, f64);
 pub(super) struct Smoother {
     /// The ticks of the stretch that has no line yet.
     stretch: Vec<BusTick>,
+    /// The line before, and the last tick on it, if those of the stretch follow.
+    before: Option<(Line, BusTick)>,
+    first_us: Option<u64>,
     timed: VecDeque<TimedTick>,
     ticks: usize,
     squares: f64,
@@ -52,6 +79,7 @@ impl Smoother {
     pub(super) fn take(&mut self, tick: BusTick) {
         if !tick.follows {
             self.end();
+            self.before = None;
         }
         self.stretch.push(tick);
         if self.stretch.len() >= 2 * STRETCH_TICKS {
@@ -64,6 +92,10 @@ impl Smoother {
     /// No tick follows on those that were taken.
     pub(super) fn end(&mut self) {
         let stretch = std::mem::take(&mut self.stretch);
+        if stretch.len() < STRETCH_TICKS_MIN {
+            self.smoothing.untimed += stretch.len();
+            return;
+        }
         // Equal parts, so that none is too short for a line.
         let parts = stretch.len().div_ceil(STRETCH_TICKS).max(1);
         for part in stretch.chunks(stretch.len().div_ceil(parts).max(1)) {
@@ -85,18 +117,45 @@ impl Smoother {
     }
 
     fn part(&mut self, part: &[BusTick]) {
+        let (Some(first), Some(last)) = (part.first(), part.last()) else {
+            return;
+        };
         let line = Line::through(part);
         if self.smoothing.stretches == 0 {
             self.smoothing.period_us = line.slope;
         }
         self.smoothing.stretches += 1;
         self.ticks += part.len();
-        for tick in part {
-            let time = line.at(tick);
-            let distance = tick.received_us as f64 - time;
-            self.squares += distance * distance;
-            self.smoothing.max_us = self.smoothing.max_us.max(distance.abs());
-            self.timed.push_back((*tick, time));
+        if let Some((before, end)) = self.before.replace((line, *last)) {
+            let lost_us = (first.sequence - end.sequence) as f64 * line.slope;
+            let apart_us = (line.at(first) - before.at(first)).abs();
+            self.note((apart_us - RATE_CHANGE_MAX * lost_us).max(0.0), first);
+        }
+        let blocks = part.len().div_ceil(LATE_TICKS_MAX);
+        let mut before_us = None;
+        for block in part.chunks(part.len().div_ceil(blocks)) {
+            let mut earliest_us = f64::INFINITY;
+            for tick in block {
+                let time = line.at(tick);
+                let distance = tick.received_us as f64 - time;
+                self.squares += distance * distance;
+                self.smoothing.max_us = self.smoothing.max_us.max(distance.abs());
+                earliest_us = earliest_us.min(distance);
+                self.timed.push_back((*tick, time));
+            }
+            // A line may lie across a step of the clock.
+            let step_us = earliest_us - before_us.replace(earliest_us).unwrap_or(earliest_us);
+            let off_us = earliest_us.abs().max(step_us.abs());
+            self.note(off_us, block.first().unwrap_or(first));
+        }
+    }
+
+    /// Notes how far off its line a tick is.
+    fn note(&mut self, off_us: f64, tick: &BusTick) {
+        let first_us = *self.first_us.get_or_insert(tick.received_us);
+        if off_us > self.smoothing.off_us {
+            self.smoothing.off_us = off_us;
+            self.smoothing.off_at_s = tick.received_us.saturating_sub(first_us) as f64 * 1e-6;
         }
     }
 }
@@ -147,7 +206,7 @@ impl<'s> EvenTicks<'s> {
     /// What the record held, and how even its times were.
     ///
     /// # Errors
-    /// `NoTicks`, and `UnevenTimes` if receive times are a servo period off their lines.
+    /// `NoTicks`, and `UnevenTimes` if those of half a second are all off their line.
     pub(super) fn finish(
         &self,
         settings: &ImportSettings,
@@ -159,16 +218,20 @@ impl<'s> EvenTicks<'s> {
                 path: settings.bus.clone(),
                 frames: counts.frames,
                 saturated: counts.saturated,
+                ticks: counts.ticks,
             });
         }
-        let rms_us = smoothing.rms_us;
-        if rms_us > stage.servo_period_s * 1e6 {
-            return Err(ImportError::UnevenTimes { rms_us });
+        if smoothing.off_us > OFF_PERIODS_MAX * stage.servo_period_s * 1e6 {
+            return Err(ImportError::UnevenTimes {
+                off_us: smoothing.off_us,
+                at_s: smoothing.off_at_s,
+            });
         }
         Ok((counts, smoothing))
     }
 }
 
+#[derive(Clone, Copy, Debug)]
 struct Line {
     start: u64,
     start_us: u64,
@@ -200,8 +263,9 @@ impl Line {
         let points = ticks.iter().map(|t| {
             let x = (t.sequence - self.start) as f64;
             let y = t.received_us as f64 - self.start_us as f64;
-            let is_late = y > self.constant + self.slope * x;
-            (x, y, if is_late { LATE_WEIGHT } else { 1.0 })
+            let late_us = y - (self.constant + self.slope * x);
+            let late_weight = LATE_WEIGHT * (LATE_PULL_US / late_us).min(1.0);
+            (x, y, if late_us > 0.0 { late_weight } else { 1.0 })
         });
         let sums = points.clone().fold([0.0; 3], |[n, sx, sy], (x, y, w)| {
             [n + w, sx + w * x, sy + w * y]
@@ -244,6 +308,7 @@ mod tests {
             received_us,
             hall: [0; 3],
             capacitive: [0; 3],
+            is_saturated: false,
         }
     }
 
@@ -292,12 +357,16 @@ mod tests {
 
     #[test]
     fn a_sender_that_starts_again_gets_a_line_of_its_own() {
-        let mut ticks: Vec<_> = (0..50).map(|k| tick(k, 2_000 * k)).collect();
-        ticks.extend((50..100).map(|k| tick(k, 2_000 * k + 777_000)));
-        ticks[50].follows = false;
+        let mut ticks: Vec<_> = (0..500).map(|k| tick(k, 2_000 * k)).collect();
+        ticks.extend((500..1_000).map(|k| tick(k, 2_000 * k + 777_000)));
+        ticks[500].follows = false;
+        // It starts again soon: a few ticks may all be late.
+        ticks.extend((1_000..1_100).map(|k| tick(k, 2_000 * k + 888_000)));
+        ticks[1_000].follows = false;
         let (times, smoothing) = sample_times_us(&ticks);
-        assert_eq!(smoothing.stretches, 2);
+        assert_eq!((smoothing.stretches, smoothing.untimed), (2, 100));
+        assert_eq!(times.len(), 1_000);
         assert!(smoothing.max_us < 1e-6);
-        assert!((times[50] - 877_000.0).abs() < 1e-6);
+        assert!((times[500] - 1_777_000.0).abs() < 1e-6);
     }
 }

@@ -49,9 +49,11 @@ pub enum ImportError {
         /// The other one.
         other: String,
     },
-    /// The record holds no whole tick.
+    /// The record holds no whole ticks that can be timed.
     #[error(
-        "{}: no whole tick among {frames} frames ({saturated} have a code at a rail of its converter); is it the right record, layout and interface?",
+        "{}: no tick can be timed: {frames} frames are {ticks} whole ticks, {saturated} with a code at a rail of its converter; it takes \
+         125 ticks in a row, and the sensor node's time frames (0x15A) before and after them. Is it the right record, layout and \
+         interface, and does it hold all of the node's frames?",
         path.display()
     )]
     NoTicks {
@@ -59,6 +61,8 @@ pub enum ImportError {
         path: PathBuf,
         /// Frames that it holds.
         frames: usize,
+        /// Whole ticks.
+        ticks: usize,
         /// Whole ticks that were left out for a code at a rail.
         saturated: usize,
     },
@@ -172,12 +176,15 @@ pub enum ImportError {
     },
     /// Frames were received too unevenly to tell when their codes were sampled.
     #[error(
-        "the receive times of the ticks are {rms_us:.0} us (rms) off an even course, more than a servo period: the clock of \
-         the recording computer was set during the record, or it could not keep up; record again"
+        "about {at_s:.1} s after the first tick the receive times leave the even course of the others by {off_us:.0} us, for half a \
+         second or more: the clock of the recording computer was set during the record (turn its adjustment off, NTP), or it could \
+         not keep up for so long; record again"
     )]
     UnevenTimes {
-        /// Standard deviation about the course, us.
-        rms_us: f64,
+        /// The smallest distance of those ticks from the course, us.
+        off_us: f64,
+        /// When, s after the first tick.
+        at_s: f64,
     },
     /// The log cannot be written.
     #[error(transparent)]

@@ -146,6 +146,7 @@ mod tests {
                 received_us: u64::from(n) * 2_000,
                 hall: [hall; 3],
                 capacitive: [0; 3],
+                is_saturated: false,
             };
             survey.take(&(tick, f64::from(n) * 2_000.0));
         }

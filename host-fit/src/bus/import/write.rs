@@ -71,14 +71,15 @@ impl Display for ImportReport {
         writeln!(
             f,
             "bus: {} frames, {} whole ticks, {} missing in {} gaps; {} lines left out, {} of another kind; {} ticks left out, \
-             a code at a rail of its converter",
+             a code at a rail of its converter, {} beside a loss, a restart or an end of the record, which have no certain time",
             bus.frames,
             bus.ticks,
             bus.ticks_missing,
             bus.gaps,
             bus.bad_lines,
             bus.other_lines,
-            bus.saturated
+            bus.saturated,
+            bus.unnumbered + self.smoothing.untimed as u64
         )?;
         writeln!(
             f,
@@ -94,8 +95,9 @@ impl Display for ImportReport {
         let times = &self.smoothing;
         writeln!(
             f,
-            "  {:.3} us a tick; receive times {:.1} us rms and at most {:.1} us from even ones, in {} stretches",
-            times.period_us, times.rms_us, times.max_us, times.stretches
+            "  {:.3} us a tick; receive times {:.1} us rms and at most {:.1} us from even ones, in {} stretches; the earliest of each half second \
+             at most {:.1} us",
+            times.period_us, times.rms_us, times.max_us, times.stretches, times.off_us
         )?;
         let reference = &self.reference;
         writeln!(

@@ -1,0 +1,141 @@
+//! Frames that the recorder lost or received late: whatever is missing, each row is that of its tick.
+
+use super::tests::{OFFSET_US, files, reference};
+use super::*;
+use hal_adapters::can::{BusFrame, Coded, sensor};
+use hal_adapters::candump::LogLine;
+use runtime::RawFrame;
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+const TICKS: u32 = 750;
+
+/// When the node sampled a tick, us on the clock of the reference.
+fn sampled_us(n: u32) -> f64 {
+    2_000.0 * f64::from(n) + 300.0
+}
+
+/// A record in which the capacitive codes tell each tick's number. `received_us` says when a frame
+/// of a tick was received, us on the clock of the reference, if it was.
+fn candump(received_us: impl Fn(u32, &Coded) -> Option<f64>) -> String {
+    let mut text = String::new();
+    for n in 0..TICKS {
+        let codes = RawFrame {
+            hall: [0; 3],
+            capacitive: [n as i32 + 1; 3],
+            sequence: n + 5,
+            time_us: 2_000 * n,
+        };
+        for (k, coded) in (0u8..).zip(sensor::frames(Layout::Bits16, &codes)) {
+            if let Some(received_us) = received_us(n, &coded) {
+                let line = LogLine {
+                    time_us: (received_us + OFFSET_US) as u64 + 135 * u64::from(k),
+                    interface: "can0",
+                    frame: BusFrame::from(coded),
+                };
+                writeln!(text, "{line}").expect("a string");
+            }
+        }
+    }
+    text
+}
+
+/// Receive times with a jitter of up to 1.2 ms.
+fn jittered_us(n: u32) -> f64 {
+    sampled_us(n) + 150.0 + f64::from(n * 7919 % 1_201)
+}
+
+fn imported(bus: &str) -> Result<String, ImportError> {
+    let (_folder, mut args) = files(bus, &reference());
+    args.estimate_offset = false;
+    args.offset_us = OFFSET_US + 150.0;
+    run(&args)?;
+    Ok(std::fs::read_to_string(&args.out).expect("written"))
+}
+
+/// How many rows a log has, each checked against its own tick.
+fn check(log: &str, what: &str) -> usize {
+    for line in log.lines().skip(1) {
+        let cells: Vec<f64> = line
+            .split(',')
+            .map(|cell| cell.parse().expect("a number"))
+            .collect();
+        let t_us = sampled_us(cells[5] as u32 - 1);
+        // The line lies along the earliest frames, not on them.
+        assert!((cells[1] - t_us).abs() < 400.0, "{what}: {line}, at {t_us}");
+        // The first movement moves X alone, at up to 3.8 um a ms.
+        if t_us < 499_000.0 {
+            let x_nm = 300e3 * (TAU * t_us / 500_000.0).sin();
+            assert!((cells[2] - x_nm).abs() < 1_600.0, "{what}: {line}");
+        }
+    }
+    log.lines().count() - 1
+}
+
+#[test]
+fn a_loss_of_any_number_of_ticks_shifts_no_row() {
+    for lost in [
+        1, 2, 3, 7, 14, 15, 16, 17, 18, 31, 32, 33, 47, 48, 64, 160, 320,
+    ] {
+        for start in 200..216 {
+            let what = format!("{lost} ticks from {start} on");
+            let bus = candump(|n, _| (!(start..start + lost).contains(&n)).then(|| jittered_us(n)));
+            let log = imported(&bus).unwrap_or_else(|error| panic!("{what}: {error}"));
+            let rows = check(&log, &what);
+            // All but the ticks to the time frames before and after, and at both ends.
+            let least = (TICKS - lost) as usize - if lost < 15 { 40 } else { 70 };
+            assert!(rows >= least, "{what}: {rows} rows");
+        }
+    }
+}
+
+#[test]
+fn frames_that_come_late_all_at_once_with_or_without_a_loss_shift_no_row() {
+    for late in [16u32, 33, 50] {
+        for lost in [0, 15, 16, 17, 32] {
+            for start in [200, 205, 211] {
+                // The recorder sleeps for `late` ticks; then it gets what its buffer kept: the first.
+                let end = start + late;
+                let bus = candump(|n, _| {
+                    let is_lost = (end.saturating_sub(lost)..end).contains(&n);
+                    let is_late = (start..end).contains(&n);
+                    (!is_lost).then(|| jittered_us(if is_late { end } else { n }))
+                });
+                let what = format!("{late} late, {lost} lost, from {start} on");
+                let log = imported(&bus).unwrap_or_else(|error| panic!("{what}: {error}"));
+                assert!(check(&log, &what) > 650, "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_record_without_time_frames_and_one_of_a_tenth_of_a_second_are_refused() {
+    let is_time = |coded: &Coded| coded.message == hal_adapters::can::Message::SensorTime;
+    for bus in [
+        candump(|n, coded| (!is_time(coded)).then(|| jittered_us(n))),
+        candump(|n, _| (n < 60).then(|| jittered_us(n))),
+    ] {
+        let refused = imported(&bus).expect_err("refused");
+        assert!(matches!(refused, ImportError::NoTicks { .. }), "{refused}");
+    }
+}
+
+/// A few ticks by another clock do not count: they are timed with the others.
+#[test]
+fn a_clock_that_is_set_during_the_record_is_told_or_shifts_no_row() {
+    let mut refused = 0;
+    for step_us in [3_000.0, 50_000.0, 3e6, -1_500_000.0] {
+        for start in [200, 300, 375, 500, 700] {
+            let bus = candump(|n, _| Some(jittered_us(n) + if n < start { 0.0 } else { step_us }));
+            match imported(&bus) {
+                Ok(log) => assert!(check(&log, &format!("{step_us} us from {start} on")) > 700),
+                Err(ImportError::UnevenTimes { .. } | ImportError::ClockBackwards { .. }) => {
+                    refused += 1;
+                }
+                Err(error) => panic!("{step_us} us from {start} on: {error}"),
+            }
+        }
+    }
+    assert!((12..20).contains(&refused), "{refused}");
+}
