@@ -170,8 +170,8 @@ impl Passing {
         }
     }
 
-    /// Halves the share of the log that has most rows until half as many rows are left as may be, or
-    /// no log has more than a run.
+    /// Halves the share of the log that has most rows until a quarter of the rows that may be held is
+    /// free, or no log has more than a run.
     fn thin(&mut self) {
         loop {
             let mut rows = vec![0; self.logs.len()];
@@ -181,7 +181,7 @@ impl Passing {
             let left: usize = rows.iter().sum();
             let most = rows.iter().enumerate().max_by_key(|(_, rows)| **rows);
             match most {
-                Some((log, rows)) if left > self.rows_max / 2 && *rows > RUN => {
+                Some((log, rows)) if left > self.rows_max / 4 * 3 && *rows > RUN => {
                     let share = &mut self.logs[log].share;
                     *share = f64::min(*share / 2.0, 1.0);
                 }

@@ -132,7 +132,7 @@ fn short_logs_and_logs_at_rest_keep_rows_beside_a_long_one() {
     }
     let kept = kept(&dataset, 6_000);
     let rows: Vec<usize> = kept.logs.iter().map(|log| log.rows.len()).collect();
-    assert!((1_000..=3_000).contains(&rows[0]), "{rows:?}");
+    assert!((1_000..=4_000).contains(&rows[0]), "{rows:?}");
     assert_eq!(rows[1], 400);
     assert!((1_000..=2_000).contains(&rows[2]), "{rows:?}");
 }
@@ -156,7 +156,11 @@ fn rows_that_pass_are_judged_as_those_that_are_held() {
     let (stage, paths) = (stage(), [shipped(&folder, "log.csv.gz")]);
     let held = read(&paths, &stage, &options(10_000)).expect("sound");
     let model = Model::of(runtime::ModelKind::M31);
-    let settings = FitSettings::new(ModelChoice::Named(model));
+    let settings = FitSettings {
+        // However badly so few rows tell the parameters.
+        force: true,
+        ..FitSettings::new(ModelChoice::Named(model))
+    };
     let set = fit(&held.dataset, &stage, &settings).expect("a fit").set;
     let whole = held.dataset.whole.expect("an excerpt");
     let decoder = set.decoder();
