@@ -17,7 +17,9 @@ use crate::bus::replay::ReplayError;
 use crate::bus::update::{UpdateError, UpdateRunError};
 use crate::fit::FitError;
 use crate::input::log::LogError;
+use crate::input::source::SourceError;
 use crate::input::stage::StageError;
+use crate::interrupt;
 use crate::output::OutputError;
 use crate::output::blob_file::BlobFileError;
 use crate::output::export::ExportError;
@@ -194,12 +196,18 @@ pub enum HostError {
 impl HostError {
     /// The exit status of a run that ends with this error.
     pub const fn exit_status(&self) -> u8 {
+        use SourceError::Interrupted;
         match self {
             Self::Update(UpdateRunError::Dialog {
                 cause: UpdateError::Interrupted,
                 ..
             })
-            | Self::Interrupted { .. } => 130,
+            | Self::Log(LogError::Source(Interrupted { .. }))
+            | Self::Import(
+                ImportError::Bus(Interrupted { .. })
+                | ImportError::Reference(LogError::Source(Interrupted { .. })),
+            )
+            | Self::Interrupted { .. } => interrupt::EXIT_STATUS,
             Self::Usage { .. }
             | Self::Export(ExportError::NoSlot { .. } | ExportError::Unaligned { .. }) => 2,
             Self::Stage(_)

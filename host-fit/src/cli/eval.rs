@@ -5,12 +5,12 @@ use crate::cli::terminal;
 use crate::diagnose;
 use crate::diagnose::finding::Severity;
 use crate::fit::FitWarning;
-use crate::input::dataset::FIT_ROWS_MAX;
 use crate::input::log::{self, ReadOptions};
 use crate::input::stage::Stage;
+use crate::input::whole::chunk::Sample;
 use crate::judge::statistics::PoseError;
-use crate::judge::whole::WholeJudgement;
-use crate::judge::{Decoded, Zeros};
+use crate::judge::whole::Judge;
+use crate::judge::{Decoded, Zeros, error};
 use crate::output::blob_file;
 use crate::problem::model::Model;
 use crate::report::errors;
@@ -20,6 +20,9 @@ use clap::{Args, ValueEnum};
 use runtime::{ModelKind, ParameterSet};
 use std::path::PathBuf;
 use std::time::Instant;
+
+/// The most rows that the diagnosis looks at: three minutes, in less than 64 MB with all else.
+const ROWS_MAX: usize = 100_000;
 
 /// How `eval` treats zero deviations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -97,10 +100,18 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     let options = ReadOptions {
         split_s: args.split,
         memory_bytes: args.memory.limit_bytes(),
-        rows_max: Some(FIT_ROWS_MAX),
+        rows_max: Some(ROWS_MAX),
         ..super::EVAL
     };
-    let log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;
+    let mut judge = Judge::new(&set, &stage, args.logs.len());
+    let decoder = set.decoder();
+    let log = terminal::timed("reading", || {
+        let error = |sample: &Sample| error(&decoder, &sample.frame(), sample.reference);
+        log::read_passing(&args.logs, &stage, &options, error, |log, row| {
+            let (sample, error) = row.item;
+            judge.take(log, row.begins, error, sample.reference);
+        })
+    })?;
     let zeros = match args.delta {
         None => Zeros::of_model(Model::of(set.model)),
         Some(DeltaChoice::Fit) => Zeros::Refit,
@@ -111,21 +122,23 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     // Of a long log the rows above are an excerpt, which the diagnosis looks at; errors are those of
     // all rows.
     let judge_whole = |zeros| {
-        let whole = log.dataset.whole.as_ref()?;
-        Some(WholeJudgement::new(&set, whole, &stage, zeros))
+        let whole = judge.judgement(zeros);
+        (whole.rows() > log.dataset.rows.len()).then_some(whole)
     };
     let whole = judge_whole(zeros);
-    let undecoded = (whole.as_ref()).map_or(judgement.undecoded, |whole| whole.undecoded);
+    let clipped = || judgement.zeros.iter().filter(|zero| zero.clipped).count();
+    let (undecoded, clipped, movements) = match &whole {
+        Some(whole) => (whole.undecoded, whole.clipped, whole.movements),
+        None => (judgement.undecoded, clipped(), judgement.zeros.len()),
+    };
     let mut circumstances = super::circumstances(&log, &stage, started);
     if undecoded > 0 {
         let undecoded = FitWarning::Undecoded { rows: undecoded };
         circumstances.warnings.push(undecoded.to_string());
     }
-    let clipped = judgement.zeros.iter().filter(|zero| zero.clipped).count();
     if clipped > 0 {
         circumstances.warnings.push(format!(
-            "the zero deviation of {clipped} of {} movements was clipped to its range",
-            judgement.zeros.len()
+            "the zero deviation of {clipped} of {movements} movements was clipped to its range"
         ));
     }
     let errors = decoded.errors_less(&judgement.zeros, &log.dataset);

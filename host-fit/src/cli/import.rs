@@ -4,6 +4,7 @@ use super::args::LayoutChoice;
 use crate::bus::import::{self, ImportSettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
+use crate::interrupt;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -73,6 +74,7 @@ pub(super) fn run(args: ImportArgs) -> Result<(), HostError> {
         &[Some(&args.out)],
         &[&args.bus, &args.reference, &args.stage],
     )?;
+    interrupt::watch();
     let settings = ImportSettings {
         bus: args.bus,
         reference: args.reference,

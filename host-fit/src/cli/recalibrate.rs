@@ -3,7 +3,7 @@
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::fit::FitWarning;
-use crate::input::log::{self, LogReading, ReadOptions};
+use crate::input::log::{self, LogReading, LogWarning, ReadOptions};
 use crate::input::stage::Stage;
 use crate::output::posterior_file::PosteriorFileError;
 use crate::output::{Outputs, blob_file, check_writable, posterior_file};
@@ -146,9 +146,12 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     let options = ReadOptions {
         split_s: args.split,
         memory_bytes: args.memory.limit_bytes(),
+        rows_max: ReadOptions::FIT.rows_max,
         ..ReadOptions::default()
     };
-    let log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;
+    let log = terminal::timed("reading", || {
+        log::read_passing(&args.logs, &stage, &options, |_| (), |_, _| ())
+    })?;
     let created = args.created.clone().unwrap_or_default();
     let new = recalibrate(
         &old,
@@ -191,7 +194,14 @@ fn read_known(
 }
 
 fn warnings(log: &LogReading, new: &Recalibration) -> Vec<String> {
-    let mut warnings: Vec<String> = log.warnings.iter().map(ToString::to_string).collect();
+    let told = |warning: &LogWarning| match warning {
+        LogWarning::Excerpt { rows, taken, runs } => format!(
+            "{taken} of {rows} rows are used, in {runs} runs spread over all that moves, and errors are over those; a few \
+             seconds of log would do"
+        ),
+        other => other.to_string(),
+    };
+    let mut warnings: Vec<String> = log.warnings.iter().map(told).collect();
     if new.judgement.undecoded > 0 {
         let undecoded = FitWarning::Undecoded {
             rows: new.judgement.undecoded,

@@ -43,6 +43,8 @@ pub use warning::{LogWarning, SkipReason};
 use crate::input::dataset::{Dataset, FIT_ROWS_MAX, LogSource};
 use crate::input::stage::Stage;
 use crate::input::text::TextReader;
+use crate::input::whole::chunk::Sample;
+use crate::input::whole::passing::Passing;
 use gathered::Gathered;
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -151,6 +153,43 @@ pub fn read<P: AsRef<Path>>(
         refuse_repeated_log(&gathered)?;
     }
     reading.dataset = gathered.into_dataset(hash.finalize().into(), &mut reading.warnings);
+    Ok(reading)
+}
+
+/// As [`read`], in little memory however long the logs are: of more than `rows_max` rows the dataset
+/// is an excerpt, and the whole is not held. `make` tells what is wanted of each row, on any core, and
+/// `take` gets it with the number of its log, row after row.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_passing<P: AsRef<Path>, T: Send>(
+    paths: &[P],
+    stage: &Stage,
+    options: &ReadOptions,
+    make: impl Fn(&Sample) -> T + Sync,
+    mut take: impl FnMut(usize, &LogRow<(Sample, T)>),
+) -> Result<LogReading, LogError> {
+    if paths.is_empty() {
+        return Err(LogError::NoLog);
+    }
+    let mut reading = LogReading::default();
+    let mut passing = Passing::new(stage, options.rows_max.unwrap_or(usize::MAX));
+    let mut hash = Sha256::new();
+    for (log, path) in paths.iter().enumerate() {
+        let text = TextReader::open(path.as_ref())?.with_hash(hash);
+        let take = |row: &LogRow<(Sample, T)>| take(log, row);
+        let all = (&mut reading, &mut passing);
+        hash = reader::pass(all, text, stage, options, &make, take)?.unwrap_or_default();
+    }
+    let rows = passing.passed();
+    reading.dataset = passing.into_dataset(hash.finalize().into());
+    let taken = reading.dataset.rows.len();
+    if taken < rows {
+        let runs = reading.dataset.movements.len();
+        reading
+            .warnings
+            .push(LogWarning::Excerpt { rows, taken, runs });
+    }
     Ok(reading)
 }
 

@@ -1,6 +1,7 @@
 //! A file as bytes, read whole or piece by piece. `-` is standard input.
 
 use super::unpack::Unpacked;
+use crate::interrupt;
 use std::io::{Cursor, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
@@ -40,6 +41,9 @@ pub enum SourceError {
     /// Text in UTF-16 with bytes that are no character: where, from 0, after decompression.
     #[error("{}: the UTF-16 text is damaged (byte {offset}); save it again, as UTF-8", path.display())]
     Utf16 { path: PathBuf, offset: usize },
+    /// Ctrl-C, where the program watches for it.
+    #[error("interrupted while {} was read; nothing was written", path.display())]
+    Interrupted { path: PathBuf },
     /// The gzip stream ends too early.
     #[error("{}: the gzip file is cut short (after {bytes} decompressed bytes); copy or record it again", path.display())]
     GzipCut { path: PathBuf, bytes: usize },
@@ -171,6 +175,11 @@ impl Read for Raw<'_> {
     fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
         loop {
             match self.file.read(bytes) {
+                // After a read, which may have waited for long.
+                _ if interrupt::requested() => {
+                    let path = self.path.clone();
+                    return Err(std::io::Error::other(SourceError::Interrupted { path }));
+                }
                 Ok(read) => {
                     self.read += read as u64;
                     return Ok(read);

@@ -1,8 +1,9 @@
 //! A log that is too long to be held as rows: its samples in [`chunk`]s, and the [`excerpt`] of
-//! them that a fit works on.
+//! them that a fit works on; or what is kept of it while it is [`passing`].
 
 pub mod chunk;
 pub mod excerpt;
+pub mod passing;
 
 use super::dataset::{LogSource, Movement, Row, Scales};
 use chunk::{Chunk, Sample};

@@ -7,14 +7,14 @@ pub mod statistics;
 pub mod uncertainty;
 pub mod whole;
 
-use crate::input::dataset::{Dataset, LogSource, Row};
+use crate::input::dataset::{Dataset, LogSource, LoggedFrame, Row};
 use crate::input::stage::Stage;
 use crate::judge::statistics::{ErrorSums, PoseError};
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
-use runtime::{ParameterSet, PlanarPose};
+use runtime::{AnyDecoder, ParameterSet, PlanarPose};
 
 /// Which zero deviations are taken off before errors are counted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,12 +80,7 @@ impl Decoded {
     /// Decodes every row of a dataset with reference.
     pub fn new(set: &ParameterSet, dataset: &Dataset) -> Self {
         let decoder = set.decoder();
-        let one = |row: &Row| {
-            let reading = row.frame.decode(&decoder, &PlanarPose::ZERO);
-            let pose = reading.planar()?.to_array();
-            let error = |axis: usize| f64::from(pose[axis]) - row.reference[axis];
-            Some(std::array::from_fn(error))
-        };
+        let one = |row: &Row| error(&decoder, &row.frame, row.reference);
         Self {
             parameters: Parameters::of_set(set),
             errors: dataset.rows.par_iter().map(one).collect(),
@@ -135,6 +130,17 @@ impl Decoded {
         }
         errors
     }
+}
+
+/// The decoded pose less the reference, m, m, rad, no zero deviation taken off; `None` where the
+/// decoder finds bad codes.
+pub fn error(decoder: &AnyDecoder, frame: &LoggedFrame, reference: [f64; 3]) -> Option<[f64; 3]> {
+    let pose = frame
+        .decode(decoder, &PlanarPose::ZERO)
+        .planar()?
+        .to_array();
+    let error = |axis: usize| f64::from(pose[axis]) - reference[axis];
+    Some(std::array::from_fn(error))
 }
 
 /// The errors of each log, of errors by row.

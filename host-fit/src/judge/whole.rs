@@ -1,14 +1,14 @@
 //! The errors of a parameter set over all rows of a long log, of which only sums are kept.
 
-use crate::input::dataset::{LoggedFrame, Movement};
+use crate::input::dataset::Movement;
 use crate::input::stage::Stage;
 use crate::input::whole::Whole;
-use crate::judge::Zeros;
 use crate::judge::statistics::{AxisError, PoseError};
+use crate::judge::{Zeros, error};
 use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
-use runtime::{AnyDecoder, ParameterSet, PlanarPose};
+use runtime::{AnyDecoder, ParameterSet};
 use std::ops::Range;
 
 /// Errors over all rows of long logs.
@@ -16,12 +16,25 @@ use std::ops::Range;
 pub struct WholeJudgement {
     /// Over all decoded rows of all logs; the rows of the peaks are not known.
     pub errors: PoseError,
-    /// The same for each log.
-    pub logs: Vec<PoseError>,
+    /// Each log.
+    pub logs: Vec<LogJudgement>,
     /// Rows that the decoder could not decode.
     pub undecoded: usize,
+    /// Movements of all logs.
+    pub movements: usize,
+    /// Those of them whose zero deviation was clipped to its range.
+    pub clipped: usize,
     /// Root mean square of the reference: m, m, rad.
     pub motion: [f64; 3],
+}
+
+/// Errors over all rows of one log.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogJudgement {
+    /// Its rows, those included that could not be decoded.
+    pub rows: usize,
+    /// Over its decoded rows.
+    pub errors: PoseError,
 }
 
 /// Sums over rows of one movement.
@@ -47,17 +60,16 @@ impl Sums {
         reference_squares: [0.0; 3],
     };
 
-    fn take(&mut self, decoder: &AnyDecoder, frame: &LoggedFrame, reference: [f64; 3]) {
+    fn take(&mut self, error: Option<[f64; 3]>, reference: [f64; 3]) {
         for (sum, x) in self.reference_squares.iter_mut().zip(reference) {
             *sum += x * x;
         }
-        let Some(pose) = frame.decode(decoder, &PlanarPose::ZERO).planar() else {
+        let Some(error) = error else {
             self.undecoded += 1;
             return;
         };
         self.rows += 1.0;
-        for (axis, pose) in pose.to_array().into_iter().enumerate() {
-            let error = f64::from(pose) - reference[axis];
+        for (axis, error) in error.into_iter().enumerate() {
             self.error[axis] += error;
             self.squares[axis] += error * error;
             self.low[axis] = self.low[axis].min(error);
@@ -90,6 +102,10 @@ impl Sums {
         less
     }
 
+    const fn all_rows(&self) -> usize {
+        self.rows as usize + self.undecoded
+    }
+
     fn errors(&self) -> PoseError {
         let axis = |axis: usize| AxisError {
             rms: (self.squares[axis] / self.rows.max(1.0)).sqrt(),
@@ -103,11 +119,116 @@ impl Sums {
     }
 }
 
+/// Sums over the movements of one log.
+#[derive(Clone, Copy, Debug)]
+struct LogSums {
+    /// No zero deviation taken off.
+    plain: Sums,
+    /// Those of the movements refitted.
+    refitted: Sums,
+    movements: usize,
+    clipped: usize,
+}
+
+impl LogSums {
+    const NONE: Self = Self {
+        plain: Sums::NONE,
+        refitted: Sums::NONE,
+        movements: 0,
+        clipped: 0,
+    };
+}
+
+/// Judges a parameter set on rows as they come, movement after movement.
+#[derive(Clone, Debug)]
+pub struct Judge<'s> {
+    parameters: Parameters,
+    stage: &'s Stage,
+    /// The movement that is not over, and its log.
+    movement: (usize, Sums),
+    logs: Vec<LogSums>,
+}
+
+impl<'s> Judge<'s> {
+    /// Of so many logs.
+    pub fn new(set: &ParameterSet, stage: &'s Stage, logs: usize) -> Self {
+        Self {
+            parameters: Parameters::of_set(set),
+            stage,
+            movement: (0, Sums::NONE),
+            logs: vec![LogSums::NONE; logs],
+        }
+    }
+
+    /// Takes the next row: the number of its log, whether a movement begins with it, what
+    /// [`error`](super::error) says of it, and its reference, m, m, rad.
+    pub fn take(&mut self, log: usize, begins: bool, error: Option<[f64; 3]>, reference: [f64; 3]) {
+        if begins {
+            self.end_movement();
+        }
+        self.movement.0 = log;
+        self.movement.1.take(error, reference);
+    }
+
+    fn end_movement(&mut self) {
+        let (log, sums) = std::mem::replace(&mut self.movement, (0, Sums::NONE));
+        if sums.rows > 0.0 || sums.undecoded > 0 {
+            self.take_movement(log, &sums);
+        }
+    }
+
+    fn take_movement(&mut self, log: usize, sums: &Sums) {
+        let zero = match sums.rows > 0.0 {
+            true => {
+                let mean = sums.error.map(|sum| sum / sums.rows);
+                ZeroDeviation::of_mean_error(&self.parameters, mean, &self.stage.search.delta_m)
+            }
+            false => ZeroDeviation::NONE,
+        };
+        let log = &mut self.logs[log];
+        log.plain.add(sums);
+        log.refitted.add(&sums.less(zero.pose));
+        log.movements += 1;
+        log.clipped += usize::from(zero.clipped);
+    }
+
+    /// The figures of the rows so far; zero deviations are refitted unless there are to be none.
+    pub fn judgement(&self, zeros: Zeros<'_>) -> WholeJudgement {
+        let mut all = self.clone();
+        all.end_movement();
+        let refits = zeros != Zeros::None;
+        let mut total = Sums::NONE;
+        let mut of_log = |log: &LogSums| {
+            let sums = if refits { &log.refitted } else { &log.plain };
+            total.add(sums);
+            LogJudgement {
+                rows: sums.all_rows(),
+                errors: sums.errors(),
+            }
+        };
+        let logs = all.logs.iter().map(&mut of_log).collect();
+        let rows = total.all_rows() as f64;
+        let clipped: usize = all.logs.iter().map(|log| log.clipped).sum();
+        WholeJudgement {
+            errors: total.errors(),
+            logs,
+            undecoded: total.undecoded,
+            movements: all.logs.iter().map(|log| log.movements).sum(),
+            clipped: if refits { clipped } else { 0 },
+            motion: (total.reference_squares).map(|sum| (sum / rows.max(1.0)).sqrt()),
+        }
+    }
+}
+
 impl WholeJudgement {
-    /// Decodes every row; zero deviations are refitted unless there are to be none.
+    /// Rows of all logs, those included that could not be decoded.
+    pub const fn rows(&self) -> usize {
+        self.errors.rows + self.undecoded
+    }
+
+    /// Decodes every row of logs that are held.
     pub fn new(set: &ParameterSet, whole: &Whole, stage: &Stage, zeros: Zeros<'_>) -> Self {
         let decoder = set.decoder();
-        let parameters = Parameters::of_set(set);
         let pieces: Vec<Vec<(usize, Sums)>> = (whole.samples().ranges().into_par_iter())
             .map(|rows| pieces(whole, &decoder, rows))
             .collect();
@@ -115,26 +236,11 @@ impl WholeJudgement {
         for (movement, sums) in pieces.iter().flatten() {
             movements[*movement].add(sums);
         }
-        let mut logs = vec![Sums::NONE; whole.logs().len()];
-        for (movement, sums) in whole.movements().iter().zip(movements) {
-            let zero = match zeros {
-                Zeros::Refit if sums.rows > 0.0 => {
-                    let mean = sums.error.map(|sum| sum / sums.rows);
-                    ZeroDeviation::of_mean_error(&parameters, mean, &stage.search.delta_m).pose
-                }
-                _ => ZeroDeviation::NONE.pose,
-            };
-            logs[movement.log].add(&sums.less(zero));
+        let mut judge = Judge::new(set, stage, whole.logs().len());
+        for (movement, sums) in whole.movements().iter().zip(&movements) {
+            judge.take_movement(movement.log, sums);
         }
-        let mut all = Sums::NONE;
-        logs.iter().for_each(|log| all.add(log));
-        let rows = all.rows + all.undecoded as f64;
-        Self {
-            errors: all.errors(),
-            logs: logs.iter().map(Sums::errors).collect(),
-            undecoded: all.undecoded,
-            motion: (all.reference_squares).map(|sum| (sum / rows.max(1.0)).sqrt()),
-        }
+        judge.judgement(zeros)
     }
 }
 
@@ -149,7 +255,7 @@ fn pieces(whole: &Whole, decoder: &AnyDecoder, rows: Range<usize>) -> Vec<(usize
         .map(|(movement, number)| {
             let mut sums = Sums::NONE;
             for row in whole.rows_of(number, here(movement)) {
-                sums.take(decoder, &row.frame, row.reference);
+                sums.take(error(decoder, &row.frame, row.reference), row.reference);
             }
             (number, sums)
         })

@@ -152,7 +152,9 @@ impl Outputs {
     }
 
     /// Puts everything in its place, in the order in which it was added; streams first, since only
-    /// they can still be full.
+    /// they can still be full. Where one is, nothing has been replaced. The other way round a blob
+    /// would be replaced by a command that fails and whose figures are lost; this way a command that
+    /// fails may have told figures of files that are not there, and its exit status says so.
     ///
     /// # Errors
     /// Every variant of [`OutputError`].

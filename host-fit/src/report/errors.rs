@@ -2,6 +2,7 @@
 
 use crate::input::dataset::{Dataset, LogSource};
 use crate::judge::statistics::{AxisError, PoseError};
+use crate::judge::whole::{LogJudgement, WholeJudgement};
 use crate::judge::{Decoded, Judgement, errors_by_log};
 use serde::Serialize;
 
@@ -70,19 +71,23 @@ pub(super) fn by_log(
     dataset: &Dataset,
 ) -> Vec<LogErrors> {
     let errors = decoded.errors_less(&judgement.zeros, dataset);
-    of_logs(dataset, &errors_by_log(&errors, dataset))
-}
-
-/// The errors of each log as they are given.
-pub(super) fn of_logs(dataset: &Dataset, errors: &[PoseError]) -> Vec<LogErrors> {
-    let logs = dataset.whole.as_ref().map(|whole| whole.logs());
+    let errors = errors_by_log(&errors, dataset);
     let of_log = |(log, errors): (&LogSource, &PoseError)| LogErrors {
         path: log.path.display().to_string(),
         rows: log.rows.len(),
         errors: Errors::from(errors),
     };
-    let logs = logs.unwrap_or(&dataset.logs);
-    logs.iter().zip(errors).map(of_log).collect()
+    dataset.logs.iter().zip(&errors).map(of_log).collect()
+}
+
+/// The errors of each log over all its rows, of which the dataset is an excerpt.
+pub(super) fn of_whole(dataset: &Dataset, whole: &WholeJudgement) -> Vec<LogErrors> {
+    let of_log = |(log, judged): (&LogSource, &LogJudgement)| LogErrors {
+        path: log.path.display().to_string(),
+        rows: judged.rows,
+        errors: Errors::from(&judged.errors),
+    };
+    dataset.logs.iter().zip(&whole.logs).map(of_log).collect()
 }
 
 /// The rms errors of each of several logs for a terminal, a line each.

@@ -9,7 +9,7 @@ use crate::judge::whole::WholeJudgement;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
-use crate::report::errors::{Errors, LogErrors, by_log, of_logs};
+use crate::report::errors::{Errors, LogErrors, by_log, of_whole};
 use crate::report::field::{ByAxis, Correlation, FieldReport};
 use crate::report::parameters::{
     Coordinates, Parameter, field_parameters, parameters, parameters_in,
@@ -260,7 +260,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         warnings,
         findings: c.findings.clone(),
         logs: match &fit.whole {
-            Some(whole) => of_logs(c.dataset, &whole.logs),
+            Some(whole) => of_whole(c.dataset, whole),
             None => by_log(&fit.decoded, &fit.judgement, c.dataset),
         },
         trusted_inputs: trusted(&fit.set),
@@ -291,9 +291,9 @@ pub fn of_eval(
         standard_errors: None,
         correlations: Vec::new(),
         cross_validation: None,
-        rows: c.dataset.named().0,
+        rows: whole.map_or(c.dataset.rows.len(), WholeJudgement::rows),
         train_rows: set.fit.train_rows as usize,
-        movements: c.dataset.named().1,
+        movements: whole.map_or(c.dataset.movements.len(), |whole| whole.movements),
         skipped_rows: c.skipped_rows,
         evaluations: None,
         elapsed_s: c.elapsed_s,
@@ -313,7 +313,7 @@ pub fn of_eval(
         warnings: c.warnings.clone(),
         findings: c.findings.clone(),
         logs: match whole {
-            Some(whole) => of_logs(c.dataset, &whole.logs),
+            Some(whole) => of_whole(c.dataset, whole),
             None => by_log(decoded, judgement, c.dataset),
         },
         trusted_inputs: trusted(set),

@@ -6,6 +6,7 @@ mod bad_input;
 mod common;
 mod diagnose;
 mod field_model;
+mod interrupted;
 mod killed;
 mod log_forms;
 mod main_job;

@@ -3,6 +3,7 @@
 
 use crate::input::dataset::{LoggedFrame, Row};
 use runtime::{RawFrame, VerticalPose};
+use std::hash::{Hash, Hasher};
 
 /// Codes of three converters, in as few bytes as those of the chunk need.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,6 +123,16 @@ impl Sample {
                 time_us,
             },
         }
+    }
+
+    /// Feeds a hash, which tells logs from each other.
+    pub(super) fn hash(&self, hash: &mut impl Hasher) {
+        (self.t_us, self.hall).hash(hash);
+        match self.vertical {
+            SampledVertical::Codes(codes) => codes.hash(hash),
+            SampledVertical::Pose(pose) => pose.map(f64::to_bits).hash(hash),
+        }
+        self.reference.map(f64::to_bits).hash(hash);
     }
 
     /// What a row was made of.

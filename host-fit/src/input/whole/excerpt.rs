@@ -19,7 +19,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Rows of a run: a second, as long as the period of the paper's motions.
-const RUN: usize = 500;
+pub(super) const RUN: usize = 500;
 /// Rows of a run that are looked at for its leverage, about.
 const LOOKED_AT: usize = 50;
 /// Regressors.
@@ -31,7 +31,7 @@ const IDLE_M: f64 = 2e-6;
 const IDLE_RAD: f64 = 20e-6;
 /// How far the place within a step moves from step to step, in steps: by the golden ratio the
 /// places of any number of steps are spread evenly.
-const GOLDEN: f64 = 0.618_033_988_749_894_8;
+pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_8;
 /// Runs of a log of which no other was taken, at most.
 const FEW: usize = 8;
 /// Leverage, in terms of the mean of the runs that move, from which on a run is likelier to be taken.
@@ -89,7 +89,7 @@ impl Whole {
         let inverse = Cholesky::new(total).map_or_else(Products::zeros, |factor| factor.inverse());
         let told = |run: &Run| {
             let products = self.products(run).component_mul(&inverse);
-            (products.sum(), self.moves(run))
+            (products.sum(), moves(self.looked_at(run)))
         };
         let mut told: Vec<(f64, bool)> = runs.par_iter().map(told).collect();
         if told.iter().all(|(_, moves)| !moves) {
@@ -134,23 +134,8 @@ impl Whole {
         chosen.map(|(run, _)| run).collect()
     }
 
-    /// Whether a run moves in any of the six axes.
-    fn moves(&self, run: &Run) -> bool {
-        const IDLE: [f64; 6] = [IDLE_M, IDLE_M, IDLE_RAD, IDLE_M, IDLE_RAD, IDLE_RAD];
-        let (mut low, mut high) = ([f64::INFINITY; 6], [f64::NEG_INFINITY; 6]);
-        for row in self.looked_at(run) {
-            let ([x, y, rz], [z, rx, ry]) = (row.reference, row.vertical);
-            for (k, value) in [x, y, rz, z, rx, ry].into_iter().enumerate() {
-                low[k] = low[k].min(value);
-                high[k] = high[k].max(value);
-            }
-        }
-        (0..6).any(|k| high[k] - low[k] >= IDLE[k])
-    }
-
     fn looked_at(&self, run: &Run) -> impl Iterator<Item = Row> {
-        let stride = run.rows.len().div_ceil(LOOKED_AT).max(1);
-        run.rows.clone().step_by(stride).map(|row| self.row(row))
+        looked_at(run.rows.clone()).map(|row| self.row(row))
     }
 
     /// All movements in runs of about equal length.
@@ -180,6 +165,26 @@ impl Whole {
         // As if all rows had been looked at.
         sum * (run.rows.len() as f64 / regressors.len().max(1) as f64)
     }
+}
+
+/// Some of the rows of a run.
+pub(super) fn looked_at<R: ExactSizeIterator>(rows: R) -> impl Iterator<Item = R::Item> {
+    let stride = rows.len().div_ceil(LOOKED_AT).max(1);
+    rows.step_by(stride)
+}
+
+/// Whether the stage moves in any of the six axes from one of these rows to another.
+pub(super) fn moves(rows: impl Iterator<Item = Row>) -> bool {
+    const IDLE: [f64; 6] = [IDLE_M, IDLE_M, IDLE_RAD, IDLE_M, IDLE_RAD, IDLE_RAD];
+    let (mut low, mut high) = ([f64::INFINITY; 6], [f64::NEG_INFINITY; 6]);
+    for row in rows {
+        let ([x, y, rz], [z, rx, ry]) = (row.reference, row.vertical);
+        for (k, value) in [x, y, rz, z, rx, ry].into_iter().enumerate() {
+            low[k] = low[k].min(value);
+            high[k] = high[k].max(value);
+        }
+    }
+    (0..6).any(|k| high[k] - low[k] >= IDLE[k])
 }
 
 fn regressors(row: &Row) -> SVector<f64, COUNT> {

@@ -4,7 +4,7 @@ use crate::input::dataset::{Dataset, LoggedFrame};
 use crate::input::log::{LogWarning, ReadOptions, read_bytes};
 use crate::input::shipped::{LOG_GZ, STAGE_TOML};
 use crate::input::stage::Stage;
-use crate::judge::whole::WholeJudgement;
+use crate::judge::whole::{LogJudgement, WholeJudgement};
 use crate::judge::{Decoded, Zeros};
 use crate::problem::parameters::Parameters;
 use crate::problem::synthetic;
@@ -12,7 +12,7 @@ use runtime::VerticalPose;
 use std::path::Path;
 use std::sync::Arc;
 
-fn stage() -> Stage {
+pub(super) fn stage() -> Stage {
     Stage::from_toml(STAGE_TOML, Path::new("stage.toml")).expect("sound")
 }
 
@@ -153,7 +153,7 @@ fn an_excerpt_takes_the_rare_motion_and_not_the_rest() {
 }
 
 /// Movements of 20 rows, whose rows `row` gives by movement and row.
-fn movements(count: usize, row: impl Fn(usize, usize, Row) -> Row) -> Dataset {
+pub(super) fn movements(count: usize, row: impl Fn(usize, usize, Row) -> Row) -> Dataset {
     let truth = Parameters::designed(&stage());
     let mut dataset = synthetic::Protocol::exact(truth, 100).dataset(&stage());
     let rows: Vec<Row> = dataset.rows[..20].to_vec();
@@ -174,7 +174,7 @@ fn movements(count: usize, row: impl Fn(usize, usize, Row) -> Row) -> Dataset {
 }
 
 /// How many runs of an excerpt each kind of movement gives, which repeat in turn.
-fn kinds<const N: usize>(excerpt: &Dataset) -> [usize; N] {
+pub(super) fn kinds<const N: usize>(excerpt: &Dataset) -> [usize; N] {
     let mut counts = [0; N];
     for run in &excerpt.movements {
         counts[run.index as usize % N] += 1;
@@ -274,7 +274,9 @@ fn a_whole_log_is_judged_as_its_rows_are() {
         let want = decoded.judge(&dataset, &stage, zeros).errors;
         let have = WholeJudgement::new(&fit.set, &whole_of(&dataset), &stage, zeros);
         assert_eq!(have.errors.rows, want.rows);
-        assert_eq!(have.logs, [have.errors]);
+        let rows = dataset.rows.len();
+        let errors = have.errors;
+        assert_eq!(have.logs, [LogJudgement { rows, errors }]);
         for (have, want) in have.errors.axes.iter().zip(want.axes) {
             assert!((have.rms / want.rms - 1.0).abs() < 1e-9);
             assert!((have.peak / want.peak - 1.0).abs() < 1e-9);

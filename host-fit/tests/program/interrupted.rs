@@ -1,0 +1,48 @@
+//! Ctrl-C while a file is read.
+#![cfg(unix)]
+
+use crate::common::{Bench, stderr, thinned_log};
+use std::io::Write;
+use std::process::{Command, Stdio};
+
+/// Lines that every reader leaves out, more than a pipe holds.
+const LINES: usize = 20_000;
+/// So much of them is written to a command that does not end: some seconds.
+const TIMES_MAX: usize = 2_000;
+
+#[test]
+fn ctrl_c_ends_a_command_that_reads_and_leaves_nothing_behind() {
+    let bench = Bench::new();
+    let log = thinned_log(5, |_| true);
+    bench.write("log.csv", &log);
+    bench.write("ifm.csv", &log);
+    bench.good("fit log.csv --stage stage.toml --model 31 --out p.bin");
+    for arguments in [
+        "fit - --stage stage.toml --out o.bin --json o.json --report o",
+        "check - --stage stage.toml --json o.json",
+        "decode p.bin - --stage stage.toml --out o.csv",
+        "import - ifm.csv --stage stage.toml --out o.csv --skip-bad-lines",
+    ] {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        let mut command = bench.command(&arguments);
+        command.stdin(Stdio::piped());
+        command.stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut running = command.spawn().expect("started");
+        let mut pipe = running.stdin.take().expect("a pipe");
+        let lines = "# nothing\n".repeat(LINES);
+        // It reads, or these would not have fit into the pipe.
+        pipe.write_all(log.as_bytes()).expect("read");
+        pipe.write_all(lines.as_bytes()).expect("read");
+        let id = running.id().to_string();
+        let sent = Command::new("kill").args(["-INT", &id]).status();
+        assert!(sent.expect("kill runs").success());
+        let ended = (0..TIMES_MAX).any(|_| pipe.write_all(lines.as_bytes()).is_err());
+        drop(pipe);
+        let output = running.wait_with_output().expect("ended");
+        let told = stderr(&output);
+        assert!(ended, "{arguments:?} read on: {told}");
+        assert_eq!(output.status.code(), Some(130), "{arguments:?}: {told}");
+        assert!(told.contains("interrupted"), "{told}");
+        assert!(bench.holds_only(&["log.csv", "ifm.csv", "p.bin"]));
+    }
+}
