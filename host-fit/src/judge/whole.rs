@@ -18,6 +18,8 @@ pub struct WholeJudgement {
     pub errors: PoseError,
     /// The same for each log.
     pub logs: Vec<PoseError>,
+    /// The zero deviation that was taken off each movement of the whole.
+    pub zeros: Vec<ZeroDeviation>,
     /// Rows that the decoder could not decode.
     pub undecoded: usize,
     /// Root mean square of the reference: m, m, rad.
@@ -116,15 +118,17 @@ impl WholeJudgement {
             movements[*movement].add(sums);
         }
         let mut logs = vec![Sums::NONE; whole.logs().len()];
+        let mut taken_off = Vec::with_capacity(movements.len());
         for (movement, sums) in whole.movements().iter().zip(movements) {
             let zero = match zeros {
                 Zeros::Refit if sums.rows > 0.0 => {
                     let mean = sums.error.map(|sum| sum / sums.rows);
-                    ZeroDeviation::of_mean_error(&parameters, mean, &stage.search.delta_m).pose
+                    ZeroDeviation::of_mean_error(&parameters, mean, &stage.search.delta_m)
                 }
-                _ => ZeroDeviation::NONE.pose,
+                _ => ZeroDeviation::NONE,
             };
-            logs[movement.log].add(&sums.less(zero));
+            logs[movement.log].add(&sums.less(zero.pose));
+            taken_off.push(zero);
         }
         let mut all = Sums::NONE;
         logs.iter().for_each(|log| all.add(log));
@@ -132,6 +136,7 @@ impl WholeJudgement {
         Self {
             errors: all.errors(),
             logs: logs.iter().map(Sums::errors).collect(),
+            zeros: taken_off,
             undecoded: all.undecoded,
             motion: (all.reference_squares).map(|sum| (sum / rows.max(1.0)).sqrt()),
         }

@@ -94,7 +94,8 @@ impl Residuals {
             let fit = residuals.step(log, k, probe, &mut values, &mut lag_s, f64::INFINITY)?;
             let left = residuals.left_m(log, k, &fit);
             let noise_m = 1e-3 * white_noise(log, &left, 1e3);
-            let left_m = robust_deviation(left.iter().copied());
+            let used = (0..log.len()).filter(|&row| log.usable[row]);
+            let left_m = robust_deviation(used.map(|row| left[row]));
             let moved = signals_less_means(log, k);
             let squares: f64 = moved.iter().map(|m| m * m).sum();
             let moved_m = (squares / moved.len().max(1) as f64).sqrt();
