@@ -113,6 +113,22 @@ impl Residuals {
         Some(residuals)
     }
 
+    /// rms about the means over a second in terms of the white noise, of the probe where it is largest.
+    pub(super) fn to_noise(&self, log: &LogSignals) -> f64 {
+        let of_probe = |k: usize| {
+            let (mut squares, mut count) = (0.0, 0.0_f64);
+            for segment in &log.segments {
+                for block in self.values[k][segment.clone()].chunks(log.rows_in(1.0)) {
+                    let mean = block.iter().sum::<f64>() / block.len() as f64;
+                    squares += block.iter().map(|m| (m - mean) * (m - mean)).sum::<f64>();
+                    count += block.len() as f64;
+                }
+            }
+            (squares / count.max(1.0)).sqrt() / self.noise_m[k].max(1e-3 * NOISE_MIN_MM)
+        };
+        (0..3).map(of_probe).fold(0.0, f64::max)
+    }
+
     fn row(&self, log: &LogSignals, (k, probe): (usize, &Probe), lag_s: f64, row: usize) -> Row {
         let speed = self.speeds[row];
         let here = &log.rows[row];
