@@ -140,13 +140,10 @@ impl Fit {
         };
         self.warnings
             .extend(FitWarning::of_rest(&self.judgement.errors, &judged.errors));
-        // Of all rows, where those of the excerpt were counted.
-        let counts_rows = |warning: &FitWarning| matches!(warning, FitWarning::Undecoded { .. });
-        self.warnings.retain(|warning| !counts_rows(warning));
-        if judged.undecoded > 0 {
-            let rows = judged.undecoded;
-            self.warnings.push(FitWarning::Undecoded { rows });
-        }
+        // Of all rows and movements, where those of the excerpt were counted.
+        self.warnings.retain(|warning| !warning.is_count());
+        let counts = FitWarning::of_counts(&judged.zeros, judged.undecoded);
+        self.warnings.extend(counts);
         self.whole = Some(judged);
         Ok(())
     }

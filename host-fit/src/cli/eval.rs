@@ -126,17 +126,18 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         (whole.rows() > log.dataset.rows.len()).then_some(whole)
     };
     let whole = judge_whole(zeros);
-    let clipped = || judgement.zeros.iter().filter(|zero| zero.clipped).count();
-    let (undecoded, clipped, movements) = match &whole {
-        Some(whole) => (whole.undecoded, whole.clipped, whole.movements),
-        None => (judgement.undecoded, clipped(), judgement.zeros.len()),
+    let (undecoded, zeros_taken_off) = match &whole {
+        Some(whole) => (whole.undecoded, &whole.zeros),
+        None => (judgement.undecoded, &judgement.zeros),
     };
     let mut circumstances = super::circumstances(&log, &stage, started);
     if undecoded > 0 {
         let undecoded = FitWarning::Undecoded { rows: undecoded };
         circumstances.warnings.push(undecoded.to_string());
     }
+    let clipped = zeros_taken_off.iter().filter(|zero| zero.clipped).count();
     if clipped > 0 {
+        let movements = zeros_taken_off.len();
         circumstances.warnings.push(format!(
             "the zero deviation of {clipped} of {movements} movements was clipped to its range"
         ));

@@ -7,7 +7,7 @@ use super::warning;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::identify::check_motion;
-use crate::judge::uncertainty::own_fit;
+use crate::judge::uncertainty::OwnFit;
 use crate::problem::model::Model;
 use crate::problem::{Group, Problem};
 use runtime::ModelKind;
@@ -15,11 +15,11 @@ use std::fmt::Write;
 
 /// Logs with parameters of their own may have errors smaller by this factor than together: runs with
 /// other motion ask for others, because Model (31) is not all that there is.
-const BETTER_MAX: f64 = 1.15;
+pub(super) const BETTER_MAX: f64 = 1.15;
 /// Beyond this they are of different stages, or something has changed.
-const BETTER_REFUSED: f64 = 1.5;
+pub(super) const BETTER_REFUSED: f64 = 1.5;
 /// Or beyond this difference of sensitivities, as a part of one.
-const GAIN_REFUSED: f64 = 0.02;
+pub(super) const GAIN_REFUSED: f64 = 0.02;
 
 /// How far the logs contradict each other: by the errors that parameters of its own would leave in
 /// each, whether or not it determines them.
@@ -95,14 +95,7 @@ impl Gains {
 
 /// How the sensitivities differ that logs show which can be fitted alone.
 fn gain_difference(dataset: &Dataset, stage: &Stage) -> Option<Gains> {
-    let (zeros_free, unlimited) = (zeros_free(stage), unlimited(stage));
-    let eta = |log: usize| {
-        let dataset = of_log(dataset, log);
-        let model = Model::of(ModelKind::M31);
-        check_motion(&dataset, stage, dataset.rows.len(), model).ok()?;
-        let trial = Trials::new(&dataset, stage, &zeros_free, &unlimited).of(None)?;
-        Some((log, trial.free.eta()))
-    };
+    let eta = |log: usize| Some((log, sensitivities(&of_log(dataset, log), stage)?));
     let mut alone = (0..dataset.logs.len()).filter_map(eta);
     let (first, theirs) = alone.next()?;
     let differences = alone.map(|(log, eta)| Gains {
@@ -111,6 +104,15 @@ fn gain_difference(dataset: &Dataset, stage: &Stage) -> Option<Gains> {
         parts: [0, 1, 2].map(|k| eta[k] / theirs[k] - 1.0),
     });
     differences.max_by(|a, b| a.worst().total_cmp(&b.worst()))
+}
+
+/// The sensitivities of A, B, C that rows show which can be fitted alone.
+pub(super) fn sensitivities(dataset: &Dataset, stage: &Stage) -> Option<[f64; 3]> {
+    let model = Model::of(ModelKind::M31);
+    check_motion(dataset, stage, dataset.rows.len(), model).ok()?;
+    let (zeros_free, unlimited) = (zeros_free(stage), unlimited(stage));
+    let trial = Trials::new(dataset, stage, &zeros_free, &unlimited).of(None)?;
+    Some(trial.free.eta())
 }
 
 /// How well Model (31) describes one log: rms over X, Y, Rz (um, um, urad).
@@ -133,12 +135,12 @@ fn fits_of_logs(dataset: &Dataset, stage: &Stage) -> Option<Vec<LogFit>> {
         let problem = part(trials.problem(), |movement| {
             dataset.movements[movement].log == log
         });
-        let (cost, fall) = own_fit(&problem, &together)?;
+        let own = OwnFit::new(&problem, &together)?;
         Some(LogFit {
             log,
             rows: problem.rows.len() as f64,
-            together_um: problem.fitness(cost),
-            alone_um: problem.fitness(cost - fall),
+            together_um: problem.fitness(own.cost),
+            alone_um: problem.fitness(own.cost_alone()),
         })
     };
     // Of a log in which nothing moves an excerpt has no rows.
@@ -147,7 +149,7 @@ fn fits_of_logs(dataset: &Dataset, stage: &Stage) -> Option<Vec<LogFit>> {
 }
 
 /// The groups of some movements.
-fn part<'a>(problem: &Problem<'a>, is_in: impl Fn(usize) -> bool) -> Problem<'a> {
+pub(super) fn part<'a>(problem: &Problem<'a>, is_in: impl Fn(usize) -> bool) -> Problem<'a> {
     let mut part = Problem {
         rows: Vec::new(),
         groups: Vec::new(),
@@ -165,7 +167,7 @@ fn part<'a>(problem: &Problem<'a>, is_in: impl Fn(usize) -> bool) -> Problem<'a>
 }
 
 /// The rows of one log.
-fn of_log(dataset: &Dataset, log: usize) -> Dataset {
+pub(super) fn of_log(dataset: &Dataset, log: usize) -> Dataset {
     dataset.only(|rows| {
         let movement = rows.first().map(|row| row.movement);
         movement.is_some_and(|movement| dataset.movements[movement].log == log)

@@ -9,12 +9,14 @@
 //! | `consequences` | what is not told beside its cause |
 //! | [`zeros`] | zero deviations beyond their range |
 //! | [`logs`] | logs that contradict each other |
+//! | [`change`] | a log whose two parts do |
 //! | [`range`] | poses beyond the range of a calibration |
 //! | [`of_fit`] | what a fit says of itself |
 //! | [`signals`] | what the signals tell by themselves |
 //! | [`trusted`] | the inputs that no log can show to be wrong |
 
 pub mod causes;
+pub mod change;
 mod consequences;
 pub mod finding;
 pub mod hypothesis;
@@ -46,6 +48,7 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     let of_models = || {
         let mut findings = causes::causes(&sound, stage);
         findings.extend(logs::disagreement(&sound, stage));
+        findings.extend(change::changes(dataset, &sound, stage));
         findings
     };
     let of_signals = || signals::signal_findings(dataset, stage, errors.as_deref());

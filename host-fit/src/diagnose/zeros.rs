@@ -2,7 +2,7 @@
 
 use super::finding::{Code, Finding};
 use super::warning;
-use crate::input::dataset::Dataset;
+use crate::input::dataset::{Dataset, Movement};
 use crate::input::stage::Stage;
 use crate::problem::Problem;
 use crate::problem::parameters::Parameters;
@@ -27,9 +27,28 @@ pub(super) fn clipped(
     let zeros = zero_deviations(problem, parameters, &point);
     let beyond = |delta: f64| (delta - range.clip(delta)).abs() - BEYOND_MIN * range.width();
     let largest = |delta: [f64; 3]| delta.map(f64::abs).into_iter().fold(0.0, f64::max);
-    let beyond: Vec<(String, f64)> = (dataset.movements.iter().zip(&zeros))
+    let mut beyond: Vec<(&Movement, f64)> = (dataset.movements.iter().zip(&zeros))
         .filter(|(_, zero)| zero.delta_m.iter().any(|delta| beyond(*delta) > 0.0))
-        .map(|(movement, zero)| (dataset.movement_name(movement), largest(zero.delta_m)))
+        .map(|(movement, zero)| (movement, largest(zero.delta_m)))
+        .collect();
+    // An excerpt may hold several runs of a movement.
+    let is_again = |later: &Movement, earlier: &Movement| {
+        (later.log, later.index) == (earlier.log, earlier.index)
+    };
+    beyond.dedup_by(|(later, more), (earlier, most)| {
+        let again = is_again(later, earlier);
+        if again {
+            *most = most.max(*more);
+        }
+        again
+    });
+    let again = dataset
+        .movements
+        .windows(2)
+        .filter(|pair| is_again(&pair[1], &pair[0]));
+    let movements = dataset.movements.len() - again.count();
+    let beyond: Vec<(String, f64)> = (beyond.into_iter())
+        .map(|(movement, most)| (dataset.movement_name(movement), most))
         .collect();
     let (worst, most) = beyond.iter().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
     let most_um = most * 1e6;
@@ -45,7 +64,7 @@ pub(super) fn clipped(
              {worst}, {most_um:.1} um at a probe: reset the interferometers nearer to zero before each movement, or widen \
              search.delta_m in stage.toml to [-{wide}e-6, {wide}e-6]",
             beyond.len(),
-            dataset.movements.len(),
+            movements,
             names.join(", "),
             range.low * 1e6,
             range.high * 1e6,

@@ -8,6 +8,7 @@ use crate::judge::statistics::{AxisError, PoseError};
 use crate::problem::Problem;
 use crate::problem::model::ParameterId;
 use crate::problem::terms::shown;
+use crate::problem::zero_deviation::ZeroDeviation;
 use crate::solve::Solution;
 
 /// Something that the user should know of a fit that is good nevertheless.
@@ -146,6 +147,26 @@ impl FitWarning {
         })
     }
 
+    /// Of the movements whose zero deviation was clipped, and of the rows that were not decoded.
+    pub(super) fn of_counts(zeros: &[ZeroDeviation], undecoded: usize) -> Vec<Self> {
+        let (count, of) = (
+            zeros.iter().filter(|zero| zero.clipped).count(),
+            zeros.len(),
+        );
+        let clipped = (count > 0).then_some(Self::ZeroDeviationClipped { count, of });
+        let rows = undecoded;
+        let undecoded = (rows > 0).then_some(Self::Undecoded { rows });
+        clipped.into_iter().chain(undecoded).collect()
+    }
+
+    /// Whether it is one of [`of_counts`](Self::of_counts).
+    pub(super) const fn is_count(&self) -> bool {
+        matches!(
+            self,
+            Self::ZeroDeviationClipped { .. } | Self::Undecoded { .. }
+        )
+    }
+
     /// Of the axes that the log moves (X, Y, Rz and Z, Rx, Ry: largest magnitudes, m, rad) far less
     /// than service does.
     pub(super) fn of_ranges(stage: &Stage, planar: [f64; 3], vertical: [f64; 3]) -> Vec<Self> {
@@ -193,13 +214,6 @@ pub(super) fn warnings(
         warnings.push(FitWarning::VerticalTermsAtLimit { count: vertical });
     }
     warnings.extend(wild_row(dataset, judgement));
-    let clipped = judgement.zeros.iter().filter(|zero| zero.clipped).count();
-    if clipped > 0 {
-        warnings.push(FitWarning::ZeroDeviationClipped {
-            count: clipped,
-            of: dataset.movements.len(),
-        });
-    }
     let mut present = vec![false; dataset.movements.len()];
     for &row in selected {
         present[dataset.rows[row].movement] = true;
@@ -214,11 +228,7 @@ pub(super) fn warnings(
     if problem.model.has_zero_deviation && !missed.is_empty() {
         warnings.push(FitWarning::MovementsMissed { movements: missed });
     }
-    if judgement.undecoded > 0 {
-        warnings.push(FitWarning::Undecoded {
-            rows: judgement.undecoded,
-        });
-    }
+    warnings.extend(FitWarning::of_counts(&judgement.zeros, judgement.undecoded));
     warnings
 }
 

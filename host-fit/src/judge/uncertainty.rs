@@ -122,19 +122,64 @@ pub fn uncertainty(
     })
 }
 
-/// The weighted sum of squared errors of these rows at a solution, um^2, and by how much parameters
-/// of their own would lower it, to first order: by the step of Gauss and Newton, in which what the
-/// rows do not determine stays as it is. `None` as for [`uncertainty`].
-pub fn own_fit(problem: &Problem, parameters: &Parameters) -> Option<(f64, f64)> {
-    let point = point_of(parameters)?;
-    let offsets = vec![Offset::Free; problem.groups.len()];
-    let sums = scatter(problem, &point.ratios, &offsets)?;
-    let weights = Matrix3::from_diagonal(&problem.weights.into());
-    let all: Vec<usize> = (0..COUNT).collect();
-    let (inverse, _) = pseudo_inverse(&gram(&sums, &point.gain, &weights), &all);
-    let descent = descent(&sums, &point.gain, problem.weights);
-    let fall = (descent.transpose() * inverse * descent)[0];
-    Some((cost(&sums, &point.gain, problem.weights), fall))
+/// The weighted sum of squared errors of some rows near a solution, um^2, to second order in the
+/// change of the parameters. Those of movements add up.
+#[derive(Clone, Copy, Debug)]
+pub struct OwnFit {
+    /// At the solution.
+    pub cost: f64,
+    descent: Column,
+    curvature: Square,
+}
+
+impl OwnFit {
+    /// Of no rows.
+    pub fn none() -> Self {
+        Self {
+            cost: 0.0,
+            descent: Column::zeros(),
+            curvature: Square::zeros(),
+        }
+    }
+
+    /// Zero deviations are free. `None` as for [`uncertainty`].
+    pub fn new(problem: &Problem, parameters: &Parameters) -> Option<Self> {
+        let point = point_of(parameters)?;
+        let offsets = vec![Offset::Free; problem.groups.len()];
+        let sums = scatter(problem, &point.ratios, &offsets)?;
+        let weights = Matrix3::from_diagonal(&problem.weights.into());
+        Some(Self {
+            cost: cost(&sums, &point.gain, problem.weights),
+            descent: descent(&sums, &point.gain, problem.weights),
+            curvature: gram(&sums, &point.gain, &weights),
+        })
+    }
+
+    /// With more rows.
+    pub fn add(&mut self, more: &Self) {
+        self.cost += more.cost;
+        self.descent += more.descent;
+        self.curvature += more.curvature;
+    }
+
+    /// The step of Gauss and Newton to parameters of their own; what the rows do not determine stays
+    /// as it is.
+    pub fn step(&self) -> Column {
+        let all: Vec<usize> = (0..COUNT).collect();
+        pseudo_inverse(&self.curvature, &all).0 * self.descent
+    }
+
+    /// The cost after a step.
+    pub fn cost_after(&self, step: &Column) -> f64 {
+        let first = self.descent.dot(step);
+        let second = step.dot(&(self.curvature * step));
+        self.cost - 2.0 * first + second
+    }
+
+    /// The cost with parameters of their own.
+    pub fn cost_alone(&self) -> f64 {
+        self.cost_after(&self.step())
+    }
 }
 
 /// The inverse of the curvature over the free parameters, without the directions that hold no

@@ -18,12 +18,10 @@ pub struct WholeJudgement {
     pub errors: PoseError,
     /// Each log.
     pub logs: Vec<LogJudgement>,
+    /// The zero deviation that was taken off each movement.
+    pub zeros: Vec<ZeroDeviation>,
     /// Rows that the decoder could not decode.
     pub undecoded: usize,
-    /// Movements of all logs.
-    pub movements: usize,
-    /// Those of them whose zero deviation was clipped to its range.
-    pub clipped: usize,
     /// Root mean square of the reference: m, m, rad.
     pub motion: [f64; 3],
 }
@@ -126,16 +124,12 @@ struct LogSums {
     plain: Sums,
     /// Those of the movements refitted.
     refitted: Sums,
-    movements: usize,
-    clipped: usize,
 }
 
 impl LogSums {
     const NONE: Self = Self {
         plain: Sums::NONE,
         refitted: Sums::NONE,
-        movements: 0,
-        clipped: 0,
     };
 }
 
@@ -147,6 +141,8 @@ pub struct Judge<'s> {
     /// The movement that is not over, and its log.
     movement: (usize, Sums),
     logs: Vec<LogSums>,
+    /// Of each movement that is over.
+    zeros: Vec<ZeroDeviation>,
 }
 
 impl<'s> Judge<'s> {
@@ -157,6 +153,7 @@ impl<'s> Judge<'s> {
             stage,
             movement: (0, Sums::NONE),
             logs: vec![LogSums::NONE; logs],
+            zeros: Vec::new(),
         }
     }
 
@@ -188,8 +185,7 @@ impl<'s> Judge<'s> {
         let log = &mut self.logs[log];
         log.plain.add(sums);
         log.refitted.add(&sums.less(zero.pose));
-        log.movements += 1;
-        log.clipped += usize::from(zero.clipped);
+        self.zeros.push(zero);
     }
 
     /// The figures of the rows so far; zero deviations are refitted unless there are to be none.
@@ -208,13 +204,14 @@ impl<'s> Judge<'s> {
         };
         let logs = all.logs.iter().map(&mut of_log).collect();
         let rows = total.all_rows() as f64;
-        let clipped: usize = all.logs.iter().map(|log| log.clipped).sum();
+        if !refits {
+            all.zeros.fill(ZeroDeviation::NONE);
+        }
         WholeJudgement {
             errors: total.errors(),
             logs,
             undecoded: total.undecoded,
-            movements: all.logs.iter().map(|log| log.movements).sum(),
-            clipped: if refits { clipped } else { 0 },
+            zeros: all.zeros,
             motion: (total.reference_squares).map(|sum| (sum / rows.max(1.0)).sqrt()),
         }
     }

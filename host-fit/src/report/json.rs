@@ -3,12 +3,13 @@
 use crate::diagnose::finding::Finding;
 use crate::diagnose::trusted::{Trusted, trusted};
 use crate::fit::{CrossValidation, Fit};
-use crate::input::dataset::Dataset;
+use crate::input::dataset::{Dataset, Movement};
 use crate::input::stage::Stage;
 use crate::judge::whole::WholeJudgement;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
+use crate::problem::zero_deviation::ZeroDeviation;
 use crate::report::errors::{Errors, LogErrors, by_log, of_whole};
 use crate::report::field::{ByAxis, Correlation, FieldReport};
 use crate::report::parameters::{
@@ -42,6 +43,25 @@ pub struct MovementZero {
     pub c_um: f64,
     /// Whether it was clipped to its range.
     pub clipped: bool,
+}
+
+/// The rows of a long log that a fit, a diagnosis and figures use.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Excerpt {
+    /// How many.
+    pub rows: usize,
+    /// How many runs of rows that follow each other.
+    pub runs: usize,
+}
+
+impl Excerpt {
+    /// `None` if the rows are all.
+    pub fn of(dataset: &Dataset, whole: Option<&WholeJudgement>) -> Option<Self> {
+        whole.map(|_| Self {
+            rows: dataset.rows.len(),
+            runs: dataset.movements.len(),
+        })
+    }
 }
 
 /// What `fit` and `eval` both report.
@@ -110,7 +130,10 @@ pub struct Report {
     pub coordinates: Coordinates,
     /// Serial number in the blob.
     pub serial: String,
-    /// Zero deviation of each movement; of an excerpt that of each run.
+    /// Of a long log the rows that fit, diagnosis and figures use; null where they use all.
+    pub excerpt: Option<Excerpt>,
+    /// Zero deviation of each movement of the logs named; of a long log that `eval` judged, of each
+    /// run of its excerpt.
     pub zero_deviations: Vec<MovementZero>,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -139,8 +162,14 @@ pub struct Circumstances<'a> {
     pub findings: Vec<Finding>,
 }
 
-fn movement_zeros(judgement: &Judgement, dataset: &Dataset) -> Vec<MovementZero> {
-    let movements = dataset.movements.iter().zip(&judgement.zeros);
+/// The zero deviations of the movements of a dataset, or of those of the logs that it is an excerpt
+/// of.
+pub(super) fn movement_zeros(
+    dataset: &Dataset,
+    movements: &[Movement],
+    zeros: &[ZeroDeviation],
+) -> Vec<MovementZero> {
+    let movements = movements.iter().zip(zeros);
     movements
         .map(|(movement, zero)| {
             let [a_um, b_um, c_um] = zero.delta_m.map(|d| d * 1e6);
@@ -153,6 +182,18 @@ fn movement_zeros(judgement: &Judgement, dataset: &Dataset) -> Vec<MovementZero>
             }
         })
         .collect()
+}
+
+/// Those of the movements of the logs named, or of the runs of an excerpt, where only that is held.
+fn zero_deviations(
+    judgement: &Judgement,
+    judged: Option<&WholeJudgement>,
+    dataset: &Dataset,
+) -> Vec<MovementZero> {
+    match (judged, &dataset.whole) {
+        (Some(judged), Some(whole)) => movement_zeros(dataset, whole.movements(), &judged.zeros),
+        _ => movement_zeros(dataset, &dataset.movements, &judgement.zeros),
+    }
 }
 
 /// Errors on rows left out.
@@ -256,7 +297,8 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
             .nearest_with(&parameters_fitted.geometry())
             .into(),
         serial: fit.set.serial.as_str().to_owned(),
-        zero_deviations: movement_zeros(&fit.judgement, c.dataset),
+        excerpt: Excerpt::of(c.dataset, fit.whole.as_ref()),
+        zero_deviations: zero_deviations(&fit.judgement, fit.whole.as_ref(), c.dataset),
         warnings,
         findings: c.findings.clone(),
         logs: match &fit.whole {
@@ -293,7 +335,7 @@ pub fn of_eval(
         cross_validation: None,
         rows: whole.map_or(c.dataset.rows.len(), WholeJudgement::rows),
         train_rows: set.fit.train_rows as usize,
-        movements: whole.map_or(c.dataset.movements.len(), |whole| whole.movements),
+        movements: whole.map_or(c.dataset.movements.len(), |whole| whole.zeros.len()),
         skipped_rows: c.skipped_rows,
         evaluations: None,
         elapsed_s: c.elapsed_s,
@@ -309,7 +351,8 @@ pub fn of_eval(
         reference_lag: None,
         coordinates: c.stage.designed.nearest_with(&values.geometry()).into(),
         serial: set.serial.as_str().to_owned(),
-        zero_deviations: movement_zeros(judgement, c.dataset),
+        excerpt: Excerpt::of(c.dataset, whole),
+        zero_deviations: zero_deviations(judgement, whole, c.dataset),
         warnings: c.warnings.clone(),
         findings: c.findings.clone(),
         logs: match whole {

@@ -4,7 +4,7 @@ use super::before_after::{Errors, before_after};
 use super::chart::Chart;
 use super::figures::{Log, errors, fitting, residuals, signals};
 use super::html::{PageError, STYLE, render};
-use super::json::Report;
+use super::json::{Report, movement_zeros};
 use super::provenance::Provenance;
 use super::series::times;
 use super::tables::{
@@ -109,13 +109,15 @@ impl Source<'_> {
         let report = fit.map(|(_, report)| report);
         let of_movements = last.map(|last| errors::of_movements(&log, last));
         let of_movements = of_movements.unwrap_or_default();
-        let zeros = report.map_or(&[][..], |report| &report.zero_deviations);
+        let zeros = fit.map_or_else(Vec::new, |(fit, _)| {
+            movement_zeros(dataset, &dataset.movements, &fit.judgement.zeros)
+        });
         let has_zeros = report.is_some_and(|report| report.delta == "fit");
         let range = stage.search.delta_m;
         let by_movement = last.map(|_| errors::by_movement(&of_movements));
         let by_movement = by_movement
             .into_iter()
-            .chain(has_zeros.then(|| fitting::zero_deviations(zeros, [range.low, range.high])));
+            .chain(has_zeros.then(|| fitting::zero_deviations(&zeros, [range.low, range.high])));
         let page = Page {
             style: STYLE,
             provenance: &self.provenance,
@@ -129,7 +131,7 @@ impl Source<'_> {
             stages: stage_rows(&stages),
             noise: noise.map(|noise| noise.map(|noise| noise * 1e6)),
             before_after: figures(over_time(&log, &stages, noise))?,
-            movements: movement_rows(dataset, &of_movements, zeros),
+            movements: movement_rows(dataset, &of_movements, &zeros),
             has_zeros,
             movements_max: MOVEMENTS_MAX,
             by_movement: figures(by_movement)?,

@@ -1,6 +1,6 @@
 //! Where the figures of a report come from: command, versions, inputs, seed.
 
-use crate::input::dataset::Dataset;
+use crate::input::dataset::{Dataset, Movement};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -65,14 +65,26 @@ impl Provenance {
     pub fn add_logs(&mut self, dataset: &Dataset) {
         let hash = hex(&dataset.sha256);
         for (k, log) in dataset.logs.iter().enumerate() {
-            let movements = dataset.movements.iter().filter(|m| m.log == k);
-            let rows: usize = movements.clone().map(|m| m.rows.len()).sum();
+            let count = |movements: &[Movement]| {
+                let of_log = movements.iter().filter(|m| m.log == k);
+                of_log.fold((0, 0), |(rows, n), m| (rows + m.rows.len(), n + 1))
+            };
+            let here = count(&dataset.movements);
+            let (rows, movements) = match &dataset.whole {
+                Some(whole) => count(whole.movements()),
+                None => here,
+            };
+            let movements = match movements {
+                1 => "one movement".to_owned(),
+                several => format!("{several} movements"),
+            };
+            let drawn = match (&dataset.whole, here) {
+                (Some(_), (rows, runs)) => format!("; {rows} of them, in {runs} runs, are drawn"),
+                (None, _) => String::new(),
+            };
             self.inputs.push(Input {
                 name: log.path.display().to_string(),
-                what: match movements.count() {
-                    1 => format!("log, {rows} rows in one movement"),
-                    count => format!("log, {rows} rows in {count} movements"),
-                },
+                what: format!("log, {rows} rows in {movements}{drawn}"),
                 sha256: match dataset.logs.len() {
                     1 => hash.clone(),
                     _ => String::new(),

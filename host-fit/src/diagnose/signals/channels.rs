@@ -86,6 +86,12 @@ impl<'a> LogSignals<'a> {
         ((time_s / self.period_s).round() as usize).max(1)
     }
 
+    /// Whether the tests of residuals use at least half of some rows.
+    pub(super) fn is_mostly_used(&self, rows: &Range<usize>) -> bool {
+        let used = self.usable[rows.clone()].iter().filter(|used| **used);
+        2 * used.count() >= rows.len()
+    }
+
     pub(super) fn leave_out_undecoded(&mut self, errors: &[Option<[f64; 3]>]) {
         let errors = errors.get(self.first..).unwrap_or_default();
         for (usable, error) in self.usable.iter_mut().zip(errors) {

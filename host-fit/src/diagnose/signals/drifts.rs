@@ -5,9 +5,11 @@ use super::residual::Residuals;
 use crate::diagnose::finding::{Code, Finding};
 use std::ops::Range;
 
-/// Slope in standard errors that is no chance; more where few blocks tell the walk.
+/// Slope in standard errors that is no chance.
 const ERRORS_MIN: f64 = 5.0;
-/// Drift over a movement or the log, whichever is longer, that is worth a warning, m.
+/// A standard error from the scatter of few values is larger by this over their number.
+const FEW: f64 = 3.0;
+/// Drift over the log that is worth a warning, m.
 const DRIFT_MIN_M: f64 = 2e-6;
 /// Change of a gain over the log that is.
 const GAIN_MIN: f64 = 0.003;
@@ -34,6 +36,10 @@ impl Slope {
     fn in_errors(self) -> f64 {
         self.value / self.error.max(f64::MIN_POSITIVE)
     }
+
+    fn is_clear(self, least: f64) -> bool {
+        self.value.abs() > least.max(ERRORS_MIN * self.error)
+    }
 }
 
 /// Names channels that drift, and probes whose gain does.
@@ -42,33 +48,38 @@ pub(super) fn findings(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> 
     if blocks.len() < BLOCKS_MIN {
         return Vec::new();
     }
-    let limit = ERRORS_MIN * (1.0 + 5.0 / blocks.len() as f64);
-    let length_s = log.time_s.last().copied().unwrap_or(0.0);
-    let longest_s = (log.segments.iter())
-        .map(|segment| log.time_s[segment.end - 1] - log.time_s[segment.start])
-        .fold(length_s, f64::max);
+    let (start_s, end_s) = (
+        log.time_s[blocks[0].start],
+        log.time_s[blocks[blocks.len() - 1].end - 1],
+    );
+    let length_s = end_s - start_s;
     let mut findings = Vec::new();
     let mut drifts = Vec::new();
     for k in 0..3 {
         let time = residuals.unexplained(log, k, &log.time_s);
         let signal = log.channels[k].values.iter().zip(&log.time_s);
-        let growing: Vec<f64> = signal.map(|(s, t)| s * (t / length_s - 0.5)).collect();
+        let growing: Vec<f64> = signal
+            .map(|(s, t)| s * ((t - start_s) / length_s - 0.5))
+            .collect();
         let growing = residuals.unexplained(log, k, &growing);
         // Least squares, so that what is left without the drifts is the noise.
         let values = &residuals.unexplained(log, k, &residuals.values[k]);
         let (of_time, of_growing) = (less(&time, &growing), less(&growing, &time));
         let left = less(&less(values, &growing), &of_time);
-        let noise = Noise::new(log, &left, residuals.noise_m[k], &blocks);
-        let gain = noise.slope(log, values, &of_growing, &left, &blocks);
-        if gain.value.abs() > GAIN_MIN.max(limit * gain.error) {
+        let slope = |over: &[f64]| {
+            let noise = Noise::new(log, &left, over, residuals.noise_m[k], &blocks);
+            noise.slope(log, values, over, &left, &blocks)
+        };
+        let gain = slope(&of_growing);
+        if gain.is_clear(GAIN_MIN) {
             findings.push(of_gain(log, k, gain.value));
         }
-        drifts.push(noise.slope(log, values, &of_time, &left, &blocks));
+        drifts.push(slope(&of_time));
     }
-    let least = DRIFT_MIN_M / longest_s.max(f64::MIN_POSITIVE);
+    let least = DRIFT_MIN_M / length_s;
     let trends = (0..3).map(|k| trend(log, residuals, k)).collect();
     for slopes in [Some(drifts), trends].into_iter().flatten() {
-        let of = drifting(log, residuals, &slopes, limit, least);
+        let of = drifting(log, residuals, &slopes, least);
         if !of.is_empty() {
             findings.extend(of);
             break;
@@ -81,6 +92,11 @@ fn product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
+/// What the rows of a block tell of the slope over a regressor.
+fn told(over: &[f64], block: &Range<usize>) -> f64 {
+    product(&over[block.clone()], &over[block.clone()])
+}
+
 /// A regressor less what the other explains of it.
 fn less(regressor: &[f64], other: &[f64]) -> Vec<f64> {
     let share = product(regressor, other) / product(other, other).max(f64::MIN_POSITIVE);
@@ -89,13 +105,15 @@ fn less(regressor: &[f64], other: &[f64]) -> Vec<f64> {
         .collect()
 }
 
+/// Those of which at least half of the rows are used.
 fn blocks(log: &LogSignals) -> Vec<Range<usize>> {
     let length = log.rows_in(BLOCK_S);
     let in_segment = |segment: &Range<usize>| {
         let (start, count) = (segment.start, segment.len() / length);
         (0..count).map(move |k| start + k * length..start + (k + 1) * length)
     };
-    log.segments.iter().flat_map(in_segment).collect()
+    let blocks = log.segments.iter().flat_map(in_segment);
+    blocks.filter(|block| log.is_mostly_used(block)).collect()
 }
 
 /// White noise and the walk of the reference, as a probe sees them.
@@ -105,19 +123,29 @@ struct Noise {
 }
 
 impl Noise {
-    /// The walk from the differences of neighbouring blocks of residuals without drift.
-    fn new(log: &LogSignals, values: &[f64], white_m: f64, blocks: &[Range<usize>]) -> Self {
+    /// The walk from the differences of neighbouring blocks of residuals without drift, each counted
+    /// by what its blocks tell of the slope over `over`: while the stage rests they tell nothing of a
+    /// gain, nor of what the model leaves unexplained when it moves.
+    fn new(
+        log: &LogSignals,
+        values: &[f64],
+        over: &[f64],
+        white_m: f64,
+        blocks: &[Range<usize>],
+    ) -> Self {
         let mean =
             |block: &Range<usize>| values[block.clone()].iter().sum::<f64>() / block.len() as f64;
         let starts = |row: usize| log.segments.iter().any(|segment| segment.start == row);
-        let steps: Vec<f64> = (blocks.windows(2))
-            .filter(|pair| pair[0].end == pair[1].start && !starts(pair[1].start))
-            .map(|pair| mean(&pair[1]) - mean(&pair[0]))
-            .collect();
-        let count = steps.len().max(1) as f64;
-        let squares = product(&steps, &steps);
+        let (mut squares, mut weights) = (0.0, f64::MIN_POSITIVE);
+        for pair in blocks.windows(2) {
+            if pair[0].end == pair[1].start && !starts(pair[1].start) {
+                let weight = told(over, &pair[0]) + told(over, &pair[1]);
+                squares += weight * (mean(&pair[1]) - mean(&pair[0])).powi(2);
+                weights += weight;
+            }
+        }
         let of_white = 2.0 * white_m * white_m / log.rows_in(BLOCK_S) as f64;
-        let variance = squares / count;
+        let variance = squares / weights;
         // Noise that is not white leaves less in the means than white noise of its size.
         let variance_m2 = (variance - of_white).max(0.5 * variance);
         // Means over neighbouring blocks of a walk differ by two thirds of its variance.
@@ -154,9 +182,13 @@ impl Noise {
             sum * sum
         };
         let shown: f64 = blocks.iter().map(shown).sum();
+        let told: Vec<f64> = blocks.iter().map(|block| told(over, block)).collect();
+        // Blocks that count alike, as many as tell as much.
+        let sum: f64 = told.iter().sum();
+        let count = (sum * sum / product(&told, &told).max(f64::MIN_POSITIVE)).max(1.0);
         Slope {
             value,
-            error: noise.max(shown).sqrt() / length,
+            error: (1.0 + FEW / count) * noise.max(shown).sqrt() / length,
         }
     }
 }
@@ -193,20 +225,13 @@ fn trend(log: &LogSignals, residuals: &Residuals, probe: usize) -> Option<Slope>
         .sum();
     (steps > WHITE_MIN * squares).then(|| Slope {
         value,
-        error: (squares / (n - 2.0) / tt).sqrt(),
+        error: (1.0 + FEW / n) * (squares / (n - 2.0) / tt).sqrt(),
     })
 }
 
 /// The channels whose drift explains the slopes (m/s) of the probes: one beam, or else probes.
-fn drifting(
-    log: &LogSignals,
-    residuals: &Residuals,
-    slopes: &[Slope],
-    limit: f64,
-    least: f64,
-) -> Vec<Finding> {
-    let clear = |slope: &Slope| slope.value.abs() > least.max(limit * slope.error);
-    if !slopes.iter().any(clear) {
+fn drifting(log: &LogSignals, residuals: &Residuals, slopes: &[Slope], least: f64) -> Vec<Finding> {
+    if !slopes.iter().any(|slope| slope.is_clear(least)) {
         return Vec::new();
     }
     let all: f64 = slopes.iter().map(|slope| slope.in_errors().powi(2)).sum();
@@ -233,7 +258,9 @@ fn drifting(
             vec![of_drift(log, name, m_per_s, "")]
         }
         _ => (0..3)
-            .filter(|&k| clear(&slopes[k]) && slopes[k].in_errors().powi(2) > LEFT_MAX * most)
+            .filter(|&k| {
+                slopes[k].is_clear(least) && slopes[k].in_errors().powi(2) > LEFT_MAX * most
+            })
             .map(|k| {
                 let same = " (a drift of ifm_x looks the same)";
                 of_drift(

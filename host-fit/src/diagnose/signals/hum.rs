@@ -51,7 +51,12 @@ pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
     if length < ROWS_MIN {
         return Vec::new();
     }
-    let windows = windows(&log.segments, length);
+    let mut windows = windows(&log.segments, length);
+    // A mean over windows without residuals would be told as if all of them had gone in.
+    windows.retain(|window| log.is_mostly_used(window));
+    if windows.is_empty() {
+        return Vec::new();
+    }
     let raw: Vec<Spectrum> = (log.channels.iter())
         .map(|channel| Spectrum::new(&channel.values, &windows))
         .collect();

@@ -61,6 +61,23 @@ pub fn signal_findings(
     findings
 }
 
+/// What the field model leaves of the Hall signals of a log, in terms of their white noise, of the probe
+/// of which it leaves most: rms about the means over a second, in which the reference hardly drifts.
+/// Infinite where the motion does not explain the signals; `None` without reference or rows.
+pub(crate) fn residual_to_noise(dataset: &Dataset, stage: &Stage, log: usize) -> Option<f64> {
+    let mut signals = LogSignals::new(dataset, stage, log);
+    if !dataset.logs[log].has_reference || signals.len() < ROWS_MIN {
+        return None;
+    }
+    let mut residuals = Residuals::new(&signals, stage);
+    if let Some(with) = &residuals
+        && !outliers::outliers(&mut signals, with).is_empty()
+    {
+        residuals = Residuals::new(&signals, stage);
+    }
+    Some(residuals.map_or(f64::INFINITY, |residuals| residuals.to_noise(&signals)))
+}
+
 fn of_log(
     dataset: &Dataset,
     stage: &Stage,

@@ -94,7 +94,8 @@ impl Residuals {
             let fit = residuals.step(log, k, probe, &mut values, &mut lag_s, f64::INFINITY)?;
             let left = residuals.left_m(log, k, &fit);
             let noise_m = 1e-3 * white_noise(log, &left, 1e3);
-            let left_m = robust_deviation(left.iter().copied());
+            let used = (0..log.len()).filter(|&row| log.usable[row]);
+            let left_m = robust_deviation(used.map(|row| left[row]));
             let moved = signals_less_means(log, k);
             let squares: f64 = moved.iter().map(|m| m * m).sum();
             let moved_m = (squares / moved.len().max(1) as f64).sqrt();
@@ -110,6 +111,22 @@ impl Residuals {
             residuals.noise_m[k] = noise_m;
         }
         Some(residuals)
+    }
+
+    /// rms about the means over a second in terms of the white noise, of the probe where it is largest.
+    pub(super) fn to_noise(&self, log: &LogSignals) -> f64 {
+        let of_probe = |k: usize| {
+            let (mut squares, mut count) = (0.0, 0.0_f64);
+            for segment in &log.segments {
+                for block in self.values[k][segment.clone()].chunks(log.rows_in(1.0)) {
+                    let mean = block.iter().sum::<f64>() / block.len() as f64;
+                    squares += block.iter().map(|m| (m - mean) * (m - mean)).sum::<f64>();
+                    count += block.len() as f64;
+                }
+            }
+            (squares / count.max(1.0)).sqrt() / self.noise_m[k].max(1e-3 * NOISE_MIN_MM)
+        };
+        (0..3).map(of_probe).fold(0.0, f64::max)
     }
 
     fn row(&self, log: &LogSignals, (k, probe): (usize, &Probe), lag_s: f64, row: usize) -> Row {

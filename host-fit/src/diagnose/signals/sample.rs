@@ -7,7 +7,7 @@ use crate::input::shipped::STAGE_TOML;
 use crate::input::stage::Stage;
 use crate::simulate::assembly::Assembly;
 use crate::simulate::protocol::Protocol;
-use crate::simulate::recording::{Recording, record};
+use crate::simulate::recording::{Recording, Sample, record};
 use crate::simulate::sensors::SensorErrors;
 
 /// Rows of each of its movements, and their servo period, s.
@@ -20,10 +20,17 @@ fn stage() -> Stage {
 
 /// Three movements of 4 s, all axes moving.
 pub(super) fn recording() -> Recording {
+    with_rests(0)
+}
+
+/// The same log with so many movements of a stage that stands still behind its own.
+pub(super) fn with_rests(count: usize) -> Recording {
     let stage = stage();
     let mut run = Protocol::Combined.run(PERIOD_S, 3);
     run.movements.truncate(3);
     (run.movements.iter_mut()).for_each(|poses| poses.truncate(ROWS));
+    let rest = vec![run.movements[0][0]; ROWS];
+    run.movements.extend(std::iter::repeat_n(rest, count));
     let assembly = Assembly::draw(&stage, 3);
     record(&stage, &assembly, run, &SensorErrors::USUAL, 3).expect("clear")
 }
@@ -56,6 +63,31 @@ pub(super) fn only(recording: &Recording, code: Code, channel: Option<&str>) -> 
     };
     assert_eq!((finding.code, finding.channel.as_deref()), (code, channel));
     finding.clone()
+}
+
+/// However long the stage stands still beside them, three movements tell no more of a gain, nor of
+/// hum.
+#[test]
+fn rests_make_no_other_test_of_residuals_more_certain() {
+    let found = signal_findings(&dataset(&with_rests(150)), &stage(), None);
+    let codes: Vec<Code> = found.iter().map(|finding| finding.code).collect();
+    assert_eq!(codes, [Code::IdleMovement], "{found:#?}");
+}
+
+/// Over minutes the interferometers drift by more than a stage at rest may move.
+#[test]
+fn a_long_rest_is_idle_though_its_reference_drifts() {
+    let mut recording = with_rests(1);
+    let mut rest = Vec::new();
+    for k in 0..40 {
+        rest.extend(recording.movements[3].iter().map(|sample| Sample {
+            t_us: sample.t_us + k * 2000 * ROWS as i64,
+            beams_nm: sample.beams_nm.map(|nm| nm + 100 * k),
+            ..*sample
+        }));
+    }
+    recording.movements[3] = rest;
+    only(&recording, Code::IdleMovement, None);
 }
 
 #[test]

@@ -34,7 +34,7 @@ pub(super) fn steps(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding>
         .map(|channel| {
             let of = |segment: &Range<usize>| {
                 let segment = segment.clone();
-                (segment.clone())
+                (segment.clone().filter(|&row| signals.usable[row]))
                     .filter_map(move |row| jump_m(signals, &channel.values, &segment, row))
             };
             robust_deviation(signals.segments.iter().flat_map(of))

@@ -12,8 +12,9 @@ const RUN_MIN: usize = 50;
 const GAP_CODES: f64 = 20.0;
 /// Rows of a stretch in which the liveliness of a channel is counted.
 const STRETCH: usize = 250;
-/// A movement stands still within this, m.
+/// A movement stands still within this, m; its beams within this time, s.
 const IDLE_M: f64 = 2e-6;
+const ONCE_S: f64 = 1.0;
 /// Residual that shows that it should have moved, m.
 pub(super) const MISSED_M: f64 = 6e-6;
 /// Length of a rest after a crash, s, of the stretches it is looked for in, and the share of
@@ -135,7 +136,7 @@ pub(super) fn idle_and_crashed(log: &mut LogSignals) -> Vec<Finding> {
         if rows.len() < 2 || !rows.clone().all(|row| log.usable[row]) {
             continue;
         }
-        if motion_m(log, &rows) < IDLE_M && hall_motion_m(log, &rows) < IDLE_M {
+        if !moves_at_once(log, &rows) && hall_motion_m(log, &rows) < IDLE_M {
             idle_rows.push(rows);
         } else if let Some(rest) = sudden_rest(log, &rows) {
             crashed.push(rest);
@@ -160,6 +161,15 @@ pub(super) fn idle_and_crashed(log: &mut LogSignals) -> Vec<Finding> {
     }
     leave_out(log, idle_rows.into_iter().chain(crashed));
     findings
+}
+
+/// Whether any beam moves within a second or so: over longer the interferometers of a stage at rest
+/// drift.
+fn moves_at_once(log: &LogSignals, rows: &Range<usize>) -> bool {
+    let length = log.rows_in(ONCE_S);
+    let stretch = |start: usize| start..(start + length).min(rows.end);
+    let mut starts = rows.clone().step_by(length.div_ceil(2));
+    starts.any(|start| motion_m(log, &stretch(start)) >= IDLE_M)
 }
 
 /// How far the stage moves by any beam, m.
