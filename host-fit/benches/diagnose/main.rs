@@ -78,6 +78,18 @@ fn main() {
         found.into_iter().collect()
     });
     tell("two stages", Code::LogsDisagree, &found.collect::<Vec<_>>());
+    let found = (1..=FAULTY).map(|seed| {
+        // A planned run is one movement.
+        let logs =
+            [seed, seed + FAULTY].map(|n| recording_of(&stage, &planned, 1000 + n, seed % 2));
+        let [mut mixed, second] = logs;
+        let half = mixed.movements.len() / 2;
+        mixed.movements[half..].clone_from_slice(&second.movements[half..]);
+        let dataset = mixed.dataset(&stage).expect("a plane");
+        diagnose::change::changes(&dataset, &dataset, &stage)
+    });
+    let name = "two stages in one log";
+    tell(name, Code::LogsDisagree, &found.collect::<Vec<_>>());
     signals::table(&stage, &planned);
 }
 

@@ -160,7 +160,7 @@ impl FitWarning {
     }
 
     /// Whether it is one of [`of_counts`](Self::of_counts).
-    pub(super) const fn is_count(&self) -> bool {
+    pub(crate) const fn is_count(&self) -> bool {
         matches!(
             self,
             Self::ZeroDeviationClipped { .. } | Self::Undecoded { .. }

@@ -277,11 +277,73 @@ fn a_whole_log_is_judged_as_its_rows_are() {
         let rows = dataset.rows.len();
         let errors = have.errors;
         assert_eq!(have.logs, [LogJudgement { rows, errors }]);
+        let zeros = decoded.judge(&dataset, &stage, zeros).zeros;
+        for (have, want) in have.zeros.iter().zip(&zeros) {
+            for (have, want) in have.delta_m.iter().zip(want.delta_m) {
+                assert!((have - want).abs() < 1e-12);
+            }
+        }
+        assert_eq!(have.zeros.len(), zeros.len());
         for (have, want) in have.errors.axes.iter().zip(want.axes) {
             assert!((have.rms / want.rms - 1.0).abs() < 1e-9);
             assert!((have.peak / want.peak - 1.0).abs() < 1e-9);
         }
     }
+}
+
+/// A fit to an excerpt of the shipped log with the Hall codes of some rows changed: by movement and row of
+/// the movement.
+fn fitted_excerpt(
+    stage: &Stage,
+    change: impl Fn(usize, usize, &mut [i32; 3]),
+) -> (Dataset, crate::fit::Fit) {
+    let (mut dataset, _) = shipped(None);
+    for (number, movement) in dataset.movements.iter().enumerate() {
+        for (k, row) in dataset.rows[movement.rows.clone()].iter_mut().enumerate() {
+            if let LoggedFrame::Codes(frame) = &mut row.frame {
+                change(number, k, &mut frame.hall);
+            }
+        }
+    }
+    let excerpt = whole_of(&dataset).excerpt(12_500, [0; 32]);
+    let model = crate::problem::model::Model::of(runtime::ModelKind::M31);
+    let settings = crate::fit::FitSettings::new(crate::fit::ModelChoice::Named(model));
+    let fit = crate::fit::fit(&excerpt, stage, &settings).expect("a fit");
+    (excerpt, fit)
+}
+
+#[test]
+fn a_fit_to_an_excerpt_counts_what_cannot_be_decoded_and_what_is_clipped_in_the_whole_log() {
+    let mut narrow = stage();
+    narrow.search.delta_m.low = -1.5e-6;
+    narrow.search.delta_m.high = 1.5e-6;
+    // A code at the end of the range in the last row of each movement.
+    let (excerpt, fit) = fitted_excerpt(&narrow, |_, row, hall| {
+        if row == 999 {
+            hall[0] = 32_767;
+        }
+    });
+    assert!(excerpt.movements.len() < 57);
+    let judged = fit.whole.as_ref().expect("an excerpt");
+    let count = judged.zeros.iter().filter(|zero| zero.clipped).count();
+    assert!((20..57).contains(&count), "{count}");
+    let counts: Vec<_> = fit.warnings.iter().filter(|told| told.is_count()).collect();
+    let want = [
+        crate::fit::FitWarning::ZeroDeviationClipped { count, of: 57 },
+        crate::fit::FitWarning::Undecoded { rows: 57 },
+    ];
+    assert_eq!(counts, want.each_ref());
+}
+
+#[test]
+fn a_report_says_how_much_of_a_long_log_is_drawn() {
+    let (excerpt, _) = shipped(Some(50_000));
+    let mut provenance = crate::report::provenance::Provenance::default();
+    provenance.add_logs(&excerpt);
+    let (rows, runs) = (excerpt.rows.len(), excerpt.movements.len());
+    let want =
+        format!("log, 57000 rows in 57 movements; {rows} of them, in {runs} runs, are drawn");
+    assert_eq!(provenance.inputs[0].what, want);
 }
 
 #[test]
