@@ -3,6 +3,7 @@
 
 pub mod chunk;
 pub mod excerpt;
+pub mod pieces;
 
 use super::dataset::{LogSource, Movement, Row, Scales};
 use chunk::{Chunk, Sample};

@@ -4,6 +4,8 @@
 //! | module | what it does |
 //! |---|---|
 //! | `channels` | the signals of one log by channel |
+//! | `places` | where in a log something was found |
+//! | `row_by_row` | what all rows of a log tell by themselves: the four modules that follow |
 //! | `timing` | rows missing, uneven times |
 //! | `converters` | flat tops |
 //! | `still` | channels that repeat one value, movements that stand still |
@@ -23,7 +25,9 @@ mod converters;
 mod drifts;
 mod hum;
 mod outliers;
+mod places;
 mod residual;
+mod row_by_row;
 #[cfg(test)]
 mod sample;
 mod spectrum;
@@ -69,13 +73,8 @@ fn of_log(
     findings: &mut Vec<Finding>,
 ) {
     let mut signals = LogSignals::new(dataset, stage, log);
-    findings.extend(timing::findings(&signals, stage));
-    findings.extend(converters::saturated(&mut signals));
+    findings.extend(row_by_row::findings(&mut signals, dataset, log, stage));
     let has_reference = dataset.logs[log].has_reference;
-    if has_reference {
-        findings.extend(still::idle_and_crashed(&mut signals));
-    }
-    findings.extend(still::frozen(&mut signals, has_reference));
     if !has_reference || signals.len() < ROWS_MIN {
         return;
     }
