@@ -124,19 +124,21 @@ fn channels(rows: &[Row], stage: &Stage) -> Vec<Channel> {
             m_per_code: stage.hall.m_per_count,
         });
     }
-    for (i, name) in BEAMS.into_iter().enumerate() {
-        let beam = |row: &Row| {
-            let [x, y, rz] = row.reference;
-            // Through the pose and back equal beams would differ by rounding.
-            let beam_m = [x, y + half_m * rz.tan(), y - half_m * rz.tan()][i];
-            (beam_m / BEAM_GRID_M).round() * BEAM_GRID_M
-        };
-        channels.push(Channel {
-            name,
-            values: rows.iter().map(beam).collect(),
-            m_per_code: 0.0,
-        });
+    // Through the pose and back equal beams would differ by rounding.
+    let on_grid = |beam_m: f64| (beam_m / BEAM_GRID_M).round() * BEAM_GRID_M;
+    let mut beams = [(); 3].map(|()| Vec::with_capacity(rows.len()));
+    for row in rows {
+        let [x, y, rz] = row.reference;
+        let apart_m = half_m * rz.tan();
+        for (values, beam_m) in beams.iter_mut().zip([x, y + apart_m, y - apart_m]) {
+            values.push(on_grid(beam_m));
+        }
     }
+    channels.extend(BEAMS.into_iter().zip(beams).map(|(name, values)| Channel {
+        name,
+        values,
+        m_per_code: 0.0,
+    }));
     let m_per_code = stage.capacitive.m_per_count;
     for (i, name) in CAPACITIVE.into_iter().enumerate() {
         let gap = |row: &Row| Some(f64::from(row.frame.capacitive()?[i]) * m_per_code);

@@ -40,6 +40,7 @@ use crate::diagnose::finding::Finding;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use channels::LogSignals;
+use places::Told;
 use residual::Residuals;
 
 pub(crate) use channels::{period_s, times_s};
@@ -81,6 +82,24 @@ fn of_log(
     if let Some(errors) = errors {
         signals.leave_out_undecoded(errors);
     }
+    let found = of_residuals(&mut signals, stage);
+    let all = Told::new(dataset, log).rows;
+    findings.extend(found.into_iter().map(|found| match signals.len() < all {
+        true => Finding {
+            message: format!(
+                "{} (looked for in {} of {all} rows)",
+                found.message,
+                signals.len()
+            ),
+            ..found
+        },
+        false => found,
+    }));
+}
+
+/// What the motion does not explain of the Hall signals.
+fn of_residuals(signals: &mut LogSignals, stage: &Stage) -> Vec<Finding> {
+    let mut findings = Vec::new();
     // The second time for steps that a larger one hid.
     let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 4] = [
         standing::standing,
@@ -88,19 +107,20 @@ fn of_log(
         steps::steps,
         steps::steps,
     ];
-    let Some(mut residuals) = Residuals::new(&signals, stage) else {
-        return;
+    let Some(mut residuals) = Residuals::new(signals, stage) else {
+        return findings;
     };
     for test in tests {
-        let found = test(&mut signals, &residuals);
+        let found = test(signals, &residuals);
         if !found.is_empty() {
             findings.extend(found);
-            match Residuals::new(&signals, stage) {
+            match Residuals::new(signals, stage) {
                 Some(again) => residuals = again,
-                None => return,
+                None => return findings,
             }
         }
     }
-    findings.extend(hum::hum(&signals, &residuals));
-    findings.extend(drifts::findings(&signals, &residuals));
+    findings.extend(hum::hum(signals, &residuals));
+    findings.extend(drifts::findings(signals, &residuals));
+    findings
 }

@@ -172,6 +172,8 @@ pub(super) struct Rests {
 struct Part {
     first: Place,
     rows: usize,
+    /// Time of the last row, us.
+    last_us: i64,
     /// Whether no row was left out.
     usable: bool,
     beams_move: bool,
@@ -188,6 +190,7 @@ impl Part {
         Self {
             first: log.at(rows.start),
             rows: rows.len(),
+            last_us: log.rows[rows.end - 1].t_us,
             usable: rows.clone().all(|row| log.usable[row]),
             beams_move: motion_m(log, rows) >= IDLE_M,
             halls_m: hall_means_m(log, rows),
@@ -200,6 +203,7 @@ impl Part {
     /// With the part that follows.
     fn and(mut self, next: Self) -> Self {
         self.rows = next.first.row + next.rows - self.first.row;
+        self.last_us = next.last_us;
         self.usable &= next.usable;
         self.beams_move |= next.beams_move;
         for (range, [low, high]) in self.halls_m.iter_mut().zip(next.halls_m) {
@@ -276,7 +280,7 @@ impl Rests {
                 self.idle.push(part.first);
             } else if let Some(rows) = rest() {
                 let start = part.rows - rows;
-                let t_us = part.first.t_us + (start as f64 * period_s * 1e6) as i64;
+                let t_us = part.last_us - ((rows - 1) as f64 * period_s * 1e6).round() as i64;
                 let row = part.first.row + start;
                 let first = Place {
                     row,
@@ -343,6 +347,11 @@ fn hall_means_m(log: &LogSignals, rows: &Range<usize>) -> [[f64; 2]; 3] {
 /// The rest at the end of a movement that begins at speed.
 fn sudden_rest(log: &LogSignals, rows: &Range<usize>) -> Option<Range<usize>> {
     let (length, rest_rows) = (log.rows_in(REST_STRETCH_S), log.rows_in(REST_S));
+    // Cheap first: most movements do not end in a rest.
+    let last = rows.end.saturating_sub(length).max(rows.start)..rows.end;
+    if motion_m(log, &last) >= IDLE_M {
+        return None;
+    }
     let rest = rest_of(motion_m(log, rows), &moved_m(log, rows), length, rest_rows)?;
     Some(rows.end - rest..rows.end)
 }

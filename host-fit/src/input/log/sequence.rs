@@ -63,7 +63,7 @@ impl Numbering {
 }
 
 /// Numbers the rows of these movements of one log.
-pub(super) fn number<'m>(
+pub(in crate::input) fn number<'m>(
     rows: &mut [Row],
     movements: impl Iterator<Item = &'m Movement> + Clone,
     servo_period_s: f64,

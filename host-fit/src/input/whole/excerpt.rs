@@ -14,8 +14,10 @@
 
 use super::Whole;
 use crate::input::dataset::{Dataset, Movement, Row};
+use crate::input::log::sequence;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -49,21 +51,68 @@ const TOGETHER: usize = 64;
 type Products = SMatrix<f64, COUNT, COUNT>;
 
 /// Rows of one movement.
-struct Run {
-    movement: usize,
-    rows: Range<usize>,
+pub struct Run {
+    /// Its number.
+    pub movement: usize,
+    /// The rows.
+    pub rows: Range<usize>,
 }
 
 impl Whole {
     /// An excerpt of about `most` rows, each run a movement by itself; sequence numbers are 0.
     pub fn excerpt(self: &Arc<Self>, most: usize, sha256: [u8; 32]) -> Dataset {
+        self.dataset(self.chosen(most), sha256)
+    }
+
+    /// An excerpt with more rows of the whole, given by the numbers of [`runs`](Self::runs); those
+    /// that follow each other in a movement are one movement.
+    pub fn with_more(
+        self: &Arc<Self>,
+        excerpt: &Dataset,
+        more: &BTreeSet<usize>,
+        servo_period_s: f64,
+    ) -> Dataset {
+        let mut of_excerpt = excerpt.movements.iter().peekable();
+        let mut joined: Vec<Run> = Vec::new();
+        let mut before_is_more = false;
+        for (number, run) in self.runs().into_iter().enumerate() {
+            let is_same = |taken: &&Movement| {
+                let movement = &self.movements[run.movement];
+                (taken.log, taken.index) == (movement.log, movement.index)
+                    && taken.rows.len() == run.rows.len()
+                    && excerpt.rows[taken.rows.start].t_us == self.row(run.rows.start).t_us
+            };
+            let is_taken = of_excerpt.next_if(is_same).is_some();
+            let is_more = more.contains(&number);
+            match joined.last_mut() {
+                Some(last) if is_more && before_is_more && last.movement == run.movement => {
+                    last.rows.end = run.rows.end;
+                }
+                _ if is_taken || is_more => joined.push(run),
+                _ => {}
+            }
+            before_is_more = is_more;
+        }
+        let mut dataset = self.dataset(joined, excerpt.sha256);
+        for log in 0..dataset.logs.len() {
+            let of_log = dataset
+                .movements
+                .iter()
+                .filter(|movement| movement.log == log);
+            sequence::number(&mut dataset.rows, of_log, servo_period_s);
+        }
+        dataset
+    }
+
+    /// Each run a movement by itself; sequence numbers are 0.
+    fn dataset(self: &Arc<Self>, runs: Vec<Run>, sha256: [u8; 32]) -> Dataset {
         let mut dataset = Dataset {
             logs: self.logs.clone(),
             sha256,
             whole: Some(Arc::clone(self)),
             ..Dataset::default()
         };
-        for run in self.chosen(most) {
+        for run in runs {
             let (start, number) = (dataset.rows.len(), dataset.movements.len());
             dataset.rows.extend(self.rows_of(number, run.rows));
             dataset.movements.push(Movement {
@@ -202,13 +251,14 @@ impl Whole {
         (0..6).any(|k| high[k] - low[k] >= IDLE[k])
     }
 
-    fn looked_at(&self, run: &Run) -> impl Iterator<Item = Row> {
+    /// Some rows of a run, spread evenly.
+    pub fn looked_at(&self, run: &Run) -> impl Iterator<Item = Row> {
         let stride = run.rows.len().div_ceil(LOOKED_AT).max(1);
         run.rows.clone().step_by(stride).map(|row| self.row(row))
     }
 
     /// All movements in runs of about equal length.
-    fn runs(&self) -> Vec<Run> {
+    pub fn runs(&self) -> Vec<Run> {
         let mut runs = Vec::new();
         for (movement, Movement { rows, .. }) in self.movements.iter().enumerate() {
             let count = rows.len().div_ceil(RUN);
