@@ -13,6 +13,7 @@
 //! | [`range`] | poses beyond the range of a calibration |
 //! | [`of_fit`] | what a fit says of itself |
 //! | [`signals`] | what the signals tell by themselves |
+//! | `stretches` | parts of a long log that an excerpt of it may have missed |
 //! | [`trusted`] | the inputs that no log can show to be wrong |
 
 pub mod causes;
@@ -24,6 +25,7 @@ pub mod logs;
 pub mod of_fit;
 pub mod range;
 pub mod signals;
+mod stretches;
 pub mod trials;
 pub mod trusted;
 pub mod zeros;
@@ -51,7 +53,11 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         findings.extend(change::changes(dataset, &sound, stage));
         findings
     };
-    let of_signals = || signals::signal_findings(dataset, stage, errors.as_deref());
+    let of_signals = || {
+        let wider = (dataset.whole.as_ref().zip(fitted.ok()))
+            .and_then(|(whole, fit)| stretches::findings(dataset, whole, stage, fit));
+        wider.unwrap_or_else(|| signals::signal_findings(dataset, stage, errors.as_deref()))
+    };
     let (mut findings, more) = rayon::join(of_models, of_signals);
     findings.extend(more);
     if let Ok(fit) = fitted {

@@ -24,7 +24,7 @@ mod parse;
 mod preamble;
 mod reader;
 pub(crate) mod rows;
-mod sequence;
+pub(in crate::input) mod sequence;
 mod skipped;
 mod split;
 mod stitch;

@@ -4,6 +4,7 @@
 pub mod chunk;
 pub mod excerpt;
 pub mod passing;
+pub mod pieces;
 
 use super::dataset::{LogSource, Movement, Row, Scales};
 use chunk::{Chunk, Sample};

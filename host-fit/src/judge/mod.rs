@@ -4,6 +4,7 @@ pub mod identify;
 pub mod lag;
 pub mod precision;
 pub mod statistics;
+pub mod stretches;
 pub mod uncertainty;
 pub mod whole;
 

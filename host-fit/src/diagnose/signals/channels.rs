@@ -1,6 +1,6 @@
 //! The signals of one log, channel by channel.
 
-use crate::diagnose::finding::{Code, Finding, Severity};
+use super::places::{Place, Told};
 use crate::input::dataset::{Dataset, Movement, Row};
 use crate::input::stage::Stage;
 use runtime::capacitive::vertical_rows;
@@ -24,7 +24,11 @@ pub(super) struct Channel {
 
 /// One log. Rows are numbered from its first.
 pub(super) struct LogSignals<'a> {
-    dataset: &'a Dataset,
+    pub(super) told: Told<'a>,
+    /// The place of the first row.
+    pub(super) from: Place,
+    /// Whether its only movement goes on before or behind these rows.
+    pub(super) is_part: bool,
     pub(super) rows: &'a [Row],
     /// Its movements; their rows are those of the dataset.
     pub(super) movements: Vec<&'a Movement>,
@@ -64,7 +68,13 @@ impl<'a> LogSignals<'a> {
             gap_rows: vertical_rows(&stage.capacitive_probes_m).unwrap_or_default(),
             baseline_m: stage.y_baseline_m,
             first: range.start,
-            dataset,
+            told: Told::held(dataset, log),
+            from: Place {
+                row: range.start,
+                movement: 0,
+                t_us: 0,
+            },
+            is_part: false,
             rows,
             movements,
             segments,
@@ -108,58 +118,6 @@ impl<'a> LogSignals<'a> {
             self.segments.insert(index + 1, row..end);
         }
     }
-
-    /// The movement of a row, by name.
-    pub(super) fn movement_name(&self, row: usize) -> String {
-        let movement = &self.dataset.movements[self.rows[row].movement];
-        self.dataset.movement_name(movement)
-    }
-
-    /// "movement 3 at t_us = 4000".
-    pub(super) fn place(&self, row: usize) -> String {
-        let t_us = self.rows[row].t_us;
-        format!("movement {} at t_us = {t_us}", self.movement_name(row))
-    }
-
-    /// The first places of many, in words.
-    pub(super) fn places(&self, rows: &[usize]) -> String {
-        const SHOWN: usize = 3;
-        let shown: Vec<String> = (rows.iter().take(SHOWN)).map(|&r| self.place(r)).collect();
-        let dots = if rows.len() > SHOWN { ", ..." } else { "" };
-        shown.join(", ") + dots
-    }
-
-    /// A warning about the whole log, or several of its movements.
-    pub(super) fn warning(&self, code: Code, message: String) -> Finding {
-        let message = match self.dataset.logs.len() {
-            1 => message,
-            _ => {
-                let log = self.rows.first().map(|row| row.movement);
-                let log = log.map(|movement| self.dataset.movements[movement].log);
-                let path = log.map(|log| self.dataset.logs[log].path.display().to_string());
-                format!("{}: {message}", path.unwrap_or_default())
-            }
-        };
-        Finding {
-            code,
-            severity: Severity::Warn,
-            message,
-            channel: None,
-            movement: None,
-            t_us: None,
-            value: None,
-            unit: None,
-        }
-    }
-
-    /// A warning about a place in the log.
-    pub(super) fn warning_at(&self, code: Code, row: usize, message: String) -> Finding {
-        Finding {
-            movement: Some(self.movement_name(row)),
-            t_us: Some(self.rows[row].t_us),
-            ..self.warning(code, message)
-        }
-    }
 }
 
 fn channels(rows: &[Row], stage: &Stage) -> Vec<Channel> {
@@ -172,19 +130,21 @@ fn channels(rows: &[Row], stage: &Stage) -> Vec<Channel> {
             m_per_code: stage.hall.m_per_count,
         });
     }
-    for (i, name) in BEAMS.into_iter().enumerate() {
-        let beam = |row: &Row| {
-            let [x, y, rz] = row.reference;
-            // Through the pose and back equal beams would differ by rounding.
-            let beam_m = [x, y + half_m * rz.tan(), y - half_m * rz.tan()][i];
-            (beam_m / BEAM_GRID_M).round() * BEAM_GRID_M
-        };
-        channels.push(Channel {
-            name,
-            values: rows.iter().map(beam).collect(),
-            m_per_code: 0.0,
-        });
+    // Through the pose and back equal beams would differ by rounding.
+    let on_grid = |beam_m: f64| (beam_m / BEAM_GRID_M).round() * BEAM_GRID_M;
+    let mut beams = [(); 3].map(|()| Vec::with_capacity(rows.len()));
+    for row in rows {
+        let [x, y, rz] = row.reference;
+        let apart_m = half_m * rz.tan();
+        for (values, beam_m) in beams.iter_mut().zip([x, y + apart_m, y - apart_m]) {
+            values.push(on_grid(beam_m));
+        }
     }
+    channels.extend(BEAMS.into_iter().zip(beams).map(|(name, values)| Channel {
+        name,
+        values,
+        m_per_code: 0.0,
+    }));
     let m_per_code = stage.capacitive.m_per_count;
     for (i, name) in CAPACITIVE.into_iter().enumerate() {
         let gap = |row: &Row| Some(f64::from(row.frame.capacitive()?[i]) * m_per_code);

@@ -4,6 +4,8 @@
 //! | module | what it does |
 //! |---|---|
 //! | `channels` | the signals of one log by channel |
+//! | `places` | where in a log something was found |
+//! | `row_by_row` | what all rows of a log tell by themselves: the four modules that follow |
 //! | `timing` | rows missing, uneven times |
 //! | `converters` | flat tops |
 //! | `still` | channels that repeat one value, movements that stand still |
@@ -23,7 +25,9 @@ mod converters;
 mod drifts;
 mod hum;
 mod outliers;
+mod places;
 mod residual;
+mod row_by_row;
 #[cfg(test)]
 mod sample;
 mod spectrum;
@@ -36,6 +40,7 @@ use crate::diagnose::finding::Finding;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use channels::LogSignals;
+use places::Told;
 use residual::Residuals;
 
 pub(crate) use channels::{period_s, times_s};
@@ -86,19 +91,32 @@ fn of_log(
     findings: &mut Vec<Finding>,
 ) {
     let mut signals = LogSignals::new(dataset, stage, log);
-    findings.extend(timing::findings(&signals, stage));
-    findings.extend(converters::saturated(&mut signals));
+    findings.extend(row_by_row::findings(&mut signals, dataset, log, stage));
     let has_reference = dataset.logs[log].has_reference;
-    if has_reference {
-        findings.extend(still::idle_and_crashed(&mut signals));
-    }
-    findings.extend(still::frozen(&mut signals, has_reference));
     if !has_reference || signals.len() < ROWS_MIN {
         return;
     }
     if let Some(errors) = errors {
         signals.leave_out_undecoded(errors);
     }
+    let found = of_residuals(&mut signals, stage);
+    let all = Told::new(dataset, log).rows;
+    findings.extend(found.into_iter().map(|found| match signals.len() < all {
+        true => Finding {
+            message: format!(
+                "{} (looked for in {} of {all} rows)",
+                found.message,
+                signals.len()
+            ),
+            ..found
+        },
+        false => found,
+    }));
+}
+
+/// What the motion does not explain of the Hall signals.
+fn of_residuals(signals: &mut LogSignals, stage: &Stage) -> Vec<Finding> {
+    let mut findings = Vec::new();
     // The second time for steps that a larger one hid.
     let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 4] = [
         standing::standing,
@@ -106,19 +124,20 @@ fn of_log(
         steps::steps,
         steps::steps,
     ];
-    let Some(mut residuals) = Residuals::new(&signals, stage) else {
-        return;
+    let Some(mut residuals) = Residuals::new(signals, stage) else {
+        return findings;
     };
     for test in tests {
-        let found = test(&mut signals, &residuals);
+        let found = test(signals, &residuals);
         if !found.is_empty() {
             findings.extend(found);
-            match Residuals::new(&signals, stage) {
+            match Residuals::new(signals, stage) {
                 Some(again) => residuals = again,
-                None => return,
+                None => return findings,
             }
         }
     }
-    findings.extend(hum::hum(&signals, &residuals));
-    findings.extend(drifts::findings(&signals, &residuals));
+    findings.extend(hum::hum(signals, &residuals));
+    findings.extend(drifts::findings(signals, &residuals));
+    findings
 }

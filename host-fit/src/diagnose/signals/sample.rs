@@ -14,7 +14,7 @@ use crate::simulate::sensors::SensorErrors;
 pub(super) const ROWS: usize = 2000;
 pub(super) const PERIOD_S: f64 = 0.002;
 
-fn stage() -> Stage {
+pub(super) fn stage() -> Stage {
     Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("a sound stage")
 }
 

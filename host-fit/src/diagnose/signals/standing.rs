@@ -29,7 +29,15 @@ pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
         let mut stuck_runs = still_runs(log, &signal.values, 4.0 * own_noise_m);
         stuck_runs.retain(|run| is_missed(log, residuals, channel, run, MISSED_M + 4.0 * noise_m));
         if let Some(longest) = stuck_runs.iter().max_by_key(|run| run.len()) {
-            findings.push(stuck(log, &[signal.name], longest));
+            let first = &log.at(longest.start);
+            let stood_s = longest.len() as f64 * log.period_s;
+            findings.push(stuck(
+                &log.told,
+                signal.name,
+                Some(signal.name),
+                first,
+                stood_s,
+            ));
         }
         left_out.extend(stuck_runs);
     }

@@ -1,6 +1,7 @@
 //! Channels and movements that stand still.
 
 use super::channels::{Channel, LogSignals, median, spread};
+use super::places::{Place, Run, Told};
 use crate::diagnose::finding::{Code, Finding};
 use std::ops::Range;
 
@@ -23,29 +24,39 @@ const REST_S: f64 = 0.2;
 const REST_STRETCH_S: f64 = 0.05;
 const SPEED_SHARE: f64 = 0.3;
 
-/// Channels that repeat one value longer than their own noise lets them; their rows are left out.
-pub(super) fn frozen(log: &mut LogSignals, has_reference: bool) -> Vec<Finding> {
-    let mut runs: Vec<(usize, Range<usize>)> = Vec::new();
+/// How often each channel may repeat a value, by its own noise; `None` where that is not looked at.
+pub(super) fn most_repeats(log: &LogSignals, has_reference: bool) -> Vec<Option<f64>> {
     let lively = |values: &[f64]| {
         let changes = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
         changes as f64 / (values.len() - 1) as f64
     };
-    for (index, channel) in log.channels.iter().enumerate() {
+    let most = |(index, channel): (usize, &Channel)| {
         let mut shares: Vec<f64> = (log.segments.iter())
             .flat_map(|segment| channel.values[segment.clone()].chunks_exact(STRETCH))
             .map(lively)
             .collect();
         if shares.is_empty() || ((3..6).contains(&index) && !has_reference) {
-            continue;
+            return None;
         }
         let high = shares.len() * 3 / 4;
         let share = *shares.select_nth_unstable_by(high, f64::total_cmp).1;
         // At a share of one, a single repetition would be beyond chance.
         let chance = (CHANCE.ln() / (-share.min(0.9)).ln_1p()).max(RUN_MIN as f64);
-        let least = match spread(&channel.values) {
+        Some(match spread(&channel.values) {
             0.0 => RUN_MIN as f64,
             _ if share > 0.0 => chance,
             _ => f64::INFINITY,
+        })
+    };
+    log.channels.iter().enumerate().map(most).collect()
+}
+
+/// Where channels repeat one value more often than `most` says; such rows are left out.
+pub(super) fn frozen(log: &mut LogSignals, most: &[Option<f64>]) -> Vec<Run> {
+    let mut runs: Vec<(usize, Range<usize>)> = Vec::new();
+    for (index, channel) in log.channels.iter().enumerate() {
+        let Some(Some(most)) = most.get(index) else {
+            continue;
         };
         for segment in &log.segments {
             let mut row = segment.start;
@@ -54,16 +65,27 @@ pub(super) fn frozen(log: &mut LogSignals, has_reference: bool) -> Vec<Finding> 
                 while row < segment.end && channel.values[row] == channel.values[start] {
                     row += 1;
                 }
-                let long = (row - start) as f64 > least;
+                let long = (row - start) as f64 > *most;
                 if long && log.usable[start] && others_move(log, index, &(start..row)) {
                     runs.push((index, start..row));
                 }
             }
         }
     }
-    let findings = of_runs(log, &runs);
+    let still = |rows: &Range<usize>| {
+        let mut channels = log.channels.iter();
+        channels.all(|channel| spread(&channel.values[rows.clone()]) == 0.0)
+    };
+    let run = |(channel, rows): &(usize, Range<usize>)| Run {
+        channel: *channel,
+        first: log.at(rows.start),
+        len: rows.len(),
+        value: log.channels[*channel].values[rows.start],
+        all_still: still(rows),
+    };
+    let found = runs.iter().map(run).collect();
     leave_out(log, runs.into_iter().map(|(_, run)| run));
-    findings
+    found
 }
 
 /// Whether others move while a channel does not: a beam or gap of coarse steps may well rest. A
@@ -81,86 +103,219 @@ fn others_move(log: &LogSignals, channel: usize, run: &Range<usize>) -> bool {
 }
 
 /// One finding for a channel, at its longest run; one for channels that stand still together.
-fn of_runs(log: &LogSignals, runs: &[(usize, Range<usize>)]) -> Vec<Finding> {
-    let mut longest: Vec<(Vec<&'static str>, Range<usize>)> = Vec::new();
-    for (index, channel) in log.channels.iter().enumerate() {
-        let own = runs.iter().filter(|(of, _)| *of == index);
-        let Some((_, run)) = own.max_by_key(|(_, run)| run.len()) else {
+pub(super) fn of_frozen(
+    told: &Told,
+    channels: &[Channel],
+    runs: Vec<Run>,
+    period_s: f64,
+) -> Vec<Finding> {
+    let runs = Run::joined(runs);
+    let mut longest: Vec<(Vec<&'static str>, &Run)> = Vec::new();
+    for (index, channel) in channels.iter().enumerate() {
+        let own = runs.iter().filter(|run| run.channel == index);
+        let Some(run) = own.max_by_key(|run| run.len) else {
             continue;
         };
-        let together = |other: &Range<usize>| {
-            let shared = (run.end.min(other.end)).saturating_sub(run.start.max(other.start));
-            2 * shared > run.len().max(other.len())
+        let together = |other: &Run| {
+            let start = run.first.row.max(other.first.row);
+            let shared = run.end().min(other.end()).saturating_sub(start);
+            2 * shared > run.len.max(other.len)
         };
         match longest.iter_mut().find(|(_, other)| together(other)) {
             Some((names, _)) => names.push(channel.name),
-            None => longest.push((vec![channel.name], run.clone())),
+            None => longest.push((vec![channel.name], run)),
         }
     }
     (longest.into_iter())
         .map(|(names, run)| {
-            let still = |c: &Channel| spread(&c.values[run.clone()]) == 0.0;
-            if log.channels.iter().all(still) {
-                stuck(log, &["every channel"], &run)
-            } else {
-                stuck(log, &names, &run)
-            }
+            let (who, channel) = match &names[..] {
+                _ if run.all_still => ("every channel".to_owned(), None),
+                [name] => ((*name).to_owned(), Some(*name)),
+                names => (names.join(", "), None),
+            };
+            let stood_s = run.len as f64 * period_s;
+            stuck(told, &who, channel, &run.first, stood_s)
         })
         .collect()
 }
 
-pub(super) fn stuck(log: &LogSignals, names: &[&str], run: &Range<usize>) -> Finding {
-    let time_s = run.len() as f64 * log.period_s;
-    let who = names.join(", ");
+pub(super) fn stuck(
+    told: &Told,
+    who: &str,
+    channel: Option<&str>,
+    first: &Place,
+    stood_s: f64,
+) -> Finding {
     let message = format!(
-        "{who} stood still for {time_s:.2} s ({}) while it should have moved or shown its noise: look for a stage that \
+        "{who} stood still for {stood_s:.2} s ({}) while it should have moved or shown its noise: look for a stage that \
          stopped, a cable or a frozen register, and leave these rows out",
-        log.place(run.start),
+        told.place(first),
     );
     Finding {
-        channel: (log.channels.iter())
-            .find(|channel| names == [channel.name])
-            .map(|channel| channel.name.to_owned()),
-        value: Some(time_s),
+        channel: channel.map(str::to_owned),
+        value: Some(stood_s),
         unit: Some("s"),
-        ..log.warning_at(Code::Stuck, run.start, message)
+        ..told.warning_at(Code::Stuck, first, message)
     }
 }
 
-/// Movements in which nothing moves, and those that end in a sudden rest; such rows are left out.
-pub(super) fn idle_and_crashed(log: &mut LogSignals) -> Vec<Finding> {
-    let mut idle_rows = Vec::new();
-    let mut crashed = Vec::new();
-    for movement in &log.movements {
-        let rows = log.rows_of(movement);
-        if rows.len() < 2 || !rows.clone().all(|row| log.usable[row]) {
-            continue;
+/// Movements in which nothing moves, and rests at the end of movements.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rests {
+    idle: Vec<Place>,
+    /// First row and length of each.
+    crashed: Vec<(Place, usize)>,
+    parts: Vec<Part>,
+}
+
+/// A part of a movement.
+#[derive(Clone, Debug)]
+struct Part {
+    first: Place,
+    rows: usize,
+    /// Time of the last row, us.
+    last_us: i64,
+    /// Whether no row was left out.
+    usable: bool,
+    beams_move: bool,
+    /// Lowest and highest mean of each probe, m.
+    halls_m: [[f64; 2]; 3],
+    /// How far the beams move in stretches of so many rows, counted from the end, m.
+    moved_m: Vec<f64>,
+    stretch: usize,
+    rest_rows: usize,
+}
+
+impl Part {
+    fn of(log: &LogSignals, rows: &Range<usize>) -> Self {
+        Self {
+            first: log.at(rows.start),
+            rows: rows.len(),
+            last_us: log.rows[rows.end - 1].t_us,
+            usable: rows.clone().all(|row| log.usable[row]),
+            beams_move: moves_at_once(log, rows),
+            halls_m: hall_means_m(log, rows),
+            moved_m: moved_m(log, rows),
+            stretch: log.rows_in(REST_STRETCH_S),
+            rest_rows: log.rows_in(REST_S),
         }
-        if !moves_at_once(log, &rows) && hall_motion_m(log, &rows) < IDLE_M {
-            idle_rows.push(rows);
-        } else if let Some(rest) = sudden_rest(log, &rows) {
-            crashed.push(rest);
+    }
+
+    /// With the part that follows.
+    fn and(mut self, next: Self) -> Self {
+        self.rows = next.first.row + next.rows - self.first.row;
+        self.last_us = next.last_us;
+        self.usable &= next.usable;
+        self.beams_move |= next.beams_move;
+        for (range, [low, high]) in self.halls_m.iter_mut().zip(next.halls_m) {
+            *range = [range[0].min(low), range[1].max(high)];
         }
+        self.moved_m = [next.moved_m, self.moved_m].concat();
+        self
     }
-    let idle: Vec<usize> = idle_rows.iter().map(|rows| rows.start).collect();
-    let mut findings = Vec::new();
-    if let Some(&first) = idle.first() {
-        let message = format!(
-            "nothing moves in {} of {} movements ({}): they tell the fit nothing; leave them out or record them again",
-            idle.len(),
-            log.movements.len(),
-            log.places(&idle),
-        );
-        findings.push(log.warning_at(Code::IdleMovement, first, message));
+}
+
+impl Rests {
+    /// Looks for them and leaves their rows out.
+    pub(super) fn of(log: &mut LogSignals) -> Self {
+        if log.is_part {
+            let parts = log
+                .segments
+                .iter()
+                .map(|rows| Part::of(log, rows))
+                .collect();
+            return Self {
+                parts,
+                ..Self::default()
+            };
+        }
+        let mut idle_rows = Vec::new();
+        let mut crashed = Vec::new();
+        for movement in &log.movements {
+            let rows = log.rows_of(movement);
+            if rows.len() < 2 || !rows.clone().all(|row| log.usable[row]) {
+                continue;
+            }
+            if !moves_at_once(log, &rows) && hall_motion_m(log, &rows) < IDLE_M {
+                idle_rows.push(rows);
+            } else if let Some(rest) = sudden_rest(log, &rows) {
+                crashed.push(rest);
+            }
+        }
+        let rests = Self {
+            idle: idle_rows.iter().map(|rows| log.at(rows.start)).collect(),
+            crashed: (crashed.iter())
+                .map(|rest| (log.at(rest.start), rest.len()))
+                .collect(),
+            parts: Vec::new(),
+        };
+        if is_usual(crashed.len(), log.movements.len()) {
+            crashed.clear();
+        }
+        leave_out(log, idle_rows.into_iter().chain(crashed));
+        rests
     }
-    // Where most movements end so, it is how this stage is driven.
-    if 2 * crashed.len() > log.movements.len().max(2) {
-        crashed.clear();
-    } else {
-        findings.extend(crashed.iter().map(|rest| stuck(log, &["the stage"], rest)));
+
+    /// With those of rows that follow.
+    pub(super) fn and(mut self, more: Self) -> Self {
+        self.idle.extend(more.idle);
+        self.crashed.extend(more.crashed);
+        for part in more.parts {
+            match self.parts.pop() {
+                Some(before) if before.first.movement == part.first.movement => {
+                    self.parts.push(before.and(part));
+                }
+                before => self.parts.extend(before.into_iter().chain([part])),
+            }
+        }
+        self
     }
-    leave_out(log, idle_rows.into_iter().chain(crashed));
-    findings
+
+    /// What is told of them.
+    pub(super) fn findings(mut self, told: &Told, period_s: f64) -> Vec<Finding> {
+        for part in self.parts.iter().filter(|part| part.usable) {
+            let halls_move = part.halls_m.iter().any(|[low, high]| high - low >= IDLE_M);
+            let most_m = part.moved_m.iter().copied().fold(0.0, f64::max);
+            let rest = || rest_of(most_m, &part.moved_m, part.stretch, part.rest_rows);
+            if !part.beams_move && !halls_move {
+                self.idle.push(part.first);
+            } else if let Some(rows) = rest() {
+                let start = part.rows - rows;
+                let t_us = part.last_us - ((rows - 1) as f64 * period_s * 1e6).round() as i64;
+                let row = part.first.row + start;
+                let first = Place {
+                    row,
+                    t_us,
+                    ..part.first
+                };
+                self.crashed.push((first, rows));
+            }
+        }
+        self.idle.sort_by_key(|place| place.row);
+        let movements = told.movements();
+        let mut findings = Vec::new();
+        if let Some(first) = self.idle.first() {
+            let message = format!(
+                "nothing moves in {} of {movements} movements ({}): they tell the fit nothing; leave them out or record \
+                 them again",
+                self.idle.len(),
+                told.places(&self.idle),
+            );
+            findings.push(told.warning_at(Code::IdleMovement, first, message));
+        }
+        if !is_usual(self.crashed.len(), movements) {
+            let of = |(first, rows): &(Place, usize)| {
+                stuck(told, "the stage", None, first, *rows as f64 * period_s)
+            };
+            findings.extend(self.crashed.iter().map(of));
+        }
+        findings
+    }
+}
+
+/// Where most movements end in a rest, it is how the stage is driven.
+fn is_usual(crashed: usize, movements: usize) -> bool {
+    2 * crashed > movements.max(2)
 }
 
 /// Whether any beam moves within a second or so: over longer the interferometers of a stage at rest
@@ -180,40 +335,60 @@ fn motion_m(log: &LogSignals, rows: &Range<usize>) -> f64 {
     })
 }
 
-/// How far it moves by any probe: means of 25 rows, so that noise does not count, m.
+/// How far it moves by any probe, m.
 fn hall_motion_m(log: &LogSignals, rows: &Range<usize>) -> f64 {
-    let halls = &log.channels[..3];
-    halls.iter().fold(0.0, |most, hall| {
-        let means = hall.values[rows.clone()]
+    let halls = hall_means_m(log, rows);
+    (halls.iter()).fold(0.0, |most, [low, high]| (high - low).max(most))
+}
+
+/// Lowest and highest mean of 25 rows of each probe, so that noise does not count, m.
+fn hall_means_m(log: &LogSignals, rows: &Range<usize>) -> [[f64; 2]; 3] {
+    [0, 1, 2].map(|k| {
+        let means = log.channels[k].values[rows.clone()]
             .chunks(25)
-            .filter(|c| c.len() > 12);
-        let means: Vec<f64> = means
-            .map(|c| c.iter().sum::<f64>() / c.len() as f64)
-            .collect();
-        spread(&means).max(most)
+            .filter(|c| c.len() > 12)
+            .map(|c| c.iter().sum::<f64>() / c.len() as f64);
+        means.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+            [low.min(x), high.max(x)]
+        })
     })
 }
 
 /// The rest at the end of a movement that begins at speed.
 fn sudden_rest(log: &LogSignals, rows: &Range<usize>) -> Option<Range<usize>> {
+    let (length, rest_rows) = (log.rows_in(REST_STRETCH_S), log.rows_in(REST_S));
+    // Cheap first: most movements do not end in a rest.
+    let last = rows.end.saturating_sub(length).max(rows.start)..rows.end;
+    if motion_m(log, &last) >= IDLE_M {
+        return None;
+    }
+    let rest = rest_of(motion_m(log, rows), &moved_m(log, rows), length, rest_rows)?;
+    Some(rows.end - rest..rows.end)
+}
+
+/// How far the stage moves in the stretches of a movement, counted from its end, m.
+fn moved_m(log: &LogSignals, rows: &Range<usize>) -> Vec<f64> {
     let length = log.rows_in(REST_STRETCH_S);
-    let rest_rows = log.rows_in(REST_S);
-    let still_m = IDLE_M.min(0.01 * motion_m(log, rows)).max(0.3e-6);
-    let stretches = rows.len() / length;
-    // Counted from the end.
     let moved = |k: usize| {
         let end = rows.end - k * length;
         motion_m(log, &(end - length..end))
     };
-    let still = (0..stretches).take_while(|&k| moved(k) < still_m).count();
-    if still * length < rest_rows || still + 4 > stretches {
+    (0..rows.len() / length).map(moved).collect()
+}
+
+/// Rows of the rest at the end of a movement that moves so far, and in stretches of `length` rows,
+/// counted from its end, as `moved_m` says.
+fn rest_of(motion_m: f64, moved_m: &[f64], length: usize, rest_rows: usize) -> Option<usize> {
+    let still_m = IDLE_M.min(0.01 * motion_m).max(0.3e-6);
+    let still = moved_m.iter().take_while(|moved| **moved < still_m).count();
+    if still * length < rest_rows || still + 4 > moved_m.len() {
         return None;
     }
-    let mut before: Vec<f64> = (still..stretches).map(moved).collect();
+    let mut before = moved_m[still..].to_vec();
     // The stretch in which it stopped holds part of the motion only.
     let last = before[0].max(before[1]);
     let usual = median(&mut before);
-    (last > SPEED_SHARE * usual).then(|| rows.end - still * length..rows.end)
+    (last > SPEED_SHARE * usual).then_some(still * length)
 }
 
 /// Leaves rows out, with those beside them, whose velocity is not that of the motion.

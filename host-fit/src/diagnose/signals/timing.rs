@@ -1,6 +1,7 @@
 //! Rows missing, and rows at uneven times or another rate.
 
 use super::channels::LogSignals;
+use super::places::{Place, Told};
 use crate::diagnose::finding::{Code, Finding, Severity};
 use crate::input::stage::Stage;
 
@@ -13,14 +14,89 @@ const RATE_MIN: f64 = 0.005;
 const THINNED_FROM: u32 = 5;
 /// Share of missing rows from which they are worth a warning.
 const MISSING_MIN: f64 = 1e-3;
+/// Gaps that are told one by one.
+const SHOWN: usize = 3;
 
-pub(super) fn findings(log: &LogSignals, stage: &Stage) -> Vec<Finding> {
-    let mut findings = Vec::new();
-    let usual = usual_periods(log);
-    findings.extend(missing(log, usual));
-    findings.extend(uneven(log));
-    findings.extend(other_rate(log, stage, usual));
-    findings
+/// What the times of rows tell.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Timing {
+    missing: u64,
+    longest: u32,
+    gaps: usize,
+    /// The first of them.
+    shown: Vec<Place>,
+    /// Sum of the squared deviations from even times, s^2, of so many rows.
+    squares: f64,
+    rows: f64,
+    worst_s: f64,
+    worst: Option<Place>,
+    /// Length of the movements, s, and their periods.
+    time_s: f64,
+    periods: f64,
+}
+
+impl Timing {
+    /// Of the rows of a log, most of which are `usual` periods apart.
+    pub(super) fn of(log: &LogSignals, usual: u32) -> Self {
+        let mut timing = Self::default();
+        timing.look_for_gaps(log, usual);
+        timing.compare_with_even(log);
+        for segment in log.segments.iter().filter(|segment| segment.len() >= 2) {
+            timing.time_s += log.time_s[segment.end - 1] - log.time_s[segment.start];
+            timing.periods += (segment.start + 1..segment.end)
+                .map(|row| f64::from(periods(log, row)))
+                .sum::<f64>();
+        }
+        timing
+    }
+
+    /// With rows that follow.
+    pub(super) fn and(mut self, more: Self) -> Self {
+        self.missing += more.missing;
+        self.longest = self.longest.max(more.longest);
+        self.gaps += more.gaps;
+        self.shown.extend(more.shown);
+        self.shown.truncate(SHOWN);
+        self.squares += more.squares;
+        self.rows += more.rows;
+        if more.worst_s > self.worst_s {
+            (self.worst_s, self.worst) = (more.worst_s, more.worst);
+        }
+        self.time_s += more.time_s;
+        self.periods += more.periods;
+        self
+    }
+
+    /// What is wrong with them; `period_s` is the median time from row to row.
+    pub(super) fn findings(
+        &self,
+        told: &Told,
+        stage: &Stage,
+        period_s: f64,
+        usual: u32,
+    ) -> Vec<Finding> {
+        let mut findings = Vec::new();
+        findings.extend(self.of_missing(told));
+        findings.extend(self.of_uneven(told, period_s));
+        findings.extend(self.of_other_rate(told, stage, usual));
+        findings
+    }
+
+    fn look_for_gaps(&mut self, log: &LogSignals, usual: u32) {
+        for segment in &log.segments {
+            for row in segment.start + 1..segment.end {
+                let missed = (periods(log, row) / usual).saturating_sub(1);
+                if missed > 0 {
+                    self.missing += u64::from(missed);
+                    self.longest = self.longest.max(missed);
+                    self.gaps += 1;
+                    if self.shown.len() < SHOWN {
+                        self.shown.push(log.at(row));
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// Periods between two rows of a movement.
@@ -31,7 +107,7 @@ fn periods(log: &LogSignals, row: usize) -> u32 {
 
 /// Periods from most rows to the next: more than one where the log was thinned, or written at
 /// another rate.
-fn usual_periods(log: &LogSignals) -> u32 {
+pub(super) fn usual_periods(log: &LogSignals) -> u32 {
     let all = log.segments.iter().flat_map(|s| s.start + 1..s.end);
     let mut periods: Vec<u32> = all.map(|row| periods(log, row)).collect();
     let middle = periods.len() / 2;
@@ -41,118 +117,105 @@ fn usual_periods(log: &LogSignals) -> u32 {
     (*periods.select_nth_unstable(middle).1).max(1)
 }
 
-fn missing(log: &LogSignals, usual: u32) -> Option<Finding> {
-    let mut rows = 0;
-    let mut gaps = Vec::new();
-    let mut longest = 0;
-    for segment in &log.segments {
-        for row in segment.start + 1..segment.end {
-            let missed = (periods(log, row) / usual).saturating_sub(1);
-            if missed > 0 {
-                rows += u64::from(missed);
-                longest = longest.max(missed);
-                gaps.push(row);
-            }
-        }
-    }
-    let &first = gaps.first()?;
-    let share = rows as f64 / (rows as f64 + log.len() as f64);
-    let severity = if share < MISSING_MIN {
-        Severity::Note
-    } else {
-        Severity::Warn
-    };
-    let message = format!(
-        "{rows} rows are missing ({:.2} %) in {} gaps, the longest of {longest}; before {}: look for frames that the \
-         recorder lost",
-        share * 100.0,
-        gaps.len(),
-        log.places(&gaps),
-    );
-    Some(Finding {
-        severity,
-        value: Some(rows as f64),
-        unit: Some("rows"),
-        ..log.warning_at(Code::RowsMissing, first, message)
-    })
-}
-
-/// Times of the rows against even ones, in each movement.
-fn uneven(log: &LogSignals) -> Option<Finding> {
-    let (mut squares, mut rows) = (0.0, 0.0);
-    let (mut worst_s, mut worst) = (0.0, 0);
-    for segment in log.segments.iter().filter(|segment| segment.len() >= 10) {
-        let sequence = |row: usize| {
-            let [first, this] = [segment.start, row].map(|r| log.rows[r].frame.sequence());
-            f64::from(this.wrapping_sub(first))
+impl Timing {
+    fn of_missing(&self, told: &Told) -> Option<Finding> {
+        let first = self.shown.first()?;
+        let rows = self.missing;
+        let share = rows as f64 / (rows as f64 + told.rows as f64);
+        let severity = if share < MISSING_MIN {
+            Severity::Note
+        } else {
+            Severity::Warn
         };
-        // A line through the times: a rate that is only another one is not uneven.
-        let n = segment.len() as f64;
-        let mean_k = segment.clone().map(sequence).sum::<f64>() / n;
-        let mean_s = log.time_s[segment.clone()].iter().sum::<f64>() / n;
-        let (mut kk, mut kt) = (0.0, 0.0);
-        for row in segment.clone() {
-            let k = sequence(row) - mean_k;
-            kk += k * k;
-            kt += k * (log.time_s[row] - mean_s);
-        }
-        let period_s = kt / kk;
-        for row in segment.clone() {
-            let off_s = log.time_s[row] - mean_s - period_s * (sequence(row) - mean_k);
-            squares += off_s * off_s;
-            rows += 1.0;
-            if off_s.abs() > worst_s {
-                (worst_s, worst) = (off_s.abs(), row);
+        let message = format!(
+            "{rows} rows are missing ({:.2} %) in {} gaps, the longest of {}; before {}{}: look for frames that the \
+         recorder lost",
+            share * 100.0,
+            self.gaps,
+            self.longest,
+            told.places(&self.shown),
+            if self.gaps > SHOWN { ", ..." } else { "" },
+        );
+        Some(Finding {
+            severity,
+            value: Some(rows as f64),
+            unit: Some("rows"),
+            ..told.warning_at(Code::RowsMissing, first, message)
+        })
+    }
+
+    /// Times of the rows against even ones, in each movement.
+    fn compare_with_even(&mut self, log: &LogSignals) {
+        for segment in log.segments.iter().filter(|segment| segment.len() >= 10) {
+            let sequence = |row: usize| {
+                let [first, this] = [segment.start, row].map(|r| log.rows[r].frame.sequence());
+                f64::from(this.wrapping_sub(first))
+            };
+            // A line through the times: a rate that is only another one is not uneven.
+            let n = segment.len() as f64;
+            let mean_k = segment.clone().map(sequence).sum::<f64>() / n;
+            let mean_s = log.time_s[segment.clone()].iter().sum::<f64>() / n;
+            let (mut kk, mut kt) = (0.0, 0.0);
+            for row in segment.clone() {
+                let k = sequence(row) - mean_k;
+                kk += k * k;
+                kt += k * (log.time_s[row] - mean_s);
+            }
+            let period_s = kt / kk;
+            for row in segment.clone() {
+                let off_s = log.time_s[row] - mean_s - period_s * (sequence(row) - mean_k);
+                self.squares += off_s * off_s;
+                self.rows += 1.0;
+                if off_s.abs() > self.worst_s {
+                    (self.worst_s, self.worst) = (off_s.abs(), Some(log.at(row)));
+                }
             }
         }
     }
-    let rms_s = f64::sqrt(squares / f64::max(rows, 1.0));
-    if rms_s <= JITTER_MIN * log.period_s {
-        return None;
-    }
-    let message = format!(
-        "rows come at uneven times: {:.0} us rms off an even rate, at most {:.0} us ({}): have the servo's clock start \
-         all converters and stamp the rows",
-        rms_s * 1e6,
-        worst_s * 1e6,
-        log.place(worst),
-    );
-    Some(Finding {
-        value: Some(rms_s * 1e6),
-        unit: Some("us"),
-        ..log.warning_at(Code::Jitter, worst, message)
-    })
-}
 
-fn other_rate(log: &LogSignals, stage: &Stage, usual: u32) -> Option<Finding> {
-    let (mut time_s, mut count) = (0.0, 0.0);
-    for segment in log.segments.iter().filter(|segment| segment.len() >= 2) {
-        time_s += log.time_s[segment.end - 1] - log.time_s[segment.start];
-        count += (segment.start + 1..segment.end)
-            .map(|row| f64::from(periods(log, row)))
-            .sum::<f64>();
+    fn of_uneven(&self, told: &Told, period_s: f64) -> Option<Finding> {
+        let rms_s = f64::sqrt(self.squares / f64::max(self.rows, 1.0));
+        if rms_s <= JITTER_MIN * period_s {
+            return None;
+        }
+        let worst = self.worst.as_ref()?;
+        let message = format!(
+            "rows come at uneven times: {:.0} us rms off an even rate, at most {:.0} us ({}): have the servo's clock start \
+         all converters and stamp the rows",
+            rms_s * 1e6,
+            self.worst_s * 1e6,
+            told.place(worst),
+        );
+        Some(Finding {
+            value: Some(rms_s * 1e6),
+            unit: Some("us"),
+            ..told.warning_at(Code::Jitter, worst, message)
+        })
     }
-    let period_s = time_s / count * f64::from(usual);
-    let other = (period_s / stage.servo_period_s - 1.0).abs();
-    if !other.is_finite() || other <= RATE_MIN {
-        return None;
+
+    fn of_other_rate(&self, told: &Told, stage: &Stage, usual: u32) -> Option<Finding> {
+        let period_s = self.time_s / self.periods * f64::from(usual);
+        let other = (period_s / stage.servo_period_s - 1.0).abs();
+        if !other.is_finite() || other <= RATE_MIN {
+            return None;
+        }
+        let severity = if usual >= THINNED_FROM {
+            Severity::Note
+        } else {
+            Severity::Warn
+        };
+        let message = format!(
+            "rows are {:.1} us apart, the servo period of stage.toml is {:.1} us: correct servo.period_s, or log every period",
+            period_s * 1e6,
+            stage.servo_period_s * 1e6,
+        );
+        Some(Finding {
+            severity,
+            value: Some(period_s * 1e6),
+            unit: Some("us"),
+            ..told.warning(Code::Jitter, message)
+        })
     }
-    let severity = if usual >= THINNED_FROM {
-        Severity::Note
-    } else {
-        Severity::Warn
-    };
-    let message = format!(
-        "rows are {:.1} us apart, the servo period of stage.toml is {:.1} us: correct servo.period_s, or log every period",
-        period_s * 1e6,
-        stage.servo_period_s * 1e6,
-    );
-    Some(Finding {
-        severity,
-        value: Some(period_s * 1e6),
-        unit: Some("us"),
-        ..log.warning(Code::Jitter, message)
-    })
 }
 
 #[cfg(test)]

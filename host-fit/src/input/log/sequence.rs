@@ -63,7 +63,7 @@ impl Numbering {
 }
 
 /// Numbers the rows of these movements of one log.
-pub(super) fn number<'m>(
+pub(in crate::input) fn number<'m>(
     rows: &mut [Row],
     movements: impl Iterator<Item = &'m Movement> + Clone,
     servo_period_s: f64,
@@ -76,7 +76,21 @@ pub(super) fn number<'m>(
             _ => None,
         }));
     }
-    let mut numbering = Numbering::new(steps_us, servo_period_s);
+    let period_us = Numbering::new(steps_us, servo_period_s).period_us;
+    number_by(rows, movements, period_us);
+}
+
+/// The same by a known period, us.
+pub(in crate::input) fn number_by<'m>(
+    rows: &mut [Row],
+    movements: impl Iterator<Item = &'m Movement>,
+    period_us: f64,
+) {
+    let mut numbering = Numbering {
+        period_us,
+        servo_us: period_us,
+        before: (0, 0),
+    };
     for movement in movements {
         let rows = rows.get_mut(movement.rows.clone()).unwrap_or_default();
         for (at, row) in rows.iter_mut().enumerate() {

@@ -8,13 +8,16 @@
 //! and S is the sum over all runs. Its chance grows with its leverage where that is far above the
 //! mean. One run is taken in each of equal steps of the sum of their chances, at a place within the
 //! step that differs from step to step: the runs are spread over the log, a protocol that repeats
-//! is met in all its phases, and nothing is random. A log of which nothing was taken that way gives
-//! a few of its runs all the same.
+//! is met in all its phases, and nothing is random. To these are added the runs that go farthest in
+//! an axis, so that the model is fitted over the whole range, and as many of a short log beside
+//! long ones as show whether it is of the same stage.
 
 use super::Whole;
 use crate::input::dataset::{Dataset, Movement, Row};
+use crate::input::log::sequence;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -32,8 +35,14 @@ const IDLE_RAD: f64 = 20e-6;
 /// How far the place within a step moves from step to step, in steps: by the golden ratio the
 /// places of any number of steps are spread evenly.
 pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_8;
-/// Runs of a log of which no other was taken, at most.
+/// Rows of a log beside others that tell whether it is of the same stage, ...
+const OF_LOG: usize = 16_000;
+/// ... at least so many runs of it, though they be more than its share of the excerpt.
 const FEW: usize = 8;
+/// Runs that are taken of those that go farthest in an axis, where they go farther than all others
+/// by this part: one may be a fault.
+const FARTHEST: usize = 3;
+const FARTHER: f64 = 0.02;
 /// Leverage, in terms of the mean of the runs that move, from which on a run is likelier to be taken.
 const RARE: f64 = 4.0;
 /// Runs whose products are summed one after the other.
@@ -42,21 +51,68 @@ const TOGETHER: usize = 64;
 type Products = SMatrix<f64, COUNT, COUNT>;
 
 /// Rows of one movement.
-struct Run {
-    movement: usize,
-    rows: Range<usize>,
+pub struct Run {
+    /// Its number.
+    pub movement: usize,
+    /// The rows.
+    pub rows: Range<usize>,
 }
 
 impl Whole {
     /// An excerpt of about `most` rows, each run a movement by itself; sequence numbers are 0.
     pub fn excerpt(self: &Arc<Self>, most: usize, sha256: [u8; 32]) -> Dataset {
+        self.dataset(self.chosen(most), sha256)
+    }
+
+    /// An excerpt with more rows of the whole, given by the numbers of [`runs`](Self::runs); those
+    /// that follow each other in a movement are one movement.
+    pub fn with_more(
+        self: &Arc<Self>,
+        excerpt: &Dataset,
+        more: &BTreeSet<usize>,
+        servo_period_s: f64,
+    ) -> Dataset {
+        let mut of_excerpt = excerpt.movements.iter().peekable();
+        let mut joined: Vec<Run> = Vec::new();
+        let mut before_is_more = false;
+        for (number, run) in self.runs().into_iter().enumerate() {
+            let is_same = |taken: &&Movement| {
+                let movement = &self.movements[run.movement];
+                (taken.log, taken.index) == (movement.log, movement.index)
+                    && taken.rows.len() == run.rows.len()
+                    && excerpt.rows[taken.rows.start].t_us == self.row(run.rows.start).t_us
+            };
+            let is_taken = of_excerpt.next_if(is_same).is_some();
+            let is_more = more.contains(&number);
+            match joined.last_mut() {
+                Some(last) if is_more && before_is_more && last.movement == run.movement => {
+                    last.rows.end = run.rows.end;
+                }
+                _ if is_taken || is_more => joined.push(run),
+                _ => {}
+            }
+            before_is_more = is_more;
+        }
+        let mut dataset = self.dataset(joined, excerpt.sha256);
+        for log in 0..dataset.logs.len() {
+            let of_log = dataset
+                .movements
+                .iter()
+                .filter(|movement| movement.log == log);
+            sequence::number(&mut dataset.rows, of_log, servo_period_s);
+        }
+        dataset
+    }
+
+    /// Each run a movement by itself; sequence numbers are 0.
+    fn dataset(self: &Arc<Self>, runs: Vec<Run>, sha256: [u8; 32]) -> Dataset {
         let mut dataset = Dataset {
             logs: self.logs.clone(),
             sha256,
             whole: Some(Arc::clone(self)),
             ..Dataset::default()
         };
-        for run in self.chosen(most) {
+        for run in runs {
             let (start, number) = (dataset.rows.len(), dataset.movements.len());
             dataset.rows.extend(self.rows_of(number, run.rows));
             dataset.movements.push(Movement {
@@ -118,28 +174,76 @@ impl Whole {
             next > before
         };
         let mut taken: Vec<bool> = chances.iter().map(take).collect();
-        for log in 0..self.logs.len() {
-            let of_log = |k: &usize| self.movements[runs[*k].movement].log == log;
-            let of_log: Vec<usize> = (0..runs.len()).filter(of_log).collect();
-            let moving: Vec<usize> = of_log.iter().copied().filter(|k| told[*k].1).collect();
-            if !of_log.iter().any(|k| taken[*k]) {
-                let stride = moving.len().div_ceil(FEW).max(1);
-                moving
-                    .into_iter()
-                    .step_by(stride)
-                    .for_each(|k| taken[k] = true);
-            }
-        }
+        self.take_farthest(&runs, &told, &mut taken);
+        self.take_of_each_log(&runs, &told, most, &mut taken);
         let chosen = runs.into_iter().zip(taken).filter(|(_, taken)| *taken);
         chosen.map(|(run, _)| run).collect()
     }
 
-    fn looked_at(&self, run: &Run) -> impl Iterator<Item = Row> {
+    /// Takes the runs that go farthest in each axis; `told` is whether a run moves.
+    fn take_farthest(&self, runs: &[Run], told: &[(f64, bool)], taken: &mut [bool]) {
+        let reach: Vec<[f64; 6]> = runs.par_iter().map(|run| self.reach(run)).collect();
+        let mut moving: Vec<usize> = (0..runs.len()).filter(|k| told[*k].1).collect();
+        let sampled: Vec<usize> = (0..runs.len()).filter(|k| taken[*k]).collect();
+        for axis in 0..6 {
+            let farthest = sampled.iter().map(|&k| reach[k][axis]);
+            let least = farthest.fold(0.0, f64::max) * (1.0 + FARTHER);
+            moving.sort_by(|&a, &b| reach[b][axis].total_cmp(&reach[a][axis]));
+            for &run in moving.iter().take(FARTHEST) {
+                taken[run] |= reach[run][axis] > least;
+            }
+        }
+    }
+
+    /// How far a run goes from zero in each axis, m, rad: its second farthest row of those looked
+    /// at, because a single one may be a fault.
+    fn reach(&self, run: &Run) -> [f64; 6] {
+        let mut most = [[0.0f64; 2]; 6];
+        for row in self.looked_at(run) {
+            let ([x, y, rz], [z, rx, ry]) = (row.reference, row.vertical);
+            for (most, value) in most.iter_mut().zip([x, y, rz, z, rx, ry]) {
+                let [first, second] = *most;
+                let value = value.abs();
+                *most = [first.max(value), second.max(first.min(value))];
+            }
+        }
+        most.map(|[_, second]| second)
+    }
+
+    /// Takes runs of each log, spread evenly, until its share is taken; `told` is whether a run moves.
+    fn take_of_each_log(
+        &self,
+        runs: &[Run],
+        told: &[(f64, bool)],
+        most: usize,
+        taken: &mut [bool],
+    ) {
+        let share = (most / (2 * self.logs.len().max(1))).min(OF_LOG);
+        for log in 0..self.logs.len() {
+            let of_log = |run: &Run| self.movements[run.movement].log == log;
+            let has: Vec<usize> = (0..runs.len())
+                .filter(|&k| taken[k] && of_log(&runs[k]))
+                .collect();
+            let left: Vec<usize> = (0..runs.len())
+                .filter(|&k| told[k].1 && !taken[k] && of_log(&runs[k]))
+                .collect();
+            let rows = |of: &[usize]| of.iter().map(|&k| runs[k].rows.len()).sum::<usize>();
+            let missing = share.saturating_sub(rows(&has)) * left.len();
+            let wanted = missing.div_ceil(rows(&left).max(1));
+            let wanted = wanted.max(FEW.saturating_sub(has.len())).min(left.len());
+            for k in 0..wanted {
+                taken[left[k * left.len() / wanted]] = true;
+            }
+        }
+    }
+
+    /// Some rows of a run, spread evenly.
+    pub fn looked_at(&self, run: &Run) -> impl Iterator<Item = Row> {
         looked_at(run.rows.clone()).map(|row| self.row(row))
     }
 
     /// All movements in runs of about equal length.
-    fn runs(&self) -> Vec<Run> {
+    pub fn runs(&self) -> Vec<Run> {
         let mut runs = Vec::new();
         for (movement, Movement { rows, .. }) in self.movements.iter().enumerate() {
             let count = rows.len().div_ceil(RUN);

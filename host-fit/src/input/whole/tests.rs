@@ -263,6 +263,47 @@ fn a_short_log_beside_a_long_one_has_rows_in_the_excerpt() {
 }
 
 #[test]
+fn an_excerpt_holds_the_rare_runs_that_go_far() {
+    let far = 1_000..1_003;
+    let moves = |movement: usize, k: usize, row| Row {
+        reference: [
+            match far.contains(&movement) {
+                true => 3e-5,
+                false => 1e-5,
+            } * k as f64,
+            0.0,
+            0.0,
+        ],
+        ..row
+    };
+    let whole = whole_of(&movements(4_096, moves));
+    let excerpt = whole.excerpt(whole.rows() / 32, [0; 32]);
+    let far = (excerpt.movements.iter()).filter(|run| far.contains(&(run.index as usize)));
+    assert_eq!(far.count(), 3);
+    assert!(excerpt.movements.len() <= 132);
+}
+
+#[test]
+fn a_log_beside_longer_ones_has_its_share_of_an_excerpt() {
+    let all_move = |_, k: usize, row| Row {
+        reference: [1e-5 * k as f64, 0.0, 0.0],
+        ..row
+    };
+    let mut dataset = movements(1_000, all_move);
+    dataset.logs.push(dataset.logs[0].clone());
+    (dataset.logs[0].rows, dataset.logs[1].rows) = (0..19_000, 19_000..20_000);
+    for movement in &mut dataset.movements[950..] {
+        movement.log = 1;
+    }
+    let excerpt = whole_of(&dataset).excerpt(2_000, [0; 32]);
+    let of_second = excerpt.movements.iter().filter(|run| run.log == 1);
+    let numbers: Vec<i64> = of_second.map(|run| run.index).collect();
+    assert_eq!(numbers.len(), 25);
+    let early = numbers.iter().filter(|number| **number < 975).count();
+    assert!((10..=15).contains(&early), "{numbers:?}");
+}
+
+#[test]
 fn a_whole_log_is_judged_as_its_rows_are() {
     let (dataset, _) = shipped(None);
     let stage = stage();
