@@ -125,7 +125,7 @@ fn a_record_without_time_frames_and_one_of_a_tenth_of_a_second_are_refused() {
 #[test]
 fn a_clock_that_is_set_during_the_record_is_told_or_shifts_no_row() {
     let mut refused = 0;
-    for step_us in [3_000.0, 50_000.0, 3e6, -1_500_000.0] {
+    for step_us in [50_000.0, 3e6, -1_500_000.0] {
         for start in [200, 300, 375, 500, 700] {
             let bus = candump(|n, _| Some(jittered_us(n) + if n < start { 0.0 } else { step_us }));
             match imported(&bus) {
