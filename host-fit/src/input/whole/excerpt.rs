@@ -186,11 +186,12 @@ impl Whole {
         let mut moving: Vec<usize> = (0..runs.len()).filter(|k| told[*k].1).collect();
         let sampled: Vec<usize> = (0..runs.len()).filter(|k| taken[*k]).collect();
         for axis in 0..6 {
-            let farthest = sampled.iter().map(|&k| reach[k][axis]);
+            let reach = |run: usize| reach[run][axis];
+            let farthest = sampled.iter().map(|&run| reach(run));
             let least = farthest.fold(0.0, f64::max) * (1.0 + FARTHER);
-            moving.sort_by(|&a, &b| reach[b][axis].total_cmp(&reach[a][axis]));
+            moving.sort_by(|&a, &b| reach(b).total_cmp(&reach(a)));
             for &run in moving.iter().take(FARTHEST) {
-                taken[run] |= reach[run][axis] > least;
+                taken[run] |= reach(run) > least;
             }
         }
     }
