@@ -8,7 +8,7 @@
 //! movement, and a log of one movement, have no such boundary.
 
 use super::finding::{Code, Finding, Severity};
-use super::logs::{BETTER_MAX, BETTER_REFUSED, GAIN_REFUSED, of_log, sensitivities};
+use super::logs::{BETTER_MAX, BETTER_REFUSED, of_log, sensitivities};
 use super::signals::residual_to_noise;
 use super::trials::{Trials, unlimited, zeros_free};
 use super::warning;
@@ -33,6 +33,8 @@ const BETTER_SURE: f64 = 2.0;
 /// One unit of a group has at most this part of what the group is better by: more is a fault of
 /// that movement.
 const SHARE_MAX: f64 = 0.8;
+/// Sensitivities that differ by this part of one are a change, whatever the errors.
+const GAIN_REFUSED: f64 = 0.02;
 /// The field model does not describe a log of which it leaves this, in terms of the noise.
 const RESIDUAL_MIN: f64 = 1.2;
 

@@ -14,7 +14,7 @@ use crate::solve::least_squares::normal::{
     Column, Point, Square, cost, descent, gram, residual_products,
 };
 use crate::solve::least_squares::scatter::{Offset, Q, Scatter, U, origin, regressors, scatter};
-use nalgebra::{Matrix3, SymmetricEigen};
+use nalgebra::{Matrix3, SMatrix, SymmetricEigen};
 
 /// Fewer movements than this are cut into blocks.
 const CLUSTERS_MIN: usize = 20;
@@ -128,6 +128,7 @@ pub fn uncertainty(
 pub struct OwnFit {
     /// At the solution.
     pub cost: f64,
+    gain: Matrix3<f64>,
     descent: Column,
     curvature: Square,
 }
@@ -137,6 +138,7 @@ impl OwnFit {
     pub fn none() -> Self {
         Self {
             cost: 0.0,
+            gain: Matrix3::zeros(),
             descent: Column::zeros(),
             curvature: Square::zeros(),
         }
@@ -150,6 +152,7 @@ impl OwnFit {
         let weights = Matrix3::from_diagonal(&problem.weights.into());
         Some(Self {
             cost: cost(&sums, &point.gain, problem.weights),
+            gain: point.gain,
             descent: descent(&sums, &point.gain, problem.weights),
             curvature: gram(&sums, &point.gain, &weights),
         })
@@ -167,6 +170,27 @@ impl OwnFit {
     pub fn step(&self) -> Column {
         let all: Vec<usize> = (0..COUNT).collect();
         pseudo_inverse(&self.curvature, &all).0 * self.descent
+    }
+
+    /// By what part the gain of each probe would change, if nothing else did; `None` where the rows do not
+    /// determine it.
+    pub fn gain_step(&self) -> Option<[f64; 3]> {
+        // A gain is a column of G, whose numbers stand row by row before the ratios.
+        let directions = SMatrix::<f64, COUNT, 3>::from_fn(|place, probe| {
+            let is_of_probe = place < 9 && place % 3 == probe;
+            if is_of_probe {
+                self.gain[(place / 3, probe)]
+            } else {
+                0.0
+            }
+        });
+        let curvature = directions.transpose() * self.curvature * directions;
+        let factor = curvature.cholesky()?;
+        Some(
+            factor
+                .solve(&(directions.transpose() * self.descent))
+                .into(),
+        )
     }
 
     /// The cost after a step.
