@@ -5,6 +5,7 @@ use super::tests::{OFFSET_US, candump, files, read_log, reference};
 use super::*;
 use crate::input::log::{self, CellFault, LogError, ReadOptions};
 use crate::input::source::SourceError;
+use std::fmt::Write;
 use std::path::Path;
 
 /// Numbers drawn one after the other, by the method of splitmix64.
