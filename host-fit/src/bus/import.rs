@@ -8,10 +8,11 @@
 //! | numbers of the ticks by the node's own count, so that no lost tick shifts the others | `numbering` |
 //! | receive times to sample times: the node samples evenly, the bus delivers unevenly | [`clock`] |
 //! | the interferometers' CSV | [`reference`](mod@reference) |
-//! | offset between the clocks and difference in speed, where asked for | `survey`, [`offset`], `refine` |
+//! | offset between the clocks and difference in speed, found or checked by the motion | `survey`, [`offset`], `refine`, `agreement` |
 //! | reference between its samples, at the times of the ticks | [`join`] |
 //! | the log | [`write`](mod@write) |
 
+mod agreement;
 pub mod bus_log;
 mod bus_reader;
 pub mod clock;
@@ -35,7 +36,7 @@ use clock::{EvenTicks, Smoothing};
 use hal_adapters::can::Layout;
 use input::Input;
 use join::{Join, JoinCounts};
-use offset::Offset;
+use offset::{Offset, Seen};
 use reference::{ReferenceCounts, ReferenceInput};
 use std::path::PathBuf;
 use survey::Survey;
@@ -92,14 +93,14 @@ pub struct ImportReport {
 pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
     let stage = Stage::from_file(&settings.stage)?;
     let bus = Input::new(&settings.bus, settings.estimate_offset)?;
-    let reference = ReferenceInput::new(&settings.reference, settings.estimate_offset, &stage)?;
+    let reference = ReferenceInput::new(&settings.reference, true, &stage)?;
     let offset = match settings.estimate_offset {
         true => estimate(settings, &stage, &bus, &reference)?,
         false => Offset {
             us: settings.offset_us,
             rate: 0.0,
             middle_us: 0.0,
-            explained: None,
+            seen: Seen::default(),
         },
     };
     write(settings, &stage, &bus, &reference, offset)
@@ -130,19 +131,21 @@ fn write(
     settings: &ImportSettings,
     stage: &Stage,
     bus: &Input,
-    reference: &ReferenceInput<'_>,
-    offset: Offset,
+    input: &ReferenceInput<'_>,
+    mut offset: Offset,
 ) -> Result<ImportReport, ImportError> {
     let mut ticks = EvenTicks::new(BusReader::open(bus, "importing", settings, stage)?);
     let tolerance_us = settings
         .tolerance_us
         .map_or(stage.servo_period_s * 1e6, f64::from);
-    let reference = reference.reader()?;
+    let reference = input.reader()?;
     let format = LogFormat::new(reference.quantities, stage);
     let mut join = Join::new(reference, tolerance_us)?;
     let mut log = StreamedFile::create(&settings.out)?;
     let mut text = format.header();
+    let mut survey = Survey::default();
     while let Some((tick, t_us)) = ticks.next_tick()? {
+        survey.take(&(tick, t_us));
         let period_us = ticks.smoothing().period_us;
         if let Some(row) = join.take(&tick, offset.on_reference_us(t_us), period_us)? {
             format.append(&row, &mut text);
@@ -155,6 +158,10 @@ fn write(
     let (bus, smoothing) = ticks.finish(settings, stage)?;
     let (join, reference) = join.finish()?;
     join.check()?;
+    if !settings.estimate_offset {
+        survey.end();
+        offset = offset::checked(&survey, input, stage, offset)?;
+    }
     log.write(text.as_bytes())?;
     log.finish()?;
     Ok(ImportReport {

@@ -73,10 +73,15 @@ fn reference(fast: f64) -> String {
 
 /// Largest distance from the codes to those of the reference beside them, m; and the report.
 fn imported(controller: f64, interferometer: f64) -> (f64, ImportReport) {
-    try_import(controller, interferometer).expect("imported")
+    try_import(controller, interferometer, None).expect("imported")
 }
 
-fn try_import(controller: f64, interferometer: f64) -> Result<(f64, ImportReport), ImportError> {
+/// With the offset that is given, us, or found.
+fn try_import(
+    controller: f64,
+    interferometer: f64,
+    offset_us: Option<f64>,
+) -> Result<(f64, ImportReport), ImportError> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     let stage = crate::input::shipped::STAGE_TOML
@@ -93,8 +98,8 @@ fn try_import(controller: f64, interferometer: f64) -> Result<(f64, ImportReport
         stage: path("stage.toml"),
         out: path("log.csv"),
         tolerance_us: None,
-        offset_us: 0.0,
-        estimate_offset: true,
+        offset_us: offset_us.unwrap_or(0.0),
+        estimate_offset: offset_us.is_none(),
         search_s: 0.1,
         interface: None,
         layout: None,
@@ -128,9 +133,21 @@ fn clocks_that_differ_by_50_parts_in_a_million_are_followed_over_two_minutes() {
 
 #[test]
 fn clocks_too_far_apart_in_speed_are_refused() {
-    let refused = try_import(0.0, 1000e-6).expect_err("refused");
+    let refused = try_import(0.0, 1000e-6, None).expect_err("refused");
     assert!(
         matches!(refused, ImportError::UnsteadyClocks { .. }),
         "{refused}"
     );
+}
+
+#[test]
+fn a_given_offset_is_refused_if_the_clocks_drift_apart() {
+    let refused = try_import(0.0, 20e-6, Some(600.0)).expect_err("refused");
+    assert!(
+        matches!(refused, ImportError::WrongOffset { .. }),
+        "{refused}"
+    );
+    let (_, report) = try_import(0.0, 0.0, Some(600.0)).expect("imported");
+    let apart_us = report.offset.seen.apart_us.expect("as given");
+    assert!(apart_us.abs() < 800.0, "{apart_us}");
 }

@@ -168,11 +168,54 @@ pub enum ImportError {
     #[error(
         "no steady offset between the clocks makes the reference agree with the Hall signals: they differ in speed by more \
          than {most_ppm} parts in a million, or one of them was set during the record; turn its adjustment off (NTP), and \
-         record again, or give --offset-us"
+         record again"
     )]
     UnsteadyClocks {
         /// The largest difference that is looked for, parts in a million.
         most_ppm: f64,
+    },
+    /// The record is too short, or holds too little motion, to tell the offset.
+    #[error(
+        "the offset between the clocks is uncertain: its standard error is {standard_error_us:.0} us, more than {most_us:.0} us (a \
+         tenth of a servo period); record for longer, or with more motion"
+    )]
+    UncertainOffset {
+        /// Standard error at the end of the record where it is larger, us.
+        standard_error_us: f64,
+        /// The most it may be, us.
+        most_us: f64,
+    },
+    /// At the offset that was given the two do not agree.
+    #[error(
+        "at the given offset the reference does not agree with the Hall signals (it explains {percent:.0} % of their motion): is the offset \
+         right, do the clocks run alike, are both of the same run? Let it be found with --estimate-offset"
+    )]
+    UncheckedOffset {
+        /// Share that is explained.
+        percent: f64,
+    },
+    /// The motion shows another offset than the one that was given.
+    #[error(
+        "the given offset is wrong: by the motion that both records saw it lacks {start_us:.0} us at the start, {middle_us:.0} us in the \
+         middle and {end_us:.0} us at the end of the record; use --estimate-offset, which also finds how much faster one clock runs"
+    )]
+    WrongOffset {
+        /// What it lacks in the middle, us.
+        middle_us: f64,
+        /// At the start, us.
+        start_us: f64,
+        /// At the end, us.
+        end_us: f64,
+    },
+    /// One movement does not agree with the offset of the others.
+    #[error(
+        "in movement {movement} the reference does not agree with the Hall signals at the offset of the others: a clock was set, or the \
+         reference starts its time anew in each movement while the bus ran on between; log both by clocks that run through, \
+         or import each movement by itself"
+    )]
+    Astray {
+        /// The movement.
+        movement: i64,
     },
     /// Frames were received too unevenly to tell when their codes were sampled.
     #[error(

@@ -5,6 +5,7 @@ use super::tests::{OFFSET_US, candump, files, read_log, reference};
 use super::*;
 use crate::input::log::{self, CellFault, LogError, ReadOptions};
 use crate::input::source::SourceError;
+use std::fmt::Write;
 use std::path::Path;
 
 /// Numbers drawn one after the other, by the method of splitmix64.
@@ -251,5 +252,83 @@ fn a_fault_far_down_the_reference_has_its_line() {
     assert!(
         matches!(&returns, LogError::MovementReturns { place, left_line: 504 } if place.line == 1402),
         "{returns}"
+    );
+}
+
+/// Movements that start their time anew are laid end to end; here the bus ran on between them.
+#[test]
+fn movements_whose_time_starts_anew_after_a_pause_are_refused() {
+    let mut laid = String::new();
+    for line in reference().lines() {
+        let cells: Vec<&str> = line.splitn(3, ',').collect();
+        let numbers = cells[0]
+            .parse::<i64>()
+            .ok()
+            .zip(cells[1].parse::<i64>().ok());
+        let Some((movement, t_us)) = numbers else {
+            writeln!(laid, "{line}").expect("a string");
+            continue;
+        };
+        let paused_us = if movement > 0 { 150_000 } else { 0 };
+        let since_us = t_us - 500_000 * movement - paused_us;
+        if since_us >= 0 {
+            writeln!(laid, "{movement},{since_us},{}", cells[2]).expect("a string");
+        }
+    }
+    let (_folder, mut args) = files(&candump(|_, _| false), &laid);
+    run(&args).expect_err("no offset fits all movements");
+    args.estimate_offset = false;
+    args.offset_us = OFFSET_US;
+    let refused = run(&args).expect_err("refused");
+    assert!(
+        matches!(
+            refused,
+            ImportError::Astray { .. }
+                | ImportError::UncheckedOffset { .. }
+                | ImportError::WrongOffset { .. }
+        ),
+        "{refused}"
+    );
+    assert!(!args.out.exists());
+}
+
+#[test]
+fn a_given_offset_that_the_motion_contradicts_is_refused() {
+    for (wrong_us, is_sound) in [(0.0, true), (3_000.0, false), (-50_000.0, false)] {
+        let (_folder, mut args) = files(&candump(|_, _| false), &reference());
+        args.estimate_offset = false;
+        args.offset_us = OFFSET_US + wrong_us;
+        assert_eq!(run(&args).is_ok(), is_sound, "{wrong_us}");
+        assert_eq!(args.out.exists(), is_sound);
+    }
+}
+
+#[test]
+fn an_offset_that_a_noisy_reference_leaves_uncertain_is_refused() {
+    let mut noisy = String::new();
+    for (k, line) in reference().lines().enumerate() {
+        let (key, value) = line.rsplit_once(',').expect("cells");
+        let (key, x) = match (k, key.splitn(4, ',').collect::<Vec<_>>().as_slice()) {
+            (1.., [movement, t, x, y]) => {
+                let noise_nm = (k * 7919 % 1201) as f64 * 100.0 - 60_000.0;
+                let x = x.parse::<f64>().expect("a number") + noise_nm;
+                let y = y.parse::<f64>().expect("a number") + noise_nm;
+                (
+                    format!("{movement},{t},{x},{y}"),
+                    value.parse::<f64>().expect("a number") + noise_nm,
+                )
+            }
+            _ => {
+                writeln!(noisy, "{line}").expect("a string");
+                continue;
+            }
+        };
+        writeln!(noisy, "{key},{x}").expect("a string");
+    }
+    let (_folder, args) = files(&candump(|_, _| false), &noisy);
+    let refused = run(&args).expect_err("refused");
+    assert!(
+        matches!(refused, ImportError::UncertainOffset { .. }),
+        "{refused}"
     );
 }

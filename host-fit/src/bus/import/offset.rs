@@ -10,6 +10,7 @@
 //! the middle of the record, where the rate does not act.
 
 use super::ImportError;
+use super::agreement::agreement;
 use super::join::{At, Cursor};
 use super::reference::{ReferenceInput, Sample, collect};
 use super::refine::{FIRST_STRETCH_US, RATE_MAX, refine};
@@ -27,9 +28,23 @@ pub struct Offset {
     pub rate: f64,
     /// The middle of the record, us on the clock of the bus.
     pub middle_us: f64,
-    /// Share of the Hall signals' motion that the reference explains, and over how many ticks, if
-    /// it was estimated.
-    pub explained: Option<(f64, usize)>,
+    /// What the motion that both saw tells of it.
+    pub seen: Seen,
+}
+
+/// What the motion that both records saw tells of an offset.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// Share of the Hall signals' motion that the reference explains.
+    pub explained: f64,
+    /// Over how many ticks.
+    pub ticks: usize,
+    /// Standard error of the offset that the motion tells, at the end of the record where it is
+    /// larger, us.
+    pub standard_error_us: f64,
+    /// For an offset that was given: the one that the motion tells less the one given, at the
+    /// end of the record where that is larger, us.
+    pub apart_us: Option<f64>,
 }
 
 impl Offset {
@@ -64,23 +79,95 @@ const RATE_ERROR_MAX: f64 = 5e-6;
 /// wrong by some of them.
 const MARGIN_PERIODS: f64 = 20.0;
 
+/// Largest standard error of an offset, in servo periods.
+const STANDARD_ERROR_PERIODS_MAX: f64 = 0.1;
+
+/// How far a given offset may be from the one that the motion tells, in servo periods: the time
+/// that frames take is part of the latter. And by how much that may change within the record.
+const APART_PERIODS_MAX: f64 = 0.5;
+const DRIFT_PERIODS_MAX: f64 = 0.1;
+
 /// Finds the offset within `search_us` of where both records start together.
 ///
-/// A record that is longer than the liveliest two minutes of the [`Survey`] is followed from
-/// there to its ends by the survey's blocks. The reference is read anew for each step, and held
-/// only where and as densely as the step needs it.
-///
 /// # Errors
-/// `NoOffset`, `UnsteadyClocks`, and those of the reference.
+/// `NoOffset`, `UnsteadyClocks`, `UncertainOffset`, `Astray`, and those of the reference.
 pub(super) fn estimate(
     survey: &Survey,
     reference: &ReferenceInput<'_>,
     stage: &Stage,
     search_us: f64,
 ) -> Result<Offset, ImportError> {
+    let start = coarse(survey, reference, stage, search_us)?;
+    let found = follow(survey, reference, stage, start)?;
+    let most_us = STANDARD_ERROR_PERIODS_MAX * stage.servo_period_s * 1e6;
+    if found.seen.standard_error_us > most_us {
+        return Err(ImportError::UncertainOffset {
+            standard_error_us: found.seen.standard_error_us,
+            most_us,
+        });
+    }
+    Ok(found)
+}
+
+/// Checks an offset that was given against the motion, and tells how far it is from what that
+/// shows.
+///
+/// # Errors
+/// `WrongOffset`, `Astray`, and those of the reference.
+pub(super) fn checked(
+    survey: &Survey,
+    reference: &ReferenceInput<'_>,
+    stage: &Stage,
+    given: Offset,
+) -> Result<Offset, ImportError> {
+    let given = given.in_the_middle(survey.middle_us());
+    let [first_us, last_us] = ends_us(survey.liveliest());
+    let start = given.in_the_middle((first_us + last_us) / 2.0);
+    let found = match follow(survey, reference, stage, start) {
+        Err(ImportError::NoOffset { percent, .. }) => Err(ImportError::UncheckedOffset { percent }),
+        Err(ImportError::UnsteadyClocks { .. }) => {
+            Err(ImportError::UncheckedOffset { percent: 0.0 })
+        }
+        found => found,
+    }?;
+    let step_us = stage.servo_period_s * 1e6;
+    let drift_us = found.rate * (survey.middle_us() - survey.first_us());
+    let middle_us = found.us - given.us;
+    let error_us = 3.0 * found.seen.standard_error_us;
+    if middle_us.abs() > APART_PERIODS_MAX * step_us + error_us
+        || drift_us.abs() > DRIFT_PERIODS_MAX * step_us + error_us
+    {
+        return Err(ImportError::WrongOffset {
+            middle_us,
+            start_us: middle_us - drift_us,
+            end_us: middle_us + drift_us,
+        });
+    }
+    Ok(Offset {
+        seen: Seen {
+            apart_us: Some(middle_us + drift_us.abs().copysign(middle_us)),
+            ..found.seen
+        },
+        ..given
+    })
+}
+
+/// Follows an offset from the liveliest two minutes over the whole record.
+///
+/// A record that is longer than the liveliest two minutes of the [`Survey`] is followed from
+/// there to its ends by the survey's blocks. The reference is read anew for each step, and held
+/// only where and as densely as the step needs it.
+///
+/// # Errors
+/// `NoOffset`, `UnsteadyClocks`, `Astray`, and those of the reference.
+fn follow(
+    survey: &Survey,
+    reference: &ReferenceInput<'_>,
+    stage: &Stage,
+    found: Offset,
+) -> Result<Offset, ImportError> {
     let step_us = stage.servo_period_s * 1e6;
     let window = survey.liveliest();
-    let found = coarse(survey, reference, stage, search_us)?;
     let predicted = |points: &[Point], offset: &Offset| {
         let windows = windows(points, offset, step_us);
         reference.predicted(stage, &windows, step_us / 4.0)
@@ -96,25 +183,33 @@ pub(super) fn estimate(
                 least_percent: 100.0 * EXPLAINED_MIN,
             });
         }
-        Ok(Some((share, explained.ticks)))
+        Ok((share, explained.ticks))
     };
     let unsteady = || ImportError::UnsteadyClocks {
         most_ppm: RATE_MAX * 1e6,
     };
-    let explained = check(window, &samples, &refined.unwrap_or(found))?;
-    let mut best = Offset {
-        explained,
-        ..refined.ok_or_else(unsteady)?
+    let judged = |points: &[Point], samples: &[Sample], offset: Offset| {
+        let (explained, ticks) = check(points, samples, &offset)?;
+        let agreement = agreement(points, samples, &offset, step_us).ok_or_else(unsteady)?;
+        if let Some(movement) = agreement.astray {
+            return Err(ImportError::Astray { movement });
+        }
+        let seen = Seen {
+            explained,
+            ticks,
+            standard_error_us: agreement.standard_error_us,
+            apart_us: None,
+        };
+        Ok(Offset { seen, ..offset })
     };
+    check(window, &samples, &refined.unwrap_or(found))?;
+    let mut best = judged(window, &samples, refined.ok_or_else(unsteady)?)?;
     if survey.is_longer() {
         let points = survey.blocks();
         let samples = predicted(&points, &best)?;
         let refined = refine(&points, &samples, best, step_us, 4.0 * FIRST_STRETCH_US);
-        let refined = refined.ok_or_else(unsteady)?;
-        best = Offset {
-            explained: check(&points, &samples, &refined)?,
-            ..refined
-        };
+        check(&points, &samples, &refined.unwrap_or(best))?;
+        best = judged(&points, &samples, refined.ok_or_else(unsteady)?)?;
     }
     Ok(best.in_the_middle(survey.middle_us()))
 }
@@ -130,14 +225,13 @@ fn coarse(
     let window = survey.liveliest();
     let every = window.len().div_ceil(COARSE_TICKS).max(1);
     let points: Vec<Point> = window.iter().step_by(every).copied().collect();
-    let ends = points.first().zip(points.last());
-    let [first_us, last_us] = ends.map_or([0.0; 2], |(first, last)| [first.t_us, last.t_us]);
+    let [first_us, last_us] = ends_us(&points);
     let centre_us = survey.first_us() - reference.first_us()?;
     let at = |us| Offset {
         us,
         rate: 0.0,
         middle_us: (first_us + last_us) / 2.0,
-        explained: None,
+        seen: Seen::default(),
     };
     let span = [first_us, last_us].map(|t_us| t_us - centre_us);
     let span = [span[0] - search_us - step_us, span[1] + search_us + step_us];
@@ -148,6 +242,12 @@ fn coarse(
     let offsets = (-steps..=steps).map(|k| at(centre_us + k as f64 * step_us));
     let trial = |offset: &Offset| explain(&points, &samples, offset, tolerance_us).explained;
     Ok(most(offsets, trial).unwrap_or(at(centre_us)))
+}
+
+/// The times of the first and the last point, us.
+fn ends_us(points: &[Point]) -> [f64; 2] {
+    let ends = points.first().zip(points.last());
+    ends.map_or([0.0; 2], |(first, last)| [first.t_us, last.t_us])
 }
 
 /// The times of the reference around these points, ascending.

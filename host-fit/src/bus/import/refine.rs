@@ -22,8 +22,9 @@ const PAIRS: usize = COORDINATES * (COORDINATES + 1) / 2;
 const TERMS: usize = COORDINATES + 2 * PAIRS;
 /// With the two columns of time.
 const COLUMNS: usize = TERMS + 2;
-/// Standard deviation of how two crystals differ, where nothing else is known, parts in a million.
-const RATE_PRIOR_PPM: f64 = 50.0;
+/// Weight of "no difference in speed": two crystals differ by 50 parts in a million where nothing
+/// else is known.
+pub(super) const RATE_PRIOR: f64 = 1.0 / (50.0 * 50.0);
 /// Crystals differ by less; more means that the two records do not belong together.
 pub(super) const RATE_MAX: f64 = 500e-6;
 /// Added to each term's square, as a share: what a record does not move stays near 0.
@@ -64,13 +65,13 @@ pub(super) fn refine(
 }
 
 /// Middle and half of the range of each coordinate, which bring it into -1 to 1.
-struct Scales {
+pub(super) struct Scales {
     middle: [f64; COORDINATES],
     half: [f64; COORDINATES],
 }
 
 impl Scales {
-    fn of(points: &[Point], predicted: &[Sample]) -> Self {
+    pub(super) fn of(points: &[Point], predicted: &[Sample]) -> Self {
         let mut low = [f64::INFINITY; COORDINATES];
         let mut high = [f64::NEG_INFINITY; COORDINATES];
         let mut take = |first: usize, values: [f64; 3]| {
@@ -97,17 +98,83 @@ impl Scales {
     }
 }
 
+/// A tick with a reference.
+pub(super) struct Row {
+    pub(super) movement: i64,
+    pub(super) signal: [f64; 3],
+    x: [f64; COORDINATES],
+    /// Of each probe's own coordinate, in units of it per us.
+    speed: [f64; 3],
+    /// From the middle of the record, s.
+    since: f64,
+}
+
+impl Row {
+    /// The columns of a probe: terms, then the speed and the speed times the time.
+    pub(super) fn columns(&self, own: usize) -> DVector<f64> {
+        let mut columns = DVector::zeros(COLUMNS);
+        let mut place = COORDINATES;
+        for (i, a) in self.x.iter().enumerate() {
+            columns[i] = *a;
+            for b in &self.x[i..] {
+                columns[place] = a * b;
+                columns[place + PAIRS] = a * b * self.x[own];
+                place += 1;
+            }
+        }
+        columns[TERMS] = self.speed[own];
+        columns[TERMS + 1] = self.speed[own] * self.since;
+        columns
+    }
+}
+
+/// Calls `take` with each of the points that has a reference and a speed.
+pub(super) fn each_row<'p>(
+    points: impl Iterator<Item = &'p Point>,
+    predicted: &[Sample],
+    scales: &Scales,
+    offset: &Offset,
+    step_us: f64,
+    mut take: impl FnMut(Row),
+) {
+    let mut cursors = [(); 3].map(|()| Cursor::new(predicted));
+    for point in points {
+        let t_us = offset.on_reference_us(point.t_us);
+        let [before, here, after] = &mut cursors;
+        let apart_us = step_us / 2.0;
+        let found = [
+            before.at(t_us - apart_us, 2.0 * step_us),
+            here.at(t_us, 2.0 * step_us),
+            after.at(t_us + apart_us, 2.0 * step_us),
+        ];
+        let [Some(before), Some(here), Some(after)] = found.map(values) else {
+            continue;
+        };
+        if before.0 != after.0 {
+            continue;
+        }
+        let per_us = |k: usize| (after.1[k] - before.1[k]) / (step_us * scales.half[k]);
+        take(Row {
+            movement: here.0,
+            signal: point.signal,
+            x: scales.apply(here.1, point.gaps),
+            speed: [0, 1, 2].map(per_us),
+            since: (point.t_us - offset.middle_us) * 1e-6,
+        });
+    }
+}
+
 /// Normal equations of one probe, zero deviations of the movements taken out.
 #[derive(Clone)]
-struct Probe {
+pub(super) struct Probe {
     square: DMatrix<f64>,
     product: DVector<f64>,
     signal_square: f64,
     rows: f64,
 }
 
-struct Sums {
-    probes: [Probe; 3],
+pub(super) struct Sums {
+    pub(super) probes: [Probe; 3],
 }
 
 /// Sums over one movement, of columns and signal.
@@ -118,7 +185,7 @@ struct Means {
 }
 
 impl Sums {
-    fn over(
+    pub(super) fn over(
         points: &[Point],
         predicted: &[Sample],
         scales: &Scales,
@@ -139,43 +206,25 @@ impl Sums {
         };
         let mut means = [none(), none(), none()];
         let mut current = None;
-        let mut cursors = [(); 3].map(|()| Cursor::new(predicted));
         let near = |point: &&Point| (point.t_us - offset.middle_us).abs() <= stretch_us;
-        for point in points.iter().filter(near) {
-            let t_us = offset.on_reference_us(point.t_us);
-            let [before, here, after] = &mut cursors;
-            let apart_us = step_us / 2.0;
-            let found = [
-                before.at(t_us - apart_us, 2.0 * step_us),
-                here.at(t_us, 2.0 * step_us),
-                after.at(t_us + apart_us, 2.0 * step_us),
-            ];
-            let [Some(before), Some(here), Some(after)] = found.map(values) else {
-                continue;
-            };
-            if before.0 != after.0 {
-                continue;
-            }
-            if current.replace(here.0) != Some(here.0) {
+        let points = points.iter().filter(near);
+        each_row(points, predicted, scales, offset, step_us, |row| {
+            if current.replace(row.movement) != Some(row.movement) {
                 for (probe, means) in probes.iter_mut().zip(&mut means) {
                     probe.take_out(&std::mem::replace(means, none()));
                 }
             }
-            let x = scales.apply(here.1, point.gaps);
-            let since = (point.t_us - offset.middle_us) * 1e-6;
             for (k, (probe, means)) in probes.iter_mut().zip(&mut means).enumerate() {
-                // In units of the coordinate per us: the step is in us.
-                let speed = (after.1[k] - before.1[k]) / (step_us * scales.half[k]);
-                let columns = columns(&x, k, speed, since);
+                let (columns, signal) = (row.columns(k), row.signal[k]);
                 probe.square.ger(1.0, &columns, &columns, 1.0);
-                probe.product.axpy(point.signal[k], &columns, 1.0);
-                probe.signal_square += point.signal[k] * point.signal[k];
+                probe.product.axpy(signal, &columns, 1.0);
+                probe.signal_square += signal * signal;
                 probe.rows += 1.0;
                 means.rows += 1.0;
                 means.columns += columns;
-                means.signal += point.signal[k];
+                means.signal += signal;
             }
-        }
+        });
         for (probe, means) in probes.iter_mut().zip(&means) {
             probe.take_out(means);
         }
@@ -185,7 +234,7 @@ impl Sums {
     /// What the offset must change by, us, and the rate, in parts in a million, which is
     /// `rate_ppm` now; `None` if nothing moves.
     fn step(&self, rate_ppm: f64) -> Option<Vector2<f64>> {
-        let prior = 1.0 / (RATE_PRIOR_PPM * RATE_PRIOR_PPM);
+        let prior = RATE_PRIOR;
         let mut square = Matrix2::new(0.0, 0.0, 0.0, prior);
         let mut product = Vector2::new(0.0, -prior * rate_ppm);
         for (own, probe) in self.probes.iter().enumerate() {
@@ -212,28 +261,59 @@ impl Probe {
     /// solved for; over the noise that is left, and times the sensitivity to the probe's `own`
     /// coordinate: a signal that is read too early by t lacks that times its speed times t.
     fn of_time(&self, own: usize) -> Option<(Matrix2<f64>, Vector2<f64>)> {
+        let solved = self.solved(own)?;
+        let across = self.square.view((0, TERMS), (TERMS, 2));
+        let mut square = Matrix2::zeros();
+        let mut product = Vector2::zeros();
+        for i in 0..2 {
+            product[i] = self.product[TERMS + i] - across.column(i).dot(&solved.of_signal);
+            for j in 0..2 {
+                square[(i, j)] = self.square[(TERMS + i, TERMS + j)]
+                    - across.column(i).dot(&solved.of_time.column(j));
+            }
+        }
+        let (eta, variance) = (solved.sensitivity, solved.variance);
+        Some((square * (eta * eta / variance), product * (eta / variance)))
+    }
+
+    /// The terms by which the signal and the columns of time are told.
+    pub(super) fn solved(&self, own: usize) -> Option<Solved> {
         let mut terms = self.square.view((0, 0), (TERMS, TERMS)).into_owned();
         let largest = terms.diagonal().max();
         for k in 0..TERMS {
             terms[(k, k)] += RIDGE * largest + f64::MIN_POSITIVE;
         }
         let terms = terms.cholesky()?;
-        let across = self.square.view((0, TERMS), (TERMS, 2));
-        let solved = terms.solve(&across);
-        let by_terms = terms.solve(&self.product.rows(0, TERMS));
-        let mut square = Matrix2::zeros();
-        let mut product = Vector2::zeros();
-        for i in 0..2 {
-            product[i] = self.product[TERMS + i] - across.column(i).dot(&by_terms);
-            for j in 0..2 {
-                square[(i, j)] =
-                    self.square[(TERMS + i, TERMS + j)] - across.column(i).dot(&solved.column(j));
-            }
-        }
-        let left = self.signal_square - self.product.rows(0, TERMS).dot(&by_terms);
-        let variance = left.max(f64::MIN_POSITIVE) / self.rows.max(1.0);
-        let eta = self.product[own] / self.square[(own, own)];
-        Some((square * (eta * eta / variance), product * (eta / variance)))
+        let of_time = terms.solve(&self.square.view((0, TERMS), (TERMS, 2)));
+        let of_signal = terms.solve(&self.product.rows(0, TERMS));
+        let left = self.signal_square - self.product.rows(0, TERMS).dot(&of_signal);
+        Some(Solved {
+            variance: left.max(f64::MIN_POSITIVE) / self.rows.max(1.0),
+            sensitivity: self.product[own] / self.square[(own, own)],
+            of_signal,
+            of_time,
+        })
+    }
+}
+
+/// Coefficients of the terms of one probe.
+pub(super) struct Solved {
+    of_signal: DVector<f64>,
+    of_time: DMatrix<f64>,
+    sensitivity: f64,
+    /// Of what the terms leave of the signal, codes squared.
+    pub(super) variance: f64,
+}
+
+impl Solved {
+    /// What the terms leave of a row's signal, in codes, and of what a wrong offset, us, and a
+    /// wrong rate, parts in a million, would add to it.
+    pub(super) fn left(&self, row: &Row, own: usize) -> (f64, Vector2<f64>) {
+        let columns = row.columns(own);
+        let terms = columns.rows(0, TERMS);
+        let of_time = [0, 1].map(|k| columns[TERMS + k] - terms.dot(&self.of_time.column(k)));
+        let signal = row.signal[own] - terms.dot(&self.of_signal);
+        (signal, Vector2::from(of_time) * self.sensitivity)
     }
 }
 
@@ -245,21 +325,4 @@ fn values(at: At) -> Option<(i64, [f64; 3])> {
         } => Some((movement, values)),
         At::Outside | At::BetweenMovements | At::TooFar => None,
     }
-}
-
-/// The columns of one row: terms, then the speed and the speed times the time.
-fn columns(x: &[f64; COORDINATES], own: usize, speed: f64, since: f64) -> DVector<f64> {
-    let mut columns = DVector::zeros(COLUMNS);
-    let mut place = COORDINATES;
-    for (i, a) in x.iter().enumerate() {
-        columns[i] = *a;
-        for b in &x[i..] {
-            columns[place] = a * b;
-            columns[place + PAIRS] = a * b * x[own];
-            place += 1;
-        }
-    }
-    columns[TERMS] = speed;
-    columns[TERMS + 1] = speed * since;
-    columns
 }

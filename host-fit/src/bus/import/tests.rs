@@ -115,11 +115,11 @@ fn two_clocks_are_joined_and_the_offset_is_found() {
     // to the offset.
     let found_us = report.offset.us - OFFSET_US;
     assert!((-160.0..160.0).contains(&found_us), "{found_us}");
+    assert!(report.offset.seen.explained > 0.999);
+    let standard_error_us = report.offset.seen.standard_error_us;
     assert!(
-        report
-            .offset
-            .explained
-            .is_some_and(|(share, _)| share > 0.999)
+        (0.01..20.0).contains(&standard_error_us),
+        "{standard_error_us}"
     );
     assert_eq!(report.bus.ticks, TICKS as usize);
     assert!(report.smoothing.max_us < 500.0);

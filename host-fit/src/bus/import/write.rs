@@ -114,21 +114,32 @@ impl Display for ImportReport {
             }
         )?;
         write!(f, "offset of the clocks: {:.1} us", self.offset.us)?;
-        match self.offset.explained {
-            Some((share, ticks)) => writeln!(
+        let seen = &self.offset.seen;
+        match seen.apart_us {
+            None => write!(
                 f,
-                " in the middle of the record; the clock of the bus runs {} by {:.2} parts in a million; both estimated: \
-                 the reference explains {:.2} % of the Hall signals' motion in {ticks} ticks",
+                " in the middle of the record; the clock of the bus runs {} by {:.2} parts in a million; both estimated, with a \
+                 standard error of at most {:.1} us",
                 if self.offset.rate < 0.0 {
                     "slower"
                 } else {
                     "faster"
                 },
                 1e6 * self.offset.rate.abs(),
-                100.0 * share
+                seen.standard_error_us
             )?,
-            None => f.write_str(", as given\n")?,
+            Some(apart_us) => write!(
+                f,
+                ", as given; by the motion it lacks at most {apart_us:.1} us, with a standard error of {:.1} us",
+                seen.standard_error_us
+            )?,
         }
+        writeln!(
+            f,
+            ": the reference explains {:.2} % of the Hall signals' motion in {} ticks",
+            100.0 * seen.explained,
+            seen.ticks
+        )?;
         let join = &self.join;
         writeln!(
             f,
