@@ -9,6 +9,7 @@ mod error;
 mod field;
 mod settings;
 mod warning;
+mod whole;
 
 pub use compensate::fit_compensated;
 pub use cross_validation::{CrossValidation, Split, cross_validate};
@@ -20,9 +21,11 @@ pub use warning::FitWarning;
 
 use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
-use crate::judge::identify::{check_described, check_determined, check_explained, check_motion};
+use crate::judge::identify::{check_described, check_determined, check_motion};
 use crate::judge::lag::{ReferenceLag, reference_lag};
+use crate::judge::left_out::{Block, LeftOut};
 use crate::judge::statistics::PoseError;
+use crate::judge::stretches::Stretch;
 use crate::judge::uncertainty::uncertainty;
 use crate::judge::whole::WholeJudgement;
 use crate::judge::{Decoded, Judgement, Zeros};
@@ -38,6 +41,7 @@ use runtime::calibration::Origin;
 use runtime::parameters::FitRecord;
 use runtime::{Calibration, ModelKind, ParameterSet};
 use std::cell::OnceCell;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Room around the motion of the log in which the calibration still holds: offsets of
@@ -76,6 +80,9 @@ pub struct Fit {
     pub loss: Loss,
     /// Those of them that count less than half, as the loss says: row numbers, ascending.
     pub outliers: Vec<usize>,
+    /// How many these are and where; of an excerpt, those of all rows whose errors are beyond any that
+    /// the fit kept.
+    pub left_out: LeftOut,
     /// All rows, decoded by the target's decoder.
     pub decoded: Decoded,
     /// Over all rows, by the target's decoder; zero deviations refitted where the model has them.
@@ -86,6 +93,8 @@ pub struct Fit {
     pub judgement_solver_zeros: Judgement,
     /// Of a dataset that is an excerpt: errors over all rows of the logs, which the blob records.
     pub whole: Option<WholeJudgement>,
+    /// Of such a dataset: the seconds of the logs whose errors are far above the rest, the worst first.
+    pub stretches: Vec<Stretch>,
     /// What the user should know.
     pub warnings: Vec<FitWarning>,
 }
@@ -115,37 +124,6 @@ impl Fit {
             Some(whole) => &whole.errors,
             None => &self.judgement.errors,
         }
-    }
-
-    /// Judges the fit of an excerpt on all rows.
-    fn judge_whole(
-        &mut self,
-        dataset: &Dataset,
-        stage: &Stage,
-        settings: &FitSettings,
-    ) -> Result<(), FitError> {
-        let Some(whole) = &dataset.whole else {
-            return Ok(());
-        };
-        let judged = WholeJudgement::new(&self.set, whole, stage, Zeros::of_model(self.model));
-        if !settings.force {
-            check_explained(judged.motion, &judged.errors, self.model)?;
-        }
-        let axes = judged.errors.axes;
-        self.set.fit = FitRecord {
-            rows: u32::try_from(whole.rows()).unwrap_or(u32::MAX),
-            rms: axes.map(|a| a.rms as f32),
-            peak: axes.map(|a| a.peak as f32),
-            ..self.set.fit
-        };
-        self.warnings
-            .extend(FitWarning::of_rest(&self.judgement.errors, &judged.errors));
-        // Of all rows and movements, where those of the excerpt were counted.
-        self.warnings.retain(|warning| !warning.is_count());
-        let counts = FitWarning::of_counts(&judged.zeros, judged.undecoded);
-        self.warnings.extend(counts);
-        self.whole = Some(judged);
-        Ok(())
     }
 }
 
@@ -301,6 +279,7 @@ impl<'a> Job<'a> {
             lag: reference_lag(&self.field_rows(&weights), stage, model, parameters),
             loss,
             outliers: outliers(selected, &weights).collect(),
+            left_out: left_out(selected, &weights),
             correlations: uncertainty.correlations,
             judgement_solver_zeros: decoded.judge(dataset, stage, own_zeros),
             solution,
@@ -310,6 +289,7 @@ impl<'a> Job<'a> {
             judgement,
             sound,
             whole: None,
+            stretches: Vec::new(),
         })
     }
 
@@ -363,6 +343,27 @@ impl<'a> Job<'a> {
 fn outliers(selected: &[usize], weights: &[f64]) -> impl Iterator<Item = usize> {
     let light = selected.iter().zip(weights).filter(|(_, w)| **w < HALF);
     light.map(|(&row, _)| row)
+}
+
+/// How many count less than half, and where.
+fn left_out(selected: &[usize], weights: &[f64]) -> LeftOut {
+    let block = |(block, weights): (usize, &[f64])| {
+        let mut of = Block::default();
+        for (number, weight) in (block * Block::ROWS..).zip(weights) {
+            of.take(number, *weight < HALF);
+        }
+        of
+    };
+    let of_drawn = LeftOut::of_blocks(weights.chunks(Block::ROWS).enumerate().map(block));
+    let Range { start, end } = of_drawn.stretch;
+    let stretch = match start < end {
+        true => selected[start]..selected[end - 1] + 1,
+        false => 0..0,
+    };
+    LeftOut {
+        stretch,
+        ..of_drawn
+    }
 }
 
 /// A calibration on all rows, by the target's decoder.

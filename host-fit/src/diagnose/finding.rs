@@ -50,6 +50,10 @@ pub enum Code {
     Saturated,
     /// Rows far outside the noise.
     Outliers,
+    /// Rows that count less than half in a fit.
+    LeftOut,
+    /// Movements whose own zero deviations take their errors.
+    ShortMovements,
     /// Servo periods without a row.
     RowsMissing,
     /// Rows come at uneven times, or at another rate than the servo's.

@@ -11,6 +11,8 @@
 //! | [`logs`] | logs that contradict each other |
 //! | [`change`] | a log whose two parts do |
 //! | [`range`] | poses beyond the range of a calibration |
+//! | `left_out` | rows that a fit left out of account |
+//! | `short_movements` | movements whose zero deviations take their errors |
 //! | [`of_fit`] | what a fit says of itself |
 //! | [`signals`] | what the signals tell by themselves |
 //! | `stretches` | parts of a long log that an excerpt of it may have missed |
@@ -21,9 +23,11 @@ pub mod change;
 mod consequences;
 pub mod finding;
 pub mod hypothesis;
+mod left_out;
 pub mod logs;
 pub mod of_fit;
 pub mod range;
+mod short_movements;
 pub mod signals;
 mod stretches;
 pub mod trials;
@@ -61,6 +65,8 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     let (mut findings, more) = rayon::join(of_models, of_signals);
     findings.extend(more);
     if let Ok(fit) = fitted {
+        findings.extend(left_out::finding(fit, dataset));
+        findings.extend(short_movements::finding(fit, dataset));
         findings.extend(fit.warnings.iter().filter_map(of_fit::of_warning));
         if !is_explained(&findings) {
             findings.extend(of_fit::undescribed(fit, dataset));

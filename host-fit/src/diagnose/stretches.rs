@@ -8,7 +8,7 @@ use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::input::whole::Whole;
 use crate::judge::Decoded;
-use crate::judge::stretches::{Stretch, far_worse};
+use crate::judge::stretches::Stretch;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -25,8 +25,8 @@ pub(super) fn findings(
     stage: &Stage,
     fit: &Fit,
 ) -> Option<Vec<Finding>> {
-    let far = far_worse(&fit.set, whole);
-    let told = told(dataset, whole, &far)?;
+    let far = &fit.stretches;
+    let told = told(dataset, whole, far)?;
     let beside = |stretch: &Stretch| stretch.run.saturating_sub(BESIDE)..=stretch.run + BESIDE;
     let more: BTreeSet<usize> = far.iter().take(ADDED).flat_map(beside).collect();
     let wider = whole.with_more(dataset, &more, stage.servo_period_s);

@@ -181,6 +181,7 @@ impl Job<'_> {
             train_rows: selected.len(),
             loss: self.settings.loss,
             outliers: super::outliers(selected, &field.weights).collect(),
+            left_out: super::left_out(selected, &field.weights),
             correlations: (field
                 .posterior
                 .strongest_correlations(usize::MAX)
@@ -198,6 +199,7 @@ impl Job<'_> {
             sound,
             field: Some(field),
             whole: None,
+            stretches: Vec::new(),
         })
     }
 }

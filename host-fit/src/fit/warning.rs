@@ -167,6 +167,11 @@ impl FitWarning {
         )
     }
 
+    /// Whether it is one of [`of_ranges`](Self::of_ranges).
+    pub(super) const fn is_of_range(&self) -> bool {
+        matches!(self, Self::NarrowLog { .. })
+    }
+
     /// Of the axes that the log moves (X, Y, Rz and Z, Rx, Ry: largest magnitudes, m, rad) far less
     /// than service does.
     pub(super) fn of_ranges(stage: &Stage, planar: [f64; 3], vertical: [f64; 3]) -> Vec<Self> {

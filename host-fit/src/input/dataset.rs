@@ -190,6 +190,16 @@ impl Dataset {
         }
     }
 
+    /// The name of the movement of a row, and its time, us; of an excerpt a row of the whole.
+    pub fn named_place(&self, row: usize) -> Option<(String, i64)> {
+        let (movements, t_us) = match &self.whole {
+            Some(whole) => (whole.movements(), whole.t_us(row)?),
+            None => (&self.movements[..], self.rows.get(row)?.t_us),
+        };
+        let number = movements.partition_point(|movement| movement.rows.end <= row);
+        Some((self.movement_name(movements.get(number)?), t_us))
+    }
+
     /// The movements whose rows `keep` wants, numbered anew; logs and hash stay those of the
     /// whole.
     #[must_use]

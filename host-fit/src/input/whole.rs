@@ -124,6 +124,11 @@ impl Whole {
         &self.logs
     }
 
+    /// Time of a row within its log, us.
+    pub fn t_us(&self, row: usize) -> Option<i64> {
+        (row < self.rows()).then(|| self.samples.at(row).t_us)
+    }
+
     /// A row below [`rows`](Self::rows), without its movement and sequence number.
     fn row(&self, row: usize) -> Row {
         self.scales.row(0, &self.samples.at(row))

@@ -2,6 +2,8 @@
 
 pub mod identify;
 pub mod lag;
+pub mod left_out;
+pub mod of_rows;
 pub mod precision;
 pub mod statistics;
 pub mod stretches;

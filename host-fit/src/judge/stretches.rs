@@ -2,9 +2,7 @@
 //! the log may have missed.
 
 use crate::input::whole::Whole;
-use crate::input::whole::excerpt::Run;
-use rayon::prelude::*;
-use runtime::{AnyDecoder, ParameterSet, PlanarPose};
+use crate::judge::of_rows::Spread;
 
 /// Errors that are far above those of the rest, in terms of their median.
 const FAR: f64 = 3.0;
@@ -25,20 +23,10 @@ pub struct Stretch {
     pub ratio: f64,
 }
 
-/// Errors over some rows of a run: mean and rms about it.
-#[derive(Clone, Copy)]
-struct Spread {
-    mean: [f64; 3],
-    rms: [f64; 3],
-}
-
-/// The stretches of a log that a parameter set describes far worse than the rest, the worst first.
-pub fn far_worse(set: &ParameterSet, whole: &Whole) -> Vec<Stretch> {
-    let decoder = set.decoder();
+/// The stretches of a log whose errors are far above those of the rest, the worst first; `spreads` of
+/// each of [`Whole::runs`].
+pub fn far_worse(spreads: &[Option<Spread>], whole: &Whole) -> Vec<Stretch> {
     let runs = whole.runs();
-    let spreads: Vec<Option<Spread>> = (runs.par_iter())
-        .map(|run| spread(&decoder, whole, run))
-        .collect();
     let usual = [0, 1, 2].map(|axis| {
         let mut rms: Vec<f64> = spreads.iter().flatten().map(|s| s.rms[axis]).collect();
         let middle = rms.len() / 2;
@@ -73,25 +61,4 @@ pub fn far_worse(set: &ParameterSet, whole: &Whole) -> Vec<Stretch> {
     }
     far.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
     far
-}
-
-fn spread(decoder: &AnyDecoder, whole: &Whole, run: &Run) -> Option<Spread> {
-    let (mut rows, mut sums, mut squares) = (0.0, [0.0; 3], [0.0; 3]);
-    for row in whole.looked_at(run) {
-        let Some(pose) = row.frame.decode(decoder, &PlanarPose::ZERO).planar() else {
-            continue;
-        };
-        rows += 1.0;
-        for (axis, pose) in pose.to_array().into_iter().enumerate() {
-            let error = f64::from(pose) - row.reference[axis];
-            sums[axis] += error;
-            squares[axis] += error * error;
-        }
-    }
-    let mean = sums.map(|sum| sum / rows);
-    let variance = |axis: usize| squares[axis] / rows - mean[axis] * mean[axis];
-    (rows > 0.0).then(|| Spread {
-        mean,
-        rms: [0, 1, 2].map(|axis| variance(axis).max(0.0).sqrt()),
-    })
 }

@@ -1,15 +1,11 @@
 //! The errors of a parameter set over all rows of a long log, of which only sums are kept.
 
-use crate::input::dataset::Movement;
 use crate::input::stage::Stage;
-use crate::input::whole::Whole;
+use crate::judge::Zeros;
 use crate::judge::statistics::{AxisError, PoseError};
-use crate::judge::{Zeros, error};
 use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
-use rayon::prelude::*;
-use runtime::{AnyDecoder, ParameterSet};
-use std::ops::Range;
+use runtime::ParameterSet;
 
 /// Errors over all rows of long logs.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +33,7 @@ pub struct LogJudgement {
 
 /// Sums over rows of one movement.
 #[derive(Clone, Copy, Debug)]
-struct Sums {
+pub(super) struct Sums {
     rows: f64,
     undecoded: usize,
     error: [f64; 3],
@@ -48,7 +44,7 @@ struct Sums {
 }
 
 impl Sums {
-    const NONE: Self = Self {
+    pub(super) const NONE: Self = Self {
         rows: 0.0,
         undecoded: 0,
         error: [0.0; 3],
@@ -58,7 +54,7 @@ impl Sums {
         reference_squares: [0.0; 3],
     };
 
-    fn take(&mut self, error: Option<[f64; 3]>, reference: [f64; 3]) {
+    pub(super) fn take(&mut self, error: Option<[f64; 3]>, reference: [f64; 3]) {
         for (sum, x) in self.reference_squares.iter_mut().zip(reference) {
             *sum += x * x;
         }
@@ -75,7 +71,24 @@ impl Sums {
         }
     }
 
-    fn add(&mut self, more: &Self) {
+    /// Rows that were decoded.
+    pub(super) const fn rows(&self) -> f64 {
+        self.rows
+    }
+
+    /// From the lowest to the highest error of each axis, m, m, rad; negative without rows.
+    pub(super) fn widths(&self) -> [f64; 3] {
+        [0, 1, 2].map(|axis| self.high[axis] - self.low[axis])
+    }
+
+    /// Mean of the errors and rms about it, m, m, rad.
+    pub(super) fn mean_and_rms(&self) -> ([f64; 3], [f64; 3]) {
+        let mean = self.error.map(|sum| sum / self.rows);
+        let variance = |axis: usize| self.squares[axis] / self.rows - mean[axis] * mean[axis];
+        (mean, [0, 1, 2].map(|axis| variance(axis).max(0.0).sqrt()))
+    }
+
+    pub(super) fn add(&mut self, more: &Self) {
         self.rows += more.rows;
         self.undecoded += more.undecoded;
         for axis in 0..3 {
@@ -174,7 +187,8 @@ impl<'s> Judge<'s> {
         }
     }
 
-    fn take_movement(&mut self, log: usize, sums: &Sums) {
+    /// Takes a whole movement of a log.
+    pub(super) fn take_movement(&mut self, log: usize, sums: &Sums) {
         let zero = match sums.rows > 0.0 {
             true => {
                 let mean = sums.error.map(|sum| sum / sums.rows);
@@ -222,39 +236,4 @@ impl WholeJudgement {
     pub const fn rows(&self) -> usize {
         self.errors.rows + self.undecoded
     }
-
-    /// Decodes every row of logs that are held.
-    pub fn new(set: &ParameterSet, whole: &Whole, stage: &Stage, zeros: Zeros<'_>) -> Self {
-        let decoder = set.decoder();
-        let pieces: Vec<Vec<(usize, Sums)>> = (whole.samples().ranges().into_par_iter())
-            .map(|rows| pieces(whole, &decoder, rows))
-            .collect();
-        let mut movements = vec![Sums::NONE; whole.movements().len()];
-        for (movement, sums) in pieces.iter().flatten() {
-            movements[*movement].add(sums);
-        }
-        let mut judge = Judge::new(set, stage, whole.logs().len());
-        for (movement, sums) in whole.movements().iter().zip(&movements) {
-            judge.take_movement(movement.log, sums);
-        }
-        judge.judgement(zeros)
-    }
-}
-
-/// The sums of some rows by movement.
-fn pieces(whole: &Whole, decoder: &AnyDecoder, rows: Range<usize>) -> Vec<(usize, Sums)> {
-    let all = whole.movements();
-    let first = all.partition_point(|movement| movement.rows.end <= rows.start);
-    let here =
-        |movement: &Movement| movement.rows.start.max(rows.start)..movement.rows.end.min(rows.end);
-    (all[first..].iter().zip(first..))
-        .take_while(|(movement, _)| movement.rows.start < rows.end)
-        .map(|(movement, number)| {
-            let mut sums = Sums::NONE;
-            for row in whole.rows_of(number, here(movement)) {
-                sums.take(error(decoder, &row.frame, row.reference), row.reference);
-            }
-            (number, sums)
-        })
-        .collect()
 }

@@ -83,7 +83,8 @@ pub struct Report {
     /// The loss that the weights of the rows are by: "cauchy", "huber" or "none", also where the
     /// log lets none act; null for `eval`.
     pub loss: Option<&'static str>,
-    /// Rows that count less than half in the fit, as the loss says; null for `eval`.
+    /// Rows that count less than half in the fit, as the loss says; of a long log those of all rows
+    /// whose errors are beyond any that the fit kept; null for `eval`.
     pub outlier_rows: Option<usize>,
     /// What the standard errors of the parameters are; null for `eval`.
     pub standard_errors: Option<&'static str>,
@@ -247,7 +248,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         project: Some(choice.project),
         seed: Some(choice.seed),
         loss: Some(fit.loss.name()),
-        outlier_rows: Some(fit.outliers.len()),
+        outlier_rows: Some(fit.left_out.rows),
         standard_errors: Some(match fit.field {
             Some(_) => {
                 "posterior: from the curvature under white noise of the probes and a walk of the reference, with the prior"

@@ -190,6 +190,37 @@ fn model_31_forgets_a_stuck_movement_and_jumps() {
 }
 
 #[test]
+fn a_log_of_which_a_tenth_is_left_out_of_account_is_refused_with_the_place() {
+    let bench = Bench::new();
+    let (header, mut rows) = cells(&thinned_log(10, |_| true));
+    for row in &mut rows {
+        if row[0] >= 51 {
+            row[10] = -row[10];
+        }
+    }
+    bench.write("inverted.csv", text(&header, &rows));
+    let fit = "fit inverted.csv --stage stage.toml --out p.bin";
+    let parts = ["of 5700 rows", "from movement 5", "to movement 56"];
+    bench.bad(fit, 4, &parts);
+    assert!(!crate::common::exists(&bench.path("p.bin")));
+    bench.bad("check inverted.csv --stage stage.toml", 4, &parts);
+    bench.good(&format!("{fit} --force"));
+}
+
+#[test]
+fn a_log_of_movements_of_one_row_is_refused() {
+    let bench = Bench::new();
+    let (header, mut rows) = cells(&thinned_log(20, |_| true));
+    let half = rows.len() / 2;
+    for (k, row) in rows.iter_mut().enumerate().skip(half) {
+        row[0] = k as i64;
+    }
+    bench.write("short.csv", text(&header, &rows));
+    let fit = "fit short.csv --stage stage.toml --out p.bin";
+    bench.bad(fit, 4, &["rows are in movements of one or two rows"]);
+}
+
+#[test]
 fn a_search_alone_refuses_a_loss() {
     let bench = Bench::new();
     bench.write("log.csv", thinned_log(200, |_| true));

@@ -3,6 +3,7 @@ use super::*;
 use crate::fit::{FitSettings, ModelChoice, fit};
 use crate::input::log::{LogError, LogReading, LogWarning, ReadOptions, read, read_passing};
 use crate::input::shipped::LOG_GZ;
+use crate::judge::of_rows::{NO_LIMIT, OfRows};
 use crate::judge::statistics::AxisError;
 use crate::judge::whole::{Judge, WholeJudgement};
 use crate::judge::{Zeros, error};
@@ -171,10 +172,8 @@ fn rows_that_pass_are_judged_as_those_that_are_held() {
     })
     .expect("sound");
     for zeros in [Zeros::Refit, Zeros::None] {
-        let (have, want) = (
-            judge.judgement(zeros),
-            WholeJudgement::new(&set, &whole, &stage, zeros),
-        );
+        let have = judge.judgement(zeros);
+        let [want, _] = OfRows::new(&set, &whole, NO_LIMIT).judgements(&set, &whole, &stage, zeros);
         assert_eq!((have.rows(), have.zeros.len()), (57_000, 57));
         assert_eq!(
             (have.rows(), have.zeros.len()),

@@ -4,7 +4,8 @@ use crate::input::dataset::{Dataset, LoggedFrame};
 use crate::input::log::{LogWarning, ReadOptions, read_bytes};
 use crate::input::shipped::{LOG_GZ, STAGE_TOML};
 use crate::input::stage::Stage;
-use crate::judge::whole::{LogJudgement, WholeJudgement};
+use crate::judge::of_rows::{NO_LIMIT, OfRows};
+use crate::judge::whole::LogJudgement;
 use crate::judge::{Decoded, Zeros};
 use crate::problem::parameters::Parameters;
 use crate::problem::synthetic;
@@ -313,7 +314,10 @@ fn a_whole_log_is_judged_as_its_rows_are() {
     for zeros in [Zeros::Refit, Zeros::None] {
         let decoded = Decoded::new(&fit.set, &dataset);
         let want = decoded.judge(&dataset, &stage, zeros).errors;
-        let have = WholeJudgement::new(&fit.set, &whole_of(&dataset), &stage, zeros);
+        let whole = whole_of(&dataset);
+        let rows = OfRows::new(&fit.set, &whole, NO_LIMIT);
+        let [have, kept] = rows.judgements(&fit.set, &whole, &stage, zeros);
+        assert_eq!((rows.left_out.rows, &kept), (0, &have));
         assert_eq!(have.errors.rows, want.rows);
         let rows = dataset.rows.len();
         let errors = have.errors;
@@ -332,18 +336,15 @@ fn a_whole_log_is_judged_as_its_rows_are() {
     }
 }
 
-/// A fit to an excerpt of the shipped log with the Hall codes of some rows changed: by movement and row of
-/// the movement.
+/// A fit to an excerpt of the shipped log with some rows changed: by movement and row of the movement.
 fn fitted_excerpt(
     stage: &Stage,
-    change: impl Fn(usize, usize, &mut [i32; 3]),
+    change: impl Fn(usize, usize, &mut Row),
 ) -> (Dataset, crate::fit::Fit) {
     let (mut dataset, _) = shipped(None);
     for (number, movement) in dataset.movements.iter().enumerate() {
         for (k, row) in dataset.rows[movement.rows.clone()].iter_mut().enumerate() {
-            if let LoggedFrame::Codes(frame) = &mut row.frame {
-                change(number, k, &mut frame.hall);
-            }
+            change(number, k, row);
         }
     }
     let excerpt = whole_of(&dataset).excerpt(12_500, [0; 32]);
@@ -359,9 +360,9 @@ fn a_fit_to_an_excerpt_counts_what_cannot_be_decoded_and_what_is_clipped_in_the_
     narrow.search.delta_m.low = -1.5e-6;
     narrow.search.delta_m.high = 1.5e-6;
     // A code at the end of the range in the last row of each movement.
-    let (excerpt, fit) = fitted_excerpt(&narrow, |_, row, hall| {
-        if row == 999 {
-            hall[0] = 32_767;
+    let (excerpt, fit) = fitted_excerpt(&narrow, |_, k, row| {
+        if let (999, LoggedFrame::Codes(frame)) = (k, &mut row.frame) {
+            frame.hall[0] = 32_767;
         }
     });
     assert!(excerpt.movements.len() < 57);
@@ -374,6 +375,38 @@ fn a_fit_to_an_excerpt_counts_what_cannot_be_decoded_and_what_is_clipped_in_the_
         crate::fit::FitWarning::Undecoded { rows: 57 },
     ];
     assert_eq!(counts, want.each_ref());
+}
+
+#[test]
+fn wild_rows_of_a_long_log_are_counted_and_decide_neither_over_the_fit_nor_over_its_range() {
+    let (_, clean) = fitted_excerpt(&stage(), |_, _, _| {});
+    let (_, fit) = fitted_excerpt(&stage(), |movement, k, row| {
+        if movement % 7 == 3 && k == 500 {
+            row.reference[0] += 5e-3;
+        }
+    });
+    assert_eq!((clean.left_out.rows, fit.left_out.rows), (0, 8));
+    assert_eq!(fit.left_out.of, 57_000);
+    assert!(fit.errors().axes[0].rms > 50e-6, "{:?}", fit.errors());
+    let range = |fit: &crate::fit::Fit| fit.set.constants.calibrated_planar[0];
+    assert!((range(&fit) / range(&clean) - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn the_range_of_all_rows_is_that_of_a_log_held_as_rows() {
+    let (dataset, _) = shipped(None);
+    let (_, fit) = fitted_excerpt(&stage(), |_, _, _| {});
+    let rows = OfRows::new(&fit.set, &whole_of(&dataset), NO_LIMIT);
+    for axis in 0..3 {
+        let farthest = |of: fn(&Row) -> [f64; 3]| {
+            let all = dataset.rows.iter().map(|row| of(row)[axis].abs());
+            all.fold(0.0, f64::max)
+        };
+        let planar = rows.planar[axis] / farthest(|row| row.reference);
+        let vertical = rows.vertical[axis] / farthest(|row| row.vertical);
+        assert!((0.98..=1.0).contains(&planar), "{axis}: {planar}");
+        assert!((0.98..=1.0).contains(&vertical), "{axis}: {vertical}");
+    }
 }
 
 #[test]

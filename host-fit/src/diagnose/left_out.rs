@@ -1,0 +1,56 @@
+//! Rows that a fit left out of account, where they are more than a few.
+
+use super::finding::{Code, Finding, Severity};
+use super::warning;
+use crate::fit::Fit;
+use crate::input::dataset::Dataset;
+
+/// Told from this part of the rows on, ...
+const TOLD_MIN: f64 = 0.02;
+/// ... and refused from this on: what the rest says of the stage is no longer what the log says.
+const REFUSED_MIN: f64 = 0.08;
+
+/// The rows that count less than half in a fit, or lie in a stretch of such rows.
+pub(super) fn finding(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
+    let left_out = &fit.left_out;
+    let share = left_out.share();
+    if share < TOLD_MIN {
+        return None;
+    }
+    let first = left_out.stretch.start;
+    let last = left_out.stretch.end.checked_sub(1)?;
+    let (movement, t_us) = dataset.named_place(first)?;
+    let (last_movement, last_us) = dataset.named_place(last)?;
+    let place = match left_out.stretch_rows {
+        0..=1 => format!("the first in movement {movement} at t_us = {t_us}"),
+        rows => format!(
+            "many of them in a stretch of {rows} rows from movement {movement}, t_us = {t_us}, to movement {last_movement}, \
+             t_us = {last_us}"
+        ),
+    };
+    let is_refused = share >= REFUSED_MIN;
+    let remedy = match is_refused {
+        true => {
+            "too many to take the rest for the stage: find out what happened there, leave these rows out of the log or record \
+             it again (--loss none lets every row count)"
+        }
+        false => "look for a fault there",
+    };
+    Some(Finding {
+        message: format!(
+            "{} of {} rows ({:.1} %) are so far from the fitted model that they count little or nothing in the fit, {place}: {remedy}",
+            left_out.rows,
+            left_out.of,
+            100.0 * left_out.rows as f64 / left_out.of.max(1) as f64,
+        ),
+        severity: match is_refused {
+            true => Severity::Refuse,
+            false => Severity::Warn,
+        },
+        movement: Some(movement),
+        t_us: Some(t_us),
+        value: Some(left_out.rows as f64),
+        unit: Some("rows"),
+        ..warning(Code::LeftOut)
+    })
+}
