@@ -302,33 +302,3 @@ fn a_given_offset_that_the_motion_contradicts_is_refused() {
         assert_eq!(args.out.exists(), is_sound);
     }
 }
-
-#[test]
-fn an_offset_that_a_noisy_reference_leaves_uncertain_is_refused() {
-    let mut noisy = String::new();
-    for (k, line) in reference().lines().enumerate() {
-        let (key, value) = line.rsplit_once(',').expect("cells");
-        let (key, x) = match (k, key.splitn(4, ',').collect::<Vec<_>>().as_slice()) {
-            (1.., [movement, t, x, y]) => {
-                let noise_nm = (k * 7919 % 1201) as f64 * 100.0 - 60_000.0;
-                let x = x.parse::<f64>().expect("a number") + noise_nm;
-                let y = y.parse::<f64>().expect("a number") + noise_nm;
-                (
-                    format!("{movement},{t},{x},{y}"),
-                    value.parse::<f64>().expect("a number") + noise_nm,
-                )
-            }
-            _ => {
-                writeln!(noisy, "{line}").expect("a string");
-                continue;
-            }
-        };
-        writeln!(noisy, "{key},{x}").expect("a string");
-    }
-    let (_folder, args) = files(&candump(|_, _| false), &noisy);
-    let refused = run(&args).expect_err("refused");
-    assert!(
-        matches!(refused, ImportError::UncertainOffset { .. }),
-        "{refused}"
-    );
-}
