@@ -30,6 +30,8 @@ pub struct BusCounts {
     pub bad_lines: usize,
     /// Lines that hold no classic data frame: error frames, CAN FD.
     pub other_lines: usize,
+    /// Frames that were left out because the clock leapt ahead for them alone.
+    pub mistimed: usize,
     /// Whole ticks.
     pub ticks: usize,
     /// Whole ticks that were left out because a code is at a rail of its converter.

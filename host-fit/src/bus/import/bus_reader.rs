@@ -23,7 +23,9 @@ pub(super) struct BusReader<'s> {
     is_read: bool,
     /// Those that the collector and the numbering do not know.
     counts: BusCounts,
-    /// When the frame before was received, us.
+    /// The frame before, with its line: it is taken once the time of the next one confirms its own.
+    waiting: Option<(StampedFrame, usize)>,
+    /// When the frame before that was received, us.
     before_us: u64,
 }
 
@@ -48,6 +50,7 @@ impl<'s> BusReader<'s> {
             numbering: Numbering::new(stage.servo_period_s * 1e6),
             is_read: false,
             counts: BusCounts::default(),
+            waiting: None,
             before_us: 0,
         })
     }
@@ -76,6 +79,9 @@ impl<'s> BusReader<'s> {
         let parsed = match self.lines.next()? {
             None => {
                 self.is_read = true;
+                if let Some((last, line)) = self.waiting.take() {
+                    self.take(&last, line)?;
+                }
                 self.numbering.end();
                 return Ok(());
             }
@@ -120,21 +126,34 @@ impl<'s> BusReader<'s> {
                 });
             }
         };
-        frame.map_or(Ok(()), |stamped| self.take(&stamped))
+        frame.map_or(Ok(()), |stamped| self.confirm(stamped))
     }
 
-    fn take(&mut self, stamped: &StampedFrame) -> Result<(), ImportError> {
-        let back_us = self.before_us.saturating_sub(stamped.time_us);
-        if back_us as f64 > self.stage.servo_period_s * 1e6 {
+    /// Takes the frame before, unless the clock of the recording computer leapt ahead for that frame alone.
+    fn confirm(&mut self, stamped: StampedFrame) -> Result<(), ImportError> {
+        let period_us = self.stage.servo_period_s * 1e6;
+        let back_us = |before_us: u64| before_us.saturating_sub(stamped.time_us) as f64;
+        if back_us(self.before_us) > period_us {
             return Err(ImportError::ClockBackwards {
                 path: self.settings.bus.clone(),
                 line: self.line,
-                back_s: back_us as f64 * 1e-6,
+                back_s: back_us(self.before_us) * 1e-6,
             });
         }
+        match self.waiting.replace((stamped, self.line)) {
+            Some((before, _)) if back_us(before.time_us) > period_us => {
+                self.counts.mistimed += 1;
+                Ok(())
+            }
+            Some((before, line)) => self.take(&before, line),
+            None => Ok(()),
+        }
+    }
+
+    fn take(&mut self, stamped: &StampedFrame, line: usize) -> Result<(), ImportError> {
         self.before_us = stamped.time_us;
         if let Some(mut tick) = self.collector.take(stamped) {
-            tick.is_saturated = self.is_saturated(&tick)?;
+            tick.is_saturated = self.is_saturated(&tick, line)?;
             self.counts.saturated += usize::from(tick.is_saturated);
             self.numbering.take(tick);
         } else if let Some(time) = read_time(&stamped.frame) {
@@ -149,6 +168,7 @@ impl<'s> BusReader<'s> {
         BusCounts {
             bad_lines: self.counts.bad_lines,
             other_lines: self.counts.other_lines,
+            mistimed: self.counts.mistimed,
             saturated: self.counts.saturated,
             unnumbered: numbered.unnumbered,
             ticks_missing: numbered.missing,
@@ -158,7 +178,7 @@ impl<'s> BusReader<'s> {
     }
 
     /// Whether a tick has a code at a rail of its converter.
-    fn is_saturated(&self, tick: &BusTick) -> Result<bool, ImportError> {
+    fn is_saturated(&self, tick: &BusTick, line: usize) -> Result<bool, ImportError> {
         let mut is_sound = true;
         let sensors = [
             (&self.stage.hall, Quantity::HALL, tick.hall),
@@ -166,7 +186,7 @@ impl<'s> BusReader<'s> {
         ];
         for (converter, quantities, codes) in sensors {
             for (quantity, code) in quantities.into_iter().zip(codes) {
-                is_sound &= self.is_inside(converter, quantity, code)?;
+                is_sound &= self.is_inside(converter, quantity, code, line)?;
             }
         }
         Ok(!is_sound)
@@ -178,6 +198,7 @@ impl<'s> BusReader<'s> {
         converter: &CodeScale,
         quantity: Quantity,
         code: i32,
+        line: usize,
     ) -> Result<bool, ImportError> {
         let (code_min, code_max) = (converter.window.low - 1, converter.window.high + 1);
         if (code_min..=code_max).contains(&code) {
@@ -185,7 +206,7 @@ impl<'s> BusReader<'s> {
         }
         Err(ImportError::OutsideConverter {
             path: self.settings.bus.clone(),
-            line: self.line,
+            line,
             sensor: quantity.key(),
             code,
             code_min,

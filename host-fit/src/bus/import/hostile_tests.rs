@@ -139,6 +139,27 @@ fn two_records_in_one_file_are_refused_where_the_second_begins() {
 }
 
 #[test]
+fn a_frame_for_which_the_clock_leapt_ahead_is_left_out_with_its_tick() {
+    let sound = candump(|_, _| false);
+    let (_folder, args) = files(&sound, &reference());
+    let want = run(&args).expect("sound");
+    let leaps = |(number, line): (usize, &str)| {
+        let seconds = |line: &str| line[1..line.find('.')?].parse::<u64>().ok();
+        match (number, seconds(line)) {
+            (2_000, Some(s)) => line.replacen(&s.to_string(), &(s + 1).to_string(), 1) + "\n",
+            _ => format!("{line}\n"),
+        }
+    };
+    let bus: String = sound.lines().enumerate().map(leaps).collect();
+    assert_ne!(bus, sound);
+    let (_folder, args) = files(&bus, &reference());
+    let have = run(&args).expect("survived");
+    assert_eq!(have.bus.mistimed, 1);
+    assert_eq!(have.bus.frames, want.bus.frames - 1);
+    assert!(want.rows - have.rows <= 32, "{} {}", want.rows, have.rows);
+}
+
+#[test]
 fn records_that_have_little_in_common_are_refused() {
     let ticks = |from: u32, to: u32| candump(move |n, _| n < from || n >= to);
     for (bus, offset_us) in [

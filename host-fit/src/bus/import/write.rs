@@ -70,7 +70,7 @@ impl Display for ImportReport {
         let (bus, health) = (&self.bus, &self.bus.health);
         writeln!(
             f,
-            "bus: {} frames, {} whole ticks, {} missing in {} gaps; {} lines left out, {} of another kind; {} ticks left out, \
+            "bus: {} frames, {} whole ticks, {} missing in {} gaps; {} lines left out, {} of another kind, {} received at a time after the next; {} ticks left out, \
              a code at a rail of its converter, {} beside a loss, a restart or an end of the record, which have no certain time",
             bus.frames,
             bus.ticks,
@@ -78,6 +78,7 @@ impl Display for ImportReport {
             bus.gaps,
             bus.bad_lines,
             bus.other_lines,
+            bus.mistimed,
             bus.saturated,
             bus.unnumbered + self.smoothing.untimed as u64
         )?;
