@@ -208,19 +208,6 @@ fn a_log_of_which_a_tenth_is_left_out_of_account_is_refused_with_the_place() {
 }
 
 #[test]
-fn a_log_of_movements_of_one_row_is_refused() {
-    let bench = Bench::new();
-    let (header, mut rows) = cells(&thinned_log(20, |_| true));
-    let half = rows.len() / 2;
-    for (k, row) in rows.iter_mut().enumerate().skip(half) {
-        row[0] = k as i64;
-    }
-    bench.write("short.csv", text(&header, &rows));
-    let fit = "fit short.csv --stage stage.toml --out p.bin";
-    bench.bad(fit, 4, &["rows are in movements of one or two rows"]);
-}
-
-#[test]
 fn a_search_alone_refuses_a_loss() {
     let bench = Bench::new();
     bench.write("log.csv", thinned_log(200, |_| true));
