@@ -146,17 +146,17 @@ fn a_frame_for_which_the_clock_leapt_ahead_is_left_out_with_its_tick() {
     let leaps = |(number, line): (usize, &str)| {
         let seconds = |line: &str| line[1..line.find('.')?].parse::<u64>().ok();
         match (number, seconds(line)) {
-            (2_000, Some(s)) => line.replacen(&s.to_string(), &(s + 1).to_string(), 1) + "\n",
+            (900, Some(s)) => line.replacen(&s.to_string(), &(s + 1).to_string(), 1) + "\n",
             _ => format!("{line}\n"),
         }
     };
     let bus: String = sound.lines().enumerate().map(leaps).collect();
-    assert_ne!(bus, sound);
+    assert!(bus != sound);
     let (_folder, args) = files(&bus, &reference());
     let have = run(&args).expect("survived");
     assert_eq!(have.bus.mistimed, 1);
     assert_eq!(have.bus.frames, want.bus.frames - 1);
-    assert!(want.rows - have.rows <= 32, "{} {}", want.rows, have.rows);
+    assert!(want.join.rows - have.join.rows <= 32, "{}", have.join.rows);
 }
 
 #[test]

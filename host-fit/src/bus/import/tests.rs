@@ -25,7 +25,7 @@ fn pose(t_us: f64) -> [f64; 3] {
 }
 
 /// What the probes read, in codes; probes as designed.
-fn hall(t_us: f64) -> [i32; 3] {
+pub(super) fn hall(t_us: f64) -> [i32; 3] {
     let [x, y, rz] = pose(t_us);
     let s = [y + 0.1975 * rz, y - 0.1975 * rz, x - 0.36 * rz];
     s.map(|s| (s / 6.25e-8).round() as i32)
