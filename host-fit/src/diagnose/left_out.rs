@@ -4,11 +4,14 @@ use super::finding::{Code, Finding, Severity};
 use super::warning;
 use crate::fit::Fit;
 use crate::input::dataset::Dataset;
+use crate::judge::identify::{check_described, check_explained};
 
 /// Told from this part of the rows on, ...
 const TOLD_MIN: f64 = 0.02;
 /// ... and refused from this on: what the rest says of the stage is no longer what the log says.
 const REFUSED_MIN: f64 = 0.08;
+/// Or from this on, where the errors over all rows are beyond what a fit may leave of the motion.
+const UNEXPLAINED_MIN: f64 = 0.05;
 
 /// The rows that count less than half in a fit, or lie in a stretch of such rows.
 pub(super) fn finding(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
@@ -28,7 +31,11 @@ pub(super) fn finding(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
              t_us = {last_us}"
         ),
     };
-    let is_refused = share >= REFUSED_MIN;
+    let is_explained = match &fit.whole {
+        Some(judged) => check_explained(judged.motion, &judged.errors, fit.model),
+        None => check_described(dataset, &fit.judgement.errors, fit.model),
+    };
+    let is_refused = share >= REFUSED_MIN || share >= UNEXPLAINED_MIN && is_explained.is_err();
     let remedy = match is_refused {
         true => {
             "too many to take the rest for the stage: find out what happened there, leave these rows out of the log or record \

@@ -381,7 +381,7 @@ fn a_fit_to_an_excerpt_counts_what_cannot_be_decoded_and_what_is_clipped_in_the_
 fn wild_rows_of_a_long_log_are_counted_and_decide_neither_over_the_fit_nor_over_its_range() {
     let (_, clean) = fitted_excerpt(&stage(), |_, _, _| {});
     let (_, fit) = fitted_excerpt(&stage(), |movement, k, row| {
-        if movement % 7 == 3 && k == 500 {
+        if movement % 7 == 3 && k == 700 {
             row.reference[0] += 5e-3;
         }
     });
