@@ -1,20 +1,28 @@
 //! Rows that a fit left out of account, where they are more than a few.
 
 use super::finding::{Code, Finding, Severity};
+use super::signals::period_s;
 use super::warning;
 use crate::fit::Fit;
 use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
 use crate::judge::identify::{check_described, check_explained};
 
 /// Told from this part of the rows on, ...
 const TOLD_MIN: f64 = 0.02;
 /// ... and refused from this on: what the rest says of the stage is no longer what the log says.
 const REFUSED_MIN: f64 = 0.08;
-/// Or from this on, where the errors over all rows are beyond what a fit may leave of the motion.
+/// Or from this on, where the errors over all rows are beyond what a fit may leave of the motion and no
+/// channel is found that stood still for as long.
 const UNEXPLAINED_MIN: f64 = 0.05;
 
 /// The rows that count less than half in a fit, or lie in a stretch of such rows.
-pub(super) fn finding(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
+pub(super) fn finding(
+    fit: &Fit,
+    dataset: &Dataset,
+    stage: &Stage,
+    others: &[Finding],
+) -> Option<Finding> {
     let left_out = &fit.left_out;
     let share = left_out.share();
     if share < TOLD_MIN {
@@ -35,7 +43,13 @@ pub(super) fn finding(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
         Some(judged) => check_explained(judged.motion, &judged.errors, fit.model),
         None => check_described(dataset, &fit.judgement.errors, fit.model),
     };
-    let is_refused = share >= REFUSED_MIN || share >= UNEXPLAINED_MIN && is_explained.is_err();
+    let stuck_s = others.iter().filter(|found| found.code == Code::Stuck);
+    let stuck_s = stuck_s.filter_map(|found| found.value).fold(0.0, f64::max);
+    let segments: Vec<_> = dataset.movements.iter().map(|m| m.rows.clone()).collect();
+    let period_s = period_s(&dataset.rows, &segments, stage.servo_period_s);
+    let is_named = 2.0 * stuck_s > left_out.rows as f64 * period_s;
+    let is_refused =
+        share >= REFUSED_MIN || share >= UNEXPLAINED_MIN && is_explained.is_err() && !is_named;
     let remedy = match is_refused {
         true => {
             "too many to take the rest for the stage: find out what happened there, leave these rows out of the log or record \

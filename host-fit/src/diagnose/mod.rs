@@ -65,7 +65,7 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     let (mut findings, more) = rayon::join(of_models, of_signals);
     findings.extend(more);
     if let Ok(fit) = fitted {
-        findings.extend(left_out::finding(fit, dataset));
+        findings.extend(left_out::finding(fit, dataset, stage, &findings));
         findings.extend(short_movements::finding(fit, dataset));
         findings.extend(fit.warnings.iter().filter_map(of_fit::of_warning));
         if !is_explained(&findings) {

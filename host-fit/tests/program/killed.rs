@@ -89,8 +89,11 @@ fn records() -> (String, String) {
     let mut reference = "movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm\n".to_owned();
     for tick in 0..750 {
         let time_us = 2_000 * tick;
+        let angle = f64::from(tick) / 40.0;
+        let (x_nm, y_nm) = (2e5 * angle.sin(), 2e5 * angle.cos());
         let frame = RawFrame {
-            hall: [100, 200, 300].map(|code| code + tick as i32),
+            // 62.5 nm a code.
+            hall: [y_nm, y_nm, x_nm].map(|nm| (nm / 62.5).round() as i32),
             capacitive: [100, 101, 99],
             sequence: tick,
             time_us,
@@ -103,7 +106,7 @@ fn records() -> (String, String) {
             };
             writeln!(bus, "{line}").expect("a string");
         }
-        writeln!(reference, "0,{time_us},{tick},5,6").expect("a string");
+        writeln!(reference, "0,{time_us},{x_nm:.1},{y_nm:.1},{y_nm:.1}").expect("a string");
     }
     (bus, reference)
 }
