@@ -362,3 +362,31 @@ fn an_error_of_a_trusted_input_is_not_seen_and_costs_what_is_told() {
         }
     }
 }
+
+#[test]
+fn movements_that_are_too_short_to_tell_an_error_are_told_and_refused() {
+    let bench = Bench::new();
+    let log = thinned_log(10, |_| true);
+    for (rows, told) in [(2, Some(4)), (5, Some(0)), (20, None)] {
+        let mut short = String::new();
+        for (k, line) in log.lines().enumerate() {
+            let cells: Vec<&str> = line.splitn(3, ',').collect();
+            short += &match k.checked_sub(1) {
+                None => format!("{line}\n"),
+                Some(k) => format!("{},{},{}\n", k / rows, 2_000 * k, cells[2]),
+            };
+        }
+        bench.write("log.csv", short);
+        let fit = bench.run("fit log.csv --stage stage.toml --out p.bin --json fit.json");
+        let found = bench.json("fit.json");
+        let codes = found["findings"].as_array().expect("a list");
+        let is_told = codes.iter().any(|found| found["code"] == "short_movements");
+        assert_eq!(is_told, told.is_some(), "{rows}: {}", stderr(&fit));
+        assert_eq!(
+            fit.status.code(),
+            told.or(Some(0)),
+            "{rows}: {}",
+            stderr(&fit)
+        );
+    }
+}

@@ -109,13 +109,7 @@ impl Gathered {
         let whole = Arc::new(Whole::new(scales, samples, movements, logs));
         let most = (whole.rows() / EXCERPT_OF).clamp(rows_max / EXCERPT_PART, rows_max);
         let mut dataset = whole.excerpt(most, sha256);
-        for log in 0..dataset.logs.len() {
-            let of_log = dataset
-                .movements
-                .iter()
-                .filter(|movement| movement.log == log);
-            sequence::number(&mut dataset.rows, of_log, servo_period_s);
-        }
+        sequence::number_logs(&mut dataset, servo_period_s);
         warnings.push(LogWarning::Excerpt {
             rows: whole.rows(),
             taken: dataset.rows.len(),

@@ -1,7 +1,7 @@
 //! Numbers the servo periods of a log by time, so that a gap shows as frames missed.
 
 use super::warning::LogWarning;
-use crate::input::dataset::{Movement, Row};
+use crate::input::dataset::{Dataset, Movement, Row};
 use std::path::Path;
 
 /// Largest relative difference of the log's period from the servo's that passes in silence.
@@ -62,8 +62,16 @@ impl Numbering {
     }
 }
 
+/// Numbers the rows of each log of a dataset.
+pub(in crate::input) fn number_logs(dataset: &mut Dataset, servo_period_s: f64) {
+    for log in 0..dataset.logs.len() {
+        let of_log = dataset.movements.iter().filter(|m| m.log == log);
+        number(&mut dataset.rows, of_log, servo_period_s);
+    }
+}
+
 /// Numbers the rows of these movements of one log.
-pub(in crate::input) fn number<'m>(
+fn number<'m>(
     rows: &mut [Row],
     movements: impl Iterator<Item = &'m Movement> + Clone,
     servo_period_s: f64,

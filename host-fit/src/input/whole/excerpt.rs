@@ -94,13 +94,7 @@ impl Whole {
             before_is_more = is_more;
         }
         let mut dataset = self.dataset(joined, excerpt.sha256);
-        for log in 0..dataset.logs.len() {
-            let of_log = dataset
-                .movements
-                .iter()
-                .filter(|movement| movement.log == log);
-            sequence::number(&mut dataset.rows, of_log, servo_period_s);
-        }
+        sequence::number_logs(&mut dataset, servo_period_s);
         dataset
     }
 
