@@ -5,13 +5,14 @@
 //! KILLS=1000 cargo test -p host-fit --test program -- killed --nocapture
 //! ```
 
-use crate::common::{Bench, stderr, thinned_log};
+use crate::common::{Bench, shipped_log, stderr, thinned_log};
 use hal_adapters::can::{BusFrame, Layout, sensor};
 use hal_adapters::candump::LogLine;
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, SeedableRng};
 use runtime::RawFrame;
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
@@ -265,36 +266,31 @@ fn a_full_disk_leaves_every_output_of_a_command_as_it_was() {
 }
 
 #[test]
-fn of_two_writers_of_an_output_one_wins_whole() {
-    let bench = bench();
-    let fit = |serial: &str| {
-        let arguments = format!("fit log.csv --stage stage.toml --out o.bin --serial {serial}");
-        bench.command(&arguments.split(' ').collect::<Vec<_>>())
-    };
-    let whole = ["one", "two"].map(|serial| {
-        assert!(
-            fit(serial)
-                .output()
-                .expect("the program runs")
-                .status
-                .success()
-        );
-        bench.read("o.bin")
+fn of_two_writers_of_an_output_each_writes_it_whole() {
+    let bench = Bench::new();
+    let short = thinned_log(5, |_| true);
+    bench.write("short.csv", &short);
+    bench.write("long.csv", shipped_log());
+    bench.good("fit short.csv --stage stage.toml --out p.bin");
+    let [short_whole, long_whole] = ["short", "long"].map(|log| {
+        bench.good(&format!(
+            "decode p.bin {log}.csv --stage stage.toml --out whole.csv"
+        ));
+        bench.read("whole.csv")
     });
-    let mut won = [0, 0];
-    for _ in 0..10 {
-        let start = |serial| {
-            let mut command = fit(serial);
-            command.stdout(Stdio::null()).stderr(Stdio::null());
-            command.spawn().expect("the program runs")
-        };
-        for mut running in ["one", "two"].map(start) {
-            assert!(running.wait().expect("it ends").success());
-        }
-        let found = bench.read("o.bin");
-        let winner = whole.iter().position(|whole| *whole == found);
-        won[winner.expect("one of the two, whole")] += 1;
-        assert_eq!(left_behind(&bench), 0);
-    }
-    println!("RESULT two_writers won={won:?} broken=0");
+    let stalled = "decode p.bin - --stage stage.toml --out o.csv";
+    let mut command = bench.command(&stalled.split(' ').collect::<Vec<_>>());
+    command.stdin(Stdio::piped()).stdout(Stdio::null());
+    let mut stalled = command.spawn().expect("the program runs");
+    let mut pipe = stalled.stdin.take().expect("a pipe");
+    let (begin, rest) = short.as_bytes().split_at(short.len() / 2);
+    // More than a pipe holds: it has begun, and has its output open.
+    pipe.write_all(begin).expect("read");
+    bench.good("decode p.bin long.csv --stage stage.toml --out o.csv");
+    assert!(bench.read("o.csv") == long_whole);
+    pipe.write_all(rest).expect("read");
+    drop(pipe);
+    assert!(stalled.wait().expect("it ends").success());
+    assert!(bench.read("o.csv") == short_whole);
+    assert!(bench.holds_only(&["short.csv", "long.csv", "p.bin", "whole.csv", "o.csv"]));
 }
