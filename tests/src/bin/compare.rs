@@ -44,10 +44,10 @@ enum Command {
         #[arg(long)]
         out: PathBuf,
         /// Ticks of uniform random codes, with Model (31) and again with the field model.
-        #[arg(long, default_value_t = 400_000)]
+        #[arg(long, default_value_t = 100_000)]
         codes: usize,
         /// Ticks with random parameters, with either model; 0 leaves out the predicted poses, too.
-        #[arg(long, default_value_t = 80_000)]
+        #[arg(long, default_value_t = 32_000)]
         parameters: usize,
         /// Ticks for which what is invalid is held.
         #[arg(long, default_value_t = 3)]
