@@ -3,6 +3,7 @@
 //! a sector raises them. While the flash is busy the core stands, because the program lies in
 //! it. A power cut in an operation leaves random bits between what was and what was to be.
 
+use firmware::store::flash_model::{Cut, Words};
 use std::collections::VecDeque;
 
 /// Start of sector 1.
@@ -31,22 +32,6 @@ const PROTECTED: u32 = 1 << 4;
 const PARALLELISM: u32 = 1 << 6;
 const SEQUENCE: u32 = 1 << 7;
 const BUSY: u32 = 1 << 16;
-
-/// Where in an operation the power fails.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cut {
-    /// Nothing is done.
-    Before,
-    /// Some of the bits have changed.
-    Inside,
-    /// All is done, and the program does not see it.
-    After,
-}
-
-impl Cut {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Before, Self::Inside, Self::After];
-}
 
 /// A cut of the power.
 #[derive(Clone, Copy, Debug)]
@@ -209,15 +194,12 @@ impl FlashModel {
             self.power_lost = true;
             self.counted = self.operations;
         }
-        let mut chance = cut.map_or(0, |cut| cut.seed | 1);
+        let mut chance = Words(cut.map_or(0, |cut| cut.seed.into()));
         for k in offset..offset + bytes {
             let (old, new) = (self.bytes[k], wanted(self.bytes[k], k - offset));
-            chance ^= chance << 13;
-            chance ^= chance >> 17;
-            chance ^= chance << 5;
             let done = match cut.map(|cut| cut.place) {
                 Some(Cut::Before) => 0,
-                Some(Cut::Inside) => (chance >> 8) as u8,
+                Some(Cut::Inside) => chance.draw() as u8,
                 Some(Cut::After) | None => 0xff,
             };
             self.bytes[k] = old & !done | new & done;

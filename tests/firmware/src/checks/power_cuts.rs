@@ -7,8 +7,9 @@ use super::update::{large, plan, running, talk, update};
 use super::{Failure, Outcome, expect};
 use crate::adc_model::Part;
 use crate::bench::Bench;
-use crate::flash_model::{Cut, PowerCut};
+use crate::flash_model::PowerCut;
 use crate::machine::Machine;
+use firmware::store::flash_model::Cut;
 use host_fit::bus::update::Updater;
 
 const PART: Part = Part::Ads131m08;
