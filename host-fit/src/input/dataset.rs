@@ -113,6 +113,7 @@ impl Scales {
     }
 
     /// The row of a sample in a movement of a dataset; its sequence number is still 0.
+    #[inline]
     pub fn row(&self, movement: usize, sample: &Sample) -> Row {
         let vertical = match sample.vertical {
             SampledVertical::Codes(capacitive) => {

@@ -51,6 +51,16 @@ pub(super) struct LogSignals<'a> {
 
 impl<'a> LogSignals<'a> {
     pub(super) fn new(dataset: &'a Dataset, stage: &Stage, log: usize) -> Self {
+        Self::with_period(dataset, stage, log, None)
+    }
+
+    /// The same where the time between rows may be known, s.
+    pub(super) fn with_period(
+        dataset: &'a Dataset,
+        stage: &Stage,
+        log: usize,
+        known_s: Option<f64>,
+    ) -> Self {
         let range = dataset.logs[log].rows.clone();
         let rows = &dataset.rows[range.clone()];
         let movements: Vec<&Movement> = (dataset.movements.iter())
@@ -59,7 +69,7 @@ impl<'a> LogSignals<'a> {
         let segments: Vec<Range<usize>> = (movements.iter())
             .map(|movement| movement.rows.start - range.start..movement.rows.end - range.start)
             .collect();
-        let period_s = period_s(rows, &segments, stage.servo_period_s);
+        let period_s = known_s.unwrap_or_else(|| period_s(rows, &segments, stage.servo_period_s));
         Self {
             channels: channels(rows, stage),
             usable: vec![true; rows.len()],

@@ -12,80 +12,58 @@ const RUN_MIN: usize = 8;
 const EDGE_CODES: f64 = 10.0;
 const EDGE_ROWS: usize = 10;
 
-/// Flat tops, and the range of each channel, m.
-#[derive(Clone, Debug, Default)]
-pub(super) struct FlatTops {
-    tops: Vec<Run>,
-    ranges: Vec<[f64; 2]>,
+/// Flat tops at the ends of the range of each channel, m; their rows are left out.
+pub(super) fn flat_tops(log: &mut LogSignals, ranges: &[[f64; 2]]) -> Vec<Run> {
+    let mut tops = Vec::new();
+    let mut left_out = Vec::new();
+    for ((index, channel), &range) in log.channels.iter().enumerate().zip(ranges) {
+        if channel.m_per_code == 0.0 {
+            continue;
+        }
+        let of_channel = of_channel(log, channel, range);
+        tops.extend(of_channel.iter().map(|top| Run {
+            channel: index,
+            first: log.at(top.start),
+            len: top.len(),
+            value: channel.values[top.start],
+            all_still: false,
+        }));
+        left_out.extend(of_channel);
+    }
+    for row in left_out.into_iter().flatten() {
+        log.usable[row] = false;
+    }
+    tops
 }
 
-impl FlatTops {
-    /// Looks for them, and leaves their rows out.
-    pub(super) fn of(log: &mut LogSignals) -> Self {
-        let mut flat = Self::default();
-        let mut left_out = Vec::new();
-        for (index, channel) in log.channels.iter().enumerate() {
-            let range = range(&channel.values);
-            flat.ranges.push(range);
-            if channel.m_per_code == 0.0 {
-                continue;
-            }
-            let tops = flat_tops(log, channel, range);
-            flat.tops.extend(tops.iter().map(|top| Run {
-                channel: index,
-                first: log.at(top.start),
-                len: top.len(),
-                value: channel.values[top.start],
-                all_still: false,
-            }));
-            left_out.extend(tops);
-        }
-        for row in left_out.into_iter().flatten() {
-            log.usable[row] = false;
-        }
-        flat
-    }
-
-    /// With those of rows that follow.
-    pub(super) fn and(mut self, more: Self) -> Self {
-        self.tops.extend(more.tops);
-        for (range, [low, high]) in self.ranges.iter_mut().zip(more.ranges) {
-            *range = [range[0].min(low), range[1].max(high)];
-        }
-        self
-    }
-
-    /// Names them by channel.
-    pub(super) fn findings(self, told: &Told, channels: &[Channel]) -> Vec<Finding> {
-        let Self { tops, ranges } = self;
-        let is_top = |top: &Run| ranges[top.channel].contains(&top.value);
-        let tops = Run::joined(tops.into_iter().filter(is_top).collect());
-        let of = |(index, channel): (usize, &Channel)| {
-            let tops: Vec<&Run> = tops.iter().filter(|top| top.channel == index).collect();
-            let rows: usize = tops.iter().map(|top| top.len).sum();
-            let longest = tops.iter().max_by_key(|top| top.len)?;
-            let codes = longest.value / channel.m_per_code;
-            let starts: Vec<Place> = tops.iter().map(|top| top.first).collect();
-            let message = format!(
-                "{} is flat at code {codes:.0} for {rows} rows, at most {} together ({}): its converter or amplifier is at \
-                 the end of its range; lower the gain or the motion, and leave these rows out",
-                channel.name,
-                longest.len,
-                told.places(&starts),
-            );
-            Some(Finding {
-                channel: Some(channel.name.to_owned()),
-                value: Some(rows as f64),
-                unit: Some("rows"),
-                ..told.warning_at(Code::Saturated, &longest.first, message)
-            })
-        };
-        channels.iter().enumerate().filter_map(of).collect()
-    }
+/// Names flat tops by channel.
+pub(super) fn of_flat_tops(told: &Told, channels: &[Channel], tops: Vec<Run>) -> Vec<Finding> {
+    let tops = Run::joined(tops);
+    let of = |(index, channel): (usize, &Channel)| {
+        let tops: Vec<&Run> = tops.iter().filter(|top| top.channel == index).collect();
+        let rows: usize = tops.iter().map(|top| top.len).sum();
+        let longest = tops.iter().max_by_key(|top| top.len)?;
+        let codes = longest.value / channel.m_per_code;
+        let starts: Vec<Place> = tops.iter().map(|top| top.first).collect();
+        let message = format!(
+            "{} is flat at code {codes:.0} for {rows} rows, at most {} together ({}): its converter or amplifier is at \
+             the end of its range; lower the gain or the motion, and leave these rows out",
+            channel.name,
+            longest.len,
+            told.places(&starts),
+        );
+        Some(Finding {
+            channel: Some(channel.name.to_owned()),
+            value: Some(rows as f64),
+            unit: Some("rows"),
+            ..told.warning_at(Code::Saturated, &longest.first, message)
+        })
+    };
+    channels.iter().enumerate().filter_map(of).collect()
 }
 
 /// Lowest and highest value.
-fn range(values: &[f64]) -> [f64; 2] {
+pub(super) fn range(values: &[f64]) -> [f64; 2] {
     values
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &x| {
@@ -93,7 +71,7 @@ fn range(values: &[f64]) -> [f64; 2] {
         })
 }
 
-fn flat_tops(log: &LogSignals, channel: &Channel, [low, high]: [f64; 2]) -> Vec<Range<usize>> {
+fn of_channel(log: &LogSignals, channel: &Channel, [low, high]: [f64; 2]) -> Vec<Range<usize>> {
     let values = &channel.values;
     let mut tops = Vec::new();
     for segment in &log.segments {

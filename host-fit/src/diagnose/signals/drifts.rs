@@ -3,6 +3,7 @@
 use super::channels::{BEAMS, HALL, LogSignals};
 use super::residual::Residuals;
 use crate::diagnose::finding::{Code, Finding};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Slope in standard errors that is no chance.
@@ -53,29 +54,28 @@ pub(super) fn findings(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> 
         log.time_s[blocks[blocks.len() - 1].end - 1],
     );
     let length_s = end_s - start_s;
-    let mut findings = Vec::new();
-    let mut drifts = Vec::new();
-    for k in 0..3 {
-        let time = residuals.unexplained(log, k, &log.time_s);
+    let slopes = |k: usize| {
         let signal = log.channels[k].values.iter().zip(&log.time_s);
         let growing: Vec<f64> = signal
             .map(|(s, t)| s * ((t - start_s) / length_s - 0.5))
             .collect();
-        let growing = residuals.unexplained(log, k, &growing);
-        // Least squares, so that what is left without the drifts is the noise.
-        let values = &residuals.unexplained(log, k, &residuals.values[k]);
+        // The values by least squares, so that what is left without the drifts is the noise.
+        let [time, growing, values] =
+            residuals.unexplained(log, k, [&log.time_s, &growing, &residuals.values[k]]);
         let (of_time, of_growing) = (less(&time, &growing), less(&growing, &time));
-        let left = less(&less(values, &growing), &of_time);
+        let left = less(&less(&values, &growing), &of_time);
         let slope = |over: &[f64]| {
             let noise = Noise::new(log, &left, over, residuals.noise_m[k], &blocks);
-            noise.slope(log, values, over, &left, &blocks)
+            noise.slope(log, &values, over, &left, &blocks)
         };
-        let gain = slope(&of_growing);
-        if gain.is_clear(GAIN_MIN) {
-            findings.push(of_gain(log, k, gain.value));
-        }
-        drifts.push(slope(&of_time));
-    }
+        (slope(&of_growing), slope(&of_time))
+    };
+    let (gains, drifts): (Vec<Slope>, Vec<Slope>) = (0..3).into_par_iter().map(slopes).unzip();
+    let clear = gains
+        .iter()
+        .enumerate()
+        .filter(|(_, gain)| gain.is_clear(GAIN_MIN));
+    let mut findings: Vec<Finding> = clear.map(|(k, gain)| of_gain(log, k, gain.value)).collect();
     let least = DRIFT_MIN_M / length_s;
     let trends = (0..3).map(|k| trend(log, residuals, k)).collect();
     for slopes in [Some(drifts), trends].into_iter().flatten() {

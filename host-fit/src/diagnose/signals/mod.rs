@@ -137,7 +137,9 @@ fn of_residuals(signals: &mut LogSignals, stage: &Stage) -> Vec<Finding> {
             }
         }
     }
-    findings.extend(hum::hum(signals, &residuals));
-    findings.extend(drifts::findings(signals, &residuals));
+    let hum = || hum::hum(signals, &residuals);
+    let (hum, drifts) = rayon::join(hum, || drifts::findings(signals, &residuals));
+    findings.extend(hum);
+    findings.extend(drifts);
     findings
 }

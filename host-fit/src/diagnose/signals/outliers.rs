@@ -4,6 +4,7 @@ use super::blame::blame;
 use super::channels::{LogSignals, median, robust_deviation};
 use super::residual::Residuals;
 use crate::diagnose::finding::{Code, Finding};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -19,11 +20,14 @@ pub(super) const JUMP_MIN_M: f64 = 0.1e-6;
 
 /// Names rows far outside the noise, by channel, and leaves them out.
 pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
-    let usual_m: [f64; 3] = std::array::from_fn(|k| {
-        let off = |(segment, row)| off_sides_m(log, &residuals.values[k], segment, row);
-        let sample = rows(log).step_by(7).filter_map(off);
-        robust_deviation(sample).max(residuals.noise_m[k])
+    let signals: &LogSignals = log;
+    let usual_m = (residuals.values.par_iter().zip(residuals.noise_m)).map(|(values, noise_m)| {
+        let off = |(segment, row)| off_sides_m(signals, values, segment, row);
+        let sample = rows(signals).step_by(7).filter_map(off);
+        robust_deviation(sample).max(noise_m)
     });
+    let usual_m: Vec<f64> = usual_m.collect();
+    let usual_m = [0, 1, 2].map(|k| usual_m[k]);
     let mut found: Vec<(usize, [f64; 3])> = Vec::new();
     for (segment, row) in rows(log) {
         // Cheap first: most rows are near their neighbours.
@@ -45,6 +49,9 @@ pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
         if (0..3).any(|k| off_m[k].abs() > OUTLIER_MIN * usual_m[k]) {
             found.push((row, off_m));
         }
+    }
+    if found.is_empty() {
+        return Vec::new();
     }
     for (row, _) in &found {
         log.usable[*row] = false;

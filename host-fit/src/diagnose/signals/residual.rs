@@ -56,6 +56,8 @@ pub(super) struct Residuals {
     stride: usize,
     /// Of X, Y, Rz by row, per s.
     speeds: Vec<[f64; 3]>,
+    /// White noise of the signals, mm.
+    signal_noise_mm: [f64; 3],
     /// By probe and row, m at the designed scale; 0 in rows that are left out.
     pub(super) values: [Vec<f64>; 3],
     /// White noise, m.
@@ -69,6 +71,8 @@ impl Residuals {
             fits: Vec::new(),
             stride: log.len().div_ceil(ROWS_MAX),
             speeds: speeds(log),
+            signal_noise_mm: [0, 1, 2]
+                .map(|k| white_noise(log, &log.channels[k].values, 1e3).max(NOISE_MIN_MM)),
             values: Default::default(),
             noise_m: [0.0; 3],
         };
@@ -166,7 +170,7 @@ impl Residuals {
         lag_s: &mut f64,
         half_weight: f64,
     ) -> Option<ProbeFit> {
-        let rows: Vec<Vec<Row>> = (log.segments.iter())
+        let rows: Vec<Vec<Row>> = (log.segments.par_iter())
             .map(|segment| {
                 let of = |row| self.row(log, (k, &probe), *lag_s, row);
                 self.used(log, segment).map(of).collect()
@@ -190,7 +194,7 @@ impl Residuals {
             all.flat_map(|(rows, &middle)| rows.iter().map(move |row| off(row, middle))),
         )
         .max(NOISE_MIN_MM);
-        let noise_mm = white_noise(log, &log.channels[k].values, 1e3).max(NOISE_MIN_MM);
+        let noise_mm = self.signal_noise_mm[k];
 
         let mut gram = [[0.0; COLUMNS]; COLUMNS];
         let mut right = [0.0; COLUMNS];
@@ -269,43 +273,57 @@ impl Residuals {
         values
     }
 
-    /// What the model does not explain of a change of the signal of a probe, by row, in the unit of
-    /// the change.
-    pub(super) fn unexplained(&self, log: &LogSignals, k: usize, change: &[f64]) -> Vec<f64> {
+    /// What the model does not explain of some changes of the signal of a probe, by row, each in the
+    /// unit of the change.
+    pub(super) fn unexplained<const N: usize>(
+        &self,
+        log: &LogSignals,
+        k: usize,
+        changes: [&[f64]; N],
+    ) -> [Vec<f64>; N] {
         let fit = &self.fits[k];
-        let mut right = [0.0; COLUMNS];
+        let of = |row| self.row(log, (k, &fit.probe), fit.lag_s, row);
+        let mut right = [[0.0; COLUMNS]; N];
         let mut shares = Vec::with_capacity(log.segments.len());
         for segment in &log.segments {
-            let of = |row| self.row(log, (k, &fit.probe), fit.lag_s, row);
             let mut of_columns = [0.0; COLUMNS];
-            let (mut of_change, mut of_offset) = (0.0, f64::MIN_POSITIVE);
+            let (mut of_changes, mut of_offset) = ([0.0; N], f64::MIN_POSITIVE);
             for row in self.used(log, segment) {
                 let here = of(row);
-                for (i, f) in here.columns.iter().enumerate() {
-                    of_columns[i] += here.by_offset * f;
-                    right[i] += f * change[row];
+                (of_columns.iter_mut().zip(&here.columns))
+                    .for_each(|(sum, f)| *sum += here.by_offset * f);
+                for (n, change) in changes.iter().enumerate() {
+                    (right[n].iter_mut().zip(&here.columns))
+                        .for_each(|(sum, f)| *sum += f * change[row]);
+                    of_changes[n] += here.by_offset * change[row];
                 }
-                of_change += here.by_offset * change[row];
                 of_offset += here.by_offset * here.by_offset;
             }
-            (0..COLUMNS).for_each(|i| right[i] -= of_columns[i] * of_change / of_offset);
-            shares.push((of_columns.map(|sum| sum / of_offset), of_change / of_offset));
+            for (right, of_change) in right.iter_mut().zip(of_changes) {
+                (0..COLUMNS).for_each(|i| right[i] -= of_columns[i] * of_change / of_offset);
+            }
+            let offsets = of_changes.map(|of_change| of_change / of_offset);
+            shares.push((of_columns.map(|sum| sum / of_offset), offsets));
         }
-        let scaled = DVector::from_fn(COLUMNS, |i, _| right[i] * fit.scales[i]);
-        let solved = fit.factor.solve(&scaled);
-        let slopes: [f64; COLUMNS] = std::array::from_fn(|i| solved[i] * fit.scales[i]);
-        let mut out = vec![0.0; log.len()];
-        for (segment, (share, offset)) in log.segments.iter().zip(&shares) {
+        let slopes = right.map(|right| -> [f64; COLUMNS] {
+            let scaled = DVector::from_fn(COLUMNS, |i, _| right[i] * fit.scales[i]);
+            let solved = fit.factor.solve(&scaled);
+            std::array::from_fn(|i| solved[i] * fit.scales[i])
+        });
+        let mut left = [(); N].map(|()| vec![0.0; log.len()]);
+        for (segment, (share, offsets)) in log.segments.iter().zip(&shares) {
             for row in segment.clone().filter(|&row| log.usable[row]) {
-                let here = self.row(log, (k, &fit.probe), fit.lag_s, row);
-                let mut explained = offset * here.by_offset;
-                for i in 0..COLUMNS {
-                    explained += slopes[i] * (here.columns[i] - share[i] * here.by_offset);
+                let here = of(row);
+                let own: [f64; COLUMNS] =
+                    std::array::from_fn(|i| here.columns[i] - share[i] * here.by_offset);
+                for n in 0..N {
+                    let mut explained = offsets[n] * here.by_offset;
+                    (0..COLUMNS).for_each(|i| explained += slopes[n][i] * own[i]);
+                    left[n][row] = changes[n][row] - explained;
                 }
-                out[row] = change[row] - explained;
             }
         }
-        out
+        left
     }
 
     /// Offsets of a probe by segment, as displacements at its place, m.
@@ -361,12 +379,12 @@ fn speeds(log: &LogSignals) -> Vec<[f64; 3]> {
             let first = row.saturating_sub(1).max(segment.start + 1);
             let ends = first..(row + 3).min(segment.end);
             speeds[row] = [0, 1, 2].map(|i| {
-                let mut slopes: Vec<f64> = (ends.clone())
-                    .map(|end| {
-                        let moved = log.rows[end].reference[i] - log.rows[end - 1].reference[i];
-                        moved / (log.time_s[end] - log.time_s[end - 1]).max(1e-6)
-                    })
-                    .collect();
+                let mut slopes = [0.0; 4];
+                let slopes = &mut slopes[..ends.len()];
+                for (slope, end) in slopes.iter_mut().zip(ends.clone()) {
+                    let moved = log.rows[end].reference[i] - log.rows[end - 1].reference[i];
+                    *slope = moved / (log.time_s[end] - log.time_s[end - 1]).max(1e-6);
+                }
                 slopes.sort_unstable_by(f64::total_cmp);
                 let middle = slopes.len().saturating_sub(1) / 2..slopes.len() / 2 + 1;
                 let middle = slopes.get(middle).unwrap_or_default();

@@ -1,7 +1,7 @@
 //! What rows tell by themselves, of all rows of a log: of a long one piece by piece.
 
 use super::channels::LogSignals;
-use super::converters::FlatTops;
+use super::converters::{flat_tops, of_flat_tops, range};
 use super::places::{Run, Told};
 use super::still::{Rests, frozen, most_repeats, of_frozen};
 use super::timing::{Timing, usual_periods};
@@ -9,6 +9,7 @@ use crate::diagnose::finding::Finding;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::input::whole::Whole;
+use crate::input::whole::chunk::{Sample, SampledVertical};
 use crate::input::whole::pieces::Piece;
 use rayon::prelude::*;
 
@@ -18,13 +19,15 @@ struct Usual {
     periods: u32,
     period_s: f64,
     most_repeats: Vec<Option<f64>>,
+    /// Lowest and highest value of each channel of codes, m.
+    ranges: Vec<[f64; 2]>,
     has_reference: bool,
 }
 
 /// What some of its rows tell.
 struct Seen {
     timing: Timing,
-    tops: FlatTops,
+    tops: Vec<Run>,
     rests: Rests,
     frozen: Vec<Run>,
 }
@@ -34,7 +37,7 @@ impl Seen {
     fn of(log: &mut LogSignals, usual: &Usual) -> Self {
         Self {
             timing: Timing::of(log, usual.periods),
-            tops: FlatTops::of(log),
+            tops: flat_tops(log, &usual.ranges),
             rests: match usual.has_reference {
                 true => Rests::of(log),
                 false => Rests::default(),
@@ -45,12 +48,12 @@ impl Seen {
 
     /// With those of rows that follow.
     fn and(mut self, more: Self) -> Self {
+        self.tops.extend(more.tops);
         self.frozen.extend(more.frozen);
         Self {
             timing: self.timing.and(more.timing),
-            tops: self.tops.and(more.tops),
             rests: self.rests.and(more.rests),
-            frozen: self.frozen,
+            ..self
         }
     }
 }
@@ -69,6 +72,7 @@ pub(super) fn findings(
         periods: usual_periods(log),
         period_s: log.period_s,
         most_repeats: most_repeats(log, has_reference),
+        ranges: ranges(log, dataset.whole.as_deref(), number),
         has_reference,
     };
     let held = Seen::of(log, &usual);
@@ -82,17 +86,67 @@ pub(super) fn findings(
     } = seen.unwrap_or(held);
     let told = Told::new(dataset, number);
     let mut findings = timing.findings(&told, stage, usual.period_s, usual.periods);
-    findings.extend(tops.findings(&told, &log.channels));
+    findings.extend(of_flat_tops(&told, &log.channels, tops));
     findings.extend(rests.findings(&told, usual.period_s));
     findings.extend(of_frozen(&told, &log.channels, frozen, usual.period_s));
     findings
 }
 
+/// Lowest and highest value of each channel of codes, m: of all rows of the log.
+fn ranges(log: &LogSignals, whole: Option<&Whole>, number: usize) -> Vec<[f64; 2]> {
+    let Some(whole) = whole else {
+        return (log.channels.iter())
+            .map(|channel| range(&channel.values))
+            .collect();
+    };
+    let pieces = whole.pieces(number);
+    let of = |piece: &Piece| CodeRanges::of(whole.samples().of(piece.rows.clone()));
+    let CodeRanges([a, b, c, gap_1, gap_2, gap_3]) =
+        (pieces.par_iter().map(of)).reduce(CodeRanges::default, CodeRanges::and);
+    let beam = [0; 2];
+    let of_channels = [a, b, c, beam, beam, beam, gap_1, gap_2, gap_3];
+    (log.channels.iter().zip(of_channels))
+        .map(|(channel, codes)| codes.map(|code| f64::from(code) * channel.m_per_code))
+        .collect()
+}
+
+/// Lowest and highest code of the probes A, B, C and of the gaps.
+struct CodeRanges([[i32; 2]; 6]);
+
+impl Default for CodeRanges {
+    fn default() -> Self {
+        Self([[i32::MAX, i32::MIN]; 6])
+    }
+}
+
+impl CodeRanges {
+    fn of(samples: impl Iterator<Item = Sample>) -> Self {
+        let mut ranges = Self::default();
+        samples.for_each(|sample| {
+            let gaps = match sample.vertical {
+                SampledVertical::Codes(codes) => codes,
+                SampledVertical::Pose(_) => [0; 3],
+            };
+            let codes = sample.hall.into_iter().chain(gaps);
+            for ([low, high], code) in ranges.0.iter_mut().zip(codes) {
+                (*low, *high) = ((*low).min(code), (*high).max(code));
+            }
+        });
+        ranges
+    }
+
+    fn and(mut self, more: Self) -> Self {
+        for ([low, high], more) in self.0.iter_mut().zip(more.0) {
+            (*low, *high) = ((*low).min(more[0]), (*high).max(more[1]));
+        }
+        self
+    }
+}
+
 fn of_whole(whole: &Whole, log: usize, stage: &Stage, usual: &Usual) -> Option<Seen> {
     let look = |piece: &Piece| {
         let dataset = whole.piece(piece, usual.period_s * 1e6);
-        let mut signals = LogSignals::new(&dataset, stage, 0);
-        signals.period_s = usual.period_s;
+        let mut signals = LogSignals::with_period(&dataset, stage, 0, Some(usual.period_s));
         signals.from.row = piece.rows.start;
         signals.from.movement = piece.movements.start;
         signals.is_part = piece.is_part;
@@ -110,7 +164,7 @@ mod tests {
     use crate::diagnose::finding::Code;
     use crate::input::dataset::{Movement, Scales};
     use crate::input::whole::Samples;
-    use crate::input::whole::chunk::Sample;
+    use crate::input::whole::pieces::ROWS;
     use std::sync::Arc;
 
     /// A log several times, so that there are several pieces; as one movement if `is_one`.
@@ -220,7 +274,7 @@ mod tests {
     fn faults_across_the_pieces_of_a_long_movement_are_found_once() {
         let mut long = repeated(&dataset(&recording()), 12, true);
         let count = long.rows.len();
-        let boundary = count - 60_000;
+        let boundary = count - ROWS;
         for row in &mut long.rows[boundary..] {
             row.t_us += 10_000;
             row.frame = row.frame.with_sequence(row.frame.sequence() + 5);

@@ -1,9 +1,10 @@
 //! Channels that stand still, noise aside, where the residuals say that they should move.
 
-use super::channels::{LogSignals, median};
+use super::channels::{Channel, LogSignals, median};
 use super::residual::Residuals;
 use super::still::{MISSED_M, leave_out, stuck};
 use crate::diagnose::finding::Finding;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// A channel stands still if it moves by less than this share of what it moves elsewhere.
@@ -21,13 +22,21 @@ const STEP_SHARE: f64 = 0.93;
 /// Channels that stand still, noise aside, where the others say that they move; the rows of such
 /// runs are left out.
 pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
+    let noise_m = residuals.noise_m.iter().copied().fold(0.0, f64::max);
+    let signals: &LogSignals = log;
+    let runs = |(channel, signal): (usize, &Channel)| {
+        let own_noise_m = residuals.noise_m.get(channel).copied().unwrap_or(0.0);
+        let mut runs = still_runs(signals, &signal.values, 4.0 * own_noise_m);
+        let missed_m = MISSED_M + 4.0 * noise_m;
+        runs.retain(|run| is_missed(signals, residuals, channel, run, missed_m));
+        runs
+    };
+    let runs: Vec<Vec<Range<usize>>> = (signals.channels.par_iter().enumerate())
+        .map(runs)
+        .collect();
     let mut findings = Vec::new();
     let mut left_out: Vec<Range<usize>> = Vec::new();
-    let noise_m = residuals.noise_m.iter().copied().fold(0.0, f64::max);
-    for (channel, signal) in log.channels.iter().enumerate() {
-        let own_noise_m = residuals.noise_m.get(channel).copied().unwrap_or(0.0);
-        let mut stuck_runs = still_runs(log, &signal.values, 4.0 * own_noise_m);
-        stuck_runs.retain(|run| is_missed(log, residuals, channel, run, MISSED_M + 4.0 * noise_m));
+    for (signal, stuck_runs) in log.channels.iter().zip(runs) {
         if let Some(longest) = stuck_runs.iter().max_by_key(|run| run.len()) {
             let first = &log.at(longest.start);
             let stood_s = longest.len() as f64 * log.period_s;

@@ -58,19 +58,10 @@ pub(super) fn frozen(log: &mut LogSignals, most: &[Option<f64>]) -> Vec<Run> {
         let Some(Some(most)) = most.get(index) else {
             continue;
         };
-        for segment in &log.segments {
-            let mut row = segment.start;
-            while row < segment.end {
-                let start = row;
-                while row < segment.end && channel.values[row] == channel.values[start] {
-                    row += 1;
-                }
-                let long = (row - start) as f64 > *most;
-                if long && log.usable[start] && others_move(log, index, &(start..row)) {
-                    runs.push((index, start..row));
-                }
-            }
-        }
+        let all = log.segments.iter();
+        let repeats = all.flat_map(|segment| repeats(&channel.values, segment, *most));
+        let is_frozen = |run: &Range<usize>| log.usable[run.start] && others_move(log, index, run);
+        runs.extend(repeats.filter(is_frozen).map(|run| (index, run)));
     }
     let still = |rows: &Range<usize>| {
         let mut channels = log.channels.iter();
@@ -86,6 +77,27 @@ pub(super) fn frozen(log: &mut LogSignals, most: &[Option<f64>]) -> Vec<Run> {
     let found = runs.iter().map(run).collect();
     leave_out(log, runs.into_iter().map(|(_, run)| run));
     found
+}
+
+/// Where more than `most` values that follow each other are one. Looked for from the row backwards that
+/// such a run must reach: most rows need not be looked at.
+fn repeats(values: &[f64], segment: &Range<usize>, most: f64) -> Vec<Range<usize>> {
+    let mut runs = Vec::new();
+    let mut start = segment.start;
+    let reach = |start: usize| start.checked_add(most as usize);
+    while let Some(last) = reach(start).filter(|last| *last < segment.end) {
+        let value = values[last];
+        match (start..last).rev().find(|&row| values[row] != value) {
+            Some(other) => start = other + 1,
+            None => {
+                let rest = values[last..segment.end].iter();
+                let end = last + rest.take_while(|rest| **rest == value).count();
+                runs.push(start..end);
+                start = end;
+            }
+        }
+    }
+    runs
 }
 
 /// Whether others move while a channel does not: a beam or gap of coarse steps may well rest. A

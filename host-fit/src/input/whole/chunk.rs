@@ -30,6 +30,7 @@ impl Codes {
         }
     }
 
+    #[inline]
     fn at(&self, k: usize) -> [i32; 3] {
         match self {
             Self::Of24Bits(short) => short[k].map(code),
@@ -66,6 +67,7 @@ impl Times {
         }
     }
 
+    #[inline]
     fn at(&self, k: usize) -> i64 {
         match self {
             Self::Near { first_us, since_us } => first_us + i64::from(since_us[k]),
@@ -224,6 +226,7 @@ impl Chunk {
     }
 
     /// The row `k`, from 0 to less than the length.
+    #[inline]
     pub fn at(&self, k: usize) -> Sample {
         Sample {
             t_us: self.times.at(k),
