@@ -123,12 +123,12 @@ impl Job<'_> {
         } = self;
         let started = Instant::now();
         let first = self.first_phase()?;
-        let problem = Problem::new(dataset, selected, stage, Model::of(ModelKind::M31));
         let field = first.field.clone().finish(stage)?;
         if field.verdict.loses() {
             let verdict = Box::new(field.verdict);
             return Err(FieldFitError::NotCarried(verdict).into());
         }
+        let problem = Problem::new(dataset, selected, stage, Model::of(ModelKind::M31));
         let elapsed = first.elapsed + started.elapsed();
         let parameters = field.parameters.model_31();
         let at_limit = beyond_ranges(stage, &parameters)?;

@@ -186,16 +186,14 @@ fn span_and_noise(
         if within_movements {
             (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
         }
-        for row in rows {
-            let value = value(row);
+        let (mut steps, mut before) = (0.0, rows.first().map_or(0.0, &value));
+        for value in rows.iter().map(&value) {
             low = low.min(value);
             high = high.max(value);
+            steps += (value - before) * (value - before);
+            before = value;
         }
         span = span.max(high - low);
-        let steps: f64 = rows
-            .windows(2)
-            .map(|w| (value(&w[1]) - value(&w[0])).powi(2))
-            .sum();
         if rows.len() > 1 {
             noises.push((steps / (2.0 * (rows.len() - 1) as f64)).sqrt());
         }

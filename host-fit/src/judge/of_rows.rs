@@ -135,12 +135,10 @@ impl Part {
         let mut scratch = Vec::new();
         for run in runs {
             seen.clear();
-            seen.extend(
-                (whole.rows_of(run.movement, run.rows.clone())).map(|row| Seen {
-                    error: error(decoder, &row.frame, row.reference),
-                    row,
-                }),
-            );
+            (whole.rows_of(run.movement, run.rows.clone())).for_each(|row| {
+                let error = error(decoder, &row.frame, row.reference);
+                seen.push(Seen { error, row });
+            });
             let mut sums = OfMovement::NONE;
             for Seen { error, row } in &seen {
                 sums.all.take(*error, row.reference);

@@ -127,8 +127,9 @@ impl Whole {
     /// The runs of an excerpt, in the order of their rows.
     fn chosen(&self, most: usize) -> Vec<Run> {
         let runs = self.runs();
-        let parts: Vec<Products> = (runs.par_chunks(TOGETHER))
-            .map(|runs| runs.iter().map(|run| self.products(run)).sum())
+        let products: Vec<Products> = runs.par_iter().map(|run| self.products(run)).collect();
+        let parts: Vec<Products> = (products.par_chunks(TOGETHER))
+            .map(|products| products.iter().sum())
             .collect();
         let mut total: Products = parts.iter().sum();
         for k in 0..COUNT {
@@ -137,11 +138,12 @@ impl Whole {
         }
         // Beyond rounding the sum of products is positive, and the ridge is above that.
         let inverse = Cholesky::new(total).map_or_else(Products::zeros, |factor| factor.inverse());
-        let told = |run: &Run| {
-            let products = self.products(run).component_mul(&inverse);
-            (products.sum(), moves(self.looked_at(run)))
+        let told = |(run, products): (&Run, &Products)| {
+            let leverage = products.component_mul(&inverse).sum();
+            (leverage, moves(self.looked_at(run)))
         };
-        let mut told: Vec<(f64, bool)> = runs.par_iter().map(told).collect();
+        let mut told: Vec<(f64, bool)> = runs.par_iter().zip(&products).map(told).collect();
+        drop(products);
         if told.iter().all(|(_, moves)| !moves) {
             told.iter_mut().for_each(|(_, moves)| *moves = true);
         }

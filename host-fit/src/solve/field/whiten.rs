@@ -8,6 +8,7 @@
 
 use super::blocks::{Block, Rows};
 use super::terms::{COUNT, PER_PROBE};
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Unknowns: the parameters, then the lag of the reference.
@@ -43,7 +44,12 @@ pub struct Normal {
 impl Normal {
     /// Of blocks, in movement order whatever the number of threads.
     pub fn new(rows: &Rows, blocks: &[Block], noise: &Noise) -> Self {
-        let one = |movement: &std::ops::Range<usize>| filter(&blocks[movement.clone()], noise);
+        let one = |movement: &std::ops::Range<usize>| {
+            pulp::Arch::new().dispatch(OfMovement {
+                blocks: &blocks[movement.clone()],
+                noise,
+            })
+        };
         let filtered: Vec<Filtered> = rows.movements.par_iter().map(one).collect();
         let mut sum = Self {
             products: vec![[0.0; COLUMNS]; COLUMNS],
@@ -96,6 +102,23 @@ struct Filtered {
 
 type Matrix = [[f64; 3]; 3];
 
+/// The filter over the blocks of a movement: a type and not a closure, since closures are not always
+/// inlined into the function that is compiled for the instruction set.
+struct OfMovement<'a> {
+    blocks: &'a [Block],
+    noise: &'a Noise,
+}
+
+impl WithSimd for OfMovement<'_> {
+    type Output = Filtered;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Filtered {
+        filter(self.blocks, self.noise)
+    }
+}
+
+#[inline(always)]
 fn filter(blocks: &[Block], noise: &Noise) -> Filtered {
     let mut out = Filtered {
         products: vec![[0.0; COLUMNS]; COLUMNS],
@@ -129,6 +152,7 @@ fn filter(blocks: &[Block], noise: &Noise) -> Filtered {
 }
 
 /// Residuals and derivatives of a block, less what the filter expects of them.
+#[inline(always)]
 fn innovations(block: &Block, expected: &[[f64; COLUMNS]; 3]) -> [[f64; COLUMNS]; 3] {
     let mut columns = [[0.0; COLUMNS]; 3];
     for (probe, column) in columns.iter_mut().enumerate() {
@@ -145,6 +169,7 @@ fn innovations(block: &Block, expected: &[[f64; COLUMNS]; 3]) -> [[f64; COLUMNS]
 }
 
 /// Adds the products of every pair of columns: the upper triangle, in whole lanes.
+#[inline(always)]
 fn add_products(products: &mut [[f64; COLUMNS]], columns: &[[f64; COLUMNS]; 3]) {
     const LANES: usize = 4;
     let [a, b, c] = columns;
@@ -189,6 +214,7 @@ impl Gain {
         }
     }
 
+    #[inline(always)]
     fn whiten(&self, columns: &mut [[f64; COLUMNS]; 3]) {
         let l = &self.factor;
         let [first, second, third] = [1.0 / l[0][0], 1.0 / l[1][1], 1.0 / l[2][2]];
