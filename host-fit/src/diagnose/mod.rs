@@ -50,7 +50,7 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         [] => Cow::Borrowed(dataset),
         outliers => Cow::Owned(dataset.without(outliers)),
     };
-    let errors = (fitted.ok()).map(|fit| fit.decoded.errors_less(&fit.judgement.zeros, dataset));
+    let errors = (fitted.ok()).map(|fit| &fit.decoded.errors[..]);
     let of_models = || {
         let mut findings = causes::causes(&sound, stage);
         findings.extend(logs::disagreement(&sound, stage));
@@ -60,7 +60,7 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     let of_signals = || {
         let wider = (dataset.whole.as_ref().zip(fitted.ok()))
             .and_then(|(whole, fit)| stretches::findings(dataset, whole, stage, fit));
-        wider.unwrap_or_else(|| signals::signal_findings(dataset, stage, errors.as_deref()))
+        wider.unwrap_or_else(|| signals::signal_findings(dataset, stage, errors))
     };
     let (mut findings, more) = rayon::join(of_models, of_signals);
     findings.extend(more);

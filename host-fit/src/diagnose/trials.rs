@@ -86,10 +86,9 @@ impl<'a> Trials<'a> {
         } else {
             ModelKind::M30
         });
-        let all: Vec<usize> = (0..dataset.rows.len()).collect();
         Self {
             stage,
-            within: Problem::new(dataset, &all, zeros_free, model).thinned(ROWS),
+            within: Problem::thinned_of(dataset, ROWS, zeros_free, model),
             unlimited,
             vertical_span,
             has_codes: dataset

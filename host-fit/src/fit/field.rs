@@ -85,8 +85,9 @@ impl Job<'_> {
         let fitted = || {
             let started = Instant::now();
             let (rows, settings) = (&self.selected, self.settings);
-            let problem = Problem::new(self.dataset, rows, self.stage, Model::of(ModelKind::M31));
-            let least_squares = Solver::LeastSquares.solve(&problem, &settings.options);
+            let problem =
+                || Problem::new(self.dataset, rows, self.stage, Model::of(ModelKind::M31));
+            let least_squares = Solver::LeastSquares.solve(&problem(), &settings.options);
             let found = least_squares.map_err(FitError::from).and_then(|start| {
                 let field = WhiteFit::new(self.dataset, rows, self.stage, &start.parameters)?;
                 Ok((start, field))
@@ -95,7 +96,7 @@ impl Job<'_> {
                 (found, Loss::None) => found?,
                 (Ok((start, field)), loss) if !field.has_outliers(loss) => (start, field),
                 (_, loss) => {
-                    let start = robust::start(problem, &settings.options)?;
+                    let start = robust::start(problem(), &settings.options)?;
                     let (from, stage) = (&start.parameters, self.stage);
                     let field = WhiteFit::robust(self.dataset, rows, stage, from, loss)?;
                     (start, field)

@@ -98,17 +98,12 @@ impl<'a> Problem<'a> {
     /// they share; two from each that does not.
     #[must_use]
     pub fn thinned(&self, most: usize) -> Self {
-        let moved = self.groups.par_iter().map(|group| self.moved(group));
-        let moved: Vec<f64> = moved.collect();
-        let idle = IDLE_SHARE * moved.iter().copied().fold(0.0, f64::max);
-        let moving = moved.iter().filter(|moved| **moved > idle).count();
-        let quota = (most / moving.max(1)).max(MOVING_ROWS_MIN);
+        let ranges: Vec<Range<usize>> = self.groups.iter().map(|g| g.rows.clone()).collect();
+        let strides = strides(&ranges, most, |row| self.rows[row].reference_um);
         let mut rows = Vec::with_capacity(most);
         let mut groups = Vec::with_capacity(self.groups.len());
-        for (group, moved) in self.groups.iter().zip(&moved) {
+        for (group, stride) in self.groups.iter().zip(strides) {
             let from = rows.len();
-            let rows_wanted = if *moved > idle { quota } else { IDLE_ROWS };
-            let stride = group.rows.len().div_ceil(rows_wanted).max(1);
             rows.extend(self.rows[group.rows.clone()].iter().step_by(stride));
             groups.push(Group {
                 movement: group.movement,
@@ -122,18 +117,24 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// How far a movement moves: the largest range of X, Y (um) and Rz (urad) by the reference.
-    fn moved(&self, group: &Group) -> f64 {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for row in &self.rows[group.rows.clone()] {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(row.reference_um[axis]);
-                high[axis] = high[axis].max(row.reference_um[axis]);
-            }
-        }
-        (0..3)
-            .map(|axis| high[axis] - low[axis])
-            .fold(0.0, f64::max)
+    /// The same of all rows of a dataset, of which only those taken are held.
+    pub fn thinned_of(
+        dataset: &Dataset,
+        most: usize,
+        stage: &'a Stage,
+        model: &'static Model,
+    ) -> Self {
+        let all = dataset
+            .movements
+            .iter()
+            .map(|movement| movement.rows.clone());
+        let ranges: Vec<Range<usize>> = all.collect();
+        let strides = strides(&ranges, most, |row| reference_um(&dataset.rows[row]));
+        let taken = ranges.into_iter().zip(strides);
+        let taken: Vec<usize> = taken
+            .flat_map(|(rows, stride)| rows.step_by(stride))
+            .collect();
+        Self::new(dataset, &taken, stage, model)
     }
 
     /// The fitness of the paper, as this project defines it: the root of the mean over rows and
@@ -145,12 +146,48 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// Of each of some movements one of so many rows is taken, so that about `most` are.
+fn strides(
+    movements: &[Range<usize>],
+    most: usize,
+    reference_um: impl Fn(usize) -> [f64; 3] + Sync,
+) -> Vec<usize> {
+    let moved = |rows: &Range<usize>| moved(rows.clone().map(&reference_um));
+    let moved: Vec<f64> = movements.par_iter().map(moved).collect();
+    let idle = IDLE_SHARE * moved.iter().copied().fold(0.0, f64::max);
+    let moving = moved.iter().filter(|moved| **moved > idle).count();
+    let quota = (most / moving.max(1)).max(MOVING_ROWS_MIN);
+    let stride = |(rows, moved): (&Range<usize>, f64)| {
+        let wanted = if moved > idle { quota } else { IDLE_ROWS };
+        rows.len().div_ceil(wanted).max(1)
+    };
+    movements.iter().zip(moved).map(stride).collect()
+}
+
+/// How far a movement moves: the largest range of X, Y (um) and Rz (urad) by the reference.
+fn moved(reference_um: impl Iterator<Item = [f64; 3]>) -> f64 {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for reference in reference_um {
+        for axis in 0..3 {
+            low[axis] = low[axis].min(reference[axis]);
+            high[axis] = high[axis].max(reference[axis]);
+        }
+    }
+    (0..3)
+        .map(|axis| high[axis] - low[axis])
+        .fold(0.0, f64::max)
+}
+
+fn reference_um(row: &Row) -> [f64; 3] {
+    row.reference.map(|q| q * 1e6)
+}
+
 impl TrainRow {
     fn new(row: &Row, model: &Model) -> Self {
         Self {
             signal_um: row.signal_m.map(|s| s * 1e6),
             slopes: model.slopes_at(row.vertical),
-            reference_um: row.reference.map(|q| q * 1e6),
+            reference_um: reference_um(row),
             weight: 1.0,
         }
     }

@@ -81,17 +81,15 @@ impl Rows {
         for (&k, &weight) in selected.iter().zip(weights) {
             trusted[k] = weight >= HALF;
         }
-        let rows: Vec<FieldRow> = selected
-            .par_iter()
-            .zip(weights)
-            .filter(|(_, weight)| **weight > 0.0)
-            .map(|(&k, &weight)| field_row(dataset, k, &trusted, weight))
-            .collect();
+        let used = selected.iter().copied().zip(weights.iter().copied());
+        // Their number known before, for a vector that never grows.
+        let used: Vec<(usize, f64)> = used.filter(|(_, weight)| *weight > 0.0).collect();
+        let row = |&(k, weight): &(usize, f64)| field_row(dataset, k, &trusted, weight);
+        let rows: Vec<FieldRow> = used.par_iter().map(row).collect();
         let mut movements = Vec::new();
         let mut start = 0;
-        let used = selected.iter().zip(weights).filter(|(_, w)| **w > 0.0);
-        let movement_of: Vec<usize> = used.map(|(&k, _)| dataset.rows[k].movement).collect();
-        for chunk in movement_of.chunk_by(|a, b| a == b) {
+        let movement = |(k, _): &(usize, f64)| dataset.rows[*k].movement;
+        for chunk in used.chunk_by(|a, b| movement(a) == movement(b)) {
             movements.push(start..start + chunk.len());
             start += chunk.len();
         }
@@ -150,6 +148,21 @@ impl Rows {
             .zip(offset_of)
             .with_min_len(64)
             .map(|(block, offset)| mean(&self.rows[block.clone()], probes, lag_s, offset))
+            .collect()
+    }
+
+    /// The blocks of a movement of [`movements`](Self::movements), as in [`Rows::evaluate`].
+    pub fn evaluate_movement(
+        &self,
+        movement: usize,
+        probes: &[Probe; 3],
+        lag_s: f64,
+        offset_mm: [f64; 3],
+    ) -> Vec<Block> {
+        self.blocks[self.movements[movement].clone()]
+            .par_iter()
+            .with_min_len(64)
+            .map(|block| mean(&self.rows[block.clone()], probes, lag_s, offset_mm))
             .collect()
     }
 

@@ -1,7 +1,7 @@
 //! Maximum a posteriori: damped Gauss-Newton on the Hall residuals, first under white noise, then
 //! whitened by the noise that the residuals show.
 
-use super::blocks::{Block, Rows};
+use super::blocks::Rows;
 use super::carry::Verdict;
 use super::error::FieldFitError;
 use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
@@ -16,6 +16,7 @@ use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
 use crate::solve::robust::{HALF, Loss};
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Steps of one phase.
@@ -81,7 +82,6 @@ struct State {
     parameters: FieldParameters,
     lag_s: f64,
     offsets_mm: Vec<[f64; 3]>,
-    blocks: Vec<Block>,
 }
 
 /// Fits the field model to the rows `selected` (ascending) of a dataset, from a fit of Model (31).
@@ -173,16 +173,14 @@ impl WhiteFit {
                 break;
             }
             search.rows = Rows::weighted(dataset, selected, &weights).into();
-            state = search.at(state.parameters, state.lag_s, state.offsets_mm);
             search.under_white_noise(&mut state, stage)?;
         }
         let weights = loss.last(search.weights());
         // A movement may lose all its rows.
         let movements = search.rows.movement_rows().zip(&state.offsets_mm);
         let kept = movements.filter(|(rows, _)| weights[rows.clone()].iter().any(|w| *w > 0.0));
-        let offsets_mm = kept.map(|(_, offset)| *offset).collect();
+        state.offsets_mm = kept.map(|(_, offset)| *offset).collect();
         search.rows = Rows::weighted(dataset, selected, &weights).into();
-        state = search.at(state.parameters, state.lag_s, offsets_mm);
         let (noise, normal) = search.under_white_noise(&mut state, stage)?;
         Ok(Self {
             weights,
@@ -222,13 +220,16 @@ impl WhiteFit {
             drift_mm: USUAL_DRIFT_MM,
             ..noise
         };
-        normal = Normal::new(&search.rows, &state.blocks, &usual);
+        normal = search.normal(&state, &usual);
         for _ in 0..NOISE_ROUNDS {
             let white_mm = search.white_mm(&state, stage);
+            let (rows, probes) = (&search.rows, probes(&state.parameters));
+            let blocks = rows.evaluate(&probes, state.lag_s, &state.offsets_mm);
             noise = Noise {
                 white_mm,
-                drift_mm: drift_mm(&search.rows, &state.blocks, white_mm, &covariance(&normal)?),
+                drift_mm: drift_mm(rows, &blocks, white_mm, &covariance(&normal)?),
             };
+            drop(blocks);
             let end = search.descend(&mut state, &noise, GAIN_MIN, STEPS_MAX)?;
             let End::Reached(reached) = end else {
                 let iterations = search.iterations;
@@ -239,7 +240,13 @@ impl WhiteFit {
         posterior = Posterior::new(covariance(&normal)?, &state.parameters, &noise);
         let rows = &search.rows;
         // A block of outliers alone holds no residual.
-        let counted = state.blocks.iter().filter(|block| block.rows >= HALF);
+        let weight =
+            |block: &Range<usize>| rows.rows[block.clone()].iter().map(|row| row.weight).sum();
+        let counted = rows
+            .blocks
+            .iter()
+            .map(weight)
+            .filter(|sum: &f64| *sum >= HALF);
         Ok(FieldFit {
             verdict: verdict(rows, &state, &posterior),
             posterior,
@@ -300,12 +307,11 @@ impl Search {
     }
 
     fn start(&self, model_31: &Parameters, stage: &Stage) -> State {
-        let offsets_mm = vec![[0.0; 3]; self.rows.movements.len()];
-        self.at(
-            FieldParameters::of_model_31(model_31, stage),
-            0.0,
-            offsets_mm,
-        )
+        State {
+            parameters: FieldParameters::of_model_31(model_31, stage),
+            lag_s: 0.0,
+            offsets_mm: vec![[0.0; 3]; self.rows.movements.len()],
+        }
     }
 
     fn under_white_noise(
@@ -319,14 +325,9 @@ impl Search {
         }
     }
 
-    fn at(&self, parameters: FieldParameters, lag_s: f64, offsets_mm: Vec<[f64; 3]>) -> State {
-        let blocks = self.rows.evaluate(&probes(&parameters), lag_s, &offsets_mm);
-        State {
-            parameters,
-            lag_s,
-            offsets_mm,
-            blocks,
-        }
+    fn normal(&self, state: &State, noise: &Noise) -> Normal {
+        let probes = probes(&state.parameters);
+        Normal::at(&self.rows, &probes, state.lag_s, &state.offsets_mm, noise)
     }
 
     /// Steps down until the next step would gain less than `gain_min`, at most `steps_max` times.
@@ -337,7 +338,7 @@ impl Search {
         gain_min: f64,
         steps_max: u32,
     ) -> Result<End, FieldFitError> {
-        let mut normal = Normal::new(&self.rows, &state.blocks, noise);
+        let mut normal = self.normal(state, noise);
         let mut damping = 0.0;
         for _ in 0..steps_max {
             let unseen: Vec<String> = (0..COUNT)
@@ -356,8 +357,8 @@ impl Search {
                 return Ok(End::Reached(normal));
             }
             self.iterations += 1;
-            let next = self.after(state, &normal, &step);
-            let next_normal = Normal::new(&self.rows, &next.blocks, noise);
+            let next = after(state, &normal, &step);
+            let next_normal = self.normal(&next, noise);
             let cost = |normal: &Normal, state: &State| {
                 normal.chi_squared() + prior_squares(&state.parameters)
             };
@@ -375,18 +376,22 @@ impl Search {
         }
         Ok(End::StepLimit(normal))
     }
+}
 
-    fn after(&self, state: &State, normal: &Normal, step: &DVector<f64>) -> State {
-        let mut parameters = state.parameters;
-        for (k, change) in step.iter().take(COUNT).enumerate() {
-            parameters.probes[k / PER_PROBE][k % PER_PROBE] += change;
-        }
-        let offsets_mm = normal
-            .offsets_mm(step.as_slice())
-            .zip(&state.offsets_mm)
-            .map(|(change, offset)| [0, 1, 2].map(|k| offset[k] + change[k]))
-            .collect();
-        self.at(parameters, state.lag_s + step[COUNT], offsets_mm)
+fn after(state: &State, normal: &Normal, step: &DVector<f64>) -> State {
+    let mut parameters = state.parameters;
+    for (k, change) in step.iter().take(COUNT).enumerate() {
+        parameters.probes[k / PER_PROBE][k % PER_PROBE] += change;
+    }
+    let offsets_mm = normal
+        .offsets_mm(step.as_slice())
+        .zip(&state.offsets_mm)
+        .map(|(change, offset)| [0, 1, 2].map(|k| offset[k] + change[k]))
+        .collect();
+    State {
+        parameters,
+        lag_s: state.lag_s + step[COUNT],
+        offsets_mm,
     }
 }
 

@@ -179,8 +179,8 @@ pub fn update(
         for (value, change) in parameters.probes.as_flattened_mut().iter_mut().zip(&moved) {
             *value += change;
         }
-        let blocks = rows.evaluate(&probes(&parameters), moved[COUNT], &offsets_mm);
-        let normal = Normal::new(&rows, &blocks, &noise);
+        let probes = probes(&parameters);
+        let normal = Normal::at(&rows, &probes, moved[COUNT], &offsets_mm, &noise);
         let curvature = DMatrix::from_fn(UNKNOWNS, UNKNOWNS, |i, j| normal.curvature(i, j));
         let mut curvature = factor.tr_mul(&(curvature * &factor));
         for k in 0..x.len() {

@@ -7,6 +7,7 @@
 //! whitened jointly with C, for all three see the same reference.
 
 use super::blocks::{Block, Rows};
+use super::probe::Probe;
 use super::terms::{COUNT, PER_PROBE};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -19,6 +20,8 @@ const RESIDUAL: usize = UNKNOWNS;
 const COLUMNS: usize = 84;
 /// Standard deviation of an offset before a movement is seen, mm: far beyond any reset's.
 const OFFSET_MM: f64 = 1.0;
+/// Movements whose sums are held at once: 56 kB each.
+const TOGETHER: usize = 64;
 
 /// Noise of the log.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,28 +45,49 @@ pub struct Normal {
 }
 
 impl Normal {
-    /// Of blocks, in movement order whatever the number of threads.
+    /// Of blocks.
     pub fn new(rows: &Rows, blocks: &[Block], noise: &Noise) -> Self {
-        let one = |movement: &std::ops::Range<usize>| {
-            pulp::Arch::new().dispatch(OfMovement {
-                blocks: &blocks[movement.clone()],
+        Self::of_movements(rows.movements.len(), |movement| {
+            filtered(&blocks[rows.movements[movement].clone()], noise)
+        })
+    }
+
+    /// Of the blocks of [`Rows::evaluate`], of which only those of the movement at hand are held.
+    pub fn at(
+        rows: &Rows,
+        probes: &[Probe; 3],
+        lag_s: f64,
+        offsets_mm: &[[f64; 3]],
+        noise: &Noise,
+    ) -> Self {
+        Self::of_movements(rows.movements.len(), |movement| {
+            let offset_mm = offsets_mm[movement];
+            filtered(
+                &rows.evaluate_movement(movement, probes, lag_s, offset_mm),
                 noise,
-            })
-        };
-        let filtered: Vec<Filtered> = rows.movements.par_iter().map(one).collect();
+            )
+        })
+    }
+
+    /// In movement order whatever the number of threads.
+    fn of_movements(count: usize, filtered: impl Fn(usize) -> Filtered + Sync) -> Self {
         let mut sum = Self {
             products: vec![[0.0; COLUMNS]; COLUMNS],
             log_determinant: 0.0,
-            ends: Vec::with_capacity(filtered.len()),
+            ends: Vec::with_capacity(count),
         };
-        for movement in filtered {
-            for (sum, row) in sum.products.iter_mut().zip(&movement.products) {
-                for (sum, x) in sum.iter_mut().zip(row) {
-                    *sum += x;
+        for start in (0..count).step_by(TOGETHER) {
+            let some = start..(start + TOGETHER).min(count);
+            let some: Vec<Filtered> = some.into_par_iter().map(&filtered).collect();
+            for movement in some {
+                for (sum, row) in sum.products.iter_mut().zip(&movement.products) {
+                    for (sum, x) in sum.iter_mut().zip(row) {
+                        *sum += x;
+                    }
                 }
+                sum.log_determinant += movement.log_determinant;
+                sum.ends.push(movement.end);
             }
-            sum.log_determinant += movement.log_determinant;
-            sum.ends.push(movement.end);
         }
         sum
     }
@@ -116,6 +140,10 @@ impl WithSimd for OfMovement<'_> {
     fn with_simd<S: Simd>(self, _: S) -> Filtered {
         filter(self.blocks, self.noise)
     }
+}
+
+fn filtered(blocks: &[Block], noise: &Noise) -> Filtered {
+    pulp::Arch::new().dispatch(OfMovement { blocks, noise })
 }
 
 #[inline(always)]
