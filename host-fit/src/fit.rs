@@ -3,6 +3,7 @@
 //! dataset -> rows drawn -> problem -> solver -> standard errors -> parameter set -> judgement.
 //! Nothing is written here.
 
+mod calibration;
 mod compensate;
 mod cross_validation;
 mod error;
@@ -11,6 +12,8 @@ mod settings;
 mod warning;
 mod whole;
 
+pub(crate) use calibration::RANGE_MARGIN;
+pub use calibration::calibration;
 pub use compensate::fit_compensated;
 pub use cross_validation::{CrossValidation, Split, cross_validate};
 pub use error::FitError;
@@ -32,7 +35,6 @@ use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::Problem;
 use crate::problem::draw::draw_rows;
 use crate::problem::model::{COUNT, Model};
-use crate::problem::parameters::Parameters;
 use crate::solve::field::blocks::Rows;
 use crate::solve::field::fit::FieldFit;
 use crate::solve::robust::{HALF, Loss};
@@ -43,10 +45,6 @@ use runtime::{Calibration, ModelKind, ParameterSet};
 use std::cell::OnceCell;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Room around the motion of the log in which the calibration still holds: offsets of
-/// the reference and overshoot are well inside it.
-pub(crate) const RANGE_MARGIN: f64 = 1.1;
 
 /// A calibration with everything that is known about it.
 #[derive(Clone, Debug)]
@@ -372,39 +370,4 @@ struct Judged {
     decoded: Decoded,
     judgement: Judgement,
     sound: PoseError,
-}
-
-/// The calibration that `parameters` make with the stage's scales, calibrated over the motion
-/// of the rows and a tenth more.
-///
-/// # Errors
-/// [`FitError::NoDecoder`].
-pub fn calibration<'r>(
-    rows: impl IntoIterator<Item = &'r Row>,
-    stage: &Stage,
-    model: &Model,
-    parameters: &Parameters,
-) -> Result<Calibration, FitError> {
-    let mut planar = [0.0f64; 3];
-    let mut vertical = [0.0f64; 3];
-    for row in rows {
-        for axis in 0..3 {
-            planar[axis] = planar[axis].max(row.reference[axis].abs());
-            vertical[axis] = vertical[axis].max(row.vertical[axis].abs());
-        }
-    }
-    let no_decoder = FitError::NoDecoder { model: model.name };
-    Ok(Calibration {
-        model: model.kind,
-        geometry: parameters.geometry(),
-        probes: model.probes(parameters).ok_or(no_decoder)?,
-        hall_m_per_code: stage.hall.m_per_count,
-        hall_window: stage.hall.window,
-        capacitive_probes_m: stage.capacitive_probes_m,
-        capacitive_m_per_code: stage.capacitive.m_per_count,
-        capacitive_window: stage.capacitive.window,
-        calibrated_planar: planar.map(|x| x * RANGE_MARGIN),
-        calibrated_vertical: vertical.map(|x| x * RANGE_MARGIN),
-        sensitivity_min: Calibration::SENSITIVITY_MIN,
-    })
 }

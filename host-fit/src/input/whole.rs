@@ -142,4 +142,6 @@ impl Whole {
 }
 
 #[cfg(test)]
+mod fit_tests;
+#[cfg(test)]
 mod tests;

@@ -5,10 +5,11 @@
 //! |---|---|
 //! | `channels` | the signals of one log by channel |
 //! | `places` | where in a log something was found |
-//! | `row_by_row` | what all rows of a log tell by themselves: the four modules that follow |
+//! | `row_by_row` | what all rows of a log tell by themselves: the modules that follow, to `frozen` |
 //! | `timing` | rows missing, uneven times |
 //! | `converters` | flat tops |
-//! | `still` | channels that repeat one value, movements that stand still |
+//! | `still` | movements that stand still, or end in a rest |
+//! | `frozen` | channels that repeat one value |
 //! | `standing` | channels that show no more than their noise |
 //! | `residual` | what the motion does not explain of a Hall signal |
 //! | `blame` | the channel whose error explains that |
@@ -23,6 +24,7 @@ mod blame;
 mod channels;
 mod converters;
 mod drifts;
+mod frozen;
 mod hum;
 mod outliers;
 mod places;

@@ -2,8 +2,9 @@
 
 use super::channels::LogSignals;
 use super::converters::{flat_tops, of_flat_tops, range};
+use super::frozen::{frozen, most_repeats, of_frozen};
 use super::places::{Run, Told};
-use super::still::{Rests, frozen, most_repeats, of_frozen};
+use super::still::Rests;
 use super::timing::{Timing, usual_periods};
 use crate::diagnose::finding::Finding;
 use crate::input::dataset::Dataset;

@@ -1,8 +1,9 @@
 //! Channels that stand still, noise aside, where the residuals say that they should move.
 
 use super::channels::{Channel, LogSignals, median};
+use super::frozen::MISSED_M;
 use super::residual::Residuals;
-use super::still::{MISSED_M, leave_out, stuck};
+use super::still::{leave_out, stuck};
 use crate::diagnose::finding::Finding;
 use rayon::prelude::*;
 use std::ops::Range;
