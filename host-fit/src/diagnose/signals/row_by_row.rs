@@ -163,7 +163,7 @@ mod tests {
     use super::super::sample::{dataset, recording, stage};
     use super::*;
     use crate::diagnose::finding::Code;
-    use crate::input::dataset::{Movement, Scales};
+    use crate::input::dataset::{LoggedFrame, Movement, Row, Scales};
     use crate::input::whole::Samples;
     use crate::input::whole::pieces::ROWS;
     use std::sync::Arc;
@@ -186,7 +186,7 @@ mod tests {
                 for row in &log.rows[movement.rows.clone()] {
                     periods = first + row.frame.sequence();
                     let in_movement = if is_one { periods } else { periods - first };
-                    all.rows.push(crate::input::dataset::Row {
+                    all.rows.push(Row {
                         movement: number,
                         t_us: 2000 * i64::from(periods),
                         frame: row.frame.with_sequence(in_movement),
@@ -222,6 +222,14 @@ mod tests {
         let excerpt = whole.excerpt(4_000, [0; 32]);
         assert!(excerpt.rows.len() < log.rows.len() / 4);
         [found(log), found(&excerpt)]
+    }
+
+    /// Has a probe read a code.
+    fn read_by_hall(row: &mut Row, probe: usize, code: i32) {
+        if let LoggedFrame::Codes(frame) = &mut row.frame {
+            frame.hall[probe] = code;
+        }
+        row.signal_m[probe] = f64::from(code) * stage().hall.m_per_count;
     }
 
     fn codes(found: &[Finding]) -> Vec<Code> {
@@ -271,6 +279,22 @@ mod tests {
         assert_eq!(held[0].value, Some(12.0));
     }
 
+    /// There it is no flat top: elsewhere the channel goes farther.
+    #[test]
+    fn a_channel_that_stands_still_farther_than_it_goes_in_its_piece_is_stuck() {
+        let mut long = repeated(&dataset(&recording()), 12, false);
+        let farthest = long.rows.iter().map(|row| row.frame.hall()[2]).max();
+        let held = farthest.expect("rows") + 20;
+        for row in &mut long.rows[2700..3400] {
+            read_by_hall(row, 2, held);
+        }
+        let last = long.rows.len() - 1;
+        read_by_hall(&mut long.rows[last], 2, held + 100);
+        let [held, excerpt] = both(&long);
+        assert_eq!(excerpt, held);
+        assert_eq!(codes(&held), [Code::Stuck]);
+    }
+
     #[test]
     fn faults_across_the_pieces_of_a_long_movement_are_found_once() {
         let mut long = repeated(&dataset(&recording()), 12, true);
@@ -280,17 +304,9 @@ mod tests {
             row.t_us += 10_000;
             row.frame = row.frame.with_sequence(row.frame.sequence() + 5);
         }
-        let held_m = long.rows[boundary].signal_m[0];
-        let held = long.rows[boundary].frame;
+        let held = long.rows[boundary].frame.hall()[0];
         for row in &mut long.rows[boundary - 300..boundary + 300] {
-            if let (
-                crate::input::dataset::LoggedFrame::Codes(frame),
-                crate::input::dataset::LoggedFrame::Codes(held),
-            ) = (&mut row.frame, held)
-            {
-                frame.hall[0] = held.hall[0];
-            }
-            row.signal_m[0] = held_m;
+            read_by_hall(row, 0, held);
         }
         let [held, excerpt] = both(&long);
         assert_eq!(excerpt, held);
