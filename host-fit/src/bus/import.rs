@@ -8,7 +8,7 @@
 //! | numbers of the ticks by the node's own count, so that no lost tick shifts the others | `numbering` |
 //! | receive times to sample times: the node samples evenly, the bus delivers unevenly | [`clock`] |
 //! | the interferometers' CSV | [`reference`](mod@reference) |
-//! | offset between the clocks and difference in speed, found or checked by the motion | `survey`, [`offset`], `refine`, `agreement` |
+//! | offset between the clocks and difference in speed, found or checked by the motion | `survey`, [`offset`], `explained`, `refine`, `agreement` |
 //! | reference between its samples, at the times of the ticks | [`join`] |
 //! | the log | [`write`](mod@write) |
 
@@ -17,6 +17,7 @@ pub mod bus_log;
 mod bus_reader;
 pub mod clock;
 mod error;
+mod explained;
 mod input;
 pub mod join;
 mod numbering;
