@@ -330,6 +330,11 @@ fn write_through(target: &Path, bytes: &[u8]) -> std::io::Result<()> {
 fn explain(source: std::io::Error, path: &Path, folder: &Path, bytes: usize) -> OutputError {
     let path = path.to_path_buf();
     let folder = folder.to_path_buf();
+    // What is not the system's own has the name of the temporary file in it.
+    let source = match source.raw_os_error() {
+        Some(_) => source,
+        None => source.kind().into(),
+    };
     match source.kind() {
         ErrorKind::NotFound => OutputError::NoFolder { path, folder },
         ErrorKind::NotADirectory => OutputError::NotAFolder { path, folder },

@@ -254,6 +254,7 @@ fn a_full_disk_leaves_every_output_of_a_command_as_it_was() {
             let told = stderr(&output);
             assert_eq!(output.status.code(), Some(3), "{}: {told}", job.arguments);
             assert!(told.contains("no room"), "{}: {told}", job.arguments);
+            assert!(!told.contains(".host-fit-"), "a temporary name: {told}");
             let (old, new) = job.judge(&bench, &whole);
             if k < one_by_one {
                 assert_eq!(new, 0, "{} with {blocks} blocks", job.arguments);

@@ -45,8 +45,8 @@ pub enum LogError {
     /// The file cannot be read, or is no text.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// Nothing in it, or only comments and blank lines.
-    #[error("{}: the log is empty; record it again or name another file", path.display())]
+    /// Nothing in its first mebibyte, or only comments and blank lines.
+    #[error("{}: the log is empty, or its first mebibyte is only comments; record it again or name another file", path.display())]
     Empty {
         /// The file.
         path: PathBuf,

@@ -7,7 +7,7 @@ use super::table::COLUMNS_MAX;
 /// Starts a comment, as the first byte of a line.
 pub(super) const COMMENT: u8 = b'#';
 
-/// How many lines of notes may stand above the header.
+/// How many lines of notes may stand above the header, comments and blank lines not counted.
 const LINES_MAX: usize = 200;
 
 /// So many names of columns that are known make a line the header.
@@ -33,7 +33,7 @@ pub(super) fn find_header(bytes: &[u8], is_known: impl Fn(&str) -> bool) -> Opti
     let known = |line: &HeaderLine| line.names.iter().filter(|name| is_known(name)).count();
     let mut plain: Vec<HeaderLine> = Vec::new();
     let mut comment = None;
-    for Found { text, line, end } in lines(bytes).take(LINES_MAX) {
+    for Found { text, line, end } in lines(bytes) {
         if let Some(note) = text.strip_prefix(&[COMMENT]) {
             let line = header_line(note, line, end);
             let is_header = known(&line) >= KNOWN_MIN && !plain.iter().any(is_row);
@@ -44,6 +44,9 @@ pub(super) fn find_header(bytes: &[u8], is_known: impl Fn(&str) -> bool) -> Opti
                 return Some(line);
             }
             plain.push(line);
+            if plain.len() == LINES_MAX {
+                break;
+            }
         }
     }
     let above_rows = || {

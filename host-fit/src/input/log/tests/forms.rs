@@ -183,6 +183,7 @@ fn notes_stand_above_the_header_and_numpy_puts_it_in_a_comment() {
         format!("Stage 7, by hand\n\"open quote\nRate;500\n\n{LOG}"),
         stage(),
     );
+    same_rows(format!("{}\n{LOG}", "# a comment\n".repeat(1_000)), stage());
     same_rows(format!("# {LOG}"), stage());
     same_rows(format!("#{}", LOG.replace(',', "\t")), stage());
     // Lines are counted with the notes.
