@@ -36,6 +36,7 @@ use crate::problem::Problem;
 use crate::problem::draw::draw_rows;
 use crate::problem::model::{COUNT, Model};
 use crate::solve::field::blocks::Rows;
+use crate::solve::field::error::FieldFitError;
 use crate::solve::field::fit::FieldFit;
 use crate::solve::robust::{HALF, Loss};
 use crate::solve::{Projection, Solution, Solver};
@@ -154,22 +155,26 @@ impl<'a> Job<'a> {
             self.settings.solver,
             Solver::Finished | Solver::LeastSquares
         ) && self.settings.options.projection == Projection::Linear;
+        let mut unsettled = None;
         let reason = if usual {
             match self.of_model(Model::of(ModelKind::Field)) {
                 Ok(fit) if fit.field.as_ref().is_some_and(|field| field.verdict.field) => {
                     return Ok(fit);
                 }
                 Ok(fit) => fit.model_reason,
-                Err(error) => error.to_string(),
+                Err(error) => {
+                    let is_stuck = matches!(error, FitError::Field(FieldFitError::Stuck { .. }));
+                    unsettled = is_stuck.then_some(FitWarning::FieldUnsettled);
+                    error.to_string()
+                }
             }
         } else {
             "--solver and --project choose how models of the paper are fitted; the field model has a way of its own".to_owned()
         };
-        let fit = self.of_model(Model::of(ModelKind::M31))?;
-        Ok(Fit {
-            model_reason: format!("model (31): {reason}"),
-            ..fit
-        })
+        let mut fit = self.of_model(Model::of(ModelKind::M31))?;
+        fit.model_reason = format!("model (31): {reason}");
+        fit.warnings.extend(unsettled);
+        Ok(fit)
     }
 
     fn of_model(&self, model: &'static Model) -> Result<Fit, FitError> {

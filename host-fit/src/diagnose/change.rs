@@ -223,6 +223,8 @@ impl TwoGroups {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::of_log;
+    use crate::fit::{FitSettings, FitWarning, ModelChoice, fit};
     use crate::input::shipped::STAGE_TOML;
     use crate::simulate::assembly::Assembly;
     use crate::simulate::protocol::Protocol;
@@ -274,6 +276,22 @@ mod tests {
             );
             assert_eq!(found.movement.as_deref(), Some(first.as_str()));
         }
+    }
+
+    /// Which has no boundary to tell.
+    #[test]
+    fn stages_that_take_turns_are_refused_for_what_the_field_model_leaves() {
+        let stage = stage();
+        let logs = [1, 2].map(|seed| recording(Protocol::Combined, 80 + seed));
+        let turns = mixed(logs.each_ref(), |movement, _| movement % 2 == 1);
+        let dataset = turns.dataset(&stage).expect("a plane");
+        let fitted = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto));
+        let fitted = fitted.expect("Model (31) takes it");
+        assert!(fitted.warnings.contains(&FitWarning::FieldUnsettled));
+        let found = of_log(&dataset, &stage, Ok(&fitted));
+        assert_eq!(found[0].severity, Severity::Refuse);
+        let message = &found[0].message;
+        assert!(message.contains("times the noise of"), "{message}");
     }
 
     /// The paper's protocol has three tilts in turn; driven one after the other they are three groups that

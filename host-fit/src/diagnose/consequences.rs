@@ -21,6 +21,10 @@ fn is_consequence(found: &Finding, cause: &Finding) -> bool {
         // Movements that reach a flat top seem to be of another stage than those that do not.
         return found.movement.is_some();
     }
+    if found.code == Code::ModelLacks && found.severity == Severity::Refuse {
+        // That is the least certain reason of all.
+        return cause.severity == Severity::Refuse && cause.code != Code::ModelLacks;
+    }
     if found.severity > cause.severity {
         return false;
     }

@@ -11,7 +11,7 @@ use crate::judge::identify::{check_described, check_explained};
 /// Told from this part of the rows on, ...
 const TOLD_MIN: f64 = 0.02;
 /// ... and refused from this on: what the rest says of the stage is no longer what the log says.
-const REFUSED_MIN: f64 = 0.08;
+pub(super) const REFUSED_MIN: f64 = 0.08;
 /// Or from this on, where the errors over all rows are beyond what a fit may leave of the motion and no
 /// channel is found that stood still for as long.
 const UNEXPLAINED_MIN: f64 = 0.05;

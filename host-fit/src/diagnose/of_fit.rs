@@ -121,6 +121,7 @@ pub(super) fn of_warning(told: &FitWarning) -> Option<Finding> {
             unit: Some(unit),
             ..warning(Code::ModelLacks)
         },
+        FitWarning::FieldUnsettled => warning(Code::ModelLacks),
         FitWarning::Undecoded { rows } => Finding {
             value: Some(*rows as f64),
             unit: Some("rows"),

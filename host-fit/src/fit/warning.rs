@@ -115,6 +115,12 @@ pub enum FitWarning {
         /// rms over the rows that were fitted, um or urad.
         fitted_micro: f64,
     },
+    /// The field model was tried, and no parameters of it describe the log.
+    #[error(
+        "Model (31) was taken because the field model did not settle, as it does on every sound log: once all six axes move, \
+         errors will be several times those of a sound fit. Find what is wrong with the log, or fit a part of it"
+    )]
+    FieldUnsettled,
     /// Rows that the decoder refused count in no error.
     #[error("{rows} rows have codes that the decoder refuses; they are not part of the errors")]
     Undecoded {

@@ -314,7 +314,7 @@ mod tests {
             let mut recording = sound.clone();
             for samples in &mut recording.movements {
                 for (k, sample) in samples.iter_mut().enumerate() {
-                    let error_m = 1e-6 * k as f64 * PERIOD_S;
+                    let error_m = 0.4e-6 * k as f64 * PERIOD_S;
                     match channel {
                         0..3 => sample.hall[channel] += codes(error_m),
                         _ => sample.beams_nm[channel - 3] += (error_m * 1e9) as i64,
@@ -322,8 +322,8 @@ mod tests {
                 }
             }
             let found = only(&recording, Code::Drift, Some(name));
-            let off = found.value.expect("a speed") - 1.0;
-            assert!(off.abs() < 0.25, "{off} um/s");
+            let off = found.value.expect("a speed") - 0.4;
+            assert!(off.abs() < 0.1, "{off} um/s");
         }
     }
 

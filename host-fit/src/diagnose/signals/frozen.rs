@@ -115,10 +115,11 @@ pub(super) fn of_frozen(
     period_s: f64,
 ) -> Vec<Finding> {
     let runs = Run::joined(runs);
-    let mut longest: Vec<(Vec<&'static str>, &Run)> = Vec::new();
+    let mut longest: Vec<(Vec<&'static str>, &Run, usize)> = Vec::new();
     for (index, channel) in channels.iter().enumerate() {
-        let own = runs.iter().filter(|run| run.channel == index);
-        let Some(run) = own.max_by_key(|run| run.len) else {
+        let own = || runs.iter().filter(|run| run.channel == index);
+        let rows = own().map(|run| run.len).sum();
+        let Some(run) = own().max_by_key(|run| run.len) else {
             continue;
         };
         let together = |other: &Run| {
@@ -126,20 +127,25 @@ pub(super) fn of_frozen(
             let shared = run.end().min(other.end()).saturating_sub(start);
             2 * shared > run.len.max(other.len)
         };
-        match longest.iter_mut().find(|(_, other)| together(other)) {
-            Some((names, _)) => names.push(channel.name),
-            None => longest.push((vec![channel.name], run)),
+        match longest.iter_mut().find(|(_, other, _)| together(other)) {
+            Some((names, ..)) => names.push(channel.name),
+            None => longest.push((vec![channel.name], run, rows)),
         }
     }
     (longest.into_iter())
-        .map(|(names, run)| {
+        .map(|(names, run, rows)| {
             let (who, channel) = match &names[..] {
                 _ if run.all_still => ("every channel".to_owned(), None),
                 [name] => ((*name).to_owned(), Some(*name)),
                 names => (names.join(", "), None),
             };
             let stood_s = run.len as f64 * period_s;
-            stuck(told, &who, channel, &run.first, stood_s)
+            // Rows that repeat whole are true, if of no use.
+            let share = match run.all_still {
+                true => 0.0,
+                false => rows as f64 / told.rows as f64,
+            };
+            stuck(told, &who, channel, &run.first, stood_s, share)
         })
         .collect()
 }

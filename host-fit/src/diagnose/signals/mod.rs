@@ -16,6 +16,7 @@
 //! | `outliers`, `steps` | rows that jump, signals that stay where they jumped |
 //! | `spectrum`, `hum` | lines of one frequency |
 //! | `drifts` | drift of a channel, and of the gain of a probe |
+//! | `undescribed` | what the field model leaves beyond noise |
 //!
 //! Each log is tested alone, and what an earlier test names is left out of the later ones. A
 //! channel is named where it alone explains what was found.
@@ -37,6 +38,7 @@ mod standing;
 mod steps;
 mod still;
 mod timing;
+mod undescribed;
 
 use crate::diagnose::finding::Finding;
 use crate::input::dataset::Dataset;
@@ -143,5 +145,6 @@ fn of_residuals(signals: &mut LogSignals, stage: &Stage) -> Vec<Finding> {
     let (hum, drifts) = rayon::join(hum, || drifts::findings(signals, &residuals));
     findings.extend(hum);
     findings.extend(drifts);
+    undescribed::add(&mut findings, signals, &residuals);
     findings
 }

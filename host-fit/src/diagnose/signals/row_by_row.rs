@@ -5,7 +5,7 @@ use super::converters::{flat_tops, of_flat_tops, range};
 use super::frozen::{frozen, most_repeats, of_frozen};
 use super::places::{Run, Told};
 use super::still::Rests;
-use super::timing::{Timing, usual_periods};
+use super::timing::Timing;
 use crate::diagnose::finding::Finding;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
@@ -16,8 +16,6 @@ use rayon::prelude::*;
 
 /// What is known of a log before its rows are looked at.
 struct Usual {
-    /// Periods from most rows to the next.
-    periods: u32,
     period_s: f64,
     most_repeats: Vec<Option<f64>>,
     /// Lowest and highest value of each channel of codes, m.
@@ -37,7 +35,7 @@ impl Seen {
     /// Looks at the rows, and leaves those out that are named.
     fn of(log: &mut LogSignals, usual: &Usual) -> Self {
         Self {
-            timing: Timing::of(log, usual.periods),
+            timing: Timing::of(log),
             tops: flat_tops(log, &usual.ranges),
             rests: match usual.has_reference {
                 true => Rests::of(log),
@@ -70,7 +68,6 @@ pub(super) fn findings(
 ) -> Vec<Finding> {
     let has_reference = dataset.logs[number].has_reference;
     let usual = Usual {
-        periods: usual_periods(log),
         period_s: log.period_s,
         most_repeats: most_repeats(log, has_reference),
         ranges: ranges(log, dataset.whole.as_deref(), number),
@@ -86,7 +83,7 @@ pub(super) fn findings(
         frozen,
     } = seen.unwrap_or(held);
     let told = Told::new(dataset, number);
-    let mut findings = timing.findings(&told, stage, usual.period_s, usual.periods);
+    let mut findings = timing.findings(&told, stage, usual.period_s);
     findings.extend(of_flat_tops(&told, &log.channels, tops));
     findings.extend(rests.findings(&told, usual.period_s));
     findings.extend(of_frozen(&told, &log.channels, frozen, usual.period_s));

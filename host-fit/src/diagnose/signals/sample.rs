@@ -42,8 +42,9 @@ pub(super) fn codes(error_m: f64) -> i32 {
 
 pub(super) fn dataset(recording: &Recording) -> Dataset {
     let mut dataset = recording.dataset(&stage()).expect("a triangle");
+    let period_us = dataset.rows[1].t_us - dataset.rows[0].t_us;
     for row in &mut dataset.rows {
-        row.frame = row.frame.with_sequence((row.t_us / 2000) as u32);
+        row.frame = row.frame.with_sequence((row.t_us / period_us) as u32);
     }
     dataset
 }

@@ -47,6 +47,8 @@ pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
                 Some(signal.name),
                 first,
                 stood_s,
+                // Told by what the field model leaves, which a wrong log may leave too.
+                0.0,
             ));
         }
         left_out.extend(stuck_runs);

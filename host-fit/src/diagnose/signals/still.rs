@@ -2,7 +2,8 @@
 
 use super::channels::{LogSignals, median, spread};
 use super::places::{Place, Told};
-use crate::diagnose::finding::{Code, Finding};
+use crate::diagnose::finding::{Code, Finding, Severity};
+use crate::diagnose::left_out;
 use std::ops::Range;
 
 /// A movement stands still within this, m; its beams within this time, s.
@@ -14,19 +15,30 @@ const REST_S: f64 = 0.2;
 const REST_STRETCH_S: f64 = 0.05;
 const SPEED_SHARE: f64 = 0.3;
 
+/// A channel that stood still, for so long at a time, and in such a share of the log's rows.
 pub(super) fn stuck(
     told: &Told,
     who: &str,
     channel: Option<&str>,
     first: &Place,
     stood_s: f64,
+    share: f64,
 ) -> Finding {
+    let is_refused = share >= left_out::REFUSED_MIN;
+    let in_all = match is_refused {
+        true => format!(", in {:.0} % of the log in all", 100.0 * share),
+        false => String::new(),
+    };
     let message = format!(
-        "{who} stood still for {stood_s:.2} s ({}) while it should have moved or shown its noise: look for a stage that \
+        "{who} stood still for {stood_s:.2} s ({}){in_all} while it should have moved or shown its noise: look for a stage that \
          stopped, a cable or a frozen register, and leave these rows out",
         told.place(first),
     );
     Finding {
+        severity: match is_refused {
+            true => Severity::Refuse,
+            false => Severity::Warn,
+        },
         channel: channel.map(str::to_owned),
         value: Some(stood_s),
         unit: Some("s"),
@@ -179,10 +191,14 @@ impl Rests {
             findings.push(told.warning_at(Code::IdleMovement, first, message));
         }
         if !is_usual(self.crashed.len(), movements) {
-            let of = |(first, rows): &(Place, usize)| {
-                stuck(told, "the stage", None, first, *rows as f64 * period_s)
-            };
-            findings.extend(self.crashed.iter().map(of));
+            let longest = self.crashed.iter().max_by_key(|(_, rows)| *rows);
+            findings.extend(longest.map(|(first, rows)| {
+                let who = match self.crashed.len() {
+                    1 => "the stage".to_owned(),
+                    count => format!("the stage, at the end of {count} of {movements} movements,"),
+                };
+                stuck(told, &who, None, first, *rows as f64 * period_s, 0.0)
+            }));
         }
         findings
     }

@@ -11,7 +11,7 @@ const JITTER_MIN: f64 = 0.01;
 /// Relative difference of the rate from the servo's that is: far above a crystal's.
 const RATE_MIN: f64 = 0.005;
 /// From here on, in servo periods, rows are thinned on purpose.
-const THINNED_FROM: u32 = 5;
+const THINNED_FROM: f64 = 5.0;
 /// Share of missing rows from which they are worth a warning.
 const MISSING_MIN: f64 = 1e-3;
 /// Gaps that are told one by one.
@@ -36,10 +36,10 @@ pub(super) struct Timing {
 }
 
 impl Timing {
-    /// Of the rows of a log, most of which are `usual` periods apart.
-    pub(super) fn of(log: &LogSignals, usual: u32) -> Self {
+    /// Of the rows of a log.
+    pub(super) fn of(log: &LogSignals) -> Self {
         let mut timing = Self::default();
-        timing.look_for_gaps(log, usual);
+        timing.look_for_gaps(log);
         timing.compare_with_even(log);
         for segment in log.segments.iter().filter(|segment| segment.len() >= 2) {
             timing.time_s += log.time_s[segment.end - 1] - log.time_s[segment.start];
@@ -68,24 +68,18 @@ impl Timing {
     }
 
     /// What is wrong with them; `period_s` is the median time from row to row.
-    pub(super) fn findings(
-        &self,
-        told: &Told,
-        stage: &Stage,
-        period_s: f64,
-        usual: u32,
-    ) -> Vec<Finding> {
+    pub(super) fn findings(&self, told: &Told, stage: &Stage, period_s: f64) -> Vec<Finding> {
         let mut findings = Vec::new();
         findings.extend(self.of_missing(told));
         findings.extend(self.of_uneven(told, period_s));
-        findings.extend(self.of_other_rate(told, stage, usual));
+        findings.extend(self.of_other_rate(told, stage));
         findings
     }
 
-    fn look_for_gaps(&mut self, log: &LogSignals, usual: u32) {
+    fn look_for_gaps(&mut self, log: &LogSignals) {
         for segment in &log.segments {
             for row in segment.start + 1..segment.end {
-                let missed = (periods(log, row) / usual).saturating_sub(1);
+                let missed = periods(log, row).saturating_sub(1);
                 if missed > 0 {
                     self.missing += u64::from(missed);
                     self.longest = self.longest.max(missed);
@@ -99,22 +93,10 @@ impl Timing {
     }
 }
 
-/// Periods between two rows of a movement.
+/// Periods of the log between two rows of a movement.
 fn periods(log: &LogSignals, row: usize) -> u32 {
     let sequence = |row: usize| log.rows[row].frame.sequence();
     sequence(row).wrapping_sub(sequence(row - 1))
-}
-
-/// Periods from most rows to the next: more than one where the log was thinned, or written at
-/// another rate.
-pub(super) fn usual_periods(log: &LogSignals) -> u32 {
-    let all = log.segments.iter().flat_map(|s| s.start + 1..s.end);
-    let mut periods: Vec<u32> = all.map(|row| periods(log, row)).collect();
-    let middle = periods.len() / 2;
-    if periods.is_empty() {
-        return 1;
-    }
-    (*periods.select_nth_unstable(middle).1).max(1)
 }
 
 impl Timing {
@@ -193,16 +175,17 @@ impl Timing {
         })
     }
 
-    fn of_other_rate(&self, told: &Told, stage: &Stage, usual: u32) -> Option<Finding> {
-        let period_s = self.time_s / self.periods * f64::from(usual);
-        let other = (period_s / stage.servo_period_s - 1.0).abs();
-        if !other.is_finite() || other <= RATE_MIN {
+    fn of_other_rate(&self, told: &Told, stage: &Stage) -> Option<Finding> {
+        let period_s = self.time_s / self.periods;
+        let servo_periods = period_s / stage.servo_period_s;
+        let is = |count: f64| (servo_periods / count - 1.0).abs() <= RATE_MIN;
+        if !servo_periods.is_finite() || is(1.0) {
             return None;
         }
-        let severity = if usual >= THINNED_FROM {
-            Severity::Note
-        } else {
-            Severity::Warn
+        let count = servo_periods.round();
+        let severity = match count >= THINNED_FROM && is(count) {
+            true => Severity::Note,
+            false => Severity::Warn,
         };
         let message = format!(
             "rows are {:.1} us apart, the servo period of stage.toml is {:.1} us: correct servo.period_s, or log every period",
@@ -231,12 +214,12 @@ mod tests {
         (found[0].code, found[0].value)
     }
 
-    /// Each row `periods(row)` periods after the start of its movement.
-    fn at(mut dataset: Dataset, periods: impl Fn(usize) -> u32) -> Dataset {
+    /// With so many servo periods from row to row.
+    fn every(periods: f64) -> Dataset {
+        let mut dataset = dataset(&recording());
         for movement in dataset.movements.clone() {
             for (k, row) in dataset.rows[movement.rows].iter_mut().enumerate() {
-                row.t_us = (f64::from(periods(k)) * PERIOD_S * 1e6) as i64;
-                row.frame = row.frame.with_sequence(periods(k));
+                row.t_us = (k as f64 * periods * PERIOD_S * 1e6) as i64;
             }
         }
         dataset
@@ -273,11 +256,12 @@ mod tests {
 
     #[test]
     fn another_rate_is_told_and_a_thinned_log_is_not_warned_of() {
-        let slow = at(dataset(&recording()), |k| 2 * k as u32);
-        let (code, period_us) = only(&slow);
-        assert_eq!(code, Code::Jitter);
-        assert!((period_us.expect("a period") - 4000.0).abs() < 0.1);
-        let thinned = at(dataset(&recording()), |k| 10 * k as u32);
-        assert_eq!(warnings(&thinned), []);
+        for periods in [2.0, 5.5] {
+            let (code, period_us) = only(&every(periods));
+            assert_eq!(code, Code::Jitter);
+            let period_us = period_us.expect("a period");
+            assert!((period_us - 2000.0 * periods).abs() < 0.1, "{period_us}");
+        }
+        assert_eq!(warnings(&every(10.0)), []);
     }
 }
