@@ -41,6 +41,9 @@ pub struct Uncertainty {
 /// Correlations above this are told: the parameters stand in for each other.
 pub const CORRELATION_TOLD: f64 = 0.95;
 
+/// A probe is moved if it is by more than this part of what that is which moves most.
+const MOVED_MIN: f64 = 0.1;
+
 /// Smallest eigenvalue of the scaled curvature that still counts as information.
 const EIGENVALUE_MIN: f64 = 1e-10;
 
@@ -172,9 +175,9 @@ impl OwnFit {
         pseudo_inverse(&self.curvature, &all).0 * self.descent
     }
 
-    /// By what part the gain of each probe would change, if nothing else did; `None` where the rows do not
-    /// determine it.
-    pub fn gain_step(&self) -> Option<[f64; 3]> {
+    /// By what part the gain of each probe would change, if nothing else did: `None` for a probe that the rows
+    /// hardly move, beside that which they move most, and where they do not determine all three.
+    pub fn gain_step(&self) -> Option<[Option<f64>; 3]> {
         // A gain is a column of G, whose numbers stand row by row before the ratios.
         let directions = SMatrix::<f64, COUNT, 3>::from_fn(|place, probe| {
             let is_of_probe = place < 9 && place % 3 == probe;
@@ -186,11 +189,10 @@ impl OwnFit {
         });
         let curvature = directions.transpose() * self.curvature * directions;
         let factor = curvature.cholesky()?;
-        Some(
-            factor
-                .solve(&(directions.transpose() * self.descent))
-                .into(),
-        )
+        let steps = factor.solve(&(directions.transpose() * self.descent));
+        let most = curvature.diagonal().max();
+        let is_moved = |k: usize| curvature[(k, k)] > MOVED_MIN * MOVED_MIN * most;
+        Some([0, 1, 2].map(|k| is_moved(k).then(|| steps[k])))
     }
 
     /// The cost after a step.
