@@ -33,8 +33,8 @@ impl FromStr for Train {
 /// How much memory logs may take.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct Memory {
-    /// Refuse logs that take more memory than this, as 500MB or 2GiB; half of this machine's if not
-    /// given.
+    /// Refuse logs whose rows take more memory than this, as 500MB or 2GiB; half of this machine's
+    /// if not given. The work on them is not counted.
     #[arg(long = "memory", value_name = "SIZE", value_parser = bytes)]
     memory_bytes: Option<u64>,
 }

@@ -31,7 +31,7 @@ mod update;
 use crate::cli::error::HostError;
 use crate::input::log::{LogReading, LogWarning, ReadOptions, ReferenceUse};
 use crate::input::stage::Stage;
-use crate::output::{Place, is_standard, is_standard_output, write_atomically};
+use crate::output::{Place, is_standard, is_standard_output, posterior_file, write_atomically};
 use crate::progress;
 use crate::report::json::Circumstances;
 use clap::{Parser, Subcommand};
@@ -190,13 +190,14 @@ fn wrote(paths: impl IntoIterator<Item = Option<PathBuf>>) -> Result<(), HostErr
     Ok(())
 }
 
-/// Refuses outputs that are an input, or each other, by whatever name. Where one goes to standard
-/// output, nothing else does from now on.
+/// Refuses outputs that are an input, the posterior beside one, or each other, by whatever name. Where
+/// one goes to standard output, nothing else does from now on.
 fn keep_apart(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<(), HostError> {
-    let inputs: Vec<Place> = inputs
-        .iter()
-        .filter_map(|path| place_of_input(path))
-        .collect();
+    let beside = |path: &&&Path| posterior_file::beside(path).filter(|path| path.exists());
+    let posteriors = inputs.iter().filter_map(|path| beside(&path));
+    let posteriors: Vec<Place> = posteriors.map(|path| Place::of(&path)).collect();
+    let named = inputs.iter().filter_map(|path| place_of_input(path));
+    let inputs: Vec<Place> = named.chain(posteriors).collect();
     let mut taken: Vec<Place> = Vec::new();
     for output in outputs.iter().flatten() {
         let (name, here) = match is_standard(output) {

@@ -3,7 +3,7 @@
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::input::stage::Stage;
-use crate::output::{check_writable, write_atomically};
+use crate::output::{Outputs, check_writable};
 use crate::simulate::assembly::{Assembly, Magnets};
 use crate::simulate::log_text::{log_csv, truth_csv};
 use crate::simulate::plan_file;
@@ -66,10 +66,12 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
     };
     let assembly = Assembly::draw(&stage, args.seed);
     let recording = record(&stage, &assembly, run, &SensorErrors::USUAL, args.seed)?;
+    let mut outputs = Outputs::default();
     if let Some(path) = truth {
-        write(path, &truth_csv(&recording))?;
+        outputs.add(path, &bytes(path, truth_csv(&recording))?)?;
     }
-    write(&args.out, &log_csv(&recording, &stage))?;
+    outputs.add(&args.out, &bytes(&args.out, log_csv(&recording, &stage))?)?;
+    outputs.commit()?;
     let magnets = match Magnets::of_seed(args.seed) {
         Magnets::AsDesigned => "magnets as designed",
         Magnets::Imperfect => "imperfect magnets",
@@ -83,15 +85,12 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
     ))
 }
 
-/// Writes a CSV, compressed if the name ends in `.gz`.
-fn write(path: &Path, csv: &str) -> Result<(), HostError> {
+/// A CSV, compressed if the name ends in `.gz`.
+fn bytes(path: &Path, csv: String) -> Result<Vec<u8>, HostError> {
     if path.extension().is_none_or(|extension| extension != "gz") {
-        return Ok(write_atomically(path, csv.as_bytes())?);
+        return Ok(csv.into_bytes());
     }
     let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
     let packed = gzip.write_all(csv.as_bytes()).and_then(|()| gzip.finish());
-    Ok(write_atomically(
-        path,
-        &packed.map_err(HostError::Standard)?,
-    )?)
+    packed.map_err(HostError::Standard)
 }

@@ -68,7 +68,12 @@ fn an_output_that_cannot_be_written_leaves_the_others_as_they_were() {
     let fit = "fit log.csv --stage stage.toml --model 31 --out p.bin --json /dev/full";
     bench.bad(fit, 3, &["/dev/full", "no room"]);
     assert_eq!(bench.text("p.bin"), "the blob before");
-    assert!(bench.holds_only(&["log.csv", "p.bin"]));
+    bench.write("truth.csv", "the truth before");
+    let simulate =
+        "simulate --stage stage.toml --protocol service --seed 3 --out /dev/full --truth truth.csv";
+    bench.bad(simulate, 3, &["/dev/full", "no room"]);
+    assert_eq!(bench.text("truth.csv"), "the truth before");
+    assert!(bench.holds_only(&["log.csv", "p.bin", "truth.csv"]));
 }
 
 #[cfg(unix)]

@@ -198,4 +198,11 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
     );
     let arguments = "recalibrate old.bin sine.csv --stage stage.toml --what gain --out old.bin";
     bench.bad(arguments, 2, &["old.bin is an input"]);
+    bench.write("old.bin.posterior", &posterior);
+    for command in [
+        "diff old.bin old.bin --json old.bin.posterior",
+        "decode old.bin short.csv --stage stage.toml --uncertainty --out old.bin.posterior",
+    ] {
+        bench.bad(command, 2, &["old.bin.posterior is an input"]);
+    }
 }
