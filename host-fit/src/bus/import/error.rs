@@ -119,6 +119,17 @@ pub enum ImportError {
         /// The most there may be.
         most: usize,
     },
+    /// The reference has too few samples.
+    #[error(
+        "{too_far} of {ticks} ticks have no sample of the reference within --tolerance-us (one servo period, if it is not given): \
+         log the reference in every servo period, or give a larger tolerance"
+    )]
+    Sparse {
+        /// Ticks too far from a sample.
+        too_far: usize,
+        /// Ticks.
+        ticks: usize,
+    },
     /// Most of the two do not belong together.
     #[error(
         "most of the two records do not belong together: {rows} of {ticks} ticks have a reference, which covers {covered_s:.1} s of \

@@ -323,3 +323,17 @@ fn a_given_offset_that_the_motion_contradicts_is_refused() {
         assert_eq!(args.out.exists(), is_sound);
     }
 }
+
+#[test]
+fn a_reference_slower_than_the_servo_is_told_as_that() {
+    let ifm = reference();
+    let (head, rows) = ifm.split_once('\n').expect("a header");
+    let slow: Vec<&str> = rows.lines().step_by(5).collect();
+    let (_folder, mut args) = files(
+        &candump(|_, _| false),
+        &format!("{head}\n{}", slow.join("\n")),
+    );
+    assert!(matches!(run(&args), Err(ImportError::Sparse { .. })));
+    args.tolerance_us = Some(5_000);
+    run(&args).expect("a line over 5 ms");
+}

@@ -49,8 +49,14 @@ impl JoinCounts {
     /// Refuses records of which most found no partner in the other.
     ///
     /// # Errors
-    /// `NoOverlap`, `Unpaired`.
+    /// `Sparse`, `NoOverlap`, `Unpaired`.
     pub(super) fn check(&self) -> Result<(), ImportError> {
+        if 2 * self.too_far > self.ticks {
+            return Err(ImportError::Sparse {
+                too_far: self.too_far,
+                ticks: self.ticks,
+            });
+        }
         if self.rows == 0 {
             return Err(ImportError::NoOverlap {
                 bus_us: self.bus_us,
