@@ -142,9 +142,11 @@ fn of_residuals(signals: &mut LogSignals, stage: &Stage) -> Vec<Finding> {
         }
     }
     let hum = || hum::hum(signals, &residuals);
-    let (hum, drifts) = rayon::join(hum, || drifts::findings(signals, &residuals));
+    let (hum, (drifts, left)) = rayon::join(hum, || drifts::findings(signals, &residuals));
     findings.extend(hum);
     findings.extend(drifts);
-    undescribed::add(&mut findings, signals, &residuals);
+    if let Some(left) = left {
+        undescribed::add(&mut findings, signals, &left, residuals.noise_m);
+    }
     findings
 }

@@ -6,7 +6,6 @@
 //! hum vanish, about a line over each second, which takes drift and walk off.
 
 use super::channels::{HALL, LogSignals};
-use super::residual::Residuals;
 use crate::diagnose::finding::{Code, Finding, Severity};
 use crate::diagnose::left_out;
 use std::fmt::Write;
@@ -30,9 +29,15 @@ const REFUSED_MIN: f64 = 2.2;
 /// Noise below this is not that of a Hall probe, and less than the field model may lack, m.
 const NOISE_MIN_M: f64 = 0.3e-6;
 
-/// Adds the probe of which the field model leaves most to the findings, if that is more than noise.
-pub(super) fn add(findings: &mut Vec<Finding>, log: &LogSignals, residuals: &Residuals) {
-    let of_probe = |k: usize| Some((k, left_to_noise(log, residuals, k)?));
+/// Adds the probe of which the field model leaves most to the findings, if that is more than noise:
+/// `left_m` by probe and row without drift, which is told by itself and bends the model.
+pub(super) fn add(
+    findings: &mut Vec<Finding>,
+    log: &LogSignals,
+    left_m: &[Vec<f64>; 3],
+    noise_m: [f64; 3],
+) {
+    let of_probe = |k: usize| Some((k, left_to_noise(log, &left_m[k], noise_m[k])?));
     let all = (0..3).filter_map(of_probe);
     let Some((probe, left)) = all.max_by(|(_, a), (_, b)| a.total_cmp(b)) else {
         return;
@@ -78,9 +83,7 @@ pub(super) fn add(findings: &mut Vec<Finding>, log: &LogSignals, residuals: &Res
 /// What is left of a probe that follows the motion, in terms of its noise: rms within a second that
 /// only as many of the seconds exceed as a fit may leave out of account. `None` for a log of too few seconds, or
 /// rows in them.
-fn left_to_noise(log: &LogSignals, residuals: &Residuals, probe: usize) -> Option<f64> {
-    let values = &residuals.values[probe];
-    let noise_m = residuals.noise_m[probe];
+fn left_to_noise(log: &LogSignals, values: &[f64], noise_m: f64) -> Option<f64> {
     let (slow, fast) = (log.rows_in(SLOW_S), log.rows_in(FAST_S));
     if fast < ROWS_MIN {
         return None;
