@@ -22,7 +22,7 @@ fn is_consequence(found: &Finding, cause: &Finding) -> bool {
         return found.movement.is_some();
     }
     if found.code == Code::ModelLacks && found.severity == Severity::Refuse {
-        // That is the least certain reason of all.
+        // Any other reason says more.
         return cause.severity == Severity::Refuse && cause.code != Code::ModelLacks;
     }
     if found.severity > cause.severity {
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_hides_warnings_but_no_refusal() {
+    fn a_refusal_hides_warnings_and_what_the_model_lacks_but_no_other_refusal() {
         let refused = |code| Finding {
             severity: Severity::Refuse,
             ..warning(code)
@@ -103,8 +103,11 @@ mod tests {
             refused(Code::ChannelsSwapped),
             warning(Code::TermsAtLimit),
             refused(Code::LogsDisagree),
+            refused(Code::ModelLacks),
         ];
         let kept = [refused(Code::ChannelsSwapped), refused(Code::LogsDisagree)];
         assert_eq!(without(all), kept);
+        let alone = vec![refused(Code::ModelLacks)];
+        assert_eq!(without(alone.clone()), alone);
     }
 }

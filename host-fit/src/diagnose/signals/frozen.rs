@@ -153,7 +153,7 @@ pub(super) fn of_frozen(
 #[cfg(test)]
 mod tests {
     use super::super::sample::{dataset, only, recording, warnings};
-    use crate::diagnose::finding::Code;
+    use crate::diagnose::finding::{Code, Severity};
     use crate::simulate::random::{Purpose, Stream};
 
     #[test]
@@ -192,5 +192,17 @@ mod tests {
             stuck.and_then(|finding| finding.channel.as_deref()),
             Some("cap_2")
         );
+    }
+    #[test]
+    fn a_channel_that_repeats_its_code_in_a_tenth_of_the_log_is_refused() {
+        for (rows, severity) in [(300, Severity::Warn), (600, Severity::Refuse)] {
+            let mut recording = recording();
+            let held = recording.movements[0][500].capacitive[1];
+            for sample in &mut recording.movements[0][500..500 + rows] {
+                sample.capacitive[1] = held;
+            }
+            let found = only(&recording, Code::Stuck, Some("cap_2"));
+            assert_eq!(found.severity, severity, "{rows} of 6,000 rows");
+        }
     }
 }
