@@ -221,3 +221,50 @@ pub(super) fn spread(values: &[f64]) -> f64 {
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     (high - low).max(0.0)
 }
+
+/// Speeds of X, Y, Rz by row, per s: the middle two of the four slopes around each row of a segment: a jump or a step, which is no
+/// speed, spoils two at most.
+pub(super) fn speeds(log: &LogSignals) -> Vec<[f64; 3]> {
+    let mut speeds = vec![[0.0; 3]; log.len()];
+    for segment in &log.segments {
+        for row in segment.clone() {
+            let first = row.saturating_sub(1).max(segment.start + 1);
+            let ends = first..(row + 3).min(segment.end);
+            speeds[row] = [0, 1, 2].map(|i| {
+                let mut slopes = [0.0; 4];
+                let slopes = &mut slopes[..ends.len()];
+                for (slope, end) in slopes.iter_mut().zip(ends.clone()) {
+                    let moved = log.rows[end].reference[i] - log.rows[end - 1].reference[i];
+                    *slope = moved / (log.time_s[end] - log.time_s[end - 1]).max(1e-6);
+                }
+                slopes.sort_unstable_by(f64::total_cmp);
+                let middle = slopes.len().saturating_sub(1) / 2..slopes.len() / 2 + 1;
+                let middle = slopes.get(middle).unwrap_or_default();
+                middle.iter().sum::<f64>() / middle.len().max(1) as f64
+            });
+        }
+    }
+    speeds
+}
+
+/// A signal less its mean over each segment, of the rows that are used.
+pub(super) fn signals_less_means(log: &LogSignals, k: usize) -> Vec<f64> {
+    let mut out = Vec::with_capacity(log.len());
+    for segment in &log.segments {
+        let values = || {
+            let rows = segment.clone().filter(|&row| log.usable[row]);
+            rows.map(|row| log.channels[k].values[row])
+        };
+        let mean = values().sum::<f64>() / values().count().max(1) as f64;
+        out.extend(values().map(|value| value - mean));
+    }
+    out
+}
+
+/// White noise times `scale`, from second differences, which hardly know the motion.
+pub(super) fn white_noise(log: &LogSignals, values: &[f64], scale: f64) -> f64 {
+    let rows = log.segments.iter().flat_map(|s| s.start + 2..s.end);
+    let used = rows.filter(|&row| (row - 2..=row).all(|row| log.usable[row]));
+    let differences = used.map(|row| values[row] - 2.0 * values[row - 1] + values[row - 2]);
+    robust_deviation(differences) / 6f64.sqrt() * scale
+}
