@@ -297,13 +297,10 @@ impl Search {
         )
     }
 
-    fn residuals_mm(&self, state: &State) -> Vec<[f64; 3]> {
-        let probes = probes(&state.parameters);
-        (self.rows).residuals_mm(&probes, state.lag_s, &state.offsets_mm)
-    }
-
     fn weights_by(&self, state: &State, loss: Loss) -> Vec<f64> {
-        loss.weights(self.residuals_mm(state), self.rows.movement_rows())
+        let (rows, probes) = (&self.rows, probes(&state.parameters));
+        let residuals_mm = rows.residuals_mm(&probes, state.lag_s, &state.offsets_mm);
+        loss.weights(residuals_mm, rows.movement_rows())
     }
 
     fn start(&self, model_31: &Parameters, stage: &Stage) -> State {
