@@ -23,8 +23,8 @@ const SECONDS_MIN: usize = 5;
 /// Told from here on, in terms of the noise: sound logs leave 0.2, those of quick steps or of imperfect
 /// magnets up to 0.6, ...
 const TOLD_MIN: f64 = 1.2;
-/// ... and refused from here on: the gain of a probe that changes by 2 % at once leaves 2.3 and more, by
-/// 1 % at most 2.1.
+/// ... and refused from here on: the gain of a probe that changes at once by 1 % leaves from 0.9 to 2.5,
+/// by 2 % from 2.3 to 5, by how far the log moves the probe.
 const REFUSED_MIN: f64 = 2.2;
 /// Noise below this is not that of a Hall probe, and less than the field model may lack, m.
 const NOISE_MIN_M: f64 = 0.3e-6;
