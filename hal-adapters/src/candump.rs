@@ -24,62 +24,45 @@ pub struct LogLine<'l> {
 }
 
 /// What is wrong with a line. Columns count characters from 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LineError {
     /// The line does not start with `(seconds.microseconds)`.
+    #[error("no time: a line starts with (seconds.microseconds)")]
     BadTime,
     /// The interface or the frame is missing: the line is cut short.
+    #[error("cut short: time, interface and frame belong here")]
     CutShort,
     /// Neither three nor eight hexadecimal digits, or a value beyond 11 or 29 bits.
+    #[error("column {column}: an identifier has three or eight hexadecimal digits")]
     BadIdentifier {
         /// Where the identifier starts.
         column: usize,
     },
     /// No `#` after the identifier.
+    #[error("column {column}: `#` belongs after the identifier")]
     NoSeparator {
         /// Where it should be.
         column: usize,
     },
     /// Not pairs of hexadecimal digits, or more than eight.
+    #[error("column {column}: data are up to eight pairs of hexadecimal digits")]
     BadData {
         /// Where the data start.
         column: usize,
     },
     /// A frame of CAN FD: this protocol is classic CAN.
+    #[error("a frame of CAN FD, where classic CAN belongs")]
     FlexibleDataRate,
     /// An error frame of the controller, not a frame of the bus.
+    #[error("an error frame of the controller")]
     ErrorFrame,
     /// Something follows the frame.
+    #[error("column {column}: nothing belongs here")]
     Trailing {
         /// Where it starts.
         column: usize,
     },
 }
-
-impl Display for LineError {
-    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
-        match self {
-            Self::BadTime => f.write_str("no time: a line starts with (seconds.microseconds)"),
-            Self::CutShort => f.write_str("cut short: time, interface and frame belong here"),
-            Self::BadIdentifier { column } => write!(
-                f,
-                "column {column}: an identifier has three or eight hexadecimal digits"
-            ),
-            Self::NoSeparator { column } => {
-                write!(f, "column {column}: `#` belongs after the identifier")
-            }
-            Self::BadData { column } => write!(
-                f,
-                "column {column}: data are up to eight pairs of hexadecimal digits"
-            ),
-            Self::FlexibleDataRate => f.write_str("a frame of CAN FD, where classic CAN belongs"),
-            Self::ErrorFrame => f.write_str("an error frame of the controller"),
-            Self::Trailing { column } => write!(f, "column {column}: nothing belongs here"),
-        }
-    }
-}
-
-impl core::error::Error for LineError {}
 
 /// Bit of a logged identifier that marks an error frame.
 const ERROR_FLAG: u32 = 0x2000_0000;

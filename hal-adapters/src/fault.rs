@@ -14,46 +14,33 @@
 //! assert_eq!(got + faulty.injected(Fault::Drop), 100);
 //! ```
 
+use crate::can::numbered;
 use crate::can::table::TABLE;
 use crate::can::{BusFrame, Message, StampedFrame};
 use embedded_can::{Frame, Id, StandardId};
 
-/// What can happen to a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// It does not come.
-    Drop,
-    /// It comes twice.
-    Repeat,
-    /// It changes places with the next frame.
-    Swap,
-    /// It comes after the next 2 to 9 frames.
-    Delay,
-    /// One to three of its bits are flipped.
-    Flip,
-    /// A burst of 2 to 8 bits, both ends flipped.
-    Burst,
-    /// All its bits are random.
-    Noise,
-    /// It has another length.
-    WrongLength,
-    /// It has the identifier of another message, or a foreign one.
-    WrongId,
-}
-
-impl Fault {
-    /// Every fault, in the order of [`FaultRates`].
-    pub const ALL: [Self; 9] = [
-        Self::Drop,
-        Self::Repeat,
-        Self::Swap,
-        Self::Delay,
-        Self::Flip,
-        Self::Burst,
-        Self::Noise,
-        Self::WrongLength,
-        Self::WrongId,
-    ];
+numbered! {
+    /// What can happen to a frame.
+    Fault {
+        /// It does not come.
+        Drop,
+        /// It comes twice.
+        Repeat,
+        /// It changes places with the next frame.
+        Swap,
+        /// It comes after the next 2 to 9 frames.
+        Delay,
+        /// One to three of its bits are flipped.
+        Flip,
+        /// A burst of 2 to 8 bits, both ends flipped.
+        Burst,
+        /// All its bits are random.
+        Noise,
+        /// It has another length.
+        WrongLength,
+        /// It has the identifier of another message, or a foreign one.
+        WrongId,
+    }
 }
 
 /// How often each fault happens, per million frames; at most one happens to a frame.

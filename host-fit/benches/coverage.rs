@@ -7,7 +7,7 @@
 //! of a stage made of physics as well, where the model is not exact.
 
 use host_fit::fit::{FitSettings, ModelChoice, fit};
-use host_fit::input::dataset::{Dataset, LogSource, LoggedFrame, Movement, Row};
+use host_fit::input::dataset::{Dataset, LoggedFrame, Movement, Row};
 use host_fit::input::shipped::STAGE_TOML;
 use host_fit::input::stage::Stage;
 use host_fit::problem::Problem;
@@ -90,9 +90,7 @@ fn drawn(stage: &Stage, random: &mut Stream) -> FieldParameters {
     let start = Parameters::designed(stage);
     let mut parameters = FieldParameters::of_model_31(&start, stage);
     // x, y of the probes.
-    let h = &stage.designed;
-    let places = [[h.h1x_m, h.h1y_m], [-h.h2x_m, h.h2y_m], [h.h3x_m, h.h3y_m]];
-    for (values, [x, y]) in parameters.probes.iter_mut().zip(places) {
+    for (values, [x, y]) in parameters.probes.iter_mut().zip(stage.places_m()) {
         let eta = random.between(0.67, 0.93);
         let a = eta * random.between(-240.0, -210.0);
         values[0] += random.normal(2e-3);
@@ -104,10 +102,7 @@ fn drawn(stage: &Stage, random: &mut Stream) -> FieldParameters {
             }
         }
     }
-    FieldParameters {
-        positions: [host_fit::solve::field::parameters::ProbePosition::FromSlopes; 3],
-        ..parameters
-    }
+    parameters
 }
 
 /// The log of a run as the field model has it: its signals, white noise at the probes, resets and
@@ -147,11 +142,7 @@ fn model_log(truth: &FieldParameters, run: &Run, random: &mut Stream) -> Dataset
             rows: start..dataset.rows.len(),
         });
     }
-    dataset.logs.push(LogSource {
-        path: "made".into(),
-        rows: 0..dataset.rows.len(),
-        has_reference: true,
-    });
+    dataset.end_log("made");
     dataset
 }
 

@@ -11,14 +11,11 @@
 
 use flate2::read::GzDecoder;
 use host_fit::input::shipped::{LOG_GZ, STAGE_TOML};
-use plotters::prelude::{
-    ChartBuilder, Circle, EmptyElement, IntoDrawingArea, IntoLogRange, LineSeries, RGBColor,
-    SVGBackend, WHITE,
-};
+use host_fit::report::axis::Axis;
+use host_fit::report::chart::{Chart, Mark, Panel, Scale, Tone};
 use std::error::Error;
 use std::fs::File;
 use std::io::{BufWriter, Read, Write};
-use std::ops::Range;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -63,7 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         points.push((rows as f64, fit, decode));
     }
     std::fs::remove_dir_all(&folder)?;
-    plot(&points, &folder.with_extension("svg"))
+    Ok(plot(&points, &folder.with_extension("svg"))?)
 }
 
 /// The shipped log so many times, one after the other.
@@ -114,52 +111,27 @@ fn run(folder: &Path, arguments: &str) -> Result<Taken, Box<dyn Error>> {
 }
 
 /// Both commands over the rows, on logarithmic axes: time above, memory below.
-fn plot(points: &[(f64, Taken, Taken)], path: &Path) -> Result<(), Box<dyn Error>> {
-    let area = SVGBackend::new(path, (640, 640)).into_drawing_area();
-    area.fill(&WHITE)?;
-    type Figure = fn(&Taken) -> f64;
-    let panels: [(&str, Figure, Range<f64>); 2] = [
-        (
-            "s (fit red, decode blue)",
-            |taken| taken.seconds,
-            0.01..200.0,
-        ),
-        (
-            "MB (fit red, decode blue)",
-            |taken| taken.megabytes,
-            5.0..5e3,
-        ),
-    ];
-    for (part, (label, of, range)) in area.split_evenly((2, 1)).iter().zip(panels) {
-        let mut chart = ChartBuilder::on(part)
-            .margin(12)
-            .x_label_area_size(36)
-            .y_label_area_size(56)
-            .build_cartesian_2d((4e4..6e7).log_scale(), range.log_scale())?;
-        (chart.configure_mesh())
-            .x_desc("rows")
-            .y_desc(label)
-            .y_label_formatter(&|value| format!("{value}"))
-            .x_label_formatter(&|rows| format!("{rows:.0e}"))
-            .draw()?;
-        let fit: Vec<_> = points
-            .iter()
-            .map(|(rows, fit, _)| (*rows, of(fit)))
-            .collect();
-        let decode: Vec<_> = points
-            .iter()
-            .map(|(rows, _, decode)| (*rows, of(decode)))
-            .collect();
-        for (line, colour) in [
-            (fit, RGBColor(200, 40, 40)),
-            (decode, RGBColor(40, 80, 200)),
-        ] {
-            chart.draw_series(LineSeries::new(line.iter().copied(), colour))?;
-            chart.draw_series(
-                line.iter()
-                    .map(|&at| EmptyElement::at(at) + Circle::new((0, 0), 4, colour)),
-            )?;
+fn plot(points: &[(f64, Taken, Taken)], path: &Path) -> std::io::Result<()> {
+    let panel = |label: &str, of: fn(&Taken) -> f64| {
+        let fit = points.iter().map(|(rows, fit, _)| (*rows, of(fit)));
+        let decode = points.iter().map(|(rows, _, decode)| (*rows, of(decode)));
+        Panel {
+            label: label.to_owned(),
+            scale: Scale::Logarithmic,
+            marks: vec![
+                Mark::Line(Tone::Of(0), fit.collect()),
+                Mark::Line(Tone::Of(1), decode.collect()),
+            ],
         }
-    }
-    Ok(area.present()?)
+    };
+    let chart = Chart {
+        caption: "fit and decode over the length of a log".to_owned(),
+        x_label: "rows".to_owned(),
+        x: Axis::Logarithmic(4e4, 6e7),
+        panels: vec![
+            panel("s", |taken| taken.seconds),
+            panel("MB", |taken| taken.megabytes),
+        ],
+    };
+    std::fs::write(path, chart.svg_file(&[(0, "fit"), (1, "decode")]))
 }

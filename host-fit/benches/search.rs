@@ -12,12 +12,9 @@ use host_fit::input::stage::Stage;
 use host_fit::problem::Problem;
 use host_fit::problem::draw::{Draw, draw_rows};
 use host_fit::problem::model::Model;
-use host_fit::solve::objective::delta::DeltaCost;
-use host_fit::solve::objective::form::Form;
-use host_fit::solve::objective::full::FullCost;
-use host_fit::solve::objective::linear::LinearCost;
+use host_fit::solve::objective::Objective;
 use host_fit::solve::search::cost::CostFunction;
-use host_fit::solve::search::kind::{SearchKind, Settings};
+use host_fit::solve::search::kind::SearchKind;
 use host_fit::solve::search::run::{Outcome, Start, StopCriteria};
 use host_fit::solve::{Projection, Solver, SolverOptions};
 use runtime::ModelKind;
@@ -60,7 +57,7 @@ fn time_us(repeats: usize, mut call: impl FnMut()) -> (f64, f64) {
 }
 
 /// An individual inside the middle half of the box.
-fn inside(cost: &impl CostFunction, number: usize) -> Vec<f64> {
+fn inside(cost: &Objective<'_>, number: usize) -> Vec<f64> {
     let place = |(j, range): (usize, &host_fit::input::stage::Range)| {
         let share = 0.25 + 0.5 * ((number * 31 + j * 17) % 97) as f64 / 96.0;
         range.low + share * range.width()
@@ -68,32 +65,32 @@ fn inside(cost: &impl CostFunction, number: usize) -> Vec<f64> {
     cost.bounds().iter().enumerate().map(place).collect()
 }
 
+fn objective<'a>(problem: &'a Problem<'a>, projection: Projection) -> Objective<'a> {
+    Objective::new(problem, projection).expect("Model (31) has slopes")
+}
+
 /// Time of one evaluation of the objective alone.
-fn objective(name: &str, cost: &impl CostFunction) {
-    let count = 96;
-    let individuals: Vec<f64> = (0..count).flat_map(|k| inside(cost, k)).collect();
-    let mut costs = vec![0.0; count];
-    let (least, middle) = time_us(501, || cost.costs(black_box(&individuals), &mut costs));
-    let one = inside(cost, 0);
-    let (alone, _) = time_us(2001, || {
-        black_box(cost.cost(black_box(&one)));
+fn evaluation(cost: &Objective<'_>) {
+    let individuals: Vec<_> = (0..96).map(|k| inside(cost, k)).collect();
+    let (least, middle) = time_us(501, || {
+        for individual in &individuals {
+            black_box(cost.cost(black_box(individual)));
+        }
     });
     println!(
-        "evaluation, form {name:<6} {:>3} unknowns: {:.3} us (median {:.3}) in a population, {alone:.2} us alone",
+        "evaluation, form {:<6} {:>3} unknowns: {:.3} us (median {:.3})",
+        cost.projection.name(),
         cost.bounds().len(),
-        least / count as f64,
-        middle / count as f64,
+        least / 96.0,
+        middle / 96.0,
     );
 }
 
-fn settings<'a>(seed: u64, population: usize) -> Settings<'a> {
-    Settings {
+fn start(seed: u64, population: usize) -> Start<'static> {
+    Start {
         seed,
-        start: Start {
-            population,
-            individuals: &[],
-        },
-        ..Settings::default()
+        population,
+        individuals: &[],
     }
 }
 
@@ -108,11 +105,11 @@ fn generations(count: usize) -> StopCriteria<'static> {
 fn papers_experiment(problem: &impl Fn(usize, Draw, u64) -> Problem<'static>) {
     let run = |seed| {
         let problem = problem(ROWS, Draw::Plain, seed);
-        let cost = FullCost::new(&problem);
+        let cost = objective(&problem, Projection::None);
         let mut fitness = 0.0;
         let (least, middle) = time_us(5, || {
             let found =
-                SearchKind::Shtlbo.minimize(&cost, &settings(seed, PAPER), &generations(PAPER));
+                SearchKind::Shtlbo.minimize(&cost, &start(seed, PAPER), &generations(PAPER));
             fitness = found.cost;
         });
         (fitness, least, middle)
@@ -133,36 +130,38 @@ fn papers_experiment(problem: &impl Fn(usize, Draw, u64) -> Problem<'static>) {
 }
 
 /// How long a search takes to a share above the least-squares optimum, ten seeds.
-fn to_the_floor(name: &str, form: &Form<'_>, floor: f64, share: f64, population: usize) {
-    let mut evaluations = Vec::new();
-    let mut times = Vec::new();
-    let mut arrived = 0;
-    for seed in 1..=10 {
-        let criteria = StopCriteria {
-            evaluations: Some(200_000),
-            target_cost: Some(floor * (1.0 + share)),
-            ..StopCriteria::default()
-        };
+fn to_the_floor(cost: &Objective<'_>, floor: f64, share: f64, population: usize) {
+    let target = floor * (1.0 + share);
+    let criteria = StopCriteria {
+        evaluations: Some(40_000),
+        ..StopCriteria::default()
+    };
+    let way = |seed| {
         let started = Instant::now();
-        let first = form.first_population(population, seed);
-        let mut settings = settings(seed, population);
-        settings.start.individuals = &first;
-        let found = SearchKind::Shtlbo.minimize(form.cost_function(), &settings, &criteria);
-        times.push(started.elapsed().as_secs_f64() * 1e3);
-        evaluations.push(found.evaluations as f64);
-        arrived += usize::from(found.cost <= floor * (1.0 + share));
-    }
+        let start = Start {
+            individuals: &cost.first_population(population, seed),
+            ..start(seed, population)
+        };
+        let found = SearchKind::Shtlbo.minimize(cost, &start, &criteria);
+        let each_ms = started.elapsed().as_secs_f64() * 1e3 / found.evaluations as f64;
+        let mut history = found.history.iter();
+        let there = history.find(|point| point.best_cost <= target)?;
+        Some((there.evaluations as f64, there.evaluations as f64 * each_ms))
+    };
+    let ways: Vec<_> = (1..=10).filter_map(way).collect();
     println!(
-        "shtlbo, form {name}, Np {population}: {arrived} of 10 seeds within {share:e} of the least-squares \
+        "shtlbo, form {}, Np {population}: {} of 10 seeds within {share:e} of the least-squares \
          fitness {floor:.6}, median {:.0} evaluations, {:.2} ms",
-        median(evaluations),
-        median(times),
+        cost.projection.name(),
+        ways.len(),
+        median(ways.iter().map(|way| way.0).collect()),
+        median(ways.iter().map(|way| way.1).collect()),
     );
 }
 
 /// The same search on one thread and on two: time, and whether the path is the same.
 fn threads(problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
-    let cost = FullCost::new(problem);
+    let cost = objective(problem, Projection::None);
     let mut found: Vec<Outcome> = Vec::new();
     let mut times = Vec::new();
     for threads in [1, 2] {
@@ -170,7 +169,7 @@ fn threads(problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
             .num_threads(threads)
             .build()?;
         let started = Instant::now();
-        let search = || SearchKind::Shtlbo.minimize(&cost, &settings(1, PAPER), &generations(5));
+        let search = || SearchKind::Shtlbo.minimize(&cost, &start(1, PAPER), &generations(5));
         found.push(pool.install(search));
         times.push(started.elapsed().as_secs_f64() * 1e3);
     }
@@ -191,14 +190,14 @@ fn export(folder: &Path, problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
         String::from("movement,s_a_um,s_b_um,s_c_um,z_m,rx_rad,ry_rad,x_um,y_um,rz_urad\n");
     for group in &problem.groups {
         for row in &problem.rows[group.rows.clone()] {
-            let [z, rx, ry, _] = row.slopes;
+            let [z, rx, ry] = row.vertical;
             let numbers = [row.signal_um, [z, rx, ry], row.reference_um].concat();
             let text: Vec<String> = numbers.iter().map(f64::to_string).collect();
             writeln!(rows, "{},{}", group.movement, text.join(","))?;
         }
     }
     std::fs::write(folder.join("rows.csv"), rows)?;
-    let cost = FullCost::new(problem);
+    let cost = objective(problem, Projection::None);
     let individual = inside(&cost, 1);
     let mut unknowns = String::from("low,high,individual\n");
     for (range, x) in cost.bounds().iter().zip(&individual) {
@@ -209,7 +208,7 @@ fn export(folder: &Path, problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
         let mut fitness = Vec::new();
         let (_, middle) = time_us(5, || {
             let seed = fitness.len() as u64 + 1;
-            let found = kind.minimize(&cost, &settings(seed, PAPER), &generations(PAPER));
+            let found = kind.minimize(&cost, &start(seed, PAPER), &generations(PAPER));
             fitness.push(found.cost);
         });
         println!("RESULT {name}_us_per_evaluation={:.4}", middle / 20_100.0);
@@ -257,20 +256,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let few = problem(ROWS, Draw::Stratified, 1);
     let all = problem(usize::MAX, Draw::Stratified, 1);
-    let linear = LinearCost::new(&few).ok_or("Model (31) has ratios")?;
     let lm = SolverOptions::new(Projection::Linear, 1);
     let floor = few.fitness(Solver::LeastSquares.solve(&few, &lm)?.cost);
     one.install(|| {
-        objective("none", &FullCost::new(&few));
-        objective("delta", &DeltaCost::new(&few));
-        objective("linear", &linear);
+        let [_, delta, linear] =
+            [Projection::None, Projection::Delta, Projection::Linear].map(|p| {
+                let cost = objective(&few, p);
+                evaluation(&cost);
+                cost
+            });
         papers_experiment(&problem);
         // 1e-6 of the sum of squares is 5e-7 of its root.
-        let linear = Form::Linear(linear);
-        to_the_floor("linear", &linear, floor, 5e-7, FEW);
-        to_the_floor("linear", &linear, floor, 5e-7, PAPER);
-        let delta = Form::Delta(DeltaCost::new(&few));
-        to_the_floor("delta", &delta, floor, 0.01, PAPER);
+        to_the_floor(&linear, floor, 5e-7, FEW);
+        to_the_floor(&linear, floor, 5e-7, PAPER);
+        to_the_floor(&delta, floor, 0.01, PAPER);
     });
     threads(&all)
 }

@@ -1,122 +1,115 @@
 //! What changed between two parameter blobs: parameters, and the pose that the same codes give.
+//!
+//! ```
+//! use host_fit::diff::pose_difference;
+//! use runtime::ParameterSet;
+//!
+//! let blob = std::fs::read("../runtime/examples/field.bin")?;
+//! let set = ParameterSet::from_flash(&blob)?;
+//! let same = pose_difference(&set, &set);
+//! assert_eq!((&same["poses"], &same["axes"]["rz"]["peak_urad"]), (&15_625.into(), &0.0.into()));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use crate::report::parameters::{Parameter, parameters_in};
 use nalgebra::Matrix3;
 use runtime::{ParameterSet, PlanarPose, RawFrame};
+use serde_json::{Map, Value, json};
+use std::array::from_fn;
 use std::collections::BTreeMap;
 
 /// Places of each axis at which poses are compared, in parts of its range.
 const LEVELS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 /// Steps towards the codes of a pose: each leaves a tenth of the way or less.
 const STEPS: u32 = 6;
+/// Axes of a pose with the units of their errors.
+const AXES: [(&str, &str); 6] = [
+    ("x", "um"),
+    ("y", "um"),
+    ("rz", "urad"),
+    ("z", "um"),
+    ("rx", "urad"),
+    ("ry", "urad"),
+];
 
-/// One parameter of either blob.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ParameterChange {
-    /// SI unit.
-    pub unit: &'static str,
-    /// Its value in the first blob; `None` where the model has no such term.
-    pub a: Option<f64>,
-    /// In the second.
-    pub b: Option<f64>,
-    /// The change over the standard error of a difference of independent logs; `None` unless both
-    /// standard errors are known.
-    pub sigma: Option<f64>,
-}
-
-/// The second blob's pose less the first one's, one axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct AxisDifference {
-    /// m or rad.
-    pub mean: f64,
-    /// Root of the mean square, m or rad.
-    pub rms: f64,
-    /// Largest magnitude, m or rad.
-    pub peak: f64,
-}
-
-/// What two blobs make of the same codes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseDifference {
-    /// Largest magnitudes of X, Y, Rz, Z, Rx, Ry (m, m, rad, m, rad, rad) for which both are calibrated.
-    pub range: [f64; 6],
-    /// Poses of a grid over it that both decode.
-    pub poses: usize,
-    /// Poses of it whose codes one of them refuses.
-    pub refused: usize,
-    /// By axis: X, Y, Rz, Z, Rx, Ry.
-    pub axes: [AxisDifference; 6],
-}
-
-/// The parameters of both blobs by name, with their standard errors (SI) where they are known.
-pub fn parameter_changes(
-    [a, b]: [&ParameterSet; 2],
-    errors: [&BTreeMap<String, f64>; 2],
-) -> BTreeMap<String, ParameterChange> {
-    let mut changes = BTreeMap::new();
-    let (in_a, in_b) = (parameters_in(a), parameters_in(b));
-    for (name, Parameter { unit, .. }) in in_a.iter().chain(&in_b) {
+/// The parameters of both blobs by name, SI: their values `a` and `b`, null where the model has no such
+/// term; the change, and `sigma`, the change over the standard error of a difference of independent logs,
+/// null unless both `errors` (SI, by name) are known.
+pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f64>; 2]) -> Value {
+    let [in_a, in_b] = sets.map(parameters_in);
+    let change = |(name, Parameter { unit, .. }): (&String, &Parameter)| {
         let value = |of: &BTreeMap<String, Parameter>| of.get(name).map(|p| p.value);
         let (a, b) = (value(&in_a), value(&in_b));
-        let sigma = || {
-            let [of_a, of_b] = [errors[0].get(name)?, errors[1].get(name)?];
-            Some((b? - a?) / (of_a * of_a + of_b * of_b).sqrt())
-        };
-        let sigma = sigma();
-        changes.insert(name.clone(), ParameterChange { unit, a, b, sigma });
-    }
-    changes
+        let change = a.zip(b).map(|(a, b)| b - a);
+        let deviations = errors[0].get(name).zip(errors[1].get(name));
+        let sigma = change
+            .zip(deviations)
+            .map(|(change, (a, b))| change / (a * a + b * b).sqrt());
+        let figures = json!({ "a": a, "b": b, "change": change, "sigma": sigma, "unit": unit });
+        (name.clone(), figures)
+    };
+    in_a.iter()
+        .chain(&in_b)
+        .map(change)
+        .collect::<Map<_, _>>()
+        .into()
 }
 
-/// What both make of the codes of a grid of poses, by the decoder that runs on the target. The codes
-/// are those at which the first blob reads nearly the poses of the grid. `None` where the geometry
-/// of the first cannot be inverted.
-pub fn pose_difference(a: &ParameterSet, b: &ParameterSet) -> Option<PoseDifference> {
+/// The second blob's pose less the first one's, by the decoder that runs on the target, over the codes of
+/// a grid of poses: those at which the first blob reads nearly the poses. Its range is that for which both
+/// are calibrated; `refused` counts poses that one of them does not decode. Null where the geometry of the
+/// first blob cannot be inverted.
+pub fn pose_difference(a: &ParameterSet, b: &ParameterSet) -> Value {
     let range_of = |set: &ParameterSet| {
         let c = &set.constants;
-        let words = c.calibrated_planar.iter().chain(&c.calibrated_vertical);
-        words.map(|&word| f64::from(word)).collect::<Vec<_>>()
+        [c.calibrated_planar, c.calibrated_vertical].concat()
     };
     let (of_a, of_b) = (range_of(a), range_of(b));
-    let range: [f64; 6] = std::array::from_fn(|k| of_a[k].min(of_b[k]));
-    let codes = Codes::new(a)?;
-    let (decoder_a, decoder_b) = (a.decoder(), b.decoder());
-    let mut sums = [[0.0f64; 2]; 6];
-    let mut peaks = [0.0f64; 6];
-    let (mut poses, mut refused) = (0, 0);
+    let range: [f64; 6] = from_fn(|k| f64::from(of_a[k].min(of_b[k])));
+    let Some(codes) = Codes::new(a) else {
+        return Value::Null;
+    };
+    let decoders = [a.decoder(), b.decoder()];
+    // By axis: sum, sum of squares, largest magnitude.
+    let mut sums = [[0.0f64; 3]; 6];
+    let (mut poses, mut refused) = (0u32, 0u32);
     for place in 0..LEVELS.len().pow(6) {
         let level = |axis: usize| LEVELS[place / LEVELS.len().pow(axis as u32) % LEVELS.len()];
-        let pose: [f64; 6] = std::array::from_fn(|axis| level(axis) * range[axis]);
-        let frame = codes.at(pose);
+        let frame = codes.at(from_fn(|axis| level(axis) * range[axis]));
         let read = |decoder: &runtime::AnyDecoder| {
             let reading = decoder.decode(&frame, &PlanarPose::ZERO);
-            let planar = reading.planar()?.to_array().map(f64::from);
-            let vertical = reading.vertical()?.to_array().map(f64::from);
-            let both = planar.into_iter().chain(vertical);
-            Some(both.collect::<Vec<_>>())
+            let planar = reading.planar()?.to_array();
+            Some([planar, reading.vertical()?.to_array()].concat())
         };
-        let (Some(from), Some(to)) = (read(&decoder_a), read(&decoder_b)) else {
+        let [Some(from), Some(to)] = [read(&decoders[0]), read(&decoders[1])] else {
             refused += 1;
             continue;
         };
         poses += 1;
-        for axis in 0..6 {
-            let difference = to[axis] - from[axis];
-            sums[axis][0] += difference;
-            sums[axis][1] += difference * difference;
-            peaks[axis] = peaks[axis].max(difference.abs());
+        for (axis, [sum, squares, peak]) in sums.iter_mut().enumerate() {
+            let difference = f64::from(to[axis]) - f64::from(from[axis]);
+            *sum += difference;
+            *squares += difference * difference;
+            *peak = peak.max(difference.abs());
         }
     }
-    let n = f64::from(u32::try_from(poses.max(1)).unwrap_or(u32::MAX));
-    Some(PoseDifference {
-        range,
-        poses,
-        refused,
-        axes: std::array::from_fn(|axis| AxisDifference {
-            mean: sums[axis][0] / n,
-            rms: (sums[axis][1] / n).sqrt(),
-            peak: peaks[axis],
-        }),
+    let n = f64::from(poses.max(1));
+    let axis = |(k, (name, unit)): (usize, &(&str, &str))| {
+        let [sum, squares, peak] = sums[k];
+        let figures = json!({
+            format!("mean_{unit}"): sum / n * 1e6,
+            format!("rms_{unit}"): (squares / n).sqrt() * 1e6,
+            format!("peak_{unit}"): peak * 1e6,
+        });
+        ((*name).to_owned(), figures)
+    };
+    let ranges = AXES.iter().zip(range);
+    let ranges = ranges.map(|((name, unit), x)| (format!("{name}_{unit}"), json!(x * 1e6)));
+    json!({
+        "poses": poses,
+        "refused": refused,
+        "range": ranges.collect::<Map<_, _>>(),
+        "axes": AXES.iter().enumerate().map(axis).collect::<Map<_, _>>(),
     })
 }
 
@@ -176,51 +169,68 @@ impl Codes {
 mod tests {
     use super::*;
 
-    const BLOB: &[u8] = include_bytes!("../../runtime/examples/stage.bin");
-    const FIELD: &[u8] = include_bytes!("../../runtime/examples/field.bin");
+    const BLOBS: [&[u8]; 2] = [
+        include_bytes!("../../runtime/examples/stage.bin"),
+        include_bytes!("../../runtime/examples/field.bin"),
+    ];
 
-    fn set(bytes: &[u8]) -> ParameterSet {
-        ParameterSet::from_bytes(bytes).expect("sound")
+    fn sets() -> [ParameterSet; 2] {
+        BLOBS.map(|bytes| ParameterSet::from_bytes(bytes).expect("sound"))
     }
 
     #[test]
     fn a_blob_does_not_differ_from_itself() {
-        for bytes in [BLOB, FIELD] {
-            let set = set(bytes);
-            let same = pose_difference(&set, &set).expect("invertible");
-            assert_eq!((same.poses, same.refused), (15_625, 0));
-            assert_eq!(same.axes, [AxisDifference::default(); 6]);
+        for set in sets() {
+            let same = pose_difference(&set, &set);
+            assert_eq!(
+                (&same["poses"], &same["refused"]),
+                (&json!(15_625), &json!(0))
+            );
+            let axes = same["axes"].as_object().expect("axes").values();
+            let mut figures = axes.flat_map(|axis| axis.as_object().expect("figures").values());
+            assert!(figures.all(|figure| *figure == json!(0.0)));
             let none = BTreeMap::new();
             let changes = parameter_changes([&set, &set], [&none, &none]);
-            assert!(changes.values().all(|c| c.a.is_some() && c.a == c.b));
+            let mut changes = changes.as_object().expect("parameters").values();
+            assert!(changes.all(|c| c["a"].is_f64() && c["a"] == c["b"] && c["sigma"].is_null()));
         }
     }
 
     /// The grid is reached: the Hall scale a thousandth larger moves its corners by a thousandth.
     #[test]
     fn a_larger_scale_moves_every_pose_in_proportion() {
-        for bytes in [BLOB, FIELD] {
-            let a = set(bytes);
+        for a in sets() {
             let mut b = a.clone();
             for row in &mut b.constants.planar_per_code {
                 row.iter_mut().for_each(|x| *x *= 1.001);
             }
-            let found = pose_difference(&a, &b).expect("invertible");
-            for axis in 0..3 {
-                let AxisDifference { mean, rms, peak } = found.axes[axis];
-                let expected = 1e-3 * found.range[axis];
-                assert!(
-                    (peak / expected - 1.0).abs() < 0.02,
-                    "{axis}: {peak:e} {expected:e}"
-                );
+            let found = pose_difference(&a, &b);
+            for (name, unit) in AXES {
+                let figure = |what: &str| {
+                    let figure = &found["axes"][name][format!("{what}_{unit}")];
+                    figure.as_f64().expect("a figure")
+                };
+                let is_planar = ["x", "y", "rz"].contains(&name);
+                let range = &found["range"][format!("{name}_{unit}")];
+                let moved = if is_planar {
+                    1e-3 * range.as_f64().expect("a range")
+                } else {
+                    0.0
+                };
                 // Levels 0, 1/2, 1 of both signs: the root of (2 + 1/2) / 5.
-                assert!(
-                    (rms / expected - 0.5f64.sqrt()).abs() < 0.02,
-                    "{axis}: {rms:e}"
-                );
-                assert!(mean.abs() < 0.02 * expected, "{axis}: {mean:e}");
+                for (what, expected) in [
+                    ("peak", moved),
+                    ("rms", 0.5f64.sqrt() * moved),
+                    ("mean", 0.0),
+                ] {
+                    let off = (figure(what) - expected).abs();
+                    assert!(
+                        off <= 0.02 * moved,
+                        "{name} {what}: {} {expected}",
+                        figure(what)
+                    );
+                }
             }
-            assert_eq!(found.axes[3..], [AxisDifference::default(); 3]);
         }
     }
 }

@@ -51,8 +51,5 @@ fn main() -> Result<(), Box<dyn Error>> {
     for name in reading.status.names() {
         println!("  {name}");
     }
-    for fault in decoder.constants().channel_faults(&frame) {
-        println!("  {fault:?}");
-    }
     Ok(())
 }

@@ -13,9 +13,14 @@
 //! The payload holds the fields in the order of the struct: unsigned integers as varints
 //! (7 bits a byte, lowest first), signed ones zigzagged first, `f32` as four bytes
 //! little-endian, text as a length and its bytes, arrays without a length. `inspect` shows
-//! every field; the golden examples in `golden.rs` fix the bytes. In version 2 each probe has
+//! every field; the golden examples in `blob_tests.rs` fix the bytes. In version 2 each probe has
 //! the 28 numbers of a [`FieldProbe`](crate::model::FieldProbe), and three matrices that follow
 //! from the constants are left out: PM, PM^-1 and the capacitive plane matrix.
+//!
+//! theta of the probes is the angle of the sensing axis from +Y for A and B and from +X for C (see
+//! [`geometry`](crate::geometry)), whatever direction the stage was designed with: in the
+//! paper's directions it is the misalignment, and for a probe mounted the other way round it is
+//! near pi. So a stage with other directions needs nothing else in the blob.
 //!
 //! The CRC finds any five flipped bits, any odd number of them, and any burst of up to 32, in
 //! every blob: with up to [`MAX_BYTES`] at most 5,216 bits stand before the check, and up to 5,243
@@ -307,5 +312,5 @@ fn blob_length(bytes: &[u8]) -> Result<usize, BlobError> {
 }
 
 #[cfg(test)]
-#[path = "golden.rs"]
-mod golden;
+#[path = "blob_tests.rs"]
+mod tests;

@@ -13,7 +13,7 @@
 //! what is NaN.
 
 use crate::capacitive::vertical_pose;
-use crate::frame::{ChannelFault, CodeWindow, RawFrame};
+use crate::frame::{CodeWindow, RawFrame};
 use crate::model::{FieldModel, LinearModel, Model};
 use crate::pose::{PlanarPose, Pose, VerticalPose};
 use crate::real::Real;
@@ -62,8 +62,7 @@ pub trait Decode: Sync {
     /// less `zero`; invalid fields are 0 and the status says why. Never NaN.
     fn decode(&self, frame: &RawFrame, zero: &PlanarPose<f32>) -> Reading;
 
-    /// The constants that do not depend on the model. Their method
-    /// [`channel_faults`](DecoderConstants::channel_faults) says why codes are not decoded.
+    /// The constants that do not depend on the model.
     fn constants(&self) -> &DecoderConstants<f32>;
 }
 
@@ -297,22 +296,6 @@ impl<M: Model> Decode for Decoder<M> {
 
     fn constants(&self) -> &DecoderConstants<f32> {
         &self.constants
-    }
-}
-
-impl<T> DecoderConstants<T> {
-    /// Every bad code of a frame with its reason, for diagnosis off the tick path.
-    pub fn channel_faults(&self, frame: &RawFrame) -> impl Iterator<Item = ChannelFault> + use<T> {
-        let (hall_window, capacitive_window) = (self.hall_window, self.capacitive_window);
-        let hall = (0u8..).zip(frame.hall).filter_map(move |(probe, code)| {
-            let fault = hall_window.check(code).err()?;
-            Some(ChannelFault::Hall { probe, fault })
-        });
-        let gaps = (0u8..).zip(frame.capacitive);
-        hall.chain(gaps.filter_map(move |(gap, code)| {
-            let fault = capacitive_window.check(code).err()?;
-            Some(ChannelFault::Capacitive { gap, fault })
-        }))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::calibration::Calibration;
-use crate::frame::{CodeFault, MISSING_CODE};
+use crate::frame::MISSING_CODE;
 use crate::model::Sensitivity;
 use crate::sample;
 
@@ -214,28 +214,6 @@ fn the_zero_deviation_is_taken_off() {
     for ((less, plain), zero) in less.into_iter().zip(plain).zip(zero.to_array()) {
         assert!((f64::from(plain) - f64::from(zero) - f64::from(less)).abs() < 2e-11);
     }
-}
-
-#[test]
-fn channel_faults_name_channel_and_reason() {
-    let frame = RawFrame {
-        hall: [5, MISSING_CODE, 6],
-        capacitive: [1, 2, 40000],
-        sequence: 0,
-        time_us: 0,
-    };
-    let mut faults = decoder().constants().channel_faults(&frame);
-    let fault = CodeFault::Missing;
-    assert_eq!(faults.next(), Some(ChannelFault::Hall { probe: 1, fault }));
-    let fault = CodeFault::AboveWindow {
-        code: 40000,
-        high: sample::WINDOW.high,
-    };
-    assert_eq!(
-        faults.next(),
-        Some(ChannelFault::Capacitive { gap: 2, fault })
-    );
-    assert_eq!(faults.next(), None);
 }
 
 /// Motion over the whole calibrated range, codes as the converters would give them: `f32`

@@ -38,46 +38,6 @@ pub struct CodeWindow {
     pub high: i32,
 }
 
-/// A code of a frame that is not decoded: its channel, and why.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ChannelFault {
-    /// A Hall probe, 0 to 2 for A to C.
-    Hall {
-        /// Which probe.
-        probe: u8,
-        /// What is wrong.
-        fault: CodeFault,
-    },
-    /// A capacitive sensor, 0 to 2 for gaps 1 to 3.
-    Capacitive {
-        /// Which gap.
-        gap: u8,
-        /// What is wrong.
-        fault: CodeFault,
-    },
-}
-
-/// Why a code is not decoded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CodeFault {
-    /// The adapter had no code for this channel in this period.
-    Missing,
-    /// The code lies below the window: the lower rail, or an implausible value.
-    BelowWindow {
-        /// The code.
-        code: i32,
-        /// Smallest accepted code.
-        low: i32,
-    },
-    /// The code lies above the window: the upper rail, or an implausible value.
-    AboveWindow {
-        /// The code.
-        code: i32,
-        /// Largest accepted code.
-        high: i32,
-    },
-}
-
 impl CodeWindow {
     /// All codes strictly between the converter's end codes, or `None` unless
     /// `-2^23 <= code_min < code_max - 1` and `code_max <= 2^23`.
@@ -109,25 +69,6 @@ impl CodeWindow {
     pub const fn contains(&self, code: i32) -> bool {
         code.wrapping_sub(self.low) as u32 <= self.span()
     }
-
-    /// The code itself, or why it is not decoded.
-    pub const fn check(&self, code: i32) -> Result<i32, CodeFault> {
-        if code == MISSING_CODE {
-            Err(CodeFault::Missing)
-        } else if code < self.low {
-            Err(CodeFault::BelowWindow {
-                code,
-                low: self.low,
-            })
-        } else if code > self.high {
-            Err(CodeFault::AboveWindow {
-                code,
-                high: self.high,
-            })
-        } else {
-            Ok(code)
-        }
-    }
 }
 
 #[cfg(test)]
@@ -152,27 +93,7 @@ mod tests {
             (MISSING_CODE, false),
         ] {
             assert_eq!(WINDOW.contains(code), inside, "{code}");
-            assert_eq!(WINDOW.check(code).is_ok(), inside, "{code}");
         }
-    }
-
-    #[test]
-    fn each_bad_code_has_its_reason() {
-        assert_eq!(WINDOW.check(MISSING_CODE), Err(CodeFault::Missing));
-        assert_eq!(
-            WINDOW.check(-32768),
-            Err(CodeFault::BelowWindow {
-                code: -32768,
-                low: -32767
-            })
-        );
-        assert_eq!(
-            WINDOW.check(40000),
-            Err(CodeFault::AboveWindow {
-                code: 40000,
-                high: 32766
-            })
-        );
     }
 
     #[test]

@@ -1,12 +1,16 @@
 //! Where the Hall probes sit and how they are turned: the plane matrix PM (equations 11, 32).
 //!
 //! A probe at p that senses along the unit vector u reads u . (q + Rz x p) for a motion
-//! q = (X, Y) and a small Rz. So a row of PM is u and the lever arm u_y p_x - u_x p_y. Aligned,
-//! A and B sense +Y and C senses +X; a misalignment turns them counterclockwise.
+//! q = (X, Y) and a small Rz. So a row of PM is u and the lever arm u_y p_x - u_x p_y.
 //!
-//! The six coordinates enter PM only through three lever arms, its third column. `H1x` and
-//! `H1y` cannot be told apart by any data, nor can the other pairs, so a calibration holds
-//! lever arms and misalignments; coordinates are kept only as designed values.
+//! theta is the angle of u, counterclockwise, from +Y for A and B and from +X for C. In the
+//! paper's stage these are the designed directions and theta is the misalignment. A stage
+//! whose probes are mounted in other directions has other designed thetas: 180 degrees for a
+//! probe mounted the other way round. Nothing else depends on the direction, so a blob
+//! stores theta as it is here, and needs no entry for the designed directions.
+//!
+//! Two coordinates of a probe enter PM only through its lever arm, so no data can tell them
+//! apart. A calibration holds lever arms and thetas; places are kept only as designed values.
 //!
 //! Everything here runs on any [`Number`], so that the target's `f32`, the host's `f64` and
 //! the lanes of a SIMD register use the same functions. Sums and products are written out:
@@ -15,30 +19,12 @@
 use crate::real::{Number, Real};
 use nalgebra::Matrix3;
 
-/// Coordinates of the Hall probes in the stage's frame, with the paper's signs:
-/// A at (`h1x`, `h1y`), B at (-`h2x`, `h2y`), C at (`h3x`, `h3y`). All in m.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ProbeCoordinates<T> {
-    /// H1x, m.
-    pub h1x_m: T,
-    /// H1y, m.
-    pub h1y_m: T,
-    /// H2x, m (probe B sits at -H2x).
-    pub h2x_m: T,
-    /// H2y, m.
-    pub h2y_m: T,
-    /// H3x, m.
-    pub h3x_m: T,
-    /// H3y, m.
-    pub h3y_m: T,
-}
-
-/// Lever arms and misalignments of the probes A, B, C: all that PM depends on.
+/// Lever arms and angles of the probes A, B, C: all that PM depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ProbeGeometry<T> {
     /// Third column of PM: displacement along the sensing axis per rad of Rz, m.
     pub lever_arm_m: [T; 3],
-    /// Angle of each sensing axis from its designed direction, rad.
+    /// theta: angle of each sensing axis from +Y (A, B) or +X (C), rad.
     pub misalignment_rad: [T; 3],
 }
 
@@ -47,7 +33,7 @@ pub struct ProbeGeometry<T> {
 pub struct SensingAxes<T>(pub [[T; 2]; 3]);
 
 impl<T: Number> SensingAxes<T> {
-    /// The axes at the given misalignments.
+    /// The axes at the given thetas.
     #[inline(always)]
     pub fn at(misalignment_rad: [T; 3]) -> Self {
         let [a, b, c] = misalignment_rad;
@@ -56,7 +42,7 @@ impl<T: Number> SensingAxes<T> {
         Self([[-sin_a, cos_a], [-sin_b, cos_b], [cos_c, sin_c]])
     }
 
-    /// The derivative of each axis by its misalignment, per rad. It is also the unit vector
+    /// The derivative of each axis by its theta, per rad. It is also the unit vector
     /// across the axis: the axis turned by a right angle.
     #[inline(always)]
     pub fn across(&self) -> [[T; 2]; 3] {
@@ -64,24 +50,22 @@ impl<T: Number> SensingAxes<T> {
         [[-a[1], a[0]], [-b[1], b[0]], [-c[1], c[0]]]
     }
 
-    /// The derivatives of each lever arm by the two coordinates of its probe, in the order
-    /// and with the signs of [`ProbeCoordinates`]: (H1x, H1y), (H2x, H2y), (H3x, H3y).
+    /// The derivatives of each lever arm by x and y of its probe.
     #[inline(always)]
     pub fn arm_factors(&self) -> [[T; 2]; 3] {
         let [a, b, c] = self.0;
-        [[a[1], -a[0]], [-b[1], -b[0]], [c[1], -c[0]]]
+        [[a[1], -a[0]], [b[1], -b[0]], [c[1], -c[0]]]
     }
 
-    /// Lever arms of probes at `coordinates_m` (see [`ProbeCoordinates::pairs`]): the third
-    /// column of PM (equation 11), m.
+    /// Lever arms of probes at these places (x, y): the third column of PM (equation 11), m.
     #[inline(always)]
-    pub fn lever_arms_m(&self, coordinates_m: [[T; 2]; 3]) -> [T; 3] {
+    pub fn lever_arms_m(&self, places_m: [[T; 2]; 3]) -> [T; 3] {
         let [a, b, c] = self.arm_factors();
-        let [h1, h2, h3] = coordinates_m;
+        let [at_a, at_b, at_c] = places_m;
         [
-            a[0] * h1[0] + a[1] * h1[1],
-            b[0] * h2[0] + b[1] * h2[1],
-            c[0] * h3[0] + c[1] * h3[1],
+            a[0] * at_a[0] + a[1] * at_a[1],
+            b[0] * at_b[0] + b[1] * at_b[1],
+            c[0] * at_c[0] + c[1] * at_c[1],
         ]
     }
 
@@ -107,7 +91,7 @@ impl SensingAxes<f32> {
         (Self([[ax, ay], [bx, by], [cx, cy]]), [arm_a, arm_b, arm_c])
     }
 
-    /// The misalignments of the axes, rad, whatever their lengths: the inverse of
+    /// theta of each axis, -pi to pi, whatever its length: the inverse of
     /// [`SensingAxes::at`]. By `libm` in `f32` alone; its sine and cosine would take 7 KB of a
     /// Cortex-M4F's flash, for they use `f64`.
     pub fn misalignment_rad(&self) -> [f32; 3] {
@@ -120,64 +104,15 @@ impl SensingAxes<f32> {
     }
 }
 
-impl<T: Copy> ProbeCoordinates<T> {
-    /// The two coordinates of each probe: (H1x, H1y), (H2x, H2y), (H3x, H3y), m.
-    #[inline(always)]
-    pub fn pairs(&self) -> [[T; 2]; 3] {
-        [
-            [self.h1x_m, self.h1y_m],
-            [self.h2x_m, self.h2y_m],
-            [self.h3x_m, self.h3y_m],
-        ]
-    }
-
-    /// From the two coordinates of each probe, as [`ProbeCoordinates::pairs`] gives them, m.
-    #[inline(always)]
-    pub fn from_pairs([[h1x_m, h1y_m], [h2x_m, h2y_m], [h3x_m, h3y_m]]: [[T; 2]; 3]) -> Self {
+impl<T: Number> ProbeGeometry<T> {
+    /// The geometry of probes that stand at these places (x, y).
+    pub fn of_places(places_m: [[T; 2]; 3], misalignment_rad: [T; 3]) -> Self {
         Self {
-            h1x_m,
-            h1y_m,
-            h2x_m,
-            h2y_m,
-            h3x_m,
-            h3y_m,
-        }
-    }
-}
-
-impl<T: Number> ProbeCoordinates<T> {
-    /// Lever arms at the given misalignments: the third column of PM (equation 11), m.
-    pub fn lever_arms_m(&self, misalignment_rad: [T; 3]) -> [T; 3] {
-        SensingAxes::at(misalignment_rad).lever_arms_m(self.pairs())
-    }
-
-    /// The geometry of probes at these coordinates, turned by `misalignment_rad`.
-    pub fn geometry(&self, misalignment_rad: [T; 3]) -> ProbeGeometry<T> {
-        ProbeGeometry {
-            lever_arm_m: self.lever_arms_m(misalignment_rad),
+            lever_arm_m: SensingAxes::at(misalignment_rad).lever_arms_m(places_m),
             misalignment_rad,
         }
     }
 
-    /// The coordinates nearest to these (least sum of squared changes) that have the
-    /// given geometry. They are a choice, not a measurement: see the module's text.
-    pub fn nearest_with(&self, geometry: &ProbeGeometry<T>) -> Self {
-        let axes = SensingAxes::at(geometry.misalignment_rad);
-        let (now, factors) = (axes.lever_arms_m(self.pairs()), axes.arm_factors());
-        let mut pairs = self.pairs();
-        for (k, pair) in pairs.iter_mut().enumerate() {
-            // A step along the gradient, which has length one.
-            let step = geometry.lever_arm_m[k] - now[k];
-            *pair = [
-                pair[0] + step * factors[k][0],
-                pair[1] + step * factors[k][1],
-            ];
-        }
-        Self::from_pairs(pairs)
-    }
-}
-
-impl<T: Number> ProbeGeometry<T> {
     /// The rows of PM (equations 11, 32): displacement sensed by A, B, C, in m, per
     /// (m, m, rad) of (X, Y, Rz).
     pub fn plane_rows(&self) -> [[T; 3]; 3] {
@@ -221,41 +156,36 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const DESIGNED: ProbeCoordinates<f64> = ProbeCoordinates {
-        h1x_m: 0.1975,
-        h1y_m: 0.40,
-        h2x_m: 0.1975,
-        h2y_m: 0.42,
-        h3x_m: 0.1975,
-        h3y_m: 0.36,
-    };
+    /// The places of the paper's stage.
+    const PLACES_M: [[f64; 2]; 3] = [[0.1975, 0.40], [-0.1975, 0.42], [0.1975, 0.36]];
 
     #[test]
     fn aligned_probes_sense_y_y_x_with_the_designed_arms() {
-        let rows = DESIGNED.geometry([0.0; 3]).plane_rows();
+        let rows = ProbeGeometry::of_places(PLACES_M, [0.0; 3]).plane_rows();
         assert_eq!(
             rows,
             [[0.0, 1.0, 0.1975], [0.0, 1.0, -0.1975], [1.0, 0.0, -0.36]]
         );
     }
 
-    /// A rigid body turned by a small Rz moves the probe at p by Rz x p; the sensing axis
-    /// projects that. Worked from vectors, not from equation 11.
+    /// A rigid body turned by a small Rz moves a probe at p by Rz x p. Worked from vectors,
+    /// not from equation 11.
     #[test]
-    fn lever_arm_is_the_sensed_part_of_a_small_rotation() {
-        let misalignment = [0.03, -0.05, 0.08];
-        let arms = DESIGNED.lever_arms_m(misalignment);
-        let probes = [(0.1975, 0.40), (-0.1975, 0.42), (0.1975, 0.36)];
-        for (k, &(px, py)) in probes.iter().enumerate() {
-            let t = misalignment[k];
-            let axis = if k < 2 {
-                (-t.sin(), t.cos())
-            } else {
-                (t.cos(), t.sin())
-            };
-            let moved = (-py, px);
-            let expected = axis.0 * moved.0 + axis.1 * moved.1;
-            assert!((arms[k] - expected).abs() < 1e-15, "probe {k}");
+    fn a_probe_reads_the_sensed_part_of_a_rigid_motion_wherever_it_stands_and_points() {
+        let half_turn = core::f64::consts::PI;
+        for theta in [[0.03, -0.05, 0.08], [half_turn, 1.9, 0.5 - half_turn]] {
+            for place in [[0.4, -0.1], [0.1, 0.3]] {
+                let rows = ProbeGeometry::of_places([place; 3], theta).plane_rows();
+                for (k, row) in rows.iter().enumerate() {
+                    let standard = if k < 2 { half_turn / 2.0 } else { 0.0 };
+                    let axis = ((standard + theta[k]).cos(), (standard + theta[k]).sin());
+                    let [x, y, rz] = [3e-4, -2e-4, 1e-4];
+                    let moved = (x - rz * place[1], y + rz * place[0]);
+                    let expected = axis.0 * moved.0 + axis.1 * moved.1;
+                    let read = row[0] * x + row[1] * y + row[2] * rz;
+                    assert!((read - expected).abs() < 1e-18, "probe {k}");
+                }
+            }
         }
     }
 
@@ -279,35 +209,21 @@ mod tests {
                 for part in 0..2 {
                     let slope = (ahead.0[probe][part] - back.0[probe][part]) / (2.0 * step);
                     prop_assert!((axes.across()[probe][part] - slope).abs() < 1e-9);
-                    let mut moved = DESIGNED.pairs();
+                    let mut moved = PLACES_M;
                     moved[probe][part] += 1.0;
-                    let gain = axes.lever_arms_m(moved)[probe] - axes.lever_arms_m(DESIGNED.pairs())[probe];
+                    let gain = axes.lever_arms_m(moved)[probe] - axes.lever_arms_m(PLACES_M)[probe];
                     prop_assert!((axes.arm_factors()[probe][part] - gain).abs() < 1e-14);
                 }
             }
         }
 
         #[test]
-        fn misalignments_and_arms_can_be_read_from_the_rows_of_pm(t in prop::array::uniform3(-1.5..1.5f32),
+        fn misalignments_and_arms_can_be_read_from_the_rows_of_pm(t in prop::array::uniform3(-3.1..3.1f32),
                                                                   arms in prop::array::uniform3(-0.5..0.5f32)) {
             let rows = SensingAxes::at(t).plane_rows(arms);
             let (axes, found) = SensingAxes::of_rows(&rows);
             prop_assert_eq!(found, arms);
             for (have, want) in axes.misalignment_rad().iter().zip(t) { prop_assert!((have - want).abs() < 3e-7); }
-        }
-
-        #[test]
-        fn nearest_coordinates_have_the_asked_geometry(t in prop::array::uniform3(-0.14..0.14f64),
-                                                       d in prop::array::uniform3(-0.05..0.05f64)) {
-            let mut asked = DESIGNED.geometry(t);
-            for (arm, change) in asked.lever_arm_m.iter_mut().zip(d) { *arm += change; }
-            let moved = DESIGNED.nearest_with(&asked);
-            for (have, want) in moved.lever_arms_m(t).iter().zip(asked.lever_arm_m) {
-                prop_assert!((have - want).abs() < 1e-14);
-            }
-            // The change lies along the gradient, so no smaller one does it.
-            let step = ((moved.h1x_m - DESIGNED.h1x_m).powi(2) + (moved.h1y_m - DESIGNED.h1y_m).powi(2)).sqrt();
-            prop_assert!((step - d[0].abs()).abs() < 1e-14);
         }
     }
 

@@ -34,9 +34,8 @@
 //! |---|---|---|
 //! | X, Y, Rz | [`pose::PlanarPose`] `x_m`, `y_m`, `rz_rad` | m, m, rad |
 //! | Z, Rx, Ry | [`pose::VerticalPose`] `z_m`, `rx_rad`, `ry_rad` | m, rad, rad |
-//! | H1x .. H3y | [`geometry::ProbeCoordinates`] | m |
 //! | third column of PM | lever arm, `lever_arm_m` | m |
-//! | theta_A, theta_B, theta_C | misalignment, `misalignment_rad` | rad |
+//! | theta_A, theta_B, theta_C | [`geometry`], `misalignment_rad` | rad |
 //! | eta_yA, eta_yB, eta_x | `sensitivity` at the zero of the vertical pose | 1 |
 //! | a, b, c | `per_z_m`, `per_rx_rad`, `per_ry_rad` | 1/m, 1/rad, 1/rad |
 //! | phi_A, phi_B, phi_C | sensitivity at a vertical pose | 1 |
@@ -59,6 +58,7 @@ pub mod prediction;
 pub mod real;
 pub mod rezero;
 #[cfg(test)]
+#[path = "sample_for_tests.rs"]
 mod sample;
 pub mod servo;
 mod soundness;

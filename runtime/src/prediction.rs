@@ -73,11 +73,7 @@ impl Predictor {
             age_max_us,
             taken: 0,
             samples: [nothing; POSES],
-            zero: PlanarPose {
-                x_m: 0.0,
-                y_m: 0.0,
-                rz_rad: 0.0,
-            },
+            zero: PlanarPose::ZERO,
         }
     }
 

@@ -81,16 +81,8 @@ pub struct Servo<'d> {
 
 /// A pose of zeros, in a `const`.
 const NO_POSE: Pose = Pose {
-    planar: PlanarPose {
-        x_m: 0.0,
-        y_m: 0.0,
-        rz_rad: 0.0,
-    },
-    vertical: VerticalPose {
-        z_m: 0.0,
-        rx_rad: 0.0,
-        ry_rad: 0.0,
-    },
+    planar: PlanarPose::ZERO,
+    vertical: VerticalPose::ZERO,
 };
 
 /// The reading of a period without new codes.

@@ -4,6 +4,7 @@ use crate::geometry::SensingAxes;
 use crate::layout;
 use crate::model::{FieldProbe, Probes, Sensitivity, dot};
 use crate::parameters::{ParameterError, ParameterSet, RANGE_MAX};
+use core::f32::consts::{PI, TAU};
 
 /// Largest element of PM PM^-1 - I that the check accepts: 100 times the rounding of `f32`
 /// for lever arms of decimetres.
@@ -112,11 +113,16 @@ impl ParameterSet {
         )?;
         let (axes, arms) = SensingAxes::of_rows(&self.plane);
         let lengths = axes.0.map(|[x, y]| x * x + y * y);
-        check_near(
-            "PM",
-            &axes.misalignment_rad(),
-            &self.geometry.misalignment_rad,
-        )?;
+        let mut turned = axes.misalignment_rad();
+        for (found, stored) in turned.iter_mut().zip(self.geometry.misalignment_rad) {
+            // The theta of a probe mounted the other way round may go on beyond a half turn.
+            if stored - *found > PI {
+                *found += TAU;
+            } else if *found - stored > PI {
+                *found -= TAU;
+            }
+        }
+        check_near("PM", &turned, &self.geometry.misalignment_rad)?;
         check_near("PM", &arms, &self.geometry.lever_arm_m)?;
         check_near("PM", &lengths, &[1.0; 3])?;
         match &self.probes {

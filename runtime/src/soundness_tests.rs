@@ -239,3 +239,19 @@ fn a_field_model_is_refused_for_what_is_wrong_with_it() {
         ParameterError::NotTheInverse { .. }
     ));
 }
+
+#[test]
+fn a_theta_beyond_a_half_turn_is_that_of_a_probe_mounted_the_other_way_round() {
+    use core::f64::consts::{PI, TAU};
+    for turn in [PI - 0.001, PI + 0.001, -PI - 0.05, 1.5 * PI] {
+        let mut calibration = sample::calibration();
+        calibration.geometry.misalignment_rad[1] += turn;
+        calibration.geometry.lever_arm_m[1] = 0.2;
+        let set = calibration.prepare(&sample::origin());
+        assert!(set.is_ok(), "{turn}: {set:?}");
+    }
+    assert_eq!(
+        refused(|set| set.geometry.misalignment_rad[2] += 2.0 * TAU as f32),
+        ParameterError::Inconsistent { term: "PM" }
+    );
+}

@@ -161,4 +161,3 @@ def cases(logs):
     yield from exports(logs[0].blobs["31"])
     yield from imports()
     yield Case("demo", ["demo", "--out", "."])
-    yield Case("demo with zero deviations", ["demo", "--zero-deviations"])

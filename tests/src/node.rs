@@ -2,21 +2,21 @@
 //! two sectors of flash in RAM. In place of the chip there are a clock that others advance, codes
 //! that are made up, and random numbers by a seed.
 
+use crate::flash_model::FlashModel;
 use firmware::fpu::FpuSettings;
 use firmware::node::{Facts, Node as Ticking, Parameters};
 use firmware::outbox::Outbox;
-use firmware::records::Records;
+use firmware::records::{Choice, Loaded, Records};
 use firmware::retained::{FaultKind, Retained, Step, WORDS};
 use firmware::schedule::PERIOD_US;
-use firmware::slots::Loaded;
 use firmware::start_up::{Before, Cause, PROVEN_TICKS};
-use firmware::store::flash_model::FlashModel;
-use firmware::store::{Record, Store};
+use firmware::store::Image;
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{Identity, Key, Store as _};
 use hal_adapters::can::{BusFrame, Coded, Layout};
 use hal_adapters::fault::Random;
 use runtime::RawFrame;
+use std::mem::MaybeUninit;
 use std::ptr::NonNull;
 
 /// Frames that a tick takes from the bus at most.
@@ -57,13 +57,14 @@ impl Node {
     ) -> Self {
         let before = Before::of(Cause::PowerOn, None);
         let (ticking, records, statics) = start(flash, (serial, key), &before);
+        let retained = retained(&before, &records, &ticking);
         Self {
             serial,
             key,
             ticking,
             records,
             statics,
-            retained: before.record.to_words(),
+            retained,
             outbox: Outbox::new(),
             random: Random::new(seed),
             resets: 0,
@@ -71,12 +72,18 @@ impl Node {
     }
 
     /// One tick, of which so many before it were missed: decodes codes, takes frames of the bus,
-    /// and does a step of an update.
-    pub fn tick(&mut self, missed_ticks: u32, received: impl IntoIterator<Item = BusFrame>) {
+    /// and stores an update. Says whether it did: that takes half a second.
+    pub fn tick(
+        &mut self,
+        missed_ticks: u32,
+        received: impl IntoIterator<Item = BusFrame>,
+    ) -> bool {
         self.outbox.start_tick();
+        let stores = self.ticking.is_storing() && self.outbox.is_empty();
         let sample = Ok(codes(self.ticking.ticks()));
         let facts = Facts {
             missed_ticks,
+            servo_off_pin: Some(true),
             ..Facts::default()
         };
         (self.ticking).tick(sample, &facts, &mut Unchanged, &mut self.outbox);
@@ -88,9 +95,11 @@ impl Node {
             let mut record = Retained::from_words(&self.retained).unwrap_or_default();
             record.prove();
             self.retained = record.to_words();
-            self.records.prove();
         }
-        (self.ticking).update(&mut self.outbox, &mut self.records);
+        if stores {
+            (self.ticking).store(&mut self.outbox, &mut self.records);
+        }
+        stores
     }
 
     /// The next frame for the bus.
@@ -103,13 +112,18 @@ impl Node {
         self.ticking.wants_reset() && self.outbox.is_empty()
     }
 
-    /// A reset that the program asked for: flash and retained RAM are kept, and all else is as the
-    /// start-up makes it.
+    /// A reset, which may be the one that it waits for: flash and retained RAM are kept, and all else is
+    /// as the start-up makes it.
     pub fn reset(&mut self) {
+        if self.ticking.wants_reset() {
+            let mut record = Retained::from_words(&self.retained).unwrap_or_default();
+            record.activate();
+            self.retained = record.to_words();
+        }
         self.start(Cause::Reset);
     }
 
-    /// The program panics in a tick: its parameters are blamed for it, unless they are proven.
+    /// The program panics in a tick.
     pub fn fault(&mut self) {
         let mut record = Retained::from_words(&self.retained).unwrap_or_default();
         record.step = Step::Ticking;
@@ -130,7 +144,7 @@ impl Node {
         let statics;
         (self.ticking, self.records, statics) = start(flash, (self.serial, self.key), &before);
         self.statics = statics;
-        self.retained = before.record.to_words();
+        self.retained = retained(&before, &self.records, &self.ticking);
         self.outbox = Outbox::new();
         self.resets += 1;
     }
@@ -145,15 +159,32 @@ impl Node {
         self.records.flash()
     }
 
-    /// The blob that the next start would run.
-    pub fn newest(&self) -> Option<&[u8]> {
-        let newest = Store::read(self.flash(), self.serial).newest()?;
-        Some(newest.blob(self.flash()))
+    /// The blob that the next power-on would run.
+    pub fn newest(&self) -> Option<Vec<u8>> {
+        let mut flash = self.flash().clone();
+        let (records, _) = Records::start(&mut flash, Choice::Newest, self.serial);
+        let newest = records.newest()?;
+        [0, 1].into_iter().find_map(|slot| {
+            let image = Image::read(&mut flash, slot).ok()?;
+            let stored = image.stored(slot)?;
+            let is_newest = (stored.sequence, stored.crc) == (newest.sequence, newest.crc);
+            is_newest.then(|| image.blob()[..stored.bytes as usize].to_vec())
+        })
     }
 
-    /// Records that were written: the sequence number of the newest one; 0 for a plain blob.
+    /// The CRC of the blob that runs.
+    pub fn running(&self) -> Option<u32> {
+        self.records.running().map(|running| running.crc)
+    }
+
+    /// The highest sequence number; 0 for a plain blob.
     pub fn records(&self) -> u32 {
         self.records.newest_sequence()
+    }
+
+    /// State and reason after the last tick.
+    pub const fn state(&self) -> (NodeState, u8) {
+        self.ticking.state()
     }
 
     /// Whether a transfer is open.
@@ -164,18 +195,14 @@ impl Node {
 
 /// What the controller has as statics, for one start.
 struct Statics {
-    record: NonNull<Record>,
-    place: NonNull<Option<Loaded>>,
+    place: NonNull<MaybeUninit<Loaded>>,
 }
 
 impl Drop for Statics {
     fn drop(&mut self) {
-        // SAFETY: both are boxes of `start`, which gave their only references to the node and the
-        // records that it made. `Node` drops or replaces those first, and hands out neither.
-        unsafe {
-            drop(Box::from_raw(self.record.as_ptr()));
-            drop(Box::from_raw(self.place.as_ptr()));
-        }
+        // SAFETY: it is a box of `start`, which gave its only reference to the node and the records
+        // that it made. `Node` drops or replaces those first, and hands out neither.
+        drop(unsafe { Box::from_raw(self.place.as_ptr()) });
     }
 }
 
@@ -185,19 +212,18 @@ fn start(
     (serial, key): (Option<&'static str>, Option<Key>),
     before: &Before,
 ) -> (Ticking<'static>, Records<FlashModel>, Statics) {
-    let record = Box::leak(Box::new(Record::EMPTY));
-    let place = Box::leak(Box::new(None));
+    let place = Box::leak(Box::new(MaybeUninit::uninit()));
     let statics = Statics {
-        record: NonNull::from(&mut *record),
         place: NonNull::from(&mut *place),
     };
-    // No check of a blob faults here, whose CRC the next start had to know.
-    let check = before.check(serial, |_| ());
-    let (mut records, found) = Records::start(flash, record, check, before.blames_newest());
+    let (mut records, refusal) = Records::start(flash, before.choice, serial);
     let is_sound = runtime::arithmetic::check().is_ok();
-    let runs = found.blob.filter(|_| is_sound);
-    let loaded = runs.and_then(|blob| records.load(blob, place));
-    let parameters = Parameters::at_start(loaded, found.refusal, is_sound);
+    let loaded = match is_sound {
+        true => records.load(before.choice, place),
+        false => None,
+    };
+    let stop = before.stop(loaded.is_some());
+    let parameters = Parameters::at_start(loaded, refusal, stop, is_sound);
     let identity = Identity {
         serial,
         key,
@@ -207,6 +233,15 @@ fn start(
     let mut node = Ticking::new(parameters, before.by_fault, Layout::Bits24, identity);
     before.restore_zero(&mut node, loaded.map_or(0, |loaded| loaded.crc));
     (node, records, statics)
+}
+
+/// What is in RAM once it runs.
+fn retained(before: &Before, records: &Records<FlashModel>, ticking: &Ticking<'_>) -> [u32; WORDS] {
+    let mut record = before.record;
+    if let Some(running) = records.running() {
+        record.runs(running.crc, ticking.zero());
+    }
+    record.to_words()
 }
 
 /// Codes that 16-bit converters may give, and no two ticks in a row with the same.

@@ -102,37 +102,3 @@ impl Counts {
         self.in_callees += call.in_callees;
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A caller at 0x10 calls 0x100, which calls 0x200.
-    const LISTING: &str = "\
-     100:\tpush\t{r4, lr}
-     102:\tvdiv.f32\ts0, s1, s2
-     106:\tbl\t200 <callee>
-     10a:\tpop\t{r4, pc}
-     200:\tbx\tlr
-";
-
-    fn log(addresses: &[u32]) -> String {
-        let line = |at| format!("Trace 0: 0x7f3c [00800408/{at:08x}/00000110/ff000201] name\n");
-        addresses.iter().map(line).collect()
-    }
-
-    #[test]
-    fn a_call_is_counted_with_its_callees() {
-        let run = [0x10, 0x100, 0x102, 0x106, 0x200, 0x10a, 0x14, 0x16];
-        let functions = BTreeMap::from([("f".to_owned(), (0x100, 0x10c))]);
-        let text = log(&run) + "another line\n" + &log(&[0x10, 0x100, 0x10a, 0x14]);
-        let counts = count(text.as_bytes(), &Listing::parse(LISTING), &functions).expect("text");
-        let Some(f) = counts.get("f") else {
-            panic!("not counted")
-        };
-        assert_eq!((f.calls, f.fewest, f.most), (2, 2, 5));
-        assert_eq!((f.divisions, f.in_callees), (1, 1));
-        // push 3, vdiv 14, bl 4, bx 4, pop with pc 6.
-        assert_eq!(f.cycles, 3 + 14 + 4 + 4 + 6);
-    }
-}

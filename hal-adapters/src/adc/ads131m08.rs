@@ -64,7 +64,7 @@
 //! read a rail.
 
 use super::channels::INPUTS;
-use super::{AdcError, Channels, FrameSampler, silent};
+use super::{AdcError, Channels, FrameSampler, check_id, compare, silent};
 use crc::{CRC_16_IBM_3740, Crc};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{Error as _, OutputPin};
@@ -233,26 +233,6 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
 /// Where commands have the address of a register.
 const fn address(register: u8) -> u16 {
     (register as u16) << 7
-}
-
-fn check_id<B>(found: u16, mask: u16, expected: u16) -> Result<(), AdcError<B>> {
-    if found & mask == expected {
-        Ok(())
-    } else {
-        Err(AdcError::WrongId { found, expected })
-    }
-}
-
-/// Compares what a register has with what it must have.
-fn compare<B>(register: u8, found: u16, wanted: u16) -> Result<(), AdcError<B>> {
-    if found == wanted {
-        return Ok(());
-    }
-    Err(AdcError::WrongSetting {
-        register,
-        found,
-        wanted,
-    })
 }
 
 fn check_status<B>(found: u16) -> Result<(), AdcError<B>> {

@@ -48,7 +48,7 @@
 //! the firmware for the resistor that makes it read a rail.
 
 use super::channels::INPUTS;
-use super::{AdcError, Channels, FrameSampler, silent};
+use super::{AdcError, Channels, FrameSampler, check_id, compare, silent};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{Error as _, OutputPin};
 use embedded_hal::spi::{MODE_1, Mode, SpiDevice};
@@ -62,17 +62,17 @@ const RST: u16 = 0x8500;
 const AUTO_RST: u16 = 0xa000;
 
 const AUTO_SEQ_EN: u8 = 0x01;
-const AUTO_SEQ_EN_AT_RESET: u8 = 0xff;
+const AUTO_SEQ_EN_AT_RESET: u16 = 0xff;
 const POWER_DOWN: u8 = 0x02;
 const FEATURES: u8 = 0x03;
 const RANGE_0: u8 = 0x05;
 const LAST_REGISTER: u8 = 0x0c;
 
 /// Bits 7..6: device address 1. Bits 2..0: code, channel, device address and range on SDO.
-const FEATURES_WANTED: u8 = 0x43;
+const FEATURES_WANTED: u16 = 0x43;
 const DEVICE_SIGNATURE: u8 = 0b01_00;
 const SIGNATURE_MASK: u8 = 0b1111_1100;
-const RANGE_10_24_V: u8 = 0;
+const RANGE_10_24_V: u16 = 0;
 
 /// 15 ms for the reference with 22 uF, and 9 ms of margin.
 pub const REFERENCE_US: u32 = 24_000;
@@ -123,20 +123,20 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
         Ok(bytes)
     }
 
-    fn read(&mut self, register: u8) -> Result<u8, AdcError<SPI::Error>> {
+    fn read(&mut self, register: u8) -> Result<u16, AdcError<SPI::Error>> {
         let bytes = self.exchange(u16::from(register) << 9)?;
         if bytes == [0xff; FRAME_BYTES] {
             return Err(AdcError::Silent { level: 0xff });
         }
         let [_, _, value, ..] = bytes;
-        Ok(value)
+        Ok(value.into())
     }
 
     /// The value that a register must have: 0x01 to 0x0c.
-    const fn wanted(&self, register: u8) -> u8 {
+    const fn wanted(&self, register: u8) -> u16 {
         match register {
-            AUTO_SEQ_EN => self.channels.mask(),
-            POWER_DOWN => !self.channels.mask(),
+            AUTO_SEQ_EN => self.channels.mask() as u16,
+            POWER_DOWN => !self.channels.mask() as u16,
             FEATURES => FEATURES_WANTED,
             _ => RANGE_10_24_V,
         }
@@ -149,8 +149,7 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
 
     /// Writes a register and reads it back.
     fn set(&mut self, register: u8) -> Result<(), AdcError<SPI::Error>> {
-        let value = u16::from(self.wanted(register));
-        self.exchange(u16::from(register) << 9 | 1 << 8 | value)?;
+        self.exchange(u16::from(register) << 9 | 1 << 8 | self.wanted(register))?;
         self.check(register)
     }
 
@@ -165,18 +164,6 @@ impl<SPI: SpiDevice, RST: OutputPin> Ads8688<SPI, RST> {
         };
         matches!(self.reference, Reference::Settled)
     }
-}
-
-/// Compares what a register has with what it must have.
-fn compare<B>(register: u8, found: u8, wanted: u8) -> Result<(), AdcError<B>> {
-    if found == wanted {
-        return Ok(());
-    }
-    Err(AdcError::WrongSetting {
-        register,
-        found: found.into(),
-        wanted: wanted.into(),
-    })
 }
 
 impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
@@ -199,12 +186,7 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
         self.reset.set_high().map_err(|e| AdcError::Pin(e.kind()))?;
         self.exchange(RST)?;
         let found = self.read(AUTO_SEQ_EN)?;
-        if found != AUTO_SEQ_EN_AT_RESET {
-            return Err(AdcError::WrongId {
-                found: found.into(),
-                expected: AUTO_SEQ_EN_AT_RESET.into(),
-            });
-        }
+        check_id(found, u16::MAX, AUTO_SEQ_EN_AT_RESET)?;
         for register in [AUTO_SEQ_EN, POWER_DOWN, FEATURES] {
             self.set(register)?;
         }
@@ -235,7 +217,7 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
                 });
             }
             let range = (signature & !SIGNATURE_MASK) << 1 | last >> 7;
-            compare(RANGE_0 + input, range, RANGE_10_24_V)?;
+            compare(RANGE_0 + input, range.into(), RANGE_10_24_V)?;
             *code = i32::from(u16::from_be_bytes([high, low])) - ZERO_VOLT;
         }
         let register = self.turn;

@@ -115,18 +115,22 @@ pub trait FrameSampler {
 }
 
 /// Why a converter gave no codes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AdcError<B> {
     /// The bus reports an error of its own.
+    #[error("the bus to the converter: {0:?}")]
     Bus(B),
     /// A control pin reports an error of its own.
+    #[error("a control pin of the converter: {0:?}")]
     Pin(digital::ErrorKind),
     /// The data line never moved: no power, no clock, a broken wire.
+    #[error("the converter is silent: nothing but {level:#04x} was read")]
     Silent {
         /// The value of every byte that was read.
         level: u8,
     },
     /// A different part answers, or the right one was not reset.
+    #[error("another part: it says {found:#06x}, not {expected:#06x}")]
     WrongId {
         /// What identifies the part that is there.
         found: u16,
@@ -134,6 +138,7 @@ pub enum AdcError<B> {
         expected: u16,
     },
     /// A setting does not read back, or was lost later.
+    #[error("register {register:#04x} of the converter is {found:#06x}, not {wanted:#06x}")]
     WrongSetting {
         /// Address of the register.
         register: u8,
@@ -143,6 +148,7 @@ pub enum AdcError<B> {
         wanted: u16,
     },
     /// The check of a frame fails.
+    #[error("damaged frame: check {received:04x}, computed {computed:04x}")]
     WrongCheck {
         /// The check that the frame carries.
         received: u16,
@@ -150,6 +156,7 @@ pub enum AdcError<B> {
         computed: u16,
     },
     /// No new codes: the part does not convert.
+    #[error("no new codes: inputs {ready:#010b} of {read:#010b}")]
     NotReady {
         /// Bit k set: input k had a new code.
         ready: u8,
@@ -157,6 +164,7 @@ pub enum AdcError<B> {
         read: u8,
     },
     /// The code of a different input came, or a frame without the part's signature.
+    #[error("a frame signed {found:#08b} came where {expected:#08b} belongs")]
     WrongInput {
         /// The signature that came.
         found: u8,
@@ -164,6 +172,7 @@ pub enum AdcError<B> {
         expected: u8,
     },
     /// The codes of a sensor stayed the same for too long.
+    #[error("codes of sensor {channel} the same for {periods} periods")]
     Stuck {
         /// The first such sensor: 0 to 2 Hall probes A to C, 3 to 5 gaps 1 to 3.
         channel: u8,
@@ -171,6 +180,7 @@ pub enum AdcError<B> {
         periods: u8,
     },
     /// The trigger does not reach the part: the time of its samples is unknown.
+    #[error("the trigger does not reach the converter")]
     NoSync,
 }
 
@@ -193,61 +203,31 @@ impl<B> AdcError<B> {
     }
 }
 
-impl<B: core::fmt::Debug> core::fmt::Display for AdcError<B> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Bus(error) => write!(f, "the bus to the converter: {error:?}"),
-            Self::Pin(error) => write!(f, "a control pin of the converter: {error:?}"),
-            Self::Silent { level } => {
-                write!(
-                    f,
-                    "the converter is silent: nothing but {level:#04x} was read"
-                )
-            }
-            Self::WrongId { found, expected } => {
-                write!(f, "another part: it says {found:#06x}, not {expected:#06x}")
-            }
-            Self::WrongSetting {
-                register,
-                found,
-                wanted,
-            } => write!(
-                f,
-                "register {register:#04x} of the converter is {found:#06x}, not {wanted:#06x}"
-            ),
-            Self::WrongCheck { received, computed } => {
-                write!(
-                    f,
-                    "damaged frame: check {received:04x}, computed {computed:04x}"
-                )
-            }
-            Self::NotReady { ready, read } => {
-                write!(f, "no new codes: inputs {ready:#010b} of {read:#010b}")
-            }
-            Self::WrongInput { found, expected } => {
-                write!(
-                    f,
-                    "a frame signed {found:#08b} came where {expected:#08b} belongs"
-                )
-            }
-            Self::Stuck { channel, periods } => {
-                write!(
-                    f,
-                    "codes of sensor {channel} the same for {periods} periods"
-                )
-            }
-            Self::NoSync => write!(f, "the trigger does not reach the converter"),
-        }
-    }
-}
-
-impl<B: core::fmt::Debug> core::error::Error for AdcError<B> {}
-
 /// The level of a line that never moved: the frame is all 0x00 or all 0xFF.
 fn silent(bytes: &[u8]) -> Option<u8> {
     let first = *bytes.first()?;
     let quiet = first == 0x00 || first == 0xff;
     (quiet && bytes.iter().all(|&b| b == first)).then_some(first)
+}
+
+fn check_id<B>(found: u16, mask: u16, expected: u16) -> Result<(), AdcError<B>> {
+    if found & mask == expected {
+        Ok(())
+    } else {
+        Err(AdcError::WrongId { found, expected })
+    }
+}
+
+/// Compares what a register has with what it must have.
+fn compare<B>(register: u8, found: u16, wanted: u16) -> Result<(), AdcError<B>> {
+    if found == wanted {
+        return Ok(());
+    }
+    Err(AdcError::WrongSetting {
+        register,
+        found,
+        wanted,
+    })
 }
 
 #[cfg(test)]

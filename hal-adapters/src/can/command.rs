@@ -11,7 +11,7 @@
 //! assert_eq!(node.take(&sent), Some(Ok(request)));
 //! ```
 
-use super::e2e::{Payload, protect};
+use super::e2e::Payload;
 use super::frame::{Coded, standard};
 use super::notice::{BusFault, open};
 use super::status::{HealthPage, NodeStatus};
@@ -115,77 +115,53 @@ impl Command {
     }
 }
 
-/// How a request ended: the numbers of the frame, as in the table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Outcome {
-    /// It was done.
-    Done = 0,
-    /// It is running; another answer follows.
-    Started = 1,
-    /// This node does not know it.
-    UnknownCommand = 2,
-    /// There is no usable parameter blob.
-    NoParameters = 3,
-    /// Too few ticks were asked for.
-    TooShort = 4,
-    /// A tick had no pose; the detail is its status.
-    NoPose = 5,
-    /// The stage moved; the detail is the axis.
-    Moved = 6,
-    /// The stage drifted; the detail is the axis.
-    Drifted = 7,
-    /// Another request is still running.
-    Busy = 8,
-    /// The servo is on, or was not declared off.
-    ServoOn = 9,
-    /// The zero would lie too far away; the detail is the axis.
-    OutOfBounds = 10,
-    /// A pose lay outside the calibrated range; the detail is its status.
-    Extrapolated = 11,
-    /// The tag is not that of the stage's key, or nothing was verified.
-    NotAuthorised = 12,
-    /// The blob is refused; the detail is [`runtime::BlobError::number`].
-    BadContent = 13,
-    /// The sequence number is not the one that follows those in the store: the detail.
-    WrongSequence = 14,
-    /// The store has no room before the next reset.
-    NoRoom = 15,
-    /// Words are missing; the detail is the index of the first.
-    Incomplete = 16,
-    /// The store could not write. What runs goes on; what runs from the next start on is the record
-    /// before, or the new one if the failure came after the word that makes it count: that start tells.
-    StoreFailed = 17,
-    /// No transfer is open with this token: never begun, aborted, or nothing came for 5 s.
-    NoTransfer = 18,
-    /// The node's random number generator gives none, so that nothing can be authorised.
-    NoRandomNumber = 19,
+numbered! {
+    /// How a request ended: the numbers of the frame, as in the table.
+    Outcome {
+        /// It was done.
+        Done = 0,
+        /// It is running; another answer follows.
+        Started = 1,
+        /// This node does not know it.
+        UnknownCommand = 2,
+        /// There is no usable parameter blob.
+        NoParameters = 3,
+        /// Too few ticks were asked for.
+        TooShort = 4,
+        /// A tick had no pose; the detail is its status.
+        NoPose = 5,
+        /// The stage moved; the detail is the axis.
+        Moved = 6,
+        /// The stage drifted; the detail is the axis.
+        Drifted = 7,
+        /// Another request is still running.
+        Busy = 8,
+        /// The servo is on, or was not declared off.
+        ServoOn = 9,
+        /// The zero would lie too far away; the detail is the axis.
+        OutOfBounds = 10,
+        /// A pose lay outside the calibrated range; the detail is its status.
+        Extrapolated = 11,
+        /// The tag is not that of the stage's key.
+        NotAuthorised = 12,
+        /// The blob is refused; the detail is [`runtime::BlobError::number`].
+        BadContent = 13,
+        /// The sequence number is not the one that follows those in the store: the detail.
+        WrongSequence = 14,
+        /// The supply is too low to write: nothing was.
+        SupplyLow = 15,
+        /// Words are missing; the detail is the index of the first.
+        Incomplete = 16,
+        /// The store could not write. What runs goes on, and runs from the next start on.
+        StoreFailed = 17,
+        /// No transfer is open with this token: never begun, aborted, or nothing came for 5 s.
+        NoTransfer = 18,
+        /// The node's random number generator gives none, so that nothing can be authorised.
+        NoRandomNumber = 19,
+    }
 }
 
 impl Outcome {
-    const ALL: [Self; 20] = [
-        Self::Done,
-        Self::Started,
-        Self::UnknownCommand,
-        Self::NoParameters,
-        Self::TooShort,
-        Self::NoPose,
-        Self::Moved,
-        Self::Drifted,
-        Self::Busy,
-        Self::ServoOn,
-        Self::OutOfBounds,
-        Self::Extrapolated,
-        Self::NotAuthorised,
-        Self::BadContent,
-        Self::WrongSequence,
-        Self::NoRoom,
-        Self::Incomplete,
-        Self::StoreFailed,
-        Self::NoTransfer,
-        Self::NoRandomNumber,
-    ];
-
     /// Outcome and detail of a refused re-zero.
     pub fn of_refusal(refusal: &RezeroRefusal) -> (Self, u32) {
         match *refusal {
@@ -343,9 +319,9 @@ impl Mailbox {
     pub fn send(&mut self, what: &Told) -> Option<Coded> {
         let (k, payload) = what.payload();
         let (message, counter) = (*Told::MESSAGES.get(k)?, self.sent.get_mut(k)?);
-        let bytes = protect(message.key(), *counter, payload);
+        let coded = Coded::new(message, u32::from(*counter), payload);
         *counter = counter.wrapping_add(1);
-        Some(Coded { message, bytes })
+        Some(coded)
     }
 
     /// The content of a frame; `None` for a frame of another kind.

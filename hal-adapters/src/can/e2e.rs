@@ -24,7 +24,7 @@
 //! | failed check | WRONGCRC |
 //! | [`Stale`](BusFault::Stale) | NONEWDATA |
 
-use super::notice::BusFault;
+use super::notice::{BusFault, open};
 use super::table::Message;
 
 /// The 52 bits of a protected frame besides check and counter.
@@ -194,6 +194,23 @@ impl Sequence {
             self.candidate = NO_COUNTER;
         }
         follows
+    }
+
+    /// Takes a frame of a message that is sent alone: its payload, if it may be used, and what is
+    /// wrong with it or missing before it.
+    pub(super) fn take(
+        &mut self,
+        message: Message,
+        data: &[u8],
+    ) -> (Option<Payload>, Option<BusFault>) {
+        match open(message, data) {
+            Ok((counter, payload)) => {
+                let verdict = self.judge(counter);
+                let payload = verdict.is_used().then_some(payload);
+                (payload, verdict.fault(message))
+            }
+            Err(fault) => (None, Some(fault)),
+        }
     }
 
     /// Judges the counter, 0 to 15, of a frame with a correct check.

@@ -1,6 +1,7 @@
 //! Frames by value: [`Coded`], ready for any CAN controller, and [`BusFrame`], for receivers,
 //! logs and replays.
 
+use super::e2e::{Payload, protect};
 use super::table::Message;
 use embedded_can::{Frame, Id, StandardId};
 
@@ -14,6 +15,15 @@ pub struct Coded {
 }
 
 impl Coded {
+    /// The frame of this counter, of which the low nibble is used.
+    #[inline(always)]
+    pub(super) const fn new(message: Message, counter: u32, payload: Payload) -> Self {
+        Self {
+            message,
+            bytes: protect(message.key(), counter as u8, payload),
+        }
+    }
+
     /// The frame in the type of a CAN controller's driver. `None` only if that type refuses
     /// eight bytes.
     pub fn to_frame<F: Frame>(&self) -> Option<F> {

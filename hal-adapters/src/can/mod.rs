@@ -1,19 +1,48 @@
 #![doc = include_str!("protocol.md")]
 
+/// An enum, and the list of its variants, of which each stands at the place of its number.
+macro_rules! numbered {
+    ($(#[$of_enum:meta])* $name:ident {
+        $($(#[$doc:meta])* $variant:ident $(= $number:literal)?,)*
+    }) => {
+        $(#[$of_enum])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum $name {
+            $($(#[$doc])* $variant $(= $number)?,)*
+        }
+
+        impl $name {
+            /// Every one, by its number.
+            pub const ALL: [Self; [$(stringify!($variant)),*].len()] = [$(Self::$variant),*];
+        }
+
+        const _: () = {
+            let mut place = 0;
+            while place < $name::ALL.len() {
+                assert!($name::ALL[place] as usize == place);
+                place += 1;
+            }
+        };
+    };
+}
+pub(crate) use numbered;
+
 pub mod command;
 #[cfg(test)]
-mod dbc;
+mod dbc_tests;
 pub mod e2e;
 pub mod frame;
 mod group;
 #[cfg(test)]
-mod load;
+mod load_tests;
 pub mod notice;
 pub mod pose;
 pub mod receiver;
 pub mod sensor;
 pub mod service;
-pub mod signals;
+#[cfg(test)]
+mod signals_tests;
 pub mod status;
 pub mod table;
 pub mod update;
@@ -27,4 +56,4 @@ pub use service::Service;
 pub use table::Message;
 
 /// Version of this protocol, as [`Message::NodeStatus`] tells it.
-pub const PROTOCOL_VERSION: u8 = 2;
+pub const PROTOCOL_VERSION: u8 = 3;

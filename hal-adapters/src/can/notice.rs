@@ -24,9 +24,10 @@ impl Default for Timing {
 }
 
 /// What is wrong with a frame, or with a source that sends none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BusFault {
     /// Not eight bytes, or a remote frame.
+    #[error("{}: {bytes} bytes instead of 8", message.name())]
     WrongLength {
         /// Which message.
         message: Message,
@@ -34,16 +35,19 @@ pub enum BusFault {
         bytes: u8,
     },
     /// The check fails: the frame is damaged, or belongs to another message.
+    #[error("{}: check fails", message.name())]
     WrongCheck {
         /// Which message.
         message: Message,
     },
     /// The last frame again.
+    #[error("{}: repeated", message.name())]
     Repeated {
         /// Which message.
         message: Message,
     },
     /// The counter neither repeats nor follows the last one: late, or after a long gap.
+    #[error("{}: counter {ahead} ahead", message.name())]
     WrongSequence {
         /// Which message.
         message: Message,
@@ -51,6 +55,7 @@ pub enum BusFault {
         ahead: u8,
     },
     /// Frames are missing before this one, which is used.
+    #[error("{}: {frames} lost", message.name())]
     Lost {
         /// Which message.
         message: Message,
@@ -58,18 +63,22 @@ pub enum BusFault {
         frames: u8,
     },
     /// The frame is good, but its tick was handed out before.
+    #[error("{}: late", message.name())]
     Late {
         /// Which message.
         message: Message,
     },
     /// A multiple of 16 ticks is missing, by the sensor node's own count.
+    #[error("{ticks} ticks lost")]
     TicksLost {
         /// How many.
         ticks: u32,
     },
     /// The sensor node restarted: its count of ticks began again.
+    #[error("the sensor node started again")]
     SenderRestarted,
     /// No good frame for [`Timing::stale_us`].
+    #[error("stale: no good frame for {age_us} us")]
     Stale {
         /// Age of the last good frame, us.
         age_us: u32,
@@ -89,27 +98,6 @@ pub(super) fn open(message: Message, data: &[u8]) -> Result<(u8, Payload), BusFa
         _ => {
             let bytes = data.len() as u8;
             Err(BusFault::WrongLength { message, bytes })
-        }
-    }
-}
-
-impl core::fmt::Display for BusFault {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let name = |message: &Message| message.spec().name;
-        match self {
-            Self::WrongLength { message, bytes } => {
-                write!(f, "{}: {bytes} bytes instead of 8", name(message))
-            }
-            Self::WrongCheck { message } => write!(f, "{}: check fails", name(message)),
-            Self::Repeated { message } => write!(f, "{}: repeated", name(message)),
-            Self::WrongSequence { message, ahead } => {
-                write!(f, "{}: counter {ahead} ahead", name(message))
-            }
-            Self::Lost { message, frames } => write!(f, "{}: {frames} lost", name(message)),
-            Self::Late { message } => write!(f, "{}: late", name(message)),
-            Self::TicksLost { ticks } => write!(f, "{ticks} ticks lost"),
-            Self::SenderRestarted => f.write_str("the sensor node started again"),
-            Self::Stale { age_us } => write!(f, "stale: no good frame for {age_us} us"),
         }
     }
 }

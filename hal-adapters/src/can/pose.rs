@@ -20,11 +20,12 @@
 //! assert_eq!(receiver.sampled_us(&pose, 2_000), Some(14_000));
 //! ```
 
-use super::e2e::{Payload, Sequence, protect};
+use super::e2e::{Payload, Sequence};
 use super::frame::{Coded, standard};
 use super::group::{Group, GroupTick};
-use super::notice::{BusFault, BusHealth, Taken, Timing, open};
-use super::table::{Message, SLOW_TICKS, VERTICAL_TICKS};
+use super::notice::{BusFault, BusHealth, Taken, Timing};
+use super::sensor::time_frame;
+use super::table::{Message, VERTICAL_TICKS};
 use embedded_can::Frame;
 use runtime::{PlanarPose, RawFrame, Reading, Status};
 
@@ -38,10 +39,7 @@ const fn axis_frame(message: Message, counter: u32, value: f32, status: Status) 
         short: status.bits(),
         long: value.to_bits(),
     };
-    Coded {
-        message,
-        bytes: protect(message.key(), counter as u8, payload),
-    }
+    Coded::new(message, counter, payload)
 }
 
 /// The three frames of the planar pose; `counter` rises by one from call to call.
@@ -53,19 +51,6 @@ pub const fn planar_frames(reading: &Reading, counter: u32) -> [Coded; 3] {
         axis_frame(Message::PoseY, counter, p.y_m, status),
         axis_frame(Message::PoseRz, counter, p.rz_rad, status),
     ]
-}
-
-/// The frame with number and time of a tick.
-const fn time_frame(sampled: &RawFrame, counter: u32) -> Coded {
-    let payload = Payload {
-        short: sampled.sequence,
-        long: sampled.time_us,
-    };
-    let message = Message::PoseTime;
-    Coded {
-        message,
-        bytes: protect(message.key(), counter as u8, payload),
-    }
 }
 
 /// Numbers the pose frames of one node and decides when the vertical axes are sent.
@@ -97,7 +82,7 @@ impl PoseSender {
         }
     }
 
-    /// The frames of one tick: X, Y, Rz; in every [`SLOW_TICKS`]th tick, together with X, Y and
+    /// The frames of one tick: X, Y, Rz; in every [`super::table::SLOW_TICKS`]th tick, together with X, Y and
     /// Rz of counter 0, number and time of `sampled`; and the vertical axes that are due.
     /// `sampled` are the codes that were decoded; a tick without codes has no time.
     pub fn frames(
@@ -115,10 +100,7 @@ impl PoseSender {
             let turn = k.wrapping_mul(every) / 3;
             (tick & (every - 1) == turn).then(|| axis_frame(message, tick >> shift, value, status))
         });
-        let slow = u32::from(SLOW_TICKS);
-        let time = sampled
-            .filter(|_| tick.is_multiple_of(slow))
-            .map(|sampled| time_frame(sampled, tick / slow));
+        let time = sampled.and_then(|sampled| time_frame(Message::PoseTime, sampled, tick));
         planar_frames(reading, tick)
             .into_iter()
             .chain(time)
@@ -186,7 +168,14 @@ fn received(tick: &GroupTick) -> ReceivedPose {
     let lost = Status::PLANAR_INVALID.with(Status::FRAMES_MISSED);
     let [x, y, rz] = [0, 1, 2].map(|k| tick.payload(k));
     let status = match (x, y, rz) {
-        (Some(x), Some(y), Some(rz)) if x.short == y.short && y.short == rz.short => {
+        (Some(x), Some(y), Some(rz))
+            if x.short == y.short
+                && y.short == rz.short
+                && [x, y, rz]
+                    .map(|axis| f32::from_bits(axis.long))
+                    .iter()
+                    .all(|axis| axis.is_finite()) =>
+        {
             Status::from_bits(x.short)
         }
         _ => lost,
@@ -231,33 +220,28 @@ impl PoseReceiver {
             }
             return taken;
         }
-        if is(&Message::PoseTime) {
-            let fault = self.take_time(data, now_us);
-            return Taken { tick: None, fault };
+        let fault = if is(&Message::PoseTime) {
+            self.take_time(data, now_us)
+        } else {
+            let vertical = VERTICAL.iter().position(is);
+            vertical.and_then(|k| self.take_vertical(k, data, now_us))
+        };
+        Taken {
+            tick: None,
+            fault: fault.map(|fault| self.planar.note(fault)),
         }
-        let fault = VERTICAL
-            .iter()
-            .position(is)
-            .and_then(|k| self.take_vertical(k, data, now_us));
-        Taken { tick: None, fault }
     }
 
     fn take_time(&mut self, data: &[u8], now_us: u32) -> Option<BusFault> {
-        let message = Message::PoseTime;
-        let (counter, payload) = match open(message, data) {
-            Ok(opened) => opened,
-            Err(fault) => return Some(self.planar.note(fault)),
-        };
-        let verdict = self.clock.judge(counter);
-        if verdict.is_used() {
+        let (payload, fault) = self.clock.take(Message::PoseTime, data);
+        if let Some(payload) = payload {
             self.dated = Some(Dated {
                 sequence: self.planar.nearest(0),
                 time_us: payload.long,
                 received_us: now_us,
             });
         }
-        let fault = verdict.fault(message)?;
-        Some(self.planar.note(fault))
+        fault
     }
 
     /// When the codes of a pose were sampled, us of the node's clock, which wraps: the last time
@@ -276,21 +260,15 @@ impl PoseReceiver {
     }
 
     fn take_vertical(&mut self, k: usize, data: &[u8], time_us: u32) -> Option<BusFault> {
-        let (message, sequence) = (*VERTICAL.get(k)?, self.sequences.get_mut(k)?);
-        let (counter, payload) = match open(message, data) {
-            Ok(opened) => opened,
-            Err(fault) => return Some(self.planar.note(fault)),
-        };
-        let verdict = sequence.judge(counter);
-        if verdict.is_used() {
+        let (payload, fault) = self.sequences.get_mut(k)?.take(*VERTICAL.get(k)?, data);
+        if let Some(payload) = payload {
             *self.vertical.get_mut(k)? = Some(ReceivedAxis {
                 value: f32::from_bits(payload.long),
                 status: Status::from_bits(payload.short),
                 time_us,
             });
         }
-        let fault = verdict.fault(message)?;
-        Some(self.planar.note(fault))
+        fault
     }
 
     /// What the passing of time brings: see [`super::SensorReceiver::poll`].

@@ -54,6 +54,16 @@ fn the_words_of_the_decoder_come_back_to_the_bit() {
 }
 
 #[test]
+fn a_pose_that_is_no_number_is_invalid() {
+    let mut receiver = PoseReceiver::new(Timing::default());
+    let mut forged = reading(0);
+    forged.pose.planar.y_m = f32::INFINITY;
+    let taken = planar_frames(&forged, 0).map(|frame| receiver.take(&BusFrame::from(frame), 0));
+    let pose = taken.into_iter().find_map(|taken| taken.tick);
+    assert_eq!(pose.expect("all three axes came").valid(), None);
+}
+
+#[test]
 fn a_pose_with_an_axis_missing_is_invalid() {
     let mut receiver = PoseReceiver::new(Timing::default());
     let [x, y, _] = planar_frames(&reading(2), 0).map(BusFrame::from);
@@ -171,7 +181,8 @@ fn a_pose_after_any_loss_has_its_own_time_or_none() {
 
 #[test]
 fn a_time_frame_worked_by_hand() {
-    let frame = time_frame(&codes(0x12_3456, 0x0102_0304), 0x15);
+    let codes = codes(0x12_3456, 0x0102_0304);
+    let frame = time_frame(Message::PoseTime, &codes, 0x150).expect("a sixteenth tick");
     // Counter 5, the 20 low bits of the number, the time, low byte first.
     assert_eq!(frame.bytes[1..], [0x65, 0x45, 0x23, 4, 3, 2, 1]);
     assert_eq!(

@@ -23,7 +23,7 @@
 use super::e2e::{SHORT_BITS, Sequence};
 use super::frame::standard;
 use super::group::{Group, GroupTick};
-use super::notice::{BusFault, BusHealth, Taken, Timing, open};
+use super::notice::{BusFault, BusHealth, Taken, Timing};
 use super::sensor::{Layout, read_three, read_two};
 use super::table::Message;
 use embedded_can::Frame;
@@ -118,15 +118,8 @@ impl SensorReceiver {
     /// Compares the sensor node's own count of ticks with the receiver's.
     #[inline(never)]
     fn take_time(&mut self, data: &[u8]) -> Option<BusFault> {
-        let message = Message::SensorTime;
-        let (counter, payload) = match open(message, data) {
-            Ok(opened) => opened,
-            Err(fault) => return Some(fault),
-        };
-        let verdict = self.clock.judge(counter);
-        if !verdict.is_used() {
-            return verdict.fault(message);
-        }
+        let (payload, fault) = self.clock.take(Message::SensorTime, data);
+        let Some(payload) = payload else { return fault };
         let counted = self.group.nearest((payload.short & 0xf) as u8);
         let offset = payload.short.wrapping_sub(counted) << (32 - SHORT_BITS);
         let before = self.offset.replace(offset)?;

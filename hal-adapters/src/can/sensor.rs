@@ -3,7 +3,7 @@
 //! Coding needs no state: the counter of each frame is the low nibble of the tick's number. So
 //! every receiver notices a tick that the node skips.
 
-use super::e2e::{Payload, protect};
+use super::e2e::Payload;
 use super::frame::{Coded, standard};
 use super::notice::open;
 use super::table::{Message, SLOW_TICKS};
@@ -126,21 +126,13 @@ pub(super) const fn read_two(p: Payload) -> [i32; 2] {
     ]
 }
 
-#[inline(always)]
-const fn frame_of(message: Message, counter: u32, payload: Payload) -> Coded {
-    Coded {
-        message,
-        bytes: protect(message.key(), counter as u8, payload),
-    }
-}
-
 /// The two frames of a tick in the 16-bit layout. A code that does not fit is sent as
 /// missing, never truncated.
 #[inline(always)]
 pub const fn frames_16(frame: &RawFrame) -> [Coded; 2] {
     [
-        frame_of(Message::Hall, frame.sequence, three_codes(frame.hall)),
-        frame_of(
+        Coded::new(Message::Hall, frame.sequence, three_codes(frame.hall)),
+        Coded::new(
             Message::Capacitive,
             frame.sequence,
             three_codes(frame.capacitive),
@@ -154,28 +146,21 @@ const fn frames_24(frame: &RawFrame) -> [Coded; 3] {
     let ([a, b, c], [g1, g2, g3]) = (frame.hall, frame.capacitive);
     let counter = frame.sequence;
     [
-        frame_of(Message::HallAb24, counter, two_codes(a, b)),
-        frame_of(Message::HallCCapacitive1At24, counter, two_codes(c, g1)),
-        frame_of(Message::Capacitive23At24, counter, two_codes(g2, g3)),
+        Coded::new(Message::HallAb24, counter, two_codes(a, b)),
+        Coded::new(Message::HallCCapacitive1At24, counter, two_codes(c, g1)),
+        Coded::new(Message::Capacitive23At24, counter, two_codes(g2, g3)),
     ]
 }
 
-/// The frame with number and time of a tick; sent in every [`SLOW_TICKS`]th tick, before the
-/// frames with its codes.
-const fn time_frame(frame: &RawFrame) -> Option<Coded> {
-    let slow = SLOW_TICKS as u32;
-    if !frame.sequence.is_multiple_of(slow) {
-        return None;
-    }
+/// The frame with number and time of what was sampled; sent in every [`SLOW_TICKS`]th tick.
+pub(super) fn time_frame(message: Message, sampled: &RawFrame, tick: u32) -> Option<Coded> {
+    let slow = u32::from(SLOW_TICKS);
     let payload = Payload {
-        short: frame.sequence,
-        long: frame.time_us,
+        short: sampled.sequence,
+        long: sampled.time_us,
     };
-    Some(frame_of(
-        Message::SensorTime,
-        frame.sequence / slow,
-        payload,
-    ))
+    tick.is_multiple_of(slow)
+        .then(|| Coded::new(message, tick / slow, payload))
 }
 
 /// Number and time of a tick, as [`Message::SensorTime`] tells them.
@@ -200,7 +185,7 @@ pub fn read_time<F: Frame>(frame: &F) -> Option<TickTime> {
     })
 }
 
-/// Every frame of a tick in the order in which it is sent.
+/// Every frame of a tick in the order in which it is sent: its time before its codes.
 pub fn frames(layout: Layout, frame: &RawFrame) -> impl Iterator<Item = Coded> + use<> {
     let codes = match layout {
         Layout::Bits16 => {
@@ -209,7 +194,7 @@ pub fn frames(layout: Layout, frame: &RawFrame) -> impl Iterator<Item = Coded> +
         }
         Layout::Bits24 => frames_24(frame).map(Some),
     };
-    time_frame(frame)
+    time_frame(Message::SensorTime, frame, frame.sequence)
         .into_iter()
         .chain(codes.into_iter().flatten())
 }
@@ -252,6 +237,7 @@ mod tests {
     #[test]
     fn every_sixteenth_tick_tells_its_number_and_time() {
         let at = |sequence| RawFrame { sequence, ..FRAME };
+        let time_frame = |frame: &RawFrame| time_frame(Message::SensorTime, frame, frame.sequence);
         let sent: Option<Coded> = time_frame(&at(0x1_2340));
         // Counter 4 of this message's own frames, sequence 0x12340, time 7.
         let bytes = sent.expect("a sixteenth tick").bytes;

@@ -3,40 +3,31 @@
 use super::e2e::Payload;
 use runtime::servo::Health;
 
-/// What the decoding node is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum NodeState {
-    /// Between reset and the first tick.
-    Starting = 0,
-    /// It decodes.
-    Running = 1,
-    /// There is no parameter blob: no pose.
-    NoParameters = 2,
-    /// The parameter blob is refused: no pose. The reason says why.
-    BadParameters = 3,
-    /// No frames come from the sensors.
-    NoFrames = 4,
-    /// A sensor or its converter reports a fault.
-    SensorFault = 5,
-    /// The node failed its own test at start: no pose.
-    SelfTestFailed = 6,
-    /// New parameters are being received or stored: no pose.
-    Updating = 7,
+numbered! {
+    /// What the decoding node is doing.
+    NodeState {
+        /// Between reset and the first tick.
+        Starting = 0,
+        /// It decodes.
+        Running = 1,
+        /// There is no parameter blob: no pose.
+        NoParameters = 2,
+        /// The parameter blob is refused: no pose. The reason says why.
+        BadParameters = 3,
+        /// No frames come from the sensors.
+        NoFrames = 4,
+        /// A sensor or its converter reports a fault.
+        SensorFault = 5,
+        /// The node failed its own test at start: no pose.
+        SelfTestFailed = 6,
+        /// New parameters are being received or stored: no pose.
+        Updating = 7,
+        /// No parameters run until that is acknowledged: no pose. The reason says why.
+        Stopped = 8,
+    }
 }
 
 impl NodeState {
-    const ALL: [Self; 8] = [
-        Self::Starting,
-        Self::Running,
-        Self::NoParameters,
-        Self::BadParameters,
-        Self::NoFrames,
-        Self::SensorFault,
-        Self::SelfTestFailed,
-        Self::Updating,
-    ];
-
     /// From its number, or `None` for a state of a later version.
     fn from_number(number: u8) -> Option<Self> {
         Self::ALL.get(usize::from(number)).copied()
@@ -62,6 +53,11 @@ pub mod flag {
     pub const INTERNAL_OSCILLATOR: u8 = 1 << 6;
     /// The codes of every tick are sent.
     pub const RECORDING: u8 = 1 << 7;
+}
+
+/// A bit, if it `is` so.
+pub const fn bit(bit: u32, is: bool) -> u32 {
+    if is { bit } else { 0 }
 }
 
 /// A frame of [`super::Message::NodeStatus`].
@@ -129,6 +125,15 @@ pub struct BoardFacts {
     pub board_checks: u32,
 }
 
+impl BoardFacts {
+    /// The words of the pages, in their order.
+    pub const fn words(&self) -> [u32; 6] {
+        let (fault, detail) = (self.fault_address, self.fault_detail);
+        let (options, checks) = (self.option_bytes, self.board_checks);
+        [self.last_fault, fault, detail, self.faults, options, checks]
+    }
+}
+
 /// Bits of [`BoardFacts::board_checks`].
 pub mod board_check {
     /// Chip select has no pull-up on the board.
@@ -144,6 +149,8 @@ pub mod board_check {
     pub const CAN_NOT_STARTED: u32 = 1 << 4;
     /// A zero deviation that was kept is lost: its record is damaged, or of another blob.
     pub const ZERO_LOST: u32 = 1 << 5;
+    /// The supply is below 2.9 V now: nothing is written.
+    pub const SUPPLY_LOW: u32 = 1 << 6;
 }
 
 /// One counter of [`runtime::servo::Health`], or one of [`BoardFacts`], with its page.
@@ -169,15 +176,11 @@ impl HealthPage {
         ];
         let pages = if board.is_some() { 12 } else { 6 };
         let page = number % pages;
-        let value = match (page, board) {
-            (6, Some(board)) => board.last_fault,
-            (7, Some(board)) => board.fault_address,
-            (8, Some(board)) => board.fault_detail,
-            (9, Some(board)) => board.faults,
-            (10, Some(board)) => board.option_bytes,
-            (11, Some(board)) => board.board_checks,
-            (page, _) => counters[(page % 6) as usize],
+        let words = match board {
+            Some(board) if page >= 6 => board.words(),
+            _ => counters,
         };
+        let value = words[(page % 6) as usize];
         let page = page as u8;
         Self { page, value }
     }
@@ -220,14 +223,6 @@ mod tests {
         };
         assert_eq!(status.payload(), want);
         assert_eq!(NodeStatus::from_payload(want), status);
-    }
-
-    #[test]
-    fn every_state_has_the_number_of_its_place() {
-        for (number, state) in (0u8..).zip(NodeState::ALL) {
-            assert_eq!(state as u8, number);
-        }
-        assert_eq!(NodeState::from_number(8), None);
     }
 
     #[test]

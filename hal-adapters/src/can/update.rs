@@ -7,31 +7,27 @@
 //! Begin {bytes, check}        ->     a transfer is open, under the token of this command; the pose
 //!                                    is invalid until it ends. Done {bytes, check}, ServoOn, Busy,
 //!                                    BadContent (too long), NoParameters (nothing to go back to),
-//!                                    WrongSequence (another record to go back to), NoRoom,
-//!                                    StoreFailed, NoRandomNumber
+//!                                    WrongSequence (another blob to go back to), NoRandomNumber
 //! Challenge {0 to 3}          ->     the nonce of this transfer
 //! UpdateData, any order       ->     kept in RAM; the tag from index 240, where the node has a key
-//! Verify {sequence}           ->     Incomplete {first missing index}: send it and ask again;
-//!                                    WrongSequence; Started, then Done {CRC}, NotAuthorised,
-//!                                    BadContent
-//! Commit {sequence}           ->     Started, and once the record is read back Done {CRC}, or
-//!                                    StoreFailed
-//! Activate                    ->     Done, and a reset: the newest record runs
+//! Commit {sequence}           ->     Incomplete {first missing index}: send it and ask again;
+//!                                    WrongSequence; Started. Then up to half a second without any
+//!                                    frame, and Done {CRC}, NotAuthorised, BadContent, SupplyLow,
+//!                                    StoreFailed, ServoOn
+//! Activate                    ->     Done, and a reset: the newest blob runs
 //! ```
 //!
 //! Every request may be repeated, with the same token: it is not done twice, and its answer comes
 //! again. A transfer ends when it is committed, refused or aborted, when the servo is declared on,
-//! and when nothing came for 5 s; until then another host is told Busy. A verified transfer takes no
-//! more data. A host sends at most one frame in a millisecond: the store of a controller holds
-//! three frames, and is emptied every 2 ms.
+//! and when nothing came for 5 s; until then another host is told Busy. A host sends at most one
+//! frame in a millisecond: the store of a controller holds three frames, and is emptied every 2 ms.
 //!
-//! A transfer of length 0 has no words but those of the tag; its commit goes back to the record
-//! before the newest, if that is the one whose check it began with.
+//! A transfer of length 0 has no words but those of the tag; its commit goes back to the blob before
+//! the newest, if that is the one whose check it began with.
 //!
 //! Two hosts may choose the same token. So `Begin` names the low half of the blob's CRC-32C, and
-//! opens no transfer while one of another blob is open; and `Done` names what was begun, verified
-//! or stored: a host that finds another blob's there begins anew under another token. Whoever lost
-//! the answer to a commit asks which record runs from the next reset on ([`page::NEXT`]).
+//! opens no transfer while one of another blob is open; and `Done` names what was begun or stored.
+//! Whoever lost the answer to a commit asks which blob is the newest ([`page::NEXT`]).
 //!
 //! Who may: where the node has a key, whoever sends the right tag ([`Authenticator`]): AES-CMAC over
 //! the transfer's nonce, the blob, the sequence number, the length and the CRC-32C. A nonce is drawn for each
@@ -42,8 +38,6 @@
 //! parameters.
 
 mod authentication;
-#[cfg(test)]
-mod memory;
 mod receiver;
 mod request;
 mod staging;
@@ -51,10 +45,8 @@ mod store;
 mod tell;
 
 pub use authentication::{Authenticator, Key, Nonce, TAG_BYTES, tag};
-#[cfg(test)]
-use memory::MemoryStore;
 pub use receiver::{Receiver, Surroundings};
 pub use request::{UpdateData, UpdateRequest};
 pub use staging::{TAG_INDEX, crc_of, word_of};
-pub use store::{Change, Kept, Running, Store, Written};
+pub use store::{Change, Kept, NotWritten, Running, Store};
 pub use tell::{Identity, page};

@@ -3,12 +3,13 @@
 //!
 //! Prints a table and `RESULT key=value` lines.
 
+mod faults;
 mod signals;
 
 use host_fit::diagnose;
-use host_fit::diagnose::finding::{Code, Finding, Severity};
+use host_fit::finding::{Code, Finding, Severity};
 use host_fit::fit::{FitSettings, ModelChoice, fit};
-use host_fit::input::dataset::{Dataset, LogSource, Movement, Row};
+use host_fit::input::dataset::{Dataset, Movement, Row};
 use host_fit::input::shipped::STAGE_TOML;
 use host_fit::input::stage::Stage;
 use host_fit::plan::plan;
@@ -36,9 +37,9 @@ fn main() {
                 mistake(sample);
             }
             let dataset = recording.dataset(&stage).expect("a plane");
-            diagnose::causes::causes(&dataset, &stage)
+            diagnose::structure::structure(&dataset, &stage)
         });
-        tell(name, code, &found.collect::<Vec<_>>());
+        tell(name, code, &found.map(Vec::from_iter).collect::<Vec<_>>());
     }
     for (name, code, from, to) in STAGE_MISTAKES {
         let toml = STAGE_TOML.replacen(from, to, 1);
@@ -47,9 +48,9 @@ fn main() {
         let found = (1..=FAULTY).map(|seed| {
             let recording = recording(&stage, &planned, 1000 + seed);
             let dataset = recording.dataset(&wrong).expect("a plane");
-            diagnose::causes::causes(&dataset, &wrong)
+            diagnose::structure::structure(&dataset, &wrong)
         });
-        tell(name, code, &found.collect::<Vec<_>>());
+        tell(name, code, &found.map(Vec::from_iter).collect::<Vec<_>>());
     }
     for percent in [0.0, 1.0, 1.5, 2.0, 3.0, 5.0] {
         let found = (1..=FAULTY).map(|seed| {
@@ -61,8 +62,7 @@ fn main() {
                     .map(|code| (f64::from(code) * (1.0 + percent / 100.0)).round() as i32);
             }
             let logs = [first, second].map(|r| r.dataset(&stage).expect("a plane"));
-            let found = diagnose::logs::disagreement(&joined(logs), &stage);
-            found.into_iter().collect()
+            of_fit(&joined(logs), &stage)
         });
         let found: Vec<_> = found.collect();
         tell(
@@ -74,8 +74,7 @@ fn main() {
     let found = (1..=FAULTY).map(|seed| {
         let logs = [seed, seed + FAULTY].map(|seed| recording(&stage, &planned, 1000 + seed));
         let logs = logs.map(|r| r.dataset(&stage).expect("a plane"));
-        let found = diagnose::logs::disagreement(&joined(logs), &stage);
-        found.into_iter().collect()
+        of_fit(&joined(logs), &stage)
     });
     tell("two stages", Code::LogsDisagree, &found.collect::<Vec<_>>());
     let found = (1..=FAULTY).map(|seed| {
@@ -86,11 +85,18 @@ fn main() {
         let half = mixed.movements.len() / 2;
         mixed.movements[half..].clone_from_slice(&second.movements[half..]);
         let dataset = mixed.dataset(&stage).expect("a plane");
-        diagnose::change::changes(&dataset, &dataset, &stage)
+        of_fit(&dataset, &stage)
     });
     let name = "two stages in one log";
     tell(name, Code::LogsDisagree, &found.collect::<Vec<_>>());
+    faults::table(&stage, &planned, 2000..2004);
     signals::table(&stage, &planned);
+}
+
+/// All findings of a log, as `fit` gives them.
+fn of_fit(dataset: &Dataset, stage: &Stage) -> Vec<Finding> {
+    let fitted = fit(dataset, stage, &FitSettings::new(ModelChoice::Auto));
+    diagnose::of_log(dataset, stage, fitted.as_ref()).findings
 }
 
 /// Findings above a note on clean stages.
@@ -101,7 +107,7 @@ fn clean(stage: &Stage, planned: &Trajectory) {
         let dataset = recording.dataset(stage).expect("a plane");
         let settings = FitSettings::new(ModelChoice::Auto);
         let fitted = fit(&dataset, stage, &settings);
-        let found = diagnose::of_log(&dataset, stage, fitted.as_ref());
+        let found = diagnose::of_log(&dataset, stage, fitted.as_ref()).findings;
         let grave: Vec<_> = (found.iter())
             .filter(|finding| finding.severity > Severity::Note)
             .collect();
@@ -162,11 +168,7 @@ fn joined([mut first, second]: [Dataset; 2]) -> Dataset {
             rows: movement.rows.start + rows..movement.rows.end + rows,
             ..movement.clone()
         }));
-    first.logs.push(LogSource {
-        path: "second".into(),
-        rows: rows..first.rows.len(),
-        has_reference: true,
-    });
+    first.end_log("second");
     first
 }
 

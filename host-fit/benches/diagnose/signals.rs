@@ -2,8 +2,7 @@
 //! how many other warnings come beside.
 
 use crate::{FAULTY, recording};
-use host_fit::diagnose::finding::{Code, Severity};
-use host_fit::diagnose::signals::signal_findings;
+use host_fit::finding::{Code, Severity};
 use host_fit::input::stage::Stage;
 use host_fit::simulate::protocol::Trajectory;
 use host_fit::simulate::recording::{Recording, Sample};
@@ -208,7 +207,7 @@ pub(crate) fn table(stage: &Stage, planned: &Trajectory) {
                 };
                 fault(&mut faulty, size);
                 let dataset = faulty.recording.dataset(stage).expect("a plane");
-                let mut found = signal_findings(&dataset, stage, None);
+                let mut found = crate::of_fit(&dataset, stage);
                 found.retain(|finding| finding.severity > Severity::Note);
                 let (right, wrong): (Vec<_>, Vec<_>) = (found.into_iter()).partition(|finding| {
                     finding.code == code && finding.channel.as_deref() == Some(CHANNELS[channel])

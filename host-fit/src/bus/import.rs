@@ -3,45 +3,33 @@
 //!
 //! | step | module |
 //! |---|---|
-//! | lines of text, from a file as often as needed | `input` |
 //! | lines of `candump -L` to ticks, by the receiver of the bus | `bus_reader`, [`bus_log`] |
-//! | numbers of the ticks by the node's own count, so that no lost tick shifts the others | `numbering` |
-//! | receive times to sample times: the node samples evenly, the bus delivers unevenly | [`clock`] |
+//! | ticks at the times when the node sampled them, by its own clock | `node_clock` |
 //! | the interferometers' CSV | [`reference`](mod@reference) |
-//! | offset between the clocks and difference in speed, found or checked by the motion | `survey`, [`offset`], `explained`, `refine`, `agreement` |
+//! | offset between the clocks and difference in speed, found or checked by the motion | [`offset`] |
 //! | reference between its samples, at the times of the ticks | [`join`] |
-//! | the log | [`write`](mod@write) |
 
-mod agreement;
 pub mod bus_log;
 mod bus_reader;
-pub mod clock;
 mod error;
-mod explained;
-mod input;
 pub mod join;
-mod numbering;
+mod lines;
+mod node_clock;
 pub mod offset;
 pub mod reference;
-mod refine;
-mod survey;
-pub mod write;
+mod report;
 
 pub use error::ImportError;
 
+use crate::input::log_format::LogFormat;
 use crate::input::stage::Stage;
-use crate::output::streamed_file::StreamedFile;
+use crate::output::Output;
 use bus_log::BusCounts;
-use bus_reader::BusReader;
-use clock::{EvenTicks, Smoothing};
 use hal_adapters::can::Layout;
-use input::Input;
-use join::{Join, JoinCounts};
-use offset::{Offset, Seen};
-use reference::{ReferenceCounts, ReferenceInput};
+use join::{JoinCounts, JoinedRow, join};
+use offset::{Clocks, Offset, Records};
+use reference::{Reference, ReferenceCounts};
 use std::path::PathBuf;
-use survey::Survey;
-use write::LogFormat;
 
 /// What is joined, and how.
 #[derive(Clone, Debug)]
@@ -76,8 +64,6 @@ pub struct ImportSettings {
 pub struct ImportReport {
     /// What the record of the bus held.
     pub bus: BusCounts,
-    /// How even its times were.
-    pub smoothing: Smoothing,
     /// What the log of the interferometers held.
     pub reference: ReferenceCounts,
     /// Offset between the clocks.
@@ -86,90 +72,66 @@ pub struct ImportReport {
     pub join: JoinCounts,
 }
 
-/// Reads both records, joins them and writes the log. Each is read from its start as often as
-/// it is needed and never held as a whole; a pipe is copied to a temporary file for that.
+/// Bytes of the log that are written at a time, about.
+const TEXT_BYTES: usize = 1 << 16;
+
+/// Reads both records, joins them and writes the log.
 ///
 /// # Errors
 /// See [`ImportError`]; nothing is written then.
 pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
     let stage = Stage::from_file(&settings.stage)?;
-    let bus = Input::new(&settings.bus, settings.estimate_offset)?;
-    let reference = ReferenceInput::new(&settings.reference, true, &stage)?;
-    let offset = match settings.estimate_offset {
-        true => estimate(settings, &stage, &bus, &reference)?,
-        false => Offset {
-            us: settings.offset_us,
-            rate: 0.0,
-            middle_us: 0.0,
-            seen: Seen::default(),
-        },
+    let (run, bus) = bus_reader::read(settings, &stage)?;
+    let reference = Reference::read(&settings.reference, &stage)?;
+    let period_us = stage.servo_period_s * 1e6;
+    let tolerance_us = settings.tolerance_us.map_or(period_us, f64::from);
+    let joined = |clocks: &Clocks, take: &mut dyn FnMut(&JoinedRow) -> Result<(), ImportError>| {
+        let reference_us = |t_us| clocks.on_reference_us(t_us);
+        let limits_us = (tolerance_us, period_us);
+        join(
+            &run.ticks,
+            &reference.samples,
+            reference_us,
+            limits_us,
+            take,
+        )
     };
-    write(settings, &stage, &bus, &reference, offset)
-}
-
-fn estimate(
-    settings: &ImportSettings,
-    stage: &Stage,
-    bus: &Input,
-    reference: &ReferenceInput<'_>,
-) -> Result<Offset, ImportError> {
-    let mut ticks = EvenTicks::new(BusReader::open(bus, "clocks", settings, stage)?);
-    let mut survey = Survey::default();
-    while let Some(timed) = ticks.next_tick()? {
-        survey.take(&timed);
-    }
-    survey.end();
-    ticks.finish(settings, stage)?;
-    let search_us = settings.search_s * 1e6;
-    offset::estimate(&survey, reference, stage, search_us)
-}
-
-/// Bytes of the log that are written at a time, about.
-const TEXT_BYTES: usize = 1 << 16;
-
-/// Joins the two and writes the log.
-fn write(
-    settings: &ImportSettings,
-    stage: &Stage,
-    bus: &Input,
-    input: &ReferenceInput<'_>,
-    mut offset: Offset,
-) -> Result<ImportReport, ImportError> {
-    let mut ticks = EvenTicks::new(BusReader::open(bus, "importing", settings, stage)?);
-    let tolerance_us = settings
-        .tolerance_us
-        .map_or(stage.servo_period_s * 1e6, f64::from);
-    let reference = input.reader()?;
-    let format = LogFormat::new(reference.quantities, stage);
-    let mut join = Join::new(reference, tolerance_us)?;
-    let mut log = StreamedFile::create(&settings.out)?;
+    let records = Records::new(&run, &reference, &stage);
+    let recorder_us = run.recorder_less_node_us();
+    let (clocks, seen) = if settings.estimate_offset {
+        records.estimate(settings.search_s * 1e6)?
+    } else {
+        let given = Clocks {
+            us: settings.offset_us - recorder_us,
+            rate: 0.0,
+            middle_us: records.middle_us(),
+        };
+        joined(&given, &mut |_| Ok(()))?.check()?;
+        records.checked(given)?
+    };
+    let format = LogFormat::new(reference.quantities, &stage);
+    let mut log = Output::create(&settings.out)?;
     let mut text = format.header();
-    let mut survey = Survey::default();
-    while let Some((tick, t_us)) = ticks.next_tick()? {
-        survey.take(&(tick, t_us));
-        let period_us = ticks.smoothing().period_us;
-        if let Some(row) = join.take(&tick, offset.on_reference_us(t_us), period_us)? {
-            format.append(&row, &mut text);
-            if text.len() > TEXT_BYTES {
-                log.write(text.as_bytes())?;
-                text.clear();
-            }
+    let join = joined(&clocks, &mut |row| {
+        let at = (row.movement, row.t_us);
+        format.append(&mut text, at, row.values, [row.capacitive, row.hall]);
+        if text.len() > TEXT_BYTES {
+            log.write(text.as_bytes())?;
+            text.clear();
         }
-    }
-    let (bus, smoothing) = ticks.finish(settings, stage)?;
-    let (join, reference) = join.finish()?;
+        Ok(())
+    })?;
     join.check()?;
-    if !settings.estimate_offset {
-        survey.end();
-        offset = offset::checked(&survey, input, stage, offset)?;
-    }
     log.write(text.as_bytes())?;
     log.finish()?;
     Ok(ImportReport {
         bus,
-        smoothing,
-        reference,
-        offset,
+        reference: reference.counts,
+        offset: Offset {
+            us: clocks.us + recorder_us,
+            rate: clocks.rate,
+            seen,
+        },
         join,
     })
 }

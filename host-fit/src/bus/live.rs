@@ -10,8 +10,8 @@ mod node;
 mod rhythm;
 mod run;
 
-pub(crate) use bus::Bus;
 pub use bus::BusError;
+pub(crate) use bus::{Bus, now_us};
 pub use run::run;
 
 use crate::output::OutputError;

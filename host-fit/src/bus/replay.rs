@@ -3,9 +3,9 @@
 mod pace;
 
 use crate::bus::live::{Bus, BusError};
-use crate::input::log::{self, Batch, LogError, LogRow, ReadOptions};
+use crate::input::dataset::LoggedFrame;
+use crate::input::log::{LogError, LogRow, LogRows, ReadOptions};
 use crate::input::stage::{Stage, StageError};
-use crate::input::whole::chunk::{Sample, SampledVertical};
 use crate::interrupt;
 use crate::output::is_standard;
 use crate::progress::Progress;
@@ -88,6 +88,9 @@ pub struct Replayed {
 /// Most rows that are sent at once when the replay is late.
 const BATCH_ROWS: usize = 20;
 
+/// Rows that are read before they are sent.
+const AHEAD_ROWS: usize = 1024;
+
 /// How long a frame may wait for a place in the transmit queue.
 const SEND_DEADLINE: Duration = Duration::from_secs(1);
 
@@ -118,88 +121,47 @@ pub fn run(settings: &ReplaySettings) -> Result<Replayed, ReplayError> {
     };
     let progress = Progress::new("sending", rows as u64);
     let mut timeline = Timeline::default();
-    let played = frames_of(&settings.log, "reading", &stage, |batch| {
-        timeline.period_us = batch.period_us as u64;
-        for rows in &batch.blocks {
-            let left = most - player.done.rows;
-            let due: Vec<Due> = rows
-                .iter()
-                .take(left)
-                .map(|row| timeline.due(row))
-                .collect();
-            let is_over = player.play(&due)? || rows.len() >= left;
-            progress.reach(player.done.rows as u64);
-            if is_over {
-                return Err(Stopped::Early);
+    let mut rows = LogRows::open(&settings.log, "reading", &stage, &ReadOptions::DECODE)?;
+    timeline.period_us = rows.period_us() as u64;
+    let mut is_over = false;
+    while !is_over {
+        let mut due = Vec::with_capacity(AHEAD_ROWS);
+        while due.len() < AHEAD_ROWS.min(most - player.done.rows) {
+            match rows.next_row()? {
+                Some(row) => due.push(timeline.due(&row, codes(&row, &settings.log)?)),
+                None => break,
             }
         }
-        Ok(())
-    });
-    match played {
-        Err(Stopped::Fault(fault)) => Err(fault),
-        Ok(()) | Err(Stopped::Early) => {
-            player.done.elapsed_s = player.pacer.elapsed_s();
-            Ok(player.done)
-        }
+        is_over = due.is_empty() || player.play(&due)?;
+        progress.reach(player.done.rows as u64);
     }
-}
-
-/// Why a log was not read to its end.
-enum Stopped {
-    Fault(ReplayError),
-    /// Enough was sent, or the user wants no more.
-    Early,
-}
-
-impl From<LogError> for Stopped {
-    fn from(fault: LogError) -> Self {
-        Self::Fault(fault.into())
+    if player.done.rows < most && !player.stop.load(Ordering::Relaxed) {
+        rows.end()?;
     }
+    player.done.elapsed_s = player.pacer.elapsed_s();
+    Ok(player.done)
 }
 
 /// How many rows a log has that can be played.
 fn rows_of(log: &Path, stage: &Stage) -> Result<usize, ReplayError> {
-    let mut rows = 0;
-    let counted = frames_of(log, "checking", stage, |batch| {
-        rows += batch.blocks.iter().map(Vec::len).sum::<usize>();
-        Ok(())
-    });
-    match counted {
-        Err(Stopped::Fault(fault)) => Err(fault),
-        _ => Ok(rows),
+    let mut rows = LogRows::open(log, "checking", stage, &ReadOptions::DECODE)?;
+    let mut count = 0;
+    while let Some(row) = rows.next_row()? {
+        codes(&row, log)?;
+        count += 1;
     }
+    rows.end()?;
+    Ok(count)
 }
 
-/// Gives away the frames of a log.
-fn frames_of(
-    log: &Path,
-    what: &'static str,
-    stage: &Stage,
-    mut take: impl FnMut(Batch<RawFrame>) -> Result<(), Stopped>,
-) -> Result<(), Stopped> {
-    let no_codes = AtomicBool::new(false);
-    let frame = |sample: &Sample| RawFrame {
-        hall: sample.hall,
-        capacitive: match sample.vertical {
-            SampledVertical::Codes(codes) => codes,
-            SampledVertical::Pose(_) => {
-                no_codes.store(true, Ordering::Relaxed);
-                [0; 3]
-            }
-        },
-        sequence: 0,
-        time_us: sample.t_us as u32,
-    };
-    let options = &ReadOptions::DECODE;
-    log::stream(log, what, stage, options, frame, |batch| {
-        match no_codes.load(Ordering::Relaxed) {
-            true => Err(Stopped::Fault(ReplayError::NoCodes {
-                path: log.to_path_buf(),
-            })),
-            false => take(batch),
-        }
-    })?;
-    Ok(())
+/// The codes of a row, all six.
+fn codes(row: &LogRow, log: &Path) -> Result<RawFrame, ReplayError> {
+    match row.row.frame {
+        LoggedFrame::Codes(frame) => Ok(frame),
+        LoggedFrame::HallCodes { .. } => Err(ReplayError::NoCodes {
+            path: log.to_path_buf(),
+        }),
+    }
 }
 
 /// The layout asked for, or the narrowest; refused if it does not hold the codes of the stage.
@@ -241,21 +203,25 @@ struct Timeline {
 
 impl Timeline {
     /// When the next row is due, and as what.
-    fn due(&mut self, row: &LogRow<RawFrame>) -> Due {
+    /// Its frame carries this time, as the clock of a node goes on between movements, too.
+    fn due(&mut self, row: &LogRow, frame: RawFrame) -> Due {
         if row.begins {
-            self.first_us = row.t_us;
+            self.first_us = row.row.t_us;
             self.start = self.last.map_or((0, 0), |last| {
                 let at_us = last.at_us.saturating_add(self.period_us);
                 (at_us, last.frame.sequence.wrapping_add(1))
             });
         }
         let (start_us, start) = self.start;
-        let since_us = row.t_us.saturating_sub(self.first_us);
+        let since_us = row.row.t_us.saturating_sub(self.first_us);
+        let at_us = start_us.saturating_add(u64::try_from(since_us).unwrap_or(0));
         let due = Due {
-            at_us: start_us.saturating_add(u64::try_from(since_us).unwrap_or(0)),
+            at_us,
             frame: RawFrame {
-                sequence: start.wrapping_add(row.sequence),
-                ..row.item
+                sequence: start.wrapping_add(frame.sequence),
+                // Wraps as the node's clock does.
+                time_us: at_us as u32,
+                ..frame
             },
         };
         self.last = Some(due);
@@ -275,7 +241,7 @@ struct Player<'a> {
 
 impl Player<'_> {
     /// Sends these rows; tells whether the user wants no more.
-    fn play(&mut self, rows: &[Due]) -> Result<bool, Stopped> {
+    fn play(&mut self, rows: &[Due]) -> Result<bool, ReplayError> {
         let mut left = rows;
         while let [first, ..] = left {
             let (now_us, late_s) = self.pacer.wait_until(first.at_us, self.stop);
@@ -299,7 +265,7 @@ impl Player<'_> {
             let rows = self.done.rows;
             self.bus
                 .send(&self.frames, SEND_DEADLINE)
-                .map_err(|cause| Stopped::Fault(ReplayError::Bus { cause, rows }))?;
+                .map_err(|cause| ReplayError::Bus { cause, rows })?;
             self.done.frames += self.frames.len();
             self.done.rows += now.len();
             left = later;

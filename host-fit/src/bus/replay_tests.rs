@@ -23,13 +23,13 @@ const CODES: &str = "cap1_cnt,cap2_cnt,cap3_cnt,hall_a_cnt,hall_b_cnt,hall_c_cnt
 fn movements_follow_each_other_one_period_apart_and_gaps_within_them_stay() {
     let log = log(&[&[500, 2_500, 4_500, 10_500], &[900_000, 902_000]], CODES);
     let (mut timeline, mut due) = (Timeline::default(), Vec::new());
-    let read = frames_of(log.path(), "reading", &stage(), |batch| {
-        timeline.period_us = batch.period_us as u64;
-        let rows = batch.blocks.iter().flatten();
-        due.extend(rows.map(|row| timeline.due(row)));
-        Ok(())
-    });
-    assert!(read.is_ok());
+    let stage = stage();
+    let open = LogRows::open(log.path(), "reading", &stage, &ReadOptions::DECODE);
+    let mut rows = open.expect("sound");
+    timeline.period_us = rows.period_us() as u64;
+    while let Some(row) = rows.next_row().expect("sound") {
+        due.push(timeline.due(&row, codes(&row, log.path()).expect("codes")));
+    }
     let times: Vec<_> = due.iter().map(|d| (d.at_us, d.frame.sequence)).collect();
     let want = [
         (0, 0),
@@ -40,8 +40,9 @@ fn movements_follow_each_other_one_period_apart_and_gaps_within_them_stay() {
         (14_000, 7),
     ];
     assert_eq!(times, want);
+    assert!(due.iter().all(|d| u64::from(d.frame.time_us) == d.at_us));
     assert_eq!(due[0].frame.hall, [1, 2, 3]);
-    assert_eq!(rows_of(log.path(), &stage()).ok(), Some(6));
+    assert_eq!(rows_of(log.path(), &stage).ok(), Some(6));
 }
 
 #[test]

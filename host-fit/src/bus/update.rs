@@ -1,24 +1,23 @@
 //! `identify`, `update`, `read-back`: who a node is, new parameters for it, and the parameters that it
 //! runs, over the bus. The protocol is that of [`hal_adapters::can::update`].
 //!
-//! Each is a [`Job`], which says step by step what it wants; a [`Dialog`] has its requests answered,
-//! without a bus and without a clock: frames and times in, frames out. The functions put it on an interface.
+//! Each is a straight script over [`Talk::exchange`], on whatever [`Link`]: a bus, or a model of one.
 
-mod dialog;
-mod goal;
 mod identity;
-mod outgoing;
 mod plan;
-mod read_back;
 mod run;
-mod updater;
+mod script;
+mod talk;
 
-pub use dialog::{Dialog, Job, SPACING_US, Wish};
-pub use identity::{Identifier, Identity, RunningParameters};
+pub use identity::{Identity, RunningParameters};
 pub use plan::{Plan, Updated, Wanted};
-pub use read_back::BlobReader;
 pub use run::{identify, read_back, update};
-pub use updater::Updater;
+pub use talk::{Link, SPACING_US, Talk};
+/// The scripts without an interface.
+pub mod on {
+    pub use super::identity::{identify, read_back};
+    pub use super::script::update;
+}
 
 use super::live::BusError;
 use hal_adapters::can::command::Outcome;
@@ -27,6 +26,9 @@ use runtime::BlobError;
 /// Why a node was not identified, updated or read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UpdateError {
+    /// The bus cannot be used.
+    #[error("the bus cannot be used")]
+    Link,
     /// Nobody answers.
     #[error(
         "no controller answered for 3 s; is it on, and is the interface set to its bit rate (`ip -details link show`)?"
@@ -81,9 +83,7 @@ pub enum UpdateError {
         declared: bool,
     },
     /// Another host is at it.
-    #[error(
-        "another computer is updating this controller, and has not ended for 7 s; try again when it is done"
-    )]
+    #[error("another computer is updating this controller; try again when it is done")]
     Busy,
     /// Nothing can be authorised.
     #[error(
@@ -121,16 +121,15 @@ pub enum UpdateError {
         "the controller's records have used up all sequence numbers: erase its store with a probe"
     )]
     NumbersUsedUp,
-    /// The store is full until the next start.
+    /// The supply is too low to write.
     #[error(
-        "the controller's store is full until its next start, which makes room once the newest parameters have run for a second: restart it, and try again"
+        "the supply of the controller is below 2.9 V, so that nothing is written: it goes on with the parameters that it runs"
     )]
-    NoRoom,
+    SupplyLow,
     /// The flash could not be written.
     #[error(
-        "the controller could not write its flash, and goes on with the parameters that it runs; restart it, look at them \
-         with `host-fit identify`, and try again. If it fails again, the flash is worn out, or both slots hold blobs that a \
-         probe has flashed and the program does not take: erase one of them with the probe"
+        "the controller could not write its flash, and goes on with the parameters that it runs; those before them may be \
+         lost. Try again; if it fails again, the flash is worn out"
     )]
     StoreFailed,
     /// There are no parameters to activate.
@@ -141,7 +140,7 @@ pub enum UpdateError {
     NoPrevious,
     /// Too much is lost.
     #[error(
-        "the controller lost the update again and again; look at the bus, its termination and its load"
+        "the controller lost the update again and again, or was restarted; look at the bus, its termination and its load"
     )]
     Lossy,
     /// No answer to the commit.
@@ -152,8 +151,9 @@ pub enum UpdateError {
     Unknown,
     /// The new parameters are stored, but the node was not reset.
     #[error(
-        "the parameters are stored as number {sequence} and run from the next start on; they were not activated, because \
-         the servo may be on again, or another computer is updating. Once it is off and the other one done, use `host-fit update --servo-off --activate`"
+        "the parameters are stored as number {sequence} and wait; they were not activated, because the servo may be on \
+         again, or another computer is updating. Once it is off and the other one done, use `host-fit update --servo-off \
+         --activate`"
     )]
     NotActivated {
         /// Their sequence number.
@@ -161,8 +161,8 @@ pub enum UpdateError {
     },
     /// The new parameters do not run.
     #[error(
-        "the parameters are stored as number {sequence}, but the controller does not run them after its reset, or has \
-         passed them over because they made its program fail: see `host-fit identify`"
+        "the parameters are stored as number {sequence}, but the controller does not run them, or has stopped because its \
+         program failed twice: see its state, and go back with `host-fit update --servo-off --previous --activate`"
     )]
     NotActive {
         /// Their sequence number.

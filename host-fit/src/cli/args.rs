@@ -1,18 +1,120 @@
-//! What several commands take: numbers of rows, the library's own choices by name.
+//! What several commands take: logs and their stage, numbers, the library's own choices by name.
 
-use crate::compare::Case;
-use crate::input::log::BadRows;
-use crate::input::memory::half_of_the_machine;
+use crate::cli::error::HostError;
+use crate::cli::terminal;
+use crate::input::log::{self, BadRows, LogReading, ReadOptions};
+use crate::input::stage::Stage;
+use crate::output::Outputs;
 use crate::problem::draw::Draw;
 use crate::solve::robust::Loss;
 use crate::solve::search::kind::SearchKind;
 use crate::solve::{Projection, Solver};
-use clap::builder::PossibleValue;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use hal_adapters::can::Layout;
 use runtime::OnInvalid;
+use runtime::parameters::Text;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
+
+/// The stage file of a command.
+#[derive(Debug, Args)]
+pub(super) struct StageFile {
+    /// The stage as designed.
+    #[arg(
+        id = "stage",
+        long = "stage",
+        value_name = "FILE",
+        default_value = "stage.toml"
+    )]
+    pub(super) path: PathBuf,
+}
+
+impl StageFile {
+    pub(super) fn read(&self) -> Result<Stage, HostError> {
+        Ok(Stage::from_file(&self.path)?)
+    }
+}
+
+/// Logs of a stage, and how they are read.
+#[derive(Debug, Args)]
+pub(super) struct Logs {
+    /// Logs: CSV or CSV.gz, one or more; `-` for standard input.
+    #[arg(required = true, value_name = "LOG")]
+    pub(super) paths: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) stage: StageFile,
+    /// Logs without a column for the movement: begin one every so many seconds, not only after gaps
+    /// in time.
+    #[arg(long, value_name = "SECONDS", value_parser = movement_seconds)]
+    split: Option<f64>,
+}
+
+impl Logs {
+    /// The files that are read.
+    pub(super) fn inputs(&self) -> impl Iterator<Item = &Path> {
+        (self.paths.iter().chain([&self.stage.path])).map(PathBuf::as_path)
+    }
+
+    /// How they are read, by the arguments and the command.
+    pub(super) fn options(&self, command: ReadOptions) -> ReadOptions {
+        ReadOptions {
+            split_s: self.split,
+            ..command
+        }
+    }
+
+    /// Reads them.
+    pub(super) fn read(
+        &self,
+        stage: &Stage,
+        command: ReadOptions,
+    ) -> Result<LogReading, HostError> {
+        let options = self.options(command);
+        let read = || log::read(&self.paths, stage, &options);
+        Ok(terminal::timed("reading", read)?)
+    }
+}
+
+/// Where the figures of a command go.
+#[derive(Debug, Args)]
+pub(super) struct Json {
+    /// Write the figures as JSON; `-` for standard output.
+    #[arg(id = "json", long = "json", value_name = "FILE")]
+    pub(super) path: Option<PathBuf>,
+}
+
+impl Json {
+    /// Adds the figures to the outputs, if they are asked for.
+    pub(super) fn add(
+        &self,
+        outputs: &mut Outputs,
+        result: &impl serde::Serialize,
+    ) -> Result<(), HostError> {
+        let Some(path) = &self.path else {
+            return Ok(());
+        };
+        let text = serde_json::to_string_pretty(result)? + "\n";
+        Ok(outputs.add(path, text.as_bytes())?)
+    }
+
+    /// Writes the figures of a command that has no other output, if they are asked for.
+    pub(super) fn write(&self, result: &impl serde::Serialize) -> Result<(), HostError> {
+        let mut outputs = Outputs::default();
+        self.add(&mut outputs, result)?;
+        outputs.commit()?;
+        Ok(())
+    }
+}
+
+/// How many threads work.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct Threads {
+    /// Threads; all cores if not given. The result does not depend on it.
+    #[arg(id = "threads", long = "threads", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(super) number: Option<u16>,
+}
 
 /// How many rows are fitted: a number, or `None` for `all`.
 #[derive(Clone, Copy, Debug)]
@@ -30,156 +132,95 @@ impl FromStr for Train {
     }
 }
 
-/// How much memory logs may take.
-#[derive(Clone, Copy, Debug, Args)]
-pub(super) struct Memory {
-    /// Refuse logs whose rows take more memory than this, as 500MB or 2GiB; half of this machine's
-    /// if not given. The work on them is not counted.
-    #[arg(long = "memory", value_name = "SIZE", value_parser = bytes)]
-    memory_bytes: Option<u64>,
-}
-
-impl Memory {
-    /// The limit, bytes; `None` where neither the user nor the system names one.
-    pub(super) fn limit_bytes(self) -> Option<u64> {
-        self.memory_bytes.or_else(half_of_the_machine)
-    }
-}
-
-/// A number of bytes with its unit.
-fn bytes(text: &str) -> Result<u64, &'static str> {
-    const UNITS: [(&str, f64); 7] = [
-        ("kB", 1e3),
-        ("MB", 1e6),
-        ("GB", 1e9),
-        ("KiB", 1024.0),
-        ("MiB", 1_048_576.0),
-        ("GiB", 1_073_741_824.0),
-        ("B", 1.0),
-    ];
-    let with_unit = |(unit, bytes): &(&str, f64)| Some((text.strip_suffix(unit)?, *bytes));
-    let (number, unit) = UNITS.iter().find_map(with_unit).unwrap_or((text, 1.0));
-    match number.trim().parse::<f64>().map(|number| number * unit) {
-        Ok(bytes) if (1.0..1e18).contains(&bytes) => Ok(bytes as u64),
-        _ => Err("expected a size, as 500MB or 2GiB"),
+/// A number between two ends, both included.
+pub(super) fn between(text: &str, low: f64, high: f64, what: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (low..=high).contains(&number) => Ok(number),
+        _ => Err(format!("expected {what} from {low} to {high}")),
     }
 }
 
 /// How long a bus is watched.
-pub(super) fn seconds(text: &str) -> Result<Duration, &'static str> {
-    match text.parse::<f64>() {
-        Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(Duration::from_secs_f64(seconds)),
-        _ => Err("expected a number of seconds above 0"),
-    }
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
+    between(text, 1e-9, 1e9, "a number of seconds").map(Duration::from_secs_f64)
 }
 
 /// A length of movements: `--split`.
-pub(super) fn movement_seconds(text: &str) -> Result<f64, &'static str> {
-    match text.parse::<f64>() {
-        Ok(seconds) if (1e-3..=1e6).contains(&seconds) => Ok(seconds),
-        _ => Err("expected a number of seconds from 0.001 to 1000000"),
-    }
+fn movement_seconds(text: &str) -> Result<f64, String> {
+    between(text, 1e-3, 1e6, "a number of seconds")
 }
 
-impl ValueEnum for Projection {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[Self::None, Self::Delta, Self::Linear]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let help = match self {
-            Self::None => {
-                "Nothing: every zero deviation is an unknown of its own, within its range (the paper)"
-            }
-            Self::Delta => "The zero deviations",
-            Self::Linear => {
-                "Everything linear: the gain G and one offset for each movement. Nine unknowns of model 31 are left"
-            }
-        };
-        Some(PossibleValue::new(self.name()).help(help))
-    }
+/// A text that goes into a blob.
+pub(super) fn blob_text(value: &str) -> Result<Text, &'static str> {
+    Text::try_from(value).map_err(|_| "at most 32 bytes fit in the blob")
 }
 
-impl ValueEnum for Case {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Self::ALL
-    }
+/// A type whose values are chosen by name on the command line.
+pub(super) trait Choice: Clone + Send + Sync + 'static {
+    /// Each value, its name and its help, which may be empty.
+    fn all() -> Vec<(Self, &'static str, &'static str)>;
+}
 
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        match self {
-            Self::Model31(projection) => projection.to_possible_value(),
-            Self::Field => Some(PossibleValue::new(self.name()).help(
-                "The field model, which the log must carry: nine unknowns are left, the same as with linear",
-            )),
+/// Parses a [`Choice`].
+pub(super) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
+    let value = |(_, name, help): (T, &'static str, &'static str)| match help {
+        "" => PossibleValue::new(name),
+        help => PossibleValue::new(name).help(help),
+    };
+    PossibleValuesParser::new(T::all().into_iter().map(value)).try_map(|name| {
+        let found = T::all().into_iter().find(|(_, known, _)| *known == name);
+        found.map(|(value, ..)| value).ok_or("not one of these")
+    })
+}
+
+/// Choices whose values are the variants of an enum: name and help of each.
+macro_rules! values {
+    ($($type:ty { $($variant:ident: $name:literal, $help:literal;)* })*) => {$(
+        impl $crate::cli::args::Choice for $type {
+            fn all() -> Vec<(Self, &'static str, &'static str)> {
+                vec![$((Self::$variant, $name, $help)),*]
+            }
         }
+    )*};
+}
+pub(super) use values;
+
+values! {
+    Projection {
+        None: "none", "Nothing: every zero deviation is an unknown of its own, within its range (the paper)";
+        Delta: "delta", "The zero deviations";
+        Linear: "linear", "Everything linear: the gain G and one offset for each movement. Nine unknowns of model 31 are left";
+    }
+    Loss {
+        Cauchy: "cauchy", "Hardly at all (the default)";
+        Huber: "huber", "As rows at the limit of 6 robust standard deviations do";
+        None: "none", "As any other: plain least squares";
+    }
+    Draw {
+        Stratified: "stratified", "Each movement gives its share, so that none is missed while N is at least their number";
+        Plain: "plain", "As the paper draws: any row with the same chance. Most draws of 200 rows out of 57 movements miss one, whose zero deviation then is free";
+    }
+    BadRows {
+        Refuse: "refuse", "Stop at the first and say where it is";
+        Skip: "skip", "Leave them out and count them";
     }
 }
 
-impl ValueEnum for SearchKind {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Self::ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name()))
-    }
-}
-
-impl ValueEnum for Solver {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Self::ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name()))
+impl Choice for SearchKind {
+    fn all() -> Vec<(Self, &'static str, &'static str)> {
+        Self::ALL
+            .iter()
+            .map(|value| (*value, value.name(), ""))
+            .collect()
     }
 }
 
-impl ValueEnum for Loss {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Self::ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let help = match self {
-            Self::Cauchy => "Hardly at all (the default)",
-            Self::Huber => "As rows at the limit of 6 robust standard deviations do",
-            Self::None => "As any other: plain least squares",
-        };
-        Some(PossibleValue::new(self.name()).help(help))
-    }
-}
-
-impl ValueEnum for Draw {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[Self::Stratified, Self::Plain]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(match self {
-            Self::Stratified => PossibleValue::new("stratified").help(
-                "Each movement gives its share, so that none is missed while N is at least their number",
-            ),
-            Self::Plain => PossibleValue::new("plain").help(
-                "As the paper draws: any row with the same chance. Most draws of 200 rows out of 57 movements miss \
-                 one, whose zero deviation then is free",
-            ),
-        })
-    }
-}
-
-impl ValueEnum for BadRows {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[Self::Refuse, Self::Skip]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(match self {
-            Self::Refuse => {
-                PossibleValue::new("refuse").help("Stop at the first and say where it is")
-            }
-            Self::Skip => PossibleValue::new("skip").help("Leave them out and count them"),
-        })
+impl Choice for Solver {
+    fn all() -> Vec<(Self, &'static str, &'static str)> {
+        Self::ALL
+            .iter()
+            .map(|value| (*value, value.name(), ""))
+            .collect()
     }
 }
 

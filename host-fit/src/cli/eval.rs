@@ -1,21 +1,22 @@
 //! `host-fit eval`.
 
+use super::args::{Json, Logs};
+use super::report::{Report, finish};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::diagnose;
-use crate::diagnose::finding::Severity;
-use crate::fit::FitWarning;
-use crate::input::log::{self, ReadOptions};
-use crate::input::stage::Stage;
-use crate::input::whole::chunk::Sample;
+use crate::finding::{self, Severity};
+use crate::fit::of_counts;
+use crate::input::log::{self, ReadOptions, ReferenceUse};
 use crate::judge::statistics::PoseError;
-use crate::judge::whole::Judge;
-use crate::judge::{Decoded, Zeros, error};
-use crate::output::blob_file;
+use crate::judge::{Decoded, Judge, Zeros, error};
+use crate::output::{Outputs, blob_file};
 use crate::problem::model::Model;
-use crate::report::errors;
+use crate::problem::parameters::Parameters;
 use crate::report::json::of_eval;
-use crate::report::text;
+use crate::report::page::Errors;
+use crate::report::table::tables;
+use crate::report::verdict::{End, Subject};
 use clap::{Args, ValueEnum};
 use runtime::{ModelKind, ParameterSet};
 use std::path::PathBuf;
@@ -39,28 +40,19 @@ pub(super) struct EvalArgs {
     /// The parameter blob.
     #[arg(value_name = "params.bin")]
     params: PathBuf,
-    /// Logs: CSV or CSV.gz, one or more; `-` for standard input.
-    #[arg(required = true, value_name = "LOG")]
-    logs: Vec<PathBuf>,
-    /// The stage as designed.
-    #[arg(long, value_name = "stage.toml")]
-    stage: PathBuf,
+    #[command(flatten)]
+    logs: Logs,
     /// Zero deviations; as the blob's model has them if not given: models (12) and (15) have none.
     #[arg(long, value_enum)]
     delta: Option<DeltaChoice>,
-    /// Logs without a column for the movement: begin one every so many seconds, not only after gaps
-    /// in time.
-    #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
-    split: Option<f64>,
-    #[command(flatten)]
-    memory: super::args::Memory,
     /// Largest rms error, in terms of that of the logs that the blob was fitted to: 3 if not given,
     /// and 10 for models (12) to (31), whose own logs may not show what they lack.
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
     limit: Option<f64>,
-    /// Write the figures as JSON; `-` for standard output.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    report: Report,
+    #[command(flatten)]
+    json: Json,
 }
 
 fn factor(value: &str) -> Result<f64, &'static str> {
@@ -71,45 +63,44 @@ fn factor(value: &str) -> Result<f64, &'static str> {
 
 /// The largest error in terms of the blob's own, if that is beyond the limit; the blob of an exact fit
 /// has none to compare with.
-fn beyond_limit(set: &ParameterSet, errors: &PoseError, limit: f64) -> Option<HostError> {
+fn beyond_limit(set: &ParameterSet, errors: &PoseError, limit: f64) -> Option<String> {
     const AXES: [(&str, &str); 3] = [("X", "um"), ("Y", "um"), ("Rz", "urad")];
-    let ratio = |axis: usize| errors.axes[axis].rms / f64::from(set.fit.rms[axis]);
+    let own = |axis: usize| f64::from(set.fit.rms[axis]);
+    let ratio = |axis: usize| errors.axes[axis].rms / own(axis);
     let worst = (0..3)
-        .filter(|&axis| set.fit.rms[axis] > 0.0)
+        .filter(|&axis| own(axis) > 0.0)
         .max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
     let (axis, unit) = AXES[worst];
-    (ratio(worst) > limit).then(|| HostError::BeyondLimit {
-        axis,
-        unit,
-        error: errors.axes[worst].rms * 1e6,
-        own: f64::from(set.fit.rms[worst]) * 1e6,
-        limit,
-        cause: String::new(),
+    (ratio(worst) > limit).then(|| {
+        let [error, own] = [errors.axes[worst].rms, own(worst)].map(|x| x * 1e6);
+        format!(
+            "the parameter blob does not describe this log: {error:.2} {unit} rms in {axis}, where it had {own:.2} {unit} in \
+             the logs that it was fitted to, more than {limit} times as much (--limit)"
+        )
     })
 }
 
 /// Judges a blob on logs with reference.
 pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     let started = Instant::now();
-    let mut inputs = vec![args.params.as_path(), args.stage.as_path()];
-    inputs.extend(args.logs.iter().map(PathBuf::as_path));
-    super::keep_apart(&[args.json.as_deref()], &inputs)?;
-    let set = blob_file::read(&args.params)?;
-    let stage = Stage::from_file(&args.stage)?;
-    super::same_scales(&set, &stage, &args.stage)?;
-    let options = ReadOptions {
-        split_s: args.split,
-        memory_bytes: args.memory.limit_bytes(),
+    let inputs = [args.params.as_path()]
+        .into_iter()
+        .chain(args.logs.inputs());
+    super::keep_apart_with([args.json.path.as_deref()], &args.report, inputs)?;
+    let (set, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
+    // The reference is needed, and the decoder marks saturated codes.
+    let options = args.logs.options(ReadOptions {
+        reference: ReferenceUse::Required,
         rows_max: Some(ROWS_MAX),
-        ..super::EVAL
-    };
-    let mut judge = Judge::new(&set, &stage, args.logs.len());
+        ..ReadOptions::DECODE
+    });
+    let parameters = Parameters::of_set(&set);
+    let mut judge = Judge::new(&parameters, &stage, args.logs.paths.len());
     let decoder = set.decoder();
     let log = terminal::timed("reading", || {
-        let error = |sample: &Sample| error(&decoder, &sample.frame(), sample.reference);
-        log::read_passing(&args.logs, &stage, &options, error, |log, row| {
-            let (sample, error) = row.item;
-            judge.take(log, row.begins, error, sample.reference);
+        log::read_each(&args.logs.paths, &stage, &options, |log, row| {
+            let error = error(&decoder, &row.row);
+            judge.take((log, row.movement, row.begins), &row.row, error);
         })
     })?;
     let zeros = match args.delta {
@@ -117,87 +108,79 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         Some(DeltaChoice::Fit) => Zeros::Refit,
         Some(DeltaChoice::Zero) => Zeros::None,
     };
-    let decoded = Decoded::new(&set, &log.dataset);
-    let judgement = decoded.judge(&log.dataset, &stage, zeros);
-    // Of a long log the rows above are an excerpt, which the diagnosis looks at; errors are those of
-    // all rows.
-    let judge_whole = |zeros| {
-        let whole = judge.judgement(zeros);
-        (whole.rows() > log.dataset.rows.len()).then_some(whole)
-    };
-    let whole = judge_whole(zeros);
-    let (undecoded, zeros_taken_off) = match &whole {
-        Some(whole) => (whole.undecoded, &whole.zeros),
-        None => (judgement.undecoded, &judgement.zeros),
-    };
+    let judgement = judge.clone().judgement(zeros);
     let mut circumstances = super::circumstances(&log, &stage, started);
-    if undecoded > 0 {
-        let undecoded = FitWarning::Undecoded { rows: undecoded };
-        circumstances.warnings.push(undecoded.to_string());
-    }
-    let clipped = zeros_taken_off.iter().filter(|zero| zero.clipped).count();
-    if clipped > 0 {
-        let movements = zeros_taken_off.len();
-        circumstances.warnings.push(format!(
-            "the zero deviation of {clipped} of {movements} movements was clipped to its range"
-        ));
-    }
-    let errors = decoded.errors_less(&judgement.zeros, &log.dataset);
-    circumstances.findings = terminal::timed("diagnosis", || {
-        diagnose::of_judged(&log.dataset, &stage, &set, &errors)
+    let counts = of_counts(&judgement.zeros, judgement.undecoded);
+    circumstances
+        .warnings
+        .extend(counts.map(|found| found.message));
+    let decoded = Decoded::new(&set, &log.dataset);
+    let of_sample = decoded.judge(&log.dataset, &stage, zeros);
+    let by_row = decoded.errors_less(&of_sample.zeros, &log.dataset);
+    circumstances.diagnosis = terminal::timed("diagnosis", || {
+        diagnose::of_judged(&log.dataset, &stage, &set, &by_row)
     });
-    let report = of_eval(
-        &set,
-        &decoded,
-        &judgement,
-        whole.as_ref(),
-        zeros,
-        &circumstances,
-    );
-    if let Some(path) = &args.json {
-        super::write_json(&report, path)?;
-    }
-    terminal::print(&format!(
-        "{}, {} rows in {} movements\n\n{}",
-        report.model_title,
-        report.rows,
-        report.movements,
-        text::errors(
-            &format!("errors, {}", report.zeros_in_words),
-            whole
-                .as_ref()
-                .map_or(&judgement.errors, |whole| &whole.errors),
-            None
-        ) + &errors::as_text(&report.logs)
-    ))?;
-    super::wrote([args.json.clone()])?;
-    terminal::warn(&report.warnings);
+    let report = of_eval(&set, &judgement, zeros, &circumstances);
     // As the blob's own errors were counted, whatever --delta says.
     let own_zeros = Zeros::of_model(Model::of(set.model));
-    let comparable = match judge_whole(own_zeros) {
-        Some(whole) => whole.errors,
-        None => decoded.judge(&log.dataset, &stage, own_zeros).errors,
+    let comparable = judge.judgement(own_zeros).errors;
+    let is_field = set.model == ModelKind::Field;
+    let limit = args.limit.unwrap_or(if is_field { 3.0 } else { 10.0 });
+    let problem = beyond_limit(&set, &comparable, limit);
+    let own = set.fit.rms.map(f64::from);
+    let subject = Subject {
+        end: problem.as_deref().map_or(End::Judged, End::Failed),
+        diagnosis: &circumstances.diagnosis,
+        is_field,
+        errors: Some(&judgement.errors),
+        limits: own.map(|rms| (rms > 0.0).then_some(limit * rms)),
     };
-    let usual = if set.model == ModelKind::Field {
-        3.0
-    } else {
-        10.0
+    let mut hidden = report.hidden();
+    hidden.push("trusted_inputs");
+    let mut outputs = Outputs::default();
+    args.json.add(&mut outputs, &report)?;
+    args.report.add(&mut outputs, || {
+        let what = ("Verification of a calibration", set.serial.as_str());
+        let mut source = args
+            .report
+            .source(what, &args.logs, (&log, &stage), subject);
+        let blob = blob_file::to_bytes(&args.params, &set)?;
+        let provenance = &mut source.provenance;
+        provenance.add_bytes(&args.params, &blob, "parameter blob, judged");
+        source.warnings.clone_from(&report.warnings);
+        source.errors = Some(Errors {
+            set: &set,
+            by_row,
+            figures: &of_sample.errors,
+            movements: &report.zero_deviations,
+            parameters: &report.parameters,
+            details: tables(&report, &[&hidden[..], &["errors"]].concat()),
+        });
+        Ok(source)
+    })?;
+    finish(
+        outputs,
+        &tables(&report, &hidden),
+        &report.warnings,
+        &subject,
+    )?;
+    let Some(problem) = problem.as_deref() else {
+        return Ok(());
     };
-    let mut beyond = beyond_limit(&set, &comparable, args.limit.unwrap_or(usual));
-    if let Some(HostError::BeyondLimit { cause, .. }) = &mut beyond {
-        let found = diagnose::messages(&report.findings, Severity::Warn);
-        let remedy = if set.model == ModelKind::Field {
-            "bring the blob up to date with host-fit recalibrate"
-        } else {
-            "take the field model, from a log in which all six axes move at once"
-        };
-        *cause = if found.is_empty() {
-            format!(". If channels and scales are right, {remedy}")
-        } else {
-            format!(". {found}")
-        };
-    } else {
-        terminal::tell(&report.findings);
-    }
-    beyond.map_or(Ok(()), Err)
+    // What the diagnosis found explains more than a remedy; warnings stand above already.
+    let found = &report.findings;
+    let refusals = finding::messages(found, Severity::Refuse);
+    let more = match (refusals.as_str(), found.iter().any(|f| f.severity == Severity::Warn)) {
+        ("", true) => String::new(),
+        ("", false) if is_field => {
+            ". If channels and scales are right, bring the blob up to date with host-fit recalibrate"
+                .to_owned()
+        }
+        ("", false) => {
+            ". If channels and scales are right, take the field model, from a log in which all six axes move at once"
+                .to_owned()
+        }
+        (refusals, _) => format!(". {refusals}"),
+    };
+    Err(HostError::rejected(format!("{problem}{more}")))
 }

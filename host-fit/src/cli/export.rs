@@ -1,26 +1,19 @@
 //! `host-fit export`.
 
+use super::args::choice;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::blob_file;
-use crate::output::export::{ExportError, ExportFormat, Place, SLOTS, export};
+use crate::output::export::{ExportError, ExportFormat, SLOTS, address_of, export};
 use crate::output::write_atomically;
-use clap::builder::PossibleValue;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use runtime::blob::MAX_BYTES;
 use std::path::PathBuf;
 
-impl ValueEnum for ExportFormat {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[Self::Bin, Self::Hex]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let help = match self {
-            Self::Bin => "The bytes of the blob; the flash tool is told the address",
-            Self::Hex => "Intel HEX",
-        };
-        Some(PossibleValue::new(self.extension()).help(help))
+super::args::values! {
+    ExportFormat {
+        Bin: "bin", "The bytes of the blob; the flash tool is told the address";
+        Hex: "hex", "Intel HEX";
     }
 }
 
@@ -31,15 +24,15 @@ pub(super) struct ExportArgs {
     #[arg(value_name = "params.bin")]
     params: PathBuf,
     /// Format of the file.
-    #[arg(long, value_enum, default_value = "hex")]
+    #[arg(long, value_parser = choice::<ExportFormat>(), default_value = "hex")]
     format: ExportFormat,
-    /// Where in flash: a number, or 0x and a hexadecimal one.
-    #[arg(long, value_name = "A", value_parser = address, required_unless_present = "slot")]
+    /// Where in flash, in place of both slots of memory.x: a number, or 0x and a hexadecimal one.
+    #[arg(long, value_name = "A", value_parser = address)]
     address: Option<u32>,
-    /// Which parameter slot of memory.x: 0 or 1.
+    /// One slot alone, 0 or 1: what the controller has stored in the other may be newer, and run.
     #[arg(long, value_name = "0|1", conflicts_with = "address")]
     slot: Option<u8>,
-    /// Where to write; next to the blob, named after the address, if not given.
+    /// Where to write; next to the blob, named after the first address, if not given.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -57,12 +50,13 @@ pub(super) fn run(args: &ExportArgs) -> Result<(), HostError> {
     let set = blob_file::read(&args.params)?;
     let mut buffer = [0; MAX_BYTES];
     let blob = set.to_bytes(&mut buffer).map_err(ExportError::Blob)?;
-    let place = match (args.address, args.slot) {
-        (Some(address), _) => Place::Address(address),
-        (None, slot) => Place::Slot(slot.unwrap_or(0)),
+    let addresses = match (args.address, args.slot) {
+        (Some(address), _) => vec![address],
+        (None, Some(slot)) => vec![address_of(slot)?],
+        (None, None) => SLOTS.to_vec(),
     };
-    let file = export(blob, args.format, place)?;
-    let address = place.address()?;
+    let file = export(blob, args.format, &addresses)?;
+    let address = addresses.first().copied().unwrap_or_default();
     let stem = args
         .params
         .file_stem()
@@ -70,13 +64,13 @@ pub(super) fn run(args: &ExportArgs) -> Result<(), HostError> {
         .to_string_lossy();
     let name = format!("{stem}-{address:08x}.{}", args.format.extension());
     let out = (args.out.clone()).unwrap_or_else(|| args.params.with_file_name(name));
-    super::keep_apart(&[Some(&out)], &[&args.params])?;
+    super::keep_apart([Some(out.as_path())], [args.params.as_path()])?;
     write_atomically(&out, &file)?;
-    let slot = SLOTS.iter().position(|slot| *slot == address);
-    let slot = slot.map_or(String::new(), |slot| format!(", slot {slot}"));
+    let places: Vec<_> = addresses.iter().map(|at| format!("{at:#010x}")).collect();
     terminal::print(&format!(
-        "wrote {}: {} bytes for {address:#010x}{slot}\n",
+        "wrote {}: {} bytes for {}\n",
         out.display(),
-        blob.len()
+        blob.len(),
+        places.join(" and ")
     ))
 }

@@ -1,38 +1,38 @@
 //! `host-fit fit`.
 
-use self::told::{add_report, summary};
-use super::args::Train;
-use super::check::Checked;
+use super::args::{Json, Logs, Threads, Train, blob_text, choice};
+use super::check::{checked, failed};
 use super::limit::Limits;
+use super::report::finish;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::diagnose;
-use crate::diagnose::finding::{Finding, Severity};
 use crate::diagnose::of_fit;
-use crate::fit::{Fit, FitError, FitSettings, ModelChoice, cross_validate, fit, fit_compensated};
-use crate::input::log;
+use crate::finding::{self, Finding, Severity};
+use crate::fit::{
+    Fit, FitError, FitSettings, ModelChoice, cross_validate, fit_compensated, fit_log,
+};
 use crate::input::log::{BadRows, LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
-use crate::output;
 use crate::output::{Outputs, blob_file, posterior_file};
 use crate::problem::draw::Draw;
 use crate::problem::model::MODELS;
 use crate::problem::parameters::Parameters;
 use crate::recalibrate::Known;
-use crate::report;
-use crate::report::json::{Choice, Circumstances, of_fit};
-use crate::report::verdict::End;
+use crate::report::json::{Choice, Circumstances, Report, of_cross_validation, of_fit};
+use crate::report::page::{Errors, Source};
+use crate::report::parameters;
+use crate::report::table::tables;
+use crate::report::verdict::{End, Subject};
 use crate::solve::robust::Loss;
 use crate::solve::{Projection, SolveError, Solver, SolverOptions};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use runtime::ModelKind;
 use runtime::parameters::Text;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
-
-mod told;
 
 /// The models on the command line, `auto` and those of the table.
 fn models() -> impl TypedValueParser<Value = ModelChoice> {
@@ -48,19 +48,11 @@ fn models() -> impl TypedValueParser<Value = ModelChoice> {
     })
 }
 
-pub(super) fn blob_text(value: &str) -> Result<Text, &'static str> {
-    Text::try_from(value).map_err(|_| "at most 32 bytes fit in the blob")
-}
-
 /// Arguments of `fit`.
 #[derive(Debug, Args)]
 pub(super) struct FitArgs {
-    /// Logs: CSV or CSV.gz, one or more; `-` for standard input.
-    #[arg(required = true, value_name = "LOG")]
-    logs: Vec<PathBuf>,
-    /// The stage as designed.
-    #[arg(long, value_name = "stage.toml")]
-    stage: PathBuf,
+    #[command(flatten)]
+    logs: Logs,
     /// Where to write the parameter blob.
     #[arg(long, value_name = "params.bin")]
     out: PathBuf,
@@ -69,19 +61,19 @@ pub(super) struct FitArgs {
     model: ModelChoice,
     /// Solver. The default searches by SHTLBO and finishes by least squares, `lm` is least squares
     /// alone, the others search only.
-    #[arg(long, value_name = "NAME", value_enum, default_value = Solver::Finished.name())]
+    #[arg(long, value_name = "NAME", value_parser = choice::<Solver>(), default_value = Solver::Finished.name())]
     solver: Solver,
     /// How much of the problem is solved in closed form.
-    #[arg(long, value_enum, default_value = "linear")]
+    #[arg(long, value_parser = choice::<Projection>(), default_value = "linear")]
     project: Projection,
     /// How much rows count that the model does not explain.
-    #[arg(long, value_name = "NAME", value_enum)]
+    #[arg(long, value_name = "NAME", value_parser = choice::<Loss>())]
     loss: Option<Loss>,
     /// Rows to fit: `all` or a number.
     #[arg(long, value_name = "N|all", default_value = "all")]
     train: Train,
     /// How rows are drawn.
-    #[arg(long, value_enum, default_value = "stratified")]
+    #[arg(long, value_parser = choice::<Draw>(), default_value = "stratified")]
     draw: Draw,
     /// Individuals of a population: 100 as in the paper, or 16 with --project linear.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=100_000))]
@@ -96,94 +88,190 @@ pub(super) struct FitArgs {
     /// Warm start: a search begins with the parameters of this blob among its population.
     #[arg(long, value_name = "params.bin")]
     start: Option<PathBuf>,
-    /// Threads; all cores if not given. The result does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub(super) threads: Option<u16>,
+    #[command(flatten)]
+    pub(super) threads: Threads,
     /// Take the lag of the reference off, as the fit finds it.
     #[arg(long)]
     compensate_lag: bool,
-    /// Tell the errors on rows left out as well: five more fits.
+    /// Also report the errors on rows left out: five more fits.
     #[arg(long)]
     cross_validate: bool,
     /// Serial number of the stage, for the blob; at most 32 bytes.
     #[arg(long, value_name = "TEXT", value_parser = blob_text)]
     serial: Option<Text>,
-    /// Creation time, for the blob, as you want it to read; at most 32 bytes.
-    #[arg(long, value_name = "TIME", value_parser = blob_text)]
-    created: Option<Text>,
     /// What to do with rows that cannot be used.
-    #[arg(long, value_enum, default_value = "refuse")]
+    #[arg(long, value_parser = choice::<BadRows>(), default_value = "refuse")]
     bad_rows: BadRows,
-    /// Logs without a column for the movement: begin one every so many seconds, not only after gaps
-    /// in time.
-    #[arg(long, value_name = "SECONDS", value_parser = super::args::movement_seconds)]
-    split: Option<f64>,
-    #[command(flatten)]
-    memory: super::args::Memory,
     /// Largest rms errors over all rows; beyond, no blob is written.
     #[arg(long, value_name = "x=1.5um,...")]
     limit: Option<Limits>,
     /// Write the blob of a log that is refused, or of a fit beyond --limit; the blob says so.
     #[arg(long)]
     force: bool,
-    /// Write a report with plots into this folder.
-    #[arg(long, value_name = "DIR")]
-    report: Option<PathBuf>,
-    /// Write the figures as JSON; `-` for standard output.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    report: super::report::Report,
+    #[command(flatten)]
+    json: Json,
 }
 
-/// Reads, fits, judges; then writes blob, JSON and report, in this order.
+/// Reads, fits, judges; then writes JSON, report and blob, in this order.
 pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let started = Instant::now();
-    let inputs: Vec<&Path> = args
-        .logs
-        .iter()
-        .chain([&args.stage])
-        .chain(&args.start)
-        .map(PathBuf::as_path)
-        .collect();
     let posterior = posterior_file::beside(&args.out);
-    let page = args.report.as_deref().map(report::page_in);
-    let outputs = [
-        Some(args.out.as_path()),
-        posterior.as_deref(),
-        args.json.as_deref(),
-        page.as_deref(),
-    ];
-    super::keep_apart(&outputs, &inputs)?;
-    check_field_arguments(args)?;
-    check_loss(args)?;
+    let outputs = [Some(&args.out), posterior.as_ref(), args.json.path.as_ref()];
+    let outputs = outputs.map(|path| path.map(PathBuf::as_path));
+    let inputs = args.logs.inputs().chain(args.start.as_deref());
+    super::keep_apart_with(outputs, &args.report, inputs)?;
+    check_arguments(args)?;
     interrupt::watch();
-    let stage = Stage::from_file(&args.stage)?;
-    let options = ReadOptions {
-        bad_rows: args.bad_rows,
-        split_s: args.split,
-        memory_bytes: args.memory.limit_bytes(),
-        // With the lag taken off all rows are other rows.
-        rows_max: ReadOptions::FIT.rows_max.filter(|_| !args.compensate_lag),
-        ..ReadOptions::FIT
-    };
-    // Before the work, so that no blob is left without the figures that were asked for.
-    output::check_writable(&args.out)?;
-    if let Some(path) = &args.json {
-        output::check_writable(path)?;
+    let stage = args.logs.stage.read()?;
+    let mut log = args.logs.read(
+        &stage,
+        ReadOptions {
+            bad_rows: args.bad_rows,
+            // With the lag taken off all rows are other rows.
+            rows_max: ReadOptions::FIT.rows_max.filter(|_| !args.compensate_lag),
+            ..ReadOptions::FIT
+        },
+    )?;
+    let settings = settings(args)?;
+    let mut fitted = terminal::timed("fit", || {
+        if args.compensate_lag {
+            let found = fit_compensated(&log.dataset, &stage, &settings);
+            Ok(found.map(|(fit, compensated)| {
+                log.dataset = compensated;
+                fit
+            }))
+        } else {
+            fit_log(&log, &stage, &settings)
+        }
+    })?;
+    let is_interrupted = interrupt::requested();
+    match &fitted {
+        // No fit was tried: the arguments do not go together.
+        Err(FitError::Solver(error @ SolveError::Unsupported { .. })) => {
+            return Err(HostError::usage("--project", error));
+        }
+        Err(error) if is_interrupted => {
+            let kept = format!("nothing was written: {error}");
+            return Err(HostError::interrupted(kept));
+        }
+        _ => {}
     }
-    if let Some(folder) = args.report.as_deref().filter(|folder| folder.exists()) {
-        output::make_folder(folder)?;
+    let diagnosis = terminal::timed("diagnosis", || {
+        diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
+    });
+    if let Some(repair) = &diagnosis.repair {
+        fitted = match fitted {
+            Ok(fit) => fit.repaired(&log, &stage, repair)?,
+            failed => failed,
+        };
     }
-    let mut log = terminal::timed("reading", || log::read(&args.logs, &stage, &options))?;
-    let known = match &args.start {
-        Some(path) => Some(Parameters::of_set(&blob_file::read(path)?)),
-        None => None,
+    let findings = &diagnosis.findings;
+    let refusal = match &fitted {
+        Err(error) => Some(failed(error, findings).to_string()),
+        Ok(fit) => refusal(fit, findings, args.limit.as_ref())
+            .or_else(|| unfinished(fit, &log).filter(|_| is_interrupted)),
     };
-    let mut options = SolverOptions::new(args.project, args.seed);
-    options.population = args.population.map_or(options.population, |n| n as usize);
-    options.generations = args.generations.map_or(options.generations, |n| n as usize);
-    options.known = known;
-    options.interrupt = Some(interrupt::watch());
-    let settings = FitSettings {
+    let has_blob = fitted.is_ok() && (refusal.is_none() || args.force);
+    if let (Some(cause), true, false) = (&refusal, is_interrupted, has_blob) {
+        let kept = format!("nothing was written: {cause}. --force writes it all the same");
+        return Err(HostError::interrupted(kept));
+    }
+    let mut outputs = Outputs::default();
+    let report = match &mut fitted {
+        Err(error) => {
+            let checked = checked(&log, Err(error), &diagnosis);
+            args.json.add(&mut outputs, &checked)?;
+            None
+        }
+        Ok(fit) => {
+            fit.set.fit.forced = refusal.is_some();
+            let circumstances = Circumstances {
+                diagnosis: diagnosis.clone(),
+                ..super::circumstances(&log, &stage, started)
+            };
+            let (solver, project) = match fit.field {
+                Some(_) => (Solver::LeastSquares, Projection::Linear),
+                None => (args.solver, args.project),
+            };
+            let choice = Choice {
+                solver: solver.name(),
+                project: project.name(),
+                seed: args.seed,
+                lag_compensated: args.compensate_lag,
+            };
+            let mut report = of_fit(fit, choice, &circumstances);
+            if args.cross_validate && refusal.is_none() {
+                match cross_validate(fit, &log.dataset, &stage, &settings) {
+                    Ok(found) => report.of_fit["cross_validation"] = of_cross_validation(&found),
+                    Err(error) => {
+                        let told =
+                            format!("no cross-validation: without a fifth of the rows, {error}");
+                        terminal::warn(std::slice::from_ref(&told));
+                        report.warnings.push(told);
+                    }
+                }
+            }
+            args.json.add(&mut outputs, &report)?;
+            Some(report)
+        }
+    };
+    let found = fitted.as_ref().ok().zip(report.as_ref());
+    let end = match &refusal {
+        Some(cause) if !has_blob => End::Failed(cause),
+        _ if interrupt::requested() => End::Interrupted,
+        _ => End::Written,
+    };
+    let subject = Subject {
+        end,
+        diagnosis: &diagnosis,
+        is_field: found.is_some_and(|(fit, _)| fit.field.is_some()),
+        errors: found.map(|(fit, _)| &fit.all.errors),
+        limits: args.limit.unwrap_or_default().0,
+    };
+    let source = || source(args, (&log, &stage), subject, found);
+    args.report.add(&mut outputs, source)?;
+    let warnings = super::warnings_of(&log);
+    let (Some((fit, report)), true) = (found, has_blob) else {
+        finish(outputs, &[], &warnings, &subject)?;
+        return Err(match (fitted, refusal) {
+            (Ok(_), Some(cause)) => HostError::rejected(format!(
+                "{cause}. No parameter blob was written; --force writes one that says so"
+            )),
+            (_, cause) => HostError::rejected(cause.unwrap_or_default()),
+        });
+    };
+    if let Some(cause) = &refusal {
+        terminal::warn(&[format!("written all the same, as --force asks: {cause}")]);
+    }
+    let known = fit.field.as_ref().map(Known::of_fit);
+    posterior_file::add_calibration(&mut outputs, &args.out, &fit.set, known.as_ref())?;
+    let designed = [("designed", parameters::designed(&stage))];
+    let mut details = tables(&report, &report.hidden());
+    details.splice(1..1, parameters::tables(&report.parameters, &designed));
+    finish(outputs, &details, &warnings, &subject)?;
+    match interrupt::requested() {
+        true => Err(HostError::interrupted(format!(
+            "{} holds the best so far",
+            args.out.display()
+        ))),
+        false => Ok(()),
+    }
+}
+
+/// How the fit is made, by the arguments.
+fn settings(args: &FitArgs) -> Result<FitSettings, HostError> {
+    let start = args.start.as_deref().map(blob_file::read).transpose()?;
+    let usual = SolverOptions::new(args.project, args.seed);
+    let options = SolverOptions {
+        population: args.population.map_or(usual.population, |n| n as usize),
+        generations: args.generations.map_or(usual.generations, |n| n as usize),
+        known: start.as_ref().map(Parameters::of_set),
+        interrupt: Some(interrupt::watch()),
+        ..usual
+    };
+    Ok(FitSettings {
         model: args.model,
         train: args.train.0,
         draw: args.draw,
@@ -194,151 +282,16 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         }),
         options,
         serial: args.serial.clone().unwrap_or_default(),
-        created: args.created.clone().unwrap_or_default(),
+        created: args.report.created.clone().unwrap_or_default(),
         force: args.force,
-    };
-    let fitted = terminal::timed("fit", || {
-        if args.compensate_lag {
-            fit_compensated(&log.dataset, &stage, &settings).map(|(fit, compensated)| {
-                log.dataset = compensated;
-                fit
-            })
-        } else {
-            fit(&log.dataset, &stage, &settings)
-        }
-    });
-    let is_interrupted = interrupt::requested();
-    if let (Err(error), true) = (&fitted, is_interrupted) {
-        return Err(HostError::Interrupted {
-            kept: format!("nothing was written: {error}"),
-        });
-    }
-    let findings = terminal::timed("diagnosis", || {
-        diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
-    });
-    let mut fit = match fitted {
-        // No fit was tried: the arguments do not go together.
-        Err(FitError::Solver(error @ SolveError::Unsupported { .. })) => {
-            return Err(HostError::Usage {
-                argument: "--project",
-                problem: error.to_string(),
-            });
-        }
-        Err(error) => {
-            let mut outputs = Outputs::default();
-            if let Some(path) = &args.json {
-                let checked = Checked::new(&log, Err(&error), findings.clone());
-                outputs.add(path, super::json(&checked)?.as_bytes())?;
-            }
-            let ended = super::check::failed(error, &findings);
-            let why = match (&ended, findings.first()) {
-                (HostError::Refused { .. }, Some(gravest)) => {
-                    diagnose::messages(&findings, gravest.severity)
-                }
-                (HostError::Fit(error) | HostError::FitDiagnosed { error, .. }, _) => {
-                    error.to_string()
-                }
-                _ => ended.to_string(),
-            };
-            let end = (End::Failed(&why), &[][..]);
-            add_report(&mut outputs, args, (&log, &stage), &findings, None, end)?;
-            outputs.commit()?;
-            return Err(ended);
-        }
-        Ok(fit) => fit,
-    };
-    let unfinished = || is_interrupted.then(|| unfinished(&fit, &log)).flatten();
-    let refusal = refusal(&fit, &findings, args.limit.as_ref()).or_else(unfinished);
-    if let (Some(cause), true, false) = (&refusal, is_interrupted, args.force) {
-        return Err(HostError::Interrupted {
-            kept: format!("nothing was written: {cause}. --force writes it all the same"),
-        });
-    }
-    fit.set.fit.forced = refusal.is_some();
-    let circumstances = Circumstances {
-        findings,
-        ..super::circumstances(&log, &stage, started)
-    };
-    let (solver, project) = match fit.field {
-        Some(_) => (Solver::LeastSquares, Projection::Linear),
-        None => (args.solver, args.project),
-    };
-    let choice = Choice {
-        solver: solver.name(),
-        project: project.name(),
-        seed: args.seed,
-        lag_compensated: args.compensate_lag,
-    };
-    let mut report = of_fit(&fit, choice, &circumstances);
-    if args.cross_validate && refusal.is_none() {
-        match cross_validate(&fit, &log.dataset, &stage, &settings) {
-            Ok(found) => report.cross_validation = Some((&found).into()),
-            Err(error) => {
-                let told = format!("no cross-validation: without a fifth of the rows, {error}");
-                terminal::warn(std::slice::from_ref(&told));
-                report.warnings.push(told);
-            }
-        }
-    }
-    let mut outputs = Outputs::default();
-    if let Some(path) = &args.json {
-        outputs.add(path, super::json(&report)?.as_bytes())?;
-    }
-    let found = Some((&fit, &report));
-    match refusal {
-        Some(cause) if args.force => {
-            terminal::warn(&[format!("written all the same, as --force asks: {cause}")]);
-        }
-        Some(cause) => {
-            let end = (End::Failed(&cause), &[][..]);
-            let findings = &report.findings;
-            add_report(&mut outputs, args, (&log, &stage), findings, found, end)?;
-            outputs.commit()?;
-            terminal::tell(&report.findings);
-            return Err(HostError::NotWritten { cause });
-        }
-        None => {}
-    }
-    let end = match interrupt::requested() {
-        true => End::Interrupted,
-        false => End::Written,
-    };
-    let blob = blob_file::to_bytes(&args.out, &fit.set)?;
-    let findings = &report.findings;
-    add_report(
-        &mut outputs,
-        args,
-        (&log, &stage),
-        findings,
-        found,
-        (end, &blob),
-    )?;
-    if let (Some(field), Some(path)) = (&fit.field, &posterior) {
-        let known = posterior_file::to_bytes(path, &fit.set, &Known::of_fit(field))?;
-        outputs.add(path, &known)?;
-    }
-    // The blob last: it is what the stage takes.
-    outputs.add(&args.out, &blob)?;
-    outputs.commit()?;
-    terminal::print(&summary(&fit, &report, &stage))?;
-    let page = args.report.as_deref().map(report::page_in);
-    let beside = posterior.filter(|_| fit.field.is_some());
-    super::wrote([Some(args.out.clone()), beside, args.json.clone(), page])?;
-    terminal::warn(&circumstances.warnings);
-    terminal::tell(&report.findings);
-    if interrupt::requested() {
-        return Err(HostError::Interrupted {
-            kept: format!("{} holds the best so far", args.out.display()),
-        });
-    }
-    Ok(())
+    })
 }
 
 /// Why a fit is not to be written.
 fn refusal(fit: &Fit, findings: &[Finding], limits: Option<&Limits>) -> Option<String> {
-    let refused = diagnose::messages(findings, Severity::Refuse);
+    let refused = finding::messages(findings, Severity::Refuse);
     if refused.is_empty() {
-        return limits?.exceeded(fit.errors());
+        return limits?.exceeded(&fit.all.errors);
     }
     Some(format!("the log is refused: {refused}"))
 }
@@ -353,42 +306,54 @@ fn unfinished(fit: &Fit, log: &LogReading) -> Option<String> {
     ))
 }
 
-/// Only least squares has weights.
-fn check_loss(args: &FitArgs) -> Result<(), HostError> {
+/// Only least squares has weights, and the field model has one way to be fitted.
+fn check_arguments(args: &FitArgs) -> Result<(), HostError> {
+    let is_field =
+        matches!(args.model, ModelChoice::Named(model) if model.kind == ModelKind::Field);
+    let refused = |argument, problem: String| Err(HostError::usage(argument, problem));
     match (args.solver, args.loss) {
-        (Solver::Search(_), Some(Loss::Huber | Loss::Cauchy)) => Err(HostError::Usage {
-            argument: "--loss",
-            problem: format!(
+        (Solver::Search(_), Some(Loss::Huber | Loss::Cauchy)) => refused(
+            "--loss",
+            format!(
                 "a search alone counts all rows alike: leave --solver {} out, or take --loss none",
                 args.solver.name()
             ),
-        }),
+        ),
+        (solver, _) if is_field && solver != Solver::Finished => refused(
+            "--solver",
+            "--model field has a solver of its own; leave --solver out".to_owned(),
+        ),
+        _ if is_field && args.project != Projection::Linear => refused(
+            "--project",
+            "--model field has a projection of its own; leave --project out".to_owned(),
+        ),
         _ => Ok(()),
     }
 }
 
-/// The field model has one way to be fitted.
-fn check_field_arguments(args: &FitArgs) -> Result<(), HostError> {
-    let refused = |argument, problem: &str| {
-        Err(HostError::Usage {
-            argument,
-            problem: problem.to_owned(),
-        })
-    };
-    if !matches!(args.model, ModelChoice::Named(model) if model.kind == ModelKind::Field) {
-        return Ok(());
+/// What the report says of a fit with its figures, or of a log that has none.
+fn source<'a>(
+    args: &FitArgs,
+    (log, stage): (&'a LogReading, &'a Stage),
+    subject: Subject<'a>,
+    fit: Option<(&'a Fit, &'a Report)>,
+) -> Result<Source<'a>, HostError> {
+    let serial = args.serial.as_deref().unwrap_or_default();
+    let what = ("Calibration certificate", serial);
+    let mut source = args.report.source(what, &args.logs, (log, stage), subject);
+    if let Some(start) = &args.start {
+        source
+            .provenance
+            .add_file(start, "parameters to start from");
     }
-    if args.solver != Solver::Finished {
-        return refused(
-            "--solver",
-            "--model field has a solver of its own; leave --solver out",
-        );
+    if let (Some((fit, _)), End::Written | End::Interrupted) = (fit, subject.end) {
+        let blob = blob_file::to_bytes(&args.out, &fit.set)?;
+        let provenance = &mut source.provenance;
+        provenance.add_bytes(&args.out, &blob, "parameter blob, written");
     }
-    if args.project != Projection::Linear {
-        return refused(
-            "--project",
-            "--model field has a projection of its own; leave --project out",
-        );
-    }
-    Ok(())
+    source.errors = fit.map(|(fit, report)| {
+        let details = tables(report, &[&report.hidden()[..], &["errors"]].concat());
+        Errors::of_fit(fit, &log.dataset, report, details)
+    });
+    Ok(source)
 }

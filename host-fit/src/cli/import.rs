@@ -1,6 +1,6 @@
 //! `host-fit import`.
 
-use super::args::LayoutChoice;
+use super::args::{LayoutChoice, StageFile, between};
 use crate::bus::import::{self, ImportSettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -18,9 +18,8 @@ pub(super) struct ImportArgs {
     /// columns that stage.toml names.
     #[arg(value_name = "REFERENCE")]
     reference: PathBuf,
-    /// The stage as designed.
-    #[arg(long, value_name = "stage.toml")]
-    stage: PathBuf,
+    #[command(flatten)]
+    stage: StageFile,
     /// Where to write the calibration log.
     #[arg(long, value_name = "LOG.csv")]
     out: PathBuf,
@@ -61,30 +60,25 @@ pub(super) struct ImportArgs {
 }
 
 /// Further than an hour apart, two records are dated by hand: `--offset-us`.
-fn search_seconds(text: &str) -> Result<f64, &'static str> {
-    match text.parse::<f64>() {
-        Ok(seconds) if (0.0..=3600.0).contains(&seconds) => Ok(seconds),
-        _ => Err("expected a number of seconds from 0 to 3600"),
-    }
+fn search_seconds(text: &str) -> Result<f64, String> {
+    between(text, 0.0, 3600.0, "a number of seconds")
 }
 
 /// Joins a record of the bus and a reference, and says how it went.
-pub(super) fn run(args: ImportArgs) -> Result<(), HostError> {
-    super::keep_apart(
-        &[Some(&args.out)],
-        &[&args.bus, &args.reference, &args.stage],
-    )?;
+pub(super) fn run(args: &ImportArgs) -> Result<(), HostError> {
+    let inputs = [&args.bus, &args.reference, &args.stage.path].map(PathBuf::as_path);
+    super::keep_apart([Some(args.out.as_path())], inputs)?;
     interrupt::watch();
     let settings = ImportSettings {
-        bus: args.bus,
-        reference: args.reference,
-        stage: args.stage,
-        out: args.out,
+        bus: args.bus.clone(),
+        reference: args.reference.clone(),
+        stage: args.stage.path.clone(),
+        out: args.out.clone(),
         tolerance_us: args.tolerance_us,
         offset_us: args.offset_us,
         estimate_offset: args.estimate_offset,
         search_s: args.search_s,
-        interface: args.interface,
+        interface: args.interface.clone(),
         layout: args.layout.layout(),
         skip_bad_lines: args.skip_bad_lines,
     };

@@ -3,9 +3,9 @@
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::input::draft::draft;
-use crate::output::{check_writable, is_standard, write_atomically};
+use crate::output::{is_standard, write_atomically};
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `init`.
 #[derive(Debug, Args)]
@@ -23,18 +23,14 @@ pub(super) struct InitArgs {
 
 /// Drafts a stage file for logs.
 pub(super) fn run(args: &InitArgs) -> Result<(), HostError> {
-    let inputs: Vec<&Path> = args.logs.iter().map(PathBuf::as_path).collect();
-    super::keep_apart(&[Some(&args.out)], &inputs)?;
+    let inputs = args.logs.iter().map(PathBuf::as_path);
+    super::keep_apart([Some(args.out.as_path())], inputs)?;
     if !is_standard(&args.out) && !args.force && args.out.exists() {
-        return Err(HostError::Usage {
-            argument: "--out",
-            problem: format!(
-                "{} exists already; name another file, or replace it with --force",
-                args.out.display()
-            ),
-        });
+        let there = args.out.display();
+        let problem =
+            format!("{there} exists already; name another file, or replace it with --force");
+        return Err(HostError::usage("--out", problem));
     }
-    check_writable(&args.out)?;
     let draft = draft(&args.logs)?;
     write_atomically(&args.out, draft.text.as_bytes())?;
     let left_out = match draft.ignored.as_slice() {

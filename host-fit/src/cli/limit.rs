@@ -16,7 +16,7 @@ const AXES: [Axis; 3] = [
 
 /// The largest rms errors of X, Y, Rz that a fit may have: m, m, rad; `None` where any will do.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Limits([Option<f64>; 3]);
+pub(super) struct Limits(pub(super) [Option<f64>; 3]);
 
 impl FromStr for Limits {
     type Err = String;

@@ -54,13 +54,13 @@ fn vertical_ticks(text: &str) -> Result<u8, &'static str> {
 }
 
 /// Decodes a bus.
-pub(super) fn run(args: LiveArgs) -> Result<(), HostError> {
-    super::keep_apart(&[args.record.as_deref()], &[&args.params])?;
+pub(super) fn run(args: &LiveArgs) -> Result<(), HostError> {
+    super::keep_apart([args.record.as_deref()], [args.params.as_path()])?;
     live::run(&LiveSettings {
-        interface: args.can,
-        params: args.params,
-        serial: args.serial,
-        record: args.record,
+        interface: args.can.clone(),
+        params: args.params.clone(),
+        serial: args.serial.clone(),
+        record: args.record.clone(),
         on_invalid: on_invalid(args.hold),
         vertical_ticks: args.vertical_every,
         listen_only: args.listen_only,

@@ -22,6 +22,7 @@ mod read_back;
 mod recalibrate;
 mod record;
 mod replay;
+mod report;
 mod shell;
 mod simulate;
 mod terminal;
@@ -29,14 +30,18 @@ mod threads;
 mod update;
 
 use crate::cli::error::HostError;
-use crate::input::log::{LogReading, LogWarning, ReadOptions, ReferenceUse};
+use crate::diagnose::Diagnosis;
+use crate::input::log::LogReading;
 use crate::input::stage::Stage;
-use crate::output::{Place, is_standard, is_standard_output, posterior_file, write_atomically};
+use crate::output::{
+    Place, blob_file, check_writable, is_standard, is_standard_output, posterior_file,
+};
 use crate::progress;
 use crate::report::json::Circumstances;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use runtime::ParameterSet;
 use std::ffi::OsStr;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -51,115 +56,126 @@ struct Cli {
     /// What to do.
     #[command(subcommand)]
     command: Command,
-    /// Tell errors only.
+    /// Print errors only.
     #[arg(short, long, global = true)]
     quiet: bool,
-    /// Tell how long each step takes.
+    /// Print how long each step takes.
     #[arg(short, long, global = true, conflicts_with = "quiet")]
     verbose: bool,
 }
 
-/// The commands.
-#[derive(Debug, Subcommand)]
-enum Command {
-    /// Run the main job on logs that ship with the program, beside the figures of the paper.
-    Demo(demo::DemoArgs),
-    /// Fit a calibration to one or more logs and write the parameter blob.
-    Fit(Box<fit::FitArgs>),
-    /// Tell what is wrong with one or more logs, or with stage.toml; nothing is kept.
-    Check(check::CheckArgs),
-    /// Judge a parameter blob on one or more logs with reference.
-    Eval(eval::EvalArgs),
-    /// Decode a log with a parameter blob, by the code that runs on the target.
-    Decode(decode::DecodeArgs),
-    /// Show what a parameter blob holds.
-    Inspect(inspect::InspectArgs),
-    /// Show what changed between two parameter blobs, and by how much their poses differ.
-    Diff(diff::DiffArgs),
-    /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
-    Live(live::LiveArgs),
-    /// Record the codes of a controller's own converter from a CAN bus (Linux).
-    Record(record::RecordArgs),
-    /// Tell which controller is on a CAN bus, and which parameters it runs (Linux).
-    Identify(identify::IdentifyArgs),
-    /// Store new parameters in a controller over a CAN bus (Linux).
-    Update(update::UpdateArgs),
-    /// Write the parameters that a controller runs as a parameter blob (Linux).
-    ReadBack(read_back::ReadBackArgs),
-    /// Play a log onto a CAN bus as the sensor node would send it (Linux).
-    Replay(replay::ReplayArgs),
-    /// Write a parameter blob as the file that a flash tool takes.
-    Export(export::ExportArgs),
-    /// Compare the solvers on one or more logs, over several seeds at equal evaluations.
-    Compare(compare::CompareArgs),
-    /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
-    Import(Box<import::ImportArgs>),
-    /// Draft a stage.toml for logs: their columns mapped, and what must be filled in.
-    Init(init::InitArgs),
-    /// Plan the run to make for the field model, and tell what to expect of it.
-    Plan(plan::PlanArgs),
-    /// Bring a parameter blob up to date by a few seconds of log.
-    Recalibrate(recalibrate::RecalibrateArgs),
-    /// Write the log of a simulated stage, to rehearse a calibration.
-    Simulate(simulate::SimulateArgs),
-    /// Write the completions of a shell to standard output.
-    Completions(shell::CompletionsArgs),
-    /// Write the manual pages into a folder.
-    Man(shell::ManArgs),
+/// The commands, and what runs them.
+macro_rules! commands {
+    ($($(#[$help:meta])* $name:ident($args:ty) => $run:path,)*) => {
+        #[derive(Debug, Subcommand)]
+        enum Command {
+            $($(#[$help])* $name(Box<$args>),)*
+        }
+
+        impl Command {
+            fn run(&self) -> Result<(), HostError> {
+                match self {
+                    $(Self::$name(args) => $run(args),)*
+                }
+            }
+        }
+    };
 }
 
-/// How `eval` reads: it needs the reference, and the decoder marks saturated codes.
-const EVAL: ReadOptions = ReadOptions {
-    reference: ReferenceUse::Required,
-    ..ReadOptions::DECODE
-};
+commands! {
+    /// Run the main job on logs that ship with the program, beside the figures of the paper.
+    Demo(demo::DemoArgs) => demo::run,
+    /// Draft a stage.toml for logs: their columns mapped, and what must be filled in.
+    Init(init::InitArgs) => init::run,
+    /// Plan the run to make for the field model, and predict its errors in service.
+    Plan(plan::PlanArgs) => plan::run,
+    /// Write the log of a simulated stage, to rehearse a calibration.
+    Simulate(simulate::SimulateArgs) => simulate::run,
+    /// Write the completions of a shell to standard output.
+    Completions(shell::CompletionsArgs) => shell::completions,
+    /// Write the manual pages into a folder.
+    Man(shell::ManArgs) => shell::man,
+    /// Report what is wrong with one or more logs, or with stage.toml; nothing is kept.
+    Check(check::CheckArgs) => check::run,
+    /// Fit a calibration to one or more logs and write the parameter blob.
+    Fit(fit::FitArgs) => fit::run,
+    /// Judge a parameter blob on one or more logs with reference.
+    Eval(eval::EvalArgs) => eval::run,
+    /// Bring a parameter blob up to date by a few seconds of log.
+    Recalibrate(recalibrate::RecalibrateArgs) => recalibrate::run,
+    /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
+    Import(import::ImportArgs) => import::run,
+    /// Decode a log with a parameter blob, by the code that runs on the target.
+    Decode(decode::DecodeArgs) => decode::run,
+    /// Show what a parameter blob holds.
+    Inspect(inspect::InspectArgs) => inspect::run,
+    /// Show what changed between two parameter blobs, and by how much their poses differ.
+    Diff(diff::DiffArgs) => diff::run,
+    /// Write a parameter blob as the file that a flash tool takes.
+    Export(export::ExportArgs) => export::run,
+    /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
+    Live(live::LiveArgs) => live::run,
+    /// Record the codes of a controller's own converter from a CAN bus (Linux).
+    Record(record::RecordArgs) => record::run,
+    /// Play a log onto a CAN bus as the sensor node would send it (Linux).
+    Replay(replay::ReplayArgs) => replay::run,
+    /// Show which controller is on a CAN bus, and which parameters it runs (Linux).
+    Identify(identify::IdentifyArgs) => identify::run,
+    /// Store new parameters in a controller over a CAN bus (Linux).
+    Update(update::UpdateArgs) => update::run,
+    /// Write the parameters that a controller runs as a parameter blob (Linux).
+    ReadBack(read_back::ReadBackArgs) => read_back::run,
+    /// Compare the solvers on one or more logs, over several seeds at equal evaluations.
+    Compare(compare::CompareArgs) => compare::run,
+}
+
+/// The first command of each group, in the order of the commands.
+const GROUPS: [(&str, &str); 5] = [
+    ("Start", "demo"),
+    ("Calibrate", "check"),
+    ("Use", "decode"),
+    ("Controller", "live"),
+    ("Research", "compare"),
+];
+
+/// The command line, its commands in groups.
+fn command() -> clap::Command {
+    let command = Cli::command();
+    let mut list = String::new();
+    for one in command.get_subcommands() {
+        if let Some((title, _)) = GROUPS.iter().find(|(_, first)| *first == one.get_name()) {
+            let _ = writeln!(list, "\n{title}:");
+        }
+        let about = one.get_about().map(ToString::to_string).unwrap_or_default();
+        let _ = writeln!(list, "  {:<12} {about}", one.get_name());
+    }
+    command.help_template(format!(
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n{list}\nOptions:\n{{options}}{{after-help}}"
+    ))
+}
 
 /// Parses the command line, runs the command, prints an error if there is one.
 pub fn main() -> ExitCode {
-    run(Cli::parse())
+    run(&Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|error| error.exit()))
 }
 
 /// As [`main`], of these arguments, the name of the program first: for programs that run commands
 /// in their own process. Wrong usage is not explained.
 pub fn main_of(arguments: &[&OsStr]) -> ExitCode {
-    Cli::try_parse_from(arguments).map_or_else(|_| ExitCode::from(2), run)
+    Cli::try_parse_from(arguments).map_or_else(|_| ExitCode::from(2), |cli| run(&cli))
 }
 
-fn run(cli: Cli) -> ExitCode {
+fn run(cli: &Cli) -> ExitCode {
     terminal::set_level(i8::from(cli.verbose) - i8::from(cli.quiet));
     if !cli.quiet {
         progress::show();
     }
     threads::start(match &cli.command {
-        Command::Fit(args) => args.threads,
-        Command::Compare(args) => args.threads,
+        Command::Fit(args) => args.threads.number,
+        Command::Compare(args) => args.threads.number,
         _ => None,
     });
-    let result = match cli.command {
-        Command::Demo(args) => demo::run(&args),
-        Command::Fit(args) => fit::run(&args),
-        Command::Check(args) => check::run(&args),
-        Command::Eval(args) => eval::run(&args),
-        Command::Decode(args) => decode::run(&args),
-        Command::Inspect(args) => inspect::run(&args),
-        Command::Diff(args) => diff::run(&args),
-        Command::Live(args) => live::run(args),
-        Command::Record(args) => record::run(args),
-        Command::Identify(args) => identify::run(&args),
-        Command::Update(args) => update::run(args),
-        Command::ReadBack(args) => read_back::run(&args),
-        Command::Replay(args) => replay::run(args),
-        Command::Export(args) => export::run(&args),
-        Command::Compare(args) => compare::run(&args),
-        Command::Import(args) => import::run(*args),
-        Command::Init(args) => init::run(&args),
-        Command::Plan(args) => plan::run(&args),
-        Command::Recalibrate(args) => recalibrate::run(&args),
-        Command::Simulate(args) => simulate::run(&args),
-        Command::Completions(args) => shell::completions(&args),
-        Command::Man(args) => shell::man(&args),
-    };
-    match result {
+    match cli.command.run() {
         Ok(()) => ExitCode::SUCCESS,
         // Who reads standard output, as `head` does, has seen enough.
         Err(error) if terminal::is_closed(&error) => ExitCode::SUCCESS,
@@ -170,36 +186,48 @@ fn run(cli: Cli) -> ExitCode {
     }
 }
 
-/// Writes a report as JSON to a file, or to standard output for `-`.
-fn write_json(report: &impl serde::Serialize, path: &Path) -> Result<(), HostError> {
-    Ok(write_atomically(path, json(report)?.as_bytes())?)
+/// Prints which files were written.
+fn wrote(paths: impl IntoIterator<Item = PathBuf>) -> Result<(), HostError> {
+    let line = |path: PathBuf| terminal::print(&format!("wrote {}\n", path.display()));
+    paths.into_iter().try_for_each(line)
 }
 
-/// A report as JSON.
-fn json(report: &impl serde::Serialize) -> Result<String, HostError> {
-    let mut text = serde_json::to_string_pretty(report)?;
-    text.push('\n');
-    Ok(text)
+/// Refuses outputs that are an input, the posterior beside one, or each other, by whatever name, and those
+/// that cannot be written: before the work. Where one goes to standard output, nothing else does from now
+/// on.
+fn keep_apart<'p>(
+    outputs: impl IntoIterator<Item = Option<&'p Path>>,
+    inputs: impl IntoIterator<Item = &'p Path>,
+) -> Result<(), HostError> {
+    keep_apart_with(outputs, &report::Report::default(), inputs)
 }
 
-/// Says which files were written.
-fn wrote(paths: impl IntoIterator<Item = Option<PathBuf>>) -> Result<(), HostError> {
-    for path in paths.into_iter().flatten() {
-        terminal::print(&format!("wrote {}\n", path.display()))?;
+/// The same beside a report in a folder.
+fn keep_apart_with<'p>(
+    outputs: impl IntoIterator<Item = Option<&'p Path>>,
+    report: &report::Report,
+    inputs: impl IntoIterator<Item = &'p Path>,
+) -> Result<(), HostError> {
+    let inputs: Vec<&Path> = inputs.into_iter().collect();
+    if inputs.iter().filter(|path| is_standard(path)).count() > 1 {
+        let problem = "standard input can be read only once; name other inputs by their files";
+        return Err(HostError::usage("-", problem));
     }
-    Ok(())
-}
-
-/// Refuses outputs that are an input, the posterior beside one, or each other, by whatever name. Where
-/// one goes to standard output, nothing else does from now on.
-fn keep_apart(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<(), HostError> {
-    let beside = |path: &&&Path| posterior_file::beside(path).filter(|path| path.exists());
-    let posteriors = inputs.iter().filter_map(|path| beside(&path));
-    let posteriors: Vec<Place> = posteriors.map(|path| Place::of(&path)).collect();
-    let named = inputs.iter().filter_map(|path| place_of_input(path));
-    let inputs: Vec<Place> = named.chain(posteriors).collect();
+    let beside = |path| posterior_file::beside(path).filter(|path| path.exists());
+    let places = |path| {
+        let posterior = beside(path).map(|path| Place::of(&path));
+        place_of_input(path).into_iter().chain(posterior)
+    };
+    let inputs: Vec<Place> = inputs.into_iter().flat_map(places).collect();
     let mut taken: Vec<Place> = Vec::new();
-    for output in outputs.iter().flatten() {
+    let outputs: Vec<&Path> = outputs.into_iter().flatten().collect();
+    let page = report.page();
+    // A new folder takes no place but its own; where there is one, the page is in it.
+    let (folder, page) = match report.folder.as_deref() {
+        Some(folder) if folder.exists() => (None, page.as_deref()),
+        folder => (folder, None),
+    };
+    for output in outputs.iter().copied().chain(folder).chain(page) {
         let (name, here) = match is_standard(output) {
             true => (
                 "standard output".into(),
@@ -218,11 +246,13 @@ fn keep_apart(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<(), HostErr
             taken.push(here);
             continue;
         };
-        return Err(HostError::Usage {
-            argument: "output",
-            problem: format!("{name} is {what} of this command; name another file"),
-        });
+        let problem = format!("{name} is {what} of this command; name another file");
+        return Err(HostError::usage("output", problem));
     }
+    outputs
+        .into_iter()
+        .chain(page)
+        .try_for_each(check_writable)?;
     Ok(())
 }
 
@@ -236,38 +266,37 @@ fn place_of_input(path: &Path) -> Option<Place> {
     }
 }
 
-/// Refuses a blob that was made for other scales than `stage.toml` gives.
-fn same_scales(set: &ParameterSet, stage: &Stage, path: &Path) -> Result<(), HostError> {
-    let pairs = [
-        (
-            "hall.m_per_count",
-            stage.hall.m_per_count,
-            set.hall.m_per_code,
-        ),
+/// Reads a blob and its stage. A blob that was made for other scales than `stage.toml` gives is refused.
+fn blob_of_stage(
+    blob: &Path,
+    stage_file: &args::StageFile,
+) -> Result<(ParameterSet, Stage), HostError> {
+    let set = blob_file::read(blob)?;
+    let stage = stage_file.read()?;
+    let (hall, capacitive) = (&set.hall, &set.capacitive);
+    for (key, of_stage, of_blob) in [
+        ("hall.m_per_count", stage.hall.m_per_count, hall.m_per_code),
         (
             "capacitive.m_per_count",
             stage.capacitive.m_per_count,
-            set.capacitive.m_per_code,
+            capacitive.m_per_code,
         ),
-    ];
-    for (key, stage, blob) in pairs {
-        if stage as f32 != blob {
-            return Err(HostError::OtherScale {
-                path: path.to_owned(),
-                key,
-                stage,
-                blob: blob.into(),
-            });
+    ] {
+        if of_stage as f32 != of_blob {
+            return Err(HostError::input(format!(
+                "{}: {key} is {of_stage:e}, but the parameter blob was made for {of_blob:e}: name the stage.toml that \
+                 the blob was fitted with",
+                stage_file.path.display()
+            )));
         }
     }
-    Ok(())
+    Ok((set, stage))
 }
 
 /// The warnings of a log that is diagnosed, which tells of another rate itself.
 fn warnings_of(log: &LogReading) -> Vec<String> {
-    let told = |warning: &&LogWarning| !matches!(warning, LogWarning::OtherPeriod { .. });
-    let warnings = log.warnings.iter().filter(told);
-    warnings.map(ToString::to_string).collect()
+    let messages = log.warnings.iter().map(|found| found.message.clone());
+    messages.collect()
 }
 
 /// What the reports say of the logs.
@@ -278,6 +307,23 @@ fn circumstances<'s>(log: &'s LogReading, stage: &'s Stage, started: Instant) ->
         skipped_rows: log.skipped_rows,
         elapsed_s: started.elapsed().as_secs_f64(),
         warnings: warnings_of(log),
-        findings: Vec::new(),
+        diagnosis: Diagnosis::default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_group_of_commands_begins_with_one_that_is_there() {
+        let command = command();
+        for (title, first) in GROUPS {
+            assert!(command.find_subcommand(first).is_some(), "{title}");
+        }
+        let help = command.clone().render_help().to_string();
+        for name in command.get_subcommands().map(clap::Command::get_name) {
+            assert_eq!(help.matches(&format!("\n  {name} ")).count(), 1, "{name}");
+        }
     }
 }

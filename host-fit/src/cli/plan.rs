@@ -1,13 +1,12 @@
 //! `host-fit plan`.
 
+use super::args::{Json, StageFile, between};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::input::stage::Stage;
-use crate::output::{Outputs, check_writable, make_folder};
+use crate::output::Outputs;
 use crate::plan::plan;
-use crate::report;
-use crate::report::plan::PlanReport;
-use crate::report::plan_page::PlanPage;
+use crate::report::plan::{figures, tables};
+use crate::report::table::as_text;
 use crate::simulate::plan_file;
 use clap::Args;
 use std::path::PathBuf;
@@ -18,20 +17,15 @@ const SECONDS_MAX: f64 = 600.0;
 const ROWS_MAX: f64 = 2e6;
 
 fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if seconds > 0.0 && seconds <= SECONDS_MAX => Ok(seconds),
-        _ => Err(format!(
-            "expected a number of seconds above 0 and up to {SECONDS_MAX}"
-        )),
-    }
+    between(text, f64::MIN_POSITIVE, SECONDS_MAX, "a number of seconds")
+        .map_err(|_| format!("expected a number of seconds above 0 and up to {SECONDS_MAX}"))
 }
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
-    /// The stage as designed; its optional table [motion] says how it may move.
-    #[arg(long, value_name = "stage.toml")]
-    stage: PathBuf,
+    #[command(flatten)]
+    stage: StageFile,
     /// Length of the run; 20 are plenty for a stage of the usual limits.
     #[arg(long, value_name = "T", value_parser = seconds, allow_negative_numbers = true)]
     seconds: f64,
@@ -39,52 +33,32 @@ pub(super) struct PlanArgs {
     /// for every servo period; `-` for standard output.
     #[arg(long, value_name = "run.csv")]
     out: Option<PathBuf>,
-    /// Write a page with plots into this folder.
-    #[arg(long, value_name = "DIR")]
-    report: Option<PathBuf>,
-    /// Write the figures as JSON; `-` for standard output.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: Json,
 }
 
-/// Plans; then writes trajectory, JSON and page, in this order.
+/// Plans; then writes trajectory and JSON. The optional table [motion] of the stage
+/// file says how the stage may move.
 pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
-    let (out, json) = (args.out.as_deref(), args.json.as_deref());
-    let page = args.report.as_deref().map(report::page_in);
-    super::keep_apart(&[out, json, page.as_deref()], &[&args.stage])?;
-    for path in [out, json].into_iter().flatten() {
-        check_writable(path)?;
+    let outputs = [args.out.as_deref(), args.json.path.as_deref()];
+    super::keep_apart(outputs, [args.stage.path.as_path()])?;
+    let stage = args.stage.read()?;
+    let (seconds, period_s) = (args.seconds, stage.servo_period_s);
+    if seconds / period_s > ROWS_MAX {
+        let problem = format!(
+            "a run of {seconds} s has more than {ROWS_MAX} servo periods of {period_s} s; make it shorter"
+        );
+        return Err(HostError::usage("--seconds", problem));
     }
-    if let Some(folder) = args.report.as_deref().filter(|folder| folder.exists()) {
-        make_folder(folder)?;
-    }
-    let stage = Stage::from_file(&args.stage)?;
-    if args.seconds / stage.servo_period_s > ROWS_MAX {
-        return Err(HostError::Usage {
-            argument: "--seconds",
-            problem: format!(
-                "a run of {} s has more than {ROWS_MAX} servo periods of {} s; make it shorter",
-                args.seconds, stage.servo_period_s
-            ),
-        });
-    }
-    let plan = plan(&stage, args.seconds)?;
-    let figures = PlanReport::new(&plan, &stage);
+    let plan = plan(&stage, seconds)?;
+    let figures = figures(&plan, &stage);
     let mut outputs = Outputs::default();
-    if let Some(path) = out {
-        let trajectory = plan.run.trajectory(stage.servo_period_s);
-        let csv = plan_file::to_csv(&trajectory, stage.servo_period_s);
+    if let Some(path) = &args.out {
+        let csv = plan_file::to_csv(&plan.run.trajectory(period_s), period_s);
         outputs.add(path, csv.as_bytes())?;
     }
-    if let Some(path) = json {
-        outputs.add(path, super::json(&figures)?.as_bytes())?;
-    }
-    if let (Some(folder), Some(path)) = (&args.report, &page) {
-        let page = PlanPage::new(&figures, &plan)?.to_html()?;
-        make_folder(folder)?;
-        outputs.add(path, page.as_bytes())?;
-    }
-    outputs.commit()?;
-    terminal::print(&figures.text())?;
-    super::wrote([args.out.clone(), args.json.clone(), page])
+    args.json.add(&mut outputs, &figures)?;
+    let written = outputs.commit()?;
+    terminal::print(&as_text(&tables(&figures)))?;
+    super::wrote(written)
 }

@@ -21,10 +21,10 @@ pub(super) struct ReadBackArgs {
 
 /// Writes the parameters that a controller runs, as a blob, bit for bit.
 pub(super) fn run(args: &ReadBackArgs) -> Result<(), HostError> {
-    super::keep_apart(&[Some(&args.out)], &[])?;
+    super::keep_apart([Some(args.out.as_path())], [])?;
     let (identity, blob) = update::read_back(&args.can)?;
     write_atomically(&args.out, &blob)?;
     let parameters = identify::parameters(identity.running.as_ref());
     terminal::print(&format!("{}: runs {parameters}\n", identity.serial))?;
-    super::wrote([Some(args.out.clone())])
+    super::wrote([args.out.clone()])
 }

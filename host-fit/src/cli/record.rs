@@ -23,11 +23,11 @@ pub(super) struct RecordArgs {
 }
 
 /// Records, and says what the record holds.
-pub(super) fn run(args: RecordArgs) -> Result<(), HostError> {
-    super::keep_apart(&[Some(&args.out)], &[])?;
+pub(super) fn run(args: &RecordArgs) -> Result<(), HostError> {
+    super::keep_apart([Some(args.out.as_path())], [])?;
     let settings = RecorderSettings {
-        interface: args.can,
-        out: args.out,
+        interface: args.can.clone(),
+        out: args.out.clone(),
         duration: args.seconds,
         shows: !terminal::is_quiet(),
     };

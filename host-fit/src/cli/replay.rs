@@ -1,6 +1,6 @@
 //! `host-fit replay`.
 
-use super::args::LayoutChoice;
+use super::args::{LayoutChoice, StageFile, between};
 use crate::bus::replay::{self, ReplaySettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -14,9 +14,8 @@ pub(super) struct ReplayArgs {
     /// The log: CSV or CSV.gz, or `-` for standard input; it needs no reference.
     #[arg(value_name = "LOG")]
     log: PathBuf,
-    /// The stage as designed.
-    #[arg(long, value_name = "stage.toml")]
-    stage: PathBuf,
+    #[command(flatten)]
+    stage: StageFile,
     /// CAN interface, for instance can0.
     #[arg(long, value_name = "IFACE")]
     can: String,
@@ -31,19 +30,16 @@ pub(super) struct ReplayArgs {
     rows: Option<usize>,
 }
 
-fn rate(text: &str) -> Result<f64, &'static str> {
-    match text.parse::<f64>() {
-        Ok(rate) if (1e-3..=1e6).contains(&rate) => Ok(rate),
-        _ => Err("expected a number from 0.001 to 1000000"),
-    }
+fn rate(text: &str) -> Result<f64, String> {
+    between(text, 1e-3, 1e6, "a number")
 }
 
 /// Plays a log onto a bus and says how it went.
-pub(super) fn run(args: ReplayArgs) -> Result<(), HostError> {
+pub(super) fn run(args: &ReplayArgs) -> Result<(), HostError> {
     let done = replay::run(&ReplaySettings {
-        log: args.log,
-        stage: args.stage,
-        interface: args.can,
+        log: args.log.clone(),
+        stage: args.stage.path.clone(),
+        interface: args.can.clone(),
         rate: args.rate,
         layout: args.layout.layout(),
         rows: args.rows,
@@ -58,9 +54,8 @@ pub(super) fn run(args: ReplayArgs) -> Result<(), HostError> {
         done.late_max_s * 1e3
     ))?;
     if interrupt::requested() {
-        return Err(HostError::Interrupted {
-            kept: "the rows above were sent, the rest of the log was not".to_owned(),
-        });
+        let kept = "the rows above were sent, the rest of the log was not";
+        return Err(HostError::interrupted(kept));
     }
     Ok(())
 }

@@ -40,7 +40,7 @@ pub(super) fn man(args: &ManArgs) -> Result<(), HostError> {
     for page in pages {
         let man = Man::new(page);
         let mut text = Vec::new();
-        man.render(&mut text).map_err(HostError::Standard)?;
+        man.render(&mut text)?;
         let path = args.out.join(man.get_filename());
         write_atomically(&path, &text)?;
         super::terminal::print(&format!("wrote {}\n", path.display()))?;

@@ -1,9 +1,9 @@
 //! `host-fit simulate`.
 
+use super::args::{StageFile, choice};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::input::stage::Stage;
-use crate::output::{Outputs, check_writable};
+use crate::output::Outputs;
 use crate::simulate::assembly::{Assembly, Magnets};
 use crate::simulate::log_text::{log_csv, truth_csv};
 use crate::simulate::plan_file;
@@ -15,53 +15,52 @@ use flate2::{Compression, write::GzEncoder};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+super::args::values! {
+    Protocol {
+        Paper: "paper", "The paper's: at the 19 settings of its Table 6, a sine along Y, X and Rz in turn";
+        Combined: "combined", "All six axes at once, 8 movements of 8 s";
+        Service: "service", "As combined, other trajectories, interferometers zeroed truly";
+    }
+}
+
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
 pub(super) struct SimulateArgs {
-    /// The stage as designed.
-    #[arg(long, value_name = "stage.toml")]
-    pub stage: PathBuf,
+    #[command(flatten)]
+    stage: StageFile,
     /// Run this trajectory: columns t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad, one row for
     /// every servo period.
     #[arg(long, value_name = "run.csv")]
-    pub plan: Option<PathBuf>,
+    plan: Option<PathBuf>,
     /// Run this protocol.
-    #[arg(long, value_enum, conflicts_with = "plan")]
-    pub protocol: Option<Protocol>,
+    #[arg(long, value_parser = choice::<Protocol>(), conflicts_with = "plan")]
+    protocol: Option<Protocol>,
     /// Which stage, and its noise: an even one has magnets as designed, an odd one imperfect
     /// magnets.
     #[arg(long, value_name = "N")]
-    pub seed: u64,
+    seed: u64,
     /// Where to write the log: CSV, or CSV.gz if the name ends so; `-` for standard output.
     #[arg(long, value_name = "log.csv", default_value = "-")]
-    pub out: PathBuf,
+    out: PathBuf,
     /// Where to write the true poses, likewise.
     #[arg(long, value_name = "truth.csv")]
-    pub truth: Option<PathBuf>,
+    truth: Option<PathBuf>,
 }
 
 /// Writes the log of a simulated stage.
 pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
     let truth = args.truth.as_deref();
-    let inputs: Vec<&Path> = [Some(&args.stage), args.plan.as_ref()]
-        .into_iter()
-        .flatten()
-        .map(PathBuf::as_path)
-        .collect();
-    super::keep_apart(&[Some(&args.out), truth], &inputs)?;
-    for path in [Some(args.out.as_path()), truth].into_iter().flatten() {
-        check_writable(path)?;
-    }
-    let stage = Stage::from_file(&args.stage)?;
+    let inputs = [Some(&args.stage.path), args.plan.as_ref()];
+    let outputs = [Some(args.out.as_path()), truth];
+    super::keep_apart(outputs, inputs.into_iter().flatten().map(PathBuf::as_path))?;
+    let stage = args.stage.read()?;
     let period_s = stage.servo_period_s;
     let run = match (&args.plan, args.protocol) {
         (Some(plan), _) => Run::planned(plan_file::read(plan, period_s)?),
         (None, Some(protocol)) => protocol.run(period_s, args.seed),
         (None, None) => {
-            return Err(HostError::Usage {
-                argument: "--protocol",
-                problem: "name a protocol, or a trajectory with --plan".to_owned(),
-            });
+            let problem = "name a protocol, or a trajectory with --plan";
+            return Err(HostError::usage("--protocol", problem));
         }
     };
     let assembly = Assembly::draw(&stage, args.seed);
@@ -92,5 +91,5 @@ fn bytes(path: &Path, csv: String) -> Result<Vec<u8>, HostError> {
     }
     let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
     let packed = gzip.write_all(csv.as_bytes()).and_then(|()| gzip.finish());
-    packed.map_err(HostError::Standard)
+    Ok(packed?)
 }

@@ -4,10 +4,10 @@
 //! Nothing that a file holds moves the cursor or begins a line here: see [`plain`].
 
 use crate::cli::error::HostError;
-use crate::diagnose::finding::{Finding, Severity};
+use crate::finding::{Finding, Severity};
+use crate::report::table::{Table, as_text, plain, with_signs};
 use anstyle::{AnsiColor, Style};
 use std::borrow::Cow;
-use std::error::Error;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::sync::atomic::{AtomicBool, AtomicI8, Ordering};
@@ -38,47 +38,45 @@ pub(super) fn print(text: &str) -> Result<(), HostError> {
     if is_quiet() {
         return Ok(());
     }
-    let text = plain(text, "\n");
+    let text = with_units(plain(text, "\n"));
     if TAKEN.load(Ordering::Relaxed) {
         let _ = std::io::stderr().write_all(text.as_bytes());
         return Ok(());
     }
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(HostError::Standard(error)),
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(HostError::input(format!(
+            "cannot write to standard output: {error}"
+        ))),
         _ => Ok(()),
+    }
+}
+
+/// Text with the signs of its units, where the terminal takes UTF-8.
+fn with_units(text: Cow<'_, str>) -> Cow<'_, str> {
+    let names = ["LC_ALL", "LC_CTYPE", "LANG"];
+    let mut locales = names.into_iter().filter_map(std::env::var_os);
+    let locale = locales
+        .find(|locale| !locale.is_empty())
+        .unwrap_or_default();
+    let locale = locale.to_string_lossy().to_lowercase();
+    match locale.contains("utf-8") || locale.contains("utf8") {
+        true => Cow::Owned(with_signs(&text)),
+        false => text,
     }
 }
 
 /// Whether an error says no more than that the reader of an output on standard output has closed it.
 pub(super) fn is_closed(error: &HostError) -> bool {
-    let mut causes = std::iter::successors(error.source(), |&cause| cause.source());
-    let is_closed = |cause: &(dyn Error + 'static)| {
-        let cause = cause.downcast_ref::<std::io::Error>();
-        cause.is_some_and(|cause| cause.kind() == ErrorKind::BrokenPipe)
-    };
-    TAKEN.load(Ordering::Relaxed) && causes.any(is_closed)
+    TAKEN.load(Ordering::Relaxed) && error.is_closed_pipe()
 }
 
-/// Text with its control characters escaped, those of `kept` excepted, and those that reorder what
-/// stands beside them: a name, cell or serial number of a file shows as it is and forges no line.
-pub(super) fn plain<'t>(text: &'t str, kept: &str) -> Cow<'t, str> {
-    let harmful = |c: char| {
-        let moves = c.is_control()
-            || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{2028}' | '\u{2029}');
-        moves && !kept.contains(c)
-    };
-    if !text.contains(harmful) {
-        return Cow::Borrowed(text);
+/// Writes tables that only `--verbose` shows.
+pub(super) fn details(tables: &[Table]) -> Result<(), HostError> {
+    match LEVEL.load(Ordering::Relaxed) > 0 {
+        true => print(&(as_text(tables) + "\n")),
+        false => Ok(()),
     }
-    let mut plain = String::with_capacity(text.len());
-    for c in text.chars() {
-        match harmful(c) {
-            true => plain.extend(c.escape_default()),
-            false => plain.push(c),
-        }
-    }
-    Cow::Owned(plain)
 }
 
 /// Does a step; `--verbose` tells how long it took.
@@ -120,6 +118,6 @@ pub(super) fn fail(error: &HostError) {
 fn line(start: &str, color: AnsiColor, text: impl Display) {
     let style = Style::new().bold().fg_color(Some(color.into()));
     let text = text.to_string();
-    let text = plain(&text, "");
+    let text = with_units(plain(&text, ""));
     let _ = writeln!(anstream::stderr(), "{style}{start}:{style:#} {text}");
 }

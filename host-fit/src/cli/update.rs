@@ -28,8 +28,8 @@ pub(super) struct UpdateArgs {
     /// Declare that the servo is off, for the time of the update. Switch it off first.
     #[arg(long)]
     servo_off: bool,
-    /// Reset the controller at the end, so that it runs the new parameters; else it does from its next
-    /// start on.
+    /// Reset the controller at the end, so that it runs the new parameters; else they wait for that, or
+    /// for power-on.
     #[arg(long)]
     activate: bool,
     /// Go back to the parameters that were stored before the newest.
@@ -38,7 +38,7 @@ pub(super) struct UpdateArgs {
 }
 
 /// Stores new parameters in a controller, and says what it had and has.
-pub(super) fn run(args: UpdateArgs) -> Result<(), HostError> {
+pub(super) fn run(args: &UpdateArgs) -> Result<(), HostError> {
     let key = args.key.as_deref().map(read_key).transpose()?;
     let wanted = match &args.params {
         Some(path) => Wanted::Blob(read_blob(path, args.serial.as_deref())?),
@@ -47,13 +47,12 @@ pub(super) fn run(args: UpdateArgs) -> Result<(), HostError> {
     };
     let updated = update::update(
         &args.can,
-        Plan {
+        &Plan {
             wanted,
-            serial: args.serial,
+            serial: args.serial.clone(),
             key,
             declares_servo_off: args.servo_off,
             activates: args.activate,
-            token: 0,
         },
     )?;
     terminal::print(&as_text(&updated))?;
@@ -72,13 +71,11 @@ fn read_blob(path: &Path, asked: Option<&str>) -> Result<Vec<u8>, HostError> {
     let set = blob_file::read(path)?;
     let own = set.serial.as_str();
     match asked {
-        Some(asked) if !own.is_empty() && asked != own => Err(HostError::Usage {
-            argument: "--serial",
-            problem: format!(
-                "{} belongs to the stage `{own}`, not `{asked}`",
-                path.display()
-            ),
-        }),
+        Some(asked) if !own.is_empty() && asked != own => {
+            let path = path.display();
+            let problem = format!("{path} belongs to the stage `{own}`, not `{asked}`");
+            Err(HostError::usage("--serial", problem))
+        }
         _ => Ok(blob_file::to_bytes(path, &set)?),
     }
 }
@@ -95,20 +92,22 @@ fn as_text(updated: &Updated) -> String {
         }
         (_, true) => format!("{serial}: had {before}\n{serial}: runs number {record}\n"),
         (None, false) => format!(
-            "{serial}: runs {before}\n{serial}: keeps these parameters already, as number {record}, which runs from the \
-             next start on, or at once with --activate; nothing was sent\n"
+            "{serial}: runs {before}\n{serial}: keeps these parameters already, as number {record}, which waits for \
+             --activate or power-on; nothing was sent\n"
         ),
         (Some(_), false) => format!(
-            "{serial}: runs {before}\n{serial}: stored number {record}, which runs from the next start on\n"
+            "{serial}: runs {before}\n{serial}: stored number {record}, which waits for --activate or power-on\n"
         ),
     }
 }
 
 /// A key file: 32 hexadecimal digits.
 fn read_key(path: &Path) -> Result<Key, HostError> {
-    let refused = |problem: String| HostError::Key {
-        path: path.to_owned(),
-        problem,
+    let refused = |problem: String| {
+        let path = path.display();
+        HostError::input(format!(
+            "{path}: {problem}; name the file with the key of this stage"
+        ))
     };
     let text = std::fs::read_to_string(path).map_err(|error| refused(error.to_string()))?;
     let digits = text.trim();

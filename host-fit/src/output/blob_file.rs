@@ -1,6 +1,6 @@
 //! The parameter blob as a file.
 
-use crate::output::{OutputError, is_standard, write_atomically};
+use crate::output::{OutputError, OutputProblem, is_standard, write_atomically};
 use runtime::blob::MAX_BYTES;
 use runtime::{BlobError, ParameterSet};
 use std::io::Read;
@@ -78,17 +78,13 @@ pub fn write(path: &Path, set: &ParameterSet) -> Result<(), OutputError> {
 /// The blob of a set, to be written to `path`.
 ///
 /// # Errors
-/// [`OutputError::Failed`], which no set that [`write()`] would take leads to.
+/// [`OutputProblem::Failed`], which no set that [`write()`] would take leads to.
 pub fn to_bytes(path: &Path, set: &ParameterSet) -> Result<Vec<u8>, OutputError> {
     let mut buffer = [0; MAX_BYTES];
-    match set.to_bytes(&mut buffer) {
-        Ok(bytes) => Ok(bytes.to_vec()),
-        // The buffer has the size that every blob fits into.
-        Err(cause) => Err(OutputError::Failed {
-            path: path.to_owned(),
-            source: std::io::Error::other(cause),
-        }),
-    }
+    // The buffer has the size that every blob fits into.
+    let bytes = set.to_bytes(&mut buffer).map_err(std::io::Error::other);
+    let failed = |source| OutputError::new(path, OutputProblem::Failed { source });
+    bytes.map(<[u8]>::to_vec).map_err(failed)
 }
 
 #[cfg(test)]

@@ -5,12 +5,9 @@
 //! | `bin` | st-flash, OpenOCD, probe-rs with `--binary-format bin` | given to the tool |
 //! | `hex` | Intel HEX: probe-rs, OpenOCD, vendors' tools | in the file |
 //!
-//! Only the bytes of the blob are written: what follows in the sector stays erased, and the
-//! target takes the length from the blob's header.
-
-mod memory_map;
-
-pub use memory_map::SLOTS;
+//! For both slots the blob stands at the start of each, so that it runs whatever a controller had
+//! stored in one of them. What follows it in its sector is erased, and the target takes the length from
+//! the blob's header.
 
 use runtime::{BlobError, ParameterSet};
 
@@ -33,14 +30,8 @@ impl ExportFormat {
     }
 }
 
-/// Where the blob goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// An address in flash.
-    Address(u32),
-    /// A parameter slot of `memory.x`, 0 or 1.
-    Slot(u8),
-}
+/// Addresses of the parameter slots 0 and 1: those of the project's `memory.x`.
+pub const SLOTS: [u32; 2] = [0x0800_4000, 0x0800_8000];
 
 /// Why nothing is exported.
 #[derive(Debug, thiserror::Error)]
@@ -73,49 +64,55 @@ pub enum ExportError {
     Hex(ihex::WriterError),
 }
 
-impl Place {
-    /// The address.
-    ///
-    /// # Errors
-    /// [`ExportError::NoSlot`].
-    pub fn address(self) -> Result<u32, ExportError> {
-        match self {
-            Self::Address(address) => Ok(address),
-            Self::Slot(slot) => SLOTS
-                .get(usize::from(slot))
-                .copied()
-                .ok_or(ExportError::NoSlot { slot }),
-        }
-    }
+/// The address of a slot.
+///
+/// # Errors
+/// [`ExportError::NoSlot`].
+pub fn address_of(slot: u8) -> Result<u32, ExportError> {
+    let address = SLOTS.get(usize::from(slot)).copied();
+    address.ok_or(ExportError::NoSlot { slot })
 }
 
-/// The file for a blob at a place in flash. The blob is checked first, as the target will
-/// check it.
+/// The file for a blob at these addresses in flash, in rising order. The blob is checked first, as the
+/// target will check it.
 ///
 /// # Errors
 /// Every variant of [`ExportError`].
-pub fn export(blob: &[u8], format: ExportFormat, place: Place) -> Result<Vec<u8>, ExportError> {
+pub fn export(
+    blob: &[u8],
+    format: ExportFormat,
+    addresses: &[u32],
+) -> Result<Vec<u8>, ExportError> {
     ParameterSet::from_bytes(blob).map_err(ExportError::Blob)?;
-    let address = place.address()?;
-    if address % 4 != 0 {
-        return Err(ExportError::Unaligned { address });
-    }
     let bytes = blob.len();
-    let end = u32::try_from(bytes)
-        .ok()
-        .and_then(|n| address.checked_add(n));
-    if end.is_none() {
-        return Err(ExportError::BeyondMemory { address, bytes });
+    let first = addresses.first().copied().unwrap_or_default();
+    let (mut bin, mut records) = (Vec::new(), Vec::new());
+    for &address in addresses {
+        if !address.is_multiple_of(4) {
+            return Err(ExportError::Unaligned { address });
+        }
+        let end = u32::try_from(bytes)
+            .ok()
+            .and_then(|n| address.checked_add(n));
+        if end.is_none() {
+            return Err(ExportError::BeyondMemory { address, bytes });
+        }
+        bin.resize((address - first) as usize, 0xff);
+        bin.extend(blob);
+        records.extend(hex(blob, address));
     }
+    records.push(ihex::Record::EndOfFile);
     match format {
-        ExportFormat::Bin => Ok(blob.to_vec()),
-        ExportFormat::Hex => hex(blob, address).map_err(ExportError::Hex),
+        ExportFormat::Bin => Ok(bin),
+        ExportFormat::Hex => ihex::create_object_file_representation(&records)
+            .map(String::into_bytes)
+            .map_err(ExportError::Hex),
     }
 }
 
 /// Intel HEX with 16 bytes to a record; the upper half of the address in a record of its own
 /// wherever it changes.
-fn hex(blob: &[u8], address: u32) -> Result<Vec<u8>, ihex::WriterError> {
+fn hex(blob: &[u8], address: u32) -> Vec<ihex::Record> {
     let mut records = Vec::new();
     let mut upper = None;
     let starts = (address..).step_by(16);
@@ -138,8 +135,7 @@ fn hex(blob: &[u8], address: u32) -> Result<Vec<u8>, ihex::WriterError> {
             });
         }
     }
-    records.push(ihex::Record::EndOfFile);
-    ihex::create_object_file_representation(&records).map(String::into_bytes)
+    records
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Which file a name means.
 
-use super::folder_of;
+use super::error::{OutputError, OutputProblem};
 use std::fs::{self, Metadata};
 use std::path::{Path, PathBuf};
 
@@ -48,6 +48,11 @@ fn inode(_metadata: &Metadata) -> Option<(u64, u64)> {
     None
 }
 
+/// Whether a name means standard output, or standard input: `-`.
+pub fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
 /// Whether an output by this name goes to standard output.
 pub fn is_standard_output(path: &Path) -> bool {
     let there = |path: &Path| fs::metadata(path).ok().as_ref().and_then(inode);
@@ -73,4 +78,51 @@ pub(super) fn end_of_links(path: &Path) -> PathBuf {
         end = folder_of(&end).join(next);
     }
     end
+}
+
+/// The file that an output `path` leads to, and what is there now.
+pub(super) fn resolve(path: &Path) -> Result<(PathBuf, Option<Metadata>), OutputError> {
+    let refused = |problem| Err(OutputError::new(path, problem));
+    match fs::metadata(path) {
+        _ if path.as_os_str().is_empty() => refused(OutputProblem::NoName),
+        Ok(metadata) if metadata.is_dir() => refused(OutputProblem::IsFolder),
+        Ok(metadata) if metadata.is_file() && metadata.permissions().readonly() => {
+            refused(OutputProblem::ReadOnly)
+        }
+        // A link keeps its place: what it leads to is replaced.
+        Ok(metadata) => {
+            let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+            Ok((target, Some(metadata)))
+        }
+        Err(_) if path.file_name().is_none() || ends_in_separator(path) => {
+            refused(OutputProblem::IsFolder)
+        }
+        Err(source) => match end_of_links(path) {
+            // Links in a circle.
+            end if end.is_symlink() => refused(OutputProblem::Failed { source }),
+            end => Ok((end, None)),
+        },
+    }
+}
+
+/// Whether `path` is something to write to, not to replace: a device, a pipe, or the
+/// standard streams under their names in the file system, which a shell may have led to files.
+pub(super) fn is_stream(path: &Path, metadata: &Metadata) -> bool {
+    let names = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc/self/fd"];
+    let named_stream = cfg!(unix) && names.iter().any(|name| path.starts_with(name));
+    named_stream || !metadata.is_file()
+}
+
+/// Whether the name asks for a folder, as `out/` does.
+fn ends_in_separator(path: &Path) -> bool {
+    let last = path.as_os_str().as_encoded_bytes().last();
+    last.is_some_and(|last| std::path::is_separator(char::from(*last)))
+}
+
+/// The folder that a file is in.
+pub(super) fn folder_of(target: &Path) -> PathBuf {
+    match target.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_path_buf(),
+        _ => PathBuf::from("."),
+    }
 }

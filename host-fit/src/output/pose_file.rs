@@ -17,20 +17,15 @@
 //! [`PoseFormat::Npy`] is the same in binary: see `npy.rs`.
 
 mod npy;
-mod read;
 mod stream;
 mod summary;
 mod text;
 mod uncertainty;
 
-pub use read::{PoseFileError, read};
 pub use stream::{DecodeSettings, PoseFormat, decode_log};
 pub use summary::StatusCounts;
-pub use text::to_text;
 
-use crate::input::dataset::{Dataset, LoggedFrame};
-use crate::progress::Progress;
-use runtime::{AnyDecoder, OnInvalid, Reading, Servo};
+use runtime::Reading;
 
 /// The first line of every pose file.
 pub const HEADER: &str = "movement,t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad,status";
@@ -44,37 +39,6 @@ pub struct PoseRow {
     pub t_us: i64,
     /// Pose and status.
     pub reading: Reading,
-}
-
-/// Runs the decoder over all rows as a controller would, one servo period after the other.
-///
-/// What is invalid is zero or held, as `on_invalid` says; nothing is held, and no frame is
-/// missed, from one movement to the next.
-pub fn decode(dataset: &Dataset, decoder: &AnyDecoder, on_invalid: OnInvalid) -> Vec<PoseRow> {
-    let mut servo = Servo::new(&**decoder, on_invalid);
-    let mut poses = Vec::with_capacity(dataset.rows.len());
-    let progress = Progress::new("decoding", dataset.rows.len() as u64);
-    for movement in &dataset.movements {
-        progress.reach(movement.rows.start as u64);
-        servo.forget();
-        for row in dataset.rows.get(movement.rows.clone()).unwrap_or_default() {
-            let reading = match &row.frame {
-                LoggedFrame::Codes(frame) => servo.tick(frame),
-                LoggedFrame::HallCodes {
-                    hall,
-                    vertical,
-                    sequence,
-                    ..
-                } => servo.tick_with(*sequence, |zero| decoder.decode_at(*hall, *vertical, zero)),
-            };
-            poses.push(PoseRow {
-                movement: movement.index,
-                t_us: row.t_us,
-                reading,
-            });
-        }
-    }
-    poses
 }
 
 #[cfg(test)]

@@ -13,7 +13,8 @@
 //! | 100 | 26,568 | covariance of the 81 parameters, the lower triangle row by row, as `f64` |
 //! | 26,668 | 32 | SHA-256 of everything before it |
 
-use crate::output::{OutputError, is_standard, is_stream};
+use crate::output::place::is_stream;
+use crate::output::{OutputError, Outputs, blob_file, is_standard};
 use crate::recalibrate::Known;
 use crate::solve::field::terms::COUNT;
 use crate::solve::field::whiten::Noise;
@@ -84,16 +85,22 @@ pub fn beside(blob: &Path) -> Option<PathBuf> {
     Some(name.into())
 }
 
-/// What is known beside the blob of `set`, as bytes of the file `path`.
+/// Adds a blob to the outputs, and before it, if it is known, the posterior beside it: the blob is what
+/// the stage takes, and a posterior without its blob is refused.
 ///
 /// # Errors
-/// [`OutputError::Failed`] where the set makes no blob.
-pub fn to_bytes(path: &Path, set: &ParameterSet, known: &Known) -> Result<Vec<u8>, OutputError> {
-    let hash = blob_hash(set).map_err(|cause| OutputError::Failed {
-        path: path.to_owned(),
-        source: std::io::Error::other(cause),
-    })?;
-    Ok(encode(&hash, known))
+/// [`OutputError`].
+pub fn add_calibration(
+    outputs: &mut Outputs,
+    path: &Path,
+    set: &ParameterSet,
+    known: Option<&Known>,
+) -> Result<(), OutputError> {
+    let blob = blob_file::to_bytes(path, set)?;
+    if let (Some(known), Some(beside)) = (known, beside(path)) {
+        outputs.add(&beside, &encode(&Sha256::digest(&blob).into(), known))?;
+    }
+    outputs.add(path, &blob)
 }
 
 /// Reads what is known beside the blob `set`, which was read from `blob`.

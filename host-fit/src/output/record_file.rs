@@ -1,11 +1,8 @@
 //! A record: what came is in the file, whatever ends the run.
 
-use super::{
-    OutputError, end_of_links, explain, folder_of, is_stream, names_standard_output, resolve,
-};
-use std::fs::{File, OpenOptions};
-use std::io::{Stdout, Write};
-use std::path::{Path, PathBuf};
+use super::{Output, OutputError};
+use std::io::Write;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// The longest time for which a line stays in memory: what is lost with the program.
@@ -18,8 +15,7 @@ const UNWRITTEN_BYTES: usize = 64 * 1024;
 /// standard output for `-`.
 #[derive(Debug)]
 pub struct RecordFile {
-    path: PathBuf,
-    sink: Sink,
+    output: Output,
     /// Lines that are not in the file yet.
     unwritten: Vec<u8>,
     since: Instant,
@@ -29,56 +25,14 @@ pub struct RecordFile {
     has_ended: bool,
 }
 
-#[derive(Debug)]
-enum Sink {
-    /// A file of its own, which can be cut and removed.
-    New(File),
-    Device(File),
-    Standard(Stdout),
-}
-
-impl Sink {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        match self {
-            Self::New(file) | Self::Device(file) => file.write_all(bytes),
-            Self::Standard(out) => out.write_all(bytes).and_then(|()| out.flush()),
-        }
-    }
-}
-
 impl RecordFile {
     /// An empty record.
     ///
     /// # Errors
-    /// [`OutputError::Exists`] for a file that is there, and those of a place that cannot be written.
+    /// [`OutputError`], for a file that is there too.
     pub fn create(path: &Path) -> Result<Self, OutputError> {
-        let sink = if names_standard_output(path) {
-            Sink::Standard(std::io::stdout())
-        } else {
-            let (target, existing) = resolve(path)?;
-            let opened = match existing {
-                None => {
-                    let mut new = OpenOptions::new();
-                    new.write(true)
-                        .create_new(true)
-                        .open(&target)
-                        .map(Sink::New)
-                }
-                Some(metadata) if is_stream(path, &metadata) => {
-                    let device = OpenOptions::new().append(true).open(path);
-                    device.map(Sink::Device)
-                }
-                Some(_) => {
-                    return Err(OutputError::Exists {
-                        path: path.to_path_buf(),
-                    });
-                }
-            };
-            opened.map_err(|source| explain(source, path, &folder_of(&target), 0))?
-        };
         Ok(Self {
-            path: path.to_path_buf(),
-            sink,
+            output: Output::create_new(path)?,
             unwritten: Vec::with_capacity(UNWRITTEN_BYTES),
             since: Instant::now(),
             written: 0,
@@ -99,10 +53,10 @@ impl RecordFile {
         }
         // Into memory, which does not fail.
         let _ = writeln!(self.unwritten, "{text}");
-        if self.unwritten.len() >= UNWRITTEN_BYTES {
-            self.flush()?;
+        match self.unwritten.len() >= UNWRITTEN_BYTES {
+            true => self.flush(),
+            false => Ok(()),
         }
-        Ok(())
     }
 
     /// Writes lines that have waited long enough: to be called several times a second.
@@ -110,36 +64,28 @@ impl RecordFile {
     /// # Errors
     /// As [`flush`](Self::flush).
     pub fn keep_up(&mut self) -> Result<(), OutputError> {
-        if self.since.elapsed() >= UNWRITTEN_MAX {
-            self.flush()?;
+        match self.since.elapsed() >= UNWRITTEN_MAX {
+            true => self.flush(),
+            false => Ok(()),
         }
-        Ok(())
     }
 
     /// Writes all lines that have come.
     ///
     /// # Errors
-    /// `Full`, `Failed`: then the file ends with the last line that is whole, those not written are
-    /// gone, and so are all that follow.
+    /// Then the file ends with the last line that is whole, those not written are gone, and so are all
+    /// that follow.
     pub fn flush(&mut self) -> Result<(), OutputError> {
-        let bytes = self.unwritten.len();
-        let written = self.sink.write(&self.unwritten);
-        match (&written, &mut self.sink) {
-            (Ok(()), _) => self.written += bytes as u64,
-            (Err(_), Sink::New(file)) => {
-                // What there was room for, to the end of its last line.
-                let length = file.metadata().map_or(0, |metadata| metadata.len());
-                let room = usize::try_from(length.saturating_sub(self.written)).unwrap_or(0);
-                let fits = self.unwritten.get(..room).unwrap_or_default();
-                let whole = fits.iter().rposition(|byte| *byte == b'\n');
-                self.written += whole.map_or(0, |end| end as u64 + 1);
-                let _ = file.set_len(self.written);
-            }
-            (Err(_), _) => {}
-        }
-        self.unwritten.clear();
+        let bytes = std::mem::take(&mut self.unwritten);
+        let written = self.output.write(&bytes);
+        self.written += match &written {
+            Ok(()) => bytes.len() as u64,
+            Err(_) => self.output.cut_to_whole_lines(self.written, &bytes),
+        };
         self.has_ended |= written.is_err();
-        written.map_err(|source| explain(source, &self.path, &folder_of(&self.path), bytes))
+        self.unwritten = bytes;
+        self.unwritten.clear();
+        written
     }
 
     /// Writes all lines, and waits until they are on the disk.
@@ -148,18 +94,11 @@ impl RecordFile {
     /// As [`flush`](Self::flush).
     pub fn finish(&mut self) -> Result<(), OutputError> {
         self.flush()?;
-        match &self.sink {
-            Sink::New(file) => file
-                .sync_all()
-                .map_err(|source| explain(source, &self.path, &folder_of(&self.path), 0)),
-            Sink::Device(_) | Sink::Standard(_) => Ok(()),
-        }
+        self.output.complete()
     }
 
     /// Removes the file.
     pub fn discard(self) {
-        if let Sink::New(_) = self.sink {
-            let _ = std::fs::remove_file(end_of_links(&self.path));
-        }
+        self.output.discard();
     }
 }

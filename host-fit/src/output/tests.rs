@@ -32,22 +32,22 @@ fn a_target_that_cannot_be_is_named_with_its_reason() {
     let write = |path: &Path| write_atomically(path, b"new").expect_err("refused");
     let (is_folder, no_folder) = (write(folder.path()), write(&at("missing/params.bin")));
     assert!(
-        matches!(is_folder, OutputError::IsFolder { .. }),
+        matches!(is_folder.problem, OutputProblem::IsFolder),
         "{is_folder}"
     );
     assert!(
-        matches!(no_folder, OutputError::NoFolder { .. }),
+        matches!(no_folder.problem, OutputProblem::NoFolder { .. }),
         "{no_folder}"
     );
     assert!(no_folder.to_string().contains("create it"), "{no_folder}");
     let slash = write(&at("new/"));
-    assert!(matches!(slash, OutputError::IsFolder { .. }), "{slash}");
+    assert!(matches!(slash.problem, OutputProblem::IsFolder), "{slash}");
     let empty = write(Path::new(""));
-    assert!(matches!(empty, OutputError::NoName), "{empty}");
+    assert!(matches!(empty.problem, OutputProblem::NoName), "{empty}");
     let below_file = write(&at("file/params.bin"));
     #[cfg(unix)]
     assert!(
-        matches!(below_file, OutputError::NotAFolder { .. }),
+        matches!(below_file.problem, OutputProblem::NotAFolder { .. }),
         "{below_file}"
     );
     assert!(below_file.to_string().contains("another"), "{below_file}");
@@ -64,7 +64,7 @@ fn a_read_only_file_stays_as_it_is() {
     locked.set_readonly(true);
     fs::set_permissions(&path, locked).expect("set");
     let error = write_atomically(&path, b"new").expect_err("refused");
-    assert!(matches!(error, OutputError::ReadOnly { .. }), "{error}");
+    assert!(matches!(error.problem, OutputProblem::ReadOnly), "{error}");
     assert_eq!(fs::read(&path).expect("readable"), b"old");
     fs::set_permissions(&path, writable).expect("set");
 }
@@ -102,7 +102,7 @@ fn a_device_is_written_to_and_a_full_one_says_so() {
     write_atomically(Path::new("/dev/null"), b"new").expect("swallowed");
     let error = write_atomically(Path::new("/dev/full"), b"new").expect_err("full");
     assert!(
-        matches!(error, OutputError::Full { bytes: 3, .. }),
+        matches!(error.problem, OutputProblem::Full { bytes: 3, .. }),
         "{error}"
     );
 }
@@ -135,10 +135,14 @@ fn a_record_is_in_its_file_before_it_is_finished_and_never_replaces_one() {
     assert_eq!(lines(&path), 20_000);
     drop(record);
     let again = RecordFile::create(&path);
-    assert!(matches!(again, Err(OutputError::Exists { .. })));
+    assert!(matches!(
+        again.expect_err("there").problem,
+        OutputProblem::Exists
+    ));
     assert_eq!(lines(&path), 20_000);
     let missing = RecordFile::create(&folder.path().join("missing/bus.log"));
-    assert!(matches!(missing, Err(OutputError::NoFolder { .. })));
+    let missing = missing.expect_err("no folder").problem;
+    assert!(matches!(missing, OutputProblem::NoFolder { .. }));
     let other = RecordFile::create(&folder.path().join("other.log")).expect("writable");
     other.discard();
     assert_eq!(names(folder.path()), ["bus.log"]);
@@ -161,7 +165,10 @@ fn a_link_to_a_file_that_is_not_there_makes_that_file() {
     assert!(at("there/bus.log").is_file());
     link("circle", "circle");
     let error = write_atomically(&at("circle"), b"new").expect_err("refused");
-    assert!(matches!(error, OutputError::Failed { .. }), "{error}");
+    assert!(
+        matches!(error.problem, OutputProblem::Failed { .. }),
+        "{error}"
+    );
     assert!(at("circle").is_symlink());
 }
 
@@ -171,7 +178,7 @@ fn files_of_killed_programs_are_swept_and_those_of_running_ones_are_not() {
     let folder = tempfile::tempdir().expect("a folder");
     let left = folder.path().join(".host-fit-killed");
     fs::write(&left, b"half").expect("written");
-    let running = super::temporary(folder.path()).expect("a file");
+    let running = temporary::temporary(folder.path()).expect("a file");
     write_atomically(&folder.path().join("params.bin"), b"new").expect("written");
     assert!(!left.exists());
     assert!(running.path().exists());

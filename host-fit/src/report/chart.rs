@@ -1,23 +1,37 @@
 //! Charts as SVG that follow the page they stand in: its colours, light, dark or printed, and its
 //! width. A chart is a stack of panels over the same abscissa.
 
-use super::axis::Axis;
-use super::plots::{DrawResult, PlotError, as_svg};
-use plotters::coord::Shift;
-use plotters::prelude::*;
-use std::ops::Range;
+use super::axis::{Axis, short};
+use super::table::with_signs;
+use serde::{Serialize, Serializer};
+use std::fmt::Write;
 
 /// Size in the units of the drawing, of which two are about a pixel: see `style.css`.
-const WIDTH: u32 = 720;
-const PANEL_HEIGHT: u32 = 150;
-const TOP: u32 = 8;
-const BOTTOM: u32 = 58;
-const LEFT: u32 = 104;
-const TEXT: u32 = 23;
+const WIDTH: f64 = 720.0;
+const PANEL_HEIGHT: f64 = 150.0;
+const TOP: f64 = 8.0;
+const BOTTOM: f64 = 58.0;
+const LEFT: f64 = 104.0;
+const RIGHT: f64 = 696.0;
+const MARGIN: f64 = 6.0;
+
+/// Kinds that a legend tells apart: class and colour.
+const KINDS: [(&str, &str); 10] = [
+    ("k0", "#1f77b4"),
+    ("k1", "#ff7f0e"),
+    ("k2", "#2ca02c"),
+    ("k3", "#d62728"),
+    ("k4", "#9467bd"),
+    ("k5", "#8c564b"),
+    ("k6", "#e377c2"),
+    ("k7", "#7f7f7f"),
+    ("k8", "#bcbd22"),
+    ("k9", "#17becf"),
+];
 
 /// A role, to which the style sheet gives its colour by the value that the drawing has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Tone {
+pub enum Tone {
     /// What is shown.
     Data,
     /// A second quantity in the same panel.
@@ -26,37 +40,37 @@ pub(super) enum Tone {
     Noise,
     /// Lines of the grid and borders between movements.
     Grid,
+    /// One of many kinds, told apart in a legend.
+    Of(usize),
 }
 
 impl Tone {
-    const fn colour(self) -> RGBColor {
+    /// Its class in the style sheet.
+    const fn class(self) -> &'static str {
         match self {
-            Self::Data => RGBColor(0x14, 0x5A, 0xA0),
-            Self::Second => RGBColor(0xB8, 0x55, 0x1B),
-            Self::Noise => RGBColor(0xA8, 0xA8, 0xA8),
-            Self::Grid => RGBColor(0xDD, 0xDD, 0xDD),
+            Self::Data => "data",
+            Self::Second => "second",
+            Self::Noise => "noise",
+            Self::Grid => "grid",
+            Self::Of(k) => KINDS[k % KINDS.len()].0,
         }
     }
 }
 
 /// What is drawn into a panel.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Mark {
+pub enum Mark {
     /// A line through points.
     Line(Tone, Vec<(f64, f64)>),
-    /// A dot at each point.
-    Dots(Tone, Vec<(f64, f64)>),
     /// A filled band: abscissa, lower end, upper end.
     Band(Tone, Vec<(f64, f64, f64)>),
-    /// Bars from zero: left end, right end, value.
-    Bars(Tone, Vec<(f64, f64, f64)>),
     /// Lines over the height of the panel.
     Borders(Tone, Vec<f64>),
 }
 
 /// How the ordinates of a panel are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scale {
+pub enum Scale {
     /// About zero, to the same distance.
     Symmetric,
     /// From zero up.
@@ -67,126 +81,233 @@ pub(super) enum Scale {
 
 /// One panel.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Panel {
+pub struct Panel {
     /// What stands at its ordinate, with the unit.
-    pub(super) label: String,
+    pub label: String,
     /// Its scale.
-    pub(super) scale: Scale,
+    pub scale: Scale,
     /// What is drawn, the hindmost first.
-    pub(super) marks: Vec<Mark>,
+    pub marks: Vec<Mark>,
 }
 
 /// Panels below each other.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Chart {
+pub struct Chart {
     /// What it shows, for the caption.
-    pub(super) caption: String,
+    pub caption: String,
     /// What stands at the abscissa, with the unit.
-    pub(super) x_label: String,
+    pub x_label: String,
     /// The abscissa.
-    pub(super) x: Axis,
+    pub x: Axis,
     /// The panels, the topmost first.
-    pub(super) panels: Vec<Panel>,
+    pub panels: Vec<Panel>,
+}
+
+impl Serialize for Chart {
+    /// Caption and drawing, for a page.
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        [&self.caption, &self.svg()].serialize(to)
+    }
 }
 
 impl Chart {
-    /// The chart as an `svg` element to stand in a page.
-    ///
-    /// # Errors
-    /// [`PlotError`] when the drawing library refuses.
-    pub(super) fn svg(&self) -> Result<String, PlotError> {
-        let svg = as_svg(&self.caption, |svg| self.draw(svg))?;
-        // Within a page an element needs no name space, and its width is that of its place.
-        let size = format!("width=\"{WIDTH}\" height=\"{}\" ", self.height());
-        let svg = svg.replacen(&size, "role=\"img\" ", 1);
-        Ok(svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1))
+    /// Three panels, of X, Y and Rz or of the probes, over an abscissa with a label.
+    pub fn of_three(
+        caption: impl Into<String>,
+        (x_label, x): (&str, Axis),
+        panel: impl FnMut(usize) -> Panel,
+    ) -> Self {
+        Self {
+            caption: caption.into(),
+            x_label: x_label.to_owned(),
+            x,
+            panels: [0, 1, 2].map(panel).into(),
+        }
     }
 
-    const fn height(&self) -> u32 {
-        TOP + PANEL_HEIGHT * self.panels.len() as u32 + BOTTOM
-    }
-
-    fn draw(&self, svg: &mut String) -> DrawResult {
-        let root = SVGBackend::with_string(svg, (WIDTH, self.height())).into_drawing_area();
-        let (_, mut rest) = root.split_vertically(TOP);
+    /// The chart as an `svg` element to stand in a page, whose style sheet gives the colours.
+    pub(super) fn svg(&self) -> String {
+        let height = TOP + PANEL_HEIGHT * self.panels.len() as f64 + BOTTOM;
+        let mut svg = format!("<svg role=\"img\" viewBox=\"0 0 {WIDTH} {height}\">\n");
         for (k, panel) in self.panels.iter().enumerate() {
-            let last = k + 1 == self.panels.len();
-            let height = PANEL_HEIGHT + if last { BOTTOM } else { 0 };
-            let (here, below) = rest.split_vertically(height);
-            self.draw_panel(&here, panel, last)?;
-            rest = below;
+            let top = TOP + PANEL_HEIGHT * k as f64;
+            let area = Area {
+                x: self.x,
+                y: panel.axis(),
+                top: top + MARGIN,
+                bottom: top + PANEL_HEIGHT - MARGIN,
+            };
+            area.draw_axes(&mut svg, &with_signs(&panel.label));
+            panel
+                .marks
+                .iter()
+                .for_each(|mark| area.draw(&mut svg, mark));
         }
-        root.present()?;
-        Ok(())
+        let bottom = TOP + PANEL_HEIGHT * self.panels.len() as f64;
+        for mark in self.x.marks(6.0) {
+            let x = LEFT + self.x.place(mark) * (RIGHT - LEFT);
+            let label = short(mark);
+            line(
+                &mut svg,
+                format_args!(
+                    "text-anchor=\"middle\" x=\"{x:.1}\" y=\"{}\">{label}",
+                    bottom + 20.0
+                ),
+            );
+        }
+        let (middle, below) = (0.5 * (LEFT + RIGHT), bottom + 48.0);
+        line(
+            &mut svg,
+            format_args!(
+                "text-anchor=\"middle\" x=\"{middle}\" y=\"{below}\">{}",
+                with_signs(&self.x_label)
+            ),
+        );
+        svg + "</svg>\n"
     }
 
-    fn draw_panel(
-        &self,
-        area: &DrawingArea<SVGBackend<'_>, Shift>,
-        panel: &Panel,
-        last: bool,
-    ) -> DrawResult {
-        let mut chart = ChartBuilder::on(area)
-            .margin_top(6)
-            .margin_bottom(6)
-            .margin_right(24)
-            .x_label_area_size(if last { BOTTOM } else { 0 })
-            .y_label_area_size(LEFT)
-            .build_cartesian_2d(self.x, panel.axis())?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(Tone::Grid.colour())
-            .axis_style(Tone::Noise.colour())
-            .x_labels(if last { 6 } else { 0 })
-            .x_desc(if last { self.x_label.as_str() } else { "" })
-            .y_desc(&panel.label)
-            .y_labels(5)
-            .label_style(("sans-serif", TEXT))
-            .axis_desc_style(("sans-serif", TEXT))
-            .draw()?;
-        for mark in &panel.marks {
-            draw_mark(&mut chart, mark)?;
+    /// The chart as a file of its own, with a legend.
+    pub fn svg_file(&self, legend: &[(usize, &str)]) -> String {
+        let mut head = String::from(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1080\">\n<style>text { font: 20px sans-serif }\n\
+             .grid { color: #ddd } .noise { color: #a8a8a8 }\n",
+        );
+        KINDS.iter().for_each(|(class, colour)| {
+            let _ = writeln!(head, ".{class} {{ color: {colour} }}");
+        });
+        head += "</style>\n";
+        line(
+            &mut head,
+            format_args!("x=\"{LEFT}\" y=\"24\">{}", self.caption),
+        );
+        for (k, (kind, name)) in legend.iter().enumerate() {
+            let class = Tone::Of(*kind).class();
+            let y = 60 + 26 * k;
+            line(
+                &mut head,
+                format_args!("class=\"{class}\" fill=\"currentColor\" x=\"740\" y=\"{y}\">{name}"),
+            );
         }
-        Ok(())
+        let body = self
+            .svg()
+            .replacen("<svg ", "<svg y=\"30\" width=\"720\" ", 1);
+        let height = 60.0 + TOP + PANEL_HEIGHT * self.panels.len() as f64 + BOTTOM;
+        let height = height.max(90.0 + 26.0 * legend.len() as f64);
+        head = head.replacen(
+            "width=\"1080\"",
+            &format!("viewBox=\"0 0 1080 {height}\" width=\"1080\""),
+            1,
+        );
+        head + &body + "</svg>\n"
     }
 }
 
-fn draw_mark<'a>(
-    chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>,
-    mark: &Mark,
-) -> DrawResult {
-    match mark {
-        Mark::Line(tone, points) => {
-            let style = tone.colour().stroke_width(2);
-            chart.draw_series([PathElement::new(points.clone(), style)])?;
+/// Adds a line of text, its attributes first.
+fn line(svg: &mut String, text: std::fmt::Arguments<'_>) {
+    // Writing to a string cannot fail.
+    let _ = writeln!(svg, "<text {text}</text>");
+}
+
+/// Where the marks of a panel are drawn.
+struct Area {
+    x: Axis,
+    y: Axis,
+    top: f64,
+    bottom: f64,
+}
+
+impl Area {
+    /// A point in the units of the drawing.
+    fn at(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        (
+            LEFT + self.x.place(x) * (RIGHT - LEFT),
+            self.bottom - self.y.place(y) * (self.bottom - self.top),
+        )
+    }
+
+    fn draw_axes(&self, svg: &mut String, label: &str) {
+        let (top, bottom) = (self.top, self.bottom);
+        let mut grid = String::new();
+        for mark in self.x.marks(6.0) {
+            let x = LEFT + self.x.place(mark) * (RIGHT - LEFT);
+            let _ = write!(grid, "M{x:.1} {top}V{bottom}");
         }
-        Mark::Dots(tone, points) => {
-            let dot = |&point| Circle::new(point, 4, tone.colour().filled());
-            chart.draw_series(points.iter().map(dot))?;
+        for mark in self.y.marks(4.0) {
+            let y = bottom - self.y.place(mark) * (bottom - top);
+            let _ = write!(grid, "M{LEFT} {y:.1}H{RIGHT}");
+            let attributes = format!(
+                "text-anchor=\"end\" x=\"{}\" y=\"{:.1}\"",
+                LEFT - 8.0,
+                y + 7.0
+            );
+            line(svg, format_args!("{attributes}>{}", short(mark)));
         }
-        Mark::Band(tone, ends) => {
-            let lower = ends.iter().map(|&(x, low, _)| (x, low));
-            let upper = ends.iter().rev().map(|&(x, _, high)| (x, high));
-            let outline: Vec<_> = lower.chain(upper).collect();
-            chart.draw_series([Polygon::new(outline, tone.colour().mix(0.35))])?;
-        }
-        Mark::Bars(tone, bars) => {
-            let bar = |&(left, right, value): &(f64, f64, f64)| {
-                Rectangle::new([(left, 0.0), (right, value)], tone.colour().filled())
-            };
-            chart.draw_series(bars.iter().map(bar))?;
-        }
-        Mark::Borders(tone, places) => {
-            let Range { start, end } = chart.y_range();
-            let border = |&x: &f64| PathElement::new([(x, start), (x, end)], tone.colour());
-            chart.draw_series(places.iter().map(border))?;
+        path(svg, Tone::Grid, "stroke=\"currentColor\"", &grid);
+        path(
+            svg,
+            Tone::Noise,
+            "stroke=\"currentColor\" fill=\"none\"",
+            &format!("M{LEFT} {top}V{bottom}H{RIGHT}"),
+        );
+        let middle = 0.5 * (top + bottom);
+        line(
+            svg,
+            format_args!(
+                "text-anchor=\"middle\" transform=\"rotate(-90)\" x=\"{}\" y=\"24\">{label}",
+                -middle
+            ),
+        );
+    }
+
+    fn draw(&self, svg: &mut String, mark: &Mark) {
+        let through = |points: &mut dyn Iterator<Item = (f64, f64)>| {
+            points.enumerate().fold(String::new(), |mut d, (k, point)| {
+                let (x, y) = self.at(point);
+                let _ = write!(d, "{}{x:.1} {y:.1}", if k == 0 { 'M' } else { 'L' });
+                d
+            })
+        };
+        match mark {
+            Mark::Line(tone, points) => {
+                let style = "stroke=\"currentColor\" stroke-width=\"2\" fill=\"none\"";
+                path(svg, *tone, style, &through(&mut points.iter().copied()));
+            }
+            Mark::Band(tone, ends) => {
+                let lower = ends.iter().map(|&(x, low, _)| (x, low));
+                let upper = ends.iter().rev().map(|&(x, _, high)| (x, high));
+                let style = "stroke=\"currentColor\" fill=\"currentColor\" opacity=\"0.5\"";
+                path(svg, *tone, style, &through(&mut lower.chain(upper)));
+            }
+            Mark::Borders(tone, places) => {
+                let lines = places.iter().map(|&x| {
+                    let x = LEFT + self.x.place(x) * (RIGHT - LEFT);
+                    format!("M{x:.1} {}V{}", self.top, self.bottom)
+                });
+                path(
+                    svg,
+                    *tone,
+                    "stroke=\"currentColor\"",
+                    &lines.collect::<String>(),
+                );
+            }
         }
     }
-    Ok(())
+}
+
+fn path(svg: &mut String, tone: Tone, style: &str, d: &str) {
+    let _ = writeln!(svg, "<path class=\"{}\" {style} d=\"{d}\"/>", tone.class());
 }
 
 impl Panel {
+    /// A panel.
+    pub fn new(label: &str, scale: Scale, marks: Vec<Mark>) -> Self {
+        Self {
+            label: label.to_owned(),
+            scale,
+            marks,
+        }
+    }
+
     /// The ordinate, with some room beyond what is shown.
     fn axis(&self) -> Axis {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -197,14 +318,13 @@ impl Panel {
         };
         for mark in &self.marks {
             match mark {
-                Mark::Line(_, points) | Mark::Dots(_, points) => {
+                Mark::Line(_, points) => {
                     points.iter().for_each(|point| take(point.1));
                 }
                 Mark::Band(_, ends) => ends.iter().for_each(|&(_, low, high)| {
                     take(low);
                     take(high);
                 }),
-                Mark::Bars(_, bars) => bars.iter().for_each(|bar| take(bar.2)),
                 Mark::Borders(..) => {}
             }
         }

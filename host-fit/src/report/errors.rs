@@ -1,104 +1,85 @@
-//! Errors of the pose in a report: over all rows, and log by log.
+//! Errors of the pose in a report: as JSON and as tables, over all rows and log by log.
 
-use crate::input::dataset::{Dataset, LogSource};
-use crate::judge::statistics::{AxisError, PoseError};
-use crate::judge::whole::{LogJudgement, WholeJudgement};
-use crate::judge::{Decoded, Judgement, errors_by_log};
-use serde::Serialize;
+use super::table::Table;
+use crate::fit::calibration;
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::judge::statistics::PoseError;
+use crate::judge::{Decoded, Judgement, Zeros};
+use crate::problem::model::Model;
+use crate::problem::parameters::Parameters;
+use runtime::ModelKind;
+use runtime::calibration::Origin;
+use serde_json::{Value, json};
 
-/// rms and peak of a displacement.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Micrometres {
-    /// um.
-    pub rmse_um: f64,
-    /// um.
-    pub peak_um: f64,
+/// Errors of X, Y, Rz by row, m, m, rad; `None` where there was no pose.
+pub type RowErrors = Vec<Option<[f64; 3]>>;
+
+/// The errors of a log with the designed values, Model (15), no zero deviation taken off. `None` where
+/// no decoder can be made of them, or where it decodes no row.
+pub fn designed(dataset: &Dataset, stage: &Stage) -> Option<(RowErrors, PoseError)> {
+    let model = Model::of(ModelKind::M15);
+    let designed = calibration(&dataset.rows, stage, model, &Parameters::designed(stage));
+    let decoded = Decoded::new(&designed.prepare(&Origin::default()).ok()?, dataset);
+    let figures = decoded.judge(dataset, stage, Zeros::None).errors;
+    (figures.rows > 0).then_some((decoded.errors, figures))
 }
 
-/// rms and peak of a rotation.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Microradians {
-    /// urad.
-    pub rmse_urad: f64,
-    /// urad.
-    pub peak_urad: f64,
+/// rms and peak of X, Y (um) and Rz (urad).
+pub fn errors(error: &PoseError) -> Value {
+    of(
+        error.axes.map(|axis| axis.rms),
+        error.axes.map(|axis| axis.peak),
+    )
 }
 
-/// Errors of the three planar axes.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Errors {
-    /// X.
-    pub x: Micrometres,
-    /// Y.
-    pub y: Micrometres,
-    /// Rz.
-    pub rz: Microradians,
+/// The same of X, Y, Rz in SI. An error below zero, or of 1 m or more, which the blob of another program
+/// may hold, is null.
+pub fn of(rms: [f64; 3], peak: [f64; 3]) -> Value {
+    let micro = |error: f64| (0.0..1.0).contains(&error).then_some(error * 1e6);
+    let axis = |k: usize, unit: &str| json!({ format!("rmse_{unit}"): micro(rms[k]), format!("peak_{unit}"): micro(peak[k]) });
+    json!({ "x": axis(0, "um"), "y": axis(1, "um"), "rz": axis(2, "urad") })
 }
 
-impl From<&PoseError> for Errors {
-    fn from(error: &PoseError) -> Self {
-        let [x, y, rz] = error.axes;
-        let linear = |a: AxisError| Micrometres {
-            rmse_um: a.rms * 1e6,
-            peak_um: a.peak * 1e6,
-        };
-        Self {
-            x: linear(x),
-            y: linear(y),
-            rz: Microradians {
-                rmse_urad: rz.rms * 1e6,
-                peak_urad: rz.peak * 1e6,
-            },
-        }
+/// rms and peak of X, Y (um) and Rz (urad).
+pub fn micro(error: &PoseError) -> [[f64; 2]; 3] {
+    error.axes.map(|axis| [axis.rms * 1e6, axis.peak * 1e6])
+}
+
+/// A table with a row of rms and peak for each of these (um, um, urad); what is not known is NaN.
+pub fn error_table(
+    title: &str,
+    rows: impl IntoIterator<Item = (impl Into<String>, [[f64; 2]; 3])>,
+) -> Table {
+    let titles = [
+        "X rms, um",
+        "peak",
+        "Y rms, um",
+        "peak",
+        "Rz rms, urad",
+        "peak",
+    ];
+    let mut table = Table::new(title, &titles);
+    for (what, errors) in rows {
+        table.row(what, errors.as_flattened().iter().map(|x| cell(*x)));
+    }
+    table
+}
+
+/// An error in um or urad.
+fn cell(x: f64) -> String {
+    match x.is_nan() {
+        true => "-".to_owned(),
+        false => format!("{x:.3}"),
     }
 }
 
-/// The errors of one log.
-#[derive(Clone, Debug, Serialize)]
-pub struct LogErrors {
-    /// The file.
-    pub path: String,
-    /// Its rows.
-    pub rows: usize,
-    /// Over all of them.
-    pub errors: Errors,
-}
-
-/// The errors of each log, zero deviations as in `judgement`.
-pub(super) fn by_log(
-    decoded: &Decoded,
-    judgement: &Judgement,
-    dataset: &Dataset,
-) -> Vec<LogErrors> {
-    let errors = decoded.errors_less(&judgement.zeros, dataset);
-    let errors = errors_by_log(&errors, dataset);
-    let of_log = |(log, errors): (&LogSource, &PoseError)| LogErrors {
-        path: log.path.display().to_string(),
-        rows: log.rows.len(),
-        errors: Errors::from(errors),
-    };
-    dataset.logs.iter().zip(&errors).map(of_log).collect()
-}
-
-/// The errors of each log over all its rows, of which the dataset is an excerpt.
-pub(super) fn of_whole(dataset: &Dataset, whole: &WholeJudgement) -> Vec<LogErrors> {
-    let of_log = |(log, judged): (&LogSource, &LogJudgement)| LogErrors {
-        path: log.path.display().to_string(),
-        rows: judged.rows,
-        errors: Errors::from(&judged.errors),
-    };
-    dataset.logs.iter().zip(&whole.logs).map(of_log).collect()
-}
-
-/// The rms errors of each of several logs for a terminal, a line each.
-pub fn as_text(logs: &[LogErrors]) -> String {
-    let line = |log: &LogErrors| {
-        let Errors { x, y, rz } = &log.errors;
-        format!(
-            "  {:>8.3} um {:>8.3} um {:>8.3} urad rms in {}\n",
-            x.rmse_um, y.rmse_um, rz.rmse_urad, log.path
-        )
-    };
-    let several = logs.iter().filter(|_| logs.len() > 1);
-    several.map(line).collect()
+/// The errors of each log over all its rows.
+pub(super) fn by_log(dataset: &Dataset, judgement: &Judgement) -> Vec<Value> {
+    let logs = dataset.logs.iter().zip(&judgement.logs);
+    let figures = logs.map(|(log, judged)| {
+        let path = log.path.display().to_string();
+        json!({ "path": path, "rows": judged.rows, "errors": errors(&judged.errors) })
+    });
+    figures.collect()
 }

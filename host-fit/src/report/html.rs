@@ -1,35 +1,91 @@
-//! Pages from templates. A template's name ends in `.html`, so that every text is escaped.
+//! Pages: a verdict, facts, findings by their cause, and sections of tables and charts. One template serves
+//! all; its name ends in `.html`, so that every text is escaped.
 
-use super::plots::PlotError;
-use crate::output::OutputError;
+use super::chart::Chart;
+use super::table::{Table, with_signs};
+use super::verdict::Summary;
+use crate::finding::{Code, Finding, Severity};
 use minijinja::value::Serde;
 use minijinja::{Environment, Error, UndefinedBehavior};
 use serde::Serialize;
 
-/// The style of every page: it stands in the page, which so is complete in one file.
-pub(super) const STYLE: &str = include_str!("style.css");
-
-/// Why there is no page.
-#[derive(Debug, thiserror::Error)]
-pub enum PageError {
-    /// A plot could not be drawn.
-    #[error(transparent)]
-    Plot(#[from] PlotError),
-    /// The template names something that is not there.
-    #[error("the template of the report: {0}")]
-    Template(#[from] Error),
-    /// The page was not written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
+/// A page, complete in one file.
+#[derive(Clone, Debug, Serialize)]
+pub struct Page<'a> {
+    /// Its title.
+    pub title: &'static str,
+    /// Whether a calibration can be used.
+    pub verdict: Summary,
+    /// Name and text of what else a certificate says.
+    pub facts: Vec<[String; 2]>,
+    /// What was found.
+    pub causes: Vec<Cause<'a>>,
+    /// What the user should know besides.
+    pub warnings: &'a [String],
+    /// What follows.
+    pub sections: Vec<Section>,
 }
 
-/// A template filled in.
-pub(super) fn render(
-    name: &str,
-    template: &str,
-    context: &impl Serialize,
-) -> Result<String, Error> {
-    let mut engine = Environment::new();
-    engine.set_undefined_behavior(UndefinedBehavior::Strict);
-    engine.render_named_str(name, template, Serde(context))
+/// Findings of one code.
+#[derive(Clone, Debug, Serialize)]
+pub struct Cause<'a> {
+    code: Code,
+    /// The worst of theirs.
+    severity: Severity,
+    meaning: &'static str,
+    remedy: &'static str,
+    /// Predicted errors in service over the noise floor with the worst of them alone.
+    cost: Option<f64>,
+    findings: Vec<&'a Finding>,
+}
+
+impl<'a> Cause<'a> {
+    /// Of findings in order, the most severe first.
+    pub fn of(findings: &'a [Finding]) -> Vec<Self> {
+        let mut causes: Vec<Self> = Vec::new();
+        for found in findings {
+            match causes.iter_mut().find(|cause| cause.code == found.code) {
+                Some(cause) => {
+                    cause.cost = cause.cost.into_iter().chain(found.cost).reduce(f64::max);
+                    cause.findings.push(found);
+                }
+                None => causes.push(Self {
+                    code: found.code,
+                    severity: found.severity,
+                    meaning: found.code.entry().meaning,
+                    remedy: found.code.entry().remedy,
+                    cost: found.cost,
+                    findings: vec![found],
+                }),
+            }
+        }
+        causes
+    }
+}
+
+/// A part of a page.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Section {
+    /// Its title.
+    pub title: &'static str,
+    /// What stands first.
+    pub notes: Vec<String>,
+    /// Its tables; long ones are folded.
+    pub tables: Vec<Table>,
+    /// Its charts.
+    pub charts: Vec<Chart>,
+}
+
+impl Page<'_> {
+    /// The page as HTML.
+    ///
+    /// # Errors
+    /// [`Error`] when the template names something that is not there.
+    pub fn html(&self) -> Result<String, Error> {
+        let mut engine = Environment::new();
+        engine.set_undefined_behavior(UndefinedBehavior::Strict);
+        engine.add_global("style", include_str!("style.css"));
+        engine.add_filter("signs", |text: String| with_signs(&text));
+        engine.render_named_str("page.html", include_str!("page.html"), Serde(self))
+    }
 }

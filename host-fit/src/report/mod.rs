@@ -1,8 +1,7 @@
 //! What a fit, a judgement or a plan shows: JSON, text tables, plots, an HTML page.
 
-mod axis;
-mod before_after;
-mod chart;
+pub mod axis;
+pub mod chart;
 pub mod errors;
 pub mod field;
 mod figures;
@@ -11,17 +10,7 @@ pub mod json;
 pub mod page;
 pub mod parameters;
 pub mod plan;
-pub mod plan_page;
-pub mod plots;
 pub mod provenance;
 mod series;
-mod tables;
-pub mod text;
+pub mod table;
 pub mod verdict;
-
-use std::path::{Path, PathBuf};
-
-/// The one file of a report in `folder`.
-pub fn page_in(folder: &Path) -> PathBuf {
-    folder.join("index.html")
-}

@@ -1,160 +1,251 @@
-//! The report of a fit as one HTML file, written whether or not there is a calibration.
+//! The report of logs and what was made of them as one HTML page, written whether or not there is a
+//! calibration: a certificate first, then what it rests on.
 
-use super::before_after::{Errors, before_after};
-use super::chart::Chart;
-use super::figures::{Log, errors, fitting, residuals, signals};
-use super::html::{PageError, STYLE, render};
-use super::json::{Report, movement_zeros};
+use super::errors::{RowErrors, designed, error_table, micro};
+use super::figures::Log;
+use super::html::{Cause, Page, Section};
+use super::json::{MovementZero, Report};
+use super::parameters::{self, Parameter};
 use super::provenance::Provenance;
-use super::series::times;
-use super::tables::{
-    MOVEMENTS_MAX, MovementRow, ParameterRow, StageRow, movement_rows, parameter_rows, stage_rows,
-};
-use super::verdict::{End, Verdict};
-use crate::diagnose::finding::Finding;
+use super::table::{self, Table};
+use super::verdict::{Subject, Summary};
 use crate::diagnose::signals::period_s;
 use crate::fit::Fit;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
-use crate::judge::statistics::white_noise;
-use serde::Serialize;
+use crate::judge::statistics::{PoseError, white_noise};
+use crate::problem::model::Model;
+use minijinja::Error;
+use runtime::{ModelKind, ParameterSet};
+use std::collections::BTreeMap;
+
+/// Movements that the page lists.
+const MOVEMENTS_MAX: usize = 1000;
+
+const PAPER: &str = "The figures that the paper has, of this log: Fig. 9 (displacements and Hall signals) and Figs 10 to 12 \
+     (errors with the designed values and after calibration) of Z. Chen et al., \"Calibration of the Hall Measurement System \
+     for a 6-DOF Precision Stage Using Self-Adaptive Hybrid TLBO\", Sensors 2016.";
 
 /// What a report is made of.
 #[derive(Clone, Debug)]
 pub struct Source<'a> {
+    /// Title of the page.
+    pub title: &'static str,
+    /// What was judged, and how it ended.
+    pub subject: Subject<'a>,
+    /// What a person says of the run: name and text.
+    pub facts: Vec<[String; 2]>,
     /// The stage.
     pub stage: &'a Stage,
     /// The rows.
     pub dataset: &'a Dataset,
     /// Where the figures come from.
     pub provenance: Provenance,
-    /// What was found, the gravest first.
-    pub findings: &'a [Finding],
     /// Warnings from reading the logs.
-    pub warnings: &'a [String],
-    /// The fit with its figures, if there is one.
-    pub fit: Option<(&'a Fit, &'a Report)>,
-    /// How the run ended.
-    pub end: End<'a>,
+    pub warnings: Vec<String>,
+    /// The errors, if there is a fit or a blob.
+    pub errors: Option<Errors<'a>>,
 }
 
-/// One figure of the page.
-#[derive(Clone, Debug, Serialize)]
-struct Figure {
-    caption: String,
-    /// The drawing, which alone goes into the page without escaping.
-    svg: String,
+/// The errors of a fit, or of a blob.
+#[derive(Clone, Debug)]
+pub struct Errors<'a> {
+    /// The blob.
+    pub set: &'a ParameterSet,
+    /// By row of the dataset, zero deviations taken off.
+    pub by_row: RowErrors,
+    /// Over these.
+    pub figures: &'a PoseError,
+    /// The movements of the logs.
+    pub movements: &'a [MovementZero],
+    /// The parameters by name.
+    pub parameters: &'a BTreeMap<String, Parameter>,
+    /// More figures.
+    pub details: Vec<Table>,
 }
 
-fn figures(charts: impl IntoIterator<Item = Chart>) -> Result<Vec<Figure>, PageError> {
-    let figure = |chart: Chart| {
-        Ok(Figure {
-            svg: chart.svg()?,
-            caption: chart.caption,
-        })
-    };
-    charts.into_iter().map(figure).collect()
-}
-
-/// What the template shows.
-#[derive(Clone, Debug, Serialize)]
-struct Page<'a> {
-    style: &'static str,
-    provenance: &'a Provenance,
-    verdict: Verdict,
-    findings: &'a [Finding],
-    /// Those that are no finding.
-    warnings: &'a [String],
-    report: Option<&'a Report>,
-    /// Name of the model, and how zero deviations were treated.
-    model: &'a str,
-    zeros_in_words: &'static str,
-    signals: Vec<Figure>,
-    stages: Vec<StageRow>,
-    /// Noise of X, Y (um), Rz (urad) from row to row.
-    noise: Option<[f64; 3]>,
-    before_after: Vec<Figure>,
-    movements: Vec<MovementRow<'a>>,
-    /// Whether the model has zero deviations.
-    has_zeros: bool,
-    movements_max: usize,
-    by_movement: Vec<Figure>,
-    residuals: Vec<Figure>,
-    search: Vec<Figure>,
-    parameters: Vec<ParameterRow>,
+impl<'a> Errors<'a> {
+    /// Of a fit to a dataset.
+    pub fn of_fit(
+        fit: &'a Fit,
+        dataset: &Dataset,
+        report: &'a Report,
+        details: Vec<Table>,
+    ) -> Self {
+        let judgement = &fit.judgement;
+        Self {
+            set: &fit.set,
+            by_row: fit.decoded.errors_less(&judgement.zeros, dataset),
+            figures: &judgement.errors,
+            movements: &report.zero_deviations,
+            parameters: &report.parameters,
+            details,
+        }
+    }
 }
 
 impl Source<'_> {
     /// The page.
     ///
     /// # Errors
-    /// [`PageError`] when it cannot be drawn.
-    pub fn html(&self) -> Result<String, PageError> {
-        let Self {
-            stage,
-            dataset,
-            fit,
-            ..
-        } = self;
+    /// [`Error`] as in [`Page::html`].
+    pub fn html(&self) -> Result<String, Error> {
+        let (stage, dataset) = (self.stage, self.dataset);
         let segments: Vec<_> = dataset.movements.iter().map(|m| m.rows.clone()).collect();
-        let period_s = period_s(&dataset.rows, &segments, stage.servo_period_s);
         let log = Log {
-            times_s: times(dataset, period_s),
             dataset,
-            period_s,
+            period_s: period_s(&dataset.rows, &segments, stage.servo_period_s),
         };
-        let stages = before_after(dataset, stage, fit.map(|(fit, _)| fit));
-        let last = fit.and(stages.last());
-        let noise = last.map(|last| white_noise(&last.by_row, &dataset.movements));
-        let report = fit.map(|(_, report)| report);
-        let of_movements = last.map(|last| errors::of_movements(&log, last));
-        let of_movements = of_movements.unwrap_or_default();
-        let zeros = fit.map_or_else(Vec::new, |(fit, _)| {
-            movement_zeros(dataset, &dataset.movements, &fit.judgement.zeros)
+        let before = designed(dataset, stage);
+        let mut sections = Vec::new();
+        if let Some(errors) = &self.errors {
+            sections.extend(self.of_errors(&log, errors, before.as_ref()));
+        }
+        sections.push(Section {
+            title: "Provenance",
+            tables: vec![self.provenance.0.clone()],
+            ..Section::default()
         });
-        let has_zeros = report.is_some_and(|report| report.delta == "fit");
-        let range = stage.search.delta_m;
-        let by_movement = last.map(|_| errors::by_movement(&of_movements));
-        let by_movement = by_movement
-            .into_iter()
-            .chain(has_zeros.then(|| fitting::zero_deviations(&zeros, [range.low, range.high])));
+        let before =
+            before.map(|(rows, _)| log.errors("Errors with the designed values", &rows, None));
+        let after = self.errors.as_ref();
+        let after =
+            after.map(|errors| log.errors("Errors after calibration", &errors.by_row, None));
+        sections.push(Section {
+            title: "Appendix: figures of the paper",
+            notes: vec![PAPER.to_owned()],
+            charts: log
+                .signals()
+                .into_iter()
+                .chain(before)
+                .chain(after)
+                .collect(),
+            ..Section::default()
+        });
         let page = Page {
-            style: STYLE,
-            provenance: &self.provenance,
-            verdict: Verdict::new(self.end, self.findings, report.zip(noise)),
-            findings: self.findings,
-            warnings: self.warnings,
-            report,
-            model: report.map_or("", |report| &report.model_title),
-            zeros_in_words: report.map_or("", |report| report.zeros_in_words),
-            signals: figures(signals::charts(&log))?,
-            stages: stage_rows(&stages),
-            noise: noise.map(|noise| noise.map(|noise| noise * 1e6)),
-            before_after: figures(over_time(&log, &stages, noise))?,
-            movements: movement_rows(dataset, &of_movements, &zeros),
-            has_zeros,
-            movements_max: MOVEMENTS_MAX,
-            by_movement: figures(by_movement)?,
-            residuals: figures(last.zip(noise).into_iter().flat_map(|(last, noise)| {
-                let against = residuals::against(&log, last, noise);
-                let spectrum = residuals::spectrum(&log, last, noise);
-                against
-                    .into_iter()
-                    .chain(spectrum)
-                    .chain([errors::distribution(last)])
-            }))?,
-            search: figures(fit.and_then(|(fit, _)| fitting::search(&fit.solution.history)))?,
-            parameters: report.map_or_else(Vec::new, |report| parameter_rows(report, stage)),
+            title: self.title,
+            verdict: Summary::new(&self.subject),
+            facts: self.facts(),
+            causes: Cause::of(&self.subject.diagnosis.findings),
+            warnings: &self.warnings,
+            sections,
         };
-        Ok(render("report.html", include_str!("report.html"), &page)?)
+        page.html()
     }
-}
 
-/// The errors over time of every stage, with the noise behind those of the fit.
-fn over_time(log: &Log, stages: &[Errors], noise: Option<[f64; 3]>) -> Vec<Chart> {
-    let last = stages.len().saturating_sub(1);
-    let chart = |(k, stage)| errors::over_time(log, stage, noise.filter(|_| k == last));
-    stages.iter().enumerate().map(chart).collect()
+    /// What a certificate says besides the verdict: who, when, of what, and what it is valid for.
+    fn facts(&self) -> Vec<[String; 2]> {
+        let mut facts = self.facts.clone();
+        let mut add = |name: &str, text: String| facts.push([name.to_owned(), text]);
+        if let Some(Errors { set, .. }) = &self.errors {
+            let c = &set.constants;
+            let [x, y, rz] = c.calibrated_planar.map(|x| f64::from(x) * 1e6);
+            let [z, rx, ry] = c.calibrated_vertical.map(|x| f64::from(x) * 1e6);
+            add(
+                "valid for",
+                format!(
+                    "X ±{x:.0} um, Y ±{y:.0} um, Rz ±{rz:.0} urad, Z ±{z:.0} um, Rx ±{rx:.0} urad, Ry ±{ry:.0} urad, {}",
+                    match set.model {
+                        ModelKind::Field => "all axes moving",
+                        _ => "movements like those of the log",
+                    }
+                ),
+            );
+            add("model", Model::of(set.model).title());
+        }
+        add("temperature", "not logged".to_owned());
+        add(
+            "reference",
+            "laser interferometers X, Y1, Y2, as logged".to_owned(),
+        );
+        let (rows, movements) = self.dataset.read();
+        let logs = self
+            .dataset
+            .logs
+            .iter()
+            .map(|log| table::file_name(&log.path));
+        let logs: Vec<String> = logs.collect();
+        let movements = match movements {
+            1 => "one movement".to_owned(),
+            several => format!("{several} movements"),
+        };
+        add(
+            "log",
+            format!("{}: {rows} rows in {movements}", logs.join(", ")),
+        );
+        facts
+    }
+
+    /// What there is to show of errors.
+    fn of_errors(
+        &self,
+        log: &Log,
+        errors: &Errors,
+        before: Option<&(RowErrors, PoseError)>,
+    ) -> [Section; 5] {
+        let noise = white_noise(&errors.by_row, &self.dataset.movements);
+        let after = format!("after: {}", Model::of(errors.set.model).title());
+        let rows = [
+            before.map(|(_, errors)| ("before: designed values, Model (15)", micro(errors))),
+            Some((after.as_str(), micro(errors.figures))),
+            Some(("noise from row to row", noise.map(|x| [x * 1e6, f64::NAN]))),
+        ];
+        let before = before.map(|(rows, _)| rows);
+        let of_log = Section {
+            title: "Errors on the log",
+            notes: vec![
+                "Decoded by the code of the target; zero deviations refitted where the model has them.".to_owned(),
+            ],
+            tables: vec![error_table("", rows.into_iter().flatten())],
+            charts: vec![
+                log.errors("Before (grey) and after (blue), on one scale", &errors.by_row, before),
+                log.errors("After, enlarged", &errors.by_row, None),
+            ],
+        };
+        let mut against = log.against(&errors.by_row, noise);
+        against.extend(log.spectrum(&errors.by_row, noise));
+        let residuals = Section {
+            title: "Errors against pose, signals and frequency",
+            notes: vec![
+                "Line: mean of the errors. Band: two of their standard deviations. Orange lines: two standard deviations of the \
+                 noise from row to row. Where the mean leaves zero over a long way, the model lacks something."
+                    .to_owned(),
+            ],
+            charts: against,
+            ..Section::default()
+        };
+        let designed = [("designed", parameters::designed(self.stage))];
+        let mut tables = parameters::tables(errors.parameters, &designed);
+        for table in &mut tables {
+            table.columns.push("meaning".to_owned());
+            for row in &mut table.rows {
+                row.push(parameters::meaning(&row[0]));
+            }
+        }
+        let parameters = Section {
+            title: "Parameters",
+            notes: vec![
+                "In brackets the standard error, in units of the last digits. u is the displacement along the line of a probe, w \
+                 across it, z its height, in mm."
+                    .to_owned(),
+            ],
+            tables,
+            ..Section::default()
+        };
+        let mut movements = table::list("movements", errors.movements);
+        movements.rows.truncate(MOVEMENTS_MAX);
+        let movements = Section {
+            title: "Movements",
+            tables: vec![movements],
+            ..Section::default()
+        };
+        let trust = Section {
+            title: "More figures",
+            tables: errors.details.clone(),
+            ..Section::default()
+        };
+        [of_log, residuals, parameters, movements, trust]
+    }
 }
 
 #[cfg(test)]

@@ -1,12 +1,15 @@
 use super::*;
-use crate::diagnose::finding::{Code, Severity};
+use crate::diagnose::Diagnosis;
+use crate::finding::{Code, Finding};
 use crate::fit::{FitSettings, ModelChoice, fit};
-use crate::input::dataset::{LogSource, Movement};
+use crate::input::dataset::Movement;
 use crate::input::log;
 use crate::input::log::ReadOptions;
 use crate::input::shipped::{LOG_GZ, STAGE_TOML};
-use crate::report::json::{Choice, Circumstances, of_fit};
-use crate::solve::Solver;
+use crate::judge::Zeros;
+use crate::judge::verdict::Verdict;
+use crate::report::json::{Circumstances, of_eval};
+use crate::report::verdict::End;
 
 /// Every 20th row of the shipped log, each movement as often as `copies` says.
 fn shipped(stage: &Stage, copies: usize) -> Dataset {
@@ -34,41 +37,48 @@ fn shipped(stage: &Stage, copies: usize) -> Dataset {
             });
         }
     }
-    dataset.logs = vec![LogSource {
-        path: "a <log> & more.csv".into(),
-        rows: 0..dataset.rows.len(),
-        has_reference: true,
-    }];
+    dataset.logs.clear();
+    dataset.end_log("a <log> & more.csv");
     dataset
-}
-
-fn provenance(dataset: &Dataset) -> Provenance {
-    let mut provenance = Provenance {
-        serial: "<b>&S".to_owned(),
-        ..Provenance::new(std::iter::empty())
-    };
-    provenance.add_logs(dataset);
-    provenance
 }
 
 fn stage() -> Stage {
     Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")
 }
 
+fn subject<'a>(end: End<'a>, diagnosis: &'a Diagnosis) -> Subject<'a> {
+    Subject {
+        end,
+        diagnosis,
+        is_field: false,
+        errors: None,
+        limits: [None; 3],
+    }
+}
+
+fn source<'a>(stage: &'a Stage, dataset: &'a Dataset, subject: Subject<'a>) -> Source<'a> {
+    let mut provenance = Provenance::new(std::iter::empty());
+    provenance.add_logs(dataset);
+    Source {
+        title: "Calibration certificate",
+        subject,
+        facts: vec![["stage".to_owned(), "<b>&S".to_owned()]],
+        stage,
+        dataset,
+        provenance,
+        warnings: Vec::new(),
+        errors: None,
+    }
+}
+
 #[test]
 fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
     let stage = stage();
     let dataset = shipped(&stage, 1);
-    let settings = FitSettings {
-        solver: Solver::Finished,
-        ..FitSettings::new(ModelChoice::Auto)
-    };
-    let fit = fit(&dataset, &stage, &settings).expect("a fit");
-    let choice = Choice {
-        solver: "shtlbo-lm",
-        project: "linear",
-        seed: 1,
-        lag_compensated: false,
+    let fit = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
+    let diagnosis = Diagnosis {
+        verdict: Some(Verdict::Limited),
+        ..Diagnosis::default()
     };
     let circumstances = Circumstances {
         stage: &stage,
@@ -76,52 +86,53 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
         skipped_rows: 0,
         elapsed_s: 0.0,
         warnings: Vec::new(),
-        findings: Vec::new(),
+        diagnosis: diagnosis.clone(),
     };
-    let report = of_fit(&fit, choice, &circumstances);
+    let judged = of_eval(&fit.set, &fit.all, Zeros::Refit, &circumstances);
+    let details = vec![Table::new("some details", &["more"])];
+    let subject = Subject {
+        errors: Some(&fit.all.errors),
+        ..subject(End::Written, &diagnosis)
+    };
     let source = Source {
-        stage: &stage,
-        dataset: &dataset,
-        provenance: provenance(&dataset),
-        findings: &[],
-        warnings: &[],
-        fit: Some((&fit, &report)),
-        end: End::Written,
+        errors: Some(Errors::of_fit(&fit, &dataset, &judged, details)),
+        ..source(&stage, &dataset, subject)
     };
     let page = source.html().expect("a page");
     for part in [
-        "Good</b>: errors in X, Y, Rz of 0.9",
-        "Errors with designed values, Model (15)",
-        "Errors with Model (30)",
-        "Errors with Model (31)",
+        "Limited</b>",
+        "uncertainty, k = 2",
+        "X ±",
+        "movements like those of the log",
+        "on one scale",
         "Displacements by the interferometers",
-        "rms error of each movement",
         "Errors against Rz",
         "Errors against signal C",
         "Amplitude spectral density",
-        "mutation probability p",
-        "Zero deviations, and the ends",
-        "interferometer.y_baseline_m",
-        "Standard errors: sandwich",
+        "some details",
+        "sensitivity at rest over the designed one",
+        "Sensors 2016",
+        "X rms, µm",
         "prefers-color-scheme: dark",
         "table-header-group",
     ] {
         assert!(page.contains(part), "no `{part}`");
     }
-    // Three before and after, three of signals, two by movement, nine quantities, spectrum,
-    // distribution, search.
-    assert_eq!(page.matches("<svg ").count(), 20);
+    // Before and after, nine quantities, spectrum; in the appendix signals and both errors.
+    assert_eq!(page.matches("<svg ").count(), 17);
     for part in [
-        "http:", "https:", "src=", "<script", "@import", "url(", "NaN",
+        "http:", "https:", "src=", "<script", "@import", "url(", "NaN", " um", " urad",
     ] {
         assert!(!page.contains(part), "`{part}`");
     }
     assert!(page.contains("&lt;b&gt;&amp;S") && !page.contains("<b>&"));
     assert!(page.contains("a &lt;log&gt; &amp; more.csv"));
-    // Angles in degrees: the designed ones are zero and within the eight of the ranges.
-    let theta = page.split("<td>theta_b</td><td>").nth(1).expect("theta_b");
-    let value: f64 = (theta.split('<').next().and_then(|v| v.parse().ok())).expect("a number");
-    assert!((0.3..0.6).contains(&value), "{value}");
+    // Angles in mrad: the designed ones are zero and within the 140 of the ranges.
+    let theta = page.split(">theta</td>").nth(1).expect("theta");
+    let value = theta.split('>').nth(5);
+    let value = value.and_then(|cell| cell.split(['(', '<']).next());
+    let value: f64 = value.and_then(|v| v.parse().ok()).expect("a number");
+    assert!((5.0..11.0).contains(&value), "{value}");
     assert!(page.len() < 1_000_000, "{}", page.len());
     assert_eq!(page, source.html().expect("a page"));
 }
@@ -129,33 +140,30 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
 #[test]
 fn the_page_of_a_refused_log_has_its_findings_and_signals_and_does_not_grow_with_the_rows() {
     let stage = stage();
+    let found = |message: &str, cost| Finding::new(Code::ChannelsSwapped, message).costing(cost);
+    let diagnosis = Diagnosis {
+        findings: vec![found("Hall A & B", 3.0), found("Hall C", 7.25)],
+        ..Diagnosis::default()
+    };
     let length = |copies: usize| {
         let dataset = shipped(&stage, copies);
-        let finding = Finding {
-            code: Code::ChannelsSwapped,
-            severity: Severity::Refuse,
-            message: "Hall A & B".to_owned(),
-            channel: None,
-            movement: None,
-            t_us: None,
-            value: None,
-            unit: None,
-        };
         let source = Source {
-            stage: &stage,
-            dataset: &dataset,
-            provenance: provenance(&dataset),
-            findings: &[finding],
-            warnings: &["a line is cut".to_owned()],
-            fit: None,
-            end: End::Failed("it does not fit"),
+            warnings: vec!["a line is cut".to_owned()],
+            ..source(
+                &stage,
+                &dataset,
+                subject(End::Failed("it does not fit"), &diagnosis),
+            )
         };
         let page = source.html().expect("a page");
-        assert!(page.contains("Refused</b>: no parameter blob was written: it does not fit."));
-        assert!(page.contains("<code>channels_swapped</code> Hall A &amp; B"));
-        assert!(page.contains("a line is cut"));
-        // Signals, and errors with the designed values and Model (30).
-        assert_eq!(page.matches("<svg ").count(), 5);
+        assert!(page.contains("Refused</b>: it does not fit"));
+        // One cause, with the cost of the worst.
+        assert_eq!(page.matches("<code>channels_swapped</code>").count(), 1);
+        assert!(page.contains("(2 times): 7.25 times the noise in service"));
+        assert!(page.contains("Hall A &amp; B (cost 3.0)"));
+        assert!(page.contains("a line is cut") && !page.contains("uncertainty, k = 2"));
+        // Signals, and errors with the designed values.
+        assert_eq!(page.matches("<svg ").count(), 4);
         page.len()
     };
     let (short, long) = (length(1), length(8));

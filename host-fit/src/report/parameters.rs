@@ -1,12 +1,15 @@
 //! Parameters by name in JSON.
 
+use crate::input::stage::{Stage, paper_signs};
 use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::problem::parameters::Parameters;
+use crate::problem::terms::shown;
+use crate::report::table::{Table, number, with_error};
 use crate::solve::field::parameters::values_of;
-use crate::solve::field::terms::{self, PER_PROBE};
-use runtime::ParameterSet;
-use runtime::geometry::ProbeCoordinates;
+use crate::solve::field::terms::{self, BEYOND_MODEL_31, PER_PROBE};
+use runtime::{ModelKind, ParameterSet};
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// One parameter.
@@ -22,36 +25,17 @@ pub struct Parameter {
 }
 
 /// The six coordinates nearest to the designed ones: a choice, not a measurement.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Coordinates {
-    /// m.
-    pub h1x_m: f64,
-    /// m.
-    pub h1y_m: f64,
-    /// m.
-    pub h2x_m: f64,
-    /// m.
-    pub h2y_m: f64,
-    /// m.
-    pub h3x_m: f64,
-    /// m.
-    pub h3y_m: f64,
-    /// What they are.
-    pub note: &'static str,
-}
-
-impl From<ProbeCoordinates<f64>> for Coordinates {
-    fn from(h: ProbeCoordinates<f64>) -> Self {
-        Self {
-            h1x_m: h.h1x_m,
-            h1y_m: h.h1y_m,
-            h2x_m: h.h2x_m,
-            h2y_m: h.h2y_m,
-            h3x_m: h.h3x_m,
-            h3y_m: h.h3y_m,
-            note: "smallest change from the designed values that gives the lever arms; data cannot tell the two coordinates of a probe apart",
-        }
-    }
+pub fn coordinates(places_m: [[f64; 2]; 3]) -> Value {
+    let [[h1x_m, h1y_m], [h2x_m, h2y_m], [h3x_m, h3y_m]] = paper_signs(places_m);
+    json!({
+        "h1x_m": h1x_m,
+        "h1y_m": h1y_m,
+        "h2x_m": h2x_m,
+        "h2y_m": h2y_m,
+        "h3x_m": h3x_m,
+        "h3y_m": h3y_m,
+        "note": "smallest change from the designed values that gives the lever arms; data cannot tell the two coordinates of a probe apart",
+    })
 }
 
 /// The parameters of a model by name, with their standard errors where they are known.
@@ -98,4 +82,112 @@ pub fn parameters_in(set: &ParameterSet) -> BTreeMap<String, Parameter> {
             &[None; COUNT],
         ),
     }
+}
+
+/// A table with a row for each of these terms, and with these columns for each probe. `cells` gives
+/// them for a parameter by its name and the factor from SI to the unit of the row, as
+/// misalignments are in mrad; a term that it gives none for is left out.
+pub fn by_probe<'c>(
+    title: &str,
+    terms: std::ops::Range<usize>,
+    columns: &[&'c str],
+    cells: impl Fn(&str, f64) -> Option<Vec<String>>,
+) -> Table {
+    let of_probe = |probe: &'static str| {
+        let title = |column: &&'c str| if column.is_empty() { probe } else { *column };
+        columns.iter().map(title).collect::<Vec<_>>()
+    };
+    let titles = ["A", "B", "C"].into_iter().flat_map(of_probe);
+    let titles: Vec<&str> = titles.chain(["unit"]).collect();
+    let mut table = Table::new(title, &titles);
+    for term in terms {
+        let (scale, unit) = shown(1.0, terms::TERMS[term].unit);
+        let probes = [0, 1, 2].map(|probe| cells(&terms::name(probe * PER_PROBE + term), scale));
+        if let [Some(a), Some(b), Some(c)] = probes {
+            table.row(
+                terms::TERMS[term].name,
+                [a, b, c, vec![unit.to_owned()]].concat(),
+            );
+        }
+    }
+    table
+}
+
+/// Parameters with their standard errors in the last digits: those of Model (31), beside values of the
+/// same names if there are any, and those beyond it.
+pub fn tables(
+    parameters: &BTreeMap<String, Parameter>,
+    beside: &[(&str, BTreeMap<String, f64>)],
+) -> Vec<Table> {
+    let value = |name: &str, scale: f64| {
+        let p = parameters.get(name)?;
+        Some(with_error(
+            p.value * scale,
+            p.standard_error.map(|error| error * scale),
+        ))
+    };
+    let columns: Vec<&str> = [""]
+        .into_iter()
+        .chain(beside.iter().map(|(title, _)| *title))
+        .collect();
+    let of_31 = by_probe("parameters", 0..BEYOND_MODEL_31, &columns, |name, scale| {
+        let beside = beside.iter().map(|(_, values)| {
+            values
+                .get(name)
+                .map_or("-".to_owned(), |x| number(x * scale, ""))
+        });
+        Some(std::iter::once(value(name, scale)?).chain(beside).collect())
+    });
+    let beyond = by_probe(
+        "field terms",
+        BEYOND_MODEL_31..PER_PROBE,
+        &[""],
+        |name, scale| Some(vec![value(name, scale)?]),
+    );
+    [of_31, beyond]
+        .into_iter()
+        .filter(|table| !table.rows.is_empty())
+        .collect()
+}
+
+/// What a term means, in a line.
+pub fn meaning(name: &str) -> String {
+    let meaning = match name {
+        "lever_arm" => {
+            "distance of the line along which the probe senses from the centre of the stage"
+        }
+        "theta" => "angle between that line and its designed direction",
+        "eta" => "sensitivity at rest over the designed one",
+        "a" => "change of the sensitivity with height Z",
+        "b" => "change of the sensitivity with tilt Rx",
+        "c" => "change of the sensitivity with tilt Ry",
+        "e_z" => "how far height Z carries the probe sideways",
+        "e_rx" => "how far tilt Rx carries the probe sideways",
+        "e_ry" => "how far tilt Ry carries the probe sideways",
+        // u, w and z with their powers.
+        _ => {
+            return format!(
+                "shape of the field: the part that goes with {}",
+                powers(name)
+            );
+        }
+    };
+    meaning.to_owned()
+}
+
+/// `uw2` as u w².
+fn powers(name: &str) -> String {
+    let sign = |c: char| match c {
+        '2' => "²".to_owned(),
+        '3' => "³".to_owned(),
+        letter => format!(" {letter}"),
+    };
+    name.chars().map(sign).collect::<String>().trim().to_owned()
+}
+
+/// The designed values by name, SI.
+pub fn designed(stage: &Stage) -> BTreeMap<String, f64> {
+    let values = Parameters::designed(stage).values;
+    let ids = Model::of(ModelKind::M31).parameters();
+    ids.map(|id| (id.name(), values[id.index])).collect()
 }

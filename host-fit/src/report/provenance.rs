@@ -1,48 +1,37 @@
 //! Where the figures of a report come from: command, versions, inputs, seed.
 
-use crate::input::dataset::{Dataset, Movement};
-use serde::Serialize;
+use super::table::{Table, file_name};
+use crate::input::dataset::Dataset;
 use sha2::{Digest, Sha256};
+use std::ffi::{OsStr, OsString};
 use std::fmt::Write;
 use std::path::Path;
 
-/// What somebody needs to make the same calibration again.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Provenance {
-    /// The command as it was given.
-    pub command: String,
-    /// Name and version of the program.
-    pub program: String,
-    /// Serial number of the stage, as given.
-    pub serial: String,
-    /// Creation time, as given.
-    pub created: String,
-    /// The files that were read.
-    pub inputs: Vec<Input>,
-    /// Seed of everything random.
-    pub seed: u64,
-}
-
-/// One file that was read.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Input {
-    /// Its name, as given.
-    pub name: String,
-    /// What it is.
-    pub what: String,
-    /// SHA-256 in hexadecimal digits: of a log without compression.
-    pub sha256: String,
-}
+/// What somebody needs to make the same calibration again: a table of name, what it is, and for files
+/// their SHA-256.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Provenance(pub Table);
 
 impl Provenance {
-    /// Of a run of this program with these arguments, the name of the program first.
-    pub fn new(arguments: impl Iterator<Item = String>) -> Self {
-        let words: Vec<String> = arguments.skip(1).map(|word| quoted(&word)).collect();
-        Self {
-            command: format!("{} {}", env!("CARGO_PKG_NAME"), words.join(" ")),
-            program: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
-            ..Self::default()
-        }
+    /// Of a run of this program with these arguments, the name of the program first; no absolute path.
+    pub fn new(arguments: impl Iterator<Item = OsString>) -> Self {
+        let words = arguments.skip(1);
+        let words: Vec<String> = words.map(|word| quoted(&without_folder(&word))).collect();
+        let mut provenance = Self::default();
+        let program = env!("CARGO_PKG_NAME");
+        let version = env!("CARGO_PKG_VERSION");
+        provenance.add("command", format!("{program} {}", words.join(" ")), "");
+        provenance.add("program", format!("{program} {version}"), "");
+        provenance
+    }
+
+    /// Adds a row: of a file its SHA-256 in hexadecimal digits too, of a log without compression.
+    fn add(&mut self, name: impl Into<String>, what: String, sha256: &str) {
+        let what = match sha256 {
+            "" => what,
+            hash => format!("{what}, SHA-256 {hash}"),
+        };
+        self.0.row(name, [what]);
     }
 
     /// Adds a file by its bytes; nothing where it cannot be read any more.
@@ -54,50 +43,44 @@ impl Provenance {
 
     /// Adds a file with these bytes.
     pub fn add_bytes(&mut self, path: &Path, bytes: &[u8], what: &str) {
-        self.inputs.push(Input {
-            name: path.display().to_string(),
-            what: what.to_owned(),
-            sha256: hex(&Sha256::digest(bytes)),
-        });
+        let hash = hex(&Sha256::digest(bytes));
+        self.add(file_name(path), what.to_owned(), &hash);
     }
 
     /// Adds the logs. They have one hash, which the blob holds too.
     pub fn add_logs(&mut self, dataset: &Dataset) {
         let hash = hex(&dataset.sha256);
         for (k, log) in dataset.logs.iter().enumerate() {
-            let count = |movements: &[Movement]| {
-                let of_log = movements.iter().filter(|m| m.log == k);
-                of_log.fold((0, 0), |(rows, n), m| (rows + m.rows.len(), n + 1))
-            };
-            let here = count(&dataset.movements);
-            let (rows, movements) = match &dataset.whole {
-                Some(whole) => count(whole.movements()),
-                None => here,
-            };
-            let movements = match movements {
+            let movements = match log.movements_read {
                 1 => "one movement".to_owned(),
                 several => format!("{several} movements"),
             };
-            let drawn = match (&dataset.whole, here) {
-                (Some(_), (rows, runs)) => format!("; {rows} of them, in {runs} runs, are drawn"),
-                (None, _) => String::new(),
+            let (rows, drawn) = (log.rows_read, log.rows.len());
+            let runs = dataset.movements.iter().filter(|m| m.log == k).count();
+            let drawn = match drawn < rows {
+                true => format!("; {drawn} of them, in {runs} runs, are drawn"),
+                false => String::new(),
             };
-            self.inputs.push(Input {
-                name: log.path.display().to_string(),
-                what: format!("log, {rows} rows in {movements}{drawn}"),
-                sha256: match dataset.logs.len() {
-                    1 => hash.clone(),
-                    _ => String::new(),
-                },
-            });
+            let hash = if dataset.logs.len() == 1 {
+                hash.as_str()
+            } else {
+                ""
+            };
+            let what = format!("log, {rows} rows in {movements}{drawn}");
+            self.add(file_name(&log.path), what, hash);
         }
         if dataset.logs.len() > 1 {
-            self.inputs.push(Input {
-                name: "all logs".to_owned(),
-                what: "one after the other".to_owned(),
-                sha256: hash,
-            });
+            self.add("all logs", "one after the other".to_owned(), &hash);
         }
+    }
+}
+
+/// A word of a command line, of an absolute path the name alone: a report is mailed.
+fn without_folder(word: &OsStr) -> String {
+    let path = Path::new(word);
+    match path.is_absolute() {
+        true => file_name(path),
+        false => word.to_string_lossy().into_owned(),
     }
 }
 
@@ -123,21 +106,44 @@ pub fn hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::log::{ReadOptions, read_bytes};
+    use crate::input::shipped::{LOG_GZ, STAGE_TOML};
+    use crate::input::stage::Stage;
 
     #[test]
     fn the_command_can_be_given_again_as_it_stands() {
         let words = [
             "/usr/bin/host-fit",
             "fit",
-            "my log.csv",
+            "/home/me/my log.csv",
             "--serial",
             "it's",
             "",
         ];
-        let provenance = Provenance::new(words.into_iter().map(str::to_owned));
+        let Provenance(table) = Provenance::new(words.into_iter().map(OsString::from));
         assert_eq!(
-            provenance.command,
-            r"host-fit fit 'my log.csv' --serial 'it'\''s' ''"
+            table.rows[0],
+            [
+                "command",
+                r"host-fit fit 'my log.csv' --serial 'it'\''s' ''"
+            ]
         );
+    }
+
+    #[test]
+    fn a_report_says_how_much_of_a_long_log_is_drawn() {
+        let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+        let options = ReadOptions {
+            rows_max: Some(50_000),
+            ..ReadOptions::FIT
+        };
+        let reading = read_bytes(LOG_GZ, "log".as_ref(), &stage, &options).expect("sound");
+        let sample = reading.dataset;
+        let mut provenance = Provenance::default();
+        provenance.add_logs(&sample);
+        let (rows, runs) = (sample.rows.len(), sample.movements.len());
+        let want =
+            format!("log, 57000 rows in 57 movements; {rows} of them, in {runs} runs, are drawn");
+        assert!(provenance.0.rows[0][1].starts_with(&want));
     }
 }

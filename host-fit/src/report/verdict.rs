@@ -1,22 +1,11 @@
-//! The verdict of a report: one sentence that says whether the calibration can be used.
+//! What a person reads first: whether the calibration can be used, its errors by axis, what to do next.
 
-use super::errors::Errors;
-use super::field::PosePrediction;
-use super::json::Report;
-use crate::diagnose::finding::{Finding, Severity};
-use crate::diagnose::of_fit::ERROR_TO_NOISE_MAX;
+use super::table::{Table, as_text};
+use crate::diagnose::Diagnosis;
+use crate::finding::Severity;
+use crate::judge::statistics::PoseError;
+use crate::judge::verdict::{LIMITED_MAX, Predicted, Verdict};
 use serde::Serialize;
-
-/// What the reader is told first.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Verdict {
-    /// How the page marks it: `good`, `warn` or `refuse`.
-    pub mark: &'static str,
-    /// The word for it.
-    pub word: String,
-    /// What follows the word: what was refused and why, or how large the errors are.
-    pub sentence: String,
-}
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,117 +14,304 @@ pub enum End<'a> {
     Written,
     /// With the best so far in the blob; the log was not diagnosed.
     Interrupted,
-    /// Without a blob, for this reason.
+    /// Without a blob, or with errors beyond the limit, for this reason.
     Failed(&'a str),
+    /// A blob was judged on the log.
+    Judged,
+    /// The log was looked at, and nothing was kept.
+    Checked,
 }
 
-/// X and Y in um, Rz in urad.
-fn three([x, y, rz]: [f64; 3]) -> String {
-    format!("{x:.2} um, {y:.2} um, {rz:.2} urad")
+/// What is judged.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    /// How the run ended.
+    pub end: End<'a>,
+    /// What is wrong with the log, and what is predicted.
+    pub diagnosis: &'a Diagnosis,
+    /// Whether the model is the field model, which is made for service.
+    pub is_field: bool,
+    /// Errors over all rows, if there is a fit or a blob.
+    pub errors: Option<&'a PoseError>,
+    /// Largest rms errors of X, Y, Rz: m, m, rad.
+    pub limits: [Option<f64>; 3],
 }
 
-/// How large the errors are, beside what noise gives, and what is predicted for service.
-fn accuracy(report: &Report, noise: [f64; 3]) -> String {
-    let Errors { x, y, rz } = report.errors;
-    let mut words = format!(
-        "errors in X, Y, Rz of {} rms over all {} rows (peaks {}); noise from row to row {}",
-        three([x.rmse_um, y.rmse_um, rz.rmse_urad]),
-        report.rows,
-        three([x.peak_um, y.peak_um, rz.peak_urad]),
-        three(noise.map(|noise| noise * 1e6)),
-    );
-    if let Some(field) = &report.field {
-        let add = |p: &PosePrediction| {
-            let by = p.systematic;
-            format!("{} ({})", three([by.x_um, by.y_um, by.rz_urad]), p.place)
+/// Verdict, errors by axis, and what to do.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Summary {
+    /// How the page marks it: `good`, `limited` or `refused`.
+    pub mark: &'static str,
+    /// The verdict.
+    pub word: &'static str,
+    /// What it means.
+    pub sentence: String,
+    /// A row for each axis.
+    pub axes: Table,
+    /// What to do next; empty if nothing.
+    pub next: String,
+}
+
+impl Summary {
+    /// Of a run.
+    pub fn new(of: &Subject) -> Self {
+        let predicted = of.diagnosis.predicted.as_ref();
+        let verdict = of.diagnosis.verdict;
+        let (mark, word) = match (of.end, verdict) {
+            (End::Failed(_), _) => ("refused", "Refused"),
+            (End::Interrupted, _) => ("limited", "Interrupted, the best so far"),
+            (End::Written, Some(Verdict::Refused)) => ("refused", "Written in spite of a refusal"),
+            (_, Some(Verdict::Refused)) => ("refused", "Refused"),
+            (_, Some(Verdict::Limited)) => ("limited", "Limited"),
+            (_, Some(Verdict::Good)) => ("good", "Good"),
+            (_, None) => ("limited", "Within the limit on this log"),
         };
-        let all: Vec<String> = field.pose_uncertainty.iter().map(add).collect();
-        words += &format!(
-            "; standard deviation that the parameters add to a pose {}",
-            all.join(", ")
-        );
-    }
-    words + "."
-}
-
-impl Verdict {
-    /// Of a run; of its fit the figures, and the noise of its errors from row to row (m, m, rad).
-    pub fn new(end: End, findings: &[Finding], fit: Option<(&Report, [f64; 3])>) -> Self {
-        let of = |severity| findings.iter().filter(|f| f.severity == severity).count();
-        let sentence = fit.map(|(report, noise)| accuracy(report, noise));
-        let verdict = |mark, word: &str| Self {
+        Self {
             mark,
-            word: word.to_owned(),
-            sentence: sentence.unwrap_or_default(),
-        };
-        match (end, of(Severity::Refuse), of(Severity::Warn)) {
-            (End::Failed(why), ..) => Self {
-                mark: "refuse",
-                word: "Refused".to_owned(),
-                sentence: format!("no parameter blob was written: {why}."),
-            },
-            (End::Interrupted, ..) => verdict("warn", "Interrupted, the best so far"),
-            (End::Written, 1.., _) => verdict("refuse", "Written in spite of a refusal"),
-            (End::Written, 0, 0) => verdict("good", "Good"),
-            (End::Written, 0, n) => {
-                // A wrong log may still give a good fit, which the errors show.
-                let beyond = |(report, noise): (&Report, [f64; 3])| {
-                    let Errors { x, y, rz } = report.errors;
-                    let rms = [x.rmse_um, y.rmse_um, rz.rmse_urad];
-                    (0..3).any(|axis| rms[axis] > ERROR_TO_NOISE_MAX * noise[axis] * 1e6)
-                };
-                let word = if fit.is_some_and(beyond) {
-                    "Doubtful"
-                } else {
-                    "Good"
-                };
-                let warnings = if n == 1 {
-                    "a warning".to_owned()
-                } else {
-                    format!("{n} warnings")
-                };
-                verdict("warn", &format!("{word}, with {warnings}"))
-            }
+            word,
+            sentence: sentence(of, predicted),
+            axes: axes(of, predicted),
+            next: next(of, verdict),
         }
     }
+
+    /// The summary on a terminal: a line, the table, a line.
+    pub fn as_text(&self) -> String {
+        // Of a refusal the error that ends the command says the reason.
+        let sentence = match self.word {
+            "Refused" => String::new(),
+            _ => format!(": {}", self.sentence),
+        };
+        let next = match self.next.as_str() {
+            "" => String::new(),
+            next => format!("next: {next}\n"),
+        };
+        let axes = match self.axes.rows.is_empty() {
+            true => String::new(),
+            false => as_text(std::slice::from_ref(&self.axes)),
+        };
+        format!("{}{sentence}\n{axes}{next}", self.word)
+    }
+}
+
+/// What the verdict means.
+fn sentence(of: &Subject, predicted: Option<&Predicted>) -> String {
+    match (of.end, predicted) {
+        (End::Failed(why), _) => why.to_owned(),
+        (_, Some(predicted)) if of.is_field => {
+            let ratio = predicted.worst_ratio();
+            format!("errors in service of {ratio:.2} times the noise of the sensors")
+        }
+        (_, Some(predicted)) => {
+            let [x, y, rz] = predicted.range.map(|ends| ends.map(|end| end * 1e6));
+            let range = |[low, high]: [f64; 2]| match high > 1.05 * low {
+                true => format!("{low:.1} to {high:.1}"),
+                false => format!("{high:.1}"),
+            };
+            format!(
+                "for movements like those of the log; in service expect {} um in X, {} um in Y, {} urad in Rz",
+                range(x),
+                range(y),
+                range(rz)
+            )
+        }
+        (_, None) => "the log does not show the errors in service".to_owned(),
+    }
+}
+
+/// rms over all rows, noise, what is predicted for service, expanded uncertainty, limit. The uncertainty is
+/// that in service if it is predicted, else that on the log; k = 2 covers 95 % of normal errors.
+fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
+    let titles = [
+        "rms on the log",
+        "noise",
+        "rms in service",
+        "uncertainty, k = 2",
+        "limit",
+        "pass",
+        "unit",
+    ];
+    let mut table = Table::new("", &titles);
+    if of.errors.is_none() && predicted.is_none() {
+        return Table::default();
+    }
+    for (axis, (name, unit)) in [("X", "um"), ("Y", "um"), ("Rz", "urad")]
+        .into_iter()
+        .enumerate()
+    {
+        let rms = of.errors.map(|errors| errors.axes[axis].rms);
+        let service = predicted.map(|predicted| predicted.rms[axis]);
+        let noise = predicted.map(|predicted| predicted.rms[axis] / predicted.ratio[axis]);
+        let own = noise
+            .filter(|_| of.is_field)
+            .map(|noise| LIMITED_MAX * noise);
+        // What --limit asks for holds on the log, what follows from the noise in service.
+        let (limit, measured) = match of.limits[axis] {
+            Some(limit) => (Some(limit), rms),
+            None => (own, service),
+        };
+        let passes = limit.zip(measured).map(|(limit, rms)| rms <= limit);
+        let micro = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{:.2}", x * 1e6));
+        let uncertainty = service.or(rms).map(|rms| 2.0 * rms);
+        let pass = match passes {
+            None => "-",
+            Some(true) => "yes",
+            Some(false) => "no",
+        };
+        let cells = [rms, noise, service, uncertainty, limit].map(micro);
+        table.row(
+            name,
+            cells.into_iter().chain([pass, unit].map(str::to_owned)),
+        );
+    }
+    table
+}
+
+/// What to do next.
+fn next(of: &Subject, verdict: Option<Verdict>) -> String {
+    let findings = &of.diagnosis.findings;
+    let remedy = |least: Severity| {
+        let worst = findings.iter().find(|found| found.severity >= least);
+        worst.map(|found| found.code.entry().remedy.to_owned())
+    };
+    let usual = match of.end {
+        End::Written => "judge it on another log with host-fit eval",
+        End::Checked => "host-fit fit",
+        _ => "",
+    };
+    match (of.end, verdict) {
+        (End::Failed(_), _) | (_, Some(Verdict::Refused)) => remedy(Severity::Refuse),
+        (_, Some(Verdict::Limited)) if of.is_field => remedy(Severity::Warn),
+        (_, Some(Verdict::Limited)) => {
+            Some("for service record all six axes moving at once: host-fit plan".to_owned())
+        }
+        _ => None,
+    }
+    .unwrap_or_else(|| usual.to_owned())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::finding::Code;
+    use crate::finding::{Code, Finding};
+    use crate::judge::statistics::AxisError;
+
+    const PREDICTED: Predicted = Predicted {
+        rms: [1.2e-6, 0.5e-6, 2.4e-6],
+        ratio: [1.2, 1.0, 1.0],
+        range: [[1e-6, 3e-6], [0.4e-6, 0.6e-6], [2e-6, 3e-6]],
+    };
+
+    fn summary(end: End, verdict: Option<Verdict>, is_field: bool) -> Summary {
+        let axis = AxisError {
+            rms: 1e-6,
+            ..AxisError::default()
+        };
+        let errors = PoseError {
+            axes: [axis; 3],
+            rows: 1,
+        };
+        let diagnosis = Diagnosis {
+            findings: vec![Finding::new(Code::Hum, "")],
+            verdict,
+            predicted: Some(PREDICTED),
+            repair: None,
+        };
+        Summary::new(&Subject {
+            end,
+            diagnosis: &diagnosis,
+            is_field,
+            errors: Some(&errors),
+            limits: [None, Some(0.9e-6), None],
+        })
+    }
 
     #[test]
-    fn a_failure_or_the_gravest_finding_decides() {
-        let finding = |severity| Finding {
-            code: Code::Hum,
-            severity,
-            message: String::new(),
-            channel: None,
-            movement: None,
-            t_us: None,
-            value: None,
-            unit: None,
+    fn the_end_of_the_run_and_the_verdict_decide_what_is_said_first() {
+        use Verdict::{Good, Limited, Refused};
+        for (end, verdict, is_field, mark, sentence, next) in [
+            (
+                End::Written,
+                Some(Good),
+                true,
+                "good",
+                "1.20 times",
+                "host-fit eval",
+            ),
+            (
+                End::Checked,
+                Some(Good),
+                true,
+                "good",
+                "1.20 times",
+                "host-fit fit",
+            ),
+            (
+                End::Written,
+                Some(Limited),
+                true,
+                "limited",
+                "1.20 times",
+                "look for mains",
+            ),
+            (
+                End::Written,
+                Some(Limited),
+                false,
+                "limited",
+                "1.0 to 3.0 um in X",
+                "host-fit plan",
+            ),
+            (
+                End::Written,
+                Some(Refused),
+                true,
+                "refused",
+                "1.20 times",
+                "host-fit eval",
+            ),
+            (
+                End::Failed("no motion"),
+                Some(Good),
+                true,
+                "refused",
+                "no motion",
+                "",
+            ),
+            (
+                End::Interrupted,
+                Some(Good),
+                true,
+                "limited",
+                "1.20 times",
+                "",
+            ),
+            (End::Judged, None, true, "limited", "1.20 times", ""),
+        ] {
+            let found = summary(end, verdict, is_field);
+            assert_eq!(found.mark, mark, "{end:?} {verdict:?}");
+            assert!(found.sentence.contains(sentence), "{found:?}");
+            assert!(found.next.contains(next), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_limit_holds_on_the_log_and_that_of_the_noise_in_service() {
+        let text = summary(End::Written, Some(Verdict::Good), true).as_text();
+        let row = |axis: &str| {
+            let line = text
+                .lines()
+                .find(|line| line.starts_with(axis))
+                .expect("a row");
+            line.split_whitespace()
+                .skip(1)
+                .collect::<Vec<_>>()
+                .join(" ")
         };
-        let (note, warn, refuse) = (
-            finding(Severity::Note),
-            finding(Severity::Warn),
-            finding(Severity::Refuse),
-        );
-        let verdict = |findings: &[Finding]| {
-            let verdict = Verdict::new(End::Written, findings, None);
-            (verdict.mark, verdict.word)
-        };
-        assert_eq!(
-            verdict(std::slice::from_ref(&note)),
-            ("good", "Good".to_owned())
-        );
-        let one = verdict(&[warn.clone(), note]);
-        assert_eq!(one, ("warn", "Good, with a warning".to_owned()));
-        assert_eq!(verdict(&[warn.clone(), warn]).1, "Good, with 2 warnings");
-        // What is written all the same is not good.
-        assert_eq!(verdict(&[refuse]).0, "refuse");
-        let failed = Verdict::new(End::Failed("no motion in X"), &[], None);
-        assert!(failed.word == "Refused" && failed.sentence.contains("no motion in X"));
+        // rms, noise, in service, k = 2, limit.
+        assert_eq!(row("  X "), "1.00 1.00 1.20 2.40 1.30 yes um");
+        assert_eq!(row("  Y "), "1.00 0.50 0.50 1.00 0.90 no um");
+        assert_eq!(row("  Rz"), "1.00 2.40 2.40 4.80 3.12 yes urad");
+        assert!(text.ends_with("next: judge it on another log with host-fit eval\n"));
     }
 }

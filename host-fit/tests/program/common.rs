@@ -1,7 +1,10 @@
 //! Runs the program in a folder of its own, on logs made from the one that ships with it.
 
+use serde_json::Value;
+use std::f64::consts::TAU;
+use std::fmt::Write;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Output};
 
 /// A folder with `stage.toml` in it.
@@ -15,6 +18,13 @@ impl Bench {
             folder: tempfile::tempdir().expect("a folder"),
         };
         bench.write("stage.toml", host_fit::input::shipped::STAGE_TOML);
+        bench
+    }
+
+    /// With every twentieth row of the shipped log in `log.csv`.
+    pub fn with_log() -> Self {
+        let bench = Self::new();
+        bench.write("log.csv", log());
         bench
     }
 
@@ -36,7 +46,7 @@ impl Bench {
         String::from_utf8(self.read(name)).expect("text")
     }
 
-    pub fn json(&self, name: &str) -> serde_json::Value {
+    pub fn json(&self, name: &str) -> Value {
         serde_json::from_slice(&self.read(name)).expect("JSON")
     }
 
@@ -53,6 +63,8 @@ impl Bench {
     /// The program with its arguments, not yet started.
     pub fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_host-fit"));
+        // Units without signs, whatever the language of the machine.
+        command.env("LC_ALL", "C");
         command.args(arguments).current_dir(self.folder.path());
         command
     }
@@ -83,6 +95,21 @@ impl Bench {
         assert!(!message.contains("panicked"), "{message}");
     }
 
+    /// Whether a file or folder has this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.path(name).exists()
+    }
+
+    /// rms of X, Y, Rz of a blob over a log, zero deviations refitted, um, um, urad.
+    pub fn rms(&self, blob: &str, log: &str) -> [f64; 3] {
+        self.good(&format!(
+            "eval {blob} {log} --stage stage.toml --limit 100 --json eval.json"
+        ));
+        let errors = &self.json("eval.json")["errors"];
+        [("x", "rmse_um"), ("y", "rmse_um"), ("rz", "rmse_urad")]
+            .map(|(axis, rms)| number(&errors[axis][rms]))
+    }
+
     /// Whether nothing but the named files is in the folder.
     pub fn holds_only(&self, names: &[&str]) -> bool {
         let entries = std::fs::read_dir(self.folder.path()).expect("listed");
@@ -101,13 +128,45 @@ pub fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
+pub fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+pub fn unzipped(log: &[u8]) -> String {
+    let mut text = String::new();
+    let mut reader = flate2::read::GzDecoder::new(log);
+    reader.read_to_string(&mut text).expect("a shipped log");
+    text
+}
+
 /// The shipped log as text.
 pub fn shipped_log() -> String {
-    let mut text = String::new();
-    flate2::read::GzDecoder::new(host_fit::input::shipped::LOG_GZ)
-        .read_to_string(&mut text)
-        .expect("the shipped log");
-    text
+    unzipped(host_fit::input::shipped::LOG_GZ)
+}
+
+/// Every twentieth row of it.
+pub fn log() -> String {
+    thinned_log(20, |_| true)
+}
+
+/// A run of so many cycles of each axis over the range of service; an axis of none stands still.
+pub fn plan(seconds: f64, cycles: [f64; 6]) -> String {
+    const AMPLITUDES: [f64; 6] = [500.0, 800.0, 500.0, 240.0, 480.0, 480.0];
+    let mut csv = "t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad\n".to_owned();
+    let rows = (seconds * 500.0) as u32;
+    for row in 0..rows {
+        let t_s = f64::from(row) * 0.002;
+        let end = (t_s.min(seconds - t_s) / 0.5).clamp(0.0, 1.0);
+        let taper = end * end * (3.0 - 2.0 * end);
+        let _ = write!(csv, "{}", row * 2000);
+        for (axis, amplitude) in AMPLITUDES.into_iter().enumerate() {
+            let moves = if cycles[axis] > 0.0 { amplitude } else { 0.0 };
+            let phase = TAU * cycles[axis] * t_s / seconds + 1.7 * axis as f64;
+            let _ = write!(csv, ",{:.4}", moves * taper * phase.sin());
+        }
+        csv.push('\n');
+    }
+    csv
 }
 
 /// The shipped log with every `stride`-th row of each movement and only the movements wanted.
@@ -140,9 +199,4 @@ pub fn with_cell(log: &str, row: usize, column: &str, value: &str) -> String {
     cells[index] = value;
     lines[row + 1] = cells.join(",");
     lines.join("\n") + "\n"
-}
-
-/// Whether a path exists.
-pub fn exists(path: &Path) -> bool {
-    path.exists()
 }

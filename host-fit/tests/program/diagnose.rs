@@ -1,6 +1,6 @@
 //! What the program says of logs with mistakes that labs make, and that it writes no blob of them.
 
-use crate::common::{Bench, stderr, stdout, thinned_log};
+use crate::common::{Bench, number, stderr, thinned_log};
 use host_fit::input::shipped::STAGE_TOML;
 
 /// Every fiftieth row of the shipped log.
@@ -130,12 +130,12 @@ fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
     ] {
         let fit = format!("fit {log} --stage stage.toml --out p.bin --json p.json");
         bench.bad(&fit, 4, &[words]);
-        assert!(!bench.path("p.bin").exists());
+        assert!(!bench.has("p.bin"));
         assert_eq!(bench.json("p.json")["findings"][0]["code"], code);
         let output = bench.good(&format!("{fit} --force"));
         assert!(stderr(&output).contains("written all the same, as --force asks"));
         let told = bench.good("inspect p.bin --json i.json");
-        assert!(stdout(&told).contains("FORCED"));
+        assert!(stderr(&told).contains("(--force)"));
         assert_eq!(bench.json("i.json")["fit"]["forced"], true);
         std::fs::remove_file(bench.path("p.bin")).expect("removed");
     }
@@ -199,17 +199,14 @@ fn wrong_scales_are_named_and_refused() {
 }
 
 #[test]
-fn resets_far_from_zero_are_named_and_not_called_signs() {
+fn resets_far_from_zero_are_a_warning_and_not_called_signs() {
     let bench = Bench::new();
     let off = changed(&log(), &BEAMS, |movement, nm| nm + movement % 2 * 50_000);
     bench.write("log.csv", off);
     let output = bench.run("fit log.csv --stage stage.toml --out p.bin");
     let message = stderr(&output);
-    assert_eq!(output.status.code(), Some(4), "{message}");
-    for part in [
-        "of 57 movements (1, 3, 5, 7, 9, ...)",
-        "widen search.delta_m in stage.toml to [-60e-6, 60e-6]",
-    ] {
+    assert_eq!(output.status.code(), Some(0), "{message}");
+    for part in ["of 57 movements", "widen search.delta_m in stage.toml"] {
         assert!(message.contains(part), "{message}");
     }
     assert!(!message.contains("signs of the sensors"), "{message}");
@@ -229,10 +226,7 @@ fn a_log_of_another_gain_is_told_from_the_first() {
         "second.csv",
         changed(&log, &halls, |_, code| (code * 103 + 50).div_euclid(100)),
     );
-    let parts = [
-        "second.csv fits to",
-        "in second.csv differs by +3.0, +3.0, +3.0 %",
-    ];
+    let parts = ["all Hall probes", "in second.csv differs by +"];
     bench.bad(
         "fit first.csv second.csv --stage stage.toml --out p.bin",
         4,
@@ -245,7 +239,7 @@ fn a_log_of_another_gain_is_told_from_the_first() {
     assert_eq!(logs.len(), 2);
     for (log, name) in logs.iter().zip(["first.csv", "second.csv"]) {
         assert_eq!(log["path"], name);
-        let x_um = log["errors"]["x"]["rmse_um"].as_f64().expect("a number");
+        let x_um = number(&log["errors"]["x"]["rmse_um"]);
         assert!((1.0..10.0).contains(&x_um), "{x_um}");
     }
 }
@@ -351,7 +345,7 @@ fn an_error_of_a_trusted_input_is_not_seen_and_costs_what_is_told() {
             match cost {
                 // The range is the log's and a tenth more.
                 Some(cost) => {
-                    let told = cost["value"].as_f64().expect("a number");
+                    let told = number(&cost["value"]);
                     assert!(
                         (1.05..1.2).contains(&(told / off)),
                         "{place} {axis}: {told} {off}"

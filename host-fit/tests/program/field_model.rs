@@ -1,33 +1,14 @@
 //! The field model from the log to the pose file, on a stage made of physics.
 
-use crate::common::{Bench, stderr, stdout, thinned_log};
+use crate::common::{Bench, log, number, plan, stderr, stdout};
 use serde_json::Value;
-use std::f64::consts::TAU;
 use std::fmt::Write;
-
-/// A run of 8 s, all six axes at once over the range of service, with these periods.
-fn plan(cycles: [f64; 6]) -> String {
-    const AMPLITUDES: [f64; 6] = [500.0, 800.0, 500.0, 240.0, 480.0, 480.0];
-    let mut csv = "t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad\n".to_owned();
-    for row in 0..4000 {
-        let t_s = f64::from(row) * 0.002;
-        let end = (t_s.min(8.0 - t_s) / 0.5).clamp(0.0, 1.0);
-        let taper = end * end * (3.0 - 2.0 * end);
-        let _ = write!(csv, "{}", row * 2000);
-        for (axis, amplitude) in AMPLITUDES.into_iter().enumerate() {
-            let phase = TAU * cycles[axis] * t_s / 8.0 + 1.7 * axis as f64;
-            let _ = write!(csv, ",{:.4}", amplitude * taper * phase.sin());
-        }
-        csv.push('\n');
-    }
-    csv
-}
 
 /// A folder with the log of a run, and another run of the same stage as its service.
 fn bench() -> Bench {
     let bench = Bench::new();
-    bench.write("run.csv", plan([5.0, 8.0, 7.0, 6.0, 4.0, 7.5]));
-    bench.write("other.csv", plan([7.0, 5.0, 4.0, 8.0, 6.0, 3.0]));
+    bench.write("run.csv", plan(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5]));
+    bench.write("other.csv", plan(8.0, [7.0, 5.0, 4.0, 8.0, 6.0, 3.0]));
     bench.good("simulate --stage stage.toml --plan run.csv --seed 3 --out log.csv");
     bench.good(
         "simulate --stage stage.toml --plan other.csv --seed 3 --out service.csv --truth truth.csv",
@@ -81,29 +62,29 @@ fn log_of_truth(bench: &Bench) -> String {
 fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
     let bench = bench();
     let fitted = bench.good(
-        "fit log.csv --stage stage.toml --out p.bin --model field --serial HS-3 --json p.json --report report",
+        "fit log.csv --stage stage.toml --out p.bin --model field --serial HS-3 --json p.json --report report -v",
     );
-    assert!(stdout(&fitted).contains("lag of the reference"));
+    assert!(stdout(&fitted).contains("reference lag"));
     let json = bench.json("p.json");
     assert_eq!(json["model"], "field");
     let reason = json["model_reason"].as_str().expect("a sentence");
     assert!(reason.contains("times the noise floor"), "{reason}");
     let lag = &json["reference_lag"];
-    let error = lag["standard_error_us"].as_f64().expect("a number");
-    assert!(lag["value_us"].as_f64().expect("a number").abs() < 5.0 * error);
+    let error = number(&lag["standard_error_us"]);
+    assert!(number(&lag["value_us"]).abs() < 5.0 * error);
     let parameters = json["parameters"].as_object().expect("by name");
     assert_eq!(parameters.len(), 81);
     for (name, p) in parameters {
         assert!(p["standard_error"].as_f64() > Some(0.0), "{name}: {p}");
     }
-    let page = String::from_utf8(bench.read("report/index.html")).expect("text");
-    assert!(page.contains("Field model") && page.contains("uw2z_b"));
+    let page = bench.text("report/index.html");
+    assert!(page.contains("Field model") && page.contains("uw2z"));
 
     bench.good("inspect p.bin --json inspect.json");
     let inspected = bench.json("inspect.json");
     assert_eq!(inspected["layout_version"], 2);
     for (name, p) in parameters {
-        let value = |p: &Value| p["value"].as_f64().expect("a number");
+        let value = |p: &Value| number(&p["value"]);
         let (fitted, stored) = (value(p), value(&inspected["parameters"][name]));
         assert!((stored - fitted).abs() <= 1e-6 * fitted.abs(), "{name}");
     }
@@ -167,7 +148,7 @@ fn a_late_reference_is_told_by_every_model_and_taken_off_when_asked() {
         );
         let lag = |bench: &Bench| {
             let lag = &bench.json("p.json")["reference_lag"];
-            let number = |key: &str| lag[key].as_f64().expect("a number");
+            let number = |key: &str| number(&lag[key]);
             (
                 number("value_us"),
                 number("standard_error_us"),
@@ -185,7 +166,7 @@ fn a_late_reference_is_told_by_every_model_and_taken_off_when_asked() {
             (&found["severity"], &found["unit"]),
             (&"warn".into(), &"us".into())
         );
-        let told_us = found["value"].as_f64().expect("a number");
+        let told_us = number(&found["value"]);
         assert!((told_us - value_us).abs() < 1e-6, "{told_us} {value_us}");
         assert!(
             found["message"]
@@ -207,7 +188,7 @@ fn a_late_reference_is_told_by_every_model_and_taken_off_when_asked() {
 #[test]
 fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
     let bench = bench();
-    bench.write("paper.csv", thinned_log(20, |_| true));
+    bench.write("paper.csv", log());
     for (log, model, reason) in [
         (
             "log.csv",
@@ -229,8 +210,17 @@ fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
         assert!(told.starts_with(reason), "{told}");
         let findings = json["findings"].as_array().expect("a list");
         let note = findings.iter().find(|found| found["code"] == "model_lacks");
-        let note = note.map(|note| (note["severity"].as_str(), note["message"].as_str()));
-        assert_eq!(note, (model == "31").then_some((Some("note"), Some(told))));
+        let expected = note.and_then(|note| note["message"].as_str()?.strip_prefix(told));
+        assert_eq!(
+            expected.map(|expected| expected.contains("in service expect")),
+            (model == "31").then_some(true)
+        );
+        let (verdict, worst) = (&json["verdict"], number(&json["predicted"]["worst_ratio"]));
+        assert_eq!(verdict, if model == "31" { "limited" } else { "good" });
+        assert_eq!(worst > 1.1, model == "31", "{worst}");
+        let rms_um = number(&json["predicted"]["x"]["rms_um"]);
+        let floor_um = rms_um / number(&json["predicted"]["x"]["ratio"]);
+        assert!((0.8..1.2).contains(&floor_um), "{floor_um}");
         bench.good(&format!(
             "fit {log} --stage stage.toml --out named.bin --model {model}"
         ));
@@ -253,7 +243,8 @@ fn a_log_of_little_motion_warns_and_one_of_exchanged_probes_is_refused() {
         4,
         &["fits if Hall A and B are exchanged"],
     );
-    let stage = bench.text("stage.toml") + "\n[motion]\nrz = { service_rad = 1.2e-3 }\n";
+    let stage = bench.text("stage.toml");
+    let stage = stage.replace("rz = { service_rad = 500e-6", "rz = { service_rad = 1.2e-3");
     bench.write("wide.toml", stage);
     let told = bench.good("fit log.csv --stage wide.toml --out p.bin --model field");
     assert!(stderr(&told).contains("moves rz by 5"), "{}", stderr(&told));
@@ -263,8 +254,7 @@ fn a_log_of_little_motion_warns_and_one_of_exchanged_probes_is_refused() {
 
 #[test]
 fn a_log_of_still_heights_is_refused_and_no_blob_is_left() {
-    let bench = Bench::new();
-    bench.write("log.csv", thinned_log(20, |_| true));
+    let bench = Bench::with_log();
     bench.bad(
         "fit log.csv --stage stage.toml --out p.bin --model field",
         4,

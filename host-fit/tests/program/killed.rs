@@ -114,8 +114,7 @@ fn records() -> (String, String) {
 
 /// Every input, and every output as it was before.
 fn bench() -> Bench {
-    let bench = Bench::new();
-    bench.write("log.csv", thinned_log(20, |_| true));
+    let bench = Bench::with_log();
     bench.write("run.csv.gz", host_fit::input::shipped::RUN_GZ);
     let (bus, reference) = records();
     bench.write("bus.log", bus);
@@ -144,8 +143,14 @@ impl Job {
     fn finish(&self, bench: &Bench) -> (Duration, Vec<Vec<u8>>) {
         self.restore(bench);
         let started = Instant::now();
-        let status = self.start(bench).wait().expect("it ends");
-        assert_eq!(status.code(), Some(0), "{}", self.arguments);
+        let output = bench.run(self.arguments);
+        let message = stderr(&output);
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{}: {message}",
+            self.arguments
+        );
         let time = started.elapsed();
         (
             time,

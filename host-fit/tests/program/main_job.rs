@@ -1,6 +1,6 @@
 //! The main job through the command line, on the log that ships with the program.
 
-use crate::common::{Bench, shipped_log, stdout, thinned_log};
+use crate::common::{Bench, log, number, shipped_log, stdout, thinned_log};
 use serde_json::Value;
 
 fn close(value: &Value, expected: f64, part: f64) {
@@ -62,7 +62,7 @@ fn fit_eval_decode_and_inspect_agree_on_the_shipped_log() {
         "{}",
         stdout(&output)
     );
-    let poses = String::from_utf8(bench.read("pose.csv")).expect("text");
+    let poses = bench.text("pose.csv");
     assert_eq!(poses.lines().count(), 57001);
     assert_eq!(
         poses.lines().next(),
@@ -75,34 +75,73 @@ fn fit_eval_decode_and_inspect_agree_on_the_shipped_log() {
     assert_eq!(inspect["serial"], "S7");
     assert_eq!(inspect["created"], "2026-01-02");
     close(&inspect["fit"]["errors"]["x"]["rmse_um"], 0.946, 0.02);
-    let page = String::from_utf8(bench.read("report/index.html")).expect("text");
+    let page = bench.text("report/index.html");
     assert!(page.contains("S7"));
 }
 
 #[test]
-fn the_report_page_shows_the_figures_of_the_fit_and_escapes_every_text() {
-    let bench = Bench::new();
-    bench.write("log.csv", thinned_log(20, |_| true));
-    let fit = "fit log.csv --stage stage.toml --out p.bin --solver lm --serial <b>&S";
-    bench.good(&format!("{fit} --report report --json fit.json"));
-    let page = String::from_utf8(bench.read("report/index.html")).expect("text");
-    assert!(page.contains("&lt;b&gt;&amp;S") && !page.contains("<b>&"));
-    for part in ["host-fit fit log.csv --stage", "SHA-256", "Good"] {
-        assert!(page.contains(part), "{part}");
+fn the_report_pages_show_the_figures_escape_every_text_and_name_no_folder() {
+    let bench = Bench::with_log();
+    let folder = bench.path("").display().to_string();
+    let more = "--operator A<b --note key=<i>x --created 2026-01-02";
+    for command in [
+        "fit log.csv --out p.bin --solver lm --serial <b>&S --json fit.json --report fit",
+        "eval p.bin log.csv --json eval.json --report eval",
+        "check log.csv --report check",
+    ] {
+        bench.good(&format!("{command} {more} --stage {folder}/stage.toml"));
     }
-    let figures = bench.json("fit.json");
-    let number = |value: &serde_json::Value| value.as_f64().expect("a number");
-    let errors = &figures["errors"];
-    let all = format!(
-        "{:.2} um, {:.2} um, {:.2} urad rms over all 2850 rows",
-        number(&errors["x"]["rmse_um"]),
-        number(&errors["y"]["rmse_um"]),
-        number(&errors["rz"]["rmse_urad"])
+    // After the end of a cell with this text, the text of the next cells.
+    let cells = |page: &str, name: &str| {
+        let row = page
+            .split(&format!(">{name}</td>"))
+            .nth(1)
+            .expect("a row")
+            .to_owned();
+        let cells = row
+            .split("</td>")
+            .map(|cell| cell.rsplit('>').next().unwrap_or_default().to_owned());
+        cells.collect::<Vec<_>>()
+    };
+    for (name, title) in [
+        ("fit", "Calibration certificate"),
+        ("eval", "Verification of a calibration"),
+        ("check", "Check of a log"),
+    ] {
+        let page = bench.text(&format!("{name}/index.html"));
+        for part in [
+            title,
+            "Limited</b>",
+            "SHA-256",
+            "A&lt;b",
+            "<td>key</td><td>&lt;i&gt;x</td>",
+            "2026-01-02",
+            "--stage stage.toml",
+        ] {
+            assert!(page.contains(part), "{name}: {part}");
+        }
+        assert!(!page.contains(&folder) && !page.contains("<b>&"), "{name}");
+        if name != "check" {
+            assert!(page.contains("&lt;b&gt;&amp;S"));
+            let errors = &bench.json(&format!("{name}.json"))["errors"];
+            for (axis, key) in [("X", "x"), ("Y", "y")] {
+                let rms = format!("{:.2}", number(&errors[key]["rmse_um"]));
+                assert_eq!(cells(&page, axis)[0], rms, "{name}");
+            }
+        }
+    }
+    let eta = &bench.json("fit.json")["parameters"]["eta_b"];
+    let row = cells(&bench.text("fit/index.html"), "eta");
+    let shown: f64 = row[2]
+        .split('(')
+        .next()
+        .and_then(|x| x.parse().ok())
+        .expect("a value");
+    let error = number(&eta["standard_error"]);
+    assert!(
+        (shown - number(&eta["value"])).abs() < 0.1 * error,
+        "{row:?}"
     );
-    assert!(page.contains(&all), "{all}");
-    let eta = &figures["parameters"]["eta_b"];
-    let row = format!("<td>eta_b</td><td>{:.6}</td>", number(&eta["value"]));
-    assert!(page.contains(&row), "{row}");
 }
 
 #[test]
@@ -127,8 +166,7 @@ fn blob_bytes_do_not_depend_on_threads_and_follow_the_seed() {
 
 #[test]
 fn every_model_and_form_fits_and_richer_models_fit_better() {
-    let bench = Bench::new();
-    bench.write("log.csv", thinned_log(20, |_| true));
+    let bench = Bench::with_log();
     let mut last = f64::INFINITY;
     for model in ["12", "15", "30", "31"] {
         for project in ["linear", "delta", "none"] {
@@ -145,7 +183,7 @@ fn every_model_and_form_fits_and_richer_models_fit_better() {
                 (&json["errors"], &json["delta"]),
                 "({model}) {project}"
             );
-            let fitness = json["train_fitness"].as_f64().expect("a number");
+            let fitness = number(&json["train_fitness"]);
             if project == "linear" {
                 assert!(
                     fitness < last,
@@ -165,7 +203,7 @@ fn every_model_and_form_fits_and_richer_models_fit_better() {
 #[test]
 fn a_log_in_si_columns_other_separators_and_line_ends_gives_the_same_figures() {
     let bench = Bench::new();
-    let log = thinned_log(20, |_| true);
+    let log = log();
     bench.write("plain.csv", &log);
     bench.good("fit plain.csv --stage stage.toml --out plain.bin --json plain.json");
     let semicolons = format!(
@@ -201,14 +239,13 @@ fn a_log_in_si_columns_other_separators_and_line_ends_gives_the_same_figures() {
     bench.write("si.csv", si);
     bench.good("fit si.csv --stage stage.toml --out si.bin --json si.json");
     let (a, b) = (bench.json("plain.json"), bench.json("si.json"));
-    let rms = |json: &Value| json["errors"]["x"]["rmse_um"].as_f64().expect("a number");
+    let rms = |json: &Value| number(&json["errors"]["x"]["rmse_um"]);
     assert!((rms(&a) - rms(&b)).abs() < 1e-6);
 }
 
 #[test]
 fn movements_that_a_plain_draw_misses_are_named_and_a_stratified_one_misses_none() {
-    let bench = Bench::new();
-    bench.write("log.csv", thinned_log(20, |_| true));
+    let bench = Bench::with_log();
     for (draw, missed) in [("plain", 1), ("stratified", 0)] {
         bench.good(&format!(
             "fit log.csv --stage stage.toml --out p.bin --json p.json --train 150 --draw {draw}"
@@ -216,7 +253,7 @@ fn movements_that_a_plain_draw_misses_are_named_and_a_stratified_one_misses_none
         let json = bench.json("p.json");
         assert_eq!(json["train_rows"], 150);
         // The zero deviations that the few rows gave fit all rows worse than refitted ones.
-        let rms = |errors: &Value| errors["x"]["rmse_um"].as_f64().expect("a number");
+        let rms = |errors: &Value| number(&errors["x"]["rmse_um"]);
         assert!(
             rms(&json["errors_solver_delta"]) > 1.02 * rms(&json["errors"]),
             "{draw}"
@@ -249,29 +286,26 @@ fn several_logs_are_fitted_together_and_hashed_in_their_order() {
 #[test]
 fn demo_prints_the_tables_of_the_paper_beside_ours() {
     let bench = Bench::new();
-    let output = bench.good("demo --zero-deviations --out demo");
+    let output = bench.good("demo --out demo");
     let text = stdout(&output);
     for part in [
         "Table 2",
         "Table 4",
         "Table 8",
         "Table 7",
-        "Table A1",
-        "27.8795",
-        "1.3919",
+        "27.880",
+        "1.392",
         "f32 against f64",
     ] {
         assert!(text.contains(part), "{part}");
     }
     for file in ["params.bin", "pose.csv", "paper.csv.gz", "stage.toml"] {
-        assert!(
-            crate::common::exists(&bench.path("demo").join(file)),
-            "{file}"
-        );
+        assert!(bench.has(&format!("demo/{file}")), "{file}");
     }
     let nanometres: Vec<f64> = text
         .lines()
-        .find(|line| line.starts_with("f32 against f64"))
+        .skip_while(|line| !line.starts_with("f32 against f64"))
+        .nth(1)
         .expect("the line")
         .split_whitespace()
         .filter_map(|word| word.parse().ok())
@@ -280,7 +314,7 @@ fn demo_prints_the_tables_of_the_paper_beside_ours() {
         nanometres[0] <= 0.25 && nanometres[1] <= 0.25 && nanometres[2] <= 1.0,
         "{nanometres:?}"
     );
-    assert!(crate::common::exists(&bench.path("stage.toml")));
+    assert!(bench.has("stage.toml"));
 }
 
 #[test]

@@ -1,11 +1,7 @@
 //! Fits that succeed, with something that the user must be told.
 
-use crate::common::{Bench, stderr, thinned_log, with_cell};
+use crate::common::{Bench, log, number, stderr, thinned_log, with_cell};
 use host_fit::input::shipped::STAGE_TOML;
-
-fn log() -> String {
-    thinned_log(20, |_| true)
-}
 
 #[test]
 fn one_wild_code_is_named_with_its_movement_and_time() {
@@ -25,9 +21,8 @@ fn one_wild_code_is_named_with_its_movement_and_time() {
 }
 
 #[test]
-fn a_range_that_is_narrower_than_the_errors_or_without_width_holds_its_parameter() {
-    let bench = Bench::new();
-    bench.write("log.csv", log());
+fn a_range_narrower_than_the_errors_is_a_warning_and_one_without_width_holds_its_parameter() {
+    let bench = Bench::with_log();
     for range in ["[0.8374, 0.83745]", "[0.85, 0.85]"] {
         bench.write(
             "stage.toml",
@@ -45,16 +40,20 @@ fn a_range_that_is_narrower_than_the_errors_or_without_width_holds_its_parameter
                 json["warnings"]
             );
         } else {
-            let value = eta["value"].as_f64().expect("a number");
-            assert!((0.8374..=0.83745).contains(&value), "{value}");
+            let value = number(&eta["value"]);
+            assert!((value - 0.8374).abs() < 1e-3, "{value}");
+            assert!(
+                json["warnings"].to_string().contains("eta_a"),
+                "{}",
+                json["warnings"]
+            );
         }
     }
 }
 
 #[test]
 fn a_blob_of_other_scales_is_refused() {
-    let bench = Bench::new();
-    bench.write("log.csv", log());
+    let bench = Bench::with_log();
     bench.good("fit log.csv --stage stage.toml --out p.bin");
     for (from, to, key) in [
         (
@@ -97,8 +96,7 @@ fn movements_of_several_logs_are_told_apart() {
 fn a_fit_goes_on_where_the_system_starts_no_threads() {
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
     use std::os::unix::process::CommandExt;
-    let bench = Bench::new();
-    bench.write("log.csv", log());
+    let bench = Bench::with_log();
     let fit = "exec ./host-fit fit log.csv --stage stage.toml --json p.json --out";
     std::fs::copy(env!("CARGO_BIN_EXE_host-fit"), bench.path("host-fit")).expect("copied");
     let folder = bench.path("");

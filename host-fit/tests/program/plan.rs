@@ -1,31 +1,25 @@
 //! `plan` from the command line: what it writes, and what it refuses.
 
-use crate::common::{Bench, stderr, stdout};
+use crate::common::{Bench, number, stderr, stdout};
 use host_fit::input::shipped::STAGE_TOML;
 
 /// A run that is short enough to be planned fast, rehearsed, and written nowhere else.
 #[test]
 fn a_planned_run_is_written_told_and_can_be_rehearsed() {
     let bench = Bench::new();
-    let planned = bench.good(
-        "plan --stage stage.toml --seconds 60 --out run.csv --json plan.json --report report",
-    );
+    let planned = bench.good("plan --stage stage.toml --seconds 60 --out run.csv --json plan.json");
     let told = stdout(&planned);
-    assert!(
-        told.contains("run of 60 s: one movement, 30001 rows"),
-        "{told}"
-    );
-    assert!(told.contains("least determined:") && told.contains("wrote run.csv"));
+    assert!(told.contains("30001"), "{told}");
+    assert!(told.contains("least determined") && told.contains("wrote run.csv"));
     let json = bench.json("plan.json");
     for axis in ["x", "y", "rz"] {
-        let ratio = json["service"][axis]["ratio"].as_f64().expect("a number");
+        let ratio = number(&json["service"][axis]["ratio"]);
         assert!((1.0..1.01).contains(&ratio), "{axis}: {ratio}");
     }
     let parameters = json["parameters"].as_object().expect("by name");
     assert_eq!(parameters.len(), 81);
-    let page = bench.text("report/index.html");
-    assert_eq!(page.matches("<svg").count(), 3);
-    assert!(page.contains("<td>Rz</td><td>500.0</td>"));
+    let rz = told.lines().find(|line| line.starts_with("  rz "));
+    assert!(rz.is_some_and(|line| line.contains("500.0")), "{told}");
 
     bench.good("simulate --stage stage.toml --plan run.csv --seed 2 --out log.csv");
     assert_eq!(bench.text("log.csv").lines().count(), 30_002);
@@ -34,7 +28,7 @@ fn a_planned_run_is_written_told_and_can_be_rehearsed() {
 #[test]
 fn what_cannot_be_planned_leaves_no_file() {
     let bench = Bench::new();
-    let plan = "plan --stage stage.toml --out run.csv --json plan.json --report report";
+    let plan = "plan --stage stage.toml --out run.csv --json plan.json";
     bench.bad(
         &format!("{plan} --seconds 2"),
         4,
@@ -66,8 +60,10 @@ fn what_cannot_be_planned_leaves_no_file() {
         2,
         &["make it shorter"],
     );
-    let motion = "[motion]\nz = { amplitude_m = 1.0 }\n";
-    bench.write("far.toml", format!("{STAGE_TOML}\n{motion}"));
+    bench.write(
+        "far.toml",
+        STAGE_TOML.replace("\nz = { service_m = 240e-6", "\nz = { amplitude_m = 1.0"),
+    );
     let output = bench.run("plan --stage far.toml --seconds 20 --out run.csv");
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
     assert!(stderr(&output).contains("`motion.z.amplitude_m`: 1 m is outside"));

@@ -1,31 +1,9 @@
 //! An old calibration brought up to date, on a stage made of physics whose codes are scaled as
 //! changed gains scale them.
 
-use crate::common::{Bench, exists, stderr};
+use crate::common::{Bench, number, plan, stderr};
 use serde_json::Value;
-use std::f64::consts::TAU;
 use std::fmt::Write;
-
-const AMPLITUDES: [f64; 6] = [500.0, 800.0, 500.0, 240.0, 480.0, 480.0];
-
-/// A run of these cycles of each axis; an axis of none stands still.
-fn plan(seconds: f64, cycles: [f64; 6]) -> String {
-    let mut csv = "t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad\n".to_owned();
-    let rows = (seconds * 500.0) as u32;
-    for row in 0..rows {
-        let t_s = f64::from(row) * 0.002;
-        let end = (t_s.min(seconds - t_s) / 0.5).clamp(0.0, 1.0);
-        let taper = end * end * (3.0 - 2.0 * end);
-        let _ = write!(csv, "{}", row * 2000);
-        for (axis, amplitude) in AMPLITUDES.into_iter().enumerate() {
-            let moves = if cycles[axis] > 0.0 { amplitude } else { 0.0 };
-            let phase = TAU * cycles[axis] * t_s / seconds + 1.7 * axis as f64;
-            let _ = write!(csv, ",{:.4}", moves * taper * phase.sin());
-        }
-        csv.push('\n');
-    }
-    csv
-}
 
 /// A log whose probes A, B, C read `gains` times as much.
 fn with_gains(log: &str, gains: [f64; 3]) -> String {
@@ -58,23 +36,6 @@ fn bench() -> Bench {
         "fit log.csv --stage stage.toml --out old.bin --model field --serial HS-3 --json fit.json",
     );
     bench
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().expect("a number")
-}
-
-/// rms of X, Y, Rz over a log, zero deviations refitted, um and urad.
-fn rms(bench: &Bench, blob: &str, log: &str) -> [f64; 3] {
-    bench.good(&format!(
-        "eval {blob} {log} --stage stage.toml --limit 100 --json eval.json"
-    ));
-    let errors = &bench.json("eval.json")["errors"];
-    [
-        number(&errors["x"]["rmse_um"]),
-        number(&errors["y"]["rmse_um"]),
-        number(&errors["rz"]["rmse_urad"]),
-    ]
 }
 
 /// A log with the sign of Hall probe A turned.
@@ -116,10 +77,10 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
         assert!(number(&before[axis]) > 1.2 * floor, "{axis}");
         assert!(number(&after[axis]) < 1.02 * floor, "{axis}");
     }
-    let good = rms(&bench, "old.bin", "log.csv");
+    let good = bench.rms("old.bin", "log.csv");
     let (before, after) = (
-        rms(&bench, "old.bin", "later.csv"),
-        rms(&bench, "new.bin", "later.csv"),
+        bench.rms("old.bin", "later.csv"),
+        bench.rms("new.bin", "later.csv"),
     );
     assert!(before[1] > 5.0 * good[1], "{before:?} {good:?}");
     for axis in 0..3 {
@@ -142,8 +103,8 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
     std::fs::remove_file(bench.path("old.bin.posterior")).expect("there");
     let alone = bench.good(&format!("{recalibrate} --out alone.bin"));
     assert!(stderr(&alone).contains("no posterior stands beside"));
-    assert!(!exists(&bench.path("alone.bin.posterior")));
-    let alone = rms(&bench, "alone.bin", "later.csv");
+    assert!(!bench.has("alone.bin.posterior"));
+    let alone = bench.rms("alone.bin", "later.csv");
     assert!(alone[1] < 1.02 * good[1], "{alone:?} {good:?}");
 }
 
@@ -155,7 +116,7 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
     let refused = |arguments: &str, status: i32, parts: &[&str]| {
         let arguments = format!("recalibrate {arguments} --stage stage.toml --out new.bin");
         bench.bad(&arguments, status, parts);
-        assert!(!exists(&bench.path("new.bin")) && !exists(&bench.path("new.bin.posterior")));
+        assert!(!bench.has("new.bin") && !bench.has("new.bin.posterior"));
     };
     let parts = [
         "does not tell a gain for each probe",

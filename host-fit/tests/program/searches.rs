@@ -1,6 +1,6 @@
 //! The population searches through the command line, on the log that ships with the program.
 
-use crate::common::{Bench, stderr};
+use crate::common::{Bench, stderr, stdout};
 use serde_json::Value;
 
 fn bench() -> Bench {
@@ -85,7 +85,7 @@ fn compare_prints_its_table_and_writes_curves() {
         "compare log.csv.gz --stage stage.toml --project delta,linear --solvers shtlbo,de --seeds 2 \
          --evaluations 3000 --population 30 --out report",
     );
-    let table = crate::common::stdout(&printed);
+    let table = stdout(&printed);
     assert_eq!(table.lines().count(), 2 + 2 * 3);
     for row in ["| delta | lm |", "| delta | shtlbo |", "| linear | de |"] {
         assert!(table.contains(row), "{row}");
@@ -164,7 +164,7 @@ fn a_search_that_ends_next_to_a_pole_says_so_and_writes_nothing() {
         4,
         &["random search", "pole of 1/phi", "--generations"],
     );
-    assert!(!crate::common::exists(&bench.path("p.bin")));
+    assert!(!bench.has("p.bin"));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What goes to standard output and standard error, and what does not.
 
-use crate::common::{Bench, stderr, stdout, thinned_log};
+use crate::common::{Bench, log, stderr, stdout};
 use std::io::Write;
 use std::process::Stdio;
 
@@ -10,7 +10,7 @@ fn bench() -> Bench {
     let stage = bench.text("stage.toml");
     let slow = stage.replace("period_s = 0.002", "period_s = 0.04");
     bench.write("stage.toml", slow);
-    bench.write("log.csv", thinned_log(20, |_| true));
+    bench.write("log.csv", log());
     bench
 }
 
@@ -43,7 +43,7 @@ fn a_dash_is_standard_output_for_one_output_and_nothing_else() {
     bench.good(&format!("{fit} p.bin"));
     let blob = bench.good(&format!("{fit} -"));
     assert_eq!(blob.stdout, bench.read("p.bin"));
-    assert!(!bench.path("-").exists() && !bench.path("-.posterior").exists());
+    assert!(!bench.has("-") && !bench.has("-.posterior"));
     bench.bad(
         &format!("{fit} - --json -"),
         2,
@@ -82,8 +82,10 @@ fn each_command_has_a_manual_page_and_completions() {
     let bench = bench();
     bench.good("man --out man");
     let help = stdout(&bench.good("--help"));
-    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
-    let names = commands.take_while(|line| !line.is_empty());
+    let names = help
+        .lines()
+        .filter_map(|line| line.strip_prefix("  "))
+        .filter(|line| line.starts_with(|c: char| c.is_ascii_lowercase()));
     let names: Vec<&str> = names
         .filter_map(|line| line.split_whitespace().next())
         .collect();
@@ -97,5 +99,5 @@ fn each_command_has_a_manual_page_and_completions() {
             "{name}"
         );
     }
-    assert!(bench.path("man/host-fit.1").exists());
+    assert!(bench.has("man/host-fit.1"));
 }

@@ -5,6 +5,7 @@
 use core::convert::Infallible;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use hal_adapters::adc::{Channels, FrameSampler};
+use hal_adapters::can::status::{bit, board_check};
 use hal_adapters::can::update::Key;
 use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0, PB1, PC1, PinState, Pull, Speed};
 use stm32f4xx_hal::pac::{CAN1, GPIOA, GPIOB, GPIOC, SPI1};
@@ -28,8 +29,16 @@ pub type SpiDevice = ExclusiveDevice<stm32f4xx_hal::spi::Spi<SPI1>, PA4<Output>,
 pub type ControlPin = PB0<Output>;
 /// The LED, on when high.
 pub type Led = PC1<Output>;
-/// Says whether the servo is on: low if it is. Pulled up, so that it may be left open.
+/// Driven low while the servo is off. Pulled up: where the line is open, the servo counts as on.
 pub type ServoPin = PB1<Input>;
+/// Whether the board has that line. Without it a program with a key goes by the request "servo off"
+/// alone, and one without a key takes the servo for on.
+const HAS_SERVO_LINE: bool = true;
+
+/// Whether the servo is off, if the board has a line that says so.
+pub fn servo_is_off(pin: &ServoPin) -> Option<bool> {
+    HAS_SERVO_LINE.then(|| pin.is_low())
+}
 
 /// Frequency of the crystal.
 const CRYSTAL_HZ: u32 = 8_000_000;
@@ -73,17 +82,8 @@ const SPI_HZ: u32 = {
     hz
 };
 
-/// Division of a bit into quanta of the clock of the first peripheral bus.
-pub struct BitTiming {
-    /// Periods of that clock in a quantum.
-    pub prescaler: u16,
-    /// Quanta before the sample, besides the first.
-    pub segment_1: u8,
-    /// Quanta after the sample.
-    pub segment_2: u8,
-    /// Quanta by which a bit is lengthened or shortened at most, to follow other nodes.
-    pub jump: u8,
-}
+/// Periods of the clock of the first peripheral bus in a quantum, of which a bit has 14.
+pub const CAN_PRESCALER: u16 = 3;
 
 /// 1 Mbit/s: 42 = 3 * 14. By the crystal sampled at 86 % with the least resynchronisation; by the
 /// internal oscillator at 71 % with the most.
@@ -95,14 +95,11 @@ pub struct BitTiming {
 /// beside a node with a crystal. The internal oscillator keeps 1 % at 25 degC, and 4 % from -10 to
 /// 85 degC (DS8626, HSI oscillator characteristics): in a laboratory that is enough. Elsewhere it
 /// may not be; see `Bus::new`.
-pub const fn can_bit_timing(crystal: bool) -> BitTiming {
-    let (segment_1, segment_2, jump) = if crystal { (11, 2, 1) } else { (9, 4, 4) };
-    BitTiming {
-        prescaler: 3,
-        segment_1,
-        segment_2,
-        jump,
-    }
+///
+/// Quanta before the sample, besides the first; after the sample; and by which a bit is lengthened or
+/// shortened at most, to follow other nodes.
+pub const fn can_bit_timing(crystal: bool) -> (u8, u8, u8) {
+    if crystal { (11, 2, 1) } else { (9, 4, 4) }
 }
 
 /// Longest serial number, as in [`runtime::parameters::Text`].
@@ -187,20 +184,12 @@ pub struct Parts {
     pub can: CAN1,
     /// The LED.
     pub led: Led,
-    /// Whether the servo is on.
+    /// Whether the servo is off.
     pub servo: ServoPin,
-    /// Which lines to the converter are pulled up.
-    pub pulled_up: PulledUp,
-}
-
-/// Whether lines that must be high before the program drives them are pulled up: by 10 kOhm or
-/// less, against an internal resistor of 30 kOhm at least.
-#[derive(Clone, Copy)]
-pub struct PulledUp {
-    /// Chip select.
-    pub select: bool,
-    /// SYNC/RESET or RST/PD.
-    pub control: bool,
+    /// Bits of [`board_check`]: lines to the converter that must be high before the program drives
+    /// them, and are not pulled up by 10 kOhm or less, against an internal resistor of 30 kOhm at
+    /// least.
+    pub not_pulled_up: u32,
 }
 
 /// Time for a line to follow the internal resistor of 30 to 50 kOhm, us: three times that of 50 pF.
@@ -219,10 +208,8 @@ pub fn set_up(
         gpiob.pb0.into_pull_down_input(),
     );
     cortex_m::asm::delay(PULL_US * (CORE_HZ / 1_000_000));
-    let pulled_up = PulledUp {
-        select: select.is_high(),
-        control: control.is_high(),
-    };
+    let not_pulled_up = bit(board_check::NO_PULL_UP_ON_SELECT, select.is_low())
+        | bit(board_check::NO_PULL_UP_ON_CONTROL, control.is_low());
     let mut select = select.into_push_pull_output_in_state(PinState::High);
     select.set_speed(Speed::VeryHigh);
     let mut control = control.into_push_pull_output_in_state(PinState::High);
@@ -248,7 +235,7 @@ pub fn set_up(
         can: can1,
         led: gpioc.pc1.into_push_pull_output(),
         servo: gpiob.pb1.into_pull_up_input(),
-        pulled_up,
+        not_pulled_up,
     }
 }
 

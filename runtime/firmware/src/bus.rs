@@ -57,13 +57,13 @@ impl Bus {
             state.inak().bit_is_set() && state.slak().bit_is_clear()
         });
         if started {
-            let timing = board::can_bit_timing(crystal);
+            let (segment_1, segment_2, jump) = board::can_bit_timing(crystal);
             // SAFETY: `board` keeps within the fields' bits.
             can.btr().write(|w| unsafe {
-                w.brp().bits(timing.prescaler - 1);
-                w.ts1().bits(timing.segment_1 - 1);
-                w.ts2().bits(timing.segment_2 - 1);
-                w.sjw().bits(timing.jump - 1)
+                w.brp().bits(board::CAN_PRESCALER - 1);
+                w.ts1().bits(segment_1 - 1);
+                w.ts2().bits(segment_2 - 1);
+                w.sjw().bits(jump - 1)
             });
             receive_commands_only(&can);
             // BOFIE lets ERRI latch a bus-off; ERRIE, which would make it an interrupt, is off.

@@ -1,14 +1,19 @@
-//! Flash of the STM32F405 (RM0090 rev. 21, section 3): the two parameter sectors, which the store
-//! reads, programs and erases, and the program's own bytes.
+//! Flash of the STM32F405 (RM0090 rev. 21, section 3): the two parameter sectors, and the program's own
+//! bytes.
 
+use crate::supply::Supply;
 use cortex_m::asm;
 use crc::{CRC_32_ISCSI, Crc, NoTable};
-use firmware::store::{Flash, FlashFault, SECTOR_BYTES, SECTOR_WORDS, Sector};
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, ReadNorFlash, check_erase, check_read, check_write,
+};
+use firmware::store::{FlashFault, SLOT_BYTES, SLOTS};
 use stm32f4xx_hal::pac::FLASH;
 
+const BYTES: usize = SLOTS * SLOT_BYTES as usize;
+
 unsafe extern "C" {
-    static mut _parameter_slot_0: [u8; SECTOR_BYTES];
-    static mut _parameter_slot_1: [u8; SECTOR_BYTES];
+    static mut _parameter_slot_0: [u8; BYTES];
     static __stext: u8;
     static __erodata: u8;
 }
@@ -36,27 +41,31 @@ pub fn program_crc() -> u32 {
     Crc::<u32, NoTable>::new(&CRC_32_ISCSI).checksum(program)
 }
 
-/// The parameter sectors of `memory.x`.
+/// The parameter sectors of `memory.x`: offset 0 is the start of slot 0, which slot 1 follows.
 pub struct Sectors {
     registers: FLASH,
+    /// Looked at before and after each operation.
+    pub supply: Supply,
 }
 
 impl Sectors {
     /// Takes the registers over; FLASH_CR is locked after a reset.
-    pub const fn new(registers: FLASH) -> Self {
-        Self { registers }
+    pub const fn new(registers: FLASH, supply: Supply) -> Self {
+        Self { registers, supply }
     }
 
-    const fn address(sector: Sector) -> *mut [u8; SECTOR_BYTES] {
-        match sector {
-            Sector::First => &raw mut _parameter_slot_0,
-            Sector::Second => &raw mut _parameter_slot_1,
-        }
+    const fn address(offset: u32) -> *mut u8 {
+        (&raw mut _parameter_slot_0)
+            .cast::<u8>()
+            .wrapping_add(offset as usize)
     }
 
     /// Opens FLASH_CR, does an operation, and locks it again. The operation gives the number of
-    /// looks until it is given up.
+    /// looks until it is given up. It sets PSIZE to x32, which needs at least 2.7 V (table 13).
     fn operate(&mut self, start: impl FnOnce(&FLASH) -> u32) -> Result<(), FlashFault> {
+        if self.supply.is_low() {
+            return Err(FlashFault::SupplyLow);
+        }
         let registers = &self.registers;
         if registers.cr().read().lock().bit_is_set() {
             // SAFETY: any word may be written; these two open FLASH_CR.
@@ -86,47 +95,67 @@ impl Sectors {
         registers.acr().modify(|_, w| w.dcrst().clear_bit());
         registers.acr().modify(|_, w| w.dcen().set_bit());
         match status & (BUSY | ERRORS) {
+            // What was done meanwhile may not last.
+            0 if self.supply.is_low() => Err(FlashFault::SupplyLow),
             0 => Ok(()),
-            status => Err(FlashFault { status }),
+            status => Err(FlashFault::Reported { status }),
         }
     }
 }
 
-impl Flash for Sectors {
-    fn bytes(&self, sector: Sector) -> &[u8; SECTOR_BYTES] {
-        // SAFETY: the linker's script gives the addresses of two sectors of this length that hold
-        // nothing else; they change only in `program` and `erase`, which borrow `self` mutably.
-        unsafe { &*Self::address(sector) }
-    }
+impl ErrorType for Sectors {
+    type Error = FlashFault;
+}
 
-    fn program(&mut self, sector: Sector, word: usize, value: u32) -> Result<(), FlashFault> {
-        if word >= SECTOR_WORDS {
-            return Err(FlashFault { status: 0 });
+impl ReadNorFlash for Sectors {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashFault> {
+        check_read(self, offset, bytes.len()).map_err(FlashFault::Argument)?;
+        for (k, byte) in bytes.iter_mut().enumerate() {
+            // SAFETY: within the sectors of the linker's script, which hold nothing else.
+            *byte = unsafe { Self::address(offset).add(k).read_volatile() };
         }
-        self.operate(|registers| {
-            registers
-                .cr()
-                .modify(|_, w| w.psize().psize32().pg().set_bit());
-            // SAFETY: within the sector, which the linker's script aligns to words. A write to
-            // flash programs it while PG is set (section 3.6.4).
-            unsafe {
-                let address = Self::address(sector).cast::<u32>().add(word);
-                address.write_volatile(value);
-            }
-            WORD_LOOKS
-        })
+        Ok(())
     }
 
-    fn erase(&mut self, sector: Sector) -> Result<(), FlashFault> {
-        let number = 1 + sector as u8;
-        self.operate(|registers| {
-            // SAFETY: the numbers of the two sectors, 1 and 2 (table 5).
-            registers.cr().modify(|_, w| unsafe {
-                w.psize().psize32().ser().set_bit();
-                w.snb().bits(number)
-            });
-            registers.cr().modify(|_, w| w.strt().set_bit());
-            SECTOR_LOOKS
-        })
+    fn capacity(&self) -> usize {
+        BYTES
+    }
+}
+
+impl NorFlash for Sectors {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SLOT_BYTES as usize;
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashFault> {
+        check_write(self, offset, bytes.len()).map_err(FlashFault::Argument)?;
+        for (word, offset) in bytes.as_chunks().0.iter().zip((offset..).step_by(4)) {
+            self.operate(|registers| {
+                (registers.cr()).modify(|_, w| w.psize().psize32().pg().set_bit());
+                let address = Self::address(offset).cast::<u32>();
+                // SAFETY: within the sectors, which the linker's script aligns to words. A write
+                // to flash programs it while PG is set (section 3.6.4).
+                unsafe { address.write_volatile(u32::from_le_bytes(*word)) };
+                WORD_LOOKS
+            })?;
+        }
+        Ok(())
+    }
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashFault> {
+        check_erase(self, from, to).map_err(FlashFault::Argument)?;
+        for slot in from / SLOT_BYTES..to / SLOT_BYTES {
+            self.operate(|registers| {
+                // SAFETY: the numbers of the two sectors, 1 and 2 (table 5).
+                registers.cr().modify(|_, w| unsafe {
+                    w.psize().psize32().ser().set_bit();
+                    w.snb().bits(1 + slot as u8)
+                });
+                registers.cr().modify(|_, w| w.strt().set_bit());
+                SECTOR_LOOKS
+            })?;
+        }
+        Ok(())
     }
 }

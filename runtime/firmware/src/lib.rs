@@ -9,15 +9,14 @@
 //! |---|---|
 //! | [`schedule`] | ticks at multiples of 2 ms, and those that were missed |
 //! | [`acquisition`] | a converter that is started, read, and started again after faults |
-//! | [`slots`] | what is told of the two parameter slots, and what a sound blob gives |
-//! | [`store`] | parameters in flash that are replaced without ever being absent |
+//! | [`store`] | two slots of flash, of which one takes a blob while the other one stays |
 //! | [`records`] | which parameters run, and new ones that come over the bus |
 //! | [`node`] | one tick: decode, report, obey |
 //! | [`light`] | what the LED shows |
 //! | [`outbox`] | frames that wait for a mailbox |
 //! | [`telemetry`] | what a debugger reads |
 //! | [`start_up`] | what is known of the run that a reset ended |
-//! | [`retained`] | what survives a reset: the last fault, the zero deviation |
+//! | [`retained`] | what survives a reset: the last fault, what ran, the zero deviation |
 //! | [`fpu`] | the rounding mode that the decoder relies on |
 //!
 //! The program around it is `main.rs`; pins, clocks and bit timing are in `board.rs`.
@@ -33,7 +32,6 @@ pub mod outbox;
 pub mod records;
 pub mod retained;
 pub mod schedule;
-pub mod slots;
 pub mod start_up;
 pub mod store;
 #[allow(unsafe_code)] // a symbol name that a debugger finds; see its text

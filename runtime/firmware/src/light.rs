@@ -5,7 +5,7 @@
 //! | one flash a second | decoding |
 //! | four flashes a second | as one or two flashes, on the internal oscillator |
 //! | five flashes a second | as one or two flashes, but CAN takes no part in the bus |
-//! | two flashes a second | no parameters, bad ones, or new ones that are coming |
+//! | two flashes a second | no parameters, bad ones, new ones that are coming, or stopped |
 //! | three flashes a second | no codes from the converter, or a sensor fault |
 //! | steadily on | the controller failed its own test |
 //! | blinking fast, on as long as off | asked to show where it is |
@@ -31,7 +31,10 @@ pub const fn is_on(state: NodeState, board_checks: u32, identifying: bool, tick:
         NodeState::NoFrames | NodeState::SensorFault => 3,
         _ if board_checks & board_check::CAN_NOT_STARTED != 0 => 5,
         _ if board_checks & board_check::INTERNAL_OSCILLATOR != 0 => 4,
-        NodeState::NoParameters | NodeState::BadParameters | NodeState::Updating => 2,
+        NodeState::NoParameters
+        | NodeState::BadParameters
+        | NodeState::Updating
+        | NodeState::Stopped => 2,
         NodeState::Running => 1,
     };
     let slot = (tick % SECOND) / FLASH;

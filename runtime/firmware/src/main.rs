@@ -23,6 +23,7 @@ mod fault;
 mod flash;
 mod random;
 mod start;
+mod supply;
 mod timer;
 mod wait;
 mod watchdog;
@@ -45,30 +46,32 @@ impl DelayNs for Cycles {
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
-    use super::start::{self, Found, OptionBytes, ZeroKeeper};
+    use super::start::{self, ZeroKeeper};
+    use super::timer::{SETTLED, TICK};
     use super::{Cycles, board, board::Converter, bus::Bus, fault, flash, timer::Clock};
-    use super::{random::Random, wait::Stopwatch, watchdog::Watchdog};
+    use super::{random::Random, supply::Supply, wait::Stopwatch, watchdog::Watchdog};
+    use core::mem::MaybeUninit;
     use cortex_m::peripheral::SCB;
     use firmware::acquisition::Acquisition;
     use firmware::fpu::{Fpu, FpuSettings};
     use firmware::node::{Facts, Node, Parameters, SampleFault};
+    use firmware::records::Loaded;
     use firmware::records::Records;
     use firmware::retained::{Retained, Step};
     use firmware::schedule::{Schedule, Tick};
-    use firmware::slots::Loaded;
     use firmware::start_up::{Cause, PROVEN_TICKS};
-    use firmware::store::Record;
-    use firmware::telemetry::{Counters, Ended, STAGE};
+    use firmware::telemetry::{Ended, STAGE};
     use hal_adapters::adc::FrameSampler;
     use hal_adapters::can::Layout;
+    use hal_adapters::can::status::{bit, board_check};
     use hal_adapters::can::update::Identity;
     use stm32f4xx_hal::gpio::PinState;
     use stm32f4xx_hal::pac::TIM2;
     use stm32f4xx_hal::rcc::Enable;
 
     const CORE_MHZ: u32 = board::CORE_HZ / 1_000_000;
-    /// Where no other node acknowledges the answers, a reset waits no longer.
-    const RESET_TICKS_MAX: u32 = 100;
+    /// Where no other node acknowledges the answers, a reset or an erase waits no longer.
+    const SILENCE_TICKS_MAX: u32 = 100;
 
     #[shared]
     struct Shared {
@@ -88,18 +91,19 @@ mod app {
         zero: ZeroKeeper,
         records: Records<flash::Sectors>,
         random: Random,
-        /// Ticks for which a reset has waited until the answers have left.
-        reset_waits: u32,
+        /// Ticks for which a reset or an erase has waited until the answers have left.
+        silence_waits: u32,
         watchdog: Watchdog,
+        stopwatch: Stopwatch,
         led: board::Led,
         servo: board::ServoPin,
         overrun_ticks: u32,
     }
 
     #[init(local = [
-        loaded: Option<Loaded> = None,
-        node_place: Option<Node<'static>> = None,
-        record: Record = Record::EMPTY,
+        // Without a value, so that flash holds none.
+        loaded: MaybeUninit<Loaded> = MaybeUninit::uninit(),
+        node_place: MaybeUninit<Node<'static>> = MaybeUninit::uninit(),
     ])]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         fault::guard_stack(&mut cx.core.MPU);
@@ -107,6 +111,8 @@ mod app {
         let mut stopwatch = Stopwatch::new(cx.core.SYST);
         let before = start::before(&device.RCC);
         let mut watchdog = Watchdog::start(device.IWDG, &device.DBGMCU, &mut stopwatch);
+        // Before anything runs faster or is written.
+        let supply = Supply::wait(device.PWR, &device.RCC, &mut watchdog, &mut stopwatch);
         let (mut rcc, crystal) = start::clocks(&before, device.RCC, &mut stopwatch);
 
         watchdog.feed();
@@ -118,25 +124,21 @@ mod app {
 
         watchdog.feed();
         fault::begin(Step::Parameters);
-        // A sector may be erased, and the core stands meanwhile.
-        watchdog.set_period(CORE_MHZ, true, &mut stopwatch);
-        let options = OptionBytes::read(&device.FLASH);
-        let sectors = flash::Sectors::new(device.FLASH);
-        let is_faulty = before.blames_newest();
-        let check = before.check(board::stage_serial(), |crc| {
-            fault::update(|record| record.checked_blob = crc.unwrap_or(0));
-        });
-        let (mut records, found) = Records::start(sectors, cx.local.record, check, is_faulty);
+        let options = device.FLASH.optcr().read().bits();
+        let sectors = flash::Sectors::new(device.FLASH, supply);
+        let (mut records, refusal) = Records::start(sectors, before.choice, board::stage_serial());
         let program_hash = flash::program_crc();
         // After a warm start the FPU may have any settings; with these the arithmetic is the host's.
         Fpu.restore();
         let sound = runtime::arithmetic::check().is_ok() && Fpu::defaults_are_sound();
         // What does not decode does not run.
-        let runs = found.blob.filter(|_| sound);
-        let loaded = runs.and_then(|blob| records.load(blob, cx.local.loaded));
-        watchdog.set_period(CORE_MHZ, false, &mut stopwatch);
+        let loaded = match sound {
+            true => records.load(before.choice, cx.local.loaded),
+            false => None,
+        };
         let blob = loaded.map_or(0, |loaded| loaded.crc);
-        let parameters = Parameters::at_start(loaded, found.refusal, sound);
+        let stop = before.stop(loaded.is_some());
+        let parameters = Parameters::at_start(loaded, refusal, stop, sound);
         let identity = Identity {
             serial: board::stage_serial(),
             key: board::stage_key(),
@@ -153,21 +155,16 @@ mod app {
         // If the converter is not there yet, the ticks report why and start it again.
         let _ = acquisition.start(&mut Cycles);
 
-        let board = start::board_facts(
-            &before,
-            options,
-            &Found {
-                pulled_up: parts.pulled_up,
-                crystal,
-                can_started: bus.takes_part(),
-                zero_lost,
-            },
-        );
+        let checks = parts.not_pulled_up
+            | bit(board_check::INTERNAL_OSCILLATOR, !crystal)
+            | bit(board_check::CAN_NOT_STARTED, !bus.takes_part())
+            | bit(board_check::ZERO_LOST, zero_lost);
+        let board = start::board_facts(&before, options, checks);
         STAGE.put_start(before.cause == Cause::Watchdog, &board);
         TIM2::enable(&mut rcc);
         let mut clock = Clock::new(device.TIM2);
         let schedule = Schedule::starting(clock.now_us());
-        clock.set_tick_alarm(schedule.due_us());
+        clock.set_alarm::<TICK>(schedule.due_us());
         watchdog.feed();
         fault::begin(Step::Ticking);
 
@@ -180,15 +177,15 @@ mod app {
                 acquisition,
                 node,
                 facts: Facts {
-                    internal_oscillator: !crystal,
                     board,
                     ..Facts::default()
                 },
                 zero,
                 records,
                 random,
-                reset_waits: 0,
+                silence_waits: 0,
                 watchdog,
+                stopwatch,
                 led: parts.led,
                 servo: parts.servo,
                 overrun_ticks: 0,
@@ -200,14 +197,14 @@ mod app {
     /// there while the parameters are read.
     #[inline(never)]
     fn node(
-        place: &'static mut Option<Node<'static>>,
+        place: &'static mut MaybeUninit<Node<'static>>,
         parameters: Parameters<'static>,
         by_fault: bool,
         identity: Identity<'static>,
     ) -> &'static mut Node<'static> {
         let layout = Layout::for_bits(Converter::CODE_BITS);
         let node = Node::new(parameters, by_fault, layout, identity);
-        place.insert(node.recording(cfg!(feature = "record")))
+        place.write(node.recording(cfg!(feature = "record")))
     }
 
     #[idle]
@@ -222,101 +219,101 @@ mod app {
         binds = TIM2,
         priority = 1,
         local = [
-            clock, schedule, open, acquisition, node, facts, zero, records, random, reset_waits,
-            watchdog, led, servo, overrun_ticks
+            clock, schedule, open, acquisition, node, facts, zero, records, random,
+            silence_waits, watchdog, stopwatch, led, servo, overrun_ticks
         ],
         shared = [bus]
     )]
     fn tick(cx: tick::Context) {
-        let tick::LocalResources {
-            clock,
-            schedule,
-            open,
-            acquisition,
-            node,
-            facts,
-            zero,
-            records,
-            random,
-            reset_waits,
-            watchdog,
-            led,
-            servo,
-            overrun_ticks,
-            ..
-        } = cx.local;
+        let local = cx.local;
         let bus = cx.shared.bus;
 
-        let alarms = clock.take_alarms();
+        let alarms = local.clock.take_alarms();
         if alarms.tick {
-            let started_us = clock.now_us();
-            let tick = schedule.start_tick(started_us);
-            acquisition.trigger(&mut Cycles);
-            clock.set_tick_alarm(schedule.due_us());
+            let started_us = local.clock.now_us();
+            let tick = local.schedule.start_tick(started_us);
+            local.acquisition.trigger(&mut Cycles);
+            local.clock.set_alarm::<TICK>(local.schedule.due_us());
             // A tick that is still open is abandoned: it never feeds the watchdog.
-            if open.replace(tick).is_some() {
-                *overrun_ticks = overrun_ticks.saturating_add(1);
+            if local.open.replace(tick).is_some() {
+                *local.overrun_ticks = local.overrun_ticks.saturating_add(1);
             }
             if Converter::SETTLE_US > 0 {
-                clock.set_settled_alarm(started_us.wrapping_add(Converter::SETTLE_US));
+                local
+                    .clock
+                    .set_alarm::<SETTLED>(started_us.wrapping_add(Converter::SETTLE_US));
                 return;
             }
         } else if !alarms.settled {
             return;
         }
-        let Some(tick) = open.take() else { return };
+        let Some(tick) = local.open.take() else {
+            return;
+        };
 
         let sampled_us = tick.started_us.wrapping_add(Converter::SAMPLE_US);
-        let sample = acquisition.sample(tick.sequence, sampled_us, &mut Cycles);
+        let sample = local
+            .acquisition
+            .sample(tick.sequence, sampled_us, &mut Cycles);
         bus.start_tick();
-        if node.wants_reset() {
-            *reset_waits += 1;
-            if bus.is_idle() || *reset_waits > RESET_TICKS_MAX {
-                SCB::sys_reset();
-            }
+        // What tells of it has left, or nobody listens.
+        let is_silent = bus.is_idle() || *local.silence_waits > SILENCE_TICKS_MAX;
+        let waits = local.node.wants_reset() || local.node.is_storing();
+        *local.silence_waits = if waits { *local.silence_waits + 1 } else { 0 };
+        if local.node.wants_reset() && is_silent {
+            fault::update(Retained::activate);
+            SCB::sys_reset();
         }
-        facts.missed_ticks = schedule.missed();
-        facts.bus_off = bus.bus_off();
-        facts.note_bus(bus.takes_part());
-        facts.servo_off_pin = Some(servo.is_high());
+        local.facts.missed_ticks = local.schedule.missed();
+        local.facts.bus_off = bus.bus_off();
+        let is_low = local.records.flash().supply.is_low();
+        (local.facts).note(board_check::SUPPLY_LOW, is_low);
+        (local.facts).note(board_check::CAN_NOT_STARTED, !bus.takes_part());
+        local.facts.servo_off_pin = board::servo_is_off(local.servo);
         let sample = sample.map_err(|fault| SampleFault::from(&fault));
-        let reading = node.tick(sample, facts, &mut Fpu, &mut bus.outbox);
+        let reading = local
+            .node
+            .tick(sample, local.facts, &mut Fpu, &mut bus.outbox);
         // After the pose, whose frames then find the mailboxes empty.
-        bus.receive(node, records, random);
+        bus.receive(local.node, local.records, local.random);
         bus.send();
-        led.set_state(PinState::from(node.light()));
-        zero.keep(node.zero());
-        if node.ticks() == PROVEN_TICKS {
+        local.led.set_state(PinState::from(local.node.light()));
+        local.zero.keep(local.node.zero());
+        if local.node.ticks() == PROVEN_TICKS {
             fault::update(Retained::prove);
-            records.prove();
         }
-        node.update(&mut bus.outbox, records);
+        if waits && is_silent {
+            // A sector is erased, and the core stands meanwhile.
+            local.watchdog.set_period(CORE_MHZ, true, local.stopwatch);
+            local.node.store(&mut bus.outbox, local.records);
+            local.watchdog.set_period(CORE_MHZ, false, local.stopwatch);
+        }
         bus.send();
 
-        let (state, reason) = node.state();
+        let (state, reason) = local.node.state();
         STAGE.put(&Ended {
             state: (state as u8, reason),
-            ticks: node.ticks(),
+            ticks: local.node.ticks(),
             sequence: tick.sequence,
             time_us: tick.started_us,
             reading,
-            counters: Counters {
-                missed_ticks: schedule.missed(),
-                overrun_ticks: *overrun_ticks,
-                adc_faults: acquisition.faults(),
-                adc_starts: acquisition.starts(),
-                frames_sent: bus.sent(),
-                frames_dropped: bus.outbox.dropped(),
-                bus_off: bus.bus_off(),
-                fpu_restored: node.fpu_restored(),
-            },
+            counters: [
+                local.schedule.missed(),
+                *local.overrun_ticks,
+                local.acquisition.faults(),
+                local.acquisition.starts(),
+                bus.sent(),
+                bus.outbox.dropped(),
+                bus.bus_off(),
+                local.node.fpu_restored(),
+            ],
         });
-        let now_us = clock.now_us();
+        let now_us = local.clock.now_us();
         STAGE.put_duration(now_us.wrapping_sub(tick.started_us));
         if tick.on_schedule(now_us) {
-            watchdog.feed();
+            local.watchdog.feed();
         } else {
-            *overrun_ticks = overrun_ticks.saturating_add(1);
+            *local.overrun_ticks = local.overrun_ticks.saturating_add(1);
         }
     }
 

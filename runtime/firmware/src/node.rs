@@ -12,7 +12,7 @@ use embedded_can::Frame;
 use hal_adapters::can::command::Told;
 use hal_adapters::can::service::Updates;
 pub use hal_adapters::can::status::BoardFacts;
-use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus, board_check, flag};
+use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus, bit, board_check, flag};
 use hal_adapters::can::table::{Message, SLOW_TICKS};
 use hal_adapters::can::update::{Identity, Nonce, Receiver, Store};
 use hal_adapters::can::{Layout, PROTOCOL_VERSION, PoseSender, Service, sensor};
@@ -26,16 +26,8 @@ const TICKS_PER_SECOND: u32 = 1_000_000 / crate::schedule::PERIOD_US;
 /// The reading of a tick that gave no pose.
 const NOTHING: Reading = Reading {
     pose: runtime::Pose {
-        planar: PlanarPose {
-            x_m: 0.0,
-            y_m: 0.0,
-            rz_rad: 0.0,
-        },
-        vertical: runtime::VerticalPose {
-            z_m: 0.0,
-            rx_rad: 0.0,
-            ry_rad: 0.0,
-        },
+        planar: PlanarPose::ZERO,
+        vertical: runtime::VerticalPose::ZERO,
     },
     status: Status::PLANAR_INVALID.with(Status::VERTICAL_INVALID),
 };
@@ -47,21 +39,18 @@ pub struct Facts {
     pub missed_ticks: u32,
     /// Times the bus was off.
     pub bus_off: u32,
-    /// Whether the service pin says that the servo is off; `None`: this board has no such pin.
+    /// Whether the service pin says that the servo is off; `None`: this board has no such pin. Then a
+    /// node without a key takes the servo for on: whoever can send could declare it off.
     pub servo_off_pin: Option<bool>,
-    /// Whether the core runs on its internal oscillator.
-    pub internal_oscillator: bool,
     /// What the start-up found.
     pub board: BoardFacts,
 }
 
 impl Facts {
-    /// Notes whether the CAN controller takes part in the bus.
-    pub const fn note_bus(&mut self, takes_part: bool) {
-        self.board.board_checks &= !board_check::CAN_NOT_STARTED;
-        if !takes_part {
-            self.board.board_checks |= board_check::CAN_NOT_STARTED;
-        }
+    /// Notes what a check of the board, a bit of [`board_check`], finds now.
+    pub const fn note(&mut self, check: u32, fails: bool) {
+        self.board.board_checks &= !check;
+        self.board.board_checks |= bit(check, fails);
     }
 }
 
@@ -75,6 +64,7 @@ pub struct Node<'d> {
     sender: PoseSender,
     service: Service,
     receiver: Receiver<'d>,
+    has_key: bool,
     ticks: u32,
     state: (NodeState, u8),
     fpu_restored: u32,
@@ -97,6 +87,7 @@ impl<'d> Node<'d> {
             layout,
             sender: PoseSender::default(),
             service: Service::new(TICKS_PER_SECOND),
+            has_key: identity.key.is_some(),
             receiver: Receiver::new(identity, TICKS_PER_SECOND),
             ticks: 0,
             state: (NodeState::Starting, 0),
@@ -170,7 +161,8 @@ impl<'d> Node<'d> {
         outbox: &mut Outbox,
     ) -> Reading {
         let servo = self.parameters.servo_mut();
-        self.service.before_tick(servo, facts.servo_off_pin);
+        let without_pin = (!self.has_key).then_some(false);
+        (self.service).before_tick(servo, facts.servo_off_pin.or(without_pin));
         let reading = self.decode(&sample, fpu);
         let is_updating = self.receiver.is_updating();
         self.state = state_of(&self.parameters, is_updating, &sample, &reading);
@@ -187,9 +179,11 @@ impl<'d> Node<'d> {
         let answer = self.service.tick(servo.as_deref());
         let page = self.service.identity_page(self.parameters.serial());
         let was_off = core::mem::replace(&mut self.bus_off_told, facts.bus_off) != facts.bus_off;
+        self.receiver.tick(self.service.servo_is_off());
         let due = match self.ticks % u32::from(SLOW_TICKS) {
             0 => Some(Told::Status(self.status(facts))),
-            _ if was_off => Some(Told::Status(self.status(facts))),
+            // A receiver must know why frames stay away.
+            _ if was_off || self.is_storing() => Some(Told::Status(self.status(facts))),
             8 => {
                 let number = self.ticks / u32::from(SLOW_TICKS);
                 let page = HealthPage::of(&self.health(), Some(&facts.board), number);
@@ -226,9 +220,15 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// A step of an update, if one runs: at the end of a tick, as it may take 0.2 ms and more.
-    pub fn update(&mut self, outbox: &mut Outbox, store: &mut dyn Store) {
-        let answer = self.receiver.tick(self.service.servo_is_off(), store);
+    /// Whether [`Node::store`] is to be called at the end of a tick before which nothing was left to
+    /// be sent.
+    pub const fn is_storing(&self) -> bool {
+        self.receiver.is_storing()
+    }
+
+    /// Stores new parameters: takes half a second.
+    pub fn store(&mut self, outbox: &mut Outbox, store: &mut dyn Store) {
+        let answer = self.receiver.store(self.service.servo_is_off(), store);
         let told = answer.and_then(|answer| self.service.tell(&Told::Answer(answer)));
         told.into_iter().for_each(|frame| outbox.push(frame));
     }
@@ -284,12 +284,13 @@ impl<'d> Node<'d> {
     fn status(&self, facts: &Facts) -> NodeStatus {
         let on = |bit, is| if is { bit } else { 0 };
         let (state, reason) = self.state;
+        let by_internal = facts.board.board_checks & board_check::INTERNAL_OSCILLATOR != 0;
         NodeStatus {
             state: Some(state),
             reason,
             flags: on(flag::WATCHDOG_RESET, self.watchdog_reset)
                 | on(flag::BUS_WAS_OFF, facts.bus_off > 0)
-                | on(flag::INTERNAL_OSCILLATOR, facts.internal_oscillator)
+                | on(flag::INTERNAL_OSCILLATOR, by_internal)
                 | self.service.flags(self.parameters.servo()),
             missed_ticks: u16::try_from(facts.missed_ticks).unwrap_or(u16::MAX),
             bus_off: u8::try_from(facts.bus_off).unwrap_or(u8::MAX),

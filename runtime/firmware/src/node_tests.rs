@@ -1,13 +1,16 @@
 extern crate std;
 
 use super::*;
-use crate::records::Records;
-use crate::slots::{Loaded, Refusal, load};
-use crate::store::Record;
+use crate::records::{Choice, Loaded, Records, Refusal};
 use crate::store::flash_model::FlashModel;
 use hal_adapters::adc::AdcError;
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request};
 use hal_adapters::can::{BusFrame, SensorReceiver, Timing};
+use runtime::calibration::{Calibration, Origin};
+use runtime::frame::CodeWindow;
+use runtime::geometry::ProbeGeometry;
+use runtime::model::{ModelKind, Probes, Sensitivity};
+use runtime::parameters::Text;
 use runtime::{OnInvalid, Servo};
 use std::boxed::Box;
 use std::vec::Vec;
@@ -26,9 +29,51 @@ impl FpuSettings for Disturbed {
     }
 }
 
+const WINDOW: CodeWindow = CodeWindow {
+    low: -32767,
+    high: 32766,
+};
+
+/// A blob of this stage.
+fn blob(serial: &str) -> Vec<u8> {
+    let calibration = Calibration {
+        model: ModelKind::M31,
+        geometry: ProbeGeometry {
+            lever_arm_m: [0.19, -0.21, -0.34],
+            misalignment_rad: [0.01, -0.02, 0.03],
+        },
+        probes: Probes::Linear(
+            [Sensitivity {
+                eta: 0.8,
+                per_z_m: -190.0,
+                per_rx_rad: -70.0,
+                per_ry_rad: 15.0,
+            }; 3],
+        ),
+        hall_m_per_code: 6.25e-8,
+        hall_window: WINDOW,
+        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
+        capacitive_m_per_code: 1.5625e-8,
+        capacitive_window: WINDOW,
+        calibrated_planar: [1e-3; 3],
+        calibrated_vertical: [5e-4; 3],
+        sensitivity_min: 0.1,
+    };
+    let origin = Origin {
+        serial: Text::try_from(serial).expect("short"),
+        ..Origin::default()
+    };
+    let set = calibration.prepare(&origin).expect("a sound calibration");
+    let mut buffer = [0; runtime::blob::MAX_BYTES];
+    set.to_bytes(&mut buffer).expect("it fits").to_vec()
+}
+
 fn loaded() -> &'static Loaded {
-    let memory = crate::slots::tests::slot("stage-7", "");
-    Box::leak(Box::new(load(&memory).expect("a sound slot")))
+    let mut flash = FlashModel::erased();
+    flash.load(0, &blob("stage-7"));
+    let (mut records, _) = Records::start(&mut flash, Choice::Newest, None);
+    let place = Box::leak(Box::new(core::mem::MaybeUninit::uninit()));
+    records.load(Choice::Newest, place).expect("a sound slot")
 }
 
 fn node() -> Node<'static> {
@@ -49,8 +94,7 @@ const IDENTITY: Identity<'_> = Identity {
 };
 
 fn take(node: &mut Node<'_>, frame: &impl Frame, outbox: &mut Outbox) {
-    let record = Box::leak(Box::new(Record::EMPTY));
-    let (mut records, _) = Records::start(FlashModel::erased(), record, None::<&str>, false);
+    let (mut records, _) = Records::start(FlashModel::erased(), Choice::Newest, None);
     node.take(frame, outbox, &mut records, None);
 }
 
@@ -69,12 +113,11 @@ fn tick(
     sample: Result<RawFrame, SampleFault>,
 ) -> Vec<hal_adapters::can::Coded> {
     let mut outbox = Outbox::new();
-    node.tick(
-        sample,
-        &Facts::default(),
-        &mut Disturbed::default(),
-        &mut outbox,
-    );
+    let facts = Facts {
+        servo_off_pin: Some(true),
+        ..Facts::default()
+    };
+    node.tick(sample, &facts, &mut Disturbed::default(), &mut outbox);
     core::iter::from_fn(|| outbox.pop()).collect()
 }
 
@@ -166,10 +209,7 @@ fn a_fault_of_the_converter_is_a_state_and_an_invalid_pose() {
 
 #[test]
 fn without_parameters_there_are_states_but_no_poses() {
-    let refusal = Refusal {
-        reason: 7,
-        erased: false,
-    };
+    let refusal = Refusal { reason: 7 };
     let mut node = Node::new(Parameters::None { refusal }, true, Layout::Bits16, IDENTITY);
     for k in 0..32 {
         let frames = tick(&mut node, Ok(frame(k)));
@@ -325,4 +365,35 @@ fn a_remote_frame_or_a_foreign_one_is_no_command() {
     let foreign = BusFrame::new(embedded_can::StandardId::MAX, &[0; 8]).expect("eight bytes");
     take(&mut node, &foreign, &mut outbox);
     assert_eq!(outbox.front(true), None);
+}
+
+/// The line must say so; without a line, the key must, and without both nothing moves the pose.
+#[test]
+fn the_servo_counts_as_on_unless_the_line_says_off_or_a_key_stands_in_for_it() {
+    let key = Some([7; 16]);
+    for (line, key, outcome) in [
+        (Some(true), None, Outcome::Done),
+        (Some(true), key, Outcome::Done),
+        (Some(false), key, Outcome::ServoOn),
+        (None, key, Outcome::Done),
+        (None, None, Outcome::ServoOn),
+    ] {
+        let loaded = loaded();
+        let parameters = Parameters::at_start(Some(loaded), None, None, true);
+        let identity = Identity { key, ..IDENTITY };
+        let mut node = Node::new(parameters, false, Layout::Bits24, identity);
+        let facts = Facts {
+            servo_off_pin: line,
+            ..Facts::default()
+        };
+        let mut outbox = Outbox::new();
+        node.tick(Ok(frame(0)), &facts, &mut Disturbed::default(), &mut outbox);
+        ask(&mut node, Request::ServoOff { seconds: 9 }, 1);
+        let told = ask(&mut node, Request::ClearZero, 2);
+        let answered = told.iter().find_map(|told| match told {
+            Told::Answer(answer) => answer.outcome,
+            _ => None,
+        });
+        assert_eq!(answered, Some(outcome), "{line:?} {key:?}");
+    }
 }

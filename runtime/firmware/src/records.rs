@@ -1,78 +1,163 @@
-//! The parameters that the controller keeps in flash: which it runs, and new ones that come over
-//! the bus.
+//! The parameters that the controller keeps in flash: which it runs, what is told of the others, and
+//! new ones that come over the bus.
 
-use crate::slots::{self, Loaded, Refusal};
-use crate::store::{self, Check, Flash, Record, Sector, Step, Store, Stored, Writing};
-use hal_adapters::can::update::{self, Change, Kept, Running, Written, crc_of};
-use runtime::blob::MAGIC;
+use crate::store::{self, Contents, Flash, FlashFault, Image, SLOTS, Stored};
+use core::mem::MaybeUninit;
+use hal_adapters::can::update::{Change, Kept, NotWritten, Running, Store};
+use runtime::blob::{BlobError, MAX_BYTES};
+use runtime::parameters::{FitRecord, Text};
+use runtime::{AnyDecoder, ParameterSet};
 
-/// Words that are programmed in one tick: 0.2 ms at most on an STM32F405 (DS8626, flash memory
-/// programming), in which the core stands.
-const WORDS_PER_TICK: usize = 2;
+/// Which blob a start runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// The newest: after power-on, and once it was activated.
+    Newest,
+    /// The one with this CRC, which ran before the reset.
+    Blob(u32),
+    /// None, and none is looked into.
+    Nothing,
+}
 
-/// The store with its flash.
+/// Why a slot is not used, in one byte for the status frame: the number of the slot in bits 4 to 6
+/// and [`BlobError::number`] below.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// The byte.
+    pub reason: u8,
+}
+
+impl Refusal {
+    /// Both slots are empty.
+    pub const NEITHER: Self = Self { reason: 2 };
+
+    fn of(slot: u8, error: &BlobError) -> Self {
+        let reason = slot << 4 | error.number();
+        Self { reason }
+    }
+}
+
+/// What a sound blob gives.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The decoder.
+    pub decoder: AnyDecoder,
+    /// Serial number of the stage.
+    pub serial: Text,
+    /// When it was made.
+    pub created: Text,
+    /// The errors of its fit.
+    pub fit: FitRecord,
+    /// CRC of the blob.
+    pub crc: u32,
+}
+
+/// Both slots with their flash.
 #[derive(Debug)]
 pub struct Records<F> {
     flash: F,
-    store: Store,
+    /// The blobs that may run.
+    stored: [Option<Stored>; SLOTS],
+    /// The highest sequence number of any blob.
+    highest: u32,
     running: Option<(Stored, &'static Loaded)>,
-    record: &'static mut Record,
-    /// Whether the record is put together.
-    is_ready: bool,
-    writing: Option<Writing>,
-}
-
-/// What the start-up found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Found {
-    /// The blob to run, if there is one.
-    pub blob: Option<Stored>,
-    /// The worst that is to be told.
-    pub refusal: Option<Refusal>,
 }
 
 impl<F: Flash> Records<F> {
-    /// At start-up: looks at both sectors, settles what was interrupted, erases one if there is no
-    /// room for an update (500 ms at most, on an STM32F405). `is_faulty` is whether the newest blob
-    /// made the program fault twice, [`Check::suspect`] a blob whose check did. Then another one is
-    /// used, from now on if that can be written, else until the next start. If there is no other,
-    /// or the newest record itself passes over another, whose faults then had another cause,
-    /// none is used, and the next start tries again. `record` is the room in which records are put
-    /// together.
-    pub fn start(
-        mut flash: F,
-        record: &'static mut Record,
-        check: impl Into<Check>,
-        is_faulty: bool,
-    ) -> (Self, Found) {
-        let mut check = check.into();
-        // The start may erase a blob, and may renew what is neither a blob nor a journal.
-        let damaged = plain(&flash, &check, |memory| memory.starts_with(&MAGIC));
-        let newest = is_faulty
-            .then(|| Store::read(&flash, check))
-            .and_then(|store| Some((store.newest()?, store.passed_over().is_some())));
-        let is_last = newest.is_some_and(|(_, passes_over)| passes_over);
-        if let Some((newest, false)) = newest {
-            check.suspect = crc_of(newest.blob(&flash));
-        }
-        let store = Store::start(&mut flash, check);
+    /// At start-up: settles what was interrupted and looks at both slots. Blobs of another stage than
+    /// `serial` are refused. Gives what is wrong with a slot, slot 0 first.
+    pub fn start(mut flash: F, choice: Choice, serial: Option<&str>) -> (Self, Option<Refusal>) {
+        store::settle(&mut flash);
         let mut records = Self {
             flash,
-            store,
+            stored: [None; SLOTS],
+            highest: 0,
             running: None,
-            record,
-            is_ready: false,
-            writing: None,
         };
-        let blob = match (check.suspect, is_last) {
-            (Some(_), _) => records.pass_over().or(records.store.newest()),
-            (None, true) => None,
-            (None, false) => records.store.newest(),
+        let mut refusal = None;
+        for slot in [0, 1] {
+            let looked = records.look(slot, choice, serial);
+            if let Some(to) = records.stored.get_mut(usize::from(slot)) {
+                *to = looked.unwrap_or_default();
+            }
+            if let Err(error) = looked {
+                refusal.get_or_insert(Refusal::of(slot, &error));
+            }
+        }
+        (records, refusal)
+    }
+
+    /// The blob of a slot, if it is sound. A parameter set has 700 bytes: in a function of its own, it
+    /// leaves the stack at once.
+    #[inline(never)]
+    fn look(
+        &mut self,
+        slot: u8,
+        choice: Choice,
+        serial: Option<&str>,
+    ) -> Result<Option<Stored>, BlobError> {
+        let read = Image::read(&mut self.flash, slot);
+        let Ok(image) = read.as_ref() else {
+            return Ok(None);
         };
-        let has_faulted = check.suspect.is_some() || is_last;
-        let refusal = (records.refusal(has_faulted).or(damaged))
-            .or_else(|| plain(&records.flash, &check, |_| true));
-        (records, Found { blob, refusal })
+        match image.contents() {
+            Contents::Nothing => return Ok(None),
+            Contents::Damaged => {
+                return Err(BlobError::BadCrc {
+                    stored: 0,
+                    computed: 0,
+                });
+            }
+            Contents::Plain | Contents::Committed(_) => {}
+        }
+        let stored = image.stored(slot);
+        self.highest = self.highest.max(stored.map_or(0, |stored| stored.sequence));
+        if choice == Choice::Nothing {
+            return Ok(stored);
+        }
+        match check(image.blob(), serial) {
+            Ok(()) => Ok(stored),
+            Err(BlobError::Erased) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Reads the blob that is to run, which runs from now on. `None` if it is not there.
+    #[inline(never)]
+    pub fn load(
+        &mut self,
+        choice: Choice,
+        place: &'static mut MaybeUninit<Loaded>,
+    ) -> Option<&'static Loaded> {
+        let stored = match choice {
+            Choice::Newest => self.latest(|_| true),
+            Choice::Blob(crc) => self.latest(|stored| stored.crc == crc),
+            Choice::Nothing => None,
+        }?;
+        let image = Image::read(&mut self.flash, stored.slot).ok()?;
+        let read = ParameterSet::from_flash(image.blob());
+        let set = read.as_ref().ok()?;
+        let loaded: &'static Loaded = place.write(Loaded {
+            decoder: set.decoder(),
+            serial: set.serial.clone(),
+            created: set.created.clone(),
+            fit: set.fit,
+            crc: stored.crc,
+        });
+        self.running = Some((stored, loaded));
+        Some(loaded)
+    }
+
+    /// Of these blobs the one with the highest sequence number; of two equal ones that in slot 0.
+    fn latest(&self, is_meant: impl Fn(&Stored) -> bool) -> Option<Stored> {
+        let stored = self.stored.iter().rev().flatten().copied();
+        stored.filter(is_meant).max_by_key(|stored| stored.sequence)
+    }
+
+    /// The other one than the newest, if it differs.
+    fn before(&self) -> Option<Stored> {
+        let newest = self.latest(|_| true)?;
+        self.latest(|stored| stored.slot != newest.slot && stored.crc != newest.crc)
     }
 
     /// The flash as it is now.
@@ -80,98 +165,53 @@ impl<F: Flash> Records<F> {
         &self.flash
     }
 
-    fn refusal(&self, has_faulted: bool) -> Option<Refusal> {
-        if has_faulted || self.store.passed_over().is_some() {
-            return Some(Refusal::PASSED_OVER);
-        }
-        if self.store.fault().is_some() {
-            return Some(Refusal::NOT_WRITTEN);
-        }
-        let rejected = self.store.rejected().filter(|blob| blob.sequence > 0)?;
-        Some(Refusal::of(rejected.sector as u8, &rejected.error))
+    /// The slot that may be erased: not that of the blob that runs, nor, where none runs, of the newest.
+    fn spare(&self) -> u8 {
+        let running = self.running.map(|(stored, _)| stored);
+        let kept = running.or_else(|| self.latest(|_| true));
+        kept.map_or(0, |kept| 1 - kept.slot)
     }
 
-    /// The record that is written for it, with what runs in its place.
-    fn pass_over(&mut self) -> Option<Stored> {
-        self.store.pass_over(&self.flash, self.record).ok()?;
-        let mut writing = self.store.begin(&self.flash, self.record).ok()?;
-        for _ in 0..writing.words() {
-            writing.step(&mut self.flash, self.record).ok()?;
-        }
-        self.store.finish(&self.flash, &writing);
-        self.store.newest()
-    }
-
-    /// Reads a blob that [`Records::start`] found, which runs from now on.
-    #[inline(never)]
-    pub fn load(
+    fn try_write(
         &mut self,
-        blob: Stored,
-        place: &'static mut Option<Loaded>,
-    ) -> Option<&'static Loaded> {
-        let loaded: &'static Loaded = place.insert(slots::load(blob.blob(&self.flash))?);
-        self.running = Some((blob, loaded));
-        Some(loaded)
-    }
-
-    /// What runs has run long enough to be proven: the next start may erase what was before it. One
-    /// word of flash at most, two if one is worn.
-    pub fn prove(&mut self) {
-        let running = self.running.as_ref().map(|(stored, _)| *stored);
-        if running == self.store.newest() {
-            self.store.prove(&mut self.flash);
-        }
-    }
-
-    /// Puts the record together: in a tick of its own, as is [`Records::begin`].
-    fn make(&mut self, sequence: u32, change: Change<'_>) -> Option<()> {
-        let (store, record) = (&self.store, &mut *self.record);
-        match change {
-            Change::Blob(blob) => {
-                record.room().get_mut(..blob.len())?.copy_from_slice(blob);
-                store.update(record, blob.len(), sequence).ok()
+        slot: u8,
+        sequence: u32,
+        change: Change<'_>,
+    ) -> Result<Stored, FlashFault> {
+        match (change, self.before()) {
+            (Change::Blob(blob), _) => store::write(&mut self.flash, slot, sequence, blob),
+            (Change::Previous, Some(before)) => {
+                let image = Image::read(&mut self.flash, before.slot)?;
+                let blob = image.blob().get(..before.bytes as usize);
+                let blob = blob.unwrap_or_default();
+                store::write(&mut self.flash, slot, sequence, blob)
             }
-            Change::Previous if store.due() == Some(sequence) => {
-                store.go_back(&self.flash, record).ok()
-            }
-            Change::Previous => None,
+            (Change::Previous, None) => Err(FlashFault::ReadsOtherwise { offset: 0 }),
         }
-    }
-
-    fn kept(&self, stored: Option<Stored>) -> Option<Kept> {
-        let stored = stored?;
-        let crc = crc_of(stored.blob(&self.flash))?;
-        Some(Kept {
-            sequence: stored.sequence,
-            crc,
-        })
-    }
-
-    /// Begins to write it.
-    fn begin(&mut self) -> Option<()> {
-        self.writing = Some(self.store.begin(&self.flash, self.record).ok()?);
-        Some(())
     }
 }
 
-/// What is wrong with the plain contents of the sectors that are looked at.
-#[inline(never)]
-fn plain(flash: &impl Flash, check: &Check, is_looked_at: fn(&[u8]) -> bool) -> Option<Refusal> {
-    let memory =
-        |sector| Some(store::readable(flash, sector)).filter(|memory| is_looked_at(memory));
-    slots::refusal(
-        Sector::ALL.map(|sector| memory(sector).unwrap_or_default()),
-        check,
-    )
+/// Whether a blob, with what follows it or without, is sound and that of the stage.
+fn check(memory: &[u8], serial: Option<&str>) -> Result<(), BlobError> {
+    let read = ParameterSet::from_flash(memory);
+    let set = read.as_ref().map_err(|error| *error)?;
+    serial.map_or(Ok(()), |serial| set.expect_serial(serial))
 }
 
-impl<F: Flash> update::Store for Records<F> {
+const fn kept(stored: Stored) -> Kept {
+    let Stored { sequence, crc, .. } = stored;
+    Kept { sequence, crc }
+}
+
+impl<F: Flash> Store for Records<F> {
     fn running(&self) -> Option<Running<'_>> {
         let (stored, loaded) = self.running.as_ref()?;
         Some(Running {
-            slot: stored.sector as u8,
+            slot: stored.slot,
             sequence: stored.sequence,
-            blob: stored.blob(&self.flash),
+            crc: stored.crc,
+            bytes: stored.bytes,
+            is_forced: loaded.fit.forced,
             serial: &loaded.serial,
             created: &loaded.created,
             rms: loaded.fit.rms,
@@ -179,52 +219,41 @@ impl<F: Flash> update::Store for Records<F> {
         })
     }
 
+    fn word(&mut self, index: usize) -> Option<u32> {
+        let (stored, loaded) = self.running?;
+        let image = Image::read(&mut self.flash, stored.slot).ok()?;
+        // An update may have written another one into its slot.
+        let is_there = image.stored(stored.slot)?.crc == loaded.crc;
+        let blob = image.blob().get(..(stored.bytes as usize).min(MAX_BYTES))?;
+        hal_adapters::can::update::word_of(blob, index).filter(|_| is_there)
+    }
+
     fn newest(&self) -> Option<Kept> {
-        self.kept(self.store.newest())
+        self.latest(|_| true).map(kept)
     }
 
     fn previous(&self) -> Option<Kept> {
-        self.kept(self.store.previous())
+        self.before().map(kept)
     }
 
     fn newest_sequence(&self) -> u32 {
-        self.store.due().map_or(u32::MAX, |due| due - 1)
+        self.highest
     }
 
-    fn is_writable(&self) -> bool {
-        self.store.is_writable()
-    }
-
-    fn has_room(&self) -> bool {
-        self.store.has_room(&self.flash)
-    }
-
-    fn write(&mut self, sequence: u32, change: Change<'_>) -> Written {
-        let Some(mut writing) = self.writing.take() else {
-            let is_begun = core::mem::replace(&mut self.is_ready, false);
-            let done = if is_begun {
-                self.begin()
-            } else {
-                self.make(sequence, change)
-            };
-            self.is_ready = !is_begun && done.is_some();
-            return match done {
-                Some(()) => Written::InProgress,
-                None => Written::Failed,
-            };
-        };
-        for _ in 0..WORDS_PER_TICK {
-            match writing.step(&mut self.flash, self.record) {
-                Ok(Step::More) => {}
-                Ok(Step::Done) => {
-                    self.store.finish(&self.flash, &writing);
-                    return Written::Done;
-                }
-                Err(_) => return Written::Failed,
-            }
+    fn write(&mut self, sequence: u32, change: Change<'_>) -> Result<(), NotWritten> {
+        let slot = self.spare();
+        let written = self.try_write(slot, sequence, change);
+        // What a failure has left there is what was there before, or nothing.
+        let left = Image::read(&mut self.flash, slot).ok();
+        if let Some(to) = self.stored.get_mut(usize::from(slot)) {
+            *to =
+                to.filter(|before| left.and_then(|left| left.stored(before.slot)) == Some(*before));
+            *to = written.ok().or(*to);
         }
-        self.writing = Some(writing);
-        Written::InProgress
+        if let Ok(stored) = written {
+            self.highest = stored.sequence;
+        }
+        written.map(|_| ()).map_err(NotWritten::from)
     }
 }
 

@@ -1,5 +1,5 @@
 //! What survives a reset in RAM that the start-up code leaves alone: the step of the start-up
-//! that was running, the last fault, and the zero deviation.
+//! that was running, the last fault, the parameters that ran, and the zero deviation.
 //!
 //! After power-on that RAM holds anything, and its content is not read. After any other reset
 //! it is used only if its check is right.
@@ -8,15 +8,16 @@ use crc::{CRC_32_ISCSI, Crc, NoTable};
 use runtime::PlanarPose;
 
 /// Words of the record with its check.
-pub const WORDS: usize = 11;
+pub const WORDS: usize = 10;
 
 /// Marks a record of this layout.
-const MAGIC: u32 = 0x5354_4732;
+const MAGIC: u32 = 0x5354_4733;
 /// Bits of the first word besides the step.
 const CRASHED_BIT: u32 = 8;
 const PROVEN_BIT: u32 = 9;
+const ACTIVATED_BIT: u32 = 10;
 const EARLY_SHIFT: u32 = 16;
-/// After so many early faults in a row the parameters are blamed.
+/// After so many early faults in a row the program stops.
 const EARLY_MAX: u8 = 2;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
@@ -66,18 +67,6 @@ pub enum FaultKind {
     Watchdog = 5,
 }
 
-/// Parameters that made the program fault twice in a row at its start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Blamed {
-    /// Those that it used.
-    Newest,
-    /// Those that it had begun to check.
-    Blob {
-        /// CRC of the blob.
-        crc: u32,
-    },
-}
-
 /// The last fault, as words.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Fault {
@@ -106,15 +95,6 @@ impl Fault {
     }
 }
 
-/// A zero deviation and the blob that it was measured with.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct KeptZero {
-    /// CRC of that blob.
-    pub blob: u32,
-    /// The zero deviation, m and rad.
-    pub zero: PlanarPose<f32>,
-}
-
 /// The record.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Retained {
@@ -126,111 +106,102 @@ pub struct Retained {
     pub faults: u32,
     /// Whether the last fault is the cause of this start.
     pub crashed: bool,
-    /// Faults in a row that came while the parameters were read, or in the first ticks with them.
-    /// Saturates.
+    /// Faults in a row in the first second. Saturates.
     pub early_faults: u8,
-    /// CRC of the blob that is being checked; 0: none.
-    pub checked_blob: u32,
-    /// Whether the ticks since this start are enough to say that the parameters are not at fault.
+    /// Whether the program has run for a second since this start.
     pub proven: bool,
-    /// The zero deviation; that of an unmoved stage is zero.
-    pub zero: KeptZero,
+    /// Whether the newest parameters are to run, whatever ran before.
+    pub activated: bool,
+    /// CRC of the blob that runs, or ran last; 0: none since power-on.
+    pub running: u32,
+    /// The zero deviation that was measured with it, m and rad; that of an unmoved stage is zero.
+    pub zero: PlanarPose<f32>,
 }
 
 impl Retained {
-    /// In place of a record that is damaged: whether a zero deviation was set is not known, so
-    /// it is not a number, which [`crate::node::Node::restore_zero`] does not take.
+    /// In place of a record that is damaged: neither what ran nor whether a zero deviation was set is
+    /// known, so that is not a number, which [`crate::node::Node::restore_zero`] does not take.
     pub fn damaged() -> Self {
         let zero = PlanarPose {
             x_m: f32::NAN,
             ..PlanarPose::ZERO
         };
         Self {
-            zero: KeptZero { blob: 0, zero },
+            zero,
             ..Self::default()
         }
     }
 
-    /// Notes a fault in the step that runs.
-    pub const fn note(&mut self, kind: FaultKind, address: u32, detail: u32) {
+    /// Whether it is in place of a damaged one.
+    pub const fn is_damaged(&self) -> bool {
+        self.zero.x_m.is_nan()
+    }
+
+    /// Notes a fault in the step that runs. One of the crystal has its own remedy.
+    pub fn note(&mut self, kind: FaultKind, address: u32, detail: u32) {
         self.fault = Fault::new(kind, self.step, address, detail);
         self.faults = self.faults.saturating_add(1);
         self.crashed = true;
-        let by_core = matches!(
-            kind,
-            FaultKind::Panic | FaultKind::HardFault | FaultKind::StackOverflow
-        );
-        // Late ticks are the converter's or the bus's: decoding takes a bounded number of steps,
-        // whatever the parameters are. Blamed for them, sound parameters would be passed over.
-        let early = match self.step {
-            Step::Parameters => by_core || matches!(kind, FaultKind::Watchdog),
-            Step::Ticking => by_core && !self.proven,
-            _ => false,
-        };
-        if early {
+        if !self.proven && !self.fault.is_of_the_crystal() {
             self.early_faults = self.early_faults.saturating_add(1);
         }
     }
 
-    /// What made the program fault twice in a row at its start. Asked once in a start: the next
-    /// parameters begin anew.
-    pub const fn blames(&mut self) -> Option<Blamed> {
-        self.proven = false;
-        let checked = core::mem::replace(&mut self.checked_blob, 0);
-        if self.early_faults < EARLY_MAX {
-            return None;
-        }
+    /// The newest parameters run from the next start on; what was wrong is acknowledged.
+    pub fn activate(&mut self) {
+        self.activated = true;
         self.early_faults = 0;
-        Some(match checked {
-            0 => Blamed::Newest,
-            crc => Blamed::Blob { crc },
-        })
+        if self.is_damaged() {
+            self.zero = PlanarPose::ZERO;
+        }
     }
 
-    /// The program has run long enough with its parameters.
+    /// The blob of this CRC runs, with this zero deviation.
+    pub const fn runs(&mut self, crc: u32, zero: PlanarPose<f32>) {
+        (self.running, self.zero, self.activated) = (crc, zero, false);
+    }
+
+    /// Whether the program faulted twice in a row in its first second.
+    pub const fn has_faulted_twice(&self) -> bool {
+        self.early_faults >= EARLY_MAX
+    }
+
+    /// The program has run for a second. One that stopped stays so.
     pub const fn prove(&mut self) {
         self.proven = true;
-        self.early_faults = 0;
+        if !self.has_faulted_twice() {
+            self.early_faults = 0;
+        }
     }
 
     /// The words, the check last.
     pub fn to_words(&self) -> [u32; WORDS] {
-        let zero = self.zero.zero;
+        let zero = self.zero;
         let content = [
             MAGIC
                 ^ (self.step as u32
                     | (self.crashed as u32) << CRASHED_BIT
                     | (self.proven as u32) << PROVEN_BIT
+                    | (self.activated as u32) << ACTIVATED_BIT
                     | (self.early_faults as u32) << EARLY_SHIFT),
             self.fault.kind_and_step,
             self.fault.address,
             self.fault.detail,
             self.faults,
-            self.checked_blob,
-            self.zero.blob,
+            self.running,
             zero.x_m.to_bits(),
             zero.y_m.to_bits(),
             zero.rz_rad.to_bits(),
         ];
-        let [a, b, c, d, e, f, g, h, i, j] = content;
-        [a, b, c, d, e, f, g, h, i, j, check(&content)]
+        let [a, b, c, d, e, f, g, h, i] = content;
+        [a, b, c, d, e, f, g, h, i, check(&content)]
     }
 
     /// The record of these words, if its check is right.
     pub fn from_words(words: &[u32; WORDS]) -> Option<Self> {
         let [content @ .., stored] = words;
-        let [
-            state,
-            kind_and_step,
-            address,
-            detail,
-            faults,
-            checked_blob,
-            blob,
-            x,
-            y,
-            rz,
-        ] = *content;
+        let [state, kind_and_step, address, detail, rest @ ..] = *content;
+        let [faults, running, zero @ ..] = rest;
         let state = state ^ MAGIC;
         let step = *Step::ALL.get(usize::from(state as u8))?;
         (check(content) == *stored).then_some(Self {
@@ -241,18 +212,12 @@ impl Retained {
                 detail,
             },
             faults,
-            checked_blob,
             crashed: state >> CRASHED_BIT & 1 == 1,
             proven: state >> PROVEN_BIT & 1 == 1,
+            activated: state >> ACTIVATED_BIT & 1 == 1,
             early_faults: (state >> EARLY_SHIFT) as u8,
-            zero: KeptZero {
-                blob,
-                zero: PlanarPose {
-                    x_m: f32::from_bits(x),
-                    y_m: f32::from_bits(y),
-                    rz_rad: f32::from_bits(rz),
-                },
-            },
+            running,
+            zero: PlanarPose::from_array(zero.map(f32::from_bits)),
         })
     }
 }
@@ -274,15 +239,13 @@ mod tests {
             step: Step::Converter,
             faults: 3,
             early_faults: 1,
-            checked_blob: 0x89ab_cdef,
             proven: true,
-            zero: KeptZero {
-                blob: 0x1234_5678,
-                zero: PlanarPose {
-                    x_m: 1.5e-6,
-                    y_m: -2e-7,
-                    rz_rad: 3e-6,
-                },
+            activated: true,
+            running: 0x1234_5678,
+            zero: PlanarPose {
+                x_m: 1.5e-6,
+                y_m: -2e-7,
+                rz_rad: 3e-6,
             },
             ..Retained::default()
         };
@@ -311,49 +274,6 @@ mod tests {
         assert_eq!(record.fault.kind_and_step, 0x0502);
         assert_eq!((record.fault.address, record.faults), (0x0800_c124, 4));
         assert!(record.crashed);
-    }
-
-    #[test]
-    fn parameters_are_blamed_for_two_faults_in_a_row_at_their_start() {
-        let mut record = Retained::default();
-        let mut fault = |kind, step, proves| {
-            record.step = step;
-            if proves {
-                record.prove();
-            }
-            record.note(kind, 0, 0);
-            record.blames().is_some()
-        };
-        assert!(!fault(FaultKind::HardFault, Step::Ticking, true));
-        assert!(!fault(FaultKind::Watchdog, Step::Clocks, false));
-        assert!(!fault(FaultKind::Panic, Step::Ticking, false));
-        assert!(!fault(FaultKind::Watchdog, Step::Ticking, false));
-        assert!(!fault(FaultKind::HardFault, Step::Converter, false));
-        assert!(!fault(FaultKind::HardFault, Step::Ticking, true));
-        assert!(!fault(FaultKind::Watchdog, Step::Parameters, false));
-        assert!(fault(FaultKind::StackOverflow, Step::Ticking, false));
-        // Those that are used in their place begin anew.
-        assert!(!fault(FaultKind::Panic, Step::Ticking, false));
-        assert!(fault(FaultKind::Panic, Step::Ticking, false));
-        assert!(!fault(FaultKind::Panic, Step::Ticking, true));
-    }
-
-    #[test]
-    fn a_blob_is_blamed_if_the_second_fault_came_while_it_was_checked() {
-        let mut record = Retained::default();
-        for (first, second, blamed) in [
-            (7, 7, Blamed::Blob { crc: 7 }),
-            (0, 7, Blamed::Blob { crc: 7 }),
-            (7, 0, Blamed::Newest),
-        ] {
-            for (checked, expected) in [(first, None), (second, Some(blamed))] {
-                record.step = Step::Parameters;
-                record.checked_blob = checked;
-                record.note(FaultKind::HardFault, 0, 0);
-                assert_eq!(record.blames(), expected);
-                assert_eq!(record.checked_blob, 0);
-            }
-        }
     }
 
     #[test]

@@ -6,11 +6,11 @@
 use crate::board::{self, INTERNAL_MHZ};
 use crate::fault;
 use crate::wait::Stopwatch;
-use firmware::retained::{KeptZero, Step};
+use firmware::retained::Step;
 use firmware::start_up::{Before, Cause};
-use hal_adapters::can::status::{BoardFacts, board_check as check};
+use hal_adapters::can::status::{BoardFacts, bit, board_check};
 use runtime::PlanarPose;
-use stm32f4xx_hal::pac::{FLASH, RCC};
+use stm32f4xx_hal::pac::RCC;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 
@@ -18,36 +18,8 @@ use stm32f4xx_hal::rcc::Rcc;
 /// characteristics), and less than the shortest period of the watchdog.
 const CRYSTAL_US: u32 = 8000;
 
-/// What the start-up found.
-pub struct Found {
-    /// Which lines to the converter are pulled up.
-    pub pulled_up: board::PulledUp,
-    /// Whether the core runs by the crystal.
-    pub crystal: bool,
-    /// Whether the CAN controller could be set up.
-    pub can_started: bool,
-    /// Whether a zero deviation was lost.
-    pub zero_lost: bool,
-}
-
-/// FLASH_OPTCR as it was read.
-#[derive(Clone, Copy)]
-pub struct OptionBytes {
-    word: u32,
-    brown_out_low: bool,
-}
-
-impl OptionBytes {
-    /// Reads it.
-    pub fn read(flash: &FLASH) -> Self {
-        let options = flash.optcr().read();
-        Self {
-            word: options.bits(),
-            // 0 is the highest level, 2.7 V.
-            brown_out_low: options.bor_lev().bits() != 0,
-        }
-    }
-}
+/// The brown-out level in FLASH_OPTCR: 0 is the highest, 2.7 V.
+const BROWN_OUT_LEVEL: u32 = 0b11 << 2;
 
 /// Reads and clears the cause of the reset; what was before it.
 pub fn before(rcc: &RCC) -> Before {
@@ -87,48 +59,43 @@ pub fn clocks(before: &Before, rcc: RCC, stopwatch: &mut Stopwatch) -> (Rcc, boo
     (rcc, crystal)
 }
 
-/// What the health frames tell of the board and of the last fault.
-pub fn board_facts(before: &Before, options: OptionBytes, found: &Found) -> BoardFacts {
-    let on = |bit, is| if is { bit } else { 0 };
+/// What the health frames tell of the board and of the last fault; `checks` are the bits of
+/// [`board_check`] that are known besides those of `option_bytes`, the word FLASH_OPTCR.
+pub const fn board_facts(before: &Before, option_bytes: u32, checks: u32) -> BoardFacts {
+    let low = bit(
+        board_check::BROWN_OUT_LOW,
+        option_bytes & BROWN_OUT_LEVEL != 0,
+    );
     BoardFacts {
         last_fault: before.record.fault.kind_and_step,
         fault_address: before.record.fault.address,
         fault_detail: before.record.fault.detail,
         faults: before.record.faults,
-        option_bytes: options.word,
-        board_checks: on(check::NO_PULL_UP_ON_SELECT, !found.pulled_up.select)
-            | on(check::NO_PULL_UP_ON_CONTROL, !found.pulled_up.control)
-            | on(check::BROWN_OUT_LOW, options.brown_out_low)
-            | on(check::INTERNAL_OSCILLATOR, !found.crystal)
-            | on(check::CAN_NOT_STARTED, !found.can_started)
-            | on(check::ZERO_LOST, found.zero_lost),
+        option_bytes,
+        board_checks: checks | low,
     }
 }
 
 /// Keeps the zero deviation where a reset leaves it alone.
 pub struct ZeroKeeper {
-    kept: KeptZero,
+    zero: PlanarPose<f32>,
 }
 
 impl ZeroKeeper {
-    /// Keeps zero deviations of the blob of this CRC; without one, what was kept stays for a
-    /// later start.
+    /// Keeps zero deviations of the blob of this CRC, which runs; without one, what was kept stays
+    /// for a later start.
     pub fn new(blob: Option<u32>, zero: PlanarPose<f32>) -> Self {
-        let kept = KeptZero {
-            blob: blob.unwrap_or_default(),
-            zero,
-        };
-        if blob.is_some() {
-            fault::update(|record| record.zero = kept);
+        if let Some(crc) = blob {
+            fault::update(|record| record.runs(crc, zero));
         }
-        Self { kept }
+        Self { zero }
     }
 
     /// Keeps `zero`, if it is another.
     pub fn keep(&mut self, zero: PlanarPose<f32>) {
-        if self.kept.zero != zero {
-            self.kept.zero = zero;
-            fault::update(|record| record.zero = self.kept);
+        if self.zero != zero {
+            self.zero = zero;
+            fault::update(|record| record.zero = zero);
         }
     }
 }

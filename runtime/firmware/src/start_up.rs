@@ -1,10 +1,10 @@
-//! The start-up, apart from the chip: what is known of the run that a reset ended.
+//! The start-up, apart from the chip: what is known of the run that a reset ended, and what follows.
 
 use crate::node::Node;
-use crate::retained::{Blamed, FaultKind, KeptZero, Retained};
-use crate::store::Check;
+use crate::records::Choice;
+use crate::retained::{FaultKind, Retained};
 
-/// After so many ticks, 1 s, parameters are not blamed for a fault.
+/// A program that ran for so many ticks, 1 s, does not fault at its start.
 pub const PROVEN_TICKS: u32 = 500;
 
 /// The cause of this start.
@@ -18,6 +18,19 @@ pub enum Cause {
     Reset,
 }
 
+/// Why the controller runs no parameters until it is told to, or the power comes back: in the status
+/// frame the reason of its state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Stop {
+    /// The program faulted twice in its first second.
+    FaultedTwice = 1,
+    /// What ran before the reset is not known: the record in RAM is damaged.
+    NotKnown = 2,
+    /// What ran before the reset is no longer in flash.
+    Gone = 3,
+}
+
 /// What was before this start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Before {
@@ -25,8 +38,10 @@ pub struct Before {
     pub cause: Cause,
     /// Whether the watchdog or the program itself caused it, on a fault.
     pub by_fault: bool,
-    /// The parameters that made the program fault twice in a row.
-    pub blames: Option<Blamed>,
+    /// Whether no parameters run.
+    pub stop: Option<Stop>,
+    /// The parameters that run. A reset alone never changes them under a servo.
+    pub choice: Choice,
     /// The record that survived; after power-on an empty one. It is to be retained again.
     pub record: Retained,
 }
@@ -42,79 +57,137 @@ impl Before {
             record.note(FaultKind::Watchdog, 0, 0);
         }
         let by_fault = core::mem::take(&mut record.crashed);
-        let blames = record.blames();
+        record.proven = false;
+        let stop = if record.is_damaged() {
+            Some(Stop::NotKnown)
+        } else {
+            Some(Stop::FaultedTwice).filter(|_| record.has_faulted_twice())
+        };
+        let choice = match record.running {
+            _ if stop.is_some() => Choice::Nothing,
+            0 => Choice::Newest,
+            _ if record.activated => Choice::Newest,
+            crc => Choice::Blob(crc),
+        };
         Self {
             cause,
             by_fault,
-            blames,
+            stop,
+            choice,
             record,
         }
     }
 
-    /// Whether the parameters that it used are to blame.
-    pub fn blames_newest(&self) -> bool {
-        self.blames == Some(Blamed::Newest)
-    }
-
-    /// What blobs are checked for at start-up; a fault in a check is blamed on its blob, whose CRC
-    /// goes to `note`.
-    pub const fn check(&self, serial: Option<&'static str>, note: fn(Option<u32>)) -> Check {
-        let suspect = match self.blames {
-            Some(Blamed::Blob { crc }) => Some(crc),
-            Some(Blamed::Newest) | None => None,
-        };
-        Check {
-            serial,
-            suspect,
-            note,
-        }
+    /// Why nothing runs, once it is known whether the parameters were loaded.
+    pub fn stop(&self, is_loaded: bool) -> Option<Stop> {
+        let is_gone = !is_loaded && matches!(self.choice, Choice::Blob(_));
+        self.stop.or(is_gone.then_some(Stop::Gone))
     }
 
     /// Restores the zero deviation if it was measured with the blob of this CRC. Says whether one
     /// may have been lost.
     pub fn restore_zero(&self, node: &mut Node<'_>, blob: u32) -> bool {
-        let KeptZero { blob: of, zero } = self.record.zero;
-        if of == blob {
-            node.restore_zero(zero);
+        if self.record.running == blob {
+            node.restore_zero(self.record.zero);
         }
-        node.zero() != zero
+        node.zero() != self.record.zero
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::retained::Step;
+
+    /// A run of these parameters that ended with a fault, or a reset without one.
+    fn run(crc: u32, fault: Option<FaultKind>) -> Retained {
+        let mut record = Retained {
+            running: crc,
+            ..Retained::default()
+        };
+        if let Some(kind) = fault {
+            record.note(kind, 1, 2);
+        }
+        record
+    }
 
     #[test]
     fn ram_is_not_believed_after_power_on() {
-        let mut kept = Retained::default();
-        kept.note(FaultKind::HardFault, 1, 2);
+        let kept = run(7, Some(FaultKind::HardFault));
         let before = Before::of(Cause::PowerOn, Some(kept));
         assert_eq!(before.record, Retained::default());
-        assert!(!before.by_fault && before.blames.is_none());
+        assert_eq!((before.by_fault, before.choice), (false, Choice::Newest));
+        assert_eq!(before.stop(false), None);
     }
 
     #[test]
     fn a_fault_is_the_cause_of_one_start_only() {
-        let mut kept = Retained::default();
-        kept.note(FaultKind::Panic, 1, 2);
-        let first = Before::of(Cause::Reset, Some(kept));
+        let first = Before::of(Cause::Reset, Some(run(7, Some(FaultKind::Panic))));
         let second = Before::of(Cause::Reset, Some(first.record));
         assert_eq!((first.by_fault, second.by_fault), (true, false));
         assert_eq!((first.record.faults, second.record.faults), (1, 1));
+        let bitten = Before::of(Cause::Watchdog, Some(run(7, None)));
+        assert_eq!((bitten.by_fault, bitten.record.faults), (true, 1));
     }
 
     #[test]
-    fn a_bite_of_the_watchdog_is_noted() {
-        let before = Before::of(Cause::Watchdog, Some(Retained::default()));
-        assert!(before.by_fault);
-        assert_eq!(before.record.faults, 1);
+    fn a_reset_runs_what_ran_or_stops_and_activation_alone_changes_it() {
+        for (cause, kept, choice, stop) in [
+            (Cause::Reset, Some(run(7, None)), Choice::Blob(7), None),
+            (Cause::Watchdog, Some(run(7, None)), Choice::Blob(7), None),
+            // Nothing ran since power-on.
+            (Cause::Reset, Some(run(0, None)), Choice::Newest, None),
+            (Cause::Reset, None, Choice::Nothing, Some(Stop::NotKnown)),
+        ] {
+            let before = Before::of(cause, kept);
+            assert_eq!((before.choice, before.stop(true)), (choice, stop));
+            // And again at the next reset.
+            let before = Before::of(Cause::Reset, Some(before.record));
+            assert_eq!((before.choice, before.stop(true)), (choice, stop));
+        }
+        let gone = Before::of(Cause::Reset, Some(run(7, None)));
+        assert_eq!(gone.stop(false), Some(Stop::Gone));
+        for mut kept in [run(7, None), Retained::damaged()] {
+            kept.activate();
+            let before = Before::of(Cause::Reset, Some(kept));
+            assert_eq!((before.choice, before.stop(true)), (Choice::Newest, None));
+        }
+    }
+
+    #[test]
+    fn two_faults_in_the_first_second_stop_the_program_until_it_is_acknowledged() {
+        let start = |record: &mut Retained, kind| {
+            record.note(kind, 0, 0);
+            let before = Before::of(Cause::Reset, Some(*record));
+            *record = before.record;
+            before.stop
+        };
+        let mut record = run(7, None);
+        assert_eq!(start(&mut record, FaultKind::Panic), None);
+        record.prove();
+        assert_eq!(start(&mut record, FaultKind::Panic), None);
+        assert_eq!(start(&mut record, FaultKind::Watchdog), None);
+        let stopped = Some(Stop::FaultedTwice);
+        assert_eq!(start(&mut record, FaultKind::HardFault), stopped);
+        // However long it then stands.
+        record.prove();
+        let before = Before::of(Cause::Reset, Some(record));
+        assert_eq!((before.stop, before.choice), (stopped, Choice::Nothing));
+        record.activate();
+        let before = Before::of(Cause::Reset, Some(record));
+        assert_eq!((before.stop, before.choice), (None, Choice::Newest));
+        // A crystal that fails has its own remedy.
+        let mut record = run(7, None);
+        for _ in 0..3 {
+            record.step = Step::Clocks;
+            assert_eq!(start(&mut record, FaultKind::Watchdog), None);
+        }
     }
 
     #[test]
     fn of_a_damaged_record_a_zero_may_have_been_lost() {
         let before = Before::of(Cause::Reset, None);
-        assert!(before.record.zero.zero.x_m.is_nan());
+        assert!(before.record.zero.x_m.is_nan());
         assert!(!before.by_fault);
     }
 }

@@ -8,27 +8,6 @@ use core::sync::atomic::{AtomicU32, Ordering::Relaxed, Ordering::Release, compil
 use hal_adapters::can::status::BoardFacts;
 use runtime::Reading;
 
-/// Counters of the program, besides those of the servo.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counters {
-    /// Ticks that came late or not at all.
-    pub missed_ticks: u32,
-    /// Ticks that were not done before the next one was due.
-    pub overrun_ticks: u32,
-    /// Ticks without codes.
-    pub adc_faults: u32,
-    /// How often the converter was started.
-    pub adc_starts: u32,
-    /// Frames handed to a mailbox.
-    pub frames_sent: u32,
-    /// Frames discarded because newer ones followed.
-    pub frames_dropped: u32,
-    /// Times the bus was off.
-    pub bus_off: u32,
-    /// Ticks in which the FPU's settings had been changed.
-    pub fpu_restored: u32,
-}
-
 /// The words of `STAGE`.
 #[derive(Debug)]
 #[repr(C)]
@@ -41,6 +20,7 @@ pub struct Telemetry {
     time_us: AtomicU32,
     status: AtomicU32,
     pose: [AtomicU32; 6],
+    /// See [`Ended::counters`].
     counters: [AtomicU32; 8],
     /// Time that the last tick took from its start to its end, and the longest, us.
     last_us: AtomicU32,
@@ -87,8 +67,11 @@ pub struct Ended {
     pub time_us: u32,
     /// What it read.
     pub reading: Reading,
-    /// The counters.
-    pub counters: Counters,
+    /// Ticks that came late or not at all, and ticks that were not done before the next one was due;
+    /// ticks without codes, and how often the converter was started; frames handed to a mailbox, and
+    /// those discarded because newer ones followed; times the bus was off; ticks in which the FPU's
+    /// settings had been changed.
+    pub counters: [u32; 8],
 }
 
 impl Telemetry {
@@ -108,18 +91,7 @@ impl Telemetry {
         for (to, from) in self.pose.iter().zip(pose) {
             to.store(from.to_bits(), Relaxed);
         }
-        let c = &ended.counters;
-        let counters = [
-            c.missed_ticks,
-            c.overrun_ticks,
-            c.adc_faults,
-            c.adc_starts,
-            c.frames_sent,
-            c.frames_dropped,
-            c.bus_off,
-            c.fpu_restored,
-        ];
-        for (to, from) in self.counters.iter().zip(counters) {
+        for (to, from) in self.counters.iter().zip(ended.counters) {
             to.store(from, Relaxed);
         }
         compiler_fence(Release);
@@ -138,15 +110,7 @@ impl Telemetry {
     /// Notes whether the watchdog caused the last reset, and what is told of the board.
     pub fn put_start(&self, watchdog: bool, facts: &BoardFacts) {
         self.watchdog_reset.store(watchdog.into(), Relaxed);
-        let words = [
-            facts.last_fault,
-            facts.fault_address,
-            facts.fault_detail,
-            facts.faults,
-            facts.option_bytes,
-            facts.board_checks,
-        ];
-        for (to, from) in self.board.iter().zip(words) {
+        for (to, from) in self.board.iter().zip(facts.words()) {
             to.store(from, Relaxed);
         }
     }

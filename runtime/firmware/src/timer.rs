@@ -4,6 +4,11 @@
 use crate::board;
 use stm32f4xx_hal::pac::TIM2;
 
+/// The alarm of ticks.
+pub const TICK: u8 = 0;
+/// The alarm at which the converter has settled.
+pub const SETTLED: u8 = 1;
+
 /// The clock.
 pub struct Clock {
     timer: TIM2,
@@ -36,29 +41,16 @@ impl Clock {
         self.timer.cnt().read().cnt().bits()
     }
 
-    /// Sets off the alarm for ticks at `due_us`; at once, if that is past.
-    pub fn set_tick_alarm(&mut self, due_us: u32) {
-        self.timer.ccr1().write(|w| w.ccr().set(due_us));
+    /// Sets off alarm `N`, [`TICK`] or [`SETTLED`], at `due_us`; at once, if that is past.
+    pub fn set_alarm<const N: u8>(&mut self, due_us: u32) {
+        self.timer.ccr(N.into()).write(|w| w.ccr().set(due_us));
         // A match with the register's value before is no alarm. Writing 1 leaves a flag as it is.
         self.timer
             .sr()
-            .write(|w| w.cc1if().bit(false).cc2if().bit(true));
-        self.timer.dier().modify(|_, w| w.cc1ie().set_bit());
+            .write(|w| w.cc1if().bit(N != TICK).cc2if().bit(N != SETTLED));
+        self.timer.dier().modify(|_, w| w.ccie(N).set_bit());
         if self.now_us().wrapping_sub(due_us) < u32::MAX / 2 {
-            self.timer.egr().write(|w| w.cc1g().set_bit());
-        }
-    }
-
-    /// Sets off the alarm for the converter at `due_us`; at once, if that is past.
-    pub fn set_settled_alarm(&mut self, due_us: u32) {
-        self.timer.ccr2().write(|w| w.ccr().set(due_us));
-        // As above: the counter starts at the value that this register has after a reset.
-        self.timer
-            .sr()
-            .write(|w| w.cc1if().bit(true).cc2if().bit(false));
-        self.timer.dier().modify(|_, w| w.cc2ie().set_bit());
-        if self.now_us().wrapping_sub(due_us) < u32::MAX / 2 {
-            self.timer.egr().write(|w| w.cc2g().set_bit());
+            self.timer.egr().write(|w| w.ccg(N).set_bit());
         }
     }
 

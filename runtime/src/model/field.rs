@@ -131,22 +131,10 @@ impl<T: Real> FieldProbe<T> {
     #[must_use]
     pub fn rounded<U: Real>(&self) -> FieldProbe<U> {
         let round = |x: T| U::from_f64(x.to_f64());
-        let p = &self.shape;
         FieldProbe {
             sensitivity: self.sensitivity.rounded(),
             carry: self.carry.map(round),
-            shape: Shape {
-                u_w_w: p.u_w_w.map(round),
-                u_w: p.u_w.map(round),
-                u_z_z: p.u_z_z.map(round),
-                u_u_u: p.u_u_u.map(round),
-                u_u: p.u_u.map(round),
-                w_w: p.w_w.map(round),
-                w_z: p.w_z.map(round),
-                z_z: p.z_z.map(round),
-                u_u_w: round(p.u_u_w),
-                w_w_w: round(p.w_w_w),
-            },
+            shape: self.shape.map(round),
             lateral: self.lateral.map(round),
         }
     }
@@ -166,20 +154,7 @@ impl FieldProbe<f32> {
     /// slopes of a p without minus signs, at the corner of that box.
     #[inline(never)]
     pub(crate) fn steepest_slopes(&self, u: f32, w: f32, zr: f32) -> [f32; 2] {
-        let size = |[constant, slope]: [f32; 2]| [constant.abs(), slope.abs()];
-        let p = &self.shape;
-        let corner = Shape {
-            u_w_w: size(p.u_w_w),
-            u_w: size(p.u_w),
-            u_z_z: size(p.u_z_z),
-            u_u_u: size(p.u_u_u),
-            u_u: size(p.u_u),
-            w_w: size(p.w_w),
-            w_z: size(p.w_z),
-            z_z: size(p.z_z),
-            u_u_w: p.u_u_w.abs(),
-            w_w_w: p.w_w_w.abs(),
-        };
+        let corner = self.shape.map(f32::abs);
         let Tangent { per_u, per_w, .. } = corner.at(u, w, zr);
         [per_u, per_w]
     }
@@ -211,6 +186,24 @@ struct Tangent<T> {
 }
 
 impl<T: Real> Shape<T> {
+    /// `f` of each coefficient.
+    #[must_use]
+    pub fn map<U>(&self, f: impl Fn(T) -> U) -> Shape<U> {
+        let pair = |[constant, slope]: [T; 2]| [f(constant), f(slope)];
+        Shape {
+            u_w_w: pair(self.u_w_w),
+            u_w: pair(self.u_w),
+            u_z_z: pair(self.u_z_z),
+            u_u_u: pair(self.u_u_u),
+            u_u: pair(self.u_u),
+            w_w: pair(self.w_w),
+            w_z: pair(self.w_z),
+            z_z: pair(self.z_z),
+            u_u_w: f(self.u_u_w),
+            w_w_w: f(self.w_w_w),
+        }
+    }
+
     /// The terms that depend on the height alone.
     #[inline(always)]
     fn still(&self, zr: T) -> T {

@@ -42,9 +42,6 @@ pub struct Bench {
 
 type Failure = Box<dyn std::error::Error>;
 
-/// The start of an erased sector that is ready for records.
-const JOURNAL: &[u8] = b"HJNLSEAL";
-
 impl Bench {
     /// Reads what lies in `folder`.
     pub fn read(folder: &Path, library: OsString) -> Result<Self, Failure> {
@@ -77,19 +74,13 @@ impl Bench {
         self.machine_playing(part, slots, self.rows.clone())
     }
 
-    /// A controller whose converter plays these rows. An empty slot beside a full one is an empty
-    /// journal, as the first start with it leaves it.
+    /// A controller whose converter plays these rows.
     pub fn machine_playing(
         &self,
         part: Part,
         slots: [&[u8]; 2],
         rows: Vec<Row>,
     ) -> Result<Machine, Failure> {
-        let slots = match slots {
-            [first, []] if !first.is_empty() => [first, JOURNAL],
-            [[], second] if !second.is_empty() => [JOURNAL, second],
-            both => both,
-        };
         Machine::new(&self.library, self.image(part), part, rows, slots)
     }
 }

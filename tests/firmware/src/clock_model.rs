@@ -31,7 +31,8 @@ pub struct Clocks {
     cfgr: u32,
     cir: u32,
     hse_since: u64,
-    pll_since: u64,
+    /// When the PLL was switched on.
+    pub pll_since: u64,
     /// Whether the crystal oscillates once it is switched on.
     pub crystal: bool,
     /// The PLL.

@@ -3,7 +3,7 @@
 //! a sector raises them. While the flash is busy the core stands, because the program lies in
 //! it. A power cut in an operation leaves random bits between what was and what was to be.
 
-use firmware::store::flash_model::{Cut, Words};
+use ::tests::flash_model::{Cut, Words};
 use std::collections::VecDeque;
 
 /// Start of sector 1.

@@ -29,8 +29,8 @@ use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
 use checks::{
-    Outcome, Report, bus, commands, figures, log, motion, parameters, passed_over, power_cuts,
-    sensors, start, timing, update, zero,
+    Outcome, Report, bus, commands, figures, log, motion, parameters, power_cuts, sensors, start,
+    stopped, timing, update, zero,
 };
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -176,6 +176,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     });
     check("zero: over power-on", &|| zero::over_power_on(bench));
     check("zero: lost", &|| zero::lost(bench));
+    check("start: supply that comes late", &|| {
+        start::supply_that_comes_late(bench)
+    });
     check("start: crystal absent", &|| start::no_crystal(bench));
     check("start: silent after bus-off", &|| {
         start::silent_after_bus_off(bench)
@@ -214,8 +217,8 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("parameters: the field model", &|| {
         parameters::the_field_model(bench)
     });
-    check("parameters: the later of two", &|| {
-        parameters::the_later_of_two(bench)
+    check("parameters: the first of two", &|| {
+        parameters::the_first_of_two(bench)
     });
     check("command: identify", &|| commands::identify(bench));
     check("command: answers outlive a failing bus", &|| {
@@ -243,31 +246,25 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("update: no random number twice", &|| {
         update::no_nonce_twice(bench)
     });
-    check("update: two blobs of a probe", &|| {
-        update::two_plain_blobs(bench)
-    });
     check("update: flash that fails", &|| {
         update::flash_that_fails(bench)
+    });
+    check("update: supply that drops", &|| {
+        update::supply_that_drops(bench)
     });
     check("update: a cut of the power leaves old or new", &|| {
         power_cuts::in_an_update(bench)
     });
-    check("update: a cut in the erase at the start", &|| {
-        power_cuts::in_an_erase(bench)
+    check("update: a reset runs what ran", &|| {
+        stopped::a_reset_runs_what_ran(bench)
     });
-    check("update: a cut while parameters are passed over", &|| {
-        power_cuts::in_a_pass_over(bench)
-    });
-    check("update: parameters that crash are passed over", &|| {
-        passed_over::parameters_that_crash(bench)
+    check("update: parameters that crash stop the program", &|| {
+        stopped::parameters_that_crash(bench)
     });
     check(
-        "update: parameters whose check crashes are passed over",
-        &|| passed_over::parameters_whose_check_crashes(bench),
+        "update: parameters whose check crashes stop the program",
+        &|| stopped::parameters_whose_check_crashes(bench),
     );
-    check("update: a sector is erased at the start", &|| {
-        update::erase_at_the_start(bench)
-    });
     check("command: odd ones", &|| commands::odd_commands(bench));
     check("command: any data length code", &|| {
         commands::any_length_code(bench)

@@ -73,9 +73,13 @@ pub struct Peripherals {
     pub random: RandomModel,
     /// FLASH_OPTCR: the option bytes.
     pub option_bytes: u32,
+    /// The supply is below 2.9 V until this time, ns, and from this operation of the flash on.
+    pub supply_low_until_ns: u64,
+    /// See above.
+    pub supply_drops_at: Option<u64>,
     /// Whether chip select and the control pin have pull-ups on the board.
     pub pulled_up: [bool; 2],
-    /// Whether the service pin is pulled low: the servo is on.
+    /// Whether nothing drives the service pin low: the servo is on, or the line is open.
     pub servo_on: bool,
     /// Whether the program accessed memory that is protected.
     pub memory_fault: bool,
@@ -121,6 +125,8 @@ impl Peripherals {
             random: RandomModel::new(),
             // As delivered, but with the highest brown-out level.
             option_bytes: 0x0fff_aae1,
+            supply_low_until_ns: 0,
+            supply_drops_at: None,
             pulled_up: [true; 2],
             servo_on: false,
             memory_fault: false,
@@ -169,6 +175,14 @@ impl Peripherals {
         (self.can.sent, self.can.filled) = (sent, filled);
         self.can.acknowledges = acknowledges;
         self.can.set_bus(bus, self.now_ns);
+    }
+
+    /// Whether the supply is below 2.9 V.
+    fn is_supply_low(&self) -> bool {
+        let drops = self
+            .supply_drops_at
+            .is_some_and(|at| self.flash.operations >= at);
+        drops || self.now_ns < self.supply_low_until_ns
     }
 
     fn timer_us(&self) -> u32 {

@@ -113,7 +113,7 @@ pub fn judge(
     let blob = std::fs::read(blob)?;
     let of_fit = ParameterSet::from_bytes(&std::fs::read(direct)?)?.fit.rms;
     let text = std::fs::read_to_string(log)?;
-    let (mut machine, ticks) = moving(bench, part, [&bench.blob, &blob], &text)?;
+    let (mut machine, ticks) = moving(bench, part, [&[], &blob], &text)?;
     machine.run_ticks(ticks - 1)?;
     let resets = (machine.panics, machine.watchdog_resets);
     equal("panics and watchdog resets", resets, (0, 0))?;

@@ -8,7 +8,10 @@ use host_fit::output::pose_file;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use runtime::blob::MAX_BYTES;
-use runtime::{AnyDecoder, Decode, Decoder, OnInvalid, ParameterSet};
+use runtime::{
+    AnyDecoder, Decode, Decoder, OnInvalid, ParameterSet, PlanarPose, Pose, Reading, Servo, Status,
+    VerticalPose,
+};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -245,21 +248,32 @@ fn check_poses(
         0 => OnInvalid::Zero,
         ticks => OnInvalid::Hold { ticks },
     };
-    let host = pose_file::decode(&dataset, &set.decoder(), on_invalid);
-    let target = pose_file::read(poses)?;
+    let decoder = set.decoder();
+    let mut servo = Servo::new(&*decoder, on_invalid);
+    let mut host = Vec::with_capacity(dataset.rows.len());
+    for movement in &dataset.movements {
+        servo.forget();
+        for row in &dataset.rows[movement.rows.clone()] {
+            let frame = &row.frame;
+            let reading = servo.tick_with(frame.sequence(), |zero| frame.decode(&decoder, zero));
+            host.push((movement.index, row.t_us, reading));
+        }
+    }
+    let target = read_poses(poses)?;
     if host.len() != target.len() {
         let (rows, lines) = (host.len(), target.len());
         return Err(format!("the log has {rows} rows and the pose file {lines}").into());
     }
     let mut differing = 0;
     for (row, (host, target)) in host.iter().zip(&target).enumerate() {
-        let words = [host, target].map(|pose| tests::job::answer(&pose.reading));
+        let (movement, t_us, reading) = host;
+        let words = [reading, target].map(tests::job::answer);
         if words[0] != words[1] {
             differing += 1;
             if differing <= 10 {
                 println!(
                     "row {row} (movement {}, {} us): {:08x?} on the host, {:08x?} recorded; codes {:?}",
-                    host.movement, host.t_us, words[0], words[1], dataset.rows[row].frame,
+                    movement, t_us, words[0], words[1], dataset.rows[row].frame,
                 );
             }
         }
@@ -267,4 +281,30 @@ fn check_poses(
     println!("RESULT rows={}", host.len());
     println!("RESULT differing_rows={differing}");
     Ok(differing == 0 && !host.is_empty())
+}
+
+/// The readings of a pose file.
+fn read_poses(path: &Path) -> Result<Vec<Reading>, Box<dyn Error>> {
+    let text = std::fs::read_to_string(path)?;
+    let mut lines = text.lines();
+    if lines.next() != Some(pose_file::HEADER) {
+        return Err(format!("{} is no pose file", path.display()).into());
+    }
+    let reading = |line: &str| -> Result<Reading, Box<dyn Error>> {
+        let cells: Vec<&str> = line.split(',').collect();
+        let [_, _, words @ .., status] = cells.as_slice() else {
+            return Err(format!("too few cells: {line}").into());
+        };
+        let micro: Result<Vec<f64>, _> = words.iter().map(|cell| cell.parse()).collect();
+        let words: Vec<f32> = micro?.iter().map(|x| (x * 1e-6) as f32).collect();
+        let [x, y, rz, z, rx, ry] = words[..] else {
+            return Err(format!("not six words: {line}").into());
+        };
+        let planar = PlanarPose::from_array([x, y, rz]);
+        let vertical = VerticalPose::from_array([z, rx, ry]);
+        let pose = Pose { planar, vertical };
+        let status = Status::from_bits(status.parse()?);
+        Ok(Reading { pose, status })
+    };
+    lines.map(reading).collect()
 }

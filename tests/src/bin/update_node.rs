@@ -7,18 +7,18 @@
 //! ends.
 
 use firmware::schedule::Schedule;
-use firmware::store::Sector;
-use firmware::store::flash_model::FlashModel;
 use hal_adapters::can::{BusFrame, Message};
 use hal_adapters::socketcan::SocketCan;
 use std::collections::VecDeque;
 use std::error::Error;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
+use tests::flash_model::FlashModel;
 use tests::node::{Node, TAKEN_PER_TICK};
 
-/// How long it is deaf after a reset.
+/// How long it is deaf after a reset, and while it erases a sector.
 const START: Duration = Duration::from_millis(200);
+const ERASE: Duration = Duration::from_millis(500);
 const SEND_DEADLINE: Duration = Duration::from_millis(20);
 
 fn main() -> ExitCode {
@@ -53,7 +53,7 @@ fn run(
     key: Option<[u8; 16]>,
 ) -> Result<(), Box<dyn Error>> {
     let mut flash = FlashModel::erased();
-    flash.load(Sector::First, &std::fs::read(params)?);
+    flash.load(0, &std::fs::read(params)?);
     let mut node = Node::new(Some(serial), key, flash, u64::from(std::process::id()));
     let mut bus = SocketCan::open(interface, &[Message::Command, Message::UpdateData])?;
     println!("ready");
@@ -74,13 +74,19 @@ fn run(
         }
         schedule.start_tick(now_us());
         let taken = received.len().min(TAKEN_PER_TICK);
-        node.tick(schedule.missed(), received.drain(..taken));
+        let stored = node.tick(schedule.missed(), received.drain(..taken));
         while let Some(coded) = node.send() {
             bus.send(&BusFrame::from(coded), SEND_DEADLINE)?;
         }
-        if node.is_to_be_reset() {
-            node.reset();
-            std::thread::sleep(START);
+        let deaf = match node.is_to_be_reset() {
+            true => Some(START),
+            false => Some(ERASE).filter(|_| stored),
+        };
+        if let Some(deaf) = deaf {
+            if !stored {
+                node.reset();
+            }
+            std::thread::sleep(deaf);
             received.clear();
             while bus.receive(Duration::ZERO)?.is_some() {}
             schedule = Schedule::starting(now_us());

@@ -2,15 +2,15 @@
 
 use super::world::{World, flashed};
 use super::{KEY, NEW, OLD, SERIAL, plan};
-use firmware::store::flash_model::Cut;
 use host_fit::bus::update::UpdateError;
+use tests::flash_model::Cut;
 use tests::node::Node;
 
 #[test]
 fn a_cut_of_the_power_in_any_operation_leaves_the_old_or_the_new_and_is_told() {
     let mut whole = World::new(Some(KEY), &[], 5);
     let in_the_start = whole.node.flash().operations;
-    assert!(whole.update(plan(NEW)).is_ok());
+    assert!(whole.update(&plan(NEW)).is_ok());
     let operations = whole.node.flash().operations;
     let (mut old, mut new) = (0, 0);
     for (at, cut) in (0..operations).flat_map(|at| Cut::ALL.map(|cut| (at, cut))) {
@@ -21,7 +21,7 @@ fn a_cut_of_the_power_in_any_operation_leaves_the_old_or_the_new_and_is_told() {
         flash.cut_at(at, cut);
         let mut world = World::new(Some(KEY), &[], seed);
         world.node = Node::new(Some(SERIAL), Some(KEY), flash, seed);
-        let result = world.update(plan(NEW));
+        let result = world.update(&plan(NEW));
         let found = match &world.after_cuts[..] {
             [blob] => blob.clone(),
             cuts => panic!("{at} {cut:?}: {} cuts", cuts.len()),
@@ -35,8 +35,12 @@ fn a_cut_of_the_power_in_any_operation_leaves_the_old_or_the_new_and_is_told() {
                     UpdateError::ServoOn { declared: true },
                     "{at} {cut:?}"
                 );
-                assert_eq!((&found[..], world.newest()), (OLD, OLD), "{at} {cut:?}");
-                assert!(world.update(plan(NEW)).is_ok(), "{at} {cut:?}");
+                assert_eq!(
+                    (&found[..], &world.newest()[..]),
+                    (OLD, OLD),
+                    "{at} {cut:?}"
+                );
+                assert!(world.update(&plan(NEW)).is_ok(), "{at} {cut:?}");
             }
         }
         old += u32::from(found == OLD);

@@ -1,4 +1,4 @@
-//! A host and a node on one bus, in memory: the host's own dialog against the firmware's own
+//! A host and a node on one bus, in memory: the host's own script against the firmware's own
 //! node, with a lossy bus, two hosts, resets, cuts of the power, and a recording played again.
 
 mod alone;
@@ -23,7 +23,6 @@ fn plan(blob: &[u8]) -> Plan {
         key: Some(KEY),
         declares_servo_off: true,
         activates: false,
-        token: 9,
     }
 }
 

@@ -1,21 +1,22 @@
 //! The bus, the node on it, and hosts.
 
 use super::{OLD, SERIAL};
-use firmware::store::Sector;
-use firmware::store::flash_model::FlashModel;
 use hal_adapters::can::BusFrame;
-use hal_adapters::can::command::{Answer, Mailbox, Told};
+use hal_adapters::can::command::{Answer, Command, Mailbox, Request, Told};
 use hal_adapters::can::update::Key;
 use hal_adapters::fault::{Fault, Random};
-use host_fit::bus::update::{Dialog, Job, Plan, UpdateError, Updated, Updater};
+use host_fit::bus::update::{Identity, Link, Plan, Talk, UpdateError, Updated, on};
 use std::collections::VecDeque;
+use tests::flash_model::FlashModel;
 use tests::node::{Node, TAKEN_PER_TICK};
 
 /// The longest frame at 1 Mbit/s, us.
 pub const SLOT_US: u64 = 135;
 const TICK_US: u64 = 2_000;
 /// A node is deaf for so long after a reset, us.
-const START_US: u64 = 500_000;
+const START_US: u64 = 200_000;
+/// It is deaf while it erases a sector, too, us.
+const ERASE_US: u64 = 500_000;
 
 /// Frames under way, some lost, repeated, delayed or damaged.
 pub struct Channel {
@@ -73,7 +74,7 @@ impl Channel {
 /// Flash of which a probe has written the first slot.
 pub fn flashed(blob: &[u8]) -> FlashModel {
     let mut flash = FlashModel::erased();
-    flash.load(Sector::First, blob);
+    flash.load(0, blob);
     flash
 }
 
@@ -84,11 +85,23 @@ pub struct World {
     pub to_node: Channel,
     to_hosts: Channel,
     pub now_us: u64,
-    /// Everything that the hosts sent.
-    pub recording: Vec<BusFrame>,
+    /// Everything that the host sent, and when.
+    pub recording: Vec<(u64, BusFrame)>,
+    /// What another host sends, and when; in the order of time.
+    pub others: VecDeque<(u64, BusFrame)>,
+    /// What another host sends as soon as something was stored, and the node hears again.
+    pub once_stored: Option<BusFrame>,
+    /// The user wants the script to end at this frame of the host.
+    pub interrupt_at: Option<usize>,
+    token: u8,
+    faults_us: Vec<u64>,
+    /// What the host has yet to hear.
+    heard: VecDeque<BusFrame>,
     pub overruns: u32,
     /// The node is reset at these times.
     pub resets_us: Vec<u64>,
+    /// The program faults so long after it was first activated, us.
+    pub faults_after_activation_us: Vec<u64>,
     /// What was in flash after each cut of the power.
     pub after_cuts: Vec<Vec<u8>>,
     /// Answers of the node that no host hears.
@@ -105,8 +118,15 @@ impl World {
             to_hosts: Channel::new(faults, seed ^ 0xaaaa),
             now_us: 0,
             recording: Vec::new(),
+            others: VecDeque::new(),
+            once_stored: None,
+            interrupt_at: None,
+            token: 8,
+            faults_us: Vec::new(),
+            heard: VecDeque::new(),
             overruns: 0,
             resets_us: Vec::new(),
+            faults_after_activation_us: Vec::new(),
             after_cuts: Vec::new(),
             loses: |_| false,
         }
@@ -124,8 +144,22 @@ impl World {
                 self.overruns += u32::from(!is_deaf);
             }
         }
-        if self.now_us / TICK_US > tick_before && !is_deaf {
-            self.node.tick(0, self.fifo.drain(..));
+        if self.now_us / TICK_US > tick_before && !is_deaf && self.node.tick(0, self.fifo.drain(..))
+        {
+            self.deaf_until_us = self.now_us + ERASE_US;
+        }
+        if self.node.records() > 0
+            && let Some(frame) = self.once_stored.take()
+        {
+            self.others.push_back((self.deaf_until_us, frame));
+        }
+        while let Some((_, frame)) = self.others.pop_front_if(|(at, _)| *at <= self.now_us) {
+            self.to_node.send(self.now_us, frame);
+            self.heard.push_back(frame);
+        }
+        if self.node.resets() > 0 && (self.faults_us.first()).is_some_and(|at| *at <= self.now_us) {
+            self.faults_us.remove(0);
+            self.fault();
         }
         let is_due = self.resets_us.first().is_some_and(|at| *at <= self.now_us);
         let is_off = self.node.flash().is_off();
@@ -135,9 +169,12 @@ impl World {
             }
             if is_off {
                 self.node.power_cycle();
-                self.after_cuts.push(self.newest().to_vec());
+                self.after_cuts.push(self.newest());
             } else {
                 self.node.reset();
+                let faults = self.faults_after_activation_us.drain(..);
+                self.faults_us
+                    .extend(faults.map(|after| self.now_us + after));
             }
             self.fifo.clear();
             self.deaf_until_us = self.now_us + START_US;
@@ -156,45 +193,69 @@ impl World {
     }
 
     /// The program faults, and is deaf until its next start.
-    pub fn fault(&mut self) {
+    fn fault(&mut self) {
         self.node.fault();
         self.fifo.clear();
         self.deaf_until_us = self.now_us + START_US;
     }
 
-    /// Runs dialogs to their ends; two hosts hear each other.
-    pub fn run<J: Job>(&mut self, hosts: &mut [Dialog<J>]) {
-        let until_us = self.now_us + 120_000_000;
-        while hosts.iter().any(|host| !host.is_over()) {
-            assert!(self.now_us < until_us, "it does not end");
-            for frame in self.slot() {
-                let now_us = self.now_us;
-                hosts.iter_mut().for_each(|host| host.take(&frame, now_us));
-            }
-            for k in 0..hosts.len() {
-                let Some(coded) = hosts[k].poll(self.now_us) else {
-                    continue;
-                };
-                let frame = BusFrame::from(coded);
-                self.recording.push(frame);
-                self.to_node.send(self.now_us, frame);
-                for (other, host) in hosts.iter_mut().enumerate() {
-                    if other != k {
-                        host.take(&frame, self.now_us);
-                    }
-                }
-            }
-        }
+    /// Sends a request of another host after so long.
+    pub fn other_asks(&mut self, after_us: u64, request: Request, token: u8) {
+        let frame = command(request, token, self.others.len());
+        self.others.push_back((self.now_us + after_us, frame));
     }
 
-    pub fn update(&mut self, plan: Plan) -> Result<Updated, UpdateError> {
-        let mut hosts = [Dialog::new(Updater::new(plan), 1)];
-        self.run(&mut hosts);
-        let [host] = hosts;
-        host.into_job().result()
+    /// A host that asks one thing after the other.
+    pub fn talk(&mut self) -> Talk<&mut Self> {
+        self.token = self.token.wrapping_add(40);
+        let token = self.token;
+        Talk::new(self, token)
     }
 
-    pub fn newest(&self) -> &[u8] {
+    pub fn update(&mut self, plan: &Plan) -> Result<Updated, UpdateError> {
+        on::update(&mut self.talk(), plan, &mut |_, _| {})
+    }
+
+    pub fn identify(&mut self) -> Identity {
+        on::identify(&mut self.talk()).expect("it answers")
+    }
+
+    pub fn newest(&self) -> Vec<u8> {
         self.node.newest().expect("there is one")
+    }
+}
+
+/// A frame with a request, by another host's count of frames.
+pub fn command(request: Request, token: u8, counter: usize) -> BusFrame {
+    let mut mailbox = Mailbox::default();
+    let told = Told::Command(Command::new(request, token));
+    let frames = (0..=counter).map(|_| mailbox.send(&told));
+    BusFrame::from(frames.last().flatten().expect("a known message"))
+}
+
+impl Link for &mut World {
+    fn send(&mut self, frame: BusFrame) -> Result<(), UpdateError> {
+        let now_us = self.now_us;
+        self.recording.push((now_us, frame));
+        self.to_node.send(now_us, frame);
+        Ok(())
+    }
+
+    fn receive(&mut self, until_us: u64) -> Result<Option<BusFrame>, UpdateError> {
+        assert!(self.now_us < 300_000_000, "it does not end");
+        while self.heard.is_empty() && self.now_us < until_us {
+            let heard = self.slot();
+            self.heard.extend(heard);
+        }
+        Ok(self.heard.pop_front())
+    }
+
+    fn now_us(&self) -> u64 {
+        self.now_us
+    }
+
+    fn is_interrupted(&self) -> bool {
+        self.interrupt_at
+            .is_some_and(|at| self.recording.len() >= at)
     }
 }

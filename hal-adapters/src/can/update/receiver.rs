@@ -2,8 +2,8 @@
 
 use super::authentication::{Authenticator, Nonce};
 use super::request::{UpdateData, UpdateRequest};
-use super::staging::{Staging, crc_of, word_of};
-use super::store::{Change, Store, Written};
+use super::staging::{Staging, crc_of};
+use super::store::{Change, NotWritten, Store};
 use super::tell::{Identity, tell};
 use crate::can::command::{Answer, Outcome};
 use runtime::ParameterSet;
@@ -13,33 +13,16 @@ use runtime::blob::{BlobError, MAX_BYTES};
 const IDLE_S: u32 = 5;
 /// [`BlobError::number`] of a wrong check.
 const WRONG_CHECK: u32 = 7;
-/// Bytes of a blob that are authenticated in one tick: four blocks of AES.
-const BYTES_PER_TICK: usize = 64;
 
 /// What a request meets: the servo, the store, and a random number.
 pub struct Surroundings<'u> {
     /// Whether the servo is declared off.
     pub servo_is_off: bool,
-    /// Keeps the records.
+    /// Keeps the parameters.
     pub store: &'u mut dyn Store,
     /// A fresh random number, for a transfer that begins; `None` if there is no source of any:
     /// a node with a key then refuses the transfer.
     pub nonce: Option<Nonce>,
-}
-
-/// How far a transfer is.
-#[derive(Clone, Debug)]
-enum Stage {
-    /// Words come.
-    Receiving,
-    /// The tag is computed, a piece in each tick; so many bytes are done.
-    Authenticating(Authenticator, usize),
-    /// The blob itself is to be checked.
-    Checking,
-    /// It may be stored.
-    Verified,
-    /// It is being stored.
-    Storing,
 }
 
 /// An open transfer.
@@ -51,16 +34,14 @@ struct Transfer {
     /// The low half of its CRC-32C, as it was begun.
     check: u16,
     nonce: Nonce,
-    /// The sequence number that [`UpdateRequest::Verify`] named.
-    sequence: u32,
-    /// The CRC-32C, once every word is there.
-    crc: u32,
     idle_ticks: u32,
-    stage: Stage,
+    /// Sequence number and CRC-32C of what is to be stored, once that is asked for.
+    commit: Option<(u32, u32)>,
 }
 
 /// Receives blobs, one at a time, and has them stored: [`Receiver::take`] with every frame of
-/// data, [`Receiver::obey`] with every request, [`Receiver::tick`] in every tick.
+/// data, [`Receiver::obey`] with every request, [`Receiver::tick`] in every tick, and
+/// [`Receiver::store`] when [`Receiver::is_storing`] says so.
 #[derive(Clone, Debug)]
 pub struct Receiver<'s> {
     identity: Identity<'s>,
@@ -95,15 +76,16 @@ impl<'s> Receiver<'s> {
         self.wants_reset
     }
 
-    const fn is_verified(&self) -> bool {
-        matches!(&self.transfer, Some(transfer) if matches!(transfer.stage, Stage::Verified))
+    /// Whether [`Receiver::store`] is to be called, once what tells of it has left.
+    pub const fn is_storing(&self) -> bool {
+        matches!(&self.transfer, Some(transfer) if transfer.commit.is_some())
     }
 
-    /// Takes a word. Words of other transfers, and of one that is being checked or stored, are ignored.
+    /// Takes a word. Words of other transfers, and of one that is being stored, are ignored.
     pub fn take(&mut self, data: &UpdateData) {
         if let Some(transfer) = &mut self.transfer
             && transfer.token == data.token
-            && matches!(transfer.stage, Stage::Receiving)
+            && transfer.commit.is_none()
         {
             transfer.idle_ticks = 0;
             self.staging.put(data.index, data.word, transfer.bytes);
@@ -111,7 +93,7 @@ impl<'s> Receiver<'s> {
     }
 
     /// Obeys a request; outcome and detail are to be answered. After [`Outcome::Started`]
-    /// another answer comes from [`Receiver::tick`].
+    /// another answer comes from [`Receiver::store`].
     pub fn obey(
         &mut self,
         token: u8,
@@ -123,32 +105,25 @@ impl<'s> Receiver<'s> {
                 let ended = self.ended.map(|(_, outcome, _)| outcome);
                 tell(page, &self.identity, ended, around.store)
             }
-            UpdateRequest::ReadBack { index } => {
-                let running = around.store.running();
-                let word = running.map(|running| word_of(running.blob, index.into()));
-                match word {
-                    None => (Outcome::NoParameters, 0),
-                    Some(None) => (Outcome::UnknownCommand, 0),
-                    Some(Some(word)) => (Outcome::Done, word),
-                }
-            }
+            UpdateRequest::ReadBack { index } => match around.store.word(index.into()) {
+                Some(word) => (Outcome::Done, word),
+                None if around.store.running().is_none() => (Outcome::NoParameters, 0),
+                None => (Outcome::UnknownCommand, 0),
+            },
             UpdateRequest::Challenge { part } => {
                 let nonce = self.transfer.as_ref().map(|transfer| transfer.nonce);
                 let word = nonce.and_then(|nonce| nonce.get(usize::from(part)).copied());
                 word.map_or((Outcome::NoTransfer, 0), |word| (Outcome::Done, word))
             }
             UpdateRequest::Abort => self.abort(token),
-            // Once it is being stored or has ended, nothing begins: this only asks again.
-            UpdateRequest::Commit { sequence } if !self.is_verified() => {
-                self.commit(token, sequence)
-            }
+            // Once it has ended, nothing begins: this only asks again.
+            UpdateRequest::Commit { .. } if !self.is_updating() => self.without_transfer(token),
             _ if !around.servo_is_off => (Outcome::ServoOn, 0),
             UpdateRequest::Begin { bytes, check } => {
                 let refusal = self.begin(token, bytes.into(), check, around).err();
                 refusal.unwrap_or((Outcome::Done, request.argument()))
             }
-            UpdateRequest::Verify { sequence } => self.verify(token, sequence, around.store),
-            UpdateRequest::Commit { sequence } => self.commit(token, sequence),
+            UpdateRequest::Commit { sequence } => self.commit(token, sequence, around.store),
             UpdateRequest::Activate if self.is_updating() => (Outcome::Busy, 0),
             UpdateRequest::Activate => {
                 self.wants_reset = true;
@@ -157,61 +132,65 @@ impl<'s> Receiver<'s> {
         }
     }
 
-    /// One tick: a step of a check or of storing. Gives the answer to a request that has ended.
-    pub fn tick(&mut self, servo_is_off: bool, store: &mut dyn Store) -> Option<Answer> {
-        let transfer = self.transfer.as_mut()?;
-        let blob = self.staging.blob(transfer.bytes);
-        let end = match &mut transfer.stage {
-            Stage::Storing => {
-                let change = match transfer.bytes {
-                    0 => Change::Previous,
-                    _ => Change::Blob(blob),
-                };
-                match store.write(transfer.sequence, change) {
-                    Written::InProgress => return None,
-                    Written::Done => (Outcome::Done, transfer.crc),
-                    Written::Failed => (Outcome::StoreFailed, 0),
-                }
-            }
-            _ if !servo_is_off => (Outcome::ServoOn, 0),
-            Stage::Authenticating(authenticator, done) => {
-                let rest = blob.get(*done..).unwrap_or_default();
-                if !rest.is_empty() {
-                    let piece = rest.get(..BYTES_PER_TICK).unwrap_or(rest);
-                    authenticator.update(piece);
-                    *done += piece.len();
-                    return None;
-                }
-                let last = (transfer.sequence, transfer.bytes as u32, transfer.crc);
-                if authenticator.agrees(last, &self.staging.tag()) {
-                    transfer.stage = Stage::Checking;
-                    return None;
-                }
-                (Outcome::NotAuthorised, 0)
-            }
-            Stage::Checking => match check(blob, self.identity.serial) {
-                Ok(()) => {
-                    transfer.stage = Stage::Verified;
-                    transfer.idle_ticks = 0;
-                    let end = (Outcome::Done, transfer.crc);
-                    return Some(answer(VERIFY, transfer.token, end));
-                }
-                Err(error) => (Outcome::BadContent, error.number().into()),
-            },
-            Stage::Receiving | Stage::Verified if transfer.idle_ticks < self.idle_ticks_max => {
-                transfer.idle_ticks += 1;
-                return None;
-            }
-            Stage::Receiving | Stage::Verified => (Outcome::NoTransfer, 0),
+    /// One tick: closes a transfer whose host is silent, and any once the servo is on.
+    pub fn tick(&mut self, servo_is_off: bool) {
+        let Some(transfer) = self.transfer.as_mut().filter(|t| t.commit.is_none()) else {
+            return;
         };
-        let number = match transfer.stage {
-            Stage::Storing => Some(COMMIT),
-            Stage::Authenticating(..) | Stage::Checking => Some(VERIFY),
-            Stage::Receiving | Stage::Verified => None,
-        };
-        let token = transfer.token;
+        transfer.idle_ticks += 1;
+        let (token, is_idle) = (transfer.token, transfer.idle_ticks > self.idle_ticks_max);
+        if !servo_is_off {
+            self.end(token, (Outcome::ServoOn, 0));
+        } else if is_idle {
+            self.end(token, (Outcome::NoTransfer, 0));
+        }
+    }
+
+    /// Checks what was committed, stores it, and gives the answer. Takes half a second.
+    pub fn store(&mut self, servo_is_off: bool, store: &mut dyn Store) -> Option<Answer> {
+        let transfer = self.transfer.as_ref()?;
+        let (token, end) = (transfer.token, self.stored(transfer, servo_is_off, store)?);
         self.end(token, end);
-        number.map(|number| answer(number, token, end))
+        let (outcome, detail) = end;
+        Some(Answer {
+            number: COMMIT,
+            token,
+            outcome: Some(outcome),
+            detail,
+        })
+    }
+
+    fn stored(
+        &self,
+        transfer: &Transfer,
+        servo_is_off: bool,
+        store: &mut dyn Store,
+    ) -> Option<(Outcome, u32)> {
+        let (sequence, crc) = transfer.commit?;
+        if !servo_is_off {
+            return Some((Outcome::ServoOn, 0));
+        }
+        let blob = self.staging.blob(transfer.bytes);
+        if let Some(key) = &self.identity.key {
+            let mut authenticator = Authenticator::new(key, &transfer.nonce);
+            authenticator.update(blob);
+            let last = (sequence, transfer.bytes as u32, crc);
+            if !authenticator.agrees(last, &self.staging.tag()) {
+                return Some((Outcome::NotAuthorised, 0));
+            }
+        }
+        if let Err(error) = check(blob, self.identity.serial) {
+            return Some((Outcome::BadContent, error.number().into()));
+        }
+        let change = match transfer.bytes {
+            0 => Change::Previous,
+            _ => Change::Blob(blob),
+        };
+        Some(match store.write(sequence, change) {
+            Ok(()) => (Outcome::Done, crc),
+            Err(NotWritten::SupplyLow) => (Outcome::SupplyLow, 0),
+            Err(NotWritten::Failed) => (Outcome::StoreFailed, 0),
+        })
     }
 
     fn begin(
@@ -221,14 +200,12 @@ impl<'s> Receiver<'s> {
         check: u16,
         around: Surroundings<'_>,
     ) -> Result<(), (Outcome, u32)> {
-        if let Some(transfer) = &mut self.transfer {
+        if let Some(transfer) = &self.transfer {
             let named = (transfer.token, transfer.bytes, transfer.check);
-            let same = named == (token, bytes, check);
             // The answer to the first of two equal requests may have been lost.
-            return if same && matches!(transfer.stage, Stage::Receiving) {
-                Ok(())
-            } else {
-                Err((Outcome::Busy, 0))
+            return match named == (token, bytes, check) && transfer.commit.is_none() {
+                true => Ok(()),
+                false => Err((Outcome::Busy, 0)),
             };
         }
         if bytes > MAX_BYTES {
@@ -244,12 +221,6 @@ impl<'s> Receiver<'s> {
                 Some(_) => {}
             }
         }
-        if !around.store.is_writable() {
-            return Err((Outcome::StoreFailed, 0));
-        }
-        if !around.store.has_room() {
-            return Err((Outcome::NoRoom, 0));
-        }
         let nonce = match (self.identity.key, around.nonce) {
             (Some(_), None) => return Err((Outcome::NoRandomNumber, 0)),
             (_, nonce) => nonce.unwrap_or_default(),
@@ -261,28 +232,23 @@ impl<'s> Receiver<'s> {
             bytes,
             check,
             nonce,
-            sequence: 0,
-            crc: 0,
             idle_ticks: 0,
-            stage: Stage::Receiving,
+            commit: None,
         });
         Ok(())
     }
 
-    fn verify(&mut self, token: u8, sequence: u32, store: &dyn Store) -> (Outcome, u32) {
+    fn commit(&mut self, token: u8, sequence: u32, store: &dyn Store) -> (Outcome, u32) {
         let Some(transfer) = self.transfer.as_mut().filter(|t| t.token == token) else {
-            return self.without_transfer(token);
+            return (Outcome::Busy, 0);
         };
-        match transfer.stage {
-            Stage::Receiving => {}
-            _ if transfer.sequence != sequence => return (Outcome::Busy, 0),
-            Stage::Authenticating(..) | Stage::Checking => return (Outcome::Started, 0),
-            Stage::Verified => return (Outcome::Done, transfer.crc),
-            Stage::Storing => return (Outcome::Busy, 0),
+        match transfer.commit {
+            None => transfer.idle_ticks = 0,
+            Some((asked, _)) if asked == sequence => return (Outcome::Started, 0),
+            Some(_) => return (Outcome::Busy, 0),
         }
-        transfer.idle_ticks = 0;
-        let key = self.identity.key;
-        if let Some(index) = self.staging.missing(transfer.bytes, key.is_some()) {
+        let has_key = self.identity.key.is_some();
+        if let Some(index) = self.staging.missing(transfer.bytes, has_key) {
             return (Outcome::Incomplete, index.into());
         }
         // Of two transfers that were made for the same store only one is stored.
@@ -294,38 +260,19 @@ impl<'s> Receiver<'s> {
             0 => store.previous().map(|kept| kept.crc),
             bytes => crc_of(self.staging.blob(bytes)),
         };
-        let Some(crc) = crc.filter(|crc| *crc as u16 == transfer.check) else {
-            let end = (Outcome::BadContent, WRONG_CHECK);
-            self.end(token, end);
-            return end;
-        };
-        (transfer.sequence, transfer.crc) = (sequence, crc);
-        transfer.stage = match key {
-            None => Stage::Checking,
-            Some(key) => Stage::Authenticating(Authenticator::new(&key, &transfer.nonce), 0),
-        };
-        (Outcome::Started, 0)
-    }
-
-    fn commit(&mut self, token: u8, sequence: u32) -> (Outcome, u32) {
-        let Some(transfer) = self.transfer.as_mut().filter(|t| t.token == token) else {
-            return self.without_transfer(token);
-        };
-        match transfer.stage {
-            Stage::Verified if transfer.sequence == sequence => {
-                transfer.stage = Stage::Storing;
-                (Outcome::Started, 0)
-            }
-            Stage::Storing if transfer.sequence == sequence => (Outcome::Started, 0),
-            Stage::Receiving => (Outcome::NotAuthorised, 0),
-            _ => (Outcome::Busy, 0),
+        if let Some(crc) = crc.filter(|crc| *crc as u16 == transfer.check) {
+            transfer.commit = Some((sequence, crc));
+            return (Outcome::Started, 0);
         }
+        let end = (Outcome::BadContent, WRONG_CHECK);
+        self.end(token, end);
+        end
     }
 
     fn abort(&mut self, token: u8) -> (Outcome, u32) {
         match &self.transfer {
             None => (Outcome::Done, 0),
-            Some(t) if t.token != token || matches!(t.stage, Stage::Storing) => (Outcome::Busy, 0),
+            Some(t) if t.token != token || t.commit.is_some() => (Outcome::Busy, 0),
             Some(_) => {
                 self.end(token, (Outcome::NoTransfer, 0));
                 (Outcome::Done, 0)
@@ -336,7 +283,6 @@ impl<'s> Receiver<'s> {
     /// To a request for a transfer that is not open: how it ended, if it was the last one.
     fn without_transfer(&self, token: u8) -> (Outcome, u32) {
         match self.ended {
-            _ if self.is_updating() => (Outcome::Busy, 0),
             Some((ended, outcome, detail)) if ended == token => (outcome, detail),
             _ => (Outcome::NoTransfer, 0),
         }
@@ -348,19 +294,9 @@ impl<'s> Receiver<'s> {
     }
 }
 
-const VERIFY: u8 = UpdateRequest::Verify { sequence: 0 }.number();
 const COMMIT: u8 = UpdateRequest::Commit { sequence: 0 }.number();
 
-const fn answer(number: u8, token: u8, (outcome, detail): (Outcome, u32)) -> Answer {
-    Answer {
-        number,
-        token,
-        outcome: Some(outcome),
-        detail,
-    }
-}
-
-/// The sequence number of the next record; `None` once all are used up.
+/// The sequence number that is due; `None` once all are used up.
 fn due(store: &dyn Store) -> Option<u32> {
     store.newest_sequence().checked_add(1)
 }

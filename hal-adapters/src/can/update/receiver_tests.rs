@@ -1,6 +1,6 @@
 extern crate std;
 
-use super::super::{Kept, Key, MemoryStore, Running, TAG_BYTES, TAG_INDEX, page, tag};
+use super::super::{Kept, Key, Running, TAG_BYTES, TAG_INDEX, page, tag, word_of};
 use super::*;
 use crate::can::command::{Command, Mailbox, Request, Told};
 use crate::can::service::{Service, Updates};
@@ -26,63 +26,96 @@ struct Bench {
     random: Random,
 }
 
-/// Every write must be of a sound blob of this stage, under a newer number; `expected` are those
-/// that may be written at all.
+/// Keeps the newest blob and the one before, and runs what was newest at the last reset. Every write
+/// must be of a sound blob of this stage, under the next number; `expected` are those that may be
+/// written at all.
 struct Watched {
-    inner: MemoryStore,
+    newest: (u32, Vec<u8>),
+    previous: Option<(u32, Vec<u8>)>,
+    running: Option<(u32, Vec<u8>, ParameterSet)>,
+    writes: u32,
     expected: Vec<Vec<u8>>,
-    /// The CRC-32C that the last verification told.
-    verified: Option<u32>,
-    /// Whether the test notes every verification: nothing is written without one.
-    notes_verified: bool,
     went_back: bool,
-    room: bool,
-    fails: bool,
+    fails: Option<NotWritten>,
+}
+
+impl Watched {
+    fn new() -> Self {
+        let mut store = Self {
+            newest: (3, OLD.to_vec()),
+            previous: None,
+            running: None,
+            writes: 0,
+            expected: [NEW.to_vec()].to_vec(),
+            went_back: false,
+            fails: None,
+        };
+        store.reset();
+        store
+    }
+
+    fn reset(&mut self) {
+        let (sequence, blob) = self.newest.clone();
+        let set = ParameterSet::from_bytes(&blob).expect("sound");
+        self.running = Some((sequence, blob, set));
+    }
+}
+
+fn kept((sequence, blob): &(u32, Vec<u8>)) -> Option<Kept> {
+    let (sequence, crc) = (*sequence, crc_of(blob)?);
+    Some(Kept { sequence, crc })
 }
 
 impl Store for Watched {
     fn running(&self) -> Option<Running<'_>> {
-        self.inner.running()
+        let (sequence, blob, set) = self.running.as_ref()?;
+        Some(Running {
+            slot: 0,
+            sequence: *sequence,
+            crc: crc_of(blob)?,
+            bytes: blob.len() as u32,
+            is_forced: set.fit.forced,
+            serial: &set.serial,
+            created: &set.created,
+            rms: set.fit.rms,
+            peak: set.fit.peak,
+        })
+    }
+
+    fn word(&mut self, index: usize) -> Option<u32> {
+        word_of(&self.running.as_ref()?.1, index)
     }
 
     fn newest(&self) -> Option<Kept> {
-        self.inner.newest()
+        kept(&self.newest)
     }
 
     fn previous(&self) -> Option<Kept> {
-        self.inner.previous()
+        kept(self.previous.as_ref()?)
     }
 
     fn newest_sequence(&self) -> u32 {
-        self.inner.newest_sequence()
+        self.newest.0
     }
 
-    fn is_writable(&self) -> bool {
-        !self.fails
-    }
-
-    fn has_room(&self) -> bool {
-        self.room
-    }
-
-    fn write(&mut self, sequence: u32, change: Change<'_>) -> Written {
+    fn write(&mut self, sequence: u32, change: Change<'_>) -> Result<(), NotWritten> {
         assert_eq!(sequence, self.newest_sequence() + 1);
-        let crc = match change {
+        self.went_back = change == Change::Previous;
+        let blob = match change {
             Change::Blob(blob) => {
                 let set = ParameterSet::from_bytes(blob).expect("a sound blob");
                 assert_eq!(set.serial, SERIAL);
                 assert!(self.expected.iter().any(|expected| expected == blob));
-                crc_of(blob)
+                blob.to_vec()
             }
-            Change::Previous => self.previous().map(|kept| kept.crc),
+            Change::Previous => self.previous.clone().expect("one before").1,
         };
-        assert!(self.verified.is_some() || !self.notes_verified);
-        assert!(crc.is_some() && self.verified.is_none_or(|verified| crc == Some(verified)));
-        self.went_back = change == Change::Previous;
-        if self.fails {
-            return Written::Failed;
+        if let Some(why) = self.fails {
+            return Err(why);
         }
-        self.inner.write(sequence, change)
+        self.previous = Some(core::mem::replace(&mut self.newest, (sequence, blob)));
+        self.writes += 1;
+        Ok(())
     }
 }
 
@@ -97,15 +130,7 @@ impl Bench {
         Self {
             service: Service::new(TICKS_PER_S),
             receiver: Receiver::new(identity, TICKS_PER_S),
-            store: Watched {
-                inner: MemoryStore::holding(3, OLD).expect("a sound example"),
-                expected: [NEW.to_vec()].to_vec(),
-                verified: None,
-                notes_verified: false,
-                went_back: false,
-                room: true,
-                fails: false,
-            },
+            store: Watched::new(),
             host: Mailbox::default(),
             random: Random::new(1),
         }
@@ -184,16 +209,24 @@ impl Bench {
             self.service.before_tick(None, None);
             assert_eq!(self.service.tick(None), None);
             let servo_is_off = self.service.servo_is_off();
-            answers.extend(self.receiver.tick(servo_is_off, &mut self.store));
+            self.receiver.tick(servo_is_off);
+            answers.extend(self.receiver.store(servo_is_off, &mut self.store));
         }
         answers
     }
 
-    fn ends(&mut self, number: u8, token: u8, end: (Outcome, u32)) {
-        assert_eq!(self.rest(), [answer(number, token, end)]);
+    /// The end of what was committed.
+    fn ends(&mut self, token: u8, (outcome, detail): (Outcome, u32)) {
+        let end = Answer {
+            number: COMMIT,
+            token,
+            outcome: Some(outcome),
+            detail,
+        };
+        assert_eq!(self.rest(), [end]);
     }
 
-    /// Everything up to the verification, with the right tag for `sequence`.
+    /// Everything up to the commit, with the right tag for `sequence`.
     fn transfer(&mut self, token: u8, blob: &[u8], sequence: u32) {
         let previous = self.store.previous().map(|kept| kept.crc);
         let crc = crc_of(blob).or(previous).expect("a blob, or one before");
@@ -204,7 +237,7 @@ impl Bench {
         self.blob(token, blob);
         if self.receiver.identity.key.is_some() {
             let incomplete = (Outcome::Incomplete, TAG_INDEX.into());
-            assert_eq!(self.update(verify(sequence), token), incomplete);
+            assert_eq!(self.update(commit(sequence), token), incomplete);
         }
         self.tag(token, tag(&KEY, &nonce, sequence, blob, crc));
     }
@@ -219,10 +252,6 @@ const NEW_CRC: u32 = match NEW {
     [.., a, b, c, d] => u32::from_le_bytes([*a, *b, *c, *d]),
     _ => 0,
 };
-
-const fn verify(sequence: u32) -> UpdateRequest {
-    UpdateRequest::Verify { sequence }
-}
 
 const fn commit(sequence: u32) -> UpdateRequest {
     UpdateRequest::Commit { sequence }

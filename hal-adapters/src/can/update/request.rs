@@ -13,25 +13,20 @@ pub enum UpdateRequest {
     /// Opens a transfer, whose token this command's becomes.
     Begin {
         /// Length of the blob, 1 to [`runtime::blob::MAX_BYTES`]; 0 for no blob: the commit then
-        /// goes back to the record before the newest.
+        /// goes back to the blob before the newest.
         bytes: u16,
-        /// The low half of its CRC-32C, or of that of the record to go back to: another one is
+        /// The low half of its CRC-32C, or of that of the blob to go back to: another one is
         /// not stored.
         check: u16,
     },
-    /// Checks what was transferred.
-    Verify {
-        /// Sequence number that the new record will have: one above the highest in the store.
-        sequence: u32,
-    },
-    /// Stores what was verified.
+    /// Checks what was transferred, and stores it.
     Commit {
-        /// The same number as in [`UpdateRequest::Verify`].
+        /// Sequence number that it will have: one above the highest in the store.
         sequence: u32,
     },
     /// Closes the transfer; nothing is stored.
     Abort,
-    /// Resets the node, which then runs the newest record.
+    /// Resets the node, which then runs the newest blob. Acknowledges that it stopped.
     Activate,
     /// A word of the blob that runs: the detail of the answer.
     ReadBack {
@@ -59,7 +54,6 @@ impl UpdateRequest {
         match self {
             Self::Challenge { .. } => 6,
             Self::Begin { .. } => 7,
-            Self::Verify { .. } => 8,
             Self::Commit { .. } => 9,
             Self::Abort => 10,
             Self::Activate => 11,
@@ -75,7 +69,7 @@ impl UpdateRequest {
             | Self::ReadBack { index: byte }
             | Self::Tell { page: byte } => byte as u32,
             Self::Begin { bytes, check } => (check as u32) << 16 | bytes as u32,
-            Self::Verify { sequence } | Self::Commit { sequence } => sequence,
+            Self::Commit { sequence } => sequence,
             Self::Abort | Self::Activate => 0,
         }
     }
@@ -89,7 +83,6 @@ impl UpdateRequest {
                 bytes: argument as u16,
                 check: (argument >> 16) as u16,
             }),
-            (8, sequence) => Some(Self::Verify { sequence }),
             (9, sequence) => Some(Self::Commit { sequence }),
             (10, 0) => Some(Self::Abort),
             (11, 0) => Some(Self::Activate),

@@ -1,14 +1,18 @@
-//! What the transfer needs of the memory that keeps the records.
+//! What the transfer needs of the memory that keeps the parameters.
 
-/// The record that runs.
+/// The blob that runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Running<'r> {
-    /// Where it lies: number of the sector or slot.
+    /// Number of its slot.
     pub slot: u8,
     /// Its sequence number; 0 for a blob that a probe has flashed.
     pub sequence: u32,
-    /// The blob, byte for byte.
-    pub blob: &'r [u8],
+    /// Its CRC-32C.
+    pub crc: u32,
+    /// Its length, bytes.
+    pub bytes: u32,
+    /// Whether the fit was refused and written all the same.
+    pub is_forced: bool,
     /// Serial number of its stage, as the blob tells.
     pub serial: &'r str,
     /// When it was made, as the blob tells.
@@ -19,12 +23,12 @@ pub struct Running<'r> {
     pub peak: [f32; 3],
 }
 
-/// A record in the store.
+/// A blob in the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kept {
     /// Its sequence number; 0 for a blob that a probe has flashed.
     pub sequence: u32,
-    /// The CRC-32C of its blob.
+    /// Its CRC-32C.
     pub crc: u32,
 }
 
@@ -33,47 +37,40 @@ pub struct Kept {
 pub enum Change<'b> {
     /// A new blob.
     Blob(&'b [u8]),
-    /// The record before the newest one again.
+    /// The blob before the newest again.
     Previous,
 }
 
-/// How far a change is.
+/// Why a change was not stored. What was the newest blob still is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Written {
-    /// Call again.
-    InProgress,
-    /// The record is whole, committed and read back.
-    Done,
-    /// It could not be written. The next start settles whether the record counts; until then the one
-    /// before is the newest.
+pub enum NotWritten {
+    /// The supply is too low to write.
+    SupplyLow,
+    /// The memory failed.
     Failed,
 }
 
-/// Keeps records over a loss of power.
+/// Keeps two blobs over a loss of power.
 pub trait Store {
-    /// The record that runs, if there is one.
+    /// The blob that runs, if there is one.
     fn running(&self) -> Option<Running<'_>>;
 
-    /// The record that runs from the next reset on.
+    /// A word of the blob that runs, from 0; the last one is padded with zeros.
+    fn word(&mut self, index: usize) -> Option<u32>;
+
+    /// The blob that runs once it is activated, or after power-on.
     fn newest(&self) -> Option<Kept>;
 
-    /// The record to which [`Change::Previous`] goes back.
+    /// The blob to which [`Change::Previous`] goes back.
     fn previous(&self) -> Option<Kept>;
 
-    /// The highest sequence number of any committed record, of one that is refused too; 0 if
-    /// there is none.
+    /// The highest sequence number of any blob, of one that is refused too; 0 if there is none.
     fn newest_sequence(&self) -> u32;
 
-    /// Whether records can be written before the next start. If not, that start may try again.
-    fn is_writable(&self) -> bool {
-        true
-    }
-
-    /// Whether a record of any size fits without an erase.
-    fn has_room(&self) -> bool;
-
-    /// Writes a part of a change, as long as fits between two ticks. It is called in every tick with
-    /// the same arguments until it gives something other than [`Written::InProgress`], and then
-    /// not again for this change. `sequence` is one above [`Store::newest_sequence`].
-    fn write(&mut self, sequence: u32, change: Change<'_>) -> Written;
+    /// Stores a change, whole and read back; it may take half a second. `sequence` is one above
+    /// [`Store::newest_sequence`].
+    ///
+    /// # Errors
+    /// [`NotWritten`].
+    fn write(&mut self, sequence: u32, change: Change<'_>) -> Result<(), NotWritten>;
 }

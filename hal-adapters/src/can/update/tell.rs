@@ -1,7 +1,7 @@
 //! Who the node is: the pages of [`super::UpdateRequest::Tell`].
 
 use super::authentication::Key;
-use super::staging::{crc_of, word_of};
+use super::staging::word_of;
 use super::store::{Kept, Store};
 use crate::can::command::Outcome;
 
@@ -21,9 +21,9 @@ pub struct Identity<'s> {
     pub program_hash: u32,
 }
 
-/// Numbers of the pages. Those up to [`page::PEAK`] are of the record that runs.
+/// Numbers of the pages. Those up to [`page::PEAK`] are of the blob that runs.
 pub mod page {
-    /// Bits 0 to 7: slot or sector; bit 8: the fit was refused and written all the same.
+    /// Bits 0 to 7: number of the slot; bit 8: the fit was refused and written all the same.
     pub const PLACE: u8 = 0;
     /// Sequence number.
     pub const SEQUENCE: u8 = 1;
@@ -44,15 +44,15 @@ pub mod page {
     /// Bits 0 to 7: how the last transfer since the reset ended, a number of
     /// [`Outcome`](crate::can::command::Outcome), 255 for none; bit 8: a key is needed.
     pub const LAST_UPDATE: u8 = 20;
-    /// The highest sequence number in the store: above that of [`NEXT`] if the newest record is
+    /// The highest sequence number in the store: above that of [`NEXT`] if the newest blob is
     /// refused.
     pub const NEWEST: u8 = 21;
     /// Serial number of the stage: eight pages of four bytes of UTF-8, 0 after the end.
     pub const SERIAL: u8 = 22;
-    /// Sequence number of the record that runs from the next reset on, and the check of its blob,
+    /// Sequence number of the blob that runs once it is activated or after power-on, and its check,
     /// CRC-32C: two pages.
     pub const NEXT: u8 = 30;
-    /// The same of the record to which a transfer of length 0 goes back: two pages.
+    /// The same of the blob to which a transfer of length 0 goes back: two pages.
     pub const PREVIOUS: u8 = 32;
     /// How many there are.
     pub const COUNT: u8 = 34;
@@ -89,28 +89,25 @@ fn word_of_text(text: &str, index: u8) -> u32 {
     word_of(text.as_bytes(), index.into()).unwrap_or(0)
 }
 
-/// A page that follows from the store; `None` without a running record.
+/// A page that follows from the store; `None` where no blob runs.
 fn of_running(number: u8, store: &dyn Store) -> Option<u32> {
     let running = store.running()?;
-    let number_of = |values: [f32; 3], first: u8| {
+    let value_of = |values: [f32; 3], first: u8| {
         let k = usize::from(number.checked_sub(first)?);
         values.get(k).map(|value| value.to_bits())
     };
     match number {
-        page::PLACE => {
-            let forced = running.blob.get(6) == Some(&1);
-            Some(u32::from(forced) << 8 | u32::from(running.slot))
-        }
+        page::PLACE => Some(u32::from(running.is_forced) << 8 | u32::from(running.slot)),
         page::SEQUENCE => Some(running.sequence),
-        page::CRC => crc_of(running.blob),
-        page::LENGTH => u32::try_from(running.blob.len()).ok(),
+        page::CRC => Some(running.crc),
+        page::LENGTH => Some(running.bytes),
         page::CREATED..page::RMS => Some(word_of_text(running.created, number - page::CREATED)),
-        page::RMS..page::PEAK => number_of(running.rms, page::RMS),
-        _ => number_of(running.peak, page::PEAK),
+        page::RMS..page::PEAK => value_of(running.rms, page::RMS),
+        _ => value_of(running.peak, page::PEAK),
     }
 }
 
-/// A page of a record in the store: its sequence number, or from 1 on its check.
+/// A page of a blob in the store: its sequence number, or from 1 on its check.
 fn of_kept(kept: Option<Kept>, page: u8) -> Option<u32> {
     let kept = kept?;
     Some(if page == 0 { kept.sequence } else { kept.crc })

@@ -3,43 +3,35 @@
 use super::*;
 
 #[test]
-fn a_whole_update_with_a_key_is_stored_and_runs_after_the_reset() {
+fn a_whole_update_with_a_key_is_stored_and_runs_once_activated() {
     let mut bench = Bench::new(Some(KEY));
     assert_eq!(bench.update(BEGIN, 7), (Outcome::ServoOn, 0));
     bench.servo_off();
     assert!(!bench.receiver.is_updating());
     bench.transfer(7, NEW, 4);
-    assert!(bench.receiver.is_updating());
-    assert_eq!(bench.update(commit(4), 7), (Outcome::NotAuthorised, 0));
-    assert_eq!(bench.update(verify(4), 7), STARTED);
-    assert_eq!(bench.update(verify(4), 7), STARTED);
-    bench.ends(VERIFY, 7, NEW_DONE);
-    assert_eq!(bench.update(verify(4), 7), NEW_DONE);
+    assert!(bench.receiver.is_updating() && !bench.receiver.is_storing());
+    assert_eq!(bench.update(commit(4), 7), STARTED);
+    assert_eq!(bench.update(commit(4), 7), STARTED);
     assert_eq!(bench.update(commit(5), 7), (Outcome::Busy, 0));
-    assert_eq!(bench.update(commit(4), 7), STARTED);
-    assert_eq!(bench.update(commit(4), 7), STARTED);
     assert_eq!(bench.update(UpdateRequest::Abort, 7), (Outcome::Busy, 0));
-    bench.ends(COMMIT, 7, NEW_DONE);
+    assert!(bench.receiver.is_storing());
+    bench.ends(7, NEW_DONE);
     assert_eq!(bench.update(commit(4), 7), NEW_DONE);
     assert!(!bench.receiver.is_updating());
-    assert_eq!(bench.store.inner.newest_blob(), Some(NEW));
+    assert_eq!(bench.store.newest.1, NEW);
     // It runs after the reset only.
     let tell = |page| UpdateRequest::Tell { page };
     assert_eq!(bench.update(tell(page::SEQUENCE), 8).1, 3);
     assert_eq!(bench.update(tell(page::NEWEST), 8).1, 4);
     assert_eq!(bench.update(UpdateRequest::Activate, 9), DONE);
     assert!(bench.receiver.wants_reset());
-    bench.store.inner.reset();
+    bench.store.reset();
     assert_eq!(bench.update(tell(page::SEQUENCE), 8).1, 4);
-    // Back again: the record before, under a new number, authorised like any.
+    // Back again: the blob before, under a new number, authorised like any.
     bench.transfer(10, &[], 5);
-    assert_eq!(bench.update(verify(5), 10), STARTED);
-    let old_done = (Outcome::Done, crc_of(OLD).expect("a blob"));
-    bench.ends(VERIFY, 10, old_done);
     assert_eq!(bench.update(commit(5), 10), STARTED);
-    bench.ends(COMMIT, 10, old_done);
-    assert_eq!(bench.store.inner.newest_blob(), Some(OLD));
-    assert_eq!(bench.store.inner.writes(), 2);
+    bench.ends(10, (Outcome::Done, crc_of(OLD).expect("a blob")));
+    assert_eq!((&bench.store.newest.1[..], bench.store.writes), (OLD, 2));
 }
 
 #[test]
@@ -53,33 +45,36 @@ fn every_word_that_is_missing_is_asked_for() {
         bench.data(7, 147, 1);
         bench.data(7, TAG_INDEX, 1);
         bench.data(8, missing as u8, 1);
-        assert_eq!(bench.update(verify(4), 7), incomplete);
+        assert_eq!(bench.update(commit(4), 7), incomplete);
         bench.data(7, missing as u8, word_of(NEW, missing).expect("within"));
     }
-    assert_eq!(bench.update(verify(3), 7), (Outcome::WrongSequence, 4));
-    assert_eq!(bench.update(verify(4), 7), STARTED);
-    bench.ends(VERIFY, 7, NEW_DONE);
-    bench.store.fails = true;
+    assert_eq!(bench.update(commit(3), 7), (Outcome::WrongSequence, 4));
     assert_eq!(bench.update(commit(4), 7), STARTED);
-    bench.ends(COMMIT, 7, (Outcome::StoreFailed, 0));
-    assert_eq!(bench.store.inner.newest_blob(), Some(OLD));
+    bench.ends(7, NEW_DONE);
 }
 
 #[test]
-fn a_damaged_blob_and_one_of_another_stage_are_refused_by_kind() {
+fn what_cannot_be_stored_is_refused_by_kind() {
     let mut damaged = NEW.to_vec();
     damaged[100] ^= 1;
     let mut other = ParameterSet::from_bytes(NEW).expect("sound");
     other.serial = "HS-0008".try_into().expect("short");
     let mut buffer = [0; MAX_BYTES];
     let other = other.to_bytes(&mut buffer).expect("room");
-    for (blob, kind) in [(&damaged[..], 7), (other, 10)] {
+    for (blob, fails, end) in [
+        (&damaged[..], None, (Outcome::BadContent, 7)),
+        (other, None, (Outcome::BadContent, 10)),
+        (NEW, Some(NotWritten::Failed), (Outcome::StoreFailed, 0)),
+        (NEW, Some(NotWritten::SupplyLow), (Outcome::SupplyLow, 0)),
+    ] {
         let mut bench = Bench::new(Some(KEY));
+        bench.store.fails = fails;
         bench.servo_off();
         bench.transfer(7, blob, 4);
-        assert_eq!(bench.update(verify(4), 7), STARTED);
-        bench.ends(VERIFY, 7, (Outcome::BadContent, kind));
+        assert_eq!(bench.update(commit(4), 7), STARTED);
+        bench.ends(7, end);
         assert!(!bench.receiver.is_updating());
+        assert_eq!(bench.store.newest.1, OLD);
     }
     let mut bench = Bench::new(None);
     bench.servo_off();
@@ -87,37 +82,24 @@ fn a_damaged_blob_and_one_of_another_stage_are_refused_by_kind() {
     assert_eq!(bench.update(long, 7), (Outcome::BadContent, 0));
     let back = UpdateRequest::begin(0, 0);
     assert_eq!(bench.update(back, 7), (Outcome::NoParameters, 0));
-    bench.store.room = false;
-    assert_eq!(bench.update(BEGIN, 7), (Outcome::NoRoom, 0));
-    bench.store.fails = true;
-    assert_eq!(bench.update(BEGIN, 7), (Outcome::StoreFailed, 0));
 }
 
 #[test]
 fn a_servo_that_goes_on_ends_a_transfer_at_once() {
     let on = Request::ServoOff { seconds: 0 };
-    for checks in [false, true] {
-        let mut bench = Bench::new(Some(KEY));
-        bench.servo_off();
-        bench.transfer(7, NEW, 4);
-        if checks {
-            assert_eq!(bench.update(verify(4), 7), STARTED);
-        }
-        bench.ask(on, 50);
-        let answers = bench.ticks(1);
-        let want = answer(VERIFY, 7, (Outcome::ServoOn, 0));
-        assert_eq!(answers, if checks { [want].to_vec() } else { Vec::new() });
-        assert!(!bench.receiver.is_updating());
-    }
-    // What is being stored is stored: half a record helps nobody.
     let mut bench = Bench::new(Some(KEY));
     bench.servo_off();
     bench.transfer(7, NEW, 4);
-    assert_eq!(bench.update(verify(4), 7), STARTED);
-    bench.rest();
+    bench.ask(on, 50);
+    assert!(bench.ticks(1).is_empty());
+    assert!(!bench.receiver.is_updating());
+    // Also before it is stored.
+    bench.servo_off();
+    bench.transfer(7, NEW, 4);
     assert_eq!(bench.update(commit(4), 7), STARTED);
     bench.ask(on, 50);
-    bench.ends(COMMIT, 7, NEW_DONE);
+    bench.ends(7, (Outcome::ServoOn, 0));
+    assert_eq!(bench.store.writes, 0);
 }
 
 #[test]
@@ -164,9 +146,7 @@ fn every_page_tells_what_runs() {
     assert_eq!(&read[..OLD.len()], OLD);
     let beyond = UpdateRequest::ReadBack { index: 255 };
     assert_eq!(bench.update(beyond, 1), (Outcome::UnknownCommand, 0));
-    bench.store.inner = MemoryStore::default();
+    bench.store.running = None;
     assert_eq!(tell(&mut bench, page::PLACE), none);
-    assert_eq!(tell(&mut bench, page::NEXT), none);
-    assert_eq!(tell(&mut bench, page::NEWEST), DONE);
     assert_eq!(bench.update(beyond, 1), (Outcome::NoParameters, 0));
 }

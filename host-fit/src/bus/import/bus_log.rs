@@ -7,10 +7,8 @@ use runtime::frame::MISSING_CODE;
 /// A whole tick of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusTick {
-    /// Its number, lost ticks counted as far as the counters show them.
-    pub sequence: u64,
-    /// Whether the sensor node counted on since the tick before.
-    pub follows: bool,
+    /// The last four bits of its number.
+    pub counter: u8,
     /// When its first frame was received, us.
     pub received_us: u64,
     /// Hall codes of A, B, C.
@@ -30,15 +28,15 @@ pub struct BusCounts {
     pub bad_lines: usize,
     /// Lines that hold no classic data frame: error frames, CAN FD.
     pub other_lines: usize,
-    /// Frames that were left out because the clock leapt ahead for them alone.
-    pub mistimed: usize,
     /// Whole ticks.
     pub ticks: usize,
     /// Whole ticks that were left out because a code is at a rail of its converter.
     pub saturated: usize,
-    /// Whole ticks that were left out because their number is not certain: no time frame came on
-    /// both sides of them, or 16 ticks or more were lost between the two.
-    pub unnumbered: u64,
+    /// Whole ticks that were left out because their time is not certain, or because they belong to
+    /// another run of the node than the longest.
+    pub untimed: usize,
+    /// How often the node started again.
+    pub restarts: usize,
     /// Ticks missing between them, those that were not whole included.
     pub ticks_missing: u64,
     /// Places where ticks are missing.
@@ -59,8 +57,8 @@ pub(in crate::bus) struct Collector {
     layout: Option<Layout>,
     receiver: Option<SensorReceiver>,
     counts: BusCounts,
-    /// Number of the last whole tick, by the receiver and in the record.
-    last: Option<(u32, u64)>,
+    /// Number of the last whole tick by the receiver.
+    last: Option<u32>,
 }
 
 impl Collector {
@@ -91,10 +89,8 @@ impl Collector {
         if codes.clone().any(|c| *c == MISSING_CODE) {
             return None;
         }
-        let (last, before) = self.last.unwrap_or((raw.sequence, u64::from(raw.sequence)));
+        let last = self.last.replace(raw.sequence).unwrap_or(raw.sequence);
         let ahead = raw.sequence.wrapping_sub(last);
-        let sequence = before + u64::from(ahead);
-        self.last = Some((raw.sequence, sequence));
         self.counts.ticks += 1;
         if ahead > 1 {
             self.counts.gaps += 1;
@@ -104,8 +100,7 @@ impl Collector {
         // The record's clock may step back within a tick.
         let age_us = if age_us > u32::MAX / 2 { 0 } else { age_us };
         Some(BusTick {
-            sequence,
-            follows: true,
+            counter: (raw.sequence & 0xf) as u8,
             received_us: now_us.saturating_sub(age_us.into()),
             hall: raw.hall,
             capacitive: raw.capacitive,

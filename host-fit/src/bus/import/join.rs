@@ -2,8 +2,8 @@
 //! straight line between the samples before and after it.
 
 use super::ImportError;
-use super::bus_log::BusTick;
-use super::reference::{ReferenceCounts, ReferenceReader, Sample};
+use super::node_clock::Tick;
+use super::reference::Sample;
 
 /// A tick with its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +35,7 @@ pub struct JoinCounts {
     pub covered_s: f64,
     /// Rows.
     pub rows: usize,
-    /// Ticks before the first or after the last sample, and those at or before the tick before.
+    /// Ticks before the first or after the last sample.
     pub outside: usize,
     /// Ticks whose samples before and after belong to different movements.
     pub between_movements: usize,
@@ -49,32 +49,12 @@ impl JoinCounts {
     /// Refuses records of which most found no partner in the other.
     ///
     /// # Errors
-    /// `Sparse`, `NoOverlap`, `Unpaired`.
-    pub(super) fn check(&self) -> Result<(), ImportError> {
-        if 2 * self.too_far > self.ticks {
-            return Err(ImportError::Sparse {
-                too_far: self.too_far,
-                ticks: self.ticks,
-            });
-        }
-        if self.rows == 0 {
-            return Err(ImportError::NoOverlap {
-                bus_us: self.bus_us,
-                reference_us: self.reference_us.map(f64::round),
-            });
-        }
+    /// `Unpaired`.
+    pub(super) fn check(self) -> Result<(), ImportError> {
         if 2 * self.rows >= self.ticks && 2.0 * self.covered_s >= self.reference_s {
             return Ok(());
         }
-        Err(ImportError::Unpaired {
-            rows: self.rows,
-            ticks: self.ticks,
-            covered_s: self.covered_s,
-            reference_s: self.reference_s,
-            outside: self.outside,
-            between_movements: self.between_movements,
-            too_far: self.too_far,
-        })
+        Err(ImportError::Unpaired(self))
     }
 }
 
@@ -91,66 +71,33 @@ pub(super) enum At {
     TooFar,
 }
 
-/// Goes along samples with rising times.
-#[derive(Clone, Debug)]
-pub(super) struct Cursor<'s> {
-    samples: &'s [Sample],
-    next: usize,
-}
-
-impl<'s> Cursor<'s> {
-    pub(super) const fn new(samples: &'s [Sample]) -> Self {
-        Self { samples, next: 0 }
-    }
-
-    /// For times that begin with this one.
-    pub(super) fn from(samples: &'s [Sample], t_us: f64) -> Self {
-        let next = samples.partition_point(|sample| sample.t_us < t_us);
-        Self { samples, next }
-    }
-
-    /// The reference at `t_us`, which must not be before that of the last call.
-    pub(super) fn at(&mut self, t_us: f64, tolerance_us: f64) -> At {
-        while self.samples.get(self.next).is_some_and(|s| s.t_us < t_us) {
-            self.next += 1;
-        }
-        let before = self.next.checked_sub(1).and_then(|k| self.samples.get(k));
-        between(before, self.samples.get(self.next), t_us, tolerance_us)
-    }
-}
-
-/// The reference at `t_us`, between the last sample before it and the first one at or after it.
-fn between(before: Option<&Sample>, after: Option<&Sample>, t_us: f64, tolerance_us: f64) -> At {
-    let Some(after) = after else {
+/// The reference at a time.
+pub(super) fn at(samples: &[Sample], t_us: f64, tolerance_us: f64) -> At {
+    let next = samples.partition_point(|sample| sample.t_us < t_us);
+    let Some(after) = samples.get(next) else {
         return At::Outside;
     };
-    if after.t_us == t_us {
-        return At::Found {
-            movement: after.movement,
-            values: after.values,
-            nearest_us: 0.0,
-        };
-    }
-    let Some(before) = before else {
-        return At::Outside;
+    let before = match next.checked_sub(1).and_then(|k| samples.get(k)) {
+        _ if after.t_us == t_us => after,
+        Some(before) => before,
+        None => return At::Outside,
     };
     if before.movement != after.movement {
         return At::BetweenMovements;
     }
     let (since, until) = (t_us - before.t_us, after.t_us - t_us);
-    if since < 0.0 {
-        return At::Outside;
-    }
     if since > tolerance_us || until > tolerance_us {
         return At::TooFar;
     }
-    let part = since / (since + until);
-    let [a, b, c] = before.values;
-    let [d, e, f] = after.values;
-    let between = |from: f64, to: f64| from + part * (to - from);
+    let part = if until > 0.0 {
+        since / (since + until)
+    } else {
+        0.0
+    };
+    let between = |k: usize| before.values[k] + part * (after.values[k] - before.values[k]);
     At::Found {
         movement: before.movement,
-        values: [between(a, d), between(b, e), between(c, f)],
+        values: [0, 1, 2].map(between),
         nearest_us: since.min(until),
     }
 }
@@ -158,126 +105,75 @@ fn between(before: Option<&Sample>, after: Option<&Sample>, t_us: f64, tolerance
 /// Longest time from row to row of a log without a gap, in ticks.
 const GAP_TICKS: f64 = 10.0;
 
-/// Joins ticks with a reference as both are read.
-pub(super) struct Join {
-    reference: ReferenceReader,
-    tolerance_us: f64,
-    before: Option<Sample>,
-    after: Option<Sample>,
-    /// Movement and time of the row before.
-    row: Option<(i64, f64)>,
-    counts: JoinCounts,
-}
-
-impl Join {
-    /// Reads the reference from where it is.
-    ///
-    /// # Errors
-    /// Those of [`ReferenceReader::next_sample`].
-    pub(super) fn new(
-        mut reference: ReferenceReader,
-        tolerance_us: f64,
-    ) -> Result<Self, ImportError> {
-        let after = reference.next_sample()?;
-        Ok(Self {
-            reference,
-            tolerance_us,
-            before: None,
-            after,
-            row: None,
-            counts: JoinCounts {
-                reference_us: [after.map_or(f64::NAN, |sample| sample.t_us); 2],
-                bus_us: [f64::NAN; 2],
-                ..JoinCounts::default()
-            },
-        })
-    }
-
-    /// The row of a tick at this time on the clock of the reference, if it has one; `period_us` is
-    /// the time from tick to tick.
-    ///
-    /// # Errors
-    /// Those of [`ReferenceReader::next_sample`].
-    pub(super) fn take(
-        &mut self,
-        tick: &BusTick,
-        t_us: f64,
-        period_us: f64,
-    ) -> Result<Option<JoinedRow>, ImportError> {
-        // The log holds whole microseconds; the reference is taken at what it holds.
-        let t_us = t_us.round();
-        let counts = &mut self.counts;
-        counts.bus_us = [
-            if counts.ticks == 0 {
-                t_us
-            } else {
-                counts.bus_us[0]
-            },
-            t_us,
-        ];
-        counts.ticks += 1;
-        while self.after.is_some_and(|after| after.t_us < t_us) {
-            self.advance()?;
-        }
-        let at = match self.row {
-            // A sender that started again may overlap its own past by the jitter of the bus.
-            Some((_, before_us)) if t_us <= before_us => At::Outside,
-            _ => between(
-                self.before.as_ref(),
-                self.after.as_ref(),
-                t_us,
-                self.tolerance_us,
-            ),
-        };
-        let counts = &mut self.counts;
-        match at {
-            At::Outside => counts.outside += 1,
-            At::BetweenMovements => counts.between_movements += 1,
-            At::TooFar => counts.too_far += 1,
+/// Joins ticks with a reference; `reference_us` puts a time of the node on the reference's clock.
+///
+/// # Errors
+/// Those of `take`.
+pub(super) fn join(
+    ticks: &[Tick],
+    samples: &[Sample],
+    reference_us: impl Fn(f64) -> f64,
+    (tolerance_us, period_us): (f64, f64),
+    take: &mut dyn FnMut(&JoinedRow) -> Result<(), ImportError>,
+) -> Result<JoinCounts, ImportError> {
+    // The log holds whole microseconds; the reference is taken at what it holds.
+    let t_us = |tick: &Tick| reference_us(tick.t_us).round();
+    let ends = |first: Option<f64>, last: Option<f64>| [first, last].map(|t| t.unwrap_or(f64::NAN));
+    let span_s = |movement: &[Sample]| match movement {
+        [first, .., last] => (last.t_us - first.t_us) * 1e-6,
+        _ => 0.0,
+    };
+    let mut counts = JoinCounts {
+        ticks: ticks.len(),
+        bus_us: ends(ticks.first().map(t_us), ticks.last().map(t_us)),
+        reference_us: ends(
+            samples.first().map(|sample| sample.t_us),
+            samples.last().map(|sample| sample.t_us),
+        ),
+        reference_s: samples
+            .chunk_by(|a, b| a.movement == b.movement)
+            .map(span_s)
+            .sum(),
+        ..JoinCounts::default()
+    };
+    // Movement and time of the row before.
+    let mut row: Option<(i64, f64)> = None;
+    for tick in ticks {
+        let t_us = t_us(tick);
+        let (movement, values, nearest_us) = match at(samples, t_us, tolerance_us) {
+            At::Outside => {
+                counts.outside += 1;
+                continue;
+            }
+            At::BetweenMovements => {
+                counts.between_movements += 1;
+                continue;
+            }
+            At::TooFar => {
+                counts.too_far += 1;
+                continue;
+            }
             At::Found {
                 movement,
                 values,
                 nearest_us,
-            } => {
-                counts.rows += 1;
-                counts.nearest_max_us = counts.nearest_max_us.max(nearest_us);
-                if let Some((last, before_us)) = self.row.replace((movement, t_us))
-                    && last == movement
-                    && t_us - before_us <= (GAP_TICKS * period_us).max(2.0 * self.tolerance_us)
-                {
-                    counts.covered_s += (t_us - before_us) * 1e-6;
-                }
-                return Ok(Some(JoinedRow {
-                    t_us: t_us as i64,
-                    movement,
-                    values,
-                    hall: tick.hall,
-                    capacitive: tick.capacitive,
-                }));
-            }
+            } => (movement, values, nearest_us),
+        };
+        counts.rows += 1;
+        counts.nearest_max_us = counts.nearest_max_us.max(nearest_us);
+        if let Some((last, before_us)) = row.replace((movement, t_us))
+            && last == movement
+            && t_us - before_us <= (GAP_TICKS * period_us).max(2.0 * tolerance_us)
+        {
+            counts.covered_s += (t_us - before_us) * 1e-6;
         }
-        Ok(None)
+        take(&JoinedRow {
+            t_us: t_us as i64,
+            movement,
+            values,
+            hall: tick.hall,
+            capacitive: tick.capacitive,
+        })?;
     }
-
-    /// Reads the rest of the reference.
-    ///
-    /// # Errors
-    /// Those of [`ReferenceReader::next_sample`].
-    pub(super) fn finish(mut self) -> Result<(JoinCounts, ReferenceCounts), ImportError> {
-        while self.after.is_some() {
-            self.advance()?;
-        }
-        Ok((self.counts, self.reference.counts()))
-    }
-
-    fn advance(&mut self) -> Result<(), ImportError> {
-        self.before = std::mem::replace(&mut self.after, self.reference.next_sample()?);
-        if let (Some(before), Some(after)) = (&self.before, &self.after) {
-            self.counts.reference_us[1] = after.t_us;
-            if before.movement == after.movement {
-                self.counts.reference_s += (after.t_us - before.t_us) * 1e-6;
-            }
-        }
-        Ok(())
-    }
+    Ok(counts)
 }

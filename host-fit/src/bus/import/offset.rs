@@ -1,59 +1,68 @@
 //! The offset between the clocks and how much faster one runs, by the motion that both saw.
 //!
-//! A grid of one servo period finds the offset: at the right one each Hall signal is about what the
-//! designed probe would read at the reference pose, times a sensitivity (`explained`). (A
+//! A grid of one servo period finds the offset by correlation: at the right one each Hall signal is
+//! about what the designed probe would read at the reference pose, times a sensitivity. (A
 //! fit by all three axes of the reference would also explain a run shifted by a whole movement:
-//! each movement moves one axis only, and some matrix turns any axis into any other.)
-//!
-//! `refine` then finds offset and rate to a few microseconds. The offset is that in
-//! the middle of the record, where the rate does not act.
+//! each movement moves one axis only, and some matrix turns any axis into any other.) From the
+//! minute with most motion, offset and rate are then followed to the ends of the record: they are the
+//! lag of the reference and its rate in the fit of the field model.
 
 use super::ImportError;
-use super::agreement::agreement;
-use super::explained::explain;
-use super::reference::{ReferenceInput, Sample, collect};
-use super::refine::{FIRST_STRETCH_US, RATE_MAX, refine};
-use super::survey::{Point, Survey};
+use super::join::{At, at};
+use super::node_clock::{Run, Tick};
+use super::reference::{Reference, Sample};
 use crate::input::log::layout::Quantity;
 use crate::input::stage::Stage;
+use crate::solve::field::blocks::{FieldRow, Rows};
+use crate::solve::field::clocks::{Alignment, Lag};
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+use runtime::capacitive::{vertical_pose, vertical_rows};
 use runtime::model::dot;
 
 /// The offset between the clocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Offset {
-    /// Time of the bus less time of the reference in the middle of the record, us.
+    /// Time of the recorder less time of the reference in the middle of the record, us.
     pub us: f64,
-    /// How much faster the clock of the bus runs, as a part of one.
+    /// How much faster the clock of the sensor node runs than that of the reference, as a part of one.
     pub rate: f64,
-    /// The middle of the record, us on the clock of the bus.
-    pub middle_us: f64,
-    /// What the motion that both saw tells of it.
+    /// What the motion that both saw shows.
     pub seen: Seen,
 }
 
-/// What the motion that both records saw tells of an offset.
+/// What the motion that both records saw shows of an offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Seen {
     /// Share of the Hall signals' motion that the reference explains.
     pub explained: f64,
     /// Over how many ticks.
     pub ticks: usize,
-    /// Standard error of the offset that the motion tells, at the end of the record where it is
+    /// Standard error of the offset that the motion shows, at the end of the record where it is
     /// larger, us.
     pub standard_error_us: f64,
-    /// For an offset that was given: the one that the motion tells less the one given, at the
-    /// end of the record where that is larger, us.
+    /// For an offset that was given: the one that the motion shows less the one given, us.
     pub apart_us: Option<f64>,
 }
 
-impl Offset {
-    /// A time of the bus on the clock of the reference, us.
-    pub fn on_reference_us(&self, bus_us: f64) -> f64 {
-        bus_us - self.us - self.rate * (bus_us - self.middle_us)
+/// The clocks of node and reference.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Clocks {
+    /// Time of the node less time of the reference in the middle, us.
+    pub(super) us: f64,
+    /// How much faster the node's runs, as a part of one.
+    pub(super) rate: f64,
+    /// The middle, us on the clock of the node.
+    pub(super) middle_us: f64,
+}
+
+impl Clocks {
+    /// A time of the node on the clock of the reference, us.
+    pub(super) fn on_reference_us(&self, node_us: f64) -> f64 {
+        node_us - self.us - self.rate * (node_us - self.middle_us)
     }
 
-    /// The same, told by the offset at another time of the bus.
-    fn in_the_middle(self, middle_us: f64) -> Self {
+    /// The same with another middle.
+    pub(super) fn about(self, middle_us: f64) -> Self {
         Self {
             us: self.us + self.rate * (middle_us - self.middle_us),
             middle_us,
@@ -62,255 +71,387 @@ impl Offset {
     }
 }
 
-/// Ticks of the coarse search, at most.
-const COARSE_TICKS: usize = 4_000;
+/// Both records.
+pub(super) struct Records<'r> {
+    ticks: &'r [Tick],
+    /// When the record starts, us on the clock of the node.
+    start_us: f64,
+    samples: &'r [Sample],
+    stage: &'r Stage,
+    period_us: f64,
+    /// m or rad per unit of the reference's columns.
+    scale: [f64; 3],
+    /// Whether the reference has beams.
+    is_beams: bool,
+    /// What the designed probes read of X, Y, Rz.
+    plane: [[f64; 3]; 3],
+}
 
-/// Samples of the reference that are held at a time, about.
-const SAMPLES: f64 = 200_000.0;
+/// A tick with its reference.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    tick: Tick,
+    movement: i64,
+    /// X, Y, Rz: m, m, rad.
+    pose: [f64; 3],
+}
+
+/// Ticks of the correlation, and of a fit, at most.
+const COARSE_TICKS: usize = 2_000;
+const FIT_TICKS: usize = 10_000;
+
+/// The first part of a record that is fitted: a wrong rate has moved little in it, us.
+const STRETCH_US: f64 = 60e6;
+
+/// Steps for one stretch of the record, at most, and the last one in standard errors.
+const STEPS: usize = 4;
+const SETTLED: f64 = 0.1;
 
 /// Share that must be explained: signals of another run reach a third by chance.
 const EXPLAINED_MIN: f64 = 0.6;
 
-/// How far the rate that two minutes tell may be wrong, as a part of one.
-const RATE_ERROR_MAX: f64 = 5e-6;
+/// Crystals differ by less; more means that the two records do not belong together.
+const RATE_MAX: f64 = 500e-6;
 
-/// Servo periods of the reference that are read before and after the points: a coarse offset may be
-/// wrong by some of them.
-const MARGIN_PERIODS: f64 = 20.0;
+/// A clock that was set shows in some ten seconds of a movement, us.
+const PIECE_US: f64 = 1e7;
+
+/// The motion of such a piece, as a share of the mean motion of the record, from which on as much of it
+/// must be explained.
+const MOTION_MIN: f64 = 0.02;
+
+/// How far its own offset may be off, in standard errors.
+const STANDARD_ERRORS: f64 = 5.0;
+
+/// How far the correlation may be wrong, in servo periods.
+const COARSE_PERIODS_MAX: f64 = 2.0;
 
 /// Largest standard error of an offset, in servo periods.
 const STANDARD_ERROR_PERIODS_MAX: f64 = 0.1;
 
-/// How far a given offset may be from the one that the motion tells, in servo periods: the time
-/// that frames take is part of the latter. And by how much that may change within the record.
+/// How far a given offset, or that of a piece of the record, may be from the one that the motion
+/// shows, in servo periods: the time that frames take is part of the latter.
 const APART_PERIODS_MAX: f64 = 0.5;
-const DRIFT_PERIODS_MAX: f64 = 0.1;
 
-/// Finds the offset within `search_us` of where both records start together.
-///
-/// # Errors
-/// `NoOffset`, `UnsteadyClocks`, `UncertainOffset`, `Astray`, and those of the reference.
-pub(super) fn estimate(
-    survey: &Survey,
-    reference: &ReferenceInput<'_>,
-    stage: &Stage,
-    search_us: f64,
-) -> Result<Offset, ImportError> {
-    let start = coarse(survey, reference, stage, search_us)?;
-    let found = follow(survey, reference, stage, start)?;
-    let most_us = STANDARD_ERROR_PERIODS_MAX * stage.servo_period_s * 1e6;
-    if found.seen.standard_error_us > most_us {
-        return Err(ImportError::UncertainOffset {
-            standard_error_us: found.seen.standard_error_us,
-            most_us,
-        });
-    }
-    Ok(found)
-}
-
-/// Checks an offset that was given against the motion, and tells how far it is from what that
-/// shows.
-///
-/// # Errors
-/// `WrongOffset`, `Astray`, and those of the reference.
-pub(super) fn checked(
-    survey: &Survey,
-    reference: &ReferenceInput<'_>,
-    stage: &Stage,
-    given: Offset,
-) -> Result<Offset, ImportError> {
-    let given = given.in_the_middle(survey.middle_us());
-    let [first_us, last_us] = ends_us(survey.liveliest());
-    let start = given.in_the_middle((first_us + last_us) / 2.0);
-    let found = match follow(survey, reference, stage, start) {
-        Err(ImportError::NoOffset { percent, .. }) => Err(ImportError::UncheckedOffset { percent }),
-        Err(ImportError::UnsteadyClocks { .. }) => {
-            Err(ImportError::UncheckedOffset { percent: 0.0 })
+impl<'r> Records<'r> {
+    pub(super) fn new(run: &'r Run, reference: &'r Reference, stage: &'r Stage) -> Self {
+        Self {
+            ticks: &run.ticks,
+            start_us: -run.since_start_us,
+            samples: &reference.samples,
+            period_us: stage.servo_period_s * 1e6,
+            scale: reference.quantities.map(|q| stage.log.column(q).scale),
+            stage,
+            is_beams: reference.quantities == Quantity::BEAMS,
+            plane: stage.geometry().plane_rows(),
         }
-        found => found,
-    }?;
-    let step_us = stage.servo_period_s * 1e6;
-    let drift_us = found.rate * (survey.middle_us() - survey.first_us());
-    let middle_us = found.us - given.us;
-    let error_us = 3.0 * found.seen.standard_error_us;
-    if middle_us.abs() > APART_PERIODS_MAX * step_us + error_us
-        || drift_us.abs() > DRIFT_PERIODS_MAX * step_us + error_us
-    {
-        return Err(ImportError::WrongOffset {
-            middle_us,
-            start_us: middle_us - drift_us,
-            end_us: middle_us + drift_us,
-        });
     }
-    Ok(Offset {
-        seen: Seen {
-            apart_us: Some(middle_us + drift_us.abs().copysign(middle_us)),
-            ..found.seen
-        },
-        ..given
-    })
-}
 
-/// Follows an offset from the liveliest two minutes over the whole record.
-///
-/// A record that is longer than the liveliest two minutes of the [`Survey`] is followed from
-/// there to its ends by the survey's blocks. The reference is read anew for each step, and held
-/// only where and as densely as the step needs it.
-///
-/// # Errors
-/// `NoOffset`, `UnsteadyClocks`, `Astray`, and those of the reference.
-fn follow(
-    survey: &Survey,
-    reference: &ReferenceInput<'_>,
-    stage: &Stage,
-    found: Offset,
-) -> Result<Offset, ImportError> {
-    let step_us = stage.servo_period_s * 1e6;
-    let window = survey.liveliest();
-    let predicted = |points: &[Point], offset: &Offset| {
-        let windows = windows(points, offset, step_us);
-        reference.predicted(stage, &windows, step_us / 4.0)
-    };
-    let samples = predicted(window, &found)?;
-    let refined = refine(window, &samples, found, step_us, FIRST_STRETCH_US);
-    let check = |points: &[Point], samples: &[Sample], offset: &Offset| {
-        let explained = explain(points, samples, offset, 2.0 * step_us);
-        let share = explained.share();
-        if share.is_nan() || share < EXPLAINED_MIN {
-            return Err(ImportError::NoOffset {
-                percent: 100.0 * share.max(0.0),
-                least_percent: 100.0 * EXPLAINED_MIN,
+    /// The middle of the record, us on the clock of the node.
+    pub(super) fn middle_us(&self) -> f64 {
+        middle_us(self.ticks)
+    }
+
+    /// Finds the offset within `search_us` of where both records start together.
+    ///
+    /// # Errors
+    /// `NoOffset`, `UnsteadyClocks`, `UncertainOffset`, `Astray`.
+    pub(super) fn estimate(&self, search_us: f64) -> Result<(Clocks, Seen), ImportError> {
+        let start = self.coarse(search_us);
+        let (found, seen) = self.follow(start)?;
+        let most_us = STANDARD_ERROR_PERIODS_MAX * self.period_us;
+        if seen.standard_error_us > most_us {
+            return Err(ImportError::UncertainOffset {
+                standard_error_us: seen.standard_error_us,
+                most_us,
             });
         }
-        Ok((share, explained.ticks))
-    };
-    let unsteady = || ImportError::UnsteadyClocks {
-        most_ppm: RATE_MAX * 1e6,
-    };
-    let judged = |points: &[Point], samples: &[Sample], offset: Offset| {
-        let (explained, ticks) = check(points, samples, &offset)?;
-        let agreement = agreement(points, samples, &offset, step_us).ok_or_else(unsteady)?;
-        if let Some(movement) = agreement.astray {
-            return Err(ImportError::Astray { movement });
+        let moved_us = found.about(start.middle_us).us - start.us;
+        if moved_us.abs() > COARSE_PERIODS_MAX * self.period_us {
+            return Err(UNSTEADY);
         }
-        let seen = Seen {
-            explained,
-            ticks,
-            standard_error_us: agreement.standard_error_us,
-            apart_us: None,
+        Ok((found, seen))
+    }
+
+    /// Checks an offset that was given for the middle of the record against the motion, which
+    /// adds the rate.
+    ///
+    /// # Errors
+    /// `NoOffset`, `UnsteadyClocks`, `WrongOffset`, `Astray`.
+    pub(super) fn checked(&self, given: Clocks) -> Result<(Clocks, Seen), ImportError> {
+        let (found, seen) = self.follow(given.about(middle_us(self.liveliest())))?;
+        let apart_us = found.us - given.us;
+        let most_us = APART_PERIODS_MAX * self.period_us + 3.0 * seen.standard_error_us;
+        if apart_us.abs() > most_us {
+            return Err(ImportError::WrongOffset { apart_us });
+        }
+        let clocks = Clocks {
+            us: given.us,
+            ..found
         };
-        Ok(Offset { seen, ..offset })
-    };
-    check(window, &samples, &refined.unwrap_or(found))?;
-    let mut best = judged(window, &samples, refined.ok_or_else(unsteady)?)?;
-    if survey.is_longer() {
-        let points = survey.blocks();
-        let samples = predicted(&points, &best)?;
-        let refined = refine(&points, &samples, best, step_us, 4.0 * FIRST_STRETCH_US);
-        check(&points, &samples, &refined.unwrap_or(best))?;
-        best = judged(&points, &samples, refined.ok_or_else(unsteady)?)?;
-    }
-    Ok(best.in_the_middle(survey.middle_us()))
-}
-
-/// The offset on a grid of one servo period.
-fn coarse(
-    survey: &Survey,
-    reference: &ReferenceInput<'_>,
-    stage: &Stage,
-    search_us: f64,
-) -> Result<Offset, ImportError> {
-    let step_us = stage.servo_period_s * 1e6;
-    let window = survey.liveliest();
-    let every = window.len().div_ceil(COARSE_TICKS).max(1);
-    let points: Vec<Point> = window.iter().step_by(every).copied().collect();
-    let [first_us, last_us] = ends_us(&points);
-    let centre_us = survey.first_us() - reference.first_us()?;
-    let at = |us| Offset {
-        us,
-        rate: 0.0,
-        middle_us: (first_us + last_us) / 2.0,
-        seen: Seen::default(),
-    };
-    let span = [first_us, last_us].map(|t_us| t_us - centre_us);
-    let span = [span[0] - search_us - step_us, span[1] + search_us + step_us];
-    let spacing_us = step_us.max((span[1] - span[0]) / SAMPLES);
-    let samples = reference.predicted(stage, &[span], spacing_us)?;
-    let tolerance_us = 2.0 * step_us.max(spacing_us);
-    let steps = (search_us / step_us).ceil().clamp(1.0, 1e6) as i64;
-    let offsets = (-steps..=steps).map(|k| at(centre_us + k as f64 * step_us));
-    let trial = |offset: &Offset| explain(&points, &samples, offset, tolerance_us).explained;
-    Ok(most(offsets, trial).unwrap_or(at(centre_us)))
-}
-
-/// The times of the first and the last point, us.
-fn ends_us(points: &[Point]) -> [f64; 2] {
-    let ends = points.first().zip(points.last());
-    ends.map_or([0.0; 2], |(first, last)| [first.t_us, last.t_us])
-}
-
-/// The times of the reference around these points, ascending.
-fn windows(points: &[Point], offset: &Offset, step_us: f64) -> Vec<[f64; 2]> {
-    let mut windows: Vec<[f64; 2]> = Vec::new();
-    for point in points {
-        let t_us = offset.on_reference_us(point.t_us);
-        let since_us = (point.t_us - offset.middle_us).abs();
-        let margin_us = MARGIN_PERIODS * step_us + RATE_ERROR_MAX * since_us;
-        let window = [t_us - margin_us, t_us + margin_us];
-        match windows.last_mut() {
-            Some(last) if window[0] <= last[1] => last[1] = last[1].max(window[1]),
-            _ => windows.push(window),
-        }
-    }
-    windows
-}
-
-/// The one with the largest value, the first of equals.
-fn most(offsets: impl Iterator<Item = Offset>, value: impl Fn(&Offset) -> f64) -> Option<Offset> {
-    let mut best = None;
-    for offset in offsets {
-        let value = value(&offset);
-        if best.is_none_or(|(most, _)| value > most) {
-            best = Some((value, offset));
-        }
-    }
-    best.map(|(_, offset)| offset)
-}
-
-impl ReferenceInput<'_> {
-    /// The time of the first sample, us.
-    fn first_us(&self) -> Result<f64, ImportError> {
-        let mut reader = self.reader()?;
-        Ok(reader.next_sample()?.map_or(0.0, |sample| sample.t_us))
+        let apart_us = Some(apart_us);
+        Ok((clocks, Seen { apart_us, ..seen }))
     }
 
-    /// The samples within these times, with what the designed probes would read, in m, in place
-    /// of their values; at least `spacing_us` apart, and further where they would be too many.
-    fn predicted(
-        &self,
-        stage: &Stage,
-        windows: &[[f64; 2]],
-        spacing_us: f64,
-    ) -> Result<Vec<Sample>, ImportError> {
-        let mut reader = self.reader()?;
-        let whole_us: f64 = windows.iter().map(|[start, end]| end - start).sum();
-        let spacing_us = spacing_us.max(whole_us / SAMPLES);
-        let mut samples = collect(&mut reader, windows, spacing_us)?;
-        let quantities = reader.quantities;
-        let scale = quantities.map(|quantity| stage.log.column(quantity).scale);
-        let plane = stage.designed.geometry([0.0; 3]).plane_rows();
-        let beams = quantities == Quantity::BEAMS;
-        for sample in &mut samples {
-            let [a, b, c] = sample.values;
-            let [x, second, third] = [a * scale[0], b * scale[1], c * scale[2]];
-            let pose = if beams {
-                let rz = ((second - third) / stage.y_baseline_m).atan();
-                [x, 0.5 * (second + third), rz]
-            } else {
-                [x, second, third]
+    /// The minute with most motion.
+    fn liveliest(&self) -> &'r [Tick] {
+        let ticks = (STRETCH_US / self.period_us).max(1.0);
+        let parts = (self.ticks.len() as f64 / ticks).ceil().max(1.0) as usize;
+        let minutes = self.ticks.chunks(self.ticks.len().div_ceil(parts).max(1));
+        let motion = |ticks: &&[Tick]| {
+            let mean = |k: usize| {
+                let sum: f64 = ticks.iter().map(|tick| f64::from(tick.hall[k])).sum();
+                sum / ticks.len() as f64
             };
-            sample.values = plane.map(|row| dot(&row, pose));
-        }
-        Ok(samples)
+            let means = [0, 1, 2].map(mean);
+            let of_tick = |tick: &Tick| -> f64 {
+                let of_probe = |k: usize| (f64::from(tick.hall[k]) - means[k]).powi(2);
+                [0, 1, 2].map(of_probe).iter().sum()
+            };
+            ticks.iter().map(of_tick).sum::<f64>()
+        };
+        let most = minutes.max_by(|a, b| motion(a).total_cmp(&motion(b)));
+        most.unwrap_or_default()
     }
+
+    /// The best offset on a grid of one servo period.
+    fn coarse(&self, search_us: f64) -> Clocks {
+        let minute = self.liveliest();
+        let points: Vec<Tick> = thinned(minute, COARSE_TICKS).collect();
+        let first_us = self.samples.first().map_or(0.0, |sample| sample.t_us);
+        let steps = (search_us / self.period_us).ceil().clamp(1.0, 1e6) as i32;
+        let clocks = |step: i32| Clocks {
+            us: self.start_us - first_us + f64::from(step) * self.period_us,
+            rate: 0.0,
+            middle_us: middle_us(minute),
+        };
+        let trial = |step: i32| (self.explained(&self.rows(&points, &clocks(step)))[0], step);
+        let trials: Vec<(f64, i32)> = (-steps..steps + 1).into_par_iter().map(trial).collect();
+        // The first of equals.
+        let best = trials.iter().rev().max_by(|a, b| a.0.total_cmp(&b.0));
+        clocks(best.map_or(0, |(_, step)| *step))
+    }
+
+    /// Follows an offset from the first stretch about its middle over the whole record.
+    ///
+    /// # Errors
+    /// `NoOffset`, `UnsteadyClocks`, `Astray`.
+    fn follow(&self, start: Clocks) -> Result<(Clocks, Seen), ImportError> {
+        let far_us = |tick: Option<&Tick>| tick.map_or(0.0, |t| (t.t_us - start.middle_us).abs());
+        let half_us = far_us(self.ticks.first()).max(far_us(self.ticks.last()));
+        let mut clocks = start;
+        let mut alignment = Alignment::new(self.stage);
+        let mut stretch_us = STRETCH_US / 2.0;
+        loop {
+            let from = |t_us: f64| self.ticks.partition_point(|tick| tick.t_us < t_us);
+            let (first, last) = (
+                from(start.middle_us - stretch_us),
+                from(start.middle_us + stretch_us),
+            );
+            let near = self.ticks.get(first..last).unwrap_or_default();
+            let points: Vec<Tick> = thinned(near, FIT_TICKS).collect();
+            let rows = self.rows(&points, &clocks);
+            let share = self.share(&rows)?;
+            let mut lag = self.step(&mut alignment, &rows, &mut clocks)?;
+            for _ in 1..STEPS {
+                lag = self.step(&mut alignment, &self.rows(&points, &clocks), &mut clocks)?;
+                if lag.value_s.abs() < SETTLED * lag.standard_errors_s[0] {
+                    break;
+                }
+            }
+            if clocks.rate.abs() > RATE_MAX {
+                return Err(UNSTEADY);
+            }
+            if stretch_us > half_us {
+                let rows = self.rows(&points, &clocks);
+                self.check_pieces(&alignment, &rows, &clocks, lag.excess)?;
+                let seen = Seen {
+                    explained: share.max(self.share(&rows)?),
+                    ticks: rows.len(),
+                    standard_error_us: 1e6 * lag.standard_errors_s[0].max(lag.standard_errors_s[1]),
+                    apart_us: None,
+                };
+                return Ok((clocks.about(self.middle_us()), seen));
+            }
+            stretch_us *= 4.0;
+        }
+    }
+
+    /// One step of the fit, by which the clocks move.
+    fn step(
+        &self,
+        alignment: &mut Alignment,
+        rows: &[Row],
+        clocks: &mut Clocks,
+    ) -> Result<Lag, ImportError> {
+        let lag = alignment
+            .step(&self.field_rows(rows, clocks))
+            .ok_or(UNSTEADY)?;
+        // What lags is read too early.
+        clocks.us -= 1e6 * lag.value_s;
+        clocks.rate -= lag.rate;
+        Ok(lag)
+    }
+
+    /// Every piece of the record must agree with the offset of all.
+    ///
+    /// # Errors
+    /// `Astray`.
+    fn check_pieces(
+        &self,
+        alignment: &Alignment,
+        rows: &[Row],
+        clocks: &Clocks,
+        excess: f64,
+    ) -> Result<(), ImportError> {
+        let key = |row: &Row| (row.movement, (row.tick.t_us / PIECE_US).floor() as i64);
+        let least_motion = MOTION_MIN * self.explained(rows)[1] / rows.len() as f64;
+        for piece in rows.chunk_by(|a, b| key(a) == key(b)) {
+            let [explained, motion] = self.explained(piece);
+            let is_explained =
+                explained >= EXPLAINED_MIN * motion || motion < least_motion * piece.len() as f64;
+            let own = alignment.own_lag_s(&self.field_rows(piece, clocks));
+            let is_far = own.is_some_and(|[lag_s, standard_error_s]| {
+                let most_s = STANDARD_ERRORS * standard_error_s * excess.sqrt();
+                lag_s.abs() > 1e-6 * APART_PERIODS_MAX * self.period_us + most_s
+            });
+            if is_far || !is_explained {
+                let movement = piece.first().map_or(0, |row| row.movement);
+                return Err(ImportError::Astray { movement });
+            }
+        }
+        Ok(())
+    }
+
+    /// The rows of the fit, with the speed of the reference.
+    fn field_rows(&self, rows: &[Row], clocks: &Clocks) -> Rows {
+        let hall_mm = self.stage.hall.m_per_count * 1e3;
+        let gap_m = self.stage.capacitive.m_per_count;
+        // A checked stage has its sensors in a triangle.
+        let vertical = vertical_rows(&self.stage.capacitive_probes_m).unwrap_or_default();
+        let mut used = Vec::with_capacity(rows.len());
+        let mut movements = Vec::new();
+        for movement in rows.chunk_by(|a, b| a.movement == b.movement) {
+            let first = used.len();
+            used.extend(movement.iter().filter_map(|row| {
+                let t_us = clocks.on_reference_us(row.tick.t_us);
+                let half_us = self.period_us / 2.0;
+                let (before, after) = (self.at(t_us - half_us)?, self.at(t_us + half_us)?);
+                let per_second = 1e9 / self.period_us;
+                (before.0 == after.0).then(|| FieldRow {
+                    time_s: 1e-6 * (row.tick.t_us - clocks.middle_us),
+                    signal_mm: row.tick.hall.map(|code| hall_mm * f64::from(code)),
+                    vertical: vertical_pose(
+                        &vertical,
+                        row.tick.capacitive.map(|code| gap_m * f64::from(code)),
+                    )
+                    .to_array(),
+                    reference_mm: row.pose.map(|q| q * 1e3),
+                    rate_mm_per_s: [0, 1, 2].map(|k| (after.1[k] - before.1[k]) * per_second),
+                    weight: 1.0,
+                })
+            }));
+            if used.len() > first {
+                movements.push(first..used.len());
+            }
+        }
+        Rows::of_movements(used, movements)
+    }
+
+    /// The ticks that have a reference.
+    fn rows(&self, ticks: &[Tick], clocks: &Clocks) -> Vec<Row> {
+        let row = |tick: &Tick| {
+            let (movement, pose) = self.at(clocks.on_reference_us(tick.t_us))?;
+            Some(Row {
+                tick: *tick,
+                movement,
+                pose,
+            })
+        };
+        ticks.iter().filter_map(row).collect()
+    }
+
+    /// Movement and pose at a time of the reference.
+    fn at(&self, t_us: f64) -> Option<(i64, [f64; 3])> {
+        let At::Found {
+            movement, values, ..
+        } = at(self.samples, t_us, 2.0 * self.period_us)
+        else {
+            return None;
+        };
+        let [x, second, third] = [0, 1, 2].map(|k| values[k] * self.scale[k]);
+        let pose = match self.is_beams {
+            true => {
+                let rz = ((second - third) / self.stage.y_baseline_m).atan();
+                [x, 0.5 * (second + third), rz]
+            }
+            false => [x, second, third],
+        };
+        Some((movement, pose))
+    }
+
+    /// What the designed probes explain of the signals' motion, each with a factor for all rows and a
+    /// constant for each movement, and that motion; codes squared.
+    fn explained(&self, rows: &[Row]) -> [f64; 2] {
+        let mut sums = [[0.0; 3]; 3];
+        for movement in rows.chunk_by(|a, b| a.movement == b.movement) {
+            for (k, [ss, sp, pp]) in sums.iter_mut().enumerate() {
+                let n = movement.len() as f64;
+                let pair = |row: &Row| [f64::from(row.tick.hall[k]), dot(&self.plane[k], row.pose)];
+                let [signal, probe] =
+                    [0, 1].map(|i| movement.iter().map(|row| pair(row)[i]).sum::<f64>() / n);
+                for row in movement {
+                    let [s, p] = pair(row);
+                    let (s, p) = (s - signal, p - probe);
+                    *ss += s * s;
+                    *sp += s * p;
+                    *pp += p * p;
+                }
+            }
+        }
+        sums.iter()
+            .fold([0.0; 2], |[explained, motion], [ss, sp, pp]| {
+                // A probe that reads against its designed sense explains nothing.
+                let is_sound = *sp > 0.0 && *pp > 0.0;
+                let own = if is_sound { sp * sp / pp } else { 0.0 };
+                [explained + own, motion + ss]
+            })
+    }
+
+    /// The share of the motion that is explained, if it is enough.
+    fn share(&self, rows: &[Row]) -> Result<f64, ImportError> {
+        let [explained, motion] = self.explained(rows);
+        match explained / motion {
+            share if share >= EXPLAINED_MIN => Ok(share),
+            share => Err(ImportError::NoOffset {
+                percent: 100.0 * share.max(0.0),
+                least_percent: 100.0 * EXPLAINED_MIN,
+            }),
+        }
+    }
+}
+
+const UNSTEADY: ImportError = ImportError::UnsteadyClocks {
+    most_ppm: RATE_MAX * 1e6,
+};
+
+fn middle_us(ticks: &[Tick]) -> f64 {
+    let ends = ticks.first().zip(ticks.last());
+    ends.map_or(0.0, |(first, last)| (first.t_us + last.t_us) / 2.0)
+}
+
+/// At most `most` of the ticks from all over them, in steps that no motion repeats in.
+fn thinned(ticks: &[Tick], most: usize) -> impl Iterator<Item = Tick> {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let step = (ticks.len() as f64 / most as f64).max(1.0);
+    let count = (ticks.len() as f64 / step) as usize;
+    let place = move |k: usize| {
+        let within = if step > 1.0 {
+            (k as f64 * GOLDEN).fract()
+        } else {
+            0.0
+        };
+        ((k as f64 + within) * step) as usize
+    };
+    (0..count).filter_map(move |k| ticks.get(place(k)).copied())
 }

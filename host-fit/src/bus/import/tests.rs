@@ -1,6 +1,6 @@
 use super::*;
 use crate::input::log::{self, ReadOptions};
-use hal_adapters::can::{BusFrame, sensor};
+use hal_adapters::can::{BusFrame, Coded, sensor};
 use hal_adapters::candump::{LineError, LogLine};
 use runtime::RawFrame;
 use std::f64::consts::TAU;
@@ -11,7 +11,7 @@ use tempfile::TempDir;
 /// Time of the bus less time of the reference, us: the bus counts from 1970.
 pub(super) const OFFSET_US: f64 = 1_735_270_496_123_456.0;
 const MOVEMENT_US: f64 = 500_000.0;
-const TICKS: u32 = 750;
+pub(super) const TICKS: u32 = 750;
 
 /// X, Y, Rz at a time of the reference, m, m, rad: three movements, one axis each.
 fn pose(t_us: f64) -> [f64; 3] {
@@ -42,21 +42,38 @@ fn candump_of(
     number: impl Fn(u32) -> u32,
     hall: impl Fn(f64) -> [i32; 3],
 ) -> String {
+    let codes = |n: u32| {
+        let t_us = 2_000.0 * f64::from(n) + 300.0;
+        (hall(t_us), [100, 101, 99], number(n), t_us as u32)
+    };
+    record(codes, |n, k, _| {
+        let jitter_us = f64::from(n * 7919 % 201) - 100.0;
+        (!skip(n, k)).then_some(2_000.0 * f64::from(n) + 300.0 + jitter_us)
+    })
+}
+
+/// Hall and capacitive codes, number and time by the node's clock.
+pub(super) type Codes = ([i32; 3], [i32; 3], u32, u32);
+
+/// A record of the codes of each tick; `received_us` says when a frame of it, the k-th, was received,
+/// us on the clock of the reference, if it was.
+pub(super) fn record(
+    codes: impl Fn(u32) -> Codes,
+    received_us: impl Fn(u32, usize, &Coded) -> Option<f64>,
+) -> String {
     let mut text = String::new();
     for n in 0..TICKS {
-        let t_us = 2_000.0 * f64::from(n) + 300.0;
+        let (hall, capacitive, sequence, time_us) = codes(n);
         let frame = RawFrame {
-            hall: hall(t_us),
-            capacitive: [100, 101, 99],
-            sequence: number(n),
-            time_us: t_us as u32,
+            hall,
+            capacitive,
+            sequence,
+            time_us,
         };
-        let jitter_us = f64::from(n * 7919 % 201) - 100.0;
-        let received_us = (t_us + OFFSET_US + jitter_us) as u64;
         for (k, coded) in sensor::frames(Layout::Bits16, &frame).enumerate() {
-            if !skip(n, k) {
+            if let Some(received_us) = received_us(n, k, &coded) {
                 let line = LogLine {
-                    time_us: received_us + 135 * k as u64,
+                    time_us: (received_us + OFFSET_US) as u64 + 135 * k as u64,
                     interface: "can0",
                     frame: BusFrame::from(coded),
                 };
@@ -115,8 +132,8 @@ pub(super) fn read_log(args: &ImportSettings) -> crate::input::dataset::Dataset 
 fn two_clocks_are_joined_and_the_offset_is_found() {
     let (_folder, args) = files(&candump(|_, _| false), &reference());
     let report = run(&args).expect("imported");
-    // The line lies along the earliest receive times, up to 100 us early here; that belongs
-    // to the offset.
+    // The earliest frames of each half second tell the recorder's clock, up to 100 us early here; that
+    // belongs to the offset.
     let found_us = report.offset.us - OFFSET_US;
     assert!((-160.0..160.0).contains(&found_us), "{found_us}");
     assert!(report.offset.seen.explained > 0.999);
@@ -126,7 +143,6 @@ fn two_clocks_are_joined_and_the_offset_is_found() {
         "{standard_error_us}"
     );
     assert_eq!(report.bus.ticks, TICKS as usize);
-    assert!(report.smoothing.max_us < 500.0);
     let dataset = read_log(&args);
     assert_eq!(dataset.movements.len(), 3);
     assert!(dataset.rows.len() > 730);
@@ -138,8 +154,8 @@ fn two_clocks_are_joined_and_the_offset_is_found() {
         }
         let hall = hall(row.t_us as f64);
         for (have, want) in row.frame.hall().iter().zip(hall) {
-            // 100 us of offset are 0.4 um, 6 codes.
-            assert!((have - want).abs() <= 10, "{} {have} {want}", row.t_us);
+            // 15 us of offset are 0.06 um, a code.
+            assert!((have - want).abs() <= 2, "{} {have} {want}", row.t_us);
         }
     }
 }
@@ -186,6 +202,37 @@ fn an_offset_that_noise_leaves_uncertain_is_refused() {
     }
 }
 
+/// On a circle a shift in time is a rotation of the probes: it leaves the offset open, which is another
+/// fault than records of different runs. An offset that is given is taken.
+#[test]
+fn of_a_circle_the_offset_is_uncertain_and_one_that_is_given_is_taken() {
+    let circle = |t_us: f64| {
+        let (sin, cos) = (TAU * t_us / MOVEMENT_US).sin_cos();
+        [300e-6 * sin, 300e-6 * cos]
+    };
+    let hall = |t_us| {
+        let [x, y] = circle(t_us);
+        [y, y, x].map(|s| (s / 6.25e-8).round() as i32)
+    };
+    let bus = candump_of(|_, _| false, |n| n + 5, hall);
+    let mut ifm = "t_us,x_m,y_m,rz_rad\n".to_owned();
+    for k in 0..1_500 {
+        let [x, y] = circle(1e3 * f64::from(k));
+        writeln!(ifm, "{k}000,{x:.12},{y:.12},0").expect("a string");
+    }
+    let (_folder, mut args) = files(&bus, &ifm);
+    args.search_s = 0.1;
+    let refused = run(&args).expect_err("refused");
+    assert!(
+        matches!(refused, ImportError::UncertainOffset { .. }),
+        "{refused}"
+    );
+    args.estimate_offset = false;
+    args.offset_us = OFFSET_US;
+    let seen = run(&args).expect("imported").offset.seen;
+    assert!(seen.standard_error_us > 1_000.0, "{seen:?}");
+}
+
 #[test]
 fn missing_frames_and_repeated_samples_are_reported_and_leave_gaps() {
     let bus = candump(|n, k| n == 100 && k == 0 || (200..203).contains(&n));
@@ -222,24 +269,29 @@ fn a_clock_that_steps_back_within_a_tick_moves_no_time() {
     lines[at + 1] = early.to_string();
     let (_folder, args) = files(&lines.join("\n"), &reference());
     let report = run(&args).expect("imported");
-    assert!(
-        report.smoothing.max_us < 500.0,
-        "{}",
-        report.smoothing.max_us
-    );
     assert!(report.join.rows > 730);
 }
 
 /// The node's count is sent modulo 2^20: back to 0 from more than half of that looks like a
-/// jump forward, and here the time frame that tells it is used 16 ticks after the codes are.
+/// jump forward.
 #[test]
-fn a_node_that_starts_again_after_a_long_time_bends_no_line() {
+fn of_a_node_that_starts_again_the_longest_part_is_imported() {
     let number = |n| if n < 300 { 599_840 + n } else { n - 300 };
     let (_folder, args) = files(&candump_of(|_, _| false, number, hall), &reference());
     let report = run(&args).expect("imported");
-    let max_us = report.smoothing.max_us;
-    assert!(max_us < 500.0, "{max_us}");
-    assert!(report.join.rows > 690, "{}", report.join.rows);
+    assert_eq!(report.bus.restarts, 1);
+    assert!(
+        (430..450).contains(&report.join.rows),
+        "{}",
+        report.join.rows
+    );
+    let rows = read_log(&args).rows;
+    for row in rows {
+        let want = hall(row.t_us as f64);
+        for (have, want) in row.frame.hall().iter().zip(want) {
+            assert!((have - want).abs() <= 2, "{} {have} {want}", row.t_us);
+        }
+    }
 }
 
 #[test]
@@ -277,7 +329,7 @@ fn records_of_different_runs_and_clocks_are_refused() {
     let (_folder, mut args) = files(&candump(|_, _| false), &other);
     assert!(matches!(run(&args), Err(ImportError::NoOffset { .. })));
     args.estimate_offset = false;
-    assert!(matches!(run(&args), Err(ImportError::NoOverlap { .. })));
+    assert!(matches!(run(&args), Err(ImportError::Unpaired { .. })));
 }
 
 #[test]
@@ -318,40 +370,23 @@ fn each_fault_of_the_reference_has_its_place() {
                 "time runs backwards",
             ],
         ),
+        (
+            rows("0,1000,1e9,0,0"),
+            ["ifm.csv:3: column 3 (ifm_x_nm)", " m"],
+        ),
+        (
+            rows("1,1000,1,2,3\n0,2000,1,2,3"),
+            [
+                "ifm.csv:4: column 1 (movement)",
+                "was left at line 3 and comes back",
+            ],
+        ),
     ] {
         let message = refused(&reference);
         for part in parts.iter().chain(&["; "]) {
             assert!(message.contains(part), "{part}: {message}");
         }
     }
-}
-
-/// What the same numbers give, however they are written down.
-#[test]
-fn separators_line_ends_comments_gzip_and_further_columns_do_not_matter() {
-    let bus = candump(|_, _| false);
-    let imported = |reference: &[u8]| {
-        let (_folder, args) = files(&bus, "");
-        std::fs::write(&args.reference, reference).expect("written");
-        run(&args).expect("imported");
-        std::fs::read(&args.out).expect("written")
-    };
-    let plain = reference();
-    let want = imported(plain.as_bytes());
-    for same in [
-        plain.replace(',', ";"),
-        plain.replace(',', " ,\t").replace(",\t", ", "),
-        plain.replace('\n', "\r\n"),
-        format!("\u{feff}# made, by; hand\n\n{plain}\n  \n# end"),
-        plain.replace('\n', ",,quality\n"),
-        // The movement's number may come from a program that writes fractions.
-        plain.replace("\n1,", "\n1.0,"),
-    ] {
-        assert!(imported(same.as_bytes()) == want, "{}", &same[..80]);
-    }
-    let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
-    std::io::Write::write_all(&mut gzip, plain.as_bytes()).expect("in memory");
-    assert!(imported(&gzip.finish().expect("in memory")) == want);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The interface: SocketCAN on Linux, a plain refusal elsewhere.
 
 use hal_adapters::can::{BusFrame, Message, StampedFrame};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 /// Why the bus cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +36,12 @@ impl BusError {
         }
         false
     }
+}
+
+/// Now, on the clock of the kernel's receive times, us.
+pub(crate) fn now_us() -> u64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    since.map_or(0, |d| u64::try_from(d.as_micros()).unwrap_or(u64::MAX))
 }
 
 /// One CAN interface.

@@ -66,7 +66,9 @@ impl Display {
             let text: String = lines.iter().map(|l| format!("\x1b[2K{l}\n")).collect();
             let _ = write!(out, "{up}{text}");
         } else {
-            let _ = writeln!(out, "{}", line(shown));
+            let words = |line: &String| line.split_whitespace().collect::<Vec<_>>().join(" ");
+            let line: Vec<String> = block(shown).iter().map(words).collect();
+            let _ = writeln!(out, "{}", line.join("; "));
         }
         let _ = out.flush();
     }
@@ -131,34 +133,14 @@ fn block(shown: &Shown<'_>) -> Vec<String> {
             pace.rate_hz, pace.jitter_rms_us, pace.jitter_span_us
         ),
         format!(
-            "ticks {}   invalid {} planar, {} vertical   missed {}   dropped by the kernel {}   not sent {}",
+            "ticks {}, missed {}, dropped {}, not sent {}; invalid {} planar, {} vertical",
             shown.servo.ticks,
-            shown.servo.planar_invalid,
-            shown.servo.vertical_invalid,
             shown.servo.frames_missed,
             shown.dropped,
-            shown.not_sent
+            shown.not_sent,
+            shown.servo.planar_invalid,
+            shown.servo.vertical_invalid
         ),
         format!("frames: {}", faults(&shown.bus)),
     ]
-}
-
-fn line(shown: &Shown<'_>) -> String {
-    let [x, y, rz, z, rx, ry] = shown.reading.map(pose).unwrap_or_default();
-    let pace = shown.pace.unwrap_or_default();
-    format!(
-        "{:.1} s: x {x:.3} um, y {y:.3} um, rz {rz:.3} urad, z {z:.3} um, rx {rx:.3} urad, ry {ry:.3} urad; \
-         {:.1} ticks/s, jitter {:.0} us rms, {:.0} us peak to peak; ticks {}, missed {}, dropped {}, not sent {}; \
-         frames: {}; {}",
-        shown.elapsed_s,
-        pace.rate_hz,
-        pace.jitter_rms_us,
-        pace.jitter_span_us,
-        shown.servo.ticks,
-        shown.servo.frames_missed,
-        shown.dropped,
-        shown.not_sent,
-        faults(&shown.bus),
-        state(shown)
-    )
 }

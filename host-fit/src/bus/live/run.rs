@@ -1,5 +1,6 @@
 //! The loop of `live`: the node on an interface, recorded and shown.
 
+use super::bus::now_us;
 use super::display::{Display, Shown};
 use super::node::{Node, NodeSettings};
 use super::rhythm::{Pace, Rhythm};
@@ -11,7 +12,7 @@ use hal_adapters::can::{BusFault, BusFrame, Coded, Layout, StampedFrame};
 use hal_adapters::candump::LogLine;
 use runtime::{ParameterSet, Reading};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 /// Longest wait for a frame: how soon Ctrl-C is noticed on a silent bus.
 const WAIT_MAX: Duration = Duration::from_millis(100);
@@ -86,12 +87,6 @@ fn check_serial(set: &ParameterSet, settings: &LiveSettings) -> Result<(), LiveE
         }),
         _ => Ok(()),
     }
-}
-
-/// Now, on the clock of the kernel's receive times, us.
-fn now_us() -> u64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    since.map_or(0, |d| u64::try_from(d.as_micros()).unwrap_or(u64::MAX))
 }
 
 struct Session<'d> {

@@ -1,7 +1,7 @@
 //! The controller asked, the bus recorded, the controller asked again.
 
 use super::{MISSING_ONE_IN, Recorded, RecorderError, RecorderSettings, Watch};
-use crate::bus::live::{Bus, BusError};
+use crate::bus::live::{Bus, BusError, now_us};
 use crate::interrupt;
 use crate::output::record_file::RecordFile;
 use hal_adapters::can::command::{Answer, Command, Mailbox, Outcome, Request, Told};
@@ -10,7 +10,7 @@ use hal_adapters::can::{BusFrame, Message, StampedFrame};
 use hal_adapters::candump::LogLine;
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 /// Longest wait for a frame: how soon Ctrl-C is noticed on a silent bus.
 const WAIT_MAX: Duration = Duration::from_millis(50);
@@ -64,11 +64,6 @@ pub fn run(settings: &RecorderSettings) -> Result<Recorded, RecorderError> {
     };
     let watch = session.finish(end_us)?;
     Ok(Recorded { watch, is_stopped })
-}
-
-fn now_us() -> u64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    since.map_or(0, |d| u64::try_from(d.as_micros()).unwrap_or(u64::MAX))
 }
 
 struct Session<'s> {

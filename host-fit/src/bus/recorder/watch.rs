@@ -76,6 +76,7 @@ impl Watch {
             }
             Some(NodeState::SelfTestFailed) => "it failed its own test".to_owned(),
             Some(NodeState::Updating) => "it is getting new parameters".to_owned(),
+            Some(NodeState::Stopped) => format!("it has stopped (reason {reason})"),
             Some(NodeState::Starting) => "it is starting".to_owned(),
             None => "its state is one that this version does not know".to_owned(),
         }

@@ -1,9 +1,11 @@
-//! Who a node is, asked page by page.
+//! Who a node is, asked page by page, and the blob that it runs.
 
 use super::UpdateError;
-use super::dialog::{Job, Wish};
+use super::talk::{Link, Talk, page as tell};
 use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::update::{Kept, UpdateRequest, crc_of, page};
+use runtime::ParameterSet;
+use runtime::blob::MAX_BYTES;
 
 /// What a node tells of itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,12 +14,12 @@ pub struct Identity {
     pub serial: String,
     /// The parameters that it runs, if any.
     pub running: Option<RunningParameters>,
-    /// The highest sequence number of any record in its store, of one that is refused too; 0 if
+    /// The highest sequence number of any blob in its store, of one that is refused too; 0 if
     /// there is none.
     pub newest_sequence: u32,
-    /// The record that runs from its next reset on, if there is one.
+    /// The blob that runs once it is activated or after power-on, if there is one.
     pub next: Option<Kept>,
-    /// The record before, to which it can go back.
+    /// The blob before, to which it can go back.
     pub previous: Option<Kept>,
     /// Version of its program: major, minor, patch.
     pub program_version: [u8; 3],
@@ -32,11 +34,11 @@ pub struct Identity {
 /// The parameters that a node runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunningParameters {
-    /// Where they lie: number of the sector or slot.
+    /// Where they lie: number of the slot.
     pub slot: u8,
     /// Whether the fit was refused and written all the same.
     pub forced: bool,
-    /// Sequence number of the record; 0 for a blob that a probe has flashed.
+    /// Sequence number; 0 for a blob that a probe has flashed.
     pub sequence: u32,
     /// CRC-32C of the blob.
     pub crc: u32,
@@ -59,42 +61,12 @@ impl RunningParameters {
 
 /// The pages of a node, as they come.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Pages {
+struct Pages {
     /// `None`: the node has no parameters, and so no such page.
     words: Vec<Option<u32>>,
-    /// Whether the number of the next record was the same after its check was told.
-    is_settled: bool,
 }
 
 impl Pages {
-    /// What to ask for next; `None` once every page is there.
-    pub(super) fn next(&self) -> Option<Request> {
-        let page = match u8::try_from(self.words.len()).ok()? {
-            // Between the two pages another host may have stored a record.
-            page::PREVIOUS if !self.is_settled => page::NEXT,
-            page => page,
-        };
-        (page < page::COUNT).then_some(Request::Update(UpdateRequest::Tell { page }))
-    }
-
-    /// Takes the answer to the last request.
-    pub(super) fn take(&mut self, outcome: Option<Outcome>, word: u32) -> Result<(), UpdateError> {
-        let word = match outcome {
-            Some(Outcome::Done) => Some(word),
-            Some(Outcome::NoParameters) => None,
-            Some(Outcome::UnknownCommand) => return Err(UpdateError::TellsNothing),
-            outcome => return Err(UpdateError::Unexpected { outcome }),
-        };
-        if self.words.len() != usize::from(page::PREVIOUS) || self.is_settled {
-            self.words.push(word);
-        } else if word == self.word(page::NEXT) {
-            self.is_settled = true;
-        } else {
-            self.words.clear();
-        }
-        Ok(())
-    }
-
     fn word(&self, page: u8) -> Option<u32> {
         self.words.get(usize::from(page)).copied().flatten()
     }
@@ -131,7 +103,7 @@ impl Pages {
     }
 
     /// All pages together.
-    pub(super) fn identity(&self) -> Identity {
+    fn identity(&self) -> Identity {
         let [patch, minor, major, _] = self
             .word(page::PROGRAM_VERSION)
             .unwrap_or_default()
@@ -153,73 +125,61 @@ impl Pages {
 }
 
 /// Asks who the node is.
-#[derive(Clone, Debug, Default)]
-pub struct Identifier {
-    pages: Pages,
-    failure: Option<UpdateError>,
-}
-
-impl Identifier {
-    /// What came of it.
-    ///
-    /// # Errors
-    /// [`UpdateError::NoAnswer`], [`UpdateError::TellsNothing`], [`UpdateError::Unexpected`].
-    pub fn result(self) -> Result<Identity, UpdateError> {
-        match self.failure {
-            Some(failure) => Err(failure),
-            None => Ok(self.pages.identity()),
+///
+/// # Errors
+/// [`UpdateError::NoAnswer`], [`UpdateError::TellsNothing`], [`UpdateError::Unexpected`].
+pub fn identify<L: Link>(talk: &mut Talk<L>) -> Result<Identity, UpdateError> {
+    let mut pages = Pages::default();
+    while pages.words.len() < usize::from(page::COUNT) {
+        let number = pages.words.len() as u8;
+        let word = told(talk, number)?;
+        pages.words.push(word);
+        // Between the two pages another host may have stored a blob.
+        if number == page::NEXT + 1 && told(talk, page::NEXT)? != pages.word(page::NEXT) {
+            pages.words.clear();
         }
     }
+    Ok(pages.identity())
 }
 
-impl Job for Identifier {
-    fn next(&mut self) -> Wish {
-        match self.pages.next() {
-            Some(request) if self.failure.is_none() => Wish::Ask {
-                request,
-                transfer: None,
-            },
-            _ => Wish::Over,
-        }
-    }
-
-    fn answered(&mut self, _request: Request, outcome: Option<Outcome>, detail: u32) {
-        self.failure = self.pages.take(outcome, detail).err();
-    }
-
-    fn unanswered(&mut self) {
-        self.failure = Some(UpdateError::NoAnswer);
-    }
-
-    fn interrupt(&mut self) -> bool {
-        self.failure.replace(UpdateError::Interrupted).is_none()
+/// A page; `None` where the node has no parameters, and so no such page.
+fn told<L: Link>(talk: &mut Talk<L>, number: u8) -> Result<Option<u32>, UpdateError> {
+    match talk.exchange(tell(number))? {
+        (Outcome::Done, word) => Ok(Some(word)),
+        (Outcome::NoParameters, _) => Ok(None),
+        (Outcome::UnknownCommand, _) => Err(UpdateError::TellsNothing),
+        (outcome, _) => Err(UpdateError::Unexpected {
+            outcome: Some(outcome),
+        }),
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn where_the_next_record_changes_between_its_pages_all_are_asked_anew() {
-        let (mut pages, mut asked) = (Pages::default(), 0);
-        let told = |page, asked| match page {
-            // Another host stores number 8 once the number was told.
-            page::NEXT if asked <= 31 => 7,
-            page::NEXT => 8,
-            page if page == page::NEXT + 1 => 0x88,
-            page => page.into(),
-        };
-        while let Some(request) = pages.next() {
-            asked += 1;
-            let Request::Update(UpdateRequest::Tell { page }) = request else {
-                panic!("{request:?}");
-            };
-            let taken = pages.take(Some(Outcome::Done), told(page, asked));
-            assert_eq!(taken, Ok(()));
+/// The blob that the node runs, word by word, checked, and who the node is. `progress` is told the bytes
+/// that came, and how many there are.
+///
+/// # Errors
+/// As [`identify`]; [`UpdateError::NothingRuns`]; [`UpdateError::Changed`]; [`UpdateError::ReadBack`].
+pub fn read_back<L: Link>(
+    talk: &mut Talk<L>,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<(Identity, Vec<u8>), UpdateError> {
+    let identity = identify(talk)?;
+    let running = identity.running.clone().ok_or(UpdateError::NothingRuns)?;
+    let bytes = (running.bytes as usize).min(MAX_BYTES);
+    let mut blob = Vec::new();
+    for index in 0..bytes.div_ceil(4) {
+        let index = index as u8;
+        let read = Request::Update(UpdateRequest::ReadBack { index });
+        match talk.exchange(read)? {
+            (Outcome::Done, word) => blob.extend(word.to_le_bytes()),
+            _ => return Err(UpdateError::Changed),
         }
-        let (sequence, crc) = (8, 0x88);
-        assert_eq!(pages.identity().next, Some(Kept { sequence, crc }));
-        assert_eq!(asked, 33 + 35);
+        progress(blob.len() as u64, bytes as u64);
+    }
+    blob.truncate(bytes);
+    ParameterSet::from_bytes(&blob).map_err(|cause| UpdateError::ReadBack { cause })?;
+    match running.are(&blob) {
+        true => Ok((identity, blob)),
+        false => Err(UpdateError::Changed),
     }
 }

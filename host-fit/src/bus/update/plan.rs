@@ -4,7 +4,7 @@ use super::identity::Identity;
 use hal_adapters::can::update::Key;
 use runtime::ParameterSet;
 
-/// What a node is to run, from its next reset on.
+/// What a node is to run, from its activation or power-on on.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Wanted {
     /// This blob, which the caller has checked.
@@ -44,8 +44,6 @@ pub struct Plan {
     pub declares_servo_off: bool,
     /// Reset the node at the end, so that it runs the new parameters.
     pub activates: bool,
-    /// Token of the first transfer; two programs need different ones.
-    pub token: u8,
 }
 
 /// What was done.
@@ -53,7 +51,7 @@ pub struct Plan {
 pub struct Updated {
     /// The node before.
     pub before: Identity,
-    /// Sequence number of the record with what was wanted.
+    /// Sequence number of what was wanted.
     pub record: u32,
     /// The same, if this update stored it; `None`: the node kept it already.
     pub sequence: Option<u32>,

@@ -1,18 +1,13 @@
-//! A dialog on an interface.
+//! Talks on an interface.
 
-use super::dialog::{Dialog, Job};
-use super::{
-    BlobReader, Identifier, Identity, Plan, UpdateError, UpdateRunError, Updated, Updater,
-};
-use crate::bus::live::Bus;
+use super::{Identity, Link, Plan, Talk, UpdateError, UpdateRunError, Updated, identity, script};
+use crate::bus::live::{Bus, BusError};
 use crate::interrupt;
 use crate::progress::Progress;
 use hal_adapters::can::{BusFrame, Message};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-/// How soon Ctrl-C is noticed.
-const WAIT_MAX: Duration = Duration::from_millis(50);
 /// How long a frame may wait for a place in the transmit queue.
 const SEND_DEADLINE: Duration = Duration::from_millis(20);
 
@@ -21,8 +16,7 @@ const SEND_DEADLINE: Duration = Duration::from_millis(20);
 /// # Errors
 /// See [`UpdateRunError`].
 pub fn identify(interface: &str) -> Result<Identity, UpdateRunError> {
-    let job = hold(interface, Identifier::default(), |_| {})?;
-    job.result().map_err(|cause| told(interface, cause))
+    hold(interface, "asking", |talk, _| identity::identify(talk))
 }
 
 /// Reads the blob that the node runs.
@@ -30,37 +24,19 @@ pub fn identify(interface: &str) -> Result<Identity, UpdateRunError> {
 /// # Errors
 /// See [`UpdateRunError`].
 pub fn read_back(interface: &str) -> Result<(Identity, Vec<u8>), UpdateRunError> {
-    let mut bar = None;
-    let job = hold(interface, BlobReader::default(), |job| {
-        show(&mut bar, "reading", job.progress());
-    })?;
-    job.result().map_err(|cause| told(interface, cause))
+    hold(interface, "reading", |talk, progress| {
+        identity::read_back(talk, progress)
+    })
 }
 
 /// Updates the node. On Ctrl-C nothing is stored, unless the node is storing already.
 ///
 /// # Errors
 /// See [`UpdateRunError`].
-pub fn update(interface: &str, plan: Plan) -> Result<Updated, UpdateRunError> {
-    let token = now_token();
-    let plan = Plan { token, ..plan };
-    let mut bar = None;
-    let job = hold(interface, Updater::new(plan), |job| {
-        show(&mut bar, "updating", job.progress());
-    })?;
-    job.result().map_err(|cause| told(interface, cause))
-}
-
-fn told(interface: &str, cause: UpdateError) -> UpdateRunError {
-    let interface = interface.to_owned();
-    UpdateRunError::Dialog { interface, cause }
-}
-
-fn show(bar: &mut Option<Progress>, what: &'static str, (done, total): (u64, u64)) {
-    if total > 0 {
-        bar.get_or_insert_with(|| Progress::new(what, total))
-            .reach(done);
-    }
+pub fn update(interface: &str, plan: &Plan) -> Result<Updated, UpdateRunError> {
+    hold(interface, "updating", |talk, progress| {
+        script::update(talk, plan, progress)
+    })
 }
 
 /// A token that another program, or the last run of this one, hardly has.
@@ -69,32 +45,68 @@ fn now_token() -> u8 {
     since.map_or(0, |d| (d.as_millis() ^ d.as_millis() >> 8) as u8)
 }
 
-/// Runs a dialog to its end; `watch` sees the job in every turn.
-fn hold<J: Job>(interface: &str, job: J, mut watch: impl FnMut(&J)) -> Result<J, UpdateRunError> {
-    let mut bus = Bus::open(interface, &[Message::Answer, Message::Command])?;
-    let mut dialog = Dialog::new(job, now_token());
-    let stop = interrupt::watch();
-    let started = Instant::now();
-    let now_us = || u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
-    while !dialog.is_over() {
-        watch(dialog.job());
-        if stop.load(Ordering::Relaxed) {
-            dialog.interrupt();
-        }
-        if let Some(coded) = dialog.poll(now_us()) {
-            match bus.send(&[BusFrame::from(coded)], SEND_DEADLINE) {
-                // Lost, like any frame that nobody answers.
-                Err(error) if error.is_queue_full() => {}
-                sent => sent?,
-            }
-        }
-        let wait = Duration::from_micros(dialog.due_us().saturating_sub(now_us()));
-        if dialog.is_over() {
-            break;
-        }
-        if let Some(stamped) = bus.receive(wait.min(WAIT_MAX))? {
-            dialog.take(&stamped.frame, now_us());
+/// An interface.
+struct Interface<'s> {
+    bus: Bus,
+    started: Instant,
+    stop: &'s AtomicBool,
+    /// Why it cannot be used.
+    failure: Option<BusError>,
+}
+
+impl Interface<'_> {
+    fn failed(&mut self, error: BusError) -> UpdateError {
+        self.failure = Some(error);
+        UpdateError::Link
+    }
+}
+
+impl Link for Interface<'_> {
+    fn send(&mut self, frame: BusFrame) -> Result<(), UpdateError> {
+        match self.bus.send(&[frame], SEND_DEADLINE) {
+            // Lost, like any frame that nobody answers.
+            Err(error) if error.is_queue_full() => Ok(()),
+            sent => sent.map_err(|error| self.failed(error)),
         }
     }
-    Ok(dialog.into_job())
+
+    fn receive(&mut self, until_us: u64) -> Result<Option<BusFrame>, UpdateError> {
+        let wait = Duration::from_micros(until_us.saturating_sub(self.now_us()));
+        let received = self.bus.receive(wait).map_err(|error| self.failed(error))?;
+        Ok(received.map(|stamped| stamped.frame))
+    }
+
+    fn now_us(&self) -> u64 {
+        u64::try_from(self.started.elapsed().as_micros()).unwrap_or(u64::MAX)
+    }
+
+    fn is_interrupted(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+/// Talks on an interface, and shows how far it is.
+fn hold<T>(
+    interface: &str,
+    what: &'static str,
+    talks: impl FnOnce(&mut Talk<Interface<'_>>, &mut dyn FnMut(u64, u64)) -> Result<T, UpdateError>,
+) -> Result<T, UpdateRunError> {
+    let link = Interface {
+        bus: Bus::open(interface, &[Message::Answer, Message::Command])?,
+        started: Instant::now(),
+        stop: interrupt::watch(),
+        failure: None,
+    };
+    let (mut talk, mut bar) = (Talk::new(link, now_token()), None);
+    let result = talks(&mut talk, &mut |done, total| {
+        bar.get_or_insert_with(|| Progress::new(what, total))
+            .reach(done);
+    });
+    result.map_err(|cause| match talk.link.failure.take() {
+        Some(error) => UpdateRunError::Bus(error),
+        None => UpdateRunError::Dialog {
+            interface: interface.to_owned(),
+            cause,
+        },
+    })
 }

@@ -70,17 +70,21 @@ fn hex_writes(file: &[u8]) -> Vec<(u32, Vec<u8>)> {
 
 #[test]
 fn the_slots_are_those_of_the_memory_map() {
-    assert_eq!(SLOTS, [0x0800_4000, 0x0800_8000]);
+    let map = include_str!("../../../../memory.x");
+    for (slot, address) in (0..).zip(SLOTS) {
+        assert!(map.contains(&format!("_parameter_slot_{slot} = {address:#010x};")));
+        assert!(matches!(address_of(slot), Ok(of_slot) if of_slot == address));
+    }
     assert!(matches!(
-        Place::Slot(2).address(),
+        address_of(2),
         Err(ExportError::NoSlot { slot: 2 })
     ));
 }
 
 #[test]
 fn each_format_read_back_from_padded_flash_is_the_same_set() {
-    for (slot, found) in (0..).zip(SLOTS) {
-        let made = |format| export(&blob(), format, Place::Slot(slot)).expect("a file");
+    for found in SLOTS {
+        let made = |format| export(&blob(), format, &[found]).expect("a file");
         let bin = vec![(found, made(ExportFormat::Bin))];
         let hex = hex_writes(&made(ExportFormat::Hex));
         for writes in [bin, hex] {
@@ -91,10 +95,27 @@ fn each_format_read_back_from_padded_flash_is_the_same_set() {
 }
 
 #[test]
+fn in_the_file_for_both_slots_the_blob_is_at_the_start_of_each() {
+    let made = |format| export(&blob(), format, &SLOTS).expect("a file");
+    let bin = made(ExportFormat::Bin);
+    for (slot, start) in (0..).zip(SLOTS) {
+        let at = slot * SLOT_BYTES;
+        assert_eq!(ParameterSet::from_flash(&bin[at..]), Ok(set()));
+        let writes = hex_writes(&made(ExportFormat::Hex));
+        let end = start + SLOT_BYTES as u32;
+        let own = writes
+            .into_iter()
+            .filter(|(at, _)| (start..end).contains(at));
+        let sector = flashed(start, &own.collect::<Vec<_>>());
+        assert_eq!(ParameterSet::from_flash(&sector), Ok(set()));
+    }
+}
+
+#[test]
 fn intel_hex_crosses_a_boundary_of_64_kib() {
     let start = 0x0800_ff00;
     for address in [0x0800_ff04, 0x0800_fff8, 0x0800_fffc, 0x0801_0000] {
-        let file = export(&blob(), ExportFormat::Hex, Place::Address(address)).expect("a file");
+        let file = export(&blob(), ExportFormat::Hex, &[address]).expect("a file");
         let writes = hex_writes(&file);
         let sector = flashed(start, &writes);
         let at = (address - start) as usize;
@@ -107,9 +128,8 @@ fn intel_hex_crosses_a_boundary_of_64_kib() {
 
 #[test]
 fn what_cannot_be_flashed_is_refused() {
-    let refused = |bytes: &[u8], address| {
-        export(bytes, ExportFormat::Hex, Place::Address(address)).expect_err("refused")
-    };
+    let refused =
+        |bytes: &[u8], address| export(bytes, ExportFormat::Hex, &[address]).expect_err("refused");
     assert!(matches!(
         refused(&blob(), 0x0800_4002),
         ExportError::Unaligned { .. }

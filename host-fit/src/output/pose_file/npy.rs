@@ -12,9 +12,6 @@
 
 use super::PoseRow;
 
-/// Bytes of a record, for the buffer.
-pub(super) const RECORD_BYTES: usize = 44;
-
 const FIELDS: &str = "('movement', '<i8'), ('t_us', '<i8'), ('x_m', '<f4'), ('y_m', '<f4'), ('rz_rad', '<f4'), \
      ('z_m', '<f4'), ('rx_rad', '<f4'), ('ry_rad', '<f4'), ('status', '<u4')";
 const UNCERTAINTIES: &str = ", ('u_x_m', '<f4'), ('u_y_m', '<f4'), ('u_rz_rad', '<f4')";

@@ -1,19 +1,20 @@
 //! From a log to its pose file, in little memory however long they are.
 
 use super::{PoseRow, StatusCounts, npy, text, uncertainty};
-use crate::input::log::{self, LogEnd, LogError, LogRow, ReadOptions};
+use crate::input::log::{LogEnd, LogError, LogRows, ReadOptions};
 use crate::input::stage::Stage;
-use crate::output::OutputError;
-use crate::output::streamed_file::StreamedFile;
+use crate::output::{Output, OutputError};
 use crate::solve::field::posterior::Posterior;
-use rayon::prelude::*;
-use runtime::{AnyDecoder, OnInvalid, PlanarPose, Reading, Servo};
+use runtime::{AnyDecoder, OnInvalid, PlanarPose, Servo};
 use std::path::Path;
+
+/// Bytes that are written at once.
+const PIECE_BYTES: usize = 64 * 1024;
 
 /// How poses are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PoseFormat {
-    /// Text, for people and for [`read`](super::read).
+    /// Text.
     #[default]
     Csv,
     /// An array of NumPy's format: half the bytes, and the decoder's own words.
@@ -41,28 +42,18 @@ impl DecodeSettings<'_> {
         }
     }
 
-    fn written(&self, rows: &[LogRow<Reading>]) -> Vec<u8> {
-        let row_bytes = text::LINE_BYTES.max(npy::RECORD_BYTES);
-        let mut bytes = Vec::with_capacity(rows.len() * row_bytes);
-        let mut line = text::Line::default();
-        for row in rows {
-            let known = self.posterior;
-            let uncertainty = known.map(|known| uncertainty::uncertainty(&row.item, known));
-            let row = PoseRow {
-                movement: row.movement,
-                t_us: row.t_us,
-                reading: row.item,
-            };
-            match self.format {
-                PoseFormat::Csv => bytes.extend_from_slice(line.of(&row, uncertainty)),
-                PoseFormat::Npy => npy::record(&mut bytes, &row, uncertainty),
-            }
+    fn write(&self, row: &PoseRow, bytes: &mut Vec<u8>) {
+        let known = self.posterior;
+        let uncertainty = known.map(|known| uncertainty::uncertainty(&row.reading, known));
+        match self.format {
+            PoseFormat::Csv => text::line(bytes, row, uncertainty),
+            PoseFormat::Npy => npy::record(bytes, row, uncertainty),
         }
-        bytes
     }
 }
 
-/// Decodes a log into `out`, as [`decode`](super::decode) does: how many rows have which status,
+/// Decodes a log into `out` as a controller would, one servo period after the other. What is invalid is
+/// zero or held; nothing is held, and no frame is missed, from one movement to the next. Tells how many rows have which status,
 /// and what is odd about the log. `go_on` is asked now and then and can end it.
 ///
 /// # Errors
@@ -72,47 +63,43 @@ pub fn decode_log<E: From<LogError> + From<OutputError>>(
     log: &Path,
     stage: &Stage,
     settings: &DecodeSettings<'_>,
-    mut out: StreamedFile,
+    mut out: Output,
     go_on: impl Fn() -> Result<(), E>,
 ) -> Result<(StatusCounts, LogEnd), E> {
     let decoder = settings.decoder;
     let mut servo = Servo::new(&**decoder, settings.on_invalid);
     let mut counts = StatusCounts::default();
-    // Written while the next rows are turned into bytes.
-    let mut pending = vec![settings.header(0)];
-    let end = log::stream(
-        log,
-        "decoding",
-        stage,
-        &ReadOptions::DECODE,
-        |sample| sample.frame().decode(decoder, &PlanarPose::ZERO),
-        |batch| {
+    let mut log = LogRows::open(log, "decoding", stage, &ReadOptions::DECODE)?;
+    let mut bytes = settings.header(0);
+    let rows = loop {
+        let row = match log.next_row() {
+            Ok(Some(row)) => row,
+            over => break over,
+        };
+        if row.begins {
+            servo.forget();
+        }
+        let frame = &row.row.frame;
+        let reading = frame.decode(decoder, &PlanarPose::ZERO);
+        let row = PoseRow {
+            movement: row.movement,
+            t_us: row.row.t_us,
+            reading: servo.tick_with(frame.sequence(), |_| reading),
+        };
+        counts.add(row.reading.status);
+        settings.write(&row, &mut bytes);
+        if bytes.len() >= PIECE_BYTES {
             go_on()?;
-            let mut blocks = batch.blocks;
-            for row in blocks.iter_mut().flatten() {
-                if row.begins {
-                    servo.forget();
-                }
-                let reading = row.item;
-                row.item = servo.tick_with(row.sequence, |_| reading);
-                counts.add(row.item.status);
-            }
-            let mut next = Vec::new();
-            rayon::in_place_scope(|scope| {
-                scope.spawn(|_| {
-                    let written = blocks.par_iter().map(|rows| settings.written(rows));
-                    next = written.collect();
-                });
-                pending.iter().try_for_each(|bytes| out.write(bytes))
-            })?;
-            pending = next;
-            Ok::<(), E>(())
-        },
-    )?;
-    pending.iter().try_for_each(|bytes| out.write(bytes))?;
+            out.write(&bytes)?;
+            bytes.clear();
+        }
+    };
+    out.write(&bytes)?;
+    rows?;
     if settings.format == PoseFormat::Npy {
         out.rewrite_start(&settings.header(counts.rows))?;
     }
+    let end = log.end()?;
     out.finish()?;
     Ok((counts, end))
 }

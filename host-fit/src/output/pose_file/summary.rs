@@ -1,6 +1,5 @@
 //! How many rows of a pose file have which status.
 
-use super::PoseRow;
 use runtime::Status;
 
 /// Rows by status.
@@ -16,15 +15,6 @@ pub struct StatusCounts {
 }
 
 impl StatusCounts {
-    /// Counts the rows.
-    pub fn of(rows: &[PoseRow]) -> Self {
-        let mut counts = Self::default();
-        for row in rows {
-            counts.add(row.reading.status);
-        }
-        counts
-    }
-
     /// Counts one more row.
     pub fn add(&mut self, status: Status) {
         self.rows += 1;

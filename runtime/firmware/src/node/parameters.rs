@@ -1,6 +1,7 @@
 //! Why a node decodes or does not.
 
-use crate::slots::{Loaded, Refusal};
+use crate::records::{Loaded, Refusal};
+use crate::start_up::Stop;
 use runtime::{OnInvalid, Servo};
 
 /// Why a node decodes or does not.
@@ -24,22 +25,30 @@ pub enum Parameters<'d> {
         /// What is wrong with the slots.
         refusal: Refusal,
     },
+    /// None run until that is acknowledged.
+    Stopped(Stop),
     /// The controller failed its own test and must not decode.
     SelfTestFailed,
 }
 
 impl<'d> Parameters<'d> {
-    /// At start-up: what was loaded and what is wrong with the rest. Without `is_sound`, whether
-    /// the arithmetic is that of the host, nothing is decoded.
-    pub fn at_start(loaded: Option<&'d Loaded>, refusal: Option<Refusal>, is_sound: bool) -> Self {
-        match loaded {
+    /// At start-up: what was loaded, what is wrong with the rest, and why nothing is to run. Without
+    /// `is_sound`, whether the arithmetic is that of the host, nothing is decoded.
+    pub fn at_start(
+        loaded: Option<&'d Loaded>,
+        refusal: Option<Refusal>,
+        stop: Option<Stop>,
+        is_sound: bool,
+    ) -> Self {
+        match (loaded, stop) {
             _ if !is_sound => Self::SelfTestFailed,
-            Some(loaded) => Self::Usable {
+            (_, Some(stop)) => Self::Stopped(stop),
+            (Some(loaded), None) => Self::Usable {
                 servo: Servo::new(&*loaded.decoder, OnInvalid::Zero),
                 serial: &loaded.serial,
                 other_slot: refusal,
             },
-            None => Self::None {
+            (None, None) => Self::None {
                 refusal: refusal.unwrap_or(Refusal::NEITHER),
             },
         }
@@ -49,7 +58,7 @@ impl<'d> Parameters<'d> {
     pub(super) const fn servo(&self) -> Option<&Servo<'d>> {
         match self {
             Self::Usable { servo, .. } => Some(servo),
-            Self::None { .. } | Self::SelfTestFailed => None,
+            _ => None,
         }
     }
 
@@ -57,7 +66,7 @@ impl<'d> Parameters<'d> {
     pub(super) const fn servo_mut(&mut self) -> Option<&mut Servo<'d>> {
         match self {
             Self::Usable { servo, .. } => Some(servo),
-            Self::None { .. } | Self::SelfTestFailed => None,
+            _ => None,
         }
     }
 
@@ -65,7 +74,7 @@ impl<'d> Parameters<'d> {
     pub(super) const fn serial(&self) -> &'d str {
         match self {
             Self::Usable { serial, .. } => serial,
-            Self::None { .. } | Self::SelfTestFailed => "",
+            _ => "",
         }
     }
 }

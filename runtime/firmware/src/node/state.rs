@@ -2,15 +2,17 @@
 //!
 //! | state | reason |
 //! |---|---|
-//! | 1 running | 0; or 0x80 + reason of parameters that do not run: of a slot, if that is damaged; 12: those that are passed over, as they made the program fault twice; 13: the flash cannot be written |
+//! | 1 running | 0; or 0x80 + reason of the other slot, if that is damaged |
 //! | 2 no parameters | 2: both slots are erased |
-//! | 3 bad parameters | slot * 16 + kind: 1 cut short, 3 no blob at all, 4 newer layout, 5 bad header, 7 wrong check (torn), 8 bad payload, 9 unusable values, 10 another stage's; 12 made the program fault twice, and there are no others, or they ran in place of others that did: tried again at the next start |
+//! | 3 bad parameters | slot * 16 + kind: 1 cut short, 3 no blob at all, 4 newer layout, 5 bad header, 7 wrong check (torn), 8 bad payload, 9 unusable values, 10 another stage's |
 //! | 4 no frames | 3 silent converter (line at 0 or 1), 7 no new codes |
 //! | 5 sensor fault | 1 SPI, 2 pin, 4 wrong part, 5 wrong setting or unexpected reset, 6 wrong check, 8 wrong input, 10 SYNC does not arrive; 0x10 + channel: code at a rail, 0x20 + channel: code that never changes (0 to 2 Hall A to C, 3 to 5 gaps 1 to 3) |
 //! | 6 self-test failed | 1: arithmetic is not that of the host, or the core would not restore the FPU's settings |
-//! | 7 updating | 0: new parameters are coming or being stored, and every pose is invalid |
+//! | 7 updating | 0: new parameters are coming or being stored, and every pose is invalid; no frame comes for up to half a second |
+//! | 8 stopped | until it is activated, or power-on: 1 the program faulted twice in its first second, 2 what ran before the reset is not known, 3 it is no longer in flash |
 
 use super::Parameters;
+use crate::records::Refusal;
 use hal_adapters::adc::AdcError;
 use hal_adapters::can::status::NodeState;
 use runtime::{RawFrame, Reading, Status};
@@ -19,7 +21,7 @@ use runtime::{RawFrame, Reading, Status};
 /// its channel (0 to 2 Hall A to C, 3 to 5 gaps 1 to 3). Below: [`AdcError::number`].
 pub const REASON_CHANNEL: u8 = 0x10;
 /// Reasons of [`NodeState::Running`] with this bit: the other slot is damaged; below it
-/// [`crate::slots::Refusal::reason`].
+/// [`crate::records::Refusal::reason`].
 pub const REASON_OTHER_SLOT: u8 = 0x80;
 /// Reason of [`NodeState::SelfTestFailed`]: arithmetic is not that of the host, or the core
 /// would not restore the FPU's settings for interrupts.
@@ -51,11 +53,12 @@ pub(super) fn state_of(
     let other_slot = match parameters {
         Parameters::SelfTestFailed => return (NodeState::SelfTestFailed, REASON_FPU),
         _ if is_updating => return (NodeState::Updating, 0),
-        Parameters::None { refusal } if refusal.erased => {
+        Parameters::Stopped(stop) => return (NodeState::Stopped, *stop as u8),
+        Parameters::None { refusal } if *refusal == Refusal::NEITHER => {
             return (NodeState::NoParameters, refusal.reason);
         }
         Parameters::None { refusal } => return (NodeState::BadParameters, refusal.reason),
-        Parameters::Usable { other_slot, .. } => other_slot.filter(|slot| !slot.erased),
+        Parameters::Usable { other_slot, .. } => other_slot,
     };
     let bad_codes = reading.status.bits() & Status::HALL.with(Status::CAPACITIVE).bits();
     match sample {

@@ -9,7 +9,7 @@ use crate::image::FLASH;
 use crate::machine::Cost;
 
 /// Flash that the program may take, bytes.
-const TEXT_BYTES_MAX: usize = 56 << 10;
+const TEXT_BYTES_MAX: usize = 48 << 10;
 /// RAM that statics and stack may take, bytes.
 pub const RAM_BYTES_MAX: usize = 9 << 10;
 /// An interrupt may block for a tenth of a period, us.

@@ -1,16 +1,14 @@
-//! Cuts of the power before, inside and after operations of the flash: in an update, in the erase at
-//! a start, in the record that passes over parameters that crash, and in the start that settles
-//! what a cut has left. Afterwards the old or the new blob runs, and another update is possible.
+//! Cuts of the power before, inside and after operations of the flash: in an update, and in the start
+//! that settles what a cut has left. Afterwards the old or the new blob runs, and another update is
+//! possible.
 
-use super::passed_over::{about_to_crash, crash};
-use super::update::{large, plan, running, talk, update};
+use super::update::{large, plan, running, update};
 use super::{Failure, Outcome, expect};
 use crate::adc_model::Part;
 use crate::bench::Bench;
 use crate::flash_model::PowerCut;
 use crate::machine::Machine;
-use firmware::store::flash_model::Cut;
-use host_fit::bus::update::Updater;
+use tests::flash_model::Cut;
 
 const PART: Part = Part::Ads131m08;
 
@@ -60,7 +58,7 @@ impl Scene<'_> {
         )?;
         // What was cut inside is the hardest to write beside.
         if cuts.iter().all(|cut| cut.place == Cut::Inside) {
-            let (updated, _) = update(&mut machine, plan(&large()?, 7))?;
+            let (updated, _) = update(&mut machine, &plan(&large()?))?;
             expect(updated?.sequence.is_some(), || {
                 format!("no update after {cuts:?}")
             })?;
@@ -100,7 +98,8 @@ fn print(name: &str, [first, second]: [Counts; 2]) {
     }
 }
 
-/// In an update: the new blob runs for certain once the update was answered.
+/// In an update beside one blob, and beside two: the new blob runs for certain once the update was
+/// answered.
 pub fn in_an_update(bench: &Bench) -> Outcome {
     let scene = Scene {
         bench,
@@ -110,16 +109,16 @@ pub fn in_an_update(bench: &Bench) -> Outcome {
             Ok(machine)
         },
         happens: |bench, machine| {
-            let token = 1;
-            talk(machine, Updater::new(plan(&bench.later, token)), token)?;
+            let _cut_or_done = update(machine, &plan(&bench.later))?;
             Ok(())
         },
     };
     let whole = scene.operations()?;
-    expect(whole > 100, || format!("{whole} operations"))?;
-    // The first words, some between, and the last ones: check, commit word, seal.
-    let places = (0..6).map(|k| k * k * whole / 40).chain(whole - 6..whole);
-    let counts = scene.cut_at(places)?;
+    expect(whole > 90, || format!("{whole} operations"))?;
+    // The drop of the old slot, its erase, the first words, some between, and the last ones: check,
+    // commit word, seal.
+    let places = (0..4).chain((1..6).map(|k| k * whole / 6));
+    let counts = scene.cut_at(places.chain(whole - 4..whole))?;
     print("update", counts);
     let [first, second] = counts;
     expect(first.old > 0 && first.new > 0 && second.old > 0, || {
@@ -128,41 +127,20 @@ pub fn in_an_update(bench: &Bench) -> Outcome {
     let mut last = Counts::default();
     let (at, place, seed) = (whole - 1, Cut::After, 1);
     scene.cut(&[PowerCut { at, place, seed }], &mut last)?;
-    expect(last.new == 1, || "the new one is lost".to_owned())
-}
-
-/// In the erase that makes room at the start beside a plain blob.
-pub fn in_an_erase(bench: &Bench) -> Outcome {
-    let scene = Scene {
-        bench,
-        before: |bench| bench.machine(PART, [&bench.blob, &[0x5a; 4096]]),
-        happens: |_, machine| Ok(machine.run_ticks(20)?),
-    };
-    let whole = scene.operations()?;
-    let counts = scene.cut_at(0..whole)?;
-    print("erase", counts);
-    let [first, second] = counts;
-    expect(first.new + second.new == 0, || "a new blob".to_owned())?;
-    expect(first.old >= 9 && second.old >= 9, || "few cuts".to_owned())
-}
-
-/// In the record that passes over parameters that made the program fault twice.
-pub fn in_a_pass_over(bench: &Bench) -> Outcome {
-    let scene = Scene {
-        bench,
+    expect(last.new == 1, || "the new one is lost".to_owned())?;
+    // The older one of two is the field model's, and the newest must stay.
+    let beside_two = Scene {
         before: |bench| {
-            let mut machine = about_to_crash(bench)?;
-            crash(&mut machine)?;
+            let mut machine = bench.machine(PART, [&large()?, &[]])?;
+            machine.run_ticks(20)?;
+            update(&mut machine, &plan(&bench.blob))?.0?;
+            machine.power_cycle();
+            machine.run_ticks(20)?;
             Ok(machine)
         },
-        happens: |_, machine| crash(machine),
+        ..scene
     };
-    let whole = scene.operations()?;
-    expect(whole > 100, || format!("{whole} operations"))?;
-    let counts = scene.cut_at([0, 1, whole / 2].into_iter().chain(whole - 3..whole))?;
-    print("pass_over", counts);
-    let [first, second] = counts;
-    expect(first.old > 0 && first.new > 0 && second.new > 0, || {
-        "all cuts ended alike".to_owned()
-    })
+    let counts = beside_two.cut_at((0..3).chain(whole - 2..whole))?;
+    print("second_update", counts);
+    Ok(())
 }

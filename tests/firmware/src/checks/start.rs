@@ -102,6 +102,31 @@ fn valid(axes: &[Axis]) -> usize {
         .count()
 }
 
+/// A supply that rises slowly: nothing runs faster than after a reset and nothing is written before it
+/// is sound, and the watchdog does not bite meanwhile.
+pub fn supply_that_comes_late(bench: &Bench) -> Outcome {
+    const LATE_NS: u64 = 300_000_000;
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.chip.supply_low_until_ns = LATE_NS;
+    machine.run_ticks(400)?;
+    let first_ns = machine.chip.first_tick_ns.unwrap_or(0);
+    expect(first_ns > LATE_NS, || format!("a tick at {first_ns} ns"))?;
+    let raised_ns = machine.chip.clocks.pll_since;
+    expect(raised_ns > LATE_NS, || {
+        format!("the PLL runs at {raised_ns} ns")
+    })?;
+    equal("resets", (machine.panics, machine.watchdog_resets), (0, 0))?;
+    let seen = Seen::since_last(&mut machine);
+    expect(valid(&seen.axes) > 700, || "too few poses".to_owned())?;
+    row(
+        bench,
+        "supply low for 0.3 s at power-on",
+        0,
+        Some(0),
+        &seen.axes,
+    )
+}
+
 /// No crystal: the internal oscillator from the start, told by flag, check and light.
 pub fn no_crystal(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;

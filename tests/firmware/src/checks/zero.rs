@@ -7,7 +7,7 @@ use crate::adc_model::Part;
 use crate::bench::{Bench, Seen};
 use crate::machine::Machine;
 use hal_adapters::can::command::Outcome as Ended;
-use hal_adapters::can::status::{board_check, flag};
+use hal_adapters::can::status::{NodeState, board_check, flag};
 use runtime::Status;
 
 const PART: Part = Part::Ads131m08;
@@ -93,30 +93,35 @@ pub fn over_power_on(bench: &Bench) -> Outcome {
     equal("checks", page(&seen, 11), Some(0))
 }
 
-/// Another blob since the re-zero, or a record that is damaged: no zero, which is told.
+/// What ran is no longer in flash, or the record is damaged: no pose, which is told, and that a zero is
+/// lost.
 pub fn lost(bench: &Bench) -> Outcome {
     let image = bench.image(PART);
     let slot = image.address("_parameter_slot_0")?;
     let record = image.address("RETAINED")?;
     type Change<'c> = &'c dyn Fn(&mut Machine);
-    let changes: [(&str, Change<'_>); 2] = [
-        ("zero set with another blob", &|machine| {
+    let changes: [(&str, u8, Change<'_>); 2] = [
+        ("what ran is no longer in flash", 3, &|machine| {
             machine.write_flash(slot, &bench.later);
         }),
-        ("zero's record damaged", &|machine| {
+        ("what ran is not known: its record damaged", 2, &|machine| {
             machine.flip(record, 8 * 24 + 5);
         }),
     ];
-    for (fault, change) in changes {
+    for (fault, reason, change) in changes {
         let mut machine = re_zeroed(bench)?;
         change(&mut machine);
         machine.hold_ns = 25 * MS;
         machine.run_ticks(300)?;
+        Seen::since_last(&mut machine);
+        machine.run_ticks(300)?;
         let seen = Seen::since_last(&mut machine);
-        expect_zero(&seen, false)?;
+        equal("words of poses", seen.axes.len(), 0)?;
+        let status = seen.last_status().ok_or("no state")?;
+        let state = (status.state, status.reason);
+        equal("state", state, (Some(NodeState::Stopped), reason))?;
         equal("checks", page(&seen, 11), Some(board_check::ZERO_LOST))?;
-        let (_, near) = near_zero(&seen);
-        println!("FAULT   controller | {fault} | in the first state | {near}");
+        println!("FAULT   controller | {fault} | in the first state | 0");
     }
     Ok(())
 }

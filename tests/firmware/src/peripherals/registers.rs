@@ -34,7 +34,20 @@ const SPI_GAP_NS: u64 = 150;
 /// Time of a read of a register that a program polls: loops that wait take time.
 const POLL_NS: u64 = US;
 
+/// Thresholds of the voltage detector, mV, by PLS (RM0090 5.4.1).
+const THRESHOLDS_MV: [u32; 8] = [2000, 2100, 2300, 2500, 2600, 2700, 2800, 2900];
+/// A supply that is low, mV: only the highest threshold tells.
+const LOW_MV: u32 = 2850;
+
 impl Peripherals {
+    /// PVDO (RM0090 5.4.2): valid only while the detector and its clock are on.
+    fn detects_low_supply(&self) -> bool {
+        let (control, clocked) = (self.words[PWR / 4], self.words[(RCC + 0x40) / 4] >> 28 & 1);
+        let threshold_mv = THRESHOLDS_MV[control as usize >> 5 & 0b111];
+        let is_on = clocked == 1 && control >> 4 & 1 == 1;
+        is_on && self.is_supply_low() && LOW_MV < threshold_mv
+    }
+
     /// A register, by its distance from the start of the range.
     pub fn read(&mut self, offset: usize) -> u32 {
         let word = self.words[offset / 4];
@@ -45,7 +58,10 @@ impl Peripherals {
             }
             o if o == RCC + 0x70 => word | (word & 1) << 1,
             o if o == RCC + 0x74 => word & 1 | (word & 1) << 1 | self.reset_flags,
-            o if o == PWR + 4 => 1 << 14 | word,
+            o if o == PWR + 4 => {
+                self.now_ns += POLL_NS;
+                1 << 14 | word | u32::from(self.detects_low_supply()) << 2
+            }
             o if o == OPTCR => self.option_bytes,
             o if (FLASH + 4..OPTCR).contains(&o) => {
                 self.flash.read_register(o - FLASH, &mut self.now_ns)
@@ -53,7 +69,7 @@ impl Peripherals {
             o if o == GPIOA + 0x10 => self.level(GPIOA, SELECT_PIN, self.pulled_up[0]),
             o if o == GPIOB + 0x10 => {
                 self.level(GPIOB, SYNC_PIN, self.pulled_up[1])
-                    | self.level(GPIOB, SERVO_PIN, false) & u32::from(!self.servo_on) << SERVO_PIN
+                    | self.level(GPIOB, SERVO_PIN, false) & u32::from(self.servo_on) << SERVO_PIN
             }
             o if o == TIM2 + 0x10 => {
                 self.advance();

@@ -4,8 +4,6 @@
 #![no_main]
 
 use embedded_can::Frame;
-use firmware::store::Sector;
-use firmware::store::flash_model::FlashModel;
 use fuzz::PARAMS;
 use fuzz::bus::Numbers;
 use hal_adapters::can::command::{Command, Request};
@@ -17,6 +15,7 @@ use runtime::ParameterSet;
 use runtime::blob::MAX_BYTES;
 use runtime::parameters::Text;
 use std::sync::LazyLock;
+use tests::flash_model::FlashModel;
 use tests::node::{Node, TAKEN_PER_TICK};
 
 /// What is sent: other parameters of the same stage.
@@ -89,8 +88,7 @@ impl Bench {
                 };
                 self.take(Message::UpdateData, data.payload());
             }
-            4 => self.ask(ask(UpdateRequest::Verify { sequence }), token),
-            5 => self.ask(ask(UpdateRequest::Commit { sequence }), token),
+            4 | 5 => self.ask(ask(UpdateRequest::Commit { sequence }), token),
             6 => self.ask(ask(UpdateRequest::Abort), token),
             7 => self.ask(ask(UpdateRequest::Activate), token),
             8 => self.ask(ask(UpdateRequest::Challenge { part: a }), token),
@@ -123,7 +121,7 @@ fuzz_target!(|data: &[u8]| {
     };
     let key = (form & 1 == 1).then_some([7; 16]);
     let mut flash = FlashModel::erased();
-    flash.load(Sector::First, PARAMS);
+    flash.load(0, PARAMS);
     let mut bench = Bench {
         node: Node::new(Some("HS-0007"), key, flash, u64::from(form)),
         numbers: Numbers::default(),
@@ -138,7 +136,7 @@ fuzz_target!(|data: &[u8]| {
         if now != records {
             records = now;
             let blob = bench.node.newest();
-            assert!(blob.is_some_and(|blob| blob == PARAMS || blob == NEW.as_slice()));
+            assert!(blob.is_some_and(|blob| blob == PARAMS || blob == *NEW));
         }
     }
     assert!(bench.node.newest().is_some());

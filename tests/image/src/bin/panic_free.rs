@@ -8,7 +8,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use hal_adapters::can::command::{Command, Mailbox, Request, Told};
 use hal_adapters::can::service::Updates;
-use hal_adapters::can::update::{Change, Identity, Kept, Receiver, Running, Store, Written};
+use hal_adapters::can::update::{Change, Identity, Kept, NotWritten, Receiver, Running, Store};
 use hal_adapters::can::{
     BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing, sensor,
 };
@@ -85,13 +85,14 @@ impl Store for Nowhere {
         black_box(0)
     }
 
-    fn has_room(&self) -> bool {
-        black_box(true)
+    fn word(&mut self, index: usize) -> Option<u32> {
+        black_box(index);
+        black_box(None)
     }
 
-    fn write(&mut self, sequence: u32, change: Change<'_>) -> Written {
+    fn write(&mut self, sequence: u32, change: Change<'_>) -> Result<(), NotWritten> {
         black_box((sequence, change));
-        black_box(Written::Done)
+        black_box(Ok(()))
     }
 }
 
@@ -112,7 +113,8 @@ fn update(frame: &BusFrame) {
         nonce: black_box(Some([0; 4])),
     };
     black_box(service.take_updating(frame, None, Some(updates)));
-    black_box(receiver.tick(service.servo_is_off(), store));
+    receiver.tick(service.servo_is_off());
+    black_box(receiver.store(service.servo_is_off(), store));
     black_box((receiver.is_updating(), receiver.wants_reset()));
 }
 
@@ -144,7 +146,6 @@ fn main() -> ! {
         servo.forget();
         commands(&mut servo);
         black_box((servo.rezero_state(), servo.health(), servo.zero()));
-        black_box(decoder.constants().channel_faults(&frame).count());
     }
     bus(&frame);
     update(&black_box(BusFrame::from(sensor::frames_16(&frame)[0])));

@@ -1,0 +1,227 @@
+//! The bank: what a fault of each channel does to the signals.
+
+use super::blocks::{Log, Mean};
+use super::map::Estimate;
+use crate::finding::Code;
+use crate::input::stage::Stage;
+use crate::solve::field::probe::probes;
+use nalgebra::Vector3;
+use runtime::capacitive::{vertical_pose, vertical_rows};
+use std::ops::Range;
+
+/// Step of the derivative by Z, Rx, Ry: m, rad.
+const STEP: f64 = 1e-6;
+
+/// What is wrong with the channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Its zero, by 1 um.
+    Offset,
+    /// Its gain, by 1 %.
+    Gain,
+}
+
+/// How a fault goes over the log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Course {
+    /// From a mean on to the end of the log.
+    From(usize),
+    /// From a mean on to the end of its movement: a reset takes it off.
+    ToReset(usize),
+    /// Growing evenly over the log.
+    Ramp,
+    /// Growing evenly in each movement, by 1 in a second.
+    RampInMovements,
+}
+
+/// A row of the bank.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Family {
+    /// The channel or the group.
+    pub(super) channel: &'static str,
+    /// The first channel at fault and the one after the last: Hall A, B, C; beams X, Y1, Y2; gaps 1, 2, 3.
+    channels: (usize, usize),
+    pub(super) kind: Kind,
+    pub(super) steps: bool,
+    pub(super) to_reset: bool,
+    pub(super) ramp: bool,
+    pub(super) ramp_in_movements: bool,
+}
+
+const fn gain(channel: &'static str, from: usize, to: usize) -> Family {
+    Family {
+        channel,
+        channels: (from, to),
+        kind: Kind::Gain,
+        steps: true,
+        to_reset: false,
+        ramp: true,
+        ramp_in_movements: false,
+    }
+}
+
+const fn offset(channel: &'static str, of: usize) -> Family {
+    // A reset takes an error of the reference off; a gap's stays.
+    Family {
+        channel,
+        channels: (of, of + 1),
+        kind: Kind::Offset,
+        steps: of < 3 || of >= 6,
+        to_reset: of < 6,
+        ramp: true,
+        ramp_in_movements: of < 6,
+    }
+}
+
+/// All faults that are looked for.
+pub(super) const FAMILIES: [Family; 18] = [
+    gain("hall_a", 0, 1),
+    gain("hall_b", 1, 2),
+    gain("hall_c", 2, 3),
+    gain("hall", 0, 3),
+    gain("ifm", 3, 6),
+    gain("cap_1", 6, 7),
+    gain("cap_2", 7, 8),
+    gain("cap_3", 8, 9),
+    gain("cap", 6, 9),
+    offset("hall_a", 0),
+    offset("hall_b", 1),
+    offset("hall_c", 2),
+    offset("ifm_x", 3),
+    offset("ifm_y1", 4),
+    offset("ifm_y2", 5),
+    offset("cap_1", 6),
+    offset("cap_2", 7),
+    offset("cap_3", 8),
+];
+
+impl Family {
+    pub(super) const fn code(&self, course: Course) -> Code {
+        match (self.kind, course) {
+            (Kind::Gain, _) => Code::GainDrift,
+            (Kind::Offset, Course::From(_) | Course::ToReset(_)) => Code::Step,
+            (Kind::Offset, _) => Code::Drift,
+        }
+    }
+}
+
+/// Changes of the signals (mm) by a change of each of the nine channels by 1 mm, by mean.
+pub(super) fn by_channel(log: &Log, stage: &Stage, estimate: &Estimate) -> Vec<[Vector3<f64>; 9]> {
+    let probes = probes(&estimate.state.parameters);
+    let rows = vertical_rows(&stage.capacitive_probes_m).unwrap_or_default();
+    let per_gap: [[f64; 3]; 3] = [0, 1, 2].map(|gap| {
+        let mut gaps = [0.0; 3];
+        gaps[gap] = 1e-3;
+        vertical_pose(&rows, gaps).to_array()
+    });
+    let turn = 1.0 / stage.y_baseline_m;
+    let per_beam = [[1.0, 0.0, 0.0], [0.0, 0.5, turn], [0.0, 0.5, -turn]];
+    let of_mean = |mean: &Mean| {
+        let row = &mean.row;
+        let read = |vertical: [f64; 3]| {
+            let planar_mm = row.planar_mm(estimate.state.lag_s, [0.0; 3]);
+            Vector3::from_fn(|k, _| probes[k].signal_mm(planar_mm, vertical))
+        };
+        let here = read(row.vertical);
+        let by_vertical = [0, 1, 2].map(|axis| {
+            let mut vertical = row.vertical;
+            vertical[axis] += STEP;
+            (read(vertical) - here) / STEP
+        });
+        let by_planar = [0, 1, 2].map(|axis| {
+            let by = probes.map(|probe| {
+                probe
+                    .read(row.planar_mm(estimate.state.lag_s, [0.0; 3]), row.vertical)
+                    .by_pose[axis]
+            });
+            Vector3::from(by)
+        });
+        let along = |by: &[Vector3<f64>; 3], change: [f64; 3]| {
+            -(by[0] * change[0] + by[1] * change[1] + by[2] * change[2])
+        };
+        std::array::from_fn(|channel| match channel {
+            0..3 => Vector3::ith(channel, 1.0),
+            3..6 => along(&by_planar, per_beam[channel - 3]),
+            _ => along(&by_vertical, per_gap[channel - 6]),
+        })
+    };
+    log.means.iter().map(of_mean).collect()
+}
+
+impl Family {
+    /// What it adds to the residuals in the channels of the filter, without its course.
+    pub(super) fn raw(
+        &self,
+        log: &Log,
+        estimate: &Estimate,
+        by_channel: &[[Vector3<f64>; 9]],
+    ) -> Vec<[f64; 3]> {
+        let at = |(place, mean): (usize, &Mean)| {
+            let mut sum = Vector3::zeros();
+            let (first, end) = self.channels;
+            for (channel, by) in by_channel[place].iter().enumerate().take(end).skip(first) {
+                let size = match (self.kind, channel) {
+                    (Kind::Offset, _) => 1e-3,
+                    (Kind::Gain, 0..3) => 1e-2 * mean.row.signal_mm[channel],
+                    (Kind::Gain, 3..6) => 1e-2 * mean.beams_mm[channel - 3],
+                    (Kind::Gain, _) => 1e-2 * mean.gaps_mm[channel - 6],
+                };
+                sum += by * size;
+            }
+            (estimate.channels[place] * sum).into()
+        };
+        log.means.iter().enumerate().map(at).collect()
+    }
+}
+
+/// A raw column of a fault with its course. What becomes another stage is zero at the end of the log, so that
+/// the parameters are those of the stage as it is then; the zero of a Hall probe is set anew.
+pub(super) fn shaped(
+    log: &Log,
+    raw: &[[f64; 3]],
+    family: &Family,
+    course: Course,
+) -> Vec<[f64; 3]> {
+    let mut shares = shares(log, course);
+    let stays = family.kind == Kind::Gain || family.channels.0 >= 6;
+    if stays && matches!(course, Course::From(_) | Course::Ramp) {
+        shares.iter_mut().for_each(|share| *share -= 1.0);
+    }
+    raw.iter()
+        .zip(shares)
+        .map(|(x, share)| x.map(|x| x * share))
+        .collect()
+}
+
+/// How much of a fault each mean has.
+fn shares(log: &Log, course: Course) -> Vec<f64> {
+    let count = log.means.len();
+    let mut shares = vec![0.0; count];
+    match course {
+        Course::From(from) => shares[from..].fill(1.0),
+        Course::ToReset(from) => shares[to_reset(log, from)].fill(1.0),
+        Course::Ramp => {
+            for (at, share) in shares.iter_mut().enumerate() {
+                *share = at as f64 / count as f64;
+            }
+        }
+        Course::RampInMovements => {
+            for movement in &log.movements {
+                let start_s = log.means[movement.start].row.time_s;
+                for at in movement.clone() {
+                    shares[at] = log.means[at].row.time_s - start_s;
+                }
+            }
+        }
+    }
+    shares
+}
+
+/// The means from one on to the end of its movement.
+pub(super) fn to_reset(log: &Log, from: usize) -> Range<usize> {
+    let movement = log
+        .movements
+        .iter()
+        .find(|movement| movement.contains(&from));
+    from..movement.map_or(from, |movement| movement.end)
+}

@@ -1,0 +1,395 @@
+//! One likelihood, one currency: what is wrong with a log by score tests on one estimate, and what it costs
+//! at work.
+//!
+//! | module | what it does |
+//! |---|---|
+//! | `blocks` | the log in means over a few rows, spikes left out |
+//! | `noise` | white noise and the walk of the reference: three scalar filters |
+//! | `map` | the most likely parameters, with faults as further unknowns |
+//! | `columns` | the bank: each fault of a channel or a group, and its course in time |
+//! | `score` | which of them explains the residuals, the parameters profiled out |
+
+mod blocks;
+mod columns;
+mod map;
+mod noise;
+mod score;
+#[cfg(test)]
+mod tests;
+
+use crate::finding::{Code, Finding, Severity};
+use crate::fit::Repair;
+use crate::fit::with_reference_later;
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, Predicted};
+use crate::problem::model::Model;
+use crate::solve::field::carry::{Service, service_poses};
+use crate::solve::field::parameters::FieldParameters;
+use crate::solve::field::probe::probes;
+use crate::solve::field::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE};
+use blocks::Log;
+use columns::{Course, FAMILIES, Kind, by_channel, shaped};
+use map::{Estimate, UNKNOWNS};
+use nalgebra::{DMatrix, DVector};
+use runtime::ModelKind;
+use score::{Candidate, Scan, Split, range_of, split};
+
+/// Faults of one log at most.
+const FAULTS_MAX: usize = 6;
+/// Errors in service over the noise floor below which a finding is a note.
+const NOTE_MAX: f64 = 1.05;
+/// Poses spread evenly over this part of a range have half of it as rms, as sines have that start anywhere.
+const OF_SINES: f64 = 0.866;
+/// One sound log in so many has a fault that a fit can feel.
+const RARITY: f64 = 100.0;
+/// A lag beyond this part of a servo period is taken off before anything else is looked at.
+const LAG_MAX: f64 = 0.5;
+/// A fault that costs less is none.
+const COST_MIN: f64 = 1.01;
+/// Faults whose gains in chi-square differ by less are not told apart: odds of 20 to 1, ...
+const UNDECIDED: f64 = 6.0;
+/// ... or by less than this part, for large faults are not quite linear.
+const ALIKE: f64 = 0.01;
+
+/// What the diagnosis of a log says.
+#[derive(Debug)]
+pub struct Diagnosis {
+    /// What is wrong, each with its cost.
+    pub findings: Vec<Finding>,
+    /// What the fit has to expect at work.
+    pub predicted: Predicted,
+    /// The parameters with the faults taken off and what they have to expect, where the faults are clear and
+    /// that makes a good calibration.
+    pub repair: Option<(Repair, Predicted)>,
+    /// What the residuals have left, over their noise: 1 for a log without any fault.
+    pub rest: f64,
+}
+
+/// The severity of a cost.
+pub fn severity(ratio: f64) -> Severity {
+    match ratio {
+        ratio if ratio < NOTE_MAX => Severity::Note,
+        ratio if ratio < LIMITED_MAX => Severity::Warn,
+        _ => Severity::Refuse,
+    }
+}
+
+/// The diagnosis of the rows of a log that no other test has found to be wrong, from the parameters of a
+/// fit. `None` where the log is too short or too still for an estimate.
+pub fn diagnose(
+    dataset: &Dataset,
+    stage: &Stage,
+    fitted: &FieldParameters,
+    model: ModelKind,
+) -> Option<Diagnosis> {
+    let log = Log::new(dataset, stage, &probes(fitted));
+    let estimate = Estimate::new(&log, fitted)?;
+    let of = |dataset, log: &Log, estimate| {
+        Job {
+            dataset,
+            stage,
+            log,
+            fitted,
+            model,
+        }
+        .diagnosis(estimate)
+    };
+    let lag_s = estimate.state.lag_s;
+    if lag_s.abs() < LAG_MAX * stage.servo_period_s {
+        return of(dataset, &log, estimate);
+    }
+    // A lag is not linear.
+    let dataset = &with_reference_later(dataset, lag_s);
+    let log = Log::new(dataset, stage, &probes(&estimate.state.parameters));
+    let estimate = Estimate::new(&log, &estimate.state.parameters)?;
+    of(dataset, &log, estimate)
+}
+
+/// A log with what it was fitted by.
+struct Job<'a> {
+    dataset: &'a Dataset,
+    stage: &'a Stage,
+    log: &'a Log,
+    fitted: &'a FieldParameters,
+    model: ModelKind,
+}
+
+impl Job<'_> {
+    fn diagnosis(&self, mut estimate: Estimate) -> Option<Diagnosis> {
+        let log = self.log;
+        let service = |poses: Vec<_>| Service::new(self.fitted, log.white_mm, poses.into_iter());
+        let most = |axis: usize| OF_SINES * self.stage.motion.axes[axis].service;
+        let declared = service_poses(([0, 1, 2].map(most), [3, 4, 5].map(most)));
+        let declared = service(declared.collect())?;
+        // What the log leaves open of the model's own parameters decides before any fault does.
+        let of_model = match self.model {
+            ModelKind::Field => PER_PROBE,
+            model => Model::of(model).fitted,
+        };
+        let own = estimate.without_faults(of_model)?.covariance();
+        let own = Predicted::new(&declared, &own, &[0.0; COUNT]);
+        if own.worst_ratio() > LIMITED_MAX {
+            return Some(Diagnosis {
+                findings: vec![self.not_determined(&own)],
+                predicted: own,
+                repair: None,
+                rest: 1.0,
+            });
+        }
+        let whole = estimate.curvature.covariance();
+        let carried = Predicted::new(&declared, &whole, &[0.0; COUNT]).worst_ratio() < LIMITED_MAX;
+        // A log that leaves the field model open shows what it costs the smaller one, on motion like its own.
+        let (free, at_work) = match carried {
+            true => (PER_PROBE, declared.clone()),
+            false => (BEYOND_MODEL_31, service(log.poses())?),
+        };
+        let other = split(log, &estimate);
+        let by_channel = by_channel(log, self.stage, &estimate);
+        let raw: Vec<Vec<[f64; 3]>> = FAMILIES
+            .iter()
+            .map(|family| family.raw(log, &estimate, &by_channel))
+            .collect();
+        let per_unknown = libm::log(3.0 * log.means.len() as f64);
+        let mut explained = 0.0;
+        let mut faults: Vec<(Candidate, Vec<Candidate>)> = Vec::new();
+        while faults.len() < FAULTS_MAX {
+            let mut candidates = Scan::new(log, &estimate).candidates(&raw);
+            let net = |candidate: &Candidate| {
+                candidate.gain - per_unknown - 2.0 * libm::log(RARITY * candidate.choices)
+            };
+            candidates.sort_by(|a, b| net(b).total_cmp(&net(a)));
+            let Some(best) = candidates.first().copied().filter(|best| net(best) > 0.0) else {
+                break;
+            };
+            let near = f64::max(UNDECIDED, ALIKE * best.gain);
+            let is_other = |other: &&Candidate| {
+                FAMILIES[other.family].channel != FAMILIES[best.family].channel
+                    && best.gain - other.gain < near
+            };
+            let alike = candidates[1..].iter().filter(is_other).copied().collect();
+            faults.push((best, alike));
+            let columns: Vec<_> = faults
+                .iter()
+                .map(|(fault, _)| {
+                    let family = &FAMILIES[fault.family];
+                    shaped(log, &raw[fault.family], family, fault.course)
+                })
+                .collect();
+            let before = estimate.chi_squared;
+            // Faults that cannot be told apart any more are no further ones.
+            let Some(next) = estimate.with_faults(log, &columns) else {
+                faults.pop();
+                break;
+            };
+            estimate = next;
+            explained += before - estimate.chi_squared + net(&best) - best.gain;
+        }
+        let residuals = 3.0 * (log.means.len() - log.movements.len()) as f64 - UNKNOWNS as f64;
+        let rest = (estimate.chi_squared / residuals.max(1.0)).sqrt();
+        // What no fault explains makes the parameters as much less certain.
+        let certain = rest.max(1.0).powi(2);
+        let without_faults = estimate.without_faults(free)?;
+        let nothing = DMatrix::zeros(COUNT, COUNT);
+        let cost = |off: &DVector<f64>| {
+            Predicted::new(&at_work, &nothing, &off.as_slice()[..COUNT]).worst_ratio()
+        };
+        let of_parts = |other: &Split| other.gain - UNKNOWNS as f64 * per_unknown;
+        let other = other.filter(|other| of_parts(other) > explained.max(0.0));
+        let off_by = |number: usize| {
+            without_faults.solve(&estimate.pull(number)) * estimate.state.faults[number]
+        };
+        let (predicted, of_parts, offs) = match &other {
+            Some(other) => {
+                let off = without_faults.solve(&other.pull);
+                let predicted = Predicted::new(&declared, &whole, &off.as_slice()[..COUNT]);
+                (
+                    predicted,
+                    Some(self.two_states(other.from, cost(&off))),
+                    Vec::new(),
+                )
+            }
+            None => {
+                // What the fit at hand is off the repaired one, whatever bent it.
+                let own = estimate.state.parameters.probes.as_flattened();
+                let pairs = self.fitted.probes.as_flattened().iter().zip(own);
+                let (off, covariance) = match carried {
+                    true => (
+                        pairs.map(|(a, b)| a - b).collect(),
+                        estimate.curvature.covariance(),
+                    ),
+                    false => (vec![0.0; COUNT], estimate.omitting(of_model)?),
+                };
+                let predicted = Predicted::new(&declared, &(covariance * certain), &off);
+                (predicted, None, (0..faults.len()).map(off_by).collect())
+            }
+        };
+        let costs: Vec<f64> = offs.iter().map(cost).collect();
+        let covariance = estimate.curvature.covariance() * certain;
+        let repair = self.repair(&estimate, (&declared, &covariance), &faults, &costs);
+        let of_faults = faults.iter().zip(costs.iter().copied()).enumerate();
+        let of_faults = of_faults.filter(|(_, (_, cost))| *cost >= COST_MIN);
+        let of_faults = of_faults.map(|(number, ((fault, alike), cost))| {
+            // A robust fit may have left out of account what it would have cost.
+            let cost = cost.min(predicted.worst_ratio());
+            self.finding(fault, alike, estimate.state.faults[number], cost)
+        });
+        Some(Diagnosis {
+            findings: of_parts.into_iter().chain(of_faults).collect(),
+            predicted,
+            repair,
+            rest,
+        })
+    }
+
+    /// The estimate that has the faults among its unknowns, and what it has to expect, if it is worth it and
+    /// good; an error of the reference or one that may be another's says nothing of the stage.
+    fn repair(
+        &self,
+        estimate: &Estimate,
+        (declared, covariance): (&Service, &DMatrix<f64>),
+        faults: &[(Candidate, Vec<Candidate>)],
+        costs: &[f64],
+    ) -> Option<(Repair, Predicted)> {
+        let is_worth_it = costs.iter().any(|cost| severity(*cost) > Severity::Note);
+        let is_clear = |(fault, alike): &(Candidate, Vec<Candidate>)| {
+            let family = &FAMILIES[fault.family];
+            alike.is_empty() && (family.channel != "ifm" || family.kind != Kind::Gain)
+        };
+        if self.model != ModelKind::Field || !is_worth_it || !faults.iter().all(is_clear) {
+            return None;
+        }
+        let predicted = Predicted::new(declared, covariance, &[0.0; COUNT]);
+        (predicted.worst_ratio() <= GOOD_MAX).then(|| {
+            let repair = Repair {
+                parameters: estimate.state.parameters,
+                covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
+            };
+            (repair, predicted)
+        })
+    }
+
+    /// Movement and time of a mean, and its log if that begins there.
+    fn place(&self, at: usize) -> (String, i64, Option<String>) {
+        let row = &self.dataset.rows[self.log.means[at].first];
+        let name = self
+            .dataset
+            .movement_name(&self.dataset.movements[row.movement]);
+        let log_of = |at: usize| {
+            let row = &self.dataset.rows[self.log.means[at].first];
+            self.dataset.movements[row.movement].log
+        };
+        let begins = at > 0 && log_of(at - 1) != log_of(at);
+        let log = begins.then(|| self.dataset.logs[log_of(at)].path.display().to_string());
+        (name, row.t_us, log)
+    }
+
+    fn not_determined(&self, predicted: &Predicted) -> Finding {
+        let [x, y, rz] = predicted.ratio;
+        let message = format!(
+            "the log leaves so much open that {x:.2} / {y:.2} / {rz:.2} times the noise floor are to be expected in X / Y / Rz over the \
+             range of service ([motion] in stage.toml). Remedy: {}",
+            Code::NotDetermined.entry().remedy
+        );
+        Finding::new(Code::NotDetermined, message).costing(predicted.worst_ratio())
+    }
+
+    fn two_states(&self, from: usize, cost: f64) -> Finding {
+        let (movement, t_us, log) = self.place(from);
+        let part = match log {
+            Some(log) => format!(
+                "{log} does not fit to the logs before it: two stages, or everything changed between them"
+            ),
+            None => format!(
+                "from movement {movement}, t_us = {t_us} on the log does not fit to what is before: two stages in one log, or \
+                 everything changed there"
+            ),
+        };
+        let message =
+            format!("{part} ({cost:.2} times the noise floor at work). Fit the parts that agree");
+        let found = Finding::new(Code::LogsDisagree, message).severe(severity(cost));
+        found.at(movement, t_us).costing(cost)
+    }
+
+    fn finding(&self, fault: &Candidate, alike: &[Candidate], size: f64, cost: f64) -> Finding {
+        let family = &FAMILIES[fault.family];
+        let (what, unit) = match family.kind {
+            Kind::Gain => ("the gain", "%"),
+            Kind::Offset => ("the zero", "um"),
+        };
+        let (movement, t_us, log) = self.place(range_of(self.log, fault.course).start);
+        let course = match (fault.course, &log) {
+            (Course::From(_), Some(log)) => {
+                format!("in {log} differs by {size:+.2} {unit} from that before")
+            }
+            (Course::From(_), None) => {
+                format!("changes by {size:+.2} {unit} in movement {movement} at t_us = {t_us}")
+            }
+            (Course::ToReset(_), _) => {
+                format!("jumps by {size:+.1} {unit} in movement {movement} at t_us = {t_us}")
+            }
+            (Course::Ramp, _) => format!("drifts by {size:+.2} {unit} over the log"),
+            (Course::RampInMovements, _) => {
+                format!("drifts by {size:+.2} {unit}/s within movements")
+            }
+        };
+        let mut names: Vec<String> = vec![title(family.channel)];
+        for other in alike {
+            let other = title(FAMILIES[other.family].channel);
+            if !names.contains(&other) {
+                names.push(other);
+            }
+        }
+        let undecided = match names.len() {
+            1 => "",
+            _ => " (the log does not tell which)",
+        };
+        let code = match (&log, fault.course) {
+            (Some(_), Course::From(_)) => Code::LogsDisagree,
+            _ => family.code(fault.course),
+        };
+        let message = format!(
+            "{what} of {}{undecided} {course}: {cost:.2} times the noise floor at work. Remedy: {}",
+            names.join(" or "),
+            code.entry().remedy
+        );
+        let found = Finding::new(code, message)
+            .severe(severity(cost))
+            .of(size, unit)
+            .costing(cost);
+        let found = if undecided.is_empty() {
+            found.on(family.channel)
+        } else {
+            found
+        };
+        match fault.course {
+            Course::From(_) | Course::ToReset(_) => found.at(movement, t_us),
+            Course::Ramp | Course::RampInMovements => found,
+        }
+    }
+}
+
+/// A finding of a fault that the calibration is without.
+pub(super) fn repaired(found: Finding) -> Finding {
+    let message = format!(
+        "{}. The calibration has this taken off, and is that of the stage at the end of the log",
+        found.message
+    );
+    let severity = found.severity.min(Severity::Warn);
+    Finding {
+        message,
+        severity,
+        ..found
+    }
+}
+
+fn title(channel: &str) -> String {
+    match channel.split_once('_') {
+        Some(("hall", probe)) => format!("Hall {}", probe.to_uppercase()),
+        Some(("cap", gap)) => format!("capacitive sensor {gap}"),
+        Some((_, beam)) => format!("beam {}", beam.to_uppercase()),
+        None if channel == "hall" => "all Hall probes".to_owned(),
+        None if channel == "cap" => "all capacitive sensors".to_owned(),
+        None => "all beams".to_owned(),
+    }
+}

@@ -1,0 +1,176 @@
+//! White noise of the probes and the walk of the reference, as three scalar channels.
+//!
+//! In the space of the pose the reference's walk has a diagonal covariance D a second, and the probes'
+//! noise N = B^-1 S B^-T (B: derivatives of the signals by the pose). A matrix T with T N T' = 1 and
+//! T D T' diagonal makes three channels that a scalar filter each turns into innovations. The offset of
+//! each movement, which starts anywhere, is projected out exactly.
+
+use super::blocks::Log;
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use std::ops::Range;
+
+/// Declared drift of the interferometers in a movement: mm, mm, mrad. A free walk swallows faults.
+const DRIFT_MAX: [f64; 3] = [0.6e-3; 3];
+/// Walks that are tried, as parts of the largest.
+const PARTS: [f64; 5] = [1.0, 0.7, 0.45, 0.25, 0.1];
+
+/// The filter of one log: for each mean and channel gain and scale.
+#[derive(Clone, Debug)]
+pub(super) struct Filter {
+    /// From B^-1 y to the channels.
+    pub(super) to_channels: Matrix3<f64>,
+    /// By mean: gains and scales of the three channels.
+    steps: Vec<[[f64; 2]; 3]>,
+    movements: Vec<Range<usize>>,
+    log_determinant: f64,
+}
+
+impl Filter {
+    /// For a walk (mm, mm, mrad in a root of a second) and derivatives by the pose at the middle.
+    fn new(log: &Log, by_pose: &Matrix3<f64>, walk: [f64; 3]) -> Option<Self> {
+        let inverse = by_pose.try_inverse()?;
+        let white = Matrix3::from_diagonal(&Vector3::from(log.white_mm.map(|x| x * x)));
+        let noise = inverse * white * inverse.transpose();
+        let lower = noise.cholesky()?.l().try_inverse()?;
+        let walk = Matrix3::from_diagonal(&Vector3::from(walk.map(|x| x * x)));
+        let eigen = SymmetricEigen::new(lower * walk * lower.transpose());
+        let to_channels = eigen.eigenvectors.transpose() * lower;
+        let mut steps = vec![[[0.0; 2]; 3]; log.means.len()];
+        let mut log_determinant = 0.0;
+        for movement in &log.movements {
+            for (channel, per_s) in eigen.eigenvalues.iter().enumerate() {
+                let first = &log.means[movement.start].row;
+                let (mut spread, mut time_s) = (1.0 / first.weight, first.time_s);
+                // The first mean sets the offset: it says nothing else.
+                steps[movement.start][channel] = [1.0, 0.0];
+                let of_movement = steps[movement.clone()]
+                    .iter_mut()
+                    .zip(&log.means[movement.clone()]);
+                for (step, mean) in of_movement.skip(1) {
+                    let row = &mean.row;
+                    spread += per_s.max(0.0) * (row.time_s - time_s).max(0.0);
+                    time_s = row.time_s;
+                    let sum = spread + 1.0 / row.weight;
+                    let gain = spread / sum;
+                    step[channel] = [gain, 1.0 / sum.sqrt()];
+                    spread *= 1.0 - gain;
+                    log_determinant += libm::log(sum);
+                }
+            }
+        }
+        Some(Self {
+            to_channels,
+            steps,
+            movements: log.movements.clone(),
+            log_determinant,
+        })
+    }
+
+    /// The walk that explains the residuals (pose, by mean) best, up to the declared drift.
+    pub(super) fn best(
+        log: &Log,
+        by_pose: &Matrix3<f64>,
+        residuals: &[Vector3<f64>],
+    ) -> Option<Self> {
+        let longest_s = log.movements.iter().map(|movement| {
+            log.means[movement.end - 1].row.time_s - log.means[movement.start].row.time_s
+        });
+        let root_s = longest_s.fold(0.0, f64::max).max(0.1).sqrt();
+        let mut best: Option<(f64, Self)> = None;
+        for part in PARTS {
+            let filter = Self::new(log, by_pose, DRIFT_MAX.map(|most| part * most / root_s))?;
+            let mut column: Vec<[f64; 3]> = residuals
+                .iter()
+                .map(|r| (filter.to_channels * r).into())
+                .collect();
+            filter.whiten(&mut column);
+            let cost = column.iter().flatten().map(|x| x * x).sum::<f64>() + filter.log_determinant;
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, filter));
+            }
+        }
+        Some(best?.1)
+    }
+
+    /// Innovations of a column, over their standard deviations.
+    pub(super) fn whiten(&self, column: &mut [[f64; 3]]) {
+        for movement in &self.movements {
+            self.whiten_movement(movement.start, &mut column[movement.clone()]);
+        }
+    }
+
+    /// The same of a piece of a column that begins a movement.
+    fn whiten_movement(&self, start: usize, column: &mut [[f64; 3]]) {
+        let mut expected = [0.0; 3];
+        for (value, steps) in column.iter_mut().zip(&self.steps[start..]) {
+            for channel in 0..3 {
+                let [gain, scale] = steps[channel];
+                let innovation = value[channel] - expected[channel];
+                expected[channel] += gain * innovation;
+                value[channel] = scale * innovation;
+            }
+        }
+    }
+
+    /// The sum of squares of a whitened column that is `raw` in a range and zero elsewhere.
+    pub(super) fn squares(&self, raw: &[[f64; 3]], range: &Range<usize>) -> f64 {
+        let mut sum = 0.0;
+        for movement in &self.movements {
+            let (start, end) = (range.start.max(movement.start), range.end.min(movement.end));
+            if start >= end {
+                continue;
+            }
+            let mut expected = [0.0; 3];
+            let after = std::iter::repeat_n(&[0.0; 3], movement.end - end);
+            let values = raw[start..end].iter().chain(after);
+            for (steps, value) in self.steps[start..movement.end].iter().zip(values) {
+                for channel in 0..3 {
+                    let [gain, scale] = steps[channel];
+                    let value = value[channel];
+                    let innovation = value - expected[channel];
+                    expected[channel] += gain * innovation;
+                    sum += (scale * innovation) * (scale * innovation);
+                }
+            }
+        }
+        sum
+    }
+
+    /// Many columns side by side, whitened: `rows` holds three rows of `width` for each mean.
+    pub(super) fn whiten_rows(&self, rows: &mut [f64], width: usize) {
+        for movement in &self.movements {
+            let mut expected = vec![0.0; 3 * width];
+            for at in movement.clone() {
+                for channel in 0..3 {
+                    let [gain, scale] = self.steps[at][channel];
+                    let row = &mut rows[(3 * at + channel) * width..][..width];
+                    let expected = &mut expected[channel * width..][..width];
+                    for (x, m) in row.iter_mut().zip(expected) {
+                        let innovation = *x - *m;
+                        *m += gain * innovation;
+                        *x = scale * innovation;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The transposed of [`whiten_rows`](Self::whiten_rows).
+    pub(super) fn whiten_rows_back(&self, rows: &mut [f64], width: usize) {
+        for movement in &self.movements {
+            let mut after = vec![0.0; 3 * width];
+            for at in movement.clone().rev() {
+                for channel in 0..3 {
+                    let [gain, scale] = self.steps[at][channel];
+                    let row = &mut rows[(3 * at + channel) * width..][..width];
+                    let after = &mut after[channel * width..][..width];
+                    for (x, m) in row.iter_mut().zip(after) {
+                        let scaled = scale * *x;
+                        *x = scaled + gain * *m;
+                        *m = (1.0 - gain) * *m - scaled;
+                    }
+                }
+            }
+        }
+    }
+}

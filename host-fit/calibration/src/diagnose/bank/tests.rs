@@ -1,0 +1,212 @@
+//! Faults of known size in simulated logs, and logs without any.
+
+use super::severity;
+use crate::diagnose::{Diagnosis, of_log};
+use crate::finding::{Code, Finding, Severity};
+use crate::fit::{FitSettings, ModelChoice, fit};
+use crate::input::shipped::STAGE_TOML;
+use crate::input::stage::Stage;
+use crate::judge::verdict::Verdict;
+use crate::judge::{Decoded, Zeros};
+use crate::problem::model::Model;
+use crate::simulate::assembly::Assembly;
+use crate::simulate::protocol::Protocol;
+use crate::simulate::recording::{Recording, Sample, record};
+use crate::simulate::sensors::SensorErrors;
+use crate::solve::field::parameters::FieldParameters;
+use runtime::ModelKind;
+
+fn stage() -> Stage {
+    Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")
+}
+
+/// Three movements of 8 s, all axes moving.
+fn recording(seed: u64) -> Recording {
+    let stage = stage();
+    let mut run = Protocol::Combined.run(stage.servo_period_s, seed);
+    run.movements.truncate(3);
+    let assembly = Assembly::draw(&stage, seed);
+    record(&stage, &assembly, run, &SensorErrors::USUAL, seed).expect("clear")
+}
+
+/// The diagnosis of the first rows of a recording.
+fn of_start(recording: &Recording, rows: usize) -> Diagnosis {
+    let stage = stage();
+    let mut recording = recording.clone();
+    recording.movements.truncate(1);
+    recording.movements[0].truncate(rows);
+    let dataset = recording.dataset(&stage).expect("a triangle");
+    let fitted = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto));
+    of_log(&dataset, &stage, fitted.as_ref())
+}
+
+#[test]
+fn a_short_log_is_never_good_and_refused_where_it_leaves_the_field_model_open() {
+    let short = of_start(&recording(3), 1000);
+    assert!(matches!(
+        short.verdict,
+        Some(Verdict::Limited | Verdict::Refused)
+    ));
+    assert!(short.predicted.expect("figures").worst_ratio() > 5.0);
+    let longer = of_start(&recording(4), 2000);
+    assert_eq!(longer.verdict, Some(Verdict::Refused));
+    assert_eq!(longer.findings[0].code, Code::NotDetermined);
+}
+
+/// Errors of a fit of Model (31) at poses of service, over the noise floor.
+#[test]
+fn what_is_predicted_for_model_31_holds_in_service() {
+    let (stage, seed) = (stage(), 3);
+    let assembly = Assembly::draw(&stage, seed);
+    let recorded = |protocol: Protocol, errors: &SensorErrors| {
+        let run = protocol.run(stage.servo_period_s, seed);
+        let recording = record(&stage, &assembly, run, errors, seed).expect("clear");
+        recording.dataset(&stage).expect("a triangle")
+    };
+    let dataset = recorded(Protocol::Combined, &SensorErrors::USUAL);
+    let model = ModelChoice::Named(Model::of(ModelKind::M31));
+    let fitted = fit(&dataset, &stage, &FitSettings::new(model)).expect("a fit");
+    let diagnosis = of_log(&dataset, &stage, Ok(&fitted));
+    assert_eq!(diagnosis.verdict, Some(Verdict::Limited));
+    let service = recorded(
+        Protocol::Service,
+        &SensorErrors {
+            drift_per_root_s: [0.0; 3],
+            ..SensorErrors::USUAL
+        },
+    );
+    let errors = Decoded::new(&fitted.set, &service)
+        .judge(&service, &stage, Zeros::None)
+        .errors;
+    for (axis, predicted) in errors
+        .axes
+        .iter()
+        .zip(diagnosis.predicted.expect("figures").rms)
+    {
+        // The poses of service are spread evenly over the range, those of the log are sines.
+        let ratio = predicted / axis.rms;
+        assert!((0.8..1.6).contains(&ratio), "{ratio}");
+    }
+}
+
+/// What is found in a recording, with a change of the samples from the middle of the second movement on.
+fn found(recording: Recording, change: impl Fn(&mut Sample, bool)) -> Vec<Finding> {
+    diagnosed(recording, change).findings
+}
+
+fn diagnosed(mut recording: Recording, change: impl Fn(&mut Sample, bool)) -> Diagnosis {
+    let stage = stage();
+    let middle = recording.movements[1].len() / 2;
+    for (movement, samples) in recording.movements.iter_mut().enumerate() {
+        for (row, sample) in samples.iter_mut().enumerate() {
+            if (movement, row) >= (1, middle) {
+                change(sample, movement == 1);
+            }
+        }
+    }
+    let dataset = recording.dataset(&stage).expect("a triangle");
+    let fitted = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto));
+    of_log(&dataset, &stage, fitted.as_ref())
+}
+
+fn gain(code: i32, percent: f64) -> i32 {
+    (f64::from(code) * (1.0 + percent / 100.0)).round() as i32
+}
+
+#[test]
+fn a_clean_log_raises_nothing_above_a_note() {
+    for seed in [3, 4] {
+        let found = found(recording(seed), |_, _| {});
+        assert!(
+            found.iter().all(|f| f.severity == Severity::Note),
+            "{found:#?}"
+        );
+    }
+}
+
+/// The finding has what it would cost, the calibration is that of the gain at the end.
+#[test]
+fn a_gain_that_changes_is_named_with_channel_onset_size_and_cost_and_taken_off() {
+    let (stage, sound) = (stage(), recording(3).dataset(&stage()).expect("a triangle"));
+    let sound = fit(&sound, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
+    for percent in [0.3, 1.0] {
+        let diagnosis = diagnosed(recording(3), |sample, _| {
+            sample.hall[1] = gain(sample.hall[1], percent)
+        });
+        let first = &diagnosis.findings[0];
+        assert_eq!(
+            (first.code, first.channel.as_deref()),
+            (Code::GainDrift, Some("hall_b"))
+        );
+        assert_eq!(
+            (first.movement.as_deref(), first.severity),
+            (Some("1"), Severity::Warn),
+            "{first:#?}"
+        );
+        assert!(
+            (first.t_us.expect("a time") - 4_000_000).abs() < 500_000,
+            "{first:?}"
+        );
+        assert!(
+            (first.value.expect("a size") / percent - 1.0).abs() < 0.1,
+            "{first:?}"
+        );
+        assert_eq!(severity(first.cost.expect("a cost")), Severity::Refuse);
+        assert_eq!(diagnosis.verdict, Some(Verdict::Good));
+        let repair = diagnosis.repair.expect("a repair");
+        let eta = |parameters: &FieldParameters| parameters.model_31().eta()[1];
+        let before = &sound.field.as_ref().expect("the field model").parameters;
+        let change = 100.0 * (eta(&repair.parameters) / eta(before) - 1.0);
+        assert!((change - percent).abs() < 0.05, "{change}");
+    }
+}
+
+#[test]
+fn causes_that_a_log_cannot_tell_apart_are_named_together() {
+    let found = found(recording(3), |sample, _| {
+        sample.hall = sample.hall.map(|code| gain(code, -1.0))
+    });
+    let message = &found[0].message;
+    for cause in ["all Hall probes", "all beams", "does not tell which"] {
+        assert!(message.contains(cause), "{message}");
+    }
+    assert_eq!(
+        (found[0].channel.as_deref(), found[0].severity),
+        (None, Severity::Refuse)
+    );
+}
+
+#[test]
+fn a_step_of_a_gap_stays_and_one_of_a_beam_ends_with_its_movement() {
+    let stage = stage();
+    let codes = (10e-6 / stage.capacitive.m_per_count).round() as i32;
+    let of_gap = found(recording(4), |sample, _| sample.capacitive[1] += codes);
+    assert_eq!(
+        (of_gap[0].code, of_gap[0].channel.as_deref()),
+        (Code::Step, Some("cap_2"))
+    );
+    assert_eq!(severity(of_gap[0].cost.expect("a cost")), Severity::Refuse);
+    let of_beam = found(recording(4), |sample, is_second| {
+        if is_second {
+            sample.beams_nm[1] += 5000;
+        }
+    });
+    let is_step = |f: &&Finding| f.code == Code::Step;
+    let step = of_beam.iter().find(is_step).expect("a step");
+    assert_eq!(step.channel.as_deref(), Some("ifm_y1"));
+    assert!((step.value.expect("a size") - 5.0).abs() < 1.0, "{step:?}");
+}
+
+#[test]
+fn another_stage_from_a_movement_on_is_refused() {
+    let (first, mut second) = (recording(3), recording(4));
+    second.movements[0].clone_from(&first.movements[0]);
+    let found = found(second, |_, _| {});
+    let first = &found[0];
+    assert_eq!(
+        (first.code, first.severity),
+        (Code::LogsDisagree, Severity::Refuse),
+        "{found:#?}"
+    );
+    assert_eq!(first.movement.as_deref(), Some("1"));
+}

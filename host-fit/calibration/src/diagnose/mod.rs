@@ -1,0 +1,256 @@
+//! What is wrong with a log, and by how much it can be trusted: between the fit and the blob.
+//!
+//! | module | what it does |
+//! |---|---|
+//! | `mistakes` | what labs mix up: order, signs, scales, places |
+//! | [`structure`] | which of them alone explains a log |
+//! | [`bank`] | faults of channels, logs or parts of one that contradict each other, with their cost |
+//! | [`range`] | poses beyond the range of a calibration |
+//! | `left_out` | rows that a fit left out of account |
+//! | `short_movements` | movements whose zero deviations take their errors |
+//! | [`of_fit`] | what a fit says of itself |
+//! | [`signals`] | what the signals tell by themselves |
+//! | [`trusted`] | the inputs that no log can show to be wrong |
+//!
+//! ```
+//! # use hall_input::input::shipped::STAGE_TOML;
+//! # use hall_input::input::stage::Stage;
+//! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
+//! # use hall_input::input::log::{self, ReadOptions};
+//! # use hall_input::input::shipped::RUN_GZ;
+//! # let reading = log::read_bytes(RUN_GZ, "run30.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
+//! # let dataset = reading.dataset;
+//! # use hall_calibration::fit::{FitSettings, ModelChoice, fit};
+//! # let fit = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto))?;
+//! use hall_calibration::judge::verdict::Verdict;
+//!
+//! let diagnosis = hall_calibration::diagnose::of_log(&dataset, &stage, Ok(&fit));
+//! assert!(diagnosis.findings.is_empty());
+//! assert_eq!(diagnosis.verdict, Some(Verdict::Good));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod bank;
+mod left_out;
+mod mistakes;
+pub mod of_fit;
+pub mod range;
+mod short_movements;
+pub mod signals;
+pub mod structure;
+#[cfg(test)]
+mod structure_tests;
+pub mod trusted;
+
+use crate::finding::{Code, Finding, Severity, in_order, is_explained};
+use crate::fit::{Fit, FitError, Repair};
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::judge::identify::FitFailure;
+use crate::judge::verdict::{LIMITED_MAX, Predicted, Verdict};
+use crate::problem::parameters::Parameters;
+use crate::solve::field::parameters::FieldParameters;
+use runtime::{ModelKind, ParameterSet};
+use std::borrow::Cow;
+
+/// What is wrong with a log, and what a calibration is good for.
+#[derive(Clone, Debug, Default)]
+pub struct Diagnosis {
+    /// What is wrong, the most severe first.
+    pub findings: Vec<Finding>,
+    /// Whether the calibration can be used; `None` where a log does not tell that of a blob.
+    pub verdict: Option<Verdict>,
+    /// The errors that it has to expect at work; `None` where the log is too short or too still to tell.
+    pub predicted: Option<Predicted>,
+    /// The parameters without the faults of the log, for which the verdict is: see [`Fit::repaired`].
+    pub repair: Option<Repair>,
+}
+
+/// Everything that is wrong with a log, and the verdict; `fitted` is what came of the fit to it.
+///
+/// Rows that the fit left out of account are for the tests of the signals and the channels alone.
+pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Diagnosis {
+    let outliers = fitted.map_or(&[][..], |fit| &fit.outliers);
+    let sound = match outliers {
+        [] => Cow::Borrowed(dataset),
+        outliers => Cow::Owned(dataset.without(outliers)),
+    };
+    let errors = (fitted.ok()).map(|fit| &fit.decoded.errors[..]);
+    let of_signals = || signals::signal_findings(dataset, stage, errors);
+    let (of_structure, (more, bad)) =
+        rayon::join(|| structure::structure(&sound, stage), of_signals);
+    let mut findings: Vec<Finding> = of_structure.into_iter().chain(more).collect();
+    let designed = || FieldParameters::of_model_31(&Parameters::designed(stage), stage);
+    let (parameters, model) = match fitted {
+        Ok(fit) => match &fit.field {
+            Some(field) => (field.parameters, ModelKind::Field),
+            None => (
+                FieldParameters::of_model_31(&fit.solution.parameters, stage),
+                fit.model.kind,
+            ),
+        },
+        Err(_) => (designed(), ModelKind::M31),
+    };
+    // A log that determines nothing says nothing of its channels.
+    let is_described = match fitted {
+        Ok(_) | Err(FitError::Failed(FitFailure::NotDescribed { .. })) => true,
+        Err(_) => false,
+    };
+    let (mut predicted, mut repair) = (None, None);
+    let described = is_described.then(|| {
+        let fitted = (&parameters, model);
+        of_channels(dataset, stage, &bad, &findings, fitted)
+    });
+    if let Some(of) = described.flatten() {
+        // The failure of a fit says more of what the log leaves open.
+        let is_own = |found: &Finding| fitted.is_ok() || found.code != Code::NotDetermined;
+        let found = of.findings.into_iter().filter(is_own);
+        match of.repair.filter(|_| fitted.is_ok()) {
+            Some((found_repair, expected)) => {
+                findings.extend(found.map(bank::repaired));
+                (predicted, repair) = (Some(expected), Some(found_repair));
+            }
+            None => {
+                findings.extend(found);
+                predicted = Some(of.predicted).filter(|_| fitted.is_ok());
+            }
+        }
+    }
+    findings.extend(short_movements::finding(fitted.ok(), dataset));
+    if let Ok(fit) = fitted {
+        // Rows that a fault explains are no riddle.
+        if repair.is_none() {
+            findings.extend(left_out::finding(fit, dataset, stage, &findings));
+        }
+        findings.extend(fit.warnings.iter().cloned());
+        let ranged = |found: &Finding| {
+            let is_of =
+                |other: &Finding| other.code == found.code && other.channel == found.channel;
+            fit.warnings.iter().any(is_of)
+        };
+        findings.extend(range::undeclared(dataset, stage).filter(|found| !ranged(found)));
+        if !is_explained(&findings) {
+            findings.extend(of_fit::undescribed(fit, dataset));
+            findings.extend(of_fit::not_field(fit, predicted.as_ref()));
+        }
+        // Of the field model the bank says what is left.
+        let is_other = fit.field.is_none();
+        if is_other && findings.iter().all(|f| f.severity == Severity::Note) {
+            findings.extend(of_fit::unexplained(fit, dataset));
+        }
+    }
+    let mut findings = in_order(findings);
+    findings.splice(0..0, beyond_service(model, predicted.as_ref(), &findings));
+    let verdict = match fitted {
+        Ok(fit) => Verdict::new(fit.model.kind, predicted.as_ref(), &findings),
+        Err(_) => Verdict::Refused,
+    };
+    Diagnosis {
+        findings,
+        verdict: Some(verdict),
+        predicted,
+        repair,
+    }
+}
+
+/// That a calibration is refused for what is predicted, where no finding refuses it by itself.
+fn beyond_service(
+    model: ModelKind,
+    predicted: Option<&Predicted>,
+    findings: &[Finding],
+) -> Option<Finding> {
+    let ratio = predicted?.worst_ratio();
+    let is_refused = findings.iter().any(|f| f.severity == Severity::Refuse);
+    (model == ModelKind::Field && ratio > LIMITED_MAX && !is_refused).then(|| {
+        let message = format!(
+            "all that is wrong with the log together makes errors of {ratio:.2} times the noise floor at work"
+        );
+        Finding::new(Code::NotDetermined, message).costing(ratio)
+    })
+}
+
+/// What the bank of faults finds in the rows that are not `bad`, unless the log is refused already, and
+/// what it predicts.
+fn of_channels(
+    dataset: &Dataset,
+    stage: &Stage,
+    bad: &[usize],
+    others: &[Finding],
+    (parameters, model): (&FieldParameters, ModelKind),
+) -> Option<bank::Diagnosis> {
+    if dataset.logs.iter().any(|log| !log.has_reference) {
+        return None;
+    }
+    let mut found = bank::diagnose(&dataset.without(bad), stage, parameters, model)?;
+    let is_refused = others
+        .iter()
+        .any(|found| found.severity == Severity::Refuse);
+    if is_refused {
+        found.findings.clear();
+        found.repair = None;
+        return Some(found);
+    }
+    let all_notes = |findings: &[Finding]| findings.iter().all(|f| f.severity == Severity::Note);
+    let rest = found.rest;
+    if rest > LIMITED_MAX && all_notes(others) && all_notes(&found.findings) {
+        let message = format!(
+            "the log does not fit to itself: {rest:.1} times the noise are left of the Hall signals, and no single fault explains \
+             them. Fit parts of it"
+        );
+        // Of other models it is what they lack.
+        let cost = found.predicted.worst_ratio();
+        let severity = match model {
+            ModelKind::Field => bank::severity(cost).max(Severity::Warn),
+            _ => Severity::Refuse,
+        };
+        let lacks = Finding::new(Code::ModelLacks, message).severe(severity);
+        found.findings.push(lacks.of(rest, "times").costing(cost));
+    }
+    Some(found)
+}
+
+/// Everything that is wrong with a log that a blob is judged on; `errors` as in
+/// [`signals::signal_findings`].
+pub fn of_judged(
+    dataset: &Dataset,
+    stage: &Stage,
+    set: &ParameterSet,
+    errors: &[Option<[f64; 3]>],
+) -> Diagnosis {
+    let (more, bad) = signals::signal_findings(dataset, stage, Some(errors));
+    let of_structure = structure::structure(dataset, stage);
+    let mut findings: Vec<Finding> = of_structure.into_iter().chain(more).collect();
+    let (parameters, model) = match FieldParameters::of_set(set, stage) {
+        Some(parameters) => (parameters, ModelKind::Field),
+        None => (
+            FieldParameters::of_model_31(&Parameters::of_set(set), stage),
+            set.model,
+        ),
+    };
+    let of_channels = of_channels(dataset, stage, &bad, &findings, (&parameters, model));
+    let (of_channels, predicted) =
+        of_channels.map_or((Vec::new(), None), |of| (of.findings, Some(of.predicted)));
+    // A log that leaves a calibration open says nothing of one that is not fitted to it.
+    let is_open = |found: &Finding| found.code == Code::NotDetermined;
+    let predicted = predicted.filter(|_| !of_channels.iter().any(is_open));
+    let of_channels = of_channels.into_iter().filter(|found| !is_open(found));
+    // Nothing is fitted to this log.
+    findings.extend(of_channels.map(|found| {
+        let severity = found.severity.min(Severity::Warn);
+        found.severe(severity)
+    }));
+    findings.extend(range::out_of_range(set, dataset));
+    let findings = in_order(findings);
+    let verdict = predicted.map(|predicted| Verdict::new(model, Some(&predicted), &findings));
+    Diagnosis {
+        findings,
+        verdict,
+        predicted,
+        repair: None,
+    }
+}
+
+/// A warning without message, place and size.
+fn warning(code: Code) -> Finding {
+    Finding::new(code, "").severe(Severity::Warn)
+}

@@ -1,0 +1,116 @@
+//! What the signals of a log tell by themselves, whatever model is fitted: missing and uneven
+//! rows, sensors that stand still or saturate, jumps, lines in the spectrum.
+//!
+//! | module | what it does |
+//! |---|---|
+//! | `channels` | the signals of one log by channel |
+//! | `places` | where in a log something was found |
+//! | `row_by_row` | what rows tell by themselves: the modules that follow, to `frozen` |
+//! | `timing` | rows missing, uneven times |
+//! | `converters` | flat tops |
+//! | `still` | movements that stand still, or end in a rest |
+//! | `frozen` | channels that repeat one value |
+//! | `standing` | channels that show no more than their noise |
+//! | `residual` | what the motion does not explain of a Hall signal |
+//! | `blame` | the channel whose error explains that |
+//! | `outliers` | rows that jump |
+//! | `spectrum`, `hum` | lines of one frequency |
+//!
+//! Each log is tested alone, and what an earlier test names is left out of the later ones. A
+//! channel is named where it alone explains what was found.
+
+mod blame;
+mod channels;
+mod converters;
+mod frozen;
+mod hum;
+mod outliers;
+mod places;
+mod residual;
+mod row_by_row;
+#[cfg(test)]
+mod sample_for_tests;
+mod spectrum;
+mod standing;
+mod still;
+mod timing;
+
+use crate::finding::Finding;
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use channels::LogSignals;
+use residual::Residuals;
+
+pub use channels::{period_s, times_s};
+pub use spectrum::{Spectrum, windows};
+
+/// Fewest rows of a log whose residuals are tested.
+const ROWS_MIN: usize = 1000;
+
+/// What the signals of a dataset show, log after log, and the rows that no other test is to use.
+///
+/// `errors`: decoded pose less reference by row, m, m, rad. Rows without one, which the decoder
+/// refused, are left out of the tests of residuals. The residuals themselves are not taken from
+/// there: a fit that a fault has bent spreads it over all channels.
+pub fn signal_findings(
+    dataset: &Dataset,
+    stage: &Stage,
+    errors: Option<&[Option<[f64; 3]>]>,
+) -> (Vec<Finding>, Vec<usize>) {
+    let (mut findings, mut bad) = (Vec::new(), Vec::new());
+    for log in 0..dataset.logs.len() {
+        let mut signals = LogSignals::new(dataset, stage, log);
+        findings.extend(of_log(&mut signals, dataset, stage, errors, log));
+        let first = dataset.logs[log].rows.start;
+        let unusable = (0..signals.len()).filter(|&row| !signals.usable[row]);
+        bad.extend(unusable.map(|row| first + row));
+    }
+    (findings, bad)
+}
+
+fn of_log(
+    signals: &mut LogSignals,
+    dataset: &Dataset,
+    stage: &Stage,
+    errors: Option<&[Option<[f64; 3]>]>,
+    log: usize,
+) -> Vec<Finding> {
+    let has_reference = dataset.logs[log].has_reference;
+    let mut found = row_by_row::findings(signals, has_reference, stage);
+    if has_reference && signals.len() >= ROWS_MIN {
+        if let Some(errors) = errors {
+            signals.leave_out_undecoded(errors);
+        }
+        found.extend(of_residuals(signals, stage));
+    }
+    let all = dataset.logs[log].rows_read;
+    if signals.len() < all {
+        for found in &mut found {
+            let rows = signals.len();
+            found.message += &format!(" (looked for in {rows} of {all} rows)");
+        }
+    }
+    found
+}
+
+/// What the motion does not explain of the Hall signals.
+fn of_residuals(signals: &mut LogSignals, stage: &Stage) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 2] =
+        [standing::standing, outliers::outliers];
+    let Some(mut residuals) = Residuals::new(signals, stage) else {
+        return findings;
+    };
+    for test in tests {
+        let found = test(signals, &residuals);
+        if !found.is_empty() {
+            findings.extend(found);
+            match Residuals::new(signals, stage) {
+                Some(again) => residuals = again,
+                None => return findings,
+            }
+        }
+    }
+    findings.extend(hum::hum(signals, &residuals));
+    findings
+}

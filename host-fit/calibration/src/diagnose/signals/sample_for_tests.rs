@@ -1,0 +1,103 @@
+//! A small simulated log for the tests of faults.
+
+use super::signal_findings;
+use crate::finding::{Code, Finding, Severity};
+use crate::input::dataset::Dataset;
+use crate::input::shipped::STAGE_TOML;
+use crate::input::stage::Stage;
+use crate::simulate::assembly::Assembly;
+use crate::simulate::protocol::Protocol;
+use crate::simulate::recording::{Recording, Sample, record};
+use crate::simulate::sensors::SensorErrors;
+
+/// Rows of each of its movements, and their servo period, s.
+pub(super) const ROWS: usize = 2000;
+pub(super) const PERIOD_S: f64 = 0.002;
+
+pub(super) fn stage() -> Stage {
+    Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("a sound stage")
+}
+
+/// Three movements of 4 s, all axes moving.
+pub(super) fn recording() -> Recording {
+    with_rests(0)
+}
+
+/// The same log with so many movements of a stage that stands still behind its own.
+pub(super) fn with_rests(count: usize) -> Recording {
+    let stage = stage();
+    let mut run = Protocol::Combined.run(PERIOD_S, 3);
+    run.movements.truncate(3);
+    (run.movements.iter_mut()).for_each(|poses| poses.truncate(ROWS));
+    let rest = vec![run.movements[0][0]; ROWS];
+    run.movements.extend(std::iter::repeat_n(rest, count));
+    let assembly = Assembly::draw(&stage, 3);
+    record(&stage, &assembly, run, &SensorErrors::USUAL, 3).expect("clear")
+}
+
+/// Codes of a Hall channel.
+pub(super) fn codes(error_m: f64) -> i32 {
+    (error_m / stage().hall.m_per_count).round() as i32
+}
+
+pub(super) fn dataset(recording: &Recording) -> Dataset {
+    let mut dataset = recording.dataset(&stage()).expect("a triangle");
+    let period_us = dataset.rows[1].t_us - dataset.rows[0].t_us;
+    for row in &mut dataset.rows {
+        row.frame = row.frame.with_sequence((row.t_us / period_us) as u32);
+    }
+    dataset
+}
+
+/// The warnings about a log.
+pub(super) fn warnings(dataset: &Dataset) -> Vec<Finding> {
+    let (mut findings, _) = signal_findings(dataset, &stage(), None);
+    findings.retain(|finding| finding.severity > Severity::Note);
+    findings
+}
+
+/// The only warning about a recording, of this code and channel.
+pub(super) fn only(recording: &Recording, code: Code, channel: Option<&str>) -> Finding {
+    let found = warnings(&dataset(recording));
+    let [finding] = &found[..] else {
+        panic!("{found:#?}");
+    };
+    assert_eq!((finding.code, finding.channel.as_deref()), (code, channel));
+    finding.clone()
+}
+
+/// However long the stage stands still beside them, three movements tell no more of a gain, nor of
+/// hum.
+#[test]
+fn rests_make_no_other_test_of_residuals_more_certain() {
+    let (found, _) = signal_findings(&dataset(&with_rests(150)), &stage(), None);
+    let codes: Vec<Code> = found.iter().map(|finding| finding.code).collect();
+    assert_eq!(codes, [Code::IdleMovement], "{found:#?}");
+}
+
+/// Over minutes the interferometers drift by more than a stage at rest may move.
+#[test]
+fn a_long_rest_is_idle_though_its_reference_drifts() {
+    let mut recording = with_rests(1);
+    let mut rest = Vec::new();
+    for k in 0..40 {
+        rest.extend(recording.movements[3].iter().map(|sample| Sample {
+            t_us: sample.t_us + k * 2000 * ROWS as i64,
+            beams_nm: sample.beams_nm.map(|nm| nm + 100 * k),
+            ..*sample
+        }));
+    }
+    recording.movements[3] = rest;
+    only(&recording, Code::IdleMovement, None);
+}
+
+#[test]
+fn a_sound_log_raises_no_warning_whole_or_thinned() {
+    let recording = recording();
+    assert_eq!(warnings(&dataset(&recording)), []);
+    let mut thinned = recording;
+    for samples in &mut thinned.movements {
+        *samples = samples.iter().step_by(5).copied().collect();
+    }
+    assert_eq!(warnings(&dataset(&thinned)), []);
+}

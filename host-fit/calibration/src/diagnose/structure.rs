@@ -1,0 +1,298 @@
+//! What is mixed up between stage, wires, log and `stage.toml`: order, signs and scales of channels, places of
+//! sensors.
+//!
+//! Every such mistake is a linear change of the Hall signals, of the reference or of the vertical pose, and a
+//! probe fitted by itself absorbs it: its residual stays that of a sound log. What gives the mistake away is
+//! where the parameters end up. So each probe is fitted once, and a mistake undone is a change of its
+//! parameters: the direction that it senses, its lever arm and sensitivity must be those of the drawing, and
+//! the sensitivity must fall with the height at its place, so that b/a = y and c/a = -x.
+
+use super::mistakes::{Change, Mistake, mistakes};
+use crate::finding::{Code, Finding, Severity};
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::judge::identify::check_motion;
+use crate::problem::model::Model;
+use crate::problem::parameters::Parameters;
+use crate::solve::field::parameters::FALL_PER_M;
+use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
+use runtime::ModelKind;
+
+/// Rows that a probe is fitted to.
+const ROWS: usize = 6000;
+/// Steps: the products of two parameters settle in four.
+const STEPS: usize = 8;
+/// Gain and its slopes, and how far height and tilts carry the probe.
+const UNKNOWNS: usize = 9;
+/// A parameter that the log does not show has any value, in mm and mrad.
+const OPEN: f64 = 10.0;
+
+/// Tolerances, standard deviations, up to twice those of simulated stages: of the logarithm of eta, of
+/// theta, of a lever arm (m), of a/eta (1/mm), and of b/eta and c/eta, which show the place of a probe within
+/// 40 mm (1/mrad).
+const TOLERANCES: [f64; 6] = [0.08, 0.04, 0.035, 0.025, 0.009, 0.009];
+/// The same of eta where `stage.toml` has no range of it.
+const ETA_OPEN: f64 = 1.0;
+/// Of spans beyond twice or below a tenth of the declared motion, by the logarithm.
+const SPAN: f64 = 0.35;
+/// Squares of distances in terms of tolerances, of three probes: one sound log in a thousand has more, ...
+const SOUND_MAX: f64 = 42.0;
+/// ... and a mistake undone makes them so much smaller: odds of 10^4 to 1.
+const GAIN_MIN: f64 = 20.0;
+/// Mistakes that come so near to each other are not told apart: odds of 20 to 1.
+const UNDECIDED: f64 = 6.0;
+
+type Vector = SVector<f64, 6>;
+type Covariance = SMatrix<f64, 6, 6>;
+
+/// A probe fitted by itself: gains by X, Y, Rz (per mm, mm, mrad), and slopes over gain by Z, Rx, Ry.
+#[derive(Clone, Copy, Debug)]
+struct Fitted {
+    gains: Vector3<f64>,
+    slopes: Vector3<f64>,
+    covariance: Covariance,
+}
+
+/// What keeps a log from being that of the designed stage, if anything does; `None` of a log in which
+/// nothing moves.
+pub fn structure(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
+    let planar = Model::of(ModelKind::M30);
+    check_motion(dataset, stage, dataset.rows.len(), planar).ok()?;
+    let fitted = fitted(dataset)?;
+    let drawing = Drawing::new(stage);
+    let distance = |change: &Change| drawing.distance(&fitted, change);
+    let as_logged = distance(&Change::NOTHING);
+    if as_logged < SOUND_MAX {
+        return None;
+    }
+    let spans = spans(dataset);
+    let has_codes = dataset
+        .rows
+        .iter()
+        .all(|row| row.frame.capacitive().is_some());
+    // The declared motion tells apart what the geometry does not.
+    let rank = |mistake: &Mistake| {
+        distance(&mistake.change) + beyond_motion(stage, &spans, &mistake.change) + mistake.penalty
+    };
+    let mistakes = mistakes(stage, has_codes).into_iter();
+    let mut ranked: Vec<(f64, Mistake)> = mistakes.map(|m| (rank(&m), m)).collect();
+    ranked.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    let (least, _) = ranked.first()?;
+    let (least, sound) = (*least, 1.5 * SOUND_MAX);
+    if !(least < sound && least < as_logged - GAIN_MIN) {
+        return Some(unexplained(as_logged));
+    }
+    ranked.retain(|(rank, _)| *rank < least + UNDECIDED);
+    let mut named: Vec<&Mistake> = Vec::new();
+    for (_, mistake) in &ranked {
+        if named.iter().all(|other| other.group != mistake.group) {
+            named.push(mistake);
+        }
+    }
+    Some(finding(&named))
+}
+
+fn finding(named: &[&Mistake]) -> Finding {
+    let cures: Vec<&str> = named.iter().map(|mistake| mistake.cure.as_str()).collect();
+    let (undecided, remedy) = match named {
+        [one] => ("", one.remedy),
+        _ => (
+            " (the log does not tell which)",
+            "find out which before anything is changed: check wiring, columns, units and stage.toml",
+        ),
+    };
+    let message = format!(
+        "the log is not that of the stage in stage.toml as it is, and fits if {}{undecided}: {remedy}",
+        cures.join(", or if ")
+    );
+    let found = Finding::new(named[0].code, message).severe(Severity::Refuse);
+    match named {
+        [one] => match one.factor {
+            Some(factor) => found.on(one.channel.clone()).of(factor, ""),
+            None => found.on(one.channel.clone()),
+        },
+        _ => found,
+    }
+}
+
+fn unexplained(distance: f64) -> Finding {
+    let message = format!(
+        "the fitted probes are not those of stage.toml ({:.1} times the tolerances of directions, sensitivities and places), and no \
+         single mistake with channels, signs, scales or places explains it: check order and signs of all channels, the scales \
+         and the designed values in stage.toml",
+        (distance / SOUND_MAX).sqrt()
+    );
+    Finding::new(Code::TermsAtLimit, message)
+}
+
+/// What the drawing says of the probes.
+struct Drawing {
+    eta: [f64; 3],
+    tolerance: Vector,
+    theta: [f64; 3],
+    lever_arm: [f64; 3],
+    places: [[f64; 2]; 3],
+}
+
+impl Drawing {
+    fn new(stage: &Stage) -> Self {
+        let geometry = Parameters::designed(stage).geometry();
+        let etas = stage.search.of("eta");
+        let mut tolerance = Vector::from(TOLERANCES);
+        if etas.is_none() {
+            tolerance[0] = ETA_OPEN;
+        }
+        Self {
+            eta: etas.map_or([1.0; 3], |ranges| ranges.map(|r| 0.5 * (r.low + r.high))),
+            tolerance,
+            theta: geometry.misalignment_rad,
+            lever_arm: geometry.lever_arm_m,
+            places: stage.places_m(),
+        }
+    }
+
+    /// How far a probe is from where the drawing has it.
+    fn features(&self, probe: usize, at: &Vector) -> Vector {
+        let (x, y, turn) = (at[0], at[1], at[2]);
+        // A and B sense Y, C senses X.
+        let theta = match probe {
+            2 => libm::atan2(y, x),
+            _ => libm::atan2(-x, y),
+        };
+        let off = theta - self.theta[probe];
+        let eta = x.hypot(y).max(f64::MIN_POSITIVE);
+        let [a, b, c] = [at[3], at[4], at[5]];
+        let [place_x, place_y] = self.places[probe];
+        Vector::from([
+            libm::log(eta / self.eta[probe]),
+            libm::atan2(libm::sin(off), libm::cos(off)),
+            turn / eta - self.lever_arm[probe],
+            a - FALL_PER_M * 1e-3,
+            b - a * place_y,
+            c + a * place_x,
+        ])
+    }
+
+    /// Squares of the distances in terms of tolerances and of what the log leaves open, of three probes.
+    fn distance(&self, fitted: &[Fitted; 3], change: &Change) -> f64 {
+        let of_probe = |probe: usize| self.distance_of(probe, fitted, change);
+        (0..3)
+            .map(|probe| of_probe(probe).unwrap_or(f64::INFINITY))
+            .sum()
+    }
+
+    fn distance_of(&self, probe: usize, fitted: &[Fitted; 3], change: &Change) -> Option<f64> {
+        let from = (0..3).find(|&from| change.signal[(probe, from)] != 0.0)?;
+        let by_gain = change.reference.try_inverse()?.transpose() * change.signal[(probe, from)];
+        let by_slope = change.vertical.try_inverse()?.transpose();
+        let mut turned = Covariance::zeros();
+        turned.fixed_view_mut::<3, 3>(0, 0).copy_from(&by_gain);
+        turned.fixed_view_mut::<3, 3>(3, 3).copy_from(&by_slope);
+        let Fitted {
+            gains,
+            slopes,
+            covariance,
+        } = fitted[from];
+        let (gains, slopes) = (by_gain * gains, by_slope * slopes);
+        let at = Vector::from([gains.x, gains.y, gains.z, slopes.x, slopes.y, slopes.z]);
+        let here = self.features(probe, &at);
+        let mut by = Covariance::zeros();
+        for k in 0..6 {
+            let step = 1e-6 * at.fixed_rows::<3>(k / 3 * 3).norm().max(1e-9);
+            let mut moved = at;
+            moved[k] += step;
+            by.set_column(k, &((self.features(probe, &moved) - here) / step));
+        }
+        let by = by * turned;
+        let tolerance = Covariance::from_diagonal(&self.tolerance.map(|x| x * x));
+        let spread = Cholesky::new(tolerance + by * covariance * by.transpose())?;
+        Some(here.dot(&spread.solve(&here)))
+    }
+}
+
+/// Each Hall signal by itself: s = (1 + a Z + b Rx + c Ry) g q + e V + a constant of each movement.
+fn fitted(dataset: &Dataset) -> Option<[Fitted; 3]> {
+    let apart = (dataset.rows.len() / ROWS).max(1);
+    let of_probe = |probe: usize| {
+        let mut at = SVector::<f64, UNKNOWNS>::zeros();
+        let mut found = None;
+        for _ in 0..STEPS {
+            let mut products = SMatrix::<f64, { UNKNOWNS + 1 }, { UNKNOWNS + 1 }>::zeros();
+            let mut count = 0.0;
+            for movement in &dataset.movements {
+                let rows = dataset.rows[movement.rows.clone()].iter().step_by(apart);
+                let columns: Vec<SVector<f64, { UNKNOWNS + 1 }>> = rows
+                    .map(|row| {
+                        let q = Vector3::from(row.reference) * 1e3;
+                        let v = Vector3::from(row.vertical) * 1e3;
+                        let moved = at.fixed_rows::<3>(0).dot(&q);
+                        let grown = 1.0 + at.fixed_rows::<3>(3).dot(&v);
+                        let mut column = SVector::<f64, { UNKNOWNS + 1 }>::zeros();
+                        column.fixed_rows_mut::<3>(0).copy_from(&(q * grown));
+                        column.fixed_rows_mut::<3>(3).copy_from(&(v * moved));
+                        column.fixed_rows_mut::<3>(6).copy_from(&v);
+                        let carried = at.fixed_rows::<3>(6).dot(&v);
+                        column[UNKNOWNS] = row.signal_m[probe] * 1e3 - grown * moved - carried;
+                        column
+                    })
+                    .collect();
+                let mean = columns.iter().sum::<SVector<_, _>>() / columns.len().max(1) as f64;
+                for column in &columns {
+                    let column = column - mean;
+                    products.ger(1.0, &column, &column, 1.0);
+                }
+                count += columns.len() as f64 - 1.0;
+            }
+            let rest = products[(UNKNOWNS, UNKNOWNS)] / f64::max(count, 1.0);
+            let mut own = products.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into_owned();
+            for k in 0..UNKNOWNS {
+                own[(k, k)] += (rest / (OPEN * OPEN)).max(f64::MIN_POSITIVE);
+            }
+            let factor = Cholesky::new(own)?;
+            at += factor.solve(&products.fixed_view::<UNKNOWNS, 1>(0, UNKNOWNS));
+            let covariance = factor.inverse() * rest;
+            found = Some(Fitted {
+                gains: at.fixed_rows::<3>(0).into(),
+                slopes: at.fixed_rows::<3>(3).into(),
+                covariance: covariance.fixed_view::<6, 6>(0, 0).into(),
+            });
+        }
+        found.filter(|found| {
+            found
+                .gains
+                .iter()
+                .chain(&found.slopes)
+                .all(|x| x.is_finite())
+        })
+    };
+    Some([of_probe(0)?, of_probe(1)?, of_probe(2)?])
+}
+
+/// Root mean squares of the reference and of the vertical pose, as matrices of products: m2, rad2.
+fn spans(dataset: &Dataset) -> [Matrix3<f64>; 2] {
+    let mut sums = [Matrix3::zeros(); 2];
+    for row in &dataset.rows {
+        for (sum, pose) in sums.iter_mut().zip([row.reference, row.vertical]) {
+            let pose = Vector3::from(pose);
+            *sum += pose * pose.transpose();
+        }
+    }
+    sums.map(|sum| sum / dataset.rows.len().max(1) as f64)
+}
+
+/// How far the motion with a mistake undone is from the declared one.
+fn beyond_motion(stage: &Stage, spans: &[Matrix3<f64>; 2], change: &Change) -> f64 {
+    let mut sum = 0.0;
+    for (half, by) in [change.reference, change.vertical].iter().enumerate() {
+        let products = by * spans[half] * by.transpose();
+        for axis in 0..3 {
+            let service = stage.motion.axes[3 * half + axis].service;
+            // A sine within the range has 0.7 times its rms.
+            let part = products[(axis, axis)].max(0.0).sqrt() * std::f64::consts::SQRT_2 / service;
+            let log = libm::log(part.max(f64::MIN_POSITIVE));
+            let beyond = f64::max(log - libm::log(2.0), libm::log(0.1) - log).max(0.0);
+            sum += (beyond.min(20.0) / SPAN).powi(2);
+        }
+    }
+    sum
+}

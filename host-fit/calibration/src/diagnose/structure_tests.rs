@@ -1,0 +1,142 @@
+//! Every mistake is named by itself, or beside what a log cannot tell it from.
+
+use super::structure::structure;
+use crate::finding::{Code, Severity};
+use crate::input::shipped::STAGE_TOML;
+use crate::input::stage::Stage;
+use crate::simulate::assembly::Assembly;
+use crate::simulate::protocol::Protocol;
+use crate::simulate::recording::{Recording, Sample, record};
+use crate::simulate::sensors::SensorErrors;
+
+fn stage(from: &str, to: &str) -> Stage {
+    assert!(STAGE_TOML.contains(from));
+    let toml = STAGE_TOML.replacen(from, to, 1);
+    Stage::from_toml(&toml, "stage.toml".as_ref()).expect("sound")
+}
+
+fn recordings() -> [Recording; 2] {
+    let stage = stage("", "");
+    [(Protocol::Paper, 3), (Protocol::Combined, 4)].map(|(protocol, seed)| {
+        let assembly = Assembly::draw(&stage, seed);
+        let run = protocol.run(stage.servo_period_s, seed);
+        record(&stage, &assembly, run, &SensorErrors::USUAL, seed).expect("clear")
+    })
+}
+
+#[test]
+fn a_sound_log_is_that_of_its_stage() {
+    let stage = stage("", "");
+    for recording in recordings() {
+        let dataset = recording.dataset(&stage).expect("a triangle");
+        assert_eq!(structure(&dataset, &stage), None);
+    }
+}
+
+#[test]
+fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
+    type Mistake = (Code, &'static [&'static str], fn(&mut Sample));
+    let both: &[&str] = &[
+        "the Hall signals are multiplied by 2.0",
+        "the reference is multiplied by 0.50",
+    ];
+    let mistakes: [Mistake; 9] = [
+        (
+            Code::ChannelsSwapped,
+            &["Hall A and C are exchanged"],
+            |s| s.hall.swap(0, 2),
+        ),
+        (
+            Code::ChannelInverted,
+            &["the sign of Hall B is turned"],
+            |s| s.hall[1] = -s.hall[1],
+        ),
+        (Code::BeamsSwapped, &["beam Y1 and Y2 are exchanged"], |s| {
+            s.beams_nm.swap(1, 2)
+        }),
+        (Code::BeamInverted, &["the sign of beam X is turned"], |s| {
+            s.beams_nm[0] = -s.beams_nm[0]
+        }),
+        (
+            Code::CapacitiveSwapped,
+            &[
+                "capacitive 1 and 2 are exchanged",
+                "the places of the capacitive sensors are mirrored along x",
+            ],
+            |s| s.capacitive.swap(0, 1),
+        ),
+        (Code::ScaleWrong, &["the gaps are multiplied by 10"], |s| {
+            s.capacitive = s.capacitive.map(|code| code / 10);
+        }),
+        (Code::ScaleWrong, &["Hall B is multiplied by 0.50"], |s| {
+            s.hall[1] *= 2
+        }),
+        (
+            Code::ScaleWrong,
+            &["the reference is multiplied by 1000"],
+            |s| {
+                s.beams_nm = s.beams_nm.map(|nm| nm / 1000);
+            },
+        ),
+        (Code::ScaleWrong, both, |s| {
+            s.beams_nm = s.beams_nm.map(|nm| 2 * nm)
+        }),
+    ];
+    let stage = stage("", "");
+    for recording in recordings() {
+        for (code, cures, mistake) in mistakes {
+            let mut recording = recording.clone();
+            recording.movements.iter_mut().flatten().for_each(mistake);
+            let dataset = recording.dataset(&stage).expect("a triangle");
+            let found = structure(&dataset, &stage).expect("a finding");
+            assert_eq!(
+                (found.code, found.severity),
+                (code, Severity::Refuse),
+                "{found:?}"
+            );
+            for cure in cures {
+                assert!(found.message.contains(cure), "{cure}: {}", found.message);
+            }
+            assert_eq!(
+                found.message.matches(", or if ").count(),
+                cures.len() - 1,
+                "{}",
+                found.message
+            );
+        }
+    }
+}
+
+#[test]
+fn a_mistake_in_the_stage_file_is_named() {
+    const PLACES: &str = "[[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]]";
+    for (from, to, cure) in [
+        (
+            "y_baseline_m = 0.10",
+            "y_baseline_m = 0.20",
+            "Rz of the reference is multiplied by 2.0",
+        ),
+        (
+            "[0.0, -0.12]]",
+            "[0.0, 0.12]]",
+            "the y of capacitive sensor 3 in stage.toml is -0.12 m",
+        ),
+        (
+            PLACES,
+            "[[0.06, 0.0], [-0.06, 0.0], [0.0, -0.06]]",
+            "sensors are multiplied by 2.0",
+        ),
+        (
+            PLACES,
+            "[[0.0, 0.12], [0.0, -0.12], [0.12, 0.0]]",
+            "sensors are turned by -90 degrees",
+        ),
+    ] {
+        let stage = stage(from, to);
+        for recording in recordings() {
+            let dataset = recording.dataset(&stage).expect("a triangle");
+            let found = structure(&dataset, &stage).expect("a finding");
+            assert!(found.message.contains(cure), "{cure}: {}", found.message);
+        }
+    }
+}

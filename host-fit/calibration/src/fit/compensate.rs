@@ -1,0 +1,193 @@
+//! A fit to a log whose reference lags: the lag is estimated with the parameters, the reference
+//! read later by as much, and so on until nothing of it is left.
+
+use super::{Fit, FitError, FitSettings, ModelChoice, fit};
+use crate::input::dataset::{Dataset, Movement, Row};
+use crate::input::stage::Stage;
+use crate::problem::model::Model;
+use runtime::ModelKind;
+
+/// Rounds of fit and compensation: the first leaves a hundredth of a lag of several rows.
+const ROUNDS_MAX: u32 = 4;
+/// A lag below this part of its standard error is none.
+const LEFT: f64 = 0.1;
+/// Longest step between two rows that is interpolated over, in terms of the shortest of the three:
+/// one row may be missing.
+const STEP_MAX: i64 = 2;
+
+/// Fits, with the lag of the reference compensated: the fit, whose lag is the whole of it, and
+/// the dataset as compensated, which lacks the first or last rows of each movement.
+///
+/// # Errors
+/// See [`FitError`].
+pub fn fit_compensated(
+    dataset: &Dataset,
+    stage: &Stage,
+    settings: &FitSettings,
+) -> Result<(Fit, Dataset), FitError> {
+    let mut total_s = 0.0;
+    let mut at = dataset.clone();
+    let mut found = match fit(&at, stage, settings) {
+        // A lag of many rows is more than the field model's fit can follow: Model (31) tells it first.
+        Err(FitError::Field(_)) => {
+            let model = ModelChoice::Named(Model::of(ModelKind::M31));
+            fit(
+                &at,
+                stage,
+                &FitSettings {
+                    model,
+                    ..settings.clone()
+                },
+            )?
+        }
+        found => found?,
+    };
+    for _ in 0..ROUNDS_MAX {
+        let Some(lag) = found.lag else { break };
+        if lag.value_s.abs() < LEFT * lag.standard_error_s {
+            break;
+        }
+        total_s += lag.value_s;
+        at = with_reference_later(dataset, total_s);
+        found = fit(&at, stage, settings)?;
+    }
+    if let Some(lag) = &mut found.lag {
+        lag.value_s += total_s;
+    }
+    Ok((found, at))
+}
+
+/// The rows with the reference of `later_s` after them, interpolated between its neighbours (cubic);
+/// rows that lack neighbours, at the ends of a movement and beside gaps, are left out.
+pub(crate) fn with_reference_later(dataset: &Dataset, later_s: f64) -> Dataset {
+    let mut out = Dataset {
+        rows: Vec::with_capacity(dataset.rows.len()),
+        movements: Vec::new(),
+        logs: dataset.logs.clone(),
+        sha256: dataset.sha256,
+    };
+    let later_us = later_s * 1e6;
+    for movement in &dataset.movements {
+        let rows = &dataset.rows[movement.rows.clone()];
+        let (start, number) = (out.rows.len(), out.movements.len());
+        let mut next = 0;
+        for row in rows {
+            let t_us = row.t_us as f64 + later_us;
+            while next < rows.len() && rows[next].t_us as f64 <= t_us {
+                next += 1;
+            }
+            let four = next.checked_sub(2).and_then(|k| rows.get(k..k + 4));
+            if let Some(reference) = four.and_then(|four| between(four, t_us)) {
+                out.rows.push(Row {
+                    movement: number,
+                    reference,
+                    ..*row
+                });
+            }
+        }
+        if out.rows.len() > start {
+            out.movements.push(Movement {
+                rows: start..out.rows.len(),
+                ..movement.clone()
+            });
+        }
+    }
+    for (log, source) in out.logs.iter_mut().enumerate() {
+        let of_log = || out.movements.iter().filter(|movement| movement.log == log);
+        let start = of_log().next().map_or(0, |movement| movement.rows.start);
+        let end = of_log().next_back().map_or(0, |movement| movement.rows.end);
+        source.rows = start..end;
+        (source.rows_read, source.movements_read) = (end - start, of_log().count());
+    }
+    out
+}
+
+/// The reference at a time within four rows, by the cubic through them; `None` across a gap.
+fn between(four: &[Row], t_us: f64) -> Option<[f64; 3]> {
+    let steps = || four.windows(2).map(|pair| pair[1].t_us - pair[0].t_us);
+    if steps().max() > steps().min().map(|shortest| STEP_MAX * shortest) {
+        return None;
+    }
+    let mut sum = [0.0; 3];
+    for (i, row) in four.iter().enumerate() {
+        let mut weight = 1.0;
+        for (k, other) in four.iter().enumerate() {
+            if k != i {
+                weight *= (t_us - other.t_us as f64) / (row.t_us - other.t_us) as f64;
+            }
+        }
+        for (sum, x) in sum.iter_mut().zip(row.reference) {
+            *sum += weight * x;
+        }
+    }
+    Some(sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::dataset::LoggedFrame;
+    use runtime::RawFrame;
+
+    /// A pose of third order in time, s.
+    fn pose(t_s: f64) -> [f64; 3] {
+        [1.0, -0.3, 2.0].map(|a| a * (t_s * (1.0 + t_s * (0.5 - 7.0 * t_s))))
+    }
+
+    /// Two movements of ten rows; the second lacks its sixth and seventh. The reference shows
+    /// where the stage was `lag_s` before, and that stands in the signal as well.
+    fn dataset(lag_s: f64) -> Dataset {
+        let mut dataset = Dataset::default();
+        for movement in 0..2 {
+            let start = dataset.rows.len();
+            for k in (0..10).filter(|k| movement == 0 || ![5, 6].contains(k)) {
+                let t_us = 2000 * k;
+                dataset.rows.push(Row {
+                    movement,
+                    t_us,
+                    frame: LoggedFrame::Codes(RawFrame {
+                        hall: [0; 3],
+                        capacitive: [0; 3],
+                        sequence: 0,
+                        time_us: 0,
+                    }),
+                    signal_m: pose(t_us as f64 * 1e-6),
+                    vertical: [0.0; 3],
+                    reference: pose(t_us as f64 * 1e-6 - lag_s),
+                });
+            }
+            dataset.movements.push(Movement {
+                log: 0,
+                index: movement as i64,
+                rows: start..dataset.rows.len(),
+            });
+        }
+        dataset.end_log("log.csv");
+        dataset
+    }
+
+    #[test]
+    fn the_reference_is_read_later_by_the_lag_and_never_across_a_gap() {
+        for (lag_s, left) in [(1.3e-3, 7), (4.6e-3, 6), (-2.7e-3, 7)] {
+            let after = with_reference_later(&dataset(lag_s), lag_s);
+            for row in &after.rows {
+                for (found, wanted) in row.reference.iter().zip(row.signal_m) {
+                    assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
+                }
+            }
+            let rows: Vec<_> = after.movements.iter().map(|m| m.rows.clone()).collect();
+            // Of ten rows; the second movement has two less, and more of them lack neighbours.
+            assert_eq!(rows[0], 0..left);
+            assert_eq!(rows[1].start, rows[0].end);
+            assert!(rows[1].len() < rows[0].len() && after.rows.len() == rows[1].end);
+            assert_eq!(after.logs[0].rows, 0..after.rows.len());
+            let movements = after.rows.iter().map(|row| row.movement);
+            assert!(
+                movements.eq(rows
+                    .iter()
+                    .enumerate()
+                    .flat_map(|(m, r)| r.clone().map(move |_| m)))
+            );
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! Stages whose probes stand or point elsewhere than in the paper: from `stage.toml` to a
+//! calibration at the noise floor.
+
+use crate::fit::{FitSettings, ModelChoice, fit};
+use crate::input::shipped::STAGE_TOML;
+use crate::input::stage::Stage;
+use crate::problem::model::Model;
+use crate::simulate::assembly::Assembly;
+use crate::simulate::protocol::Protocol;
+use crate::simulate::recording::record;
+use crate::simulate::sensors::SensorErrors;
+use crate::solve::field::parameters::FieldParameters;
+use runtime::{ModelKind, ParameterSet, VerticalPose};
+
+const SEED: u64 = 2;
+
+/// The shipped stage with `changes` of its text.
+fn stage(changes: &[(&str, &str)]) -> Stage {
+    let text = changes
+        .iter()
+        .fold(STAGE_TOML.to_owned(), |text, (old, new)| {
+            assert_eq!(text.matches(old).count(), 1, "{old}");
+            text.replace(old, new)
+        });
+    Stage::from_toml(&text, "stage.toml".as_ref()).expect("sound")
+}
+
+/// Fits the field model to a simulated log, reads its blob, and gives the rms error in service, the
+/// noise of the probes included, over that noise alone: of the worst axis.
+fn ratio_in_service(stage: &Stage) -> f64 {
+    let assembly = Assembly::draw(stage, SEED);
+    let run = Protocol::Combined.run(stage.servo_period_s, SEED);
+    let log = record(stage, &assembly, run, &SensorErrors::USUAL, SEED).expect("clear");
+    let dataset = log.dataset(stage).expect("a triangle");
+    let settings = FitSettings::new(ModelChoice::Named(Model::of(ModelKind::Field)));
+    let fit = fit(&dataset, stage, &settings).expect("a fit");
+    let mut buffer = [0; runtime::blob::MAX_BYTES];
+    let blob = fit.set.to_bytes(&mut buffer).expect("room");
+    let set = ParameterSet::from_bytes(blob).expect("a sound blob");
+    let parameters = FieldParameters::of_set(&set, stage).expect("a field model");
+    let constants = parameters.constants(1.0).expect("regular");
+    let (mut squares, mut count) = ([0.0; 3], 0.0);
+    let service = Protocol::Service.run(stage.servo_period_s, SEED);
+    for pose in service.movements.iter().flatten().step_by(50) {
+        let signal_m = assembly.probes.map(|probe| probe.signal_m(pose));
+        let vertical = VerticalPose::from_array(pose.vertical);
+        let decoded = constants.decode(signal_m, &vertical).to_array();
+        for axis in 0..3 {
+            squares[axis] += (decoded[axis] - pose.planar[axis]).powi(2);
+        }
+        count += 1.0;
+    }
+    let ratio = |axis: usize| {
+        let noise = |k: usize| {
+            let eta = constants.probes[k].sensitivity.eta;
+            (constants.pose_rows[axis][k] * SensorErrors::USUAL.hall_m / eta).powi(2)
+        };
+        (1.0 + squares[axis] / count / (noise(0) + noise(1) + noise(2))).sqrt()
+    };
+    ratio(0).max(ratio(1)).max(ratio(2))
+}
+
+#[test]
+fn a_stage_is_calibrated_to_the_noise_floor_wherever_its_probes_stand_and_point() {
+    let code_max = "code_max = 32767\n\n[cap";
+    let directions = |degrees| format!("code_max = 32767\ndirection_deg = {degrees}\n\n[cap");
+    let turned = directions("[90, 270, 0]");
+    let oblique = directions("[90, 90, 30]");
+    let all = directions("[-90, 100, 150]");
+    let b_at_positive_x = [
+        ("h2x_m = 0.1975", "h2x_m = -0.05"),
+        ("h2x_m = [0.1475, 0.2475]", "h2x_m = [-0.10, 0.0]"),
+        (
+            "c_per_rad = [[0.0, 5000.0], [-5000.0, 0.0]",
+            "c_per_rad = [[0.0, 5000.0], [0.0, 5000.0]",
+        ),
+    ];
+    let stages: [(&str, &[(&str, &str)]); 5] = [
+        ("as in the paper", &[]),
+        ("B turned by 180 degrees", &[(code_max, &turned)]),
+        ("B at positive x", &b_at_positive_x),
+        ("C at 30 degrees", &[(code_max, &oblique)]),
+        ("all three turned", &[(code_max, &all)]),
+    ];
+    for (name, changes) in stages {
+        let ratio = ratio_in_service(&stage(changes));
+        assert!(ratio < 1.02, "{name}: {ratio}");
+    }
+}

@@ -1,0 +1,80 @@
+//! A fit with the faults of its log taken off.
+
+use super::{Fit, FitError};
+use crate::input::log::{LogError, LogReading};
+use crate::input::stage::Stage;
+use crate::judge::{Decoded, Zeros};
+use crate::solve::field::parameters::FieldParameters;
+use crate::solve::field::posterior::Posterior;
+use nalgebra::DMatrix;
+use runtime::calibration::Origin;
+use runtime::model::Probes;
+use runtime::parameters::{FitRecord, ParameterError};
+
+/// Parameters that were estimated together with the faults of a log: those of the stage at its end.
+#[derive(Clone, Debug)]
+pub struct Repair {
+    /// The parameters.
+    pub parameters: FieldParameters,
+    /// Their covariance, in their order and units.
+    pub covariance: DMatrix<f64>,
+}
+
+impl Fit {
+    /// This fit of the field model with the repaired parameters, judged on the rows of its logs.
+    ///
+    /// # Errors
+    /// Those of reading again, and inside the result [`FitError::Unusable`].
+    pub fn repaired(
+        mut self,
+        log: &LogReading,
+        stage: &Stage,
+        repair: &Repair,
+    ) -> Result<Result<Self, FitError>, LogError> {
+        let (parameters, dataset) = (&repair.parameters, &log.dataset);
+        let Some(constants) = parameters.constants(stage.hall.m_per_count) else {
+            return Ok(Err(FitError::Unusable(ParameterError::SingularPlane)));
+        };
+        self.calibration.geometry = parameters.model_31().geometry();
+        self.calibration.probes = Probes::Field(constants.probes);
+        let origin = Origin {
+            serial: self.set.serial.clone(),
+            created: self.set.created.clone(),
+            logs_sha256: self.set.logs_sha256,
+            fit: self.set.fit,
+        };
+        self.set = match self.calibration.prepare(&origin) {
+            Ok(set) => set,
+            Err(error) => return Ok(Err(FitError::Unusable(error))),
+        };
+        self.decoded = Decoded::new(&self.set, dataset);
+        self.judgement = self.decoded.judge(dataset, stage, Zeros::Refit);
+        self.all = self.judgement.clone();
+        let mut sound = self.decoded.clone();
+        for &row in &self.outliers {
+            sound.errors[row] = None;
+        }
+        self.sound = sound.judge(dataset, stage, Zeros::Refit).errors;
+        self.train_fitness = self.judgement.errors.fitness();
+        let axes = self.judgement.errors.axes;
+        self.set.fit = FitRecord {
+            rms: axes.map(|a| a.rms as f32),
+            peak: axes.map(|a| a.peak as f32),
+            ..self.set.fit
+        };
+        self.solution.parameters = parameters.model_31();
+        let zeros = self.judgement.zeros.iter();
+        self.solution.delta_m = zeros.map(|zero| zero.delta_m).collect();
+        self.errors_solver_zeros = Some(self.judgement.errors);
+        if let Some(field) = &mut self.field {
+            let covariance = repair.covariance.clone();
+            field.posterior = Posterior::of_parameters(covariance, parameters, &field.noise);
+            field.parameters = *parameters;
+            self.standard_error = field.posterior.standard_errors_31();
+        }
+        match dataset.read() {
+            (rows, _) if rows > dataset.rows.len() => self.judged_on_all_rows(log, stage),
+            _ => Ok(Ok(self)),
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! Whether a log can determine the model at all, and whether the model describes the log.
+
+use crate::input::dataset::{Dataset, Row};
+use crate::input::stage::Stage;
+use crate::judge::statistics::PoseError;
+use crate::judge::uncertainty::Uncertainty;
+use crate::problem::Problem;
+use crate::problem::model::{GAIN_TERMS, Model, ParameterId};
+use crate::problem::parameters::{Parameters, THETA, search_box};
+use crate::problem::terms::Motion;
+use crate::statistics::median;
+use runtime::model::dot;
+
+/// An axis moves when its span is at least this many times its noise from sample to sample: a
+/// million samples of noise alone span ten times its standard deviation.
+const SPAN_TO_NOISE_MIN: f64 = 20.0;
+/// An axis or probe that spans more than this (m or rad) moves, however coarsely it was sampled:
+/// far apart, samples of a motion differ as those of noise do.
+const SPAN_OF_MOTION: f64 = 20e-6;
+/// A parameter is determined when the error that the motion allows is below this part of its search range.
+const ERROR_TO_RANGE_MAX: f64 = 0.1;
+/// The model describes the log when its rms errors are below this part of the rms motion: the
+/// vertical terms that (30) lacks cost it less than a tenth.
+const ERROR_TO_MOTION_MAX: f64 = 0.2;
+/// Without sensitivity or zero deviations a model may miss much, but not more than there is.
+const ERROR_TO_MOTION_MAX_BASELINE: f64 = 1.0;
+
+/// What a log lacks, or what is wrong with a fit to it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitFailure {
+    /// Fewer rows than unknowns.
+    #[error(
+        "{rows} rows cannot determine {unknowns} unknowns of model ({model}): use a longer log or a larger --train"
+    )]
+    TooFewRows {
+        /// Rows that the fit had.
+        rows: usize,
+        /// Unknowns, zero deviations counted.
+        unknowns: usize,
+        /// Name of the model.
+        model: &'static str,
+    },
+    /// An axis does not move in the log.
+    #[error(
+        "{} does not move in the log (span {span_micro:.3} {unit}, noise {noise_micro:.3} {unit}), so {parameters} \
+         cannot be found: record {}{}",
+        motion.axis(), motion.recording(), without(*motion), unit = motion.micro_unit()
+    )]
+    NoMotion {
+        /// The motion that is missing.
+        motion: Motion,
+        /// Peak-to-peak over the log, um or urad.
+        span_micro: f64,
+        /// Noise from sample to sample, um or urad.
+        noise_micro: f64,
+        /// The parameters that need the motion.
+        parameters: String,
+    },
+    /// A Hall probe reads nothing but noise while the stage moves.
+    #[error(
+        "Hall probe {probe} does not follow the motion in the log (span {span_micro:.3} um, noise {noise_micro:.3} um): \
+         check the probe, its cable and its column"
+    )]
+    DeadProbe {
+        /// The probe.
+        probe: &'static str,
+        /// Peak-to-peak of its displacement within a movement, um.
+        span_micro: f64,
+        /// Its noise from sample to sample, um.
+        noise_micro: f64,
+    },
+    /// The log moves, but not so that these parameters show.
+    #[error("the log does not determine {what}: {remedy}")]
+    NotDetermined {
+        /// The parameters, with their standard errors where there are any.
+        what: String,
+        /// What to record.
+        remedy: String,
+    },
+    /// The fitted model leaves most of the motion unexplained.
+    #[error(
+        "the fitted model ({model}) is wrong by {error_micro:.1} {unit} rms in {axis} where the motion itself has \
+         {motion_micro:.1} {unit} rms: it does not describe this log. Check the column mapping, the order and signs \
+         of the sensors and the scales in stage.toml, and record a log in which the stage moves along {axis}",
+        axis = motion.axis(), unit = motion.micro_unit()
+    )]
+    NotDescribed {
+        /// Name of the model.
+        model: &'static str,
+        /// The axis.
+        motion: Motion,
+        /// rms error, um or urad.
+        error_micro: f64,
+        /// rms motion, um or urad.
+        motion_micro: f64,
+    },
+}
+
+/// Refuses a log in which an axis that the model needs does not move, or a probe does not see it.
+///
+/// # Errors
+/// [`FitFailure::NoMotion`] for the first such axis, [`FitFailure::DeadProbe`] for the first such
+/// probe, [`FitFailure::TooFewRows`].
+pub fn check_motion(
+    dataset: &Dataset,
+    stage: &Stage,
+    train_rows: usize,
+    model: &'static Model,
+) -> Result<(), FitFailure> {
+    let zeros = if model.has_zero_deviation {
+        3 * dataset.movements.len()
+    } else {
+        0
+    };
+    let unknowns = model.free_count() + zeros;
+    if 3 * train_rows <= unknowns {
+        return Err(FitFailure::TooFewRows {
+            rows: train_rows,
+            unknowns,
+            model: model.name,
+        });
+    }
+    for (axis, motion) in Motion::ALL.into_iter().enumerate() {
+        let needing = model.free().filter(|id| id.seen_in(stage) == motion);
+        let parameters: Vec<String> = needing.map(|id| id.name()).collect();
+        if parameters.is_empty() {
+            continue;
+        }
+        let (span, noise) = if axis < 3 {
+            span_and_noise(dataset, true, |row| row.reference[axis])
+        } else {
+            span_and_noise(dataset, false, |row| row.vertical[axis - 3])
+        };
+        if stands_still(span, noise) {
+            return Err(FitFailure::NoMotion {
+                motion,
+                span_micro: span * 1e6,
+                noise_micro: noise * 1e6,
+                parameters: parameters.join(", "),
+            });
+        }
+    }
+    let plane = Parameters::designed(stage).geometry().plane_rows();
+    for (k, probe) in ["A", "B", "C"].into_iter().enumerate() {
+        let (span, noise) = span_and_noise(dataset, true, |row| row.signal_m[k]);
+        let (moved, _) = span_and_noise(dataset, true, |row| dot(&plane[k], row.reference));
+        if stands_still(span, noise) && moved > SPAN_OF_MOTION {
+            return Err(FitFailure::DeadProbe {
+                probe,
+                span_micro: span * 1e6,
+                noise_micro: noise * 1e6,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The way out where a log has no vertical motion.
+const fn without(motion: Motion) -> &'static str {
+    match motion {
+        Motion::X | Motion::Y | Motion::Rz => "",
+        Motion::Z | Motion::Rx | Motion::Ry => {
+            ", or fit a model without vertical terms (--model 30)"
+        }
+    }
+}
+
+fn stands_still(span: f64, noise: f64) -> bool {
+    span == 0.0 || (span <= SPAN_TO_NOISE_MIN * noise && span <= SPAN_OF_MOTION)
+}
+
+/// Peak-to-peak of a value (within movements where offsets differ between them, as for X, Y, Rz
+/// and the probes; else over the log) and the median over movements of its noise from sample to
+/// sample.
+fn span_and_noise(
+    dataset: &Dataset,
+    within_movements: bool,
+    value: impl Fn(&Row) -> f64,
+) -> (f64, f64) {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut span: f64 = 0.0;
+    let mut noises = Vec::new();
+    for movement in &dataset.movements {
+        let rows = &dataset.rows[movement.rows.clone()];
+        if within_movements {
+            (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
+        }
+        let (mut steps, mut before) = (0.0, rows.first().map_or(0.0, &value));
+        for value in rows.iter().map(&value) {
+            low = low.min(value);
+            high = high.max(value);
+            steps += (value - before) * (value - before);
+            before = value;
+        }
+        span = span.max(high - low);
+        if rows.len() > 1 {
+            noises.push((steps / (2.0 * (rows.len() - 1) as f64)).sqrt());
+        }
+    }
+    (span, median(&mut noises).unwrap_or(0.0))
+}
+
+/// An error that does no harm, however narrow the search range: one per cent of sensitivity, of
+/// a radian or of a lever arm of a quarter metre: one per cent of a motion.
+fn tolerable(id: &ParameterId, vertical_span: [f64; 3]) -> f64 {
+    const PART: f64 = 0.01;
+    if id.is_slope() {
+        PART / vertical_span[id.index / 3 - GAIN_TERMS].abs()
+    } else if id.index < THETA {
+        PART * 0.25
+    } else {
+        PART
+    }
+}
+
+/// Refuses a fit whose parameters the log leaves open; `vertical_span` is the largest magnitude
+/// of Z, Rx, Ry in the log (m, rad, rad).
+///
+/// # Errors
+/// [`FitFailure::NotDetermined`] with every such parameter.
+pub fn check_determined(
+    problem: &Problem<'_>,
+    parameters: &Parameters,
+    uncertainty: &Uncertainty,
+    vertical_span: [f64; 3],
+) -> Result<(), FitFailure> {
+    let misalignment_rad = parameters.geometry().misalignment_rad;
+    let ranges = search_box(problem.stage, problem.model, misalignment_rad);
+    let mut what = Vec::new();
+    let mut remedies: Vec<&str> = Vec::new();
+    for id in problem.model.free() {
+        let open = uncertainty.undetermined.contains(&id);
+        let error = uncertainty.motion_error[id.index];
+        let useless = ERROR_TO_RANGE_MAX * ranges[id.index].width();
+        if !open && (error <= useless || error <= tolerable(&id, vertical_span)) {
+            continue;
+        }
+        what.push(if open {
+            id.name()
+        } else {
+            format!(
+                "{} (standard error {error:.3e} {})",
+                id.name(),
+                id.term.unit
+            )
+        });
+        let remedy = id.seen_in(problem.stage).recording();
+        if !remedies.contains(&remedy) {
+            remedies.push(remedy);
+        }
+    }
+    if what.is_empty() {
+        return Ok(());
+    }
+    let mut remedy = format!(
+        "record independent {}, with larger amplitude or more rows (or, if --solver named a search, it may have \
+         ended far from the best fit: take the default)",
+        remedies.join(", ")
+    );
+    if uncertainty.undetermined.iter().any(ParameterId::is_slope) {
+        remedy.push_str("; without vertical motion use --model 30");
+    }
+    Err(FitFailure::NotDetermined {
+        what: what.join(", "),
+        remedy,
+    })
+}
+
+/// Refuses a fit that leaves most of the motion unexplained.
+///
+/// # Errors
+/// [`FitFailure::NotDescribed`] for the first such axis.
+pub fn check_described(
+    dataset: &Dataset,
+    errors: &PoseError,
+    model: &Model,
+) -> Result<(), FitFailure> {
+    let n = dataset.rows.len().max(1) as f64;
+    let moved = [0, 1, 2].map(|axis| {
+        let squares: f64 = dataset.rows.iter().map(|r| r.reference[axis].powi(2)).sum();
+        (squares / n).sqrt()
+    });
+    check_explained(moved, errors, model)
+}
+
+/// The same from the root mean square of the reference: m, m, rad.
+///
+/// # Errors
+/// [`FitFailure::NotDescribed`] for the first such axis.
+pub fn check_explained(
+    moved: [f64; 3],
+    errors: &PoseError,
+    model: &Model,
+) -> Result<(), FitFailure> {
+    for (axis, motion) in Motion::ALL.into_iter().enumerate().take(3) {
+        let moved = moved[axis];
+        let error = errors.axes[axis].rms;
+        let most = if model.has_zero_deviation {
+            ERROR_TO_MOTION_MAX
+        } else {
+            ERROR_TO_MOTION_MAX_BASELINE
+        };
+        if error > most * moved {
+            return Err(FitFailure::NotDescribed {
+                model: model.name,
+                motion,
+                error_micro: error * 1e6,
+                motion_micro: moved * 1e6,
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,134 @@
+//! How good a parameter set is on a log, by the decoder that runs on the target.
+//!
+//! ```
+//! # use hall_input::input::shipped::STAGE_TOML;
+//! # use hall_input::input::stage::Stage;
+//! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
+//! # use hall_input::input::log::{self, ReadOptions};
+//! # use hall_input::input::shipped::RUN_GZ;
+//! # let reading = log::read_bytes(RUN_GZ, "run30.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
+//! # let dataset = reading.dataset;
+//! # use hall_calibration::fit::{FitSettings, ModelChoice, fit};
+//! # let fit = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto))?;
+//! use hall_calibration::judge::{Decoded, Zeros};
+//!
+//! let judgement = Decoded::new(&fit.set, &dataset).judge(&dataset, &stage, Zeros::Refit);
+//! assert!(judgement.errors.axes[0].rms < 1e-6); // X, m
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod identify;
+mod judgement;
+pub mod lag;
+pub mod left_out;
+pub mod precision;
+pub mod statistics;
+pub mod uncertainty;
+pub mod verdict;
+
+pub(crate) use judgement::medians;
+pub use judgement::{Judge, Judgement, LogJudgement};
+
+use crate::input::dataset::{Dataset, Row};
+use crate::input::stage::Stage;
+use crate::problem::model::Model;
+use crate::problem::parameters::Parameters;
+use crate::problem::zero_deviation::ZeroDeviation;
+use rayon::prelude::*;
+use runtime::{AnyDecoder, ParameterSet, PlanarPose};
+
+/// Which zero deviations are taken off before errors are counted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Zeros<'z> {
+    /// None: the pose as the target gives it without a re-zero.
+    None,
+    /// The closed-form one of each movement, over all its rows.
+    Refit,
+    /// Given ones, by movement, m at the probes.
+    Given(&'z [[f64; 3]]),
+}
+
+impl Zeros<'_> {
+    /// The way to judge a model as it was fitted: refitted where it has zero deviations.
+    pub const fn of_model(model: &Model) -> Self {
+        if model.has_zero_deviation {
+            Self::Refit
+        } else {
+            Self::None
+        }
+    }
+
+    /// How JSON names it: "zero" where none are taken off, else "fit".
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::None => "zero",
+            Self::Refit | Self::Given(_) => "fit",
+        }
+    }
+
+    /// How a title names it.
+    pub const fn words(&self) -> &'static str {
+        match self {
+            Self::None => "no zero deviation taken off",
+            Self::Refit => "zero deviations refitted",
+            Self::Given(_) => "given zero deviations taken off",
+        }
+    }
+}
+
+/// A dataset decoded with one parameter set: to be judged in several ways.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decoded {
+    /// The parameters that the set carries.
+    pub parameters: Parameters,
+    /// Pose errors of every row, m, m, rad, with no zero deviation taken off; `None` where the
+    /// decoder found bad codes.
+    pub errors: Vec<Option<[f64; 3]>>,
+}
+
+impl Decoded {
+    /// Decodes every row of a dataset with reference.
+    pub fn new(set: &ParameterSet, dataset: &Dataset) -> Self {
+        let decoder = set.decoder();
+        let one = |row: &Row| error(&decoder, row);
+        Self {
+            parameters: Parameters::of_set(set),
+            errors: dataset.rows.par_iter().map(one).collect(),
+        }
+    }
+
+    /// The figures with these zero deviations taken off.
+    pub fn judge(&self, dataset: &Dataset, stage: &Stage, zeros: Zeros) -> Judgement {
+        let mut judge = Judge::new(&self.parameters, stage, dataset.logs.len());
+        for movement in &dataset.movements {
+            for row in movement.rows.clone() {
+                let begins = row == movement.rows.start;
+                let (error, row) = (self.errors[row], &dataset.rows[row]);
+                judge.take((movement.log, movement.index, begins), row, error);
+            }
+        }
+        judge.judgement(zeros)
+    }
+
+    /// The errors with the zero deviations of a judgement taken off.
+    pub fn errors_less(&self, zeros: &[ZeroDeviation], dataset: &Dataset) -> Vec<Option<[f64; 3]>> {
+        let mut errors = self.errors.clone();
+        for (movement, zero) in dataset.movements.iter().zip(zeros) {
+            for error in errors[movement.rows.clone()].iter_mut().flatten() {
+                for (error, zero) in error.iter_mut().zip(zero.pose) {
+                    *error -= zero;
+                }
+            }
+        }
+        errors
+    }
+}
+
+/// The decoded pose less the reference, m, m, rad, no zero deviation taken off; `None` where the
+/// decoder finds bad codes.
+pub fn error(decoder: &AnyDecoder, row: &Row) -> Option<[f64; 3]> {
+    let reading = row.frame.decode(decoder, &PlanarPose::ZERO);
+    let pose = reading.planar()?.to_array();
+    let error = |axis: usize| f64::from(pose[axis]) - row.reference[axis];
+    Some(std::array::from_fn(error))
+}

@@ -1,0 +1,322 @@
+//! Standard errors of the parameters.
+//!
+//! The residuals of neighbouring rows are not independent: the interferometers drift. So the
+//! covariance is the sandwich A^-1 M A^-1 with M summed over clusters of rows that may depend on
+//! each other: whole movements where there are at least 20, else blocks of
+//! half a second within them. Where independence would give the larger figure that one is taken,
+//! so that a chance cancellation within few clusters promises nothing.
+
+use crate::problem::model::{COUNT, ParameterId};
+use crate::problem::parameters::{ETA, Parameters};
+use crate::problem::{Group, Problem};
+use crate::solve::gauss_newton::{Equations, Normal, Point};
+use crate::solve::least_squares::rows::{COLUMNS, Decoder};
+use crate::solve::least_squares::solve::free;
+use nalgebra::{DVector, Matrix3, SMatrix, SVector, SymmetricEigen};
+use rayon::prelude::*;
+
+type Square = SMatrix<f64, COUNT, COUNT>;
+type Column = SVector<f64, COUNT>;
+
+/// Fewer movements than this are cut into blocks.
+const CLUSTERS_MIN: usize = 20;
+/// Length of a block, s: the drift of an interferometer in a laboratory changes over seconds.
+const BLOCK_S: f64 = 0.5;
+
+/// How well the log determines the parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Uncertainty {
+    /// Standard error of each parameter, SI; `None` for one that the model fixes, that the log does not determine at all,
+    /// and for all where there are fewer clusters than parameters.
+    pub standard_error: [Option<f64>; COUNT],
+    /// The same if rows were independent: what the log's motion alone allows, whatever the model
+    /// leaves unexplained. Zero where there is none.
+    pub motion_error: [f64; COUNT],
+    /// Parameters that the log does not determine: no motion shows them, or only in combination
+    /// with others.
+    pub undetermined: Vec<ParameterId>,
+    /// Pairs of parameters whose estimates are correlated by more than [`CORRELATION_TOLD`], either
+    /// way, with their correlation.
+    pub correlations: Vec<(String, String, f64)>,
+}
+
+/// Correlations above this are told: the parameters stand in for each other.
+pub const CORRELATION_TOLD: f64 = 0.95;
+
+/// A probe is moved if it is by more than this part of what that is which moves most.
+const MOVED_MIN: f64 = 0.1;
+
+/// Smallest eigenvalue of the scaled curvature that still counts as information.
+const EIGENVALUE_MIN: f64 = 1e-10;
+
+/// Standard errors at a solution. `None` when the solution itself cannot be evaluated.
+pub fn uncertainty(problem: &Problem, parameters: &Parameters) -> Option<Uncertainty> {
+    let normal = normal(problem, parameters)?;
+    let curvature = Square::from_fn(|i, j| normal.curvature(i, j));
+    let Scores {
+        clustered,
+        clusters,
+        independent,
+    } = Scores::new(problem, parameters)?;
+    let free = free(problem);
+    let (inverse, undetermined) = pseudo_inverse(&curvature, &free);
+    // What the fit itself used up: unknowns and zero deviations.
+    let used = free.len()
+        + match problem.model.has_zero_deviation {
+            true => 3 * problem.groups.len(),
+            false => 0,
+        };
+    let all = 3 * problem.rows.len();
+    let scale = all as f64 / all.saturating_sub(used).max(1) as f64;
+    let mut standard_error = [None; COUNT];
+    let mut motion_error = [0.0; COUNT];
+    for &k in &free {
+        let row = inverse.row(k);
+        let error = |meat: &Square| ((row * meat * row.transpose())[0] * scale).sqrt();
+        motion_error[k] = error(&independent);
+        let largest = motion_error[k].max(error(&clustered));
+        // Fewer clusters than parameters say nothing of some of them.
+        if !undetermined.contains(&k) && largest.is_finite() && clusters > free.len() {
+            standard_error[k] = Some(largest);
+        }
+    }
+    let covariance = inverse * clustered * inverse;
+    let names: Vec<(usize, String)> = (problem.model.free())
+        .filter(|id| standard_error[id.index].is_some())
+        .map(|id| (id.index, id.name()))
+        .collect();
+    let mut correlations = Vec::new();
+    for (j, (b, name_b)) in names.iter().enumerate() {
+        for (a, name_a) in &names[..j] {
+            let (a, b) = (*a, *b);
+            let product = covariance[(a, a)] * covariance[(b, b)];
+            let correlation = covariance[(a, b)] / product.sqrt();
+            if correlation.abs() > CORRELATION_TOLD {
+                correlations.push((name_a.clone(), name_b.clone(), correlation));
+            }
+        }
+    }
+    Some(Uncertainty {
+        correlations,
+        standard_error,
+        motion_error,
+        undetermined: (problem.model.free())
+            .filter(|id| undetermined.contains(&id.index))
+            .collect(),
+    })
+}
+
+/// The normal equations of a problem at parameters.
+fn normal(problem: &Problem, parameters: &Parameters) -> Option<Normal<COLUMNS>> {
+    problem.normal(&Point {
+        values: DVector::from_column_slice(&parameters.values),
+        offsets: Vec::new(),
+    })
+}
+
+/// The weighted sum of squared errors of some rows near a solution, um^2, to second order in the
+/// change of the parameters. Those of movements add up.
+#[derive(Clone, Copy, Debug)]
+pub struct OwnFit {
+    /// At the solution.
+    pub cost: f64,
+    parameters: Parameters,
+    descent: Column,
+    curvature: Square,
+}
+
+impl OwnFit {
+    /// Of no rows.
+    pub fn none() -> Self {
+        Self {
+            cost: 0.0,
+            parameters: Parameters {
+                values: [0.0; COUNT],
+            },
+            descent: Column::zeros(),
+            curvature: Square::zeros(),
+        }
+    }
+
+    /// Zero deviations are free. `None` as for [`uncertainty`].
+    pub fn new(problem: &Problem, parameters: &Parameters) -> Option<Self> {
+        let normal = normal(problem, parameters)?;
+        Some(Self {
+            cost: normal.chi_squared(),
+            parameters: *parameters,
+            descent: Column::from_fn(|k, _| normal.descent(k)),
+            curvature: Square::from_fn(|i, j| normal.curvature(i, j)),
+        })
+    }
+
+    /// With more rows.
+    pub fn add(&mut self, more: &Self) {
+        self.cost += more.cost;
+        self.descent += more.descent;
+        self.curvature += more.curvature;
+    }
+
+    /// The step of Gauss and Newton to parameters of their own; what the rows do not determine stays
+    /// as it is.
+    pub fn step(&self) -> Column {
+        let all: Vec<usize> = (0..COUNT).collect();
+        pseudo_inverse(&self.curvature, &all).0 * self.descent
+    }
+
+    /// By what part the gain of each probe would change, if nothing else did: `None` for a probe that the rows
+    /// hardly move, beside that which they move most, and where they do not determine all three.
+    pub fn gain_step(&self) -> Option<[Option<f64>; 3]> {
+        // The pose grows with the gain as eta and the slopes fall.
+        let directions = SMatrix::<f64, COUNT, 3>::from_fn(|place, probe| {
+            let is_of_probe = place >= ETA && place % 3 == probe;
+            if is_of_probe {
+                -self.parameters.values[place]
+            } else {
+                0.0
+            }
+        });
+        let curvature = directions.transpose() * self.curvature * directions;
+        let factor = curvature.cholesky()?;
+        let steps = factor.solve(&(directions.transpose() * self.descent));
+        let most = curvature.diagonal().max();
+        let is_moved = |k: usize| curvature[(k, k)] > MOVED_MIN * MOVED_MIN * most;
+        Some([0, 1, 2].map(|k| is_moved(k).then(|| steps[k])))
+    }
+
+    /// The cost after a step.
+    pub fn cost_after(&self, step: &Column) -> f64 {
+        let first = self.descent.dot(step);
+        let second = step.dot(&(self.curvature * step));
+        self.cost - 2.0 * first + second
+    }
+
+    /// The cost with parameters of their own.
+    pub fn cost_alone(&self) -> f64 {
+        self.cost_after(&self.step())
+    }
+}
+
+/// The inverse of the curvature over the free parameters, without the directions that hold no
+/// information, and the parameters that take part in such a direction.
+fn pseudo_inverse(curvature: &Square, free: &[usize]) -> (Square, Vec<usize>) {
+    let scale = Column::from_fn(|k, _| {
+        let d = curvature[(k, k)].sqrt();
+        if free.contains(&k) && d.is_normal() {
+            1.0 / d
+        } else {
+            0.0
+        }
+    });
+    let mut scaled = Square::from_fn(|i, j| curvature[(i, j)] * scale[i] * scale[j]);
+    for k in 0..COUNT {
+        scaled[(k, k)] = 1.0;
+    }
+    let mut undetermined: Vec<usize> = free.iter().copied().filter(|&k| scale[k] == 0.0).collect();
+    let eigen = SymmetricEigen::new(scaled);
+    let mut inverse = Square::zeros();
+    for (value, vector) in eigen
+        .eigenvalues
+        .iter()
+        .zip(eigen.eigenvectors.column_iter())
+    {
+        if *value > EIGENVALUE_MIN {
+            inverse += vector * vector.transpose() / *value;
+        } else {
+            undetermined.extend(free.iter().copied().filter(|&k| vector[k].abs() > 0.1));
+        }
+    }
+    undetermined.sort_unstable();
+    undetermined.dedup();
+    let inverse = Square::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]);
+    (inverse, undetermined)
+}
+
+/// Sums over the rows of outer products of their scores J' W e.
+struct Scores {
+    /// Summed over each cluster first, with the usual correction for few clusters.
+    clustered: Square,
+    clusters: usize,
+    /// As if rows were independent, axes not: of J' W S W J with the covariance S of the residuals.
+    independent: Square,
+}
+
+/// Residuals of a row by the roots of the weights, in the last column, and their derivatives.
+type Columns = [[f64; COLUMNS]; 3];
+
+impl Scores {
+    fn new(problem: &Problem, parameters: &Parameters) -> Option<Self> {
+        const ERROR: usize = COLUMNS - 1;
+        let decoder = &Decoder::new(problem, parameters)?;
+        let block = if problem.groups.len() >= CLUSTERS_MIN {
+            usize::MAX
+        } else {
+            (BLOCK_S / problem.stage.servo_period_s).ceil().max(1.0) as usize
+        };
+        let of_group = |group: &Group| {
+            let rows = &problem.rows[group.rows.clone()];
+            let mean = decoder.mean(problem, rows)?;
+            let mut covariance = Matrix3::zeros();
+            let mut sums = Vec::new();
+            for cluster in rows.chunks(block.min(rows.len())) {
+                let mut sum = Column::zeros();
+                for row in cluster {
+                    let columns = less(&decoder.columns(row)?, &mean);
+                    for i in 0..3 {
+                        let error = row.weight * columns[i][ERROR];
+                        for (sum, by) in sum.iter_mut().zip(&columns[i]) {
+                            *sum += error * by;
+                        }
+                        for j in 0..3 {
+                            covariance[(i, j)] += error * columns[j][ERROR];
+                        }
+                    }
+                }
+                sums.push(sum);
+            }
+            Some((covariance, sums))
+        };
+        let groups: Option<Vec<_>> = problem.groups.par_iter().map(of_group).collect();
+        let mut clustered = Square::zeros();
+        let (mut clusters, mut covariance) = (0, Matrix3::zeros());
+        for (of_group, sums) in groups? {
+            covariance += of_group / problem.rows.len() as f64;
+            clusters += sums.len();
+            for sum in sums {
+                clustered.ger(1.0, &sum, &sum, 1.0);
+            }
+        }
+        let n = clusters.max(2) as f64;
+        // J' S J with S = R' R.
+        let root = covariance
+            .cholesky()
+            .map_or_else(Matrix3::zeros, |s| s.l().transpose());
+        let independent = Normal::of_movements(problem.groups.len(), |group| {
+            let rows = &problem.rows[problem.groups[group].rows.clone()];
+            let mean = decoder.mean(problem, rows)?;
+            let mut sums = Normal::none();
+            for row in rows {
+                let columns = less(&decoder.columns(row)?, &mean);
+                let rooted: Columns = [0, 1, 2].map(|i| {
+                    std::array::from_fn(|k| {
+                        (0..3).fold(0.0, |sum, j| sum + root[(i, j)] * columns[j][k])
+                    })
+                });
+                sums.add_row(&rooted, row.weight);
+            }
+            Some(sums)
+        })?;
+        Some(Self {
+            clustered: clustered * (n / (n - 1.0)),
+            clusters,
+            independent: Square::from_fn(|i, j| independent.curvature(i, j)),
+        })
+    }
+}
+
+fn less(columns: &Columns, mean: &Columns) -> Columns {
+    [0, 1, 2].map(|axis| std::array::from_fn(|k| columns[axis][k] - mean[axis][k]))
+}
+
+#[cfg(test)]
+#[path = "uncertainty_tests.rs"]
+mod tests;

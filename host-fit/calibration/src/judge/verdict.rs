@@ -1,0 +1,127 @@
+//! What a calibration is good for at work.
+
+use crate::finding::{Finding, Severity};
+use crate::solve::field::carry::Service;
+use nalgebra::DMatrix;
+use runtime::ModelKind;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
+
+/// Errors at work over the noise floor up to which a calibration is good, ...
+pub const GOOD_MAX: f64 = 1.10;
+/// ... and up to which it serves at all.
+pub const LIMITED_MAX: f64 = 1.30;
+/// Nine of ten stages have errors above the lower end of the range that is told, and nine of ten below the
+/// upper: standard deviations.
+const END: f64 = 1.2816;
+
+/// Whether a calibration can be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// At work its errors are those of the sensors.
+    Good,
+    /// It serves with larger errors, or on movements like those of the log only.
+    Limited,
+    /// It is not to be used.
+    Refused,
+}
+
+impl Verdict {
+    /// Of a calibration with these findings.
+    pub fn new(model: ModelKind, predicted: Option<&Predicted>, findings: &[Finding]) -> Self {
+        let is_refused = findings.iter().any(|f| f.severity == Severity::Refuse);
+        let ratio = predicted.map_or(LIMITED_MAX, Predicted::worst_ratio);
+        match (is_refused, model) {
+            (true, _) => Self::Refused,
+            (false, ModelKind::Field) if ratio <= GOOD_MAX => Self::Good,
+            (false, ModelKind::Field) if ratio > LIMITED_MAX => Self::Refused,
+            // What other models lack is no fault of the log.
+            _ => Self::Limited,
+        }
+    }
+}
+
+/// Errors of X, Y, Rz that are predicted for service over the range that `[motion]` declares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Predicted {
+    /// rms: m, m, rad.
+    pub rms: [f64; 3],
+    /// The same over the noise floor, which is that of the probes.
+    pub ratio: [f64; 3],
+    /// Eight of ten stages with such a log have an rms between these: m, m, rad.
+    pub range: [[f64; 2]; 3],
+}
+
+impl Predicted {
+    /// Of parameters that are `off` the best estimate, which has this covariance.
+    pub fn new(service: &Service, covariance: &DMatrix<f64>, off: &[f64]) -> Self {
+        let variance = service.variance(covariance);
+        let known = service.squares(off);
+        let spread = service.spread(covariance);
+        let rms =
+            |axis: usize| (variance.noise[axis] + variance.systematic[axis] + known[axis]).sqrt();
+        let range = |axis: usize| {
+            let least = variance.noise[axis] + known[axis];
+            [-END, END]
+                .map(|end| (least + quantile(variance.systematic[axis], spread[axis], end)).sqrt())
+        };
+        let rms = [0, 1, 2].map(rms);
+        Self {
+            rms,
+            ratio: [0, 1, 2].map(|axis| rms[axis] / variance.noise[axis].sqrt()),
+            range: [0, 1, 2].map(range),
+        }
+    }
+
+    /// The ratio of the worst axis.
+    pub fn worst_ratio(&self) -> f64 {
+        self.ratio.into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// The quantile, this many standard deviations from the middle, of a sum of squares with this mean and
+/// variance: as of a chi-square with as many degrees of freedom, by Wilson and Hilferty.
+fn quantile(mean: f64, variance: f64, deviations: f64) -> f64 {
+    if mean <= 0.0 {
+        return 0.0;
+    }
+    let part = variance / (9.0 * mean * mean);
+    mean * (1.0 - part + deviations * part.sqrt()).max(0.0).powi(3)
+}
+
+/// By axis `rms_um` or `rms_urad`, `ratio` and the range of the rms, and `worst_ratio`.
+impl Serialize for Predicted {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Um {
+            rms_um: f64,
+            ratio: f64,
+            range_um: [f64; 2],
+        }
+        #[derive(Serialize)]
+        struct Urad {
+            rms_urad: f64,
+            ratio: f64,
+            range_urad: [f64; 2],
+        }
+        let [x, y, rz] = self.rms.map(|rms| rms * 1e6);
+        let [of_x, of_y, of_rz] = self.range.map(|range| range.map(|end| end * 1e6));
+        let um = |axis: usize, rms_um, range_um| Um {
+            rms_um,
+            ratio: self.ratio[axis],
+            range_um,
+        };
+        let rz = Urad {
+            rms_urad: rz,
+            ratio: self.ratio[2],
+            range_urad: of_rz,
+        };
+        let mut map = serializer.serialize_map(Some(4))?;
+        map.serialize_entry("x", &um(0, x, of_x))?;
+        map.serialize_entry("y", &um(1, y, of_y))?;
+        map.serialize_entry("rz", &rz)?;
+        map.serialize_entry("worst_ratio", &self.worst_ratio())?;
+        map.end()
+    }
+}

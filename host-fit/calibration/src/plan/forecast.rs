@@ -1,0 +1,70 @@
+//! What a fit to a run will give, before anything is measured.
+
+use super::run::Run;
+use crate::input::stage::Stage;
+use crate::problem::parameters::Parameters;
+use crate::simulate::sensors::SensorErrors;
+use crate::solve::field::blocks::{FieldRow, Rows};
+use crate::solve::field::forecast::{Forecast, Forecaster};
+use crate::solve::field::parameters::{FALL_PER_M, FieldParameters};
+use crate::solve::field::whiten::Noise;
+use runtime::model::Sensitivity;
+
+/// The stage as far as it is known before it is calibrated: probes at their designed places with
+/// sensitivities in the middle of the search range, over magnets on whose centre lines they sit.
+fn designed(stage: &Stage) -> FieldParameters {
+    let geometry = stage.geometry();
+    let etas = stage.search.of("eta");
+    let eta = etas.map_or([1.0; 3], |ranges| ranges.map(|r| 0.5 * (r.low + r.high)));
+    let places = stage.places_m();
+    let sensitivity = [0, 1, 2].map(|k| {
+        // phi follows the height at the probe: Z + y Rx - x Ry.
+        let [x, y] = places[k];
+        let a = FALL_PER_M * eta[k];
+        Sensitivity {
+            eta: eta[k],
+            per_z_m: a,
+            per_rx_rad: a * y,
+            per_ry_rad: -a * x,
+        }
+    });
+    FieldParameters::of_model_31(&Parameters::of_model_31(&geometry, &sensitivity), stage)
+}
+
+/// What is known of a stage before it is calibrated: as designed, with the noise of the given
+/// logs. `None` where its probes can't tell a pose of its service.
+pub fn forecaster(stage: &Stage) -> Option<Forecaster> {
+    let sensors = SensorErrors::USUAL;
+    let noise = Noise {
+        white_mm: [sensors.hall_m * 1e3; 3],
+        drift_mm: sensors.drift_per_root_s.map(|drift| drift * 1e3),
+    };
+    let [x, y, rz, z, rx, ry] = stage.motion.axes.map(|axis| axis.service);
+    Forecaster::new(&designed(stage), &noise, ([x, y, rz], [z, rx, ry]))
+}
+
+/// The forecast for a run that is recorded every `period_s` and looked at every `step_s`; `None`
+/// where it doesn't determine the parameters.
+pub fn forecast(
+    forecaster: &Forecaster,
+    run: &Run,
+    period_s: f64,
+    step_s: f64,
+) -> Option<Forecast> {
+    let count = (run.seconds / step_s).floor() as usize;
+    let row = |k: usize| {
+        let time_s = (k as f64 + 0.5) * step_s;
+        let at: [[f64; 3]; 6] = std::array::from_fn(|axis| run.axis_at(axis, time_s));
+        FieldRow {
+            weight: 1.0,
+            time_s,
+            signal_mm: [0.0; 3],
+            vertical: [at[3][0], at[4][0], at[5][0]],
+            reference_mm: [0, 1, 2].map(|k| at[k][0] * 1e3),
+            rate_mm_per_s: [0, 1, 2].map(|k| at[k][1] * 1e3),
+        }
+    };
+    let movements = std::iter::once(0..count).collect();
+    let rows = Rows::of_movements((0..count).map(row).collect(), movements);
+    forecaster.forecast(&rows, step_s / period_s)
+}

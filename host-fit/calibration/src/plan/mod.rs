@@ -1,0 +1,163 @@
+//! The run to make for the field model, and what to expect of it before anything is measured.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`run`] | six sines between smooth ends |
+//! | [`mod@forecast`] | what a fit to a run will give |
+//! | [`search`] | the choice of the frequencies |
+//!
+//! ```
+//! # use hall_input::input::shipped::STAGE_TOML;
+//! # use hall_input::input::stage::Stage;
+//! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
+//! let plan = hall_calibration::plan::plan(&stage, 8.0)?;
+//! assert_eq!(plan.run.seconds, 8.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod forecast;
+pub mod run;
+pub mod search;
+#[cfg(test)]
+mod tests;
+
+use crate::input::stage::{AXES, Stage};
+use crate::solve::field::forecast::{Forecast, Forecaster};
+use forecast::{forecast, forecaster};
+use run::Run;
+
+/// Errors in service over the noise floor that a run may lead to. Beyond this the run, not the
+/// sensors, decides how good the stage is.
+pub const RATIO_MAX: f64 = 1.03;
+/// Length of the ends, s, where the limits allow it.
+const TAPER_S: f64 = 0.5;
+/// Longest ends, as a part of the run.
+const TAPER_MAX: f64 = 0.25;
+/// Most rows that the final forecast looks at.
+const ROWS_MAX: f64 = 20_000.0;
+
+/// A run and what it leads to.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The run.
+    pub run: Run,
+    /// What a fit to it will give on a stage as designed.
+    pub forecast: Forecast,
+}
+
+/// Why there is no plan.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// An axis can't move as far as it should within its limits.
+    #[error(
+        "a run of {seconds} s can't move {axis} by {:.1} {} to both sides within the limits of its speed and \
+         acceleration; make the run longer, or change amplitude or limits in [motion] of stage.toml",
+        amplitude * 1e6, if axis.starts_with('r') { "urad" } else { "um" }
+    )]
+    TooFast {
+        /// Its key in `[motion]`.
+        axis: &'static str,
+        /// How far it should move, m or rad.
+        amplitude: f64,
+        /// The length, s.
+        seconds: f64,
+    },
+    /// The axes can't all have a frequency of their own.
+    #[error(
+        "a run of {seconds} s is too short for six different frequencies within the limits of speed and acceleration; \
+         make it longer, or raise the limits in [motion] of stage.toml"
+    )]
+    TooFewFrequencies {
+        /// The length, s.
+        seconds: f64,
+    },
+    /// The designed probes can't tell a pose of the service.
+    #[error(
+        "the probes as designed can't tell every pose of the service apart; correct [hall] or the range of service in \
+         [motion] of stage.toml"
+    )]
+    NoPose,
+    /// The run does not determine the field model.
+    #[error(
+        "a run of {seconds} s does not determine the field model: errors predicted for service are {:.2} / {:.2} / \
+         {:.2} times the noise floor in X / Y / Rz, where {RATIO_MAX} is the most; {remedy}", ratios[0], ratios[1], ratios[2]
+    )]
+    NotDetermined {
+        /// The length, s.
+        seconds: f64,
+        /// Errors in service over the noise floor, X, Y, Rz.
+        ratios: [f64; 3],
+        /// What to do.
+        remedy: String,
+    },
+}
+
+/// The best run of this length for a stage of unknown assembly.
+///
+/// # Errors
+/// Every variant of [`PlanError`].
+pub fn plan(stage: &Stage, seconds: f64) -> Result<Plan, PlanError> {
+    let mut taper_s = TAPER_S.min(TAPER_MAX * seconds);
+    let allowed = loop {
+        let of_axis =
+            |axis: usize| search::allowed_cycles(&stage.motion.axes[axis], axis, seconds, taper_s);
+        let allowed: [Vec<f64>; 6] = std::array::from_fn(of_axis);
+        let Some(axis) = allowed.iter().position(Vec::is_empty) else {
+            break allowed;
+        };
+        // Longer ends are slower.
+        if taper_s >= TAPER_MAX * seconds {
+            return Err(PlanError::TooFast {
+                axis: AXES[axis].0,
+                amplitude: stage.motion.axes[axis].amplitude,
+                seconds,
+            });
+        }
+        taper_s = (2.0 * taper_s).min(TAPER_MAX * seconds);
+    };
+    let forecaster = forecaster(stage).ok_or(PlanError::NoPose)?;
+    let run = search::best(stage, &forecaster, seconds, taper_s, &allowed)
+        .ok_or(PlanError::TooFewFrequencies { seconds })?;
+    judged(stage, &forecaster, run)
+}
+
+/// A run with its forecast, if that is good enough.
+///
+/// # Errors
+/// [`PlanError::NotDetermined`].
+pub fn judged(stage: &Stage, forecaster: &Forecaster, run: Run) -> Result<Plan, PlanError> {
+    let step_s = stage.servo_period_s.max(run.seconds / ROWS_MAX);
+    let refused = |ratios| {
+        Err(PlanError::NotDetermined {
+            seconds: run.seconds,
+            ratios,
+            remedy: remedy(stage, &run),
+        })
+    };
+    let Some(forecast) = forecast(forecaster, &run, stage.servo_period_s, step_s) else {
+        return refused([f64::INFINITY; 3]);
+    };
+    let ratios = forecast.service.ratios();
+    if ratios.iter().all(|&ratio| ratio <= RATIO_MAX) {
+        Ok(Plan { run, forecast })
+    } else {
+        refused(ratios)
+    }
+}
+
+/// What to change about a run that determines too little.
+fn remedy(stage: &Stage, run: &Run) -> String {
+    let short = AXES.iter().zip(&stage.motion.axes).zip(run.amplitudes);
+    let short: Vec<&str> = short
+        .filter(|((_, motion), amplitude)| *amplitude < motion.service)
+        .map(|(((key, _), _), _)| *key)
+        .collect();
+    if short.is_empty() {
+        "make the run longer, or allow higher speeds in [motion] of stage.toml".to_owned()
+    } else {
+        let axes = short.join(", ");
+        format!(
+            "move {axes} as far as in service: raise the amplitude in [motion] of stage.toml, or make the run longer"
+        )
+    }
+}

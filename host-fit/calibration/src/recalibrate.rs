@@ -1,0 +1,357 @@
+//! A few parameters from a few seconds of log: an old calibration brought up to date.
+//!
+//! old blob and its posterior -> what has changed -> checks -> new blob and its posterior. Nothing
+//! is written here.
+//!
+//! ```
+//! # use hall_input::input::shipped::STAGE_TOML;
+//! # use hall_input::input::stage::Stage;
+//! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
+//! # use hall_input::input::log::{self, ReadOptions};
+//! # use hall_input::input::shipped::RUN_GZ;
+//! # let reading = log::read_bytes(RUN_GZ, "run30.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
+//! # let dataset = reading.dataset;
+//! # use hall_calibration::fit::{FitSettings, ModelChoice, fit};
+//! # let fit = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto))?;
+//! use hall_calibration::recalibrate::{Known, recalibrate};
+//! use hall_solver::solve::field::update::Change;
+//!
+//! let known = fit.field.as_ref().map(Known::of_fit);
+//! let created = "2026-11-23".try_into()?;
+//! let new = recalibrate(&fit.set, known.as_ref(), &dataset, &stage, Change::Gains, created)?;
+//! let (change, standard_error) = new.gains[0];
+//! assert!(change.abs() < standard_error); // the same log
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use crate::fit::RANGE_MARGIN;
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::judge::{Decoded, Judgement, Zeros};
+use crate::problem::model::Model;
+use crate::solve::field::carry::ServiceVariance;
+use crate::solve::field::error::FieldFitError;
+use crate::solve::field::fit::FieldFit;
+use crate::solve::field::noise::USUAL_DRIFT_MM;
+use crate::solve::field::parameters::FieldParameters;
+use crate::solve::field::posterior::Posterior;
+use crate::solve::field::update::{Change, Update, update};
+use crate::solve::field::whiten::Noise;
+use nalgebra::DMatrix;
+use runtime::calibration::Origin;
+use runtime::model::Probes;
+use runtime::parameters::{FitRecord, ParameterError, Text};
+use runtime::{Calibration, ModelKind, ParameterSet};
+
+/// What a log may leave open: systematic errors in service of this part of the noise (variances)
+/// more than the old calibration had. Two seconds that tell gains leave 0.01, a single axis for
+/// three gains 0.1 and far more; errors in service are then 1.025 times the noise floor ...
+const OPEN_MAX_GAINS: f64 = 0.05;
+/// ... and here 1.1 times: 4 s of all six axes leave 0.1, 2 s leave 1.2.
+const OPEN_MAX_ALL: f64 = 0.21;
+/// Chi-square may exceed that of the old log by this part, for the model is not exact ...
+const MISFIT_MAX: f64 = 0.02;
+/// ... and by chance by this many standard deviations.
+const CHANCE_MAX: f64 = 3.0;
+/// The same for the changes in terms of what the prior allows for.
+const FAR_MAX: f64 = 4.0;
+
+/// What is kept of a fit of the field model beside its blob: the prior of a recalibration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Known {
+    /// Covariance of the 81 parameters, in their order and units.
+    pub covariance: DMatrix<f64>,
+    /// The noise of the log.
+    pub noise: Noise,
+    /// Chi-square over residuals of the fit: above 1 by what the model does not describe.
+    pub misfit: f64,
+}
+
+impl Known {
+    /// Of a fit.
+    pub fn of_fit(fit: &FieldFit) -> Self {
+        Self {
+            covariance: fit.posterior.covariance.clone(),
+            noise: fit.noise,
+            misfit: fit.score.chi_squared / fit.score.residuals.max(1) as f64,
+        }
+    }
+}
+
+/// A calibration brought up to date.
+#[derive(Clone, Debug)]
+pub struct Recalibration {
+    /// What goes into the blob.
+    pub set: ParameterSet,
+    /// What goes beside it; `None` without an old one.
+    pub known: Option<Known>,
+    /// Change of the gain of A, B, C, in parts of the old one, with its standard error.
+    pub gains: [(f64, f64); 3],
+    /// Errors predicted for service with the new blob, over the noise floor: X, Y, Rz.
+    pub after: [f64; 3],
+    /// The same with the old blob.
+    pub before: [f64; 3],
+    /// The noise floor of X, Y, Rz, rms: m, m, rad.
+    pub floor: [f64; 3],
+    /// Chi-square over residuals.
+    pub chi_squared: f64,
+    /// Errors over the log by the target's decoder, with the new and with the old blob; zero
+    /// deviations refitted.
+    pub judgement: Judgement,
+    /// With the old blob.
+    pub judgement_before: Judgement,
+}
+
+/// Why an old calibration is not brought up to date.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RecalibrateError {
+    /// The blob is not of the field model.
+    #[error(
+        "the blob is of {model}, and only the field model knows what it has to expect: fit again, with --model field"
+    )]
+    OtherModel {
+        /// What it is of.
+        model: String,
+    },
+    /// `all` needs the old posterior.
+    #[error("without the old posterior nothing but gains can be found: fit again")]
+    NothingKnown,
+    /// The log leaves too much open.
+    #[error(
+        "this log does not tell {}: it leaves errors of {:.2} / {:.2} / {:.2} times the noise floor in X / Y / Rz in \
+         service. Record {}", told(*change), ratios[0], ratios[1], ratios[2], recording(*change)
+    )]
+    NotCarried {
+        /// What was to be found.
+        change: Change,
+        /// Errors predicted for service over the noise floor: X, Y, Rz.
+        ratios: [f64; 3],
+    },
+    /// The log shows another change than the one asked for.
+    #[error(
+        "{} does not describe this log: its residuals are {ratio:.1} times what noise makes them (chi-square, limit \
+         {limit:.2}). {}", told(*change), remedy(*change)
+    )]
+    NotDescribed {
+        /// What was to be found.
+        change: Change,
+        /// Chi-square over residuals.
+        ratio: f64,
+        /// Its limit.
+        limit: f64,
+    },
+    /// The parameters would have to change further than any probe drifts.
+    #[error(
+        "{} would be one beyond all that probes drift or are moved by (sum of squares {prior:.0} against what the prior \
+         allows for, limit {limit:.0}): check that the log is of this stage, and its columns, order and signs; or fit again",
+        told(*change)
+    )]
+    TooFar {
+        /// What was to be found.
+        change: Change,
+        /// Sum of squares of the changes in terms of what is allowed for.
+        prior: f64,
+        /// Its limit.
+        limit: f64,
+    },
+    /// The equations can't be solved.
+    #[error(transparent)]
+    Unsolved(#[from] FieldFitError),
+    /// The new parameters cannot serve a decoder.
+    #[error("the new parameters cannot be used: {0}. Check the log and the stage file")]
+    Unusable(ParameterError),
+}
+
+const fn told(change: Change) -> &'static str {
+    match change {
+        Change::Gain => "one gain for all probes",
+        Change::Gains => "a gain for each probe",
+        Change::All => "a change of all parameters",
+    }
+}
+
+const fn recording(change: Change) -> &'static str {
+    match change {
+        Change::Gain => "a sine along Y at service amplitude, 2 s",
+        Change::Gains => {
+            "X, Y and Rz moving at once, each at a frequency of its own, 2 s; or try --what gain"
+        }
+        Change::All => {
+            "all six axes moving at once at service amplitude, each at a frequency of its own (host-fit plan --seconds 8); \
+             or try --what gains"
+        }
+    }
+}
+
+const fn remedy(change: Change) -> &'static str {
+    match change {
+        Change::Gain => "Try --what gains; if a probe was moved, --what all",
+        Change::Gains => "Something else has changed as well: try --what all",
+        Change::All => "Check the columns, signs and scales of the log, or fit again",
+    }
+}
+
+/// Brings `old` up to date by a log. `created` is for the new blob, which keeps the serial number
+/// and the calibrated range of the old one.
+///
+/// # Errors
+/// See [`RecalibrateError`].
+pub fn recalibrate(
+    old: &ParameterSet,
+    known: Option<&Known>,
+    dataset: &Dataset,
+    stage: &Stage,
+    change: Change,
+    created: Text,
+) -> Result<Recalibration, RecalibrateError> {
+    let old_parameters =
+        FieldParameters::of_set(old, stage).ok_or_else(|| RecalibrateError::OtherModel {
+            model: Model::of(old.model).title(),
+        })?;
+    if known.is_none() && change == Change::All {
+        return Err(RecalibrateError::NothingKnown);
+    }
+    let covariance = known.map(|known| &known.covariance);
+    let drift_mm = known.map_or(USUAL_DRIFT_MM, |known| known.noise.drift_mm);
+    let update = update(
+        dataset,
+        stage,
+        &old_parameters,
+        covariance,
+        change,
+        drift_mm,
+    )?;
+    let range = |words: [f32; 3]| words.map(|x| f64::from(x) / RANGE_MARGIN);
+    let ranges = (
+        range(old.constants.calibrated_planar),
+        range(old.constants.calibrated_vertical),
+    );
+    let expected = |parameters: &FieldParameters, posterior: &Posterior| {
+        ServiceVariance::new(parameters, posterior, &old_parameters, ranges)
+    };
+    let service = expected(&update.parameters, &update.posterior);
+    let open_before = covariance.map_or([0.0; 3], |covariance| {
+        let posterior =
+            Posterior::of_parameters(covariance.clone(), &old_parameters, &update.noise);
+        expected(&old_parameters, &posterior).systematic
+    });
+    let open_max = match change {
+        Change::Gain | Change::Gains => OPEN_MAX_GAINS,
+        Change::All => OPEN_MAX_ALL,
+    };
+    let open = |k: usize| service.systematic[k] > open_before[k] + open_max * service.noise[k];
+    if (0..3).any(open) {
+        return Err(RecalibrateError::NotCarried {
+            change,
+            ratios: service.ratios(),
+        });
+    }
+    check_described(&update, known, change)?;
+
+    let origin = Origin {
+        serial: old.serial.clone(),
+        created,
+        logs_sha256: dataset.sha256,
+        fit: FitRecord::default(),
+    };
+    let set = prepare(old, &update.parameters, stage, &origin)?;
+    let judge = |set: &ParameterSet| Decoded::new(set, dataset).judge(dataset, stage, Zeros::Refit);
+    let judgement = judge(&set);
+    let axes = judgement.errors.axes;
+    let rows = u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX);
+    let fit = FitRecord {
+        rows,
+        train_rows: rows,
+        rms: axes.map(|a| a.rms as f32),
+        peak: axes.map(|a| a.peak as f32),
+        forced: old.fit.forced,
+    };
+    let gains = update.gains(&old_parameters);
+    let before = |k: usize| {
+        let off = service.difference[k] + service.systematic[k];
+        (1.0 + off / service.noise[k]).sqrt()
+    };
+    Ok(Recalibration {
+        set: ParameterSet { fit, ..set },
+        known: known.map(|known| Known {
+            covariance: update.posterior.covariance.clone(),
+            noise: update.noise,
+            misfit: known.misfit,
+        }),
+        gains,
+        after: service.ratios(),
+        before: [before(0), before(1), before(2)],
+        floor: service.noise.map(f64::sqrt),
+        chi_squared: update.chi_squared / update.residuals.max(1) as f64,
+        judgement,
+        judgement_before: judge(old),
+    })
+}
+
+/// Refuses a log whose residuals the change asked for does not explain, or not by a change that
+/// probes undergo.
+fn check_described(
+    update: &Update,
+    known: Option<&Known>,
+    change: Change,
+) -> Result<(), RecalibrateError> {
+    let count = update.residuals.max(1) as f64;
+    let misfit = known.map_or(1.0, |known| known.misfit.max(1.0));
+    let limit = match change {
+        Change::Gain | Change::Gains => {
+            misfit * (1.0 + MISFIT_MAX) + CHANCE_MAX * (2.0 / count).sqrt()
+        }
+        // All parameters are free: what they don't describe is no other change of the stage.
+        Change::All => misfit + OPEN_MAX_ALL * 3.0 * update.rows as f64 / count,
+    };
+    let ratio = update.chi_squared / count;
+    if ratio > limit {
+        return Err(RecalibrateError::NotDescribed {
+            change,
+            ratio,
+            limit,
+        });
+    }
+    // Among thousands of residuals a few wild changes would not show.
+    let changes = update.changes as f64;
+    let far = changes + FAR_MAX * (2.0 * changes).sqrt();
+    if update.prior > far {
+        return Err(RecalibrateError::TooFar {
+            change,
+            prior: update.prior,
+            limit: far,
+        });
+    }
+    Ok(())
+}
+
+/// `old` with other parameters.
+fn prepare(
+    old: &ParameterSet,
+    parameters: &FieldParameters,
+    stage: &Stage,
+    origin: &Origin,
+) -> Result<ParameterSet, RecalibrateError> {
+    let constants = parameters
+        .constants(stage.hall.m_per_count)
+        .ok_or(RecalibrateError::Unusable(ParameterError::SingularPlane))?;
+    let calibration = Calibration {
+        model: ModelKind::Field,
+        geometry: parameters.model_31().geometry(),
+        probes: Probes::Field(constants.probes),
+        hall_m_per_code: stage.hall.m_per_count,
+        hall_window: old.constants.hall_window,
+        capacitive_probes_m: stage.capacitive_probes_m,
+        capacitive_m_per_code: stage.capacitive.m_per_count,
+        capacitive_window: old.constants.capacitive_window,
+        calibrated_planar: old.constants.calibrated_planar.map(f64::from),
+        calibrated_vertical: old.constants.calibrated_vertical.map(f64::from),
+        sensitivity_min: old.constants.sensitivity_min.into(),
+    };
+    calibration
+        .prepare(origin)
+        .map_err(RecalibrateError::Unusable)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,218 @@
+//! A log as the fit sees it: rows in SI units, grouped by movement.
+
+use runtime::{AnyDecoder, PlanarPose, RawFrame, Reading, VerticalPose};
+use std::hash::{Hash, Hasher};
+use std::path::PathBuf;
+
+/// The most rows that a fit works on. Of longer logs it takes a sample: what more rows would add to
+/// a calibration is far below the noise of a pose.
+pub const FIT_ROWS_MAX: usize = 125_000;
+
+/// What one servo period of a log gives the decoder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LoggedFrame {
+    /// All six codes, as on the target.
+    Codes(RawFrame),
+    /// Hall codes, and a vertical pose that the log holds in SI units: there are no
+    /// capacitive codes, so this goes through [`AnyDecoder::decode_at`].
+    HallCodes {
+        /// Hall codes of the probes A, B, C.
+        hall: [i32; 3],
+        /// Z, Rx, Ry rounded to the decoder's words: m, rad, rad.
+        vertical: VerticalPose<f32>,
+        /// Number of the servo period, wrapping.
+        sequence: u32,
+        /// When the codes were sampled, in us, wrapping.
+        time_us: u32,
+    },
+}
+
+impl LoggedFrame {
+    /// Hall codes of the probes A, B, C.
+    pub const fn hall(&self) -> [i32; 3] {
+        match self {
+            Self::Codes(frame) => frame.hall,
+            Self::HallCodes { hall, .. } => *hall,
+        }
+    }
+
+    /// Codes of the capacitive gaps 1, 2, 3, where the log has them.
+    pub const fn capacitive(&self) -> Option<[i32; 3]> {
+        match self {
+            Self::Codes(frame) => Some(frame.capacitive),
+            Self::HallCodes { .. } => None,
+        }
+    }
+
+    /// Number of the servo period within its movement, from 0: by time, so a gap in the log
+    /// shows as frames missed.
+    pub const fn sequence(&self) -> u32 {
+        match self {
+            Self::Codes(frame) => frame.sequence,
+            Self::HallCodes { sequence, .. } => *sequence,
+        }
+    }
+
+    /// The same frame with another sequence number.
+    #[must_use]
+    pub const fn with_sequence(mut self, number: u32) -> Self {
+        match &mut self {
+            Self::Codes(frame) => frame.sequence = number,
+            Self::HallCodes { sequence, .. } => *sequence = number,
+        }
+        self
+    }
+
+    /// The reading of the runtime's own decoder, less `zero`.
+    pub fn decode(&self, decoder: &AnyDecoder, zero: &PlanarPose<f32>) -> Reading {
+        match self {
+            Self::Codes(frame) => decoder.decode(frame, zero),
+            Self::HallCodes { hall, vertical, .. } => decoder.decode_at(*hall, *vertical, zero),
+        }
+    }
+}
+
+/// One sampled servo period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// Which movement it belongs to: an index into [`Dataset::movements`].
+    pub movement: usize,
+    /// Time within the log, us.
+    pub t_us: i64,
+    /// What the decoder takes.
+    pub frame: LoggedFrame,
+    /// Displacement read by the Hall probes A, B, C at the designed scale, m.
+    pub signal_m: [f64; 3],
+    /// Z, Rx, Ry by the capacitive sensors: m, rad, rad.
+    pub vertical: [f64; 3],
+    /// X, Y, Rz by the interferometers: m, m, rad. Zeros in a log without reference.
+    pub reference: [f64; 3],
+}
+
+impl Hash for Row {
+    fn hash<H: Hasher>(&self, hash: &mut H) {
+        (self.t_us, self.frame.hall()).hash(hash);
+        self.vertical.map(f64::to_bits).hash(hash);
+        self.reference.map(f64::to_bits).hash(hash);
+    }
+}
+
+/// One movement of one log: between its start and its end the interferometers were not reset.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Movement {
+    /// Which of the logs named on the command line, from 0: an index into [`Dataset::logs`].
+    pub log: usize,
+    /// Its number in that log's `movement` column.
+    pub index: i64,
+    /// Its rows in [`Dataset::rows`].
+    pub rows: core::ops::Range<usize>,
+}
+
+/// One log that the rows came from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogSource {
+    /// The file, as it was named.
+    pub path: PathBuf,
+    /// Its rows in [`Dataset::rows`].
+    pub rows: core::ops::Range<usize>,
+    /// How many rows were read of it, with those that are not in the dataset.
+    pub rows_read: usize,
+    /// How many movements these have.
+    pub movements_read: usize,
+    /// Whether it holds the interferometers' reference; if not, [`Row::reference`] is zero.
+    pub has_reference: bool,
+}
+
+/// Rows of one or more logs, movement after movement: all rows of short logs, and of long ones a
+/// sample of runs, each a movement by itself.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Dataset {
+    /// The rows, those of a movement next to each other.
+    pub rows: Vec<Row>,
+    /// The movements, in the order of their first rows.
+    pub movements: Vec<Movement>,
+    /// The logs, in the order in which they were named.
+    pub logs: Vec<LogSource>,
+    /// SHA-256 of the decompressed logs, one after the other.
+    pub sha256: [u8; 32],
+}
+
+impl Dataset {
+    /// How many rows and movements were read.
+    pub fn read(&self) -> (usize, usize) {
+        let logs = || self.logs.iter();
+        (
+            logs().map(|log| log.rows_read).sum(),
+            logs().map(|log| log.movements_read).sum(),
+        )
+    }
+
+    /// Ends a log with reference: all rows and movements after those of the logs before are its own.
+    pub fn end_log(&mut self, path: impl Into<PathBuf>) {
+        let start = self.logs.last().map_or(0, |log| log.rows.end);
+        let log = self.logs.len();
+        let rows = start..self.rows.len();
+        self.logs.push(LogSource {
+            path: path.into(),
+            rows_read: rows.len(),
+            movements_read: self.movements.iter().filter(|m| m.log == log).count(),
+            rows,
+            has_reference: true,
+        });
+    }
+
+    /// How to name a movement: its number, after the name of its log where there are several.
+    pub fn movement_name(&self, movement: &Movement) -> String {
+        self.movement_named(movement.log, movement.index)
+    }
+
+    /// The same of a movement by its log and its number there.
+    pub fn movement_named(&self, log: usize, index: i64) -> String {
+        match self.logs.get(log) {
+            Some(log) if self.logs.len() > 1 => format!("{}:{index}", log.path.display()),
+            _ => index.to_string(),
+        }
+    }
+
+    /// The movements whose rows `keep` wants, numbered anew; logs and hash stay those of the
+    /// whole.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(&[Row]) -> bool) -> Self {
+        let wanted = |movement: &Movement| keep(&self.rows[movement.rows.clone()]);
+        let wanted: Vec<bool> = self.movements.iter().map(wanted).collect();
+        self.where_row(|row| wanted[self.rows[row].movement])
+    }
+
+    /// All rows but some; movements that lose all of theirs are left out. Logs and hash stay those of
+    /// the whole.
+    #[must_use]
+    pub fn without(&self, rows: &[usize]) -> Self {
+        let mut wanted = vec![true; self.rows.len()];
+        for row in rows {
+            wanted[*row] = false;
+        }
+        self.where_row(|row| wanted[row])
+    }
+
+    fn where_row(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let mut out = Self {
+            rows: Vec::new(),
+            movements: Vec::new(),
+            logs: self.logs.clone(),
+            sha256: self.sha256,
+        };
+        for movement in &self.movements {
+            let (start, number) = (out.rows.len(), out.movements.len());
+            let kept = movement.rows.clone().filter(|row| keep(*row));
+            out.rows.extend(kept.map(|row| Row {
+                movement: number,
+                ..self.rows[row]
+            }));
+            let rows = start..out.rows.len();
+            if !rows.is_empty() {
+                out.movements.push(Movement { rows, ..*movement });
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,191 @@
+//! The order of the rows of a log: movement after movement, time forwards; and their sequence numbers
+//! by time, so that a gap shows as frames missed.
+//!
+//! In a log that has no column for them, a movement ends where the time starts again, where rows are
+//! missing for more than ten of the log's own periods (its median step), or, where the user
+//! asks for it, after a given time.
+
+use super::error::LogError;
+use super::table::Head;
+use std::collections::HashMap;
+
+/// Most movements of a log: more than a week of the shortest, in little memory.
+pub(super) const MOVEMENTS_MAX: usize = 1 << 19;
+
+/// Longest gap within a movement, in periods of the log: longer than what a busy computer loses
+/// now and then, shorter than it takes to reset an interferometer.
+pub(super) const GAP_PERIODS: f64 = 10.0;
+
+/// So many rows make a movement after which the time may start again; after fewer, rows are out
+/// of order.
+const ROWS_MIN: usize = 10;
+
+/// Which cells of a row hold its place.
+#[derive(Clone, Copy, Debug)]
+pub struct OrderCells {
+    /// The time.
+    pub time: usize,
+    /// The movement, if there is a column for it.
+    pub movement: Option<usize>,
+}
+
+/// The place of a row that is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RowPlace {
+    /// Number of its movement.
+    pub movement: i64,
+    /// Whether a movement begins with it.
+    pub begins: bool,
+    /// 0 at the start of each movement, then by the time since the row kept before, in periods, at
+    /// least 1 more.
+    pub sequence: u32,
+}
+
+/// Follows the rows of one log.
+#[derive(Debug)]
+pub struct Order {
+    cells: OrderCells,
+    /// The median time between rows, us.
+    pub period_us: f64,
+    /// Length of the movements, us, where the user asks for one.
+    split_us: Option<f64>,
+    /// Movement, if there is a column for it, and time of the row in hand.
+    current: Option<(Option<i64>, f64)>,
+    /// The line at which each movement was left.
+    left: HashMap<i64, usize>,
+    /// Time of the first row, kept or not, since the time last started, and how many rows since then.
+    started: (f64, usize),
+    /// Whether a movement begins with the next row that is kept.
+    begins: bool,
+    kept: Kept,
+    /// Movements so far.
+    pub(super) movements: usize,
+    /// The first movement with a single row, and how many there are.
+    single: Option<(i64, usize)>,
+}
+
+/// The rows of a movement that were kept.
+#[derive(Debug, Default)]
+struct Kept {
+    movement: i64,
+    rows: usize,
+    first_us: f64,
+    last_us: f64,
+    /// Of the last one.
+    sequence: u32,
+}
+
+impl Order {
+    /// Of a log with this period, us; `split_s` is the length of its movements, if the user asks for
+    /// one.
+    pub fn new(cells: OrderCells, period_us: f64, split_s: Option<f64>) -> Self {
+        Self {
+            cells,
+            period_us,
+            split_us: split_s.map(|seconds| seconds * 1e6),
+            current: None,
+            left: HashMap::new(),
+            started: (0.0, 0),
+            begins: true,
+            kept: Kept::default(),
+            movements: 0,
+            single: None,
+        }
+    }
+
+    /// Takes the next row, in this line, in hand: its movement, if the log has a column for it, and its
+    /// time, us.
+    ///
+    /// # Errors
+    /// `TimeBackwards`, `DuplicatedRow`, `MovementReturns`, `TooManyMovements`.
+    pub fn take(
+        &mut self,
+        head: &Head,
+        line: usize,
+        named: Option<i64>,
+        t_us: f64,
+    ) -> Result<(), LogError> {
+        let place = |cell| head.place(line, cell, named);
+        let (first_us, rows) = self.started;
+        let restarts = named.is_none() && rows >= ROWS_MIN && t_us <= first_us;
+        match self.current {
+            Some((current, before_us)) if current == named && !restarts => {
+                if t_us < before_us {
+                    return Err(LogError::TimeBackwards {
+                        place: place(self.cells.time),
+                        before_us: before_us.round() as i64,
+                        t_us: t_us.round() as i64,
+                    });
+                }
+                if t_us == before_us {
+                    return Err(LogError::DuplicatedRow {
+                        place: place(self.cells.time),
+                        t_us: t_us.round() as i64,
+                    });
+                }
+                let is_gap = t_us - before_us > GAP_PERIODS * self.period_us;
+                self.begins |= named.is_none() && is_gap;
+                self.started.1 += 1;
+            }
+            current => {
+                let left = current.and_then(|(movement, _)| movement);
+                self.left.extend(left.map(|movement| (movement, line)));
+                if let Some(&left_line) = named.and_then(|named| self.left.get(&named)) {
+                    return Err(LogError::MovementReturns {
+                        place: place(self.cells.movement.unwrap_or_default()),
+                        left_line,
+                    });
+                }
+                if self.left.len() >= MOVEMENTS_MAX {
+                    return Err(LogError::TooManyMovements {
+                        path: head.path.clone(),
+                        line,
+                        limit: MOVEMENTS_MAX,
+                    });
+                }
+                self.started = (t_us, 1);
+                self.begins = true;
+            }
+        }
+        self.current = Some((named, t_us));
+        Ok(())
+    }
+
+    /// The place of the row in hand, which is kept.
+    pub fn keep(&mut self) -> RowPlace {
+        let (named, t_us) = self.current.unwrap_or_default();
+        // Half a period early is on time: steps jitter.
+        let is_over = |length: f64| t_us - self.kept.first_us >= length - self.period_us / 2.0;
+        let begins = self.begins || self.split_us.is_some_and(is_over);
+        self.begins = false;
+        if begins {
+            self.end_movement();
+            self.kept = Kept {
+                movement: named.unwrap_or(self.movements as i64),
+                first_us: t_us,
+                ..Kept::default()
+            };
+            self.movements += 1;
+        } else {
+            let periods = ((t_us - self.kept.last_us) / self.period_us).round();
+            // Within half the range of u32, which the servo counts as ahead.
+            let periods = periods.clamp(1.0, f64::from(i32::MAX)) as u32;
+            self.kept.sequence = self.kept.sequence.wrapping_add(periods);
+        }
+        self.kept.last_us = t_us;
+        self.kept.rows += 1;
+        RowPlace {
+            movement: self.kept.movement,
+            begins,
+            sequence: self.kept.sequence,
+        }
+    }
+
+    /// The last movement is over. Gives the first movement with a single row, and how many there are.
+    pub(super) fn end_movement(&mut self) -> Option<(i64, usize)> {
+        if self.kept.rows == 1 {
+            self.single.get_or_insert((self.kept.movement, 0)).1 += 1;
+        }
+        self.single
+    }
+}

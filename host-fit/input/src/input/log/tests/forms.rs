@@ -1,0 +1,306 @@
+//! The forms in which laboratories save logs.
+
+use super::*;
+
+/// The log with numbers of some columns divided by `by`, with so many decimals.
+fn divided(columns: std::ops::Range<usize>, by: f64, decimals: usize) -> String {
+    let mut lines = LOG.lines();
+    let header = lines.next().expect("a header").to_owned() + "\n";
+    lines.fold(header, |text, line| {
+        let cells = line
+            .split(',')
+            .enumerate()
+            .map(|(k, cell)| match cell.parse::<f64>() {
+                Ok(number) if columns.contains(&k) => format!("{:.decimals$}", number / by),
+                _ => cell.to_owned(),
+            });
+        text + &cells.collect::<Vec<_>>().join(",") + "\n"
+    })
+}
+
+#[test]
+fn units_stand_in_the_header_in_every_spelling() {
+    let um = divided(2..5, 1e3, 3);
+    for names in [
+        ["ifm_x_um", "ifm_y1_um", "ifm_y2_um"],
+        ["ifm_x [um]", "ifm_y1 [um]", "ifm_y2 [um]"],
+        ["ifm_x(um)", "IFM Y1 (um)", "Ifm-Y2 ( um )"],
+        ["ifm_x/um", "ifm_y1 / um", "ifm_y2/\u{b5}m"],
+        ["ifm_x [\u{b5}m]", "ifm_y1 (\u{3bc}m)", "ifm_y2_\u{3bc}m"],
+    ] {
+        let log = um
+            .replace("ifm_x_nm", names[0])
+            .replace("ifm_y1_nm", names[1])
+            .replace("ifm_y2_nm", names[2]);
+        same_rows(&log, stage());
+    }
+    let log = divided(1..2, 1e6, 3)
+        .replace("t_us", "Time (s)")
+        .replace("hall_a_cnt", "Hall A [counts]");
+    same_rows(
+        log.replace("cap1_cnt", "cap 1")
+            .replace("movement", "Movement"),
+        stage(),
+    );
+    // Latin-1, as older programs write it.
+    let latin = um
+        .replace("ifm_x_nm", "ifm_x [um]")
+        .replace("ifm_y1_nm", "ifm_y1_um")
+        .replace("ifm_y2_nm", "ifm_y2_um");
+    let mut latin = latin.into_bytes();
+    let at = latin.iter().position(|b| *b == b'[').expect("a bracket") + 1;
+    latin[at] = 0xb5;
+    same_rows(latin, stage());
+    // A default name with a unit is no other's once [log] names a column for the quantity.
+    let mapped = stage_with("ifm_x = \"laser_nm\"");
+    let named = LOG.replace("ifm_x_nm", "ifm_x [nm]");
+    refused_with(&named, &mapped, &["(ifm_x [nm]) is unknown"]);
+    // A name in [log] is that of the header, letter for letter, and its unit is read from it.
+    let mapped = stage_with(
+        "ifm_x = \"X [um]\"\nifm_y1 = \"Y left/um\"\nifm_y2 = { column = \"Y (right)\", unit = \"\u{b5}m\" }",
+    );
+    let log = um
+        .replace("ifm_x_nm", "X [um]")
+        .replace("ifm_y1_nm", "Y left/um")
+        .replace("ifm_y2_nm", "Y (right)");
+    same_rows(&log, &mapped);
+}
+
+#[test]
+fn a_row_of_units_below_the_header_tells_them_or_agrees() {
+    let um = divided(2..5, 1e3, 3);
+    let bare = um
+        .replace("ifm_x_nm", "ifm_x")
+        .replace("ifm_y1_nm", "ifm_y1")
+        .replace("ifm_y2_nm", "ifm_y2");
+    let with_units = |log: &str, units: &str| log.replacen('\n', &format!("\n{units}\n"), 1);
+    same_rows(with_units(&bare, ",us,um,um,um,,,,,,"), stage());
+    same_rows(
+        with_units(&bare, "-,[\u{b5}s],[\u{b5}m],(um),um,cnt,cnt,cnt,-,-,-"),
+        stage(),
+    );
+    same_rows(
+        with_units(LOG, "-,us,nm,nm,nm,cnt,cnt,cnt,cnt,cnt,cnt"),
+        stage(),
+    );
+    for (log, units, column) in [
+        (LOG, "-,us,um,nm,nm,cnt,cnt,cnt,cnt,cnt,cnt", 3),
+        (LOG, "-,s,nm,nm,nm,cnt,cnt,cnt,cnt,cnt,cnt", 2),
+        (LOG, "-,us,nm,nm,nm,cnt,cnt,cnt,V,V,V", 9),
+    ] {
+        let place = format!("log.csv:1: column {column} ");
+        refused_with(
+            &with_units(log, units),
+            stage(),
+            &["row below the header", &place],
+        );
+    }
+    // What is no row of units is a row with bad cells.
+    for row in [
+        "-,us,nm,nm,nm,cnt,cnt,cnt,cnt,cnt,1",
+        "a,b,c,d,e,f,g,h,i,j,k",
+    ] {
+        let error = refused_with(&with_units(LOG, row), stage(), &["not a number"]);
+        assert_eq!(place(&error).0, 2);
+    }
+    refused_with(
+        &with_units(&bare, ",us,,um,um,,,,,,"),
+        stage(),
+        &["ifm_x", "no unit"],
+    );
+}
+
+#[test]
+fn notes_stand_above_the_header_and_numpy_puts_it_in_a_comment() {
+    same_rows(
+        format!("Stage 7, by hand\n\"open quote\nRate;500\n\n{LOG}"),
+        stage(),
+    );
+    same_rows(format!("{}\n{LOG}", "# a comment\n".repeat(1_000)), stage());
+    same_rows(format!("# {LOG}"), stage());
+    same_rows(format!("#{}", LOG.replace(',', "\t")), stage());
+    // Lines are counted with the notes.
+    let error = refused(&format!("note\nnote\n{}", spoilt(",161,", ",x,")));
+    assert_eq!(place(&error).0, 5);
+}
+
+#[test]
+fn decimal_commas_are_read_where_commas_do_not_separate_cells() {
+    let um = divided(2..5, 1e3, 3).replace("_nm", "_um");
+    for separator in [";", "\t"] {
+        same_rows(um.replace(',', separator).replace('.', ","), stage());
+        // A comma that may stand between thousands, and one beside a point.
+        let log = LOG.replace(',', separator);
+        let comma = if separator == ";" { "7,664" } else { "7,5" };
+        let log = log.replace("7664", comma).replace("8700", "8700.5");
+        let error = refused_with(&log, stage(), &["decimal comma"]);
+        assert_eq!(place(&error).0, 3);
+    }
+    same_rows(
+        um.replace(',', "\";\"")
+            .replace('.', ",")
+            .replace('\n', "\"\n\"")
+            .trim_end_matches('"')
+            .replacen("movement", "\"movement", 1),
+        stage(),
+    );
+}
+
+#[test]
+fn utf_16_with_and_without_a_mark() {
+    let text = LOG.replace("ifm_x_nm", "ifm_x (nm)").replace('\n', "\r\n");
+    for mark in ["", "\u{feff}"] {
+        let marked = format!("{mark}{text}");
+        let little: Vec<u8> = marked.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let big: Vec<u8> = marked.encode_utf16().flat_map(u16::to_be_bytes).collect();
+        same_rows(&little, stage());
+        same_rows(&big, stage());
+        same_rows(gzip(&little), stage());
+        // The hash is that of the file, as another program would compute it.
+        let hash = read_in(gzip(&big), stage()).expect("sound").dataset.sha256;
+        assert_eq!(hash, <[u8; 32]>::from(Sha256::digest(&big)));
+        let cut = read_in(&little[..little.len() - 1], stage()).expect_err("half a character");
+        assert!(
+            matches!(cut, LogError::Source(SourceError::Utf16 { .. })),
+            "{cut}"
+        );
+        let units: Vec<u8> = [&little[..40], &[0, 0], &little[40..]].concat();
+        let zero = read_in(&units, stage()).expect_err("a character that no text has");
+        assert!(
+            matches!(zero, LogError::Source(SourceError::Binary { .. })),
+            "{zero}"
+        );
+    }
+}
+
+#[test]
+fn gaps_in_um_are_read_as_they_are() {
+    // 1.5625e-8 m a code.
+    let um = divided(5..8, 64.0, 6);
+    let named = um
+        .replace("cap1_cnt", "cap1_um")
+        .replace("cap2_cnt", "Cap 2 [um]");
+    let below =
+        named
+            .replace("cap3_cnt", "cap 3")
+            .replacen('\n', "\n-,us,nm,nm,nm,um,um,um,-,-,-\n", 1);
+    let named = named.replace("cap3_cnt", "gap_3/um");
+    let mapped = um
+        .replace("cap1_cnt", "left")
+        .replace("cap2_cnt", "right")
+        .replace("cap3_cnt", "front_um");
+    let log = "gap_1 = { column = \"left\", unit = \"um\" }\ngap_2 = { column = \"right\", unit = \"um\" }\ngap_3 = \"front_um\"";
+    let want = sound(LOG).dataset.rows;
+    for (text, stage) in [
+        (named, stage()),
+        (below, stage()),
+        (mapped, &stage_with(log)),
+    ] {
+        let rows = read_in(&text, stage).expect(&text).dataset.rows;
+        for (have, want) in rows.iter().zip(&want) {
+            let pairs = have.vertical.into_iter().zip(want.vertical);
+            assert!({ pairs }.all(|(a, b)| (a - b).abs() < 1e-15), "{have:?}");
+            assert_eq!(have.frame.hall(), want.frame.hall());
+        }
+    }
+    let both = LOG.replace("movement", "gap_1_um");
+    refused_with(&both, stage(), &["both `cap1_cnt` and `gap1_m`"]);
+}
+
+#[test]
+fn dates_and_times_become_microseconds() {
+    let dated = |zone: &str, time: &str| {
+        let mut day = 0;
+        let mut lines = LOG.lines();
+        let header = lines.next().expect("a header").replace("t_us", time) + "\n";
+        lines.fold(header, |text, line| {
+            let cells: Vec<_> = line.splitn(3, ',').collect();
+            day += i64::from(cells[1] == "0");
+            let ms = cells[1].parse::<i64>().expect("a time") / 1000;
+            let date = match (day, ms) {
+                (1, 0) => "2025-12-31T23:59:59.998".to_owned(),
+                (1, ms) => format!("2026-01-01T00:00:00.{:03}", ms - 2),
+                (_, ms) => format!("2026-01-02T03:04:05.{ms:03}"),
+            };
+            text + &format!("{},{date}{zone},{}\n", cells[0], cells[2])
+        })
+    };
+    for zone in ["Z", "", "+01:00"] {
+        for name in ["t_us", "Time", "t"] {
+            let dataset = read_in(dated(zone, name).as_bytes(), stage())
+                .expect("sound")
+                .dataset;
+            let (rows, want) = (&dataset.rows, sound(LOG).dataset.rows);
+            let steps = |rows: &[Row]| -> Vec<i64> {
+                rows[..3]
+                    .windows(2)
+                    .map(|p| p[1].t_us - p[0].t_us)
+                    .collect()
+            };
+            assert_eq!(steps(rows), steps(&want), "over the end of the year");
+            assert_eq!(rows[4].frame.with_sequence(0).hall(), want[4].frame.hall());
+        }
+    }
+    let mapped = stage_with("time = { column = \"Zeit\", unit = \"iso\" }");
+    read_in(dated("Z", "Zeit").as_bytes(), &mapped).expect("sound");
+    let mixed = dated("Z", "Time").replace("05.002Z", "05.002");
+    let error = refused_with(&mixed, stage(), &["another way"]);
+    assert_eq!(place(&error), (6, 2, "Time", Some(4)));
+    refused_with(
+        &dated("", "Time").replace("2026-01-01T", "2026-02-30T"),
+        stage(),
+        &["not a number"],
+    );
+}
+
+#[test]
+fn voltages_become_the_codes_of_the_converter() {
+    // 20.48 V over 65536 codes.
+    let volts = divided(8..11, 1.0 / 3.125e-4, 6);
+    let in_volts = volts
+        .replace("hall_a_cnt", "Hall A [V]")
+        .replace("hall_b_cnt", "hall_b/V")
+        .replace("hall_c_cnt", "hall_c_V");
+    refused_with(
+        &in_volts,
+        stage(),
+        &["column 9 ", "volts_per_count", "[hall]"],
+    );
+    let with_volts = |volts: &str, log: &str| {
+        let text = SOUND.replacen(
+            "code_min",
+            &format!("volts_per_count = {volts}\ncode_min"),
+            1,
+        );
+        Stage::from_toml(&format!("{text}[log]\n{log}\n"), Path::new("stage.toml"))
+    };
+    let stage = with_volts("3.125e-4", "").expect("sound");
+    same_rows(&in_volts, &stage);
+    let mv = divided(8..11, 1.0 / 0.3125, 3).replace("hall_a_cnt", "ADC 1");
+    let mv = mv
+        .replace("hall_b_cnt", "hall_b [mV]")
+        .replace("hall_c_cnt", "hall_c [mV]");
+    let mapped = with_volts("3.125e-4", "hall_a = { column = \"ADC 1\", unit = \"mV\" }");
+    same_rows(&mv, &mapped.expect("sound"));
+    // Counts stay counts.
+    same_rows(LOG, &stage);
+    let error = with_volts("-1.0", "").expect_err("no converter");
+    assert!(
+        error.to_string().contains("hall.volts_per_count"),
+        "{error}"
+    );
+    let text = format!("{SOUND}[log]\ncap_1 = \"gap 1 [V]\"\n");
+    let error = Stage::from_toml(&text, Path::new("stage.toml")).expect_err("no scale");
+    assert!(error.to_string().contains("[capacitive]"), "{error}");
+    // Another scale than the converter's is told by voltages that fall between codes.
+    let other = with_volts("3.2e-4", "").expect("sound");
+    let reading = read_in(in_volts.as_bytes(), &other).expect("read, with a warning");
+    assert!(
+        matches!(reading.warnings.as_slice(), [found] if found.code == Code::BetweenCodes && found.value > Some(0.15)),
+        "{:?}",
+        reading.warnings
+    );
+    let far = in_volts.replace("0.030312", "11.0");
+    let error = refused_with(&far, &stage, &["outside the converter's range"]);
+    assert_eq!(place(&error).1, 9);
+}

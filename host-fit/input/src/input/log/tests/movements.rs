@@ -1,0 +1,160 @@
+//! Logs without a column for the movement.
+
+use super::*;
+
+/// Rows at these times, ms, without a movement.
+fn log_at(times_ms: impl IntoIterator<Item = i64>) -> String {
+    let header = LOG.split_once('\n').expect("a header").0;
+    let header = header.replace("movement,", "");
+    times_ms
+        .into_iter()
+        .enumerate()
+        .fold(header + "\n", |text, (k, t)| {
+            text + &format!("{},{k},0,0,0,0,0,{},13,14\n", t * 1000, k % 100)
+        })
+}
+
+fn read_split(text: &str, split_s: Option<f64>) -> Result<LogReading, LogError> {
+    let options = ReadOptions {
+        split_s,
+        bad_rows: BadRows::Skip,
+        ..ReadOptions::default()
+    };
+    read_text(text, &options)
+}
+
+/// How many rows each movement has.
+#[track_caller]
+fn lengths(text: &str, split_s: Option<f64>) -> Vec<usize> {
+    let reading = read_split(text, split_s).expect("sound");
+    let movements = reading.dataset.movements;
+    let told = reading.warnings.iter().any(|found| {
+        found.code == Code::MovementsByTime && found.value == Some(movements.len() as f64)
+    });
+    assert!(told, "{:?}", reading.warnings);
+    for (slot, (movement, index)) in movements.iter().zip(0..).enumerate() {
+        assert_eq!(movement.index, index);
+        let rows = &reading.dataset.rows[movement.rows.clone()];
+        assert!(rows.iter().all(|row| row.movement == slot));
+        assert_eq!(rows[0].frame.sequence(), 0);
+    }
+    movements
+        .into_iter()
+        .map(|movement| movement.rows.len())
+        .collect()
+}
+
+#[test]
+fn a_continuous_log_is_one_movement_however_its_times_jitter() {
+    assert_eq!(lengths(&log_at((0..500).map(|k| 2 * k)), None), [500]);
+    let jitter = (0..500).map(|k| 20 * k + [0, 3, -4, 8][k as usize % 4]);
+    assert_eq!(lengths(&log_at(jitter), None), [500]);
+    // Every tenth row is missing, and ten in a row once.
+    let missing = (0..500).filter(|k| k % 10 != 3 && !(100..109).contains(k));
+    assert_eq!(lengths(&log_at(missing.map(|k| 2 * k)), None).len(), 1);
+}
+
+#[test]
+fn a_movement_ends_at_a_gap_and_where_the_time_starts_again() {
+    let gaps = (0..20).chain(31..50).chain(200..230).map(|k| 2 * k);
+    assert_eq!(lengths(&log_at(gaps), None), [20, 19, 30]);
+    let again = (0..20).chain(0..30).chain(-5..20).map(|k| 2 * k);
+    assert_eq!(lengths(&log_at(again), None), [20, 30, 25]);
+}
+
+#[test]
+fn rows_that_are_left_out_make_no_gap() {
+    let mut lines: Vec<String> = log_at((0..60).map(|k| 2 * k))
+        .lines()
+        .map(str::to_owned)
+        .collect();
+    for line in &mut lines[20..45] {
+        *line = line.replace(",13,", ",32767,");
+    }
+    assert_eq!(lengths(&(lines.join("\n") + "\n"), None), [35]);
+    // A gap before rows that are left out is one.
+    for line in &mut lines[20..45] {
+        let (time, rest) = line.split_once(',').expect("cells");
+        *line = format!("{},{rest}", time.parse::<i64>().expect("a time") + 100_000);
+    }
+    for line in &mut lines[45..] {
+        let (time, rest) = line.split_once(',').expect("cells");
+        *line = format!("{},{rest}", time.parse::<i64>().expect("a time") + 100_000);
+    }
+    assert_eq!(lengths(&(lines.join("\n") + "\n"), None), [19, 16]);
+}
+
+#[test]
+fn split_cuts_movements_of_a_length() {
+    let log = log_at((0..250).map(|k| 2 * k));
+    assert_eq!(lengths(&log, Some(0.2)), [100, 100, 50]);
+    let jitter = log_at((0..250).map(|k| 20 * k + [0, 3, -4, 8][k as usize % 4]));
+    assert_eq!(lengths(&jitter, Some(2.0)), [100, 100, 50]);
+    // A gap begins a movement, too.
+    let gap = log_at((0..130).chain(200..250).map(|k| 2 * k));
+    assert_eq!(lengths(&gap, Some(0.2)), [100, 30, 50]);
+    let error = read_split(LOG, Some(2.0)).expect_err("there is a column");
+    assert!(
+        matches!(error, LogError::SplitWithMovements { .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn rows_out_of_order_stay_refused() {
+    for times in [
+        vec![0, 2, 0, 4, 6],
+        (0..30).chain(20..40).collect(),
+        (0..30).chain(29..40).collect(),
+    ] {
+        let error = read_split(&log_at(times), None).expect_err("out of order");
+        let text = error.to_string();
+        assert!(
+            text.contains("backwards") || text.contains("repeats"),
+            "{text}"
+        );
+    }
+    // A column that stage.toml names must be there.
+    let stage = stage_with("movement = \"run\"");
+    let log = log_at((0..30).map(|k| 2 * k));
+    let error = read_bytes(
+        log.as_bytes(),
+        Path::new("log.csv"),
+        &stage,
+        &ReadOptions::default(),
+    );
+    assert!(matches!(
+        error,
+        Err(LogError::MissingColumn {
+            key: "movement",
+            ..
+        })
+    ));
+}
+
+#[test]
+fn one_file_for_each_movement() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let paths: Vec<_> = (0..3)
+        .map(|k| folder.path().join(format!("run{k}.csv")))
+        .collect();
+    for (k, path) in (0..).zip(&paths) {
+        std::fs::write(path, log_at((0..30 + k).map(|k| 2 * k))).expect("written");
+    }
+    let reading = read(&paths, stage(), &ReadOptions::default()).expect("sound");
+    let names: Vec<_> = reading
+        .dataset
+        .movements
+        .iter()
+        .map(|m| (m.log, m.index, m.rows.len()))
+        .collect();
+    assert_eq!(names, [(0, 0, 30), (1, 0, 31), (2, 0, 32)]);
+    let codes: Vec<Code> = reading.warnings.iter().map(|found| found.code).collect();
+    assert_eq!(codes, [Code::MovementsByTime; 3]);
+    assert!(
+        reading
+            .dataset
+            .movement_name(&reading.dataset.movements[1])
+            .contains("run1.csv")
+    );
+}

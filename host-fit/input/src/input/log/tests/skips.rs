@@ -1,0 +1,104 @@
+use super::*;
+
+const SKIP: ReadOptions = ReadOptions {
+    bad_rows: BadRows::Skip,
+    rows_max: None,
+    ..ReadOptions::FIT
+};
+
+fn codes(reading: &LogReading) -> Vec<i32> {
+    let first = |row: &Row| row.frame.hall()[0];
+    reading.dataset.rows.iter().map(first).collect()
+}
+
+#[test]
+fn bad_cells_are_left_out_and_counted_by_reason() {
+    let text = LOG
+        .replace(",97,", ",32767,")
+        .replace(",180,", ",-32768,")
+        .replace(",90,", ",,")
+        .replace("-860", "NaN");
+    let reading = read_text(&text, &SKIP).expect("read");
+    assert_eq!(codes(&reading), [13, 11]);
+    assert_eq!(reading.skipped_rows, 4);
+    let told = |code| move |found: &&Finding| found.code == code;
+    let skipped: Vec<_> = (reading.warnings.iter())
+        .filter(told(Code::RowsSkipped))
+        .map(|found| (found.message.as_str(), found.value))
+        .collect();
+    let want = [
+        ("a saturated code: 2 (the first: line 3, column 9", 2.0),
+        ("an empty cell: 1 (the first: line 6, column 9", 1.0),
+        ("a NaN or an infinity: 1 (the first: line 7, column 3", 1.0),
+    ];
+    assert_eq!(skipped.len(), want.len());
+    for ((message, rows), (words, count)) in skipped.into_iter().zip(want) {
+        assert!(message.contains(words) && rows == Some(count), "{message}");
+    }
+    let movements: Vec<_> = reading
+        .dataset
+        .movements
+        .iter()
+        .map(|m| (m.index, m.rows.clone()))
+        .collect();
+    assert_eq!(movements, [(0, 0..1), (4, 1..2)]);
+}
+
+#[test]
+fn a_gap_left_by_a_bad_row_shows_in_the_sequence() {
+    let text = LOG.replace(",97,", ",x,");
+    let reading = read_text(&text, &SKIP).expect("read");
+    let sequences: Vec<_> = reading
+        .dataset
+        .rows
+        .iter()
+        .map(|row| row.frame.sequence())
+        .collect();
+    // The median of the steps left, 2, 2 and 4 ms, is the servo's.
+    assert_eq!(sequences, [0, 2, 0, 1, 2]);
+}
+
+#[test]
+fn a_movement_of_which_nothing_is_left_gives_a_warning() {
+    let text = LOG
+        .replace(",13,14", ",a,14")
+        .replace(",97,", ",b,")
+        .replace(",180,", ",c,");
+    let reading = read_text(&text, &SKIP).expect("read");
+    assert_eq!(reading.dataset.movements.len(), 1);
+    assert_eq!(reading.dataset.rows[0].movement, 0);
+    let lost = |found: &Finding| {
+        found.code == Code::RowsSkipped
+            && found.value == Some(3.0)
+            && found.message.contains("all rows of movement 0 are bad")
+    };
+    assert!(reading.warnings.iter().any(lost), "{:?}", reading.warnings);
+}
+
+#[test]
+fn a_log_of_which_nothing_is_left_is_refused() {
+    let text: String = LOG
+        .replace(",1,", ",?,")
+        .replace(",2,", ",?,")
+        .replace(",-767,", ",?,")
+        .replace(",-765,", ",?,")
+        .replace(",-766,", ",?,");
+    let error = read_text(&text, &SKIP).expect_err("nothing left");
+    let LogError::NoGoodRows { rows: 6, first, .. } = &error else {
+        panic!("{error}");
+    };
+    assert!(matches!(**first, LogError::Cell { .. }), "{error}");
+}
+
+#[test]
+fn a_wrong_structure_is_refused_all_the_same() {
+    for (old, new, part) in [
+        ("97,87,-6", "97,87", "10 cells"),
+        ("150,2\n", "", "ends in the middle"),
+        ("\n4,2000,-871", "\n4,-1,x", "backwards"),
+        ("hall_b_cnt", "hall_d_cnt", "unknown"),
+    ] {
+        let error = read_text(&spoilt(old, new), &SKIP).expect_err(part);
+        assert!(error.to_string().contains(part), "{error}");
+    }
+}

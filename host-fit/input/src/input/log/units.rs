@@ -1,0 +1,182 @@
+//! Units, and how headers write them: `ifm_x_um`, `X [um]`, `X (um)`, `X/um`, with either micro
+//! sign.
+
+use super::layout::Kind;
+use std::borrow::Cow;
+
+const LENGTHS: [(&str, f64); 5] = [
+    ("m", 1.0),
+    ("mm", 1e-3),
+    ("um", 1e-6),
+    ("nm", 1e-9),
+    ("pm", 1e-12),
+];
+const ANGLES: [(&str, f64); 5] = [
+    ("rad", 1.0),
+    ("mrad", 1e-3),
+    ("urad", 1e-6),
+    ("nrad", 1e-9),
+    ("deg", core::f64::consts::PI / 180.0),
+];
+/// `iso` is the date and time of ISO 8601, which a cell says by itself; a number is us.
+const TIMES_TO_US: [(&str, f64); 5] = [
+    ("s", 1e6),
+    ("ms", 1e3),
+    ("us", 1.0),
+    ("ns", 1e-3),
+    ("iso", 1.0),
+];
+const VOLTAGES: [(&str, f64); 3] = [("V", 1.0), ("mV", 1e-3), ("uV", 1e-6)];
+/// What stands for no unit: of codes and indices.
+const COUNTS: [&str; 7] = ["", "-", "cnt", "count", "counts", "code", "LSB"];
+
+/// A symbol as the tables here write it.
+fn plain(symbol: &str) -> Cow<'_, str> {
+    let symbol = symbol.trim();
+    match symbol.is_ascii() {
+        true => symbol.into(),
+        false => symbol
+            .replace(['\u{b5}', '\u{3bc}'], "u")
+            .replace('\u{b0}', "deg")
+            .into(),
+    }
+}
+
+/// Whether the symbol stands for no unit.
+pub fn is_count(symbol: &str) -> bool {
+    COUNTS.contains(&symbol.trim())
+}
+
+/// Whether the symbol is a unit of any kind.
+pub(super) fn is_known(symbol: &str) -> bool {
+    let kinds = [Kind::Length, Kind::Angle, Kind::Time, Kind::Code];
+    kinds.into_iter().any(|kind| kind.unit(symbol).is_some())
+}
+
+impl Kind {
+    const fn table(self) -> &'static [(&'static str, f64)] {
+        match self {
+            Self::Length => &LENGTHS,
+            Self::Angle => &ANGLES,
+            Self::Time => &TIMES_TO_US,
+            Self::Code => &VOLTAGES,
+            Self::Index => &[],
+        }
+    }
+
+    /// What one `symbol` is in m, rad, us or, of codes, V; `None` if this kind has no such unit.
+    pub fn unit(self, symbol: &str) -> Option<f64> {
+        let symbol = plain(symbol);
+        let found = self.table().iter().find(|(name, _)| *name == symbol)?;
+        Some(found.1)
+    }
+
+    /// Whether one unit of this kind is `scale` m, rad or us.
+    pub(super) fn has_unit_of(self, scale: f64) -> bool {
+        self.table().iter().any(|(_, unit)| *unit == scale)
+    }
+
+    /// The unit that a column's name ends in, as `_nm` in `ifm_x_nm` or `[um]` in `X [um]`.
+    pub fn unit_of_name(self, name: &str) -> Option<f64> {
+        self.unit(split(name).1.unwrap_or(name))
+    }
+
+    /// The units of this kind, for messages.
+    pub const fn units(self) -> &'static str {
+        match self {
+            Self::Length => "m, mm, um, nm, pm",
+            Self::Angle => "rad, mrad, urad, nrad, deg",
+            Self::Time => "s, ms, us, ns, iso",
+            Self::Code => "V, mV, uV",
+            Self::Index => "none",
+        }
+    }
+
+    /// The SI unit in which a `scale` is given.
+    pub const fn scale_unit(self) -> &'static str {
+        match self {
+            Self::Length => "m",
+            Self::Angle => "rad",
+            Self::Time => "s",
+            Self::Index | Self::Code => "",
+        }
+    }
+
+    /// A `scale` in SI units times this leads to m, rad or us.
+    pub const fn per_si(self) -> f64 {
+        match self {
+            Self::Time => 1e6,
+            _ => 1.0,
+        }
+    }
+}
+
+/// A column's name without its unit, and the unit: what stands in brackets at its end, or a known
+/// unit after the last slash or underscore.
+pub fn split(name: &str) -> (&str, Option<&str>) {
+    let name = name.trim();
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        let inside = name.strip_suffix(close).and_then(|n| n.rsplit_once(open));
+        if let Some((base, unit)) = inside {
+            return (base.trim_end(), Some(unit.trim()));
+        }
+    }
+    let is_unit = |unit: &str| is_known(unit) || (is_count(unit) && !unit.trim().is_empty());
+    for mark in ['/', '_'] {
+        if let Some((base, unit)) = name.rsplit_once(mark).filter(|(_, unit)| is_unit(unit)) {
+            return (base.trim_end(), Some(unit.trim()));
+        }
+    }
+    (name, None)
+}
+
+/// A name without its unit as keys are written: lower case, one underscore between words.
+pub fn key_of(base: &str) -> String {
+    let words = base.split(|c: char| c.is_whitespace() || "_-.".contains(c));
+    let words: Vec<String> = words
+        .filter(|word| !word.is_empty())
+        .map(str::to_lowercase)
+        .collect();
+    words.join("_")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_split_into_base_and_unit_in_every_spelling() {
+        for (name, base, unit) in [
+            ("ifm_x_nm", "ifm_x", Some("nm")),
+            ("X [um]", "X", Some("um")),
+            ("X(um)", "X", Some("um")),
+            ("X / \u{b5}m", "X", Some("\u{b5}m")),
+            ("ifm_y1_\u{3bc}m", "ifm_y1", Some("\u{3bc}m")),
+            ("hall_a_cnt", "hall_a", Some("cnt")),
+            ("Hall A [mV]", "Hall A", Some("mV")),
+            ("T [degC]", "T", Some("degC")),
+            ("hall_a", "hall_a", None),
+            ("ifm_x_", "ifm_x_", None),
+            ("movement", "movement", None),
+            ("X/Y_um", "X/Y", Some("um")),
+            ("in/out", "in/out", None),
+            ("[", "[", None),
+            ("", "", None),
+        ] {
+            assert_eq!(split(name), (base, unit), "{name}");
+        }
+        assert_eq!(key_of("Hall  A"), "hall_a");
+        assert_eq!(key_of("IFM-Y1"), "ifm_y1");
+    }
+
+    #[test]
+    fn both_micro_signs_and_the_degree_are_units() {
+        for um in ["um", "\u{b5}m", "\u{3bc}m", " um "] {
+            assert_eq!(Kind::Length.unit(um), Some(1e-6), "{um:?}");
+        }
+        assert_eq!(Kind::Angle.unit("\u{b5}rad"), Some(1e-6));
+        assert_eq!(Kind::Angle.unit("\u{b0}"), Kind::Angle.unit("deg"));
+        assert_eq!(Kind::Time.unit_of_name("t (\u{3bc}s)"), Some(1.0));
+        assert_eq!(Kind::Length.unit("s"), None);
+    }
+}

@@ -1,0 +1,27 @@
+//! What a fit starts from: the stage as designed, and its logs as rows in SI units.
+//!
+//! ```
+//! use hall_input::input::log::{self, ReadOptions};
+//! use hall_input::input::shipped::{RUN_GZ, STAGE_TOML};
+//! use hall_input::input::stage::Stage;
+//!
+//! let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
+//! // `log::read` reads files.
+//! let reading = log::read_bytes(RUN_GZ, "run30.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
+//! assert_eq!(reading.dataset.rows.len(), 15_000);
+//! assert_eq!(reading.dataset.movements.len(), 1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod binary;
+pub mod dataset;
+pub mod draft;
+mod encoding;
+pub mod log;
+pub mod log_format;
+mod sample;
+pub mod shipped;
+pub mod source;
+pub mod stage;
+pub mod text;
+mod unpack;

@@ -1,0 +1,140 @@
+//! The table `[search]`: the ranges in which a search looks, and in which a fit's parameters are expected.
+//! Every key is optional: the defaults follow from the design.
+
+use super::document::{Document, List};
+use super::error::StageError;
+use super::file::COORDINATE_MAX_M;
+use super::{Probe, Range, SearchRanges, paper_signs};
+use toml::Spanned;
+
+/// Largest sensible sensitivity: a probe that reads 100 times its designed scale is another probe.
+const ETA_MAX: f64 = 100.0;
+/// Largest sensible misalignment: short of lying along the other axis.
+const THETA_MAX_DEG: f64 = 80.0;
+/// Largest sensible change of sensitivity per m or rad.
+const SLOPE_MAX: f64 = 1e7;
+/// Largest sensible zero deviation, m.
+const DELTA_MAX_M: f64 = 0.01;
+/// One degree, rad.
+const DEGREE: f64 = core::f64::consts::PI / 180.0;
+
+/// How far a probe may stand from its designed place along X and Y, m.
+const PLACE_M: f64 = 0.1;
+/// Usual misalignment at most.
+const THETA_DEG: f64 = 8.0;
+/// Usual sensitivities.
+const ETA: Range = Range {
+    low: 0.5,
+    high: 1.5,
+};
+/// Usual change of a sensitivity with height, 1/m: the field falls as the gap grows.
+const FALL_PER_M: Range = Range {
+    low: -5000.0,
+    high: 0.0,
+};
+/// Usual zero deviation at most, m.
+const DELTA_M: f64 = 1e-4;
+
+/// [low, high] as it stands in the file.
+type Ends = List<Spanned<f64>>;
+
+/// The ranges of the table, which must hold the designed coordinates. A key that it leaves out has
+/// its default.
+pub(super) fn ranges(
+    document: &Document<'_>,
+    designed: &[Probe; 3],
+) -> Result<SearchRanges, StageError> {
+    let one = |name, most, unit, designed, default| -> Result<Range, StageError> {
+        let ends: Option<Ends> = document.read("search", name)?;
+        ends.map_or(Ok(default), |ends| {
+            range(document, &ends, most, unit, designed)
+        })
+    };
+    let h = |name, at| one(name, COORDINATE_MAX_M, "m", Some(at), about(at, PLACE_M));
+    let [h1, h2, h3] = paper_signs(designed.map(|probe| probe.place_m));
+    let h_m = [
+        [h("h1x_m", h1[0])?, h("h1y_m", h1[1])?],
+        [h("h2x_m", h2[0])?, h("h2y_m", h2[1])?],
+        [h("h3x_m", h3[0])?, h("h3y_m", h3[1])?],
+    ];
+    let delta_m = one("delta_m", DELTA_MAX_M, "m", None, about(0.0, DELTA_M))?;
+    let mut ranges = SearchRanges::new(paper_signs(h_m), delta_m);
+    let eta = |name| one(name, ETA_MAX, "", None, ETA);
+    ranges.set("eta", [eta("eta_a")?, eta("eta_b")?, eta("eta_c")?]);
+    let default = about(0.0, THETA_DEG);
+    let theta = one("theta_deg", THETA_MAX_DEG, "degrees", Some(0.0), default)?;
+    let theta = Range {
+        low: theta.low * DEGREE,
+        high: theta.high * DEGREE,
+    };
+    ranges.set("theta_deg", [theta; 3]);
+    let three = |key, unit, default: [Range; 3]| -> Result<[Range; 3], StageError> {
+        let Some(list) = document.read::<List<Ends>>("search", key)? else {
+            return Ok(default);
+        };
+        let list: &[_; 3] = document.exactly(&list)?;
+        let [a, b, c] = list
+            .each_ref()
+            .map(|ends| range(document, ends, SLOPE_MAX, unit, None));
+        Ok([a?, b?, c?])
+    };
+    let a = three("a_per_m", "1/m", [FALL_PER_M; 3])?;
+    ranges.set("a_per_m", a);
+    // phi follows the height at the probe: b = a y, c = -a x.
+    let by =
+        |at: fn(&Probe) -> f64| [0, 1, 2].map(|k| product(a[k], about(at(&designed[k]), PLACE_M)));
+    let b = three("b_per_rad", "1/rad", by(|probe| probe.place_m[1]))?;
+    let c = three("c_per_rad", "1/rad", by(|probe| -probe.place_m[0]))?;
+    ranges.set("b_per_rad", b);
+    ranges.set("c_per_rad", c);
+    Ok(ranges)
+}
+
+/// The range of so much to both sides of a value.
+const fn about(value: f64, room: f64) -> Range {
+    Range {
+        low: value - room,
+        high: value + room,
+    }
+}
+
+/// The range of the products of two ranges.
+fn product(a: Range, b: Range) -> Range {
+    let ends = [
+        a.low * b.low,
+        a.low * b.high,
+        a.high * b.low,
+        a.high * b.high,
+    ];
+    Range {
+        low: ends.into_iter().fold(f64::INFINITY, f64::min),
+        high: ends.into_iter().fold(f64::NEG_INFINITY, f64::max),
+    }
+}
+
+/// The range, if its ends are in order and at most `most` in magnitude, and it holds the
+/// designed value.
+fn range(
+    document: &Document<'_>,
+    ends: &Ends,
+    most: f64,
+    unit: &'static str,
+    designed: Option<f64>,
+) -> Result<Range, StageError> {
+    let [low, high] = document.exactly(ends)?;
+    let low = document.within(low, -most, most, unit)?;
+    let high = document.within(high, -most, most, unit)?;
+    let refused = |problem| Err(document.refuse(ends.span(), problem));
+    if low > high {
+        let problem = format!("the range [{low}, {high}] is reversed; write the lower end first");
+        return refused(problem);
+    }
+    let range = Range { low, high };
+    match designed {
+        Some(designed) if !range.contains(designed) => refused(format!(
+            "the range [{low}, {high}] excludes the designed value {designed}; widen the range or \
+             correct the designed value"
+        )),
+        _ => Ok(range),
+    }
+}

@@ -1,0 +1,147 @@
+//! A file of text, piece by piece: decompressed, in UTF-8 or in another encoding that has ASCII in
+//! it, and refused by its start where it is plainly no text: a device or a damaged file may have no
+//! end.
+
+use super::binary;
+use super::encoding::Utf16;
+use super::source::{self, Raw, SourceError};
+use super::unpack::Unpacked;
+use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::{Chain, Cursor, Read, Seek};
+use std::path::{Path, PathBuf};
+
+/// Written at the start of UTF-8 files by some programs.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// A text that is read piece by piece.
+pub struct TextReader<'a> {
+    path: PathBuf,
+    bytes: Chain<Cursor<Vec<u8>>, Unpacked<'a>>,
+    /// Of a text in UTF-16.
+    utf16: Option<Utf16>,
+    /// The mark of its encoding.
+    mark: Vec<u8>,
+    hash: Option<Sha256>,
+}
+
+impl<'a> TextReader<'a> {
+    /// Opens a file, plain or gzip.
+    ///
+    /// # Errors
+    /// Every variant of [`SourceError`] but `TooLarge` and `Utf16`.
+    pub fn open(path: &Path) -> Result<Self, SourceError> {
+        Self::new(Unpacked::open(path)?, source::shown_name(path))
+    }
+
+    /// Opens a file, and the copy that is made of it while it is read, if it can be read but once: see
+    /// [`Self::open_copy`].
+    ///
+    /// # Errors
+    /// As [`Self::open`], and those of the copy.
+    pub fn open_to_read_again(path: &Path) -> Result<(Self, Option<File>), SourceError> {
+        let (raw, copy) = Raw::open_copied(path)?;
+        let shown = source::shown_name(path);
+        Ok((Self::new(Unpacked::of_raw(raw, shown)?, shown)?, copy))
+    }
+
+    /// Opens the copy of a file that was read; `path` is only named in errors.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_copy(copy: &'a File, path: &Path) -> Result<Self, SourceError> {
+        let (mut copy, shown) = (copy, source::shown_name(path));
+        copy.rewind()
+            .map_err(|error| source::refused(shown, error))?;
+        Self::of_reader(copy, shown)
+    }
+
+    /// The text that a reader gives, as bytes in memory do, plain or gzip; `path` is only named in errors.
+    ///
+    /// # Errors
+    /// `Binary`, `Unreadable`, and those of gzip.
+    pub fn of_reader(reader: impl Read + Send + 'a, path: &Path) -> Result<Self, SourceError> {
+        Self::new(Unpacked::of_raw(Raw::of_reader(reader, path), path)?, path)
+    }
+
+    fn new(mut unpacked: Unpacked<'a>, path: &Path) -> Result<Self, SourceError> {
+        let mut mark = Vec::new();
+        let probe = (&mut unpacked).take(binary::PROBE_BYTES as u64);
+        source::read_to_end(probe, &mut mark, path)?;
+        let (utf16, bytes) = Utf16::of_start(&mark).unzip();
+        let is_marked = mark.starts_with(BYTE_ORDER_MARK);
+        let start =
+            mark.split_off(bytes.unwrap_or(if is_marked { BYTE_ORDER_MARK.len() } else { 0 }));
+        let mut text = Self {
+            path: path.to_path_buf(),
+            bytes: Cursor::new(start.clone()).chain(unpacked),
+            utf16: utf16.clone(),
+            mark,
+            hash: None,
+        };
+        let start = text.decoded(start, false)?;
+        text.utf16 = utf16;
+        match binary::in_text(&start) {
+            None => Ok(text),
+            Some((offset, looks_like)) => Err(SourceError::Binary {
+                path: path.to_path_buf(),
+                offset,
+                looks_like,
+            }),
+        }
+    }
+
+    /// The next piece of the text in UTF-8.
+    fn decoded(&mut self, piece: Vec<u8>, is_last: bool) -> Result<Vec<u8>, SourceError> {
+        let Some(decoder) = &mut self.utf16 else {
+            return Ok(piece);
+        };
+        let mut text = Vec::new();
+        let decoded = decoder.append(&piece, is_last, &mut text);
+        let path = self.path.clone();
+        decoded.map_err(|place| SourceError::Utf16 {
+            path,
+            offset: place.start,
+        })?;
+        Ok(text)
+    }
+
+    /// Goes on with the hash of all that is read: of the decompressed file, as it is encoded.
+    pub fn with_hash(self, mut hash: Sha256) -> Self {
+        hash.update(&self.mark);
+        Self {
+            hash: Some(hash),
+            ..self
+        }
+    }
+
+    /// The hash of [`Self::with_hash`].
+    pub fn into_hash(self) -> Option<Sha256> {
+        self.hash
+    }
+
+    /// What the file is called in messages.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// How many bytes of the file were read, and how many it has; 0 where that is not known.
+    pub fn progress(&self) -> (u64, u64) {
+        self.bytes.get_ref().1.progress()
+    }
+
+    /// Appends about `bytes` more bytes of text; `false` at the end.
+    ///
+    /// # Errors
+    /// `Unreadable`, `Binary`, `Utf16`, and those of gzip.
+    pub fn append(&mut self, text: &mut Vec<u8>, bytes: usize) -> Result<bool, SourceError> {
+        let mut piece = Vec::with_capacity(bytes);
+        source::read_to_end((&mut self.bytes).take(bytes as u64), &mut piece, &self.path)?;
+        let is_last = piece.is_empty();
+        if let Some(hash) = &mut self.hash {
+            hash.update(&piece);
+        }
+        text.extend(self.decoded(piece, is_last)?);
+        Ok(!is_last)
+    }
+}

@@ -1,0 +1,65 @@
+//! Medians, quantiles and noise from differences: once, for every folder.
+
+/// The number below which this share of all numbers lies; `None` of none. Rearranges them.
+pub fn quantile(numbers: &mut [f64], share: f64) -> Option<f64> {
+    let place = (share * numbers.len() as f64) as usize;
+    let place = place.min(numbers.len().checked_sub(1)?);
+    Some(*numbers.select_nth_unstable_by(place, f64::total_cmp).1)
+}
+
+/// The upper median; `None` of no numbers. Rearranges them.
+pub fn median(numbers: &mut [f64]) -> Option<f64> {
+    quantile(numbers, 0.5)
+}
+
+/// White noise of three numbers that come row by row: the root mean square of their second
+/// differences over the root of 6, which neither an offset nor a slow change alters.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SecondDifferences {
+    squares: [f64; 3],
+    count: usize,
+}
+
+impl SecondDifferences {
+    /// Takes three rows that follow each other.
+    pub fn add(&mut self, before: [f64; 3], here: [f64; 3], after: [f64; 3]) {
+        for (k, squares) in self.squares.iter_mut().enumerate() {
+            let second = (before[k] - 2.0 * here[k]) + after[k];
+            *squares += second * second;
+        }
+        self.count += 1;
+    }
+
+    /// The standard deviations; zero of no rows.
+    pub fn deviations(&self) -> [f64; 3] {
+        let count = 6.0 * self.count.max(1) as f64;
+        self.squares.map(|sum| (sum / count).sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_median_is_the_upper_middle_and_a_quantile_its_share() {
+        assert_eq!(median(&mut []), None);
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&mut [4.0, 3.0, 1.0, 2.0]), Some(3.0));
+        let mut numbers: Vec<f64> = (0..100).rev().map(f64::from).collect();
+        assert_eq!(quantile(&mut numbers, 0.9), Some(90.0));
+        assert_eq!(quantile(&mut numbers, 1.0), Some(99.0));
+    }
+
+    #[test]
+    fn second_differences_see_noise_and_no_ramp() {
+        let mut differences = SecondDifferences::default();
+        for row in 0..1000 {
+            let at = |row: i32| [5.0 + 0.1 * f64::from(row), f64::from(row % 2), 0.0];
+            differences.add(at(row), at(row + 1), at(row + 2));
+        }
+        let [ramp, alternating, none] = differences.deviations();
+        assert!(ramp < 1e-12 && none == 0.0);
+        assert!((alternating - 2.0 / 6f64.sqrt()).abs() < 1e-12);
+    }
+}

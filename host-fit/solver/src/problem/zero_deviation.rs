@@ -1,0 +1,84 @@
+//! The zero deviation of each movement, in closed form.
+//!
+//! Given the other parameters the pose is linear in it: delta = eta (PM mean pose error of the
+//! movement).
+
+use crate::input::stage::Range;
+use crate::problem::parameters::Parameters;
+use runtime::PlanarPose;
+use runtime::geometry::inverse_rows;
+use runtime::model::{zero_deviation_m, zero_pose};
+
+/// The zero deviation of one movement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ZeroDeviation {
+    /// delta of A, B, C, m.
+    pub delta_m: [f64; 3],
+    /// The pose that it stands for: PM^-1 (delta / eta), m, m, rad.
+    pub pose: [f64; 3],
+    /// Whether any of the three is beyond its range in `stage.toml`.
+    pub is_beyond: bool,
+}
+
+impl ZeroDeviation {
+    /// No zero deviation.
+    pub const NONE: Self = Self {
+        delta_m: [0.0; 3],
+        pose: [0.0; 3],
+        is_beyond: false,
+    };
+
+    /// The zero deviation that takes off a mean pose error (m, m, rad).
+    pub fn of_mean_error(parameters: &Parameters, mean_error: [f64; 3], range: &Range) -> Self {
+        let plane = parameters.geometry().plane_rows();
+        let pose = PlanarPose::from_array(mean_error);
+        let delta_m = zero_deviation_m(&plane, parameters.eta(), &pose);
+        Self {
+            delta_m,
+            pose: mean_error,
+            is_beyond: delta_m.map(|delta| range.clip(delta)) != delta_m,
+        }
+    }
+
+    /// A zero deviation that is known, m at the probes.
+    pub fn given(parameters: &Parameters, delta_m: [f64; 3]) -> Self {
+        let pose = inverse_rows(&parameters.geometry().plane_rows()).map_or([0.0; 3], |inverse| {
+            zero_pose(&inverse, parameters.eta(), delta_m).to_array()
+        });
+        Self {
+            delta_m,
+            pose,
+            is_beyond: false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::shipped::STAGE_TOML;
+    use crate::input::stage::Stage;
+
+    /// Aligned probes with arms 0.1975, -0.1975, -0.36 m and eta 1: a pose offset of (x, y, rz)
+    /// reads y + 0.1975 rz, y - 0.1975 rz, x - 0.36 rz.
+    #[test]
+    fn a_mean_error_becomes_the_deviation_of_each_probe() {
+        let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+        let designed = Parameters::designed(&stage);
+        let range = Range {
+            low: -10e-6,
+            high: 10e-6,
+        };
+        let within = ZeroDeviation::of_mean_error(&designed, [3e-6, 2e-6, 10e-6], &range);
+        for (have, want) in within.delta_m.iter().zip([3.975e-6, 0.025e-6, -0.6e-6]) {
+            assert!((have - want).abs() < 1e-15, "{have:e} {want:e}");
+        }
+        assert!(!within.is_beyond && within.pose == [3e-6, 2e-6, 10e-6]);
+        let beyond = ZeroDeviation::of_mean_error(&designed, [-30e-6, 40e-6, 0.0], &range);
+        assert!(beyond.is_beyond && beyond.pose == [-30e-6, 40e-6, 0.0]);
+        let given = ZeroDeviation::given(&designed, beyond.delta_m);
+        for (have, want) in given.pose.iter().zip(beyond.pose) {
+            assert!((have - want).abs() < 1e-15, "{have:e} {want:e}");
+        }
+    }
+}

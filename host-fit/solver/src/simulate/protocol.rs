@@ -1,0 +1,206 @@
+//! The motions of a run: movements, each a trajectory at the servo rate.
+
+use super::pose::StagePose;
+use super::random::{Purpose, Stream};
+use std::f64::consts::TAU;
+
+/// The 19 vertical settings of Table 6: Z in um, Rx and Ry in urad.
+pub const TABLE_6: [[f64; 3]; 19] = [
+    [0.0, 0.0, 0.0],
+    [250.0, 0.0, 0.0],
+    [-250.0, 0.0, 0.0],
+    [150.0, 0.0, 0.0],
+    [-150.0, 0.0, 0.0],
+    [50.0, 0.0, 0.0],
+    [-50.0, 0.0, 0.0],
+    [0.0, 500.0, 0.0],
+    [0.0, -500.0, 0.0],
+    [0.0, 250.0, 0.0],
+    [0.0, -250.0, 0.0],
+    [0.0, 100.0, 0.0],
+    [0.0, -100.0, 0.0],
+    [0.0, 0.0, 500.0],
+    [0.0, 0.0, -500.0],
+    [0.0, 0.0, 250.0],
+    [0.0, 0.0, -250.0],
+    [0.0, 0.0, 100.0],
+    [0.0, 0.0, -100.0],
+];
+
+/// What is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Protocol {
+    /// The paper's: at the 19 settings of its Table 6, a sine along Y, X and Rz in turn.
+    Paper,
+    /// All six axes at once, 8 movements of 8 s.
+    Combined,
+    /// As combined, other trajectories, interferometers zeroed truly.
+    Service,
+}
+
+/// One movement: the pose of every servo period, between a reset of the interferometers and
+/// the next.
+pub type Trajectory = Vec<StagePose>;
+
+/// A run of the stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// The movements.
+    pub movements: Vec<Trajectory>,
+    /// Whether the interferometers are zeroed truly; if not, every reset has an error.
+    pub zeroed_truly: bool,
+    /// Tells the noise of one run of a stage from that of another.
+    pub number: u64,
+}
+
+/// Amplitudes of the paper's sines along X, Y (m) and Rz (rad).
+const PAPER_AMPLITUDES: [f64; 3] = [300e-6, 500e-6, 300e-6];
+/// Frequency (Hz) and length (s) of the paper's sines.
+const PAPER_SINE: (f64, f64) = (1.0, 2.0);
+/// Amplitudes of the combined motion: X, Y, Rz and Z, Rx, Ry, m and rad.
+const COMBINED_AMPLITUDES: [[f64; 3]; 2] = [[250e-6, 400e-6, 250e-6], [120e-6, 240e-6, 240e-6]];
+/// Frequencies of the combined motion, Hz: any between these, as in the given logs.
+const COMBINED_HZ: [f64; 2] = [0.3, 2.0];
+const COMBINED_MOVEMENTS: usize = 8;
+const COMBINED_S: f64 = 8.0;
+
+/// Numbers of planned runs begin here.
+const PLANNED_FROM: u64 = 256;
+
+impl Protocol {
+    /// The run of this protocol for a seed; the paper's is the same for all.
+    pub fn run(self, servo_period_s: f64, seed: u64) -> Run {
+        let number = self as u64;
+        let movements = match self {
+            Self::Paper => paper(servo_period_s),
+            Self::Combined | Self::Service => {
+                let mut random = Stream::new(seed, Purpose::Motion, number);
+                let movement = |_| combined(servo_period_s, &mut random);
+                (0..COMBINED_MOVEMENTS).map(movement).collect()
+            }
+        };
+        Run {
+            movements,
+            zeroed_truly: self == Self::Service,
+            number,
+        }
+    }
+}
+
+impl Run {
+    /// A planned run: one movement. Its number follows from its poses, so that two plans of one stage
+    /// do not share their noise.
+    pub fn planned(trajectory: Trajectory) -> Self {
+        let numbers = trajectory.iter().flat_map(|p| [p.planar, p.vertical]);
+        // FNV-1a by whole words.
+        let hash = numbers
+            .flatten()
+            .fold(0xcbf2_9ce4_8422_2325, |hash: u64, x| {
+                (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3)
+            });
+        Self {
+            movements: vec![trajectory],
+            zeroed_truly: false,
+            // The stream of a run has room for 56 bits; the protocols have the first numbers.
+            number: PLANNED_FROM + (hash >> 16),
+        }
+    }
+}
+
+/// The poses of a movement of this length, from its time in s.
+fn trajectory(servo_period_s: f64, length_s: f64, pose: impl Fn(f64) -> StagePose) -> Trajectory {
+    let rows = (length_s / servo_period_s).round() as usize;
+    (0..rows).map(|k| pose(k as f64 * servo_period_s)).collect()
+}
+
+fn paper(servo_period_s: f64) -> Vec<Trajectory> {
+    let (frequency_hz, length_s) = PAPER_SINE;
+    let settings = TABLE_6.iter();
+    settings
+        .flat_map(|setting| [1, 0, 2].map(|axis| (setting.map(|x| x * 1e-6), axis)))
+        .map(|(vertical, axis)| {
+            trajectory(servo_period_s, length_s, |t| {
+                let mut planar = [0.0; 3];
+                planar[axis] = PAPER_AMPLITUDES[axis] * libm::sin(TAU * frequency_hz * t);
+                StagePose { planar, vertical }
+            })
+        })
+        .collect()
+}
+
+/// A sine of its own frequency and phase along each axis, from rest position.
+fn combined(servo_period_s: f64, random: &mut Stream) -> Trajectory {
+    let [low, high] = COMBINED_HZ;
+    let waves = COMBINED_AMPLITUDES.map(|amplitudes| {
+        amplitudes.map(|amplitude| (amplitude, random.between(low, high), TAU * random.uniform()))
+    });
+    trajectory(servo_period_s, COMBINED_S, |t| {
+        let [planar, vertical] = waves.map(|axes| {
+            axes.map(|(amplitude, frequency_hz, phase)| {
+                amplitude * (libm::sin(TAU * frequency_hz * t + phase) - libm::sin(phase))
+            })
+        });
+        StagePose { planar, vertical }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_paper_s_run_is_57_movements_that_each_move_one_planar_axis() {
+        let run = Protocol::Paper.run(0.002, 1);
+        assert_eq!(run.movements.len(), 57);
+        for (m, poses) in run.movements.iter().enumerate() {
+            assert_eq!(poses.len(), 1000);
+            let axis = [1, 0, 2][m % 3];
+            for pose in poses {
+                assert_eq!(pose.vertical, TABLE_6[m / 3].map(|x| x * 1e-6));
+                assert!((0..3).all(|i| i == axis || pose.planar[i] == 0.0));
+            }
+            // A quarter of a period after the start.
+            assert_eq!(poses[125].planar[axis], PAPER_AMPLITUDES[axis]);
+        }
+    }
+
+    #[test]
+    fn combined_and_service_start_at_rest_and_move_every_axis_in_their_own_way() {
+        let runs = [Protocol::Combined, Protocol::Service].map(|p| p.run(0.002, 1));
+        assert_ne!(runs[0].movements, runs[1].movements);
+        for run in &runs {
+            assert_eq!(run.movements.len(), 8);
+            for poses in &run.movements {
+                assert_eq!((poses.len(), poses[0]), (4000, StagePose::default()));
+                for axis in 0..6 {
+                    let [block, i] = [axis / 3, axis % 3];
+                    let of = |pose: &StagePose| [pose.planar, pose.vertical][block][i];
+                    let span = |f: fn(f64, f64) -> f64| poses.iter().map(of).fold(0.0, f);
+                    let span = span(f64::max) - span(f64::min);
+                    let amplitude = COMBINED_AMPLITUDES[block][i];
+                    assert!((span / amplitude - 2.0).abs() < 1e-3, "{span}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_plan_has_noise_of_its_own() {
+        let still = |rows: usize| Run::planned(vec![StagePose::default(); rows]).number;
+        let numbers = [still(1), still(2), Protocol::Service.run(0.002, 1).number];
+        assert!(numbers[0] != numbers[1] && numbers[1] != numbers[2]);
+        assert_eq!(still(5), still(5));
+        let mut streams = numbers.map(|n| Stream::new(1, Purpose::Sensors, n).uniform());
+        streams.sort_by(f64::total_cmp);
+        assert!(streams[0] < streams[1] && streams[1] < streams[2]);
+    }
+
+    #[test]
+    fn only_the_service_run_is_zeroed_truly() {
+        let zeroed = |p: Protocol| p.run(0.002, 1).zeroed_truly;
+        assert_eq!(
+            [Protocol::Paper, Protocol::Combined, Protocol::Service].map(zeroed),
+            [false, false, true]
+        );
+    }
+}

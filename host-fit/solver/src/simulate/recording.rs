@@ -1,0 +1,269 @@
+//! What a run of a simulated stage leaves: codes, beams and the truth.
+
+use super::assembly::Assembly;
+use super::pose::StagePose;
+use super::protocol::Run;
+use super::random::{Purpose, Stream};
+use super::sensors::{ReferenceError, SensorErrors, beams_m, code, gaps_m};
+use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
+use crate::input::stage::Stage;
+use runtime::RawFrame;
+use runtime::capacitive::{vertical_pose, vertical_rows};
+
+/// Why a run cannot be simulated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RecordError {
+    /// A probe would meet its magnet.
+    #[error(
+        "movement {movement}, {t_us} us: probe {probe} would hit its magnet; keep the stage higher or tilt it less"
+    )]
+    ProbeHitsMagnet {
+        /// A, B or C.
+        probe: char,
+        /// The movement, from 0.
+        movement: usize,
+        /// Time within it, us.
+        t_us: i64,
+    },
+}
+
+/// What one servo period gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sample {
+    /// Time within the movement, us.
+    pub t_us: i64,
+    /// Displacements along the beams X, Y1, Y2, nm.
+    pub beams_nm: [i64; 3],
+    /// Codes of the gaps 1, 2, 3.
+    pub capacitive: [i32; 3],
+    /// Hall codes of A, B, C.
+    pub hall: [i32; 3],
+}
+
+/// The log of a run, and where the stage truly was.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// The movements, sample after sample.
+    pub movements: Vec<Vec<Sample>>,
+    /// The true poses: the run itself.
+    pub truth: Vec<Vec<StagePose>>,
+}
+
+/// Runs a stage. `seed` is that of noise, drift and resets, in a stream of its own for each
+/// [`Run::number`]: it may be the one that the assembly was drawn from.
+///
+/// # Errors
+/// [`RecordError::ProbeHitsMagnet`].
+pub fn record(
+    stage: &Stage,
+    assembly: &Assembly,
+    run: Run,
+    errors: &SensorErrors,
+    seed: u64,
+) -> Result<Recording, RecordError> {
+    let mut random = Stream::new(seed, Purpose::Sensors, run.number);
+    let mut movements = Vec::with_capacity(run.movements.len());
+    for (movement, poses) in run.movements.iter().enumerate() {
+        let period_s = stage.servo_period_s;
+        let mut reference = ReferenceError::reset(errors, run.zeroed_truly, period_s, &mut random);
+        let mut samples = Vec::with_capacity(poses.len());
+        for (k, pose) in poses.iter().enumerate() {
+            let t_us = (k as f64 * period_s * 1e6).round() as i64;
+            let struck = assembly
+                .probes
+                .iter()
+                .position(|probe| !probe.is_clear(pose));
+            if let Some(probe) = struck {
+                return Err(RecordError::ProbeHitsMagnet {
+                    probe: ['A', 'B', 'C'][probe],
+                    movement,
+                    t_us,
+                });
+            }
+            let error = reference.next(&mut random);
+            let planar = core::array::from_fn(|i| pose.planar[i] + error[i]);
+            let mut noisy = |value: f64, deviation: f64| value + random.normal(deviation);
+            samples.push(Sample {
+                t_us,
+                beams_nm: beams_m(stage, planar)
+                    .map(|beam| (noisy(beam, errors.beam_m) * 1e9).round() as i64),
+                capacitive: gaps_m(stage, pose)
+                    .map(|gap| code(noisy(gap, errors.gap_m), &stage.capacitive)),
+                hall: (assembly.probes)
+                    .map(|probe| code(noisy(probe.signal_m(pose), errors.hall_m), &stage.hall)),
+            });
+        }
+        movements.push(samples);
+    }
+    Ok(Recording {
+        movements,
+        truth: run.movements,
+    })
+}
+
+impl Recording {
+    /// How many samples there are.
+    pub fn rows(&self) -> usize {
+        self.movements.iter().map(Vec::len).sum()
+    }
+
+    /// The log as the fit sees it: what reading [`super::log_text::log_csv`] gives, less the
+    /// hash of a file. `None` if the capacitive sensors stand in one line, which no checked
+    /// stage has.
+    pub fn dataset(&self, stage: &Stage) -> Option<Dataset> {
+        let plane = vertical_rows(&stage.capacitive_probes_m)?;
+        let mut dataset = Dataset::default();
+        for (movement, samples) in self.movements.iter().enumerate() {
+            let start = dataset.rows.len();
+            let rows = (0..).zip(samples);
+            dataset
+                .rows
+                .extend(rows.map(|(k, sample)| row(stage, &plane, movement, k, sample)));
+            dataset.movements.push(Movement {
+                log: 0,
+                index: movement as i64,
+                rows: start..dataset.rows.len(),
+            });
+        }
+        dataset.end_log("simulated");
+        Some(dataset)
+    }
+}
+
+fn row(stage: &Stage, plane: &[[f64; 3]; 3], movement: usize, sequence: u32, s: &Sample) -> Row {
+    let gaps = s
+        .capacitive
+        .map(|code| f64::from(code) * stage.capacitive.m_per_count);
+    let [x, y1, y2] = s.beams_nm.map(|nm| nm as f64 * 1e-9);
+    Row {
+        movement,
+        t_us: s.t_us,
+        frame: LoggedFrame::Codes(RawFrame {
+            hall: s.hall,
+            capacitive: s.capacitive,
+            sequence,
+            time_us: s.t_us as u32,
+        }),
+        signal_m: s.hall.map(|code| f64::from(code) * stage.hall.m_per_count),
+        vertical: vertical_pose(plane, gaps).to_array(),
+        reference: [
+            x,
+            (y1 + y2) / 2.0,
+            libm::atan((y1 - y2) / stage.y_baseline_m),
+        ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::log::{ReadOptions, read_bytes};
+    use crate::simulate::log_text::log_csv;
+    use crate::simulate::protocol::Protocol;
+    use crate::simulate::tests::stage;
+    use sha2::{Digest, Sha256};
+
+    fn short(protocol: Protocol, errors: &SensorErrors, seed: u64) -> Recording {
+        let stage = stage();
+        let mut run = protocol.run(stage.servo_period_s, seed);
+        run.movements.truncate(3);
+        run.movements
+            .iter_mut()
+            .for_each(|poses| poses.truncate(300));
+        record(&stage, &Assembly::draw(&stage, seed), run, errors, seed).expect("clear")
+    }
+
+    #[test]
+    fn the_dataset_is_what_reading_the_log_gives() {
+        let recording = short(Protocol::Combined, &SensorErrors::USUAL, 1);
+        let csv = log_csv(&recording, &stage());
+        let read = read_bytes(
+            csv.as_bytes(),
+            "simulated".as_ref(),
+            &stage(),
+            &ReadOptions::default(),
+        );
+        let read = read.expect("a sound log");
+        assert_eq!(read.warnings, []);
+        let dataset = recording.dataset(&stage()).expect("a triangle");
+        assert_eq!(
+            (&dataset.movements, &dataset.logs),
+            (&read.dataset.movements, &read.dataset.logs)
+        );
+        assert_eq!(dataset.rows, read.dataset.rows);
+    }
+
+    /// The hash of the same log from an optimised program: a change of it changes every log.
+    #[test]
+    fn a_seed_gives_the_same_bytes_at_every_optimisation_level() {
+        let stage = stage();
+        let run = Protocol::Combined.run(stage.servo_period_s, 1);
+        let assembly = Assembly::draw(&stage, 1);
+        let recording = record(&stage, &assembly, run, &SensorErrors::USUAL, 1).expect("clear");
+        let hash = Sha256::digest(log_csv(&recording, &stage));
+        let want = "b68e5114b4fc9b91d3410f804fcf13e760b919ea2577fd438b004b1c084b6868";
+        let have: String = hash.iter().map(|byte| format!("{byte:02x}")).collect();
+        assert_eq!(have, want);
+    }
+
+    #[test]
+    fn noise_is_that_of_the_sensors_and_the_rest_follows_the_truth() {
+        let [noisy, exact] = [SensorErrors::USUAL, SensorErrors::NONE]
+            .map(|errors| short(Protocol::Service, &errors, 4));
+        let pairs = || {
+            noisy
+                .movements
+                .iter()
+                .flatten()
+                .zip(exact.movements.iter().flatten())
+        };
+        let rms = |of: &dyn Fn(&Sample) -> f64| {
+            let squares = pairs().map(|(n, e)| (of(n) - of(e)).powi(2));
+            (squares.sum::<f64>() / noisy.rows() as f64).sqrt()
+        };
+        for i in 0..3 {
+            let hall = rms(&|s| f64::from(s.hall[i]) * 62.5);
+            assert!((450.0..550.0).contains(&hall), "{hall} nm");
+            let gap = rms(&|s| f64::from(s.capacitive[i]) * 15.625);
+            assert!((11.0..16.0).contains(&gap), "{gap} nm");
+            // 0.6 s of drift: 50 nm rms.
+            let beam = rms(&|s| s.beams_nm[i] as f64);
+            assert!((10.0..200.0).contains(&beam), "{beam} nm");
+        }
+    }
+
+    #[test]
+    fn a_reset_is_off_by_micrometres_but_in_service() {
+        for (protocol, range) in [
+            (Protocol::Paper, 300..8000),
+            (Protocol::Combined, 300..8000),
+            (Protocol::Service, 0..30),
+        ] {
+            let recording = short(protocol, &SensorErrors::USUAL, 2);
+            let first = recording
+                .movements
+                .iter()
+                .map(|samples| samples[0].beams_nm[0].abs());
+            let worst = first.max().unwrap_or(-1);
+            assert!(range.contains(&worst), "{protocol:?}: {worst} nm");
+        }
+    }
+
+    #[test]
+    fn a_run_that_drives_a_probe_into_its_magnet_is_refused() {
+        let stage = stage();
+        let low = StagePose {
+            vertical: [-8e-3, 0.0, 0.0],
+            ..StagePose::default()
+        };
+        let run = Run::planned(vec![StagePose::default(), low]);
+        let assembly = Assembly::draw(&stage, 1);
+        let error = record(&stage, &assembly, run, &SensorErrors::USUAL, 1).expect_err("too low");
+        let RecordError::ProbeHitsMagnet {
+            probe,
+            movement,
+            t_us,
+        } = error;
+        assert_eq!((probe, movement, t_us), ('A', 0, 2000));
+    }
+}

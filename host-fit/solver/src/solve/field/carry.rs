@@ -1,0 +1,285 @@
+//! Whether a log can carry the field model, by the errors that it predicts for service.
+
+use super::parameters::FieldParameters;
+use super::posterior::{FORM_MM, PoseErrors, Posterior};
+use super::probe::probes;
+use super::terms::COUNT;
+use crate::input::stage::Stage;
+use crate::problem::parameters::Parameters;
+use nalgebra::DMatrix;
+use runtime::VerticalPose;
+
+/// Poses over which service is averaged.
+const POSES: usize = 256;
+/// Systematic errors above this part of the noise (variances) are too large, whatever Model (31)
+/// seems to have: a log that determines so little can't tell that either.
+const SYSTEMATIC_MAX: f64 = 1.0;
+/// Systematic errors below this part of the noise (variances) are rounding: one per cent of the
+/// noise floor.
+const ROUNDING: f64 = 0.02;
+
+/// What service over the whole range of a log has to expect: variances of X, Y, Rz (m2, m2,
+/// rad2), means over poses spread evenly in the box of the log's ranges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServiceVariance {
+    /// By the parameters of the field model.
+    pub systematic: [f64; 3],
+    /// By the noise of the probes: the floor.
+    pub noise: [f64; 3],
+    /// Mean squared difference between the poses of the other model and of the field model.
+    pub difference: [f64; 3],
+}
+
+/// The poses of a service: how errors of the parameters and of the signals show there, as means.
+#[derive(Clone, Debug)]
+pub struct Service {
+    /// Of X, Y, Rz: products of the derivatives by two parameters.
+    by_parameters: [Vec<[f64; COUNT]>; 3],
+    /// Of X, Y, Rz: variance by the noise of the probes.
+    by_noise: [f64; 3],
+    /// By what the form leaves of their readings.
+    by_form: [f64; 3],
+}
+
+impl Service {
+    /// Of probes with this noise at poses X, Y, Rz and Z, Rx, Ry (m, rad); `None` where they can't
+    /// tell one.
+    pub fn new(
+        parameters: &FieldParameters,
+        white_mm: [f64; 3],
+        poses: impl ExactSizeIterator<Item = ([f64; 3], [f64; 3])>,
+    ) -> Option<Self> {
+        let probes = probes(parameters);
+        let share = 1.0 / poses.len() as f64;
+        let mut sums = Self {
+            by_parameters: [0; 3].map(|_| vec![[0.0; COUNT]; COUNT]),
+            by_noise: [0.0; 3],
+            by_form: [0.0; 3],
+        };
+        for (planar, vertical) in poses {
+            let errors = PoseErrors::new(&probes, planar, vertical)?;
+            for axis in 0..3 {
+                let by = &errors.by_parameter[axis];
+                for (row, x) in sums.by_parameters[axis].iter_mut().zip(by) {
+                    for (sum, y) in row.iter_mut().zip(by) {
+                        *sum += share * (x * y);
+                    }
+                }
+                for (by, white) in errors.by_signal[axis].iter().zip(white_mm) {
+                    sums.by_noise[axis] += share * (by * white) * (by * white);
+                    sums.by_form[axis] += share * (by * FORM_MM) * (by * FORM_MM);
+                }
+            }
+        }
+        Some(sums)
+    }
+
+    /// What to expect of parameters with this covariance.
+    pub fn variance(&self, covariance: &DMatrix<f64>) -> ServiceVariance {
+        let systematic = [0, 1, 2].map(|axis| {
+            let mut sum = self.by_form[axis];
+            let columns = covariance.column_iter().zip(&self.by_parameters[axis]);
+            for (column, products) in columns {
+                for (covariance, product) in column.iter().zip(products) {
+                    sum += covariance * product;
+                }
+            }
+            sum
+        });
+        ServiceVariance {
+            systematic,
+            noise: self.by_noise,
+            difference: [0.0; 3],
+        }
+    }
+
+    /// Mean squares of the errors of X, Y, Rz (m2, m2, rad2) by an error of the parameters.
+    pub fn squares(&self, off: &[f64]) -> [f64; 3] {
+        self.by_parameters.each_ref().map(|products| {
+            let rows = products.iter().zip(off);
+            rows.map(|(row, x)| x * row.iter().zip(off).map(|(p, y)| p * y).sum::<f64>())
+                .sum()
+        })
+    }
+
+    /// Of X, Y, Rz the variance, over the errors that are possible with this covariance, of their mean square:
+    /// m4, m4, rad4.
+    pub fn spread(&self, covariance: &DMatrix<f64>) -> [f64; 3] {
+        self.by_parameters.each_ref().map(|products| {
+            let products = DMatrix::from_fn(COUNT, COUNT, |i, j| products[i][j]);
+            let both = products * covariance.view((0, 0), (COUNT, COUNT));
+            2.0 * both.component_mul(&both.transpose()).sum()
+        })
+    }
+}
+
+/// Mean squared difference between poses and what another model decodes there.
+fn difference(
+    parameters: &FieldParameters,
+    other: &FieldParameters,
+    ranges: ([f64; 3], [f64; 3]),
+) -> Option<[f64; 3]> {
+    let constants = other.constants(1.0)?;
+    let probes = probes(parameters);
+    let mut sum = [0.0; 3];
+    for (planar, vertical) in service_poses(ranges) {
+        let planar_mm = planar.map(|x| x * 1e3);
+        let signal_m = [0, 1, 2].map(|k| probes[k].signal_mm(planar_mm, vertical) * 1e-3);
+        let decoded = constants.decode(signal_m, &VerticalPose::from_array(vertical));
+        for ((sum, decoded), planar) in sum.iter_mut().zip(decoded.to_array()).zip(planar) {
+            *sum += (decoded - planar) * (decoded - planar) / POSES as f64;
+        }
+    }
+    Some(sum)
+}
+
+/// Which of the two models is better taken, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// Whether it is the field model.
+    pub field: bool,
+    /// What it has to expect in service.
+    pub service: ServiceVariance,
+}
+
+impl ServiceVariance {
+    /// Of the field model with this posterior, and of another one ((31), or an old one), over
+    /// X, Y, Rz and Z, Rx, Ry of the largest magnitudes `ranges` (m, rad). Infinite where the
+    /// probes cannot tell the pose.
+    pub fn new(
+        parameters: &FieldParameters,
+        posterior: &Posterior,
+        other: &FieldParameters,
+        ranges: ([f64; 3], [f64; 3]),
+    ) -> Self {
+        let found = Service::new(parameters, posterior.white_mm, service_poses(ranges)).and_then(
+            |service| {
+                Some(Self {
+                    difference: difference(parameters, other, ranges)?,
+                    ..service.variance(&posterior.covariance)
+                })
+            },
+        );
+        found.unwrap_or(Self {
+            systematic: [f64::INFINITY; 3],
+            noise: [1.0; 3],
+            difference: [0.0; 3],
+        })
+    }
+
+    /// Errors of the field model in service over the noise floor: of X, Y, Rz.
+    pub fn ratios(&self) -> [f64; 3] {
+        [0, 1, 2].map(|k| (1.0 + self.systematic[k] / self.noise[k]).sqrt())
+    }
+
+    /// The systematic variance over that of the noise, of the axis where it is largest.
+    pub fn worst(&self) -> f64 {
+        (0..3).fold(0.0, |worst, k| {
+            f64::max(worst, self.systematic[k] / self.noise[k])
+        })
+    }
+
+    /// Errors of Model (31) in service over the noise floor, as far as the field model knows.
+    pub fn ratios_31(&self) -> [f64; 3] {
+        [0, 1, 2].map(|k| (1.0 + self.difference[k] / self.noise[k]).sqrt())
+    }
+
+    // The difference between the models holds the errors of both: where it is all the field
+    // model's, its mean square is the systematic variance. So the field model gains where the
+    // difference is more than twice that.
+
+    fn gains_in(&self, k: usize) -> bool {
+        self.difference[k] > 2.0 * self.systematic[k]
+    }
+
+    /// Whether the field model makes an axis worse than Model (31) has it.
+    fn loses(&self) -> bool {
+        let accepted = |k: usize| {
+            if self.gains_in(k) {
+                SYSTEMATIC_MAX
+            } else {
+                ROUNDING
+            }
+        };
+        (0..3).any(|k| self.systematic[k] > accepted(k) * self.noise[k])
+    }
+
+    /// Whether it makes an axis better.
+    fn gains(&self) -> bool {
+        (0..3).any(|k| self.gains_in(k) && self.difference[k] > ROUNDING * self.noise[k])
+    }
+}
+
+impl Verdict {
+    /// Of a fit beside one of Model (31) to the same rows, over X, Y, Rz and Z, Rx, Ry of the
+    /// largest magnitudes `ranges` (m, rad).
+    pub fn new(
+        parameters: &FieldParameters,
+        posterior: &Posterior,
+        model_31: &Parameters,
+        stage: &Stage,
+        ranges: ([f64; 3], [f64; 3]),
+    ) -> Self {
+        let model_31 = FieldParameters::of_model_31(model_31, stage);
+        let service = ServiceVariance::new(parameters, posterior, &model_31, ranges);
+        Self {
+            field: !service.loses() && service.gains(),
+            service,
+        }
+    }
+
+    /// Whether the log leaves an axis of the field model worse than Model (31).
+    pub fn loses(&self) -> bool {
+        self.service.loses()
+    }
+}
+
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let words = |[x, y, rz]: [f64; 3]| {
+            format!("{x:.2} / {y:.2} / {rz:.2} times the noise floor in X / Y / Rz")
+        };
+        let (field, model_31) = (words(self.service.ratios()), self.service.ratios_31());
+        if self.field {
+            write!(
+                f,
+                "the field model: errors predicted over the range of the log are {field}, those of model (31) {}",
+                words(model_31)
+            )
+        } else if self.loses() {
+            write!(
+                f,
+                "this log leaves the field model with errors of {field}; record all six axes moving at \
+                 once, and for longer (host-fit plan makes such a run)"
+            )
+        } else {
+            f.write_str("the field model finds nothing that model (31) lacks")
+        }
+    }
+}
+
+/// Poses (X, Y, Rz and Z, Rx, Ry) spread evenly in the box of these largest magnitudes.
+pub fn service_poses(
+    (planar_range, vertical_range): ([f64; 3], [f64; 3]),
+) -> impl ExactSizeIterator<Item = ([f64; 3], [f64; 3])> {
+    (0..POSES).map(move |index| {
+        let place: [f64; 6] = std::array::from_fn(|axis| 2.0 * halton(index + 1, axis) - 1.0);
+        let planar = [0, 1, 2].map(|k| place[k] * planar_range[k]);
+        let vertical = [0, 1, 2].map(|k| place[3 + k] * vertical_range[k]);
+        (planar, vertical)
+    })
+}
+
+/// The `index`-th place of the axis in an even spread over (0, 1): the radical inverse in the
+/// axis' prime.
+fn halton(index: usize, axis: usize) -> f64 {
+    const PRIMES: [usize; 6] = [2, 3, 5, 7, 11, 13];
+    let base = PRIMES[axis];
+    let (mut rest, mut digit, mut sum) = (index, 1.0, 0.0);
+    while rest > 0 {
+        digit /= base as f64;
+        sum += digit * (rest % base) as f64;
+        rest /= base;
+    }
+    sum
+}

@@ -1,0 +1,317 @@
+//! Maximum a posteriori: Gauss-Newton on the Hall residuals, first under white noise, then whitened
+//! by the noise that the residuals show.
+
+use super::blocks::Rows;
+use super::carry::Verdict;
+use super::error::FieldFitError;
+use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
+use super::parameters::{FieldParameters, unknowns};
+use super::posterior::Posterior;
+use super::probe::probes;
+use super::terms::COUNT;
+use super::whiten::{COLUMNS, FieldEquations, Noise, UNKNOWNS};
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::interrupt;
+use crate::problem::parameters::Parameters;
+use crate::solve::gauss_newton::{self, Limits, Normal, Point, Solved, Unknowns};
+use crate::solve::robust::{HALF, Loss};
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// The white phase is only a start. A log that can carry the model needs three steps; one that can't
+/// goes on for long along a valley of E and the offsets, which is not worth the time.
+const WHITE: Limits = Limits {
+    steps: 8,
+    gain: 1.0,
+};
+/// One step after each change of the weights: both settle together.
+const REWEIGHTED: Limits = Limits { steps: 1, ..WHITE };
+/// The last step would be three hundredths of a standard error.
+const WHITENED: Limits = Limits {
+    steps: 20,
+    gain: 1e-3,
+};
+/// Rounds of weights and fit at most: two seconds of 57,000 rows.
+const ROUNDS_MAX: u32 = 15;
+/// Weights that change by less have settled.
+const WEIGHT_SETTLED: f64 = 0.01;
+/// Rounds of noise and parameters in turn.
+const NOISE_ROUNDS: u32 = 2;
+
+/// A calibration by the field model with everything that the log says about it.
+#[derive(Clone, Debug)]
+pub struct FieldFit {
+    /// The parameters.
+    pub parameters: FieldParameters,
+    /// How well the log determines them.
+    pub posterior: Posterior,
+    /// The noise of the log.
+    pub noise: Noise,
+    /// Lag of the reference behind the probes, s: positive where it shows an earlier pose.
+    pub lag_s: f64,
+    /// Error of the reference at the end of each movement of the rows used, mm, mm, mrad.
+    pub offsets_mm: Vec<[f64; 3]>,
+    /// The terms of the log-posterior at its maximum.
+    pub score: Score,
+    /// Largest magnitudes of X, Y, Rz (m, m, rad) in the log, each movement's middle taken off.
+    pub planar_range: [f64; 3],
+    /// Largest magnitudes of Z, Rx, Ry in the log: m, rad, rad.
+    pub vertical_range: [f64; 3],
+    /// Whether it is better taken than Model (31).
+    pub verdict: Verdict,
+    /// The weights of the rows used.
+    pub weights: Vec<f64>,
+    /// Gauss-Newton steps.
+    pub iterations: u32,
+}
+
+/// -2 times the log-posterior is the sum of these, but for a constant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Score {
+    /// Sum of squares of the whitened residuals of the blocks: about three times their number.
+    pub chi_squared: f64,
+    /// The logarithm of the determinant of their covariance.
+    pub log_determinant: f64,
+    /// Sum of squares of the parameters in terms of their priors' standard deviations.
+    pub prior: f64,
+    /// Whitened residuals: three for each block, less three for each movement's offset.
+    pub residuals: usize,
+}
+
+/// Fits the field model to the rows `selected` (ascending) of a dataset, from a fit of Model (31).
+///
+/// # Errors
+/// See [`FieldFitError`].
+pub fn fit_field(
+    dataset: &Dataset,
+    selected: &[usize],
+    stage: &Stage,
+    start: &Parameters,
+) -> Result<FieldFit, FieldFitError> {
+    WhiteFit::new(dataset, selected, stage, start)?.finish(stage)
+}
+
+/// The first phase of a fit: under white noise, each row with its weight.
+#[derive(Clone, Debug)]
+pub struct WhiteFit {
+    /// How much each of the rows used counts: from 0 to 1.
+    pub weights: Vec<f64>,
+    rows: Arc<Rows>,
+    unknowns: Unknowns,
+    places: [[f64; 2]; 3],
+    at: Point,
+    noise: Noise,
+    iterations: u32,
+    /// Of Model (31).
+    start: Parameters,
+}
+
+impl WhiteFit {
+    /// The first phase of [`fit_field`]: all rows count alike.
+    ///
+    /// # Errors
+    /// See [`FieldFitError`].
+    pub fn new(
+        dataset: &Dataset,
+        selected: &[usize],
+        stage: &Stage,
+        start: &Parameters,
+    ) -> Result<Self, FieldFitError> {
+        let mut fit = Self::start(dataset, selected, stage, start);
+        fit.under_white_noise(stage, WHITE)?;
+        Ok(fit)
+    }
+
+    fn start(dataset: &Dataset, selected: &[usize], stage: &Stage, start: &Parameters) -> Self {
+        let rows: Arc<Rows> = Rows::new(dataset, selected).into();
+        let places = stage.places_m();
+        let mut values = DVector::zeros(UNKNOWNS);
+        let parameters = FieldParameters::of_model_31(start, stage);
+        values.as_mut_slice()[..COUNT].copy_from_slice(parameters.probes.as_flattened());
+        Self {
+            weights: vec![1.0; selected.len()],
+            at: Point {
+                values,
+                offsets: vec![[0.0; 3]; rows.movements.len()],
+            },
+            rows,
+            unknowns: unknowns(&places),
+            places,
+            noise: white_only([1.0; 3]),
+            iterations: 0,
+            start: *start,
+        }
+    }
+
+    /// The rows used, with their weights.
+    pub fn rows(&self) -> &Arc<Rows> {
+        &self.rows
+    }
+
+    /// Whether a loss would make rows count less.
+    pub fn has_outliers(&self, loss: Loss) -> bool {
+        self.weights_by(loss).iter().any(|weight| *weight < 1.0)
+    }
+
+    /// The same as [`WhiteFit::new`] with weights by a loss, from a start that bad rows don't bend.
+    /// An interrupt ends the rounds early.
+    ///
+    /// # Errors
+    /// See [`FieldFitError`].
+    pub fn robust(
+        dataset: &Dataset,
+        selected: &[usize],
+        stage: &Stage,
+        start: &Parameters,
+        loss: Loss,
+    ) -> Result<Self, FieldFitError> {
+        let mut fit = Self::start(dataset, selected, stage, start);
+        for _ in 0..ROUNDS_MAX {
+            let weights = fit.weights_by(loss);
+            let mut pairs = fit.weights.iter().zip(&weights);
+            if pairs.all(|(a, b)| (a - b).abs() < WEIGHT_SETTLED) || interrupt::requested() {
+                break;
+            }
+            fit.rows = Rows::weighted(dataset, selected, &weights).into();
+            fit.weights = weights;
+            fit.under_white_noise(stage, REWEIGHTED)?;
+        }
+        let weights = loss.last(fit.weights);
+        // A movement may lose all its rows.
+        let movements = fit.rows.movement_rows().zip(&fit.at.offsets);
+        let kept = movements.filter(|(rows, _)| weights[rows.clone()].iter().any(|w| *w > 0.0));
+        fit.at.offsets = kept.map(|(_, offset)| *offset).collect();
+        fit.rows = Rows::weighted(dataset, selected, &weights).into();
+        fit.weights = weights;
+        fit.under_white_noise(stage, WHITE)?;
+        Ok(fit)
+    }
+
+    /// The rest of [`fit_field`]: under the noise that the residuals show.
+    ///
+    /// # Errors
+    /// See [`FieldFitError`].
+    pub fn finish(mut self, stage: &Stage) -> Result<FieldFit, FieldFitError> {
+        let mut covariance = self.covariance(&self.normal()?)?;
+        // White noise alone makes the errors too small, never too large: what fails here, fails.
+        let early = self.verdict(stage, &self.posterior(covariance));
+        if early.loses() {
+            return Err(FieldFitError::NotCarried(Box::new(early)));
+        }
+        // What the parameters took of the drift depends on how much there is of it.
+        self.noise.drift_mm = USUAL_DRIFT_MM;
+        let mut normal = self.normal()?;
+        for _ in 0..NOISE_ROUNDS {
+            covariance = self.covariance(&normal)?;
+            let white_mm = self.white_mm(stage);
+            let blocks =
+                self.rows
+                    .evaluate(&probes(&self.parameters()), self.lag_s(), &self.at.offsets);
+            self.noise = Noise {
+                white_mm,
+                drift_mm: drift_mm(&self.rows, &blocks, white_mm, &covariance),
+            };
+            drop(blocks);
+            let solved = self.descend(WHITENED)?;
+            if !solved.reached {
+                let iterations = self.iterations;
+                return Err(FieldFitError::Stuck { iterations });
+            }
+            normal = solved.normal;
+        }
+        let posterior = self.posterior(self.covariance(&normal)?);
+        let rows = &self.rows;
+        // A block of outliers alone holds no residual.
+        let weight =
+            |block: &Range<usize>| rows.rows[block.clone()].iter().map(|row| row.weight).sum();
+        let weights = rows.blocks.iter().map(weight);
+        let counted = weights.filter(|sum: &f64| *sum >= HALF).count();
+        Ok(FieldFit {
+            verdict: self.verdict(stage, &posterior),
+            posterior,
+            score: Score {
+                chi_squared: normal.chi_squared(),
+                log_determinant: normal.log_determinant,
+                prior: self.unknowns.prior_squares(&self.at.values),
+                residuals: 3 * counted.saturating_sub(rows.movements.len()),
+            },
+            parameters: self.parameters(),
+            noise: self.noise,
+            lag_s: self.lag_s(),
+            planar_range: rows.planar_range_mm.map(|x| x * 1e-3),
+            vertical_range: rows.vertical_range,
+            offsets_mm: self.at.offsets,
+            weights: self.weights,
+            iterations: self.iterations,
+        })
+    }
+
+    fn parameters(&self) -> FieldParameters {
+        self.equations().parameters(&self.at)
+    }
+
+    fn lag_s(&self) -> f64 {
+        self.at.values[COUNT]
+    }
+
+    fn equations(&self) -> FieldEquations<'_> {
+        FieldEquations {
+            rows: &self.rows,
+            places: self.places,
+            noise: self.noise,
+        }
+    }
+
+    fn normal(&self) -> Result<Normal<COLUMNS>, FieldFitError> {
+        let normal = gauss_newton::Equations::normal(&self.equations(), &self.at);
+        normal.ok_or(FieldFitError::Singular)
+    }
+
+    fn covariance(&self, normal: &Normal<COLUMNS>) -> Result<DMatrix<f64>, FieldFitError> {
+        self.unknowns
+            .covariance(normal)
+            .ok_or(FieldFitError::Singular)
+    }
+
+    fn posterior(&self, covariance: DMatrix<f64>) -> Posterior {
+        Posterior::new(covariance, &self.parameters(), &self.noise)
+    }
+
+    fn verdict(&self, stage: &Stage, posterior: &Posterior) -> Verdict {
+        let rows = &self.rows;
+        let ranges = (rows.planar_range_mm.map(|x| x * 1e-3), rows.vertical_range);
+        Verdict::new(&self.parameters(), posterior, &self.start, stage, ranges)
+    }
+
+    fn white_mm(&self, stage: &Stage) -> [f64; 3] {
+        let probes = probes(&self.parameters());
+        white_mm(&self.rows, &probes, self.lag_s(), &self.at.offsets, stage)
+    }
+
+    fn weights_by(&self, loss: Loss) -> Vec<f64> {
+        let probes = probes(&self.parameters());
+        let residuals_mm = self
+            .rows
+            .residuals_mm(&probes, self.lag_s(), &self.at.offsets);
+        loss.weights(residuals_mm, self.rows.movement_rows())
+    }
+
+    fn under_white_noise(&mut self, stage: &Stage, limits: Limits) -> Result<(), FieldFitError> {
+        self.noise = white_only(self.white_mm(stage));
+        self.descend(limits)?;
+        Ok(())
+    }
+
+    fn descend(&mut self, limits: Limits) -> Result<Solved<COLUMNS>, FieldFitError> {
+        // The basis is that of the values themselves.
+        let x = self.at.values.clone();
+        let offsets = self.at.offsets.clone();
+        let solved = gauss_newton::solve(&self.equations(), &self.unknowns, x, offsets, limits);
+        let solved = solved.ok_or(FieldFitError::Singular)?;
+        self.at = solved.point.clone();
+        self.iterations += solved.steps;
+        Ok(solved)
+    }
+}

@@ -1,0 +1,60 @@
+//! What a log that is not recorded yet will tell: its posterior does not depend on the residuals.
+
+use super::blocks::Rows;
+use super::carry::{Service, ServiceVariance, service_poses};
+use super::parameters::{FieldParameters, unknowns};
+use super::posterior::Posterior;
+use super::probe::probes;
+use super::whiten::{FieldEquations, Noise};
+
+/// What is to be expected of a fit to rows whose signals are not known yet.
+#[derive(Clone, Debug)]
+pub struct Forecast {
+    /// The posterior of the parameters.
+    pub posterior: Posterior,
+    /// Errors in service; Model (31) differs from a field model without E and p by nothing.
+    pub service: ServiceVariance,
+}
+
+/// A stage about to be calibrated, with the poses of its service.
+#[derive(Clone, Debug)]
+pub struct Forecaster {
+    parameters: FieldParameters,
+    noise: Noise,
+    service: Service,
+}
+
+impl Forecaster {
+    /// For a stage of these parameters, of which E = p = 0, under this noise, in service within X,
+    /// Y, Rz and Z, Rx, Ry of these largest magnitudes (m, rad); `None` where its probes can't tell
+    /// a pose there.
+    pub fn new(
+        parameters: &FieldParameters,
+        noise: &Noise,
+        service: ([f64; 3], [f64; 3]),
+    ) -> Option<Self> {
+        Some(Self {
+            parameters: *parameters,
+            noise: *noise,
+            service: Service::new(parameters, noise.white_mm, service_poses(service))?,
+        })
+    }
+
+    /// The forecast for rows that each stand for `weight` rows of the log; `None` where they don't
+    /// determine the parameters.
+    pub fn forecast(&self, rows: &Rows, weight: f64) -> Option<Forecast> {
+        let offsets_mm = vec![[0.0; 3]; rows.movements.len()];
+        let mut blocks = rows.evaluate(&probes(&self.parameters), 0.0, &offsets_mm);
+        blocks.iter_mut().for_each(|block| block.rows *= weight);
+        let places = self.parameters.places;
+        let equations = FieldEquations {
+            rows,
+            places,
+            noise: self.noise,
+        };
+        let covariance = unknowns(&places).covariance(&equations.of_blocks(&blocks))?;
+        let posterior = Posterior::new(covariance, &self.parameters, &self.noise);
+        let service = self.service.variance(&posterior.covariance);
+        Some(Forecast { posterior, service })
+    }
+}

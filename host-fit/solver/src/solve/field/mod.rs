@@ -1,0 +1,34 @@
+//! The field model: maximum a posteriori of its 81 parameters, and what a log tells of them.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`terms`] | the parameters: names, units, prior |
+//! | [`parameters`] | their values, and the decoder's constants |
+//! | [`probe`] | what a probe reads, with derivatives |
+//! | [`blocks`] | rows and their means over a few |
+//! | [`whiten`] | the normal equations under drift |
+//! | [`noise`] | noise from residuals |
+//! | [`fit`] | the steps in a row |
+//! | [`posterior`] | covariance of parameters and of a pose |
+//! | [`carry`] | whether the log can carry the model |
+//! | [`clocks`] | two clocks, from the motion that both saw |
+//! | [`forecast`] | what a log that is not recorded yet will tell |
+//! | [`update`] | a few seconds of log on top of an old posterior |
+
+pub mod blocks;
+pub mod carry;
+pub mod clocks;
+pub mod error;
+pub mod fit;
+pub mod forecast;
+pub mod noise;
+pub mod parameters;
+pub mod posterior;
+pub mod probe;
+#[cfg(test)]
+mod sample_for_tests;
+pub mod terms;
+#[cfg(test)]
+mod tests;
+pub mod update;
+pub mod whiten;

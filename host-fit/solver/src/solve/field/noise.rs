@@ -1,0 +1,224 @@
+//! The noise of a log from the residuals of a fit: white at the probes, a walk of the reference.
+
+use super::blocks::{Block, Rows};
+use super::probe::Probe;
+use super::terms::{COUNT, PER_PROBE};
+use super::whiten::{Noise, UNKNOWNS};
+use crate::input::stage::Stage;
+use crate::solve::robust::HALF;
+use crate::statistics::SecondDifferences;
+use nalgebra::DMatrix;
+use runtime::geometry::inverse_rows;
+
+/// Length over which the reference's walk is averaged, s.
+const SPAN_S: f64 = 1.0;
+/// A span shorter than this part of [`SPAN_S`] is left out.
+const PART_MIN: f64 = 0.5;
+
+/// White noise of the probes A, B, C, mm: from second differences of the residuals, whose
+/// variance is six times that of the noise, at least what rounding to codes leaves.
+/// Rows below half weight are left out.
+pub fn white_mm(
+    rows: &Rows,
+    probes: &[Probe; 3],
+    lag_s: f64,
+    offsets_mm: &[[f64; 3]],
+    stage: &Stage,
+) -> [f64; 3] {
+    let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
+    let residuals = rows.residuals_mm(probes, lag_s, offsets_mm);
+    let mut noise = SecondDifferences::default();
+    for movement in rows.movement_rows() {
+        let of_rows = residuals[movement.clone()].windows(3);
+        for (three, rows) in of_rows.zip(rows.rows[movement].windows(3)) {
+            if rows.iter().all(|row| row.weight >= HALF) {
+                noise.add(three[0], three[1], three[2]);
+            }
+        }
+    }
+    noise.deviations().map(|white| white.max(least_mm))
+}
+
+/// Means over a span of about [`SPAN_S`], as poses.
+struct Span {
+    rows: f64,
+    time_s: f64,
+    /// Error of the reference, mm, mm, mrad.
+    error: [f64; 3],
+    /// Its variance by white noise of one row.
+    white: [f64; 3],
+    /// Its change by the unknowns.
+    by_unknown: [[f64; UNKNOWNS]; 3],
+}
+
+/// What the reference of a stage like those at hand walks in a second in X, Y, Rz: mm, mm, mrad.
+pub const USUAL_DRIFT_MM: [f64; 3] = [1e-4; 3];
+/// Standard deviation of the logarithm of a walk, before a log is seen: a factor of two.
+const DRIFT_SPREAD: f64 = 0.7;
+
+/// The reference's walk in X, Y, Rz, per root of a second (mm, mm, mrad): from differences
+/// between means of neighbouring spans of a second, with what the fitted parameters took of them
+/// (by their `covariance`) put back.
+///
+/// A short log has few spans, from which the walk is known within a factor of two. Standard errors
+/// are honest on average with the mean of the walk's variance over all values that the spans
+/// allow, not with the most likely one, which is often zero.
+pub fn drift_mm(
+    rows: &Rows,
+    blocks: &[Block],
+    white_mm: [f64; 3],
+    covariance: &DMatrix<f64>,
+) -> [f64; 3] {
+    let mut differences = [const { Vec::new() }; 3];
+    for movement in &rows.movements {
+        let spans = spans(&blocks[movement.clone()], white_mm);
+        for pair in spans.windows(2) {
+            let (a, b) = (&pair[0], &pair[1]);
+            for (axis, differences) in differences.iter_mut().enumerate() {
+                let error = b.error[axis] - a.error[axis];
+                let by: [f64; UNKNOWNS] =
+                    std::array::from_fn(|j| b.by_unknown[axis][j] - a.by_unknown[axis][j]);
+                differences.push(Difference {
+                    square: error * error + quadratic(covariance, &by),
+                    white: a.white[axis] / a.rows + b.white[axis] / b.rows,
+                    // Means over neighbouring spans of a walk differ by 2/3 of what it does from
+                    // the middle of one to that of the other.
+                    seconds: (b.time_s - a.time_s) * 2.0 / 3.0,
+                });
+            }
+        }
+    }
+    [0, 1, 2].map(|axis| mean_walk(&differences[axis], USUAL_DRIFT_MM[axis]))
+}
+
+/// The difference between two spans.
+struct Difference {
+    square: f64,
+    /// Its variance by white noise.
+    white: f64,
+    /// Over that of a walk in a second.
+    seconds: f64,
+}
+
+/// Root of the mean of a walk's variance in a second over its posterior: normal differences, a
+/// log-normal prior about the `usual` walk.
+fn mean_walk(differences: &[Difference], usual: f64) -> f64 {
+    const STEPS: i32 = 40;
+    const STEP: f64 = 0.125;
+    let at = |step: i32| {
+        let place = STEP * f64::from(step);
+        let walk = usual * libm::exp(DRIFT_SPREAD * place);
+        let mut log = -0.5 * place * place;
+        for d in differences {
+            let variance = d.white + d.seconds * walk * walk;
+            log -= 0.5 * (libm::log(variance) + d.square / variance);
+        }
+        (log, walk * walk)
+    };
+    let places: Vec<(f64, f64)> = (-STEPS..=STEPS).map(at).collect();
+    let highest = places.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (log, variance) in places {
+        let weight = libm::exp(log - highest);
+        sum += weight * variance;
+        weights += weight;
+    }
+    (sum / weights).sqrt()
+}
+
+fn quadratic(covariance: &DMatrix<f64>, by: &[f64; UNKNOWNS]) -> f64 {
+    let mut sum = 0.0;
+    for (column, x) in covariance.column_iter().zip(by) {
+        let product: f64 = column.iter().zip(by).map(|(c, y)| c * y).sum();
+        sum += x * product;
+    }
+    sum
+}
+
+fn spans(blocks: &[Block], white_mm: [f64; 3]) -> Vec<Span> {
+    let start_s = blocks.first().map_or(0.0, |block| block.time_s);
+    let number = |block: &Block| ((block.time_s - start_s) / SPAN_S).floor() as i64;
+    let mut spans: Vec<Span> = blocks
+        .chunk_by(|a, b| number(a) == number(b))
+        .filter_map(|blocks| span(blocks, white_mm))
+        .collect();
+    let most = spans.iter().map(|span| span.rows).fold(0.0, f64::max);
+    spans.retain(|span| span.rows >= PART_MIN * most);
+    spans
+}
+
+fn span(blocks: &[Block], white_mm: [f64; 3]) -> Option<Span> {
+    let mut sum = Span {
+        rows: 0.0,
+        time_s: 0.0,
+        error: [0.0; 3],
+        white: [0.0; 3],
+        by_unknown: [[0.0; UNKNOWNS]; 3],
+    };
+    for block in blocks {
+        let inverse = inverse_rows(&block.by_pose)?;
+        sum.rows += block.rows;
+        sum.time_s += block.rows * block.time_s;
+        for (axis, row) in inverse.iter().enumerate() {
+            for (probe, per_mm) in row.iter().enumerate() {
+                let weight = per_mm * block.rows;
+                let white = per_mm * white_mm[probe];
+                sum.error[axis] += weight * block.residual_mm[probe];
+                sum.white[axis] += block.rows * white * white;
+                let by = &mut sum.by_unknown[axis];
+                by[COUNT] += weight * block.by_lag[probe];
+                let own = &mut by[probe * PER_PROBE..(probe + 1) * PER_PROBE];
+                for (sum, x) in own.iter_mut().zip(&block.by_parameter[probe]) {
+                    *sum += weight * x;
+                }
+            }
+        }
+    }
+    let share = 1.0 / sum.rows;
+    sum.time_s *= share;
+    for axis in 0..3 {
+        sum.error[axis] *= share;
+        sum.white[axis] *= share;
+        sum.by_unknown[axis].iter_mut().for_each(|x| *x *= share);
+    }
+    Some(sum)
+}
+
+/// The noise of a log before anything is known of the drift.
+pub fn white_only(white_mm: [f64; 3]) -> Noise {
+    Noise {
+        white_mm,
+        drift_mm: [0.0; 3],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Differences as large as a walk of this size makes them on average.
+    fn differences(count: usize, walk: f64) -> Vec<Difference> {
+        let white = 2e-9;
+        let one = |_| Difference {
+            square: white + walk * walk / 1.5,
+            white,
+            seconds: 1.0 / 1.5,
+        };
+        (0..count).map(one).collect()
+    }
+
+    #[test]
+    fn many_spans_give_the_walk_and_few_an_allowance_for_what_they_leave_open() {
+        for walk in [3e-5, 1e-4, 1e-3] {
+            let found = |count| mean_walk(&differences(count, walk), 1e-4) / walk;
+            let (many, few) = (found(2000), found(7));
+            assert!((0.95..1.05).contains(&many), "{walk}: {many}");
+            // Towards the usual walk.
+            assert!((0.8..2.2).contains(&few), "{walk}: {few}");
+        }
+        // Spans that show no walk don't show that there is none.
+        let still = mean_walk(&differences(7, 0.0), 1e-4);
+        assert!((2e-5..1e-4).contains(&still), "{still}");
+        assert!(mean_walk(&[], 1e-4) > 1e-4);
+    }
+}

@@ -1,0 +1,221 @@
+//! What the log tells of the parameters, and what that means for a pose.
+
+use super::parameters::FieldParameters;
+use super::probe::{Probe, probes};
+use super::terms::{CARRY, COUNT, PER_PROBE, name};
+use super::whiten::Noise;
+use crate::problem::model;
+use nalgebra::{DMatrix, Matrix3, SymmetricEigen};
+use runtime::geometry::inverse_rows;
+
+/// What the form leaves of a probe's reading in service, rms, mm: mean over simulated stages, each
+/// fitted to 30 s without noise and drift, which leave 16 to 46 nm.
+pub const FORM_MM: f64 = 25e-6;
+
+/// The posterior of a fit: normal, with the parameters as its mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Posterior {
+    /// Covariance of the parameters, 81 by 81, in the order and the units of the parameters.
+    pub covariance: DMatrix<f64>,
+    /// Standard error of the lag of the reference, s; `None` where the log shows nothing of it.
+    pub lag_error_s: Option<f64>,
+    parameters: FieldParameters,
+    pub(super) white_mm: [f64; 3],
+}
+
+/// A combination of parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Direction {
+    /// Variance along it over what it would be if the parameters were independent: how much
+    /// they stand in for each other.
+    pub inflation: f64,
+    /// The parameters with the largest shares: name, and share in terms of standard errors.
+    pub parts: Vec<(String, f64)>,
+}
+
+/// What is to be expected of a pose, as covariances of X, Y, Rz in m, m, rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseUncertainty {
+    /// By the parameters and by what the model's form leaves: the same at every visit of the pose.
+    pub systematic: Matrix3<f64>,
+    /// By the noise of the probes: new at every tick.
+    pub noise: Matrix3<f64>,
+}
+
+/// How errors become errors of a pose in X, Y, Rz: m, m, rad.
+pub(super) struct PoseErrors {
+    /// Per error of each parameter.
+    pub(super) by_parameter: [[f64; COUNT]; 3],
+    /// Per mm of error of each probe's signal.
+    pub(super) by_signal: [[f64; 3]; 3],
+}
+
+impl PoseErrors {
+    /// At the pose `planar` (m, m, rad), `vertical` (m, rad, rad); `None` where the probes can't
+    /// tell it.
+    pub(super) fn new(probes: &[Probe; 3], planar: [f64; 3], vertical: [f64; 3]) -> Option<Self> {
+        let planar_mm = planar.map(|x| x * 1e3);
+        let read = [0, 1, 2].map(|k| probes[k].read(planar_mm, vertical));
+        let inverse = inverse_rows(&read.map(|r| r.by_pose))?;
+        let by_signal = inverse.map(|row| row.map(|x| 1e-3 * x));
+        let by_parameter = by_signal.map(|row| {
+            std::array::from_fn(|k| {
+                let probe = k / PER_PROBE;
+                -row[probe] * read[probe].by_parameter[k % PER_PROBE]
+            })
+        });
+        Some(Self {
+            by_parameter,
+            by_signal,
+        })
+    }
+}
+
+impl Posterior {
+    pub(super) fn new(with_lag: DMatrix<f64>, parameters: &FieldParameters, noise: &Noise) -> Self {
+        let lag = with_lag[(COUNT, COUNT)];
+        let covariance = with_lag.view((0, 0), (COUNT, COUNT)).into_owned();
+        Self {
+            lag_error_s: (lag > 0.0).then(|| lag.sqrt()),
+            ..Self::of_parameters(covariance, parameters, noise)
+        }
+    }
+
+    /// Of parameters with this covariance, 81 by 81 in their order and units, for probes with this
+    /// noise.
+    pub const fn of_parameters(
+        covariance: DMatrix<f64>,
+        parameters: &FieldParameters,
+        noise: &Noise,
+    ) -> Self {
+        Self {
+            covariance,
+            lag_error_s: None,
+            parameters: *parameters,
+            white_mm: noise.white_mm,
+        }
+    }
+
+    /// The standard errors of the parameters, in their units.
+    pub fn standard_errors(&self) -> [f64; COUNT] {
+        std::array::from_fn(|k| self.covariance[(k, k)].sqrt())
+    }
+
+    /// Those of the parameters that Model (31) has too, in the order and the units of
+    /// [`Parameters`](crate::problem::parameters::Parameters).
+    pub fn standard_errors_31(&self) -> [Option<f64>; model::COUNT] {
+        let errors = self.standard_errors();
+        std::array::from_fn(|k| (k < 3 * CARRY).then(|| errors[k % 3 * PER_PROBE + k / 3]))
+    }
+
+    /// The correlation of two parameters.
+    pub fn correlation(&self, i: usize, j: usize) -> f64 {
+        self.covariance[(i, j)] / (self.covariance[(i, i)] * self.covariance[(j, j)]).sqrt()
+    }
+
+    /// The `count` pairs of parameters that are most strongly correlated, the strongest first.
+    pub fn strongest_correlations(&self, count: usize) -> Vec<(String, String, f64)> {
+        let mut pairs: Vec<(usize, usize)> = (0..COUNT)
+            .flat_map(|i| (0..i).map(move |j| (j, i)))
+            .collect();
+        let strength = |&(i, j): &(usize, usize)| self.correlation(i, j).abs();
+        pairs.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+        let named = |(i, j)| (name(i), name(j), self.correlation(i, j));
+        pairs.into_iter().take(count).map(named).collect()
+    }
+
+    /// The `count` combinations of parameters that the log tells apart worst, the worst first,
+    /// with the `parts` parameters that have most to do with each.
+    pub fn weakest_directions(&self, count: usize, parts: usize) -> Vec<Direction> {
+        let correlations = DMatrix::from_fn(COUNT, COUNT, |i, j| self.correlation(i, j));
+        let eigen = SymmetricEigen::new(correlations);
+        let mut order: Vec<usize> = (0..COUNT).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let direction = |k: usize| {
+            let vector = eigen.eigenvectors.column(k);
+            let mut largest: Vec<usize> = (0..COUNT).collect();
+            largest.sort_by(|&a, &b| vector[b].abs().total_cmp(&vector[a].abs()));
+            // The largest share is positive, so that the same log gives the same signs.
+            let sign = vector[largest[0]].signum();
+            Direction {
+                inflation: eigen.eigenvalues[k],
+                parts: largest
+                    .into_iter()
+                    .take(parts)
+                    .map(|j| (name(j), sign * vector[j]))
+                    .collect(),
+            }
+        };
+        order.into_iter().take(count).map(direction).collect()
+    }
+
+    /// What is to be expected of the pose `planar` (m, m, rad) at `vertical` (m, rad, rad);
+    /// `None` where the probes can't tell it.
+    pub fn at_pose(&self, planar: [f64; 3], vertical: [f64; 3]) -> Option<PoseUncertainty> {
+        let errors = PoseErrors::new(&probes(&self.parameters), planar, vertical)?;
+        let by_parameter = DMatrix::from_fn(3, COUNT, |axis, k| errors.by_parameter[axis][k]);
+        let systematic = &by_parameter * &self.covariance * by_parameter.transpose();
+        let by_probes = |errors_mm: [f64; 3]| {
+            let by = Matrix3::from_fn(|axis, k| errors.by_signal[axis][k] * errors_mm[k]);
+            by * by.transpose()
+        };
+        Some(PoseUncertainty {
+            systematic: systematic.fixed_view::<3, 3>(0, 0) + by_probes([FORM_MM; 3]),
+            noise: by_probes(self.white_mm),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::field::sample_for_tests::parameters;
+    use crate::solve::field::whiten::UNKNOWNS;
+    use runtime::VerticalPose;
+
+    /// A small error of one parameter at a time, decoded, against what is predicted for it; the
+    /// decoder's one step leaves up to some thousandths of its effect.
+    #[test]
+    fn the_predicted_error_of_a_pose_is_what_the_decoder_makes_of_the_parameters_error() {
+        let truth = parameters();
+        let (planar, vertical) = ([210e-6, -330e-6, 150e-6], [120e-6, 300e-6, -260e-6]);
+        let signal_m =
+            probes(&truth).map(|probe| probe.signal_mm(planar.map(|x| x * 1e3), vertical) * 1e-3);
+        let decode = |parameters: &FieldParameters| {
+            let constants = parameters.constants(1.0).expect("sound");
+            let vertical = VerticalPose::from_array(vertical);
+            constants.decode(signal_m, &vertical).to_array()
+        };
+        let noise = Noise {
+            white_mm: [5e-4; 3],
+            drift_mm: [0.0; 3],
+        };
+        for k in 0..COUNT {
+            let values = truth.probes.as_flattened();
+            let error = 1e-4 * values[k].abs().max(0.01);
+            let moved = |step: f64| {
+                let mut parameters = truth;
+                parameters.probes[k / PER_PROBE][k % PER_PROBE] += step;
+                decode(&parameters)
+            };
+            let (up, down) = (moved(error), moved(-error));
+            let mut covariance = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
+            covariance[(k, k)] = error * error;
+            let at_pose = |covariance| {
+                let posterior = Posterior::new(covariance, &truth, &noise);
+                posterior.at_pose(planar, vertical).expect("a pose")
+            };
+            // The noise of the probes acts as what the form leaves of their readings.
+            let of_form = at_pose(DMatrix::zeros(UNKNOWNS, UNKNOWNS));
+            let of_noise = of_form.noise * (FORM_MM / noise.white_mm[0]).powi(2);
+            assert!((of_form.systematic - of_noise).norm() < 1e-9 * of_noise.norm());
+            let of_parameter = at_pose(covariance).systematic - of_form.systematic;
+            for axis in 0..3 {
+                let found = 0.5 * (up[axis] - down[axis]).abs();
+                let predicted = of_parameter[(axis, axis)].max(0.0).sqrt();
+                let close = (found - predicted).abs() <= 1e-2 * found + 1e-12;
+                assert!(close, "{} {axis}: {found:e} {predicted:e}", name(k));
+            }
+        }
+    }
+}

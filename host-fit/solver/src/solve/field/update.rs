@@ -1,0 +1,344 @@
+//! A few seconds of log with an old posterior as the prior: recalibration.
+//!
+//! The prior is normal about the old parameters. Its covariance is the old posterior's plus what
+//! may have changed since, written as L L': the parameters are p = p_old + L x with x standard
+//! normal. This needs no inverse, so a change may be of one parameter or of all, with or without
+//! an old posterior. The lag of the reference is an unknown of every log.
+
+use super::blocks::Rows;
+use super::error::FieldFitError;
+use super::noise::white_mm;
+use super::parameters::FieldParameters;
+use super::posterior::Posterior;
+use super::probe::probes;
+use super::terms::{CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SLOPES, TERMS, THETA};
+use super::whiten::{FieldEquations, Noise, UNKNOWNS};
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::solve::gauss_newton::{self, Limits, Unknowns};
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+/// What may have changed since the old log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// The gain of all probes in common, as the temperature of magnets and amplifiers changes it.
+    Gain,
+    /// The gain of each probe.
+    Gains,
+    /// Anything: also the place and the height of each probe, and the shape of its field.
+    All,
+}
+
+/// Standard deviations of what may have changed.
+///
+/// A gain scales eta, a, b and c alike. Beyond it a probe that was taken off and seated again is
+/// elsewhere by some tenths of a millimetre and turned by up to a degree; its slopes follow the
+/// height, and the terms of its field change by a fifth of what is expected of them at all: so
+/// chosen, 0.3 mm is followed and a log of 4 s is enough.
+const GAIN: f64 = 0.1;
+const LEVER_ARM_M: f64 = 1e-3;
+const THETA_RAD: f64 = 0.02;
+/// Of a, b and c together, in parts of themselves.
+const SLOPE: f64 = 0.05;
+/// Of b and c for themselves: a times this lever.
+const PLACE_M: f64 = 5e-3;
+const OF_PRIOR: f64 = 0.2;
+const LAG_S: f64 = 0.01;
+
+/// Residuals are nearly linear in the unknowns: three steps do.
+const LIMITS: Limits = Limits {
+    steps: 20,
+    gain: 1e-3,
+};
+
+impl Change {
+    /// How the command line names it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Gain => "gain",
+            Self::Gains => "gains",
+            Self::All => "all",
+        }
+    }
+
+    /// The columns of L for it, each over the parameters.
+    fn columns(self, old: &FieldParameters) -> Vec<[f64; COUNT]> {
+        let gain = |probes: &[usize]| {
+            let mut column = [0.0; COUNT];
+            for &probe in probes {
+                for k in ETA..CARRY {
+                    column[probe * PER_PROBE + k] = GAIN * old.probes[probe][k];
+                }
+            }
+            column
+        };
+        let gains = || [0, 1, 2].map(|probe| gain(&[probe]));
+        match self {
+            Self::Gain => vec![gain(&[0, 1, 2])],
+            Self::Gains => gains().to_vec(),
+            Self::All => {
+                let mut columns = gains().to_vec();
+                for (probe, values) in old.probes.iter().enumerate() {
+                    columns.extend(seating(probe, values));
+                }
+                columns
+            }
+        }
+    }
+}
+
+/// What seating a probe anew changes beside its gain.
+fn seating(probe: usize, values: &[f64; PER_PROBE]) -> Vec<[f64; COUNT]> {
+    let own = probe * PER_PROBE;
+    let one = |k: usize, deviation: f64| {
+        let mut column = [0.0; COUNT];
+        column[own + k] = deviation;
+        column
+    };
+    let mut slopes = [0.0; COUNT];
+    for k in SLOPES..CARRY {
+        slopes[own + k] = SLOPE * values[k];
+    }
+    let place = PLACE_M * values[SLOPES];
+    let mut columns = vec![
+        slopes,
+        one(LEVER_ARM, LEVER_ARM_M),
+        one(THETA, THETA_RAD),
+        one(SLOPES + 1, place),
+        one(SLOPES + 2, place),
+    ];
+    for (k, term) in TERMS.iter().enumerate() {
+        columns.extend(term.prior.map(|prior| one(k, OF_PRIOR * prior)));
+    }
+    columns
+}
+
+/// The parameters after a log, with what it says of them.
+#[derive(Clone, Debug)]
+pub struct Update {
+    /// The parameters.
+    pub parameters: FieldParameters,
+    /// How well they are known; without an old covariance as if the others were exact.
+    pub posterior: Posterior,
+    /// The noise that the log was weighed with.
+    pub noise: Noise,
+    /// Sum of squares of the whitened residuals and of x: about [`Update::residuals`] if nothing
+    /// else has changed.
+    pub chi_squared: f64,
+    /// The part of x in it: at most about the number of its entries if what changed is what the
+    /// prior allows for.
+    pub prior: f64,
+    /// Entries of x.
+    pub changes: usize,
+    /// Whitened residuals: three for each block, less three for each movement's offset.
+    pub residuals: usize,
+    /// Rows behind them.
+    pub rows: usize,
+    /// Gauss-Newton steps.
+    pub iterations: u32,
+}
+
+impl Update {
+    /// The change of eta of A, B, C in parts of the old one, with the standard error of the new.
+    pub fn gains(&self, old: &FieldParameters) -> [(f64, f64); 3] {
+        let errors = self.posterior.standard_errors();
+        [0, 1, 2].map(|probe| {
+            let (eta, new) = (old.probes[probe][ETA], self.parameters.probes[probe][ETA]);
+            let error = errors[probe * PER_PROBE + ETA];
+            ((new - eta) / eta, (error / eta).abs())
+        })
+    }
+}
+
+/// Fits what has changed to all rows of a dataset. `covariance` is the old posterior's, 81 by 81;
+/// without one the parameters that don't change stay as they are. `drift_mm` is the walk of the
+/// reference in X, Y, Rz in a second, mm, mm, mrad: a few seconds don't tell it.
+///
+/// # Errors
+/// [`FieldFitError::Singular`] where a number is not finite or
+/// `covariance` is none.
+pub fn update(
+    dataset: &Dataset,
+    stage: &Stage,
+    old: &FieldParameters,
+    covariance: Option<&DMatrix<f64>>,
+    change: Change,
+    drift_mm: [f64; 3],
+) -> Result<Update, FieldFitError> {
+    let all: Vec<usize> = (0..dataset.rows.len()).collect();
+    let rows = Rows::new(dataset, &all);
+    let basis = factor(old, covariance, change).ok_or(FieldFitError::Singular)?;
+    let offsets_mm = vec![[0.0; 3]; rows.movements.len()];
+    let equations = FieldEquations {
+        rows: &rows,
+        places: old.places,
+        noise: Noise {
+            white_mm: white_mm(&rows, &probes(old), 0.0, &offsets_mm, stage),
+            drift_mm,
+        },
+    };
+    let mut origin = DVector::zeros(UNKNOWNS);
+    origin.as_mut_slice()[..COUNT].copy_from_slice(old.probes.as_flattened());
+    let changes = basis.ncols();
+    let unknowns = Unknowns {
+        origin,
+        basis,
+        prior: DMatrix::identity(changes, changes),
+        ranges: Vec::new(),
+    };
+    let x = DVector::zeros(changes);
+    let solved = gauss_newton::solve(&equations, &unknowns, x, offsets_mm, LIMITS);
+    let solved = solved.ok_or(FieldFitError::Singular)?;
+    let with_lag = unknowns.covariance(&solved.normal);
+    let parameters = equations.parameters(&solved.point);
+    let prior = unknowns.prior_squares(&solved.x);
+    let noise = equations.noise;
+    Ok(Update {
+        posterior: Posterior::new(
+            with_lag.ok_or(FieldFitError::Singular)?,
+            &parameters,
+            &noise,
+        ),
+        parameters,
+        noise,
+        chi_squared: solved.normal.chi_squared() + prior,
+        prior,
+        changes,
+        residuals: 3 * (rows.blocks.len() - rows.movements.len()),
+        rows: rows.rows.len(),
+        iterations: solved.steps,
+    })
+}
+
+/// L, over the parameters and the lag. `None` if `covariance` is no covariance.
+fn factor(
+    old: &FieldParameters,
+    covariance: Option<&DMatrix<f64>>,
+    change: Change,
+) -> Option<DMatrix<f64>> {
+    let changes = change.columns(old);
+    let known = covariance.map_or(0, |_| COUNT);
+    let mut l = DMatrix::zeros(UNKNOWNS, known + changes.len() + 1);
+    if let Some(covariance) = covariance {
+        // In the scale in which the diagonal is one: the units differ by orders of magnitude.
+        let scale = covariance.diagonal().map(f64::sqrt);
+        let scaled = DMatrix::from_fn(COUNT, COUNT, |i, j| {
+            covariance[(i, j)] / (scale[i] * scale[j])
+        });
+        let scaled = Cholesky::new(scaled)?.unpack();
+        for i in 0..COUNT {
+            for j in 0..=i {
+                l[(i, j)] = scale[i] * scaled[(i, j)];
+            }
+        }
+    }
+    for (j, column) in changes.iter().enumerate() {
+        for (i, value) in column.iter().enumerate() {
+            l[(i, known + j)] = *value;
+        }
+    }
+    l[(COUNT, known + changes.len())] = LAG_S;
+    Some(l)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::field::sample_for_tests::{Run, parameters, stage};
+    use crate::solve::field::terms::SHAPES;
+
+    /// What a log of the changed stage gives, from the sample parameters known to a thousandth.
+    fn updated(new: &FieldParameters, run: &Run, change: Change) -> (Update, FieldParameters) {
+        let old = parameters();
+        let covariance = DMatrix::from_fn(COUNT, COUNT, |i, j| {
+            let value = old.probes.as_flattened()[i];
+            if i == j { 1e-10 * value * value } else { 0.0 }
+        });
+        let update = update(
+            &run.dataset(new),
+            &stage(),
+            &old,
+            Some(&covariance),
+            change,
+            run.drift.map(|x| x * 1e3),
+        );
+        (update.expect("an update"), old)
+    }
+
+    fn scaled(gains: [f64; 3]) -> FieldParameters {
+        let mut new = parameters();
+        for (values, gain) in new.probes.iter_mut().zip(gains) {
+            values[ETA..CARRY].iter_mut().for_each(|x| *x *= gain);
+        }
+        new
+    }
+
+    const TWO_SECONDS: Run = Run {
+        seconds: 2.0,
+        ..Run::EIGHT_SECONDS
+    };
+
+    #[test]
+    fn gains_are_found_within_their_standard_errors() {
+        for (change, gains) in [
+            (Change::Gain, [0.99; 3]),
+            (Change::Gains, [1.01, 0.95, 1.0]),
+            (Change::All, [1.01, 0.95, 1.0]),
+        ] {
+            let run = if change == Change::All {
+                Run::EIGHT_SECONDS
+            } else {
+                TWO_SECONDS
+            };
+            let (update, old) = updated(&scaled(gains), &run, change);
+            for ((found, error), gain) in update.gains(&old).into_iter().zip(gains) {
+                assert!(error < 2e-3, "{change:?}: {error}");
+                assert!(
+                    (found - (gain - 1.0)).abs() < 4.5 * error,
+                    "{change:?}: {found} {error}"
+                );
+            }
+            let ratio = update.chi_squared / update.residuals as f64;
+            assert!((0.8..1.2).contains(&ratio), "{change:?}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn a_change_that_is_no_gain_shows_in_chi_squared_unless_all_is_free() {
+        let mut new = parameters();
+        new.probes[1][THETA] += 5e-3;
+        new.probes[1][SHAPES] += 0.01;
+        let run = Run::EIGHT_SECONDS;
+        for (change, low, high) in [
+            (Change::Gain, 3.0, 1e3),
+            (Change::Gains, 3.0, 1e3),
+            (Change::All, 0.8, 1.2),
+        ] {
+            let (update, _) = updated(&new, &run, change);
+            let ratio = update.chi_squared / update.residuals as f64;
+            assert!((low..high).contains(&ratio), "{change:?}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn without_an_old_covariance_only_gains_change() {
+        let (new, old) = (scaled([0.97; 3]), parameters());
+        let dataset = TWO_SECONDS.dataset(&new);
+        let update = update(&dataset, &stage(), &old, None, Change::Gain, [1e-4; 3]);
+        let update = update.expect("an update");
+        let [first, ..] = update.gains(&old);
+        assert!((first.0 + 0.03).abs() < 1e-3, "{first:?}");
+        for (k, (new, old)) in update.parameters.probes[2]
+            .iter()
+            .zip(old.probes[2])
+            .enumerate()
+        {
+            let factor = if (ETA..CARRY).contains(&k) {
+                1.0 + first.0
+            } else {
+                1.0
+            };
+            assert!((new - factor * old).abs() <= 1e-12 * old.abs(), "{k}");
+        }
+    }
+}

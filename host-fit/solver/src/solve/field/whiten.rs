@@ -1,0 +1,274 @@
+//! The normal equations of a log under white noise of the probes and a drifting reference.
+//!
+//! The error of the reference is a random walk in X, Y, Rz that starts anywhere: its start is
+//! the offset of the movement's reset. A Kalman filter that follows it turns residuals and their
+//! derivatives into innovations that don't depend on each other, and takes the offset out at the
+//! same time: without drift this is the same as solving for each movement's offset. A and B are
+//! whitened jointly with C, for all three see the same reference.
+
+use super::blocks::{Block, Rows};
+use super::parameters::FieldParameters;
+use super::probe::probes;
+use super::terms::{COUNT, PER_PROBE};
+use crate::solve::gauss_newton::{Equations, Normal, Point};
+
+/// Unknowns: the parameters, then the lag of the reference.
+pub const UNKNOWNS: usize = COUNT + 1;
+/// The column of the lag's growth by time, which an alignment of two clocks takes too.
+pub const LAG_RATE: usize = UNKNOWNS;
+/// Columns: these and the residual.
+pub const COLUMNS: usize = 84;
+/// The residual's column.
+const RESIDUAL: usize = COLUMNS - 1;
+/// Standard deviation of an offset before a movement is seen, mm: far beyond any reset's.
+const OFFSET_MM: f64 = 1.0;
+
+/// Noise of the log.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// White noise of the probes A, B, C from row to row, standard deviation, mm.
+    pub white_mm: [f64; 3],
+    /// Random walk of the reference in X, Y, Rz: standard deviation after a second, mm, mm, mrad.
+    pub drift_mm: [f64; 3],
+}
+
+/// The field model with the rows of a log.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldEquations<'a> {
+    /// The rows.
+    pub rows: &'a Rows,
+    /// Designed places of the probes: see [`FieldParameters::places`].
+    pub places: [[f64; 2]; 3],
+    /// Their noise.
+    pub noise: Noise,
+}
+
+impl FieldEquations<'_> {
+    /// The parameters at a point.
+    pub fn parameters(&self, at: &Point) -> FieldParameters {
+        FieldParameters::of_values(at.values.as_slice(), self.places)
+    }
+
+    /// Of blocks that are evaluated already.
+    pub fn of_blocks(&self, blocks: &[Block]) -> Normal<COLUMNS> {
+        let movement =
+            |k: usize| Some(filter(&blocks[self.rows.movements[k].clone()], &self.noise));
+        let sums = Normal::of_movements(self.rows.movements.len(), movement);
+        sums.unwrap_or_else(Normal::none)
+    }
+}
+
+impl Equations<COLUMNS> for FieldEquations<'_> {
+    fn normal(&self, at: &Point) -> Option<Normal<COLUMNS>> {
+        let probes = probes(&self.parameters(at));
+        Normal::of_movements(self.rows.movements.len(), |k| {
+            let (lag_s, offset_mm) = (at.values[COUNT], at.offsets[k]);
+            let blocks = self.rows.evaluate_movement(k, &probes, lag_s, offset_mm);
+            Some(filter(&blocks, &self.noise))
+        })
+    }
+}
+
+type Matrix = [[f64; 3]; 3];
+
+/// The sums over the blocks of a movement.
+fn filter(blocks: &[Block], noise: &Noise) -> Normal<COLUMNS> {
+    let mut out = Normal::none();
+    let mut end = [[0.0; COLUMNS]; 3];
+    let mut spread: Matrix = [[0.0; 3]; 3];
+    for (axis, row) in spread.iter_mut().enumerate() {
+        row[axis] = OFFSET_MM * OFFSET_MM;
+    }
+    let mut time_s = blocks.first().map_or(0.0, |block| block.time_s);
+    for block in blocks {
+        for (axis, drift) in noise.drift_mm.into_iter().enumerate() {
+            spread[axis][axis] += drift * drift * (block.time_s - time_s).max(0.0);
+        }
+        time_s = block.time_s;
+        let gain = Gain::new(block, &spread, noise);
+        let mut columns = innovations(block, &end);
+        let [of_a, of_b, of_c] = &columns;
+        for (end, [a, b, c]) in end.iter_mut().zip(gain.kalman) {
+            for (j, end) in end.iter_mut().enumerate() {
+                *end += (a * of_a[j] + b * of_b[j]) + c * of_c[j];
+            }
+        }
+        spread = gain.spread;
+        gain.whiten(&mut columns);
+        out.log_determinant += gain.log_determinant();
+        out.add_row(&columns, 1.0);
+    }
+    out.ends.push(end);
+    out
+}
+
+/// Residuals and derivatives of a block, less what the filter expects of them.
+#[inline(always)]
+fn innovations(block: &Block, expected: &[[f64; COLUMNS]; 3]) -> [[f64; COLUMNS]; 3] {
+    let mut columns = [[0.0; COLUMNS]; 3];
+    for (probe, column) in columns.iter_mut().enumerate() {
+        let own = probe * PER_PROBE;
+        column[own..own + PER_PROBE].copy_from_slice(&block.by_parameter[probe]);
+        column[COUNT] = block.by_lag[probe];
+        column[LAG_RATE] = block.by_lag[probe] * block.time_s;
+        column[RESIDUAL] = block.residual_mm[probe];
+        let [x, y, rz] = block.by_pose[probe];
+        for j in 0..COLUMNS {
+            column[j] -= (x * expected[0][j] + y * expected[1][j]) + rz * expected[2][j];
+        }
+    }
+    columns
+}
+
+/// One step of the filter.
+struct Gain {
+    /// Pose (X, Y, Rz) per innovation (A, B, C).
+    kalman: Matrix,
+    /// Covariance of the reference's error after the step.
+    spread: Matrix,
+    /// Cholesky factor of the covariance of the innovations.
+    factor: Matrix,
+}
+
+impl Gain {
+    fn new(block: &Block, spread: &Matrix, noise: &Noise) -> Self {
+        let h = &block.by_pose;
+        // P H', by axis and probe.
+        let seen = each(|axis, probe| dot(&spread[axis], &h[probe]));
+        let mut innovation =
+            each(|i, k| h[i][0] * seen[0][k] + h[i][1] * seen[1][k] + h[i][2] * seen[2][k]);
+        for (k, row) in innovation.iter_mut().enumerate() {
+            row[k] += noise.white_mm[k] * noise.white_mm[k] / block.rows;
+        }
+        let factor = cholesky(&innovation);
+        let kalman = seen.map(|row| solve(&factor, row));
+        let spread = each(|i, k| spread[i][k] - dot(&kalman[i], &seen[k]));
+        let spread = each(|i, k| 0.5 * (spread[i][k] + spread[k][i]));
+        Self {
+            kalman,
+            spread,
+            factor,
+        }
+    }
+
+    #[inline(always)]
+    fn whiten(&self, columns: &mut [[f64; COLUMNS]; 3]) {
+        let l = &self.factor;
+        let [first, second, third] = [1.0 / l[0][0], 1.0 / l[1][1], 1.0 / l[2][2]];
+        let [of_a, of_b, of_c] = columns;
+        for ((x, y), z) in of_a.iter_mut().zip(of_b).zip(of_c) {
+            *x *= first;
+            *y = (*y - l[1][0] * *x) * second;
+            *z = (*z - l[2][0] * *x - l[2][1] * *y) * third;
+        }
+    }
+
+    fn log_determinant(&self) -> f64 {
+        let [a, b, c] = [0, 1, 2].map(|k| libm::log(self.factor[k][k]));
+        2.0 * (a + b + c)
+    }
+}
+
+fn each(value: impl Fn(usize, usize) -> f64) -> Matrix {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|k| value(i, k)))
+}
+
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
+}
+
+/// The lower factor of a covariance; what rounding makes negative counts as next to nothing.
+fn cholesky(m: &Matrix) -> Matrix {
+    let root = |x: f64| x.max(f64::MIN_POSITIVE).sqrt();
+    let a = root(m[0][0]);
+    let (b, c) = (m[1][0] / a, m[2][0] / a);
+    let d = root(m[1][1] - b * b);
+    let e = (m[2][1] - c * b) / d;
+    let f = root(m[2][2] - c * c - e * e);
+    [[a, 0.0, 0.0], [b, d, 0.0], [c, e, f]]
+}
+
+/// The solution of L L' x = right.
+fn solve(l: &Matrix, right: [f64; 3]) -> [f64; 3] {
+    let a = right[0] / l[0][0];
+    let b = (right[1] - l[1][0] * a) / l[1][1];
+    let c = (right[2] - l[2][0] * a - l[2][1] * b) / l[2][2];
+    let z = c / l[2][2];
+    let y = (b - l[2][1] * z) / l[1][1];
+    let x = (a - l[1][0] * y - l[2][0] * z) / l[0][0];
+    [x, y, z]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::field::sample_for_tests::{Run, parameters};
+    use nalgebra::{Cholesky, DMatrix};
+
+    /// The same sums from the covariance of all residuals of each movement, written out whole:
+    /// white noise, walk and offset.
+    #[test]
+    fn the_filter_whitens_as_the_whole_covariance_does() {
+        let run = Run {
+            movements: 2,
+            seconds: 0.3,
+            ..Run::EIGHT_SECONDS
+        };
+        let dataset = run.dataset(&parameters());
+        let all: Vec<usize> = (0..dataset.rows.len()).collect();
+        let rows = Rows::new(&dataset, &all);
+        let blocks = rows.evaluate(&probes(&parameters()), 0.0, &[[0.0; 3]; 2]);
+        let noise = Noise {
+            white_mm: [5e-4, 4e-4, 6e-4],
+            drift_mm: [1e-3, 2e-3, 5e-4],
+        };
+        let equations = FieldEquations {
+            rows: &rows,
+            places: parameters().places,
+            noise,
+        };
+        let found = equations.of_blocks(&blocks);
+
+        let mut products = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
+        let mut log_determinant = 0.0;
+        for movement in &rows.movements {
+            let blocks = &blocks[movement.clone()];
+            assert!(blocks.len() > 10);
+            let covariance = DMatrix::from_fn(3 * blocks.len(), 3 * blocks.len(), |i, j| {
+                let (a, b) = (&blocks[i / 3], &blocks[j / 3]);
+                let time_s = a.time_s.min(b.time_s) - blocks[0].time_s;
+                let shared: f64 = (0..3)
+                    .map(|axis| {
+                        let walk = noise.drift_mm[axis].powi(2) * time_s + OFFSET_MM.powi(2);
+                        a.by_pose[i % 3][axis] * walk * b.by_pose[j % 3][axis]
+                    })
+                    .sum();
+                let white = noise.white_mm[i % 3].powi(2) / a.rows;
+                shared + if i == j { white } else { 0.0 }
+            });
+            let columns = DMatrix::from_fn(3 * blocks.len(), COLUMNS, |i, j| {
+                let (block, probe) = (&blocks[i / 3], i % 3);
+                match j {
+                    COUNT => block.by_lag[probe],
+                    LAG_RATE => block.by_lag[probe] * block.time_s,
+                    RESIDUAL => block.residual_mm[probe],
+                    _ if j < COUNT && j / PER_PROBE == probe => {
+                        block.by_parameter[probe][j % PER_PROBE]
+                    }
+                    _ => 0.0,
+                }
+            });
+            let factor = Cholesky::new(covariance).expect("positive");
+            log_determinant += 2.0 * factor.l().diagonal().map(f64::ln).sum();
+            products += columns.transpose() * factor.solve(&columns);
+        }
+        assert!((found.log_determinant - log_determinant).abs() < 1e-4);
+        for i in 0..=RESIDUAL {
+            for j in i..=RESIDUAL {
+                let size = (products[(i, i)] * products[(j, j)]).sqrt();
+                let error = (found.curvature(i, j) - products[(i, j)]).abs();
+                assert!(error <= 1e-6 * size, "{i} {j}: {error} {size}");
+            }
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! The least-squares fit against known truth, an independent crate, and its own derivatives.
+
+use super::gains::{parameters_of, point_of};
+use super::rows::{COLUMNS, Decoder};
+use super::solve::{fit, solve};
+use crate::input::shipped::STAGE_TOML;
+use crate::input::stage::Stage;
+use crate::problem::Problem;
+use crate::problem::model::{COUNT, Model};
+use crate::problem::parameters::Parameters;
+use crate::problem::synthetic::Protocol;
+use crate::solve::gauss_newton::{Equations, Normal, Point};
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use runtime::ModelKind;
+
+fn stage() -> Stage {
+    Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("the shipped stage")
+}
+
+fn truth() -> Parameters {
+    from_array([
+        0.1944, -0.2150, -0.3290, 0.0005, 0.0077, -0.0010, 0.8671, 0.7049, 0.8632, -188.2, -156.6,
+        -178.2, -69.7, -56.8, -63.4, 14.9, -55.1, 12.7,
+    ])
+}
+
+fn from_array(first: [f64; 18]) -> Parameters {
+    let mut values = [0.0; COUNT];
+    values[..18].copy_from_slice(&first);
+    Parameters { values }
+}
+
+fn model_31<'a>(dataset: &crate::input::dataset::Dataset, stage: &'a Stage) -> Problem<'a> {
+    let all: Vec<usize> = (0..dataset.rows.len()).collect();
+    Problem::new(dataset, &all, stage, Model::of(ModelKind::M31))
+}
+
+fn normal(problem: &Problem, parameters: &Parameters) -> Option<Normal<COLUMNS>> {
+    problem.normal(&Point {
+        values: DVector::from_column_slice(&parameters.values[..18]),
+        offsets: Vec::new(),
+    })
+}
+
+fn noisy(seed: u64) -> Protocol {
+    Protocol {
+        hall_noise_m: 0.5e-6,
+        zero_deviation_m: 4e-6,
+        seed,
+        ..Protocol::exact(truth(), 40)
+    }
+}
+
+#[test]
+fn truth_is_recovered_from_a_log_without_noise() {
+    let stage = stage();
+    let exact = Protocol {
+        zero_deviation_m: 4e-6,
+        ..Protocol::exact(truth(), 40)
+    };
+    let dataset = exact.dataset(&stage);
+    let solution = solve(&model_31(&dataset, &stage), &[]).expect("a fit");
+    let pairs = solution.parameters.values.iter().zip(truth().values);
+    for (k, (have, want)) in pairs.enumerate() {
+        assert!(
+            (have - want).abs() < 1e-5 * want.abs() + 1e-8,
+            "{k}: {have} {want}"
+        );
+    }
+    // The forward model holds the zero deviation that the closed form gives back.
+    let deltas = solution.delta_m.iter().flatten();
+    let largest = deltas.fold(0.0f64, |m, d| m.max(d.abs()));
+    assert!(largest > 3e-6 && largest <= 4e-6 + 1e-12, "{largest}");
+}
+
+/// Derivatives of the cost with respect to the 18 parameters against differences of the cost.
+#[test]
+fn gradient_matches_differences_of_the_cost() {
+    let stage = stage();
+    let dataset = noisy(3).dataset(&stage);
+    let problem = model_31(&dataset, &stage);
+    let mut at = truth();
+    at.values.iter_mut().for_each(|value| *value *= 1.01);
+    // Angles that are not small, so that the sign of a sine shows.
+    at.values[3..6].copy_from_slice(&[0.05, -0.04, 0.06]);
+    let here = normal(&problem, &at).expect("regular");
+    for k in 0..18 {
+        let step = 1e-4 * at.values[k].abs().max(0.05);
+        let cost = |step: f64| {
+            let mut moved = at;
+            moved.values[k] += step;
+            normal(&problem, &moved).expect("regular").chi_squared()
+        };
+        let difference = -(cost(step) - cost(-step)) / (4.0 * step);
+        let gradient = here.descent(k);
+        let rounding = 1e-7 * here.chi_squared() / step;
+        let close = (gradient - difference).abs() < 1e-4 * difference.abs() + rounding;
+        assert!(close, "{k}: {gradient} {difference}");
+    }
+}
+
+/// The same residuals for the `levenberg-marquardt` crate: every unknown and every offset its
+/// own, nothing projected, differences for the Jacobian.
+struct Plain<'p> {
+    problem: &'p Problem<'p>,
+    x: DVector<f64>,
+}
+
+impl Plain<'_> {
+    fn residuals_at(&self, x: &DVector<f64>) -> DVector<f64> {
+        let scaled: [f64; COUNT] = std::array::from_fn(|k| x[k] * truth().values[k]);
+        let parameters = Parameters { values: scaled };
+        let decoder = Decoder::new(self.problem, &parameters).expect("regular");
+        let mut out = Vec::new();
+        for (index, group) in self.problem.groups.iter().enumerate() {
+            for row in &self.problem.rows[group.rows.clone()] {
+                let error = decoder.error(row).expect("no pole");
+                for (axis, error) in error.into_iter().enumerate() {
+                    out.push(-error - x[COUNT + 3 * index + axis]);
+                }
+            }
+        }
+        DVector::from_vec(out)
+    }
+}
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Plain<'_> {
+    type ParameterStorage = Owned<f64, Dyn>;
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+
+    fn set_params(&mut self, x: &DVector<f64>) {
+        self.x = x.clone();
+    }
+    fn params(&self) -> DVector<f64> {
+        self.x.clone()
+    }
+    fn residuals(&self) -> Option<DVector<f64>> {
+        Some(self.residuals_at(&self.x))
+    }
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        let columns: Vec<DVector<f64>> = (0..self.x.len())
+            .map(|k| {
+                let (mut up, mut down) = (self.x.clone(), self.x.clone());
+                up[k] += 1e-5;
+                down[k] -= 1e-5;
+                (self.residuals_at(&up) - self.residuals_at(&down)) / 2e-5
+            })
+            .collect();
+        Some(DMatrix::from_columns(&columns))
+    }
+}
+
+#[test]
+fn optimum_equals_that_of_an_independent_solver_without_projection() {
+    let stage = stage();
+    let dataset = Protocol {
+        settings: crate::simulate::protocol::TABLE_6[..9]
+            .iter()
+            .chain(&crate::simulate::protocol::TABLE_6[13..15])
+            .copied()
+            .collect(),
+        rows_per_movement: 8,
+        ..noisy(5)
+    }
+    .dataset(&stage);
+    let problem = model_31(&dataset, &stage);
+    let ours = solve(&problem, &[]).expect("a fit");
+    let mut start = DVector::zeros(COUNT + 3 * problem.groups.len());
+    start.rows_mut(0, COUNT).fill(1.0);
+    let (found, report) = LevenbergMarquardt::new().minimize(Plain {
+        problem: &problem,
+        x: start,
+    });
+    let theirs = 2.0 * report.objective_function;
+    assert!(
+        (ours.cost - theirs).abs() < 1e-6 * theirs,
+        "{} {theirs} {report:?}",
+        ours.cost
+    );
+    for k in 0..18 {
+        let ours = ours.parameters.values[k];
+        let theirs = found.x[k] * truth().values[k];
+        assert!(
+            (ours - theirs).abs() < 2e-3 * theirs.abs(),
+            "{k}: {ours} {theirs}"
+        );
+    }
+}
+
+#[test]
+fn a_truth_outside_its_range_is_found_and_named_and_a_fit_within_the_ranges_ends_on_the_edge() {
+    let mut narrow = stage();
+    let mut eta = narrow.search.of("eta").expect("known");
+    eta[0].high = 0.85;
+    narrow.search.set("eta", eta);
+    let dataset = noisy(7).dataset(&narrow);
+    let problem = model_31(&dataset, &narrow);
+    let free = solve(&problem, &[]).expect("a fit");
+    assert!((free.parameters.eta()[0] - 0.8671).abs() < 1e-3);
+    let names: Vec<String> = free.at_limit.iter().map(|id| id.name()).collect();
+    assert_eq!(names, ["eta_a"]);
+    let within = fit(&problem, &[free.parameters], true).expect("a fit");
+    assert_eq!(within.parameters.eta()[0], 0.85);
+    // Worse than free, better than the free optimum merely clipped.
+    let mut clipped = free.parameters;
+    clipped.values[6] = 0.85;
+    let clipped = normal(&problem, &clipped).expect("regular").chi_squared();
+    assert!(free.cost < within.cost && within.cost < clipped);
+}
+
+#[test]
+fn a_range_without_width_fixes_its_parameter() {
+    let mut fixed = stage();
+    let mut eta = fixed.search.of("eta").expect("known");
+    eta[1].low = 0.7;
+    eta[1].high = 0.7;
+    fixed.search.set("eta", eta);
+    let dataset = noisy(13).dataset(&fixed);
+    let solution = solve(&model_31(&dataset, &fixed), &[]).expect("a fit");
+    assert_eq!(solution.parameters.eta()[1], 0.7);
+    assert!(solution.at_limit.is_empty(), "{:?}", solution.at_limit);
+}
+
+#[test]
+fn parameters_next_to_a_pole_have_no_cost() {
+    let stage = stage();
+    let dataset = noisy(1).dataset(&stage);
+    let mut pole = truth();
+    pole.values[9] = -0.8671 / 250e-6;
+    assert!(normal(&model_31(&dataset, &stage), &pole).is_none());
+}
+
+#[test]
+fn parameters_and_gains_undo_each_other() {
+    let point = point_of(&truth()).expect("regular");
+    let back = parameters_of(&point, &stage()).expect("regular").values;
+    for (have, want) in back.iter().zip(truth().values) {
+        assert!((have - want).abs() < 1e-12 * want.abs() + 1e-15);
+    }
+}
+
+/// Sensors in another order or with other signs are another stage, which a regression starts at.
+#[test]
+fn a_probe_with_the_other_sign_is_found() {
+    let stage = stage();
+    let mut dataset = noisy(9).dataset(&stage);
+    dataset
+        .rows
+        .iter_mut()
+        .for_each(|row| row.signal_m[1] *= -1.0);
+    let solution = solve(&model_31(&dataset, &stage), &[]).expect("a fit");
+    assert!((solution.parameters.eta()[1] + 0.7049).abs() < 1e-3);
+}

@@ -1,0 +1,207 @@
+//! How a problem is solved: least squares, SHTLBO and its relatives, by one function.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`gauss_newton`] | the one estimator: damped Gauss-Newton with a prior |
+//! | [`least_squares`] | the models of the paper by it |
+//! | [`field`] | the field model by it |
+//! | [`objective`] | the fitness as a cost function of a search |
+//! | [`search`] | SHTLBO, its ablations and its peers, for any cost function |
+//! | [`robust`] | rows that the model does not explain count less |
+//! | [`by_search`] | a search on the fitness, with or without a least-squares finish |
+//!
+//! ```
+//! # use hall_input::input::shipped::STAGE_TOML;
+//! # use hall_input::input::stage::Stage;
+//! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
+//! # use hall_input::input::log::{self, ReadOptions};
+//! # use hall_input::input::shipped::LOG_GZ;
+//! # let reading = log::read_bytes(LOG_GZ, "paper.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
+//! # let dataset = reading.dataset;
+//! # use hall_solver::problem::Problem;
+//! # use hall_solver::problem::draw::{Draw, draw_rows};
+//! # use hall_solver::problem::model::Model;
+//! # let rows = draw_rows(&dataset, 200, Draw::Stratified, 1);
+//! # let problem = Problem::new(&dataset, &rows, &stage, Model::of(runtime::ModelKind::M31));
+//! use hall_solver::solve::{Projection, Solver, SolverOptions};
+//!
+//! let options = SolverOptions::new(Projection::Linear, 1);
+//! let solution = Solver::LeastSquares.solve(&problem, &options)?;
+//! assert!(problem.fitness(solution.cost) < 1.4); // um, um, urad
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod by_search;
+pub mod field;
+pub mod gauss_newton;
+pub mod least_squares;
+pub mod objective;
+pub mod robust;
+pub mod search;
+
+use crate::problem::Problem;
+use crate::problem::model::ParameterId;
+use crate::problem::parameters::Parameters;
+use search::kind::SearchKind;
+use search::run::Checkpoint;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+/// How much of the problem is solved in closed form.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Projection {
+    /// Nothing: every zero deviation is an unknown of its own, within its range (the paper).
+    None,
+    /// The zero deviations.
+    Delta,
+    /// Everything linear: the gain G and one offset for each movement. The ratios of the slopes to
+    /// eta are left, nine for Model (31).
+    Linear,
+}
+
+impl Projection {
+    /// Its name on the command line and in JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Delta => "delta",
+            Self::Linear => "linear",
+        }
+    }
+}
+
+/// A way to find the parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Solver {
+    /// SHTLBO on a few hundred rows, then least squares on all: the best result.
+    Finished,
+    /// Least squares alone.
+    LeastSquares,
+    /// A search alone.
+    Search(SearchKind),
+}
+
+impl Solver {
+    /// All of them, the default first.
+    pub const ALL: [Self; SearchKind::ALL.len() + 2] = {
+        let mut all = [Self::Finished; SearchKind::ALL.len() + 2];
+        all[1] = Self::LeastSquares;
+        let mut k = 0;
+        while k < SearchKind::ALL.len() {
+            all[k + 2] = Self::Search(SearchKind::ALL[k]);
+            k += 1;
+        }
+        all
+    };
+
+    /// The name on the command line and in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Finished => "shtlbo-lm",
+            Self::LeastSquares => "lm",
+            Self::Search(kind) => kind.name(),
+        }
+    }
+
+    /// Finds parameters of low cost.
+    ///
+    /// # Errors
+    /// See [`SolveError`].
+    pub fn solve(
+        self,
+        problem: &Problem<'_>,
+        options: &SolverOptions,
+    ) -> Result<Solution, SolveError> {
+        let started = Instant::now();
+        let mut solution = match self {
+            Self::Finished => by_search::solve_finished(problem, options)?,
+            Self::LeastSquares => least_squares::solve::solve(problem, options.known.as_slice())?,
+            Self::Search(kind) => by_search::solve(kind, problem, options)?,
+        };
+        solution.elapsed = started.elapsed();
+        Ok(solution)
+    }
+}
+
+/// What a solver is told besides the problem.
+#[derive(Clone, Debug)]
+pub struct SolverOptions {
+    /// How much is projected out.
+    pub projection: Projection,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Individuals and generations of a population: see [`by_search::default_size`].
+    pub population: usize,
+    /// Generations of a population.
+    pub generations: usize,
+    /// Known parameters to start from, such as those of an earlier blob.
+    pub known: Option<Parameters>,
+    /// Set by Ctrl-C: a search then ends and keeps the best so far.
+    pub interrupt: Option<&'static AtomicBool>,
+}
+
+impl SolverOptions {
+    /// The usual size of a population for a form, nothing known, no interrupt.
+    pub const fn new(projection: Projection, seed: u64) -> Self {
+        let (population, generations) = by_search::default_size(projection);
+        Self {
+            projection,
+            seed,
+            population,
+            generations,
+            known: None,
+            interrupt: None,
+        }
+    }
+}
+
+/// What a solver found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// The parameters.
+    pub parameters: Parameters,
+    /// The solver's own zero deviation of each movement of the log, m; zero where the model has
+    /// none or the movement had no row.
+    pub delta_m: Vec<[f64; 3]>,
+    /// Weighted sum of squared errors over the problem's rows, um^2.
+    pub cost: f64,
+    /// Evaluations of the cost.
+    pub evaluations: u64,
+    /// The course of the search, the first population and every generation; empty without one.
+    pub history: Vec<Checkpoint>,
+    /// Time that the solver took.
+    pub elapsed: Duration,
+    /// Why it stopped, for the report.
+    pub stopped: String,
+    /// Parameters that stand at an end of their search range.
+    pub at_limit: Vec<ParameterId>,
+}
+
+/// Why a solver gave nothing.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// The signals of the three probes do not span three dimensions.
+    #[error(
+        "the log does not move the stage in X, Y and Rz independently, so the three probes cannot \
+         be told apart: record movements along each of the three axes"
+    )]
+    NoPlanarMotion,
+    /// No start led anywhere.
+    #[error(
+        "no start of the search could be evaluated: every one put a row next to a pole of 1/phi or \
+         made PM singular. Check the search ranges in stage.toml against the vertical motion in the log"
+    )]
+    NoUsableStart,
+    /// The solver does not know this form of the problem.
+    #[error("solver {solver} cannot solve model ({model}) with --project {projection}: {reason}")]
+    Unsupported {
+        /// Name of the solver.
+        solver: &'static str,
+        /// Name of the model.
+        model: &'static str,
+        /// The form asked for.
+        projection: &'static str,
+        /// What to do instead.
+        reason: &'static str,
+    },
+}

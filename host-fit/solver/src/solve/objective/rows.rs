@@ -1,0 +1,123 @@
+//! Sums of squared pose errors over the rows of a problem, in um, um, urad.
+//!
+//! The same equations as `runtime::model`, which is the model; a test holds the two equal
+//! within rounding. eta moves from phi into the matrix: PM^-1 (s / phi - delta / eta) =
+//! G (s' - delta) with G = PM^-1 diag(1/eta) and s' = s / (phi / eta).
+
+use super::poles::SHARE_MIN;
+use crate::problem::parameters::Parameters;
+use crate::problem::{Problem, TrainRow};
+use crate::solve::least_squares::gains::Point;
+use nalgebra::{Matrix3, Vector3};
+use runtime::geometry::{inverse_rows, matrix};
+
+/// The slopes over eta of A, B, C.
+struct Ratios(Matrix3<f64>);
+
+impl Ratios {
+    fn new(ratios: &[[f64; 3]; 3]) -> Self {
+        Self(matrix(ratios))
+    }
+
+    /// phi / eta of the three probes at a row (equation 33), and s' there, um.
+    #[inline(always)]
+    fn correct(&self, row: &TrainRow) -> (Vector3<f64>, Vector3<f64>) {
+        let shares = Vector3::repeat(1.0) + self.0 * Vector3::from(row.vertical);
+        let corrected_um = Vector3::from(row.signal_um).component_div(&shares);
+        (shares, corrected_um)
+    }
+}
+
+/// At the given zero deviation of each movement, m.
+pub fn with_delta(
+    problem: &Problem<'_>,
+    point: &Point,
+    delta_m: impl Fn(usize) -> [f64; 3],
+) -> Vector3<f64> {
+    let ratios = Ratios::new(&point.ratios);
+    let mut squares = Vector3::zeros();
+    for group in &problem.groups {
+        let zero_um = point.gain * (Vector3::from(delta_m(group.movement)) * 1e6);
+        for row in &problem.rows[group.rows.clone()] {
+            let (_, corrected_um) = ratios.correct(row);
+            let error = point.gain * corrected_um - Vector3::from(row.reference_um) - zero_um;
+            squares += error.component_mul(&error);
+        }
+    }
+    squares
+}
+
+/// At the best zero deviation of each movement: it takes off the movement's mean pose error,
+/// delta = eta (PM mean error), clipped to its range.
+pub fn with_best_delta(
+    problem: &Problem<'_>,
+    point: &Point,
+    parameters: &Parameters,
+) -> Option<Vector3<f64>> {
+    let ratios = Ratios::new(&point.ratios);
+    let range = problem.stage.search.delta_m;
+    let rows = matrix(&parameters.geometry().plane_rows());
+    let to_delta = Matrix3::from_diagonal(&Vector3::from(parameters.eta())) * rows;
+    let mut smallest = Vector3::repeat(f64::INFINITY);
+    let mut squares = Vector3::zeros();
+    for group in &problem.groups {
+        let rows = &problem.rows[group.rows.clone()];
+        let (mut sum, mut here) = (Vector3::zeros(), Vector3::zeros());
+        for row in rows {
+            let (shares, corrected_um) = ratios.correct(row);
+            smallest = smallest.inf(&shares);
+            let error = point.gain * corrected_um - Vector3::from(row.reference_um);
+            sum += error;
+            here += error.component_mul(&error);
+        }
+        if problem.model.has_zero_deviation {
+            let n = rows.len() as f64;
+            let mean = sum / n;
+            let delta_um = (to_delta * mean).map(|um| range.clip(um * 1e-6) * 1e6);
+            // Sum of (error - zero)^2, free of the cancellation that zero^2 would bring.
+            let off = mean - point.gain * delta_um;
+            here += off.component_mul(&off) * n - sum.component_mul(&mean);
+        }
+        squares += here;
+    }
+    (smallest.min() > SHARE_MIN).then_some(squares)
+}
+
+/// The gain, um, um, urad per um, and one offset of each movement that fit best, and the squares
+/// that they leave. With s' and q each less its mean over the movement, A = sum s' s'^T and
+/// B = sum s' q^T, G^T is A^-1 B.
+pub fn best_gain(
+    problem: &Problem<'_>,
+    ratios: &[[f64; 3]; 3],
+) -> Option<(Matrix3<f64>, Vector3<f64>)> {
+    let ratios = Ratios::new(ratios);
+    let mut smallest = Vector3::repeat(f64::INFINITY);
+    let (mut signal, mut mixed) = (Matrix3::zeros(), Matrix3::zeros());
+    let mut squares = Vector3::zeros();
+    for group in &problem.groups {
+        let rows = &problem.rows[group.rows.clone()];
+        let (mut signal_sum, mut reference_sum) = (Vector3::zeros(), Vector3::zeros());
+        for row in rows {
+            let (shares, s) = ratios.correct(row);
+            let q = Vector3::from(row.reference_um);
+            smallest = smallest.inf(&shares);
+            signal_sum += s;
+            reference_sum += q;
+            signal += s * s.transpose();
+            mixed += s * q.transpose();
+            squares += q.component_mul(&q);
+        }
+        let n = rows.len() as f64;
+        signal -= signal_sum * signal_sum.transpose() / n;
+        mixed -= signal_sum * reference_sum.transpose() / n;
+        squares -= reference_sum.component_mul(&reference_sum) / n;
+    }
+    if smallest.min() <= SHARE_MIN {
+        return None;
+    }
+    let rows = std::array::from_fn(|i| std::array::from_fn(|k| signal[(i, k)]));
+    let gain = mixed.tr_mul(&matrix(&inverse_rows(&rows)?));
+    let left = squares - (gain * mixed).diagonal();
+    // Rounding could make an exact fit negative.
+    Some((gain, left.map(|left| left.max(0.0))))
+}

@@ -1,0 +1,260 @@
+//! Each form against the runtime's own model in f64, and the forms against each other.
+
+use super::Objective;
+use super::poles::SHARE_MIN;
+use super::sample_for_tests::{dataset, fitness_by_the_runtime, problem, stage, truth, vertical};
+use crate::input::stage::Range;
+use crate::problem::model::Model;
+use crate::problem::parameters::Parameters;
+use crate::problem::zero_deviation::ZeroDeviation;
+use crate::problem::{Problem, TrainRow};
+use crate::solve::Projection;
+use crate::solve::search::cost::CostFunction;
+use crate::solve::search::random::{Phase, RandomSource, stream};
+use runtime::geometry::inverse_rows;
+use runtime::model::{planar_pose, sensitivity_at};
+use runtime::{ModelKind, VerticalPose};
+
+const MODELS: [ModelKind; 4] = [
+    ModelKind::M12,
+    ModelKind::M15,
+    ModelKind::M30,
+    ModelKind::M31,
+];
+
+/// An individual drawn from the whole box.
+fn draw(cost: &Objective<'_>, number: usize) -> Vec<f64> {
+    let mut individual = vec![0.0; cost.bounds().len()];
+    stream(3, 0, Phase::Start, number).fill_within(cost.bounds(), &mut individual);
+    individual
+}
+
+fn objective<'a>(problem: &'a Problem<'a>, projection: Projection) -> Objective<'a> {
+    Objective::new(problem, projection).expect("a form with unknowns")
+}
+
+fn assert_close(have: f64, want: f64, relative: f64, what: &str) {
+    assert!(
+        (have - want).abs() <= relative * want.abs(),
+        "{what}: {have}, expected {want}"
+    );
+}
+
+/// The mean pose error of each movement by the runtime's model, and so its zero deviation.
+fn zero_deviations(problem: &Problem<'_>, parameters: &Parameters) -> Vec<ZeroDeviation> {
+    let inverse = inverse_rows(&parameters.geometry().plane_rows()).expect("sound");
+    let mut zeros = vec![ZeroDeviation::NONE; problem.movements];
+    for group in &problem.groups {
+        let rows = &problem.rows[group.rows.clone()];
+        let mut mean = [0.0; 3];
+        for row in rows {
+            let vertical = VerticalPose::from_array(vertical(row));
+            let phi = parameters
+                .sensitivity()
+                .map(|s| sensitivity_at(&s, &vertical));
+            let signal = row.signal_um.map(|s| s * 1e-6);
+            let pose = planar_pose(&inverse, signal, phi, &runtime::PlanarPose::ZERO).to_array();
+            for k in 0..3 {
+                mean[k] += (pose[k] - row.reference_um[k] * 1e-6) / rows.len() as f64;
+            }
+        }
+        let range = &problem.stage.search.delta_m;
+        // A search holds them within their range.
+        let mut zero = ZeroDeviation::of_mean_error(parameters, mean, range);
+        zero.delta_m = zero.delta_m.map(|delta| range.clip(delta));
+        zeros[group.movement] = zero;
+    }
+    zeros
+}
+
+/// The smallest phi / eta of all rows by the runtime's model.
+fn smallest_share(problem: &Problem<'_>, parameters: &Parameters) -> f64 {
+    let share = |row: &TrainRow| {
+        let vertical = VerticalPose::from_array(vertical(row));
+        let shares = parameters
+            .sensitivity()
+            .map(|s| sensitivity_at(&s, &vertical) / s.eta);
+        shares[0].min(shares[1]).min(shares[2])
+    };
+    problem.rows.iter().map(share).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn the_full_form_equals_the_runtimes_model() {
+    let (stage, dataset) = (stage(), dataset(7, 5));
+    for model in MODELS {
+        let mut problem = problem(&dataset, &stage, model);
+        problem.weights = [1.0, 2.0, 0.5];
+        let cost = objective(&problem, Projection::None);
+        for number in 0..50 {
+            let individual = draw(&cost, number);
+            let by_runtime = fitness_by_the_runtime(
+                &problem,
+                &cost.parameters(&individual).expect("parameters"),
+                &cost.own_delta_m(&individual).expect("its own"),
+            );
+            assert_close(cost.cost(&individual), by_runtime, 1e-11, "full form");
+        }
+    }
+}
+
+#[test]
+fn the_delta_form_equals_the_runtimes_model_at_the_best_zero_deviations() {
+    let (stage, dataset) = (stage(), dataset(7, 5));
+    let (mut clipped, mut beyond_pole) = (0, 0);
+    for model in MODELS {
+        let mut problem = problem(&dataset, &stage, model);
+        problem.weights = [1.0, 2.0, 0.5];
+        let cost = objective(&problem, Projection::Delta);
+        let near = cost.individual(&truth());
+        for number in 0..50 {
+            // From the truth to anywhere in the box, so that some deviations are clipped.
+            let share = number as f64 / 49.0;
+            let far = draw(&cost, number);
+            let mix = |(near, far): (&f64, &f64)| near + share * (far - near);
+            let individual: Vec<f64> = near.iter().zip(&far).map(mix).collect();
+            let parameters = cost.parameters(&individual).expect("parameters");
+            let zeros = if Model::of(model).has_zero_deviation {
+                zero_deviations(&problem, &parameters)
+            } else {
+                vec![ZeroDeviation::NONE; problem.movements]
+            };
+            let cost = cost.cost(&individual);
+            if smallest_share(&problem, &parameters) < SHARE_MIN {
+                assert!(cost.is_nan());
+                beyond_pole += 1;
+                continue;
+            }
+            clipped += zeros.iter().filter(|zero| zero.is_beyond).count();
+            let delta_m: Vec<_> = zeros.iter().map(|zero| zero.delta_m).collect();
+            let by_runtime = fitness_by_the_runtime(&problem, &parameters, &delta_m);
+            assert_close(cost, by_runtime, 1e-10, "delta form");
+        }
+    }
+    assert!(clipped > 100 && clipped < 600, "{clipped}");
+    assert!((1..40).contains(&beyond_pole), "{beyond_pole}");
+}
+
+#[test]
+fn the_linear_form_equals_the_runtimes_model_at_its_own_gain_and_offsets() {
+    let (stage, dataset) = (stage(), dataset(9, 6));
+    let mut problem = problem(&dataset, &stage, ModelKind::M31);
+    problem.weights = [1.0, 2.0, 0.5];
+    let cost = objective(&problem, Projection::Linear);
+    let mut wide = stage.clone();
+    wide.search.delta_m = Range {
+        low: -1.0,
+        high: 1.0,
+    };
+    let unclipped = Problem {
+        stage: &wide,
+        ..problem.clone()
+    };
+    let near = cost.individual(&truth());
+    for number in 0..50 {
+        let individual: Vec<f64> = near
+            .iter()
+            .zip(draw(&cost, number))
+            .map(|(near, far)| near + 0.1 * (far - near))
+            .collect();
+        let parameters = cost.parameters(&individual).expect("a gain");
+        let zeros = zero_deviations(&unclipped, &parameters);
+        let delta_m: Vec<_> = zeros.iter().map(|zero| zero.delta_m).collect();
+        let by_runtime = fitness_by_the_runtime(&problem, &parameters, &delta_m);
+        assert_close(cost.cost(&individual), by_runtime, 1e-9, "linear form");
+        // No other gain does better with these ratios.
+        let mut other = parameters;
+        other.values[number % 3] *= 1.0 + 1e-3;
+        let zeros = zero_deviations(&unclipped, &other);
+        let delta_m: Vec<_> = zeros.iter().map(|zero| zero.delta_m).collect();
+        assert!(fitness_by_the_runtime(&problem, &other, &delta_m) > by_runtime);
+    }
+}
+
+#[test]
+fn the_forms_have_the_papers_unknowns_and_bounds() {
+    let (stage, dataset) = (stage(), dataset(57, 1));
+    let unknowns = |model| {
+        let problem = problem(&dataset, &stage, model);
+        [
+            objective(&problem, Projection::None).bounds().len(),
+            objective(&problem, Projection::Delta).bounds().len(),
+        ]
+    };
+    assert_eq!(unknowns(ModelKind::M31), [192, 18]);
+    assert_eq!(unknowns(ModelKind::M30), [183, 9]);
+    assert_eq!(unknowns(ModelKind::M15), [12, 9]);
+    assert_eq!(unknowns(ModelKind::M12), [9, 6]);
+    let problem = problem(&dataset, &stage, ModelKind::M31);
+    let full = objective(&problem, Projection::None);
+    // H3y (Table 3), c of B (Table 5), and the last zero deviation.
+    let bounds = |index: usize| (full.bounds()[index].low, full.bounds()[index].high);
+    assert_eq!(bounds(5), (0.26, 0.46));
+    assert_eq!(bounds(19), (-5000.0, 0.0));
+    assert_eq!(bounds(191), (-10e-6, 10e-6));
+    // c / eta of C: 0 to 5000 over 0.72, cut where 1 + r Ry would be 0.05 at the lowest Ry.
+    let linear = objective(&problem, Projection::Linear);
+    let last = linear.bounds()[8];
+    let lowest = problem
+        .rows
+        .iter()
+        .map(|row| row.vertical[2])
+        .fold(0.0, f64::min);
+    assert!(
+        5000.0 / 0.72 * -lowest > 1.0,
+        "the box reaches beyond the pole"
+    );
+    assert_eq!((last.low, last.high), (0.0, -0.95 / lowest));
+    let no_ratios = Problem {
+        model: Model::of(ModelKind::M30),
+        ..problem.clone()
+    };
+    assert!(Objective::new(&no_ratios, Projection::Linear).is_none());
+}
+
+#[test]
+fn a_warm_start_gives_back_its_parameters() {
+    let (stage, dataset) = (stage(), dataset(6, 4));
+    for model in MODELS {
+        let problem = problem(&dataset, &stage, model);
+        let mut known = Parameters::designed(&stage);
+        let fitted = 3 * Model::of(model).fitted;
+        known.values[..fitted].copy_from_slice(&truth().values[..fitted]);
+        let same = |back: Parameters| {
+            for (have, want) in back.values.iter().zip(known.values) {
+                assert_close(*have, want, 1e-12, "warm start");
+            }
+        };
+        let delta = objective(&problem, Projection::Delta);
+        same(
+            delta
+                .parameters(&delta.individual(&known))
+                .expect("parameters"),
+        );
+        let full = objective(&problem, Projection::None);
+        let individual = full.individual(&known);
+        same(full.parameters(&individual).expect("parameters"));
+        assert_eq!(individual.len(), full.bounds().len());
+        let best = super::best_delta_m(&problem, &known);
+        assert_eq!(full.own_delta_m(&individual).expect("its own"), best);
+        assert_eq!(delta.own_delta_m(&delta.individual(&known)), None);
+    }
+}
+
+#[test]
+fn whatever_lies_beyond_a_pole_costs_nan() {
+    let (stage, dataset) = (stage(), dataset(6, 4));
+    let problem = problem(&dataset, &stage, ModelKind::M31);
+    let cost = objective(&problem, Projection::Linear);
+    let sound = cost.individual(&truth());
+    assert!(cost.cost(&sound) < 3.0);
+    // a / eta of A that leaves the first row a share of 0.06, 0.04, -0.5 of eta.
+    let [z, rx, ry] = vertical(&problem.rows[0]);
+    let at_share = |share: f64| {
+        let mut individual = sound.clone();
+        individual[0] = (share - 1.0 - sound[1] * rx - sound[2] * ry) / z;
+        cost.cost(&individual)
+    };
+    assert!(at_share(0.06).is_finite());
+    assert!(at_share(0.04).is_nan() && at_share(-0.5).is_nan());
+}

@@ -1,0 +1,213 @@
+use super::*;
+use crate::input::stage::Range;
+use crate::solve::search::cost::known::{Known, rastrigin, rosenbrock, sphere};
+use crate::solve::search::run::StopReason;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+fn evaluations(count: usize) -> StopCriteria<'static> {
+    StopCriteria {
+        evaluations: Some(count),
+        ..StopCriteria::default()
+    }
+}
+
+fn with_seed(seed: u64, population: usize) -> Start<'static> {
+    Start {
+        seed,
+        population,
+        individuals: &[],
+    }
+}
+
+/// Every search but the random one does far better than it, at equal evaluations.
+#[test]
+fn every_search_beats_random_draws_on_known_functions() {
+    let cases = [
+        (sphere as fn(&[f64]) -> f64, 5.0, 0.05),
+        (rosenbrock, 3.0, 0.2),
+        (rastrigin, 5.0, 0.6),
+    ];
+    for (function, half_width, share) in cases {
+        let function = Known::new(8, -half_width, half_width, function);
+        let median = |kind: SearchKind| {
+            let run = |seed| kind.minimize(&function, &with_seed(seed, 40), &evaluations(8_000));
+            let mut costs: Vec<f64> = (1..=5).map(|seed| run(seed).cost).collect();
+            costs.sort_by(f64::total_cmp);
+            costs[2]
+        };
+        let random = median(SearchKind::Random);
+        for kind in SearchKind::ALL
+            .into_iter()
+            .filter(|&s| s != SearchKind::Random)
+        {
+            let cost = median(kind);
+            assert!(
+                cost < share * random,
+                "{}: {cost}, random {random}",
+                kind.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn shtlbo_finds_the_minimum_of_the_sphere_and_of_rosenbrock() {
+    let sphere = Known::new(6, -4.0, 4.0, sphere);
+    let outcome = SearchKind::Shtlbo.minimize(&sphere, &with_seed(3, 30), &evaluations(12_000));
+    assert!(outcome.cost < 1e-10, "{}", outcome.cost);
+    assert!(outcome.best.iter().all(|x| (x - 1.0).abs() < 1e-4));
+    let rosenbrock = Known::new(4, -2.0, 2.0, rosenbrock);
+    let outcome = SearchKind::Shtlbo.minimize(&rosenbrock, &with_seed(3, 40), &evaluations(60_000));
+    assert!(outcome.cost < 1e-3, "{}", outcome.cost);
+}
+
+#[test]
+fn the_path_is_the_same_on_one_thread_and_on_several() {
+    let function = Known::new(7, -3.0, 3.0, rastrigin);
+    for kind in SearchKind::ALL {
+        let path = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let search = || kind.minimize(&function, &with_seed(5, 50), &evaluations(1_500));
+            pool.expect("a thread pool").install(search)
+        };
+        let one = path(1);
+        assert_eq!(one, path(2), "{}", kind.name());
+        assert_eq!(one, path(3), "{}", kind.name());
+        let other = kind.minimize(&function, &with_seed(6, 50), &evaluations(1_500));
+        assert_ne!(one.best, other.best, "{}: the seed counts", kind.name());
+    }
+}
+
+/// A function whose minimum lies outside its box, which watches where it is evaluated.
+struct Watched {
+    bounds: [Range; 3],
+    outside: AtomicUsize,
+    seen: Mutex<usize>,
+}
+
+impl CostFunction for Watched {
+    fn bounds(&self) -> &[Range] {
+        &self.bounds
+    }
+    fn cost(&self, x: &[f64]) -> f64 {
+        let outside = x
+            .iter()
+            .zip(&self.bounds)
+            .any(|(x, range)| !range.contains(*x));
+        self.outside
+            .fetch_add(usize::from(outside), Ordering::Relaxed);
+        *self.seen.lock().expect("not poisoned") += 1;
+        x.iter().map(|x| (x - 10.0) * (x - 10.0)).sum()
+    }
+}
+
+#[test]
+fn no_candidate_leaves_the_bounds_and_all_are_counted() {
+    for kind in SearchKind::ALL {
+        let function = Watched {
+            bounds: [(-1.0, 1.0), (0.0, 0.1), (2.0, 3.0)].map(|(low, high)| Range { low, high }),
+            outside: AtomicUsize::new(0),
+            seen: Mutex::new(0),
+        };
+        let outcome = kind.minimize(&function, &with_seed(2, 20), &evaluations(2_000));
+        assert_eq!(function.outside.into_inner(), 0, "{}", kind.name());
+        let seen = function.seen.into_inner().expect("not poisoned");
+        assert_eq!(outcome.evaluations, seen, "{}", kind.name());
+        if kind != SearchKind::Random {
+            let corner = outcome.best.iter().zip([1.0, 0.1, 3.0]);
+            for (x, best) in corner {
+                assert!(
+                    (x - best).abs() < 1e-2,
+                    "{}: {:?}",
+                    kind.name(),
+                    outcome.best
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn nan_costs_are_counted_and_never_win() {
+    let hole = |x: &[f64]| if x[0] < 0.0 { f64::NAN } else { sphere(x) };
+    let function = Known::new(2, -3.0, 3.0, hole);
+    for kind in SearchKind::ALL {
+        let outcome = kind.minimize(&function, &with_seed(4, 30), &evaluations(3_000));
+        assert!(outcome.nan_costs > 0, "{}", kind.name());
+        assert!(
+            outcome.best[0] >= 0.0 && outcome.cost < 0.1,
+            "{}",
+            kind.name()
+        );
+        let all = Known::new(2, -3.0, 3.0, |_| f64::NAN);
+        let lost = kind.minimize(&all, &with_seed(4, 30), &evaluations(300));
+        assert!(
+            lost.cost.is_nan() && lost.nan_costs == lost.evaluations,
+            "{}",
+            kind.name()
+        );
+    }
+}
+
+#[test]
+fn a_warm_start_is_never_worse_than_what_it_starts_from() {
+    let function = Known::new(5, -3.0, 3.0, rosenbrock);
+    let known = vec![vec![1.0, 1.0, 1.0, 1.0, 1.001], vec![0.0; 4]];
+    for kind in SearchKind::ALL {
+        let start = Start {
+            individuals: &known,
+            ..with_seed(1, 20)
+        };
+        let outcome = kind.minimize(&function, &start, &evaluations(200));
+        assert!(outcome.cost <= rosenbrock(&known[0]), "{}", kind.name());
+    }
+}
+
+#[test]
+fn an_interrupt_ends_every_search_with_what_it_has() {
+    let function = Known::new(3, -3.0, 3.0, sphere);
+    let flag = AtomicBool::new(true);
+    for kind in SearchKind::ALL {
+        let criteria = StopCriteria {
+            interrupt: Some(&flag),
+            ..StopCriteria::default()
+        };
+        let outcome = kind.minimize(&function, &with_seed(1, 10), &criteria);
+        assert_eq!(outcome.reason, StopReason::Interrupted);
+        assert!(
+            outcome.cost.is_finite() && outcome.best.len() == 3,
+            "{}",
+            kind.name()
+        );
+    }
+}
+
+#[test]
+fn the_papers_budget_is_20_100_evaluations() {
+    let function = Known::new(3, -3.0, 3.0, sphere);
+    let criteria = StopCriteria {
+        generations: Some(100),
+        ..StopCriteria::default()
+    };
+    let outcome = SearchKind::Shtlbo.minimize(&function, &with_seed(1, 100), &criteria);
+    assert_eq!((outcome.evaluations, outcome.generations), (20_100, 100));
+    assert_eq!(outcome.reason, StopReason::Generations);
+    assert_eq!(outcome.history.len(), 101);
+    assert!(outcome.history.iter().all(|point| point.p.is_some()));
+    assert!(
+        outcome
+            .history
+            .windows(2)
+            .all(|w| w[1].best_cost <= w[0].best_cost)
+    );
+}
+
+#[test]
+fn each_search_stands_at_its_place_of_the_table_under_a_name_of_its_own() {
+    for (place, kind) in SearchKind::ALL.into_iter().enumerate() {
+        assert_eq!(place, kind as usize);
+    }
+    let names: std::collections::BTreeSet<_> = SearchKind::ALL.map(SearchKind::name).into();
+    assert_eq!(names.len(), SearchKind::ALL.len());
+}

@@ -1,0 +1,166 @@
+//! p, the share of individuals that learn rather than mutate, and how it adapts
+//! (equations 25 and 27-29).
+//!
+//! Choices that the paper leaves open: p is updated at the end of each learning period
+//! (default: every generation, both phases counted together), kept within
+//! [[`P_MIN`], [`P_MAX`]] so that neither kind of step dies out, and kept as it was when the
+//! formula gives 0/0. An individual whose old cost is NaN, infinite or zero counts with a
+//! decline of one, since equation 29 has no value there.
+
+use super::cost::ranks_before;
+
+/// Smallest p.
+pub const P_MIN: f64 = 0.05;
+/// Largest p.
+pub const P_MAX: f64 = 0.95;
+/// p at the start (section 4.2 of the paper).
+pub const P_START: f64 = 0.5;
+
+/// How p follows what the two kinds of step achieve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Adaptation {
+    /// p stays as it is (equations 23, 24).
+    Fixed,
+    /// p follows how many individuals each kind improved (equation 25).
+    SuccessRatio,
+    /// p follows by how much each kind lowered the cost (equations 27-29): SHTLBO.
+    DeclineRatio,
+}
+
+/// The step that one individual takes. A hybrid (equation 26) takes "Eq. (1)", learning, when
+/// rand < p, and "Eq. (2)", the mutation, otherwise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Step {
+    /// Equations 16-18: the step of TLBO.
+    #[default]
+    Learn,
+    /// Equations 19, 20: the step of GBTLBO.
+    Scatter,
+    /// Equations 21, 22: the paper's mutation.
+    Mutate,
+}
+
+/// What the two kinds of step achieved since the last update of p.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// ns1, ns2: individuals improved.
+    pub improved: [u32; 2],
+    /// nf1, nf2: individuals not improved.
+    pub failed: [u32; 2],
+    /// vs1, vs2: sum of the relative declines of the cost (equation 28).
+    pub decline: [f64; 2],
+}
+
+/// Equation 29: the share of the old cost by which the new one is lower.
+pub fn relative_decline(old: f64, new: f64) -> f64 {
+    let decline = (old - new) / old.abs();
+    if decline.is_finite() { decline } else { 1.0 }
+}
+
+impl Tally {
+    /// Counts one individual: its step, its old cost and its candidate's cost.
+    pub fn count(&mut self, step: Step, old: f64, new: f64) {
+        let kind = usize::from(step != Step::Learn);
+        if ranks_before(new, old) {
+            self.improved[kind] += 1;
+            self.decline[kind] += relative_decline(old, new);
+        } else {
+            self.failed[kind] += 1;
+        }
+    }
+
+    /// Equations 25 and 27, whose form is the same: w1 n2 / (w2 n1 + w1 n2), with w the
+    /// achievement of each kind and n how often it was tried. `None` on 0/0.
+    fn share(achieved: [f64; 2], tried: [f64; 2]) -> Option<f64> {
+        let first = achieved[0] * tried[1];
+        let second = achieved[1] * tried[0];
+        let sum = second + first;
+        (sum > 0.0).then(|| first / sum)
+    }
+
+    /// The next p after `p`.
+    pub fn next_p(&self, adaptation: Adaptation, p: f64) -> f64 {
+        let improved = self.improved.map(f64::from);
+        let tried = [0, 1].map(|k| improved[k] + f64::from(self.failed[k]));
+        let next = match adaptation {
+            Adaptation::Fixed => return p,
+            Adaptation::SuccessRatio => Self::share(improved, tried),
+            Adaptation::DeclineRatio => Self::share(self.decline, tried),
+        };
+        next.map_or(p, |next| next.clamp(P_MIN, P_MAX))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tally(improved: [u32; 2], failed: [u32; 2], decline: [f64; 2]) -> Tally {
+        Tally {
+            improved,
+            failed,
+            decline,
+        }
+    }
+
+    #[test]
+    fn equation_25_worked_by_hand() {
+        // ns1 = 30 of 60, ns2 = 10 of 40: 30*40 / (10*60 + 30*40) = 1200/1800.
+        let t = tally([30, 10], [30, 30], [9.0, 9.0]);
+        let p = t.next_p(Adaptation::SuccessRatio, 0.5);
+        assert!((p - 2.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn equation_27_worked_by_hand() {
+        // vs1 = 0.6 over 60 tries, vs2 = 1.2 over 40: 0.6*40 / (1.2*60 + 0.6*40) = 24/96.
+        let t = tally([30, 10], [30, 30], [0.6, 1.2]);
+        let p = t.next_p(Adaptation::DeclineRatio, 0.5);
+        assert!((p - 0.25).abs() < 1e-15);
+    }
+
+    #[test]
+    fn equations_28_and_29_sum_the_declines_of_the_improved_only() {
+        let mut t = Tally::default();
+        t.count(Step::Learn, 8.0, 6.0);
+        t.count(Step::Learn, 8.0, 8.0);
+        t.count(Step::Learn, 4.0, 3.0);
+        t.count(Step::Mutate, 2.0, 1.0);
+        t.count(Step::Mutate, 2.0, f64::NAN);
+        assert_eq!(t, tally([2, 1], [1, 1], [0.5, 0.5]));
+        // 0.5*2 / (0.5*3 + 0.5*2) = 1/2.5.
+        assert!((t.next_p(Adaptation::DeclineRatio, 0.5) - 0.4).abs() < 1e-15);
+    }
+
+    #[test]
+    fn p_stays_when_nothing_improved() {
+        for adaptation in [Adaptation::SuccessRatio, Adaptation::DeclineRatio] {
+            assert_eq!(Tally::default().next_p(adaptation, 0.3), 0.3);
+            let none = tally([0, 0], [70, 30], [0.0, 0.0]);
+            assert_eq!(none.next_p(adaptation, 0.3), 0.3);
+            // Only learning was tried: 25 and 27 are again 0/0.
+            let one_kind = tally([70, 0], [30, 0], [3.0, 0.0]);
+            assert_eq!(one_kind.next_p(adaptation, 0.3), 0.3);
+        }
+    }
+
+    #[test]
+    fn p_keeps_both_kinds_alive() {
+        let only_learning = tally([10, 0], [40, 50], [1.0, 0.0]);
+        let only_mutation = tally([0, 10], [50, 40], [0.0, 1.0]);
+        for adaptation in [Adaptation::SuccessRatio, Adaptation::DeclineRatio] {
+            assert_eq!(only_learning.next_p(adaptation, 0.5), P_MAX);
+            assert_eq!(only_mutation.next_p(adaptation, 0.5), P_MIN);
+            assert_eq!(only_mutation.next_p(Adaptation::Fixed, 0.5), 0.5);
+        }
+    }
+
+    #[test]
+    fn a_decline_without_a_value_counts_one() {
+        assert_eq!(relative_decline(f64::NAN, 3.0), 1.0);
+        assert_eq!(relative_decline(f64::INFINITY, 3.0), 1.0);
+        assert_eq!(relative_decline(0.0, -1.0), 1.0);
+        assert_eq!(relative_decline(4.0, 1.0), 0.75);
+        assert_eq!(relative_decline(-2.0, -3.0), 0.5);
+    }
+}

@@ -1,0 +1,172 @@
+//! Requests and their answers, over a bus that may lose either.
+
+use super::UpdateError;
+use hal_adapters::can::BusFrame;
+use hal_adapters::can::command::{Command, Mailbox, Outcome, Request, Told};
+use hal_adapters::can::update::{UpdateData, UpdateRequest};
+
+/// From frame to frame, us. The receive store of a controller holds three frames and is emptied in
+/// every tick of 2 ms: at one frame in a millisecond none is lost, not even to a tick that is late.
+pub const SPACING_US: u64 = 1_000;
+/// How long an answer is waited for before the request is repeated, us.
+const PATIENCE_US: u64 = 100_000;
+/// The same where a node has said that it is at it: longer than an erase of its flash, us.
+const STARTED_US: u64 = 1_000_000;
+/// How often a request is sent: for 3 s, in which a controller starts.
+const ATTEMPTS: u32 = 30;
+/// The tokens of transfers have this bit, those of other requests do not.
+const TRANSFER_TOKEN: u8 = 0x80;
+
+/// A bus and a clock.
+pub trait Link {
+    /// Sends a frame; one that finds no place may be lost.
+    ///
+    /// # Errors
+    /// [`UpdateError::Link`] if the bus cannot be used.
+    fn send(&mut self, frame: BusFrame) -> Result<(), UpdateError>;
+
+    /// The next frame of the bus, or `None` at this time.
+    ///
+    /// # Errors
+    /// [`UpdateError::Link`] if the bus cannot be used.
+    fn receive(&mut self, until_us: u64) -> Result<Option<BusFrame>, UpdateError>;
+
+    /// Time since some moment, us.
+    fn now_us(&self) -> u64;
+
+    /// Whether the user wants it to end.
+    fn is_interrupted(&self) -> bool {
+        false
+    }
+}
+
+/// A host that asks one thing after the other.
+#[derive(Debug)]
+pub struct Talk<L> {
+    /// The bus.
+    pub link: L,
+    mailbox: Mailbox,
+    token: u8,
+    /// When the next frame may leave, us.
+    free_us: u64,
+    /// Whether the user may end it now.
+    pub(super) may_stop: bool,
+}
+
+impl<L: Link> Talk<L> {
+    /// Before the first request. Programs that run one after the other need different tokens: a node
+    /// ignores a request that equals the last one.
+    pub fn new(link: L, token: u8) -> Self {
+        Self {
+            link,
+            mailbox: Mailbox::default(),
+            token: token & !TRANSFER_TOKEN,
+            free_us: 0,
+            may_stop: true,
+        }
+    }
+
+    /// The next token of a transfer.
+    pub(super) fn transfer_token(&mut self) -> u8 {
+        self.next_token() | TRANSFER_TOKEN
+    }
+
+    fn next_token(&mut self) -> u8 {
+        self.token = self.token.wrapping_add(1) & !TRANSFER_TOKEN;
+        self.token
+    }
+
+    /// The answer to a request, which is repeated until it comes.
+    ///
+    /// # Errors
+    /// [`UpdateError::NoAnswer`], [`UpdateError::Unexpected`], [`UpdateError::Interrupted`],
+    /// [`UpdateError::Link`].
+    pub fn exchange(&mut self, request: Request) -> Result<(Outcome, u32), UpdateError> {
+        let token = self.next_token();
+        self.exchange_under(token, request)
+    }
+
+    /// The same of a request about parameters, under the token of a transfer.
+    pub(super) fn exchange_under(
+        &mut self,
+        mut token: u8,
+        request: impl Into<Request>,
+    ) -> Result<(Outcome, u32), UpdateError> {
+        let request = request.into();
+        for _ in 0..ATTEMPTS {
+            let command = Command::new(request, token);
+            self.send(&Told::Command(command))?;
+            let mut until_us = self.link.now_us() + PATIENCE_US;
+            while let Some(told) = self.receive(until_us)? {
+                match told {
+                    Told::Answer(answer)
+                        if (answer.number, answer.token) == (command.number, token) =>
+                    {
+                        match answer.outcome {
+                            None => return Err(UpdateError::Unexpected { outcome: None }),
+                            Some(Outcome::Started) => {
+                                until_us = self.link.now_us() + STARTED_US;
+                            }
+                            Some(outcome) => return Ok((outcome, answer.detail)),
+                        }
+                    }
+                    // The answer could be that of another host: ask anew.
+                    Told::Command(other)
+                        if (other.number, other.token) == (command.number, token)
+                            && token < TRANSFER_TOKEN
+                            && other.request != command.request =>
+                    {
+                        token = self.next_token();
+                        break;
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Err(UpdateError::NoAnswer)
+    }
+
+    /// Sends a word, to which no answer comes.
+    pub(super) fn tell(&mut self, data: UpdateData) -> Result<(), UpdateError> {
+        self.send(&Told::UpdateData(data))
+    }
+
+    /// Waits.
+    pub(super) fn pause(&mut self, us: u64) -> Result<(), UpdateError> {
+        let until_us = self.link.now_us() + us;
+        while self.receive(until_us)?.is_some() {}
+        Ok(())
+    }
+
+    fn send(&mut self, told: &Told) -> Result<(), UpdateError> {
+        while self.receive(self.free_us)?.is_some() {}
+        self.free_us = self.link.now_us() + SPACING_US;
+        let coded = self.mailbox.send(told);
+        coded.map_or(Ok(()), |coded| self.link.send(BusFrame::from(coded)))
+    }
+
+    /// What a frame tells that comes until then.
+    fn receive(&mut self, until_us: u64) -> Result<Option<Told>, UpdateError> {
+        /// How soon Ctrl-C is noticed.
+        const WAIT_US: u64 = 50_000;
+        loop {
+            if self.may_stop && self.link.is_interrupted() {
+                return Err(UpdateError::Interrupted);
+            }
+            let now_us = self.link.now_us();
+            if now_us >= until_us {
+                return Ok(None);
+            }
+            if let Some(frame) = self.link.receive(until_us.min(now_us + WAIT_US))?
+                && let Some(Ok(told)) = self.mailbox.take(&frame)
+            {
+                return Ok(Some(told));
+            }
+        }
+    }
+}
+
+/// Tells a fact of the node.
+pub(super) const fn page(page: u8) -> Request {
+    Request::Update(UpdateRequest::Tell { page })
+}

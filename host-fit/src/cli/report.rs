@@ -1,0 +1,122 @@
+//! `--report` of the commands that judge: where the page goes, and what stands on it besides figures.
+
+use super::args::{Logs, blob_text};
+use crate::cli::error::HostError;
+use crate::cli::terminal;
+use crate::input::log::LogReading;
+use crate::input::stage::Stage;
+use crate::output::{Outputs, make_folder};
+use crate::report::page::Source;
+use crate::report::provenance::Provenance;
+use crate::report::table::Table;
+use crate::report::verdict::{Subject, Summary};
+use clap::Args;
+use runtime::parameters::Text;
+use std::path::PathBuf;
+
+/// Where the report of a command goes.
+#[derive(Debug, Default, Args)]
+pub(super) struct Report {
+    /// Write a report into this folder: one page, DIR/index.html.
+    #[arg(id = "report", long = "report", value_name = "DIR")]
+    pub(super) folder: Option<PathBuf>,
+    /// Who did it, for the report.
+    #[arg(long, value_name = "NAME", requires = "report")]
+    pub(super) operator: Option<String>,
+    /// A line for the report, as --note "probe B=serial 1234"; may be given several times.
+    #[arg(long = "note", value_name = "KEY=VALUE", requires = "report", value_parser = note)]
+    pub(super) notes: Vec<(String, String)>,
+    /// Date and time for blob and report, as you want them to read; at most 32 bytes. The program
+    /// does not look at the clock: the same command gives the same bytes.
+    #[arg(long, value_name = "TIME", value_parser = blob_text)]
+    pub(super) created: Option<Text>,
+}
+
+fn note(text: &str) -> Result<(String, String), &'static str> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => {
+            Ok((key.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err("expected KEY=VALUE"),
+    }
+}
+
+impl Report {
+    /// The one file of the report.
+    pub(super) fn page(&self) -> Option<PathBuf> {
+        Some(self.folder.as_ref()?.join("index.html"))
+    }
+
+    /// What a person says of the run, in the order of a certificate.
+    fn facts(&self, serial: &str) -> Vec<[String; 2]> {
+        let date = match self.created.as_deref() {
+            None | Some("") => "not given; name it with --created",
+            Some(date) => date,
+        };
+        let serial = if serial.is_empty() {
+            "without serial number"
+        } else {
+            serial
+        };
+        let mut facts = vec![["stage".to_owned(), serial.to_owned()]];
+        let operator = self.operator.iter();
+        facts.extend(operator.map(|name| ["operator".to_owned(), name.clone()]));
+        facts.push(["date".to_owned(), date.to_owned()]);
+        let notes = self.notes.iter();
+        facts.extend(notes.map(|(key, value)| [key.clone(), value.clone()]));
+        facts
+    }
+
+    /// What a page says of logs, before there are errors.
+    pub(super) fn source<'a>(
+        &self,
+        (title, serial): (&'static str, &str),
+        logs: &Logs,
+        (log, stage): (&'a LogReading, &'a Stage),
+        subject: Subject<'a>,
+    ) -> Source<'a> {
+        let mut provenance = Provenance::new(std::env::args_os());
+        provenance.add_logs(&log.dataset);
+        provenance.add_file(&logs.stage.path, "stage as designed");
+        Source {
+            title,
+            subject,
+            facts: self.facts(serial),
+            stage,
+            dataset: &log.dataset,
+            provenance,
+            warnings: super::warnings_of(log),
+            errors: None,
+        }
+    }
+
+    /// Adds the report to the outputs, if it is asked for.
+    pub(super) fn add<'a>(
+        &self,
+        outputs: &mut Outputs,
+        source: impl FnOnce() -> Result<Source<'a>, HostError>,
+    ) -> Result<(), HostError> {
+        if let (Some(folder), Some(page)) = (&self.folder, self.page()) {
+            let html = source()?.html()?;
+            make_folder(folder)?;
+            outputs.add(&page, html.as_bytes())?;
+        }
+        Ok(())
+    }
+}
+
+/// Puts the outputs in their places and prints: tables with `--verbose`, what was written, warnings,
+/// findings, the summary.
+pub(super) fn finish(
+    outputs: Outputs,
+    details: &[Table],
+    warnings: &[String],
+    subject: &Subject,
+) -> Result<(), HostError> {
+    let written = outputs.commit()?;
+    terminal::details(details)?;
+    super::wrote(written)?;
+    terminal::warn(warnings);
+    terminal::tell(&subject.diagnosis.findings);
+    terminal::print(&Summary::new(subject).as_text())
+}

@@ -1,0 +1,221 @@
+//! The charts of a report: what the log holds and the errors, over time; the errors against all that they
+//! may depend on, and their spectrum.
+
+use super::axis::Axis;
+use super::chart::{Chart, Mark, Panel, Scale, Tone};
+use super::errors::RowErrors;
+use super::series::{Column, band, columns};
+use crate::diagnose::signals::{Spectrum, windows};
+use crate::input::dataset::{Dataset, Row};
+use std::ops::Range;
+
+/// Half the width of the band of the noise, standard deviations.
+const BAND: f64 = 2.0;
+/// Movements up to which their borders can be told apart.
+const MOVEMENTS_SHOWN: usize = 150;
+/// Intervals of a quantity that errors are shown against.
+const BINS: usize = 40;
+/// Longest and shortest window of the spectrum, rows.
+const WINDOW_MAX: usize = 4096;
+const WINDOW_MIN: usize = 32;
+/// Points of a spectrum, evenly over its logarithm.
+const POINTS: f64 = 250.0;
+
+/// A quantity of a row in um or urad, and its name.
+type Quantity = (&'static str, fn(&Row) -> f64);
+
+/// All that a log holds, three quantities a chart.
+const QUANTITIES: [Quantity; 9] = [
+    ("X, um", |row| row.reference[0] * 1e6),
+    ("Y, um", |row| row.reference[1] * 1e6),
+    ("Rz, urad", |row| row.reference[2] * 1e6),
+    ("signal A, um", |row| row.signal_m[0] * 1e6),
+    ("signal B, um", |row| row.signal_m[1] * 1e6),
+    ("signal C, um", |row| row.signal_m[2] * 1e6),
+    ("Z, um", |row| row.vertical[0] * 1e6),
+    ("Rx, urad", |row| row.vertical[1] * 1e6),
+    ("Ry, urad", |row| row.vertical[2] * 1e6),
+];
+
+/// The planar axes, as charts name them.
+pub(super) const PLANAR: [&str; 3] = [QUANTITIES[0].0, QUANTITIES[1].0, QUANTITIES[2].0];
+
+/// A log, and what is shown of it over time: row after row, without the gaps between them.
+pub(super) struct Log<'a> {
+    pub(super) dataset: &'a Dataset,
+    /// Time between rows, s.
+    pub(super) period_s: f64,
+}
+
+impl Log<'_> {
+    /// Where movements begin, unless there are too many to be told apart.
+    fn borders(&self) -> Mark {
+        let starts = self.dataset.movements.iter().skip(1).map(|m| m.rows.start);
+        let starts = starts.map(|row| row as f64 * self.period_s);
+        let few = self.dataset.movements.len() <= MOVEMENTS_SHOWN;
+        Mark::Borders(Tone::Grid, starts.filter(|_| few).collect())
+    }
+
+    /// Panels over time. Each has a series in each of the tones, the hindmost first; `of` gives the value
+    /// of a row by tone and panel.
+    fn over_time(
+        &self,
+        caption: &str,
+        labels: [&str; 3],
+        tones: &[Tone],
+        of: impl Fn(Tone, usize, usize) -> Option<f64>,
+    ) -> Chart {
+        let rows = self.dataset.rows.len();
+        let end_s = rows.max(1) as f64 * self.period_s;
+        let panel = |k: usize| {
+            let series = tones.iter().map(|&tone| {
+                let values = (0..rows)
+                    .filter_map(|row| Some((row as f64 * self.period_s, of(tone, row, k)?)));
+                Mark::Band(tone, band(values, end_s, rows))
+            });
+            let marks = std::iter::once(self.borders()).chain(series).collect();
+            Panel::new(labels[k], Scale::Symmetric, marks)
+        };
+        Chart::of_three(
+            caption,
+            ("time of the rows, s", Axis::Linear(0.0, end_s)),
+            panel,
+        )
+    }
+
+    /// What the log holds.
+    pub(super) fn signals(&self) -> Vec<Chart> {
+        let captions = [
+            "Displacements by the interferometers",
+            "Hall signals at the designed scale",
+            "Vertical pose by the capacitive sensors",
+        ];
+        let chart = |(caption, quantities): (&str, &[Quantity; 3])| {
+            let labels = quantities.map(|(name, _)| name);
+            self.over_time(caption, labels, &[Tone::Data], |_, row, k| {
+                Some(quantities[k].1(&self.dataset.rows[row]))
+            })
+        };
+        let (threes, _) = QUANTITIES.as_chunks();
+        captions.into_iter().zip(threes).map(chart).collect()
+    }
+
+    /// Errors over time (m, m, rad) on one scale, those before behind those after.
+    pub(super) fn errors(
+        &self,
+        caption: &str,
+        after: &RowErrors,
+        before: Option<&RowErrors>,
+    ) -> Chart {
+        let tones: &[Tone] = match before {
+            Some(_) => &[Tone::Noise, Tone::Data],
+            None => &[Tone::Data],
+        };
+        self.over_time(caption, PLANAR, tones, |tone, row, axis| {
+            let errors = before.filter(|_| tone == Tone::Noise).unwrap_or(after);
+            Some((*errors.get(row)?)?[axis] * 1e6)
+        })
+    }
+
+    /// Mean of the errors and two of their standard deviations about it against pose and signals, beside
+    /// the band of the noise (m, m, rad); one chart for each quantity that the log moves.
+    pub(super) fn against(&self, errors: &RowErrors, noise: [f64; 3]) -> Vec<Chart> {
+        let chart = |&(name, of): &Quantity| {
+            let values = || self.dataset.rows.iter().map(of);
+            let low = values().fold(f64::INFINITY, f64::min);
+            let high = values().fold(f64::NEG_INFINITY, f64::max);
+            let panel = |axis: usize| {
+                let points = values().zip(errors);
+                let points = points.filter_map(|(x, error)| Some((x, error.as_ref()?[axis] * 1e6)));
+                let mut columns = columns(points, (low, high), BINS);
+                let least = errors.len() as f64 / (50.0 * BINS as f64);
+                columns.retain(|column| column.count > 0.0 && column.count >= least);
+                let spread = |column: &Column| {
+                    let ((x, mean), half) = (column.mean(), BAND * column.deviation());
+                    (x, mean - half, mean + half)
+                };
+                let noise_end = |side: f64| {
+                    let end = side * BAND * noise[axis] * 1e6;
+                    Mark::Line(Tone::Second, vec![(low, end), (high, end)])
+                };
+                let marks = vec![
+                    Mark::Band(Tone::Data, columns.iter().map(spread).collect()),
+                    Mark::Line(Tone::Data, columns.iter().map(Column::mean).collect()),
+                    noise_end(-1.0),
+                    noise_end(1.0),
+                ];
+                Panel::new(PLANAR[axis], Scale::Symmetric, marks)
+            };
+            let caption = format!("Errors against {}", name.split(',').next().unwrap_or(name));
+            (high > low).then(|| Chart::of_three(caption, (name, Axis::Linear(low, high)), panel))
+        };
+        QUANTITIES.iter().filter_map(chart).collect()
+    }
+
+    /// Amplitude spectral density of the errors beside that of white noise (m, m, rad); `None` where no
+    /// movement is long enough.
+    pub(super) fn spectrum(&self, errors: &RowErrors, noise: [f64; 3]) -> Option<Chart> {
+        let movements: Vec<Range<usize>> = (self.dataset.movements.iter())
+            .map(|movement| movement.rows.clone())
+            .collect();
+        let longest = movements.iter().map(ExactSizeIterator::len).max()?;
+        let length = (1usize << longest.checked_ilog2()?).min(WINDOW_MAX);
+        if length < WINDOW_MIN {
+            return None;
+        }
+        let lowest_hz = 1.0 / (length as f64 * self.period_s);
+        let highest_hz = 0.5 / self.period_s;
+        let panel = |axis: usize| {
+            let micro = |error: &Option<[f64; 3]>| error.map_or(0.0, |error| error[axis] * 1e6);
+            let values: Vec<f64> = errors.iter().map(micro).collect();
+            let spectrum = Spectrum::new(&values, &windows(&movements, length));
+            // One side of the spectrum; the sum of squares of the taper is 3/8 of its length.
+            let scale = 2.0 * self.period_s / (0.375 * length as f64);
+            let white = noise[axis] * 1e6 * (2.0 * self.period_s).sqrt();
+            let white = vec![(lowest_hz, white), (highest_hz, white)];
+            let bins = spectrum.power.iter().enumerate().skip(1);
+            let bins = bins.map(|(bin, &power)| (bin as f64 * lowest_hz, power * scale));
+            let data = Mark::Line(Tone::Data, thinned(bins));
+            let marks = vec![Mark::Line(Tone::Noise, white), data];
+            Panel::new(&format!("{}/rtHz", PLANAR[axis]), Scale::Logarithmic, marks)
+        };
+        Some(Chart::of_three(
+            "Amplitude spectral density of the errors, and that of white noise",
+            ("frequency, Hz", Axis::Logarithmic(lowest_hz, highest_hz)),
+            panel,
+        ))
+    }
+}
+
+/// The root of the mean power of the points that stand together on a logarithmic axis, at their middle.
+fn thinned(powers: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    let place = |x: f64| (x.log10() * POINTS / 4.0).floor();
+    let points: Vec<(f64, f64)> = powers.collect();
+    let groups = points.chunk_by(|a, b| place(a.0) == place(b.0));
+    let mean = |group: &[(f64, f64)]| {
+        let n = group.len() as f64;
+        let sum = |of: fn(&(f64, f64)) -> f64| group.iter().map(of).sum::<f64>();
+        (sum(|point| point.0) / n, (sum(|point| point.1) / n).sqrt())
+    };
+    groups.map(mean).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_spectrum_keeps_its_level_and_shows_its_lines() {
+        let points = |line: f64| {
+            (1..4096).map(move |k| (f64::from(k), if k == 3000 { line * line } else { 1.0 }))
+        };
+        let flat = thinned(points(1.0));
+        assert!(flat.len() < POINTS as usize && flat.iter().all(|(_, y)| (y - 1.0).abs() < 1e-12));
+        let line = thinned(points(90.0));
+        let (x, y) = line
+            .into_iter()
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .expect("points");
+        assert!((x - 3000.0).abs() < 30.0 && y > 5.0, "{x} {y}");
+    }
+}

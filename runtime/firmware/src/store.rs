@@ -1,0 +1,303 @@
+//! Two slots of flash, each with one blob of [`runtime::blob`]: one runs, the other takes the next.
+//!
+//! Numbers are little-endian. A slot is a sector of 16 KiB; what is not mentioned is erased.
+//!
+//! | offset | bytes | what |
+//! |---|---|---|
+//! | 0 | 656 | the blob, filled up with 0xFF |
+//! | 656 | 4 | sequence number, 1 to 2^32 - 2 |
+//! | 660 | 4 | CRC-32C (Castagnoli) of the 660 bytes before it |
+//! | 664 | 4 | commit word `COMT`; 0: never to be committed |
+//! | 668 | 4 | `SEAL`: the word before was programmed to the end |
+//!
+//! A blob that a probe flashes has none of the four words, and the sequence number 0. The blob with
+//! the highest number is the newest; of two that a probe has flashed it is the one in slot 0.
+//!
+//! # What survives a cut of the power
+//!
+//! What an interrupted operation leaves is not guaranteed (RM0090 rev. 21, section 3.6). A bit may
+//! even read right after one start and wrong after the next, until it is programmed or erased to the
+//! end; file systems on flash know such unstable bits (UBIFS). Therefore
+//! - the blob that runs is never erased, nor, where none runs, the one to be kept;
+//! - a slot is erased before each write, and dropped before that by a commit word of 0, so that no
+//!   word that an interrupted operation may have touched is used;
+//! - the sequence number is programmed before the blob: half an update never looks like a blob that
+//!   a probe has flashed;
+//! - the commit word follows once all is read back, and its seal after it. Where the seal is missing,
+//!   a start programs the commit word again if it reads right, else to 0, which nothing can undo
+//!   ([`settle`]).
+//!
+//! So after a cut the newest blob is the one that is kept or the new one, and for certain the new one
+//! once [`write`] has ended; what waits for an activation gives way to what is stored after it. Going
+//! back is a write, too, of a copy of the blob before: if it is cut, the blob before may be lost.
+
+use crc::{CRC_32_ISCSI, Crc};
+use embedded_storage::nor_flash::{NorFlash, NorFlashError, NorFlashErrorKind};
+use hal_adapters::can::update::NotWritten;
+use runtime::blob::{CRC_BYTES, HEADER_BYTES, MAGIC, MAX_BYTES};
+
+/// Bytes of a slot: sectors 1 and 2 of the STM32F405 (RM0090 rev. 21, table 5).
+pub const SLOT_BYTES: u32 = 16 * 1024;
+/// Slots there are.
+pub const SLOTS: usize = 2;
+
+const SEQUENCE: usize = MAX_BYTES;
+const CHECK: usize = SEQUENCE + 4;
+const COMMIT: usize = CHECK + 4;
+const SEAL: usize = COMMIT + 4;
+/// Bytes of a slot that are used.
+const USED: usize = SEAL + 4;
+
+const COMMITTED: [u8; 4] = *b"COMT";
+const SEALED: [u8; 4] = *b"SEAL";
+const VOID: [u8; 4] = [0; 4];
+const BLANK: [u8; 4] = [0xff; 4];
+
+/// CRC-32C, without a table where flash is short.
+static CRC: Crc<u32, Lookup> = Crc::<u32, Lookup>::new(&CRC_32_ISCSI);
+#[cfg(target_os = "none")]
+type Lookup = crc::NoTable;
+#[cfg(not(target_os = "none"))]
+type Lookup = crc::Table<1>;
+
+/// The flash did not do what it was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlashFault {
+    /// The supply was too low: before an operation, which was not done, or after it.
+    SupplyLow,
+    /// The flash reported an error or did not end in time.
+    Reported {
+        /// Its status register: FLASH_SR on the STM32F405.
+        status: u32,
+    },
+    /// Nothing was reported, and yet bytes read otherwise.
+    ReadsOtherwise {
+        /// The first of them, from the start of slot 0.
+        offset: u32,
+    },
+    /// The arguments do not fit the flash.
+    Argument(NorFlashErrorKind),
+}
+
+impl NorFlashError for FlashFault {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Self::Argument(kind) => *kind,
+            _ => NorFlashErrorKind::Other,
+        }
+    }
+}
+
+impl From<FlashFault> for NotWritten {
+    fn from(fault: FlashFault) -> Self {
+        match fault {
+            FlashFault::SupplyLow => Self::SupplyLow,
+            _ => Self::Failed,
+        }
+    }
+}
+
+/// Both slots, one after the other, in words that may be programmed again as long as bits only fall
+/// (RM0090 rev. 21, section 3.6.4).
+pub trait Flash: NorFlash<Error = FlashFault> {}
+impl<F: NorFlash<Error = FlashFault>> Flash for F {}
+
+/// A blob in a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stored {
+    /// Number of the slot.
+    pub slot: u8,
+    /// Its sequence number; 0 of a blob that a probe has flashed.
+    pub sequence: u32,
+    /// Its own CRC-32C.
+    pub crc: u32,
+    /// Its length.
+    pub bytes: u32,
+}
+
+/// The bytes of a slot that are used.
+#[derive(Clone, Debug)]
+pub struct Image([u8; USED]);
+
+/// What a slot holds, by its four words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Contents {
+    /// Nothing that counts.
+    Nothing,
+    /// What a probe has flashed, sound or not.
+    Plain,
+    /// What was committed under this number.
+    Committed(u32),
+    /// What was committed, but is damaged.
+    Damaged,
+}
+
+impl Image {
+    /// Reads a slot.
+    ///
+    /// # Errors
+    /// [`FlashFault`].
+    #[inline(never)]
+    pub fn read(flash: &mut impl Flash, slot: u8) -> Result<Self, FlashFault> {
+        let mut image = Self([0xff; USED]);
+        flash.read(at(slot, 0), &mut image.0)?;
+        Ok(image)
+    }
+
+    /// The blob and its padding.
+    pub fn blob(&self) -> &[u8] {
+        self.0.get(..SEQUENCE).unwrap_or_default()
+    }
+
+    fn word(&self, offset: usize) -> [u8; 4] {
+        let word = self.0.get(offset..).and_then(<[u8]>::first_chunk);
+        *word.unwrap_or(&BLANK)
+    }
+
+    fn is_whole(&self) -> bool {
+        let body = self.0.get(..CHECK).unwrap_or_default();
+        CRC.checksum(body).to_le_bytes() == self.word(CHECK)
+    }
+
+    /// What the slot holds.
+    pub fn contents(&self) -> Contents {
+        let words = self.0.get(SEQUENCE..).unwrap_or_default();
+        if words.iter().all(|byte| *byte == 0xff) {
+            return Contents::Plain;
+        }
+        match (self.word(COMMIT) == COMMITTED, self.is_whole()) {
+            (false, _) => Contents::Nothing,
+            (true, true) => Contents::Committed(u32::from_le_bytes(self.word(SEQUENCE))),
+            (true, false) => Contents::Damaged,
+        }
+    }
+
+    /// The blob by its own header, if there is one; its soundness is not looked at.
+    pub fn stored(&self, slot: u8) -> Option<Stored> {
+        let sequence = match self.contents() {
+            Contents::Committed(sequence) => sequence,
+            Contents::Plain if self.0.starts_with(&MAGIC) => 0,
+            _ => return None,
+        };
+        let (header, rest) = self.blob().split_first_chunk::<HEADER_BYTES>()?;
+        let payload = u32::from_le_bytes(*header.last_chunk()?);
+        let crc = rest.get(payload as usize..)?.first_chunk()?;
+        Some(Stored {
+            slot,
+            sequence,
+            crc: u32::from_le_bytes(*crc),
+            bytes: payload + (HEADER_BYTES + CRC_BYTES) as u32,
+        })
+    }
+}
+
+/// Offset from the start of slot 0.
+fn at(slot: u8, offset: usize) -> u32 {
+    u32::from(slot) * SLOT_BYTES + offset as u32
+}
+
+/// Programs a word and reads it back.
+#[inline(never)]
+fn program(
+    flash: &mut impl Flash,
+    slot: u8,
+    offset: usize,
+    word: [u8; 4],
+) -> Result<(), FlashFault> {
+    flash.write(at(slot, offset), &word)?;
+    expect(flash, slot, offset, word)
+}
+
+fn expect(
+    flash: &mut impl Flash,
+    slot: u8,
+    offset: usize,
+    word: [u8; 4],
+) -> Result<(), FlashFault> {
+    let (mut reads, offset) = ([0; 4], at(slot, offset));
+    flash.read(offset, &mut reads)?;
+    if reads == word {
+        Ok(())
+    } else {
+        Err(FlashFault::ReadsOtherwise { offset })
+    }
+}
+
+/// At power-on and after a reset, before anything is read: makes final whether a slot counts, where
+/// an interrupted operation may have left that undecided. A word that cannot be made final costs
+/// nothing: its slot is erased before it is used again.
+pub fn settle(flash: &mut impl Flash) {
+    for slot in [0, 1] {
+        let Ok(image) = Image::read(flash, slot) else {
+            continue;
+        };
+        let commit = image.word(COMMIT);
+        if image.contents() == Contents::Plain || image.word(SEAL) == SEALED || commit == VOID {
+            continue;
+        }
+        if commit != COMMITTED {
+            let _ = program(flash, slot, COMMIT, VOID);
+        } else if program(flash, slot, COMMIT, COMMITTED).is_ok() {
+            let _ = program(flash, slot, SEAL, SEALED);
+        }
+    }
+}
+
+/// Erases a slot and writes a blob there, under this sequence number; it takes half a second.
+///
+/// # Errors
+/// [`FlashFault`]; the slot then does not count.
+pub fn write(
+    flash: &mut impl Flash,
+    slot: u8,
+    sequence: u32,
+    blob: &[u8],
+) -> Result<Stored, FlashFault> {
+    let mut image = Image([0xff; USED]);
+    let too_long = FlashFault::Argument(NorFlashErrorKind::OutOfBounds);
+    let body = image.0.get_mut(..blob.len().min(SEQUENCE + 1));
+    body.filter(|body| body.len() == blob.len())
+        .ok_or(too_long)?
+        .copy_from_slice(blob);
+    put(&mut image, SEQUENCE, sequence.to_le_bytes());
+    let check = CRC.checksum(image.0.get(..CHECK).unwrap_or_default());
+    put(&mut image, CHECK, check.to_le_bytes());
+
+    program(flash, slot, COMMIT, VOID)?;
+    flash.erase(at(slot, 0), at(slot, SLOT_BYTES as usize))?;
+    (0..SLOT_BYTES as usize)
+        .step_by(4)
+        .try_for_each(|offset| expect(flash, slot, offset, BLANK))?;
+    program(flash, slot, SEQUENCE, image.word(SEQUENCE))?;
+    for offset in (0..SEQUENCE).step_by(4).chain([CHECK]) {
+        if image.word(offset) != BLANK {
+            program(flash, slot, offset, image.word(offset))?;
+        }
+    }
+    (0..USED)
+        .step_by(4)
+        .try_for_each(|offset| expect(flash, slot, offset, image.word(offset)))?;
+    if let Err(fault) = program(flash, slot, COMMIT, COMMITTED) {
+        // It must not count: what else could be done?
+        let _ = program(flash, slot, COMMIT, VOID);
+        return Err(fault);
+    }
+    // The commit word was read back, and a start seals it.
+    let _ = program(flash, slot, SEAL, SEALED);
+    put(&mut image, COMMIT, COMMITTED);
+    image.stored(slot).ok_or(too_long)
+}
+
+fn put(image: &mut Image, offset: usize, word: [u8; 4]) {
+    let to = image.0.get_mut(offset..).and_then(<[u8]>::first_chunk_mut);
+    if let Some(to) = to {
+        *to = word;
+    }
+}
+
+#[cfg(test)]
+#[path = "../tests/flash_model/mod.rs"]
+pub(crate) mod flash_model;
+#[cfg(test)]
+#[path = "store_tests.rs"]
+pub(crate) mod tests;

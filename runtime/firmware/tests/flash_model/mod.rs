@@ -1,0 +1,377 @@
+//! Two sectors of NOR flash, and what a cut of the power leaves in them. Written from what is
+//! known of flash, not from the store.
+//!
+//! - Programming lets bits fall, a word at a time, also in a word that is not blank (RM0090
+//!   rev. 21, section 3.6.4). Only the erase of a whole sector raises bits (3.6.3).
+//! - After a reset in an operation, contents are not guaranteed (3.6). Of a word that was being
+//!   programmed, each bit that should fall has fallen or not.
+//! - An erase that was interrupted leaves any mixture of raised bits, bits as they were, and
+//!   fallen bits: NOR flash is programmed to 0 before it is erased (the Linux change "UBI: fix
+//!   NOR flash recovery", for a Spansion S29GL512N).
+//! - Such bits stay as they are, or read anew after each start (the "unstable bits" of UBIFS),
+//!   until they are programmed to 0 or erased to the end. Programming again the bits that were
+//!   to fall makes them fall for good.
+//!
+//! Not modelled: wear beyond a word that is stuck, disturbed neighbours, and bits that change
+//! without a cut.
+
+extern crate std;
+
+use super::{FlashFault, SLOT_BYTES};
+use embedded_storage::nor_flash::{
+    ErrorType, MultiwriteNorFlash, NorFlash, ReadNorFlash, check_erase, check_read, check_write,
+};
+use std::vec;
+use std::vec::Vec;
+
+const BYTES: usize = 2 * SLOT_BYTES as usize;
+
+/// Where in an operation the power fails.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cut {
+    /// Nothing has changed.
+    Before,
+    /// Some bits have.
+    Inside,
+    /// The operation is complete, and the caller is not told.
+    After,
+}
+
+impl Cut {
+    /// Each.
+    pub const ALL: [Self; 3] = [Self::Before, Self::Inside, Self::After];
+}
+
+/// Random words by a seed (SplitMix64, Steele et al. 2014).
+#[derive(Clone, Debug)]
+pub struct Words(
+    /// The seed.
+    pub u64,
+);
+
+impl Words {
+    /// The next word.
+    pub fn draw(&mut self) -> u32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 32) as u32
+    }
+
+    /// The next number from 0 to `n` - 1.
+    ///
+    /// # Panics
+    /// If `n` is 0.
+    pub fn below(&mut self, n: u32) -> u32 {
+        self.draw() % n
+    }
+
+    /// A word in which each bit is 1 with the probability `eighths` / 8.
+    fn biased(&mut self, eighths: u32) -> u32 {
+        if eighths >= 8 {
+            return u32::MAX;
+        }
+        (0..3).fold(0, |word, digit| match eighths >> digit & 1 {
+            1 => word | self.draw(),
+            _ => word & self.draw(),
+        })
+    }
+}
+
+/// Bits that were not programmed or erased to their end.
+#[derive(Clone, Debug)]
+struct Weak {
+    word: usize,
+    bits: u32,
+    /// They read as 1 with this probability.
+    eighths: u32,
+}
+
+/// Two sectors, with what a cut of the power leaves in them. Two are equal if they read the same.
+#[derive(Clone, Debug)]
+pub struct FlashModel {
+    bytes: Vec<u8>,
+    weak: Vec<Weak>,
+    words: Words,
+    /// Whether weak bits read anew after each start.
+    unstable: bool,
+    /// Operations since the last start.
+    pub operations: usize,
+    cut: Option<(usize, Cut)>,
+    off: bool,
+    /// From this operation on the supply is too low.
+    pub supply_low: Option<usize>,
+    /// An operation that reports an error, and is done all the same.
+    pub reports: Option<usize>,
+    /// A word, of both sectors, that neither programming nor an erase changes, without an error.
+    pub stuck: Option<usize>,
+}
+
+const OFF: FlashFault = FlashFault::Reported { status: 0 };
+
+impl FlashModel {
+    /// Both sectors as they come from the factory.
+    #[must_use]
+    pub fn erased() -> Self {
+        Self {
+            bytes: vec![0xff; BYTES],
+            weak: Vec::new(),
+            words: Words(0),
+            unstable: false,
+            operations: 0,
+            cut: None,
+            off: false,
+            supply_low: None,
+            reports: None,
+            stuck: None,
+        }
+    }
+
+    /// Contents of a slot as a probe writes them.
+    ///
+    /// # Panics
+    /// If they are longer than a sector.
+    pub fn load(&mut self, slot: u8, contents: &[u8]) {
+        let at = usize::from(slot) * SLOT_BYTES as usize;
+        let bytes = &mut self.bytes[at..at + SLOT_BYTES as usize];
+        bytes.fill(0xff);
+        bytes[..contents.len()].copy_from_slice(contents);
+    }
+
+    /// Another course of chance; with odd seeds weak bits read anew after each start.
+    pub fn seed(&mut self, seed: u64) {
+        self.words = Words(seed);
+        self.unstable = seed % 2 == 1;
+    }
+
+    /// Cuts the power at this operation from now on, counted from 0.
+    pub fn cut_at(&mut self, operation: usize, cut: Cut) {
+        self.operations = 0;
+        self.cut = Some((operation, cut));
+    }
+
+    /// The power comes back.
+    pub fn power_on(&mut self) {
+        (self.off, self.cut, self.operations) = (false, None, 0);
+        if self.unstable {
+            for index in 0..self.weak.len() {
+                let weak = self.weak[index].clone();
+                let drawn = self.words.biased(weak.eighths) & weak.bits;
+                let word = self.word(weak.word) & !weak.bits | drawn;
+                self.put(weak.word, word);
+            }
+        }
+    }
+
+    /// Whether the power has failed since the last start.
+    pub const fn is_off(&self) -> bool {
+        self.off
+    }
+
+    fn word(&self, word: usize) -> u32 {
+        let bytes = &self.bytes[4 * word..4 * word + 4];
+        u32::from_le_bytes(bytes.try_into().expect("four"))
+    }
+
+    fn put(&mut self, word: usize, value: u32) {
+        if self.stuck != Some(word) {
+            self.bytes[4 * word..4 * word + 4].copy_from_slice(&value.to_le_bytes());
+        }
+    }
+
+    /// Whether this operation is cut, and where.
+    fn next(&mut self) -> Result<Option<Cut>, FlashFault> {
+        if self.off {
+            return Err(OFF);
+        }
+        let operation = self.operations;
+        self.operations += 1;
+        if self.supply_low.is_some_and(|from| operation >= from) {
+            return Err(FlashFault::SupplyLow);
+        }
+        let cut = (self.cut)
+            .filter(|&(at, _)| at == operation)
+            .map(|(_, cut)| cut);
+        self.off = cut.is_some();
+        Ok(cut)
+    }
+
+    fn end(&self, cut: Option<Cut>) -> Result<(), FlashFault> {
+        if cut.is_some() || self.reports == Some(self.operations - 1) {
+            return Err(OFF);
+        }
+        Ok(())
+    }
+
+    fn program(&mut self, word: usize, value: u32) -> Result<(), FlashFault> {
+        let cut = self.next()?;
+        let old = self.word(word);
+        let falling = old & !value;
+        match cut {
+            Some(Cut::Before) => {}
+            Some(Cut::Inside) => {
+                let eighths = self.words.below(9);
+                let risen = self.words.biased(eighths) & falling;
+                self.put(word, old & !falling | risen);
+                let bits = falling;
+                self.weak.push(Weak {
+                    word,
+                    bits,
+                    eighths,
+                });
+            }
+            Some(Cut::After) | None => {
+                self.put(word, old & value);
+                // Bits that are driven to 0, weak ones too, are 0 for good.
+                for weak in self.weak.iter_mut().filter(|weak| weak.word == word) {
+                    weak.bits &= value;
+                }
+            }
+        }
+        self.end(cut)
+    }
+}
+
+impl ErrorType for FlashModel {
+    type Error = FlashFault;
+}
+
+impl ReadNorFlash for FlashModel {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashFault> {
+        check_read(self, offset, bytes.len()).map_err(FlashFault::Argument)?;
+        bytes.copy_from_slice(&self.bytes[offset as usize..][..bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        BYTES
+    }
+}
+
+impl NorFlash for FlashModel {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SLOT_BYTES as usize;
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashFault> {
+        check_write(self, offset, bytes.len()).map_err(FlashFault::Argument)?;
+        let words = bytes.as_chunks().0.iter().zip(offset as usize / 4..);
+        for (value, word) in words {
+            self.program(word, u32::from_le_bytes(*value))?;
+        }
+        Ok(())
+    }
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashFault> {
+        check_erase(self, from, to).map_err(FlashFault::Argument)?;
+        let (from, to) = (from as usize / 4, to as usize / 4);
+        let cut = self.next()?;
+        if cut == Some(Cut::Before) {
+            return self.end(cut);
+        }
+        self.weak.retain(|weak| !(from..to).contains(&weak.word));
+        // How far it came: bits fall first, in part of the sector, then all rise.
+        let (eighths, falls) = (self.words.below(9), self.words.below(3) == 0);
+        for word in from..to {
+            if cut != Some(Cut::Inside) {
+                self.put(word, u32::MAX);
+                continue;
+            }
+            let (drawn, old) = (self.words.biased(eighths), self.word(word));
+            self.put(word, if falls { old & drawn } else { old | drawn });
+            let eighths = if self.unstable {
+                self.words.below(9)
+            } else {
+                0
+            };
+            let bits = u32::MAX;
+            self.weak.push(Weak {
+                word,
+                bits,
+                eighths,
+            });
+        }
+        self.end(cut)
+    }
+}
+
+impl MultiwriteNorFlash for FlashModel {}
+
+impl PartialEq for FlashModel {
+    fn eq(&self, other: &Self) -> bool {
+        self.bytes == other.bytes
+    }
+}
+
+#[test]
+fn bits_only_fall_until_the_sector_is_erased() {
+    let mut flash = FlashModel::erased();
+    for (value, reads) in [
+        (0xffff_00ff, 0xffff_00ff),
+        (0x0fff_ffff, 0x0fff_00ff),
+        (u32::MAX, 0x0fff_00ff),
+    ] {
+        assert_eq!(flash.program(7, value), Ok(()));
+        assert_eq!(flash.word(7), reads);
+    }
+    assert_eq!(flash.erase(SLOT_BYTES, 2 * SLOT_BYTES), Ok(()));
+    assert_eq!(flash.word(7), 0x0fff_00ff);
+    assert_eq!(flash.erase(0, SLOT_BYTES), Ok(()));
+    assert_eq!(flash, FlashModel::erased());
+}
+
+#[test]
+fn a_cut_leaves_bits_between_and_lets_nothing_follow() {
+    let wrote = 0x00ff_f00f;
+    let mut seen = [false; 3];
+    for seed in 0..64 {
+        let mut flash = FlashModel::erased();
+        flash.seed(seed);
+        flash.cut_at(1, Cut::Inside);
+        assert_eq!(flash.program(0, wrote), Ok(()));
+        assert_eq!(flash.program(1, wrote), Err(OFF));
+        assert_eq!(flash.program(2, wrote), Err(OFF));
+        assert_eq!(flash.erase(0, SLOT_BYTES), Err(OFF));
+        let torn = flash.word(1);
+        assert_eq!((flash.word(0), flash.word(2)), (wrote, u32::MAX));
+        assert_eq!(torn & wrote, wrote);
+        seen[0] |= torn == wrote;
+        seen[1] |= torn == u32::MAX;
+        flash.power_on();
+        seen[2] |= flash.word(1) != torn;
+        assert!(flash.unstable || flash.word(1) == torn);
+        // Programmed again, it is as it should be, for good.
+        assert_eq!(flash.program(1, wrote), Ok(()));
+        flash.power_on();
+        assert_eq!(flash.word(1), wrote);
+    }
+    assert_eq!(seen, [true; 3]);
+}
+
+#[test]
+fn a_cut_erase_leaves_any_mixture_in_its_sector_only() {
+    let sector = SLOT_BYTES as usize;
+    let (mut risen, mut fallen, mut kept) = (0, 0, 0);
+    for seed in 0..64 {
+        let mut flash = FlashModel::erased();
+        flash.seed(seed);
+        flash.load(0, &[0x5a; SLOT_BYTES as usize]);
+        flash.load(1, &[0x33; SLOT_BYTES as usize]);
+        flash.cut_at(0, Cut::Inside);
+        assert_eq!(flash.erase(0, SLOT_BYTES), Err(OFF));
+        assert!(flash.bytes[sector..].iter().all(|&b| b == 0x33));
+        for &byte in &flash.bytes[..sector] {
+            risen += (byte & !0x5a).count_ones();
+            fallen += (!byte & 0x5a).count_ones();
+            kept += (!(byte ^ 0x5a)).count_ones();
+        }
+        let before = flash.clone();
+        flash.power_on();
+        assert_eq!(flash == before, !flash.unstable);
+        assert_eq!(flash.erase(0, SLOT_BYTES), Ok(()));
+        flash.power_on();
+        assert!(flash.bytes[..sector].iter().all(|&b| b == 0xff));
+    }
+    assert!(risen > 100_000 && fallen > 100_000 && kept > 100_000);
+}
