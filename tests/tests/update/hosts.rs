@@ -101,11 +101,10 @@ fn what_another_host_declares_on_is_not_declared_off_again() {
 #[test]
 fn a_lost_answer_to_a_commit_is_settled_by_asking_what_the_node_keeps() {
     let mut world = World::new(Some(KEY), &[], 1);
-    world.update(&plan(NEW)).expect("it is taken");
+    world.update(&activating(plan(NEW))).expect("it is taken");
     world.loses = |answer| answer.number == COMMIT && answer.outcome == Some(Outcome::Done);
-    // Also where another host begins at once, whose transfer is left alone.
     for (sequence, newest) in [(2, OLD), (3, NEW)] {
-        let updated = world.update(&back()).expect("it is stored");
+        let updated = world.update(&activating(back())).expect("it is stored");
         assert_eq!(
             (updated.sequence, updated.record),
             (Some(sequence), sequence)
@@ -115,6 +114,7 @@ fn a_lost_answer_to_a_commit_is_settled_by_asking_what_the_node_keeps() {
             (newest, sequence)
         );
     }
+    // Also where another host begins at once, whose transfer is left alone.
     let mut world = World::new(Some(KEY), &[], 6);
     world.loses = |answer| answer.number == COMMIT && answer.outcome == Some(Outcome::Done);
     world.once_stored = Some(command(BEGIN, 200, 0));

@@ -160,7 +160,8 @@ pub(super) fn large() -> Result<Vec<u8>, Failure> {
 }
 
 /// An update: in time, poses invalid meanwhile and "updating" told before the erase, in which the ticks
-/// stand and the watchdog does not bite; the next power-on runs it. Another one is activated at once; and back to the one before.
+/// stand and the watchdog does not bite; the next power-on runs it. Another one takes its place and is
+/// activated at once; back is to the one that ran before.
 pub fn new_parameters(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ticks(100)?;
@@ -219,7 +220,7 @@ pub fn new_parameters(bench: &Bench) -> Outcome {
         (updated.sequence, updated.is_active),
         (Some(3), true),
     )?;
-    equal("running", running(&mut machine)?, large)?;
+    equal("running", running(&mut machine)?, bench.blob.clone())?;
     let resets = (machine.panics, machine.watchdog_resets);
     equal("resets asked for, and by the watchdog", resets, (2, 0))?;
     let (statics, stack) = (bench.image(PART).static_bytes, machine.stack_bytes());
