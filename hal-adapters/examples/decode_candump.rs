@@ -7,7 +7,7 @@
 
 use hal_adapters::can::{Layout, SensorReceiver, Timing};
 use hal_adapters::candump::LogLine;
-use runtime::{OnInvalid, ParameterSet, RawFrame, Reading, Servo};
+use runtime::{OnInvalid, ParameterSet, PoseTracker, RawFrame, Reading};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -31,7 +31,7 @@ fn decode(
     mut show: impl FnMut(&RawFrame, &Reading),
 ) -> Result<(), Box<dyn Error>> {
     let decoder = ParameterSet::from_bytes(blob)?.decoder();
-    let mut servo = Servo::new(&*decoder, OnInvalid::Zero);
+    let mut tracker = PoseTracker::new(decoder, OnInvalid::Zero);
     let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
     for (number, text) in (1..).zip(log.lines()) {
         let line = LogLine::parse(text).map_err(|e| format!("line {number}: {e}"))?;
@@ -42,7 +42,7 @@ fn decode(
                 eprintln!("line {number}: {fault}");
             }
             if let Some(frame) = taken.tick {
-                show(&frame, &servo.tick(&frame));
+                show(&frame, &tracker.tick(&frame));
             }
         }
     }

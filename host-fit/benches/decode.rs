@@ -53,7 +53,7 @@ fn main() {
     ];
     for (model, blob) in blobs {
         let decoder = ParameterSet::from_bytes(blob).expect("sound").decoder();
-        let rate = million_ticks_per_s(&*decoder, &frames);
+        let rate = million_ticks_per_s(&decoder, &frames);
         println!("RESULT decode_{model}_million_ticks_per_s={rate:.1}");
     }
 }

@@ -13,7 +13,7 @@
 
 use crate::report::parameters::{Parameter, parameters_in};
 use nalgebra::Matrix3;
-use runtime::{ParameterSet, PlanarPose, RawFrame};
+use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
 use serde_json::{Map, Value, json};
 use std::array::from_fn;
 use std::collections::BTreeMap;

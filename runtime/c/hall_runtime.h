@@ -26,7 +26,7 @@
 #define HALL_DECODER_WORDS 114
 
 // Words of a servo.
-#define HALL_SERVO_WORDS 56
+#define HALL_SERVO_WORDS 55
 
 // Major version of the library that this header belongs to.
 #define HALL_RUNTIME_VERSION_MAJOR 0

@@ -3,7 +3,7 @@
 //! `cargo run -p runtime --example decode -- runtime/examples/stage.bin 1200 900 700 300 -200 100`:
 //! the blob, Hall codes A, B, C, capacitive codes 1, 2, 3.
 
-use runtime::{ParameterSet, PlanarPose, RawFrame};
+use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {

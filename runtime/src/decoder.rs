@@ -18,8 +18,6 @@ use crate::model::{FieldModel, LinearModel, Model};
 use crate::pose::{PlanarPose, Pose, VerticalPose};
 use crate::real::Real;
 use crate::status::Status;
-use core::fmt;
-use core::ops::Deref;
 
 /// What a tick reads in addition to the coefficients of the probes.
 ///
@@ -55,8 +53,8 @@ pub struct Reading {
 
 /// Decodes frames by one calibration, whatever its model.
 ///
-/// A [`Decoder`] does this for its own model. The model of a parameter set is looked up once,
-/// when the set is loaded; from then on a servo holds a `&dyn Decode` and no tick chooses.
+/// A [`Decoder`] does this for its own model, an [`AnyDecoder`] for that of a parameter set, and
+/// a reference for what it refers to.
 pub trait Decode: Sync {
     /// The vertical pose of a frame's capacitive codes and the planar pose of its Hall codes,
     /// less `zero`; invalid fields are 0 and the status says why. Never NaN.
@@ -66,10 +64,14 @@ pub trait Decode: Sync {
     fn constants(&self) -> &DecoderConstants<f32>;
 }
 
-/// Without the constants: formatting numbers would take more flash than the runtime does.
-impl fmt::Debug for dyn Decode + '_ {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("decoder")
+impl<D: Decode + ?Sized> Decode for &D {
+    #[inline(always)]
+    fn decode(&self, frame: &RawFrame, zero: &PlanarPose<f32>) -> Reading {
+        (**self).decode(frame, zero)
+    }
+
+    fn constants(&self) -> &DecoderConstants<f32> {
+        (**self).constants()
     }
 }
 
@@ -101,8 +103,7 @@ pub struct Decoder<M: Model> {
     probes: [M::Probe<f32>; 3],
 }
 
-/// The decoder of a parameter set, whatever its model: chosen once, when the set is loaded,
-/// and borrowed as the [`Decode`] that it derefs to.
+/// The decoder of a parameter set, whatever its model. A tick takes the same branch each time.
 #[expect(
     clippy::large_enum_variant,
     reason = "there is one, in a static, and no heap"
@@ -131,13 +132,18 @@ impl AnyDecoder {
     }
 }
 
-impl Deref for AnyDecoder {
-    type Target = dyn Decode;
-
-    fn deref(&self) -> &Self::Target {
+impl Decode for AnyDecoder {
+    fn decode(&self, frame: &RawFrame, zero: &PlanarPose<f32>) -> Reading {
         match self {
-            Self::Linear(decoder) => decoder,
-            Self::Field(decoder) => decoder,
+            Self::Linear(decoder) => decoder.decode(frame, zero),
+            Self::Field(decoder) => decoder.decode(frame, zero),
+        }
+    }
+
+    fn constants(&self) -> &DecoderConstants<f32> {
+        match self {
+            Self::Linear(decoder) => decoder.constants(),
+            Self::Field(decoder) => decoder.constants(),
         }
     }
 }

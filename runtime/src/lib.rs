@@ -5,9 +5,9 @@
 //! one way, one type a step:
 //!
 //! ```text
-//! bytes --ParameterSet::from_bytes--> ParameterSet --decoder--> AnyDecoder, a &dyn Decode
+//! bytes --ParameterSet::from_bytes--> ParameterSet --decoder--> AnyDecoder
 //!     once, at start: checked, its model chosen, then borrowed read-only
-//! RawFrame --Decode::decode--> Reading (Pose + Status) --Servo::tick--> Reading, Health
+//! RawFrame --Decode::decode--> Reading (Pose + Status) --PoseTracker::tick--> Reading, Health
 //!     every servo period
 //! ```
 //!
@@ -21,8 +21,8 @@
 //! | [`status`] | the documented bit mask that goes with every pose |
 //! | [`calibration`] | what a fit yields, in SI units, and how it becomes decoder constants |
 //! | [`decoder`] | one frame to one reading: the flat tick path |
-//! | [`servo`] | what lasts from tick to tick: hold, sequence, counters, re-zero |
-//! | [`rezero`] | the zero deviation measured at rest |
+//! | [`tracker`] | what lasts from tick to tick: hold, sequence, counters, re-zero |
+//! | [`zero_offset`] | the zero deviation measured at rest |
 //! | [`prediction`] | the pose at a later time than that of the sample |
 //! | [`parameters`], [`blob`] | the parameter set, and its bytes in flash |
 //! | [`arithmetic`] | the check at start-up that this machine rounds as the host does |
@@ -56,13 +56,13 @@ pub mod parameters;
 pub mod pose;
 pub mod prediction;
 pub mod real;
-pub mod rezero;
 #[cfg(test)]
 #[path = "sample_for_tests.rs"]
 mod sample;
-pub mod servo;
 mod soundness;
 pub mod status;
+pub mod tracker;
+pub mod zero_offset;
 
 pub use blob::BlobError;
 pub use calibration::Calibration;
@@ -72,5 +72,9 @@ pub use model::{FieldModel, LinearModel, Model, ModelKind};
 pub use parameters::ParameterSet;
 pub use pose::{PlanarPose, Pose, VerticalPose};
 pub use prediction::Predictor;
-pub use servo::{OnInvalid, Servo};
 pub use status::Status;
+pub use tracker::{OnInvalid, PoseTracker};
+
+/// The earlier name of a [`PoseTracker`] that borrows its decoder.
+#[deprecated(since = "0.2.0", note = "use PoseTracker, which can own its decoder")]
+pub type Servo<'d> = PoseTracker<&'d dyn Decode>;

@@ -14,10 +14,10 @@
 //! 57 mm/s^2 that go with 4.8 mm/s it is 0.4 mm/s late, 0.12 um for 0.3 ms. What is left of the
 //! error in service stands in the README.
 
-use crate::decoder::Reading;
+use crate::decoder::{Decode, Reading};
 use crate::frame::RawFrame;
 use crate::pose::PlanarPose;
-use crate::servo::Servo;
+use crate::tracker::PoseTracker;
 
 /// Poses through which the line is laid.
 pub const POSES: usize = 8;
@@ -29,20 +29,20 @@ struct Sample {
     time_us: u32,
 }
 
-/// Predicts X, Y, Rz from the last valid poses of a [`Servo`], in a straight line.
+/// Predicts X, Y, Rz from the last valid poses of a [`PoseTracker`], in a straight line.
 ///
 /// ```
-/// use runtime::{OnInvalid, ParameterSet, Predictor, RawFrame, Servo};
+/// use runtime::{OnInvalid, ParameterSet, Predictor, RawFrame, PoseTracker};
 /// # const BLOB: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/stage.bin"));
 /// # fn main() -> Result<(), runtime::BlobError> {
 /// let decoder = ParameterSet::from_bytes(BLOB)?.decoder();
-/// let mut servo = Servo::new(&*decoder, OnInvalid::Zero);
+/// let mut tracker = PoseTracker::new(decoder, OnInvalid::Zero);
 /// let mut predictor = Predictor::new(4_000); // two periods of 2 ms
 /// # let mut read_frame = |k: u32| RawFrame { hall: [12 * k as i32, 90, 70], capacitive: [0; 3], sequence: k, time_us: 2_000 * k };
 /// for period in 0..8 {
 ///     let frame = read_frame(period);
-///     let reading = servo.tick(&frame);
-///     predictor.take(&servo, &frame, &reading);
+///     let reading = tracker.tick(&frame);
+///     predictor.take(&tracker, &frame, &reading);
 ///     let now_us = frame.time_us + 300;
 ///     let _pose = predictor.pose_at(now_us).or(reading.planar());
 /// }
@@ -77,11 +77,16 @@ impl Predictor {
         }
     }
 
-    /// Takes the reading that `servo` has just made of `frame`; an invalid one is passed over.
+    /// Takes the reading that `tracker` has just made of `frame`; an invalid one is passed over.
     /// The poses start anew when the time does not go on, or by more than the largest age, and
     /// when the zero deviation changes.
-    pub fn take(&mut self, servo: &Servo<'_>, frame: &RawFrame, reading: &Reading) {
-        let zero = servo.zero();
+    pub fn take<D: Decode>(
+        &mut self,
+        tracker: &PoseTracker<D>,
+        frame: &RawFrame,
+        reading: &Reading,
+    ) {
+        let zero = tracker.zero();
         if zero != self.zero {
             // A re-zero that ended in this tick holds from the next one on.
             (self.zero, self.taken) = (zero, 0);

@@ -3,8 +3,8 @@
 use super::*;
 use crate::pose::Pose;
 use crate::sample;
-use crate::servo::OnInvalid;
 use crate::status::Status;
+use crate::tracker::OnInvalid;
 use proptest::prelude::*;
 use std::vec::Vec;
 
@@ -34,10 +34,10 @@ fn reading(pose: [f32; 3]) -> Reading {
 /// A predictor that has taken poses, each with its time.
 fn fed(samples: &[(u32, [f32; 3])]) -> Predictor {
     let decoder = sample::parameters().decoder();
-    let servo = Servo::new(&*decoder, OnInvalid::Zero);
+    let tracker = PoseTracker::new(decoder, OnInvalid::Zero);
     let mut predictor = Predictor::new(AGE_MAX_US);
     for (time_us, pose) in samples {
-        predictor.take(&servo, &frame(*time_us), &reading(*pose));
+        predictor.take(&tracker, &frame(*time_us), &reading(*pose));
     }
     predictor
 }
@@ -92,13 +92,13 @@ proptest! {
     #[test]
     fn invalid_and_held_poses_change_nothing(walk in walks(), bad in prop::array::uniform3(any::<f32>()), held: bool) {
         let decoder = sample::parameters().decoder();
-        let servo = Servo::new(&*decoder, OnInvalid::Zero);
+        let tracker = PoseTracker::new(decoder, OnInvalid::Zero);
         let mut predictor = fed(&walk);
         let before = predictor;
         let time_us = walk[walk.len() - 1].0.wrapping_add(1);
         let marks = if held { Status::PLANAR_HELD } else { Status::GOOD };
         let invalid = Reading { status: Status::PLANAR_INVALID.with(marks), ..reading(bad) };
-        predictor.take(&servo, &frame(time_us), &invalid);
+        predictor.take(&tracker, &frame(time_us), &invalid);
         prop_assert_eq!(predictor, before);
     }
 
@@ -182,15 +182,15 @@ fn a_gap_or_a_time_that_stands_starts_the_poses_anew() {
 #[test]
 fn a_zero_deviation_that_changes_is_no_movement() {
     let decoder = sample::parameters().decoder();
-    let mut servo = Servo::new(&*decoder, OnInvalid::Zero);
+    let mut tracker = PoseTracker::new(decoder, OnInvalid::Zero);
     let mut predictor = Predictor::new(AGE_MAX_US);
-    let mut tick = |servo: &mut Servo<'_>, k: u32| {
+    let mut tick = |tracker: &mut PoseTracker, k: u32| {
         let frame = RawFrame {
             sequence: k,
             ..frame(2_000 * k)
         };
-        let reading = servo.tick(&frame);
-        predictor.take(servo, &frame, &reading);
+        let reading = tracker.tick(&frame);
+        predictor.take(tracker, &frame, &reading);
         let pose = predictor.pose_at(frame.time_us + 300);
         (pose, reading.planar())
     };
@@ -200,9 +200,9 @@ fn a_zero_deviation_that_changes_is_no_movement() {
                 x_m: 20e-6,
                 ..PlanarPose::ZERO
             };
-            assert!(servo.set_zero(zero));
+            assert!(tracker.set_zero(zero));
         }
-        let (predicted, measured) = tick(&mut servo, k);
+        let (predicted, measured) = tick(&mut tracker, k);
         assert_eq!(predicted.is_some(), (7..12).contains(&k) || k >= 20, "{k}");
         // The stage stands: what is predicted is what is measured.
         assert!(predicted.is_none() || predicted == measured);

@@ -5,8 +5,8 @@ use runtime::frame::CodeWindow;
 use runtime::model::{Sensitivity, planar_pose, sensitivity_at};
 use runtime::real::Real;
 use runtime::{
-    Decoder, LinearModel, Model, OnInvalid, PlanarPose, RawFrame, Reading, Servo, Status,
-    VerticalPose,
+    Decode, Decoder, LinearModel, Model, OnInvalid, PlanarPose, PoseTracker, RawFrame, Reading,
+    Status, VerticalPose,
 };
 
 /// phi = eta + a Z + b Rx + c Ry + d Z^2.
@@ -78,8 +78,8 @@ fn frame(sequence: u32) -> RawFrame {
     }
 }
 
-fn first_reading(decoder: &dyn runtime::Decode) -> Reading {
-    Servo::new(decoder, OnInvalid::Zero).tick(&frame(0))
+fn first_reading(decoder: &dyn Decode) -> Reading {
+    PoseTracker::new(decoder, OnInvalid::Zero).tick(&frame(0))
 }
 
 #[test]
@@ -118,17 +118,15 @@ fn its_sensitivities_are_checked_as_those_of_every_model() {
 }
 
 #[test]
-fn one_servo_type_runs_every_model() {
+fn one_tracker_type_runs_every_model() {
     let (bent, linear) = (
         bent(9e7),
         Decoder::<LinearModel>::new(CONSTANTS, [LINEAR; 3]),
     );
-    let mut servos = [
-        Servo::new(&bent, OnInvalid::Zero),
-        Servo::new(&linear, OnInvalid::Zero),
-    ];
-    let [a, b] = servos
+    let decoders: [&dyn Decode; 2] = [&bent, &linear];
+    let mut trackers = decoders.map(|decoder| PoseTracker::new(decoder, OnInvalid::Zero));
+    let [a, b] = trackers
         .each_mut()
-        .map(|servo| servo.tick(&frame(7)).pose.planar.x_m);
+        .map(|tracker| tracker.tick(&frame(7)).pose.planar.x_m);
     assert!((b / a - 2.0 / 1.1).abs() < 1e-6);
 }

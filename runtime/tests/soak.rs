@@ -6,9 +6,9 @@
 //! ```
 
 use runtime::frame::MISSING_CODE;
-use runtime::servo::Health;
+use runtime::tracker::Health;
 use runtime::{
-    Decode, OnInvalid, ParameterSet, PlanarPose, Pose, RawFrame, Reading, Servo, Status,
+    Decode, OnInvalid, ParameterSet, PlanarPose, Pose, PoseTracker, RawFrame, Reading, Status,
 };
 use std::collections::BTreeMap;
 
@@ -195,8 +195,7 @@ fn frame(n: u32, sequence: u32) -> RawFrame {
 fn soak(blob: &[u8], ticks: u32, seed: u64) {
     let set = ParameterSet::from_bytes(blob).expect("a golden blob");
     let decoder = set.decoder();
-    let decoder: &dyn Decode = &*decoder;
-    let mut servo = Servo::new(decoder, OnInvalid::Hold { ticks: HOLD });
+    let mut tracker = PoseTracker::new(decoder, OnInvalid::Hold { ticks: HOLD });
     let (mut random, mut account) = (Random(seed), Account::default());
     let mut sequence = u32::MAX - ticks / 2;
     let mut event = Event::Sound;
@@ -221,31 +220,31 @@ fn soak(blob: &[u8], ticks: u32, seed: u64) {
                 frame.sequence = sequence;
             }
             Event::NoFrame => {
-                account.check(event, &servo.tick_without_frame(), None);
+                account.check(event, &tracker.tick_without_frame(), None);
                 continue;
             }
             Event::Late(by) => {
                 sequence = sequence.wrapping_sub(1);
                 frame.sequence = sequence.wrapping_sub(by);
-                account.check(event, &servo.tick(&frame), None);
+                account.check(event, &tracker.tick(&frame), None);
                 continue;
             }
             Event::Zero(zero) => {
-                assert!(servo.set_zero(zero));
+                assert!(tracker.set_zero(zero));
                 (account.zero, account.holds_left[0]) = (zero, 0);
             }
             Event::Restart(anew) => {
-                servo.forget();
+                tracker.forget();
                 account.holds_left = [0; 2];
                 sequence = anew;
-                account.check(event, &servo.tick_without_frame(), None);
+                account.check(event, &tracker.tick_without_frame(), None);
                 continue;
             }
         }
         let decoded = decoder.decode(&frame, &account.zero);
-        account.check(event, &servo.tick(&frame), Some(decoded));
+        account.check(event, &tracker.tick(&frame), Some(decoded));
     }
-    assert_eq!(servo.health(), account.health);
+    assert_eq!(tracker.health(), account.health);
     let good: u64 = (account.seen.iter())
         .filter(|(status, _)| Status::from_bits(**status).is_good())
         .map(|(_, ticks)| ticks)

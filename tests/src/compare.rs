@@ -1,8 +1,10 @@
 //! The host's words of a job, and where the target's differ.
 
-use crate::job::{self, ANSWER_WORDS, Bare, FRAME_WORDS, HEAD_WORDS, Head, PredictingServo};
+use crate::job::{self, ANSWER_WORDS, Bare, FRAME_WORDS, HEAD_WORDS, Head, PredictingTracker};
 use crate::motion::Section;
-use runtime::{BlobError, Decode, FieldModel, LinearModel, ParameterSet, RawFrame, Reading, Servo};
+use runtime::{
+    BlobError, Decode, FieldModel, LinearModel, ParameterSet, PoseTracker, RawFrame, Reading,
+};
 
 /// Why a job or its answer is refused.
 #[derive(Debug, thiserror::Error)]
@@ -175,12 +177,12 @@ pub fn run(
         source,
     })?;
     let decoder = set.decoder();
-    let mut servo = Servo::new(&*decoder, section.head.on_invalid());
-    let mut predicting = PredictingServo::new(servo.clone());
+    let mut tracker = PoseTracker::new(decoder, section.head.on_invalid());
+    let mut predicting = PredictingTracker::new(tracker.clone());
     for (tick, frame) in section.frames.iter().enumerate() {
         let reading = match section.head.source {
             job::PREDICTED => predicting.tick(frame),
-            _ => servo.tick(frame),
+            _ => tracker.tick(frame),
         };
         take(tick, frame, reading);
     }

@@ -18,8 +18,8 @@ use runtime::decoder::DecoderConstants;
 use runtime::frame::CodeWindow;
 use runtime::model::{FieldProbe, Sensitivity, Shape};
 use runtime::{
-    Decode, Decoder, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, Predictor, RawFrame,
-    Reading, Servo,
+    Decode, Decoder, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, PoseTracker, Predictor,
+    RawFrame, Reading,
 };
 
 /// Source: a decoder of Model (31) and a zero deviation as bare words.
@@ -95,17 +95,17 @@ impl Head {
     }
 }
 
-/// A servo whose X, Y, Rz are predicted, from frames whose times its sequence numbers give.
-pub struct PredictingServo<'d> {
-    servo: Servo<'d>,
+/// A tracker whose X, Y, Rz are predicted, from frames whose times its sequence numbers give.
+pub struct PredictingTracker {
+    tracker: PoseTracker,
     predictor: Predictor,
 }
 
-impl<'d> PredictingServo<'d> {
-    /// With the servo that decodes.
-    pub const fn new(servo: Servo<'d>) -> Self {
+impl PredictingTracker {
+    /// With the tracker that decodes.
+    pub const fn new(tracker: PoseTracker) -> Self {
         Self {
-            servo,
+            tracker,
             predictor: Predictor::new(4_000),
         }
     }
@@ -117,8 +117,8 @@ impl<'d> PredictingServo<'d> {
         let k = frame.sequence;
         let time_us = (k.wrapping_mul(2_000) | (k.wrapping_mul(k) & 15)).wrapping_sub(64_000);
         let frame = RawFrame { time_us, ..*frame };
-        let mut reading = self.servo.tick(&frame);
-        self.predictor.take(&self.servo, &frame, &reading);
+        let mut reading = self.tracker.tick(&frame);
+        self.predictor.take(&self.tracker, &frame, &reading);
         let at_us = time_us.wrapping_add(k.wrapping_mul(193) % 4_500);
         reading.pose.planar = self.predictor.pose_at(at_us).unwrap_or(PlanarPose::ZERO);
         reading

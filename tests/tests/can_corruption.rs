@@ -9,7 +9,7 @@ use runtime::calibration::Origin;
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeGeometry;
 use runtime::model::{Probes, Sensitivity};
-use runtime::{AnyDecoder, Calibration, ModelKind, PlanarPose, RawFrame, Reading, Status};
+use runtime::{AnyDecoder, Calibration, Decode, ModelKind, PlanarPose, RawFrame, Reading, Status};
 
 /// A stage near the designed one.
 fn decoder() -> AnyDecoder {

@@ -9,7 +9,7 @@ use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::protocol::Protocol;
 use host_fit::simulate::recording::{Recording, Sample, record};
 use host_fit::simulate::sensors::SensorErrors;
-use runtime::{ModelKind, OnInvalid, ParameterSet, Predictor, RawFrame, Servo};
+use runtime::{ModelKind, OnInvalid, ParameterSet, PoseTracker, Predictor, RawFrame};
 use std::path::Path;
 
 /// The simulated stage, with magnets as designed.
@@ -52,7 +52,7 @@ fn add_squares(
     sums: &mut [[f64; 3]; 2],
 ) -> usize {
     let decoder = set.decoder();
-    let mut servo = Servo::new(&*decoder, OnInvalid::Zero);
+    let mut tracker = PoseTracker::new(decoder, OnInvalid::Zero);
     let mut predictor = Predictor::new(4_000);
     let mut count = 0;
     for (k, sample) in samples[..samples.len() - 2].iter().enumerate() {
@@ -62,8 +62,8 @@ fn add_squares(
             sequence: k as u32,
             time_us: sample.t_us as u32,
         };
-        let reading = servo.tick(&frame);
-        predictor.take(&servo, &frame, &reading);
+        let reading = tracker.tick(&frame);
+        predictor.take(&tracker, &frame, &reading);
         let Some(predicted) = predictor.pose_at(frame.time_us + age_us) else {
             continue;
         };

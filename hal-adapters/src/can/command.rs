@@ -18,13 +18,13 @@ use super::status::{HealthPage, NodeStatus};
 use super::table::Message;
 use super::update::{UpdateData, UpdateRequest};
 use embedded_can::Frame;
-use runtime::rezero::RezeroRefusal;
+use runtime::zero_offset::ZeroOffsetRefusal;
 
 /// What a node is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Average `ticks` ticks at rest, and subtract the mean from then on; 0 stands for the
-    /// default of [`runtime::rezero::RezeroSettings`].
+    /// default of [`runtime::zero_offset::ZeroOffsetSettings`].
     Rezero {
         /// Ticks to average.
         ticks: u16,
@@ -163,14 +163,14 @@ numbered! {
 
 impl Outcome {
     /// Outcome and detail of a refused re-zero.
-    pub fn of_refusal(refusal: &RezeroRefusal) -> (Self, u32) {
+    pub fn of_refusal(refusal: &ZeroOffsetRefusal) -> (Self, u32) {
         match *refusal {
-            RezeroRefusal::TooShort { .. } => (Self::TooShort, 0),
-            RezeroRefusal::NoPose { status } => (Self::NoPose, status.bits()),
-            RezeroRefusal::Moved { axis, .. } => (Self::Moved, u32::from(axis)),
-            RezeroRefusal::Drifted { axis, .. } => (Self::Drifted, u32::from(axis)),
-            RezeroRefusal::OutOfBounds { axis, .. } => (Self::OutOfBounds, u32::from(axis)),
-            RezeroRefusal::Extrapolated { status } => (Self::Extrapolated, status.bits()),
+            ZeroOffsetRefusal::TooShort { .. } => (Self::TooShort, 0),
+            ZeroOffsetRefusal::NoPose { status } => (Self::NoPose, status.bits()),
+            ZeroOffsetRefusal::Moved { axis, .. } => (Self::Moved, u32::from(axis)),
+            ZeroOffsetRefusal::Drifted { axis, .. } => (Self::Drifted, u32::from(axis)),
+            ZeroOffsetRefusal::OutOfBounds { axis, .. } => (Self::OutOfBounds, u32::from(axis)),
+            ZeroOffsetRefusal::Extrapolated { status } => (Self::Extrapolated, status.bits()),
         }
     }
 }

@@ -33,7 +33,7 @@ use runtime::frame::MISSING_CODE;
 /// Receives the sensor frames of one stage.
 ///
 /// Raw frames are numbered from the first counter seen. Lost ticks are counted in the number,
-/// so [`runtime::Servo`] sees them, too. `time_us` of a raw frame is when its first bus frame
+/// so [`runtime::PoseTracker`] sees them, too. `time_us` of a raw frame is when its first bus frame
 /// came, by the receiver's clock.
 #[derive(Clone, Debug)]
 pub struct SensorReceiver {

@@ -26,8 +26,8 @@ use super::notice::BusFault;
 use super::status::flag;
 use super::update::{Nonce, Receiver, Store, Surroundings};
 use embedded_can::Frame;
-use runtime::rezero::{RezeroSettings, RezeroState};
-use runtime::{PlanarPose, Servo};
+use runtime::zero_offset::{ZeroOffsetSettings, ZeroOffsetState};
+use runtime::{Decode, PlanarPose, PoseTracker};
 
 /// A command that came, and its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,10 +93,10 @@ impl Service {
     ///
     /// # Errors
     /// The command's frame is damaged or repeated: not obeyed, not answered.
-    pub fn take<F: Frame>(
+    pub fn take<F: Frame, D: Decode>(
         &mut self,
         frame: &F,
-        servo: Option<&mut Servo<'_>>,
+        servo: Option<&mut PoseTracker<D>>,
     ) -> Option<Result<Answered, BusFault>> {
         self.take_updating(frame, servo, None)
     }
@@ -106,10 +106,10 @@ impl Service {
     ///
     /// # Errors
     /// The command's frame is damaged or repeated: not obeyed, not answered.
-    pub fn take_updating<F: Frame>(
+    pub fn take_updating<F: Frame, D: Decode>(
         &mut self,
         frame: &F,
-        servo: Option<&mut Servo<'_>>,
+        servo: Option<&mut PoseTracker<D>>,
         updates: Option<Updates<'_, '_>>,
     ) -> Option<Result<Answered, BusFault>> {
         match self.mailbox.take(frame)? {
@@ -140,27 +140,31 @@ impl Service {
     /// Before the servo's own tick, which may end a re-zero and move the pose: one that runs is
     /// given up if the servo is not off. `servo_off_pin` is whether the service pin says that it
     /// is, `None` without such a pin.
-    pub fn before_tick(&mut self, servo: Option<&mut Servo<'_>>, servo_off_pin: Option<bool>) {
+    pub fn before_tick<D: Decode>(
+        &mut self,
+        servo: Option<&mut PoseTracker<D>>,
+        servo_off_pin: Option<bool>,
+    ) {
         self.servo_off_pin = servo_off_pin;
         if let Some(servo) = servo
             && self.rezero.is_some()
             && !self.servo_is_off()
         {
-            servo.cancel_rezero();
+            servo.cancel_zero_offset();
         }
     }
 
     /// One tick, after the servo's own: the declaration and the blinking run on, and a re-zero
     /// that has ended is answered.
-    pub fn tick(&mut self, servo: Option<&Servo<'_>>) -> Option<Coded> {
+    pub fn tick<D: Decode>(&mut self, servo: Option<&PoseTracker<D>>) -> Option<Coded> {
         self.identify_ticks = self.identify_ticks.saturating_sub(1);
         self.servo_off_ticks = self.servo_off_ticks.saturating_sub(1);
         let (token, servo) = (self.rezero?, servo?);
-        let (outcome, detail) = match servo.rezero_state() {
-            RezeroState::Running { .. } => return None,
-            RezeroState::Idle => (Outcome::ServoOn, 0),
-            RezeroState::Done { .. } => (Outcome::Done, 0),
-            RezeroState::Refused(refusal) => Outcome::of_refusal(&refusal),
+        let (outcome, detail) = match servo.zero_offset_state() {
+            ZeroOffsetState::Running { .. } => return None,
+            ZeroOffsetState::Idle => (Outcome::ServoOn, 0),
+            ZeroOffsetState::Done { .. } => (Outcome::Done, 0),
+            ZeroOffsetState::Refused(refusal) => Outcome::of_refusal(&refusal),
         };
         self.rezero = None;
         self.was_refused = outcome != Outcome::Done;
@@ -185,9 +189,9 @@ impl Service {
     }
 
     /// The bits of [`flag`] that follow from commands.
-    pub fn flags(&self, servo: Option<&Servo<'_>>) -> u8 {
+    pub fn flags<D: Decode>(&self, servo: Option<&PoseTracker<D>>) -> u8 {
         let on = |bit, is| if is { bit } else { 0 };
-        let zero = servo.map_or(PlanarPose::ZERO, Servo::zero);
+        let zero = servo.map_or(PlanarPose::ZERO, PoseTracker::zero);
         on(flag::REZERO_RUNS, self.rezero.is_some())
             | on(flag::ZERO_SET, zero != PlanarPose::ZERO)
             | on(flag::REZERO_REFUSED, self.was_refused)
@@ -210,7 +214,11 @@ impl Service {
         self.servo_off_ticks > 0 && !matches!(self.servo_off_pin, Some(false))
     }
 
-    fn obey(&mut self, command: &Command, servo: Option<&mut Servo<'_>>) -> (Outcome, u32) {
+    fn obey<D: Decode>(
+        &mut self,
+        command: &Command,
+        servo: Option<&mut PoseTracker<D>>,
+    ) -> (Outcome, u32) {
         let Some(request) = command.request else {
             return (Outcome::UnknownCommand, 0);
         };
@@ -242,13 +250,18 @@ impl Service {
         (Outcome::Done, 0)
     }
 
-    fn start_rezero(&mut self, ticks: u16, token: u8, servo: &mut Servo<'_>) -> (Outcome, u32) {
-        let mut settings = RezeroSettings::default();
+    fn start_rezero<D: Decode>(
+        &mut self,
+        ticks: u16,
+        token: u8,
+        servo: &mut PoseTracker<D>,
+    ) -> (Outcome, u32) {
+        let mut settings = ZeroOffsetSettings::default();
         if ticks > 0 {
             settings.ticks = ticks;
         }
-        servo.start_rezero(settings);
-        if let RezeroState::Refused(refusal) = servo.rezero_state() {
+        servo.start_zero_offset(settings);
+        if let ZeroOffsetState::Refused(refusal) = servo.zero_offset_state() {
             self.was_refused = true;
             return Outcome::of_refusal(&refusal);
         }

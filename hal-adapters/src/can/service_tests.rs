@@ -36,7 +36,7 @@ fn decoder() -> AnyDecoder {
 
 /// A node with a servo, and a host that commands it.
 struct Stage<'d> {
-    servo: Servo<'d>,
+    servo: PoseTracker<&'d AnyDecoder>,
     service: Service,
     host: Mailbox,
     sequence: u32,
@@ -46,7 +46,7 @@ struct Stage<'d> {
 impl<'d> Stage<'d> {
     fn new(decoder: &'d AnyDecoder) -> Self {
         Self {
-            servo: Servo::new(&**decoder, OnInvalid::Zero),
+            servo: PoseTracker::new(decoder, OnInvalid::Zero),
             service: Service::new(TICKS_PER_S),
             host: Mailbox::default(),
             sequence: 0,
@@ -201,7 +201,7 @@ fn a_node_without_parameters_records_and_identifies_and_has_no_zero() {
         let command = Told::Command(Command::new(request, token));
         let frame = BusFrame::from(host.send(&command).expect("a command"));
         let answered = service
-            .take(&frame, None)
+            .take(&frame, None::<&mut PoseTracker>)
             .expect("a command")
             .expect("sound");
         let answer = BusFrame::from(answered.answer.expect("an answer"));
@@ -212,12 +212,15 @@ fn a_node_without_parameters_records_and_identifies_and_has_no_zero() {
     }
     use Outcome::{Done, NoParameters};
     assert_eq!(outcomes, [Done, Done, Done, NoParameters, NoParameters]);
-    assert_eq!(service.flags(None), flag::RECORDING | flag::IDENTIFYING);
+    assert_eq!(
+        service.flags(None::<&PoseTracker>),
+        flag::RECORDING | flag::IDENTIFYING
+    );
     let pages: Vec<_> = core::iter::from_fn(|| service.identity_page("")).collect();
     assert_eq!(pages.len(), usize::from(IdentityPage::PAGES));
     assert!(pages.iter().all(|page| page.message == Message::Identity));
-    (0..TICKS_PER_S).for_each(|_| assert_eq!(service.tick(None), None));
-    assert_eq!(service.flags(None), flag::RECORDING);
+    (0..TICKS_PER_S).for_each(|_| assert_eq!(service.tick(None::<&PoseTracker>), None));
+    assert_eq!(service.flags(None::<&PoseTracker>), flag::RECORDING);
 }
 
 #[test]
@@ -225,11 +228,14 @@ fn a_repeated_command_is_neither_obeyed_nor_answered() {
     let (mut service, mut host) = (Service::new(TICKS_PER_S), Mailbox::default());
     let command = Told::Command(Command::new(Request::Record { on: true }, 1));
     let frame = BusFrame::from(host.send(&command).expect("a command"));
-    assert!(matches!(service.take(&frame, None), Some(Ok(_))));
     assert!(matches!(
-        service.take(&frame, None),
+        service.take(&frame, None::<&mut PoseTracker>),
+        Some(Ok(_))
+    ));
+    assert!(matches!(
+        service.take(&frame, None::<&mut PoseTracker>),
         Some(Err(BusFault::Repeated { .. }))
     ));
     let foreign = BusFrame::new(embedded_can::StandardId::MAX, &[0; 8]).expect("eight bytes");
-    assert_eq!(service.take(&foreign, None), None);
+    assert_eq!(service.take(&foreign, None::<&mut PoseTracker>), None);
 }

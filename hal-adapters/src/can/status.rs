@@ -1,7 +1,7 @@
 //! The slow frames of the decoding node: its state and its counters.
 
 use super::e2e::Payload;
-use runtime::servo::Health;
+use runtime::tracker::Health;
 
 numbered! {
     /// What the decoding node is doing.
@@ -153,7 +153,7 @@ pub mod board_check {
     pub const SUPPLY_LOW: u32 = 1 << 6;
 }
 
-/// One counter of [`runtime::servo::Health`], or one of [`BoardFacts`], with its page.
+/// One counter of [`runtime::tracker::Health`], or one of [`BoardFacts`], with its page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HealthPage {
     /// Which: 0 to 5 in the order of the counters, 6 to 11 in that of the facts.

@@ -20,7 +20,7 @@ use crate::solve::Solver;
 use crate::solve::robust::Loss;
 use clap::Args;
 use runtime::geometry::ProbeGeometry;
-use runtime::servo::OnInvalid;
+use runtime::tracker::OnInvalid;
 use runtime::{ModelKind, ParameterSet};
 use std::collections::BTreeMap;
 use std::fs;

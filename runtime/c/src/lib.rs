@@ -12,8 +12,8 @@ mod types;
 
 use core::ffi::{CStr, c_char};
 use core::mem::MaybeUninit;
-use runtime::rezero::{RezeroRefusal, RezeroSettings, RezeroState};
-use runtime::{BlobError, OnInvalid, ParameterSet, Reading, Servo};
+use runtime::zero_offset::{ZeroOffsetRefusal, ZeroOffsetSettings, ZeroOffsetState};
+use runtime::{AnyDecoder, BlobError, OnInvalid, ParameterSet, PoseTracker, Reading};
 pub use storage::{HallDecoder, HallServo};
 pub use types::{
     HALL_RUNTIME_VERSION, HallFrame, HallHealth, HallPlanarPose, HallReading, HallResult,
@@ -94,7 +94,7 @@ pub unsafe extern "C" fn hall_servo_start(
         0 => OnInvalid::Zero,
         ticks => OnInvalid::Hold { ticks },
     };
-    servo.write(HallServo::new(Servo::new(&**decoder, on_invalid)));
+    servo.write(HallServo::new(PoseTracker::new(decoder, on_invalid)));
     HallResult::Ok
 }
 
@@ -124,7 +124,7 @@ pub extern "C" fn hall_tick_without_frame(
 /// Forgets the pose to hold and the sequence; zero deviation and counters stay.
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_forget(servo: Option<&mut HallServo>) -> HallResult {
-    result(started(servo).map(Servo::forget))
+    result(started(servo).map(PoseTracker::forget))
 }
 
 /// Starts to average at rest, over `ticks` ticks (250 or more) with the default limits of
@@ -132,9 +132,9 @@ pub extern "C" fn hall_forget(servo: Option<&mut HallServo>) -> HallResult {
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_rezero_start(servo: Option<&mut HallServo>, ticks: u16) -> HallResult {
     result(started(servo).map(|servo| {
-        servo.start_rezero(RezeroSettings {
+        servo.start_zero_offset(ZeroOffsetSettings {
             ticks,
-            ..RezeroSettings::default()
+            ..ZeroOffsetSettings::default()
         });
     }))
 }
@@ -142,17 +142,17 @@ pub extern "C" fn hall_rezero_start(servo: Option<&mut HallServo>, ticks: u16) -
 /// Where the re-zero stands; idle for a null pointer or a servo that was never started.
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_rezero_state(servo: Option<&HallServo>) -> HallRezero {
-    match running(servo).map(Servo::rezero_state) {
-        None | Some(RezeroState::Idle) => HallRezero::Idle,
-        Some(RezeroState::Running { .. }) => HallRezero::Running,
-        Some(RezeroState::Done { .. }) => HallRezero::Done,
-        Some(RezeroState::Refused(refusal)) => match refusal {
-            RezeroRefusal::TooShort { .. } => HallRezero::TooShort,
-            RezeroRefusal::NoPose { .. } => HallRezero::NoPose,
-            RezeroRefusal::Moved { .. } => HallRezero::Moved,
-            RezeroRefusal::Drifted { .. } => HallRezero::Drifted,
-            RezeroRefusal::OutOfBounds { .. } => HallRezero::OutOfBounds,
-            RezeroRefusal::Extrapolated { .. } => HallRezero::Extrapolated,
+    match running(servo).map(PoseTracker::zero_offset_state) {
+        None | Some(ZeroOffsetState::Idle) => HallRezero::Idle,
+        Some(ZeroOffsetState::Running { .. }) => HallRezero::Running,
+        Some(ZeroOffsetState::Done { .. }) => HallRezero::Done,
+        Some(ZeroOffsetState::Refused(refusal)) => match refusal {
+            ZeroOffsetRefusal::TooShort { .. } => HallRezero::TooShort,
+            ZeroOffsetRefusal::NoPose { .. } => HallRezero::NoPose,
+            ZeroOffsetRefusal::Moved { .. } => HallRezero::Moved,
+            ZeroOffsetRefusal::Drifted { .. } => HallRezero::Drifted,
+            ZeroOffsetRefusal::OutOfBounds { .. } => HallRezero::OutOfBounds,
+            ZeroOffsetRefusal::Extrapolated { .. } => HallRezero::Extrapolated,
         },
     }
 }
@@ -175,16 +175,21 @@ pub extern "C" fn hall_set_zero(servo: Option<&mut HallServo>, zero: HallPlanarP
 /// The counters; zeros for a null pointer or a servo that was never started.
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_health(servo: Option<&HallServo>) -> HallHealth {
-    running(servo).map(Servo::health).unwrap_or_default().into()
+    running(servo)
+        .map(PoseTracker::health)
+        .unwrap_or_default()
+        .into()
 }
 
 /// The servo that C points to, if it was started.
-fn running(servo: Option<&HallServo>) -> Option<&Servo<'static>> {
+fn running(servo: Option<&HallServo>) -> Option<&PoseTracker<&'static AnyDecoder>> {
     servo?.get()
 }
 
 /// The servo that C points to, or why there is none.
-fn started(servo: Option<&mut HallServo>) -> Result<&mut Servo<'static>, HallResult> {
+fn started(
+    servo: Option<&mut HallServo>,
+) -> Result<&mut PoseTracker<&'static AnyDecoder>, HallResult> {
     let servo = servo.ok_or(HallResult::NullPointer)?;
     servo.get_mut().ok_or(HallResult::NotStarted)
 }
@@ -198,7 +203,7 @@ fn result(done: Result<(), HallResult>) -> HallResult {
 fn tick(
     servo: Option<&mut HallServo>,
     reading: Option<&mut MaybeUninit<HallReading>>,
-    tick: impl FnOnce(&mut Servo<'static>) -> Result<Reading, HallResult>,
+    tick: impl FnOnce(&mut PoseTracker<&'static AnyDecoder>) -> Result<Reading, HallResult>,
 ) -> HallResult {
     let Some(reading) = reading else {
         return HallResult::NullPointer;

@@ -1,12 +1,12 @@
 //! Room for a decoder and a servo, of a size that C knows.
 
 use core::mem::{ManuallyDrop, MaybeUninit, align_of, size_of};
-use runtime::{AnyDecoder, Servo};
+use runtime::{AnyDecoder, PoseTracker};
 
 /// Words of a decoder.
 pub const HALL_DECODER_WORDS: usize = 114;
 /// Words of a servo.
-pub const HALL_SERVO_WORDS: usize = 56;
+pub const HALL_SERVO_WORDS: usize = 55;
 
 /// A decoder, as C sees it. Its contents are private.
 #[repr(C)]
@@ -48,11 +48,16 @@ macro_rules! room {
 }
 
 room!(HallDecoder, HALL_DECODER_WORDS, AnyDecoder, 0x9c3e_51d7);
-room!(HallServo, HALL_SERVO_WORDS, Servo<'static>, 0x6ab4_e825);
+room!(
+    HallServo,
+    HALL_SERVO_WORDS,
+    PoseTracker<&'static AnyDecoder>,
+    0x6ab4_e825
+);
 
 impl HallServo {
     /// As `get`, to be changed.
-    pub(crate) fn get_mut(&mut self) -> Option<&mut Servo<'static>> {
+    pub(crate) fn get_mut(&mut self) -> Option<&mut PoseTracker<&'static AnyDecoder>> {
         self.get()?;
         // SAFETY: as in `get`; the borrow is unique.
         Some(unsafe { &mut *(&raw mut self.opaque).cast() })

@@ -1,6 +1,6 @@
 //! What C hands in and gets back.
 
-use runtime::servo::Health;
+use runtime::tracker::Health;
 use runtime::{PlanarPose, RawFrame, Reading};
 
 /// Major version of the library that this header belongs to.

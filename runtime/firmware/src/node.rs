@@ -16,8 +16,8 @@ use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus, bit, board_ch
 use hal_adapters::can::table::{Message, SLOW_TICKS};
 use hal_adapters::can::update::{Identity, Nonce, Receiver, Store};
 use hal_adapters::can::{Layout, PROTOCOL_VERSION, PoseSender, Service, sensor};
-use runtime::servo::Health;
-use runtime::{PlanarPose, RawFrame, Reading, Servo, Status};
+use runtime::tracker::Health;
+use runtime::{AnyDecoder, PlanarPose, PoseTracker, RawFrame, Reading, Status};
 use state::state_of;
 
 /// Ticks of a second.
@@ -314,7 +314,7 @@ impl<'d> Node<'d> {
 /// The arithmetic of a tick, in a function of its own: the checks of the FPU's settings stay
 /// before and after it.
 #[inline(never)]
-fn run(servo: &mut Servo<'_>, sample: &Result<RawFrame, SampleFault>) -> Reading {
+fn run(servo: &mut PoseTracker<&AnyDecoder>, sample: &Result<RawFrame, SampleFault>) -> Reading {
     match sample {
         Ok(frame) => servo.tick(frame),
         Err(_) => servo.tick_without_frame(),

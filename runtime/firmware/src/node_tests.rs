@@ -11,7 +11,7 @@ use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeGeometry;
 use runtime::model::{ModelKind, Probes, Sensitivity};
 use runtime::parameters::Text;
-use runtime::{OnInvalid, Servo};
+use runtime::{OnInvalid, PoseTracker};
 use std::boxed::Box;
 use std::vec::Vec;
 
@@ -79,7 +79,7 @@ fn loaded() -> &'static Loaded {
 fn node() -> Node<'static> {
     let loaded = loaded();
     let parameters = Parameters::Usable {
-        servo: Servo::new(&*loaded.decoder, OnInvalid::Zero),
+        servo: PoseTracker::new(&loaded.decoder, OnInvalid::Zero),
         serial: &loaded.serial,
         other_slot: None,
     };

@@ -9,8 +9,8 @@ use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use runtime::blob::MAX_BYTES;
 use runtime::{
-    AnyDecoder, Decode, Decoder, OnInvalid, ParameterSet, PlanarPose, Pose, Reading, Servo, Status,
-    VerticalPose,
+    AnyDecoder, Decode, Decoder, OnInvalid, ParameterSet, PlanarPose, Pose, PoseTracker, Reading,
+    Status, VerticalPose,
 };
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -249,13 +249,13 @@ fn check_poses(
         ticks => OnInvalid::Hold { ticks },
     };
     let decoder = set.decoder();
-    let mut servo = Servo::new(&*decoder, on_invalid);
+    let mut tracker = PoseTracker::new(decoder, on_invalid);
     let mut host = Vec::with_capacity(dataset.rows.len());
     for movement in &dataset.movements {
-        servo.forget();
+        tracker.forget();
         for row in &dataset.rows[movement.rows.clone()] {
             let frame = &row.frame;
-            let reading = servo.tick_with(frame.sequence(), |zero| frame.decode(&decoder, zero));
+            let reading = tracker.tick_with(frame.sequence(), |zero| frame.decode(&decoder, zero));
             host.push((movement.index, row.t_us, reading));
         }
     }

@@ -144,7 +144,9 @@ impl Bench {
             store: &mut self.store,
             nonce: Some(nonce),
         };
-        let taken = self.service.take_updating(frame, None, Some(updates))?;
+        let taken =
+            self.service
+                .take_updating(frame, None::<&mut runtime::PoseTracker>, Some(updates))?;
         taken.ok()?.answer
     }
 
@@ -206,8 +208,9 @@ impl Bench {
     fn ticks(&mut self, ticks: u32) -> Vec<Answer> {
         let mut answers = Vec::new();
         for _ in 0..ticks {
-            self.service.before_tick(None, None);
-            assert_eq!(self.service.tick(None), None);
+            self.service
+                .before_tick(None::<&mut runtime::PoseTracker>, None);
+            assert_eq!(self.service.tick(None::<&runtime::PoseTracker>), None);
             let servo_is_off = self.service.servo_is_off();
             self.receiver.tick(servo_is_off);
             answers.extend(self.receiver.store(servo_is_off, &mut self.store));

@@ -1,6 +1,6 @@
 //! A log as the fit sees it: rows in SI units, grouped by movement.
 
-use runtime::{AnyDecoder, PlanarPose, RawFrame, Reading, VerticalPose};
+use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Reading, VerticalPose};
 use std::hash::{Hash, Hasher};
 use std::path::PathBuf;
 

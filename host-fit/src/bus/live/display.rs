@@ -2,7 +2,7 @@
 
 use super::rhythm::Pace;
 use hal_adapters::can::BusHealth;
-use runtime::servo::Health;
+use runtime::tracker::Health;
 use runtime::{Reading, Status};
 use std::io::{IsTerminal, Write};
 use std::time::Duration;

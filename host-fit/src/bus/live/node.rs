@@ -7,7 +7,7 @@ use hal_adapters::can::{
     BusFault, Coded, Layout, Message, PROTOCOL_VERSION, PoseSender, SensorReceiver, Service,
     StampedFrame, Timing,
 };
-use runtime::{Decode, OnInvalid, RawFrame, Reading, Servo, Status};
+use runtime::{AnyDecoder, OnInvalid, PoseTracker, RawFrame, Reading, Status};
 
 /// Ticks of a second: while the sensors are silent the node publishes at this rate.
 const TICKS_PER_S: u32 = 1_000_000 / SILENT_US;
@@ -42,7 +42,7 @@ pub struct Step {
 #[derive(Debug)]
 pub struct Node<'d> {
     receiver: SensorReceiver,
-    servo: Servo<'d>,
+    tracker: PoseTracker,
     poses: PoseSender,
     service: Service,
     serial: &'d str,
@@ -56,10 +56,10 @@ const NO_FRAMES: Status = Status::PLANAR_INVALID
 
 impl<'d> Node<'d> {
     /// A node that has seen nothing; `serial` is what it tells when asked who it is.
-    pub fn new(decoder: &'d dyn Decode, serial: &'d str, settings: &NodeSettings) -> Self {
+    pub fn new(decoder: AnyDecoder, serial: &'d str, settings: &NodeSettings) -> Self {
         Self {
             receiver: SensorReceiver::new(settings.layout, settings.timing),
-            servo: Servo::new(decoder, settings.on_invalid),
+            tracker: PoseTracker::new(decoder, settings.on_invalid),
             poses: PoseSender::new(settings.vertical_ticks),
             service: Service::new(TICKS_PER_S),
             serial,
@@ -76,7 +76,7 @@ impl<'d> Node<'d> {
 
     /// Takes one frame; what is to be sent is added to `out`.
     pub fn take(&mut self, frame: &StampedFrame, out: &mut Vec<Coded>) -> Step {
-        match self.service.take(&frame.frame, Some(&mut self.servo)) {
+        match self.service.take(&frame.frame, Some(&mut self.tracker)) {
             Some(Ok(answered)) => {
                 out.extend(answered.answer);
                 // A controller spreads the pages over ticks, for its three mailboxes.
@@ -132,8 +132,8 @@ impl<'d> Node<'d> {
     ) -> Step {
         let tick = tick.map(|frame| {
             // A computer has no service pin.
-            self.service.before_tick(Some(&mut self.servo), None);
-            let reading = self.servo.tick(&frame);
+            self.service.before_tick(Some(&mut self.tracker), None);
+            let reading = self.tracker.tick(&frame);
             self.publish(&reading, Some(&frame), out);
             (frame, reading)
         });
@@ -150,15 +150,15 @@ impl<'d> Node<'d> {
         if self.ticks.is_multiple_of(u32::from(SLOW_TICKS)) {
             let round = self.ticks / u32::from(SLOW_TICKS);
             let status = Told::Status(self.status());
-            let health = Told::Health(HealthPage::of(&self.servo.health(), None, round));
+            let health = Told::Health(HealthPage::of(&self.tracker.health(), None, round));
             out.extend([status, health].iter().filter_map(|t| self.service.tell(t)));
         }
-        out.extend(self.service.tick(Some(&self.servo)));
+        out.extend(self.service.tick(Some(&self.tracker)));
         self.ticks = self.ticks.wrapping_add(1);
     }
 
     fn status(&self) -> NodeStatus {
-        let missed = self.servo.health().frames_missed;
+        let missed = self.tracker.health().frames_missed;
         NodeStatus {
             state: Some(if self.receiver.is_stale() {
                 NodeState::NoFrames
@@ -166,7 +166,7 @@ impl<'d> Node<'d> {
                 NodeState::Running
             }),
             reason: 0,
-            flags: self.service.flags(Some(&self.servo)),
+            flags: self.service.flags(Some(&self.tracker)),
             missed_ticks: u16::try_from(missed).unwrap_or(u16::MAX),
             bus_off: 0,
             version: PROTOCOL_VERSION,
@@ -178,9 +178,9 @@ impl<'d> Node<'d> {
         &self.receiver
     }
 
-    /// The servo, for its counters.
-    pub const fn servo(&self) -> &Servo<'d> {
-        &self.servo
+    /// The tracker, for its counters.
+    pub const fn tracker(&self) -> &PoseTracker {
+        &self.tracker
     }
 }
 

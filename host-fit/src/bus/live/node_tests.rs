@@ -77,11 +77,11 @@ fn told(node_sent: &[Coded], mailbox: &mut Mailbox) -> Vec<Told> {
 #[test]
 fn the_published_pose_has_the_bits_of_the_decoder() {
     let decoder = decoder();
-    let mut node = Node::new(&*decoder, "", &SETTINGS);
-    let mut servo = Servo::new(&*decoder, OnInvalid::Zero);
+    let mut node = Node::new(decoder, "", &SETTINGS);
+    let mut tracker = PoseTracker::new(decoder, OnInvalid::Zero);
     let mut receiver = PoseReceiver::new(SETTINGS.timing);
     for sequence in 3..500 {
-        let want = servo.tick(&raw(sequence));
+        let want = tracker.tick(&raw(sequence));
         let sent = feed(&mut node, &raw(sequence));
         let poses = sent
             .iter()
@@ -97,7 +97,7 @@ fn the_published_pose_has_the_bits_of_the_decoder() {
 #[test]
 fn a_silent_bus_is_published_as_invalid_until_frames_come_again() {
     let decoder = decoder();
-    let mut node = Node::new(&*decoder, "", &SETTINGS);
+    let mut node = Node::new(decoder, "", &SETTINGS);
     feed(&mut node, &raw(1));
     let mut out = Vec::new();
     assert_eq!(node.patience_us(4_500), Some(500));
@@ -118,7 +118,7 @@ fn a_silent_bus_is_published_as_invalid_until_frames_come_again() {
 #[test]
 fn a_request_to_identify_is_answered_with_the_serial_number() {
     let decoder = decoder();
-    let mut node = Node::new(&*decoder, "stage 7", &SETTINGS);
+    let mut node = Node::new(decoder, "stage 7", &SETTINGS);
     let mut host = Mailbox::default();
     let command = Command::new(Request::Identify { seconds: 1 }, 42);
     let frame = host.send(&Told::Command(command)).expect("known");
@@ -142,7 +142,7 @@ fn a_request_to_identify_is_answered_with_the_serial_number() {
 #[test]
 fn a_re_zero_at_rest_is_done_while_the_servo_is_off() {
     let decoder = decoder();
-    let mut node = Node::new(&*decoder, "", &SETTINGS);
+    let mut node = Node::new(decoder, "", &SETTINGS);
     let (mut host, mut out) = (Mailbox::default(), Vec::new());
     for (token, request) in (1..).zip([
         Request::Rezero { ticks: 250 },
@@ -172,5 +172,5 @@ fn a_re_zero_at_rest_is_done_while_the_servo_is_off() {
         (3, Outcome::Done),
     ];
     assert_eq!(outcomes, want.map(Some));
-    assert!(node.servo().zero().x_m != 0.0);
+    assert!(node.tracker().zero().x_m != 0.0);
 }

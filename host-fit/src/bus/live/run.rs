@@ -43,7 +43,7 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
     let stop = interrupt::watch();
     let decoder = set.decoder();
     let mut session = Session {
-        node: Node::new(&*decoder, &set.serial, &node),
+        node: Node::new(decoder, &set.serial, &node),
         bus,
         interface: &settings.interface,
         record,
@@ -257,7 +257,7 @@ impl Session<'_> {
             elapsed_s: self.started.elapsed().as_secs_f64(),
             reading: self.last.as_ref(),
             pace: self.pace,
-            servo: self.node.servo().health(),
+            servo: self.node.tracker().health(),
             bus: *self.node.receiver().health(),
             dropped: self.bus.dropped(),
             not_sent: self.not_sent,

@@ -5,7 +5,7 @@ use crate::input::log::{LogEnd, LogError, LogRows, ReadOptions};
 use crate::input::stage::Stage;
 use crate::output::{Output, OutputError};
 use crate::solve::field::posterior::Posterior;
-use runtime::{AnyDecoder, OnInvalid, PlanarPose, Servo};
+use runtime::{AnyDecoder, OnInvalid, PlanarPose, PoseTracker};
 use std::path::Path;
 
 /// Bytes that are written at once.
@@ -67,7 +67,7 @@ pub fn decode_log<E: From<LogError> + From<OutputError>>(
     go_on: impl Fn() -> Result<(), E>,
 ) -> Result<(StatusCounts, LogEnd), E> {
     let decoder = settings.decoder;
-    let mut servo = Servo::new(&**decoder, settings.on_invalid);
+    let mut tracker = PoseTracker::new(decoder, settings.on_invalid);
     let mut counts = StatusCounts::default();
     let mut log = LogRows::open(log, "decoding", stage, &ReadOptions::DECODE)?;
     let mut bytes = settings.header(0);
@@ -77,14 +77,14 @@ pub fn decode_log<E: From<LogError> + From<OutputError>>(
             over => break over,
         };
         if row.begins {
-            servo.forget();
+            tracker.forget();
         }
         let frame = &row.row.frame;
         let reading = frame.decode(decoder, &PlanarPose::ZERO);
         let row = PoseRow {
             movement: row.movement,
             t_us: row.row.t_us,
-            reading: servo.tick_with(frame.sequence(), |_| reading),
+            reading: tracker.tick_with(frame.sequence(), |_| reading),
         };
         counts.add(row.reading.status);
         settings.write(&row, &mut bytes);

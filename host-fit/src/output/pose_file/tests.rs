@@ -1,21 +1,23 @@
 use super::*;
 use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
 use proptest::prelude::*;
-use runtime::{AnyDecoder, OnInvalid, PlanarPose, Pose, RawFrame, Servo, Status, VerticalPose};
+use runtime::{
+    AnyDecoder, OnInvalid, PlanarPose, Pose, PoseTracker, RawFrame, Status, VerticalPose,
+};
 use std::path::Path;
 
 /// Runs the decoder over all rows as a controller would.
 fn decode(dataset: &Dataset, decoder: &AnyDecoder, on_invalid: OnInvalid) -> Vec<PoseRow> {
-    let mut servo = Servo::new(&**decoder, on_invalid);
+    let mut tracker = PoseTracker::new(decoder, on_invalid);
     let mut poses = Vec::with_capacity(dataset.rows.len());
     for movement in &dataset.movements {
-        servo.forget();
+        tracker.forget();
         for row in &dataset.rows[movement.rows.clone()] {
             let frame = &row.frame;
             poses.push(PoseRow {
                 movement: movement.index,
                 t_us: row.t_us,
-                reading: servo.tick_with(frame.sequence(), |zero| frame.decode(decoder, zero)),
+                reading: tracker.tick_with(frame.sequence(), |zero| frame.decode(decoder, zero)),
             });
         }
     }

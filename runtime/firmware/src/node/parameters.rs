@@ -2,7 +2,7 @@
 
 use crate::records::{Loaded, Refusal};
 use crate::start_up::Stop;
-use runtime::{OnInvalid, Servo};
+use runtime::{AnyDecoder, OnInvalid, PoseTracker};
 
 /// Why a node decodes or does not.
 #[derive(Clone, Debug)]
@@ -14,7 +14,7 @@ pub enum Parameters<'d> {
     /// There are parameters.
     Usable {
         /// Runs their decoder.
-        servo: Servo<'d>,
+        servo: PoseTracker<&'d AnyDecoder>,
         /// Serial number of the stage.
         serial: &'d str,
         /// What is wrong with parameters that are not used.
@@ -44,7 +44,7 @@ impl<'d> Parameters<'d> {
             _ if !is_sound => Self::SelfTestFailed,
             (_, Some(stop)) => Self::Stopped(stop),
             (Some(loaded), None) => Self::Usable {
-                servo: Servo::new(&*loaded.decoder, OnInvalid::Zero),
+                servo: PoseTracker::new(&loaded.decoder, OnInvalid::Zero),
                 serial: &loaded.serial,
                 other_slot: refusal,
             },
@@ -55,7 +55,7 @@ impl<'d> Parameters<'d> {
     }
 
     /// The servo, where there are parameters.
-    pub(super) const fn servo(&self) -> Option<&Servo<'d>> {
+    pub(super) const fn servo(&self) -> Option<&PoseTracker<&'d AnyDecoder>> {
         match self {
             Self::Usable { servo, .. } => Some(servo),
             _ => None,
@@ -63,7 +63,7 @@ impl<'d> Parameters<'d> {
     }
 
     /// The same, to be changed.
-    pub(super) const fn servo_mut(&mut self) -> Option<&mut Servo<'d>> {
+    pub(super) const fn servo_mut(&mut self) -> Option<&mut PoseTracker<&'d AnyDecoder>> {
         match self {
             Self::Usable { servo, .. } => Some(servo),
             _ => None,

@@ -7,7 +7,7 @@ use crate::bench::{Bench, Comparison, Seen, Words};
 use hal_adapters::can::status::NodeState;
 use runtime::blob::{CRC_BYTES, MAX_BYTES};
 use runtime::parameters::Text;
-use runtime::{ParameterSet, PlanarPose, RawFrame};
+use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
 
 const PART: Part = Part::Ads131m08;
 

@@ -10,7 +10,7 @@ use hal_adapters::can::{
     BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing,
 };
 use libfuzzer_sys::fuzz_target;
-use runtime::{OnInvalid, ParameterSet, Predictor, Reading, Servo};
+use runtime::{OnInvalid, ParameterSet, PoseTracker, Predictor, Reading};
 use std::sync::LazyLock;
 
 static SET: LazyLock<ParameterSet> =
@@ -38,8 +38,8 @@ fuzz_target!(|data: &[u8]| {
     } else {
         Layout::Bits24
     };
-    let mut servo = Servo::new(
-        &*decoder,
+    let mut servo = PoseTracker::new(
+        decoder,
         OnInvalid::Hold {
             ticks: u16::from(form >> 1),
         },

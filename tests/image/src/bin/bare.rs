@@ -6,8 +6,8 @@
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use runtime::blob::MAX_BYTES;
-use runtime::rezero::RezeroSettings;
-use runtime::{OnInvalid, ParameterSet, RawFrame, Servo};
+use runtime::zero_offset::ZeroOffsetSettings;
+use runtime::{OnInvalid, ParameterSet, PoseTracker, RawFrame};
 
 extern crate image;
 
@@ -18,8 +18,8 @@ fn main() -> ! {
         && set.expect_serial("HS-0007").is_ok()
     {
         let decoder = set.decoder();
-        let mut servo = Servo::new(&*decoder, OnInvalid::Hold { ticks: 3 });
-        servo.start_rezero(RezeroSettings::default());
+        let mut tracker = PoseTracker::new(decoder, OnInvalid::Hold { ticks: 3 });
+        tracker.start_zero_offset(ZeroOffsetSettings::default());
         loop {
             let frame = black_box(RawFrame {
                 hall: [0; 3],
@@ -27,7 +27,7 @@ fn main() -> ! {
                 sequence: 0,
                 time_us: 0,
             });
-            black_box(servo.tick(&frame));
+            black_box(tracker.tick(&frame));
         }
     }
     loop {

@@ -5,10 +5,10 @@
 use cortex_m_rt::entry;
 use image::job::{
     self, ANSWER_WORDS, BLOB_WORDS, Bare, FRAME_WORDS, HEAD_WORDS, Head, PARAMETER_WORDS,
-    PredictingServo,
+    PredictingTracker,
 };
 use image::semihost::{CONSOLE, Fault, File, exit};
-use runtime::{Decode, FieldModel, LinearModel, ParameterSet, Reading, Servo};
+use runtime::{Decode, FieldModel, LinearModel, ParameterSet, PoseTracker, Reading};
 
 /// Frames of one transfer.
 const BATCH: usize = 512;
@@ -68,11 +68,11 @@ fn run() -> Result<(), Stop> {
                 }
                 let set = ParameterSet::from_flash(blob).map_err(|_| Stop::Refused)?;
                 let decoder = set.decoder();
-                let mut servo = Servo::new(&*decoder, head.on_invalid());
-                let mut predicting = PredictingServo::new(servo.clone());
+                let mut tracker = PoseTracker::new(decoder, head.on_invalid());
+                let mut predicting = PredictingTracker::new(tracker.clone());
                 frames(&input, &output, head.frames, |frame| match head.source {
                     job::PREDICTED => predicting.tick(frame),
-                    _ => servo.tick(frame),
+                    _ => tracker.tick(frame),
                 })?;
             }
             _ => return Err(Stop::NoJob),

@@ -2,7 +2,7 @@
 //!
 //! At start the parameters are loaded from slot 0, or from slot 1 if those are refused; with
 //! neither there is no pose and no control, only the reasons. Then a period is: codes from
-//! the converters, [`Servo::tick`], a controller that looks at the status first.
+//! the converters, [`PoseTracker::tick`], a controller that looks at the status first.
 //!
 //! The stage that the firmware belongs to is compiled in (`HALL_STAGE_SERIAL`, any if unset).
 //! Replace [`converters`] and [`coils`] by your own and wait for your timer in the loop.
@@ -13,7 +13,7 @@ use core::fmt::Write;
 use cortex_m_rt::entry;
 use image::semihost::{CONSOLE, File, exit};
 use runtime::frame::MISSING_CODE;
-use runtime::{BlobError, OnInvalid, ParameterSet, PlanarPose, RawFrame, Servo};
+use runtime::{BlobError, OnInvalid, ParameterSet, PlanarPose, PoseTracker, RawFrame};
 
 unsafe extern "C" {
     // Their addresses are what memory.x says; there is nothing to read at them but bytes.
@@ -121,11 +121,11 @@ fn main() -> ! {
         exit(false)
     };
     let decoder = set.decoder();
-    let mut servo = Servo::new(&*decoder, OnInvalid::Hold { ticks: 2 });
+    let mut tracker = PoseTracker::new(decoder, OnInvalid::Hold { ticks: 2 });
     for period in 0..PERIODS {
         let reading = match converters(period) {
-            Some(frame) => servo.tick(&frame),
-            None => servo.tick_without_frame(),
+            Some(frame) => tracker.tick(&frame),
+            None => tracker.tick_without_frame(),
         };
         match reading.planar_or_held() {
             Some(pose) => coils(&mut console, period, control(&pose)),
@@ -133,7 +133,7 @@ fn main() -> ! {
             None => coils(&mut console, period, [0.0; 3]),
         }
     }
-    let health = servo.health();
+    let health = tracker.health();
     let _ = writeln!(
         console,
         "{} ticks, {} held, {} frames missed",

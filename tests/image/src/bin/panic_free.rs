@@ -13,9 +13,9 @@ use hal_adapters::can::{
     BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing, sensor,
 };
 use runtime::blob::MAX_BYTES;
-use runtime::rezero::RezeroSettings;
+use runtime::zero_offset::ZeroOffsetSettings;
 use runtime::{
-    OnInvalid, ParameterSet, PlanarPose, Predictor, RawFrame, Reading, Servo, VerticalPose,
+    OnInvalid, ParameterSet, PlanarPose, PoseTracker, Predictor, RawFrame, Reading, VerticalPose,
 };
 
 extern crate image;
@@ -51,18 +51,18 @@ fn bus(frame: &RawFrame) {
 
 /// Requests and answers.
 #[inline(never)]
-fn commands(servo: &mut Servo<'_>) {
+fn commands(tracker: &mut PoseTracker) {
     let mut mailbox = Mailbox::default();
     let command = Command::new(black_box(Request::Rezero { ticks: 500 }), 1);
     let sent = mailbox.send(&black_box(Told::Command(command)));
     let mut service = black_box(Service::new(500).recording(true));
     if let Some(coded) = sent {
-        black_box(service.take(&black_box(BusFrame::from(coded)), Some(servo)));
+        black_box(service.take(&black_box(BusFrame::from(coded)), Some(tracker)));
     }
-    service.before_tick(Some(servo), black_box(Some(true)));
-    black_box(service.tick(Some(servo)));
+    service.before_tick(Some(tracker), black_box(Some(true)));
+    black_box(service.tick(Some(tracker)));
     black_box(service.identity_page(black_box("HS-0007")));
-    black_box(service.flags(Some(servo)));
+    black_box(service.flags(Some(tracker)));
 }
 
 /// A store that has nothing and keeps nothing.
@@ -112,7 +112,7 @@ fn update(frame: &BusFrame) {
         store,
         nonce: black_box(Some([0; 4])),
     };
-    black_box(service.take_updating(frame, None, Some(updates)));
+    black_box(service.take_updating(frame, None::<&mut PoseTracker>, Some(updates)));
     receiver.tick(service.servo_is_off());
     black_box(receiver.store(service.servo_is_off(), store));
     black_box((receiver.is_updating(), receiver.wants_reset()));
@@ -132,20 +132,24 @@ fn main() -> ! {
         let mut buffer = [0; MAX_BYTES];
         let _ = black_box(set.to_bytes(&mut buffer));
         let decoder = black_box(set.decoder());
-        let mut servo = Servo::new(&*decoder, black_box(OnInvalid::Hold { ticks: 3 }));
-        servo.start_rezero(black_box(RezeroSettings::default()));
-        let reading = black_box(servo.tick(&frame));
+        let mut tracker = PoseTracker::new(decoder, black_box(OnInvalid::Hold { ticks: 3 }));
+        tracker.start_zero_offset(black_box(ZeroOffsetSettings::default()));
+        let reading = black_box(tracker.tick(&frame));
         let mut predictor = black_box(Predictor::new(4_000));
-        predictor.take(&servo, &frame, &reading);
+        predictor.take(&tracker, &frame, &reading);
         black_box(predictor.pose_at(black_box(2_300)));
-        black_box(servo.tick_without_frame());
-        black_box(servo.tick_with(1, |zero| {
+        black_box(tracker.tick_without_frame());
+        black_box(tracker.tick_with(1, |zero| {
             decoder.decode_at(frame.hall, black_box(VerticalPose::ZERO), zero)
         }));
-        black_box(servo.set_zero(black_box(PlanarPose::ZERO)));
-        servo.forget();
-        commands(&mut servo);
-        black_box((servo.rezero_state(), servo.health(), servo.zero()));
+        black_box(tracker.set_zero(black_box(PlanarPose::ZERO)));
+        tracker.forget();
+        commands(&mut tracker);
+        black_box((
+            tracker.zero_offset_state(),
+            tracker.health(),
+            tracker.zero(),
+        ));
     }
     bus(&frame);
     update(&black_box(BusFrame::from(sensor::frames_16(&frame)[0])));

@@ -20,8 +20,8 @@ use runtime::arithmetic::ArithmeticFault;
 use runtime::decoder::Decoder;
 use runtime::model::{FieldProbe, Sensitivity};
 use runtime::{
-    Decode, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, Predictor, RawFrame, Reading,
-    Servo, VerticalPose,
+    Decode, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, PoseTracker, Predictor,
+    RawFrame, Reading, VerticalPose,
 };
 
 /// Displacements read by the probes.
@@ -117,8 +117,12 @@ fn counted_field_tick(
 
 #[unsafe(no_mangle)]
 #[inline(never)]
-extern "C" fn counted_servo_tick(servo: &mut Servo<'_>, frame: &RawFrame, reading: &mut Reading) {
-    *reading = servo.tick(frame);
+extern "C" fn counted_servo_tick(
+    tracker: &mut PoseTracker<&dyn Decode>,
+    frame: &RawFrame,
+    reading: &mut Reading,
+) {
+    *reading = tracker.tick(frame);
 }
 
 /// What a prediction adds to a servo's tick: the pose taken, and one predicted.
@@ -126,11 +130,11 @@ extern "C" fn counted_servo_tick(servo: &mut Servo<'_>, frame: &RawFrame, readin
 #[inline(never)]
 fn counted_prediction(
     predictor: &mut Predictor,
-    servo: &Servo<'_>,
+    tracker: &PoseTracker<&dyn Decode>,
     frame: &RawFrame,
     reading: &Reading,
 ) -> Option<PlanarPose<f32>> {
-    predictor.take(servo, frame, reading);
+    predictor.take(tracker, frame, reading);
     predictor.pose_at(frame.time_us.wrapping_add(300))
 }
 
@@ -310,7 +314,7 @@ fn main() -> ! {
     }
     let decoder = black_box(Decoder::<LinearModel>::new(SOUND, PROBES));
     let field = black_box(Decoder::<FieldModel>::new(SOUND, FIELD_PROBES));
-    let mut servo = Servo::new(&decoder, OnInvalid::Hold { ticks: 3 });
+    let mut tracker = PoseTracker::new(&decoder as &dyn Decode, OnInvalid::Hold { ticks: 3 });
     let mut predictor = Predictor::new(4_000);
     let mut frame = RawFrame {
         hall: [900, -800, 700],
@@ -322,8 +326,13 @@ fn main() -> ! {
         frame.sequence += 1 + u32::from(k % 7 == 0);
         frame.hall[0] = if k % 5 == 0 { i32::MIN } else { 900 };
         frame.time_us += 2_000;
-        counted_servo_tick(&mut servo, black_box(&frame), &mut reading);
-        black_box(counted_prediction(&mut predictor, &servo, &frame, &reading));
+        counted_servo_tick(&mut tracker, black_box(&frame), &mut reading);
+        black_box(counted_prediction(
+            &mut predictor,
+            &tracker,
+            &frame,
+            &reading,
+        ));
     }
     let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
     let mut coded = sensor::frames_16(&frame);
@@ -349,7 +358,7 @@ fn main() -> ! {
     let field_tick =
         touched(|| counted_field_tick(&field, &frame, &PlanarPose::ZERO, &mut reading));
     frame.sequence += 1;
-    let servo_tick = touched(|| counted_servo_tick(&mut servo, &frame, &mut reading));
+    let servo_tick = touched(|| counted_servo_tick(&mut tracker, &frame, &mut reading));
     let stacks = [
         ("tick", tick),
         ("field_tick", field_tick),

@@ -16,23 +16,23 @@ fn reading(x_m: f32) -> Reading {
     }
 }
 
-fn run(ticks: u16, reading_at: impl Fn(u16) -> Reading) -> RezeroState {
-    let settings = RezeroSettings {
+fn run(ticks: u16, reading_at: impl Fn(u16) -> Reading) -> ZeroOffsetState {
+    let settings = ZeroOffsetSettings {
         ticks,
-        ..RezeroSettings::default()
+        ..ZeroOffsetSettings::default()
     };
-    let mut run = RezeroRun::start(settings).expect("long enough");
-    let mut state = RezeroState::Idle;
+    let mut run = ZeroOffsetRun::start(settings).expect("long enough");
+    let mut state = ZeroOffsetState::Idle;
     for k in 0..ticks {
         state = run.take(&reading_at(k));
-        if !matches!(state, RezeroState::Running { .. }) {
+        if !matches!(state, ZeroOffsetState::Running { .. }) {
             break;
         }
     }
     state
 }
 
-fn run_x(ticks: u16, x_at: impl Fn(u16) -> f32) -> RezeroState {
+fn run_x(ticks: u16, x_at: impl Fn(u16) -> f32) -> ZeroOffsetState {
     run(ticks, |k| reading(x_at(k)))
 }
 
@@ -40,7 +40,7 @@ fn run_x(ticks: u16, x_at: impl Fn(u16) -> f32) -> RezeroState {
 fn the_mean_of_noise_at_rest_becomes_the_zero() {
     // +-1 um around 5 um, as many up as down.
     let state = run_x(250, |k| if k % 2 == 0 { 6e-6 } else { 4e-6 });
-    let RezeroState::Done { zero } = state else {
+    let ZeroOffsetState::Done { zero } = state else {
         panic!("{state:?}")
     };
     assert!((zero.x_m - 5e-6).abs() < 1e-12);
@@ -52,7 +52,7 @@ fn the_longest_run_sums_to_a_tenth_of_a_nanometre() {
     // Noise of +-4 um around 20 um: a full-period generator modulo 2^16.
     let noise = |k: u16| f32::from(k.wrapping_mul(25173).wrapping_add(13849)) / 65536.0 - 0.5;
     let x_at = |k| 20e-6 + 8e-6 * noise(k);
-    let RezeroState::Done { zero } = run_x(u16::MAX, x_at) else {
+    let ZeroOffsetState::Done { zero } = run_x(u16::MAX, x_at) else {
         panic!("refused")
     };
     let sum: f64 = (0..u16::MAX - 1).map(|k| f64::from(x_at(k))).sum();
@@ -64,7 +64,7 @@ fn the_longest_run_sums_to_a_tenth_of_a_nanometre() {
 fn a_jump_refuses_at_once_and_names_the_axis() {
     let state = run_x(250, |k| if k < 50 { 0.0 } else { 11e-6 });
     assert!(
-        matches!(state, RezeroState::Refused(RezeroRefusal::Moved { axis: 0, spread }) if spread > 10e-6)
+        matches!(state, ZeroOffsetState::Refused(ZeroOffsetRefusal::Moved { axis: 0, spread }) if spread > 10e-6)
     );
 }
 
@@ -72,11 +72,11 @@ fn a_jump_refuses_at_once_and_names_the_axis() {
 fn a_slow_drift_below_the_spread_limit_is_still_refused() {
     let state = run_x(500, |k| f32::from(k) * 8e-9);
     assert!(
-        matches!(state, RezeroState::Refused(RezeroRefusal::Drifted { axis: 0, drift }) if drift > 1.9e-6)
+        matches!(state, ZeroOffsetState::Refused(ZeroOffsetRefusal::Drifted { axis: 0, drift }) if drift > 1.9e-6)
     );
     let state = run_x(500, |k| f32::from(k) * -8e-9);
     assert!(
-        matches!(state, RezeroState::Refused(RezeroRefusal::Drifted { axis: 0, drift }) if drift < -1.9e-6)
+        matches!(state, ZeroOffsetState::Refused(ZeroOffsetRefusal::Drifted { axis: 0, drift }) if drift < -1.9e-6)
     );
 }
 
@@ -84,14 +84,15 @@ fn a_slow_drift_below_the_spread_limit_is_still_refused() {
 fn no_stage_that_moves_at_a_hundredth_of_its_speed_is_zeroed() {
     // Down to 5 um/s at the shortest run: 2 ms a tick.
     for um_per_s in [450.0, 48.0, 5.0] {
-        let state = run_x(RezeroSettings::TICKS_MIN, |k| {
+        let state = run_x(ZeroOffsetSettings::TICKS_MIN, |k| {
             f32::from(k) * 2e-3 * um_per_s * 1e-6
         });
         assert!(
             matches!(
                 state,
-                RezeroState::Refused(
-                    RezeroRefusal::Moved { axis: 0, .. } | RezeroRefusal::Drifted { axis: 0, .. }
+                ZeroOffsetState::Refused(
+                    ZeroOffsetRefusal::Moved { axis: 0, .. }
+                        | ZeroOffsetRefusal::Drifted { axis: 0, .. }
                 )
             ),
             "{um_per_s} um/s: {state:?}"
@@ -101,7 +102,7 @@ fn no_stage_that_moves_at_a_hundredth_of_its_speed_is_zeroed() {
 
 #[test]
 fn each_axis_is_refused_beyond_its_bound_and_accepted_up_to_it() {
-    let settings = RezeroSettings::default();
+    let settings = ZeroOffsetSettings::default();
     let bounds = settings.zero_max.into_iter().chain(settings.vertical_max);
     for (axis, bound) in (0u8..).zip(bounds) {
         for (part, accepted) in [(0.99, true), (-0.99, true), (1.01, false), (-1.01, false)] {
@@ -116,8 +117,8 @@ fn each_axis_is_refused_beyond_its_bound_and_accepted_up_to_it() {
                 status: Status::GOOD,
             });
             let expected = match state {
-                RezeroState::Done { .. } => accepted,
-                RezeroState::Refused(RezeroRefusal::OutOfBounds { axis: a, value }) => {
+                ZeroOffsetState::Done { .. } => accepted,
+                ZeroOffsetState::Refused(ZeroOffsetRefusal::OutOfBounds { axis: a, value }) => {
                     !accepted && a == axis && (value / (bound * part) - 1.0).abs() < 1e-5
                 }
                 _ => false,
@@ -137,28 +138,28 @@ fn a_pose_outside_the_calibrated_range_refuses_with_its_status() {
         let status = bit;
         assert_eq!(
             state,
-            RezeroState::Refused(RezeroRefusal::Extrapolated { status })
+            ZeroOffsetState::Refused(ZeroOffsetRefusal::Extrapolated { status })
         );
     }
 }
 
 #[test]
 fn a_bad_reading_ends_the_run_with_its_status() {
-    let mut run = RezeroRun::start(RezeroSettings::default()).expect("long enough");
+    let mut run = ZeroOffsetRun::start(ZeroOffsetSettings::default()).expect("long enough");
     let bad = Reading {
         status: Status::PLANAR_INVALID.with(Status::HALL_A),
         ..reading(0.0)
     };
     assert_eq!(
         run.take(&bad),
-        RezeroState::Refused(RezeroRefusal::NoPose { status: bad.status })
+        ZeroOffsetState::Refused(ZeroOffsetRefusal::NoPose { status: bad.status })
     );
-    let settings = RezeroSettings {
+    let settings = ZeroOffsetSettings {
         ticks: 249,
-        ..RezeroSettings::default()
+        ..ZeroOffsetSettings::default()
     };
     assert_eq!(
-        RezeroRun::start(settings),
-        Err(RezeroRefusal::TooShort { ticks: 249 })
+        ZeroOffsetRun::start(settings),
+        Err(ZeroOffsetRefusal::TooShort { ticks: 249 })
     );
 }

@@ -1,11 +1,11 @@
 //! A controller's loop: one frame every servo period, the pose held when a code is bad, and the
 //! zero measured at rest.
 //!
-//! `cargo run -p runtime --example servo -- runtime/examples/stage.bin`
+//! `cargo run -p runtime --example tracker -- runtime/examples/stage.bin`
 
 use runtime::frame::MISSING_CODE;
-use runtime::rezero::RezeroSettings;
-use runtime::{OnInvalid, ParameterSet, RawFrame, Servo};
+use runtime::zero_offset::ZeroOffsetSettings;
+use runtime::{OnInvalid, ParameterSet, PoseTracker, RawFrame};
 use std::error::Error;
 
 /// Stands for the converters: a stage at rest near its zero, and one Hall code lost in period 255.
@@ -20,21 +20,21 @@ fn converters(period: u32) -> RawFrame {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = std::env::args().nth(1).ok_or("use: servo params.bin")?;
+    let path = std::env::args().nth(1).ok_or("use: tracker params.bin")?;
     // Once, at start: the arithmetic is that of the host, and the parameters are sound.
     runtime::arithmetic::check()?;
     let decoder = ParameterSet::from_bytes(&std::fs::read(path)?)?.decoder();
-    let mut servo = Servo::new(&*decoder, OnInvalid::Hold { ticks: 3 });
+    let mut tracker = PoseTracker::new(decoder, OnInvalid::Hold { ticks: 3 });
 
     // Every period.
     for period in 0..260 {
         if period == 2 {
-            servo.start_rezero(RezeroSettings {
-                ticks: RezeroSettings::TICKS_MIN,
-                ..RezeroSettings::default()
+            tracker.start_zero_offset(ZeroOffsetSettings {
+                ticks: ZeroOffsetSettings::TICKS_MIN,
+                ..ZeroOffsetSettings::default()
             });
         }
-        let reading = servo.tick(&converters(period));
+        let reading = tracker.tick(&converters(period));
         if (3..250).contains(&period) {
             continue;
         }
@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             None => println!("{period:2}: no pose, status {}", reading.status.bits()),
         }
     }
-    println!("{:?}", servo.rezero_state());
-    println!("{:?}", servo.health());
+    println!("{:?}", tracker.zero_offset_state());
+    println!("{:?}", tracker.health());
     Ok(())
 }

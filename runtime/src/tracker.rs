@@ -1,15 +1,15 @@
 //! What lasts from tick to tick: the last valid pose, the sequence of the frames, counters,
 //! and a re-zero in progress.
 //!
-//! [`Servo::tick`] is what a controller calls every servo period. Time is not read here:
+//! [`PoseTracker::tick`] is what a controller calls every servo period. Time is not read here:
 //! the frame carries its sequence number, and the caller reports a period without a frame by
-//! [`Servo::tick_without_frame`].
+//! [`PoseTracker::tick_without_frame`].
 
-use crate::decoder::{Decode, Reading};
+use crate::decoder::{AnyDecoder, Decode, Reading};
 use crate::frame::RawFrame;
 use crate::pose::{PlanarPose, Pose, VerticalPose};
-use crate::rezero::{RezeroRefusal, RezeroRun, RezeroSettings, RezeroState};
 use crate::status::Status;
+use crate::zero_offset::{ZeroOffsetRefusal, ZeroOffsetRun, ZeroOffsetSettings, ZeroOffsetState};
 
 /// What an invalid field reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,34 +38,34 @@ pub struct Health {
     /// Ticks in which a value was held.
     pub held: u32,
     /// Servo periods that had no frame, by the sequence numbers or by
-    /// [`Servo::tick_without_frame`].
+    /// [`PoseTracker::tick_without_frame`].
     pub frames_missed: u32,
     /// Frames that repeated an earlier sequence number.
     pub frames_repeated: u32,
 }
 
-/// Runs a borrowed decoder, of whatever model, from tick to tick.
+/// Runs a decoder from tick to tick: one of its own, of whatever model, or a borrowed one.
 ///
 /// ```
-/// use runtime::{OnInvalid, ParameterSet, RawFrame, Servo, Status};
+/// use runtime::{OnInvalid, ParameterSet, RawFrame, PoseTracker, Status};
 /// use runtime::frame::MISSING_CODE;
 /// # const BLOB: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/stage.bin"));
 /// # fn main() -> Result<(), runtime::BlobError> {
 /// let decoder = ParameterSet::from_bytes(BLOB)?.decoder();
-/// let mut servo = Servo::new(&*decoder, OnInvalid::Hold { ticks: 2 });
+/// let mut tracker = PoseTracker::new(decoder, OnInvalid::Hold { ticks: 2 });
 /// let mut frame = RawFrame { hall: [1200, 900, 700], capacitive: [300, -200, 100], sequence: 1, time_us: 0 };
-/// let good = servo.tick(&frame);
+/// let good = tracker.tick(&frame);
 ///
 /// (frame.hall[0], frame.sequence) = (MISSING_CODE, 2);
-/// let held = servo.tick(&frame);
+/// let held = tracker.tick(&frame);
 /// assert!(held.status.any(Status::PLANAR_HELD));
 /// assert_eq!((held.planar(), held.planar_or_held()), (None, good.planar()));
 /// # Ok(())
 /// # }
 /// ```
 #[derive(Clone, Debug)]
-pub struct Servo<'d> {
-    decoder: &'d dyn Decode,
+pub struct PoseTracker<D = AnyDecoder> {
+    decoder: D,
     on_invalid: OnInvalid,
     zero: PlanarPose<f32>,
     /// [`Status::ZERO_SET`] while `zero` is not zero.
@@ -74,8 +74,8 @@ pub struct Servo<'d> {
     planar_holds_left: u16,
     vertical_holds_left: u16,
     last_sequence: Option<u32>,
-    rezero: RezeroState,
-    run: Option<RezeroRun>,
+    zero_offset: ZeroOffsetState,
+    run: Option<ZeroOffsetRun>,
     health: Health,
 }
 
@@ -91,9 +91,9 @@ const NOTHING: Reading = Reading {
     status: Status::PLANAR_INVALID.with(Status::VERTICAL_INVALID),
 };
 
-impl<'d> Servo<'d> {
-    /// A servo with no zero deviation, no pose to hold and all counters zero.
-    pub const fn new(decoder: &'d dyn Decode, on_invalid: OnInvalid) -> Self {
+impl<D: Decode> PoseTracker<D> {
+    /// A tracker with no zero deviation, no pose to hold and all counters zero.
+    pub const fn new(decoder: D, on_invalid: OnInvalid) -> Self {
         Self {
             decoder,
             on_invalid,
@@ -103,7 +103,7 @@ impl<'d> Servo<'d> {
             planar_holds_left: 0,
             vertical_holds_left: 0,
             last_sequence: None,
-            rezero: RezeroState::Idle,
+            zero_offset: ZeroOffsetState::Idle,
             run: None,
             health: Health {
                 ticks: 0,
@@ -121,14 +121,13 @@ impl<'d> Servo<'d> {
     ///
     /// A frame whose sequence number is not ahead of the last one's (modulo 2^32, by less
     /// than half of it) is not new and is not decoded. A source that starts to count
-    /// again from a lower number is refused until it has caught up: call [`Servo::forget`] when
+    /// again from a lower number is refused until it has caught up: call [`PoseTracker::forget`] when
     /// it restarts.
     pub fn tick(&mut self, frame: &RawFrame) -> Reading {
-        let decoder = self.decoder;
-        self.tick_with(frame.sequence, |zero| decoder.decode(frame, zero))
+        self.step(frame.sequence, |decoder, zero| decoder.decode(frame, zero))
     }
 
-    /// As [`Servo::tick`], with what `decode` makes of the period, less the zero deviation that
+    /// As [`PoseTracker::tick`], with what `decode` makes of the period, less the zero deviation that
     /// it is given: for a vertical pose that is known by other means (a log in SI columns), see
     /// [`Decoder::decode_at`](crate::Decoder::decode_at).
     #[inline(always)]
@@ -137,13 +136,22 @@ impl<'d> Servo<'d> {
         sequence: u32,
         decode: impl FnOnce(&PlanarPose<f32>) -> Reading,
     ) -> Reading {
+        self.step(sequence, |_, zero| decode(zero))
+    }
+
+    #[inline(always)]
+    fn step(
+        &mut self,
+        sequence: u32,
+        decode: impl FnOnce(&D, &PlanarPose<f32>) -> Reading,
+    ) -> Reading {
         let Some(sequence) = self.follow(sequence) else {
             return self.conclude(NOTHING, Status::FRAME_REPEATED);
         };
-        let reading = decode(&self.zero);
+        let reading = decode(&self.decoder, &self.zero);
         let reading = self.conclude(reading, sequence);
         if self.run.is_some() {
-            self.feed_rezero(&reading);
+            self.feed_zero_offset(&reading);
         }
         reading
     }
@@ -180,37 +188,37 @@ impl<'d> Servo<'d> {
         self.last_sequence = self.last_sequence.map(|last| last.wrapping_add(1));
         if self.run.take().is_some() {
             let status = Status::FRAMES_MISSED;
-            self.rezero = RezeroState::Refused(RezeroRefusal::NoPose { status });
+            self.zero_offset = ZeroOffsetState::Refused(ZeroOffsetRefusal::NoPose { status });
         }
         self.conclude(NOTHING, Status::FRAMES_MISSED)
     }
 
-    /// Starts to average at rest; [`Servo::rezero_state`] tells how it goes. The zero
+    /// Starts to average at rest; [`PoseTracker::zero_offset_state`] tells how it goes. The zero
     /// deviation in use stays until the run is done, and stays for good if it is refused.
-    pub fn start_rezero(&mut self, settings: RezeroSettings) {
-        match RezeroRun::start(settings) {
+    pub fn start_zero_offset(&mut self, settings: ZeroOffsetSettings) {
+        match ZeroOffsetRun::start(settings) {
             Ok(run) => {
                 self.run = Some(run);
-                self.rezero = RezeroState::Running {
+                self.zero_offset = ZeroOffsetState::Running {
                     ticks_left: settings.ticks & !1,
                 };
             }
             Err(refusal) => {
                 self.run = None;
-                self.rezero = RezeroState::Refused(refusal);
+                self.zero_offset = ZeroOffsetState::Refused(refusal);
             }
         }
     }
 
     /// Gives up a re-zero that runs; the zero deviation in use stays.
-    pub const fn cancel_rezero(&mut self) {
+    pub const fn cancel_zero_offset(&mut self) {
         self.run = None;
-        self.rezero = RezeroState::Idle;
+        self.zero_offset = ZeroOffsetState::Idle;
     }
 
     /// Where the re-zero stands.
-    pub const fn rezero_state(&self) -> RezeroState {
-        self.rezero
+    pub const fn zero_offset_state(&self) -> ZeroOffsetState {
+        self.zero_offset
     }
 
     /// The zero deviation that is subtracted, as a pose.
@@ -253,20 +261,20 @@ impl<'d> Servo<'d> {
     /// function of its own: the tick stays short while no re-zero runs.
     #[cold]
     #[inline(never)]
-    fn feed_rezero(&mut self, reading: &Reading) {
+    fn feed_zero_offset(&mut self, reading: &Reading) {
         let Some(run) = &mut self.run else { return };
         let mut unzeroed = *reading;
         unzeroed.pose.planar.x_m += self.zero.x_m;
         unzeroed.pose.planar.y_m += self.zero.y_m;
         unzeroed.pose.planar.rz_rad += self.zero.rz_rad;
-        self.rezero = run.take(&unzeroed);
-        match self.rezero {
-            RezeroState::Running { .. } => {}
-            RezeroState::Done { zero } => {
+        self.zero_offset = run.take(&unzeroed);
+        match self.zero_offset {
+            ZeroOffsetState::Running { .. } => {}
+            ZeroOffsetState::Done { zero } => {
                 self.subtract(zero);
                 self.run = None;
             }
-            RezeroState::Idle | RezeroState::Refused(_) => self.run = None,
+            ZeroOffsetState::Idle | ZeroOffsetState::Refused(_) => self.run = None,
         }
     }
 
@@ -310,5 +318,5 @@ impl<'d> Servo<'d> {
 }
 
 #[cfg(test)]
-#[path = "servo_tests.rs"]
+#[path = "tracker_tests.rs"]
 mod tests;

@@ -13,8 +13,8 @@ use crate::status::Status;
 
 /// How long to average, and what still counts as rest at the zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RezeroSettings {
-    /// Ticks to average, [`RezeroSettings::TICKS_MIN`] or more; an odd number is rounded down
+pub struct ZeroOffsetSettings {
+    /// Ticks to average, [`ZeroOffsetSettings::TICKS_MIN`] or more; an odd number is rounded down
     /// to even.
     pub ticks: u16,
     /// Largest peak-to-peak spread of X, Y, Rz over the run, m, m, rad.
@@ -27,13 +27,13 @@ pub struct RezeroSettings {
     pub vertical_max: [f32; 3],
 }
 
-impl RezeroSettings {
+impl ZeroOffsetSettings {
     /// Fewest ticks of a run: half a second at 2 ms. The mean of fewer is too noisy, and a
     /// slow movement is not seen.
     pub const TICKS_MIN: u16 = 250;
 }
 
-impl Default for RezeroSettings {
+impl Default for ZeroOffsetSettings {
     /// 500 ticks (1 s). Spread: ten times the rms noise of a sound stage (1 um, 0.5 um,
     /// 2.4 urad), which noise exceeds in one run of millions. Drift: twelve times the
     /// standard deviation of the difference of two means of 250.
@@ -56,8 +56,8 @@ impl Default for RezeroSettings {
 
 /// Why a re-zero was refused. The zero deviation stays as it was.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RezeroRefusal {
-    /// Fewer than [`RezeroSettings::TICKS_MIN`] ticks were asked for.
+pub enum ZeroOffsetRefusal {
+    /// Fewer than [`ZeroOffsetSettings::TICKS_MIN`] ticks were asked for.
     TooShort {
         /// Ticks asked for.
         ticks: u16,
@@ -97,7 +97,7 @@ pub enum RezeroRefusal {
 
 /// Where a re-zero stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RezeroState {
+pub enum ZeroOffsetState {
     /// None was asked for.
     Idle,
     /// It runs.
@@ -111,14 +111,14 @@ pub enum RezeroState {
         zero: PlanarPose<f32>,
     },
     /// It was refused.
-    Refused(RezeroRefusal),
+    Refused(ZeroOffsetRefusal),
 }
 
 /// One run in progress. Sums are of differences from the first pose, so that `f32` keeps
 /// their digits.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RezeroRun {
-    settings: RezeroSettings,
+pub struct ZeroOffsetRun {
+    settings: ZeroOffsetSettings,
     half: u16,
     taken: u16,
     first: [f32; 3],
@@ -128,14 +128,14 @@ pub struct RezeroRun {
     sum_second_half: [f32; 3],
 }
 
-impl RezeroRun {
+impl ZeroOffsetRun {
     /// Starts a run.
     ///
     /// # Errors
-    /// [`RezeroRefusal::TooShort`].
-    pub const fn start(settings: RezeroSettings) -> Result<Self, RezeroRefusal> {
-        if settings.ticks < RezeroSettings::TICKS_MIN {
-            return Err(RezeroRefusal::TooShort {
+    /// [`ZeroOffsetRefusal::TooShort`].
+    pub const fn start(settings: ZeroOffsetSettings) -> Result<Self, ZeroOffsetRefusal> {
+        if settings.ticks < ZeroOffsetSettings::TICKS_MIN {
+            return Err(ZeroOffsetRefusal::TooShort {
                 ticks: settings.ticks,
             });
         }
@@ -152,20 +152,20 @@ impl RezeroRun {
     }
 
     /// Takes one reading, decoded with no zero deviation subtracted.
-    pub fn take(&mut self, reading: &Reading) -> RezeroState {
+    pub fn take(&mut self, reading: &Reading) -> ZeroOffsetState {
         let Some(pose) = reading.planar() else {
-            return RezeroState::Refused(RezeroRefusal::NoPose {
+            return ZeroOffsetState::Refused(ZeroOffsetRefusal::NoPose {
                 status: reading.status,
             });
         };
         if reading.status.any(EXTRAPOLATED) {
-            return RezeroState::Refused(RezeroRefusal::Extrapolated {
+            return ZeroOffsetState::Refused(ZeroOffsetRefusal::Extrapolated {
                 status: reading.status,
             });
         }
         let vertical = reading.pose.vertical.to_array();
         if let Some((axis, value)) = beyond(vertical, self.settings.vertical_max) {
-            return RezeroState::Refused(RezeroRefusal::OutOfBounds {
+            return ZeroOffsetState::Refused(ZeroOffsetRefusal::OutOfBounds {
                 axis: axis + 3,
                 value,
             });
@@ -196,11 +196,11 @@ impl RezeroRun {
             self.high[2] - self.low[2],
         ];
         if let Some((axis, spread)) = beyond(spread, self.settings.spread_max) {
-            return RezeroState::Refused(RezeroRefusal::Moved { axis, spread });
+            return ZeroOffsetState::Refused(ZeroOffsetRefusal::Moved { axis, spread });
         }
         let all = self.half.saturating_mul(2);
         if self.taken < all {
-            RezeroState::Running {
+            ZeroOffsetState::Running {
                 ticks_left: all - self.taken,
             }
         } else {
@@ -208,7 +208,7 @@ impl RezeroRun {
         }
     }
 
-    fn finish(&self) -> RezeroState {
+    fn finish(&self) -> ZeroOffsetState {
         let n = f32::from(self.half);
         let (early, late) = (self.sum_first_half, self.sum_second_half);
         let drift = [
@@ -217,7 +217,7 @@ impl RezeroRun {
             (late[2] - early[2]) / n,
         ];
         if let Some((axis, drift)) = beyond(drift, self.settings.drift_max) {
-            return RezeroState::Refused(RezeroRefusal::Drifted { axis, drift });
+            return ZeroOffsetState::Refused(ZeroOffsetRefusal::Drifted { axis, drift });
         }
         let all = n + n;
         let zero = [
@@ -226,9 +226,9 @@ impl RezeroRun {
             self.first[2] + (early[2] + late[2]) / all,
         ];
         if let Some((axis, value)) = beyond(zero, self.settings.zero_max) {
-            return RezeroState::Refused(RezeroRefusal::OutOfBounds { axis, value });
+            return ZeroOffsetState::Refused(ZeroOffsetRefusal::OutOfBounds { axis, value });
         }
-        RezeroState::Done {
+        ZeroOffsetState::Done {
             zero: PlanarPose::from_array(zero),
         }
     }
@@ -247,5 +247,5 @@ fn beyond(values: [f32; 3], limits: [f32; 3]) -> Option<(u8, f32)> {
 }
 
 #[cfg(test)]
-#[path = "rezero_tests.rs"]
+#[path = "zero_offset_tests.rs"]
 mod tests;
