@@ -57,7 +57,6 @@ use crate::problem::Problem;
 use crate::problem::draw::draw_rows;
 use crate::problem::model::{COUNT, Model};
 use crate::solve::field::blocks::Rows;
-use crate::solve::field::error::FieldFitError;
 use crate::solve::field::fit::FieldFit;
 use crate::solve::robust::{HALF, Loss};
 use crate::solve::{Projection, Solution, Solver};
@@ -163,25 +162,19 @@ impl<'a> Job<'a> {
             self.settings.solver,
             Solver::Finished | Solver::LeastSquares
         ) && self.settings.options.projection == Projection::Linear;
-        let mut unsettled = None;
         let reason = if usual {
             match self.of_model(Model::of(ModelKind::Field)) {
                 Ok(fit) if fit.field.as_ref().is_some_and(|field| field.verdict.field) => {
                     return Ok(fit);
                 }
                 Ok(fit) => fit.model_reason,
-                Err(error) => {
-                    let is_stuck = matches!(error, FitError::Field(FieldFitError::Stuck { .. }));
-                    unsettled = is_stuck.then(warning::unsettled);
-                    error.to_string()
-                }
+                Err(error) => error.to_string(),
             }
         } else {
             "--solver and --project choose how models of the paper are fitted; the field model has a way of its own".to_owned()
         };
         let mut fit = self.of_model(Model::of(ModelKind::M31))?;
         fit.model_reason = format!("model (31): {reason}");
-        fit.warnings.extend(unsettled);
         Ok(fit)
     }
 

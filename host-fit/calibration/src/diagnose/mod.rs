@@ -79,7 +79,7 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     let of_signals = || signals::signal_findings(dataset, stage, errors);
     let (of_structure, (more, bad)) =
         rayon::join(|| structure::structure(&sound, stage), of_signals);
-    let mut findings: Vec<Finding> = of_structure.into_iter().chain(more).collect();
+    let mut findings: Vec<Finding> = more;
     let designed = || FieldParameters::of_model_31(&Parameters::designed(stage), stage);
     let (parameters, model) = match fitted {
         Ok(fit) => match &fit.field {
@@ -101,7 +101,20 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         let fitted = (&parameters, model);
         of_channels(dataset, stage, &bad, &findings, fitted)
     });
-    if let Some(of) = described.flatten() {
+    let mut described = described.flatten();
+    // A fault that leaves nothing of the residuals when it is taken off explains what a mistake would.
+    let explains = |of: &&mut bank::Diagnosis| of.repair.is_some() && of.rest < LIMITED_MAX;
+    if described.as_mut().filter(explains).is_none() || fitted.is_err() {
+        let refuses = |found: &Finding| found.severity == Severity::Refuse;
+        if let Some(of) = described
+            .as_mut()
+            .filter(|_| of_structure.iter().any(refuses))
+        {
+            (of.findings, of.repair) = (Vec::new(), None);
+        }
+        findings.extend(of_structure);
+    }
+    if let Some(of) = described {
         // The failure of a fit says more of what the log leaves open.
         let is_own = |found: &Finding| fitted.is_ok() || found.code != Code::NotDetermined;
         let found = of.findings.into_iter().filter(is_own);

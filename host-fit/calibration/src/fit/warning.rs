@@ -106,15 +106,6 @@ pub(super) fn of_lag(lag: &ReferenceLag, period_s: f64) -> Option<Finding> {
     })
 }
 
-/// The field model was tried, and no parameters of it describe the log.
-pub(super) fn unsettled() -> Finding {
-    Finding::new(
-        Code::ModelLacks,
-        "Model (31) was taken because the field model did not settle, as it does on every sound log: once all six axes move, \
-         errors will be several times those of a sound fit. Find what is wrong with the log, or fit a part of it",
-    )
-}
-
 /// All warnings of a fit but that of a lag.
 pub(super) fn warnings(
     dataset: &Dataset,

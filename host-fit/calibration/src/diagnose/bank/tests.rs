@@ -129,7 +129,7 @@ fn a_clean_log_raises_nothing_above_a_note() {
 fn a_gain_that_changes_is_named_with_channel_onset_size_and_cost_and_taken_off() {
     let (stage, sound) = (stage(), recording(3).dataset(&stage()).expect("a triangle"));
     let sound = fit(&sound, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
-    for percent in [0.3, 1.0] {
+    for percent in [0.3, 1.0, 3.0] {
         let diagnosis = diagnosed(recording(3), |sample, _| {
             sample.hall[1] = gain(sample.hall[1], percent)
         });
@@ -174,6 +174,18 @@ fn causes_that_a_log_cannot_tell_apart_are_named_together() {
         (found[0].channel.as_deref(), found[0].severity),
         (None, Severity::Refuse)
     );
+}
+
+#[test]
+fn a_large_step_of_a_hall_probe_is_named_as_that_and_taken_off() {
+    let codes = (25e-6 / stage().hall.m_per_count).round() as i32;
+    let diagnosis = diagnosed(recording(4), |sample, _| sample.hall[0] += codes);
+    let first = &diagnosis.findings[0];
+    assert_eq!(
+        (first.code, first.channel.as_deref(), first.severity),
+        (Code::Step, Some("hall_a"), Severity::Warn)
+    );
+    assert_eq!(diagnosis.verdict, Some(Verdict::Good));
 }
 
 #[test]

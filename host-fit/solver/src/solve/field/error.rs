@@ -33,13 +33,4 @@ pub enum FieldFitError {
         /// Upper end.
         high: f64,
     },
-    /// No step lowers the cost although the gradient is not zero.
-    #[error(
-        "the fit of the field model did not settle in {iterations} steps: the log shows something that it has no term for, \
-         such as a reference that lags by many rows, two different stages, or an axis that does not move"
-    )]
-    Stuck {
-        /// Steps made.
-        iterations: u32,
-    },
 }

@@ -214,12 +214,8 @@ impl WhiteFit {
                 drift_mm: drift_mm(&self.rows, &blocks, white_mm, &covariance),
             };
             drop(blocks);
-            let solved = self.descend(WHITENED)?;
-            if !solved.reached {
-                let iterations = self.iterations;
-                return Err(FieldFitError::Stuck { iterations });
-            }
-            normal = solved.normal;
+            // On a faulty log it ends where no step gains more: the diagnosis goes on from there.
+            normal = self.descend(WHITENED)?.normal;
         }
         let posterior = self.posterior(self.covariance(&normal)?);
         let rows = &self.rows;
