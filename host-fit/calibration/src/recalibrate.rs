@@ -24,9 +24,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use crate::diagnose::bank::declared_service;
+use crate::diagnose::signals::signal_findings;
+use crate::diagnose::{Diagnosis, of_judged};
 use crate::fit::RANGE_MARGIN;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
+use crate::judge::verdict::Predicted;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::model::Model;
 use crate::solve::field::carry::ServiceVariance;
@@ -35,6 +39,7 @@ use crate::solve::field::fit::FieldFit;
 use crate::solve::field::noise::USUAL_DRIFT_MM;
 use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::posterior::Posterior;
+use crate::solve::field::terms::COUNT;
 use crate::solve::field::update::{Change, Update, update};
 use crate::solve::field::whiten::Noise;
 use nalgebra::DMatrix;
@@ -100,6 +105,8 @@ pub struct Recalibration {
     pub judgement: Judgement,
     /// With the old blob.
     pub judgement_before: Judgement,
+    /// What is wrong with the log, and whether the new blob can be used.
+    pub diagnosis: Diagnosis,
 }
 
 /// Why an old calibration is not brought up to date.
@@ -211,10 +218,17 @@ pub fn recalibrate(
     if known.is_none() && change == Change::All {
         return Err(RecalibrateError::NothingKnown);
     }
+    let decoded = |set: &ParameterSet| Decoded::new(set, dataset);
+    let by_row = |of: &Decoded| {
+        let judgement = of.judge(dataset, stage, Zeros::Refit);
+        (of.errors_less(&judgement.zeros, dataset), judgement)
+    };
+    let (errors, judgement_before) = by_row(&decoded(old));
+    let (_, bad) = signal_findings(dataset, stage, Some(&errors));
     let covariance = known.map(|known| &known.covariance);
     let drift_mm = known.map_or(USUAL_DRIFT_MM, |known| known.noise.drift_mm);
     let update = update(
-        dataset,
+        &dataset.without(&bad),
         stage,
         &old_parameters,
         covariance,
@@ -255,8 +269,10 @@ pub fn recalibrate(
         fit: FitRecord::default(),
     };
     let set = prepare(old, &update.parameters, stage, &origin)?;
-    let judge = |set: &ParameterSet| Decoded::new(set, dataset).judge(dataset, stage, Zeros::Refit);
-    let judgement = judge(&set);
+    let (errors, judgement) = by_row(&decoded(&set));
+    let predicted = declared_service(stage, &update.parameters, update.noise.white_mm)
+        .map(|at_work| Predicted::new(&at_work, &update.posterior.covariance, &[0.0; COUNT]));
+    let diagnosis = of_judged(dataset, stage, &set, &errors, predicted);
     let axes = judgement.errors.axes;
     let rows = u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX);
     let fit = FitRecord {
@@ -284,7 +300,8 @@ pub fn recalibrate(
         floor: service.noise.map(f64::sqrt),
         chi_squared: update.chi_squared / update.residuals.max(1) as f64,
         judgement,
-        judgement_before: judge(old),
+        judgement_before,
+        diagnosis,
     })
 }
 

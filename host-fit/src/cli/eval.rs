@@ -118,7 +118,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     let of_sample = decoded.judge(&log.dataset, &stage, zeros);
     let by_row = decoded.errors_less(&of_sample.zeros, &log.dataset);
     circumstances.diagnosis = terminal::timed("diagnosis", || {
-        diagnose::of_judged(&log.dataset, &stage, &set, &by_row)
+        diagnose::of_judged(&log.dataset, &stage, &set, &by_row, None)
     });
     let report = of_eval(&set, &judgement, zeros, &circumstances);
     // As the blob's own errors were counted, whatever --delta says.

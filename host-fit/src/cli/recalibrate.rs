@@ -2,9 +2,9 @@
 
 use super::args::choice;
 use super::args::{Json, Logs};
+use super::report::finish;
 use crate::cli::error::HostError;
-use crate::cli::terminal;
-use crate::finding::Finding;
+use crate::finding::{self, Finding, Severity};
 use crate::fit::of_undecoded;
 use crate::input::log::{LogReading, ReadOptions};
 use crate::output::posterior_file::PosteriorFileError;
@@ -13,7 +13,8 @@ use crate::problem::model::Model;
 use crate::recalibrate::{Known, RecalibrateError, Recalibration, recalibrate};
 use crate::report::errors::errors;
 use crate::report::field::by_axis;
-use crate::report::table::{as_text, tables};
+use crate::report::table::tables;
+use crate::report::verdict::{End, Subject};
 use crate::solve::field::update::Change;
 use clap::Args;
 use runtime::parameters::Text;
@@ -88,13 +89,27 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     )?;
     let warnings = warnings(&log, &new);
     let figures = figures(args.what, &new, &log, &warnings);
+    let refusal = finding::messages(&new.diagnosis.findings, Severity::Refuse);
     let mut outputs = Outputs::default();
     args.json.add(&mut outputs, &figures)?;
-    posterior_file::add_calibration(&mut outputs, &args.out, &new.set, new.known.as_ref())?;
-    let written = outputs.commit()?;
-    terminal::print(&as_text(&tables(&figures, &["warnings"])))?;
-    super::wrote(written)?;
-    terminal::warn(&warnings);
+    if refusal.is_empty() {
+        posterior_file::add_calibration(&mut outputs, &args.out, &new.set, new.known.as_ref())?;
+    }
+    let subject = Subject {
+        end: match refusal.as_str() {
+            "" => End::Written,
+            refusal => End::Failed(refusal),
+        },
+        diagnosis: &new.diagnosis,
+        is_field: true,
+        errors: Some(&new.judgement.errors),
+        limits: [None; 3],
+    };
+    let hidden = ["warnings", "findings", "verdict", "predicted"];
+    finish(outputs, &tables(&figures, &hidden), &warnings, &subject)?;
+    if !refusal.is_empty() {
+        return Err(HostError::rejected(refusal));
+    }
     Ok(())
 }
 
@@ -150,5 +165,8 @@ fn figures(change: Change, new: &Recalibration, log: &LogReading, warnings: &[St
         "errors_before": errors(&new.judgement_before.errors),
         "serial": new.set.serial.as_str(),
         "warnings": warnings,
+        "verdict": new.diagnosis.verdict,
+        "predicted": new.diagnosis.predicted,
+        "findings": new.diagnosis.findings,
     })
 }

@@ -109,6 +109,48 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
 }
 
 #[test]
+fn bad_rows_do_not_bend_it_and_what_does_is_told_in_the_verdict() {
+    let bench = bench();
+    let changed = |change: &dyn Fn(usize, &mut [i64])| {
+        let log = bench.text("log.csv");
+        let (header, rows) = log.split_once('\n').expect("a header");
+        let rows = rows.lines().enumerate().map(|(row, line)| {
+            let mut cells: Vec<i64> = line
+                .split(',')
+                .map(|cell| cell.parse().expect("whole"))
+                .collect();
+            change(row, &mut cells);
+            cells
+                .iter()
+                .map(i64::to_string)
+                .collect::<Vec<_>>()
+                .join(",")
+                + "\n"
+        });
+        format!("{header}\n{}", rows.collect::<String>())
+    };
+    let hall_a = |cells: &mut [i64]| cells.len() - 3;
+    let sparks = changed(&|row, cells| cells[hall_a(cells)] += 1600 * i64::from(row % 100 == 50));
+    // From the middle of the run on B reads 0.2 % more.
+    let drifts = changed(&|row, cells| {
+        let of_b = hall_a(cells) + 1;
+        cells[of_b] += cells[of_b] * i64::from(row >= 2000) / 500;
+    });
+    for (log, code, verdict) in [
+        (sparks, "outliers", "good"),
+        (drifts, "gain_drift", "limited"),
+    ] {
+        bench.write("new.csv", log);
+        bench.good("recalibrate old.bin new.csv --stage stage.toml --what all --out new.bin --json new.json");
+        let json = bench.json("new.json");
+        assert_eq!(json["findings"][0]["code"], code, "{json}");
+        assert_eq!(json["verdict"], verdict, "{code}");
+        let change = number(&json["gains"]["a"]["change_percent"]);
+        assert!(change.abs() < 0.05, "{change}");
+    }
+}
+
+#[test]
 fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
     let bench = bench();
     let sine = bench.text("sine.csv");

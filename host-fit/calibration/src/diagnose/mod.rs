@@ -47,7 +47,7 @@ use crate::fit::{Fit, FitError, Repair};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::identify::FitFailure;
-use crate::judge::verdict::{LIMITED_MAX, Predicted, Verdict};
+use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, Predicted, Verdict};
 use crate::problem::parameters::Parameters;
 use crate::solve::field::parameters::FieldParameters;
 use runtime::{ModelKind, ParameterSet};
@@ -223,12 +223,14 @@ fn of_channels(
 }
 
 /// Everything that is wrong with a log that a blob is judged on; `errors` as in
-/// [`signals::signal_findings`].
+/// [`signals::signal_findings`]. Of a blob that was `fitted` to it with what was known before, this is what
+/// service has to expect.
 pub fn of_judged(
     dataset: &Dataset,
     stage: &Stage,
     set: &ParameterSet,
     errors: &[Option<[f64; 3]>],
+    fitted: Option<Predicted>,
 ) -> Diagnosis {
     let (more, bad) = signals::signal_findings(dataset, stage, Some(errors));
     let of_structure = structure::structure(dataset, stage);
@@ -246,15 +248,28 @@ pub fn of_judged(
     // A log that leaves a calibration open says nothing of one that is not fitted to it.
     let is_open = |found: &Finding| found.code == Code::NotDetermined;
     let predicted = predicted.filter(|_| !of_channels.iter().any(is_open));
+    let predicted = fitted.or(predicted);
     let of_channels = of_channels.into_iter().filter(|found| !is_open(found));
-    // Nothing is fitted to this log.
+    // A fault bends only what is fitted.
     findings.extend(of_channels.map(|found| {
-        let severity = found.severity.min(Severity::Warn);
+        let most = if fitted.is_some() {
+            Severity::Refuse
+        } else {
+            Severity::Warn
+        };
+        let severity = found.severity.min(most);
         found.severe(severity)
     }));
     findings.extend(range::out_of_range(set, dataset));
     let findings = in_order(findings);
-    let verdict = predicted.map(|predicted| Verdict::new(model, Some(&predicted), &findings));
+    let is_bent = fitted.is_some() && findings.iter().any(|f| f.cost > Some(GOOD_MAX));
+    let verdict =
+        predicted.map(
+            |predicted| match Verdict::new(model, Some(&predicted), &findings) {
+                Verdict::Good if is_bent => Verdict::Limited,
+                verdict => verdict,
+            },
+        );
     Diagnosis {
         findings,
         verdict,

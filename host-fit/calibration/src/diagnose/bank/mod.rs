@@ -106,6 +106,17 @@ pub fn diagnose(
     of(dataset, &log, estimate)
 }
 
+/// The service that `[motion]` declares, of a stage with this white noise of its probes, mm.
+pub fn declared_service(
+    stage: &Stage,
+    parameters: &FieldParameters,
+    white_mm: [f64; 3],
+) -> Option<Service> {
+    let most = |axis: usize| OF_SINES * stage.motion.axes[axis].service;
+    let poses = service_poses(([0, 1, 2].map(most), [3, 4, 5].map(most)));
+    Service::new(parameters, white_mm, poses)
+}
+
 /// A log with what it was fitted by.
 struct Job<'a> {
     dataset: &'a Dataset,
@@ -118,10 +129,7 @@ struct Job<'a> {
 impl Job<'_> {
     fn diagnosis(&self, mut estimate: Estimate) -> Option<Diagnosis> {
         let log = self.log;
-        let service = |poses: Vec<_>| Service::new(self.fitted, log.white_mm, poses.into_iter());
-        let most = |axis: usize| OF_SINES * self.stage.motion.axes[axis].service;
-        let declared = service_poses(([0, 1, 2].map(most), [3, 4, 5].map(most)));
-        let declared = service(declared.collect())?;
+        let declared = declared_service(self.stage, self.fitted, log.white_mm)?;
         // What the log leaves open of the model's own parameters decides before any fault does.
         let of_model = match self.model {
             ModelKind::Field => PER_PROBE,
@@ -142,7 +150,11 @@ impl Job<'_> {
         // A log that leaves the field model open shows what it costs the smaller one, on motion like its own.
         let (free, at_work) = match carried {
             true => (PER_PROBE, declared.clone()),
-            false => (BEYOND_MODEL_31, service(log.poses())?),
+            false => {
+                let poses = log.poses().into_iter();
+                let own = Service::new(self.fitted, log.white_mm, poses)?;
+                (BEYOND_MODEL_31, own)
+            }
         };
         let other = split(log, &estimate);
         let by_channel = by_channel(log, self.stage, &estimate);
