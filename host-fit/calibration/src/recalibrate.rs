@@ -70,6 +70,9 @@ pub struct Known {
     pub noise: Noise,
     /// Chi-square over residuals of the fit: above 1 by what the model does not describe.
     pub misfit: f64,
+    /// The faults of the log that the calibration is without, in words: see
+    /// [`Repair`](crate::fit::Repair).
+    pub repaired: Vec<String>,
 }
 
 impl Known {
@@ -79,6 +82,7 @@ impl Known {
             covariance: fit.posterior.covariance.clone(),
             noise: fit.noise,
             misfit: fit.score.chi_squared / fit.score.residuals.max(1) as f64,
+            repaired: Vec::new(),
         }
     }
 }
@@ -293,6 +297,7 @@ pub fn recalibrate(
             covariance: update.posterior.covariance.clone(),
             noise: update.noise,
             misfit: known.misfit,
+            repaired: known.repaired.clone(),
         }),
         gains,
         after: service.ratios(),

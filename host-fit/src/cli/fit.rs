@@ -245,7 +245,14 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     if let Some(cause) = &refusal {
         terminal::warn(&[format!("written all the same, as --force asks: {cause}")]);
     }
-    let known = fit.field.as_ref().map(Known::of_fit);
+    let repaired = diagnosis
+        .repair
+        .as_ref()
+        .map(|repair| repair.faults.clone());
+    let known = fit.field.as_ref().map(|field| Known {
+        repaired: repaired.unwrap_or_default(),
+        ..Known::of_fit(field)
+    });
     posterior_file::add_calibration(&mut outputs, &args.out, &fit.set, known.as_ref())?;
     let designed = [("designed", parameters::designed(&stage))];
     let mut details = tables(&report, &report.hidden());

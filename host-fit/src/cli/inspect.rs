@@ -3,7 +3,7 @@
 use super::args::Json;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::output::blob_file;
+use crate::output::{blob_file, posterior_file};
 use crate::problem::model::Model;
 use crate::report::errors;
 use crate::report::parameters::{self, parameters_in};
@@ -24,15 +24,22 @@ pub(super) struct InspectArgs {
     json: Json,
 }
 
-/// Shows every field of a blob.
+/// Shows every field of a blob, and the faults that its calibration is without where its posterior tells.
 pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     super::keep_apart([args.json.path.as_deref()], [args.params.as_path()])?;
     let set = blob_file::read(&args.params)?;
-    let figures = figures(&set);
+    let posterior = posterior_file::beside(&args.params);
+    let known = posterior.and_then(|path| posterior_file::read(&path, &set, &args.params).ok());
+    let repaired = known.map(|known| known.repaired);
+    let mut figures = figures(&set);
+    figures["repaired"] = json!(repaired);
     args.json.write(&figures)?;
     let parameters = parameters::tables(&parameters_in(&set), &[]);
-    let fields = tables(&figures, &["parameters"]);
+    let fields = tables(&figures, &["parameters", "repaired"]);
     terminal::print(&as_text(&[fields, parameters].concat()))?;
+    let repaired = repaired.unwrap_or_default();
+    let taken_off = repaired.iter().map(|fault| format!("taken off: {fault}"));
+    terminal::warn(&taken_off.collect::<Vec<_>>());
     if set.fit.forced {
         terminal::warn(&[
             "the log was refused, or the errors beyond --limit: written all the same (--force)"

@@ -5,13 +5,14 @@
 //! | offset | bytes | what |
 //! |---|---|---|
 //! | 0 | 8 | magic, `HALLPOST` in ASCII |
-//! | 8 | 4 | layout version: 1 |
+//! | 8 | 4 | layout version: 1, or 2 with the text below |
 //! | 12 | 32 | SHA-256 of the blob that it belongs to |
 //! | 44 | 24 | white noise of the probes A, B, C, mm, as `f64` |
 //! | 68 | 24 | walk of the reference in X, Y, Rz in a second, mm, mm, mrad, as `f64` |
 //! | 92 | 8 | chi-square over residuals, as `f64` |
 //! | 100 | 26,568 | covariance of the 81 parameters, the lower triangle row by row, as `f64` |
-//! | 26,668 | 32 | SHA-256 of everything before it |
+//! | 26,668 | | layout 2: the faults of the log that the calibration is without, a line each, in UTF-8 |
+//! | the end | 32 | SHA-256 of everything before it |
 
 use crate::output::place::is_stream;
 use crate::output::{OutputError, Outputs, blob_file, is_standard};
@@ -25,11 +26,14 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 const MAGIC: [u8; 8] = *b"HALLPOST";
-const VERSION: u32 = 1;
+/// With faults taken off; without any, 1.
+const VERSION: u32 = 2;
 const HASH_BYTES: usize = 32;
 const HEADER_BYTES: usize = 12 + HASH_BYTES;
 const NUMBERS: usize = 7 + COUNT * (COUNT + 1) / 2;
+/// Without text, and the most of that.
 const BYTES: usize = HEADER_BYTES + 8 * NUMBERS + HASH_BYTES;
+const TEXT_BYTES_MAX: usize = 8192;
 
 /// Why there is no posterior.
 #[derive(Debug, thiserror::Error)]
@@ -119,7 +123,7 @@ pub fn read(path: &Path, set: &ParameterSet, blob: &Path) -> Result<Known, Poste
     };
     let mut bytes = Vec::with_capacity(BYTES + 1);
     let file = std::fs::File::open(path).map_err(failed)?;
-    file.take(BYTES as u64 + 1)
+    file.take((BYTES + TEXT_BYTES_MAX) as u64 + 1)
         .read_to_end(&mut bytes)
         .map_err(failed)?;
     let unusable = |problem| PosteriorFileError::Unusable {
@@ -144,19 +148,22 @@ fn blob_hash(set: &ParameterSet) -> Result<[u8; HASH_BYTES], runtime::BlobError>
 
 fn encode(blob: &[u8; HASH_BYTES], known: &Known) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(BYTES);
-    bytes.extend(MAGIC);
-    bytes.extend(VERSION.to_le_bytes());
-    bytes.extend(blob);
     let Known {
         covariance,
         noise: Noise { white_mm, drift_mm },
         misfit,
+        repaired,
     } = known;
+    let version = if repaired.is_empty() { 1 } else { VERSION };
+    bytes.extend(MAGIC);
+    bytes.extend(version.to_le_bytes());
+    bytes.extend(blob);
     let triangle = (0..COUNT).flat_map(|i| (0..=i).map(move |j| covariance[(i, j)]));
     let numbers = white_mm.iter().chain(drift_mm).chain([misfit]).copied();
     for number in numbers.chain(triangle) {
         bytes.extend(number.to_le_bytes());
     }
+    bytes.extend(repaired.join("\n").bytes());
     let hash = Sha256::digest(&bytes);
     bytes.extend(hash);
     bytes
@@ -168,17 +175,23 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; HASH_BYTES], Known), String> {
         return Err("it does not begin with HALLPOST".to_owned());
     }
     let (content, hash) = match bytes.split_last_chunk::<HASH_BYTES>() {
-        Some(parts) if bytes.len() == BYTES => parts,
-        _ => return Err(format!("it has not the {BYTES} bytes that it should have")),
+        Some(parts) if (BYTES..=BYTES + TEXT_BYTES_MAX).contains(&bytes.len()) => parts,
+        _ => {
+            return Err(format!(
+                "it has not the {BYTES} bytes or more that it should have"
+            ));
+        }
     };
     if Sha256::digest(content)[..] != hash[..] {
         return Err("it is damaged, its check does not fit".to_owned());
     }
-    let version = &content[MAGIC.len()..][..4];
-    if version != VERSION.to_le_bytes() {
-        return Err(format!("its layout is not {VERSION}"));
+    let (numbers, text) = content.split_at(BYTES - HASH_BYTES);
+    let version = if text.is_empty() { 1 } else { VERSION };
+    if numbers[MAGIC.len()..][..4] != version.to_le_bytes() {
+        return Err(format!("its layout is not 1 or {VERSION}"));
     }
-    let (head, numbers) = content.split_at(HEADER_BYTES);
+    let text = str::from_utf8(text).map_err(|error| error.to_string())?;
+    let (head, numbers) = numbers.split_at(HEADER_BYTES);
     let mut blob = [0; HASH_BYTES];
     blob.copy_from_slice(&head[HEADER_BYTES - HASH_BYTES..]);
     let (numbers, _) = numbers.as_chunks::<8>();
@@ -195,6 +208,7 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; HASH_BYTES], Known), String> {
             drift_mm: [noise[3], noise[4], noise[5]],
         },
         misfit: noise[6],
+        repaired: text.lines().map(str::to_owned).collect(),
     };
     let sound = noise.iter().all(|x| *x >= 0.0 && x.is_finite());
     if !sound || !is_covariance(&known.covariance) {
@@ -225,6 +239,7 @@ mod tests {
                 drift_mm: [1e-4, 0.0, 2e-4],
             },
             misfit: 1.02,
+            repaired: Vec::new(),
         }
     }
 
@@ -233,6 +248,15 @@ mod tests {
         let bytes = encode(&[7; HASH_BYTES], &known());
         assert_eq!(bytes.len(), 26_700);
         assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], known())));
+        let repaired = Known {
+            repaired: vec![
+                "the gain of Hall B changes by 1 µV".to_owned(),
+                "a step".to_owned(),
+            ],
+            ..known()
+        };
+        let bytes = encode(&[7; HASH_BYTES], &repaired);
+        assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], repaired)));
     }
 
     #[test]

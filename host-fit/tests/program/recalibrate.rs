@@ -148,6 +148,20 @@ fn bad_rows_do_not_bend_it_and_what_does_is_told_in_the_verdict() {
         let change = number(&json["gains"]["a"]["change_percent"]);
         assert!(change.abs() < 0.05, "{change}");
     }
+    // A fit takes it off, and says so beside the blob.
+    bench.good("fit new.csv --stage stage.toml --out repaired.bin");
+    bench.good("inspect repaired.bin --json inspect.json");
+    let repaired = bench.json("inspect.json")["repaired"][0].to_string();
+    assert!(
+        repaired.contains("the gain of Hall B changes"),
+        "{repaired}"
+    );
+    assert_eq!(
+        bench.json("inspect.json")["repaired"]
+            .as_array()
+            .map(Vec::len),
+        Some(1)
+    );
 }
 
 #[test]

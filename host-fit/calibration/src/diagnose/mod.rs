@@ -119,8 +119,11 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         let is_own = |found: &Finding| fitted.is_ok() || found.code != Code::NotDetermined;
         let found = of.findings.into_iter().filter(is_own);
         match of.repair.filter(|_| fitted.is_ok()) {
-            Some((found_repair, expected)) => {
-                findings.extend(found.map(bank::repaired));
+            Some((mut found_repair, expected)) => {
+                for found in found {
+                    found_repair.faults.push(found.message.clone());
+                    findings.push(bank::repaired(found));
+                }
                 (predicted, repair) = (Some(expected), Some(found_repair));
             }
             None => {

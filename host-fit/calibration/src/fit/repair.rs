@@ -18,6 +18,8 @@ pub struct Repair {
     pub parameters: FieldParameters,
     /// Their covariance, in their order and units.
     pub covariance: DMatrix<f64>,
+    /// The faults, in words.
+    pub faults: Vec<String>,
 }
 
 impl Fit {

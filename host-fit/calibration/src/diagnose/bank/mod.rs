@@ -276,6 +276,7 @@ impl Job<'_> {
             let repair = Repair {
                 parameters: estimate.state.parameters,
                 covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
+                faults: Vec::new(),
             };
             (repair, predicted)
         })
