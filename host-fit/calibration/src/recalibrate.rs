@@ -228,7 +228,7 @@ pub fn recalibrate(
         (of.errors_less(&judgement.zeros, dataset), judgement)
     };
     let (errors, judgement_before) = by_row(&decoded(old));
-    let (_, bad) = signal_findings(dataset, stage, Some(&errors));
+    let (_, bad) = signal_findings(dataset, stage, (&old_parameters, 0.0), Some(&errors));
     let covariance = known.map(|known| &known.covariance);
     let drift_mm = known.map_or(USUAL_DRIFT_MM, |known| known.noise.drift_mm);
     let update = update(

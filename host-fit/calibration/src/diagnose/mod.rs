@@ -76,21 +76,11 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         outliers => Cow::Owned(dataset.without(outliers)),
     };
     let errors = (fitted.ok()).map(|fit| &fit.decoded.errors[..]);
-    let of_signals = || signals::signal_findings(dataset, stage, errors);
-    let (of_structure, (more, bad)) =
+    let (parameters, lag_s) = parameters_of(fitted, stage);
+    let model = fitted.map_or(ModelKind::M31, |fit| fit.model.kind);
+    let of_signals = || signals::signal_findings(dataset, stage, (&parameters, lag_s), errors);
+    let (of_structure, (mut findings, bad)) =
         rayon::join(|| structure::structure(&sound, stage), of_signals);
-    let mut findings: Vec<Finding> = more;
-    let designed = || FieldParameters::of_model_31(&Parameters::designed(stage), stage);
-    let (parameters, model) = match fitted {
-        Ok(fit) => match &fit.field {
-            Some(field) => (field.parameters, ModelKind::Field),
-            None => (
-                FieldParameters::of_model_31(&fit.solution.parameters, stage),
-                fit.model.kind,
-            ),
-        },
-        Err(_) => (designed(), ModelKind::M31),
-    };
     // A log that determines nothing says nothing of its channels.
     let is_described = match fitted {
         Ok(_) | Err(FitError::Failed(FitFailure::NotDescribed { .. })) => true,
@@ -169,6 +159,18 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     }
 }
 
+/// The parameters of a fit, those of the drawing where there is none, and the lag of the reference, s.
+fn parameters_of(fitted: Result<&Fit, &FitError>, stage: &Stage) -> (FieldParameters, f64) {
+    let of_31 = |parameters| FieldParameters::of_model_31(parameters, stage);
+    match fitted {
+        Ok(fit) => (
+            (fit.field.as_ref()).map_or_else(|| of_31(&fit.solution.parameters), |f| f.parameters),
+            fit.lag.map_or(0.0, |lag| lag.value_s),
+        ),
+        Err(_) => (of_31(&Parameters::designed(stage)), 0.0),
+    }
+}
+
 /// That a calibration is refused for what is predicted, where no finding refuses it by itself.
 fn beyond_service(
     model: ModelKind,
@@ -235,9 +237,6 @@ pub fn of_judged(
     errors: &[Option<[f64; 3]>],
     fitted: Option<Predicted>,
 ) -> Diagnosis {
-    let (more, bad) = signals::signal_findings(dataset, stage, Some(errors));
-    let of_structure = structure::structure(dataset, stage);
-    let mut findings: Vec<Finding> = of_structure.into_iter().chain(more).collect();
     let (parameters, model) = match FieldParameters::of_set(set, stage) {
         Some(parameters) => (parameters, ModelKind::Field),
         None => (
@@ -245,6 +244,9 @@ pub fn of_judged(
             set.model,
         ),
     };
+    let (more, bad) = signals::signal_findings(dataset, stage, (&parameters, 0.0), Some(errors));
+    let of_structure = structure::structure(dataset, stage);
+    let mut findings: Vec<Finding> = of_structure.into_iter().chain(more).collect();
     let of_channels = of_channels(dataset, stage, &bad, &findings, (&parameters, model));
     let (of_channels, predicted) =
         of_channels.map_or((Vec::new(), None), |of| (of.findings, Some(of.predicted)));

@@ -11,7 +11,7 @@
 //! | `still` | movements that stand still, or end in a rest |
 //! | `frozen` | channels that repeat one value |
 //! | `standing` | channels that show no more than their noise |
-//! | `residual` | what the motion does not explain of a Hall signal |
+//! | `residual` | what a calibration leaves of the Hall signals |
 //! | `blame` | the channel whose error explains that |
 //! | `outliers` | rows that jump |
 //! | `spectrum`, `hum` | lines of one frequency |
@@ -38,6 +38,7 @@ mod timing;
 use crate::finding::Finding;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
+use crate::solve::field::parameters::FieldParameters;
 use channels::LogSignals;
 use residual::Residuals;
 
@@ -49,18 +50,18 @@ const ROWS_MIN: usize = 1000;
 
 /// What the signals of a dataset show, log after log, and the rows that no other test is to use.
 ///
-/// `errors`: decoded pose less reference by row, m, m, rad. Rows without one, which the decoder
-/// refused, are left out of the tests of residuals. The residuals themselves are not taken from
-/// there: a fit that a fault has bent spreads it over all channels.
+/// `fitted`: the parameters, and the lag of the reference, s. `errors`: decoded pose less reference by row,
+/// m, m, rad; rows without one, which the decoder refused, are left out of the tests of residuals.
 pub fn signal_findings(
     dataset: &Dataset,
     stage: &Stage,
+    fitted: (&FieldParameters, f64),
     errors: Option<&[Option<[f64; 3]>]>,
 ) -> (Vec<Finding>, Vec<usize>) {
     let (mut findings, mut bad) = (Vec::new(), Vec::new());
     for log in 0..dataset.logs.len() {
         let mut signals = LogSignals::new(dataset, stage, log);
-        findings.extend(of_log(&mut signals, dataset, stage, errors, log));
+        findings.extend(of_log(&mut signals, dataset, stage, fitted, errors, log));
         let first = dataset.logs[log].rows.start;
         let unusable = (0..signals.len()).filter(|&row| !signals.usable[row]);
         bad.extend(unusable.map(|row| first + row));
@@ -72,6 +73,7 @@ fn of_log(
     signals: &mut LogSignals,
     dataset: &Dataset,
     stage: &Stage,
+    fitted: (&FieldParameters, f64),
     errors: Option<&[Option<[f64; 3]>]>,
     log: usize,
 ) -> Vec<Finding> {
@@ -81,7 +83,7 @@ fn of_log(
         if let Some(errors) = errors {
             signals.leave_out_undecoded(errors);
         }
-        found.extend(of_residuals(signals, stage));
+        found.extend(of_residuals(signals, fitted));
     }
     let all = dataset.logs[log].rows_read;
     if signals.len() < all {
@@ -94,18 +96,21 @@ fn of_log(
 }
 
 /// What the motion does not explain of the Hall signals.
-fn of_residuals(signals: &mut LogSignals, stage: &Stage) -> Vec<Finding> {
+fn of_residuals(
+    signals: &mut LogSignals,
+    (parameters, lag_s): (&FieldParameters, f64),
+) -> Vec<Finding> {
     let mut findings = Vec::new();
     let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 2] =
         [standing::standing, outliers::outliers];
-    let Some(mut residuals) = Residuals::new(signals, stage) else {
+    let Some(mut residuals) = Residuals::new(signals, parameters, lag_s) else {
         return findings;
     };
     for test in tests {
         let found = test(signals, &residuals);
         if !found.is_empty() {
             findings.extend(found);
-            match Residuals::new(signals, stage) {
+            match Residuals::new(signals, parameters, lag_s) {
                 Some(again) => residuals = again,
                 None => return findings,
             }

@@ -1,7 +1,9 @@
 //! A small simulated log for the tests of faults.
 
 use super::signal_findings;
+use crate::diagnose::parameters_of;
 use crate::finding::{Code, Finding, Severity};
+use crate::fit::{FitSettings, ModelChoice, fit};
 use crate::input::dataset::Dataset;
 use crate::input::shipped::STAGE_TOML;
 use crate::input::stage::Stage;
@@ -49,9 +51,15 @@ pub(super) fn dataset(recording: &Recording) -> Dataset {
     dataset
 }
 
+fn found(dataset: &Dataset) -> Vec<Finding> {
+    let fitted = fit(dataset, &stage(), &FitSettings::new(ModelChoice::Auto));
+    let (parameters, lag_s) = parameters_of(fitted.as_ref(), &stage());
+    signal_findings(dataset, &stage(), (&parameters, lag_s), None).0
+}
+
 /// The warnings about a log.
 pub(super) fn warnings(dataset: &Dataset) -> Vec<Finding> {
-    let (mut findings, _) = signal_findings(dataset, &stage(), None);
+    let mut findings = found(dataset);
     findings.retain(|finding| finding.severity > Severity::Note);
     findings
 }
@@ -70,7 +78,7 @@ pub(super) fn only(recording: &Recording, code: Code, channel: Option<&str>) -> 
 /// hum.
 #[test]
 fn rests_make_no_other_test_of_residuals_more_certain() {
-    let (found, _) = signal_findings(&dataset(&with_rests(150)), &stage(), None);
+    let found = found(&dataset(&with_rests(150)));
     let codes: Vec<Code> = found.iter().map(|finding| finding.code).collect();
     assert_eq!(codes, [Code::IdleMovement], "{found:#?}");
 }
