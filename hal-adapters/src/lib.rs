@@ -9,7 +9,6 @@
 //! | [`adc`] | converters on SPI: codes to raw frames |
 //! | [`can`] | frames, signals and identifiers; coding, protection, assembly of a tick |
 //! | [`candump`] | one line of a `candump -L` log, read and written |
-//! | [`fault`] | frames that are dropped, repeated, delayed and damaged, by a seed |
 //! | `socketcan` | SocketCAN on Linux (feature `socketcan`) |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -20,6 +19,8 @@ extern crate std;
 pub mod adc;
 pub mod can;
 pub mod candump;
-pub mod fault;
+#[cfg(test)]
+#[path = "../../tests/src/random.rs"]
+mod random;
 #[cfg(all(target_os = "linux", feature = "socketcan"))]
 pub mod socketcan;

@@ -3,6 +3,7 @@
 //! that are made up, and random numbers by a seed.
 
 use crate::flash_model::FlashModel;
+use crate::random::Random;
 use firmware::fpu::FpuSettings;
 use firmware::node::{Facts, Node as Ticking, Parameters};
 use firmware::outbox::Outbox;
@@ -14,7 +15,6 @@ use firmware::store::Image;
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{Identity, Key, Store as _};
 use hal_adapters::can::{BusFrame, Coded, Layout};
-use hal_adapters::fault::Random;
 use runtime::RawFrame;
 use std::mem::MaybeUninit;
 use std::ptr::NonNull;

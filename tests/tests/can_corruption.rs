@@ -4,12 +4,13 @@
 use embedded_can::Frame;
 use hal_adapters::can::e2e::unprotect;
 use hal_adapters::can::{BusFrame, Layout, SensorReceiver, StampedFrame, Timing, sensor};
-use hal_adapters::fault::{Fault, FaultRates, Faulty, Random};
 use runtime::calibration::Origin;
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeGeometry;
 use runtime::model::{Probes, Sensitivity};
 use runtime::{AnyDecoder, Calibration, Decode, ModelKind, PlanarPose, RawFrame, Reading, Status};
+use tests::fault::{Fault, FaultRates, Faulty, damaged};
+use tests::random::Random;
 
 /// A stage near the designed one.
 fn decoder() -> AnyDecoder {
@@ -166,7 +167,7 @@ fn heavier_damage_passes_the_check_no_more_often_than_once_in_256() {
     let frames = 1_000_000u32;
     let mut passed = 0u32;
     for _ in 0..frames {
-        let damaged = frame.damaged(Fault::Noise, &mut random);
+        let damaged = damaged(&frame, Fault::Noise, &mut random);
         let bytes = damaged.data().try_into().expect("eight bytes");
         passed += u32::from(unprotect(key, &bytes).is_some());
     }

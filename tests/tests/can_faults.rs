@@ -1,11 +1,13 @@
 //! Every fault of a bus is noticed within one tick, wherever it falls; silence within 4 ms.
 
+use embedded_can::Frame;
 use hal_adapters::can::{
     BusFault, BusFrame, Layout, Message, SensorReceiver, StampedFrame, Timing, sensor,
 };
-use hal_adapters::fault::{Fault, Random};
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
+use tests::fault::{Fault, FaultRates, Faulty, damaged};
+use tests::random::Random;
 
 const PERIOD_US: u64 = 2_000;
 /// From frame to frame at 1 Mbit/s.
@@ -95,7 +97,7 @@ fn with_fault(
             frames[at].time_us += late;
             frames.sort_by_key(|f| f.time_us);
         }
-        _ => frames[at].frame = hit.frame.damaged(fault, random),
+        _ => frames[at].frame = damaged(&hit.frame, fault, random),
     }
     (frames, hit.time_us)
 }
@@ -181,4 +183,56 @@ fn the_deadline_that_the_receiver_names_is_when_it_calls_the_source_stale() {
     let deadline_us = receiver.deadline_us().expect("frames came");
     assert_eq!(receiver.poll(deadline_us - 1).fault, None);
     assert!(receiver.poll(deadline_us).fault.is_some());
+}
+
+#[test]
+fn the_injector_does_what_its_faults_say_and_the_same_for_the_same_seed() {
+    let sent = traffic(Layout::Bits16, 0, 9_999);
+    let run = |fault, seed| {
+        let rates = FaultRates::NONE.with(fault, 5_000);
+        let mut faulty = Faulty::new(sent.iter().copied(), rates, seed);
+        let got: Vec<StampedFrame> = faulty.by_ref().collect();
+        (got, faulty.injected(fault) as usize)
+    };
+    for fault in Fault::ALL {
+        let (got, injected) = run(fault, 7);
+        assert_eq!((&got, injected), (&run(fault, 7).0, run(fault, 7).1));
+        assert_ne!(got, run(fault, 8).0);
+        assert!((60..140).contains(&injected), "{fault:?}: {injected}");
+        let length = match fault {
+            Fault::Drop => sent.len() - injected,
+            Fault::Repeat => sent.len() + injected,
+            _ => sent.len(),
+        };
+        assert_eq!(got.len(), length, "{fault:?}");
+        let late = (0..).zip(&got).filter_map(|(place, got)| {
+            let was = sent.iter().position(|sent| sent.time_us == got.time_us);
+            usize::checked_sub(place, was?).filter(|moved| *moved > 0)
+        });
+        match fault {
+            Fault::Swap => assert!(late.eq(vec![1; injected])),
+            Fault::Delay => {
+                let moved: Vec<usize> = late.collect();
+                assert_eq!(moved.len(), injected);
+                assert!(moved.iter().all(|by| (2..=9).contains(by)));
+            }
+            _ => {}
+        }
+    }
+    let frame = sent[0].frame;
+    let word = |frame: &BusFrame| frame.data().try_into().map(u64::from_be_bytes);
+    let random = &mut Random::new(5);
+    for _ in 0..10_000 {
+        let flipped = |fault, random: &mut Random| {
+            word(&damaged(&frame, fault, random)).expect("eight bytes")
+                ^ word(&frame).expect("eight bytes")
+        };
+        assert!((1..=3).contains(&flipped(Fault::Flip, random).count_ones()));
+        let burst = flipped(Fault::Burst, random);
+        let length = 64 - burst.leading_zeros() - burst.trailing_zeros();
+        assert!((2..=8).contains(&length), "{burst:x}");
+        assert!(damaged(&frame, Fault::WrongLength, random).dlc() < 8);
+        let renamed = damaged(&frame, Fault::WrongId, random);
+        assert_ne!(renamed.id(), frame.id());
+    }
 }

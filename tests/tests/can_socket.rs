@@ -6,11 +6,11 @@ use embedded_can::{Frame, StandardId};
 use hal_adapters::can::{
     BusFault, BusFrame, Layout, Message, SensorReceiver, StampedFrame, Timing, sensor,
 };
-use hal_adapters::fault::{Fault, FaultRates, Faulty};
 use hal_adapters::socketcan::{SocketCan, SocketCanError};
 use runtime::RawFrame;
 use std::process::Command;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use tests::fault::{Fault, FaultRates, Faulty};
 
 const WAIT: Duration = Duration::from_millis(200);
 

@@ -67,39 +67,6 @@ impl BusFrame {
             bytes,
         }
     }
-
-    /// The same frame with its bytes XOR `mask`; the most significant byte of the mask falls
-    /// on byte 0.
-    #[must_use]
-    pub fn flipped(&self, mask: u64) -> Self {
-        let bytes = (u64::from_be_bytes(self.bytes) ^ mask).to_be_bytes();
-        Self { bytes, ..*self }
-    }
-
-    /// The same frame cut or padded with zeros to `length` bytes, at most 8.
-    #[must_use]
-    pub fn resized(&self, length: u8) -> Self {
-        let length = length.min(8);
-        let mut bytes = [0; 8];
-        let kept = usize::from(length);
-        for (to, from) in bytes.iter_mut().zip(self.bytes).take(kept) {
-            *to = from;
-        }
-        Self {
-            length,
-            bytes,
-            ..*self
-        }
-    }
-
-    /// The same frame under another standard identifier.
-    #[must_use]
-    pub fn renamed(&self, id: StandardId) -> Self {
-        Self {
-            id: Id::Standard(id),
-            ..*self
-        }
-    }
 }
 
 impl Frame for BusFrame {
@@ -178,6 +145,14 @@ mod tests {
 
     const ID: StandardId = StandardId::MAX;
 
+    impl BusFrame {
+        /// The same frame with its bytes XOR `mask`, whose most significant byte falls on byte 0.
+        pub(crate) fn flipped(&self, mask: u64) -> Self {
+            let bytes = (u64::from_be_bytes(self.bytes) ^ mask).to_be_bytes();
+            Self { bytes, ..*self }
+        }
+    }
+
     #[test]
     fn a_copy_keeps_identifier_length_and_bytes() {
         for length in 0..=8 {
@@ -195,13 +170,5 @@ mod tests {
         assert_eq!((frame.dlc(), frame.data().len()), (5, 0));
         assert!(frame.is_remote_frame());
         assert_eq!(BusFrame::new_remote(ID, 9), None);
-    }
-
-    #[test]
-    fn a_mask_falls_on_byte_0_first() {
-        let frame = BusFrame::new(ID, &[0; 8]).expect("eight bytes");
-        assert_eq!(frame.flipped(0x80 << 56).data()[0], 0x80);
-        assert_eq!(frame.flipped(1).data()[7], 1);
-        assert_eq!(frame.flipped(u64::MAX).resized(3).data(), [0xff; 3]);
     }
 }

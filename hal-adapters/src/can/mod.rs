@@ -26,7 +26,6 @@ macro_rules! numbered {
         };
     };
 }
-pub(crate) use numbered;
 
 pub mod command;
 #[cfg(test)]

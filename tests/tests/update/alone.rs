@@ -5,10 +5,10 @@ use super::{KEY, NEW, OLD, SERIAL, back, plan};
 use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{Kept, UpdateRequest, crc_of};
-use hal_adapters::fault::Fault;
 use host_fit::bus::update::{Plan, UpdateError, Updated, Wanted, on};
 use runtime::ParameterSet;
 use runtime::blob::MAX_BYTES;
+use tests::fault::Fault;
 use tests::flash_model::FlashModel;
 use tests::node::Node;
 

@@ -4,11 +4,12 @@ use super::{OLD, SERIAL};
 use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Answer, Command, Mailbox, Request, Told};
 use hal_adapters::can::update::Key;
-use hal_adapters::fault::{Fault, Random};
 use host_fit::bus::update::{Identity, Link, Plan, Talk, UpdateError, Updated, on};
 use std::collections::VecDeque;
+use tests::fault::{Fault, damaged};
 use tests::flash_model::FlashModel;
 use tests::node::{Node, TAKEN_PER_TICK};
+use tests::random::Random;
 
 /// The longest frame at 1 Mbit/s, us.
 pub const SLOT_US: u64 = 135;
@@ -59,7 +60,7 @@ impl Channel {
             Some(Fault::Delay) => now_us + 2_000 + delay,
             _ => now_us,
         };
-        let frame = fault.map_or(frame, |fault| frame.damaged(fault, &mut self.random));
+        let frame = fault.map_or(frame, |fault| damaged(&frame, fault, &mut self.random));
         self.under_way.push((due_us, frame));
     }
 

@@ -5,7 +5,7 @@ use super::*;
 use crate::can::command::{Command, Mailbox, Request, Told};
 use crate::can::service::{Service, Updates};
 use crate::can::{BusFrame, Coded};
-use crate::fault::Random;
+use crate::random::Random;
 use embedded_can::Frame;
 use std::vec::Vec;
 

@@ -4,7 +4,7 @@
 //! ```
 //! use embedded_can::Frame;
 //! use hal_adapters::can::{BusFrame, Message, StampedFrame};
-//! use hal_adapters::fault::{Fault, FaultRates, Faulty};
+//! use tests::fault::{Fault, FaultRates, Faulty};
 //!
 //! let frame = BusFrame::new(Message::Hall.id(), &[0; 8]).unwrap();
 //! let frames = [StampedFrame { time_us: 0, frame }; 100];
@@ -14,33 +14,47 @@
 //! assert_eq!(got + faulty.injected(Fault::Drop), 100);
 //! ```
 
-use crate::can::numbered;
-use crate::can::table::TABLE;
-use crate::can::{BusFrame, Message, StampedFrame};
+use crate::random::Random;
 use embedded_can::{Frame, Id, StandardId};
+use hal_adapters::can::table::TABLE;
+use hal_adapters::can::{BusFrame, Message, StampedFrame};
 
-numbered! {
-    /// What can happen to a frame.
-    Fault {
-        /// It does not come.
-        Drop,
-        /// It comes twice.
-        Repeat,
-        /// It changes places with the next frame.
-        Swap,
-        /// It comes after the next 2 to 9 frames.
-        Delay,
-        /// One to three of its bits are flipped.
-        Flip,
-        /// A burst of 2 to 8 bits, both ends flipped.
-        Burst,
-        /// All its bits are random.
-        Noise,
-        /// It has another length.
-        WrongLength,
-        /// It has the identifier of another message, or a foreign one.
-        WrongId,
-    }
+/// What can happen to a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// It does not come.
+    Drop,
+    /// It comes twice.
+    Repeat,
+    /// It changes places with the next frame.
+    Swap,
+    /// It comes after the next 2 to 9 frames.
+    Delay,
+    /// One to three of its bits are flipped.
+    Flip,
+    /// A burst of 2 to 8 bits, both ends flipped.
+    Burst,
+    /// All its bits are random.
+    Noise,
+    /// It has another length.
+    WrongLength,
+    /// It has the identifier of another message, or a foreign one.
+    WrongId,
+}
+
+impl Fault {
+    /// Every one.
+    pub const ALL: [Self; 9] = [
+        Self::Drop,
+        Self::Repeat,
+        Self::Swap,
+        Self::Delay,
+        Self::Flip,
+        Self::Burst,
+        Self::Noise,
+        Self::WrongLength,
+        Self::WrongId,
+    ];
 }
 
 /// How often each fault happens, per million frames; at most one happens to a frame.
@@ -82,75 +96,72 @@ impl FaultRates {
     }
 }
 
-/// Random numbers that depend on the seed alone (SplitMix64).
-#[derive(Clone, Debug)]
-pub struct Random(u64);
-
-impl Random {
-    /// The sequence of a seed.
-    pub const fn new(seed: u64) -> Self {
-        Self(seed)
+/// A mask of one to three bits, or of a burst of 2 to 8 bits with both ends set.
+fn mask(random: &mut Random, fault: Fault) -> u64 {
+    if fault == Fault::Burst {
+        let length = 2 + random.below(7);
+        let inner = random.bits() & ((1 << (length - 1)) - 1);
+        let pattern = 1 | 1 << (length - 1) | inner;
+        return pattern << random.below(64 - length + 1);
     }
-
-    /// The next 64 bits.
-    pub const fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
+    let flips = 1 + random.below(3);
+    let mut mask: u64 = 0;
+    while u64::from(mask.count_ones()) < flips {
+        mask |= 1 << random.below(64);
     }
+    mask
+}
 
-    /// A number from 0 to `n - 1`; 0 for n = 0.
-    pub const fn below(&mut self, n: u64) -> u64 {
-        let bits = self.bits();
-        match bits.checked_rem(n) {
-            Some(rest) => rest,
-            None => 0,
+/// A damaged copy, as `random` decides. Only `Flip` to `WrongId` change the frame itself.
+#[must_use]
+pub fn damaged(frame: &BusFrame, fault: Fault, random: &mut Random) -> BusFrame {
+    match fault {
+        Fault::Flip | Fault::Burst => flipped(frame, mask(random, fault)),
+        Fault::Noise => flipped(frame, random.bits()),
+        Fault::WrongLength => {
+            let shorter = random.below(8) as usize;
+            resized(frame, if frame.dlc() == 8 { shorter } else { 8 })
         }
-    }
-
-    /// A mask of one to three bits, or of a burst of 2 to 8 bits with both ends set.
-    fn mask(&mut self, fault: Fault) -> u64 {
-        if fault == Fault::Burst {
-            let length = 2 + self.below(7);
-            let inner = self.bits() & ((1 << (length - 1)) - 1);
-            let pattern = 1 | 1 << (length - 1) | inner;
-            return pattern << self.below(64 - length + 1);
+        Fault::WrongId => {
+            let ours = Message::from_id(frame.id());
+            let other = if random.below(2) == 0 {
+                let k = random.below(TABLE.len() as u64) as usize;
+                TABLE.get(k).map(|row| row.message.id())
+            } else {
+                StandardId::new(random.below(0x800) as u16)
+            };
+            let other = other.filter(|id| Message::from_id(Id::Standard(*id)) != ours);
+            renamed(frame, other.unwrap_or(StandardId::ZERO))
         }
-        let flips = 1 + self.below(3);
-        let mut mask: u64 = 0;
-        while u64::from(mask.count_ones()) < flips {
-            mask |= 1 << self.below(64);
-        }
-        mask
+        Fault::Drop | Fault::Repeat | Fault::Swap | Fault::Delay => *frame,
     }
 }
 
-impl BusFrame {
-    /// A damaged copy, as `random` decides. Only `Flip` to `WrongId` change the frame itself.
-    #[must_use]
-    pub fn damaged(&self, fault: Fault, random: &mut Random) -> Self {
-        match fault {
-            Fault::Flip | Fault::Burst => self.flipped(random.mask(fault)),
-            Fault::Noise => self.flipped(random.bits()),
-            Fault::WrongLength => {
-                let shorter = random.below(8);
-                self.resized(if self.dlc() == 8 { shorter as u8 } else { 8 })
-            }
-            Fault::WrongId => {
-                let ours = Message::from_id(self.id);
-                let other = if random.below(2) == 0 {
-                    let k = random.below(TABLE.len() as u64) as usize;
-                    TABLE.get(k).map(|row| row.message.id())
-                } else {
-                    StandardId::new(random.below(0x800) as u16)
-                };
-                let other = other.filter(|id| Message::from_id(Id::Standard(*id)) != ours);
-                self.renamed(other.unwrap_or(StandardId::ZERO))
-            }
-            Fault::Drop | Fault::Repeat | Fault::Swap | Fault::Delay => *self,
-        }
+/// The same frame with its bytes XOR `mask`, whose most significant byte falls on byte 0.
+pub fn flipped(frame: &BusFrame, mask: u64) -> BusFrame {
+    let mut data = [0; 8];
+    for (to, (from, mask)) in data
+        .iter_mut()
+        .zip(frame.data().iter().zip(mask.to_be_bytes()))
+    {
+        *to = from ^ mask;
     }
+    made(frame.id(), &data[..frame.dlc()])
+}
+
+/// The same frame cut or padded with zeros to `length` bytes.
+fn resized(frame: &BusFrame, length: usize) -> BusFrame {
+    let mut data = [0; 8];
+    data[..frame.dlc()].copy_from_slice(frame.data());
+    made(frame.id(), &data[..length])
+}
+
+fn renamed(frame: &BusFrame, id: StandardId) -> BusFrame {
+    made(id.into(), frame.data())
+}
+
+fn made(id: Id, data: &[u8]) -> BusFrame {
+    BusFrame::new(id, data).expect("at most 8 bytes")
 }
 
 /// Injects faults into a stream of frames.
@@ -213,7 +224,7 @@ impl<I: Iterator<Item = StampedFrame>> Faulty<I> {
                 None
             }
             _ => Some(StampedFrame {
-                frame: stamped.frame.damaged(fault, &mut self.random),
+                frame: damaged(&stamped.frame, fault, &mut self.random),
                 ..stamped
             }),
         }
@@ -245,7 +256,3 @@ impl<I: Iterator<Item = StampedFrame>> Iterator for Faulty<I> {
         }
     }
 }
-
-#[cfg(test)]
-#[path = "fault_tests.rs"]
-mod tests;
