@@ -28,6 +28,9 @@
 // Words of a servo.
 #define HALL_SERVO_WORDS 55
 
+// Words of a predictor.
+#define HALL_PREDICTOR_WORDS 37
+
 // Major version of the library that this header belongs to.
 #define HALL_RUNTIME_VERSION_MAJOR 0
 
@@ -42,6 +45,45 @@
 
 // In place of a code that could not be read: INT32_MIN.
 #define HALL_MISSING_CODE INT32_MIN
+
+// Hall code A is at a rail, implausible or missing.
+#define HALL_STATUS_HALL_A (1 << 0)
+
+// Hall code B likewise.
+#define HALL_STATUS_HALL_B (1 << 1)
+
+// Hall code C likewise.
+#define HALL_STATUS_HALL_C (1 << 2)
+
+// Capacitive code 1 is at a rail, implausible or missing.
+#define HALL_STATUS_CAPACITIVE_1 (1 << 3)
+
+// Capacitive code 2 likewise.
+#define HALL_STATUS_CAPACITIVE_2 (1 << 4)
+
+// Capacitive code 3 likewise.
+#define HALL_STATUS_CAPACITIVE_3 (1 << 5)
+
+// The sensitivity of probe A is too near zero, or not finite.
+#define HALL_STATUS_SENSITIVITY_A (1 << 6)
+
+// That of probe B likewise.
+#define HALL_STATUS_SENSITIVITY_B (1 << 7)
+
+// That of probe C likewise.
+#define HALL_STATUS_SENSITIVITY_C (1 << 8)
+
+// A planar result is not finite.
+#define HALL_STATUS_PLANAR_NOT_FINITE (1 << 9)
+
+// A vertical result is not finite.
+#define HALL_STATUS_VERTICAL_NOT_FINITE (1 << 10)
+
+// Z, Rx or Ry lies outside the calibrated range.
+#define HALL_STATUS_VERTICAL_EXTRAPOLATED (1 << 11)
+
+// X, Y or Rz lies outside the calibrated range.
+#define HALL_STATUS_PLANAR_EXTRAPOLATED (1 << 12)
 
 // X, Y, Rz are invalid.
 #define HALL_STATUS_PLANAR_INVALID (1 << 13)
@@ -94,7 +136,7 @@ enum HallResult
   HALL_RESULT_OTHER_STAGE = 10,
   // The decoder was never loaded.
   HALL_RESULT_NOT_LOADED = 11,
-  // The servo was never started.
+  // The servo or the predictor was never started.
   HALL_RESULT_NOT_STARTED = 12,
 };
 #ifndef __cplusplus
@@ -207,6 +249,12 @@ typedef struct {
   uint32_t frames_repeated;
 } HallHealth;
 
+// A predictor, as C sees it. Its contents are private.
+typedef struct {
+  uint32_t mark;
+  uint32_t opaque[HALL_PREDICTOR_WORDS];
+} HallPredictor;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -268,6 +316,25 @@ HALL_NODISCARD bool hall_set_zero(HallServo *servo, HallPlanarPose zero);
 
 // The counters; zeros for a null pointer or a servo that was never started.
 HallHealth hall_health(const HallServo *servo);
+
+// Starts a predictor without poses. `age_max_us` is the largest age of a pose that is carried
+// on, and the longest time between two poses in a row: one or two servo periods.
+HALL_NODISCARD HallResult hall_predictor_start(HallPredictor *predictor, uint16_t age_max_us);
+
+// Takes the reading that `servo` has just made of `frame`; an invalid one is passed over. Call
+// it after each hall_tick.
+HallResult hall_predictor_take(HallPredictor *predictor,
+                               const HallServo *servo,
+                               const HallFrame *frame,
+                               const HallReading *reading);
+
+// X, Y, Rz at a time of the frames' clock (us, wrapping), by the slope of the last eight valid
+// poses. `false`, and zeros, before there are eight in a row, for a time before the last one or
+// further after it than the largest age, and for a predictor that was never started.
+HALL_NODISCARD
+bool hall_predict(const HallPredictor *predictor,
+                  uint32_t time_us,
+                  HallPlanarPose *pose);
 
 #ifdef __cplusplus
 }  // extern "C"

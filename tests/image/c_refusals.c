@@ -38,6 +38,35 @@ static int refuses(HallServo *none, HallResult expected)
     return 0;
 }
 
+/* A stage that moves along X. The first pose goes by: the zero deviation is new to the predictor. */
+static int predicts(void)
+{
+    HallPredictor predictor;
+    HallPlanarPose pose;
+    HallReading reading = { 0 };
+    memset(&predictor, 0xa5, sizeof predictor);
+    CHECK(!hall_predict(&predictor, 0, &pose) && pose.x_m == 0);
+    CHECK(hall_predictor_take(&predictor, &servo, &frame, &reading) == HALL_RESULT_NOT_STARTED);
+    CHECK(hall_predictor_start(NULL, 4000) == HALL_RESULT_NULL_POINTER);
+    CHECK(hall_predictor_start(&predictor, 4000) == HALL_RESULT_OK);
+    hall_forget(&servo);
+    for (uint32_t k = 0; k < 9; k++) {
+        HallFrame moved = frame;
+        moved.hall[2] += 160 * (int32_t)k;
+        moved.sequence = k;
+        moved.time_us = 2000 * k;
+        CHECK(hall_tick(&servo, &moved, &reading) == HALL_RESULT_OK);
+        CHECK(!hall_predict(&predictor, 2000 * k, &pose));
+        CHECK(hall_predictor_take(&predictor, &servo, &moved, &reading) == HALL_RESULT_OK);
+    }
+    CHECK(hall_predict(&predictor, 16000, &pose) && pose.x_m == reading.x_m);
+    const float at_the_sample = pose.x_m;
+    CHECK(hall_predict(&predictor, 16300, &pose) && pose.x_m > at_the_sample);
+    CHECK(!hall_predict(&predictor, 20001, &pose) && pose.x_m == 0);
+    CHECK(!hall_predict(NULL, 16000, &pose) && !hall_predict(&predictor, 16000, NULL));
+    return 0;
+}
+
 static int run(void)
 {
     const size_t length = (size_t)_parameter_slot_bytes;
@@ -89,7 +118,7 @@ static int run(void)
     CHECK(again.status & HALL_STATUS_ZERO_SET);
     CHECK(hall_rezero_start(&servo, 249) == HALL_RESULT_OK);
     CHECK(hall_rezero_state(&servo) == HALL_REZERO_TOO_SHORT);
-    return 0;
+    return predicts();
 }
 
 int main(void)

@@ -19,6 +19,7 @@ extern const uint8_t _parameter_slot_0[], _parameter_slot_bytes[];
 
 static HallDecoder decoder;
 static HallServo servo;
+static HallPredictor predictor;
 
 /* Stands for the converters: the third period has no code of probe A, the sixth no frame. */
 static bool read_frame(uint32_t period, HallFrame *frame)
@@ -44,13 +45,25 @@ int main(void)
     HallResult started = hall_servo_start(&servo, &decoder, 2);
     if (started != HALL_RESULT_OK)
         return (int)started;
+    HallResult begun = hall_predictor_start(&predictor, 4000);
+    if (begun != HALL_RESULT_OK)
+        return (int)begun;
     for (uint32_t period = 0; period < 10; period++) {
         HallFrame frame;
         HallReading reading;
-        if (read_frame(period, &frame))
+        if (read_frame(period, &frame)) {
             hall_tick(&servo, &frame, &reading);
-        else
+            hall_predictor_take(&predictor, &servo, &frame, &reading);
+        } else {
             hall_tick_without_frame(&servo, &reading);
+        }
+        /* Where the stage is when the forces change, 300 us after the sample, if that is known. */
+        HallPlanarPose now;
+        if (hall_predict(&predictor, frame.time_us + 300, &now)) {
+            reading.x_m = now.x_m;
+            reading.y_m = now.y_m;
+            reading.rz_rad = now.rz_rad;
+        }
         /* A controller moves on only what was measured, or held for a moment. */
         bool usable = !(reading.status & HALL_STATUS_PLANAR_INVALID)
                       || (reading.status & HALL_STATUS_PLANAR_HELD);

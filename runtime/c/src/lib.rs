@@ -13,8 +13,8 @@ mod types;
 use core::ffi::{CStr, c_char};
 use core::mem::MaybeUninit;
 use runtime::zero_offset::{ZeroOffsetRefusal, ZeroOffsetSettings, ZeroOffsetState};
-use runtime::{AnyDecoder, BlobError, OnInvalid, ParameterSet, PoseTracker, Reading};
-pub use storage::{HallDecoder, HallServo};
+use runtime::{AnyDecoder, BlobError, OnInvalid, ParameterSet, PoseTracker, Predictor, Reading};
+pub use storage::{HallDecoder, HallPredictor, HallServo};
 pub use types::{
     HALL_RUNTIME_VERSION, HallFrame, HallHealth, HallPlanarPose, HallReading, HallResult,
     HallRezero,
@@ -179,6 +179,61 @@ pub extern "C" fn hall_health(servo: Option<&HallServo>) -> HallHealth {
         .map(PoseTracker::health)
         .unwrap_or_default()
         .into()
+}
+
+/// Starts a predictor without poses. `age_max_us` is the largest age of a pose that is carried
+/// on, and the longest time between two poses in a row: one or two servo periods.
+#[must_use]
+#[unsafe(no_mangle)]
+pub extern "C" fn hall_predictor_start(
+    predictor: Option<&mut MaybeUninit<HallPredictor>>,
+    age_max_us: u16,
+) -> HallResult {
+    let Some(predictor) = predictor else {
+        return HallResult::NullPointer;
+    };
+    predictor.write(HallPredictor::new(Predictor::new(age_max_us)));
+    HallResult::Ok
+}
+
+/// Takes the reading that `servo` has just made of `frame`; an invalid one is passed over. Call
+/// it after each hall_tick.
+#[unsafe(no_mangle)]
+pub extern "C" fn hall_predictor_take(
+    predictor: Option<&mut HallPredictor>,
+    servo: Option<&HallServo>,
+    frame: Option<&HallFrame>,
+    reading: Option<&HallReading>,
+) -> HallResult {
+    let (Some(predictor), Some(servo), Some(frame), Some(reading)) =
+        (predictor, servo, frame, reading)
+    else {
+        return HallResult::NullPointer;
+    };
+    let (Some(predictor), Some(servo)) = (predictor.get_mut(), servo.get()) else {
+        return HallResult::NotStarted;
+    };
+    predictor.take(servo, &frame.raw(), &reading.into());
+    HallResult::Ok
+}
+
+/// X, Y, Rz at a time of the frames' clock (us, wrapping), by the slope of the last eight valid
+/// poses. `false`, and zeros, before there are eight in a row, for a time before the last one or
+/// further after it than the largest age, and for a predictor that was never started.
+#[must_use]
+#[unsafe(no_mangle)]
+pub extern "C" fn hall_predict(
+    predictor: Option<&HallPredictor>,
+    time_us: u32,
+    pose: Option<&mut MaybeUninit<HallPlanarPose>>,
+) -> bool {
+    let Some(pose) = pose else {
+        return false;
+    };
+    let predicted = predictor.and_then(HallPredictor::get);
+    let predicted = predicted.and_then(|predictor| predictor.pose_at(time_us));
+    pose.write(predicted.map_or(HallPlanarPose::ZERO, HallPlanarPose::from));
+    predicted.is_some()
 }
 
 /// The servo that C points to, if it was started.

@@ -1,12 +1,15 @@
-//! Room for a decoder and a servo, of a size that C knows.
+//! Room for a decoder, a servo and a predictor, of a size that C knows.
 
 use core::mem::{ManuallyDrop, MaybeUninit, align_of, size_of};
-use runtime::{AnyDecoder, PoseTracker};
+use runtime::{AnyDecoder, PoseTracker, Predictor};
 
 /// Words of a decoder.
 pub const HALL_DECODER_WORDS: usize = 114;
 /// Words of a servo.
 pub const HALL_SERVO_WORDS: usize = 55;
+
+/// Words of a predictor.
+pub const HALL_PREDICTOR_WORDS: usize = 37;
 
 /// A decoder, as C sees it. Its contents are private.
 #[repr(C)]
@@ -20,6 +23,13 @@ pub struct HallDecoder {
 pub struct HallServo {
     mark: u32,
     opaque: [MaybeUninit<u32>; HALL_SERVO_WORDS],
+}
+
+/// A predictor, as C sees it. Its contents are private.
+#[repr(C)]
+pub struct HallPredictor {
+    mark: u32,
+    opaque: [MaybeUninit<u32>; HALL_PREDICTOR_WORDS],
 }
 
 /// Lets a room be filled with its content and marked as filled. A room of C may never have been
@@ -47,6 +57,20 @@ macro_rules! room {
     };
 }
 
+/// Lets the content of a room be changed.
+macro_rules! changing_room {
+    ($room:ident, $content:ty) => {
+        impl $room {
+            /// As `get`, to be changed.
+            pub(crate) fn get_mut(&mut self) -> Option<&mut $content> {
+                self.get()?;
+                // SAFETY: as in `get`; the borrow is unique.
+                Some(unsafe { &mut *(&raw mut self.opaque).cast() })
+            }
+        }
+    };
+}
+
 room!(HallDecoder, HALL_DECODER_WORDS, AnyDecoder, 0x9c3e_51d7);
 room!(
     HallServo,
@@ -54,12 +78,6 @@ room!(
     PoseTracker<&'static AnyDecoder>,
     0x6ab4_e825
 );
-
-impl HallServo {
-    /// As `get`, to be changed.
-    pub(crate) fn get_mut(&mut self) -> Option<&mut PoseTracker<&'static AnyDecoder>> {
-        self.get()?;
-        // SAFETY: as in `get`; the borrow is unique.
-        Some(unsafe { &mut *(&raw mut self.opaque).cast() })
-    }
-}
+room!(HallPredictor, HALL_PREDICTOR_WORDS, Predictor, 0x5e17_c2a9);
+changing_room!(HallServo, PoseTracker<&'static AnyDecoder>);
+changing_room!(HallPredictor, Predictor);

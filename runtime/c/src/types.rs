@@ -1,7 +1,7 @@
 //! What C hands in and gets back.
 
 use runtime::tracker::Health;
-use runtime::{PlanarPose, RawFrame, Reading};
+use runtime::{PlanarPose, Pose, RawFrame, Reading, Status, VerticalPose};
 
 /// Major version of the library that this header belongs to.
 pub const HALL_RUNTIME_VERSION_MAJOR: u32 = 0;
@@ -63,7 +63,7 @@ pub enum HallResult {
     OtherStage = 10,
     /// The decoder was never loaded.
     NotLoaded = 11,
-    /// The servo was never started.
+    /// The servo or the predictor was never started.
     NotStarted = 12,
 }
 
@@ -138,6 +138,32 @@ pub struct HallReading {
     pub status: u32,
 }
 
+/// Hall code A is at a rail, implausible or missing.
+pub const HALL_STATUS_HALL_A: u32 = 1 << 0;
+/// Hall code B likewise.
+pub const HALL_STATUS_HALL_B: u32 = 1 << 1;
+/// Hall code C likewise.
+pub const HALL_STATUS_HALL_C: u32 = 1 << 2;
+/// Capacitive code 1 is at a rail, implausible or missing.
+pub const HALL_STATUS_CAPACITIVE_1: u32 = 1 << 3;
+/// Capacitive code 2 likewise.
+pub const HALL_STATUS_CAPACITIVE_2: u32 = 1 << 4;
+/// Capacitive code 3 likewise.
+pub const HALL_STATUS_CAPACITIVE_3: u32 = 1 << 5;
+/// The sensitivity of probe A is too near zero, or not finite.
+pub const HALL_STATUS_SENSITIVITY_A: u32 = 1 << 6;
+/// That of probe B likewise.
+pub const HALL_STATUS_SENSITIVITY_B: u32 = 1 << 7;
+/// That of probe C likewise.
+pub const HALL_STATUS_SENSITIVITY_C: u32 = 1 << 8;
+/// A planar result is not finite.
+pub const HALL_STATUS_PLANAR_NOT_FINITE: u32 = 1 << 9;
+/// A vertical result is not finite.
+pub const HALL_STATUS_VERTICAL_NOT_FINITE: u32 = 1 << 10;
+/// Z, Rx or Ry lies outside the calibrated range.
+pub const HALL_STATUS_VERTICAL_EXTRAPOLATED: u32 = 1 << 11;
+/// X, Y or Rz lies outside the calibrated range.
+pub const HALL_STATUS_PLANAR_EXTRAPOLATED: u32 = 1 << 12;
 /// X, Y, Rz are invalid.
 pub const HALL_STATUS_PLANAR_INVALID: u32 = 1 << 13;
 /// Z, Rx, Ry are invalid.
@@ -153,13 +179,37 @@ pub const HALL_STATUS_FRAME_REPEATED: u32 = 1 << 18;
 /// A zero deviation is subtracted from X, Y, Rz. No fault.
 pub const HALL_STATUS_ZERO_SET: u32 = 1 << 19;
 
-const _: () = assert!(HALL_STATUS_PLANAR_INVALID == runtime::Status::PLANAR_INVALID.bits());
-const _: () = assert!(HALL_STATUS_VERTICAL_INVALID == runtime::Status::VERTICAL_INVALID.bits());
-const _: () = assert!(HALL_STATUS_PLANAR_HELD == runtime::Status::PLANAR_HELD.bits());
-const _: () = assert!(HALL_STATUS_VERTICAL_HELD == runtime::Status::VERTICAL_HELD.bits());
-const _: () = assert!(HALL_STATUS_FRAMES_MISSED == runtime::Status::FRAMES_MISSED.bits());
-const _: () = assert!(HALL_STATUS_FRAME_REPEATED == runtime::Status::FRAME_REPEATED.bits());
-const _: () = assert!(HALL_STATUS_ZERO_SET == runtime::Status::ZERO_SET.bits());
+/// Every bit has its name here, lowest first.
+const _: () = {
+    let bits = [
+        HALL_STATUS_HALL_A,
+        HALL_STATUS_HALL_B,
+        HALL_STATUS_HALL_C,
+        HALL_STATUS_CAPACITIVE_1,
+        HALL_STATUS_CAPACITIVE_2,
+        HALL_STATUS_CAPACITIVE_3,
+        HALL_STATUS_SENSITIVITY_A,
+        HALL_STATUS_SENSITIVITY_B,
+        HALL_STATUS_SENSITIVITY_C,
+        HALL_STATUS_PLANAR_NOT_FINITE,
+        HALL_STATUS_VERTICAL_NOT_FINITE,
+        HALL_STATUS_VERTICAL_EXTRAPOLATED,
+        HALL_STATUS_PLANAR_EXTRAPOLATED,
+        HALL_STATUS_PLANAR_INVALID,
+        HALL_STATUS_VERTICAL_INVALID,
+        HALL_STATUS_PLANAR_HELD,
+        HALL_STATUS_VERTICAL_HELD,
+        HALL_STATUS_FRAMES_MISSED,
+        HALL_STATUS_FRAME_REPEATED,
+        HALL_STATUS_ZERO_SET,
+    ];
+    assert!(bits.len() == Status::NAMES.len());
+    let mut k = 0;
+    while k < bits.len() {
+        assert!(bits[k] == Status::NAMES[k].0.bits());
+        k += 1;
+    }
+};
 const _: () = assert!(HALL_MISSING_CODE == runtime::frame::MISSING_CODE);
 
 /// Counters since start. They stay at their largest value.
@@ -237,6 +287,26 @@ impl From<Reading> for HallReading {
             rx_rad: vertical.rx_rad,
             ry_rad: vertical.ry_rad,
             status: reading.status.bits(),
+        }
+    }
+}
+
+impl From<&HallReading> for Reading {
+    fn from(reading: &HallReading) -> Self {
+        Self {
+            pose: Pose {
+                planar: PlanarPose {
+                    x_m: reading.x_m,
+                    y_m: reading.y_m,
+                    rz_rad: reading.rz_rad,
+                },
+                vertical: VerticalPose {
+                    z_m: reading.z_m,
+                    rx_rad: reading.rx_rad,
+                    ry_rad: reading.ry_rad,
+                },
+            },
+            status: Status::from_bits(reading.status),
         }
     }
 }
