@@ -3,7 +3,14 @@
 use std::path::{Path, PathBuf};
 
 /// Images for the boards that QEMU models for tests; the others have the project's own map.
-const MPS2: [&str; 4] = ["compare", "measure", "panic_free", "bare"];
+const MPS2: [&str; 6] = [
+    "compare",
+    "measure",
+    "panic_free",
+    "bare",
+    "rtic_task",
+    "embassy_task",
+];
 const STM32F405: [&str; 1] = ["control_loop"];
 
 fn main() {

@@ -5,14 +5,25 @@
 //! panic can be reached, and there is no image: so every image that links is free of panics.
 #![no_std]
 
+#[cfg(feature = "tasks")]
+pub mod example;
 #[path = "../../src/job.rs"]
 pub mod job;
 pub mod semihost;
 
+#[cfg(not(feature = "tasks"))]
 unsafe extern "C" {
     fn a_panic_can_be_reached() -> !;
 }
 
+/// The examples of tasks link code of others, which may panic.
+#[cfg(feature = "tasks")]
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    semihost::exit(false)
+}
+
+#[cfg(not(feature = "tasks"))]
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     // SAFETY: never executed: an image with this call does not link.

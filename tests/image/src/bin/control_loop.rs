@@ -13,7 +13,7 @@ use core::fmt::Write;
 use cortex_m_rt::entry;
 use image::semihost::{CONSOLE, File, exit};
 use runtime::frame::MISSING_CODE;
-use runtime::{BlobError, OnInvalid, ParameterSet, PlanarPose, PoseTracker, RawFrame};
+use runtime::{BlobError, OnInvalid, ParameterSet, PlanarPose, PoseTracker, Predictor, RawFrame};
 
 unsafe extern "C" {
     // Their addresses are what memory.x says; there is nothing to read at them but bytes.
@@ -27,6 +27,9 @@ const SERIAL: Option<&str> = option_env!("HALL_STAGE_SERIAL");
 
 /// Periods that this example runs.
 const PERIODS: u32 = 12;
+
+/// From the sample to the change of the forces, us.
+const FORCES_US: u32 = 300;
 
 /// The bytes of a parameter slot.
 fn slot(number: usize) -> &'static [u8] {
@@ -122,12 +125,19 @@ fn main() -> ! {
     };
     let decoder = set.decoder();
     let mut tracker = PoseTracker::new(decoder, OnInvalid::Hold { ticks: 2 });
+    let mut predictor = Predictor::new(4_000);
     for period in 0..PERIODS {
         let reading = match converters(period) {
-            Some(frame) => tracker.tick(&frame),
+            Some(frame) => {
+                let reading = tracker.tick(&frame);
+                predictor.take(&tracker, &frame, &reading);
+                reading
+            }
             None => tracker.tick_without_frame(),
         };
-        match reading.planar_or_held() {
+        // Where the stage is when the forces change, if eight poses in a row tell.
+        let predicted = predictor.pose_at(2000 * period + FORCES_US);
+        match predicted.or(reading.planar_or_held()) {
             Some(pose) => coils(&mut console, period, control(&pose)),
             // Nothing measured for too long: let the stage down rather than guess.
             None => coils(&mut console, period, [0.0; 3]),
