@@ -8,6 +8,7 @@ use core::hint::black_box;
 
 /// How floating-point arithmetic is set wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ArithmeticFault {
     /// Subnormal numbers become zero.
     SubnormalsLost,

@@ -2,16 +2,21 @@
 //!
 //! The gap at (x, y) changes by g = Z + Rx y - Ry x.
 
+#[cfg(feature = "host")]
 use crate::geometry::inverse_rows;
 use crate::model::dot;
 use crate::pose::VerticalPose;
-use crate::real::{Number, Real};
+use crate::real::Number;
+#[cfg(feature = "host")]
+use crate::real::Real;
 
 /// Coordinates of the three capacitive probes, (x, y) in m.
+#[cfg(feature = "host")]
 pub type ProbePositions<T> = [[T; 2]; 3];
 
 /// The rows Z, Rx, Ry of the matrix that turns three gap changes (m) into the vertical
 /// pose (m, rad, rad); `None` when the probes stand in one line.
+#[cfg(feature = "host")]
 pub fn vertical_rows<T: Real>(probes_m: &ProbePositions<T>) -> Option<[[T; 3]; 3]> {
     inverse_rows(&probes_m.map(|[x, y]| [T::ONE, y, -x]))
 }
@@ -27,6 +32,7 @@ pub fn vertical_pose<T: Number>(rows: &[[T; 3]; 3], gaps: [T; 3]) -> VerticalPos
 }
 
 /// The gap changes, in m, that the three probes read at a vertical pose.
+#[cfg(feature = "host")]
 pub fn gaps_m<T: Number>(probes_m: &ProbePositions<T>, vertical: &VerticalPose<T>) -> [T; 3] {
     probes_m.map(|[x, y]| (vertical.z_m + vertical.rx_rad * y) - vertical.ry_rad * x)
 }

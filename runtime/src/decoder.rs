@@ -43,6 +43,7 @@ pub struct DecoderConstants<T> {
 
 /// A pose and what is wrong with it. Invalid fields are zero unless held.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct Reading {
     /// The pose; fields that `status` calls invalid are 0, or the last valid ones if held.

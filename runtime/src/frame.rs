@@ -13,6 +13,7 @@ pub const CODE_MAGNITUDE_MAX: i32 = 1 << 23;
 /// The codes of one servo period. Time and sequence arrive as data: the runtime reads
 /// no clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct RawFrame {
     /// Hall codes of the probes A, B, C.
@@ -30,6 +31,7 @@ pub struct RawFrame {
 /// The narrowest sensible window leaves out the converter's two end codes, since a
 /// saturated converter gives those for every larger signal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct CodeWindow {
     /// Smallest accepted code.

@@ -45,17 +45,27 @@
 
 pub mod arithmetic;
 pub mod blob;
+#[cfg(feature = "host")]
 pub mod calibration;
+#[cfg(feature = "host")]
 pub mod capacitive;
+#[cfg(not(feature = "host"))]
+mod capacitive;
 pub mod decoder;
 pub mod frame;
+#[cfg(feature = "host")]
 pub mod geometry;
+#[cfg(not(feature = "host"))]
+mod geometry;
 mod layout;
 pub mod model;
 pub mod parameters;
 pub mod pose;
 pub mod prediction;
+#[cfg(feature = "host")]
 pub mod real;
+#[cfg(not(feature = "host"))]
+mod real;
 #[cfg(test)]
 #[path = "sample_for_tests.rs"]
 mod sample;
@@ -65,6 +75,7 @@ pub mod tracker;
 pub mod zero_offset;
 
 pub use blob::BlobError;
+#[cfg(feature = "host")]
 pub use calibration::Calibration;
 pub use decoder::{AnyDecoder, Decode, Decoder, Reading};
 pub use frame::RawFrame;

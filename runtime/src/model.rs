@@ -48,6 +48,7 @@ pub trait Model: Copy + Debug + PartialEq + 'static {
 ///
 /// The order is part of the blob's layout: add new kinds at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ModelKind {
     /// Model (12): geometry only.
     M12,

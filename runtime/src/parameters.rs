@@ -91,6 +91,7 @@ pub const RANGE_MAX: f32 = 1.0;
 
 /// What is wrong with a parameter set.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ParameterError {
     /// A number of this group is NaN or infinite.
     NotFinite {

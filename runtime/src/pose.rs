@@ -20,6 +20,7 @@ use crate::real::Number;
 
 /// Motion in the plane, by the Hall probes: X and Y in m, Rz in rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct PlanarPose<T> {
     /// Displacement along X, m.
@@ -32,6 +33,7 @@ pub struct PlanarPose<T> {
 
 /// Motion out of the plane, by the capacitive sensors: Z in m, Rx and Ry in rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct VerticalPose<T> {
     /// Displacement along Z, m.
@@ -44,6 +46,7 @@ pub struct VerticalPose<T> {
 
 /// All six degrees of freedom, as the target gives them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct Pose {
     /// X, Y, Rz.

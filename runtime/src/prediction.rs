@@ -80,13 +80,18 @@ impl Predictor {
     /// Takes the reading that `tracker` has just made of `frame`; an invalid one is passed over.
     /// The poses start anew when the time does not go on, or by more than the largest age, and
     /// when the zero deviation changes.
+    #[inline(always)]
     pub fn take<D: Decode>(
         &mut self,
         tracker: &PoseTracker<D>,
         frame: &RawFrame,
         reading: &Reading,
     ) {
-        let zero = tracker.zero();
+        self.take_less(tracker.zero(), frame, reading);
+    }
+
+    /// Takes a reading less this zero deviation.
+    fn take_less(&mut self, zero: PlanarPose<f32>, frame: &RawFrame, reading: &Reading) {
         if zero != self.zero {
             // A re-zero that ended in this tick holds from the next one on.
             (self.zero, self.taken) = (zero, 0);

@@ -21,6 +21,7 @@
 
 /// The status of one reading, as a bit mask. See the module's table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(transparent)]
 pub struct Status(u32);
 

@@ -13,6 +13,7 @@ use crate::zero_offset::{ZeroOffsetRefusal, ZeroOffsetRun, ZeroOffsetSettings, Z
 
 /// What an invalid field reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum OnInvalid {
     /// Zero, marked invalid.
     #[default]
@@ -27,6 +28,7 @@ pub enum OnInvalid {
 
 /// Counters since start. They saturate: they never wrap to a good-looking zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct Health {
     /// Ticks, with and without a frame.

@@ -13,6 +13,7 @@ use crate::status::Status;
 
 /// How long to average, and what still counts as rest at the zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ZeroOffsetSettings {
     /// Ticks to average, [`ZeroOffsetSettings::TICKS_MIN`] or more; an odd number is rounded down
     /// to even.
@@ -56,6 +57,7 @@ impl Default for ZeroOffsetSettings {
 
 /// Why a re-zero was refused. The zero deviation stays as it was.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ZeroOffsetRefusal {
     /// Fewer than [`ZeroOffsetSettings::TICKS_MIN`] ticks were asked for.
     TooShort {
@@ -97,6 +99,7 @@ pub enum ZeroOffsetRefusal {
 
 /// Where a re-zero stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ZeroOffsetState {
     /// None was asked for.
     Idle,

@@ -4,7 +4,7 @@
 use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
 use nalgebra::Matrix3;
-use runtime::geometry::{SensingAxes, inverse_rows, matrix};
+use runtime::geometry::{SensingAxes, inverse_rows};
 
 /// The point (G, r) of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,14 +17,14 @@ pub struct Point {
 
 /// The point (G, r) of a set of parameters, or `None` where PM is singular or an eta is zero.
 pub fn point_of(p: &Parameters) -> Option<Point> {
-    let inverse = matrix(&inverse_rows(&p.geometry().plane_rows())?);
+    let inverse = inverse_rows(&p.geometry().plane_rows())?;
     let eta = p.eta();
     if eta.iter().any(|eta| !eta.is_normal()) {
         return None;
     }
     let slopes = p.slopes();
     Some(Point {
-        gain: Matrix3::from_fn(|i, j| inverse[(i, j)] / eta[j]),
+        gain: Matrix3::from_fn(|i, j| inverse[i][j] / eta[j]),
         ratios: [0, 1, 2].map(|probe| slopes[probe].map(|slope| slope / eta[probe])),
     })
 }

@@ -9,7 +9,7 @@ use crate::problem::parameters::Parameters;
 use crate::problem::{Problem, TrainRow};
 use crate::solve::least_squares::gains::Point;
 use nalgebra::{Matrix3, Vector3};
-use runtime::geometry::{inverse_rows, matrix};
+use runtime::geometry::inverse_rows;
 
 /// The slopes over eta of A, B, C.
 struct Ratios(Matrix3<f64>);
@@ -120,4 +120,8 @@ pub fn best_gain(
     let left = squares - (gain * mixed).diagonal();
     // Rounding could make an exact fit negative.
     Some((gain, left.map(|left| left.max(0.0))))
+}
+/// A matrix from its rows.
+fn matrix(rows: &[[f64; 3]; 3]) -> Matrix3<f64> {
+    Matrix3::from(*rows).transpose()
 }
