@@ -136,6 +136,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         is_field: fit.is_some_and(|fit| fit.field.is_some()),
         errors: fit.map(|fit| &fit.all.errors),
         limits: [None; 3],
+        in_service: false,
     };
     let mut outputs = Outputs::default();
     let checked = checked(&log, fitted.as_ref(), &diagnosis);

@@ -134,6 +134,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         is_field,
         errors: Some(&judgement.errors),
         limits: own.map(|rms| (rms > 0.0).then_some(limit * rms)),
+        in_service: false,
     };
     let mut hidden = report.hidden();
     hidden.push("trusted_inputs");

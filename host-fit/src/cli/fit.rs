@@ -102,7 +102,8 @@ pub(super) struct FitArgs {
     /// What to do with rows that cannot be used.
     #[arg(long, value_parser = choice::<BadRows>(), default_value = "refuse")]
     bad_rows: BadRows,
-    /// Largest rms errors over all rows; beyond, no blob is written.
+    /// Largest rms errors, of the field model in service, of others over all rows; beyond, no blob is
+    /// written.
     #[arg(long, value_name = "x=1.5um,...")]
     limit: Option<Limits>,
     /// Write the blob of a log that is refused, or of a fit beyond --limit; the blob says so.
@@ -168,10 +169,20 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         };
     }
     let findings = &diagnosis.findings;
+    // The field model is made for service, other models for movements like those of the log.
+    let is_field = fitted.as_ref().is_ok_and(|fit| fit.field.is_some());
+    let in_service = diagnosis
+        .predicted
+        .map(|predicted| predicted.rms)
+        .filter(|_| is_field);
     let refusal = match &fitted {
         Err(error) => Some(failed(error, findings).to_string()),
-        Ok(fit) => refusal(fit, findings, args.limit.as_ref())
-            .or_else(|| unfinished(fit, &log).filter(|_| is_interrupted)),
+        Ok(fit) => refusal(
+            findings,
+            in_service.unwrap_or(fit.all.errors.axes.map(|a| a.rms)),
+            args.limit.as_ref(),
+        )
+        .or_else(|| unfinished(fit, &log).filter(|_| is_interrupted)),
     };
     let has_blob = fitted.is_ok() && (refusal.is_none() || args.force);
     if let (Some(cause), true, false) = (&refusal, is_interrupted, has_blob) {
@@ -226,9 +237,10 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let subject = Subject {
         end,
         diagnosis: &diagnosis,
-        is_field: found.is_some_and(|(fit, _)| fit.field.is_some()),
+        is_field,
         errors: found.map(|(fit, _)| &fit.all.errors),
         limits: args.limit.unwrap_or_default().0,
+        in_service: in_service.is_some(),
     };
     let source = || source(args, (&log, &stage), subject, found);
     args.report.add(&mut outputs, source)?;
@@ -295,10 +307,10 @@ fn settings(args: &FitArgs) -> Result<FitSettings, HostError> {
 }
 
 /// Why a fit is not to be written.
-fn refusal(fit: &Fit, findings: &[Finding], limits: Option<&Limits>) -> Option<String> {
+fn refusal(findings: &[Finding], rms: [f64; 3], limits: Option<&Limits>) -> Option<String> {
     let refused = finding::messages(findings, Severity::Refuse);
     if refused.is_empty() {
-        return limits?.exceeded(&fit.all.errors);
+        return limits?.exceeded(rms);
     }
     Some(format!("the log is refused: {refused}"))
 }

@@ -1,6 +1,5 @@
-//! Quality gates on the rms errors: `--limit x=1.5um,y=1um,rz=4urad`.
+//! Largest rms errors: `--limit x=1.5um,y=1um,rz=4urad`.
 
-use crate::judge::statistics::PoseError;
 use std::str::FromStr;
 
 /// Name, unit in messages and units on the command line of an axis.
@@ -48,10 +47,10 @@ impl FromStr for Limits {
 }
 
 impl Limits {
-    /// The axes whose rms error is beyond its limit; `None` if there are none.
-    pub(super) fn exceeded(&self, errors: &PoseError) -> Option<String> {
+    /// The axes whose rms error (m, m, rad) is beyond its limit; `None` if there are none.
+    pub(super) fn exceeded(&self, rms: [f64; 3]) -> Option<String> {
         let beyond = (0..3).filter_map(|axis| {
-            let (limit, rms) = (self.0[axis]?, errors.axes[axis].rms);
+            let (limit, rms) = (self.0[axis]?, rms[axis]);
             let (name, unit, _) = AXES[axis];
             (rms > limit).then(|| {
                 format!(
@@ -69,7 +68,6 @@ impl Limits {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::judge::statistics::AxisError;
 
     #[test]
     fn limits_are_read_with_their_units() {
@@ -97,17 +95,9 @@ mod tests {
 
     #[test]
     fn only_errors_beyond_their_limit_are_told() {
-        let axis = |rms| AxisError {
-            rms,
-            ..AxisError::default()
-        };
-        let errors = PoseError {
-            axes: [axis(1e-6), axis(2e-6), axis(3e-6)],
-            rows: 1,
-        };
         let exceeded = |text: &str| {
             let limits: Limits = text.parse().expect("limits");
-            limits.exceeded(&errors)
+            limits.exceeded([1e-6, 2e-6, 3e-6])
         };
         assert_eq!(exceeded("x=1.1um,y=2.1um,rz=3.1urad"), None);
         let message = exceeded("x=1.1um,y=1.9um").expect("beyond");

@@ -104,6 +104,7 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         is_field: true,
         errors: Some(&new.judgement.errors),
         limits: [None; 3],
+        in_service: false,
     };
     let hidden = ["warnings", "findings", "verdict", "predicted"];
     finish(outputs, &tables(&figures, &hidden), &warnings, &subject)?;

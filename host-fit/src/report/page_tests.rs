@@ -53,6 +53,7 @@ fn subject<'a>(end: End<'a>, diagnosis: &'a Diagnosis) -> Subject<'a> {
         is_field: false,
         errors: None,
         limits: [None; 3],
+        in_service: false,
     }
 }
 

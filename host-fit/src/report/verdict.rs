@@ -35,6 +35,8 @@ pub struct Subject<'a> {
     pub errors: Option<&'a PoseError>,
     /// Largest rms errors of X, Y, Rz: m, m, rad.
     pub limits: [Option<f64>; 3],
+    /// Whether these hold for the errors in service, in place of those on the log.
+    pub in_service: bool,
 }
 
 /// Verdict, errors by axis, and what to do.
@@ -145,10 +147,10 @@ fn axes(of: &Subject, predicted: Option<&Predicted>) -> Table {
         let own = noise
             .filter(|_| of.is_field)
             .map(|noise| LIMITED_MAX * noise);
-        // What --limit asks for holds on the log, what follows from the noise in service.
+        // What follows from the noise holds in service.
         let (limit, measured) = match of.limits[axis] {
-            Some(limit) => (Some(limit), rms),
-            None => (own, service),
+            Some(limit) if !of.in_service => (Some(limit), rms),
+            limit => (limit.or(own), service),
         };
         let passes = limit.zip(measured).map(|(limit, rms)| rms <= limit);
         let micro = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{:.2}", x * 1e6));
@@ -223,6 +225,7 @@ mod tests {
             is_field,
             errors: Some(&errors),
             limits: [None, Some(0.9e-6), None],
+            in_service: false,
         })
     }
 
