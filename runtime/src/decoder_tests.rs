@@ -1,8 +1,8 @@
-//! Tests of the tick: every status bit, what is zero when, no NaN, `f32` against `f64`.
+//! Tests of the tick: limits, `f32` against `f64`. Every status bit, what is zero when and no NaN:
+//! `decoder_word_tests.rs`.
 
 use super::*;
 use crate::calibration::Calibration;
-use crate::frame::MISSING_CODE;
 use crate::model::Sensitivity;
 use crate::sample;
 
@@ -47,58 +47,6 @@ pub(super) fn words(reading: &Reading) -> [u32; 7] {
 }
 
 #[test]
-fn a_bad_hall_code_sets_its_bit_and_takes_x_y_and_rz() {
-    let good = decode(&decoder(), HALL, CAPACITIVE);
-    for probe in 0..3 {
-        for bad in [-32768, 32767, MISSING_CODE, i32::MAX] {
-            let mut hall = HALL;
-            hall[probe] = bad;
-            let reading = decode(&decoder(), hall, CAPACITIVE);
-            let bits =
-                Status::from_bits(Status::HALL_A.bits() << probe).with(Status::PLANAR_INVALID);
-            assert!(
-                reading
-                    .status
-                    .any(Status::from_bits(Status::HALL_A.bits() << probe))
-            );
-            let range = Status::PLANAR_EXTRAPOLATED.bits();
-            assert_eq!(
-                reading.status.bits() & !range,
-                bits.bits(),
-                "probe {probe}, code {bad}"
-            );
-            assert_eq!(reading.pose.planar, PlanarPose::ZERO);
-            assert_eq!(reading.pose.vertical, good.pose.vertical);
-            assert_eq!(
-                (reading.planar(), reading.vertical()),
-                (None, good.vertical())
-            );
-        }
-    }
-}
-
-#[test]
-fn a_bad_capacitive_code_sets_its_bit_and_takes_all_six() {
-    for gap in 0..3 {
-        for bad in [-32768, 32767, MISSING_CODE] {
-            let mut capacitive = CAPACITIVE;
-            capacitive[gap] = bad;
-            let reading = decode(&decoder(), HALL, capacitive);
-            let bit = Status::from_bits(Status::CAPACITIVE_1.bits() << gap);
-            assert!(reading.status.any(bit));
-            assert!(reading.status.any(Status::PLANAR_INVALID));
-            assert!(reading.status.any(Status::VERTICAL_INVALID));
-            assert_eq!(
-                reading.status.bits() & Status::CAPACITIVE.bits(),
-                bit.bits()
-            );
-            assert_eq!(reading.pose, Pose::default());
-            assert_eq!((reading.planar(), reading.vertical()), (None, None));
-        }
-    }
-}
-
-#[test]
 fn a_sensitivity_too_near_zero_sets_its_bit_and_takes_x_y_and_rz() {
     for probe in 0..3 {
         for eta in [
@@ -125,28 +73,6 @@ fn a_sensitivity_too_near_zero_sets_its_bit_and_takes_x_y_and_rz() {
             );
         }
     }
-}
-
-#[test]
-fn results_that_are_not_finite_are_marked_and_zero() {
-    for axis in 0..3 {
-        let decoder = changed(|c, _| c.planar_per_code[axis][1] = f32::MAX);
-        let reading = decode(&decoder, HALL, CAPACITIVE);
-        assert!(reading.status.any(Status::PLANAR_NOT_FINITE));
-        assert_eq!(reading.pose.planar, PlanarPose::ZERO);
-        assert!(reading.vertical().is_some());
-        let decoder = changed(|c, _| c.vertical_per_code[axis][1] = f32::NEG_INFINITY);
-        let reading = decode(&decoder, HALL, CAPACITIVE);
-        assert!(reading.status.any(Status::VERTICAL_NOT_FINITE));
-        assert_eq!(reading.pose, Pose::default());
-    }
-    let zero = PlanarPose {
-        x_m: 0.0,
-        y_m: f32::NAN,
-        rz_rad: 0.0,
-    };
-    let reading = decoder().decode(&frame(HALL, CAPACITIVE), &zero);
-    assert!(reading.status.any(Status::PLANAR_NOT_FINITE));
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Tests of what lasts from tick to tick: hold, sequence, counters, re-zero.
+//! Tests of what lasts from tick to tick: counters at their end, re-zero. Hold, sequence, zero and
+//! counters over all kinds of ticks: `tests/soak.rs`.
 
 use super::*;
 use crate::frame::MISSING_CODE;
@@ -41,124 +42,6 @@ fn invalid_fields_read_zero_without_hold() {
             .status
             .any(Status::PLANAR_HELD.with(Status::VERTICAL_HELD))
     );
-}
-
-#[test]
-fn the_last_valid_pose_is_held_for_so_many_ticks_and_no_longer() {
-    let decoder = sample::parameters().decoder();
-    let mut tracker = PoseTracker::new(decoder, HOLD_2);
-    let good = tracker.tick(&frame(0));
-    for sequence in 1..=2 {
-        let held = tracker.tick(&bad_gap(sequence));
-        assert_eq!(held.pose, good.pose);
-        assert!(held.status.any(Status::PLANAR_HELD) && held.status.any(Status::VERTICAL_HELD));
-        assert!(held.status.any(Status::PLANAR_INVALID) && held.planar().is_none());
-        assert_eq!(held.planar_or_held(), Some(good.pose.planar));
-    }
-    let over = tracker.tick(&bad_gap(3));
-    assert_eq!((over.pose, over.planar_or_held()), (NO_POSE, None));
-    assert!(
-        !over
-            .status
-            .any(Status::PLANAR_HELD.with(Status::VERTICAL_HELD))
-    );
-    // A valid pose renews the hold.
-    assert!(tracker.tick(&frame(4)).status.is_good());
-    assert_eq!(tracker.tick(&bad_gap(5)).pose, good.pose);
-    assert_eq!(tracker.health().held, 3);
-}
-
-#[test]
-fn only_what_is_invalid_is_held() {
-    let decoder = sample::parameters().decoder();
-    let mut tracker = PoseTracker::new(decoder, HOLD_2);
-    let good = tracker.tick(&frame(0));
-    let moved = RawFrame {
-        capacitive: [310, -200, 100],
-        ..bad_hall(1)
-    };
-    let reading = tracker.tick(&moved);
-    assert_eq!(reading.pose.planar, good.pose.planar);
-    assert_ne!(reading.pose.vertical, good.pose.vertical);
-    assert!(reading.status.any(Status::PLANAR_HELD) && !reading.status.any(Status::VERTICAL_HELD));
-    assert!(reading.vertical().is_some());
-}
-
-#[test]
-fn nothing_is_held_before_a_first_valid_pose() {
-    let decoder = sample::parameters().decoder();
-    let mut tracker = PoseTracker::new(decoder, HOLD_2);
-    let reading = tracker.tick(&bad_gap(0));
-    assert_eq!(reading.pose, NO_POSE);
-    assert!(
-        !reading
-            .status
-            .any(Status::PLANAR_HELD.with(Status::VERTICAL_HELD))
-    );
-}
-
-#[test]
-fn a_gap_in_the_sequence_is_marked_and_counted() {
-    let decoder = sample::parameters().decoder();
-    let mut tracker = PoseTracker::new(decoder, HOLD_2);
-    tracker.tick(&frame(u32::MAX - 1));
-    let reading = tracker.tick(&frame(2));
-    assert_eq!(reading.status, Status::FRAMES_MISSED);
-    assert!(reading.planar().is_some());
-    assert_eq!(tracker.health().frames_missed, 3);
-    assert!(tracker.tick(&frame(3)).status.is_good());
-}
-
-#[test]
-fn a_repeated_or_older_frame_is_not_decoded() {
-    let decoder = sample::parameters().decoder();
-    let mut tracker = PoseTracker::new(decoder, HOLD_2);
-    let good = tracker.tick(&frame(7));
-    for (sequence, held) in [(7, true), (5, true), (7, false)] {
-        let reading = tracker.tick(&frame(sequence));
-        assert!(reading.status.any(Status::FRAME_REPEATED));
-        assert!(reading.planar().is_none() && reading.vertical().is_none());
-        assert_eq!(reading.pose == good.pose, held, "frame {sequence}");
-    }
-    assert_eq!(tracker.health().frames_repeated, 3);
-    assert!(tracker.tick(&frame(8)).status.is_good());
-}
-
-#[test]
-fn a_period_without_a_frame_holds_and_keeps_the_count_in_step() {
-    let decoder = sample::parameters().decoder();
-    let mut tracker = PoseTracker::new(decoder, HOLD_2);
-    let good = tracker.tick(&frame(0));
-    let reading = tracker.tick_without_frame();
-    assert_eq!(reading.pose, good.pose);
-    assert!(reading.status.any(Status::FRAMES_MISSED) && reading.status.any(Status::PLANAR_HELD));
-    // The missed period was told: the next frame is in step.
-    assert!(tracker.tick(&frame(2)).status.is_good());
-    let health = tracker.health();
-    assert_eq!((health.ticks, health.frames_missed, health.held), (3, 1, 1));
-    assert_eq!((health.planar_invalid, health.vertical_invalid), (1, 1));
-}
-
-#[test]
-fn forgetting_drops_pose_and_sequence_and_keeps_zero_and_counters() {
-    let decoder = sample::parameters().decoder();
-    let mut tracker = PoseTracker::new(decoder, HOLD_2);
-    let zero = PlanarPose {
-        x_m: 1e-6,
-        y_m: 2e-6,
-        rz_rad: 3e-6,
-    };
-    assert!(tracker.set_zero(zero));
-    tracker.tick(&frame(100));
-    tracker.forget();
-    let reading = tracker.tick(&bad_gap(3));
-    assert_eq!(reading.pose, NO_POSE);
-    assert!(
-        !reading
-            .status
-            .any(Status::FRAMES_MISSED.with(Status::FRAME_REPEATED))
-    );
-    assert_eq!((tracker.zero(), tracker.health().ticks), (zero, 2));
 }
 
 #[test]
@@ -234,35 +117,6 @@ fn a_re_zero_at_rest_is_taken_off_from_then_on() {
     ));
     for (before, again) in before.to_array().into_iter().zip(tracker.zero().to_array()) {
         assert!((before - again).abs() < 1e-11);
-    }
-}
-
-#[test]
-fn every_reading_tells_whether_a_zero_deviation_is_subtracted() {
-    let decoder = sample::parameters().decoder();
-    let mut tracker = PoseTracker::new(decoder, HOLD_2);
-    let zero = PlanarPose {
-        rz_rad: 1e-9,
-        ..PlanarPose::ZERO
-    };
-    for (pose, told) in [
-        (PlanarPose::ZERO, false),
-        (zero, true),
-        (PlanarPose::ZERO, false),
-    ] {
-        assert!(tracker.set_zero(pose));
-        tracker.forget();
-        let readings = [
-            tracker.tick(&frame(0)),
-            tracker.tick(&frame(0)),
-            tracker.tick(&bad_hall(1)),
-            tracker.tick(&bad_gap(2)),
-            tracker.tick_without_frame(),
-        ];
-        assert!(readings[0].status.is_good());
-        for reading in readings {
-            assert_eq!(reading.status.any(Status::ZERO_SET), told);
-        }
     }
 }
 
