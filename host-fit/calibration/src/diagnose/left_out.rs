@@ -11,10 +11,18 @@ use crate::judge::identify::check_explained;
 /// Told from this part of the rows on, ...
 const TOLD_MIN: f64 = 0.02;
 /// ... and refused from this on: what the rest says of the stage is no longer what the log says.
-pub(super) const REFUSED_MIN: f64 = 0.08;
+const REFUSED_MIN: f64 = 0.08;
 /// Or from this on, where the errors over all rows are beyond what a fit may leave of the motion and no
 /// channel is found that stood still for as long.
 const UNEXPLAINED_MIN: f64 = 0.05;
+
+/// Of a channel that tells nothing in this share of the rows.
+pub(super) fn severity(share: f64) -> Severity {
+    match share >= REFUSED_MIN {
+        true => Severity::Refuse,
+        false => Severity::Warn,
+    }
+}
 
 /// The rows that count less than half in a fit, or lie in a stretch of such rows.
 pub(super) fn finding(

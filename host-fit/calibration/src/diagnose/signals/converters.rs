@@ -1,6 +1,7 @@
 //! Flat tops: a converter or its amplifier at the end of its range.
 
 use super::channels::{Channel, LogSignals};
+use crate::diagnose::left_out;
 use crate::finding::{Code, Finding};
 use std::ops::Range;
 
@@ -38,7 +39,9 @@ fn of_tops(log: &LogSignals, channel: &Channel, tops: &[Range<usize>]) -> Option
         longest.len(),
         log.places(&starts),
     );
+    let share = rows as f64 / log.len() as f64;
     Some(Finding {
+        severity: left_out::severity(share),
         channel: Some(channel.name.to_owned()),
         value: Some(rows as f64),
         unit: Some("rows"),
@@ -86,22 +89,26 @@ fn of_channel(log: &LogSignals, channel: &Channel, [low, high]: [f64; 2]) -> Vec
 mod tests {
     use crate::diagnose::signals::sample_for_tests::{only, recording};
     use crate::finding::Code;
+    use crate::finding::Severity;
 
     #[test]
     fn flat_tops_are_named_below_the_end_of_the_converter_too() {
-        let mut recording = recording();
-        let all = recording.movements.iter().flatten();
-        let top = all.map(|sample| sample.hall[1]).max().unwrap_or(0) * 9 / 10;
-        let mut clipped = 0;
-        for sample in recording.movements.iter_mut().flatten() {
-            clipped += usize::from(sample.hall[1] >= top);
-            sample.hall[1] = sample.hall[1].min(top);
+        for (tenths, severity) in [(9, Severity::Warn), (4, Severity::Refuse)] {
+            let mut recording = recording();
+            let all = recording.movements.iter().flatten();
+            let top = all.map(|sample| sample.hall[1]).max().unwrap_or(0) * tenths / 10;
+            let mut clipped = 0;
+            for sample in recording.movements.iter_mut().flatten() {
+                clipped += usize::from(sample.hall[1] >= top);
+                sample.hall[1] = sample.hall[1].min(top);
+            }
+            let found = only(&recording, Code::Saturated, Some("hall_b"));
+            assert_eq!(found.severity, severity);
+            let told = found.value.expect("rows");
+            assert!(
+                told > 0.8 * clipped as f64 && told <= clipped as f64,
+                "{told} {clipped}"
+            );
         }
-        let found = only(&recording, Code::Saturated, Some("hall_b"));
-        let told = found.value.expect("rows");
-        assert!(
-            told > 0.8 * clipped as f64 && told <= clipped as f64,
-            "{told} {clipped}"
-        );
     }
 }

@@ -24,10 +24,10 @@ pub(super) fn stuck(
     stood_s: f64,
     share: f64,
 ) -> Finding {
-    let is_refused = share >= left_out::REFUSED_MIN;
-    let in_all = match is_refused {
-        true => format!(", in {:.0} % of the log in all", 100.0 * share),
-        false => String::new(),
+    let severity = left_out::severity(share);
+    let in_all = match severity {
+        Severity::Refuse => format!(", in {:.0} % of the log in all", 100.0 * share),
+        _ => String::new(),
     };
     let message = format!(
         "{who} stood still for {stood_s:.2} s ({}){in_all} while it should have moved or shown its noise: look for a stage that \
@@ -35,10 +35,7 @@ pub(super) fn stuck(
         told.place(first),
     );
     Finding {
-        severity: match is_refused {
-            true => Severity::Refuse,
-            false => Severity::Warn,
-        },
+        severity,
         channel: channel.map(str::to_owned),
         value: Some(stood_s),
         unit: Some("s"),
