@@ -28,7 +28,7 @@ pub const WORDS: u32 = 1;
 pub const BLOB: u32 = 2;
 /// Source: as [`WORDS`], of the field model.
 pub const FIELD_WORDS: u32 = 3;
-/// Source: as [`BLOB`], with X, Y, Rz predicted by [`PredictingServo`].
+/// Source: as [`BLOB`], with X, Y, Rz predicted by [`PredictingTracker`].
 pub const PREDICTED: u32 = 4;
 /// Words of a section's head.
 pub const HEAD_WORDS: usize = 4;
