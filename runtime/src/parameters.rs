@@ -15,7 +15,7 @@ pub type Text = String<32>;
 /// capacitive plane matrix are not in the blob: they are those that the constants give.
 ///
 /// ```
-/// use runtime::{ParameterSet, PlanarPose, RawFrame};
+/// use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
 /// # const BLOB: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/stage.bin"));
 /// # fn main() -> Result<(), runtime::BlobError> {
 /// let set = ParameterSet::from_bytes(BLOB)?; // or `from_flash`, where padding follows
