@@ -61,14 +61,13 @@ const fn gain(channel: &'static str, from: usize, to: usize) -> Family {
 }
 
 const fn offset(channel: &'static str, of: usize) -> Family {
-    // A reset takes an error of the reference off; others stay.
-    let is_beam = of >= 3 && of < 6;
+    // A reset takes an error of the reference off; a gap's stays.
     Family {
         channel,
         channels: (of, of + 1),
         kind: Kind::Offset,
-        steps: !is_beam,
-        to_reset: is_beam,
+        steps: of < 3 || of >= 6,
+        to_reset: of < 6,
         ramp: true,
         ramp_in_movements: of < 6,
     }
@@ -176,8 +175,7 @@ impl Family {
 }
 
 /// A raw column of a fault with its course. What becomes another stage is zero at the end of the log, so that
-/// the parameters are those of the stage as it is then: a new zero of a Hall probe, too, whose part of the pose
-/// changes with the height, as the sensitivity does.
+/// the parameters are those of the stage as it is then; the zero of a Hall probe is set anew.
 pub(super) fn shaped(
     log: &Log,
     raw: &[[f64; 3]],
@@ -185,7 +183,8 @@ pub(super) fn shaped(
     course: Course,
 ) -> Vec<[f64; 3]> {
     let mut shares = shares(log, course);
-    if !family.to_reset && matches!(course, Course::From(_) | Course::Ramp) {
+    let stays = family.kind == Kind::Gain || family.channels.0 >= 6;
+    if stays && matches!(course, Course::From(_) | Course::Ramp) {
         shares.iter_mut().for_each(|share| *share -= 1.0);
     }
     raw.iter()
