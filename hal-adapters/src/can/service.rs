@@ -14,7 +14,7 @@
 //! let (mut host, mut node) = (Mailbox::default(), Service::new(500));
 //! let record = Told::Command(Command::new(Request::Record { on: true }, 17));
 //! let frame = BusFrame::from(host.send(&record).expect("a command"));
-//! let answered = node.take(&frame, None).expect("a command").expect("a sound one");
+//! let answered = node.take(&frame, None::<&mut runtime::PoseTracker>).expect("a command").expect("a sound one");
 //! assert!(node.is_recording());
 //! let answer = host.take(&BusFrame::from(answered.answer.expect("an answer")));
 //! assert!(matches!(answer, Some(Ok(Told::Answer(a))) if a.outcome == Some(Outcome::Done)));
