@@ -163,13 +163,20 @@ impl Job<'_> {
             .map(|family| family.raw(log, &estimate, &by_channel))
             .collect();
         let per_unknown = libm::log(3.0 * log.means.len() as f64);
-        let mut explained = 0.0;
+        let count = 3.0 * (log.means.len() - log.movements.len()) as f64 - UNKNOWNS as f64;
+        // What lowers chi-square from one value to another is worth this, whatever the noise is: where much
+        // is left that no fault explains, as hum, a fault must explain its part of that.
+        let worth = |from: f64, to: f64| count.max(1.0) * libm::log(from / to.max(1.0));
+        let faultless = estimate.chi_squared;
+        let mut penalties = 0.0;
         let mut faults: Vec<(Candidate, Vec<Candidate>)> = Vec::new();
         while faults.len() < FAULTS_MAX {
             let mut candidates = Scan::new(log, &estimate).candidates(&raw);
-            let net = |candidate: &Candidate| {
-                candidate.gain - per_unknown - 2.0 * libm::log(RARITY * candidate.choices)
-            };
+            let penalty =
+                |candidate: &Candidate| per_unknown + 2.0 * libm::log(RARITY * candidate.choices);
+            let before = estimate.chi_squared;
+            let net =
+                |candidate: &Candidate| worth(before, before - candidate.gain) - penalty(candidate);
             candidates.sort_by(|a, b| net(b).total_cmp(&net(a)));
             let Some(best) = candidates.first().copied().filter(|best| net(best) > 0.0) else {
                 break;
@@ -188,17 +195,15 @@ impl Job<'_> {
                     shaped(log, &raw[fault.family], family, fault.course)
                 })
                 .collect();
-            let before = estimate.chi_squared;
             // Faults that cannot be told apart any more are no further ones.
             let Some(next) = estimate.with_faults(log, &columns) else {
                 faults.pop();
                 break;
             };
             estimate = next;
-            explained += before - estimate.chi_squared + net(&best) - best.gain;
+            penalties += penalty(&best);
         }
-        let residuals = 3.0 * (log.means.len() - log.movements.len()) as f64 - UNKNOWNS as f64;
-        let rest = (estimate.chi_squared / residuals.max(1.0)).sqrt();
+        let rest = (estimate.chi_squared / count.max(1.0)).sqrt();
         // What no fault explains makes the parameters as much less certain.
         let certain = rest.max(1.0).powi(2);
         let without_faults = estimate.without_faults(free)?;
@@ -206,7 +211,10 @@ impl Job<'_> {
         let cost = |off: &DVector<f64>| {
             Predicted::new(&at_work, &nothing, &off.as_slice()[..COUNT]).worst_ratio()
         };
-        let of_parts = |other: &Split| other.gain - UNKNOWNS as f64 * per_unknown;
+        let explained = worth(faultless, estimate.chi_squared) - penalties;
+        let of_parts = |other: &Split| {
+            worth(faultless, faultless - other.gain) - UNKNOWNS as f64 * per_unknown
+        };
         let other = other.filter(|other| of_parts(other) > explained.max(0.0));
         let off_by = |number: usize| {
             without_faults.solve(&estimate.pull(number)) * estimate.state.faults[number]
