@@ -2,6 +2,7 @@
 
 use object::read::elf::{FileHeader, ProgramHeader};
 use object::{Object, ObjectSymbol};
+use std::ops::Range;
 use std::path::Path;
 
 /// Start of flash.
@@ -23,7 +24,7 @@ pub struct Image {
     pub static_bytes: usize,
     /// Bytes of RAM below its statics, where the stack lies.
     pub stack_bytes: usize,
-    symbols: Vec<(String, u32)>,
+    symbols: Vec<(String, Range<u32>)>,
 }
 
 impl Image {
@@ -57,7 +58,10 @@ impl Image {
         let file = object::File::parse(&*bytes)?;
         let symbols = file
             .symbols()
-            .filter_map(|s| Some((s.name().ok()?.to_owned(), s.address() as u32)))
+            .filter_map(|s| {
+                let start = s.address() as u32 & !1;
+                Some((s.name().ok()?.to_owned(), start..start + s.size() as u32))
+            })
             .collect();
         let mut static_start = RAM;
         if let Some(symbol) = file.symbols().find(|s| s.name() == Ok("_stack_start")) {
@@ -75,10 +79,15 @@ impl Image {
 
     /// Address of a symbol whose name contains `part`, without the Thumb bit.
     pub fn address(&self, part: &str) -> Result<u32, String> {
+        Ok(self.range(part)?.start)
+    }
+
+    /// Addresses of a function or static whose name contains `part`, without the Thumb bit.
+    pub fn range(&self, part: &str) -> Result<Range<u32>, String> {
         let exact = self.symbols.iter().find(|(name, _)| name == part);
         let found = exact.or_else(|| self.symbols.iter().find(|(name, _)| name.contains(part)));
         found
-            .map(|(_, at)| at & !1)
+            .map(|(_, range)| range.clone())
             .ok_or_else(|| format!("the program has no symbol {part}"))
     }
 

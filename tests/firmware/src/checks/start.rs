@@ -334,14 +334,13 @@ pub struct Crash {
 pub fn crashes(bench: &Bench) -> Result<Vec<Crash>, Failure> {
     let image = bench.image(PART);
     let set = |register, value| Injected { register, value };
-    let tick = image.address(TICK)?;
     let stack = crate::image::RAM;
     let mut crashes = vec![
         Crash {
             fault: "hard fault: a pointer to nowhere",
             inject: vec![set(register::R0, NOWHERE)],
             kind: 2,
-            address: tick..tick + 0x400,
+            address: image.range(TICK)?,
             detail: None,
         },
         Crash {
