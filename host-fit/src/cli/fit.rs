@@ -179,7 +179,10 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
         Err(error) => Some(failed(error, findings).to_string()),
         Ok(fit) => refusal(
             findings,
-            in_service.unwrap_or(fit.all.errors.axes.map(|a| a.rms)),
+            in_service.map_or_else(
+                || (fit.all.errors.axes.map(|axis| axis.rms), "on the log"),
+                |rms| (rms, "in service"),
+            ),
             args.limit.as_ref(),
         )
         .or_else(|| unfinished(fit, &log).filter(|_| is_interrupted)),
@@ -307,10 +310,14 @@ fn settings(args: &FitArgs) -> Result<FitSettings, HostError> {
 }
 
 /// Why a fit is not to be written.
-fn refusal(findings: &[Finding], rms: [f64; 3], limits: Option<&Limits>) -> Option<String> {
+fn refusal(
+    findings: &[Finding],
+    (rms, which): ([f64; 3], &str),
+    limits: Option<&Limits>,
+) -> Option<String> {
     let refused = finding::messages(findings, Severity::Refuse);
     if refused.is_empty() {
-        return limits?.exceeded(rms);
+        return limits?.exceeded(rms, which);
     }
     Some(format!("the log is refused: {refused}"))
 }

@@ -47,8 +47,9 @@ impl FromStr for Limits {
 }
 
 impl Limits {
-    /// The axes whose rms error (m, m, rad) is beyond its limit; `None` if there are none.
-    pub(super) fn exceeded(&self, rms: [f64; 3]) -> Option<String> {
+    /// The axes whose rms error (m, m, rad) is beyond its limit; `None` if there are none. `which` says where
+    /// these errors stand: in service or on the log.
+    pub(super) fn exceeded(&self, rms: [f64; 3], which: &str) -> Option<String> {
         let beyond = (0..3).filter_map(|axis| {
             let (limit, rms) = (self.0[axis]?, rms[axis]);
             let (name, unit, _) = AXES[axis];
@@ -61,7 +62,7 @@ impl Limits {
             })
         });
         let errors = beyond.collect::<Vec<_>>().join("; ");
-        (!errors.is_empty()).then(|| format!("the errors are beyond --limit: {errors}"))
+        (!errors.is_empty()).then(|| format!("the errors {which} are beyond --limit: {errors}"))
     }
 }
 
@@ -97,7 +98,7 @@ mod tests {
     fn only_errors_beyond_their_limit_are_told() {
         let exceeded = |text: &str| {
             let limits: Limits = text.parse().expect("limits");
-            limits.exceeded([1e-6, 2e-6, 3e-6])
+            limits.exceeded([1e-6, 2e-6, 3e-6], "in service")
         };
         assert_eq!(exceeded("x=1.1um,y=2.1um,rz=3.1urad"), None);
         let message = exceeded("x=1.1um,y=1.9um").expect("beyond");
