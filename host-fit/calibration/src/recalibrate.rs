@@ -196,9 +196,15 @@ const fn recording(change: Change) -> &'static str {
 
 const fn remedy(change: Change) -> &'static str {
     match change {
-        Change::Gain => "Try --what gains; if a probe was moved, --what all",
-        Change::Gains => "Something else has changed as well: try --what all",
-        Change::All => "Check the columns, signs and scales of the log, or fit again",
+        Change::Gain => {
+            "Is it the blob of this stage? If it is, try --what gains; if a probe was moved, --what all"
+        }
+        Change::Gains => {
+            "Is it the blob of this stage? If it is, something else has changed as well: try --what all"
+        }
+        Change::All => {
+            "Is it the blob of this stage? If it is, check the columns, signs and scales of the log, or fit again"
+        }
     }
 }
 

@@ -174,7 +174,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     let more = match (refusals.as_str(), found.iter().any(|f| f.severity == Severity::Warn)) {
         ("", true) => String::new(),
         ("", false) if is_field => {
-            ". If channels and scales are right, bring the blob up to date with host-fit recalibrate"
+            ". Is it the blob of this stage? If it is, and channels and scales are right, bring it up to date with host-fit recalibrate"
                 .to_owned()
         }
         ("", false) => {

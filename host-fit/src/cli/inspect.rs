@@ -10,7 +10,7 @@ use crate::report::parameters::{self, parameters_in};
 use crate::report::provenance::hex;
 use crate::report::table::{as_text, tables};
 use clap::Args;
-use runtime::ParameterSet;
+use runtime::{ModelKind, ParameterSet};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -36,7 +36,11 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     args.json.write(&figures)?;
     let parameters = parameters::tables(&parameters_in(&set), &[]);
     let fields = tables(&figures, &["parameters", "repaired"]);
-    terminal::print(&as_text(&[fields, parameters].concat()))?;
+    let mut text = as_text(&[fields, parameters].concat());
+    if repaired.is_none() && set.model == ModelKind::Field {
+        text += "\nfaults taken off: not known, its .posterior is not beside the blob\n";
+    }
+    terminal::print(&text)?;
     let repaired = repaired.unwrap_or_default();
     let taken_off = repaired.iter().map(|fault| format!("taken off: {fault}"));
     terminal::warn(&taken_off.collect::<Vec<_>>());

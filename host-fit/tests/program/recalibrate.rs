@@ -1,7 +1,7 @@
 //! An old calibration brought up to date, on a stage made of physics whose codes are scaled as
 //! changed gains scale them.
 
-use crate::common::{Bench, number, plan, stderr};
+use crate::common::{Bench, number, plan, stderr, stdout};
 use serde_json::Value;
 use std::fmt::Write;
 
@@ -166,6 +166,14 @@ fn bad_rows_do_not_bend_it_and_what_does_is_told_in_the_verdict() {
             .map(Vec::len),
         Some(1)
     );
+    // The blob alone does not know it, and `inspect` does not keep that to itself.
+    let line = "faults taken off: not known";
+    assert!(!stdout(&bench.good("inspect repaired.bin")).contains(line));
+    std::fs::remove_file(bench.path("repaired.bin.posterior")).expect("removed");
+    assert!(stdout(&bench.good("inspect repaired.bin")).contains(line));
+    let fit = "fit new.csv --stage stage.toml --out other.bin --limit y=0.2um";
+    let words = "the errors in service are beyond --limit: y 0.4";
+    bench.bad(fit, 4, &[words]);
 }
 
 #[test]
@@ -185,7 +193,11 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
     refused("old.bin sine.csv --what gains", 4, &parts);
     let parts = ["does not tell a change of all", "six axes moving at once"];
     refused("old.bin sine.csv --what all", 4, &parts);
-    let parts = ["one gain for all probes does not describe", "--what gains"];
+    let parts = [
+        "one gain for all probes does not describe",
+        "Is it the blob of this stage?",
+        "--what gains",
+    ];
     refused("old.bin weak-a.csv --what gain", 4, &parts);
 
     bench.good("fit log.csv --stage stage.toml --out p31.bin --model 31");
