@@ -1,5 +1,5 @@
-//! Faults of the signals, by size: how many of the logs have the fault named with its channel, and
-//! how many other warnings come beside.
+//! Faults of the signals that have no cost of their own, by size: how many of the logs have the fault named
+//! with its channel, and how many other warnings come beside.
 
 use crate::{FAULTY, recording};
 use host_fit::finding::{Code, Severity};
@@ -35,20 +35,12 @@ impl Faulty<'_> {
         }
     }
 
-    /// Adds an error (m) that depends on the time since the start of the log and of the movement, s.
-    fn add_over_time(&mut self, error_m: impl Fn(f64, f64) -> f64) {
-        let mut row = 0;
-        for samples in &mut self.recording.movements {
-            for (k, sample) in samples.iter_mut().enumerate() {
-                let [t, since] = [row, k].map(|k| k as f64 * self.stage.servo_period_s);
-                Self::add(self.stage, self.channel, sample, error_m(t, since));
-                row += 1;
-            }
+    /// Adds an error (m) that depends on the time since the start of the log, s.
+    fn add_over_time(&mut self, error_m: impl Fn(f64) -> f64) {
+        for (row, sample) in self.recording.movements.iter_mut().flatten().enumerate() {
+            let t_s = row as f64 * self.stage.servo_period_s;
+            Self::add(self.stage, self.channel, sample, error_m(t_s));
         }
-    }
-
-    fn length_s(&self) -> f64 {
-        self.recording.rows() as f64 * self.stage.servo_period_s
     }
 
     /// A movement, and a row in its middle half.
@@ -72,19 +64,7 @@ impl Faulty<'_> {
 /// Name, code, channels, sizes.
 type Row = (&'static str, Code, &'static [usize], &'static [f64], Fault);
 
-const FAULTS: [Row; 10] = [
-    (
-        "step, um",
-        Code::Step,
-        &[0, 2, 3, 4, 5],
-        &[1.0, 2.0, 3.0, 5.0, 10.0],
-        |f, um| {
-            let (movement, row) = f.middle();
-            for sample in &mut f.recording.movements[movement][row..] {
-                Faulty::add(f.stage, f.channel, sample, um * 1e-6);
-            }
-        },
-    ),
+const FAULTS: [Row; 6] = [
     (
         "ten jumps, um",
         Code::Outliers,
@@ -109,7 +89,7 @@ const FAULTS: [Row; 10] = [
         &[0, 2, 3, 4, 5],
         &[0.1, 0.2, 0.5, 1.0, 5.0],
         |f, um| {
-            f.add_over_time(|t, _| um * 1e-6 * (TAU * 50.0 * t).sin());
+            f.add_over_time(|t| um * 1e-6 * (TAU * 50.0 * t).sin());
         },
     ),
     (
@@ -118,39 +98,7 @@ const FAULTS: [Row; 10] = [
         &[0, 2, 3, 4, 5],
         &[0.5, 5.0],
         |f, um| {
-            f.add_over_time(|t, _| um * 1e-6 * (TAU * 83.3 * t).sin());
-        },
-    ),
-    (
-        "drift within movements, um/s",
-        Code::Drift,
-        &[0, 1, 2, 4, 5],
-        &[0.1, 0.2, 0.5, 1.0],
-        |f, um| {
-            f.add_over_time(|_, since| um * 1e-6 * since);
-        },
-    ),
-    (
-        "drift over the log, um",
-        Code::Drift,
-        &[0, 1, 2],
-        &[5.0, 10.0, 20.0, 50.0],
-        |f, um| {
-            let length_s = f.length_s();
-            f.add_over_time(|t, _| um * 1e-6 * t / length_s);
-        },
-    ),
-    (
-        "gain of a probe, %",
-        Code::GainDrift,
-        &[0, 1, 2],
-        &[0.3, 0.5, 1.0, 3.0],
-        |f, percent| {
-            let (rows, channel) = (f.recording.rows() as f64, f.channel);
-            for (k, sample) in f.recording.movements.iter_mut().flatten().enumerate() {
-                let gain = 1.0 - percent / 100.0 * k as f64 / rows;
-                sample.hall[channel] = (f64::from(sample.hall[channel]) * gain).round() as i32;
-            }
+            f.add_over_time(|t| um * 1e-6 * (TAU * 83.3 * t).sin());
         },
     ),
     (
