@@ -64,11 +64,13 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     )
 }
 
-/// Makes every access to the 1 MiB below the stack a fault. Of what lies there, system memory and
-/// reserved addresses, the manual does not say that a write faults.
+/// Makes every write to the 1 MiB below the stack a fault. Of what lies there, system memory and reserved
+/// addresses, the manual does not say that a write faults; the chip's identity and the one-time area, which
+/// lie there too, stay readable.
 pub fn guard_stack(mpu: &mut MPU) {
     const BYTES_LOG2: u32 = 20;
-    const NO_ACCESS: u32 = 0;
+    /// AP of the region: privileged code may read (ARMv7-M Architecture Reference Manual, B3.5).
+    const READ_ONLY: u32 = 0b101;
     const ENABLE: u32 = 1;
     /// Elsewhere the map of the core holds.
     const DEFAULT_MAP: u32 = 1 << 2;
@@ -78,7 +80,7 @@ pub fn guard_stack(mpu: &mut MPU) {
         mpu.rnr.write(0);
         mpu.rbar.write(below);
         mpu.rasr
-            .write(NO_ACCESS << 24 | (BYTES_LOG2 - 1) << 1 | ENABLE);
+            .write(READ_ONLY << 24 | (BYTES_LOG2 - 1) << 1 | ENABLE);
         mpu.ctrl.write(DEFAULT_MAP | ENABLE);
     }
     cortex_m::asm::dsb();

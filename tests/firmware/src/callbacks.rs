@@ -21,7 +21,7 @@ pub extern "C" fn read(handle: Handle, offset: u64, _: c_uint, user: *mut c_void
 
 /// Memory that is not there.
 pub extern "C" fn read_below_ram(handle: Handle, offset: u64, _: c_uint, user: *mut c_void) -> u64 {
-    fault_if_protected(handle, offset, user);
+    fault_if_protected(handle, offset, false, user);
     0
 }
 
@@ -33,14 +33,14 @@ pub extern "C" fn write_below_ram(
     _: u64,
     user: *mut c_void,
 ) {
-    fault_if_protected(handle, offset, user);
+    fault_if_protected(handle, offset, true, user);
 }
 
-fn fault_if_protected(handle: Handle, offset: u64, user: *mut c_void) {
+fn fault_if_protected(handle: Handle, offset: u64, is_write: bool, user: *mut c_void) {
     // SAFETY: as in `read`.
     let chip = unsafe { &mut *user.cast::<Peripherals>() };
     if let Some(stop) = chip.stop_run
-        && chip.is_protected((BELOW_RAM.0 + offset) as u32)
+        && chip.is_protected((BELOW_RAM.0 + offset) as u32, is_write)
     {
         chip.memory_fault = true;
         // SAFETY: as in `stop_if_it_stops`.

@@ -232,15 +232,19 @@ impl Peripherals {
         self.clocks.stop_crystal(self.now_ns);
     }
 
-    /// Whether the memory protection forbids an access (PM0214, MPU): one region without
-    /// access, over the map of the core.
-    pub fn is_protected(&self, address: u32) -> bool {
+    /// Whether the memory protection forbids privileged code an access (PM0214, MPU access permission
+    /// attributes, AP): one region, over the map of the core.
+    pub fn is_protected(&self, address: u32, is_write: bool) -> bool {
         let word = |offset: usize| self.core_words[offset / 4];
         let (control, attributes) = (word(MPU_CTRL), word(MPU_RASR));
         let is_on = control & 0b101 == 0b101 && attributes & 1 == 1;
-        let no_access = attributes >> 24 & 0b111 == 0;
+        let forbids = match attributes >> 24 & 0b111 {
+            0b000 => true,
+            0b101..=0b111 => is_write,
+            _ => false,
+        };
         let bytes_log2 = (attributes >> 1 & 0x1f) + 1;
-        is_on && no_access && (address ^ word(MPU_RBAR)) >> bytes_log2 == 0
+        is_on && forbids && (address ^ word(MPU_RBAR)) >> bytes_log2 == 0
     }
 
     /// Whether the chip is reset, and the program executes nothing more.
