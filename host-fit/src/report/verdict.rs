@@ -102,7 +102,11 @@ fn sentence(of: &Subject, predicted: Option<&Predicted>) -> String {
         (End::Failed(why), _) => why.to_owned(),
         (_, Some(predicted)) if of.is_field => {
             let ratio = predicted.worst_ratio();
-            format!("errors in service of {ratio:.2} times the noise of the sensors")
+            let repaired = match of.diagnosis.repair {
+                Some(_) => "; errors on the log still have the faults that are taken off",
+                None => "",
+            };
+            format!("errors in service of {ratio:.2} times the noise of the sensors{repaired}")
         }
         (_, Some(predicted)) => {
             let [x, y, rz] = predicted.range.map(|ends| ends.map(|end| end * 1e6));

@@ -150,8 +150,9 @@ fn bad_rows_do_not_bend_it_and_what_does_is_told_in_the_verdict() {
     }
     // A fit takes it off, and says so beside the blob.
     // A limit holds for service, not for the fault in the log.
-    bench
+    let fitted = bench
         .good("fit new.csv --stage stage.toml --out repaired.bin --limit y=0.55um --json fit.json");
+    assert!(stdout(&fitted).contains("errors on the log still have the faults"));
     let errors = &bench.json("fit.json")["errors"];
     assert!(number(&errors["y"]["rmse_um"]) > 0.55, "{errors}");
     bench.good("inspect repaired.bin --json inspect.json");
