@@ -15,34 +15,32 @@
 //! | CLOCK | 0x03 | 0xFF0E | channels that are read, oversampling 128, high resolution |
 //! | the others | 0x04 to 0x30 | | as after reset |
 //!
-//! **Which conversion is read.** CLKIN must be 8.000 MHz: the modulators run at 4 MHz and a
-//! conversion takes 32 us. Settled data need three conversions after the filters restart: at
-//! 96 to 171 us, by the shortest and the longest reading of sections 8.3.7.1 and 8.4.2. The part
-//! does not hold back data that are not settled; it stores two conversions and sends the older
-//! one first; what it drops when a third one comes, and whether conversions end at multiples of
-//! 32 us after SYNC or 11 us (44 modulator periods) later, is not said. So a tick does not rely on
-//! any of this:
+//! **Which conversion is read.** CLKIN is 8.000 MHz: the modulators run at 4 MHz and a conversion
+//! takes 64 us. Three of them after a resynchronisation the filters are settled. The sheet does not
+//! say whether conversions end at multiples of 64 us after SYNC or 11 us later (44 modulator periods,
+//! table 8-3; 300 of them after a reset, 8.4.2), whether what is not settled is held back, which of
+//! three conversions a full store of two loses, and whether one leaves the store when its frame begins
+//! or when it ends. A tick relies on none of this:
 //!
 //! 1. A pulse on SYNC/RESET at the trigger restarts the filters of all channels.
-//! 2. [`SETTLE_US`](FrameSampler::SETTLE_US) = 182 us later everything that the part converts is
-//!    settled (11 us of margin), and no conversion ends within 10 us.
-//! 3. Three frames follow. The first two remove what is stored, which is at most two conversions.
-//!    The third one then carries a conversion that ended after the first frame began. If there
-//!    is none yet, its ready bits say so, and a fourth frame is read: it begins at least 68 us
-//!    after the first, and two conversions have ended by then.
+//! 2. [`SETTLE_US`](FrameSampler::SETTLE_US) = 207 us later a frame removes the older of the two
+//!    conversions that may be stored. It ends before the next conversion does, at 256 us: that one
+//!    finds room in any case.
+//! 3. A second frame removes the other. The third carries the conversion that ended 256 or 267 us
+//!    after the trigger, settled in any case. If it is not there yet, the ready bits say so, and a fourth
+//!    frame carries it.
 //!
-//! The codes are settled in any case, whatever the speed of the SPI. Their age is known if the
-//! second frame begins after the next conversion has ended (192 or 203 us: frames of at least 21 us;
-//! 22.9 us at 10.5 MHz without gaps) and the third one before two more have (256 us: frames of at
-//! most 37 us, 1.2 us per byte): they are then the mean, weighted by the sinc3 filter, of the 96 us
-//! up to 192 us, or 203 us, after the trigger. The middle is 144 or 155 us after it;
-//! [`SAMPLE_US`](FrameSampler::SAMPLE_US) = 150 us is within 6 us of both. A part that drops the
-//! newest conversion, or needs the fourth frame, is a conversion of 32 us later: 0.15 um at the
-//! fastest motion of a service log (4.8 mm/s). Whichever it is, it is the same in every tick.
+//! This holds whichever way the part goes, with gaps of 1 to 8 us before each frame of 23 us (5 us if it
+//! takes 30), and if the first begins 3 us early or late. The codes are the mean, weighted by the sinc3 filter, of the 192 us
+//! before: the middle is 160 or 171 us after the trigger, and [`SAMPLE_US`](FrameSampler::SAMPLE_US) =
+//! 166 us is within 6 us of both (0.03 um at the fastest motion of a service log, 4.8 mm/s).
 //!
 //! The pulse must be shorter than 2048 periods of CLKIN, 256 us; a longer one is a reset. The part
 //! ignores a pulse that coincides with the end of a conversion, which then is settled anyway. At
-//! 8 MHz 2 ms are 62.5 conversions, so that only a tick that comes late can meet one.
+//! 8.000 MHz 2 ms are 31.25 conversions, so that only a tick that comes late can meet one. **At
+//! 8.192 MHz** 2 ms are 32 conversions, and a part that is in step would ignore all pulses: one that
+//! comes after an ignored pulse comes 2 us late, which restarts the filters. Conversions then end at
+//! 250 or 261 us, 10 us before [`SAMPLE_US`](FrameSampler::SAMPLE_US) says at most.
 //!
 //! **Checks.** Each frame has a CRC, and besides codes the three of a tick carry
 //! - the STATUS: a reset, a locked interface, a register that changed (REG_CRC_EN makes the part
@@ -103,8 +101,8 @@ const MODE_WANTED: u16 = 0x2110;
 const CFG_WANTED: u16 = 0x0600;
 /// Gain correction 1, upper 16 bits: value after reset.
 const GAIN_WANTED: u16 = 0x8000;
-/// Oversampling 128 (bits 4..2 = 0), high resolution (bits 1..0 = 2).
-const CLOCK_SPEED: u16 = 0x0002;
+/// Oversampling 256 (bits 4..2 = 1), high resolution (bits 1..0 = 2).
+const CLOCK_SPEED: u16 = 0x0006;
 /// All bits except the ready bits and F_RESYNC, which every pulse on SYNC sets.
 const STATUS_MASK: u16 = 0xbf00;
 /// 24-bit words, nothing locked, no reset, no register changed, no error.
@@ -115,6 +113,8 @@ const UNSYNCED_TICKS: u8 = 2;
 
 /// A pulse on SYNC lasts 1 to 2047 periods of CLKIN: 0.125 to 256 us.
 const SYNC_US: u32 = 1;
+/// By this much a pulse comes later that follows an ignored one.
+const SHIFT_US: u32 = 2;
 
 /// The registers can be accessed 5 us (typical) after a reset.
 const RESET_US: u32 = 10;
@@ -251,15 +251,11 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
 
     const SPI_MODE: Mode = MODE_1;
     const SPI_HZ_MAX: u32 = 25_000_000;
-
-    /// Later than 171 us, the longest that the filters may take, and 10 us from the end of any
-    /// conversion.
-    const SETTLE_US: u32 = 182;
-
-    /// The middle of the 96 us before 192 or 203 us, when the conversion ends that is read: 144 or
-    /// 155 us.
-    const SAMPLE_US: u32 = 150;
-
+    /// 4 us after a conversion may end, and early enough for a frame before the next one does.
+    const SETTLE_US: u32 = 207;
+    /// The middle of the 192 us before 256 or 267 us, when the conversion ends that is read: 160 or
+    /// 171 us.
+    const SAMPLE_US: u32 = 166;
     const CODE_BITS: u32 = 24;
 
     fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
@@ -272,6 +268,9 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
     }
 
     fn trigger(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
+        if self.unsynced_ticks > 0 {
+            delay.delay_us(SHIFT_US);
+        }
         self.sync.set_low().map_err(|e| AdcError::Pin(e.kind()))?;
         if core::mem::take(&mut self.start_failed) {
             return Ok(());

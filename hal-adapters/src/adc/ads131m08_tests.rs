@@ -95,10 +95,10 @@ fn started() -> Vec<Vec<Transaction<u8>>> {
     vec![
         frame(0x0011, 0, answer(0x0500, QUIET)),
         frame(0xa000, 0, answer(0xff28, QUIET)),
-        frame(0x6180, 0x3f02, answer(0x2804, QUIET)),
+        frame(0x6180, 0x3f06, answer(0x2804, QUIET)),
         frame(0x6100, 0x2110, answer(0x4180, QUIET)),
         frame(0xa180, 0, answer(0x4100, QUIET)),
-        frame(0xa100, 0, answer(0x3f02, QUIET)),
+        frame(0xa100, 0, answer(0x3f06, QUIET)),
         frame(0x0000, 0, answer(0x2110, QUIET)),
     ]
 }
@@ -132,7 +132,7 @@ fn a_part_that_does_not_confirm_its_reset_or_has_other_channels_is_refused() {
     );
 
     let mut all = started()[..3].to_vec();
-    all[2] = frame(0x6180, 0x3f02, answer(0x2401, QUIET));
+    all[2] = frame(0x6180, 0x3f06, answer(0x2401, QUIET));
     let (found, expected) = (0x2401, 0x2800);
     assert_eq!(
         try_start(&all.concat()),
@@ -142,7 +142,7 @@ fn a_part_that_does_not_confirm_its_reset_or_has_other_channels_is_refused() {
 
 #[test]
 fn a_setting_that_does_not_read_back_is_named() {
-    for (read, register, found, wanted) in [(5, 0x03, 0xff0e, 0x3f02), (6, 0x02, 0x0510, 0x2110)] {
+    for (read, register, found, wanted) in [(5, 0x03, 0xff0e, 0x3f06), (6, 0x02, 0x0510, 0x2110)] {
         let mut all = started()[..=read].to_vec();
         let (command, data) = [(0xa100, 0), (0, 0)][read - 5];
         all[read] = frame(command, data, answer(found, QUIET));
@@ -217,7 +217,7 @@ fn a_part_that_was_reset_locked_or_changed_meanwhile_is_not_read() {
         let good = || answer(0x413f, QUIET);
         let both = [
             tick(0, 0x02, 0x2110, good()),
-            tick(found, 0x03, 0x3f02, good()),
+            tick(found, 0x03, 0x3f06, good()),
         ];
         assert_eq!(ticks::<2>(&both.concat())[1], Err(error));
     }
@@ -242,7 +242,7 @@ fn a_conversion_that_is_not_there_yet_gets_one_more_frame() {
 fn every_register_is_read_back_in_turn() {
     let at_reset = |register: u16| match register {
         0x02 => 0x2110,
-        0x03 => 0x3f02,
+        0x03 => 0x3f06,
         0x06 => 0x0600,
         0x0c | 0x11 | 0x16 | 0x1b | 0x20 | 0x25 | 0x2a | 0x2f => 0x8000,
         _ => 0,
@@ -286,7 +286,7 @@ fn a_second_tick_without_resynchronisation_means_a_broken_wire() {
     let good = || answer(0x013f, QUIET);
     let all = [
         tick(0, 0x02, 0x2110, answer(0x413f, QUIET)),
-        tick(0x013f, 0x03, 0x3f02, good()),
+        tick(0x013f, 0x03, 0x3f06, good()),
         tick(0x413f, 0x04, 0, good()),
         tick(0x013f, 0x05, 0, good()),
         tick(0x013f, 0x06, 0x0600, good()),

@@ -2,13 +2,14 @@
 //! and nothing else; for another chip also `memory.x` at the top of the repository and the HAL's
 //! feature in `Cargo.toml`. The pins are in the README beside this crate.
 
+use crate::spi::SpiDma;
 use core::convert::Infallible;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use hal_adapters::adc::{Channels, FrameSampler};
 use hal_adapters::can::status::{bit, board_check};
 use hal_adapters::can::update::Key;
 use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0, PB1, PC1, PinState, Pull, Speed};
-use stm32f4xx_hal::pac::{CAN1, GPIOA, GPIOB, GPIOC, SPI1};
+use stm32f4xx_hal::pac::{CAN1, DMA2, GPIOA, GPIOB, GPIOC, SPI1};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
 use stm32f4xx_hal::time::Hertz;
@@ -24,7 +25,7 @@ pub type Converter = hal_adapters::adc::Ads8688<SpiDevice, ControlPin>;
 const CHANNELS: Channels = Channels::IN_ORDER;
 
 /// The SPI bus with chip select, to the converter alone.
-pub type SpiDevice = ExclusiveDevice<stm32f4xx_hal::spi::Spi<SPI1>, PA4<Output>, NoDelay>;
+pub type SpiDevice = ExclusiveDevice<SpiDma, PA4<Output>, NoDelay>;
 /// SYNC/RESET of an ADS131M08, RST/PD of an ADS8688. High at rest.
 pub type ControlPin = PB0<Output>;
 /// The LED, on when high.
@@ -198,7 +199,7 @@ const PULL_US: u32 = 8;
 /// Sets the pins up.
 pub fn set_up(
     (gpioa, gpiob, gpioc): (GPIOA, GPIOB, GPIOC),
-    spi1: SPI1,
+    (spi1, dma2): (SPI1, DMA2),
     can1: CAN1,
     rcc: &mut Rcc,
 ) -> Parts {
@@ -220,7 +221,10 @@ pub fn set_up(
         Some(gpioa.pa6.into_alternate().internal_resistor(Pull::Up)),
         Some(gpioa.pa7.into_alternate().speed(Speed::VeryHigh)),
     );
-    let spi = spi1.spi(pins, Converter::SPI_MODE, Hertz::from_raw(SPI_HZ), rcc);
+    let (spi1, _) = spi1
+        .spi(pins, Converter::SPI_MODE, Hertz::from_raw(SPI_HZ), rcc)
+        .release();
+    let spi = SpiDma::new(spi1, dma2, rcc);
     let spi = infallible(ExclusiveDevice::new_no_delay(spi, select));
     // Without a transceiver the bus looks idle.
     gpiob

@@ -1,7 +1,7 @@
 //! What the stage controller does, apart from the chip that it does it on.
 //!
 //! ```text
-//! timer --Schedule--> trigger --182 us--> Acquisition --RawFrame--> Node --frames--> Outbox --> CAN
+//! timer --Schedule--> trigger --207 us--> Acquisition --RawFrame--> Node --frames--> Outbox --> CAN
 //!                                          CAN commands --> Node          Telemetry <-- Node
 //! ```
 //!

@@ -22,6 +22,7 @@ mod bus;
 mod fault;
 mod flash;
 mod random;
+mod spi;
 mod start;
 mod supply;
 mod timer;
@@ -118,7 +119,8 @@ mod app {
         watchdog.feed();
         fault::begin(Step::Peripherals);
         let ports = (device.GPIOA, device.GPIOB, device.GPIOC);
-        let parts = board::set_up(ports, device.SPI1, device.CAN1, &mut rcc);
+        let serial = (device.SPI1, device.DMA2);
+        let parts = board::set_up(ports, serial, device.CAN1, &mut rcc);
         let bus = Bus::new(parts.can, crystal, &mut stopwatch);
         let random = Random::new(device.RNG, &mut rcc);
 

@@ -12,6 +12,7 @@ use crate::callbacks::{
 };
 use crate::flash_model::{BYTES, FIRST};
 use crate::image::{FLASH, FLASH_BYTES, Image, RAM, RAM_BYTES};
+use crate::memory::{Memory, memory};
 use crate::peripherals::{BIT_BAND, CORE, IRQ_TIM2, Peripherals, RANGE, cause};
 use crate::random_model;
 use crate::unicorn::{Unicorn, register};
@@ -24,22 +25,6 @@ const PAINT: u8 = 0xa5;
 const WFI: u16 = 0xbf30;
 /// Its number in the vector table.
 const NMI: u32 = 2;
-
-/// Memory of the core, aligned to its pages.
-#[repr(C, align(4096))]
-struct Memory<const N: usize>([u8; N]);
-
-fn memory<const N: usize>(fill: u8) -> Box<Memory<N>> {
-    let filled = vec![fill; N].into_boxed_slice();
-    let layout = std::alloc::Layout::new::<Memory<N>>();
-    // SAFETY: the memory is allocated with the layout of the type and filled before it is used.
-    unsafe {
-        let raw = std::alloc::alloc(layout).cast::<Memory<N>>();
-        assert!(!raw.is_null(), "no memory for the emulated chip");
-        std::ptr::copy_nonoverlapping(filled.as_ptr(), raw.cast(), N);
-        Box::from_raw(raw)
-    }
-}
 
 /// What RAM holds after power-on.
 fn fill_with_noise(ram: &mut [u8]) {
@@ -58,7 +43,6 @@ pub struct Machine {
     /// Everything around the core.
     pub chip: Box<Peripherals>,
     flash: Box<Memory<FLASH_BYTES>>,
-    ram: Box<Memory<RAM_BYTES>>,
     _returns: Box<Memory<4096>>,
     vectors: [u32; 48],
     waits_at: u32,
@@ -90,10 +74,10 @@ impl Machine {
         let core = Unicorn::open(library)?;
         let mut flash = memory::<FLASH_BYTES>(0xff);
         flash.0.copy_from_slice(&image.flash);
-        let mut ram = memory::<RAM_BYTES>(PAINT);
-        fill_with_noise(&mut ram.0[image.stack_bytes..]);
         let mut returns = memory::<4096>(0);
         let mut chip = Box::new(Peripherals::new(part, rows));
+        chip.ram.0[..image.stack_bytes].fill(PAINT);
+        fill_with_noise(&mut chip.ram.0[image.stack_bytes..]);
         for (slot, name) in slots
             .into_iter()
             .zip(["_parameter_slot_0", "_parameter_slot_1"])
@@ -103,15 +87,15 @@ impl Machine {
         }
         let (before, behind) = ((FIRST - FLASH) as usize, (FIRST - FLASH) as usize + BYTES);
         let user: *mut c_void = (&raw mut *chip).cast();
-        // SAFETY: flash, RAM and chip are boxes that the machine keeps as long as the core,
-        // and that are touched only between two runs of it.
+        // SAFETY: flash and chip are boxes that the machine keeps as long as the core, and that are
+        // touched only between two runs of it or by its callbacks.
         unsafe {
             let memory = flash.0.as_mut_ptr();
             core.map_memory(FLASH.into(), memory, before)?;
             let (from, rest) = (u64::from(FLASH) + behind as u64, FLASH_BYTES - behind);
             core.map_memory(from, memory.add(behind), rest)?;
             core.map_io((FIRST.into(), BYTES as u64), read_flash, write_flash, user)?;
-            core.map_memory(RAM.into(), ram.0.as_mut_ptr(), RAM_BYTES)?;
+            core.map_memory(RAM.into(), chip.ram.0.as_mut_ptr(), RAM_BYTES)?;
             core.map_memory(RETURN.into(), returns.0.as_mut_ptr(), 4096)?;
             core.map_io(RANGE, read, write, user)?;
             core.map_io(BIT_BAND, read_bit, write_bit, user)?;
@@ -128,7 +112,6 @@ impl Machine {
             core,
             chip,
             flash,
-            ram,
             _returns: returns,
             vectors,
             waits_at: waits_at(image)?,
@@ -183,7 +166,7 @@ impl Machine {
 
     /// Takes the power away and gives it back: RAM holds noise then.
     pub fn power_cycle(&mut self) {
-        fill_with_noise(&mut self.ram.0[self.stack_bytes..]);
+        fill_with_noise(&mut self.chip.ram.0[self.stack_bytes..]);
         self.reset(cause::POWER_ON);
     }
 
@@ -276,7 +259,7 @@ impl Machine {
 
     /// Flips a bit of RAM.
     pub fn flip(&mut self, address: u32, bit: u32) {
-        if let Some(byte) = self.ram.0.get_mut((address - RAM + bit / 8) as usize) {
+        if let Some(byte) = self.chip.ram.0.get_mut((address - RAM + bit / 8) as usize) {
             *byte ^= 1 << (bit % 8);
         }
     }
@@ -290,15 +273,14 @@ impl Machine {
     /// A word of RAM.
     pub fn word(&self, address: u32) -> u32 {
         let at = (address - RAM) as usize;
-        self.ram
-            .0
-            .get(at..at + 4)
+        let ram = &self.chip.ram.0;
+        ram.get(at..at + 4)
             .map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
     }
 
     /// Bytes of stack that were ever used.
     pub fn stack_bytes(&self) -> usize {
-        let stack = &self.ram.0[..self.stack_bytes];
+        let stack = &self.chip.ram.0[..self.stack_bytes];
         let untouched = stack.iter().take_while(|&&b| b == PAINT).count();
         stack.len() - untouched
     }

@@ -16,9 +16,11 @@ mod callbacks;
 mod can_model;
 mod checks;
 mod clock_model;
+mod dma_model;
 mod flash_model;
 mod image;
 mod machine;
+mod memory;
 mod peripherals;
 mod random_model;
 mod rehearsal;
@@ -118,6 +120,11 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     for (part, name) in parts {
         check(&format!("{name}: dead from the start"), &|| {
             sensors::dead_from_the_start(bench, part)
+        });
+    }
+    for (part, name) in parts {
+        check(&format!("{name}: transfers that never end"), &|| {
+            sensors::transfers_that_never_end(bench, part)
         });
     }
     check("ads131m08: a pose is of its instant", &|| {

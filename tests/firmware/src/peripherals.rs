@@ -1,5 +1,6 @@
 //! The peripherals of an STM32F405, as far as the program uses them. Time is that of the bench:
-//! it passes between interrupts and while bytes cross the SPI, and instructions take none.
+//! it passes between interrupts and while bytes cross the SPI; instructions take time where they are
+//! counted, and else none.
 
 mod registers;
 
@@ -7,7 +8,10 @@ use crate::adc_model::{Adc, Input, Part, Row};
 use crate::callbacks::Injected;
 use crate::can_model::CanModel;
 use crate::clock_model::{Clocks, Pll};
+use crate::dma_model::{Dma, Request, Side};
 use crate::flash_model::FlashModel;
+use crate::image::RAM_BYTES;
+use crate::memory::{Memory, memory};
 use crate::random_model::RandomModel;
 use crate::unicorn::Stop;
 use crate::watchdog_model::Watchdog;
@@ -57,6 +61,12 @@ pub struct Peripherals {
     pub spi_bytes: u64,
     /// The converter.
     pub adc: Adc,
+    /// RAM, which DMA reaches.
+    pub ram: Box<Memory<RAM_BYTES>>,
+    /// By how much the second alarm comes late, ns.
+    pub settled_jitter_ns: i64,
+    /// Whether no transfer by DMA starts.
+    pub dma_stands: bool,
     /// The CAN controller.
     pub can: CanModel,
     /// What the timer reads when it is started, us: 0 on the chip.
@@ -91,6 +101,8 @@ pub struct Peripherals {
     pub stop_run: Option<Stop>,
     /// Instructions executed, where they are counted.
     pub instructions: u64,
+    /// Those of them whose time has passed.
+    pub instructions_timed: u64,
     /// Instructions at the last filling of a mailbox.
     pub instructions_at_mailbox: u64,
     /// Whether the LED is on.
@@ -103,9 +115,16 @@ pub struct Peripherals {
     alarms: [Alarm; 2],
     timer_flags: u32,
     timer_started_ns: Option<u64>,
-    spi_in: u8,
-    spi_full: bool,
+    dma: Dma,
+    transfer: Option<Transfer>,
     selected: bool,
+}
+
+/// A transfer over the SPI: when it ends, what is sent, where what is received goes.
+struct Transfer {
+    end_ns: u64,
+    from: Side,
+    into: Side,
 }
 
 impl Peripherals {
@@ -116,6 +135,9 @@ impl Peripherals {
             spi_byte_ns: None,
             spi_bytes: 0,
             adc: Adc::new(part, Input::held(rows)),
+            ram: memory(0),
+            settled_jitter_ns: 0,
+            dma_stands: false,
             can: CanModel::new(),
             timer_offset_us: 0,
             first_tick_ns: None,
@@ -134,6 +156,7 @@ impl Peripherals {
             inject: Vec::new(),
             stop_run: None,
             instructions: 0,
+            instructions_timed: 0,
             instructions_at_mailbox: 0,
             led: false,
             fpscr_to_write: 0,
@@ -143,8 +166,8 @@ impl Peripherals {
             alarms: [Alarm::default(); 2],
             timer_flags: 0,
             timer_started_ns: None,
-            spi_in: 0,
-            spi_full: false,
+            dma: Dma::default(),
+            transfer: None,
             selected: false,
         };
         new.reset(cause::POWER_ON);
@@ -165,6 +188,8 @@ impl Peripherals {
         self.alarms = [Alarm::default(); 2];
         self.timer_flags = 0;
         self.timer_started_ns = None;
+        self.dma = Dma::default();
+        self.transfer = None;
         let fed = self.watchdog.fed;
         self.watchdog = Watchdog::new();
         self.watchdog.fed = fed;

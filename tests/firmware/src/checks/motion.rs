@@ -1,23 +1,50 @@
 //! Inputs that move: poses are those of the instant that the program stamps.
 
-use super::{Outcome, expect};
+use super::{Failure, Outcome, expect};
+use crate::adc_model::ads131m08::Variant;
 use crate::adc_model::{Input, Part};
 use crate::bench::{Bench, Seen};
 
 const PERIOD_US: f64 = 2000.0;
-const TICKS: u64 = 10_000;
-/// From the trigger to the middle of what the driver of the ADS131M08 reads: its 150 us stand for 144
-/// and 155 us, and the modelled part is one of 155 us. (An ADS8688 is 12 us late: too little of a step of the log
-/// to show in codes of 16 bits.)
-const SAMPLE_US: f64 = 155.0;
+const TICKS: u64 = 60;
+/// From the trigger to the middle of what the driver of the ADS131M08 reads: it stands for 160 and 171 us.
+/// (An ADS8688 is 12 us late: too little of a step of the log to show in codes of 16 bits.)
+const SAMPLE_US: f64 = 166.0;
+/// By how much the interrupt may come early or late after which the codes are read, ns.
+const JITTER_NS: i64 = 3000;
+
+/// Whichever way the ADS131M08 goes where its sheet is silent, at the gaps that the program leaves
+/// between its frames: every instruction takes its time.
+pub fn a_pose_is_of_its_instant(bench: &Bench) -> Outcome {
+    let mut lags = Vec::new();
+    for variant in Variant::all() {
+        for jitter_ns in [-JITTER_NS, 0, JITTER_NS] {
+            let lag_us = lag_us(bench, variant, jitter_ns)?;
+            expect((lag_us - SAMPLE_US).abs() < 7.0, || {
+                format!("poses {lag_us:.1} us behind the trigger: {variant:?}, {jitter_ns} ns")
+            })?;
+            lags.push(lag_us);
+        }
+    }
+    lags.sort_by(f64::total_cmp);
+    let (least, most) = (lags[0], lags[lags.len() - 1]);
+    println!("RESULT firmware_ads131m08_sample_us={least:.1}..{most:.1}");
+    Ok(())
+}
 
 /// The inputs move from row to row of the log: the lag behind the row of the tick that fits the
-/// poses X, Y and Rz best is what the driver says.
-pub fn a_pose_is_of_its_instant(bench: &Bench) -> Outcome {
+/// poses X, Y and Rz best, us.
+fn lag_us(bench: &Bench, variant: Variant, jitter_ns: i64) -> Result<f64, Failure> {
     let mut machine = bench.machine(Part::Ads131m08, [&bench.blob, &[]])?;
+    machine.count_instructions()?;
+    machine.chip.adc.set_variant(variant);
+    machine.chip.settled_jitter_ns = jitter_ns;
     machine.chip.adc.input = Input::moving(bench.rows.clone(), PERIOD_US as u64, 0);
     machine.run_ticks(TICKS)?;
     let seen = Seen::since_last(&mut machine);
+    if seen.axes.len() < 3 * TICKS as usize {
+        return Err(format!("only {} words: {variant:?}", seen.axes.len()).into());
+    }
     let value = |word: u32| f64::from(f32::from_bits(word));
     let (mut products, mut squares) = (0.0, 0.0);
     for axis in seen.axes.iter().filter(|axis| axis.axis < 3) {
@@ -26,9 +53,5 @@ pub fn a_pose_is_of_its_instant(bench: &Bench) -> Outcome {
         products += (value(axis.word) - row) * (next - row);
         squares += (next - row).powi(2);
     }
-    let lag_us = PERIOD_US * products / squares;
-    println!("RESULT firmware_ads131m08_sample_us={lag_us:.1}");
-    expect((lag_us - SAMPLE_US).abs() < 2.0, || {
-        format!("the poses are {lag_us:.1} us behind the trigger, not {SAMPLE_US}")
-    })
+    Ok(PERIOD_US * products / squares)
 }

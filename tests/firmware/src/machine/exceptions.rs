@@ -46,6 +46,7 @@ impl Machine {
         let saved = self.stack_registers();
         let is_tick = exception == 16 + IRQ_TIM2;
         let before = self.chip.instructions;
+        self.chip.instructions_timed = before;
         let (spi_before, filled_before) = (self.chip.spi_bytes, self.chip.can.filled);
         self.chip.instructions_at_mailbox = before;
         self.go(self.vectors[exception as usize], RETURN)?;
@@ -91,7 +92,12 @@ impl Machine {
         let sp = self.core.get(register::SP);
         let frame = sp.wrapping_sub(4 * saved.len() as u32) & !7;
         let at = frame.wrapping_sub(RAM) as usize;
-        if let Some(ram) = self.ram.0.get_mut(at..at.saturating_add(4 * saved.len())) {
+        if let Some(ram) = self
+            .chip
+            .ram
+            .0
+            .get_mut(at..at.saturating_add(4 * saved.len()))
+        {
             for (bytes, word) in ram.chunks_exact_mut(4).zip(saved) {
                 bytes.copy_from_slice(&word.to_le_bytes());
             }

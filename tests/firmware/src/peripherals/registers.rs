@@ -1,6 +1,6 @@
 //! Registers: what a read gives, and what a write does.
 
-use super::{Alarm, Peripherals, US};
+use super::{Alarm, Dma, Peripherals, Request, Transfer, US};
 
 pub(super) const TIM2: usize = 0x0_0000;
 const IWDG: usize = 0x0_3000;
@@ -13,7 +13,19 @@ const GPIOC: usize = 0x2_0800;
 const RCC: usize = 0x2_3800;
 const FLASH: usize = 0x2_3c00;
 const OPTCR: usize = FLASH + 0x14;
+const AHB1RSTR: usize = RCC + 0x10;
+const AHB1ENR: usize = RCC + 0x30;
 const AHB2ENR: usize = RCC + 0x34;
+const DMA2: usize = 0x2_6400;
+/// Bit of DMA2 in the registers of its bus.
+const DMA2_BIT: u32 = 1 << 22;
+/// Bits of SPI_CR1 and SPI_CR2 (RM0090 28.5.1 and 28.5.2): on; requests to receive and to send.
+const SPI_ON: u32 = 1 << 6;
+const SPI_REQUESTS: u32 = 0b11;
+/// A look at the flags of DMA2: four cycles, ns.
+const LOOK_NS: u64 = 24;
+/// Time of 21 instructions of two cycles, ns.
+const OF_21_INSTRUCTIONS_NS: u64 = 250;
 /// The core's system timer, and the register by which a program resets it.
 const SYSTICK: usize = 0xe010;
 const AIRCR: usize = 0xed0c;
@@ -29,8 +41,6 @@ const SERVO_PIN: u32 = 1;
 
 /// Clock of the bus that SPI1 is on.
 const BUS_2_HZ: u64 = 84_000_000;
-/// What the program takes between two bytes, ns.
-const SPI_GAP_NS: u64 = 150;
 /// Time of a read of a register that a program polls: loops that wait take time.
 const POLL_NS: u64 = US;
 
@@ -48,8 +58,57 @@ impl Peripherals {
         is_on && self.is_supply_low() && LOW_MV < threshold_mv
     }
 
+    /// Lets the time of the instructions pass that were executed.
+    fn pass_instructions(&mut self) {
+        let since = (self.instructions - self.instructions_timed) / 21;
+        self.instructions_timed += since * 21;
+        self.now_ns += since * OF_21_INSTRUCTIONS_NS;
+    }
+
+    /// Begins a transfer if all that it needs is on.
+    fn start_transfer(&mut self) {
+        let word = |offset: usize| self.words[offset / 4];
+        let is_on = word(SPI1) & SPI_ON != 0
+            && word(SPI1 + 4) & SPI_REQUESTS == SPI_REQUESTS
+            && word(AHB1ENR) & DMA2_BIT != 0
+            && !self.dma_stands
+            && self.transfer.is_none();
+        if !is_on {
+            return;
+        }
+        let sides = (
+            self.dma.serves(Request::Spi1Tx),
+            self.dma.serves(Request::Spi1Rx),
+        );
+        if let (Some(from), Some(into)) = sides {
+            let byte_ns = self.spi_byte_ns.unwrap_or(8_000_000_000 / self.spi_hz());
+            let end_ns = self.now_ns + byte_ns * from.count.min(into.count) as u64;
+            self.transfer = Some(Transfer { end_ns, from, into });
+        }
+    }
+
+    /// Who looks for the end of a transfer waits until it is there.
+    fn end_transfer(&mut self) {
+        self.now_ns += LOOK_NS;
+        let Some(Transfer { end_ns, from, into }) = self.transfer.take() else {
+            return;
+        };
+        self.now_ns = self.now_ns.max(end_ns);
+        // Both converters need mode 1: in another one bits are shifted.
+        let mode_1 = self.words[SPI1 / 4] & 3 == 1;
+        let count = from.count.min(into.count);
+        for k in 0..count {
+            let byte = self.adc.exchange(self.ram.0[from.at(k)]);
+            self.ram.0[into.at(k)] = if mode_1 { byte } else { byte >> 1 };
+        }
+        self.spi_bytes += count as u64;
+        self.dma.transferred(&from, count);
+        self.dma.transferred(&into, count);
+    }
+
     /// A register, by its distance from the start of the range.
     pub fn read(&mut self, offset: usize) -> u32 {
+        self.pass_instructions();
         let word = self.words[offset / 4];
         match offset {
             o if (RCC..RCC + 0x10).contains(&o) => {
@@ -76,11 +135,14 @@ impl Peripherals {
                 self.timer_flags
             }
             o if o == TIM2 + 0x24 => self.timer_us(),
-            o if o == SPI1 + 0x08 => 2 | u32::from(self.spi_full),
-            o if o == SPI1 + 0x0c => {
-                self.spi_full = false;
-                self.spi_in.into()
+            o if (DMA2..DMA2 + 0x400).contains(&o) => {
+                if o == DMA2 {
+                    self.end_transfer();
+                }
+                self.dma.read(o - DMA2)
             }
+            // Transmit buffer empty.
+            o if o == SPI1 + 0x08 => 2,
             o if (CAN1..CAN1 + 0x400).contains(&o) => {
                 self.can.advance(self.now_ns);
                 self.can.read(o - CAN1, self.now_ns)
@@ -92,6 +154,7 @@ impl Peripherals {
 
     /// Writes a register.
     pub fn write(&mut self, offset: usize, value: u32) {
+        self.pass_instructions();
         self.words[offset / 4] = value;
         match offset {
             o if o == RCC + 0x74 && value & 1 << 24 != 0 => self.reset_flags = 0,
@@ -117,16 +180,15 @@ impl Peripherals {
             o if (IWDG..IWDG + 0x10).contains(&o) => {
                 self.watchdog.write(o - IWDG, value, self.now_ns)
             }
-            o if o == SPI1 + 0x0c => {
-                let byte = self.adc.exchange(value as u8);
-                // Both converters need mode 1: in another one bits are shifted.
-                let mode_1 = self.words[SPI1 / 4] & 3 == 1;
-                self.spi_in = if mode_1 { byte } else { byte >> 1 };
-                self.spi_full = true;
-                self.spi_bytes += 1;
-                let bits_ns = 8 * 1_000_000_000 / self.spi_hz();
-                self.now_ns += self.spi_byte_ns.unwrap_or(bits_ns + SPI_GAP_NS);
+            o if o == AHB1RSTR && value & DMA2_BIT != 0 => {
+                self.dma = Dma::default();
+                self.transfer = None;
             }
+            o if (DMA2..DMA2 + 0x400).contains(&o) => {
+                self.dma.write(o - DMA2, value);
+                self.start_transfer();
+            }
+            o if o == SPI1 + 4 => self.start_transfer(),
             o if o == GPIOA + 0x18 || o == GPIOB + 0x18 || o == GPIOC + 0x18 => {
                 self.set_pins(o, value)
             }
@@ -163,7 +225,8 @@ impl Peripherals {
         let left = compare.wrapping_sub(self.timer_us());
         let start = self.timer_started_ns.unwrap_or(self.now_ns);
         let us = (self.now_ns - start) / US + u64::from(left);
-        let at_ns = (left > 0).then_some(start + us * US);
+        let late_ns = k as i64 * self.settled_jitter_ns;
+        let at_ns = (left > 0).then_some((start + us * US).saturating_add_signed(late_ns));
         self.alarms[k] = Alarm { at_ns };
     }
 
@@ -187,6 +250,8 @@ impl Peripherals {
                 }
                 Some(true) if self.selected => {
                     self.selected = false;
+                    // What is not through by now is lost.
+                    self.transfer = None;
                     self.adc.deselect(self.now_ns);
                 }
                 _ => {}
