@@ -39,6 +39,7 @@ pub struct Bus {
     was_off: bool,
     bus_off: u32,
     sent: u32,
+    overruns: u32,
     /// Frames for the mailboxes.
     pub outbox: Outbox,
 }
@@ -78,6 +79,7 @@ impl Bus {
             was_off: false,
             bus_off: 0,
             sent: 0,
+            overruns: 0,
             outbox: Outbox::new(),
         }
     }
@@ -129,6 +131,10 @@ impl Bus {
 
     /// Passes received commands and words of new parameters to the node.
     pub fn receive(&mut self, node: &mut Node<'_>, store: &mut dyn Store, random: &mut Random) {
+        if self.can.rf0r().read().fovr().bit_is_set() {
+            self.overruns = self.overruns.saturating_add(1);
+            self.can.rf0r().write(|w| w.fovr().clear());
+        }
         for _ in 0..COMMANDS_PER_TICK {
             let waiting = self.can.rf0r().read();
             let Some(received) = self.can.rx_iter().next() else {
@@ -177,6 +183,11 @@ impl Bus {
     /// Frames handed to a mailbox.
     pub const fn sent(&self) -> u32 {
         self.sent
+    }
+
+    /// Times that frames came while three were waiting, and one was lost. Saturates.
+    pub const fn overruns(&self) -> u32 {
+        self.overruns
     }
 
     /// Times the bus was off.

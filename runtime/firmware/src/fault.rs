@@ -97,7 +97,8 @@ unsafe fn NonMaskableInt() {
     reset_by(FaultKind::ClockFailed, 0, 0)
 }
 
-/// The stack pointer may be anywhere: puts it back before anything else and passes its value on.
+/// The stack pointer may be anywhere: puts it back before anything else and passes its value on. Nor
+/// are registers of the FPU to be stacked late, where the stack was: LSPACT, bit 0 of FPCCR, is cleared.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn HardFault() -> ! {
@@ -106,6 +107,11 @@ unsafe extern "C" fn HardFault() -> ! {
         "movw r1, #:lower16:_stack_start",
         "movt r1, #:upper16:_stack_start",
         "msr msp, r1",
+        "movw r1, #0xef34",
+        "movt r1, #0xe000",
+        "ldr r2, [r1]",
+        "bic r2, r2, #1",
+        "str r2, [r1]",
         "b {handler}",
         handler = sym hard_fault,
     )

@@ -60,7 +60,7 @@ mod app {
     use firmware::records::Records;
     use firmware::retained::{Retained, Step};
     use firmware::schedule::{Schedule, Tick};
-    use firmware::start_up::{Cause, PROVEN_TICKS};
+    use firmware::start_up::PROVEN_TICKS;
     use firmware::telemetry::{Ended, STAGE};
     use hal_adapters::adc::FrameSampler;
     use hal_adapters::can::Layout;
@@ -162,7 +162,6 @@ mod app {
             | bit(board_check::CAN_NOT_STARTED, !bus.takes_part())
             | bit(board_check::ZERO_LOST, zero_lost);
         let board = start::board_facts(&before, options, checks);
-        STAGE.put_start(before.cause == Cause::Watchdog, &board);
         TIM2::enable(&mut rcc);
         let mut clock = Clock::new(device.TIM2);
         let schedule = Schedule::starting(clock.now_us());
@@ -292,21 +291,17 @@ mod app {
         }
         bus.send();
 
-        let (state, reason) = local.node.state();
         STAGE.put(&Ended {
-            state: (state as u8, reason),
-            ticks: local.node.ticks(),
             sequence: tick.sequence,
             time_us: tick.started_us,
             reading,
             counters: [
-                local.schedule.missed(),
                 *local.overrun_ticks,
                 local.acquisition.faults(),
                 local.acquisition.starts(),
                 bus.sent(),
                 bus.outbox.dropped(),
-                bus.bus_off(),
+                bus.overruns(),
                 local.node.fpu_restored(),
             ],
         });

@@ -1,11 +1,11 @@
-//! What a debugger reads while the program runs: the static `STAGE`, by its symbol.
+//! What a debugger reads while the program runs: the static `STAGE`, by its symbol. State, faults and
+//! the other counters are in the status and health frames.
 //!
 //! In gdb: `print STAGE`. `STAGE.pose` holds the decoder's words unchanged: the bits of six
 //! `float`s, X, Y, Rz, Z, Rx, Ry in m and rad. `updates` is odd while the words change and even
 //! when they belong together.
 
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed, Ordering::Release, compiler_fence};
-use hal_adapters::can::status::BoardFacts;
 use runtime::Reading;
 
 /// The words of `STAGE`.
@@ -13,23 +13,15 @@ use runtime::Reading;
 #[repr(C)]
 pub struct Telemetry {
     updates: AtomicU32,
-    state: AtomicU32,
-    reason: AtomicU32,
-    ticks: AtomicU32,
     sequence: AtomicU32,
     time_us: AtomicU32,
     status: AtomicU32,
     pose: [AtomicU32; 6],
     /// See [`Ended::counters`].
-    counters: [AtomicU32; 8],
+    counters: [AtomicU32; 7],
     /// Time that the last tick took from its start to its end, and the longest, us.
     last_us: AtomicU32,
     longest_us: AtomicU32,
-    /// 1 if the last reset came from the watchdog.
-    watchdog_reset: AtomicU32,
-    /// Last fault, its address and detail, resets by faults, FLASH_OPTCR, checks of the board: pages
-    /// 6 to 11 of the health frames.
-    board: [AtomicU32; 6],
 }
 
 #[allow(clippy::declare_interior_mutable_const)] // only to fill arrays
@@ -40,38 +32,28 @@ const ZERO: AtomicU32 = AtomicU32::new(0);
 #[unsafe(no_mangle)]
 pub static STAGE: Telemetry = Telemetry {
     updates: ZERO,
-    state: ZERO,
-    reason: ZERO,
-    ticks: ZERO,
     sequence: ZERO,
     time_us: ZERO,
     status: ZERO,
     pose: [ZERO; 6],
-    counters: [ZERO; 8],
+    counters: [ZERO; 7],
     last_us: ZERO,
     longest_us: ZERO,
-    watchdog_reset: ZERO,
-    board: [ZERO; 6],
 };
 
 /// The result of a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Ended {
-    /// Number of the state and its reason, as in the status frame.
-    pub state: (u8, u8),
-    /// Ticks since start.
-    pub ticks: u32,
     /// Number of the tick.
     pub sequence: u32,
     /// When it started, us.
     pub time_us: u32,
     /// What it read.
     pub reading: Reading,
-    /// Ticks that came late or not at all, and ticks that were not done before the next one was due;
-    /// ticks without codes, and how often the converter was started; frames handed to a mailbox, and
-    /// those discarded because newer ones followed; times the bus was off; ticks in which the FPU's
-    /// settings had been changed.
-    pub counters: [u32; 8],
+    /// Ticks that were not done before the next one was due; ticks without codes, and how often the
+    /// converter was started; frames handed to a mailbox, those discarded because newer ones followed,
+    /// and times that a received one found no room; ticks in which the FPU's settings had been changed.
+    pub counters: [u32; 7],
 }
 
 impl Telemetry {
@@ -80,9 +62,6 @@ impl Telemetry {
         self.updates
             .store(self.updates.load(Relaxed).wrapping_add(1), Relaxed);
         compiler_fence(Release);
-        self.state.store(ended.state.0.into(), Relaxed);
-        self.reason.store(ended.state.1.into(), Relaxed);
-        self.ticks.store(ended.ticks, Relaxed);
         self.sequence.store(ended.sequence, Relaxed);
         self.time_us.store(ended.time_us, Relaxed);
         self.status.store(ended.reading.status.bits(), Relaxed);
@@ -104,14 +83,6 @@ impl Telemetry {
         self.last_us.store(us, Relaxed);
         if us > self.longest_us.load(Relaxed) {
             self.longest_us.store(us, Relaxed);
-        }
-    }
-
-    /// Notes whether the watchdog caused the last reset, and what is told of the board.
-    pub fn put_start(&self, watchdog: bool, facts: &BoardFacts) {
-        self.watchdog_reset.store(watchdog.into(), Relaxed);
-        for (to, from) in self.board.iter().zip(facts.words()) {
-            to.store(from, Relaxed);
         }
     }
 }

@@ -78,6 +78,8 @@ pub struct CanModel {
     done: u32,
     on_the_wire: Option<(usize, u64)>,
     received: VecDeque<[u32; 4]>,
+    /// FOVR: a frame came while the store was full (RM0090 32.9.2, CAN_RF0R).
+    overrun: bool,
     /// The bus; change it by [`Self::set_bus`].
     bus: BusState,
     /// Frames since the last look.
@@ -108,6 +110,7 @@ impl CanModel {
             done: 0,
             on_the_wire: None,
             received: VecDeque::new(),
+            overrun: false,
             bus: BusState::Good,
             sent: Vec::new(),
             filled: 0,
@@ -183,7 +186,11 @@ impl CanModel {
     /// A frame from another node, with any data length code: 9 to 15 mean eight bytes too.
     pub fn receive_coded(&mut self, id: u16, length_code: u8, bytes: [u8; 8]) {
         let [a, b, c, d, e, f, g, h] = bytes;
-        if self.received.len() < 3 && self.passes(u32::from(id) << 21) {
+        if !self.passes(u32::from(id) << 21) {
+            return;
+        }
+        self.overrun |= self.received.len() == 3;
+        if self.received.len() < 3 {
             let (low, high) = (
                 u32::from_le_bytes([a, b, c, d]),
                 u32::from_le_bytes([e, f, g, h]),
@@ -280,7 +287,7 @@ impl CanModel {
             0x00 => self.mcr,
             0x04 => self.status(now_ns),
             0x08 => self.transmit_status(),
-            0x0c => self.received.len() as u32,
+            0x0c => self.received.len() as u32 | u32::from(self.overrun) << 4,
             0x14 => self.interrupts,
             0x18 => match (self.bus, self.off_until) {
                 (_, Some(_)) => 0b111,
@@ -342,8 +349,11 @@ impl CanModel {
                 }
                 self.arbitrate(now_ns);
             }
-            0x0c if value & 1 << 5 != 0 => {
-                self.received.pop_front();
+            0x0c => {
+                self.overrun &= value & 1 << 4 == 0;
+                if value & 1 << 5 != 0 {
+                    self.received.pop_front();
+                }
             }
             0x14 => self.interrupts = value,
             0x180..0x1b0 => {

@@ -56,6 +56,9 @@ pub struct Machine {
     pub power_cuts: u32,
     /// Time by which the next tick's interrupt is held back, ns.
     pub hold_ns: u64,
+    /// Whether a handler of faults left registers of the FPU to be stacked late, where the stack had
+    /// been (LSPACT; ARM DDI 0403, B1.5.7).
+    pub lazy_left: bool,
     /// Resets by the watchdog.
     pub watchdog_resets: u32,
     /// What each interrupt of the timer took, where instructions are counted.
@@ -121,6 +124,7 @@ impl Machine {
             panics: 0,
             power_cuts: 0,
             hold_ns: 0,
+            lazy_left: false,
             watchdog_resets: 0,
             costs: Vec::new(),
         })

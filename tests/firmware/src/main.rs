@@ -139,6 +139,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     check("a debugger reads the last pose", &|| {
         log::a_debugger_reads_the_last_pose(bench)
     });
+    check("received frames without room", &|| {
+        bus::received_frames_without_room(bench)
+    });
     check("a tick that comes late", &|| timing::a_late_tick(bench));
     check("ticks that never come", &|| {
         timing::ticks_that_never_come(bench)

@@ -4,8 +4,9 @@ use super::log::Stage;
 use super::start::{first_state, row, tick_now};
 use super::{Outcome, equal, expect};
 use crate::adc_model::Part;
-use crate::bench::{Bench, Comparison, Seen};
+use crate::bench::{Bench, Comparison, Seen, command};
 use crate::can_model::BusState;
+use hal_adapters::can::command::Request;
 use hal_adapters::can::status::flag;
 
 const PART: Part = Part::Ads131m08;
@@ -24,13 +25,13 @@ pub fn goes_and_comes_back(bench: &Bench, bus: BusState) -> Outcome {
         format!("{} words on a dead bus", silent.axes.len())
     })?;
     let meanwhile = Stage::read(&machine, bench, PART)?;
-    expect(meanwhile.ticks >= 599, || {
-        format!("only {} ticks", meanwhile.ticks)
+    expect(meanwhile.sequence >= 598, || {
+        format!("only tick {}", meanwhile.sequence)
     })?;
     equal(
         "the last pose in STAGE",
         meanwhile.pose,
-        bench.poses[meanwhile.ticks as usize - 1].words,
+        bench.poses[meanwhile.sequence as usize].words,
     )?;
     expect(meanwhile.frames_dropped > 1000, || {
         format!("{} dropped", meanwhile.frames_dropped)
@@ -152,4 +153,17 @@ pub fn aborted_on_the_wire(bench: &Bench, fails: bool) -> Outcome {
     equal("words that differ", comparison.differing, 0)?;
     let dropped = Stage::read(&machine, bench, PART)?.frames_dropped - dropped_before;
     expect(dropped >= 2, || format!("{dropped} frames dropped"))
+}
+
+/// Of more frames than the store holds one is lost, and counted: once, however many they were.
+pub fn received_frames_without_room(bench: &Bench) -> Outcome {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+    machine.run_ticks(100)?;
+    for token in 0..5 {
+        let (id, bytes) = command(Request::Identify { seconds: 1 }, token, token);
+        machine.chip.can.receive(id, bytes);
+    }
+    machine.run_ticks(20)?;
+    let counted = Stage::read(&machine, bench, PART)?.receive_overruns;
+    equal("overruns counted", counted, 1)
 }

@@ -11,6 +11,9 @@ const CFSR: usize = 0xed28;
 const PRECISE: u32 = 1 << 9;
 /// See [`PRECISE`].
 pub const ACCESS_AND_STACKING: u32 = 1 << 1 | 1 << 4;
+/// The control register of the FPU's context, and its bit of what is still to be stacked.
+const FPCCR: usize = 0xef34;
+const LSPACT: u32 = 1;
 /// Its number in the vector table.
 const HARD_FAULT: usize = 3;
 /// The integer registers that the core stacks, in this order.
@@ -122,7 +125,10 @@ impl Machine {
                 },
             );
             self.stack_registers();
+            let settings = self.chip.read_core(FPCCR);
+            self.chip.write_core(FPCCR, settings | LSPACT);
             ran = self.core.run(self.vectors[HARD_FAULT], RETURN);
+            self.lazy_left |= self.chip.read_core(FPCCR) & LSPACT != 0;
         }
         let pc = self.core.get(register::PC);
         match ran {
