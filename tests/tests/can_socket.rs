@@ -10,7 +10,6 @@ use hal_adapters::socketcan::{SocketCan, SocketCanError};
 use runtime::RawFrame;
 use std::process::Command;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
-use tests::fault::{Fault, FaultRates, Faulty};
 
 const WAIT: Duration = Duration::from_millis(200);
 
@@ -186,51 +185,6 @@ fn frames_that_nobody_reads_in_time_are_counted_and_seen_as_lost() {
 
 #[test]
 #[ignore = "needs a CAN interface: run tests/vcan"]
-fn every_fault_of_a_real_bus_shows_at_the_receiver() {
-    let sent: Vec<_> = traffic(Layout::Bits16, 500)
-        .into_iter()
-        .filter(|f| f.id != Message::SensorTime.id().into())
-        .map(|frame| StampedFrame { time_us: 0, frame })
-        .collect();
-    for fault in Fault::ALL {
-        let (sender, mut bus) = (open(&[]), open(Layout::Bits16.messages()));
-        let rates = FaultRates::NONE.with(fault, 20_000);
-        let mut faulty = Faulty::new(sent.iter().copied(), rates, 5);
-        for stamped in faulty.by_ref() {
-            sender.send(&stamped.frame, WAIT).expect("room");
-        }
-        let mut receiver = receiver(Layout::Bits16);
-        let (mut faults, mut whole) = (0, 0);
-        let got = drain(&mut bus);
-        for f in &got {
-            let taken = receiver.take(&f.frame, f.time_us as u32);
-            faults += u32::from(taken.fault.is_some());
-            let Some(got) = taken.tick else { continue };
-            let want = tick(got.sequence);
-            if (got.hall, got.capacitive) == (want.hall, want.capacitive) {
-                whole += 1;
-            } else {
-                faults += 1;
-            }
-        }
-        let injected = faulty.injected(fault);
-        println!("RESULT vcan_fault={fault:?} injected={injected} noticed={faults} whole={whole}");
-        // Frames of one tick in another order are no fault.
-        let swaps_within_a_tick = if fault == Fault::Swap { injected } else { 0 };
-        assert!(
-            injected >= 5 && faults + swaps_within_a_tick >= injected,
-            "{fault:?}"
-        );
-        assert!(
-            whole >= 400 && got.len() >= 900,
-            "{fault:?}: {whole} of 500, {}",
-            got.len()
-        );
-    }
-}
-
-#[test]
-#[ignore = "needs a CAN interface: run tests/vcan"]
 fn a_full_transmit_queue_is_waited_for_until_the_deadline() {
     let name = interface();
     let bus = open(&[]);
@@ -289,23 +243,4 @@ fn what_is_no_can_interface_is_refused_by_name() {
         matches!(loopback, Err(SocketCanError::NotCan { .. })),
         "{loopback:?}"
     );
-}
-
-#[test]
-#[ignore = "needs a CAN interface: run tests/vcan"]
-fn silence_is_noticed_at_the_deadline_of_the_receiver() {
-    let (sender, mut bus) = (open(&[]), open(Layout::Bits16.messages()));
-    let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
-    for frame in traffic(Layout::Bits16, 1) {
-        sender.send(&frame, WAIT).expect("room");
-    }
-    let mut last_us = 0;
-    for f in drain(&mut bus) {
-        last_us = f.time_us;
-        receiver.take(&f.frame, f.time_us as u32);
-    }
-    let deadline_us = receiver.deadline_us().expect("a frame came");
-    assert_eq!(deadline_us.wrapping_sub(last_us as u32), 3_000);
-    let stale = receiver.poll(deadline_us).fault;
-    assert!(matches!(stale, Some(BusFault::Stale { .. })));
 }

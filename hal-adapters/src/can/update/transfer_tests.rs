@@ -85,24 +85,6 @@ fn what_cannot_be_stored_is_refused_by_kind() {
 }
 
 #[test]
-fn a_servo_that_goes_on_ends_a_transfer_at_once() {
-    let on = Request::ServoOff { seconds: 0 };
-    let mut bench = Bench::new(Some(KEY));
-    bench.servo_off();
-    bench.transfer(7, NEW, 4);
-    bench.ask(on, 50);
-    assert!(bench.ticks(1).is_empty());
-    assert!(!bench.receiver.is_updating());
-    // Also before it is stored.
-    bench.servo_off();
-    bench.transfer(7, NEW, 4);
-    assert_eq!(bench.update(commit(4), 7), STARTED);
-    bench.ask(on, 50);
-    bench.ends(7, (Outcome::ServoOn, 0));
-    assert_eq!(bench.store.writes, 0);
-}
-
-#[test]
 fn every_page_tells_what_runs() {
     let mut bench = Bench::new(Some(KEY));
     let set = ParameterSet::from_bytes(OLD).expect("sound");

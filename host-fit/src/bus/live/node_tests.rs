@@ -1,11 +1,7 @@
 use super::*;
 use hal_adapters::can::command::{Mailbox, Outcome, Request};
 use hal_adapters::can::{BusFrame, PoseReceiver, sensor};
-use runtime::calibration::Origin;
-use runtime::frame::CodeWindow;
-use runtime::geometry::ProbeGeometry;
-use runtime::model::{Probes, Sensitivity};
-use runtime::{AnyDecoder, Calibration, PlanarPose};
+use runtime::{AnyDecoder, PlanarPose};
 
 const SETTINGS: NodeSettings = NodeSettings {
     layout: Layout::Bits16,
@@ -18,26 +14,9 @@ const SETTINGS: NodeSettings = NodeSettings {
 };
 
 fn decoder() -> AnyDecoder {
-    let window = CodeWindow::between_rails(-32768, 32767).expect("16 bits");
-    let set = Calibration {
-        model: runtime::ModelKind::M30,
-        geometry: ProbeGeometry {
-            lever_arm_m: [0.2, -0.2, -0.36],
-            misalignment_rad: [0.0; 3],
-        },
-        probes: Probes::Linear([Sensitivity::constant(0.9); 3]),
-        hall_m_per_code: 6.25e-8,
-        hall_window: window,
-        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
-        capacitive_m_per_code: 1.5625e-8,
-        capacitive_window: window,
-        calibrated_planar: [1e-3; 3],
-        calibrated_vertical: [1e-3; 3],
-        sensitivity_min: Calibration::SENSITIVITY_MIN,
-    };
-    set.prepare(&Origin::default())
-        .expect("a sound stage")
-        .decoder()
+    let blob = include_bytes!("../../../../runtime/examples/stage.bin");
+    let set = runtime::ParameterSet::from_bytes(blob).expect("sound");
+    set.decoder()
 }
 
 fn raw(sequence: u32) -> RawFrame {
