@@ -11,52 +11,43 @@ fn refused(change: impl FnOnce(&mut ParameterSet)) -> ParameterError {
     set.check().expect_err("an unusable set")
 }
 
+type Change = fn(&mut ParameterSet, f32);
+
 #[test]
 fn a_number_that_is_not_finite_is_refused_by_the_name_of_its_group() {
-    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let group = |change: fn(&mut ParameterSet, f32)| match refused(|set| change(set, bad)) {
-            ParameterError::NotFinite { group } => group,
-            other => panic!("{other}"),
-        };
-        assert_eq!(group(|s, x| s.fit.peak[2] = x), "the fit record");
-        assert_eq!(
-            group(|s, x| s.geometry.lever_arm_m[0] = x),
-            "the probe geometry"
-        );
-        assert_eq!(group(|s, x| s.plane[2][2] = x), "PM");
-        assert_eq!(group(|s, x| s.plane_inverse[0][0] = x), "PM^-1");
-        assert_eq!(
-            group(|s, x| s.hall.m_per_code = x),
-            "the scale of the Hall codes"
-        );
-        assert_eq!(
-            group(|s, x| s.capacitive.vertical_per_m[1][1] = x),
-            "the capacitive plane matrix"
-        );
-        assert_eq!(
-            group(|s, x| s.capacitive.m_per_code = x),
-            "the scale of the capacitive codes"
-        );
-        assert_eq!(
-            group(|s, x| s.constants.vertical_per_code[2][2] = x),
-            "the vertical constants"
-        );
-        assert_eq!(
-            group(|s, x| sample::sensitivities(s)[2].per_ry_rad = x),
-            "the sensitivities"
-        );
-        assert_eq!(
-            group(|s, x| s.constants.planar_per_code[0][0] = x),
-            "the planar constants"
-        );
-        assert_eq!(
-            group(|s, x| s.constants.calibrated_planar[2] = x),
-            "the calibrated range"
-        );
-        assert_eq!(
-            group(|s, x| s.constants.sensitivity_min = x),
-            "the smallest sensitivity"
-        );
+    let changes: [(&str, Change); 12] = [
+        ("the fit record", |s, x| s.fit.peak[2] = x),
+        ("the probe geometry", |s, x| s.geometry.lever_arm_m[0] = x),
+        ("PM", |s, x| s.plane[2][2] = x),
+        ("PM^-1", |s, x| s.plane_inverse[0][0] = x),
+        ("the scale of the Hall codes", |s, x| s.hall.m_per_code = x),
+        ("the capacitive plane matrix", |s, x| {
+            s.capacitive.vertical_per_m[1][1] = x;
+        }),
+        ("the scale of the capacitive codes", |s, x| {
+            s.capacitive.m_per_code = x;
+        }),
+        ("the vertical constants", |s, x| {
+            s.constants.vertical_per_code[2][2] = x;
+        }),
+        ("the sensitivities", |s, x| {
+            sample::sensitivities(s)[2].per_ry_rad = x;
+        }),
+        ("the planar constants", |s, x| {
+            s.constants.planar_per_code[0][0] = x;
+        }),
+        ("the calibrated range", |s, x| {
+            s.constants.calibrated_planar[2] = x;
+        }),
+        ("the smallest sensitivity", |s, x| {
+            s.constants.sensitivity_min = x;
+        }),
+    ];
+    for (group, change) in changes {
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let want = ParameterError::NotFinite { group };
+            assert_eq!(refused(|set| change(set, bad)), want);
+        }
     }
 }
 
@@ -70,65 +61,47 @@ fn terms_that_do_not_follow_from_each_other_are_refused() {
         refused(|set| set.plane_inverse = [[f32::MAX, f32::MAX, -f32::MAX]; 3]),
         ParameterError::NotTheInverse { .. }
     ));
-    let term = "the planar constants";
-    let inconsistent = ParameterError::Inconsistent { term };
-    assert_eq!(
-        refused(|set| set.constants.planar_per_code[2][0] *= 1.00001),
-        inconsistent
-    );
-    let term = "the vertical constants";
-    let inconsistent = ParameterError::Inconsistent { term };
-    assert_eq!(
-        refused(|set| set.capacitive.m_per_code *= 1.00001),
-        inconsistent
-    );
-    let inconsistent = ParameterError::Inconsistent { term: "PM" };
-    assert_eq!(
-        refused(|set| set.geometry.misalignment_rad[2] += 1e-4),
-        inconsistent
-    );
-    assert_eq!(
-        refused(|set| set.geometry.lever_arm_m[1] += 1e-4),
-        inconsistent
-    );
-    assert_eq!(
-        refused(|set| set.geometry.misalignment_rad[0] = 1e30),
-        inconsistent
-    );
-}
-
-#[test]
-fn a_sensing_axis_that_is_no_unit_vector_is_refused() {
-    let term = "PM";
-    let longer = |set: &mut ParameterSet| {
-        set.plane[0] = set.plane[0].map(|x| 2.0 * x);
-        set.geometry.lever_arm_m[0] *= 2.0;
-        for rows in [&mut set.plane_inverse, &mut set.constants.planar_per_code] {
-            for row in rows {
-                row[0] *= 0.5;
+    let changes: [(&str, fn(&mut ParameterSet)); 6] = [
+        ("the planar constants", |set| {
+            set.constants.planar_per_code[2][0] *= 1.00001;
+        }),
+        ("the vertical constants", |set| {
+            set.capacitive.m_per_code *= 1.00001;
+        }),
+        ("PM", |set| set.geometry.misalignment_rad[2] += 1e-4),
+        ("PM", |set| set.geometry.lever_arm_m[1] += 1e-4),
+        ("PM", |set| set.geometry.misalignment_rad[0] = 1e30),
+        // A sensing axis twice as long as a unit vector.
+        ("PM", |set| {
+            set.plane[0] = set.plane[0].map(|x| 2.0 * x);
+            set.geometry.lever_arm_m[0] *= 2.0;
+            for rows in [&mut set.plane_inverse, &mut set.constants.planar_per_code] {
+                rows.iter_mut().for_each(|row| row[0] *= 0.5);
             }
-        }
-    };
-    assert_eq!(refused(longer), ParameterError::Inconsistent { term });
+        }),
+    ];
+    for (number, (term, change)) in changes.into_iter().enumerate() {
+        let want = ParameterError::Inconsistent { term };
+        assert_eq!(refused(change), want, "{number}");
+    }
 }
 
 #[test]
 fn scales_limits_and_windows_must_make_sense() {
-    let value = "the smallest sensitivity";
-    assert_eq!(
-        refused(|set| set.constants.sensitivity_min = 0.0),
-        ParameterError::NotPositive { value }
-    );
-    let value = "the scale of the Hall codes";
-    assert_eq!(
-        refused(|set| set.hall.m_per_code = -6.25e-8),
-        ParameterError::NotPositive { value }
-    );
-    let value = "a calibrated range";
-    assert_eq!(
-        refused(|set| set.constants.calibrated_vertical[1] = -1e-3),
-        ParameterError::NotPositive { value }
-    );
+    let changes: [(&str, fn(&mut ParameterSet)); 3] = [
+        ("the smallest sensitivity", |set| {
+            set.constants.sensitivity_min = 0.0;
+        }),
+        ("the scale of the Hall codes", |set| {
+            set.hall.m_per_code = -6.25e-8;
+        }),
+        ("a calibrated range", |set| {
+            set.constants.calibrated_vertical[1] = -1e-3;
+        }),
+    ];
+    for (value, change) in changes {
+        assert_eq!(refused(change), ParameterError::NotPositive { value });
+    }
     let sensors = "capacitive";
     assert_eq!(
         refused(|set| set.constants.capacitive_window = CodeWindow { low: 5, high: 4 }),
