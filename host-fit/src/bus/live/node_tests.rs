@@ -94,29 +94,6 @@ fn a_silent_bus_is_published_as_invalid_until_frames_come_again() {
     assert!(!node.receiver().is_stale());
 }
 
-#[test]
-fn a_request_to_identify_is_answered_with_the_serial_number() {
-    let decoder = decoder();
-    let mut node = Node::new(decoder, "stage 7", &SETTINGS);
-    let mut host = Mailbox::default();
-    let command = Command::new(Request::Identify { seconds: 1 }, 42);
-    let frame = host.send(&Told::Command(command)).expect("known");
-    let mut out = Vec::new();
-    let step = node.take(&stamped(frame, 0), &mut out);
-    assert_eq!(step.command, Some(command));
-    let mut text = Vec::new();
-    let mut outcome = None;
-    for told in told(&out, &mut host) {
-        match told {
-            Told::Identity(page) => text.extend(page.text),
-            Told::Answer(answer) => outcome = Some((answer.token, answer.outcome)),
-            other => panic!("{other:?}"),
-        }
-    }
-    assert_eq!(&text[..8], b"stage 7\0");
-    assert_eq!(outcome, Some((42, Some(Outcome::Done))));
-}
-
 /// Commands are the service's, whose tests are its own: this one holds that the node uses it.
 #[test]
 fn a_re_zero_at_rest_is_done_while_the_servo_is_off() {
