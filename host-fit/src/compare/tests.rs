@@ -11,7 +11,7 @@ fn an_interrupt_ends_a_comparison_with_what_there_is() {
         forms: vec![Projection::Linear],
         searches: vec![SearchKind::Shtlbo, SearchKind::Random],
         seeds: 2,
-        train: Some(60),
+        train: Some(200),
         draw: Draw::Stratified,
         evaluations: 400,
         population: 30,

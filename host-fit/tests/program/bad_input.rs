@@ -23,7 +23,11 @@ fn what_cannot_be_read_is_told_with_its_place_and_nothing_is_written() {
         ),
         ("log.csv", &gzip[..gzip.len() / 2], &["log.csv", "gzip"]),
         ("log.csv", b"", &["log.csv", "empty"]),
-        ("stage.toml", b"[search]", &["stage.toml:1:", "hall", "missing"]),
+        (
+            "stage.toml",
+            b"[search]",
+            &["stage.toml:1:", "hall", "missing"],
+        ),
     ] {
         let bench = Bench::with_log();
         bench.write(name, content);

@@ -87,7 +87,7 @@ fn compare_prints_its_table_and_writes_curves() {
         let (fitness, floor, evaluations) = (number(3), number(4), number(5));
         assert!(fitness >= floor * (1.0 - 1e-6), "{run}");
         assert!(
-            cells[1] == "lm" || (3000.0..3030.0).contains(&evaluations),
+            cells[1] == "lm" || (3000.0..=3030.0).contains(&evaluations),
             "{run}"
         );
     }
