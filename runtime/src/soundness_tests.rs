@@ -166,20 +166,20 @@ fn a_field_model_is_refused_for_what_is_wrong_with_it() {
         change(&mut set);
         set.check().expect_err("an unusable set")
     };
-    let group = "the field terms";
-    assert_eq!(
-        refused(|set| sample::field_probes(set)[1].carry[2] = f32::NAN),
-        ParameterError::NotFinite { group }
-    );
-    assert_eq!(
-        refused(|set| sample::field_probes(set)[2].shape.w_w_w = f32::INFINITY),
-        ParameterError::NotFinite { group }
-    );
-    let group = "the lateral rows";
-    assert_eq!(
-        refused(|set| sample::field_probes(set)[0].lateral[1] = f32::NAN),
-        ParameterError::NotFinite { group }
-    );
+    let changes: [(&str, fn(&mut ParameterSet)); 3] = [
+        ("the field terms", |set| {
+            sample::field_probes(set)[1].carry[2] = f32::NAN;
+        }),
+        ("the field terms", |set| {
+            sample::field_probes(set)[2].shape.w_w_w = f32::INFINITY;
+        }),
+        ("the lateral rows", |set| {
+            sample::field_probes(set)[0].lateral[1] = f32::NAN;
+        }),
+    ];
+    for (group, change) in changes {
+        assert_eq!(refused(change), ParameterError::NotFinite { group });
+    }
     assert_eq!(
         refused(|set| sample::field_probes(set)[0].sensitivity.per_z_m = 5000.0),
         ParameterError::PoleInRange { probe: 0 }
@@ -195,18 +195,18 @@ fn a_field_model_is_refused_for_what_is_wrong_with_it() {
             ParameterError::SteepInRange { probe: 0 | 1 }
         ));
     }
-    let term = "the lateral rows";
-    for change in [
-        (|set| sample::field_probes(set)[2].lateral[1] += 1e-3) as fn(&mut ParameterSet),
-        |set| sample::field_probes(set).swap(0, 2),
-    ] {
+    let changes: [(&str, fn(&mut ParameterSet)); 3] = [
+        ("the lateral rows", |set| {
+            sample::field_probes(set)[2].lateral[1] += 1e-3;
+        }),
+        ("the lateral rows", |set| {
+            sample::field_probes(set).swap(0, 2)
+        }),
+        ("PM", |set| set.geometry.lever_arm_m[1] += 1e-4),
+    ];
+    for (term, change) in changes {
         assert_eq!(refused(change), ParameterError::Inconsistent { term });
     }
-    let term = "PM";
-    assert_eq!(
-        refused(|set| set.geometry.lever_arm_m[1] += 1e-4),
-        ParameterError::Inconsistent { term }
-    );
     assert!(matches!(
         refused(|set| set.plane = [[f32::NAN; 3]; 3]),
         ParameterError::NotTheInverse { .. }
