@@ -226,9 +226,9 @@ fn add_pose(
     let expected = fit.posterior.at_pose(pose.planar, pose.vertical)?;
     let vertical = VerticalPose::from_array(pose.vertical);
     let found = constants.decode(signals_m, &vertical).to_array();
-    for axis in 0..3 {
+    for (axis, found) in found.into_iter().enumerate() {
         let variance = expected.systematic[(axis, axis)] + expected.noise[(axis, axis)];
-        poses.add(found[axis] - pose.planar[axis], variance);
+        poses.add(found - pose.planar[axis], variance);
     }
     Some(())
 }

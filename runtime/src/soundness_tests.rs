@@ -11,11 +11,12 @@ fn refused(change: impl FnOnce(&mut ParameterSet)) -> ParameterError {
     set.check().expect_err("an unusable set")
 }
 
-type Change = fn(&mut ParameterSet, f32);
+type Change = fn(&mut ParameterSet);
+type ChangeTo = fn(&mut ParameterSet, f32);
 
 #[test]
 fn a_number_that_is_not_finite_is_refused_by_the_name_of_its_group() {
-    let changes: [(&str, Change); 12] = [
+    let changes: [(&str, ChangeTo); 12] = [
         ("the fit record", |s, x| s.fit.peak[2] = x),
         ("the probe geometry", |s, x| s.geometry.lever_arm_m[0] = x),
         ("PM", |s, x| s.plane[2][2] = x),
@@ -61,7 +62,7 @@ fn terms_that_do_not_follow_from_each_other_are_refused() {
         refused(|set| set.plane_inverse = [[f32::MAX, f32::MAX, -f32::MAX]; 3]),
         ParameterError::NotTheInverse { .. }
     ));
-    let changes: [(&str, fn(&mut ParameterSet)); 6] = [
+    let changes: [(&str, Change); 6] = [
         ("the planar constants", |set| {
             set.constants.planar_per_code[2][0] *= 1.00001;
         }),
@@ -88,7 +89,7 @@ fn terms_that_do_not_follow_from_each_other_are_refused() {
 
 #[test]
 fn scales_limits_and_windows_must_make_sense() {
-    let changes: [(&str, fn(&mut ParameterSet)); 3] = [
+    let changes: [(&str, Change); 3] = [
         ("the smallest sensitivity", |set| {
             set.constants.sensitivity_min = 0.0;
         }),
@@ -166,7 +167,7 @@ fn a_field_model_is_refused_for_what_is_wrong_with_it() {
         change(&mut set);
         set.check().expect_err("an unusable set")
     };
-    let changes: [(&str, fn(&mut ParameterSet)); 3] = [
+    let changes: [(&str, Change); 3] = [
         ("the field terms", |set| {
             sample::field_probes(set)[1].carry[2] = f32::NAN;
         }),
@@ -195,7 +196,7 @@ fn a_field_model_is_refused_for_what_is_wrong_with_it() {
             ParameterError::SteepInRange { probe: 0 | 1 }
         ));
     }
-    let changes: [(&str, fn(&mut ParameterSet)); 3] = [
+    let changes: [(&str, Change); 3] = [
         ("the lateral rows", |set| {
             sample::field_probes(set)[2].lateral[1] += 1e-3;
         }),

@@ -251,8 +251,10 @@ fn diff_tells_a_change_in_units_in_sigma_and_as_a_pose() {
     let bench = bench();
     bench.good("fit run.csv --stage stage.toml --out 31.bin --model 31 --serial S2");
     bench.good("diff clean.bin clean.bin --json same.json");
-    assert_eq!(bench.json("same.json")["same_logs"], true);
-    assert_eq!(bench.json("same.json")["parameters"]["eta_a"]["sigma"], 0.0);
+    let same = bench.json("same.json");
+    assert_eq!(same["same_logs"], true);
+    assert_eq!(same["parameters"]["eta_a"]["sigma"], 0.0);
+    assert_eq!(same["pose_difference"]["axes"]["x"]["peak_um"], 0.0);
     let output = bench.good("diff clean.bin 31.bin --json other.json");
     assert!(stderr(&output).contains("serial"));
     assert!(stdout(&output).contains("15625"));
