@@ -239,11 +239,16 @@ mod tests {
         let (good, limited, refused) = (Some(Good), Some(Limited), Some(Refused));
         let failed = End::Failed("no motion");
         for (end, verdict, is_field, [mark, sentence, next]) in [
-            (End::Written, good, true, ["good", "1.20 times", "eval"]),
-            (End::Checked, good, true, ["good", "1.20 times", "fit"]),
-            (End::Written, limited, true, ["limited", "1.20", "mains"]),
+            (End::Written, good, true, ["good", "1.20", "host-fit eval"]),
+            (End::Checked, good, true, ["good", "1.20", "host-fit fit"]),
+            (
+                End::Written,
+                limited,
+                true,
+                ["limited", "1.20", "for mains"],
+            ),
             (End::Written, limited, false, ["limited", "um in X", "plan"]),
-            (End::Written, refused, true, ["refused", "1.20", "eval"]),
+            (End::Written, refused, true, ["refused", "1.20", "fit eval"]),
             (failed, good, true, ["refused", "no motion", ""]),
             (End::Interrupted, good, true, ["limited", "1.20", ""]),
             (End::Judged, None, true, ["limited", "1.20 times", ""]),
