@@ -19,8 +19,5 @@ extern crate std;
 pub mod adc;
 pub mod can;
 pub mod candump;
-#[cfg(test)]
-#[path = "../../tests/src/random.rs"]
-mod random;
 #[cfg(all(target_os = "linux", feature = "socketcan"))]
 pub mod socketcan;

@@ -1,12 +1,10 @@
-//! How often the truth lies in the 95 % intervals of a fit of the field model, and what the rule
-//! of `--model auto` is worth in service, over simulated logs.
+//! How often the truth lies in the 95 % intervals of a fit of the field model, over simulated logs.
 //!
 //! `cargo bench -p host-fit --bench coverage [-- LOGS]`: about 200 logs by default, minutes.
 //!
 //! Parameters have a truth only in logs that the field model itself makes; poses have one in logs
 //! of a stage made of physics as well, where the model is not exact.
 
-use host_fit::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::dataset::{Dataset, LoggedFrame, Movement, Row};
 use host_fit::input::shipped::STAGE_TOML;
 use host_fit::input::stage::Stage;
@@ -22,7 +20,7 @@ use host_fit::simulate::sensors::SensorErrors;
 use host_fit::solve::field::fit::{FieldFit, fit_field};
 use host_fit::solve::field::parameters::FieldParameters;
 use host_fit::solve::field::probe::probes;
-use host_fit::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
+use host_fit::solve::field::terms::TERMS;
 use host_fit::solve::{Projection, Solver, SolverOptions};
 use runtime::{ModelKind, RawFrame, VerticalPose};
 use std::error::Error;
@@ -44,7 +42,6 @@ enum Motion {
     EightSeconds,
     ThirtySeconds,
     Combined,
-    Paper,
 }
 
 impl Motion {
@@ -53,7 +50,6 @@ impl Motion {
             Self::EightSeconds => "8 s",
             Self::ThirtySeconds => "30 s",
             Self::Combined => "combined",
-            Self::Paper => "paper",
         }
     }
 
@@ -62,7 +58,6 @@ impl Motion {
             Self::EightSeconds => Run::planned(sines(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5])),
             Self::ThirtySeconds => Run::planned(sines(30.0, [13.0, 17.0, 14.0, 19.0, 16.0, 11.0])),
             Self::Combined => Protocol::Combined.run(PERIOD_S, seed),
-            Self::Paper => Protocol::Paper.run(PERIOD_S, seed),
         }
     }
 }
@@ -193,53 +188,9 @@ impl Coverage {
     }
 }
 
-/// Poses: by the parameters alone, and with the noise of the probes; X, Y, Rz.
-#[derive(Clone, Copy, Debug, Default)]
-struct Poses {
-    systematic: [Coverage; 3],
-    whole: [Coverage; 3],
-}
-
-impl Poses {
-    /// `signals` are without noise and with it, m.
-    fn add(&mut self, fit: &FieldFit, pose: &StagePose, signals_m: [[f64; 3]; 2]) -> Option<()> {
-        let constants = fit.parameters.constants(1.0)?;
-        let expected = fit.posterior.at_pose(pose.planar, pose.vertical)?;
-        let vertical = VerticalPose::from_array(pose.vertical);
-        let [exact, noisy] =
-            signals_m.map(|signal_m| constants.decode(signal_m, &vertical).to_array());
-        for axis in 0..3 {
-            let (systematic, noise) = (
-                expected.systematic[(axis, axis)],
-                expected.noise[(axis, axis)],
-            );
-            self.systematic[axis].add(exact[axis] - pose.planar[axis], systematic);
-            self.whole[axis].add(noisy[axis] - pose.planar[axis], systematic + noise);
-        }
-        Some(())
-    }
-
-    fn and(self, other: Self) -> Self {
-        let sum = |a: [Coverage; 3], b: [Coverage; 3]| [0, 1, 2].map(|k| a[k].and(b[k]));
-        Self {
-            systematic: sum(self.systematic, other.systematic),
-            whole: sum(self.whole, other.whole),
-        }
-    }
-
-    fn print(&self, title: &str) {
-        let all = |axes: [Coverage; 3]| axes[0].and(axes[1]).and(axes[2]).words();
-        println!(
-            "  {title:<34}{}   systematic part alone {}",
-            all(self.whole),
-            all(self.systematic)
-        );
-    }
-}
-
-/// Logs that the field model makes: each parameter.
-fn of_the_model(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Vec<Coverage>> {
-    let mut parameters = vec![Coverage::default(); COUNT];
+/// Logs that the field model makes: parameters.
+fn of_the_model(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Coverage> {
+    let mut parameters = Coverage::default();
     for seed in 0..logs {
         let truth = drawn(stage, &mut Stream::new(seed, Purpose::Assembly, 1));
         let random = &mut Stream::new(seed, Purpose::Sensors, 9);
@@ -249,8 +200,8 @@ fn of_the_model(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Vec<Covera
             fit.parameters.probes.as_flattened(),
             truth.probes.as_flattened(),
         );
-        for (k, coverage) in parameters.iter_mut().enumerate() {
-            coverage.add(found[k] - known[k], errors[k] * errors[k]);
+        for ((found, known), error) in found.iter().zip(known).zip(errors) {
+            parameters.add(found - known, error * error);
         }
     }
     Ok(parameters)
@@ -264,9 +215,27 @@ fn recorded(stage: &Stage, motion: Motion, seed: u64) -> Fallible<(Assembly, Dat
     Ok((assembly, log.dataset(stage).ok_or("no plane")?))
 }
 
+/// Judges a pose: with the noise of the probes in its signals.
+fn add_pose(
+    poses: &mut Coverage,
+    fit: &FieldFit,
+    pose: &StagePose,
+    signals_m: [f64; 3],
+) -> Option<()> {
+    let constants = fit.parameters.constants(1.0)?;
+    let expected = fit.posterior.at_pose(pose.planar, pose.vertical)?;
+    let vertical = VerticalPose::from_array(pose.vertical);
+    let found = constants.decode(signals_m, &vertical).to_array();
+    for (axis, found) in found.into_iter().enumerate() {
+        let variance = expected.systematic[(axis, axis)] + expected.noise[(axis, axis)];
+        poses.add(found - pose.planar[axis], variance);
+    }
+    Some(())
+}
+
 /// Logs of stages made of physics: poses.
-fn of_physics(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Poses> {
-    let mut poses = Poses::default();
+fn of_physics(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Coverage> {
+    let mut poses = Coverage::default();
     for seed in 0..logs {
         let (assembly, dataset) = recorded(stage, motion, seed)?;
         let fit = field(&dataset, stage)?;
@@ -281,55 +250,10 @@ fn of_physics(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Poses> {
         {
             let exact = assembly.probes.map(|probe| probe.signal_m(pose));
             let noisy = exact.map(|s| s + random.normal(SensorErrors::USUAL.hall_m));
-            poses.add(&fit, pose, [exact, noisy]);
+            add_pose(&mut poses, &fit, pose, noisy);
         }
     }
     Ok(poses)
-}
-
-/// rms errors in service of what `auto` takes over those of Model (31): the largest over stages
-/// and axes, and how often the field model was taken.
-fn against_model_31(stage: &Stage, motion: Motion, logs: u64) -> Fallible<(f64, f64, u64)> {
-    let (mut worst, mut sum, mut taken) = (0.0f64, 0.0, 0);
-    for seed in 0..logs {
-        let (assembly, dataset) = recorded(stage, motion, seed)?;
-        let model_31 = FieldParameters::of_model_31(&model_31(&dataset, stage)?, stage);
-        let settings = FitSettings::new(ModelChoice::Auto);
-        let auto = match fit(&dataset, stage, &settings)?.field {
-            Some(field) => {
-                taken += 1;
-                field.parameters
-            }
-            None => model_31,
-        };
-        let run = Protocol::Service.run(PERIOD_S, seed);
-        let service = record(stage, &assembly, run, &SensorErrors::USUAL, seed)?;
-        let dataset = service.dataset(stage).ok_or("no plane")?;
-        let truth = || service.truth.iter().flatten();
-        let squares = |parameters: &FieldParameters| {
-            let constants = parameters.constants(1.0).ok_or("singular")?;
-            let mut squares = [0.0; 3];
-            for (row, pose) in dataset.rows.iter().zip(truth()) {
-                let vertical = VerticalPose::from_array(row.vertical);
-                let decoded = constants.decode(row.signal_m, &vertical).to_array();
-                for axis in 0..3 {
-                    squares[axis] += (decoded[axis] - pose.planar[axis]).powi(2);
-                }
-            }
-            Fallible::Ok(squares)
-        };
-        let (auto, model_31) = (squares(&auto)?, squares(&model_31)?);
-        for axis in 0..3 {
-            let ratio = (auto[axis] / model_31[axis]).sqrt();
-            worst = worst.max(ratio);
-            sum += ratio / (3 * logs) as f64;
-        }
-    }
-    Ok((worst, sum, taken))
-}
-
-fn pooled(each: &[Coverage]) -> Coverage {
-    each.iter().fold(Coverage::default(), |sum, c| sum.and(*c))
 }
 
 fn main() -> Fallible<()> {
@@ -344,48 +268,23 @@ fn main() -> Fallible<()> {
     ];
     println!("truth within 95 % intervals (rms error over standard error)");
     println!("logs made by the field model");
-    let mut parameters = vec![Coverage::default(); COUNT];
+    let mut parameters = Coverage::default();
     for (motion, logs) in shares {
         let of_parameters = of_the_model(&stage, motion, logs)?;
         let title = format!("{}, {logs} logs: parameters", motion.name());
-        println!("  {title:<34}{}", pooled(&of_parameters).words());
-        for (sum, coverage) in parameters.iter_mut().zip(of_parameters) {
-            *sum = sum.and(coverage);
-        }
+        println!("  {title:<34}{}", of_parameters.words());
+        parameters = parameters.and(of_parameters);
     }
-    for probe in 0..3 {
-        let own = &parameters[probe * PER_PROBE..(probe + 1) * PER_PROBE];
-        for (k, coverage) in own.iter().enumerate() {
-            let name = name(probe * PER_PROBE + k);
-            print!("  {name:<10}{}", coverage.words());
-            if k % 5 == 4 || k + 1 == PER_PROBE {
-                println!();
-            }
-        }
-    }
-    println!("  {:<34}{}", "all: parameters", pooled(&parameters).words());
+    println!("  {:<34}{}", "all: parameters", parameters.words());
     println!("logs of stages made of physics");
-    let mut poses = Poses::default();
+    let mut poses = Coverage::default();
     for (motion, logs) in shares {
         let of_poses = of_physics(&stage, motion, logs)?;
-        of_poses.print(&format!("{}, {logs} logs: poses", motion.name()));
+        let title = format!("{}, {logs} logs: poses", motion.name());
+        println!("  {title:<34}{}", of_poses.words());
         poses = poses.and(of_poses);
     }
-    poses.print("all: poses");
+    println!("  {:<34}{}", "all: poses", poses.words());
 
-    println!("rms errors in service of what --model auto takes over those of model (31)");
-    let shares = [
-        (Motion::EightSeconds, logs * 3 / 20),
-        (Motion::ThirtySeconds, logs * 3 / 20),
-        (Motion::Combined, logs / 10),
-        (Motion::Paper, logs / 10),
-    ];
-    for (motion, logs) in shares {
-        let (worst, mean, taken) = against_model_31(&stage, motion, logs)?;
-        println!(
-            "  {:<10}{logs} stages: mean {mean:.3}, worst axis of all {worst:.4}; the field model was taken {taken} times",
-            motion.name()
-        );
-    }
     Ok(())
 }

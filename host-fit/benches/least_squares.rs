@@ -6,15 +6,12 @@ use host_fit::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::log;
 use host_fit::input::shipped::RUN_GZ;
 use host_fit::input::stage::Stage;
-use host_fit::problem::Problem;
-use host_fit::problem::draw::{Draw, draw_rows};
 use host_fit::problem::model::Model;
 use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::log_text::log_csv;
 use host_fit::simulate::protocol::Protocol;
 use host_fit::simulate::recording::record;
 use host_fit::simulate::sensors::SensorErrors;
-use host_fit::solve::{Projection, Solver, SolverOptions};
 use runtime::ModelKind;
 use std::path::Path;
 use std::time::Instant;
@@ -32,51 +29,19 @@ fn median_ms(runs: usize, mut call: impl FnMut()) -> f64 {
     times[runs / 2]
 }
 
-fn least_squares(name: &str, problem: &Problem, runs: usize) {
-    let options = SolverOptions::new(Projection::Linear, 1);
-    let ours = median_ms(runs, || {
-        let solution = Solver::LeastSquares.solve(problem, &options);
-        solution.expect("a solution");
-    });
-    println!("RESULT least_squares_{name}_ms={ours:.3}");
-}
-
 fn main() {
     let stage = Stage::from_toml(host_fit::input::shipped::STAGE_TOML, "stage.toml".as_ref())
         .expect("the shipped stage");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("log.csv.gz");
     std::fs::write(&path, host_fit::input::shipped::LOG_GZ).expect("written");
-    let read = || {
-        log::read(
-            std::slice::from_ref(&path),
-            &stage,
-            &log::ReadOptions::default(),
-        )
-        .expect("read")
-    };
-    println!(
-        "RESULT read_57000_rows_ms={:.1}",
-        median_ms(9, || drop(read()))
-    );
-    let dataset = read().dataset;
+    let read = log::read(&[&path], &stage, &log::ReadOptions::default());
+    let dataset = read.expect("read").dataset;
     let settings = FitSettings::new(ModelChoice::Named(Model::of(ModelKind::M31)));
     let whole = median_ms(9, || {
         fit(&dataset, &stage, &settings).expect("a fit");
     });
     println!("RESULT fit_and_judge_57000_rows_ms={whole:.1}");
-    let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    least_squares(
-        "57000_rows",
-        &Problem::new(&dataset, &all, &stage, Model::of(ModelKind::M31)),
-        9,
-    );
-    let some = draw_rows(&dataset, 200, Draw::Stratified, 1);
-    least_squares(
-        "200_rows",
-        &Problem::new(&dataset, &some, &stage, Model::of(ModelKind::M31)),
-        51,
-    );
     field_model(&stage, folder.path(), &settings);
 }
 

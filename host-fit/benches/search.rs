@@ -1,13 +1,13 @@
-//! Times of the population searches on the log that ships with the program, or on another one:
-//! an evaluation, the paper's experiment, the way to the least-squares optimum, threads.
+//! Times of the population searches on the log that ships with the program: the paper's experiment, and
+//! the way to the least-squares optimum.
 //!
-//! `cargo bench -p host-fit --bench search [-- LOG STAGE]`
+//! `cargo bench -p host-fit --bench search`
 //!
 //! `cargo bench -p host-fit --bench search -- --export DIR` writes the 200 rows of the paper's
 //! experiment, its bounds and one individual with its fitness into DIR, for other programs to
 //! be measured on the same problem, and prints what this one does with it.
 
-use host_fit::input::log::{ReadOptions, read, read_bytes};
+use host_fit::input::log::{ReadOptions, read_bytes};
 use host_fit::input::stage::Stage;
 use host_fit::problem::Problem;
 use host_fit::problem::draw::{Draw, draw_rows};
@@ -15,12 +15,11 @@ use host_fit::problem::model::Model;
 use host_fit::solve::objective::Objective;
 use host_fit::solve::search::cost::CostFunction;
 use host_fit::solve::search::kind::SearchKind;
-use host_fit::solve::search::run::{Outcome, Start, StopCriteria};
+use host_fit::solve::search::run::{Start, StopCriteria};
 use host_fit::solve::{Projection, Solver, SolverOptions};
 use runtime::ModelKind;
 use std::error::Error;
 use std::fmt::Write;
-use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
@@ -67,23 +66,6 @@ fn inside(cost: &Objective<'_>, number: usize) -> Vec<f64> {
 
 fn objective<'a>(problem: &'a Problem<'a>, projection: Projection) -> Objective<'a> {
     Objective::new(problem, projection).expect("Model (31) has slopes")
-}
-
-/// Time of one evaluation of the objective alone.
-fn evaluation(cost: &Objective<'_>) {
-    let individuals: Vec<_> = (0..96).map(|k| inside(cost, k)).collect();
-    let (least, middle) = time_us(501, || {
-        for individual in &individuals {
-            black_box(cost.cost(black_box(individual)));
-        }
-    });
-    println!(
-        "evaluation, form {:<6} {:>3} unknowns: {:.3} us (median {:.3})",
-        cost.projection.name(),
-        cost.bounds().len(),
-        least / 96.0,
-        middle / 96.0,
-    );
 }
 
 fn start(seed: u64, population: usize) -> Start<'static> {
@@ -159,30 +141,6 @@ fn to_the_floor(cost: &Objective<'_>, floor: f64, share: f64, population: usize)
     );
 }
 
-/// The same search on one thread and on two: time, and whether the path is the same.
-fn threads(problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
-    let cost = objective(problem, Projection::None);
-    let mut found: Vec<Outcome> = Vec::new();
-    let mut times = Vec::new();
-    for threads in [1, 2] {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()?;
-        let started = Instant::now();
-        let search = || SearchKind::Shtlbo.minimize(&cost, &start(1, PAPER), &generations(5));
-        found.push(pool.install(search));
-        times.push(started.elapsed().as_secs_f64() * 1e3);
-    }
-    println!(
-        "1,100 evaluations on {} rows: {:.0} ms on one thread, {:.0} ms on two, same path: {}",
-        problem.rows.len(),
-        times[0],
-        times[1],
-        found[0] == found[1],
-    );
-    Ok(())
-}
-
 /// Writes the paper's problem of seed 1 for other programs, and measures this one on it.
 fn export(folder: &Path, problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(folder)?;
@@ -227,19 +185,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         .filter(|a| a != "--bench")
         .collect();
     let named: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let options = ReadOptions::default();
-    let (stage, reading) = if let [log, stage] = named[..]
-        && log != "--export"
-    {
-        let stage = Stage::from_file(Path::new(stage))?;
-        let reading = read(&[log], &stage, &options)?;
-        (stage, reading)
-    } else {
-        let shipped = Path::new("the log that ships with the program");
-        let stage = Stage::from_toml(host_fit::input::shipped::STAGE_TOML, shipped)?;
-        let reading = read_bytes(host_fit::input::shipped::LOG_GZ, shipped, &stage, &options)?;
-        (stage, reading)
-    };
+    let shipped = Path::new("the log that ships with the program");
+    let stage = Stage::from_toml(host_fit::input::shipped::STAGE_TOML, shipped)?;
+    let log = host_fit::input::shipped::LOG_GZ;
+    let reading = read_bytes(log, shipped, &stage, &ReadOptions::default())?;
     // Lives as long as the program.
     let stage: &'static Stage = Box::leak(Box::new(stage));
     let problem = |count, draw, seed| {
@@ -255,21 +204,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             .map_err(Into::into);
     }
     let few = problem(ROWS, Draw::Stratified, 1);
-    let all = problem(usize::MAX, Draw::Stratified, 1);
     let lm = SolverOptions::new(Projection::Linear, 1);
     let floor = few.fitness(Solver::LeastSquares.solve(&few, &lm)?.cost);
     one.install(|| {
-        let [_, delta, linear] =
-            [Projection::None, Projection::Delta, Projection::Linear].map(|p| {
-                let cost = objective(&few, p);
-                evaluation(&cost);
-                cost
-            });
         papers_experiment(&problem);
         // 1e-6 of the sum of squares is 5e-7 of its root.
-        to_the_floor(&linear, floor, 5e-7, FEW);
-        to_the_floor(&linear, floor, 5e-7, PAPER);
-        to_the_floor(&delta, floor, 0.01, PAPER);
+        to_the_floor(&objective(&few, Projection::Linear), floor, 5e-7, FEW);
     });
-    threads(&all)
+    Ok(())
 }

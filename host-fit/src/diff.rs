@@ -178,24 +178,6 @@ mod tests {
         BLOBS.map(|bytes| ParameterSet::from_bytes(bytes).expect("sound"))
     }
 
-    #[test]
-    fn a_blob_does_not_differ_from_itself() {
-        for set in sets() {
-            let same = pose_difference(&set, &set);
-            assert_eq!(
-                (&same["poses"], &same["refused"]),
-                (&json!(15_625), &json!(0))
-            );
-            let axes = same["axes"].as_object().expect("axes").values();
-            let mut figures = axes.flat_map(|axis| axis.as_object().expect("figures").values());
-            assert!(figures.all(|figure| *figure == json!(0.0)));
-            let none = BTreeMap::new();
-            let changes = parameter_changes([&set, &set], [&none, &none]);
-            let mut changes = changes.as_object().expect("parameters").values();
-            assert!(changes.all(|c| c["a"].is_f64() && c["a"] == c["b"] && c["sigma"].is_null()));
-        }
-    }
-
     /// The grid is reached: the Hall scale a thousandth larger moves its corners by a thousandth.
     #[test]
     fn a_larger_scale_moves_every_pose_in_proportion() {

@@ -124,24 +124,6 @@ fn a_known_vertical_pose_decodes_like_the_codes_that_give_it() {
     assert!(status.any(Status::VERTICAL_NOT_FINITE) && status.any(Status::PLANAR_INVALID));
 }
 
-#[test]
-fn the_zero_deviation_is_taken_off() {
-    let zero = PlanarPose {
-        x_m: 3e-6,
-        y_m: -2e-6,
-        rz_rad: 1e-6,
-    };
-    let plain = decode(&decoder(), HALL, CAPACITIVE).pose.planar.to_array();
-    let less = decoder()
-        .decode(&frame(HALL, CAPACITIVE), &zero)
-        .pose
-        .planar
-        .to_array();
-    for ((less, plain), zero) in less.into_iter().zip(plain).zip(zero.to_array()) {
-        assert!((f64::from(plain) - f64::from(zero) - f64::from(less)).abs() < 2e-11);
-    }
-}
-
 /// Motion over the whole calibrated range, codes as the converters would give them: `f32`
 /// stays within 0.25 nm and 1 nrad (the field model: 0.7 nrad) of the same constants in `f64`.
 #[test]

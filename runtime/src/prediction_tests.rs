@@ -114,19 +114,6 @@ proptest! {
 }
 
 #[test]
-fn a_constant_velocity_is_predicted_over_the_wrap_of_the_time() {
-    // 4.8 mm/s along Y.
-    let samples = every_2_ms(5_000, |k| [1e-6, 9.6e-6 * k as f32, -2e-6]);
-    assert!(samples[0].0 > samples[7].0);
-    let predictor = fed(&samples);
-    for (age_us, moved_m) in [(150, 0.72e-6), (300, 1.44e-6), (2_000, 9.6e-6)] {
-        let pose = predictor.pose_at(5_000 + age_us).expect("poses in a row");
-        assert!((pose.y_m - samples[7].1[1] - moved_m).abs() < 1e-11);
-        assert_eq!((pose.x_m, pose.rz_rad), (1e-6, -2e-6));
-    }
-}
-
-#[test]
 fn the_noise_that_it_adds_is_what_its_documentation_says() {
     // White noise: the root of the sum of the squares of what each pose contributes.
     for (age_us, percent) in [(300, 1.3), (1_000, 4.4)] {

@@ -11,52 +11,44 @@ fn refused(change: impl FnOnce(&mut ParameterSet)) -> ParameterError {
     set.check().expect_err("an unusable set")
 }
 
+type Change = fn(&mut ParameterSet);
+type ChangeTo = fn(&mut ParameterSet, f32);
+
 #[test]
 fn a_number_that_is_not_finite_is_refused_by_the_name_of_its_group() {
-    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let group = |change: fn(&mut ParameterSet, f32)| match refused(|set| change(set, bad)) {
-            ParameterError::NotFinite { group } => group,
-            other => panic!("{other}"),
-        };
-        assert_eq!(group(|s, x| s.fit.peak[2] = x), "the fit record");
-        assert_eq!(
-            group(|s, x| s.geometry.lever_arm_m[0] = x),
-            "the probe geometry"
-        );
-        assert_eq!(group(|s, x| s.plane[2][2] = x), "PM");
-        assert_eq!(group(|s, x| s.plane_inverse[0][0] = x), "PM^-1");
-        assert_eq!(
-            group(|s, x| s.hall.m_per_code = x),
-            "the scale of the Hall codes"
-        );
-        assert_eq!(
-            group(|s, x| s.capacitive.vertical_per_m[1][1] = x),
-            "the capacitive plane matrix"
-        );
-        assert_eq!(
-            group(|s, x| s.capacitive.m_per_code = x),
-            "the scale of the capacitive codes"
-        );
-        assert_eq!(
-            group(|s, x| s.constants.vertical_per_code[2][2] = x),
-            "the vertical constants"
-        );
-        assert_eq!(
-            group(|s, x| sample::sensitivities(s)[2].per_ry_rad = x),
-            "the sensitivities"
-        );
-        assert_eq!(
-            group(|s, x| s.constants.planar_per_code[0][0] = x),
-            "the planar constants"
-        );
-        assert_eq!(
-            group(|s, x| s.constants.calibrated_planar[2] = x),
-            "the calibrated range"
-        );
-        assert_eq!(
-            group(|s, x| s.constants.sensitivity_min = x),
-            "the smallest sensitivity"
-        );
+    let changes: [(&str, ChangeTo); 12] = [
+        ("the fit record", |s, x| s.fit.peak[2] = x),
+        ("the probe geometry", |s, x| s.geometry.lever_arm_m[0] = x),
+        ("PM", |s, x| s.plane[2][2] = x),
+        ("PM^-1", |s, x| s.plane_inverse[0][0] = x),
+        ("the scale of the Hall codes", |s, x| s.hall.m_per_code = x),
+        ("the capacitive plane matrix", |s, x| {
+            s.capacitive.vertical_per_m[1][1] = x;
+        }),
+        ("the scale of the capacitive codes", |s, x| {
+            s.capacitive.m_per_code = x;
+        }),
+        ("the vertical constants", |s, x| {
+            s.constants.vertical_per_code[2][2] = x;
+        }),
+        ("the sensitivities", |s, x| {
+            sample::sensitivities(s)[2].per_ry_rad = x;
+        }),
+        ("the planar constants", |s, x| {
+            s.constants.planar_per_code[0][0] = x;
+        }),
+        ("the calibrated range", |s, x| {
+            s.constants.calibrated_planar[2] = x;
+        }),
+        ("the smallest sensitivity", |s, x| {
+            s.constants.sensitivity_min = x;
+        }),
+    ];
+    for (group, change) in changes {
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let want = ParameterError::NotFinite { group };
+            assert_eq!(refused(|set| change(set, bad)), want);
+        }
     }
 }
 
@@ -70,65 +62,47 @@ fn terms_that_do_not_follow_from_each_other_are_refused() {
         refused(|set| set.plane_inverse = [[f32::MAX, f32::MAX, -f32::MAX]; 3]),
         ParameterError::NotTheInverse { .. }
     ));
-    let term = "the planar constants";
-    let inconsistent = ParameterError::Inconsistent { term };
-    assert_eq!(
-        refused(|set| set.constants.planar_per_code[2][0] *= 1.00001),
-        inconsistent
-    );
-    let term = "the vertical constants";
-    let inconsistent = ParameterError::Inconsistent { term };
-    assert_eq!(
-        refused(|set| set.capacitive.m_per_code *= 1.00001),
-        inconsistent
-    );
-    let inconsistent = ParameterError::Inconsistent { term: "PM" };
-    assert_eq!(
-        refused(|set| set.geometry.misalignment_rad[2] += 1e-4),
-        inconsistent
-    );
-    assert_eq!(
-        refused(|set| set.geometry.lever_arm_m[1] += 1e-4),
-        inconsistent
-    );
-    assert_eq!(
-        refused(|set| set.geometry.misalignment_rad[0] = 1e30),
-        inconsistent
-    );
-}
-
-#[test]
-fn a_sensing_axis_that_is_no_unit_vector_is_refused() {
-    let term = "PM";
-    let longer = |set: &mut ParameterSet| {
-        set.plane[0] = set.plane[0].map(|x| 2.0 * x);
-        set.geometry.lever_arm_m[0] *= 2.0;
-        for rows in [&mut set.plane_inverse, &mut set.constants.planar_per_code] {
-            for row in rows {
-                row[0] *= 0.5;
+    let changes: [(&str, Change); 6] = [
+        ("the planar constants", |set| {
+            set.constants.planar_per_code[2][0] *= 1.00001;
+        }),
+        ("the vertical constants", |set| {
+            set.capacitive.m_per_code *= 1.00001;
+        }),
+        ("PM", |set| set.geometry.misalignment_rad[2] += 1e-4),
+        ("PM", |set| set.geometry.lever_arm_m[1] += 1e-4),
+        ("PM", |set| set.geometry.misalignment_rad[0] = 1e30),
+        // A sensing axis twice as long as a unit vector.
+        ("PM", |set| {
+            set.plane[0] = set.plane[0].map(|x| 2.0 * x);
+            set.geometry.lever_arm_m[0] *= 2.0;
+            for rows in [&mut set.plane_inverse, &mut set.constants.planar_per_code] {
+                rows.iter_mut().for_each(|row| row[0] *= 0.5);
             }
-        }
-    };
-    assert_eq!(refused(longer), ParameterError::Inconsistent { term });
+        }),
+    ];
+    for (number, (term, change)) in changes.into_iter().enumerate() {
+        let want = ParameterError::Inconsistent { term };
+        assert_eq!(refused(change), want, "{number}");
+    }
 }
 
 #[test]
 fn scales_limits_and_windows_must_make_sense() {
-    let value = "the smallest sensitivity";
-    assert_eq!(
-        refused(|set| set.constants.sensitivity_min = 0.0),
-        ParameterError::NotPositive { value }
-    );
-    let value = "the scale of the Hall codes";
-    assert_eq!(
-        refused(|set| set.hall.m_per_code = -6.25e-8),
-        ParameterError::NotPositive { value }
-    );
-    let value = "a calibrated range";
-    assert_eq!(
-        refused(|set| set.constants.calibrated_vertical[1] = -1e-3),
-        ParameterError::NotPositive { value }
-    );
+    let changes: [(&str, Change); 3] = [
+        ("the smallest sensitivity", |set| {
+            set.constants.sensitivity_min = 0.0;
+        }),
+        ("the scale of the Hall codes", |set| {
+            set.hall.m_per_code = -6.25e-8;
+        }),
+        ("a calibrated range", |set| {
+            set.constants.calibrated_vertical[1] = -1e-3;
+        }),
+    ];
+    for (value, change) in changes {
+        assert_eq!(refused(change), ParameterError::NotPositive { value });
+    }
     let sensors = "capacitive";
     assert_eq!(
         refused(|set| set.constants.capacitive_window = CodeWindow { low: 5, high: 4 }),
@@ -193,20 +167,20 @@ fn a_field_model_is_refused_for_what_is_wrong_with_it() {
         change(&mut set);
         set.check().expect_err("an unusable set")
     };
-    let group = "the field terms";
-    assert_eq!(
-        refused(|set| sample::field_probes(set)[1].carry[2] = f32::NAN),
-        ParameterError::NotFinite { group }
-    );
-    assert_eq!(
-        refused(|set| sample::field_probes(set)[2].shape.w_w_w = f32::INFINITY),
-        ParameterError::NotFinite { group }
-    );
-    let group = "the lateral rows";
-    assert_eq!(
-        refused(|set| sample::field_probes(set)[0].lateral[1] = f32::NAN),
-        ParameterError::NotFinite { group }
-    );
+    let changes: [(&str, Change); 3] = [
+        ("the field terms", |set| {
+            sample::field_probes(set)[1].carry[2] = f32::NAN;
+        }),
+        ("the field terms", |set| {
+            sample::field_probes(set)[2].shape.w_w_w = f32::INFINITY;
+        }),
+        ("the lateral rows", |set| {
+            sample::field_probes(set)[0].lateral[1] = f32::NAN;
+        }),
+    ];
+    for (group, change) in changes {
+        assert_eq!(refused(change), ParameterError::NotFinite { group });
+    }
     assert_eq!(
         refused(|set| sample::field_probes(set)[0].sensitivity.per_z_m = 5000.0),
         ParameterError::PoleInRange { probe: 0 }
@@ -222,18 +196,18 @@ fn a_field_model_is_refused_for_what_is_wrong_with_it() {
             ParameterError::SteepInRange { probe: 0 | 1 }
         ));
     }
-    let term = "the lateral rows";
-    for change in [
-        (|set| sample::field_probes(set)[2].lateral[1] += 1e-3) as fn(&mut ParameterSet),
-        |set| sample::field_probes(set).swap(0, 2),
-    ] {
+    let changes: [(&str, Change); 3] = [
+        ("the lateral rows", |set| {
+            sample::field_probes(set)[2].lateral[1] += 1e-3;
+        }),
+        ("the lateral rows", |set| {
+            sample::field_probes(set).swap(0, 2)
+        }),
+        ("PM", |set| set.geometry.lever_arm_m[1] += 1e-4),
+    ];
+    for (term, change) in changes {
         assert_eq!(refused(change), ParameterError::Inconsistent { term });
     }
-    let term = "PM";
-    assert_eq!(
-        refused(|set| set.geometry.lever_arm_m[1] += 1e-4),
-        ParameterError::Inconsistent { term }
-    );
     assert!(matches!(
         refused(|set| set.plane = [[f32::NAN; 3]; 3]),
         ParameterError::NotTheInverse { .. }

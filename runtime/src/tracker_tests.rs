@@ -31,20 +31,6 @@ fn bad_gap(sequence: u32) -> RawFrame {
 const HOLD_2: OnInvalid = OnInvalid::Hold { ticks: 2 };
 
 #[test]
-fn invalid_fields_read_zero_without_hold() {
-    let decoder = sample::parameters().decoder();
-    let mut tracker = PoseTracker::new(decoder, OnInvalid::Zero);
-    assert!(tracker.tick(&frame(0)).status.is_good());
-    let reading = tracker.tick(&bad_gap(1));
-    assert_eq!(reading.pose, NO_POSE);
-    assert!(
-        !reading
-            .status
-            .any(Status::PLANAR_HELD.with(Status::VERTICAL_HELD))
-    );
-}
-
-#[test]
 fn counters_stay_at_their_largest_value() {
     let decoder = sample::parameters().decoder();
     let mut tracker = PoseTracker::new(decoder, HOLD_2);

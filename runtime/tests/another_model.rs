@@ -116,17 +116,3 @@ fn its_sensitivities_are_checked_as_those_of_every_model() {
     );
     assert!(reading.vertical().is_some());
 }
-
-#[test]
-fn one_tracker_type_runs_every_model() {
-    let (bent, linear) = (
-        bent(9e7),
-        Decoder::<LinearModel>::new(CONSTANTS, [LINEAR; 3]),
-    );
-    let decoders: [&dyn Decode; 2] = [&bent, &linear];
-    let mut trackers = decoders.map(|decoder| PoseTracker::new(decoder, OnInvalid::Zero));
-    let [a, b] = trackers
-        .each_mut()
-        .map(|tracker| tracker.tick(&frame(7)).pose.planar.x_m);
-    assert!((b / a - 2.0 / 1.1).abs() < 1e-6);
-}

@@ -1,4 +1,4 @@
-//! Random numbers for tests: hal-adapters compiles this file for its own, too.
+//! Random numbers for tests.
 
 /// Random numbers that depend on the seed alone (SplitMix64).
 #[derive(Clone, Debug)]

@@ -4,41 +4,13 @@
 use embedded_can::Frame;
 use hal_adapters::can::e2e::unprotect;
 use hal_adapters::can::{BusFrame, Layout, SensorReceiver, StampedFrame, Timing, sensor};
-use runtime::calibration::Origin;
-use runtime::frame::CodeWindow;
-use runtime::geometry::ProbeGeometry;
-use runtime::model::{Probes, Sensitivity};
-use runtime::{AnyDecoder, Calibration, Decode, ModelKind, PlanarPose, RawFrame, Reading, Status};
+use runtime::{AnyDecoder, Decode, ParameterSet, PlanarPose, RawFrame, Reading, Status};
 use tests::fault::{Fault, FaultRates, Faulty, damaged};
 use tests::random::Random;
 
-/// A stage near the designed one.
 fn decoder() -> AnyDecoder {
-    let window = CodeWindow::between_rails(-32768, 32767).expect("16 bits");
-    let probe = |eta| Sensitivity {
-        eta,
-        per_z_m: -190.0,
-        per_rx_rad: -70.0,
-        per_ry_rad: 15.0,
-    };
-    let calibration = Calibration {
-        model: ModelKind::M31,
-        geometry: ProbeGeometry {
-            lever_arm_m: [0.1975, -0.1975, -0.36],
-            misalignment_rad: [0.02, -0.03, 0.01],
-        },
-        probes: Probes::Linear([probe(0.87), probe(0.70), probe(0.86)]),
-        hall_m_per_code: 6.25e-8,
-        hall_window: window,
-        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
-        capacitive_m_per_code: 1.5625e-8,
-        capacitive_window: window,
-        calibrated_planar: [5e-4; 3],
-        calibrated_vertical: [3e-4; 3],
-        sensitivity_min: Calibration::SENSITIVITY_MIN,
-    };
-    let set = calibration.prepare(&Origin::default());
-    set.expect("a sound stage").decoder()
+    let blob = include_bytes!("../../runtime/examples/stage.bin");
+    ParameterSet::from_bytes(blob).expect("sound").decoder()
 }
 
 /// A tick whose six codes tell its number and where they belong.

@@ -6,7 +6,7 @@ use hal_adapters::can::{
 };
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
-use tests::fault::{Fault, FaultRates, Faulty, damaged};
+use tests::fault::{Fault, damaged};
 use tests::random::Random;
 
 const PERIOD_US: u64 = 2_000;
@@ -142,15 +142,6 @@ fn each_injected_fault_is_noticed_within_one_tick() {
 }
 
 #[test]
-fn traffic_without_faults_gives_no_notice() {
-    for layout in LAYOUTS {
-        let frames = traffic(layout, 1_000, 2_000);
-        let end_us = 2_000 * PERIOD_US;
-        assert_eq!(first_notice_us(layout, &frames, end_us), None);
-    }
-}
-
-#[test]
 fn silence_is_stale_within_4_ms_of_the_last_frame_when_asked_every_millisecond() {
     let mut worst_us = 0;
     for phase_us in (0..1_000).step_by(7) {
@@ -175,64 +166,17 @@ fn silence_is_stale_within_4_ms_of_the_last_frame_when_asked_every_millisecond()
 }
 
 #[test]
-fn the_deadline_that_the_receiver_names_is_when_it_calls_the_source_stale() {
-    let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
-    for f in traffic(Layout::Bits16, 100, 120) {
-        receiver.take(&f.frame, f.time_us as u32);
-    }
-    let deadline_us = receiver.deadline_us().expect("frames came");
-    assert_eq!(receiver.poll(deadline_us - 1).fault, None);
-    assert!(receiver.poll(deadline_us).fault.is_some());
-}
-
-#[test]
-fn the_injector_does_what_its_faults_say_and_the_same_for_the_same_seed() {
-    let sent = traffic(Layout::Bits16, 0, 9_999);
-    let run = |fault, seed| {
-        let rates = FaultRates::NONE.with(fault, 5_000);
-        let mut faulty = Faulty::new(sent.iter().copied(), rates, seed);
-        let got: Vec<StampedFrame> = faulty.by_ref().collect();
-        (got, faulty.injected(fault) as usize)
-    };
-    for fault in Fault::ALL {
-        let (got, injected) = run(fault, 7);
-        assert_eq!((&got, injected), (&run(fault, 7).0, run(fault, 7).1));
-        assert_ne!(got, run(fault, 8).0);
-        assert!((60..140).contains(&injected), "{fault:?}: {injected}");
-        let length = match fault {
-            Fault::Drop => sent.len() - injected,
-            Fault::Repeat => sent.len() + injected,
-            _ => sent.len(),
-        };
-        assert_eq!(got.len(), length, "{fault:?}");
-        let late = (0..).zip(&got).filter_map(|(place, got)| {
-            let was = sent.iter().position(|sent| sent.time_us == got.time_us);
-            usize::checked_sub(place, was?).filter(|moved| *moved > 0)
-        });
-        match fault {
-            Fault::Swap => assert!(late.eq(vec![1; injected])),
-            Fault::Delay => {
-                let moved: Vec<usize> = late.collect();
-                assert_eq!(moved.len(), injected);
-                assert!(moved.iter().all(|by| (2..=9).contains(by)));
-            }
-            _ => {}
-        }
-    }
-    let frame = sent[0].frame;
-    let word = |frame: &BusFrame| frame.data().try_into().map(u64::from_be_bytes);
+fn each_injected_fault_damages_frames_as_its_name_says() {
+    let frame = traffic(Layout::Bits16, 0, 0)[0].frame;
+    let word = |frame: &BusFrame| u64::from_be_bytes(frame.data().try_into().expect("eight bytes"));
     let random = &mut Random::new(5);
     for _ in 0..10_000 {
-        let flipped = |fault, random: &mut Random| {
-            word(&damaged(&frame, fault, random)).expect("eight bytes")
-                ^ word(&frame).expect("eight bytes")
-        };
-        assert!((1..=3).contains(&flipped(Fault::Flip, random).count_ones()));
-        let burst = flipped(Fault::Burst, random);
+        let mut flipped = |fault| word(&damaged(&frame, fault, random)) ^ word(&frame);
+        assert!((1..=3).contains(&flipped(Fault::Flip).count_ones()));
+        let burst = flipped(Fault::Burst);
         let length = 64 - burst.leading_zeros() - burst.trailing_zeros();
         assert!((2..=8).contains(&length), "{burst:x}");
         assert!(damaged(&frame, Fault::WrongLength, random).dlc() < 8);
-        let renamed = damaged(&frame, Fault::WrongId, random);
-        assert_ne!(renamed.id(), frame.id());
+        assert_ne!(damaged(&frame, Fault::WrongId, random).id(), frame.id());
     }
 }

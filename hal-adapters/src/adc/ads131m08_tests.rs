@@ -110,11 +110,6 @@ fn the_check_is_that_of_the_data_sheet() {
 }
 
 #[test]
-fn a_start_resets_identifies_sets_and_reads_back() {
-    assert_eq!(try_start(&started().concat()), Ok(()));
-}
-
-#[test]
 fn a_damaged_frame_before_the_reset_does_not_matter() {
     let mut all = started();
     all[0] = frame(0x0011, 0, vec![0x55; FRAME_BYTES]);
@@ -316,19 +311,6 @@ fn a_start_that_fails_is_followed_by_a_reset_that_lasts_a_period() {
     assert_eq!(adc.trigger(&mut delay), Ok(()));
     assert_eq!(adc.start(&mut delay), Ok(()));
     assert_eq!(adc.trigger(&mut delay), Ok(()));
-    bus.done();
-    pin.done();
-}
-
-#[test]
-fn a_trigger_is_a_pulse_on_sync() {
-    let mut pin = PinMock::new(&[
-        PinTransaction::set(State::Low),
-        PinTransaction::set(State::High),
-    ]);
-    let mut bus = Mock::new(&[]);
-    let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
-    assert_eq!(adc.trigger(&mut NoopDelay::new()), Ok(()));
     bus.done();
     pin.done();
 }

@@ -1,8 +1,8 @@
 //! How much of a classic CAN bus the protocol takes.
 
 use super::sensor::Layout;
-use super::signals_tests::{Node, ROWS, Rate};
 use super::table::SLOW_TICKS;
+use super::tables_tests::{Rate, rows};
 
 /// Bits from start of frame to the end of the CRC of a standard data frame with eight bytes:
 /// 1 start, 11 identifier, 1 RTR, 1 IDE, 1 reserved, 4 length, 64 data, 15 CRC. Only these
@@ -32,9 +32,10 @@ impl Traffic {
     /// Frames in [`SLOW_TICKS`] ticks, requests and answers aside.
     pub(super) fn frames_in_slow_ticks(&self) -> u32 {
         let every = |ticks: u8| u32::from(SLOW_TICKS.checked_div(ticks).unwrap_or(0));
-        ROWS.iter()
+        rows()
+            .iter()
             .map(|row| match (row.sender, row.rate) {
-                (Node::Sensor, rate) => {
+                ("Sensor", rate) => {
                     let Some(layout) = self.layout else { return 0 };
                     match rate {
                         Rate::Ticks(1) if !layout.messages().contains(&row.spec.message) => 0,

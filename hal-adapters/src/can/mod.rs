@@ -40,10 +40,10 @@ pub mod pose;
 pub mod receiver;
 pub mod sensor;
 pub mod service;
-#[cfg(test)]
-mod signals_tests;
 pub mod status;
 pub mod table;
+#[cfg(test)]
+mod tables_tests;
 pub mod update;
 
 pub use frame::{BusFrame, Coded, StampedFrame};

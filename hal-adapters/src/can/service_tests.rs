@@ -3,35 +3,14 @@ extern crate std;
 use super::super::frame::BusFrame;
 use super::*;
 use crate::can::Message;
-use runtime::calibration::Origin;
-use runtime::frame::CodeWindow;
-use runtime::geometry::ProbeGeometry;
-use runtime::model::{Probes, Sensitivity};
-use runtime::{AnyDecoder, Calibration, ModelKind, OnInvalid, RawFrame};
+use runtime::{AnyDecoder, OnInvalid, ParameterSet, RawFrame};
 use std::vec::Vec;
 
 const TICKS_PER_S: u32 = 500;
 
 fn decoder() -> AnyDecoder {
-    let window = CodeWindow::between_rails(-32768, 32767).expect("16 bits");
-    let set = Calibration {
-        model: ModelKind::M30,
-        geometry: ProbeGeometry {
-            lever_arm_m: [0.2, -0.2, -0.36],
-            misalignment_rad: [0.0; 3],
-        },
-        probes: Probes::Linear([Sensitivity::constant(0.9); 3]),
-        hall_m_per_code: 6.25e-8,
-        hall_window: window,
-        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
-        capacitive_m_per_code: 1.5625e-8,
-        capacitive_window: window,
-        calibrated_planar: [1e-3; 3],
-        calibrated_vertical: [1e-3; 3],
-        sensitivity_min: Calibration::SENSITIVITY_MIN,
-    };
-    let set = set.prepare(&Origin::default());
-    set.expect("a sound stage").decoder()
+    let blob = include_bytes!("../../../runtime/examples/stage.bin");
+    ParameterSet::from_bytes(blob).expect("sound").decoder()
 }
 
 /// A node with a servo, and a host that commands it.

@@ -1,5 +1,5 @@
-//! The one table of messages and identifiers; what each carries is in `signals_tests.rs`. Code,
-//! documentation (`protocol.md`) and the `.dbc` file follow from both.
+//! The one table of messages and identifiers; what each carries is in the tables of `protocol.md`,
+//! from which the `.dbc` file follows.
 
 use embedded_can::{Id, StandardId};
 

@@ -98,7 +98,7 @@ struct Score {
 /// Prints the table of faults, then the score.
 pub fn table(stage: &Stage, planned: &Trajectory, seeds: std::ops::Range<u64>) {
     println!(
-        "{:<26}{:>9}{:>9}{:>9}{:>9}  class, verdict, first finding",
+        "{:<26}{:>9}{:>9}{:>9}{:>9}  class, verdict",
         "fault", "predicted", "true", "repaired", "true"
     );
     let mut score = Score::default();
@@ -176,21 +176,12 @@ pub fn table(stage: &Stage, planned: &Trajectory, seeds: std::ops::Range<u64>) {
             score.falsely_good += usize::from(is_good && last > 1.15);
             let shown = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{x:.3}"));
             println!(
-                "{name:<26}{predicted:>9.3}{truth:>9.3}{:>9}{:>9}  {}{} {:?} {}",
+                "{name:<26}{predicted:>9.3}{truth:>9.3}{:>9}{:>9}  {}{} {:?}",
                 shown(repaired.map(|_| expected)),
                 shown(repaired),
                 if is_near { "" } else { "FAR " },
                 if is_class { "right" } else { "WRONG" },
                 diagnosis.verdict.expect("a verdict"),
-                diagnosis
-                    .findings
-                    .first()
-                    .map_or(String::new(), |found| format!(
-                        "{:?} {:?} {}",
-                        found.severity,
-                        found.code,
-                        found.message.chars().take(60).collect::<String>()
-                    ))
             );
         }
     }
@@ -207,9 +198,5 @@ pub fn table(stage: &Stage, planned: &Trajectory, seeds: std::ops::Range<u64>) {
     println!(
         "repaired within 1.05 of the clean: {} of {}",
         score.repaired_well, score.repaired
-    );
-    println!(
-        "RESULT faults={asked} near={} class={}",
-        score.near, score.class
     );
 }

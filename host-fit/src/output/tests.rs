@@ -171,28 +171,3 @@ fn a_link_to_a_file_that_is_not_there_makes_that_file() {
     );
     assert!(at("circle").is_symlink());
 }
-
-#[cfg(unix)]
-#[test]
-fn files_of_killed_programs_are_swept_and_those_of_running_ones_are_not() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let left = folder.path().join(".host-fit-killed");
-    fs::write(&left, b"half").expect("written");
-    let running = temporary::temporary(folder.path()).expect("a file");
-    write_atomically(&folder.path().join("params.bin"), b"new").expect("written");
-    assert!(!left.exists());
-    assert!(running.path().exists());
-}
-
-#[cfg(unix)]
-#[test]
-fn two_names_of_a_file_are_one_place() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| folder.path().join(name);
-    fs::write(at("file"), b"").expect("written");
-    fs::hard_link(at("file"), at("hard")).expect("linked");
-    std::os::unix::fs::symlink(at("new"), at("soft")).expect("linked");
-    assert!(Place::of(&at("file")) == Place::of(&at("hard")));
-    assert!(Place::of(&at("soft")) == Place::of(&at("new")));
-    assert!(Place::of(&at("file")) != Place::of(&at("new")));
-}

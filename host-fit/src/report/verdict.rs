@@ -236,64 +236,22 @@ mod tests {
     #[test]
     fn the_end_of_the_run_and_the_verdict_decide_what_is_said_first() {
         use Verdict::{Good, Limited, Refused};
-        for (end, verdict, is_field, mark, sentence, next) in [
+        let (good, limited, refused) = (Some(Good), Some(Limited), Some(Refused));
+        let failed = End::Failed("no motion");
+        for (end, verdict, is_field, [mark, sentence, next]) in [
+            (End::Written, good, true, ["good", "1.20", "host-fit eval"]),
+            (End::Checked, good, true, ["good", "1.20", "host-fit fit"]),
             (
                 End::Written,
-                Some(Good),
+                limited,
                 true,
-                "good",
-                "1.20 times",
-                "host-fit eval",
+                ["limited", "1.20", "for mains"],
             ),
-            (
-                End::Checked,
-                Some(Good),
-                true,
-                "good",
-                "1.20 times",
-                "host-fit fit",
-            ),
-            (
-                End::Written,
-                Some(Limited),
-                true,
-                "limited",
-                "1.20 times",
-                "look for mains",
-            ),
-            (
-                End::Written,
-                Some(Limited),
-                false,
-                "limited",
-                "1.0 to 3.0 um in X",
-                "host-fit plan",
-            ),
-            (
-                End::Written,
-                Some(Refused),
-                true,
-                "refused",
-                "1.20 times",
-                "host-fit eval",
-            ),
-            (
-                End::Failed("no motion"),
-                Some(Good),
-                true,
-                "refused",
-                "no motion",
-                "",
-            ),
-            (
-                End::Interrupted,
-                Some(Good),
-                true,
-                "limited",
-                "1.20 times",
-                "",
-            ),
-            (End::Judged, None, true, "limited", "1.20 times", ""),
+            (End::Written, limited, false, ["limited", "um in X", "plan"]),
+            (End::Written, refused, true, ["refused", "1.20", "fit eval"]),
+            (failed, good, true, ["refused", "no motion", ""]),
+            (End::Interrupted, good, true, ["limited", "1.20", ""]),
+            (End::Judged, None, true, ["limited", "1.20 times", ""]),
         ] {
             let found = summary(end, verdict, is_field);
             assert_eq!(found.mark, mark, "{end:?} {verdict:?}");

@@ -188,13 +188,30 @@ pub fn thinned_log(stride: usize, keep: impl Fn(usize) -> bool) -> String {
     out
 }
 
+/// A log of whole numbers, the cells of each row (from 0 after the header) changed.
+pub fn changed(log: &str, change: impl Fn(usize, &mut [i64])) -> String {
+    let (header, rows) = log.split_once('\n').expect("a header");
+    let rows = rows.lines().enumerate().map(|(row, line)| {
+        let cells = line.split(',').map(|cell| cell.parse().expect("whole"));
+        let mut cells: Vec<i64> = cells.collect();
+        change(row, &mut cells);
+        let cells: Vec<String> = cells.iter().map(i64::to_string).collect();
+        cells.join(",") + "\n"
+    });
+    format!("{header}\n{}", rows.collect::<String>())
+}
+
+/// The place of a column.
+pub fn column(log: &str, name: &str) -> usize {
+    let header = log.lines().next().expect("a header");
+    let place = header.split(',').position(|column| column == name);
+    place.expect("the column")
+}
+
 /// Replaces one cell of a log: row from 0 after the header, column by name.
 pub fn with_cell(log: &str, row: usize, column: &str, value: &str) -> String {
     let mut lines: Vec<String> = log.lines().map(str::to_owned).collect();
-    let index = lines[0]
-        .split(',')
-        .position(|name| name == column)
-        .expect("the column");
+    let index = self::column(log, column);
     let mut cells: Vec<&str> = lines[row + 1].split(',').collect();
     cells[index] = value;
     lines[row + 1] = cells.join(",");

@@ -25,64 +25,36 @@ const OLD: &[u8] = b"what was there before";
 /// A command, and what it writes.
 struct Job {
     arguments: &'static str,
-    outputs: &'static [&'static str],
+    outputs: Vec<&'static str>,
 }
 
-const fn job(arguments: &'static str, outputs: &'static [&'static str]) -> Job {
-    Job { arguments, outputs }
-}
+/// A command and its outputs, in a line. The last three write many files one after the other.
+const JOBS: &str = "\
+fit log.csv --stage stage.toml --out o.bin --json o.json --report o > o.json o/index.html o.bin
+fit run.csv.gz --stage stage.toml --model field --out o.bin > o.bin.posterior o.bin
+recalibrate field.bin run.csv.gz --stage stage.toml --what all --out o.bin --json o.json > o.json o.bin.posterior o.bin
+decode p.bin log.csv --stage stage.toml --out o.csv > o.csv
+eval p.bin log.csv --stage stage.toml --json o.json > o.json
+check log.csv --stage stage.toml --json o.json > o.json
+import bus.log ifm.csv --stage stage.toml --out o.csv > o.csv
+inspect p.bin --json o.json > o.json
+diff p.bin field.bin --json o.json > o.json
+export p.bin --format hex --slot 0 --out o.hex > o.hex
+init log.csv --out o.toml --force > o.toml
+plan --stage stage.toml --seconds 8 --out o.csv > o.csv
+simulate --stage stage.toml --protocol service --seed 1 --out o.csv --truth o.truth > o.csv o.truth
+compare log.csv --stage stage.toml --seeds 1 --evaluations 400 --project linear --out o > o/table.md o/runs.csv o/history.csv
+man --out o > o/host-fit.1 o/host-fit-fit.1
+demo --out d > d/params.bin d/pose.csv d/field.bin";
 
-const JOBS: &[Job] = &[
-    job(
-        "fit log.csv --stage stage.toml --out o.bin --json o.json --report o",
-        &["o.json", "o/index.html", "o.bin"],
-    ),
-    job(
-        "fit run.csv.gz --stage stage.toml --model field --out o.bin",
-        &["o.bin.posterior", "o.bin"],
-    ),
-    job(
-        "recalibrate field.bin run.csv.gz --stage stage.toml --what all --out o.bin --json o.json",
-        &["o.json", "o.bin.posterior", "o.bin"],
-    ),
-    job(
-        "decode p.bin log.csv --stage stage.toml --out o.csv",
-        &["o.csv"],
-    ),
-    job(
-        "eval p.bin log.csv --stage stage.toml --json o.json",
-        &["o.json"],
-    ),
-    job(
-        "check log.csv --stage stage.toml --json o.json",
-        &["o.json"],
-    ),
-    job(
-        "import bus.log ifm.csv --stage stage.toml --out o.csv",
-        &["o.csv"],
-    ),
-    job("inspect p.bin --json o.json", &["o.json"]),
-    job("diff p.bin field.bin --json o.json", &["o.json"]),
-    job("export p.bin --format hex --slot 0 --out o.hex", &["o.hex"]),
-    job("init log.csv --out o.toml --force", &["o.toml"]),
-    job(
-        "plan --stage stage.toml --seconds 8 --out o.csv",
-        &["o.csv"],
-    ),
-    job(
-        "simulate --stage stage.toml --protocol service --seed 1 --out o.csv --truth o.truth",
-        &["o.csv", "o.truth"],
-    ),
-    job(
-        "compare log.csv --stage stage.toml --seeds 1 --evaluations 400 --project linear --out o",
-        &["o/table.md", "o/runs.csv", "o/history.csv"],
-    ),
-    job("man --out o", &["o/host-fit.1", "o/host-fit-fit.1"]),
-    job(
-        "demo --out d",
-        &["d/params.bin", "d/pose.csv", "d/field.bin"],
-    ),
-];
+fn jobs() -> Vec<Job> {
+    let job = |line: &'static str| {
+        let (arguments, outputs) = line.split_once(" > ").expect(line);
+        let outputs = outputs.split(' ').collect();
+        Job { arguments, outputs }
+    };
+    JOBS.lines().map(job).collect()
+}
 
 /// A record of the bus, and the interferometers beside it: one movement of 1.5 s.
 fn records() -> (String, String) {
@@ -128,7 +100,7 @@ fn bench() -> Bench {
 
 impl Job {
     fn restore(&self, bench: &Bench) {
-        for output in self.outputs {
+        for output in &self.outputs {
             bench.write(output, OLD);
         }
     }
@@ -205,10 +177,11 @@ fn a_killed_command_leaves_each_output_old_or_new_and_the_next_one_sweeps() {
     let kills = std::env::var("KILLS").map_or(KILLS, |kills| kills.parse().expect("a number"));
     let bench = bench();
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
+    let jobs = jobs();
     let (mut ended, mut old, mut new, mut left) = (0, 0, 0, 0);
-    for (k, job) in JOBS.iter().enumerate() {
+    for (k, job) in jobs.iter().enumerate() {
         let (time, whole) = job.finish(&bench);
-        for _ in (k as u64..kills).step_by(JOBS.len()) {
+        for _ in (k as u64..kills).step_by(jobs.len()) {
             job.restore(&bench);
             let mut running = job.start(&bench);
             // One in two near the end, where it writes.
@@ -241,9 +214,10 @@ fn a_killed_command_leaves_each_output_old_or_new_and_the_next_one_sweeps() {
 fn a_full_disk_leaves_every_output_of_a_command_as_it_was() {
     let bench = bench();
     let mut full = 0;
-    // The last three write many files one after the other: each is whole.
-    let one_by_one = JOBS.len() - 3;
-    for (k, job) in JOBS.iter().enumerate() {
+    let jobs = jobs();
+    // The others write one after the other: each is whole.
+    let one_by_one = jobs.len() - 3;
+    for (k, job) in jobs.iter().enumerate() {
         let (_, whole) = job.finish(&bench);
         let mut blocks: Vec<_> = whole.iter().map(|bytes| (bytes.len() - 1) / 512).collect();
         blocks.push(0);

@@ -1,46 +1,35 @@
 //! Logs as laboratories have them, from the command line: split, read from a pipe, drafted for.
 
-use crate::common::{Bench, log, stderr, stdout};
+use crate::common::{Bench, changed, log, stderr, stdout};
 use std::io::Write;
 use std::process::Stdio;
 
 const MARK: &str = "# FILL IN: ";
 
-/// The shipped log, thinned, as one recording: no column for the movement, time that goes on with a
-/// pause of so many ms between movements.
-fn one_recording(pause_ms: i64) -> String {
-    let log = log();
-    let mut lines = log.lines();
-    let header = lines.next().expect("a header");
-    let mut text = header.replace("movement,", "") + "\n";
-    for line in lines {
-        let cells: Vec<&str> = line.splitn(3, ',').collect();
-        let number = |at: usize| cells[at].parse::<i64>().expect("a number");
-        let t_us = number(1) + number(0) * (2_000_000 + pause_ms * 1000);
-        text += &format!("{t_us},{}\n", cells[2]);
-    }
-    text
+/// The shipped log, thinned, as one recording: no column for the movement, and time that goes on.
+fn one_recording() -> String {
+    let whole = changed(&log(), |_, cells| cells[1] += cells[0] * 2_000_000);
+    let rows = whole.lines().filter_map(|line| line.split_once(','));
+    rows.map(|(_, rest)| format!("{rest}\n")).collect()
 }
 
 #[test]
 fn one_long_recording_is_fitted_as_its_movements_are() {
     let bench = Bench::with_log();
-    bench.write("paused.csv", one_recording(1000));
-    bench.write("whole.csv", one_recording(0));
+    bench.write("whole.csv", one_recording());
     let fit = |log: &str| {
-        let output = bench.good(&format!(
-            "fit {log} --stage stage.toml --out p.bin --json p.json"
-        ));
-        (bench.json("p.json"), stderr(&output))
+        let fit = format!("fit {log} --stage stage.toml --out p.bin --json p.json");
+        let told = stderr(&bench.good(&fit));
+        (bench.json("p.json"), told)
     };
     let (want, _) = fit("log.csv");
-    for log in ["paused.csv", "whole.csv --split 2"] {
-        let (have, warnings) = fit(log);
-        assert_eq!(have["errors"], want["errors"], "{log}");
-        assert_eq!(have["movements"], 57, "{log}");
-        assert!(warnings.contains("the times tell 57"), "{warnings}");
-        bench.good(&format!("eval p.bin {log} --stage stage.toml"));
-    }
+    let (have, warnings) = fit("whole.csv --split 2");
+    assert_eq!(
+        (&have["errors"], &have["movements"]),
+        (&want["errors"], &57.into())
+    );
+    assert!(warnings.contains("the times tell 57"), "{warnings}");
+    bench.good("eval p.bin whole.csv --split 2 --stage stage.toml");
     let refused = "fit log.csv --stage stage.toml --out p.bin --split 2";
     bench.bad(refused, 3, &["log.csv", "--split does not apply"]);
     let usage = "fit log.csv --stage stage.toml --out p.bin --split 0";

@@ -1,24 +1,7 @@
 //! Fits that succeed, with something that the user must be told.
 
-use crate::common::{Bench, log, number, stderr, thinned_log, with_cell};
+use crate::common::{Bench, number, stderr, thinned_log};
 use host_fit::input::shipped::STAGE_TOML;
-
-#[test]
-fn one_wild_code_is_named_with_its_movement_and_time() {
-    let bench = Bench::new();
-    // Row 1000 of the thinned log: movement 20, its first row.
-    bench.write("log.csv", with_cell(&log(), 1010, "hall_a_cnt", "3000"));
-    let output = bench.good("fit log.csv --stage stage.toml --out p.bin");
-    let message = stderr(&output);
-    assert!(
-        message.contains("1 row of hall_a far outside the noise")
-            && message.contains("movement 20 at t_us = 400000"),
-        "{message}"
-    );
-    bench.write("log.csv", log());
-    let output = bench.good("fit log.csv --stage stage.toml --out p.bin");
-    assert!(!stderr(&output).contains("outside the noise"));
-}
 
 #[test]
 fn a_range_narrower_than_the_errors_is_a_warning_and_one_without_width_holds_its_parameter() {

@@ -1,26 +1,19 @@
 //! An old calibration brought up to date, on a stage made of physics whose codes are scaled as
 //! changed gains scale them.
 
-use crate::common::{Bench, number, plan, stderr, stdout};
-use serde_json::Value;
-use std::fmt::Write;
+use crate::common::{Bench, changed, number, plan, stderr, stdout};
 
 /// A log whose probes A, B, C read `gains` times as much.
 fn with_gains(log: &str, gains: [f64; 3]) -> String {
-    let mut lines = log.lines();
-    let mut out = lines.next().expect("a header").to_owned() + "\n";
-    for line in lines {
-        let cells: Vec<&str> = line.split(',').collect();
-        let (others, hall) = cells.split_at(cells.len() - 3);
-        out.push_str(&others.join(","));
-        for (code, gain) in hall.iter().zip(gains) {
-            let code: f64 = code.parse().expect("a code");
-            let _ = write!(out, ",{}", (code * gain).round());
+    changed(log, |_, cells| {
+        for (code, gain) in cells[HALL_A..].iter_mut().zip(gains) {
+            *code = (*code as f64 * gain).round() as i64;
         }
-        out.push('\n');
-    }
-    out
+    })
 }
+
+/// The column of Hall A, which B and C follow.
+const HALL_A: usize = 8;
 
 /// A fit of 8 s with its posterior, and a sine of 2 s along Y of the same stage.
 fn bench() -> Bench {
@@ -36,21 +29,6 @@ fn bench() -> Bench {
         "fit log.csv --stage stage.toml --out old.bin --model field --serial HS-3 --json fit.json",
     );
     bench
-}
-
-/// A log with the sign of Hall probe A turned.
-fn with_a_turned(log: &str) -> String {
-    let mut lines = log.lines();
-    let header = lines.next().expect("a header");
-    let of_a = header.split(',').position(|name| name == "hall_a_cnt");
-    let of_a = of_a.expect("the column of A");
-    let mut out = format!("{header}\n");
-    for line in lines {
-        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
-        cells[of_a] = (-cells[of_a].parse::<i64>().expect("a code")).to_string();
-        out += &(cells.join(",") + "\n");
-    }
-    out
 }
 
 #[test]
@@ -90,7 +68,7 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
     let inspected = bench.json("inspect.json");
     assert_eq!(
         (&inspected["serial"], &inspected["created"]),
-        (&Value::from("HS-3"), &Value::from("today"))
+        (&"HS-3".into(), &"today".into())
     );
 
     // The new posterior carries on: here all parameters, from the new blob.
@@ -111,30 +89,13 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
 #[test]
 fn bad_rows_do_not_bend_it_and_what_does_is_told_in_the_verdict() {
     let bench = bench();
-    let changed = |change: &dyn Fn(usize, &mut [i64])| {
-        let log = bench.text("log.csv");
-        let (header, rows) = log.split_once('\n').expect("a header");
-        let rows = rows.lines().enumerate().map(|(row, line)| {
-            let mut cells: Vec<i64> = line
-                .split(',')
-                .map(|cell| cell.parse().expect("whole"))
-                .collect();
-            change(row, &mut cells);
-            cells
-                .iter()
-                .map(i64::to_string)
-                .collect::<Vec<_>>()
-                .join(",")
-                + "\n"
-        });
-        format!("{header}\n{}", rows.collect::<String>())
-    };
-    let hall_a = |cells: &mut [i64]| cells.len() - 3;
-    let sparks = changed(&|row, cells| cells[hall_a(cells)] += 1600 * i64::from(row % 100 == 50));
+    let log = bench.text("log.csv");
+    let sparks = changed(&log, |row, cells| {
+        cells[HALL_A] += 1600 * i64::from(row % 100 == 50);
+    });
     // From the middle of the run on B reads 0.2 % more.
-    let drifts = changed(&|row, cells| {
-        let of_b = hall_a(cells) + 1;
-        cells[of_b] += cells[of_b] * i64::from(row >= 2000) / 500;
+    let drifts = changed(&log, |row, cells| {
+        cells[HALL_A + 1] += cells[HALL_A + 1] * i64::from(row >= 2000) / 500;
     });
     for (log, code, verdict) in [
         (sparks, "outliers", "good"),
@@ -221,7 +182,8 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
         &["other.bin.posterior belongs to another blob"],
     );
     bench.write("old.bin.posterior", &posterior);
-    bench.write("turned.csv", with_a_turned(&bench.text("log.csv")));
+    let turned = with_gains(&bench.text("log.csv"), [-1.0, 1.0, 1.0]);
+    bench.write("turned.csv", turned);
     let parts = ["beyond all that probes drift", "columns, order and signs"];
     refused("old.bin turned.csv --what all", 4, &parts);
     std::fs::remove_file(bench.path("old.bin.posterior")).expect("there");

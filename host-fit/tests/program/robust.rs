@@ -1,61 +1,26 @@
 //! Bad rows in a log, and how far a blob can be trusted: losses, cross-validation, uncertainty of
 //! poses, the difference between blobs.
 
-use crate::common::{Bench, log, number, stderr, stdout, thinned_log, unzipped};
+use crate::common::{Bench, changed, log, number, stderr, stdout, thinned_log, unzipped};
 use host_fit::input::shipped::{RUN_GZ, SERVICE_GZ};
 
 const HALL_CODES_IN_50_UM: i64 = 800;
 const NM_IN_50_UM: i64 = 50_000;
 
-/// The cells of a log, the header apart.
-fn cells(log: &str) -> (String, Vec<Vec<i64>>) {
-    let (header, rows) = log.split_once('\n').expect("a header");
-    let row = |line: &str| {
-        let cells = line.split(',').map(|cell| cell.parse().expect("a number"));
-        cells.collect()
-    };
-    (header.to_owned(), rows.lines().map(row).collect())
-}
-
-fn text(header: &str, rows: &[Vec<i64>]) -> String {
-    let line = |row: &Vec<i64>| {
-        let cells: Vec<String> = row.iter().map(ToString::to_string).collect();
-        cells.join(",") + "\n"
-    };
-    header.to_owned() + "\n" + &rows.iter().map(line).collect::<String>()
-}
-
 /// One row in a hundred off by 50 um in one of its beams or Hall channels.
 fn with_jumps(log: &str) -> String {
-    let (header, mut rows) = cells(log);
-    for (k, row) in rows.iter_mut().enumerate() {
+    const COLUMNS: [usize; 6] = [2, 8, 3, 9, 4, 10];
+    changed(log, |k, row| {
         if k % 97 == 13 {
-            let sign = if k / 97 % 2 == 0 { 1 } else { -1 };
-            let (column, jump) = [
-                (2, NM_IN_50_UM),
-                (8, HALL_CODES_IN_50_UM),
-                (3, NM_IN_50_UM),
-                (9, HALL_CODES_IN_50_UM),
-                (4, NM_IN_50_UM),
-                (10, HALL_CODES_IN_50_UM),
-            ][k / 97 % 6];
-            row[column] += sign * jump;
+            let column = COLUMNS[k / 97 % 6];
+            let jump = if column < 8 {
+                NM_IN_50_UM
+            } else {
+                HALL_CODES_IN_50_UM
+            };
+            row[column] += if k / 97 % 2 == 0 { jump } else { -jump };
         }
-    }
-    text(&header, &rows)
-}
-
-/// The reference stands still in `stuck` rows.
-fn with_stuck_reference(log: &str, stuck: impl Fn(usize, i64) -> bool) -> String {
-    let (header, mut rows) = cells(log);
-    let mut held: Option<Vec<i64>> = None;
-    for (k, row) in rows.iter_mut().enumerate() {
-        if stuck(k, row[0]) {
-            let held = held.get_or_insert_with(|| row[2..5].to_vec());
-            row[2..5].copy_from_slice(held);
-        }
-    }
-    text(&header, &rows)
+    })
 }
 
 /// Every other row of the shipped run.
@@ -134,47 +99,17 @@ fn one_row_in_a_hundred_off_by_50_um_costs_nothing_in_service() {
 }
 
 #[test]
-fn a_gain_that_changes_is_taken_off_the_blob() {
-    let bench = bench();
-    let (header, mut rows) = cells(&bench.text("run.csv"));
-    let half = rows.len() / 2;
-    for row in &mut rows[..half] {
-        row[9] = row[9] * 101 / 100;
-    }
-    bench.write("gain.csv", text(&header, &rows));
-    bench.good("fit gain.csv --stage stage.toml --out repaired.bin --json fit.json");
-    let report = bench.json("fit.json");
-    assert_eq!(report["verdict"], "good");
-    let findings = report["findings"].as_array().expect("a list");
-    let is_gain = |found: &&serde_json::Value| found["code"] == "gain_drift";
-    let found = findings.iter().find(is_gain).expect("a gain");
-    assert_eq!(found["severity"], "warn");
-    assert!(found["cost"].as_f64() > Some(1.3), "{found}");
-    assert_as_good(&bench, "repaired.bin", "clean.bin", "service.csv.gz", 1.02);
-}
-
-#[test]
-fn two_stuck_seconds_are_left_out() {
-    let bench = bench();
-    let stuck = |row: usize, _| (3500..4000).contains(&row);
-    bench.write(
-        "stuck.csv",
-        with_stuck_reference(&bench.text("run.csv"), stuck),
-    );
-    bench.good("fit stuck.csv --stage stage.toml --out robust.bin --json fit.json");
-    assert_eq!(bench.json("fit.json")["model"], "field");
-    assert_as_good(&bench, "robust.bin", "clean.bin", "service.csv.gz", 1.01);
-}
-
-#[test]
 fn model_31_forgets_a_stuck_movement_and_jumps() {
     let bench = Bench::new();
     let log = log();
     bench.write("clean.csv", &log);
-    bench.write(
-        "stuck.csv",
-        with_stuck_reference(&log, |_, movement| movement == 28),
-    );
+    // The reference stands still in a movement.
+    let stuck = changed(&log, |_, row| {
+        if row[0] == 28 {
+            row[2..5].fill(0);
+        }
+    });
+    bench.write("stuck.csv", stuck);
     bench.write("jumps.csv", with_jumps(&log));
     bench.good("fit clean.csv --stage stage.toml --out clean.bin --model 31");
     for log in ["stuck", "jumps"] {
@@ -197,13 +132,12 @@ fn model_31_forgets_a_stuck_movement_and_jumps() {
 #[test]
 fn a_log_of_which_a_tenth_is_left_out_of_account_is_refused_with_the_place() {
     let bench = Bench::new();
-    let (header, mut rows) = cells(&thinned_log(10, |_| true));
-    for row in &mut rows {
+    let inverted = changed(&thinned_log(10, |_| true), |_, row| {
         if row[0] >= 51 {
             row[10] = -row[10];
         }
-    }
-    bench.write("inverted.csv", text(&header, &rows));
+    });
+    bench.write("inverted.csv", inverted);
     let fit = "fit inverted.csv --stage stage.toml --out p.bin";
     let parts = ["of 5700 rows", "from movement 5", "to movement 56"];
     bench.bad(fit, 4, &parts);

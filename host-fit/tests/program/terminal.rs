@@ -51,9 +51,6 @@ fn a_dash_is_standard_output_for_one_output_and_nothing_else() {
     );
     let json = bench.good(&format!("{fit} q.bin --json -"));
     assert!(serde_json::from_slice::<serde_json::Value>(&json.stdout).is_ok());
-    bench.good("decode p.bin log.csv --stage stage.toml --out pose.csv");
-    let poses = bench.good("decode p.bin log.csv --stage stage.toml --out -");
-    assert_eq!(poses.stdout, bench.read("pose.csv"));
 }
 
 #[test]

@@ -96,30 +96,34 @@ fn on_a_bad_bus(rate: u64) -> [u32; 2] {
 
 #[test]
 fn a_reset_at_any_moment_leaves_the_old_or_the_new_and_says_which() {
-    let (mut stored, mut refused) = (0, 0);
-    for at_ms in (0..450).step_by(7) {
-        let mut world = World::new(Some(KEY), &[], 5);
-        world.resets_us = vec![at_ms * 1_000];
-        match world.update(&plan(NEW)) {
-            Ok(updated) => {
-                stored += 1;
-                assert_eq!(
-                    (updated.sequence, world.newest()),
-                    (Some(1), NEW.to_vec()),
-                    "{at_ms}"
-                );
+    for (goes_back, [before, after]) in [(false, [OLD, NEW]), (true, [NEW, OLD])] {
+        let job = if goes_back { back() } else { plan(NEW) };
+        let (mut stored, mut refused) = (0, 0);
+        for at_ms in (0..900).step_by(3) {
+            let mut world = World::new(Some(KEY), &[], 5);
+            if goes_back {
+                world.update(&plan(NEW)).expect("it is taken");
             }
-            Err(error) => {
-                refused += 1;
-                // After a restart of the machine the servo may be on: it is not declared off again.
-                assert_eq!(error, UpdateError::ServoOn { declared: true }, "{at_ms}");
-                assert_eq!(world.newest(), OLD, "{at_ms}");
-                assert!(world.update(&plan(NEW)).is_ok(), "{at_ms}");
+            let next = world.node.records() + 1;
+            world.resets_us = vec![world.now_us + at_ms * 1_000];
+            match world.update(&job) {
+                Ok(updated) => {
+                    stored += 1;
+                    let found = (updated.sequence, &world.newest()[..]);
+                    assert_eq!(found, (Some(next), after), "{at_ms}");
+                }
+                Err(error) => {
+                    refused += 1;
+                    // After a restart of the machine the servo may be on: it is not declared off again.
+                    assert_eq!(error, UpdateError::ServoOn { declared: true }, "{at_ms}");
+                    assert_eq!(world.newest(), before, "{at_ms}");
+                    assert!(world.update(&job).is_ok(), "{at_ms}");
+                }
             }
+            assert_eq!(world.node.records(), next, "{at_ms}");
         }
-        assert_eq!(world.node.records(), 1, "{at_ms}");
+        assert!(stored > 10 && refused > 3, "{stored} {refused}");
     }
-    assert!(stored > 10 && refused > 10, "{stored} {refused}");
 }
 
 #[test]

@@ -147,29 +147,6 @@ fn what_is_stored_and_not_activated_is_told_as_stored() {
 }
 
 #[test]
-fn a_reset_at_any_moment_goes_back_once_or_not_at_all() {
-    let (mut done, mut not) = (0, 0);
-    for at_ms in (0..900).step_by(3) {
-        let mut world = World::new(Some(KEY), &[], 2);
-        world.update(&plan(NEW)).expect("it is taken");
-        world.resets_us = vec![world.now_us + at_ms * 1_000];
-        match world.update(&back()) {
-            Ok(updated) => {
-                done += 1;
-                assert_eq!((updated.sequence, &world.newest()[..]), (Some(2), OLD));
-                assert_eq!(world.node.records(), 2, "{at_ms}");
-            }
-            Err(error) => {
-                not += 1;
-                assert_eq!(error, UpdateError::ServoOn { declared: true }, "{at_ms}");
-                assert_eq!((&world.newest()[..], world.node.records()), (NEW, 1));
-            }
-        }
-    }
-    assert!(done > 10 && not > 3, "{done} {not}");
-}
-
-#[test]
 fn a_recording_of_a_good_update_stores_nothing_when_it_is_played_again() {
     for key in [Some(KEY), None] {
         for pause_ms in [0, 10_000] {

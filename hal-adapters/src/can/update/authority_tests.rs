@@ -67,36 +67,6 @@ fn a_second_host_is_told_busy_until_the_first_is_done_or_silent() {
     assert_eq!(bench.update(commit(4), 8), (Outcome::NoTransfer, 0));
 }
 
-#[test]
-fn a_replayed_recording_of_an_update_stores_nothing() {
-    for key in [Some(KEY), None] {
-        let mut bench = Bench::new(key);
-        bench.servo_off();
-        bench.transfer(7, NEW, 4);
-        bench.update(commit(4), 7);
-        bench.rest();
-        assert_eq!(bench.store.writes, 1);
-        // The same frames once more, to the same node: its counters go on, and nothing else counts.
-        bench.store.expected.clear();
-        let nonce = [1, 2, 3, 4];
-        for sequence in [4, 5] {
-            assert_eq!(bench.update(BEGIN, 7), BEGUN);
-            bench.blob(7, NEW);
-            bench.tag(7, tag(&KEY, &nonce, sequence, NEW, NEW_CRC));
-            if key.is_none() && sequence == 5 {
-                break; // Without a key whoever can send may update.
-            }
-            let outcome = bench.update(commit(sequence), 7);
-            match sequence {
-                4 => assert_eq!(outcome, (Outcome::WrongSequence, 5)),
-                _ => bench.ends(7, (Outcome::NotAuthorised, 0)),
-            }
-            bench.update(UpdateRequest::Abort, 7);
-        }
-        assert_eq!(bench.store.writes, 1);
-    }
-}
-
 /// Whoever recorded a transfer that was never stored has a blob, a tag and a number that are still
 /// due. Only the nonce tells them from an answer to this challenge.
 #[test]

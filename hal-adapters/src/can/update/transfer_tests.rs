@@ -3,38 +3,6 @@
 use super::*;
 
 #[test]
-fn a_whole_update_with_a_key_is_stored_and_runs_once_activated() {
-    let mut bench = Bench::new(Some(KEY));
-    assert_eq!(bench.update(BEGIN, 7), (Outcome::ServoOn, 0));
-    bench.servo_off();
-    assert!(!bench.receiver.is_updating());
-    bench.transfer(7, NEW, 4);
-    assert!(bench.receiver.is_updating() && !bench.receiver.is_storing());
-    assert_eq!(bench.update(commit(4), 7), STARTED);
-    assert_eq!(bench.update(commit(4), 7), STARTED);
-    assert_eq!(bench.update(commit(5), 7), (Outcome::Busy, 0));
-    assert_eq!(bench.update(UpdateRequest::Abort, 7), (Outcome::Busy, 0));
-    assert!(bench.receiver.is_storing());
-    bench.ends(7, NEW_DONE);
-    assert_eq!(bench.update(commit(4), 7), NEW_DONE);
-    assert!(!bench.receiver.is_updating());
-    assert_eq!(bench.store.newest.1, NEW);
-    // It runs after the reset only.
-    let tell = |page| UpdateRequest::Tell { page };
-    assert_eq!(bench.update(tell(page::SEQUENCE), 8).1, 3);
-    assert_eq!(bench.update(tell(page::NEWEST), 8).1, 4);
-    assert_eq!(bench.update(UpdateRequest::Activate, 9), DONE);
-    assert!(bench.receiver.wants_reset());
-    bench.store.reset();
-    assert_eq!(bench.update(tell(page::SEQUENCE), 8).1, 4);
-    // Back again: the blob before, under a new number, authorised like any.
-    bench.transfer(10, &[], 5);
-    assert_eq!(bench.update(commit(5), 10), STARTED);
-    bench.ends(10, (Outcome::Done, crc_of(OLD).expect("a blob")));
-    assert_eq!((&bench.store.newest.1[..], bench.store.writes), (OLD, 2));
-}
-
-#[test]
 fn every_word_that_is_missing_is_asked_for() {
     let mut bench = Bench::new(None);
     bench.servo_off();
@@ -82,24 +50,6 @@ fn what_cannot_be_stored_is_refused_by_kind() {
     assert_eq!(bench.update(long, 7), (Outcome::BadContent, 0));
     let back = UpdateRequest::begin(0, 0);
     assert_eq!(bench.update(back, 7), (Outcome::NoParameters, 0));
-}
-
-#[test]
-fn a_servo_that_goes_on_ends_a_transfer_at_once() {
-    let on = Request::ServoOff { seconds: 0 };
-    let mut bench = Bench::new(Some(KEY));
-    bench.servo_off();
-    bench.transfer(7, NEW, 4);
-    bench.ask(on, 50);
-    assert!(bench.ticks(1).is_empty());
-    assert!(!bench.receiver.is_updating());
-    // Also before it is stored.
-    bench.servo_off();
-    bench.transfer(7, NEW, 4);
-    assert_eq!(bench.update(commit(4), 7), STARTED);
-    bench.ask(on, 50);
-    bench.ends(7, (Outcome::ServoOn, 0));
-    assert_eq!(bench.store.writes, 0);
 }
 
 #[test]

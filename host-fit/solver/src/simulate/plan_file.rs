@@ -199,31 +199,22 @@ mod tests {
 
     #[test]
     fn what_is_no_plan_is_refused_with_its_place() {
-        let h = header();
-        for (text, says) in [
-            (String::new(), "run.csv: the log is empty"),
-            ("t_us,y_um\n0,1\n".to_owned(), "the columns are t_us,y_um"),
-            (format!("{h}\n"), "run.csv: a run has from 1 to"),
+        for (rows, says) in [
+            ("", "run.csv: a run has from 1 to"),
             (
-                format!("{h}\n0,1,2,3,4,5,6\n4000,1,2,3,4,5,6\n"),
+                "0,1,2,3,4,5,6\n4000,1,2,3,4,5,6\n",
                 "run.csv:3: t_us is 4000, where 2000 is due",
             ),
-            (
-                format!("{h}\nx,1,2,3,4,5,6\n"),
-                "run.csv:2: column 1 (t_us)",
-            ),
-            (
-                format!("{h}\n0,1,2,3,inf,5,6\n"),
-                "run.csv:2: column 5 (z_um)",
-            ),
-            (
-                format!("{h}\n0,1,2,3,4,5,20000\n"),
-                "run.csv:2: column 7 (ry_urad)",
-            ),
-            (format!("{h}\n0,1,2,3\n"), "run.csv:2: 4 cells"),
+            ("x,1,2,3,4,5,6\n", "run.csv:2: column 1 (t_us)"),
+            ("0,1,2,3,inf,5,6\n", "run.csv:2: column 5 (z_um)"),
+            ("0,1,2,3,4,5,20000\n", "run.csv:2: column 7 (ry_urad)"),
+            ("0,1,2,3\n", "run.csv:2: 4 cells"),
         ] {
+            let text = format!("{}\n{rows}", header());
             let message = parse(&text).expect_err("refused");
             assert!(message.contains(says), "{message}\ndoes not say\n{says}");
         }
+        let columns = parse("t_us,y_um\n0,1\n").expect_err("refused");
+        assert!(columns.contains("the columns are t_us,y_um"), "{columns}");
     }
 }

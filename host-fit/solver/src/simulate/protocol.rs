@@ -185,17 +185,6 @@ mod tests {
     }
 
     #[test]
-    fn a_plan_has_noise_of_its_own() {
-        let still = |rows: usize| Run::planned(vec![StagePose::default(); rows]).number;
-        let numbers = [still(1), still(2), Protocol::Service.run(0.002, 1).number];
-        assert!(numbers[0] != numbers[1] && numbers[1] != numbers[2]);
-        assert_eq!(still(5), still(5));
-        let mut streams = numbers.map(|n| Stream::new(1, Purpose::Sensors, n).uniform());
-        streams.sort_by(f64::total_cmp);
-        assert!(streams[0] < streams[1] && streams[1] < streams[2]);
-    }
-
-    #[test]
     fn only_the_service_run_is_zeroed_truly() {
         let zeroed = |p: Protocol| p.run(0.002, 1).zeroed_truly;
         assert_eq!(

@@ -207,49 +207,6 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_that_of_the_sensors_and_the_rest_follows_the_truth() {
-        let [noisy, exact] = [SensorErrors::USUAL, SensorErrors::NONE]
-            .map(|errors| short(Protocol::Service, &errors, 4));
-        let pairs = || {
-            noisy
-                .movements
-                .iter()
-                .flatten()
-                .zip(exact.movements.iter().flatten())
-        };
-        let rms = |of: &dyn Fn(&Sample) -> f64| {
-            let squares = pairs().map(|(n, e)| (of(n) - of(e)).powi(2));
-            (squares.sum::<f64>() / noisy.rows() as f64).sqrt()
-        };
-        for i in 0..3 {
-            let hall = rms(&|s| f64::from(s.hall[i]) * 62.5);
-            assert!((450.0..550.0).contains(&hall), "{hall} nm");
-            let gap = rms(&|s| f64::from(s.capacitive[i]) * 15.625);
-            assert!((11.0..16.0).contains(&gap), "{gap} nm");
-            // 0.6 s of drift: 50 nm rms.
-            let beam = rms(&|s| s.beams_nm[i] as f64);
-            assert!((10.0..200.0).contains(&beam), "{beam} nm");
-        }
-    }
-
-    #[test]
-    fn a_reset_is_off_by_micrometres_but_in_service() {
-        for (protocol, range) in [
-            (Protocol::Paper, 300..8000),
-            (Protocol::Combined, 300..8000),
-            (Protocol::Service, 0..30),
-        ] {
-            let recording = short(protocol, &SensorErrors::USUAL, 2);
-            let first = recording
-                .movements
-                .iter()
-                .map(|samples| samples[0].beams_nm[0].abs());
-            let worst = first.max().unwrap_or(-1);
-            assert!(range.contains(&worst), "{protocol:?}: {worst} nm");
-        }
-    }
-
-    #[test]
     fn a_run_that_drives_a_probe_into_its_magnet_is_refused() {
         let stage = stage();
         let low = StagePose {

@@ -1,9 +1,7 @@
 use super::*;
 use crate::solve::Solver;
-use crate::solve::objective::sample_for_tests::{dataset, problem, stage, truth};
-use crate::solve::search::run::StopReason;
+use crate::solve::objective::sample_for_tests::{dataset, problem, stage};
 use runtime::ModelKind;
-use std::sync::atomic::AtomicBool;
 
 fn options(projection: Projection, generations: usize) -> SolverOptions {
     SolverOptions {
@@ -105,37 +103,6 @@ fn a_gain_outside_its_box_is_kept_and_named() {
     assert!((found.parameters.eta()[0] - 0.87).abs() < 0.01);
     let names = found.at_limit.iter().map(|id| id.name());
     assert_eq!(names.collect::<Vec<_>>(), ["eta_a"]);
-}
-
-#[test]
-fn a_warm_start_begins_at_the_known_parameters() {
-    let (stage, dataset) = (stage(), dataset(20, 5));
-    let problem = problem(&dataset, &stage, ModelKind::M31);
-    for projection in [Projection::None, Projection::Delta, Projection::Linear] {
-        let warm = SolverOptions {
-            known: Some(truth()),
-            ..options(projection, 1)
-        };
-        let found = SHTLBO.solve(&problem, &warm).expect("a fit");
-        assert!(problem.fitness(found.cost) < 3.0, "{}", projection.name());
-        let cold = SHTLBO.solve(&problem, &options(projection, 1));
-        assert!(cold.is_err() || problem.fitness(cold.expect("a fit").cost) > 4.0);
-    }
-}
-
-#[test]
-fn an_interrupted_search_gives_its_best_so_far_and_says_so() {
-    static FLAG: AtomicBool = AtomicBool::new(true);
-    let (stage, dataset) = (stage(), dataset(20, 5));
-    let problem = problem(&dataset, &stage, ModelKind::M31);
-    let interrupted = SolverOptions {
-        interrupt: Some(&FLAG),
-        ..options(Projection::None, 1_000_000)
-    };
-    let found = SHTLBO.solve(&problem, &interrupted);
-    let found = found.expect("the first population has a best");
-    assert!(found.stopped.contains(&StopReason::Interrupted.to_string()));
-    assert_eq!(found.evaluations, 30);
 }
 
 #[test]

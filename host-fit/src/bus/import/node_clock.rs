@@ -261,15 +261,4 @@ mod tests {
         assert_eq!((run.ticks.len(), untimed), (192, 108));
         assert_eq!((run.ticks[20].t_us, run.ticks[20].hall[0]), (40_000.0, 20));
     }
-
-    #[test]
-    fn two_records_in_one_are_told_by_the_clocks_that_go_back() {
-        let mut clock = NodeClock::new(2_000.0);
-        (0..64).for_each(|n| take(&mut clock, n, false));
-        let again = TickTime {
-            sequence: 0,
-            time_us: 0,
-        };
-        assert_eq!(clock.take_time(again, 5_000), Err(96_000));
-    }
 }

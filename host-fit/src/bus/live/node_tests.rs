@@ -1,11 +1,7 @@
 use super::*;
 use hal_adapters::can::command::{Mailbox, Outcome, Request};
 use hal_adapters::can::{BusFrame, PoseReceiver, sensor};
-use runtime::calibration::Origin;
-use runtime::frame::CodeWindow;
-use runtime::geometry::ProbeGeometry;
-use runtime::model::{Probes, Sensitivity};
-use runtime::{AnyDecoder, Calibration, PlanarPose};
+use runtime::{AnyDecoder, PlanarPose};
 
 const SETTINGS: NodeSettings = NodeSettings {
     layout: Layout::Bits16,
@@ -18,26 +14,9 @@ const SETTINGS: NodeSettings = NodeSettings {
 };
 
 fn decoder() -> AnyDecoder {
-    let window = CodeWindow::between_rails(-32768, 32767).expect("16 bits");
-    let set = Calibration {
-        model: runtime::ModelKind::M30,
-        geometry: ProbeGeometry {
-            lever_arm_m: [0.2, -0.2, -0.36],
-            misalignment_rad: [0.0; 3],
-        },
-        probes: Probes::Linear([Sensitivity::constant(0.9); 3]),
-        hall_m_per_code: 6.25e-8,
-        hall_window: window,
-        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
-        capacitive_m_per_code: 1.5625e-8,
-        capacitive_window: window,
-        calibrated_planar: [1e-3; 3],
-        calibrated_vertical: [1e-3; 3],
-        sensitivity_min: Calibration::SENSITIVITY_MIN,
-    };
-    set.prepare(&Origin::default())
-        .expect("a sound stage")
-        .decoder()
+    let blob = include_bytes!("../../../../runtime/examples/stage.bin");
+    let set = runtime::ParameterSet::from_bytes(blob).expect("sound");
+    set.decoder()
 }
 
 fn raw(sequence: u32) -> RawFrame {
@@ -113,29 +92,6 @@ fn a_silent_bus_is_published_as_invalid_until_frames_come_again() {
     assert!(got.is_some_and(|pose| pose.status.any(Status::FRAMES_MISSED)));
     assert!(!feed(&mut node, &raw(2)).is_empty());
     assert!(!node.receiver().is_stale());
-}
-
-#[test]
-fn a_request_to_identify_is_answered_with_the_serial_number() {
-    let decoder = decoder();
-    let mut node = Node::new(decoder, "stage 7", &SETTINGS);
-    let mut host = Mailbox::default();
-    let command = Command::new(Request::Identify { seconds: 1 }, 42);
-    let frame = host.send(&Told::Command(command)).expect("known");
-    let mut out = Vec::new();
-    let step = node.take(&stamped(frame, 0), &mut out);
-    assert_eq!(step.command, Some(command));
-    let mut text = Vec::new();
-    let mut outcome = None;
-    for told in told(&out, &mut host) {
-        match told {
-            Told::Identity(page) => text.extend(page.text),
-            Told::Answer(answer) => outcome = Some((answer.token, answer.outcome)),
-            other => panic!("{other:?}"),
-        }
-    }
-    assert_eq!(&text[..8], b"stage 7\0");
-    assert_eq!(outcome, Some((42, Some(Outcome::Done))));
 }
 
 /// Commands are the service's, whose tests are its own: this one holds that the node uses it.

@@ -1,43 +1,15 @@
 //! What a flash tool would write, read back from the padded sector.
 
 use super::*;
-use runtime::blob::MAX_BYTES;
-use runtime::calibration::Origin;
-use runtime::frame::CodeWindow;
-use runtime::geometry::ProbeGeometry;
-use runtime::model::{ModelKind, Probes, Sensitivity};
-use runtime::{Calibration, ParameterSet};
+use runtime::ParameterSet;
 
 /// Bytes of a slot's sector.
 const SLOT_BYTES: usize = 16 * 1024;
 
-fn set() -> ParameterSet {
-    let window = CodeWindow {
-        low: -32767,
-        high: 32766,
-    };
-    let calibration = Calibration {
-        model: ModelKind::M30,
-        geometry: ProbeGeometry {
-            lever_arm_m: [0.2, -0.19, -0.36],
-            misalignment_rad: [0.01, -0.02, 0.03],
-        },
-        probes: Probes::Linear([0.88, 0.75, 0.82].map(Sensitivity::constant)),
-        hall_m_per_code: 6.25e-8,
-        hall_window: window,
-        capacitive_probes_m: [[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]],
-        capacitive_m_per_code: 1.5625e-8,
-        capacitive_window: window,
-        calibrated_planar: [0.01; 3],
-        calibrated_vertical: [3e-4; 3],
-        sensitivity_min: Calibration::SENSITIVITY_MIN,
-    };
-    calibration.prepare(&Origin::default()).expect("sound")
-}
+const BLOB: &[u8] = include_bytes!("../../../../runtime/examples/stage.bin");
 
-fn blob() -> Vec<u8> {
-    let mut buffer = [0; MAX_BYTES];
-    set().to_bytes(&mut buffer).expect("room").to_vec()
+fn set() -> ParameterSet {
+    ParameterSet::from_bytes(BLOB).expect("sound")
 }
 
 /// A sector of erased flash from `start`, with these bytes written to it.
@@ -84,7 +56,7 @@ fn the_slots_are_those_of_the_memory_map() {
 #[test]
 fn each_format_read_back_from_padded_flash_is_the_same_set() {
     for found in SLOTS {
-        let made = |format| export(&blob(), format, &[found]).expect("a file");
+        let made = |format| export(BLOB, format, &[found]).expect("a file");
         let bin = vec![(found, made(ExportFormat::Bin))];
         let hex = hex_writes(&made(ExportFormat::Hex));
         for writes in [bin, hex] {
@@ -96,7 +68,7 @@ fn each_format_read_back_from_padded_flash_is_the_same_set() {
 
 #[test]
 fn in_the_file_for_both_slots_the_blob_is_at_the_start_of_each() {
-    let made = |format| export(&blob(), format, &SLOTS).expect("a file");
+    let made = |format| export(BLOB, format, &SLOTS).expect("a file");
     let bin = made(ExportFormat::Bin);
     for (slot, start) in (0..).zip(SLOTS) {
         let at = slot * SLOT_BYTES;
@@ -115,7 +87,7 @@ fn in_the_file_for_both_slots_the_blob_is_at_the_start_of_each() {
 fn intel_hex_crosses_a_boundary_of_64_kib() {
     let start = 0x0800_ff00;
     for address in [0x0800_ff04, 0x0800_fff8, 0x0800_fffc, 0x0801_0000] {
-        let file = export(&blob(), ExportFormat::Hex, &[address]).expect("a file");
+        let file = export(BLOB, ExportFormat::Hex, &[address]).expect("a file");
         let writes = hex_writes(&file);
         let sector = flashed(start, &writes);
         let at = (address - start) as usize;
@@ -131,14 +103,14 @@ fn what_cannot_be_flashed_is_refused() {
     let refused =
         |bytes: &[u8], address| export(bytes, ExportFormat::Hex, &[address]).expect_err("refused");
     assert!(matches!(
-        refused(&blob(), 0x0800_4002),
+        refused(BLOB, 0x0800_4002),
         ExportError::Unaligned { .. }
     ));
     assert!(matches!(
-        refused(&blob(), 0xffff_fff0),
+        refused(BLOB, 0xffff_fff0),
         ExportError::BeyondMemory { .. }
     ));
-    let mut damaged = blob();
+    let mut damaged = BLOB.to_vec();
     damaged[40] ^= 1;
     assert!(matches!(
         refused(&damaged, 0x0800_4000),

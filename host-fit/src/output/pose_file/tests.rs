@@ -1,9 +1,7 @@
 use super::*;
-use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
+use crate::input::dataset::Dataset;
 use proptest::prelude::*;
-use runtime::{
-    AnyDecoder, OnInvalid, PlanarPose, Pose, PoseTracker, RawFrame, Status, VerticalPose,
-};
+use runtime::{AnyDecoder, OnInvalid, PlanarPose, Pose, PoseTracker, Status, VerticalPose};
 use std::path::Path;
 
 /// Runs the decoder over all rows as a controller would.
@@ -64,109 +62,40 @@ fn decoder() -> AnyDecoder {
     set.decoder()
 }
 
-/// Movements of these rows: Hall code of A, and the sequence number.
-fn dataset(movements: &[&[(i32, u32)]]) -> Dataset {
-    let mut dataset = Dataset::default();
-    for (slot, rows) in movements.iter().enumerate() {
-        let start = dataset.rows.len();
-        for (code, sequence) in rows.iter() {
-            dataset.rows.push(Row {
-                movement: slot,
-                t_us: i64::from(*sequence) * 2000,
-                frame: LoggedFrame::Codes(RawFrame {
-                    hall: [*code, 200, -300],
-                    capacitive: [40, 50, 60],
-                    sequence: *sequence,
-                    time_us: 0,
-                }),
-                signal_m: [0.0; 3],
-                vertical: [0.0; 3],
-                reference: [0.0; 3],
-            });
-        }
-        dataset.movements.push(Movement {
-            log: 0,
-            index: 7 + slot as i64,
-            rows: start..dataset.rows.len(),
-        });
-    }
-    dataset
-}
-
-const SATURATED: i32 = 32767;
-
 #[test]
 fn a_saturated_row_is_held_for_so_many_ticks_and_never_into_the_next_movement() {
-    let (decoder, good) = (decoder(), 1000);
-    let bad = SATURATED;
-    let dataset = dataset(&[
-        &[(good, 0), (bad, 1), (bad, 2), (good, 3)],
-        &[(bad, 0), (good, 1)],
-    ]);
-    let rows = decode(&dataset, &decoder, OnInvalid::Hold { ticks: 1 });
+    let (good, bad) = (1000, 32767);
+    let rows = [(7, 0, good), (7, 1, bad), (7, 2, bad), (7, 3, good)];
+    let mut log =
+        "movement,t_us,cap1_cnt,cap2_cnt,cap3_cnt,hall_a_cnt,hall_b_cnt,hall_c_cnt\n".to_owned();
+    for (movement, tick, code) in rows.into_iter().chain([(8, 0, bad), (8, 1, good)]) {
+        log += &format!("{movement},{},40,50,60,{code},200,-300\n", 2000 * tick);
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, log).expect("written");
+    let hold = OnInvalid::Hold { ticks: 1 };
+    let (text, counts) = decoded_file(&path, hold, PoseFormat::Csv);
+    let rows = parse(&text);
     // Out of range too, which counts for nothing where there is no pose.
     let fault = Status::HALL_A
         .with(Status::PLANAR_INVALID)
         .with(Status::PLANAR_EXTRAPOLATED);
+    let held = fault.with(Status::PLANAR_HELD);
     let statuses: Vec<_> = rows.iter().map(|row| row.reading.status).collect();
-    assert_eq!(
-        statuses,
-        [
-            Status::GOOD,
-            fault.with(Status::PLANAR_HELD),
-            fault,
-            Status::GOOD,
-            fault,
-            Status::GOOD
-        ]
-    );
+    let sound = Status::GOOD;
+    assert_eq!(statuses, [sound, held, fault, sound, fault, sound]);
     assert_eq!(rows[1].reading.pose.planar, rows[0].reading.pose.planar);
     assert_eq!(rows[2].reading.pose.planar, PlanarPose::ZERO);
     assert_eq!((rows[0].movement, rows[4].movement), (7, 8));
-    let counts = counted(&rows);
     assert_eq!((counts.rows, counts.good), (6, 3));
     let named: Vec<_> = counts.named().collect();
-    assert_eq!(
-        named,
-        [
-            ("Hall code A bad", 3),
-            ("planar pose invalid", 3),
-            ("planar pose held", 1)
-        ]
-    );
-}
-
-#[test]
-fn without_hold_the_rows_are_the_decoders_own() {
-    let decoder = decoder();
-    let dataset = dataset(&[&[(-32767, 0), (5, 1), (SATURATED, 2), (32766, 4)]]);
-    let rows = decode(&dataset, &decoder, OnInvalid::Zero);
-    for (row, pose) in dataset.rows.iter().zip(&rows) {
-        let reading = row.frame.decode(&decoder, &PlanarPose::ZERO);
-        assert_eq!(pose.reading.pose, reading.pose);
-        let missed = pose.reading.status.any(Status::FRAMES_MISSED);
-        assert_eq!(missed, row.frame.sequence() == 4, "the gap shows");
-    }
-}
-
-#[test]
-fn a_vertical_pose_in_si_units_decodes_like_the_codes_that_it_came_from() {
-    let decoder = decoder();
-    let coded = dataset(&[&[(1000, 0), (SATURATED, 1), (2000, 2)]]);
-    let mut known = coded.clone();
-    for row in &mut known.rows {
-        let vertical = row.frame.decode(&decoder, &PlanarPose::ZERO).pose.vertical;
-        row.frame = LoggedFrame::HallCodes {
-            hall: row.frame.hall(),
-            vertical,
-            sequence: row.frame.sequence(),
-            time_us: 0,
-        };
-    }
-    for on_invalid in [OnInvalid::Zero, OnInvalid::Hold { ticks: 3 }] {
-        let want = decode(&coded, &decoder, on_invalid);
-        assert_eq!(decode(&known, &decoder, on_invalid), want);
-    }
+    let want = [
+        ("Hall code A bad", 3),
+        ("planar pose invalid", 3),
+        ("planar pose held", 1),
+    ];
+    assert_eq!(named, want);
 }
 
 #[test]
@@ -214,8 +143,8 @@ fn words(row: &PoseRow) -> Vec<u32> {
     all.map(f32::to_bits).collect()
 }
 
-/// The log that ships with the program, decoded into a file: its bytes and the counts.
-fn decoded_file(on_invalid: OnInvalid, format: PoseFormat) -> (Vec<u8>, StatusCounts) {
+/// A log decoded into a file: its bytes and the counts.
+fn decoded_file(log: &Path, on_invalid: OnInvalid, format: PoseFormat) -> (Vec<u8>, StatusCounts) {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
     let stage = crate::input::stage::Stage::from_file(&data.join("stage.toml")).expect("sound");
     let folder = tempfile::tempdir().expect("a folder");
@@ -227,8 +156,7 @@ fn decoded_file(on_invalid: OnInvalid, format: PoseFormat) -> (Vec<u8>, StatusCo
         posterior: None,
         format,
     };
-    let log = data.join("paper.csv.gz");
-    let decoded = decode_log::<Box<dyn std::error::Error>>(&log, &stage, &settings, out, || Ok(()));
+    let decoded = decode_log::<Box<dyn std::error::Error>>(log, &stage, &settings, out, || Ok(()));
     let (counts, end) = decoded.expect("sound");
     assert_eq!((end.skipped_rows, end.warnings), (0, Vec::new()));
     (std::fs::read(&path).expect("written"), counts)
@@ -243,12 +171,12 @@ fn a_log_is_decoded_piece_by_piece_as_it_is_in_memory() {
         .expect("sound");
     for on_invalid in [OnInvalid::Zero, OnInvalid::Hold { ticks: 2 }] {
         let rows = decode(&reading.dataset, &decoder(), on_invalid);
-        let (text, counts) = decoded_file(on_invalid, PoseFormat::Csv);
+        let (text, counts) = decoded_file(&logs[0], on_invalid, PoseFormat::Csv);
         assert!(text == to_text(&rows));
         let read = parse(&text);
         assert!(read == rows && read.iter().map(words).eq(rows.iter().map(words)));
         assert_eq!(counts, counted(&rows));
-        let (array, _) = decoded_file(on_invalid, PoseFormat::Npy);
+        let (array, _) = decoded_file(&logs[0], on_invalid, PoseFormat::Npy);
         let header = npy::header(rows.len(), false);
         assert_eq!(header.len() % 64, 0);
         let (start, records) = array.split_at(header.len());

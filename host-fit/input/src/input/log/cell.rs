@@ -277,39 +277,11 @@ mod tests {
 
     #[test]
     fn numbers_are_read_as_rust_reads_them() {
-        for text in [
-            "0",
-            "-0",
-            "+1",
-            "1.",
-            ".5",
-            "+.5",
-            "1e5",
-            "1E-5",
-            "1.e5",
-            "",
-            ".",
-            "-",
-            "+",
-            "e5",
-            "1e",
-            "1_0",
-            "0x1",
-            "1 2",
-            "--1",
-            "1,5",
-            "9007199254740993",
-            "1e400",
-            "1e-400",
-            "nan",
-            "inf",
-            "-Infinity",
-            "infinit",
-            "0.1",
-            "123456789.123456789",
-            "179769313486231580793e289",
-            "2.2250738585072014e-308",
-        ] {
+        let numbers = "0 -0 +1 1. .5 +.5 1e5 1E-5 1.e5 0.1 9007199254740993 123456789.123456789 \
+                       179769313486231580793e289 2.2250738585072014e-308 1e400 1e-400";
+        let others = ". - + e5 1e 1_0 0x1 --1 1,5 nan inf -Infinity infinit";
+        let split = numbers.split_whitespace().chain(others.split(' '));
+        for text in split.chain(["", "1 2"]) {
             let have = Cell::of(text).number();
             match text.parse::<f64>() {
                 Ok(number) if number.is_finite() => {

@@ -128,39 +128,24 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_it_is_named_with_its_place() {
-        for (motion, says) in [
-            (
-                "rotation = 3",
-                "41:1: `motion.rotation`: an unknown key, expected one of x, y, rz",
-            ),
-            ("z = 3", "41:5: `motion.z`: "),
-            (
-                "z = { amplitude_rad = 1e-4 }",
-                "41:7: `motion.z.amplitude_rad`: an unknown key; did you mean `amplitude_m`?",
-            ),
-            (
-                "rx = { speed_rad_per_s = \"fast\" }",
-                "41:26: `motion.rx.speed_rad_per_s`: ",
-            ),
-            (
-                "y = { service_m = 0.8 }",
-                "41:19: `motion.y.service_m`: 0.8 m is outside",
-            ),
-            (
-                "y = { service_m = 0.0 }",
-                "41:19: `motion.y.service_m`: 0 m is outside",
-            ),
-            (
-                "y = { amplitude_m = -1e-4 }",
-                "41:21: `motion.y.amplitude_m`: -0.0001 m is outside",
-            ),
-            (
-                "y = { speed_m_per_s = nan }",
-                "41:23: `motion.y.speed_m_per_s`: NaN m/s is outside",
-            ),
-        ] {
+        #[rustfmt::skip]
+        let cases = [
+            ("rotation = 3", 1, "rotation", "expected one of x, y, rz"),
+            ("z = 3", 5, "z", ""),
+            ("z = { amplitude_rad = 1e-4 }", 7, "z.amplitude_rad", "did you mean `amplitude_m`?"),
+            ("rx = { speed_rad_per_s = \"fast\" }", 26, "rx.speed_rad_per_s", ""),
+            ("y = { service_m = 0.8 }", 19, "y.service_m", "0.8 m is outside"),
+            ("y = { service_m = 0.0 }", 19, "y.service_m", "0 m is outside"),
+            ("y = { amplitude_m = -1e-4 }", 21, "y.amplitude_m", "-0.0001 m is outside"),
+            ("y = { speed_m_per_s = nan }", 23, "y.speed_m_per_s", "NaN m/s is outside"),
+        ];
+        for (motion, column, key, says) in cases {
+            let place = format!("41:{column}: `motion.{key}`: ");
             let message = parse(motion).expect_err(motion);
-            assert!(message.contains(says), "{message}\ndoes not say\n{says}");
+            assert!(
+                message.contains(&place) && message.contains(says),
+                "{message}"
+            );
         }
     }
 }

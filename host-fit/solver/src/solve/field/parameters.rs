@@ -255,8 +255,7 @@ mod tests {
     }
 
     proptest! {
-        /// Within what the decoder's one step leaves; and the target's words within 0.25 nm and
-        /// 0.7 nrad of the same step in `f64`.
+        /// Within what the decoder's one step leaves.
         #[test]
         fn the_decoder_undoes_the_forward_model(
             q in prop::array::uniform3(-5e-4..5e-4f64),
@@ -274,18 +273,6 @@ mod tests {
             let [x, y, rz] = nano(exact, q);
             prop_assert!(x < 10.0 && y < 10.0 && rz < 15.0, "{x} {y} {rz}");
 
-            let code = signal.map(f64::round);
-            let word = |x: f64| x as f32;
-            let (_, words) = FieldModel::planar_pose(
-                &constants.probes.map(|probe| probe.rounded()),
-                &constants.pose_rows.map(|row| row.map(word)),
-                code.map(word),
-                &VerticalPose::from_array(v.map(word)),
-                &PlanarPose::ZERO,
-            );
-            let exact = constants.decode(code, &VerticalPose::from_array(v)).to_array();
-            let [x, y, rz] = nano(words.to_array().map(f64::from), exact);
-            prop_assert!(x < 0.25 && y < 0.25 && rz < 0.7, "{x} {y} {rz}");
         }
     }
 }

@@ -1,15 +1,15 @@
 //! A small log for tests of the objective: Model (31) with noise of a known seed.
 
-use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
+use crate::input::dataset::Dataset;
 use crate::input::shipped::STAGE_TOML;
 use crate::input::stage::{Range, Stage};
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
+use crate::problem::synthetic::Protocol;
 use crate::problem::{Problem, TrainRow};
-use crate::solve::search::random::{Phase, RandomSource, stream};
 use runtime::geometry::ProbeGeometry;
-use runtime::model::{Sensitivity, probe_displacement_m};
-use runtime::{ModelKind, PlanarPose, RawFrame, VerticalPose};
+use runtime::model::Sensitivity;
+use runtime::{ModelKind, VerticalPose};
 
 /// The stage of the tests: Tables 1, 3 and 5 of the paper.
 pub fn stage() -> Stage {
@@ -44,49 +44,27 @@ pub fn truth() -> Parameters {
     )
 }
 
-/// A log of `movements` movements of `rows` rows each: planar motion of 300 um and urad, a
-/// vertical pose of its own for each movement that wanders by 0.2 um and urad, a zero deviation
-/// of up to 4 um, noise of 0.5 um.
+/// A log of so many movements of so many rows each: a vertical pose of its own for every three, a zero
+/// deviation of up to 4 um, noise of 0.5 um.
 pub fn dataset(movements: usize, rows: usize) -> Dataset {
-    let truth = truth();
-    let plane = truth.geometry().plane_rows();
-    let mut dataset = Dataset::default();
-    for movement in 0..movements {
-        let mut random = stream(7, movement, Phase::Start, 0);
-        let mut symmetric = |size: f64| size * (2.0 * random.uniform() - 1.0);
-        let held = [2.5e-4, 5e-4, 5e-4].map(&mut symmetric);
-        let delta = [4e-6; 3].map(&mut symmetric);
-        let start = dataset.rows.len();
-        for _ in 0..rows {
-            let planar = PlanarPose::from_array([3e-4, 5e-4, 3e-4].map(&mut symmetric));
-            let vertical = held.map(|v| v + symmetric(2e-7));
-            let read = probe_displacement_m(
-                &plane,
-                &truth.sensitivity(),
-                &planar,
-                &VerticalPose::from_array(vertical),
-                delta,
-            );
-            dataset.rows.push(Row {
-                movement,
-                t_us: 2000 * dataset.rows.len() as i64,
-                frame: LoggedFrame::Codes(RawFrame {
-                    hall: [0; 3],
-                    capacitive: [0; 3],
-                    sequence: 0,
-                    time_us: 0,
-                }),
-                signal_m: read.map(|s| s + symmetric(0.9e-6)),
-                vertical,
-                reference: planar.to_array(),
-            });
-        }
-        dataset.movements.push(Movement {
-            log: 0,
-            index: movement as i64,
-            rows: start..dataset.rows.len(),
-        });
-    }
+    let vertical = |k: usize| {
+        let part = |pace: f64, start: f64| (pace * k as f64 + start).cos();
+        [
+            250.0 * part(1.9, 0.0),
+            500.0 * part(2.3, 0.6),
+            500.0 * part(1.1, 2.3),
+        ]
+    };
+    let protocol = Protocol {
+        settings: (0..movements.div_ceil(3)).map(vertical).collect(),
+        hall_noise_m: 0.5e-6,
+        zero_deviation_m: 4e-6,
+        seed: 7,
+        ..Protocol::exact(truth(), rows)
+    };
+    let mut dataset = protocol.dataset(&stage());
+    dataset.movements.truncate(movements);
+    dataset.rows.truncate(movements * rows);
     dataset
 }
 

@@ -52,17 +52,6 @@ fn every_search_beats_random_draws_on_known_functions() {
 }
 
 #[test]
-fn shtlbo_finds_the_minimum_of_the_sphere_and_of_rosenbrock() {
-    let sphere = Known::new(6, -4.0, 4.0, sphere);
-    let outcome = SearchKind::Shtlbo.minimize(&sphere, &with_seed(3, 30), &evaluations(12_000));
-    assert!(outcome.cost < 1e-10, "{}", outcome.cost);
-    assert!(outcome.best.iter().all(|x| (x - 1.0).abs() < 1e-4));
-    let rosenbrock = Known::new(4, -2.0, 2.0, rosenbrock);
-    let outcome = SearchKind::Shtlbo.minimize(&rosenbrock, &with_seed(3, 40), &evaluations(60_000));
-    assert!(outcome.cost < 1e-3, "{}", outcome.cost);
-}
-
-#[test]
 fn the_path_is_the_same_on_one_thread_and_on_several() {
     let function = Known::new(7, -3.0, 3.0, rastrigin);
     for kind in SearchKind::ALL {

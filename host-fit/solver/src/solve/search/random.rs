@@ -219,23 +219,11 @@ mod tests {
     }
 
     #[test]
-    fn numbers_have_the_moments_of_their_distribution() {
-        let n = 100_000;
-        let mut numbers = vec![0.0; n];
-        let moments = |numbers: &[f64]| {
-            let mean = numbers.iter().sum::<f64>() / n as f64;
-            let variance = numbers.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n as f64;
-            (mean, variance)
-        };
-        let mut source = stream(1, 0, Phase::Start, 0);
-        source.fill_uniform(&mut numbers);
-        let (mean, variance) = moments(&numbers);
-        assert!((mean - 0.5).abs() < 0.004 && (variance - 1.0 / 12.0).abs() < 0.002);
-        source.fill_normal(&mut numbers);
-        let (mean, variance) = moments(&numbers);
-        assert!(mean.abs() < 0.013 && (variance - 1.0).abs() < 0.02);
-        let beyond_three = numbers.iter().filter(|x| x.abs() > 3.0).count();
-        assert!((220..320).contains(&beyond_three), "{beyond_three} of 270");
+    fn uniform_numbers_have_the_moments_of_their_distribution() {
+        let mut numbers = vec![0.0; 100_000];
+        stream(1, 0, Phase::Start, 0).fill_uniform(&mut numbers);
+        let moment = |power| numbers.iter().map(|x| x.powi(power)).sum::<f64>() * 1e-5;
+        assert!((moment(1) - 0.5).abs() < 0.004 && (moment(2) - 1.0 / 3.0).abs() < 0.004);
     }
 
     /// A million numbers: the share below each of 81 places, and beyond the layers.

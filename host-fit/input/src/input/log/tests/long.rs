@@ -71,20 +71,6 @@ fn faults_far_down_are_named_with_their_place_and_the_first_wins() {
 }
 
 #[test]
-fn a_decimal_point_among_decimal_commas_is_refused_where_it_stands() {
-    let mut lines: Vec<String> = lines().iter().map(|line| line.replace(',', ";")).collect();
-    for line in &mut lines[1..] {
-        *line = line.replace(";1325;", ";1325,5;");
-    }
-    let rows = sound(&text_of(&lines)).dataset.rows;
-    assert_eq!(rows[ROWS - 1].frame.hall(), [13, 14, 3]);
-    lines[line_of(90_000) - 1] = lines[line_of(90_000) - 1].replace("1325,5", "1.325");
-    let error = refused(&text_of(&lines));
-    assert_eq!(place(&error).0, line_of(90_000));
-    assert!(error.to_string().contains("1.325"), "{error}");
-}
-
-#[test]
 fn rows_that_are_left_out_of_many_movements_are_told_in_few_lines() {
     let mut lines = lines();
     for (row, line) in lines[1..].iter_mut().enumerate() {
