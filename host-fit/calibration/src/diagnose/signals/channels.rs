@@ -1,7 +1,7 @@
 //! The signals of one log, channel by channel.
 
-use super::places::Told;
-use crate::input::dataset::{Dataset, Movement, Row};
+use crate::finding::{Code, Finding, Severity};
+use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
 use crate::statistics;
 use runtime::capacitive::vertical_rows;
@@ -25,11 +25,10 @@ pub(super) struct Channel {
 
 /// One log. Rows are numbered from its first.
 pub(super) struct LogSignals<'a> {
-    pub(super) told: Told<'a>,
+    dataset: &'a Dataset,
+    log: usize,
     pub(super) rows: &'a [Row],
-    /// Its movements; their rows are those of the dataset.
-    pub(super) movements: Vec<&'a Movement>,
-    /// Rows of the log between resets and steps of the reference.
+    /// Its movements.
     pub(super) segments: Vec<Range<usize>>,
     /// Hall A, B, C; X, Y1, Y2; then the gaps where the log has codes.
     pub(super) channels: Vec<Channel>,
@@ -50,11 +49,9 @@ impl<'a> LogSignals<'a> {
     pub(super) fn new(dataset: &'a Dataset, stage: &Stage, log: usize) -> Self {
         let range = dataset.logs[log].rows.clone();
         let rows = &dataset.rows[range.clone()];
-        let movements: Vec<&Movement> = (dataset.movements.iter())
-            .filter(|movement| movement.log == log)
-            .collect();
-        let segments: Vec<Range<usize>> = (movements.iter())
-            .map(|movement| movement.rows.start - range.start..movement.rows.end - range.start)
+        let movements = dataset.movements.iter().filter(|m| m.log == log);
+        let segments: Vec<Range<usize>> = movements
+            .map(|m| m.rows.start - range.start..m.rows.end - range.start)
             .collect();
         let period_s = period_s(rows, &segments, stage.servo_period_s);
         Self {
@@ -65,9 +62,9 @@ impl<'a> LogSignals<'a> {
             gap_rows: vertical_rows(&stage.capacitive_probes_m).unwrap_or_default(),
             baseline_m: stage.y_baseline_m,
             first: range.start,
-            told: Told::new(dataset, log),
+            dataset,
+            log,
             rows,
-            movements,
             segments,
             period_s,
         }
@@ -75,11 +72,6 @@ impl<'a> LogSignals<'a> {
 
     pub(super) const fn len(&self) -> usize {
         self.rows.len()
-    }
-
-    /// Rows of a movement of [`movements`](Self::movements).
-    pub(super) fn rows_of(&self, movement: &Movement) -> Range<usize> {
-        movement.rows.start - self.first..movement.rows.end - self.first
     }
 
     /// How many rows last this long, at least one.
@@ -91,6 +83,52 @@ impl<'a> LogSignals<'a> {
     pub(super) fn is_mostly_used(&self, rows: &Range<usize>) -> bool {
         let used = self.usable[rows.clone()].iter().filter(|used| **used);
         2 * used.count() >= rows.len()
+    }
+
+    /// Leaves rows out, with those beside them, whose velocity is not that of the motion.
+    pub(super) fn leave_out(&mut self, runs: impl IntoIterator<Item = Range<usize>>) {
+        let rows = self.len();
+        for run in runs {
+            self.usable[run.start.saturating_sub(2)..(run.end + 2).min(rows)].fill(false);
+        }
+    }
+
+    /// "movement 3 at t_us = 4000".
+    pub(super) fn place(&self, row: usize) -> String {
+        let Row { movement, t_us, .. } = self.rows[row];
+        let movement = &self.dataset.movements[movement];
+        let name = self.dataset.movement_name(movement);
+        format!("movement {name} at t_us = {t_us}")
+    }
+
+    /// The first of many, in words.
+    pub(super) fn places(&self, rows: &[usize]) -> String {
+        const SHOWN: usize = 3;
+        let shown: Vec<String> = rows
+            .iter()
+            .take(SHOWN)
+            .map(|&row| self.place(row))
+            .collect();
+        let dots = if rows.len() > SHOWN { ", ..." } else { "" };
+        shown.join(", ") + dots
+    }
+
+    /// A warning about the whole log, or several of its movements.
+    pub(super) fn warning(&self, code: Code, message: String) -> Finding {
+        let message = match self.dataset.logs.len() {
+            1 => message,
+            _ => format!("{}: {message}", self.dataset.logs[self.log].path.display()),
+        };
+        Finding::new(code, message).severe(Severity::Warn)
+    }
+
+    /// A warning about a place in the log.
+    pub(super) fn warning_at(&self, code: Code, row: usize, message: String) -> Finding {
+        let Row { movement, t_us, .. } = self.rows[row];
+        let name = self
+            .dataset
+            .movement_name(&self.dataset.movements[movement]);
+        self.warning(code, message).at(name, t_us)
     }
 
     pub(super) fn leave_out_undecoded(&mut self, errors: &[Option<[f64; 3]>]) {

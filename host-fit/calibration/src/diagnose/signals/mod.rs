@@ -3,13 +3,10 @@
 //!
 //! | module | what it does |
 //! |---|---|
-//! | `channels` | the signals of one log by channel |
-//! | `places` | where in a log something was found |
-//! | `row_by_row` | what rows tell by themselves: the modules that follow, to `frozen` |
+//! | `channels` | the signals of one log by channel, and places in it |
 //! | `timing` | rows missing, uneven times |
-//! | `converters` | flat tops |
+//! | `repeats` | channels that repeat one value: flat tops, frozen registers |
 //! | `still` | movements that stand still, or end in a rest |
-//! | `frozen` | channels that repeat one value |
 //! | `standing` | channels that show no more than their noise |
 //! | `residual` | what a calibration leaves of the Hall signals |
 //! | `blame` | the channel whose error explains that |
@@ -21,13 +18,10 @@
 
 mod blame;
 mod channels;
-mod converters;
-mod frozen;
 mod hum;
 mod outliers;
-mod places;
+mod repeats;
 mod residual;
-mod row_by_row;
 #[cfg(test)]
 mod sample_for_tests;
 mod spectrum;
@@ -78,7 +72,12 @@ fn of_log(
     log: usize,
 ) -> Vec<Finding> {
     let has_reference = dataset.logs[log].has_reference;
-    let mut found = row_by_row::findings(signals, has_reference, stage);
+    let mut found: Vec<Finding> = timing::timing(signals, stage).collect();
+    found.extend(repeats::flat_tops(signals));
+    if has_reference {
+        found.extend(still::rests(signals));
+    }
+    found.extend(repeats::frozen(signals, has_reference));
     if has_reference && signals.len() >= ROWS_MIN {
         if let Some(errors) = errors {
             signals.leave_out_undecoded(errors);

@@ -1,9 +1,9 @@
 //! Channels that stand still, noise aside, where the residuals say that they should move.
 
 use super::channels::{Channel, LogSignals, median};
-use super::frozen::MISSED_M;
+use super::repeats::MISSED_M;
 use super::residual::Residuals;
-use super::still::{leave_out, stuck};
+use super::still::stuck;
 use crate::finding::Finding;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -39,21 +39,12 @@ pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
     let mut left_out: Vec<Range<usize>> = Vec::new();
     for (signal, stuck_runs) in log.channels.iter().zip(runs) {
         if let Some(longest) = stuck_runs.iter().max_by_key(|run| run.len()) {
-            let first = &log.at(longest.start);
-            let stood_s = longest.len() as f64 * log.period_s;
-            findings.push(stuck(
-                &log.told,
-                signal.name,
-                Some(signal.name),
-                first,
-                stood_s,
-                // Told by what the field model leaves, which a wrong log may leave too.
-                0.0,
-            ));
+            // Told by what the field model leaves, which a wrong log may leave too.
+            findings.push(stuck(log, signal.name, longest, 0.0).on(signal.name));
         }
         left_out.extend(stuck_runs);
     }
-    leave_out(log, left_out);
+    log.leave_out(left_out);
     findings
 }
 
