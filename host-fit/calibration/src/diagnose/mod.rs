@@ -10,6 +10,7 @@
 //! | `short_movements` | movements whose zero deviations take their errors |
 //! | [`of_fit`] | what a fit says of itself |
 //! | [`signals`] | what the signals tell by themselves |
+//! | `slopes` | how an error of each channel shows in the Hall signals |
 //! | [`trusted`] | the inputs that no log can show to be wrong |
 //!
 //! ```
@@ -37,6 +38,7 @@ pub mod of_fit;
 pub mod range;
 mod short_movements;
 pub mod signals;
+mod slopes;
 pub mod structure;
 #[cfg(test)]
 mod structure_tests;

@@ -2,15 +2,12 @@
 
 use super::blocks::{Log, Mean};
 use super::map::Estimate;
+use crate::diagnose::slopes::Slopes;
 use crate::finding::Code;
 use crate::input::stage::Stage;
 use crate::solve::field::probe::probes;
 use nalgebra::Vector3;
-use runtime::capacitive::{vertical_pose, vertical_rows};
 use std::ops::Range;
-
-/// Step of the derivative by Z, Rx, Ry: m, rad.
-const STEP: f64 = 1e-6;
 
 /// What is wrong with the channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,45 +104,11 @@ impl Family {
 
 /// Changes of the signals (mm) by a change of each of the nine channels by 1 mm, by mean.
 pub(super) fn by_channel(log: &Log, stage: &Stage, estimate: &Estimate) -> Vec<[Vector3<f64>; 9]> {
-    let probes = probes(&estimate.state.parameters);
-    let rows = vertical_rows(&stage.capacitive_probes_m).unwrap_or_default();
-    let per_gap: [[f64; 3]; 3] = [0, 1, 2].map(|gap| {
-        let mut gaps = [0.0; 3];
-        gaps[gap] = 1e-3;
-        vertical_pose(&rows, gaps).to_array()
-    });
-    let turn = 1.0 / stage.y_baseline_m;
-    let per_beam = [[1.0, 0.0, 0.0], [0.0, 0.5, turn], [0.0, 0.5, -turn]];
-    let of_mean = |mean: &Mean| {
-        let row = &mean.row;
-        let read = |vertical: [f64; 3]| {
-            let planar_mm = row.planar_mm(estimate.state.lag_s, [0.0; 3]);
-            Vector3::from_fn(|k, _| probes[k].signal_mm(planar_mm, vertical))
-        };
-        let here = read(row.vertical);
-        let by_vertical = [0, 1, 2].map(|axis| {
-            let mut vertical = row.vertical;
-            vertical[axis] += STEP;
-            (read(vertical) - here) / STEP
-        });
-        let by_planar = [0, 1, 2].map(|axis| {
-            let by = probes.map(|probe| {
-                probe
-                    .read(row.planar_mm(estimate.state.lag_s, [0.0; 3]), row.vertical)
-                    .by_pose[axis]
-            });
-            Vector3::from(by)
-        });
-        let along = |by: &[Vector3<f64>; 3], change: [f64; 3]| {
-            -(by[0] * change[0] + by[1] * change[1] + by[2] * change[2])
-        };
-        std::array::from_fn(|channel| match channel {
-            0..3 => Vector3::ith(channel, 1.0),
-            3..6 => along(&by_planar, per_beam[channel - 3]),
-            _ => along(&by_vertical, per_gap[channel - 6]),
-        })
-    };
-    log.means.iter().map(of_mean).collect()
+    let slopes = Slopes::new(stage, probes(&estimate.parameters));
+    let lag_s = estimate.lag_s();
+    let rows = log.means.iter().map(|mean| &mean.row);
+    rows.map(|row| slopes.at(row.planar_mm(lag_s, [0.0; 3]), row.vertical))
+        .collect()
 }
 
 impl Family {

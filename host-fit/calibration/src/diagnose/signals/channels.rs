@@ -1,18 +1,14 @@
 //! The signals of one log, channel by channel.
 
+use crate::diagnose::slopes::CHANNELS;
 use crate::finding::{Code, Finding, Severity};
 use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
 use crate::statistics;
-use runtime::capacitive::vertical_rows;
 use std::ops::Range;
 
-/// Names of the Hall probes and the beams.
-pub(super) const HALL: [&str; 3] = ["hall_a", "hall_b", "hall_c"];
-pub(super) const BEAMS: [&str; 3] = ["ifm_x", "ifm_y1", "ifm_y2"];
 /// Finer than any interferometer reads.
 const BEAM_GRID_M: f64 = 1e-11;
-const CAPACITIVE: [&str; 3] = ["cap_1", "cap_2", "cap_3"];
 
 /// One channel of a log.
 pub(super) struct Channel {
@@ -25,7 +21,8 @@ pub(super) struct Channel {
 
 /// One log. Rows are numbered from its first.
 pub(super) struct LogSignals<'a> {
-    dataset: &'a Dataset,
+    pub(super) dataset: &'a Dataset,
+    pub(super) stage: &'a Stage,
     log: usize,
     pub(super) rows: &'a [Row],
     /// Its movements.
@@ -36,17 +33,14 @@ pub(super) struct LogSignals<'a> {
     pub(super) usable: Vec<bool>,
     /// Time since the start of the log, s; a movement whose time starts anew follows the one before.
     pub(super) time_s: Vec<f64>,
-    /// Rows of the matrix that turns gaps (m) into Z, Rx, Ry.
-    pub(super) gap_rows: [[f64; 3]; 3],
-    /// Distance of the Y beams, m.
-    pub(super) baseline_m: f64,
     /// Median time between rows, s.
     pub(super) period_s: f64,
-    first: usize,
+    /// The first of them in the dataset.
+    pub(super) first: usize,
 }
 
 impl<'a> LogSignals<'a> {
-    pub(super) fn new(dataset: &'a Dataset, stage: &Stage, log: usize) -> Self {
+    pub(super) fn new(dataset: &'a Dataset, stage: &'a Stage, log: usize) -> Self {
         let range = dataset.logs[log].rows.clone();
         let rows = &dataset.rows[range.clone()];
         let movements = dataset.movements.iter().filter(|m| m.log == log);
@@ -58,11 +52,9 @@ impl<'a> LogSignals<'a> {
             channels: channels(rows, stage),
             usable: vec![true; rows.len()],
             time_s: times_s(rows, &segments, period_s),
-            // A checked stage has its sensors apart.
-            gap_rows: vertical_rows(&stage.capacitive_probes_m).unwrap_or_default(),
-            baseline_m: stage.y_baseline_m,
             first: range.start,
             dataset,
+            stage,
             log,
             rows,
             segments,
@@ -77,6 +69,10 @@ impl<'a> LogSignals<'a> {
     /// How many rows last this long, at least one.
     pub(super) fn rows_in(&self, time_s: f64) -> usize {
         ((time_s / self.period_s).round() as usize).max(1)
+    }
+
+    pub(super) fn same_movement(&self, a: usize, b: usize) -> bool {
+        self.rows[a].movement == self.rows[b].movement
     }
 
     /// Whether the tests of residuals use at least half of some rows.
@@ -141,41 +137,34 @@ impl<'a> LogSignals<'a> {
 
 fn channels(rows: &[Row], stage: &Stage) -> Vec<Channel> {
     let half_m = 0.5 * stage.y_baseline_m;
-    let mut channels = Vec::with_capacity(9);
-    for (i, name) in HALL.into_iter().enumerate() {
-        channels.push(Channel {
-            name,
-            values: rows.iter().map(|row| row.signal_m[i]).collect(),
-            m_per_code: stage.hall.m_per_count,
-        });
-    }
     // Through the pose and back equal beams would differ by rounding.
-    let on_grid = |beam_m: f64| (beam_m / BEAM_GRID_M).round() * BEAM_GRID_M;
-    let mut beams = [(); 3].map(|()| Vec::with_capacity(rows.len()));
-    for row in rows {
+    let on_grid = |beam_m: f64| Some((beam_m / BEAM_GRID_M).round() * BEAM_GRID_M);
+    let value = |channel: usize, row: &Row| {
         let [x, y, rz] = row.reference;
-        let apart_m = half_m * rz.tan();
-        for (values, beam_m) in beams.iter_mut().zip([x, y + apart_m, y - apart_m]) {
-            values.push(on_grid(beam_m));
+        match channel {
+            0..3 => Some(row.signal_m[channel]),
+            3 => on_grid(x),
+            4 => on_grid(y + half_m * rz.tan()),
+            5 => on_grid(y - half_m * rz.tan()),
+            _ => {
+                let codes = row.frame.capacitive()?;
+                Some(f64::from(codes[channel - 6]) * stage.capacitive.m_per_count)
+            }
         }
-    }
-    channels.extend(BEAMS.into_iter().zip(beams).map(|(name, values)| Channel {
-        name,
-        values,
-        m_per_code: 0.0,
-    }));
-    let m_per_code = stage.capacitive.m_per_count;
-    for (i, name) in CAPACITIVE.into_iter().enumerate() {
-        let gap = |row: &Row| Some(f64::from(row.frame.capacitive()?[i]) * m_per_code);
-        if let Some(values) = rows.iter().map(gap).collect() {
-            channels.push(Channel {
-                name,
-                values,
-                m_per_code,
-            });
-        }
-    }
-    channels
+    };
+    let per_code = [stage.hall.m_per_count, 0.0, stage.capacitive.m_per_count];
+    let channel = |(k, name): (usize, &'static str)| {
+        Some(Channel {
+            name,
+            values: rows
+                .iter()
+                .map(|row| value(k, row))
+                .collect::<Option<_>>()?,
+            m_per_code: per_code[k / 3],
+        })
+    };
+    let channels = CHANNELS.into_iter().enumerate();
+    channels.map_while(channel).collect()
 }
 
 /// Median time between the rows of the segments, s; that of the servo where there are too few.
@@ -212,7 +201,7 @@ pub(super) fn median(values: &mut [f64]) -> f64 {
 }
 
 /// Standard deviation of normal numbers about zero from their median magnitude.
-pub(super) fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
+pub(in crate::diagnose) fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
     let mut magnitudes: Vec<f64> = values.map(f64::abs).collect();
     1.4826 * median(&mut magnitudes)
 }
@@ -222,51 +211,4 @@ pub(super) fn spread(values: &[f64]) -> f64 {
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     (high - low).max(0.0)
-}
-
-/// Speeds of X, Y, Rz by row, per s: the middle two of the four slopes around each row of a segment: a jump or a step, which is no
-/// speed, spoils two at most.
-pub(super) fn speeds(log: &LogSignals) -> Vec<[f64; 3]> {
-    let mut speeds = vec![[0.0; 3]; log.len()];
-    for segment in &log.segments {
-        for row in segment.clone() {
-            let first = row.saturating_sub(1).max(segment.start + 1);
-            let ends = first..(row + 3).min(segment.end);
-            speeds[row] = [0, 1, 2].map(|i| {
-                let mut slopes = [0.0; 4];
-                let slopes = &mut slopes[..ends.len()];
-                for (slope, end) in slopes.iter_mut().zip(ends.clone()) {
-                    let moved = log.rows[end].reference[i] - log.rows[end - 1].reference[i];
-                    *slope = moved / (log.time_s[end] - log.time_s[end - 1]).max(1e-6);
-                }
-                slopes.sort_unstable_by(f64::total_cmp);
-                let middle = slopes.len().saturating_sub(1) / 2..slopes.len() / 2 + 1;
-                let middle = slopes.get(middle).unwrap_or_default();
-                middle.iter().sum::<f64>() / middle.len().max(1) as f64
-            });
-        }
-    }
-    speeds
-}
-
-/// A signal less its mean over each segment, of the rows that are used.
-pub(super) fn signals_less_means(log: &LogSignals, k: usize) -> Vec<f64> {
-    let mut out = Vec::with_capacity(log.len());
-    for segment in &log.segments {
-        let values = || {
-            let rows = segment.clone().filter(|&row| log.usable[row]);
-            rows.map(|row| log.channels[k].values[row])
-        };
-        let mean = values().sum::<f64>() / values().count().max(1) as f64;
-        out.extend(values().map(|value| value - mean));
-    }
-    out
-}
-
-/// White noise times `scale`, from second differences, which hardly know the motion.
-pub(super) fn white_noise(log: &LogSignals, values: &[f64], scale: f64) -> f64 {
-    let rows = log.segments.iter().flat_map(|s| s.start + 2..s.end);
-    let used = rows.filter(|&row| (row - 2..=row).all(|row| log.usable[row]));
-    let differences = used.map(|row| values[row] - 2.0 * values[row - 1] + values[row - 2]);
-    robust_deviation(differences) / 6f64.sqrt() * scale
 }

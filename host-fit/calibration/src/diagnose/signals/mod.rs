@@ -8,15 +8,13 @@
 //! | `repeats` | channels that repeat one value: flat tops, frozen registers |
 //! | `still` | movements that stand still, or end in a rest |
 //! | `standing` | channels that show no more than their noise |
-//! | `residual` | what a calibration leaves of the Hall signals |
-//! | `blame` | the channel whose error explains that |
+//! | `residual` | what a calibration leaves of the Hall signals, and the channel that explains it |
 //! | `outliers` | rows that jump |
 //! | `spectrum`, `hum` | lines of one frequency |
 //!
 //! Each log is tested alone, and what an earlier test names is left out of the later ones. A
 //! channel is named where it alone explains what was found.
 
-mod blame;
 mod channels;
 mod hum;
 mod outliers;
@@ -36,6 +34,7 @@ use crate::solve::field::parameters::FieldParameters;
 use channels::LogSignals;
 use residual::Residuals;
 
+pub(super) use channels::robust_deviation;
 pub use channels::{period_s, times_s};
 pub use spectrum::{Spectrum, windows};
 
