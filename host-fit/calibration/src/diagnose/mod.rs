@@ -128,7 +128,7 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     if let Ok(fit) = fitted {
         // Rows that a fault explains are no riddle.
         if repair.is_none() {
-            findings.extend(left_out::finding(fit, dataset, stage, &findings));
+            findings.extend(left_out::finding(fit, dataset));
         }
         findings.extend(fit.warnings.iter().cloned());
         let ranged = |found: &Finding| {
@@ -283,9 +283,4 @@ pub fn of_judged(
         predicted,
         repair: None,
     }
-}
-
-/// A warning without message, place and size.
-fn warning(code: Code) -> Finding {
-    Finding::new(code, "").severe(Severity::Warn)
 }

@@ -7,7 +7,9 @@
 //! parameters: the direction that it senses, its lever arm and sensitivity must be those of the drawing, and
 //! the sensitivity must fall with the height at its place, so that b/a = y and c/a = -x.
 
+use super::bank::UNDECIDED;
 use super::mistakes::{Change, Mistake, mistakes};
+use super::range::SPANS;
 use crate::finding::{Code, Finding, Severity};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
@@ -39,8 +41,6 @@ const SPAN: f64 = 0.35;
 const SOUND_MAX: f64 = 42.0;
 /// ... and a mistake undone makes them so much smaller: odds of 10^4 to 1.
 const GAIN_MIN: f64 = 20.0;
-/// Mistakes that come so near to each other are not told apart: odds of 20 to 1.
-const UNDECIDED: f64 = 6.0;
 
 type Vector = SVector<f64, 6>;
 type Covariance = SMatrix<f64, 6, 6>;
@@ -291,7 +291,7 @@ fn beyond_motion(stage: &Stage, spans: &[Matrix3<f64>; 2], change: &Change) -> f
             // A sine within the range has 0.7 times its rms.
             let part = products[(axis, axis)].max(0.0).sqrt() * std::f64::consts::SQRT_2 / service;
             let log = libm::log(part.max(f64::MIN_POSITIVE));
-            let beyond = f64::max(log - libm::log(2.0), libm::log(0.1) - log).max(0.0);
+            let beyond = f64::max(log - libm::log(SPANS.1), libm::log(SPANS.0) - log).max(0.0);
             sum += (beyond.min(20.0) / SPAN).powi(2);
         }
     }

@@ -39,57 +39,43 @@ pub(super) struct Family {
     /// The first channel at fault and the one after the last: Hall A, B, C; beams X, Y1, Y2; gaps 1, 2, 3.
     channels: (usize, usize),
     pub(super) kind: Kind,
+    /// Whether it may come from one row to the next and stay.
     pub(super) steps: bool,
+    /// Whether a reset takes it off.
     pub(super) to_reset: bool,
-    pub(super) ramp: bool,
-    pub(super) ramp_in_movements: bool,
 }
 
-const fn gain(channel: &'static str, from: usize, to: usize) -> Family {
+const fn family(kind: Kind, channel: &'static str, from: usize, to: usize) -> Family {
+    let is_offset = matches!(kind, Kind::Offset);
     Family {
         channel,
         channels: (from, to),
-        kind: Kind::Gain,
-        steps: true,
-        to_reset: false,
-        ramp: true,
-        ramp_in_movements: false,
-    }
-}
-
-const fn offset(channel: &'static str, of: usize) -> Family {
-    // A reset takes an error of the reference off; a gap's stays.
-    Family {
-        channel,
-        channels: (of, of + 1),
-        kind: Kind::Offset,
-        steps: of < 3 || of >= 6,
-        to_reset: of < 6,
-        ramp: true,
-        ramp_in_movements: of < 6,
+        kind,
+        steps: !is_offset || from < 3 || from >= 6,
+        to_reset: is_offset && from < 6,
     }
 }
 
 /// All faults that are looked for.
 pub(super) const FAMILIES: [Family; 18] = [
-    gain("hall_a", 0, 1),
-    gain("hall_b", 1, 2),
-    gain("hall_c", 2, 3),
-    gain("hall", 0, 3),
-    gain("ifm", 3, 6),
-    gain("cap_1", 6, 7),
-    gain("cap_2", 7, 8),
-    gain("cap_3", 8, 9),
-    gain("cap", 6, 9),
-    offset("hall_a", 0),
-    offset("hall_b", 1),
-    offset("hall_c", 2),
-    offset("ifm_x", 3),
-    offset("ifm_y1", 4),
-    offset("ifm_y2", 5),
-    offset("cap_1", 6),
-    offset("cap_2", 7),
-    offset("cap_3", 8),
+    family(Kind::Gain, "hall_a", 0, 1),
+    family(Kind::Gain, "hall_b", 1, 2),
+    family(Kind::Gain, "hall_c", 2, 3),
+    family(Kind::Gain, "hall", 0, 3),
+    family(Kind::Gain, "ifm", 3, 6),
+    family(Kind::Gain, "cap_1", 6, 7),
+    family(Kind::Gain, "cap_2", 7, 8),
+    family(Kind::Gain, "cap_3", 8, 9),
+    family(Kind::Gain, "cap", 6, 9),
+    family(Kind::Offset, "hall_a", 0, 1),
+    family(Kind::Offset, "hall_b", 1, 2),
+    family(Kind::Offset, "hall_c", 2, 3),
+    family(Kind::Offset, "ifm_x", 3, 4),
+    family(Kind::Offset, "ifm_y1", 4, 5),
+    family(Kind::Offset, "ifm_y2", 5, 6),
+    family(Kind::Offset, "cap_1", 6, 7),
+    family(Kind::Offset, "cap_2", 7, 8),
+    family(Kind::Offset, "cap_3", 8, 9),
 ];
 
 impl Family {

@@ -48,7 +48,7 @@ const LAG_MAX: f64 = 0.5;
 /// A fault that costs less is none.
 const COST_MIN: f64 = 1.01;
 /// Faults whose gains in chi-square differ by less are not told apart: odds of 20 to 1, ...
-const UNDECIDED: f64 = 6.0;
+pub(super) const UNDECIDED: f64 = 6.0;
 /// ... or by less than this part, for large faults are not quite linear.
 const ALIKE: f64 = 0.01;
 

@@ -70,31 +70,18 @@ impl<'a> Scan<'a> {
                 choices,
             }));
         };
-        if family.ramp {
-            add(Course::Ramp, self.of_column(raw, family, Course::Ramp), 1);
-        }
-        if family.ramp_in_movements {
-            add(
-                Course::RampInMovements,
-                self.of_column(raw, family, Course::RampInMovements),
-                1,
-            );
-        }
-        if family.steps {
-            let apart = (count / ONSETS).max(1);
-            if let Some((from, gain)) = self.onset(raw, std::slice::from_ref(&(0..count)), apart) {
-                add(Course::From(from), Some(gain), count);
-            }
+        add(Course::Ramp, self.of_column(raw, family, Course::Ramp), 1);
+        let apart = (count / ONSETS).max(1);
+        if family.steps
+            && let Some((from, gain)) = self.onset(raw, std::slice::from_ref(&(0..count)), apart)
+        {
+            add(Course::From(from), Some(gain), count);
         }
         if family.to_reset {
-            let least = self
-                .log
-                .movements
-                .iter()
-                .map(|m| m.len())
-                .max()
-                .unwrap_or(1);
-            let apart = (least / ONSETS_IN_MOVEMENT).max(1);
+            let course = Course::RampInMovements;
+            add(course, self.of_column(raw, family, course), 1);
+            let longest = self.log.movements.iter().map(Range::len).max();
+            let apart = (longest.unwrap_or(1) / ONSETS_IN_MOVEMENT).max(1);
             if let Some((from, gain)) = self.onset(raw, &self.log.movements, apart) {
                 add(Course::ToReset(from), Some(gain), count);
             }

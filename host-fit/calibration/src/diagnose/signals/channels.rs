@@ -31,8 +31,6 @@ pub(super) struct LogSignals<'a> {
     pub(super) channels: Vec<Channel>,
     /// Whether a row is used by the tests of residuals.
     pub(super) usable: Vec<bool>,
-    /// Time since the start of the log, s; a movement whose time starts anew follows the one before.
-    pub(super) time_s: Vec<f64>,
     /// Median time between rows, s.
     pub(super) period_s: f64,
     /// The first of them in the dataset.
@@ -51,7 +49,6 @@ impl<'a> LogSignals<'a> {
         Self {
             channels: channels(rows, stage),
             usable: vec![true; rows.len()],
-            time_s: times_s(rows, &segments, period_s),
             first: range.start,
             dataset,
             stage,
@@ -173,26 +170,6 @@ pub fn period_s(rows: &[Row], segments: &[Range<usize>], servo_period_s: f64) ->
     let steps_us = steps.map(|pair| (pair[1].t_us - pair[0].t_us) as f64);
     let median_us = statistics::median(&mut steps_us.collect::<Vec<f64>>());
     median_us.map_or(servo_period_s, |us| (us * 1e-6).max(1e-6))
-}
-
-/// Time since the first row, s; a movement whose time starts anew follows the one before.
-pub fn times_s(rows: &[Row], segments: &[Range<usize>], period_s: f64) -> Vec<f64> {
-    let mut times_s: Vec<f64> = Vec::with_capacity(rows.len());
-    for segment in segments {
-        let rows_here = &rows[segment.clone()];
-        let Some(first) = rows_here.first() else {
-            continue;
-        };
-        let start_s = match (times_s.last(), segment.start.checked_sub(1)) {
-            (Some(&before_s), Some(before)) if rows[before].t_us < first.t_us => {
-                before_s + (first.t_us - rows[before].t_us) as f64 * 1e-6
-            }
-            (Some(&before_s), _) => before_s + period_s,
-            (None, _) => 0.0,
-        };
-        times_s.extend((rows_here.iter()).map(|r| start_s + (r.t_us - first.t_us) as f64 * 1e-6));
-    }
-    times_s
 }
 
 /// The median; 0 of nothing.

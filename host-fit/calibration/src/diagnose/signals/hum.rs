@@ -19,12 +19,11 @@ const LOWEST_HZ: f64 = 10.0;
 const OF_MOTION: f64 = 8.0;
 /// Amplitude in parts of the noise of a probe from which a line is worth a warning.
 const WARN_MIN: f64 = 0.3;
-/// Lines that are told, and their least amplitude in parts of the largest.
+/// Lines that are told.
 const LINES_MAX: usize = 5;
-const OF_LARGEST: f64 = 0.05;
 
 /// Names the lines above the motion, the clearest first.
-pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
+pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let longest = log.segments.iter().map(Range::len).max().unwrap_or(0);
     let length = smooth(log.rows_in(WINDOW_S).min(longest));
     let mut windows = windows(&log.segments, length);
@@ -41,7 +40,6 @@ pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
 
     let mut left = residuals.values.clone();
     let mut findings = Vec::new();
-    let mut largest_m = 0.0;
     while findings.len() < LINES_MAX {
         let spectra = left.each_ref().map(spectrum);
         let lines = (0..3).filter_map(|k| Some((k, spectra[k].clearest_line(lowest)?)));
@@ -49,10 +47,6 @@ pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
             break;
         };
         let shown_m = spectra[probe].amplitude(bin);
-        largest_m = shown_m.max(largest_m);
-        if shown_m < OF_LARGEST * largest_m {
-            break;
-        }
         let cycles_per_row = spectra[probe].cycles_per_row(bin);
         let lines = Lines::new(log, residuals, &left, &windows, cycles_per_row);
         let Some(line) = blamed(&lines.errors(), |channel| raw[channel].amplitude(bin)) else {

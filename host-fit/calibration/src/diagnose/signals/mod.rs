@@ -34,8 +34,8 @@ use crate::solve::field::parameters::FieldParameters;
 use channels::LogSignals;
 use residual::Residuals;
 
+pub use channels::period_s;
 pub(super) use channels::robust_deviation;
-pub use channels::{period_s, times_s};
 pub use spectrum::{Spectrum, windows};
 
 /// Fewest rows of a log whose residuals are tested.
@@ -98,22 +98,18 @@ fn of_residuals(
     signals: &mut LogSignals,
     (parameters, lag_s): (&FieldParameters, f64),
 ) -> Vec<Finding> {
+    let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 3] =
+        [standing::standing, outliers::outliers, hum::hum];
     let mut findings = Vec::new();
-    let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 2] =
-        [standing::standing, outliers::outliers];
-    let Some(mut residuals) = Residuals::new(signals, parameters, lag_s) else {
-        return findings;
-    };
+    let mut residuals = None;
     for test in tests {
-        let found = test(signals, &residuals);
+        residuals = residuals.or_else(|| Residuals::new(signals, parameters, lag_s));
+        let Some(here) = &residuals else { break };
+        let found = test(signals, here);
         if !found.is_empty() {
-            findings.extend(found);
-            match Residuals::new(signals, parameters, lag_s) {
-                Some(again) => residuals = again,
-                None => return findings,
-            }
+            residuals = None;
         }
+        findings.extend(found);
     }
-    findings.extend(hum::hum(signals, &residuals));
     findings
 }

@@ -16,32 +16,23 @@ const SIDE: usize = 12;
 
 /// Names rows far outside the noise, by channel, and leaves them out.
 pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
-    let usual = (residuals.values.par_iter().zip(residuals.noise_m)).map(|(values, noise_m)| {
-        let sample = rows(log).step_by(7);
-        let off = sample.map(|(segment, row)| off_m(log, values, segment, row));
-        robust_deviation(off).max(noise_m)
+    let all: Vec<(&Range<usize>, usize)> = rows(log).collect();
+    let off = |&(segment, row): &(&Range<usize>, usize)| {
+        [0, 1, 2].map(|k| off_m(log, &residuals.values[k], segment, row))
+    };
+    let off_m: Vec<[f64; 3]> = all.par_iter().map(off).collect();
+    let usual_m = [0, 1, 2].map(|k| {
+        let usual_m = robust_deviation(off_m.iter().map(|off_m| off_m[k]));
+        usual_m.max(residuals.noise_m[k])
     });
-    let usual_m: Vec<f64> = usual.collect();
-    let mut found = Vec::new();
-    for (segment, row) in rows(log) {
-        // Cheap first: most rows are near their neighbours.
-        let ends = [
-            row.saturating_sub(3).max(segment.start),
-            (row + 3).min(segment.end - 1),
-        ];
-        let is_far = |k: usize| {
-            let off = |&end: &usize| (residuals.values[k][row] - residuals.values[k][end]).abs();
-            ends.iter()
-                .any(|end| off(end) > 0.5 * OUTLIER_MIN * usual_m[k])
-        };
-        if !(0..3).any(is_far) {
-            continue;
-        }
-        let shown_m = [0, 1, 2].map(|k| off_m(log, &residuals.values[k], segment, row));
-        if (0..3).any(|k| shown_m[k].abs() > OUTLIER_MIN * usual_m[k]) {
-            found.push((segment.clone(), row, shown_m));
-        }
-    }
+    let is_far = |off_m: &[f64; 3]| (0..3).any(|k| off_m[k].abs() > OUTLIER_MIN * usual_m[k]);
+    let found = all
+        .into_iter()
+        .zip(off_m)
+        .filter(|(_, off_m)| is_far(off_m));
+    let found: Vec<_> = found
+        .map(|((s, row), off_m)| (s.clone(), row, off_m))
+        .collect();
     for (_, row, _) in &found {
         log.usable[*row] = false;
     }

@@ -15,12 +15,6 @@ const STILL_SHARE: f64 = 0.01;
 /// what it misses, s.
 const STANDING_S: f64 = 0.25;
 const BLOCK_S: f64 = 0.02;
-/// Part of the residuals that the error of the channel explains at least, and by how much less of them than
-/// that of another; the largest part of its own that two levels may explain: that is a step.
-const EXPLAINED_MIN: f64 = 0.55;
-const WORSE_MAX: f64 = 0.1;
-const STEP_SHARE: f64 = 0.93;
-
 /// Names channels that stand still, noise aside, where the others say that they move; the rows of such
 /// runs are left out.
 pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
@@ -69,8 +63,8 @@ fn still_runs(log: &LogSignals, residuals: &Residuals, channel: usize) -> Vec<Ra
     runs
 }
 
-/// Whether an error of the channel explains the residuals in a run, and these move like a stage:
-/// noise, hum and outliers vanish in medians of blocks of rows, and a step is no motion.
+/// Whether an error of the channel explains the residuals in a run better than that of any other, and these
+/// move like a stage: noise, hum and outliers vanish in medians of blocks of rows.
 fn is_missed(log: &LogSignals, residuals: &Residuals, channel: usize, run: &Range<usize>) -> bool {
     let length = log.rows_in(BLOCK_S);
     let blocks = run
@@ -84,39 +78,20 @@ fn is_missed(log: &LogSignals, residuals: &Residuals, channel: usize, run: &Rang
         levels.iter_mut().for_each(|level| *level -= mean);
         levels
     });
-    let mut all = 0.0;
     let mut explained = vec![0.0; log.channels.len()];
-    let mut errors_m = Vec::new();
     for (k, row) in blocks.enumerate() {
         let shown_m = levels.each_ref().map(|levels| levels[k]);
-        all += residuals.over_noise(shown_m).norm_squared();
         let errors = residuals.errors(log, row, shown_m);
-        errors_m.push(errors[channel].size_m);
         errors
             .iter()
             .for_each(|error| explained[error.channel] += error.explained);
     }
     let most = explained.iter().copied().fold(0.0, f64::max);
     let missed_m = MISSED_M + 4.0 * residuals.noise_m.into_iter().fold(0.0, f64::max);
-    explained[channel] > (EXPLAINED_MIN * all).max(most - WORSE_MAX * all)
+    explained[channel] >= most
         && levels
             .into_iter()
             .any(|levels| usual_spread(levels) > missed_m)
-        && two_levels(&errors_m) < STEP_SHARE
-}
-
-/// The part of the variance that the best two levels, one after the other, explain.
-fn two_levels(values: &[f64]) -> f64 {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let all: f64 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
-    let (mut sum, mut most) = (0.0, 0.0_f64);
-    for (before, x) in (1..values.len()).zip(values) {
-        sum += x - mean;
-        let before = before as f64;
-        most = most.max(sum * sum * n / (before * (n - before)));
-    }
-    most / all.max(f64::MIN_POSITIVE)
 }
 
 /// Between the ninth part from below and from above: outliers do not count.

@@ -26,6 +26,11 @@ fn periods(log: &LogSignals, from: usize, to: usize) -> u32 {
     to.wrapping_sub(from)
 }
 
+/// Time from one row to a later one of its movement, s.
+fn seconds(log: &LogSignals, from: usize, to: usize) -> f64 {
+    (log.rows[to].t_us - log.rows[from].t_us) as f64 * 1e-6
+}
+
 fn missing(log: &LogSignals) -> Option<Finding> {
     let rows = log.segments.iter().flat_map(|s| s.start + 1..s.end);
     let missed = |row: usize| periods(log, row - 1, row).saturating_sub(1);
@@ -57,15 +62,16 @@ fn uneven(log: &LogSignals) -> Option<Finding> {
         // A line through the times: a rate that is only another one is not uneven.
         let n = segment.len() as f64;
         let mean_k = segment.clone().map(number).sum::<f64>() / n;
-        let mean_s = log.time_s[segment.clone()].iter().sum::<f64>() / n;
+        let time_s = |row: usize| seconds(log, segment.start, row);
+        let mean_s = segment.clone().map(time_s).sum::<f64>() / n;
         let (mut kk, mut kt) = (0.0, 0.0);
         for row in segment.clone() {
             let k = number(row) - mean_k;
             kk += k * k;
-            kt += k * (log.time_s[row] - mean_s);
+            kt += k * (time_s(row) - mean_s);
         }
         for row in segment.clone() {
-            let off_s = log.time_s[row] - mean_s - kt / kk * (number(row) - mean_k);
+            let off_s = time_s(row) - mean_s - kt / kk * (number(row) - mean_k);
             squares += off_s * off_s;
             if off_s.abs() > worst.0 {
                 worst = (off_s.abs(), row);
@@ -90,10 +96,7 @@ fn uneven(log: &LogSignals) -> Option<Finding> {
 fn other_rate(log: &LogSignals, stage: &Stage) -> Option<Finding> {
     let ends = log.segments.iter().filter(|segment| segment.len() >= 2);
     let ends = ends.map(|segment| (segment.start, segment.end - 1));
-    let time_s: f64 = ends
-        .clone()
-        .map(|(a, b)| log.time_s[b] - log.time_s[a])
-        .sum();
+    let time_s: f64 = ends.clone().map(|(a, b)| seconds(log, a, b)).sum();
     let period_s = time_s
         / ends
             .map(|(a, b)| f64::from(periods(log, a, b)))
