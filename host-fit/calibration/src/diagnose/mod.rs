@@ -10,6 +10,7 @@
 //! | `short_movements` | movements whose zero deviations take their errors |
 //! | [`of_fit`] | what a fit says of itself |
 //! | [`signals`] | what the signals tell by themselves |
+//! | `slopes` | how an error of each channel shows in the Hall signals |
 //! | [`trusted`] | the inputs that no log can show to be wrong |
 //!
 //! ```
@@ -37,6 +38,7 @@ pub mod of_fit;
 pub mod range;
 mod short_movements;
 pub mod signals;
+mod slopes;
 pub mod structure;
 #[cfg(test)]
 mod structure_tests;
@@ -126,7 +128,7 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     if let Ok(fit) = fitted {
         // Rows that a fault explains are no riddle.
         if repair.is_none() {
-            findings.extend(left_out::finding(fit, dataset, stage, &findings));
+            findings.extend(left_out::finding(fit, dataset));
         }
         findings.extend(fit.warnings.iter().cloned());
         let ranged = |found: &Finding| {
@@ -281,9 +283,4 @@ pub fn of_judged(
         predicted,
         repair: None,
     }
-}
-
-/// A warning without message, place and size.
-fn warning(code: Code) -> Finding {
-    Finding::new(code, "").severe(Severity::Warn)
 }

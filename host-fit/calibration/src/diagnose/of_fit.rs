@@ -1,6 +1,5 @@
 //! What a fit says of itself, as findings.
 
-use super::warning;
 use crate::finding::{Code, Finding, Severity};
 use crate::fit::Fit;
 use crate::input::dataset::Dataset;
@@ -25,21 +24,16 @@ pub(super) fn not_field(fit: &Fit, predicted: Option<&Predicted>) -> Option<Find
             ". It is good on movements like those of the log; in service expect {x} um in X, {y} um in Y, {rz} urad in Rz"
         )
     });
-    (fit.model.kind != ModelKind::Field).then(|| Finding {
-        message: fit.model_reason.clone() + &expected.unwrap_or_default(),
-        severity: Severity::Note,
-        ..warning(Code::ModelLacks)
+    (fit.model.kind != ModelKind::Field).then(|| {
+        let message = fit.model_reason.clone() + &expected.unwrap_or_default();
+        Finding::new(Code::ModelLacks, message).severe(Severity::Note)
     })
 }
 
 /// A fit that leaves most of the motion unexplained and was kept all the same.
 pub(super) fn undescribed(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     let failure = check_described(dataset, &fit.sound, fit.model).err()?;
-    Some(Finding {
-        message: failure.to_string(),
-        severity: Severity::Refuse,
-        ..warning(Code::ModelLacks)
-    })
+    Some(Finding::new(Code::ModelLacks, failure.to_string()).severe(Severity::Refuse))
 }
 
 /// Errors far above the noise from sample to sample.
@@ -52,17 +46,15 @@ pub fn unexplained(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     let worst = (0..3).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
     let (channel, axis, unit) = AXES[worst];
     let rms = fit.sound.axes[worst].rms * 1e6;
-    (ratio(worst) > ERROR_TO_NOISE_MAX).then(|| Finding {
-        message: format!(
+    (ratio(worst) > ERROR_TO_NOISE_MAX).then(|| {
+        let message = format!(
             "{} leaves {rms:.2} {unit} rms in {axis}, {:.1} times the noise from sample to sample: something in the log is not \
              in the model. With all six axes moving at once take --model field or auto; else see the other findings, and the \
              errors over the log in the report",
             fit.model.title(),
             ratio(worst)
-        ),
-        channel: Some(channel.to_owned()),
-        value: Some(rms),
-        unit: Some(unit),
-        ..warning(Code::ModelLacks)
+        );
+        let found = Finding::new(Code::ModelLacks, message);
+        found.on(channel).of(rms, unit)
     })
 }

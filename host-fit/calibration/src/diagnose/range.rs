@@ -1,6 +1,5 @@
 //! Poses beyond the range of a calibration, and motion that is not the declared one.
 
-use super::warning;
 use crate::finding::{Code, Finding};
 use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::{AXES, Stage};
@@ -8,7 +7,7 @@ use runtime::ParameterSet;
 
 /// An axis that spans more than this times its declared range, or less than that, has another scale or
 /// moves otherwise: no log shows a scale that is common to all channels of a kind.
-const SPANS: (f64, f64) = (0.1, 2.0);
+pub(super) const SPANS: (f64, f64) = (0.1, 2.0);
 
 /// Axes that span far more or far less than `[motion]` declares.
 pub(super) fn undeclared(dataset: &Dataset, stage: &Stage) -> impl Iterator<Item = Finding> {
@@ -48,16 +47,12 @@ pub fn out_of_range(set: &ParameterSet, dataset: &Dataset) -> Option<Finding> {
         .filter(|row| beyond(row.reference, planar) || beyond(row.vertical, vertical));
     let first = rows.next()?;
     let count = 1 + rows.count();
-    Some(Finding {
-        message: format!(
-            "{count} of {} rows are beyond the range of the logs that the parameter blob was fitted to, where it is extrapolated: \
-             fit it to logs of the whole range of service",
-            dataset.rows.len()
-        ),
-        movement: (dataset.movements.get(first.movement)).map(|m| dataset.movement_name(m)),
-        t_us: Some(first.t_us),
-        value: Some(count as f64),
-        unit: Some("rows"),
-        ..warning(Code::OutOfRange)
-    })
+    let message = format!(
+        "{count} of {} rows are beyond the range of the logs that the parameter blob was fitted to, where it is extrapolated: \
+         fit it to logs of the whole range of service",
+        dataset.rows.len()
+    );
+    let name = dataset.movement_name(&dataset.movements[first.movement]);
+    let found = Finding::new(Code::OutOfRange, message);
+    Some(found.at(name, first.t_us).of(count as f64, "rows"))
 }

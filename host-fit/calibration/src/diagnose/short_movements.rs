@@ -1,6 +1,5 @@
 //! Movements so short that their own zero deviations take their errors.
 
-use super::warning;
 use crate::finding::{Code, Finding, Severity};
 use crate::fit::Fit;
 use crate::input::dataset::Dataset;
@@ -30,27 +29,24 @@ pub(super) fn finding(fit: Option<&Fit>, dataset: &Dataset) -> Option<Finding> {
     let rows_of_short: usize = short().map(|movement| movement.rows.len()).sum();
     if rows_of_short as f64 > PART_MAX * rows as f64 {
         let first = short().next()?;
-        return Some(Finding {
-            message: format!(
-                "{rows_of_short} of {rows} rows are in movements of one or two rows, whose zero deviations fit them whatever the \
+        let message = format!(
+            "{rows_of_short} of {rows} rows are in movements of one or two rows, whose zero deviations fit them whatever the \
                  calibration is, so that the errors tell nothing of it: {REMEDY}"
-            ),
-            severity: Severity::Refuse,
+        );
+        let found = Finding::new(Code::ShortMovements, message).severe(Severity::Refuse);
+        let found = found.of(rows_of_short as f64, "rows");
+        return Some(Finding {
             movement: Some(dataset.movement_name(first)),
-            value: Some(rows_of_short as f64),
-            unit: Some("rows"),
-            ..warning(Code::ShortMovements)
+            ..found
         });
     }
     let mean = rows as f64 / count.max(1) as f64;
-    (mean < MEAN_MIN).then(|| Finding {
-        message: format!(
+    (mean < MEAN_MIN).then(|| {
+        let message = format!(
             "the movements have {mean:.1} rows on the mean, and each has a zero deviation of its own: the errors are told too \
              small by about {:.0} %: {REMEDY}",
             100.0 * (1.0 - (1.0 - 1.0 / mean).max(0.0).sqrt()),
-        ),
-        value: Some(mean),
-        unit: Some("rows"),
-        ..warning(Code::ShortMovements)
+        );
+        Finding::new(Code::ShortMovements, message).of(mean, "rows")
     })
 }

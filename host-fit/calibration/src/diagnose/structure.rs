@@ -7,7 +7,9 @@
 //! parameters: the direction that it senses, its lever arm and sensitivity must be those of the drawing, and
 //! the sensitivity must fall with the height at its place, so that b/a = y and c/a = -x.
 
+use super::bank::UNDECIDED;
 use super::mistakes::{Change, Mistake, mistakes};
+use super::range::SPANS;
 use crate::finding::{Code, Finding, Severity};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
@@ -39,8 +41,6 @@ const SPAN: f64 = 0.35;
 const SOUND_MAX: f64 = 42.0;
 /// ... and a mistake undone makes them so much smaller: odds of 10^4 to 1.
 const GAIN_MIN: f64 = 20.0;
-/// Mistakes that come so near to each other are not told apart: odds of 20 to 1.
-const UNDECIDED: f64 = 6.0;
 
 type Vector = SVector<f64, 6>;
 type Covariance = SMatrix<f64, 6, 6>;
@@ -61,7 +61,7 @@ pub fn structure(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
     let fitted = fitted(dataset)?;
     let drawing = Drawing::new(stage);
     let distance = |change: &Change| drawing.distance(&fitted, change);
-    let as_logged = distance(&Change::NOTHING);
+    let as_logged = distance(&Change::nothing());
     if as_logged < SOUND_MAX {
         return None;
     }
@@ -85,7 +85,7 @@ pub fn structure(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
     ranked.retain(|(rank, _)| *rank < least + UNDECIDED);
     let mut named: Vec<&Mistake> = Vec::new();
     for (_, mistake) in &ranked {
-        if named.iter().all(|other| other.group != mistake.group) {
+        if named.iter().all(|other| other.what != mistake.what) {
             named.push(mistake);
         }
     }
@@ -93,9 +93,9 @@ pub fn structure(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
 }
 
 fn finding(named: &[&Mistake]) -> Finding {
-    let cures: Vec<&str> = named.iter().map(|mistake| mistake.cure.as_str()).collect();
+    let cures: Vec<String> = named.iter().map(|mistake| mistake.cure()).collect();
     let (undecided, remedy) = match named {
-        [one] => ("", one.remedy),
+        [one] => ("", one.code.entry().remedy),
         _ => (
             " (the log does not tell which)",
             "find out which before anything is changed: check wiring, columns, units and stage.toml",
@@ -182,9 +182,10 @@ impl Drawing {
     }
 
     fn distance_of(&self, probe: usize, fitted: &[Fitted; 3], change: &Change) -> Option<f64> {
-        let from = (0..3).find(|&from| change.signal[(probe, from)] != 0.0)?;
-        let by_gain = change.reference.try_inverse()?.transpose() * change.signal[(probe, from)];
-        let by_slope = change.vertical.try_inverse()?.transpose();
+        let Change([signal, reference, vertical]) = change;
+        let from = (0..3).find(|&from| signal[(probe, from)] != 0.0)?;
+        let by_gain = reference.try_inverse()?.transpose() * signal[(probe, from)];
+        let by_slope = vertical.try_inverse()?.transpose();
         let mut turned = Covariance::zeros();
         turned.fixed_view_mut::<3, 3>(0, 0).copy_from(&by_gain);
         turned.fixed_view_mut::<3, 3>(3, 3).copy_from(&by_slope);
@@ -283,14 +284,14 @@ fn spans(dataset: &Dataset) -> [Matrix3<f64>; 2] {
 /// How far the motion with a mistake undone is from the declared one.
 fn beyond_motion(stage: &Stage, spans: &[Matrix3<f64>; 2], change: &Change) -> f64 {
     let mut sum = 0.0;
-    for (half, by) in [change.reference, change.vertical].iter().enumerate() {
+    for (half, by) in change.0[1..].iter().enumerate() {
         let products = by * spans[half] * by.transpose();
         for axis in 0..3 {
             let service = stage.motion.axes[3 * half + axis].service;
             // A sine within the range has 0.7 times its rms.
             let part = products[(axis, axis)].max(0.0).sqrt() * std::f64::consts::SQRT_2 / service;
             let log = libm::log(part.max(f64::MIN_POSITIVE));
-            let beyond = f64::max(log - libm::log(2.0), libm::log(0.1) - log).max(0.0);
+            let beyond = f64::max(log - libm::log(SPANS.1), libm::log(SPANS.0) - log).max(0.0);
             sum += (beyond.min(20.0) / SPAN).powi(2);
         }
     }

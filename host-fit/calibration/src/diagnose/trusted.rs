@@ -34,44 +34,50 @@ pub struct AxisCost {
 /// An error of this part of an input.
 const PART: f64 = 0.01;
 
+/// The axes, and of each input where it is said and what it scales.
+const AXES: [&str; 6] = ["X", "Y", "Rz", "Z", "Rx", "Ry"];
+const INPUTS: [(&str, &str, &[usize]); 4] = [
+    (
+        "scale of the interferometers",
+        "the reference columns of the log",
+        &[0, 1, 2],
+    ),
+    (
+        "distance of the two beams along Y",
+        "interferometer.y_baseline_m",
+        &[2],
+    ),
+    (
+        "scale of the capacitive codes",
+        "capacitive.m_per_count",
+        &[3, 4, 5],
+    ),
+    (
+        "places of the capacitive sensors",
+        "capacitive.probes_m",
+        &[4, 5],
+    ),
+];
+
 /// Every trusted input of a calibration.
 pub fn trusted(set: &ParameterSet) -> Vec<Trusted> {
-    let [x, y, rz] = set.constants.calibrated_planar.map(f64::from);
-    let [z, rx, ry] = set.constants.calibrated_vertical.map(f64::from);
-    let of = |axis, end: f64, unit| AxisCost {
-        axis,
-        value: PART * end * 1e6,
-        unit,
+    let constants = &set.constants;
+    let ends = [constants.calibrated_planar, constants.calibrated_vertical].concat();
+    let cost = |&axis: &usize| AxisCost {
+        axis: AXES[axis],
+        value: PART * f64::from(ends[axis]) * 1e6,
+        unit: if AXES[axis].starts_with('R') {
+            "urad"
+        } else {
+            "um"
+        },
     };
-    let (x, y, rz) = (of("X", x, "um"), of("Y", y, "um"), of("Rz", rz, "urad"));
-    let (z, rx, ry) = (of("Z", z, "um"), of("Rx", rx, "urad"), of("Ry", ry, "urad"));
-    let input = |input, place, cost: &[AxisCost]| Trusted {
+    let of_input = |(input, place, axes): (_, _, &[usize])| Trusted {
         input,
         place,
-        cost: cost.to_vec(),
+        cost: axes.iter().map(cost).collect(),
     };
-    vec![
-        input(
-            "scale of the interferometers",
-            "the reference columns of the log",
-            &[x, y, rz],
-        ),
-        input(
-            "distance of the two beams along Y",
-            "interferometer.y_baseline_m",
-            &[rz],
-        ),
-        input(
-            "scale of the capacitive codes",
-            "capacitive.m_per_count",
-            &[z, rx, ry],
-        ),
-        input(
-            "places of the capacitive sensors",
-            "capacitive.probes_m",
-            &[rx, ry],
-        ),
-    ]
+    INPUTS.map(of_input).to_vec()
 }
 
 impl Trusted {

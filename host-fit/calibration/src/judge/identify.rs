@@ -280,18 +280,6 @@ pub fn check_described(
         let squares: f64 = dataset.rows.iter().map(|r| r.reference[axis].powi(2)).sum();
         (squares / n).sqrt()
     });
-    check_explained(moved, errors, model)
-}
-
-/// The same from the root mean square of the reference: m, m, rad.
-///
-/// # Errors
-/// [`FitFailure::NotDescribed`] for the first such axis.
-pub fn check_explained(
-    moved: [f64; 3],
-    errors: &PoseError,
-    model: &Model,
-) -> Result<(), FitFailure> {
     for (axis, motion) in Motion::ALL.into_iter().enumerate().take(3) {
         let moved = moved[axis];
         let error = errors.axes[axis].rms;

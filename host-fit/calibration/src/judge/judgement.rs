@@ -26,8 +26,6 @@ pub struct Judgement {
     pub settings: Vec<[f64; 3]>,
     /// Rows that the decoder could not decode (bad codes); they count in no error.
     pub undecoded: usize,
-    /// Root mean square of the reference: m, m, rad.
-    pub motion: [f64; 3],
     /// The rows that are far off.
     pub left_out: LeftOut,
     /// How far the stage goes from zero over the other decoded rows: X, Y, Rz, m, m, rad.
@@ -80,7 +78,6 @@ pub struct Judge<'s> {
     rows: usize,
     run: Vec<Seen>,
     movements: Vec<OfMovement>,
-    reference_squares: [f64; 3],
     left_out: LeftOut,
     planar: [f64; 3],
     vertical: [f64; 3],
@@ -97,7 +94,6 @@ impl<'s> Judge<'s> {
             rows: 0,
             run: Vec::with_capacity(Block::ROWS),
             movements: Vec::new(),
-            reference_squares: [0.0; 3],
             left_out: LeftOut::default(),
             planar: [0.0; 3],
             vertical: [0.0; 3],
@@ -140,9 +136,6 @@ impl<'s> Judge<'s> {
             for (sum, x) in last.vertical.iter_mut().zip(row.vertical) {
                 *sum += x;
             }
-        }
-        for (sum, x) in self.reference_squares.iter_mut().zip(row.reference) {
-            *sum += x * x;
         }
         self.run.push(Seen {
             place: RowPlace {
@@ -208,7 +201,6 @@ impl<'s> Judge<'s> {
             rows: sums.rows + sums.undecoded,
             errors: sums.errors(),
         };
-        let rows = self.rows.max(1) as f64;
         let setting = |of: &OfMovement| of.vertical.map(|sum| sum / of.movement.rows.len() as f64);
         Judgement {
             errors: total.errors(),
@@ -218,7 +210,6 @@ impl<'s> Judge<'s> {
             movements: self.movements.into_iter().map(|of| of.movement).collect(),
             zeros: taken_off,
             undecoded: total.undecoded,
-            motion: self.reference_squares.map(|sum| (sum / rows).sqrt()),
             left_out: self.left_out,
             planar: self.planar,
             vertical: self.vertical,

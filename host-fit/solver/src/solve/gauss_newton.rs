@@ -175,7 +175,8 @@ impl Unknowns {
         self.basis.tr_mul(&of_values) - &self.prior * x
     }
 
-    fn curvature<const W: usize>(&self, normal: &Normal<W>) -> DMatrix<f64> {
+    /// The curvature along x.
+    pub fn curvature<const W: usize>(&self, normal: &Normal<W>) -> DMatrix<f64> {
         let n = self.origin.len();
         let of_values = DMatrix::from_fn(n, n, |i, j| normal.curvature(i, j));
         self.basis.tr_mul(&(of_values * &self.basis)) + &self.prior
@@ -261,7 +262,7 @@ pub struct Factor {
 
 impl Factor {
     /// Of a curvature, `damping` times its diagonal added; `None` where it is singular.
-    fn new(curvature: &DMatrix<f64>, damping: f64) -> Option<Self> {
+    pub fn new(curvature: &DMatrix<f64>, damping: f64) -> Option<Self> {
         let scale = curvature.diagonal().map(|d| {
             let d = d.sqrt();
             // What nothing shows stays as it is.

@@ -1,13 +1,15 @@
-//! A log in means over a few rows each, what spoils single rows left out.
+//! A log in means over a few rows each, rows far from the others left out.
 
+use crate::diagnose::signals::robust_deviation;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::solve::field::blocks::{FieldRow, Rows};
 use crate::solve::field::probe::Probe;
+use crate::statistics::median;
 use std::ops::Range;
 
-/// A row this many times its white noise off the middle of its block is left out: noise alone does that
-/// once in 10^9 rows.
+/// A row this many times its white noise off the middle of its block, as beside a step, is left out: noise
+/// alone does that once in 10^9 rows.
 const SPIKE: f64 = 6.0;
 
 /// Of long logs a mean is over so many more rows that there are not many more than these: a scan is
@@ -40,52 +42,48 @@ impl Log {
     /// The rows of a dataset; `probes` are those of a first fit.
     pub(super) fn new(dataset: &Dataset, stage: &Stage, probes: &[Probe; 3]) -> Self {
         let selected: Vec<usize> = (0..dataset.rows.len()).collect();
-        let all = Rows::new(dataset, &selected);
-        let residuals = all.residuals_mm(probes, 0.0, &vec![[0.0; 3]; all.movements.len()]);
+        let rows = Rows::new(dataset, &selected);
+        let residuals = rows.residuals_mm(probes, 0.0, &vec![[0.0; 3]; rows.movements.len()]);
         let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
-        let white_mm = [0, 1, 2].map(|k| white(&all, &residuals, k).max(least_mm));
-        let mut weights = vec![1.0; selected.len()];
-        for block in &all.blocks {
-            let middle = [0, 1, 2].map(|k| {
-                let mut of: Vec<f64> = block.clone().map(|row| residuals[row][k]).collect();
-                median(&mut of)
-            });
-            for row in block.clone() {
-                let is_off = |k: usize| (residuals[row][k] - middle[k]).abs() > SPIKE * white_mm[k];
-                if (0..3).any(is_off) {
-                    weights[row] = 0.0;
-                }
-            }
-        }
-        let used: Vec<usize> = selected
-            .iter()
-            .zip(&weights)
-            .filter(|(_, w)| **w > 0.0)
-            .map(|(&row, _)| row)
-            .collect();
-        let rows = Rows::weighted(dataset, &selected, &weights);
+        let white_mm = [0, 1, 2].map(|k| white(&rows, &residuals, k).max(least_mm));
         let half = 0.5 * stage.y_baseline_m;
-        let mean = |block: &Range<usize>| {
-            let row = mean_row(&rows.rows[block.clone()]);
+        let mean = |block: Range<usize>| {
+            let middle = [0, 1, 2].map(|k| {
+                let mut of_block: Vec<f64> =
+                    residuals[block.clone()].iter().map(|r| r[k]).collect();
+                median(&mut of_block).unwrap_or(0.0)
+            });
+            let is_near = |row: &usize| {
+                let off = |k: usize| (residuals[*row][k] - middle[k]).abs();
+                (0..3).all(|k| off(k) <= SPIKE * white_mm[k])
+            };
+            let near: Vec<FieldRow> = block
+                .clone()
+                .filter(is_near)
+                .map(|row| rows.rows[row])
+                .collect();
+            let row = mean_row(&near)?;
             let [x, y, rz] = row.reference_mm;
             let gaps_m = runtime::capacitive::gaps_m(
                 &stage.capacitive_probes_m,
                 &runtime::VerticalPose::from_array(row.vertical),
             );
-            Mean {
+            Some(Mean {
                 row,
-                first: used[block.start],
+                first: block.start,
                 beams_mm: [x, y + half * rz, y - half * rz],
                 gaps_mm: gaps_m.map(|gap| gap * 1e3),
-            }
+            })
         };
         let together = rows.blocks.len().div_ceil(MEANS_MAX).max(1);
         let (mut means, mut movements) = (Vec::new(), Vec::new());
         for movement in &rows.movements {
             let start = means.len();
             let some = rows.blocks[movement.clone()].chunks(together);
-            means.extend(some.map(|blocks| mean(&(blocks[0].start..blocks[blocks.len() - 1].end))));
-            movements.push(start..means.len());
+            means.extend(some.filter_map(|some| mean(some[0].start..some[some.len() - 1].end)));
+            if means.len() > start {
+                movements.push(start..means.len());
+            }
         }
         Self {
             means,
@@ -105,35 +103,25 @@ impl Log {
     }
 }
 
-fn mean_row(rows: &[FieldRow]) -> FieldRow {
+fn mean_row(rows: &[FieldRow]) -> Option<FieldRow> {
     let share = 1.0 / rows.len() as f64;
     let mean = |of: &dyn Fn(&FieldRow) -> f64| share * rows.iter().map(of).sum::<f64>();
     let three = |of: &dyn Fn(&FieldRow) -> [f64; 3]| [0, 1, 2].map(|k| mean(&|row| of(row)[k]));
-    FieldRow {
+    (!rows.is_empty()).then(|| FieldRow {
         time_s: mean(&|row| row.time_s),
         signal_mm: three(&|row| row.signal_mm),
         vertical: three(&|row| row.vertical),
         reference_mm: three(&|row| row.reference_mm),
         rate_mm_per_s: three(&|row| row.rate_mm_per_s),
         weight: rows.len() as f64,
-    }
+    })
 }
 
 /// White noise of a probe from second differences within movements, by their median.
 fn white(rows: &Rows, residuals: &[[f64; 3]], probe: usize) -> f64 {
-    let mut differences: Vec<f64> = rows
+    let differences = rows
         .movement_rows()
-        .flat_map(|movement| residuals[movement].windows(3).collect::<Vec<_>>())
-        .map(|w| ((w[0][probe] - 2.0 * w[1][probe]) + w[2][probe]).abs())
-        .collect();
-    1.4826 * median(&mut differences) / 6f64.sqrt()
-}
-
-/// The median; 0 of nothing.
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+        .flat_map(|movement| residuals[movement].windows(3))
+        .map(|w| (w[0][probe] - 2.0 * w[1][probe]) + w[2][probe]);
+    robust_deviation(differences) / 6f64.sqrt()
 }

@@ -2,15 +2,12 @@
 
 use super::blocks::{Log, Mean};
 use super::map::Estimate;
+use crate::diagnose::slopes::Slopes;
 use crate::finding::Code;
 use crate::input::stage::Stage;
 use crate::solve::field::probe::probes;
 use nalgebra::Vector3;
-use runtime::capacitive::{vertical_pose, vertical_rows};
 use std::ops::Range;
-
-/// Step of the derivative by Z, Rx, Ry: m, rad.
-const STEP: f64 = 1e-6;
 
 /// What is wrong with the channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,57 +39,43 @@ pub(super) struct Family {
     /// The first channel at fault and the one after the last: Hall A, B, C; beams X, Y1, Y2; gaps 1, 2, 3.
     channels: (usize, usize),
     pub(super) kind: Kind,
+    /// Whether it may come from one row to the next and stay.
     pub(super) steps: bool,
+    /// Whether a reset takes it off.
     pub(super) to_reset: bool,
-    pub(super) ramp: bool,
-    pub(super) ramp_in_movements: bool,
 }
 
-const fn gain(channel: &'static str, from: usize, to: usize) -> Family {
+const fn family(kind: Kind, channel: &'static str, from: usize, to: usize) -> Family {
+    let is_offset = matches!(kind, Kind::Offset);
     Family {
         channel,
         channels: (from, to),
-        kind: Kind::Gain,
-        steps: true,
-        to_reset: false,
-        ramp: true,
-        ramp_in_movements: false,
-    }
-}
-
-const fn offset(channel: &'static str, of: usize) -> Family {
-    // A reset takes an error of the reference off; a gap's stays.
-    Family {
-        channel,
-        channels: (of, of + 1),
-        kind: Kind::Offset,
-        steps: of < 3 || of >= 6,
-        to_reset: of < 6,
-        ramp: true,
-        ramp_in_movements: of < 6,
+        kind,
+        steps: !is_offset || from < 3 || from >= 6,
+        to_reset: is_offset && from < 6,
     }
 }
 
 /// All faults that are looked for.
 pub(super) const FAMILIES: [Family; 18] = [
-    gain("hall_a", 0, 1),
-    gain("hall_b", 1, 2),
-    gain("hall_c", 2, 3),
-    gain("hall", 0, 3),
-    gain("ifm", 3, 6),
-    gain("cap_1", 6, 7),
-    gain("cap_2", 7, 8),
-    gain("cap_3", 8, 9),
-    gain("cap", 6, 9),
-    offset("hall_a", 0),
-    offset("hall_b", 1),
-    offset("hall_c", 2),
-    offset("ifm_x", 3),
-    offset("ifm_y1", 4),
-    offset("ifm_y2", 5),
-    offset("cap_1", 6),
-    offset("cap_2", 7),
-    offset("cap_3", 8),
+    family(Kind::Gain, "hall_a", 0, 1),
+    family(Kind::Gain, "hall_b", 1, 2),
+    family(Kind::Gain, "hall_c", 2, 3),
+    family(Kind::Gain, "hall", 0, 3),
+    family(Kind::Gain, "ifm", 3, 6),
+    family(Kind::Gain, "cap_1", 6, 7),
+    family(Kind::Gain, "cap_2", 7, 8),
+    family(Kind::Gain, "cap_3", 8, 9),
+    family(Kind::Gain, "cap", 6, 9),
+    family(Kind::Offset, "hall_a", 0, 1),
+    family(Kind::Offset, "hall_b", 1, 2),
+    family(Kind::Offset, "hall_c", 2, 3),
+    family(Kind::Offset, "ifm_x", 3, 4),
+    family(Kind::Offset, "ifm_y1", 4, 5),
+    family(Kind::Offset, "ifm_y2", 5, 6),
+    family(Kind::Offset, "cap_1", 6, 7),
+    family(Kind::Offset, "cap_2", 7, 8),
+    family(Kind::Offset, "cap_3", 8, 9),
 ];
 
 impl Family {
@@ -107,45 +90,11 @@ impl Family {
 
 /// Changes of the signals (mm) by a change of each of the nine channels by 1 mm, by mean.
 pub(super) fn by_channel(log: &Log, stage: &Stage, estimate: &Estimate) -> Vec<[Vector3<f64>; 9]> {
-    let probes = probes(&estimate.state.parameters);
-    let rows = vertical_rows(&stage.capacitive_probes_m).unwrap_or_default();
-    let per_gap: [[f64; 3]; 3] = [0, 1, 2].map(|gap| {
-        let mut gaps = [0.0; 3];
-        gaps[gap] = 1e-3;
-        vertical_pose(&rows, gaps).to_array()
-    });
-    let turn = 1.0 / stage.y_baseline_m;
-    let per_beam = [[1.0, 0.0, 0.0], [0.0, 0.5, turn], [0.0, 0.5, -turn]];
-    let of_mean = |mean: &Mean| {
-        let row = &mean.row;
-        let read = |vertical: [f64; 3]| {
-            let planar_mm = row.planar_mm(estimate.state.lag_s, [0.0; 3]);
-            Vector3::from_fn(|k, _| probes[k].signal_mm(planar_mm, vertical))
-        };
-        let here = read(row.vertical);
-        let by_vertical = [0, 1, 2].map(|axis| {
-            let mut vertical = row.vertical;
-            vertical[axis] += STEP;
-            (read(vertical) - here) / STEP
-        });
-        let by_planar = [0, 1, 2].map(|axis| {
-            let by = probes.map(|probe| {
-                probe
-                    .read(row.planar_mm(estimate.state.lag_s, [0.0; 3]), row.vertical)
-                    .by_pose[axis]
-            });
-            Vector3::from(by)
-        });
-        let along = |by: &[Vector3<f64>; 3], change: [f64; 3]| {
-            -(by[0] * change[0] + by[1] * change[1] + by[2] * change[2])
-        };
-        std::array::from_fn(|channel| match channel {
-            0..3 => Vector3::ith(channel, 1.0),
-            3..6 => along(&by_planar, per_beam[channel - 3]),
-            _ => along(&by_vertical, per_gap[channel - 6]),
-        })
-    };
-    log.means.iter().map(of_mean).collect()
+    let slopes = Slopes::new(stage, probes(&estimate.parameters));
+    let lag_s = estimate.lag_s();
+    let rows = log.means.iter().map(|mean| &mean.row);
+    rows.map(|row| slopes.at(row.planar_mm(lag_s, [0.0; 3]), row.vertical))
+        .collect()
 }
 
 impl Family {

@@ -48,7 +48,7 @@ const LAG_MAX: f64 = 0.5;
 /// A fault that costs less is none.
 const COST_MIN: f64 = 1.01;
 /// Faults whose gains in chi-square differ by less are not told apart: odds of 20 to 1, ...
-const UNDECIDED: f64 = 6.0;
+pub(super) const UNDECIDED: f64 = 6.0;
 /// ... or by less than this part, for large faults are not quite linear.
 const ALIKE: f64 = 0.01;
 
@@ -95,14 +95,14 @@ pub fn diagnose(
         }
         .diagnosis(estimate)
     };
-    let lag_s = estimate.state.lag_s;
+    let lag_s = estimate.lag_s();
     if lag_s.abs() < LAG_MAX * stage.servo_period_s {
         return of(dataset, &log, estimate);
     }
     // A lag is not linear.
     let dataset = &with_reference_later(dataset, lag_s);
-    let log = Log::new(dataset, stage, &probes(&estimate.state.parameters));
-    let estimate = Estimate::new(&log, &estimate.state.parameters)?;
+    let log = Log::new(dataset, stage, &probes(&estimate.parameters));
+    let estimate = Estimate::new(&log, &estimate.parameters)?;
     of(dataset, &log, estimate)
 }
 
@@ -135,7 +135,7 @@ impl Job<'_> {
             ModelKind::Field => PER_PROBE,
             model => Model::of(model).fitted,
         };
-        let own = estimate.without_faults(of_model)?.covariance();
+        let own = estimate.without_faults(of_model)?.inverse();
         let own = Predicted::new(&declared, &own, &[0.0; COUNT]);
         if own.worst_ratio() > LIMITED_MAX {
             return Some(Diagnosis {
@@ -145,7 +145,7 @@ impl Job<'_> {
                 rest: 1.0,
             });
         }
-        let whole = estimate.curvature.covariance();
+        let whole = estimate.curvature.inverse();
         let carried = Predicted::new(&declared, &whole, &[0.0; COUNT]).worst_ratio() < LIMITED_MAX;
         // A log that leaves the field model open shows what it costs the smaller one, on motion like its own.
         let (free, at_work) = match carried {
@@ -216,9 +216,8 @@ impl Job<'_> {
             worth(faultless, faultless - other.gain) - UNKNOWNS as f64 * per_unknown
         };
         let other = other.filter(|other| of_parts(other) > explained.max(0.0));
-        let off_by = |number: usize| {
-            without_faults.solve(&estimate.pull(number)) * estimate.state.faults[number]
-        };
+        let off_by =
+            |number: usize| without_faults.solve(&estimate.pull(number)) * estimate.sizes()[number];
         let (predicted, of_parts, offs) = match &other {
             Some(other) => {
                 let off = without_faults.solve(&other.pull);
@@ -231,12 +230,12 @@ impl Job<'_> {
             }
             None => {
                 // What the fit at hand is off the repaired one, whatever bent it.
-                let own = estimate.state.parameters.probes.as_flattened();
+                let own = estimate.parameters.probes.as_flattened();
                 let pairs = self.fitted.probes.as_flattened().iter().zip(own);
                 let (off, covariance) = match carried {
                     true => (
                         pairs.map(|(a, b)| a - b).collect(),
-                        estimate.curvature.covariance(),
+                        estimate.curvature.inverse(),
                     ),
                     false => (vec![0.0; COUNT], estimate.omitting(of_model)?),
                 };
@@ -245,14 +244,14 @@ impl Job<'_> {
             }
         };
         let costs: Vec<f64> = offs.iter().map(cost).collect();
-        let covariance = estimate.curvature.covariance() * certain;
+        let covariance = estimate.curvature.inverse() * certain;
         let repair = self.repair(&estimate, (&declared, &covariance), &faults, &costs);
         let of_faults = faults.iter().zip(costs.iter().copied()).enumerate();
         let of_faults = of_faults.filter(|(_, (_, cost))| *cost >= COST_MIN);
         let of_faults = of_faults.map(|(number, ((fault, alike), cost))| {
             // A robust fit may have left out of account what it would have cost.
             let cost = cost.min(predicted.worst_ratio());
-            self.finding(fault, alike, estimate.state.faults[number], cost)
+            self.finding(fault, alike, estimate.sizes()[number], cost)
         });
         Some(Diagnosis {
             findings: of_parts.into_iter().chain(of_faults).collect(),
@@ -282,7 +281,7 @@ impl Job<'_> {
         let predicted = Predicted::new(declared, covariance, &[0.0; COUNT]);
         (predicted.worst_ratio() <= GOOD_MAX).then(|| {
             let repair = Repair {
-                parameters: estimate.state.parameters,
+                parameters: estimate.parameters,
                 covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
                 faults: Vec::new(),
             };

@@ -6,6 +6,7 @@
 //! each movement, which starts anywhere, is projected out exactly.
 
 use super::blocks::Log;
+use super::map::{Row, WIDTH};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::ops::Range;
 
@@ -26,9 +27,8 @@ pub(super) struct Filter {
 }
 
 impl Filter {
-    /// For a walk (mm, mm, mrad in a root of a second) and derivatives by the pose at the middle.
-    fn new(log: &Log, by_pose: &Matrix3<f64>, walk: [f64; 3]) -> Option<Self> {
-        let inverse = by_pose.try_inverse()?;
+    /// For a walk (mm, mm, mrad in a root of a second) and what turns signals into a pose at the middle.
+    fn new(log: &Log, inverse: &Matrix3<f64>, walk: [f64; 3]) -> Option<Self> {
         let white = Matrix3::from_diagonal(&Vector3::from(log.white_mm.map(|x| x * x)));
         let noise = inverse * white * inverse.transpose();
         let lower = noise.cholesky()?.l().try_inverse()?;
@@ -69,7 +69,7 @@ impl Filter {
     /// The walk that explains the residuals (pose, by mean) best, up to the declared drift.
     pub(super) fn best(
         log: &Log,
-        by_pose: &Matrix3<f64>,
+        to_pose: &Matrix3<f64>,
         residuals: &[Vector3<f64>],
     ) -> Option<Self> {
         let longest_s = log.movements.iter().map(|movement| {
@@ -78,38 +78,15 @@ impl Filter {
         let root_s = longest_s.fold(0.0, f64::max).max(0.1).sqrt();
         let mut best: Option<(f64, Self)> = None;
         for part in PARTS {
-            let filter = Self::new(log, by_pose, DRIFT_MAX.map(|most| part * most / root_s))?;
-            let mut column: Vec<[f64; 3]> = residuals
-                .iter()
-                .map(|r| (filter.to_channels * r).into())
-                .collect();
-            filter.whiten(&mut column);
-            let cost = column.iter().flatten().map(|x| x * x).sum::<f64>() + filter.log_determinant;
+            let filter = Self::new(log, to_pose, DRIFT_MAX.map(|most| part * most / root_s))?;
+            let column = residuals.iter().map(|r| (filter.to_channels * r).into());
+            let column: Vec<[f64; 3]> = column.collect();
+            let cost = filter.squares(&column, &(0..column.len())) + filter.log_determinant;
             if best.as_ref().is_none_or(|(least, _)| cost < *least) {
                 best = Some((cost, filter));
             }
         }
         Some(best?.1)
-    }
-
-    /// Innovations of a column, over their standard deviations.
-    pub(super) fn whiten(&self, column: &mut [[f64; 3]]) {
-        for movement in &self.movements {
-            self.whiten_movement(movement.start, &mut column[movement.clone()]);
-        }
-    }
-
-    /// The same of a piece of a column that begins a movement.
-    fn whiten_movement(&self, start: usize, column: &mut [[f64; 3]]) {
-        let mut expected = [0.0; 3];
-        for (value, steps) in column.iter_mut().zip(&self.steps[start..]) {
-            for channel in 0..3 {
-                let [gain, scale] = steps[channel];
-                let innovation = value[channel] - expected[channel];
-                expected[channel] += gain * innovation;
-                value[channel] = scale * innovation;
-            }
-        }
     }
 
     /// The sum of squares of a whitened column that is `raw` in a range and zero elsewhere.
@@ -136,38 +113,32 @@ impl Filter {
         sum
     }
 
-    /// Many columns side by side, whitened: `rows` holds three rows of `width` for each mean.
-    pub(super) fn whiten_rows(&self, rows: &mut [f64], width: usize) {
-        for movement in &self.movements {
-            let mut expected = vec![0.0; 3 * width];
-            for at in movement.clone() {
-                for channel in 0..3 {
-                    let [gain, scale] = self.steps[at][channel];
-                    let row = &mut rows[(3 * at + channel) * width..][..width];
-                    let expected = &mut expected[channel * width..][..width];
-                    for (x, m) in row.iter_mut().zip(expected) {
-                        let innovation = *x - *m;
-                        *m += gain * innovation;
-                        *x = scale * innovation;
-                    }
+    /// Innovations of the rows of a movement that begins at this mean, over their standard deviations.
+    pub(super) fn whiten(&self, start: usize, rows: &mut [Row]) {
+        let mut expected = [[0.0; WIDTH]; 3];
+        for (steps, row) in self.steps[start..].iter().zip(rows) {
+            for channel in 0..3 {
+                let [gain, scale] = steps[channel];
+                for (x, expected) in row[channel].iter_mut().zip(&mut expected[channel]) {
+                    let innovation = *x - *expected;
+                    *expected += gain * innovation;
+                    *x = scale * innovation;
                 }
             }
         }
     }
 
-    /// The transposed of [`whiten_rows`](Self::whiten_rows).
-    pub(super) fn whiten_rows_back(&self, rows: &mut [f64], width: usize) {
+    /// The transposed of [`whiten`](Self::whiten), of all movements.
+    pub(super) fn whiten_back(&self, rows: &mut [Row]) {
         for movement in &self.movements {
-            let mut after = vec![0.0; 3 * width];
+            let mut after = [[0.0; WIDTH]; 3];
             for at in movement.clone().rev() {
                 for channel in 0..3 {
                     let [gain, scale] = self.steps[at][channel];
-                    let row = &mut rows[(3 * at + channel) * width..][..width];
-                    let after = &mut after[channel * width..][..width];
-                    for (x, m) in row.iter_mut().zip(after) {
+                    for (x, after) in rows[at][channel].iter_mut().zip(&mut after[channel]) {
                         let scaled = scale * *x;
-                        *x = scaled + gain * *m;
-                        *m = (1.0 - gain) * *m - scaled;
+                        *x = scaled + gain * *after;
+                        *after = (1.0 - gain) * *after - scaled;
                     }
                 }
             }

@@ -3,8 +3,9 @@
 use super::UNDECIDED;
 use super::blocks::Log;
 use super::columns::{Course, FAMILIES, Family, to_reset};
-use super::map::{Curvature, Estimate, UNKNOWNS, WIDTH, prior, products};
-use crate::solve::field::terms::{COUNT, PER_PROBE};
+use super::map::{Estimate, RESIDUAL, Row, UNKNOWNS, WIDTH, solve_all};
+use crate::solve::field::terms::PER_PROBE;
+use crate::solve::gauss_newton::{Factor, Normal};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -33,26 +34,18 @@ pub(super) struct Candidate {
 pub(super) struct Scan<'a> {
     log: &'a Log,
     estimate: &'a Estimate,
-    /// By mean and channel: parameters, lag, residual, faults, whitened backwards.
-    back: Vec<f64>,
-    width: usize,
+    /// The rows of the estimate, whitened backwards.
+    back: Vec<Row>,
 }
 
 impl<'a> Scan<'a> {
     pub(super) fn new(log: &'a Log, estimate: &'a Estimate) -> Self {
-        let faults = &estimate.faults;
-        let width = WIDTH + faults.len();
-        let mut back = Vec::with_capacity(width * estimate.columns.len() / WIDTH);
-        for (place, row) in estimate.columns.chunks_exact(WIDTH).enumerate() {
-            back.extend_from_slice(row);
-            back.extend(faults.iter().map(|fault| fault[place / 3][place % 3]));
-        }
-        estimate.filter.whiten_rows_back(&mut back, width);
+        let mut back = estimate.rows.clone();
+        estimate.filter.whiten_back(&mut back);
         Self {
             log,
             estimate,
             back,
-            width,
         }
     }
 
@@ -77,31 +70,18 @@ impl<'a> Scan<'a> {
                 choices,
             }));
         };
-        if family.ramp {
-            add(Course::Ramp, self.of_column(raw, family, Course::Ramp), 1);
-        }
-        if family.ramp_in_movements {
-            add(
-                Course::RampInMovements,
-                self.of_column(raw, family, Course::RampInMovements),
-                1,
-            );
-        }
-        if family.steps {
-            let apart = (count / ONSETS).max(1);
-            if let Some((from, gain)) = self.onset(raw, std::slice::from_ref(&(0..count)), apart) {
-                add(Course::From(from), Some(gain), count);
-            }
+        add(Course::Ramp, self.of_column(raw, family, Course::Ramp), 1);
+        let apart = (count / ONSETS).max(1);
+        if family.steps
+            && let Some((from, gain)) = self.onset(raw, std::slice::from_ref(&(0..count)), apart)
+        {
+            add(Course::From(from), Some(gain), count);
         }
         if family.to_reset {
-            let least = self
-                .log
-                .movements
-                .iter()
-                .map(|m| m.len())
-                .max()
-                .unwrap_or(1);
-            let apart = (least / ONSETS_IN_MOVEMENT).max(1);
+            let course = Course::RampInMovements;
+            add(course, self.of_column(raw, family, course), 1);
+            let longest = self.log.movements.iter().map(Range::len).max();
+            let apart = (longest.unwrap_or(1) / ONSETS_IN_MOVEMENT).max(1);
             if let Some((from, gain)) = self.onset(raw, &self.log.movements, apart) {
                 add(Course::ToReset(from), Some(gain), count);
             }
@@ -158,9 +138,9 @@ impl<'a> Scan<'a> {
         wanted: impl Fn(usize) -> bool,
         take: &mut impl FnMut(usize, f64),
     ) {
-        let mut sums = vec![0.0; self.width];
+        let mut sums = [0.0; WIDTH];
         for at in range.clone().rev() {
-            self.add(&mut sums, at, raw[at], 1.0);
+            self.add(&mut sums, at, raw[at]);
             if wanted(at) {
                 let squares = self.estimate.filter.squares(raw, &(at..range.end));
                 if let Some(gain) = self.gain(&sums, squares) {
@@ -170,33 +150,26 @@ impl<'a> Scan<'a> {
         }
     }
 
-    fn add(&self, sums: &mut [f64], at: usize, raw: [f64; 3], share: f64) {
-        for (channel, x) in raw.into_iter().enumerate() {
-            let x = x * share;
-            let row = &self.back[(3 * at + channel) * self.width..][..self.width];
-            for (sum, y) in sums.iter_mut().zip(row) {
-                *sum += x * y;
-            }
+    fn add(&self, sums: &mut [f64; WIDTH], at: usize, raw: [f64; 3]) {
+        for (x, row) in raw.into_iter().zip(&self.back[at]) {
+            sums.iter_mut().zip(row).for_each(|(sum, y)| *sum += x * y);
         }
     }
 
     fn of_column(&self, raw: &[[f64; 3]], family: &Family, course: Course) -> Option<f64> {
-        let mut column = super::columns::shaped(self.log, raw, family, course);
-        let mut sums = vec![0.0; self.width];
+        let column = super::columns::shaped(self.log, raw, family, course);
+        let mut sums = [0.0; WIDTH];
         for (at, x) in column.iter().enumerate() {
-            self.add(&mut sums, at, *x, 1.0);
+            self.add(&mut sums, at, *x);
         }
-        self.estimate.filter.whiten(&mut column);
-        self.gain(&sums, column.as_flattened().iter().map(|x| x * x).sum())
+        let squares = self.estimate.filter.squares(&column, &(0..column.len()));
+        self.gain(&sums, squares)
     }
 
     /// What a column gains, by its products with all others and its squares.
-    fn gain(&self, sums: &[f64], squares: f64) -> Option<f64> {
-        let score = sums[UNKNOWNS];
-        let by = DVector::from_iterator(
-            self.width - 1,
-            sums[..UNKNOWNS].iter().chain(&sums[WIDTH..]).copied(),
-        );
+    fn gain(&self, sums: &[f64; WIDTH], squares: f64) -> Option<f64> {
+        let by = DVector::from_column_slice(&sums[..UNKNOWNS + self.estimate.sizes().len()]);
+        let score = sums[RESIDUAL] - by.dot(&self.estimate.step);
         let information = squares - by.dot(&self.estimate.curvature.solve(&by));
         (information > OWN_MIN * squares).then(|| score * score / information)
     }
@@ -243,34 +216,30 @@ pub(super) fn split(log: &Log, estimate: &Estimate) -> Option<Split> {
         ends = pieces.collect();
     }
     let common = estimate.without_faults(PER_PROBE)?;
-    let mut sums = DMatrix::<f64>::zeros(WIDTH, WIDTH);
+    let mut sums = Normal::none();
     let mut best: Option<Split> = None;
     let mut to = ends.pop()?;
     while let Some(from) = ends.pop() {
-        sums += products(&estimate.columns[3 * WIDTH * from..3 * WIDTH * to], &[]);
+        let rows = estimate.rows[from..to].iter();
+        rows.for_each(|row| sums.add_row(row, 1.0));
         to = from;
         if from.min(count - from) < count / PIECES {
             continue;
         }
-        let mut of_second = sums.view((0, 0), (UNKNOWNS, UNKNOWNS)).into_owned();
-        let score = DVector::from_fn(UNKNOWNS, |k, _| {
-            let pull = if k < COUNT {
-                prior(k) * estimate.state.off(k)
-            } else {
-                0.0
-            };
-            sums[(k, UNKNOWNS)] - 0.5 * pull
-        });
-        for k in 0..UNKNOWNS {
-            of_second[(k, k)] += 0.5 * prior(k);
+        let mut of_second = DMatrix::from_fn(UNKNOWNS, UNKNOWNS, |i, j| sums.curvature(i, j));
+        let mut score = DVector::from_fn(UNKNOWNS, |k, _| sums.descent(k));
+        for (k, (precision, pull)) in estimate.of_prior().enumerate() {
+            of_second[(k, k)] += 0.5 * precision;
+            score[k] -= 0.5 * pull;
         }
-        let followed = common.solve_all(&of_second);
+        score -= &of_second * &estimate.step;
+        let followed = solve_all(&common, &of_second);
         let mut information = &of_second - &of_second * followed;
         for k in 0..UNKNOWNS {
             // What rounding leaves of directions that neither part shows.
             information[(k, k)] += usual(k) + 1e-6 * of_second[(k, k)];
         }
-        let Some(factor) = Curvature::new(&information, 0.0) else {
+        let Some(factor) = Factor::new(&information, 0.0) else {
             continue;
         };
         let change = factor.solve(&score);

@@ -3,9 +3,10 @@
 //! a beam shows at the probes, which else would be told as lines beside it.
 
 use super::channels::LogSignals;
-use super::residual::Residuals;
+use super::residual::{Error, Residuals, blamed};
 use super::spectrum::{Spectrum, smooth, windows};
 use crate::finding::{Code, Finding, Severity};
+use nalgebra::{Matrix2, Vector2, Vector3};
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -18,201 +19,129 @@ const LOWEST_HZ: f64 = 10.0;
 const OF_MOTION: f64 = 8.0;
 /// Amplitude in parts of the noise of a probe from which a line is worth a warning.
 const WARN_MIN: f64 = 0.3;
-/// Lines that are told, and their least amplitude in parts of the largest.
+/// Lines that are told.
 const LINES_MAX: usize = 5;
-const OF_LARGEST: f64 = 0.05;
-/// Bins on each side of a line that hold what is left of it.
-const WIDTH: usize = 5;
-/// What a beam or gap explains of a line in parts of what a probe would, at least, and how far
-/// its own spectrum may be off that, as a factor.
-const EXPLAINED_MIN: f64 = 0.8;
-const SEEN_FACTOR: f64 = 2.0;
-
-/// A line of one channel: by window the amplitudes of cosine and sine, m.
-struct Line {
-    channel: usize,
-    /// Power of the residuals that it explains, in units of their noise.
-    explained: f64,
-    waves_m: Vec<[f64; 2]>,
-}
-
-impl Line {
-    /// Root mean square over the windows, as an amplitude, m.
-    fn amplitude_m(&self) -> f64 {
-        let squares: f64 = self.waves_m.iter().flatten().map(|m| m * m).sum();
-        (squares / self.waves_m.len().max(1) as f64).sqrt()
-    }
-}
 
 /// Names the lines above the motion, the clearest first.
-pub(super) fn hum(log: &LogSignals, residuals: &Residuals) -> Vec<Finding> {
+pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let longest = log.segments.iter().map(Range::len).max().unwrap_or(0);
     let length = smooth(log.rows_in(WINDOW_S).min(longest));
-    if length < ROWS_MIN {
-        return Vec::new();
-    }
     let mut windows = windows(&log.segments, length);
     // A mean over windows without residuals would be told as if all of them had gone in.
     windows.retain(|window| log.is_mostly_used(window));
-    if windows.is_empty() {
+    if length < ROWS_MIN || windows.is_empty() {
         return Vec::new();
     }
-    let raw: Vec<Spectrum> = (log.channels.iter())
-        .map(|channel| Spectrum::new(&channel.values, &windows))
-        .collect();
-    let per_bin_hz = 1.0 / (length as f64 * log.period_s);
+    let spectrum = |values: &Vec<f64>| Spectrum::new(values, &windows);
+    let raw: Vec<Spectrum> = log.channels.iter().map(|c| spectrum(&c.values)).collect();
+    let bins_in_hz = length as f64 * log.period_s;
     let motion = raw[3..6].iter().map(Spectrum::highest).max().unwrap_or(0);
-    let lowest_hz = (OF_MOTION * motion as f64 * per_bin_hz).max(LOWEST_HZ);
-    let lowest = ((lowest_hz / per_bin_hz) as usize).max(4);
+    let lowest = (OF_MOTION * motion as f64).max(LOWEST_HZ * bins_in_hz) as usize;
 
     let mut left = residuals.values.clone();
     let mut findings = Vec::new();
-    let mut largest_m = 0.0;
-    let mut told: Vec<usize> = Vec::new();
-    for _ in 0..2 * LINES_MAX {
-        let spectra = left
-            .each_ref()
-            .map(|values| Spectrum::new(values, &windows));
+    while findings.len() < LINES_MAX {
+        let spectra = left.each_ref().map(spectrum);
         let lines = (0..3).filter_map(|k| Some((k, spectra[k].clearest_line(lowest)?)));
         let Some((probe, (bin, _))) = lines.max_by(|a, b| a.1.1.total_cmp(&b.1.1)) else {
             break;
         };
-        let cycles_per_row = spectra[probe].cycles_per_row(bin);
-        let line = source(log, residuals, &left, &windows, &raw, bin, cycles_per_row);
-        let Some(line) = line else { break };
-        take_out(log, residuals, &mut left, &windows, cycles_per_row, &line);
         let shown_m = spectra[probe].amplitude(bin);
-        if shown_m < OF_LARGEST * largest_m || told.iter().any(|at| at.abs_diff(bin) <= WIDTH) {
-            continue;
-        }
-        told.push(bin);
-        largest_m = shown_m.max(largest_m);
-        let severity = if shown_m < WARN_MIN * residuals.noise_m[probe] {
-            Severity::Note
-        } else {
-            Severity::Warn
-        };
-        let frequency_hz = cycles_per_row / log.period_s;
-        findings.push(finding(log, &line, frequency_hz, severity));
-        if findings.len() == LINES_MAX {
+        let cycles_per_row = spectra[probe].cycles_per_row(bin);
+        let lines = Lines::new(log, residuals, &left, &windows, cycles_per_row);
+        let Some(line) = blamed(&lines.errors(), |channel| raw[channel].amplitude(bin)) else {
             break;
-        }
+        };
+        lines.take_out(log, residuals, &mut left, line.channel);
+        let name = log.channels[line.channel].name;
+        let frequency_hz = cycles_per_row / log.period_s;
+        let message = format!(
+            "{name} hums at {frequency_hz:.1} Hz with an amplitude of {:.2} um: look for mains (50 or 60 Hz and multiples) in \
+             its cable and supply, or for a vibration of that part",
+            line.size_m * 1e6,
+        );
+        let severity = match shown_m < WARN_MIN * residuals.noise_m[probe] {
+            true => Severity::Note,
+            false => Severity::Warn,
+        };
+        let found = log.warning(Code::Hum, message).severe(severity);
+        findings.push(found.on(name).of(frequency_hz, "Hz"));
     }
     findings
 }
 
-fn finding(log: &LogSignals, line: &Line, frequency_hz: f64, severity: Severity) -> Finding {
-    let name = log.channels[line.channel].name;
-    let message = format!(
-        "{name} hums at {frequency_hz:.1} Hz with an amplitude of {:.2} um: look for mains (50 or 60 Hz and multiples) in \
-         its cable and supply, or for a vibration of that part",
-        line.amplitude_m() * 1e6,
-    );
-    Finding {
-        severity,
-        channel: Some(name.to_owned()),
-        value: Some(frequency_hz),
-        unit: Some("Hz"),
-        ..log.warning(Code::Hum, message)
-    }
-}
-
-/// Cosine and sine of a line at a row.
-fn wave(cycles_per_row: f64, row: usize) -> [f64; 2] {
-    let (sin, cos) = libm::sincos(TAU * (cycles_per_row * row as f64).fract());
-    [cos, sin]
-}
-
-/// The channel whose line explains most of the residuals: of beams and gaps only those that show
-/// it themselves, and these before a probe that explains little more.
-fn source(
-    log: &LogSignals,
-    residuals: &Residuals,
-    left: &[Vec<f64>; 3],
-    windows: &[Range<usize>],
-    raw: &[Spectrum],
-    bin: usize,
+/// The lines of one frequency, one of each channel, that explain most of the residuals by themselves.
+struct Lines<'a> {
+    windows: &'a [Range<usize>],
     cycles_per_row: f64,
-) -> Option<Line> {
-    let lines = lines(log, residuals, left, windows, cycles_per_row);
-    let worth = |line: &Line| {
-        let (seen_m, wanted_m) = (raw[line.channel].amplitude(bin), line.amplitude_m());
-        let seen = (wanted_m / SEEN_FACTOR..wanted_m * SEEN_FACTOR).contains(&seen_m);
-        match line.channel {
-            0..3 => EXPLAINED_MIN * line.explained,
-            _ if seen => line.explained,
-            _ => 0.0,
-        }
-    };
-    (lines.into_iter()).max_by(|a, b| worth(a).total_cmp(&worth(b)))
+    /// By channel and window: amplitudes of cosine and sine, m, and what they explain.
+    waves_m: Vec<Vec<(Vector2<f64>, f64)>>,
 }
 
-/// The line of each channel that explains most of the residuals: least squares, by window.
-fn lines(
-    log: &LogSignals,
-    residuals: &Residuals,
-    left: &[Vec<f64>; 3],
-    windows: &[Range<usize>],
-    cycles_per_row: f64,
-) -> Vec<Line> {
-    let mut lines: Vec<Line> = (0..log.channels.len())
-        .map(|channel| Line {
-            channel,
-            explained: 0.0,
-            waves_m: Vec::with_capacity(windows.len()),
-        })
-        .collect();
-    let weight = residuals
-        .noise_m
-        .map(|noise_m| 1.0 / (noise_m * noise_m).max(1e-20));
-    for window in windows {
-        // By channel: cos cos, cos sin, sin sin, cos residual, sin residual.
-        let mut sums = vec![[0.0; 5]; log.channels.len()];
-        for row in window.clone().filter(|&row| log.usable[row]) {
-            let [cos, sin] = wave(cycles_per_row, row);
-            let of_errors = residuals.of_errors(log, row);
-            for (sums, slopes) in sums.iter_mut().zip(&of_errors) {
-                for k in 0..3 {
-                    let by = weight[k] * slopes[k] * slopes[k];
-                    let with = weight[k] * slopes[k] * left[k][row];
-                    let terms = [
-                        by * cos * cos,
-                        by * cos * sin,
-                        by * sin * sin,
-                        with * cos,
-                        with * sin,
-                    ];
-                    (0..5).for_each(|i| sums[i] += terms[i]);
+impl<'a> Lines<'a> {
+    /// Least squares, by window.
+    fn new(
+        log: &LogSignals,
+        residuals: &Residuals,
+        left: &[Vec<f64>; 3],
+        windows: &'a [Range<usize>],
+        cycles_per_row: f64,
+    ) -> Self {
+        let mut lines = Self {
+            windows,
+            cycles_per_row,
+            waves_m: vec![Vec::new(); log.channels.len()],
+        };
+        for window in windows {
+            let mut sums = vec![(Matrix2::zeros(), Vector2::zeros()); log.channels.len()];
+            for row in window.clone().filter(|&row| log.usable[row]) {
+                let wave = lines.wave(row);
+                let left = residuals.over_noise(left.each_ref().map(|left| left[row]));
+                for (sums, slopes) in sums.iter_mut().zip(residuals.of_errors(log, row)) {
+                    sums.0 += wave * wave.transpose() * slopes.norm_squared();
+                    sums.1 += wave * slopes.dot(&left);
                 }
             }
+            for (waves_m, (squares, products)) in lines.waves_m.iter_mut().zip(sums) {
+                let wave_m = squares.try_inverse().unwrap_or_default() * products;
+                waves_m.push((wave_m, wave_m.dot(&products)));
+            }
         }
-        for (line, [cc, cs, ss, c, s]) in lines.iter_mut().zip(sums) {
-            let determinant = (cc * ss - cs * cs).max(f64::MIN_POSITIVE);
-            let waves = [
-                (c * ss - s * cs) / determinant,
-                (s * cc - c * cs) / determinant,
-            ];
-            line.explained += waves[0] * c + waves[1] * s;
-            line.waves_m.push(waves);
-        }
+        lines
     }
-    lines
-}
 
-fn take_out(
-    log: &LogSignals,
-    residuals: &Residuals,
-    left: &mut [Vec<f64>; 3],
-    windows: &[Range<usize>],
-    cycles_per_row: f64,
-    line: &Line,
-) {
-    for (window, waves_m) in windows.iter().zip(&line.waves_m) {
-        for row in window.clone().filter(|&row| log.usable[row]) {
-            let [cos, sin] = wave(cycles_per_row, row);
-            let error_m = waves_m[0] * cos + waves_m[1] * sin;
-            let slopes = residuals.of_errors(log, row)[line.channel];
-            (0..3).for_each(|k| left[k][row] -= slopes[k] * error_m);
+    /// Cosine and sine at a row.
+    fn wave(&self, row: usize) -> Vector2<f64> {
+        let (sin, cos) = libm::sincos(TAU * (self.cycles_per_row * row as f64).fract());
+        Vector2::new(cos, sin)
+    }
+
+    /// The line of each channel, its size as root mean square of the amplitudes over the windows.
+    fn errors(&self) -> Vec<Error> {
+        let of_channel = |(channel, waves): (usize, &Vec<(Vector2<f64>, f64)>)| {
+            let squares: f64 = waves.iter().map(|(wave_m, _)| wave_m.norm_squared()).sum();
+            Error {
+                channel,
+                size_m: (squares / waves.len() as f64).sqrt(),
+                explained: waves.iter().map(|(_, explained)| explained).sum(),
+            }
+        };
+        self.waves_m.iter().enumerate().map(of_channel).collect()
+    }
+
+    fn take_out(
+        &self,
+        log: &LogSignals,
+        residuals: &Residuals,
+        left: &mut [Vec<f64>; 3],
+        channel: usize,
+    ) {
+        for (window, (wave_m, _)) in self.windows.iter().zip(&self.waves_m[channel]) {
+            for row in window.clone().filter(|&row| log.usable[row]) {
+                let error_m = wave_m.dot(&self.wave(row));
+                let shown: Vector3<f64> = residuals.of_errors(log, row)[channel] * error_m;
+                (0..3).for_each(|k| left[k][row] -= shown[k] * residuals.noise_m[k]);
+            }
         }
     }
 }

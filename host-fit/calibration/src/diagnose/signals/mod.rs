@@ -3,31 +3,23 @@
 //!
 //! | module | what it does |
 //! |---|---|
-//! | `channels` | the signals of one log by channel |
-//! | `places` | where in a log something was found |
-//! | `row_by_row` | what rows tell by themselves: the modules that follow, to `frozen` |
+//! | `channels` | the signals of one log by channel, and places in it |
 //! | `timing` | rows missing, uneven times |
-//! | `converters` | flat tops |
+//! | `repeats` | channels that repeat one value: flat tops, frozen registers |
 //! | `still` | movements that stand still, or end in a rest |
-//! | `frozen` | channels that repeat one value |
 //! | `standing` | channels that show no more than their noise |
-//! | `residual` | what a calibration leaves of the Hall signals |
-//! | `blame` | the channel whose error explains that |
+//! | `residual` | what a calibration leaves of the Hall signals, and the channel that explains it |
 //! | `outliers` | rows that jump |
 //! | `spectrum`, `hum` | lines of one frequency |
 //!
 //! Each log is tested alone, and what an earlier test names is left out of the later ones. A
 //! channel is named where it alone explains what was found.
 
-mod blame;
 mod channels;
-mod converters;
-mod frozen;
 mod hum;
 mod outliers;
-mod places;
+mod repeats;
 mod residual;
-mod row_by_row;
 #[cfg(test)]
 mod sample_for_tests;
 mod spectrum;
@@ -42,7 +34,8 @@ use crate::solve::field::parameters::FieldParameters;
 use channels::LogSignals;
 use residual::Residuals;
 
-pub use channels::{period_s, times_s};
+pub use channels::period_s;
+pub(super) use channels::robust_deviation;
 pub use spectrum::{Spectrum, windows};
 
 /// Fewest rows of a log whose residuals are tested.
@@ -78,7 +71,12 @@ fn of_log(
     log: usize,
 ) -> Vec<Finding> {
     let has_reference = dataset.logs[log].has_reference;
-    let mut found = row_by_row::findings(signals, has_reference, stage);
+    let mut found: Vec<Finding> = timing::timing(signals, stage).collect();
+    found.extend(repeats::flat_tops(signals));
+    if has_reference {
+        found.extend(still::rests(signals));
+    }
+    found.extend(repeats::frozen(signals, has_reference));
     if has_reference && signals.len() >= ROWS_MIN {
         if let Some(errors) = errors {
             signals.leave_out_undecoded(errors);
@@ -100,22 +98,18 @@ fn of_residuals(
     signals: &mut LogSignals,
     (parameters, lag_s): (&FieldParameters, f64),
 ) -> Vec<Finding> {
+    let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 3] =
+        [standing::standing, outliers::outliers, hum::hum];
     let mut findings = Vec::new();
-    let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 2] =
-        [standing::standing, outliers::outliers];
-    let Some(mut residuals) = Residuals::new(signals, parameters, lag_s) else {
-        return findings;
-    };
+    let mut residuals = None;
     for test in tests {
-        let found = test(signals, &residuals);
+        residuals = residuals.or_else(|| Residuals::new(signals, parameters, lag_s));
+        let Some(here) = &residuals else { break };
+        let found = test(signals, here);
         if !found.is_empty() {
-            findings.extend(found);
-            match Residuals::new(signals, parameters, lag_s) {
-                Some(again) => residuals = again,
-                None => return findings,
-            }
+            residuals = None;
         }
+        findings.extend(found);
     }
-    findings.extend(hum::hum(signals, &residuals));
     findings
 }

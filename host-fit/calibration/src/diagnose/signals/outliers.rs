@@ -1,9 +1,9 @@
 //! Outliers: single rows far from those before and behind.
 
-use super::blame::blame;
-use super::channels::{LogSignals, median, robust_deviation};
-use super::residual::Residuals;
+use super::channels::{LogSignals, robust_deviation};
+use super::residual::{Error, Residuals, blamed};
 use crate::finding::{Code, Finding};
+use crate::statistics;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -13,149 +13,89 @@ use std::ops::Range;
 const OUTLIER_MIN: f64 = 7.0;
 /// Rows on each side that tell where a row should be.
 const SIDE: usize = 12;
-/// How far a beam or gap is off its neighbours where that is clear, in standard deviations.
-const SEEN_MIN: f64 = 6.0;
-/// Least jump of a beam or gap that is one, m.
-pub(super) const JUMP_MIN_M: f64 = 0.1e-6;
 
 /// Names rows far outside the noise, by channel, and leaves them out.
 pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
-    let signals: &LogSignals = log;
-    let usual_m = (residuals.values.par_iter().zip(residuals.noise_m)).map(|(values, noise_m)| {
-        let off = |(segment, row)| off_sides_m(signals, values, segment, row);
-        let sample = rows(signals).step_by(7).filter_map(off);
-        robust_deviation(sample).max(noise_m)
+    let all: Vec<(&Range<usize>, usize)> = rows(log).collect();
+    let off = |&(segment, row): &(&Range<usize>, usize)| {
+        [0, 1, 2].map(|k| off_m(log, &residuals.values[k], segment, row))
+    };
+    let off_m: Vec<[f64; 3]> = all.par_iter().map(off).collect();
+    let usual_m = [0, 1, 2].map(|k| {
+        let usual_m = robust_deviation(off_m.iter().map(|off_m| off_m[k]));
+        usual_m.max(residuals.noise_m[k])
     });
-    let usual_m: Vec<f64> = usual_m.collect();
-    let usual_m = [0, 1, 2].map(|k| usual_m[k]);
-    let mut found: Vec<(usize, [f64; 3])> = Vec::new();
-    for (segment, row) in rows(log) {
-        // Cheap first: most rows are near their neighbours.
-        let ends = [
-            row.saturating_sub(3).max(segment.start),
-            (row + 3).min(segment.end - 1),
-        ];
-        let far = (0..3).any(|k| {
-            let values = &residuals.values[k];
-            let limit_m = 0.5 * OUTLIER_MIN * usual_m[k];
-            ends.iter()
-                .any(|&end| (values[row] - values[end]).abs() > limit_m)
-        });
-        if !far {
-            continue;
-        }
-        let off_m =
-            [0, 1, 2].map(|k| off_sides_m(log, &residuals.values[k], segment, row).unwrap_or(0.0));
-        if (0..3).any(|k| off_m[k].abs() > OUTLIER_MIN * usual_m[k]) {
-            found.push((row, off_m));
-        }
-    }
-    if found.is_empty() {
-        return Vec::new();
-    }
-    for (row, _) in &found {
+    let is_far = |off_m: &[f64; 3]| (0..3).any(|k| off_m[k].abs() > OUTLIER_MIN * usual_m[k]);
+    let found = all
+        .into_iter()
+        .zip(off_m)
+        .filter(|(_, off_m)| is_far(off_m));
+    let found: Vec<_> = found
+        .map(|((s, row), off_m)| (s.clone(), row, off_m))
+        .collect();
+    for (_, row, _) in &found {
         log.usable[*row] = false;
     }
-    let noise_m: Vec<f64> = (log.channels.iter())
-        .map(|channel| {
-            let off = |(segment, row)| off_neighbours_m(log, &channel.values, segment, row);
-            robust_deviation(rows(log).step_by(7).filter_map(off))
-        })
-        .collect();
-    let mut by_channel: BTreeMap<&'static str, Vec<(usize, f64)>> = BTreeMap::new();
-    for (row, off_m) in found {
-        let Some(segment) = log.segments.iter().find(|segment| segment.contains(&row)) else {
-            continue;
-        };
-        let seen_m: Vec<Option<f64>> = (log.channels.iter().zip(&noise_m))
-            .map(|(channel, noise_m)| {
-                let off_m = off_neighbours_m(log, &channel.values, segment, row)?;
-                (off_m.abs() > JUMP_MIN_M.max(SEEN_MIN * noise_m)).then_some(off_m)
-            })
-            .collect();
-        let blamed = blame(off_m, usual_m, &residuals.of_errors(log, row), &seen_m);
-        let name = log.channels[blamed.channel].name;
-        by_channel
-            .entry(name)
-            .or_default()
-            .push((row, blamed.size_m));
+    let mut by_channel: BTreeMap<&'static str, Vec<(usize, Error)>> = BTreeMap::new();
+    for (segment, row, shown_m) in found {
+        let seen_m = |k: usize| off_line_m(log, &log.channels[k].values, &segment, row);
+        let error = blamed(&residuals.errors(log, row, shown_m), seen_m).unwrap_or_default();
+        let name = log.channels[error.channel].name;
+        by_channel.entry(name).or_default().push((row, error));
     }
-    by_channel
-        .into_iter()
-        .map(|(name, rows)| finding(log, name, &rows))
-        .collect()
+    let of_channel = |(name, rows): (&'static str, Vec<_>)| finding(log, name, &rows);
+    by_channel.into_iter().map(of_channel).collect()
 }
 
-fn finding(log: &LogSignals, name: &str, outliers: &[(usize, f64)]) -> Finding {
-    let largest_m = (outliers.iter()).fold(0.0, |most: f64, (_, size_m)| most.max(size_m.abs()));
+fn finding(log: &LogSignals, name: &str, outliers: &[(usize, Error)]) -> Finding {
+    let sizes_m = outliers.iter().map(|(_, error)| error.size_m.abs());
     let rows: Vec<usize> = outliers.iter().map(|(row, _)| *row).collect();
+    let count = rows.len();
     let message = format!(
-        "{} of {name} far outside the noise, by up to {:.1} um: {}. A fit with --loss cauchy, the default, leaves \
+        "{count} {} of {name} far outside the noise, by up to {:.1} um: {}. A fit with --loss cauchy, the default, leaves \
          them out of account; look for lost pulses, sparks and bits",
-        if rows.len() == 1 {
-            "1 row".to_owned()
-        } else {
-            format!("{} rows", rows.len())
-        },
-        largest_m * 1e6,
+        if count == 1 { "row" } else { "rows" },
+        sizes_m.fold(0.0, f64::max) * 1e6,
         log.places(&rows),
     );
-    Finding {
-        channel: Some(name.to_owned()),
-        value: Some(rows.len() as f64),
-        unit: Some("rows"),
-        ..log.warning_at(Code::Outliers, rows[0], message)
-    }
+    let found = log.warning_at(Code::Outliers, rows[0], message);
+    found.on(name).of(count as f64, "rows")
 }
 
-/// The usable rows, each with its segment.
+/// The usable rows, each with its movement.
 fn rows<'s>(log: &'s LogSignals) -> impl Iterator<Item = (&'s Range<usize>, usize)> {
     let of = |segment: &'s Range<usize>| segment.clone().map(move |row| (segment, row));
     (log.segments.iter().flat_map(of)).filter(|(_, row)| log.usable[*row])
 }
 
-/// How far a row is from the median of the rows before it, or from that of the rows behind it,
-/// whichever is nearer: a row beside a step is no outlier.
-fn off_sides_m(
-    log: &LogSignals,
-    values: &[f64],
-    segment: &Range<usize>,
-    row: usize,
-) -> Option<f64> {
+/// How far a row is from the median of those before it, or from that of those behind it, whichever is
+/// nearer: beside a step, or on the way from one level to another, is no outlier.
+fn off_m(log: &LogSignals, values: &[f64], segment: &Range<usize>, row: usize) -> f64 {
     let off = |rows: Range<usize>| {
-        let mut side: Vec<f64> = (rows.filter(|&r| log.usable[r]))
-            .map(|r| values[r])
-            .collect();
-        (side.len() >= SIDE / 2).then(|| values[row] - median(&mut side))
+        let used = rows.filter(|&row| log.usable[row]);
+        Some(
+            values[row] - statistics::median(&mut used.map(|row| values[row]).collect::<Vec<_>>())?,
+        )
     };
     let before = off(row.saturating_sub(SIDE).max(segment.start)..row);
     let behind = off(row + 1..(row + 1 + SIDE).min(segment.end));
     match (before, behind) {
-        // On the way from one to the other.
-        (Some(before), Some(behind)) if before * behind < 0.0 => Some(0.0),
-        (Some(before), Some(behind)) if before.abs() > behind.abs() => Some(behind),
-        (before, behind) => before.or(behind),
+        (Some(before), Some(behind)) if before * behind < 0.0 => 0.0,
+        (Some(before), Some(behind)) if before.abs() > behind.abs() => behind,
+        (before, behind) => before.or(behind).unwrap_or(0.0),
     }
 }
 
-/// How far a row is off the line through its usable neighbours, m.
-fn off_neighbours_m(
-    log: &LogSignals,
-    values: &[f64],
-    segment: &Range<usize>,
-    row: usize,
-) -> Option<f64> {
-    let before = (segment.start..row).rev().find(|&r| log.usable[r]);
-    let behind = (row + 1..segment.end).find(|&r| log.usable[r]);
-    match (before, behind) {
-        (Some(before), Some(behind)) => {
-            let [t0, t, t1] = [before, row, behind].map(|row| log.time_s[row]);
-            let share = (t - t0) / (t1 - t0).max(1e-6);
-            Some(values[row] - values[before] - share * (values[behind] - values[before]))
-        }
-        (Some(one), None) | (None, Some(one)) => Some(values[row] - values[one]),
-        (None, None) => None,
-    }
+/// How far a row is off the line through the used rows beside it, m.
+fn off_line_m(log: &LogSignals, values: &[f64], segment: &Range<usize>, row: usize) -> f64 {
+    let before = (segment.start..row).rev().find(|&row| log.usable[row]);
+    let behind = (row + 1..segment.end).find(|&row| log.usable[row]);
+    let (before, behind) = (
+        before.or(behind).unwrap_or(row),
+        behind.or(before).unwrap_or(row),
+    );
+    let share = row.abs_diff(before) as f64 / before.abs_diff(behind).max(1) as f64;
+    values[row] - values[before] - share * (values[behind] - values[before])
 }
 
 #[cfg(test)]

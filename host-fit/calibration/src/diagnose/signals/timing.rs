@@ -1,7 +1,6 @@
 //! Rows missing, and rows at uneven times or another rate.
 
 use super::channels::LogSignals;
-use super::places::{Place, Told};
 use crate::finding::{Code, Finding, Severity};
 use crate::input::stage::Stage;
 
@@ -14,181 +13,118 @@ const RATE_MIN: f64 = 0.005;
 const THINNED_FROM: f64 = 5.0;
 /// Share of missing rows from which they are worth a warning.
 const MISSING_MIN: f64 = 1e-3;
-/// Gaps that are told one by one.
-const SHOWN: usize = 3;
 
 /// What the times of rows tell.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Timing {
-    missing: u64,
-    longest: u32,
-    gaps: usize,
-    /// The first of them.
-    shown: Vec<Place>,
-    /// Sum of the squared deviations from even times, s^2, of so many rows.
-    squares: f64,
-    rows: f64,
-    worst_s: f64,
-    worst: Option<Place>,
-    /// Length of the movements, s, and their periods.
-    time_s: f64,
-    periods: f64,
+pub(super) fn timing(log: &LogSignals, stage: &Stage) -> impl Iterator<Item = Finding> {
+    let found = [missing(log), uneven(log), other_rate(log, stage)];
+    found.into_iter().flatten()
 }
 
-impl Timing {
-    /// Of the rows of a log.
-    pub(super) fn of(log: &LogSignals) -> Self {
-        let mut timing = Self::default();
-        timing.look_for_gaps(log);
-        timing.compare_with_even(log);
-        for segment in log.segments.iter().filter(|segment| segment.len() >= 2) {
-            timing.time_s += log.time_s[segment.end - 1] - log.time_s[segment.start];
-            timing.periods += (segment.start + 1..segment.end)
-                .map(|row| f64::from(periods(log, row)))
-                .sum::<f64>();
-        }
-        timing
-    }
-
-    /// What is wrong with them; `period_s` is the median time from row to row.
-    pub(super) fn findings(&self, told: &Told, stage: &Stage, period_s: f64) -> Vec<Finding> {
-        let mut findings = Vec::new();
-        findings.extend(self.of_missing(told));
-        findings.extend(self.of_uneven(told, period_s));
-        findings.extend(self.of_other_rate(told, stage));
-        findings
-    }
-
-    fn look_for_gaps(&mut self, log: &LogSignals) {
-        for segment in &log.segments {
-            for row in segment.start + 1..segment.end {
-                let missed = periods(log, row).saturating_sub(1);
-                if missed > 0 {
-                    self.missing += u64::from(missed);
-                    self.longest = self.longest.max(missed);
-                    self.gaps += 1;
-                    if self.shown.len() < SHOWN {
-                        self.shown.push(log.at(row));
-                    }
-                }
-            }
-        }
-    }
+/// Periods of the log from one row to a later one of its movement.
+fn periods(log: &LogSignals, from: usize, to: usize) -> u32 {
+    let [from, to] = [from, to].map(|row| log.rows[row].frame.sequence());
+    to.wrapping_sub(from)
 }
 
-/// Periods of the log between two rows of a movement.
-fn periods(log: &LogSignals, row: usize) -> u32 {
-    let sequence = |row: usize| log.rows[row].frame.sequence();
-    sequence(row).wrapping_sub(sequence(row - 1))
+/// Time from one row to a later one of its movement, s.
+fn seconds(log: &LogSignals, from: usize, to: usize) -> f64 {
+    (log.rows[to].t_us - log.rows[from].t_us) as f64 * 1e-6
 }
 
-impl Timing {
-    fn of_missing(&self, told: &Told) -> Option<Finding> {
-        let first = self.shown.first()?;
-        let rows = self.missing;
-        let share = rows as f64 / (rows as f64 + told.rows as f64);
-        let severity = if share < MISSING_MIN {
-            Severity::Note
-        } else {
-            Severity::Warn
-        };
-        let message = format!(
-            "{rows} rows are missing ({:.2} %) in {} gaps, the longest of {}; before {}{}: look for frames that the \
+fn missing(log: &LogSignals) -> Option<Finding> {
+    let rows = log.segments.iter().flat_map(|s| s.start + 1..s.end);
+    let missed = |row: usize| periods(log, row - 1, row).saturating_sub(1);
+    let gaps: Vec<usize> = rows.filter(|&row| missed(row) > 0).collect();
+    let longest = gaps.iter().map(|&row| missed(row)).max()?;
+    let rows: f64 = gaps.iter().map(|&row| f64::from(missed(row))).sum();
+    let share = rows / (rows + log.len() as f64);
+    let message = format!(
+        "{rows} rows are missing ({:.2} %) in {} gaps, the longest of {longest}; before {}: look for frames that the \
          recorder lost",
-            share * 100.0,
-            self.gaps,
-            self.longest,
-            told.places(&self.shown),
-            if self.gaps > SHOWN { ", ..." } else { "" },
-        );
-        Some(Finding {
-            severity,
-            value: Some(rows as f64),
-            unit: Some("rows"),
-            ..told.warning_at(Code::RowsMissing, first, message)
-        })
-    }
+        share * 100.0,
+        gaps.len(),
+        log.places(&gaps),
+    );
+    let severity = match share < MISSING_MIN {
+        true => Severity::Note,
+        false => Severity::Warn,
+    };
+    let found = log.warning_at(Code::RowsMissing, gaps[0], message);
+    Some(found.severe(severity).of(rows, "rows"))
+}
 
-    /// Times of the rows against even ones, in each movement.
-    fn compare_with_even(&mut self, log: &LogSignals) {
-        for segment in log.segments.iter().filter(|segment| segment.len() >= 10) {
-            let sequence = |row: usize| {
-                let [first, this] = [segment.start, row].map(|r| log.rows[r].frame.sequence());
-                f64::from(this.wrapping_sub(first))
-            };
-            // A line through the times: a rate that is only another one is not uneven.
-            let n = segment.len() as f64;
-            let mean_k = segment.clone().map(sequence).sum::<f64>() / n;
-            let mean_s = log.time_s[segment.clone()].iter().sum::<f64>() / n;
-            let (mut kk, mut kt) = (0.0, 0.0);
-            for row in segment.clone() {
-                let k = sequence(row) - mean_k;
-                kk += k * k;
-                kt += k * (log.time_s[row] - mean_s);
-            }
-            let period_s = kt / kk;
-            for row in segment.clone() {
-                let off_s = log.time_s[row] - mean_s - period_s * (sequence(row) - mean_k);
-                self.squares += off_s * off_s;
-                self.rows += 1.0;
-                if off_s.abs() > self.worst_s {
-                    (self.worst_s, self.worst) = (off_s.abs(), Some(log.at(row)));
-                }
+/// Times of the rows against even ones, in each movement.
+fn uneven(log: &LogSignals) -> Option<Finding> {
+    let (mut squares, mut rows) = (0.0, 0.0);
+    let mut worst = (0.0, 0);
+    for segment in log.segments.iter().filter(|segment| segment.len() >= 10) {
+        let number = |row: usize| f64::from(periods(log, segment.start, row));
+        // A line through the times: a rate that is only another one is not uneven.
+        let n = segment.len() as f64;
+        let mean_k = segment.clone().map(number).sum::<f64>() / n;
+        let time_s = |row: usize| seconds(log, segment.start, row);
+        let mean_s = segment.clone().map(time_s).sum::<f64>() / n;
+        let (mut kk, mut kt) = (0.0, 0.0);
+        for row in segment.clone() {
+            let k = number(row) - mean_k;
+            kk += k * k;
+            kt += k * (time_s(row) - mean_s);
+        }
+        for row in segment.clone() {
+            let off_s = time_s(row) - mean_s - kt / kk * (number(row) - mean_k);
+            squares += off_s * off_s;
+            if off_s.abs() > worst.0 {
+                worst = (off_s.abs(), row);
             }
         }
+        rows += n;
     }
-
-    fn of_uneven(&self, told: &Told, period_s: f64) -> Option<Finding> {
-        let rms_s = f64::sqrt(self.squares / f64::max(self.rows, 1.0));
-        if rms_s <= JITTER_MIN * period_s {
-            return None;
-        }
-        let worst = self.worst.as_ref()?;
+    let rms_s = (squares / f64::max(rows, 1.0)).sqrt();
+    (rms_s > JITTER_MIN * log.period_s).then(|| {
         let message = format!(
             "rows come at uneven times: {:.0} us rms off an even rate, at most {:.0} us ({}): have the servo's clock start \
-         all converters and stamp the rows",
+             all converters and stamp the rows",
             rms_s * 1e6,
-            self.worst_s * 1e6,
-            told.place(worst),
+            worst.0 * 1e6,
+            log.place(worst.1),
         );
-        Some(Finding {
-            value: Some(rms_s * 1e6),
-            unit: Some("us"),
-            ..told.warning_at(Code::Jitter, worst, message)
-        })
-    }
+        let found = log.warning_at(Code::Jitter, worst.1, message);
+        found.of(rms_s * 1e6, "us")
+    })
+}
 
-    fn of_other_rate(&self, told: &Told, stage: &Stage) -> Option<Finding> {
-        let period_s = self.time_s / self.periods;
-        let servo_periods = period_s / stage.servo_period_s;
-        let is = |count: f64| (servo_periods / count - 1.0).abs() <= RATE_MIN;
-        if !servo_periods.is_finite() || is(1.0) {
-            return None;
-        }
-        let count = servo_periods.round();
-        let severity = match count >= THINNED_FROM && is(count) {
-            true => Severity::Note,
-            false => Severity::Warn,
-        };
-        let rates = format!(
-            "rows are {:.1} us apart, the servo period of stage.toml is {:.1} us",
-            period_s * 1e6,
-            stage.servo_period_s * 1e6,
-        );
-        let message = match is(count) && count >= 2.0 {
-            true => format!(
-                "the log is thinned, to one of {count} servo periods ({rates}): nothing is known of the rows between; log \
-                 every period, or correct servo.period_s"
-            ),
-            false => format!("{rates}: correct servo.period_s, or log every period"),
-        };
-        Some(Finding {
-            severity,
-            value: Some(period_s * 1e6),
-            unit: Some("us"),
-            ..told.warning(Code::Jitter, message)
-        })
+fn other_rate(log: &LogSignals, stage: &Stage) -> Option<Finding> {
+    let ends = log.segments.iter().filter(|segment| segment.len() >= 2);
+    let ends = ends.map(|segment| (segment.start, segment.end - 1));
+    let time_s: f64 = ends.clone().map(|(a, b)| seconds(log, a, b)).sum();
+    let period_s = time_s
+        / ends
+            .map(|(a, b)| f64::from(periods(log, a, b)))
+            .sum::<f64>();
+    let servo_periods = period_s / stage.servo_period_s;
+    let is = |count: f64| (servo_periods / count - 1.0).abs() <= RATE_MIN;
+    if !servo_periods.is_finite() || is(1.0) {
+        return None;
     }
+    let count = servo_periods.round();
+    let severity = match count >= THINNED_FROM && is(count) {
+        true => Severity::Note,
+        false => Severity::Warn,
+    };
+    let rates = format!(
+        "rows are {:.1} us apart, the servo period of stage.toml is {:.1} us",
+        period_s * 1e6,
+        stage.servo_period_s * 1e6,
+    );
+    let message = match is(count) && count >= 2.0 {
+        true => format!(
+            "the log is thinned, to one of {count} servo periods ({rates}): nothing is known of the rows between; log \
+             every period, or correct servo.period_s"
+        ),
+        false => format!("{rates}: correct servo.period_s, or log every period"),
+    };
+    let found = log.warning(Code::Jitter, message).severe(severity);
+    Some(found.of(period_s * 1e6, "us"))
 }
 
 #[cfg(test)]

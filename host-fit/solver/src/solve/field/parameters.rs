@@ -50,7 +50,7 @@ impl FieldParameters {
     }
 
     /// Of the values of A's, B's and C's parameters in a row.
-    pub(super) fn of_values(values: &[f64], places: [[f64; 2]; 3]) -> Self {
+    pub fn of_values(values: &[f64], places: [[f64; 2]; 3]) -> Self {
         let mut probes = [[0.0; PER_PROBE]; 3];
         probes.as_flattened_mut().copy_from_slice(&values[..COUNT]);
         Self { probes, places }
