@@ -52,6 +52,7 @@ pub struct Updates<'u, 's> {
 #[derive(Clone, Debug)]
 pub struct Service {
     ticks_per_s: u32,
+    rezero_settings: ZeroOffsetSettings,
     mailbox: Mailbox,
     /// Token of the re-zero that runs.
     rezero: Option<u8>,
@@ -71,6 +72,7 @@ impl Service {
     pub fn new(ticks_per_s: u32) -> Self {
         Self {
             ticks_per_s,
+            rezero_settings: ZeroOffsetSettings::default(),
             mailbox: Mailbox::default(),
             rezero: None,
             was_refused: false,
@@ -86,6 +88,14 @@ impl Service {
     #[must_use]
     pub const fn recording(mut self, is_on: bool) -> Self {
         self.is_recording = is_on;
+        self
+    }
+
+    /// Re-zeros within the limits of this stage, in place of those of
+    /// [`ZeroOffsetSettings::default`].
+    #[must_use]
+    pub const fn rezeroing_within(mut self, limits: ZeroOffsetSettings) -> Self {
+        self.rezero_settings = limits;
         self
     }
 
@@ -256,7 +266,7 @@ impl Service {
         token: u8,
         servo: &mut PoseTracker<D>,
     ) -> (Outcome, u32) {
-        let mut settings = ZeroOffsetSettings::default();
+        let mut settings = self.rezero_settings;
         if ticks > 0 {
             settings.ticks = ticks;
         }

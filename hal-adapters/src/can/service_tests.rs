@@ -154,6 +154,27 @@ fn a_servo_that_goes_on_ends_a_re_zero_and_leaves_the_zero() {
 }
 
 #[test]
+fn a_stage_that_rests_elsewhere_is_zeroed_within_limits_of_its_own() {
+    let decoder = decoder();
+    let zeroed_within = |vertical_max: [f32; 3]| {
+        let mut stage = Stage::new(&decoder);
+        stage.service = Service::new(TICKS_PER_S).rezeroing_within(ZeroOffsetSettings {
+            vertical_max,
+            ..ZeroOffsetSettings::default()
+        });
+        assert_eq!(
+            stage.ask(Request::ServoOff { seconds: 10 }, 1),
+            Outcome::Done
+        );
+        assert_eq!(stage.ask(REZERO, 2), Outcome::Started);
+        stage.rest(500, 2)
+    };
+    // The codes at rest are those of a stage some nm high and some nrad tilted.
+    assert_eq!(zeroed_within([1e-12; 3]), Some(Outcome::OutOfBounds));
+    assert_eq!(zeroed_within([50e-6; 3]), Some(Outcome::Done));
+}
+
+#[test]
 fn a_re_zero_that_is_too_short_is_refused_at_once() {
     let decoder = decoder();
     let mut stage = Stage::new(&decoder);

@@ -160,7 +160,7 @@ fn the_page_of_a_refused_log_has_its_findings_and_signals_and_does_not_grow_with
         assert!(page.contains("Refused</b>: it does not fit"));
         // One cause, with the cost of the worst.
         assert_eq!(page.matches("<code>channels_swapped</code>").count(), 1);
-        assert!(page.contains("(2 times): 7.25 times the noise in service"));
+        assert!(page.contains("(2 times): left as it is, 7.25 times the noise in service"));
         assert!(page.contains("Hall A &amp; B (cost 3.0)"));
         assert!(page.contains("a line is cut") && !page.contains("uncertainty, k = 2"));
         // Signals, and errors with the designed values.

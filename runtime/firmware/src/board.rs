@@ -8,6 +8,7 @@ use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use hal_adapters::adc::{Channels, FrameSampler};
 use hal_adapters::can::status::{bit, board_check};
 use hal_adapters::can::update::Key;
+use runtime::zero_offset::ZeroOffsetSettings;
 use stm32f4xx_hal::gpio::{Input, Output, PA4, PB0, PB1, PC1, PinState, Pull, Speed};
 use stm32f4xx_hal::pac::{CAN1, DMA2, GPIOA, GPIOB, GPIOC, SPI1};
 use stm32f4xx_hal::prelude::*;
@@ -101,6 +102,12 @@ pub const CAN_PRESCALER: u16 = 3;
 /// shortened at most, to follow other nodes.
 pub const fn can_bit_timing(crystal: bool) -> (u8, u8, u8) {
     if crystal { (11, 2, 1) } else { (9, 4, 4) }
+}
+
+/// What still counts as rest at the zero. A stage whose servo is off may rest lower than it floats, or
+/// tilted: then `vertical_max` is to hold where it rests, and so must the range of its calibration.
+pub fn rezero_limits() -> ZeroOffsetSettings {
+    ZeroOffsetSettings::default()
 }
 
 /// Longest serial number, as in [`runtime::parameters::Text`].

@@ -205,6 +205,7 @@ mod app {
     ) -> &'static mut Node<'static> {
         let layout = Layout::for_bits(Converter::CODE_BITS);
         let node = Node::new(parameters, by_fault, layout, identity);
+        let node = node.rezeroing_within(board::rezero_limits());
         place.write(node.recording(cfg!(feature = "record")))
     }
 

@@ -17,6 +17,7 @@ use hal_adapters::can::table::{Message, SLOW_TICKS};
 use hal_adapters::can::update::{Identity, Nonce, Receiver, Store};
 use hal_adapters::can::{Layout, PROTOCOL_VERSION, PoseSender, Service, sensor};
 use runtime::tracker::Health;
+use runtime::zero_offset::ZeroOffsetSettings;
 use runtime::{AnyDecoder, PlanarPose, PoseTracker, RawFrame, Reading, Status};
 use state::state_of;
 
@@ -102,6 +103,15 @@ impl<'d> Node<'d> {
     pub fn recording(self, is_on: bool) -> Self {
         Self {
             service: self.service.recording(is_on),
+            ..self
+        }
+    }
+
+    /// Re-zeros within the limits of this stage.
+    #[must_use]
+    pub fn rezeroing_within(self, limits: ZeroOffsetSettings) -> Self {
+        Self {
+            service: self.service.rezeroing_within(limits),
             ..self
         }
     }
