@@ -12,7 +12,7 @@
 //! | ID | 0x00 | 0x28xx | upper byte checked: eight channels |
 //! | STATUS | 0x01 | 0x0500 | twice a tick: upper byte 0x01, apart from the bit that marks a resynchronisation; lower byte one ready bit per channel |
 //! | MODE | 0x02 | 0x0510 | 0x2110: the reset flag is cleared, so a later reset shows; the part checks its registers |
-//! | CLOCK | 0x03 | 0xFF0E | channels that are read, oversampling 128, high resolution |
+//! | CLOCK | 0x03 | 0xFF0E | channels that are read, oversampling 256, high resolution |
 //! | the others | 0x04 to 0x30 | | as after reset |
 //!
 //! **Which conversion is read.** CLKIN is 8.000 MHz: the modulators run at 4 MHz and a conversion
@@ -31,8 +31,8 @@
 //!    frame carries it.
 //!
 //! This holds whichever way the part goes, with gaps of 1 to 8 us before each frame of 23 us (5 us if it
-//! takes 30), and if the first begins 3 us early or late. The codes are the mean, weighted by the sinc3 filter, of the 192 us
-//! before: the middle is 160 or 171 us after the trigger, and [`SAMPLE_US`](FrameSampler::SAMPLE_US) =
+//! takes 30), and if the first begins 3 us early or late. The codes are the mean, weighted by the sinc3
+//! filter, of the 192 us before: the middle is 160 or 171 us after the trigger, and [`SAMPLE_US`](FrameSampler::SAMPLE_US) =
 //! 166 us is within 6 us of both (0.03 um at the fastest motion of a service log, 4.8 mm/s).
 //!
 //! The pulse must be shorter than 2048 periods of CLKIN, 256 us; a longer one is a reset. The part

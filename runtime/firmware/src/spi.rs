@@ -22,7 +22,7 @@ const RECEIVED: u32 = 1 << 5;
 const ERRORS: u32 = 1 << 3 | 1 << 25;
 /// Bits of DMA_LIFCR: all of stream 0, and all of stream 3.
 const ALL_FLAGS: u32 = 0b11_1101 | 0b11_1101 << 22;
-/// Looks until a transfer is given up: 0.5 ms, if a look takes no more than four cycles. A
+/// Looks until a transfer is given up. A look takes four cycles at least: 0.5 ms or more, where a
 /// transfer of 30 bytes takes 23 us.
 const LOOKS: u32 = CORE_HZ / 4 / 2000;
 

@@ -195,8 +195,9 @@ fn an_ads8688_is_sampled_where_its_driver_says() {
     }
 }
 
-/// The sweep of the bring-up page: a constant input of 10,000 codes, read from 40 to 200 us after the
-/// trigger. From 120 us on every variant gives the code; before, some give 17 or 84 % of it.
+/// The sweep of the bring-up page: a constant input of 10,000 codes, read from 40 to 240 us after the
+/// trigger. From 190 to 215 us every variant gives the code; before, some give 17 or 84 % of it, and
+/// before and after some give none.
 #[test]
 fn a_constant_input_shows_from_when_on_codes_are_settled() {
     const CODE: i32 = 10_000;
