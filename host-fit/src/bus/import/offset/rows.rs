@@ -1,0 +1,127 @@
+//! Ticks beside the reference: rows of a fit, and what the designed probes explain of the signals.
+
+use super::{Clocks, EXPLAINED_MIN, Records};
+use crate::bus::import::ImportError;
+use crate::bus::import::join::{At, at};
+use crate::bus::import::node_clock::Tick;
+use crate::solve::field::blocks::{FieldRow, Rows};
+use runtime::capacitive::{vertical_pose, vertical_rows};
+use runtime::model::dot;
+
+/// A tick with its reference.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    pub(super) tick: Tick,
+    pub(super) movement: i64,
+    /// X, Y, Rz: m, m, rad.
+    pub(super) pose: [f64; 3],
+}
+
+impl Records<'_> {
+    /// The rows of the fit, with the speed of the reference.
+    pub(super) fn field_rows(&self, rows: &[Row], clocks: &Clocks) -> Rows {
+        let hall_mm = self.stage.hall.m_per_count * 1e3;
+        let gap_m = self.stage.capacitive.m_per_count;
+        // A checked stage has its sensors in a triangle.
+        let vertical = vertical_rows(&self.stage.capacitive_probes_m).unwrap_or_default();
+        let mut used = Vec::with_capacity(rows.len());
+        let mut movements = Vec::new();
+        for movement in rows.chunk_by(|a, b| a.movement == b.movement) {
+            let first = used.len();
+            used.extend(movement.iter().filter_map(|row| {
+                let t_us = clocks.on_reference_us(row.tick.t_us);
+                let half_us = self.period_us / 2.0;
+                let (before, after) = (self.at(t_us - half_us)?, self.at(t_us + half_us)?);
+                let per_second = 1e9 / self.period_us;
+                (before.0 == after.0).then(|| FieldRow {
+                    time_s: 1e-6 * (row.tick.t_us - clocks.middle_us),
+                    signal_mm: row.tick.hall.map(|code| hall_mm * f64::from(code)),
+                    vertical: vertical_pose(
+                        &vertical,
+                        row.tick.capacitive.map(|code| gap_m * f64::from(code)),
+                    )
+                    .to_array(),
+                    reference_mm: row.pose.map(|q| q * 1e3),
+                    rate_mm_per_s: [0, 1, 2].map(|k| (after.1[k] - before.1[k]) * per_second),
+                    weight: 1.0,
+                })
+            }));
+            if used.len() > first {
+                movements.push(first..used.len());
+            }
+        }
+        Rows::of_movements(used, movements)
+    }
+
+    /// The ticks that have a reference.
+    pub(super) fn rows(&self, ticks: &[Tick], clocks: &Clocks) -> Vec<Row> {
+        let row = |tick: &Tick| {
+            let (movement, pose) = self.at(clocks.on_reference_us(tick.t_us))?;
+            Some(Row {
+                tick: *tick,
+                movement,
+                pose,
+            })
+        };
+        ticks.iter().filter_map(row).collect()
+    }
+
+    /// Movement and pose at a time of the reference.
+    fn at(&self, t_us: f64) -> Option<(i64, [f64; 3])> {
+        let At::Found {
+            movement, values, ..
+        } = at(self.samples, t_us, 2.0 * self.period_us)
+        else {
+            return None;
+        };
+        let [x, second, third] = [0, 1, 2].map(|k| values[k] * self.scale[k]);
+        let pose = match self.is_beams {
+            true => {
+                let rz = ((second - third) / self.stage.y_baseline_m).atan();
+                [x, 0.5 * (second + third), rz]
+            }
+            false => [x, second, third],
+        };
+        Some((movement, pose))
+    }
+
+    /// What the designed probes explain of the signals' motion, each with a factor for all rows and a
+    /// constant for each movement, and that motion; codes squared.
+    pub(super) fn explained(&self, rows: &[Row]) -> [f64; 2] {
+        let mut sums = [[0.0; 3]; 3];
+        for movement in rows.chunk_by(|a, b| a.movement == b.movement) {
+            for (k, [ss, sp, pp]) in sums.iter_mut().enumerate() {
+                let n = movement.len() as f64;
+                let pair = |row: &Row| [f64::from(row.tick.hall[k]), dot(&self.plane[k], row.pose)];
+                let [signal, probe] =
+                    [0, 1].map(|i| movement.iter().map(|row| pair(row)[i]).sum::<f64>() / n);
+                for row in movement {
+                    let [s, p] = pair(row);
+                    let (s, p) = (s - signal, p - probe);
+                    *ss += s * s;
+                    *sp += s * p;
+                    *pp += p * p;
+                }
+            }
+        }
+        sums.iter()
+            .fold([0.0; 2], |[explained, motion], [ss, sp, pp]| {
+                // A probe that reads against its designed sense explains nothing.
+                let is_sound = *sp > 0.0 && *pp > 0.0;
+                let own = if is_sound { sp * sp / pp } else { 0.0 };
+                [explained + own, motion + ss]
+            })
+    }
+
+    /// The share of the motion that is explained, if it is enough.
+    pub(super) fn share(&self, rows: &[Row]) -> Result<f64, ImportError> {
+        let [explained, motion] = self.explained(rows);
+        match explained / motion {
+            share if share >= EXPLAINED_MIN => Ok(share),
+            share => Err(ImportError::NoOffset {
+                percent: 100.0 * share.max(0.0),
+                least_percent: 100.0 * EXPLAINED_MIN,
+            }),
+        }
+    }
+}
