@@ -144,12 +144,12 @@ impl Codes {
         let rounded = |codes: [f64; 3]| codes.map(|code| code.round() as i32);
         let [x, y, rz, z, rx, ry] = pose;
         let mut hall = [0.0; 3];
-        let mut frame = RawFrame {
-            hall: [0; 3],
-            capacitive: rounded(codes(&self.capacitive_per_vertical, [z, rx, ry])),
-            sequence: 0,
-            time_us: 0,
-        };
+        let mut frame = RawFrame::new(
+            [0; 3],
+            rounded(codes(&self.capacitive_per_vertical, [z, rx, ry])),
+            0,
+            0,
+        );
         for _ in 0..STEPS {
             let reading = self.decoder.decode(&frame, &PlanarPose::ZERO);
             let Some(read) = reading.planar() else { break };

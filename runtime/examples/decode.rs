@@ -21,12 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let set = ParameterSet::from_bytes(&std::fs::read(path)?)?;
     println!("stage {:?}, {}", set.serial.as_str(), set.model);
     let decoder = set.decoder();
-    let frame = RawFrame {
-        hall: [a, b, c],
-        capacitive: [g1, g2, g3],
-        sequence: 0,
-        time_us: 0,
-    };
+    let frame = RawFrame::new([a, b, c], [g1, g2, g3], 0, 0);
     let reading = decoder.decode(&frame, &PlanarPose::ZERO);
 
     match reading.planar() {

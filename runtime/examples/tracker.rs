@@ -11,12 +11,7 @@ use std::error::Error;
 /// Stands for the converters: a stage at rest near its zero, and one Hall code lost in period 255.
 fn converters(period: u32) -> RawFrame {
     let hall_b = if period == 255 { MISSING_CODE } else { 90 };
-    RawFrame {
-        hall: [120, hall_b, 70],
-        capacitive: [300, -200, 100],
-        sequence: period,
-        time_us: 2000 * period,
-    }
+    RawFrame::new([120, hall_b, 70], [300, -200, 100], period, 2000 * period)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -90,7 +90,7 @@ impl<D: Decode + ?Sized> Decode for &D {
 /// assert_eq!(decoder.probes()[0].eta, 0.87);
 ///
 /// // Z by the capacitive codes, or known by other means: the same planar pose.
-/// let frame = RawFrame { hall: [1200, 900, 700], capacitive: [300, -200, 100], sequence: 0, time_us: 0 };
+/// let frame = RawFrame::new([1200, 900, 700], [300, -200, 100], 0, 0);
 /// let by_codes = decoder.decode(&frame, &PlanarPose::ZERO);
 /// let by_pose = decoder.decode_at(frame.hall, by_codes.pose.vertical, &PlanarPose::ZERO);
 /// assert_eq!(by_codes, by_pose);

@@ -28,12 +28,7 @@ pub(super) fn changed(
 }
 
 pub(super) fn frame(hall: [i32; 3], capacitive: [i32; 3]) -> RawFrame {
-    RawFrame {
-        hall,
-        capacitive,
-        sequence: 0,
-        time_us: 0,
-    }
+    RawFrame::new(hall, capacitive, 0, 0)
 }
 
 pub(super) fn decode(decoder: &Linear, hall: [i32; 3], capacitive: [i32; 3]) -> Reading {

@@ -24,6 +24,33 @@ pub struct RawFrame {
     pub sequence: u32,
     /// When the codes were sampled, in us, wrapping (after 71 minutes).
     pub time_us: u32,
+    /// Temperature of the magnets' mount and of the stage body at the Hall elements, in m degC,
+    /// held from the last measurement; [`MISSING_CODE`] where there is none.
+    pub temperature_mc: [i32; 2],
+}
+
+impl RawFrame {
+    /// A frame without temperatures.
+    #[inline(always)]
+    pub const fn new(hall: [i32; 3], capacitive: [i32; 3], sequence: u32, time_us: u32) -> Self {
+        Self {
+            hall,
+            capacitive,
+            sequence,
+            time_us,
+            temperature_mc: [MISSING_CODE; 2],
+        }
+    }
+
+    /// The same frame with the temperatures of mount and body, m degC.
+    #[inline(always)]
+    #[must_use]
+    pub const fn with_temperature_mc(self, temperature_mc: [i32; 2]) -> Self {
+        Self {
+            temperature_mc,
+            ..self
+        }
+    }
 }
 
 /// The codes that a sensor can plausibly give: both ends belong to it.

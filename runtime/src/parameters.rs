@@ -20,7 +20,7 @@ pub type Text = String<32>;
 /// # fn main() -> Result<(), runtime::BlobError> {
 /// let set = ParameterSet::from_bytes(BLOB)?; // or `from_flash`, where padding follows
 /// set.expect_serial("HS-0007")?;
-/// let frame = RawFrame { hall: [1200, 900, 700], capacitive: [300, -200, 100], sequence: 0, time_us: 0 };
+/// let frame = RawFrame::new([1200, 900, 700], [300, -200, 100], 0, 0);
 /// let reading = set.decoder().decode(&frame, &PlanarPose::ZERO);
 /// assert!(reading.status.is_good());
 /// # Ok(())

@@ -38,7 +38,7 @@ struct Sample {
 /// let decoder = ParameterSet::from_bytes(BLOB)?.decoder();
 /// let mut tracker = PoseTracker::new(decoder, OnInvalid::Zero);
 /// let mut predictor = Predictor::new(4_000); // two periods of 2 ms
-/// # let mut read_frame = |k: u32| RawFrame { hall: [12 * k as i32, 90, 70], capacitive: [0; 3], sequence: k, time_us: 2_000 * k };
+/// # let mut read_frame = |k: u32| RawFrame::new([12 * k as i32, 90, 70], [0; 3], k, 2_000 * k);
 /// for period in 0..8 {
 ///     let frame = read_frame(period);
 ///     let reading = tracker.tick(&frame);

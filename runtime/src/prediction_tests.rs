@@ -13,12 +13,7 @@ extern crate std;
 const AGE_MAX_US: u16 = 4_000;
 
 fn frame(time_us: u32) -> RawFrame {
-    RawFrame {
-        hall: [0; 3],
-        capacitive: [0; 3],
-        sequence: 0,
-        time_us,
-    }
+    RawFrame::new([0; 3], [0; 3], 0, time_us)
 }
 
 fn reading(pose: [f32; 3]) -> Reading {

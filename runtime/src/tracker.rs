@@ -55,7 +55,7 @@ pub struct Health {
 /// # fn main() -> Result<(), runtime::BlobError> {
 /// let decoder = ParameterSet::from_bytes(BLOB)?.decoder();
 /// let mut tracker = PoseTracker::new(decoder, OnInvalid::Hold { ticks: 2 });
-/// let mut frame = RawFrame { hall: [1200, 900, 700], capacitive: [300, -200, 100], sequence: 1, time_us: 0 };
+/// let mut frame = RawFrame::new([1200, 900, 700], [300, -200, 100], 1, 0);
 /// let good = tracker.tick(&frame);
 ///
 /// (frame.hall[0], frame.sequence) = (MISSING_CODE, 2);

@@ -6,12 +6,7 @@ use crate::frame::MISSING_CODE;
 use crate::sample;
 
 fn frame(sequence: u32) -> RawFrame {
-    RawFrame {
-        hall: [1200, 900, 700],
-        capacitive: [300, -200, 100],
-        sequence,
-        time_us: 0,
-    }
+    RawFrame::new([1200, 900, 700], [300, -200, 100], sequence, 0)
 }
 
 fn bad_hall(sequence: u32) -> RawFrame {

@@ -70,12 +70,7 @@ const fn bent(per_z2_m2: f32) -> Decoder<Bent> {
 
 /// At Z = 0.1 mm.
 fn frame(sequence: u32) -> RawFrame {
-    RawFrame {
-        hall: [1000, -500, 250],
-        capacitive: [10_000, 0, 0],
-        sequence,
-        time_us: 0,
-    }
+    RawFrame::new([1000, -500, 250], [10_000, 0, 0], sequence, 0)
 }
 
 fn first_reading(decoder: &dyn Decode) -> Reading {

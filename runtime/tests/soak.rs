@@ -183,12 +183,12 @@ fn frame(n: u32, sequence: u32) -> RawFrame {
         let phase = (n % period) as i32 * 4 * amplitude / period as i32;
         (phase - 2 * amplitude).abs() - amplitude
     };
-    RawFrame {
-        hall: [swing(997, 400), swing(1009, 400), swing(1013, 400)],
-        capacitive: [swing(499, 2000), swing(503, 2000), swing(509, 2000)],
+    RawFrame::new(
+        [swing(997, 400), swing(1009, 400), swing(1013, 400)],
+        [swing(499, 2000), swing(503, 2000), swing(509, 2000)],
         sequence,
-        time_us: n.wrapping_mul(2_000),
-    }
+        n.wrapping_mul(2_000),
+    )
 }
 
 /// Runs a stage for so many ticks, from a sequence number that wraps on the way.

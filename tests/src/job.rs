@@ -243,12 +243,12 @@ pub fn to_words<M: Bare>(decoder: &Decoder<M>, zero: &PlanarPose<f32>, put: &mut
 
 /// The frame of these words.
 pub const fn frame([a, b, c, g1, g2, g3, sequence]: [u32; FRAME_WORDS]) -> RawFrame {
-    RawFrame {
-        hall: [a as i32, b as i32, c as i32],
-        capacitive: [g1 as i32, g2 as i32, g3 as i32],
+    RawFrame::new(
+        [a as i32, b as i32, c as i32],
+        [g1 as i32, g2 as i32, g3 as i32],
         sequence,
-        time_us: 0,
-    }
+        0,
+    )
 }
 
 /// The words of a frame.

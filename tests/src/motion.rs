@@ -94,12 +94,12 @@ pub fn uniform_frames(rng: &mut impl Rng, frames: usize) -> Vec<RawFrame> {
             1 => 3,
             _ => 1,
         });
-        RawFrame {
-            hall: std::array::from_fn(|_| code(rng)),
-            capacitive: std::array::from_fn(|_| code(rng)),
+        RawFrame::new(
+            std::array::from_fn(|_| code(rng)),
+            std::array::from_fn(|_| code(rng)),
             sequence,
-            time_us: 0,
-        }
+            0,
+        )
     };
     (0..frames).map(frame).collect()
 }

@@ -247,10 +247,10 @@ fn retained(before: &Before, records: &Records<FlashModel>, ticking: &Ticking<'_
 /// Codes that 16-bit converters may give, and no two ticks in a row with the same.
 fn codes(tick: u32) -> RawFrame {
     let change = (tick % 100) as i32;
-    RawFrame {
-        hall: [1_000 + change, 2_000 - change, change],
-        capacitive: [change, -change, 10 + change],
-        sequence: tick,
-        time_us: tick.wrapping_mul(PERIOD_US),
-    }
+    RawFrame::new(
+        [1_000 + change, 2_000 - change, change],
+        [change, -change, 10 + change],
+        tick,
+        tick.wrapping_mul(PERIOD_US),
+    )
 }

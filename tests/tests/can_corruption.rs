@@ -16,12 +16,12 @@ fn decoder() -> AnyDecoder {
 /// A tick whose six codes tell its number and where they belong.
 fn tick(n: u32) -> RawFrame {
     let part = |shift: u32, channel: i32| ((n >> shift & 0xfff) as i32) * 8 + channel - 16_384;
-    RawFrame {
-        hall: [part(0, 0), part(12, 1), part(0, 2)],
-        capacitive: [part(0, 3), part(12, 4), part(0, 5)],
-        sequence: n,
-        time_us: n.wrapping_mul(2_000),
-    }
+    RawFrame::new(
+        [part(0, 0), part(12, 1), part(0, 2)],
+        [part(0, 3), part(12, 4), part(0, 5)],
+        n,
+        n.wrapping_mul(2_000),
+    )
 }
 
 /// The number of the tick that a received code belongs to, by its two parts.

@@ -15,12 +15,12 @@ const FRAME_US: u64 = 135;
 const LAYOUTS: [Layout; 2] = [Layout::Bits16, Layout::Bits24];
 
 fn tick(n: u32) -> RawFrame {
-    RawFrame {
-        hall: [n as i32 % 1000, 2, 3],
-        capacitive: [4, 5, n as i32 % 777],
-        sequence: n,
-        time_us: n * 2_000,
-    }
+    RawFrame::new(
+        [n as i32 % 1000, 2, 3],
+        [4, 5, n as i32 % 777],
+        n,
+        n * 2_000,
+    )
 }
 
 /// The frames of ticks `first` to `last` as a bus carries them.

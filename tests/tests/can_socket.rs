@@ -31,12 +31,7 @@ fn run(command: &str) {
 
 fn tick(n: u32) -> RawFrame {
     let code = (n % 30_000) as i32;
-    RawFrame {
-        hall: [code, -code, 1],
-        capacitive: [2, 3, code],
-        sequence: n,
-        time_us: n.wrapping_mul(2_000),
-    }
+    RawFrame::new([code, -code, 1], [2, 3, code], n, n.wrapping_mul(2_000))
 }
 
 fn traffic(layout: Layout, ticks: u32) -> Vec<BusFrame> {

@@ -56,12 +56,7 @@ fn add_squares(
     let mut predictor = Predictor::new(4_000);
     let mut count = 0;
     for (k, sample) in samples[..samples.len() - 2].iter().enumerate() {
-        let frame = RawFrame {
-            hall: sample.hall,
-            capacitive: sample.capacitive,
-            sequence: k as u32,
-            time_us: sample.t_us as u32,
-        };
+        let frame = RawFrame::new(sample.hall, sample.capacitive, k as u32, sample.t_us as u32);
         let reading = tracker.tick(&frame);
         predictor.take(&tracker, &frame, &reading);
         let Some(predicted) = predictor.pose_at(frame.time_us + age_us) else {

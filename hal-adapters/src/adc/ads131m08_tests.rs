@@ -160,12 +160,7 @@ fn a_good_frame_gives_signed_codes_of_24_bits() {
         0x00, 0x00, 0x00, 0x7f, 0xff, 0xff, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
         0x0a, 0x99, 0x00,
     ];
-    let want = RawFrame {
-        hall: [1000, -2000, 3000],
-        capacitive: [-1, 0, 8_388_607],
-        sequence: 7,
-        time_us: 14_000,
-    };
+    let want = RawFrame::new([1000, -2000, 3000], [-1, 0, 8_388_607], 7, 14_000);
     assert_eq!(try_sample(bytes), Ok(want));
 }
 

@@ -155,12 +155,7 @@ fn codes_are_signed_around_half_scale_and_rails_stay_rails() {
         [0x83, 0xe8],
         [0x80, 0],
     ];
-    let want = RawFrame {
-        hall: [1, -1, -32768],
-        capacitive: [32767, 1000, 0],
-        sequence: 7,
-        time_us: 14_000,
-    };
+    let want = RawFrame::new([1, -1, -32768], [32767, 1000, 0], 7, 14_000);
     let all = [sampled(codes), frame([0x02, 0], [0x3f, 0, 0])].concat();
     assert_eq!(try_sample(all), Ok(want));
 }

@@ -62,12 +62,12 @@ impl Channels {
                 codes[(at[2] & 7) as usize],
             ]
         }
-        RawFrame {
-            hall: three(codes, self.hall),
-            capacitive: three(codes, self.capacitive),
+        RawFrame::new(
+            three(codes, self.hall),
+            three(codes, self.capacitive),
             sequence,
             time_us,
-        }
+        )
     }
 }
 
@@ -91,12 +91,7 @@ mod tests {
         assert_eq!(channels.mask(), 0b1100_1111);
         let codes = [10, 11, 12, 13, 14, 15, 16, 17];
         let frame = channels.frame(&codes, 7, 14_000);
-        let want = RawFrame {
-            hall: [17, 10, 13],
-            capacitive: [11, 16, 12],
-            sequence: 7,
-            time_us: 14_000,
-        };
+        let want = RawFrame::new([17, 10, 13], [11, 16, 12], 7, 14_000);
         assert_eq!(frame, want);
     }
 }

@@ -114,12 +114,7 @@ mod tests {
 
     fn frame(codes: [i32; 6], sequence: u32) -> RawFrame {
         let [a, b, c, d, e, f] = codes;
-        RawFrame {
-            hall: [a, b, c],
-            capacitive: [d, e, f],
-            sequence,
-            time_us: 0,
-        }
+        RawFrame::new([a, b, c], [d, e, f], sequence, 0)
     }
 
     /// Codes of which only `channel` stays at `code`.

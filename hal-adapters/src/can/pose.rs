@@ -6,7 +6,7 @@
 //! use hal_adapters::can::{BusFrame, PoseReceiver, PoseSender, Timing};
 //! use runtime::{RawFrame, Reading};
 //!
-//! let codes = RawFrame { hall: [1, 2, 3], capacitive: [4, 5, 6], sequence: 7, time_us: 14_000 };
+//! let codes = RawFrame::new([1, 2, 3], [4, 5, 6], 7, 14_000);
 //! let mut reading = Reading::default(); // in its place what the decoder made of the codes
 //! reading.pose.planar.x_m = 1.5e-6;
 //! let (mut sender, mut receiver) = (PoseSender::default(), PoseReceiver::new(Timing::default()));

@@ -104,12 +104,7 @@ fn every_vertical_axis_is_sent_at_its_rate_and_numbered_without_a_gap() {
 }
 
 fn codes(sequence: u32, time_us: u32) -> RawFrame {
-    RawFrame {
-        hall: [0; 3],
-        capacitive: [0; 3],
-        sequence,
-        time_us,
-    }
+    RawFrame::new([0; 3], [0; 3], sequence, time_us)
 }
 
 #[test]

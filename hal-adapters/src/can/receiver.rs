@@ -9,7 +9,7 @@
 //! use hal_adapters::can::{Layout, BusFrame, SensorReceiver, Timing, sensor};
 //! use runtime::RawFrame;
 //!
-//! let sent = RawFrame { hall: [100, -200, 300], capacitive: [1, 2, 3], sequence: 7, time_us: 14_000 };
+//! let sent = RawFrame::new([100, -200, 300], [1, 2, 3], 7, 14_000);
 //! let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
 //! let mut got = None;
 //! for frame in sensor::frames(Layout::Bits16, &sent) {
@@ -48,24 +48,14 @@ pub struct SensorReceiver {
 #[inline(always)]
 fn raw_16(tick: &GroupTick) -> RawFrame {
     let codes = |k| tick.payload(k).map_or([MISSING_CODE; 3], read_three);
-    RawFrame {
-        hall: codes(0),
-        capacitive: codes(1),
-        sequence: tick.sequence,
-        time_us: tick.time_us,
-    }
+    RawFrame::new(codes(0), codes(1), tick.sequence, tick.time_us)
 }
 
 #[inline(always)]
 fn raw_24(tick: &GroupTick) -> RawFrame {
     let codes = |k| tick.payload(k).map_or([MISSING_CODE; 2], read_two);
     let ([a, b], [c, g1], [g2, g3]) = (codes(0), codes(1), codes(2));
-    RawFrame {
-        hall: [a, b, c],
-        capacitive: [g1, g2, g3],
-        sequence: tick.sequence,
-        time_us: tick.time_us,
-    }
+    RawFrame::new([a, b, c], [g1, g2, g3], tick.sequence, tick.time_us)
 }
 
 impl SensorReceiver {

@@ -8,12 +8,12 @@ const LAYOUTS: [Layout; 2] = [Layout::Bits16, Layout::Bits24];
 
 fn raw(sequence: u32) -> RawFrame {
     let code = sequence as i32 % 30_000;
-    RawFrame {
-        hall: [code, -code, 17],
-        capacitive: [code / 2, 5, -code / 3],
+    RawFrame::new(
+        [code, -code, 17],
+        [code / 2, 5, -code / 3],
         sequence,
-        time_us: sequence.wrapping_mul(2_000),
-    }
+        sequence.wrapping_mul(2_000),
+    )
 }
 
 fn new(layout: Layout) -> SensorReceiver {

@@ -206,12 +206,12 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const FRAME: RawFrame = RawFrame {
-        hall: [0x1234, -2, i16::MIN as i32],
-        capacitive: [1, MISSING_CODE, 70000],
-        sequence: 0x35,
-        time_us: 7,
-    };
+    const FRAME: RawFrame = RawFrame::new(
+        [0x1234, -2, i16::MIN as i32],
+        [1, MISSING_CODE, 70000],
+        0x35,
+        7,
+    );
 
     #[test]
     fn sixteen_bit_frames_worked_by_hand() {

@@ -53,12 +53,7 @@ impl<'d> Stage<'d> {
         let mut outcome = None;
         for _ in 0..ticks {
             self.sequence += 1;
-            let frame = RawFrame {
-                hall: [100, -50, 70],
-                capacitive: [10, 20, 30],
-                sequence: self.sequence,
-                time_us: 0,
-            };
+            let frame = RawFrame::new([100, -50, 70], [10, 20, 30], self.sequence, 0);
             self.service.before_tick(Some(&mut self.servo), self.pin);
             self.servo.tick(&frame);
             if let Some(answer) = self.service.tick(Some(&self.servo)) {

@@ -64,13 +64,13 @@ fn records() -> (String, String) {
         let time_us = 2_000 * tick;
         let angle = f64::from(tick) / 40.0;
         let (x_nm, y_nm) = (2e5 * angle.sin(), 2e5 * angle.cos());
-        let frame = RawFrame {
-            // 62.5 nm a code.
-            hall: [y_nm, y_nm, x_nm].map(|nm| (nm / 62.5).round() as i32),
-            capacitive: [100, 101, 99],
-            sequence: tick,
+        // 62.5 nm a code.
+        let frame = RawFrame::new(
+            [y_nm, y_nm, x_nm].map(|nm| (nm / 62.5).round() as i32),
+            [100, 101, 99],
+            tick,
             time_us,
-        };
+        );
         for coded in sensor::frames(Layout::Bits16, &frame) {
             let line = LogLine {
                 time_us: time_us.into(),

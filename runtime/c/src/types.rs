@@ -232,12 +232,7 @@ pub struct HallHealth {
 
 impl HallFrame {
     pub(crate) const fn raw(&self) -> RawFrame {
-        RawFrame {
-            hall: self.hall,
-            capacitive: self.capacitive,
-            sequence: self.sequence,
-            time_us: self.time_us,
-        }
+        RawFrame::new(self.hall, self.capacitive, self.sequence, self.time_us)
     }
 }
 

@@ -159,12 +159,12 @@ mod tests {
                 return Err(AdcError::Silent { level: 0 });
             }
             self.code += 1;
-            Ok(RawFrame {
-                hall: [self.code; 3],
-                capacitive: [self.code; 3],
+            Ok(RawFrame::new(
+                [self.code; 3],
+                [self.code; 3],
                 sequence,
                 time_us,
-            })
+            ))
         }
     }
 

@@ -99,12 +99,7 @@ fn take(node: &mut Node<'_>, frame: &impl Frame, outbox: &mut Outbox) {
 }
 
 fn frame(sequence: u32) -> RawFrame {
-    RawFrame {
-        hall: [100, 200, 300],
-        capacitive: [10, 20, 30],
-        sequence,
-        time_us: sequence * 2000,
-    }
+    RawFrame::new([100, 200, 300], [10, 20, 30], sequence, sequence * 2000)
 }
 
 /// Frames that one tick sends.

@@ -30,12 +30,12 @@ pub fn start(timer: &mut SYST) {
 
 /// Codes of a stage that moves evenly along X.
 pub const fn converters(period: u32) -> RawFrame {
-    RawFrame {
-        hall: [120, 90, 70 + 160 * (period as i32)],
-        capacitive: [300, -200, 100],
-        sequence: period,
-        time_us: PERIOD_US.wrapping_mul(period),
-    }
+    RawFrame::new(
+        [120, 90, 70 + 160 * (period as i32)],
+        [300, -200, 100],
+        period,
+        PERIOD_US.wrapping_mul(period),
+    )
 }
 
 /// Takes the pose that the forces answer. Ends in the twelfth period, well if there is a pose.

@@ -145,12 +145,7 @@ mod tests {
                 dataset.rows.push(Row {
                     movement,
                     t_us,
-                    frame: LoggedFrame::Codes(RawFrame {
-                        hall: [0; 3],
-                        capacitive: [0; 3],
-                        sequence: 0,
-                        time_us: 0,
-                    }),
+                    frame: LoggedFrame::Codes(RawFrame::new([0; 3], [0; 3], 0, 0)),
                     signal_m: pose(t_us as f64 * 1e-6),
                     vertical: [0.0; 3],
                     reference: pose(t_us as f64 * 1e-6 - lag_s),

@@ -78,12 +78,12 @@ impl Protocol {
                 dataset.rows.push(Row {
                     movement: dataset.movements.len(),
                     t_us: (k as f64 * stage.servo_period_s * 1e6).round() as i64,
-                    frame: LoggedFrame::Codes(RawFrame {
-                        hall: signal_m.map(|s| code(s, stage.hall.m_per_count)),
-                        capacitive: gaps.map(|g| code(g, stage.capacitive.m_per_count)),
-                        sequence: k as u32,
-                        time_us: (k as f64 * stage.servo_period_s * 1e6).round() as u32,
-                    }),
+                    frame: LoggedFrame::Codes(RawFrame::new(
+                        signal_m.map(|s| code(s, stage.hall.m_per_count)),
+                        gaps.map(|g| code(g, stage.capacitive.m_per_count)),
+                        k as u32,
+                        (k as f64 * stage.servo_period_s * 1e6).round() as u32,
+                    )),
                     signal_m,
                     vertical: vertical.to_array(),
                     reference,

@@ -138,12 +138,7 @@ fn row(stage: &Stage, plane: &[[f64; 3]; 3], movement: usize, sequence: u32, s: 
     Row {
         movement,
         t_us: s.t_us,
-        frame: LoggedFrame::Codes(RawFrame {
-            hall: s.hall,
-            capacitive: s.capacitive,
-            sequence,
-            time_us: s.t_us as u32,
-        }),
+        frame: LoggedFrame::Codes(RawFrame::new(s.hall, s.capacitive, sequence, s.t_us as u32)),
         signal_m: s.hall.map(|code| f64::from(code) * stage.hall.m_per_count),
         vertical: vertical_pose(plane, gaps).to_array(),
         reference: [

@@ -35,12 +35,7 @@ fn candump(fast: f64) -> String {
     let mut poses = PoseSender::default();
     for n in 0..TICKS {
         let t_s = 0.002 * f64::from(n) / (1.0 + fast) + 0.0003;
-        let codes = RawFrame {
-            hall: hall(t_s),
-            capacitive: [100, 101, 99],
-            sequence: n + 70,
-            time_us: 2_000 * n,
-        };
+        let codes = RawFrame::new(hall(t_s), [100, 101, 99], n + 70, 2_000 * n);
         let pose: Vec<Coded> = poses.frames(&Reading::default(), Some(&codes)).collect();
         let frames = pose
             .into_iter()

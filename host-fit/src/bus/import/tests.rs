@@ -60,12 +60,7 @@ pub(super) fn record(
     let mut text = String::new();
     for n in 0..TICKS {
         let (hall, capacitive, sequence, time_us) = codes(n);
-        let frame = RawFrame {
-            hall,
-            capacitive,
-            sequence,
-            time_us,
-        };
+        let frame = RawFrame::new(hall, capacitive, sequence, time_us);
         for (k, coded) in sensor::frames(Layout::Bits16, &frame).enumerate() {
             if let Some(received_us) = received_us(n, k, &coded) {
                 let line = LogLine {

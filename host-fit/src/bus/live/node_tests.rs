@@ -21,12 +21,12 @@ fn decoder() -> AnyDecoder {
 
 fn raw(sequence: u32) -> RawFrame {
     let code = (sequence % 1000) as i32;
-    RawFrame {
-        hall: [code, 2 * code - 500, -code],
-        capacitive: [10, -code / 2, 30],
+    RawFrame::new(
+        [code, 2 * code - 500, -code],
+        [10, -code / 2, 30],
         sequence,
-        time_us: sequence * 2_000,
-    }
+        sequence * 2_000,
+    )
 }
 
 fn stamped(coded: Coded, time_us: u64) -> StampedFrame {

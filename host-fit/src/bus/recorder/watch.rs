@@ -123,12 +123,7 @@ mod tests {
         for layout in [Layout::Bits16, Layout::Bits24] {
             let mut watch = Watch::default();
             for sequence in (0..100).filter(|s| !(20..22).contains(s) && *s != 50) {
-                let frame = RawFrame {
-                    hall: [1, 2, sequence as i32],
-                    capacitive: [3; 3],
-                    sequence,
-                    time_us: 0,
-                };
+                let frame = RawFrame::new([1, 2, sequence as i32], [3; 3], sequence, 0);
                 for coded in sensor::frames(layout, &frame) {
                     assert_eq!(watch.take(&stamped(coded, sequence)), None);
                 }

@@ -131,12 +131,7 @@ pub(super) fn poses_of(bench: &Bench, set: &ParameterSet) -> Vec<Words> {
     let decoder = set.decoder();
     (bench.rows.iter())
         .map(|&[a, b, c, g1, g2, g3]| {
-            let frame = RawFrame {
-                hall: [a, b, c],
-                capacitive: [g1, g2, g3],
-                sequence: 0,
-                time_us: 0,
-            };
+            let frame = RawFrame::new([a, b, c], [g1, g2, g3], 0, 0);
             let reading = decoder.decode(&frame, &PlanarPose::ZERO);
             let [x, y, rz] = reading.pose.planar.to_array();
             let [z, rx, ry] = reading.pose.vertical.to_array();

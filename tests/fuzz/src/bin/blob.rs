@@ -31,12 +31,7 @@ fuzz_target!(|data: &[u8]| {
         (codes(window.high, window.low), codes(gaps.high, gaps.low)),
         ([i32::MIN; 3], [i32::MAX; 3]),
     ] {
-        let frame = RawFrame {
-            hall,
-            capacitive,
-            sequence: 0,
-            time_us: 0,
-        };
+        let frame = RawFrame::new(hall, capacitive, 0, 0);
         let reading = decoder.decode(&frame, &PlanarPose::ZERO);
         let (q, v) = (
             reading.pose.planar.to_array(),

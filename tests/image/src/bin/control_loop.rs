@@ -78,12 +78,12 @@ fn converters(period: u32) -> Option<RawFrame> {
     } else {
         900 - step
     };
-    (period != 8).then_some(RawFrame {
-        hall: [1200 - step, b, 700 - step],
-        capacitive: [300, -200, 100],
-        sequence: period,
-        time_us: 2000 * period,
-    })
+    (period != 8).then_some(RawFrame::new(
+        [1200 - step, b, 700 - step],
+        [300, -200, 100],
+        period,
+        2000 * period,
+    ))
 }
 
 /// Stands for the voice coils: takes forces in N and N m.

@@ -20,12 +20,7 @@ use runtime::{
 
 extern crate image;
 
-const FRAME: RawFrame = RawFrame {
-    hall: [0; 3],
-    capacitive: [0; 3],
-    sequence: 0,
-    time_us: 0,
-};
+const FRAME: RawFrame = RawFrame::new([0; 3], [0; 3], 0, 0);
 
 /// The bus: coding, checking, assembly.
 #[inline(never)]

@@ -95,12 +95,7 @@ impl<'a> RowReader<'a> {
         let (frame, vertical) = if set == Quantity::GAPS {
             let capacitive = self.codes(row, sources, self.capacitive)?;
             let gaps_m = capacitive.map(|code| f64::from(code) * self.capacitive.m_per_count);
-            let frame = LoggedFrame::Codes(RawFrame {
-                hall,
-                capacitive,
-                sequence,
-                time_us,
-            });
+            let frame = LoggedFrame::Codes(RawFrame::new(hall, capacitive, sequence, time_us));
             (frame, vertical_pose(&self.vertical_rows, gaps_m).to_array())
         } else {
             let [a, b, c] = sources;

@@ -316,12 +316,7 @@ fn main() -> ! {
     let field = black_box(Decoder::<FieldModel>::new(SOUND, FIELD_PROBES));
     let mut tracker = PoseTracker::new(&decoder as &dyn Decode, OnInvalid::Hold { ticks: 3 });
     let mut predictor = Predictor::new(4_000);
-    let mut frame = RawFrame {
-        hall: [900, -800, 700],
-        capacitive: [50, 60, 70],
-        sequence: 0,
-        time_us: 0,
-    };
+    let mut frame = RawFrame::new([900, -800, 700], [50, 60, 70], 0, 0);
     for k in 0..100 {
         frame.sequence += 1 + u32::from(k % 7 == 0);
         frame.hall[0] = if k % 5 == 0 { i32::MIN } else { 900 };
