@@ -106,6 +106,9 @@
 // A zero deviation is subtracted from X, Y, Rz. No fault.
 #define HALL_STATUS_ZERO_SET (1 << 19)
 
+// A temperature is missing or implausible: decoded as if at that of the calibration.
+#define HALL_STATUS_TEMPERATURE_MISSING (1 << 20)
+
 // What became of a call. 32 bits wide, whatever a compiler makes of enums.
 enum HallResult
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -202,6 +205,9 @@ typedef struct {
   uint32_t sequence;
   // When the codes were sampled, in us, wrapping.
   uint32_t time_us;
+  // Temperature of the magnets' mount and of the stage body at the Hall elements, m degC;
+  // HALL_MISSING_CODE where there is none.
+  int32_t temperature_mc[2];
 } HallFrame;
 
 // A pose and what is wrong with it: all is good when the status is 0, or HALL_STATUS_ZERO_SET

@@ -3,7 +3,7 @@
 //! | offset | bytes | what |
 //! |---|---|---|
 //! | 0 | 4 | magic, `HALL` in ASCII |
-//! | 4 | 2 | layout version, little-endian: 1, or 2 for the field model |
+//! | 4 | 2 | layout version, little-endian: 1, 2 for the field model, or 3 with temperatures |
 //! | 6 | 1 | 1 if the fit was refused and written all the same, else 0 |
 //! | 7 | 1 | reserved: 0 |
 //! | 8 | 4 | payload length n in bytes, little-endian |
@@ -16,6 +16,10 @@
 //! every field; the golden examples in `blob_tests.rs` fix the bytes. In version 2 each probe has
 //! the 28 numbers of a [`FieldProbe`](crate::model::FieldProbe), and three matrices that follow
 //! from the constants are left out: PM, PM^-1 and the capacitive plane matrix.
+//!
+//! Version 3 is the layout of the model, with [`Temperature`](crate::Temperature): T0 and reach
+//! follow the counts of rows, (k, h) of the probes follow the other numbers. With the field model
+//! the geometry is left out, too.
 //!
 //! theta of the probes is the angle of the sensing axis from +Y for A and B and from +X for C (see
 //! [`geometry`](crate::geometry)), whatever direction the stage was designed with: in the
@@ -40,9 +44,9 @@ use crc::{CRC_32_ISCSI, Crc, NoTable};
 
 /// First bytes of every blob.
 pub const MAGIC: [u8; 4] = *b"HALL";
-/// The newest layout that this version reads: that of the field model. Models (12) to (31) are
-/// written in layout 1, see [`ParameterSet::layout_version`].
-pub const LAYOUT_VERSION: u16 = 2;
+/// The newest layout that this version reads: that with temperatures. See
+/// [`ParameterSet::layout_version`].
+pub const LAYOUT_VERSION: u16 = 3;
 /// Bytes before the payload.
 pub const HEADER_BYTES: usize = 12;
 /// Bytes of the check after the payload.
@@ -182,9 +186,11 @@ impl core::error::Error for BlobError {
 }
 
 impl ParameterSet {
-    /// The version of the layout that this set is written in: 2 with the field model, else 1.
+    /// The version of the layout that this set is written in: 3 with temperatures, else 2 with the field
+    /// model, else 1.
     pub const fn layout_version(&self) -> u16 {
         match self.probes {
+            _ if self.constants.temperature.is_used() => LAYOUT_VERSION,
             Probes::Linear(_) => 1,
             Probes::Field(_) => 2,
         }
@@ -250,10 +256,11 @@ impl ParameterSet {
         let (header, payload) =
             (body.split_at_checked(HEADER_BYTES)).ok_or(BlobError::BadPayload)?;
         // Changed where it was read: a copy on the stack of a controller is 700 bytes.
-        let mut read = layout::read(payload);
+        let version = header.get(4..6).ok_or(BlobError::BadPayload)?;
+        let mut read = layout::read(payload, version == LAYOUT_VERSION.to_le_bytes());
         let set = read.as_mut().ok_or(BlobError::BadPayload)?;
         // Each version holds its own models.
-        if header.get(4..6) != Some(&set.layout_version().to_le_bytes()) {
+        if version != set.layout_version().to_le_bytes() {
             return Err(BlobError::BadPayload);
         }
         set.fit.forced = header.get(6) == Some(&1);
@@ -294,7 +301,7 @@ fn blob_length(bytes: &[u8]) -> Result<usize, BlobError> {
     // A further layout is one more arm here; what differs in its payload follows from the
     // model's tag, in `layout`.
     let largest = match u16::from_le_bytes([v0, v1]) {
-        1 | LAYOUT_VERSION => MAX_BYTES,
+        1..=LAYOUT_VERSION => MAX_BYTES,
         found => {
             return Err(BlobError::UnknownVersion {
                 found,

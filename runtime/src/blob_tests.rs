@@ -5,13 +5,14 @@ use crate::parameters::Text;
 use crate::sample;
 
 /// The blobs of [`samples`], by version of their layout.
-const GOLDEN: [&[u8]; 2] = [
+const GOLDEN: [&[u8]; 3] = [
     include_bytes!("../examples/stage.bin"),
     include_bytes!("../examples/field.bin"),
+    include_bytes!("../examples/warm.bin"),
 ];
 
 /// The golden example of each version, and its length.
-fn goldens() -> [([u8; MAX_BYTES], usize); 2] {
+fn goldens() -> [([u8; MAX_BYTES], usize); 3] {
     GOLDEN.map(|golden| {
         let mut bytes = [0; MAX_BYTES];
         bytes[..golden.len()].copy_from_slice(golden);
@@ -20,8 +21,12 @@ fn goldens() -> [([u8; MAX_BYTES], usize); 2] {
 }
 
 /// The sets that [`goldens`] were made of.
-fn samples() -> [ParameterSet; 2] {
-    [sample::parameters(), sample::field_parameters()]
+fn samples() -> [ParameterSet; 3] {
+    [
+        sample::parameters(),
+        sample::field_parameters(),
+        sample::warm_parameters(),
+    ]
 }
 
 fn golden() -> ([u8; MAX_BYTES], usize) {
@@ -95,13 +100,14 @@ fn the_layout_is_as_documented() {
     assert_eq!(&GOLDEN[1][..8], b"HALL\x02\x00\x00\x00");
     // The field model is the fifth kind.
     assert_eq!(&GOLDEN[1][12..21], b"\x04\x07HS-0007");
+    assert_eq!(&GOLDEN[2][..8], b"HALL\x03\x00\x00\x00");
     // Beyond, the CRC misses four flipped bits somewhere.
     const { assert!(8 * (MAX_BYTES - CRC_BYTES) <= 5243) }
 }
 
 #[test]
 fn a_model_in_the_layout_of_another_is_refused() {
-    for (version, (mut blob, n)) in [2u16, 1].into_iter().zip(goldens()) {
+    for (version, (mut blob, n)) in [2u16, 3, 1].into_iter().zip(goldens()) {
         blob[4..6].copy_from_slice(&version.to_le_bytes());
         seal(&mut blob, n - CRC_BYTES);
         let refused = ParameterSet::from_bytes(&blob[..n]);

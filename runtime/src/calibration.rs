@@ -10,6 +10,7 @@ use crate::parameters::{
     CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
 };
 use crate::real::Number;
+use crate::temperature::Temperature;
 use core::f64::consts::TAU;
 
 /// A calibrated stage: the parameters of one model and the scales that they hold for.
@@ -38,6 +39,7 @@ use core::f64::consts::TAU;
 ///     calibrated_planar: [550e-6, 550e-6, 350e-6],
 ///     calibrated_vertical: [280e-6, 1.2e-3, 1.2e-3],
 ///     sensitivity_min: Calibration::SENSITIVITY_MIN,
+///     temperature: runtime::Temperature::NONE,
 /// };
 /// let set = calibration.prepare(&Origin::default())?;
 /// assert_eq!(set.check(), Ok(()));
@@ -73,6 +75,8 @@ pub struct Calibration {
     pub calibrated_vertical: [f64; 3],
     /// Smallest magnitude of phi that is decoded; [`Calibration::SENSITIVITY_MIN`] if in doubt.
     pub sensitivity_min: f64,
+    /// How the sensitivities follow temperature.
+    pub temperature: Temperature<f64>,
 }
 
 /// Where a parameter set comes from: text and figures for [`Calibration::prepare`].
@@ -113,6 +117,7 @@ impl Calibration {
             sensitivity_min: self.sensitivity_min,
             hall_window: self.hall_window,
             capacitive_window: self.capacitive_window,
+            temperature: self.temperature,
         })
     }
 
@@ -181,6 +186,7 @@ impl DecoderConstants<f64> {
             sensitivity_min: round(self.sensitivity_min),
             hall_window: self.hall_window,
             capacitive_window: self.capacitive_window,
+            temperature: self.temperature.rounded(),
         }
     }
 }

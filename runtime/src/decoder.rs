@@ -18,6 +18,7 @@ use crate::model::{FieldModel, LinearModel, Model};
 use crate::pose::{PlanarPose, Pose, VerticalPose};
 use crate::real::Real;
 use crate::status::Status;
+use crate::temperature::Temperature;
 
 /// What a tick reads in addition to the coefficients of the probes.
 ///
@@ -39,6 +40,8 @@ pub struct DecoderConstants<T> {
     pub hall_window: CodeWindow,
     /// Capacitive codes that are decoded.
     pub capacitive_window: CodeWindow,
+    /// How the sensitivities follow temperature.
+    pub temperature: Temperature<T>,
 }
 
 /// A pose and what is wrong with it. Invalid fields are zero unless held.
@@ -92,7 +95,7 @@ impl<D: Decode + ?Sized> Decode for &D {
 /// // Z by the capacitive codes, or known by other means: the same planar pose.
 /// let frame = RawFrame::new([1200, 900, 700], [300, -200, 100], 0, 0);
 /// let by_codes = decoder.decode(&frame, &PlanarPose::ZERO);
-/// let by_pose = decoder.decode_at(frame.hall, by_codes.pose.vertical, &PlanarPose::ZERO);
+/// let by_pose = decoder.decode_at(frame.hall, frame.temperature_mc, by_codes.pose.vertical, &PlanarPose::ZERO);
 /// assert_eq!(by_codes, by_pose);
 /// # Ok(())
 /// # }
@@ -123,12 +126,13 @@ impl AnyDecoder {
     pub fn decode_at(
         &self,
         hall: [i32; 3],
+        temperature_mc: [i32; 2],
         vertical: VerticalPose<f32>,
         zero: &PlanarPose<f32>,
     ) -> Reading {
         match self {
-            Self::Linear(decoder) => decoder.decode_at(hall, vertical, zero),
-            Self::Field(decoder) => decoder.decode_at(hall, vertical, zero),
+            Self::Linear(decoder) => decoder.decode_at(hall, temperature_mc, vertical, zero),
+            Self::Field(decoder) => decoder.decode_at(hall, temperature_mc, vertical, zero),
         }
     }
 }
@@ -240,10 +244,11 @@ impl<M: Model> Decoder<M> {
     pub fn decode_at(
         &self,
         hall: [i32; 3],
+        temperature_mc: [i32; 2],
         vertical: VerticalPose<f32>,
         zero: &PlanarPose<f32>,
     ) -> Reading {
-        self.finish(hall, vertical, 0, zero)
+        self.finish(hall, temperature_mc, vertical, 0, zero)
     }
 
     /// The checks of a vertical pose, the planar pose at it, and the checks of that.
@@ -251,14 +256,17 @@ impl<M: Model> Decoder<M> {
     fn finish(
         &self,
         hall: [i32; 3],
+        temperature_mc: [i32; 2],
         vertical: VerticalPose<f32>,
         capacitive_bad: u32,
         zero: &PlanarPose<f32>,
     ) -> Reading {
         let c = &self.constants;
+        let ([mount, body], temperature_bad) = c.temperature.changes_mk(temperature_mc);
+        let gain = (c.temperature).gain([f32::from_code(mount), f32::from_code(body)]);
         let signal = each(hall, f32::from_code);
-        let (phi, planar) =
-            M::planar_pose(&self.probes, &c.planar_per_code, signal, &vertical, zero);
+        let rows = &c.planar_per_code;
+        let (phi, planar) = M::planar_pose(&self.probes, rows, signal, gain, &vertical, zero);
         let (v, q) = (vertical.to_array(), planar.to_array());
         let (size_v, size_q) = (each(v, magnitude), each(q, magnitude));
 
@@ -276,6 +284,7 @@ impl<M: Model> Decoder<M> {
         let status = faults
             .with(Status::VERTICAL_EXTRAPOLATED.when(beyond(size_v, range_v)))
             .with(Status::PLANAR_EXTRAPOLATED.when(beyond(size_q, range_q)))
+            .with(Status::TEMPERATURE_MISSING.when(temperature_bad))
             .with(Status::PLANAR_INVALID.when(!planar_valid))
             .with(Status::VERTICAL_INVALID.when(!vertical_valid));
         Reading {
@@ -298,7 +307,7 @@ impl<M: Model> Decode for Decoder<M> {
         let bad = outside_window(frame.capacitive, &c.capacitive_window);
         let gaps = each(frame.capacitive, f32::from_code);
         let vertical = vertical_pose(&c.vertical_per_code, gaps);
-        self.finish(frame.hall, vertical, bad, zero)
+        self.finish(frame.hall, frame.temperature_mc, vertical, bad, zero)
     }
 
     fn constants(&self) -> &DecoderConstants<f32> {

@@ -109,13 +109,15 @@ fn a_pose_outside_the_calibrated_range_is_marked_and_given() {
 #[test]
 fn a_known_vertical_pose_decodes_like_the_codes_that_give_it() {
     let by_codes = decode(&decoder(), HALL, CAPACITIVE);
-    let by_pose = decoder().decode_at(HALL, by_codes.pose.vertical, &PlanarPose::ZERO);
+    let by_pose = decoder().decode_at(HALL, [0; 2], by_codes.pose.vertical, &PlanarPose::ZERO);
     assert_eq!(words(&by_codes), words(&by_pose));
     let nan = VerticalPose {
         z_m: f32::NAN,
         ..VerticalPose::ZERO
     };
-    let status = decoder().decode_at(HALL, nan, &PlanarPose::ZERO).status;
+    let status = decoder()
+        .decode_at(HALL, [0; 2], nan, &PlanarPose::ZERO)
+        .status;
     assert!(status.any(Status::VERTICAL_NOT_FINITE) && status.any(Status::PLANAR_INVALID));
 }
 
@@ -162,7 +164,9 @@ fn largest_difference_from_f64(calibration: &Calibration) -> (f64, f64) {
                 let hall = hall.map(f64::from);
                 let rows = &exact.planar_per_code;
                 let zero = PlanarPose::ZERO;
-                let (_, q) = calibration.probes.planar_pose(rows, hall, &v, &zero);
+                let (_, q) = calibration
+                    .probes
+                    .planar_pose(rows, hall, [1.0; 3], &v, &zero);
                 let off = |have: f32, want: f64| (f64::from(have) - want).abs();
                 let (p, w) = (reading.pose.planar, reading.pose.vertical);
                 worst_m = worst_m
@@ -176,4 +180,55 @@ fn largest_difference_from_f64(calibration: &Calibration) -> (f64, f64) {
         }
     }
     (worst_m, worst_rad)
+}
+
+/// A set with temperatures, and the same without.
+fn warm_and_cold() -> [crate::AnyDecoder; 2] {
+    let warm = sample::warm_parameters();
+    let mut cold = warm.clone();
+    cold.constants.temperature = crate::Temperature::NONE;
+    [warm.decoder(), cold.decoder()]
+}
+
+#[test]
+fn at_t0_the_words_are_those_without_temperatures() {
+    let [warm, cold] = warm_and_cold();
+    for k in -9..10 {
+        let codes = frame([700 * k, 900 - 500 * k, 600 * k], [400 * k, -90 * k, 1000]);
+        let at_t0 = codes.with_temperature_mc(sample::temperature().zero_mc);
+        let zero = PlanarPose::ZERO;
+        assert_eq!(
+            words(&warm.decode(&at_t0, &zero)),
+            words(&cold.decode(&codes, &zero))
+        );
+    }
+}
+
+#[test]
+fn a_temperature_that_is_missing_is_marked_and_the_pose_is_that_at_t0() {
+    let [warm, cold] = warm_and_cold();
+    let zero = PlanarPose::ZERO;
+    let [mount, body] = sample::temperature().zero_mc;
+    let codes = frame(HALL, CAPACITIVE);
+    let plain = cold.decode(&codes, &zero);
+    for lost in [[crate::frame::MISSING_CODE, body], [mount, body + 30_001]] {
+        let reading = warm.decode(&codes.with_temperature_mc(lost), &zero);
+        assert_eq!(reading.status, Status::TEMPERATURE_MISSING);
+        assert_eq!(reading.pose, plain.pose);
+        assert!(reading.planar().is_some());
+    }
+}
+
+#[test]
+fn warm_magnets_give_a_smaller_signal_for_the_same_displacement() {
+    let [warm, cold] = warm_and_cold();
+    let zero = PlanarPose::ZERO;
+    let [mount, body] = sample::temperature().zero_mc;
+    let codes = frame(HALL, CAPACITIVE);
+    let y_m = |reading: Reading| reading.pose.planar.y_m;
+    let at_t0 = y_m(cold.decode(&codes, &zero));
+    let ten_warmer = codes.with_temperature_mc([mount + 10_000, body]);
+    let gain = y_m(warm.decode(&ten_warmer, &zero)) / at_t0;
+    // k of A and B is -0.11 and -0.12 % per kelvin.
+    assert!((1.011..1.0125).contains(&gain), "{gain}");
 }

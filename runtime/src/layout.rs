@@ -8,11 +8,12 @@
 //!
 //! Of the field model's sets three matrices are left out, which follow from the constants of
 //! the tick: [`restore`] puts them back. So the largest blob stays within the length up to
-//! which its CRC finds any five flipped bits.
+//! which its CRC finds any five flipped bits. With temperature coefficients as well, the geometry is
+//! left out, too.
 
 use crate::decoder::DecoderConstants;
 use crate::frame::CodeWindow;
-use crate::geometry::{ProbeGeometry, inverse_and_determinant};
+use crate::geometry::{ProbeGeometry, SensingAxes, inverse_and_determinant};
 use crate::model::{FieldProbe, ModelKind, Probes, Sensitivity, Shape};
 use crate::parameters::{
     CapacitiveInput, FitRecord, HallInput, ParameterError, ParameterSet, Text,
@@ -31,6 +32,10 @@ struct Head {
 
 /// What stands between the hash and the numbers: how many rows there are and were fitted.
 type Rows = (u32, u32);
+
+/// What stands next with temperature coefficients: T0 in m degC and the reach in mK, of mount and
+/// body.
+type Zero = ([i32; 2], [u32; 2]);
 
 /// What stands after the numbers: the windows of the Hall and of the capacitive codes.
 type Windows = (CodeWindow, CodeWindow);
@@ -67,9 +72,12 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
         lever_arm_m,
         misalignment_rad,
     } = geometry;
-    visit("the probe geometry", lever_arm_m);
-    visit("the probe geometry", misalignment_rad);
     let matrices = matches!(probes, Probes::Linear(_));
+    let with_temperature = constants.temperature.is_used();
+    if matrices || !with_temperature {
+        visit("the probe geometry", lever_arm_m);
+        visit("the probe geometry", misalignment_rad);
+    }
     if matrices {
         visit("PM", plane.as_flattened_mut());
         visit("PM^-1", plane_inverse.as_flattened_mut());
@@ -97,6 +105,7 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
         sensitivity_min,
         hall_window: _,
         capacitive_window: _,
+        temperature,
     } = constants;
     visit(
         "the vertical constants",
@@ -118,6 +127,12 @@ fn for_each_row(set: &mut ParameterSet, visit: &mut dyn FnMut(&'static str, &mut
     visit("the calibrated range", calibrated_vertical);
     visit("the calibrated range", calibrated_planar);
     visit("the smallest sensitivity", slice::from_mut(sensitivity_min));
+    if with_temperature {
+        visit(
+            "the temperature coefficients",
+            temperature.per_mk.as_flattened_mut(),
+        );
+    }
 }
 
 fn visit_sensitivity(
@@ -167,14 +182,19 @@ fn visit_field_probe(
 }
 
 /// Puts back the matrices that are not in the blob of a field model: PM^-1 and the capacitive
-/// plane matrix are the constants over the scales of the codes, PM is the inverse of PM^-1. Of
-/// unsound constants they are unsound as well, and refused as such.
+/// plane matrix are the constants over the scales of the codes, PM is the inverse of PM^-1, and the
+/// geometry that of PM. Of unsound constants they are unsound as well, and refused as such.
 pub(crate) fn restore(set: &mut ParameterSet) {
     if let Probes::Field(_) = set.probes {
         let c = &set.constants;
         set.plane_inverse = over(&c.planar_per_code, set.hall.m_per_code);
         set.plane = inverse_and_determinant(&set.plane_inverse).0;
         set.capacitive.vertical_per_m = over(&c.vertical_per_code, set.capacitive.m_per_code);
+        if c.temperature.is_used() {
+            let (axes, arms) = SensingAxes::of_rows(&set.plane);
+            set.geometry.lever_arm_m = arms;
+            set.geometry.misalignment_rad = axes.misalignment_rad();
+        }
     }
 }
 
@@ -197,6 +217,11 @@ pub(crate) fn write(set: &ParameterSet, room: &mut [u8]) -> Option<usize> {
         out.put(byte)?;
     }
     out.put(&rows)?;
+    let temperature = &set.constants.temperature;
+    if temperature.is_used() {
+        let zero: Zero = (temperature.zero_mc, temperature.reach_mk);
+        out.put(&zero)?;
+    }
     let mut fits = Some(());
     for_each_row(&mut set.clone(), &mut |_, row| {
         for number in row {
@@ -225,7 +250,7 @@ impl Out<'_> {
 /// Reads a payload, which must end where the set does; `None` if it is none. In a function of its
 /// own, what it needs leaves the stack before the checks.
 #[inline(never)]
-pub(crate) fn read(payload: &[u8]) -> Option<ParameterSet> {
+pub(crate) fn read(payload: &[u8], with_temperature: bool) -> Option<ParameterSet> {
     let (head, rest) = postcard::take_from_bytes::<Head>(payload).ok()?;
     let (&logs_sha256, rest) = rest.split_first_chunk()?;
     let ((rows, train_rows), mut rest) = postcard::take_from_bytes::<Rows>(rest).ok()?;
@@ -253,6 +278,12 @@ pub(crate) fn read(payload: &[u8]) -> Option<ParameterSet> {
         },
         constants: DecoderConstants::default(),
     };
+    let temperature = &mut set.constants.temperature;
+    if with_temperature {
+        let zero: Zero;
+        (zero, rest) = postcard::take_from_bytes(rest).ok()?;
+        (temperature.zero_mc, temperature.reach_mk) = zero;
+    }
     let mut complete = true;
     for_each_row(&mut set, &mut |_, row| {
         for number in row {

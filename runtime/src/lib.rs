@@ -19,6 +19,7 @@
 //! | [`capacitive`] | three gaps to Z, Rx, Ry and back |
 //! | [`frame`] | codes as the converters gave them, and what makes a code bad |
 //! | [`status`] | the documented bit mask that goes with every pose |
+//! | [`temperature`] | the factor by which sensitivities follow temperature |
 //! | [`calibration`] | what a fit yields, in SI units, and how it becomes decoder constants |
 //! | [`decoder`] | one frame to one reading: the flat tick path |
 //! | [`tracker`] | what lasts from tick to tick: hold, sequence, counters, re-zero |
@@ -40,6 +41,7 @@
 //! | a, b, c | `per_z_m`, `per_rx_rad`, `per_ry_rad` | 1/m, 1/rad, 1/rad |
 //! | phi_A, phi_B, phi_C | sensitivity at a vertical pose | 1 |
 //! | delta_A, delta_B, delta_C | zero deviation | m |
+//! | (beyond the paper) k, h, G | [`temperature`] | 1/mK, 1/mK, 1 |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -71,6 +73,7 @@ mod real;
 mod sample;
 mod soundness;
 pub mod status;
+pub mod temperature;
 pub mod tracker;
 pub mod zero_offset;
 
@@ -84,6 +87,7 @@ pub use parameters::ParameterSet;
 pub use pose::{PlanarPose, Pose, VerticalPose};
 pub use prediction::Predictor;
 pub use status::Status;
+pub use temperature::Temperature;
 pub use tracker::{OnInvalid, PoseTracker};
 
 /// The earlier name of a [`PoseTracker`] that borrows its decoder.

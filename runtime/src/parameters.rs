@@ -134,6 +134,12 @@ pub enum ParameterError {
         /// Which probe, 0 to 2 for A to C.
         probe: u8,
     },
+    /// The gain of a probe changes by half or more within the reach of the temperatures, or the
+    /// reach is beyond 24 bits.
+    LargeTemperatureChange {
+        /// Which probe, 0 to 2 for A to C.
+        probe: u8,
+    },
     /// A window of accepted codes is empty or reaches beyond 24 bits.
     UnsoundWindow {
         /// Which sensors' window.
@@ -174,6 +180,11 @@ impl core::fmt::Display for ParameterError {
             Self::SteepInRange { probe } => write!(
                 f,
                 "the field terms of probe {} are too large for the calibrated range",
+                ["A", "B", "C"].get(usize::from(probe)).unwrap_or(&"?")
+            ),
+            Self::LargeTemperatureChange { probe } => write!(
+                f,
+                "the temperature coefficients of probe {} are too large",
                 ["A", "B", "C"].get(usize::from(probe)).unwrap_or(&"?")
             ),
             Self::UnsoundWindow { sensors } => write!(

@@ -5,6 +5,7 @@ use crate::frame::CodeWindow;
 use crate::geometry::{ProbeGeometry, SensingAxes, inverse_rows};
 use crate::model::{FieldProbe, ModelKind, Probes, Sensitivity, Shape, dot};
 use crate::parameters::{FitRecord, ParameterSet, Text};
+use crate::temperature::Temperature;
 
 /// Codes strictly between the rails of a 16-bit converter.
 pub(crate) const WINDOW: CodeWindow = CodeWindow {
@@ -39,6 +40,7 @@ pub(crate) fn calibration() -> Calibration {
         calibrated_planar: [550e-6, 550e-6, 350e-6],
         calibrated_vertical: [280e-6, 1.2e-3, 1.2e-3],
         sensitivity_min: Calibration::SENSITIVITY_MIN,
+        temperature: Temperature::NONE,
     }
 }
 
@@ -133,6 +135,25 @@ pub(crate) fn field_parameters() -> ParameterSet {
     field_calibration()
         .prepare(&origin())
         .expect("a sound stage")
+}
+
+/// k and h as of a stage with NdFeB magnets and sensors on mount and body.
+pub(crate) fn temperature() -> Temperature<f64> {
+    Temperature {
+        per_mk: [[-1.1e-6, 5e-8], [-1.2e-6, -4e-8], [-1.15e-6, 3e-8]],
+        zero_mc: [20_125, 21_250],
+        reach_mk: [Temperature::<f64>::REACH_MK; 2],
+    }
+}
+
+/// The parameter set of [`field_calibration`] with [`temperature`].
+pub(crate) fn warm_parameters() -> ParameterSet {
+    Calibration {
+        temperature: temperature(),
+        ..field_calibration()
+    }
+    .prepare(&origin())
+    .expect("a sound stage")
 }
 
 /// The coefficients of [`field_parameters`], to be changed.

@@ -1,5 +1,6 @@
 //! The checks that a parameter set must pass, on the host as on the target.
 
+use crate::frame::CODE_MAGNITUDE_MAX;
 use crate::geometry::SensingAxes;
 use crate::layout;
 use crate::model::{FieldProbe, Probes, Sensitivity, dot};
@@ -36,6 +37,16 @@ impl ParameterSet {
         for (probe, s) in (0u8..).zip(self.probes.sensitivities()) {
             if smallest_sensitivity(s, &c.calibrated_vertical) < c.sensitivity_min {
                 return Err(ParameterError::PoleInRange { probe });
+            }
+        }
+        let t = &c.temperature;
+        let [mount, body] = t.reach_mk;
+        let in_24_bits = (mount | body) < CODE_MAGNITUDE_MAX.cast_unsigned();
+        for (probe, [k, h]) in (0u8..).zip(&t.per_mk) {
+            let change = k.abs() * (mount as f32) + h.abs() * (body as f32);
+            let moderate = in_24_bits && change < 0.5;
+            if !moderate {
+                return Err(ParameterError::LargeTemperatureChange { probe });
             }
         }
         match &self.probes {

@@ -16,6 +16,7 @@
 //! | 17 | 131072 | one or more servo periods had no frame before this one | |
 //! | 18 | 262144 | the frame repeats an earlier sequence number: nothing new | all six invalid |
 //! | 19 | 524288 | a zero deviation is subtracted from X, Y, Rz | none: no fault |
+//! | 20 | 1048576 | a temperature is missing or implausible | none: decoded as if at T0 |
 //!
 //! Bits 11 and 12 mean something only while bits 14 and 13 are clear.
 
@@ -62,9 +63,11 @@ impl Status {
     pub const FRAME_REPEATED: Self = Self(1 << 18);
     /// A zero deviation is subtracted from X, Y, Rz. No fault.
     pub const ZERO_SET: Self = Self(1 << 19);
+    /// A temperature is missing or implausible: the pose was decoded as if at T0.
+    pub const TEMPERATURE_MISSING: Self = Self(1 << 20);
 
     /// Every bit with its name, lowest first, for reports.
-    pub const NAMES: [(Self, &'static str); 20] = [
+    pub const NAMES: [(Self, &'static str); 21] = [
         (Self(1), "Hall code A bad"),
         (Self(1 << 1), "Hall code B bad"),
         (Self(1 << 2), "Hall code C bad"),
@@ -91,6 +94,10 @@ impl Status {
         (Self::FRAMES_MISSED, "frames missed"),
         (Self::FRAME_REPEATED, "frame repeated"),
         (Self::ZERO_SET, "zero deviation subtracted"),
+        (
+            Self::TEMPERATURE_MISSING,
+            "temperature missing or implausible",
+        ),
     ];
 
     /// The mask as a number, as it is sent and logged.

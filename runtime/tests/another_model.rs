@@ -6,7 +6,7 @@ use runtime::model::{Sensitivity, planar_pose, sensitivity_at};
 use runtime::real::Real;
 use runtime::{
     Decode, Decoder, LinearModel, Model, OnInvalid, PlanarPose, PoseTracker, RawFrame, Reading,
-    Status, VerticalPose,
+    Status, Temperature, VerticalPose,
 };
 
 /// phi = eta + a Z + b Rx + c Ry + d Z^2.
@@ -26,11 +26,13 @@ impl Model for Bent {
         probes: &[BentProbe<T>; 3],
         pose_rows: &[[T; 3]; 3],
         signal: [T; 3],
+        gain: [T; 3],
         vertical: &VerticalPose<T>,
         zero: &PlanarPose<T>,
     ) -> ([T; 3], PlanarPose<T>) {
         let z2 = vertical.z_m * vertical.z_m;
-        let phi = probes.map(|p| sensitivity_at(&p.linear, vertical) + p.per_z2_m2 * z2);
+        let at = |p: &BentProbe<T>| sensitivity_at(&p.linear, vertical) + p.per_z2_m2 * z2;
+        let phi = [0, 1, 2].map(|k| at(&probes[k]) * gain[k]);
         (phi, planar_pose(pose_rows, signal, phi, zero))
     }
 }
@@ -51,6 +53,7 @@ const CONSTANTS: DecoderConstants<f32> = DecoderConstants {
         low: -32767,
         high: 32766,
     },
+    temperature: Temperature::NONE,
 };
 
 const LINEAR: Sensitivity<f32> = Sensitivity {

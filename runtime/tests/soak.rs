@@ -260,8 +260,9 @@ fn soak(blob: &[u8], ticks: u32, seed: u64) {
     let seen = account.seen.keys().fold(0, |all, status| all | status);
     let unseen = Status::SENSITIVITY
         .with(Status::PLANAR_NOT_FINITE)
-        .with(Status::VERTICAL_NOT_FINITE);
-    assert_eq!(seen | unseen.bits(), 0xf_ffff);
+        .with(Status::VERTICAL_NOT_FINITE)
+        .with(Status::TEMPERATURE_MISSING);
+    assert_eq!(seen | unseen.bits(), 0x1f_ffff);
     assert!(good > u64::from(ticks) / 2);
 }
 

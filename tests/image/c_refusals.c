@@ -10,7 +10,7 @@ extern const uint8_t _parameter_slot_0[], _parameter_slot_bytes[];
 static HallDecoder decoder, unloaded;
 static HallServo servo, unstarted;
 
-static const HallFrame frame = { { 120, 90, 70 }, { 300, -200, 100 }, 1, 2000 };
+static const HallFrame frame = { { 120, 90, 70 }, { 300, -200, 100 }, 1, 2000, { 0, 0 } };
 
 /* Whether a reading says that there is no pose, in all six fields. */
 static bool invalid(const HallReading *reading)

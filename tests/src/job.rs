@@ -19,7 +19,7 @@ use runtime::frame::CodeWindow;
 use runtime::model::{FieldProbe, Sensitivity, Shape};
 use runtime::{
     Decode, Decoder, FieldModel, LinearModel, Model, OnInvalid, PlanarPose, PoseTracker, Predictor,
-    RawFrame, Reading,
+    RawFrame, Reading, Temperature,
 };
 
 /// Source: a decoder of Model (31) and a zero deviation as bare words.
@@ -212,6 +212,7 @@ pub fn from_words<M: Bare>(words: &[u32]) -> (Decoder<M>, PlanarPose<f32>) {
         sensitivity_min,
         hall_window,
         capacitive_window,
+        temperature: Temperature::NONE,
     };
     let zero = PlanarPose::from_array(three());
     let mut probe = || M::probe(&mut number);

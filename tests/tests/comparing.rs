@@ -5,7 +5,7 @@ use rand::rngs::ChaCha8Rng;
 use runtime::decoder::DecoderConstants;
 use runtime::frame::CodeWindow;
 use runtime::model::Sensitivity;
-use runtime::{Decoder, FieldModel, LinearModel, PlanarPose, RawFrame, Reading};
+use runtime::{Decoder, FieldModel, LinearModel, PlanarPose, RawFrame, Reading, Temperature};
 use tests::compare::{JobError, NAMES, compare, run, to_bytes};
 use tests::job::{self, ANSWER_WORDS};
 use tests::motion;
@@ -24,6 +24,7 @@ const CONSTANTS: DecoderConstants<f32> = DecoderConstants {
         low: -32766,
         high: 32765,
     },
+    temperature: Temperature::NONE,
 };
 
 const PROBE: Sensitivity<f32> = Sensitivity {

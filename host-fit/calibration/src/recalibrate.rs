@@ -375,6 +375,7 @@ fn prepare(
         calibrated_planar: old.constants.calibrated_planar.map(f64::from),
         calibrated_vertical: old.constants.calibrated_vertical.map(f64::from),
         sensitivity_min: old.constants.sensitivity_min.into(),
+        temperature: old.constants.temperature.rounded(),
     };
     calibration
         .prepare(origin)

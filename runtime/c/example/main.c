@@ -25,7 +25,8 @@ static HallPredictor predictor;
 static bool read_frame(uint32_t period, HallFrame *frame)
 {
     *frame = (HallFrame){ { 1200 + 10 * (int32_t)period, 900, 700 }, { 300, -200, 100 },
-                          period, 2000 * period };
+                          period, 2000 * period,
+                          { HALL_MISSING_CODE, HALL_MISSING_CODE } };
     if (period == 3)
         frame->hall[0] = HALL_MISSING_CODE;
     return period != 6;

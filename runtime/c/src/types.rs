@@ -103,6 +103,9 @@ pub struct HallFrame {
     pub sequence: u32,
     /// When the codes were sampled, in us, wrapping.
     pub time_us: u32,
+    /// Temperature of the magnets' mount and of the stage body at the Hall elements, m degC;
+    /// HALL_MISSING_CODE where there is none.
+    pub temperature_mc: [i32; 2],
 }
 
 /// Motion in the plane.
@@ -178,6 +181,8 @@ pub const HALL_STATUS_FRAMES_MISSED: u32 = 1 << 17;
 pub const HALL_STATUS_FRAME_REPEATED: u32 = 1 << 18;
 /// A zero deviation is subtracted from X, Y, Rz. No fault.
 pub const HALL_STATUS_ZERO_SET: u32 = 1 << 19;
+/// A temperature is missing or implausible: decoded as if at that of the calibration.
+pub const HALL_STATUS_TEMPERATURE_MISSING: u32 = 1 << 20;
 
 /// Every bit has its name here, lowest first.
 const _: () = {
@@ -202,6 +207,7 @@ const _: () = {
         HALL_STATUS_FRAMES_MISSED,
         HALL_STATUS_FRAME_REPEATED,
         HALL_STATUS_ZERO_SET,
+        HALL_STATUS_TEMPERATURE_MISSING,
     ];
     assert!(bits.len() == Status::NAMES.len());
     let mut k = 0;
@@ -233,6 +239,7 @@ pub struct HallHealth {
 impl HallFrame {
     pub(crate) const fn raw(&self) -> RawFrame {
         RawFrame::new(self.hall, self.capacitive, self.sequence, self.time_us)
+            .with_temperature_mc(self.temperature_mc)
     }
 }
 

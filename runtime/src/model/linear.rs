@@ -31,13 +31,14 @@ impl Model for LinearModel {
         probes: &[Sensitivity<T>; 3],
         pose_rows: &[[T; 3]; 3],
         signal: [T; 3],
+        gain: [T; 3],
         vertical: &VerticalPose<T>,
         zero: &PlanarPose<T>,
     ) -> ([T; 3], PlanarPose<T>) {
         let phi = [
-            sensitivity_at(&probes[0], vertical),
-            sensitivity_at(&probes[1], vertical),
-            sensitivity_at(&probes[2], vertical),
+            sensitivity_at(&probes[0], vertical) * gain[0],
+            sensitivity_at(&probes[1], vertical) * gain[1],
+            sensitivity_at(&probes[2], vertical) * gain[2],
         ];
         (phi, planar_pose(pose_rows, signal, phi, zero))
     }

@@ -4,8 +4,8 @@ use crate::input::dataset::Row;
 use crate::input::stage::Stage;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
-use runtime::Calibration;
 use runtime::model::Probes;
+use runtime::{Calibration, Temperature};
 
 /// Room around the motion of the log in which the calibration still holds: offsets of
 /// the reference and overshoot are well inside it.
@@ -39,5 +39,6 @@ pub fn calibration<'r>(
         calibrated_planar: planar.map(|x| x * RANGE_MARGIN),
         calibrated_vertical: vertical.map(|x| x * RANGE_MARGIN),
         sensitivity_min: Calibration::SENSITIVITY_MIN,
+        temperature: Temperature::NONE,
     }
 }

@@ -1,6 +1,6 @@
 //! What the target's `f32` costs: its poses beside those of the same model in `f64`.
 
-use crate::input::dataset::Dataset;
+use crate::input::dataset::{Dataset, LoggedFrame};
 use rayon::prelude::*;
 use runtime::capacitive::vertical_pose;
 use runtime::decoder::DecoderConstants;
@@ -12,11 +12,12 @@ use runtime::{AnyDecoder, PlanarPose, VerticalPose};
 pub fn decode_f64(
     constants: &DecoderConstants<f64>,
     probes: &Probes<f64>,
-    hall: [i32; 3],
+    frame: &LoggedFrame,
     vertical: &VerticalPose<f64>,
 ) -> PlanarPose<f64> {
-    let (rows, signal) = (&constants.planar_per_code, hall.map(f64::from_code));
-    let (_, pose) = probes.planar_pose(rows, signal, vertical, &PlanarPose::ZERO);
+    let (rows, signal) = (&constants.planar_per_code, frame.hall().map(f64::from_code));
+    let gain = constants.temperature.gain_at(frame.temperature_mc());
+    let (_, pose) = probes.planar_pose(rows, signal, gain, vertical, &PlanarPose::ZERO);
     pose
 }
 
@@ -38,7 +39,7 @@ pub fn largest_difference(
             Some(codes) => vertical_pose(&constants.vertical_per_code, codes.map(f64::from_code)),
             None => VerticalPose::from_array(row.vertical),
         };
-        let exact = decode_f64(constants, probes, row.frame.hall(), &vertical).to_array();
+        let exact = decode_f64(constants, probes, &row.frame, &vertical).to_array();
         Some([0, 1, 2].map(|k| (f64::from(words[k]) - exact[k]).abs()))
     };
     let larger = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| a[k].max(b[k]));

@@ -24,6 +24,8 @@ pub enum LoggedFrame {
         sequence: u32,
         /// When the codes were sampled, in us, wrapping.
         time_us: u32,
+        /// Temperature of mount and body, m degC.
+        temperature_mc: [i32; 2],
     },
 }
 
@@ -33,6 +35,15 @@ impl LoggedFrame {
         match self {
             Self::Codes(frame) => frame.hall,
             Self::HallCodes { hall, .. } => *hall,
+        }
+    }
+
+    /// Temperature of mount and body, m degC; [`MISSING_CODE`](runtime::frame::MISSING_CODE) where
+    /// the log has none.
+    pub const fn temperature_mc(&self) -> [i32; 2] {
+        match self {
+            Self::Codes(frame) => frame.temperature_mc,
+            Self::HallCodes { temperature_mc, .. } => *temperature_mc,
         }
     }
 
@@ -67,7 +78,9 @@ impl LoggedFrame {
     pub fn decode(&self, decoder: &AnyDecoder, zero: &PlanarPose<f32>) -> Reading {
         match self {
             Self::Codes(frame) => decoder.decode(frame, zero),
-            Self::HallCodes { hall, vertical, .. } => decoder.decode_at(*hall, *vertical, zero),
+            Self::HallCodes { hall, vertical, .. } => {
+                decoder.decode_at(*hall, self.temperature_mc(), *vertical, zero)
+            }
         }
     }
 }

@@ -135,7 +135,12 @@ fn main() -> ! {
         black_box(predictor.pose_at(black_box(2_300)));
         black_box(tracker.tick_without_frame());
         black_box(tracker.tick_with(1, |zero| {
-            decoder.decode_at(frame.hall, black_box(VerticalPose::ZERO), zero)
+            decoder.decode_at(
+                frame.hall,
+                frame.temperature_mc,
+                black_box(VerticalPose::ZERO),
+                zero,
+            )
         }));
         black_box(tracker.set_zero(black_box(PlanarPose::ZERO)));
         tracker.forget();

@@ -8,6 +8,7 @@ use super::time::Clock;
 use crate::input::dataset::{LoggedFrame, Row};
 use crate::input::stage::{CodeScale, Stage};
 use runtime::capacitive::{vertical_pose, vertical_rows};
+use runtime::frame::MISSING_CODE;
 use runtime::{RawFrame, VerticalPose};
 
 /// Largest sensible rotation, rad: the models are linear in rotations.
@@ -113,6 +114,7 @@ impl<'a> RowReader<'a> {
                 vertical: VerticalPose::from_array(vertical.map(|x| x as f32)),
                 sequence,
                 time_us,
+                temperature_mc: [MISSING_CODE; 2],
             };
             (frame, vertical)
         };

@@ -126,10 +126,11 @@ pub struct FieldConstants {
 }
 
 impl FieldConstants {
-    /// The planar pose of three signals at a vertical pose, nothing taken off and nothing checked.
+    /// The planar pose of three signals at a vertical pose and T0, nothing taken off and nothing
+    /// checked.
     pub fn decode(&self, signal: [f64; 3], vertical: &VerticalPose<f64>) -> PlanarPose<f64> {
-        let zero = PlanarPose::ZERO;
-        FieldModel::planar_pose(&self.probes, &self.pose_rows, signal, vertical, &zero).1
+        let (gain, zero) = ([1.0; 3], PlanarPose::ZERO);
+        FieldModel::planar_pose(&self.probes, &self.pose_rows, signal, gain, vertical, &zero).1
     }
 }
 

@@ -4,7 +4,7 @@ use image::job::{self, Bare, FRAME_WORDS, PARAMETER_WORDS};
 use runtime::decoder::{Decoder, DecoderConstants};
 use runtime::frame::CodeWindow;
 use runtime::model::{FieldProbe, Sensitivity, Shape};
-use runtime::{PlanarPose, RawFrame};
+use runtime::{PlanarPose, RawFrame, Temperature};
 
 /// A sound stage, in round numbers.
 pub const SOUND: DecoderConstants<f32> = DecoderConstants {
@@ -29,6 +29,7 @@ pub const SOUND: DecoderConstants<f32> = DecoderConstants {
         low: -32767,
         high: 32766,
     },
+    temperature: Temperature::NONE,
 };
 
 /// Its probes.

@@ -27,7 +27,7 @@ use runtime::{
 /// Displacements read by the probes.
 #[repr(C)]
 #[derive(Clone, Copy)]
-pub struct Signal([f32; 3]);
+pub struct Signal([f32; 3], [f32; 3]);
 
 /// What the pose kernel reads of a calibration.
 #[repr(C)]
@@ -45,8 +45,14 @@ fn kernel(
     vertical: &VerticalPose<f32>,
     zero: &PlanarPose<f32>,
 ) -> PlanarPose<f32> {
-    let (_, pose) =
-        LinearModel::planar_pose(&c.probes, &c.planar_per_code, signal.0, vertical, zero);
+    let (_, pose) = LinearModel::planar_pose(
+        &c.probes,
+        &c.planar_per_code,
+        signal.0,
+        signal.1,
+        vertical,
+        zero,
+    );
     pose
 }
 
@@ -101,7 +107,7 @@ fn counted_field_kernel(
     pose: &mut PlanarPose<f32>,
 ) {
     let rows = &c.planar_per_code;
-    (_, *pose) = FieldModel::planar_pose(&c.probes, rows, signal.0, vertical, zero);
+    (_, *pose) = FieldModel::planar_pose(&c.probes, rows, signal.0, signal.1, vertical, zero);
 }
 
 #[unsafe(no_mangle)]
@@ -282,7 +288,7 @@ fn main() -> ! {
     for k in 0..300 {
         let frame = black_box(codes(&mut words, k));
         let (decoder, zero) = black_box(decoder_of::<LinearModel>(&mut words, k, PROBES));
-        let signal = Signal(frame.hall.map(|code| code as f32));
+        let signal = Signal(frame.hall.map(|code| code as f32), [1.0; 3]);
         let vertical = VerticalPose::from_array(frame.capacitive.map(|code| code as f32 * 1e-8));
         let mut pose = PlanarPose::ZERO;
         let c = Kernel {

@@ -1,0 +1,130 @@
+//! How the sensitivity follows temperature: one factor for each probe, in every model.
+//!
+//! With M the temperature of the magnets' mount, H that of the stage body at the Hall elements,
+//! and dM, dH their distances from T0, at which the stage was calibrated:
+//!
+//! G_i = 1 + k_i dM + h_i dH, and phi_i becomes G_i phi_i.
+//!
+//! Magnets lose about 0.11 % of their field per kelvin, and Hall elements have a gain of their
+//! own. Frames carry temperatures in m degC: dM and dH are differences of whole numbers, and at
+//! dM = dH = 0 the factor is exactly 1.
+
+use crate::real::Real;
+
+/// k, h and T0 of a stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct Temperature<T> {
+    /// (k, h) of the probes A, B, C: change of G with dM and dH, 1/mK.
+    pub per_mk: [[T; 2]; 3],
+    /// T0 of mount and body, m degC.
+    pub zero_mc: [i32; 2],
+    /// Largest |dM| and |dH| that is plausible, mK; 0 where the stage has no such sensor.
+    pub reach_mk: [u32; 2],
+}
+
+impl<T: Real> Temperature<T> {
+    /// A stage without sensors: G = 1.
+    pub const NONE: Self = Self {
+        per_mk: [[T::ZERO; 2]; 3],
+        zero_mc: [0; 2],
+        reach_mk: [0; 2],
+    };
+
+    /// Default of `reach_mk`: three times what a stage warms by at work. Farther off a linear
+    /// gain no longer holds, and a sensor is more likely broken.
+    pub const REACH_MK: u32 = 30_000;
+
+    /// Whether the stage has a sensor.
+    #[inline(always)]
+    pub const fn is_used(&self) -> bool {
+        self.reach_mk[0] | self.reach_mk[1] != 0
+    }
+
+    /// dM and dH, mK: 0 for a temperature that is missing or implausible; and whether there is
+    /// one of those.
+    #[inline(always)]
+    pub(crate) fn changes_mk(&self, temperature_mc: [i32; 2]) -> ([i32; 2], bool) {
+        let (mount, no_mount) = change_mk(temperature_mc[0], self.zero_mc[0], self.reach_mk[0]);
+        let (body, no_body) = change_mk(temperature_mc[1], self.zero_mc[1], self.reach_mk[1]);
+        ([mount, body], no_mount | no_body)
+    }
+
+    /// G of the probes A, B, C at dM and dH, mK.
+    #[inline(always)]
+    pub fn gain(&self, [mount, body]: [T; 2]) -> [T; 3] {
+        let [a, b, c] = &self.per_mk;
+        let of = |[k, h]: &[T; 2]| (T::ONE + *k * mount) + *h * body;
+        [of(a), of(b), of(c)]
+    }
+
+    /// G of the probes A, B, C at temperatures of mount and body, m degC; a missing or implausible
+    /// one counts as T0.
+    #[inline(always)]
+    pub fn gain_at(&self, temperature_mc: [i32; 2]) -> [T; 3] {
+        self.gain(self.changes_mk(temperature_mc).0.map(T::from_code))
+    }
+
+    /// Each coefficient as another type of number, rounded to the nearest.
+    #[must_use]
+    pub fn rounded<U: Real>(&self) -> Temperature<U> {
+        Temperature {
+            per_mk: self.per_mk.map(|row| row.map(|x| U::from_f64(x.to_f64()))),
+            zero_mc: self.zero_mc,
+            reach_mk: self.reach_mk,
+        }
+    }
+}
+
+/// The change of one temperature, 0 if it is not plausible, and whether a sensor is at fault.
+#[inline(always)]
+const fn change_mk(temperature_mc: i32, zero_mc: i32, reach_mk: u32) -> (i32, bool) {
+    let change = temperature_mc.wrapping_sub(zero_mc);
+    let above_low = change.cast_unsigned().wrapping_add(reach_mk);
+    let plausible = above_low <= reach_mk.wrapping_mul(2);
+    let keep = (plausible as u32).wrapping_neg().cast_signed();
+    (change & keep, !plausible & (reach_mk != 0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::MISSING_CODE;
+
+    const STAGE: Temperature<f32> = Temperature {
+        per_mk: [[-1.2e-6, 1e-8], [-1.1e-6, 2e-8], [-1.3e-6, 3e-8]],
+        zero_mc: [20_000, 21_000],
+        reach_mk: [30_000, 30_000],
+    };
+
+    #[test]
+    fn a_temperature_that_is_missing_or_beyond_reach_counts_as_no_change_and_is_reported() {
+        for (mount, change, fault) in [
+            (20_000, 0, false),
+            (25_000, 5_000, false),
+            (-10_000, -30_000, false),
+            (-10_001, 0, true),
+            (50_000, 30_000, false),
+            (50_001, 0, true),
+            (i32::MAX, 0, true),
+            (MISSING_CODE, 0, true),
+        ] {
+            assert_eq!(STAGE.changes_mk([mount, 21_100]), ([change, 100], fault));
+        }
+    }
+
+    #[test]
+    fn a_sensor_that_the_stage_lacks_is_never_missed() {
+        for code in [0, 5, MISSING_CODE, i32::MAX, -1] {
+            let changes = Temperature::<f32>::NONE.changes_mk([code; 2]);
+            assert_eq!(changes, ([0; 2], false));
+        }
+    }
+
+    #[test]
+    fn the_gain_is_one_at_t0_and_follows_both_temperatures() {
+        assert_eq!(STAGE.gain([0.0; 2]), [1.0; 3]);
+        let [a, ..] = STAGE.gain([5000.0, -2000.0]);
+        assert!((a - (1.0 - 0.006 - 2e-5)).abs() < 1e-7, "{a}");
+    }
+}
