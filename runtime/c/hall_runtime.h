@@ -23,7 +23,7 @@
 #endif
 
 // Words of a decoder.
-#define HALL_DECODER_WORDS 114
+#define HALL_DECODER_WORDS 124
 
 // Words of a servo.
 #define HALL_SERVO_WORDS 55

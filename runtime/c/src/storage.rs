@@ -4,7 +4,7 @@ use core::mem::{ManuallyDrop, MaybeUninit, align_of, size_of};
 use runtime::{AnyDecoder, PoseTracker, Predictor};
 
 /// Words of a decoder.
-pub const HALL_DECODER_WORDS: usize = 114;
+pub const HALL_DECODER_WORDS: usize = 124;
 /// Words of a servo.
 pub const HALL_SERVO_WORDS: usize = 55;
 
