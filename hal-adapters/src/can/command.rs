@@ -79,6 +79,23 @@ impl Command {
         }
     }
 
+    /// Whether it moves the pose, makes it invalid, resets the node, or leads to that. A node with a
+    /// key obeys such a request only with a tag ([`super::update::tag`]), and a controller without one
+    /// only while its line says that the servo is off. (A commit has its own rule: its tag is over the
+    /// blob, too.)
+    pub const fn needs_authority(&self) -> bool {
+        match self.request {
+            Some(Request::Rezero { .. } | Request::ClearZero | Request::Record { .. }) => true,
+            // That the servo is on can be said by anyone.
+            Some(Request::ServoOff { seconds }) => seconds > 0,
+            Some(Request::Update(request)) => matches!(
+                request,
+                UpdateRequest::Begin { .. } | UpdateRequest::Activate
+            ),
+            Some(Request::Identify { .. }) | None => false,
+        }
+    }
+
     /// The 52 bits of the frame.
     pub const fn payload(&self) -> Payload {
         let long = match self.request {
@@ -142,7 +159,7 @@ numbered! {
         OutOfBounds = 10,
         /// A pose lay outside the calibrated range; the detail is its status.
         Extrapolated = 11,
-        /// The tag is not that of the stage's key.
+        /// The tag is missing, or not that of the stage's key.
         NotAuthorised = 12,
         /// The blob is refused; the detail is [`runtime::BlobError::number`].
         BadContent = 13,

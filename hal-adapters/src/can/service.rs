@@ -3,8 +3,9 @@
 //!
 //! A zero that is set or cleared moves the pose at once, and with it a stage whose servo is on.
 //! So both are refused unless the servo was declared off ([`Request::ServoOff`]; the
-//! declaration ends by itself) and the board's service pin, where there is one, agrees. This
-//! guards against mistakes, not against malice: whoever can send on the bus can declare.
+//! declaration ends by itself) and the board's service pin, where there is one, agrees. Against
+//! malice stands the key: where the node has one, such a request carries a tag
+//! ([`Command::needs_authority`]); where it has none, the line must say that the servo is off.
 //!
 //! ```
 //! use hal_adapters::can::BusFrame;
@@ -120,21 +121,28 @@ impl Service {
         &mut self,
         frame: &F,
         servo: Option<&mut PoseTracker<D>>,
-        updates: Option<Updates<'_, '_>>,
+        mut updates: Option<Updates<'_, '_>>,
     ) -> Option<Result<Answered, BusFault>> {
         match self.mailbox.take(frame)? {
             Ok(Told::Command(command)) => {
-                let (outcome, detail) = match (command.request, updates) {
-                    (Some(Request::Update(request)), Some(updates)) => {
+                let refusal = self.refusal(&command, updates.as_mut());
+                let (outcome, detail) = match (refusal, command.request, &mut updates) {
+                    (Some(refusal), ..) => refusal,
+                    (None, Some(Request::Update(request)), Some(updates)) => {
                         let around = Surroundings {
                             servo_is_off: self.servo_is_off(),
-                            store: updates.store,
+                            store: &mut *updates.store,
                             nonce: updates.nonce,
                         };
                         updates.receiver.obey(command.token, request, around)
                     }
                     _ => self.obey(&command, servo),
                 };
+                if let Some(updates) = updates
+                    && command.needs_authority()
+                {
+                    updates.receiver.note_answer(&command, (outcome, detail));
+                }
                 let answer = self.answer(command.number, command.token, outcome, detail);
                 Some(Ok(Answered { command, answer }))
             }
@@ -222,6 +230,24 @@ impl Service {
     /// Whether the zero and the parameters may be changed.
     pub const fn servo_is_off(&self) -> bool {
         self.servo_off_ticks > 0 && !matches!(self.servo_off_pin, Some(false))
+    }
+
+    /// The answer to a command that is not obeyed whatever it asks for: it needs a tag, or without a
+    /// key a line that says that the servo is off; or it has been obeyed.
+    fn refusal(
+        &self,
+        command: &Command,
+        updates: Option<&mut Updates<'_, '_>>,
+    ) -> Option<(Outcome, u32)> {
+        if !command.needs_authority() {
+            return None;
+        }
+        match updates {
+            Some(updates) if updates.receiver.has_key() => {
+                updates.receiver.authorise(command).err()
+            }
+            _ => matches!(self.servo_off_pin, Some(false)).then_some((Outcome::ServoOn, 0)),
+        }
     }
 
     fn obey<D: Decode>(

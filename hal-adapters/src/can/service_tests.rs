@@ -111,14 +111,14 @@ fn a_service_pin_that_says_on_overrules_the_declaration() {
     let decoder = decoder();
     let mut stage = Stage::new(&decoder);
     stage.ask(Request::ServoOff { seconds: 9 }, 1);
-    for (pin, outcome) in [
-        (Some(false), Outcome::ServoOn),
-        (None, Outcome::Started),
-        (Some(true), Outcome::Busy),
+    for (pin, token, outcome) in [
+        (Some(false), 2, Outcome::ServoOn),
+        (None, 3, Outcome::Started),
+        (Some(true), 4, Outcome::Busy),
     ] {
         stage.pin = pin;
         assert_eq!(stage.rest(1, 0), None);
-        assert_eq!(stage.ask(REZERO, 2), outcome, "{pin:?}");
+        assert_eq!(stage.ask(REZERO, token), outcome, "{pin:?}");
     }
 }
 

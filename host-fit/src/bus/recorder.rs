@@ -11,6 +11,7 @@ pub use watch::Watch;
 use super::live::BusError;
 use crate::output::OutputError;
 use hal_adapters::can::command::Outcome;
+use hal_adapters::can::update::Key;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -23,6 +24,8 @@ pub struct RecorderSettings {
     pub out: PathBuf,
     /// End after so long; on Ctrl-C if `None`.
     pub duration: Option<Duration>,
+    /// The stage's key: a controller with one sends its codes to whoever has it.
+    pub key: Option<Key>,
     /// Show on standard error, if that is a terminal, how it goes.
     pub shows: bool,
 }
@@ -53,18 +56,21 @@ pub enum RecorderError {
     RecordEnded(#[from] OutputError),
     /// Nobody answers.
     #[error(
-        "no controller on `{interface}` answered the request to send its codes within {waited_ms} ms; is it on, and is \
+        "no controller on `{interface}` answered the request to send its codes within 3 s; is it on, and is \
          the interface set to its bit rate (`ip -details link show {interface}`)? Where a sensor node sends the codes \
          and none is asked for, record with `candump -L`. Nothing was written"
     )]
     NoAnswer {
         /// The interface.
         interface: String,
-        /// How long an answer was waited for, ms.
-        waited_ms: u128,
     },
     /// It refuses.
-    #[error("the controller refuses to send its codes: {}; its program may be too old to record. Nothing was written", outcome.map_or("an answer that this version does not know".to_owned(), |outcome| format!("{outcome:?}")))]
+    #[error("the controller refuses to send its codes: {}. Nothing was written", match outcome {
+        Some(Outcome::NotAuthorised) => "name the key of its stage with --key FILE",
+        Some(Outcome::ServoOn) => "it has no key, and its line does not say that the servo is off. Switch that off, begin to \
+                                   record, and switch it on again",
+        _ => "its program may be too old to record",
+    })]
     Refused {
         /// Its answer.
         outcome: Option<Outcome>,

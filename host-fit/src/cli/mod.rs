@@ -15,6 +15,7 @@ mod identify;
 mod import;
 mod init;
 mod inspect;
+mod key;
 mod limit;
 mod live;
 mod plan;

@@ -1,6 +1,7 @@
 //! `host-fit record`.
 
 use super::args::seconds;
+use super::key::KeyFile;
 use crate::bus::recorder::{self, RecorderSettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -17,6 +18,8 @@ pub(super) struct RecordArgs {
     /// Where to write the record, as `candump -L` does, for `import`: a new file.
     #[arg(long, value_name = "BUS.log")]
     out: PathBuf,
+    #[command(flatten)]
+    key: KeyFile,
     /// End after so many seconds; without it, on Ctrl-C.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<Duration>,
@@ -29,6 +32,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<(), HostError> {
         interface: args.can.clone(),
         out: args.out.clone(),
         duration: args.seconds,
+        key: args.key.read()?,
         shows: !terminal::is_quiet(),
     };
     let recorded = recorder::run(&settings)?;

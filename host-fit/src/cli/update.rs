@@ -1,12 +1,12 @@
 //! `host-fit update`.
 
 use super::identify;
+use super::key::KeyFile;
 use crate::bus::update::{self, Plan, Updated, Wanted};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::blob_file;
 use clap::Args;
-use hal_adapters::can::update::Key;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `update`.
@@ -18,9 +18,8 @@ pub(super) struct UpdateArgs {
     /// CAN interface, for instance can0.
     #[arg(long, value_name = "IFACE")]
     can: String,
-    /// The key of the stage: a file with 32 hexadecimal digits.
-    #[arg(long, value_name = "FILE")]
-    key: Option<PathBuf>,
+    #[command(flatten)]
+    key: KeyFile,
     /// Update only a controller that tells this serial number; without it, not one that tells another
     /// than the blob.
     #[arg(long, value_name = "TEXT")]
@@ -39,7 +38,7 @@ pub(super) struct UpdateArgs {
 
 /// Stores new parameters in a controller, and says what it had and has.
 pub(super) fn run(args: &UpdateArgs) -> Result<(), HostError> {
-    let key = args.key.as_deref().map(read_key).transpose()?;
+    let key = args.key.read()?;
     let wanted = match &args.params {
         Some(path) => Wanted::Blob(read_blob(path, args.serial.as_deref())?),
         None if args.previous => Wanted::Previous,
@@ -98,52 +97,5 @@ fn as_text(updated: &Updated) -> String {
         (Some(_), false) => format!(
             "{serial}: runs {before}\n{serial}: stored number {record}, which waits for --activate or power-on\n"
         ),
-    }
-}
-
-/// A key file: 32 hexadecimal digits.
-fn read_key(path: &Path) -> Result<Key, HostError> {
-    let refused = |problem: String| {
-        let path = path.display();
-        HostError::input(format!(
-            "{path}: {problem}; name the file with the key of this stage"
-        ))
-    };
-    let text = std::fs::read_to_string(path).map_err(|error| refused(error.to_string()))?;
-    let digits = text.trim();
-    let is_hex = digits.bytes().all(|byte| byte.is_ascii_hexdigit());
-    match u128::from_str_radix(digits, 16) {
-        Ok(key) if is_hex && digits.len() == 32 => Ok(key.to_be_bytes()),
-        // The text itself is not shown: it may be most of a key.
-        _ => Err(refused(
-            "32 hexadecimal digits are expected, and nothing else".to_owned(),
-        )),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_key_is_32_hexadecimal_digits_and_no_error_shows_it() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("key");
-        let read = |text: &str| {
-            std::fs::write(&path, text).expect("written");
-            read_key(&path)
-        };
-        let key = read("000102030405060708090a0b0c0d0e0F\n").expect("a key");
-        assert_eq!(key, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
-        for wrong in [
-            "",
-            "00010203",
-            "+00102030405060708090a0b0c0d0e0f",
-            &"0".repeat(33),
-        ] {
-            let error = read(wrong).expect_err("no key").to_string();
-            assert!(error.contains("32 hexadecimal digits"), "{error}");
-            assert!(wrong.is_empty() || !error.contains(wrong), "{error}");
-        }
     }
 }

@@ -31,8 +31,8 @@ use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
 use checks::{
-    Outcome, Report, bus, commands, figures, log, motion, parameters, power_cuts, sensors, start,
-    stopped, timing, update, zero,
+    Outcome, Report, authority, bus, commands, figures, log, motion, parameters, power_cuts,
+    sensors, start, stopped, timing, update, zero,
 };
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -275,6 +275,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
         "update: parameters whose check crashes stop the program",
         &|| stopped::parameters_whose_check_crashes(bench),
     );
+    check("command: a tag, or without a key the line", &|| {
+        authority::tag_or_line(bench)
+    });
     check("command: odd ones", &|| commands::odd_commands(bench));
     check("command: any data length code", &|| {
         commands::any_length_code(bench)

@@ -174,7 +174,6 @@ fn what_waits_for_a_reset_is_not_sent_again_and_activated_alone() {
     let kept = |updated: Updated| (updated.sequence, updated.record, updated.is_active);
     let alone = Plan {
         wanted: Wanted::Newest,
-        key: None,
         activates: true,
         ..plan(&[])
     };

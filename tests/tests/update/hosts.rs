@@ -129,7 +129,7 @@ fn what_is_stored_and_not_activated_is_told_as_stored() {
         ..activating(plan(NEW))
     };
     let off = |seconds| Request::ServoOff { seconds };
-    let mut world = World::new(Some(KEY), &[], 6);
+    let mut world = World::new(None, &[], 6);
     world.other_asks(0, off(255), 3);
     world.once_stored = Some(command(off(0), 4, 1));
     let refused = world.update(&on_the_word_of_another);

@@ -1,19 +1,22 @@
-//! Who may change the parameters: whoever knows the key of the stage.
+//! Who may move the pose, make it invalid, or reset: whoever knows the key of the stage.
 //!
 //! The tag is AES-CMAC (NIST SP 800-38B, RFC 4493) over whole blocks of 16 bytes: a domain, the
-//! nonce, the blob padded with zeros, and a last block of sequence number, length in bytes, the
-//! blob's CRC-32C (without a blob, that of the record to go back to) and a zero. Numbers are words
-//! of 32 bits, lowest byte first. The construction stands here, on the
+//! nonce, the blob padded with zeros, and a last block of four words: those of the command
+//! ([`Command::payload`], number and token first), the blob's length in bytes, and its CRC-32C. A
+//! command other than a commit has no blob, and two zeros; a commit that goes back has the CRC-32C of
+//! the blob to go back to. Numbers are words of 32 bits, lowest byte first. The construction stands here, on the
 //! block cipher of a library: over whole blocks it is a few lines, and they cannot panic. (The crate
 //! `cmac` 0.8.0 can, as the linker shows at opt-level "s".)
 
+use crate::can::command::Command;
+use crate::can::e2e::Payload;
 use aes::Aes128Enc;
 use aes::cipher::{BlockCipherEncrypt, KeyInit};
 
 /// A key of AES-128, one for each stage.
 pub type Key = [u8; 16];
 
-/// A number used once: random, drawn by the node for each transfer.
+/// A number used once: random, drawn by the node for each tag.
 pub type Nonce = [u32; 4];
 
 /// Bytes of a tag: all that AES-CMAC gives.
@@ -24,7 +27,7 @@ pub(super) const BLOCK: usize = 16;
 
 /// First block under every tag, so that a tag made with the same key for anything else is none of
 /// these.
-const DOMAIN: [u8; BLOCK] = *b"hall-parameters1";
+const DOMAIN: [u8; BLOCK] = *b"hall-requests-v2";
 
 /// A tag that is computed piece by piece. The round keys, 352 bytes, are made anew for each.
 #[derive(Clone)]
@@ -63,8 +66,9 @@ impl Authenticator {
     }
 
     /// The tag, once all bytes of the blob went in.
-    pub fn tag(&self, sequence: u32, bytes: u32, crc: u32) -> [u8; TAG_BYTES] {
-        self.last(in_one_block([sequence, bytes, crc, 0]))
+    pub fn tag(&self, command: &Command, bytes: u32, crc: u32) -> [u8; TAG_BYTES] {
+        let Payload { short, long } = command.payload();
+        self.last(in_one_block([short, long, bytes, crc]))
     }
 
     /// The tag that ends with this block, which is whole.
@@ -77,9 +81,14 @@ impl Authenticator {
         encrypt(&cipher, self.chain ^ block ^ k1).to_le_bytes()
     }
 
-    /// Whether `tag` is the tag, in a time that does not depend on where they differ.
-    pub fn agrees(&self, (sequence, bytes, crc): (u32, u32, u32), tag: &[u8; TAG_BYTES]) -> bool {
-        let own = self.tag(sequence, bytes, crc);
+    /// Whether `tag` is that of this command, in a time that does not depend on where they differ.
+    pub fn agrees(
+        &self,
+        command: &Command,
+        (bytes, crc): (u32, u32),
+        tag: &[u8; TAG_BYTES],
+    ) -> bool {
+        let own = self.tag(command, bytes, crc);
         u128::from_le_bytes(own) ^ u128::from_le_bytes(*tag) == 0
     }
 }
@@ -101,13 +110,13 @@ impl core::fmt::Debug for Authenticator {
     }
 }
 
-/// The tag that a host sends with a blob, or without one to go back; `crc` is that of the blob
-/// that will run.
-pub fn tag(key: &Key, nonce: &Nonce, sequence: u32, blob: &[u8], crc: u32) -> [u8; TAG_BYTES] {
+/// The tag that a host sends before a command. `blob` and `crc` are those of what a commit stores:
+/// without a blob it goes back to the one of this CRC. For any other command both are empty.
+pub fn tag(key: &Key, nonce: &Nonce, command: &Command, blob: &[u8], crc: u32) -> [u8; TAG_BYTES] {
     let bytes = u32::try_from(blob.len()).unwrap_or(u32::MAX);
     let mut authenticator = Authenticator::new(key, nonce);
     authenticator.update(blob);
-    authenticator.tag(sequence, bytes, crc)
+    authenticator.tag(command, bytes, crc)
 }
 
 #[cfg(test)]
@@ -115,7 +124,13 @@ mod tests {
     extern crate std;
 
     use super::*;
+    use crate::can::command::Request;
+    use crate::can::update::UpdateRequest;
     use cmac::{Cmac, Mac};
+
+    const fn commit(sequence: u32) -> Command {
+        Command::new(Request::Update(UpdateRequest::Commit { sequence }), 0xab)
+    }
 
     /// RFC 4493, section 4: the key, and the tags of 16 and 64 bytes.
     #[test]
@@ -147,37 +162,47 @@ mod tests {
             let mut padded = blob.clone();
             padded.resize(blob.len().next_multiple_of(BLOCK), 0);
             let mut other = Cmac::<aes::Aes128>::new(&key.into());
-            other.update(b"hall-parameters1");
+            other.update(b"hall-requests-v2");
             nonce
                 .iter()
                 .for_each(|word| other.update(&word.to_le_bytes()));
             other.update(&padded);
-            for word in [bytes + 1, bytes, !bytes, 0] {
+            // Commit is command 9; the token stands above the four bits of the number.
+            for word in [0xab9, bytes + 1, bytes, !bytes] {
                 other.update(&word.to_le_bytes());
             }
             let want: [u8; 16] = other.finalize().into_bytes().into();
-            assert_eq!(tag(&key, &nonce, bytes + 1, &blob, !bytes), want);
+            assert_eq!(tag(&key, &nonce, &commit(bytes + 1), &blob, !bytes), want);
         }
     }
 
     #[test]
     fn every_input_changes_the_tag_and_pieces_do_not() {
         let (key, nonce, blob) = ([7; 16], [1, 2, 3, 4], [5; 100]);
-        let want = tag(&key, &nonce, 9, &blob, 6);
+        let want = tag(&key, &nonce, &commit(9), &blob, 6);
         let mut pieces = Authenticator::new(&key, &nonce);
         blob.chunks(32).for_each(|piece| pieces.update(piece));
-        assert!(pieces.agrees((9, 100, 6), &want));
+        assert!(pieces.agrees(&commit(9), (100, 6), &want));
         for bit in 0..128 {
             let wrong = u128::from_le_bytes(want) ^ 1 << bit;
-            assert!(!pieces.agrees((9, 100, 6), &wrong.to_le_bytes()));
+            assert!(!pieces.agrees(&commit(9), (100, 6), &wrong.to_le_bytes()));
         }
-        assert_ne!(tag(&[8; 16], &nonce, 9, &blob, 6), want);
-        assert_ne!(tag(&key, &[1, 2, 3, 5], 9, &blob, 6), want);
-        assert_ne!(tag(&key, &nonce, 10, &blob, 6), want);
-        assert_ne!(tag(&key, &nonce, 9, &blob[..99], 6), want);
-        assert_ne!(tag(&key, &nonce, 9, &blob, 7), want);
+        assert_ne!(tag(&[8; 16], &nonce, &commit(9), &blob, 6), want);
+        assert_ne!(tag(&key, &[1, 2, 3, 5], &commit(9), &blob, 6), want);
+        assert_ne!(tag(&key, &nonce, &commit(10), &blob, 6), want);
+        let (other_token, other_request) = (
+            Command {
+                token: 0xac,
+                ..commit(9)
+            },
+            Command::new(Request::ServoOff { seconds: 9 }, 0xab),
+        );
+        assert_ne!(tag(&key, &nonce, &other_token, &blob, 6), want);
+        assert_ne!(tag(&key, &nonce, &other_request, &blob, 6), want);
+        assert_ne!(tag(&key, &nonce, &commit(9), &blob[..99], 6), want);
+        assert_ne!(tag(&key, &nonce, &commit(9), &blob, 7), want);
         // Of equal blocks, too, the length is part of it.
-        let of_zeros = |bytes| tag(&key, &nonce, 9, &[0; 4][..bytes], 6);
+        let of_zeros = |bytes| tag(&key, &nonce, &commit(9), &[0; 4][..bytes], 6);
         assert_ne!(of_zeros(3), of_zeros(4));
     }
 }

@@ -7,7 +7,8 @@ fn a_wrong_tag_a_second_guess_and_data_after_the_commit_store_nothing() {
     let mut bench = Bench::new(Some(KEY));
     bench.servo_off();
     bench.transfer(7, NEW, 4);
-    bench.tag(7, tag(&KEY, &[0; 4], 4, NEW, NEW_CRC));
+    let stale = tag(&KEY, &[0; 4], &committing(4, 7), NEW, NEW_CRC);
+    bench.tag(7, stale);
     assert_eq!(bench.update(commit(4), 7), STARTED);
     let refused = (Outcome::NotAuthorised, 0);
     bench.ends(7, refused);
@@ -26,18 +27,125 @@ fn a_wrong_tag_a_second_guess_and_data_after_the_commit_store_nothing() {
     assert_eq!((&bench.store.newest.1[..], bench.store.writes), (NEW, 1));
 }
 
+/// The command that commits.
+const fn committing(sequence: u32, token: u8) -> Command {
+    Command::new(Request::Update(commit(sequence)), token)
+}
+
 #[test]
-fn without_a_random_number_no_transfer_begins_where_a_key_is_needed() {
-    for (key, want) in [(Some(KEY), (Outcome::NoRandomNumber, 0)), (None, BEGUN)] {
-        let mut bench = Bench::new(key);
+fn without_a_random_number_nothing_can_be_asked_for_that_needs_a_tag() {
+    let mut bench = Bench::new(Some(KEY));
+    for part in 0..4 {
         let around = Surroundings {
             servo_is_off: true,
             store: &mut bench.store,
             nonce: None,
         };
-        assert_eq!(bench.receiver.obey(7, BEGIN, around), want);
-        assert_eq!(bench.receiver.is_updating(), key.is_none());
+        let challenge = UpdateRequest::Challenge { part };
+        let answered = bench.receiver.obey(7, challenge, around);
+        let why = [Outcome::NoRandomNumber, Outcome::NoTransfer][usize::from(part > 0)];
+        assert_eq!(answered, (why, 0));
     }
+    bench.tag(
+        7,
+        tag(
+            &KEY,
+            &[0; 4],
+            &Command::new(Request::Update(BEGIN), 7),
+            &[],
+            0,
+        ),
+    );
+    assert_eq!(bench.update(BEGIN, 7), NOT_AUTHORISED);
+    assert!(!bench.receiver.is_updating());
+}
+
+const NOT_AUTHORISED: (Outcome, u32) = (Outcome::NotAuthorised, 0);
+
+/// All that moves the pose, makes it invalid or resets.
+const WITH_TAG: [Request; 7] = [
+    Request::ServoOff { seconds: 255 },
+    Request::Rezero { ticks: 300 },
+    Request::ClearZero,
+    Request::Record { on: true },
+    Request::Record { on: false },
+    Request::Update(UpdateRequest::Activate),
+    Request::Update(BEGIN),
+];
+
+#[test]
+fn no_request_that_moves_or_resets_is_obeyed_without_its_own_fresh_tag() {
+    for request in WITH_TAG {
+        let mut bench = Bench::new(Some(KEY));
+        bench.servo_off();
+        // None at all, and none that was asked for.
+        assert_eq!(bench.ask(request, 7), NOT_AUTHORISED, "{request:?}");
+        // The tag of another token, of another request, and by another key.
+        let other = Request::ServoOff { seconds: 254 };
+        for wrong in [
+            tag(&KEY, &bench.nonce(), &Command::new(request, 8), &[], 0),
+            tag(&KEY, &bench.nonce(), &Command::new(other, 7), &[], 0),
+            tag(&[0; 16], &bench.nonce(), &Command::new(request, 7), &[], 0),
+        ] {
+            bench.tag(7, wrong);
+            assert_eq!(bench.ask(request, 7), NOT_AUTHORISED, "{request:?}");
+        }
+        // Three of its four words, and then the fourth.
+        let own = tag(&KEY, &bench.nonce(), &Command::new(request, 7), &[], 0);
+        for k in 1..4 {
+            bench.data(
+                7,
+                TAG_INDEX + k,
+                word_of(&own, k.into()).expect("four words"),
+            );
+        }
+        assert_eq!(
+            bench.ask(request, 7),
+            (Outcome::Incomplete, TAG_INDEX.into())
+        );
+        bench.data(7, TAG_INDEX, word_of(&own, 0).expect("four words"));
+        let answer = bench.ask(request, 7);
+        assert_ne!(answer, NOT_AUTHORISED, "{request:?}");
+        // Its answer comes again, and nobody else's request passes by it.
+        assert_eq!(bench.ask(request, 7), answer);
+        assert_eq!(bench.ask(request, 8), NOT_AUTHORISED, "{request:?}");
+    }
+}
+
+#[test]
+fn a_tagged_request_that_is_played_again_is_answered_and_not_obeyed() {
+    let mut bench = Bench::new(Some(KEY));
+    let off = Request::ServoOff { seconds: 1 };
+    assert_eq!(bench.ask_tagged(off, 7), DONE);
+    assert!(bench.service.servo_is_off());
+    bench.rest();
+    assert_eq!(bench.ask(off, 7), DONE);
+    assert!(!bench.service.servo_is_off());
+    bench.nonce();
+    let incomplete = (Outcome::Incomplete, TAG_INDEX.into());
+    assert_eq!(bench.ask(off, 7), incomplete);
+}
+
+#[test]
+fn without_a_key_the_line_must_say_off_for_all_that_moves_or_resets() {
+    for request in WITH_TAG {
+        for (line, is_obeyed) in [(Some(false), false), (Some(true), true), (None, true)] {
+            let mut bench = Bench::new(None);
+            bench
+                .service
+                .before_tick(None::<&mut runtime::PoseTracker>, line);
+            let (outcome, _) = bench.ask(request, 7);
+            let needs_declaration = matches!(request, Request::Update(_));
+            let is_refused = outcome == Outcome::ServoOn;
+            assert!(
+                is_obeyed != is_refused || needs_declaration,
+                "{request:?} {line:?}"
+            );
+        }
+    }
+    // Whoever says that the servo is on is believed.
+    let mut bench = Bench::new(Some(KEY));
+    assert_eq!(bench.ask(Request::ServoOff { seconds: 0 }, 7), DONE);
 }
 
 #[test]
@@ -70,22 +178,22 @@ fn a_second_host_is_told_busy_until_the_first_is_done_or_silent() {
 /// Whoever recorded a transfer that was never stored has a blob, a tag and a number that are still
 /// due. Only the nonce tells them from an answer to this challenge.
 #[test]
-fn each_transfer_asks_for_a_new_nonce_and_a_recorded_tag_answers_none() {
+fn each_tag_asks_for_a_new_nonce_and_a_recorded_tag_answers_none() {
     let mut bench = Bench::new(Some(KEY));
     bench.servo_off();
     let (mut nonces, mut recorded) = (Vec::new(), None);
-    for token in 0..20 {
-        assert_eq!(bench.update(BEGIN, token), BEGUN);
+    for time in 0..20 {
+        let token = 7;
+        assert_eq!(bench.update_tagged(BEGIN, token), BEGUN);
         let nonce = bench.nonce();
-        // The same for the whole of one transfer, and then never again.
-        assert_eq!(bench.nonce(), nonce);
         assert!(!nonces.contains(&nonce));
         nonces.push(nonce);
         bench.blob(token, NEW);
-        let own = tag(&KEY, &nonce, 4, NEW, NEW_CRC);
+        // One token for all: only the number tells them apart.
+        let own = tag(&KEY, &nonce, &committing(4, token), NEW, NEW_CRC);
         bench.tag(token, *recorded.get_or_insert(own));
         // The first tag would be right: it is kept, and never used.
-        if token > 0 {
+        if time > 0 {
             assert_eq!(bench.update(commit(4), token), STARTED);
             bench.ends(token, (Outcome::NotAuthorised, 0));
         }

@@ -1,11 +1,11 @@
 //! A node's side of an update.
 
-use super::authentication::{Authenticator, Nonce};
+use super::authentication::{Authenticator, Nonce, TAG_BYTES};
 use super::request::{UpdateData, UpdateRequest};
 use super::staging::{Staging, crc_of};
 use super::store::{Change, NotWritten, Store};
 use super::tell::{Identity, tell};
-use crate::can::command::{Answer, Outcome};
+use crate::can::command::{Answer, Command, Outcome, Request};
 use runtime::ParameterSet;
 use runtime::blob::{BlobError, MAX_BYTES};
 
@@ -20,8 +20,8 @@ pub struct Surroundings<'u> {
     pub servo_is_off: bool,
     /// Keeps the parameters.
     pub store: &'u mut dyn Store,
-    /// A fresh random number, for a transfer that begins; `None` if there is no source of any:
-    /// a node with a key then refuses the transfer.
+    /// A fresh random number, for a host that asks for one; `None` if there is no source of any:
+    /// nothing can be authorised then.
     pub nonce: Option<Nonce>,
 }
 
@@ -33,13 +33,28 @@ struct Transfer {
     bytes: usize,
     /// The low half of its CRC-32C, as it was begun.
     check: u16,
-    nonce: Nonce,
     idle_ticks: u32,
-    /// Sequence number and CRC-32C of what is to be stored, once that is asked for.
-    commit: Option<(u32, u32)>,
+    /// What is to be stored, once that is asked for.
+    commit: Option<Commit>,
 }
 
-/// Receives blobs, one at a time, and has them stored: [`Receiver::take`] with every frame of
+/// What is to be stored.
+#[derive(Clone, Debug)]
+struct Commit {
+    sequence: u32,
+    /// CRC-32C of the blob.
+    crc: u32,
+    tag: Tag,
+}
+
+/// A tag, and the number that it must be over.
+#[derive(Clone, Debug)]
+struct Tag {
+    nonce: Nonce,
+    bytes: [u8; TAG_BYTES],
+}
+
+/// Receives tags, and blobs, one at a time, and has them stored: [`Receiver::take`] with every frame of
 /// data, [`Receiver::obey`] with every request, [`Receiver::tick`] in every tick, and
 /// [`Receiver::store`] when [`Receiver::is_storing`] says so.
 #[derive(Clone, Debug)]
@@ -48,6 +63,10 @@ pub struct Receiver<'s> {
     idle_ticks_max: u32,
     staging: Staging,
     transfer: Option<Transfer>,
+    /// The number that the next tag is over: asked for, and not used yet.
+    nonce: Option<Nonce>,
+    /// The last command that was obeyed by its tag, and its answer, until a number is asked for.
+    answered: Option<(Command, (Outcome, u32))>,
     /// Token and end of the last transfer, for a host that asks again.
     ended: Option<(u8, Outcome, u32)>,
     wants_reset: bool,
@@ -61,6 +80,8 @@ impl<'s> Receiver<'s> {
             idle_ticks_max: IDLE_S.saturating_mul(ticks_per_s),
             staging: Staging::EMPTY,
             transfer: None,
+            nonce: None,
+            answered: None,
             ended: None,
             wants_reset: false,
         }
@@ -81,15 +102,68 @@ impl<'s> Receiver<'s> {
         matches!(&self.transfer, Some(transfer) if transfer.commit.is_some())
     }
 
-    /// Takes a word. Words of other transfers, and of one that is being stored, are ignored.
-    pub fn take(&mut self, data: &UpdateData) {
-        if let Some(transfer) = &mut self.transfer
-            && transfer.token == data.token
-            && transfer.commit.is_none()
-        {
-            transfer.idle_ticks = 0;
-            self.staging.put(data.index, data.word, transfer.bytes);
+    /// Whether its requests need a tag.
+    pub const fn has_key(&self) -> bool {
+        self.identity.key.is_some()
+    }
+
+    /// Whether a command came with its tag, over the number that was asked for. That number is used up
+    /// by a right tag and by a wrong one. `Err` is the answer to a command that is not to be obeyed: a
+    /// repeated one is answered as before.
+    pub fn authorise(&mut self, command: &Command) -> Result<(), (Outcome, u32)> {
+        if let Some((_, answer)) = self.answered.filter(|(before, _)| before == command) {
+            return Err(answer);
         }
+        let refused = Err((Outcome::NotAuthorised, 0));
+        let Some(nonce) = self.nonce else {
+            return refused;
+        };
+        if let Some(index) = self.staging.missing(0, true) {
+            return Err((Outcome::Incomplete, index.into()));
+        }
+        self.nonce = None;
+        match self.agrees(
+            command,
+            &[],
+            0,
+            &Tag {
+                nonce,
+                bytes: self.staging.tag(),
+            },
+        ) {
+            true => Ok(()),
+            false => refused,
+        }
+    }
+
+    /// Notes how a command that needs a tag was answered.
+    pub(in crate::can) fn note_answer(&mut self, command: &Command, answer: (Outcome, u32)) {
+        let is_final = !matches!(answer.0, Outcome::NotAuthorised | Outcome::Incomplete);
+        if self.has_key() && is_final {
+            self.answered = Some((*command, answer));
+        }
+    }
+
+    /// Whether a tag is right; true without a key.
+    fn agrees(&self, command: &Command, blob: &[u8], crc: u32, tag: &Tag) -> bool {
+        let Some(key) = &self.identity.key else {
+            return true;
+        };
+        let mut authenticator = Authenticator::new(key, &tag.nonce);
+        authenticator.update(blob);
+        authenticator.agrees(command, (blob.len() as u32, crc), &tag.bytes)
+    }
+
+    /// Takes a word: of a tag, or of the open transfer. Words of other transfers, and of one that is
+    /// being stored, are ignored.
+    pub fn take(&mut self, data: &UpdateData) {
+        let open = self.transfer.as_mut();
+        let own = open.filter(|open| open.token == data.token && open.commit.is_none());
+        let bytes = own.map_or(0, |transfer| {
+            transfer.idle_ticks = 0;
+            transfer.bytes
+        });
+        self.staging.put(data.index, data.word, bytes);
     }
 
     /// Obeys a request; outcome and detail are to be answered. After [`Outcome::Started`]
@@ -111,9 +185,18 @@ impl<'s> Receiver<'s> {
                 None => (Outcome::UnknownCommand, 0),
             },
             UpdateRequest::Challenge { part } => {
-                let nonce = self.transfer.as_ref().map(|transfer| transfer.nonce);
-                let word = nonce.and_then(|nonce| nonce.get(usize::from(part)).copied());
-                word.map_or((Outcome::NoTransfer, 0), |word| (Outcome::Done, word))
+                if part == 0 {
+                    (self.nonce, self.answered) = (around.nonce, None);
+                    self.staging.clear_tag();
+                }
+                let word = self
+                    .nonce
+                    .and_then(|nonce| nonce.get(usize::from(part)).copied());
+                match (word, part) {
+                    (Some(word), _) => (Outcome::Done, word),
+                    (None, 0) => (Outcome::NoRandomNumber, 0),
+                    (None, _) => (Outcome::NoTransfer, 0),
+                }
             }
             UpdateRequest::Abort => self.abort(token),
             // Once it has ended, nothing begins: this only asks again.
@@ -166,18 +249,15 @@ impl<'s> Receiver<'s> {
         servo_is_off: bool,
         store: &mut dyn Store,
     ) -> Option<(Outcome, u32)> {
-        let (sequence, crc) = transfer.commit?;
+        let Commit { sequence, crc, tag } = transfer.commit.as_ref()?;
+        let (sequence, crc) = (*sequence, *crc);
         if !servo_is_off {
             return Some((Outcome::ServoOn, 0));
         }
         let blob = self.staging.blob(transfer.bytes);
-        if let Some(key) = &self.identity.key {
-            let mut authenticator = Authenticator::new(key, &transfer.nonce);
-            authenticator.update(blob);
-            let last = (sequence, transfer.bytes as u32, crc);
-            if !authenticator.agrees(last, &self.staging.tag()) {
-                return Some((Outcome::NotAuthorised, 0));
-            }
+        let request = Request::Update(UpdateRequest::Commit { sequence });
+        if !self.agrees(&Command::new(request, transfer.token), blob, crc, tag) {
+            return Some((Outcome::NotAuthorised, 0));
         }
         if let Err(error) = check(blob, self.identity.serial) {
             return Some((Outcome::BadContent, error.number().into()));
@@ -221,17 +301,12 @@ impl<'s> Receiver<'s> {
                 Some(_) => {}
             }
         }
-        let nonce = match (self.identity.key, around.nonce) {
-            (Some(_), None) => return Err((Outcome::NoRandomNumber, 0)),
-            (_, nonce) => nonce.unwrap_or_default(),
-        };
         self.staging.clear();
         self.ended = None;
         self.transfer = Some(Transfer {
             token,
             bytes,
             check,
-            nonce,
             idle_ticks: 0,
             commit: None,
         });
@@ -242,13 +317,13 @@ impl<'s> Receiver<'s> {
         let Some(transfer) = self.transfer.as_mut().filter(|t| t.token == token) else {
             return (Outcome::Busy, 0);
         };
-        match transfer.commit {
+        match &transfer.commit {
             None => transfer.idle_ticks = 0,
-            Some((asked, _)) if asked == sequence => return (Outcome::Started, 0),
+            Some(commit) if commit.sequence == sequence => return (Outcome::Started, 0),
             Some(_) => return (Outcome::Busy, 0),
         }
-        let has_key = self.identity.key.is_some();
-        if let Some(index) = self.staging.missing(transfer.bytes, has_key) {
+        let with_tag = self.identity.key.is_some();
+        if let Some(index) = self.staging.missing(transfer.bytes, with_tag) {
             return (Outcome::Incomplete, index.into());
         }
         // Of two transfers that were made for the same store only one is stored.
@@ -261,7 +336,14 @@ impl<'s> Receiver<'s> {
             bytes => crc_of(self.staging.blob(bytes)),
         };
         if let Some(crc) = crc.filter(|crc| *crc as u16 == transfer.check) {
-            transfer.commit = Some((sequence, crc));
+            // A number that was never asked for, or is used up, is no zero that a tag could be over.
+            let Some(nonce) = self.nonce.take().or((!with_tag).then_some([0; 4])) else {
+                self.end(token, (Outcome::NotAuthorised, 0));
+                return (Outcome::NotAuthorised, 0);
+            };
+            let bytes = self.staging.tag();
+            let tag = Tag { nonce, bytes };
+            transfer.commit = Some(Commit { sequence, crc, tag });
             return (Outcome::Started, 0);
         }
         let end = (Outcome::BadContent, WRONG_CHECK);

@@ -161,7 +161,23 @@ impl Bench {
 
     fn servo_off(&mut self) {
         let off = Request::ServoOff { seconds: 255 };
-        assert_eq!(self.ask(off, 99), (Outcome::Done, 0));
+        assert_eq!(self.ask_tagged(off, 99), (Outcome::Done, 0));
+    }
+
+    /// Asks with the right tag, where the node has a key.
+    fn ask_tagged(&mut self, request: Request, token: u8) -> (Outcome, u32) {
+        if self.receiver.has_key() {
+            let nonce = self.nonce();
+            self.tag(
+                token,
+                tag(&KEY, &nonce, &Command::new(request, token), &[], 0),
+            );
+        }
+        self.ask(request, token)
+    }
+
+    fn update_tagged(&mut self, request: UpdateRequest, token: u8) -> (Outcome, u32) {
+        self.ask_tagged(Request::Update(request), token)
     }
 
     fn data(&mut self, token: u8, index: u8, word: u32) {
@@ -225,14 +241,15 @@ impl Bench {
         let crc = crc_of(blob).or(previous).expect("a blob, or one before");
         let begin = UpdateRequest::begin(blob.len(), crc);
         let begun = (Outcome::Done, begin.argument());
-        assert_eq!(self.update(begin, token), begun);
+        assert_eq!(self.update_tagged(begin, token), begun);
         let nonce = self.nonce();
         self.blob(token, blob);
         if self.receiver.identity.key.is_some() {
             let incomplete = (Outcome::Incomplete, TAG_INDEX.into());
             assert_eq!(self.update(commit(sequence), token), incomplete);
         }
-        self.tag(token, tag(&KEY, &nonce, sequence, blob, crc));
+        let command = Command::new(Request::Update(commit(sequence)), token);
+        self.tag(token, tag(&KEY, &nonce, &command, blob, crc));
     }
 }
 

@@ -36,6 +36,13 @@ impl Staging {
         *self = Self::EMPTY;
     }
 
+    /// Forgets the tag.
+    pub(super) fn clear_tag(&mut self) {
+        for k in 0..TAG_WORDS {
+            self.note(WORDS_MAX + k, false);
+        }
+    }
+
     /// Keeps a word of a blob of `bytes` bytes, or of the tag. Any other index is ignored.
     pub(super) fn put(&mut self, index: u8, word: u32, bytes: usize) {
         let k = usize::from(index);
@@ -45,11 +52,21 @@ impl Staging {
             None if k < bytes.div_ceil(WORD) => (self.blob.get_mut(k), k),
             None => return,
         };
-        let (Some(to), Some(there)) = (to, self.there.get_mut(noted / 8)) else {
-            return;
-        };
-        *to = word.to_le_bytes();
-        *there |= 1 << (noted % 8);
+        if let Some(to) = to {
+            *to = word.to_le_bytes();
+            self.note(noted, true);
+        }
+    }
+
+    fn note(&mut self, noted: usize, is_there: bool) {
+        if let Some(there) = self.there.get_mut(noted / 8) {
+            let bit = 1 << (noted % 8);
+            *there = if is_there {
+                *there | bit
+            } else {
+                *there & !bit
+            };
+        }
     }
 
     fn is_there(&self, noted: usize) -> bool {

@@ -2,9 +2,10 @@
 
 use super::{MISSING_ONE_IN, Recorded, RecorderError, RecorderSettings, Watch};
 use crate::bus::live::{Bus, BusError, now_us};
+use crate::bus::update::{Link, Talk, UpdateError};
 use crate::interrupt;
 use crate::output::record_file::RecordFile;
-use hal_adapters::can::command::{Answer, Command, Mailbox, Outcome, Request, Told};
+use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::table::TABLE;
 use hal_adapters::can::{BusFrame, Message, StampedFrame};
 use hal_adapters::candump::LogLine;
@@ -14,10 +15,8 @@ use std::time::{Duration, Instant};
 
 /// Longest wait for a frame: how soon Ctrl-C is noticed on a silent bus.
 const WAIT_MAX: Duration = Duration::from_millis(50);
-/// How long an answer is waited for before the request is repeated.
-const PATIENCE: Duration = Duration::from_millis(300);
-/// How often a controller is asked.
-const ATTEMPTS: u8 = 4;
+/// How long a request may wait for a place in the transmit queue.
+const SEND_DEADLINE: Duration = Duration::from_millis(20);
 /// Time from request to request for codes that stay away.
 const SILENCE: Duration = Duration::from_secs(1);
 /// Time from display to display.
@@ -34,7 +33,7 @@ pub fn run(settings: &RecorderSettings) -> Result<Recorded, RecorderError> {
         bus: Bus::open(&settings.interface, &messages)?,
         file: RecordFile::create(&settings.out).map_err(RecorderError::NoRecord)?,
         watch: Watch::default(),
-        mailbox: Mailbox::default(),
+        failure: None,
         // A node ignores a request that equals the last one: another token for each program.
         token: now_us() as u8,
         started: Instant::now(),
@@ -71,8 +70,9 @@ struct Session<'s> {
     bus: Bus,
     file: RecordFile,
     watch: Watch,
-    mailbox: Mailbox,
     token: u8,
+    /// Why the dialog ended, if not by an answer.
+    failure: Option<RecorderError>,
     started: Instant,
     shown: Option<Instant>,
 }
@@ -80,29 +80,21 @@ struct Session<'s> {
 impl Session<'_> {
     /// Asks for codes, or for an end of them, and waits for the answer.
     fn ask(&mut self, on: bool) -> Result<(), RecorderError> {
-        for _ in 0..ATTEMPTS {
-            self.token = self.token.wrapping_add(1);
-            let command = Command::new(Request::Record { on }, self.token);
-            if let Some(coded) = self.mailbox.send(&Told::Command(command)) {
-                self.send(BusFrame::from(coded))?;
-            }
-            let asked = Instant::now();
-            while let Some(left) = PATIENCE.checked_sub(asked.elapsed()) {
-                match self.turn(left)? {
-                    Some(Told::Answer(answer)) if is_for(&answer, &command) => {
-                        return match answer.outcome {
-                            Some(Outcome::Done) => Ok(()),
-                            outcome => Err(RecorderError::Refused { outcome }),
-                        };
-                    }
-                    _ => {}
-                }
-            }
+        // Each dialog uses five tokens at most for each tag.
+        self.token = self.token.wrapping_add(40);
+        let (key, token) = (self.settings.key, self.token);
+        let mut talk = Talk::new(&mut *self, token);
+        let answered = talk.exchange_tagged(key.as_ref(), Request::Record { on });
+        match answered {
+            Ok((Outcome::Done, _)) => Ok(()),
+            Ok((outcome, _)) => Err(RecorderError::Refused {
+                outcome: Some(outcome),
+            }),
+            Err(UpdateError::Unexpected { outcome }) => Err(RecorderError::Refused { outcome }),
+            Err(_) => Err(self.failure.take().unwrap_or(RecorderError::NoAnswer {
+                interface: self.settings.interface.clone(),
+            })),
         }
-        Err(RecorderError::NoAnswer {
-            interface: self.settings.interface.clone(),
-            waited_ms: (PATIENCE * ATTEMPTS.into()).as_millis(),
-        })
     }
 
     fn record(&mut self, stop: &AtomicBool) -> Result<(), RecorderError> {
@@ -132,25 +124,31 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Records the next frame, waiting for it no longer than `wait`; gives what it tells.
-    fn turn(&mut self, wait: Duration) -> Result<Option<Told>, RecorderError> {
+    /// Records the next frame, waiting for it no longer than `wait`.
+    fn turn(&mut self, wait: Duration) -> Result<Option<BusFrame>, RecorderError> {
         let stamped = match self.bus.receive(wait.min(WAIT_MAX)) {
             Ok(Some(stamped)) => stamped,
             Ok(None) => return Ok(None),
             Err(error) => return self.wait_out(error).map(|()| None),
         };
         self.write(&stamped)?;
-        Ok(self.watch.take(&stamped))
+        self.watch.take(&stamped);
+        Ok(Some(stamped.frame))
     }
 
-    fn send(&mut self, frame: BusFrame) -> Result<(), RecorderError> {
-        match self.bus.send(&[frame], PATIENCE) {
+    fn request(&mut self, frame: BusFrame) -> Result<(), RecorderError> {
+        match self.bus.send(&[frame], SEND_DEADLINE) {
             Ok(()) => self.write(&StampedFrame {
                 time_us: now_us(),
                 frame,
             }),
             Err(error) => self.wait_out(error),
         }
+    }
+
+    fn failed(&mut self, error: RecorderError) -> UpdateError {
+        self.failure = Some(error);
+        UpdateError::Link
     }
 
     fn write(&mut self, stamped: &StampedFrame) -> Result<(), RecorderError> {
@@ -214,6 +212,17 @@ impl Session<'_> {
     }
 }
 
-fn is_for(answer: &Answer, command: &Command) -> bool {
-    (answer.number, answer.token) == (command.number, command.token)
+impl Link for &mut Session<'_> {
+    fn send(&mut self, frame: BusFrame) -> Result<(), UpdateError> {
+        self.request(frame).map_err(|error| self.failed(error))
+    }
+
+    fn receive(&mut self, until_us: u64) -> Result<Option<BusFrame>, UpdateError> {
+        let wait = Duration::from_micros(until_us.saturating_sub(Link::now_us(self)));
+        self.turn(wait).map_err(|error| self.failed(error))
+    }
+
+    fn now_us(&self) -> u64 {
+        u64::try_from(self.started.elapsed().as_micros()).unwrap_or(u64::MAX)
+    }
 }

@@ -21,18 +21,16 @@ const SILENT_US: u64 = 1_000_000;
 
 impl Watch {
     /// Takes a frame; gives what it tells, other than codes and poses.
-    pub fn take(&mut self, stamped: &StampedFrame) -> Option<Told> {
+    pub fn take(&mut self, stamped: &StampedFrame) {
         let before = self.counts().ticks;
         self.collector.take(stamped);
         if self.counts().ticks > before {
             self.first_us.get_or_insert(stamped.time_us);
             self.last_us = stamped.time_us;
         }
-        let told = self.mailbox.take(&stamped.frame)?.ok()?;
-        if let Told::Status(status) = told {
+        if let Some(Ok(Told::Status(status))) = self.mailbox.take(&stamped.frame) {
             self.status = Some(status);
         }
-        Some(told)
     }
 
     /// Ticks that did not come between the last one and `end_us`, if that is long ago: codes that
@@ -125,7 +123,7 @@ mod tests {
             for sequence in (0..100).filter(|s| !(20..22).contains(s) && *s != 50) {
                 let frame = RawFrame::new([1, 2, sequence as i32], [3; 3], sequence, 0);
                 for coded in sensor::frames(layout, &frame) {
-                    assert_eq!(watch.take(&stamped(coded, sequence)), None);
+                    watch.take(&stamped(coded, sequence));
                 }
             }
             assert_eq!(watch.layout(), Some(layout));
@@ -150,7 +148,7 @@ mod tests {
             version: 1,
         });
         let frame = node.send(&status).expect("a status");
-        assert_eq!(watch.take(&stamped(frame, 0)), Some(status));
+        watch.take(&stamped(frame, 0));
         assert_eq!(
             watch.state(),
             "it gets no codes from its converter (reason 0x3)"

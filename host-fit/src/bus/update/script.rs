@@ -2,19 +2,15 @@
 //! node reset to run it, the servo declared on again.
 
 use super::identity::{Identity, identify};
-use super::talk::{Link, Talk, page as tell};
+use super::talk::{Link, Talk, page as tell, words};
 use super::{Plan, UpdateError, Updated, Wanted};
-use hal_adapters::can::command::{Outcome, Request};
-use hal_adapters::can::update::{
-    Kept, TAG_INDEX, UpdateData, UpdateRequest, crc_of, page, tag, word_of,
-};
+use hal_adapters::can::command::{Command, Outcome, Request};
+use hal_adapters::can::update::{Kept, Key, UpdateRequest, crc_of, page};
 
 /// How long the servo is declared off: longer than an update takes, on a bad bus too.
 const SERVO_OFF_S: u8 = 30;
 /// How often a transfer that came to nothing, damaged or forgotten, is begun anew.
 const RESTARTS_MAX: u32 = 3;
-/// How often a commit names a word that was lost.
-const LOST_MAX: u32 = 1_000;
 /// Pause before a node is asked again whether it runs the new parameters, us, and how often.
 const RESET_US: u64 = 20_000;
 const RESET_MAX: u32 = 250;
@@ -25,7 +21,8 @@ const PROVEN_US: u64 = 2_500_000;
 struct Script<'p, L> {
     talk: &'p mut Talk<L>,
     plan: &'p Plan,
-    before: Identity,
+    /// The stage's key, if the node wants tags.
+    key: Option<Key>,
     /// What is to run.
     wanted: Kept,
     /// Token of the open transfer.
@@ -62,11 +59,13 @@ pub fn update<L: Link>(
         repeated: (0, 0),
         talk,
         plan,
-        before: before.clone(),
+        key: plan.key.filter(|_| before.needs_key),
         progress,
     };
     let is_active = if is_kept && (runs(wanted) || !plan.activates) {
         Ok(runs(wanted))
+    } else if before.needs_key && plan.key.is_none() {
+        Err(UpdateError::KeyNeeded)
     } else {
         let done = script.run(is_kept);
         script.close();
@@ -91,9 +90,6 @@ fn wanted(plan: &Plan, node: &Identity) -> Result<(Kept, bool), UpdateError> {
     if let Some(next) = node.next.filter(|next| next.crc == crc) {
         return Ok((next, true));
     }
-    if node.needs_key && plan.key.is_none() {
-        return Err(UpdateError::KeyNeeded);
-    }
     let sequence = node.newest_sequence.checked_add(1);
     let sequence = sequence.ok_or(UpdateError::NumbersUsedUp)?;
     Ok((Kept { sequence, crc }, false))
@@ -104,8 +100,13 @@ impl<L: Link> Script<'_, L> {
     fn run(&mut self, is_kept: bool) -> Result<bool, UpdateError> {
         if self.plan.declares_servo_off {
             let seconds = SERVO_OFF_S;
-            self.talk.exchange(Request::ServoOff { seconds })?;
-            self.declared = true;
+            match self.tagged(Request::ServoOff { seconds })? {
+                (Outcome::Done, _) => self.declared = true,
+                (outcome, detail) => {
+                    self.declared = true;
+                    return Err(self.refused(outcome, detail));
+                }
+            }
         }
         if !is_kept {
             self.store()?;
@@ -115,6 +116,11 @@ impl<L: Link> Script<'_, L> {
             self.activate()?;
         }
         Ok(self.plan.activates)
+    }
+
+    /// Asks with a tag, where the node wants one.
+    fn tagged(&mut self, request: Request) -> Result<(Outcome, u32), UpdateError> {
+        self.talk.exchange_tagged(self.key.as_ref(), request)
     }
 
     fn store(&mut self) -> Result<(), UpdateError> {
@@ -149,51 +155,35 @@ impl<L: Link> Script<'_, L> {
         let blob = self.plan.wanted.blob();
         let token = self.talk.transfer_token();
         let begin = UpdateRequest::begin(blob.len(), self.wanted.crc);
-        match self.talk.exchange_under(token, Request::Update(begin))? {
+        let key = self.key;
+        let begun = (self.talk).exchange_tagged_under(token, key.as_ref(), Request::Update(begin));
+        match begun? {
             (Outcome::Done, detail) if detail == begin.argument() => self.open = Some(token),
             (Outcome::NoParameters, _) => return Err(UpdateError::NoPrevious),
             (outcome, detail) => return Err(self.refused(outcome, detail)),
         }
-        let mut tag_of_blob = [0; 16];
-        if let Some(key) = self.plan.key.as_ref().filter(|_| self.before.needs_key) {
-            let mut nonce = [0; 4];
-            for (part, word) in (0..).zip(&mut nonce) {
-                let challenge = Request::Update(UpdateRequest::Challenge { part });
-                match self.talk.exchange(challenge)? {
-                    (Outcome::Done, drawn) => *word = drawn,
-                    (outcome, detail) => return Err(self.refused(outcome, detail)),
-                }
-            }
-            let Kept { sequence, crc } = self.wanted;
-            tag_of_blob = tag(key, &nonce, sequence, blob, crc);
-        }
-        let words = words(token, blob, 0);
-        let words: Vec<_> = words.chain(words_of_tag(token, &tag_of_blob)).collect();
+        let Kept { sequence, crc } = self.wanted;
+        let commit = Request::Update(UpdateRequest::Commit { sequence });
+        let mut words = words(token, blob, 0);
         for (sent, word) in (1..).zip(&words) {
             self.talk.tell(*word)?;
             (self.progress)(sent, words.len() as u64);
         }
-        let sequence = self.wanted.sequence;
-        let commit = Request::Update(UpdateRequest::Commit { sequence });
-        for _ in 0..LOST_MAX {
-            // What is being stored will be, in less than a second.
-            self.talk.may_stop = false;
-            match self.talk.exchange_under(token, commit)? {
-                (Outcome::Incomplete, index) => {
-                    self.talk.may_stop = true;
-                    self.repeated.0 += 1;
-                    for word in words.iter().filter(|word| u32::from(word.index) == index) {
-                        self.talk.tell(*word)?;
-                    }
-                }
-                (Outcome::Done, crc) if crc == self.wanted.crc => {
-                    self.open = None;
-                    return Ok(());
-                }
-                (outcome, detail) => return Err(self.refused(outcome, detail)),
-            }
+        if let Some(key) = &key {
+            let command = Command::new(commit, token);
+            words.extend(self.talk.authorise(key, &command, blob, crc)?);
         }
-        Err(UpdateError::Lossy)
+        // What is being stored will be, in less than a second.
+        self.talk.may_stop = false;
+        let (answer, lost) = self.talk.exchange_words(token, commit, &words)?;
+        self.repeated.0 += lost;
+        match answer {
+            (Outcome::Done, crc) if crc == self.wanted.crc => {
+                self.open = None;
+                Ok(())
+            }
+            (outcome, detail) => Err(self.refused(outcome, detail)),
+        }
     }
 
     /// Why a request of a transfer was not done.
@@ -231,7 +221,10 @@ impl<L: Link> Script<'_, L> {
             error => error,
         };
         let activate = Request::Update(UpdateRequest::Activate);
-        let (outcome, _) = self.talk.exchange(activate).map_err(silent)?;
+        let (outcome, _) = self.tagged(activate).map_err(silent)?;
+        if outcome == Outcome::NotAuthorised {
+            return Err(UpdateError::NotAuthorised);
+        }
         // The answer may have been lost with the reset: then the servo counts as on.
         let looks = if outcome == Outcome::Done {
             RESET_MAX
@@ -277,18 +270,6 @@ impl<L: Link> Script<'_, L> {
             let _ = self.talk.exchange(Request::ServoOff { seconds: 0 });
         }
     }
-}
-
-/// The words of `bytes`, whose first has this index.
-fn words(token: u8, bytes: &[u8], first: u8) -> impl Iterator<Item = UpdateData> {
-    (0..).map_while(move |k| {
-        let (index, word) = (first.checked_add(k)?, word_of(bytes, k.into())?);
-        Some(UpdateData { token, index, word })
-    })
-}
-
-fn words_of_tag(token: u8, tag: &[u8; 16]) -> impl Iterator<Item = UpdateData> {
-    words(token, tag, TAG_INDEX)
 }
 
 /// Why this node is not to be touched: it is that of another stage, or may be.

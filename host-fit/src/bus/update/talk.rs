@@ -3,7 +3,7 @@
 use super::UpdateError;
 use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request, Told};
-use hal_adapters::can::update::{UpdateData, UpdateRequest};
+use hal_adapters::can::update::{Key, Nonce, TAG_INDEX, UpdateData, UpdateRequest, tag, word_of};
 
 /// From frame to frame, us. The receive store of a controller holds three frames and is emptied in
 /// every tick of 2 ms: at one frame in a millisecond none is lost, not even to a tick that is late.
@@ -14,6 +14,10 @@ const PATIENCE_US: u64 = 100_000;
 const STARTED_US: u64 = 1_000_000;
 /// How often a request is sent: for 3 s, in which a controller starts.
 const ATTEMPTS: u32 = 30;
+/// How often a request is sent with a new tag, after one over a number that was no longer the last.
+const TAGS: u32 = 8;
+/// How often a node names a word that was lost.
+const LOST_MAX: u32 = 1_000;
 /// The tokens of transfers have this bit, those of other requests do not.
 const TRANSFER_TOKEN: u8 = 0x80;
 
@@ -126,6 +130,102 @@ impl<L: Link> Talk<L> {
         Err(UpdateError::NoAnswer)
     }
 
+    /// As [`Talk::exchange`], of a request that a node with a key obeys only with a tag.
+    ///
+    /// # Errors
+    /// As [`Talk::exchange`], and [`UpdateError::NoRandomNumber`].
+    pub fn exchange_tagged(
+        &mut self,
+        key: Option<&Key>,
+        request: Request,
+    ) -> Result<(Outcome, u32), UpdateError> {
+        let token = self.next_token();
+        self.exchange_tagged_under(token, key, request)
+    }
+
+    /// The same under the token of a transfer.
+    pub(super) fn exchange_tagged_under(
+        &mut self,
+        token: u8,
+        key: Option<&Key>,
+        request: Request,
+    ) -> Result<(Outcome, u32), UpdateError> {
+        let command = Command::new(request, token);
+        let mut answer = (Outcome::NotAuthorised, 0);
+        for _ in 0..TAGS {
+            let words = match key {
+                Some(key) => self.authorise(key, &command, &[], 0)?,
+                None => Vec::new(),
+            };
+            answer = self.exchange_words(token, request, &words)?.0;
+            if key.is_none() || answer.0 != Outcome::NotAuthorised {
+                break;
+            }
+        }
+        Ok(answer)
+    }
+
+    /// The answer to a request for which these words were sent: those that were lost are sent again.
+    /// And how many they were.
+    pub(super) fn exchange_words(
+        &mut self,
+        token: u8,
+        request: Request,
+        words: &[UpdateData],
+    ) -> Result<((Outcome, u32), u32), UpdateError> {
+        for lost in 0..LOST_MAX {
+            let answer = self.exchange_under(token, request)?;
+            let (Outcome::Incomplete, index) = answer else {
+                return Ok((answer, lost));
+            };
+            for word in words.iter().filter(|word| u32::from(word.index) == index) {
+                self.tell(*word)?;
+            }
+        }
+        Err(UpdateError::Lossy)
+    }
+
+    /// Sends the tag of a command, over a number that is asked for now; `blob` and `crc` as in [`tag`].
+    /// Gives the words.
+    ///
+    /// # Errors
+    /// As [`Talk::exchange`], and [`UpdateError::NoRandomNumber`], [`UpdateError::Lossy`].
+    pub fn authorise(
+        &mut self,
+        key: &Key,
+        command: &Command,
+        blob: &[u8],
+        crc: u32,
+    ) -> Result<Vec<UpdateData>, UpdateError> {
+        let nonce = self.nonce()?;
+        let tag = tag(key, &nonce, command, blob, crc);
+        let words = words(command.token, &tag, TAG_INDEX);
+        words.iter().try_for_each(|word| self.tell(*word))?;
+        Ok(words)
+    }
+
+    /// A number that a tag is to be over.
+    fn nonce(&mut self) -> Result<Nonce, UpdateError> {
+        'anew: for _ in 0..TAGS {
+            let mut nonce = [0; 4];
+            for (part, word) in (0..).zip(&mut nonce) {
+                let challenge = Request::Update(UpdateRequest::Challenge { part });
+                *word = match self.exchange(challenge)? {
+                    (Outcome::Done, drawn) => drawn,
+                    (Outcome::NoRandomNumber, _) => return Err(UpdateError::NoRandomNumber),
+                    // The node was reset, or another computer has used it up.
+                    (Outcome::NoTransfer, _) => continue 'anew,
+                    (outcome, _) => {
+                        let outcome = Some(outcome);
+                        return Err(UpdateError::Unexpected { outcome });
+                    }
+                };
+            }
+            return Ok(nonce);
+        }
+        Err(UpdateError::Lossy)
+    }
+
     /// Sends a word, to which no answer comes.
     pub(super) fn tell(&mut self, data: UpdateData) -> Result<(), UpdateError> {
         self.send(&Told::UpdateData(data))
@@ -164,6 +264,15 @@ impl<L: Link> Talk<L> {
             }
         }
     }
+}
+
+/// The words of `bytes`, whose first has this index.
+pub(super) fn words(token: u8, bytes: &[u8], first: u8) -> Vec<UpdateData> {
+    let words = (0..).map_while(|k| {
+        let (index, word) = (first.checked_add(k)?, word_of(bytes, k.into())?);
+        Some(UpdateData { token, index, word })
+    });
+    words.collect()
 }
 
 /// Tells a fact of the node.

@@ -1,22 +1,38 @@
 //! Commands over the bus.
 
+use super::update::{KEY, talk};
 use super::{Outcome, equal, expect};
 use crate::adc_model::{Part, Row};
 use crate::bench::{Bench, Seen, command};
 use crate::can_model::BusState;
 use crate::machine::Machine;
 use embedded_can::{Id, StandardId};
-use hal_adapters::can::command::{Outcome as Ended, Request};
+use hal_adapters::can::command::{Command, Outcome as Ended, Request};
 use hal_adapters::can::status::flag;
 use hal_adapters::can::{Layout, Message as M, SensorReceiver, Timing};
 use runtime::RawFrame;
 
 const PART: Part = Part::Ads131m08;
 /// From the trigger to the middle of what is sampled, by the drivers' documentation, us.
-const ADS131M08_SAMPLE_US: u32 = 150;
+const ADS131M08_SAMPLE_US: u32 = 166;
 const ADS8688_SAMPLE_US: u32 = 12;
 
 pub(super) fn ask(
+    machine: &mut Machine,
+    request: Request,
+    token: u8,
+    ticks: u64,
+) -> Result<Seen, super::Failure> {
+    let command = Command::new(request, token);
+    if command.needs_authority() {
+        // The controller without a key ignores the tag.
+        talk(machine, |talk| talk.authorise(&KEY, &command, &[], 0))?.0?;
+    }
+    ask_alone(machine, request, token, ticks)
+}
+
+/// Asks without a tag.
+pub(super) fn ask_alone(
     machine: &mut Machine,
     request: Request,
     token: u8,
@@ -28,7 +44,7 @@ pub(super) fn ask(
     Ok(Seen::since_last(machine))
 }
 
-fn ended(seen: &Seen, token: u8) -> Vec<Option<Ended>> {
+pub(super) fn ended(seen: &Seen, token: u8) -> Vec<Option<Ended>> {
     seen.answers
         .iter()
         .filter(|(_, a)| a.token == token)
@@ -262,7 +278,7 @@ pub fn record(bench: &Bench, part: Part) -> Outcome {
         };
         // Which tick is the first to be recorded, its codes tell.
         let first = ticks.first().map(codes).ok_or("no ticks")?;
-        let at = (50..60).find(|k| bench.rows[*k] == first);
+        let at = (50..90).find(|k| bench.rows[*k] == first);
         let rows = &bench.rows[at.ok_or("other codes than the converter's")?..];
         let differ = ticks
             .iter()

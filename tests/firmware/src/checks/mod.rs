@@ -1,5 +1,6 @@
 //! Every property that is checked, and how results are reported.
 
+pub mod authority;
 pub mod bus;
 pub mod commands;
 pub mod figures;

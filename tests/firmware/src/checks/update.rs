@@ -21,7 +21,7 @@ use std::collections::VecDeque;
 
 /// The program for the ADS131M08 is built with this key, the other one without any.
 pub(super) const PART: Part = Part::Ads131m08;
-const KEY: Key = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+pub(super) const KEY: Key = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 /// Between two looks at the bus.
 const STEP_NS: u64 = 250_000;
 const S: u64 = 1_000_000_000;

@@ -1,0 +1,46 @@
+//! Who may: with a key whoever has it, without one whoever holds the line low.
+
+use super::commands::{SERVO_OFF, ask, ask_alone, ended};
+use super::{Outcome, equal};
+use crate::adc_model::Part;
+use crate::bench::{Bench, Seen};
+use hal_adapters::can::command::{Outcome as Ended, Request};
+use hal_adapters::can::update::UpdateRequest;
+
+/// All that moves the pose, makes it invalid, resets, or leads to that.
+const REQUESTS: [Request; 7] = [
+    SERVO_OFF,
+    Request::Rezero { ticks: 300 },
+    Request::ClearZero,
+    Request::Record { on: true },
+    Request::Record { on: false },
+    Request::Update(UpdateRequest::begin(400, 0)),
+    Request::Update(UpdateRequest::Activate),
+];
+
+/// Without its tag no such request is obeyed by the controller with a key, whatever the line says;
+/// with it the servo is declared off. The other one obeys while the line is low, and not while it is
+/// high or open.
+pub fn tag_or_line(bench: &Bench) -> Outcome {
+    for (part, refusal) in [
+        (Part::Ads131m08, Ended::NotAuthorised),
+        (Part::Ads8688, Ended::ServoOn),
+    ] {
+        let mut machine = bench.machine(part, [&bench.blob, &[]])?;
+        machine.chip.servo_on = part == Part::Ads8688;
+        machine.run_ticks(50)?;
+        Seen::since_last(&mut machine);
+        for (token, request) in (1..).zip(REQUESTS) {
+            let seen = ask_alone(&mut machine, request, token, 10)?;
+            let what = format!("answer to {request:?}");
+            equal(&what, ended(&seen, token), vec![Some(refusal)])?;
+            equal("codes", seen.codes.len(), 0)?;
+        }
+        equal("resets", machine.panics + machine.watchdog_resets, 0)?;
+        machine.chip.servo_on = false;
+        machine.run_ticks(1)?;
+        let seen = ask(&mut machine, SERVO_OFF, 20, 10)?;
+        equal("answer", ended(&seen, 20), vec![Some(Ended::Done)])?;
+    }
+    Ok(())
+}
