@@ -3,8 +3,9 @@ fn main() {
     let manifest = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default();
     println!("cargo:rustc-link-search={manifest}/../..");
     println!("cargo:rerun-if-changed=../../memory.x");
-    println!("cargo:rerun-if-env-changed=STAGE_SERIAL");
-    println!("cargo:rerun-if-env-changed=STAGE_KEY");
+    for name in ["STAGE_SERIAL", "STAGE_KEY", "STAGE_NODE", "STAGE_PERIOD_US"] {
+        println!("cargo:rerun-if-env-changed={name}");
+    }
     if std::env::var("CARGO_CFG_TARGET_OS").is_ok_and(|os| os == "none") {
         println!("cargo:rustc-link-arg-bins=-Tlink.x");
     }

@@ -3,7 +3,9 @@
 #![cfg(target_os = "linux")]
 
 use embedded_can::{Frame, StandardId};
-use hal_adapters::can::{BusFrame, Layout, Message, SensorReceiver, StampedFrame, Timing, sensor};
+use hal_adapters::can::{
+    BusFrame, Layout, Message, NodeNumber, SensorReceiver, StampedFrame, Timing, sensor,
+};
 use hal_adapters::socketcan::{SocketCan, SocketCanError};
 use runtime::RawFrame;
 use std::process::Command;
@@ -21,7 +23,7 @@ fn interface() -> String {
 }
 
 fn open(messages: &[Message]) -> SocketCan {
-    SocketCan::open(&interface(), messages).expect("the interface is up")
+    SocketCan::open(&interface(), NodeNumber::default(), messages).expect("the interface is up")
 }
 
 fn run(command: &str) {
@@ -193,12 +195,12 @@ fn an_interface_that_is_down_says_so_and_the_socket_goes_on_when_it_is_up() {
 #[test]
 #[ignore = "needs a CAN interface: run tests/vcan"]
 fn what_is_no_can_interface_is_refused_by_name() {
-    let missing = SocketCan::open("can-none", &[]);
+    let missing = SocketCan::open("can-none", NodeNumber::default(), &[]);
     assert!(matches!(
         missing,
         Err(SocketCanError::NoSuchInterface { .. })
     ));
-    let loopback = SocketCan::open("lo", &[]);
+    let loopback = SocketCan::open("lo", NodeNumber::default(), &[]);
     assert!(
         matches!(loopback, Err(SocketCanError::NotCan { .. })),
         "{loopback:?}"

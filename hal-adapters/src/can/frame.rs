@@ -54,6 +54,13 @@ impl From<Coded> for BusFrame {
 }
 
 impl BusFrame {
+    /// The same data under another identifier, with the check changed by so much.
+    pub(super) const fn readdressed(&self, id: Id, check: u8) -> Self {
+        let [first, b, c, d, e, f, g, h] = self.bytes;
+        let bytes = [first ^ check, b, c, d, e, f, g, h];
+        Self { id, bytes, ..*self }
+    }
+
     /// Copies any frame.
     pub fn copy_of<F: Frame>(frame: &F) -> Self {
         let mut bytes = [0; 8];

@@ -35,6 +35,7 @@ pub mod frame;
 mod group;
 #[cfg(test)]
 mod load_tests;
+pub mod node_number;
 pub mod notice;
 pub mod pose;
 pub mod receiver;
@@ -47,6 +48,7 @@ mod tables_tests;
 pub mod update;
 
 pub use frame::{BusFrame, Coded, StampedFrame};
+pub use node_number::NodeNumber;
 pub use notice::{BusFault, BusHealth, Taken, Timing};
 pub use pose::{PoseReceiver, PoseSender};
 pub use receiver::SensorReceiver;
@@ -55,4 +57,4 @@ pub use service::Service;
 pub use table::Message;
 
 /// Version of this protocol, as [`Message::NodeStatus`] tells it.
-pub const PROTOCOL_VERSION: u8 = 3;
+pub const PROTOCOL_VERSION: u8 = 4;

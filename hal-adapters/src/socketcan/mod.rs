@@ -1,12 +1,12 @@
 //! SocketCAN: the frames of a Linux CAN interface, with the kernel's receive times.
 //!
 //! ```no_run
-//! use hal_adapters::can::{Layout, SensorReceiver, Timing};
+//! use hal_adapters::can::{Layout, NodeNumber, SensorReceiver, Timing};
 //! use hal_adapters::socketcan::SocketCan;
 //! use std::time::Duration;
 //!
 //! let layout = Layout::Bits16;
-//! let mut bus = SocketCan::open("can0", layout.messages())?;
+//! let mut bus = SocketCan::open("can0", NodeNumber::default(), layout.messages())?;
 //! let mut receiver = SensorReceiver::new(layout, Timing::default());
 //! while let Some(stamped) = bus.receive(Duration::from_millis(100))? {
 //!     let taken = receiver.take(&stamped.frame, stamped.time_us as u32);
@@ -28,7 +28,8 @@ mod error;
 
 pub use error::SocketCanError;
 
-use crate::can::{BusFrame, Message, StampedFrame};
+use crate::can::{BusFrame, Message, NodeNumber, StampedFrame};
+use embedded_can::Id;
 use error::sort;
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
@@ -46,8 +47,10 @@ const RECEIVE_BUFFER_BYTES: i32 = 8 << 20;
 /// Pause before a full transmit queue is tried again: less than two frames at 1 Mbit/s.
 const QUEUE_RETRY: Duration = Duration::from_micros(200);
 
-/// Mask of a filter that lets one standard identifier through.
-const STANDARD_MASK: u32 = 0x8000_07ff;
+/// Bit of the kernel's identifiers: an extended one.
+const EXTENDED: u32 = 0x8000_0000;
+/// Mask of a filter that lets one identifier through.
+const ONE_MASK: u32 = EXTENDED | 0x1fff_ffff;
 
 /// Socket level, and options that `libc` does not name (the values of all but three rare
 /// architectures).
@@ -63,16 +66,22 @@ const MEMINFO_DROPS: usize = 8;
 pub struct SocketCan {
     socket: CanSocket,
     interface: String,
+    node: NodeNumber,
     read: VecDeque<StampedFrame>,
 }
 
 impl SocketCan {
-    /// Opens an interface and asks the kernel for the frames of `messages` only.
+    /// Opens an interface and asks the kernel for the frames of `messages` of this node only. They
+    /// are received and sent as those of the table.
     ///
     /// # Errors
     /// All variants except `QueueFull`. An interface that is down can be opened; the first read
     /// reports it.
-    pub fn open(interface: &str, messages: &[Message]) -> Result<Self, SocketCanError> {
+    pub fn open(
+        interface: &str,
+        node: NodeNumber,
+        messages: &[Message],
+    ) -> Result<Self, SocketCanError> {
         let failed = |cause| sort(interface, "open it", cause);
         let addr = CanAddr::from_iface(interface).map_err(|_| SocketCanError::NoSuchInterface {
             interface: interface.to_string(),
@@ -87,7 +96,10 @@ impl SocketCan {
         })?;
         let filters: Vec<CanFilter> = messages
             .iter()
-            .map(|message| CanFilter::new(u32::from(message.spec().id), STANDARD_MASK))
+            .map(|message| match node.identifier(*message) {
+                Id::Standard(id) => CanFilter::new(id.as_raw().into(), ONE_MASK),
+                Id::Extended(id) => CanFilter::new(id.as_raw() | EXTENDED, ONE_MASK),
+            })
             .collect();
         socket.set_filters(&filters).map_err(failed)?;
         socket.set_recv_timestamp(true).map_err(failed)?;
@@ -101,6 +113,7 @@ impl SocketCan {
         Ok(Self {
             socket,
             interface: interface.to_string(),
+            node,
             read: VecDeque::with_capacity(batch::BATCH),
         })
     }
@@ -116,7 +129,12 @@ impl SocketCan {
         if self.read.is_empty() && !wait.is_zero() && self.wait_for_frame(wait)? {
             self.fill()?;
         }
-        Ok(self.read.pop_front())
+        while let Some(StampedFrame { time_us, frame }) = self.read.pop_front() {
+            if let Some(frame) = self.node.from_bus(&frame) {
+                return Ok(Some(StampedFrame { time_us, frame }));
+            }
+        }
+        Ok(None)
     }
 
     /// Whether the next [`SocketCan::receive`] returns a frame without a call to the kernel.
@@ -159,11 +177,9 @@ impl SocketCan {
     ///
     /// # Errors
     /// As [`SocketCan::send`]; the frames before the one that failed were sent.
-    pub fn send_all(
-        &self,
-        mut frames: &[BusFrame],
-        deadline: Duration,
-    ) -> Result<(), SocketCanError> {
+    pub fn send_all(&self, frames: &[BusFrame], deadline: Duration) -> Result<(), SocketCanError> {
+        let addressed: Vec<_> = frames.iter().map(|frame| self.node.to_bus(frame)).collect();
+        let mut frames = &addressed[..];
         let mut since = None;
         while !frames.is_empty() {
             match batch::send(self.socket.as_raw_fd(), frames) {

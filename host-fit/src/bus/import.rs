@@ -21,6 +21,7 @@ mod report;
 
 pub use error::ImportError;
 
+use crate::bus::BusAddress;
 use crate::input::log_format::LogFormat;
 use crate::input::stage::Stage;
 use crate::output::Output;
@@ -51,8 +52,9 @@ pub struct ImportSettings {
     pub estimate_offset: bool,
     /// How far from "both records start together" the offset is looked for, s.
     pub search_s: f64,
-    /// Only frames of this interface; all frames are of one if `None`.
-    pub interface: Option<String>,
+    /// Only frames of this interface, and of the node of this number; all frames are of one interface and
+    /// of node 0 if `None`.
+    pub address: Option<BusAddress>,
     /// How codes were put into frames; as the first frame with codes shows if `None`.
     pub layout: Option<Layout>,
     /// Leave out lines that cannot be read, and count them.

@@ -14,6 +14,7 @@ pub use bus::BusError;
 pub(crate) use bus::{Bus, now_us};
 pub use run::run;
 
+use crate::bus::BusAddress;
 use crate::output::OutputError;
 use crate::output::blob_file::BlobFileError;
 use hal_adapters::can::Timing;
@@ -24,8 +25,8 @@ use std::time::Duration;
 /// What is decoded, and how.
 #[derive(Clone, Debug)]
 pub struct LiveSettings {
-    /// CAN interface, for instance can0.
-    pub interface: String,
+    /// The interface, and the number of the node.
+    pub address: BusAddress,
     /// The parameter blob.
     pub params: PathBuf,
     /// Serial number that the blob must have.

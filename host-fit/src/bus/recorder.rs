@@ -8,6 +8,7 @@ mod watch;
 pub use run::run;
 pub use watch::Watch;
 
+use super::BusAddress;
 use super::live::BusError;
 use crate::output::OutputError;
 use hal_adapters::can::command::Outcome;
@@ -18,8 +19,8 @@ use std::time::Duration;
 /// What is recorded, and for how long.
 #[derive(Clone, Debug)]
 pub struct RecorderSettings {
-    /// CAN interface, for instance can0.
-    pub interface: String,
+    /// The interface, and the number of the node.
+    pub address: BusAddress,
     /// Where to write the record; a file that is not there yet.
     pub out: PathBuf,
     /// End after so long; on Ctrl-C if `None`.
@@ -56,13 +57,13 @@ pub enum RecorderError {
     RecordEnded(#[from] OutputError),
     /// Nobody answers.
     #[error(
-        "no controller on `{interface}` answered the request to send its codes within 3 s; is it on, and is \
-         the interface set to its bit rate (`ip -details link show {interface}`)? Where a sensor node sends the codes \
+        "no controller at `{address}` answered the request to send its codes within 3 s; is it on, and is \
+         the interface set to its bit rate (`ip -details link show`)? Where a sensor node sends the codes \
          and none is asked for, record with `candump -L`. Nothing was written"
     )]
     NoAnswer {
-        /// The interface.
-        interface: String,
+        /// Where.
+        address: BusAddress,
     },
     /// It refuses.
     #[error("the controller refuses to send its codes: {}. Nothing was written", match outcome {

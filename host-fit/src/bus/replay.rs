@@ -2,6 +2,7 @@
 
 mod pace;
 
+use crate::bus::BusAddress;
 use crate::bus::live::{Bus, BusError};
 use crate::input::dataset::LoggedFrame;
 use crate::input::log::{LogError, LogRow, LogRows, ReadOptions};
@@ -23,8 +24,8 @@ pub struct ReplaySettings {
     pub log: PathBuf,
     /// The stage file.
     pub stage: PathBuf,
-    /// CAN interface, for instance can0.
-    pub interface: String,
+    /// The interface, and the number of the node.
+    pub address: BusAddress,
     /// How many times faster than it was logged.
     pub rate: f64,
     /// How codes are put into frames; the narrowest that holds them if `None`.
@@ -110,7 +111,7 @@ pub fn run(settings: &ReplaySettings) -> Result<Replayed, ReplayError> {
         _ => rows_of(&settings.log, &stage)?.min(most),
     };
     let bus =
-        Bus::open(&settings.interface, &[]).map_err(|cause| ReplayError::Bus { cause, rows: 0 })?;
+        Bus::open(&settings.address, &[]).map_err(|cause| ReplayError::Bus { cause, rows: 0 })?;
     let mut player = Player {
         layout,
         bus,

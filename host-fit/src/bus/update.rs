@@ -19,6 +19,7 @@ pub mod on {
     pub use super::script::update;
 }
 
+use super::BusAddress;
 use super::live::BusError;
 use hal_adapters::can::command::Outcome;
 use runtime::BlobError;
@@ -201,10 +202,10 @@ pub enum UpdateRunError {
     #[error(transparent)]
     Bus(#[from] BusError),
     /// The node, or the dialog with it.
-    #[error("{interface}: {cause}")]
+    #[error("{address}: {cause}")]
     Dialog {
-        /// The interface.
-        interface: String,
+        /// Where.
+        address: BusAddress,
         /// What is wrong.
         cause: UpdateError,
     },

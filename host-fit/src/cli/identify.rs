@@ -2,6 +2,7 @@
 
 use super::args::Json;
 use super::inspect::errors;
+use crate::bus::BusAddress;
 use crate::bus::update::{self, Identity, RunningParameters};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -13,9 +14,9 @@ use serde_json::{Value, json};
 /// Arguments of `identify`.
 #[derive(Debug, Args)]
 pub(super) struct IdentifyArgs {
-    /// CAN interface, for instance can0.
+    /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
     #[arg(long, value_name = "IFACE")]
-    can: String,
+    can: BusAddress,
     #[command(flatten)]
     json: Json,
 }

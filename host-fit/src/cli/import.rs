@@ -1,6 +1,7 @@
 //! `host-fit import`.
 
 use super::args::{LayoutChoice, StageFile, between};
+use crate::bus::BusAddress;
 use crate::bus::import::{self, ImportSettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -48,9 +49,9 @@ pub(super) struct ImportArgs {
         requires = "estimate_offset"
     )]
     search_s: f64,
-    /// Only frames of this interface, where the record holds several.
+    /// Only frames of this interface, where the record holds several; can0@5 for those of node 5.
     #[arg(long, value_name = "IFACE")]
-    interface: Option<String>,
+    interface: Option<BusAddress>,
     /// How codes are put into frames; auto: as the first frame with codes shows.
     #[arg(long, value_enum, default_value = "auto")]
     layout: LayoutChoice,
@@ -78,7 +79,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<(), HostError> {
         offset_us: args.offset_us,
         estimate_offset: args.estimate_offset,
         search_s: args.search_s,
-        interface: args.interface.clone(),
+        address: args.interface.clone(),
         layout: args.layout.layout(),
         skip_bad_lines: args.skip_bad_lines,
     };

@@ -1,6 +1,7 @@
 //! `host-fit live`.
 
 use super::args::{on_invalid, seconds};
+use crate::bus::BusAddress;
 use crate::bus::live::{self, LiveSettings};
 use crate::cli::error::HostError;
 use clap::Args;
@@ -11,9 +12,9 @@ use std::time::Duration;
 /// Arguments of `live`.
 #[derive(Debug, Args)]
 pub(super) struct LiveArgs {
-    /// CAN interface, for instance can0.
+    /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
     #[arg(long, value_name = "IFACE")]
-    can: String,
+    can: BusAddress,
     /// The parameter blob.
     #[arg(value_name = "params.bin")]
     params: PathBuf,
@@ -57,7 +58,7 @@ fn vertical_ticks(text: &str) -> Result<u8, &'static str> {
 pub(super) fn run(args: &LiveArgs) -> Result<(), HostError> {
     super::keep_apart([args.record.as_deref()], [args.params.as_path()])?;
     live::run(&LiveSettings {
-        interface: args.can.clone(),
+        address: args.can.clone(),
         params: args.params.clone(),
         serial: args.serial.clone(),
         record: args.record.clone(),

@@ -1,6 +1,7 @@
 //! `host-fit read-back`.
 
 use super::identify;
+use crate::bus::BusAddress;
 use crate::bus::update;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -11,9 +12,9 @@ use std::path::PathBuf;
 /// Arguments of `read-back`.
 #[derive(Debug, Args)]
 pub(super) struct ReadBackArgs {
-    /// CAN interface, for instance can0.
+    /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
     #[arg(long, value_name = "IFACE")]
-    can: String,
+    can: BusAddress,
     /// Where to write the parameter blob; `-` for standard output.
     #[arg(long, value_name = "params.bin")]
     out: PathBuf,

@@ -2,6 +2,7 @@
 
 use super::args::seconds;
 use super::key::KeyFile;
+use crate::bus::BusAddress;
 use crate::bus::recorder::{self, RecorderSettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -12,9 +13,9 @@ use std::time::Duration;
 /// Arguments of `record`.
 #[derive(Debug, Args)]
 pub(super) struct RecordArgs {
-    /// CAN interface, for instance can0.
+    /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
     #[arg(value_name = "IFACE")]
-    can: String,
+    can: BusAddress,
     /// Where to write the record, as `candump -L` does, for `import`: a new file.
     #[arg(long, value_name = "BUS.log")]
     out: PathBuf,
@@ -29,7 +30,7 @@ pub(super) struct RecordArgs {
 pub(super) fn run(args: &RecordArgs) -> Result<(), HostError> {
     super::keep_apart([Some(args.out.as_path())], [])?;
     let settings = RecorderSettings {
-        interface: args.can.clone(),
+        address: args.can.clone(),
         out: args.out.clone(),
         duration: args.seconds,
         key: args.key.read()?,

@@ -1,6 +1,7 @@
 //! `host-fit replay`.
 
 use super::args::{LayoutChoice, StageFile, between};
+use crate::bus::BusAddress;
 use crate::bus::replay::{self, ReplaySettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -16,9 +17,9 @@ pub(super) struct ReplayArgs {
     log: PathBuf,
     #[command(flatten)]
     stage: StageFile,
-    /// CAN interface, for instance can0.
+    /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
     #[arg(long, value_name = "IFACE")]
-    can: String,
+    can: BusAddress,
     /// How many times faster than it was logged.
     #[arg(long, value_name = "X", default_value = "1", value_parser = rate)]
     rate: f64,
@@ -39,7 +40,7 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), HostError> {
     let done = replay::run(&ReplaySettings {
         log: args.log.clone(),
         stage: args.stage.path.clone(),
-        interface: args.can.clone(),
+        address: args.can.clone(),
         rate: args.rate,
         layout: args.layout.layout(),
         rows: args.rows,

@@ -2,6 +2,7 @@
 
 use super::identify;
 use super::key::KeyFile;
+use crate::bus::BusAddress;
 use crate::bus::update::{self, Plan, Updated, Wanted};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -15,9 +16,9 @@ pub(super) struct UpdateArgs {
     /// The parameter blob; with --activate it may be left out: what the controller keeps is activated.
     #[arg(value_name = "params.bin", required_unless_present_any = ["previous", "activate"])]
     params: Option<PathBuf>,
-    /// CAN interface, for instance can0.
+    /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
     #[arg(long, value_name = "IFACE")]
-    can: String,
+    can: BusAddress,
     #[command(flatten)]
     key: KeyFile,
     /// Update only a controller that tells this serial number; without it, not one that tells another

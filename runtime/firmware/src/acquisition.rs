@@ -1,5 +1,6 @@
 //! A converter: read in every tick, and started again after faults.
 
+use crate::schedule::PERIOD_US;
 use embedded_hal::delay::DelayNs;
 use hal_adapters::adc::stuck::StuckWatch;
 use hal_adapters::adc::{AdcError, FrameSampler};
@@ -7,7 +8,7 @@ use runtime::RawFrame;
 
 /// Ticks in a row without codes after which the converter is started again: 32 ms. A start
 /// takes up to 210 bytes of SPI, about 0.2 ms.
-pub const RESTART_TICKS: u16 = 16;
+pub const RESTART_TICKS: u16 = (32_000 / PERIOD_US) as u16;
 
 /// A converter and its recent faults.
 #[derive(Debug)]

@@ -6,6 +6,7 @@ use crate::spi::SpiDma;
 use core::convert::Infallible;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use hal_adapters::adc::{Channels, FrameSampler};
+use hal_adapters::can::NodeNumber;
 use hal_adapters::can::status::{bit, board_check};
 use hal_adapters::can::update::Key;
 use runtime::zero_offset::ZeroOffsetSettings;
@@ -119,6 +120,7 @@ struct Stage {
     /// Filled up with zeros.
     serial: [u8; TEXT_BYTES],
     key: Key,
+    node: NodeNumber,
 }
 
 #[unsafe(link_section = ".data.STAGE")]
@@ -130,6 +132,13 @@ static STAGE: Stage = Stage {
     key: match option_env!("STAGE_KEY") {
         Some(digits) => key(digits),
         None => [0; 16],
+    },
+    node: match option_env!("STAGE_NODE") {
+        Some(digits) => match NodeNumber::new(number(digits)) {
+            Some(node) => node,
+            None => panic!("STAGE_NODE is to be 0 to 262143"),
+        },
+        None => NodeNumber::TABLE,
     },
 };
 
@@ -151,6 +160,12 @@ pub fn stage_serial() -> Option<&'static str> {
 /// hexadecimal digits. Without one, whoever can send on the bus may replace the parameters.
 pub fn stage_key() -> Option<Key> {
     option_env!("STAGE_KEY").map(|_| stage().key)
+}
+
+/// The stage's number on its bus, `STAGE_NODE` in the environment of the build: 0, the default, sends
+/// the identifiers of the table, any other extended ones.
+pub fn stage_node() -> NodeNumber {
+    stage().node
 }
 
 const fn padded(serial: &str) -> [u8; TEXT_BYTES] {
@@ -180,7 +195,7 @@ pub const PROGRAM_VERSION: u32 = number(env!("CARGO_PKG_VERSION_MAJOR")) << 16
 const fn number(text: &str) -> u32 {
     match u32::from_str_radix(text, 10) {
         Ok(number) => number,
-        Err(_) => 0,
+        Err(_) => panic!("digits are expected"),
     }
 }
 

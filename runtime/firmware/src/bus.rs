@@ -10,8 +10,9 @@ use crate::wait::Stopwatch;
 use embedded_can::{Frame, Id, StandardId};
 use firmware::node::Node;
 use firmware::outbox::Outbox;
+use firmware::schedule::TICKS_PER_S;
 use hal_adapters::can::update::Store;
-use hal_adapters::can::{BusFrame, Coded, Message};
+use hal_adapters::can::{BusFrame, Coded, Message, NodeNumber};
 use stm32f4xx_hal::pac::CAN1;
 use stm32f4xx_hal::pac::can1::TX;
 
@@ -21,7 +22,10 @@ const COMMANDS_PER_TICK: u8 = 3;
 const INIT_US: u32 = 1000;
 /// Ticks after which a controller that does not take part in the bus is told: half a second. It
 /// waits for eleven recessive bits, which never come while RX is held low.
-const APART_TICKS: u16 = 250;
+const APART_TICKS: u16 = (TICKS_PER_S / 2) as u16;
+/// IDE in a mailbox's identifier register and in a filter: the identifier has 29 bits, of which the
+/// table's eleven come first, in the place of a standard one's (RM0090 rev. 18, 32.9.3 and 32.9.4).
+const EXTENDED: u32 = 1 << 2;
 /// Bits of TSR for mailbox 0; those of the next ones follow after eight bits each.
 const REQUEST_COMPLETED: u32 = 1;
 const SENT: u32 = 1 << 1;
@@ -33,6 +37,10 @@ const ALL_EMPTY: u32 = 0b111;
 /// The controller and what waits for it.
 pub struct Bus {
     can: CAN1,
+    /// The bits of an identifier register that the node's number sets.
+    node_bits: u32,
+    /// See [`NodeNumber::seal`].
+    seal: u8,
     started: bool,
     /// Ticks in a row in which the controller took no part in the bus.
     apart_ticks: u16,
@@ -50,7 +58,11 @@ impl Bus {
     ///
     /// By a crystal it recovers from bus-off by itself. The internal oscillator may be too inexact
     /// for a bus: then the controller's errors end in bus-off, and it stays silent.
-    pub fn new(can: CAN1, crystal: bool, stopwatch: &mut Stopwatch) -> Self {
+    pub fn new(can: CAN1, node: NodeNumber, crystal: bool, stopwatch: &mut Stopwatch) -> Self {
+        let node_bits = match node.number() {
+            0 => 0,
+            number => number << 3 | EXTENDED,
+        };
         can.mcr()
             .modify(|_, w| w.sleep().clear_bit().inrq().set_bit());
         let started = stopwatch.until(board::CORE_HZ / 1_000_000, INIT_US, || {
@@ -66,7 +78,7 @@ impl Bus {
                 w.ts2().bits(segment_2 - 1);
                 w.sjw().bits(jump - 1)
             });
-            receive_commands_only(&can);
+            receive_commands_only(&can, node_bits);
             // BOFIE lets ERRI latch a bus-off; ERRIE, which would make it an interrupt, is off.
             can.ier().write(|w| w.tmeie().set_bit().bofie().set_bit());
             can.mcr()
@@ -74,6 +86,8 @@ impl Bus {
         }
         Self {
             can,
+            node_bits,
+            seal: node.seal(),
             started,
             apart_ticks: 0,
             was_off: false,
@@ -149,6 +163,7 @@ impl Bus {
             let (low, high) = (received.rdlr().read().bits(), received.rdhr().read().bits());
             self.can.rf0r().write(|w| w.rfom().release());
             let bytes = (u64::from(high) << 32 | u64::from(low)).to_le_bytes();
+            let bytes = sealed(bytes, self.seal);
             // A length code of 9 to 15 also means eight bytes, by the standard; no command is so.
             let frame = match (id, bytes.get(..length)) {
                 (Some(id), Some(data)) => BusFrame::new(id, data),
@@ -174,7 +189,7 @@ impl Bus {
             let Some(mailbox) = self.can.tx_iter().nth(empty.trailing_zeros() as usize) else {
                 return;
             };
-            fill(mailbox, frame);
+            fill(mailbox, frame, self.node_bits, self.seal);
             self.outbox.pop();
             self.sent = self.sent.wrapping_add(1);
         }
@@ -226,10 +241,10 @@ impl Bus {
 
 /// Lets data frames of two identifiers into the first store, and no others: the command's and that
 /// of new parameters.
-fn receive_commands_only(can: &CAN1) {
-    // Extended identifiers and remote frames have bits that are 0 in these words.
+fn receive_commands_only(can: &CAN1, node_bits: u32) {
+    // Remote frames have a bit that is 0 in these words.
     let [command, data] = [Message::Command, Message::UpdateData]
-        .map(|message| u32::from(message.id().as_raw()) << 21);
+        .map(|message| u32::from(message.id().as_raw()) << 21 | node_bits);
     can.fmr().modify(|_, w| w.finit().set_bit());
     can.fa1r().write(|w| w.fact0().clear_bit());
     // A list of two identifiers of 32 bits.
@@ -246,8 +261,14 @@ fn receive_commands_only(can: &CAN1) {
     can.fmr().modify(|_, w| w.finit().clear_bit());
 }
 
-fn fill(mailbox: &TX, frame: &Coded) {
-    let [a, b, c, d, e, f, g, h] = frame.bytes;
+/// The bytes of a frame, of which the first is the check, with that of the node for that of the table
+/// or the other way round.
+const fn sealed([check, b, c, d, e, f, g, h]: [u8; 8], seal: u8) -> [u8; 8] {
+    [check ^ seal, b, c, d, e, f, g, h]
+}
+
+fn fill(mailbox: &TX, frame: &Coded, node_bits: u32, seal: u8) {
+    let [a, b, c, d, e, f, g, h] = sealed(frame.bytes, seal);
     let (low, high) = (
         u32::from_le_bytes([a, b, c, d]),
         u32::from_le_bytes([e, f, g, h]),
@@ -258,9 +279,9 @@ fn fill(mailbox: &TX, frame: &Coded) {
         mailbox.tdlr().write(|w| w.bits(low));
         mailbox.tdhr().write(|w| w.bits(high));
     }
-    let id = frame.message.id().as_raw();
-    // SAFETY: a standard identifier has the field's eleven bits.
+    let id = u32::from(frame.message.id().as_raw()) << 21 | node_bits;
+    // SAFETY: identifier and IDE; TXRQ is set besides.
     mailbox
         .tir()
-        .write(|w| unsafe { w.stid().bits(id).txrq().set_bit() });
+        .write(|w| unsafe { w.bits(id).txrq().set_bit() });
 }

@@ -11,14 +11,13 @@
 //! | blinking fast, on as long as off | asked to show where it is |
 //! | off | no power, or between reset and the first tick |
 
+use crate::schedule::TICKS_PER_S;
 use hal_adapters::can::status::{NodeState, board_check};
 
-/// Ticks of a second.
-const SECOND: u32 = 500;
 /// Ticks of a flash, and of the pause after it: 0.1 s.
-const FLASH: u32 = 50;
+const FLASH: u32 = TICKS_PER_S / 10;
 /// Ticks of half a period while identifying: 62 ms.
-const FAST: u32 = 31;
+const FAST: u32 = TICKS_PER_S / 16;
 
 /// Whether the LED is on in this tick. `board_checks` are the bits of [`board_check`].
 pub const fn is_on(state: NodeState, board_checks: u32, identifying: bool, tick: u32) -> bool {
@@ -37,7 +36,7 @@ pub const fn is_on(state: NodeState, board_checks: u32, identifying: bool, tick:
         | NodeState::Stopped => 2,
         NodeState::Running => 1,
     };
-    let slot = (tick % SECOND) / FLASH;
+    let slot = (tick % TICKS_PER_S) / FLASH;
     slot.is_multiple_of(2) && slot / 2 < flashes
 }
 
@@ -49,7 +48,7 @@ mod tests {
     fn each_state_has_its_number_of_flashes() {
         let flashes = |state, checks, identifying| {
             let on = |tick| is_on(state, checks, identifying, tick);
-            (1..=SECOND)
+            (1..=TICKS_PER_S)
                 .filter(|&tick| on(tick) && !on(tick - 1))
                 .count()
         };

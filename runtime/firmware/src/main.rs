@@ -59,7 +59,7 @@ mod app {
     use firmware::records::Loaded;
     use firmware::records::Records;
     use firmware::retained::{Retained, Step};
-    use firmware::schedule::{Schedule, Tick};
+    use firmware::schedule::{Schedule, TICKS_PER_S, Tick};
     use firmware::start_up::PROVEN_TICKS;
     use firmware::telemetry::{Ended, STAGE};
     use hal_adapters::adc::FrameSampler;
@@ -72,7 +72,7 @@ mod app {
 
     const CORE_MHZ: u32 = board::CORE_HZ / 1_000_000;
     /// Where no other node acknowledges the answers, a reset or an erase waits no longer.
-    const SILENCE_TICKS_MAX: u32 = 100;
+    const SILENCE_TICKS_MAX: u32 = TICKS_PER_S / 5;
 
     #[shared]
     struct Shared {
@@ -121,7 +121,7 @@ mod app {
         let ports = (device.GPIOA, device.GPIOB, device.GPIOC);
         let serial = (device.SPI1, device.DMA2);
         let parts = board::set_up(ports, serial, device.CAN1, &mut rcc);
-        let bus = Bus::new(parts.can, crystal, &mut stopwatch);
+        let bus = Bus::new(parts.can, board::stage_node(), crystal, &mut stopwatch);
         let random = Random::new(device.RNG, &mut rcc);
 
         watchdog.feed();

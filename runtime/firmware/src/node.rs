@@ -8,6 +8,7 @@ pub use state::{REASON_CHANNEL, REASON_FPU, REASON_OTHER_SLOT, SampleFault};
 
 use crate::fpu::FpuSettings;
 use crate::outbox::Outbox;
+use crate::schedule::TICKS_PER_S;
 use embedded_can::Frame;
 use hal_adapters::can::command::Told;
 use hal_adapters::can::service::Updates;
@@ -20,9 +21,6 @@ use runtime::tracker::Health;
 use runtime::zero_offset::ZeroOffsetSettings;
 use runtime::{AnyDecoder, PlanarPose, PoseTracker, RawFrame, Reading, Status};
 use state::state_of;
-
-/// Ticks of a second.
-const TICKS_PER_SECOND: u32 = 1_000_000 / crate::schedule::PERIOD_US;
 
 /// The reading of a tick that gave no pose.
 const NOTHING: Reading = Reading {
@@ -87,9 +85,9 @@ impl<'d> Node<'d> {
             watchdog_reset,
             layout,
             sender: PoseSender::default(),
-            service: Service::new(TICKS_PER_SECOND),
+            service: Service::new(TICKS_PER_S),
             has_key: identity.key.is_some(),
-            receiver: Receiver::new(identity, TICKS_PER_SECOND),
+            receiver: Receiver::new(identity, TICKS_PER_S),
             ticks: 0,
             state: (NodeState::Starting, 0),
             fpu_restored: 0,

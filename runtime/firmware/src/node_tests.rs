@@ -5,6 +5,7 @@ use crate::records::{Choice, Loaded, Records, Refusal};
 use crate::store::flash_model::FlashModel;
 use hal_adapters::adc::AdcError;
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request};
+use hal_adapters::can::update::{Key, TAG_INDEX, UpdateData, UpdateRequest, tag};
 use hal_adapters::can::{BusFrame, SensorReceiver, Timing};
 use runtime::calibration::{Calibration, Origin};
 use runtime::frame::CodeWindow;
@@ -93,9 +94,12 @@ const IDENTITY: Identity<'_> = Identity {
     program_hash: 2,
 };
 
+/// What is drawn for a tag.
+const NONCE: Nonce = [1, 2, 3, 4];
+
 fn take(node: &mut Node<'_>, frame: &impl Frame, outbox: &mut Outbox) {
     let (mut records, _) = Records::start(FlashModel::erased(), Choice::Newest, None);
-    node.take(frame, outbox, &mut records, None);
+    node.take(frame, outbox, &mut records, Some(NONCE));
 }
 
 fn frame(sequence: u32) -> RawFrame {
@@ -131,6 +135,27 @@ fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Told> {
         &mut outbox,
     );
     told(&core::iter::from_fn(|| outbox.pop()).collect::<Vec<_>>())
+}
+
+/// The same with the tag by this key, where there is one.
+fn ask_tagged(node: &mut Node<'_>, request: Request, token: u8, key: Option<Key>) -> Vec<Told> {
+    if let Some(key) = key {
+        ask(
+            node,
+            Request::Update(UpdateRequest::Challenge { part: 0 }),
+            token,
+        );
+        let command = Command::new(request, token);
+        let tag = tag(&key, &NONCE, &command, &[], 0);
+        let mut host = Mailbox::default();
+        for (index, word) in (TAG_INDEX..).zip(tag.as_chunks().0) {
+            let word = u32::from_le_bytes(*word);
+            let coded = host.send(&Told::UpdateData(UpdateData { token, index, word }));
+            let frame = BusFrame::from(coded.expect("a word"));
+            take(node, &frame, &mut Outbox::new());
+        }
+    }
+    ask(node, request, token)
 }
 
 #[test]
@@ -383,8 +408,8 @@ fn the_servo_counts_as_on_unless_the_line_says_off_or_a_key_stands_in_for_it() {
         };
         let mut outbox = Outbox::new();
         node.tick(Ok(frame(0)), &facts, &mut Disturbed::default(), &mut outbox);
-        ask(&mut node, Request::ServoOff { seconds: 9 }, 1);
-        let told = ask(&mut node, Request::ClearZero, 2);
+        ask_tagged(&mut node, Request::ServoOff { seconds: 9 }, 1, key);
+        let told = ask_tagged(&mut node, Request::ClearZero, 2, key);
         let answered = told.iter().find_map(|told| match told {
             Told::Answer(answer) => answer.outcome,
             _ => None,

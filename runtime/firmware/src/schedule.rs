@@ -1,8 +1,23 @@
 //! The absolute schedule: tick n is due n periods after the start, however late the ticks
 //! before it came. A deadline of "now and a period" would drift.
 
-/// The servo period, us.
-pub const PERIOD_US: u32 = 2000;
+/// The servo period, us: `STAGE_PERIOD_US` in the environment of the build, or 2000. From 1 ms, in
+/// which a tick's frames leave at 1 Mbit/s, to 10 ms, half of the watchdog's period; whole ticks in a
+/// second.
+pub const PERIOD_US: u32 = match option_env!("STAGE_PERIOD_US") {
+    Some(digits) => match u32::from_str_radix(digits, 10) {
+        Ok(us) => us,
+        Err(_) => 0,
+    },
+    None => 2000,
+};
+const _: () = assert!(
+    PERIOD_US >= 1000 && PERIOD_US <= 10_000 && 1_000_000 % PERIOD_US == 0,
+    "STAGE_PERIOD_US is to be 1000 to 10000, and a divisor of 1000000"
+);
+
+/// Ticks of a second.
+pub const TICKS_PER_S: u32 = 1_000_000 / PERIOD_US;
 
 /// A tick that starts later than this was sampled at the wrong time, us. An interrupt of this
 /// program takes 0.15 ms, and 0.3 ms when it starts the converter again.

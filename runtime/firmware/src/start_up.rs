@@ -3,9 +3,10 @@
 use crate::node::Node;
 use crate::records::Choice;
 use crate::retained::{FaultKind, Retained};
+use crate::schedule::TICKS_PER_S;
 
 /// A program that ran for so many ticks, 1 s, does not fault at its start.
-pub const PROVEN_TICKS: u32 = 500;
+pub const PROVEN_TICKS: u32 = TICKS_PER_S;
 
 /// The cause of this start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

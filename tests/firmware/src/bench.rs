@@ -22,12 +22,19 @@ pub struct Words {
     pub status: u32,
 }
 
+/// Number of a second stage on the bus.
+pub const NEIGHBOUR: u32 = 5;
+/// Its servo period, us.
+pub const NEIGHBOUR_PERIOD_US: u64 = 1000;
+
 /// Everything that the script prepared.
 pub struct Bench {
     /// The emulator's library.
     pub library: OsString,
     /// The programs for both converters.
     pub images: [Image; 2],
+    /// The program for the ADS8688 as [`NEIGHBOUR`] with a servo period of [`NEIGHBOUR_PERIOD_US`].
+    pub neighbour: Image,
     /// The blob of the log, of serial `stage-7`.
     pub blob: Vec<u8>,
     /// The same calibration, made later.
@@ -53,6 +60,7 @@ impl Bench {
                 Image::read(&file("ads131m08.elf"))?,
                 Image::read(&file("ads8688.elf"))?,
             ],
+            neighbour: Image::read(&file("neighbour.elf"))?,
             blob: bytes("params.bin")?,
             later: bytes("later.bin")?,
             other: bytes("other.bin")?,

@@ -1,6 +1,8 @@
 //! bxCAN, as far as the controller uses it, from RM0090 section 32: three mailboxes, one receive
 //! store, bus states.
 
+use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use hal_adapters::can::{BusFrame, NodeNumber};
 use std::collections::VecDeque;
 
 /// State of the bus.
@@ -16,6 +18,8 @@ pub enum BusState {
 
 /// Time of one frame at 1 Mbit/s: 111 bits and a few stuffed ones.
 const FRAME_NS: u64 = 125_000;
+/// Of one with an extended identifier: 20 bits more, and a few stuffed ones.
+const EXTENDED_FRAME_NS: u64 = 149_000;
 /// Eleven recessive bits: the controller takes part in the bus after so many.
 const JOIN_NS: u64 = 11_000;
 /// A controller that recovers is bus-off for 128 times eleven recessive bits.
@@ -82,6 +86,9 @@ pub struct CanModel {
     overrun: bool,
     /// The bus; change it by [`Self::set_bus`].
     bus: BusState,
+    /// The controller's node: frames are given and kept here as those of the table. What has another
+    /// identifier or check is kept as it is.
+    pub node: NodeNumber,
     /// Frames since the last look.
     pub sent: Vec<Sent>,
     /// Mailboxes filled since start.
@@ -90,6 +97,24 @@ pub struct CanModel {
 }
 
 const TXRQ: u32 = 1;
+/// IDE: the identifier has 29 bits, from bit 3 on, else eleven from bit 21 on (RM0090 32.9.3).
+const EXTENDED: u32 = 1 << 2;
+
+/// The bits of an identifier in a register.
+fn bits_of(id: Id) -> u32 {
+    match id {
+        Id::Standard(id) => u32::from(id.as_raw()) << 21,
+        Id::Extended(id) => id.as_raw() << 3 | EXTENDED,
+    }
+}
+
+/// The identifier in a register.
+fn id_of(bits: u32) -> Option<Id> {
+    match bits & EXTENDED {
+        0 => StandardId::new((bits >> 21) as u16).map(Id::Standard),
+        _ => ExtendedId::new(bits >> 3).map(Id::Extended),
+    }
+}
 
 impl CanModel {
     /// A controller after reset.
@@ -112,6 +137,7 @@ impl CanModel {
             received: VecDeque::new(),
             overrun: false,
             bus: BusState::Good,
+            node: NodeNumber::TABLE,
             sent: Vec::new(),
             filled: 0,
             plain,
@@ -185,8 +211,19 @@ impl CanModel {
 
     /// A frame from another node, with any data length code: 9 to 15 mean eight bytes too.
     pub fn receive_coded(&mut self, id: u16, length_code: u8, bytes: [u8; 8]) {
+        let frame = StandardId::new(id).and_then(|id| BusFrame::new(id, &bytes));
+        if let Some(frame) = frame.map(|frame| self.node.to_bus(&frame)) {
+            self.receive_frame(&frame, length_code);
+        }
+    }
+
+    /// A frame from another node, as it is on the bus.
+    pub fn receive_frame(&mut self, frame: &BusFrame, length_code: u8) {
+        let id = bits_of(frame.id);
+        let mut bytes = [0; 8];
+        bytes[..frame.data().len()].copy_from_slice(frame.data());
         let [a, b, c, d, e, f, g, h] = bytes;
-        if !self.passes(u32::from(id) << 21) {
+        if !self.passes(id) {
             return;
         }
         self.overrun |= self.received.len() == 3;
@@ -195,8 +232,7 @@ impl CanModel {
                 u32::from_le_bytes([a, b, c, d]),
                 u32::from_le_bytes([e, f, g, h]),
             );
-            self.received
-                .push_back([u32::from(id) << 21, length_code.into(), low, high]);
+            self.received.push_back([id, length_code.into(), low, high]);
         }
     }
 
@@ -225,8 +261,12 @@ impl CanModel {
             return;
         }
         let pending = (0..3).filter(|&k| self.mailboxes[k].pending);
-        let first = pending.min_by_key(|&k| self.mailboxes[k].registers[0] >> 21);
-        self.on_the_wire = first.map(|k| (k, now_ns + FRAME_NS));
+        let first = pending.min_by_key(|&k| self.mailboxes[k].registers[0] >> 3);
+        self.on_the_wire = first.map(|k| {
+            let is_long = self.mailboxes[k].registers[0] & EXTENDED != 0;
+            let takes_ns = if is_long { EXTENDED_FRAME_NS } else { FRAME_NS };
+            (k, now_ns + takes_ns)
+        });
     }
 
     /// When the next thing happens by itself.
@@ -264,15 +304,28 @@ impl CanModel {
                     ..
                 } = self.mailboxes[k];
                 let bytes = (u64::from(high) << 32 | u64::from(low)).to_le_bytes();
-                self.sent.push(Sent {
-                    asked_ns,
-                    done_ns: at,
-                    id: (id >> 21) as u16,
-                    bytes,
-                });
+                self.sent
+                    .extend(self.sent_frame(id, bytes).map(|(id, bytes)| Sent {
+                        asked_ns,
+                        done_ns: at,
+                        id,
+                        bytes,
+                    }));
                 self.complete(k, true);
             }
             self.arbitrate(at);
+        }
+    }
+
+    /// A frame of the controller as one of the table; any other as it is, with the first eleven bits of
+    /// its identifier.
+    fn sent_frame(&self, register: u32, bytes: [u8; 8]) -> Option<(u16, [u8; 8])> {
+        let frame = BusFrame::new(id_of(register)?, &bytes)?;
+        let own = self.node.from_bus(&frame).unwrap_or(frame);
+        let bytes = own.data().try_into().ok()?;
+        match own.id {
+            Id::Standard(id) => Some((id.as_raw(), bytes)),
+            Id::Extended(id) => Some((id.standard_id().as_raw(), bytes)),
         }
     }
 

@@ -31,8 +31,8 @@ use adc_model::Part;
 use bench::Bench;
 use can_model::BusState;
 use checks::{
-    Outcome, Report, authority, bus, commands, figures, log, motion, parameters, power_cuts,
-    sensors, start, stopped, timing, update, zero,
+    Outcome, Report, authority, bus, commands, figures, log, motion, neighbour, parameters,
+    power_cuts, sensors, start, stopped, timing, update, zero,
 };
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -277,6 +277,9 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     );
     check("command: a tag, or without a key the line", &|| {
         authority::tag_or_line(bench)
+    });
+    check("command: those of its own node alone", &|| {
+        neighbour::has_identifiers_and_a_period_of_its_own(bench)
     });
     check("command: odd ones", &|| commands::odd_commands(bench));
     check("command: any data length code", &|| {

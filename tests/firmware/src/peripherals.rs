@@ -196,8 +196,9 @@ impl Peripherals {
         let acknowledges = self.can.acknowledges;
         let bus = self.can.bus();
         let (sent, filled) = (std::mem::take(&mut self.can.sent), self.can.filled);
+        let node = self.can.node;
         self.can = CanModel::new();
-        (self.can.sent, self.can.filled) = (sent, filled);
+        (self.can.sent, self.can.filled, self.can.node) = (sent, filled, node);
         self.can.acknowledges = acknowledges;
         self.can.set_bus(bus, self.now_ns);
     }

@@ -7,7 +7,7 @@
 //! ends.
 
 use firmware::schedule::Schedule;
-use hal_adapters::can::{BusFrame, Message};
+use hal_adapters::can::{BusFrame, Message, NodeNumber};
 use hal_adapters::socketcan::SocketCan;
 use std::collections::VecDeque;
 use std::error::Error;
@@ -55,7 +55,11 @@ fn run(
     let mut flash = FlashModel::erased();
     flash.load(0, &std::fs::read(params)?);
     let mut node = Node::new(Some(serial), key, flash, u64::from(std::process::id()));
-    let mut bus = SocketCan::open(interface, &[Message::Command, Message::UpdateData])?;
+    let mut bus = SocketCan::open(
+        interface,
+        NodeNumber::default(),
+        &[Message::Command, Message::UpdateData],
+    )?;
     println!("ready");
     let started = Instant::now();
     let now_us = || started.elapsed().as_micros() as u32;

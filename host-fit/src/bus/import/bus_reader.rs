@@ -7,8 +7,8 @@ use super::{ImportError, ImportSettings};
 use crate::input::log::layout::Quantity;
 use crate::input::stage::{CodeScale, Stage};
 use crate::input::text::TextReader;
-use hal_adapters::can::StampedFrame;
 use hal_adapters::can::sensor::read_time;
+use hal_adapters::can::{NodeNumber, StampedFrame};
 use hal_adapters::candump::{LineError, LogLine};
 
 /// Ticks of a record, at most: two hours at 500 Hz.
@@ -26,7 +26,11 @@ pub(super) fn read(
         settings,
         stage,
         line: 0,
-        interface: settings.interface.clone(),
+        interface: settings.address.as_ref().map(|at| at.interface.clone()),
+        node: settings
+            .address
+            .as_ref()
+            .map_or(NodeNumber::default(), |at| at.node),
         collector: Collector::new(settings.layout),
         clock: NodeClock::new(stage.servo_period_s * 1e6),
         counts: BusCounts::default(),
@@ -73,6 +77,7 @@ struct BusReader<'s> {
     /// The line in hand, from 1.
     line: usize,
     interface: Option<String>,
+    node: NodeNumber,
     collector: Collector,
     clock: NodeClock,
     /// Those that the collector and the clock do not know.
@@ -86,7 +91,13 @@ impl BusReader<'_> {
             return Ok(());
         }
         match LogLine::parse(line.trim_ascii()) {
-            Ok(found) if self.is_chosen(&found)? => self.take(&found.stamped()),
+            Ok(found) if self.is_chosen(&found)? => match self.node.from_bus(&found.frame) {
+                Some(frame) => self.take(&StampedFrame {
+                    frame,
+                    ..found.stamped()
+                }),
+                None => Ok(()),
+            },
             Ok(_) => Ok(()),
             Err(LineError::ErrorFrame | LineError::FlexibleDataRate) => {
                 self.counts.other_lines += 1;
@@ -161,7 +172,7 @@ impl BusReader<'_> {
         let interface = self
             .interface
             .get_or_insert_with(|| found.interface.to_owned());
-        if interface == found.interface || self.settings.interface.is_some() {
+        if interface == found.interface || self.settings.address.is_some() {
             return Ok(interface == found.interface);
         }
         Err(ImportError::SeveralInterfaces {

@@ -104,7 +104,7 @@ pub(super) fn files(bus: &str, reference: &str) -> (TempDir, ImportSettings) {
         offset_us: 0.0,
         estimate_offset: true,
         search_s: 0.4,
-        interface: None,
+        address: None,
         layout: None,
         skip_bad_lines: false,
     };

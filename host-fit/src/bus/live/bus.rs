@@ -1,5 +1,6 @@
 //! The interface: SocketCAN on Linux, a plain refusal elsewhere.
 
+use crate::bus::BusAddress;
 use hal_adapters::can::{BusFrame, Message, StampedFrame};
 use std::time::{Duration, SystemTime};
 
@@ -53,9 +54,10 @@ pub(crate) struct Bus {
 
 #[cfg(target_os = "linux")]
 impl Bus {
-    /// Opens an interface for the frames of `messages`.
-    pub(crate) fn open(interface: &str, messages: &[Message]) -> Result<Self, BusError> {
-        let socket = hal_adapters::socketcan::SocketCan::open(interface, messages)?;
+    /// Opens an interface for the node's frames of `messages`.
+    pub(crate) fn open(address: &BusAddress, messages: &[Message]) -> Result<Self, BusError> {
+        let BusAddress { interface, node } = address;
+        let socket = hal_adapters::socketcan::SocketCan::open(interface, *node, messages)?;
         Ok(Self { socket })
     }
 
@@ -82,7 +84,7 @@ impl Bus {
 
 #[cfg(not(target_os = "linux"))]
 impl Bus {
-    pub(crate) fn open(_interface: &str, _messages: &[Message]) -> Result<Self, BusError> {
+    pub(crate) fn open(_address: &BusAddress, _messages: &[Message]) -> Result<Self, BusError> {
         Err(BusError::NoSocketCan)
     }
 

@@ -5,6 +5,7 @@ use super::display::{Display, Shown};
 use super::node::{Node, NodeSettings};
 use super::rhythm::{Pace, Rhythm};
 use super::{Bus, BusError, LiveError, LiveSettings};
+use crate::bus::BusAddress;
 use crate::interrupt;
 use crate::output::record_file::RecordFile;
 use crate::output::{OutputError, blob_file, is_standard_output};
@@ -35,7 +36,7 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
         on_invalid: settings.on_invalid,
         vertical_ticks: settings.vertical_ticks,
     };
-    let bus = Bus::open(&settings.interface, &Node::messages(node.layout))?;
+    let bus = Bus::open(&settings.address, &Node::messages(node.layout))?;
     let record = match &settings.record {
         Some(path) => Some(RecordFile::create(path).map_err(LiveError::NoRecord)?),
         None => None,
@@ -45,7 +46,7 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
     let mut session = Session {
         node: Node::new(decoder, &set.serial, &node),
         bus,
-        interface: &settings.interface,
+        address: &settings.address,
         record,
         record_ended: None,
         sends: !settings.listen_only,
@@ -92,7 +93,7 @@ fn check_serial(set: &ParameterSet, settings: &LiveSettings) -> Result<(), LiveE
 struct Session<'d> {
     node: Node<'d>,
     bus: Bus,
-    interface: &'d str,
+    address: &'d BusAddress,
     record: Option<RecordFile>,
     record_ended: Option<LiveError>,
     sends: bool,
@@ -188,8 +189,8 @@ impl Session<'_> {
     fn record(&mut self, stamped: &StampedFrame) {
         let line = LogLine {
             time_us: stamped.time_us,
-            interface: self.interface,
-            frame: stamped.frame,
+            interface: &self.address.interface,
+            frame: self.address.node.to_bus(&stamped.frame),
         };
         self.write(|record| record.line(line));
     }

@@ -30,7 +30,7 @@ pub fn run(settings: &RecorderSettings) -> Result<Recorded, RecorderError> {
     let messages: Vec<Message> = TABLE.iter().map(|row| row.message).collect();
     let mut session = Session {
         settings,
-        bus: Bus::open(&settings.interface, &messages)?,
+        bus: Bus::open(&settings.address, &messages)?,
         file: RecordFile::create(&settings.out).map_err(RecorderError::NoRecord)?,
         watch: Watch::default(),
         failure: None,
@@ -92,7 +92,7 @@ impl Session<'_> {
             }),
             Err(UpdateError::Unexpected { outcome }) => Err(RecorderError::Refused { outcome }),
             Err(_) => Err(self.failure.take().unwrap_or(RecorderError::NoAnswer {
-                interface: self.settings.interface.clone(),
+                address: self.settings.address.clone(),
             })),
         }
     }
@@ -154,8 +154,8 @@ impl Session<'_> {
     fn write(&mut self, stamped: &StampedFrame) -> Result<(), RecorderError> {
         self.file.line(LogLine {
             time_us: stamped.time_us,
-            interface: &self.settings.interface,
-            frame: stamped.frame,
+            interface: &self.settings.address.interface,
+            frame: self.settings.address.node.to_bus(&stamped.frame),
         })?;
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Talks on an interface.
 
 use super::{Identity, Link, Plan, Talk, UpdateError, UpdateRunError, Updated, identity, script};
+use crate::bus::BusAddress;
 use crate::bus::live::{Bus, BusError};
 use crate::interrupt;
 use crate::progress::Progress;
@@ -15,16 +16,16 @@ const SEND_DEADLINE: Duration = Duration::from_millis(20);
 ///
 /// # Errors
 /// See [`UpdateRunError`].
-pub fn identify(interface: &str) -> Result<Identity, UpdateRunError> {
-    hold(interface, "asking", |talk, _| identity::identify(talk))
+pub fn identify(address: &BusAddress) -> Result<Identity, UpdateRunError> {
+    hold(address, "asking", |talk, _| identity::identify(talk))
 }
 
 /// Reads the blob that the node runs.
 ///
 /// # Errors
 /// See [`UpdateRunError`].
-pub fn read_back(interface: &str) -> Result<(Identity, Vec<u8>), UpdateRunError> {
-    hold(interface, "reading", |talk, progress| {
+pub fn read_back(address: &BusAddress) -> Result<(Identity, Vec<u8>), UpdateRunError> {
+    hold(address, "reading", |talk, progress| {
         identity::read_back(talk, progress)
     })
 }
@@ -33,8 +34,8 @@ pub fn read_back(interface: &str) -> Result<(Identity, Vec<u8>), UpdateRunError>
 ///
 /// # Errors
 /// See [`UpdateRunError`].
-pub fn update(interface: &str, plan: &Plan) -> Result<Updated, UpdateRunError> {
-    hold(interface, "updating", |talk, progress| {
+pub fn update(address: &BusAddress, plan: &Plan) -> Result<Updated, UpdateRunError> {
+    hold(address, "updating", |talk, progress| {
         script::update(talk, plan, progress)
     })
 }
@@ -87,12 +88,12 @@ impl Link for Interface<'_> {
 
 /// Talks on an interface, and shows how far it is.
 fn hold<T>(
-    interface: &str,
+    address: &BusAddress,
     what: &'static str,
     talks: impl FnOnce(&mut Talk<Interface<'_>>, &mut dyn FnMut(u64, u64)) -> Result<T, UpdateError>,
 ) -> Result<T, UpdateRunError> {
     let link = Interface {
-        bus: Bus::open(interface, &[Message::Answer, Message::Command])?,
+        bus: Bus::open(address, &[Message::Answer, Message::Command])?,
         started: Instant::now(),
         stop: interrupt::watch(),
         failure: None,
@@ -105,7 +106,7 @@ fn hold<T>(
     result.map_err(|cause| match talk.link.failure.take() {
         Some(error) => UpdateRunError::Bus(error),
         None => UpdateRunError::Dialog {
-            interface: interface.to_owned(),
+            address: address.clone(),
             cause,
         },
     })

@@ -30,6 +30,12 @@ impl Input {
         }
     }
 
+    /// The same with another period.
+    pub fn every(self, period_us: u64) -> Self {
+        let period_ns = period_us * 1000;
+        Self { period_ns, ..self }
+    }
+
     /// A motion, linear from row to row, `period_us` apart, that starts so long after the first
     /// tick; the first row before its start and the last one after its end.
     pub fn moving(rows: Vec<Row>, period_us: u64, after_us: u64) -> Self {

@@ -6,6 +6,7 @@ pub mod commands;
 pub mod figures;
 pub mod log;
 pub mod motion;
+pub mod neighbour;
 pub mod parameters;
 pub mod power_cuts;
 pub mod sensors;
