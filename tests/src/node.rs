@@ -102,6 +102,11 @@ impl Node {
         stores
     }
 
+    /// Whether a zero deviation is subtracted.
+    pub fn is_zeroed(&self) -> bool {
+        self.ticking.zero() != runtime::PlanarPose::ZERO
+    }
+
     /// The next frame for the bus.
     pub fn send(&mut self) -> Option<Coded> {
         self.outbox.pop()
@@ -244,11 +249,11 @@ fn retained(before: &Before, records: &Records<FlashModel>, ticking: &Ticking<'_
     record.to_words()
 }
 
-/// Codes that 16-bit converters may give, and no two ticks in a row with the same.
+/// Codes of a stage at rest; no two ticks in a row have the same.
 fn codes(tick: u32) -> RawFrame {
-    let change = (tick % 100) as i32;
+    let change = (tick % 10) as i32;
     RawFrame::new(
-        [1_000 + change, 2_000 - change, change],
+        [100 + change, 200 - change, change],
         [change, -change, 10 + change],
         tick,
         tick.wrapping_mul(PERIOD_US),

@@ -1,21 +1,24 @@
-//! `identify`, `update`, `read-back`: who a node is, new parameters for it, and the parameters that it
-//! runs, over the bus. The protocol is that of [`hal_adapters::can::update`].
+//! `identify`, `update`, `read-back`, `rezero`: who a node is, new parameters for it, the parameters that
+//! it runs, and its zero, over the bus. The protocol is that of [`hal_adapters::can::update`].
 //!
 //! Each is a straight script over [`Talk::exchange`], on whatever [`Link`]: a bus, or a model of one.
 
 mod identity;
 mod plan;
+mod rezero;
 mod run;
 mod script;
 mod talk;
 
 pub use identity::{Identity, RunningParameters};
 pub use plan::{Plan, Updated, Wanted};
-pub use run::{identify, read_back, update};
+pub use rezero::Zero;
+pub use run::{identify, read_back, rezero, update};
 pub use talk::{Link, SPACING_US, Talk};
 /// The scripts without an interface.
 pub mod on {
     pub use super::identity::{identify, read_back};
+    pub use super::rezero::rezero;
     pub use super::script::update;
 }
 
@@ -72,9 +75,22 @@ pub enum UpdateError {
         "the controller takes new parameters only with the key of its stage: name it with --key FILE"
     )]
     KeyNeeded,
+    /// The stage is not at rest at its zero.
+    #[error("not re-zeroed, and the zero stays: {}", match outcome {
+        Outcome::NoPose => "a tick had no pose; see the state of the controller".to_owned(),
+        Outcome::Extrapolated => "the stage rests outside the range of its calibration".to_owned(),
+        Outcome::OutOfBounds => format!("{} rests too far from its zero; see the limits in `board.rs`", axis(*detail)),
+        _ => format!("{} is not at rest; wait until the stage is quiet", axis(*detail)),
+    })]
+    NotAtRest {
+        /// What the node says.
+        outcome: Outcome,
+        /// Its detail: an axis, or a status.
+        detail: u32,
+    },
     /// The servo is on, as far as the node knows.
     #[error("{}", match declared {
-        false => "the servo may be on: switch it off, and say so with --servo-off, which declares it for the time of the update",
+        false => "the servo may be on: switch it off, and say so with --servo-off, which declares it meanwhile",
         true => "the controller does not take the servo for off: it has restarted, its service pin says on, another \
                  computer has declared it on, or 30 s ran out. Nothing was stored. Look at the stage; once the servo is off, \
                  try again",
@@ -94,7 +110,8 @@ pub enum UpdateError {
     NoRandomNumber,
     /// The tag is wrong.
     #[error(
-        "the controller refuses the update as not authorised: the key is not that of this stage"
+        "the controller refuses this as not authorised: name the key of its stage with --key FILE; a key that was named is that \
+         of another stage"
     )]
     NotAuthorised,
     /// The node refuses the blob.
@@ -193,6 +210,13 @@ pub enum UpdateError {
     /// Ctrl-C.
     #[error("interrupted; the controller keeps the parameters that it has")]
     Interrupted,
+}
+
+/// Name of an axis by its number in an answer.
+fn axis(number: u32) -> &'static str {
+    const NAMES: [&str; 6] = ["X", "Y", "Rz", "Z", "Rx", "Ry"];
+    let named = usize::try_from(number).ok().and_then(|k| NAMES.get(k));
+    named.copied().unwrap_or("an axis")
 }
 
 /// Why a command that talks to a node ended early.

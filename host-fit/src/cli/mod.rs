@@ -24,6 +24,7 @@ mod recalibrate;
 mod record;
 mod replay;
 mod report;
+mod rezero;
 mod shell;
 mod simulate;
 mod terminal;
@@ -126,6 +127,8 @@ commands! {
     Update(update::UpdateArgs) => update::run,
     /// Write the parameters that a controller runs as a parameter blob (Linux).
     ReadBack(read_back::ReadBackArgs) => read_back::run,
+    /// Make the pose of a stage at rest the zero of its controller (Linux).
+    Rezero(rezero::RezeroArgs) => rezero::run,
     /// Compare the solvers on one or more logs, over several seeds at equal evaluations.
     Compare(compare::CompareArgs) => compare::run,
 }

@@ -5,7 +5,8 @@ use super::world::{SLOT_US, World, command};
 use super::{KEY, NEW, OLD, back, like, plan};
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request, Told};
 use hal_adapters::can::update::UpdateRequest;
-use host_fit::bus::update::{Plan, UpdateError};
+use host_fit::bus::update::{Plan, UpdateError, Zero, on};
+use tests::fault::Fault;
 
 const ACTIVATE: u8 = UpdateRequest::Activate.number();
 const COMMIT: u8 = UpdateRequest::Commit { sequence: 0 }.number();
@@ -144,6 +145,38 @@ fn what_is_stored_and_not_activated_is_told_as_stored() {
     world.loses = |answer| answer.number == ACTIVATE;
     let silent = Err(UpdateError::Silent { sequence: 1 });
     assert_eq!(world.update(&activating(plan(NEW))), silent);
+}
+
+#[test]
+fn a_stage_at_rest_is_zeroed_by_its_key_with_the_servo_off_on_a_bad_bus_too() {
+    let zero = Zero {
+        key: Some(KEY),
+        declares_servo_off: true,
+        clears: false,
+    };
+    let rezero = |world: &mut World, zero: &Zero| on::rezero(&mut world.talk(), zero);
+    for seed in 0..10 {
+        let mut world = World::new(Some(KEY), &[(Fault::Drop, 100_000)], seed);
+        let no_key = Zero {
+            key: None,
+            ..zero.clone()
+        };
+        assert_eq!(rezero(&mut world, &no_key), Err(UpdateError::NotAuthorised));
+        let servo_on = Zero {
+            declares_servo_off: false,
+            ..zero.clone()
+        };
+        let refused = Err(UpdateError::ServoOn { declared: false });
+        assert_eq!(rezero(&mut world, &servo_on), refused);
+        assert_eq!(rezero(&mut world, &zero), Ok(()), "{seed}");
+        assert!(world.node.is_zeroed(), "{seed}");
+        let clear = Zero {
+            clears: true,
+            ..zero.clone()
+        };
+        assert_eq!(rezero(&mut world, &clear), Ok(()), "{seed}");
+        assert!(!world.node.is_zeroed(), "{seed}");
+    }
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Talks on an interface.
 
-use super::{Identity, Link, Plan, Talk, UpdateError, UpdateRunError, Updated, identity, script};
+use super::{
+    Identity, Link, Plan, Talk, UpdateError, UpdateRunError, Updated, Zero, identity, script,
+};
 use crate::bus::BusAddress;
 use crate::bus::live::{Bus, BusError};
 use crate::interrupt;
@@ -37,6 +39,16 @@ pub fn read_back(address: &BusAddress) -> Result<(Identity, Vec<u8>), UpdateRunE
 pub fn update(address: &BusAddress, plan: &Plan) -> Result<Updated, UpdateRunError> {
     hold(address, "updating", |talk, progress| {
         script::update(talk, plan, progress)
+    })
+}
+
+/// Sets or clears the zero of a stage at rest.
+///
+/// # Errors
+/// See [`UpdateRunError`].
+pub fn rezero(address: &BusAddress, zero: &Zero) -> Result<(), UpdateRunError> {
+    hold(address, "re-zeroing", |talk, _| {
+        super::on::rezero(talk, zero)
     })
 }
 

@@ -10,8 +10,9 @@ use hal_adapters::can::update::{Key, Nonce, TAG_INDEX, UpdateData, UpdateRequest
 pub const SPACING_US: u64 = 1_000;
 /// How long an answer is waited for before the request is repeated, us.
 const PATIENCE_US: u64 = 100_000;
-/// The same where a node has said that it is at it: longer than an erase of its flash, us.
-const STARTED_US: u64 = 1_000_000;
+/// The same where a node has said that it is at it: longer than an erase of its flash, and than a re-zero
+/// at the longest servo period, us.
+const STARTED_US: u64 = 6_000_000;
 /// How often a request is sent: for 3 s, in which a controller starts.
 const ATTEMPTS: u32 = 30;
 /// How often a request is sent with a new tag, after one over a number that was no longer the last.

@@ -1,0 +1,62 @@
+//! A re-zero, step by step: the servo declared off, the mean of a second at rest taken for zero, the
+//! servo declared on again.
+
+use super::UpdateError;
+use super::talk::{Link, Talk};
+use hal_adapters::can::command::{Outcome, Request};
+use hal_adapters::can::update::Key;
+
+/// How long the servo is declared off, s: longer than a re-zero takes.
+const SERVO_OFF_S: u8 = 15;
+
+/// What is to be done with the zero.
+#[derive(Clone, Debug, Default)]
+pub struct Zero {
+    /// The stage's key.
+    pub key: Option<Key>,
+    /// Declare the servo off meanwhile.
+    pub declares_servo_off: bool,
+    /// Clear it in place of setting it.
+    pub clears: bool,
+}
+
+/// Sets the zero of a stage at rest, or clears it.
+///
+/// # Errors
+/// [`UpdateError::ServoOn`], [`UpdateError::NotAtRest`] with what the node says, and those of
+/// [`Talk::exchange_tagged`].
+pub fn rezero<L: Link>(talk: &mut Talk<L>, zero: &Zero) -> Result<(), UpdateError> {
+    let seconds = SERVO_OFF_S;
+    if zero.declares_servo_off {
+        let off = Request::ServoOff { seconds };
+        done(talk.exchange_tagged(zero.key.as_ref(), off)?, true)?;
+    }
+    let request = match zero.clears {
+        true => Request::ClearZero,
+        false => Request::Rezero { ticks: 0 },
+    };
+    let answer = talk.exchange_tagged(zero.key.as_ref(), request);
+    if zero.declares_servo_off {
+        // It ends by itself, too.
+        let _ = talk.exchange(Request::ServoOff { seconds: 0 });
+    }
+    done(answer?, zero.declares_servo_off)
+}
+
+fn done((outcome, detail): (Outcome, u32), declared: bool) -> Result<(), UpdateError> {
+    match outcome {
+        Outcome::Done => Ok(()),
+        Outcome::ServoOn => Err(UpdateError::ServoOn { declared }),
+        Outcome::NotAuthorised => Err(UpdateError::NotAuthorised),
+        Outcome::NoParameters => Err(UpdateError::NothingRuns),
+        Outcome::Busy => Err(UpdateError::Busy),
+        Outcome::NoPose
+        | Outcome::Moved
+        | Outcome::Drifted
+        | Outcome::OutOfBounds
+        | Outcome::Extrapolated => Err(UpdateError::NotAtRest { outcome, detail }),
+        outcome => Err(UpdateError::Unexpected {
+            outcome: Some(outcome),
+        }),
+    }
+}
