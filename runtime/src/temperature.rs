@@ -50,6 +50,12 @@ impl<T: Real> Temperature<T> {
         ([mount, body], no_mount | no_body)
     }
 
+    /// dM and dH in K, as [`Temperature::gain_at`] takes them.
+    pub fn changes_k(&self, temperature_mc: [i32; 2]) -> [f64; 2] {
+        let changes_mk = self.changes_mk(temperature_mc).0;
+        changes_mk.map(|change_mk| f64::from(change_mk) * 1e-3)
+    }
+
     /// G of the probes A, B, C at dM and dH, mK.
     #[inline(always)]
     pub fn gain(&self, [mount, body]: [T; 2]) -> [T; 3] {

@@ -239,7 +239,10 @@ impl<'a> Job<'a> {
             solver: solver.name(),
         };
         let uncertainty = uncertainty(&problem, parameters).ok_or(at_pole)?;
-        let calibration = calibration(self.sound_rows(&weights), stage, model, parameters);
+        let calibration = Calibration {
+            temperature: dataset.temperature,
+            ..calibration(self.sound_rows(&weights), stage, model, parameters)
+        };
         let vertical = calibration.calibrated_vertical;
         let determined = check_determined(&problem, parameters, &uncertainty, vertical);
         let judged = self.judged(model, &calibration, &weights);

@@ -228,6 +228,9 @@ pub fn recalibrate(
     if known.is_none() && change == Change::All {
         return Err(RecalibrateError::NothingKnown);
     }
+    let mut dataset = dataset.clone();
+    dataset.compensate(old.constants.temperature.rounded());
+    let dataset = &dataset;
     let decoded = |set: &ParameterSet| Decoded::new(set, dataset);
     let by_row = |of: &Decoded| {
         let judgement = of.judge(dataset, stage, Zeros::Refit);

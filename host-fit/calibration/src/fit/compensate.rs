@@ -65,6 +65,7 @@ pub(crate) fn with_reference_later(dataset: &Dataset, later_s: f64) -> Dataset {
         movements: Vec::new(),
         logs: dataset.logs.clone(),
         sha256: dataset.sha256,
+        temperature: dataset.temperature,
     };
     let later_us = later_s * 1e6;
     for movement in &dataset.movements {

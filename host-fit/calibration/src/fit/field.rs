@@ -128,8 +128,9 @@ impl Job<'_> {
         let elapsed = first.elapsed + started.elapsed();
         let parameters = field.parameters.model_31();
         check_near(&problem, &parameters)?;
-        let calibration =
+        let mut calibration =
             field_calibration(self.sound_rows(&field.weights), stage, &field.parameters)?;
+        calibration.temperature = field.warmth.temperature;
         let Judged {
             set,
             decoded,

@@ -56,6 +56,7 @@ pub fn forecast(
         let time_s = (k as f64 + 0.5) * step_s;
         let at: [[f64; 3]; 6] = std::array::from_fn(|axis| run.axis_at(axis, time_s));
         FieldRow {
+            warmth_k: [[0.0; 2]; 3],
             weight: 1.0,
             time_s,
             signal_mm: [0.0; 3],

@@ -1,6 +1,8 @@
 //! A log as the fit sees it: rows in SI units, grouped by movement.
 
-use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Reading, VerticalPose};
+use super::stage::TemperatureTable;
+use runtime::frame::MISSING_CODE;
+use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Reading, Temperature, VerticalPose};
 use std::hash::{Hash, Hasher};
 use std::path::PathBuf;
 
@@ -148,6 +150,8 @@ pub struct Dataset {
     pub logs: Vec<LogSource>,
     /// SHA-256 of the decompressed logs, one after the other.
     pub sha256: [u8; 32],
+    /// How sensitivities follow temperature, as far as [`Row::signal_m`] has it taken out.
+    pub temperature: Temperature<f64>,
 }
 
 impl Dataset {
@@ -172,6 +176,54 @@ impl Dataset {
             rows,
             has_reference: true,
         });
+    }
+
+    /// Takes the effect of temperature out of the signals, in place of what was taken out before.
+    pub fn compensate(&mut self, temperature: Temperature<f64>) {
+        for row in &mut self.rows {
+            let temperature_mc = row.frame.temperature_mc();
+            let before = self.temperature.gain_at(temperature_mc);
+            let gain = temperature.gain_at(temperature_mc);
+            for (k, signal) in row.signal_m.iter_mut().enumerate() {
+                *signal *= before[k] / gain[k];
+            }
+        }
+        self.temperature = temperature;
+    }
+
+    /// The same as is known of the stage before a fit, about the mean temperatures of the rows.
+    pub fn compensate_as_expected(&mut self, table: &TemperatureTable) {
+        let mut temperature = Temperature::NONE;
+        for sensor in 0..2 {
+            let codes = self
+                .rows
+                .iter()
+                .map(|row| row.frame.temperature_mc()[sensor]);
+            let there = codes.filter(|code| *code != MISSING_CODE).map(i64::from);
+            let (count, sum) = there.fold((0, 0), |(count, sum), code| (count + 1, sum + code));
+            if count > 0 {
+                temperature.zero_mc[sensor] = (sum as f64 / f64::from(count)).round() as i32;
+                temperature.reach_mk[sensor] = Temperature::<f64>::REACH_MK;
+                for probe in &mut temperature.per_mk {
+                    probe[sensor] = table.prior_per_k[sensor][0] * 1e-3;
+                }
+            }
+        }
+        self.compensate(temperature);
+    }
+
+    /// Smallest and largest temperature of mount or body in rows of the dataset, m degC.
+    pub fn temperature_range_mc(&self, sensor: usize) -> Option<[i32; 2]> {
+        let codes = self
+            .rows
+            .iter()
+            .map(|row| row.frame.temperature_mc()[sensor]);
+        codes
+            .filter(|code| *code != MISSING_CODE)
+            .fold(None, |ends: Option<[i32; 2]>, code| {
+                let [low, high] = ends.unwrap_or([code; 2]);
+                Some([low.min(code), high.max(code)])
+            })
     }
 
     /// How to name a movement: its number, after the name of its log where there are several.
@@ -213,6 +265,7 @@ impl Dataset {
             movements: Vec::new(),
             logs: self.logs.clone(),
             sha256: self.sha256,
+            temperature: self.temperature,
         };
         for movement in &self.movements {
             let (start, number) = (out.rows.len(), out.movements.len());

@@ -226,6 +226,7 @@ fn read_texts<'t>(
         return Err(LogError::NoLog);
     }
     reading.dataset = sampler.into_dataset(hash.finalize().into());
+    reading.dataset.compensate_as_expected(&stage.temperature);
     let (rows, _) = reading.dataset.read();
     let (taken, runs) = (reading.dataset.rows.len(), reading.dataset.movements.len());
     if taken < rows {

@@ -8,6 +8,7 @@
 //! phases, and nothing is random. Of a log in which nothing moves, the runs at rest are kept likewise.
 
 use crate::input::dataset::{Dataset, LogSource, Movement, Row};
+use runtime::Temperature;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Range;
 
@@ -247,6 +248,7 @@ impl Sampler {
             movements,
             logs: self.sources,
             sha256,
+            temperature: Temperature::NONE,
         }
     }
 }

@@ -6,9 +6,11 @@ mod error;
 mod file;
 mod motion;
 mod search;
+mod temperature;
 
 pub use error::{Place, StageError};
 pub use motion::{AXES, AxisMotion, Motion};
+pub use temperature::TemperatureTable;
 
 use crate::input::log::layout::LogLayout;
 use runtime::capacitive::ProbePositions;
@@ -132,6 +134,8 @@ pub struct Stage {
     pub search: SearchRanges,
     /// How it moves.
     pub motion: Motion,
+    /// Temperatures in a log, and what is known of their effect.
+    pub temperature: TemperatureTable,
     /// Which column of a log holds what.
     pub log: LogLayout,
 }

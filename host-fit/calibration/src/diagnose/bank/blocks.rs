@@ -113,6 +113,7 @@ fn mean_row(rows: &[FieldRow]) -> Option<FieldRow> {
         vertical: three(&|row| row.vertical),
         reference_mm: three(&|row| row.reference_mm),
         rate_mm_per_s: three(&|row| row.rate_mm_per_s),
+        warmth_k: [[0.0; 2]; 3],
         weight: rows.len() as f64,
     })
 }

@@ -5,6 +5,7 @@ use super::cell::shown;
 use super::error::{CellPlace, LogError};
 use super::layout::{Kind, LogLayout, Meaning, Quantity, UnitFault};
 use super::table::Head;
+use crate::input::stage::Stage;
 
 /// A cell of each row that is read.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +30,8 @@ pub(super) struct Columns {
     pub(super) vertical: Set,
     /// The beams, or X, Y, Rz.
     pub(super) reference: Option<Set>,
+    /// Temperatures of mount and body.
+    pub(super) temperature: [Option<Source>; 2],
 }
 
 /// What to do with columns that the layout does not know.
@@ -51,9 +54,10 @@ pub struct Header<'a> {
 /// Finds the columns of a log.
 pub(super) fn columns(
     table: &Head,
-    layout: &LogLayout,
+    stage: &Stage,
     reference: ReferenceUse,
 ) -> Result<Columns, LogError> {
+    let layout = &stage.log;
     let header = Header::new(table, layout, UnknownColumns::Refuse)?;
     let movement = match header.find(Quantity::Movement) {
         None if !layout.is_mapped(Quantity::Movement) => None,
@@ -72,6 +76,14 @@ pub(super) fn columns(
         hall,
         vertical,
         reference,
+        temperature: stage.temperature.columns.each_ref().map(|column| {
+            let cell = table
+                .names
+                .iter()
+                .position(|name| Some(name) == column.as_ref())?;
+            let scale = stage.temperature.scale_mc[0];
+            Some(Source { cell, scale })
+        }),
     })
 }
 

@@ -13,6 +13,8 @@ use runtime::{RawFrame, VerticalPose};
 
 /// Largest sensible rotation, rad: the models are linear in rotations.
 pub const ROTATION_MAX_RAD: f64 = 0.1;
+/// Largest sensible temperature in the unit of its column, m degC or mK.
+const TEMPERATURE_MAX_MC: f64 = 1e6;
 /// Largest sensible displacement, in full scales of the sensor that follows it: no sensor
 /// that is worth reading has a quarter of its designed sensitivity.
 const FULL_SCALES: f64 = 4.0;
@@ -32,6 +34,8 @@ pub(super) struct RowReader<'a> {
     y_baseline_m: f64,
     displacement_max_m: f64,
     height_max_m: f64,
+    /// m degC at zero of the columns.
+    zero_mc: f64,
     keep_saturated: bool,
     clock: Clock,
     /// Voltages, and the sum of how far they are from whole codes.
@@ -59,6 +63,7 @@ impl<'a> RowReader<'a> {
             y_baseline_m: stage.y_baseline_m,
             displacement_max_m: displacement_max_m(stage),
             height_max_m: FULL_SCALES * full_scale_m(&stage.capacitive),
+            zero_mc: stage.temperature.scale_mc[1],
             keep_saturated,
             clock: Clock::default(),
             between_codes: (0, 0.0),
@@ -92,11 +97,17 @@ impl<'a> RowReader<'a> {
     pub(super) fn row(&mut self, row: &Record, t_us: i64) -> Result<Row, BadCell> {
         let hall = self.codes(row, self.columns.hall, self.hall)?;
         let (sequence, time_us) = (0, t_us as u32);
+        let [mount, body] = self.columns.temperature;
+        let temperature_mc = [
+            self.temperature_mc(row, mount)?,
+            self.temperature_mc(row, body)?,
+        ];
         let (set, sources) = self.columns.vertical;
         let (frame, vertical) = if set == Quantity::GAPS {
             let capacitive = self.codes(row, sources, self.capacitive)?;
             let gaps_m = capacitive.map(|code| f64::from(code) * self.capacitive.m_per_count);
-            let frame = LoggedFrame::Codes(RawFrame::new(hall, capacitive, sequence, time_us));
+            let frame = RawFrame::new(hall, capacitive, sequence, time_us);
+            let frame = LoggedFrame::Codes(frame.with_temperature_mc(temperature_mc));
             (frame, vertical_pose(&self.vertical_rows, gaps_m).to_array())
         } else {
             let [a, b, c] = sources;
@@ -114,7 +125,7 @@ impl<'a> RowReader<'a> {
                 vertical: VerticalPose::from_array(vertical.map(|x| x as f32)),
                 sequence,
                 time_us,
-                temperature_mc: [MISSING_CODE; 2],
+                temperature_mc,
             };
             (frame, vertical)
         };
@@ -152,6 +163,15 @@ impl<'a> RowReader<'a> {
         };
         let [a, b, c] = sources;
         Ok([one(a)?, one(b)?, one(c)?])
+    }
+
+    /// m degC, or [`MISSING_CODE`] where the log has no column or nothing in it.
+    fn temperature_mc(&self, row: &Record, source: Option<Source>) -> Result<i32, BadCell> {
+        let there = source.filter(|source| !row.cell(source.cell).text.trim_ascii().is_empty());
+        there.map_or(Ok(MISSING_CODE), |source| {
+            let above_zero = scaled(row, source, TEMPERATURE_MAX_MC, "m degC")?;
+            Ok((above_zero + self.zero_mc).round() as i32)
+        })
     }
 
     /// X, Y, Rz: m, m, rad.

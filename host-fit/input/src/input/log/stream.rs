@@ -81,7 +81,7 @@ impl<'a> LogRows<'a> {
         options: &ReadOptions,
     ) -> Result<Self, LogError> {
         let mut table = Table::open(text, |name| stage.log.knows(name))?;
-        let columns = header::columns(&table.head, &stage.log, options.reference)?;
+        let columns = header::columns(&table.head, stage, options.reference)?;
         if columns.movement.is_some() && options.split_s.is_some() {
             let path = table.head.path;
             return Err(LogError::SplitWithMovements { path });

@@ -70,6 +70,9 @@ pub(super) fn log_layout(document: &Document<'_>) -> Result<LogLayout, StageErro
         }
         layout.ignored.push(name);
     }
+    for key in ["mount", "body"] {
+        layout.ignored.extend(document.read("temperature", key)?);
+    }
     Ok(layout)
 }
 

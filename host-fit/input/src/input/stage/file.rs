@@ -1,11 +1,11 @@
 //! Reads `stage.toml` and checks every value of it.
 //!
-//! Each table is read key by key. A key that nobody asked for is refused. `direction_deg`, `volts_per_count` and the tables `[search]`, `[motion]`
-//! and `[log]` are optional, key by key.
+//! Each table is read key by key. A key that nobody asked for is refused. `direction_deg`, `volts_per_count` and the tables `[search]`, `[motion]`,
+//! `[temperature]` and `[log]` are optional, key by key.
 
 use super::document::{Document, List};
 use super::error::StageError;
-use super::{CodeScale, Probe, Stage, columns, motion, paper_signs, search};
+use super::{CodeScale, Probe, Stage, columns, motion, paper_signs, search, temperature};
 use crate::input::source;
 use runtime::capacitive::{ProbePositions, vertical_rows};
 use runtime::frame::{CODE_MAGNITUDE_MAX, CodeWindow};
@@ -68,6 +68,7 @@ impl Stage {
             servo_period_s: number("servo", "period_s", PERIODS_S, "s")?,
             search: search::ranges(document, &probes)?,
             motion: motion::motion(document)?,
+            temperature: temperature::temperature(document)?,
             log: columns::log_layout(document)?,
         };
         document.refuse_unknown()?;

@@ -32,6 +32,8 @@ pub struct FieldRow {
     pub reference_mm: [f64; 3],
     /// Its change by time: mm/s, mm/s, mrad/s.
     pub rate_mm_per_s: [f64; 3],
+    /// dM and dH over the gain of A, B, C that [`Self::signal_mm`] is compensated for, K.
+    pub warmth_k: [[f64; 2]; 3],
     /// How much it counts: 1 unless a robust loss says less.
     pub weight: f64,
 }
@@ -66,6 +68,8 @@ pub struct Block {
     pub by_parameter: [[f64; PER_PROBE]; 3],
     /// Derivatives by the lag of the reference, mm/s.
     pub by_lag: [f64; 3],
+    /// Derivatives by k and h of each probe, mm K.
+    pub by_warmth: [[f64; 2]; 3],
 }
 
 impl Rows {
@@ -177,7 +181,10 @@ impl Rows {
         let of_movement = |(range, &offset): (Range<usize>, &[f64; 3])| {
             let residual = move |row: &FieldRow| {
                 let planar_mm = row.planar_mm(lag_s, offset);
-                [0, 1, 2].map(|k| row.signal_mm[k] - probes[k].signal_mm(planar_mm, row.vertical))
+                [0, 1, 2].map(|k| {
+                    let gain = probes[k].gain(row.warmth_k[k]);
+                    row.signal_mm[k] - gain * probes[k].signal_mm(planar_mm, row.vertical)
+                })
             };
             self.rows[range].par_iter().with_min_len(256).map(residual)
         };
@@ -221,7 +228,12 @@ fn field_row(dataset: &Dataset, index: usize, trusted: &[bool], weight: f64) -> 
         let moved = (after.reference[k] - before.reference[k]) * 1e3;
         if time_s > 0.0 { moved / time_s } else { 0.0 }
     };
+    let temperature = &dataset.temperature;
+    let temperature_mc = row.frame.temperature_mc();
+    let changes_k = temperature.changes_k(temperature_mc);
+    let gain = temperature.gain_at(temperature_mc);
     FieldRow {
+        warmth_k: gain.map(|gain| changes_k.map(|change| change / gain)),
         time_s: row.t_us as f64 * 1e-6,
         signal_mm: row.signal_m.map(|s| s * 1e3),
         vertical: row.vertical,
@@ -256,6 +268,7 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3])
         by_pose: [[0.0; 3]; 3],
         by_parameter: [[0.0; PER_PROBE]; 3],
         by_lag: [0.0; 3],
+        by_warmth: [[0.0; 2]; 3],
     };
     for row in rows {
         let planar_mm = row.planar_mm(lag_s, offset_mm);
@@ -267,14 +280,18 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3])
                 by_pose,
                 by_parameter,
             } = probe.read(planar_mm, row.vertical);
-            sum.residual_mm[k] += row.weight * (row.signal_mm[k] - signal_mm);
+            let gain = probe.gain(row.warmth_k[k]);
+            sum.residual_mm[k] += row.weight * (row.signal_mm[k] - gain * signal_mm);
+            for (sum, warmth_k) in sum.by_warmth[k].iter_mut().zip(row.warmth_k[k]) {
+                *sum += row.weight * signal_mm * warmth_k;
+            }
             for (axis, by) in by_pose.into_iter().enumerate() {
-                let by = row.weight * by;
+                let by = row.weight * gain * by;
                 sum.by_pose[k][axis] += by;
                 sum.by_lag[k] += by * row.rate_mm_per_s[axis];
             }
             for (sum, by) in sum.by_parameter[k].iter_mut().zip(by_parameter) {
-                *sum += row.weight * by;
+                *sum += row.weight * gain * by;
             }
         }
     }
@@ -285,6 +302,7 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3])
         sum.by_lag[k] *= share;
         sum.by_pose[k].iter_mut().for_each(|x| *x *= share);
         sum.by_parameter[k].iter_mut().for_each(|x| *x *= share);
+        sum.by_warmth[k].iter_mut().for_each(|x| *x *= share);
     }
     sum
 }

@@ -5,11 +5,11 @@ use super::blocks::Rows;
 use super::carry::Verdict;
 use super::error::FieldFitError;
 use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
-use super::parameters::{FieldParameters, unknowns};
+use super::parameters::{FieldParameters, HELD, unknowns};
 use super::posterior::Posterior;
 use super::probe::probes;
 use super::terms::COUNT;
-use super::whiten::{COLUMNS, FieldEquations, Noise, UNKNOWNS};
+use super::whiten::{COLUMNS, FieldEquations, Noise, UNKNOWNS, WARMTH};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::interrupt;
@@ -17,6 +17,7 @@ use crate::problem::parameters::Parameters;
 use crate::solve::gauss_newton::{self, Limits, Normal, Point, Solved, Unknowns};
 use crate::solve::robust::{HALF, Loss};
 use nalgebra::{DMatrix, DVector};
+use runtime::Temperature;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -40,6 +41,42 @@ const WEIGHT_SETTLED: f64 = 0.01;
 /// Rounds of noise and parameters in turn.
 const NOISE_ROUNDS: u32 = 2;
 
+/// k and h as a fit found them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Warmth {
+    /// k, h and T0.
+    pub temperature: Temperature<f64>,
+    /// Standard errors of (k, h) of A, B, C, 1/K: those of the prior where the log tells nothing.
+    pub error_per_k: [[f64; 2]; 3],
+    /// How far the temperatures of mount and body span that told k and h, K; 0 where they tell nothing.
+    pub spans_k: [f64; 2],
+}
+
+/// A log by itself that spans less than this tells no k, K: its drift is also that of the reference.
+const SPAN_MIN_K: f64 = 2.0;
+/// What sensors that differ from the magnets' own temperature put k off by, times the span.
+const OF_SENSORS: f64 = 4e-5;
+/// See [`Warmth::spans_k`].
+fn spans_k(dataset: &Dataset) -> [f64; 2] {
+    let least = if dataset.logs.len() > 1 {
+        0.0
+    } else {
+        SPAN_MIN_K
+    };
+    [0, 1].map(|sensor| {
+        let span_k = dataset
+            .temperature_range_mc(sensor)
+            .map_or(0.0, |[low, high]| f64::from(high - low) * 1e-3);
+        if span_k < least { 0.0 } else { span_k }
+    })
+}
+
+/// Standard deviations of k and h about what the rows were compensated with.
+fn warmth_prior(dataset: &Dataset, stage: &Stage) -> [f64; 2] {
+    let (spans_k, prior) = (spans_k(dataset), stage.temperature.prior_per_k);
+    [0, 1].map(|k| if spans_k[k] > 0.0 { prior[k][1] } else { HELD })
+}
+
 /// A calibration by the field model with everything that the log says about it.
 #[derive(Clone, Debug)]
 pub struct FieldFit {
@@ -61,6 +98,8 @@ pub struct FieldFit {
     pub vertical_range: [f64; 3],
     /// Whether it is better taken than Model (31).
     pub verdict: Verdict,
+    /// k and h with their standard errors.
+    pub warmth: Warmth,
     /// The weights of the rows used.
     pub weights: Vec<f64>,
     /// Gauss-Newton steps.
@@ -101,6 +140,9 @@ pub struct WhiteFit {
     rows: Arc<Rows>,
     unknowns: Unknowns,
     places: [[f64; 2]; 3],
+    temperature: Temperature<f64>,
+    spans_k: [f64; 2],
+    prior_per_k: [[f64; 2]; 2],
     at: Point,
     noise: Noise,
     iterations: u32,
@@ -137,7 +179,10 @@ impl WhiteFit {
                 offsets: vec![[0.0; 3]; rows.movements.len()],
             },
             rows,
-            unknowns: unknowns(&places),
+            unknowns: unknowns(&places, warmth_prior(dataset, stage)),
+            temperature: dataset.temperature,
+            spans_k: spans_k(dataset),
+            prior_per_k: stage.temperature.prior_per_k,
             places,
             noise: white_only([1.0; 3]),
             iterations: 0,
@@ -217,7 +262,9 @@ impl WhiteFit {
             // On a faulty log it ends where no step gains more: the diagnosis goes on from there.
             normal = self.descend(WHITENED)?.normal;
         }
-        let posterior = self.posterior(self.covariance(&normal)?);
+        let covariance = self.covariance(&normal)?;
+        let warmth = self.warmth(&covariance);
+        let posterior = self.posterior(covariance);
         let rows = &self.rows;
         // A block of outliers alone holds no residual.
         let weight =
@@ -227,6 +274,7 @@ impl WhiteFit {
         Ok(FieldFit {
             verdict: self.verdict(stage, &posterior),
             posterior,
+            warmth,
             score: Score {
                 chi_squared: normal.chi_squared(),
                 log_determinant: normal.log_determinant,
@@ -242,6 +290,28 @@ impl WhiteFit {
             weights: self.weights,
             iterations: self.iterations,
         })
+    }
+
+    /// k and h of the calibration: what the rows were compensated with and what was found beyond.
+    fn warmth(&self, covariance: &DMatrix<f64>) -> Warmth {
+        let mut out = Warmth {
+            temperature: self.temperature,
+            error_per_k: [[0.0; 2]; 3],
+            spans_k: self.spans_k,
+        };
+        for (probe, beyond) in self.parameters().gain_per_k.into_iter().enumerate() {
+            for sensor in (0..2).filter(|k| self.temperature.reach_mk[*k] != 0) {
+                let k = WARMTH + 2 * probe + sensor;
+                out.temperature.per_mk[probe][sensor] += 1e-3 * beyond[sensor];
+                let sensors = OF_SENSORS / self.spans_k[sensor].max(1e-3);
+                let error = (covariance[(k, k)] + sensors * sensors).sqrt();
+                out.error_per_k[probe][sensor] = error.min(self.prior_per_k[sensor][1]);
+                if self.spans_k[sensor] == 0.0 {
+                    out.error_per_k[probe][sensor] = self.prior_per_k[sensor][1];
+                }
+            }
+        }
+        out
     }
 
     fn parameters(&self) -> FieldParameters {

@@ -2,7 +2,7 @@
 
 use super::blocks::Rows;
 use super::carry::{Service, ServiceVariance, service_poses};
-use super::parameters::{FieldParameters, unknowns};
+use super::parameters::{FieldParameters, HELD, unknowns};
 use super::posterior::Posterior;
 use super::probe::probes;
 use super::whiten::{FieldEquations, Noise};
@@ -52,7 +52,7 @@ impl Forecaster {
             places,
             noise: self.noise,
         };
-        let covariance = unknowns(&places).covariance(&equations.of_blocks(&blocks))?;
+        let covariance = unknowns(&places, [HELD; 2]).covariance(&equations.of_blocks(&blocks))?;
         let posterior = Posterior::new(covariance, &self.parameters, &self.noise);
         let service = self.service.variance(&posterior.covariance);
         Some(Forecast { posterior, service })

@@ -3,7 +3,7 @@
 use super::terms::{
     CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SHAPE, SHAPES, SLOPES, TERMS, THETA, shape, shape_list,
 };
-use super::whiten::UNKNOWNS;
+use super::whiten::{UNKNOWNS, WARMTH};
 use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
 use crate::solve::gauss_newton::Unknowns;
@@ -17,6 +17,9 @@ use runtime::{ParameterSet, PlanarPose, VerticalPose};
 pub struct FieldParameters {
     /// The values in the order of [`TERMS`] and in its units, of A, B and C.
     pub probes: [[f64; PER_PROBE]; 3],
+    /// k and h of A, B, C beyond what the rows were compensated with, 1/K: see
+    /// [`Dataset::compensate`](crate::input::dataset::Dataset::compensate).
+    pub gain_per_k: [[f64; 2]; 3],
     /// Designed places (x, y) of A, B and C, m.
     pub places: [[f64; 2]; 3],
 }
@@ -45,6 +48,7 @@ impl FieldParameters {
         };
         Self {
             probes: [probe(0), probe(1), probe(2)],
+            gain_per_k: [[0.0; 2]; 3],
             places: stage.places_m(),
         }
     }
@@ -53,13 +57,18 @@ impl FieldParameters {
     pub fn of_values(values: &[f64], places: [[f64; 2]; 3]) -> Self {
         let mut probes = [[0.0; PER_PROBE]; 3];
         probes.as_flattened_mut().copy_from_slice(&values[..COUNT]);
-        Self { probes, places }
+        Self {
+            probes,
+            gain_per_k: [[0.0; 2]; 3],
+            places,
+        }
     }
 
     /// Those that a blob carries; `None` for another model.
     pub fn of_set(set: &ParameterSet, stage: &Stage) -> Option<Self> {
         Some(Self {
             probes: values_of(set)?,
+            gain_per_k: [[0.0; 2]; 3],
             places: stage.places_m(),
         })
     }
@@ -202,8 +211,12 @@ pub(super) fn place(values: &[f64; PER_PROBE], designed: [f64; 2]) -> ([f64; 2],
     ([x, y], [[by(-c, x), -a * share], [by(b, y), a * share]])
 }
 
-/// All parameters and the lag, with what is known of them before a log is seen.
-pub(super) fn unknowns(places: &[[f64; 2]; 3]) -> Unknowns {
+/// Standard deviation of a temperature coefficient that stays at its prior, 1/K.
+pub(super) const HELD: f64 = 1e-9;
+
+/// All parameters, the lag, k and h, with what is known of them before a log is seen; `warmth` are the
+/// standard deviations of k and h.
+pub(super) fn unknowns(places: &[[f64; 2]; 3], warmth: [f64; 2]) -> Unknowns {
     let mut prior = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
     for (probe, [x, y]) in places.iter().enumerate() {
         let own = probe * PER_PROBE;
@@ -221,6 +234,10 @@ pub(super) fn unknowns(places: &[[f64; 2]; 3]) -> Unknowns {
             prior[(a, slope)] += weight * per_a;
             prior[(a, a)] += weight * per_a * per_a;
         }
+    }
+    for k in WARMTH..UNKNOWNS {
+        let deviation = warmth[(k - WARMTH) % 2];
+        prior[(k, k)] = 1.0 / (deviation * deviation);
     }
     Unknowns {
         origin: DVector::zeros(UNKNOWNS),

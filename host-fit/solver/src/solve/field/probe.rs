@@ -7,6 +7,7 @@ use super::terms::{CARRY, ETA, LEVER_ARM, PER_PROBE, SHAPE, SHAPES, SLOPES, THET
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
     values: [f64; PER_PROBE],
+    gain_per_k: [f64; 2],
     sin: f64,
     cos: f64,
     /// Lateral displacement per Rz, m, and its derivatives by theta, a, b, c.
@@ -29,7 +30,10 @@ pub struct Reading {
 /// The three probes of a calibration.
 pub fn probes(parameters: &FieldParameters) -> [Probe; 3] {
     let axes = parameters.axes().0;
-    [0, 1, 2].map(|k| Probe::new(&parameters.probes[k], parameters.places[k], axes[k]))
+    [0, 1, 2].map(|k| Probe {
+        gain_per_k: parameters.gain_per_k[k],
+        ..Probe::new(&parameters.probes[k], parameters.places[k], axes[k])
+    })
 }
 
 impl Probe {
@@ -38,12 +42,19 @@ impl Probe {
         let ([x, y], [[x_by_a, x_by_c], [y_by_a, y_by_b]]) = place(values, designed);
         Self {
             values: *values,
+            gain_per_k: [0.0; 2],
             sin,
             cos,
             lateral_arm: cos * y - sin * x,
             lateral_arm_by_theta: -(sin * y) - cos * x,
             lateral_arm_by_slope: [cos * y_by_a - sin * x_by_a, cos * y_by_b, -sin * x_by_c],
         }
+    }
+
+    /// The gain at changes of temperature, K, over that which was expected.
+    #[inline(always)]
+    pub fn gain(&self, warmth_k: [f64; 2]) -> f64 {
+        1.0 + (self.gain_per_k[0] * warmth_k[0] + self.gain_per_k[1] * warmth_k[1])
     }
 
     /// The displacement read at the planar pose `planar_mm` (mm, mm, mrad) and the vertical pose

@@ -32,6 +32,7 @@ pub(super) fn parameters() -> FieldParameters {
         values
     };
     FieldParameters {
+        gain_per_k: [[0.0; 2]; 3],
         probes: [
             probe(
                 [0.2, 0.01, 0.87, -190.0, -70.0, 30.0],

@@ -12,12 +12,14 @@ use super::probe::probes;
 use super::terms::{COUNT, PER_PROBE};
 use crate::solve::gauss_newton::{Equations, Normal, Point};
 
-/// Unknowns: the parameters, then the lag of the reference.
-pub const UNKNOWNS: usize = COUNT + 1;
+/// Unknowns: the parameters, the lag of the reference, then k and h of A, B, C beyond their priors.
+pub const UNKNOWNS: usize = WARMTH + 6;
+/// The first column of k and h.
+pub const WARMTH: usize = COUNT + 1;
 /// The column of the lag's growth by time, which an alignment of two clocks takes too.
 pub const LAG_RATE: usize = UNKNOWNS;
 /// Columns: these and the residual.
-pub const COLUMNS: usize = 84;
+pub const COLUMNS: usize = 92;
 /// The residual's column.
 const RESIDUAL: usize = COLUMNS - 1;
 /// Standard deviation of an offset before a movement is seen, mm: far beyond any reset's.
@@ -46,7 +48,11 @@ pub struct FieldEquations<'a> {
 impl FieldEquations<'_> {
     /// The parameters at a point.
     pub fn parameters(&self, at: &Point) -> FieldParameters {
-        FieldParameters::of_values(at.values.as_slice(), self.places)
+        let values = at.values.as_slice();
+        let mut parameters = FieldParameters::of_values(values, self.places);
+        let warmth = parameters.gain_per_k.as_flattened_mut();
+        warmth.copy_from_slice(&values[WARMTH..UNKNOWNS]);
+        parameters
     }
 
     /// Of blocks that are evaluated already.
@@ -110,6 +116,8 @@ fn innovations(block: &Block, expected: &[[f64; COLUMNS]; 3]) -> [[f64; COLUMNS]
         let own = probe * PER_PROBE;
         column[own..own + PER_PROBE].copy_from_slice(&block.by_parameter[probe]);
         column[COUNT] = block.by_lag[probe];
+        let warmth = WARMTH + 2 * probe;
+        column[warmth..warmth + 2].copy_from_slice(&block.by_warmth[probe]);
         column[LAG_RATE] = block.by_lag[probe] * block.time_s;
         column[RESIDUAL] = block.residual_mm[probe];
         let [x, y, rz] = block.by_pose[probe];

@@ -34,6 +34,7 @@ impl Records<'_> {
                 let (before, after) = (self.at(t_us - half_us)?, self.at(t_us + half_us)?);
                 let per_second = 1e9 / self.period_us;
                 (before.0 == after.0).then(|| FieldRow {
+                    warmth_k: [[0.0; 2]; 3],
                     time_s: 1e-6 * (row.tick.t_us - clocks.middle_us),
                     signal_mm: row.tick.hall.map(|code| hall_mm * f64::from(code)),
                     vertical: vertical_pose(

@@ -1,0 +1,121 @@
+//! Reads the optional table `[temperature]`: the columns of a log that hold the temperatures of the
+//! magnets' mount and of the stage body at the Hall elements, and what is known beforehand of the
+//! coefficients k and h (see [`runtime::temperature`]).
+//!
+//! ```toml
+//! [temperature]
+//! mount = "mount_mc"
+//! body = "body_mc"
+//! unit = "mC"              # C, mC or K; or c_per_count and c_at_zero for codes
+//! magnet = "NdFeB"         # NdFeB or SmCo, or k_per_k = [-1.2e-3, 3e-4]: mean, deviation
+//! hall = "uncompensated"   # uncompensated, compensated or GaAs, or h_per_k = [0.0, 2e-4]
+//! ```
+
+use super::document::{Document, List};
+use super::error::StageError;
+use toml::Spanned;
+
+/// What the table says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TemperatureTable {
+    /// Columns of mount and body.
+    pub columns: [Option<String>; 2],
+    /// m degC per unit of the columns, and m degC at zero.
+    pub scale_mc: [f64; 2],
+    /// k and h before a log is seen: mean and standard deviation, 1/K.
+    pub prior_per_k: [[f64; 2]; 2],
+}
+
+impl Default for TemperatureTable {
+    fn default() -> Self {
+        Self {
+            columns: [None, None],
+            scale_mc: UNITS[0].1,
+            prior_per_k: [MAGNETS[0].1, HALL_PARTS[0].1],
+        }
+    }
+}
+
+/// m degC per unit, and at zero.
+const UNITS: [(&str, [f64; 2]); 3] = [
+    ("C", [1e3, 0.0]),
+    ("mC", [1.0, 0.0]),
+    ("K", [1e3, -273_150.0]),
+];
+/// k: remanence, less what the gap grows, 1/K.
+const MAGNETS: [(&str, [f64; 2]); 2] = [("NdFeB", [-1.2e-3, 3e-4]), ("SmCo", [-4e-4, 1e-4])];
+/// h, 1/K. A compensated part gains what NdFeB loses.
+const HALL_PARTS: [(&str, [f64; 2]); 3] = [
+    ("uncompensated", [0.0, 2e-4]),
+    ("compensated", [1.2e-3, 2e-4]),
+    ("GaAs", [-6e-4, 2e-4]),
+];
+/// Coefficients that make sense, 1/K.
+const COEFFICIENT_MAX: f64 = 0.01;
+
+/// The table, or its defaults where it is missing.
+pub(super) fn temperature(document: &Document<'_>) -> Result<TemperatureTable, StageError> {
+    const TABLE: &str = "temperature";
+    let mut out = TemperatureTable {
+        columns: [
+            document.read(TABLE, "mount")?,
+            document.read(TABLE, "body")?,
+        ],
+        ..TemperatureTable::default()
+    };
+    let number = |key, (low, high), unit| -> Result<Option<f64>, StageError> {
+        let value: Option<Spanned<f64>> = document.read(TABLE, key)?;
+        let value = value.map(|value| document.within(&value, low, high, unit));
+        value.transpose()
+    };
+    if let Some(scale_mc) = named(document, "unit", &UNITS)? {
+        out.scale_mc = scale_mc;
+    }
+    let per_count = number("c_per_count", (-10.0, 10.0), "degC per code")?;
+    let at_zero = number("c_at_zero", (-300.0, 300.0), "degC")?;
+    if let Some(per_count) = per_count {
+        out.scale_mc = [per_count * 1e3, at_zero.unwrap_or(0.0) * 1e3];
+    }
+    let classes: [(_, &[_], _); 2] = [
+        ("magnet", &MAGNETS, "k_per_k"),
+        ("hall", &HALL_PARTS, "h_per_k"),
+    ];
+    for (prior, (class, known, numbers)) in out.prior_per_k.iter_mut().zip(classes) {
+        if let Some(of_class) = named(document, class, known)? {
+            *prior = of_class;
+        }
+        let list: Option<List<Spanned<f64>>> = document.read(TABLE, numbers)?;
+        if let Some(list) = &list {
+            let [mean, deviation]: &[_; 2] = document.exactly(list)?;
+            *prior = [
+                document.within(mean, -COEFFICIENT_MAX, COEFFICIENT_MAX, "1/K")?,
+                document.within(deviation, 1e-9, COEFFICIENT_MAX, "1/K")?,
+            ];
+        }
+    }
+    Ok(out)
+}
+
+/// What one of these names stands for.
+fn named(
+    document: &Document<'_>,
+    key: &str,
+    known: &[(&str, [f64; 2])],
+) -> Result<Option<[f64; 2]>, StageError> {
+    let Some(name): Option<Spanned<String>> = document.read("temperature", key)? else {
+        return Ok(None);
+    };
+    let found = known.iter().find(|(known, _)| known == name.get_ref());
+    let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
+    let problem = || {
+        format!(
+            "\"{}\" is not known; use one of {}",
+            name.get_ref(),
+            names.join(", ")
+        )
+    };
+    match found {
+        Some((_, value)) => Ok(Some(*value)),
+        None => Err(document.refuse(name.span(), problem())),
+    }
+}
