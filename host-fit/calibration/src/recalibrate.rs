@@ -228,9 +228,7 @@ pub fn recalibrate(
     if known.is_none() && change == Change::All {
         return Err(RecalibrateError::NothingKnown);
     }
-    let mut dataset = dataset.clone();
-    dataset.compensate(old.constants.temperature.rounded());
-    let dataset = &dataset;
+    let dataset = &*dataset.compensated(old.constants.temperature.rounded());
     let decoded = |set: &ParameterSet| Decoded::new(set, dataset);
     let by_row = |of: &Decoded| {
         let judgement = of.judge(dataset, stage, Zeros::Refit);

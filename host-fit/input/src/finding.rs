@@ -52,6 +52,7 @@ pub enum Code {
     BetweenCodes,
     FileCut,
     Excerpt,
+    Temperature,
 }
 
 /// All that holds for every finding of a code.
@@ -99,7 +100,7 @@ use Severity::{Note, Refuse, Warn};
 
 /// One row for each code, in the order of [`Code`].
 #[rustfmt::skip]
-pub static TABLE: [Entry; 31] = [
+pub static TABLE: [Entry; 32] = [
     entry(C::ChannelsSwapped, "channels_swapped", Refuse, "two Hall channels are exchanged", "check wires, column order and stage.toml"),
     entry(C::ChannelInverted, "channel_inverted", Refuse, "a Hall channel has the wrong sign", "check wires, the sensor's direction and stage.toml"),
     entry(C::BeamsSwapped, "beams_swapped", Refuse, "two beams of the interferometers are exchanged", "check the column order"),
@@ -139,6 +140,7 @@ pub static TABLE: [Entry; 31] = [
     entry(C::BetweenCodes, "between_codes", Warn, "voltages that are no whole codes of the converter", "check volts_per_count and the instrument"),
     entry(C::FileCut, "file_cut", Warn, "the last line has no line break", "check whether the file was cut"),
     entry(C::Excerpt, "excerpt", Warn, "more rows than a fit needs: it takes some of all", "nothing"),
+    entry(C::Temperature, "temperature", Note, "what the logs tell of the effect of temperature", "fit a cold and a warm log together, 3 K apart or more"),
 ];
 
 impl Code {

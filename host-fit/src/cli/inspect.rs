@@ -60,7 +60,14 @@ pub(super) fn errors(rms: [f32; 3], peak: [f32; 3]) -> Value {
 
 fn figures(set: &ParameterSet) -> Value {
     let c = &set.constants;
-    json!({
+    let temperature = c.temperature.is_used().then(|| {
+        json!({
+            "k_h_per_k": c.temperature.per_mk.map(|row| row.map(|x| f64::from(x) * 1e3)),
+            "t0_c": c.temperature.zero_mc.map(|mc| f64::from(mc) * 1e-3),
+            "reach_k": c.temperature.reach_mk.map(|mk| f64::from(mk) * 1e-3),
+        })
+    });
+    let mut figures = json!({
         "layout_version": set.layout_version(),
         "model": Model::of(set.model).name,
         "serial": set.serial.as_str(),
@@ -87,5 +94,9 @@ fn figures(set: &ParameterSet) -> Value {
         "sensitivity_min": c.sensitivity_min,
         "hall_codes": [c.hall_window.low, c.hall_window.high],
         "capacitive_codes": [c.capacitive_window.low, c.capacitive_window.high],
-    })
+    });
+    if let Some(temperature) = temperature {
+        figures["temperature"] = temperature;
+    }
+    figures
 }

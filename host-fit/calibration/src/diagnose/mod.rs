@@ -72,6 +72,8 @@ pub struct Diagnosis {
 ///
 /// Rows that the fit left out of account are for the tests of the signals and the channels alone.
 pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Diagnosis {
+    let compensated = fitted.map(|fit| dataset.compensated(fit.calibration.temperature));
+    let dataset = compensated.as_deref().unwrap_or(dataset);
     let outliers = fitted.map_or(&[][..], |fit| &fit.outliers);
     let sound = match outliers {
         [] => Cow::Borrowed(dataset),
@@ -239,6 +241,7 @@ pub fn of_judged(
     errors: &[Option<[f64; 3]>],
     fitted: Option<Predicted>,
 ) -> Diagnosis {
+    let dataset = &*dataset.compensated(set.constants.temperature.rounded());
     let (parameters, model) = match FieldParameters::of_set(set, stage) {
         Some(parameters) => (parameters, ModelKind::Field),
         None => (

@@ -3,6 +3,7 @@
 use super::stage::TemperatureTable;
 use runtime::frame::MISSING_CODE;
 use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Reading, Temperature, VerticalPose};
+use std::borrow::Cow;
 use std::hash::{Hash, Hasher};
 use std::path::PathBuf;
 
@@ -189,6 +190,16 @@ impl Dataset {
             }
         }
         self.temperature = temperature;
+    }
+
+    /// The rows with the effect of temperature taken out as a calibration has it.
+    pub fn compensated(&self, temperature: Temperature<f64>) -> Cow<'_, Self> {
+        if temperature == self.temperature {
+            return Cow::Borrowed(self);
+        }
+        let mut out = self.clone();
+        out.compensate(temperature);
+        Cow::Owned(out)
     }
 
     /// The same as is known of the stage before a fit, about the mean temperatures of the rows.

@@ -281,7 +281,10 @@ impl WhiteFit {
                 prior: self.unknowns.prior_squares(&self.at.values),
                 residuals: 3 * counted.saturating_sub(rows.movements.len()),
             },
-            parameters: self.parameters(),
+            parameters: FieldParameters {
+                gain_per_k: [[0.0; 2]; 3],
+                ..self.parameters()
+            },
             noise: self.noise,
             lag_s: self.lag_s(),
             planar_range: rows.planar_range_mm.map(|x| x * 1e-3),

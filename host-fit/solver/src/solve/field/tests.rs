@@ -5,13 +5,14 @@ use super::fit::{FieldFit, fit_field};
 use super::parameters::FieldParameters;
 use super::sample_for_tests::{Run, parameters, stage};
 use super::terms::{COUNT, name};
-use crate::input::dataset::Dataset;
+use crate::input::dataset::{Dataset, LoggedFrame};
 use crate::input::stage::Stage;
 use crate::problem::Problem;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::solve::{Projection, Solver, SolverOptions};
-use runtime::ModelKind;
+use runtime::frame::MISSING_CODE;
+use runtime::{ModelKind, RawFrame};
 
 fn model_31(dataset: &Dataset, all: &[usize], stage: &Stage) -> Parameters {
     let options = SolverOptions::new(Projection::Linear, 1);
@@ -131,4 +132,60 @@ fn a_stage_that_is_model_31_keeps_it() {
     let truth = FieldParameters::of_model_31(&parameters().model_31(), &stage());
     let fit = fit(&Run::EIGHT_SECONDS.dataset(&truth)).expect("a fit");
     assert!(!fit.verdict.field, "{}", fit.verdict);
+}
+
+/// Two runs, the second at a mount that is 5 K warmer, of magnets whose k differ.
+fn cold_and_warm(k_per_k: [f64; 3], logs: usize) -> Dataset {
+    let run = Run {
+        movements: 2,
+        ..Run::EIGHT_SECONDS
+    };
+    let mut dataset = run.dataset(&parameters());
+    let cold = dataset.movements[1].rows.start;
+    for (index, row) in dataset.rows.iter_mut().enumerate() {
+        let change_k = if index < cold { 0.0 } else { 5.0 };
+        let frame = RawFrame::new([0; 3], [0; 3], 0, 0);
+        let mount_mc = 20_000 + (change_k * 1e3) as i32;
+        row.frame = LoggedFrame::Codes(frame.with_temperature_mc([mount_mc, MISSING_CODE]));
+        for (signal, k) in row.signal_m.iter_mut().zip(k_per_k) {
+            *signal *= 1.0 + k * change_k;
+        }
+    }
+    let whole = dataset.logs[0].clone();
+    dataset.logs = vec![whole; logs];
+    dataset.compensate_as_expected(&stage().temperature);
+    dataset
+}
+
+#[test]
+fn a_cold_and_a_warm_log_tell_k_within_its_standard_error() {
+    let truth = [-0.9e-3, -1.3e-3, -1.6e-3];
+    let warmth = fit(&cold_and_warm(truth, 2)).expect("a fit").warmth;
+    assert_eq!(warmth.temperature.zero_mc[0], 22_500);
+    for (probe, truth) in truth.into_iter().enumerate() {
+        // k counts from the gain at T0, 2.5 K above the cold log.
+        let truth = truth / (1.0 + truth * 2.5);
+        let found = warmth.temperature.per_mk[probe][0] * 1e3;
+        let error = warmth.error_per_k[probe][0];
+        assert!(error < 6e-5, "{probe}: {error:e}");
+        let off = (found - truth) / error;
+        assert!(off.abs() < 3.5, "{probe}: {found:e} is {off} errors off");
+    }
+    assert_eq!(warmth.temperature.reach_mk[1], 0, "there is no body sensor");
+}
+
+#[test]
+fn one_log_of_less_than_two_kelvin_leaves_k_as_expected() {
+    let mut dataset = cold_and_warm([-1.2e-3; 3], 1);
+    for row in &mut dataset.rows {
+        if let LoggedFrame::Codes(frame) = &mut row.frame {
+            frame.temperature_mc[0] = 20_000 + (frame.temperature_mc[0] - 20_000) / 3;
+        }
+    }
+    dataset.compensate_as_expected(&stage().temperature);
+    let warmth = fit(&dataset).expect("a fit").warmth;
+    for (per_mk, error) in warmth.temperature.per_mk.iter().zip(warmth.error_per_k) {
+        assert!((per_mk[0] + 1.2e-6).abs() < 1e-9, "{per_mk:?}");
+        assert_eq!(error[0], 3e-4);
+    }
 }

@@ -227,3 +227,20 @@ fn several_logs_are_one_dataset_hashed_in_their_order() {
         .dataset;
     assert_ne!(turned.sha256, dataset.sha256);
 }
+
+#[test]
+fn temperatures_are_read_in_their_unit_and_an_empty_cell_is_missing() {
+    let mut lines = LOG.lines();
+    let header = lines.next().expect("a header").to_owned() + ",mount\n";
+    let log = lines.enumerate().fold(header, |text, (k, line)| {
+        let cell = if k == 0 { "" } else { "293.65" };
+        text + &format!("{line},{cell}\n")
+    });
+    let toml = crate::input::shipped::STAGE_TOML.to_owned();
+    let toml = toml + "\n[temperature]\nmount = \"mount\"\nunit = \"K\"\n";
+    let stage = Stage::from_toml(&toml, "stage.toml".as_ref()).expect("sound");
+    let rows = read_in(&log, &stage).expect("sound").dataset.rows;
+    let missing = runtime::frame::MISSING_CODE;
+    assert_eq!(rows[0].frame.temperature_mc(), [missing; 2]);
+    assert_eq!(rows[1].frame.temperature_mc(), [20_500, missing]);
+}
