@@ -44,7 +44,9 @@ impl ParameterSet {
         let in_24_bits = (mount | body) < CODE_MAGNITUDE_MAX.cast_unsigned();
         for (probe, [k, h]) in (0u8..).zip(&t.per_mk) {
             let change = k.abs() * (mount as f32) + h.abs() * (body as f32);
-            let moderate = in_24_bits && change < 0.5;
+            // A sensor that is not there has no effect.
+            let unused = (mount == 0 && *k != 0.0) || (body == 0 && *h != 0.0);
+            let moderate = in_24_bits && change < 0.5 && !unused;
             if !moderate {
                 return Err(ParameterError::LargeTemperatureChange { probe });
             }

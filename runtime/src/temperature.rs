@@ -41,19 +41,24 @@ impl<T: Real> Temperature<T> {
         self.reach_mk[0] | self.reach_mk[1] != 0
     }
 
-    /// dM and dH, mK: 0 for a temperature that is missing or implausible; and whether there is
-    /// one of those.
+    /// dM and dH, mK: both 0 if one is missing or implausible; and whether one is. Of a sensor that
+    /// the stage lacks it is any number.
     #[inline(always)]
     pub(crate) fn changes_mk(&self, temperature_mc: [i32; 2]) -> ([i32; 2], bool) {
-        let (mount, no_mount) = change_mk(temperature_mc[0], self.zero_mc[0], self.reach_mk[0]);
-        let (body, no_body) = change_mk(temperature_mc[1], self.zero_mc[1], self.reach_mk[1]);
-        ([mount, body], no_mount | no_body)
+        let mount = temperature_mc[0].wrapping_sub(self.zero_mc[0]);
+        let body = temperature_mc[1].wrapping_sub(self.zero_mc[1]);
+        let bad = is_beyond(mount, self.reach_mk[0]) | is_beyond(body, self.reach_mk[1]);
+        let keep = u32::from(bad).wrapping_sub(1).cast_signed();
+        ([mount & keep, body & keep], bad)
     }
 
-    /// dM and dH in K, as [`Temperature::gain_at`] takes them.
+    /// dM and dH in K, as [`Temperature::gain_at`] takes them; 0 of a sensor that the stage lacks.
     pub fn changes_k(&self, temperature_mc: [i32; 2]) -> [f64; 2] {
         let changes_mk = self.changes_mk(temperature_mc).0;
-        changes_mk.map(|change_mk| f64::from(change_mk) * 1e-3)
+        [0, 1].map(|sensor| match self.reach_mk[sensor] {
+            0 => 0.0,
+            _ => f64::from(changes_mk[sensor]) * 1e-3,
+        })
     }
 
     /// G of the probes A, B, C at dM and dH, mK.
@@ -82,14 +87,12 @@ impl<T: Real> Temperature<T> {
     }
 }
 
-/// The change of one temperature, 0 if it is not plausible, and whether a sensor is at fault.
+/// Whether a change lies beyond -reach..reach, mK: one sum and one comparison. For a reach of 0 the
+/// limit wraps to the largest number, which nothing is beyond.
 #[inline(always)]
-const fn change_mk(temperature_mc: i32, zero_mc: i32, reach_mk: u32) -> (i32, bool) {
-    let change = temperature_mc.wrapping_sub(zero_mc);
-    let above_low = change.cast_unsigned().wrapping_add(reach_mk);
-    let plausible = above_low <= reach_mk.wrapping_mul(2);
-    let keep = (plausible as u32).wrapping_neg().cast_signed();
-    (change & keep, !plausible & (reach_mk != 0))
+const fn is_beyond(change_mk: i32, reach_mk: u32) -> bool {
+    let above_low = change_mk.cast_unsigned().wrapping_add(reach_mk);
+    above_low > reach_mk.wrapping_mul(2).wrapping_sub(1)
 }
 
 #[cfg(test)]
@@ -110,20 +113,23 @@ mod tests {
             (25_000, 5_000, false),
             (-10_000, -30_000, false),
             (-10_001, 0, true),
-            (50_000, 30_000, false),
-            (50_001, 0, true),
+            (49_999, 29_999, false),
+            (50_000, 0, true),
             (i32::MAX, 0, true),
             (MISSING_CODE, 0, true),
         ] {
-            assert_eq!(STAGE.changes_mk([mount, 21_100]), ([change, 100], fault));
+            let body = if fault { 0 } else { 100 };
+            assert_eq!(STAGE.changes_mk([mount, 21_100]), ([change, body], fault));
         }
     }
 
     #[test]
     fn a_sensor_that_the_stage_lacks_is_never_missed() {
         for code in [0, 5, MISSING_CODE, i32::MAX, -1] {
-            let changes = Temperature::<f32>::NONE.changes_mk([code; 2]);
-            assert_eq!(changes, ([0; 2], false));
+            let none = Temperature::<f32>::NONE;
+            assert!(!none.changes_mk([code; 2]).1);
+            assert_eq!(none.changes_k([code; 2]), [0.0; 2]);
+            assert_eq!(none.gain_at([code; 2]), [1.0; 3]);
         }
     }
 
