@@ -32,9 +32,9 @@ struct Cli {
 const LIMITS: [(&str, u64, u64, u64); 5] = [
     ("kernel", 77, 96, 3),
     ("kernel_by_value", 77, 96, 3),
-    ("tick", 240, 96, 3),
-    ("field_kernel", 330, 112, 3),
-    ("field_tick", 510, 112, 3),
+    ("tick", 280, 96, 3),
+    ("field_kernel", 370, 112, 3),
+    ("field_tick", 560, 112, 3),
 ];
 
 /// Functions that together make one job, and the most instructions that it may take: the two
