@@ -17,6 +17,8 @@ const STARTED_US: u64 = 6_000_000;
 const ATTEMPTS: u32 = 30;
 /// How often a request is sent with a new tag, after one over a number that was no longer the last.
 const TAGS: u32 = 8;
+/// Pause before a new tag, times the token, us: two hosts hardly have the same.
+const BACK_OFF_US: u64 = 500;
 /// How often a node names a word that was lost.
 const LOST_MAX: u32 = 1_000;
 /// The tokens of transfers have this bit, those of other requests do not.
@@ -162,6 +164,8 @@ impl<L: Link> Talk<L> {
             if key.is_none() || answer.0 != Outcome::NotAuthorised {
                 break;
             }
+            // Another host may have asked for a number meanwhile: not again at the same time.
+            self.pause(u64::from(token) * BACK_OFF_US)?;
         }
         Ok(answer)
     }
