@@ -151,6 +151,9 @@ pub mod board_check {
     pub const ZERO_LOST: u32 = 1 << 5;
     /// The supply is below 2.9 V now: nothing is written.
     pub const SUPPLY_LOW: u32 = 1 << 6;
+    /// The parameters want temperatures, and one is missing or implausible: poses are as if at the
+    /// temperature of the calibration.
+    pub const TEMPERATURE_MISSING: u32 = 1 << 7;
 }
 
 /// One counter of [`runtime::tracker::Health`], or one of [`BoardFacts`], with its page.

@@ -66,6 +66,7 @@ mod app {
     use hal_adapters::can::Layout;
     use hal_adapters::can::status::{bit, board_check};
     use hal_adapters::can::update::Identity;
+    use runtime::Status;
     use stm32f4xx_hal::gpio::PinState;
     use stm32f4xx_hal::pac::TIM2;
     use stm32f4xx_hal::rcc::Enable;
@@ -276,6 +277,8 @@ mod app {
         let reading = local
             .node
             .tick(sample, local.facts, &mut Fpu, &mut bus.outbox);
+        let is_missing = reading.status.any(Status::TEMPERATURE_MISSING);
+        (local.facts).note(board_check::TEMPERATURE_MISSING, is_missing);
         // After the pose, whose frames then find the mailboxes empty.
         bus.receive(local.node, local.records, local.random);
         bus.send();

@@ -59,6 +59,7 @@ fn blob(serial: &str) -> Vec<u8> {
         calibrated_planar: [1e-3; 3],
         calibrated_vertical: [5e-4; 3],
         sensitivity_min: 0.1,
+        temperature: runtime::temperature::Temperature::NONE,
     };
     let origin = Origin {
         serial: Text::try_from(serial).expect("short"),

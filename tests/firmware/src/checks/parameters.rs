@@ -1,10 +1,11 @@
 //! Parameter slots in every state.
 
 use super::log::Stage;
+use super::start::page;
 use super::{Outcome, equal, expect};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen, Words};
-use hal_adapters::can::status::NodeState;
+use hal_adapters::can::status::{NodeState, board_check};
 use runtime::blob::{CRC_BYTES, MAX_BYTES};
 use runtime::parameters::Text;
 use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
@@ -126,6 +127,9 @@ pub fn one_usable(bench: &Bench) -> Outcome {
 /// The golden example of the field model, in a stage of its own.
 pub(super) const FIELD: &[u8] = include_bytes!("../../../../runtime/examples/field.bin");
 
+/// One that wants temperatures.
+const WARM: &[u8] = include_bytes!("../../../../runtime/examples/warm.bin");
+
 /// What the host's decoder makes of the log with these parameters.
 pub(super) fn poses_of(bench: &Bench, set: &ParameterSet) -> Vec<Words> {
     let decoder = set.decoder();
@@ -137,15 +141,22 @@ pub(super) fn poses_of(bench: &Bench, set: &ParameterSet) -> Vec<Words> {
             let [z, rx, ry] = reading.pose.vertical.to_array();
             Words {
                 words: [x, y, rz, z, rx, ry].map(f32::to_bits),
-                status: reading.status.bits(),
+                // A frame has room for so many; the next is in a page of health.
+                status: reading.status.bits() & 0xf_ffff,
             }
         })
         .collect()
 }
 
-/// With a blob of the field model the words on the bus are those of the host's decoder.
+/// With a blob of the field model the words on the bus are those of the host's decoder; with one that
+/// wants temperatures, too, and that they are missing is told.
 pub fn the_field_model(bench: &Bench) -> Outcome {
-    let mut set = ParameterSet::from_bytes(FIELD)?;
+    same_words(bench, FIELD, 0)?;
+    same_words(bench, WARM, board_check::TEMPERATURE_MISSING)
+}
+
+fn same_words(bench: &Bench, example: &[u8], told: u32) -> Outcome {
+    let mut set = ParameterSet::from_bytes(example)?;
     set.serial = Text::try_from("stage-7").map_err(|_| "the serial")?;
     let mut buffer = [0; MAX_BYTES];
     let blob = set.to_bytes(&mut buffer)?;
@@ -158,6 +169,12 @@ pub fn the_field_model(bench: &Bench) -> Outcome {
     println!("RESULT firmware_field_words={}", comparison.words);
     println!("RESULT firmware_field_differing={}", comparison.differing);
     equal("words that differ", comparison.differing, 0)?;
+    let checks = page(&seen, 11).ok_or("no page 11")?;
+    equal(
+        "temperature missing",
+        checks & board_check::TEMPERATURE_MISSING,
+        told,
+    )?;
     expect(comparison.planar >= 998, || {
         format!("only {} poses", comparison.planar)
     })?;
