@@ -41,7 +41,7 @@ impl LoggedFrame {
         }
     }
 
-    /// Temperature of mount and body, m degC; [`MISSING_CODE`](runtime::frame::MISSING_CODE) where
+    /// Temperature of mount and body, m degC; [`MISSING_CODE`] where
     /// the log has none.
     pub const fn temperature_mc(&self) -> [i32; 2] {
         match self {
