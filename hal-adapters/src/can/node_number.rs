@@ -16,7 +16,7 @@
 //! let sent = node.to_bus(&frame);
 //! assert_eq!(sent.id, node.identifier(Message::Command));
 //! assert_eq!(node.from_bus(&sent), Some(frame));
-//! assert_eq!(NodeNumber::default().from_bus(&sent), None);
+//! assert_eq!(NodeNumber::new(6).unwrap().from_bus(&sent), None);
 //! ```
 
 use super::e2e::{Payload, protect};
