@@ -10,6 +10,7 @@
 //! dM = dH = 0 the factor is exactly 1.
 
 use crate::real::Real;
+use core::hint::black_box;
 
 /// k, h and T0 of a stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,8 +49,10 @@ impl<T: Real> Temperature<T> {
         let mount = temperature_mc[0].wrapping_sub(self.zero_mc[0]);
         let body = temperature_mc[1].wrapping_sub(self.zero_mc[1]);
         let bad = is_beyond(mount, self.reach_mk[0]) | is_beyond(body, self.reach_mk[1]);
-        let keep = u32::from(bad).wrapping_sub(1).cast_signed();
-        ([mount & keep, body & keep], bad)
+        // The compiler must not see what the mask is made of: it would choose between numbers instead,
+        // and keep more of them than there are registers (36 instructions of the field model's tick).
+        let keep = black_box(u32::from(bad).wrapping_sub(1).cast_signed());
+        ([mount & keep, body & keep], keep == 0)
     }
 
     /// dM and dH in K, as [`Temperature::gain_at`] takes them; 0 of a sensor that the stage lacks.
