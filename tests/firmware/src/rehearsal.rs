@@ -3,7 +3,8 @@
 //! made of them are judged against the log.
 
 use crate::adc_model::{Input, Part};
-use crate::bench::{Bench, Seen, command, rows};
+use crate::bench::{Bench, Seen, rows};
+use crate::checks::update::{KEY, talk};
 use crate::checks::{Failure, Outcome, equal, expect};
 use crate::machine::Machine;
 use hal_adapters::can::command::Request;
@@ -55,12 +56,10 @@ pub fn record(bench: &Bench, part: Part, log: &Path, bus: &Path, reference: &Pat
     let (mut machine, ticks) = moving(bench, part, [&[], &[]], &text)?;
     // A request before the controller has joined the bus is lost.
     machine.run_ticks(TICKS_APART)?;
-    for (on, ticks) in [(true, ticks - 2 * TICKS_APART), (false, TICKS_APART)] {
-        let token = u8::from(on);
-        let (id, bytes) = command(Request::Record { on }, token, token);
-        machine.chip.can.receive(id, bytes);
-        machine.run_ticks(ticks)?;
-    }
+    // What was on the bus before the answer is not recorded. The record ends as candump does.
+    let (key, request) = (Some(&KEY), Request::Record { on: true });
+    talk(&mut machine, |talk| talk.exchange_tagged(key, request))?.0?;
+    machine.run_ticks(ticks - TICKS_APART)?;
     let mut lines = String::new();
     for (k, sent) in machine.chip.can.sent.iter().enumerate() {
         // The computer looks at its clock up to 0.15 ms after the end of a frame.

@@ -21,7 +21,7 @@ use std::collections::VecDeque;
 
 /// The program for the ADS131M08 is built with this key, the other one without any.
 pub(super) const PART: Part = Part::Ads131m08;
-pub(super) const KEY: Key = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+pub(crate) const KEY: Key = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 /// Between two looks at the bus.
 const STEP_NS: u64 = 250_000;
 const S: u64 = 1_000_000_000;
@@ -43,7 +43,7 @@ pub(super) fn plan(blob: &[u8]) -> Plan {
 }
 
 /// The controller on a bus that only the host is on. It ends when the power is lost.
-pub(super) struct Wire<'m> {
+pub(crate) struct Wire<'m> {
     machine: &'m mut Machine,
     cuts: u32,
     until_ns: u64,
@@ -92,7 +92,7 @@ impl Link for Wire<'_> {
 }
 
 /// Runs a script until it is over or the power is lost; what was on the bus meanwhile.
-pub(super) fn talk<T>(
+pub(crate) fn talk<T>(
     machine: &mut Machine,
     script: impl FnOnce(&mut Talk<Wire<'_>>) -> Result<T, UpdateError>,
 ) -> Result<(Result<T, UpdateError>, Seen), Failure> {
