@@ -93,6 +93,31 @@ impl Authenticator {
     }
 }
 
+/// A tag that came, and the number that it must be over.
+#[derive(Clone, Debug)]
+pub(super) struct Tag {
+    pub(super) nonce: Nonce,
+    pub(super) bytes: [u8; TAG_BYTES],
+}
+
+impl Tag {
+    /// Whether it is that of this command; `blob` and `crc` as in [`tag`]. Without a key any is.
+    pub(super) fn is_of(
+        &self,
+        key: Option<&Key>,
+        command: &Command,
+        blob: &[u8],
+        crc: u32,
+    ) -> bool {
+        let Some(key) = key else {
+            return true;
+        };
+        let mut authenticator = Authenticator::new(key, &self.nonce);
+        authenticator.update(blob);
+        authenticator.agrees(command, (blob.len() as u32, crc), &self.bytes)
+    }
+}
+
 fn encrypt(cipher: &Aes128Enc, block: u128) -> u128 {
     let mut bytes = block.to_le_bytes().into();
     cipher.encrypt_block(&mut bytes);

@@ -1,6 +1,6 @@
 //! A node's side of an update.
 
-use super::authentication::{Authenticator, Nonce, TAG_BYTES};
+use super::authentication::{Nonce, Tag};
 use super::request::{UpdateData, UpdateRequest};
 use super::staging::{Staging, crc_of};
 use super::store::{Change, NotWritten, Store};
@@ -45,13 +45,6 @@ struct Commit {
     /// CRC-32C of the blob.
     crc: u32,
     tag: Tag,
-}
-
-/// A tag, and the number that it must be over.
-#[derive(Clone, Debug)]
-struct Tag {
-    nonce: Nonce,
-    bytes: [u8; TAG_BYTES],
 }
 
 /// Receives tags, and blobs, one at a time, and has them stored: [`Receiver::take`] with every frame of
@@ -122,15 +115,9 @@ impl<'s> Receiver<'s> {
             return Err((Outcome::Incomplete, index.into()));
         }
         self.nonce = None;
-        match self.agrees(
-            command,
-            &[],
-            0,
-            &Tag {
-                nonce,
-                bytes: self.staging.tag(),
-            },
-        ) {
+        let bytes = self.staging.tag();
+        let tag = Tag { nonce, bytes };
+        match tag.is_of(self.identity.key.as_ref(), command, &[], 0) {
             true => Ok(()),
             false => refused,
         }
@@ -142,16 +129,6 @@ impl<'s> Receiver<'s> {
         if self.has_key() && is_final {
             self.answered = Some((*command, answer));
         }
-    }
-
-    /// Whether a tag is right; true without a key.
-    fn agrees(&self, command: &Command, blob: &[u8], crc: u32, tag: &Tag) -> bool {
-        let Some(key) = &self.identity.key else {
-            return true;
-        };
-        let mut authenticator = Authenticator::new(key, &tag.nonce);
-        authenticator.update(blob);
-        authenticator.agrees(command, (blob.len() as u32, crc), &tag.bytes)
     }
 
     /// Takes a word: of a tag, or of the open transfer. Words of other transfers, and of one that is
@@ -256,7 +233,8 @@ impl<'s> Receiver<'s> {
         }
         let blob = self.staging.blob(transfer.bytes);
         let request = Request::Update(UpdateRequest::Commit { sequence });
-        if !self.agrees(&Command::new(request, transfer.token), blob, crc, tag) {
+        let command = Command::new(request, transfer.token);
+        if !tag.is_of(self.identity.key.as_ref(), &command, blob, crc) {
             return Some((Outcome::NotAuthorised, 0));
         }
         if let Err(error) = check(blob, self.identity.serial) {
