@@ -5,7 +5,6 @@ use crate::records::{Choice, Loaded, Records, Refusal};
 use crate::store::flash_model::FlashModel;
 use hal_adapters::adc::AdcError;
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request};
-use hal_adapters::can::update::{Key, TAG_INDEX, UpdateData, UpdateRequest, tag};
 use hal_adapters::can::{BusFrame, SensorReceiver, Timing};
 use runtime::calibration::{Calibration, Origin};
 use runtime::frame::CodeWindow;
@@ -15,6 +14,9 @@ use runtime::parameters::Text;
 use runtime::{OnInvalid, PoseTracker};
 use std::boxed::Box;
 use std::vec::Vec;
+
+#[path = "node_key_tests.rs"]
+mod key;
 
 /// An FPU whose settings something else changes: before these calls, counted from 0.
 #[derive(Default)]
@@ -136,27 +138,6 @@ fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Told> {
         &mut outbox,
     );
     told(&core::iter::from_fn(|| outbox.pop()).collect::<Vec<_>>())
-}
-
-/// The same with the tag by this key, where there is one.
-fn ask_tagged(node: &mut Node<'_>, request: Request, token: u8, key: Option<Key>) -> Vec<Told> {
-    if let Some(key) = key {
-        ask(
-            node,
-            Request::Update(UpdateRequest::Challenge { part: 0 }),
-            token,
-        );
-        let command = Command::new(request, token);
-        let tag = tag(&key, &NONCE, &command, &[], 0);
-        let mut host = Mailbox::default();
-        for (index, word) in (TAG_INDEX..).zip(tag.as_chunks().0) {
-            let word = u32::from_le_bytes(*word);
-            let coded = host.send(&Told::UpdateData(UpdateData { token, index, word }));
-            let frame = BusFrame::from(coded.expect("a word"));
-            take(node, &frame, &mut Outbox::new());
-        }
-    }
-    ask(node, request, token)
 }
 
 #[test]
@@ -386,35 +367,4 @@ fn a_remote_frame_or_a_foreign_one_is_no_command() {
     let foreign = BusFrame::new(embedded_can::StandardId::MAX, &[0; 8]).expect("eight bytes");
     take(&mut node, &foreign, &mut outbox);
     assert_eq!(outbox.front(true), None);
-}
-
-/// The line must say so; without a line, the key must, and without both nothing moves the pose.
-#[test]
-fn the_servo_counts_as_on_unless_the_line_says_off_or_a_key_stands_in_for_it() {
-    let key = Some([7; 16]);
-    for (line, key, outcome) in [
-        (Some(true), None, Outcome::Done),
-        (Some(true), key, Outcome::Done),
-        (Some(false), key, Outcome::ServoOn),
-        (None, key, Outcome::Done),
-        (None, None, Outcome::ServoOn),
-    ] {
-        let loaded = loaded();
-        let parameters = Parameters::at_start(Some(loaded), None, None, true);
-        let identity = Identity { key, ..IDENTITY };
-        let mut node = Node::new(parameters, false, Layout::Bits24, identity);
-        let facts = Facts {
-            servo_off_pin: line,
-            ..Facts::default()
-        };
-        let mut outbox = Outbox::new();
-        node.tick(Ok(frame(0)), &facts, &mut Disturbed::default(), &mut outbox);
-        ask_tagged(&mut node, Request::ServoOff { seconds: 9 }, 1, key);
-        let told = ask_tagged(&mut node, Request::ClearZero, 2, key);
-        let answered = told.iter().find_map(|told| match told {
-            Told::Answer(answer) => answer.outcome,
-            _ => None,
-        });
-        assert_eq!(answered, Some(outcome), "{line:?} {key:?}");
-    }
 }

@@ -1,7 +1,8 @@
 //! bxCAN, as far as the controller uses it, from RM0090 section 32: three mailboxes, one receive
 //! store, bus states.
 
-use embedded_can::{ExtendedId, Frame, Id, StandardId};
+use crate::can_identifier::{EXTENDED, bits_of, of_the_table};
+use embedded_can::{Frame, StandardId};
 use hal_adapters::can::{BusFrame, NodeNumber};
 use std::collections::VecDeque;
 
@@ -97,24 +98,6 @@ pub struct CanModel {
 }
 
 const TXRQ: u32 = 1;
-/// IDE: the identifier has 29 bits, from bit 3 on, else eleven from bit 21 on (RM0090 32.9.3).
-const EXTENDED: u32 = 1 << 2;
-
-/// The bits of an identifier in a register.
-fn bits_of(id: Id) -> u32 {
-    match id {
-        Id::Standard(id) => u32::from(id.as_raw()) << 21,
-        Id::Extended(id) => id.as_raw() << 3 | EXTENDED,
-    }
-}
-
-/// The identifier in a register.
-fn id_of(bits: u32) -> Option<Id> {
-    match bits & EXTENDED {
-        0 => StandardId::new((bits >> 21) as u16).map(Id::Standard),
-        _ => ExtendedId::new(bits >> 3).map(Id::Extended),
-    }
-}
 
 impl CanModel {
     /// A controller after reset.
@@ -305,7 +288,7 @@ impl CanModel {
                 } = self.mailboxes[k];
                 let bytes = (u64::from(high) << 32 | u64::from(low)).to_le_bytes();
                 self.sent
-                    .extend(self.sent_frame(id, bytes).map(|(id, bytes)| Sent {
+                    .extend(of_the_table(self.node, id, bytes).map(|(id, bytes)| Sent {
                         asked_ns,
                         done_ns: at,
                         id,
@@ -314,18 +297,6 @@ impl CanModel {
                 self.complete(k, true);
             }
             self.arbitrate(at);
-        }
-    }
-
-    /// A frame of the controller as one of the table; any other as it is, with the first eleven bits of
-    /// its identifier.
-    fn sent_frame(&self, register: u32, bytes: [u8; 8]) -> Option<(u16, [u8; 8])> {
-        let frame = BusFrame::new(id_of(register)?, &bytes)?;
-        let own = self.node.from_bus(&frame).unwrap_or(frame);
-        let bytes = own.data().try_into().ok()?;
-        match own.id {
-            Id::Standard(id) => Some((id.as_raw(), bytes)),
-            Id::Extended(id) => Some((id.standard_id().as_raw(), bytes)),
         }
     }
 

@@ -13,6 +13,7 @@
 mod adc_model;
 mod bench;
 mod callbacks;
+mod can_identifier;
 mod can_model;
 mod checks;
 mod clock_model;

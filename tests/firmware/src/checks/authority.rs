@@ -1,6 +1,7 @@
 //! Who may: with a key whoever has it, without one whoever holds the line low.
 
-use super::commands::{SERVO_OFF, ask, ask_alone, ended};
+use super::asking::{ask, ask_alone, ended};
+use super::commands::SERVO_OFF;
 use super::{Outcome, equal};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Seen};

@@ -1,13 +1,12 @@
 //! Commands over the bus.
 
-use super::update::{KEY, talk};
+use super::asking::{answers, ask, ended};
 use super::{Outcome, equal, expect};
 use crate::adc_model::{Part, Row};
 use crate::bench::{Bench, Seen, command};
 use crate::can_model::BusState;
-use crate::machine::Machine;
 use embedded_can::{Id, StandardId};
-use hal_adapters::can::command::{Command, Outcome as Ended, Request};
+use hal_adapters::can::command::{Outcome as Ended, Request};
 use hal_adapters::can::status::flag;
 use hal_adapters::can::{Layout, Message as M, SensorReceiver, Timing};
 use runtime::RawFrame;
@@ -16,41 +15,6 @@ const PART: Part = Part::Ads131m08;
 /// From the trigger to the middle of what is sampled, by the drivers' documentation, us.
 const ADS131M08_SAMPLE_US: u32 = 166;
 const ADS8688_SAMPLE_US: u32 = 12;
-
-pub(super) fn ask(
-    machine: &mut Machine,
-    request: Request,
-    token: u8,
-    ticks: u64,
-) -> Result<Seen, super::Failure> {
-    let command = Command::new(request, token);
-    if command.needs_authority() {
-        // The controller without a key ignores the tag.
-        talk(machine, |talk| talk.authorise(&KEY, &command, &[], 0))?.0?;
-    }
-    ask_alone(machine, request, token, ticks)
-}
-
-/// Asks without a tag.
-pub(super) fn ask_alone(
-    machine: &mut Machine,
-    request: Request,
-    token: u8,
-    ticks: u64,
-) -> Result<Seen, super::Failure> {
-    let (id, bytes) = command(request, token, token);
-    machine.chip.can.receive(id, bytes);
-    machine.run_ticks(ticks)?;
-    Ok(Seen::since_last(machine))
-}
-
-pub(super) fn ended(seen: &Seen, token: u8) -> Vec<Option<Ended>> {
-    seen.answers
-        .iter()
-        .filter(|(_, a)| a.token == token)
-        .map(|(_, a)| a.outcome)
-        .collect()
-}
 
 fn flags(seen: &Seen) -> u8 {
     seen.last_status().map_or(0, |status| status.flags)
@@ -122,16 +86,6 @@ pub(super) fn at_rest(rest: [i32; 6]) -> Vec<Row> {
     (0..1000)
         .map(|k| core::array::from_fn(|c| rest[c] + noise(k, c)))
         .collect()
-}
-
-/// Asks for one thing after the other; each must be answered at once, and so.
-pub(super) fn answers(machine: &mut Machine, asked: &[(Request, u8, Ended)]) -> Outcome {
-    for (request, token, outcome) in asked {
-        let seen = ask(machine, *request, *token, 10)?;
-        let what = format!("answer to {request:?}");
-        equal(&what, ended(&seen, *token), vec![Some(*outcome)])?;
-    }
-    Ok(())
 }
 
 pub(super) const REZERO: Request = Request::Rezero { ticks: 400 };

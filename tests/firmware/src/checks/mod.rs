@@ -1,5 +1,6 @@
 //! Every property that is checked, and how results are reported.
 
+mod asking;
 pub mod authority;
 pub mod bus;
 pub mod commands;

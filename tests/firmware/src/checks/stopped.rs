@@ -1,6 +1,7 @@
 //! What runs after a reset: what ran before it; and nothing, where the program faults at its start.
 
-use super::commands::{SERVO_OFF, answers};
+use super::asking::answers;
+use super::commands::SERVO_OFF;
 use super::start::TICK;
 use super::update::{PART, identity, plan, running, update};
 use super::{Failure, Outcome, equal, expect};

@@ -1,6 +1,7 @@
 //! New parameters over the bus: the host's own dialog against the program and its flash.
 
-use super::commands::{SERVO_OFF, answers, ask};
+use super::asking::{answers, ask};
+use super::commands::SERVO_OFF;
 use super::parameters::{FIELD, poses_of};
 use super::start::page;
 use super::{Failure, Outcome, equal, expect};

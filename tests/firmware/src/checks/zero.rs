@@ -1,6 +1,7 @@
 //! The zero deviation over resets: kept by the controller that measured it, and by no other.
 
-use super::commands::{REZERO, SERVO_OFF, answers, ask, at_rest};
+use super::asking::{answers, ask};
+use super::commands::{REZERO, SERVO_OFF, at_rest};
 use super::start::{first_state, page, tick_now};
 use super::{Failure, Outcome, equal, expect};
 use crate::adc_model::Part;
