@@ -65,11 +65,6 @@ impl Instruction {
         (branch && !returns) || matches!(name, "cbz" | "cbnz" | "tbb" | "tbh")
     }
 
-    /// Whether it may jump or not, or calls: a jump over constants among the instructions is none.
-    pub fn is_branch(&self) -> bool {
-        self.is_jump() && self.mnemonic != "b.w" && self.mnemonic != "b.n" && self.mnemonic != "b"
-    }
-
     /// Registers of a list like `{r4, r5, d8-d15}`: words that they hold.
     fn listed_words(&self) -> u64 {
         let Some((_, list)) = self.operands.split_once('{') else {

@@ -81,10 +81,7 @@ fn run(cli: &Cli) -> Result<Vec<String>, Box<dyn Error>> {
         let c = counts.get(name).copied().unwrap_or_default();
         let stack: u64 = listing.between(entry, end).map(|i| i.pushed_bytes()).sum();
         let calls_out = listing.between(entry, end).filter(|i| i.is_call()).count();
-        let jumps = listing
-            .between(entry, end)
-            .filter(|i| i.is_branch())
-            .count();
+        let jumps = listing.between(entry, end).filter(|i| i.is_jump()).count();
         let key = format!("{}{name}", cli.prefix);
         println!("RESULT {key}_calls={}", c.calls);
         println!("RESULT {key}_instructions={}", c.most);
