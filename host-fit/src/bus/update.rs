@@ -92,8 +92,8 @@ pub enum UpdateError {
     #[error("{}", match declared {
         false => "the servo may be on: switch it off, and say so with --servo-off, which declares it meanwhile",
         true => "the controller does not take the servo for off: it has restarted, its service pin says on, another \
-                 computer has declared it on, or 30 s ran out. Nothing was stored. Look at the stage; once the servo is off, \
-                 try again",
+                 computer has declared it on, or the time of the declaration ran out. Nothing was changed. Look at the stage; \
+                 once the servo is off, try again",
     })]
     ServoOn {
         /// Whether it was declared off.

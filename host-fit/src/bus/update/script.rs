@@ -100,12 +100,10 @@ impl<L: Link> Script<'_, L> {
     fn run(&mut self, is_kept: bool) -> Result<bool, UpdateError> {
         if self.plan.declares_servo_off {
             let seconds = SERVO_OFF_S;
-            match self.tagged(Request::ServoOff { seconds })? {
-                (Outcome::Done, _) => self.declared = true,
-                (outcome, detail) => {
-                    self.declared = true;
-                    return Err(self.refused(outcome, detail));
-                }
+            let (outcome, detail) = self.tagged(Request::ServoOff { seconds })?;
+            self.declared = true;
+            if outcome != Outcome::Done {
+                return Err(self.refused(outcome, detail));
             }
         }
         if !is_kept {
