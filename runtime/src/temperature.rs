@@ -10,7 +10,6 @@
 //! dM = dH = 0 the factor is exactly 1.
 
 use crate::real::Real;
-use core::hint::black_box;
 
 /// k, h and T0 of a stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -42,17 +41,14 @@ impl<T: Real> Temperature<T> {
         self.reach_mk[0] | self.reach_mk[1] != 0
     }
 
-    /// dM and dH, mK: both 0 if one is missing or implausible; and whether one is. Of a sensor that
-    /// the stage lacks it is any number.
+    /// dM and dH, mK: both 0 if one is missing or implausible; and all ones if one is, else 0. Of a
+    /// sensor that the stage lacks it is any number.
     #[inline(always)]
-    pub(crate) fn changes_mk(&self, temperature_mc: [i32; 2]) -> ([i32; 2], bool) {
+    pub(crate) fn changes_mk(&self, temperature_mc: [i32; 2]) -> ([i32; 2], u32) {
         let mount = temperature_mc[0].wrapping_sub(self.zero_mc[0]);
         let body = temperature_mc[1].wrapping_sub(self.zero_mc[1]);
-        let bad = is_beyond(mount, self.reach_mk[0]) | is_beyond(body, self.reach_mk[1]);
-        // The compiler must not see what the mask is made of: it would choose between numbers instead,
-        // and keep more of them than there are registers (36 instructions of the field model's tick).
-        let keep = black_box(u32::from(bad).wrapping_sub(1).cast_signed());
-        ([mount & keep, body & keep], keep == 0)
+        let bad = beyond(mount, self.reach_mk[0]) | beyond(body, self.reach_mk[1]);
+        ([mount & !bad, body & !bad], bad.cast_unsigned())
     }
 
     /// dM and dH in K, as [`Temperature::gain_at`] takes them; 0 of a sensor that the stage lacks.
@@ -90,12 +86,14 @@ impl<T: Real> Temperature<T> {
     }
 }
 
-/// Whether a change lies beyond -reach..reach, mK: one sum and one comparison. For a reach of 0 the
-/// limit wraps to the largest number, which nothing is beyond.
+/// All ones if a change lies beyond -reach..reach, mK, else 0: the borrow of one subtraction. A mask
+/// from a comparison would be made a choice between numbers, for which the tick has no registers left.
+/// For a reach of 0 the limit wraps to the largest number, which nothing is beyond.
 #[inline(always)]
-const fn is_beyond(change_mk: i32, reach_mk: u32) -> bool {
-    let above_low = change_mk.cast_unsigned().wrapping_add(reach_mk);
-    above_low > reach_mk.wrapping_mul(2).wrapping_sub(1)
+const fn beyond(change_mk: i32, reach_mk: u32) -> i32 {
+    // |change|, or one less if it is negative.
+    let size = (change_mk ^ change_mk >> 31).cast_unsigned();
+    ((reach_mk.wrapping_sub(1) as u64).wrapping_sub(size as u64) >> 32) as i32
 }
 
 #[cfg(test)]
@@ -122,7 +120,8 @@ mod tests {
             (MISSING_CODE, 0, true),
         ] {
             let body = if fault { 0 } else { 100 };
-            assert_eq!(STAGE.changes_mk([mount, 21_100]), ([change, body], fault));
+            let bad = u32::from(fault).wrapping_neg();
+            assert_eq!(STAGE.changes_mk([mount, 21_100]), ([change, body], bad));
         }
     }
 
@@ -130,7 +129,7 @@ mod tests {
     fn a_sensor_that_the_stage_lacks_is_never_missed() {
         for code in [0, 5, MISSING_CODE, i32::MAX, -1] {
             let none = Temperature::<f32>::NONE;
-            assert!(!none.changes_mk([code; 2]).1);
+            assert_eq!(none.changes_mk([code; 2]).1, 0);
             assert_eq!(none.changes_k([code; 2]), [0.0; 2]);
             assert_eq!(none.gain_at([code; 2]), [1.0; 3]);
         }
