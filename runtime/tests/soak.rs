@@ -199,9 +199,11 @@ fn soak(blob: &[u8], ticks: u32, seed: u64) {
     let (mut random, mut account) = (Random(seed), Account::default());
     let mut sequence = u32::MAX - ticks / 2;
     let mut event = Event::Sound;
+    let mut is_first = true;
     for n in 0..ticks {
         event = random.event(event);
-        if n == 0 {
+        // After a restart no frame is late, and none was missed before the first.
+        if n == 0 || is_first && matches!(event, Event::Late(_) | Event::Gap(_)) {
             event = Event::Sound;
         }
         sequence = sequence.wrapping_add(1);
@@ -235,12 +237,14 @@ fn soak(blob: &[u8], ticks: u32, seed: u64) {
             }
             Event::Restart(anew) => {
                 tracker.forget();
+                is_first = true;
                 account.holds_left = [0; 2];
                 sequence = anew;
                 account.check(event, &tracker.tick_without_frame(), None);
                 continue;
             }
         }
+        is_first = false;
         let decoded = decoder.decode(&frame, &account.zero);
         account.check(event, &tracker.tick(&frame), Some(decoded));
     }
@@ -270,14 +274,7 @@ const MODEL_31: &[u8] = include_bytes!("../examples/stage.bin");
 const FIELD_MODEL: &[u8] = include_bytes!("../examples/field.bin");
 
 #[test]
-fn twenty_minutes_of_ticks_with_faults_are_accounted_for() {
-    soak(MODEL_31, HOUR / 3, 1);
-    soak(FIELD_MODEL, HOUR / 3, 2);
-}
-
-#[test]
-#[ignore = "a day of ticks, for each model: 20 s, optimised"]
-fn a_day_of_ticks_with_faults_is_accounted_for() {
-    soak(MODEL_31, 24 * HOUR, 3);
-    soak(FIELD_MODEL, 24 * HOUR, 4);
+fn hours_of_ticks_with_faults_are_accounted_for() {
+    soak(MODEL_31, 3 * HOUR, 3);
+    soak(FIELD_MODEL, 3 * HOUR, 4);
 }
