@@ -70,6 +70,7 @@ pub enum RecorderError {
         Some(Outcome::NotAuthorised) => "name the key of its stage with --key FILE",
         Some(Outcome::ServoOn) => "it has no key, and its line does not say that the servo is off. Switch that off, begin to \
                                    record, and switch it on again",
+        Some(Outcome::NoRandomNumber) => "its random number generator gives no numbers; restart it",
         _ => "its program may be too old to record",
     })]
     Refused {

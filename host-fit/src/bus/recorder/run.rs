@@ -91,6 +91,9 @@ impl Session<'_> {
                 outcome: Some(outcome),
             }),
             Err(UpdateError::Unexpected { outcome }) => Err(RecorderError::Refused { outcome }),
+            Err(UpdateError::NoRandomNumber) => Err(RecorderError::Refused {
+                outcome: Some(Outcome::NoRandomNumber),
+            }),
             Err(_) => Err(self.failure.take().unwrap_or(RecorderError::NoAnswer {
                 address: self.settings.address.clone(),
             })),
