@@ -1,9 +1,5 @@
-//! A day of ticks with faults: every status is the one that the injected fault explains, held poses
+//! Hours of ticks with faults: every status is the one that the injected fault explains, held poses
 //! are the last valid ones to the bit, and the counters add up.
-//!
-//! ```sh
-//! cargo test --release -p runtime --test soak -- --ignored --nocapture   # 24 h: 43.2 million ticks
-//! ```
 
 use runtime::frame::MISSING_CODE;
 use runtime::tracker::Health;
