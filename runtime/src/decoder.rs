@@ -273,19 +273,18 @@ impl<M: Model> Decoder<M> {
         let phi_bad = outside(each(phi, magnitude), c.sensitivity_min.to_bits(), FINITE);
         // Finite or not is asked in two ways: so a tick keeps the fewest values on the stack.
         let faults = (Status::HALL_A.with_next(outside_window(hall, &c.hall_window)))
-            .with(Status::TEMPERATURE_MISSING.with_next(temperature_bad & 1))
             .with(Status::CAPACITIVE_1.with_next(capacitive_bad))
             .with(Status::SENSITIVITY_A.with_next(phi_bad))
             .with(Status::PLANAR_NOT_FINITE.when(beyond(size_q, [FINITE, FINITE, FINITE])))
             .with(Status::VERTICAL_NOT_FINITE.when(any_not_finite(size_v)));
         let vertical_valid = !faults.any(VERTICAL_FAULTS);
-        // A missing temperature is no fault: it leaves a pose as if at T0.
-        let planar_valid = faults.bits() & !Status::TEMPERATURE_MISSING.bits() == 0;
+        let planar_valid = faults.bits() == 0;
         let range_v = each(c.calibrated_vertical, f32::to_bits);
         let range_q = each(c.calibrated_planar, f32::to_bits);
         let status = faults
             .with(Status::VERTICAL_EXTRAPOLATED.when(beyond(size_v, range_v)))
             .with(Status::PLANAR_EXTRAPOLATED.when(beyond(size_q, range_q)))
+            .with(Status::TEMPERATURE_MISSING.with_next(temperature_bad & 1))
             .with(Status::PLANAR_INVALID.when(!planar_valid))
             .with(Status::VERTICAL_INVALID.when(!vertical_valid));
         Reading {
