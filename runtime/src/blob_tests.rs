@@ -228,7 +228,7 @@ fn other_versions_are_refused_even_with_a_right_check() {
 }
 
 #[test]
-fn erased_and_foreign_memory_are_told_apart() {
+fn erased_and_foreign_memory_are_distinguished() {
     for fill in [0x00, 0xff] {
         assert_eq!(
             ParameterSet::from_flash(&[fill; MAX_BYTES]),

@@ -43,7 +43,7 @@ enum Event {
     Late(u32),
     /// Another zero deviation from this tick on.
     Zero(PlanarPose<f32>),
-    /// The source was restarted, and the servo is told; the first tick passes without a frame.
+    /// The source was restarted, and the servo knows; the first tick passes without a frame.
     Restart(u32),
 }
 

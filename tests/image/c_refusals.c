@@ -112,7 +112,7 @@ static int run(void)
     CHECK(hall_tick_without_frame(&servo, NULL) == HALL_RESULT_NULL_POINTER);
     CHECK(hall_health(&servo).ticks == 2);
 
-    /* A zero deviation is told in the status; a run that is too short is refused. */
+    /* The status shows a zero deviation; a run that is too short is refused. */
     CHECK(hall_set_zero(&servo, (HallPlanarPose){ 1e-6f, 0, 0 }));
     CHECK(hall_tick_without_frame(&servo, &again) == HALL_RESULT_OK);
     CHECK(again.status & HALL_STATUS_ZERO_SET);

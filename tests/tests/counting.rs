@@ -27,7 +27,7 @@ fn stack_is_what_pushes_and_subtractions_take() {
 }
 
 #[test]
-fn jumps_calls_and_divisions_are_told_apart() {
+fn jumps_calls_and_divisions_are_distinguished() {
     for (text, jump, call, division) in [
         ("bl\tf88 <f>", true, true, false),
         ("bne.n\t1276 <f+0x2a>", true, false, false),

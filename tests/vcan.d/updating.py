@@ -1,4 +1,4 @@
-"""While a node tells that it is updating every pose must be invalid, before and after none:
+"""While the state of a node is "updating" every pose must be invalid, before and after none:
 updating.py DBC RECORD."""
 
 import sys
@@ -17,10 +17,10 @@ for frame in frames(sys.argv[2]):
         valid.append(not s["Status"] & INVALID)
     elif name == "NodeStatus":
         states.append((s["State"], len(valid)))
-told = [poses for state, poses in states if state == UPDATING]
-if not told:
-    sys.exit("it did not tell that it was updating")
-during = valid[told[0] : told[-1]]
-print(f"{len(valid)} poses, {valid.count(False)} invalid, {len(during)} while it told that it was updating")
+updating = [poses for state, poses in states if state == UPDATING]
+if not updating:
+    sys.exit('no state was "updating"')
+during = valid[updating[0] : updating[-1]]
+print(f"{len(valid)} poses, {valid.count(False)} invalid, {len(during)} while its state was updating")
 wrong = any(during) or len(during) < 20 or not (valid[0] and valid[-1])
 sys.exit(wrong or {state for state, _ in states} != {RUNNING, UPDATING})

@@ -45,7 +45,7 @@
 //! **Checks.** Each frame has a CRC, and besides codes the three of a tick carry
 //! - the STATUS: a reset, a locked interface, a register that changed (REG_CRC_EN makes the part
 //!   compare its registers' CRC every 94 us; a change in the 0.2 ms before the codes are read is
-//!   told a tick later), and whether SYNC arrived. Two ticks in a row without a resynchronisation
+//!   reported a tick later), and whether SYNC arrived. Two ticks in a row without a resynchronisation
 //!   mean that its wire is broken;
 //! - one register, read back and compared: all of 0x02 to 0x30 in turn, in 94 ms.
 //!
@@ -215,7 +215,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
         compare(MODE_REGISTER, found, MODE_WANTED)
     }
 
-    /// Whether the responses of a tick, `None` if it was none, tell of a resynchronisation.
+    /// Whether the responses of a tick, `None` if it was none, report a resynchronisation.
     fn count_unsynced(&mut self, responses: [Option<u16>; 3]) -> Result<(), AdcError<SPI::Error>> {
         let synced = responses.into_iter().flatten().any(|r| r & F_RESYNC != 0);
         self.unsynced_ticks = if synced {
@@ -292,7 +292,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
         let first = self.exchange(READ | address(register), 0)?.response;
         let found = self.exchange(NULL, 0)?.response;
         let mut frame = self.exchange(NULL, 0)?;
-        // What a status tells is told once: that of a frame without codes counts, too.
+        // A status reports each event once: that of a frame without codes counts, too.
         let third = frame.response;
         if !is_ready(&frame) {
             frame = self.exchange(NULL, 0)?;

@@ -282,9 +282,9 @@ fn a_second_tick_without_resynchronisation_means_a_broken_wire() {
         tick(0x013f, 0x06, 0x0600, good()),
         tick(0x413f, 0x07, 0, good()),
     ];
-    let told = ticks::<6>(&all.concat()).map(|tick| tick.err());
+    let errors = ticks::<6>(&all.concat()).map(|tick| tick.err());
     let lost = Some(AdcError::NoSync);
-    assert_eq!(told, [None, None, None, None, lost, None]);
+    assert_eq!(errors, [None, None, None, None, lost, None]);
 }
 
 #[test]

@@ -136,8 +136,8 @@ mod tests {
             for k in 0..limit + 300 {
                 let passed = watch.pass::<()>(only(channel, 7777, k));
                 assert_eq!(passed.is_ok(), k < limit, "{channel} {k}");
-                if let Err(AdcError::Stuck { channel: told, .. }) = passed {
-                    assert_eq!(usize::from(told), channel);
+                if let Err(AdcError::Stuck { channel: found, .. }) = passed {
+                    assert_eq!(usize::from(found), channel);
                 }
             }
             let moved = only(channel, 7778, 1);

@@ -3,9 +3,9 @@
 //!
 //! ```
 //! use hal_adapters::can::BusFrame;
-//! use hal_adapters::can::command::{Command, Mailbox, Request, Told};
+//! use hal_adapters::can::command::{Command, Content, Mailbox, Request};
 //!
-//! let request = Told::Command(Command::new(Request::Rezero { ticks: 500 }, 17));
+//! let request = Content::Command(Command::new(Request::Rezero { ticks: 500 }, 17));
 //! let (mut host, mut node) = (Mailbox::default(), Mailbox::default());
 //! let sent = host.send(&request).map(BusFrame::from).unwrap();
 //! assert_eq!(node.take(&sent), Some(Ok(request)));
@@ -275,7 +275,7 @@ impl IdentityPage {
 
 /// The content of an occasional frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Told {
+pub enum Content {
     /// State of the decoding node.
     Status(NodeStatus),
     /// One of its counters.
@@ -290,7 +290,7 @@ pub enum Told {
     UpdateData(UpdateData),
 }
 
-impl Told {
+impl Content {
     const MESSAGES: [Message; 6] = [
         Message::NodeStatus,
         Message::Health,
@@ -333,9 +333,9 @@ pub struct Mailbox {
 
 impl Mailbox {
     /// The frame with this content.
-    pub fn send(&mut self, what: &Told) -> Option<Coded> {
-        let (k, payload) = what.payload();
-        let (message, counter) = (*Told::MESSAGES.get(k)?, self.sent.get_mut(k)?);
+    pub fn send(&mut self, content: &Content) -> Option<Coded> {
+        let (k, payload) = content.payload();
+        let (message, counter) = (*Content::MESSAGES.get(k)?, self.sent.get_mut(k)?);
         let coded = Coded::new(message, u32::from(*counter), payload);
         *counter = counter.wrapping_add(1);
         Some(coded)
@@ -346,10 +346,10 @@ impl Mailbox {
     /// A gap in the counter is no fault here, and neither is a sender that restarts, since these
     /// messages have no fixed rate. A frame that equals the last one bit for bit is a fault:
     /// a program that sends one request and ends must choose a different token each time.
-    pub fn take<F: Frame>(&mut self, frame: &F) -> Option<Result<Told, BusFault>> {
+    pub fn take<F: Frame>(&mut self, frame: &F) -> Option<Result<Content, BusFault>> {
         let (id, data) = standard(frame)?;
-        let k = Told::MESSAGES.iter().position(|m| m.id() == id)?;
-        let (message, last) = (*Told::MESSAGES.get(k)?, self.received.get_mut(k)?);
+        let k = Content::MESSAGES.iter().position(|m| m.id() == id)?;
+        let (message, last) = (*Content::MESSAGES.get(k)?, self.received.get_mut(k)?);
         let opened = match open(message, data) {
             Ok(opened) => opened,
             Err(fault) => return Some(Err(fault)),
@@ -357,7 +357,7 @@ impl Mailbox {
         if last.replace(opened) == Some(opened) {
             return Some(Err(BusFault::Repeated { message }));
         }
-        Some(Ok(Told::read(k, opened.1)))
+        Some(Ok(Content::read(k, opened.1)))
     }
 }
 

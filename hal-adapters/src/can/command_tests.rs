@@ -46,7 +46,7 @@ fn a_serial_number_of_32_bytes_comes_over_in_pages() {
 #[test]
 fn a_mailbox_reads_what_another_sent_and_refuses_a_repeat() {
     let (mut host, mut node) = (Mailbox::default(), Mailbox::default());
-    let command = Told::Command(Command::new(Request::Identify { seconds: 3 }, 9));
+    let command = Content::Command(Command::new(Request::Identify { seconds: 3 }, 9));
     let frame = BusFrame::from(host.send(&command).expect("known"));
     assert_eq!(node.take(&frame), Some(Ok(command)));
     let message = Message::Command;

@@ -96,7 +96,7 @@ fn the_counter_wraps_without_a_verdict() {
 }
 
 #[test]
-fn gaps_repeats_and_late_frames_are_told_apart() {
+fn gaps_repeats_and_late_frames_are_distinguished() {
     let mut sequence = Sequence::START;
     assert_eq!(sequence.judge(3), Verdict::First);
     assert_eq!(sequence.judge(3), Verdict::Repeated);

@@ -8,9 +8,9 @@
 //!
 //! ```
 //! use hal_adapters::can::{BusFrame, Coded, Message, NodeNumber};
-//! use hal_adapters::can::command::{Command, Mailbox, Request, Told};
+//! use hal_adapters::can::command::{Command, Content, Mailbox, Request};
 //!
-//! let request = Told::Command(Command::new(Request::ClearZero, 17));
+//! let request = Content::Command(Command::new(Request::ClearZero, 17));
 //! let frame = BusFrame::from(Mailbox::default().send(&request).unwrap());
 //! let node = NodeNumber::new(5).unwrap();
 //! let sent = node.to_bus(&frame);
@@ -100,14 +100,14 @@ impl NodeNumber {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::can::command::{Command, Mailbox, Request, Told};
+    use crate::can::command::{Command, Content, Mailbox, Request};
     use crate::can::e2e::unprotect;
     use crate::can::table::TABLE;
     use embedded_can::Frame;
 
     fn command() -> BusFrame {
-        let told = Told::Command(Command::new(Request::Rezero { ticks: 500 }, 17));
-        BusFrame::from(Mailbox::default().send(&told).expect("a command"))
+        let content = Content::Command(Command::new(Request::Rezero { ticks: 500 }, 17));
+        BusFrame::from(Mailbox::default().send(&content).expect("a command"))
     }
 
     #[test]

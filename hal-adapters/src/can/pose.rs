@@ -245,7 +245,7 @@ impl PoseReceiver {
     }
 
     /// When the codes of a pose were sampled, us of the node's clock, which wraps: the last time
-    /// that it told, and one servo period for each tick since. `None` before the first time
+    /// that it gave, and one servo period for each tick since. `None` before the first time
     /// frame and, after a tick that the node missed, until the next one: the node does not
     /// number the ticks that it missed. `None`, too, where the receive times do not bear the
     /// numbers out: a loss of 16 ticks does not show in the counters.

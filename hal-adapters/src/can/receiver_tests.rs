@@ -137,7 +137,7 @@ fn a_frame_sixteen_ticks_on_is_not_joined_to_an_old_one() {
 }
 
 #[test]
-fn sixteen_lost_ticks_are_told_by_the_time_frame() {
+fn sixteen_lost_ticks_are_known_from_the_time_frame() {
     let mut r = new(Layout::Bits16);
     for sequence in 12..18 {
         feed(&mut r, Layout::Bits16, sequence);

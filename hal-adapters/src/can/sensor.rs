@@ -243,11 +243,11 @@ mod tests {
         let bytes = sent.expect("a sixteenth tick").bytes;
         assert_eq!(bytes[1..], [0x04, 0x34, 0x12, 7, 0, 0, 0]);
         let sent = sent.map(BusFrame::from).expect("a sixteenth tick");
-        let told = TickTime {
+        let time = TickTime {
             sequence: 0x1_2340,
             time_us: 7,
         };
-        assert_eq!(read_time(&sent), Some(told));
+        assert_eq!(read_time(&sent), Some(time));
         assert_eq!(read_time(&sent.flipped(1)), None);
         assert_eq!(read_time(&BusFrame::from(frames_16(&FRAME)[0])), None);
         assert_eq!(time_frame(&at(0x1_2341)), None);

@@ -9,19 +9,19 @@
 //!
 //! ```
 //! use hal_adapters::can::BusFrame;
-//! use hal_adapters::can::command::{Command, Mailbox, Outcome, Request, Told};
+//! use hal_adapters::can::command::{Command, Content, Mailbox, Outcome, Request};
 //! use hal_adapters::can::service::Service;
 //!
 //! let (mut host, mut node) = (Mailbox::default(), Service::new(500));
-//! let record = Told::Command(Command::new(Request::Record { on: true }, 17));
+//! let record = Content::Command(Command::new(Request::Record { on: true }, 17));
 //! let frame = BusFrame::from(host.send(&record).expect("a command"));
 //! let answered = node.take(&frame, None::<&mut runtime::PoseTracker>).expect("a command").expect("a sound one");
 //! assert!(node.is_recording());
 //! let answer = host.take(&BusFrame::from(answered.answer.expect("an answer")));
-//! assert!(matches!(answer, Some(Ok(Told::Answer(a))) if a.outcome == Some(Outcome::Done)));
+//! assert!(matches!(answer, Some(Ok(Content::Answer(a))) if a.outcome == Some(Outcome::Done)));
 //! ```
 
-use super::command::{Answer, Command, IdentityPage, Mailbox, Outcome, Request, Told};
+use super::command::{Answer, Command, Content, IdentityPage, Mailbox, Outcome, Request};
 use super::frame::Coded;
 use super::notice::BusFault;
 use super::status::flag;
@@ -124,7 +124,7 @@ impl Service {
         mut updates: Option<Updates<'_, '_>>,
     ) -> Option<Result<Answered, BusFault>> {
         match self.mailbox.take(frame)? {
-            Ok(Told::Command(command)) => {
+            Ok(Content::Command(command)) => {
                 let refusal = self.refusal(&command, updates.as_mut());
                 let (outcome, detail) = match (refusal, command.request, &mut updates) {
                     (Some(refusal), ..) => refusal,
@@ -146,7 +146,7 @@ impl Service {
                 let answer = self.answer(command.number, command.token, outcome, detail);
                 Some(Ok(Answered { command, answer }))
             }
-            Ok(Told::UpdateData(data)) => {
+            Ok(Content::UpdateData(data)) => {
                 updates?.receiver.take(&data);
                 None
             }
@@ -198,12 +198,12 @@ impl Service {
         }
         let page = IdentityPage::of(serial, self.page);
         self.page += 1;
-        self.tell(&Told::Identity(page))
+        self.send(&Content::Identity(page))
     }
 
-    /// The frame with a state or a counter, numbered.
-    pub fn tell(&mut self, what: &Told) -> Option<Coded> {
-        self.mailbox.send(what)
+    /// The frame with this content, numbered.
+    pub fn send(&mut self, content: &Content) -> Option<Coded> {
+        self.mailbox.send(content)
     }
 
     /// The bits of [`flag`] that follow from commands.
@@ -311,7 +311,7 @@ impl Service {
     }
 
     fn answer(&mut self, number: u8, token: u8, outcome: Outcome, detail: u32) -> Option<Coded> {
-        self.tell(&Told::Answer(Answer {
+        self.send(&Content::Answer(Answer {
             number,
             token,
             outcome: Some(outcome),

@@ -34,7 +34,7 @@ impl<'d> Stage<'d> {
     }
 
     fn ask(&mut self, request: Request, token: u8) -> Outcome {
-        let command = Told::Command(Command::new(request, token));
+        let command = Content::Command(Command::new(request, token));
         let frame = BusFrame::from(self.host.send(&command).expect("a command"));
         let taken = self.service.take(&frame, Some(&mut self.servo));
         let answered = taken.expect("a command").expect("a sound one");
@@ -43,7 +43,7 @@ impl<'d> Stage<'d> {
 
     fn read(&mut self, answer: Coded, token: u8) -> Outcome {
         match self.host.take(&BusFrame::from(answer)) {
-            Some(Ok(Told::Answer(a))) if a.token == token => a.outcome.expect("a known one"),
+            Some(Ok(Content::Answer(a))) if a.token == token => a.outcome.expect("a known one"),
             other => panic!("{other:?}"),
         }
     }
@@ -193,7 +193,7 @@ fn a_node_without_parameters_records_and_identifies_and_has_no_zero() {
         REZERO,
         Request::ClearZero,
     ]) {
-        let command = Told::Command(Command::new(request, token));
+        let command = Content::Command(Command::new(request, token));
         let frame = BusFrame::from(host.send(&command).expect("a command"));
         let answered = service
             .take(&frame, None::<&mut PoseTracker>)
@@ -201,7 +201,7 @@ fn a_node_without_parameters_records_and_identifies_and_has_no_zero() {
             .expect("sound");
         let answer = BusFrame::from(answered.answer.expect("an answer"));
         match host.take(&answer) {
-            Some(Ok(Told::Answer(answer))) => outcomes.extend(answer.outcome),
+            Some(Ok(Content::Answer(answer))) => outcomes.extend(answer.outcome),
             other => panic!("{other:?}"),
         }
     }
@@ -221,7 +221,7 @@ fn a_node_without_parameters_records_and_identifies_and_has_no_zero() {
 #[test]
 fn a_repeated_command_is_neither_obeyed_nor_answered() {
     let (mut service, mut host) = (Service::new(TICKS_PER_S), Mailbox::default());
-    let command = Told::Command(Command::new(Request::Record { on: true }, 1));
+    let command = Content::Command(Command::new(Request::Record { on: true }, 1));
     let frame = BusFrame::from(host.send(&command).expect("a command"));
     assert!(matches!(
         service.take(&frame, None::<&mut PoseTracker>),

@@ -19,7 +19,7 @@
 //! Where the node has a key, a request with a tag is sent like this; else alone.
 //!
 //! ```text
-//! Challenge {0}               ->     a new nonce is drawn, and its first word told; NoRandomNumber
+//! Challenge {0}               ->     a new nonce is drawn, the answer is its first word; NoRandomNumber
 //! Challenge {1 to 3}          ->     its other words
 //! UpdateData 240 to 243       ->     the tag, kept in RAM
 //! the request                 ->     Incomplete {first missing index}: send it and ask again;
@@ -28,7 +28,7 @@
 //!
 //! Every request may be repeated, with the same token: it is not done twice, and its answer comes
 //! again (that of a tagged one until the next challenge). A transfer ends when it is committed, refused or aborted, when the servo is declared on,
-//! and when nothing came for 5 s; until then another host is told Busy. A host sends at most one
+//! and when nothing came for 5 s; until then another host gets Busy. A host sends at most one
 //! frame in a millisecond: the store of a controller holds three frames, and is emptied every 2 ms.
 //!
 //! A transfer of length 0 has no words; its commit goes back to the blob before

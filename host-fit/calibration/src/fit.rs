@@ -79,7 +79,7 @@ pub struct Fit {
     /// [`Uncertainty`](crate::judge::uncertainty::Uncertainty).
     pub standard_error: [Option<f64>; COUNT],
     /// Pairs of parameters whose estimates are correlated by more than
-    /// [`CORRELATION_TOLD`](crate::judge::uncertainty::CORRELATION_TOLD).
+    /// [`CORRELATION_SHOWN`](crate::judge::uncertainty::CORRELATION_SHOWN).
     pub correlations: Vec<(String, String, f64)>,
     /// All of a fit of the field model.
     pub field: Option<FieldFit>,

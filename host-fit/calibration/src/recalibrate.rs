@@ -130,7 +130,7 @@ pub enum RecalibrateError {
     /// The log leaves too much open.
     #[error(
         "this log does not tell {}: it leaves errors of {:.2} / {:.2} / {:.2} times the noise floor in X / Y / Rz in \
-         service. Record {}", told(*change), ratios[0], ratios[1], ratios[2], recording(*change)
+         service. Record {}", assumed(*change), ratios[0], ratios[1], ratios[2], recording(*change)
     )]
     NotCarried {
         /// What was to be found.
@@ -141,7 +141,7 @@ pub enum RecalibrateError {
     /// The log shows another change than the one asked for.
     #[error(
         "{} does not describe this log: its residuals are {ratio:.1} times what noise makes them (chi-square, limit \
-         {limit:.2}). {}", told(*change), remedy(*change)
+         {limit:.2}). {}", assumed(*change), remedy(*change)
     )]
     NotDescribed {
         /// What was to be found.
@@ -155,7 +155,7 @@ pub enum RecalibrateError {
     #[error(
         "{} would be one beyond all that probes drift or are moved by (sum of squares {prior:.0} against what the prior \
          allows for, limit {limit:.0}): check that the log is of this stage, and its columns, order and signs; or fit again",
-        told(*change)
+        assumed(*change)
     )]
     TooFar {
         /// What was to be found.
@@ -173,7 +173,7 @@ pub enum RecalibrateError {
     Unusable(ParameterError),
 }
 
-const fn told(change: Change) -> &'static str {
+const fn assumed(change: Change) -> &'static str {
     match change {
         Change::Gain => "one gain for all probes",
         Change::Gains => "a gain for each probe",

@@ -1,5 +1,5 @@
 //! `record`: asks a controller for the codes of its own converter, and records the bus, in the
-//! form of `candump -L`, until told to stop. No parameters are needed: the first calibration
+//! form of `candump -L`, until the user stops it. No parameters are needed: the first calibration
 //! has none.
 
 mod run;

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 super::args::values! {
     ExportFormat {
-        Bin: "bin", "The bytes of the blob; the flash tool is told the address";
+        Bin: "bin", "The bytes of the blob; give the address to the flash tool";
         Hex: "hex", "Intel HEX";
     }
 }

@@ -220,10 +220,10 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
                 match cross_validate(fit, &log.dataset, &stage, &settings) {
                     Ok(found) => report.of_fit["cross_validation"] = of_cross_validation(&found),
                     Err(error) => {
-                        let told =
+                        let warning =
                             format!("no cross-validation: without a fifth of the rows, {error}");
-                        terminal::warn(std::slice::from_ref(&told));
-                        report.warnings.push(told);
+                        terminal::warn(std::slice::from_ref(&warning));
+                        report.warnings.push(warning);
                     }
                 }
             }

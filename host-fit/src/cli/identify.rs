@@ -78,9 +78,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_waits_for_a_reset_and_what_is_not_used_are_told_apart() {
+    fn what_waits_for_a_reset_and_what_is_not_used_are_distinguished() {
         let kept = |sequence| Some(Kept { sequence, crc: 7 });
-        let told = |next, newest_sequence| {
+        let shown = |next, newest_sequence| {
             let running = RunningParameters {
                 slot: 0,
                 forced: false,
@@ -109,7 +109,7 @@ mod tests {
             (kept(3), 4, false, true),
             (kept(4), 5, true, true),
         ] {
-            let found = told(next, newest);
+            let found = shown(next, newest);
             assert_eq!(found["waiting"].is_object(), waits, "{found}");
             assert_eq!(found["not_used"].is_object(), is_unused, "{found}");
             assert!(found["previous"].is_object(), "{found}");

@@ -36,7 +36,7 @@ use crate::diagnose::Diagnosis;
 use crate::input::log::LogReading;
 use crate::input::stage::Stage;
 use crate::output::{
-    Place, blob_file, check_writable, is_standard, is_standard_output, posterior_file,
+    FileIdentity, blob_file, check_writable, is_standard, is_standard_output, posterior_file,
 };
 use crate::progress;
 use crate::report::json::Circumstances;
@@ -218,15 +218,15 @@ fn keep_apart_with<'p>(
         return Err(HostError::usage("-", problem));
     }
     let beside = |path| posterior_file::beside(path).filter(|path| path.exists());
-    let places = |path| {
-        let posterior = beside(path).map(|path| Place::of(&path));
-        place_of_input(path).into_iter().chain(posterior)
+    let files = |path| {
+        let posterior = beside(path).map(|path| FileIdentity::of(&path));
+        file_of_input(path).into_iter().chain(posterior)
     };
-    let inputs: Vec<Place> = inputs.into_iter().flat_map(places).collect();
-    let mut taken: Vec<Place> = Vec::new();
+    let inputs: Vec<FileIdentity> = inputs.into_iter().flat_map(files).collect();
+    let mut taken: Vec<FileIdentity> = Vec::new();
     let outputs: Vec<&Path> = outputs.into_iter().flatten().collect();
     let page = report.page();
-    // A new folder takes no place but its own; where there is one, the page is in it.
+    // A new folder holds only new files; in one that exists the page may be an input.
     let (folder, page) = match report.folder.as_deref() {
         Some(folder) if folder.exists() => (None, page.as_deref()),
         folder => (folder, None),
@@ -235,9 +235,9 @@ fn keep_apart_with<'p>(
         let (name, here) = match is_standard(output) {
             true => (
                 "standard output".into(),
-                Place::of(Path::new("/dev/stdout")),
+                FileIdentity::of(Path::new("/dev/stdout")),
             ),
-            false => (output.to_string_lossy(), Place::of(output)),
+            false => (output.to_string_lossy(), FileIdentity::of(output)),
         };
         if is_standard_output(output) {
             terminal::keep_for_output();
@@ -262,11 +262,11 @@ fn keep_apart_with<'p>(
 
 /// The file that an input is read from, also where the shell opened it as standard input; of a
 /// pipe or a terminal there is none.
-fn place_of_input(path: &Path) -> Option<Place> {
+fn file_of_input(path: &Path) -> Option<FileIdentity> {
     let standard = Path::new("/dev/stdin");
     match is_standard(path) {
-        true => (standard.metadata().ok()?.is_file()).then(|| Place::of(standard)),
-        false => Some(Place::of(path)),
+        true => (standard.metadata().ok()?.is_file()).then(|| FileIdentity::of(standard)),
+        false => Some(FileIdentity::of(path)),
     }
 }
 

@@ -128,8 +128,8 @@ fn read_known(
 }
 
 fn warnings(log: &LogReading, new: &Recalibration) -> Vec<String> {
-    let told = |found: &Finding| found.message.clone();
-    let mut warnings: Vec<String> = log.warnings.iter().map(told).collect();
+    let message = |found: &Finding| found.message.clone();
+    let mut warnings: Vec<String> = log.warnings.iter().map(message).collect();
     let undecoded = of_undecoded(new.judgement.undecoded);
     warnings.extend(undecoded.map(|found| found.message));
     if new.known.is_none() {

@@ -117,6 +117,6 @@ pub(super) fn finish(
     terminal::details(details)?;
     super::wrote(written)?;
     terminal::warn(warnings);
-    terminal::tell(&subject.diagnosis.findings);
+    terminal::show(&subject.diagnosis.findings);
     terminal::print(&Summary::new(subject).as_text())
 }

@@ -18,7 +18,7 @@ static LEVEL: AtomicI8 = AtomicI8::new(0);
 /// Whether standard output carries an output.
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
-/// From now on less (-1) or more (1) is told.
+/// From now on less (-1) or more (1) is shown.
 pub(super) fn set_level(level: i8) {
     LEVEL.store(level, Ordering::Relaxed);
 }
@@ -28,7 +28,7 @@ pub(super) fn keep_for_output() {
     TAKEN.store(true, Ordering::Relaxed);
 }
 
-/// Whether nothing but errors is told.
+/// Whether only errors are shown.
 pub(super) fn is_quiet() -> bool {
     LEVEL.load(Ordering::Relaxed) < 0
 }
@@ -79,7 +79,7 @@ pub(super) fn details(tables: &[Table]) -> Result<(), HostError> {
     }
 }
 
-/// Does a step; `--verbose` tells how long it took.
+/// Does a step; `--verbose` shows how long it took.
 pub(super) fn timed<T>(step: &str, work: impl FnOnce() -> T) -> T {
     let started = Instant::now();
     let done = work();
@@ -97,8 +97,8 @@ pub(super) fn warn(warnings: &[String]) {
     }
 }
 
-/// Writes findings; refusals end the command, which tells them.
-pub(super) fn tell(findings: &[Finding]) {
+/// Writes findings; not refusals: the error that ends the command names them.
+pub(super) fn show(findings: &[Finding]) {
     for finding in findings.iter().filter(|_| !is_quiet()) {
         match finding.severity {
             Severity::Note => line("note", AnsiColor::Cyan, &finding.message),

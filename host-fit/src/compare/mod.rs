@@ -105,7 +105,7 @@ impl Run {
     }
 }
 
-/// Makes all runs, form after form, solver after solver; `done` is told of each. Ends early,
+/// Makes all runs, form after form, solver after solver; `done` gets each. Ends early,
 /// with what there is, once `interrupt` is set.
 ///
 /// # Errors

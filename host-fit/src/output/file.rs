@@ -1,7 +1,7 @@
 //! An output of any length, written piece by piece.
 
 use super::error::{OutputError, OutputProblem};
-use super::place::{folder_of, is_stream, names_standard_output, resolve};
+use super::file_identity::{folder_of, is_stream, names_standard_output, resolve};
 use super::temporary::{sweep, temporary};
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{Seek, SeekFrom, Stdout, Write};

@@ -22,7 +22,7 @@ pub mod blob_file;
 mod error;
 pub mod export;
 mod file;
-mod place;
+mod file_identity;
 pub mod pose_file;
 pub mod posterior_file;
 pub mod record_file;
@@ -30,9 +30,9 @@ mod temporary;
 
 pub use error::{OutputError, OutputProblem};
 pub use file::Output;
-pub use place::{Place, is_standard, is_standard_output};
+pub use file_identity::{FileIdentity, is_standard, is_standard_output};
 
-use place::{is_stream, names_standard_output, resolve};
+use file_identity::{is_stream, names_standard_output, resolve};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -120,7 +120,7 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     if existing.is_some_and(|metadata| is_stream(path, &metadata)) {
         return Ok(());
     }
-    let folder = place::folder_of(&target);
+    let folder = file_identity::folder_of(&target);
     let tried = temporary::temporary(&folder);
     tried.map_or_else(
         |source| Err(OutputError::of_system(source, path, &folder, 0)),

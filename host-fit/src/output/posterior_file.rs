@@ -14,7 +14,7 @@
 //! | 26,668 | | layout 2: the faults of the log that the calibration is without, a line each, in UTF-8 |
 //! | the end | 32 | SHA-256 of everything before it |
 
-use crate::output::place::is_stream;
+use crate::output::file_identity::is_stream;
 use crate::output::{OutputError, Outputs, blob_file, is_standard};
 use crate::recalibrate::Known;
 use crate::solve::field::terms::COUNT;

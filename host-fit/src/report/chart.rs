@@ -40,7 +40,7 @@ pub enum Tone {
     Noise,
     /// Lines of the grid and borders between movements.
     Grid,
-    /// One of many kinds, told apart in a legend.
+    /// One of many kinds, each with its entry in a legend.
     Of(usize),
 }
 

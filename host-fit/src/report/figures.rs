@@ -11,7 +11,7 @@ use std::ops::Range;
 
 /// Half the width of the band of the noise, standard deviations.
 const BAND: f64 = 2.0;
-/// Movements up to which their borders can be told apart.
+/// With more movements their borders would merge.
 const MOVEMENTS_SHOWN: usize = 150;
 /// Intervals of a quantity that errors are shown against.
 const BINS: usize = 40;
@@ -48,7 +48,7 @@ pub(super) struct Log<'a> {
 }
 
 impl Log<'_> {
-    /// Where movements begin, unless there are too many to be told apart.
+    /// Where movements begin, unless there are so many that they would merge.
     fn borders(&self) -> Mark {
         let starts = self.dataset.movements.iter().skip(1).map(|m| m.rows.start);
         let starts = starts.map(|row| row as f64 * self.period_s);

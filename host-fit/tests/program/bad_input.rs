@@ -9,7 +9,7 @@ const FIT: &str = "fit log.csv --stage stage.toml --out p.bin --json p.json --re
 
 /// What is wrong with each kind of file its reader tells, whose tests are its own.
 #[test]
-fn what_cannot_be_read_is_told_with_its_place_and_nothing_is_written() {
+fn what_cannot_be_read_is_named_with_its_place_and_nothing_is_written() {
     let log = log();
     let mut gzip = GzEncoder::new(Vec::new(), Compression::fast());
     gzip.write_all(log.as_bytes()).expect("compressed");

@@ -78,8 +78,8 @@ fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
         assert_eq!(bench.json("p.json")["findings"][0]["code"], code);
         let output = bench.good(&format!("{fit} --force"));
         assert!(stderr(&output).contains("written all the same, as --force asks"));
-        let told = bench.good("inspect p.bin --json i.json");
-        assert!(stderr(&told).contains("(--force)"));
+        let inspect = bench.good("inspect p.bin --json i.json");
+        assert!(stderr(&inspect).contains("(--force)"));
         assert_eq!(bench.json("i.json")["fit"]["forced"], true);
         std::fs::remove_file(bench.path("p.bin")).expect("removed");
     }
@@ -142,7 +142,7 @@ fn resets_far_from_zero_are_a_warning_and_not_called_signs() {
 }
 
 #[test]
-fn a_log_of_another_gain_is_told_from_the_first() {
+fn a_log_of_another_gain_is_distinguished_from_the_first() {
     let bench = Bench::new();
     let log = log();
     bench.write("first.csv", &log);
@@ -220,7 +220,7 @@ fn eval_judges_a_blob_by_its_own_errors() {
 
 /// What the list of trusted inputs says of each is what an error of 1 % does.
 #[test]
-fn an_error_of_a_trusted_input_is_not_seen_and_costs_what_is_told() {
+fn an_error_of_a_trusted_input_is_not_seen_and_costs_what_is_announced() {
     let bench = Bench::new();
     bench.write("stage.toml", stage());
     bench.write("log.csv", log());
@@ -250,8 +250,8 @@ fn an_error_of_a_trusted_input_is_not_seen_and_costs_what_is_told() {
         ),
     ] {
         bench.write("wrong.toml", stage().replace(from, to));
-        let told = bench.good("fit log.csv --stage wrong.toml --out w.bin");
-        assert!(!stderr(&told).contains("warning"), "{}", stderr(&told));
+        let fit = bench.good("fit log.csv --stage wrong.toml --out w.bin");
+        assert!(!stderr(&fit).contains("warning"), "{}", stderr(&fit));
         bench.good("decode w.bin log.csv --stage wrong.toml --out w.csv");
         let inputs = trusted.as_array().expect("a list").iter();
         let mut input = inputs.filter(|input| input["place"] == place);
@@ -270,10 +270,10 @@ fn an_error_of_a_trusted_input_is_not_seen_and_costs_what_is_told() {
             match cost {
                 // The range is the log's and a tenth more.
                 Some(cost) => {
-                    let told = number(&cost["value"]);
+                    let announced = number(&cost["value"]);
                     assert!(
-                        (1.05..1.2).contains(&(told / off)),
-                        "{place} {axis}: {told} {off}"
+                        (1.05..1.2).contains(&(announced / off)),
+                        "{place} {axis}: {announced} {off}"
                     );
                 }
                 None => assert!(off < 5e-4 * end, "{place} {axis}: {off} of {end}"),
@@ -283,10 +283,10 @@ fn an_error_of_a_trusted_input_is_not_seen_and_costs_what_is_told() {
 }
 
 #[test]
-fn movements_that_are_too_short_to_tell_an_error_are_told_and_refused() {
+fn movements_that_are_too_short_to_show_an_error_are_reported_and_refused() {
     let bench = Bench::new();
     let log = thinned_log(10, |_| true);
-    for (rows, told) in [(2, Some(4)), (5, Some(0)), (20, None)] {
+    for (rows, status) in [(2, Some(4)), (5, Some(0)), (20, None)] {
         let mut short = String::new();
         for (k, line) in log.lines().enumerate() {
             let cells: Vec<&str> = line.splitn(3, ',').collect();
@@ -299,11 +299,11 @@ fn movements_that_are_too_short_to_tell_an_error_are_told_and_refused() {
         let fit = bench.run("fit log.csv --stage stage.toml --out p.bin --json fit.json");
         let found = bench.json("fit.json");
         let codes = found["findings"].as_array().expect("a list");
-        let is_told = codes.iter().any(|found| found["code"] == "short_movements");
-        assert_eq!(is_told, told.is_some(), "{rows}: {}", stderr(&fit));
+        let is_found = codes.iter().any(|found| found["code"] == "short_movements");
+        assert_eq!(is_found, status.is_some(), "{rows}: {}", stderr(&fit));
         assert_eq!(
             fit.status.code(),
-            told.or(Some(0)),
+            status.or(Some(0)),
             "{rows}: {}",
             stderr(&fit)
         );

@@ -110,17 +110,17 @@ fn late(log: &str, rows: usize) -> String {
 }
 
 #[test]
-fn a_late_reference_is_told_by_every_model_and_taken_off_when_asked() {
+fn a_late_reference_is_reported_by_every_model_and_taken_off_when_asked() {
     let bench = bench();
     bench.write("late.csv", late(&bench.text("log.csv"), 3));
     for model in ["31", "field", "auto"] {
         let fit =
             format!("fit late.csv --stage stage.toml --out p.bin --model {model} --json p.json");
-        let told = bench.good(&fit);
+        let output = bench.good(&fit);
         assert!(
-            stderr(&told).contains("the reference lags behind the probes by "),
+            stderr(&output).contains("the reference lags behind the probes by "),
             "{}",
-            stderr(&told)
+            stderr(&output)
         );
         let lag = |bench: &Bench| {
             let lag = &bench.json("p.json")["reference_lag"];
@@ -142,8 +142,8 @@ fn a_late_reference_is_told_by_every_model_and_taken_off_when_asked() {
             (&found["severity"], &found["unit"]),
             (&"warn".into(), &"us".into())
         );
-        let told_us = number(&found["value"]);
-        assert!((told_us - value_us).abs() < 1e-6, "{told_us} {value_us}");
+        let found_us = number(&found["value"]);
+        assert!((found_us - value_us).abs() < 1e-6, "{found_us} {value_us}");
         assert!(
             found["message"]
                 .as_str()
@@ -182,11 +182,11 @@ fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
         ));
         let json = bench.json("auto.json");
         assert_eq!(json["model"], model);
-        let told = json["model_reason"].as_str().expect("a sentence");
-        assert!(told.starts_with(reason), "{told}");
+        let said = json["model_reason"].as_str().expect("a sentence");
+        assert!(said.starts_with(reason), "{said}");
         let findings = json["findings"].as_array().expect("a list");
         let note = findings.iter().find(|found| found["code"] == "model_lacks");
-        let expected = note.and_then(|note| note["message"].as_str()?.strip_prefix(told));
+        let expected = note.and_then(|note| note["message"].as_str()?.strip_prefix(said));
         assert_eq!(
             expected.map(|expected| expected.contains("in service expect")),
             (model == "31").then_some(true)
@@ -214,10 +214,10 @@ fn a_log_of_little_motion_is_a_warning() {
     let stage = bench.text("stage.toml");
     let stage = stage.replace("rz = { service_rad = 500e-6", "rz = { service_rad = 1.2e-3");
     bench.write("wide.toml", stage);
-    let told = bench.good("fit log.csv --stage wide.toml --out p.bin --model field");
-    assert!(stderr(&told).contains("moves rz by 5"), "{}", stderr(&told));
-    let told = bench.good("fit log.csv --stage stage.toml --out p.bin --model field");
-    assert_eq!(stderr(&told), "");
+    let fit = bench.good("fit log.csv --stage wide.toml --out p.bin --model field");
+    assert!(stderr(&fit).contains("moves rz by 5"), "{}", stderr(&fit));
+    let fit = bench.good("fit log.csv --stage stage.toml --out p.bin --model field");
+    assert_eq!(stderr(&fit), "");
 }
 
 #[test]

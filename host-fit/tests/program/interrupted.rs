@@ -39,10 +39,10 @@ fn ctrl_c_ends_a_command_that_reads_and_leaves_nothing_behind() {
         let ended = (0..TIMES_MAX).any(|_| pipe.write_all(lines.as_bytes()).is_err());
         drop(pipe);
         let output = running.wait_with_output().expect("ended");
-        let told = stderr(&output);
-        assert!(ended, "{arguments:?} read on: {told}");
-        assert_eq!(output.status.code(), Some(130), "{arguments:?}: {told}");
-        assert!(told.contains("interrupted"), "{told}");
+        let errors = stderr(&output);
+        assert!(ended, "{arguments:?} read on: {errors}");
+        assert_eq!(output.status.code(), Some(130), "{arguments:?}: {errors}");
+        assert!(errors.contains("interrupted"), "{errors}");
         assert!(bench.holds_only(&["log.csv", "ifm.csv", "p.bin"]));
     }
 }

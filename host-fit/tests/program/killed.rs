@@ -230,10 +230,10 @@ fn a_full_disk_leaves_every_output_of_a_command_as_it_was() {
                 .args(job.arguments.split(' '))
                 .current_dir(bench.path("."));
             let output = limited.output().expect("sh runs");
-            let told = stderr(&output);
-            assert_eq!(output.status.code(), Some(3), "{}: {told}", job.arguments);
-            assert!(told.contains("no room"), "{}: {told}", job.arguments);
-            assert!(!told.contains(".host-fit-"), "a temporary name: {told}");
+            let errors = stderr(&output);
+            assert_eq!(output.status.code(), Some(3), "{}: {errors}", job.arguments);
+            assert!(errors.contains("no room"), "{}: {errors}", job.arguments);
+            assert!(!errors.contains(".host-fit-"), "a temporary name: {errors}");
             let (old, new) = job.judge(&bench, &whole);
             if k < one_by_one {
                 assert_eq!(new, 0, "{} with {blocks} blocks", job.arguments);

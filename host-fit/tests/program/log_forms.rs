@@ -19,8 +19,8 @@ fn one_long_recording_is_fitted_as_its_movements_are() {
     bench.write("whole.csv", one_recording());
     let fit = |log: &str| {
         let fit = format!("fit {log} --stage stage.toml --out p.bin --json p.json");
-        let told = stderr(&bench.good(&fit));
-        (bench.json("p.json"), told)
+        let warnings = stderr(&bench.good(&fit));
+        (bench.json("p.json"), warnings)
     };
     let (want, _) = fit("log.csv");
     let (have, warnings) = fit("whole.csv --split 2");
@@ -87,10 +87,10 @@ fn init_drafts_a_stage_file_that_is_refused_until_it_is_filled_in() {
         .replacen("21.5", "temperature", 1);
     bench.write("log.csv", renamed);
     bench.bad("init log.csv", 2, &["stage.toml exists", "--force"]);
-    let told = stdout(&bench.good("init log.csv --out new.toml"));
+    let shown = stdout(&bench.good("init log.csv --out new.toml"));
     assert!(
-        told.contains("11 columns mapped, left out: temperature"),
-        "{told}"
+        shown.contains("11 columns mapped, left out: temperature"),
+        "{shown}"
     );
     let fit = "fit log.csv --stage new.toml --out p.bin";
     bench.bad(fit, 3, &["new.toml", "`: missing; fill in the"]);

@@ -1,4 +1,4 @@
-//! Fits that succeed, with something that the user must be told.
+//! Fits that succeed, with something that the user must know.
 
 use crate::common::{Bench, number, stderr, thinned_log};
 use host_fit::input::shipped::STAGE_TOML;
@@ -63,7 +63,7 @@ fn a_blob_of_other_scales_is_refused() {
 }
 
 #[test]
-fn movements_of_several_logs_are_told_apart() {
+fn movements_of_several_logs_are_distinguished() {
     let bench = Bench::new();
     bench.write("a.csv", thinned_log(20, |m| m < 30));
     bench.write("b.csv", thinned_log(20, |m| m < 57));

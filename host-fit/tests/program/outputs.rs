@@ -166,7 +166,7 @@ fn text_from_a_file_forges_no_line() {
     let bench = Bench::new();
     let forged = with_cell(&log(), 4, "ifm_x_nm", "1\u{202e}warning: forged");
     bench.write("log.csv", forged);
-    let told = stderr(&bench.run("fit log.csv --stage stage.toml --out p.bin"));
+    let of_log = stderr(&bench.run("fit log.csv --stage stage.toml --out p.bin"));
     let stage = bench.text("stage.toml") + "\"a\\nwarning: forged\\u001B[2J\" = 1\n";
     bench.write("odd.toml", stage);
     let of_stage = stderr(&bench.run("check log.csv --stage odd.toml"));
@@ -177,7 +177,7 @@ fn text_from_a_file_forges_no_line() {
     blob_file::write(&bench.path("q.bin"), &set).expect("written");
     let shown = stdout(&bench.good("inspect q.bin"));
     let compared = stdout(&bench.good("diff q.bin q.bin"));
-    for text in [told, of_stage, shown, compared] {
+    for text in [of_log, of_stage, shown, compared] {
         assert!(text.contains("warning: forged"), "{text}");
         assert!(!text.contains(['\u{1b}', '\u{202e}']), "{text}");
         assert!(

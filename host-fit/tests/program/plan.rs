@@ -5,12 +5,12 @@ use host_fit::input::shipped::STAGE_TOML;
 
 /// A run that is short enough to be planned fast, rehearsed, and written nowhere else.
 #[test]
-fn a_planned_run_is_written_told_and_can_be_rehearsed() {
+fn a_planned_run_is_written_shown_and_can_be_rehearsed() {
     let bench = Bench::new();
     let planned = bench.good("plan --stage stage.toml --seconds 60 --out run.csv --json plan.json");
-    let told = stdout(&planned);
-    assert!(told.contains("30001"), "{told}");
-    assert!(told.contains("least determined") && told.contains("wrote run.csv"));
+    let shown = stdout(&planned);
+    assert!(shown.contains("30001"), "{shown}");
+    assert!(shown.contains("least determined") && shown.contains("wrote run.csv"));
     let json = bench.json("plan.json");
     for axis in ["x", "y", "rz"] {
         let ratio = number(&json["service"][axis]["ratio"]);
@@ -18,8 +18,8 @@ fn a_planned_run_is_written_told_and_can_be_rehearsed() {
     }
     let parameters = json["parameters"].as_object().expect("by name");
     assert_eq!(parameters.len(), 81);
-    let rz = told.lines().find(|line| line.starts_with("  rz "));
-    assert!(rz.is_some_and(|line| line.contains("500.0")), "{told}");
+    let rz = shown.lines().find(|line| line.starts_with("  rz "));
+    assert!(rz.is_some_and(|line| line.contains("500.0")), "{shown}");
 
     bench.good("simulate --stage stage.toml --plan run.csv --seed 2 --out log.csv");
     assert_eq!(bench.text("log.csv").lines().count(), 30_002);

@@ -87,7 +87,7 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
 }
 
 #[test]
-fn bad_rows_do_not_bend_it_and_what_does_is_told_in_the_verdict() {
+fn bad_rows_do_not_bend_it_and_what_does_is_in_the_verdict() {
     let bench = bench();
     let log = bench.text("log.csv");
     let sparks = changed(&log, |row, cells| {

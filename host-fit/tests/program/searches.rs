@@ -145,8 +145,8 @@ fn an_interrupt_keeps_the_best_so_far() {
 fn an_interrupt_keeps_nothing_that_has_errors_far_above_the_noise() {
     let bench = bench();
     bench.write("p.bin", "the blob before");
-    let told = stderr(&interrupted(&bench, "--project delta --population 2000"));
-    assert!(told.contains("nothing was written"), "{told}");
+    let errors = stderr(&interrupted(&bench, "--project delta --population 2000"));
+    assert!(errors.contains("nothing was written"), "{errors}");
     assert_eq!(bench.text("p.bin"), "the blob before");
 }
 

@@ -18,9 +18,9 @@ fn bench() -> Bench {
 fn quiet_tells_errors_only() {
     let bench = bench();
     let fit = "fit log.csv --stage stage.toml --out p.bin";
-    let told = bench.good(fit);
-    assert!(stdout(&told).contains("wrote p.bin"));
-    assert!(stderr(&told).contains("note: "));
+    let output = bench.good(fit);
+    assert!(stdout(&output).contains("wrote p.bin"));
+    assert!(stderr(&output).contains("note: "));
     let quiet = bench.good(&format!("{fit} --quiet"));
     assert_eq!((stdout(&quiet), stderr(&quiet)), Default::default());
     bench.bad("-q inspect absent.bin", 3, &["absent.bin"]);
@@ -30,9 +30,9 @@ fn quiet_tells_errors_only() {
 #[test]
 fn verbose_tells_the_time_of_each_step() {
     let bench = bench();
-    let told = bench.good("check log.csv --stage stage.toml -v");
+    let output = bench.good("check log.csv --stage stage.toml -v");
     for step in ["reading: ", "fit: ", "diagnosis: "] {
-        assert!(stderr(&told).contains(step), "{}", stderr(&told));
+        assert!(stderr(&output).contains(step), "{}", stderr(&output));
     }
 }
 
@@ -70,8 +70,8 @@ fn a_blob_is_read_from_standard_input() {
 #[test]
 fn nothing_is_coloured_or_drawn_where_there_is_no_terminal() {
     let bench = bench();
-    let told = bench.good("fit log.csv --stage stage.toml --out p.bin --project none");
-    assert!(!(stdout(&told) + &stderr(&told)).contains('\u{1b}'));
+    let output = bench.good("fit log.csv --stage stage.toml --out p.bin --project none");
+    assert!(!(stdout(&output) + &stderr(&output)).contains('\u{1b}'));
 }
 
 #[test]

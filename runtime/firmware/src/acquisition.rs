@@ -174,8 +174,8 @@ mod tests {
         let mut adc = Acquisition::new(Fake::default());
         assert_eq!(adc.start(&mut NoDelay), Ok(()));
         adc.converter.loses_setting = true;
-        let told = [(); 4].map(|()| adc.sample(0, 0, &mut NoDelay).map_err(|e| e.number()));
-        assert_eq!(told.map(|t| t.err()), [Some(5), Some(7), None, None]);
+        let errors = [(); 4].map(|()| adc.sample(0, 0, &mut NoDelay).map_err(|e| e.number()));
+        assert_eq!(errors.map(|e| e.err()), [Some(5), Some(7), None, None]);
         assert_eq!(adc.starts(), 2);
     }
 

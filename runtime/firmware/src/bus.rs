@@ -20,7 +20,7 @@ use stm32f4xx_hal::pac::can1::TX;
 const COMMANDS_PER_TICK: u8 = 3;
 /// Longest wait for the controller to stand still, us. It takes a few bits.
 const INIT_US: u32 = 1000;
-/// Ticks after which a controller that does not take part in the bus is told: half a second. It
+/// Ticks after which a controller that does not take part in the bus counts as apart: half a second. It
 /// waits for eleven recessive bits, which never come while RX is held low.
 const APART_TICKS: u16 = (TICKS_PER_S / 2) as u16;
 /// IDE in a mailbox's identifier register and in a filter: the identifier has 29 bits, of which the

@@ -10,7 +10,7 @@ use crate::fpu::FpuSettings;
 use crate::outbox::Outbox;
 use crate::schedule::TICKS_PER_S;
 use embedded_can::Frame;
-use hal_adapters::can::command::Told;
+use hal_adapters::can::command::Content;
 use hal_adapters::can::service::Updates;
 pub use hal_adapters::can::status::BoardFacts;
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus, bit, board_check, flag};
@@ -68,8 +68,8 @@ pub struct Node<'d> {
     state: (NodeState, u8),
     fpu_restored: u32,
     board_checks: u32,
-    /// Times the bus was off that a state has told.
-    bus_off_told: u32,
+    /// Times the bus was off, as the last state says.
+    bus_off_sent: u32,
 }
 
 impl<'d> Node<'d> {
@@ -92,7 +92,7 @@ impl<'d> Node<'d> {
             state: (NodeState::Starting, 0),
             fpu_restored: 0,
             board_checks: 0,
-            bus_off_told: 0,
+            bus_off_sent: 0,
         }
     }
 
@@ -186,21 +186,21 @@ impl<'d> Node<'d> {
         let servo = self.parameters.servo_mut();
         let answer = self.service.tick(servo.as_deref());
         let page = self.service.identity_page(self.parameters.serial());
-        let was_off = core::mem::replace(&mut self.bus_off_told, facts.bus_off) != facts.bus_off;
+        let was_off = core::mem::replace(&mut self.bus_off_sent, facts.bus_off) != facts.bus_off;
         self.receiver.tick(self.service.servo_is_off());
         let due = match self.ticks % u32::from(SLOW_TICKS) {
-            0 => Some(Told::Status(self.status(facts))),
+            0 => Some(Content::Status(self.status(facts))),
             // A receiver must know why frames stay away.
-            _ if was_off || self.is_storing() => Some(Told::Status(self.status(facts))),
+            _ if was_off || self.is_storing() => Some(Content::Status(self.status(facts))),
             8 => {
                 let number = self.ticks / u32::from(SLOW_TICKS);
                 let page = HealthPage::of(&self.health(), Some(&facts.board), number);
-                Some(Told::Health(page))
+                Some(Content::Health(page))
             }
             _ => None,
         };
-        let told = due.and_then(|told| self.service.tell(&told));
-        let frames = answer.into_iter().chain(page).chain(told);
+        let due = due.and_then(|content| self.service.send(&content));
+        let frames = answer.into_iter().chain(page).chain(due);
         frames.for_each(|frame| outbox.push(frame));
         self.ticks = self.ticks.wrapping_add(1);
         reading
@@ -237,8 +237,8 @@ impl<'d> Node<'d> {
     /// Stores new parameters: takes half a second.
     pub fn store(&mut self, outbox: &mut Outbox, store: &mut dyn Store) {
         let answer = self.receiver.store(self.service.servo_is_off(), store);
-        let told = answer.and_then(|answer| self.service.tell(&Told::Answer(answer)));
-        told.into_iter().for_each(|frame| outbox.push(frame));
+        let frame = answer.and_then(|answer| self.service.send(&Content::Answer(answer)));
+        frame.into_iter().for_each(|frame| outbox.push(frame));
     }
 
     /// Whether the controller is to be reset, once its answers have left.

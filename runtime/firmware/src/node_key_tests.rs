@@ -4,7 +4,7 @@ use super::*;
 use hal_adapters::can::update::{Key, TAG_INDEX, UpdateData, UpdateRequest, tag};
 
 /// The same with the tag by this key, where there is one.
-fn ask_tagged(node: &mut Node<'_>, request: Request, token: u8, key: Option<Key>) -> Vec<Told> {
+fn ask_tagged(node: &mut Node<'_>, request: Request, token: u8, key: Option<Key>) -> Vec<Content> {
     if let Some(key) = key {
         ask(
             node,
@@ -16,7 +16,7 @@ fn ask_tagged(node: &mut Node<'_>, request: Request, token: u8, key: Option<Key>
         let mut host = Mailbox::default();
         for (index, word) in (TAG_INDEX..).zip(tag.as_chunks().0) {
             let word = u32::from_le_bytes(*word);
-            let coded = host.send(&Told::UpdateData(UpdateData { token, index, word }));
+            let coded = host.send(&Content::UpdateData(UpdateData { token, index, word }));
             let frame = BusFrame::from(coded.expect("a word"));
             take(node, &frame, &mut Outbox::new());
         }
@@ -46,9 +46,9 @@ fn the_servo_counts_as_on_unless_the_line_says_off_or_a_key_stands_in_for_it() {
         let mut outbox = Outbox::new();
         node.tick(Ok(frame(0)), &facts, &mut Disturbed::default(), &mut outbox);
         ask_tagged(&mut node, Request::ServoOff { seconds: 9 }, 1, key);
-        let told = ask_tagged(&mut node, Request::ClearZero, 2, key);
-        let answered = told.iter().find_map(|told| match told {
-            Told::Answer(answer) => answer.outcome,
+        let contents = ask_tagged(&mut node, Request::ClearZero, 2, key);
+        let answered = contents.iter().find_map(|content| match content {
+            Content::Answer(answer) => answer.outcome,
             _ => None,
         });
         assert_eq!(answered, Some(outcome), "{line:?} {key:?}");

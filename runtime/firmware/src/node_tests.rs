@@ -123,21 +123,21 @@ fn tick(
     core::iter::from_fn(|| outbox.pop()).collect()
 }
 
-fn told(frames: &[hal_adapters::can::Coded]) -> Vec<Told> {
+fn contents(frames: &[hal_adapters::can::Coded]) -> Vec<Content> {
     let mut mailbox = Mailbox::default();
     let read = |coded: &hal_adapters::can::Coded| mailbox.take(&BusFrame::from(*coded))?.ok();
     frames.iter().filter_map(read).collect()
 }
 
-fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Told> {
-    let coded = Mailbox::default().send(&Told::Command(Command::new(request, token)));
+fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Content> {
+    let coded = Mailbox::default().send(&Content::Command(Command::new(request, token)));
     let mut outbox = Outbox::new();
     take(
         node,
         &BusFrame::from(coded.expect("a command")),
         &mut outbox,
     );
-    told(&core::iter::from_fn(|| outbox.pop()).collect::<Vec<_>>())
+    contents(&core::iter::from_fn(|| outbox.pop()).collect::<Vec<_>>())
 }
 
 #[test]
@@ -151,20 +151,20 @@ fn pose_frames_come_first_in_the_order_of_their_identifiers() {
 }
 
 #[test]
-fn every_sixteenth_tick_tells_the_state_and_half_way_a_counter() {
+fn every_sixteenth_tick_sends_the_state_and_half_way_a_counter() {
     let mut node = node();
     for k in 0..64u32 {
-        let told = told(&tick(&mut node, Ok(frame(k))));
-        let status = told
+        let contents = contents(&tick(&mut node, Ok(frame(k))));
+        let status = contents
             .iter()
-            .any(|t| matches!(t, Told::Status(s) if s.state == Some(NodeState::Running)));
-        let health = told.iter().any(|t| matches!(t, Told::Health(_)));
+            .any(|t| matches!(t, Content::Status(s) if s.state == Some(NodeState::Running)));
+        let health = contents.iter().any(|t| matches!(t, Content::Health(_)));
         assert_eq!((status, health), (k % 16 == 0, k % 16 == 8), "{k}");
     }
 }
 
 #[test]
-fn a_bus_that_was_off_is_told_at_once() {
+fn a_bus_that_was_off_is_reported_at_once() {
     let mut node = node();
     tick(&mut node, Ok(frame(0)));
     let facts = Facts {
@@ -175,9 +175,10 @@ fn a_bus_that_was_off_is_told_at_once() {
         let mut outbox = Outbox::new();
         node.tick(Ok(frame(k)), &facts, &mut Disturbed::default(), &mut outbox);
         let frames: Vec<_> = core::iter::from_fn(|| outbox.pop()).collect();
-        let told = told(&frames);
-        told.iter()
-            .filter(|t| matches!(t, Told::Status(s) if s.bus_off == 1))
+        let contents = contents(&frames);
+        contents
+            .iter()
+            .filter(|t| matches!(t, Content::Status(s) if s.bus_off == 1))
             .count()
     };
     assert_eq!([1, 2, 3].map(&mut states), [1, 0, 0]);
@@ -220,8 +221,8 @@ fn without_parameters_there_are_states_but_no_poses() {
                 .iter()
                 .all(|c| matches!(c.message, Message::NodeStatus | Message::Health))
         );
-        for told in told(&frames) {
-            if let Told::Status(status) = told {
+        for content in contents(&frames) {
+            if let Content::Status(status) = content {
                 assert_eq!(
                     (status.state, status.reason),
                     (Some(NodeState::BadParameters), 7)
@@ -231,7 +232,9 @@ fn without_parameters_there_are_states_but_no_poses() {
         }
     }
     let answers = ask(&mut node, Request::Rezero { ticks: 10 }, 3);
-    assert!(matches!(answers[..], [Told::Answer(a)] if a.outcome == Some(Outcome::NoParameters)));
+    assert!(
+        matches!(answers[..], [Content::Answer(a)] if a.outcome == Some(Outcome::NoParameters))
+    );
 }
 
 #[test]
@@ -264,7 +267,7 @@ fn a_re_zero_needs_the_servo_off_and_its_answer_comes_in_the_tick_that_ends_it()
     let mut asked = |node: &mut Node<'_>, request| {
         token += 1;
         match ask(node, request, token)[..] {
-            [Told::Answer(answer)] => answer.outcome,
+            [Content::Answer(answer)] => answer.outcome,
             _ => None,
         }
     };
@@ -274,17 +277,19 @@ fn a_re_zero_needs_the_servo_off_and_its_answer_comes_in_the_tick_that_ends_it()
     assert_eq!(asked(&mut node, off), Some(Outcome::Done));
     assert_eq!(asked(&mut node, rezero), Some(Outcome::Started));
     let answers = (1..=400).flat_map(|k| {
-        let told = told(&tick(&mut node, Ok(frame(k))));
-        let answers = told.into_iter().filter(|t| matches!(t, Told::Answer(_)));
+        let contents = contents(&tick(&mut node, Ok(frame(k))));
+        let answers = contents
+            .into_iter()
+            .filter(|t| matches!(t, Content::Answer(_)));
         answers.map(move |answer| (k, answer)).collect::<Vec<_>>()
     });
     let answers: Vec<_> = answers.collect();
-    assert!(matches!(answers[..], [(300, Told::Answer(a))] if a.outcome == Some(Outcome::Done)));
+    assert!(matches!(answers[..], [(300, Content::Answer(a))] if a.outcome == Some(Outcome::Done)));
     assert_ne!(node.zero(), PlanarPose::ZERO);
 }
 
 #[test]
-fn a_zero_that_is_restored_is_subtracted_and_told() {
+fn a_zero_that_is_restored_is_subtracted_and_reported() {
     let mut node = node();
     let zero = PlanarPose {
         x_m: 3e-6,
@@ -293,10 +298,12 @@ fn a_zero_that_is_restored_is_subtracted_and_told() {
     node.restore_zero(zero);
     assert_eq!(node.zero(), zero);
     let frames = tick(&mut node, Ok(frame(0)));
-    let status = told(&frames).into_iter().find_map(|told| match told {
-        Told::Status(status) => Some(status),
-        _ => None,
-    });
+    let status = contents(&frames)
+        .into_iter()
+        .find_map(|content| match content {
+            Content::Status(status) => Some(status),
+            _ => None,
+        });
     assert_eq!(status.map(|status| status.flags), Some(flag::ZERO_SET));
 }
 

@@ -1,4 +1,4 @@
-//! The parameters that the controller keeps in flash: which it runs, what is told of the others, and
+//! The parameters that the controller keeps in flash: which it runs, what it reports of the others, and
 //! new ones that come over the bus.
 
 use crate::store::{self, Contents, Flash, FlashFault, Image, SLOTS, Stored};

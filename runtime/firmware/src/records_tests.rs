@@ -32,7 +32,7 @@ fn a_reset_runs_what_ran_and_what_is_stored_waits_for_an_activation() {
 }
 
 #[test]
-fn each_kind_of_unusable_blob_is_told_and_the_other_one_runs() {
+fn each_kind_of_unusable_blob_is_reported_and_the_other_one_runs() {
     let sound = blob(1);
     let mut torn = sound.clone();
     torn[200..].fill(0xff);

@@ -19,7 +19,7 @@ pub enum Cause {
     Reset,
 }
 
-/// Why the controller runs no parameters until it is told to, or the power comes back: in the status
+/// Why the controller runs no parameters until a command starts it, or the power comes back: in the status
 /// frame the reason of its state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]

@@ -75,12 +75,12 @@ struct Scenario {
 
 /// A start after a cut: what is found must be one of two, must stay, and must be replaceable. Gives
 /// the operations on the flash of this start.
-fn verify(mut flash: FlashModel, scenario: &Scenario, told: bool, case: &str) -> usize {
+fn verify(mut flash: FlashModel, scenario: &Scenario, confirmed: bool, case: &str) -> usize {
     flash.power_on();
     let first = found(&mut flash);
     let operations = flash.operations;
     let [old, new] = scenario.found;
-    assert!(first == new || !told && first == old, "{case}");
+    assert!(first == new || !confirmed && first == old, "{case}");
     for _ in 0..2 {
         flash.power_on();
         assert_eq!(found(&mut flash), first, "{case}: at another start");
@@ -150,8 +150,8 @@ fn cut_everywhere(scenario: &Scenario) -> usize {
     let mut whole = scenario.flash.clone();
     whole.power_on();
     assert!(run(&mut whole));
-    let (operations, mut cuts, mut told_of) = (whole.operations, 0, 0);
-    // The last one comes after the end was told: what is cut is the next start.
+    let (operations, mut cuts, mut confirmations) = (whole.operations, 0, 0);
+    // The last one comes after the end was confirmed: what is cut is the next start.
     for operation in 0..=operations {
         for cut in Cut::ALL {
             // Chance plays a part inside only.
@@ -160,25 +160,30 @@ fn cut_everywhere(scenario: &Scenario) -> usize {
                 flash.seed(seed ^ (operation as u64) << 8);
                 flash.power_on();
                 flash.cut_at(operation, cut);
-                let told = run(&mut flash);
+                let confirmed = run(&mut flash);
                 cuts += usize::from(flash.is_off());
-                told_of += usize::from(told);
+                confirmations += usize::from(confirmed);
                 let case = format!("{} {operation} {cut:?} {seed}", scenario.name);
                 // Again, during the start, wherever it does something.
-                for second in 0..verify(flash.clone(), scenario, told, &case) {
+                for second in 0..verify(flash.clone(), scenario, confirmed, &case) {
                     for again in Cut::ALL {
                         let mut flash = flash.clone();
                         flash.power_on();
                         flash.cut_at(second, again);
                         start(&mut flash);
                         cuts += 1;
-                        verify(flash, scenario, told, &format!("{case} {second} {again:?}"));
+                        verify(
+                            flash,
+                            scenario,
+                            confirmed,
+                            &format!("{case} {second} {again:?}"),
+                        );
                     }
                 }
             }
         }
     }
-    assert!(told_of > 0, "{}", scenario.name);
+    assert!(confirmations > 0, "{}", scenario.name);
     println!("{}: {operations} operations, {cuts} cuts", scenario.name);
     cuts
 }
@@ -200,12 +205,12 @@ fn any_number_of_cuts_in_a_row_loses_nothing() {
                 1 => flash.cut_at(words.below(6) as usize, cut),
                 _ => flash.cut_at(words.below(110) as usize, cut),
             }
-            let told = update(&mut flash, &new).is_ok();
+            let confirmed = update(&mut flash, &new).is_ok();
             cuts += usize::from(flash.is_off());
             flash.power_on();
             let now = found(&mut flash);
             let is_new = now == Some(crc(&new));
-            assert!(is_new || !told && now == there, "{seed} {number}");
+            assert!(is_new || !confirmed && now == there, "{seed} {number}");
             there = now;
         }
     }

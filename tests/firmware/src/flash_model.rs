@@ -48,7 +48,7 @@ pub struct PowerCut {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failing {
     /// An error in FLASH_SR.
-    Told,
+    Reported,
     /// Nothing.
     Silent,
 }
@@ -181,7 +181,7 @@ impl FlashModel {
         if let Some((from, failing)) = self.fails
             && number >= from
         {
-            self.status |= if failing == Failing::Told {
+            self.status |= if failing == Failing::Reported {
                 PROTECTED
             } else {
                 0

@@ -1,7 +1,7 @@
 //! Runs the stage controller's unmodified image on an emulated STM32F405, with an emulated
 //! converter that plays a log over SPI, and compares what it sends over CAN with what the host
 //! decodes from the log. A line `FAULT part | fault | ticks | poses` says after how many ticks a
-//! fault was told, and how many valid poses were wrong until then.
+//! fault was reported, and how many valid poses were wrong until then.
 //!
 //! Use, as the scripts beside this package do:
 //!

@@ -1,4 +1,4 @@
-//! One host: how long it takes, a bad bus, resets, what is told and refused.
+//! One host: how long it takes, a bad bus, resets, what is reported and refused.
 
 use super::world::{World, flashed};
 use super::{KEY, NEW, OLD, SERIAL, back, plan};
@@ -127,7 +127,7 @@ fn a_reset_at_any_moment_leaves_the_old_or_the_new_and_says_which() {
 }
 
 #[test]
-fn activated_parameters_run_are_told_and_read_back() {
+fn activated_parameters_run_are_reported_and_read_back() {
     let mut world = World::new(Some(KEY), &[(Fault::Drop, 20_000)], 8);
     let updated = world.update(&Plan {
         activates: true,
@@ -184,10 +184,10 @@ fn what_waits_for_a_reset_is_not_sent_again_and_activated_alone() {
     let updated = world.update(&plan(NEW)).expect("nothing to do");
     assert_eq!(kept(updated), (None, 1, false));
     let identity = world.identify();
-    let told = |record: Option<Kept>| record.map(|record| (record.sequence, record.crc));
-    assert_eq!(told(identity.next), Some((1, crc_of(NEW).expect("a blob"))));
+    let of = |record: Option<Kept>| record.map(|record| (record.sequence, record.crc));
+    assert_eq!(of(identity.next), Some((1, crc_of(NEW).expect("a blob"))));
     assert_eq!(
-        told(identity.previous),
+        of(identity.previous),
         Some((0, crc_of(OLD).expect("a blob")))
     );
     let on = Plan {

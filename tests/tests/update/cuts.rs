@@ -7,7 +7,7 @@ use tests::flash_model::Cut;
 use tests::node::Node;
 
 #[test]
-fn a_cut_of_the_power_in_any_operation_leaves_the_old_or_the_new_and_is_told() {
+fn a_cut_of_the_power_in_any_operation_leaves_the_old_or_the_new_and_is_reported() {
     let mut whole = World::new(Some(KEY), &[], 5);
     let in_the_start = whole.node.flash().operations;
     assert!(whole.update(&plan(NEW)).is_ok());

@@ -3,7 +3,7 @@
 
 use super::world::{SLOT_US, World, command};
 use super::{KEY, NEW, OLD, back, like, plan};
-use hal_adapters::can::command::{Command, Mailbox, Outcome, Request, Told};
+use hal_adapters::can::command::{Command, Content, Mailbox, Outcome, Request};
 use hal_adapters::can::update::UpdateRequest;
 use host_fit::bus::update::{Plan, UpdateError, Zero, on};
 use tests::fault::Fault;
@@ -22,7 +22,7 @@ fn activating(plan: Plan) -> Plan {
 const BEGIN: Request = Request::Update(UpdateRequest::begin(500, 0));
 
 #[test]
-fn of_two_hosts_at_once_one_stores_and_the_other_is_told() {
+fn of_two_hosts_at_once_one_stores_and_the_other_is_refused() {
     let mut alone = World::new(None, &[], 1);
     assert!(alone.update(&plan(NEW)).is_ok());
     let other = like(NEW);
@@ -43,12 +43,12 @@ fn of_two_hosts_at_once_one_stores_and_the_other_is_told() {
             }
             Err(error) => {
                 busy += u32::from(error == UpdateError::Busy);
-                let told = [
+                let reasons = [
                     UpdateError::Busy,
                     UpdateError::Overtaken { least: 2 },
                     UpdateError::ServoOn { declared: true },
                 ];
-                assert!(told.contains(&error), "{after_ms}: {error}");
+                assert!(reasons.contains(&error), "{after_ms}: {error}");
                 assert_eq!(newest, NEW, "{after_ms}: {error}");
             }
         }
@@ -57,7 +57,7 @@ fn of_two_hosts_at_once_one_stores_and_the_other_is_told() {
 }
 
 #[test]
-fn a_host_that_finds_another_at_it_is_told_busy_and_does_not_end_its_transfer() {
+fn a_host_that_finds_another_at_it_gives_up_as_busy_and_does_not_end_its_transfer() {
     let mut world = World::new(None, &[], 1);
     world.other_asks(0, Request::ServoOff { seconds: 255 }, 3);
     world.other_asks(4_000, BEGIN, 200);
@@ -90,7 +90,7 @@ fn what_another_host_declares_on_is_not_declared_off_again() {
         let declared = world.recording.iter().filter(|(_, frame)| {
             let is_off = |request| matches!(request, Some(Request::ServoOff { seconds: 1.. }));
             match mailbox.take(frame) {
-                Some(Ok(Told::Command(Command { request, .. }))) => is_off(request),
+                Some(Ok(Content::Command(Command { request, .. }))) => is_off(request),
                 _ => false,
             }
         });
@@ -124,7 +124,7 @@ fn a_lost_answer_to_a_commit_is_settled_by_asking_what_the_node_keeps() {
 }
 
 #[test]
-fn what_is_stored_and_not_activated_is_told_as_stored() {
+fn what_is_stored_and_not_activated_is_reported_as_stored() {
     let on_the_word_of_another = Plan {
         declares_servo_off: false,
         ..activating(plan(NEW))

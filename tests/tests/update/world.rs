@@ -2,7 +2,7 @@
 
 use super::{OLD, SERIAL};
 use hal_adapters::can::BusFrame;
-use hal_adapters::can::command::{Answer, Command, Mailbox, Request, Told};
+use hal_adapters::can::command::{Answer, Command, Content, Mailbox, Request};
 use hal_adapters::can::update::Key;
 use host_fit::bus::update::{Identity, Link, Plan, Talk, UpdateError, Updated, on};
 use std::collections::VecDeque;
@@ -183,7 +183,7 @@ impl World {
         if !is_deaf && let Some(coded) = self.node.send() {
             let frame = BusFrame::from(coded);
             let is_lost = match Mailbox::default().take(&frame) {
-                Some(Ok(Told::Answer(answer))) => (self.loses)(&answer),
+                Some(Ok(Content::Answer(answer))) => (self.loses)(&answer),
                 _ => false,
             };
             if !is_lost {
@@ -229,8 +229,8 @@ impl World {
 /// A frame with a request, by another host's count of frames.
 pub fn command(request: Request, token: u8, counter: usize) -> BusFrame {
     let mut mailbox = Mailbox::default();
-    let told = Told::Command(Command::new(request, token));
-    let frames = (0..=counter).map(|_| mailbox.send(&told));
+    let content = Content::Command(Command::new(request, token));
+    let frames = (0..=counter).map(|_| mailbox.send(&content));
     BusFrame::from(frames.last().flatten().expect("a known message"))
 }
 

@@ -149,7 +149,7 @@ fn without_a_key_the_line_must_say_off_for_all_that_moves_or_resets() {
 }
 
 #[test]
-fn a_second_host_is_told_busy_until_the_first_is_done_or_silent() {
+fn a_second_host_is_refused_as_busy_until_the_first_is_done_or_silent() {
     let mut bench = Bench::new(None);
     bench.servo_off();
     assert_eq!(bench.update(BEGIN, 7), BEGUN);

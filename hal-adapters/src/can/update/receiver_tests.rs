@@ -2,7 +2,7 @@ extern crate std;
 
 use super::super::{Kept, Key, Running, TAG_BYTES, TAG_INDEX, page, tag, word_of};
 use super::*;
-use crate::can::command::{Command, Mailbox, Request, Told};
+use crate::can::command::{Command, Content, Mailbox, Request};
 use crate::can::service::{Service, Updates};
 use crate::can::{BusFrame, Coded};
 use std::vec::Vec;
@@ -140,15 +140,15 @@ impl Bench {
         taken.ok()?.answer
     }
 
-    fn frame(&mut self, what: Told) -> BusFrame {
+    fn frame(&mut self, what: Content) -> BusFrame {
         BusFrame::from(self.host.send(&what).expect("a known message"))
     }
 
     fn ask(&mut self, request: Request, token: u8) -> (Outcome, u32) {
-        let frame = self.frame(Told::Command(Command::new(request, token)));
+        let frame = self.frame(Content::Command(Command::new(request, token)));
         let answer = self.take(&frame).expect("an answer");
         match Mailbox::default().take(&BusFrame::from(answer)) {
-            Some(Ok(Told::Answer(answer))) if answer.token == token => {
+            Some(Ok(Content::Answer(answer))) if answer.token == token => {
                 (answer.outcome.expect("a known one"), answer.detail)
             }
             other => panic!("{other:?}"),
@@ -182,7 +182,7 @@ impl Bench {
 
     fn data(&mut self, token: u8, index: u8, word: u32) {
         let data = UpdateData { token, index, word };
-        let frame = self.frame(Told::UpdateData(data));
+        let frame = self.frame(Content::UpdateData(data));
         assert_eq!(self.take(&frame), None);
     }
 

@@ -1,4 +1,4 @@
-//! What one host does: stored, refused, told.
+//! What one host does: stored, refused, answered.
 
 use super::*;
 

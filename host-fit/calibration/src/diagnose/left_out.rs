@@ -4,11 +4,11 @@ use crate::finding::{Code, Finding, Severity};
 use crate::fit::Fit;
 use crate::input::dataset::Dataset;
 
-/// Told from this part of the rows on, ...
-const TOLD_MIN: f64 = 0.02;
-/// ... and refused from this on: what the rest says of the stage is no longer what the log says.
+/// A warning from this part of the rows on, ...
+const WARN_MIN: f64 = 0.02;
+/// ... and refused from this on: the rest may be another stage than the log shows.
 const REFUSED_MIN: f64 = 0.08;
-/// Of a channel that tells nothing in this share of the rows.
+/// Of a channel whose values are void in this share of the rows.
 pub(super) fn severity(share: f64) -> Severity {
     match share >= REFUSED_MIN {
         true => Severity::Refuse,
@@ -20,7 +20,7 @@ pub(super) fn severity(share: f64) -> Severity {
 pub(super) fn finding(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     let left_out = &fit.left_out;
     let share = left_out.share();
-    if share < TOLD_MIN {
+    if share < WARN_MIN {
         return None;
     }
     let (first, last) = left_out.stretch?;

@@ -4,18 +4,18 @@ use crate::finding::{Code, Finding, Severity};
 use crate::fit::Fit;
 use crate::input::dataset::Dataset;
 
-/// Rows a movement, on the mean, below which the errors are told too small: by 5 % at ten.
+/// Rows a movement, on the mean, below which the errors come out too small: by 5 % at ten.
 const MEAN_MIN: f64 = 10.0;
-/// Movements of fewer rows tell hardly any error, ...
+/// Movements of fewer rows show hardly any error, ...
 const ROWS_MIN: usize = 3;
-/// ... and a log with more than this part of its rows in such movements tells the fit too little.
+/// ... and a log with more than this part of its rows in such movements is refused.
 const PART_MAX: f64 = 0.1;
 
 /// What is to be done.
 const REMEDY: &str = "check the times and the movement column; a log without one begins a movement after every gap of more \
                       than ten rows";
 
-/// That the errors of a model with zero deviations are void, or told too small.
+/// Whether the errors of a model with zero deviations are meaningless or too small.
 pub(super) fn finding(fit: Option<&Fit>, dataset: &Dataset) -> Option<Finding> {
     if fit.is_some_and(|fit| !fit.model.has_zero_deviation) {
         return None;
@@ -31,7 +31,7 @@ pub(super) fn finding(fit: Option<&Fit>, dataset: &Dataset) -> Option<Finding> {
         let first = short().next()?;
         let message = format!(
             "{rows_of_short} of {rows} rows are in movements of one or two rows, whose zero deviations fit them whatever the \
-                 calibration is, so that the errors tell nothing of it: {REMEDY}"
+                 calibration is, so that the errors say nothing about it: {REMEDY}"
         );
         let found = Finding::new(Code::ShortMovements, message).severe(Severity::Refuse);
         let found = found.of(rows_of_short as f64, "rows");
@@ -43,7 +43,7 @@ pub(super) fn finding(fit: Option<&Fit>, dataset: &Dataset) -> Option<Finding> {
     let mean = rows as f64 / count.max(1) as f64;
     (mean < MEAN_MIN).then(|| {
         let message = format!(
-            "the movements have {mean:.1} rows on the mean, and each has a zero deviation of its own: the errors are told too \
+            "the movements have {mean:.1} rows on the mean, and each has a zero deviation of its own: the errors come out too \
              small by about {:.0} %: {REMEDY}",
             100.0 * (1.0 - (1.0 - 1.0 / mean).max(0.0).sqrt()),
         );

@@ -7,7 +7,7 @@ use crate::input::dataset::Row;
 use crate::input::stage::Stage;
 use crate::judge::Zeros;
 use crate::judge::lag::ReferenceLag;
-use crate::judge::uncertainty::CORRELATION_TOLD;
+use crate::judge::uncertainty::CORRELATION_SHOWN;
 use crate::problem::Problem;
 use crate::problem::model::Model;
 use crate::problem::parameters::{Parameters, SLOPES, search_box};
@@ -180,7 +180,7 @@ impl Job<'_> {
                 .posterior
                 .strongest_correlations(usize::MAX)
                 .into_iter())
-            .take_while(|(_, _, correlation)| correlation.abs() > CORRELATION_TOLD)
+            .take_while(|(_, _, correlation)| correlation.abs() > CORRELATION_SHOWN)
             .collect(),
             standard_error: field.posterior.standard_errors_31(),
             lag: field.posterior.lag_error_s.map(lag),

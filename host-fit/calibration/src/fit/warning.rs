@@ -70,7 +70,7 @@ pub(super) const fn is_count(found: &Finding) -> bool {
     matches!(found.code, Code::ZeroClipped | Code::Saturated)
 }
 
-/// What the logs told of k and h of each sensor that they have.
+/// k and h of each sensor that the logs have, with their standard errors.
 pub(super) fn of_temperature(warmth: &Warmth) -> impl Iterator<Item = Finding> {
     let sensors = [("mount", "k"), ("body", "h")].into_iter().enumerate();
     let temperature = warmth.temperature;
@@ -84,7 +84,7 @@ pub(super) fn of_temperature(warmth: &Warmth) -> impl Iterator<Item = Finding> {
         };
         let values = [0, 1, 2].map(of_probe).join(", ");
         let span_k = warmth.spans_k[sensor];
-        let told = if span_k > 0.0 {
+        let source = if span_k > 0.0 {
             format!("over {span_k:.1} K, with what stage.toml expects of it")
         } else {
             "as stage.toml expects: one log spans too little to tell; fit it together with a log at another \
@@ -92,7 +92,7 @@ pub(super) fn of_temperature(warmth: &Warmth) -> impl Iterator<Item = Finding> {
                 .to_owned()
         };
         let message = format!(
-            "{symbol} of A, B, C is {values} %/K of the {place}'s temperature from {zero_c:.2} degC, {told}"
+            "{symbol} of A, B, C is {values} %/K of the {place}'s temperature from {zero_c:.2} degC, {source}"
         );
         Finding::new(Code::Temperature, message).of(span_k, "K")
     })

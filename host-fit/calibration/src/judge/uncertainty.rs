@@ -35,13 +35,13 @@ pub struct Uncertainty {
     /// Parameters that the log does not determine: no motion shows them, or only in combination
     /// with others.
     pub undetermined: Vec<ParameterId>,
-    /// Pairs of parameters whose estimates are correlated by more than [`CORRELATION_TOLD`], either
+    /// Pairs of parameters whose estimates are correlated by more than [`CORRELATION_SHOWN`], either
     /// way, with their correlation.
     pub correlations: Vec<(String, String, f64)>,
 }
 
-/// Correlations above this are told: the parameters stand in for each other.
-pub const CORRELATION_TOLD: f64 = 0.95;
+/// Correlations above this are shown: the parameters stand in for each other.
+pub const CORRELATION_SHOWN: f64 = 0.95;
 
 /// A probe is moved if it is by more than this part of what that is which moves most.
 const MOVED_MIN: f64 = 0.1;
@@ -91,7 +91,7 @@ pub fn uncertainty(problem: &Problem, parameters: &Parameters) -> Option<Uncerta
             let (a, b) = (*a, *b);
             let product = covariance[(a, a)] * covariance[(b, b)];
             let correlation = covariance[(a, b)] / product.sqrt();
-            if correlation.abs() > CORRELATION_TOLD {
+            if correlation.abs() > CORRELATION_SHOWN {
                 correlations.push((name_a.clone(), name_b.clone(), correlation));
             }
         }

@@ -11,7 +11,7 @@ use serde::{Serialize, Serializer};
 pub const GOOD_MAX: f64 = 1.10;
 /// ... and up to which it serves at all.
 pub const LIMITED_MAX: f64 = 1.30;
-/// Nine of ten stages have errors above the lower end of the range that is told, and nine of ten below the
+/// Nine of ten stages have errors above the lower end of the range, and nine of ten below the
 /// upper: standard deviations.
 const END: f64 = 1.2816;
 

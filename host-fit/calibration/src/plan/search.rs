@@ -1,7 +1,7 @@
 //! The choice of the six frequencies, by the service error that each set leads to.
 //!
-//! What moves together can't be told apart, and products of two axes that fall on the frequency
-//! of a third, or near zero where the reference drifts, are told badly. No rule sees all of that:
+//! Axes that move together can't be separated, and products of two axes that fall on the frequency
+//! of a third, or near zero where the reference drifts, are badly determined. No rule sees all of that:
 //! sets are drawn, judged by their forecast, and the best is improved axis by axis.
 
 use super::forecast::forecast;

@@ -1,4 +1,4 @@
-//! Files that are no text: told by their bytes, named, with the way to CSV.
+//! Files that are not text: recognised by their first bytes, with the way to CSV.
 
 /// How far into a file binary data are looked for.
 pub(super) const PROBE_BYTES: usize = 64 * 1024;

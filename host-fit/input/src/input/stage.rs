@@ -8,7 +8,7 @@ mod motion;
 mod search;
 mod temperature;
 
-pub use error::{Place, StageError};
+pub use error::{StageError, TextPosition};
 pub use motion::{AXES, AxisMotion, Motion};
 pub use temperature::TemperatureTable;
 

@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_of_the_system_is_not_told_as_one_of_the_gzip_data() {
+    fn a_fault_of_the_system_is_not_reported_as_one_of_the_gzip_data() {
         let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::none());
         encoder.write_all(&[b'a'; 1000]).expect("in memory");
         let packed = encoder.finish().expect("in memory");

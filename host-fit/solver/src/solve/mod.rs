@@ -123,7 +123,7 @@ impl Solver {
     }
 }
 
-/// What a solver is told besides the problem.
+/// Settings of a solver besides the problem.
 #[derive(Clone, Debug)]
 pub struct SolverOptions {
     /// How much is projected out.
@@ -183,7 +183,7 @@ pub enum SolveError {
     /// The signals of the three probes do not span three dimensions.
     #[error(
         "the log does not move the stage in X, Y and Rz independently, so the three probes cannot \
-         be told apart: record movements along each of the three axes"
+         be separated: record movements along each of the three axes"
     )]
     NoPlanarMotion,
     /// No start led anywhere.

@@ -147,7 +147,7 @@ fn a_given_offset_that_the_motion_contradicts_is_refused() {
 }
 
 #[test]
-fn a_reference_slower_than_the_servo_is_told_as_that() {
+fn a_reference_slower_than_the_servo_is_named_as_that() {
     let ifm = reference();
     let (head, rows) = ifm.split_once('\n').expect("a header");
     let slow: Vec<&str> = rows.lines().step_by(5).collect();

@@ -108,7 +108,7 @@ impl NodeClock {
 
     /// Takes a whole tick.
     pub(super) fn take(&mut self, tick: BusTick) {
-        // No more than these are told apart.
+        // A time frame distinguishes no more than so many.
         if self.waiting.len() <= TICKS as usize {
             self.waiting.push(tick);
         } else {

@@ -1,6 +1,6 @@
 //! The decoding node, without a bus and without a clock: frames and times in, frames out.
 
-use hal_adapters::can::command::{Command, Told};
+use hal_adapters::can::command::{Command, Content};
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus};
 use hal_adapters::can::table::SLOW_TICKS;
 use hal_adapters::can::{
@@ -149,9 +149,9 @@ impl<'d> Node<'d> {
         out.extend(self.poses.frames(reading, sampled));
         if self.ticks.is_multiple_of(u32::from(SLOW_TICKS)) {
             let round = self.ticks / u32::from(SLOW_TICKS);
-            let status = Told::Status(self.status());
-            let health = Told::Health(HealthPage::of(&self.tracker.health(), None, round));
-            out.extend([status, health].iter().filter_map(|t| self.service.tell(t)));
+            let status = Content::Status(self.status());
+            let health = Content::Health(HealthPage::of(&self.tracker.health(), None, round));
+            out.extend([status, health].iter().filter_map(|t| self.service.send(t)));
         }
         out.extend(self.service.tick(Some(&self.tracker)));
         self.ticks = self.ticks.wrapping_add(1);

@@ -45,11 +45,11 @@ fn feed(node: &mut Node<'_>, frame: &RawFrame) -> Vec<Coded> {
     out
 }
 
-fn told(node_sent: &[Coded], mailbox: &mut Mailbox) -> Vec<Told> {
+fn contents(node_sent: &[Coded], mailbox: &mut Mailbox) -> Vec<Content> {
     let frames = node_sent.iter().map(|c| BusFrame::from(*c));
     frames
         .filter_map(|f| mailbox.take(&f)?.ok())
-        .filter(|t| !matches!(t, Told::Status(_) | Told::Health(_)))
+        .filter(|t| !matches!(t, Content::Status(_) | Content::Health(_)))
         .collect()
 }
 
@@ -105,7 +105,7 @@ fn a_re_zero_at_rest_is_done_while_the_servo_is_off() {
         Request::ServoOff { seconds: 1 },
         Request::Rezero { ticks: 250 },
     ]) {
-        let command = Told::Command(Command::new(request, token));
+        let command = Content::Command(Command::new(request, token));
         let frame = host.send(&command).expect("known");
         node.take(&stamped(frame, 0), &mut out);
     }
@@ -116,11 +116,11 @@ fn a_re_zero_at_rest_is_done_while_the_servo_is_off() {
         };
         out.extend(feed(&mut node, &rest));
     }
-    let outcome = |told| match told {
-        Told::Answer(answer) => answer.outcome.map(|outcome| (answer.token, outcome)),
+    let outcome = |content| match content {
+        Content::Answer(answer) => answer.outcome.map(|outcome| (answer.token, outcome)),
         other => panic!("{other:?}"),
     };
-    let outcomes: Vec<_> = told(&out, &mut host).into_iter().map(outcome).collect();
+    let outcomes: Vec<_> = contents(&out, &mut host).into_iter().map(outcome).collect();
     let want = [
         (1, Outcome::ServoOn),
         (2, Outcome::Done),

@@ -1,7 +1,7 @@
 //! What a record holds so far.
 
 use crate::bus::import::bus_log::{BusCounts, Collector};
-use hal_adapters::can::command::{Mailbox, Told};
+use hal_adapters::can::command::{Content, Mailbox};
 use hal_adapters::can::status::{NodeState, NodeStatus};
 use hal_adapters::can::{Layout, StampedFrame};
 
@@ -28,7 +28,7 @@ impl Watch {
             self.first_us.get_or_insert(stamped.time_us);
             self.last_us = stamped.time_us;
         }
-        if let Some(Ok(Told::Status(status))) = self.mailbox.take(&stamped.frame) {
+        if let Some(Ok(Content::Status(status))) = self.mailbox.take(&stamped.frame) {
             self.status = Some(status);
         }
     }
@@ -139,7 +139,7 @@ mod tests {
     fn the_state_is_that_of_the_last_status() {
         let (mut watch, mut node) = (Watch::default(), Mailbox::default());
         assert_eq!(watch.state(), "it does not tell its state");
-        let status = Told::Status(NodeStatus {
+        let status = Content::Status(NodeStatus {
             state: Some(NodeState::NoFrames),
             reason: 3,
             flags: 0,

@@ -7,7 +7,7 @@ use hal_adapters::can::update::{Kept, UpdateRequest, crc_of, page};
 use runtime::ParameterSet;
 use runtime::blob::MAX_BYTES;
 
-/// What a node tells of itself.
+/// What a node says about itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identity {
     /// Serial number of its stage; empty if it knows none.
@@ -132,10 +132,10 @@ pub fn identify<L: Link>(talk: &mut Talk<L>) -> Result<Identity, UpdateError> {
     let mut pages = Pages::default();
     while pages.words.len() < usize::from(page::COUNT) {
         let number = pages.words.len() as u8;
-        let word = told(talk, number)?;
+        let word = ask_page(talk, number)?;
         pages.words.push(word);
         // Between the two pages another host may have stored a blob.
-        if number == page::NEXT + 1 && told(talk, page::NEXT)? != pages.word(page::NEXT) {
+        if number == page::NEXT + 1 && ask_page(talk, page::NEXT)? != pages.word(page::NEXT) {
             pages.words.clear();
         }
     }
@@ -143,7 +143,7 @@ pub fn identify<L: Link>(talk: &mut Talk<L>) -> Result<Identity, UpdateError> {
 }
 
 /// A page; `None` where the node has no parameters, and so no such page.
-fn told<L: Link>(talk: &mut Talk<L>, number: u8) -> Result<Option<u32>, UpdateError> {
+fn ask_page<L: Link>(talk: &mut Talk<L>, number: u8) -> Result<Option<u32>, UpdateError> {
     match talk.exchange(tell(number))? {
         (Outcome::Done, word) => Ok(Some(word)),
         (Outcome::NoParameters, _) => Ok(None),
@@ -154,8 +154,8 @@ fn told<L: Link>(talk: &mut Talk<L>, number: u8) -> Result<Option<u32>, UpdateEr
     }
 }
 
-/// The blob that the node runs, word by word, checked, and who the node is. `progress` is told the bytes
-/// that came, and how many there are.
+/// The blob that the node runs, word by word, checked, and who the node is. `progress` takes how many bytes
+/// came, and of how many.
 ///
 /// # Errors
 /// As [`identify`]; [`UpdateError::NothingRuns`]; [`UpdateError::Changed`]; [`UpdateError::ReadBack`].

@@ -33,8 +33,8 @@ struct Script<'p, L> {
     progress: &'p mut dyn FnMut(u64, u64),
 }
 
-/// Updates the node. Once it stores, the user no longer ends it. `progress` is told the words that were
-/// sent, and how many there are.
+/// Updates the node. Once it stores, the user no longer ends it. `progress` takes how many words were
+/// sent, and of how many.
 ///
 /// # Errors
 /// See [`UpdateError`]. Unless it says otherwise the node keeps what it kept before.
@@ -164,7 +164,7 @@ impl<L: Link> Script<'_, L> {
         let commit = Request::Update(UpdateRequest::Commit { sequence });
         let mut words = words(token, blob, 0);
         for (sent, word) in (1..).zip(&words) {
-            self.talk.tell(*word)?;
+            self.talk.send_word(*word)?;
             (self.progress)(sent, words.len() as u64);
         }
         if let Some(key) = &key {

@@ -2,7 +2,7 @@
 
 use super::UpdateError;
 use hal_adapters::can::BusFrame;
-use hal_adapters::can::command::{Command, Mailbox, Outcome, Request, Told};
+use hal_adapters::can::command::{Command, Content, Mailbox, Outcome, Request};
 use hal_adapters::can::update::{Key, Nonce, TAG_INDEX, UpdateData, UpdateRequest, tag, word_of};
 
 /// From frame to frame, us. The receive store of a controller holds three frames and is emptied in
@@ -102,11 +102,11 @@ impl<L: Link> Talk<L> {
         let request = request.into();
         for _ in 0..ATTEMPTS {
             let command = Command::new(request, token);
-            self.send(&Told::Command(command))?;
+            self.send(&Content::Command(command))?;
             let mut until_us = self.link.now_us() + PATIENCE_US;
-            while let Some(told) = self.receive(until_us)? {
-                match told {
-                    Told::Answer(answer)
+            while let Some(content) = self.receive(until_us)? {
+                match content {
+                    Content::Answer(answer)
                         if (answer.number, answer.token) == (command.number, token) =>
                     {
                         match answer.outcome {
@@ -118,7 +118,7 @@ impl<L: Link> Talk<L> {
                         }
                     }
                     // The answer could be that of another host: ask anew.
-                    Told::Command(other)
+                    Content::Command(other)
                         if (other.number, other.token) == (command.number, token)
                             && token < TRANSFER_TOKEN
                             && other.request != command.request =>
@@ -184,7 +184,7 @@ impl<L: Link> Talk<L> {
                 return Ok((answer, lost));
             };
             for word in words.iter().filter(|word| u32::from(word.index) == index) {
-                self.tell(*word)?;
+                self.send_word(*word)?;
             }
         }
         Err(UpdateError::Lossy)
@@ -205,7 +205,7 @@ impl<L: Link> Talk<L> {
         let nonce = self.nonce()?;
         let tag = tag(key, &nonce, command, blob, crc);
         let words = words(command.token, &tag, TAG_INDEX);
-        words.iter().try_for_each(|word| self.tell(*word))?;
+        words.iter().try_for_each(|word| self.send_word(*word))?;
         Ok(words)
     }
 
@@ -232,8 +232,8 @@ impl<L: Link> Talk<L> {
     }
 
     /// Sends a word, to which no answer comes.
-    pub(super) fn tell(&mut self, data: UpdateData) -> Result<(), UpdateError> {
-        self.send(&Told::UpdateData(data))
+    pub(super) fn send_word(&mut self, data: UpdateData) -> Result<(), UpdateError> {
+        self.send(&Content::UpdateData(data))
     }
 
     /// Waits.
@@ -243,15 +243,15 @@ impl<L: Link> Talk<L> {
         Ok(())
     }
 
-    fn send(&mut self, told: &Told) -> Result<(), UpdateError> {
+    fn send(&mut self, content: &Content) -> Result<(), UpdateError> {
         while self.receive(self.free_us)?.is_some() {}
         self.free_us = self.link.now_us() + SPACING_US;
-        let coded = self.mailbox.send(told);
+        let coded = self.mailbox.send(content);
         coded.map_or(Ok(()), |coded| self.link.send(BusFrame::from(coded)))
     }
 
-    /// What a frame tells that comes until then.
-    fn receive(&mut self, until_us: u64) -> Result<Option<Told>, UpdateError> {
+    /// The content of the next frame, if one comes until then.
+    fn receive(&mut self, until_us: u64) -> Result<Option<Content>, UpdateError> {
         /// How soon Ctrl-C is noticed.
         const WAIT_US: u64 = 50_000;
         loop {
@@ -263,9 +263,9 @@ impl<L: Link> Talk<L> {
                 return Ok(None);
             }
             if let Some(frame) = self.link.receive(until_us.min(now_us + WAIT_US))?
-                && let Some(Ok(told)) = self.mailbox.take(&frame)
+                && let Some(Ok(content)) = self.mailbox.take(&frame)
             {
-                return Ok(Some(told));
+                return Ok(Some(content));
             }
         }
     }

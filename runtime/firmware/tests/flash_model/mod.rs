@@ -33,7 +33,7 @@ pub enum Cut {
     Before,
     /// Some bits have.
     Inside,
-    /// The operation is complete, and the caller is not told.
+    /// The operation is complete, but its end is not reported.
     After,
 }
 

@@ -112,8 +112,8 @@ pub fn off_for_less_than_a_tick(bench: &Bench) -> Outcome {
     let seen = Seen::since_last(&mut machine);
     let status = seen.last_status().ok_or("no status frame")?;
     equal("times the bus was off", status.bus_off, 1)?;
-    let told = first_state(&seen, flag::BUS_WAS_OFF);
-    row(bench, "bus off for 0.3 ms", at, told, &seen.axes)
+    let reported = first_state(&seen, flag::BUS_WAS_OFF);
+    row(bench, "bus off for 0.3 ms", at, reported, &seen.axes)
 }
 
 /// A frame that is on the wire when its tick is over is sent once or, if it fails then, not at all,

@@ -91,7 +91,7 @@ pub(super) fn at_rest(rest: [i32; 6]) -> Vec<Row> {
 pub(super) const REZERO: Request = Request::Rezero { ticks: 400 };
 pub(super) const SERVO_OFF: Request = Request::ServoOff { seconds: 3 };
 
-/// A stage that is not at rest at its zero is not re-zeroed, and told why.
+/// A stage that is not at rest at its zero is not re-zeroed, and the answer says why.
 pub fn rezero_refused(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ticks(50)?;
@@ -200,8 +200,8 @@ pub fn rezero(bench: &Bench) -> Outcome {
     equal("answer", ended(&seen, 9), vec![Some(Ended::ServoOn)])
 }
 
-/// Record mode: every tick's codes, after the pose, with parameters and without, until told to
-/// stop.
+/// Record mode: every tick's codes, after the pose, with parameters and without, until a command
+/// ends it.
 pub fn record(bench: &Bench, part: Part) -> Outcome {
     let layout = match part {
         Part::Ads131m08 => Layout::Bits24,

@@ -67,25 +67,25 @@ pub fn same_words(bench: &Bench, part: Part, ticks: u64, name: &str) -> Outcome 
         (machine.panics, machine.watchdog_resets),
         (0, 0),
     )?;
-    let told = seen
+    let state = seen
         .last_status()
         .map(|s| (s.state, s.missed_ticks, s.bus_off));
     let running = Some((Some(NodeState::Running), 0, 0));
-    equal("state, missed ticks, times the bus was off", told, running)?;
+    equal("state, missed ticks, times the bus was off", state, running)?;
     equal("ticks without codes", stage.adc_faults.into(), settling)?;
     expect(stage.frames_dropped <= 8, || {
         format!("{} frames dropped", stage.frames_dropped)
     })?;
     let fed = machine.chip.watchdog.fed - fed_before;
     equal("feeds of the watchdog", fed, u64::from(stage.sequence) + 1)?;
-    let ticks_told = seen
+    let ticks_reported = seen
         .health
         .iter()
         .rev()
         .find(|page| page.page == 0)
         .map_or(0, |page| page.value);
-    expect(u64::from(ticks_told) + 200 > ticks, || {
-        format!("health tells {ticks_told} ticks")
+    expect(u64::from(ticks_reported) + 200 > ticks, || {
+        format!("health reports {ticks_reported} ticks")
     })?;
     let wrong = seen
         .health

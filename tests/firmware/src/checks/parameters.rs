@@ -149,13 +149,13 @@ pub(super) fn poses_of(bench: &Bench, set: &ParameterSet) -> Vec<Words> {
 }
 
 /// With a blob of the field model the words on the bus are those of the host's decoder; with one that
-/// wants temperatures, too, and that they are missing is told.
+/// wants temperatures, too, and a bit says that they are missing.
 pub fn the_field_model(bench: &Bench) -> Outcome {
     same_words(bench, FIELD, 0)?;
     same_words(bench, WARM, board_check::TEMPERATURE_MISSING)
 }
 
-fn same_words(bench: &Bench, example: &[u8], told: u32) -> Outcome {
+fn same_words(bench: &Bench, example: &[u8], missing: u32) -> Outcome {
     let mut set = ParameterSet::from_bytes(example)?;
     set.serial = Text::try_from("stage-7").map_err(|_| "the serial")?;
     let mut buffer = [0; MAX_BYTES];
@@ -173,7 +173,7 @@ fn same_words(bench: &Bench, example: &[u8], told: u32) -> Outcome {
     equal(
         "temperature missing",
         checks & board_check::TEMPERATURE_MISSING,
-        told,
+        missing,
     )?;
     expect(comparison.planar >= 998, || {
         format!("only {} poses", comparison.planar)

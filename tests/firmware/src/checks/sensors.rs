@@ -1,5 +1,5 @@
-//! Faults of converters, wires and sensors: told, survived, and gone when they end. Each prints
-//! a row of a table: after how many ticks it is told, and how many valid poses were wrong.
+//! Faults of converters, wires and sensors: reported, survived, and gone when they end. Each prints
+//! a row of a table: after how many ticks it is reported, and how many valid poses were wrong.
 
 mod cases;
 
@@ -78,16 +78,16 @@ pub fn survives(bench: &Bench, part: Part, case: &Case) -> Outcome {
     let mut axes = during.axes;
     axes.extend(&after.axes);
     let planar = |axis: &&Axis| axis.axis < 3;
-    let told = axes
+    let reported = axes
         .iter()
         .filter(planar)
         .find(|axis| axis.status & Status::PLANAR_INVALID.bits() != 0)
         .map(|axis| axis.tick + 1 - BEFORE);
     let wrong = wrong_poses(&axes, &bench.poses);
-    let text = told.map_or("never".to_owned(), |ticks| ticks.to_string());
+    let text = reported.map_or("never".to_owned(), |ticks| ticks.to_string());
     println!("FAULT   {part:?} | {} | {text} | {wrong}", case.name);
-    expect(told.is_some_and(|ticks| ticks <= case.within), || {
-        format!("told after {text} ticks, not {}", case.within)
+    expect(reported.is_some_and(|ticks| ticks <= case.within), || {
+        format!("reported after {text} ticks, not {}", case.within)
     })?;
     expect(wrong <= case.wrong, || format!("{wrong} wrong valid poses"))?;
 
@@ -105,7 +105,7 @@ pub fn survives(bench: &Bench, part: Part, case: &Case) -> Outcome {
         expect(statuses.clone().count() >= 12, || "few states".to_owned())?;
         for (tick, status) in statuses {
             let found = (status.state, status.reason);
-            let known = case.told.iter().any(|(s, r)| found == (Some(*s), *r));
+            let known = case.reported.iter().any(|(s, r)| found == (Some(*s), *r));
             expect(known, || format!("{found:?} at tick {tick}"))?;
         }
     }
@@ -161,7 +161,7 @@ pub fn dead_from_the_start(bench: &Bench, part: Part) -> Outcome {
     Ok(())
 }
 
-/// Transfers by DMA that never end are given up, told as errors of the bus, and work again later.
+/// Transfers by DMA that never end are given up, reported as errors of the bus, and work again later.
 pub fn transfers_that_never_end(bench: &Bench, part: Part) -> Outcome {
     let mut machine = bench.machine(part, [&bench.blob, &[]])?;
     run_to(&mut machine, BEFORE)?;
@@ -171,8 +171,8 @@ pub fn transfers_that_never_end(bench: &Bench, part: Part) -> Outcome {
     let during = Seen::since_last(&mut machine);
     let valid = |axis: &&Axis| axis.status & Status::PLANAR_INVALID.bits() == 0;
     equal("valid poses", during.axes.iter().filter(valid).count(), 0)?;
-    let told = during.last_status().map(|s| (s.state, s.reason));
-    equal("state", told, Some((Some(NodeState::SensorFault), 1)))?;
+    let state = during.last_status().map(|s| (s.state, s.reason));
+    equal("state", state, Some((Some(NodeState::SensorFault), 1)))?;
     machine.chip.dma_stands = false;
     run_to(&mut machine, BEFORE + 300)?;
     let after = Seen::since_last(&mut machine);
@@ -188,7 +188,7 @@ pub fn transfers_that_never_end(bench: &Bench, part: Part) -> Outcome {
     equal("panics and watchdog resets", resets, (0, 0))
 }
 
-/// A register of the ADS131M08 that changes at any time of a period is told two ticks later at the
+/// A register of the ADS131M08 that changes at any time of a period is reported two ticks later at the
 /// latest: what changes while codes settle can be flagged after they are read.
 pub fn a_register_changes_at_any_time(bench: &Bench) -> Outcome {
     for offset_ns in (0..TICK_NS).step_by(50_000) {
@@ -200,10 +200,12 @@ pub fn a_register_changes_at_any_time(bench: &Bench) -> Outcome {
         Seen::since_last(&mut machine);
         run_to(&mut machine, BEFORE + 4)?;
         let seen = Seen::since_last(&mut machine);
-        let told = seen.axes.iter().any(|axis| {
+        let reported = seen.axes.iter().any(|axis| {
             axis.tick <= BEFORE + 1 && axis.status & Status::PLANAR_INVALID.bits() != 0
         });
-        expect(told, || format!("not told: {offset_ns} ns after a trigger"))?;
+        expect(reported, || {
+            format!("not reported: {offset_ns} ns after a trigger")
+        })?;
     }
     Ok(())
 }

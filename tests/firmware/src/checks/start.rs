@@ -1,5 +1,5 @@
-//! Starts that go wrong, clocks that stop, programs that crash: what is told, and that no pose
-//! is wrong meanwhile. Each check prints a row: the fault, the ticks until it was told, and the
+//! Starts that go wrong, clocks that stop, programs that crash: what the controller reports, and that no pose
+//! is wrong meanwhile. Each check prints a row: the fault, the ticks until it was reported, and the
 //! words of poses that were sent as valid and were wrong.
 
 use super::log::Stage;
@@ -36,13 +36,13 @@ pub fn wrong_valid(bench: &Bench, axes: &[Axis]) -> usize {
     axes.iter().filter(wrong).count()
 }
 
-/// Prints the row of a fault. `told` is the tick of the first frame that tells it.
-pub fn row(bench: &Bench, fault: &str, at: u64, told: Option<u64>, axes: &[Axis]) -> Outcome {
-    let told = told.ok_or("it was never told")?;
+/// Prints the row of a fault. `reported` is the tick of the first frame that reports it.
+pub fn row(bench: &Bench, fault: &str, at: u64, reported: Option<u64>, axes: &[Axis]) -> Outcome {
+    let reported = reported.ok_or("it was never reported")?;
     let wrong = wrong_valid(bench, axes);
     println!(
         "FAULT   controller | {fault} | {} | {wrong}",
-        told.saturating_sub(at)
+        reported.saturating_sub(at)
     );
     equal("valid poses that are wrong", wrong, 0)
 }
@@ -53,7 +53,7 @@ pub fn tick_now(machine: &Machine) -> u64 {
     (machine.chip.now_ns - first_ns) / 2_000_000
 }
 
-/// The tick of the first state with all of these flags.
+/// The tick of the first state with all the flags.
 pub fn first_state(seen: &Seen, flags: u8) -> Option<u64> {
     let mut states = seen.statuses.iter();
     let first = states.find(|(_, status)| status.flags & flags == flags);
@@ -67,8 +67,8 @@ pub fn page(seen: &Seen, number: u8) -> Option<u32> {
         .map(|page| page.value)
 }
 
-/// Kind and step, address and detail of the last fault as the health frames tell them.
-fn fault_told(seen: &Seen) -> Option<[u32; 3]> {
+/// Kind and step, address and detail of the last fault of the health frames.
+fn reported_fault(seen: &Seen) -> Option<[u32; 3]> {
     Some([page(seen, 6)?, page(seen, 7)?, page(seen, 8)?])
 }
 
@@ -127,7 +127,7 @@ pub fn supply_that_comes_late(bench: &Bench) -> Outcome {
     )
 }
 
-/// No crystal: the internal oscillator from the start, told by flag, check and light.
+/// No crystal: the internal oscillator from the start, shown by flag, check and light.
 pub fn no_crystal(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.chip.clocks.crystal = false;
@@ -135,13 +135,13 @@ pub fn no_crystal(bench: &Bench) -> Outcome {
     let seen = Seen::since_last(&mut machine);
     let checks = page(&seen, 11);
     equal("checks", checks, Some(board_check::INTERNAL_OSCILLATOR))?;
-    equal("fault", fault_told(&seen), Some([0; 3]))?;
+    equal("fault", reported_fault(&seen), Some([0; 3]))?;
     expect(valid(&seen.axes) > 1800, || "too few poses".to_owned())?;
     let resets = (machine.panics, machine.watchdog_resets);
     equal("resets", resets, (0, 0))?;
-    let told = first_state(&seen, flag::INTERNAL_OSCILLATOR);
-    let told = since_power_on(&machine, told, 10)?;
-    row(bench, "crystal absent", 0, told, &seen.axes)
+    let reported = first_state(&seen, flag::INTERNAL_OSCILLATOR);
+    let reported = since_power_on(&machine, reported, 10)?;
+    row(bench, "crystal absent", 0, reported, &seen.axes)
 }
 
 /// On the internal oscillator a bus-off is for good: a clock that is too inexact disturbs the bus
@@ -181,12 +181,18 @@ pub fn crystal_lost(bench: &Bench) -> Outcome {
     machine.chip.stop_crystal();
     machine.run_ticks(500)?;
     let seen = Seen::since_last(&mut machine);
-    equal("fault", fault_told(&seen), Some([4, 0, 0]))?;
+    equal("fault", reported_fault(&seen), Some([4, 0, 0]))?;
     equal("faults", page(&seen, 9), Some(1))?;
     equal("resets", (machine.panics, machine.watchdog_resets), (1, 0))?;
     expect(valid(&seen.axes) > 1800, || "too few poses".to_owned())?;
-    let told = first_state(&seen, flag::INTERNAL_OSCILLATOR | flag::WATCHDOG_RESET);
-    row(bench, "crystal lost while running", at, told, &seen.axes)
+    let reported = first_state(&seen, flag::INTERNAL_OSCILLATOR | flag::WATCHDOG_RESET);
+    row(
+        bench,
+        "crystal lost while running",
+        at,
+        reported,
+        &seen.axes,
+    )
 }
 
 /// The PLL does not lock to the crystal: the watchdog resets once, and the internal oscillator
@@ -196,19 +202,19 @@ pub fn pll_without_lock(bench: &Bench) -> Outcome {
     machine.chip.clocks.pll = Pll::NotToCrystal;
     machine.run_ticks(500)?;
     let seen = Seen::since_last(&mut machine);
-    equal("fault", fault_told(&seen), Some([0x0105, 0, 0]))?;
+    equal("fault", reported_fault(&seen), Some([0x0105, 0, 0]))?;
     let checks = page(&seen, 11);
     equal("checks", checks, Some(board_check::INTERNAL_OSCILLATOR))?;
     equal("resets", (machine.panics, machine.watchdog_resets), (0, 1))?;
     expect(valid(&seen.axes) > 1800, || "too few poses".to_owned())?;
-    let told = first_state(&seen, flag::INTERNAL_OSCILLATOR);
+    let reported = first_state(&seen, flag::INTERNAL_OSCILLATOR);
     // The watchdog's 20 ms, and the start-up twice.
-    let told = since_power_on(&machine, told, 15)?;
+    let reported = since_power_on(&machine, reported, 15)?;
     row(
         bench,
         "PLL does not lock to the crystal",
         0,
-        told,
+        reported,
         &seen.axes,
     )
 }
@@ -245,7 +251,7 @@ pub fn can_dead(bench: &Bench) -> Outcome {
     equal("resets", resets, (0, 0))?;
     let frames = Seen::since_last(&mut machine).axes.len();
     println!(
-        "FAULT   controller | CAN does not start | told by the light from tick 1 on | {frames}"
+        "FAULT   controller | CAN does not start | shown by the light from tick 1 on | {frames}"
     );
     equal("words on the bus", frames, 0)
 }
@@ -262,11 +268,11 @@ pub fn receive_line_low(bench: &Bench) -> Outcome {
         equal("flashes", flashes(&mut machine)?, 5)?;
         equal("words", Seen::since_last(&mut machine).axes.len(), 0)?;
     }
-    println!("FAULT   controller | CAN receive line low | told by the light after 0.5 s | 0");
+    println!("FAULT   controller | CAN receive line low | shown by the light after 0.5 s | 0");
     Ok(())
 }
 
-/// Pull-ups and option bytes of the board are told.
+/// Pull-ups and option bytes of the board are reported.
 pub fn the_board(bench: &Bench) -> Outcome {
     let cases = [
         (
@@ -295,7 +301,7 @@ pub fn the_board(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// A program that crashes tells after the reset how and where.
+/// A program that crashes reports after the reset how and where.
 pub fn crash(bench: &Bench, wanted: &Crash) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.hook_injection(bench.image(PART).address(TICK)?)?;
@@ -305,7 +311,7 @@ pub fn crash(bench: &Bench, wanted: &Crash) -> Outcome {
     machine.chip.inject.clone_from(&wanted.inject);
     machine.run_ticks(500)?;
     let seen = Seen::since_last(&mut machine);
-    let [kind, address, detail] = fault_told(&seen).ok_or("no fault is told")?;
+    let [kind, address, detail] = reported_fault(&seen).ok_or("no fault is reported")?;
     equal("kind and step", kind, wanted.kind)?;
     expect(wanted.address.contains(&address), || {
         format!("the address is {address:#010x}")
@@ -317,11 +323,11 @@ pub fn crash(bench: &Bench, wanted: &Crash) -> Outcome {
     equal("resets", (machine.panics, machine.watchdog_resets), (1, 0))?;
     equal("late stacking still due", machine.lazy_left, false)?;
     expect(valid(&seen.axes) > 1800, || "too few poses".to_owned())?;
-    let told = first_state(&seen, flag::WATCHDOG_RESET);
-    row(bench, wanted.fault, at, told, &seen.axes)
+    let reported = first_state(&seen, flag::WATCHDOG_RESET);
+    row(bench, wanted.fault, at, reported, &seen.axes)
 }
 
-/// A crash, and what is told of it.
+/// A crash, and what is reported of it.
 pub struct Crash {
     /// Its name.
     pub fault: &'static str,

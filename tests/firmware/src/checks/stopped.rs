@@ -62,7 +62,7 @@ fn crash(machine: &mut Machine) -> Outcome {
     Ok(machine.run_ticks(10)?)
 }
 
-/// Parameters that make the program fault twice at its start: none run, which is told and stays so over
+/// Parameters that make the program fault twice at its start: none run, and the state says so, also after
 /// resets, until the user goes back.
 pub fn parameters_that_crash(bench: &Bench) -> Outcome {
     let mut machine = about_to_crash(bench)?;
@@ -104,14 +104,14 @@ pub fn parameters_whose_check_crashes(bench: &Bench) -> Outcome {
     )
 }
 
-/// Nothing runs, and it is told why.
+/// Nothing runs, and the state says why.
 fn has_stopped(machine: &mut Machine) -> Outcome {
     machine.run_ticks(10)?;
     Seen::since_last(machine);
     machine.run_ticks(40)?;
     let seen = Seen::since_last(machine);
     let status = seen.last_status().ok_or("no state")?;
-    let told = (status.state, status.reason);
-    equal("state", told, (Some(NodeState::Stopped), 1))?;
+    let state = (status.state, status.reason);
+    equal("state", state, (Some(NodeState::Stopped), 1))?;
     equal("words of poses", seen.axes.len(), 0)
 }

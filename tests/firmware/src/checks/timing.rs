@@ -39,7 +39,7 @@ pub fn a_late_tick(bench: &Bench) -> Outcome {
         format!("only {} poses", comparison.planar)
     })?;
     equal(
-        "missed ticks told",
+        "missed ticks reported",
         seen.last_status().map(|s| s.missed_ticks),
         Some(1),
     )?;
@@ -63,7 +63,7 @@ pub fn ticks_that_never_come(bench: &Bench) -> Outcome {
         .axes
         .iter()
         .find(|a| a.status == Status::FRAMES_MISSED.bits());
-    let gap = gap.ok_or("no pose tells of missed frames")?.tick;
+    let gap = gap.ok_or("no pose reports missed frames")?.tick;
     let mut comparison = Comparison::default();
     let others: Vec<_> = seen
         .axes
@@ -77,7 +77,7 @@ pub fn ticks_that_never_come(bench: &Bench) -> Outcome {
         "no poses after".to_owned()
     })?;
     equal(
-        "missed ticks told",
+        "missed ticks reported",
         seen.last_status().map(|s| s.missed_ticks),
         Some(3),
     )?;

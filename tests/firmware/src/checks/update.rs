@@ -10,7 +10,7 @@ use crate::bench::{Bench, Comparison, Seen, Words};
 use crate::flash_model::Failing;
 use crate::machine::Machine;
 use embedded_can::{Frame, Id, StandardId};
-use hal_adapters::can::command::{Mailbox, Outcome as Ended, Request, Told};
+use hal_adapters::can::command::{Content, Mailbox, Outcome as Ended, Request};
 use hal_adapters::can::status::{NodeState, NodeStatus, board_check};
 use hal_adapters::can::update::{Key, TAG_INDEX, UpdateData, UpdateRequest};
 use hal_adapters::can::{BusFrame, Coded};
@@ -159,7 +159,7 @@ pub(super) fn large() -> Result<Vec<u8>, Failure> {
     Ok(set.to_bytes(&mut buffer)?.to_vec())
 }
 
-/// An update: in time, poses invalid meanwhile and "updating" told before the erase, in which the ticks
+/// An update: in time, poses invalid meanwhile and the state "updating" sent before the erase, in which the ticks
 /// stand and the watchdog does not bite; the next power-on runs it. Another one takes its place and is
 /// activated at once; back is to the one that ran before.
 pub fn new_parameters(bench: &Bench) -> Outcome {
@@ -191,11 +191,11 @@ pub fn new_parameters(bench: &Bench) -> Outcome {
         .iter()
         .filter(|axis| axis.axis == 0 && axis.status & Status::PLANAR_INVALID.bits() != 0);
     expect(invalid.count() > 70, || "poses were valid".to_owned())?;
-    // What is told last before the ticks that are missed.
+    // The last state before the ticks that are missed.
     let gap = |pair: &&[(u64, NodeStatus)]| pair[1].0 - pair[0].0 > 200;
     let before = seen.statuses.windows(2).find(gap);
     let before = before.map(|pair| pair[0].1.state);
-    equal("told", before, Some(Some(NodeState::Updating)))?;
+    equal("state", before, Some(Some(NodeState::Updating)))?;
     equal("running", running(&mut machine)?, bench.blob.clone())?;
     starts_with(
         bench,
@@ -285,7 +285,7 @@ pub fn refused(bench: &Bench) -> Outcome {
     let mut host = Mailbox::default();
     for index in (TAG_INDEX..TAG_INDEX + 4).chain([0]) {
         let (token, word) = (104, 0);
-        let data = host.send(&Told::UpdateData(UpdateData { token, index, word }));
+        let data = host.send(&Content::UpdateData(UpdateData { token, index, word }));
         let Coded { message, bytes } = data.ok_or("a word")?;
         machine.chip.can.receive(message.spec().id, bytes);
         machine.run_ticks(1)?;
@@ -320,10 +320,10 @@ pub fn no_nonce_twice(bench: &Bench) -> Outcome {
         for (part, word) in (0..).zip(&mut nonce) {
             let challenge = Request::Update(UpdateRequest::Challenge { part });
             let seen = ask(&mut machine, challenge, token, 10)?;
-            let told = seen.answers.iter().find(|(_, told)| told.token == token);
-            let (_, told) = told.ok_or("no answer")?;
-            equal("answer", told.outcome, Some(Ended::Done))?;
-            *word = told.detail;
+            let answer = seen.answers.iter().find(|(_, a)| a.token == token);
+            let (_, answer) = answer.ok_or("no answer")?;
+            equal("answer", answer.outcome, Some(Ended::Done))?;
+            *word = answer.detail;
         }
         expect(
             nonces.iter().flatten().all(|word| !nonce.contains(word)),
@@ -341,9 +341,9 @@ pub fn no_nonce_twice(bench: &Bench) -> Outcome {
 /// flash takes new ones.
 pub fn flash_that_fails(bench: &Bench) -> Outcome {
     for (word, failing) in [
-        (0, Failing::Told),
+        (0, Failing::Reported),
         (0, Failing::Silent),
-        (50, Failing::Told),
+        (50, Failing::Reported),
         (50, Failing::Silent),
     ] {
         let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
@@ -366,7 +366,7 @@ pub fn flash_that_fails(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// The supply drops at any operation of an update: no further one is done, it is told why, the blob that
+/// The supply drops at any operation of an update: no further one is done, the answer says why, the blob that
 /// was there runs, and with a sound supply another update is taken.
 pub fn supply_that_drops(bench: &Bench) -> Outcome {
     let mut whole = bench.machine(PART, [&bench.blob, &[]])?;

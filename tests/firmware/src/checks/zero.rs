@@ -58,11 +58,11 @@ pub fn over_a_watchdog_reset(bench: &Bench) -> Outcome {
     let seen = Seen::since_last(&mut machine);
     expect_zero(&seen, true)?;
     equal("checks", page(&seen, 11), Some(0))?;
-    let told = first_state(&seen, flag::WATCHDOG_RESET).ok_or("it was never told")?;
+    let reported = first_state(&seen, flag::WATCHDOG_RESET).ok_or("it was never reported")?;
     let (valid, near) = near_zero(&seen);
     println!(
         "FAULT   controller | watchdog reset with a zero set | {} | {}",
-        told - at,
+        reported - at,
         valid - near
     );
     Ok(())
@@ -80,8 +80,8 @@ pub fn over_a_reset_by_pin(bench: &Bench) -> Outcome {
         first_state(&seen, flag::WATCHDOG_RESET),
         None,
     )?;
-    let told = [6, 9, 11].map(|number| page(&seen, number));
-    equal("faults and checks", told, [Some(0); 3])
+    let pages = [6, 9, 11].map(|number| page(&seen, number));
+    equal("faults and checks", pages, [Some(0); 3])
 }
 
 /// Power-on: no zero, and none is missed.
@@ -94,7 +94,7 @@ pub fn over_power_on(bench: &Bench) -> Outcome {
     equal("checks", page(&seen, 11), Some(0))
 }
 
-/// What ran is no longer in flash, or the record is damaged: no pose, which is told, and that a zero is
+/// What ran is no longer in flash, or the record is damaged: no pose, and the state says so and that a zero is
 /// lost.
 pub fn lost(bench: &Bench) -> Outcome {
     let image = bench.image(PART);

@@ -6,7 +6,7 @@
 
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use hal_adapters::can::command::{Command, Mailbox, Request, Told};
+use hal_adapters::can::command::{Command, Mailbox, Request, Content};
 use hal_adapters::can::service::Updates;
 use hal_adapters::can::update::{Change, Identity, Kept, NotWritten, Receiver, Running, Store};
 use hal_adapters::can::{
@@ -49,7 +49,7 @@ fn bus(frame: &RawFrame) {
 fn commands(tracker: &mut PoseTracker) {
     let mut mailbox = Mailbox::default();
     let command = Command::new(black_box(Request::Rezero { ticks: 500 }), 1);
-    let sent = mailbox.send(&black_box(Told::Command(command)));
+    let sent = mailbox.send(&black_box(Content::Command(command)));
     let mut service = black_box(Service::new(500).recording(true));
     if let Some(coded) = sent {
         black_box(service.take(&black_box(BusFrame::from(coded)), Some(tracker)));

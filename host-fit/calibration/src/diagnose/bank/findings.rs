@@ -1,4 +1,4 @@
-//! What is told of what the bank found.
+//! The findings of the bank.
 
 use super::columns::{Course, FAMILIES, Kind};
 use super::score::{Candidate, range_of};

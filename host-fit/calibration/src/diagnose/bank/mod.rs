@@ -50,7 +50,7 @@ const RARITY: f64 = 100.0;
 const LAG_MAX: f64 = 0.5;
 /// A fault that costs less is none.
 const COST_MIN: f64 = 1.01;
-/// Faults whose gains in chi-square differ by less are not told apart: odds of 20 to 1, ...
+/// Faults whose gains in chi-square differ by less are undecided: odds of 20 to 1, ...
 pub(super) const UNDECIDED: f64 = 6.0;
 /// ... or by less than this part, for large faults are not quite linear.
 const ALIKE: f64 = 0.01;
@@ -198,7 +198,7 @@ impl Job<'_> {
                     shaped(log, &raw[fault.family], family, fault.course)
                 })
                 .collect();
-            // Faults that cannot be told apart any more are no further ones.
+            // A fault that can no longer be separated from the others is not a further one.
             let Some(next) = estimate.with_faults(log, &columns) else {
                 faults.pop();
                 break;

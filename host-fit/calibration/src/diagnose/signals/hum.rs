@@ -1,6 +1,6 @@
 //! Hum: lines in the spectra of the residuals, the channel that each comes from, and its size
 //! there. A line is taken out before the next is looked for: the motion modulates what an error of
-//! a beam shows at the probes, which else would be told as lines beside it.
+//! a beam shows at the probes, which else would look like further lines.
 
 use super::channels::LogSignals;
 use super::residual::{Error, Residuals, blamed};
@@ -19,7 +19,7 @@ const LOWEST_HZ: f64 = 10.0;
 const OF_MOTION: f64 = 8.0;
 /// Amplitude in parts of the noise of a probe from which a line is worth a warning.
 const WARN_MIN: f64 = 0.3;
-/// Lines that are told.
+/// At most this many lines are reported.
 const LINES_MAX: usize = 5;
 
 /// Names the lines above the motion, the clearest first.
@@ -27,7 +27,7 @@ pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let longest = log.segments.iter().map(Range::len).max().unwrap_or(0);
     let length = smooth(log.rows_in(WINDOW_S).min(longest));
     let mut windows = windows(&log.segments, length);
-    // A mean over windows without residuals would be told as if all of them had gone in.
+    // A mean over windows without residuals would count as if all of them had gone in.
     windows.retain(|window| log.is_mostly_used(window));
     if length < ROWS_MIN || windows.is_empty() {
         return Vec::new();

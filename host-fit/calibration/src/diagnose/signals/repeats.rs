@@ -147,7 +147,7 @@ pub(super) fn frozen(log: &mut LogSignals, has_reference: bool) -> Vec<Finding> 
         }
         runs.extend(own);
     }
-    let told = |(names, run, rows): (Vec<&str>, Range<usize>, usize)| {
+    let finding = |(names, run, rows): (Vec<&str>, Range<usize>, usize)| {
         let mut channels = log.channels.iter();
         let share = rows as f64 / log.len() as f64;
         // Rows that repeat whole are true, if of no use.
@@ -160,7 +160,7 @@ pub(super) fn frozen(log: &mut LogSignals, has_reference: bool) -> Vec<Finding> 
             _ => found,
         }
     };
-    let findings = found.into_iter().map(told).collect();
+    let findings = found.into_iter().map(finding).collect();
     log.leave_out(runs);
     findings
 }
@@ -245,10 +245,10 @@ mod tests {
             }
             let found = only(&recording, Code::Saturated, Some("hall_b"));
             assert_eq!(found.severity, severity);
-            let told = found.value.expect("rows");
+            let rows = found.value.expect("rows");
             assert!(
-                told > 0.8 * clipped as f64 && told <= clipped as f64,
-                "{told} {clipped}"
+                rows > 0.8 * clipped as f64 && rows <= clipped as f64,
+                "{rows} {clipped}"
             );
         }
     }

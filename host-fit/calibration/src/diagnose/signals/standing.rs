@@ -25,12 +25,12 @@ pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
     };
     let channels = (0..log.channels.len()).into_par_iter();
     let runs: Vec<Vec<Range<usize>>> = channels.map(missed).collect();
-    let told = |(runs, channel): (&Vec<_>, &super::channels::Channel)| {
+    let finding = |(runs, channel): (&Vec<_>, &super::channels::Channel)| {
         let longest: &Range<usize> = runs.iter().max_by_key(|run: &&Range<usize>| run.len())?;
-        // Told by what the field model leaves, which a wrong log may leave too.
+        // No cost: the residuals show it, and those of a wrong log may look alike.
         Some(stuck(log, channel.name, longest, 0.0).on(channel.name))
     };
-    let findings = runs.iter().zip(&log.channels).filter_map(told).collect();
+    let findings = runs.iter().zip(&log.channels).filter_map(finding).collect();
     log.leave_out(runs.into_iter().flatten());
     findings
 }

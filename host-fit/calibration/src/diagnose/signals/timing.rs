@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn uneven_times_are_told_in_us() {
+    fn uneven_times_are_reported_in_us() {
         let mut random = Stream::new(7, Purpose::Sensors, 0);
         let mut uneven = dataset(&recording());
         for row in &mut uneven.rows {
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn another_rate_is_told_and_a_thinned_log_is_not_warned_of() {
+    fn another_rate_is_reported_and_a_thinned_log_is_not_warned_of() {
         for periods in [2.0, 5.5] {
             let (code, period_us) = only(&every(periods));
             assert_eq!(code, Code::Jitter);

@@ -22,7 +22,7 @@ pub type Set = ([Quantity; 3], [Source; 3]);
 /// The columns of one log.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Columns {
-    /// `None` where the movements are to be told by the time.
+    /// `None` where gaps in the time separate the movements.
     pub(super) movement: Option<Source>,
     pub(super) time: Source,
     pub(super) hall: [Source; 3],

@@ -29,9 +29,9 @@ pub struct OrderCells {
     pub movement: Option<usize>,
 }
 
-/// The place of a row that is kept.
+/// Where a kept row stands in its movement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RowPlace {
+pub struct KeptRow {
     /// Number of its movement.
     pub movement: i64,
     /// Whether a movement begins with it.
@@ -151,8 +151,8 @@ impl Order {
         Ok(())
     }
 
-    /// The place of the row in hand, which is kept.
-    pub fn keep(&mut self) -> RowPlace {
+    /// Keeps the row in hand.
+    pub fn keep(&mut self) -> KeptRow {
         let (named, t_us) = self.current.unwrap_or_default();
         // Half a period early is on time: steps jitter.
         let is_over = |length: f64| t_us - self.kept.first_us >= length - self.period_us / 2.0;
@@ -174,7 +174,7 @@ impl Order {
         }
         self.kept.last_us = t_us;
         self.kept.rows += 1;
-        RowPlace {
+        KeptRow {
             movement: self.kept.movement,
             begins,
             sequence: self.kept.sequence,

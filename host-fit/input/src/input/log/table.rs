@@ -129,9 +129,9 @@ impl<'a> Table<'a> {
     ///
     /// Cells are separated by commas, semicolons or tabs, whichever the header has most;
     /// lines end in LF, CRLF or CR, a line that starts with `#` is a comment, blank lines are
-    /// skipped. Notes may stand above the header, which is told by the names of columns that are
-    /// known, and a row of units below it. Numbers may have decimal commas where commas do not
-    /// separate cells. All this is told from the first mebibyte of the text.
+    /// skipped. Notes may stand above the header, which is recognised by the names of its
+    /// columns, and a row of units below it. Numbers may have decimal commas where commas do not
+    /// separate cells. All this is decided by the first mebibyte of the text.
     ///
     /// # Errors
     /// Those of reading, `Empty`, `NoHeader`, `NoSeparator`, `TooManyColumns`, `LineTooLong`.

@@ -91,11 +91,11 @@ fn of_a_long_log_runs_are_kept_as_they_are() {
         (dataset.logs[0].rows.clone(), dataset.read()),
         (0..taken, (57_000, 57))
     );
-    let told: Vec<_> = warnings
+    let found: Vec<_> = warnings
         .iter()
         .map(|found| (found.code, found.value))
         .collect();
-    assert_eq!(told, [(Code::Excerpt, Some(taken as f64))]);
+    assert_eq!(found, [(Code::Excerpt, Some(taken as f64))]);
     for (number, run) in dataset.movements.iter().enumerate() {
         let rows = &dataset.rows[run.rows.clone()];
         let of_log = all.dataset.movements[run.index as usize].rows.clone();

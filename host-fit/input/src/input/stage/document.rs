@@ -1,7 +1,7 @@
 //! The parsed text of a stage file: gives the values of its tables, and of whatever is wrong the
 //! place and the key.
 
-use super::error::{Place, StageError};
+use super::error::{StageError, TextPosition};
 use crate::input::draft::MARK;
 use crate::input::shipped::STAGE_TOML;
 use serde::de::DeserializeOwned;
@@ -26,7 +26,7 @@ pub(super) type List<T> = Spanned<Vec<T>>;
 impl<'t> Document<'t> {
     pub(super) fn parse(text: &'t str, path: &'t Path) -> Result<Self, StageError> {
         let top = DeTable::parse(text).map_err(|error| {
-            let place = place(path, text, error.span().map_or(0, |span| span.start));
+            let place = position(path, text, error.span().map_or(0, |span| span.start));
             let line = text.lines().nth(place.line - 1).unwrap_or_default();
             let value = line.split_once('=').map_or("", |(_, value)| value);
             let message = decimal_comma(value);
@@ -233,7 +233,7 @@ impl<'t> Document<'t> {
 
     fn error(&self, offset: usize, key: String, problem: String) -> StageError {
         StageError::Key {
-            place: place(self.path, self.text, offset),
+            place: position(self.path, self.text, offset),
             key,
             problem,
         }
@@ -302,10 +302,10 @@ fn decimal_comma(text: &str) -> Option<String> {
 }
 
 /// Line and column of a byte offset.
-fn place(path: &Path, text: &str, offset: usize) -> Place {
+fn position(path: &Path, text: &str, offset: usize) -> TextPosition {
     let before = text.get(..offset).unwrap_or(text);
     let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-    Place {
+    TextPosition {
         path: path.to_path_buf(),
         line: before.matches('\n').count() + 1,
         column: before.get(line_start..).unwrap_or("").chars().count() + 1,

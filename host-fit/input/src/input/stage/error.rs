@@ -3,9 +3,9 @@
 use crate::input::source::SourceError;
 use std::path::PathBuf;
 
-/// A place in a text file; line and column count from 1, the column in characters.
+/// A position in a text file; line and column count from 1, the column in characters.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct TextPosition {
     /// The file.
     pub path: PathBuf,
     /// Line.
@@ -14,7 +14,7 @@ pub struct Place {
     pub column: usize,
 }
 
-impl core::fmt::Display for Place {
+impl core::fmt::Display for TextPosition {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(f, "{}:{}:{}", self.path.display(), self.line, self.column)
     }
@@ -38,7 +38,7 @@ pub enum StageError {
     #[error("{place}: not TOML: {message}; correct this line")]
     Syntax {
         /// Where.
-        place: Place,
+        place: TextPosition,
         /// What the parser says.
         message: String,
     },
@@ -46,8 +46,8 @@ pub enum StageError {
     /// or cannot be true.
     #[error("{place}: `{key}`: {problem}")]
     Key {
-        /// Where; the table's place for a missing key.
-        place: Place,
+        /// Where; the table's for a missing key.
+        place: TextPosition,
         /// The key in full, as in `search.a_per_m[0]`.
         key: String,
         /// What is wrong, and what to do.

@@ -46,13 +46,13 @@ const NOISE_ROUNDS: u32 = 2;
 pub struct Warmth {
     /// k, h and T0.
     pub temperature: Temperature<f64>,
-    /// Standard errors of (k, h) of A, B, C, 1/K: those of the prior where the log tells nothing.
+    /// Standard errors of (k, h) of A, B, C, 1/K: those of the prior where the log has no information.
     pub error_per_k: [[f64; 2]; 3],
-    /// How far the temperatures of mount and body span that told k and h, K; 0 where they tell nothing.
+    /// The spans of the temperatures of mount and body that determine k and h, K; 0 where only the prior does.
     pub spans_k: [f64; 2],
 }
 
-/// A log by itself that spans less than this tells no k, K: its drift is also that of the reference.
+/// A single log that spans less than this does not determine k, K: its drift is also that of the reference.
 const SPAN_MIN_K: f64 = 2.0;
 /// What sensors that differ from the magnets' own temperature put k off by, times the span.
 const OF_SENSORS: f64 = 4e-5;

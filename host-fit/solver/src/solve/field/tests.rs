@@ -60,7 +60,7 @@ fn eight_seconds_give_the_parameters_within_their_standard_errors() {
 }
 
 #[test]
-fn the_noise_of_the_probes_and_the_walk_of_the_reference_are_told_apart() {
+fn the_noise_of_the_probes_and_the_walk_of_the_reference_are_separated() {
     let fit = fitted(&Run {
         movements: 4,
         drift: [0.3e-6, 0.1e-6, 0.5e-6],

@@ -45,9 +45,9 @@ pub struct Case {
     pub(super) name: String,
     pub(super) event: Event,
     pub(super) lasts: Lasts,
-    /// States and reasons in the status frames, any of these.
-    pub(super) told: Vec<(NodeState, u8)>,
-    /// Ticks after which the fault is told at the latest.
+    /// The states and reasons that its status frames may have.
+    pub(super) reported: Vec<(NodeState, u8)>,
+    /// Ticks after which the fault is reported at the latest.
     pub(super) within: u64,
     /// Bits of the pose's status.
     pub(super) status: Status,
@@ -71,12 +71,12 @@ pub const fn ticks_to_settle(part: Part) -> u64 {
 }
 
 impl Case {
-    fn of(name: &str, fault: AdcFault, told: &[(NodeState, u8)], part: Part) -> Self {
+    fn of(name: &str, fault: AdcFault, reported: &[(NodeState, u8)], part: Part) -> Self {
         Self {
             name: name.to_owned(),
             event: Event::Fault(fault),
             lasts: Lasts::Long,
-            told: told.to_vec(),
+            reported: reported.to_vec(),
             within: 1,
             status: NOTHING,
             back_within: 1 + RESTART + ticks_to_settle(part),
@@ -85,8 +85,8 @@ impl Case {
     }
 
     fn of_register(register: u8, bits: u16, name: &str, part: Part) -> Self {
-        // A part of which a signature covers the registers tells the wrong input.
-        let told = [
+        // A part whose signature covers the registers reports the wrong input.
+        let reported = [
             (NodeState::SensorFault, 5),
             (NodeState::SensorFault, 8),
             NOT_READY,
@@ -94,7 +94,7 @@ impl Case {
         Self {
             event: Event::Flip { register, bits },
             lasts: Lasts::UntilStarted,
-            ..Self::of(name, AdcFault::None, &told, part)
+            ..Self::of(name, AdcFault::None, &reported, part)
         }
     }
 
@@ -163,29 +163,29 @@ pub fn cases(part: Part) -> Vec<Case> {
         } else {
             NOTHING
         };
-        let told = [fault(0x10 + k as u8)];
+        let reported = [fault(0x10 + k as u8)];
         all.push(Case {
             status: Status::from_bits(1 << k).with(lost),
             back_within: 1,
-            ..Case::of(&name, AdcFault::Rail(k), &told, part)
+            ..Case::of(&name, AdcFault::Rail(k), &reported, part)
         });
     }
     all.push(Case {
         event: Event::PowerLoss,
         lasts: Lasts::UntilStarted,
-        told: vec![fault(5), fault(8), NOT_READY],
+        reported: vec![fault(5), fault(8), NOT_READY],
         ..Case::of("a short loss of power", AdcFault::None, &[], part)
     });
     match part {
         Part::Ads131m08 => {
-            let told = [fault(10), fault(5)];
+            let reported = [fault(10), fault(5)];
             all.push(Case {
                 within: 2,
                 back_within: 1 + RESTART,
-                ..Case::of("SYNC cut", AdcFault::Control, &told, part)
+                ..Case::of("SYNC cut", AdcFault::Control, &reported, part)
             });
-            let told = [NOT_READY, fault(5)];
-            all.push(Case::of("CLKIN stops", AdcFault::Clock, &told, part));
+            let reported = [NOT_READY, fault(5)];
+            all.push(Case::of("CLKIN stops", AdcFault::Clock, &reported, part));
             for (register, bits, name) in [
                 (0x03, 1 << 2, "a bit of CLOCK flips"),
                 (0x04, 1 << 12, "a bit of GAIN1 flips"),

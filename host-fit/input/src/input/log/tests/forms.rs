@@ -274,7 +274,7 @@ fn voltages_become_the_codes_of_the_converter() {
     let text = format!("{SOUND}[log]\ncap_1 = \"gap 1 [V]\"\n");
     let error = Stage::from_toml(&text, Path::new("stage.toml")).expect_err("no scale");
     assert!(error.to_string().contains("[capacitive]"), "{error}");
-    // Another scale than the converter's is told by voltages that fall between codes.
+    // Another scale than the converter's: voltages fall between codes.
     let other = with_volts("3.2e-4", "").expect("sound");
     let reading = read_in(in_volts.as_bytes(), &other).expect("read, with a warning");
     assert!(

@@ -71,7 +71,7 @@ fn faults_far_down_are_named_with_their_place_and_the_first_wins() {
 }
 
 #[test]
-fn rows_that_are_left_out_of_many_movements_are_told_in_few_lines() {
+fn rows_that_are_left_out_of_many_movements_are_reported_in_few_lines() {
     let mut lines = lines();
     for (row, line) in lines[1..].iter_mut().enumerate() {
         if (row / 1000) % 4 == 1 {

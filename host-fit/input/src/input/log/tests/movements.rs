@@ -28,10 +28,10 @@ fn read_split(text: &str, split_s: Option<f64>) -> Result<LogReading, LogError> 
 fn lengths(text: &str, split_s: Option<f64>) -> Vec<usize> {
     let reading = read_split(text, split_s).expect("sound");
     let movements = reading.dataset.movements;
-    let told = reading.warnings.iter().any(|found| {
+    let is_found = reading.warnings.iter().any(|found| {
         found.code == Code::MovementsByTime && found.value == Some(movements.len() as f64)
     });
-    assert!(told, "{:?}", reading.warnings);
+    assert!(is_found, "{:?}", reading.warnings);
     for (slot, (movement, index)) in movements.iter().zip(0..).enumerate() {
         assert_eq!(movement.index, index);
         let rows = &reading.dataset.rows[movement.rows.clone()];

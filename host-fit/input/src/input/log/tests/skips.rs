@@ -21,9 +21,9 @@ fn bad_cells_are_left_out_and_counted_by_reason() {
     let reading = read_text(&text, &SKIP).expect("read");
     assert_eq!(codes(&reading), [13, 11]);
     assert_eq!(reading.skipped_rows, 4);
-    let told = |code| move |found: &&Finding| found.code == code;
+    let has = |code| move |found: &&Finding| found.code == code;
     let skipped: Vec<_> = (reading.warnings.iter())
-        .filter(told(Code::RowsSkipped))
+        .filter(has(Code::RowsSkipped))
         .map(|found| (found.message.as_str(), found.value))
         .collect();
     let want = [

@@ -7,17 +7,17 @@ use std::path::{Path, PathBuf};
 /// As many links as Linux follows.
 const LINKS_MAX: usize = 40;
 
-/// A file, whether it is there or not: names that lead to the same file have the same place, hard
-/// links included.
+/// A file, whether it is there or not: equal where two names lead to the same file, hard links
+/// included.
 #[derive(Clone, Debug)]
-pub struct Place {
+pub struct FileIdentity {
     path: PathBuf,
     /// Device and number on it of a file that is there.
     inode: Option<(u64, u64)>,
 }
 
-impl Place {
-    /// The place that a name leads to.
+impl FileIdentity {
+    /// The file that a name leads to.
     pub fn of(path: &Path) -> Self {
         let end = end_of_links(path);
         // A file that is not there yet is known by its folder and its name.
@@ -30,7 +30,7 @@ impl Place {
     }
 }
 
-impl PartialEq for Place {
+impl PartialEq for FileIdentity {
     fn eq(&self, other: &Self) -> bool {
         self.path == other.path || (self.inode.is_some() && self.inode == other.inode)
     }
@@ -42,7 +42,7 @@ fn inode(metadata: &Metadata) -> Option<(u64, u64)> {
     Some((metadata.dev(), metadata.ino()))
 }
 
-/// Other systems do not tell.
+/// Other systems do not show it.
 #[cfg(not(unix))]
 fn inode(_metadata: &Metadata) -> Option<(u64, u64)> {
     None
