@@ -82,7 +82,7 @@ impl<'l> LogLine<'l> {
         let interface = parts.next().ok_or(LineError::CutShort)?;
         let text = parts.next().ok_or(LineError::CutShort)?;
         let column = column_of(text);
-        // A fourth part, R or T, tells the direction (candump -x).
+        // A fourth part, R or T, is the direction (candump -x).
         let rest = parts.find(|part| !matches!(*part, "R" | "T"));
         if let Some(rest) = rest {
             let column = column_of(rest);

@@ -16,7 +16,7 @@
 //! | [`solve`] | how: least squares, SHTLBO and its relatives |
 //! | [`plan`] | the run to make for the field model, and what to expect of it |
 //! | [`judge`] | errors by the target's own decoder, standard errors, what the log leaves open |
-//! | [`fit`] | all of these in a row |
+//! | [`fit`] | all steps in a row |
 //! | [`diagnose`] | what is wrong with a log, beyond what the fit itself finds |
 //! | [`recalibrate`] | an old calibration brought up to date by a few seconds of log |
 //! | [`output`] | blobs, pose files and images for flash tools, written whole or not at all |

@@ -1,4 +1,4 @@
-//! Tells the linker where `memory.x` lies: at the top of the repository.
+//! Shows the linker where `memory.x` lies: at the top of the repository.
 fn main() {
     let manifest = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default();
     println!("cargo:rustc-link-search={manifest}/../..");

@@ -63,7 +63,7 @@ const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 pub enum BlobError {
     /// Shorter than a header, or than the header says.
     Truncated {
-        /// Bytes that are needed, as far as is known.
+        /// Bytes that are needed, at least.
         needed: usize,
         /// Bytes that are there.
         found: usize,

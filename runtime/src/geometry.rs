@@ -9,8 +9,8 @@
 //! probe mounted the other way round. Nothing else depends on the direction, so a blob
 //! stores theta as it is here, and needs no entry for the designed directions.
 //!
-//! Two coordinates of a probe enter PM only through its lever arm, so no data can tell them
-//! apart. A calibration holds lever arms and thetas; places are kept only as designed values.
+//! Two coordinates of a probe enter PM only through its lever arm, so no data can separate them
+//! A calibration holds lever arms and thetas; places are kept only as designed values.
 //!
 //! Everything here runs on any [`Number`], so that the target's `f32`, the host's `f64` and
 //! the lanes of a SIMD register use the same functions. Sums and products are written out:

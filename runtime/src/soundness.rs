@@ -22,7 +22,7 @@ impl ParameterSet {
     /// the sensing axes, and the slopes of p below 1 in that range.
     ///
     /// # Errors
-    /// The first of these that does not hold.
+    /// The first condition that does not hold.
     pub fn check(&self) -> Result<(), ParameterError> {
         layout::check_finite(&mut self.clone())?;
         self.check_terms()

@@ -242,7 +242,7 @@ pub fn to_words<M: Bare>(decoder: &Decoder<M>, zero: &PlanarPose<f32>, put: &mut
     }
 }
 
-/// The frame of these words.
+/// The frame of the words.
 pub const fn frame([a, b, c, g1, g2, g3, sequence]: [u32; FRAME_WORDS]) -> RawFrame {
     RawFrame::new(
         [a as i32, b as i32, c as i32],

@@ -211,7 +211,7 @@ impl Drop for Statics {
     }
 }
 
-/// What the firmware's `init` does, as far as it is not about the chip.
+/// What the firmware's `init` does, without what concerns the chip.
 fn start(
     flash: FlashModel,
     (serial, key): (Option<&'static str>, Option<Key>),

@@ -28,7 +28,7 @@
 //! **Check.** The part has neither an identification register nor a CRC. At start, reset
 //! values that read back correctly show that it is there. Later each code is followed by its
 //! channel (4 bits), the device address (2 bits, here 01: a line stuck at 0 or at 1 fails) and
-//! its input range (3 bits), and all of these are checked. A flipped bit in the code itself goes
+//! its input range (3 bits), and all three are checked. A flipped bit in the code itself goes
 //! unnoticed: prefer the [ADS131M08](super::ads131m08) on long cables. After the codes each tick
 //! reads one register back: all of them in turn, in 22 ms. (It comes last because only the AUTO_RST
 //! of the next tick starts the sequence again.)

@@ -1,5 +1,5 @@
 //! Codes that never change: a converter, or one of its channels, can freeze and still send valid
-//! frames, and an amplifier can stop. Noise tells a stage at rest from that.
+//! frames, and an amplifier can stop. The noise of a stage at rest rules that out.
 //!
 //! Each sensor is watched by itself. Its limit follows from the chance that noise alone repeats a
 //! code while the stage is at rest for a year, 1.6e10 periods:

@@ -56,5 +56,5 @@ pub use sensor::Layout;
 pub use service::Service;
 pub use table::Message;
 
-/// Version of this protocol, as [`Message::NodeStatus`] tells it.
+/// Version of this protocol, as [`Message::NodeStatus`] carries it.
 pub const PROTOCOL_VERSION: u8 = 4;

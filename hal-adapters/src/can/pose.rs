@@ -69,7 +69,7 @@ impl Default for PoseSender {
 
 impl PoseSender {
     /// Sends each vertical axis in every `vertical_ticks`th tick: 1, 2, 4, 8 or 16; any other
-    /// number is rounded down to one of these (0 counts as 1).
+    /// number is rounded down to the next such (0 counts as 1).
     pub const fn new(vertical_ticks: u8) -> Self {
         let ticks = if vertical_ticks > 16 {
             16

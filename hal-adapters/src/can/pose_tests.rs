@@ -112,7 +112,7 @@ fn poses_between_two_time_frames_are_dated_by_their_numbers() {
     let (mut sender, mut receiver) = (PoseSender::default(), PoseReceiver::new(Timing::default()));
     let (mut undated, mut time_frames) = (0, 0);
     for k in 0..100u16 {
-        // The node misses three ticks before its 40th, and tells so in the status.
+        // The node misses three ticks before its 40th, and says so in the status.
         let number = u32::from(k) + if k >= 40 { 3 } else { 0 };
         let time_us = (u32::MAX - 50_000).wrapping_add(2_000 * number);
         let mut reading = reading(k);
@@ -158,7 +158,7 @@ fn a_pose_after_any_loss_has_its_own_time_or_none() {
                     let Some(pose) = taken.tick.filter(|pose| pose.valid().is_some()) else {
                         continue;
                     };
-                    // X tells the tick.
+                    // X is the tick.
                     let number = (pose.pose.x_m / 1.3e-7).round() as u32;
                     if let Some(sampled_us) = receiver.sampled_us(&pose, 2_000) {
                         assert_eq!(sampled_us, 2_000 * number, "{lost} from {start} on");

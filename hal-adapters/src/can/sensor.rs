@@ -163,7 +163,7 @@ pub(super) fn time_frame(message: Message, sampled: &RawFrame, tick: u32) -> Opt
         .then(|| Coded::new(message, tick / slow, payload))
 }
 
-/// Number and time of a tick, as [`Message::SensorTime`] tells them.
+/// Number and time of a tick, as [`Message::SensorTime`] carries them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TickTime {
     /// The number that the sensor node gave it, modulo 2^20.
@@ -172,7 +172,7 @@ pub struct TickTime {
     pub time_us: u32,
 }
 
-/// What a time frame tells; `None` for any other frame and for a damaged one.
+/// The content of a time frame; `None` for any other frame and for a damaged one.
 pub fn read_time<F: Frame>(frame: &F) -> Option<TickTime> {
     let (id, data) = standard(frame)?;
     if id != Message::SensorTime.id() {

@@ -106,7 +106,7 @@ impl NodeStatus {
     }
 }
 
-/// What a controller tells of its start and of its board: pages 6 to 11, in this order.
+/// What a controller reports of its start and its board: pages 6 to 11, in this order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BoardFacts {
     /// The last fault that caused a reset since power-on. Bits 0 to 7: 0 none, 1 panic, 2 hard

@@ -75,7 +75,7 @@ pub struct Fit {
     pub model_reason: String,
     /// What the solver found; of the field model the parameters that Model (31) has too.
     pub solution: Solution,
-    /// Standard errors of these; `None` as in
+    /// Standard errors of them; `None` as in
     /// [`Uncertainty`](crate::judge::uncertainty::Uncertainty).
     pub standard_error: [Option<f64>; COUNT],
     /// Pairs of parameters whose estimates are correlated by more than

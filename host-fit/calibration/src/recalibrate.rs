@@ -49,7 +49,7 @@ use runtime::parameters::{FitRecord, ParameterError, Text};
 use runtime::{Calibration, ModelKind, ParameterSet};
 
 /// What a log may leave open: systematic errors in service of this part of the noise (variances)
-/// more than the old calibration had. Two seconds that tell gains leave 0.01, a single axis for
+/// more than the old calibration had. Two seconds that determine gains leave 0.01, a single axis for
 /// three gains 0.1 and far more; errors in service are then 1.025 times the noise floor ...
 const OPEN_MAX_GAINS: f64 = 0.05;
 /// ... and here 1.1 times: 4 s of all six axes leave 0.1, 2 s leave 1.2.

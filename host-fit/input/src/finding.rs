@@ -140,7 +140,7 @@ pub static TABLE: [Entry; 32] = [
     entry(C::BetweenCodes, "between_codes", Warn, "voltages that are no whole codes of the converter", "check volts_per_count and the instrument"),
     entry(C::FileCut, "file_cut", Warn, "the last line has no line break", "check whether the file was cut"),
     entry(C::Excerpt, "excerpt", Warn, "more rows than a fit needs: it takes some of all", "nothing"),
-    entry(C::Temperature, "temperature", Note, "what the logs tell of the effect of temperature", "fit a cold and a warm log together, 3 K apart or more"),
+    entry(C::Temperature, "temperature", Note, "the effect of temperature that the logs show", "fit a cold and a warm log together, 3 K apart or more"),
 ];
 
 impl Code {

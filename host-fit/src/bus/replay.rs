@@ -241,7 +241,7 @@ struct Player<'a> {
 }
 
 impl Player<'_> {
-    /// Sends these rows; tells whether the user wants no more.
+    /// Sends the rows; whether the user wants no more.
     fn play(&mut self, rows: &[Due]) -> Result<bool, ReplayError> {
         let mut left = rows;
         while let [first, ..] = left {

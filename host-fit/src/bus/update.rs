@@ -40,7 +40,7 @@ pub enum UpdateError {
     NoAnswer,
     /// The node answers, but does not know these requests.
     #[error(
-        "the controller does not tell what it runs: its program is too old for updates over the bus, or it is `host-fit \
+        "the controller does not say what it runs: its program is too old for updates over the bus, or it is `host-fit \
          live`. Flash a newer program, and parameters with `host-fit export` and a probe"
     )]
     TellsNothing,
@@ -61,9 +61,9 @@ pub enum UpdateError {
         /// That of the node.
         found: String,
     },
-    /// A serial number was asked for, and the node tells none.
+    /// A serial number was asked for, and the node has none.
     #[error(
-        "the controller tells no serial number, so it may not be that of the stage `{expected}`; nothing was sent to it. \
+        "the controller has no serial number, so it may not be that of the stage `{expected}`; nothing was sent to it. \
          Leave out --serial if it is"
     )]
     NoSerial {
@@ -88,7 +88,7 @@ pub enum UpdateError {
         /// Its detail: an axis, or a status.
         detail: u32,
     },
-    /// The servo is on, as far as the node knows.
+    /// The node takes the servo for on.
     #[error("{}", match declared {
         false => "the servo may be on: switch it off, and say so with --servo-off, which declares it meanwhile",
         true => "the controller does not take the servo for off: it has restarted, its service pin says on, another \

@@ -169,7 +169,7 @@ pub(super) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
     };
     PossibleValuesParser::new(T::all().into_iter().map(value)).try_map(|name| {
         let found = T::all().into_iter().find(|(_, known, _)| *known == name);
-        found.map(|(value, ..)| value).ok_or("not one of these")
+        found.map(|(value, ..)| value).ok_or("not a known value")
     })
 }
 

@@ -102,7 +102,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<(), HostError> {
 }
 
 /// Writes logs and stage into `folder`, fits, decodes, judges. Gives what it shows, and the files. Refuses
-/// a folder with a file of one of these names that is not of an earlier demo: its stage file shows that.
+/// a folder with a file of such a name that is not of an earlier demo: its stage file shows that.
 fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
     let inputs = [
         ("paper.csv.gz", LOG_GZ),
@@ -218,8 +218,7 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
     let mut tables = parameters::tables(&of_fit, &beside);
     for table in &mut tables {
         table.title =
-            "Table 7: parameters (lever arms in place of H, which no data can tell apart)"
-                .to_owned();
+            "Table 7: parameters (lever arms in place of H, which no data can separate)".to_owned();
     }
     tables.insert(0, errors);
     let text = as_text(&tables)

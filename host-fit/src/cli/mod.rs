@@ -163,7 +163,7 @@ pub fn main() -> ExitCode {
     run(&Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|error| error.exit()))
 }
 
-/// As [`main`], of these arguments, the name of the program first: for programs that run commands
+/// As [`main`], with the given arguments, the name of the program first: for programs that run commands
 /// in their own process. Wrong usage is not explained.
 pub fn main_of(arguments: &[&OsStr]) -> ExitCode {
     Cli::try_parse_from(arguments).map_or_else(|_| ExitCode::from(2), |cli| run(&cli))
@@ -297,7 +297,7 @@ fn blob_of_stage(
     Ok((set, stage))
 }
 
-/// The warnings of a log that is diagnosed, which tells of another rate itself.
+/// The warnings of a log that is diagnosed, which reports another rate itself.
 fn warnings_of(log: &LogReading) -> Vec<String> {
     let messages = log.warnings.iter().map(|found| found.message.clone());
     messages.collect()

@@ -15,7 +15,7 @@ const LEFT: f64 = 104.0;
 const RIGHT: f64 = 696.0;
 const MARGIN: f64 = 6.0;
 
-/// Kinds that a legend tells apart: class and colour.
+/// Kinds that a legend distinguishes: class and colour.
 const KINDS: [(&str, &str); 10] = [
     ("k0", "#1f77b4"),
     ("k1", "#ff7f0e"),

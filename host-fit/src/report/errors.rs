@@ -46,7 +46,7 @@ pub fn micro(error: &PoseError) -> [[f64; 2]; 3] {
     error.axes.map(|axis| [axis.rms * 1e6, axis.peak * 1e6])
 }
 
-/// A table with a row of rms and peak for each of these (um, um, urad); what is not known is NaN.
+/// A table with a row of rms and peak for each entry (um, um, urad); what is not known is NaN.
 pub fn error_table(
     title: &str,
     rows: impl IntoIterator<Item = (impl Into<String>, [[f64; 2]; 3])>,

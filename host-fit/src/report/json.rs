@@ -99,11 +99,11 @@ pub struct Report {
     pub zero_deviations: Vec<MovementZero>,
     /// What the user should know.
     pub warnings: Vec<String>,
-    /// Whether the blob can be used; null where the log does not tell that of a blob.
+    /// Whether the blob can be used; null where the log cannot show that for a blob.
     pub verdict: Option<Verdict>,
-    /// Errors of the blob that are predicted for service; null where the log does not tell.
+    /// Errors of the blob that are predicted for service; null where the log cannot show them.
     pub predicted: Option<Predicted>,
-    /// What a diagnosis of the log found, the gravest first.
+    /// What a diagnosis of the log found, by severity.
     pub findings: Vec<Finding>,
     /// The same errors log by log.
     pub logs: Vec<Value>,

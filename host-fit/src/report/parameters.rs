@@ -84,7 +84,7 @@ pub fn parameters_in(set: &ParameterSet) -> BTreeMap<String, Parameter> {
     }
 }
 
-/// A table with a row for each of these terms, and with these columns for each probe. `cells` gives
+/// A table with a row for each term, and with the given columns for each probe. `cells` gives
 /// them for a parameter by its name and the factor from SI to the unit of the row, as
 /// misalignments are in mrad; a term that it gives none for is left out.
 pub fn by_probe<'c>(

@@ -7,10 +7,10 @@ use crate::plan::Plan;
 use crate::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
 use serde_json::{Map, Value, json};
 
-/// How many of the parameters that the log will tell least about are named.
+/// How many of the least determined parameters are named.
 const NAMED: usize = 5;
 /// The figures of a plan. Axes are in m and rad; `of_prior` is the standard error over the deviation of
-/// the prior, 1 where the log tells nothing.
+/// the prior, 1 where the log adds nothing.
 pub fn figures(plan: &Plan, stage: &Stage) -> Value {
     let run = &plan.run;
     let axis =

@@ -116,7 +116,7 @@ fn group(title: &str, members: &Map<String, Value>, hidden: &[&str]) -> Vec<Tabl
     tables
 }
 
-/// A table with a row for each of these.
+/// A table with a row for each item.
 pub fn list(title: &str, items: &[impl Serialize]) -> Table {
     let objects: Vec<_> = items
         .iter()

@@ -97,7 +97,7 @@ impl<A: FrameSampler> Acquisition<A> {
             return Err(AdcError::NotReady { ready, read });
         }
         let sampled = self.converter.sample(sequence, time_us);
-        // The next samples would be wrong, and a part can tell of it only once.
+        // The next samples would be wrong, and a part can report it only once.
         if let Err(AdcError::WrongSetting { .. }) = sampled {
             self.faults_in_a_row = RESTART_TICKS;
         }
@@ -121,7 +121,7 @@ mod tests {
     struct Fake {
         broken: bool,
         set_up: bool,
-        /// Tells once that a setting is lost.
+        /// Reports once that a setting is lost.
         loses_setting: bool,
         code: i32,
     }

@@ -115,7 +115,7 @@ pub fn rezero_limits() -> ZeroOffsetSettings {
 const TEXT_BYTES: usize = 32;
 
 /// What differs from stage to stage. In `.data`, which the program's hash leaves out: programs that
-/// differ in nothing else have the same, and it tells nothing of the key.
+/// differ in nothing else have the same, and it says nothing about the key.
 struct Stage {
     /// Filled up with zeros.
     serial: [u8; TEXT_BYTES],

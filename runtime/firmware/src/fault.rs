@@ -1,5 +1,5 @@
 //! What is done on a fault: it is noted in RAM that a reset leaves alone, and the core is reset.
-//! The next start tells it, see [`firmware::retained`].
+//! The next start reports it, see [`firmware::retained`].
 
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;

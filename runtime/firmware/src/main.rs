@@ -12,7 +12,7 @@
 //! - Only a tick that was done before the next one was due feeds the watchdog. Faults of
 //!   sensors, parameters and bus are reported and do not cause a reset.
 //! - A panic, a fault of the core, a stack that overflows and a crystal that stops are noted in
-//!   RAM that a reset leaves alone, and reset. The next start tells them. No tick can reach a
+//!   RAM that a reset leaves alone, and reset. The next start reports them. No tick can reach a
 //!   panic: those that the linker keeps are in the HAL's set-up of the clocks.
 #![no_std]
 #![no_main]
@@ -259,7 +259,7 @@ mod app {
             .acquisition
             .sample(tick.sequence, sampled_us, &mut Cycles);
         bus.start_tick();
-        // What tells of it has left, or nobody listens.
+        // The frames that announce it have left, or nobody listens.
         let is_silent = bus.is_idle() || *local.silence_waits > SILENCE_TICKS_MAX;
         let waits = local.node.wants_reset() || local.node.is_storing();
         *local.silence_waits = if waits { *local.silence_waits + 1 } else { 0 };

@@ -31,7 +31,7 @@ const NOTHING: Reading = Reading {
     status: Status::PLANAR_INVALID.with(Status::VERTICAL_INVALID),
 };
 
-/// What the rest of the program and the board tell the node in each tick.
+/// What the rest of the program and the board give the node in each tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Facts {
     /// Ticks that came late or not at all.

@@ -148,7 +148,7 @@ impl<F: Flash> Records<F> {
         Some(loaded)
     }
 
-    /// Of these blobs the one with the highest sequence number; of two equal ones that in slot 0.
+    /// Of the blobs that are meant the one with the highest sequence number; of two equal ones that in slot 0.
     fn latest(&self, is_meant: impl Fn(&Stored) -> bool) -> Option<Stored> {
         let stored = self.stored.iter().rev().flatten().copied();
         stored.filter(is_meant).max_by_key(|stored| stored.sequence)

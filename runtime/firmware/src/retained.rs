@@ -197,7 +197,7 @@ impl Retained {
         [a, b, c, d, e, f, g, h, i, check(&content)]
     }
 
-    /// The record of these words, if its check is right.
+    /// The record in the words, if its check is right.
     pub fn from_words(words: &[u32; WORDS]) -> Option<Self> {
         let [content @ .., stored] = words;
         let [state, kind_and_step, address, detail, rest @ ..] = *content;

@@ -59,7 +59,7 @@ pub fn clocks(before: &Before, rcc: RCC, stopwatch: &mut Stopwatch) -> (Rcc, boo
     (rcc, crystal)
 }
 
-/// What the health frames tell of the board and of the last fault; `checks` are the bits of
+/// What the health frames report of the board and the last fault; `checks` are the bits of
 /// [`board_check`] that are known besides those of `option_bytes`, the word FLASH_OPTCR.
 pub const fn board_facts(before: &Before, option_bytes: u32, checks: u32) -> BoardFacts {
     let low = bit(

@@ -100,7 +100,7 @@ mod tests {
     use super::*;
     use crate::retained::Step;
 
-    /// A run of these parameters that ended with a fault, or a reset without one.
+    /// A run with the parameters that ended with a fault, or a reset without one.
     fn run(crc: u32, fault: Option<FaultKind>) -> Retained {
         let mut record = Retained {
             running: crc,

@@ -140,8 +140,8 @@ impl<T: Real> FieldProbe<T> {
         }
     }
 
-    /// r: the displacement along the probe's axis as far as the signal and the vertical pose
-    /// tell it, s / phi - E V, less the terms of p that depend on the height alone.
+    /// r: the displacement along the probe's axis that follows from the signal and the vertical
+    /// pose, s / phi - E V, less the terms of p that depend on the height alone.
     #[inline(always)]
     fn first_displacement(&self, ratio: T, zr: T, vertical: &VerticalPose<T>) -> T {
         let [e_z, e_rx, e_ry] = self.carry;

@@ -1,4 +1,4 @@
-//! bxCAN, as far as the controller uses it, from RM0090 section 32: three mailboxes, one receive
+//! The parts of bxCAN that the controller uses, from RM0090 section 32: three mailboxes, one receive
 //! store, bus states.
 
 use crate::can_identifier::{EXTENDED, bits_of, of_the_table};

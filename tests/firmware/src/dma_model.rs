@@ -1,4 +1,4 @@
-//! DMA2 of an STM32F405 (RM0090 rev. 18, section 10), as far as it serves SPI1: bytes between memory and
+//! DMA2 of an STM32F405 (RM0090 rev. 18, section 10) where it serves SPI1: bytes between memory and
 //! the data register, in direct mode.
 
 use crate::image::{RAM, RAM_BYTES};

@@ -1,4 +1,4 @@
-//! Flash of the STM32F405 as far as the program writes it: sectors 1 and 2, from RM0090 section 3.
+//! Flash of the STM32F405 where the program writes it: sectors 1 and 2, from RM0090 section 3.
 //! FLASH_CR opens by two keys; a word is programmed by letting bits fall, and only the erase of
 //! a sector raises them. While the flash is busy the core stands, because the program lies in
 //! it. A power cut in an operation leaves random bits between what was and what was to be.

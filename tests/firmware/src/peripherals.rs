@@ -1,4 +1,4 @@
-//! The peripherals of an STM32F405, as far as the program uses them. Time is that of the bench:
+//! The peripherals of an STM32F405 that the program uses. Time is that of the bench:
 //! it passes between interrupts and while bytes cross the SPI; instructions take time where they are
 //! counted, and else none.
 

@@ -246,7 +246,7 @@ fn what_is_refused_is_refused_by_its_reason_and_nothing_is_written() {
         assert_eq!(world.update(&plan), Err(want));
         assert_eq!(world.node.records(), 0);
     }
-    // A node that tells no serial number is not taken for the one that was asked for.
+    // A node without a serial number is not taken for the one that was asked for.
     let mut world = World::new(None, &[], 3);
     world.node = Node::new(None, None, FlashModel::erased(), 3);
     let expected = SERIAL.to_owned();

@@ -176,7 +176,7 @@ fn a_second_host_is_refused_as_busy_until_the_first_is_done_or_silent() {
 }
 
 /// Whoever recorded a transfer that was never stored has a blob, a tag and a number that are still
-/// due. Only the nonce tells them from an answer to this challenge.
+/// due. Only the nonce distinguishes them from an answer to this challenge.
 #[test]
 fn each_tag_asks_for_a_new_nonce_and_a_recorded_tag_answers_none() {
     let mut bench = Bench::new(Some(KEY));
@@ -189,7 +189,7 @@ fn each_tag_asks_for_a_new_nonce_and_a_recorded_tag_answers_none() {
         assert!(!nonces.contains(&nonce));
         nonces.push(nonce);
         bench.blob(token, NEW);
-        // One token for all: only the number tells them apart.
+        // One token for all: only the number distinguishes them.
         let own = tag(&KEY, &nonce, &committing(4, token), NEW, NEW_CRC);
         bench.tag(token, *recorded.get_or_insert(own));
         // The first tag would be right: it is kept, and never used.

@@ -90,7 +90,7 @@ impl<'s> Receiver<'s> {
         self.wants_reset
     }
 
-    /// Whether [`Receiver::store`] is to be called, once what tells of it has left.
+    /// Whether [`Receiver::store`] is to be called, once the frames that announce it have left.
     pub const fn is_storing(&self) -> bool {
         matches!(&self.transfer, Some(transfer) if transfer.commit.is_some())
     }

@@ -13,9 +13,9 @@ pub struct Running<'r> {
     pub bytes: u32,
     /// Whether the fit was refused and written all the same.
     pub is_forced: bool,
-    /// Serial number of its stage, as the blob tells.
+    /// Serial number of its stage, as the blob says.
     pub serial: &'r str,
-    /// When it was made, as the blob tells.
+    /// When it was made, as the blob says.
     pub created: &'r str,
     /// rms error of X, Y, Rz of its fit: m, m, rad.
     pub rms: [f32; 3],

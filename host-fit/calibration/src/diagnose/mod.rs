@@ -9,7 +9,7 @@
 //! | `left_out` | rows that a fit left out of account |
 //! | `short_movements` | movements whose zero deviations take their errors |
 //! | [`of_fit`] | what a fit says of itself |
-//! | [`signals`] | what the signals tell by themselves |
+//! | [`signals`] | what the signals show by themselves |
 //! | `slopes` | how an error of each channel shows in the Hall signals |
 //! | [`trusted`] | the inputs that no log can show to be wrong |
 //!
@@ -60,9 +60,9 @@ use std::borrow::Cow;
 pub struct Diagnosis {
     /// What is wrong, the most severe first.
     pub findings: Vec<Finding>,
-    /// Whether the calibration can be used; `None` where a log does not tell that of a blob.
+    /// Whether the calibration can be used; `None` where a log cannot show that for a blob.
     pub verdict: Option<Verdict>,
-    /// The errors that it has to expect at work; `None` where the log is too short or too still to tell.
+    /// The errors that it has to expect at work; `None` where the log is too short or too still to show them.
     pub predicted: Option<Predicted>,
     /// The parameters without the faults of the log, for which the verdict is: see [`Fit::repaired`].
     pub repair: Option<Repair>,

@@ -28,7 +28,7 @@ pub fn fit_compensated(
     let mut total_s = 0.0;
     let mut at = dataset.clone();
     let mut found = match fit(&at, stage, settings) {
-        // A lag of many rows is more than the field model's fit can follow: Model (31) tells it first.
+        // A lag of many rows is more than the field model's fit can follow: Model (31) finds it first.
         Err(FitError::Field(_)) => {
             let model = ModelChoice::Named(Model::of(ModelKind::M31));
             fit(

@@ -16,7 +16,7 @@ pub enum Split {
     /// Whole movements, every fifth.
     Movements,
     /// Fifths of each movement, one after the other: where one of the movements holds a fifth of the rows
-    /// or more, and may be all that tells some parameters.
+    /// or more, and may be all that determines some parameters.
     Time,
 }
 

@@ -150,7 +150,7 @@ impl<'s> Judge<'s> {
         });
     }
 
-    /// Tells the rows of a run that are far off from the others.
+    /// Separates the rows of a run that are far off.
     fn end_run(&mut self) {
         let far = far_off(&self.run, self.limit);
         let mut block = Block::default();

@@ -10,7 +10,7 @@ use crate::solve::field::parameters::{FALL_PER_M, FieldParameters};
 use crate::solve::field::whiten::Noise;
 use runtime::model::Sensitivity;
 
-/// The stage as far as it is known before it is calibrated: probes at their designed places with
+/// The stage as it is known before it is calibrated: probes at their designed places with
 /// sensitivities in the middle of the search range, over magnets on whose centre lines they sit.
 fn designed(stage: &Stage) -> FieldParameters {
     let geometry = stage.geometry();
@@ -32,7 +32,7 @@ fn designed(stage: &Stage) -> FieldParameters {
 }
 
 /// What is known of a stage before it is calibrated: as designed, with the noise of the given
-/// logs. `None` where its probes can't tell a pose of its service.
+/// logs. `None` where its probes don't determine a pose of its service.
 pub fn forecaster(stage: &Stage) -> Option<Forecaster> {
     let sensors = SensorErrors::USUAL;
     let noise = Noise {

@@ -48,7 +48,7 @@ pub struct Plan {
 /// Why there is no plan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// An axis can't move as far as it should within its limits.
+    /// An axis can't reach its amplitude within its limits.
     #[error(
         "a run of {seconds} s can't move {axis} by {:.1} {} to both sides within the limits of its speed and \
          acceleration; make the run longer, or change amplitude or limits in [motion] of stage.toml",
@@ -71,9 +71,9 @@ pub enum PlanError {
         /// The length, s.
         seconds: f64,
     },
-    /// The designed probes can't tell a pose of the service.
+    /// The designed probes don't determine a pose of the service.
     #[error(
-        "the probes as designed can't tell every pose of the service apart; correct [hall] or the range of service in \
+        "the probes as designed don't determine every pose of the service; correct [hall] or the range of service in \
          [motion] of stage.toml"
     )]
     NoPose,
@@ -157,7 +157,7 @@ fn remedy(stage: &Stage, run: &Run) -> String {
     } else {
         let axes = short.join(", ");
         format!(
-            "move {axes} as far as in service: raise the amplitude in [motion] of stage.toml, or make the run longer"
+            "move {axes} over their whole range of service: raise the amplitude in [motion] of stage.toml, or make the run longer"
         )
     }
 }

@@ -151,11 +151,11 @@ fn what_cannot_identify_the_model_is_refused_with_a_remedy() {
     still.amplitudes[3] = 0.0;
     says(
         &still,
-        &["move z as far as in service", "times the noise floor"],
+        &["move z over their whole", "times the noise floor"],
     );
     let mut small = PLAN.run;
     small.amplitudes = small.amplitudes.map(|amplitude| 0.5 * amplitude);
-    says(&small, &["move x, y, rz, z, rx, ry as far as in service"]);
+    says(&small, &["move x, y, rz, z, rx, ry over their whole"]);
     let short = Run {
         seconds: 4.0,
         cycles: [2.5, 4.0, 3.0, 3.5, 2.0, 1.5],

@@ -151,7 +151,7 @@ pub struct Dataset {
     pub logs: Vec<LogSource>,
     /// SHA-256 of the decompressed logs, one after the other.
     pub sha256: [u8; 32],
-    /// How sensitivities follow temperature, as far as [`Row::signal_m`] has it taken out.
+    /// How sensitivities follow temperature: what [`Row::signal_m`] is corrected for.
     pub temperature: Temperature<f64>,
 }
 

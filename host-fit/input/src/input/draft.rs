@@ -1,5 +1,5 @@
-//! A draft of `stage.toml` for logs as they are: their columns mapped, as far as names and units
-//! tell, and everything else as lines to fill in.
+//! A draft of `stage.toml` for logs as they are: their columns mapped where names and units
+//! are clear, and everything else as lines to fill in.
 //!
 //! A line to fill in is a comment until the user writes its value, so a draft that is not finished
 //! lacks a key, and is refused.
@@ -19,7 +19,7 @@ use std::path::Path;
 
 /// What stands before a line to fill in.
 pub const MARK: &str = "# FILL IN: ";
-/// So many rows of a log tell its period and its codes.
+/// So many rows of a log show its period and its codes.
 const ROWS_MAX: usize = 10_000;
 /// Where the comments of the drafted lines begin.
 const COMMENT_COLUMN: usize = 60;

@@ -5,7 +5,7 @@ use std::ops::Range;
 /// The first bytes of UTF-16, and whether the low byte of a character comes first.
 const MARKS: [([u8; 2], bool); 2] = [([0xff, 0xfe], true), ([0xfe, 0xff], false)];
 
-/// Without such a mark: so many characters of Latin-1 at the start tell UTF-16 from binary data.
+/// Without such a mark: so many characters of Latin-1 at the start distinguish UTF-16 from binary data.
 const PROBE_CHARACTERS: usize = 8;
 
 /// The order of the bytes of UTF-16, and how many bytes its mark has; `None` for other text.
@@ -46,7 +46,7 @@ impl Utf16 {
         Some((decoder, mark))
     }
 
-    /// Appends the next piece to `text` as UTF-8; `is_last` tells that nothing follows.
+    /// Appends the next piece to `text` as UTF-8; `is_last`: nothing follows.
     ///
     /// # Errors
     /// The first bytes that are no character, from 0.

@@ -14,7 +14,7 @@ use std::ops::Range;
 
 /// Rows of a run: a second, as long as the period of the paper's motions.
 const RUN: usize = 500;
-/// Rows of a run that are looked at to tell whether it moves, about.
+/// Rows of a run that are looked at for whether it moves, about.
 const LOOKED_AT: usize = 50;
 /// A run in which X, Y and Z move less, m, and Rz, Rx and Ry, rad, stands still.
 const IDLE_M: f64 = 2e-6;
@@ -38,7 +38,7 @@ struct Run {
     stands_still: bool,
 }
 
-/// A log as far as it was read.
+/// A log while it is read.
 #[derive(Debug)]
 struct Log {
     /// Runs at places below this are kept.
@@ -116,7 +116,7 @@ impl Sampler {
                 index,
                 begins,
                 rows: self.rows.len()..self.rows.len(),
-                // Kept until its end, which tells.
+                // Decided at its end.
                 place: 0.0,
                 stands_still: false,
             });
@@ -135,7 +135,7 @@ impl Sampler {
         }
     }
 
-    /// The log is over. Tells which one before it had the same rows.
+    /// The log is over. Gives the one before it with the same rows, if any.
     pub(super) fn end_log(&mut self, mut source: LogSource) -> Option<&LogSource> {
         self.end_run();
         let (last, earlier) = self.logs.split_last()?;
@@ -253,7 +253,7 @@ impl Sampler {
     }
 }
 
-/// Whether the stage moves in any of the six axes from one of these rows to another.
+/// Whether the stage moves in any of the six axes between any two of the rows.
 fn moves(rows: &[Row]) -> bool {
     const IDLE: [f64; 6] = [IDLE_M, IDLE_M, IDLE_RAD, IDLE_M, IDLE_RAD, IDLE_RAD];
     let (mut low, mut high) = ([f64::INFINITY; 6], [f64::NEG_INFINITY; 6]);

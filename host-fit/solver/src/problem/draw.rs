@@ -71,7 +71,7 @@ mod tests {
     use crate::input::shipped::STAGE_TOML;
     use crate::input::stage::Stage;
 
-    /// A log of movements of these sizes; a draw looks at nothing else of it.
+    /// A log with movements of the sizes given: a draw looks at nothing else.
     fn log(sizes: &[usize]) -> Dataset {
         let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
         let truth = crate::problem::parameters::Parameters::designed(&stage);

@@ -1,4 +1,4 @@
-//! The models as a fit sees them: which terms they have and which of these are fitted.
+//! The models as a fit sees them: which terms they have and which are fitted.
 
 use super::terms::{MODEL_31, Motion, Term};
 use crate::input::stage::Stage;

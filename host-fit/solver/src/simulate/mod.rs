@@ -10,7 +10,7 @@
 //! | [`assembly`] | a stage with drawn tolerances |
 //! | [`protocol`], [`plan_file`] | how it moves |
 //! | [`sensors`] | noise, drift, resets, converters, beams |
-//! | [`recording`] | all of these in a row: the log, in memory |
+//! | [`recording`] | all steps in a row: the log, in memory |
 //! | [`log_text`] | the log and the truth as CSV |
 //! | [`random`] | numbers that are the same on every machine |
 //!

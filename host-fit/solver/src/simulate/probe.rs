@@ -14,7 +14,7 @@ use nalgebra::{Matrix3, Vector3};
 /// Half the edges of the designed magnet, 12.7 x 6.4 x 6.4 mm (section 2 of the paper), m.
 pub const MAGNET_HALF_M: Vector3<f64> = Vector3::new(6.35e-3, 3.2e-3, 3.2e-3);
 
-/// Distance of the designed probe from the magnet's upper face, m. The paper does not tell it;
+/// Distance of the designed probe from the magnet's upper face, m. The paper does not give it;
 /// with 4.0 mm the slope falls with height as in the given logs, by 215 to 237 per m at
 /// sensitivities of 0.93 to 0.67.
 pub const DESIGNED_GAP_M: f64 = 4.0e-3;

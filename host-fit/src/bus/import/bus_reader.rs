@@ -70,7 +70,7 @@ pub(super) fn read(
 /// Ticks of a record, at least: a quarter of a second.
 const TICKS_MIN: usize = 125;
 
-/// A record of the bus as far as it is read.
+/// A record of the bus while it is read.
 struct BusReader<'s> {
     settings: &'s ImportSettings,
     stage: &'s Stage,

@@ -144,7 +144,7 @@ pub enum ImportError {
         /// The largest difference that is looked for, parts in a million.
         most_ppm: f64,
     },
-    /// The record is too short, or holds too little motion, to tell the offset, or its axes move at one
+    /// The record is too short, or holds too little motion, to find the offset, or its axes move at one
     /// frequency: then a shift in time looks like a rotation.
     #[error(
         "the offset between the clocks is uncertain: its standard error is {standard_error_us:.0} us, more than {most_us:.0} us (a \

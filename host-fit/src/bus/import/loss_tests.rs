@@ -10,7 +10,7 @@ fn sampled_us(n: u32) -> f64 {
     2_000.0 * f64::from(n) + 300.0
 }
 
-/// A record in which the capacitive codes tell each tick's number. `received_us` says when a frame
+/// A record in which the capacitive codes are each tick's number. `received_us` says when a frame
 /// of a tick was received, us on the clock of the reference, if it was.
 fn candump(received_us: impl Fn(u32, &Coded) -> Option<f64>) -> String {
     let codes = |n| (hall(sampled_us(n)), [n as i32 + 1; 3], n + 5, 2_000 * n);
@@ -80,7 +80,7 @@ fn a_record_without_time_frames_and_one_of_a_tenth_of_a_second_are_refused() {
     }
 }
 
-/// The sensor node's clock tells when its codes were sampled, not the recorder's.
+/// The sensor node's clock says when its codes were sampled, not the recorder's.
 #[test]
 fn a_recorder_whose_clock_is_set_shifts_no_row() {
     for step_us in [50_000.0, 3e6, -1_500_000.0] {

@@ -3,12 +3,12 @@
 //! One tick in 16 has a time frame with its number and time; the others have the last four bits of
 //! their number. Between two time frames that follow each other in number and time every tick that
 //! came has its place. Ticks beside a time frame that is missing, or out of order, are left out: 16
-//! ticks may be lost there unseen, and receive times do not tell.
+//! ticks may be lost there unseen, and receive times do not show it.
 
 use super::bus_log::BusTick;
 use hal_adapters::can::sensor::TickTime;
 
-/// Numbers that a time frame can tell.
+/// Numbers that a time frame distinguishes.
 const NUMBERS: u32 = 1 << 20;
 
 /// Ticks from one time frame to the next.
@@ -20,7 +20,7 @@ const MISSED_MAX_US: f64 = 1e6;
 /// How far the node's clock and the designed servo period may differ, as a part of one.
 const CLOCK_SHARE: f64 = 1e-3;
 
-/// Ticks of which the first to arrive tells how far the recorder's clock is from the node's: half a
+/// Ticks of which the first to arrive shows how far the recorder's clock is from the node's: half a
 /// second at 500 Hz.
 const BLOCK_TICKS: usize = 250;
 
@@ -188,7 +188,7 @@ impl NodeClock {
 mod tests {
     use super::*;
 
-    /// Ticks tell their own number, from 1, by their code.
+    /// Ticks carry their own number, from 1, by their code.
     fn tick(n: u32) -> BusTick {
         BusTick {
             counter: (n % TICKS) as u8,

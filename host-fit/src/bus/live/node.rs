@@ -55,7 +55,7 @@ const NO_FRAMES: Status = Status::PLANAR_INVALID
     .with(Status::FRAMES_MISSED);
 
 impl<'d> Node<'d> {
-    /// A node that has seen nothing; `serial` is what it tells when asked who it is.
+    /// A node that has seen nothing; `serial` is its answer when asked who it is.
     pub fn new(decoder: AnyDecoder, serial: &'d str, settings: &NodeSettings) -> Self {
         Self {
             receiver: SensorReceiver::new(settings.layout, settings.timing),

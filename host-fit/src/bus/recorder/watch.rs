@@ -5,7 +5,7 @@ use hal_adapters::can::command::{Content, Mailbox};
 use hal_adapters::can::status::{NodeState, NodeStatus};
 use hal_adapters::can::{Layout, StampedFrame};
 
-/// Watches the frames that are recorded: ticks of codes, and what the controller tells.
+/// Watches the frames that are recorded: ticks of codes, and what the controller says.
 #[derive(Clone, Debug, Default)]
 pub struct Watch {
     collector: Collector,
@@ -20,7 +20,7 @@ pub struct Watch {
 const SILENT_US: u64 = 1_000_000;
 
 impl Watch {
-    /// Takes a frame; gives what it tells, other than codes and poses.
+    /// Takes a frame; gives what it says, other than codes and poses.
     pub fn take(&mut self, stamped: &StampedFrame) {
         let before = self.counts().ticks;
         self.collector.take(stamped);
@@ -57,7 +57,7 @@ impl Watch {
     /// What the controller says of itself.
     pub fn state(&self) -> String {
         let Some(status) = self.status else {
-            return "it does not tell its state".to_owned();
+            return "it does not say its state".to_owned();
         };
         let reason = status.reason;
         match status.state {
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn the_state_is_that_of_the_last_status() {
         let (mut watch, mut node) = (Watch::default(), Mailbox::default());
-        assert_eq!(watch.state(), "it does not tell its state");
+        assert_eq!(watch.state(), "it does not say its state");
         let status = Content::Status(NodeStatus {
             state: Some(NodeState::NoFrames),
             reason: 3,

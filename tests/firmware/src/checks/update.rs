@@ -122,7 +122,7 @@ pub(super) fn update(
     talk(machine, |talk| on::update(talk, plan, &mut |_, _| {}))
 }
 
-/// What the controller tells of itself.
+/// What the controller says about itself.
 pub(super) fn identity(machine: &mut Machine) -> Result<Identity, Failure> {
     let (identity, _) = talk(machine, |talk| {
         let identity = on::identify(talk)?;

@@ -236,7 +236,7 @@ pub(super) fn split(log: &Log, estimate: &Estimate) -> Option<Split> {
         let followed = solve_all(&common, &of_second);
         let mut information = &of_second - &of_second * followed;
         for k in 0..UNKNOWNS {
-            // What rounding leaves of directions that neither part shows.
+            // Against rounding, in directions that neither part determines.
             information[(k, k)] += usual(k) + 1e-6 * of_second[(k, k)];
         }
         let Some(factor) = Factor::new(&information, 0.0) else {

@@ -1,4 +1,4 @@
-//! What the signals of a log tell by themselves, whatever model is fitted: missing and uneven
+//! What the signals of a log show by themselves, whatever model is fitted: missing and uneven
 //! rows, sensors that stand still or saturate, jumps, lines in the spectrum.
 //!
 //! | module | what it does |
@@ -8,7 +8,7 @@
 //! | `repeats` | channels that repeat one value: flat tops, frozen registers |
 //! | `still` | movements that stand still, or end in a rest |
 //! | `standing` | channels that show no more than their noise |
-//! | `residual` | what a calibration leaves of the Hall signals, and the channel that explains it |
+//! | `residual` | residuals of the Hall signals, and the channel that explains them |
 //! | `outliers` | rows that jump |
 //! | `spectrum`, `hum` | lines of one frequency |
 //!

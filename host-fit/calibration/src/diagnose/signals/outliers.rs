@@ -11,7 +11,7 @@ use std::ops::Range;
 /// Deviation of an outlier, in standard deviations of such deviations. The largest of a million
 /// rows of noise is at 5.
 const OUTLIER_MIN: f64 = 7.0;
-/// Rows on each side that tell where a row should be.
+/// Rows on each side that show where a row should be.
 const SIDE: usize = 12;
 
 /// Names rows far outside the noise, by channel, and leaves them out.

@@ -1,4 +1,4 @@
-//! What a calibration leaves of the Hall signals, and the channel whose error explains it.
+//! Residuals of the Hall signals, and the channel whose error explains them.
 
 use super::channels::{LogSignals, median, robust_deviation};
 use crate::diagnose::slopes::Slopes;

@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Bins on each side that tell the level of the noise.
+/// Bins on each side that give the level of the noise.
 const SIDE: usize = 20;
 /// How far outside the noise a line is, in standard deviations of a normal number.
 const LINE_MIN: f64 = 6.5;
@@ -164,7 +164,7 @@ impl Spectrum {
             .unwrap_or(0)
     }
 
-    /// Cycles per row of a line at a bin: the ratio of two neighbouring bins of a Hann spectrum tells
+    /// Cycles per row of a line at a bin: the ratio of two neighbouring bins of a Hann spectrum gives
     /// where between them it is.
     pub(super) fn cycles_per_row(&self, bin: usize) -> f64 {
         let level = self.level(bin);

@@ -55,7 +55,7 @@ pub(super) fn rests(log: &mut LogSignals) -> Vec<Finding> {
     if let Some(first) = idle.first() {
         let starts: Vec<usize> = idle.iter().map(|rows| rows.start).collect();
         let message = format!(
-            "nothing moves in {} of {movements} movements ({}): they tell the fit nothing; leave them out or record \
+            "nothing moves in {} of {movements} movements ({}): they add nothing to the fit; leave them out or record \
              them again",
             idle.len(),
             log.places(&starts),

@@ -14,7 +14,7 @@ const THINNED_FROM: f64 = 5.0;
 /// Share of missing rows from which they are worth a warning.
 const MISSING_MIN: f64 = 1e-3;
 
-/// What the times of rows tell.
+/// What the times of rows show.
 pub(super) fn timing(log: &LogSignals, stage: &Stage) -> impl Iterator<Item = Finding> {
     let found = [missing(log), uneven(log), other_rate(log, stage)];
     found.into_iter().flatten()

@@ -195,7 +195,7 @@ impl<'a> Header<'a> {
         self.sources[quantity as usize]
     }
 
-    /// The cells of these quantities, or an error that names the first missing one.
+    /// The cells of the quantities, or an error that names the first missing one.
     pub fn all<const N: usize>(&self, quantities: [Quantity; N]) -> Result<[Source; N], LogError> {
         let mut sources = [Source {
             cell: 0,

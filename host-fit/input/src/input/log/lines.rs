@@ -10,7 +10,7 @@ const PIECE_BYTES: usize = 128 * 1024;
 /// Longest line. What is longer is damaged or hostile.
 pub(crate) const LINE_BYTES_MAX: usize = 1 << 20;
 
-/// How far a text is looked at to tell what its table is like.
+/// How much of a text is read to find out the form of its table.
 pub(crate) const OPENING_BYTES: usize = 1 << 20;
 
 /// The lines of a text, one after the other; they end in LF, CRLF or CR.

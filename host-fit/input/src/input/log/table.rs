@@ -178,7 +178,7 @@ impl<'a> Table<'a> {
     }
 
     /// The median time between the rows that follow in one movement, us, by the next mebibyte of the
-    /// text; `None` if that does not tell.
+    /// text; `None` if that does not show it.
     ///
     /// # Errors
     /// Those of reading, `LineTooLong`.

@@ -10,7 +10,7 @@ pub(super) fn single_rows(path: &Path, first: i64, movements: usize) -> Finding 
         several => format!(" (as have {} more)", several - 1),
     };
     let message = format!(
-        "{}: movement {first} has one row{others}, which tells the fit nothing: its zero deviation fits it exactly; check the \
+        "{}: movement {first} has one row{others}, which adds nothing to the fit: its zero deviation fits it exactly; check the \
          movement column",
         path.display()
     );
@@ -26,7 +26,7 @@ pub(super) fn file_cut(path: &Path, line: usize) -> Finding {
     Finding::new(Code::FileCut, message)
 }
 
-/// A log has no column for the movement: its times tell where movements begin.
+/// A log has no column for the movement: gaps in its times separate them.
 pub(super) fn by_time(path: &Path, movements: usize, split_s: Option<f64>) -> Finding {
     let every = split_s.map_or(String::new(), |seconds| format!("every {seconds} s, "));
     let message = format!(

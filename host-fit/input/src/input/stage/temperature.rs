@@ -96,7 +96,7 @@ pub(super) fn temperature(document: &Document<'_>) -> Result<TemperatureTable, S
     Ok(out)
 }
 
-/// What one of these names stands for.
+/// What such a name stands for.
 fn named(
     document: &Document<'_>,
     key: &str,

@@ -1,7 +1,7 @@
 //! Rows of a log in mm and mrad, and short blocks of them.
 //!
 //! Neighbouring rows see nearly the same pose: the mean of a few rows' residuals and derivatives
-//! holds what they tell of the parameters, and is a tenth of the work for all that follows. No
+//! holds their information on the parameters, and is a tenth of the work for all that follows. No
 //! bias comes of it, for residuals and derivatives are those of each row.
 
 use super::probe::{Probe, Reading};
@@ -78,7 +78,7 @@ impl Rows {
         Self::weighted(dataset, selected, &vec![1.0; selected.len()])
     }
 
-    /// The same with weights. A row without is left out; one below half tells nothing of its
+    /// The same with weights. A row without is left out; one below half says nothing about its
     /// neighbours' rates.
     pub fn weighted(dataset: &Dataset, selected: &[usize], weights: &[f64]) -> Self {
         let mut trusted = vec![true; dataset.rows.len()];

@@ -12,7 +12,7 @@ use runtime::VerticalPose;
 /// Poses over which service is averaged.
 const POSES: usize = 256;
 /// Systematic errors above this part of the noise (variances) are too large, whatever Model (31)
-/// seems to have: a log that determines so little can't tell that either.
+/// seems to have: a log that determines so little can't show that either.
 const SYSTEMATIC_MAX: f64 = 1.0;
 /// Systematic errors below this part of the noise (variances) are rounding: one per cent of the
 /// noise floor.
@@ -37,7 +37,7 @@ pub struct Service {
     by_parameters: [Vec<[f64; COUNT]>; 3],
     /// Of X, Y, Rz: variance by the noise of the probes.
     by_noise: [f64; 3],
-    /// By what the form leaves of their readings.
+    /// By the errors of their form.
     by_form: [f64; 3],
 }
 
@@ -145,7 +145,7 @@ pub struct Verdict {
 impl ServiceVariance {
     /// Of the field model with this posterior, and of another one ((31), or an old one), over
     /// X, Y, Rz and Z, Rx, Ry of the largest magnitudes `ranges` (m, rad). Infinite where the
-    /// probes cannot tell the pose.
+    /// probes do not determine the pose.
     pub fn new(
         parameters: &FieldParameters,
         posterior: &Posterior,
@@ -179,7 +179,7 @@ impl ServiceVariance {
         })
     }
 
-    /// Errors of Model (31) in service over the noise floor, as far as the field model knows.
+    /// Errors of Model (31) in service over the noise floor, by the field model.
     pub fn ratios_31(&self) -> [f64; 3] {
         [0, 1, 2].map(|k| (1.0 + self.difference[k] / self.noise[k]).sqrt())
     }
@@ -258,7 +258,7 @@ impl std::fmt::Display for Verdict {
     }
 }
 
-/// Poses (X, Y, Rz and Z, Rx, Ry) spread evenly in the box of these largest magnitudes.
+/// Poses (X, Y, Rz and Z, Rx, Ry) spread evenly in the box of the largest magnitudes given.
 pub fn service_poses(
     (planar_range, vertical_range): ([f64; 3], [f64; 3]),
 ) -> impl ExactSizeIterator<Item = ([f64; 3], [f64; 3])> {

@@ -106,7 +106,7 @@ pub struct FieldFit {
     pub iterations: u32,
 }
 
-/// -2 times the log-posterior is the sum of these, but for a constant.
+/// -2 times the log-posterior is their sum, but for a constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Score {
     /// Sum of squares of the whitened residuals of the blocks: about three times their number.

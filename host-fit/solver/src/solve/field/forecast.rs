@@ -1,4 +1,4 @@
-//! What a log that is not recorded yet will tell: its posterior does not depend on the residuals.
+//! The posterior of a log that is not recorded yet: it does not depend on the residuals.
 
 use super::blocks::Rows;
 use super::carry::{Service, ServiceVariance, service_poses};
@@ -25,9 +25,9 @@ pub struct Forecaster {
 }
 
 impl Forecaster {
-    /// For a stage of these parameters, of which E = p = 0, under this noise, in service within X,
-    /// Y, Rz and Z, Rx, Ry of these largest magnitudes (m, rad); `None` where its probes can't tell
-    /// a pose there.
+    /// For a stage of these parameters, of which E = p = 0, under this noise, in service within the
+    /// largest magnitudes of X, Y, Rz and Z, Rx, Ry given (m, rad); `None` where its probes don't
+    /// determine a pose there.
     pub fn new(
         parameters: &FieldParameters,
         noise: &Noise,

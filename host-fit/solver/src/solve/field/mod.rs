@@ -1,4 +1,4 @@
-//! The field model: maximum a posteriori of its 81 parameters, and what a log tells of them.
+//! The field model: maximum a posteriori of its 81 parameters, and their uncertainty.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -12,7 +12,7 @@
 //! | [`posterior`] | covariance of parameters and of a pose |
 //! | [`carry`] | whether the log can carry the model |
 //! | [`clocks`] | two clocks, from the motion that both saw |
-//! | [`forecast`] | what a log that is not recorded yet will tell |
+//! | [`forecast`] | the posterior of a log that is not recorded yet |
 //! | [`update`] | a few seconds of log on top of an old posterior |
 
 pub mod blocks;

@@ -197,7 +197,7 @@ fn powi(x: f64, n: i32) -> f64 {
 }
 
 /// Where a probe stands, (x, y), m, and the derivatives of x by (a, c) and of y by (a, b). The
-/// vertical terms tell it: phi follows the height at the probe, a (Z + y Rx - x Ry), so that x = -c/a
+/// vertical terms determine it: phi follows the height at the probe, a (Z + y Rx - x Ry), so that x = -c/a
 /// and y = b/a; where a is small the drawing does.
 pub(super) fn place(values: &[f64; PER_PROBE], designed: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
     let [a, b, c] = [values[SLOPES], values[SLOPES + 1], values[SLOPES + 2]];

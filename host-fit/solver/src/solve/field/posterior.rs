@@ -1,4 +1,4 @@
-//! What the log tells of the parameters, and what that means for a pose.
+//! The posterior of the parameters, and the uncertainty of a pose that follows from it.
 
 use super::parameters::FieldParameters;
 use super::probe::{Probe, probes};
@@ -8,8 +8,8 @@ use crate::problem::model;
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen};
 use runtime::geometry::inverse_rows;
 
-/// What the form leaves of a probe's reading in service, rms, mm: mean over simulated stages, each
-/// fitted to 30 s without noise and drift, which leave 16 to 46 nm.
+/// Error of a probe's reading in service by the form of the model, rms, mm: mean over simulated stages,
+/// each fitted to 30 s without noise and drift; 16 to 46 nm.
 pub const FORM_MM: f64 = 25e-6;
 
 /// The posterior of a fit: normal, with the parameters as its mean.
@@ -51,8 +51,8 @@ pub(super) struct PoseErrors {
 }
 
 impl PoseErrors {
-    /// At the pose `planar` (m, m, rad), `vertical` (m, rad, rad); `None` where the probes can't
-    /// tell it.
+    /// At the pose `planar` (m, m, rad), `vertical` (m, rad, rad); `None` where the probes don't
+    /// determine it.
     pub(super) fn new(probes: &[Probe; 3], planar: [f64; 3], vertical: [f64; 3]) -> Option<Self> {
         let planar_mm = planar.map(|x| x * 1e3);
         let read = [0, 1, 2].map(|k| probes[k].read(planar_mm, vertical));
@@ -124,7 +124,7 @@ impl Posterior {
         pairs.into_iter().take(count).map(named).collect()
     }
 
-    /// The `count` combinations of parameters that the log tells apart worst, the worst first,
+    /// The `count` combinations of parameters that the log determines worst, the worst first,
     /// with the `parts` parameters that have most to do with each.
     pub fn weakest_directions(&self, count: usize, parts: usize) -> Vec<Direction> {
         let correlations = DMatrix::from_fn(COUNT, COUNT, |i, j| self.correlation(i, j));
@@ -150,7 +150,7 @@ impl Posterior {
     }
 
     /// What is to be expected of the pose `planar` (m, m, rad) at `vertical` (m, rad, rad);
-    /// `None` where the probes can't tell it.
+    /// `None` where the probes don't determine it.
     pub fn at_pose(&self, planar: [f64; 3], vertical: [f64; 3]) -> Option<PoseUncertainty> {
         let errors = PoseErrors::new(&probes(&self.parameters), planar, vertical)?;
         let by_parameter = DMatrix::from_fn(3, COUNT, |axis, k| errors.by_parameter[axis][k]);
@@ -205,7 +205,7 @@ mod tests {
                 let posterior = Posterior::new(covariance, &truth, &noise);
                 posterior.at_pose(planar, vertical).expect("a pose")
             };
-            // The noise of the probes acts as what the form leaves of their readings.
+            // Errors of the form act as the noise of the probes does.
             let of_form = at_pose(DMatrix::zeros(UNKNOWNS, UNKNOWNS));
             let of_noise = of_form.noise * (FORM_MM / noise.white_mm[0]).powi(2);
             assert!((of_form.systematic - of_noise).norm() < 1e-9 * of_noise.norm());

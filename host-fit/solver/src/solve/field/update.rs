@@ -152,7 +152,7 @@ impl Update {
 
 /// Fits what has changed to all rows of a dataset. `covariance` is the old posterior's, 81 by 81;
 /// without one the parameters that don't change stay as they are. `drift_mm` is the walk of the
-/// reference in X, Y, Rz in a second, mm, mm, mrad: a few seconds don't tell it.
+/// reference in X, Y, Rz in a second, mm, mm, mrad: a few seconds don't determine it.
 ///
 /// # Errors
 /// [`FieldFitError::Singular`] where a number is not finite or

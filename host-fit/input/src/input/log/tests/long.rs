@@ -4,7 +4,7 @@ use super::*;
 use crate::input::log::lines::LINE_BYTES_MAX;
 use crate::input::log::table::COLUMNS_MAX;
 
-/// More rows than tell the period of a log, in movements of a thousand.
+/// More rows than are read for the period of a log, in movements of a thousand.
 const ROWS: usize = 100_000;
 
 /// The line of a row, from 1.
