@@ -42,7 +42,7 @@ use crate::progress;
 use crate::report::json::Circumstances;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use runtime::ParameterSet;
-use std::ffi::OsStr;
+use std::ffi::OsString;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -160,16 +160,24 @@ fn command() -> clap::Command {
 
 /// Parses the command line, runs the command, prints an error if there is one.
 pub fn main() -> ExitCode {
-    run(&Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|error| error.exit()))
+    ExitCode::from(main_of(std::env::args_os()))
 }
 
 /// As [`main`], with the given arguments, the name of the program first: for programs that run commands
-/// in their own process. Wrong usage is not explained.
-pub fn main_of(arguments: &[&OsStr]) -> ExitCode {
-    Cli::try_parse_from(arguments).map_or_else(|_| ExitCode::from(2), |cli| run(&cli))
+/// in their own process; gives the exit status.
+pub fn main_of(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> u8 {
+    let matches = command().try_get_matches_from(arguments);
+    match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
+        Ok(cli) => run(&cli),
+        Err(error) => {
+            // Help goes to standard output. Nobody is left to read that it cannot be printed.
+            let _ = error.print();
+            error.exit_code().try_into().unwrap_or(2)
+        }
+    }
 }
 
-fn run(cli: &Cli) -> ExitCode {
+fn run(cli: &Cli) -> u8 {
     terminal::set_level(i8::from(cli.verbose) - i8::from(cli.quiet));
     if !cli.quiet {
         progress::show();
@@ -180,12 +188,12 @@ fn run(cli: &Cli) -> ExitCode {
         _ => None,
     });
     match cli.command.run() {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         // Who reads standard output, as `head` does, has seen enough.
-        Err(error) if terminal::is_closed(&error) => ExitCode::SUCCESS,
+        Err(error) if terminal::is_closed(&error) => 0,
         Err(error) => {
             terminal::fail(&error);
-            ExitCode::from(error.exit_status())
+            error.exit_status()
         }
     }
 }
