@@ -30,6 +30,7 @@ use hal_adapters::can::Layout;
 use join::{JoinCounts, JoinedRow, join};
 use offset::{Clocks, Offset, Records};
 use reference::{Reference, ReferenceCounts};
+use runtime::frame::MISSING_CODE;
 use std::path::PathBuf;
 
 /// What is joined, and how.
@@ -111,12 +112,18 @@ pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
         joined(&given, &mut |_| Ok(()))?.check()?;
         records.checked(given)?
     };
-    let format = LogFormat::new(reference.quantities, &stage);
+    let format = LogFormat::new(reference.quantities, false, &stage);
     let mut log = Output::create(&settings.out)?;
     let mut text = format.header();
     let join = joined(&clocks, &mut |row| {
         let at = (row.movement, row.t_us);
-        format.append(&mut text, at, row.values, [row.capacitive, row.hall]);
+        format.append(
+            &mut text,
+            at,
+            row.values,
+            [row.capacitive, row.hall],
+            [MISSING_CODE; 2],
+        );
         if text.len() > TEXT_BYTES {
             log.write(text.as_bytes())?;
             text.clear();

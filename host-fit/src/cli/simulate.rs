@@ -1,6 +1,6 @@
 //! `host-fit simulate`.
 
-use super::args::{StageFile, choice};
+use super::args::{StageFile, between, choice};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
@@ -8,8 +8,9 @@ use crate::simulate::assembly::{Assembly, Magnets};
 use crate::simulate::log_text::{log_csv, truth_csv};
 use crate::simulate::plan_file;
 use crate::simulate::protocol::{Protocol, Run};
-use crate::simulate::recording::record;
+use crate::simulate::recording::{record, record_in};
 use crate::simulate::sensors::SensorErrors;
+use crate::simulate::thermal::{Climate, Thermal};
 use clap::Args;
 use flate2::{Compression, write::GzEncoder};
 use std::io::Write;
@@ -20,6 +21,7 @@ super::args::values! {
         Paper: "paper", "The paper's: at the 19 settings of its Table 6, a sine along Y, X and Rz in turn";
         Combined: "combined", "All six axes at once, 8 movements of 8 s";
         Service: "service", "As combined, other trajectories, interferometers zeroed truly";
+        Day: "day", "A working day: 37 pieces of service, one each quarter of an hour, each after 0.4 s at rest";
     }
 }
 
@@ -35,6 +37,10 @@ pub(super) struct SimulateArgs {
     /// Run this protocol.
     #[arg(long, value_parser = choice::<Protocol>(), conflicts_with = "plan")]
     protocol: Option<Protocol>,
+    /// Begin the run at this hour of a working day (work begins at 0), and follow the temperatures of
+    /// mount and body, whose columns [temperature] of the stage file names: -0.2 is cold, 3.5 warm.
+    #[arg(long, value_name = "H", value_parser = hour, allow_negative_numbers = true)]
+    hour: Option<f64>,
     /// Which stage, and its noise: an even one has magnets as designed, an odd one imperfect
     /// magnets.
     #[arg(long, value_name = "N")]
@@ -45,6 +51,10 @@ pub(super) struct SimulateArgs {
     /// Where to write the true poses, likewise.
     #[arg(long, value_name = "truth.csv")]
     truth: Option<PathBuf>,
+}
+
+fn hour(text: &str) -> Result<f64, String> {
+    between(text, -24.0, 24.0, "an hour of the day")
 }
 
 /// Writes the log of a simulated stage.
@@ -63,8 +73,30 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
             return Err(HostError::usage("--protocol", problem));
         }
     };
-    let assembly = Assembly::draw(&stage, args.seed);
-    let recording = record(&stage, &assembly, run, &SensorErrors::USUAL, args.seed)?;
+    let (seed, errors) = (args.seed, &SensorErrors::USUAL);
+    let assembly = Assembly::draw(&stage, seed);
+    let hour = args
+        .hour
+        .or_else(|| (args.protocol? == Protocol::Day).then_some(0.0));
+    let recording = match hour {
+        None => record(&stage, &assembly, run, errors, seed)?,
+        Some(_) if stage.temperature.columns == [None, None] => {
+            let problem = "the stage file names no column for a temperature: add [temperature] with mount = \"mount_mc\", \
+                           body = \"body_mc\" and unit = \"mC\"";
+            return Err(HostError::usage("--hour", problem));
+        }
+        Some(hour) => {
+            let stage_in_day = (&assembly, &Thermal::draw(seed));
+            record_in(
+                &stage,
+                stage_in_day,
+                Climate::Day { hour },
+                run,
+                errors,
+                seed,
+            )?
+        }
+    };
     let mut outputs = Outputs::default();
     if let Some(path) = truth {
         outputs.add(path, &bytes(path, truth_csv(&recording))?)?;

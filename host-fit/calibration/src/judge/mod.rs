@@ -36,6 +36,7 @@ use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
 use runtime::{AnyDecoder, ParameterSet, PlanarPose};
+use statistics::ErrorSums;
 
 /// Which zero deviations are taken off before errors are counted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,6 +109,29 @@ impl Decoded {
             }
         }
         judge.judgement(zeros)
+    }
+
+    /// The errors of movements that begin at rest, re-zeroed there as a stage is: less their mean over
+    /// the first `rest_s`, whose rows have none.
+    pub fn rezeroed(&self, dataset: &Dataset, rest_s: f64) -> Vec<Option<[f64; 3]>> {
+        let mut errors = self.errors.clone();
+        for movement in &dataset.movements {
+            let (rows, errors) = (
+                &dataset.rows[movement.rows.clone()],
+                &mut errors[movement.rows.clone()],
+            );
+            let begin_us = rows.first().map_or(0, |row| row.t_us);
+            let rest = rows.partition_point(|row| (row.t_us - begin_us) as f64 * 1e-6 < rest_s);
+            let mut sums = ErrorSums::NONE;
+            errors[..rest]
+                .iter_mut()
+                .for_each(|error| sums.take(0, error.take()));
+            let zero = sums.mean().unwrap_or([f64::NAN; 3]);
+            for error in errors.iter_mut().flatten() {
+                (0..3).for_each(|axis| error[axis] -= zero[axis]);
+            }
+        }
+        errors
     }
 
     /// The errors with the zero deviations of a judgement taken off.

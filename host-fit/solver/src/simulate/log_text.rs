@@ -4,22 +4,33 @@ use super::recording::Recording;
 use crate::input::log::layout::Quantity;
 use crate::input::log_format::LogFormat;
 use crate::input::stage::Stage;
+use runtime::frame::MISSING_CODE;
 use std::fmt::Write;
 
 /// The columns of a truth file.
 pub const TRUTH_HEADER: &str = "movement,t_us,x_nm,y_nm,rz_nrad,z_nm,rx_nrad,ry_nrad";
 
 /// The log, in the columns and units that the stage names; by default those of the given logs:
-/// `movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm,cap1_cnt,..,hall_a_cnt,..`.
+/// `movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm,cap1_cnt,..,hall_a_cnt,..`; then, in a climate, the
+/// temperatures that the stage names.
 pub fn log_csv(recording: &Recording, stage: &Stage) -> String {
-    let format = LogFormat::new(Quantity::BEAMS, stage);
+    let first = recording.movements.iter().flatten().next();
+    let in_climate = first.is_some_and(|sample| sample.temperature_mc != [MISSING_CODE; 2]);
+    let format = LogFormat::new(Quantity::BEAMS, in_climate, stage);
     let mut text = format.header();
     text.reserve(64 * recording.rows());
     let per_nm = Quantity::BEAMS.map(|beam| 1e-9 / stage.log.column(beam).scale);
     for (movement, samples) in (0..).zip(&recording.movements) {
         for s in samples {
             let beams = [0, 1, 2].map(|i| s.beams_nm[i] as f64 * per_nm[i]);
-            format.append(&mut text, (movement, s.t_us), beams, [s.capacitive, s.hall]);
+            let at = (movement, s.t_us);
+            format.append(
+                &mut text,
+                at,
+                beams,
+                [s.capacitive, s.hall],
+                s.temperature_mc,
+            );
         }
     }
     text
@@ -59,6 +70,7 @@ mod tests {
             beams_nm: [1, -2, 3],
             capacitive: [4, -5, 6],
             hall: [-7, 8, -9],
+            temperature_mc: [MISSING_CODE; 2],
         };
         let later = Sample {
             t_us: 2000,
@@ -88,6 +100,12 @@ mod tests {
     #[test]
     fn a_log_in_other_columns_and_units_reads_back() {
         let mut stage = stage();
+        let mut recording = recording();
+        recording.movements[0][1].temperature_mc = [20_348, MISSING_CODE];
+        recording.movements[0][0].temperature_mc = [-40_001, 29_000];
+        stage.temperature.columns = ["mount", "body"].map(|name| Some(name.to_owned()));
+        stage.log.ignored = ["mount", "body"].map(str::to_owned).to_vec();
+        stage.temperature.scale_mc = [1e3, -273_150.0];
         let mut set = |quantity, name: &str, scale| {
             let name = name.to_owned();
             stage.log.set(quantity, Column { name, scale });
@@ -96,7 +114,7 @@ mod tests {
         set(Quantity::Time, "time_ms", 1e3);
         set(Quantity::BeamX, "ifm_x_um", 1e-6);
         set(Quantity::HallA, "Hall A [V]", 1.0 / 3.125e-4);
-        let csv = log_csv(&recording(), &stage);
+        let csv = log_csv(&recording, &stage);
         let read = read_bytes(
             csv.as_bytes(),
             "log".as_ref(),
@@ -107,5 +125,11 @@ mod tests {
         assert_eq!((rows.len(), rows[1].t_us), (3, 2000));
         assert!((rows[2].reference[0] - 1e-9).abs() < 1e-20);
         assert_eq!(rows[2].frame.hall(), [-7, 8, -9]);
+        let read: Vec<_> = rows.iter().map(|row| row.frame.temperature_mc()).collect();
+        let written = recording.movements.iter().flatten();
+        assert!(
+            read.into_iter()
+                .eq(written.map(|sample| sample.temperature_mc))
+        );
     }
 }

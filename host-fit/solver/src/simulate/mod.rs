@@ -10,6 +10,7 @@
 //! | [`assembly`] | a stage with drawn tolerances |
 //! | [`protocol`], [`plan_file`] | how it moves |
 //! | [`sensors`] | noise, drift, resets, converters, beams |
+//! | [`thermal`] | how its parts follow temperature, and a working day |
 //! | [`recording`] | all steps in a row: the log, in memory |
 //! | [`log_text`] | the log and the truth as CSV |
 //! | [`random`] | numbers that are the same on every machine |
@@ -17,7 +18,7 @@
 //! A seed names a stage: all protocols and plans of one seed run on the same one, each with its
 //! own noise. The same seed gives the same bytes on every machine.
 //!
-//! Not simulated: vibration, temperature, lag between the sensors, and how the servo follows
+//! Not simulated: vibration, lag between the sensors, and how the servo follows
 //! its trajectory.
 //!
 //! ```
@@ -45,6 +46,7 @@ pub mod protocol;
 pub mod random;
 pub mod recording;
 pub mod sensors;
+pub mod thermal;
 
 #[cfg(test)]
 mod tests {

@@ -45,12 +45,30 @@ pub struct HallProbe {
     pub curvature: [f64; 2],
 }
 
+/// What another temperature makes of a probe and its magnet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Warmed {
+    /// Remanence in parts of what it was.
+    pub remanence: f64,
+    /// Growth of the stage and of the framework in parts of their size.
+    pub body: f64,
+    /// See above.
+    pub frame: f64,
+    /// Growth of the gap by what holds probe and magnet, m.
+    pub gap_m: f64,
+    /// Gain of the Hall element, and what it reads without a field in units of the designed
+    /// remanence.
+    pub element: [f64; 2],
+}
+
 /// A probe whose amplifier is trimmed: it reads zero at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrimmedProbe {
     probe: HallProbe,
     rest_flux: f64,
     flux_per_m: f64,
+    /// Gain of the Hall element, and what it reads without a field, in units of the flux.
+    element: [f64; 2],
 }
 
 impl HallProbe {
@@ -69,6 +87,7 @@ impl HallProbe {
             probe: self,
             rest_flux: self.flux(&StagePose::default()),
             flux_per_m: slope_per_m(DESIGNED_GAP_M),
+            element: [1.0, 0.0],
         }
     }
 
@@ -88,7 +107,9 @@ impl HallProbe {
 impl TrimmedProbe {
     /// What the probe reads at a pose, at the designed scale, m.
     pub fn signal_m(&self, pose: &StagePose) -> f64 {
-        let s = (self.probe.flux(pose) - self.rest_flux) / self.flux_per_m;
+        let [gain, offset] = self.element;
+        let flux = gain * self.probe.flux(pose) + offset;
+        let s = (flux - self.rest_flux) / self.flux_per_m;
         let [k2, k3] = self.probe.curvature;
         s * (1.0 + s * (k2 + s * k3))
     }
@@ -97,6 +118,19 @@ impl TrimmedProbe {
     #[must_use]
     pub fn with_gain(mut self, gain: f64) -> Self {
         self.flux_per_m /= gain;
+        self
+    }
+
+    /// The same with its parts at another temperature, the amplifier as trimmed.
+    #[must_use]
+    pub fn warmed(mut self, by: &Warmed) -> Self {
+        self.probe.magnet.remanence *= by.remanence;
+        // Stage and framework grow about the origin, which is the middle of the interferometers.
+        let moved = self.probe.position_m * (by.body - by.frame);
+        self.probe.position_m *= 1.0 + by.body;
+        self.probe.at_rest_m += self.probe.mount.tr_mul(&moved);
+        self.probe.at_rest_m.z += by.gap_m;
+        self.element = by.element;
         self
     }
 

@@ -2,6 +2,7 @@
 
 use super::pose::StagePose;
 use super::random::{Purpose, Stream};
+use super::thermal::Climate;
 use std::f64::consts::TAU;
 
 /// The 19 vertical settings of Table 6: Z in um, Rx and Ry in urad.
@@ -36,6 +37,9 @@ pub enum Protocol {
     Combined,
     /// As combined, other trajectories, interferometers zeroed truly.
     Service,
+    /// A working day in 37 pieces of service, one each quarter of an hour: 1 s of motion after 0.4 s
+    /// at rest, for a re-zero.
+    Day,
 }
 
 /// One movement: the pose of every servo period, between a reset of the interferometers and
@@ -49,6 +53,8 @@ pub struct Run {
     pub movements: Vec<Trajectory>,
     /// Whether the interferometers are zeroed truly; if not, every reset has an error.
     pub zeroed_truly: bool,
+    /// Time from the begin of a movement to that of the next, s; `None` for one after the other.
+    pub spacing_s: Option<f64>,
     /// Tells the noise of one run of a stage from that of another.
     pub number: u64,
 }
@@ -63,6 +69,12 @@ const COMBINED_AMPLITUDES: [[f64; 3]; 2] = [[250e-6, 400e-6, 250e-6], [120e-6, 2
 const COMBINED_HZ: [f64; 2] = [0.3, 2.0];
 const COMBINED_MOVEMENTS: usize = 8;
 const COMBINED_S: f64 = 8.0;
+const DAY_MOVEMENTS: usize = 37;
+const DAY_SPACING_S: f64 = 900.0;
+/// Time at rest and of motion of a piece of the day, s.
+const DAY_PIECE_S: [f64; 2] = [REST_S, 1.0];
+/// How long a stage stands still before a movement of the day, s.
+pub const REST_S: f64 = 0.4;
 
 /// Numbers of planned runs begin here.
 const PLANNED_FROM: u64 = 256;
@@ -75,13 +87,24 @@ impl Protocol {
             Self::Paper => paper(servo_period_s),
             Self::Combined | Self::Service => {
                 let mut random = Stream::new(seed, Purpose::Motion, number);
-                let movement = |_| combined(servo_period_s, &mut random);
+                let movement = |_| combined(servo_period_s, COMBINED_S, &mut random);
                 (0..COMBINED_MOVEMENTS).map(movement).collect()
+            }
+            Self::Day => {
+                let mut random = Stream::new(seed, Purpose::Motion, number);
+                let [rest_s, motion_s] = DAY_PIECE_S;
+                let rest = trajectory(servo_period_s, rest_s, |_| StagePose::default());
+                let movement = |_| {
+                    let motion = combined(servo_period_s, motion_s, &mut random);
+                    [rest.as_slice(), &motion].concat()
+                };
+                (0..DAY_MOVEMENTS).map(movement).collect()
             }
         };
         Run {
             movements,
             zeroed_truly: self == Self::Service,
+            spacing_s: (self == Self::Day).then_some(DAY_SPACING_S),
             number,
         }
     }
@@ -92,19 +115,29 @@ impl Run {
     /// do not share their noise.
     pub fn planned(trajectory: Trajectory) -> Self {
         let numbers = trajectory.iter().flat_map(|p| [p.planar, p.vertical]);
-        // FNV-1a by whole words.
-        let hash = numbers
-            .flatten()
-            .fold(0xcbf2_9ce4_8422_2325, |hash: u64, x| {
-                (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3)
-            });
+        let number = numbered(numbers.flatten().map(f64::to_bits));
         Self {
             movements: vec![trajectory],
             zeroed_truly: false,
-            // The stream of a run has room for 56 bits; the protocols have the first numbers.
-            number: PLANNED_FROM + (hash >> 16),
+            spacing_s: None,
+            number,
         }
     }
+
+    /// The same run in a climate: with a number of its own.
+    pub(super) fn in_climate(self, climate: &Climate) -> Self {
+        let number = numbered([self.number, climate.number()].into_iter());
+        Self { number, ..self }
+    }
+}
+
+/// A number for a run that follows from these words: FNV-1a.
+fn numbered(words: impl Iterator<Item = u64>) -> u64 {
+    let hash = words.fold(0xcbf2_9ce4_8422_2325, |hash: u64, word| {
+        (hash ^ word).wrapping_mul(0x0100_0000_01b3)
+    });
+    // The stream of a run has room for 56 bits; the protocols have the first numbers.
+    PLANNED_FROM + (hash >> 16)
 }
 
 /// The poses of a movement of this length, from its time in s.
@@ -129,12 +162,12 @@ fn paper(servo_period_s: f64) -> Vec<Trajectory> {
 }
 
 /// A sine of its own frequency and phase along each axis, from rest position.
-fn combined(servo_period_s: f64, random: &mut Stream) -> Trajectory {
+fn combined(servo_period_s: f64, length_s: f64, random: &mut Stream) -> Trajectory {
     let [low, high] = COMBINED_HZ;
     let waves = COMBINED_AMPLITUDES.map(|amplitudes| {
         amplitudes.map(|amplitude| (amplitude, random.between(low, high), TAU * random.uniform()))
     });
-    trajectory(servo_period_s, COMBINED_S, |t| {
+    trajectory(servo_period_s, length_s, |t| {
         let [planar, vertical] = waves.map(|axes| {
             axes.map(|(amplitude, frequency_hz, phase)| {
                 amplitude * (libm::sin(TAU * frequency_hz * t + phase) - libm::sin(phase))

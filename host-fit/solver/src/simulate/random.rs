@@ -15,6 +15,8 @@ pub enum Purpose {
     Motion = 2,
     /// Noise, drift and resets.
     Sensors = 3,
+    /// How parts follow temperature, and the errors of its sensors.
+    Thermal = 4,
 }
 
 /// A stream of random numbers.

@@ -5,10 +5,12 @@ use super::pose::StagePose;
 use super::protocol::Run;
 use super::random::{Purpose, Stream};
 use super::sensors::{ReferenceError, SensorErrors, beams_m, code, gaps_m};
+use super::thermal::{Climate, HELD_S, Thermal, Thermometers};
 use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
 use crate::input::stage::Stage;
 use runtime::RawFrame;
 use runtime::capacitive::{vertical_pose, vertical_rows};
+use runtime::frame::MISSING_CODE;
 
 /// Why a run cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -38,6 +40,8 @@ pub struct Sample {
     pub capacitive: [i32; 3],
     /// Hall codes of A, B, C.
     pub hall: [i32; 3],
+    /// Temperatures of mount and body, m degC; [`MISSING_CODE`] where no climate is simulated.
+    pub temperature_mc: [i32; 2],
 }
 
 /// The log of a run, and where the stage truly was.
@@ -61,18 +65,52 @@ pub fn record(
     errors: &SensorErrors,
     seed: u64,
 ) -> Result<Recording, RecordError> {
+    record_with(stage, assembly, run, errors, seed, None)
+}
+
+/// The same of a stage whose parts follow the temperatures of a climate, as [`Thermal`] has it.
+///
+/// # Errors
+/// [`RecordError::ProbeHitsMagnet`].
+pub fn record_in(
+    stage: &Stage,
+    (assembly, thermal): (&Assembly, &Thermal),
+    climate: Climate,
+    run: Run,
+    errors: &SensorErrors,
+    seed: u64,
+) -> Result<Recording, RecordError> {
+    let run = run.in_climate(&climate);
+    record_with(stage, assembly, run, errors, seed, Some((thermal, climate)))
+}
+
+fn record_with(
+    stage: &Stage,
+    assembly: &Assembly,
+    run: Run,
+    errors: &SensorErrors,
+    seed: u64,
+    warmth: Option<(&Thermal, Climate)>,
+) -> Result<Recording, RecordError> {
     let mut random = Stream::new(seed, Purpose::Sensors, run.number);
+    let mut thermometers = Thermometers::new(seed, run.number);
     let mut movements = Vec::with_capacity(run.movements.len());
+    let period_s = stage.servo_period_s;
+    let rows_held = (HELD_S / period_s).round().max(1.0) as usize;
+    let mut start_s = 0.0;
     for (movement, poses) in run.movements.iter().enumerate() {
-        let period_s = stage.servo_period_s;
         let mut reference = ReferenceError::reset(errors, run.zeroed_truly, period_s, &mut random);
         let mut samples = Vec::with_capacity(poses.len());
+        let mut warmed = *assembly;
+        let mut temperature_mc = [MISSING_CODE; 2];
         for (k, pose) in poses.iter().enumerate() {
             let t_us = (k as f64 * period_s * 1e6).round() as i64;
-            let struck = assembly
-                .probes
-                .iter()
-                .position(|probe| !probe.is_clear(pose));
+            if let (Some((thermal, climate)), 0) = (&warmth, k % rows_held) {
+                let celsius = climate.at(start_s + k as f64 * period_s);
+                warmed = thermal.warmed(assembly, celsius);
+                temperature_mc = thermometers.read_mc(celsius);
+            }
+            let struck = warmed.probes.iter().position(|probe| !probe.is_clear(pose));
             if let Some(probe) = struck {
                 return Err(RecordError::ProbeHitsMagnet {
                     probe: ['A', 'B', 'C'][probe],
@@ -89,10 +127,12 @@ pub fn record(
                     .map(|beam| (noisy(beam, errors.beam_m) * 1e9).round() as i64),
                 capacitive: gaps_m(stage, pose)
                     .map(|gap| code(noisy(gap, errors.gap_m), &stage.capacitive)),
-                hall: (assembly.probes)
+                hall: (warmed.probes)
                     .map(|probe| code(noisy(probe.signal_m(pose), errors.hall_m), &stage.hall)),
+                temperature_mc,
             });
         }
+        start_s += run.spacing_s.unwrap_or(poses.len() as f64 * period_s);
         movements.push(samples);
     }
     Ok(Recording {
@@ -111,21 +151,37 @@ impl Recording {
     /// hash of a file. `None` if the capacitive sensors stand in one line, which no checked
     /// stage has.
     pub fn dataset(&self, stage: &Stage) -> Option<Dataset> {
+        Self::joined(&[self], stage)
+    }
+
+    /// The same with the true poses for a reference.
+    pub fn dataset_of_truth(&self, stage: &Stage) -> Option<Dataset> {
+        let mut dataset = self.dataset(stage)?;
+        for (row, truth) in dataset.rows.iter_mut().zip(self.truth.iter().flatten()) {
+            row.reference = truth.planar;
+        }
+        Some(dataset)
+    }
+
+    /// What reading several logs gives.
+    pub fn joined(logs: &[&Self], stage: &Stage) -> Option<Dataset> {
         let plane = vertical_rows(&stage.capacitive_probes_m)?;
         let mut dataset = Dataset::default();
-        for (movement, samples) in self.movements.iter().enumerate() {
-            let start = dataset.rows.len();
-            let rows = (0..).zip(samples);
-            dataset
-                .rows
-                .extend(rows.map(|(k, sample)| row(stage, &plane, movement, k, sample)));
-            dataset.movements.push(Movement {
-                log: 0,
-                index: movement as i64,
-                rows: start..dataset.rows.len(),
-            });
+        for (log, recording) in logs.iter().enumerate() {
+            for (index, samples) in (0..).zip(&recording.movements) {
+                let (start, movement) = (dataset.rows.len(), dataset.movements.len());
+                let rows = (0..).zip(samples);
+                let rows = rows.map(|(k, sample)| row(stage, &plane, movement, k, sample));
+                dataset.rows.extend(rows);
+                dataset.movements.push(Movement {
+                    log,
+                    index,
+                    rows: start..dataset.rows.len(),
+                });
+            }
+            dataset.end_log("simulated");
         }
-        dataset.end_log("simulated");
+        dataset.compensate_as_expected(&stage.temperature);
         Some(dataset)
     }
 }
@@ -138,7 +194,10 @@ fn row(stage: &Stage, plane: &[[f64; 3]; 3], movement: usize, sequence: u32, s: 
     Row {
         movement,
         t_us: s.t_us,
-        frame: LoggedFrame::Codes(RawFrame::new(s.hall, s.capacitive, sequence, s.t_us as u32)),
+        frame: LoggedFrame::Codes(
+            RawFrame::new(s.hall, s.capacitive, sequence, s.t_us as u32)
+                .with_temperature_mc(s.temperature_mc),
+        ),
         signal_m: s.hall.map(|code| f64::from(code) * stage.hall.m_per_count),
         vertical: vertical_pose(plane, gaps).to_array(),
         reference: [

@@ -137,6 +137,7 @@ mod tests {
                 beams_nm: first.beams_nm.map(|nm| nm + noise(5.0) as i64),
                 capacitive: first.capacitive.map(|code| code + noise(0.8) as i32),
                 hall: first.hall.map(|code| code + noise(8.0) as i32),
+                ..*sample
             };
         }
     }

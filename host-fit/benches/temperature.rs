@@ -1,0 +1,366 @@
+//! What temperature costs and what its model leaves, on simulated stages: errors in service over the
+//! noise of the probes, against the truth, re-zeroed by the 0.4 s at rest before each movement.
+//!
+//! `cargo bench -p host-fit --bench temperature [-- STAGES | FOLDER STAGE.TOML]`: 20 stages by default,
+//! minutes; or the logs `cold`, `early`, `warm`, `day` and `day.truth` of a folder.
+
+use host_fit::fit::{Fit, FitSettings, ModelChoice, fit};
+use host_fit::input::dataset::Dataset;
+use host_fit::input::log::{self, ReadOptions};
+use host_fit::input::shipped::STAGE_TOML;
+use host_fit::input::stage::Stage;
+use host_fit::judge::Decoded;
+use host_fit::judge::statistics::{ErrorSums, white_noise};
+use host_fit::plan::run::Run as PlannedRun;
+use host_fit::problem::model::Model;
+use host_fit::simulate::assembly::Assembly;
+use host_fit::simulate::pose::StagePose;
+use host_fit::simulate::protocol::{Protocol, REST_S, Run};
+use host_fit::simulate::recording::{Recording, record_in};
+use host_fit::simulate::sensors::SensorErrors;
+use host_fit::simulate::thermal::{ASSEMBLED_C, Climate, Thermal};
+use runtime::ModelKind;
+use runtime::frame::MISSING_CODE;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+type Fallible<T> = Result<T, Box<dyn Error>>;
+/// X, Y, Rz.
+type Axes = [f64; 3];
+
+/// 95 % of normal numbers are within this many standard deviations.
+const WITHIN: f64 = 1.959_964;
+/// Distances from the cold run, K.
+const CHANGES_K: [f64; 4] = [-10.0, -5.0, 5.0, 10.0];
+
+/// `run30` and `run8` of the given logs.
+const RUN_30: PlannedRun = run(30.0, [13.0, 17.0, 14.0, 19.0, 16.0, 11.0]);
+const RUN_8: PlannedRun = run(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5]);
+
+const fn run(seconds: f64, cycles: [f64; 6]) -> PlannedRun {
+    PlannedRun {
+        seconds,
+        taper_s: 0.5,
+        amplitudes: [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6],
+        cycles,
+    }
+}
+
+/// A simulated stage.
+struct Twin<'a> {
+    stage: &'a Stage,
+    seed: u64,
+    assembly: Assembly,
+    thermal: Thermal,
+}
+
+impl<'a> Twin<'a> {
+    fn new(stage: &'a Stage, seed: u64) -> Self {
+        Self {
+            stage,
+            seed,
+            assembly: Assembly::draw(stage, seed),
+            thermal: Thermal::draw(seed),
+        }
+    }
+
+    fn record(&self, run: Run, climate: Climate) -> Recording {
+        let parts = (&self.assembly, &self.thermal);
+        record_in(
+            self.stage,
+            parts,
+            climate,
+            run,
+            &SensorErrors::USUAL,
+            self.seed,
+        )
+        .expect("no probe hits its magnet")
+    }
+
+    fn planned(&self, run: &PlannedRun, climate: Climate) -> Recording {
+        self.record(
+            Run::planned(run.trajectory(self.stage.servo_period_s)),
+            climate,
+        )
+    }
+
+    /// Service this far from the cold run, each movement after a rest.
+    fn service(&self, change_k: f64) -> Recording {
+        let period_s = self.stage.servo_period_s;
+        let mut run = Protocol::Service.run(period_s, self.seed);
+        let rest = vec![StagePose::default(); (REST_S / period_s).round() as usize];
+        for movement in &mut run.movements {
+            movement.splice(0..0, rest.iter().copied());
+        }
+        self.record(run, steady(change_k))
+    }
+
+    fn fit(&self, logs: &[&Recording]) -> Fallible<Fit> {
+        Ok(fitted(
+            &Recording::joined(logs, self.stage).ok_or("no plane")?,
+            self.stage,
+        )?)
+    }
+
+    fn judge(&self, fit: &Fit, recording: &Recording) -> Fallible<Axes> {
+        let truth = recording.dataset_of_truth(self.stage).ok_or("no plane")?;
+        Ok(ratios(fit, &truth))
+    }
+
+    /// Change of the sensitivities of A, B, C with mount and body between two temperatures, 1/K.
+    fn change_per_k(&self, from_c: [f64; 2], to_c: [f64; 2]) -> [f64; 3] {
+        let slope = |celsius, probe: usize| {
+            let warmed = self.thermal.warmed(&self.assembly, celsius);
+            let at = |u: f64| {
+                let planar = if probe == 2 {
+                    [u, 0.0, 0.0]
+                } else {
+                    [0.0, u, 0.0]
+                };
+                let vertical = [0.0; 3];
+                warmed.probes[probe].signal_m(&StagePose { planar, vertical })
+            };
+            at(1e-4) - at(-1e-4)
+        };
+        let span_k = (to_c[0] - from_c[0]) + (to_c[1] - from_c[1]);
+        [0, 1, 2].map(|probe| (slope(to_c, probe) / slope(from_c, probe)).ln() / span_k)
+    }
+}
+
+const fn steady(change_k: f64) -> Climate {
+    Climate::Steady(ASSEMBLED_C + change_k)
+}
+
+fn fitted(dataset: &Dataset, stage: &Stage) -> Fallible<Fit> {
+    let model = ModelChoice::Named(Model::of(ModelKind::Field));
+    Ok(fit(dataset, stage, &FitSettings::new(model))?)
+}
+
+/// rms of the errors over that of the noise, in the rows after the rest.
+fn ratios(fit: &Fit, truth: &Dataset) -> Axes {
+    let errors = Decoded::new(&fit.set, truth).rezeroed(truth, REST_S);
+    let mut sums = ErrorSums::NONE;
+    errors
+        .iter()
+        .filter(|error| error.is_some())
+        .for_each(|error| sums.take(0, *error));
+    let noise = white_noise(&errors, &truth.movements);
+    let rms = sums.errors().axes.map(|axis| axis.rms);
+    [0, 1, 2].map(|axis| rms[axis] / noise[axis])
+}
+
+/// Without temperatures in the log.
+fn blind(recording: &Recording, sensors: [bool; 2]) -> Recording {
+    changed(recording, |read_mc| {
+        [0, 1].map(|k| if sensors[k] { read_mc[k] } else { MISSING_CODE })
+    })
+}
+
+fn changed(recording: &Recording, change: impl Fn([i32; 2]) -> [i32; 2]) -> Recording {
+    let mut recording = recording.clone();
+    for sample in recording.movements.iter_mut().flatten() {
+        sample.temperature_mc = change(sample.temperature_mc);
+    }
+    recording
+}
+
+/// Ratios of some stages.
+#[derive(Default)]
+struct Ratios(Vec<Axes>);
+
+impl Ratios {
+    fn print(&self, title: &str) {
+        let of = |axis: usize| self.0.iter().map(move |ratio| ratio[axis]);
+        let words = |values: Axes| values.map(|x| format!("{x:6.3}")).join(" ");
+        let mean = [0, 1, 2].map(|axis| of(axis).sum::<f64>() / self.0.len() as f64);
+        let worst = [0, 1, 2].map(|axis| of(axis).fold(0.0, f64::max));
+        println!("{title:<58}{}  {}", words(mean), words(worst));
+    }
+}
+
+/// Errors of coefficients in terms of their standard errors.
+#[derive(Default)]
+struct Coefficients {
+    squares: f64,
+    within: u32,
+    of: u32,
+}
+
+impl Coefficients {
+    fn take(&mut self, found: f64, truth: f64, error: f64) {
+        self.squares += (found - truth) * (found - truth);
+        self.within += u32::from((found - truth).abs() <= WITHIN * error);
+        self.of += 1;
+    }
+
+    fn print(&self, title: &str) {
+        let of = f64::from(self.of.max(1));
+        let (rms, share) = (
+            (self.squares / of).sqrt() * 100.0,
+            f64::from(self.within) / of,
+        );
+        println!(
+            "{title:<58}{rms:.4} %/K rms, {:.1} % of {} within",
+            100.0 * share,
+            self.of
+        );
+    }
+}
+
+/// Errors of k of a mount's sensor alone (with which the body goes), by `run30` cold and `run8` warm.
+fn coefficients(stage: &Stage, stages: u64, spacing_k: f64) -> Fallible<Coefficients> {
+    let mut all = Coefficients::default();
+    for seed in 1..=stages {
+        let twin = Twin::new(stage, seed);
+        let [cold, warm] = [(RUN_30, 0.0), (RUN_8, spacing_k)]
+            .map(|(run, change_k)| blind(&twin.planned(&run, steady(change_k)), [true, false]));
+        let field = twin.fit(&[&cold, &warm])?.field.ok_or("no field model")?;
+        let zero_c = f64::from(field.warmth.temperature.zero_mc[0]) * 1e-3;
+        let truth = twin.change_per_k([zero_c - 0.5; 2], [zero_c + 0.5; 2]);
+        for probe in 0..3 {
+            let found = field.warmth.temperature.per_mk[probe][0] * 1e3;
+            // Both temperatures change.
+            all.take(
+                found,
+                2.0 * truth[probe],
+                field.warmth.error_per_k[probe][0],
+            );
+        }
+    }
+    Ok(all)
+}
+
+fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
+    println!(
+        "errors over the noise, {stages} stages{:>48}",
+        "mean X, Y, Rz         worst X, Y, Rz"
+    );
+    for spacing_k in [3.0, 5.0] {
+        let mut by_change: [Ratios; 4] = Default::default();
+        let mut off = Ratios::default();
+        for seed in 1..=stages {
+            let twin = Twin::new(stage, seed);
+            let cold = twin.planned(&RUN_30, steady(0.0));
+            let warm = twin.planned(&RUN_8, steady(spacing_k));
+            let fit = twin.fit(&[&cold, &warm])?;
+            for (ratios, change_k) in by_change.iter_mut().zip(CHANGES_K) {
+                ratios.0.push(twin.judge(&fit, &twin.service(change_k))?);
+            }
+            let warm = changed(&warm, |read_mc| read_mc.map(|mc| mc + 100));
+            let fit = twin.fit(&[&cold, &warm])?;
+            off.0.push(twin.judge(&fit, &twin.service(10.0))?);
+        }
+        for (ratios, change_k) in by_change.iter().zip(CHANGES_K) {
+            ratios.print(&format!(
+                "run30, run8 {spacing_k} K warmer; service at {change_k:+} K"
+            ));
+        }
+        off.print(&format!("the same, sensors of run8 0.1 K off; at +10 K"));
+    }
+    let mut days: [Ratios; 4] = Default::default();
+    let (mut k, mut h) = (Coefficients::default(), Coefficients::default());
+    for seed in 1..=stages {
+        let twin = Twin::new(stage, seed);
+        let at = |hour: f64| Climate::Day { hour };
+        let cold = twin.planned(&RUN_30, at(-1.0 / 6.0));
+        let early = twin.planned(&RUN_8, at(1.0 / 6.0));
+        let warm = twin.planned(&RUN_8, at(3.5));
+        let day = twin.record(Protocol::Day.run(stage.servo_period_s, seed), at(0.0));
+        let none = [&cold, &early, &warm].map(|log| blind(log, [false; 2]));
+        let fits: [&[&Recording]; 4] = [
+            &[&cold, &early, &warm],
+            &[&cold, &warm],
+            &[&cold],
+            &[&none[0]],
+        ];
+        for (logs, ratios) in fits.into_iter().zip(&mut days) {
+            ratios.0.push(twin.judge(&twin.fit(logs)?, &day)?);
+        }
+        let field = twin.fit(fits[0])?.field.ok_or("no field model")?;
+        let [mount, body] = field
+            .warmth
+            .temperature
+            .zero_mc
+            .map(|mc| f64::from(mc) * 1e-3);
+        for (sensor, all) in [&mut k, &mut h].into_iter().enumerate() {
+            let at = |by: f64| {
+                if sensor == 0 {
+                    [mount + by, body]
+                } else {
+                    [mount, body + by]
+                }
+            };
+            let truth = twin.change_per_k(at(-0.5), at(0.5));
+            for probe in 0..3 {
+                let found = field.warmth.temperature.per_mk[probe][sensor] * 1e3;
+                all.take(found, truth[probe], field.warmth.error_per_k[probe][sensor]);
+            }
+        }
+    }
+    let titles = [
+        "cold, early, warm",
+        "cold, warm",
+        "cold",
+        "cold, no temperatures",
+    ];
+    for (title, ratios) in titles.into_iter().zip(&days) {
+        ratios.print(&format!("{title}; the day"));
+    }
+    k.print("k by cold, early, warm");
+    h.print("h by cold, early, warm");
+    for spacing_k in [3.0, 5.0] {
+        let found = coefficients(stage, 5 * stages, spacing_k)?;
+        found.print(&format!("k by run30, run8 {spacing_k} K warmer"));
+    }
+    Ok(())
+}
+
+/// The logs of a folder.
+fn of_logs(folder: &Path, stage: &Path) -> Fallible<()> {
+    let stage = Stage::from_file(stage)?;
+    let paths = |names: &[&str]| -> Vec<PathBuf> {
+        names
+            .iter()
+            .map(|name| folder.join(format!("{name}.csv.gz")))
+            .collect()
+    };
+    let read = |names: &[&str]| log::read(&paths(names), &stage, &ReadOptions::DECODE);
+    let mut day = read(&["day"])?.dataset;
+    let truth = std::fs::read(&paths(&["day.truth"])[0])?;
+    let mut text = String::new();
+    std::io::Read::read_to_string(
+        &mut flate2::read::GzDecoder::new(truth.as_slice()),
+        &mut text,
+    )?;
+    for (row, line) in day.rows.iter_mut().zip(text.lines().skip(1)) {
+        let cells: Vec<f64> = line
+            .split(',')
+            .skip(2)
+            .map_while(|cell| cell.parse().ok())
+            .collect();
+        row.reference = [cells[0] * 1e-9, cells[1] * 1e-9, cells[2] * 1e-9];
+    }
+    for names in [&["cold", "early", "warm"][..], &["cold", "warm"], &["cold"]] {
+        let logs = log::read(&paths(names), &stage, &ReadOptions::FIT)?.dataset;
+        let mut ratio = Ratios::default();
+        ratio.0.push(ratios(&fitted(&logs, &stage)?, &day));
+        ratio.print(&format!("{}; the day", names.join(", ")));
+    }
+    Ok(())
+}
+
+fn main() -> Fallible<()> {
+    // Cargo passes `--bench`.
+    let given: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| a != "--bench")
+        .collect();
+    if let [folder, stage] = given.as_slice() {
+        return of_logs(folder.as_ref(), stage.as_ref());
+    }
+    let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
+    of_twins(
+        &stage,
+        given.first().map_or(Ok(20), |stages| stages.parse())?,
+    )
+}
