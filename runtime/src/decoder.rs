@@ -263,10 +263,10 @@ impl<M: Model> Decoder<M> {
     ) -> Reading {
         let c = &self.constants;
         let ([mount, body], temperature_bad) = c.temperature.changes_mk(temperature_mc);
-        let gain = (c.temperature).gain([f32::from_code(mount), f32::from_code(body)]);
+        let change = (c.temperature).gain_change([f32::from_code(mount), f32::from_code(body)]);
         let signal = each(hall, f32::from_code);
         let rows = &c.planar_per_code;
-        let (phi, planar) = M::planar_pose(&self.probes, rows, signal, gain, &vertical, zero);
+        let (phi, planar) = M::planar_pose(&self.probes, rows, signal, change, &vertical, zero);
         let (v, q) = (vertical.to_array(), planar.to_array());
         let (size_v, size_q) = (each(v, magnitude), each(q, magnitude));
 

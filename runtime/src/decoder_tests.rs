@@ -166,7 +166,7 @@ fn largest_difference_from_f64(calibration: &Calibration) -> (f64, f64) {
                 let zero = PlanarPose::ZERO;
                 let (_, q) = calibration
                     .probes
-                    .planar_pose(rows, hall, [1.0; 3], &v, &zero);
+                    .planar_pose(rows, hall, [0.0; 3], &v, &zero);
                 let off = |have: f32, want: f64| (f64::from(have) - want).abs();
                 let (p, w) = (reading.pose.planar, reading.pose.vertical);
                 worst_m = worst_m

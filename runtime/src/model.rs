@@ -28,10 +28,10 @@ pub trait Model: Copy + Debug + PartialEq + 'static {
     /// The coefficients of one probe.
     type Probe<T: Real>: Copy + Debug + PartialEq + Send + Sync;
 
-    /// The sensitivities phi of the probes A, B, C at a vertical pose, times `gain`, and the
-    /// planar pose less `zero`.
+    /// The sensitivities G phi of the probes A, B, C at a vertical pose, and the planar pose less
+    /// `zero`.
     ///
-    /// `gain` is 1 at the temperature of the calibration, see [`crate::temperature`].
+    /// `gain_change` is G - 1, 0 at the temperature of the calibration: see [`crate::temperature`].
     /// `pose_rows` are the rows X, Y, Rz of PM^-1 with the scale of `signal` in them, and
     /// `zero` is the zero deviation as a pose. To be straight-line code, the same
     /// instructions for every input: it is the heart of a tick. A phi near zero, or a result
@@ -40,7 +40,7 @@ pub trait Model: Copy + Debug + PartialEq + 'static {
         probes: &[Self::Probe<T>; 3],
         pose_rows: &[[T; 3]; 3],
         signal: [T; 3],
-        gain: [T; 3],
+        gain_change: [T; 3],
         vertical: &VerticalPose<T>,
         zero: &PlanarPose<T>,
     ) -> ([T; 3], PlanarPose<T>);
@@ -92,16 +92,16 @@ impl<T: Real> Probes<T> {
         &self,
         pose_rows: &[[T; 3]; 3],
         signal: [T; 3],
-        gain: [T; 3],
+        gain_change: [T; 3],
         vertical: &VerticalPose<T>,
         zero: &PlanarPose<T>,
     ) -> ([T; 3], PlanarPose<T>) {
         match self {
             Self::Linear(probes) => {
-                LinearModel::planar_pose(probes, pose_rows, signal, gain, vertical, zero)
+                LinearModel::planar_pose(probes, pose_rows, signal, gain_change, vertical, zero)
             }
             Self::Field(probes) => {
-                FieldModel::planar_pose(probes, pose_rows, signal, gain, vertical, zero)
+                FieldModel::planar_pose(probes, pose_rows, signal, gain_change, vertical, zero)
             }
         }
     }
@@ -122,6 +122,12 @@ impl<T: Real> Probes<T> {
             Self::Field(probes) => Probes::Field(probes.map(|probe| probe.rounded())),
         }
     }
+}
+
+/// G phi, from G - 1. At G = 1 it is phi, to the bit, if that is finite.
+#[inline(always)]
+pub fn with_gain<T: Number>(phi: T, gain_change: T) -> T {
+    phi + phi * gain_change
 }
 
 /// The product of a row and a column of three, summed from the left.

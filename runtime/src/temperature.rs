@@ -60,19 +60,20 @@ impl<T: Real> Temperature<T> {
         })
     }
 
-    /// G of the probes A, B, C at dM and dH, mK.
+    /// G - 1 of the probes A, B, C at dM and dH, mK.
     #[inline(always)]
-    pub fn gain(&self, [mount, body]: [T; 2]) -> [T; 3] {
+    pub(crate) fn gain_change(&self, [mount, body]: [T; 2]) -> [T; 3] {
         let [a, b, c] = &self.per_mk;
-        let of = |[k, h]: &[T; 2]| (T::ONE + *k * mount) + *h * body;
+        let of = |[k, h]: &[T; 2]| *k * mount + *h * body;
         [of(a), of(b), of(c)]
     }
 
     /// G of the probes A, B, C at temperatures of mount and body, m degC; a missing or implausible
     /// one counts as T0.
-    #[inline(always)]
     pub fn gain_at(&self, temperature_mc: [i32; 2]) -> [T; 3] {
-        self.gain(self.changes_mk(temperature_mc).0.map(T::from_code))
+        let changes_mk = self.changes_mk(temperature_mc).0;
+        let change = self.gain_change(changes_mk.map(T::from_code));
+        change.map(|change| T::ONE + change)
     }
 
     /// Each coefficient as another type of number, rounded to the nearest.
@@ -137,8 +138,8 @@ mod tests {
 
     #[test]
     fn the_gain_is_one_at_t0_and_follows_both_temperatures() {
-        assert_eq!(STAGE.gain([0.0; 2]), [1.0; 3]);
-        let [a, ..] = STAGE.gain([5000.0, -2000.0]);
+        assert_eq!(STAGE.gain_at([20_000, 21_000]), [1.0; 3]);
+        let [a, ..] = STAGE.gain_at([25_000, 19_000]);
         assert!((a - (1.0 - 0.006 - 2e-5)).abs() < 1e-7, "{a}");
     }
 }

@@ -2,7 +2,7 @@
 
 use runtime::decoder::DecoderConstants;
 use runtime::frame::CodeWindow;
-use runtime::model::{Sensitivity, planar_pose, sensitivity_at};
+use runtime::model::{Sensitivity, planar_pose, sensitivity_at, with_gain};
 use runtime::real::Real;
 use runtime::{
     Decode, Decoder, LinearModel, Model, OnInvalid, PlanarPose, PoseTracker, RawFrame, Reading,
@@ -26,13 +26,13 @@ impl Model for Bent {
         probes: &[BentProbe<T>; 3],
         pose_rows: &[[T; 3]; 3],
         signal: [T; 3],
-        gain: [T; 3],
+        gain_change: [T; 3],
         vertical: &VerticalPose<T>,
         zero: &PlanarPose<T>,
     ) -> ([T; 3], PlanarPose<T>) {
         let z2 = vertical.z_m * vertical.z_m;
         let at = |p: &BentProbe<T>| sensitivity_at(&p.linear, vertical) + p.per_z2_m2 * z2;
-        let phi = [0, 1, 2].map(|k| at(&probes[k]) * gain[k]);
+        let phi = [0, 1, 2].map(|k| with_gain(at(&probes[k]), gain_change[k]));
         (phi, planar_pose(pose_rows, signal, phi, zero))
     }
 }

@@ -9,7 +9,7 @@
 static HallDecoder decoder;
 static HallServo servo;
 static uint8_t blob[656];
-static uint32_t frames[256][7];
+static uint32_t frames[256][9];
 static HallReading readings[256];
 
 _Static_assert(sizeof(HallReading) == 28, "seven words");
@@ -47,7 +47,8 @@ int main(void)
                 return 5;
             for (uint32_t k = 0; k < now; k++) {
                 HallFrame frame = { .time_us = 0 };
-                memcpy(&frame, frames[k], sizeof frames[k]);
+                memcpy(&frame, frames[k], 7 * sizeof frames[k][0]);
+                memcpy(frame.temperature_mc, &frames[k][7], sizeof frame.temperature_mc);
                 hall_tick(&servo, &frame, &readings[k]);
             }
             if (!all(put, words, readings, now * sizeof readings[0]))

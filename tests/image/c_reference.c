@@ -14,10 +14,13 @@ typedef struct {
     float calibrated_vertical[3], calibrated_planar[3];
     float sensitivity_min;
     window hall, capacitive;
+    float gain_per_mk[3][2];
+    int32_t temperature_zero_mc[2];
+    uint32_t temperature_reach_mk[2];
     sensitivity probe[3];
 } decoder;
 typedef struct { float planar_per_code[3][3]; sensitivity probe[3]; } kernel;
-typedef struct { int32_t hall[3], capacitive[3]; uint32_t sequence, time_us; } frame;
+typedef struct { int32_t hall[3], capacitive[3]; uint32_t sequence, time_us; int32_t temperature_mc[2]; } frame;
 typedef struct { planar planar; vertical vertical; uint32_t status; } reading;
 
 static inline float dot(const float *row, const float *v)

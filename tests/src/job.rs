@@ -6,8 +6,8 @@
 //! | words | what |
 //! |---|---|
 //! | 4 | source ([`WORDS`], [`FIELD_WORDS`], [`BLOB`] or [`PREDICTED`]), frames, hold in ticks, bytes of the blob |
-//! | 44, 116 or the blob | the decoder's constants, a zero deviation and the probes' coefficients as bare words, or a blob padded with 0xFF to whole words |
-//! | 7 a frame | Hall codes A, B, C, capacitive codes 1, 2, 3, sequence number |
+//! | 54, 126 or the blob | the decoder's constants, a zero deviation and the probes' coefficients as bare words, or a blob padded with 0xFF to whole words |
+//! | 9 a frame | Hall codes A, B, C, capacitive codes 1, 2, 3, sequence number, temperatures of mount and body |
 //!
 //! Bare words go straight into a decoder, unchecked: they may be anything. A blob is loaded
 //! as from flash and run by a servo; in a section of [`PREDICTED`] X, Y, Rz are those of a
@@ -33,11 +33,11 @@ pub const PREDICTED: u32 = 4;
 /// Words of a section's head.
 pub const HEAD_WORDS: usize = 4;
 /// Bare words of constants, zero deviation and coefficients in the field model.
-pub const PARAMETER_WORDS: usize = 116;
+pub const PARAMETER_WORDS: usize = 126;
 /// The same in Model (31).
-const LINEAR_PARAMETER_WORDS: usize = 44;
+const LINEAR_PARAMETER_WORDS: usize = 54;
 /// Words of a frame.
-pub const FRAME_WORDS: usize = 7;
+pub const FRAME_WORDS: usize = 9;
 /// Words of an answer: X, Y, Rz, Z, Rx, Ry, status.
 pub const ANSWER_WORDS: usize = 7;
 /// Words that a blob takes at most.
@@ -201,19 +201,30 @@ pub fn from_words<M: Bare>(words: &[u32]) -> (Decoder<M>, PlanarPose<f32>) {
         high: next() as i32,
     };
     let (hall_window, capacitive_window) = (window(), window());
+    let mut pair = || [next(), next()];
+    let (zero_mc, reach_mk) = (pair().map(u32::cast_signed), pair());
     let mut number = || f32::from_bits(next());
     let sensitivity_min = number();
     let mut three = || [number(), number(), number()];
+    let (vertical_per_code, planar_per_code) =
+        ([three(), three(), three()], [three(), three(), three()]);
+    let (calibrated_vertical, calibrated_planar) = (three(), three());
+    let mut two = || [number(), number()];
     let constants = DecoderConstants {
-        vertical_per_code: [three(), three(), three()],
-        planar_per_code: [three(), three(), three()],
-        calibrated_vertical: three(),
-        calibrated_planar: three(),
+        vertical_per_code,
+        planar_per_code,
+        calibrated_vertical,
+        calibrated_planar,
         sensitivity_min,
         hall_window,
         capacitive_window,
-        temperature: Temperature::NONE,
+        temperature: Temperature {
+            per_mk: [two(), two(), two()],
+            zero_mc,
+            reach_mk,
+        },
     };
+    let mut three = || [number(), number(), number()];
     let zero = PlanarPose::from_array(three());
     let mut probe = || M::probe(&mut number);
     (Decoder::new(constants, [probe(), probe(), probe()]), zero)
@@ -223,9 +234,11 @@ pub fn from_words<M: Bare>(words: &[u32]) -> (Decoder<M>, PlanarPose<f32>) {
 pub fn to_words<M: Bare>(decoder: &Decoder<M>, zero: &PlanarPose<f32>, put: &mut impl FnMut(u32)) {
     let c = decoder.constants();
     let [hall, gaps] = [&c.hall_window, &c.capacitive_window];
-    for code in [hall.low, hall.high, gaps.low, gaps.high] {
+    let ([mount, body], reach) = (c.temperature.zero_mc, c.temperature.reach_mk);
+    for code in [hall.low, hall.high, gaps.low, gaps.high, mount, body] {
         put(code as u32);
     }
+    reach.into_iter().for_each(&mut *put);
     let mut put = |number: f32| put(number.to_bits());
     put(c.sensitivity_min);
     let zero = zero.to_array();
@@ -233,6 +246,7 @@ pub fn to_words<M: Bare>(decoder: &Decoder<M>, zero: &PlanarPose<f32>, put: &mut
         .chain(c.planar_per_code.as_flattened())
         .chain(&c.calibrated_vertical)
         .chain(&c.calibrated_planar)
+        .chain(c.temperature.per_mk.as_flattened())
         .chain(&zero);
     for number in numbers {
         put(*number);
@@ -243,18 +257,20 @@ pub fn to_words<M: Bare>(decoder: &Decoder<M>, zero: &PlanarPose<f32>, put: &mut
 }
 
 /// The frame of the words.
-pub const fn frame([a, b, c, g1, g2, g3, sequence]: [u32; FRAME_WORDS]) -> RawFrame {
+pub const fn frame([a, b, c, g1, g2, g3, sequence, mount, body]: [u32; FRAME_WORDS]) -> RawFrame {
     RawFrame::new(
         [a as i32, b as i32, c as i32],
         [g1 as i32, g2 as i32, g3 as i32],
         sequence,
         0,
     )
+    .with_temperature_mc([mount as i32, body as i32])
 }
 
 /// The words of a frame.
 pub const fn frame_words(frame: &RawFrame) -> [u32; FRAME_WORDS] {
     let ([a, b, c], [g1, g2, g3]) = (frame.hall, frame.capacitive);
+    let [mount, body] = frame.temperature_mc;
     [
         a as u32,
         b as u32,
@@ -263,6 +279,8 @@ pub const fn frame_words(frame: &RawFrame) -> [u32; FRAME_WORDS] {
         g2 as u32,
         g3 as u32,
         frame.sequence,
+        mount as u32,
+        body as u32,
     ]
 }
 

@@ -6,7 +6,7 @@ use rand::{Rng, RngExt};
 use runtime::frame::MISSING_CODE;
 use runtime::geometry::SensingAxes;
 use runtime::model::{FieldProbe, Probes, Sensitivity, Shape, dot};
-use runtime::{Decoder, ModelKind, ParameterSet, PlanarPose, RawFrame};
+use runtime::{Decoder, ModelKind, ParameterSet, PlanarPose, RawFrame, Temperature};
 
 /// One section: parameters as they lie in the file, and the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -81,7 +81,8 @@ fn count<T>(items: &[T]) -> u32 {
 }
 
 /// Codes of a 16-bit converter, each as likely as any other, now and then one missing, with
-/// a gap or a repeated number in the sequence here and there.
+/// a gap or a repeated number in the sequence here and there. Temperatures are those of a stage at
+/// work, now and then missing, or anything.
 pub fn uniform_frames(rng: &mut impl Rng, frames: usize) -> Vec<RawFrame> {
     let mut sequence = 0u32;
     let code = |rng: &mut dyn Rng| match rng.random_range(0..200u32) {
@@ -100,6 +101,12 @@ pub fn uniform_frames(rng: &mut impl Rng, frames: usize) -> Vec<RawFrame> {
             sequence,
             0,
         )
+        .with_temperature_mc(std::array::from_fn(|_| match rng.random_range(0..100u32) {
+            0 => MISSING_CODE,
+            1 => rng.random(),
+            2 => rng.random_range(-20_000..60_000),
+            _ => rng.random_range(17_000..27_000),
+        }))
     };
     (0..frames).map(frame).collect()
 }
@@ -174,6 +181,23 @@ pub fn field_probe(
         carry: [part() / VERTICAL, part() / VERTICAL, part() / VERTICAL],
         lateral,
     }
+}
+
+/// The set with random temperature coefficients, about 20 degC.
+pub fn with_temperature(rng: &mut impl Rng, set: &ParameterSet) -> ParameterSet {
+    let mut set = set.clone();
+    let mut pair = || {
+        [
+            rng.random_range(-2e-6..-1e-6),
+            rng.random_range(-2e-7..2e-7),
+        ]
+    };
+    set.constants.temperature = Temperature {
+        per_mk: [pair(), pair(), pair()],
+        zero_mc: [20_125, 21_250],
+        reach_mk: [Temperature::<f32>::REACH_MK; 2],
+    };
+    set
 }
 
 /// The parameter set of Model (31) with random terms of the field model added.

@@ -24,7 +24,11 @@ const CONSTANTS: DecoderConstants<f32> = DecoderConstants {
         low: -32766,
         high: 32765,
     },
-    temperature: Temperature::NONE,
+    temperature: Temperature {
+        per_mk: [[-1e-6, 1e-8], [-2e-6, 2e-8], [-3e-6, 3e-8]],
+        zero_mc: [21_000, 22_000],
+        reach_mk: [30_000, 20_000],
+    },
 };
 
 const PROBE: Sensitivity<f32> = Sensitivity {

@@ -24,7 +24,7 @@
 //! the height alone have no slopes and are taken off r; the others are a polynomial in u and w
 //! alone at one height.
 
-use super::{Model, Sensitivity, dot, dot_less};
+use super::{Model, Sensitivity, dot, dot_less, with_gain};
 use crate::pose::{PlanarPose, VerticalPose};
 use crate::real::Real;
 
@@ -89,7 +89,7 @@ impl Model for FieldModel {
         probes: &[FieldProbe<T>; 3],
         pose_rows: &[[T; 3]; 3],
         signal: [T; 3],
-        gain: [T; 3],
+        gain_change: [T; 3],
         vertical: &VerticalPose<T>,
         zero: &PlanarPose<T>,
     ) -> ([T; 3], PlanarPose<T>) {
@@ -100,9 +100,9 @@ impl Model for FieldModel {
             change_with(&c.sensitivity, vertical),
         ];
         let phi = [
-            (a.sensitivity.eta + change[0]) * gain[0],
-            (b.sensitivity.eta + change[1]) * gain[1],
-            (c.sensitivity.eta + change[2]) * gain[2],
+            with_gain(a.sensitivity.eta + change[0], gain_change[0]),
+            with_gain(b.sensitivity.eta + change[1], gain_change[1]),
+            with_gain(c.sensitivity.eta + change[2], gain_change[2]),
         ];
         let r = [
             a.first_displacement(signal[0] / phi[0], change[0], vertical),
@@ -308,9 +308,9 @@ mod tests {
         let u = plane.map(|row| dot(&row, q));
         let s = [0, 1, 2].map(|k| signal(&probes[k], u[k], dot(&probes[k].lateral, u), &vertical));
         let zero = PlanarPose::ZERO;
-        let (phi, back) = FieldModel::planar_pose(&probes, &rows, s, [1.0; 3], &vertical, &zero);
+        let (phi, back) = FieldModel::planar_pose(&probes, &rows, s, [0.0; 3], &vertical, &zero);
         let linear = probes.map(|probe| probe.sensitivity);
-        let (_, other) = LinearModel::planar_pose(&linear, &rows, s, [1.0; 3], &vertical, &zero);
+        let (_, other) = LinearModel::planar_pose(&linear, &rows, s, [0.0; 3], &vertical, &zero);
         (phi, back.to_array(), other.to_array())
     }
 
@@ -370,10 +370,10 @@ mod tests {
             }
             let vertical = VerticalPose::from_array(v);
             let (rows, zero) = (&set.constants.planar_per_code, PlanarPose::ZERO);
-            let (phi, pose) = FieldModel::planar_pose(&probes, rows, s, [1.0; 3], &vertical, &zero);
+            let (phi, pose) = FieldModel::planar_pose(&probes, rows, s, [0.0; 3], &vertical, &zero);
             prop_assert_eq!(pose, crate::model::planar_pose(rows, s, phi, &zero));
             let linear = probes.map(|probe| probe.sensitivity);
-            let (of_31, _) = LinearModel::planar_pose(&linear, rows, s, [1.0; 3], &vertical, &zero);
+            let (of_31, _) = LinearModel::planar_pose(&linear, rows, s, [0.0; 3], &vertical, &zero);
             for (phi, of_31) in phi.into_iter().zip(of_31) {
                 prop_assert!((phi - of_31).abs() < 1e-6);
             }

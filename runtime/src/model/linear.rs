@@ -14,7 +14,7 @@
 //! and eta = 1 gives (12). So one function decodes them all, and in service, where delta is
 //! zero or what a re-zero measured, the models differ only in their constants.
 
-use super::{Model, dot, dot_less};
+use super::{Model, dot, dot_less, with_gain};
 use crate::pose::{PlanarPose, VerticalPose};
 use crate::real::{Number, Real};
 
@@ -31,14 +31,14 @@ impl Model for LinearModel {
         probes: &[Sensitivity<T>; 3],
         pose_rows: &[[T; 3]; 3],
         signal: [T; 3],
-        gain: [T; 3],
+        gain_change: [T; 3],
         vertical: &VerticalPose<T>,
         zero: &PlanarPose<T>,
     ) -> ([T; 3], PlanarPose<T>) {
         let phi = [
-            sensitivity_at(&probes[0], vertical) * gain[0],
-            sensitivity_at(&probes[1], vertical) * gain[1],
-            sensitivity_at(&probes[2], vertical) * gain[2],
+            with_gain(sensitivity_at(&probes[0], vertical), gain_change[0]),
+            with_gain(sensitivity_at(&probes[1], vertical), gain_change[1]),
+            with_gain(sensitivity_at(&probes[2], vertical), gain_change[2]),
         ];
         (phi, planar_pose(pose_rows, signal, phi, zero))
     }

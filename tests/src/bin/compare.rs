@@ -22,7 +22,7 @@ use tests::motion::{self, Section};
 /// Compares the words that a target gives with those of the host, bit for bit.
 ///
 /// `make` writes the frames of a log, random codes and random parameters into a job file, for
-/// Model (31) and for the field model; an
+/// Model (31) and for the field model, with and without temperatures; an
 /// image that does the job on the target answers with a file of words; `check` compares them.
 /// `poses` compares a pose file that a controller recorded with the host's decoder.
 #[derive(Parser)]
@@ -152,6 +152,11 @@ fn make(
     let field_set = motion::with_field_terms(&mut rng, &set);
     let mut sections = Vec::new();
     for set in [&set, &field_set] {
+        let warm = motion::with_temperature(&mut rng, set);
+        let mut buffer = [0; MAX_BYTES];
+        let blob = warm.to_bytes(&mut buffer)?;
+        let frames = motion::uniform_frames(&mut rng, codes / 2);
+        sections.push(motion::of_blob(blob, frames, hold));
         let mut buffer = [0; MAX_BYTES];
         let blob = set.to_bytes(&mut buffer)?;
         let logged = motion::of_log(blob, &dataset, hold)
@@ -166,7 +171,7 @@ fn make(
             sections.extend(logged.into_iter().map(motion::predicted));
             sections.push(motion::predicted(uniform(codes / 8)));
         }
-        match set.decoder() {
+        match warm.decoder() {
             AnyDecoder::Linear(sound) => {
                 sections.extend(bare(&mut rng, &sound, parameters, |_| sound));
             }

@@ -17,7 +17,8 @@ pub fn decode_f64(
 ) -> PlanarPose<f64> {
     let (rows, signal) = (&constants.planar_per_code, frame.hall().map(f64::from_code));
     let gain = constants.temperature.gain_at(frame.temperature_mc());
-    let (_, pose) = probes.planar_pose(rows, signal, gain, vertical, &PlanarPose::ZERO);
+    let change = gain.map(|gain| gain - 1.0);
+    let (_, pose) = probes.planar_pose(rows, signal, change, vertical, &PlanarPose::ZERO);
     pose
 }
 

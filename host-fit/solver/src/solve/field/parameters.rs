@@ -138,8 +138,16 @@ impl FieldConstants {
     /// The planar pose of three signals at a vertical pose and T0, nothing taken off and nothing
     /// checked.
     pub fn decode(&self, signal: [f64; 3], vertical: &VerticalPose<f64>) -> PlanarPose<f64> {
-        let (gain, zero) = ([1.0; 3], PlanarPose::ZERO);
-        FieldModel::planar_pose(&self.probes, &self.pose_rows, signal, gain, vertical, &zero).1
+        let (at_t0, zero) = ([0.0; 3], PlanarPose::ZERO);
+        FieldModel::planar_pose(
+            &self.probes,
+            &self.pose_rows,
+            signal,
+            at_t0,
+            vertical,
+            &zero,
+        )
+        .1
     }
 }
 

@@ -288,7 +288,7 @@ fn main() -> ! {
     for k in 0..300 {
         let frame = black_box(codes(&mut words, k));
         let (decoder, zero) = black_box(decoder_of::<LinearModel>(&mut words, k, PROBES));
-        let signal = Signal(frame.hall.map(|code| code as f32), [1.0; 3]);
+        let signal = Signal(frame.hall.map(|code| code as f32), [0.0; 3]);
         let vertical = VerticalPose::from_array(frame.capacitive.map(|code| code as f32 * 1e-8));
         let mut pose = PlanarPose::ZERO;
         let c = Kernel {
