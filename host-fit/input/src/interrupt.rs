@@ -22,6 +22,21 @@ pub fn watch() -> &'static AtomicBool {
     &INTERRUPTED
 }
 
+/// As Ctrl-C does, where another program watches for it: what can be ended, ends.
+pub fn request() {
+    INTERRUPTED.store(true, Ordering::Relaxed);
+}
+
+/// Forgets a [`request`], after what it ended.
+pub fn clear() {
+    INTERRUPTED.store(false, Ordering::Relaxed);
+}
+
+/// The flag that a search looks at.
+pub const fn flag() -> &'static AtomicBool {
+    &INTERRUPTED
+}
+
 /// Whether Ctrl-C was pressed since [`watch`].
 pub fn requested() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)

@@ -38,6 +38,7 @@ use crate::input::text::TextReader;
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What to do with a row that has a bad cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -120,7 +121,28 @@ pub struct LogReading {
     pub skipped_rows: usize,
     options: ReadOptions,
     /// Where the logs can be read again.
-    again: Vec<(PathBuf, Option<File>)>,
+    again: Vec<(PathBuf, Again)>,
+}
+
+/// How a log can be read again.
+#[derive(Debug)]
+enum Again {
+    /// From its file.
+    File,
+    /// From a copy, as its own file can be read but once.
+    Copy(File),
+    /// From memory.
+    Bytes(Arc<[u8]>),
+}
+
+impl Again {
+    fn open(&self, path: &Path) -> Result<TextReader<'_>, LogError> {
+        Ok(match self {
+            Self::File => TextReader::open(path)?,
+            Self::Copy(copy) => TextReader::open_copy(copy, path)?,
+            Self::Bytes(bytes) => TextReader::of_reader(&**bytes, path)?,
+        })
+    }
 }
 
 /// Reads the logs, in this order, into one dataset: in little memory however long they are, where
@@ -140,7 +162,8 @@ pub fn read<P: AsRef<Path>>(
             Some(_) => TextReader::open_to_read_again(path)?,
             None => (TextReader::open(path)?, None),
         };
-        again.push((path.to_path_buf(), copy));
+        let place = copy.map_or(Again::File, Again::Copy);
+        again.push((path.to_path_buf(), place));
         Ok(text)
     });
     let reading = read_texts(texts, stage, options, |_, _| ())?;
@@ -174,7 +197,9 @@ pub fn read_bytes(
     options: &ReadOptions,
 ) -> Result<LogReading, LogError> {
     let text = TextReader::of_reader(bytes, path).map_err(LogError::from);
-    read_texts([text], stage, options, |_, _| ())
+    let reading = read_texts([text], stage, options, |_, _| ())?;
+    let again = vec![(path.to_path_buf(), Again::Bytes(bytes.into()))];
+    Ok(LogReading { again, ..reading })
 }
 
 fn read_texts<'t>(
@@ -237,6 +262,25 @@ fn read_texts<'t>(
 }
 
 impl LogReading {
+    /// Reads the logs anew in another way, as [`read_each`] would; of what is read nothing can be read again.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn read_anew(
+        &self,
+        stage: &Stage,
+        options: &ReadOptions,
+        take: impl FnMut(usize, &LogRow),
+    ) -> Result<Self, LogError> {
+        let texts = self.again.iter().map(|(path, again)| again.open(path));
+        read_texts(texts, stage, options, take)
+    }
+
+    /// How the logs were read.
+    pub const fn options(&self) -> &ReadOptions {
+        &self.options
+    }
+
     /// Reads the logs again, as they were read by [`read`]; `take` as for [`read_each`].
     ///
     /// # Errors
@@ -247,11 +291,8 @@ impl LogReading {
         mut take: impl FnMut(usize, &LogRow),
     ) -> Result<(), LogError> {
         let sources = self.again.iter().zip(&self.dataset.logs);
-        for (log, ((path, copy), source)) in sources.enumerate() {
-            let text = match copy {
-                Some(copy) => TextReader::open_copy(copy, path)?,
-                None => TextReader::open(path)?,
-            };
+        for (log, ((path, again), source)) in sources.enumerate() {
+            let text = again.open(path)?;
             let mut rows = LogRows::new(text, "judging", stage, &self.options)?;
             let mut count = 0;
             while let Some(row) = rows.next_row()? {

@@ -52,6 +52,23 @@ pub enum SourceError {
     },
 }
 
+impl SourceError {
+    /// The file.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::NotFound { path }
+            | Self::IsFolder { path }
+            | Self::Unreadable { path, .. }
+            | Self::TooLarge { path, .. }
+            | Self::Binary { path, .. }
+            | Self::Utf16 { path, .. }
+            | Self::Interrupted { path }
+            | Self::GzipCut { path, .. }
+            | Self::GzipDamaged { path, .. } => path,
+        }
+    }
+}
+
 /// What an input is called in messages.
 pub fn shown_name(path: &Path) -> &Path {
     let (argument, name) = STANDARD_INPUT;

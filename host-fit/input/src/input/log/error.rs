@@ -2,7 +2,7 @@
 
 use super::cell::CellFault;
 use crate::input::source::SourceError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// One cell of a log.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -285,4 +285,50 @@ pub enum LogError {
         /// What is wrong with the first of them.
         first: Box<LogError>,
     },
+}
+
+impl LogError {
+    /// The file and the line that it names, where it names them.
+    pub fn file_and_line(&self) -> (Option<&Path>, Option<usize>) {
+        if let Some(place) = self.place() {
+            return (Some(&place.path), Some(place.line));
+        }
+        match self {
+            Self::HeaderOnly { path, line }
+            | Self::NoHeader { path, line }
+            | Self::NoSeparator { path, line, .. }
+            | Self::TooManyColumns { path, line, .. }
+            | Self::LineTooLong { path, line, .. }
+            | Self::TooManyMovements { path, line, .. }
+            | Self::MissingColumn { path, line, .. }
+            | Self::AmbiguousColumns { path, line, .. }
+            | Self::CellCount { path, line, .. }
+            | Self::CutLine { path, line, .. } => (Some(path), Some(*line)),
+            Self::Empty { path }
+            | Self::TooManyRows { path, .. }
+            | Self::Changed { path }
+            | Self::SplitWithMovements { path }
+            | Self::SameLog { path, .. }
+            | Self::NoGoodRows { path, .. } => (Some(path), None),
+            Self::Source(source) => (Some(source.path()), None),
+            _ => (None, None),
+        }
+    }
+
+    /// The cell that it names, if it is about one.
+    pub const fn place(&self) -> Option<&CellPlace> {
+        match self {
+            Self::UnknownColumn { place, .. }
+            | Self::UnnamedColumn { place }
+            | Self::RepeatedColumn { place, .. }
+            | Self::NoUnit { place, .. }
+            | Self::NoVoltsPerCount { place, .. }
+            | Self::UnitsDisagree { place, .. }
+            | Self::Cell { place, .. }
+            | Self::TimeBackwards { place, .. }
+            | Self::DuplicatedRow { place, .. }
+            | Self::MovementReturns { place, .. } => Some(place),
+            _ => None,
+        }
+    }
 }
