@@ -55,11 +55,13 @@ use crate::judge::uncertainty::uncertainty;
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::Problem;
 use crate::problem::draw::draw_rows;
-use crate::problem::model::{COUNT, Model};
+use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::solve::field::blocks::Rows;
 use crate::solve::field::fit::FieldFit;
+use crate::solve::field::terms;
 use crate::solve::robust::{HALF, Loss};
 use crate::solve::{Projection, Solution, Solver};
+use nalgebra::DMatrix;
 use runtime::calibration::Origin;
 use runtime::parameters::FitRecord;
 use runtime::{Calibration, ModelKind, ParameterSet};
@@ -81,6 +83,8 @@ pub struct Fit {
     /// Pairs of parameters whose estimates are correlated by more than
     /// [`CORRELATION_SHOWN`](crate::judge::uncertainty::CORRELATION_SHOWN).
     pub correlations: Vec<(String, String, f64)>,
+    /// Covariance of the parameters that have a standard error; of the field model its posterior has it.
+    covariance_31: DMatrix<f64>,
     /// All of a fit of the field model.
     pub field: Option<FieldFit>,
     /// By how much the reference lags behind the probes, fitted with the parameters; `None` where
@@ -96,6 +100,8 @@ pub struct Fit {
     pub train_rows: usize,
     /// The loss that their weights are by.
     pub loss: Loss,
+    /// How much each row of the dataset counted, 0 to 1; 0 for those that the fit did not use.
+    pub weights: Vec<f64>,
     /// Those of them that count less than half, as the loss says: row numbers, ascending.
     pub outliers: Vec<usize>,
     /// How many these are and where; of a sample, those of all rows of the logs whose errors are beyond
@@ -131,6 +137,19 @@ pub fn fit(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<F
             .extend(warning::of_lag(lag, stage.servo_period_s));
     }
     Ok(fit)
+}
+
+impl Fit {
+    /// The parameters that have a standard error, by name, and their covariance in this order, SI.
+    pub fn covariance(&self) -> (Vec<String>, DMatrix<f64>) {
+        if let Some(field) = &self.field {
+            let names = (0..terms::COUNT).map(terms::name).collect();
+            return (names, field.posterior.covariance.clone());
+        }
+        let known = |id: &ParameterId| self.standard_error[id.index].is_some();
+        let names = self.model.free().filter(known).map(|id| id.name());
+        (names.collect(), self.covariance_31.clone())
+    }
 }
 
 /// What every model of a log is fitted with.
@@ -278,6 +297,8 @@ impl<'a> Job<'a> {
             outliers: outliers(selected, &weights).collect(),
             left_out: left_out(dataset, selected, &weights),
             correlations: uncertainty.correlations,
+            covariance_31: uncertainty.covariance,
+            weights: by_row(dataset, selected, &weights),
             errors_solver_zeros: Some(decoded.judge(dataset, stage, own_zeros).errors),
             solution,
             calibration,
@@ -339,6 +360,15 @@ impl<'a> Job<'a> {
 fn outliers(selected: &[usize], weights: &[f64]) -> impl Iterator<Item = usize> {
     let light = selected.iter().zip(weights).filter(|(_, w)| **w < HALF);
     light.map(|(&row, _)| row)
+}
+
+/// The weights of all rows of a dataset.
+fn by_row(dataset: &Dataset, selected: &[usize], weights: &[f64]) -> Vec<f64> {
+    let mut all = vec![0.0; dataset.rows.len()];
+    for (&row, weight) in selected.iter().zip(weights) {
+        all[row] = *weight;
+    }
+    all
 }
 
 /// How many count less than half, and where.

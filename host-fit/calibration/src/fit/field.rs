@@ -17,6 +17,7 @@ use crate::solve::field::parameters::FieldParameters;
 use crate::solve::least_squares::solve::at_limit;
 use crate::solve::robust::{self, Loss};
 use crate::solve::{Solution, Solver};
+use nalgebra::DMatrix;
 use runtime::model::Probes;
 use runtime::parameters::ParameterError;
 use runtime::{Calibration, ModelKind};
@@ -183,6 +184,8 @@ impl Job<'_> {
             .take_while(|(_, _, correlation)| correlation.abs() > CORRELATION_SHOWN)
             .collect(),
             standard_error: field.posterior.standard_errors_31(),
+            covariance_31: DMatrix::zeros(0, 0),
+            weights: super::by_row(dataset, selected, &field.weights),
             lag: field.posterior.lag_error_s.map(lag),
             errors_solver_zeros: {
                 let zeros = Zeros::Given(&solution.delta_m);

@@ -12,7 +12,7 @@ use crate::problem::{Group, Problem};
 use crate::solve::gauss_newton::{Equations, Normal, Point};
 use crate::solve::least_squares::rows::{COLUMNS, Decoder};
 use crate::solve::least_squares::solve::free;
-use nalgebra::{DVector, Matrix3, SMatrix, SVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, SymmetricEigen};
 use rayon::prelude::*;
 
 type Square = SMatrix<f64, COUNT, COUNT>;
@@ -38,6 +38,8 @@ pub struct Uncertainty {
     /// Pairs of parameters whose estimates are correlated by more than [`CORRELATION_SHOWN`], either
     /// way, with their correlation.
     pub correlations: Vec<(String, String, f64)>,
+    /// Covariance of the parameters that have a standard error, in their order, SI.
+    pub covariance: DMatrix<f64>,
 }
 
 /// Correlations above this are shown: the parameters stand in for each other.
@@ -85,19 +87,32 @@ pub fn uncertainty(problem: &Problem, parameters: &Parameters) -> Option<Uncerta
         .filter(|id| standard_error[id.index].is_some())
         .map(|id| (id.index, id.name()))
         .collect();
+    // Of an exact fit there is none.
+    let correlation = |a: usize, b: usize| {
+        let product = covariance[(a, a)] * covariance[(b, b)];
+        match product > 0.0 {
+            true => covariance[(a, b)] / product.sqrt(),
+            false => 0.0,
+        }
+    };
     let mut correlations = Vec::new();
     for (j, (b, name_b)) in names.iter().enumerate() {
         for (a, name_a) in &names[..j] {
-            let (a, b) = (*a, *b);
-            let product = covariance[(a, a)] * covariance[(b, b)];
-            let correlation = covariance[(a, b)] / product.sqrt();
+            let correlation = correlation(*a, *b);
             if correlation.abs() > CORRELATION_SHOWN {
                 correlations.push((name_a.clone(), name_b.clone(), correlation));
             }
         }
     }
+    // With the standard errors on its diagonal, whichever way they were found.
+    let error = |k: usize| standard_error[names[k].0].unwrap_or_default();
+    let covariance = DMatrix::from_fn(names.len(), names.len(), |i, j| match i == j {
+        true => error(i).powi(2),
+        false => error(i) * error(j) * correlation(names[i].0, names[j].0),
+    });
     Some(Uncertainty {
         correlations,
+        covariance,
         standard_error,
         motion_error,
         undetermined: (problem.model.free())
