@@ -155,7 +155,39 @@ impl Log<'_> {
     /// Amplitude spectral density of the errors beside that of white noise (m, m, rad); `None` where no
     /// movement is long enough.
     pub(super) fn spectrum(&self, errors: &RowErrors, noise: [f64; 3]) -> Option<Chart> {
-        let movements: Vec<Range<usize>> = (self.dataset.movements.iter())
+        let Density { bin_hz, power } = Density::new(self.dataset, self.period_s, errors)?;
+        let highest_hz = 0.5 / self.period_s;
+        let panel = |axis: usize| {
+            let white = noise[axis] * 1e6 * (2.0 * self.period_s).sqrt();
+            let white = vec![(bin_hz, white), (highest_hz, white)];
+            let bins = power[axis].iter().enumerate().skip(1);
+            let bins = bins.map(|(bin, &power)| (bin as f64 * bin_hz, power * 1e12));
+            let data = Mark::Line(Tone::Data, thinned(bins));
+            let marks = vec![Mark::Line(Tone::Noise, white), data];
+            Panel::new(&format!("{}/rtHz", PLANAR[axis]), Scale::Logarithmic, marks)
+        };
+        Some(Chart::of_three(
+            "Amplitude spectral density of the errors, and that of white noise",
+            ("frequency, Hz", Axis::Logarithmic(bin_hz, highest_hz)),
+            panel,
+        ))
+    }
+}
+
+/// Power spectral density of errors, mean over windows of equal length within the movements.
+#[derive(Clone, Debug)]
+pub struct Density {
+    /// Distance of the bins, the first of which is at 0, Hz.
+    pub bin_hz: f64,
+    /// One-sided, of X, Y, Rz: m²/Hz, m²/Hz, rad²/Hz.
+    pub power: [Vec<f64>; 3],
+}
+
+impl Density {
+    /// Of errors by row of a dataset, m, m, rad, with this time between rows, s. Rows without a pose count
+    /// as zero. `None` where no movement is long enough.
+    pub fn new(dataset: &Dataset, period_s: f64, errors: &RowErrors) -> Option<Self> {
+        let movements: Vec<Range<usize>> = (dataset.movements.iter())
             .map(|movement| movement.rows.clone())
             .collect();
         let longest = movements.iter().map(ExactSizeIterator::len).max()?;
@@ -163,27 +195,20 @@ impl Log<'_> {
         if length < WINDOW_MIN {
             return None;
         }
-        let lowest_hz = 1.0 / (length as f64 * self.period_s);
-        let highest_hz = 0.5 / self.period_s;
-        let panel = |axis: usize| {
-            let micro = |error: &Option<[f64; 3]>| error.map_or(0.0, |error| error[axis] * 1e6);
-            let values: Vec<f64> = errors.iter().map(micro).collect();
-            let spectrum = Spectrum::new(&values, &windows(&movements, length));
+        let windows = windows(&movements, length);
+        let of_axis = |axis: usize| {
+            let of = |error: &Option<[f64; 3]>| error.map_or(0.0, |error| error[axis]);
+            let values: Vec<f64> = errors.iter().map(of).collect();
             // One side of the spectrum; the sum of squares of the taper is 3/8 of its length.
-            let scale = 2.0 * self.period_s / (0.375 * length as f64);
-            let white = noise[axis] * 1e6 * (2.0 * self.period_s).sqrt();
-            let white = vec![(lowest_hz, white), (highest_hz, white)];
-            let bins = spectrum.power.iter().enumerate().skip(1);
-            let bins = bins.map(|(bin, &power)| (bin as f64 * lowest_hz, power * scale));
-            let data = Mark::Line(Tone::Data, thinned(bins));
-            let marks = vec![Mark::Line(Tone::Noise, white), data];
-            Panel::new(&format!("{}/rtHz", PLANAR[axis]), Scale::Logarithmic, marks)
+            let scale = 2.0 * period_s / (0.375 * length as f64);
+            let mut power = Spectrum::new(&values, &windows).power;
+            power.iter_mut().for_each(|power| *power *= scale);
+            power
         };
-        Some(Chart::of_three(
-            "Amplitude spectral density of the errors, and that of white noise",
-            ("frequency, Hz", Axis::Logarithmic(lowest_hz, highest_hz)),
-            panel,
-        ))
+        Some(Self {
+            bin_hz: 1.0 / (length as f64 * period_s),
+            power: [0, 1, 2].map(of_axis),
+        })
     }
 }
 

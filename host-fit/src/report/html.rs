@@ -76,16 +76,33 @@ pub struct Section {
     pub charts: Vec<Chart>,
 }
 
+/// Renders a template that may include those of verdict, findings and cells.
+fn rendered(name: &str, template: &str, of: &impl Serialize) -> Result<String, Error> {
+    let mut engine = Environment::new();
+    engine.set_undefined_behavior(UndefinedBehavior::Strict);
+    engine.add_global("style", include_str!("style.css"));
+    engine.add_filter("signs", |text: String| with_signs(&text));
+    engine.add_template("cells.html", include_str!("cells.html"))?;
+    engine.add_template("verdict.html", include_str!("verdict.html"))?;
+    engine.add_template("findings.html", include_str!("findings.html"))?;
+    engine.render_named_str(name, template, Serde(of))
+}
+
 impl Page<'_> {
     /// The page as HTML.
     ///
     /// # Errors
     /// [`Error`] when the template names something that is not there.
     pub fn html(&self) -> Result<String, Error> {
-        let mut engine = Environment::new();
-        engine.set_undefined_behavior(UndefinedBehavior::Strict);
-        engine.add_global("style", include_str!("style.css"));
-        engine.add_filter("signs", |text: String| with_signs(&text));
-        engine.render_named_str("page.html", include_str!("page.html"), Serde(self))
+        rendered("page.html", include_str!("page.html"), self)
+    }
+
+    /// Verdict and findings alone, to stand in a notebook.
+    ///
+    /// # Errors
+    /// As [`Self::html`].
+    pub fn head(&self) -> Result<String, Error> {
+        let parts = "{% include \"verdict.html\" %}\n{% include \"findings.html\" %}";
+        rendered("head.html", parts, self)
     }
 }

@@ -5,6 +5,7 @@ use crate::diagnose::trusted::{Trusted, trusted};
 use crate::finding::Finding;
 use crate::fit::{CrossValidation, Fit};
 use crate::input::dataset::{Dataset, Movement};
+use crate::input::log::LogReading;
 use crate::input::stage::Stage;
 use crate::judge::verdict::{Predicted, Verdict};
 use crate::judge::{Judgement, Zeros};
@@ -151,6 +152,26 @@ pub struct Circumstances<'a> {
     pub warnings: Vec<String>,
     /// What a diagnosis of the log found.
     pub diagnosis: Diagnosis,
+}
+
+impl<'a> Circumstances<'a> {
+    /// Of a log that was read, so long after the start, and diagnosed.
+    pub fn new(
+        log: &'a LogReading,
+        stage: &'a Stage,
+        elapsed_s: f64,
+        diagnosis: Diagnosis,
+    ) -> Self {
+        let warnings = log.warnings.iter().map(|found| found.message.clone());
+        Self {
+            stage,
+            dataset: &log.dataset,
+            skipped_rows: log.skipped_rows,
+            elapsed_s,
+            warnings: warnings.collect(),
+            diagnosis,
+        }
+    }
 }
 
 /// The movements that were judged, by their names in the dataset.

@@ -14,3 +14,5 @@ pub mod provenance;
 mod series;
 pub mod table;
 pub mod verdict;
+
+pub use figures::Density;

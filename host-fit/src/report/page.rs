@@ -84,6 +84,31 @@ impl<'a> Errors<'a> {
     }
 }
 
+/// What a person says of a run, in the order of a certificate.
+pub fn facts(
+    serial: &str,
+    operator: Option<&str>,
+    created: Option<&str>,
+    notes: &[(String, String)],
+) -> Vec<[String; 2]> {
+    let date = match created {
+        None | Some("") => "not given; name it with --created",
+        Some(date) => date,
+    };
+    let serial = if serial.is_empty() {
+        "without serial number"
+    } else {
+        serial
+    };
+    let operator = operator.map(|name| ("operator", name));
+    let notes = notes.iter().map(|(key, value)| (&**key, &**value));
+    let facts = [("stage", serial)].into_iter().chain(operator);
+    let facts = facts.chain([("date", date)]).chain(notes);
+    facts
+        .map(|(key, value)| [key.to_owned(), value.to_owned()])
+        .collect()
+}
+
 impl Source<'_> {
     /// The page.
     ///
