@@ -21,6 +21,7 @@
 //! | [`recalibrate`] | an old calibration brought up to date by a few seconds of log |
 //! | [`output`] | blobs, pose files and images for flash tools, written whole or not at all |
 //! | [`report`] | JSON, tables, plots, an HTML page |
+//! | [`calibrate`] | what the commands decide: used, refused or forced |
 //! | [`compare`] | the solvers beside each other |
 //! | [`diff`] | what changed between two blobs |
 //! | [`bus`] | the stage on a CAN bus: decoded as it comes, played from a log, made into a log |
@@ -32,6 +33,7 @@ pub use hall_input::{finding, input, interrupt, progress, statistics};
 pub use hall_solver::{problem, simulate, solve};
 
 pub mod bus;
+pub mod calibrate;
 pub mod cli;
 pub mod compare;
 pub mod diff;

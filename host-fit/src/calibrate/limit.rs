@@ -15,7 +15,7 @@ const AXES: [Axis; 3] = [
 
 /// The largest rms errors of X, Y, Rz that a fit may have: m, m, rad; `None` where any will do.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Limits(pub(super) [Option<f64>; 3]);
+pub struct Limits(pub [Option<f64>; 3]);
 
 impl FromStr for Limits {
     type Err = String;
@@ -49,7 +49,7 @@ impl FromStr for Limits {
 impl Limits {
     /// The axes whose rms error (m, m, rad) is beyond its limit; `None` if there are none. `which` says where
     /// these errors stand: in service or on the log.
-    pub(super) fn exceeded(&self, rms: [f64; 3], which: &str) -> Option<String> {
+    pub fn exceeded(&self, rms: [f64; 3], which: &str) -> Option<String> {
         let beyond = (0..3).filter_map(|axis| {
             let (limit, rms) = (self.0[axis]?, rms[axis]);
             let (name, unit, _) = AXES[axis];

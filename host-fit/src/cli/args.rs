@@ -1,14 +1,11 @@
 //! What several commands take: logs and their stage, numbers, the library's own choices by name.
 
+use crate::calibrate::Choice;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::input::log::{self, BadRows, LogReading, ReadOptions};
+use crate::input::log::{self, LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::output::Outputs;
-use crate::problem::draw::Draw;
-use crate::solve::robust::Loss;
-use crate::solve::search::kind::SearchKind;
-use crate::solve::{Projection, Solver};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use hal_adapters::can::Layout;
@@ -155,12 +152,6 @@ pub(super) fn blob_text(value: &str) -> Result<Text, &'static str> {
     Text::try_from(value).map_err(|_| "at most 32 bytes fit in the blob")
 }
 
-/// A type whose values are chosen by name on the command line.
-pub(super) trait Choice: Clone + Send + Sync + 'static {
-    /// Each value, its name and its help, which may be empty.
-    fn all() -> Vec<(Self, &'static str, &'static str)>;
-}
-
 /// Parses a [`Choice`].
 pub(super) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
     let value = |(_, name, help): (T, &'static str, &'static str)| match help {
@@ -171,57 +162,6 @@ pub(super) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
         let found = T::all().into_iter().find(|(_, known, _)| *known == name);
         found.map(|(value, ..)| value).ok_or("not a known value")
     })
-}
-
-/// Choices whose values are the variants of an enum: name and help of each.
-macro_rules! values {
-    ($($type:ty { $($variant:ident: $name:literal, $help:literal;)* })*) => {$(
-        impl $crate::cli::args::Choice for $type {
-            fn all() -> Vec<(Self, &'static str, &'static str)> {
-                vec![$((Self::$variant, $name, $help)),*]
-            }
-        }
-    )*};
-}
-pub(super) use values;
-
-values! {
-    Projection {
-        None: "none", "Nothing: every zero deviation is an unknown of its own, within its range (the paper)";
-        Delta: "delta", "The zero deviations";
-        Linear: "linear", "Everything linear: the gain G and one offset for each movement. Nine unknowns of model 31 are left";
-    }
-    Loss {
-        Cauchy: "cauchy", "Hardly at all (the default)";
-        Huber: "huber", "As rows at the limit of 6 robust standard deviations do";
-        None: "none", "As any other: plain least squares";
-    }
-    Draw {
-        Stratified: "stratified", "Each movement gives its share, so that none is missed while N is at least their number";
-        Plain: "plain", "As the paper draws: any row with the same chance. Most draws of 200 rows out of 57 movements miss one, whose zero deviation then is free";
-    }
-    BadRows {
-        Refuse: "refuse", "Stop at the first and say where it is";
-        Skip: "skip", "Leave them out and count them";
-    }
-}
-
-impl Choice for SearchKind {
-    fn all() -> Vec<(Self, &'static str, &'static str)> {
-        Self::ALL
-            .iter()
-            .map(|value| (*value, value.name(), ""))
-            .collect()
-    }
-}
-
-impl Choice for Solver {
-    fn all() -> Vec<(Self, &'static str, &'static str)> {
-        Self::ALL
-            .iter()
-            .map(|value| (*value, value.name(), ""))
-            .collect()
-    }
 }
 
 /// How codes are put into frames.

@@ -2,25 +2,22 @@
 
 use super::args::{Json, Logs};
 use super::report::{Report, finish};
-use crate::cli::error::{HostError, NOT_WRITTEN};
+use crate::calibrate::{check_refusal, checked, warnings_of};
+use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::diagnose::trusted::trusted;
 use crate::diagnose::{self, Diagnosis};
-use crate::finding::{self, Code, Finding, Severity};
-use crate::fit::{Fit, FitError, FitSettings, ModelChoice, fit_log};
-use crate::input::log::{LogReading, ReadOptions};
+use crate::finding::{Finding, Severity};
+use crate::fit::{FitSettings, ModelChoice, fit_log};
+use crate::input::log::ReadOptions;
 use crate::interrupt;
 use crate::judge::Zeros;
-use crate::judge::identify::FitFailure;
 use crate::output::Outputs;
-use crate::report::errors::errors;
-use crate::report::json::of_eval;
+use crate::report::json::{Circumstances, of_eval};
 use crate::report::page::Errors;
 use crate::report::table::tables;
 use crate::report::verdict::{End, Subject};
 use crate::solve::{Projection, SolverOptions};
 use clap::Args;
-use serde_json::{Value, json};
 use std::time::Instant;
 
 /// Arguments of `check`.
@@ -32,69 +29,6 @@ pub(super) struct CheckArgs {
     report: Report,
     #[command(flatten)]
     json: Json,
-}
-
-/// What is said of a log of which no calibration is kept: model and errors of the fit over all rows, null
-/// without a fit; why there is no fit, null if there is one.
-pub(super) fn checked(
-    log: &LogReading,
-    fitted: Result<&Fit, &FitError>,
-    diagnosis: &Diagnosis,
-) -> Value {
-    let (rows, movements) = log.dataset.read();
-    let fit = fitted.ok();
-    json!({
-        "rows": rows,
-        "movements": movements,
-        "skipped_rows": log.skipped_rows,
-        "model": fit.map(|fit| fit.model.name),
-        "errors": fit.map(|fit| errors(&fit.all.errors)),
-        "failure": fitted.err().map(ToString::to_string),
-        "warnings": super::warnings_of(log),
-        "verdict": diagnosis.verdict,
-        "predicted": diagnosis.predicted,
-        "findings": diagnosis.findings,
-        "trusted_inputs": fit.map_or_else(Vec::new, |fit| trusted(&fit.set)),
-    })
-}
-
-/// Whether findings explain why a fit failed.
-fn is_explained(error: &FitError, findings: &[Finding]) -> bool {
-    let spoils = |found: &Finding| {
-        let harmless = [
-            Code::TermsAtLimit,
-            Code::Jitter,
-            Code::RowsMissing,
-            Code::NotDetermined,
-        ];
-        found.severity >= Severity::Warn && !harmless.contains(&found.code)
-    };
-    match error {
-        // What it says may be wrong is for logs of which nothing is known.
-        FitError::Failed(FitFailure::NotDescribed { .. }) => findings.iter().any(spoils),
-        // What a log leaves open, the failure says better.
-        _ => {
-            let names = |found: &Finding| finding::is_explained(std::slice::from_ref(found));
-            findings
-                .iter()
-                .any(|found| found.code != Code::NotDetermined && names(found))
-        }
-    }
-}
-
-/// The end of a run whose fit failed, with what the diagnosis found.
-pub(super) fn failed(error: &FitError, findings: &[Finding]) -> HostError {
-    let messages = finding::messages(findings, Severity::Warn);
-    match is_explained(error, findings) {
-        _ if messages.is_empty() => HostError::rejected(format!("{NOT_WRITTEN}{error}")),
-        true => HostError::rejected(refused(&messages)),
-        false => HostError::rejected(format!("{NOT_WRITTEN}{error}. {messages}")),
-    }
-}
-
-/// How the command ends of a log that is refused.
-fn refused(findings: &str) -> String {
-    format!("the log is refused, and no parameter blob was written: {findings}")
 }
 
 /// Reads and fits, keeps nothing, and reports what was found.
@@ -122,13 +56,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
     });
     let findings = &diagnosis.findings;
-    let refusals = finding::messages(findings, Severity::Refuse);
-    let failure = match &fitted {
-        Err(error) => Some(failed(error, findings)),
-        Ok(_) if refusals.is_empty() => None,
-        Ok(_) => Some(HostError::rejected(refused(&refusals))),
-    };
-    let why = failure.as_ref().map(ToString::to_string);
+    let why = check_refusal(fitted.as_ref(), findings);
     let fit = fitted.as_ref().ok();
     let subject = Subject {
         end: why.as_deref().map_or(End::Checked, End::Failed),
@@ -141,7 +69,8 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     let mut outputs = Outputs::default();
     let checked = checked(&log, fitted.as_ref(), &diagnosis);
     args.json.add(&mut outputs, &checked)?;
-    let circumstances = super::circumstances(&log, &stage, started);
+    let elapsed_s = started.elapsed().as_secs_f64();
+    let circumstances = Circumstances::new(&log, &stage, elapsed_s, Diagnosis::default());
     let judged = fit.map(|fit| {
         let zeros = Zeros::of_model(fit.model);
         of_eval(&fit.set, &fit.all, zeros, &circumstances)
@@ -159,14 +88,14 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     })?;
     let hidden = ["failure", "warnings", "verdict", "predicted", "findings"];
     let is_note = |found: &Finding| found.severity == Severity::Note;
-    if failure.is_none() && findings.iter().all(is_note) {
+    if why.is_none() && findings.iter().all(is_note) {
         terminal::print("nothing is wrong with it\n")?;
     }
     finish(
         outputs,
         &tables(&checked, &hidden),
-        &super::warnings_of(&log),
+        &warnings_of(&log),
         &subject,
     )?;
-    failure.map_or(Ok(()), Err)
+    why.map_or(Ok(()), |why| Err(HostError::rejected(why)))
 }

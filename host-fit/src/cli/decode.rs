@@ -43,13 +43,6 @@ pub(super) struct DecodeArgs {
     format: PoseFormat,
 }
 
-super::args::values! {
-    PoseFormat {
-        Csv: "csv", "Text";
-        Npy: "npy", "A structured array for numpy.load, in SI units, the decoder's words bit for bit";
-    }
-}
-
 /// Decodes a log into a pose file.
 pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     let inputs = [&args.params, &args.log, &args.stage.path].map(PathBuf::as_path);

@@ -13,6 +13,7 @@
 
 use crate::bus::import::ImportError;
 use crate::bus::update::{UpdateError, UpdateRunError};
+use crate::calibrate::{CalibrateError, Mismatch, NOT_WRITTEN};
 use crate::fit::FitError;
 use crate::input::log::LogError;
 use crate::input::source::SourceError::Interrupted;
@@ -22,10 +23,6 @@ use crate::plan::PlanError;
 use crate::recalibrate::RecalibrateError;
 use std::error::Error;
 use std::fmt::{self, Display, Formatter};
-
-/// What comes before the cause of a fit that failed.
-pub(super) const NOT_WRITTEN: &str =
-    "the fit failed its own checks, and no parameter blob was written: ";
 
 /// Why a run ended early.
 #[derive(Debug)]
@@ -84,6 +81,22 @@ impl HostError {
 impl Display for HostError {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         write!(f, "{}{}", self.lost, self.cause)
+    }
+}
+
+impl HostError {
+    /// Why a fit was not tried, or not kept.
+    pub(super) fn of_fit(error: CalibrateError) -> Self {
+        match error {
+            CalibrateError::Log(error) => error.into(),
+            CalibrateError::Unsupported(error) => Self::usage("--project", error),
+            CalibrateError::Interrupted(kept) => Self::interrupted(kept),
+        }
+    }
+
+    /// Settings of a fit that do not go together.
+    pub(super) fn of_mismatch(Mismatch { argument, problem }: Mismatch) -> Self {
+        Self::usage(&format!("--{argument}"), problem)
     }
 }
 

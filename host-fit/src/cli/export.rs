@@ -10,7 +10,7 @@ use clap::Args;
 use runtime::blob::MAX_BYTES;
 use std::path::PathBuf;
 
-super::args::values! {
+crate::calibrate::values! {
     ExportFormat {
         Bin: "bin", "The bytes of the blob; give the address to the flash tool";
         Hex: "hex", "Intel HEX";

@@ -1,52 +1,28 @@
 //! `host-fit fit`.
 
 use super::args::{Json, Logs, Threads, Train, blob_text, choice};
-use super::check::{checked, failed};
-use super::limit::Limits;
 use super::report::finish;
+use crate::calibrate::{FitOrder, Limits, checked, loss_of, warnings_of};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::diagnose;
-use crate::diagnose::of_fit;
-use crate::finding::{self, Finding, Severity};
-use crate::fit::{
-    Fit, FitError, FitSettings, ModelChoice, cross_validate, fit_compensated, fit_log,
-};
+use crate::fit::{Fit, FitSettings, ModelChoice};
 use crate::input::log::{BadRows, LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::interrupt;
 use crate::output::{Outputs, blob_file, posterior_file};
 use crate::problem::draw::Draw;
-use crate::problem::model::MODELS;
 use crate::problem::parameters::Parameters;
-use crate::recalibrate::Known;
-use crate::report::json::{Choice, Circumstances, Report, of_cross_validation, of_fit};
+use crate::report::json::Report;
 use crate::report::page::{Errors, Source};
 use crate::report::parameters;
 use crate::report::table::tables;
 use crate::report::verdict::{End, Subject};
 use crate::solve::robust::Loss;
-use crate::solve::{Projection, SolveError, Solver, SolverOptions};
+use crate::solve::{Projection, Solver, SolverOptions};
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use runtime::ModelKind;
 use runtime::parameters::Text;
 use std::path::PathBuf;
 use std::time::Instant;
-
-/// The models on the command line, `auto` and those of the table.
-fn models() -> impl TypedValueParser<Value = ModelChoice> {
-    let auto =
-        PossibleValue::new("auto").help("The field model where the log can carry it, else 31");
-    let named = MODELS
-        .iter()
-        .map(|model| PossibleValue::new(model.name).help(model.summary));
-    let names: Vec<PossibleValue> = [auto].into_iter().chain(named).collect();
-    PossibleValuesParser::new(names).map(|name| {
-        let named = MODELS.iter().find(|model| model.name == name);
-        named.map_or(ModelChoice::Auto, ModelChoice::Named)
-    })
-}
 
 /// Arguments of `fit`.
 #[derive(Debug, Args)]
@@ -57,7 +33,7 @@ pub(super) struct FitArgs {
     #[arg(long, value_name = "params.bin")]
     out: PathBuf,
     /// Measurement model.
-    #[arg(long, value_name = "MODEL", value_parser = models(), default_value = "auto")]
+    #[arg(long, value_name = "MODEL", value_parser = choice::<ModelChoice>(), default_value = "auto")]
     model: ModelChoice,
     /// Solver. The default searches by SHTLBO and finishes by least squares, `lm` is least squares
     /// alone, the others search only.
@@ -123,151 +99,64 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let outputs = outputs.map(|path| path.map(PathBuf::as_path));
     let inputs = args.logs.inputs().chain(args.start.as_deref());
     super::keep_apart_with(outputs, &args.report, inputs)?;
-    check_arguments(args)?;
+    let loss = loss_of(args.loss, args.model, args.solver, args.project);
+    let loss = loss.map_err(HostError::of_mismatch)?;
     interrupt::watch();
     let stage = args.logs.stage.read()?;
     let mut log = args.logs.read(
         &stage,
         ReadOptions {
             bad_rows: args.bad_rows,
-            // With the lag taken off all rows are other rows.
-            rows_max: ReadOptions::FIT.rows_max.filter(|_| !args.compensate_lag),
-            ..ReadOptions::FIT
+            ..FitOrder::read_options(args.compensate_lag)
         },
     )?;
-    let settings = settings(args)?;
-    let mut fitted = terminal::timed("fit", || {
-        if args.compensate_lag {
-            let found = fit_compensated(&log.dataset, &stage, &settings);
-            Ok(found.map(|(fit, compensated)| {
-                log.dataset = compensated;
-                fit
-            }))
-        } else {
-            fit_log(&log, &stage, &settings)
-        }
-    })?;
-    let is_interrupted = interrupt::requested();
-    match &fitted {
-        // No fit was tried: the arguments do not go together.
-        Err(FitError::Solver(error @ SolveError::Unsupported { .. })) => {
-            return Err(HostError::usage("--project", error));
-        }
-        Err(error) if is_interrupted => {
-            let kept = format!("nothing was written: {error}");
-            return Err(HostError::interrupted(kept));
-        }
-        _ => {}
-    }
-    let diagnosis = terminal::timed("diagnosis", || {
-        diagnose::of_log(&log.dataset, &stage, fitted.as_ref())
-    });
-    if let Some(repair) = &diagnosis.repair {
-        fitted = match fitted {
-            Ok(fit) => fit.repaired(&log, &stage, repair)?,
-            failed => failed,
-        };
-    }
-    let findings = &diagnosis.findings;
-    // The field model is made for service, other models for movements like those of the log.
-    let is_field = fitted.as_ref().is_ok_and(|fit| fit.field.is_some());
-    let in_service = diagnosis
-        .predicted
-        .map(|predicted| predicted.rms)
-        .filter(|_| is_field);
-    let refusal = match &fitted {
-        Err(error) => Some(failed(error, findings).to_string()),
-        Ok(fit) => refusal(
-            findings,
-            in_service.map_or_else(
-                || (fit.all.errors.axes.map(|axis| axis.rms), "on the log"),
-                |rms| (rms, "in service"),
-            ),
-            args.limit.as_ref(),
-        )
-        .or_else(|| unfinished(fit, &log).filter(|_| is_interrupted)),
+    let order = FitOrder {
+        settings: settings(args, loss)?,
+        compensate_lag: args.compensate_lag,
+        limits: args.limit.unwrap_or_default(),
     };
-    let has_blob = fitted.is_ok() && (refusal.is_none() || args.force);
-    if let (Some(cause), true, false) = (&refusal, is_interrupted, has_blob) {
-        let kept = format!("nothing was written: {cause}. --force writes it all the same");
-        return Err(HostError::interrupted(kept));
+    let fitted = terminal::timed("fit", || order.fit(&log, &stage));
+    let (fitted, compensated) = fitted.map_err(HostError::of_fit)?;
+    if let Some(compensated) = compensated {
+        log.dataset = compensated;
     }
+    let outcome = terminal::timed("diagnosis", || order.judge(fitted, &log, &stage));
+    let outcome = outcome.map_err(HostError::of_fit)?;
+    let of_log = (&log, &stage);
+    let mut report = outcome.report(&order, of_log, started.elapsed().as_secs_f64());
     let mut outputs = Outputs::default();
-    let report = match &mut fitted {
-        Err(error) => {
-            let checked = checked(&log, Err(error), &diagnosis);
+    match &mut report {
+        None => {
+            let checked = checked(&log, outcome.fitted.as_ref(), &outcome.diagnosis);
             args.json.add(&mut outputs, &checked)?;
-            None
         }
-        Ok(fit) => {
-            fit.set.fit.forced = refusal.is_some();
-            let circumstances = Circumstances {
-                diagnosis: diagnosis.clone(),
-                ..super::circumstances(&log, &stage, started)
-            };
-            let (solver, project) = match fit.field {
-                Some(_) => (Solver::LeastSquares, Projection::Linear),
-                None => (args.solver, args.project),
-            };
-            let choice = Choice {
-                solver: solver.name(),
-                project: project.name(),
-                seed: args.seed,
-                lag_compensated: args.compensate_lag,
-            };
-            let mut report = of_fit(fit, choice, &circumstances);
-            if args.cross_validate && refusal.is_none() {
-                match cross_validate(fit, &log.dataset, &stage, &settings) {
-                    Ok(found) => report.of_fit["cross_validation"] = of_cross_validation(&found),
-                    Err(error) => {
-                        let warning =
-                            format!("no cross-validation: without a fifth of the rows, {error}");
-                        terminal::warn(std::slice::from_ref(&warning));
-                        report.warnings.push(warning);
-                    }
-                }
+        Some(report) => {
+            if args.cross_validate && outcome.refusal.is_none() {
+                let failed = outcome.cross_validate(report, &order, of_log);
+                terminal::warn(failed.as_slice());
             }
-            args.json.add(&mut outputs, &report)?;
-            Some(report)
+            args.json.add(&mut outputs, report)?;
         }
-    };
-    let found = fitted.as_ref().ok().zip(report.as_ref());
-    let end = match &refusal {
-        Some(cause) if !has_blob => End::Failed(cause),
-        _ if interrupt::requested() => End::Interrupted,
-        _ => End::Written,
-    };
-    let subject = Subject {
-        end,
-        diagnosis: &diagnosis,
-        is_field,
-        errors: found.map(|(fit, _)| &fit.all.errors),
-        limits: args.limit.unwrap_or_default().0,
-        in_service: in_service.is_some(),
-    };
-    let source = || source(args, (&log, &stage), subject, found);
-    args.report.add(&mut outputs, source)?;
-    let warnings = super::warnings_of(&log);
-    let (Some((fit, report)), true) = (found, has_blob) else {
+    }
+    let found = outcome.fitted.as_ref().ok().zip(report.as_ref());
+    let subject = outcome.subject();
+    args.report
+        .add(&mut outputs, || source(args, of_log, subject, found))?;
+    let warnings = warnings_of(&log);
+    let (Some((fit, report)), true) = (found, outcome.has_blob) else {
         finish(outputs, &[], &warnings, &subject)?;
-        return Err(match (fitted, refusal) {
-            (Ok(_), Some(cause)) => HostError::rejected(format!(
-                "{cause}. No parameter blob was written; --force writes one that says so"
-            )),
-            (_, cause) => HostError::rejected(cause.unwrap_or_default()),
-        });
+        let cause = outcome.refusal.unwrap_or_default();
+        return Err(HostError::rejected(match &outcome.fitted {
+            Ok(_) => {
+                format!("{cause}. No parameter blob was written; --force writes one that says so")
+            }
+            Err(_) => cause,
+        }));
     };
-    if let Some(cause) = &refusal {
+    if let Some(cause) = &outcome.refusal {
         terminal::warn(&[format!("written all the same, as --force asks: {cause}")]);
     }
-    let repaired = diagnosis
-        .repair
-        .as_ref()
-        .map(|repair| repair.faults.clone());
-    let known = fit.field.as_ref().map(|field| Known {
-        repaired: repaired.unwrap_or_default(),
-        ..Known::of_fit(field)
-    });
+    let known = outcome.known();
     posterior_file::add_calibration(&mut outputs, &args.out, &fit.set, known.as_ref())?;
     let designed = [("designed", parameters::designed(&stage))];
     let mut details = tables(&report, &report.hidden());
@@ -283,7 +172,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
 }
 
 /// How the fit is made, by the arguments.
-fn settings(args: &FitArgs) -> Result<FitSettings, HostError> {
+fn settings(args: &FitArgs, loss: Loss) -> Result<FitSettings, HostError> {
     let start = args.start.as_deref().map(blob_file::read).transpose()?;
     let usual = SolverOptions::new(args.project, args.seed);
     let options = SolverOptions {
@@ -298,63 +187,12 @@ fn settings(args: &FitArgs) -> Result<FitSettings, HostError> {
         train: args.train.0,
         draw: args.draw,
         solver: args.solver,
-        loss: args.loss.unwrap_or(match args.solver {
-            Solver::Search(_) => Loss::None,
-            Solver::Finished | Solver::LeastSquares => Loss::Cauchy,
-        }),
+        loss,
         options,
         serial: args.serial.clone().unwrap_or_default(),
         created: args.report.created.clone().unwrap_or_default(),
         force: args.force,
     })
-}
-
-/// Why a fit is not to be written.
-fn refusal(
-    findings: &[Finding],
-    (rms, which): ([f64; 3], &str),
-    limits: Option<&Limits>,
-) -> Option<String> {
-    let refused = finding::messages(findings, Severity::Refuse);
-    if refused.is_empty() {
-        return limits?.exceeded(rms, which);
-    }
-    Some(format!("the log is refused: {refused}"))
-}
-
-/// Why a search that was interrupted is not to be written: a finished one leaves little but noise.
-fn unfinished(fit: &Fit, log: &LogReading) -> Option<String> {
-    let found = of_fit::unexplained(fit, &log.dataset)?;
-    let (rms, unit) = (found.value?, found.unit?);
-    Some(format!(
-        "the best so far has errors of {rms:.1} {unit} rms, more than {} times the noise from sample to sample: let it run longer",
-        of_fit::ERROR_TO_NOISE_MAX
-    ))
-}
-
-/// Only least squares has weights, and the field model has one way to be fitted.
-fn check_arguments(args: &FitArgs) -> Result<(), HostError> {
-    let is_field =
-        matches!(args.model, ModelChoice::Named(model) if model.kind == ModelKind::Field);
-    let refused = |argument, problem: String| Err(HostError::usage(argument, problem));
-    match (args.solver, args.loss) {
-        (Solver::Search(_), Some(Loss::Huber | Loss::Cauchy)) => refused(
-            "--loss",
-            format!(
-                "a search alone counts all rows alike: leave --solver {} out, or take --loss none",
-                args.solver.name()
-            ),
-        ),
-        (solver, _) if is_field && solver != Solver::Finished => refused(
-            "--solver",
-            "--model field has a solver of its own; leave --solver out".to_owned(),
-        ),
-        _ if is_field && args.project != Projection::Linear => refused(
-            "--project",
-            "--model field has a projection of its own; leave --project out".to_owned(),
-        ),
-        _ => Ok(()),
-    }
 }
 
 /// What the report says of a fit with its figures, or of a log that has none.

@@ -16,7 +16,6 @@ mod import;
 mod init;
 mod inspect;
 mod key;
-mod limit;
 mod live;
 mod plan;
 mod read_back;
@@ -31,22 +30,19 @@ mod terminal;
 mod threads;
 mod update;
 
+use crate::calibrate::other_scales;
 use crate::cli::error::HostError;
-use crate::diagnose::Diagnosis;
-use crate::input::log::LogReading;
 use crate::input::stage::Stage;
 use crate::output::{
     FileIdentity, blob_file, check_writable, is_standard, is_standard_output, posterior_file,
 };
 use crate::progress;
-use crate::report::json::Circumstances;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use runtime::ParameterSet;
 use std::ffi::OsString;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
 
 /// Calibrates the Hall-sensor array of a 6-DOF precision stage from logged data.
 ///
@@ -285,42 +281,11 @@ fn blob_of_stage(
 ) -> Result<(ParameterSet, Stage), HostError> {
     let set = blob_file::read(blob)?;
     let stage = stage_file.read()?;
-    let (hall, capacitive) = (&set.hall, &set.capacitive);
-    for (key, of_stage, of_blob) in [
-        ("hall.m_per_count", stage.hall.m_per_count, hall.m_per_code),
-        (
-            "capacitive.m_per_count",
-            stage.capacitive.m_per_count,
-            capacitive.m_per_code,
-        ),
-    ] {
-        if of_stage as f32 != of_blob {
-            return Err(HostError::input(format!(
-                "{}: {key} is {of_stage:e}, but the parameter blob was made for {of_blob:e}: name the stage.toml that \
-                 the blob was fitted with",
-                stage_file.path.display()
-            )));
-        }
+    if let Some(problem) = other_scales(&set, &stage) {
+        let path = stage_file.path.display();
+        return Err(HostError::input(format!("{path}: {problem}")));
     }
     Ok((set, stage))
-}
-
-/// The warnings of a log that is diagnosed, which reports another rate itself.
-fn warnings_of(log: &LogReading) -> Vec<String> {
-    let messages = log.warnings.iter().map(|found| found.message.clone());
-    messages.collect()
-}
-
-/// What the reports say of the logs.
-fn circumstances<'s>(log: &'s LogReading, stage: &'s Stage, started: Instant) -> Circumstances<'s> {
-    Circumstances {
-        stage,
-        dataset: &log.dataset,
-        skipped_rows: log.skipped_rows,
-        elapsed_s: started.elapsed().as_secs_f64(),
-        warnings: warnings_of(log),
-        diagnosis: Diagnosis::default(),
-    }
 }
 
 #[cfg(test)]

@@ -3,32 +3,21 @@
 use super::args::choice;
 use super::args::{Json, Logs};
 use super::report::finish;
+use crate::calibrate::{figures_of_recalibration, warnings_of_recalibration};
 use crate::cli::error::HostError;
-use crate::finding::{self, Finding, Severity};
-use crate::fit::of_undecoded;
-use crate::input::log::{LogReading, ReadOptions};
+use crate::finding::{self, Severity};
+use crate::input::log::ReadOptions;
 use crate::output::posterior_file::PosteriorFileError;
 use crate::output::{Outputs, posterior_file};
 use crate::problem::model::Model;
-use crate::recalibrate::{Known, RecalibrateError, Recalibration, recalibrate};
-use crate::report::errors::errors;
-use crate::report::field::by_axis;
+use crate::recalibrate::{Known, RecalibrateError, recalibrate};
 use crate::report::table::tables;
 use crate::report::verdict::{End, Subject};
 use crate::solve::field::update::Change;
 use clap::Args;
 use runtime::parameters::Text;
 use runtime::{ModelKind, ParameterSet};
-use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-
-super::args::values! {
-    Change {
-        Gain: "gain", "One gain for all probes: 2 s of a sine along Y tell it";
-        Gains: "gains", "A gain for each probe: 2 s of X, Y and Rz moving at once";
-        All: "all", "All parameters, as after a probe was seated anew: 8 s of all six axes moving at once";
-    }
-}
 
 /// Arguments of `recalibrate`.
 #[derive(Debug, Args)]
@@ -87,8 +76,8 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         args.what,
         created,
     )?;
-    let warnings = warnings(&log, &new);
-    let figures = figures(args.what, &new, &log, &warnings);
+    let warnings = warnings_of_recalibration(&log, &new);
+    let figures = figures_of_recalibration(args.what, &new, &log, &warnings);
     let refusal = finding::messages(&new.diagnosis.findings, Severity::Refuse);
     let mut outputs = Outputs::default();
     args.json.add(&mut outputs, &figures)?;
@@ -125,49 +114,4 @@ fn read_known(
         Err(PosteriorFileError::Missing { .. }) if args.what != Change::All => Ok(None),
         Err(error) => Err(error.into()),
     }
-}
-
-fn warnings(log: &LogReading, new: &Recalibration) -> Vec<String> {
-    let message = |found: &Finding| found.message.clone();
-    let mut warnings: Vec<String> = log.warnings.iter().map(message).collect();
-    let undecoded = of_undecoded(new.judgement.undecoded);
-    warnings.extend(undecoded.map(|found| found.message));
-    if new.known.is_none() {
-        warnings.push(
-            "no posterior stands beside the old blob: the predicted errors count those of the gains alone, and the new \
-             blob can only have its gains recalibrated"
-                .to_owned(),
-        );
-    }
-    warnings
-}
-
-fn figures(change: Change, new: &Recalibration, log: &LogReading, warnings: &[String]) -> Value {
-    let gain = |(change, error): (f64, f64)| json!({ "change_percent": change * 100.0, "standard_error_percent": error * 100.0 });
-    let [a, b, c] = new.gains.map(gain);
-    // rms errors, from ratios to the noise floor.
-    let rms = |ratios: [f64; 3]| by_axis([0, 1, 2].map(|k| new.floor[k] * ratios[k]));
-    json!({
-        "what": change.name(),
-        "rows": log.dataset.rows.len(),
-        "movements": log.dataset.movements.len(),
-        "gains": { "a": a, "b": b, "c": c },
-        // What is predicted for service over the calibrated range: with the old blob, with the new one,
-        // and by the noise of the probes alone.
-        "predicted_service": {
-            "before": rms(new.before), "after": rms(new.after), "floor": rms([1.0; 3]),
-        },
-        // Whether an old posterior was there, and a new one is.
-        "posterior": new.known.is_some(),
-        // Over residuals: about 1.
-        "chi_squared": new.chi_squared,
-        // Over the log, zero deviations refitted.
-        "errors": errors(&new.judgement.errors),
-        "errors_before": errors(&new.judgement_before.errors),
-        "serial": new.set.serial.as_str(),
-        "warnings": warnings,
-        "verdict": new.diagnosis.verdict,
-        "predicted": new.diagnosis.predicted,
-        "findings": new.diagnosis.findings,
-    })
 }

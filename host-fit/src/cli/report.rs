@@ -1,12 +1,13 @@
 //! `--report` of the commands that judge: where the page goes, and what stands on it besides figures.
 
 use super::args::{Logs, blob_text};
+use crate::calibrate::warnings_of;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::input::log::LogReading;
 use crate::input::stage::Stage;
 use crate::output::{Outputs, make_folder};
-use crate::report::page::Source;
+use crate::report::page::{Source, facts};
 use crate::report::provenance::Provenance;
 use crate::report::table::Table;
 use crate::report::verdict::{Subject, Summary};
@@ -47,26 +48,6 @@ impl Report {
         Some(self.folder.as_ref()?.join("index.html"))
     }
 
-    /// What a person says of the run, in the order of a certificate.
-    fn facts(&self, serial: &str) -> Vec<[String; 2]> {
-        let date = match self.created.as_deref() {
-            None | Some("") => "not given; name it with --created",
-            Some(date) => date,
-        };
-        let serial = if serial.is_empty() {
-            "without serial number"
-        } else {
-            serial
-        };
-        let mut facts = vec![["stage".to_owned(), serial.to_owned()]];
-        let operator = self.operator.iter();
-        facts.extend(operator.map(|name| ["operator".to_owned(), name.clone()]));
-        facts.push(["date".to_owned(), date.to_owned()]);
-        let notes = self.notes.iter();
-        facts.extend(notes.map(|(key, value)| [key.clone(), value.clone()]));
-        facts
-    }
-
     /// What a page says of logs, before there are errors.
     pub(super) fn source<'a>(
         &self,
@@ -81,11 +62,16 @@ impl Report {
         Source {
             title,
             subject,
-            facts: self.facts(serial),
+            facts: facts(
+                serial,
+                self.operator.as_deref(),
+                self.created.as_deref(),
+                &self.notes,
+            ),
             stage,
             dataset: &log.dataset,
             provenance,
-            warnings: super::warnings_of(log),
+            warnings: warnings_of(log),
             errors: None,
         }
     }

@@ -16,7 +16,7 @@ use flate2::{Compression, write::GzEncoder};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-super::args::values! {
+crate::calibrate::values! {
     Protocol {
         Paper: "paper", "The paper's: at the 19 settings of its Table 6, a sine along Y, X and Rz in turn";
         Combined: "combined", "All six axes at once, 8 movements of 8 s";

@@ -24,6 +24,7 @@ mod uncertainty;
 
 pub use stream::{DecodeSettings, PoseFormat, decode_log};
 pub use summary::StatusCounts;
+pub use uncertainty::uncertainty;
 
 use runtime::Reading;
 

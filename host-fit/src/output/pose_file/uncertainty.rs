@@ -5,7 +5,7 @@ use runtime::Reading;
 
 /// Standard uncertainties of X, Y, Rz of a reading, m, m, rad: by the parameters and by the noise of
 /// the probes together, at the pose that was decoded. 0 where none was.
-pub(super) fn uncertainty(reading: &Reading, posterior: &Posterior) -> [f64; 3] {
+pub fn uncertainty(reading: &Reading, posterior: &Posterior) -> [f64; 3] {
     let known = || {
         let planar = reading.planar()?.to_array().map(f64::from);
         let vertical = reading.vertical()?.to_array().map(f64::from);

@@ -1,0 +1,87 @@
+//! Settings that are chosen by name, on the command line and in Python.
+
+use crate::fit::ModelChoice;
+use crate::input::log::BadRows;
+use crate::output::pose_file::PoseFormat;
+use crate::problem::draw::Draw;
+use crate::problem::model::MODELS;
+use crate::solve::field::update::Change;
+use crate::solve::robust::Loss;
+use crate::solve::search::kind::SearchKind;
+use crate::solve::{Projection, Solver};
+
+/// A type whose values are chosen by name.
+pub trait Choice: Clone + Send + Sync + 'static {
+    /// Each value, its name and its help, which may be empty.
+    fn all() -> Vec<(Self, &'static str, &'static str)>;
+}
+
+/// Choices whose values are the variants of an enum: name and help of each.
+macro_rules! values {
+    ($($type:ty { $($variant:ident: $name:literal, $help:literal;)* })*) => {$(
+        impl $crate::calibrate::Choice for $type {
+            fn all() -> Vec<(Self, &'static str, &'static str)> {
+                vec![$((Self::$variant, $name, $help)),*]
+            }
+        }
+    )*};
+}
+pub(crate) use values;
+
+values! {
+    Projection {
+        None: "none", "Nothing: every zero deviation is an unknown of its own, within its range (the paper)";
+        Delta: "delta", "The zero deviations";
+        Linear: "linear", "Everything linear: the gain G and one offset for each movement. Nine unknowns of model 31 are left";
+    }
+    Loss {
+        Cauchy: "cauchy", "Hardly at all (the default)";
+        Huber: "huber", "As rows at the limit of 6 robust standard deviations do";
+        None: "none", "As any other: plain least squares";
+    }
+    Draw {
+        Stratified: "stratified", "Each movement gives its share, so that none is missed while N is at least their number";
+        Plain: "plain", "As the paper draws: any row with the same chance. Most draws of 200 rows out of 57 movements miss one, whose zero deviation then is free";
+    }
+    BadRows {
+        Refuse: "refuse", "Stop at the first and say where it is";
+        Skip: "skip", "Leave them out and count them";
+    }
+    Change {
+        Gain: "gain", "One gain for all probes: 2 s of a sine along Y tell it";
+        Gains: "gains", "A gain for each probe: 2 s of X, Y and Rz moving at once";
+        All: "all", "All parameters, as after a probe was seated anew: 8 s of all six axes moving at once";
+    }
+    PoseFormat {
+        Csv: "csv", "Text";
+        Npy: "npy", "A structured array for numpy.load, in SI units, the decoder's words bit for bit";
+    }
+}
+
+impl Choice for SearchKind {
+    fn all() -> Vec<(Self, &'static str, &'static str)> {
+        let named = Self::ALL.iter().map(|value| (*value, value.name(), ""));
+        named.collect()
+    }
+}
+
+impl Choice for Solver {
+    fn all() -> Vec<(Self, &'static str, &'static str)> {
+        let named = Self::ALL.iter().map(|value| (*value, value.name(), ""));
+        named.collect()
+    }
+}
+
+impl Choice for ModelChoice {
+    /// `auto`, and those of the table.
+    fn all() -> Vec<(Self, &'static str, &'static str)> {
+        let auto = "The field model where the log can carry it, else 31";
+        let named = MODELS
+            .iter()
+            .map(|model| (Self::Named(model), model.name, model.summary));
+        [(Self::Auto, "auto", auto)]
+            .into_iter()
+            .chain(named)
+            .collect()
+    }
+}

@@ -1,0 +1,211 @@
+//! A blob judged on logs with reference.
+
+use super::warnings_of;
+use crate::diagnose::{self, Diagnosis};
+use crate::finding::{self, Severity};
+use crate::fit::of_counts;
+use crate::input::log::{LogError, LogReading, LogRow, ReadOptions, ReferenceUse};
+use crate::input::stage::Stage;
+use crate::judge::statistics::PoseError;
+use crate::judge::{Decoded, Judge, Judgement, Zeros, error};
+use crate::problem::model::Model;
+use crate::problem::parameters::Parameters;
+use crate::report::errors::RowErrors;
+use crate::report::json::{Circumstances, Report, of_eval};
+use crate::report::page::Errors;
+use crate::report::table::tables;
+use crate::report::verdict::{End, Subject};
+use runtime::{ModelKind, ParameterSet};
+
+/// The most rows that the diagnosis looks at: three minutes, in less than 64 MB with all else.
+const ROWS_MAX: usize = 100_000;
+
+/// What an evaluation is asked for.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct EvalOrder {
+    /// Which zero deviations are taken off; as the blob's model has them if `None`.
+    pub zeros: Option<Zeros<'static>>,
+    /// Largest rms error, in terms of that of the logs that the blob was fitted to; if `None` 3, and 10 for
+    /// models (12) to (31), whose own logs may not show what they lack.
+    pub limit: Option<f64>,
+}
+
+/// Logs that were read and decoded row by row.
+pub struct Judged<'a> {
+    set: &'a ParameterSet,
+    stage: &'a Stage,
+    judge: Judge<'a>,
+    log: LogReading,
+}
+
+/// How a blob does on logs.
+#[derive(Debug)]
+pub struct Evaluation {
+    set: ParameterSet,
+    stage: Stage,
+    /// Rows of the logs: all, or a sample.
+    pub log: LogReading,
+    /// Over all rows.
+    pub judgement: Judgement,
+    /// What is wrong with the logs.
+    pub diagnosis: Diagnosis,
+    /// Errors of the rows, zero deviations taken off.
+    pub by_row: RowErrors,
+    /// Over these.
+    of_rows: Judgement,
+    zeros: Zeros<'static>,
+    limit: f64,
+    /// The error beyond the limit, if one is.
+    pub problem: Option<String>,
+}
+
+impl<'a> Judged<'a> {
+    /// How logs are read: the reference is needed, and the decoder marks saturated codes.
+    pub const OPTIONS: ReadOptions = ReadOptions {
+        reference: ReferenceUse::Required,
+        rows_max: Some(ROWS_MAX),
+        ..ReadOptions::DECODE
+    };
+
+    /// Of so many `logs`, which `read` reads and gives row by row to what it gets.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    pub fn new(
+        set: &'a ParameterSet,
+        stage: &'a Stage,
+        logs: usize,
+        read: impl FnOnce(&mut dyn FnMut(usize, &LogRow)) -> Result<LogReading, LogError>,
+    ) -> Result<Self, LogError> {
+        let mut judge = Judge::new(&Parameters::of_set(set), stage, logs);
+        let decoder = set.decoder();
+        let log = read(&mut |log, row| {
+            let error = error(&decoder, &row.row);
+            judge.take((log, row.movement, row.begins), &row.row, error);
+        })?;
+        Ok(Self {
+            set,
+            stage,
+            judge,
+            log,
+        })
+    }
+
+    /// Counts the errors and diagnoses the logs.
+    pub fn evaluated(self, order: EvalOrder) -> Evaluation {
+        let Self {
+            set,
+            stage,
+            judge,
+            log,
+        } = self;
+        let own_zeros = Zeros::of_model(Model::of(set.model));
+        let zeros = order.zeros.unwrap_or(own_zeros);
+        let judgement = judge.clone().judgement(zeros);
+        let decoded = Decoded::new(set, &log.dataset);
+        let of_rows = decoded.judge(&log.dataset, stage, zeros);
+        let by_row = decoded.errors_less(&of_rows.zeros, &log.dataset);
+        let diagnosis = diagnose::of_judged(&log.dataset, stage, set, &by_row, None);
+        // As the blob's own errors were counted, whatever zeros are asked for.
+        let comparable = judge.judgement(own_zeros).errors;
+        let usual = if is_field(set) { 3.0 } else { 10.0 };
+        let limit = order.limit.unwrap_or(usual);
+        Evaluation {
+            problem: beyond_limit(set, &comparable, limit),
+            set: set.clone(),
+            stage: stage.clone(),
+            log,
+            judgement,
+            diagnosis,
+            by_row,
+            of_rows,
+            zeros,
+            limit,
+        }
+    }
+}
+
+fn is_field(set: &ParameterSet) -> bool {
+    set.model == ModelKind::Field
+}
+
+/// The largest error in terms of the blob's own, if that is beyond the limit; the blob of an exact fit
+/// has none to compare with.
+fn beyond_limit(set: &ParameterSet, errors: &PoseError, limit: f64) -> Option<String> {
+    const AXES: [(&str, &str); 3] = [("X", "um"), ("Y", "um"), ("Rz", "urad")];
+    let own = |axis: usize| f64::from(set.fit.rms[axis]);
+    let ratio = |axis: usize| errors.axes[axis].rms / own(axis);
+    let worst = (0..3)
+        .filter(|&axis| own(axis) > 0.0)
+        .max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
+    let (axis, unit) = AXES[worst];
+    (ratio(worst) > limit).then(|| {
+        let [error, own] = [errors.axes[worst].rms, own(worst)].map(|x| x * 1e6);
+        format!(
+            "the parameter blob does not describe this log: {error:.2} {unit} rms in {axis}, where it had {own:.2} {unit} in \
+             the logs that it was fitted to, more than {limit} times as much (--limit)"
+        )
+    })
+}
+
+impl Evaluation {
+    /// The figures.
+    pub fn report(&self, elapsed_s: f64) -> Report {
+        let counts = of_counts(&self.judgement.zeros, self.judgement.undecoded);
+        let mut warnings = warnings_of(&self.log);
+        warnings.extend(counts.map(|found| found.message));
+        let circumstances = Circumstances {
+            warnings,
+            ..Circumstances::new(&self.log, &self.stage, elapsed_s, self.diagnosis.clone())
+        };
+        of_eval(&self.set, &self.judgement, self.zeros, &circumstances)
+    }
+
+    /// How it ended, for reports.
+    pub fn subject(&self) -> Subject<'_> {
+        let own = self.set.fit.rms.map(f64::from);
+        let end = self.problem.as_deref();
+        Subject {
+            end: end.map_or(End::Judged, End::Failed),
+            diagnosis: &self.diagnosis,
+            is_field: is_field(&self.set),
+            errors: Some(&self.judgement.errors),
+            limits: own.map(|rms| (rms > 0.0).then_some(self.limit * rms)),
+            in_service: false,
+        }
+    }
+
+    /// What a page shows of the errors.
+    pub fn errors<'e>(&'e self, report: &'e Report) -> Errors<'e> {
+        let hidden = [&report.hidden()[..], &["trusted_inputs", "errors"]].concat();
+        Errors {
+            set: &self.set,
+            by_row: self.by_row.clone(),
+            figures: &self.of_rows.errors,
+            movements: &report.zero_deviations,
+            parameters: &report.parameters,
+            details: tables(report, &hidden),
+        }
+    }
+
+    /// Why the blob does not do for these logs, and what to do; `None` if it does.
+    pub fn refusal(&self) -> Option<String> {
+        let problem = self.problem.as_deref()?;
+        // What the diagnosis found explains more than a remedy; warnings stand above already.
+        let found = &self.diagnosis.findings;
+        let refusals = finding::messages(found, Severity::Refuse);
+        let more = match (refusals.as_str(), found.iter().any(|f| f.severity == Severity::Warn)) {
+            ("", true) => String::new(),
+            ("", false) if is_field(&self.set) => {
+                ". Is it the blob of this stage? If it is, and channels and scales are right, bring it up to date with host-fit recalibrate"
+                    .to_owned()
+            }
+            ("", false) => {
+                ". If channels and scales are right, take the field model, from a log in which all six axes move at once"
+                    .to_owned()
+            }
+            (refusals, _) => format!(". {refusals}"),
+        };
+        Some(format!("{problem}{more}"))
+    }
+}

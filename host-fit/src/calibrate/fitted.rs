@@ -1,0 +1,249 @@
+//! A fit with the decisions around it.
+
+use super::{Limits, failure};
+use crate::diagnose::of_fit as of_residuals;
+use crate::diagnose::{self, Diagnosis};
+use crate::finding::{self, Severity};
+use crate::fit::{Fit, FitError, FitSettings, cross_validate, fit_compensated, fit_log};
+use crate::input::dataset::Dataset;
+use crate::input::log::{LogError, LogReading, ReadOptions};
+use crate::input::stage::Stage;
+use crate::interrupt;
+use crate::recalibrate::Known;
+use crate::report::json::{Choice, Circumstances, Report, of_cross_validation, of_fit};
+use crate::report::verdict::{End, Subject};
+use crate::solve::{Projection, SolveError, Solver};
+
+/// What a fit is asked for.
+#[derive(Clone, Debug)]
+pub struct FitOrder {
+    /// How it is made. With `force` the blob of a refused log is written, too.
+    pub settings: FitSettings,
+    /// Whether the lag of the reference is taken off.
+    pub compensate_lag: bool,
+    /// Largest rms errors of X, Y, Rz: of the field model in service, of others over all rows.
+    pub limits: Limits,
+}
+
+/// Why nothing is known of a log.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrateError {
+    /// Those of reading a long log again.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// No fit was tried: the settings do not go together.
+    #[error(transparent)]
+    Unsupported(SolveError),
+    /// Ctrl-C, and nothing that is good enough was found before it.
+    #[error("{0}")]
+    Interrupted(String),
+}
+
+/// What a fit made of a log.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The fit, without the faults of the log where these can be taken off.
+    pub fitted: Result<Fit, FitError>,
+    /// What is wrong with the log, and what the calibration is good for.
+    pub diagnosis: Diagnosis,
+    /// Why it is not to be used; `None` where it may be.
+    pub refusal: Option<String>,
+    /// Whether there is a blob to write: of a fit that is not refused, or that is forced.
+    pub has_blob: bool,
+    limits: Limits,
+}
+
+impl FitOrder {
+    /// How logs are read for it, beyond what the user says of bad rows and movements.
+    pub fn read_options(compensate_lag: bool) -> ReadOptions {
+        ReadOptions {
+            // With the lag taken off all rows are other rows.
+            rows_max: ReadOptions::FIT.rows_max.filter(|_| !compensate_lag),
+            ..ReadOptions::FIT
+        }
+    }
+
+    /// Fits a log. With the lag of the reference taken off it also gives the rows with the reference read
+    /// later, for which the fit is.
+    ///
+    /// # Errors
+    /// See [`CalibrateError`]; inside the result those of the fit.
+    pub fn fit(
+        &self,
+        log: &LogReading,
+        stage: &Stage,
+    ) -> Result<(Result<Fit, FitError>, Option<Dataset>), CalibrateError> {
+        let (fitted, compensated) = if self.compensate_lag {
+            match fit_compensated(&log.dataset, stage, &self.settings) {
+                Ok((fit, compensated)) => (Ok(fit), Some(compensated)),
+                Err(error) => (Err(error), None),
+            }
+        } else {
+            (fit_log(log, stage, &self.settings)?, None)
+        };
+        match fitted {
+            Err(FitError::Solver(error @ SolveError::Unsupported { .. })) => {
+                Err(CalibrateError::Unsupported(error))
+            }
+            Err(error) if interrupt::requested() => Err(CalibrateError::Interrupted(format!(
+                "nothing was written: {error}"
+            ))),
+            fitted => Ok((fitted, compensated)),
+        }
+    }
+
+    /// Diagnoses the log with its fit, repairs the calibration, and says whether it may be used.
+    ///
+    /// # Errors
+    /// See [`CalibrateError`].
+    pub fn judge(
+        &self,
+        mut fitted: Result<Fit, FitError>,
+        log: &LogReading,
+        stage: &Stage,
+    ) -> Result<Outcome, CalibrateError> {
+        let is_interrupted = interrupt::requested();
+        let diagnosis = diagnose::of_log(&log.dataset, stage, fitted.as_ref());
+        if let Some(repair) = &diagnosis.repair {
+            fitted = match fitted {
+                Ok(fit) => fit.repaired(log, stage, repair)?,
+                failed => failed,
+            };
+        }
+        let mut outcome = Outcome {
+            fitted,
+            diagnosis,
+            refusal: None,
+            has_blob: false,
+            limits: self.limits,
+        };
+        let refusal = match &outcome.fitted {
+            Err(error) => Some(failure(error, &outcome.diagnosis.findings)),
+            Ok(fit) => outcome
+                .refusal_of(fit)
+                .or_else(|| unfinished(fit, log).filter(|_| is_interrupted)),
+        };
+        let force = self.settings.force;
+        outcome.has_blob = outcome.fitted.is_ok() && (refusal.is_none() || force);
+        if let (Some(cause), true, false) = (&refusal, is_interrupted, outcome.has_blob) {
+            return Err(CalibrateError::Interrupted(format!(
+                "nothing was written: {cause}. --force writes it all the same"
+            )));
+        }
+        if let Ok(fit) = &mut outcome.fitted {
+            fit.set.fit.forced = refusal.is_some();
+        }
+        outcome.refusal = refusal;
+        Ok(outcome)
+    }
+}
+
+impl Outcome {
+    /// Whether it is of the field model, which is made for service; others are for movements like those of
+    /// the log.
+    fn is_field(&self) -> bool {
+        self.fitted.as_ref().is_ok_and(|fit| fit.field.is_some())
+    }
+
+    /// Errors in service that the limits hold for, rms: m, m, rad.
+    fn in_service(&self) -> Option<[f64; 3]> {
+        let predicted = self.diagnosis.predicted.map(|predicted| predicted.rms);
+        predicted.filter(|_| self.is_field())
+    }
+
+    /// Why a fit is not to be used: findings, or errors beyond the limits.
+    fn refusal_of(&self, fit: &Fit) -> Option<String> {
+        let refused = finding::messages(&self.diagnosis.findings, Severity::Refuse);
+        if !refused.is_empty() {
+            return Some(format!("the log is refused: {refused}"));
+        }
+        let on_log = || (fit.all.errors.axes.map(|axis| axis.rms), "on the log");
+        let (rms, which) = self
+            .in_service()
+            .map_or_else(on_log, |rms| (rms, "in service"));
+        self.limits.exceeded(rms, which)
+    }
+
+    /// What goes beside the blob: what is known of a field model; `None` of others.
+    pub fn known(&self) -> Option<Known> {
+        let field = self.fitted.as_ref().ok()?.field.as_ref()?;
+        let repair = self.diagnosis.repair.as_ref();
+        Some(Known {
+            repaired: repair.map_or_else(Vec::new, |repair| repair.faults.clone()),
+            ..Known::of_fit(field)
+        })
+    }
+
+    /// How it ended, for reports.
+    pub fn subject(&self) -> Subject<'_> {
+        let end = match &self.refusal {
+            Some(cause) if !self.has_blob => End::Failed(cause),
+            _ if interrupt::requested() => End::Interrupted,
+            _ => End::Written,
+        };
+        Subject {
+            end,
+            diagnosis: &self.diagnosis,
+            is_field: self.is_field(),
+            errors: self.fitted.as_ref().ok().map(|fit| &fit.all.errors),
+            limits: self.limits.0,
+            in_service: self.in_service().is_some(),
+        }
+    }
+
+    /// The figures of the fit; `None` without one.
+    pub fn report(
+        &self,
+        order: &FitOrder,
+        (log, stage): (&LogReading, &Stage),
+        elapsed_s: f64,
+    ) -> Option<Report> {
+        let fit = self.fitted.as_ref().ok()?;
+        let settings = &order.settings;
+        let (solver, project) = match fit.field {
+            Some(_) => (Solver::LeastSquares, Projection::Linear),
+            None => (settings.solver, settings.options.projection),
+        };
+        let choice = Choice {
+            solver: solver.name(),
+            project: project.name(),
+            seed: settings.options.seed,
+            lag_compensated: order.compensate_lag,
+        };
+        let diagnosis = self.diagnosis.clone();
+        let circumstances = Circumstances::new(log, stage, elapsed_s, diagnosis);
+        Some(of_fit(fit, choice, &circumstances))
+    }
+
+    /// Adds the errors on rows left out to a report: five more fits. Where one fails, it warns and gives the
+    /// warning.
+    pub fn cross_validate(
+        &self,
+        report: &mut Report,
+        order: &FitOrder,
+        (log, stage): (&LogReading, &Stage),
+    ) -> Option<String> {
+        let fit = self.fitted.as_ref().ok()?;
+        match cross_validate(fit, &log.dataset, stage, &order.settings) {
+            Ok(found) => {
+                report.of_fit["cross_validation"] = of_cross_validation(&found);
+                None
+            }
+            Err(error) => {
+                let warning = format!("no cross-validation: without a fifth of the rows, {error}");
+                report.warnings.push(warning.clone());
+                Some(warning)
+            }
+        }
+    }
+}
+
+/// Why a search that was interrupted is not to be written: a finished one leaves little but noise.
+fn unfinished(fit: &Fit, log: &LogReading) -> Option<String> {
+    let found = of_residuals::unexplained(fit, &log.dataset)?;
+    let (rms, unit) = (found.value?, found.unit?);
+    Some(format!(
+        "the best so far has errors of {rms:.1} {unit} rms, more than {} times the noise from sample to sample: let it run longer",
+        of_residuals::ERROR_TO_NOISE_MAX
+    ))
+}

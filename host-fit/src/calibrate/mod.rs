@@ -1,0 +1,125 @@
+//! What `fit`, `check`, `eval` and `recalibrate` decide, before anything is written: fitted, diagnosed,
+//! repaired, refused or not. The command line and the Python package show the same.
+
+mod choice;
+mod evaluation;
+mod fitted;
+mod limit;
+mod recalibration;
+mod settings;
+
+pub use choice::Choice;
+pub(crate) use choice::values;
+pub use evaluation::{EvalOrder, Evaluation, Judged};
+pub use fitted::{CalibrateError, FitOrder, Outcome};
+pub use limit::Limits;
+pub use recalibration::{figures_of_recalibration, warnings_of_recalibration};
+pub use settings::{Mismatch, loss_of};
+
+use crate::diagnose::Diagnosis;
+use crate::diagnose::trusted::trusted;
+use crate::finding::{self, Code, Finding, Severity};
+use crate::fit::{Fit, FitError};
+use crate::input::log::LogReading;
+use crate::input::stage::Stage;
+use crate::judge::identify::FitFailure;
+use crate::report::errors::errors;
+use runtime::ParameterSet;
+use serde_json::{Value, json};
+
+/// What comes before the cause of a fit that failed.
+pub const NOT_WRITTEN: &str = "the fit failed its own checks, and no parameter blob was written: ";
+
+/// The warnings of a log that is diagnosed, which reports another rate itself.
+pub fn warnings_of(log: &LogReading) -> Vec<String> {
+    let messages = log.warnings.iter().map(|found| found.message.clone());
+    messages.collect()
+}
+
+/// Whether findings explain why a fit failed.
+fn is_explained(error: &FitError, findings: &[Finding]) -> bool {
+    let spoils = |found: &Finding| {
+        let harmless = [
+            Code::TermsAtLimit,
+            Code::Jitter,
+            Code::RowsMissing,
+            Code::NotDetermined,
+        ];
+        found.severity >= Severity::Warn && !harmless.contains(&found.code)
+    };
+    match error {
+        // What it says may be wrong is for logs of which nothing is known.
+        FitError::Failed(FitFailure::NotDescribed { .. }) => findings.iter().any(spoils),
+        // What a log leaves open, the failure says better.
+        _ => {
+            let names = |found: &Finding| finding::is_explained(std::slice::from_ref(found));
+            findings
+                .iter()
+                .any(|found| found.code != Code::NotDetermined && names(found))
+        }
+    }
+}
+
+/// Why a log has no calibration, with what the diagnosis found.
+fn failure(error: &FitError, findings: &[Finding]) -> String {
+    let messages = finding::messages(findings, Severity::Warn);
+    match is_explained(error, findings) {
+        _ if messages.is_empty() => format!("{NOT_WRITTEN}{error}"),
+        true => refused(&messages),
+        false => format!("{NOT_WRITTEN}{error}. {messages}"),
+    }
+}
+
+fn refused(findings: &str) -> String {
+    format!("the log is refused, and no parameter blob was written: {findings}")
+}
+
+/// Why `check` refuses a log; `None` where it does not.
+pub fn check_refusal(fitted: Result<&Fit, &FitError>, findings: &[Finding]) -> Option<String> {
+    let refusals = finding::messages(findings, Severity::Refuse);
+    match fitted {
+        Err(error) => Some(failure(error, findings)),
+        Ok(_) if refusals.is_empty() => None,
+        Ok(_) => Some(refused(&refusals)),
+    }
+}
+
+/// Why a blob is not of a stage: it was made for other scales of codes; `None` where it may be.
+pub fn other_scales(set: &ParameterSet, stage: &Stage) -> Option<String> {
+    let (hall, capacitive) = (&set.hall, &set.capacitive);
+    let keys = [
+        ("hall.m_per_count", stage.hall.m_per_count, hall.m_per_code),
+        (
+            "capacitive.m_per_count",
+            stage.capacitive.m_per_count,
+            capacitive.m_per_code,
+        ),
+    ];
+    let other = |(_, of_stage, of_blob): &(&str, f64, f32)| *of_stage as f32 != *of_blob;
+    keys.into_iter().find(other).map(|(key, of_stage, of_blob)| {
+        format!(
+            "{key} is {of_stage:e}, but the parameter blob was made for {of_blob:e}: name the stage.toml that the blob was \
+             fitted with"
+        )
+    })
+}
+
+/// What is said of a log of which no calibration is kept: model and errors of the fit over all rows, null
+/// without a fit; why there is no fit, null if there is one.
+pub fn checked(log: &LogReading, fitted: Result<&Fit, &FitError>, diagnosis: &Diagnosis) -> Value {
+    let (rows, movements) = log.dataset.read();
+    let fit = fitted.ok();
+    json!({
+        "rows": rows,
+        "movements": movements,
+        "skipped_rows": log.skipped_rows,
+        "model": fit.map(|fit| fit.model.name),
+        "errors": fit.map(|fit| errors(&fit.all.errors)),
+        "failure": fitted.err().map(ToString::to_string),
+        "warnings": warnings_of(log),
+        "verdict": diagnosis.verdict,
+        "predicted": diagnosis.predicted,
+        "findings": diagnosis.findings,
+        "trusted_inputs": fit.map_or_else(Vec::new, |fit| trusted(&fit.set)),
+    })
+}
