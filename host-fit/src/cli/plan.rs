@@ -4,17 +4,12 @@ use super::args::{Json, StageFile, between};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
-use crate::plan::plan;
+use crate::plan::{PERIODS_MAX, SECONDS_MAX, plan};
 use crate::report::plan::{figures, tables};
 use crate::report::table::as_text;
 use crate::simulate::plan_file;
 use clap::Args;
 use std::path::PathBuf;
-
-/// Longest run, s: nothing is gained beyond a few minutes.
-const SECONDS_MAX: f64 = 600.0;
-/// Most rows of a run.
-const ROWS_MAX: f64 = 2e6;
 
 fn seconds(text: &str) -> Result<f64, String> {
     between(text, f64::MIN_POSITIVE, SECONDS_MAX, "a number of seconds")
@@ -44,9 +39,9 @@ pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     super::keep_apart(outputs, [args.stage.path.as_path()])?;
     let stage = args.stage.read()?;
     let (seconds, period_s) = (args.seconds, stage.servo_period_s);
-    if seconds / period_s > ROWS_MAX {
+    if seconds / period_s > PERIODS_MAX {
         let problem = format!(
-            "a run of {seconds} s has more than {ROWS_MAX} servo periods of {period_s} s; make it shorter"
+            "a run of {seconds} s has more than {PERIODS_MAX} servo periods of {period_s} s; make it shorter"
         );
         return Err(HostError::usage("--seconds", problem));
     }

@@ -29,6 +29,10 @@ use run::Run;
 /// Errors in service over the noise floor that a run may lead to. Beyond this the run, not the
 /// sensors, decides how good the stage is.
 pub const RATIO_MAX: f64 = 1.03;
+/// Longest run, s: nothing is gained beyond a few minutes.
+pub const SECONDS_MAX: f64 = 600.0;
+/// Most servo periods of a run.
+pub const PERIODS_MAX: f64 = 2e6;
 /// Length of the ends, s, where the limits allow it.
 const TAPER_S: f64 = 0.5;
 /// Longest ends, as a part of the run.

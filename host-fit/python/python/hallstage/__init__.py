@@ -3,6 +3,6 @@
 The work is done by the Rust library `host-fit`; this package has no model of its own. All numbers are SI: m, rad, s.
 """
 
-from ._hallstage import write_demo
+from ._hallstage import OptimizeResult, minimize, write_demo
 
-__all__ = ["write_demo"]
+__all__ = ["OptimizeResult", "minimize", "write_demo"]

@@ -67,12 +67,22 @@ pub enum PlanFileError {
     },
 }
 
-/// Reads a plan for a stage of this servo period.
+/// Reads a plan for a stage of this servo period from a file.
 ///
 /// # Errors
 /// Every variant of [`PlanFileError`].
 pub fn read(path: &Path, servo_period_s: f64) -> Result<Trajectory, PlanFileError> {
-    let text = TextReader::open(path).map_err(LogError::from)?;
+    of_text(
+        TextReader::open(path).map_err(LogError::from)?,
+        servo_period_s,
+    )
+}
+
+/// As [`read`], from its text.
+///
+/// # Errors
+/// Every variant of [`PlanFileError`].
+pub fn of_text(text: TextReader<'_>, servo_period_s: f64) -> Result<Trajectory, PlanFileError> {
     let mut table = Table::open(text, |name| COLUMNS.contains(&name))?;
     if table.head.names != COLUMNS {
         return Err(PlanFileError::Columns {

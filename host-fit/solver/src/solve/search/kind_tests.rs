@@ -1,6 +1,7 @@
 use super::*;
 use crate::input::stage::Range;
 use crate::solve::search::cost::known::{Known, rastrigin, rosenbrock, sphere};
+use crate::solve::search::population::Individual;
 use crate::solve::search::run::StopReason;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -65,6 +66,36 @@ fn the_path_is_the_same_on_one_thread_and_on_several() {
         assert_eq!(one, path(3), "{}", kind.name());
         let other = kind.minimize(&function, &with_seed(6, 50), &evaluations(1_500));
         assert_ne!(one.best, other.best, "{}: the seed counts", kind.name());
+    }
+}
+
+/// A function that takes whole populations.
+struct Together(Known);
+
+impl CostFunction for Together {
+    fn bounds(&self) -> &[Range] {
+        self.0.bounds()
+    }
+    fn cost(&self, _: &[f64]) -> f64 {
+        unreachable!("it takes all at once")
+    }
+    fn costs(&self, individuals: &mut [Individual]) {
+        assert_eq!(individuals.len(), 50);
+        self.0.costs(individuals);
+    }
+    fn piece(&self) -> usize {
+        usize::MAX
+    }
+}
+
+#[test]
+fn a_function_of_whole_populations_takes_the_same_path() {
+    let one_by_one = Known::new(6, -3.0, 3.0, rosenbrock);
+    let together = Together(Known::new(6, -3.0, 3.0, rosenbrock));
+    for kind in SearchKind::ALL {
+        let search =
+            |f: &dyn CostFunction| kind.minimize(f, &with_seed(5, 50), &evaluations(1_500));
+        assert_eq!(search(&one_by_one), search(&together), "{}", kind.name());
     }
 }
 

@@ -9,10 +9,6 @@ use super::random::{Phase, RandomSource};
 use crate::input::stage::Range;
 use rayon::prelude::*;
 
-/// Individuals that a thread takes at a time: handing work to another thread and waiting for it takes
-/// 5 to 10 us here, an evaluation on a few hundred rows 2 to 3.
-const PIECE: usize = 8;
-
 /// A point of the box and its cost.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Individual {
@@ -159,12 +155,21 @@ impl<'f, B: Breeding, R: RandomSource, S: Fn(usize, Phase, usize) -> R + Sync> S
         let mut candidates = std::mem::take(&mut self.candidates);
         let mut notes = std::mem::take(&mut self.notes);
         let (function, search) = (self.function, &*self);
-        let each = candidates.par_iter_mut().zip(&mut notes).enumerate();
-        each.with_min_len(PIECE).for_each(|(k, (candidate, note))| {
-            *note = make(search, k, &mut candidate.place);
-            clip(&mut candidate.place, function.bounds());
-            candidate.cost = function.cost(&candidate.place);
-        });
+        let piece = function.piece();
+        let evaluate = |first: usize, candidates: &mut [Individual], notes: &mut [B::Note]| {
+            for (k, (candidate, note)) in (first..).zip(candidates.iter_mut().zip(notes)) {
+                *note = make(search, k, &mut candidate.place);
+                clip(&mut candidate.place, function.bounds());
+            }
+            function.costs(candidates);
+        };
+        if candidates.len() <= piece {
+            evaluate(0, &mut candidates, &mut notes);
+        } else {
+            let pieces = candidates.par_chunks_mut(piece);
+            let pieces = pieces.zip(notes.par_chunks_mut(piece)).enumerate();
+            pieces.for_each(|(k, (candidates, notes))| evaluate(k * piece, candidates, notes));
+        }
         self.evaluations += candidates.len();
         self.nan_costs += candidates.iter().filter(|c| c.cost.is_nan()).count();
         (self.candidates, self.notes) = (candidates, notes);

@@ -1,0 +1,333 @@
+//! The searches of the library on a function of Python.
+
+use host_fit::input::stage::Range;
+use host_fit::solve::search::cost::CostFunction;
+use host_fit::solve::search::kind::SearchKind;
+use host_fit::solve::search::population::Individual;
+use host_fit::solve::search::run::{Start, StopCriteria, StopReason};
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What a search found: the fields of SciPy's `OptimizeResult`.
+#[pyclass(frozen, get_all, module = "hallstage")]
+pub struct OptimizeResult {
+    /// The best place, shape (N,).
+    x: Py<PyArray1<f64>>,
+    /// The value there.
+    fun: f64,
+    /// How many places were evaluated.
+    nfev: usize,
+    /// How many generations were bred after the first population.
+    nit: usize,
+    /// Whether `fun` is a finite number.
+    success: bool,
+    /// Why the search ended, and how many values were NaN.
+    message: String,
+}
+
+#[pymethods]
+impl OptimizeResult {
+    fn __repr__(&self, python: Python<'_>) -> PyResult<String> {
+        Ok(format!(
+            " message: {}\n success: {}\n     fun: {:e}\n       x: {}\n     nit: {}\n    nfev: {}",
+            self.message,
+            if self.success { "True" } else { "False" },
+            self.fun,
+            self.x
+                .bind(python)
+                .str()?
+                .to_string()
+                .replace('\n', "\n          "),
+            self.nit,
+            self.nfev
+        ))
+    }
+}
+
+/// A function of Python over a box.
+struct Function<'a> {
+    bounds: Vec<Range>,
+    fun: &'a Py<PyAny>,
+    vectorized: bool,
+    /// What it raised; from then on it is not called.
+    error: Mutex<Option<PyErr>>,
+    failed: AtomicBool,
+}
+
+impl Function<'_> {
+    fn value(&self, python: Python<'_>, individual: &[f64]) -> PyResult<f64> {
+        let x = PyArray1::from_slice(python, individual);
+        let value = self.fun.bind(python).call1((x,))?;
+        value.extract().map_err(|_| {
+            let what = "fun: it must return one real number (set vectorized=True if it takes many places at once)";
+            not_what(&value, what)
+        })
+    }
+
+    fn values(&self, python: Python<'_>, individuals: &mut [Individual]) -> PyResult<()> {
+        let x = PyArray2::zeros(python, [self.bounds.len(), individuals.len()], true);
+        {
+            // A column for each individual, one after the other in memory.
+            let mut x = x.try_readwrite()?;
+            let columns = x.as_slice_mut()?.chunks_exact_mut(self.bounds.len());
+            for (column, individual) in columns.zip(&*individuals) {
+                column.copy_from_slice(&individual.place);
+            }
+        }
+        let values = self.fun.bind(python).call1((x,))?;
+        let read = values.extract::<PyArrayLike1<'_, f64, AllowTypeChange>>();
+        let read = read
+            .ok()
+            .filter(|read| read.as_array().len() == individuals.len());
+        let Some(read) = read else {
+            let n = individuals.len();
+            let what = format!(
+                "fun: it must return {n} real numbers, shape ({n},), one for each column of x (vectorized=True)"
+            );
+            return Err(not_what(&values, &what));
+        };
+        for (individual, value) in individuals.iter_mut().zip(read.as_array()) {
+            individual.cost = *value;
+        }
+        Ok(())
+    }
+
+    /// Whether it gave what it should; if not, that is kept, and the search ends.
+    fn keep(&self, done: PyResult<()>) {
+        if let Err(error) = done {
+            self.failed.store(true, Ordering::Relaxed);
+            if let Ok(mut kept) = self.error.lock() {
+                kept.get_or_insert(error);
+            }
+        }
+    }
+}
+
+/// The error for something else than was expected.
+fn not_what(value: &Bound<'_, PyAny>, what: &str) -> PyErr {
+    let shape = value
+        .getattr("shape")
+        .map_or(String::new(), |shape| format!(" of shape {shape}"));
+    let name = value.get_type().name();
+    let name = name.map_or("another object".to_owned(), |name| name.to_string());
+    PyTypeError::new_err(format!("{what}; it returned {name}{shape}"))
+}
+
+impl CostFunction for Function<'_> {
+    fn bounds(&self) -> &[Range] {
+        &self.bounds
+    }
+
+    fn cost(&self, individual: &[f64]) -> f64 {
+        let mut cost = f64::NAN;
+        if !self.failed.load(Ordering::Relaxed) {
+            self.keep(Python::attach(|python| {
+                python.check_signals()?;
+                cost = self.value(python, individual)?;
+                Ok(())
+            }));
+        }
+        cost
+    }
+
+    fn costs(&self, individuals: &mut [Individual]) {
+        for individual in &mut *individuals {
+            individual.cost = match self.vectorized {
+                true => f64::NAN,
+                false => self.cost(&individual.place),
+            };
+        }
+        if self.vectorized && !self.failed.load(Ordering::Relaxed) {
+            self.keep(Python::attach(|python| {
+                python.check_signals()?;
+                self.values(python, individuals)
+            }));
+        }
+    }
+
+    /// All of them: Python runs one thread, that of the caller.
+    fn piece(&self) -> usize {
+        usize::MAX
+    }
+}
+
+/// Searches for the minimum of a function over a box, by the paper's algorithm or one of its relatives.
+///
+/// Parameters
+/// ----------
+/// fun : callable
+///     The function. `fun(x)` gets an array of shape (N,) and returns a number; with `vectorized` it gets
+///     shape (N, S), a column for each place, and returns shape (S,). NaN ranks worst. What it raises ends
+///     the search and reaches the caller.
+/// bounds : array_like, shape (N, 2)
+///     Lower and upper end of each unknown, finite. A place outside is moved to the nearer end.
+/// method : str
+///     "shtlbo" (equations 23, 24, 27-29 of the paper), "tlbo" (16-18), "gbtlbo" (19, 20), "mutation" (21, 22),
+///     "hybrid" (23, 24), "success-ratio" (23-25), or "de", "pso", "ga", "cmaes", "random".
+/// seed : int
+///     Seed of all random numbers, from 0 to 2**64 - 1: the same seed gives the same result.
+/// population : int
+///     Individuals, from 2 to 100,000; the paper has 100.
+/// maxiter : int
+///     Generations after the first population. TLBO and its relatives evaluate every individual twice in one.
+/// maxfev : int, optional
+///     Ends the search after the generation in which so many places were evaluated.
+/// x0 : array_like, shape (N,), optional
+///     A first individual; all others are drawn from the box.
+/// vectorized : bool
+///     Whether `fun` takes many places at once.
+///
+/// Returns
+/// -------
+/// OptimizeResult
+///     x, fun, nfev, nit, success, message.
+///
+/// Raises
+/// ------
+/// ValueError, TypeError
+///     An argument, named in the message, has the wrong type, shape or range.
+#[pyfunction]
+#[pyo3(signature = (fun, bounds, *, method="shtlbo", seed=1, population=50, maxiter=1000, maxfev=None, x0=None, vectorized=false))]
+#[expect(clippy::too_many_arguments, reason = "they have names in Python")]
+pub fn minimize(
+    python: Python<'_>,
+    fun: Py<PyAny>,
+    bounds: &Bound<'_, PyAny>,
+    method: &str,
+    #[pyo3(from_py_with = read_seed)] seed: u64,
+    #[pyo3(from_py_with = read_population)] population: u64,
+    #[pyo3(from_py_with = read_maxiter)] maxiter: u64,
+    maxfev: Option<&Bound<'_, PyAny>>,
+    x0: Option<&Bound<'_, PyAny>>,
+    vectorized: bool,
+) -> PyResult<OptimizeResult> {
+    if !fun.bind(python).is_callable() {
+        return Err(PyTypeError::new_err("fun: it must be callable"));
+    }
+    let bounds = ranges(bounds)?;
+    let all = SearchKind::ALL;
+    let kind = all.into_iter().find(|kind| kind.name() == method);
+    let kind = kind.ok_or_else(|| {
+        let names = all.map(SearchKind::name).join(", ");
+        wrong("method", format!("{method:?} is none of {names}"))
+    })?;
+    let maxfev = maxfev.map(|given| whole("maxfev", given, 1, STEPS_MAX));
+    let maxfev = maxfev.transpose()?;
+    let first = x0.map(|x0| individual(x0, bounds.len())).transpose()?;
+    let function = Function {
+        bounds,
+        fun: &fun,
+        vectorized,
+        error: Mutex::new(None),
+        failed: AtomicBool::new(false),
+    };
+    let start = Start {
+        seed,
+        population: population as usize,
+        individuals: first.as_slice(),
+    };
+    let criteria = StopCriteria {
+        generations: Some(maxiter as usize),
+        evaluations: maxfev.map(|count| count as usize),
+        stall: None,
+        interrupt: Some(&function.failed),
+    };
+    let found = kind.minimize(&function, &start, &criteria);
+    if let Some(error) = function.error.into_inner().ok().flatten() {
+        return Err(error);
+    }
+    let mut message = match found.reason {
+        StopReason::Interrupted => "fun failed".to_owned(),
+        reason => reason.to_string(),
+    };
+    if found.nan_costs > 0 {
+        message += &format!(
+            "; {} of {} values were NaN",
+            found.nan_costs, found.evaluations
+        );
+    }
+    Ok(OptimizeResult {
+        x: PyArray1::from_vec(python, found.best).unbind(),
+        fun: found.cost,
+        nfev: found.evaluations,
+        nit: found.generations,
+        success: found.cost.is_finite(),
+        message,
+    })
+}
+
+/// Most individuals: more than any search makes use of.
+const POPULATION_MAX: u64 = 100_000;
+/// Most generations and evaluations: more than end in a lifetime.
+const STEPS_MAX: u64 = 1 << 40;
+
+/// A whole number in a range.
+fn whole(argument: &str, given: &Bound<'_, PyAny>, low: u64, high: u64) -> PyResult<u64> {
+    let number = given.extract().ok();
+    let number = number.filter(|number| (low..=high).contains(number));
+    number.ok_or_else(|| {
+        let problem = format!("a whole number from {low} to {high} is needed, not {given}");
+        wrong(argument, problem)
+    })
+}
+
+fn read_seed(given: &Bound<'_, PyAny>) -> PyResult<u64> {
+    whole("seed", given, 0, u64::MAX)
+}
+
+fn read_population(given: &Bound<'_, PyAny>) -> PyResult<u64> {
+    whole("population", given, 2, POPULATION_MAX)
+}
+
+fn read_maxiter(given: &Bound<'_, PyAny>) -> PyResult<u64> {
+    whole("maxiter", given, 0, STEPS_MAX)
+}
+
+/// One finite number for each of `unknowns`.
+fn individual(x0: &Bound<'_, PyAny>, unknowns: usize) -> PyResult<Vec<f64>> {
+    let read = x0.extract::<PyArrayLike1<'_, f64, AllowTypeChange>>().ok();
+    let read = read.map(|read| read.as_array().to_vec());
+    let read = read.filter(|x| x.len() == unknowns && x.iter().all(|x| x.is_finite()));
+    read.ok_or_else(|| {
+        let problem = format!("{unknowns} finite numbers are needed, one for each row of bounds");
+        wrong("x0", problem)
+    })
+}
+
+/// The box.
+fn ranges(bounds: &Bound<'_, PyAny>) -> PyResult<Vec<Range>> {
+    let read = bounds
+        .extract::<PyArrayLike2<'_, f64, AllowTypeChange>>()
+        .ok();
+    let read = read.filter(|read| matches!(read.as_array().dim(), (1.., 2)));
+    let read = read.ok_or_else(|| {
+        let problem = "numbers of shape (N, 2) are needed, a row (low, high) for each unknown";
+        wrong("bounds", problem)
+    })?;
+    let rows = read.as_array();
+    let range = |row: numpy::ndarray::ArrayView1<'_, f64>| Range {
+        low: row[0],
+        high: row[1],
+    };
+    let ranges: Vec<Range> = rows.rows().into_iter().map(range).collect();
+    let sound =
+        |range: &Range| range.low.is_finite() && range.high.is_finite() && range.low <= range.high;
+    match ranges.iter().position(|range| !sound(range)) {
+        None => Ok(ranges),
+        Some(k) => {
+            let Range { low, high } = ranges[k];
+            let problem = format!(
+                "row {k} is ({low}, {high}): finite numbers are needed, the lower one first"
+            );
+            Err(wrong("bounds", problem))
+        }
+    }
+}
+
+/// A wrong argument, by its name.
+fn wrong(argument: &str, problem: impl std::fmt::Display) -> PyErr {
+    PyValueError::new_err(format!("{argument}: {problem}"))
+}
