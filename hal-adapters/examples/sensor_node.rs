@@ -11,6 +11,7 @@ use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::spi::{self, Operation, SpiDevice};
 use hal_adapters::adc::ads8688::REFERENCE_US;
 use hal_adapters::adc::{AdcError, Ads8688, Channels, FrameSampler};
+use hal_adapters::can::sensor::TemperatureSender;
 use hal_adapters::can::{BusFrame, Layout, sensor};
 use hal_adapters::candump::LogLine;
 use std::convert::Infallible;
@@ -32,6 +33,7 @@ fn main() -> Result<(), AdcError<Infallible>> {
 /// Samples and sends so many ticks, once the converter's reference has settled.
 fn run(ticks: u32, mut send: impl FnMut(u32, BusFrame)) -> Result<(), AdcError<Infallible>> {
     let mut converter = Ads8688::new(Part::default(), Pin, Channels::IN_ORDER);
+    let mut temperatures = TemperatureSender::START;
     converter.start(&mut Sleep)?;
     let settled = REFERENCE_US / PERIOD_US;
     for sequence in 0..settled + ticks {
@@ -43,7 +45,9 @@ fn run(ticks: u32, mut send: impl FnMut(u32, BusFrame)) -> Result<(), AdcError<I
             Err(AdcError::NotReady { .. }) if sequence < settled => continue,
             sampled => sampled?,
         };
-        for coded in sensor::frames(Layout::Bits16, &frame) {
+        // None here: its `Channels` have no thermometers.
+        let temperatures = temperatures.frame(&frame).into_iter();
+        for coded in temperatures.chain(sensor::frames(Layout::Bits16, &frame)) {
             // On a controller: `coded.to_frame()` gives the frame type of its driver.
             send(time_us, BusFrame::from(coded));
         }

@@ -62,6 +62,7 @@
 //! read a rail.
 
 use super::channels::INPUTS;
+use super::thermometer::{AnalogInput, Held};
 use super::{AdcError, Channels, FrameSampler, check_id, compare, silent};
 use crc::{CRC_16_IBM_3740, Crc};
 use embedded_hal::delay::DelayNs;
@@ -131,6 +132,7 @@ pub struct Ads131m08<SPI, SYNC> {
     status_is_next: bool,
     unsynced_ticks: u8,
     start_failed: bool,
+    temperatures: Held,
 }
 
 /// What the part sent in one frame.
@@ -150,6 +152,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
             status_is_next: false,
             unsynced_ticks: 0,
             start_failed: false,
+            temperatures: Held::NOTHING,
         }
     }
 
@@ -183,11 +186,16 @@ impl<SPI: SpiDevice, SYNC: OutputPin> Ads131m08<SPI, SYNC> {
         Ok(frame)
     }
 
+    /// The inputs that are converted.
+    const fn enabled(&self) -> u8 {
+        self.channels.mask() | self.channels.thermometer_mask()
+    }
+
     /// The value that a register must have: 0x02 to 0x30.
     const fn wanted(&self, register: u8) -> u16 {
         match register {
             MODE_REGISTER => MODE_WANTED,
-            CLOCK => (self.channels.mask() as u16) << 8 | CLOCK_SPEED,
+            CLOCK => (self.enabled() as u16) << 8 | CLOCK_SPEED,
             CFG => CFG_WANTED,
             GAIN_0.. if (register - GAIN_0).is_multiple_of(CHANNEL_REGISTERS) => GAIN_WANTED,
             _ => 0,
@@ -257,10 +265,16 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
     /// 171 us.
     const SAMPLE_US: u32 = 166;
     const CODE_BITS: u32 = 24;
+    const INPUT: AnalogInput = AnalogInput {
+        codes_per_v: 8_388_608.0 / 1.2,
+        ohm: 330e3,
+        bias_v: 0.0,
+    };
 
     fn start(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<SPI::Error>> {
         // What was set raises the flag of changed registers: the next STATUS is not looked at.
         self.status_is_next = false;
+        self.temperatures = Held::NOTHING;
         self.turn = MODE_REGISTER;
         let result = self.try_start(delay);
         self.start_failed = result.is_err();
@@ -280,7 +294,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
     }
 
     fn sample(&mut self, sequence: u32, time_us: u32) -> Result<RawFrame, AdcError<SPI::Error>> {
-        let (register, read) = (self.turn, self.channels.mask());
+        let (register, read) = (self.turn, self.enabled());
         self.turn = if register < LAST_REGISTER {
             register + 1
         } else {
@@ -313,7 +327,12 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
             return Err(AdcError::NotReady { ready, read });
         }
         self.count_unsynced(statuses)?;
-        Ok(self.channels.frame(&frame.codes, sequence, time_us))
+        if let Some(due) = self.temperatures.due(&self.channels, time_us) {
+            let code = frame.codes[usize::from(due.1.input & 7)];
+            self.temperatures.take(due, code, time_us);
+        }
+        let sampled = self.channels.frame(&frame.codes, sequence, time_us);
+        Ok(sampled.with_temperature_mc(self.temperatures.temperature_mc()))
     }
 }
 

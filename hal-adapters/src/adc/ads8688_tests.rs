@@ -245,3 +245,30 @@ fn the_error_of_the_bus_is_kept() {
     assert_eq!(adc.sample(0, 0), Err(error));
     pin.done();
 }
+
+/// The frame of the last code selects the thermometer's channel, and the next one has its code in place of
+/// a register; 100 ms later again.
+#[test]
+fn a_thermometer_is_read_in_place_of_a_register() {
+    use crate::adc::thermometer::{Thermometer, tmp235};
+    static CODES: [i32; 2] = tmp235::codes(&<Ads8688<Broken, PinMock>>::INPUT);
+    static BODY: Thermometer = Thermometer {
+        input: 7,
+        curve: tmp235::curve(&CODES),
+    };
+    let channels = Channels::IN_ORDER.with_thermometers([None, Some(&BODY)]);
+    // 0.75 V are 25 degC and 2400 codes.
+    let mut warm = sampled(ZERO);
+    warm.truncate(6 * 3);
+    warm.extend(frame([0xdc, 0x00], [0x80, 0, 0x54]));
+    warm.extend(frame([0, 0], [0x89, 0x60, 0x74]));
+    let all = [warm.clone(), tick(0x01, 0x3f), warm].concat();
+    on_part(&all, &[], |adc| {
+        adc.reference = Reference::Settled;
+        adc.channels = channels.expect("a free input");
+        for (time_us, body_mc) in [(0, 25_000), (99_999, 25_000), (100_000, 25_000)] {
+            let read = adc.sample(7, time_us).map(|frame| frame.temperature_mc);
+            assert_eq!(read, Ok([runtime::frame::MISSING_CODE, body_mc]));
+        }
+    });
+}

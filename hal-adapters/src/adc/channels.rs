@@ -1,15 +1,17 @@
 //! Which input of the converter carries which sensor.
 
+use super::thermometer::Thermometer;
 use runtime::RawFrame;
 
 /// Inputs of both parts.
 pub(super) const INPUTS: usize = 8;
 
-/// The inputs of the six sensors: 0 to 7, all different.
+/// The inputs of the six sensors, and of thermometers where there are any: 0 to 7, all different.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Channels {
     hall: [u8; 3],
     capacitive: [u8; 3],
+    pub(super) thermometers: [Option<&'static Thermometer>; 2],
 }
 
 impl Channels {
@@ -17,6 +19,7 @@ impl Channels {
     pub const IN_ORDER: Self = Self {
         hall: [0, 1, 2],
         capacitive: [3, 4, 5],
+        thermometers: [None; 2],
     };
 
     /// The inputs of Hall probes A, B, C and of capacitive gaps 1, 2, 3; `None` unless all
@@ -38,10 +41,49 @@ impl Channels {
             mask |= 1 << all[k];
             k += 1;
         }
-        Some(Self { hall, capacitive })
+        Some(Self {
+            hall,
+            capacitive,
+            thermometers: [None; 2],
+        })
     }
 
-    /// The inputs that are read: bit k for input k.
+    /// With thermometers at the magnets' mount and on the stage body at the Hall elements; `None` unless
+    /// their inputs are below 8 and free.
+    #[must_use]
+    pub const fn with_thermometers(
+        self,
+        thermometers: [Option<&'static Thermometer>; 2],
+    ) -> Option<Self> {
+        let (mut mask, mut k) = (self.mask() as u32, 0);
+        while k < thermometers.len() {
+            if let Some(Thermometer { input, .. }) = thermometers[k] {
+                if *input as usize >= INPUTS || mask & (1 << *input) != 0 {
+                    return None;
+                }
+                mask |= 1 << *input;
+            }
+            k += 1;
+        }
+        Some(Self {
+            thermometers,
+            ..self
+        })
+    }
+
+    /// The inputs of the thermometers: bit k for input k.
+    pub(super) const fn thermometer_mask(&self) -> u8 {
+        let (mut mask, mut k) = (0, 0);
+        while k < self.thermometers.len() {
+            if let Some(Thermometer { input, .. }) = self.thermometers[k] {
+                mask |= 1 << (*input & 7);
+            }
+            k += 1;
+        }
+        mask
+    }
+
+    /// The inputs of the six sensors: bit k for input k.
     pub const fn mask(&self) -> u8 {
         let ([a, b, c], [d, e, f]) = (self.hall, self.capacitive);
         1 << a | 1 << b | 1 << c | 1 << d | 1 << e | 1 << f
@@ -83,6 +125,31 @@ mod tests {
             Channels::new([0, 1, 2], [3, 4, 5]),
             Some(Channels::IN_ORDER)
         );
+    }
+
+    #[test]
+    fn a_thermometer_needs_a_free_input() {
+        use crate::adc::thermometer::Curve;
+        let at = |input| -> &'static Thermometer {
+            static ALL: [Thermometer; 9] = {
+                let curve = Curve::new(0, 1, &[]);
+                let mut all = [Thermometer { input: 0, curve }; 9];
+                let mut k = 0;
+                while k < 9 {
+                    all[k].input = k as u8;
+                    k += 1;
+                }
+                all
+            };
+            &ALL[input]
+        };
+        let with = |mount, body| Channels::IN_ORDER.with_thermometers([mount, body]);
+        assert_eq!(with(Some(at(5)), None), None);
+        assert_eq!(with(None, Some(at(8))), None);
+        assert_eq!(with(Some(at(6)), Some(at(6))), None);
+        let both = with(Some(at(7)), Some(at(6))).expect("free");
+        assert_eq!((both.mask(), both.thermometer_mask()), (0x3f, 0xc0));
+        assert_eq!(with(None, None), Some(Channels::IN_ORDER));
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! | [`ads131m08`] | TI ADS131M08 | eight channels of 24 bits sampled at once, CRC over every frame |
 //! | [`ads8688`] | TI ADS8688 | eight channels of 16 bits, sampled one after the other, no CRC |
 //! | [`Channels`] | any | which input carries which sensor |
+//! | [`thermometer`] | Semitec 103AT-2, TI TMP235 | temperatures of the magnets' mount and of the stage body at free inputs |
 //! | [`stuck`] | any | codes that never change: a converter or a sensor that is frozen |
 //!
 //! Which to choose: the first where the stage moves fast or the cable is long. The skew of the
@@ -55,6 +56,7 @@ pub mod ads131m08;
 pub mod ads8688;
 mod channels;
 pub mod stuck;
+pub mod thermometer;
 
 pub use ads131m08::Ads131m08;
 pub use ads8688::Ads8688;
@@ -93,6 +95,9 @@ pub trait FrameSampler {
     /// Bits of a code: 16 or 24.
     const CODE_BITS: u32;
 
+    /// What an input is to the source of its voltage.
+    const INPUT: thermometer::AnalogInput;
+
     /// Resets the part, checks what it is, sets it up and reads the settings back.
     ///
     /// # Errors
@@ -106,7 +111,8 @@ pub trait FrameSampler {
     fn trigger(&mut self, delay: &mut impl DelayNs) -> Result<(), AdcError<Self::Bus>>;
 
     /// Reads the codes of one period. `sequence` and `time_us` go into the frame unchanged: the
-    /// time of the trigger plus [`SAMPLE_US`](Self::SAMPLE_US).
+    /// time of the trigger plus [`SAMPLE_US`](Self::SAMPLE_US). Its temperatures are those that were
+    /// read in the last 100 ms, one a period.
     /// A code at a rail is no error here: the decoder's window refuses it.
     ///
     /// # Errors
@@ -233,6 +239,23 @@ fn compare<B>(register: u8, found: u16, wanted: u16) -> Result<(), AdcError<B>> 
 #[cfg(test)]
 mod testing {
     use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
+
+    /// A pin that nothing hangs on.
+    pub(super) struct NoPin;
+
+    impl embedded_hal::digital::ErrorType for NoPin {
+        type Error = core::convert::Infallible;
+    }
+
+    impl embedded_hal::digital::OutputPin for NoPin {
+        fn set_low(&mut self) -> Result<(), Self::Error> {
+            Ok(())
+        }
+
+        fn set_high(&mut self) -> Result<(), Self::Error> {
+            Ok(())
+        }
+    }
 
     /// A bus that always fails.
     pub(super) struct Broken;

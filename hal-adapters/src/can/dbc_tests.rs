@@ -6,7 +6,7 @@ extern crate std;
 use super::PROTOCOL_VERSION;
 use super::e2e::BASE_LIST;
 use super::load_tests::{FRAME_BITS_MAX, Traffic};
-use super::sensor::Layout;
+use super::sensor::{Layout, REPEAT_US};
 use super::table::FRAME_BYTES;
 use super::tables_tests::{Kind, Rate, Row, Signal, rows};
 use core::fmt::{Result, Write};
@@ -50,6 +50,10 @@ fn write_dbc(out: &mut impl Write) -> Result {
         writeln!(out, "BA_ \"E2EDataIdKey\" BO_ {} {};", spec.id, spec.key)?;
         if let Rate::Ticks(ticks) | Rate::Decimated(ticks) = rate {
             let cycle_ms = u32::from(*ticks) * PERIOD_MS;
+            writeln!(out, "BA_ \"GenMsgCycleTime\" BO_ {} {cycle_ms};", spec.id)?;
+        }
+        if *rate == Rate::Held {
+            let cycle_ms = REPEAT_US / 1000;
             writeln!(out, "BA_ \"GenMsgCycleTime\" BO_ {} {cycle_ms};", spec.id)?;
         }
     }

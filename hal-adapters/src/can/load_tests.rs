@@ -40,12 +40,14 @@ impl Traffic {
                     match rate {
                         Rate::Ticks(1) if !layout.messages().contains(&row.spec.message) => 0,
                         Rate::Ticks(ticks) | Rate::Decimated(ticks) => every(ticks),
+                        // Two thermometers that change: 0.64 frames.
+                        Rate::Held => 1,
                         Rate::OnRequest => 0,
                     }
                 }
                 (_, Rate::Ticks(ticks)) => every(ticks),
                 (_, Rate::Decimated(_)) => every(self.vertical_ticks),
-                (_, Rate::OnRequest) => 0,
+                (_, Rate::OnRequest | Rate::Held) => 0,
             })
             .sum()
     }
@@ -70,15 +72,15 @@ fn the_load_worked_by_hand() {
         layout,
         vertical_ticks,
     };
-    // In 16 ticks: 2 x 16 codes, 1 time, 3 x 16 planar, 3 x 4 vertical, 1 time, status, health.
+    // In 16 ticks: 2 x 16 codes, 1 time, 1 of temperatures, 3 x 16 planar, 3 x 4 vertical, 1 time, status, health.
     let usual = traffic(Some(Layout::Bits16), 4);
-    assert_eq!(usual.frames_in_slow_ticks(), 32 + 1 + 48 + 12 + 3);
-    assert!((usual.worst_load(1_000_000) - 0.405).abs() < 1e-5);
+    assert_eq!(usual.frames_in_slow_ticks(), 32 + 2 + 48 + 12 + 3);
+    assert!((usual.worst_load(1_000_000) - 0.409_22).abs() < 1e-5);
     // On half the rate the vertical pose goes to every 16th tick.
     let slow = traffic(Some(Layout::Bits16), 16);
-    assert!((slow.worst_load(500_000) - 0.734_06).abs() < 1e-5);
+    assert!((slow.worst_load(500_000) - 0.742_5).abs() < 1e-5);
     let wide = traffic(Some(Layout::Bits24), 16);
-    assert_eq!(wide.frames_in_slow_ticks(), 48 + 1 + 48 + 3 + 3);
-    assert!(wide.worst_load(500_000) < 0.87);
+    assert_eq!(wide.frames_in_slow_ticks(), 48 + 2 + 48 + 3 + 3);
+    assert!(wide.worst_load(500_000) < 0.88);
     assert_eq!(traffic(None, 0).frames_in_slow_ticks(), 48 + 3);
 }

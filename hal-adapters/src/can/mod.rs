@@ -57,4 +57,4 @@ pub use service::Service;
 pub use table::Message;
 
 /// Version of this protocol, as [`Message::NodeStatus`] carries it.
-pub const PROTOCOL_VERSION: u8 = 4;
+pub const PROTOCOL_VERSION: u8 = 5;

@@ -1,5 +1,5 @@
-//! Pose frames. Each frame carries one axis, as the decoder's own `f32` word, and the 20 low
-//! bits of the status. So the bits on the bus are the bits of the decoder, and each frame says
+//! Pose frames. Each frame carries one axis, as the decoder's own `f32` word, and the status in 20
+//! bits: see [`status_to_bus`]. So the bits on the bus are the bits of the decoder, and each frame says
 //! whether its value may be used.
 //!
 //! ```
@@ -20,7 +20,7 @@
 //! assert_eq!(receiver.sampled_us(&pose, 2_000), Some(14_000));
 //! ```
 
-use super::e2e::{Payload, Sequence};
+use super::e2e::{Payload, SHORT_BITS, Sequence};
 use super::frame::{Coded, standard};
 use super::group::{Group, GroupTick};
 use super::notice::{BusFault, BusHealth, Taken, Timing};
@@ -34,9 +34,31 @@ const PLANAR: [Message; 3] = [Message::PoseX, Message::PoseY, Message::PoseRz];
 /// The vertical axes.
 const VERTICAL: [Message; 3] = [Message::PoseZ, Message::PoseRx, Message::PoseRy];
 
+/// The 20 bits of a status on the bus. [`Status::TEMPERATURE_MISSING`] of a valid pose takes the place
+/// of [`Status::PLANAR_HELD`], which only an invalid one has.
+#[inline(always)]
+pub const fn status_to_bus(status: Status) -> u32 {
+    const FREE: u32 = Status::PLANAR_HELD.bits();
+    let bits = status.bits() & (u32::MAX >> (32 - SHORT_BITS));
+    match status.any(Status::PLANAR_INVALID) {
+        true => bits,
+        false => bits & !FREE | status.any(Status::TEMPERATURE_MISSING) as u32 * FREE,
+    }
+}
+
+/// The status of a pose frame, from its 20 bits.
+pub const fn status_from_bus(bits: u32) -> Status {
+    let status = Status::from_bits(bits);
+    if status.any(Status::PLANAR_HELD) && !status.any(Status::PLANAR_INVALID) {
+        let others = bits & !Status::PLANAR_HELD.bits();
+        return Status::from_bits(others).with(Status::TEMPERATURE_MISSING);
+    }
+    status
+}
+
 const fn axis_frame(message: Message, counter: u32, value: f32, status: Status) -> Coded {
     let payload = Payload {
-        short: status.bits(),
+        short: status_to_bus(status),
         long: value.to_bits(),
     };
     Coded::new(message, counter, payload)
@@ -176,7 +198,7 @@ fn received(tick: &GroupTick) -> ReceivedPose {
                     .iter()
                     .all(|axis| axis.is_finite()) =>
         {
-            Status::from_bits(x.short)
+            status_from_bus(x.short)
         }
         _ => lost,
     };
@@ -264,7 +286,7 @@ impl PoseReceiver {
         if let Some(payload) = payload {
             *self.vertical.get_mut(k)? = Some(ReceivedAxis {
                 value: f32::from_bits(payload.long),
-                status: Status::from_bits(payload.short),
+                status: status_from_bus(payload.short),
                 time_us,
             });
         }

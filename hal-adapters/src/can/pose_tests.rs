@@ -188,3 +188,35 @@ fn a_time_frame_worked_by_hand() {
         0
     );
 }
+
+/// Every status that a tracker gives to a valid or an invalid pose is told apart on the bus.
+#[test]
+fn a_missing_temperature_of_a_valid_pose_is_sent_in_20_bits() {
+    let missing = Status::TEMPERATURE_MISSING;
+    let held = Status::PLANAR_INVALID.with(Status::PLANAR_HELD);
+    for others in [
+        Status::GOOD,
+        Status::ZERO_SET,
+        Status::FRAMES_MISSED.with(Status::VERTICAL_EXTRAPOLATED),
+    ] {
+        for status in [others, others.with(missing), others.with(held)] {
+            let sent = status_to_bus(status);
+            assert_eq!((sent >> 20, status_from_bus(sent)), (0, status));
+        }
+        // Of an invalid pose that bit alone is lost.
+        let invalid = others.with(Status::PLANAR_INVALID);
+        assert_eq!(
+            status_from_bus(status_to_bus(invalid.with(missing))),
+            invalid
+        );
+    }
+    let mut receiver = PoseReceiver::new(Timing::default());
+    let cold = Reading {
+        status: missing,
+        ..reading(1)
+    };
+    let got = planar_frames(&cold, 0)
+        .into_iter()
+        .find_map(|frame| receiver.take(&BusFrame::from(frame), 0).tick);
+    assert_eq!(got.map(|pose| pose.status), Some(missing));
+}

@@ -24,7 +24,7 @@ use super::e2e::{SHORT_BITS, Sequence};
 use super::frame::standard;
 use super::group::{Group, GroupTick};
 use super::notice::{BusFault, BusHealth, Taken, Timing};
-use super::sensor::{Layout, read_three, read_two};
+use super::sensor::{Layout, read_temperature_mc, read_three, read_two};
 use super::table::Message;
 use embedded_can::Frame;
 use runtime::RawFrame;
@@ -34,7 +34,7 @@ use runtime::frame::MISSING_CODE;
 ///
 /// Raw frames are numbered from the first counter seen. Lost ticks are counted in the number,
 /// so [`runtime::PoseTracker`] sees them, too. `time_us` of a raw frame is when its first bus frame
-/// came, by the receiver's clock.
+/// came, by the receiver's clock. Its temperatures are those that the node sent last.
 #[derive(Clone, Debug)]
 pub struct SensorReceiver {
     layout: Layout,
@@ -43,19 +43,29 @@ pub struct SensorReceiver {
     clock: Sequence,
     /// The sensor node's number of a tick minus the receiver's, in the upper bits.
     offset: Option<u32>,
+    /// Counters of the temperature frames.
+    temperature: Sequence,
+    temperature_mc: [i32; 2],
+    /// When the last temperature frame came, us.
+    temperature_us: u32,
 }
 
+/// Temperatures are forgotten this long after they came, us.
+const TEMPERATURE_STALE_US: u32 = 350_000;
+
 #[inline(always)]
-fn raw_16(tick: &GroupTick) -> RawFrame {
+fn raw_16(tick: &GroupTick, temperature_mc: [i32; 2]) -> RawFrame {
     let codes = |k| tick.payload(k).map_or([MISSING_CODE; 3], read_three);
     RawFrame::new(codes(0), codes(1), tick.sequence, tick.time_us)
+        .with_temperature_mc(temperature_mc)
 }
 
 #[inline(always)]
-fn raw_24(tick: &GroupTick) -> RawFrame {
+fn raw_24(tick: &GroupTick, temperature_mc: [i32; 2]) -> RawFrame {
     let codes = |k| tick.payload(k).map_or([MISSING_CODE; 2], read_two);
     let ([a, b], [c, g1], [g2, g3]) = (codes(0), codes(1), codes(2));
     RawFrame::new([a, b, c], [g1, g2, g3], tick.sequence, tick.time_us)
+        .with_temperature_mc(temperature_mc)
 }
 
 impl SensorReceiver {
@@ -66,6 +76,9 @@ impl SensorReceiver {
             group: Group::new(layout.messages().len(), timing),
             clock: Sequence::START,
             offset: None,
+            temperature: Sequence::START,
+            temperature_mc: [MISSING_CODE; 2],
+            temperature_us: 0,
         }
     }
 
@@ -89,8 +102,11 @@ impl SensorReceiver {
         const SECOND: u16 = M::HallCCapacitive1At24.spec().id;
         const THIRD: u16 = M::Capacitive23At24.spec().id;
         const TIME: u16 = M::SensorTime.spec().id;
+        const TEMPERATURE: u16 = M::Temperature.spec().id;
         use Layout::{Bits16, Bits24};
         let group = &mut self.group;
+        let raw_16 = |tick: &GroupTick| raw_16(tick, self.temperature_mc);
+        let raw_24 = |tick: &GroupTick| raw_24(tick, self.temperature_mc);
         match (self.layout, id) {
             (Bits16, HALL) => group.take(0, M::Hall, data, now_us, raw_16),
             (Bits16, CAPACITIVE) => group.take(1, M::Capacitive, data, now_us, raw_16),
@@ -98,10 +114,27 @@ impl SensorReceiver {
             (Bits24, SECOND) => group.take(1, M::HallCCapacitive1At24, data, now_us, raw_24),
             (Bits24, THIRD) => group.take(2, M::Capacitive23At24, data, now_us, raw_24),
             (_, TIME) => {
+                self.forget_temperature_at(now_us);
                 let fault = self.take_time(data).map(|fault| self.group.note(fault));
                 Taken { tick: None, fault }
             }
+            (_, TEMPERATURE) => {
+                let (payload, fault) = self.temperature.take(M::Temperature, data);
+                if let Some(payload) = payload {
+                    self.temperature_mc = read_temperature_mc(payload);
+                    self.temperature_us = now_us;
+                }
+                let fault = fault.map(|fault| self.group.note(fault));
+                Taken { tick: None, fault }
+            }
             _ => Taken::NOTHING,
+        }
+    }
+
+    /// Forgets temperatures that came too long ago. The time frames are often enough for that.
+    const fn forget_temperature_at(&mut self, now_us: u32) {
+        if now_us.wrapping_sub(self.temperature_us) > TEMPERATURE_STALE_US {
+            self.temperature_mc = [MISSING_CODE; 2];
         }
     }
 
@@ -129,10 +162,14 @@ impl SensorReceiver {
     /// What the passing of time brings: a tick whose time is over, a source that is stale. A
     /// source is reported as stale once; [`SensorReceiver::is_stale`] holds until a good frame.
     pub fn poll(&mut self, now_us: u32) -> Taken<RawFrame> {
-        self.group.poll(now_us).map(match self.layout {
-            Layout::Bits16 => raw_16,
-            Layout::Bits24 => raw_24,
-        })
+        let taken = self.group.poll(now_us).map(|tick| match self.layout {
+            Layout::Bits16 => raw_16(tick, self.temperature_mc),
+            Layout::Bits24 => raw_24(tick, self.temperature_mc),
+        });
+        if self.group.is_stale() {
+            self.temperature_mc = [MISSING_CODE; 2];
+        }
+        taken
     }
 
     /// When [`SensorReceiver::poll`] will have something to report if no frame comes before;

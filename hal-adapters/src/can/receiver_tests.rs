@@ -1,6 +1,6 @@
 use super::super::e2e::unprotect;
 use super::super::frame::BusFrame;
-use super::super::sensor::frames;
+use super::super::sensor::{TemperatureSender, frames};
 use super::*;
 use proptest::prelude::*;
 
@@ -224,4 +224,44 @@ proptest! {
             }
         }
     }
+}
+
+const WARM: [i32; 2] = [21_500, -3];
+
+/// A node at work that sends temperatures; gives what the receiver holds at each of these ticks.
+fn temperatures(
+    (sender, r): &mut (TemperatureSender, SensorReceiver),
+    ticks: core::ops::Range<u32>,
+    sends: bool,
+) -> [i32; 2] {
+    let mut last = [0; 2];
+    for sequence in ticks {
+        let tick = raw(sequence).with_temperature_mc(WARM);
+        if let Some(frame) = sends.then(|| sender.frame(&tick)).flatten() {
+            assert_eq!(r.take(&BusFrame::from(frame), 2_000 * sequence).fault, None);
+        }
+        let (tick, _) = feed(r, Layout::Bits16, sequence);
+        last = tick.expect("whole").temperature_mc;
+    }
+    last
+}
+
+#[test]
+fn temperatures_hold_from_the_tick_before_which_they_came() {
+    let mut r = (TemperatureSender::START, new(Layout::Bits16));
+    assert_eq!(temperatures(&mut r, 100..101, false), [MISSING_CODE; 2]);
+    assert_eq!(temperatures(&mut r, 101..102, true), WARM);
+    assert_eq!(temperatures(&mut r, 102..260, false), WARM);
+}
+
+#[test]
+fn temperatures_are_forgotten_when_none_come_or_the_node_is_silent() {
+    let mut r = (TemperatureSender::START, new(Layout::Bits16));
+    assert_eq!(temperatures(&mut r, 100..101, true), WARM);
+    // 350 ms, and up to 16 ticks until the next time frame.
+    assert_eq!(temperatures(&mut r, 101..292, false), [MISSING_CODE; 2]);
+    assert_eq!(temperatures(&mut r, 292..293, true), WARM);
+    r.1.poll(293 * 2_000 + 2_000);
+    assert!(r.1.is_stale());
+    assert_eq!(temperatures(&mut r, 295..296, false), [MISSING_CODE; 2]);
 }

@@ -163,6 +163,59 @@ pub(super) fn time_frame(message: Message, sampled: &RawFrame, tick: u32) -> Opt
         .then(|| Coded::new(message, tick / slow, payload))
 }
 
+/// From one frame of temperatures to the next while they stay the same, us.
+pub const REPEAT_US: u32 = 100_000;
+/// Bits of the mount's and of the body's temperature on the bus.
+const TEMPERATURE_BITS: [u32; 2] = [20, 24];
+
+/// Sends the temperatures of a node: when they change, and again after [`REPEAT_US`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TemperatureSender {
+    sent_mc: [i32; 2],
+    sent_us: u32,
+    counter: u32,
+}
+
+impl TemperatureSender {
+    /// A sender of a node that has sent none.
+    pub const START: Self = Self {
+        sent_mc: [MISSING_CODE; 2],
+        sent_us: 0,
+        counter: 0,
+    };
+
+    /// The frame that is due before the codes of a tick. A node without thermometers has none.
+    pub const fn frame(&mut self, tick: &RawFrame) -> Option<Coded> {
+        let ([mount, body], [sent_mount, sent_body]) = (tick.temperature_mc, self.sent_mc);
+        let is_new = mount != sent_mount || body != sent_body;
+        let is_there = mount != MISSING_CODE || body != MISSING_CODE;
+        let is_over = tick.time_us.wrapping_sub(self.sent_us) >= REPEAT_US;
+        if !is_new && !(is_there && is_over) {
+            return None;
+        }
+        self.sent_mc = tick.temperature_mc;
+        self.sent_us = tick.time_us;
+        self.counter = self.counter.wrapping_add(1);
+        let [mount_bits, body_bits] = TEMPERATURE_BITS;
+        let ((mount, no_mount), (body, no_body)) =
+            (coded(mount, mount_bits), coded(body, body_bits));
+        let payload = Payload {
+            short: mount,
+            long: no_body << 25 | no_mount << 24 | body,
+        };
+        Some(Coded::new(Message::Temperature, self.counter, payload))
+    }
+}
+
+/// Mount and body, m degC, of a frame of [`Message::Temperature`].
+pub(super) const fn read_temperature_mc(p: Payload) -> [i32; 2] {
+    let [mount_bits, body_bits] = TEMPERATURE_BITS;
+    [
+        code(p.short, mount_bits, p.long >> 24),
+        code(p.long, body_bits, p.long >> 25),
+    ]
+}
+
 /// Number and time of a tick, as [`Message::SensorTime`] carries them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TickTime {
@@ -253,6 +306,36 @@ mod tests {
         assert_eq!(time_frame(&at(0x1_2341)), None);
         assert_eq!(frames(Layout::Bits16, &at(0)).count(), 3);
         assert_eq!(frames(Layout::Bits24, &at(1)).count(), 3);
+    }
+
+    #[test]
+    fn temperatures_worked_by_hand_and_back() {
+        let mut sender = TemperatureSender::START;
+        let mut frame = |temperature_mc: [i32; 2], time_us| {
+            let tick = RawFrame { time_us, ..FRAME }.with_temperature_mc(temperature_mc);
+            sender.frame(&tick).map(|frame| frame.bytes)
+        };
+        assert_eq!(frame([MISSING_CODE; 2], 200_000), None);
+        // 21,500 = 0x53fc and -1: counter 1, nothing missing.
+        let bytes = frame([21_500, -1], 200_000).expect("new");
+        assert_eq!(bytes[1..], [0xc1, 0x3f, 0x05, 0xff, 0xff, 0xff, 0x00]);
+        assert_eq!(frame([21_500, -1], 299_999), None);
+        let again = frame([21_500, -1], 300_000).expect("after 100 ms");
+        assert_eq!(again[1], 0xc2);
+        let bytes = frame([MISSING_CODE, 5], 302_000).expect("one is lost");
+        assert_eq!(bytes[1..], [0x03, 0, 0, 5, 0, 0, 1]);
+        for sent in [
+            [-40_000, 65_000],
+            [MISSING_CODE, 5],
+            [5, MISSING_CODE],
+            [MISSING_CODE; 2],
+        ] {
+            let bytes = frame(sent, 304_000).expect("new");
+            let (_, payload) = unprotect(Message::Temperature.key(), &bytes).expect("sound");
+            assert_eq!(read_temperature_mc(payload), sent);
+        }
+        // Gone for good: the receiver forgets by itself.
+        assert_eq!(frame([MISSING_CODE; 2], 900_000), None);
     }
 
     #[test]

@@ -80,6 +80,8 @@ messages! {
     PoseTime: 0x20c, 0xea;
     /// A word of new parameters.
     UpdateData: 0x230, 0xf7;
+    /// Temperatures of the magnets' mount and of the stage body.
+    Temperature: 0x23f, 0x04;
 }
 
 /// Ticks between two frames of [`Message::SensorTime`], [`Message::PoseTime`],

@@ -13,6 +13,8 @@ use std::vec::Vec;
 pub(super) enum Rate {
     /// Every so many ticks.
     Ticks(u8),
+    /// Every [`REPEAT_US`](super::sensor::REPEAT_US), and when it changes.
+    Held,
     /// Every so many ticks by default; the sender can be set to 1 to 16.
     Decimated(u8),
     /// When asked for.
@@ -132,6 +134,7 @@ pub(super) fn rows() -> Vec<Row> {
         let rate = match every {
             "tick" => Rate::Ticks(1),
             "on request" => Rate::OnRequest,
+            "100 ms" => Rate::Held,
             every if every == decimated => Rate::Decimated(VERTICAL_TICKS),
             every if every == format!("{SLOW_TICKS} ticks") => Rate::Ticks(SLOW_TICKS),
             other => panic!("{name}: {other}"),

@@ -28,6 +28,7 @@ use crate::output::Output;
 use bus_log::BusCounts;
 use hal_adapters::can::Layout;
 use join::{JoinCounts, JoinedRow, join};
+use node_clock::Tick;
 use offset::{Clocks, Offset, Records};
 use reference::{Reference, ReferenceCounts};
 use runtime::frame::MISSING_CODE;
@@ -73,6 +74,8 @@ pub struct ImportReport {
     pub offset: Offset,
     /// How ticks and reference went together.
     pub join: JoinCounts,
+    /// The record has temperatures for which the stage names no columns: they are not in the log.
+    pub temperatures_left_out: bool,
 }
 
 /// Bytes of the log that are written at a time, about.
@@ -112,7 +115,9 @@ pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
         joined(&given, &mut |_| Ok(()))?.check()?;
         records.checked(given)?
     };
-    let format = LogFormat::new(reference.quantities, false, &stage);
+    let is_warm = |tick: &Tick| tick.temperature_mc != [MISSING_CODE; 2];
+    let has_temperatures = run.ticks.iter().any(is_warm);
+    let format = LogFormat::new(reference.quantities, has_temperatures, &stage);
     let mut log = Output::create(&settings.out)?;
     let mut text = format.header();
     let join = joined(&clocks, &mut |row| {
@@ -122,7 +127,7 @@ pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
             at,
             row.values,
             [row.capacitive, row.hall],
-            [MISSING_CODE; 2],
+            row.temperature_mc,
         );
         if text.len() > TEXT_BYTES {
             log.write(text.as_bytes())?;
@@ -142,6 +147,8 @@ pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
             seen,
         },
         join,
+        temperatures_left_out: has_temperatures
+            && stage.temperature.columns.iter().all(Option::is_none),
     })
 }
 

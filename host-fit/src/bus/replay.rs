@@ -10,7 +10,8 @@ use crate::input::stage::{Stage, StageError};
 use crate::interrupt;
 use crate::output::is_standard;
 use crate::progress::Progress;
-use hal_adapters::can::{BusFrame, Layout, sensor};
+use hal_adapters::can::sensor::{self, TemperatureSender};
+use hal_adapters::can::{BusFrame, Layout};
 use pace::Pacer;
 use runtime::RawFrame;
 use std::path::{Path, PathBuf};
@@ -119,6 +120,7 @@ pub fn run(settings: &ReplaySettings) -> Result<Replayed, ReplayError> {
         pacer: Pacer::new(Instant::now(), settings.rate),
         done: Replayed::default(),
         frames: Vec::with_capacity(BATCH_ROWS * 4),
+        temperatures: TemperatureSender::START,
     };
     let progress = Progress::new("sending", rows as u64);
     let mut timeline = Timeline::default();
@@ -238,6 +240,7 @@ struct Player<'a> {
     pacer: Pacer,
     done: Replayed,
     frames: Vec<BusFrame>,
+    temperatures: TemperatureSender,
 }
 
 impl Player<'_> {
@@ -259,7 +262,8 @@ impl Player<'_> {
             let (now, later) = left.split_at_checked(due).unwrap_or((left, &[]));
             self.frames.clear();
             for due in now {
-                let frames = sensor::frames(self.layout, &due.frame);
+                let temperatures = self.temperatures.frame(&due.frame).into_iter();
+                let frames = temperatures.chain(sensor::frames(self.layout, &due.frame));
                 self.frames.extend(frames.map(BusFrame::from));
                 self.done.logged_s = due.at_us as f64 * 1e-6;
             }

@@ -110,6 +110,7 @@ mod tests {
     extern crate std;
     use super::*;
     use embedded_hal::spi::{ErrorKind, MODE_1, Mode};
+    use hal_adapters::adc::thermometer::AnalogInput;
 
     struct NoDelay;
     impl DelayNs for NoDelay {
@@ -133,6 +134,11 @@ mod tests {
         const SETTLE_US: u32 = 110;
         const SAMPLE_US: u32 = 60;
         const CODE_BITS: u32 = 16;
+        const INPUT: AnalogInput = AnalogInput {
+            codes_per_v: 3_200.0,
+            ohm: 1e6,
+            bias_v: 0.0,
+        };
 
         fn start(&mut self, _: &mut impl DelayNs) -> Result<(), AdcError<ErrorKind>> {
             self.set_up = !self.broken;

@@ -5,6 +5,7 @@
 use crate::spi::SpiDma;
 use core::convert::Infallible;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
+use hal_adapters::adc::thermometer::{Thermometer, ntc_103at, tmp235};
 use hal_adapters::adc::{Channels, FrameSampler};
 use hal_adapters::can::NodeNumber;
 use hal_adapters::can::status::{bit, board_check};
@@ -24,7 +25,28 @@ pub type Converter = hal_adapters::adc::Ads131m08<SpiDevice, ControlPin>;
 pub type Converter = hal_adapters::adc::Ads8688<SpiDevice, ControlPin>;
 
 /// Which input of the converter carries which sensor.
-const CHANNELS: Channels = Channels::IN_ORDER;
+const CHANNELS: Channels = match Channels::IN_ORDER.with_thermometers(THERMOMETERS) {
+    Some(channels) => channels,
+    None => panic!("a thermometer needs a free input"),
+};
+
+/// What the supply of the thermistor and of its resistor give: 68 kOhm let its voltage stay within the
+/// range of the ADS131M08 above -10 degC.
+const THERMISTOR: [i32; ntc_103at::POINTS] = ntc_103at::codes(&Converter::INPUT, 3.3, 68e3);
+const LINEAR: [i32; 2] = tmp235::codes(&Converter::INPUT);
+
+/// The thermometers at the magnets' mount and on the stage body at the Hall elements; `None` where
+/// there is none.
+const THERMOMETERS: [Option<&Thermometer>; 2] = [
+    Some(&Thermometer {
+        input: 6,
+        curve: ntc_103at::curve(&THERMISTOR),
+    }),
+    Some(&Thermometer {
+        input: 7,
+        curve: tmp235::curve(&LINEAR),
+    }),
+];
 
 /// The SPI bus with chip select, to the converter alone.
 pub type SpiDevice = ExclusiveDevice<SpiDma, PA4<Output>, NoDelay>;

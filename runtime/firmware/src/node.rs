@@ -11,12 +11,13 @@ use crate::outbox::Outbox;
 use crate::schedule::TICKS_PER_S;
 use embedded_can::Frame;
 use hal_adapters::can::command::Content;
+use hal_adapters::can::sensor::{self, TemperatureSender};
 use hal_adapters::can::service::Updates;
 pub use hal_adapters::can::status::BoardFacts;
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus, bit, board_check, flag};
 use hal_adapters::can::table::{Message, SLOW_TICKS};
 use hal_adapters::can::update::{Identity, Nonce, Receiver, Store};
-use hal_adapters::can::{Layout, PROTOCOL_VERSION, PoseSender, Service, sensor};
+use hal_adapters::can::{Layout, PROTOCOL_VERSION, PoseSender, Service};
 use runtime::tracker::Health;
 use runtime::zero_offset::ZeroOffsetSettings;
 use runtime::{AnyDecoder, PlanarPose, PoseTracker, RawFrame, Reading, Status};
@@ -61,6 +62,7 @@ pub struct Node<'d> {
     /// How codes are put into frames.
     layout: Layout,
     sender: PoseSender,
+    temperatures: TemperatureSender,
     service: Service,
     receiver: Receiver<'d>,
     has_key: bool,
@@ -85,6 +87,7 @@ impl<'d> Node<'d> {
             watchdog_reset,
             layout,
             sender: PoseSender::default(),
+            temperatures: TemperatureSender::START,
             service: Service::new(TICKS_PER_S),
             has_key: identity.key.is_some(),
             receiver: Receiver::new(identity, TICKS_PER_S),
@@ -178,10 +181,14 @@ impl<'d> Node<'d> {
         if self.decodes() {
             self.send_pose(&reading, sample.as_ref().ok(), outbox);
         }
-        if let Ok(frame) = &sample
-            && self.service.is_recording()
-        {
-            self.send_codes(frame, outbox);
+        if let Ok(frame) = &sample {
+            let temperatures = self.temperatures.frame(frame);
+            temperatures
+                .into_iter()
+                .for_each(|frame| outbox.push(frame));
+            if self.service.is_recording() {
+                self.send_codes(frame, outbox);
+            }
         }
         let servo = self.parameters.servo_mut();
         let answer = self.service.tick(servo.as_deref());

@@ -9,9 +9,9 @@
 use hal_adapters::can::{Coded, Message};
 use heapless::Deque;
 
-/// Frames of one tick at most: X, Y, Rz, their time, a vertical axis, three of codes, their
-/// time, a state or a counter.
-const FRESH_MAX: usize = 10;
+/// Frames of one tick at most: X, Y, Rz, their time, a vertical axis, temperatures, three of codes,
+/// their time, a state or a counter.
+const FRESH_MAX: usize = 11;
 /// Answers to the commands of a few ticks, and the six pages of a serial number.
 const LASTING_MAX: usize = 14;
 

@@ -10,6 +10,7 @@ use hal_adapters::can::command::{Answer, Command, IdentityPage, Request};
 use hal_adapters::can::e2e::{protect, unprotect};
 use hal_adapters::can::status::{HealthPage, NodeStatus};
 use hal_adapters::can::{BusFrame, Message};
+use runtime::frame::MISSING_CODE;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -172,7 +173,9 @@ pub struct Seen {
     pub identity: Vec<u8>,
     /// Number and time of ticks, us, by the controller.
     pub times: Vec<(u32, u32)>,
-    /// Frames of codes, and when they were sent completely, ns.
+    /// Temperatures of mount and body, m degC, each from its tick on.
+    pub temperatures: Vec<(u64, [i32; 2])>,
+    /// Frames of codes and temperatures, and when they were sent completely, ns.
     pub codes: Vec<(u64, BusFrame)>,
     /// Frames whose check fails or that are none of the protocol's.
     pub damaged: usize,
@@ -221,6 +224,18 @@ impl Seen {
             }
             Message::PoseTime | Message::SensorTime => {
                 self.times.push((payload.short, payload.long));
+            }
+            Message::Temperature => {
+                let signed = |word: u32, bits: u32| (word << (32 - bits)) as i32 >> (32 - bits);
+                let [mount, body] = [(payload.short, 20, 24), (payload.long, 24, 25)].map(
+                    |(word, bits, missing)| match payload.long >> missing & 1 {
+                        0 => signed(word, bits),
+                        _ => MISSING_CODE,
+                    },
+                );
+                self.temperatures.push((tick, [mount, body]));
+                let frame = BusFrame::new(message.id(), &sent.bytes);
+                self.codes.extend(frame.map(|frame| (sent.done_ns, frame)));
             }
             Message::Hall
             | Message::Capacitive

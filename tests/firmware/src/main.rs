@@ -33,7 +33,7 @@ use bench::Bench;
 use can_model::BusState;
 use checks::{
     Outcome, Report, authority, bus, commands, figures, log, motion, neighbour, parameters,
-    power_cuts, sensors, start, stopped, timing, update, zero,
+    power_cuts, sensors, start, stopped, temperature, timing, update, zero,
 };
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -126,6 +126,11 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     for (part, name) in parts {
         check(&format!("{name}: transfers that never end"), &|| {
             sensors::transfers_that_never_end(bench, part)
+        });
+    }
+    for (part, name) in parts {
+        check(&format!("{name}: temperatures"), &|| {
+            temperature::follow_the_stage(bench, part, name)
         });
     }
     check("ads131m08: a pose is of its instant", &|| {

@@ -15,6 +15,8 @@ pub struct BusTick {
     pub hall: [i32; 3],
     /// Capacitive codes 1, 2, 3.
     pub capacitive: [i32; 3],
+    /// Temperatures of mount and body, m degC.
+    pub temperature_mc: [i32; 2],
     /// Whether a code is at a rail of its converter.
     pub is_saturated: bool,
 }
@@ -104,6 +106,7 @@ impl Collector {
             received_us: now_us.saturating_sub(age_us.into()),
             hall: raw.hall,
             capacitive: raw.capacitive,
+            temperature_mc: raw.temperature_mc,
             is_saturated: false,
         })
     }

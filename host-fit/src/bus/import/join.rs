@@ -18,6 +18,8 @@ pub struct JoinedRow {
     pub hall: [i32; 3],
     /// Capacitive codes.
     pub capacitive: [i32; 3],
+    /// Temperatures of mount and body, m degC.
+    pub temperature_mc: [i32; 2],
 }
 
 /// How ticks and reference went together.
@@ -173,6 +175,7 @@ pub(super) fn join(
             values,
             hall: tick.hall,
             capacitive: tick.capacitive,
+            temperature_mc: tick.temperature_mc,
         })?;
     }
     Ok(counts)

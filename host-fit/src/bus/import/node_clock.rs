@@ -31,6 +31,7 @@ pub(super) struct Tick {
     pub(super) t_us: f64,
     pub(super) hall: [i32; 3],
     pub(super) capacitive: [i32; 3],
+    pub(super) temperature_mc: [i32; 2],
 }
 
 /// Ticks since the node started.
@@ -56,6 +57,7 @@ impl Run {
             t_us,
             hall: tick.hall,
             capacitive: tick.capacitive,
+            temperature_mc: tick.temperature_mc,
         });
     }
 
@@ -195,6 +197,7 @@ mod tests {
             received_us: u64::from(n) * 2_000 + 5_000,
             hall: [n as i32; 3],
             capacitive: [0; 3],
+            temperature_mc: [0; 2],
             is_saturated: false,
         }
     }

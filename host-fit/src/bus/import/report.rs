@@ -37,6 +37,12 @@ impl Display for ImportReport {
             health.late,
             health.incomplete
         )?;
+        if self.temperatures_left_out {
+            writeln!(
+                f,
+                "  temperatures are left out: name their columns in [temperature] of the stage file (mount, body)"
+            )?;
+        }
         let reference = &self.reference;
         writeln!(
             f,

@@ -70,7 +70,7 @@ impl<'d> Node<'d> {
     /// The messages that the node wants to receive.
     pub fn messages(layout: Layout) -> Vec<Message> {
         let mut messages = layout.messages().to_vec();
-        messages.extend([Message::SensorTime, Message::Command]);
+        messages.extend([Message::SensorTime, Message::Temperature, Message::Command]);
         messages
     }
 

@@ -59,11 +59,6 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
         not_sent: 0,
         is_down: false,
     };
-    if set.constants.temperature.is_used() {
-        let what = "the parameters want temperatures, which no frame of this bus carries: poses are as if at that of the \
-                    calibration";
-        session.display.say(what);
-    }
     let ended = session.until(stop, settings.duration, settings.every);
     // What was recorded is kept whatever ended the run.
     session.write(RecordFile::finish);

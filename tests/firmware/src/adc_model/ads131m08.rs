@@ -259,7 +259,7 @@ impl Ads131m08 {
         &mut self,
         now_ns: u64,
         input: &Input,
-        faulty: impl FnOnce(Row) -> Row,
+        faulty: impl FnOnce(Row) -> [i32; 8],
         flipped: bool,
     ) {
         self.received.clear();
@@ -290,8 +290,11 @@ impl Ads131m08 {
         self.reply.extend(word(response));
         let enabled = self.registers[CLOCK] >> 8;
         for channel in 0..8 {
-            let code = codes.get(channel).copied().unwrap_or(0);
-            let code = if enabled >> channel & 1 == 1 { code } else { 0 };
+            let code = if enabled >> channel & 1 == 1 {
+                codes[channel]
+            } else {
+                0
+            };
             self.reply.extend(&code.to_be_bytes()[1..]);
         }
         self.reply.extend(word(crc(self.reply.iter().copied())));

@@ -27,7 +27,12 @@ fn frame(part: &mut Ads131m08, now_ns: u64, command: u16, data: u16) -> (u16, [i
     let sent = [command.to_be_bytes(), data.to_be_bytes()];
     let mut out = vec![sent[0][0], sent[0][1], 0, sent[1][0], sent[1][1]];
     out.resize(30, 0);
-    part.select(now_ns, &input(), |codes| codes, false);
+    part.select(
+        now_ns,
+        &input(),
+        |codes| super::super::with(codes, [0; 2]),
+        false,
+    );
     let read: Vec<_> = out.into_iter().map(|byte| part.exchange(byte)).collect();
     part.deselect(now_ns);
     let word =
@@ -181,7 +186,12 @@ fn commands_are_answered_in_the_next_frame_and_not_before_power_is_good() {
     assert_eq!(frame(&mut part, POWER_ON_NS, 0x6180, 0x3f02).0, 0xff0e);
     assert_eq!(frame(&mut part, POWER_ON_NS, 0xa180, 0).0, 0x4180);
     // A short frame does not reset.
-    part.select(T_0, &input(), |codes| codes, false);
+    part.select(
+        T_0,
+        &input(),
+        |codes| super::super::with(codes, [0; 2]),
+        false,
+    );
     for byte in [0x00, 0x11, 0] {
         part.exchange(byte);
     }

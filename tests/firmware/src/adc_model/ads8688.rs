@@ -1,8 +1,6 @@
 //! TI ADS8688 (SBAS582C): a frame's answer follows 16 bits of command; the channel that the
 //! previous frame selected is sampled when chip select falls.
 
-use super::Row;
-
 /// From power-up until the reference is right, ns.
 const REFERENCE_NS: u64 = 15_000_000;
 /// RST/PD: low for as long is power-down, for less a reset, ns.
@@ -20,6 +18,8 @@ pub struct Ads8688 {
     registers: [u8; REGISTERS],
     /// Channel that the next frame samples; `None` outside of its conversion modes.
     next: Option<u8>,
+    /// Whether that was chosen by MAN_Ch_n, and stays.
+    is_manual: bool,
     /// Channel and code of this frame.
     sampled: Option<(u8, i32)>,
     received: Vec<u8>,
@@ -33,6 +33,7 @@ impl Ads8688 {
             low_since_ns: None,
             registers: [0; REGISTERS],
             next: None,
+            is_manual: false,
             sampled: None,
             received: Vec::new(),
         };
@@ -74,16 +75,20 @@ impl Ads8688 {
     }
 
     /// Chip select falls; `input` is what the inputs have now.
-    pub fn select(&mut self, now_ns: u64, input: Row, faulty: impl FnOnce(Row) -> Row) {
+    pub fn select(
+        &mut self,
+        now_ns: u64,
+        input: [i32; 8],
+        faulty: impl FnOnce([i32; 8]) -> [i32; 8],
+    ) {
         self.received.clear();
         self.sampled = self.next.map(|channel| {
             let settled = (now_ns - self.powered_ns).min(REFERENCE_NS) as f64 / REFERENCE_NS as f64;
             // A reference that is too low gives codes that are too large.
             let codes = input.map(|code| (f64::from(code) / settled.max(1e-3)).round() as i32);
-            let code = faulty(codes)
-                .get(usize::from(channel))
-                .copied()
-                .unwrap_or(0);
+            let code = faulty(codes)[usize::from(channel)];
+            // A channel that is powered down is not sampled.
+            let code = code * i32::from(self.registers[POWER_DOWN] >> channel & 1 == 0);
             // Ranges of +-2.5, 1.25 and 0.625 times the reference; unipolar ones from 0.
             let code = match self.range(channel) {
                 range @ 0..=2 => code << range,
@@ -145,7 +150,14 @@ impl Ads8688 {
             let enabled = || (0..8u8).filter(|k| on >> k & 1 == 1);
             enabled().find(later).or_else(|| enabled().next())
         };
-        match u16::from_be_bytes([head, value]) {
+        let command = u16::from_be_bytes([head, value]);
+        let was_manual = std::mem::take(&mut self.is_manual);
+        match command {
+            0x0000 if was_manual => self.is_manual = true,
+            0xc000..=0xdc00 if command & 0x3ff == 0 => {
+                self.next = Some((command >> 10 & 7) as u8);
+                self.is_manual = true;
+            }
             0x0000 => self.next = self.next.and_then(|channel| sequence(Some(channel))),
             0x8500 => self.reset(),
             0xa000 => self.next = sequence(None),
@@ -160,7 +172,7 @@ mod tests {
     use super::*;
 
     fn frame(part: &mut Ads8688, now_ns: u64, command: u16) -> [u8; 4] {
-        part.select(now_ns, [10, -20, 30, -40, 50, -60], |codes| codes);
+        part.select(now_ns, [10, -20, 30, -40, 50, -60, 70, -80], |codes| codes);
         let [high, low] = command.to_be_bytes();
         let read = [high, low, 0, 0, 0, 0].map(|out| part.exchange(out, false));
         part.deselect();
@@ -203,6 +215,18 @@ mod tests {
         // A register access ends the sequence.
         frame(&mut part, LATER_NS, 0x01 << 9);
         assert_eq!(frame(&mut part, LATER_NS, 0), [0; 4]);
+    }
+
+    #[test]
+    fn a_channel_chosen_by_hand_stays_until_a_sequence_starts() {
+        let mut part = Ads8688::new();
+        frame(&mut part, LATER_NS, 0x01 << 9 | 1 << 8 | 0b101);
+        frame(&mut part, LATER_NS, 0x03 << 9 | 1 << 8 | 0x42);
+        frame(&mut part, LATER_NS, 0xa000);
+        assert_eq!(frame(&mut part, LATER_NS, 0xd800), [0x80, 10, 0x04, 0]);
+        assert_eq!(frame(&mut part, LATER_NS, 0), [0x80, 70, 0xc4, 0]);
+        assert_eq!(frame(&mut part, LATER_NS, 0xa000), [0x80, 70, 0xc4, 0]);
+        assert_eq!(frame(&mut part, LATER_NS, 0), [0x80, 10, 0x04, 0]);
     }
 
     #[test]

@@ -5,10 +5,12 @@ pub mod ads131m08;
 pub mod ads8688;
 mod filter;
 pub mod input;
+pub mod thermometers;
 
 use ads131m08::{Ads131m08, Variant};
 use ads8688::Ads8688;
 pub use input::{Input, Row};
+use thermometers::Thermometers;
 
 /// What is wrong with the converter or its wires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +56,9 @@ pub struct Adc {
     pub fault: AdcFault,
     /// What is at its inputs.
     pub input: Input,
+    /// What is at inputs 7 and 8.
+    pub thermometers: Thermometers,
+    part: Part,
     faulty: Faulty,
 }
 
@@ -92,6 +97,8 @@ impl Adc {
             model,
             fault,
             input,
+            thermometers: Thermometers::default(),
+            part,
             faulty: Faulty {
                 fault,
                 last: [0; 6],
@@ -141,17 +148,22 @@ impl Adc {
             return;
         }
         self.faulty.fault = self.fault;
+        let warmth = self.thermometers.codes(self.part);
         match &mut self.model {
             Model::Ads131m08(part) => {
                 part.set_clock(self.fault != AdcFault::Clock, now_ns);
                 let flipped = self.fault == AdcFault::FlippedBit;
                 let faulty = &mut self.faulty;
-                part.select(now_ns, &self.input, |codes| faulty.codes(codes), flipped);
+                let faulty = |codes| with(faulty.codes(codes), warmth);
+                part.select(now_ns, &self.input, faulty, flipped);
             }
             Model::Ads8688(part) => {
                 let (now, faulty) = (self.input.at(now_ns), &mut self.faulty);
                 let codes = now.map(|code| code.round() as i32);
-                part.select(now_ns, codes, |codes| faulty.codes(codes));
+                part.select(now_ns, with(codes, warmth), |codes| {
+                    let [a, b, c, d, e, f, mount, body] = codes;
+                    with(faulty.codes([a, b, c, d, e, f]), [mount, body])
+                });
             }
         }
     }
@@ -179,6 +191,11 @@ impl Adc {
             Model::Ads8688(part) => part.deselect(),
         }
     }
+}
+
+/// The codes of all eight inputs.
+const fn with([a, b, c, d, e, f]: Row, [mount, body]: [i32; 2]) -> [i32; 8] {
+    [a, b, c, d, e, f, mount, body]
 }
 
 #[cfg(test)]

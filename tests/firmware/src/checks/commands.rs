@@ -10,6 +10,7 @@ use hal_adapters::can::command::{Outcome as Ended, Request};
 use hal_adapters::can::status::flag;
 use hal_adapters::can::{Layout, Message as M, SensorReceiver, Timing};
 use runtime::RawFrame;
+use runtime::frame::MISSING_CODE;
 
 const PART: Part = Part::Ads131m08;
 /// From the trigger to the middle of what is sampled, by the drivers' documentation, us.
@@ -211,7 +212,8 @@ pub fn record(bench: &Bench, part: Part) -> Outcome {
         let mut machine = bench.machine(part, [blob, &[]])?;
         machine.run_ticks(50)?;
         let seen = Seen::since_last(&mut machine);
-        equal("codes that nobody asked for", seen.codes.len(), 0)?;
+        let codes = |seen: &Seen| seen.codes.len() - seen.temperatures.len();
+        equal("codes that nobody asked for", codes(&seen), 0)?;
         let seen = ask(&mut machine, Request::Record { on: true }, 1, 800)?;
         equal("answer", ended(&seen, 1), vec![Some(Ended::Done)])?;
         equal("flag", flags(&seen) & flag::RECORDING, flag::RECORDING)?;
@@ -226,6 +228,12 @@ pub fn record(bench: &Bench, part: Part) -> Outcome {
             0,
         )?;
         expect(ticks.len() >= 797, || format!("{} ticks", ticks.len()))?;
+        let warm = |tick: &&RawFrame| !tick.temperature_mc.contains(&MISSING_CODE);
+        let warm = ticks.iter().filter(warm).count();
+        // Record mode begins up to 100 ms before the next frame of temperatures.
+        expect(warm >= 797 - 52, || {
+            format!("{warm} ticks with temperatures")
+        })?;
         let codes = |tick: &RawFrame| -> Row {
             let ([a, b, c], [d, e, f]) = (tick.hall, tick.capacitive);
             [a, b, c, d, e, f]
@@ -246,7 +254,11 @@ pub fn record(bench: &Bench, part: Part) -> Outcome {
         equal("answer", ended(&seen, 2), vec![Some(Ended::Done)])?;
         machine.run_ticks(20)?;
         let seen = Seen::since_last(&mut machine);
-        equal("codes afterwards", seen.codes.len(), 0)?;
+        equal(
+            "codes afterwards",
+            seen.codes.len() - seen.temperatures.len(),
+            0,
+        )?;
     }
     Ok(())
 }
@@ -269,6 +281,7 @@ pub fn order_and_age(bench: &Bench, part: Part, name: &str) -> Outcome {
         &[M::PoseX, M::PoseY, M::PoseRz][..],
         &[M::PoseTime],
         &[M::PoseZ, M::PoseRx, M::PoseRy],
+        &[M::Temperature],
         &[M::SensorTime],
         Layout::Bits16.messages(),
         Layout::Bits24.messages(),

@@ -13,6 +13,7 @@ pub mod power_cuts;
 pub mod sensors;
 pub mod start;
 pub mod stopped;
+pub mod temperature;
 pub mod timing;
 pub mod update;
 pub mod zero;

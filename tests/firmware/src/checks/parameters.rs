@@ -127,9 +127,6 @@ pub fn one_usable(bench: &Bench) -> Outcome {
 /// The golden example of the field model, in a stage of its own.
 pub(super) const FIELD: &[u8] = include_bytes!("../../../../runtime/examples/field.bin");
 
-/// One that wants temperatures.
-const WARM: &[u8] = include_bytes!("../../../../runtime/examples/warm.bin");
-
 /// What the host's decoder makes of the log with these parameters.
 pub(super) fn poses_of(bench: &Bench, set: &ParameterSet) -> Vec<Words> {
     let decoder = set.decoder();
@@ -141,27 +138,17 @@ pub(super) fn poses_of(bench: &Bench, set: &ParameterSet) -> Vec<Words> {
             let [z, rx, ry] = reading.pose.vertical.to_array();
             Words {
                 words: [x, y, rz, z, rx, ry].map(f32::to_bits),
-                // A frame has room for so many; the next is in a page of health.
-                status: reading.status.bits() & 0xf_ffff,
+                status: reading.status.bits(),
             }
         })
         .collect()
 }
 
-/// With a blob of the field model the words on the bus are those of the host's decoder; with one that
-/// wants temperatures, too, and a bit says that they are missing.
+/// With a blob of the field model the words on the bus are those of the host's decoder.
 pub fn the_field_model(bench: &Bench) -> Outcome {
-    same_words(bench, FIELD, 0)?;
-    same_words(bench, WARM, board_check::TEMPERATURE_MISSING)
-}
-
-fn same_words(bench: &Bench, example: &[u8], missing: u32) -> Outcome {
-    let mut set = ParameterSet::from_bytes(example)?;
-    set.serial = Text::try_from("stage-7").map_err(|_| "the serial")?;
-    let mut buffer = [0; MAX_BYTES];
-    let blob = set.to_bytes(&mut buffer)?;
+    let (blob, set) = of_stage_7(FIELD)?;
     let poses = poses_of(bench, &set);
-    let mut machine = bench.machine(PART, [blob, &[]])?;
+    let mut machine = bench.machine(PART, [&blob, &[]])?;
     machine.run_ticks(1000)?;
     let seen = Seen::since_last(&mut machine);
     let mut comparison = Comparison::default();
@@ -173,7 +160,7 @@ fn same_words(bench: &Bench, example: &[u8], missing: u32) -> Outcome {
     equal(
         "temperature missing",
         checks & board_check::TEMPERATURE_MISSING,
-        missing,
+        0,
     )?;
     expect(comparison.planar >= 998, || {
         format!("only {} poses", comparison.planar)
@@ -182,6 +169,14 @@ fn same_words(bench: &Bench, example: &[u8], missing: u32) -> Outcome {
     expect(planar.filter(|axis| axis.word != 0).count() >= 998, || {
         "poses that are not valid".to_owned()
     })
+}
+
+/// An example as a blob of the bench's stage.
+pub(super) fn of_stage_7(example: &[u8]) -> Result<(Vec<u8>, ParameterSet), super::Failure> {
+    let mut set = ParameterSet::from_bytes(example)?;
+    set.serial = Text::try_from("stage-7").map_err(|_| "the serial")?;
+    let mut buffer = [0; MAX_BYTES];
+    Ok((set.to_bytes(&mut buffer)?.to_vec(), set))
 }
 
 /// Of two blobs that a probe has flashed the one in slot 0 is used.

@@ -204,11 +204,11 @@ pub fn cases(part: Part) -> Vec<Case> {
             ] {
                 all.push(Case::of_register(register, bits, name, part));
             }
-            // It changes nothing yet, and is found when its register is read back.
+            // It is found when its register is read back, or when the thermometer is read.
             all.push(Case {
-                within: 11,
-                back_within: 12 + ticks_to_settle(part),
-                ..Case::of_register(0x0c, 1, "the range of an unused input flips", part)
+                within: 13,
+                back_within: 14 + ticks_to_settle(part),
+                ..Case::of_register(0x0c, 1, "the range of a thermometer's input flips", part)
             });
         }
     }

@@ -1,0 +1,96 @@
+//! Thermometers at inputs 7 and 8, and the voltage that a converter's input has of them: at the
+//! magnets' mount a Semitec 103AT-2 to ground with 68 kOhm to 3.3 V, on the stage body a TI TMP235.
+
+use super::Part;
+
+/// Rows of the 103AT-2's sheet (Semitec P12-13): degC, Ohm.
+const THERMISTOR: [(f64, f64); 10] = [
+    (0.0, 27_280.0),
+    (5.0, 22_050.0),
+    (10.0, 17_960.0),
+    (15.0, 14_690.0),
+    (20.0, 12_090.0),
+    (25.0, 10_000.0),
+    (30.0, 8_313.0),
+    (35.0, 6_940.0),
+    (40.0, 5_827.0),
+    (45.0, 4_911.0),
+];
+
+const SUPPLY_V: f64 = 3.3;
+const SERIES_OHM: f64 = 68e3;
+
+/// A sensor and its wires.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wiring {
+    /// As it should be.
+    Sound,
+    /// The sensor is torn off: the input has what the rest of its circuit gives.
+    Open,
+    /// Both wires touch.
+    Shorted,
+}
+
+/// Both sensors.
+#[derive(Clone, Copy, Debug)]
+pub struct Thermometers {
+    /// Temperatures of mount and body, degC.
+    pub celsius: [f64; 2],
+    /// Their wiring.
+    pub wiring: [Wiring; 2],
+}
+
+impl Default for Thermometers {
+    fn default() -> Self {
+        Self {
+            celsius: [24.3, 26.1],
+            wiring: [Wiring::Sound; 2],
+        }
+    }
+}
+
+/// Between two rows ln R is a line in 1/T, which is what a B value says.
+fn thermistor_ohm(celsius: f64) -> f64 {
+    let rows = THERMISTOR
+        .windows(2)
+        .filter_map(|pair| pair.first().zip(pair.last()));
+    let mut rows = rows.filter(|(low, high)| (low.0..=high.0).contains(&celsius));
+    let Some(((t0, r0), (t1, r1))) = rows.next() else {
+        return f64::NAN;
+    };
+    let inverse = |t: f64| 1.0 / (t + 273.15);
+    let part = (inverse(celsius) - inverse(*t0)) / (inverse(*t1) - inverse(*t0));
+    r0 * (r1 / r0).powf(part)
+}
+
+impl Thermometers {
+    /// Codes of inputs 7 and 8.
+    pub fn codes(&self, part: Part) -> [i32; 2] {
+        let [mount, body] = self.celsius;
+        let mount_ohm = match self.wiring[0] {
+            Wiring::Sound => thermistor_ohm(mount),
+            Wiring::Open => 1e12,
+            Wiring::Shorted => 1e-3,
+        };
+        // Voltage and resistance of each source without the converter.
+        let mount = (
+            SUPPLY_V * mount_ohm / (SERIES_OHM + mount_ohm),
+            SERIES_OHM * mount_ohm / (SERIES_OHM + mount_ohm),
+        );
+        let body = match self.wiring[1] {
+            Wiring::Sound => (0.5 + 0.010 * body, 1.0),
+            Wiring::Open => (0.0, 1e12),
+            Wiring::Shorted => (0.0, 1e-3),
+        };
+        [mount, body].map(|(volt, ohm)| {
+            // SBAS950: 330 kOhm to ground, +-1.2 V in 24 bits. SBAS582C 7.5: (V - 2.25 V) / 1 MOhm, and
+            // +-10.24 V in 16 bits.
+            let (input_ohm, bias_v, full_v, rail) = match part {
+                Part::Ads131m08 => (330e3, 0.0, 1.2, 8_388_608.0),
+                Part::Ads8688 => (1e6, 2.25, 10.24, 32_768.0),
+            };
+            let at_pin = (volt * input_ohm + bias_v * ohm) / (input_ohm + ohm);
+            (at_pin / full_v * rail).round().clamp(-rail, rail - 1.0) as i32
+        })
+    }
+}

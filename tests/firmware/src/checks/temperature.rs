@@ -1,0 +1,114 @@
+//! Temperatures from the thermometers to the pose: the words of the host's decoder at what the bus says
+//! of them, and a broken one that every pose says.
+
+use super::parameters::of_stage_7;
+use super::start::page;
+use super::{Outcome, equal, expect};
+use crate::adc_model::Part;
+use crate::adc_model::thermometers::Wiring;
+use crate::bench::{Bench, Seen};
+use hal_adapters::can::pose::status_to_bus;
+use hal_adapters::can::status::board_check;
+use runtime::frame::MISSING_CODE;
+use runtime::{Decode, ParameterSet, PlanarPose, RawFrame, Status};
+
+/// A blob that wants temperatures, about 20.1 and 21.3 degC.
+const WARM: &[u8] = include_bytes!("../../../../runtime/examples/warm.bin");
+/// A change of the stage has been read and is in the poses after so many ticks.
+const READ: u64 = 52;
+/// Ticks of each step: a page of health comes once in 192.
+const TICKS: u64 = 400;
+
+/// Poses follow the temperatures, which are those of the stage; a thermometer that is open or shorted
+/// is missing, and back when it is mended.
+pub fn follow_the_stage(bench: &Bench, part: Part, name: &str) -> Outcome {
+    let (blob, set) = of_stage_7(WARM)?;
+    let mut machine = bench.machine(part, [&blob, &[]])?;
+    let mut worst_mk = 0;
+    let mut words = 0;
+    let sound = [Wiring::Sound; 2];
+    for (celsius, wiring) in [
+        ([24.3, 26.1], sound),
+        ([21.0, 19.5], sound),
+        ([33.2, 30.0], sound),
+        ([33.2, 30.0], [Wiring::Open, Wiring::Sound]),
+        ([33.2, 30.0], [Wiring::Sound, Wiring::Open]),
+        ([33.2, 30.0], [Wiring::Shorted, Wiring::Shorted]),
+        ([22.0, 23.0], sound),
+    ] {
+        machine.chip.adc.thermometers.celsius = celsius;
+        machine.chip.adc.thermometers.wiring = wiring;
+        let first = machine
+            .chip
+            .first_tick_ns
+            .map_or(0, |ns| (machine.chip.now_ns - ns).div_ceil(2_000_000));
+        machine.run_ticks(TICKS)?;
+        let what = format!("{celsius:?} {wiring:?}");
+        let seen = Seen::since_last(&mut machine);
+        words += same_words(bench, &set, &seen, &what)?;
+        let (_, last_mc) = *seen.temperatures.last().ok_or("no temperatures")?;
+        for k in 0..2 {
+            if wiring[k] != Wiring::Sound {
+                equal(&what, last_mc[k], MISSING_CODE)?;
+                continue;
+            }
+            let off_mk = (f64::from(last_mc[k]) - 1e3 * celsius[k]).abs() as i32;
+            worst_mk = worst_mk.max(off_mk);
+            expect(off_mk <= 60, || format!("{what}: {last_mc:?}"))?;
+        }
+        let is_missing = wiring != sound;
+        let late = seen.axes.iter().filter(|axis| axis.tick >= first + READ);
+        let marked = late.clone().filter(|axis| axis.status & MARK != 0).count();
+        let wanted = if is_missing { late.count() } else { 0 };
+        equal(&format!("{what}: words that are marked"), marked, wanted)?;
+        let checks = page(&seen, 11).ok_or("no page 11")?;
+        equal(
+            &format!("{what}: page 11"),
+            checks & board_check::TEMPERATURE_MISSING != 0,
+            is_missing,
+        )?;
+    }
+    println!("RESULT firmware_{name}_temperature_off_max_mk={worst_mk}");
+    println!("RESULT firmware_{name}_temperature_words={words}");
+    let resets = (machine.panics, machine.watchdog_resets);
+    equal("panics and watchdog resets", resets, (0, 0))
+}
+
+/// What says on the bus that a temperature of a valid pose is missing.
+const MARK: u32 = Status::PLANAR_HELD.bits();
+
+/// The words on the bus beside the host's at the temperatures that were sent last. Gives their number.
+fn same_words(
+    bench: &Bench,
+    set: &ParameterSet,
+    seen: &Seen,
+    what: &str,
+) -> Result<u64, super::Failure> {
+    let decoder = set.decoder();
+    let mut words = 0;
+    for axis in &seen.axes {
+        let sent = seen.temperatures.iter().rev();
+        let Some((_, temperature_mc)) = sent.clone().find(|(tick, _)| *tick <= axis.tick) else {
+            // Before the first frame since the last step.
+            continue;
+        };
+        let [a, b, c, g1, g2, g3] = bench.rows[axis.tick as usize % bench.rows.len()];
+        let frame = RawFrame::new([a, b, c], [g1, g2, g3], 0, 0);
+        let frame = frame.with_temperature_mc(*temperature_mc);
+        let reading = decoder.decode(&frame, &PlanarPose::ZERO);
+        let [x, y, rz] = reading.pose.planar.to_array();
+        let [z, rx, ry] = reading.pose.vertical.to_array();
+        let word = [x, y, rz, z, rx, ry][axis.axis].to_bits();
+        let want = (word, status_to_bus(reading.status));
+        equal(
+            &format!("{what}: axis {} of tick {}", axis.axis, axis.tick),
+            (axis.word, axis.status),
+            want,
+        )?;
+        words += 1;
+    }
+    expect(words > 3 * (TICKS - READ), || {
+        format!("{what}: only {words} words")
+    })?;
+    Ok(words)
+}
