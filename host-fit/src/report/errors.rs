@@ -1,6 +1,6 @@
 //! Errors of the pose in a report: as JSON and as tables, over all rows and log by log.
 
-use super::table::Table;
+use super::table::{Table, file_name};
 use crate::fit::calibration;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
@@ -78,7 +78,7 @@ fn cell(x: f64) -> String {
 pub(super) fn by_log(dataset: &Dataset, judgement: &Judgement) -> Vec<Value> {
     let logs = dataset.logs.iter().zip(&judgement.logs);
     let figures = logs.map(|(log, judged)| {
-        let path = log.path.display().to_string();
+        let path = file_name(&log.path);
         json!({ "path": path, "rows": judged.rows, "errors": errors(&judged.errors) })
     });
     figures.collect()

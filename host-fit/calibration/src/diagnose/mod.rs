@@ -52,6 +52,7 @@ use crate::judge::identify::FitFailure;
 use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, Predicted, Verdict};
 use crate::problem::parameters::Parameters;
 use crate::solve::field::parameters::FieldParameters;
+use bank::Fitted;
 use runtime::{ModelKind, ParameterSet};
 use std::borrow::Cow;
 
@@ -82,6 +83,8 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     let errors = (fitted.ok()).map(|fit| &fit.decoded.errors[..]);
     let (parameters, lag_s) = parameters_of(fitted, stage);
     let model = fitted.map_or(ModelKind::M31, |fit| fit.model.kind);
+    let field = fitted.ok().and_then(|fit| fit.field.as_ref());
+    let for_service = field.is_some_and(|field| !field.verdict.by_resets);
     let of_signals = || signals::signal_findings(dataset, stage, (&parameters, lag_s), errors);
     let (of_structure, (mut findings, bad)) =
         rayon::join(|| structure::structure(&sound, stage), of_signals);
@@ -92,7 +95,11 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
     };
     let (mut predicted, mut repair) = (None, None);
     let described = is_described.then(|| {
-        let fitted = (&parameters, model);
+        let fitted = Fitted {
+            parameters: &parameters,
+            model,
+            for_service,
+        };
         of_channels(dataset, stage, &bad, &findings, fitted)
     });
     let mut described = described.flatten();
@@ -150,9 +157,12 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         }
     }
     let mut findings = in_order(findings);
-    findings.splice(0..0, beyond_service(model, predicted.as_ref(), &findings));
+    let beyond = predicted
+        .filter(|_| for_service)
+        .and_then(|p| beyond_service(&p, &findings));
+    findings.splice(0..0, beyond);
     let verdict = match fitted {
-        Ok(fit) => Verdict::new(fit.model.kind, predicted.as_ref(), &findings),
+        Ok(_) => Verdict::new(for_service, predicted.as_ref(), &findings),
         Err(_) => Verdict::Refused,
     };
     Diagnosis {
@@ -176,14 +186,10 @@ fn parameters_of(fitted: Result<&Fit, &FitError>, stage: &Stage) -> (FieldParame
 }
 
 /// That a calibration is refused for what is predicted, where no finding refuses it by itself.
-fn beyond_service(
-    model: ModelKind,
-    predicted: Option<&Predicted>,
-    findings: &[Finding],
-) -> Option<Finding> {
-    let ratio = predicted?.worst_ratio();
+fn beyond_service(predicted: &Predicted, findings: &[Finding]) -> Option<Finding> {
+    let ratio = predicted.worst_ratio();
     let is_refused = findings.iter().any(|f| f.severity == Severity::Refuse);
-    (model == ModelKind::Field && ratio > LIMITED_MAX && !is_refused).then(|| {
+    (ratio > LIMITED_MAX && !is_refused).then(|| {
         let message = format!(
             "all that is wrong with the log together makes errors of {ratio:.2} times the noise floor at work"
         );
@@ -198,12 +204,12 @@ fn of_channels(
     stage: &Stage,
     bad: &[usize],
     others: &[Finding],
-    (parameters, model): (&FieldParameters, ModelKind),
+    fitted: Fitted,
 ) -> Option<bank::Diagnosis> {
     if dataset.logs.iter().any(|log| !log.has_reference) {
         return None;
     }
-    let mut found = bank::diagnose(&dataset.without(bad), stage, parameters, model)?;
+    let mut found = bank::diagnose(&dataset.without(bad), stage, fitted)?;
     let is_refused = others
         .iter()
         .any(|found| found.severity == Severity::Refuse);
@@ -221,7 +227,7 @@ fn of_channels(
         );
         // Of other models it is what they lack.
         let cost = found.predicted.worst_ratio();
-        let severity = match model {
+        let severity = match fitted.model {
             ModelKind::Field => bank::severity(cost).max(Severity::Warn),
             _ => Severity::Refuse,
         };
@@ -252,7 +258,12 @@ pub fn of_judged(
     let (more, bad) = signals::signal_findings(dataset, stage, (&parameters, 0.0), Some(errors));
     let of_structure = structure::structure(dataset, stage);
     let mut findings: Vec<Finding> = of_structure.into_iter().chain(more).collect();
-    let of_channels = of_channels(dataset, stage, &bad, &findings, (&parameters, model));
+    let of_blob = Fitted {
+        parameters: &parameters,
+        model,
+        for_service: model == ModelKind::Field,
+    };
+    let of_channels = of_channels(dataset, stage, &bad, &findings, of_blob);
     let (of_channels, predicted) =
         of_channels.map_or((Vec::new(), None), |of| (of.findings, Some(of.predicted)));
     // A log that leaves a calibration open says nothing of one that is not fitted to it.
@@ -273,13 +284,12 @@ pub fn of_judged(
     findings.extend(range::out_of_range(set, dataset));
     let findings = in_order(findings);
     let is_bent = fitted.is_some() && findings.iter().any(|f| f.cost > Some(GOOD_MAX));
-    let verdict =
-        predicted.map(
-            |predicted| match Verdict::new(model, Some(&predicted), &findings) {
-                Verdict::Good if is_bent => Verdict::Limited,
-                verdict => verdict,
-            },
-        );
+    let verdict = predicted.map(|predicted| {
+        match Verdict::new(of_blob.for_service, Some(&predicted), &findings) {
+            Verdict::Good if is_bent => Verdict::Limited,
+            verdict => verdict,
+        }
+    });
     Diagnosis {
         findings,
         verdict,

@@ -19,7 +19,7 @@ pub(super) fn not_field(fit: &Fit, predicted: Option<&Predicted>) -> Option<Find
         let [x, y, rz] = predicted
             .range
             .map(|ends| ends.map(|end| end * 1e6))
-            .map(|[low, high]| format!("{low:.0} to {high:.0}"));
+            .map(|[low, high]| format!("{low:.1} to {high:.1}"));
         format!(
             ". It is good on movements like those of the log; in service expect {x} um in X, {y} um in Y, {rz} urad in Rz"
         )

@@ -49,6 +49,7 @@ pub fn reference_lag(
             drift_mm: drift_mm(rows, &blocks, white_mm, &unknown),
             white_mm,
         },
+        resets_mm: None,
     };
     let normal = equations.of_blocks(&blocks);
     // The first terms of a probe are those of Model (31), in its order.

@@ -3,7 +3,6 @@
 use crate::finding::{Finding, Severity};
 use crate::solve::field::carry::Service;
 use nalgebra::DMatrix;
-use runtime::ModelKind;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
@@ -11,9 +10,11 @@ use serde::{Serialize, Serializer};
 pub const GOOD_MAX: f64 = 1.10;
 /// ... and up to which it serves at all.
 pub const LIMITED_MAX: f64 = 1.30;
-/// Nine of ten stages have errors above the lower end of the range, and nine of ten below the
-/// upper: standard deviations.
-const END: f64 = 1.2816;
+/// The ends of the range are where one of twenty stages is below, and one above: standard deviations.
+const END: f64 = 1.645;
+/// Mean squares of the errors of one calibration over services within the declared range, standard deviation
+/// over mean.
+const OF_MOTION: f64 = 0.5;
 
 /// Whether a calibration can be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -28,14 +29,15 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Of a calibration with these findings.
-    pub fn new(model: ModelKind, predicted: Option<&Predicted>, findings: &[Finding]) -> Self {
+    /// Of a calibration with these findings; `for_service` where its model describes service and its log
+    /// could show it.
+    pub fn new(for_service: bool, predicted: Option<&Predicted>, findings: &[Finding]) -> Self {
         let is_refused = findings.iter().any(|f| f.severity == Severity::Refuse);
         let ratio = predicted.map_or(LIMITED_MAX, Predicted::worst_ratio);
-        match (is_refused, model) {
+        match (is_refused, for_service) {
             (true, _) => Self::Refused,
-            (false, ModelKind::Field) if ratio <= GOOD_MAX => Self::Good,
-            (false, ModelKind::Field) if ratio > LIMITED_MAX => Self::Refused,
+            (false, true) if ratio <= GOOD_MAX => Self::Good,
+            (false, true) if ratio > LIMITED_MAX => Self::Refused,
             // What other models lack is no fault of the log.
             _ => Self::Limited,
         }
@@ -49,7 +51,7 @@ pub struct Predicted {
     pub rms: [f64; 3],
     /// The same over the noise floor, which is that of the probes.
     pub ratio: [f64; 3],
-    /// Eight of ten stages with such a log have an rms between these: m, m, rad.
+    /// Nine of ten stages with such a log have an rms between these: m, m, rad.
     pub range: [[f64; 2]; 3],
 }
 
@@ -58,13 +60,13 @@ impl Predicted {
     pub fn new(service: &Service, covariance: &DMatrix<f64>, off: &[f64]) -> Self {
         let variance = service.variance(covariance);
         let known = service.squares(off);
-        let spread = service.spread(covariance);
+        let spread = service.spread(covariance, off);
         let rms =
             |axis: usize| (variance.noise[axis] + variance.systematic[axis] + known[axis]).sqrt();
         let range = |axis: usize| {
-            let least = variance.noise[axis] + known[axis];
-            [-END, END]
-                .map(|end| (least + quantile(variance.systematic[axis], spread[axis], end)).sqrt())
+            let mean = variance.systematic[axis] + known[axis];
+            let spread = spread[axis] + (OF_MOTION * mean) * (OF_MOTION * mean);
+            [-END, END].map(|end| (variance.noise[axis] + quantile(mean, spread, end)).sqrt())
         };
         let rms = [0, 1, 2].map(rms);
         Self {

@@ -139,6 +139,15 @@ pub struct LogSource {
     pub has_reference: bool,
 }
 
+impl LogSource {
+    /// How messages name it: as it was named, of an absolute path the file name alone, for reports are mailed.
+    pub fn name(&self) -> String {
+        let file = self.path.file_name().filter(|_| self.path.is_absolute());
+        let name = file.unwrap_or(self.path.as_os_str());
+        name.to_string_lossy().into_owned()
+    }
+}
+
 /// Rows of one or more logs, movement after movement: all rows of short logs, and of long ones a
 /// sample of runs, each a movement by itself.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -245,7 +254,7 @@ impl Dataset {
     /// The same of a movement by its log and its number there.
     pub fn movement_named(&self, log: usize, index: i64) -> String {
         match self.logs.get(log) {
-            Some(log) if self.logs.len() > 1 => format!("{}:{index}", log.path.display()),
+            Some(log) if self.logs.len() > 1 => format!("{}:{index}", log.name()),
             _ => index.to_string(),
         }
     }

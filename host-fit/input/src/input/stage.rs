@@ -128,6 +128,9 @@ pub struct Stage {
     pub capacitive: CodeScale,
     /// Distance between the two Y beams of the interferometer, m.
     pub y_baseline_m: f64,
+    /// Error of a reset of the interferometers in X, Y, Rz, standard deviation, m, m, rad; `None` where nothing
+    /// is known of it, or where the Hall probes say where the stage is reset.
+    pub reset_sd: Option<[f64; 3]>,
     /// Servo period, s.
     pub servo_period_s: f64,
     /// Search ranges.
@@ -144,6 +147,11 @@ impl Stage {
     /// Where the designed probes stand, m.
     pub fn places_m(&self) -> [[f64; 2]; 3] {
         self.probes.map(|probe| probe.place_m)
+    }
+
+    /// [`Stage::reset_sd`] in mm, mm, mrad.
+    pub fn resets_mm(&self) -> Option<[f64; 3]> {
+        self.reset_sd.map(|deviations| deviations.map(|x| x * 1e3))
     }
 
     /// Lever arms and thetas of the designed probes.

@@ -36,6 +36,8 @@ pub(super) struct Log {
     pub(super) movements: Vec<Range<usize>>,
     /// White noise of A, B, C from row to row, mm.
     pub(super) white_mm: [f64; 3],
+    /// Errors of the resets, mm, mm, mrad, where they are declared.
+    pub(super) resets_mm: Option<[f64; 3]>,
 }
 
 impl Log {
@@ -89,7 +91,14 @@ impl Log {
             means,
             movements,
             white_mm,
+            resets_mm: stage.resets_mm(),
         }
+    }
+
+    /// How many numbers the means hold beyond the offsets of the movements.
+    pub(super) fn count(&self) -> f64 {
+        let offsets = self.resets_mm.map_or(self.movements.len(), |_| 0);
+        3.0 * (self.means.len() - offsets) as f64
     }
 
     /// Poses (X, Y, Rz and Z, Rx, Ry: m, rad) spread over the log: what a model is good for that has no more

@@ -18,18 +18,8 @@ impl Job<'_> {
             self.dataset.movements[row.movement].log
         };
         let begins = at > 0 && log_of(at - 1) != log_of(at);
-        let log = begins.then(|| self.dataset.logs[log_of(at)].path.display().to_string());
+        let log = begins.then(|| self.dataset.logs[log_of(at)].name());
         (name, row.t_us, log)
-    }
-
-    pub(super) fn not_determined(&self, predicted: &Predicted) -> Finding {
-        let [x, y, rz] = predicted.ratio;
-        let message = format!(
-            "the log leaves so much open that {x:.2} / {y:.2} / {rz:.2} times the noise floor are to be expected in X / Y / Rz over the \
-             range of service ([motion] in stage.toml). Remedy: {}",
-            Code::NotDetermined.entry().remedy
-        );
-        Finding::new(Code::NotDetermined, message).costing(predicted.worst_ratio())
     }
 
     pub(super) fn two_states(&self, from: usize, cost: f64) -> Finding {
@@ -111,6 +101,17 @@ impl Job<'_> {
             Course::Ramp | Course::RampInMovements => found,
         }
     }
+}
+
+/// That the log leaves so much open.
+pub(super) fn not_determined(predicted: &Predicted) -> Finding {
+    let [x, y, rz] = predicted.ratio;
+    let message = format!(
+        "the log leaves so much open that {x:.2} / {y:.2} / {rz:.2} times the noise floor are to be expected in X / Y / Rz over the \
+         range of service ([motion] in stage.toml). Remedy: {}",
+        Code::NotDetermined.entry().remedy
+    );
+    Finding::new(Code::NotDetermined, message).costing(predicted.worst_ratio())
 }
 
 /// A finding of a fault that the calibration is without.

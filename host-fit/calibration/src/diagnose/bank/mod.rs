@@ -32,6 +32,7 @@ use crate::solve::field::probe::probes;
 use crate::solve::field::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE};
 use blocks::Log;
 use columns::{FAMILIES, Kind, by_channel, shaped};
+use findings::not_determined;
 pub(super) use findings::repaired;
 use map::{Estimate, UNKNOWNS};
 use nalgebra::{DMatrix, DVector};
@@ -80,21 +81,15 @@ pub fn severity(ratio: f64) -> Severity {
 
 /// The diagnosis of the rows of a log that no other test has found to be wrong, from the parameters of a
 /// fit. `None` where the log is too short or too still for an estimate.
-pub fn diagnose(
-    dataset: &Dataset,
-    stage: &Stage,
-    fitted: &FieldParameters,
-    model: ModelKind,
-) -> Option<Diagnosis> {
-    let log = Log::new(dataset, stage, &probes(fitted));
-    let estimate = Estimate::new(&log, fitted)?;
+pub fn diagnose(dataset: &Dataset, stage: &Stage, fitted: Fitted) -> Option<Diagnosis> {
+    let log = Log::new(dataset, stage, &probes(fitted.parameters));
+    let estimate = Estimate::new(&log, fitted.parameters)?;
     let of = |dataset, log: &Log, estimate| {
         Job {
             dataset,
             stage,
             log,
             fitted,
-            model,
         }
         .diagnosis(estimate)
     };
@@ -120,29 +115,41 @@ pub fn declared_service(
     Service::new(parameters, white_mm, poses)
 }
 
+/// What a log is judged by.
+#[derive(Clone, Copy, Debug)]
+pub struct Fitted<'a> {
+    /// The parameters, of other models as one of the field model.
+    pub parameters: &'a FieldParameters,
+    /// The model.
+    pub model: ModelKind,
+    /// Whether the model describes service and the log can carry it without what is declared of resets.
+    pub for_service: bool,
+}
+
 /// A log with what it was fitted by.
 struct Job<'a> {
     dataset: &'a Dataset,
     stage: &'a Stage,
     log: &'a Log,
-    fitted: &'a FieldParameters,
-    model: ModelKind,
+    fitted: Fitted<'a>,
 }
 
 impl Job<'_> {
     fn diagnosis(&self, mut estimate: Estimate) -> Option<Diagnosis> {
         let log = self.log;
-        let declared = declared_service(self.stage, self.fitted, log.white_mm)?;
+        let declared = declared_service(self.stage, self.fitted.parameters, log.white_mm)?;
         // What the log leaves open of the model's own parameters decides before any fault does.
-        let of_model = match self.model {
+        let of_model = match self.fitted.model {
             ModelKind::Field => PER_PROBE,
             model => Model::of(model).fitted,
         };
         let own = estimate.without_faults(of_model)?.inverse();
         let own = Predicted::new(&declared, &own, &[0.0; COUNT]);
-        if own.worst_ratio() > LIMITED_MAX {
+        let is_open = own.worst_ratio() > LIMITED_MAX;
+        let by_resets = self.fitted.model == ModelKind::Field && !self.fitted.for_service;
+        if is_open && !by_resets {
             return Some(Diagnosis {
-                findings: vec![self.not_determined(&own)],
+                findings: vec![not_determined(&own)],
                 predicted: own,
                 repair: None,
                 rest: 1.0,
@@ -155,7 +162,7 @@ impl Job<'_> {
             true => (PER_PROBE, declared.clone()),
             false => {
                 let poses = log.poses().into_iter();
-                let own = Service::new(self.fitted, log.white_mm, poses)?;
+                let own = Service::new(self.fitted.parameters, log.white_mm, poses)?;
                 (BEYOND_MODEL_31, own)
             }
         };
@@ -166,7 +173,7 @@ impl Job<'_> {
             .map(|family| family.raw(log, &estimate, &by_channel))
             .collect();
         let per_unknown = libm::log(3.0 * log.means.len() as f64);
-        let count = 3.0 * (log.means.len() - log.movements.len()) as f64 - UNKNOWNS as f64;
+        let count = log.count() - UNKNOWNS as f64;
         // What lowers chi-square from one value to another is worth this, whatever the noise is: where much
         // is left that no fault explains, as hum, a fault must explain its part of that.
         let worth = |from: f64, to: f64| count.max(1.0) * libm::log(from / to.max(1.0));
@@ -233,15 +240,12 @@ impl Job<'_> {
             }
             None => {
                 // What the fit at hand is off the repaired one, whatever bent it.
-                let own = estimate.parameters.probes.as_flattened();
-                let pairs = self.fitted.probes.as_flattened().iter().zip(own);
-                let (off, covariance) = match carried {
-                    true => (
-                        pairs.map(|(a, b)| a - b).collect(),
-                        estimate.curvature.inverse(),
-                    ),
-                    false => (vec![0.0; COUNT], estimate.omitting(of_model)?),
+                let (own, covariance) = match self.fitted.model {
+                    ModelKind::Field => (estimate.values(), estimate.curvature.inverse()),
+                    _ => estimate.of_this_stage()?,
                 };
+                let pairs = (self.fitted.parameters.probes.as_flattened().iter()).zip(&own);
+                let off: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
                 let predicted = Predicted::new(&declared, &(covariance * certain), &off);
                 (predicted, None, (0..faults.len()).map(off_by).collect())
             }
@@ -256,8 +260,9 @@ impl Job<'_> {
             let cost = cost.min(predicted.worst_ratio());
             self.finding(fault, alike, estimate.sizes()[number], cost)
         });
+        let open = (is_open && by_resets).then(|| not_determined(&own).severe(Severity::Warn));
         Some(Diagnosis {
-            findings: of_parts.into_iter().chain(of_faults).collect(),
+            findings: open.into_iter().chain(of_parts).chain(of_faults).collect(),
             predicted,
             repair,
             rest,
@@ -278,7 +283,7 @@ impl Job<'_> {
             let family = &FAMILIES[fault.family];
             alike.is_empty() && (family.channel != "ifm" || family.kind != Kind::Gain)
         };
-        if self.model != ModelKind::Field || !is_worth_it || !faults.iter().all(is_clear) {
+        if self.fitted.model != ModelKind::Field || !is_worth_it || !faults.iter().all(is_clear) {
             return None;
         }
         let predicted = Predicted::new(declared, covariance, &[0.0; COUNT]);

@@ -3,7 +3,8 @@
 //! In the space of the pose the reference's walk has a diagonal covariance D a second, and the probes'
 //! noise N = B^-1 S B^-T (B: derivatives of the signals by the pose). A matrix T with T N T' = 1 and
 //! T D T' diagonal makes three channels that a scalar filter each turns into innovations. The offset of
-//! each movement, which starts anywhere, is projected out exactly.
+//! each movement, which starts anywhere, is projected out exactly; where errors of resets are declared it is
+//! unknown within these.
 
 use super::blocks::Log;
 use super::map::{Row, WIDTH};
@@ -35,14 +36,27 @@ impl Filter {
         let walk = Matrix3::from_diagonal(&Vector3::from(walk.map(|x| x * x)));
         let eigen = SymmetricEigen::new(lower * walk * lower.transpose());
         let to_channels = eigen.eigenvectors.transpose() * lower;
+        // Nearly diagonal: resets and walk are those of the same beams.
+        let resets = log.resets_mm.map(|resets_mm| {
+            let resets = Matrix3::from_diagonal(&Vector3::from(resets_mm.map(|x| x * x)));
+            to_channels * resets * to_channels.transpose()
+        });
         let mut steps = vec![[[0.0; 2]; 3]; log.means.len()];
         let mut log_determinant = 0.0;
         for movement in &log.movements {
             for (channel, per_s) in eigen.eigenvalues.iter().enumerate() {
                 let first = &log.means[movement.start].row;
                 let (mut spread, mut time_s) = (1.0 / first.weight, first.time_s);
-                // The first mean sets the offset: it says nothing else.
-                steps[movement.start][channel] = [1.0, 0.0];
+                // Where nothing is known of it the first mean sets the offset, and says nothing else.
+                let mut step = [1.0, 0.0];
+                if let Some(resets) = &resets {
+                    let reset = resets[(channel, channel)];
+                    let sum = reset + spread;
+                    step = [reset / sum, 1.0 / sum.sqrt()];
+                    spread *= step[0];
+                    log_determinant += libm::log(sum);
+                }
+                steps[movement.start][channel] = step;
                 let of_movement = steps[movement.clone()]
                     .iter_mut()
                     .zip(&log.means[movement.clone()]);

@@ -110,7 +110,7 @@ impl<'a> LogSignals<'a> {
     pub(super) fn warning(&self, code: Code, message: String) -> Finding {
         let message = match self.dataset.logs.len() {
             1 => message,
-            _ => format!("{}: {message}", self.dataset.logs[self.log].path.display()),
+            _ => format!("{}: {message}", self.dataset.logs[self.log].name()),
         };
         Finding::new(code, message).severe(Severity::Warn)
     }

@@ -22,6 +22,8 @@ pub(super) const COORDINATE_MAX_M: f64 = 10.0;
 const FULL_SCALES_M: (f64, f64) = (1e-6, 0.1);
 /// Distances between the two Y beams that make sense, m.
 const BASELINES_M: (f64, f64) = (1e-3, COORDINATE_MAX_M);
+/// Errors of a reset that make sense, m or rad.
+const RESETS: (f64, f64) = (1e-9, 1e-3);
 /// Servo periods that make sense, s.
 const PERIODS_S: (f64, f64) = (1e-6, 10.0);
 /// Smallest area of the triangle of the capacitive sensors, as a part of its longest side squared.
@@ -65,6 +67,7 @@ impl Stage {
             capacitive_probes_m: capacitive_probes(document, &capacitive)?,
             capacitive,
             y_baseline_m: number("interferometer", "y_baseline_m", BASELINES_M, "m")?,
+            reset_sd: reset_sd(document)?,
             servo_period_s: number("servo", "period_s", PERIODS_S, "s")?,
             search: search::ranges(document, &probes)?,
             motion: motion::motion(document)?,
@@ -105,6 +108,26 @@ fn designed_probes(document: &Document<'_>) -> Result<[Probe; 3], StageError> {
         place_m: places_m[k],
         theta_rad: theta_rad[k],
     }))
+}
+
+/// All three or none.
+fn reset_sd(document: &Document<'_>) -> Result<Option<[f64; 3]>, StageError> {
+    const TABLE: &str = "interferometer.reset_sd";
+    let keys = ["x_m", "y_m", "rz_rad"];
+    let mut given = [None; 3];
+    for (given, key) in given.iter_mut().zip(keys) {
+        *given = document.read::<f64>(TABLE, key)?;
+    }
+    if given == [None; 3] {
+        return Ok(None);
+    }
+    let mut out = [0.0; 3];
+    for (out, key) in out.iter_mut().zip(keys) {
+        let (low, high) = RESETS;
+        let unit = key.rsplit('_').next().unwrap_or_default();
+        *out = document.within(&document.require(TABLE, key)?, low, high, unit)?;
+    }
+    Ok(Some(out))
 }
 
 fn code_scale(document: &Document<'_>, table: &str) -> Result<CodeScale, StageError> {

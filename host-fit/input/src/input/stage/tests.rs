@@ -202,6 +202,7 @@ fn what_is_wrong_is_named_with_its_place_its_key_and_a_remedy() {
         ("= 6.25e-8", "= nan", 9, 15, "hall.m_per_count", "NaN m per code"),
         ("= 1.5625e-8", "= 1.5e-18", 15, 15, "capacitive.m_per_count", "a full scale"),
         ("= 0.10", "= 0", 20, 16, "interferometer.y_baseline_m", "0 m is outside"),
+        ("= 0.10", "= 0.10\nreset_sd = { x_m = 2e-6, y_m = 2.0, rz_rad = 1e-6 }", 21, 32, "interferometer.reset_sd.y_m", "2 m is outside"),
         ("= 0.002", "= 0.0", 23, 12, "servo.period_s", "0 s is outside"),
         ("= 0.002", "= -0.002", 23, 12, "servo.period_s", "is outside"),
         ("= 0.002", "= 2e-9", 23, 12, "servo.period_s", "is outside"),

@@ -6,7 +6,7 @@ use super::probe::probes;
 use super::terms::COUNT;
 use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use runtime::VerticalPose;
 
 /// Poses over which service is averaged.
@@ -102,13 +102,17 @@ impl Service {
         })
     }
 
-    /// Of X, Y, Rz the variance, over the errors that are possible with this covariance, of their mean square:
-    /// m4, m4, rad4.
-    pub fn spread(&self, covariance: &DMatrix<f64>) -> [f64; 3] {
+    /// Of X, Y, Rz the variance, over the errors that are possible with this covariance about `off`, of their
+    /// mean square: m4, m4, rad4.
+    pub fn spread(&self, covariance: &DMatrix<f64>, off: &[f64]) -> [f64; 3] {
+        let covariance = covariance.view((0, 0), (COUNT, COUNT));
+        let off = DVector::from_column_slice(off);
         self.by_parameters.each_ref().map(|products| {
             let products = DMatrix::from_fn(COUNT, COUNT, |i, j| products[i][j]);
-            let both = products * covariance.view((0, 0), (COUNT, COUNT));
+            let both = &products * covariance;
+            let pull = products * &off;
             2.0 * both.component_mul(&both.transpose()).sum()
+                + 4.0 * pull.dot(&(covariance * &pull))
         })
     }
 }
@@ -138,6 +142,8 @@ fn difference(
 pub struct Verdict {
     /// Whether it is the field model.
     pub field: bool,
+    /// Whether only the declared errors of the resets let the log carry it.
+    pub by_resets: bool,
     /// What it has to expect in service.
     pub service: ServiceVariance,
 }
@@ -208,6 +214,12 @@ impl ServiceVariance {
     fn gains(&self) -> bool {
         (0..3).any(|k| self.gains_in(k) && self.difference[k] > ROUNDING * self.noise[k])
     }
+
+    /// Whether its worst axis is better than that of Model (31), the difference less its own part of it.
+    fn is_better(&self) -> bool {
+        let of_31 = |k: usize| (self.difference[k] - self.systematic[k]) / self.noise[k];
+        (0..3).any(|k| of_31(k) > self.worst())
+    }
 }
 
 impl Verdict {
@@ -222,15 +234,17 @@ impl Verdict {
     ) -> Self {
         let model_31 = FieldParameters::of_model_31(model_31, stage);
         let service = ServiceVariance::new(parameters, posterior, &model_31, ranges);
+        let by_resets = stage.reset_sd.is_some() && service.loses() && service.is_better();
         Self {
-            field: !service.loses() && service.gains(),
+            field: by_resets || !service.loses() && service.gains(),
+            by_resets,
             service,
         }
     }
 
     /// Whether the log leaves an axis of the field model worse than Model (31).
     pub fn loses(&self) -> bool {
-        self.service.loses()
+        self.service.loses() && !self.by_resets
     }
 }
 

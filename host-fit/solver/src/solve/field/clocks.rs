@@ -129,6 +129,7 @@ impl<'s> Alignment<'s> {
                 white_mm: white_mm(rows, &probes, 0.0, &point.offsets, self.stage),
                 drift_mm: USUAL_DRIFT_MM,
             },
+            resets_mm: None,
         }
     }
 }

@@ -145,6 +145,7 @@ pub struct WhiteFit {
     prior_per_k: [[f64; 2]; 2],
     at: Point,
     noise: Noise,
+    resets_mm: Option<[f64; 3]>,
     iterations: u32,
     /// Of Model (31).
     start: Parameters,
@@ -185,6 +186,7 @@ impl WhiteFit {
             prior_per_k: stage.temperature.prior_per_k,
             places,
             noise: white_only([1.0; 3]),
+            resets_mm: stage.resets_mm(),
             iterations: 0,
             start: *start,
         }
@@ -330,6 +332,7 @@ impl WhiteFit {
             rows: &self.rows,
             places: self.places,
             noise: self.noise,
+            resets_mm: self.resets_mm,
         }
     }
 

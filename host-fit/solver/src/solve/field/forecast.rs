@@ -51,6 +51,7 @@ impl Forecaster {
             rows,
             places,
             noise: self.noise,
+            resets_mm: None,
         };
         let covariance = unknowns(&places, [HELD; 2]).covariance(&equations.of_blocks(&blocks))?;
         let posterior = Posterior::new(covariance, &self.parameters, &self.noise);

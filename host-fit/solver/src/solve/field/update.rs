@@ -176,6 +176,7 @@ pub fn update(
             white_mm: white_mm(&rows, &probes(old), 0.0, &offsets_mm, stage),
             drift_mm,
         },
+        resets_mm: stage.resets_mm(),
     };
     let mut origin = DVector::zeros(UNKNOWNS);
     origin.as_mut_slice()[..COUNT].copy_from_slice(old.probes.as_flattened());

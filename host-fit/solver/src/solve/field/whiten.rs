@@ -43,6 +43,8 @@ pub struct FieldEquations<'a> {
     pub places: [[f64; 2]; 3],
     /// Their noise.
     pub noise: Noise,
+    /// Errors of the resets in X, Y, Rz, standard deviations, mm, mm, mrad; `None` where nothing is known.
+    pub resets_mm: Option<[f64; 3]>,
 }
 
 impl FieldEquations<'_> {
@@ -55,10 +57,21 @@ impl FieldEquations<'_> {
         parameters
     }
 
-    /// Of blocks that are evaluated already.
+    /// How far from zero the offset of a movement may start, and what is expected of it beyond one that is
+    /// taken off already, mm, mm, mrad.
+    fn start(&self, offset_mm: [f64; 3]) -> [[f64; 3]; 2] {
+        match self.resets_mm {
+            Some(resets_mm) => [resets_mm, offset_mm.map(|x| -x)],
+            None => [[OFFSET_MM; 3], [0.0; 3]],
+        }
+    }
+
+    /// Of blocks that are evaluated already, with no offset.
     pub fn of_blocks(&self, blocks: &[Block]) -> Normal<COLUMNS> {
-        let movement =
-            |k: usize| Some(filter(&blocks[self.rows.movements[k].clone()], &self.noise));
+        let movement = |k: usize| {
+            let blocks = &blocks[self.rows.movements[k].clone()];
+            Some(filter(blocks, &self.noise, self.start([0.0; 3])))
+        };
         let sums = Normal::of_movements(self.rows.movements.len(), movement);
         sums.unwrap_or_else(Normal::none)
     }
@@ -70,7 +83,7 @@ impl Equations<COLUMNS> for FieldEquations<'_> {
         Normal::of_movements(self.rows.movements.len(), |k| {
             let (lag_s, offset_mm) = (at.values[COUNT], at.offsets[k]);
             let blocks = self.rows.evaluate_movement(k, &probes, lag_s, offset_mm);
-            Some(filter(&blocks, &self.noise))
+            Some(filter(&blocks, &self.noise, self.start(offset_mm)))
         })
     }
 }
@@ -78,12 +91,17 @@ impl Equations<COLUMNS> for FieldEquations<'_> {
 type Matrix = [[f64; 3]; 3];
 
 /// The sums over the blocks of a movement.
-fn filter(blocks: &[Block], noise: &Noise) -> Normal<COLUMNS> {
+fn filter(
+    blocks: &[Block],
+    noise: &Noise,
+    [resets_mm, expected_mm]: [[f64; 3]; 2],
+) -> Normal<COLUMNS> {
     let mut out = Normal::none();
     let mut end = [[0.0; COLUMNS]; 3];
     let mut spread: Matrix = [[0.0; 3]; 3];
     for (axis, row) in spread.iter_mut().enumerate() {
-        row[axis] = OFFSET_MM * OFFSET_MM;
+        row[axis] = resets_mm[axis] * resets_mm[axis];
+        end[axis][RESIDUAL] = expected_mm[axis];
     }
     let mut time_s = blocks.first().map_or(0.0, |block| block.time_s);
     for block in blocks {
@@ -230,52 +248,57 @@ mod tests {
             white_mm: [5e-4, 4e-4, 6e-4],
             drift_mm: [1e-3, 2e-3, 5e-4],
         };
-        let equations = FieldEquations {
-            rows: &rows,
-            places: parameters().places,
-            noise,
-        };
-        let found = equations.of_blocks(&blocks);
+        for resets_mm in [None, Some([2e-3, 3e-3, 1e-3])] {
+            let reset_mm = resets_mm.unwrap_or([OFFSET_MM; 3]);
+            let equations = FieldEquations {
+                rows: &rows,
+                places: parameters().places,
+                noise,
+                resets_mm,
+            };
+            let found = equations.of_blocks(&blocks);
 
-        let mut products = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
-        let mut log_determinant = 0.0;
-        for movement in &rows.movements {
-            let blocks = &blocks[movement.clone()];
-            assert!(blocks.len() > 10);
-            let covariance = DMatrix::from_fn(3 * blocks.len(), 3 * blocks.len(), |i, j| {
-                let (a, b) = (&blocks[i / 3], &blocks[j / 3]);
-                let time_s = a.time_s.min(b.time_s) - blocks[0].time_s;
-                let shared: f64 = (0..3)
-                    .map(|axis| {
-                        let walk = noise.drift_mm[axis].powi(2) * time_s + OFFSET_MM.powi(2);
-                        a.by_pose[i % 3][axis] * walk * b.by_pose[j % 3][axis]
-                    })
-                    .sum();
-                let white = noise.white_mm[i % 3].powi(2) / a.rows;
-                shared + if i == j { white } else { 0.0 }
-            });
-            let columns = DMatrix::from_fn(3 * blocks.len(), COLUMNS, |i, j| {
-                let (block, probe) = (&blocks[i / 3], i % 3);
-                match j {
-                    COUNT => block.by_lag[probe],
-                    LAG_RATE => block.by_lag[probe] * block.time_s,
-                    RESIDUAL => block.residual_mm[probe],
-                    _ if j < COUNT && j / PER_PROBE == probe => {
-                        block.by_parameter[probe][j % PER_PROBE]
+            let mut products = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
+            let mut log_determinant = 0.0;
+            for movement in &rows.movements {
+                let blocks = &blocks[movement.clone()];
+                assert!(blocks.len() > 10);
+                let covariance = DMatrix::from_fn(3 * blocks.len(), 3 * blocks.len(), |i, j| {
+                    let (a, b) = (&blocks[i / 3], &blocks[j / 3]);
+                    let time_s = a.time_s.min(b.time_s) - blocks[0].time_s;
+                    let shared: f64 = (0..3)
+                        .map(|axis| {
+                            let walk =
+                                noise.drift_mm[axis].powi(2) * time_s + reset_mm[axis].powi(2);
+                            a.by_pose[i % 3][axis] * walk * b.by_pose[j % 3][axis]
+                        })
+                        .sum();
+                    let white = noise.white_mm[i % 3].powi(2) / a.rows;
+                    shared + if i == j { white } else { 0.0 }
+                });
+                let columns = DMatrix::from_fn(3 * blocks.len(), COLUMNS, |i, j| {
+                    let (block, probe) = (&blocks[i / 3], i % 3);
+                    match j {
+                        COUNT => block.by_lag[probe],
+                        LAG_RATE => block.by_lag[probe] * block.time_s,
+                        RESIDUAL => block.residual_mm[probe],
+                        _ if j < COUNT && j / PER_PROBE == probe => {
+                            block.by_parameter[probe][j % PER_PROBE]
+                        }
+                        _ => 0.0,
                     }
-                    _ => 0.0,
+                });
+                let factor = Cholesky::new(covariance).expect("positive");
+                log_determinant += 2.0 * factor.l().diagonal().map(f64::ln).sum();
+                products += columns.transpose() * factor.solve(&columns);
+            }
+            assert!((found.log_determinant - log_determinant).abs() < 1e-4);
+            for i in 0..=RESIDUAL {
+                for j in i..=RESIDUAL {
+                    let size = (products[(i, i)] * products[(j, j)]).sqrt();
+                    let error = (found.curvature(i, j) - products[(i, j)]).abs();
+                    assert!(error <= 1e-6 * size, "{i} {j}: {error} {size}");
                 }
-            });
-            let factor = Cholesky::new(covariance).expect("positive");
-            log_determinant += 2.0 * factor.l().diagonal().map(f64::ln).sum();
-            products += columns.transpose() * factor.solve(&columns);
-        }
-        assert!((found.log_determinant - log_determinant).abs() < 1e-4);
-        for i in 0..=RESIDUAL {
-            for j in i..=RESIDUAL {
-                let size = (products[(i, i)] * products[(j, j)]).sqrt();
-                let error = (found.curvature(i, j) - products[(i, j)]).abs();
-                assert!(error <= 1e-6 * size, "{i} {j}: {error} {size}");
             }
         }
     }
