@@ -64,7 +64,7 @@ const FAR_MAX: f64 = 4.0;
 /// What is kept of a fit of the field model beside its blob: the prior of a recalibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
-    /// Covariance of the 81 parameters, in their order and units.
+    /// Covariance of the parameters, and of k and h: see [`Posterior::covariance`].
     pub covariance: DMatrix<f64>,
     /// The noise of the log.
     pub noise: Noise,
@@ -124,9 +124,14 @@ pub enum RecalibrateError {
         /// What it is of.
         model: String,
     },
-    /// `all` needs the old posterior.
+    /// `all` and `temperature` need the old posterior.
     #[error("without the old posterior nothing but gains can be found: fit again")]
     NothingKnown,
+    /// `temperature` of a blob, or of a log, without temperatures.
+    #[error(
+        "{0} has no temperatures: name their columns in [temperature] of the stage file, and fit a cold and a warm log together"
+    )]
+    NoTemperature(&'static str),
     /// The log leaves too much open.
     #[error(
         "this log does not tell {}: it leaves errors of {:.2} / {:.2} / {:.2} times the noise floor in X / Y / Rz in \
@@ -178,6 +183,7 @@ const fn assumed(change: Change) -> &'static str {
         Change::Gain => "one gain for all probes",
         Change::Gains => "a gain for each probe",
         Change::All => "a change of all parameters",
+        Change::Temperature => "a change of temperature alone",
     }
 }
 
@@ -187,7 +193,7 @@ const fn recording(change: Change) -> &'static str {
         Change::Gains => {
             "X, Y and Rz moving at once, each at a frequency of its own, 2 s; or try --what gain"
         }
-        Change::All => {
+        Change::All | Change::Temperature => {
             "all six axes moving at once at service amplitude, each at a frequency of its own (host-fit plan --seconds 8); \
              or try --what gains"
         }
@@ -199,7 +205,7 @@ const fn remedy(change: Change) -> &'static str {
         Change::Gain => {
             "Is it the blob of this stage? If it is, try --what gains; if a probe was moved, --what all"
         }
-        Change::Gains => {
+        Change::Gains | Change::Temperature => {
             "Is it the blob of this stage? If it is, something else has changed as well: try --what all"
         }
         Change::All => {
@@ -225,10 +231,21 @@ pub fn recalibrate(
         FieldParameters::of_set(old, stage).ok_or_else(|| RecalibrateError::OtherModel {
             model: Model::of(old.model).title(),
         })?;
-    if known.is_none() && change == Change::All {
+    let temperature = old.constants.temperature.rounded::<f64>();
+    if known.is_none() && matches!(change, Change::All | Change::Temperature) {
         return Err(RecalibrateError::NothingKnown);
     }
-    let dataset = &*dataset.compensated(old.constants.temperature.rounded());
+    if change == Change::Temperature {
+        let with_warmth = known.is_some_and(|known| known.covariance.nrows() > COUNT);
+        if !temperature.is_used() || !with_warmth {
+            return Err(RecalibrateError::NoTemperature("the blob"));
+        }
+        let all = 0..dataset.rows.len();
+        if (0..2).all(|sensor| dataset.temperature_mean_mc(sensor, all.clone()).is_none()) {
+            return Err(RecalibrateError::NoTemperature("the log"));
+        }
+    }
+    let dataset = &*dataset.compensated(temperature);
     let decoded = |set: &ParameterSet| Decoded::new(set, dataset);
     let by_row = |of: &Decoded| {
         let judgement = of.judge(dataset, stage, Zeros::Refit);
@@ -262,7 +279,7 @@ pub fn recalibrate(
     });
     let open_max = match change {
         Change::Gain | Change::Gains => OPEN_MAX_GAINS,
-        Change::All => OPEN_MAX_ALL,
+        Change::All | Change::Temperature => OPEN_MAX_ALL,
     };
     let open = |k: usize| service.systematic[k] > open_before[k] + open_max * service.noise[k];
     if (0..3).any(open) {
@@ -327,7 +344,7 @@ fn check_described(
     let count = update.residuals.max(1) as f64;
     let misfit = known.map_or(1.0, |known| known.misfit.max(1.0));
     let limit = match change {
-        Change::Gain | Change::Gains => {
+        Change::Gain | Change::Gains | Change::Temperature => {
             misfit * (1.0 + MISFIT_MAX) + CHANCE_MAX * (2.0 / count).sqrt()
         }
         // All parameters are free: what they don't describe is no other change of the stage.
@@ -364,6 +381,10 @@ fn prepare(
     let constants = parameters
         .constants(stage.hall.m_per_count)
         .ok_or(RecalibrateError::Unusable(ParameterError::SingularPlane))?;
+    let mut temperature = old.constants.temperature.rounded::<f64>();
+    for (per_mk, beyond) in temperature.per_mk.iter_mut().zip(parameters.gain_per_k) {
+        (0..2).for_each(|sensor| per_mk[sensor] += 1e-3 * beyond[sensor]);
+    }
     let calibration = Calibration {
         model: ModelKind::Field,
         geometry: parameters.model_31().geometry(),
@@ -376,7 +397,7 @@ fn prepare(
         calibrated_planar: old.constants.calibrated_planar.map(f64::from),
         calibrated_vertical: old.constants.calibrated_vertical.map(f64::from),
         sensitivity_min: old.constants.sensitivity_min.into(),
-        temperature: old.constants.temperature.rounded(),
+        temperature,
     };
     calibration
         .prepare(origin)

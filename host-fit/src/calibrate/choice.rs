@@ -51,6 +51,7 @@ values! {
         Gain: "gain", "One gain for all probes: 2 s of a sine along Y tell it";
         Gains: "gains", "A gain for each probe: 2 s of X, Y and Rz moving at once";
         All: "all", "All parameters, as after a probe was seated anew: 8 s of all six axes moving at once";
+        Temperature: "temperature", "Nothing but the temperature: each run of 8 s at another one adds to k and h";
     }
     PoseFormat {
         Csv: "csv", "Text";

@@ -105,7 +105,10 @@ impl<'a> Judged<'a> {
         let decoded = Decoded::new(set, &log.dataset);
         let of_rows = decoded.judge(&log.dataset, stage, zeros);
         let by_row = decoded.errors_less(&of_rows.zeros, &log.dataset);
-        let diagnosis = diagnose::of_judged(&log.dataset, stage, set, &by_row, None);
+        let mut diagnosis = diagnose::of_judged(&log.dataset, stage, set, &by_row, None);
+        let rezero = diagnose::temperature::rezero(set, &log.dataset, zeros == Zeros::Refit);
+        let findings = diagnosis.findings.into_iter().chain(rezero);
+        diagnosis.findings = finding::in_order(findings.collect());
         // As the blob's own errors were counted, whatever zeros are asked for.
         let comparable = judge.judgement(own_zeros).errors;
         let usual = if is_field(set) { 3.0 } else { 10.0 };
@@ -158,7 +161,13 @@ impl Evaluation {
             warnings,
             ..Circumstances::new(&self.log, &self.stage, elapsed_s, self.diagnosis.clone())
         };
-        of_eval(&self.set, &self.judgement, self.zeros, &circumstances)
+        of_eval(
+            &self.set,
+            &self.judgement,
+            self.zeros,
+            &self.by_row,
+            &circumstances,
+        )
     }
 
     /// How it ended, for reports.

@@ -73,7 +73,8 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     let circumstances = Circumstances::new(&log, &stage, elapsed_s, Diagnosis::default());
     let judged = fit.map(|fit| {
         let zeros = Zeros::of_model(fit.model);
-        of_eval(&fit.set, &fit.all, zeros, &circumstances)
+        let by_row = fit.decoded.errors_less(&fit.judgement.zeros, &log.dataset);
+        of_eval(&fit.set, &fit.all, zeros, &by_row, &circumstances)
     });
     args.report.add(&mut outputs, || {
         let what = ("Check of a log", "");

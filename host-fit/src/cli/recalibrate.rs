@@ -111,7 +111,11 @@ fn read_known(
 ) -> Result<Option<Known>, HostError> {
     match posterior_file::read(path, old, &args.params) {
         Ok(known) => Ok(Some(known)),
-        Err(PosteriorFileError::Missing { .. }) if args.what != Change::All => Ok(None),
+        Err(PosteriorFileError::Missing { .. })
+            if matches!(args.what, Change::Gain | Change::Gains) =>
+        {
+            Ok(None)
+        }
         Err(error) => Err(error.into()),
     }
 }

@@ -5,13 +5,14 @@
 //! | offset | bytes | what |
 //! |---|---|---|
 //! | 0 | 8 | magic, `HALLPOST` in ASCII |
-//! | 8 | 4 | layout version: 1, or 2 with the text below |
+//! | 8 | 4 | layout version: 1, 2 with the text below, or 3 with k and h |
 //! | 12 | 32 | SHA-256 of the blob that it belongs to |
 //! | 44 | 24 | white noise of the probes A, B, C, mm, as `f64` |
 //! | 68 | 24 | walk of the reference in X, Y, Rz in a second, mm, mm, mrad, as `f64` |
 //! | 92 | 8 | chi-square over residuals, as `f64` |
 //! | 100 | 26,568 | covariance of the 81 parameters, the lower triangle row by row, as `f64` |
-//! | 26,668 | | layout 2: the faults of the log that the calibration is without, a line each, in UTF-8 |
+//! | 26,668 | 4,056 | layout 3: six more rows of it, of k and h of A, B and C |
+//! | | | layouts 2 and 3: the faults of the log that the calibration is without, a line each, in UTF-8 |
 //! | the end | 32 | SHA-256 of everything before it |
 
 use crate::output::file_identity::is_stream;
@@ -26,14 +27,16 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 const MAGIC: [u8; 8] = *b"HALLPOST";
-/// With faults taken off; without any, 1.
-const VERSION: u32 = 2;
+/// Rows of the covariance with k and h.
+const ROWS_MAX: usize = COUNT + 6;
 const HASH_BYTES: usize = 32;
 const HEADER_BYTES: usize = 12 + HASH_BYTES;
-const NUMBERS: usize = 7 + COUNT * (COUNT + 1) / 2;
-/// Without text, and the most of that.
-const BYTES: usize = HEADER_BYTES + 8 * NUMBERS + HASH_BYTES;
 const TEXT_BYTES_MAX: usize = 8192;
+
+/// Length without text.
+const fn bytes(rows: usize) -> usize {
+    HEADER_BYTES + 8 * (7 + rows * (rows + 1) / 2) + HASH_BYTES
+}
 
 /// Why there is no posterior.
 #[derive(Debug, thiserror::Error)]
@@ -121,9 +124,9 @@ pub fn read(path: &Path, set: &ParameterSet, blob: &Path) -> Result<Known, Poste
             cause,
         },
     };
-    let mut bytes = Vec::with_capacity(BYTES + 1);
+    let mut bytes = Vec::new();
     let file = std::fs::File::open(path).map_err(failed)?;
-    file.take((BYTES + TEXT_BYTES_MAX) as u64 + 1)
+    file.take((self::bytes(ROWS_MAX) + TEXT_BYTES_MAX) as u64 + 1)
         .read_to_end(&mut bytes)
         .map_err(failed)?;
     let unusable = |problem| PosteriorFileError::Unusable {
@@ -147,18 +150,23 @@ fn blob_hash(set: &ParameterSet) -> Result<[u8; HASH_BYTES], runtime::BlobError>
 }
 
 fn encode(blob: &[u8; HASH_BYTES], known: &Known) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(BYTES);
+    let mut bytes = Vec::new();
     let Known {
         covariance,
         noise: Noise { white_mm, drift_mm },
         misfit,
         repaired,
     } = known;
-    let version = if repaired.is_empty() { 1 } else { VERSION };
+    let rows = covariance.nrows();
+    let version: u32 = match (rows > COUNT, repaired.is_empty()) {
+        (true, _) => 3,
+        (false, true) => 1,
+        (false, false) => 2,
+    };
     bytes.extend(MAGIC);
     bytes.extend(version.to_le_bytes());
     bytes.extend(blob);
-    let triangle = (0..COUNT).flat_map(|i| (0..=i).map(move |j| covariance[(i, j)]));
+    let triangle = (0..rows).flat_map(|i| (0..=i).map(move |j| covariance[(i, j)]));
     let numbers = white_mm.iter().chain(drift_mm).chain([misfit]).copied();
     for number in numbers.chain(triangle) {
         bytes.extend(number.to_le_bytes());
@@ -174,21 +182,26 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; HASH_BYTES], Known), String> {
     if !bytes.starts_with(&MAGIC) {
         return Err("it does not begin with HALLPOST".to_owned());
     }
+    let version = bytes
+        .get(MAGIC.len()..)
+        .and_then(|bytes| bytes.first_chunk());
+    let version = version.map(|version| u32::from_le_bytes(*version));
+    let rows = if version == Some(3) { ROWS_MAX } else { COUNT };
+    let least = self::bytes(rows);
     let (content, hash) = match bytes.split_last_chunk::<HASH_BYTES>() {
-        Some(parts) if (BYTES..=BYTES + TEXT_BYTES_MAX).contains(&bytes.len()) => parts,
+        Some(parts) if (least..=least + TEXT_BYTES_MAX).contains(&bytes.len()) => parts,
         _ => {
             return Err(format!(
-                "it has not the {BYTES} bytes or more that it should have"
+                "it has not the {least} bytes or more that it should have"
             ));
         }
     };
     if Sha256::digest(content)[..] != hash[..] {
         return Err("it is damaged, its check does not fit".to_owned());
     }
-    let (numbers, text) = content.split_at(BYTES - HASH_BYTES);
-    let version = if text.is_empty() { 1 } else { VERSION };
-    if numbers[MAGIC.len()..][..4] != version.to_le_bytes() {
-        return Err(format!("its layout is not 1 or {VERSION}"));
+    let (numbers, text) = content.split_at(least - HASH_BYTES);
+    if version != Some(3) && version != Some(if text.is_empty() { 1 } else { 2 }) {
+        return Err("its layout is not 1, 2 or 3".to_owned());
     }
     let text = str::from_utf8(text).map_err(|error| error.to_string())?;
     let (head, numbers) = numbers.split_at(HEADER_BYTES);
@@ -197,7 +210,7 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; HASH_BYTES], Known), String> {
     let (numbers, _) = numbers.as_chunks::<8>();
     let numbers: Vec<f64> = numbers.iter().map(|n| f64::from_le_bytes(*n)).collect();
     let (noise, triangle) = numbers.split_at(7);
-    let covariance = DMatrix::from_fn(COUNT, COUNT, |i, j| {
+    let covariance = DMatrix::from_fn(rows, rows, |i, j| {
         let (row, column) = (i.max(j), i.min(j));
         triangle[row * (row + 1) / 2 + column]
     });
@@ -220,7 +233,8 @@ fn from_bytes(bytes: &[u8]) -> Result<([u8; HASH_BYTES], Known), String> {
 /// Whether a matrix is one, in the scale in which its diagonal is one.
 fn is_covariance(matrix: &DMatrix<f64>) -> bool {
     let scale = matrix.diagonal().map(f64::sqrt);
-    let scaled = DMatrix::from_fn(COUNT, COUNT, |i, j| matrix[(i, j)] / (scale[i] * scale[j]));
+    let (rows, columns) = matrix.shape();
+    let scaled = DMatrix::from_fn(rows, columns, |i, j| matrix[(i, j)] / (scale[i] * scale[j]));
     scaled.iter().all(|x| x.is_finite()) && Cholesky::new(scaled).is_some()
 }
 
@@ -229,8 +243,12 @@ mod tests {
     use super::*;
 
     fn known() -> Known {
+        of_rows(COUNT)
+    }
+
+    fn of_rows(rows: usize) -> Known {
         Known {
-            covariance: DMatrix::from_fn(COUNT, COUNT, |i, j| {
+            covariance: DMatrix::from_fn(rows, rows, |i, j| {
                 let size = |k: usize| 1e-6 * (1.0 + k as f64);
                 size(i) * size(j) * if i == j { 1.0 } else { 0.5 }
             }),
@@ -257,6 +275,10 @@ mod tests {
         };
         let bytes = encode(&[7; HASH_BYTES], &repaired);
         assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], repaired)));
+        let with_warmth = of_rows(COUNT + 6);
+        let bytes = encode(&[7; HASH_BYTES], &with_warmth);
+        assert_eq!(bytes.len(), 26_700 + 4_056);
+        assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], with_warmth)));
     }
 
     #[test]

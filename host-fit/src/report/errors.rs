@@ -4,13 +4,15 @@ use super::table::{Table, file_name};
 use crate::fit::calibration;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
-use crate::judge::statistics::PoseError;
+use crate::judge::statistics::{ErrorSums, PoseError};
 use crate::judge::{Decoded, Judgement, Zeros};
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use runtime::ModelKind;
 use runtime::calibration::Origin;
+use runtime::frame::MISSING_CODE;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 /// Errors of X, Y, Rz by row, m, m, rad; `None` where there was no pose.
 pub type RowErrors = Vec<Option<[f64; 3]>>;
@@ -82,4 +84,28 @@ pub(super) fn by_log(dataset: &Dataset, judgement: &Judgement) -> Vec<Value> {
         json!({ "path": path, "rows": judged.rows, "errors": errors(&judged.errors) })
     });
     figures.collect()
+}
+
+/// The errors of rows by whole degrees of mount and body; empty where the log has no temperatures.
+pub(super) fn by_temperature(dataset: &Dataset, by_row: &RowErrors) -> Vec<Value> {
+    let mut degrees: BTreeMap<(usize, i32), ErrorSums> = BTreeMap::new();
+    for (index, (row, error)) in dataset.rows.iter().zip(by_row).enumerate() {
+        for (sensor, read_mc) in row.frame.temperature_mc().into_iter().enumerate() {
+            if read_mc != MISSING_CODE {
+                let degree = read_mc.div_euclid(1000);
+                let sums = degrees.entry((sensor, degree)).or_insert(ErrorSums::NONE);
+                sums.take(index, *error);
+            }
+        }
+    }
+    let value = |((sensor, degree), sums): ((usize, i32), ErrorSums)| {
+        json!({
+            "sensor": (["mount", "body"][sensor]),
+            "from_c": degree,
+            "to_c": degree + 1,
+            "rows": sums.rows,
+            "errors": errors(&sums.errors()),
+        })
+    };
+    degrees.into_iter().map(value).collect()
 }

@@ -7,6 +7,7 @@ use super::errors::RowErrors;
 use super::series::{Column, band, columns};
 use crate::diagnose::signals::{Spectrum, windows};
 use crate::input::dataset::{Dataset, Row};
+use runtime::frame::MISSING_CODE;
 use std::ops::Range;
 
 /// Half the width of the band of the noise, standard deviations.
@@ -24,7 +25,20 @@ const POINTS: f64 = 250.0;
 /// A quantity of a row in um or urad, and its name.
 type Quantity = (&'static str, fn(&Row) -> f64);
 
-/// All that a log holds, three quantities a chart.
+/// Temperatures, where the log has them.
+const TEMPERATURES: [Quantity; 2] = [
+    ("mount, degC", |row| celsius(row, 0)),
+    ("body, degC", |row| celsius(row, 1)),
+];
+
+fn celsius(row: &Row, sensor: usize) -> f64 {
+    match row.frame.temperature_mc()[sensor] {
+        MISSING_CODE => f64::NAN,
+        read_mc => f64::from(read_mc) * 1e-3,
+    }
+}
+
+/// All else that a log holds, three quantities a chart.
 const QUANTITIES: [Quantity; 9] = [
     ("X, um", |row| row.reference[0] * 1e6),
     ("Y, um", |row| row.reference[1] * 1e6),
@@ -117,7 +131,7 @@ impl Log<'_> {
         })
     }
 
-    /// Mean of the errors and two of their standard deviations about it against pose and signals, beside
+    /// Mean of the errors and two of their standard deviations about it against pose, signals and temperatures, beside
     /// the band of the noise (m, m, rad); one chart for each quantity that the log moves.
     pub(super) fn against(&self, errors: &RowErrors, noise: [f64; 3]) -> Vec<Chart> {
         let chart = |&(name, of): &Quantity| {
@@ -126,6 +140,7 @@ impl Log<'_> {
             let high = values().fold(f64::NEG_INFINITY, f64::max);
             let panel = |axis: usize| {
                 let points = values().zip(errors);
+                let points = points.filter(|(x, _)| x.is_finite());
                 let points = points.filter_map(|(x, error)| Some((x, error.as_ref()?[axis] * 1e6)));
                 let mut columns = columns(points, (low, high), BINS);
                 let least = errors.len() as f64 / (50.0 * BINS as f64);
@@ -149,7 +164,9 @@ impl Log<'_> {
             let caption = format!("Errors against {}", name.split(',').next().unwrap_or(name));
             (high > low).then(|| Chart::of_three(caption, (name, Axis::Linear(low, high)), panel))
         };
-        QUANTITIES.iter().filter_map(chart).collect()
+        (QUANTITIES.iter().chain(&TEMPERATURES))
+            .filter_map(chart)
+            .collect()
     }
 
     /// Amplitude spectral density of the errors beside that of white noise (m, m, rad); `None` where no

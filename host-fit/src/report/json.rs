@@ -11,7 +11,7 @@ use crate::judge::verdict::{Predicted, Verdict};
 use crate::judge::{Judgement, Zeros};
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
-use crate::report::errors::{by_log, errors};
+use crate::report::errors::{RowErrors, by_log, by_temperature, errors};
 use crate::report::field::{self, by_axis};
 use crate::report::parameters::{
     Parameter, coordinates, field_parameters, parameters, parameters_in,
@@ -104,6 +104,10 @@ pub struct Report {
     pub verdict: Option<Verdict>,
     /// Errors of the blob that are predicted for service; null where the log cannot show them.
     pub predicted: Option<Predicted>,
+    /// How far from the temperature of the log the blob is good, K; null where that is not known.
+    pub valid_within_k: Option<f64>,
+    /// The errors by degree of mount and body, where the logs have temperatures.
+    pub temperatures: Vec<Value>,
     /// What a diagnosis of the log found, by severity.
     pub findings: Vec<Finding>,
     /// The same errors log by log.
@@ -127,11 +131,15 @@ impl Report {
             "findings",
             "verdict",
             "predicted",
+            "valid_within_k",
             "elapsed_s",
             "solver_s",
         ];
         if self.logs.len() < 2 {
             hidden.push("logs");
+        }
+        if self.temperatures.len() < 2 {
+            hidden.push("temperatures");
         }
         hidden
     }
@@ -241,6 +249,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         ),
         None => parameters(fit.model, &fit.solution.parameters, &fit.standard_error),
     };
+    let by_row = fit.decoded.errors_less(&fit.judgement.zeros, c.dataset);
     let warnings = fit.warnings.iter().map(|found| found.message.clone());
     let standard_errors = match fit.field {
         Some(_) => {
@@ -281,15 +290,16 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         coordinates: coordinates(fit.solution.parameters.nearest_places_m(c.stage)),
         warnings: c.warnings.iter().cloned().chain(warnings).collect(),
         of_fit: of_fit.as_object().cloned().unwrap_or_default(),
-        ..of_eval(&fit.set, &fit.all, Zeros::of_model(fit.model), c)
+        ..of_eval(&fit.set, &fit.all, Zeros::of_model(fit.model), &by_row, c)
     }
 }
 
-/// The report of a judgement of a blob.
+/// The report of a judgement of a blob; `by_row` are the errors of the rows of the dataset.
 pub fn of_eval(
     set: &ParameterSet,
     judgement: &Judgement,
     zeros: Zeros,
+    by_row: &RowErrors,
     c: &Circumstances,
 ) -> Report {
     let dataset = c.dataset;
@@ -311,6 +321,8 @@ pub fn of_eval(
         warnings: c.warnings.clone(),
         verdict: c.diagnosis.verdict,
         predicted: c.diagnosis.predicted,
+        valid_within_k: c.diagnosis.validity.map(|validity| validity.within_k),
+        temperatures: by_temperature(dataset, by_row),
         findings: c.diagnosis.findings.clone(),
         logs: by_log(dataset, judgement),
         trusted_inputs: trusted(set),

@@ -14,6 +14,7 @@ use crate::fit::Fit;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::statistics::{PoseError, white_noise};
+use crate::judge::verdict::Validity;
 use crate::problem::model::Model;
 use minijinja::Error;
 use runtime::{ModelKind, ParameterSet};
@@ -178,7 +179,7 @@ impl Source<'_> {
             );
             add("model", Model::of(set.model).title());
         }
-        add("temperature", "not logged".to_owned());
+        add("temperature", self.temperature());
         add(
             "reference",
             "laser interferometers X, Y1, Y2, as logged".to_owned(),
@@ -199,6 +200,29 @@ impl Source<'_> {
             format!("{}: {rows} rows in {movements}", logs.join(", ")),
         );
         facts
+    }
+
+    /// Temperatures of the log, and how far from that of calibration the errors hold.
+    fn temperature(&self) -> String {
+        let all = 0..self.dataset.rows.len();
+        let range = |sensor: usize| {
+            let [low, high] = self.dataset.temperature_range_mc(sensor, all.clone())?;
+            let [low, high] = [low, high].map(|mc| f64::from(mc) * 1e-3);
+            Some(format!(
+                "{} {low:.1} to {high:.1} degC",
+                ["mount", "body"][sensor]
+            ))
+        };
+        let mut parts: Vec<String> = (0..2).filter_map(range).collect();
+        if parts.is_empty() {
+            parts.push("not logged".to_owned());
+        }
+        if let Some(Validity { within_k, .. }) = self.subject.diagnosis.validity {
+            parts.push(format!(
+                "errors hold within {within_k:.1} K of that of calibration"
+            ));
+        }
+        parts.join("; ")
     }
 
     /// What there is to show of errors.

@@ -89,7 +89,13 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
         warnings: Vec::new(),
         diagnosis: diagnosis.clone(),
     };
-    let judged = of_eval(&fit.set, &fit.all, Zeros::Refit, &circumstances);
+    let judged = of_eval(
+        &fit.set,
+        &fit.all,
+        Zeros::Refit,
+        &Vec::new(),
+        &circumstances,
+    );
     let details = vec![Table::new("some details", &["more"])];
     let subject = Subject {
         errors: Some(&fit.all.errors),

@@ -4,7 +4,7 @@ use super::table::{Table, as_text};
 use crate::diagnose::Diagnosis;
 use crate::finding::Severity;
 use crate::judge::statistics::PoseError;
-use crate::judge::verdict::{LIMITED_MAX, Predicted, Verdict};
+use crate::judge::verdict::{LIMITED_MAX, Predicted, Validity, Verdict};
 use serde::Serialize;
 
 /// How a run ended.
@@ -106,7 +106,19 @@ fn sentence(of: &Subject, predicted: Option<&Predicted>) -> String {
                 Some(_) => "; errors on the log still have the faults that are taken off",
                 None => "",
             };
-            format!("errors in service of {ratio:.2} times the noise of the sensors{repaired}")
+            let within = match &of.diagnosis.validity {
+                None => String::new(),
+                Some(Validity {
+                    within_k,
+                    is_followed: true,
+                }) => format!("; good within {within_k:.0} K of the temperature of calibration"),
+                Some(Validity { within_k, .. }) => format!(
+                    "; good within {within_k:.1} K of the temperature of calibration, which was not logged"
+                ),
+            };
+            format!(
+                "errors in service of {ratio:.2} times the noise of the sensors{repaired}{within}"
+            )
         }
         (_, Some(predicted)) => {
             let [x, y, rz] = predicted.range.map(|ends| ends.map(|end| end * 1e6));
@@ -221,7 +233,11 @@ mod tests {
             findings: vec![Finding::new(Code::Hum, "")],
             verdict,
             predicted: Some(PREDICTED),
-            repair: None,
+            validity: Some(Validity {
+                within_k: 0.34,
+                is_followed: false,
+            }),
+            ..Diagnosis::default()
         };
         Summary::new(&Subject {
             end,
@@ -240,6 +256,7 @@ mod tests {
         let failed = End::Failed("no motion");
         for (end, verdict, is_field, [mark, sentence, next]) in [
             (End::Written, good, true, ["good", "1.20", "host-fit eval"]),
+            (End::Written, good, true, ["good", "within 0.3 K", "eval"]),
             (End::Checked, good, true, ["good", "1.20", "host-fit fit"]),
             (
                 End::Written,

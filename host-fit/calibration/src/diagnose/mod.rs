@@ -11,6 +11,7 @@
 //! | [`of_fit`] | what a fit says of itself |
 //! | [`signals`] | what the signals show by themselves |
 //! | `slopes` | how an error of each channel shows in the Hall signals |
+//! | [`temperature`] | k and h, a drift of temperature, how far a calibration is good |
 //! | [`trusted`] | the inputs that no log can show to be wrong |
 //!
 //! ```
@@ -42,6 +43,7 @@ mod slopes;
 pub mod structure;
 #[cfg(test)]
 mod structure_tests;
+pub mod temperature;
 pub mod trusted;
 
 use crate::finding::{Code, Finding, Severity, in_order, is_explained};
@@ -49,7 +51,7 @@ use crate::fit::{Fit, FitError, Repair};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::identify::FitFailure;
-use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, Predicted, Verdict};
+use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, Predicted, Validity, Verdict};
 use crate::problem::parameters::Parameters;
 use crate::solve::field::parameters::FieldParameters;
 use bank::Fitted;
@@ -67,6 +69,8 @@ pub struct Diagnosis {
     pub predicted: Option<Predicted>,
     /// The parameters without the faults of the log, for which the verdict is: see [`Fit::repaired`].
     pub repair: Option<Repair>,
+    /// How far from the temperature of the log a calibration by the field model is good.
+    pub validity: Option<Validity>,
 }
 
 /// Everything that is wrong with a log, and the verdict; `fitted` is what came of the fit to it.
@@ -140,6 +144,7 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
             findings.extend(left_out::finding(fit, dataset));
         }
         findings.extend(fit.warnings.iter().cloned());
+        findings.extend(temperature::findings(fit, dataset, stage));
         let ranged = |found: &Finding| {
             let is_of =
                 |other: &Finding| other.code == found.code && other.channel == found.channel;
@@ -170,6 +175,12 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         verdict: Some(verdict),
         predicted,
         repair,
+        validity: (fitted.ok())
+            .and_then(|fit| fit.field.as_ref())
+            .and_then(|field| {
+                let (white_mm, covariance) = (field.noise.white_mm, &field.posterior.covariance);
+                temperature::validity(stage, &field.parameters, white_mm, covariance)
+            }),
     }
 }
 
@@ -295,5 +306,6 @@ pub fn of_judged(
         verdict,
         predicted,
         repair: None,
+        validity: None,
     }
 }

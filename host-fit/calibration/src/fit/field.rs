@@ -1,7 +1,7 @@
 //! The main job for the field model: Model (31) by least squares first, then the field model from
 //! there, refused where the log leaves it worse than Model (31).
 
-use super::warning::{of_ranges, of_temperature, warnings};
+use super::warning::{of_ranges, warnings};
 use super::{Fit, FitError, Job, Judged, calibration};
 use crate::input::dataset::Row;
 use crate::input::stage::Stage;
@@ -170,7 +170,6 @@ impl Job<'_> {
             warnings: warnings(dataset, selected, &problem, &solution, &judgement)
                 .into_iter()
                 .chain(of_ranges(stage, field.planar_range, field.vertical_range))
-                .chain(of_temperature(&field.warmth))
                 .collect(),
             train_fitness: problem.fitness(cost),
             train_rows: selected.len(),

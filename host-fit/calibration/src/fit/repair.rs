@@ -69,7 +69,16 @@ impl Fit {
         self.solution.delta_m = zeros.map(|zero| zero.delta_m).collect();
         self.errors_solver_zeros = Some(self.judgement.errors);
         if let Some(field) = &mut self.field {
-            let covariance = repair.covariance.clone();
+            let mut covariance = repair.covariance.clone();
+            // The faults are told apart from the parameters, not from k and h.
+            let with_warmth = &field.posterior.covariance;
+            let (of_parameters, all) = (covariance.nrows(), with_warmth.nrows());
+            covariance.resize_mut(all, all, 0.0);
+            for i in of_parameters..all {
+                for j in of_parameters..all {
+                    covariance[(i, j)] = with_warmth[(i, j)];
+                }
+            }
             field.posterior = Posterior::of_parameters(covariance, parameters, &field.noise);
             field.parameters = *parameters;
             self.standard_error = field.posterior.standard_errors_31();

@@ -10,7 +10,6 @@ use crate::problem::Problem;
 use crate::problem::terms::shown;
 use crate::problem::zero_deviation::ZeroDeviation;
 use crate::solve::Solution;
-use crate::solve::field::fit::Warmth;
 
 /// The axes of the pose: key, name, unit.
 const POSE: [(&str, &str, &str); 3] = [("x", "X", "um"), ("y", "Y", "um"), ("rz", "Rz", "urad")];
@@ -68,34 +67,6 @@ pub fn of_undecoded(rows: usize) -> Option<Finding> {
 /// Whether it is one of [`of_counts`].
 pub(super) const fn is_count(found: &Finding) -> bool {
     matches!(found.code, Code::ZeroClipped | Code::Saturated)
-}
-
-/// k and h of each sensor that the logs have, with their standard errors.
-pub(super) fn of_temperature(warmth: &Warmth) -> impl Iterator<Item = Finding> {
-    let sensors = [("mount", "k"), ("body", "h")].into_iter().enumerate();
-    let temperature = warmth.temperature;
-    let there = sensors.filter(move |(sensor, _)| temperature.reach_mk[*sensor] != 0);
-    there.map(move |(sensor, (place, symbol))| {
-        let zero_c = f64::from(temperature.zero_mc[sensor]) * 1e-3;
-        let of_probe = |probe: usize| {
-            let percent = temperature.per_mk[probe][sensor] * 1e5;
-            let error = warmth.error_per_k[probe][sensor] * 1e2;
-            format!("{percent:.4}({error:.4})")
-        };
-        let values = [0, 1, 2].map(of_probe).join(", ");
-        let span_k = warmth.spans_k[sensor];
-        let source = if span_k > 0.0 {
-            format!("over {span_k:.1} K, with what stage.toml expects of it")
-        } else {
-            "as stage.toml expects: one log spans too little to tell; fit it together with a log at another \
-             temperature, 3 K away or more"
-                .to_owned()
-        };
-        let message = format!(
-            "{symbol} of A, B, C is {values} %/K of the {place}'s temperature from {zero_c:.2} degC, {source}"
-        );
-        Finding::new(Code::Temperature, message).of(span_k, "K")
-    })
 }
 
 /// Axes that the log moves (X, Y, Rz and Z, Rx, Ry: largest magnitudes, m, rad) far less than service

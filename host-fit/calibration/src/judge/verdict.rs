@@ -1,8 +1,13 @@
 //! What a calibration is good for at work.
 
 use crate::finding::{Finding, Severity};
+use crate::input::stage::TemperatureTable;
 use crate::solve::field::carry::Service;
+use crate::solve::field::parameters::FieldParameters;
+use crate::solve::field::posterior::covariance_at;
+use crate::solve::field::terms::COUNT;
 use nalgebra::DMatrix;
+use runtime::Temperature;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
@@ -79,6 +84,59 @@ impl Predicted {
     /// The ratio of the worst axis.
     pub fn worst_ratio(&self) -> f64 {
         self.ratio.into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// How far from the temperature of its log a calibration is good; all parts change alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Validity {
+    /// Errors at work are at most [`GOOD_MAX`] times the noise floor within this distance, K.
+    pub within_k: f64,
+    /// Whether the calibration follows temperature; without sensors the distance is an estimate by what is
+    /// known of the parts.
+    pub is_followed: bool,
+}
+
+impl Validity {
+    /// Of a calibration at a service.
+    pub fn new(
+        service: &Service,
+        parameters: &FieldParameters,
+        covariance: &DMatrix<f64>,
+        table: &TemperatureTable,
+    ) -> Self {
+        let is_followed = covariance.nrows() > COUNT;
+        let [k, h] = table.prior_per_k;
+        let mut covariance = covariance.clone();
+        if !is_followed {
+            covariance.resize_mut(COUNT + 6, COUNT + 6, 0.0);
+            for (place, [_, deviation]) in (COUNT..).zip([k, h, k, h, k, h]) {
+                covariance[(place, place)] = deviation * deviation;
+            }
+        }
+        let off_per_k = if is_followed { 0.0 } else { k[0] + h[0] };
+        let is_good = |change_k: f64| {
+            let off = parameters.by_gain([off_per_k * change_k; 3]);
+            let covariance = covariance_at(&covariance, parameters, [change_k; 2]);
+            Predicted::new(service, &covariance, &off).worst_ratio() <= GOOD_MAX
+        };
+        let [mut good, mut bad] = [0.0, f64::from(Temperature::<f64>::REACH_MK) * 1e-3];
+        if is_good(bad) {
+            good = bad;
+        }
+        // To a hundredth of a kelvin.
+        for _ in 0..12 {
+            let middle = 0.5 * (good + bad);
+            if is_good(middle) {
+                good = middle;
+            } else {
+                bad = middle;
+            }
+        }
+        Self {
+            within_k: good,
+            is_followed,
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use runtime::frame::MISSING_CODE;
 use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Reading, Temperature, VerticalPose};
 use std::borrow::Cow;
 use std::hash::{Hash, Hasher};
+use std::ops::Range;
 use std::path::PathBuf;
 
 /// The most rows that a fit works on. Of longer logs it takes a sample: what more rows would add to
@@ -215,14 +216,8 @@ impl Dataset {
     pub fn compensate_as_expected(&mut self, table: &TemperatureTable) {
         let mut temperature = Temperature::NONE;
         for sensor in 0..2 {
-            let codes = self
-                .rows
-                .iter()
-                .map(|row| row.frame.temperature_mc()[sensor]);
-            let there = codes.filter(|code| *code != MISSING_CODE).map(i64::from);
-            let (count, sum) = there.fold((0, 0), |(count, sum), code| (count + 1, sum + code));
-            if count > 0 {
-                temperature.zero_mc[sensor] = (sum as f64 / f64::from(count)).round() as i32;
+            if let Some(mean) = self.temperature_mean_mc(sensor, 0..self.rows.len()) {
+                temperature.zero_mc[sensor] = mean;
                 temperature.reach_mk[sensor] = Temperature::<f64>::REACH_MK;
                 for probe in &mut temperature.per_mk {
                     probe[sensor] = table.prior_per_k[sensor][0] * 1e-3;
@@ -232,18 +227,28 @@ impl Dataset {
         self.compensate(temperature);
     }
 
-    /// Smallest and largest temperature of mount or body in rows of the dataset, m degC.
-    pub fn temperature_range_mc(&self, sensor: usize) -> Option<[i32; 2]> {
-        let codes = self
-            .rows
+    fn temperatures_mc(&self, sensor: usize, rows: Range<usize>) -> impl Iterator<Item = i32> {
+        let rows = self.rows.get(rows).unwrap_or_default();
+        let codes = rows
             .iter()
-            .map(|row| row.frame.temperature_mc()[sensor]);
-        codes
-            .filter(|code| *code != MISSING_CODE)
-            .fold(None, |ends: Option<[i32; 2]>, code| {
-                let [low, high] = ends.unwrap_or([code; 2]);
-                Some([low.min(code), high.max(code)])
-            })
+            .map(move |row| row.frame.temperature_mc()[sensor]);
+        codes.filter(|code| *code != MISSING_CODE)
+    }
+
+    /// Mean temperature of mount or body in these rows, m degC.
+    pub fn temperature_mean_mc(&self, sensor: usize, rows: Range<usize>) -> Option<i32> {
+        let codes = self.temperatures_mc(sensor, rows).map(i64::from);
+        let (count, sum) = codes.fold((0, 0), |(count, sum), code| (count + 1, sum + code));
+        (count > 0).then(|| (sum as f64 / f64::from(count)).round() as i32)
+    }
+
+    /// Smallest and largest temperature of mount or body in these rows, m degC.
+    pub fn temperature_range_mc(&self, sensor: usize, rows: Range<usize>) -> Option<[i32; 2]> {
+        let codes = self.temperatures_mc(sensor, rows);
+        codes.fold(None, |ends: Option<[i32; 2]>, code| {
+            let [low, high] = ends.unwrap_or([code; 2]);
+            Some([low.min(code), high.max(code)])
+        })
     }
 
     /// How to name a movement: its number, after the name of its log where there are several.

@@ -89,6 +89,17 @@ impl FieldParameters {
         Parameters::of_model_31(&self.geometry(), &self.probes.map(|p| sensitivity(&p)))
     }
 
+    /// What gains of A, B, C, as parts, add to each parameter: eta, a, b and c are scaled alike.
+    pub fn by_gain(&self, parts: [f64; 3]) -> [f64; COUNT] {
+        std::array::from_fn(|k| {
+            let (probe, term) = (k / PER_PROBE, k % PER_PROBE);
+            match (ETA..CARRY).contains(&term) {
+                true => parts[probe] * self.probes[probe][term],
+                false => 0.0,
+            }
+        })
+    }
+
     /// The sensing axes of A, B, C.
     pub fn axes(&self) -> SensingAxes<f64> {
         SensingAxes::at(self.probes.map(|p| p[THETA]))

@@ -15,7 +15,8 @@ pub const FORM_MM: f64 = 25e-6;
 /// The posterior of a fit: normal, with the parameters as its mean.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
-    /// Covariance of the parameters, 81 by 81, in the order and the units of the parameters.
+    /// Covariance of the 81 parameters, in their order and units, and then, where the stage has sensors
+    /// of temperature, of (k, h) of A, B, C, 1/K.
     pub covariance: DMatrix<f64>,
     /// Standard error of the lag of the reference, s; `None` where the log shows nothing of it.
     pub lag_error_s: Option<f64>,
@@ -71,6 +72,22 @@ impl PoseErrors {
     }
 }
 
+/// The covariance of parameters as they act where mount and body are this far from T0, K, from a
+/// [`Posterior::covariance`]: k and h change the sensitivity of a probe by a part.
+pub fn covariance_at(
+    covariance: &DMatrix<f64>,
+    parameters: &FieldParameters,
+    change_k: [f64; 2],
+) -> DMatrix<f64> {
+    let mut acts = DMatrix::identity(COUNT, covariance.nrows());
+    for (k, mut column) in acts.column_iter_mut().skip(COUNT).enumerate() {
+        let mut parts = [0.0; 3];
+        parts[k / 2] = change_k[k % 2];
+        column.copy_from_slice(&parameters.by_gain(parts));
+    }
+    &acts * covariance * acts.transpose()
+}
+
 impl Posterior {
     pub(super) fn new(with_lag: DMatrix<f64>, parameters: &FieldParameters, noise: &Noise) -> Self {
         let lag = with_lag[(COUNT, COUNT)];
@@ -81,8 +98,7 @@ impl Posterior {
         }
     }
 
-    /// Of parameters with this covariance, 81 by 81 in their order and units, for probes with this
-    /// noise.
+    /// Of parameters with this covariance, for probes with this noise.
     pub const fn of_parameters(
         covariance: DMatrix<f64>,
         parameters: &FieldParameters,
@@ -94,6 +110,21 @@ impl Posterior {
             parameters: *parameters,
             white_mm: noise.white_mm,
         }
+    }
+
+    /// The same with k and h, whose covariance with themselves and with the parameters is in
+    /// `with_lag`: that of all unknowns.
+    #[must_use]
+    pub(super) fn with_warmth(mut self, with_lag: &DMatrix<f64>) -> Self {
+        self.covariance = with_lag.clone().remove_row(COUNT).remove_column(COUNT);
+        self
+    }
+
+    /// Standard errors of (k, h) of A, B, C, 1/K; `None` without sensors of temperature.
+    pub fn warmth_errors(&self) -> Option<[[f64; 2]; 3]> {
+        let error = |k: usize| self.covariance[(k, k)].sqrt();
+        (self.covariance.nrows() > COUNT)
+            .then(|| [0, 1, 2].map(|probe| [0, 1].map(|k| error(COUNT + 2 * probe + k))))
     }
 
     /// The standard errors of the parameters, in their units.
@@ -154,7 +185,8 @@ impl Posterior {
     pub fn at_pose(&self, planar: [f64; 3], vertical: [f64; 3]) -> Option<PoseUncertainty> {
         let errors = PoseErrors::new(&probes(&self.parameters), planar, vertical)?;
         let by_parameter = DMatrix::from_fn(3, COUNT, |axis, k| errors.by_parameter[axis][k]);
-        let systematic = &by_parameter * &self.covariance * by_parameter.transpose();
+        let covariance = self.covariance.view((0, 0), (COUNT, COUNT));
+        let systematic = &by_parameter * covariance * by_parameter.transpose();
         let by_probes = |errors_mm: [f64; 3]| {
             let by = Matrix3::from_fn(|axis, k| errors.by_signal[axis][k] * errors_mm[k]);
             by * by.transpose()

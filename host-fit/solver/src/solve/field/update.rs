@@ -27,6 +27,8 @@ pub enum Change {
     Gains,
     /// Anything: also the place and the height of each probe, and the shape of its field.
     All,
+    /// Nothing: the log adds to what is known, above all of k and h.
+    Temperature,
 }
 
 /// Standard deviations of what may have changed.
@@ -58,26 +60,26 @@ impl Change {
             Self::Gain => "gain",
             Self::Gains => "gains",
             Self::All => "all",
+            Self::Temperature => "temperature",
         }
     }
 
     /// The columns of L for it, each over the parameters.
     fn columns(self, old: &FieldParameters) -> Vec<[f64; COUNT]> {
-        let gain = |probes: &[usize]| {
-            let mut column = [0.0; COUNT];
-            for &probe in probes {
-                for k in ETA..CARRY {
-                    column[probe * PER_PROBE + k] = GAIN * old.probes[probe][k];
-                }
-            }
-            column
+        let gains = || {
+            let gain = |probe: usize| {
+                let mut parts = [0.0; 3];
+                parts[probe] = GAIN;
+                old.by_gain(parts)
+            };
+            vec![gain(0), gain(1), gain(2)]
         };
-        let gains = || [0, 1, 2].map(|probe| gain(&[probe]));
         match self {
-            Self::Gain => vec![gain(&[0, 1, 2])],
-            Self::Gains => gains().to_vec(),
+            Self::Gain => vec![old.by_gain([GAIN; 3])],
+            Self::Gains => gains(),
+            Self::Temperature => Vec::new(),
             Self::All => {
-                let mut columns = gains().to_vec();
+                let mut columns = gains();
                 for (probe, values) in old.probes.iter().enumerate() {
                     columns.extend(seating(probe, values));
                 }
@@ -150,7 +152,8 @@ impl Update {
     }
 }
 
-/// Fits what has changed to all rows of a dataset. `covariance` is the old posterior's, 81 by 81;
+/// Fits what has changed to all rows of a dataset, whose signals are compensated as the old calibration
+/// has it. `covariance` is the old [`Posterior::covariance`];
 /// without one the parameters that don't change stay as they are. `drift_mm` is the walk of the
 /// reference in X, Y, Rz in a second, mm, mm, mrad: a few seconds don't determine it.
 ///
@@ -194,12 +197,13 @@ pub fn update(
     let parameters = equations.parameters(&solved.point);
     let prior = unknowns.prior_squares(&solved.x);
     let noise = equations.noise;
+    let with_lag = with_lag.ok_or(FieldFitError::Singular)?;
+    let posterior = Posterior::new(with_lag.clone(), &parameters, &noise);
     Ok(Update {
-        posterior: Posterior::new(
-            with_lag.ok_or(FieldFitError::Singular)?,
-            &parameters,
-            &noise,
-        ),
+        posterior: match covariance.is_some_and(|covariance| covariance.nrows() > COUNT) {
+            true => posterior.with_warmth(&with_lag),
+            false => posterior,
+        },
         parameters,
         noise,
         chi_squared: solved.normal.chi_squared() + prior,
@@ -218,18 +222,20 @@ fn factor(
     change: Change,
 ) -> Option<DMatrix<f64>> {
     let changes = change.columns(old);
-    let known = covariance.map_or(0, |_| COUNT);
+    let known = covariance.map_or(0, DMatrix::nrows);
     let mut l = DMatrix::zeros(UNKNOWNS, known + changes.len() + 1);
     if let Some(covariance) = covariance {
         // In the scale in which the diagonal is one: the units differ by orders of magnitude.
         let scale = covariance.diagonal().map(f64::sqrt);
-        let scaled = DMatrix::from_fn(COUNT, COUNT, |i, j| {
+        let scaled = DMatrix::from_fn(known, known, |i, j| {
             covariance[(i, j)] / (scale[i] * scale[j])
         });
         let scaled = Cholesky::new(scaled)?.unpack();
-        for i in 0..COUNT {
+        for i in 0..known {
+            // k and h stand behind the lag.
+            let unknown = if i < COUNT { i } else { i + 1 };
             for j in 0..=i {
-                l[(i, j)] = scale[i] * scaled[(i, j)];
+                l[(unknown, j)] = scale[i] * scaled[(i, j)];
             }
         }
     }

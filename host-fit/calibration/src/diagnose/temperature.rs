@@ -1,0 +1,152 @@
+//! What a calibration knows of temperature: k and h, what a drift in the log costs, how far from the
+//! temperature of its log it is good, and when to zero again.
+
+use super::bank::{declared_service, severity};
+use crate::finding::{Code, Finding, Severity};
+use crate::fit::Fit;
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use crate::judge::statistics::white_noise;
+use crate::judge::verdict::Validity;
+use crate::solve::field::parameters::FieldParameters;
+use crate::solve::field::posterior::covariance_at;
+use crate::solve::field::terms::COUNT;
+use nalgebra::DMatrix;
+use runtime::{ParameterSet, Temperature};
+
+/// Offsets of Hall elements and the expansion of the stage move its zero. After such a change, K, the
+/// stage is zeroed again.
+const REZERO_K: f64 = 5.0;
+
+/// The sensors, and the symbols of their coefficients.
+const SENSORS: [(&str, &str); 2] = [("mount", "k"), ("body", "h")];
+
+/// What a fit found of k and h, a finding for each sensor. Its cost is that of the temperature's drift in
+/// the log, of which k and h leave a part.
+pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Finding> {
+    let temperature = &fit.calibration.temperature;
+    let (parameters, error_per_k, spans_k) = match &fit.field {
+        Some(field) => (
+            field.parameters,
+            field.warmth.error_per_k,
+            field.warmth.spans_k,
+        ),
+        // Other models take k and h as the stage file expects them.
+        None => {
+            let expected = stage
+                .temperature
+                .prior_per_k
+                .map(|[_, deviation]| deviation);
+            let parameters = FieldParameters::of_model_31(&fit.solution.parameters, stage);
+            (parameters, [expected; 3], [0.0; 2])
+        }
+    };
+    let floor = white_noise(&fit.decoded.errors, &dataset.movements);
+    let cost = |sensor: usize| {
+        let mut covariance = DMatrix::zeros(COUNT + 6, COUNT + 6);
+        for (probe, errors) in error_per_k.iter().enumerate() {
+            let k = COUNT + 2 * probe + sensor;
+            covariance[(k, k)] = errors[sensor] * errors[sensor];
+        }
+        let changes_k = [drift_k(dataset, temperature, sensor); 2];
+        let changes = covariance_at(&covariance, &parameters, changes_k);
+        let service = declared_service(stage, &parameters, [0.0; 3])?.variance(&changes);
+        let ratio =
+            |axis: usize| (1.0 + service.systematic[axis] / (floor[axis] * floor[axis])).sqrt();
+        let ratio = (0..3).map(ratio).fold(1.0, f64::max);
+        Some(ratio).filter(|ratio| ratio.is_finite())
+    };
+    let there = (0..2).filter(|sensor| temperature.reach_mk[*sensor] != 0);
+    let finding = |sensor: usize| {
+        let (place, symbol) = SENSORS[sensor];
+        let zero_c = f64::from(temperature.zero_mc[sensor]) * 1e-3;
+        let of_probe = |probe: usize| {
+            let percent = temperature.per_mk[probe][sensor] * 1e5;
+            let error = error_per_k[probe][sensor] * 1e2;
+            format!("{percent:.4}({error:.4})")
+        };
+        let values = [0, 1, 2].map(of_probe).join(", ");
+        let span_k = spans_k[sensor];
+        let from = if span_k > 0.0 {
+            format!("from logs {span_k:.1} K apart")
+        } else if fit.field.is_none() {
+            "as stage.toml expects, for only the field model fits it".to_owned()
+        } else {
+            "as stage.toml expects, for the temperature hardly changes: fit the log together with one that is 3 K away or \
+             more"
+                .to_owned()
+        };
+        let message = format!(
+            "{symbol} of A, B, C is {values} %/K of the {place}'s temperature from {zero_c:.2} degC, {from}"
+        );
+        let found = Finding::new(Code::Temperature, message).of(span_k, "K");
+        match cost(sensor) {
+            Some(cost) => found.severe(severity(cost)).costing(cost),
+            None => found,
+        }
+    };
+    there.map(finding).collect()
+}
+
+/// rms distance of a sensor's temperature from T0 over the log, K.
+fn drift_k(dataset: &Dataset, temperature: &Temperature<f64>, sensor: usize) -> f64 {
+    let change_k = |row: &crate::input::dataset::Row| {
+        temperature.changes_k(row.frame.temperature_mc())[sensor]
+    };
+    let squares: f64 = dataset
+        .rows
+        .iter()
+        .map(change_k)
+        .map(|change| change * change)
+        .sum();
+    (squares / dataset.rows.len().max(1) as f64).sqrt()
+}
+
+/// How far from the temperature of its calibration a stage stays good; `covariance` is a
+/// [`Posterior::covariance`](crate::solve::field::posterior::Posterior::covariance).
+pub fn validity(
+    stage: &Stage,
+    parameters: &FieldParameters,
+    white_mm: [f64; 3],
+    covariance: &DMatrix<f64>,
+) -> Option<Validity> {
+    let service = declared_service(stage, parameters, white_mm)?;
+    Some(Validity::new(
+        &service,
+        parameters,
+        covariance,
+        &stage.temperature,
+    ))
+}
+
+/// That the temperature changed, in a log that a blob is judged on, by more than a zero holds: since the
+/// begin of a movement if its zero deviation is `refitted`, else since the calibration.
+pub fn rezero(set: &ParameterSet, dataset: &Dataset, refitted: bool) -> Option<Finding> {
+    let zero_mc = set.constants.temperature.zero_mc;
+    let logged = |sensor: usize| set.constants.temperature.reach_mk[sensor] != 0 || refitted;
+    let of_movement = |(movement, sensor): (usize, usize)| {
+        let rows = dataset.movements[movement].rows.clone();
+        let [low, high] = dataset.temperature_range_mc(sensor, rows)?;
+        let change_mc = match refitted {
+            true => high - low,
+            false => (high - zero_mc[sensor]).max(zero_mc[sensor] - low),
+        };
+        Some((f64::from(change_mc) * 1e-3, movement, sensor))
+    };
+    let sensors = (0..2).filter(|sensor| logged(*sensor));
+    let all = sensors.flat_map(|sensor| (0..dataset.movements.len()).map(move |m| (m, sensor)));
+    let changes = all.filter_map(of_movement);
+    let (change_k, movement, sensor) = changes.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (change_k > REZERO_K).then(|| {
+        let (place, _) = SENSORS[sensor];
+        let since = if refitted { "within a movement" } else { "since the calibration" };
+        let message = format!(
+            "the temperature of the {place} changes by {change_k:.1} K {since}: zero the stage again after every {REZERO_K} K, for \
+             offsets and expansion are not in the model"
+        );
+        let movement = &dataset.movements[movement];
+        let t_us = dataset.rows[movement.rows.start].t_us;
+        let found = Finding::new(Code::Temperature, message).severe(Severity::Warn);
+        found.at(dataset.movement_name(movement), t_us).of(change_k, "K")
+    })
+}
