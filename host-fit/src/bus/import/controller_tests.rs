@@ -1,9 +1,11 @@
-//! A record as the stage controller sends it with its own converter: poses, codes of 24 bits and
-//! times on one bus, over two minutes, by clocks that differ.
+//! A record as the stage controller sends it with its own converter: poses, temperatures, codes of 24
+//! bits and times on one bus, over two minutes, by clocks that differ.
 
 use super::*;
+use crate::input::dataset::Row;
 use crate::input::log::{self, ReadOptions};
-use hal_adapters::can::{BusFrame, Coded, PoseSender, sensor};
+use hal_adapters::can::sensor::{self, TemperatureSender};
+use hal_adapters::can::{BusFrame, Coded, PoseSender};
 use hal_adapters::candump::LogLine;
 use runtime::{RawFrame, Reading};
 use std::f64::consts::TAU;
@@ -28,17 +30,24 @@ fn hall(t_s: f64) -> [i32; 3] {
     s.map(|s| (s / M_PER_CODE).round() as i32)
 }
 
+/// Temperatures of mount and body in tick `n`, m degC: both are read every 100 ms, one after the other.
+fn temperature_mc(n: u32) -> [i32; 2] {
+    [20_000 + (n / 50) as i32, 21_000 - ((n + 49) / 50) as i32]
+}
+
 /// The record by a computer whose clock is the true one: the controller's runs faster by
 /// `fast`, and each frame comes after those before it.
 fn candump(fast: f64) -> String {
     let mut text = String::new();
-    let mut poses = PoseSender::default();
+    let (mut poses, mut temperatures) = (PoseSender::default(), TemperatureSender::START);
     for n in 0..TICKS {
         let t_s = 0.002 * f64::from(n) / (1.0 + fast) + 0.0003;
-        let codes = RawFrame::new(hall(t_s), [100, 101, 99], n + 70, 2_000 * n);
+        let codes = RawFrame::new(hall(t_s), [100, 101, 99], n + 70, 2_000 * n)
+            .with_temperature_mc(temperature_mc(n));
         let pose: Vec<Coded> = poses.frames(&Reading::default(), Some(&codes)).collect();
         let frames = pose
             .into_iter()
+            .chain(temperatures.frame(&codes))
             .chain(sensor::frames(Layout::Bits24, &codes));
         let late_us = f64::from(n * 7919 % 101);
         for (k, coded) in (1u32..).zip(frames) {
@@ -66,9 +75,19 @@ fn reference(fast: f64) -> String {
     text
 }
 
-/// Largest distance from the codes to those of the reference beside them, m; and the report.
+/// Largest distance from the codes to those of the reference beside them, m; and the report. Each row has
+/// the temperatures of its tick.
 fn imported(controller: f64, interferometer: f64) -> (f64, ImportReport) {
-    try_import(controller, interferometer, None).expect("imported")
+    let (distance_m, rows, report) =
+        try_import(controller, interferometer, None).expect("imported");
+    let differ = rows.iter().filter(|row| {
+        let t_s = 1e-6 * row.t_us as f64 / (1.0 + interferometer);
+        let n = ((t_s - 0.0003) * (1.0 + controller) / 0.002).round() as u32;
+        row.frame.temperature_mc() != temperature_mc(n)
+    });
+    assert_eq!(differ.count(), 0);
+    assert!(!report.temperatures_left_out);
+    (distance_m, report)
 }
 
 /// With the offset that is given, us, or found.
@@ -76,14 +95,15 @@ fn try_import(
     controller: f64,
     interferometer: f64,
     offset_us: Option<f64>,
-) -> Result<(f64, ImportReport), ImportError> {
+) -> Result<(f64, Vec<Row>, ImportReport), ImportError> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     let stage = crate::input::shipped::STAGE_TOML
         .replace("m_per_count = 6.25e-8 ", "m_per_count = 2.44140625e-10 ")
         .replace("m_per_count = 1.5625e-8 ", "m_per_count = 6.103515625e-11 ")
         .replace("-32768", "-8388608")
-        .replace("32767", "8388607");
+        .replace("32767", "8388607")
+        + "\n[temperature]\nmount = \"mount_c\"\nbody = \"body_c\"\nunit = \"C\"\n";
     std::fs::write(path("bus.log"), candump(controller)).expect("written");
     std::fs::write(path("ifm.csv"), reference(interferometer)).expect("written");
     std::fs::write(path("stage.toml"), stage).expect("written");
@@ -110,7 +130,7 @@ fn try_import(
         let signals = row.frame.hall().map(|code| f64::from(code) * M_PER_CODE);
         s.into_iter().zip(signals).map(|(s, code)| (s - code).abs())
     });
-    Ok((distance.fold(0.0, f64::max), report))
+    Ok((distance.fold(0.0, f64::max), rows, report))
 }
 
 #[test]
@@ -143,9 +163,9 @@ fn a_given_offset_is_refused_unless_it_is_that_in_the_middle() {
         matches!(refused, ImportError::WrongOffset { .. }),
         "{refused}"
     );
-    let (_, report) = try_import(0.0, 0.0, Some(600.0)).expect("imported");
+    let (_, _, report) = try_import(0.0, 0.0, Some(600.0)).expect("imported");
     let apart_us = report.offset.seen.apart_us.expect("as given");
     assert!(apart_us.abs() < 800.0, "{apart_us}");
-    let (distance_m, _) = try_import(0.0, 100e-6, Some(600.0 - 57.0 * 100.0)).expect("imported");
+    let (distance_m, ..) = try_import(0.0, 100e-6, Some(600.0 - 57.0 * 100.0)).expect("imported");
     assert!(distance_m < 3e-6, "{distance_m}");
 }
