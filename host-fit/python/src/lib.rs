@@ -3,8 +3,21 @@
 //! One file a group of classes; each function reads its arguments, calls the library without the GIL,
 //! and hands over what it gives. Nothing is computed here.
 
+mod array_text;
+mod arrays;
+mod calibration;
+mod choice;
+mod decoder;
+mod error;
+mod evaluation;
+mod finding;
+mod fit;
+mod log;
 mod minimize;
 mod program;
+mod report;
+mod stage;
+mod work;
 
 use pyo3::prelude::*;
 
@@ -12,7 +25,19 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _hallstage {
     #[pymodule_export]
+    use crate::calibration::Calibration;
+    #[pymodule_export]
+    use crate::decoder::{Decoder, status_names};
+    #[pymodule_export]
+    use crate::evaluation::Evaluation;
+    #[pymodule_export]
+    use crate::fit::{check, fit};
+    #[pymodule_export]
+    use crate::log::{Log, read_log};
+    #[pymodule_export]
     use crate::minimize::{OptimizeResult, minimize};
     #[pymodule_export]
     use crate::program::{main_of, write_demo};
+    #[pymodule_export]
+    use crate::stage::Stage;
 }

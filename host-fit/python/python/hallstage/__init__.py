@@ -3,6 +3,44 @@
 The work is done by the Rust library `host-fit`; this package has no model of its own. All numbers are SI: m, rad, s.
 """
 
-from ._hallstage import OptimizeResult, minimize, write_demo
+from ._errors import LogError, LogRefused
+from ._hallstage import (
+    Calibration,
+    Decoder,
+    Evaluation,
+    Log,
+    OptimizeResult,
+    Stage,
+    check,
+    fit,
+    minimize,
+    read_log,
+    status_names,
+    write_demo,
+)
+from ._results import Finding, Findings, Labelled, Parameter, Residuals
 
-__all__ = ["OptimizeResult", "minimize", "write_demo"]
+#: What each bit of a decoder's `status` means, by its value.
+STATUS: dict[int, str] = status_names()
+
+__all__ = [
+    "STATUS",
+    "Calibration",
+    "Decoder",
+    "Evaluation",
+    "Finding",
+    "Findings",
+    "Labelled",
+    "Log",
+    "LogError",
+    "LogRefused",
+    "OptimizeResult",
+    "Parameter",
+    "Residuals",
+    "Stage",
+    "check",
+    "fit",
+    "minimize",
+    "read_log",
+    "write_demo",
+]

@@ -1,0 +1,157 @@
+"""What calibrations consist of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Half the width of an interval that covers 95 % of a normal distribution, in standard deviations.
+_COVERS_95 = 1.959963984540054
+
+_AXES = {"x": ("X", "um"), "y": ("Y", "um"), "rz": ("Rz", "urad")}
+
+
+class Finding(NamedTuple):
+    """One thing that is wrong with a log."""
+
+    #: What it is: a name that stays, explained in the reference of `host-fit`.
+    code: str
+    #: "note", "warn" or "refuse".
+    severity: Literal["note", "warn", "refuse"]
+    #: Evidence and remedy.
+    message: str
+    #: The channel, such as "hall_a", "cap_1", "ifm_y1", "x".
+    channel: str | None
+    #: The movement.
+    movement: str | None
+    #: When, us in the log.
+    t_us: int | None
+    #: How large, in `unit`.
+    value: float | None
+    unit: str | None
+    #: Predicted errors in service over the noise floor, with this alone.
+    cost: float | None
+
+
+class Findings(list[Finding]):
+    """What is wrong with a log, the most severe first."""
+
+    def __init__(self, findings: list[Finding], verdict: str | None, refusal: str | None) -> None:
+        super().__init__(findings)
+        #: "good", "limited" or "refused": of the calibration that the log gives.
+        self.verdict = verdict
+        #: Why the log is refused; None where it is not.
+        self.refusal = refusal
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{f.severity}</td><td>{f.code}</td><td>{escape(f.message)}</td>"
+            f"<td>{'' if f.cost is None else f'{f.cost:.2f}'}</td></tr>"
+            for f in self
+        )
+        head = "<tr><th></th><th>code</th><th>finding</th><th>cost</th></tr>"
+        return f"<p><b>{self.verdict}</b></p><table>{head}{rows}</table>"
+
+
+class Parameter(NamedTuple):
+    """One parameter of a calibration, in its unit."""
+
+    name: str
+    value: float
+    #: Standard error; None where it is not known, or where the model fixes the parameter.
+    std: float | None
+    unit: str
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The ends of the interval that covers 95 %: value -+ 1.96 std; None without a standard error."""
+        if self.std is None:
+            return None
+        half = _COVERS_95 * self.std
+        return (self.value - half, self.value + half)
+
+
+class Labelled(np.ndarray[tuple[int, int], np.dtype[np.float64]]):
+    """A square matrix, float64, (k, k), with the names of its rows and columns: `labels`.
+
+    A part or a product of it has no labels: `labels` is empty there.
+    """
+
+    labels: list[str]
+
+    def __new__(cls, matrix: NDArray[np.float64], labels: list[str]) -> Labelled:
+        made = np.asarray(matrix).view(cls)
+        made.labels = labels
+        return made
+
+    def __array_finalize__(self, of: Any) -> None:
+        labels = getattr(of, "labels", [])
+        self.labels = labels if self.shape == (len(labels), len(labels)) else []
+
+
+class Residuals:
+    """Errors of the rows of a log: decoded pose less reference, zero deviations taken off.
+
+    `time` (s, within the log), `movement` (its number), `x`, `y` (m), `rz` (rad), `weight` (0 to 1: how much the
+    row counted in the fit, 0 if it was not used), all (n,). Rows without a pose are NaN.
+    """
+
+    def __init__(
+        self,
+        time: NDArray[np.float64],
+        movement: NDArray[np.int64],
+        axes: NDArray[np.float64],
+        weight: NDArray[np.float64],
+        bin_hz: float,
+        power: Sequence[NDArray[np.float64]],
+    ) -> None:
+        self.time = time
+        self.movement = movement
+        self.x, self.y, self.rz = axes
+        self.weight = weight
+        self._bin_hz = bin_hz
+        self._power = dict(zip(_AXES, power, strict=False))
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        rms = {axis: float(np.sqrt(np.nanmean(getattr(self, axis) ** 2)) * 1e6) for axis in _AXES}
+        told = ", ".join(f"{name} {rms[axis]:.3f} {unit}" for axis, (name, unit) in _AXES.items())
+        return f"<Residuals of {len(self)} rows, rms {told}>"
+
+    def asd(self, axis: Literal["x", "y", "rz"]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Amplitude spectral density of an axis: frequencies, Hz, and m/rtHz or rad/rtHz, without that at 0 Hz.
+
+        Mean over windows of up to 4096 rows within the movements, with a Hann taper: Welch's method. Raises
+        `ValueError` for another axis, or where no movement is long enough (32 rows).
+        """
+        if axis not in _AXES:
+            raise ValueError(f"axis: {axis!r} is none of x, y, rz")
+        if axis not in self._power:
+            raise ValueError("axis: no movement has the 32 rows that a spectrum needs")
+        power = self._power[axis][1:]
+        return (self._bin_hz * np.arange(1, len(power) + 1), np.sqrt(power))
+
+    def plot(self) -> Figure:
+        """Errors over time, a panel for each axis, um and urad; needs matplotlib."""
+        from matplotlib import pyplot
+
+        figure, panels = pyplot.subplots(3, 1, sharex=True)
+        rows = np.arange(len(self))
+        begins = np.flatnonzero(np.diff(self.movement)) + 1
+        for panel, (axis, (name, unit)) in zip(panels, _AXES.items(), strict=True):
+            panel.plot(rows, getattr(self, axis) * 1e6, linewidth=0.5)
+            if len(begins) < 150:
+                for row in begins:
+                    panel.axvline(row, color="0.8", linewidth=0.5, zorder=0)
+            panel.set_ylabel(f"{name}, {unit}".replace("u", "\N{MICRO SIGN}"))
+        panels[-1].set_xlabel("row")
+        return figure

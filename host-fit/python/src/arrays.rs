@@ -1,0 +1,140 @@
+//! Arguments that are arrays: checked, and read where they lie if their layout allows it.
+
+use crate::error::wrong;
+use numpy::{
+    PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyUntypedArray, PyUntypedArrayMethods,
+};
+use pyo3::intern;
+use pyo3::prelude::*;
+
+/// The argument as an array of numbers with this many dimensions and at least a row; `kinds` are those of
+/// its dtype that will do.
+fn array<'py>(
+    argument: &str,
+    given: &Bound<'py, PyAny>,
+    dimensions: usize,
+    kinds: &str,
+    wanted: &str,
+) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let py = given.py();
+    let numpy = py.import("numpy")?;
+    let masked = numpy.getattr("ma")?.getattr("MaskedArray")?;
+    if given.is_instance(&masked)? {
+        return Err(wrong(
+            argument,
+            "a masked array, whose mask would be lost; leave the masked rows out",
+        ));
+    }
+    let made = numpy.call_method1("asarray", (given,));
+    let made = made.map_err(|error| wrong(argument, format!("no array of {wanted}: {error}")))?;
+    let made = made.cast_into::<PyUntypedArray>()?;
+    let dtype = made.dtype();
+    let kind: String = dtype.getattr("kind")?.extract()?;
+    if made.ndim() != dimensions {
+        let shape = shape(&made);
+        let want = match dimensions {
+            1 => "one number a row, (n,)",
+            _ => "three numbers a row, (n, 3)",
+        };
+        return Err(wrong(argument, format!("shape {shape}: {want} is needed")));
+    }
+    if made.is_empty() {
+        return Err(wrong(argument, "no rows"));
+    }
+    if !kinds.contains(&kind) {
+        return Err(wrong(
+            argument,
+            format!("dtype {dtype}: {wanted} are needed"),
+        ));
+    }
+    Ok(made)
+}
+
+fn shape(array: &Bound<'_, PyUntypedArray>) -> String {
+    let sizes: Vec<String> = array.shape().iter().map(usize::to_string).collect();
+    match &sizes[..] {
+        [one] => format!("({one},)"),
+        sizes => format!("({})", sizes.join(", ")),
+    }
+}
+
+/// In C order, of this dtype; the same array where it is that already.
+fn laid_out<'py>(array: &Bound<'py, PyUntypedArray>, dtype: &str) -> PyResult<Bound<'py, PyAny>> {
+    let numpy = array.py().import("numpy")?;
+    numpy.call_method1("ascontiguousarray", (array, dtype))
+}
+
+/// That all whole numbers fit into this range.
+fn check_range(
+    argument: &str,
+    array: &Bound<'_, PyUntypedArray>,
+    low: i64,
+    high: i64,
+) -> PyResult<()> {
+    let end = |which| -> PyResult<i128> { array.call_method0(which)?.extract() };
+    let [least, most] = [
+        end(intern!(array.py(), "min"))?,
+        end(intern!(array.py(), "max"))?,
+    ];
+    if least < low.into() || most > high.into() {
+        let problem = format!("numbers from {least} to {most}, but {low} to {high} is what fits");
+        return Err(wrong(argument, problem));
+    }
+    Ok(())
+}
+
+/// Codes of three sensors a row, (n, 3), in `i32`.
+pub fn codes<'py>(
+    argument: &str,
+    given: &Bound<'py, PyAny>,
+) -> PyResult<PyReadonlyArray2<'py, i32>> {
+    let array = array(argument, given, 2, "iu", "codes (whole numbers)")?;
+    if array.shape()[1] != 3 {
+        let shape = shape(&array);
+        let problem = format!("shape {shape}: three codes a row, (n, 3), are needed");
+        return Err(wrong(argument, problem));
+    }
+    if array.dtype().itemsize() >= 4 {
+        check_range(argument, &array, i32::MIN.into(), i32::MAX.into())?;
+    }
+    let laid_out = laid_out(&array, "int32")?.cast_into::<PyArray2<i32>>()?;
+    Ok(laid_out.try_readonly()?)
+}
+
+/// Whole numbers, (n,), in `i64`.
+pub fn whole<'py>(
+    argument: &str,
+    given: &Bound<'py, PyAny>,
+) -> PyResult<PyReadonlyArray1<'py, i64>> {
+    let array = array(argument, given, 1, "iu", "whole numbers")?;
+    check_range(argument, &array, i64::MIN, i64::MAX)?;
+    let laid_out = laid_out(&array, "int64")?.cast_into::<PyArray1<i64>>()?;
+    Ok(laid_out.try_readonly()?)
+}
+
+/// Numbers, (n,), in `f64`.
+pub fn reals<'py>(
+    argument: &str,
+    given: &Bound<'py, PyAny>,
+) -> PyResult<PyReadonlyArray1<'py, f64>> {
+    let array = array(argument, given, 1, "iuf", "numbers")?;
+    let laid_out = laid_out(&array, "float64")?.cast_into::<PyArray1<f64>>()?;
+    Ok(laid_out.try_readonly()?)
+}
+
+/// That an argument has as many rows as another one.
+pub fn same_rows(argument: &str, rows: usize, other: &str, wanted: usize) -> PyResult<()> {
+    match rows == wanted {
+        true => Ok(()),
+        false => Err(wrong(
+            argument,
+            format!("{rows} rows, but {other} has {wanted}"),
+        )),
+    }
+}
+
+/// The numbers of an array that [`codes`], [`whole`] or [`reals`] has laid out.
+pub fn slice<T>(made: Result<&[T], impl std::fmt::Display>) -> PyResult<&[T]> {
+    made.map_err(crate::error::internal)
+}

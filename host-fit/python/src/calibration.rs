@@ -1,0 +1,537 @@
+//! A calibration: of a fit, brought up to date, or read from its files.
+
+use crate::choice::chosen;
+use crate::decoder::{self, Decoder};
+use crate::error::{internal, of_log, of_output, of_recalibrate, refused, wrong};
+use crate::evaluation::Evaluation;
+use crate::finding;
+use crate::fit::blob_text;
+use crate::log::Log;
+use crate::report::{About, head, residuals, text, write};
+use crate::stage::Stage;
+use crate::work;
+use host_fit::calibrate::{
+    EvalOrder, Judged, Outcome, figures_of_recalibration, other_scales, warnings_of,
+    warnings_of_recalibration,
+};
+use host_fit::diagnose::Diagnosis;
+use host_fit::diff::{parameter_changes, pose_difference};
+use host_fit::finding::{Severity, messages};
+use host_fit::fit::Fit;
+use host_fit::input::log::LogReading;
+use host_fit::input::stage::Stage as Designed;
+use host_fit::judge::Zeros;
+use host_fit::output::{Outputs, blob_file, posterior_file};
+use host_fit::problem::model::Model;
+use host_fit::recalibrate::{Known, Recalibration, recalibrate};
+use host_fit::report::json::Report;
+use host_fit::report::page::Errors;
+use host_fit::report::parameters::{Parameter, parameters_in};
+use host_fit::report::table::tables;
+use host_fit::report::verdict::{End, Subject};
+use host_fit::solve::field::terms;
+use host_fit::solve::field::update::Change;
+use nalgebra::DMatrix;
+use numpy::{PyArray1, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyList};
+use runtime::ParameterSet;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A calibration of a stage, and what is known of it. Made by `fit`, `Calibration.recalibrate` and
+/// `Calibration.open`.
+#[pyclass(frozen, module = "hallstage")]
+pub struct Calibration {
+    set: ParameterSet,
+    known: Option<Known>,
+    /// The stage, with the columns of the log that was fitted.
+    designed: Arc<Designed>,
+    stage: Py<Stage>,
+    origin: Origin,
+}
+
+/// What a calibration comes from.
+enum Origin {
+    Fit(Box<OfFit>),
+    Update(Box<OfUpdate>),
+    Files,
+}
+
+struct OfFit {
+    outcome: Outcome,
+    report: Report,
+    log: Arc<LogReading>,
+}
+
+struct OfUpdate {
+    new: Recalibration,
+    warnings: Vec<String>,
+    figures: Value,
+}
+
+impl Calibration {
+    /// Of a fit that has a blob, with its report.
+    pub fn of_fit(
+        outcome: Outcome,
+        report: Report,
+        log: Arc<LogReading>,
+        designed: Arc<Designed>,
+        stage: Py<Stage>,
+    ) -> PyResult<Self> {
+        let fit = outcome.fitted.as_ref().map_err(internal)?;
+        Ok(Self {
+            set: fit.set.clone(),
+            known: outcome.known(),
+            designed,
+            stage,
+            origin: Origin::Fit(Box::new(OfFit {
+                outcome,
+                report,
+                log,
+            })),
+        })
+    }
+
+    pub const fn set(&self) -> &ParameterSet {
+        &self.set
+    }
+
+    fn fit(&self) -> Option<(&OfFit, &Fit)> {
+        match &self.origin {
+            Origin::Fit(of) => Some((of, of.outcome.fitted.as_ref().ok()?)),
+            _ => None,
+        }
+    }
+
+    fn fit_or_raise(&self, what: &str) -> PyResult<(&OfFit, &Fit)> {
+        let problem = || {
+            PyValueError::new_err(format!(
+                "{what}: only a calibration that `fit` has made has its log; use evaluate(log)"
+            ))
+        };
+        self.fit().ok_or_else(problem)
+    }
+
+    fn diagnosis(&self) -> Option<&Diagnosis> {
+        match &self.origin {
+            Origin::Fit(of) => Some(&of.outcome.diagnosis),
+            Origin::Update(of) => Some(&of.new.diagnosis),
+            Origin::Files => None,
+        }
+    }
+
+    fn subject(&self) -> Option<Subject<'_>> {
+        match &self.origin {
+            Origin::Fit(of) => Some(of.outcome.subject()),
+            Origin::Update(of) => Some(Subject {
+                end: End::Written,
+                diagnosis: &of.new.diagnosis,
+                is_field: true,
+                errors: Some(&of.new.judgement.errors),
+                limits: [None; 3],
+                in_service: false,
+            }),
+            Origin::Files => None,
+        }
+    }
+
+    /// Names and covariance of the parameters that have a standard error.
+    fn matrix(&self) -> Option<(Vec<String>, DMatrix<f64>)> {
+        if let Some((_, fit)) = self.fit() {
+            return Some(fit.covariance());
+        }
+        let covariance = self.known.as_ref()?.covariance.clone();
+        Some(((0..terms::COUNT).map(terms::name).collect(), covariance))
+    }
+
+    /// A matrix as a `hallstage.Labelled`.
+    fn labelled<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&DMatrix<f64>, usize, usize) -> f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let problem = "covariance: none stands beside the blob, as params.bin.posterior";
+        let matrix = self.matrix().ok_or_else(|| PyValueError::new_err(problem));
+        let (names, matrix) = matrix?;
+        let n = names.len();
+        // Its lower triangle counts, as in the file.
+        let number = |(i, j): (usize, usize)| of(&matrix, i.max(j), i.min(j));
+        let numbers = (0..n * n).map(|k| number((k / n, k % n)));
+        let array = PyArray1::from_iter(py, numbers).reshape([n, n])?;
+        let class = py.import("hallstage._results")?.getattr("Labelled")?;
+        class.call1((array, names))
+    }
+
+    /// Standard errors by name, where the posterior tells them.
+    fn standard_errors(&self) -> BTreeMap<String, f64> {
+        let errors = self.known.iter().flat_map(|known| {
+            let error = |k: usize| known.covariance[(k, k)].sqrt();
+            (0..terms::COUNT).map(move |k| (terms::name(k), error(k)))
+        });
+        errors.collect()
+    }
+
+    fn blob_bytes(&self) -> PyResult<Vec<u8>> {
+        blob_file::to_bytes(Path::new("params.bin"), &self.set).map_err(|error| of_output(&error))
+    }
+}
+
+#[pymethods]
+impl Calibration {
+    /// Reads a parameter blob, and what is known of its errors if `params.bin.posterior` stands beside it.
+    ///
+    /// Raises `OSError` where it cannot be read, `ValueError` where it is no sound blob, or one for other
+    /// scales than those of the stage.
+    #[staticmethod]
+    fn open(path: PathBuf, stage: Py<Stage>) -> PyResult<Self> {
+        let (set, known) = decoder::read(&path)?;
+        let designed = Arc::clone(&stage.get().designed);
+        if let Some(problem) = other_scales(&set, &designed) {
+            return Err(wrong("stage", problem));
+        }
+        Ok(Self {
+            set,
+            known,
+            designed,
+            stage,
+            origin: Origin::Files,
+        })
+    }
+
+    /// Writes the parameter blob, the bytes of `host-fit fit`, and of the field model the posterior beside it,
+    /// `params.bin.posterior`: both, or nothing.
+    ///
+    /// Raises `OSError` where they cannot be written.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let written = py.detach(|| {
+            let mut outputs = Outputs::default();
+            let known = self.known.as_ref();
+            posterior_file::add_calibration(&mut outputs, &path, &self.set, known)?;
+            outputs.commit()
+        });
+        written.map(drop).map_err(|error| of_output(&error))
+    }
+
+    /// The parameter blob, as a controller takes it.
+    #[getter]
+    fn blob<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &self.blob_bytes()?))
+    }
+
+    /// A decoder with these parameters.
+    fn decoder(&self) -> Decoder {
+        Decoder::new(self.set.clone(), self.known.clone())
+    }
+
+    /// Equation of the model: "12", "15", "30", "31", or "field".
+    #[getter]
+    fn model(&self) -> &'static str {
+        Model::of(self.set.model).name
+    }
+
+    /// Serial number of the stage.
+    #[getter]
+    fn serial(&self) -> &str {
+        &self.set.serial
+    }
+
+    /// Creation time, as it was given.
+    #[getter]
+    fn created(&self) -> &str {
+        &self.set.created
+    }
+
+    /// Whether it was made by `force` of a log that is refused, or in spite of a limit.
+    #[getter]
+    fn forced(&self) -> bool {
+        self.set.fit.forced
+    }
+
+    /// "good", "limited" or "refused"; None where it is not known.
+    #[getter]
+    fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let verdict = self.diagnosis().and_then(|diagnosis| diagnosis.verdict);
+        finding::figures(py, &verdict)
+    }
+
+    /// What is wrong with the log, the most severe first: a list of `Finding`.
+    #[getter]
+    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let found = self.diagnosis().map(|diagnosis| &diagnosis.findings[..]);
+        finding::list(py, found.unwrap_or_default())
+    }
+
+    /// What the user should know besides.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        match &self.origin {
+            Origin::Fit(of) => of.report.warnings.clone(),
+            Origin::Update(of) => of.warnings.clone(),
+            Origin::Files => Vec::new(),
+        }
+    }
+
+    /// All figures as a dict, as `host-fit fit --json` or `host-fit recalibrate --json` writes them; None of a
+    /// calibration that was read from its files.
+    #[getter]
+    fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        match &self.origin {
+            Origin::Fit(of) => finding::figures(py, &of.report),
+            Origin::Update(of) => finding::figures(py, &of.figures),
+            Origin::Files => finding::figures(py, &Value::Null),
+        }
+    }
+
+    /// The parameters by name, a dict of `Parameter`: lever arms (m), misalignments (rad), sensitivities and
+    /// their slopes (equation 33), of the field model its other terms, in the units that each says.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let class = py.import("hallstage._results")?.getattr("Parameter")?;
+        let errors = self.standard_errors();
+        let mut all: BTreeMap<String, Parameter> = match self.fit() {
+            Some((of, _)) => of.report.parameters.clone(),
+            None => parameters_in(&self.set),
+        };
+        let order = self.matrix().map(|(names, _)| names).unwrap_or_default();
+        let parameters = PyDict::new(py);
+        let add = |name: String, parameter: Parameter| {
+            let error = parameter
+                .standard_error
+                .or_else(|| errors.get(&name).copied());
+            let made = class.call1((&name, parameter.value, error, parameter.unit))?;
+            parameters.set_item(name, made)
+        };
+        for name in order {
+            if let Some(parameter) = all.remove(&name) {
+                add(name, parameter)?;
+            }
+        }
+        all.into_iter()
+            .try_for_each(|(name, parameter)| add(name, parameter))?;
+        Ok(parameters)
+    }
+
+    /// Covariance of the parameters that have a standard error, float64, (k, k), in their units; `.labels` are
+    /// their names. Of the field model the posterior under the noise of the log; of others the sandwich over
+    /// movements.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.labelled(py, |matrix, i, j| matrix[(i, j)])
+    }
+
+    /// Correlations of the same parameters, from -1 to 1.
+    #[getter]
+    fn correlations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.labelled(py, |matrix, i, j| match i == j {
+            true => 1.0,
+            false => matrix[(i, j)] / (matrix[(i, i)] * matrix[(j, j)]).sqrt(),
+        })
+    }
+
+    /// rms and peak of X, Y, Rz, a dict, um, um, urad: over all rows of the log, zero deviations refitted where
+    /// the model has them.
+    #[getter]
+    fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let [rms, peak] = [self.set.fit.rms, self.set.fit.peak].map(|of| of.map(f64::from));
+        match &self.origin {
+            Origin::Fit(of) => finding::figures(py, &of.report.errors),
+            _ => finding::figures(py, &host_fit::report::errors::of(rms, peak)),
+        }
+    }
+
+    /// Errors of the rows of the log that was fitted (of a long one, of the sample), zero deviations taken off,
+    /// as `Residuals`: decoded pose less reference, m, m, rad, with the weight of each row in the fit.
+    ///
+    /// Raises `ValueError` of a calibration that `fit` has not made.
+    fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (of, fit) = self.fit_or_raise("residuals")?;
+        let dataset = &of.log.dataset;
+        let errors = fit.decoded.errors_less(&fit.judgement.zeros, dataset);
+        residuals(py, dataset, &self.designed, &errors, Some(&fit.weights))
+    }
+
+    /// Judges the calibration on another log with reference, by the target's decoder.
+    ///
+    /// `delta`: zero deviations, "fit" for each movement or "zero"; as the model has them if not given.
+    /// `limit`: largest rms error in terms of that on the calibration's own log; 3 if not given, and 10 for
+    /// models 12 to 31. Raises `LogError` for a log without reference.
+    #[pyo3(signature = (log, *, delta = None, limit = None))]
+    fn evaluate(
+        &self,
+        py: Python<'_>,
+        log: &Bound<'_, Log>,
+        delta: Option<&str>,
+        limit: Option<f64>,
+    ) -> PyResult<Evaluation> {
+        let started = Instant::now();
+        let log = log.get();
+        log.check_reference(py)?;
+        let zeros = match delta {
+            None => None,
+            Some("fit") => Some(Zeros::Refit),
+            Some("zero") => Some(Zeros::None),
+            Some(other) => return Err(wrong("delta", format!("`{other}` is none of fit, zero"))),
+        };
+        if limit.is_some_and(|limit| !(limit.is_finite() && limit > 0.0)) {
+            return Err(wrong("limit", "a factor above zero is needed"));
+        }
+        self.check_scales(log)?;
+        let order = EvalOrder { zeros, limit };
+        let options = log.options(Judged::OPTIONS);
+        let logs = log.reading.dataset.logs.len();
+        let (set, designed) = (&self.set, &log.designed);
+        let evaluated = work::run(py, || {
+            let judged = Judged::new(set, designed, logs, |take| {
+                log.reading.read_anew(designed, &options, take)
+            })?;
+            Ok(judged.evaluated(order))
+        })?;
+        let evaluated = evaluated.map_err(|error| of_log(py, &error))?;
+        Ok(Evaluation {
+            report: evaluated.report(started.elapsed().as_secs_f64()),
+            evaluated,
+            designed: Arc::clone(designed),
+            stage: log.stage.clone_ref(py),
+            serial: self.set.serial.as_str().to_owned(),
+            blob: self.blob_bytes()?,
+        })
+    }
+
+    /// Brings the calibration up to date by a few seconds of log; of the field model.
+    ///
+    /// `what` has changed: "gain" of all probes (2 s of a sine along Y), "gains" of each probe (2 s of X, Y, Rz
+    /// at once), "all" (8 s of all six axes at once, as after a probe was seated anew). `created`: creation
+    /// time for the blob. Raises `LogRefused` where the log does not tell that, `ValueError` of other models or
+    /// where `all` lacks the posterior.
+    #[pyo3(signature = (log, what, *, created = ""))]
+    fn recalibrate(
+        &self,
+        py: Python<'_>,
+        log: &Bound<'_, Log>,
+        what: &str,
+        created: &str,
+    ) -> PyResult<Self> {
+        let log = log.get();
+        log.check_reference(py)?;
+        let what = chosen::<Change>("what", what)?;
+        let created = blob_text("created", created)?;
+        self.check_scales(log)?;
+        let (dataset, designed) = (&log.reading.dataset, &log.designed);
+        let new = work::run(py, || {
+            recalibrate(
+                &self.set,
+                self.known.as_ref(),
+                dataset,
+                designed,
+                what,
+                created,
+            )
+        })?;
+        let new = new.map_err(|error| of_recalibrate(py, &error))?;
+        let findings = &new.diagnosis.findings;
+        let refusal = messages(findings, Severity::Refuse);
+        if !refusal.is_empty() {
+            return Err(refused(py, &refusal, findings));
+        }
+        let warnings = warnings_of_recalibration(&log.reading, &new);
+        let figures = figures_of_recalibration(what, &new, &log.reading, &warnings);
+        Ok(Self {
+            set: new.set.clone(),
+            known: new.known.clone(),
+            designed: Arc::clone(designed),
+            stage: log.stage.clone_ref(py),
+            origin: Origin::Update(Box::new(OfUpdate {
+                new,
+                warnings,
+                figures,
+            })),
+        })
+    }
+
+    /// What is different from an `older` calibration, a dict: `parameters` by name (a: older, b: this one,
+    /// change, sigma) and `pose_difference`, by the decoder over their common range, um and urad.
+    fn diff<'py>(&self, py: Python<'py>, older: PyRef<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let sets = [&older.set, &self.set];
+        let errors = [older.standard_errors(), self.standard_errors()];
+        let figures = py.detach(|| {
+            json!({
+                "same_logs": sets[0].logs_sha256 == sets[1].logs_sha256,
+                "parameters": parameter_changes(sets, [&errors[0], &errors[1]]),
+                "pose_difference": pose_difference(sets[0], sets[1]),
+            })
+        });
+        finding::figures(py, &figures)
+    }
+
+    /// Writes the certificate that `host-fit fit --report` writes, to this file.
+    ///
+    /// `operator`: who did it; `notes`: lines of name and text. Raises `OSError` where the file cannot be
+    /// written, `ValueError` of a calibration that `fit` has not made.
+    #[pyo3(signature = (path, *, operator = None, notes = None))]
+    fn report(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        operator: Option<&str>,
+        notes: Option<BTreeMap<String, String>>,
+    ) -> PyResult<()> {
+        let (of, fit) = self.fit_or_raise("report")?;
+        let about = About {
+            title: "Calibration certificate",
+            serial: &self.set.serial,
+            operator,
+            notes: notes.unwrap_or_default(),
+            created: &self.set.created,
+            call: vec!["hallstage".into(), "fit".into()],
+        };
+        let blob = self.blob_bytes()?;
+        let stage_file = self.stage.get().path.as_ref();
+        py.detach(|| {
+            let (log, report) = (&of.log, &of.report);
+            let details = tables(report, &[&report.hidden()[..], &["errors"]].concat());
+            write(
+                &path,
+                about,
+                (log, &self.designed),
+                stage_file,
+                of.outcome.subject(),
+                (warnings_of(log), &blob),
+                Errors::of_fit(fit, &log.dataset, report, details),
+            )
+        })
+    }
+
+    fn __repr__(&self) -> String {
+        let model = Model::of(self.set.model).title();
+        let of = match self.set.serial.as_str() {
+            "" => String::new(),
+            serial => format!(" of {serial}"),
+        };
+        let title = format!("calibration{of}, {model}");
+        let findings = self.diagnosis().map(|diagnosis| &diagnosis.findings[..]);
+        match self.subject() {
+            Some(subject) => format!("{title}\n{}", text(&subject, findings.unwrap_or_default())),
+            None => format!("<{title}>"),
+        }
+    }
+
+    fn _repr_html_(&self) -> PyResult<Option<String>> {
+        let subject = self.subject();
+        subject.map(|subject| head(&subject, &[])).transpose()
+    }
+}
+
+impl Calibration {
+    /// Raises `ValueError` for a log of a stage with other scales of its codes.
+    fn check_scales(&self, log: &Log) -> PyResult<()> {
+        match other_scales(&self.set, &log.designed) {
+            Some(problem) => Err(wrong("log", problem)),
+            None => Ok(()),
+        }
+    }
+}

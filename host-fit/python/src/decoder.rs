@@ -1,0 +1,339 @@
+//! Poses from codes, by the code that runs on the target.
+
+use crate::arrays::{codes, reals, same_rows, slice};
+use crate::error::{of_blob, of_log, of_posterior, wrong};
+use crate::log::Log;
+use crate::work;
+use host_fit::input::log::{LogReading, ReadOptions};
+use host_fit::output::pose_file::uncertainty;
+use host_fit::output::{blob_file, posterior_file};
+use host_fit::problem::model::Model;
+use host_fit::recalibrate::Known;
+use host_fit::solve::field::parameters::FieldParameters;
+use host_fit::solve::field::posterior::Posterior;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use runtime::frame::MISSING_CODE;
+use runtime::{
+    AnyDecoder, Decode, OnInvalid, ParameterSet, PlanarPose, PoseTracker, RawFrame, Reading,
+};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Words of a record: X, Y, Rz, Z, Rx, Ry, status.
+const WORDS: usize = 7;
+/// The fields of a record, as those of `host-fit decode --format npy`.
+const FIELDS: [(&str, &str); WORDS] = [
+    ("x_m", "<f4"),
+    ("y_m", "<f4"),
+    ("rz_rad", "<f4"),
+    ("z_m", "<f4"),
+    ("rx_rad", "<f4"),
+    ("ry_rad", "<f4"),
+    ("status", "<u4"),
+];
+/// So many rows are decoded without a look at signals: some ten milliseconds.
+const ROWS_AT_ONCE: usize = 1 << 18;
+
+/// Decodes as the controller does, bit for bit: equations (31) to (33) of the paper, or the field model.
+///
+/// `Decoder.open("params.bin")` reads a parameter blob; `Calibration.decoder()` gives that of a fit.
+#[pyclass(frozen, module = "hallstage")]
+pub struct Decoder {
+    set: ParameterSet,
+    decoder: AnyDecoder,
+    known: Option<Known>,
+}
+
+impl Decoder {
+    pub fn new(set: ParameterSet, known: Option<Known>) -> Self {
+        Self {
+            decoder: set.decoder(),
+            set,
+            known,
+        }
+    }
+}
+
+#[pymethods]
+impl Decoder {
+    /// Reads a parameter blob, and what is known of its errors if `params.bin.posterior` stands beside it.
+    ///
+    /// Raises `OSError` where it cannot be read, `ValueError` where it is no sound blob.
+    #[staticmethod]
+    fn open(path: PathBuf) -> PyResult<Self> {
+        let (set, known) = read(&path)?;
+        Ok(Self::new(set, known))
+    }
+
+    /// The pose of each row, as a structured array, (n,): `x_m`, `y_m`, `rz_rad`, `z_m`, `rx_rad`, `ry_rad` in
+    /// float32 and `status` in uint32, 0 when all is good (see `hallstage.STATUS`). What is invalid is 0, or
+    /// the last valid pose for at most `hold` rows.
+    ///
+    /// Of codes: `hall` of the probes A, B, C and `caps` of the gaps 1, 2, 3, whole numbers, (n, 3), a row every
+    /// servo period; `mount`, `body`: temperatures, degC, (n,), NaN where there is none. int32 in C order
+    /// is read where it lies. Or of a `log`: all its rows, as `host-fit decode` does; a gap in its times
+    /// shows as missed frames.
+    ///
+    /// Raises `ValueError` that names the argument whose shape or dtype is wrong.
+    #[pyo3(signature = (log = None, *, hall = None, caps = None, mount = None, body = None, hold = 0))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "each is named where it is called"
+    )]
+    fn __call__<'py>(
+        &self,
+        py: Python<'py>,
+        log: Option<&Bound<'py, Log>>,
+        hall: Option<&Bound<'py, PyAny>>,
+        caps: Option<&Bound<'py, PyAny>>,
+        mount: Option<&Bound<'py, PyAny>>,
+        body: Option<&Bound<'py, PyAny>>,
+        hold: u16,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let on_invalid = match hold {
+            0 => OnInvalid::Zero,
+            ticks => OnInvalid::Hold { ticks },
+        };
+        let (hall, caps) = match (log, hall, caps) {
+            (Some(log), None, None) if mount.is_none() && body.is_none() => {
+                return records(py, self.of_log(py, log.get(), on_invalid)?);
+            }
+            (None, Some(hall), Some(caps)) => (hall, caps),
+            (Some(_), ..) => {
+                return Err(wrong("log", "a log has its codes and temperatures itself"));
+            }
+            (None, None, _) => return Err(wrong("hall", "is missing")),
+            (None, _, None) => return Err(wrong("caps", "is missing")),
+        };
+        let (hall, caps) = (codes("hall", hall)?, codes("caps", caps)?);
+        let (hall, _) = slice(hall.as_slice())?.as_chunks::<3>();
+        let (caps, _) = slice(caps.as_slice())?.as_chunks::<3>();
+        same_rows("caps", caps.len(), "hall", hall.len())?;
+        let temperature = temperatures(hall.len(), mount, body)?;
+        let mut words = Vec::with_capacity(hall.len() * WORDS);
+        let mut tracker = PoseTracker::new(self.decoder, on_invalid);
+        for start in (0..hall.len()).step_by(ROWS_AT_ONCE) {
+            let end = hall.len().min(start + ROWS_AT_ONCE);
+            let rows = Rows {
+                hall: &hall[start..end],
+                caps: &caps[start..end],
+                temperature: temperature.as_ref().map(|all| &all[start..end]),
+                first: start,
+            };
+            py.detach(|| match (&self.decoder, on_invalid) {
+                (AnyDecoder::Linear(decoder), OnInvalid::Zero) => rows.decode(decoder, &mut words),
+                (AnyDecoder::Field(decoder), OnInvalid::Zero) => rows.decode(decoder, &mut words),
+                _ => rows.track(&mut tracker, &mut words),
+            });
+            py.check_signals()?;
+        }
+        records(py, words)
+    }
+
+    /// Standard uncertainty of X, Y, Rz of each row, float64, (n, 3), m, m, rad: by the parameters and by the
+    /// noise of the probes together, at the pose that is decoded; 0 where none is. Arguments as of a call.
+    ///
+    /// Raises `ValueError` without a posterior: of other models than the field model, or where
+    /// `params.bin.posterior` does not stand beside the blob.
+    #[pyo3(signature = (hall, caps, *, mount = None, body = None))]
+    fn uncertainty<'py>(
+        &self,
+        py: Python<'py>,
+        hall: &Bound<'py, PyAny>,
+        caps: &Bound<'py, PyAny>,
+        mount: Option<&Bound<'py, PyAny>>,
+        body: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let posterior = self.posterior()?;
+        let (hall, caps) = (codes("hall", hall)?, codes("caps", caps)?);
+        let (hall, _) = slice(hall.as_slice())?.as_chunks::<3>();
+        let (caps, _) = slice(caps.as_slice())?.as_chunks::<3>();
+        same_rows("caps", caps.len(), "hall", hall.len())?;
+        let temperature = temperatures(hall.len(), mount, body)?;
+        let rows = Rows {
+            hall,
+            caps,
+            temperature: temperature.as_deref(),
+            first: 0,
+        };
+        let of_row = |row: usize| {
+            let reading = self.decoder.decode(&rows.frame(row), &PlanarPose::ZERO);
+            uncertainty(&reading, &posterior)
+        };
+        let found: Vec<[f64; 3]> =
+            work::run(py, || (0..hall.len()).into_par_iter().map(of_row).collect())?;
+        crate::log::rows_of_three(py, found)
+    }
+
+    /// Equation of the model: "12", "15", "30", "31", or "field".
+    #[getter]
+    fn model(&self) -> &'static str {
+        Model::of(self.set.model).name
+    }
+
+    /// Serial number of the stage.
+    #[getter]
+    fn serial(&self) -> &str {
+        &self.set.serial
+    }
+
+    /// Creation time, as it was given.
+    #[getter]
+    fn created(&self) -> &str {
+        &self.set.created
+    }
+
+    fn __repr__(&self) -> String {
+        let (model, serial) = (Model::of(self.set.model).title(), &self.set.serial);
+        match serial.as_str() {
+            "" => format!("<Decoder, {model}>"),
+            serial => format!("<Decoder of {serial}, {model}>"),
+        }
+    }
+}
+
+impl Decoder {
+    fn posterior(&self) -> PyResult<Posterior> {
+        let parameters = FieldParameters::of_blob(&self.set).ok_or_else(|| {
+            let model = Model::of(self.set.model).name;
+            wrong(
+                "model",
+                format!("({model}) does not know its errors in service; fit the field model"),
+            )
+        })?;
+        let known = self.known.as_ref().ok_or_else(|| {
+            wrong(
+                "posterior",
+                "none stands beside the blob, or the calibration has none",
+            )
+        })?;
+        let covariance = known.covariance.clone();
+        Ok(Posterior::of_parameters(
+            covariance,
+            &parameters,
+            &known.noise,
+        ))
+    }
+
+    /// The words of all rows of a log.
+    fn of_log(&self, py: Python<'_>, log: &Log, on_invalid: OnInvalid) -> PyResult<Vec<u32>> {
+        let decoder = &self.decoder;
+        let options = log.options(ReadOptions::DECODE);
+        let decoded = work::run(py, || {
+            let mut tracker = PoseTracker::new(decoder, on_invalid);
+            let mut words = Vec::new();
+            let read = log.reading.read_anew(&log.designed, &options, |_, row| {
+                if row.begins {
+                    tracker.forget();
+                }
+                let frame = &row.row.frame;
+                let reading =
+                    tracker.tick_with(frame.sequence(), |zero| frame.decode(decoder, zero));
+                words.extend(words_of(&reading));
+            });
+            read.map(|_: LogReading| words)
+        })?;
+        decoded.map_err(|error| of_log(py, &error))
+    }
+}
+
+/// A blob, and what stands beside it.
+pub fn read(path: &PathBuf) -> PyResult<(ParameterSet, Option<Known>)> {
+    let set = blob_file::read(path).map_err(|error| of_blob(&error))?;
+    let beside = posterior_file::beside(path).filter(|path| path.exists());
+    let known = beside.map(|beside| posterior_file::read(&beside, &set, path));
+    let known = known.transpose().map_err(|error| of_posterior(&error))?;
+    Ok((set, known))
+}
+
+/// Codes by row, without those of other pieces.
+struct Rows<'a> {
+    hall: &'a [[i32; 3]],
+    caps: &'a [[i32; 3]],
+    temperature: Option<&'a [[i32; 2]]>,
+    /// Number of the first row.
+    first: usize,
+}
+
+impl Rows<'_> {
+    #[inline(always)]
+    fn frame(&self, row: usize) -> RawFrame {
+        let sequence = (self.first + row) as u32;
+        let frame = RawFrame::new(self.hall[row], self.caps[row], sequence, 0);
+        match self.temperature {
+            Some(all) => frame.with_temperature_mc(all[row]),
+            None => frame,
+        }
+    }
+
+    /// Adds the words of all rows, invalid fields 0.
+    fn decode(&self, decoder: &impl Decode, words: &mut Vec<u32>) {
+        for row in 0..self.hall.len() {
+            words.extend(words_of(
+                &decoder.decode(&self.frame(row), &PlanarPose::ZERO),
+            ));
+        }
+    }
+
+    /// The same with what is invalid held.
+    fn track(&self, tracker: &mut PoseTracker, words: &mut Vec<u32>) {
+        for row in 0..self.hall.len() {
+            words.extend(words_of(&tracker.tick(&self.frame(row))));
+        }
+    }
+}
+
+#[inline(always)]
+fn words_of(reading: &Reading) -> [u32; WORDS] {
+    let [x, y, rz] = reading.pose.planar.to_array().map(f32::to_bits);
+    let [z, rx, ry] = reading.pose.vertical.to_array().map(f32::to_bits);
+    [x, y, rz, z, rx, ry, reading.status.bits()]
+}
+
+/// Temperatures as codes, m degC; `None` where none are given.
+fn temperatures(
+    rows: usize,
+    mount: Option<&Bound<'_, PyAny>>,
+    body: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Option<Vec<[i32; 2]>>> {
+    if mount.is_none() && body.is_none() {
+        return Ok(None);
+    }
+    let mut all = vec![[MISSING_CODE; 2]; rows];
+    for (sensor, (argument, given)) in [("mount", mount), ("body", body)].into_iter().enumerate() {
+        let Some(given) = given else { continue };
+        let celsius = reals(argument, given)?;
+        let celsius = slice(celsius.as_slice())?;
+        same_rows(argument, celsius.len(), "hall", rows)?;
+        for (row, (code, celsius)) in all.iter_mut().zip(celsius).enumerate() {
+            match celsius.abs() {
+                ..=1e6 => code[sensor] = (celsius * 1e3).round() as i32,
+                _ if celsius.is_nan() => {}
+                _ => {
+                    let problem = format!("row {row}: {celsius} degC is no temperature");
+                    return Err(wrong(argument, problem));
+                }
+            }
+        }
+    }
+    Ok(Some(all))
+}
+
+/// Words as an array of records, without a copy.
+fn records(py: Python<'_>, words: Vec<u32>) -> PyResult<Bound<'_, PyAny>> {
+    let dtype = py
+        .import("numpy")?
+        .getattr("dtype")?
+        .call1((FIELDS.to_vec(),))?;
+    let words = PyArray1::from_vec(py, words);
+    words.call_method1("view", (dtype,))
+}
+
+/// What each bit of a status means, by its value.
+#[pyfunction]
+pub fn status_names() -> BTreeMap<u32, &'static str> {
+    let names = runtime::Status::NAMES.iter();
+    names.map(|(bit, name)| (bit.bits(), *name)).collect()
+}

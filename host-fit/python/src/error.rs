@@ -1,0 +1,151 @@
+//! The library's errors as Python's exceptions. Those of their own stand in `hallstage._errors`.
+
+use host_fit::calibrate::CalibrateError;
+use host_fit::finding::Finding;
+use host_fit::input::log::LogError;
+use host_fit::input::source::SourceError;
+use host_fit::input::stage::StageError;
+use host_fit::output::OutputError;
+use host_fit::output::blob_file::BlobFileError;
+use host_fit::output::posterior_file::PosteriorFileError;
+use host_fit::recalibrate::RecalibrateError;
+use pyo3::call::PyCallArgs;
+use pyo3::exceptions::{
+    PyFileNotFoundError, PyKeyboardInterrupt, PyOSError, PyRuntimeError, PyValueError,
+};
+use pyo3::prelude::*;
+use std::fmt::Display;
+use std::io;
+
+/// A wrong argument, by its name.
+pub fn wrong(argument: &str, problem: impl Display) -> PyErr {
+    PyValueError::new_err(format!("{argument}: {problem}"))
+}
+
+/// An exception of a class of this package.
+fn own<'py>(py: Python<'py>, class: &str, arguments: impl PyCallArgs<'py>) -> PyErr {
+    let made = || -> PyResult<Bound<'py, PyAny>> {
+        let class = py.import("hallstage._errors")?.getattr(class)?;
+        class.call1(arguments)
+    };
+    made().map_or_else(|error| error, PyErr::from_value)
+}
+
+/// What the library says, with the options of its program as arguments of this package.
+fn message(error: impl Display) -> String {
+    error.to_string()
+}
+
+/// A log that is refused: `LogError`, or `OSError` where its file cannot be read. `named` gives the argument
+/// and the row of a cell, in place of its line and column.
+pub fn of_log(py: Python<'_>, error: &LogError) -> PyErr {
+    match error {
+        LogError::Source(SourceError::Interrupted { .. }) => PyKeyboardInterrupt::new_err(()),
+        LogError::Source(SourceError::NotFound { .. }) => {
+            PyFileNotFoundError::new_err(message(error))
+        }
+        LogError::Source(SourceError::IsFolder { .. } | SourceError::Unreadable { .. }) => {
+            PyOSError::new_err(message(error))
+        }
+        error => {
+            let (file, line) = error.file_and_line();
+            let place = error.place();
+            let arguments = (
+                message(error),
+                file.map(|file| file.display().to_string()),
+                line,
+                place.map(|place| place.column),
+                place.map(|place| place.name.clone()),
+            );
+            own(py, "LogError", arguments)
+        }
+    }
+}
+
+/// A log that arrays made, by argument and row: a header stands above its rows.
+pub fn of_arrays(py: Python<'_>, error: &LogError, arguments: &[(String, String)]) -> PyErr {
+    let Some(place) = error.place() else {
+        return of_log(py, error);
+    };
+    let argument = arguments.iter().find(|(column, _)| *column == place.name);
+    let Some(((_, argument), row)) = argument.zip(place.line.checked_sub(2)) else {
+        return of_log(py, error);
+    };
+    let text = error.to_string();
+    let said = text.strip_prefix(&place.to_string()).unwrap_or(&text);
+    let arguments = (
+        format!("{argument}[{row}]{said}"),
+        None::<String>,
+        row,
+        place.column,
+        argument.clone(),
+    );
+    own(py, "LogError", arguments)
+}
+
+/// A log that is no good for a calibration.
+pub fn refused(py: Python<'_>, why: &str, findings: &[Finding]) -> PyErr {
+    let made = crate::finding::list(py, findings);
+    made.map_or_else(
+        |error| error,
+        |findings| own(py, "LogRefused", (why, findings)),
+    )
+}
+
+pub fn of_calibrate(py: Python<'_>, error: &CalibrateError) -> PyErr {
+    match error {
+        CalibrateError::Log(error) => of_log(py, error),
+        CalibrateError::Unsupported(error) => wrong("project", error),
+        CalibrateError::Interrupted(_) => PyKeyboardInterrupt::new_err(()),
+    }
+}
+
+pub fn of_stage(error: &StageError) -> PyErr {
+    match error {
+        StageError::Source(source) => match source {
+            SourceError::NotFound { .. } => PyFileNotFoundError::new_err(message(error)),
+            _ => PyOSError::new_err(message(error)),
+        },
+        _ => PyValueError::new_err(message(error)),
+    }
+}
+
+fn of_system(cause: &io::Error, message: String) -> PyErr {
+    match cause.kind() {
+        io::ErrorKind::NotFound => PyFileNotFoundError::new_err(message),
+        _ => PyOSError::new_err(message),
+    }
+}
+
+pub fn of_blob(error: &BlobFileError) -> PyErr {
+    match error {
+        BlobFileError::Read { cause, .. } => of_system(cause, message(error)),
+        BlobFileError::Unusable { .. } => PyValueError::new_err(message(error)),
+    }
+}
+
+pub fn of_posterior(error: &PosteriorFileError) -> PyErr {
+    match error {
+        PosteriorFileError::Missing { .. } => PyFileNotFoundError::new_err(message(error)),
+        PosteriorFileError::Read { cause, .. } => of_system(cause, message(error)),
+        _ => PyValueError::new_err(message(error)),
+    }
+}
+
+pub fn of_output(error: &OutputError) -> PyErr {
+    PyOSError::new_err(message(error))
+}
+
+pub fn of_recalibrate(py: Python<'_>, error: &RecalibrateError) -> PyErr {
+    match error {
+        RecalibrateError::OtherModel { .. } | RecalibrateError::NothingKnown => {
+            PyValueError::new_err(message(error))
+        }
+        _ => refused(py, &message(error), &[]),
+    }
+}
+
+/// What no input leads to.
+pub fn internal(error: impl Display) -> PyErr {
+    PyRuntimeError::new_err(error.to_string())
+}

@@ -1,0 +1,107 @@
+//! A calibration judged on another log.
+
+use crate::finding;
+use crate::report::{About, head, residuals, text, write};
+use crate::stage::Stage;
+use host_fit::calibrate::Evaluation as Evaluated;
+use host_fit::input::stage::Stage as Designed;
+use host_fit::report::json::Report;
+use pyo3::prelude::*;
+use pyo3::types::PyList;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// How a calibration does on logs with reference, by the target's own decoder.
+#[pyclass(frozen, module = "hallstage")]
+pub struct Evaluation {
+    pub evaluated: Evaluated,
+    pub report: Report,
+    pub designed: Arc<Designed>,
+    pub stage: Py<Stage>,
+    pub serial: String,
+    pub blob: Vec<u8>,
+}
+
+#[pymethods]
+impl Evaluation {
+    /// All figures, as `host-fit eval --json` writes them.
+    #[getter]
+    fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        finding::figures(py, &self.report)
+    }
+
+    /// rms and peak of X, Y, Rz over all rows: um, um, urad.
+    #[getter]
+    fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        finding::figures(py, &self.report.errors)
+    }
+
+    /// What is wrong with the logs, the most severe first.
+    #[getter]
+    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        finding::list(py, &self.report.findings)
+    }
+
+    /// What the user should know besides.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.report.warnings.clone()
+    }
+
+    /// Why the calibration does not do for these logs, and what to do; None if it does.
+    #[getter]
+    fn refusal(&self) -> Option<String> {
+        self.evaluated.refusal()
+    }
+
+    /// Errors of the rows, zero deviations taken off, m, m, rad.
+    fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let of = &self.evaluated;
+        residuals(py, &of.log.dataset, &self.designed, &of.by_row, None)
+    }
+
+    /// Writes the page that `host-fit eval --report` writes, to this file.
+    ///
+    /// `operator`: who did it; `notes`: lines of name and text; `created`: date and time, as you want them to
+    /// read. Raises `OSError` where the file cannot be written.
+    #[pyo3(signature = (path, *, operator = None, notes = None, created = ""))]
+    fn report(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        operator: Option<&str>,
+        notes: Option<BTreeMap<String, String>>,
+        created: &str,
+    ) -> PyResult<()> {
+        let of = &self.evaluated;
+        let about = About {
+            title: "Verification of a calibration",
+            serial: &self.serial,
+            operator,
+            notes: notes.unwrap_or_default(),
+            created,
+            call: vec!["hallstage".into(), "Calibration.evaluate".into()],
+        };
+        let stage_file = self.stage.get().path.as_ref();
+        py.detach(|| {
+            write(
+                &path,
+                about,
+                (&of.log, &self.designed),
+                stage_file,
+                of.subject(),
+                (self.report.warnings.clone(), &self.blob),
+                of.errors(&self.report),
+            )
+        })
+    }
+
+    fn __repr__(&self) -> String {
+        text(&self.evaluated.subject(), &self.report.findings)
+    }
+
+    fn _repr_html_(&self) -> PyResult<String> {
+        head(&self.evaluated.subject(), &self.report.warnings)
+    }
+}

@@ -1,0 +1,23 @@
+//! Findings, and figures in general, on their way to Python: as JSON, which has a name for each.
+
+use host_fit::finding::Finding;
+use pyo3::prelude::*;
+use pyo3::types::PyList;
+use serde::Serialize;
+
+/// What a report has, as `json.loads` reads it.
+pub fn figures<'py>(py: Python<'py>, figures: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(figures).map_err(crate::error::internal)?;
+    py.import("json")?.call_method1("loads", (text,))
+}
+
+/// A list of `hallstage.Finding`.
+pub fn list<'py>(py: Python<'py>, findings: &[Finding]) -> PyResult<Bound<'py, PyList>> {
+    let class = py.import("hallstage._results")?.getattr("Finding")?;
+    let made = findings.iter().map(|found| {
+        let members = figures(py, found)?;
+        let members = members.cast_into::<pyo3::types::PyDict>()?;
+        class.call((), Some(&members))
+    });
+    PyList::new(py, made.collect::<PyResult<Vec<_>>>()?)
+}

@@ -1,0 +1,181 @@
+//! Fits and checks.
+
+use crate::calibration::Calibration;
+use crate::choice::chosen;
+use crate::error::{of_calibrate, of_log, refused, wrong};
+use crate::finding;
+use crate::log::Log;
+use crate::work;
+use host_fit::calibrate::{FitOrder, Limits, check_refusal, loss_of};
+use host_fit::diagnose;
+use host_fit::fit::{FitSettings, ModelChoice, fit_log};
+use host_fit::interrupt;
+use host_fit::problem::draw::Draw;
+use host_fit::problem::parameters::Parameters;
+use host_fit::solve::robust::Loss;
+use host_fit::solve::{Projection, Solver, SolverOptions};
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use runtime::parameters::Text;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A text that goes into a blob.
+pub fn blob_text(argument: &str, text: &str) -> PyResult<Text> {
+    Text::try_from(text).map_err(|_| wrong(argument, "at most 32 bytes fit into a blob"))
+}
+
+/// A whole number within these ends.
+fn within(argument: &str, number: Option<i64>, low: i64, high: i64) -> PyResult<Option<usize>> {
+    match number {
+        Some(number) if !(low..=high).contains(&number) => Err(wrong(
+            argument,
+            format!("{number}; {low} to {high} will do"),
+        )),
+        number => Ok(number.map(|number| number as usize)),
+    }
+}
+
+/// Looks at a log as `host-fit check` does: fits it, keeps nothing, and gives what is wrong with it, the most
+/// severe first: a list of `Finding`, with `.verdict` and `.refusal`.
+///
+/// Raises `LogError` for a log without reference.
+#[pyfunction]
+pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, PyAny>> {
+    let log = log.get();
+    log.check_reference(py)?;
+    let mut settings = FitSettings::new(ModelChoice::Auto);
+    settings.options.interrupt = Some(interrupt::flag());
+    let (reading, stage) = (&log.reading, &log.designed);
+    let checked = work::run(py, || {
+        let fitted = fit_log(reading, stage, &settings)?;
+        let diagnosis = diagnose::of_log(&reading.dataset, stage, fitted.as_ref());
+        let refusal = check_refusal(fitted.as_ref(), &diagnosis.findings);
+        Ok((diagnosis, refusal))
+    })?;
+    let (diagnosis, refusal) = checked.map_err(|error| of_log(py, &error))?;
+    let verdict = finding::figures(py, &diagnosis.verdict)?;
+    let findings = finding::list(py, &diagnosis.findings)?;
+    let class = py.import("hallstage._results")?.getattr("Findings")?;
+    class.call1((findings, verdict, refusal))
+}
+
+/// Fits the calibration of a stage to logs, diagnoses them, and takes off the faults that can be: what
+/// `host-fit fit` does, with the same defaults, figures and bytes.
+///
+/// `model`: "auto" (the field model where the log can carry it, else 31), "12", "15", "30", "31" (equations of
+/// the paper), "field". `solver`, `project`, `loss`, `train`, `draw`, `population`, `generations`, `seed`,
+/// `start` (a calibration), `compensate_lag`, `cross_validate`, `serial`, `created`, `limit` ("x=1.5um,rz=4urad"),
+/// `force`: as the options of that program, which its reference explains. Other threads of Python go on
+/// meanwhile; Ctrl-C ends it.
+///
+/// Raises `LogRefused` with `.findings` where the log is no good for a calibration or the errors are beyond
+/// `limit`, unless `force` is true; `ValueError` that names the argument that is wrong.
+#[pyfunction]
+#[pyo3(signature = (
+    log, *, model = "auto", solver = "shtlbo-lm", project = "linear", loss = None, train = None,
+    draw = "stratified", population = None, generations = None, seed = 1, start = None, compensate_lag = false,
+    cross_validate = false, serial = "", created = "", limit = None, force = false
+))]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "each is named where it is called"
+)]
+pub fn fit(
+    py: Python<'_>,
+    log: &Bound<'_, Log>,
+    model: &str,
+    solver: &str,
+    project: &str,
+    loss: Option<&str>,
+    train: Option<i64>,
+    draw: &str,
+    population: Option<i64>,
+    generations: Option<i64>,
+    seed: u64,
+    start: Option<PyRef<'_, Calibration>>,
+    compensate_lag: bool,
+    cross_validate: bool,
+    serial: &str,
+    created: &str,
+    limit: Option<&str>,
+    force: bool,
+) -> PyResult<Calibration> {
+    let started = Instant::now();
+    let log = log.get();
+    log.check_reference(py)?;
+    let model = chosen::<ModelChoice>("model", model)?;
+    let solver = chosen::<Solver>("solver", solver)?;
+    let project = chosen::<Projection>("project", project)?;
+    let loss = loss.map(|name| chosen::<Loss>("loss", name)).transpose()?;
+    let loss = loss_of(loss, model, solver, project);
+    let loss = loss.map_err(|mismatch| wrong(mismatch.argument, mismatch.problem))?;
+    let usual = SolverOptions::new(project, seed);
+    let population = within("population", population, 4, 100_000)?;
+    let generations = within("generations", generations, 1, 10_000_000)?;
+    let limits: Option<Result<Limits, String>> = limit.map(str::parse);
+    let order = FitOrder {
+        settings: FitSettings {
+            model,
+            train: within("train", train, 1, i64::MAX)?,
+            draw: chosen::<Draw>("draw", draw)?,
+            solver,
+            loss,
+            options: SolverOptions {
+                population: population.unwrap_or(usual.population),
+                generations: generations.unwrap_or(usual.generations),
+                known: start.map(|start| Parameters::of_set(start.set())),
+                interrupt: Some(interrupt::flag()),
+                ..usual
+            },
+            serial: blob_text("serial", serial)?,
+            created: blob_text("created", created)?,
+            force,
+        },
+        compensate_lag,
+        limits: limits
+            .transpose()
+            .map_err(|problem| wrong("limit", problem))?
+            .unwrap_or_default(),
+    };
+    let stage = &log.designed;
+    let made = work::run(py, || {
+        // With the lag taken off all rows are other rows.
+        let options = log.options(FitOrder::read_options(compensate_lag));
+        let anew = || log.reading.read_anew(stage, &options, |_, _| ());
+        let anew = compensate_lag.then(anew).transpose()?;
+        let (fitted, compensated) = order.fit(anew.as_ref().unwrap_or(&log.reading), stage)?;
+        let reading = match anew.zip(compensated) {
+            Some((mut anew, dataset)) => {
+                anew.dataset = dataset;
+                Arc::new(anew)
+            }
+            None => Arc::clone(&log.reading),
+        };
+        let outcome = order.judge(fitted, &reading, stage)?;
+        let of_log = (&*reading, &**stage);
+        let mut report = outcome.report(&order, of_log, started.elapsed().as_secs_f64());
+        if let Some(report) = report
+            .as_mut()
+            .filter(|_| cross_validate && outcome.refusal.is_none())
+        {
+            outcome.cross_validate(report, &order, of_log);
+        }
+        Ok((outcome, report, reading))
+    })?;
+    let (outcome, report, reading) = made.map_err(|error| of_calibrate(py, &error))?;
+    // A search that was interrupted in another thread.
+    if interrupt::requested() {
+        return Err(PyKeyboardInterrupt::new_err(()));
+    }
+    match report {
+        Some(report) if outcome.has_blob => {
+            let (designed, stage) = (Arc::clone(stage), log.stage.clone_ref(py));
+            Calibration::of_fit(outcome, report, reading, designed, stage)
+        }
+        _ => {
+            let why = outcome.refusal.as_deref().unwrap_or_default();
+            Err(refused(py, why, &outcome.diagnosis.findings))
+        }
+    }
+}

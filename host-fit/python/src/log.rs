@@ -1,0 +1,386 @@
+//! Logs: from files, and from arrays.
+
+use crate::array_text::ArrayText;
+use crate::choice::chosen;
+use crate::error::{of_arrays, of_log, wrong};
+use crate::stage::Stage;
+use crate::work;
+use host_fit::calibrate::warnings_of;
+use host_fit::input::dataset::Row;
+use host_fit::input::log::layout::LogLayout;
+use host_fit::input::log::{self, BadRows, LogReading, ReadOptions, ReferenceUse};
+use host_fit::input::stage::{Stage as Designed, TemperatureTable};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use runtime::frame::MISSING_CODE;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Logs of a stage, read and checked: rows in SI units, by movement.
+///
+/// Of more than 125,000 rows it holds a sample, of whole runs; `fit`, `evaluate` and a decoder that take it go
+/// through all rows all the same. Made by `read_log` and `Log.from_arrays`.
+#[pyclass(frozen, module = "hallstage")]
+pub struct Log {
+    pub reading: Arc<LogReading>,
+    /// The stage with the columns of this log.
+    pub designed: Arc<Designed>,
+    pub stage: Py<Stage>,
+}
+
+fn options(bad_rows: &str, split_s: Option<f64>) -> PyResult<ReadOptions> {
+    if let Some(seconds) = split_s
+        && !(1e-3..=1e6).contains(&seconds)
+    {
+        return Err(wrong("split_s", "0.001 to 1,000,000 s"));
+    }
+    Ok(ReadOptions {
+        bad_rows: chosen::<BadRows>("bad_rows", bad_rows)?,
+        split_s,
+        // A log that is only decoded has none.
+        reference: ReferenceUse::IfPresent,
+        ..ReadOptions::FIT
+    })
+}
+
+/// Reads logs of a stage, in every form that the program `host-fit` takes: CSV or CSV.gz, any separator,
+/// decimal commas, units in the header, UTF-16, dates as times.
+///
+/// `paths`: one file or several, which are calibrated together. `bad_rows`: "refuse", or "skip" to leave rows
+/// with a bad cell out and count them. `split_s`: length of the movements of a log that has no column for
+/// them, s; else they end at gaps in time alone.
+///
+/// Raises `LogError` with `.file`, `.line`, `.column` where something is wrong, `OSError` where a file cannot
+/// be read.
+#[pyfunction]
+#[pyo3(signature = (paths, stage, *, bad_rows = "refuse", split_s = None))]
+pub fn read_log(
+    py: Python<'_>,
+    paths: &Bound<'_, PyAny>,
+    stage: Py<Stage>,
+    bad_rows: &str,
+    split_s: Option<f64>,
+) -> PyResult<Log> {
+    let paths: Vec<PathBuf> = match paths.extract::<PathBuf>() {
+        Ok(one) => vec![one],
+        Err(_) => paths
+            .extract()
+            .map_err(|_| wrong("paths", "a path, or a list of paths, is needed"))?,
+    };
+    if paths.iter().any(|path| path.as_os_str() == "-") {
+        return Err(wrong(
+            "paths",
+            "`-` is no file; read standard input by sys.stdin",
+        ));
+    }
+    let options = options(bad_rows, split_s)?;
+    let designed = Arc::clone(&stage.get().designed);
+    let reading = work::run(py, || log::read(&paths, &designed, &options))?;
+    let reading = reading.map_err(|error| of_log(py, &error))?;
+    Ok(Log {
+        reading: Arc::new(reading),
+        designed,
+        stage,
+    })
+}
+
+#[pymethods]
+impl Log {
+    /// A log of arrays, by the checks that files pass.
+    ///
+    /// `t_us`: time, us, (n,). `hall`, `caps`: codes of the Hall probes A, B, C and of the gaps 1, 2, 3, whole
+    /// numbers, (n, 3); in place of `caps` the vertical pose `z`, `rx`, `ry`, (n,). Reference, (n,): the beams
+    /// `x`, `y1`, `y2`, or the pose `x`, `y`, `rz`; a log that is only decoded needs none. `movement`: its number,
+    /// whole, (n,); without it movements end at gaps in time. `mount`, `body`: temperatures, degC, (n,), NaN
+    /// where there is none. `units` of lengths: m, mm, um, nm, pm; `angles`: rad, mrad, urad, nrad, deg.
+    /// `name` stands for the file in reports; `bad_rows`, `split_s` as for `read_log`.
+    ///
+    /// Raises `ValueError` that names the argument whose shape, dtype or unit is wrong, and `LogError` for a
+    /// row, with `.line` the row from 0 and `.name` the argument.
+    #[staticmethod]
+    #[pyo3(signature = (
+        stage, *, t_us, hall, caps = None, z = None, rx = None, ry = None, x = None, y1 = None, y2 = None, y = None,
+        rz = None, movement = None, mount = None, body = None, units = "m", angles = "rad", name = "arrays",
+        bad_rows = "refuse", split_s = None
+    ))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "each is named where it is called"
+    )]
+    fn from_arrays(
+        py: Python<'_>,
+        stage: Py<Stage>,
+        t_us: &Bound<'_, PyAny>,
+        hall: &Bound<'_, PyAny>,
+        caps: Option<&Bound<'_, PyAny>>,
+        z: Option<&Bound<'_, PyAny>>,
+        rx: Option<&Bound<'_, PyAny>>,
+        ry: Option<&Bound<'_, PyAny>>,
+        x: Option<&Bound<'_, PyAny>>,
+        y1: Option<&Bound<'_, PyAny>>,
+        y2: Option<&Bound<'_, PyAny>>,
+        y: Option<&Bound<'_, PyAny>>,
+        rz: Option<&Bound<'_, PyAny>>,
+        movement: Option<&Bound<'_, PyAny>>,
+        mount: Option<&Bound<'_, PyAny>>,
+        body: Option<&Bound<'_, PyAny>>,
+        units: &str,
+        angles: &str,
+        name: &str,
+        bad_rows: &str,
+        split_s: Option<f64>,
+    ) -> PyResult<Self> {
+        let options = options(bad_rows, split_s)?;
+        let mut text = ArrayText::new(units, angles)?;
+        text.real("t_us", "t_us", Some(t_us))?;
+        text.whole("movement", movement)?;
+        text.codes("hall", ["hall_a", "hall_b", "hall_c"], Some(hall))?;
+        text.codes("caps", ["cap_1", "cap_2", "cap_3"], caps)?;
+        // A third beam or none: the key of x is that of the beam or of the pose.
+        let x_key = if y1.is_some() || y2.is_some() {
+            "ifm_x"
+        } else {
+            "x"
+        };
+        for (argument, key, given) in [("z", "z", z), ("x", x_key, x), ("y1", "ifm_y1", y1)] {
+            text.length(argument, key, given)?;
+        }
+        for (argument, key, given) in [("y2", "ifm_y2", y2), ("y", "y", y)] {
+            text.length(argument, key, given)?;
+        }
+        for (argument, given) in [("rx", rx), ("ry", ry), ("rz", rz)] {
+            text.angle(argument, given)?;
+        }
+        for (column, argument, given) in [(MOUNT, "mount", mount), (BODY, "body", body)] {
+            text.optional(column, argument, given)?;
+        }
+        Self::of_text(
+            py,
+            &text.bytes(),
+            Path::new(name),
+            stage,
+            &options,
+            &text.arguments,
+        )
+    }
+
+    /// Rows that are held.
+    fn __len__(&self) -> usize {
+        self.reading.dataset.rows.len()
+    }
+
+    /// Rows that were read; more than are held of a long log.
+    #[getter]
+    fn rows_read(&self) -> usize {
+        self.reading.dataset.read().0
+    }
+
+    /// The stage.
+    #[getter]
+    fn stage(&self, py: Python<'_>) -> Py<Stage> {
+        self.stage.clone_ref(py)
+    }
+
+    /// What is odd about the logs, in words.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        warnings_of(&self.reading)
+    }
+
+    /// Time of the rows within their log, us: int64, (n,).
+    #[getter]
+    fn t_us<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.rows().iter().map(|row| row.t_us))
+    }
+
+    /// Number of the movement of the rows: int64, (n,).
+    #[getter]
+    fn movement<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        let movements = &self.reading.dataset.movements;
+        PyArray1::from_iter(
+            py,
+            self.rows().iter().map(|row| movements[row.movement].index),
+        )
+    }
+
+    /// Codes of the Hall probes A, B, C: int32, (n, 3).
+    #[getter]
+    fn hall<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i32>>> {
+        rows_of_three(py, self.rows().iter().map(|row| row.frame.hall()))
+    }
+
+    /// Codes of the gaps 1, 2, 3: int32, (n, 3); None of a log that has gaps or the vertical pose itself.
+    #[getter]
+    fn caps<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<i32>>>> {
+        let codes = self.rows().iter().map(|row| row.frame.capacitive());
+        let codes: Option<Vec<[i32; 3]>> = codes.collect();
+        codes.map(|codes| rows_of_three(py, codes)).transpose()
+    }
+
+    /// X, Y, Rz by the interferometers: float64, (n, 3), m, m, rad; zeros in a log without reference.
+    #[getter]
+    fn reference<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        rows_of_three(py, self.rows().iter().map(|row| row.reference))
+    }
+
+    /// Z, Rx, Ry by the capacitive sensors: float64, (n, 3), m, rad, rad.
+    #[getter]
+    fn vertical<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        rows_of_three(py, self.rows().iter().map(|row| row.vertical))
+    }
+
+    /// Temperature of the magnets' mount: float64, (n,), degC, NaN where there is none.
+    #[getter]
+    fn mount<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.temperature(py, 0)
+    }
+
+    /// Temperature of the stage body at the Hall elements, as `mount`.
+    #[getter]
+    fn body<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.temperature(py, 1)
+    }
+
+    /// The rows as a `pandas.DataFrame`: number of the log, movement, time, codes, poses, temperatures, in SI
+    /// units but for `t_us` and degC. Needs pandas.
+    #[getter]
+    fn df<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let pandas = py.import("pandas")?;
+        let columns = PyDict::new(py);
+        let log_of = |row: &Row| self.reading.dataset.movements[row.movement].log;
+        let logs = self.rows().iter().map(|row| log_of(row) as i64);
+        columns.set_item("log", PyArray1::from_iter(py, logs))?;
+        columns.set_item("movement", self.movement(py))?;
+        columns.set_item("t_us", self.t_us(py))?;
+        let three = |names: [&str; 3], array: &Bound<'py, PyAny>| -> PyResult<()> {
+            let across = array.getattr("T")?;
+            for (k, name) in names.iter().enumerate() {
+                columns.set_item(name, across.get_item(k)?)?;
+            }
+            Ok(())
+        };
+        three(["hall_a", "hall_b", "hall_c"], self.hall(py)?.as_any())?;
+        if let Some(caps) = self.caps(py)? {
+            three(["cap_1", "cap_2", "cap_3"], caps.as_any())?;
+        }
+        three(["z_m", "rx_rad", "ry_rad"], self.vertical(py)?.as_any())?;
+        if self.has_reference() {
+            three(["x_m", "y_m", "rz_rad"], self.reference(py)?.as_any())?;
+        }
+        for (sensor, name) in [MOUNT, BODY].into_iter().enumerate() {
+            if self.reading.dataset.temperature_range_mc(sensor).is_some() {
+                columns.set_item(name, self.temperature(py, sensor))?;
+            }
+        }
+        pandas.call_method1("DataFrame", (columns,))
+    }
+
+    fn __repr__(&self) -> String {
+        let dataset = &self.reading.dataset;
+        let (rows, movements) = dataset.read();
+        let names = dataset
+            .logs
+            .iter()
+            .map(|log| log.path.display().to_string());
+        let names = names.collect::<Vec<_>>().join(", ");
+        let held = match dataset.rows.len() {
+            held if held < rows => format!(", {held} of them held"),
+            _ => String::new(),
+        };
+        format!("<Log {names}: {rows} rows in {movements} movements{held}>")
+    }
+}
+
+/// Columns of temperatures in a log of arrays, and in a table.
+const MOUNT: &str = "mount_c";
+const BODY: &str = "body_c";
+
+impl Log {
+    /// Of the text of a log, and where its columns come from if arrays made it: name in the header and name
+    /// of the argument.
+    pub fn of_text(
+        py: Python<'_>,
+        text: &[u8],
+        name: &Path,
+        stage: Py<Stage>,
+        options: &ReadOptions,
+        arguments: &[(String, String)],
+    ) -> PyResult<Self> {
+        let of_stage = &stage.get().designed;
+        // Columns have names of their own here, whatever those of the stage's files.
+        let designed = Arc::new(Designed {
+            log: LogLayout {
+                // What temperatures stand in is none of its quantities.
+                ignored: vec![MOUNT.to_owned(), BODY.to_owned()],
+                ..LogLayout::default()
+            },
+            temperature: TemperatureTable {
+                columns: [Some(MOUNT.to_owned()), Some(BODY.to_owned())],
+                scale_mc: [1e3, 0.0],
+                ..of_stage.temperature.clone()
+            },
+            ..Designed::clone(of_stage)
+        });
+        let reading = work::run(py, || log::read_bytes(text, name, &designed, options))?;
+        let reading = reading.map_err(|error| of_arrays(py, &error, arguments))?;
+        Ok(Self {
+            reading: Arc::new(reading),
+            designed,
+            stage,
+        })
+    }
+
+    fn rows(&self) -> &[Row] {
+        &self.reading.dataset.rows
+    }
+
+    fn temperature<'py>(&self, py: Python<'py>, sensor: usize) -> Bound<'py, PyArray1<f64>> {
+        let celsius = |row: &Row| match row.frame.temperature_mc()[sensor] {
+            MISSING_CODE => f64::NAN,
+            code => f64::from(code) * 1e-3,
+        };
+        PyArray1::from_iter(py, self.rows().iter().map(celsius))
+    }
+
+    pub fn has_reference(&self) -> bool {
+        self.reading
+            .dataset
+            .logs
+            .iter()
+            .all(|log| log.has_reference)
+    }
+
+    /// How the log is read for a command, beyond what the user said.
+    pub fn options(&self, command: ReadOptions) -> ReadOptions {
+        let own = self.reading.options();
+        ReadOptions {
+            bad_rows: own.bad_rows,
+            split_s: own.split_s,
+            ..command
+        }
+    }
+
+    /// Raises the error of a log without reference, where one is needed.
+    pub fn check_reference(&self, py: Python<'_>) -> PyResult<()> {
+        if self.has_reference() {
+            return Ok(());
+        }
+        let options = self.options(ReadOptions::FIT);
+        let again = self.reading.read_anew(&self.designed, &options, |_, _| ());
+        match again {
+            Ok(_) => Ok(()),
+            Err(error) => Err(of_log(py, &error)),
+        }
+    }
+}
+
+/// An array of rows of three.
+pub fn rows_of_three<'py, T: numpy::Element + Copy>(
+    py: Python<'py>,
+    rows: impl IntoIterator<Item = [T; 3]>,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let flat: Vec<T> = rows.into_iter().flatten().collect();
+    let rows = flat.len() / 3;
+    PyArray1::from_vec(py, flat).reshape([rows, 3])
+}

@@ -1,0 +1,117 @@
+//! What calibrations and evaluations show alike: verdict and findings in a notebook, residuals, a page.
+
+use crate::error::{internal, of_output, wrong};
+use crate::log::rows_of_three;
+use host_fit::diagnose::signals::period_s;
+use host_fit::finding::Finding;
+use host_fit::input::dataset::Dataset;
+use host_fit::input::log::LogReading;
+use host_fit::input::stage::Stage as Designed;
+use host_fit::output::write_atomically;
+use host_fit::report::Density;
+use host_fit::report::errors::RowErrors;
+use host_fit::report::html::{Cause, Page};
+use host_fit::report::page::{Errors, Source, facts};
+use host_fit::report::provenance::Provenance;
+use host_fit::report::verdict::{Subject, Summary};
+use numpy::{PyArray1, PyArrayMethods};
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+/// Verdict, table by axis and findings, for a notebook.
+pub fn head(subject: &Subject, warnings: &[String]) -> PyResult<String> {
+    let page = Page {
+        title: "",
+        verdict: Summary::new(subject),
+        facts: Vec::new(),
+        causes: Cause::of(&subject.diagnosis.findings),
+        warnings,
+        sections: Vec::new(),
+    };
+    page.head().map_err(internal)
+}
+
+/// The same in words, for a terminal.
+pub fn text(subject: &Subject, findings: &[Finding]) -> String {
+    let told = findings.iter().map(|found| format!("{}\n", found.message));
+    Summary::new(subject).as_text() + &told.collect::<String>()
+}
+
+/// Errors of the rows of a dataset (m, m, rad) as a `hallstage.Residuals`.
+pub fn residuals<'py>(
+    py: Python<'py>,
+    dataset: &Dataset,
+    stage: &Designed,
+    errors: &RowErrors,
+    weights: Option<&[f64]>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let rows = dataset.rows.iter();
+    let time = PyArray1::from_iter(py, rows.clone().map(|row| row.t_us as f64 * 1e-6));
+    let movement = rows.map(|row| dataset.movements[row.movement].index);
+    let movement = PyArray1::from_iter(py, movement);
+    let axes = errors.iter().map(|error| error.unwrap_or([f64::NAN; 3]));
+    let axes = rows_of_three(py, axes)?.transpose()?;
+    let weight = match weights {
+        Some(weights) => PyArray1::from_slice(py, weights),
+        None => PyArray1::from_vec(py, vec![1.0; errors.len()]),
+    };
+    let movements: Vec<_> = dataset.movements.iter().map(|m| m.rows.clone()).collect();
+    let period_s = period_s(&dataset.rows, &movements, stage.servo_period_s);
+    let density = Density::new(dataset, period_s, errors);
+    let (bin_hz, power) = density.map_or((0.0, Vec::new()), |density| {
+        let power = density.power.map(|power| PyArray1::from_vec(py, power));
+        (density.bin_hz, power.into())
+    });
+    let class = py.import("hallstage._results")?.getattr("Residuals")?;
+    class.call1((time, movement, axes, weight, bin_hz, power))
+}
+
+/// Who says what on a page.
+pub struct About<'a> {
+    pub title: &'static str,
+    pub serial: &'a str,
+    pub operator: Option<&'a str>,
+    pub notes: BTreeMap<String, String>,
+    pub created: &'a str,
+    /// The call that led to it, in words.
+    pub call: Vec<OsString>,
+}
+
+/// Writes the page of logs and what was made of them, whole or not at all.
+pub fn write(
+    path: &Path,
+    about: About,
+    (log, stage): (&LogReading, &Designed),
+    stage_file: Option<&PathBuf>,
+    subject: Subject,
+    (warnings, blob): (Vec<String>, &[u8]),
+    errors: Errors,
+) -> PyResult<()> {
+    let mut provenance = Provenance::new(about.call.into_iter());
+    provenance.add_logs(&log.dataset);
+    if let Some(file) = stage_file {
+        provenance.add_file(file, "stage as designed");
+    }
+    provenance.add_bytes(Path::new("calibration"), blob, "parameter blob");
+    let notes: Vec<(String, String)> = about.notes.into_iter().collect();
+    let source = Source {
+        title: about.title,
+        subject,
+        facts: facts(about.serial, about.operator, Some(about.created), &notes),
+        stage,
+        dataset: &log.dataset,
+        provenance,
+        warnings,
+        errors: Some(errors),
+    };
+    let html = source.html().map_err(internal)?;
+    if path.is_dir() {
+        return Err(wrong(
+            "path",
+            "a folder; name a file, such as certificate.html",
+        ));
+    }
+    write_atomically(path, html.as_bytes()).map_err(|error| of_output(&error))
+}

@@ -1,0 +1,203 @@
+//! The stage as designed.
+
+use crate::error::{of_stage, wrong};
+use host_fit::input::stage::AXES;
+use host_fit::input::stage::Stage as Designed;
+use host_fit::report::table::{Table, as_text, number};
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A stage as designed: where its sensors stand, what their codes mean, how it moves, and which column of a
+/// log holds what.
+///
+/// Its keyword arguments are the tables of `stage.toml`, each a dict: `hall`, `capacitive`, `interferometer`,
+/// `servo`, and where they are wanted `motion`, `search`, `temperature`, `log`. All numbers are SI.
+/// Raises `ValueError` with the key where one is missing, unknown or cannot be true.
+///
+/// `Stage.load("stage.toml")` is the same as `Stage(**tomllib.load(file))`.
+#[pyclass(frozen, eq, module = "hallstage")]
+pub struct Stage {
+    pub designed: Arc<Designed>,
+    /// The file that it was read from.
+    pub path: Option<PathBuf>,
+}
+
+impl PartialEq for Stage {
+    /// Whatever file they were read from.
+    fn eq(&self, other: &Self) -> bool {
+        self.designed == other.designed
+    }
+}
+
+#[pymethods]
+impl Stage {
+    #[new]
+    #[pyo3(signature = (**tables))]
+    fn new(tables: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut text = String::new();
+        for (name, table) in tables.into_iter().flatten() {
+            let name: String = name.extract()?;
+            let Ok(table) = table.cast::<PyDict>() else {
+                return Err(wrong(&name, "a dict is needed, as the table of stage.toml"));
+            };
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "[{}]", quoted(&name));
+            for (key, value) in table {
+                let _ = writeln!(
+                    text,
+                    "{} = {}",
+                    quoted(&key.to_string()),
+                    toml(&name, &value, 0)?
+                );
+            }
+        }
+        let designed = Designed::from_toml(&text, Path::new("Stage(...)"));
+        Ok(Self {
+            designed: Arc::new(designed.map_err(|error| of_stage(&error))?),
+            path: None,
+        })
+    }
+
+    /// Reads a `stage.toml`.
+    ///
+    /// Raises `OSError` where it cannot be read, `ValueError` with line and key where it is wrong.
+    #[staticmethod]
+    fn load(path: PathBuf) -> PyResult<Self> {
+        let designed = Designed::from_file(&path).map_err(|error| of_stage(&error))?;
+        Ok(Self {
+            designed: Arc::new(designed),
+            path: Some(path),
+        })
+    }
+
+    /// Time between two rows of the servo, s.
+    #[getter]
+    fn servo_period_s(&self) -> f64 {
+        self.designed.servo_period_s
+    }
+
+    /// Displacement of a Hall code at the designed sensitivity, m.
+    #[getter]
+    fn hall_m_per_count(&self) -> f64 {
+        self.designed.hall.m_per_count
+    }
+
+    /// Change of a gap for a capacitive code, m.
+    #[getter]
+    fn capacitive_m_per_count(&self) -> f64 {
+        self.designed.capacitive.m_per_count
+    }
+
+    /// Where the Hall probes A, B, C stand as designed, (x, y) of each, m.
+    #[getter]
+    fn hall_places_m(&self) -> [[f64; 2]; 3] {
+        self.designed.places_m()
+    }
+
+    /// Where the capacitive sensors 1, 2, 3 stand, (x, y) of each, m.
+    #[getter]
+    fn capacitive_places_m(&self) -> [[f64; 2]; 3] {
+        self.designed.capacitive_probes_m
+    }
+
+    /// Distance between the two Y beams of the interferometer, m.
+    #[getter]
+    fn y_baseline_m(&self) -> f64 {
+        self.designed.y_baseline_m
+    }
+
+    fn __repr__(&self) -> String {
+        as_text(&self.tables())
+    }
+}
+
+impl Stage {
+    fn tables(&self) -> Vec<Table> {
+        let stage = &*self.designed;
+        let mut sensors = Table::new("stage", &["x, mm", "y, mm", "um per code", "codes"]);
+        let places = stage.places_m().into_iter().zip(["A", "B", "C"]);
+        let hall = places.map(|(place, name)| (format!("Hall probe {name}"), place, &stage.hall));
+        let places = stage.capacitive_probes_m.into_iter().zip(1..);
+        let gaps = places.map(|(place, k)| (format!("gap {k}"), place, &stage.capacitive));
+        for (name, place, scale) in hall.chain(gaps) {
+            let [x, y] = place.map(|x| number(x * 1e3, ""));
+            let window = format!("{} to {}", scale.window.low, scale.window.high);
+            let cells = [x, y, number(scale.m_per_count * 1e6, ""), window];
+            sensors.row(name, cells);
+        }
+        let mut motion = Table::new("in service", &["to either side", "unit"]);
+        for ((name, _), axis) in AXES.iter().zip(&stage.motion.axes) {
+            let unit = if name.starts_with('r') { "urad" } else { "um" };
+            let cells = [number(axis.service * 1e6, ""), unit.to_owned()];
+            motion.row(*name, cells);
+        }
+        let mut others = Table::default();
+        others.row(
+            "Y beams apart",
+            [format!("{} mm", number(stage.y_baseline_m * 1e3, ""))],
+        );
+        let period = number(stage.servo_period_s * 1e3, "");
+        others.row("servo period", [format!("{period} ms")]);
+        vec![sensors, motion, others]
+    }
+}
+
+/// A text as TOML has it.
+fn quoted(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}
+
+/// Lists in lists and dicts in dicts: a stage has three at most.
+const DEPTH_MAX: u32 = 8;
+
+/// A value as TOML has it: numbers, texts, lists, dicts.
+fn toml(table: &str, value: &Bound<'_, PyAny>, depth: u32) -> PyResult<String> {
+    if depth > DEPTH_MAX {
+        return Err(wrong(table, "lists or dicts too deep in each other"));
+    }
+    let inner = |value: &Bound<'_, PyAny>| toml(table, value, depth + 1);
+    let joined =
+        |items: Vec<String>, open: &str, close: &str| format!("{open}{}{close}", items.join(", "));
+    if value.is_instance_of::<PyBool>() {
+        return Ok(value.extract::<bool>()?.to_string());
+    }
+    if value.is_instance_of::<PyInt>() {
+        return Ok(value.to_string());
+    }
+    if value.is_instance_of::<PyFloat>() {
+        let number: f64 = value.extract()?;
+        return match number.is_finite() {
+            true => Ok(format!("{number:?}")),
+            false => Err(wrong(
+                table,
+                format!("{number} is no number that a stage has"),
+            )),
+        };
+    }
+    if value.is_instance_of::<PyString>() {
+        return Ok(quoted(&value.extract::<String>()?));
+    }
+    if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
+        let items = value.try_iter()?.map(|item| inner(&item?));
+        return Ok(joined(items.collect::<PyResult<_>>()?, "[", "]"));
+    }
+    if let Ok(dict) = value.cast::<PyDict>() {
+        let items = dict.iter().map(|(key, value)| {
+            let key = quoted(&key.to_string());
+            Ok(format!("{key} = {}", inner(&value)?))
+        });
+        return Ok(joined(items.collect::<PyResult<_>>()?, "{ ", " }"));
+    }
+    // Arrays of NumPy and their numbers.
+    if value.hasattr("tolist")? {
+        return inner(&value.call_method0("tolist")?);
+    }
+    let kind = value.get_type();
+    Err(wrong(
+        table,
+        format!("{kind} is no value of stage.toml: numbers, texts, lists and dicts are"),
+    ))
+}

@@ -1,0 +1,69 @@
+//! Long work without the GIL: Ctrl-C ends it, and a notebook shows how far it is.
+
+use host_fit::{interrupt, progress};
+use pyo3::prelude::*;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// So often Python is asked for signals.
+const PERIOD: Duration = Duration::from_millis(50);
+/// What takes less is not shown.
+const SHOWN_AFTER: Duration = Duration::from_secs(1);
+
+/// Does `work` in a thread of its own, while this one looks for signals and shows the progress.
+///
+/// # Errors
+/// What a signal raises, such as `KeyboardInterrupt`. The work has ended then: what it would have given is
+/// dropped.
+pub fn run<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let (done, wait) = channel();
+    let started = Instant::now();
+    let watched = py.detach(move || {
+        thread::scope(|scope| {
+            scope.spawn(move || {
+                let _ = done.send(work());
+            });
+            let mut raised = None;
+            let made = loop {
+                match wait.recv_timeout(PERIOD) {
+                    Ok(made) => break Some(made),
+                    Err(RecvTimeoutError::Disconnected) => break None,
+                    Err(RecvTimeoutError::Timeout) if raised.is_some() => {}
+                    Err(RecvTimeoutError::Timeout) => {
+                        let is_long = started.elapsed() > SHOWN_AFTER;
+                        let looked = Python::attach(|py| {
+                            py.check_signals()?;
+                            if is_long { show(py) } else { Ok(()) }
+                        });
+                        raised = looked.err();
+                        if raised.is_some() {
+                            interrupt::request();
+                        }
+                    }
+                }
+            };
+            (made, raised)
+        })
+    });
+    let (made, raised) = watched;
+    if started.elapsed() > SHOWN_AFTER {
+        py.import("hallstage._progress")?.call_method0("end")?;
+    }
+    if let Some(raised) = raised {
+        interrupt::clear();
+        return Err(raised);
+    }
+    // Without a result the work has panicked, and `scope` with it.
+    made.ok_or_else(|| crate::error::internal("the work ended without a result"))
+}
+
+/// Shows how far the work is, where somebody sees it.
+fn show(py: Python<'_>) -> PyResult<()> {
+    let Some((what, done, total)) = progress::current() else {
+        return Ok(());
+    };
+    let module = py.import("hallstage._progress")?;
+    module.call_method1("show", (what, done, total))?;
+    Ok(())
+}
