@@ -309,12 +309,11 @@ impl Log {
     ) -> PyResult<Self> {
         let of_stage = &stage.get().designed;
         // Columns have names of their own here, whatever those of the stage's files.
+        let mut layout = LogLayout::default();
+        // Temperatures are none of its quantities.
+        layout.ignored = vec![MOUNT.to_owned(), BODY.to_owned()];
         let designed = Arc::new(Designed {
-            log: LogLayout {
-                // What temperatures stand in is none of its quantities.
-                ignored: vec![MOUNT.to_owned(), BODY.to_owned()],
-                ..LogLayout::default()
-            },
+            log: layout,
             temperature: TemperatureTable {
                 columns: [Some(MOUNT.to_owned()), Some(BODY.to_owned())],
                 scale_mc: [1e3, 0.0],
