@@ -7,6 +7,7 @@ use crate::evaluation::Evaluation;
 use crate::finding;
 use crate::fit::blob_text;
 use crate::log::Log;
+use crate::origin::{OfFit, OfUpdate, Origin};
 use crate::report::{About, head, residuals, text, write};
 use crate::stage::Stage;
 use crate::work;
@@ -14,7 +15,6 @@ use host_fit::calibrate::{
     EvalOrder, Judged, Outcome, figures_of_recalibration, other_scales, warnings_of,
     warnings_of_recalibration,
 };
-use host_fit::diagnose::Diagnosis;
 use host_fit::diff::{parameter_changes, pose_difference};
 use host_fit::finding::{Severity, messages};
 use host_fit::fit::Fit;
@@ -23,12 +23,11 @@ use host_fit::input::stage::Stage as Designed;
 use host_fit::judge::Zeros;
 use host_fit::output::{Outputs, blob_file, posterior_file};
 use host_fit::problem::model::Model;
-use host_fit::recalibrate::{Known, Recalibration, recalibrate};
+use host_fit::recalibrate::{Known, recalibrate};
 use host_fit::report::json::Report;
 use host_fit::report::page::Errors;
 use host_fit::report::parameters::{Parameter, parameters_in};
 use host_fit::report::table::tables;
-use host_fit::report::verdict::{End, Subject};
 use host_fit::solve::field::terms;
 use host_fit::solve::field::update::Change;
 use nalgebra::DMatrix;
@@ -53,25 +52,6 @@ pub struct Calibration {
     designed: Arc<Designed>,
     stage: Py<Stage>,
     origin: Origin,
-}
-
-/// What a calibration comes from.
-enum Origin {
-    Fit(Box<OfFit>),
-    Update(Box<OfUpdate>),
-    Files,
-}
-
-struct OfFit {
-    outcome: Outcome,
-    report: Report,
-    log: Arc<LogReading>,
-}
-
-struct OfUpdate {
-    new: Recalibration,
-    warnings: Vec<String>,
-    figures: Value,
 }
 
 impl Calibration {
@@ -101,48 +81,18 @@ impl Calibration {
         &self.set
     }
 
-    fn fit(&self) -> Option<(&OfFit, &Fit)> {
-        match &self.origin {
-            Origin::Fit(of) => Some((of, of.outcome.fitted.as_ref().ok()?)),
-            _ => None,
-        }
-    }
-
     fn fit_or_raise(&self, what: &str) -> PyResult<(&OfFit, &Fit)> {
         let problem = || {
             PyValueError::new_err(format!(
                 "{what}: only a calibration that `fit` has made has its log; use evaluate(log)"
             ))
         };
-        self.fit().ok_or_else(problem)
-    }
-
-    fn diagnosis(&self) -> Option<&Diagnosis> {
-        match &self.origin {
-            Origin::Fit(of) => Some(&of.outcome.diagnosis),
-            Origin::Update(of) => Some(&of.new.diagnosis),
-            Origin::Files => None,
-        }
-    }
-
-    fn subject(&self) -> Option<Subject<'_>> {
-        match &self.origin {
-            Origin::Fit(of) => Some(of.outcome.subject()),
-            Origin::Update(of) => Some(Subject {
-                end: End::Written,
-                diagnosis: &of.new.diagnosis,
-                is_field: true,
-                errors: Some(&of.new.judgement.errors),
-                limits: [None; 3],
-                in_service: false,
-            }),
-            Origin::Files => None,
-        }
+        self.origin.fit().ok_or_else(problem)
     }
 
     /// Names and covariance of the parameters that have a standard error.
     fn matrix(&self) -> Option<(Vec<String>, DMatrix<f64>)> {
-        if let Some((_, fit)) = self.fit() {
+        if let Some((_, fit)) = self.origin.fit() {
             return Some(fit.covariance());
         }
         let covariance = self.known.as_ref()?.covariance.clone();
@@ -255,25 +205,27 @@ impl Calibration {
     /// "good", "limited" or "refused"; None where it is not known.
     #[getter]
     fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let verdict = self.diagnosis().and_then(|diagnosis| diagnosis.verdict);
+        let verdict = self
+            .origin
+            .diagnosis()
+            .and_then(|diagnosis| diagnosis.verdict);
         finding::figures(py, &verdict)
     }
 
     /// What is wrong with the log, the most severe first: a list of `Finding`.
     #[getter]
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        let found = self.diagnosis().map(|diagnosis| &diagnosis.findings[..]);
+        let found = self
+            .origin
+            .diagnosis()
+            .map(|diagnosis| &diagnosis.findings[..]);
         finding::list(py, found.unwrap_or_default())
     }
 
     /// What the user should know besides.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        match &self.origin {
-            Origin::Fit(of) => of.report.warnings.clone(),
-            Origin::Update(of) => of.warnings.clone(),
-            Origin::Files => Vec::new(),
-        }
+        self.origin.warnings().to_vec()
     }
 
     /// All figures as a dict, as `host-fit fit --json` or `host-fit recalibrate --json` writes them; None of a
@@ -293,7 +245,7 @@ impl Calibration {
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let class = py.import("hallstage._results")?.getattr("Parameter")?;
         let errors = self.standard_errors();
-        let mut all: BTreeMap<String, Parameter> = match self.fit() {
+        let mut all: BTreeMap<String, Parameter> = match self.origin.fit() {
             Some((of, _)) => of.report.parameters.clone(),
             None => parameters_in(&self.set),
         };
@@ -513,15 +465,18 @@ impl Calibration {
             serial => format!(" of {serial}"),
         };
         let title = format!("calibration{of}, {model}");
-        let findings = self.diagnosis().map(|diagnosis| &diagnosis.findings[..]);
-        match self.subject() {
+        let findings = self
+            .origin
+            .diagnosis()
+            .map(|diagnosis| &diagnosis.findings[..]);
+        match self.origin.subject() {
             Some(subject) => format!("{title}\n{}", text(&subject, findings.unwrap_or_default())),
             None => format!("<{title}>"),
         }
     }
 
     fn _repr_html_(&self) -> PyResult<Option<String>> {
-        let subject = self.subject();
+        let subject = self.origin.subject();
         subject.map(|subject| head(&subject, &[])).transpose()
     }
 }

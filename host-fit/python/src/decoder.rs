@@ -19,7 +19,7 @@ use runtime::{
     AnyDecoder, Decode, OnInvalid, ParameterSet, PlanarPose, PoseTracker, RawFrame, Reading,
 };
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Words of a record: X, Y, Rz, Z, Rx, Ry, status.
 const WORDS: usize = 7;
@@ -240,7 +240,7 @@ impl Decoder {
 }
 
 /// A blob, and what stands beside it.
-pub fn read(path: &PathBuf) -> PyResult<(ParameterSet, Option<Known>)> {
+pub fn read(path: &Path) -> PyResult<(ParameterSet, Option<Known>)> {
     let set = blob_file::read(path).map_err(|error| of_blob(&error))?;
     let beside = posterior_file::beside(path).filter(|path| path.exists());
     let known = beside.map(|beside| posterior_file::read(&beside, &set, path));

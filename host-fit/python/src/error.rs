@@ -31,27 +31,21 @@ fn own<'py>(py: Python<'py>, class: &str, arguments: impl PyCallArgs<'py>) -> Py
     made().map_or_else(|error| error, PyErr::from_value)
 }
 
-/// What the library says, with the options of its program as arguments of this package.
-fn message(error: impl Display) -> String {
-    error.to_string()
-}
-
-/// A log that is refused: `LogError`, or `OSError` where its file cannot be read. `named` gives the argument
-/// and the row of a cell, in place of its line and column.
+/// A log that is refused: `LogError`, or `OSError` where its file cannot be read.
 pub fn of_log(py: Python<'_>, error: &LogError) -> PyErr {
     match error {
         LogError::Source(SourceError::Interrupted { .. }) => PyKeyboardInterrupt::new_err(()),
         LogError::Source(SourceError::NotFound { .. }) => {
-            PyFileNotFoundError::new_err(message(error))
+            PyFileNotFoundError::new_err(error.to_string())
         }
         LogError::Source(SourceError::IsFolder { .. } | SourceError::Unreadable { .. }) => {
-            PyOSError::new_err(message(error))
+            PyOSError::new_err(error.to_string())
         }
         error => {
             let (file, line) = error.file_and_line();
             let place = error.place();
             let arguments = (
-                message(error),
+                error.to_string(),
                 file.map(|file| file.display().to_string()),
                 line,
                 place.map(|place| place.column),
@@ -103,10 +97,10 @@ pub fn of_calibrate(py: Python<'_>, error: &CalibrateError) -> PyErr {
 pub fn of_stage(error: &StageError) -> PyErr {
     match error {
         StageError::Source(source) => match source {
-            SourceError::NotFound { .. } => PyFileNotFoundError::new_err(message(error)),
-            _ => PyOSError::new_err(message(error)),
+            SourceError::NotFound { .. } => PyFileNotFoundError::new_err(error.to_string()),
+            _ => PyOSError::new_err(error.to_string()),
         },
-        _ => PyValueError::new_err(message(error)),
+        _ => PyValueError::new_err(error.to_string()),
     }
 }
 
@@ -119,29 +113,29 @@ fn of_system(cause: &io::Error, message: String) -> PyErr {
 
 pub fn of_blob(error: &BlobFileError) -> PyErr {
     match error {
-        BlobFileError::Read { cause, .. } => of_system(cause, message(error)),
-        BlobFileError::Unusable { .. } => PyValueError::new_err(message(error)),
+        BlobFileError::Read { cause, .. } => of_system(cause, error.to_string()),
+        BlobFileError::Unusable { .. } => PyValueError::new_err(error.to_string()),
     }
 }
 
 pub fn of_posterior(error: &PosteriorFileError) -> PyErr {
     match error {
-        PosteriorFileError::Missing { .. } => PyFileNotFoundError::new_err(message(error)),
-        PosteriorFileError::Read { cause, .. } => of_system(cause, message(error)),
-        _ => PyValueError::new_err(message(error)),
+        PosteriorFileError::Missing { .. } => PyFileNotFoundError::new_err(error.to_string()),
+        PosteriorFileError::Read { cause, .. } => of_system(cause, error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
     }
 }
 
 pub fn of_output(error: &OutputError) -> PyErr {
-    PyOSError::new_err(message(error))
+    PyOSError::new_err(error.to_string())
 }
 
 pub fn of_recalibrate(py: Python<'_>, error: &RecalibrateError) -> PyErr {
     match error {
         RecalibrateError::OtherModel { .. } | RecalibrateError::NothingKnown => {
-            PyValueError::new_err(message(error))
+            PyValueError::new_err(error.to_string())
         }
-        _ => refused(py, &message(error), &[]),
+        _ => refused(py, &error.to_string(), &[]),
     }
 }
 

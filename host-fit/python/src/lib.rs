@@ -14,6 +14,7 @@ mod finding;
 mod fit;
 mod log;
 mod minimize;
+mod origin;
 mod program;
 mod report;
 mod stage;

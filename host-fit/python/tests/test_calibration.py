@@ -72,7 +72,8 @@ def test_covariance_and_correlations_are_labelled(cal: hs.Calibration, run30: hs
         assert np.allclose(np.sqrt(np.diag(covariance)), np.array(std, dtype=float))
         assert np.allclose(covariance, covariance.T) and np.allclose(np.diag(correlations), 1)
         assert np.all(np.abs(correlations) < 1 + 1e-9)
-        assert covariance[:2].labels == [] and covariance.dtype == np.float64
+        part = covariance[:2]
+        assert isinstance(part, hs.Labelled) and part.labels == [] and part.dtype == np.float64
 
 
 def test_residuals_are_the_errors_of_the_report(cal: hs.Calibration, run30: hs.Log) -> None:

@@ -1,6 +1,7 @@
 """The decoder gives the words of the target."""
 
 from pathlib import Path
+from typing import Any
 
 import hallstage as hs
 import numpy as np
@@ -39,7 +40,10 @@ def test_codes_of_any_layout_give_the_same_words(cal: hs.Calibration, service: h
     dec, hall, caps = cal.decoder(), service.hall, service.caps
     assert caps is not None
     wanted = bits(dec(hall=hall, caps=caps))
-    for other in [hall.astype(np.int16), hall.astype(np.int64), np.asfortranarray(hall), hall[::-1][::-1]]:
+    others: list[np.ndarray] = [
+        hall.astype(np.int16), hall.astype(np.int64), np.asfortranarray(hall), hall[::-1][::-1],
+    ]  # fmt: skip
+    for other in others:
         assert np.array_equal(bits(dec(hall=other, caps=caps)), wanted)
     assert np.array_equal(bits(dec(hall=hall[7:8], caps=caps[7:8])), wanted[7:8])
     assert np.array_equal(bits(dec(hall=hall[::3], caps=caps[::3])), wanted[::3])
@@ -97,7 +101,8 @@ def test_a_blob_without_posterior_has_no_uncertainty(
 
 
 def test_temperatures_are_read_where_parameters_want_them(cal: hs.Calibration, run30: hs.Log) -> None:
-    dec, arrays = cal.decoder(), {"hall": run30.hall, "caps": run30.caps}
+    dec = cal.decoder()
+    arrays: dict[str, Any] = {"hall": run30.hall, "caps": run30.caps}
     warm = np.full(len(run30), 25.0)
     # These parameters know no temperature.
     assert np.array_equal(bits(dec(**arrays, mount=warm, body=warm)), bits(dec(**arrays)))
@@ -109,12 +114,13 @@ def test_temperatures_are_read_where_parameters_want_them(cal: hs.Calibration, r
 
 def test_a_wrong_argument_is_named(cal: hs.Calibration, run30: hs.Log, tmp_path: Path) -> None:
     dec, hall, caps = cal.decoder(), run30.hall, run30.caps
-    for wrong, told in [
+    cases: list[tuple[dict[str, Any], str]] = [
         ({}, "hall"), ({"hall": hall}, "caps"), ({"caps": caps}, "hall"),
         ({"hall": hall * 1.0, "caps": caps}, "hall: dtype"), ({"hall": hall[:5], "caps": caps}, "caps"),
         ({"log": run30, "hall": hall}, "log"), ({"hall": hall[:0], "caps": caps}, "hall: no rows"),
         ({"hall": hall[:, :2], "caps": caps}, "hall: shape"),
-    ]:  # fmt: skip
+    ]  # fmt: skip
+    for wrong, told in cases:
         with pytest.raises(ValueError, match=told):
             dec(**wrong)
     with pytest.raises(FileNotFoundError):

@@ -2,6 +2,7 @@
 
 import gzip
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -210,6 +211,7 @@ def test_a_log_without_reference_is_decoded_and_not_fitted(run30: hs.Log, cal: h
     columns = columns_of(run30)
     alone = hs.Log.from_arrays(run30.stage, **{k: columns[k] for k in ["t_us", "movement", "hall", "caps"]})
     assert np.array_equal(cal.decoder()(alone), cal.decoder()(run30))
-    for use in [hs.fit, hs.check, cal.evaluate]:
+    uses: list[Callable[[hs.Log], object]] = [hs.fit, hs.check, cal.evaluate]
+    for use in uses:
         with pytest.raises(hs.LogError, match="ifm_x"):
             use(alone)

@@ -3,7 +3,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, final
 
 import numpy as np
-import pandas
+import pandas  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import ArrayLike, NDArray
 
 from ._results import Finding, Findings, Labelled, Parameter, Residuals

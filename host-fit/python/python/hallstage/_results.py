@@ -138,7 +138,8 @@ class Residuals:
         if axis not in self._power:
             raise ValueError("axis: no movement has the 32 rows that a spectrum needs")
         power = self._power[axis][1:]
-        return (self._bin_hz * np.arange(1, len(power) + 1), np.sqrt(power))
+        frequencies = self._bin_hz * np.arange(1, len(power) + 1, dtype=np.float64)
+        return (np.asarray(frequencies), np.sqrt(power))
 
     def plot(self) -> Figure:
         """Errors over time, a panel for each axis, um and urad; needs matplotlib."""

@@ -1,0 +1,72 @@
+//! What a calibration comes from, and what that says of it.
+
+use host_fit::calibrate::Outcome;
+use host_fit::diagnose::Diagnosis;
+use host_fit::fit::Fit;
+use host_fit::input::log::LogReading;
+use host_fit::recalibrate::Recalibration;
+use host_fit::report::json::Report;
+use host_fit::report::verdict::{End, Subject};
+use serde_json::Value;
+use std::sync::Arc;
+
+/// What a calibration comes from.
+pub enum Origin {
+    Fit(Box<OfFit>),
+    Update(Box<OfUpdate>),
+    Files,
+}
+
+pub struct OfFit {
+    pub outcome: Outcome,
+    pub report: Report,
+    pub log: Arc<LogReading>,
+}
+
+pub struct OfUpdate {
+    pub new: Recalibration,
+    pub warnings: Vec<String>,
+    pub figures: Value,
+}
+
+impl Origin {
+    /// The fit, if there was one.
+    pub fn fit(&self) -> Option<(&OfFit, &Fit)> {
+        match self {
+            Self::Fit(of) => Some((of, of.outcome.fitted.as_ref().ok()?)),
+            _ => None,
+        }
+    }
+
+    pub fn diagnosis(&self) -> Option<&Diagnosis> {
+        match self {
+            Self::Fit(of) => Some(&of.outcome.diagnosis),
+            Self::Update(of) => Some(&of.new.diagnosis),
+            Self::Files => None,
+        }
+    }
+
+    /// What reports say of it.
+    pub fn subject(&self) -> Option<Subject<'_>> {
+        match self {
+            Self::Fit(of) => Some(of.outcome.subject()),
+            Self::Update(of) => Some(Subject {
+                end: End::Written,
+                diagnosis: &of.new.diagnosis,
+                is_field: true,
+                errors: Some(&of.new.judgement.errors),
+                limits: [None; 3],
+                in_service: false,
+            }),
+            Self::Files => None,
+        }
+    }
+
+    pub fn warnings(&self) -> &[String] {
+        match self {
+            Self::Fit(of) => &of.report.warnings,
+            Self::Update(of) => &of.warnings,
+            Self::Files => &[],
+        }
+    }
+}
