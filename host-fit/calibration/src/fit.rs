@@ -143,8 +143,8 @@ impl Fit {
     /// The parameters that have a standard error, by name, and their covariance in this order, SI.
     pub fn covariance(&self) -> (Vec<String>, DMatrix<f64>) {
         if let Some(field) = &self.field {
-            let names = (0..terms::COUNT).map(terms::name).collect();
-            return (names, field.posterior.covariance.clone());
+            let covariance = field.posterior.covariance.clone();
+            return (terms::names(covariance.nrows()), covariance);
         }
         let known = |id: &ParameterId| self.standard_error[id.index].is_some();
         let names = self.model.free().filter(known).map(|id| id.name());

@@ -96,7 +96,7 @@ impl Calibration {
             return Some(fit.covariance());
         }
         let covariance = self.known.as_ref()?.covariance.clone();
-        Some(((0..terms::COUNT).map(terms::name).collect(), covariance))
+        Some((terms::names(covariance.nrows()), covariance))
     }
 
     /// A matrix as a `hallstage.Labelled`.
@@ -120,8 +120,9 @@ impl Calibration {
     /// Standard errors by name, where the posterior tells them.
     fn standard_errors(&self) -> BTreeMap<String, f64> {
         let errors = self.known.iter().flat_map(|known| {
-            let error = |k: usize| known.covariance[(k, k)].sqrt();
-            (0..terms::COUNT).map(move |k| (terms::name(k), error(k)))
+            let errors = known.covariance.diagonal().map(f64::sqrt);
+            let names = terms::names(known.covariance.nrows());
+            names.into_iter().zip(errors.as_slice().to_vec())
         });
         errors.collect()
     }
@@ -240,7 +241,8 @@ impl Calibration {
     }
 
     /// The parameters by name, a dict of `Parameter`: lever arms (m), misalignments (rad), sensitivities and
-    /// their slopes (equation 33), of the field model its other terms, in the units that each says.
+    /// their slopes (equation 33), of the field model its other terms, and k and h of the temperatures, in the
+    /// units that each says.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let class = py.import("hallstage._results")?.getattr("Parameter")?;
@@ -249,6 +251,22 @@ impl Calibration {
             Some((of, _)) => of.report.parameters.clone(),
             None => parameters_in(&self.set),
         };
+        let temperature = &self.set.constants.temperature;
+        if temperature.is_used() {
+            let of_probes = temperature.per_mk.as_flattened().iter();
+            for (name, per_mk) in terms::names(usize::MAX)
+                .split_off(terms::COUNT)
+                .into_iter()
+                .zip(of_probes)
+            {
+                let parameter = Parameter {
+                    value: f64::from(*per_mk) * 1e3,
+                    unit: "1/K",
+                    standard_error: None,
+                };
+                all.insert(name, parameter);
+            }
+        }
         let order = self.matrix().map(|(names, _)| names).unwrap_or_default();
         let parameters = PyDict::new(py);
         let add = |name: String, parameter: Parameter| {
@@ -357,9 +375,9 @@ impl Calibration {
     /// Brings the calibration up to date by a few seconds of log; of the field model.
     ///
     /// `what` has changed: "gain" of all probes (2 s of a sine along Y), "gains" of each probe (2 s of X, Y, Rz
-    /// at once), "all" (8 s of all six axes at once, as after a probe was seated anew). `created`: creation
-    /// time for the blob. Raises `LogRefused` where the log does not tell that, `ValueError` of other models or
-    /// where `all` lacks the posterior.
+    /// at once), "all" (8 s of all six axes at once, as after a probe was seated anew), "temperature" (a run
+    /// of 8 s at another one adds to k and h). `created`: creation time for the blob. Raises `LogRefused` where
+    /// the log does not tell that, `ValueError` of other models or where `all` lacks the posterior.
     #[pyo3(signature = (log, what, *, created = ""))]
     fn recalibrate(
         &self,

@@ -269,7 +269,12 @@ impl Log {
             three(["x_m", "y_m", "rz_rad"], self.reference(py)?.as_any())?;
         }
         for (sensor, name) in [MOUNT, BODY].into_iter().enumerate() {
-            if self.reading.dataset.temperature_range_mc(sensor).is_some() {
+            if self
+                .reading
+                .dataset
+                .temperature_range_mc(sensor, 0..self.rows().len())
+                .is_some()
+            {
                 columns.set_item(name, self.temperature(py, sensor))?;
             }
         }

@@ -96,6 +96,13 @@ pub fn name(index: usize) -> String {
     format!("{}_{probe}", TERMS[index % PER_PROBE].name)
 }
 
+/// The names of the rows of a covariance: those of all parameters, and where it has more rows those of
+/// (k, h) of A, B, C.
+pub fn names(rows: usize) -> Vec<String> {
+    let warmth = ["k_a", "h_a", "k_b", "h_b", "k_c", "h_c"].map(str::to_owned);
+    (0..COUNT).map(name).chain(warmth).take(rows).collect()
+}
+
 /// The coefficients of p, in the order of [`TERMS`], where the decoder has them.
 pub(super) fn shape(c: [f64; SHAPE]) -> Shape<f64> {
     let [
