@@ -137,11 +137,6 @@ impl Node {
         self.start(Cause::Reset);
     }
 
-    /// The power goes and comes back: only the flash is kept.
-    pub fn power_cycle(&mut self) {
-        self.start(Cause::PowerOn);
-    }
-
     fn start(&mut self, cause: Cause) {
         let before = Before::of(cause, Retained::from_words(&self.retained));
         let mut flash = self.flash().clone();

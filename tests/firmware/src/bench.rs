@@ -8,7 +8,7 @@ use crate::machine::Machine;
 use embedded_can::{Frame, Id, StandardId};
 use hal_adapters::can::command::{Answer, Command, IdentityPage, Request};
 use hal_adapters::can::e2e::{protect, unprotect};
-use hal_adapters::can::status::{HealthPage, NodeStatus};
+use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus};
 use hal_adapters::can::{BusFrame, Message};
 use runtime::frame::MISSING_CODE;
 use std::ffi::OsString;
@@ -81,6 +81,14 @@ impl Bench {
     /// A controller with these parameter slots, whose converter plays the log.
     pub fn machine(&self, part: Part, slots: [&[u8]; 2]) -> Result<Machine, Failure> {
         self.machine_playing(part, slots, self.rows.clone())
+    }
+
+    /// The same with the blob of the log, after so many ticks; what it sent is forgotten.
+    pub fn running(&self, part: Part, ticks: u64) -> Result<Machine, Failure> {
+        let mut machine = self.machine(part, [&self.blob, &[]])?;
+        machine.run_ticks(ticks)?;
+        machine.chip.can.sent.clear();
+        Ok(machine)
     }
 
     /// A controller whose converter plays these rows.
@@ -258,7 +266,23 @@ impl Seen {
         }
     }
 
-    /// The last state on the bus.
+    /// The last state and its reason.
+    pub fn last_state(&self) -> Option<(NodeState, u8)> {
+        let status = self.last_status()?;
+        Some((status.state?, status.reason))
+    }
+
+    /// The last flags.
+    pub fn flags(&self) -> u8 {
+        self.last_status().map_or(0, |status| status.flags)
+    }
+
+    /// The last number of missed ticks.
+    pub fn missed_ticks(&self) -> Option<u16> {
+        self.last_status().map(|status| status.missed_ticks)
+    }
+
+    /// The last status on the bus.
     pub fn last_status(&self) -> Option<NodeStatus> {
         self.statuses.last().map(|(_, status)| *status)
     }

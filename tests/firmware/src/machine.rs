@@ -10,6 +10,7 @@ use crate::callbacks::{
     read_flash, read_random, set_fpscr, write, write_below_ram, write_bit, write_core, write_flash,
     write_random,
 };
+use crate::can_model::BusState;
 use crate::flash_model::{BYTES, FIRST};
 use crate::image::{FLASH, FLASH_BYTES, Image, RAM, RAM_BYTES};
 use crate::memory::{Memory, memory};
@@ -248,6 +249,11 @@ impl Machine {
     /// Runs for so many ticks of 2 ms.
     pub fn run_ticks(&mut self, ticks: u64) -> Result<(), String> {
         self.run_ns(ticks * 2_000_000)
+    }
+
+    /// From now on the bus is so.
+    pub fn set_bus(&mut self, bus: BusState) {
+        self.chip.can.set_bus(bus, self.chip.now_ns);
     }
 
     /// From the reset vector until the program sleeps or the chip is reset.

@@ -73,8 +73,7 @@ fn main() -> ExitCode {
 /// A step of the rehearsal, if one is asked for.
 fn rehearse(bench: &Bench, step: &OsStr, arguments: &[OsString]) -> Option<Outcome> {
     let (part, files) = arguments.split_first()?;
-    let parts = [(Part::Ads131m08, "ads131m08"), (Part::Ads8688, "ads8688")];
-    let part = parts.into_iter().find(|(_, name)| part == *name)?;
+    let part = PARTS.into_iter().find(|(_, name)| part == *name)?;
     let files: Vec<_> = files.iter().map(Path::new).collect();
     match (step.to_str()?, files.as_slice()) {
         ("record", [log, bus, reference]) => {
@@ -88,6 +87,143 @@ fn rehearse(bench: &Bench, step: &OsStr, arguments: &[OsString]) -> Option<Outco
     }
 }
 
+/// The checks of each image, with the converter's name.
+type OfPart = fn(&Bench, Part, &str) -> Outcome;
+const CHECKS_OF_PARTS: &[(&str, OfPart)] = &[
+    ("flash and RAM", figures::flash_and_ram),
+    ("interrupt to mailbox", figures::interrupt_to_mailbox),
+    ("dead from the start", |bench, part, _| {
+        sensors::dead_from_the_start(bench, part)
+    }),
+    ("transfers that never end", |bench, part, _| {
+        sensors::transfers_that_never_end(bench, part)
+    }),
+    ("temperatures", temperature::follow_the_stage),
+    ("record", |bench, part, _| commands::record(bench, part)),
+    ("order and age of frames", commands::order_and_age),
+];
+
+/// The checks of one image.
+const CHECKS: &[(&str, fn(&Bench) -> Outcome)] = &[
+    (
+        "ads131m08: a pose is of its instant",
+        motion::a_pose_is_of_its_instant,
+    ),
+    (
+        "ads131m08: a register changes at any time",
+        sensors::a_register_changes_at_any_time,
+    ),
+    (
+        "ads131m08: whatever its sheet leaves open",
+        sensors::every_variant,
+    ),
+    (
+        "a debugger reads the last pose",
+        log::a_debugger_reads_the_last_pose,
+    ),
+    (
+        "received frames without room",
+        bus::received_frames_without_room,
+    ),
+    ("a tick that comes late", timing::a_late_tick),
+    ("ticks that never come", timing::ticks_that_never_come),
+    ("the clock wraps", timing::the_clock_wraps),
+    ("a watchdog reset", timing::a_watchdog_reset),
+    (
+        "overrun ticks do not feed the watchdog",
+        timing::overrun_ticks_do_not_feed,
+    ),
+    (
+        "FPU settings left behind by an interrupt",
+        timing::fpu_settings_left_behind,
+    ),
+    (
+        "FPU settings changed during the decoding",
+        timing::fpu_settings_changed_during_the_decoding,
+    ),
+    (
+        "FPU defaults that are wrong",
+        timing::fpu_defaults_that_are_wrong,
+    ),
+    ("no other node from the start", bus::alone_from_the_start),
+    (
+        "bus off for less than a tick",
+        bus::off_for_less_than_a_tick,
+    ),
+    ("zero: over a watchdog reset", zero::over_a_watchdog_reset),
+    ("zero: over a reset by the pin", zero::over_a_reset_by_pin),
+    ("zero: over power-on", zero::over_power_on),
+    ("zero: lost", zero::lost),
+    (
+        "start: supply that comes late",
+        start::supply_that_comes_late,
+    ),
+    ("start: crystal absent", start::no_crystal),
+    ("start: silent after bus-off", start::silent_after_bus_off),
+    ("start: crystal lost while running", start::crystal_lost),
+    (
+        "start: PLL does not lock to the crystal",
+        start::pll_without_lock,
+    ),
+    ("start: PLL dead", start::pll_dead),
+    ("start: CAN dead", start::can_dead),
+    ("start: CAN receive line low", start::receive_line_low),
+    ("start: the board", start::the_board),
+    ("parameters: one sound slot of two", parameters::one_usable),
+    ("parameters: the field model", parameters::the_field_model),
+    ("parameters: the first of two", parameters::the_first_of_two),
+    ("command: identify", commands::identify),
+    ("command: re-zero", commands::rezero),
+    (
+        "update: new parameters over the bus",
+        update::new_parameters,
+    ),
+    ("update: refused, and nothing is written", update::refused),
+    ("update: no random number twice", update::no_nonce_twice),
+    ("update: flash that fails", update::flash_that_fails),
+    ("update: supply that drops", update::supply_that_drops),
+    (
+        "update: a cut of the power leaves old or new",
+        power_cuts::in_an_update,
+    ),
+    (
+        "update: a reset runs what ran",
+        stopped::a_reset_runs_what_ran,
+    ),
+    (
+        "update: parameters that crash stop the program",
+        stopped::parameters_that_crash,
+    ),
+    (
+        "update: parameters whose check crashes stop the program",
+        stopped::parameters_whose_check_crashes,
+    ),
+    (
+        "command: a tag, or without a key the line",
+        authority::tag_or_line,
+    ),
+    (
+        "command: those of its own node alone",
+        neighbour::has_identifiers_and_a_period_of_its_own,
+    ),
+    ("command: any data length code", commands::any_length_code),
+    ("bus off and back", |b| {
+        bus::goes_and_comes_back(b, BusState::Off)
+    }),
+    ("no other node for a second", |b| {
+        bus::goes_and_comes_back(b, BusState::Alone)
+    }),
+    ("aborted on the wire: completed", |b| {
+        bus::aborted_on_the_wire(b, false)
+    }),
+    ("aborted on the wire: failed", |b| {
+        bus::aborted_on_the_wire(b, true)
+    }),
+    ("parameters: none usable", parameters::unusable),
+];
+
+const PARTS: [(Part, &str); 2] = [(Part::Ads131m08, "ads131m08"), (Part::Ads8688, "ads8688")];
+
 fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
     let mut check = |name: &str, run: &dyn Fn() -> Outcome| {
         if name.contains(filter) {
@@ -95,19 +231,12 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
         }
     };
     let whole = bench.rows.len() as u64;
-    let parts = [(Part::Ads131m08, "ads131m08"), (Part::Ads8688, "ads8688")];
-    for (part, name) in parts {
+    for (part, name) in PARTS {
         let ticks = if part == Part::Ads131m08 {
             ticks.max(whole)
         } else {
             whole
         };
-        check(&format!("{name}: flash and RAM"), &|| {
-            figures::flash_and_ram(bench, part, name)
-        });
-        check(&format!("{name}: interrupt to mailbox"), &|| {
-            figures::interrupt_to_mailbox(bench, part, name)
-        });
         check(
             &format!("{name}: the whole log gives the host's words"),
             &|| log::same_words(bench, part, ticks, name),
@@ -117,100 +246,13 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
                 sensors::survives(bench, part, &case)
             });
         }
+        for (what, run) in CHECKS_OF_PARTS {
+            check(&format!("{name}: {what}"), &|| run(bench, part, name));
+        }
     }
-    for (part, name) in parts {
-        check(&format!("{name}: dead from the start"), &|| {
-            sensors::dead_from_the_start(bench, part)
-        });
+    for (name, run) in CHECKS {
+        check(name, &|| run(bench));
     }
-    for (part, name) in parts {
-        check(&format!("{name}: transfers that never end"), &|| {
-            sensors::transfers_that_never_end(bench, part)
-        });
-    }
-    for (part, name) in parts {
-        check(&format!("{name}: temperatures"), &|| {
-            temperature::follow_the_stage(bench, part, name)
-        });
-    }
-    check("ads131m08: a pose is of its instant", &|| {
-        motion::a_pose_is_of_its_instant(bench)
-    });
-    check("ads131m08: a register changes at any time", &|| {
-        sensors::a_register_changes_at_any_time(bench)
-    });
-    check("ads131m08: whatever its sheet leaves open", &|| {
-        sensors::every_variant(bench)
-    });
-    check("a debugger reads the last pose", &|| {
-        log::a_debugger_reads_the_last_pose(bench)
-    });
-    check("received frames without room", &|| {
-        bus::received_frames_without_room(bench)
-    });
-    check("a tick that comes late", &|| timing::a_late_tick(bench));
-    check("ticks that never come", &|| {
-        timing::ticks_that_never_come(bench)
-    });
-    check("the clock wraps", &|| timing::the_clock_wraps(bench));
-    check("a watchdog reset", &|| timing::a_watchdog_reset(bench));
-    check("overrun ticks do not feed the watchdog", &|| {
-        timing::overrun_ticks_do_not_feed(bench)
-    });
-    check("FPU settings left behind by an interrupt", &|| {
-        timing::fpu_settings_left_behind(bench)
-    });
-    check("FPU settings changed during the decoding", &|| {
-        timing::fpu_settings_changed_during_the_decoding(bench)
-    });
-    check("FPU defaults that are wrong", &|| {
-        timing::fpu_defaults_that_are_wrong(bench)
-    });
-    check("bus off and back", &|| {
-        bus::goes_and_comes_back(bench, BusState::Off)
-    });
-    check("no other node for a second", &|| {
-        bus::goes_and_comes_back(bench, BusState::Alone)
-    });
-    check("no other node from the start", &|| {
-        bus::alone_from_the_start(bench)
-    });
-    check("bus off for less than a tick", &|| {
-        bus::off_for_less_than_a_tick(bench)
-    });
-    check("aborted on the wire: completed", &|| {
-        bus::aborted_on_the_wire(bench, false)
-    });
-    check("aborted on the wire: failed", &|| {
-        bus::aborted_on_the_wire(bench, true)
-    });
-    check("zero: over a watchdog reset", &|| {
-        zero::over_a_watchdog_reset(bench)
-    });
-    check("zero: over a reset by the pin", &|| {
-        zero::over_a_reset_by_pin(bench)
-    });
-    check("zero: over power-on", &|| zero::over_power_on(bench));
-    check("zero: lost", &|| zero::lost(bench));
-    check("start: supply that comes late", &|| {
-        start::supply_that_comes_late(bench)
-    });
-    check("start: crystal absent", &|| start::no_crystal(bench));
-    check("start: silent after bus-off", &|| {
-        start::silent_after_bus_off(bench)
-    });
-    check("start: crystal lost while running", &|| {
-        start::crystal_lost(bench)
-    });
-    check("start: PLL does not lock to the crystal", &|| {
-        start::pll_without_lock(bench)
-    });
-    check("start: PLL dead", &|| start::pll_dead(bench));
-    check("start: CAN dead", &|| start::can_dead(bench));
-    check("start: CAN receive line low", &|| {
-        start::receive_line_low(bench)
-    });
-    check("start: the board", &|| start::the_board(bench));
     match start::crashes(bench) {
         Ok(crashes) => {
             for crash in crashes {
@@ -221,74 +263,4 @@ fn run(bench: &Bench, ticks: u64, report: &mut Report, filter: &str) {
         }
         Err(failure) => check("crash", &|| Err(failure.to_string().into())),
     }
-    for (name, outcome) in parameters::unusable_kinds(bench) {
-        let outcome = std::cell::Cell::new(Some(outcome));
-        check(&format!("parameters: {name}"), &|| {
-            outcome.take().unwrap_or(Ok(()))
-        });
-    }
-    check("parameters: one sound slot of two", &|| {
-        parameters::one_usable(bench)
-    });
-    check("parameters: the field model", &|| {
-        parameters::the_field_model(bench)
-    });
-    check("parameters: the first of two", &|| {
-        parameters::the_first_of_two(bench)
-    });
-    check("command: identify", &|| commands::identify(bench));
-    check("command: answers outlive a failing bus", &|| {
-        commands::answers_outlive_a_failing_bus(bench)
-    });
-    check("command: re-zero", &|| commands::rezero(bench));
-    check("command: re-zero refused", &|| {
-        commands::rezero_refused(bench)
-    });
-    for (part, name) in parts {
-        check(&format!("command: record, {name}"), &|| {
-            commands::record(bench, part)
-        });
-        check(
-            &format!("command: order and age of frames, {name}"),
-            &|| commands::order_and_age(bench, part, name),
-        );
-    }
-    check("update: new parameters over the bus", &|| {
-        update::new_parameters(bench)
-    });
-    check("update: refused, and nothing is written", &|| {
-        update::refused(bench)
-    });
-    check("update: no random number twice", &|| {
-        update::no_nonce_twice(bench)
-    });
-    check("update: flash that fails", &|| {
-        update::flash_that_fails(bench)
-    });
-    check("update: supply that drops", &|| {
-        update::supply_that_drops(bench)
-    });
-    check("update: a cut of the power leaves old or new", &|| {
-        power_cuts::in_an_update(bench)
-    });
-    check("update: a reset runs what ran", &|| {
-        stopped::a_reset_runs_what_ran(bench)
-    });
-    check("update: parameters that crash stop the program", &|| {
-        stopped::parameters_that_crash(bench)
-    });
-    check(
-        "update: parameters whose check crashes stop the program",
-        &|| stopped::parameters_whose_check_crashes(bench),
-    );
-    check("command: a tag, or without a key the line", &|| {
-        authority::tag_or_line(bench)
-    });
-    check("command: those of its own node alone", &|| {
-        neighbour::has_identifiers_and_a_period_of_its_own(bench)
-    });
-    check("command: odd ones", &|| commands::odd_commands(bench));
-    check("command: any data length code", &|| {
-        commands::any_length_code(bench)
-    });
 }

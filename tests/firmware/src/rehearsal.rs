@@ -5,7 +5,7 @@
 use crate::adc_model::{Input, Part};
 use crate::bench::{Bench, Seen, rows};
 use crate::checks::update::{KEY, talk};
-use crate::checks::{Failure, Outcome, equal, expect};
+use crate::checks::{Failure, Outcome, expect, no_resets};
 use crate::machine::Machine;
 use hal_adapters::can::command::Request;
 use host_fit::input::dataset::{Dataset, Row};
@@ -114,8 +114,7 @@ pub fn judge(
     let text = std::fs::read_to_string(log)?;
     let (mut machine, ticks) = moving(bench, part, [&[], &blob], &text)?;
     machine.run_ticks(ticks - 1)?;
-    let resets = (machine.panics, machine.watchdog_resets);
-    equal("panics and watchdog resets", resets, (0, 0))?;
+    no_resets(&machine)?;
 
     let errors = errors(&mut machine, &dataset)?;
     let enough = errors.len() as u64 + 2 * TICKS_APART > ticks;

@@ -4,14 +4,10 @@ use clap::{Parser, Subcommand};
 use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
-use host_fit::output::pose_file;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use runtime::blob::MAX_BYTES;
-use runtime::{
-    AnyDecoder, Decode, Decoder, OnInvalid, ParameterSet, PlanarPose, Pose, PoseTracker, Reading,
-    Status, VerticalPose,
-};
+use runtime::{AnyDecoder, Decode, Decoder, ParameterSet};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -24,7 +20,6 @@ use tests::motion::{self, Section};
 /// `make` writes the frames of a log, random codes and random parameters into a job file, for
 /// Model (31) and for the field model, with and without temperatures; an
 /// image that does the job on the target answers with a file of words; `check` compares them.
-/// `poses` compares a pose file that a controller recorded with the host's decoder.
 #[derive(Parser)]
 struct Cli {
     #[command(subcommand)]
@@ -66,21 +61,6 @@ enum Command {
         /// The target's words.
         words: PathBuf,
     },
-    /// Compare recorded poses with the host's decoder.
-    Poses {
-        /// The parameter blob that the controller runs.
-        params: PathBuf,
-        /// The log of the codes.
-        log: PathBuf,
-        /// The stage that the log belongs to.
-        #[arg(long)]
-        stage: PathBuf,
-        /// The poses that the controller gave for them, in a pose file.
-        poses: PathBuf,
-        /// Ticks for which the controller holds what is invalid.
-        #[arg(long, default_value_t = 0)]
-        hold: u16,
-    },
 }
 
 fn main() -> ExitCode {
@@ -104,13 +84,6 @@ fn main() -> ExitCode {
         )
         .and_then(|bytes| Ok(std::fs::write(&out, bytes).map(|()| true)?)),
         Command::Check { job, words } => check(&job, &words),
-        Command::Poses {
-            params,
-            log,
-            stage,
-            poses,
-            hold,
-        } => check_poses(&params, &log, &stage, &poses, hold),
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,
@@ -237,79 +210,4 @@ fn check(job: &Path, words: &Path) -> Result<bool, Box<dyn Error>> {
         println!("{difference}");
     }
     Ok(*differing == 0 && *nans == 0 && *ticks > 0)
-}
-
-fn check_poses(
-    params: &Path,
-    log: &Path,
-    stage: &Path,
-    poses: &Path,
-    hold: u16,
-) -> Result<bool, Box<dyn Error>> {
-    let set: ParameterSet = read_blob(params)?;
-    let stage = Stage::from_file(stage)?;
-    let dataset = log::read(&[log], &stage, &ReadOptions::DECODE)?.dataset;
-    let on_invalid = match hold {
-        0 => OnInvalid::Zero,
-        ticks => OnInvalid::Hold { ticks },
-    };
-    let decoder = set.decoder();
-    let mut tracker = PoseTracker::new(decoder, on_invalid);
-    let mut host = Vec::with_capacity(dataset.rows.len());
-    for movement in &dataset.movements {
-        tracker.forget();
-        for row in &dataset.rows[movement.rows.clone()] {
-            let frame = &row.frame;
-            let reading = tracker.tick_with(frame.sequence(), |zero| frame.decode(&decoder, zero));
-            host.push((movement.index, row.t_us, reading));
-        }
-    }
-    let target = read_poses(poses)?;
-    if host.len() != target.len() {
-        let (rows, lines) = (host.len(), target.len());
-        return Err(format!("the log has {rows} rows and the pose file {lines}").into());
-    }
-    let mut differing = 0;
-    for (row, (host, target)) in host.iter().zip(&target).enumerate() {
-        let (movement, t_us, reading) = host;
-        let words = [reading, target].map(tests::job::answer);
-        if words[0] != words[1] {
-            differing += 1;
-            if differing <= 10 {
-                println!(
-                    "row {row} (movement {}, {} us): {:08x?} on the host, {:08x?} recorded; codes {:?}",
-                    movement, t_us, words[0], words[1], dataset.rows[row].frame,
-                );
-            }
-        }
-    }
-    println!("RESULT rows={}", host.len());
-    println!("RESULT differing_rows={differing}");
-    Ok(differing == 0 && !host.is_empty())
-}
-
-/// The readings of a pose file.
-fn read_poses(path: &Path) -> Result<Vec<Reading>, Box<dyn Error>> {
-    let text = std::fs::read_to_string(path)?;
-    let mut lines = text.lines();
-    if lines.next() != Some(pose_file::HEADER) {
-        return Err(format!("{} is no pose file", path.display()).into());
-    }
-    let reading = |line: &str| -> Result<Reading, Box<dyn Error>> {
-        let cells: Vec<&str> = line.split(',').collect();
-        let [_, _, words @ .., status] = cells.as_slice() else {
-            return Err(format!("too few cells: {line}").into());
-        };
-        let micro: Result<Vec<f64>, _> = words.iter().map(|cell| cell.parse()).collect();
-        let words: Vec<f32> = micro?.iter().map(|x| (x * 1e-6) as f32).collect();
-        let [x, y, rz, z, rx, ry] = words[..] else {
-            return Err(format!("not six words: {line}").into());
-        };
-        let planar = PlanarPose::from_array([x, y, rz]);
-        let vertical = VerticalPose::from_array([z, rx, ry]);
-        let pose = Pose { planar, vertical };
-        let status = Status::from_bits(status.parse()?);
-        Ok(Reading { pose, status })
-    };
-    lines.map(reading).collect()
 }

@@ -287,23 +287,6 @@ fn an_interrupted_update_closes_its_transfer() {
 }
 
 #[test]
-fn a_reset_runs_what_ran_until_what_is_stored_is_activated_or_the_power_comes_back() {
-    let mut world = World::new(Some(KEY), &[], 3);
-    let [old, new] = [OLD, NEW].map(crc_of);
-    assert!(world.update(&plan(NEW)).is_ok());
-    world.node.reset();
-    assert_eq!(world.node.running(), old);
-    // One fault, and another one long after it.
-    world.node.fault();
-    assert_eq!(world.node.running(), old);
-    (0..20_000).for_each(|_| drop(world.slot()));
-    world.node.fault();
-    assert_eq!(world.node.running(), old);
-    world.node.power_cycle();
-    assert_eq!(world.node.running(), new);
-}
-
-#[test]
 fn parameters_that_fault_twice_stop_the_node_until_it_goes_back() {
     let mut world = World::new(Some(KEY), &[], 6);
     let activating = Plan {

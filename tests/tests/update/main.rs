@@ -1,8 +1,7 @@
 //! A host and a node on one bus, in memory: the host's own script against the firmware's own
-//! node, with a lossy bus, two hosts, resets, cuts of the power, and a recording played again.
+//! node, with a lossy bus, two hosts, resets, and a recording played again.
 
 mod alone;
-mod cuts;
 mod hosts;
 mod world;
 

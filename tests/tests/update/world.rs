@@ -103,8 +103,6 @@ pub struct World {
     pub resets_us: Vec<u64>,
     /// The program faults so long after it was first activated, us.
     pub faults_after_activation_us: Vec<u64>,
-    /// What was in flash after each cut of the power.
-    pub after_cuts: Vec<Vec<u8>>,
     /// Answers of the node that no host hears.
     pub loses: fn(&Answer) -> bool,
 }
@@ -128,7 +126,6 @@ impl World {
             overruns: 0,
             resets_us: Vec::new(),
             faults_after_activation_us: Vec::new(),
-            after_cuts: Vec::new(),
             loses: |_| false,
         }
     }
@@ -163,20 +160,14 @@ impl World {
             self.fault();
         }
         let is_due = self.resets_us.first().is_some_and(|at| *at <= self.now_us);
-        let is_off = self.node.flash().is_off();
-        if is_due || is_off || self.node.is_to_be_reset() {
+        if is_due || self.node.is_to_be_reset() {
             if is_due {
                 self.resets_us.remove(0);
             }
-            if is_off {
-                self.node.power_cycle();
-                self.after_cuts.push(self.newest());
-            } else {
-                self.node.reset();
-                let faults = self.faults_after_activation_us.drain(..);
-                self.faults_us
-                    .extend(faults.map(|after| self.now_us + after));
-            }
+            self.node.reset();
+            let faults = self.faults_after_activation_us.drain(..);
+            self.faults_us
+                .extend(faults.map(|after| self.now_us + after));
             self.fifo.clear();
             self.deaf_until_us = self.now_us + START_US;
         }

@@ -2,9 +2,9 @@
 
 use super::log::Stage;
 use super::start::{first_state, row, tick_now};
-use super::{Outcome, equal, expect};
+use super::{Outcome, equal, expect, no_resets, same_words};
 use crate::adc_model::Part;
-use crate::bench::{Bench, Comparison, Seen, command};
+use crate::bench::{Bench, Seen, command};
 use crate::can_model::BusState;
 use hal_adapters::can::command::Request;
 use hal_adapters::can::status::flag;
@@ -14,11 +14,8 @@ const MS: u64 = 1_000_000;
 
 /// The bus goes away and comes back. The ticks go on; old poses are never sent late.
 pub fn goes_and_comes_back(bench: &Bench, bus: BusState) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ticks(100)?;
-    Seen::since_last(&mut machine);
-    let now_ns = machine.chip.now_ns;
-    machine.chip.can.set_bus(bus, now_ns);
+    let mut machine = bench.running(PART, 100)?;
+    machine.set_bus(bus);
     machine.run_ticks(500)?;
     let silent = Seen::since_last(&mut machine);
     expect(silent.axes.len() <= 6, || {
@@ -37,16 +34,10 @@ pub fn goes_and_comes_back(bench: &Bench, bus: BusState) -> Outcome {
         format!("{} dropped", meanwhile.frames_dropped)
     })?;
 
-    let now_ns = machine.chip.now_ns;
-    machine.chip.can.set_bus(BusState::Good, now_ns);
+    machine.set_bus(BusState::Good);
     machine.run_ticks(500)?;
     let after = Seen::since_last(&mut machine);
-    let mut comparison = Comparison::default();
-    comparison.add(&after.axes, &bench.poses, 0);
-    equal("words that differ after", comparison.differing, 0)?;
-    expect(comparison.planar >= 498, || {
-        format!("only {} poses after", comparison.planar)
-    })?;
+    same_words(&after.axes, &bench.poses, 0, 498)?;
     let first = after.axes.first().map_or(0, |axis| axis.tick);
     expect(first >= 598, || {
         format!("a pose of tick {first} was sent late")
@@ -60,11 +51,7 @@ pub fn goes_and_comes_back(bench: &Bench, bus: BusState) -> Outcome {
         off * flag::BUS_WAS_OFF,
     )?;
     equal("missed ticks", status.missed_ticks, 0)?;
-    equal(
-        "panics and watchdog resets",
-        (machine.panics, machine.watchdog_resets),
-        (0, 0),
-    )
+    no_resets(&machine)
 }
 
 /// A controller that starts alone on the bus runs, and is heard once other nodes are there.
@@ -77,32 +64,21 @@ pub fn alone_from_the_start(bench: &Bench) -> Outcome {
         Seen::since_last(&mut machine).axes.len(),
         0,
     )?;
-    let now_ns = machine.chip.now_ns;
-    machine.chip.can.set_bus(BusState::Good, now_ns);
+    machine.set_bus(BusState::Good);
     machine.run_ticks(100)?;
     let seen = Seen::since_last(&mut machine);
-    let mut comparison = Comparison::default();
-    comparison.add(&seen.axes, &bench.poses, 0);
-    equal("words that differ", comparison.differing, 0)?;
-    expect(comparison.planar >= 98, || {
-        format!("only {} poses", comparison.planar)
-    })?;
-    equal(
-        "panics and watchdog resets",
-        (machine.panics, machine.watchdog_resets),
-        (0, 0),
-    )
+    same_words(&seen.axes, &bench.poses, 0, 98)?;
+    no_resets(&machine)
 }
 
 /// A bus that is off for 0.3 ms, between two ticks, is counted.
 pub fn off_for_less_than_a_tick(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ns(200 * MS + 7 * MS / 10)?;
+    let before = Seen::since_last(&mut machine).last_status();
     equal(
         "times the bus was off before",
-        Seen::since_last(&mut machine)
-            .last_status()
-            .map(|s| s.bus_off),
+        before.map(|s| s.bus_off),
         Some(0),
     )?;
     let now_ns = machine.chip.now_ns;
@@ -119,9 +95,7 @@ pub fn off_for_less_than_a_tick(bench: &Bench) -> Outcome {
 /// A frame that is on the wire when its tick is over is sent once or, if it fails then, not at all,
 /// and no newer one overtakes it.
 pub fn aborted_on_the_wire(bench: &Bench, fails: bool) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ticks(100)?;
-    Seen::since_last(&mut machine);
+    let mut machine = bench.running(PART, 100)?;
     let dropped_before = Stage::read(&machine, bench, PART)?.frames_dropped;
     // Other nodes hold the bus from this tick's frames on until just before those of the next.
     let free_ns = machine.chip.now_ns + 2 * MS + 18 * MS / 100;
@@ -148,9 +122,7 @@ pub fn aborted_on_the_wire(bench: &Bench, fails: bool) -> Outcome {
     expect(count >= 9, || format!("only {count} poses"))?;
     let in_order = sent.is_sorted_by_key(|frame| frame.asked_ns);
     expect(in_order, || "a frame overtook an older one".to_owned())?;
-    let mut comparison = Comparison::default();
-    comparison.add(&seen.axes, &bench.poses, 0);
-    equal("words that differ", comparison.differing, 0)?;
+    same_words(&seen.axes, &bench.poses, 0, 0)?;
     let dropped = Stage::read(&machine, bench, PART)?.frames_dropped - dropped_before;
     expect(dropped >= 2, || format!("{dropped} frames dropped"))
 }

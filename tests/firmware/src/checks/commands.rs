@@ -1,10 +1,9 @@
 //! Commands over the bus.
 
 use super::asking::{answers, ask, ended};
-use super::{Outcome, equal, expect};
+use super::{Outcome, equal, expect, no_resets};
 use crate::adc_model::{Part, Row};
 use crate::bench::{Bench, Seen, command};
-use crate::can_model::BusState;
 use embedded_can::{Id, StandardId};
 use hal_adapters::can::command::{Outcome as Ended, Request};
 use hal_adapters::can::status::flag;
@@ -17,15 +16,9 @@ const PART: Part = Part::Ads131m08;
 const ADS131M08_SAMPLE_US: u32 = 166;
 const ADS8688_SAMPLE_US: u32 = 12;
 
-fn flags(seen: &Seen) -> u8 {
-    seen.last_status().map_or(0, |status| status.flags)
-}
-
 /// Identify: the serial number in six pages, the flag for as long as was asked, a fast LED.
 pub fn identify(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ticks(50)?;
-    Seen::since_last(&mut machine);
+    let mut machine = bench.running(PART, 50)?;
     let seen = ask(&mut machine, Request::Identify { seconds: 1 }, 1, 100)?;
     equal("answer", ended(&seen, 1), vec![Some(Ended::Done)])?;
     let text: Vec<u8> = seen
@@ -40,7 +33,7 @@ pub fn identify(bench: &Bench) -> Outcome {
         "stage-7".to_owned(),
     )?;
     equal("bytes of text", seen.identity.len(), 36)?;
-    equal("flag", flags(&seen) & flag::IDENTIFYING, flag::IDENTIFYING)?;
+    equal("flag", seen.flags() & flag::IDENTIFYING, flag::IDENTIFYING)?;
     let mut blinks = 0;
     let mut lit = machine.chip.led;
     for _ in 0..300 {
@@ -54,31 +47,9 @@ pub fn identify(bench: &Bench) -> Outcome {
     machine.run_ticks(300)?;
     equal(
         "flag afterwards",
-        flags(&Seen::since_last(&mut machine)) & flag::IDENTIFYING,
+        Seen::since_last(&mut machine).flags() & flag::IDENTIFYING,
         0,
     )
-}
-
-/// An answer and a serial number outlive a bus on which nobody listens; old poses do not.
-pub fn answers_outlive_a_failing_bus(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ticks(50)?;
-    let (id, bytes) = command(Request::Identify { seconds: 1 }, 1, 1);
-    machine.chip.can.receive(id, bytes);
-    let now_ns = machine.chip.now_ns;
-    machine.chip.can.set_bus(BusState::Alone, now_ns);
-    machine.run_ticks(100)?;
-    Seen::since_last(&mut machine);
-    let now_ns = machine.chip.now_ns;
-    machine.chip.can.set_bus(BusState::Good, now_ns);
-    machine.run_ticks(20)?;
-    let seen = Seen::since_last(&mut machine);
-    equal("answer", ended(&seen, 1), vec![Some(Ended::Done)])?;
-    equal("bytes of text", seen.identity.len(), 36)?;
-    let first = seen.axes.first().map_or(0, |axis| axis.tick);
-    expect(first >= 148, || {
-        format!("a pose of tick {first} was sent late")
-    })
 }
 
 /// Rows of a stage at rest, with the noise of a few codes around one row.
@@ -91,39 +62,6 @@ pub(super) fn at_rest(rest: [i32; 6]) -> Vec<Row> {
 
 pub(super) const REZERO: Request = Request::Rezero { ticks: 400 };
 pub(super) const SERVO_OFF: Request = Request::ServoOff { seconds: 3 };
-
-/// A stage that is not at rest at its zero is not re-zeroed, and the answer says why.
-pub fn rezero_refused(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ticks(50)?;
-    answers(&mut machine, &[(SERVO_OFF, 1, Ended::Done)])?;
-    let seen = ask(&mut machine, REZERO, 2, 460)?;
-    equal(
-        "answers while moving",
-        ended(&seen, 2),
-        vec![Some(Ended::Started), Some(Ended::Moved)],
-    )?;
-    equal(
-        "flag",
-        flags(&seen) & flag::REZERO_REFUSED,
-        flag::REZERO_REFUSED,
-    )?;
-    let short = Request::Rezero { ticks: 200 };
-    answers(&mut machine, &[(short, 3, Ended::TooShort)])?;
-
-    // At rest, 0.9 mm off, in range of the calibration or not.
-    let far = at_rest([14_000, 14_000, 0, 10, 20, -30]);
-    let mut machine = bench.machine_playing(PART, [&bench.blob, &[]], far)?;
-    machine.run_ticks(50)?;
-    answers(&mut machine, &[(SERVO_OFF, 1, Ended::Done)])?;
-    let seen = ask(&mut machine, REZERO, 2, 460)?;
-    let outcomes = ended(&seen, 2);
-    let refused = [Some(Ended::OutOfBounds), Some(Ended::Extrapolated)];
-    expect(
-        outcomes.len() == 2 && refused.contains(&outcomes[1]),
-        || format!("answers far from the zero are {outcomes:?}"),
-    )
-}
 
 /// With the servo off and the stage at rest a re-zero is done, and the pose is zero from then on
 /// until the zero is cleared; with the servo on neither is.
@@ -149,7 +87,7 @@ pub fn rezero(bench: &Bench) -> Outcome {
     )?;
     machine.run_ticks(100)?;
     let seen = Seen::since_last(&mut machine);
-    equal("flag", flags(&seen) & flag::REZERO_RUNS, flag::REZERO_RUNS)?;
+    equal("flag", seen.flags() & flag::REZERO_RUNS, flag::REZERO_RUNS)?;
     machine.run_ticks(350)?;
     let seen = Seen::since_last(&mut machine);
     equal(
@@ -159,7 +97,7 @@ pub fn rezero(bench: &Bench) -> Outcome {
     )?;
     equal(
         "flag",
-        flags(&seen) & (flag::ZERO_SET | flag::REZERO_RUNS),
+        seen.flags() & (flag::ZERO_SET | flag::REZERO_RUNS),
         flag::ZERO_SET,
     )?;
     let is_zero = |seen: &Seen| {
@@ -168,11 +106,6 @@ pub fn rezero(bench: &Bench) -> Outcome {
     };
     is_zero(&seen)?;
 
-    // The declaration has ended three seconds after it was made.
-    machine.run_ticks(1200)?;
-    answers(&mut machine, &[(Request::ClearZero, 6, Ended::ServoOn)])?;
-    machine.run_ticks(20)?;
-    is_zero(&Seen::since_last(&mut machine))?;
     answers(
         &mut machine,
         &[
@@ -189,16 +122,7 @@ pub fn rezero(bench: &Bench) -> Outcome {
     // The service pin overrules the declaration.
     machine.chip.servo_on = true;
     machine.run_ticks(1)?;
-    answers(&mut machine, &[(REZERO, 11, Ended::ServoOn)])?;
-    machine.chip.servo_on = false;
-    machine.run_ticks(1)?;
-
-    // A servo that goes on during a re-zero ends it.
-    let on = Request::ServoOff { seconds: 0 };
-    answers(&mut machine, &[(REZERO, 9, Ended::Started)])?;
-    machine.run_ticks(100)?;
-    let seen = ask(&mut machine, on, 10, 10)?;
-    equal("answer", ended(&seen, 9), vec![Some(Ended::ServoOn)])
+    answers(&mut machine, &[(REZERO, 11, Ended::ServoOn)])
 }
 
 /// Record mode: every tick's codes, after the pose, with parameters and without, until a command
@@ -216,7 +140,7 @@ pub fn record(bench: &Bench, part: Part) -> Outcome {
         equal("codes that nobody asked for", codes(&seen), 0)?;
         let seen = ask(&mut machine, Request::Record { on: true }, 1, 800)?;
         equal("answer", ended(&seen, 1), vec![Some(Ended::Done)])?;
-        equal("flag", flags(&seen) & flag::RECORDING, flag::RECORDING)?;
+        equal("flag", seen.flags() & flag::RECORDING, flag::RECORDING)?;
         let mut receiver = SensorReceiver::new(layout, Timing::default());
         let mut ticks: Vec<RawFrame> = Vec::new();
         for (done_ns, frame) in &seen.codes {
@@ -238,7 +162,7 @@ pub fn record(bench: &Bench, part: Part) -> Outcome {
             let ([a, b, c], [d, e, f]) = (tick.hall, tick.capacitive);
             [a, b, c, d, e, f]
         };
-        // Which tick is the first to be recorded, its codes tell.
+        // Its codes show which tick is the first of the record.
         let first = ticks.first().map(codes).ok_or("no ticks")?;
         let at = (50..90).find(|k| bench.rows[*k] == first);
         let rows = &bench.rows[at.ok_or("other codes than the converter's")?..];
@@ -321,39 +245,6 @@ pub fn order_and_age(bench: &Bench, part: Part, name: &str) -> Outcome {
     expect(oldest_us < 2_000, || format!("a frame of {oldest_us} us"))
 }
 
-/// Commands without parameters, unknown ones, damaged ones and repeated ones.
-pub fn odd_commands(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&[], &[]])?;
-    machine.run_ticks(50)?;
-    let seen = ask(&mut machine, Request::Rezero { ticks: 0 }, 1, 20)?;
-    equal(
-        "answer without parameters",
-        ended(&seen, 1),
-        vec![Some(Ended::NoParameters)],
-    )?;
-    let seen = ask(&mut machine, Request::Identify { seconds: 1 }, 2, 20)?;
-    equal(
-        "answer to identify",
-        ended(&seen, 2),
-        vec![Some(Ended::Done)],
-    )?;
-
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ticks(50)?;
-    Seen::since_last(&mut machine);
-    let (id, mut bytes) = command(Request::ServoOff { seconds: 1 }, 9, 1);
-    machine.chip.can.receive(id, bytes);
-    machine.chip.can.receive(id, bytes);
-    bytes[3] ^= 1;
-    machine.chip.can.receive(id, bytes);
-    machine.run_ticks(20)?;
-    equal(
-        "answers to one good frame of three",
-        ended(&Seen::since_last(&mut machine), 9).len(),
-        1,
-    )
-}
-
 /// Frames under the command's identifier with every data length code: none stops the program.
 pub fn any_length_code(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
@@ -363,11 +254,7 @@ pub fn any_length_code(bench: &Bench) -> Outcome {
         machine.chip.can.receive_coded(id, code, bytes);
         machine.run_ticks(20)?;
     }
-    equal(
-        "panics and watchdog resets",
-        (machine.panics, machine.watchdog_resets),
-        (0, 0),
-    )?;
+    no_resets(&machine)?;
     let seen = Seen::since_last(&mut machine);
     equal(
         "tokens answered",

@@ -1,7 +1,7 @@
 //! The whole log through converter, decoder and bus.
 
 use super::sensors::ticks_to_settle;
-use super::{Outcome, equal, expect};
+use super::{Outcome, equal, expect, no_resets};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen};
 use crate::machine::Machine;
@@ -62,11 +62,7 @@ pub fn same_words(bench: &Bench, part: Part, ticks: u64, name: &str) -> Outcome 
         || format!("only {} words", comparison.words),
     )?;
     equal("damaged frames", seen.damaged, 0)?;
-    equal(
-        "panics and watchdog resets",
-        (machine.panics, machine.watchdog_resets),
-        (0, 0),
-    )?;
+    no_resets(&machine)?;
     let state = seen
         .last_status()
         .map(|s| (s.state, s.missed_ticks, s.bus_off));

@@ -18,6 +18,9 @@ pub mod timing;
 pub mod update;
 pub mod zero;
 
+use crate::bench::{Axis, Comparison, Words};
+use crate::machine::Machine;
+
 /// Why a check failed.
 pub type Failure = Box<dyn std::error::Error>;
 /// How a check ended.
@@ -58,4 +61,19 @@ pub fn equal<T: PartialEq + core::fmt::Debug>(what: &str, found: T, wanted: T) -
     expect(found == wanted, || {
         format!("{what} is {found:?}, not {wanted:?}")
     })
+}
+
+/// Fails if the program panicked or the watchdog bit.
+pub fn no_resets(machine: &Machine) -> Outcome {
+    let resets = (machine.panics, machine.watchdog_resets);
+    equal("panics and watchdog resets", resets, (0, 0))
+}
+
+/// Fails unless every word from this tick on is the host's, and so many poses are there at least.
+pub fn same_words(axes: &[Axis], poses: &[Words], from: u64, least: u64) -> Outcome {
+    let mut comparison = Comparison::default();
+    comparison.add(axes, poses, from);
+    equal("words that differ", comparison.differing, 0)?;
+    let planar = comparison.planar;
+    expect(planar >= least, || format!("only {planar} poses"))
 }

@@ -2,11 +2,11 @@
 
 use super::log::Stage;
 use super::start::page;
-use super::{Outcome, equal, expect};
+use super::{Outcome, equal, expect, no_resets, same_words};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen, Words};
 use hal_adapters::can::status::{NodeState, board_check};
-use runtime::blob::{CRC_BYTES, MAX_BYTES};
+use runtime::blob::MAX_BYTES;
 use runtime::parameters::Text;
 use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
 
@@ -19,29 +19,9 @@ fn torn(blob: &[u8]) -> Vec<u8> {
     torn
 }
 
-/// The blob with another layout version, and the check that belongs to it.
-fn newer(blob: &[u8]) -> Vec<u8> {
-    let mut newer = blob.to_vec();
-    newer[4] = 9;
-    let body = newer.len() - CRC_BYTES;
-    let register = newer[..body].iter().fold(u32::MAX, |crc, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |c, _| {
-            c >> 1 ^ if c & 1 == 1 { 0x82f6_3b78 } else { 0 }
-        })
-    });
-    newer[body..].copy_from_slice(&(!register).to_le_bytes());
-    newer
-}
-
-fn foreign(blob: &[u8]) -> Vec<u8> {
-    let mut foreign = blob.to_vec();
-    foreign[..4].copy_from_slice(b"FONT");
-    foreign
-}
-
 /// Without usable parameters the controller runs, says why in every status frame and gives
 /// no pose.
-pub fn none_usable(
+fn none_usable(
     bench: &Bench,
     [slot_0, slot_1]: [&[u8]; 2],
     state: NodeState,
@@ -55,44 +35,28 @@ pub fn none_usable(
         format!("only {} status frames", seen.statuses.len())
     })?;
     for (tick, status) in &seen.statuses {
-        let found = (status.state, status.reason);
-        equal(
-            &format!("state at tick {tick}"),
-            found,
-            (Some(state), reason),
-        )?;
+        let (what, found) = (
+            format!("state at tick {tick}"),
+            (status.state, status.reason),
+        );
+        equal(&what, found, (Some(state), reason))?;
     }
     let stage = Stage::read(&machine, bench, PART)?;
     expect(stage.sequence >= 398, || {
         format!("only tick {}", stage.sequence)
     })?;
     equal("the pose in STAGE", stage.pose, [0; 6])?;
-    equal(
-        "panics and watchdog resets",
-        (machine.panics, machine.watchdog_resets),
-        (0, 0),
-    )
+    no_resets(&machine)
 }
 
-/// Every kind of unusable parameters.
-pub fn unusable_kinds(bench: &Bench) -> Vec<(&'static str, Outcome)> {
-    let (torn, newer, foreign) = (torn(&bench.blob), newer(&bench.blob), foreign(&bench.blob));
+/// Unusable parameters: both slots erased, a torn blob in either, the blob of another stage.
+pub fn unusable(bench: &Bench) -> Outcome {
+    let torn = torn(&bench.blob);
     let bad = NodeState::BadParameters;
-    let check = |slots, state, reason| none_usable(bench, slots, state, reason);
-    vec![
-        (
-            "both slots erased",
-            check([&[], &[]], NodeState::NoParameters, 2),
-        ),
-        ("a torn blob", check([&torn, &[]], bad, 7)),
-        ("a newer blob", check([&newer, &[]], bad, 4)),
-        ("something else in the slot", check([&foreign, &[]], bad, 3)),
-        (
-            "the blob of another stage",
-            check([&bench.other, &[]], bad, 10),
-        ),
-        ("a torn blob in slot 1", check([&[], &torn], bad, 0x17)),
-    ]
+    none_usable(bench, [&[], &[]], NodeState::NoParameters, 2)?;
+    none_usable(bench, [&torn, &[]], bad, 7)?;
+    none_usable(bench, [&bench.other, &[]], bad, 10)?;
+    none_usable(bench, [&[], &torn], bad, 0x17)
 }
 
 /// With one valid slot the controller uses it, and says what is wrong with the other.
@@ -108,18 +72,9 @@ pub fn one_usable(bench: &Bench) -> Outcome {
         let mut machine = bench.machine(PART, slots)?;
         machine.run_ticks(100)?;
         let seen = Seen::since_last(&mut machine);
-        let mut comparison = Comparison::default();
-        comparison.add(&seen.axes, &bench.poses, 0);
-        equal("words that differ", comparison.differing, 0)?;
-        expect(comparison.planar >= 98, || {
-            format!("only {} poses", comparison.planar)
-        })?;
-        let status = seen.last_status().ok_or("no status frame")?;
-        equal(
-            "state",
-            (status.state, status.reason),
-            (Some(NodeState::Running), reason),
-        )?;
+        same_words(&seen.axes, &bench.poses, 0, 98)?;
+        let state = Some((NodeState::Running, reason));
+        equal("state", seen.last_state(), state)?;
     }
     Ok(())
 }

@@ -103,11 +103,7 @@ fn print(name: &str, [first, second]: [Counts; 2]) {
 pub fn in_an_update(bench: &Bench) -> Outcome {
     let scene = Scene {
         bench,
-        before: |bench| {
-            let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-            machine.run_ticks(20)?;
-            Ok(machine)
-        },
+        before: |bench| bench.running(PART, 20),
         happens: |bench, machine| {
             let _cut_or_done = update(machine, &plan(&bench.later))?;
             Ok(())

@@ -5,7 +5,7 @@ mod cases;
 
 pub use cases::{Case, cases, ticks_to_settle};
 
-use super::{Outcome, equal, expect};
+use super::{Outcome, equal, expect, no_resets, same_words};
 use crate::adc_model::{AdcFault, Part};
 use crate::bench::{Axis, Bench, Comparison, Seen, Words};
 use crate::machine::Machine;
@@ -38,6 +38,10 @@ fn run_to(machine: &mut Machine, from: u64) -> Outcome {
     Ok(())
 }
 
+fn state(seen: &Seen) -> Option<NodeState> {
+    seen.last_state().map(|(state, _)| state)
+}
+
 /// The planar words of valid poses that differ from the host's.
 fn wrong_poses(axes: &[Axis], poses: &[Words]) -> u64 {
     let mut ticks: Vec<_> = axes
@@ -55,12 +59,7 @@ pub fn survives(bench: &Bench, part: Part, case: &Case) -> Outcome {
     let mut machine = bench.machine(part, [&bench.blob, &[]])?;
     run_to(&mut machine, BEFORE)?;
     let before = Seen::since_last(&mut machine);
-    let mut good = Comparison::default();
-    good.add(&before.axes, &bench.poses, ticks_to_settle(part));
-    equal("words that differ before", good.differing, 0)?;
-    expect(good.planar > 80, || {
-        format!("only {} poses before", good.planar)
-    })?;
+    same_words(&before.axes, &bench.poses, ticks_to_settle(part), 81)?;
 
     let now_ns = machine.chip.now_ns;
     case.event.happen(&mut machine.chip.adc, now_ns);
@@ -115,19 +114,12 @@ pub fn survives(bench: &Bench, part: Part, case: &Case) -> Outcome {
     } else {
         BEFORE + 1
     };
-    let mut good = Comparison::default();
-    // The first good frame tells that frames were missed before it; then all is as before.
-    good.add(&axes, &bench.poses, gone + 1 + case.back_within);
-    equal("words that differ after", good.differing, 0)?;
-    expect(good.planar > 200, || {
-        format!("only {} poses after", good.planar)
-    })?;
-    let state = after.last_status().and_then(|status| status.state);
-    equal("state after", state, Some(NodeState::Running))?;
+    // The first good frame says that frames were missed before it; then all is as before.
+    same_words(&axes, &bench.poses, gone + 1 + case.back_within, 201)?;
+    equal("state after", state(&after), Some(NodeState::Running))?;
     let damaged = before.damaged + during.damaged + after.damaged;
     equal("damaged frames", damaged, 0)?;
-    let resets = (machine.panics, machine.watchdog_resets);
-    equal("panics and watchdog resets", resets, (0, 0))
+    no_resets(&machine)
 }
 
 /// A converter that does not answer when the controller starts, and does later; one whose supply
@@ -138,8 +130,7 @@ pub fn dead_from_the_start(bench: &Bench, part: Part) -> Outcome {
         machine.chip.adc.fault = AdcFault::Line(0xff);
         run_to(&mut machine, 200)?;
         let seen = Seen::since_last(&mut machine);
-        let state = seen.last_status().and_then(|status| status.state);
-        equal("state", state, Some(NodeState::NoFrames))?;
+        equal("state", state(&seen), Some(NodeState::NoFrames))?;
         machine.chip.adc.fault = AdcFault::None;
         if late_supply {
             let now_ns = machine.chip.now_ns;
@@ -148,15 +139,10 @@ pub fn dead_from_the_start(bench: &Bench, part: Part) -> Outcome {
         run_to(&mut machine, 400)?;
         let seen = Seen::since_last(&mut machine);
         equal("wrong poses", wrong_poses(&seen.axes, &bench.poses), 0)?;
-        let mut good = Comparison::default();
         let first = 200 + 2 * RESTART + ticks_to_settle(part);
-        good.add(&seen.axes, &bench.poses, first);
-        equal("words that differ", good.differing, 0)?;
-        expect(good.planar >= 150, || format!("only {} poses", good.planar))?;
-        let state = seen.last_status().and_then(|status| status.state);
-        equal("state", state, Some(NodeState::Running))?;
-        let resets = (machine.panics, machine.watchdog_resets);
-        equal("panics and watchdog resets", resets, (0, 0))?;
+        same_words(&seen.axes, &bench.poses, first, 150)?;
+        equal("state", state(&seen), Some(NodeState::Running))?;
+        no_resets(&machine)?;
     }
     Ok(())
 }
@@ -171,21 +157,14 @@ pub fn transfers_that_never_end(bench: &Bench, part: Part) -> Outcome {
     let during = Seen::since_last(&mut machine);
     let valid = |axis: &&Axis| axis.status & Status::PLANAR_INVALID.bits() == 0;
     equal("valid poses", during.axes.iter().filter(valid).count(), 0)?;
-    let state = during.last_status().map(|s| (s.state, s.reason));
-    equal("state", state, Some((Some(NodeState::SensorFault), 1)))?;
+    let fault = Some((NodeState::SensorFault, 1));
+    equal("state", during.last_state(), fault)?;
     machine.chip.dma_stands = false;
     run_to(&mut machine, BEFORE + 300)?;
     let after = Seen::since_last(&mut machine);
-    let mut good = Comparison::default();
-    good.add(
-        &after.axes,
-        &bench.poses,
-        BEFORE + 20 + RESTART + ticks_to_settle(part),
-    );
-    equal("words that differ", good.differing, 0)?;
-    expect(good.planar > 200, || format!("only {} poses", good.planar))?;
-    let resets = (machine.panics, machine.watchdog_resets);
-    equal("panics and watchdog resets", resets, (0, 0))
+    let first = BEFORE + 20 + RESTART + ticks_to_settle(part);
+    same_words(&after.axes, &bench.poses, first, 201)?;
+    no_resets(&machine)
 }
 
 /// A register of the ADS131M08 that changes at any time of a period is reported two ticks later at the

@@ -3,7 +3,7 @@
 //! words of poses that were sent as valid and were wrong.
 
 use super::log::Stage;
-use super::{Failure, Outcome, equal, expect};
+use super::{Failure, Outcome, equal, expect, no_resets};
 use crate::adc_model::Part;
 use crate::bench::{Axis, Bench, Seen};
 use crate::callbacks::Injected;
@@ -115,7 +115,7 @@ pub fn supply_that_comes_late(bench: &Bench) -> Outcome {
     expect(raised_ns > LATE_NS, || {
         format!("the PLL runs at {raised_ns} ns")
     })?;
-    equal("resets", (machine.panics, machine.watchdog_resets), (0, 0))?;
+    no_resets(&machine)?;
     let seen = Seen::since_last(&mut machine);
     expect(valid(&seen.axes) > 700, || "too few poses".to_owned())?;
     row(
@@ -137,8 +137,7 @@ pub fn no_crystal(bench: &Bench) -> Outcome {
     equal("checks", checks, Some(board_check::INTERNAL_OSCILLATOR))?;
     equal("fault", reported_fault(&seen), Some([0; 3]))?;
     expect(valid(&seen.axes) > 1800, || "too few poses".to_owned())?;
-    let resets = (machine.panics, machine.watchdog_resets);
-    equal("resets", resets, (0, 0))?;
+    no_resets(&machine)?;
     let reported = first_state(&seen, flag::INTERNAL_OSCILLATOR);
     let reported = since_power_on(&machine, reported, 10)?;
     row(bench, "crystal absent", 0, reported, &seen.axes)
@@ -151,8 +150,7 @@ pub fn silent_after_bus_off(bench: &Bench) -> Outcome {
     machine.chip.clocks.crystal = false;
     machine.run_ticks(100)?;
     for bus in [BusState::Off, BusState::Good] {
-        let now_ns = machine.chip.now_ns;
-        machine.chip.can.set_bus(bus, now_ns);
+        machine.set_bus(bus);
         machine.run_ticks(10)?;
     }
     Seen::since_last(&mut machine);
@@ -247,8 +245,7 @@ pub fn can_dead(bench: &Bench) -> Outcome {
         stage.pose,
         bench.poses[stage.sequence as usize].words,
     )?;
-    let resets = (machine.panics, machine.watchdog_resets);
-    equal("resets", resets, (0, 0))?;
+    no_resets(&machine)?;
     let frames = Seen::since_last(&mut machine).axes.len();
     println!(
         "FAULT   controller | CAN does not start | shown by the light from tick 1 on | {frames}"

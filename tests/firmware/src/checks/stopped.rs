@@ -19,8 +19,7 @@ const CHECK: &str = "10from_flash";
 
 /// A blob that is stored waits: over resets of any cause what ran before runs, until power-on.
 pub fn a_reset_runs_what_ran(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ticks(20)?;
+    let mut machine = bench.running(PART, 20)?;
     update(&mut machine, &plan(&bench.later))?.0?;
     machine.reset_by_pin();
     equal("after the pin", running(&mut machine)?, bench.blob.clone())?;
@@ -110,8 +109,6 @@ fn has_stopped(machine: &mut Machine) -> Outcome {
     Seen::since_last(machine);
     machine.run_ticks(40)?;
     let seen = Seen::since_last(machine);
-    let status = seen.last_status().ok_or("no state")?;
-    let state = (status.state, status.reason);
-    equal("state", state, (Some(NodeState::Stopped), 1))?;
+    equal("state", seen.last_state(), Some((NodeState::Stopped, 1)))?;
     equal("words of poses", seen.axes.len(), 0)
 }

@@ -2,9 +2,9 @@
 
 use super::log::Stage;
 use super::update::talk;
-use super::{Outcome, equal, expect};
+use super::{Outcome, equal, expect, no_resets, same_words};
 use crate::adc_model::Part;
-use crate::bench::{Bench, Comparison, Seen};
+use crate::bench::{Bench, Seen};
 use hal_adapters::can::status::{NodeState, flag};
 use host_fit::bus::update::{UpdateError, on};
 use runtime::Status;
@@ -13,10 +13,6 @@ const PART: Part = Part::Ads131m08;
 const MS: u64 = 1_000_000;
 /// FPSCR that rounds towards zero and flushes subnormal numbers.
 const OTHER_SETTINGS: u32 = 0b111 << 22;
-
-fn flags(seen: &Seen) -> u8 {
-    seen.last_status().map_or(0, |status| status.flags)
-}
 
 /// All ticks but these few send X within 0.4 ms of when they were due.
 fn stays_in_step(seen: &Seen, late: usize) -> Outcome {
@@ -32,23 +28,10 @@ pub fn a_late_tick(bench: &Bench) -> Outcome {
     machine.hold_ns = MS / 2;
     machine.run_ticks(100)?;
     let seen = Seen::since_last(&mut machine);
-    let mut comparison = Comparison::default();
-    comparison.add(&seen.axes, &bench.poses, 0);
-    equal("words that differ", comparison.differing, 0)?;
-    expect(comparison.planar >= 198, || {
-        format!("only {} poses", comparison.planar)
-    })?;
-    equal(
-        "missed ticks reported",
-        seen.last_status().map(|s| s.missed_ticks),
-        Some(1),
-    )?;
+    same_words(&seen.axes, &bench.poses, 0, 198)?;
+    equal("missed ticks reported", seen.missed_ticks(), Some(1))?;
     stays_in_step(&seen, 1)?;
-    equal(
-        "panics and watchdog resets",
-        (machine.panics, machine.watchdog_resets),
-        (0, 0),
-    )
+    no_resets(&machine)
 }
 
 /// Ticks that never come keep their numbers, and the schedule stays where it was.
@@ -64,29 +47,19 @@ pub fn ticks_that_never_come(bench: &Bench) -> Outcome {
         .iter()
         .find(|a| a.status == Status::FRAMES_MISSED.bits());
     let gap = gap.ok_or("no pose reports missed frames")?.tick;
-    let mut comparison = Comparison::default();
     let others: Vec<_> = seen
         .axes
         .iter()
         .filter(|a| a.tick != gap)
         .copied()
         .collect();
-    comparison.add(&others, &bench.poses, 0);
-    equal("words that differ", comparison.differing, 0)?;
+    same_words(&others, &bench.poses, 0, 0)?;
     expect(others.iter().any(|a| a.tick > gap + 100), || {
         "no poses after".to_owned()
     })?;
-    equal(
-        "missed ticks reported",
-        seen.last_status().map(|s| s.missed_ticks),
-        Some(3),
-    )?;
+    equal("missed ticks reported", seen.missed_ticks(), Some(3))?;
     stays_in_step(&seen, 1)?;
-    equal(
-        "panics and watchdog resets",
-        (machine.panics, machine.watchdog_resets),
-        (0, 0),
-    )
+    no_resets(&machine)
 }
 
 /// The watchdog bites when ticks stay away; the program starts again, says so and goes on.
@@ -94,14 +67,14 @@ pub fn a_watchdog_reset(bench: &Bench) -> Outcome {
     let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
     machine.run_ticks(1000)?;
     let before = Seen::since_last(&mut machine);
-    equal("the flag before", flags(&before) & flag::WATCHDOG_RESET, 0)?;
+    equal("the flag before", before.flags() & flag::WATCHDOG_RESET, 0)?;
     machine.hold_ns = 60 * MS;
     machine.run_ticks(2000)?;
     equal("watchdog resets", machine.watchdog_resets, 1)?;
     let after = Seen::since_last(&mut machine);
     equal(
         "the flag after",
-        flags(&after) & flag::WATCHDOG_RESET,
+        after.flags() & flag::WATCHDOG_RESET,
         flag::WATCHDOG_RESET,
     )?;
     let good = after.axes.iter().filter(|a| a.status == 0).count();
@@ -142,12 +115,7 @@ pub fn fpu_settings_left_behind(bench: &Bench) -> Outcome {
     }
     machine.set_fpscr(0);
     let seen = Seen::since_last(&mut machine);
-    let mut comparison = Comparison::default();
-    comparison.add(&seen.axes, &bench.poses, 0);
-    equal("words that differ", comparison.differing, 0)?;
-    expect(comparison.planar > 190, || {
-        format!("only {} poses", comparison.planar)
-    })?;
+    same_words(&seen.axes, &bench.poses, 0, 191)?;
     let counted = Stage::read(&machine, bench, PART)?.fpu_restored;
     expect(counted >= 50, || format!("only {counted} counted"))
 }
@@ -171,12 +139,7 @@ pub fn fpu_settings_changed_during_the_decoding(bench: &Bench) -> Outcome {
     machine.chip.fpscr_to_write = 0;
     machine.run_ticks(100)?;
     let after = Seen::since_last(&mut machine);
-    let mut comparison = Comparison::default();
-    comparison.add(&after.axes, &bench.poses, 203);
-    equal("words that differ after", comparison.differing, 0)?;
-    expect(comparison.planar > 80, || {
-        format!("only {} poses after", comparison.planar)
-    })
+    same_words(&after.axes, &bench.poses, 203, 81)
 }
 
 /// The clock of 32 bits wraps after 71 minutes: no tick is lost or doubled.
@@ -185,18 +148,9 @@ pub fn the_clock_wraps(bench: &Bench) -> Outcome {
     machine.chip.timer_offset_us = u32::MAX - 200_500;
     machine.run_ticks(300)?;
     let seen = Seen::since_last(&mut machine);
-    let mut comparison = Comparison::default();
-    comparison.add(&seen.axes, &bench.poses, 0);
-    equal("words that differ", comparison.differing, 0)?;
-    expect(comparison.planar >= 298, || {
-        format!("only {} poses", comparison.planar)
-    })?;
+    same_words(&seen.axes, &bench.poses, 0, 298)?;
     stays_in_step(&seen, 0)?;
-    equal(
-        "missed ticks",
-        seen.last_status().map(|s| s.missed_ticks),
-        Some(0),
-    )
+    equal("missed ticks", seen.missed_ticks(), Some(0))
 }
 
 /// A core that would give interrupts wrong settings fails the self-test: no pose, and the state
@@ -225,6 +179,5 @@ pub fn fpu_defaults_that_are_wrong(bench: &Bench) -> Outcome {
     let (read, _) = talk(&mut machine, |talk| on::read_back(talk, &mut |_, _| {}))?;
     let read = read.map(|(_, blob)| blob);
     equal("running", read, Err(UpdateError::NothingRuns))?;
-    let resets = (machine.panics, machine.watchdog_resets);
-    equal("panics and watchdog resets", resets, (0, 0))
+    no_resets(&machine)
 }

@@ -4,16 +4,16 @@ use super::asking::{answers, ask};
 use super::commands::SERVO_OFF;
 use super::parameters::{FIELD, poses_of};
 use super::start::page;
-use super::{Failure, Outcome, equal, expect};
+use super::{Failure, Outcome, equal, expect, same_words};
 use crate::adc_model::Part;
-use crate::bench::{Bench, Comparison, Seen, Words};
+use crate::bench::{Bench, Seen, Words};
 use crate::flash_model::Failing;
 use crate::machine::Machine;
 use embedded_can::{Frame, Id, StandardId};
-use hal_adapters::can::command::{Content, Mailbox, Outcome as Ended, Request};
+use hal_adapters::can::BusFrame;
+use hal_adapters::can::command::{Outcome as Ended, Request};
 use hal_adapters::can::status::{NodeState, NodeStatus, board_check};
-use hal_adapters::can::update::{Key, TAG_INDEX, UpdateData, UpdateRequest};
-use hal_adapters::can::{BusFrame, Coded};
+use hal_adapters::can::update::{Key, UpdateRequest};
 use host_fit::bus::update::{Identity, Link, Plan, Talk, UpdateError, Updated, Wanted, on};
 use runtime::blob::MAX_BYTES;
 use runtime::parameters::Text;
@@ -142,12 +142,7 @@ fn starts_with(bench: &Bench, machine: &Machine, poses: &[Words]) -> Outcome {
     let mut next = bench.machine(PART, [&[], &[]])?;
     next.chip.flash.bytes.clone_from(&machine.chip.flash.bytes);
     next.run_ticks(200)?;
-    let mut comparison = Comparison::default();
-    comparison.add(&Seen::since_last(&mut next).axes, poses, 0);
-    equal("words that differ", comparison.differing, 0)?;
-    expect(comparison.planar >= 198, || {
-        format!("only {} poses", comparison.planar)
-    })
+    same_words(&Seen::since_last(&mut next).axes, poses, 0, 198)
 }
 
 /// The field model's example as one of this stage, with the longest text of its time.
@@ -163,9 +158,7 @@ pub(super) fn large() -> Result<Vec<u8>, Failure> {
 /// stand and the watchdog does not bite; the next power-on runs it. Another one takes its place and is
 /// activated at once; back is to the one that ran before.
 pub fn new_parameters(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ticks(100)?;
-    Seen::since_last(&mut machine);
+    let mut machine = bench.running(PART, 100)?;
     let large = large()?;
     let from_ns = machine.chip.now_ns;
     let (updated, seen) = update(&mut machine, &plan(&large))?;
@@ -232,85 +225,36 @@ pub fn new_parameters(bench: &Bench) -> Outcome {
     })
 }
 
-/// A wrong key, no key, another stage's blob, the service pin, a stale sequence number, a generator
-/// of random numbers that is broken.
+/// A key that is not the program's, the service pin, a generator of random numbers that is broken.
 pub fn refused(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ticks(100)?;
-    let (updated, _) = update(&mut machine, &plan(&bench.later))?;
-    updated?;
-    let operations = machine.chip.flash.operations;
-    let with_key = |key| Plan {
-        key,
-        ..plan(&bench.blob)
+    let mut machine = bench.running(PART, 100)?;
+    let other = Plan {
+        key: Some([0; 16]),
+        ..plan(&bench.later)
     };
-    let other_stage = Plan {
-        serial: None,
-        ..plan(&bench.other)
-    };
-    let [expected, found] = ["stage-8", "stage-7"].map(str::to_owned);
-    for (plan, want) in [
-        (with_key(Some([0; 16])), UpdateError::NotAuthorised),
-        (with_key(None), UpdateError::KeyNeeded),
-        (other_stage, UpdateError::OtherStage { expected, found }),
-    ] {
-        let (refused, _) = update(&mut machine, &plan)?;
-        equal("the end", refused, Err(want))?;
-    }
+    let (refused, _) = update(&mut machine, &other)?;
+    equal("the end", refused, Err(UpdateError::NotAuthorised))?;
     machine.chip.servo_on = true;
-    let (refused, _) = update(&mut machine, &plan(&bench.blob))?;
+    let (refused, _) = update(&mut machine, &plan(&bench.later))?;
     expect(matches!(refused, Err(UpdateError::ServoOn { .. })), || {
         format!("with the servo on: {refused:?}")
     })?;
     machine.chip.servo_on = false;
     machine.run_ticks(2)?;
-    let request = Request::Update;
-    answers(
-        &mut machine,
-        &[
-            (Request::ServoOff { seconds: 0 }, 99, Ended::Done),
-            (request(UpdateRequest::begin(0, 0)), 100, Ended::ServoOn),
-            (SERVO_OFF, 101, Ended::Done),
-            (request(UpdateRequest::begin(1, 0)), 102, Ended::Done),
-            (request(UpdateRequest::begin(1, 0)), 103, Ended::Busy),
-            (
-                request(UpdateRequest::Commit { sequence: 2 }),
-                102,
-                Ended::Incomplete,
-            ),
-            (request(UpdateRequest::Abort), 102, Ended::Done),
-            (request(UpdateRequest::begin(1, 0)), 104, Ended::Done),
-        ],
-    )?;
-    let mut host = Mailbox::default();
-    for index in (TAG_INDEX..TAG_INDEX + 4).chain([0]) {
-        let (token, word) = (104, 0);
-        let data = host.send(&Content::UpdateData(UpdateData { token, index, word }));
-        let Coded { message, bytes } = data.ok_or("a word")?;
-        machine.chip.can.receive(message.spec().id, bytes);
-        machine.run_ticks(1)?;
-    }
-    let stale = request(UpdateRequest::Commit { sequence: 1 });
-    answers(&mut machine, &[(stale, 104, Ended::WrongSequence)])?;
-    answers(
-        &mut machine,
-        &[(request(UpdateRequest::Abort), 104, Ended::Done)],
-    )?;
     machine.chip.random.broken = true;
-    let (refused, _) = update(&mut machine, &plan(&bench.blob))?;
+    let (refused, _) = update(&mut machine, &plan(&bench.later))?;
     expect(matches!(refused, Err(UpdateError::NoRandomNumber)), || {
         format!("without random numbers: {refused:?}")
     })?;
     machine.chip.random.broken = false;
-    equal("operations", machine.chip.flash.operations, operations)?;
-    let (updated, _) = update(&mut machine, &plan(&bench.blob))?;
-    equal("once all is well", updated?.sequence, Some(2))
+    equal("operations", machine.chip.flash.operations, 0)?;
+    let (updated, _) = update(&mut machine, &plan(&bench.later))?;
+    equal("once all is well", updated?.sequence, Some(1))
 }
 
 /// Every transfer has a random number of its own: what was proven for one proves nothing for another.
 pub fn no_nonce_twice(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ticks(20)?;
+    let mut machine = bench.running(PART, 20)?;
     answers(&mut machine, &[(SERVO_OFF, 99, Ended::Done)])?;
     let mut nonces: Vec<[u32; 4]> = Vec::new();
     for token in 100..104 {
@@ -346,8 +290,7 @@ pub fn flash_that_fails(bench: &Bench) -> Outcome {
         (50, Failing::Reported),
         (50, Failing::Silent),
     ] {
-        let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-        machine.run_ticks(20)?;
+        let mut machine = bench.running(PART, 20)?;
         let from = machine.chip.flash.operations + word;
         machine.chip.flash.fails = Some((from, failing));
         let (ended, _) = update(&mut machine, &plan(&bench.later))?;
@@ -375,8 +318,7 @@ pub fn supply_that_drops(bench: &Bench) -> Outcome {
     let operations = whole.chip.flash.operations;
     // Without its seal the blob counts, and a start seals it.
     for at in 0..operations - 1 {
-        let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-        machine.run_ticks(20)?;
+        let mut machine = bench.running(PART, 20)?;
         machine.chip.supply_drops_at = Some(at);
         let (ended, _) = update(&mut machine, &plan(&bench.later))?;
         equal("the end", ended, Err(UpdateError::SupplyLow))?;

@@ -30,8 +30,11 @@ fn expect_zero(seen: &Seen, is_set: bool) -> Outcome {
     let (valid, near) = near_zero(seen);
     expect(valid > 200, || format!("only {valid} poses"))?;
     equal("poses at the zero", near, if is_set { valid } else { 0 })?;
-    let set = seen.last_status().ok_or("no state")?.flags & flag::ZERO_SET;
-    equal("flag", set, if is_set { flag::ZERO_SET } else { 0 })
+    equal(
+        "flag",
+        seen.flags() & flag::ZERO_SET,
+        if is_set { flag::ZERO_SET } else { 0 },
+    )
 }
 
 /// A controller whose stage was re-zeroed at rest.
@@ -118,9 +121,8 @@ pub fn lost(bench: &Bench) -> Outcome {
         machine.run_ticks(300)?;
         let seen = Seen::since_last(&mut machine);
         equal("words of poses", seen.axes.len(), 0)?;
-        let status = seen.last_status().ok_or("no state")?;
-        let state = (status.state, status.reason);
-        equal("state", state, (Some(NodeState::Stopped), reason))?;
+        let stopped = Some((NodeState::Stopped, reason));
+        equal("state", seen.last_state(), stopped)?;
         equal("checks", page(&seen, 11), Some(board_check::ZERO_LOST))?;
         println!("FAULT   controller | {fault} | in the first state | 0");
     }

@@ -6,7 +6,7 @@
 
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use hal_adapters::can::command::{Command, Mailbox, Request, Content};
+use hal_adapters::can::command::{Command, Content, Mailbox, Request};
 use hal_adapters::can::service::Updates;
 use hal_adapters::can::update::{Change, Identity, Kept, NotWritten, Receiver, Running, Store};
 use hal_adapters::can::{
