@@ -187,14 +187,6 @@ fn every_flipped_bit_of_a_frame_is_noticed() {
 }
 
 #[test]
-fn a_line_that_never_moves_is_silent() {
-    for level in [0x00, 0xff] {
-        let first = frame(0xa100, 0, vec![level; FRAME_BYTES]);
-        assert_eq!(ticks(&first), [Err(AdcError::Silent { level })]);
-    }
-}
-
-#[test]
 fn a_part_that_was_reset_locked_or_changed_meanwhile_is_not_read() {
     for found in [0x053f, 0x813f, 0x113f, 0x033f, 0x213f] {
         let error = AdcError::WrongSetting {
@@ -269,45 +261,6 @@ fn every_register_is_read_back_in_turn() {
         bus.done();
         pin.done();
     }
-}
-
-#[test]
-fn a_second_tick_without_resynchronisation_means_a_broken_wire() {
-    let good = || answer(0x013f, QUIET);
-    let all = [
-        tick(0, 0x02, 0x2110, answer(0x413f, QUIET)),
-        tick(0x013f, 0x03, 0x3f06, good()),
-        tick(0x413f, 0x04, 0, good()),
-        tick(0x013f, 0x05, 0, good()),
-        tick(0x013f, 0x06, 0x0600, good()),
-        tick(0x413f, 0x07, 0, good()),
-    ];
-    let errors = ticks::<6>(&all.concat()).map(|tick| tick.err());
-    let lost = Some(AdcError::NoSync);
-    assert_eq!(errors, [None, None, None, None, lost, None]);
-}
-
-#[test]
-fn a_start_that_fails_is_followed_by_a_reset_that_lasts_a_period() {
-    let mut all = frame(0x0011, 0, answer(0, QUIET));
-    all.extend(frame(0xa000, 0, answer(0x0011, QUIET)));
-    all.extend(started().concat());
-    let mut bus = Mock::new(&all);
-    let (low, high) = (
-        PinTransaction::set(State::Low),
-        PinTransaction::set(State::High),
-    );
-    let starts = [high.clone(), low.clone(), low.clone(), high.clone()];
-    let mut pin = PinMock::new(&[&starts[..], &[high.clone(), low, high]].concat());
-    let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
-    let mut delay = NoopDelay::new();
-    assert!(adc.start(&mut delay).is_err());
-    assert_eq!(adc.trigger(&mut delay), Ok(()));
-    assert_eq!(adc.trigger(&mut delay), Ok(()));
-    assert_eq!(adc.start(&mut delay), Ok(()));
-    assert_eq!(adc.trigger(&mut delay), Ok(()));
-    bus.done();
-    pin.done();
 }
 
 #[test]

@@ -90,29 +90,6 @@ fn tick(register: u8, value: u8) -> Vec<Transaction<u8>> {
 }
 
 #[test]
-fn codes_count_from_24_ms_after_the_first_sample_of_a_start() {
-    let ticks = [tick(0x01, 0x3f), tick(0x02, 0xc0), tick(0x03, 0x43)];
-    let all = [started(), ticks.concat(), started(), tick(0x01, 0x3f)].concat();
-    let levels = [
-        PinTransaction::set(State::High),
-        PinTransaction::set(State::High),
-    ];
-    on_part(&all, &levels, |adc| {
-        let not_ready = Err(AdcError::NotReady {
-            ready: 0,
-            read: 0x3f,
-        });
-        let first = u32::MAX - 10_000; // The timer wraps in between.
-        assert_eq!(adc.start(&mut NoopDelay::new()), Ok(()));
-        assert_eq!(adc.sample(0, first), not_ready);
-        assert_eq!(adc.sample(1, first.wrapping_add(23_999)), not_ready);
-        assert!(adc.sample(2, first.wrapping_add(24_000)).is_ok());
-        assert_eq!(adc.start(&mut NoopDelay::new()), Ok(()));
-        assert_eq!(adc.sample(3, first.wrapping_add(26_000)), not_ready);
-    });
-}
-
-#[test]
 fn every_register_is_read_back_in_turn() {
     let wanted = [
         (0x01, 0x3f),
@@ -210,30 +187,6 @@ fn a_code_of_another_range_is_refused() {
         };
         assert_eq!(try_sample(all), Err(error));
     }
-}
-
-#[test]
-fn a_line_that_never_moves_is_silent() {
-    let mut low = frame([0xa0, 0x00], [0, 0, 0]);
-    low.extend(frame([0, 0], [0, 0, 0]));
-    assert_eq!(try_sample(low), Err(AdcError::Silent { level: 0 }));
-    let high = |out: u8| {
-        let sent = vec![out, 0, 0, 0, 0, 0];
-        let all = [
-            Transaction::transaction_start(),
-            Transaction::transfer_in_place(sent, vec![0xff; 6]),
-            Transaction::transaction_end(),
-        ];
-        all.to_vec()
-    };
-    assert_eq!(
-        try_sample([high(0xa0), high(0)].concat()),
-        Err(AdcError::Silent { level: 0xff })
-    );
-    assert_eq!(
-        try_start([high(0x85), high(0x02)].concat()),
-        Err(AdcError::Silent { level: 0xff })
-    );
 }
 
 #[test]

@@ -35,7 +35,7 @@ def in_environment():
 
 def ours():
     """The RESULT lines of the benchmark, which also writes rows.csv and unknowns.csv."""
-    command = ["cargo", "bench", "-p", "host-fit", "--bench", "search", "--", "--export", FOLDER]
+    command = ["cargo", "bench", "-p", "host-fit", "--bench", "search", "--", FOLDER]
     output = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
     lines = [line.split()[1].split("=") for line in output.splitlines() if line.startswith("RESULT")]
     return {key: float(value) for key, value in lines}

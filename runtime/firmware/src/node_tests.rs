@@ -141,16 +141,6 @@ fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Content> {
 }
 
 #[test]
-fn pose_frames_come_first_in_the_order_of_their_identifiers() {
-    let mut node = node();
-    for k in 0..32 {
-        let frames = tick(&mut node, Ok(frame(k)));
-        let planar: Vec<_> = frames.iter().take(3).map(|coded| coded.message).collect();
-        assert_eq!(planar, [Message::PoseX, Message::PoseY, Message::PoseRz]);
-    }
-}
-
-#[test]
 fn every_sixteenth_tick_sends_the_state_and_half_way_a_counter() {
     let mut node = node();
     for k in 0..64u32 {
@@ -161,102 +151,6 @@ fn every_sixteenth_tick_sends_the_state_and_half_way_a_counter() {
         let health = contents.iter().any(|t| matches!(t, Content::Health(_)));
         assert_eq!((status, health), (k % 16 == 0, k % 16 == 8), "{k}");
     }
-}
-
-#[test]
-fn a_bus_that_was_off_is_reported_at_once() {
-    let mut node = node();
-    tick(&mut node, Ok(frame(0)));
-    let facts = Facts {
-        bus_off: 1,
-        ..Facts::default()
-    };
-    let mut states = |k| {
-        let mut outbox = Outbox::new();
-        node.tick(Ok(frame(k)), &facts, &mut Disturbed::default(), &mut outbox);
-        let frames: Vec<_> = core::iter::from_fn(|| outbox.pop()).collect();
-        let contents = contents(&frames);
-        contents
-            .iter()
-            .filter(|t| matches!(t, Content::Status(s) if s.bus_off == 1))
-            .count()
-    };
-    assert_eq!([1, 2, 3].map(&mut states), [1, 0, 0]);
-}
-
-#[test]
-fn a_fault_of_the_converter_is_a_state_and_an_invalid_pose() {
-    let mut node = node();
-    tick(&mut node, Ok(frame(0)));
-    for (error, state) in [
-        (AdcError::Silent { level: 0 }, NodeState::NoFrames),
-        (
-            AdcError::WrongCheck {
-                received: 1,
-                computed: 2,
-            },
-            NodeState::SensorFault,
-        ),
-        (AdcError::Bus(()), NodeState::SensorFault),
-    ] {
-        tick(&mut node, Err(SampleFault::from(&error)));
-        assert_eq!(node.state(), (state, error.number()));
-    }
-    let rail = RawFrame {
-        capacitive: [0, 32767, 0],
-        ..frame(9)
-    };
-    tick(&mut node, Ok(rail));
-    assert_eq!(node.state(), (NodeState::SensorFault, REASON_CHANNEL + 4));
-}
-
-#[test]
-fn without_parameters_there_are_states_but_no_poses() {
-    let refusal = Refusal { reason: 7 };
-    let mut node = Node::new(Parameters::None { refusal }, true, Layout::Bits16, IDENTITY);
-    for k in 0..32 {
-        let frames = tick(&mut node, Ok(frame(k)));
-        assert!(
-            frames
-                .iter()
-                .all(|c| matches!(c.message, Message::NodeStatus | Message::Health))
-        );
-        for content in contents(&frames) {
-            if let Content::Status(status) = content {
-                assert_eq!(
-                    (status.state, status.reason),
-                    (Some(NodeState::BadParameters), 7)
-                );
-                assert_eq!(status.flags, flag::WATCHDOG_RESET);
-            }
-        }
-    }
-    let answers = ask(&mut node, Request::Rezero { ticks: 10 }, 3);
-    assert!(
-        matches!(answers[..], [Content::Answer(a)] if a.outcome == Some(Outcome::NoParameters))
-    );
-}
-
-#[test]
-fn a_pose_decoded_under_other_fpu_settings_is_withdrawn() {
-    let run = |at: &[usize]| {
-        let mut node = node();
-        let mut fpu = Disturbed {
-            calls: 0,
-            at: at.to_vec(),
-        };
-        let reading = node.tick(
-            Ok(frame(0)),
-            &Facts::default(),
-            &mut fpu,
-            &mut Outbox::new(),
-        );
-        (reading, node.fpu_restored())
-    };
-    let (good, none) = run(&[]);
-    assert!(good.planar().is_some() && none == 0);
-    assert_eq!(run(&[0]), (good, 1));
-    assert_eq!(run(&[1]), (NOTHING, 1));
 }
 
 #[test]
@@ -286,25 +180,6 @@ fn a_re_zero_needs_the_servo_off_and_its_answer_comes_in_the_tick_that_ends_it()
     let answers: Vec<_> = answers.collect();
     assert!(matches!(answers[..], [(300, Content::Answer(a))] if a.outcome == Some(Outcome::Done)));
     assert_ne!(node.zero(), PlanarPose::ZERO);
-}
-
-#[test]
-fn a_zero_that_is_restored_is_subtracted_and_reported() {
-    let mut node = node();
-    let zero = PlanarPose {
-        x_m: 3e-6,
-        ..PlanarPose::ZERO
-    };
-    node.restore_zero(zero);
-    assert_eq!(node.zero(), zero);
-    let frames = tick(&mut node, Ok(frame(0)));
-    let status = contents(&frames)
-        .into_iter()
-        .find_map(|content| match content {
-            Content::Status(status) => Some(status),
-            _ => None,
-        });
-    assert_eq!(status.map(|status| status.flags), Some(flag::ZERO_SET));
 }
 
 /// Codes as wide as the converter's, with a tick that the schedule missed and one that the

@@ -86,7 +86,7 @@ pub struct CanModel {
     /// FOVR: a frame came while the store was full (RM0090 32.9.2, CAN_RF0R).
     overrun: bool,
     /// The bus; change it by [`Self::set_bus`].
-    bus: BusState,
+    pub bus: BusState,
     /// The controller's node: frames are given and kept here as those of the table. What has another
     /// identifier or check is kept as it is.
     pub node: NodeNumber,
@@ -139,11 +139,6 @@ impl CanModel {
         }
         self.bus = bus;
         self.arbitrate(now_ns);
-    }
-
-    /// What the bus does.
-    pub const fn bus(&self) -> BusState {
-        self.bus
     }
 
     /// The controller is bus-off from `now_ns` for so long, shorter than the standard has it.

@@ -194,7 +194,7 @@ impl Peripherals {
         self.watchdog = Watchdog::new();
         self.watchdog.fed = fed;
         let acknowledges = self.can.acknowledges;
-        let bus = self.can.bus();
+        let bus = self.can.bus;
         let (sent, filled) = (std::mem::take(&mut self.can.sent), self.can.filled);
         let node = self.can.node;
         self.can = CanModel::new();

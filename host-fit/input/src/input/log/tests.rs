@@ -1,6 +1,5 @@
 mod accepts;
 mod forms;
-mod fuzz;
 mod long;
 mod movements;
 mod refuses;
