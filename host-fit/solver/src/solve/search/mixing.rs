@@ -104,22 +104,6 @@ mod tests {
     }
 
     #[test]
-    fn equation_25_worked_by_hand() {
-        // ns1 = 30 of 60, ns2 = 10 of 40: 30*40 / (10*60 + 30*40) = 1200/1800.
-        let t = tally([30, 10], [30, 30], [9.0, 9.0]);
-        let p = t.next_p(Adaptation::SuccessRatio, 0.5);
-        assert!((p - 2.0 / 3.0).abs() < 1e-15);
-    }
-
-    #[test]
-    fn equation_27_worked_by_hand() {
-        // vs1 = 0.6 over 60 tries, vs2 = 1.2 over 40: 0.6*40 / (1.2*60 + 0.6*40) = 24/96.
-        let t = tally([30, 10], [30, 30], [0.6, 1.2]);
-        let p = t.next_p(Adaptation::DeclineRatio, 0.5);
-        assert!((p - 0.25).abs() < 1e-15);
-    }
-
-    #[test]
     fn equations_28_and_29_sum_the_declines_of_the_improved_only() {
         let mut t = Tally::default();
         t.count(Step::Learn, 8.0, 6.0);
