@@ -10,7 +10,7 @@ use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::shipped::STAGE_TOML;
 use host_fit::input::stage::Stage;
 use host_fit::judge::Decoded;
-use host_fit::judge::statistics::{ErrorSums, white_noise};
+use host_fit::judge::statistics::over_noise;
 use host_fit::plan::run::Run as PlannedRun;
 use host_fit::problem::model::Model;
 use host_fit::simulate::assembly::Assembly;
@@ -19,6 +19,7 @@ use host_fit::simulate::protocol::{Protocol, REST_S, Run};
 use host_fit::simulate::recording::{Recording, record_in};
 use host_fit::simulate::sensors::SensorErrors;
 use host_fit::simulate::thermal::{ASSEMBLED_C, Climate, Thermal};
+use host_fit::solve::field::carry::service_poses;
 use runtime::ModelKind;
 use runtime::frame::MISSING_CODE;
 use std::error::Error;
@@ -107,23 +108,24 @@ impl<'a> Twin<'a> {
         Ok(ratios(fit, &truth))
     }
 
-    /// Change of the sensitivities of A, B, C with mount and body between two temperatures, 1/K.
-    fn change_per_k(&self, from_c: [f64; 2], to_c: [f64; 2]) -> [f64; 3] {
-        let slope = |celsius, probe: usize| {
-            let warmed = self.thermal.warmed(&self.assembly, celsius);
-            let at = |u: f64| {
-                let planar = if probe == 2 {
-                    [u, 0.0, 0.0]
-                } else {
-                    [0.0, u, 0.0]
-                };
-                let vertical = [0.0; 3];
-                warmed.probes[probe].signal_m(&StagePose { planar, vertical })
+    /// Change of the signals of A, B, C over service between two pairs of temperatures, as a part.
+    fn change(&self, from_c: [f64; 2], to_c: [f64; 2]) -> [f64; 3] {
+        let [from, to] = [from_c, to_c].map(|celsius| self.thermal.warmed(&self.assembly, celsius));
+        let [x, y, rz, z, rx, ry] = RUN_30.amplitudes;
+        let poses: Vec<StagePose> = service_poses(([x, y, rz], [z, rx, ry]))
+            .map(|(planar, vertical)| StagePose { planar, vertical })
+            .collect();
+        [0, 1, 2].map(|probe| {
+            let signals = |of: &Assembly| -> Vec<f64> {
+                let signals = poses.iter().map(|pose| of.probes[probe].signal_m(pose));
+                let signals: Vec<f64> = signals.collect();
+                let mean = signals.iter().sum::<f64>() / signals.len() as f64;
+                signals.into_iter().map(|signal| signal - mean).collect()
             };
-            at(1e-4) - at(-1e-4)
-        };
-        let span_k = (to_c[0] - from_c[0]) + (to_c[1] - from_c[1]);
-        [0, 1, 2].map(|probe| (slope(to_c, probe) / slope(from_c, probe)).ln() / span_k)
+            let (from, to) = (signals(&from), signals(&to));
+            let both: f64 = from.iter().zip(&to).map(|(from, to)| from * to).sum();
+            both / from.iter().map(|from| from * from).sum::<f64>() - 1.0
+        })
     }
 }
 
@@ -139,14 +141,7 @@ fn fitted(dataset: &Dataset, stage: &Stage) -> Fallible<Fit> {
 /// rms of the errors over that of the noise, in the rows after the rest.
 fn ratios(fit: &Fit, truth: &Dataset) -> Axes {
     let errors = Decoded::new(&fit.set, truth).rezeroed(truth, REST_S);
-    let mut sums = ErrorSums::NONE;
-    errors
-        .iter()
-        .filter(|error| error.is_some())
-        .for_each(|error| sums.take(0, *error));
-    let noise = white_noise(&errors, &truth.movements);
-    let rms = sums.errors().axes.map(|axis| axis.rms);
-    [0, 1, 2].map(|axis| rms[axis] / noise[axis])
+    over_noise(&errors, &truth.movements)
 }
 
 /// Without temperatures in the log.
@@ -182,6 +177,7 @@ impl Ratios {
 #[derive(Default)]
 struct Coefficients {
     squares: f64,
+    scaled: f64,
     within: u32,
     of: u32,
 }
@@ -189,6 +185,7 @@ struct Coefficients {
 impl Coefficients {
     fn take(&mut self, found: f64, truth: f64, error: f64) {
         self.squares += (found - truth) * (found - truth);
+        self.scaled += (found - truth) * (found - truth) / (error * error);
         self.within += u32::from((found - truth).abs() <= WITHIN * error);
         self.of += 1;
     }
@@ -216,7 +213,8 @@ fn coefficients(stage: &Stage, stages: u64, spacing_k: f64) -> Fallible<Coeffici
             .map(|(run, change_k)| blind(&twin.planned(&run, steady(change_k)), [true, false]));
         let field = twin.fit(&[&cold, &warm])?.field.ok_or("no field model")?;
         let zero_c = f64::from(field.warmth.temperature.zero_mc[0]) * 1e-3;
-        let truth = twin.change_per_k([zero_c - 0.5; 2], [zero_c + 0.5; 2]);
+        // Per K of both.
+        let truth = twin.change([zero_c - 0.5; 2], [zero_c + 0.5; 2]);
         for probe in 0..3 {
             let found = field.warmth.temperature.per_mk[probe][0] * 1e3;
             // Both temperatures change.
@@ -290,7 +288,7 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
                     [mount, body + by]
                 }
             };
-            let truth = twin.change_per_k(at(-0.5), at(0.5));
+            let truth = twin.change(at(-0.5), at(0.5));
             for probe in 0..3 {
                 let found = field.warmth.temperature.per_mk[probe][sensor] * 1e3;
                 all.take(found, truth[probe], field.warmth.error_per_k[probe][sensor]);

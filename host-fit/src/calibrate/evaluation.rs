@@ -106,7 +106,8 @@ impl<'a> Judged<'a> {
         let of_rows = decoded.judge(&log.dataset, stage, zeros);
         let by_row = decoded.errors_less(&of_rows.zeros, &log.dataset);
         let mut diagnosis = diagnose::of_judged(&log.dataset, stage, set, &by_row, None);
-        let rezero = diagnose::temperature::rezero(set, &log.dataset, zeros == Zeros::Refit);
+        let (temperature, refitted) = (&set.constants.temperature, zeros == Zeros::Refit);
+        let rezero = diagnose::temperature::rezero(temperature, &log.dataset, refitted);
         let findings = diagnosis.findings.into_iter().chain(rezero);
         diagnosis.findings = finding::in_order(findings.collect());
         // As the blob's own errors were counted, whatever zeros are asked for.

@@ -8,17 +8,25 @@ use crate::input::log::{self, ReadOptions};
 use crate::input::shipped::{LOG_GZ, RUN_GZ, SERVICE_GZ, STAGE_TOML};
 use crate::input::stage::Stage;
 use crate::judge::precision::largest_difference;
+use crate::judge::statistics::over_noise;
 use crate::judge::{Decoded, Zeros};
 use crate::output::pose_file::{DecodeSettings, PoseFormat, decode_log};
 use crate::output::{self, Output, Outputs, posterior_file};
+use crate::plan::plan;
 use crate::problem::model::Model;
 use crate::recalibrate::Known;
 use crate::report::errors::{self, error_table, micro};
 use crate::report::parameters::{self, parameters};
 use crate::report::table::as_text;
+use crate::simulate::assembly::Assembly;
+use crate::simulate::protocol::{Protocol, REST_S, Run};
+use crate::simulate::recording::{Recording, record_in};
+use crate::simulate::sensors::SensorErrors;
+use crate::simulate::thermal::{Climate, Thermal};
 use crate::solve::Solver;
 use crate::solve::robust::Loss;
 use clap::Args;
+use runtime::frame::MISSING_CODE;
 use runtime::geometry::ProbeGeometry;
 use runtime::tracker::OnInvalid;
 use runtime::{ModelKind, ParameterSet};
@@ -224,8 +232,46 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
     let text = as_text(&tables)
         + "\nf32 against f64, largest\n"
         + &rounding("Model (31), its own log", &model_31, &paper)?
-        + &rounding("field model, in service", &field, &service)?;
+        + &rounding("field model, in service", &field, &service)?
+        + &day(&stage)?;
     Ok((text, files))
+}
+
+/// A line about the working day of a simulated stage, calibrated by three logs of its morning with their
+/// temperatures, or by the first without.
+fn day(stage: &Stage) -> Result<String, HostError> {
+    const SEED: u64 = 1;
+    let (assembly, thermal) = (Assembly::draw(stage, SEED), Thermal::draw(SEED));
+    let record = |run, hour| {
+        let (parts, errors) = ((&assembly, &thermal), &SensorErrors::USUAL);
+        record_in(stage, parts, Climate::Day { hour }, run, errors, SEED)
+    };
+    let planned = |seconds: f64, hour: f64| -> Result<Recording, HostError> {
+        let run = plan(stage, seconds)?.run;
+        Ok(record(
+            Run::planned(run.trajectory(stage.servo_period_s)),
+            hour,
+        )?)
+    };
+    let cold = planned(30.0, -1.0 / 6.0)?;
+    let (early, warm) = (planned(8.0, 1.0 / 6.0)?, planned(8.0, 3.5)?);
+    let day = record(Protocol::Day.run(stage.servo_period_s, SEED), 0.0)?;
+    let mut blind = cold.clone();
+    let samples = blind.movements.iter_mut().flatten();
+    samples.for_each(|sample| sample.temperature_mc = [MISSING_CODE; 2]);
+    let day = day.dataset_of_truth(stage).unwrap_or_default();
+    let ratios = |logs: &[&Recording]| -> Result<String, HostError> {
+        let dataset = Recording::joined(logs, stage).unwrap_or_default();
+        let model = ModelChoice::Named(Model::of(ModelKind::Field));
+        let fit = fit(&dataset, stage, &FitSettings::new(model))?;
+        let errors = Decoded::new(&fit.set, &day).rezeroed(&day, REST_S);
+        let [x, y, rz] = over_noise(&errors, &day.movements);
+        Ok(format!("{x:.2} / {y:.2} / {rz:.2}"))
+    };
+    let (with, without) = (ratios(&[&cold, &early, &warm])?, ratios(&[&blind])?);
+    Ok(format!(
+        "\na simulated day, body 5 K warmer: rms of X / Y / Rz over the noise {with}; without temperature {without}\n"
+    ))
 }
 
 /// The largest difference of the target's `f32` from `f64` over the rows of a log, in a line.

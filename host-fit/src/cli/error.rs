@@ -124,7 +124,9 @@ fn end_of(error: &(dyn Error + 'static)) -> (u8, &'static str) {
     }
     if let Some(cause) = error.downcast_ref() {
         let status = match cause {
-            RecalibrateError::OtherModel { .. } | RecalibrateError::NothingKnown => 3,
+            RecalibrateError::OtherModel { .. }
+            | RecalibrateError::NothingKnown
+            | RecalibrateError::NoTemperature(_) => 3,
             _ => 4,
         };
         return (

@@ -4,8 +4,9 @@ use super::args::{Json, StageFile, between};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
+use crate::plan::temperature::{COLD_S, protocol};
 use crate::plan::{PERIODS_MAX, SECONDS_MAX, plan};
-use crate::report::plan::{figures, tables};
+use crate::report::plan::{figures, steps, tables};
 use crate::report::table::as_text;
 use crate::simulate::plan_file;
 use clap::Args;
@@ -22,8 +23,12 @@ pub(super) struct PlanArgs {
     #[command(flatten)]
     stage: StageFile,
     /// Length of the run; 20 are plenty for a stage of the usual limits.
-    #[arg(long, value_name = "T", value_parser = seconds, allow_negative_numbers = true)]
-    seconds: f64,
+    #[arg(long, value_name = "T", value_parser = seconds, allow_negative_numbers = true, required_unless_present = "temperature")]
+    seconds: Option<f64>,
+    /// Show also which logs determine how the stage follows temperature, and what to expect of them. The
+    /// run is the first of them, of 30 s if no length is given.
+    #[arg(long)]
+    temperature: bool,
     /// Where to write the trajectory: columns t_us,x_um,y_um,rz_urad,z_um,rx_urad,ry_urad, one row
     /// for every servo period; `-` for standard output.
     #[arg(long, value_name = "run.csv")]
@@ -38,7 +43,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     let outputs = [args.out.as_deref(), args.json.path.as_deref()];
     super::keep_apart(outputs, [args.stage.path.as_path()])?;
     let stage = args.stage.read()?;
-    let (seconds, period_s) = (args.seconds, stage.servo_period_s);
+    let (seconds, period_s) = (args.seconds.unwrap_or(COLD_S), stage.servo_period_s);
     if seconds / period_s > PERIODS_MAX {
         let problem = format!(
             "a run of {seconds} s has more than {PERIODS_MAX} servo periods of {period_s} s; make it shorter"
@@ -46,7 +51,11 @@ pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
         return Err(HostError::usage("--seconds", problem));
     }
     let plan = plan(&stage, seconds)?;
-    let figures = figures(&plan, &stage);
+    let protocol = match args.temperature {
+        true => protocol(&stage, seconds)?,
+        false => Vec::new(),
+    };
+    let figures = figures(&plan, &protocol, &stage);
     let mut outputs = Outputs::default();
     if let Some(path) = &args.out {
         let csv = plan_file::to_csv(&plan.run.trajectory(period_s), period_s);
@@ -55,5 +64,6 @@ pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     args.json.add(&mut outputs, &figures)?;
     let written = outputs.commit()?;
     terminal::print(&as_text(&tables(&figures)))?;
+    terminal::print(&steps(&protocol))?;
     super::wrote(written)
 }

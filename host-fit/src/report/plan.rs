@@ -4,6 +4,7 @@ use super::parameters::by_probe;
 use super::table::{Table, number};
 use crate::input::stage::{AXES, Stage};
 use crate::plan::Plan;
+use crate::plan::temperature::WarmLog;
 use crate::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
 use serde_json::{Map, Value, json};
 
@@ -11,7 +12,7 @@ use serde_json::{Map, Value, json};
 const NAMED: usize = 5;
 /// The figures of a plan. Axes are in m and rad; `of_prior` is the standard error over the deviation of
 /// the prior, 1 where the log adds nothing.
-pub fn figures(plan: &Plan, stage: &Stage) -> Value {
+pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Value {
     let run = &plan.run;
     let axis =
         |(k, ((key, _), motion)): (usize, (&(&str, _), &crate::input::stage::AxisMotion))| {
@@ -59,7 +60,78 @@ pub fn figures(plan: &Plan, stage: &Stage) -> Value {
         "service": { "x": predicted(0, "um"), "y": predicted(1, "um"), "rz": predicted(2, "urad") },
         "parameters": (0..COUNT).map(parameter).collect::<Map<_, _>>(),
         "least_determined": worst.collect::<Vec<_>>(),
+        "temperature": protocol.iter().map(of_log).collect::<Vec<_>>(),
     })
+}
+
+/// A log at a temperature, and what is expected of a fit of all up to it.
+fn of_log(log: &WarmLog) -> Value {
+    let [k, h] = log.error_per_k;
+    let at = |distance: usize| {
+        let [x, y, rz] = log.ratios[distance];
+        json!({ "x": x, "y": y, "rz": rz })
+    };
+    json!({
+        "log": log.name,
+        "seconds": log.seconds,
+        "mount_k": log.warmer_k[0],
+        "body_k": log.warmer_k[1],
+        "error_of_k_per_k": k,
+        "error_of_h_per_k": h,
+        "ratio_at_5_k": at(0),
+        "ratio_at_10_k": at(1),
+    })
+}
+
+/// How the logs of a protocol are made.
+pub fn steps(protocol: &[WarmLog]) -> String {
+    if protocol.is_empty() {
+        return String::new();
+    }
+    let step = |log: &WarmLog| format!("  {}: {} s, {}\n", log.name, log.seconds, log.when);
+    let names: Vec<String> = protocol
+        .iter()
+        .map(|log| format!("{}.csv", log.name))
+        .collect();
+    format!(
+        "logs for temperature, of runs by host-fit plan --seconds\n{}next: host-fit fit {}, with the columns of the sensors in [temperature] of stage.toml; at work zero \
+         the stage again after every 5 K\n",
+        protocol.iter().map(step).collect::<String>(),
+        names.join(" ")
+    )
+}
+
+/// Errors in service over the noise floor, as expected after each log.
+fn of_protocol(figures: &Value) -> Option<Table> {
+    let titles = [
+        "k, %/K",
+        "h, %/K",
+        "X at 5 K",
+        "Y",
+        "Rz",
+        "X at 10 K",
+        "Y",
+        "Rz",
+    ];
+    let mut table = Table::new(
+        "temperature: standard errors, and errors in service over the noise",
+        &titles,
+    );
+    for log in figures["temperature"].as_array()? {
+        let of = |group: &str| {
+            ["x", "y", "rz"]
+                .map(|axis| format!("{:.2}", log[group][axis].as_f64().unwrap_or(f64::NAN)))
+        };
+        let error = |key: &str| match log[key].as_f64() {
+            Some(error) if error > 1e-8 => format!("{:.4}", error * 1e2),
+            _ => "-".to_owned(),
+        };
+        let errors = [error("error_of_k_per_k"), error("error_of_h_per_k")];
+        let ratios = [of("ratio_at_5_k"), of("ratio_at_10_k")].concat();
+        let name = log["log"].as_str().unwrap_or_default();
+        table.row(name, errors.into_iter().chain(ratios));
+    }
+    (!table.rows.is_empty()).then_some(table)
 }
 
 /// The tables of these figures: the run, errors predicted for service, standard errors.
@@ -108,8 +180,9 @@ pub fn tables(figures: &Value) -> Vec<Table> {
             ])
         },
     );
-    let mut all = super::table::tables(figures, &["axes", "parameters"]);
+    let mut all = super::table::tables(figures, &["axes", "parameters", "temperature"]);
     all.splice(1..1, [motion]);
     all.push(errors);
+    all.extend(of_protocol(figures));
     all
 }

@@ -16,4 +16,5 @@ mod plan;
 mod recalibrate;
 mod robust;
 mod searches;
+mod temperature;
 mod terminal;

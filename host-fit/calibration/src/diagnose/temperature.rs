@@ -12,7 +12,7 @@ use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::posterior::covariance_at;
 use crate::solve::field::terms::COUNT;
 use nalgebra::DMatrix;
-use runtime::{ParameterSet, Temperature};
+use runtime::Temperature;
 
 /// Offsets of Hall elements and the expansion of the stage move its zero. After such a change, K, the
 /// stage is zeroed again.
@@ -121,9 +121,13 @@ pub fn validity(
 
 /// That the temperature changed, in a log that a blob is judged on, by more than a zero holds: since the
 /// begin of a movement if its zero deviation is `refitted`, else since the calibration.
-pub fn rezero(set: &ParameterSet, dataset: &Dataset, refitted: bool) -> Option<Finding> {
-    let zero_mc = set.constants.temperature.zero_mc;
-    let logged = |sensor: usize| set.constants.temperature.reach_mk[sensor] != 0 || refitted;
+pub fn rezero(
+    temperature: &Temperature<f32>,
+    dataset: &Dataset,
+    refitted: bool,
+) -> Option<Finding> {
+    let zero_mc = temperature.zero_mc;
+    let logged = |sensor: usize| temperature.reach_mk[sensor] != 0 || refitted;
     let of_movement = |(movement, sensor): (usize, usize)| {
         let rows = dataset.movements[movement].rows.clone();
         let [low, high] = dataset.temperature_range_mc(sensor, rows)?;
@@ -149,4 +153,101 @@ pub fn rezero(set: &ParameterSet, dataset: &Dataset, refitted: bool) -> Option<F
         let found = Finding::new(Code::Temperature, message).severe(Severity::Warn);
         found.at(dataset.movement_name(movement), t_us).of(change_k, "K")
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::dataset::{LoggedFrame, Movement, Row};
+    use crate::input::shipped::STAGE_TOML;
+    use crate::judge::verdict::{GOOD_MAX, Predicted};
+    use crate::problem::parameters::Parameters;
+    use runtime::RawFrame;
+    use runtime::frame::MISSING_CODE;
+
+    fn stage() -> Stage {
+        Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")
+    }
+
+    /// Two movements, at these temperatures of the mount, m degC.
+    fn dataset(movements: [[i32; 2]; 2]) -> Dataset {
+        let mut dataset = Dataset::default();
+        for (movement, read_mc) in movements.into_iter().enumerate() {
+            let start = dataset.rows.len();
+            dataset.rows.extend(read_mc.map(|mount_mc| {
+                let frame = RawFrame::new([0; 3], [0; 3], 0, 0);
+                Row {
+                    movement,
+                    t_us: 7,
+                    frame: LoggedFrame::Codes(frame.with_temperature_mc([mount_mc, MISSING_CODE])),
+                    signal_m: [0.0; 3],
+                    vertical: [0.0; 3],
+                    reference: [0.0; 3],
+                }
+            }));
+            dataset.movements.push(Movement {
+                log: 0,
+                index: movement as i64,
+                rows: start..dataset.rows.len(),
+            });
+        }
+        dataset
+    }
+
+    #[test]
+    fn a_zero_holds_for_five_kelvin_from_the_begin_of_a_movement_or_from_the_calibration() {
+        let temperature = Temperature {
+            zero_mc: [20_000, 0],
+            reach_mk: [30_000, 0],
+            ..Temperature::NONE
+        };
+        for (movements, refitted, movement) in [
+            ([[20_000, 24_000], [26_000, 29_000]], true, None),
+            ([[20_000, 24_000], [26_000, 29_000]], false, Some("1")),
+            ([[20_000, 24_000], [22_000, 28_000]], true, Some("1")),
+            ([[14_000, 16_000], [20_000, 24_000]], false, Some("0")),
+            ([[MISSING_CODE; 2]; 2], false, None),
+        ] {
+            let found = rezero(&temperature, &dataset(movements), refitted);
+            let found = found.map(|found| found.movement.expect("a movement"));
+            assert_eq!(found.as_deref(), movement, "{movements:?} {refitted}");
+        }
+    }
+
+    /// Known exactly but for k, a stage is good as far as the error of k allows.
+    #[test]
+    fn a_calibration_is_good_as_far_as_k_is_known() {
+        let (stage, white_mm) = (stage(), [5e-4; 3]);
+        let parameters = FieldParameters::of_model_31(&Parameters::designed(&stage), &stage);
+        let within = |error_per_k: f64| {
+            let mut covariance = DMatrix::zeros(COUNT + 6, COUNT + 6);
+            (0..3).for_each(|probe| {
+                let k = COUNT + 2 * probe;
+                covariance[(k, k)] = error_per_k * error_per_k;
+            });
+            let found = validity(&stage, &parameters, white_mm, &covariance);
+            found.expect("a service").within_k
+        };
+        let (rough, fine) = (within(3e-4), within(1e-4));
+        assert!((fine / rough - 3.0).abs() < 0.05, "{rough} {fine}");
+        assert_eq!(within(0.0), 30.0);
+        // At that distance the gain is off by as much as makes the errors so large.
+        let service = declared_service(&stage, &parameters, white_mm).expect("a service");
+        let mut covariance = DMatrix::zeros(COUNT, COUNT);
+        for probe in 0..3 {
+            let mut parts = [0.0; 3];
+            parts[probe] = 3e-4 * rough;
+            let by = DMatrix::from_column_slice(COUNT, 1, &parameters.by_gain(parts));
+            covariance += &by * by.transpose();
+        }
+        let ratio = Predicted::new(&service, &covariance, &[0.0; COUNT]).worst_ratio();
+        assert!((ratio - GOOD_MAX).abs() < 2e-3, "{ratio}");
+        // Without a sensor the whole effect of temperature is an error.
+        let blind = DMatrix::zeros(COUNT, COUNT);
+        let blind = validity(&stage, &parameters, white_mm, &blind).expect("a service");
+        assert!(
+            !blind.is_followed && blind.within_k < 0.3 * rough,
+            "{blind:?}"
+        );
+    }
 }

@@ -145,6 +145,14 @@ pub fn white_noise(errors: &[Option<[f64; 3]>], movements: &[Movement]) -> [f64;
     noise.deviations()
 }
 
+/// rms of errors of X, Y, Rz over their noise from row to row within the movements.
+pub fn over_noise(errors: &[Option<[f64; 3]>], movements: &[Movement]) -> [f64; 3] {
+    let mut sums = ErrorSums::NONE;
+    (errors.iter().enumerate()).for_each(|(row, error)| sums.take(row, *error));
+    let (axes, noise) = (sums.errors().axes, white_noise(errors, movements));
+    [0, 1, 2].map(|axis| axes[axis].rms / noise[axis])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

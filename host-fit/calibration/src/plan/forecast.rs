@@ -51,21 +51,29 @@ pub fn forecast(
     period_s: f64,
     step_s: f64,
 ) -> Option<Forecast> {
-    let count = (run.seconds / step_s).floor() as usize;
-    let row = |k: usize| {
-        let time_s = (k as f64 + 0.5) * step_s;
-        let at: [[f64; 3]; 6] = std::array::from_fn(|axis| run.axis_at(axis, time_s));
-        FieldRow {
-            warmth_k: [[0.0; 2]; 3],
-            weight: 1.0,
-            time_s,
-            signal_mm: [0.0; 3],
-            vertical: [at[3][0], at[4][0], at[5][0]],
-            reference_mm: [0, 1, 2].map(|k| at[k][0] * 1e3),
-            rate_mm_per_s: [0, 1, 2].map(|k| at[k][1] * 1e3),
-        }
-    };
-    let movements = std::iter::once(0..count).collect();
-    let rows = Rows::of_movements((0..count).map(row).collect(), movements);
-    forecaster.forecast(&rows, step_s / period_s)
+    forecaster.forecast(&rows_of(&[(run, [0.0; 2])], step_s), step_s / period_s)
+}
+
+/// Rows of runs, each a movement at its distance (mount, body) from T0, K, looked at every `step_s`.
+pub(super) fn rows_of(runs: &[(&Run, [f64; 2])], step_s: f64) -> Rows {
+    let (mut rows, mut movements) = (Vec::new(), Vec::new());
+    for (run, change_k) in runs {
+        let start = rows.len();
+        let row = |k: usize| {
+            let time_s = (k as f64 + 0.5) * step_s;
+            let at: [[f64; 3]; 6] = std::array::from_fn(|axis| run.axis_at(axis, time_s));
+            FieldRow {
+                warmth_k: [*change_k; 3],
+                weight: 1.0,
+                time_s,
+                signal_mm: [0.0; 3],
+                vertical: [at[3][0], at[4][0], at[5][0]],
+                reference_mm: [0, 1, 2].map(|k| at[k][0] * 1e3),
+                rate_mm_per_s: [0, 1, 2].map(|k| at[k][1] * 1e3),
+            }
+        };
+        rows.extend((0..(run.seconds / step_s).floor() as usize).map(row));
+        movements.push(start..rows.len());
+    }
+    Rows::of_movements(rows, movements)
 }

@@ -5,6 +5,7 @@
 //! | [`run`] | six sines between smooth ends |
 //! | [`mod@forecast`] | what a fit to a run will give |
 //! | [`search`] | the choice of the frequencies |
+//! | [`temperature`] | the logs that determine how the stage follows temperature |
 //!
 //! ```
 //! # use hall_input::input::shipped::STAGE_TOML;
@@ -18,6 +19,7 @@
 pub mod forecast;
 pub mod run;
 pub mod search;
+pub mod temperature;
 #[cfg(test)]
 mod tests;
 

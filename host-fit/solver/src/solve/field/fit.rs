@@ -5,10 +5,11 @@ use super::blocks::Rows;
 use super::carry::Verdict;
 use super::error::FieldFitError;
 use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
-use super::parameters::{FieldParameters, HELD, unknowns};
+use super::parameters::{FieldParameters, unknowns};
 use super::posterior::Posterior;
 use super::probe::probes;
 use super::terms::COUNT;
+use super::warmth::{Sensors, Warmth};
 use super::whiten::{COLUMNS, FieldEquations, Noise, UNKNOWNS, WARMTH};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
@@ -16,7 +17,7 @@ use crate::interrupt;
 use crate::problem::parameters::Parameters;
 use crate::solve::gauss_newton::{self, Limits, Normal, Point, Solved, Unknowns};
 use crate::solve::robust::{HALF, Loss};
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector};
 use runtime::Temperature;
 use std::ops::Range;
 use std::sync::Arc;
@@ -40,72 +41,6 @@ const ROUNDS_MAX: u32 = 15;
 const WEIGHT_SETTLED: f64 = 0.01;
 /// Rounds of noise and parameters in turn.
 const NOISE_ROUNDS: u32 = 2;
-
-/// k and h as a fit found them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Warmth {
-    /// k, h and T0.
-    pub temperature: Temperature<f64>,
-    /// Standard errors of (k, h) of A, B, C, 1/K: those of the prior where the log has no information.
-    pub error_per_k: [[f64; 2]; 3],
-    /// The spans of the temperatures of mount and body that determine k and h, K; 0 where only the prior does.
-    pub spans_k: [f64; 2],
-}
-
-/// A single log that spans less than this does not determine k, K: its drift is also that of the reference.
-const SPAN_MIN_K: f64 = 2.0;
-/// What the error of the sensors' temperatures in one log makes of its gain; of two logs it puts k off by
-/// 4e-5 over their distance in K.
-const OF_SENSORS: f64 = 2.8e-5;
-
-/// See [`Warmth::spans_k`]: the range of a log that spans enough, else of the means of several logs. 0
-/// where errors of the sensors would leave k less certain than the prior.
-fn spans_k(dataset: &Dataset, stage: &Stage) -> [f64; 2] {
-    [0, 1].map(|sensor| {
-        let of_logs = || dataset.logs.iter().map(|log| log.rows.clone());
-        let range_k = |ends: Option<[i32; 2]>| ends.map_or(0.0, |[a, b]| f64::from(b - a) * 1e-3);
-        let within = of_logs().map(|rows| range_k(dataset.temperature_range_mc(sensor, rows)));
-        let means = of_logs().filter_map(|rows| dataset.temperature_mean_mc(sensor, rows));
-        let ends = means.fold([i32::MAX, i32::MIN], |[low, high], mean| {
-            [low.min(mean), high.max(mean)]
-        });
-        let span_k = if within.fold(0.0, f64::max) >= SPAN_MIN_K {
-            range_k(dataset.temperature_range_mc(sensor, 0..dataset.rows.len()))
-        } else {
-            range_k(Some(ends).filter(|[low, high]| low < high))
-        };
-        let [_, deviation] = stage.temperature.prior_per_k[sensor];
-        let of_sensors = OF_SENSORS * f64::sqrt(2.0);
-        if of_sensors < deviation * span_k {
-            span_k
-        } else {
-            0.0
-        }
-    })
-}
-
-/// Rows and mean changes of temperature, K, of each log; of one alone, of its halves.
-fn by_log(dataset: &Dataset) -> Vec<(f64, [f64; 2])> {
-    let parts: Vec<Range<usize>> = match dataset.logs.as_slice() {
-        [log] => {
-            let middle = usize::midpoint(log.rows.start, log.rows.end);
-            vec![log.rows.start..middle, middle..log.rows.end]
-        }
-        logs => logs.iter().map(|log| log.rows.clone()).collect(),
-    };
-    let one = |rows: Range<usize>| {
-        let zero_mc = dataset.temperature.zero_mc;
-        let mean_mc = |k: usize| dataset.temperature_mean_mc(k, rows.clone());
-        let mean_mc = [0, 1].map(|k| mean_mc(k).unwrap_or(zero_mc[k]));
-        (rows.len() as f64, dataset.temperature.changes_k(mean_mc))
-    };
-    parts.into_iter().map(one).collect()
-}
-
-/// Standard deviations of k and h about what the rows were compensated with.
-fn warmth_prior(spans_k: [f64; 2], prior: &[[f64; 2]; 2]) -> [f64; 2] {
-    [0, 1].map(|k| if spans_k[k] > 0.0 { prior[k][1] } else { HELD })
-}
 
 /// A calibration by the field model with everything that the log says about it.
 #[derive(Clone, Debug)]
@@ -171,9 +106,7 @@ pub struct WhiteFit {
     unknowns: Unknowns,
     places: [[f64; 2]; 3],
     temperature: Temperature<f64>,
-    spans_k: [f64; 2],
-    by_log: Vec<(f64, [f64; 2])>,
-    prior_per_k: [[f64; 2]; 2],
+    sensors: Sensors,
     at: Point,
     noise: Noise,
     resets_mm: Option<[f64; 3]>,
@@ -201,7 +134,7 @@ impl WhiteFit {
     fn start(dataset: &Dataset, selected: &[usize], stage: &Stage, start: &Parameters) -> Self {
         let rows: Arc<Rows> = Rows::new(dataset, selected).into();
         let places = stage.places_m();
-        let spans_k = spans_k(dataset, stage);
+        let sensors = Sensors::new(dataset, stage);
         let mut values = DVector::zeros(UNKNOWNS);
         let parameters = FieldParameters::of_model_31(start, stage);
         values.as_mut_slice()[..COUNT].copy_from_slice(parameters.probes.as_flattened());
@@ -212,14 +145,9 @@ impl WhiteFit {
                 offsets: vec![[0.0; 3]; rows.movements.len()],
             },
             rows,
-            unknowns: unknowns(
-                &places,
-                warmth_prior(spans_k, &stage.temperature.prior_per_k),
-            ),
+            unknowns: unknowns(&places, sensors.deviations()),
             temperature: dataset.temperature,
-            spans_k,
-            by_log: by_log(dataset),
-            prior_per_k: stage.temperature.prior_per_k,
+            sensors,
             places,
             noise: white_only([1.0; 3]),
             resets_mm: stage.resets_mm(),
@@ -336,22 +264,16 @@ impl WhiteFit {
     /// found beyond.
     fn with_warmth(&self, mut covariance: DMatrix<f64>) -> (Posterior, Warmth) {
         let mut temperature = self.temperature;
-        let of_sensors = self.of_sensors();
-        // The same error for all probes.
-        for i in WARMTH..UNKNOWNS {
-            for j in WARMTH..UNKNOWNS {
-                covariance[(i, j)] += of_sensors[((i - WARMTH) % 2, (j - WARMTH) % 2)];
-            }
-        }
         for (k, beyond) in self.at.values.as_slice()[WARMTH..].iter().enumerate() {
-            let (probe, sensor) = (k / 2, k % 2);
-            if self.spans_k[sensor] > 0.0 {
-                temperature.per_mk[probe][sensor] += 1e-3 * beyond;
-            } else if temperature.reach_mk[sensor] != 0 {
-                let [_, deviation] = self.prior_per_k[sensor];
-                covariance[(WARMTH + k, WARMTH + k)] = deviation * deviation;
+            if self.sensors.spans_k[k % 2] > 0.0 {
+                temperature.per_mk[k / 2][k % 2] += 1e-3 * beyond;
             }
         }
+        let (rows, white_mm) = (&self.rows.rows, self.noise.white_mm[0]);
+        let squares = rows.iter().map(|row| row.signal_mm[0] * row.signal_mm[0]);
+        let mean_square = squares.sum::<f64>() / rows.len().max(1) as f64;
+        let signal_to_noise = mean_square / (white_mm * white_mm);
+        self.sensors.complete(&mut covariance, signal_to_noise);
         let of_parameters = self.posterior(covariance.clone());
         let posterior = match temperature.is_used() {
             true => of_parameters.with_warmth(&covariance),
@@ -360,35 +282,9 @@ impl WhiteFit {
         let warmth = Warmth {
             temperature,
             error_per_k: posterior.warmth_errors().unwrap_or_default(),
-            spans_k: self.spans_k,
+            spans_k: self.sensors.spans_k,
         };
         (posterior, warmth)
-    }
-
-    /// What the errors of the sensors, one for each log, add to the covariance of (k, h): the gains of
-    /// the logs follow 1, dM and dH, each known as well as its rows tell it.
-    fn of_sensors(&self) -> Matrix2<f64> {
-        let rows = &self.rows.rows;
-        let squares = rows.iter().map(|row| row.signal_mm[1] * row.signal_mm[1]);
-        let mean_square = squares.sum::<f64>() / rows.len().max(1) as f64;
-        let white_mm = self.noise.white_mm[1];
-        let per_row = mean_square / (white_mm * white_mm);
-        let known = warmth_prior(self.spans_k, &self.prior_per_k).map(|x| 1.0 / (x * x));
-        let along = |change_k: [f64; 2]| Vector3::new(1.0, change_k[0], change_k[1]);
-        let mut normal = Matrix3::from_diagonal(&Vector3::new(1.0, known[0], known[1]));
-        for (count, change_k) in &self.by_log {
-            let along = along(*change_k);
-            normal += along * along.transpose() * (count * per_row);
-        }
-        let mut sum = Matrix2::zeros();
-        for (count, change_k) in &self.by_log {
-            if let Some(inverse) = normal.try_inverse() {
-                let by_log = inverse * along(*change_k) * (count * per_row * OF_SENSORS);
-                let of_warmth = by_log.fixed_rows::<2>(1);
-                sum += of_warmth * of_warmth.transpose();
-            }
-        }
-        sum
     }
 
     fn parameters(&self) -> FieldParameters {

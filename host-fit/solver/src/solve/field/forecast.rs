@@ -3,9 +3,11 @@
 use super::blocks::Rows;
 use super::carry::{Service, ServiceVariance, service_poses};
 use super::parameters::{FieldParameters, HELD, unknowns};
-use super::posterior::Posterior;
+use super::posterior::{Posterior, covariance_at};
 use super::probe::probes;
+use super::warmth::Sensors;
 use super::whiten::{FieldEquations, Noise};
+use nalgebra::DMatrix;
 
 /// What is to be expected of a fit to rows whose signals are not known yet.
 #[derive(Clone, Debug)]
@@ -43,6 +45,37 @@ impl Forecaster {
     /// The forecast for rows that each stand for `weight` rows of the log; `None` where they don't
     /// determine the parameters.
     pub fn forecast(&self, rows: &Rows, weight: f64) -> Option<Forecast> {
+        let covariance = self.covariance(rows, weight, [HELD; 2])?;
+        let posterior = Posterior::new(covariance, &self.parameters, &self.noise);
+        let service = self.service.variance(&posterior.covariance);
+        Some(Forecast { posterior, service })
+    }
+
+    /// The same for logs at several temperatures, at distances (mount, body) from T0, K: the standard
+    /// errors of (k, h) of A, B, C, 1/K, and the errors in service over the noise floor at each distance.
+    pub fn forecast_warm(
+        &self,
+        rows: &Rows,
+        weight: f64,
+        sensors: &Sensors,
+        distances_k: &[[f64; 2]],
+    ) -> Option<([[f64; 2]; 3], Vec<[f64; 3]>)> {
+        let mut covariance = self.covariance(rows, weight, sensors.deviations())?;
+        let amplitude_mm = rows.rows.iter().map(|row| row.reference_mm[1].abs());
+        let white_mm = self.noise.white_mm[1];
+        // Of a sine.
+        let rms_to_noise = amplitude_mm.fold(0.0, f64::max) / (f64::sqrt(2.0) * white_mm);
+        sensors.complete(&mut covariance, rms_to_noise * rms_to_noise);
+        let posterior = Posterior::new(covariance.clone(), &self.parameters, &self.noise);
+        let posterior = posterior.with_warmth(&covariance);
+        let ratios = distances_k.iter().map(|distance_k| {
+            let there = covariance_at(&posterior.covariance, &self.parameters, *distance_k);
+            self.service.variance(&there).ratios()
+        });
+        Some((posterior.warmth_errors()?, ratios.collect()))
+    }
+
+    fn covariance(&self, rows: &Rows, weight: f64, warmth: [f64; 2]) -> Option<DMatrix<f64>> {
         let offsets_mm = vec![[0.0; 3]; rows.movements.len()];
         let mut blocks = rows.evaluate(&probes(&self.parameters), 0.0, &offsets_mm);
         blocks.iter_mut().for_each(|block| block.rows *= weight);
@@ -53,9 +86,6 @@ impl Forecaster {
             noise: self.noise,
             resets_mm: None,
         };
-        let covariance = unknowns(&places, [HELD; 2]).covariance(&equations.of_blocks(&blocks))?;
-        let posterior = Posterior::new(covariance, &self.parameters, &self.noise);
-        let service = self.service.variance(&posterior.covariance);
-        Some(Forecast { posterior, service })
+        unknowns(&places, warmth).covariance(&equations.of_blocks(&blocks))
     }
 }

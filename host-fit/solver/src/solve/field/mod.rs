@@ -6,6 +6,7 @@
 //! | [`parameters`] | their values, and the decoder's constants |
 //! | [`probe`] | what a probe reads, with derivatives |
 //! | [`blocks`] | rows and their means over a few |
+//! | [`warmth`] | which temperatures determine k and h, and how well |
 //! | [`whiten`] | the normal equations under drift |
 //! | [`noise`] | noise from residuals |
 //! | [`fit`] | the steps in a row |
@@ -31,4 +32,5 @@ pub mod terms;
 #[cfg(test)]
 mod tests;
 pub mod update;
+pub mod warmth;
 pub mod whiten;

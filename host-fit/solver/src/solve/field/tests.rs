@@ -2,17 +2,19 @@
 
 use super::error::FieldFitError;
 use super::fit::{FieldFit, fit_field};
-use super::parameters::FieldParameters;
+use super::parameters::{FieldParameters, HELD};
 use super::sample_for_tests::{Run, parameters, stage};
 use super::terms::{COUNT, name};
-use crate::input::dataset::{Dataset, LoggedFrame};
+use super::update::{Change, update};
+use crate::input::dataset::{Dataset, LogSource, LoggedFrame};
 use crate::input::stage::Stage;
 use crate::problem::Problem;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::solve::{Projection, Solver, SolverOptions};
+use nalgebra::DMatrix;
 use runtime::frame::MISSING_CODE;
-use runtime::{ModelKind, RawFrame};
+use runtime::{ModelKind, RawFrame, Temperature};
 
 fn model_31(dataset: &Dataset, all: &[usize], stage: &Stage) -> Parameters {
     let options = SolverOptions::new(Projection::Linear, 1);
@@ -151,8 +153,14 @@ fn cold_and_warm(k_per_k: [f64; 3], logs: usize) -> Dataset {
             *signal *= 1.0 + k * change_k;
         }
     }
-    let whole = dataset.logs[0].clone();
-    dataset.logs = vec![whole; logs];
+    if logs == 2 {
+        let whole = dataset.logs[0].clone();
+        let of_rows = |rows| LogSource {
+            rows,
+            ..whole.clone()
+        };
+        dataset.logs = vec![of_rows(0..cold), of_rows(cold..whole.rows.end)];
+    }
     dataset.compensate_as_expected(&stage().temperature);
     dataset
 }
@@ -175,17 +183,77 @@ fn a_cold_and_a_warm_log_tell_k_within_its_standard_error() {
 }
 
 #[test]
-fn one_log_of_less_than_two_kelvin_leaves_k_as_expected() {
-    let mut dataset = cold_and_warm([-1.2e-3; 3], 1);
-    for row in &mut dataset.rows {
-        if let LoggedFrame::Codes(frame) = &mut row.frame {
-            frame.temperature_mc[0] = 20_000 + (frame.temperature_mc[0] - 20_000) / 3;
+fn logs_at_nearly_one_temperature_leave_k_as_expected() {
+    // One log of 1.7 K, and two 0.05 K apart.
+    for (logs, part) in [(1, 3), (2, 100)] {
+        let mut dataset = cold_and_warm([-1.2e-3; 3], logs);
+        for row in &mut dataset.rows {
+            if let LoggedFrame::Codes(frame) = &mut row.frame {
+                frame.temperature_mc[0] = 20_000 + (frame.temperature_mc[0] - 20_000) / part;
+            }
+        }
+        dataset.compensate_as_expected(&stage().temperature);
+        let warmth = fit(&dataset).expect("a fit").warmth;
+        assert_eq!(warmth.spans_k, [0.0; 2]);
+        for (per_mk, error) in warmth.temperature.per_mk.iter().zip(warmth.error_per_k) {
+            assert!((per_mk[0] + 1.2e-6).abs() < 1e-9, "{per_mk:?}");
+            assert_eq!(error[0], 3e-4);
         }
     }
-    dataset.compensate_as_expected(&stage().temperature);
-    let warmth = fit(&dataset).expect("a fit").warmth;
-    for (per_mk, error) in warmth.temperature.per_mk.iter().zip(warmth.error_per_k) {
-        assert!((per_mk[0] + 1.2e-6).abs() < 1e-9, "{per_mk:?}");
-        assert_eq!(error[0], 3e-4);
+}
+
+#[test]
+fn each_run_at_another_temperature_adds_to_what_is_known_of_k() {
+    let (old, truth) = (parameters(), [-0.9e-3, -1.3e-3, -1.6e-3]);
+    let mut temperature = Temperature {
+        per_mk: [[-1.2e-6, 0.0]; 3],
+        zero_mc: [20_000, 0],
+        reach_mk: [30_000, 0],
+    };
+    // Parameters to a hundred thousandth, k as expected of the magnets, no sensor on the body.
+    let deviation = |k: usize| match k.checked_sub(COUNT) {
+        None => 1e-5 * old.probes.as_flattened()[k].abs(),
+        Some(k) => [3e-4, HELD][k % 2],
+    };
+    let mut known = DMatrix::from_fn(COUNT + 6, COUNT + 6, |i, j| {
+        if i == j {
+            deviation(i) * deviation(i)
+        } else {
+            0.0
+        }
+    });
+    let mut errors = [[3e-4; 2]; 3];
+    for change_mk in [2_000, 4_000, 6_000] {
+        let run = Run::EIGHT_SECONDS;
+        let mut dataset = run.dataset(&old);
+        for row in &mut dataset.rows {
+            let frame = RawFrame::new([0; 3], [0; 3], 0, 0);
+            let temperature_mc = [20_000 + change_mk, MISSING_CODE];
+            row.frame = LoggedFrame::Codes(frame.with_temperature_mc(temperature_mc));
+            for (signal, k) in row.signal_m.iter_mut().zip(truth) {
+                *signal *= 1.0 + k * f64::from(change_mk) * 1e-3;
+            }
+        }
+        dataset.compensate(temperature);
+        let drift_mm = run.drift.map(|x| x * 1e3);
+        let what = Change::Temperature;
+        let update = update(&dataset, &stage(), &old, Some(&known), what, drift_mm);
+        let update = update.expect("an update");
+        let found = update.posterior.warmth_errors().expect("k and h");
+        for probe in 0..3 {
+            assert!(
+                found[probe][0] < 0.9 * errors[probe][0],
+                "{found:?} {errors:?}"
+            );
+            temperature.per_mk[probe][0] += 1e-3 * update.parameters.gain_per_k[probe][0];
+        }
+        (errors, known) = (found, update.posterior.covariance);
+    }
+    for (probe, truth) in truth.into_iter().enumerate() {
+        let (k, error) = (temperature.per_mk[probe][0] * 1e3, errors[probe][0]);
+        assert!(
+            error < 1e-5 && (k - truth).abs() < 3.5 * error,
+            "{k:e} {truth:e} {error:e}"
+        );
     }
 }

@@ -1,0 +1,99 @@
+//! The logs that determine k and h, and what to expect at other temperatures after each.
+//!
+//! A cold run first; where the body has a sensor a short one soon after work begins, when the body is
+//! warm and the mount is not; a short one when both are warm.
+
+use super::forecast::{forecaster, rows_of};
+use super::{PlanError, plan};
+use crate::input::stage::Stage;
+use crate::solve::field::warmth::Sensors;
+
+/// Usual length of the cold run, s.
+pub const COLD_S: f64 = 30.0;
+/// Length of the runs after it, s.
+const SHORT_S: f64 = 8.0;
+/// Distances from the cold run, K, of all parts alike.
+const DISTANCES_K: [f64; 2] = [5.0, 10.0];
+/// Rows of a run that a forecast looks at.
+const ROWS: f64 = 1000.0;
+
+/// A log of the protocol.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WarmLog {
+    /// What it is called.
+    pub name: &'static str,
+    /// When to record it.
+    pub when: &'static str,
+    /// Length, s.
+    pub seconds: f64,
+    /// How much warmer mount and body are supposed to be than in the first, K.
+    pub warmer_k: [f64; 2],
+    /// Standard errors of k and h of the worst probe by the logs up to this one, 1/K.
+    pub error_per_k: [f64; 2],
+    /// Errors in service over the noise floor, X, Y, Rz, 5 and 10 K away from the cold run.
+    pub ratios: Vec<[f64; 3]>,
+}
+
+/// The protocol for a stage whose cold run lasts `seconds`.
+///
+/// # Errors
+/// Those of [`plan`] for its runs.
+pub fn protocol(stage: &Stage, seconds: f64) -> Result<Vec<WarmLog>, PlanError> {
+    let is_there = [true, stage.temperature.columns[1].is_some()];
+    let (long, short) = (plan(stage, seconds)?.run, plan(stage, SHORT_S)?.run);
+    let with_body = |k: f64| if is_there[1] { k } else { 0.0 };
+    let log = |name, when, seconds, warmer_k| WarmLog {
+        name,
+        when,
+        seconds,
+        warmer_k,
+        error_per_k: [0.0; 2],
+        ratios: Vec::new(),
+    };
+    let warm = "an hour after that or later, when the mount is 3 K warmer or more";
+    let mut logs = vec![
+        log("cold", "before work", seconds, [0.0; 2]),
+        log(
+            "early",
+            "ten minutes after work begins",
+            SHORT_S,
+            [0.3, 2.0],
+        ),
+        log("warm", warm, SHORT_S, [3.0, with_body(6.0)]),
+    ];
+    // Without a sensor on the body it says no more than the cold run.
+    logs.retain(|log| is_there[1] || log.name != "early");
+    let forecaster = forecaster(stage).ok_or(PlanError::NoPose)?;
+    let step_s = (seconds / ROWS).max(stage.servo_period_s);
+    for last in 0..logs.len() {
+        let of = &logs[..=last];
+        let all_s: f64 = of.iter().map(|log| log.seconds).sum();
+        // T0 is the mean over the rows.
+        let zero = [0, 1].map(|k| {
+            let sums = of.iter().map(|log| log.seconds * log.warmer_k[k]);
+            sums.sum::<f64>() / all_s
+        });
+        let change = |log: &WarmLog| [0, 1].map(|k| log.warmer_k[k] - zero[k]);
+        let run = |index: usize| if index == 0 { &long } else { &short };
+        let runs: Vec<_> = (of.iter().enumerate())
+            .map(|(index, log)| (run(index), change(log)))
+            .collect();
+        let most = |k: usize| of.iter().map(|log| log.warmer_k[k]).fold(0.0, f64::max);
+        let rows = |log: &WarmLog| log.seconds / stage.servo_period_s;
+        let sensors = Sensors {
+            is_there,
+            spans_k: [most(0), most(1)],
+            by_log: of.iter().map(|log| (rows(log), change(log))).collect(),
+            prior_per_k: stage.temperature.prior_per_k,
+        };
+        let at = DISTANCES_K.map(|distance| [0, 1].map(|k| distance - zero[k]));
+        let weight = step_s / stage.servo_period_s;
+        let rows = rows_of(&runs, step_s);
+        let expected = forecaster.forecast_warm(&rows, weight, &sensors, &at);
+        let (errors, ratios) = expected.ok_or(PlanError::NoPose)?;
+        let worst = |k: usize| errors.iter().map(|error| error[k]).fold(0.0, f64::max);
+        logs[last].error_per_k = [worst(0), worst(1)];
+        logs[last].ratios = ratios;
+    }
+    Ok(logs)
+}

@@ -1,0 +1,162 @@
+//! What logs determine of k and h: which temperatures count, what is known before, and what errors of the
+//! temperature sensors leave.
+
+use super::parameters::HELD;
+use crate::input::dataset::Dataset;
+use crate::input::stage::Stage;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use runtime::Temperature;
+use std::ops::Range;
+
+/// k and h as a fit found them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Warmth {
+    /// k, h and T0.
+    pub temperature: Temperature<f64>,
+    /// Standard errors of (k, h) of A, B, C, 1/K; those of the prior where the log determines nothing.
+    pub error_per_k: [[f64; 2]; 3],
+    /// The spans of the temperatures of mount and body that determine k and h, K; 0 where only the prior does.
+    pub spans_k: [f64; 2],
+}
+
+/// A single log that spans less than this does not determine k, K: its drift is also that of the reference.
+const SPAN_MIN_K: f64 = 2.0;
+/// Error of a log's gain by those of its temperatures: of two logs it puts k off by 4e-5 over their
+/// distance in K.
+const OF_SENSORS: f64 = 2.8e-5;
+
+/// The sensors of temperature of some logs.
+#[derive(Clone, Debug)]
+pub struct Sensors {
+    /// Whether mount and body have one.
+    pub is_there: [bool; 2],
+    /// See [`Warmth::spans_k`].
+    pub spans_k: [f64; 2],
+    /// Rows and mean changes of temperature from T0, K, of each log; of one alone, of its halves.
+    pub by_log: Vec<(f64, [f64; 2])>,
+    /// k and h before a log is seen: mean and standard deviation, 1/K.
+    pub prior_per_k: [[f64; 2]; 2],
+}
+
+impl Sensors {
+    /// Those of a dataset.
+    pub fn new(dataset: &Dataset, stage: &Stage) -> Self {
+        let prior_per_k = stage.temperature.prior_per_k;
+        Self {
+            is_there: dataset.temperature.reach_mk.map(|reach| reach != 0),
+            spans_k: [0, 1].map(|sensor| span_k(dataset, sensor, prior_per_k[sensor][1])),
+            by_log: by_log(dataset),
+            prior_per_k,
+        }
+    }
+
+    /// Standard deviations of k and h about their means for the fit, 1/K.
+    pub(super) fn deviations(&self) -> [f64; 2] {
+        [0, 1].map(|k| match self.spans_k[k] > 0.0 {
+            true => self.prior_per_k[k][1],
+            false => HELD,
+        })
+    }
+
+    /// Completes the covariance of k and h, which stand at the end of a fit's: by errors of the sensors,
+    /// one for each log and the same for all probes, and by the prior where it was held in the fit. The
+    /// gains of the logs follow 1, dM and dH, each known by its rows: `signal_to_noise` is the mean
+    /// square of a row's signal over its noise.
+    pub(super) fn complete(&self, covariance: &mut DMatrix<f64>, signal_to_noise: f64) {
+        let along = |change_k: [f64; 2]| Vector3::new(1.0, change_k[0], change_k[1]);
+        let [k, h] = self
+            .deviations()
+            .map(|deviation| 1.0 / (deviation * deviation));
+        let mut normal = Matrix3::from_diagonal(&Vector3::new(1.0, k, h));
+        for (rows, change_k) in &self.by_log {
+            let along = along(*change_k);
+            normal += along * along.transpose() * (rows * signal_to_noise);
+        }
+        let inverse = normal.try_inverse().unwrap_or_else(Matrix3::zeros);
+        let mut of_sensors = Matrix3::zeros();
+        for (rows, change_k) in &self.by_log {
+            let error = inverse * along(*change_k) * (rows * signal_to_noise * OF_SENSORS);
+            of_sensors += error * error.transpose();
+        }
+        let (first, end) = (covariance.nrows() - 6, covariance.nrows());
+        for i in first..end {
+            for j in first..end {
+                covariance[(i, j)] += of_sensors[(1 + (i - first) % 2, 1 + (j - first) % 2)];
+            }
+            let sensor = (i - first) % 2;
+            if self.is_there[sensor] && self.spans_k[sensor] == 0.0 {
+                covariance[(i, i)] = self.prior_per_k[sensor][1] * self.prior_per_k[sensor][1];
+            }
+        }
+    }
+}
+
+/// The range of a log that spans enough, else of the means of several logs; 0 where errors of the sensors
+/// would leave a coefficient less certain than before, `deviation`.
+fn span_k(dataset: &Dataset, sensor: usize, deviation: f64) -> f64 {
+    let of_logs = || dataset.logs.iter().map(|log| log.rows.clone());
+    let range_k = |ends: Option<[i32; 2]>| ends.map_or(0.0, |[a, b]| f64::from(b - a) * 1e-3);
+    let within = of_logs().map(|rows| range_k(dataset.temperature_range_mc(sensor, rows)));
+    let means = of_logs().filter_map(|rows| dataset.temperature_mean_mc(sensor, rows));
+    let ends = means.fold([i32::MAX, i32::MIN], |[low, high], mean| {
+        [low.min(mean), high.max(mean)]
+    });
+    let span_k = if within.fold(0.0, f64::max) >= SPAN_MIN_K {
+        range_k(dataset.temperature_range_mc(sensor, 0..dataset.rows.len()))
+    } else {
+        range_k(Some(ends).filter(|[low, high]| low < high))
+    };
+    let of_two_logs = OF_SENSORS * f64::sqrt(2.0);
+    if of_two_logs < deviation * span_k {
+        span_k
+    } else {
+        0.0
+    }
+}
+
+fn by_log(dataset: &Dataset) -> Vec<(f64, [f64; 2])> {
+    let parts: Vec<Range<usize>> = match dataset.logs.as_slice() {
+        [log] => {
+            let middle = usize::midpoint(log.rows.start, log.rows.end);
+            vec![log.rows.start..middle, middle..log.rows.end]
+        }
+        logs => logs.iter().map(|log| log.rows.clone()).collect(),
+    };
+    let one = |rows: Range<usize>| {
+        let zero_mc = dataset.temperature.zero_mc;
+        let mean_mc = |k: usize| dataset.temperature_mean_mc(k, rows.clone());
+        let mean_mc = [0, 1].map(|k| mean_mc(k).unwrap_or(zero_mc[k]));
+        (rows.len() as f64, dataset.temperature.changes_k(mean_mc))
+    };
+    parts.into_iter().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_logs_leave_k_as_uncertain_as_their_sensors_over_their_distance() {
+        for distance_k in [1.0, 3.0, 8.0] {
+            let sensors = Sensors {
+                is_there: [true, false],
+                spans_k: [distance_k, 0.0],
+                by_log: vec![(15_000.0, [0.0; 2]), (4_000.0, [distance_k, 0.0])],
+                prior_per_k: [[-1.2e-3, 3e-4], [0.0, 2e-4]],
+            };
+            let mut covariance = DMatrix::zeros(6, 6);
+            sensors.complete(&mut covariance, 3e5);
+            let expected = 4e-5 / distance_k;
+            for probe in 0..3 {
+                let error = covariance[(2 * probe, 2 * probe)].sqrt();
+                assert!(
+                    (error / expected - 1.0).abs() < 0.03,
+                    "{error:e} {expected:e}"
+                );
+            }
+            // The same error for all probes, and h is held.
+            assert!((covariance[(0, 4)] / covariance[(0, 0)] - 1.0).abs() < 1e-9);
+            assert!(covariance[(1, 1)] < 1e-20);
+        }
+    }
+}

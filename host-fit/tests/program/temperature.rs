@@ -1,0 +1,85 @@
+//! A simulated stage that warms at work: fitted cold, brought up to date warm, judged over the day.
+
+use crate::common::{Bench, number, plan, stdout};
+
+const TEMPERATURE: &str = "
+[temperature]
+mount = \"mount_mc\"
+body = \"body_mc\"
+unit = \"mC\"
+";
+
+/// k of the probes, %/K, and how far from its temperature the blob is good, by its judgement over the day.
+fn known(bench: &Bench, blob: &str) -> ([f64; 3], f64) {
+    bench.good(&format!("inspect {blob} --json inspect.json"));
+    let k = &bench.json("inspect.json")["temperature"]["k_h_per_k"];
+    bench.good(&format!(
+        "eval {blob} day.csv --stage warm.toml --json eval.json"
+    ));
+    let within = number(&bench.json("eval.json")["valid_within_k"]);
+    ([0, 1, 2].map(|probe| 100.0 * number(&k[probe][0])), within)
+}
+
+#[test]
+fn a_run_at_work_tells_how_the_stage_follows_temperature() {
+    let bench = Bench::new();
+    let without = bench.text("stage.toml");
+    bench.write("warm.toml", without + TEMPERATURE);
+    bench.write("run.csv", plan(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5]));
+    let simulate = "simulate --seed 3 --plan run.csv --hour";
+    let refused = &["names no column", "[temperature]"];
+    bench.bad(
+        &format!("{simulate} 1 --stage stage.toml --out log.csv"),
+        2,
+        refused,
+    );
+    for (log, hour) in [("cold", "-0.2"), ("later", "2"), ("warm", "3.5")] {
+        bench.good(&format!(
+            "{simulate} {hour} --stage warm.toml --out {log}.csv"
+        ));
+    }
+    bench.good("simulate --seed 3 --protocol day --stage warm.toml --out day.csv");
+    bench.good("fit cold.csv --stage warm.toml --model field --out cold.bin --json fit.json");
+    let fit = bench.json("fit.json");
+    assert_eq!(fit["temperatures"][0]["sensor"], "mount");
+    let findings = fit["findings"].as_array().expect("findings");
+    let told = findings
+        .iter()
+        .filter(|found| found["code"] == "temperature");
+    assert_eq!(told.count(), 2, "one for each sensor: {findings:?}");
+    let (k, within) = known(&bench, "cold.bin");
+    assert!(
+        k.iter().all(|k| (k + 0.12).abs() < 1e-4),
+        "as expected of the magnets: {k:?}"
+    );
+    let recalibrate = "recalibrate --stage warm.toml --what temperature";
+    bench.good(&format!("{recalibrate} cold.bin warm.csv --out warm.bin"));
+    bench.good(&format!("{recalibrate} warm.bin later.csv --out later.bin"));
+    let (of_warm, of_later) = (known(&bench, "warm.bin"), known(&bench, "later.bin"));
+    assert!(
+        of_warm.0.iter().all(|k| (-0.15..-0.09).contains(k)),
+        "{of_warm:?}"
+    );
+    assert!(
+        of_warm.1 > 1.5 * within && of_later.1 > of_warm.1,
+        "{within} {of_warm:?} {of_later:?}"
+    );
+    // Each degree of the day, and a zero that does not hold all day.
+    let [mount, body] = ["mount", "body"].map(|sensor| {
+        let json = bench.json("eval.json");
+        let degrees = json["temperatures"].as_array().expect("degrees").clone();
+        degrees
+            .iter()
+            .filter(|degree| degree["sensor"] == sensor)
+            .count()
+    });
+    assert!(mount > 3 && body > 6, "{mount} {body}");
+    let text =
+        stdout(&bench.good("eval later.bin day.csv --stage warm.toml --delta zero --limit 99"));
+    assert!(!text.is_empty());
+    bench.bad(
+        &format!("{recalibrate} cold.bin run.csv --out x.bin"),
+        3,
+        &[],
+    );
+}
