@@ -8,12 +8,12 @@ use numpy::{
 use pyo3::intern;
 use pyo3::prelude::*;
 
-/// The argument as an array of numbers with this many dimensions and at least a row; `kinds` are those of
-/// its dtype that will do.
+/// The argument as an array of numbers with at least a row: one number each, or so many columns; `kinds` are
+/// those of its dtype that will do.
 fn array<'py>(
     argument: &str,
     given: &Bound<'py, PyAny>,
-    dimensions: usize,
+    columns: Option<usize>,
     kinds: &str,
     wanted: &str,
 ) -> PyResult<Bound<'py, PyUntypedArray>> {
@@ -31,13 +31,16 @@ fn array<'py>(
     let made = made.cast_into::<PyUntypedArray>()?;
     let dtype = made.dtype();
     let kind: String = dtype.getattr("kind")?.extract()?;
-    if made.ndim() != dimensions {
+    let (fits, want) = match (made.shape(), columns) {
+        (shape, None) => (shape.len() == 1, "one number a row, (n,)".to_owned()),
+        (shape, Some(columns)) => (
+            matches!(shape, [_, found] if *found == columns),
+            format!("{columns} numbers a row, (n, {columns})"),
+        ),
+    };
+    if !fits {
         let shape = shape(&made);
-        let want = match dimensions {
-            1 => "one number a row, (n,)",
-            _ => "three numbers a row, (n, 3)",
-        };
-        return Err(wrong(argument, format!("shape {shape}: {want} is needed")));
+        return Err(wrong(argument, format!("shape {shape}: {want}, is needed")));
     }
     if made.is_empty() {
         return Err(wrong(argument, "no rows"));
@@ -89,12 +92,7 @@ pub fn codes<'py>(
     argument: &str,
     given: &Bound<'py, PyAny>,
 ) -> PyResult<PyReadonlyArray2<'py, i32>> {
-    let array = array(argument, given, 2, "iu", "codes (whole numbers)")?;
-    if array.shape()[1] != 3 {
-        let shape = shape(&array);
-        let problem = format!("shape {shape}: three codes a row, (n, 3), are needed");
-        return Err(wrong(argument, problem));
-    }
+    let array = array(argument, given, Some(3), "iu", "codes (whole numbers)")?;
     if array.dtype().itemsize() >= 4 {
         check_range(argument, &array, i32::MIN.into(), i32::MAX.into())?;
     }
@@ -107,7 +105,7 @@ pub fn whole<'py>(
     argument: &str,
     given: &Bound<'py, PyAny>,
 ) -> PyResult<PyReadonlyArray1<'py, i64>> {
-    let array = array(argument, given, 1, "iu", "whole numbers")?;
+    let array = array(argument, given, None, "iu", "whole numbers")?;
     check_range(argument, &array, i64::MIN, i64::MAX)?;
     let laid_out = laid_out(&array, "int64")?.cast_into::<PyArray1<i64>>()?;
     Ok(laid_out.try_readonly()?)
@@ -118,8 +116,19 @@ pub fn reals<'py>(
     argument: &str,
     given: &Bound<'py, PyAny>,
 ) -> PyResult<PyReadonlyArray1<'py, f64>> {
-    let array = array(argument, given, 1, "iuf", "numbers")?;
+    let array = array(argument, given, None, "iuf", "numbers")?;
     let laid_out = laid_out(&array, "float64")?.cast_into::<PyArray1<f64>>()?;
+    Ok(laid_out.try_readonly()?)
+}
+
+/// Numbers of so many columns, (n, columns), in `f64`.
+pub fn table<'py>(
+    argument: &str,
+    given: &Bound<'py, PyAny>,
+    columns: usize,
+) -> PyResult<PyReadonlyArray2<'py, f64>> {
+    let array = array(argument, given, Some(columns), "iuf", "numbers")?;
+    let laid_out = laid_out(&array, "float64")?.cast_into::<PyArray2<f64>>()?;
     Ok(laid_out.try_readonly()?)
 }
 
@@ -134,7 +143,7 @@ pub fn same_rows(argument: &str, rows: usize, other: &str, wanted: usize) -> PyR
     }
 }
 
-/// The numbers of an array that [`codes`], [`whole`] or [`reals`] has laid out.
+/// The numbers of an array that [`codes`], [`whole`], [`reals`] or [`table`] has laid out.
 pub fn slice<T>(made: Result<&[T], impl std::fmt::Display>) -> PyResult<&[T]> {
     made.map_err(crate::error::internal)
 }

@@ -15,6 +15,7 @@ mod fit;
 mod log;
 mod minimize;
 mod origin;
+mod plan;
 mod program;
 mod report;
 mod stage;
@@ -37,6 +38,8 @@ mod _hallstage {
     use crate::log::{Log, read_log};
     #[pymodule_export]
     use crate::minimize::{OptimizeResult, minimize};
+    #[pymodule_export]
+    use crate::plan::{Plan, SimulatedLog, plan_run, simulate};
     #[pymodule_export]
     use crate::program::{main_of, write_demo};
     #[pymodule_export]

@@ -21,7 +21,7 @@ use std::sync::Arc;
 ///
 /// Of more than 125,000 rows it holds a sample, of whole runs; `fit`, `evaluate` and a decoder that take it go
 /// through all rows all the same. Made by `read_log` and `Log.from_arrays`.
-#[pyclass(frozen, module = "hallstage")]
+#[pyclass(frozen, subclass, module = "hallstage")]
 pub struct Log {
     pub reading: Arc<LogReading>,
     /// The stage with the columns of this log.

@@ -1,12 +1,14 @@
 //! The searches of the library on a function of Python.
 
+use crate::arrays::{reals, slice, table};
+use crate::error::wrong;
 use host_fit::input::stage::Range;
 use host_fit::solve::search::cost::CostFunction;
 use host_fit::solve::search::kind::SearchKind;
 use host_fit::solve::search::population::Individual;
 use host_fit::solve::search::run::{Start, StopCriteria, StopReason};
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -78,10 +80,9 @@ impl Function<'_> {
             }
         }
         let values = self.fun.bind(python).call1((x,))?;
-        let read = values.extract::<PyArrayLike1<'_, f64, AllowTypeChange>>();
+        let read = reals("fun", &values).ok();
         let read = read
-            .ok()
-            .filter(|read| read.as_array().len() == individuals.len());
+            .filter(|read| matches!(read.as_slice(), Ok(all) if all.len() == individuals.len()));
         let Some(read) = read else {
             let n = individuals.len();
             let what = format!(
@@ -89,7 +90,7 @@ impl Function<'_> {
             );
             return Err(not_what(&values, &what));
         };
-        for (individual, value) in individuals.iter_mut().zip(read.as_array()) {
+        for (individual, value) in individuals.iter_mut().zip(slice(read.as_slice())?) {
             individual.cost = *value;
         }
         Ok(())
@@ -265,7 +266,7 @@ const POPULATION_MAX: u64 = 100_000;
 const STEPS_MAX: u64 = 1 << 40;
 
 /// A whole number in a range.
-fn whole(argument: &str, given: &Bound<'_, PyAny>, low: u64, high: u64) -> PyResult<u64> {
+pub fn whole(argument: &str, given: &Bound<'_, PyAny>, low: u64, high: u64) -> PyResult<u64> {
     let number = given.extract().ok();
     let number = number.filter(|number| (low..=high).contains(number));
     number.ok_or_else(|| {
@@ -288,31 +289,23 @@ fn read_maxiter(given: &Bound<'_, PyAny>) -> PyResult<u64> {
 
 /// One finite number for each of `unknowns`.
 fn individual(x0: &Bound<'_, PyAny>, unknowns: usize) -> PyResult<Vec<f64>> {
-    let read = x0.extract::<PyArrayLike1<'_, f64, AllowTypeChange>>().ok();
-    let read = read.map(|read| read.as_array().to_vec());
-    let read = read.filter(|x| x.len() == unknowns && x.iter().all(|x| x.is_finite()));
-    read.ok_or_else(|| {
-        let problem = format!("{unknowns} finite numbers are needed, one for each row of bounds");
-        wrong("x0", problem)
-    })
+    let read = reals("x0", x0)?;
+    let x0 = slice(read.as_slice())?;
+    match x0.len() == unknowns && x0.iter().all(|x| x.is_finite()) {
+        true => Ok(x0.to_vec()),
+        false => {
+            let problem = "finite numbers are needed, one for each row of bounds";
+            Err(wrong("x0", problem))
+        }
+    }
 }
 
 /// The box.
 fn ranges(bounds: &Bound<'_, PyAny>) -> PyResult<Vec<Range>> {
-    let read = bounds
-        .extract::<PyArrayLike2<'_, f64, AllowTypeChange>>()
-        .ok();
-    let read = read.filter(|read| matches!(read.as_array().dim(), (1.., 2)));
-    let read = read.ok_or_else(|| {
-        let problem = "numbers of shape (N, 2) are needed, a row (low, high) for each unknown";
-        wrong("bounds", problem)
-    })?;
-    let rows = read.as_array();
-    let range = |row: numpy::ndarray::ArrayView1<'_, f64>| Range {
-        low: row[0],
-        high: row[1],
-    };
-    let ranges: Vec<Range> = rows.rows().into_iter().map(range).collect();
+    let read = table("bounds", bounds, 2)?;
+    let (rows, _) = slice(read.as_slice())?.as_chunks::<2>();
+    let ranges = rows.iter().map(|&[low, high]| Range { low, high });
+    let ranges: Vec<Range> = ranges.collect();
     let sound =
         |range: &Range| range.low.is_finite() && range.high.is_finite() && range.low <= range.high;
     match ranges.iter().position(|range| !sound(range)) {
@@ -325,9 +318,4 @@ fn ranges(bounds: &Bound<'_, PyAny>) -> PyResult<Vec<Range>> {
             Err(wrong("bounds", problem))
         }
     }
-}
-
-/// A wrong argument, by its name.
-fn wrong(argument: &str, problem: impl std::fmt::Display) -> PyErr {
-    PyValueError::new_err(format!("{argument}: {problem}"))
 }

@@ -124,9 +124,10 @@ def test_what_the_function_returns_must_be_numbers() -> None:
     ("argument", "value", "says"),
     [
         ("fun", 3, "callable"),
-        ("bounds", [], r"shape \(N, 2\)"),
-        ("bounds", [(0, 1, 2)], r"shape \(N, 2\)"),
-        ("bounds", "ab", r"shape \(N, 2\)"),
+        ("bounds", [], r"\(n, 2\)"),
+        ("bounds", [(0, 1, 2)], r"\(n, 2\)"),
+        ("bounds", "ab", r"\(n, 2\)"),
+        ("bounds", [(0, 1j)], "dtype complex128"),
         ("bounds", [(0, 1), (1, 0)], r"row 1 is \(1, 0\)"),
         ("bounds", [(0, np.nan)], "finite"),
         ("method", "simplex", "shtlbo, tlbo"),
@@ -135,8 +136,8 @@ def test_what_the_function_returns_must_be_numbers() -> None:
         ("population", 1, "from 2 to"),
         ("maxiter", -3, "from 0 to"),
         ("maxfev", 0, "from 1 to"),
-        ("x0", [1.0], "6 finite numbers"),
-        ("x0", [np.inf] * 6, "6 finite numbers"),
+        ("x0", [1.0], "finite numbers are needed, one for each"),
+        ("x0", [np.inf] * 6, "finite numbers are needed, one for each"),
     ],
 )
 def test_a_wrong_argument_is_named(argument: str, value: Any, says: str) -> None:

@@ -5,6 +5,7 @@ from typing import Any, Literal, final
 import numpy as np
 import pandas  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import disjoint_base
 
 from ._results import Finding, Findings, Labelled, Parameter, Residuals
 
@@ -17,12 +18,16 @@ __all__ = [
     "Evaluation",
     "Log",
     "OptimizeResult",
+    "Plan",
+    "SimulatedLog",
     "Stage",
     "check",
     "fit",
     "main_of",
     "minimize",
+    "plan",
     "read_log",
+    "simulate",
     "status_names",
     "write_demo",
 ]
@@ -68,6 +73,13 @@ def read_log(
     bad_rows: Literal["refuse", "skip"] = "refuse",
     split_s: float | None = None,
 ) -> Log: ...
+def plan(stage: Stage, *, seconds: float = 20.0) -> Plan: ...
+def simulate(
+    stage: Stage,
+    run: Plan | Literal["paper", "combined", "service"] | ArrayLike,
+    *,
+    seed: int = 1,
+) -> SimulatedLog: ...
 def check(log: Log) -> Findings: ...
 def fit(
     log: Log,
@@ -109,7 +121,7 @@ class Stage:
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
 
-@final
+@disjoint_base
 class Log:
     @staticmethod
     def from_arrays(
@@ -265,3 +277,18 @@ class Decoder:
     def serial(self) -> str: ...
     @property
     def created(self) -> str: ...
+
+@final
+class Plan:
+    def save(self, path: _Path) -> None: ...
+    @property
+    def seconds(self) -> float: ...
+    @property
+    def trajectory(self) -> NDArray[np.float64]: ...
+    @property
+    def figures(self) -> dict[str, Any]: ...
+
+@final
+class SimulatedLog(Log):
+    @property
+    def truth(self) -> NDArray[np.float64]: ...

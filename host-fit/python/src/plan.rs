@@ -1,0 +1,196 @@
+//! The run to make, and its rehearsal on a simulated stage.
+
+use crate::arrays::{slice, table};
+use crate::error::{internal, of_log, of_output, wrong};
+use crate::log::Log;
+use crate::minimize::whole;
+use crate::stage::Stage;
+use crate::work;
+use host_fit::input::log::{self, LogReading, ReadOptions};
+use host_fit::input::stage::Stage as Designed;
+use host_fit::input::text::TextReader;
+use host_fit::output::write_atomically;
+use host_fit::plan::{self, PERIODS_MAX, SECONDS_MAX};
+use host_fit::report::plan::{figures, tables};
+use host_fit::report::table::as_text;
+use host_fit::simulate::assembly::Assembly;
+use host_fit::simulate::log_text::log_csv;
+use host_fit::simulate::plan_file;
+use host_fit::simulate::pose::StagePose;
+use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
+use host_fit::simulate::recording::{RecordError, record};
+use host_fit::simulate::sensors::SensorErrors;
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A run of the stage for the field model, and what a fit to its log will give. Made by `plan`.
+#[pyclass(frozen, module = "hallstage")]
+pub struct Plan {
+    plan: plan::Plan,
+    designed: Arc<Designed>,
+}
+
+impl Plan {
+    /// As it is read from a file: to 10 pm and prad.
+    fn csv(&self) -> String {
+        let period_s = self.designed.servo_period_s;
+        plan_file::to_csv(&self.plan.run.trajectory(period_s), period_s)
+    }
+}
+
+#[pymethods]
+impl Plan {
+    /// Length, s.
+    #[getter]
+    fn seconds(&self) -> f64 {
+        self.plan.run.seconds
+    }
+
+    /// The poses, a row for each servo period: float64, (n, 6), X, Y, Rz, Z, Rx, Ry in m and rad.
+    #[getter]
+    fn trajectory<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        poses(py, &self.plan.run.trajectory(self.designed.servo_period_s))
+    }
+
+    /// Amplitudes, frequencies, speeds, errors predicted for service and standard errors of the parameters: the
+    /// JSON of `host-fit plan` as a dict.
+    #[getter]
+    fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = figures(&self.plan, &[], &self.designed).to_string();
+        py.import("json")?.call_method1("loads", (text,))
+    }
+
+    /// Writes the trajectory: columns t_us, x_um, y_um, rz_urad, z_um, rx_urad, ry_urad, a row for each servo
+    /// period. Raises `OSError` where it cannot be written.
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        write_atomically(&path, self.csv().as_bytes()).map_err(|error| of_output(&error))
+    }
+
+    fn __repr__(&self) -> String {
+        as_text(&tables(&figures(&self.plan, &[], &self.designed)))
+    }
+}
+
+/// Plans the run to make for the field model: all six axes at once, a sine each, within the limits that
+/// `[motion]` of the stage gives.
+///
+/// `seconds`: its length, s, above 0 and up to 600; 20 are plenty for a stage of the usual limits.
+///
+/// Raises `ValueError` where no run of that length within the limits determines the model; it says what to change.
+#[pyfunction]
+#[pyo3(signature = (stage, *, seconds = 20.0), name = "plan")]
+pub fn plan_run(py: Python<'_>, stage: PyRef<'_, Stage>, seconds: f64) -> PyResult<Plan> {
+    let designed = Arc::clone(&stage.designed);
+    let most = SECONDS_MAX.min(PERIODS_MAX * designed.servo_period_s);
+    if !(seconds > 0.0 && seconds <= most) {
+        let problem = format!("a number above 0 and up to {most} is needed, not {seconds}");
+        return Err(wrong("seconds", problem));
+    }
+    let planned = work::run(py, || plan::plan(&designed, seconds))?;
+    let plan = planned.map_err(|error| wrong("seconds", error))?;
+    Ok(Plan { plan, designed })
+}
+
+/// The log of a simulated stage, and where it truly was. Made by `simulate`.
+#[pyclass(frozen, extends = Log, module = "hallstage")]
+pub struct SimulatedLog {
+    /// The true poses, a row for each row that was recorded: float64, (n, 6), X, Y, Rz, Z, Rx, Ry in m and rad.
+    #[pyo3(get)]
+    truth: Py<PyArray2<f64>>,
+}
+
+/// Records a run of a simulated stage: magnets and their fields, rigid motion, noise, drift, converters; nothing
+/// of the models that are fitted.
+///
+/// `run`: a `Plan`; "paper", "combined" or "service", the protocols of the program; or poses, (n, 6), X, Y, Rz,
+/// Z, Rx, Ry in m and rad, one for each servo period. `seed`: which stage, and its noise: an even one has magnets
+/// as designed, an odd one imperfect magnets. The log is that of `host-fit simulate`, to the bit.
+///
+/// Raises `ValueError` where a probe would hit its magnet.
+#[pyfunction]
+#[pyo3(signature = (stage, run, *, seed = 1))]
+pub fn simulate<'py>(
+    py: Python<'py>,
+    stage: Py<Stage>,
+    run: &Bound<'py, PyAny>,
+    #[pyo3(from_py_with = read_seed)] seed: u64,
+) -> PyResult<Bound<'py, SimulatedLog>> {
+    let designed = Arc::clone(&stage.get().designed);
+    let run = run_of(run, designed.servo_period_s, seed)?;
+    let recorded = work::run(py, || {
+        let assembly = Assembly::draw(&designed, seed);
+        let recording = record(&designed, &assembly, run, &SensorErrors::USUAL, seed)?;
+        let csv = log_csv(&recording, &designed);
+        Ok((read(csv, &designed), recording.truth.concat()))
+    })?;
+    let (reading, truth) = recorded.map_err(|error: RecordError| wrong("run", error))?;
+    let log = Log {
+        reading: Arc::new(reading.map_err(|error| of_log(py, &error))?),
+        designed,
+        stage,
+    };
+    let truth = poses(py, &truth)?.unbind();
+    Bound::new(
+        py,
+        PyClassInitializer::from(log).add_subclass(SimulatedLog { truth }),
+    )
+}
+
+fn read(csv: String, designed: &Designed) -> Result<LogReading, log::LogError> {
+    log::read_bytes(
+        csv.as_bytes(),
+        Path::new("simulated"),
+        designed,
+        &ReadOptions::FIT,
+    )
+}
+
+fn read_seed(given: &Bound<'_, PyAny>) -> PyResult<u64> {
+    whole("seed", given, 0, u64::MAX)
+}
+
+/// What is run. Poses are rounded as in a file, so that the noise, which follows from them, is the same, too.
+fn run_of(run: &Bound<'_, PyAny>, period_s: f64, seed: u64) -> PyResult<Run> {
+    let protocol = |name: &str| match name {
+        "paper" => Ok(Protocol::Paper),
+        "combined" => Ok(Protocol::Combined),
+        "service" => Ok(Protocol::Service),
+        _ => Err(wrong(
+            "run",
+            format!("{name:?} is none of paper, combined, service"),
+        )),
+    };
+    if let Ok(name) = run.extract::<String>() {
+        return Ok(protocol(&name)?.run(period_s, seed));
+    }
+    let csv = match run.cast::<Plan>() {
+        Ok(plan) => plan.get().csv(),
+        Err(_) => plan_file::to_csv(&given_poses(run)?, period_s),
+    };
+    let text = TextReader::of_reader(csv.as_bytes(), Path::new("run")).map_err(internal)?;
+    let trajectory = plan_file::of_text(text, period_s).map_err(|error| wrong("run", error))?;
+    Ok(Run::planned(trajectory))
+}
+
+/// Poses of a caller.
+fn given_poses(run: &Bound<'_, PyAny>) -> PyResult<Trajectory> {
+    let read = table("run", run, 6)?;
+    let (rows, _) = slice(read.as_slice())?.as_chunks::<6>();
+    if !rows.as_flattened().iter().all(|x| x.is_finite()) {
+        return Err(wrong("run", "its poses must be finite numbers"));
+    }
+    let pose = |&[x, y, rz, z, rx, ry]: &[f64; 6]| StagePose {
+        planar: [x, y, rz],
+        vertical: [z, rx, ry],
+    };
+    Ok(rows.iter().map(pose).collect())
+}
+
+/// Poses as rows of an array.
+fn poses<'py>(py: Python<'py>, poses: &[StagePose]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let numbers = poses.iter().flat_map(|pose| [pose.planar, pose.vertical]);
+    let flat: Vec<f64> = numbers.flatten().collect();
+    PyArray1::from_vec(py, flat).reshape([poses.len(), 6])
+}
