@@ -329,7 +329,7 @@ impl<SPI: SpiDevice, SYNC: OutputPin> FrameSampler for Ads131m08<SPI, SYNC> {
         self.count_unsynced(statuses)?;
         if let Some(due) = self.temperatures.due(&self.channels, time_us) {
             let code = frame.codes[usize::from(due.1.input & 7)];
-            self.temperatures.take(due, code, time_us);
+            self.temperatures.take(due, code);
         }
         let sampled = self.channels.frame(&frame.codes, sequence, time_us);
         Ok(sampled.with_temperature_mc(self.temperatures.temperature_mc()))

@@ -248,7 +248,7 @@ impl<SPI: SpiDevice, RST: OutputPin> FrameSampler for Ads8688<SPI, RST> {
         }
         if let Some(due) = due {
             let code = self.code(due.1.input, NO_OP)?;
-            self.temperatures.take(due, code, time_us);
+            self.temperatures.take(due, code);
         } else {
             let register = self.turn;
             self.turn = match register {

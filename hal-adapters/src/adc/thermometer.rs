@@ -49,12 +49,11 @@ impl Curve {
     pub fn temperature_mc(&self, code: i32) -> i32 {
         let mut start_mc = self.first_mc;
         for pair in self.codes.windows(2) {
-            if let [from, to] = *pair {
-                let (since, span) = (code.wrapping_sub(from), to.wrapping_sub(from));
-                let part = since as f32 / span as f32;
-                if (0.0..=1.0).contains(&part) {
-                    return start_mc.wrapping_add((part * self.step_mc as f32) as i32);
-                }
+            if let [from, to] = *pair
+                && (from.min(to)..=from.max(to)).contains(&code)
+            {
+                let part = (code - from) as f32 / (to - from) as f32;
+                return start_mc + (part * self.step_mc as f32) as i32;
             }
             start_mc = start_mc.wrapping_add(self.step_mc);
         }
@@ -137,43 +136,49 @@ pub mod tmp235 {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Held {
     temperature_mc: [i32; 2],
-    read_us: [Option<u32>; 2],
+    /// When both were read, us.
+    read_us: u32,
+    /// The sensor that is read next: 0 or 1, or both once their time has come.
+    turn: u8,
 }
 
 impl Held {
+    const BOTH: u8 = 2;
+
     /// Nothing is read yet.
     pub(super) const NOTHING: Self = Self {
         temperature_mc: [MISSING_CODE; 2],
-        read_us: [None; 2],
+        read_us: 0,
+        turn: 0,
     };
 
-    /// The sensor that is to be read at `now_us`, if one is.
+    /// The sensor that is to be read at `now_us`, if one is: the mount's, and the body's in the next
+    /// period.
     pub(super) fn due(
-        &self,
+        &mut self,
         channels: &Channels,
         now_us: u32,
     ) -> Option<(usize, &'static Thermometer)> {
-        let sensors = (0..).zip(channels.thermometers).zip(self.read_us);
-        sensors
-            .filter(|(_, read_us)| {
-                read_us.is_none_or(|read_us| now_us.wrapping_sub(read_us) >= REFRESH_US)
-            })
-            .find_map(|((which, thermometer), _)| Some((which, thermometer?)))
+        if self.turn >= Self::BOTH {
+            if now_us.wrapping_sub(self.read_us) < REFRESH_US {
+                return None;
+            }
+            self.turn = 0;
+        }
+        let sensors = (0..).zip(channels.thermometers);
+        let mut left = sensors.skip(self.turn.into());
+        let next = left.find_map(|(which, thermometer)| Some((which, thermometer?)));
+        if self.turn == 0 {
+            self.read_us = now_us;
+        }
+        self.turn = next.map_or(Self::BOTH, |(which, _)| which as u8 + 1);
+        next
     }
 
     /// Takes the code of a sensor that was due.
-    pub(super) fn take(
-        &mut self,
-        (which, thermometer): (usize, &Thermometer),
-        code: i32,
-        now_us: u32,
-    ) {
-        if let (Some(held), Some(read_us)) = (
-            self.temperature_mc.get_mut(which),
-            self.read_us.get_mut(which),
-        ) {
+    pub(super) fn take(&mut self, (which, thermometer): (usize, &Thermometer), code: i32) {
+        if let Some(held) = self.temperature_mc.get_mut(which) {
             *held = thermometer.curve.temperature_mc(code);
-            *read_us = Some(now_us);
         }
     }
 
@@ -316,11 +321,15 @@ mod tests {
             let now_us = (u32::MAX - 50_000).wrapping_add(2_000 * tick);
             if let Some(due) = held.due(&channels, now_us) {
                 read.push((tick, due.1.input));
-                held.take(due, LINEAR[0][0], now_us);
+                held.take(due, LINEAR[0][0]);
             }
         }
         assert_eq!(read, [(0, 6), (1, 7), (50, 6), (51, 7), (100, 6)]);
         assert_eq!(held.temperature_mc(), [-40_000; 2]);
-        assert_eq!(Held::NOTHING.due(&Channels::IN_ORDER, 0), None);
+        let (mut none, channels) = (Held::NOTHING, Channels::IN_ORDER);
+        assert_eq!(
+            (none.due(&channels, 0), none.due(&channels, 1)),
+            (None, None)
+        );
     }
 }
