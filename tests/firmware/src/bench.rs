@@ -266,6 +266,11 @@ impl Seen {
         }
     }
 
+    /// Frames of codes: those of temperatures come unasked.
+    pub fn recorded(&self) -> usize {
+        self.codes.len() - self.temperatures.len()
+    }
+
     /// The last state and its reason.
     pub fn last_state(&self) -> Option<(NodeState, u8)> {
         let status = self.last_status()?;

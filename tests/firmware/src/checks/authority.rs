@@ -35,7 +35,7 @@ pub fn tag_or_line(bench: &Bench) -> Outcome {
             let seen = ask_alone(&mut machine, request, token, 10)?;
             let what = format!("answer to {request:?}");
             equal(&what, ended(&seen, token), vec![Some(refusal)])?;
-            equal("codes", seen.codes.len(), 0)?;
+            equal("codes", seen.recorded(), 0)?;
         }
         equal("resets", machine.panics + machine.watchdog_resets, 0)?;
         machine.chip.servo_on = false;
