@@ -244,10 +244,15 @@ def test_other_threads_go_on_while_a_log_is_fitted(run30: hs.Log) -> None:
     assert after - before > 10
 
 
-def test_ctrl_c_ends_a_search_and_the_next_fit_works(run30: hs.Log) -> None:
+def test_ctrl_c_ends_a_search_that_shows_how_far_it_is_and_the_next_fit_works(
+    run30: hs.Log, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("hallstage._progress._is_seen", lambda: True)
     paper = hs.read_log(DATA / "paper.csv.gz", run30.stage)
-    timer = threading.Timer(0.5, signal.raise_signal, [signal.SIGINT])
+    timer = threading.Timer(1.5, signal.raise_signal, [signal.SIGINT])
     timer.start()
     with pytest.raises(KeyboardInterrupt):
         hs.fit(paper, model="31", solver="de", project="none", generations=10_000_000)
+    shown = capsys.readouterr().err
+    assert " % " in shown and shown.endswith("\r")
     assert hs.fit(run30).verdict == "good"

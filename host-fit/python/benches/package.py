@@ -1,0 +1,66 @@
+"""How fast arrays are decoded, on one core, and how a fit compares with that of the program.
+
+    python host-fit/python/benches/package.py [target/release/host-fit]
+
+Prints `RESULT key=value` lines, medians of several runs. The fit is of the shipped run of 30 s, reading and writing
+included; without the path of a program that of the package's own environment starts, with Python around it.
+"""
+
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+import hallstage as hs
+import numpy as np
+
+RUNS = 15
+ROWS = 2_000_000
+
+
+def seconds(work: Callable[[], object], runs: int = RUNS) -> float:
+    def once() -> float:
+        started = time.perf_counter()
+        work()
+        return time.perf_counter() - started
+
+    return statistics.median(once() for _ in range(runs))
+
+
+def main() -> None:
+    folder = Path(tempfile.mkdtemp())
+    hs.write_demo(folder)
+    stage_file, run30 = folder / "stage.toml", folder / "run30.csv.gz"
+    stage = hs.Stage.load(stage_file)
+    service = hs.read_log(folder / "service.csv.gz", stage)
+    times = ROWS // len(service)
+    hall = np.tile(service.hall, (times, 1))
+    caps = np.tile(service.caps, (times, 1)) if service.caps is not None else hall
+    models: list[Literal["31", "field"]] = ["31", "field"]
+    for model in models:
+        dec = hs.fit(hs.read_log(run30, stage), model=model).decoder()
+        rate = len(hall) * 1e-6 / seconds(lambda dec=dec: dec(hall=hall, caps=caps))
+        print(f"RESULT decode_{model}_million_ticks_per_s={rate:.1f}", flush=True)
+
+    program = sys.argv[1] if len(sys.argv) > 1 else str(Path(sys.executable).parent / "host-fit")
+    command = [program, "-q", "fit", run30, "--stage", stage_file, "--out", folder / "p.bin"]
+
+    def of_package() -> None:
+        hs.fit(hs.read_log(run30, stage)).save(folder / "own.bin")
+
+    def of_program() -> None:
+        subprocess.run(command, check=True)
+
+    # In turn, so that both meet the same machine.
+    pairs = [(seconds(of_package, 1), seconds(of_program, 1)) for _ in range(RUNS)]
+    own, other = (statistics.median(times) for times in zip(*pairs, strict=True))
+    assert (folder / "own.bin").read_bytes() == (folder / "p.bin").read_bytes()
+    print(f"RESULT fit_package_s={own:.3f} fit_program_s={other:.3f} ratio={own / other:.2f}")
+
+
+if __name__ == "__main__":
+    main()
