@@ -354,12 +354,12 @@ impl Calibration {
         let order = EvalOrder { zeros, limit };
         let options = log.options(Judged::OPTIONS);
         let logs = log.reading.dataset.logs.len();
-        let (set, designed) = (&self.set, &log.designed);
+        let (set, designed, known) = (&self.set, &log.designed, self.known.as_ref());
         let evaluated = work::run(py, || {
             let judged = Judged::new(set, designed, logs, |take| {
                 log.reading.read_anew(designed, &options, take)
             })?;
-            Ok(judged.evaluated(order))
+            Ok(judged.evaluated(order, known))
         })?;
         let evaluated = evaluated.map_err(|error| of_log(py, &error))?;
         Ok(Evaluation {

@@ -10,11 +10,13 @@ use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Judge, Judgement, Zeros, error};
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
+use crate::recalibrate::Known;
 use crate::report::errors::RowErrors;
 use crate::report::json::{Circumstances, Report, of_eval};
 use crate::report::page::Errors;
 use crate::report::table::tables;
 use crate::report::verdict::{End, Subject};
+use crate::solve::field::parameters::FieldParameters;
 use runtime::{ModelKind, ParameterSet};
 
 /// The most rows that the diagnosis looks at: three minutes, in less than 64 MB with all else.
@@ -91,8 +93,9 @@ impl<'a> Judged<'a> {
         })
     }
 
-    /// Counts the errors and diagnoses the logs.
-    pub fn evaluated(self, order: EvalOrder) -> Evaluation {
+    /// Counts the errors and diagnoses the logs; `known` is what stands beside the blob, which tells how far
+    /// from its temperature it is good.
+    pub fn evaluated(self, order: EvalOrder, known: Option<&Known>) -> Evaluation {
         let Self {
             set,
             stage,
@@ -110,6 +113,11 @@ impl<'a> Judged<'a> {
         let rezero = diagnose::temperature::rezero(temperature, &log.dataset, refitted);
         let findings = diagnosis.findings.into_iter().chain(rezero);
         diagnosis.findings = finding::in_order(findings.collect());
+        diagnosis.validity = known.and_then(|known| {
+            let parameters = FieldParameters::of_set(set, stage)?;
+            let (white_mm, covariance) = (known.noise.white_mm, &known.covariance);
+            diagnose::temperature::validity(stage, &parameters, white_mm, covariance)
+        });
         // As the blob's own errors were counted, whatever zeros are asked for.
         let comparable = judge.judgement(own_zeros).errors;
         let usual = if is_field(set) { 3.0 } else { 10.0 };

@@ -5,12 +5,10 @@ use super::report::{Report, finish};
 use crate::calibrate::{EvalOrder, Judged};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::diagnose::temperature::validity;
 use crate::input::log;
 use crate::judge::Zeros;
 use crate::output::{Outputs, blob_file, posterior_file};
 use crate::report::table::tables;
-use crate::solve::field::parameters::FieldParameters;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -73,13 +71,11 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         }),
         limit: args.limit,
     };
-    let mut evaluation = terminal::timed("diagnosis", || judged.evaluated(order));
     // What is known of k and h stands beside the blob.
-    evaluation.diagnosis.validity = posterior_file::beside(&args.params).and_then(|path| {
-        let known = posterior_file::read(&path, &set, &args.params).ok()?;
-        let parameters = FieldParameters::of_set(&set, &stage)?;
-        validity(&stage, &parameters, known.noise.white_mm, &known.covariance)
-    });
+    let known = posterior_file::beside(&args.params);
+    let known = known.and_then(|path| posterior_file::read(&path, &set, &args.params).ok());
+    let judged = || judged.evaluated(order, known.as_ref());
+    let evaluation = terminal::timed("diagnosis", judged);
     let report = evaluation.report(started.elapsed().as_secs_f64());
     let subject = evaluation.subject();
     let mut hidden = report.hidden();
