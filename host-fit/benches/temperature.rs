@@ -33,6 +33,12 @@ type Axes = [f64; 3];
 const WITHIN: f64 = 1.959_964;
 /// Distances from the cold run, K.
 const CHANGES_K: [f64; 4] = [-10.0, -5.0, 5.0, 10.0];
+/// Most that the mean and the worst stage may have at these, ...
+const LIMITS: [[f64; 2]; 4] = [[1.06, 1.3], [1.02, 1.1], [1.02, 1.1], [1.06, 1.3]];
+/// ... the mean where sensors are off, ...
+const LIMITS_OFF: [f64; 2] = [1.08, f64::INFINITY];
+/// ... and over the day.
+const LIMITS_DAY: [f64; 2] = [1.04, 1.1];
 
 /// `run30` and `run8` of the given logs.
 const RUN_30: PlannedRun = run(30.0, [13.0, 17.0, 14.0, 19.0, 16.0, 11.0]);
@@ -164,12 +170,20 @@ fn changed(recording: &Recording, change: impl Fn([i32; 2]) -> [i32; 2]) -> Reco
 struct Ratios(Vec<Axes>);
 
 impl Ratios {
-    fn print(&self, title: &str) {
+    /// Prints means and worst stages; whether they are within `limits` of any axis, where there are some.
+    fn print(&self, title: &str, limits: Option<[f64; 2]>) -> bool {
         let of = |axis: usize| self.0.iter().map(move |ratio| ratio[axis]);
         let words = |values: Axes| values.map(|x| format!("{x:6.3}")).join(" ");
         let mean = [0, 1, 2].map(|axis| of(axis).sum::<f64>() / self.0.len() as f64);
         let worst = [0, 1, 2].map(|axis| of(axis).fold(0.0, f64::max));
-        println!("{title:<58}{}  {}", words(mean), words(worst));
+        let most = [mean, worst].map(|axes| axes.into_iter().fold(0.0, f64::max));
+        let is_within = limits.is_none_or(|limits| most[0] <= limits[0] && most[1] <= limits[1]);
+        let limits = limits.map_or(String::new(), |[mean, worst]| {
+            let found = if is_within { "met" } else { "MISSED" };
+            format!("  limits {mean:.2}, {worst:.2} {found}")
+        });
+        println!("{title:<58}{}  {}{limits}", words(mean), words(worst));
+        is_within
     }
 }
 
@@ -232,6 +246,7 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
         "errors over the noise, {stages} stages{:>48}",
         "mean X, Y, Rz         worst X, Y, Rz"
     );
+    let mut all_met = true;
     for spacing_k in [3.0, 5.0] {
         let mut by_change: [Ratios; 4] = Default::default();
         let mut off = Ratios::default();
@@ -247,12 +262,12 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
             let fit = twin.fit(&[&cold, &warm])?;
             off.0.push(twin.judge(&fit, &twin.service(10.0))?);
         }
-        for (ratios, change_k) in by_change.iter().zip(CHANGES_K) {
-            ratios.print(&format!(
-                "run30, run8 {spacing_k} K warmer; service at {change_k:+} K"
-            ));
+        for ((ratios, change_k), limits) in by_change.iter().zip(CHANGES_K).zip(LIMITS) {
+            let title = format!("run30, run8 {spacing_k} K warmer; service at {change_k:+} K");
+            all_met &= ratios.print(&title, Some(limits));
         }
-        off.print(&format!("the same, sensors of run8 0.1 K off; at +10 K"));
+        let limits = (spacing_k == 5.0).then_some(LIMITS_OFF);
+        all_met &= off.print("the same, sensors of run8 0.1 K off; at +10 K", limits);
     }
     let mut days: [Ratios; 4] = Default::default();
     let (mut k, mut h) = (Coefficients::default(), Coefficients::default());
@@ -300,8 +315,9 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
         "cold",
         "cold, no temperatures",
     ];
-    for (title, ratios) in titles.into_iter().zip(&days) {
-        ratios.print(&format!("{title}; the day"));
+    for (index, (title, ratios)) in titles.into_iter().zip(&days).enumerate() {
+        let limits = (index == 0).then_some(LIMITS_DAY);
+        all_met &= ratios.print(&format!("{title}; the day"), limits);
     }
     k.print("k by cold, early, warm");
     h.print("h by cold, early, warm");
@@ -314,7 +330,10 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
         };
         found.print(&format!("k by run30, run8 {spacing_k} K warmer{growth}"));
     }
-    Ok(())
+    match all_met {
+        true => Ok(()),
+        false => Err("a limit is missed".into()),
+    }
 }
 
 /// The logs of a folder.
@@ -346,7 +365,7 @@ fn of_logs(folder: &Path, stage: &Path) -> Fallible<()> {
         let logs = log::read(&paths(names), &stage, &ReadOptions::FIT)?.dataset;
         let mut ratio = Ratios::default();
         ratio.0.push(ratios(&fitted(&logs, &stage)?, &day));
-        ratio.print(&format!("{}; the day", names.join(", ")));
+        ratio.print(&format!("{}; the day", names.join(", ")), None);
     }
     Ok(())
 }

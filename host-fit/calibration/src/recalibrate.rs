@@ -26,6 +26,7 @@
 
 use crate::diagnose::bank::declared_service;
 use crate::diagnose::signals::signal_findings;
+use crate::diagnose::temperature::validity;
 use crate::diagnose::{Diagnosis, of_judged};
 use crate::fit::RANGE_MARGIN;
 use crate::input::dataset::Dataset;
@@ -300,7 +301,12 @@ pub fn recalibrate(
     let (errors, judgement) = by_row(&decoded(&set));
     let predicted = declared_service(stage, &update.parameters, update.noise.white_mm)
         .map(|at_work| Predicted::new(&at_work, &update.posterior.covariance, &[0.0; COUNT]));
-    let diagnosis = of_judged(dataset, stage, &set, &errors, predicted);
+    let (white_mm, covariance) = (update.noise.white_mm, &update.posterior.covariance);
+    let validity = known.and_then(|_| validity(stage, &update.parameters, white_mm, covariance));
+    let diagnosis = Diagnosis {
+        validity,
+        ..of_judged(dataset, stage, &set, &errors, predicted)
+    };
     let axes = judgement.errors.axes;
     let rows = u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX);
     let fit = FitRecord {

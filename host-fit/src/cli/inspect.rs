@@ -9,6 +9,7 @@ use crate::report::errors;
 use crate::report::parameters::{self, parameters_in};
 use crate::report::provenance::hex;
 use crate::report::table::{as_text, tables};
+use crate::solve::field::posterior::warmth_errors;
 use clap::Args;
 use runtime::{ModelKind, ParameterSet};
 use serde_json::{Value, json};
@@ -30,8 +31,14 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), HostError> {
     let set = blob_file::read(&args.params)?;
     let posterior = posterior_file::beside(&args.params);
     let known = posterior.and_then(|path| posterior_file::read(&path, &set, &args.params).ok());
-    let repaired = known.map(|known| known.repaired);
     let mut figures = figures(&set);
+    let errors = known
+        .as_ref()
+        .and_then(|known| warmth_errors(&known.covariance));
+    if let (Some(errors), true) = (errors, set.constants.temperature.is_used()) {
+        figures["temperature"]["standard_errors_per_k"] = json!(errors);
+    }
+    let repaired = known.map(|known| known.repaired);
     figures["repaired"] = json!(repaired);
     args.json.write(&figures)?;
     let parameters = parameters::tables(&parameters_in(&set), &[]);

@@ -12,7 +12,12 @@ unit = \"mC\"
 /// k of the probes, %/K, and how far from its temperature the blob is good, by its judgement over the day.
 fn known(bench: &Bench, blob: &str) -> ([f64; 3], f64) {
     bench.good(&format!("inspect {blob} --json inspect.json"));
-    let k = &bench.json("inspect.json")["temperature"]["k_h_per_k"];
+    let temperature = &bench.json("inspect.json")["temperature"];
+    let (k, errors) = (
+        &temperature["k_h_per_k"],
+        &temperature["standard_errors_per_k"],
+    );
+    assert!(number(&errors[0][0]) > 0.0, "{temperature}");
     bench.good(&format!(
         "eval {blob} day.csv --stage warm.toml --json eval.json"
     ));

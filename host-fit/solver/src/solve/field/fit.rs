@@ -6,7 +6,7 @@ use super::carry::Verdict;
 use super::error::FieldFitError;
 use super::noise::{USUAL_DRIFT_MM, drift_mm, white_mm, white_only};
 use super::parameters::{FieldParameters, unknowns};
-use super::posterior::Posterior;
+use super::posterior::{Posterior, warmth_errors};
 use super::probe::probes;
 use super::terms::COUNT;
 use super::warmth::{Sensors, Warmth};
@@ -281,7 +281,7 @@ impl WhiteFit {
         };
         let warmth = Warmth {
             temperature,
-            error_per_k: posterior.warmth_errors().unwrap_or_default(),
+            error_per_k: warmth_errors(&posterior.covariance).unwrap_or_default(),
             spans_k: self.sensors.spans_k,
         };
         (posterior, warmth)

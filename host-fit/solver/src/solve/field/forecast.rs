@@ -3,7 +3,7 @@
 use super::blocks::Rows;
 use super::carry::{Service, ServiceVariance, service_poses};
 use super::parameters::{FieldParameters, HELD, unknowns};
-use super::posterior::{Posterior, covariance_at};
+use super::posterior::{Posterior, covariance_at, warmth_errors};
 use super::probe::probes;
 use super::warmth::Sensors;
 use super::whiten::{FieldEquations, Noise};
@@ -72,7 +72,7 @@ impl Forecaster {
             let there = covariance_at(&posterior.covariance, &self.parameters, *distance_k);
             self.service.variance(&there).ratios()
         });
-        Some((posterior.warmth_errors()?, ratios.collect()))
+        Some((warmth_errors(&posterior.covariance)?, ratios.collect()))
     }
 
     fn covariance(&self, rows: &Rows, weight: f64, warmth: [f64; 2]) -> Option<DMatrix<f64>> {

@@ -88,6 +88,14 @@ pub fn covariance_at(
     &acts * covariance * acts.transpose()
 }
 
+/// Standard errors of (k, h) of A, B, C, 1/K, from a [`Posterior::covariance`]; `None` without sensors of
+/// temperature.
+pub fn warmth_errors(covariance: &DMatrix<f64>) -> Option<[[f64; 2]; 3]> {
+    let error = |k: usize| covariance[(k, k)].sqrt();
+    (covariance.nrows() > COUNT)
+        .then(|| [0, 1, 2].map(|probe| [0, 1].map(|k| error(COUNT + 2 * probe + k))))
+}
+
 impl Posterior {
     pub(super) fn new(with_lag: DMatrix<f64>, parameters: &FieldParameters, noise: &Noise) -> Self {
         let lag = with_lag[(COUNT, COUNT)];
@@ -118,13 +126,6 @@ impl Posterior {
     pub(super) fn with_warmth(mut self, with_lag: &DMatrix<f64>) -> Self {
         self.covariance = with_lag.clone().remove_row(COUNT).remove_column(COUNT);
         self
-    }
-
-    /// Standard errors of (k, h) of A, B, C, 1/K; `None` without sensors of temperature.
-    pub fn warmth_errors(&self) -> Option<[[f64; 2]; 3]> {
-        let error = |k: usize| self.covariance[(k, k)].sqrt();
-        (self.covariance.nrows() > COUNT)
-            .then(|| [0, 1, 2].map(|probe| [0, 1].map(|k| error(COUNT + 2 * probe + k))))
     }
 
     /// The standard errors of the parameters, in their units.

@@ -3,6 +3,7 @@
 use super::error::FieldFitError;
 use super::fit::{FieldFit, fit_field};
 use super::parameters::{FieldParameters, HELD};
+use super::posterior::warmth_errors;
 use super::sample_for_tests::{Run, parameters, stage};
 use super::terms::{COUNT, name};
 use super::update::{Change, update};
@@ -239,7 +240,7 @@ fn each_run_at_another_temperature_adds_to_what_is_known_of_k() {
         let what = Change::Temperature;
         let update = update(&dataset, &stage(), &old, Some(&known), what, drift_mm);
         let update = update.expect("an update");
-        let found = update.posterior.warmth_errors().expect("k and h");
+        let found = warmth_errors(&update.posterior.covariance).expect("k and h");
         for probe in 0..3 {
             assert!(
                 found[probe][0] < 0.9 * errors[probe][0],

@@ -25,6 +25,12 @@ const SPAN_MIN_K: f64 = 2.0;
 /// distance in K.
 const OF_SENSORS: f64 = 2.8e-5;
 
+/// Errors of k and of h by what the form leaves, 1/K: expansion moves a probe over its magnet, where the
+/// field differs. Standard deviations over simulated stages where one temperature changes, ...
+const OF_FORM: f64 = 3.5e-5;
+/// ... and of their sum, where both change alike and stage and framework grow together.
+const OF_FORM_TOGETHER: f64 = 1.3e-5;
+
 /// The sensors of temperature of some logs.
 #[derive(Clone, Debug)]
 pub struct Sensors {
@@ -59,8 +65,8 @@ impl Sensors {
     }
 
     /// Completes the covariance of k and h, which stand at the end of a fit's: by errors of the sensors,
-    /// one for each log and the same for all probes, and by the prior where it was held in the fit. The
-    /// gains of the logs follow 1, dM and dH, each known by its rows: `signal_to_noise` is the mean
+    /// one for each log and the same for all probes, by those of the form, and by the prior where they
+    /// were held in the fit. The gains of the logs follow 1, dM and dH, each known by its rows: `signal_to_noise` is the mean
     /// square of a row's signal over its noise.
     pub(super) fn complete(&self, covariance: &mut DMatrix<f64>, signal_to_noise: f64) {
         let along = |change_k: [f64; 2]| Vector3::new(1.0, change_k[0], change_k[1]);
@@ -83,7 +89,19 @@ impl Sensors {
             for j in first..end {
                 covariance[(i, j)] += of_sensors[(1 + (i - first) % 2, 1 + (j - first) % 2)];
             }
-            let sensor = (i - first) % 2;
+            let (sensor, other) = (
+                (i - first) % 2,
+                first + (i - first) / 2 * 2 + (i + 1 - first) % 2,
+            );
+            let together = OF_FORM_TOGETHER * OF_FORM_TOGETHER;
+            match [sensor, 1 - sensor].map(|sensor| self.spans_k[sensor] > 0.0) {
+                [true, true] => {
+                    covariance[(i, i)] += OF_FORM * OF_FORM;
+                    covariance[(i, other)] += 0.5 * together - OF_FORM * OF_FORM;
+                }
+                [true, false] => covariance[(i, i)] += together,
+                [false, _] => {}
+            }
             if self.is_there[sensor] && self.spans_k[sensor] == 0.0 {
                 covariance[(i, i)] = self.prior_per_k[sensor][1] * self.prior_per_k[sensor][1];
             }
@@ -146,7 +164,7 @@ mod tests {
             };
             let mut covariance = DMatrix::zeros(6, 6);
             sensors.complete(&mut covariance, 3e5);
-            let expected = 4e-5 / distance_k;
+            let expected = (4e-5 / distance_k).hypot(OF_FORM_TOGETHER);
             for probe in 0..3 {
                 let error = covariance[(2 * probe, 2 * probe)].sqrt();
                 assert!(
@@ -154,8 +172,9 @@ mod tests {
                     "{error:e} {expected:e}"
                 );
             }
-            // The same error for all probes, and h is held.
-            assert!((covariance[(0, 4)] / covariance[(0, 0)] - 1.0).abs() < 1e-9);
+            // The sensors' part is the same for all probes, and h is held.
+            let shared = covariance[(0, 4)].sqrt() * distance_k;
+            assert!((shared / 4e-5 - 1.0).abs() < 0.03, "{shared:e}");
             assert!(covariance[(1, 1)] < 1e-20);
         }
     }
