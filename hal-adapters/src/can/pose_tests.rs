@@ -189,7 +189,7 @@ fn a_time_frame_worked_by_hand() {
     );
 }
 
-/// Every status that a tracker gives to a valid or an invalid pose is told apart on the bus.
+/// Every status that a tracker gives to a valid or an invalid pose is distinguished on the bus.
 #[test]
 fn a_missing_temperature_of_a_valid_pose_is_sent_in_20_bits() {
     let missing = Status::TEMPERATURE_MISSING;

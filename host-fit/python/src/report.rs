@@ -35,8 +35,8 @@ pub fn head(subject: &Subject, warnings: &[String]) -> PyResult<String> {
 
 /// The same in words, for a terminal.
 pub fn text(subject: &Subject, findings: &[Finding]) -> String {
-    let told = findings.iter().map(|found| format!("{}\n", found.message));
-    Summary::new(subject).as_text() + &told.collect::<String>()
+    let messages = findings.iter().map(|found| format!("{}\n", found.message));
+    Summary::new(subject).as_text() + &messages.collect::<String>()
 }
 
 /// Errors of the rows of a dataset (m, m, rad) as a `hallstage.Residuals`.

@@ -48,10 +48,10 @@ fn a_run_at_work_tells_how_the_stage_follows_temperature() {
     let fit = bench.json("fit.json");
     assert_eq!(fit["temperatures"][0]["sensor"], "mount");
     let findings = fit["findings"].as_array().expect("findings");
-    let told = findings
+    let notes = findings
         .iter()
         .filter(|found| found["code"] == "temperature");
-    assert_eq!(told.count(), 2, "one for each sensor: {findings:?}");
+    assert_eq!(notes.count(), 2, "one for each sensor: {findings:?}");
     let (k, within) = known(&bench, "cold.bin");
     assert!(
         k.iter().all(|k| (k + 0.12).abs() < 1e-4),

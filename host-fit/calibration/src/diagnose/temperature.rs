@@ -214,9 +214,9 @@ mod tests {
         }
     }
 
-    /// Known exactly but for k, a stage is good as far as the error of k allows.
+    /// Known exactly but for k, a stage is good while the error of k allows.
     #[test]
-    fn a_calibration_is_good_as_far_as_k_is_known() {
+    fn a_calibration_is_good_while_k_is_known_well_enough() {
         let (stage, white_mm) = (stage(), [5e-4; 3]);
         let parameters = FieldParameters::of_model_31(&Parameters::designed(&stage), &stage);
         let within = |error_per_k: f64| {

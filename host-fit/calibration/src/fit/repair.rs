@@ -70,7 +70,7 @@ impl Fit {
         self.errors_solver_zeros = Some(self.judgement.errors);
         if let Some(field) = &mut self.field {
             let mut covariance = repair.covariance.clone();
-            // The faults are told apart from the parameters, not from k and h.
+            // The faults are separated from the parameters, not from k and h.
             let with_warmth = &field.posterior.covariance;
             let (of_parameters, all) = (covariance.nrows(), with_warmth.nrows());
             covariance.resize_mut(all, all, 0.0);

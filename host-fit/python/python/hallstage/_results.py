@@ -124,8 +124,8 @@ class Residuals:
 
     def __repr__(self) -> str:
         rms = {axis: float(np.sqrt(np.nanmean(getattr(self, axis) ** 2)) * 1e6) for axis in _AXES}
-        told = ", ".join(f"{name} {rms[axis]:.3f} {unit}" for axis, (name, unit) in _AXES.items())
-        return f"<Residuals of {len(self)} rows, rms {told}>"
+        figures = ", ".join(f"{name} {rms[axis]:.3f} {unit}" for axis, (name, unit) in _AXES.items())
+        return f"<Residuals of {len(self)} rows, rms {figures}>"
 
     def asd(self, axis: Literal["x", "y", "rz"]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Amplitude spectral density of an axis: frequencies, Hz, and m/rtHz or rad/rtHz, without that at 0 Hz.

@@ -15,7 +15,7 @@ pub trait CostFunction: Sync {
     /// The cost of one individual: one number for each unknown, inside the bounds.
     fn cost(&self, individual: &[f64]) -> f64;
 
-    /// Writes the cost of each of these individuals: for functions that take many at once.
+    /// Writes the cost of each individual: for functions that take many at once.
     fn costs(&self, individuals: &mut [Individual]) {
         for individual in individuals {
             individual.cost = self.cost(&individual.place);
