@@ -264,6 +264,29 @@ fn every_register_is_read_back_in_turn() {
 }
 
 #[test]
+fn a_start_that_fails_is_followed_by_a_reset_that_lasts_a_period() {
+    let mut all = frame(0x0011, 0, answer(0, QUIET));
+    all.extend(frame(0xa000, 0, answer(0x0011, QUIET)));
+    all.extend(started().concat());
+    let mut bus = Mock::new(&all);
+    let (low, high) = (
+        PinTransaction::set(State::Low),
+        PinTransaction::set(State::High),
+    );
+    let starts = [high.clone(), low.clone(), low.clone(), high.clone()];
+    let mut pin = PinMock::new(&[&starts[..], &[high.clone(), low, high]].concat());
+    let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
+    let mut delay = NoopDelay::new();
+    assert!(adc.start(&mut delay).is_err());
+    assert_eq!(adc.trigger(&mut delay), Ok(()));
+    assert_eq!(adc.trigger(&mut delay), Ok(()));
+    assert_eq!(adc.start(&mut delay), Ok(()));
+    assert_eq!(adc.trigger(&mut delay), Ok(()));
+    bus.done();
+    pin.done();
+}
+
+#[test]
 fn the_error_of_the_bus_is_kept() {
     let mut pin = PinMock::new(&[PinTransaction::set(State::High)]);
     let mut adc = Ads131m08::new(Broken, pin.clone(), Channels::IN_ORDER);
