@@ -12,7 +12,7 @@ use super::mistakes::{Change, Mistake, mistakes};
 use super::range::SPANS;
 use crate::finding::{Code, Finding, Severity};
 use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
+use crate::input::stage::{Range, Stage};
 use crate::judge::identify::check_motion;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
@@ -29,12 +29,10 @@ const UNKNOWNS: usize = 9;
 /// A parameter that the log does not show has any value, in mm and mrad.
 const OPEN: f64 = 10.0;
 
-/// Tolerances, standard deviations, up to twice those of simulated stages: of the logarithm of eta, of
-/// theta, of a lever arm (m), of a/eta (1/mm), and of b/eta and c/eta, which show the place of a probe within
-/// 40 mm (1/mrad).
-const TOLERANCES: [f64; 6] = [0.08, 0.04, 0.035, 0.025, 0.009, 0.009];
-/// The same of eta where `stage.toml` has no range of it.
-const ETA_OPEN: f64 = 1.0;
+/// Tolerances, standard deviations, up to twice those of simulated stages: of the logarithm of eta (where
+/// `stage.toml` has a range of it, that of any value within), of theta, of a lever arm (m), of a/eta (1/mm), and
+/// of b/eta and c/eta, which show the place of a probe within 40 mm (1/mrad).
+const TOLERANCES: [f64; 6] = [1.0, 0.04, 0.035, 0.025, 0.009, 0.009];
 /// Of spans beyond twice or below a tenth of the declared motion, by the logarithm.
 const SPAN: f64 = 0.35;
 /// Squares of distances in terms of tolerances, of three probes: one sound log in a thousand has more, ...
@@ -62,7 +60,8 @@ pub fn structure(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
     let drawing = Drawing::new(stage);
     let distance = |change: &Change| drawing.distance(&fitted, change);
     let as_logged = distance(&Change::nothing());
-    if as_logged < SOUND_MAX {
+    // Nothing could make it so much smaller.
+    if as_logged < GAIN_MIN {
         return None;
     }
     let spans = spans(dataset);
@@ -80,7 +79,7 @@ pub fn structure(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
     let (least, _) = ranked.first()?;
     let (least, sound) = (*least, 1.5 * SOUND_MAX);
     if !(least < sound && least < as_logged - GAIN_MIN) {
-        return Some(unexplained(as_logged));
+        return (as_logged > SOUND_MAX).then(|| unexplained(as_logged));
     }
     ranked.retain(|(rank, _)| *rank < least + UNDECIDED);
     let mut named: Vec<&Mistake> = Vec::new();
@@ -128,7 +127,7 @@ fn unexplained(distance: f64) -> Finding {
 /// What the drawing says of the probes.
 struct Drawing {
     eta: [f64; 3],
-    tolerance: Vector,
+    eta_tolerance: [f64; 3],
     theta: [f64; 3],
     lever_arm: [f64; 3],
     places: [[f64; 2]; 3],
@@ -138,13 +137,11 @@ impl Drawing {
     fn new(stage: &Stage) -> Self {
         let geometry = Parameters::designed(stage).geometry();
         let etas = stage.search.of("eta");
-        let mut tolerance = Vector::from(TOLERANCES);
-        if etas.is_none() {
-            tolerance[0] = ETA_OPEN;
-        }
+        let middle = |range: Range| 0.5 * (range.low + range.high);
+        let even = |range: Range| range.width() / (middle(range) * 12f64.sqrt());
         Self {
-            eta: etas.map_or([1.0; 3], |ranges| ranges.map(|r| 0.5 * (r.low + r.high))),
-            tolerance,
+            eta: etas.map_or([1.0; 3], |ranges| ranges.map(middle)),
+            eta_tolerance: etas.map_or([TOLERANCES[0]; 3], |ranges| ranges.map(even)),
             theta: geometry.misalignment_rad,
             lever_arm: geometry.lever_arm_m,
             places: stage.places_m(),
@@ -205,7 +202,9 @@ impl Drawing {
             by.set_column(k, &((self.features(probe, &moved) - here) / step));
         }
         let by = by * turned;
-        let tolerance = Covariance::from_diagonal(&self.tolerance.map(|x| x * x));
+        let mut tolerance = Vector::from(TOLERANCES);
+        tolerance[0] = self.eta_tolerance[probe];
+        let tolerance = Covariance::from_diagonal(&tolerance.map(|x| x * x));
         let spread = Cholesky::new(tolerance + by * covariance * by.transpose())?;
         Some(here.dot(&spread.solve(&here)))
     }

@@ -40,7 +40,7 @@ fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
         "the Hall signals are multiplied by 2.0",
         "the reference is multiplied by 0.50",
     ];
-    let mistakes: [Mistake; 9] = [
+    let mistakes: [Mistake; 10] = [
         (
             Code::ChannelsSwapped,
             &["Hall A and C are exchanged"],
@@ -70,6 +70,9 @@ fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
         }),
         (Code::ScaleWrong, &["Hall B is multiplied by 0.50"], |s| {
             s.hall[1] *= 2
+        }),
+        (Code::ScaleWrong, &["Hall A is multiplied by 0.6"], |s| {
+            s.hall[0] += s.hall[0] / 2;
         }),
         (
             Code::ScaleWrong,
