@@ -35,7 +35,7 @@ pub use all_rows::fit_log;
 pub(crate) use calibration::RANGE_MARGIN;
 pub use calibration::calibration;
 pub use compensate::fit_compensated;
-pub(crate) use compensate::with_reference_later;
+pub(crate) use compensate::with_beams_later;
 pub use cross_validation::{CrossValidation, Split, cross_validate};
 pub use error::FitError;
 pub use field::field_calibration;

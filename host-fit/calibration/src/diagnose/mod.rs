@@ -143,7 +143,13 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         if repair.is_none() {
             findings.extend(left_out::finding(fit, dataset));
         }
-        findings.extend(fit.warnings.iter().cloned());
+        // One beam that is late is a lag of all of them to a fit.
+        let is_late = findings
+            .iter()
+            .any(|found| found.code == Code::ReferenceLag);
+        let of_fit = fit.warnings.iter();
+        let of_fit = of_fit.filter(|found| !is_late || found.code != Code::ReferenceLag);
+        findings.extend(of_fit.cloned());
         findings.extend(temperature::findings(fit, dataset, stage));
         let ranged = |found: &Finding| {
             let is_of =

@@ -57,9 +57,15 @@ pub fn fit_compensated(
     Ok((found, at))
 }
 
-/// The rows with the reference of `later_s` after them, interpolated between its neighbours (cubic);
-/// rows that lack neighbours, at the ends of a movement and beside gaps, are left out.
-pub(crate) fn with_reference_later(dataset: &Dataset, later_s: f64) -> Dataset {
+/// The rows with the reference of `later_s` after them: see [`with_beams_later`].
+fn with_reference_later(dataset: &Dataset, later_s: f64) -> Dataset {
+    with_beams_later(dataset, [later_s; 3], 1.0)
+}
+
+/// The rows with the beams X, Y1, Y2 (the latter two 2 `half_m` apart) of `later_s` after them, interpolated
+/// between their neighbours (cubic); rows that lack neighbours, at the ends of a movement and beside gaps, are
+/// left out.
+pub(crate) fn with_beams_later(dataset: &Dataset, later_s: [f64; 3], half_m: f64) -> Dataset {
     let mut out = Dataset {
         rows: Vec::with_capacity(dataset.rows.len()),
         movements: Vec::new(),
@@ -67,21 +73,20 @@ pub(crate) fn with_reference_later(dataset: &Dataset, later_s: f64) -> Dataset {
         sha256: dataset.sha256,
         temperature: dataset.temperature,
     };
-    let later_us = later_s * 1e6;
     for movement in &dataset.movements {
         let rows = &dataset.rows[movement.rows.clone()];
         let (start, number) = (out.rows.len(), out.movements.len());
-        let mut next = 0;
         for row in rows {
-            let t_us = row.t_us as f64 + later_us;
-            while next < rows.len() && rows[next].t_us as f64 <= t_us {
-                next += 1;
-            }
-            let four = next.checked_sub(2).and_then(|k| rows.get(k..k + 4));
-            if let Some(reference) = four.and_then(|four| between(four, t_us)) {
+            let later = |later_s: f64| {
+                let t_us = row.t_us as f64 + later_s * 1e6;
+                let next = rows.partition_point(|row| row.t_us as f64 <= t_us);
+                between(rows.get(next.checked_sub(2)?..next + 2)?, t_us)
+            };
+            if let [Some([x, ..]), Some([_, y1, rz1]), Some([_, y2, rz2])] = later_s.map(later) {
+                let (y1, y2) = (y1 + half_m * rz1, y2 - half_m * rz2);
                 out.rows.push(Row {
                     movement: number,
-                    reference,
+                    reference: [x, 0.5 * (y1 + y2), 0.5 * (y1 - y2) / half_m],
                     ..*row
                 });
             }

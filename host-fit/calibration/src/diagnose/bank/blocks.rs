@@ -36,6 +36,8 @@ pub(super) struct Log {
     pub(super) movements: Vec<Range<usize>>,
     /// White noise of A, B, C from row to row, mm.
     pub(super) white_mm: [f64; 3],
+    /// Half the distance of the Y beams, m.
+    pub(super) half_m: f64,
     /// Errors of the resets, mm, mm, mrad, where they are declared.
     pub(super) resets_mm: Option<[f64; 3]>,
 }
@@ -91,8 +93,37 @@ impl Log {
             means,
             movements,
             white_mm,
+            half_m: half,
             resets_mm: stage.resets_mm(),
         }
+    }
+
+    /// Changes of X, Y, Rz (mm/s, mm/s, mrad/s) by the lag of each beam.
+    pub(super) fn by_lag(&self, row: &FieldRow) -> [[f64; 3]; 3] {
+        let [x, y, rz] = row.rate_mm_per_s;
+        let (y1, y2) = (0.5 * (y + self.half_m * rz), 0.5 * (y - self.half_m * rz));
+        [
+            [x, 0.0, 0.0],
+            [0.0, y1, y1 / self.half_m],
+            [0.0, y2, -y2 / self.half_m],
+        ]
+    }
+
+    /// Where the stage was: the beams with their lags and the offset taken off.
+    pub(super) fn planar_mm(
+        &self,
+        row: &FieldRow,
+        lags_s: [f64; 3],
+        offset_mm: [f64; 3],
+    ) -> [f64; 3] {
+        let mut planar_mm = row.planar_mm(0.0, offset_mm);
+        for (rates, lag_s) in self.by_lag(row).iter().zip(lags_s) {
+            planar_mm
+                .iter_mut()
+                .zip(rates)
+                .for_each(|(x, rate)| *x += rate * lag_s);
+        }
+        planar_mm
     }
 
     /// How many numbers the means hold beyond the offsets of the movements.

@@ -91,9 +91,9 @@ impl Family {
 /// Changes of the signals (mm) by a change of each of the nine channels by 1 mm, by mean.
 pub(super) fn by_channel(log: &Log, stage: &Stage, estimate: &Estimate) -> Vec<[Vector3<f64>; 9]> {
     let slopes = Slopes::new(stage, probes(&estimate.parameters));
-    let lag_s = estimate.lag_s();
+    let lags_s = estimate.lags_s();
     let rows = log.means.iter().map(|mean| &mean.row);
-    rows.map(|row| slopes.at(row.planar_mm(lag_s, [0.0; 3]), row.vertical))
+    rows.map(|row| slopes.at(log.planar_mm(row, lags_s, [0.0; 3]), row.vertical))
         .collect()
 }
 

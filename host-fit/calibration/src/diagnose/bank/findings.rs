@@ -3,6 +3,7 @@
 use super::columns::{Course, FAMILIES, Kind};
 use super::score::{Candidate, range_of};
 use super::{Job, severity};
+use crate::diagnose::slopes::CHANNELS;
 use crate::finding::{Code, Finding, Severity};
 use crate::judge::verdict::Predicted;
 
@@ -101,6 +102,18 @@ impl Job<'_> {
             Course::Ramp | Course::RampInMovements => found,
         }
     }
+}
+
+/// That a beam (X, Y1, Y2) is late, s.
+pub(super) fn late_beam(beam: usize, late_s: f64, cost: f64) -> Finding {
+    let channel = CHANNELS[3 + beam];
+    let late_ms = late_s * 1e3;
+    let message = format!(
+        "{} shows the pose {late_ms:+.2} ms later than the other beams: {cost:.2} times the noise floor at work. Remedy: set its delay",
+        title(channel)
+    );
+    let found = Finding::new(Code::ReferenceLag, message).severe(severity(cost));
+    found.on(channel).of(late_ms, "ms").costing(cost)
 }
 
 /// That the log leaves so much open.

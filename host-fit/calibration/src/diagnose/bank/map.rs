@@ -9,8 +9,8 @@ use crate::solve::field::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE, TERMS};
 use crate::solve::gauss_newton::{self, Factor, Limits, Normal, Point, Unknowns};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-/// The parameters and the lag of the reference.
-pub(super) const UNKNOWNS: usize = COUNT + 1;
+/// The parameters and the lags of the beams X, Y1, Y2.
+pub(super) const UNKNOWNS: usize = COUNT + 3;
 /// Columns: these, the sizes of the faults, and the residual in the last one; a multiple of four is quick.
 pub(super) const WIDTH: usize = (UNKNOWNS + FAULTS_MAX + 1).next_multiple_of(4);
 pub(super) const RESIDUAL: usize = WIDTH - 1;
@@ -32,6 +32,9 @@ const ROUNDS: usize = 8;
 /// How far lever arm, theta, eta and a, b, c, whose priors are flat, are from any start: so far that no log
 /// that shows them feels it.
 const OPEN: [f64; 6] = [1.0, 1.0, 3.0, 400.0, 200.0, 200.0];
+
+/// Lags of beams, standard deviation, s: a beam that hardly moves shows none.
+const LAG_S: f64 = 0.02;
 
 /// Columns of a mean in the three channels.
 pub(super) type Row = [[f64; WIDTH]; 3];
@@ -101,7 +104,7 @@ fn readings(
     let probes = probes(&FieldParameters::of_values(at.values.as_slice(), places));
     let reading = |mean: usize| {
         let row = &log.means[mean].row;
-        let planar_mm = row.planar_mm(at.values[COUNT], at.offsets[movement]);
+        let planar_mm = log.planar_mm(row, lags_s(&at.values), at.offsets[movement]);
         let readings = [0, 1, 2].map(|k| probes[k].read(planar_mm, row.vertical));
         let by_pose = Matrix3::from_fn(|probe, axis| readings[probe].by_pose[axis]);
         Some((readings, by_pose.try_inverse()?))
@@ -127,8 +130,10 @@ impl Equations<'_> {
                     for (out, x) in own.iter_mut().zip(&reading.by_parameter) {
                         *out = by * x;
                     }
-                    let rates = reading.by_pose.iter().zip(&row.rate_mm_per_s);
-                    out[COUNT] += by * rates.map(|(a, b)| a * b).sum::<f64>();
+                    for (out, rates) in out[COUNT..].iter_mut().zip(self.log.by_lag(row)) {
+                        let rates = reading.by_pose.iter().zip(rates);
+                        *out += by * rates.map(|(a, b)| a * b).sum::<f64>();
+                    }
                     out[RESIDUAL] += by * (row.signal_mm[probe] - reading.signal_mm);
                 }
                 for (k, fault) in self.faults.iter().enumerate() {
@@ -146,9 +151,17 @@ impl Equations<'_> {
 /// The precision of the prior of an unknown.
 fn prior(unknown: usize) -> f64 {
     let place = unknown % PER_PROBE;
-    let deviation = OPEN.get(place).copied().or(TERMS[place].prior);
-    let deviation = deviation.filter(|_| unknown < COUNT);
+    let deviation = match unknown {
+        0..COUNT => OPEN.get(place).copied().or(TERMS[place].prior),
+        COUNT..UNKNOWNS => Some(LAG_S),
+        _ => None,
+    };
     deviation.map_or(0.0, |deviation| 1.0 / (deviation * deviation))
+}
+
+/// The lags of X, Y1, Y2 among values, s.
+fn lags_s(values: &DVector<f64>) -> [f64; 3] {
+    [0, 1, 2].map(|beam| values[COUNT + beam])
 }
 
 /// The solution for each column.
@@ -166,7 +179,7 @@ impl Estimate {
             values: DVector::from_fn(UNKNOWNS, |k, _| values.get(k).copied().unwrap_or(0.0)),
             offsets: vec![[0.0; 3]; log.movements.len()],
         };
-        let is_flat = |k: usize| k % PER_PROBE < OPEN.len();
+        let is_flat = |k: usize| k < COUNT && k % PER_PROBE < OPEN.len();
         let expected = |k: usize, _| if is_flat(k) { at.values[k] } else { 0.0 };
         let expected = DVector::from_fn(UNKNOWNS, expected);
         let filter = Self::filter(log, start, &at)?;
@@ -255,9 +268,9 @@ impl Estimate {
         )
     }
 
-    /// The lag of the reference, s.
-    pub(super) fn lag_s(&self) -> f64 {
-        self.at.values[COUNT]
+    /// The lags of the beams X, Y1, Y2, s.
+    pub(super) fn lags_s(&self) -> [f64; 3] {
+        lags_s(&self.at.values)
     }
 
     /// The values of the unknowns.

@@ -21,7 +21,7 @@ mod tests;
 
 use crate::finding::{Finding, Severity};
 use crate::fit::Repair;
-use crate::fit::with_reference_later;
+use crate::fit::with_beams_later;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, Predicted};
@@ -84,24 +84,26 @@ pub fn severity(ratio: f64) -> Severity {
 pub fn diagnose(dataset: &Dataset, stage: &Stage, fitted: Fitted) -> Option<Diagnosis> {
     let log = Log::new(dataset, stage, &probes(fitted.parameters));
     let estimate = Estimate::new(&log, fitted.parameters)?;
-    let of = |dataset, log: &Log, estimate| {
+    let of = |dataset, log: &Log, estimate, lags_s: [f64; 3]| {
         Job {
             dataset,
             stage,
             log,
             fitted,
+            lags_s,
         }
         .diagnosis(estimate)
     };
-    let lag_s = estimate.lag_s();
-    if lag_s.abs() < LAG_MAX * stage.servo_period_s {
-        return of(dataset, &log, estimate);
+    let lags_s = estimate.lags_s();
+    let most_s = LAG_MAX * stage.servo_period_s;
+    if lags_s.iter().all(|lag_s| lag_s.abs() < most_s) {
+        return of(dataset, &log, estimate, [0.0; 3]);
     }
     // A lag is not linear.
-    let dataset = &with_reference_later(dataset, lag_s);
+    let dataset = &with_beams_later(dataset, lags_s, log.half_m);
     let log = Log::new(dataset, stage, &probes(&estimate.parameters));
     let estimate = Estimate::new(&log, &estimate.parameters)?;
-    of(dataset, &log, estimate)
+    of(dataset, &log, estimate, lags_s)
 }
 
 /// The service that `[motion]` declares, of a stage with this white noise of its probes, mm.
@@ -132,6 +134,8 @@ struct Job<'a> {
     stage: &'a Stage,
     log: &'a Log,
     fitted: Fitted<'a>,
+    /// Lags of the beams X, Y1, Y2 that are taken off, s.
+    lags_s: [f64; 3],
 }
 
 impl Job<'_> {
@@ -250,8 +254,15 @@ impl Job<'_> {
                 (predicted, None, (0..faults.len()).map(off_by).collect())
             }
         };
-        let costs: Vec<f64> = offs.iter().map(cost).collect();
+        let mut costs: Vec<f64> = offs.iter().map(cost).collect();
         let covariance = estimate.curvature.inverse() * certain;
+        let likely = per_unknown + 2.0 * libm::log(RARITY);
+        let late = self.late_beam(&estimate, &covariance, likely);
+        // What bent the fit, whatever else did.
+        let late = late.filter(|_| other.is_none()).map(|(beam, late_s)| {
+            costs.push(predicted.worst_ratio());
+            findings::late_beam(beam, late_s, predicted.worst_ratio())
+        });
         let repair = self.repair(&estimate, (&declared, &covariance), &faults, &costs);
         let of_faults = faults.iter().zip(costs.iter().copied()).enumerate();
         let of_faults = of_faults.filter(|(_, (_, cost))| *cost >= COST_MIN);
@@ -262,11 +273,33 @@ impl Job<'_> {
         });
         let open = (is_open && by_resets).then(|| not_determined(&own).severe(Severity::Warn));
         Some(Diagnosis {
-            findings: open.into_iter().chain(of_parts).chain(of_faults).collect(),
+            findings: (open.into_iter().chain(of_parts))
+                .chain(late)
+                .chain(of_faults)
+                .collect(),
             predicted,
             repair,
             rest,
         })
+    }
+
+    /// The beam that is not of the time of the two others, and by how much it is late, s.
+    fn late_beam(
+        &self,
+        estimate: &Estimate,
+        covariance: &DMatrix<f64>,
+        likely: f64,
+    ) -> Option<(usize, f64)> {
+        let rest_s = estimate.lags_s();
+        let lags_s = [0, 1, 2].map(|beam| self.lags_s[beam] + rest_s[beam]);
+        let mut sorted = lags_s;
+        sorted.sort_by(f64::total_cmp);
+        let off_s = lags_s.map(|lag_s| lag_s - sorted[1]);
+        let beam = (0..3).max_by(|&a, &b| off_s[a].abs().total_cmp(&off_s[b].abs()))?;
+        let late_s = off_s[beam];
+        let variance = covariance[(COUNT + beam, COUNT + beam)];
+        let is_late = late_s.abs() > LAG_MAX * self.stage.servo_period_s;
+        (is_late && late_s * late_s > likely * variance).then_some((beam, late_s))
     }
 
     /// The estimate that has the faults among its unknowns, and what it has to expect, if it is worth it and

@@ -125,6 +125,26 @@ fn declared_errors_of_resets_let_the_field_model_serve_on_a_log_of_the_paper() {
     assert!(worst(after) < 0.7 * worst(before), "{after:?} {before:?}");
 }
 
+#[test]
+fn a_beam_that_lags_is_named_with_its_time() {
+    let mut late = recording(3);
+    for samples in &mut late.movements {
+        let shown: Vec<i64> = samples.iter().map(|sample| sample.beams_nm[1]).collect();
+        for (sample, shown) in samples.iter_mut().skip(3).zip(shown) {
+            sample.beams_nm[1] = shown;
+        }
+    }
+    let diagnosis = diagnosed(late, |_, _| {});
+    let first = &diagnosis.findings[0];
+    assert_eq!(
+        (first.code, first.channel.as_deref()),
+        (Code::ReferenceLag, Some("ifm_y1")),
+        "{first:#?}"
+    );
+    assert!((first.value.expect("ms") - 6.0).abs() < 0.2, "{first:?}");
+    assert_eq!(diagnosis.verdict, Some(Verdict::Refused));
+}
+
 /// What is found in a recording, with a change of the samples from the middle of the second movement on.
 fn found(recording: Recording, change: impl Fn(&mut Sample, bool)) -> Vec<Finding> {
     diagnosed(recording, change).findings
