@@ -152,9 +152,13 @@ impl Job<'_> {
         let is_open = own.worst_ratio() > LIMITED_MAX;
         let by_resets = self.fitted.model == ModelKind::Field && !self.fitted.for_service;
         if is_open && !by_resets {
+            let predicted = match self.fitted.model {
+                ModelKind::Field => own,
+                _ => self.expected(&estimate, &declared, 1.0)?,
+            };
             return Some(Diagnosis {
-                findings: vec![not_determined(&own)],
-                predicted: own,
+                findings: vec![not_determined(&predicted)],
+                predicted,
                 repair: None,
                 rest: 1.0,
             });
@@ -243,14 +247,7 @@ impl Job<'_> {
                 )
             }
             None => {
-                // What the fit at hand is off the repaired one, whatever bent it.
-                let (own, covariance) = match self.fitted.model {
-                    ModelKind::Field => (estimate.values(), estimate.curvature.inverse()),
-                    _ => estimate.of_this_stage()?,
-                };
-                let pairs = (self.fitted.parameters.probes.as_flattened().iter()).zip(&own);
-                let off: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
-                let predicted = Predicted::new(&declared, &(covariance * certain), &off);
+                let predicted = self.expected(&estimate, &declared, certain)?;
                 (predicted, None, (0..faults.len()).map(off_by).collect())
             }
         };
@@ -281,6 +278,18 @@ impl Job<'_> {
             repair,
             rest,
         })
+    }
+
+    /// What the fit at hand has to expect: what it is off the estimate, whatever bent it, and what that leaves
+    /// open, its variances times `certain`.
+    fn expected(&self, estimate: &Estimate, declared: &Service, certain: f64) -> Option<Predicted> {
+        let (own, covariance) = match self.fitted.model {
+            ModelKind::Field => (estimate.values(), estimate.curvature.inverse()),
+            _ => estimate.of_this_stage()?,
+        };
+        let pairs = (self.fitted.parameters.probes.as_flattened().iter()).zip(&own);
+        let off: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+        Some(Predicted::new(declared, &(covariance * certain), &off))
     }
 
     /// The beam that is not of the time of the two others, and by how much it is late, s.
