@@ -73,7 +73,7 @@ fn ratio(set: &ParameterSet, service: &Recording, stage: &Stage, floor: [f64; 3]
     (0..3).map(|k| errors[k] / floor[k]).fold(0.0, f64::max)
 }
 
-fn in_service(set: &ParameterSet, service: &Recording, stage: &Stage) -> [f64; 3] {
+pub fn in_service(set: &ParameterSet, service: &Recording, stage: &Stage) -> [f64; 3] {
     let dataset = service.dataset(stage).expect("a plane");
     let decoded = Decoded::new(set, &dataset);
     decoded

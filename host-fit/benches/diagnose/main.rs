@@ -1,9 +1,10 @@
 //! What the diagnosis says of simulated logs: of 200 clean stages how many it warns of, and of logs
-//! with a mistake or a fault how many it names.
+//! with a mistake or a fault how many it names; of logs of the paper what is predicted of service.
 //!
 //! Prints a table and `RESULT key=value` lines.
 
 mod faults;
+mod paper;
 mod signals;
 
 use host_fit::diagnose;
@@ -45,6 +46,7 @@ fn main() {
             format!("{channels:?} {change:?}")
         );
     }
+    paper::table(&stage, 7000..7024);
     faults::table(&stage, &planned, 2000..2004);
     signals::table(&stage, &planned);
 }

@@ -108,7 +108,7 @@ pub static TABLE: [Entry; 32] = [
     entry(C::CapacitiveSwapped, "capacitive_swapped", Refuse, "two capacitive channels, or their places in stage.toml, are exchanged", "check wires, column order and capacitive.probes_m"),
     entry(C::CapacitiveInverted, "capacitive_inverted", Refuse, "capacitive channels, or a coordinate of theirs in stage.toml, have the wrong sign", "check wires, signs and capacitive.probes_m"),
     entry(C::ScaleWrong, "scale_wrong", Refuse, "a scale, a unit or a length is wrong", "check units, single or double pass, and the scales in stage.toml"),
-    entry(C::ReferenceLag, "reference_lag", Warn, "the reference shows an earlier or later pose than the probes", "fit with --compensate-lag, or set the delay of the interferometers"),
+    entry(C::ReferenceLag, "reference_lag", Warn, "the reference, or one of its beams, shows an earlier or later pose than the probes", "set the delay of the interferometers; of all beams alike fit with --compensate-lag"),
     entry(C::Hum, "hum", Warn, "a channel has a disturbance of one frequency", "look for mains in its cable and supply, or a vibration")
         .suppresses(&[C::ReferenceLag, C::Outliers]),
     entry(C::Drift, "drift", Warn, "a channel drifts", "let the stage and its electronics warm up")

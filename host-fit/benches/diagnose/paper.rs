@@ -1,0 +1,62 @@
+//! Logs of the paper's protocol: whether the range of errors that is predicted of Model (31) holds the truth in
+//! service, and what the field model has there once the errors of the resets are declared.
+
+use crate::faults::in_service;
+use host_fit::diagnose;
+use host_fit::fit::{FitSettings, ModelChoice, fit};
+use host_fit::input::stage::Stage;
+use host_fit::simulate::assembly::Assembly;
+use host_fit::simulate::protocol::Protocol;
+use host_fit::simulate::recording::record;
+use host_fit::simulate::sensors::SensorErrors;
+
+/// Prints a line for each of the two.
+pub fn table(stage: &Stage, seeds: std::ops::Range<u64>) {
+    let quiet = SensorErrors {
+        drift_per_root_s: [0.0; 3],
+        beam_m: 0.0,
+        ..SensorErrors::USUAL
+    };
+    let declared = Stage {
+        reset_sd: Some(SensorErrors::USUAL.reset),
+        ..stage.clone()
+    };
+    for (what, stage) in [("nothing declared", stage), ("resets declared", &declared)] {
+        let (mut inside, mut axes, mut field, mut fits) = (0, 0, 0, 0);
+        let (mut predicted, mut true_worst) = (0.0, [0.0, 0.0f64]);
+        for seed in seeds.clone() {
+            let assembly = Assembly::draw(stage, seed);
+            let run = Protocol::Paper.run(stage.servo_period_s, seed);
+            let log = record(stage, &assembly, run, &SensorErrors::USUAL, seed).expect("clear");
+            let service = Protocol::Service.run(stage.servo_period_s, seed + 500);
+            let service = record(stage, &assembly, service, &quiet, seed + 500).expect("clear");
+            let dataset = log.dataset(stage).expect("a plane");
+            let fitted = fit(&dataset, stage, &FitSettings::new(ModelChoice::Auto));
+            let diagnosis = diagnose::of_log(&dataset, stage, fitted.as_ref());
+            let (Ok(fitted), Some(expected)) = (fitted, diagnosis.predicted) else {
+                println!("{what}: no fit of stage {seed}");
+                continue;
+            };
+            let rms = in_service(&fitted.set, &service, stage);
+            let mut worst = 0.0f64;
+            for (axis, rms) in rms.into_iter().enumerate() {
+                let [low, high] = expected.range[axis];
+                inside += usize::from((low..high).contains(&rms));
+                axes += 1;
+                worst = worst.max(rms * expected.ratio[axis] / expected.rms[axis]);
+            }
+            field += usize::from(fitted.model.name == "field");
+            fits += 1;
+            predicted += expected.worst_ratio();
+            true_worst = [true_worst[0] + worst, true_worst[1].max(worst)];
+        }
+        let mean = |sum: f64| sum / f64::from(fits);
+        println!(
+            "paper's protocol, {what}: field model on {field} of {fits}; range holds the truth on {inside} of {axes} axes; worst axis \
+             over the noise floor, mean: predicted {:.2}, true {:.2}; largest true {:.2}",
+            mean(predicted),
+            mean(true_worst[0]),
+            true_worst[1]
+        );
+    }
+}
