@@ -19,7 +19,7 @@ pub const LIMITED_MAX: f64 = 1.30;
 const END: f64 = 1.645;
 /// Mean squares of the errors of one calibration over services within the declared range, standard deviation
 /// over mean.
-const OF_MOTION: f64 = 0.5;
+const OF_MOTION: f64 = 0.7;
 
 /// Whether a calibration can be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -99,7 +99,7 @@ fn what_is_predicted_for_model_31_holds_in_service() {
         let range = diagnosis.predicted.expect("figures").range;
         for ([low, high], rms) in range.into_iter().zip(rms) {
             assert!(low < rms && rms < high, "{seed}: {low:e} {rms:e} {high:e}");
-            assert!(high < 5.0 * low, "{seed}: {low:e} {high:e}");
+            assert!(high < 8.0 * low, "{seed}: {low:e} {high:e}");
         }
     }
 }
