@@ -1,5 +1,6 @@
 """What the tests share: the shipped logs, a calibration of one, the program beside the package."""
 
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -10,6 +11,12 @@ import pytest
 
 DATA = Path(__file__).parents[2] / "data"
 HostFit = Callable[..., Path]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def ctrl_c() -> None:
+    """A program that a shell started in the background ignores Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
