@@ -10,6 +10,7 @@ use crate::log::Log;
 use crate::origin::{OfFit, OfUpdate, Origin};
 use crate::report::{About, head, residuals, text, write};
 use crate::stage::Stage;
+use crate::statistics::Statistics;
 use crate::work;
 use host_fit::calibrate::{
     EvalOrder, Judged, Outcome, figures_of_recalibration, other_scales, warnings_of,
@@ -26,12 +27,8 @@ use host_fit::problem::model::Model;
 use host_fit::recalibrate::{Known, recalibrate};
 use host_fit::report::json::Report;
 use host_fit::report::page::Errors;
-use host_fit::report::parameters::{Parameter, parameters_in};
 use host_fit::report::table::tables;
-use host_fit::solve::field::terms;
 use host_fit::solve::field::update::Change;
-use nalgebra::DMatrix;
-use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
@@ -90,41 +87,13 @@ impl Calibration {
         self.origin.fit().ok_or_else(problem)
     }
 
-    /// Names and covariance of the parameters that have a standard error.
-    fn matrix(&self) -> Option<(Vec<String>, DMatrix<f64>)> {
-        if let Some((_, fit)) = self.origin.fit() {
-            return Some(fit.covariance());
+    /// What is known of the parameters.
+    fn known(&self) -> Statistics<'_> {
+        Statistics {
+            set: &self.set,
+            known: self.known.as_ref(),
+            fit: self.origin.fit().map(|(of, fit)| (&of.report, fit)),
         }
-        let covariance = self.known.as_ref()?.covariance.clone();
-        Some((terms::names(covariance.nrows()), covariance))
-    }
-
-    /// A matrix as a `hallstage.Labelled`.
-    fn labelled<'py>(
-        &self,
-        py: Python<'py>,
-        of: impl Fn(&DMatrix<f64>, usize, usize) -> f64,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let problem = "covariance: none stands beside the blob, as params.bin.posterior";
-        let matrix = self.matrix().ok_or_else(|| PyValueError::new_err(problem));
-        let (names, matrix) = matrix?;
-        let n = names.len();
-        // Its lower triangle counts, as in the file.
-        let number = |(i, j): (usize, usize)| of(&matrix, i.max(j), i.min(j));
-        let numbers = (0..n * n).map(|k| number((k / n, k % n)));
-        let array = PyArray1::from_iter(py, numbers).reshape([n, n])?;
-        let class = py.import("hallstage._results")?.getattr("Labelled")?;
-        class.call1((array, names))
-    }
-
-    /// Standard errors by name, where the posterior tells them.
-    fn standard_errors(&self) -> BTreeMap<String, f64> {
-        let errors = self.known.iter().flat_map(|known| {
-            let errors = known.covariance.diagonal().map(f64::sqrt);
-            let names = terms::names(known.covariance.nrows());
-            names.into_iter().zip(errors.as_slice().to_vec())
-        });
-        errors.collect()
     }
 
     fn blob_bytes(&self) -> PyResult<Vec<u8>> {
@@ -245,45 +214,7 @@ impl Calibration {
     /// units that each says.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let class = py.import("hallstage._results")?.getattr("Parameter")?;
-        let errors = self.standard_errors();
-        let mut all: BTreeMap<String, Parameter> = match self.origin.fit() {
-            Some((of, _)) => of.report.parameters.clone(),
-            None => parameters_in(&self.set),
-        };
-        let temperature = &self.set.constants.temperature;
-        if temperature.is_used() {
-            let of_probes = temperature.per_mk.as_flattened().iter();
-            for (name, per_mk) in terms::names(usize::MAX)
-                .split_off(terms::COUNT)
-                .into_iter()
-                .zip(of_probes)
-            {
-                let parameter = Parameter {
-                    value: f64::from(*per_mk) * 1e3,
-                    unit: "1/K",
-                    standard_error: None,
-                };
-                all.insert(name, parameter);
-            }
-        }
-        let order = self.matrix().map(|(names, _)| names).unwrap_or_default();
-        let parameters = PyDict::new(py);
-        let add = |name: String, parameter: Parameter| {
-            let error = parameter
-                .standard_error
-                .or_else(|| errors.get(&name).copied());
-            let made = class.call1((&name, parameter.value, error, parameter.unit))?;
-            parameters.set_item(name, made)
-        };
-        for name in order {
-            if let Some(parameter) = all.remove(&name) {
-                add(name, parameter)?;
-            }
-        }
-        all.into_iter()
-            .try_for_each(|(name, parameter)| add(name, parameter))?;
-        Ok(parameters)
+        self.known().parameters(py)
     }
 
     /// Covariance of the parameters that have a standard error, float64, (k, k), in their units; `.labels` are
@@ -291,13 +222,13 @@ impl Calibration {
     /// movements.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.labelled(py, |matrix, i, j| matrix[(i, j)])
+        self.known().labelled(py, |matrix, i, j| matrix[(i, j)])
     }
 
     /// Correlations of the same parameters, from -1 to 1.
     #[getter]
     fn correlations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.labelled(py, |matrix, i, j| match i == j {
+        self.known().labelled(py, |matrix, i, j| match i == j {
             true => 1.0,
             false => matrix[(i, j)] / (matrix[(i, i)] * matrix[(j, j)]).sqrt(),
         })
@@ -427,7 +358,10 @@ impl Calibration {
     /// change, sigma) and `pose_difference`, by the decoder over their common range, um and urad.
     fn diff<'py>(&self, py: Python<'py>, older: PyRef<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let sets = [&older.set, &self.set];
-        let errors = [older.standard_errors(), self.standard_errors()];
+        let errors = [
+            older.known().standard_errors(),
+            self.known().standard_errors(),
+        ];
         let figures = py.detach(|| {
             json!({
                 "same_logs": sets[0].logs_sha256 == sets[1].logs_sha256,

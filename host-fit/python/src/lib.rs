@@ -19,6 +19,7 @@ mod plan;
 mod program;
 mod report;
 mod stage;
+mod statistics;
 mod work;
 
 use pyo3::prelude::*;

@@ -1,0 +1,104 @@
+//! What is known of the parameters of a calibration: values, standard errors, covariance.
+
+use host_fit::fit::Fit;
+use host_fit::recalibrate::Known;
+use host_fit::report::json::Report;
+use host_fit::report::parameters::{Parameter, parameters_in};
+use host_fit::solve::field::terms;
+use nalgebra::DMatrix;
+use numpy::{PyArray1, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use runtime::ParameterSet;
+use std::collections::BTreeMap;
+
+/// A blob, what stands beside it, and the fit that it comes from, where there is one.
+pub struct Statistics<'a> {
+    pub set: &'a ParameterSet,
+    pub known: Option<&'a Known>,
+    pub fit: Option<(&'a Report, &'a Fit)>,
+}
+
+impl Statistics<'_> {
+    /// Names and covariance of the parameters that have a standard error.
+    fn covariance(&self) -> Option<(Vec<String>, DMatrix<f64>)> {
+        if let Some((_, fit)) = self.fit {
+            return Some(fit.covariance());
+        }
+        let covariance = self.known?.covariance.clone();
+        Some((terms::names(covariance.nrows()), covariance))
+    }
+
+    /// Standard errors by name, where the posterior tells them.
+    pub fn standard_errors(&self) -> BTreeMap<String, f64> {
+        let errors = self.known.into_iter().flat_map(|known| {
+            let errors = known.covariance.diagonal().map(f64::sqrt);
+            let names = terms::names(known.covariance.nrows());
+            names.into_iter().zip(errors.as_slice().to_vec())
+        });
+        errors.collect()
+    }
+
+    /// What `of` makes of the covariance and two of its rows, as a `hallstage.Labelled`.
+    pub fn labelled<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&DMatrix<f64>, usize, usize) -> f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let problem = "covariance: none stands beside the blob, as params.bin.posterior";
+        let covariance = self.covariance();
+        let (names, matrix) = covariance.ok_or_else(|| PyValueError::new_err(problem))?;
+        let n = names.len();
+        // Its lower triangle counts, as in the file.
+        let number = |(i, j): (usize, usize)| of(&matrix, i.max(j), i.min(j));
+        let numbers = (0..n * n).map(|k| number((k / n, k % n)));
+        let array = PyArray1::from_iter(py, numbers).reshape([n, n])?;
+        let class = py.import("hallstage._results")?.getattr("Labelled")?;
+        class.call1((array, names))
+    }
+
+    /// k and h of the temperatures, 1/K, where the parameters have them.
+    fn of_temperature(&self) -> impl Iterator<Item = (String, Parameter)> {
+        let temperature = &self.set.constants.temperature;
+        let names = terms::names(usize::MAX).split_off(terms::COUNT).into_iter();
+        let of_probes = temperature.per_mk.into_iter().flatten();
+        let named = names.zip(of_probes).map(|(name, per_mk)| {
+            let parameter = Parameter {
+                value: f64::from(per_mk) * 1e3,
+                unit: "1/K",
+                standard_error: None,
+            };
+            (name, parameter)
+        });
+        named.filter(|_| temperature.is_used())
+    }
+
+    /// The parameters as a dict of `hallstage.Parameter`, those of the covariance first, in its order.
+    pub fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let class = py.import("hallstage._results")?.getattr("Parameter")?;
+        let errors = self.standard_errors();
+        let mut all = match self.fit {
+            Some((report, _)) => report.parameters.clone(),
+            None => parameters_in(self.set),
+        };
+        all.extend(self.of_temperature());
+        let parameters = PyDict::new(py);
+        let add = |name: String, parameter: Parameter| {
+            let error = parameter
+                .standard_error
+                .or_else(|| errors.get(&name).copied());
+            let made = class.call1((&name, parameter.value, error, parameter.unit))?;
+            parameters.set_item(name, made)
+        };
+        let order = self.covariance().map(|(names, _)| names);
+        for name in order.unwrap_or_default() {
+            if let Some(parameter) = all.remove(&name) {
+                add(name, parameter)?;
+            }
+        }
+        all.into_iter()
+            .try_for_each(|(name, parameter)| add(name, parameter))?;
+        Ok(parameters)
+    }
+}
