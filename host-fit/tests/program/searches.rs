@@ -34,21 +34,6 @@ fn the_papers_experiment_runs_and_ends_far_above_the_floor() {
 }
 
 #[test]
-fn shtlbo_on_the_linear_form_is_exact_at_any_thread_count() {
-    let bench = bench();
-    let fit = "fit log.csv.gz --stage stage.toml --train 200 --seed 2";
-    bench.good(&format!("{fit} --solver lm --out lm.bin --json lm.json"));
-    bench.good(&format!(
-        "{fit} --solver shtlbo --threads 1 --out one.bin --json shtlbo.json"
-    ));
-    bench.good(&format!("{fit} --solver shtlbo --threads 2 --out two.bin"));
-    assert_eq!(bench.read("one.bin"), bench.read("two.bin"));
-    let [exact, found] =
-        ["lm.json", "shtlbo.json"].map(|name| number(&bench.json(name), "train_fitness"));
-    assert!((found / exact - 1.0).abs() < 5e-7, "{found} and {exact}");
-}
-
-#[test]
 fn a_warm_start_continues_from_a_blob() {
     let bench = bench();
     let fit = "fit log.csv.gz --stage stage.toml --train 200 --project none";
