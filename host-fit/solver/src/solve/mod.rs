@@ -188,8 +188,8 @@ pub enum SolveError {
     NoPlanarMotion,
     /// No start led anywhere.
     #[error(
-        "no start of the search could be evaluated: every one put a row next to a pole of 1/phi or \
-         made PM singular. Check the search ranges in stage.toml against the vertical motion in the log"
+        "every start of the search has a row beside a pole of 1/phi or a singular PM, so there is nothing to \
+         improve. Check the search ranges in stage.toml against the vertical motion in the log"
     )]
     NoUsableStart,
     /// The solver does not know this form of the problem.

@@ -158,11 +158,11 @@ pub enum ImportError {
     },
     /// The motion shows another offset than the one that was given.
     #[error(
-        "the given offset is wrong: by the motion that both records saw it lacks {apart_us:.0} us in the middle of the record; use \
+        "the given offset is wrong: the motion that both records saw asks for {apart_us:.0} us more in the middle of the record; use \
          --estimate-offset"
     )]
     WrongOffset {
-        /// What it lacks, us.
+        /// What the motion asks for beyond it, us.
         apart_us: f64,
     },
     /// One movement does not agree with the offset of the others.

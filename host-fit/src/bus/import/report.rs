@@ -62,7 +62,7 @@ impl Display for ImportReport {
         let (error_us, faster) = (seen.standard_error_us, 1e6 * self.offset.rate);
         match seen.apart_us {
             None => write!(f, " in the middle of the record, estimated")?,
-            Some(apart_us) => write!(f, ", as given; by the motion it lacks {apart_us:.1} us")?,
+            Some(apart_us) => write!(f, ", as given; the motion asks for {apart_us:.1} us more")?,
         }
         write!(
             f,
