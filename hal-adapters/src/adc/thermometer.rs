@@ -47,17 +47,16 @@ impl Curve {
 
     /// The temperature of a code, m degC; [`MISSING_CODE`] where no temperature of the curve gives it.
     pub fn temperature_mc(&self, code: i32) -> i32 {
-        let mut start_mc = self.first_mc;
-        for pair in self.codes.windows(2) {
-            if let [from, to] = *pair
-                && (from.min(to)..=from.max(to)).contains(&code)
-            {
-                let part = (code - from) as f32 / (to - from) as f32;
-                return start_mc + (part * self.step_mc as f32) as i32;
+        let is_rising = self.codes.first() < self.codes.last();
+        let is_before = |at: &i32| (*at < code) == is_rising && *at != code;
+        let from = self.codes.partition_point(is_before).saturating_sub(1);
+        match self.codes.get(from..) {
+            Some(&[start, end, ..]) if (start.min(end)..=start.max(end)).contains(&code) => {
+                let part = (code - start) as f32 / (end - start) as f32;
+                self.first_mc + (self.step_mc * from as i32) + (part * self.step_mc as f32) as i32
             }
-            start_mc = start_mc.wrapping_add(self.step_mc);
+            _ => MISSING_CODE,
         }
-        MISSING_CODE
     }
 }
 

@@ -40,9 +40,12 @@ const VERTICAL: [Message; 3] = [Message::PoseZ, Message::PoseRx, Message::PoseRy
 pub const fn status_to_bus(status: Status) -> u32 {
     const FREE: u32 = Status::PLANAR_HELD.bits();
     let bits = status.bits() & (u32::MAX >> (32 - SHORT_BITS));
-    match status.any(Status::PLANAR_INVALID) {
-        true => bits,
-        false => bits & !FREE | status.any(Status::TEMPERATURE_MISSING) as u32 * FREE,
+    if status.any(Status::PLANAR_INVALID) {
+        bits
+    } else if status.any(Status::TEMPERATURE_MISSING) {
+        bits | FREE
+    } else {
+        bits & !FREE
     }
 }
 

@@ -190,7 +190,7 @@ impl TemperatureSender {
         let is_new = mount != sent_mount || body != sent_body;
         let is_there = mount != MISSING_CODE || body != MISSING_CODE;
         let is_over = tick.time_us.wrapping_sub(self.sent_us) >= REPEAT_US;
-        if !is_new && !(is_there && is_over) {
+        if !(is_new || is_there && is_over) {
             return None;
         }
         self.sent_mc = tick.temperature_mc;
