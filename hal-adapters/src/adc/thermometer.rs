@@ -47,16 +47,17 @@ impl Curve {
 
     /// The temperature of a code, m degC; [`MISSING_CODE`] where no temperature of the curve gives it.
     pub fn temperature_mc(&self, code: i32) -> i32 {
-        let is_rising = self.codes.first() < self.codes.last();
-        let is_before = |at: &i32| (*at < code) == is_rising && *at != code;
-        let from = self.codes.partition_point(is_before).saturating_sub(1);
-        match self.codes.get(from..) {
-            Some(&[start, end, ..]) if (start.min(end)..=start.max(end)).contains(&code) => {
+        let mut start_mc = self.first_mc;
+        for pair in self.codes.windows(2) {
+            if let [start, end] = *pair
+                && (start.min(end)..=start.max(end)).contains(&code)
+            {
                 let part = (code - start) as f32 / (end - start) as f32;
-                self.first_mc + (self.step_mc * from as i32) + (part * self.step_mc as f32) as i32
+                return start_mc + (part * self.step_mc as f32) as i32;
             }
-            _ => MISSING_CODE,
+            start_mc += self.step_mc;
         }
+        MISSING_CODE
     }
 }
 
