@@ -289,12 +289,8 @@ impl Ads131m08 {
         };
         self.reply.extend(word(response));
         let enabled = self.registers[CLOCK] >> 8;
-        for channel in 0..8 {
-            let code = if enabled >> channel & 1 == 1 {
-                codes[channel]
-            } else {
-                0
-            };
+        for (channel, code) in codes.into_iter().enumerate() {
+            let code = if enabled >> channel & 1 == 1 { code } else { 0 };
             self.reply.extend(&code.to_be_bytes()[1..]);
         }
         self.reply.extend(word(crc(self.reply.iter().copied())));
