@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -49,11 +50,11 @@ def main() -> None:
     models: list[Literal["31", "field"]] = ["31", "field"]
     for model in models:
         dec = hs.fit(hs.read_log(run30, stage), model=model).decoder()
-        rate = len(hall) * 1e-6 / seconds(lambda dec=dec: dec(hall=hall, caps=caps))
+        rate = len(hall) * 1e-6 / seconds(partial(dec, hall=hall, caps=caps))
         print(f"RESULT decode_{model}_million_ticks_per_s={rate:.1f}", flush=True)
 
     program = sys.argv[1] if len(sys.argv) > 1 else str(Path(sys.executable).parent / "host-fit")
-    command = [program, "-q", "fit", run30, "--stage", stage_file, "--out", folder / "p.bin"]
+    command: list[str | Path] = [program, "-q", "fit", run30, "--stage", stage_file, "--out", folder / "p.bin"]
 
     def of_package() -> None:
         hs.fit(hs.read_log(run30, stage)).save(folder / "own.bin")
