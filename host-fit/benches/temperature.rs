@@ -103,10 +103,10 @@ impl<'a> Twin<'a> {
     }
 
     fn fit(&self, logs: &[&Recording]) -> Fallible<Fit> {
-        Ok(fitted(
+        fitted(
             &Recording::joined(logs, self.stage).ok_or("no plane")?,
             self.stage,
-        )?)
+        )
     }
 
     fn judge(&self, fit: &Fit, recording: &Recording) -> Fallible<Axes> {
@@ -233,9 +233,9 @@ fn coefficients(stage: &Stage, stages: u64, spacing_k: f64, grows: bool) -> Fall
         let zero_c = f64::from(field.warmth.temperature.zero_mc[0]) * 1e-3;
         // Per K of both.
         let truth = twin.change([zero_c - 0.5; 2], [zero_c + 0.5; 2]);
-        for probe in 0..3 {
+        for (probe, truth) in truth.into_iter().enumerate() {
             let found = field.warmth.temperature.per_mk[probe][0] * 1e3;
-            all.take(found, truth[probe], field.warmth.error_per_k[probe][0]);
+            all.take(found, truth, field.warmth.error_per_k[probe][0]);
         }
     }
     Ok(all)
@@ -303,9 +303,9 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
                 }
             };
             let truth = twin.change(at(-0.5), at(0.5));
-            for probe in 0..3 {
+            for (probe, truth) in truth.into_iter().enumerate() {
                 let found = field.warmth.temperature.per_mk[probe][sensor] * 1e3;
-                all.take(found, truth[probe], field.warmth.error_per_k[probe][sensor]);
+                all.take(found, truth, field.warmth.error_per_k[probe][sensor]);
             }
         }
     }

@@ -90,10 +90,11 @@ pub fn protocol(stage: &Stage, seconds: f64) -> Result<Vec<WarmLog>, PlanError> 
         let weight = step_s / stage.servo_period_s;
         let rows = rows_of(&runs, step_s);
         let expected = forecaster.forecast_warm(&rows, weight, &sensors, &at);
-        let (errors, ratios) = expected.ok_or(PlanError::NoPose)?;
+        let expected = expected.ok_or(PlanError::NoPose)?;
+        let errors = expected.error_per_k;
         let worst = |k: usize| errors.iter().map(|error| error[k]).fold(0.0, f64::max);
         logs[last].error_per_k = [worst(0), worst(1)];
-        logs[last].ratios = ratios;
+        logs[last].ratios = expected.ratios;
     }
     Ok(logs)
 }

@@ -18,6 +18,15 @@ pub struct Forecast {
     pub service: ServiceVariance,
 }
 
+/// What is to be expected of logs at several temperatures.
+#[derive(Clone, Debug)]
+pub struct WarmForecast {
+    /// Standard errors of (k, h) of A, B, C, 1/K.
+    pub error_per_k: [[f64; 2]; 3],
+    /// Errors in service over the noise floor at each distance, X, Y, Rz.
+    pub ratios: Vec<[f64; 3]>,
+}
+
 /// A stage about to be calibrated, with the poses of its service.
 #[derive(Clone, Debug)]
 pub struct Forecaster {
@@ -51,15 +60,14 @@ impl Forecaster {
         Some(Forecast { posterior, service })
     }
 
-    /// The same for logs at several temperatures, at distances (mount, body) from T0, K: the standard
-    /// errors of (k, h) of A, B, C, 1/K, and the errors in service over the noise floor at each distance.
+    /// The same for logs at several temperatures, at distances (mount, body) from T0, K.
     pub fn forecast_warm(
         &self,
         rows: &Rows,
         weight: f64,
         sensors: &Sensors,
         distances_k: &[[f64; 2]],
-    ) -> Option<([[f64; 2]; 3], Vec<[f64; 3]>)> {
+    ) -> Option<WarmForecast> {
         let mut covariance = self.covariance(rows, weight, sensors.deviations())?;
         let amplitude_mm = rows.rows.iter().map(|row| row.reference_mm[1].abs());
         let white_mm = self.noise.white_mm[1];
@@ -72,7 +80,10 @@ impl Forecaster {
             let there = covariance_at(&posterior.covariance, &self.parameters, *distance_k);
             self.service.variance(&there).ratios()
         });
-        Some((warmth_errors(&posterior.covariance)?, ratios.collect()))
+        Some(WarmForecast {
+            error_per_k: warmth_errors(&posterior.covariance)?,
+            ratios: ratios.collect(),
+        })
     }
 
     fn covariance(&self, rows: &Rows, weight: f64, warmth: [f64; 2]) -> Option<DMatrix<f64>> {
