@@ -1,7 +1,6 @@
 """Stages and logs: from files and from arrays, by the same checks."""
 
 import gzip
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ def columns_of(log: hs.Log) -> dict[str, Any]:
 
 
 def test_a_stage_is_made_of_tables_as_of_a_file(stage: hs.Stage) -> None:
+    tomllib = pytest.importorskip("tomllib", reason="Python 3.11")
     tables = tomllib.loads((DATA / "stage.toml").read_text())
     assert hs.Stage(**tables) == stage
     tables["capacitive"]["probes_m"] = np.array(tables["capacitive"]["probes_m"])
@@ -43,6 +43,7 @@ def test_a_stage_is_made_of_tables_as_of_a_file(stage: hs.Stage) -> None:
     ],
 )  # fmt: skip
 def test_a_wrong_stage_names_the_key(table: str, key: str, value: object, told: str) -> None:
+    tomllib = pytest.importorskip("tomllib", reason="Python 3.11")
     tables = tomllib.loads((DATA / "stage.toml").read_text())
     tables.setdefault(table, {})[key] = value
     with pytest.raises(ValueError, match=told):
