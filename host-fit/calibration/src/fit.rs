@@ -30,6 +30,7 @@ mod mounting_tests;
 mod repair;
 mod settings;
 mod warning;
+mod weights;
 
 pub use all_rows::fit_log;
 pub(crate) use calibration::RANGE_MARGIN;
@@ -43,13 +44,14 @@ use field::{FirstPhase, check_near};
 pub use repair::Repair;
 pub use settings::{FitSettings, ModelChoice};
 pub use warning::{of_counts, of_undecoded};
+use weights::{by_row, left_out, outliers};
 
 use crate::finding::Finding;
 use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::Stage;
 use crate::judge::identify::{check_described, check_determined, check_motion};
 use crate::judge::lag::{ReferenceLag, reference_lag};
-use crate::judge::left_out::{Block, LeftOut, RowPlace};
+use crate::judge::left_out::LeftOut;
 use crate::judge::statistics::PoseError;
 use crate::judge::uncertainty::uncertainty;
 use crate::judge::{Decoded, Judgement, Zeros};
@@ -59,7 +61,7 @@ use crate::problem::model::{COUNT, Model, ParameterId};
 use crate::solve::field::blocks::Rows;
 use crate::solve::field::fit::FieldFit;
 use crate::solve::field::terms;
-use crate::solve::robust::{HALF, Loss};
+use crate::solve::robust::Loss;
 use crate::solve::{Projection, Solution, Solver};
 use nalgebra::DMatrix;
 use runtime::calibration::Origin;
@@ -354,43 +356,6 @@ impl<'a> Job<'a> {
             sound,
         })
     }
-}
-
-/// The rows that count less than half.
-fn outliers(selected: &[usize], weights: &[f64]) -> impl Iterator<Item = usize> {
-    let light = selected.iter().zip(weights).filter(|(_, w)| **w < HALF);
-    light.map(|(&row, _)| row)
-}
-
-/// The weights of all rows of a dataset.
-fn by_row(dataset: &Dataset, selected: &[usize], weights: &[f64]) -> Vec<f64> {
-    let mut all = vec![0.0; dataset.rows.len()];
-    for (&row, weight) in selected.iter().zip(weights) {
-        all[row] = *weight;
-    }
-    all
-}
-
-/// How many count less than half, and where.
-fn left_out(dataset: &Dataset, selected: &[usize], weights: &[f64]) -> LeftOut {
-    let mut left_out = LeftOut::default();
-    let drawn: Vec<(usize, (&usize, &f64))> = selected.iter().zip(weights).enumerate().collect();
-    for rows in drawn.chunks(Block::ROWS) {
-        let mut block = Block::default();
-        for &(number, (&row, weight)) in rows {
-            let row = &dataset.rows[row];
-            let movement = &dataset.movements[row.movement];
-            let place = RowPlace {
-                row: number,
-                log: movement.log,
-                movement: movement.index,
-                t_us: row.t_us,
-            };
-            block.take(place, *weight < HALF);
-        }
-        left_out.take(block);
-    }
-    left_out
 }
 
 /// A calibration on all rows, by the target's decoder.

@@ -24,6 +24,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod described;
+
+use described::check_described;
+
 use crate::diagnose::bank::declared_service;
 use crate::diagnose::signals::signal_findings;
 use crate::diagnose::temperature::validity;
@@ -41,7 +45,7 @@ use crate::solve::field::noise::USUAL_DRIFT_MM;
 use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::posterior::Posterior;
 use crate::solve::field::terms::COUNT;
-use crate::solve::field::update::{Change, Update, update};
+use crate::solve::field::update::{Change, update};
 use crate::solve::field::whiten::Noise;
 use nalgebra::DMatrix;
 use runtime::calibration::Origin;
@@ -55,13 +59,6 @@ use runtime::{Calibration, ModelKind, ParameterSet};
 const OPEN_MAX_GAINS: f64 = 0.05;
 /// ... and here 1.1 times: 4 s of all six axes leave 0.1, 2 s leave 1.2.
 const OPEN_MAX_ALL: f64 = 0.21;
-/// Chi-square may exceed that of the old log by this part, for the model is not exact ...
-const MISFIT_MAX: f64 = 0.02;
-/// ... and by chance by this many standard deviations.
-const CHANCE_MAX: f64 = 3.0;
-/// The same for the changes in terms of what the prior allows for.
-const FAR_MAX: f64 = 4.0;
-
 /// What is kept of a fit of the field model beside its blob: the prior of a recalibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
@@ -338,43 +335,6 @@ pub fn recalibrate(
         judgement_before,
         diagnosis,
     })
-}
-
-/// Refuses a log whose residuals the change asked for does not explain, or not by a change that
-/// probes undergo.
-fn check_described(
-    update: &Update,
-    known: Option<&Known>,
-    change: Change,
-) -> Result<(), RecalibrateError> {
-    let count = update.residuals.max(1) as f64;
-    let misfit = known.map_or(1.0, |known| known.misfit.max(1.0));
-    let limit = match change {
-        Change::Gain | Change::Gains | Change::Temperature => {
-            misfit * (1.0 + MISFIT_MAX) + CHANCE_MAX * (2.0 / count).sqrt()
-        }
-        // All parameters are free: what they don't describe is no other change of the stage.
-        Change::All => misfit + OPEN_MAX_ALL * 3.0 * update.rows as f64 / count,
-    };
-    let ratio = update.chi_squared / count;
-    if ratio > limit {
-        return Err(RecalibrateError::NotDescribed {
-            change,
-            ratio,
-            limit,
-        });
-    }
-    // Among thousands of residuals a few wild changes would not show.
-    let changes = update.changes as f64;
-    let far = changes + FAR_MAX * (2.0 * changes).sqrt();
-    if update.prior > far {
-        return Err(RecalibrateError::TooFar {
-            change,
-            prior: update.prior,
-            limit: far,
-        });
-    }
-    Ok(())
 }
 
 /// `old` with other parameters.

@@ -120,8 +120,8 @@ def test_a_wrong_argument_is_named(cal: hs.Calibration, run30: hs.Log, tmp_path:
         ({"log": run30, "hall": hall}, "log"), ({"hall": hall[:0], "caps": caps}, "hall: no rows"),
         ({"hall": hall[:, :2], "caps": caps}, "hall: shape"),
     ]  # fmt: skip
-    for wrong, told in cases:
-        with pytest.raises(ValueError, match=told):
+    for wrong, words in cases:
+        with pytest.raises(ValueError, match=words):
             dec(**wrong)
     with pytest.raises(FileNotFoundError):
         hs.Decoder.open(tmp_path / "none.bin")

@@ -35,18 +35,18 @@ def test_a_stage_is_made_of_tables_as_of_a_file(stage: hs.Stage) -> None:
 
 
 @pytest.mark.parametrize(
-    ("table", "key", "value", "told"),
+    ("table", "key", "value", "words"),
     [
         ("hall", "h1x_m", "far", "h1x_m"), ("servo", "period_s", -1.0, "period_s"),
         ("servo", "periods", 1.0, "periods"), ("hall", "m_per_count", float("nan"), "hall"),
         ("hall", "h1x_m", object(), "hall"), ("no_such", "x", 1, "no_such"),
     ],
 )  # fmt: skip
-def test_a_wrong_stage_names_the_key(table: str, key: str, value: object, told: str) -> None:
+def test_a_wrong_stage_names_the_key(table: str, key: str, value: object, words: str) -> None:
     tomllib = pytest.importorskip("tomllib", reason="Python 3.11")
     tables = tomllib.loads((DATA / "stage.toml").read_text())
     tables.setdefault(table, {})[key] = value
-    with pytest.raises(ValueError, match=told):
+    with pytest.raises(ValueError, match=words):
         hs.Stage(**tables)
 
 
@@ -110,7 +110,7 @@ def test_temperatures_pass_through(run30: hs.Log) -> None:
 
 
 @pytest.mark.parametrize(
-    ("argument", "value", "told"),
+    ("argument", "value", "words"),
     [
         ("hall", np.zeros(5, int), r"hall: shape \(5,\)"),
         ("hall", np.zeros((3, 9), int), r"hall: shape \(3, 9\)"),
@@ -135,19 +135,19 @@ def test_temperatures_pass_through(run30: hs.Log) -> None:
         ("split_s", float("nan"), "split_s"),
     ],
 )
-def test_a_wrong_argument_is_named(stage: hs.Stage, argument: str, value: object, told: str) -> None:
+def test_a_wrong_argument_is_named(stage: hs.Stage, argument: str, value: object, words: str) -> None:
     arrays: dict[str, Any] = {
         "t_us": 2000 * np.arange(9), "movement": np.zeros(9, int), "hall": np.zeros((9, 3), int),
         "caps": np.zeros((9, 3), int), "x": np.zeros(9), "y": np.zeros(9), "rz": np.zeros(9),
     }  # fmt: skip
     hs.Log.from_arrays(stage, **arrays)
-    with pytest.raises((ValueError, TypeError), match=told):
+    with pytest.raises((ValueError, TypeError), match=words):
         hs.Log.from_arrays(stage, **(arrays | {argument: value}))
 
 
 def test_a_wrong_row_is_named_by_argument_and_row(run30: hs.Log) -> None:
     columns = columns_of(run30)
-    for argument, row, wrong, told in [
+    for argument, row, wrong, words in [
         ("x", 17, np.nan, "NaN"), ("y", 0, np.inf, "inf"), ("rz", 3, 2.0, "1e-1 rad"), ("x", 5, 1.0, "m"),
         ("t_us", 8, 2000, "backwards"),
     ]:  # fmt: skip
@@ -156,7 +156,7 @@ def test_a_wrong_row_is_named_by_argument_and_row(run30: hs.Log) -> None:
         with pytest.raises(hs.LogError) as raised:
             hs.Log.from_arrays(run30.stage, **(columns | {argument: spoilt}))
         assert str(raised.value).startswith(f"{argument}[{row}]"), raised.value
-        assert told in str(raised.value)
+        assert words in str(raised.value)
         assert (raised.value.line, raised.value.name, raised.value.file) == (row, argument, None)
     skipped = hs.Log.from_arrays(run30.stage, **(columns | {"x": spoilt_at(columns["x"], 17)}), bad_rows="skip")
     assert len(skipped) == len(run30) - 1 and skipped.warnings

@@ -104,7 +104,8 @@ const CHECKS_OF_PARTS: &[(&str, OfPart)] = &[
 ];
 
 /// The checks of one image.
-const CHECKS: &[(&str, fn(&Bench) -> Outcome)] = &[
+type OfImage = fn(&Bench) -> Outcome;
+const CHECKS: &[(&str, OfImage)] = &[
     (
         "ads131m08: a pose is of its instant",
         motion::a_pose_is_of_its_instant,
