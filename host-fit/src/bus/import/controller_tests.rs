@@ -32,7 +32,7 @@ fn hall(t_s: f64) -> [i32; 3] {
 
 /// Temperatures of mount and body in tick `n`, m degC: both are read every 100 ms, one after the other.
 fn temperature_mc(n: u32) -> [i32; 2] {
-    [20_000 + (n / 50) as i32, 21_000 - ((n + 49) / 50) as i32]
+    [20_000 + (n / 50) as i32, 21_000 - n.div_ceil(50) as i32]
 }
 
 /// The record by a computer whose clock is the true one: the controller's runs faster by
