@@ -13,8 +13,8 @@ use runtime::{RawFrame, VerticalPose};
 
 /// Largest sensible rotation, rad: the models are linear in rotations.
 pub const ROTATION_MAX_RAD: f64 = 0.1;
-/// Largest sensible temperature in the unit of its column, m degC or mK.
-const TEMPERATURE_MAX_MC: f64 = 1e6;
+/// Largest sensible temperature, m degC. Kelvin taken for degrees Celsius are beyond it.
+const TEMPERATURE_MAX_MC: f64 = 2e5;
 /// Largest sensible displacement, in full scales of the sensor that follows it: no sensor
 /// that is worth reading has a quarter of its designed sensitivity.
 const FULL_SCALES: f64 = 4.0;
@@ -169,7 +169,8 @@ impl<'a> RowReader<'a> {
     fn temperature_mc(&self, row: &Record, source: Option<Source>) -> Result<i32, BadCell> {
         let there = source.filter(|source| !row.cell(source.cell).text.trim_ascii().is_empty());
         there.map_or(Ok(MISSING_CODE), |source| {
-            let above_zero = scaled(row, source, TEMPERATURE_MAX_MC, "m degC")?;
+            let limit = TEMPERATURE_MAX_MC + self.zero_mc.abs();
+            let above_zero = scaled(row, source, limit, "m degC")?;
             Ok((above_zero + self.zero_mc).round() as i32)
         })
     }

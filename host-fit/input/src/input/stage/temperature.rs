@@ -73,8 +73,16 @@ pub(super) fn temperature(document: &Document<'_>) -> Result<TemperatureTable, S
     }
     let per_count = number("c_per_count", (-10.0, 10.0), "degC per code")?;
     let at_zero = number("c_at_zero", (-300.0, 300.0), "degC")?;
-    if let Some(per_count) = per_count {
-        out.scale_mc = [per_count * 1e3, at_zero.unwrap_or(0.0) * 1e3];
+    match (per_count, at_zero) {
+        (None, None) => {}
+        (Some(per_count), at_zero) if per_count != 0.0 => {
+            out.scale_mc = [per_count * 1e3, at_zero.unwrap_or(0.0) * 1e3];
+        }
+        (per_count, _) => {
+            let key = per_count.map_or("c_at_zero", |_| "c_per_count");
+            let problem = "codes need `c_per_count`, in degC per code and not 0";
+            return Err(document.refuse(document.span(TABLE, key), problem));
+        }
     }
     let classes: [(_, &[_], _); 2] = [
         ("magnet", &MAGNETS, "k_per_k"),

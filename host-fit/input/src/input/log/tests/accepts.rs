@@ -243,4 +243,7 @@ fn temperatures_are_read_in_their_unit_and_an_empty_cell_is_missing() {
     let missing = runtime::frame::MISSING_CODE;
     assert_eq!(rows[0].frame.temperature_mc(), [missing; 2]);
     assert_eq!(rows[1].frame.temperature_mc(), [20_500, missing]);
+    let taken_for_c = Stage::from_toml(&toml.replace("\"K\"", "\"C\""), "stage.toml".as_ref());
+    let refused = read_in(&log, &taken_for_c.expect("sound")).expect_err("293.65 degC");
+    assert!(refused.to_string().contains("unit"), "{refused}");
 }
