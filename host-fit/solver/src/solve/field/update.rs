@@ -12,6 +12,7 @@ use super::parameters::FieldParameters;
 use super::posterior::Posterior;
 use super::probe::probes;
 use super::terms::{CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SLOPES, TERMS, THETA};
+use super::warmth::OF_SENSORS;
 use super::whiten::{FieldEquations, Noise, UNKNOWNS};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
@@ -77,7 +78,8 @@ impl Change {
         match self {
             Self::Gain => vec![old.by_gain([GAIN; 3])],
             Self::Gains => gains(),
-            Self::Temperature => Vec::new(),
+            // What errors of the log's temperatures make of its gain.
+            Self::Temperature => vec![old.by_gain([OF_SENSORS; 3])],
             Self::All => {
                 let mut columns = gains();
                 for (probe, values) in old.probes.iter().enumerate() {
@@ -192,8 +194,17 @@ pub fn update(
     };
     let x = DVector::zeros(changes);
     let solved = gauss_newton::solve(&equations, &unknowns, x, offsets_mm, LIMITS);
-    let solved = solved.ok_or(FieldFitError::Singular)?;
-    let with_lag = unknowns.covariance(&solved.normal);
+    let mut solved = solved.ok_or(FieldFitError::Singular)?;
+    let mut lasting = unknowns.basis.clone();
+    if change == Change::Temperature {
+        // Errors of temperatures are those of this log. The lag stands behind them.
+        lasting.column_mut(changes - 2).fill(0.0);
+    }
+    let inverse = unknowns
+        .factor(&solved.normal)
+        .map(|factor| factor.inverse());
+    let with_lag = inverse.map(|inverse| &lasting * inverse * lasting.transpose());
+    solved.point.values = &unknowns.origin + &lasting * &solved.x;
     let parameters = equations.parameters(&solved.point);
     let prior = unknowns.prior_squares(&solved.x);
     let noise = equations.noise;

@@ -23,7 +23,7 @@ pub struct Warmth {
 const SPAN_MIN_K: f64 = 2.0;
 /// Error of a log's gain by those of its temperatures: of two logs it puts k off by 4e-5 over their
 /// distance in K.
-const OF_SENSORS: f64 = 2.8e-5;
+pub(super) const OF_SENSORS: f64 = 2.8e-5;
 
 /// Errors of k and of h by what the form leaves, 1/K: expansion moves a probe over its magnet, where the
 /// field differs. Standard deviations over simulated stages where one temperature changes, ...
