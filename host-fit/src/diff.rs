@@ -11,7 +11,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::report::parameters::{Parameter, parameters_in};
+use crate::report::parameters::{Parameter, parameters_in, temperature_parameters_in};
 use nalgebra::Matrix3;
 use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
 use serde_json::{Map, Value, json};
@@ -32,11 +32,15 @@ const AXES: [(&str, &str); 6] = [
     ("ry", "urad"),
 ];
 
-/// The parameters of both blobs by name, SI: their values `a` and `b`, null where the model has no such
+/// The parameters of both blobs by name, with k and h of the temperatures, SI: their values `a` and `b`, null where the model has no such
 /// term; the change, and `sigma`, the change over the standard error of a difference of independent logs,
 /// null unless both `errors` (SI, by name) are known.
 pub fn parameter_changes(sets: [&ParameterSet; 2], errors: [&BTreeMap<String, f64>; 2]) -> Value {
-    let [in_a, in_b] = sets.map(parameters_in);
+    let [in_a, in_b] = sets.map(|set| {
+        let mut all = parameters_in(set);
+        all.extend(temperature_parameters_in(set));
+        all
+    });
     let change = |(name, Parameter { unit, .. }): (&String, &Parameter)| {
         let value = |of: &BTreeMap<String, Parameter>| of.get(name).map(|p| p.value);
         let (a, b) = (value(&in_a), value(&in_b));

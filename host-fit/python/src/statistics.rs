@@ -3,7 +3,7 @@
 use host_fit::fit::Fit;
 use host_fit::recalibrate::Known;
 use host_fit::report::json::Report;
-use host_fit::report::parameters::{Parameter, parameters_in};
+use host_fit::report::parameters::{Parameter, parameters_in, temperature_parameters_in};
 use host_fit::solve::field::terms;
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayMethods};
@@ -58,22 +58,6 @@ impl Statistics<'_> {
         class.call1((array, names))
     }
 
-    /// k and h of the temperatures, 1/K, where the parameters have them.
-    fn of_temperature(&self) -> impl Iterator<Item = (String, Parameter)> {
-        let temperature = &self.set.constants.temperature;
-        let names = terms::names(usize::MAX).split_off(terms::COUNT).into_iter();
-        let of_probes = temperature.per_mk.into_iter().flatten();
-        let named = names.zip(of_probes).map(|(name, per_mk)| {
-            let parameter = Parameter {
-                value: f64::from(per_mk) * 1e3,
-                unit: "1/K",
-                standard_error: None,
-            };
-            (name, parameter)
-        });
-        named.filter(|_| temperature.is_used())
-    }
-
     /// The parameters as a dict of `hallstage.Parameter`, those of the covariance first, in its order.
     pub fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let class = py.import("hallstage._results")?.getattr("Parameter")?;
@@ -82,7 +66,7 @@ impl Statistics<'_> {
             Some((report, _)) => report.parameters.clone(),
             None => parameters_in(self.set),
         };
-        all.extend(self.of_temperature());
+        all.extend(temperature_parameters_in(self.set));
         let parameters = PyDict::new(py);
         let add = |name: String, parameter: Parameter| {
             let error = parameter

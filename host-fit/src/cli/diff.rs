@@ -8,7 +8,7 @@ use crate::diff::{parameter_changes, pose_difference};
 use crate::output::{blob_file, posterior_file};
 use crate::problem::model::Model;
 use crate::report::table::{as_text, tables};
-use crate::solve::field::terms::{COUNT, name};
+use crate::solve::field::terms::names;
 use clap::Args;
 use runtime::{ModelKind, ParameterSet};
 use serde_json::{Value, json};
@@ -84,6 +84,9 @@ fn standard_errors(set: &ParameterSet, blob: &Path) -> Result<BTreeMap<String, f
         return Ok(BTreeMap::new());
     }
     let known = posterior_file::read(&path, set, blob)?;
-    let error = |k: usize| (name(k), known.covariance[(k, k)].sqrt());
-    Ok((0..COUNT).map(error).collect())
+    let errors = known.covariance.diagonal().map(f64::sqrt);
+    Ok(names(errors.len())
+        .into_iter()
+        .zip(errors.iter().copied())
+        .collect())
 }

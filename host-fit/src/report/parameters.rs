@@ -84,6 +84,22 @@ pub fn parameters_in(set: &ParameterSet) -> BTreeMap<String, Parameter> {
     }
 }
 
+/// k and h of the temperatures, where a blob has them, by name.
+pub fn temperature_parameters_in(set: &ParameterSet) -> BTreeMap<String, Parameter> {
+    let temperature = &set.constants.temperature;
+    let names = terms::names(usize::MAX).split_off(terms::COUNT);
+    let one = |(name, per_mk): (String, &f32)| {
+        let parameter = Parameter {
+            value: f64::from(*per_mk) * 1e3,
+            unit: "1/K",
+            standard_error: None,
+        };
+        (name, parameter)
+    };
+    let named = names.into_iter().zip(temperature.per_mk.as_flattened());
+    named.map(one).filter(|_| temperature.is_used()).collect()
+}
+
 /// A table with a row for each term, and with the given columns for each probe. `cells` gives
 /// them for a parameter by its name and the factor from SI to the unit of the row, as
 /// misalignments are in mrad; a term that it gives none for is left out.
