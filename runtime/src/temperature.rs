@@ -51,6 +51,11 @@ impl<T: Real> Temperature<T> {
         ([mount & !bad, body & !bad], bad.cast_unsigned())
     }
 
+    /// Whether each sensor that the stage has reads a temperature that may be true, m degC.
+    pub fn is_plausible(&self, temperature_mc: [i32; 2]) -> bool {
+        self.changes_mk(temperature_mc).1 == 0
+    }
+
     /// dM and dH in K, as [`Temperature::gain_at`] takes them; 0 of a sensor that the stage lacks.
     pub fn changes_k(&self, temperature_mc: [i32; 2]) -> [f64; 2] {
         let changes_mk = self.changes_mk(temperature_mc).0;

@@ -1,6 +1,6 @@
 //! A simulated stage that warms at work: fitted cold, brought up to date warm, judged over the day.
 
-use crate::common::{Bench, number, plan, stdout};
+use crate::common::{Bench, number, plan, stderr, stdout};
 
 const TEMPERATURE: &str = "
 [temperature]
@@ -87,4 +87,36 @@ fn a_run_at_work_tells_how_the_stage_follows_temperature() {
         3,
         &[],
     );
+    // What became of k, and how sure that is.
+    bench.good("diff cold.bin warm.bin --json diff.json");
+    let k = &bench.json("diff.json")["parameters"]["k_a"];
+    assert!(
+        number(&k["change"]) != 0.0 && number(&k["sigma"]).abs() < 5.0,
+        "{k}"
+    );
+    // A blob that follows temperatures, on a log that has none.
+    let without: Vec<String> = bench.text("warm.csv").lines().map(first_columns).collect();
+    bench.write("none.csv", without.join("\n") + "\n");
+    let none = stderr(&bench.good("eval warm.bin none.csv --stage warm.toml --limit 99"));
+    assert!(none.contains("rows have no temperature"), "{none}");
+    bench.bad(
+        "fit cold.csv none.csv --stage warm.toml --out x.bin",
+        4,
+        &["have no temperature"],
+    );
+    // Magnets of another kind than the stage file says.
+    let other = bench.text("warm.toml") + "magnet = \"SmCo\"\n";
+    bench.write("other.toml", other);
+    let fit = "fit cold.csv later.csv warm.csv --stage other.toml --model field --out x.bin";
+    let told = stderr(&bench.good(fit));
+    assert!(
+        told.contains("standard deviations from what `magnet`"),
+        "{told}"
+    );
+}
+
+/// A row without its last two cells.
+fn first_columns(row: &str) -> String {
+    let cells: Vec<&str> = row.split(',').collect();
+    cells[..cells.len() - 2].join(",")
 }

@@ -299,6 +299,7 @@ pub fn of_judged(
         found.severe(severity)
     }));
     findings.extend(range::out_of_range(set, dataset));
+    findings.extend(temperature::missing(&set.constants.temperature, dataset));
     let findings = in_order(findings);
     let is_bent = fitted.is_some() && findings.iter().any(|f| f.cost > Some(GOOD_MAX));
     let verdict = predicted.map(|predicted| {

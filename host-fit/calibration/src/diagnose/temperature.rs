@@ -13,13 +13,18 @@ use crate::solve::field::posterior::covariance_at;
 use crate::solve::field::terms::COUNT;
 use nalgebra::DMatrix;
 use runtime::Temperature;
+use runtime::real::Real;
 
 /// Offsets of Hall elements and the expansion of the stage move its zero. After such a change, K, the
 /// stage is zeroed again.
 const REZERO_K: f64 = 5.0;
 
-/// The sensors, and the symbols of their coefficients.
-const SENSORS: [(&str, &str); 2] = [("mount", "k"), ("body", "h")];
+/// The sensors, the symbols of their coefficients, and the part of the stage that these describe.
+const SENSORS: [(&str, &str, &str); 2] = [("mount", "k", "magnet"), ("body", "h", "hall")];
+/// A coefficient this many standard deviations from what the stage file expects has another cause.
+const DEVIATIONS_MAX: f64 = 4.0;
+/// Rows without a temperature, in parts of all, that k and h can bear.
+const MISSING_MAX: f64 = 0.01;
 
 /// What a fit found of k and h, a finding for each sensor. Its cost is that of the temperature's drift in
 /// the log, of which k and h leave a part.
@@ -58,7 +63,7 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
     };
     let there = (0..2).filter(|sensor| temperature.reach_mk[*sensor] != 0);
     let finding = |sensor: usize| {
-        let (place, symbol) = SENSORS[sensor];
+        let (place, symbol, part) = SENSORS[sensor];
         let zero_c = f64::from(temperature.zero_mc[sensor]) * 1e-3;
         let of_probe = |probe: usize| {
             let percent = temperature.per_mk[probe][sensor] * 1e5;
@@ -76,16 +81,62 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
              more"
                 .to_owned()
         };
+        let [expected, deviation] = stage.temperature.prior_per_k[sensor];
+        let deviations = |probe: usize| {
+            let value = temperature.per_mk[probe][sensor] * 1e3;
+            ((value - expected) / deviation.hypot(error_per_k[probe][sensor])).abs()
+        };
+        let deviations = [0, 1, 2].map(deviations).into_iter().fold(0.0, f64::max);
+        let is_other = span_k > 0.0 && deviations > DEVIATIONS_MAX;
+        let other = if is_other {
+            format!(
+                ": {deviations:.0} standard deviations from what `{part}` in [temperature] expects; check the sensor, its column, \
+                 unit and sign, and `{part}`"
+            )
+        } else {
+            String::new()
+        };
         let message = format!(
-            "{symbol} of A, B, C is {values} %/K of the {place}'s temperature from {zero_c:.2} degC, {from}"
+            "{symbol} of A, B, C is {values} %/K of the {place}'s temperature from {zero_c:.2} degC, {from}{other}"
         );
         let found = Finding::new(Code::Temperature, message).of(span_k, "K");
-        match cost(sensor) {
+        let found = match cost(sensor) {
             Some(cost) => found.severe(severity(cost)).costing(cost),
             None => found,
-        }
+        };
+        let least = if is_other {
+            Severity::Warn
+        } else {
+            Severity::Note
+        };
+        let severity = found.severity.max(least);
+        found.severe(severity)
     };
-    there.map(finding).collect()
+    let incomplete = missing(temperature, dataset).map(|found| {
+        let share = found.value.unwrap_or(0.0) / dataset.rows.len() as f64;
+        match share > MISSING_MAX {
+            true => found.severe(Severity::Refuse),
+            false => found,
+        }
+    });
+    there.map(finding).chain(incomplete).collect()
+}
+
+/// Rows without a temperature that the calibration needs, or with one too far from T0 to be true.
+pub(super) fn missing<T: Real>(temperature: &Temperature<T>, dataset: &Dataset) -> Option<Finding> {
+    let mut rows =
+        (dataset.rows.iter()).filter(|row| !temperature.is_plausible(row.frame.temperature_mc()));
+    let first = rows.next()?;
+    let count = 1 + rows.count();
+    let message = format!(
+        "{count} of {} rows have no temperature, or one more than {} K from that of the calibration, and count as if at that: check \
+         the columns of [temperature], their unit and the sensors",
+        dataset.rows.len(),
+        Temperature::<T>::REACH_MK / 1000,
+    );
+    let name = dataset.movement_name(&dataset.movements[first.movement]);
+    let found = Finding::new(Code::Temperature, message).severe(Severity::Warn);
+    Some(found.at(name, first.t_us).of(count as f64, "rows"))
 }
 
 /// rms distance of a sensor's temperature from T0 over the log, K.
@@ -142,7 +193,7 @@ pub fn rezero(
     let changes = all.filter_map(of_movement);
     let (change_k, movement, sensor) = changes.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (change_k > REZERO_K).then(|| {
-        let (place, _) = SENSORS[sensor];
+        let (place, ..) = SENSORS[sensor];
         let since = if refitted { "within a movement" } else { "since the calibration" };
         let message = format!(
             "the temperature of the {place} changes by {change_k:.1} K {since}: zero the stage again after every {REZERO_K} K, for \
@@ -212,6 +263,27 @@ mod tests {
             let found = found.map(|found| found.movement.expect("a movement"));
             assert_eq!(found.as_deref(), movement, "{movements:?} {refitted}");
         }
+    }
+
+    #[test]
+    fn rows_without_a_temperature_that_may_be_true_are_counted() {
+        let mut temperature = Temperature {
+            zero_mc: [20_000, 0],
+            reach_mk: [30_000, 0],
+            ..Temperature::<f32>::NONE
+        };
+        let dataset = dataset([[20_000, MISSING_CODE], [21_000, 293_000]]);
+        let found = missing(&temperature, &dataset).expect("two");
+        assert_eq!(
+            (found.value, found.movement),
+            (Some(2.0), Some("0".to_owned()))
+        );
+        temperature.reach_mk = [0; 2];
+        assert_eq!(
+            missing(&temperature, &dataset),
+            None,
+            "no sensor, nothing missing"
+        );
     }
 
     /// Known exactly but for k, a stage is good while the error of k allows.
