@@ -371,8 +371,8 @@ proptest! {
 #[test]
 fn codes_of_temperatures_need_a_scale() {
     for line in ["c_at_zero = 25.0", "c_per_count = 0.0"] {
-        let toml = format!("{STAGE_TOML}\n[temperature]\nmount = \"mount\"\n{line}\n");
-        let refused = Stage::from_toml(&toml, "stage.toml".as_ref()).expect_err(line);
+        let toml = format!("{SOUND}\n[temperature]\nmount = \"mount\"\n{line}\n");
+        let refused = parse(&toml).expect_err(line);
         assert!(refused.to_string().contains("`c_per_count`"), "{refused}");
     }
 }
