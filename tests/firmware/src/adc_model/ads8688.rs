@@ -224,8 +224,8 @@ mod tests {
         frame(&mut part, LATER_NS, 0x03 << 9 | 1 << 8 | 0x42);
         frame(&mut part, LATER_NS, 0xa000);
         assert_eq!(frame(&mut part, LATER_NS, 0xd800), [0x80, 10, 0x04, 0]);
-        assert_eq!(frame(&mut part, LATER_NS, 0), [0x80, 70, 0xc4, 0]);
-        assert_eq!(frame(&mut part, LATER_NS, 0xa000), [0x80, 70, 0xc4, 0]);
+        assert_eq!(frame(&mut part, LATER_NS, 0), [0x80, 70, 0x64, 0]);
+        assert_eq!(frame(&mut part, LATER_NS, 0xa000), [0x80, 70, 0x64, 0]);
         assert_eq!(frame(&mut part, LATER_NS, 0), [0x80, 10, 0x04, 0]);
     }
 
