@@ -18,8 +18,9 @@ use host_fit::simulate::log_text::log_csv;
 use host_fit::simulate::plan_file;
 use host_fit::simulate::pose::StagePose;
 use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
-use host_fit::simulate::recording::{RecordError, record};
+use host_fit::simulate::recording::{RecordError, record, record_in};
 use host_fit::simulate::sensors::SensorErrors;
+use host_fit::simulate::thermal::{Climate, Thermal};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
@@ -106,22 +107,38 @@ pub struct SimulatedLog {
 ///
 /// `run`: a `Plan`; "paper", "combined" or "service", the protocols of the program; or poses, (n, 6), X, Y, Rz,
 /// Z, Rx, Ry in m and rad, one for each servo period. `seed`: which stage, and its noise: an even one has magnets
-/// as designed, an odd one imperfect magnets. The log is that of `host-fit simulate`, to the bit.
+/// as designed, an odd one imperfect magnets. `hour`: begins the run at this hour of a working day, -24 to 24
+/// (work begins at 0), and the stage follows the temperatures of the day; `[temperature]` of the stage names
+/// their columns. The log is that of `host-fit simulate`, to the bit.
 ///
-/// Raises `ValueError` where a probe would hit its magnet.
+/// Raises `ValueError` where a probe would hit its magnet, and for an `hour` of a stage without `[temperature]`.
 #[pyfunction]
-#[pyo3(signature = (stage, run, *, seed = 1))]
+#[pyo3(signature = (stage, run, *, seed = 1, hour = None))]
 pub fn simulate<'py>(
     py: Python<'py>,
     stage: Py<Stage>,
     run: &Bound<'py, PyAny>,
     #[pyo3(from_py_with = read_seed)] seed: u64,
+    hour: Option<f64>,
 ) -> PyResult<Bound<'py, SimulatedLog>> {
     let designed = Arc::clone(&stage.get().designed);
     let run = run_of(run, designed.servo_period_s, seed)?;
+    if hour.is_some_and(|hour| !(-24.0..=24.0).contains(&hour)) {
+        return Err(wrong("hour", "-24 to 24 h of the day are possible"));
+    }
+    if hour.is_some() && designed.temperature.columns == [None, None] {
+        return Err(wrong("hour", "[temperature] of the stage names no column"));
+    }
     let recorded = work::run(py, || {
         let assembly = Assembly::draw(&designed, seed);
-        let recording = record(&designed, &assembly, run, &SensorErrors::USUAL, seed)?;
+        let errors = &SensorErrors::USUAL;
+        let recording = match hour {
+            None => record(&designed, &assembly, run, errors, seed)?,
+            Some(hour) => {
+                let in_day = (&assembly, &Thermal::draw(seed));
+                record_in(&designed, in_day, Climate::Day { hour }, run, errors, seed)?
+            }
+        };
         let csv = log_csv(&recording, &designed);
         Ok((read(csv, &designed), recording.truth.concat()))
     })?;

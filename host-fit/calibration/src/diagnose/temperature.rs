@@ -104,13 +104,11 @@ pub(super) fn findings(fit: &Fit, dataset: &Dataset, stage: &Stage) -> Vec<Findi
             Some(cost) => found.severe(severity(cost)).costing(cost),
             None => found,
         };
-        let least = if is_other {
-            Severity::Warn
-        } else {
-            Severity::Note
-        };
-        let severity = found.severity.max(least);
-        found.severe(severity)
+        // Wrong at any other temperature.
+        match is_other {
+            true => found.severe(Severity::Refuse),
+            false => found,
+        }
     };
     let incomplete = missing(temperature, dataset).map(|found| {
         let share = found.value.unwrap_or(0.0) / dataset.rows.len() as f64;

@@ -79,6 +79,7 @@ def simulate(
     run: Plan | Literal["paper", "combined", "service"] | ArrayLike,
     *,
     seed: int = 1,
+    hour: float | None = None,
 ) -> SimulatedLog: ...
 def check(log: Log) -> Findings: ...
 def fit(
