@@ -2,7 +2,7 @@
 
 use crate::choice::chosen;
 use crate::decoder::{self, Decoder};
-use crate::error::{internal, of_log, of_output, of_recalibrate, refused, wrong};
+use crate::error::{internal, of_output, of_recalibrate, refused, wrong};
 use crate::evaluation::Evaluation;
 use crate::finding;
 use crate::fit::blob_text;
@@ -13,15 +13,12 @@ use crate::stage::Stage;
 use crate::statistics::Statistics;
 use crate::work;
 use host_fit::calibrate::{
-    EvalOrder, Judged, Outcome, figures_of_recalibration, other_scales, warnings_of,
-    warnings_of_recalibration,
+    Outcome, figures_of_recalibration, other_scales, warnings_of, warnings_of_recalibration,
 };
-use host_fit::diff::{parameter_changes, pose_difference};
 use host_fit::finding::{Severity, messages};
 use host_fit::fit::Fit;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
-use host_fit::judge::Zeros;
 use host_fit::output::{Outputs, blob_file, posterior_file};
 use host_fit::problem::model::Model;
 use host_fit::recalibrate::{Known, recalibrate};
@@ -33,11 +30,10 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use runtime::ParameterSet;
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 /// A calibration of a stage, and what is known of it. Made by `fit`, `Calibration.recalibrate` and
 /// `Calibration.open`.
@@ -94,6 +90,12 @@ impl Calibration {
             known: self.known.as_ref(),
             fit: self.origin.fit().map(|(of, fit)| (&of.report, fit)),
         }
+    }
+
+    /// Raises for a log without reference, or of a stage with other scales of its codes.
+    fn check_log(&self, py: Python<'_>, log: &Log) -> PyResult<()> {
+        log.check_reference(py)?;
+        other_scales(&self.set, &log.designed).map_or(Ok(()), |problem| Err(wrong("log", problem)))
     }
 
     fn blob_bytes(&self) -> PyResult<Vec<u8>> {
@@ -269,38 +271,15 @@ impl Calibration {
         delta: Option<&str>,
         limit: Option<f64>,
     ) -> PyResult<Evaluation> {
-        let started = Instant::now();
         let log = log.get();
-        log.check_reference(py)?;
-        let zeros = match delta {
-            None => None,
-            Some("fit") => Some(Zeros::Refit),
-            Some("zero") => Some(Zeros::None),
-            Some(other) => return Err(wrong("delta", format!("`{other}` is none of fit, zero"))),
-        };
-        if limit.is_some_and(|limit| !(limit.is_finite() && limit > 0.0)) {
-            return Err(wrong("limit", "a factor above zero is needed"));
-        }
-        self.check_scales(log)?;
-        let order = EvalOrder { zeros, limit };
-        let options = log.options(Judged::OPTIONS);
-        let logs = log.reading.dataset.logs.len();
-        let (set, designed, known) = (&self.set, &log.designed, self.known.as_ref());
-        let evaluated = work::run(py, || {
-            let judged = Judged::new(set, designed, logs, |take| {
-                log.reading.read_anew(designed, &options, take)
-            })?;
-            Ok(judged.evaluated(order, known))
-        })?;
-        let evaluated = evaluated.map_err(|error| of_log(py, &error))?;
-        Ok(Evaluation {
-            report: evaluated.report(started.elapsed().as_secs_f64()),
-            evaluated,
-            designed: Arc::clone(designed),
-            stage: log.stage.clone_ref(py),
-            serial: self.set.serial.as_str().to_owned(),
-            blob: self.blob_bytes()?,
-        })
+        self.check_log(py, log)?;
+        Evaluation::new(
+            py,
+            log,
+            (&self.set, self.known.as_ref()),
+            self.blob_bytes()?,
+            (delta, limit),
+        )
     }
 
     /// Brings the calibration up to date by a few seconds of log; of the field model.
@@ -318,10 +297,9 @@ impl Calibration {
         created: &str,
     ) -> PyResult<Self> {
         let log = log.get();
-        log.check_reference(py)?;
+        self.check_log(py, log)?;
         let what = chosen::<Change>("what", what)?;
         let created = blob_text("created", created)?;
-        self.check_scales(log)?;
         let (dataset, designed) = (&log.reading.dataset, &log.designed);
         let new = work::run(py, || {
             recalibrate(
@@ -357,18 +335,8 @@ impl Calibration {
     /// What is different from an `older` calibration, a dict: `parameters` by name (a: older, b: this one,
     /// change, sigma) and `pose_difference`, by the decoder over their common range, um and urad.
     fn diff<'py>(&self, py: Python<'py>, older: PyRef<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let sets = [&older.set, &self.set];
-        let errors = [
-            older.known().standard_errors(),
-            self.known().standard_errors(),
-        ];
-        let figures = py.detach(|| {
-            json!({
-                "same_logs": sets[0].logs_sha256 == sets[1].logs_sha256,
-                "parameters": parameter_changes(sets, [&errors[0], &errors[1]]),
-                "pose_difference": pose_difference(sets[0], sets[1]),
-            })
-        });
+        let [before, now] = [older.known(), self.known()];
+        let figures = py.detach(|| now.changes_from(&before));
         finding::figures(py, &figures)
     }
 
@@ -417,12 +385,11 @@ impl Calibration {
             serial => format!(" of {serial}"),
         };
         let title = format!("calibration{of}, {model}");
-        let findings = self
-            .origin
-            .diagnosis()
-            .map(|diagnosis| &diagnosis.findings[..]);
         match self.origin.subject() {
-            Some(subject) => format!("{title}\n{}", text(&subject, findings.unwrap_or_default())),
+            Some(subject) => {
+                let findings = &subject.diagnosis.findings;
+                format!("{title}\n{}", text(&subject, findings))
+            }
             None => format!("<{title}>"),
         }
     }
@@ -430,15 +397,5 @@ impl Calibration {
     fn _repr_html_(&self) -> PyResult<Option<String>> {
         let subject = self.origin.subject();
         subject.map(|subject| head(&subject, &[])).transpose()
-    }
-}
-
-impl Calibration {
-    /// Raises `ValueError` for a log of a stage with other scales of its codes.
-    fn check_scales(&self, log: &Log) -> PyResult<()> {
-        match other_scales(&self.set, &log.designed) {
-            Some(problem) => Err(wrong("log", problem)),
-            None => Ok(()),
-        }
     }
 }

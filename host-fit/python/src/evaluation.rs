@@ -1,26 +1,73 @@
 //! A calibration judged on another log.
 
+use crate::error::{of_log, wrong};
 use crate::finding;
+use crate::log::Log;
 use crate::report::{About, head, residuals, text, write};
 use crate::stage::Stage;
-use host_fit::calibrate::Evaluation as Evaluated;
+use crate::work;
+use host_fit::calibrate::{EvalOrder, Evaluation as Evaluated, Judged};
 use host_fit::input::stage::Stage as Designed;
+use host_fit::judge::Zeros;
+use host_fit::recalibrate::Known;
 use host_fit::report::json::Report;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
+use runtime::ParameterSet;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// How a calibration does on logs with reference, by the target's own decoder.
 #[pyclass(frozen, module = "hallstage")]
 pub struct Evaluation {
-    pub evaluated: Evaluated,
-    pub report: Report,
-    pub designed: Arc<Designed>,
-    pub stage: Py<Stage>,
-    pub serial: String,
-    pub blob: Vec<u8>,
+    evaluated: Evaluated,
+    report: Report,
+    designed: Arc<Designed>,
+    stage: Py<Stage>,
+    serial: String,
+    blob: Vec<u8>,
+}
+
+impl Evaluation {
+    /// Judges a parameter set, and what is known of it, on a log.
+    pub fn new(
+        py: Python<'_>,
+        log: &Log,
+        (set, known): (&ParameterSet, Option<&Known>),
+        blob: Vec<u8>,
+        (delta, limit): (Option<&str>, Option<f64>),
+    ) -> PyResult<Self> {
+        let started = Instant::now();
+        let zeros = match delta {
+            None => None,
+            Some("fit") => Some(Zeros::Refit),
+            Some("zero") => Some(Zeros::None),
+            Some(other) => return Err(wrong("delta", format!("`{other}` is none of fit, zero"))),
+        };
+        if limit.is_some_and(|limit| !(limit.is_finite() && limit > 0.0)) {
+            return Err(wrong("limit", "a factor above zero is needed"));
+        }
+        let order = EvalOrder { zeros, limit };
+        let options = log.options(Judged::OPTIONS);
+        let (designed, logs) = (&log.designed, log.reading.dataset.logs.len());
+        let evaluated = work::run(py, || {
+            let judged = Judged::new(set, designed, logs, |take| {
+                log.reading.read_anew(designed, &options, take)
+            })?;
+            Ok(judged.evaluated(order, known))
+        })?;
+        let evaluated = evaluated.map_err(|error| of_log(py, &error))?;
+        Ok(Self {
+            report: evaluated.report(started.elapsed().as_secs_f64()),
+            evaluated,
+            designed: Arc::clone(designed),
+            stage: log.stage.clone_ref(py),
+            serial: set.serial.as_str().to_owned(),
+            blob,
+        })
+    }
 }
 
 #[pymethods]

@@ -1,5 +1,6 @@
 //! What is known of the parameters of a calibration: values, standard errors, covariance.
 
+use host_fit::diff::{parameter_changes, pose_difference};
 use host_fit::fit::Fit;
 use host_fit::recalibrate::Known;
 use host_fit::report::json::Report;
@@ -11,6 +12,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use runtime::ParameterSet;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// A blob, what stands beside it, and the fit that it comes from, where there is one.
@@ -30,8 +32,18 @@ impl Statistics<'_> {
         Some((terms::names(covariance.nrows()), covariance))
     }
 
-    /// Standard errors by name, where the posterior tells them.
-    pub fn standard_errors(&self) -> BTreeMap<String, f64> {
+    /// What changed since `older`, in parameters and in poses.
+    pub fn changes_from(&self, older: &Self) -> Value {
+        let errors = [older.standard_errors(), self.standard_errors()];
+        json!({
+            "same_logs": older.set.logs_sha256 == self.set.logs_sha256,
+            "parameters": parameter_changes([older.set, self.set], [&errors[0], &errors[1]]),
+            "pose_difference": pose_difference(older.set, self.set),
+        })
+    }
+
+    /// Standard errors by name, where the posterior holds them.
+    fn standard_errors(&self) -> BTreeMap<String, f64> {
         let errors = self.known.into_iter().flat_map(|known| {
             let errors = known.covariance.diagonal().map(f64::sqrt);
             let names = terms::names(known.covariance.nrows());
