@@ -6,13 +6,15 @@ use crate::can_model::Sent;
 use crate::image::Image;
 use crate::machine::Machine;
 use embedded_can::{Frame, Id, StandardId};
-use hal_adapters::can::command::{Answer, Command, IdentityPage, Request};
+use hal_adapters::can::command::{Answer, Command, IdentityPage, Outcome, Request};
 use hal_adapters::can::e2e::{protect, unprotect};
+use hal_adapters::can::pose::status_to_bus;
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus};
-use hal_adapters::can::{BusFrame, Message};
+use hal_adapters::can::{BusFrame, Layout, Message};
 use runtime::frame::MISSING_CODE;
+use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Status};
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Bits of the six words of a pose, X, Y, Rz, Z, Rx, Ry, and its status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +23,22 @@ pub struct Words {
     pub words: [u32; 6],
     /// The status.
     pub status: u32,
+}
+
+impl Words {
+    /// What the host's decoder makes of a row of the log.
+    pub fn decoded(decoder: &AnyDecoder, row: Row, temperature_mc: [i32; 2]) -> Self {
+        let [a, b, c, g1, g2, g3] = row;
+        let frame = RawFrame::new([a, b, c], [g1, g2, g3], 0, 0);
+        let frame = frame.with_temperature_mc(temperature_mc);
+        let reading = decoder.decode(&frame, &PlanarPose::ZERO);
+        let [x, y, rz] = reading.pose.planar.to_array();
+        let [z, rx, ry] = reading.pose.vertical.to_array();
+        Self {
+            words: [x, y, rz, z, rx, ry].map(f32::to_bits),
+            status: status_to_bus(reading.status),
+        }
+    }
 }
 
 /// Number of a second stage on the bus.
@@ -48,26 +66,32 @@ pub struct Bench {
     pub poses: Vec<Words>,
 }
 
-type Failure = Box<dyn std::error::Error>;
-
 impl Bench {
     /// Reads what lies in `folder`.
-    pub fn read(folder: &Path, library: OsString) -> Result<Self, Failure> {
-        let file = |name: &str| -> PathBuf { folder.join(name) };
-        let bytes = |name: &str| std::fs::read(file(name)).map_err(|e| format!("{name}: {e}"));
-        Ok(Self {
+    ///
+    /// # Panics
+    /// If a file is missing, or is not what its name says.
+    pub fn read(folder: &Path, library: OsString) -> Self {
+        let image = |name: &str| Image::read(&folder.join(name));
+        let bytes = |name: &str| std::fs::read(folder.join(name)).expect(name);
+        let text = |name: &str| String::from_utf8(bytes(name)).expect("text");
+        let pose = |[status, words @ ..]: [f64; 7]| Words {
+            words: words.map(|micro| ((micro * 1e-6) as f32).to_bits()),
+            status: status as u32,
+        };
+        let pose_columns = [
+            "status", "x_um", "y_um", "rz_urad", "z_um", "rx_urad", "ry_urad",
+        ];
+        Self {
             library,
-            images: [
-                Image::read(&file("ads131m08.elf"))?,
-                Image::read(&file("ads8688.elf"))?,
-            ],
-            neighbour: Image::read(&file("neighbour.elf"))?,
-            blob: bytes("params.bin")?,
-            later: bytes("later.bin")?,
-            other: bytes("other.bin")?,
-            rows: rows(&std::fs::read_to_string(file("log.csv"))?)?,
-            poses: poses(&std::fs::read_to_string(file("pose.csv"))?)?,
-        })
+            images: ["ads131m08.elf", "ads8688.elf"].map(image),
+            neighbour: image("neighbour.elf"),
+            blob: bytes("params.bin"),
+            later: bytes("later.bin"),
+            other: bytes("other.bin"),
+            rows: rows(&text("log.csv")),
+            poses: columns(&text("pose.csv"), pose_columns).map(pose).collect(),
+        }
     }
 
     /// The program for a part.
@@ -79,41 +103,42 @@ impl Bench {
     }
 
     /// A controller with these parameter slots, whose converter plays the log.
-    pub fn machine(&self, part: Part, slots: [&[u8]; 2]) -> Result<Machine, Failure> {
+    pub fn machine(&self, part: Part, slots: [&[u8]; 2]) -> Machine {
         self.machine_playing(part, slots, self.rows.clone())
     }
 
     /// The same with the blob of the log, after so many ticks; what it sent is forgotten.
-    pub fn running(&self, part: Part, ticks: u64) -> Result<Machine, Failure> {
-        let mut machine = self.machine(part, [&self.blob, &[]])?;
-        machine.run_ticks(ticks)?;
+    pub fn running(&self, part: Part, ticks: u64) -> Machine {
+        let mut machine = self.machine(part, [&self.blob, &[]]);
+        machine.run_ticks(ticks);
         machine.chip.can.sent.clear();
-        Ok(machine)
+        machine
     }
 
     /// A controller whose converter plays these rows.
-    pub fn machine_playing(
-        &self,
-        part: Part,
-        slots: [&[u8]; 2],
-        rows: Vec<Row>,
-    ) -> Result<Machine, Failure> {
+    pub fn machine_playing(&self, part: Part, slots: [&[u8]; 2], rows: Vec<Row>) -> Machine {
         Machine::new(&self.library, self.image(part), part, rows, slots)
+    }
+
+    /// The host's words of a tick: the log is played in a loop.
+    pub fn pose(&self, tick: u64) -> Words {
+        self.poses[tick as usize % self.poses.len()]
     }
 }
 
-fn columns(header: &str, names: [&str; 6]) -> Result<[usize; 6], String> {
-    let found = names.map(|name| header.split(',').position(|cell| cell == name));
-    let mut at = [0; 6];
-    for (at, (found, name)) in at.iter_mut().zip(found.into_iter().zip(names)) {
-        *at = found.ok_or_else(|| format!("no column {name}"))?;
-    }
-    Ok(at)
+/// Numbers in the columns of these names.
+fn columns<const N: usize>(text: &str, names: [&str; N]) -> impl Iterator<Item = [f64; N]> {
+    let mut lines = text.lines();
+    let header: Vec<_> = lines.next().unwrap_or_default().split(',').collect();
+    let at = names.map(|name| header.iter().position(|cell| *cell == name).expect(name));
+    lines.map(move |line| {
+        let cells: Vec<_> = line.split(',').collect();
+        at.map(|at| cells[at].parse().expect("a number"))
+    })
 }
 
 /// The codes of a log.
-pub fn rows(text: &str) -> Result<Vec<Row>, Failure> {
-    let mut lines = text.lines();
+pub fn rows(text: &str) -> Vec<Row> {
     let names = [
         "hall_a_cnt",
         "hall_b_cnt",
@@ -122,33 +147,8 @@ pub fn rows(text: &str) -> Result<Vec<Row>, Failure> {
         "cap2_cnt",
         "cap3_cnt",
     ];
-    let at = columns(lines.next().unwrap_or_default(), names)?;
-    let row = |line: &str| -> Result<Row, Failure> {
-        let cells: Vec<_> = line.split(',').collect();
-        let mut row = [0; 6];
-        for (code, at) in row.iter_mut().zip(at) {
-            *code = cells.get(at).ok_or("a short line")?.parse()?;
-        }
-        Ok(row)
-    };
-    lines.map(row).collect()
-}
-
-fn poses(text: &str) -> Result<Vec<Words>, Failure> {
-    let mut lines = text.lines();
-    let names = ["x_um", "y_um", "rz_urad", "z_um", "rx_urad", "ry_urad"];
-    let at = columns(lines.next().unwrap_or_default(), names)?;
-    let pose = |line: &str| -> Result<Words, Failure> {
-        let cells: Vec<_> = line.split(',').collect();
-        let mut words = [0; 6];
-        for (word, at) in words.iter_mut().zip(at) {
-            let micro: f64 = cells.get(at).ok_or("a short line")?.parse()?;
-            *word = ((micro * 1e-6) as f32).to_bits();
-        }
-        let status = cells.last().ok_or("a short line")?.parse()?;
-        Ok(Words { words, status })
-    };
-    lines.map(pose).collect()
+    let row = |codes: [f64; 6]| codes.map(|code| code as i32);
+    columns(text, names).map(row).collect()
 }
 
 /// One axis of one tick, as it came over the bus.
@@ -166,6 +166,22 @@ pub struct Axis {
     pub status: u32,
 }
 
+impl Axis {
+    /// Whether it is called valid.
+    pub fn is_valid(&self) -> bool {
+        let invalid = match self.axis {
+            0..3 => Status::PLANAR_INVALID,
+            _ => Status::VERTICAL_INVALID,
+        };
+        self.status & invalid.bits() == 0
+    }
+
+    /// Whether it is of these words.
+    pub fn is_of(&self, words: &Words) -> bool {
+        (self.word, self.status) == (words.words[self.axis], words.status)
+    }
+}
+
 /// What was on the bus, by kind, each with its tick.
 #[derive(Default)]
 pub struct Seen {
@@ -174,7 +190,7 @@ pub struct Seen {
     /// States.
     pub statuses: Vec<(u64, NodeStatus)>,
     /// Answers.
-    pub answers: Vec<(u64, Answer)>,
+    pub answers: Vec<Answer>,
     /// Counters.
     pub health: Vec<HealthPage>,
     /// Text of the identity pages.
@@ -183,8 +199,10 @@ pub struct Seen {
     pub times: Vec<(u32, u32)>,
     /// Temperatures of mount and body, m degC, each from its tick on.
     pub temperatures: Vec<(u64, [i32; 2])>,
-    /// Frames of codes and temperatures, and when they were sent completely, ns.
-    pub codes: Vec<(u64, BusFrame)>,
+    /// Sound frames, and when they were sent completely, ns.
+    pub frames: Vec<(u64, BusFrame)>,
+    /// How many of them have codes.
+    pub recorded: usize,
     /// Frames whose check fails or that are none of the protocol's.
     pub damaged: usize,
 }
@@ -209,6 +227,12 @@ impl Seen {
         seen
     }
 
+    /// Runs so many ticks, and takes what was sent since the last look.
+    pub fn after(machine: &mut Machine, ticks: u64) -> Self {
+        machine.run_ticks(ticks);
+        Self::since_last(machine)
+    }
+
     /// Takes one frame.
     pub fn take(&mut self, sent: &Sent, first_ns: u64) {
         let since_ns = sent.asked_ns.saturating_sub(first_ns);
@@ -220,12 +244,14 @@ impl Seen {
             self.damaged += 1;
             return;
         };
+        let frame = BusFrame::new(message.id(), &sent.bytes);
+        self.frames.extend(frame.map(|frame| (sent.done_ns, frame)));
         match message {
             Message::NodeStatus => self
                 .statuses
                 .push((tick, NodeStatus::from_payload(payload))),
             Message::Health => self.health.push(HealthPage::from_payload(payload)),
-            Message::Answer => self.answers.push((tick, Answer::from_payload(payload))),
+            Message::Answer => self.answers.push(Answer::from_payload(payload)),
             Message::Identity => {
                 self.identity
                     .extend(IdentityPage::from_payload(payload).text);
@@ -242,17 +268,8 @@ impl Seen {
                     },
                 );
                 self.temperatures.push((tick, [mount, body]));
-                let frame = BusFrame::new(message.id(), &sent.bytes);
-                self.codes.extend(frame.map(|frame| (sent.done_ns, frame)));
             }
-            Message::Hall
-            | Message::Capacitive
-            | Message::HallAb24
-            | Message::HallCCapacitive1At24
-            | Message::Capacitive23At24 => {
-                let frame = BusFrame::new(message.id(), &sent.bytes);
-                self.codes.extend(frame.map(|frame| (sent.done_ns, frame)));
-            }
+            _ if Layout::carrying(message).is_some() => self.recorded += 1,
             _ => match AXES.iter().position(|axis| *axis == message) {
                 Some(axis) => self.axes.push(Axis {
                     tick,
@@ -266,11 +283,6 @@ impl Seen {
         }
     }
 
-    /// Frames of codes: those of temperatures come unasked.
-    pub fn recorded(&self) -> usize {
-        self.codes.len() - self.temperatures.len()
-    }
-
     /// The last state and its reason.
     pub fn last_state(&self) -> Option<(NodeState, u8)> {
         let status = self.last_status()?;
@@ -282,9 +294,28 @@ impl Seen {
         self.last_status().map_or(0, |status| status.flags)
     }
 
-    /// The last number of missed ticks.
-    pub fn missed_ticks(&self) -> Option<u16> {
-        self.last_status().map(|status| status.missed_ticks)
+    /// The tick of the first state with all the flags.
+    pub fn first_state(&self, flags: u8) -> Option<u64> {
+        let mut states = self.statuses.iter();
+        let first = states.find(|(_, status)| status.flags & flags == flags);
+        first.map(|(tick, _)| *tick)
+    }
+
+    /// The last value of a page of health.
+    pub fn page(&self, number: u8) -> Option<u32> {
+        let last = self.health.iter().rev().find(|page| page.page == number);
+        last.map(|page| page.value)
+    }
+
+    /// The words of X.
+    pub fn x(&self) -> impl Iterator<Item = &Axis> {
+        self.axes.iter().filter(|axis| axis.axis == 0)
+    }
+
+    /// How the requests with this token were answered.
+    pub fn ended(&self, token: u8) -> Vec<Option<Outcome>> {
+        let own = self.answers.iter().filter(|answer| answer.token == token);
+        own.map(|answer| answer.outcome).collect()
     }
 
     /// The last status on the bus.
@@ -311,8 +342,7 @@ impl Comparison {
             let want = poses[axis.tick as usize % poses.len()];
             self.words += 1;
             self.planar += u64::from(axis.axis == 0);
-            let same = want.words[axis.axis] == axis.word && want.status == axis.status;
-            self.differing += u64::from(!same);
+            self.differing += u64::from(!axis.is_of(&want));
         }
     }
 }

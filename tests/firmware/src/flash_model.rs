@@ -1,16 +1,16 @@
-//! Flash of the STM32F405 where the program writes it: sectors 1 and 2, from RM0090 section 3.
-//! FLASH_CR opens by two keys; a word is programmed by letting bits fall, and only the erase of
-//! a sector raises them. While the flash is busy the core stands, because the program lies in
-//! it. A power cut in an operation leaves random bits between what was and what was to be.
+//! Flash of the STM32F405 where the program writes it: the registers of RM0090 section 3 before
+//! sectors 1 and 2, which are those of [`tests::flash_model`]. FLASH_CR opens by two keys. While the
+//! flash is busy the core stands, because the program lies in it.
 
-use ::tests::flash_model::{Cut, Words};
+use ::tests::flash_model::{Cut, FlashModel as Sectors};
+use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use std::collections::VecDeque;
 
 /// Start of sector 1.
 pub const FIRST: u32 = 0x0800_4000;
 /// Bytes of both sectors.
-pub const BYTES: usize = 2 * SECTOR;
-const SECTOR: usize = 16 << 10;
+pub const BYTES: usize = 2 * SECTOR as usize;
+const SECTOR: u32 = 16 << 10;
 
 /// The longest times with words of 32 bits (DS8626, flash memory programming).
 const WORD_NS: u64 = 100_000;
@@ -37,38 +37,21 @@ const BUSY: u32 = 1 << 16;
 #[derive(Clone, Copy, Debug)]
 pub struct PowerCut {
     /// In which operation, counted from 0: from now on, or since the cut before.
-    pub at: u64,
+    pub at: usize,
     /// Where in it.
     pub place: Cut,
     /// The course of chance.
-    pub seed: u32,
-}
-
-/// What an operation that fails tells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Failing {
-    /// An error in FLASH_SR.
-    Reported,
-    /// Nothing.
-    Silent,
+    pub seed: u64,
 }
 
 /// The two sectors and the registers.
 pub struct FlashModel {
-    /// What the sectors hold.
-    pub bytes: Vec<u8>,
-    /// Operations so far: words programmed and sectors erased.
-    pub operations: u64,
+    /// What the sectors hold, and what goes wrong with them.
+    pub sectors: Sectors,
     /// Sectors erased.
     pub erases: u64,
-    /// Where the power fails.
+    /// Where the power fails after the next loss of it.
     cuts: VecDeque<PowerCut>,
-    /// Operations before those that the next of them counts.
-    counted: u64,
-    /// Whether it has failed.
-    pub power_lost: bool,
-    /// From which operation on nothing changes any more, and how the program can know.
-    pub fails: Option<(u64, Failing)>,
     control: u32,
     status: u32,
     keys: usize,
@@ -81,13 +64,9 @@ impl FlashModel {
     /// Erased sectors.
     pub fn new() -> Self {
         Self {
-            bytes: vec![0xff; BYTES],
-            operations: 0,
+            sectors: Sectors::erased(),
             erases: 0,
             cuts: VecDeque::new(),
-            counted: 0,
-            power_lost: false,
-            fails: None,
             control: LOCK,
             status: 0,
             keys: 0,
@@ -99,7 +78,20 @@ impl FlashModel {
     /// Cuts the power, one time after the other.
     pub fn cut_at(&mut self, cuts: &[PowerCut]) {
         self.cuts = cuts.iter().copied().collect();
-        self.counted = self.operations;
+        self.next_cut();
+    }
+
+    fn next_cut(&mut self) {
+        if let Some(PowerCut { at, place, seed }) = self.cuts.pop_front() {
+            self.sectors.seed(seed);
+            self.sectors.cut_at(at, place);
+        }
+    }
+
+    /// The power comes back.
+    pub fn power_on(&mut self) {
+        self.sectors.power_on();
+        self.next_cut();
     }
 
     /// The registers as after a reset.
@@ -141,74 +133,39 @@ impl FlashModel {
     }
 
     /// Reads so many bytes, lowest first.
-    pub fn read(&self, offset: usize, bytes: usize) -> u64 {
-        let read = self.bytes.get(offset..offset + bytes).unwrap_or_default();
-        read.iter()
-            .rev()
-            .fold(0, |word, byte| word << 8 | u64::from(*byte))
+    pub fn read(&mut self, offset: usize, bytes: usize) -> u64 {
+        let mut read = [0; 8];
+        let done = self.sectors.read(offset as u32, &mut read[..bytes]);
+        done.map_or(0, |()| u64::from_le_bytes(read))
     }
 
     /// A write of the core to a sector.
     pub fn write(&mut self, offset: usize, bytes: usize, value: u32, now_ns: u64) {
-        let state = self.control & (LOCK | PG | 0b11 << 8);
-        if state != PG | WORDS || bytes != 4 || !offset.is_multiple_of(4) {
-            self.status |= if state & PG == 0 {
-                SEQUENCE
-            } else {
-                PARALLELISM
-            };
-            return;
-        }
-        let wanted = |old: u8, k: usize| old & (value >> (8 * (k % 4))) as u8;
-        self.operate(offset, 4, wanted);
+        self.status |= match self.control & (LOCK | PG | 0b11 << 8) {
+            state if state & PG == 0 => SEQUENCE,
+            state if state != PG | WORDS || bytes != 4 => PARALLELISM,
+            _ => match self.sectors.write(offset as u32, &value.to_le_bytes()) {
+                Ok(()) => 0,
+                Err(_) => PROTECTED,
+            },
+        };
         self.busy_until_ns = now_ns + WORD_NS;
     }
 
     fn erase(&mut self, sector: u32, now_ns: u64) {
+        let from = sector.wrapping_sub(1).wrapping_mul(SECTOR);
         // Of the other sectors none is the program's to erase.
-        if !matches!(sector, 1 | 2) || self.control & (0b11 << 8) != WORDS {
+        let is_own = matches!(sector, 1 | 2) && self.control & (0b11 << 8) == WORDS;
+        if !is_own || self.sectors.erase(from, from + SECTOR).is_err() {
             self.status |= PROTECTED;
-            return;
         }
-        self.operate((sector as usize - 1) * SECTOR, SECTOR, |_, _| 0xff);
-        self.erases += 1;
+        self.erases += u64::from(is_own);
         self.busy_until_ns = now_ns + ERASE_NS;
-    }
-
-    fn operate(&mut self, offset: usize, bytes: usize, wanted: impl Fn(u8, usize) -> u8) {
-        let number = self.operations;
-        self.operations += 1;
-        if let Some((from, failing)) = self.fails
-            && number >= from
-        {
-            self.status |= if failing == Failing::Reported {
-                PROTECTED
-            } else {
-                0
-            };
-            return;
-        }
-        let counted = number - self.counted;
-        let cut = self.cuts.pop_front_if(|cut| cut.at == counted);
-        if cut.is_some() {
-            self.power_lost = true;
-            self.counted = self.operations;
-        }
-        let mut chance = Words(cut.map_or(0, |cut| cut.seed.into()));
-        for k in offset..offset + bytes {
-            let (old, new) = (self.bytes[k], wanted(self.bytes[k], k - offset));
-            let done = match cut.map(|cut| cut.place) {
-                Some(Cut::Before) => 0,
-                Some(Cut::Inside) => chance.draw() as u8,
-                Some(Cut::After) | None => 0xff,
-            };
-            self.bytes[k] = old & !done | new & done;
-        }
     }
 }
 
 #[cfg(test)]
-mod tests {
+mod of_registers {
     use super::*;
 
     const WORD: u32 = WORDS | PG;
@@ -247,22 +204,5 @@ mod tests {
         assert_eq!(flash.read(8, 4), 0xffff_ffff);
         assert_eq!(flash.read_register(SR, &mut now_ns), 0);
         assert_eq!(now_ns, WORD_NS + ERASE_NS);
-    }
-
-    #[test]
-    fn a_cut_leaves_bits_between() {
-        let mut between = 0;
-        for seed in 1..64 {
-            let mut flash = FlashModel::new();
-            open(&mut flash);
-            flash.write_register(CR, WORD, 0);
-            let (at, place) = (0, Cut::Inside);
-            flash.cut_at(&[PowerCut { at, place, seed }]);
-            flash.write(0, 4, 0xffff_0000, 0);
-            assert!(flash.power_lost);
-            assert_eq!(flash.read(2, 2), 0xffff);
-            between += u32::from(!matches!(flash.read(0, 2), 0 | 0xffff));
-        }
-        assert!(between > 50, "{between}");
     }
 }

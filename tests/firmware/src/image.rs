@@ -29,33 +29,31 @@ pub struct Image {
 
 impl Image {
     /// Reads an ELF file.
-    pub fn read(path: &Path) -> Result<Self, Box<dyn std::error::Error>> {
-        let bytes = std::fs::read(path)?;
-        let elf = object::elf::FileHeader32::<object::Endianness>::parse(&*bytes)?;
-        let endian = elf.endian()?;
+    ///
+    /// # Panics
+    /// If it is no program for this chip.
+    pub fn read(path: &Path) -> Self {
+        let bytes = std::fs::read(path).expect("an image");
+        let elf =
+            object::elf::FileHeader32::<object::Endianness>::parse(&*bytes).expect("an ELF file");
+        let endian = elf.endian().expect("an ELF file");
         let mut flash = vec![0xff; FLASH_BYTES];
         let (mut text_bytes, mut static_end) = (0, RAM);
-        for segment in elf.program_headers(endian, &*bytes)? {
+        for segment in elf.program_headers(endian, &*bytes).expect("segments") {
             if segment.p_type(endian) != object::elf::PT_LOAD {
                 continue;
             }
-            let data = segment
-                .data(endian, &*bytes)
-                .map_err(|()| "segment out of the file")?;
+            let data = segment.data(endian, &*bytes).expect("its bytes");
             let (load, run) = (segment.p_paddr(endian), segment.p_vaddr(endian));
             if !data.is_empty() {
-                let at = load.checked_sub(FLASH).ok_or("segment below flash")? as usize;
-                flash
-                    .get_mut(at..at + data.len())
-                    .ok_or("segment beyond flash")?
-                    .copy_from_slice(data);
+                flash[(load - FLASH) as usize..][..data.len()].copy_from_slice(data);
                 text_bytes += data.len();
             }
             if run >= RAM {
                 static_end = static_end.max(run + segment.p_memsz(endian));
             }
         }
-        let file = object::File::parse(&*bytes)?;
+        let file = object::File::parse(&*bytes).expect("an ELF file");
         let symbols = file
             .symbols()
             .filter_map(|s| {
@@ -68,27 +66,25 @@ impl Image {
             static_start = symbol.address() as u32;
         }
         let static_bytes = static_end.saturating_sub(static_start) as usize;
-        Ok(Self {
+        Self {
             flash,
             text_bytes,
             static_bytes,
             stack_bytes: (static_start - RAM) as usize,
             symbols,
-        })
+        }
     }
 
     /// Address of a symbol whose name contains `part`, without the Thumb bit.
-    pub fn address(&self, part: &str) -> Result<u32, String> {
-        Ok(self.range(part)?.start)
+    pub fn address(&self, part: &str) -> u32 {
+        self.range(part).expect(part).start
     }
 
     /// Addresses of a function or static whose name contains `part`, without the Thumb bit.
-    pub fn range(&self, part: &str) -> Result<Range<u32>, String> {
+    pub fn range(&self, part: &str) -> Option<Range<u32>> {
         let exact = self.symbols.iter().find(|(name, _)| name == part);
         let found = exact.or_else(|| self.symbols.iter().find(|(name, _)| name.contains(part)));
-        found
-            .map(|(_, range)| range.clone())
-            .ok_or_else(|| format!("the program has no symbol {part}"))
+        found.map(|(_, range)| range.clone())
     }
 
     /// A word of flash.

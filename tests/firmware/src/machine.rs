@@ -5,17 +5,12 @@ mod exceptions;
 pub use exceptions::{ACCESS_AND_STACKING, Cost};
 
 use crate::adc_model::{Part, Row};
-use crate::callbacks::{
-    BELOW_RAM, FpscrHook, JumpHook, count, jump, read, read_below_ram, read_bit, read_core,
-    read_flash, read_random, set_fpscr, write, write_below_ram, write_bit, write_core, write_flash,
-    write_random,
-};
+use crate::callbacks::{Context, count, inject, read, write};
 use crate::can_model::BusState;
 use crate::flash_model::{BYTES, FIRST};
 use crate::image::{FLASH, FLASH_BYTES, Image, RAM, RAM_BYTES};
 use crate::memory::{Memory, memory};
-use crate::peripherals::{BIT_BAND, CORE, IRQ_TIM2, Peripherals, RANGE, cause};
-use crate::random_model;
+use crate::peripherals::{IRQ_TIM2, Peripherals, WINDOWS, cause};
 use crate::unicorn::{Unicorn, register};
 use std::ffi::{OsStr, c_void};
 
@@ -47,6 +42,8 @@ pub struct Machine {
     _returns: Box<Memory<4096>>,
     vectors: [u32; 48],
     waits_at: u32,
+    /// Address of the static that a debugger reads.
+    pub stage_at: u32,
     /// Bytes of RAM below the statics, where the stack lies.
     stack_bytes: usize,
     asleep: bool,
@@ -64,6 +61,8 @@ pub struct Machine {
     pub watchdog_resets: u32,
     /// What each interrupt of the timer took, where instructions are counted.
     pub costs: Vec<Cost>,
+    /// What the emulator's callbacks are given.
+    contexts: Vec<Box<Context>>,
 }
 
 impl Machine {
@@ -74,51 +73,46 @@ impl Machine {
         part: Part,
         rows: Vec<Row>,
         slots: [&[u8]; 2],
-    ) -> Result<Self, Box<dyn std::error::Error>> {
-        let core = Unicorn::open(library)?;
+    ) -> Self {
+        let core = Unicorn::open(library);
         let mut flash = memory::<FLASH_BYTES>(0xff);
         flash.0.copy_from_slice(&image.flash);
         let mut returns = memory::<4096>(0);
         let mut chip = Box::new(Peripherals::new(part, rows));
         chip.ram.0[..image.stack_bytes].fill(PAINT);
         fill_with_noise(&mut chip.ram.0[image.stack_bytes..]);
-        for (slot, name) in slots
-            .into_iter()
-            .zip(["_parameter_slot_0", "_parameter_slot_1"])
-        {
-            let at = (image.address(name)? - FIRST) as usize;
-            chip.flash.bytes[at..at + slot.len()].copy_from_slice(slot);
+        for (slot, contents) in (0..).zip(slots) {
+            chip.flash.sectors.load(slot, contents);
         }
         let (before, behind) = ((FIRST - FLASH) as usize, (FIRST - FLASH) as usize + BYTES);
-        let user: *mut c_void = (&raw mut *chip).cast();
         // SAFETY: flash and chip are boxes that the machine keeps as long as the core, and that are
         // touched only between two runs of it or by its callbacks.
         unsafe {
             let memory = flash.0.as_mut_ptr();
-            core.map_memory(FLASH.into(), memory, before)?;
+            core.map_memory(FLASH.into(), memory, before);
             let (from, rest) = (u64::from(FLASH) + behind as u64, FLASH_BYTES - behind);
-            core.map_memory(from, memory.add(behind), rest)?;
-            core.map_io((FIRST.into(), BYTES as u64), read_flash, write_flash, user)?;
-            core.map_memory(RAM.into(), chip.ram.0.as_mut_ptr(), RAM_BYTES)?;
-            core.map_memory(RETURN.into(), returns.0.as_mut_ptr(), 4096)?;
-            core.map_io(RANGE, read, write, user)?;
-            core.map_io(BIT_BAND, read_bit, write_bit, user)?;
-            core.map_io(CORE, read_core, write_core, user)?;
-            core.map_io(random_model::PAGE, read_random, write_random, user)?;
-            core.map_io(BELOW_RAM, read_below_ram, write_below_ram, user)?;
+            core.map_memory(from, memory.add(behind), rest);
+            core.map_memory(RAM.into(), chip.ram.0.as_mut_ptr(), RAM_BYTES);
+            core.map_memory(RETURN.into(), returns.0.as_mut_ptr(), 4096);
         }
-        chip.stop_run = Some(core.stopper());
+        let mut contexts = Vec::new();
+        for window in WINDOWS {
+            let context = context(&mut contexts, &core, &mut chip, window.0);
+            // SAFETY: the context is a box that is kept, too.
+            unsafe { core.map_io(window, read, write, context) };
+        }
         let mut vectors = [0; 48];
         for (k, vector) in vectors.iter_mut().enumerate() {
             *vector = image.word(FLASH + 4 * k as u32);
         }
-        Ok(Self {
+        Self {
             core,
             chip,
             flash,
             _returns: returns,
             vectors,
-            waits_at: waits_at(image)?,
+            waits_at: waits_at(image),
+            stage_at: image.address("STAGE"),
             stack_bytes: image.stack_bytes,
             asleep: false,
             started: false,
@@ -128,27 +122,24 @@ impl Machine {
             lazy_left: false,
             watchdog_resets: 0,
             costs: Vec::new(),
-        })
+            contexts,
+        }
     }
 
     /// Counts instructions from now on. Call it before the first run.
-    pub fn count_instructions(&mut self) -> Result<(), String> {
-        let user: *mut c_void = (&raw mut *self.chip).cast();
+    pub fn count_instructions(&mut self) {
+        let context = context(&mut self.contexts, &self.core, &mut self.chip, 0);
         // SAFETY: as in `new`.
-        unsafe { self.core.hook_code(count, user, (1, 0)) }.map_err(|fault| fault.to_string())
+        unsafe { self.core.hook_code(count, context, (1, 0)) };
     }
 
-    /// Writes `fpscr_to_write`, unless 0, to FPSCR whenever the core comes to `address`. Call
-    /// it before the first run.
-    pub fn hook_fpscr(&mut self, address: u32) -> Result<(), String> {
-        let hook = FpscrHook {
-            chip: &raw const *self.chip,
-            write: self.core.writer(),
-        };
-        let user: *mut c_void = (&raw mut *Box::leak(Box::new(hook))).cast();
+    /// Changes the registers that `chip.inject` says whenever the core comes to `address`. Call it
+    /// before the first run.
+    pub fn hook_injection(&mut self, address: u32) {
+        let context = context(&mut self.contexts, &self.core, &mut self.chip, 0);
         let at = u64::from(address);
-        // SAFETY: as in `new`; the hook is leaked.
-        unsafe { self.core.hook_code(set_fpscr, user, (at, at)) }.map_err(|fault| fault.to_string())
+        // SAFETY: as in `new`.
+        unsafe { self.core.hook_code(inject, context, (at, at)) };
     }
 
     /// Changes FPSCR while the core sleeps, like an interrupt that does not restore it.
@@ -156,21 +147,9 @@ impl Machine {
         self.core.set(register::FPSCR, value);
     }
 
-    /// Changes a register of the core, once `chip.inject` says which, when the core comes to
-    /// `address`. Call it before the first run.
-    pub fn hook_injection(&mut self, address: u32) -> Result<(), String> {
-        let hook = JumpHook {
-            chip: &raw mut *self.chip,
-            write: self.core.writer(),
-        };
-        let user: *mut c_void = (&raw mut *Box::leak(Box::new(hook))).cast();
-        let at = u64::from(address);
-        // SAFETY: as in `new`; the hook is leaked.
-        unsafe { self.core.hook_code(jump, user, (at, at)) }.map_err(|fault| fault.to_string())
-    }
-
     /// Takes the power away and gives it back: RAM holds noise then.
     pub fn power_cycle(&mut self) {
+        self.chip.flash.power_on();
         fill_with_noise(&mut self.chip.ram.0[self.stack_bytes..]);
         self.reset(cause::POWER_ON);
     }
@@ -187,7 +166,7 @@ impl Machine {
 
     /// Resets if the watchdog bit or the program asked for it, and says whether.
     fn reset_if_due(&mut self) -> bool {
-        if std::mem::take(&mut self.chip.flash.power_lost) {
+        if self.chip.flash.sectors.is_off() {
             self.power_cuts += 1;
             self.power_cycle();
         } else if self.chip.watchdog_bites() {
@@ -203,19 +182,19 @@ impl Machine {
     }
 
     /// Runs for so many ns. The start-up after power-on comes on top.
-    pub fn run_ns(&mut self, ns: u64) -> Result<(), String> {
+    pub fn run_ns(&mut self, ns: u64) {
         if !self.started {
             self.started = true;
-            self.boot()?;
+            self.boot();
         }
         let end_ns = self.chip.now_ns + ns;
         loop {
             if self.chip.now_ns <= end_ns && (self.reset_if_due() || !self.asleep) {
-                self.boot()?;
+                self.boot();
                 continue;
             }
             if self.chip.clocks.interrupts() && self.chip.now_ns <= end_ns {
-                self.interrupt(NMI)?;
+                self.interrupt(NMI);
                 continue;
             }
             let stands = self.chip.clocks.stands(self.chip.now_ns);
@@ -227,7 +206,7 @@ impl Machine {
                 if self.chip.stops() {
                     break;
                 }
-                self.interrupt(16 + irq)?;
+                self.interrupt(16 + irq);
                 self.chip.advance();
             }
             if self.chip.stops() && self.chip.now_ns <= end_ns {
@@ -239,7 +218,7 @@ impl Machine {
                 }
                 _ => {
                     self.chip.now_ns = self.chip.now_ns.max(end_ns);
-                    return Ok(());
+                    return;
                 }
             }
             self.chip.advance();
@@ -247,8 +226,8 @@ impl Machine {
     }
 
     /// Runs for so many ticks of 2 ms.
-    pub fn run_ticks(&mut self, ticks: u64) -> Result<(), String> {
-        self.run_ns(ticks * 2_000_000)
+    pub fn run_ticks(&mut self, ticks: u64) {
+        self.run_ns(ticks * 2_000_000);
     }
 
     /// From now on the bus is so.
@@ -257,14 +236,13 @@ impl Machine {
     }
 
     /// From the reset vector until the program sleeps or the chip is reset.
-    fn boot(&mut self) -> Result<(), String> {
+    fn boot(&mut self) {
         if !self.asleep {
             self.core.set(register::SP, self.vectors[0]);
             self.core.set(register::FPSCR, 0);
-            self.go(self.vectors[1], self.waits_at)?;
+            self.go(self.vectors[1], self.waits_at);
             self.asleep = true;
         }
-        Ok(())
     }
 
     /// Flips a bit of RAM.
@@ -272,12 +250,6 @@ impl Machine {
         if let Some(byte) = self.chip.ram.0.get_mut((address - RAM + bit / 8) as usize) {
             *byte ^= 1 << (bit % 8);
         }
-    }
-
-    /// Writes to the parameter sectors, as a debugger does while the core stands.
-    pub fn write_flash(&mut self, address: u32, bytes: &[u8]) {
-        let at = (address - FIRST) as usize;
-        self.chip.flash.bytes[at..at + bytes.len()].copy_from_slice(bytes);
     }
 
     /// A word of RAM.
@@ -302,18 +274,34 @@ impl Machine {
 }
 
 /// The one place where the program sleeps.
-fn waits_at(image: &Image) -> Result<u32, String> {
-    let start = image
-        .address("_stext")
-        .or_else(|_| image.address("__stext"))?;
-    let end = image.address("__etext")?;
+fn waits_at(image: &Image) -> u32 {
+    let start = image.range("_stext").or_else(|| image.range("__stext"));
+    let start = start.expect("its instructions").start;
+    let end = image.address("__etext");
     let code = &image.flash[(start - FLASH) as usize..(end - FLASH) as usize];
-    let found: Vec<_> = (0u32..)
-        .zip(code.as_chunks::<2>().0)
-        .filter(|(_, b)| u16::from_le_bytes(**b) == WFI)
+    let halves = (0u32..).zip(code.as_chunks::<2>().0);
+    let found: Vec<_> = halves
+        .filter(|(_, half)| u16::from_le_bytes(**half) == WFI)
         .collect();
-    match found.as_slice() {
-        [(k, _)] => Ok(start + 2 * k),
-        all => Err(format!("{} places look like WFI, not one", all.len())),
-    }
+    assert_eq!(found.len(), 1, "places that look like WFI");
+    start + 2 * found[0].0
+}
+
+/// A box that a callback is given, and that is kept.
+fn context(
+    kept: &mut Vec<Box<Context>>,
+    core: &Unicorn,
+    chip: &mut Peripherals,
+    start: u64,
+) -> *mut c_void {
+    let (stop, write) = (core.stopper(), core.writer());
+    let mut context = Box::new(Context {
+        chip,
+        start,
+        stop,
+        write,
+    });
+    let user = (&raw mut *context).cast();
+    kept.push(context);
+    user
 }

@@ -5,24 +5,32 @@
 mod registers;
 
 use crate::adc_model::{Adc, Input, Part, Row};
-use crate::callbacks::Injected;
 use crate::can_model::CanModel;
 use crate::clock_model::{Clocks, Pll};
 use crate::dma_model::{Dma, Request, Side};
-use crate::flash_model::FlashModel;
+use crate::flash_model::{BYTES, FIRST, FlashModel};
 use crate::image::RAM_BYTES;
 use crate::memory::{Memory, memory};
 use crate::random_model::RandomModel;
-use crate::unicorn::Stop;
 use crate::watchdog_model::Watchdog;
 use registers::{MPU_CTRL, MPU_RASR, MPU_RBAR, TIM2};
 
-/// Address range of the peripherals: start and bytes.
-pub const RANGE: (u64, u64) = (0x4000_0000, 0x8_0000);
+/// The peripherals: start and bytes.
+const RANGE: (u64, u64) = (0x4000_0000, 0x8_0000);
 /// The same, one word a bit.
-pub const BIT_BAND: (u64, u64) = (0x4200_0000, 0x100_0000);
+const BIT_BAND: (u64, u64) = (0x4200_0000, 0x100_0000);
 /// The core's own peripherals.
-pub const CORE: (u64, u64) = (0xe000_0000, 0x10_0000);
+const CORE: (u64, u64) = (0xe000_0000, 0x10_0000);
+/// The parameter sectors.
+const SECTORS: (u64, u64) = (FIRST as u64, BYTES as u64);
+/// The page of the generator of random numbers, and where in it its registers begin.
+const RANDOM: (u64, u64) = (0x5006_0000, 0x1000);
+const RANDOM_FIRST: u64 = 0x800;
+/// Between the return address of interrupts and RAM: accesses do nothing, unless the memory
+/// protection makes them faults.
+const BELOW_RAM: (u64, u64) = (0x1fff_1000, 0xf000);
+/// All that is no plain memory.
+pub const WINDOWS: [(u64, u64); 6] = [RANGE, BIT_BAND, CORE, SECTORS, RANDOM, BELOW_RAM];
 
 /// Numbers of the interrupts.
 pub const IRQ_CAN1_TX: u32 = 19;
@@ -86,7 +94,7 @@ pub struct Peripherals {
     /// The supply is below 2.9 V until this time, ns, and from this operation of the flash on.
     pub supply_low_until_ns: u64,
     /// See above.
-    pub supply_drops_at: Option<u64>,
+    pub supply_drops_at: Option<usize>,
     /// Whether chip select and the control pin have pull-ups on the board.
     pub pulled_up: [bool; 2],
     /// Whether nothing drives the service pin low: the servo is on, or the line is open.
@@ -95,10 +103,10 @@ pub struct Peripherals {
     pub memory_fault: bool,
     /// Whether the program has asked for a reset.
     pub reset_asked: bool,
-    /// What a hook changes once.
-    pub inject: Vec<Injected>,
-    /// Ends a run of the core.
-    pub stop_run: Option<Stop>,
+    /// Registers of the core that the hook changes to these values,
+    pub inject: Vec<(i32, u32)>,
+    /// once or each time.
+    pub injects_again: bool,
     /// Instructions executed, where they are counted.
     pub instructions: u64,
     /// Those of them whose time has passed.
@@ -107,8 +115,6 @@ pub struct Peripherals {
     pub instructions_at_mailbox: u64,
     /// Whether the LED is on.
     pub led: bool,
-    /// Value written to FPSCR by a hook, and whether it is armed.
-    pub fpscr_to_write: u32,
     words: Vec<u32>,
     core_words: Vec<u32>,
     reset_flags: u32,
@@ -154,12 +160,11 @@ impl Peripherals {
             memory_fault: false,
             reset_asked: false,
             inject: Vec::new(),
-            stop_run: None,
+            injects_again: false,
             instructions: 0,
             instructions_timed: 0,
             instructions_at_mailbox: 0,
             led: false,
-            fpscr_to_write: 0,
             words: Vec::new(),
             core_words: Vec::new(),
             reset_flags: 0,
@@ -207,7 +212,7 @@ impl Peripherals {
     fn is_supply_low(&self) -> bool {
         let drops = self
             .supply_drops_at
-            .is_some_and(|at| self.flash.operations >= at);
+            .is_some_and(|at| self.flash.sectors.operations >= at);
         drops || self.now_ns < self.supply_low_until_ns
     }
 
@@ -275,7 +280,15 @@ impl Peripherals {
 
     /// Whether the chip is reset, and the program executes nothing more.
     pub fn stops(&self) -> bool {
-        self.reset_asked || self.flash.power_lost || self.watchdog_bites()
+        self.reset_asked || self.flash.sectors.is_off() || self.watchdog_bites()
+    }
+
+    /// What the hook changes now.
+    pub fn injected(&mut self) -> Vec<(i32, u32)> {
+        match self.injects_again {
+            true => self.inject.clone(),
+            false => std::mem::take(&mut self.inject),
+        }
     }
 
     /// Whether a tick's alarm (the first one) is what is pending.

@@ -4,11 +4,6 @@
 const READY: u32 = 1;
 const SEED: u32 = 1 << 6 | 1 << 2;
 
-/// Where its registers are: start and bytes of their page, and the first of them.
-pub const PAGE: (u64, u64) = (0x5006_0000, 0x1000);
-/// See [`PAGE`].
-pub const FIRST: usize = 0x800;
-
 /// The generator.
 pub struct RandomModel {
     /// Whether it is switched on.

@@ -4,14 +4,17 @@
 
 use crate::adc_model::{Input, Part};
 use crate::bench::{Bench, Seen, rows};
+use crate::checks::no_resets;
 use crate::checks::update::{KEY, talk};
-use crate::checks::{Failure, Outcome, expect, no_resets};
 use crate::machine::Machine;
+use embedded_can::{Frame, StandardId};
+use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::Request;
+use hal_adapters::candump::LogLine;
 use host_fit::input::dataset::{Dataset, Row};
 use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::stage::Stage;
-use runtime::{ParameterSet, Status};
+use runtime::ParameterSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -32,56 +35,52 @@ const LAG_US_MAX: f64 = 20.0;
 
 /// A controller whose stage moves as the codes say. Row 0 is there in the middle of the first
 /// sample, so that samples see rows with all of their noise, not means of two rows.
-fn moving(
-    bench: &Bench,
-    part: Part,
-    slots: [&[u8]; 2],
-    log: &str,
-) -> Result<(Machine, u64), Failure> {
-    let codes = rows(log)?;
+fn moving(bench: &Bench, part: Part, slots: [&[u8]; 2], log: &str) -> (Machine, u64) {
+    let codes = rows(log);
     let ticks = codes.len() as u64;
-    let mut machine = bench.machine_playing(part, slots, Vec::new())?;
+    let mut machine = bench.machine_playing(part, slots, Vec::new());
     let middle_us = match part {
         Part::Ads131m08 => 150,
         Part::Ads8688 => 12,
     };
     machine.chip.adc.input = Input::moving(codes, PERIOD_US, middle_us);
-    Ok((machine, ticks))
+    (machine, ticks)
 }
 
 /// Plays `log` to a controller without parameters in record mode; writes what was on the bus as
 /// `candump -L` does, and the reference of the log as the interferometers' own file.
-pub fn record(bench: &Bench, part: Part, log: &Path, bus: &Path, reference: &Path) -> Outcome {
-    let text = std::fs::read_to_string(log)?;
-    let (mut machine, ticks) = moving(bench, part, [&[], &[]], &text)?;
+pub fn record(bench: &Bench, part: Part, log: &str, bus: &str, reference: &str) {
+    let text = std::fs::read_to_string(log).expect("the log");
+    let (mut machine, ticks) = moving(bench, part, [&[], &[]], &text);
     // A request before the controller has joined the bus is lost.
-    machine.run_ticks(TICKS_APART)?;
+    machine.run_ticks(TICKS_APART);
     // What was on the bus before the answer is not recorded. The record ends as candump does.
     let (key, request) = (Some(&KEY), Request::Record { on: true });
-    talk(&mut machine, |talk| talk.exchange_tagged(key, request))?.0?;
-    machine.run_ticks(ticks - TICKS_APART)?;
+    let (asked, _) = talk(&mut machine, |talk| talk.exchange_tagged(key, request));
+    asked.expect("an answer");
+    machine.run_ticks(ticks - TICKS_APART);
     let mut lines = String::new();
     for (k, sent) in machine.chip.can.sent.iter().enumerate() {
         // The computer looks at its clock up to 0.15 ms after the end of a frame.
         let us = sent.done_ns / 1000 + k as u64 * 7919 % 150;
-        let (s, us) = (BUS_CLOCK_S + us / 1_000_000, us % 1_000_000);
-        let _ = write!(lines, "({s}.{us:06}) can0 {:03X}#", sent.id);
-        for byte in sent.bytes {
-            let _ = write!(lines, "{byte:02X}");
-        }
-        lines.push('\n');
+        let id = StandardId::new(sent.id).expect("of the table");
+        let line = LogLine {
+            time_us: BUS_CLOCK_S * 1_000_000 + us,
+            interface: "can0",
+            frame: BusFrame::new(id, &sent.bytes).expect("eight bytes"),
+        };
+        let _ = writeln!(lines, "{line}");
     }
-    std::fs::write(bus, lines)?;
-    std::fs::write(reference, reference_of(&text)?)?;
-    Ok(())
+    std::fs::write(bus, lines).expect("the record");
+    std::fs::write(reference, reference_of(&text)).expect("the reference");
 }
 
 /// The columns of a log that are no codes, with a clock of their own.
-fn reference_of(log: &str) -> Result<String, String> {
+fn reference_of(log: &str) -> String {
     let mut lines = log.lines();
     let header: Vec<_> = lines.next().unwrap_or_default().split(',').collect();
     let time = header.iter().position(|name| *name == "t_us");
-    let time = time.ok_or("no column t_us")?;
+    let time = time.expect("no column t_us");
     let is_kept = |k: &usize| !header[*k].ends_with("_cnt");
     let kept: Vec<_> = (0..header.len()).filter(is_kept).collect();
     let mut out = String::new();
@@ -95,30 +94,28 @@ fn reference_of(log: &str) -> Result<String, String> {
         cells[time] = &clock;
         write(kept.iter().map(|&k| cells[k]).collect());
     }
-    Ok(out)
+    out
 }
 
 /// Runs a controller whose second slot holds `blob` while the stage moves as `log` says, and
 /// compares the poses on its bus, at the times that it tells, with the reference of the log. Their
 /// errors must be those that `direct` tells, the blob that was fitted to the log itself.
-pub fn judge(
-    bench: &Bench,
-    (part, name): (Part, &str),
-    (log, stage): (&Path, &Path),
-    (blob, direct): (&Path, &Path),
-) -> Outcome {
-    let stage = Stage::from_file(stage)?;
-    let dataset = log::read(&[log], &stage, &ReadOptions::default())?.dataset;
-    let blob = std::fs::read(blob)?;
-    let of_fit = ParameterSet::from_bytes(&std::fs::read(direct)?)?.fit.rms;
-    let text = std::fs::read_to_string(log)?;
-    let (mut machine, ticks) = moving(bench, part, [&[], &blob], &text)?;
-    machine.run_ticks(ticks - 1)?;
-    no_resets(&machine)?;
+pub fn judge(bench: &Bench, part: Part, (log, stage): (&str, &str), (blob, direct): (&str, &str)) {
+    let name = part.name();
+    let stage = Stage::from_file(Path::new(stage)).expect("the stage");
+    let dataset = log::read(&[Path::new(log)], &stage, &ReadOptions::default());
+    let dataset = dataset.expect("the log").dataset;
+    let blob = std::fs::read(blob).expect("the blob");
+    let direct = std::fs::read(direct).expect("that of the log itself");
+    let of_fit = ParameterSet::from_bytes(&direct).expect("sound").fit.rms;
+    let text = std::fs::read_to_string(log).expect("the log");
+    let (mut machine, ticks) = moving(bench, part, [&[], &blob], &text);
+    machine.run_ticks(ticks - 1);
+    no_resets(&machine);
 
-    let errors = errors(&mut machine, &dataset)?;
+    let errors = errors(&mut machine, &dataset);
     let enough = errors.len() as u64 + 2 * TICKS_APART > ticks;
-    expect(enough, || format!("only {} poses", errors.len()))?;
+    assert!(enough, "only {} poses", errors.len());
     let (sums, weights) = errors.iter().fold((0.0, 0.0), |(sum, weight), error| {
         let [ex, ey, _] = error.less_zero;
         let [vx, vy, _] = error.speed;
@@ -132,13 +129,9 @@ pub fn judge(
         let of_fit = f64::from(of_fit[axis]) * 1e6;
         println!("RESULT rehearsal_{name}_rms_{unit}={rms:.4}");
         println!("RESULT rehearsal_{name}_rms_of_fit_{unit}={of_fit:.4}");
-        expect(rms <= RATIO_MAX * of_fit, || {
-            format!("rms in {unit} is {rms:.4}, and {of_fit:.4} where the log itself is fitted")
-        })?;
+        assert!(rms <= RATIO_MAX * of_fit);
     }
-    expect(lag_us.abs() <= LAG_US_MAX, || {
-        format!("the poses lag by {lag_us:.1} us")
-    })
+    assert!(lag_us.abs() <= LAG_US_MAX);
 }
 
 /// A pose on the bus beside the reference at its time: X, Y, Rz in m, m, rad, and per s.
@@ -149,22 +142,19 @@ struct PoseError {
 }
 
 /// What the poses on the bus are off, less the mean of each movement: zero deviations.
-fn errors(machine: &mut Machine, dataset: &Dataset) -> Result<Vec<PoseError>, Failure> {
+fn errors(machine: &mut Machine, dataset: &Dataset) -> Vec<PoseError> {
     let seen = Seen::since_last(machine);
     let start_us = machine
         .chip
         .motion_start_us()
-        .ok_or("the stage did not move")?;
+        .expect("the stage did not move");
     let mut errors = Vec::new();
     for of_tick in seen.axes.chunk_by(|a, b| a.tick == b.tick) {
-        let invalid = of_tick
-            .iter()
-            .any(|a| a.status & Status::PLANAR_INVALID.bits() != 0);
         let mut pose = [None; 3];
-        for axis in of_tick.iter().filter(|a| a.axis < 3) {
+        for axis in of_tick.iter().filter(|a| a.axis < 3 && a.is_valid()) {
             pose[axis.axis] = Some(f64::from(f32::from_bits(axis.word)));
         }
-        let ([Some(x), Some(y), Some(rz)], false) = (pose, invalid) else {
+        let [Some(x), Some(y), Some(rz)] = pose else {
             continue;
         };
         let tick = of_tick[0].tick;
@@ -194,7 +184,7 @@ fn errors(machine: &mut Machine, dataset: &Dataset) -> Result<Vec<PoseError>, Fa
                 .for_each(|e| e.less_zero[axis] -= mean);
         }
     }
-    Ok(errors)
+    errors
 }
 
 /// Movement, reference and its speed so many us after row 0; `None` outside of the movements.

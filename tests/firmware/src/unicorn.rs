@@ -84,57 +84,46 @@ pub struct Unicorn {
     _library: Library,
 }
 
-/// An error of the emulator, by its number.
-#[derive(Debug)]
-pub struct Fault {
-    /// What was tried.
-    pub what: &'static str,
-    /// The library's number.
-    pub number: c_int,
+/// What cannot fail on a sound installation.
+fn check(what: &str, number: c_int) {
+    assert_eq!(number, 0, "the emulator: {what}");
 }
 
-impl core::fmt::Display for Fault {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "the emulator: {}: error {}", self.what, self.number)
-    }
-}
-
-impl std::error::Error for Fault {}
-
-fn check(what: &'static str, number: c_int) -> Result<(), Fault> {
-    if number == 0 {
-        Ok(())
-    } else {
-        Err(Fault { what, number })
-    }
+/// A function of the library.
+///
+/// # Safety
+/// It must have the type.
+unsafe fn function<F: Copy>(library: &Library, name: &[u8]) -> F {
+    // SAFETY: as the caller promises.
+    *unsafe { library.get(name) }.expect("a function of Unicorn 2.1")
 }
 
 impl Unicorn {
     /// A Cortex-M4 with FPU, from the library at `path`.
-    pub fn open(path: &OsStr) -> Result<Self, Box<dyn std::error::Error>> {
+    pub fn open(path: &OsStr) -> Self {
         // SAFETY: the library and its functions are those of Unicorn 2.1, whose declarations
         // in `unicorn.h` the types above repeat.
         unsafe {
-            let library = Library::new(path)?;
-            let open: Open = *library.get(b"uc_open")?;
-            let ctl: Ctl = *library.get(b"uc_ctl")?;
+            let library = Library::new(path).expect("the emulator's library");
+            let open: Open = function(&library, b"uc_open");
+            let ctl: Ctl = function(&library, b"uc_ctl");
             let mut handle = std::ptr::null_mut();
             let ok = open(ARCH_ARM, MODE_THUMB_MCLASS, &mut handle);
-            check("open", ok)?;
+            check("open", ok);
             let ok = ctl(handle, CTL_WRITE_CPU_MODEL, CORTEX_M4);
-            check("model", ok)?;
-            Ok(Self {
+            check("model", ok);
+            Self {
                 handle,
-                close: *library.get(b"uc_close")?,
-                read: *library.get(b"uc_reg_read")?,
-                write: *library.get(b"uc_reg_write")?,
-                map_pointer: *library.get(b"uc_mem_map_ptr")?,
-                map_io: *library.get(b"uc_mmio_map")?,
-                start: *library.get(b"uc_emu_start")?,
-                stop: *library.get(b"uc_emu_stop")?,
-                hook_add: *library.get(b"uc_hook_add")?,
+                close: function(&library, b"uc_close"),
+                read: function(&library, b"uc_reg_read"),
+                write: function(&library, b"uc_reg_write"),
+                map_pointer: function(&library, b"uc_mem_map_ptr"),
+                map_io: function(&library, b"uc_mmio_map"),
+                start: function(&library, b"uc_emu_start"),
+                stop: function(&library, b"uc_emu_stop"),
+                hook_add: function(&library, b"uc_hook_add"),
                 _library: library,
-            })
+            }
         }
     }
 
@@ -156,17 +145,12 @@ impl Unicorn {
     ///
     /// # Safety
     /// The memory must live as long as the emulator, and be touched only while it stands.
-    pub unsafe fn map_memory(
-        &self,
-        address: u64,
-        memory: *mut u8,
-        bytes: usize,
-    ) -> Result<(), Fault> {
+    pub unsafe fn map_memory(&self, address: u64, memory: *mut u8, bytes: usize) {
         // SAFETY: as the caller promises.
         let ok = unsafe {
             (self.map_pointer)(self.handle, address, bytes as u64, PROT_ALL, memory.cast())
         };
-        check("map memory", ok)
+        check("map memory", ok);
     }
 
     /// Sends reads and writes of a range to callbacks.
@@ -179,10 +163,10 @@ impl Unicorn {
         read: ReadCallback,
         write: WriteCallback,
         user: *mut c_void,
-    ) -> Result<(), Fault> {
+    ) {
         // SAFETY: as the caller promises.
         let ok = unsafe { (self.map_io)(self.handle, address, bytes, read, user, write, user) };
-        check("map registers", ok)
+        check("map registers", ok);
     }
 
     /// Calls back before instructions from `first` to `last`.
@@ -194,7 +178,7 @@ impl Unicorn {
         callback: CodeCallback,
         user: *mut c_void,
         (first, last): (u64, u64),
-    ) -> Result<(), Fault> {
+    ) {
         let mut hook = 0;
         // SAFETY: as the caller promises.
         let ok = unsafe {
@@ -208,14 +192,16 @@ impl Unicorn {
                 last,
             )
         };
-        check("hook", ok)
+        check("hook", ok);
     }
 
-    /// Runs from `address` until `until`, a halt, or a fault.
-    pub fn run(&self, address: u32, until: u32) -> Result<(), Fault> {
+    /// Runs from `address` until `until`, a halt, or a fault, which has the library's number.
+    pub fn run(&self, address: u32, until: u32) -> Result<(), c_int> {
         // SAFETY: the core is set up; callbacks only touch their own state.
-        let ok = unsafe { (self.start)(self.handle, u64::from(address | 1), until.into(), 0, 0) };
-        check("run", ok)
+        match unsafe { (self.start)(self.handle, u64::from(address | 1), until.into(), 0, 0) } {
+            0 => Ok(()),
+            fault => Err(fault),
+        }
     }
 
     /// Ends a run from within a callback.

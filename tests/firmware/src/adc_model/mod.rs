@@ -44,6 +44,19 @@ pub enum Part {
     Ads8688,
 }
 
+impl Part {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Ads131m08, Self::Ads8688];
+
+    /// Its name, as that of its image.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ads131m08 => "ads131m08",
+            Self::Ads8688 => "ads8688",
+        }
+    }
+}
+
 enum Model {
     Ads131m08(Box<Ads131m08>),
     Ads8688(Ads8688),

@@ -1,10 +1,11 @@
 //! Who may: with a key whoever has it, without one whoever holds the line low.
 
-use super::asking::{ask, ask_alone, ended};
+use super::asking::{ask, ask_alone};
 use super::commands::SERVO_OFF;
-use super::{Outcome, equal};
+use super::no_resets;
+
 use crate::adc_model::Part;
-use crate::bench::{Bench, Seen};
+use crate::bench::Bench;
 use hal_adapters::can::command::{Outcome as Ended, Request};
 use hal_adapters::can::update::UpdateRequest;
 
@@ -22,26 +23,23 @@ const REQUESTS: [Request; 7] = [
 /// Without its tag no such request is obeyed by the controller with a key, whatever the line says;
 /// with it the servo is declared off. The other one obeys while the line is low, and not while it is
 /// high or open.
-pub fn tag_or_line(bench: &Bench) -> Outcome {
+pub fn tag_or_line(bench: &Bench) {
     for (part, refusal) in [
         (Part::Ads131m08, Ended::NotAuthorised),
         (Part::Ads8688, Ended::ServoOn),
     ] {
-        let mut machine = bench.machine(part, [&bench.blob, &[]])?;
+        let mut machine = bench.running(part, 50);
         machine.chip.servo_on = part == Part::Ads8688;
-        machine.run_ticks(50)?;
-        Seen::since_last(&mut machine);
+        machine.run_ticks(1);
         for (token, request) in (1..).zip(REQUESTS) {
-            let seen = ask_alone(&mut machine, request, token, 10)?;
-            let what = format!("answer to {request:?}");
-            equal(&what, ended(&seen, token), vec![Some(refusal)])?;
-            equal("codes", seen.recorded(), 0)?;
+            let seen = ask_alone(&mut machine, request, token, 10);
+            assert_eq!(seen.ended(token), [Some(refusal)], "{request:?}");
+            assert_eq!(seen.recorded, 0);
         }
-        equal("resets", machine.panics + machine.watchdog_resets, 0)?;
+        no_resets(&machine);
         machine.chip.servo_on = false;
-        machine.run_ticks(1)?;
-        let seen = ask(&mut machine, SERVO_OFF, 20, 10)?;
-        equal("answer", ended(&seen, 20), vec![Some(Ended::Done)])?;
+        machine.run_ticks(1);
+        let seen = ask(&mut machine, SERVO_OFF, 20, 10);
+        assert_eq!(seen.ended(20), [Some(Ended::Done)]);
     }
-    Ok(())
 }

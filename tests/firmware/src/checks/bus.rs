@@ -1,8 +1,8 @@
 //! A bus that fails.
 
 use super::log::Stage;
-use super::start::{first_state, row, tick_now};
-use super::{Outcome, equal, expect, no_resets, same_words};
+use super::start::{row, tick_now};
+use super::{no_resets, same_words};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Seen, command};
 use crate::can_model::BusState;
@@ -13,129 +13,112 @@ const PART: Part = Part::Ads131m08;
 const MS: u64 = 1_000_000;
 
 /// The bus goes away and comes back. The ticks go on; old poses are never sent late.
-pub fn goes_and_comes_back(bench: &Bench, bus: BusState) -> Outcome {
-    let mut machine = bench.running(PART, 100)?;
+fn goes_and_comes_back(bench: &Bench, bus: BusState) {
+    let mut machine = bench.running(PART, 100);
     machine.set_bus(bus);
-    machine.run_ticks(500)?;
-    let silent = Seen::since_last(&mut machine);
-    expect(silent.axes.len() <= 6, || {
-        format!("{} words on a dead bus", silent.axes.len())
-    })?;
-    let meanwhile = Stage::read(&machine, bench, PART)?;
-    expect(meanwhile.sequence >= 598, || {
-        format!("only tick {}", meanwhile.sequence)
-    })?;
-    equal(
-        "the last pose in STAGE",
-        meanwhile.pose,
-        bench.poses[meanwhile.sequence as usize].words,
-    )?;
-    expect(meanwhile.frames_dropped > 1000, || {
-        format!("{} dropped", meanwhile.frames_dropped)
-    })?;
+    let silent = Seen::after(&mut machine, 500);
+    assert!(silent.axes.len() <= 6, "words on a dead bus");
+    let meanwhile = Stage::read(&machine);
+    meanwhile.has_the_pose(bench, 598);
+    assert!(meanwhile.count("frames_dropped") > 1000);
 
     machine.set_bus(BusState::Good);
-    machine.run_ticks(500)?;
-    let after = Seen::since_last(&mut machine);
-    same_words(&after.axes, &bench.poses, 0, 498)?;
+    let after = Seen::after(&mut machine, 500);
+    same_words(&after.axes, &bench.poses, 0, 498);
     let first = after.axes.first().map_or(0, |axis| axis.tick);
-    expect(first >= 598, || {
-        format!("a pose of tick {first} was sent late")
-    })?;
-    let status = after.last_status().ok_or("no status frame")?;
+    assert!(first >= 598, "a pose of tick {first} was sent late");
+    let status = after.last_status().expect("no status frame");
     let off = u8::from(bus == BusState::Off);
-    equal("times the bus was off", status.bus_off, off)?;
-    equal(
-        "the flag",
-        status.flags & flag::BUS_WAS_OFF,
-        off * flag::BUS_WAS_OFF,
-    )?;
-    equal("missed ticks", status.missed_ticks, 0)?;
+    assert_eq!(status.bus_off, off);
+    assert_eq!(status.flags & flag::BUS_WAS_OFF, off * flag::BUS_WAS_OFF);
+    assert_eq!(status.missed_ticks, 0);
     no_resets(&machine)
 }
 
+/// A short circuit.
+pub fn off_and_back(bench: &Bench) {
+    goes_and_comes_back(bench, BusState::Off);
+}
+
+/// Nobody acknowledges.
+pub fn no_other_node_for_a_second(bench: &Bench) {
+    goes_and_comes_back(bench, BusState::Alone);
+}
+
 /// A controller that starts alone on the bus runs, and is heard once other nodes are there.
-pub fn alone_from_the_start(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
+pub fn alone_from_the_start(bench: &Bench) {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
     machine.chip.can.set_bus(BusState::Alone, 0);
-    machine.run_ticks(200)?;
-    equal(
-        "words on the bus",
-        Seen::since_last(&mut machine).axes.len(),
-        0,
-    )?;
+    machine.run_ticks(200);
+    assert_eq!(Seen::since_last(&mut machine).axes.len(), 0);
     machine.set_bus(BusState::Good);
-    machine.run_ticks(100)?;
-    let seen = Seen::since_last(&mut machine);
-    same_words(&seen.axes, &bench.poses, 0, 98)?;
+    let seen = Seen::after(&mut machine, 100);
+    same_words(&seen.axes, &bench.poses, 0, 98);
     no_resets(&machine)
 }
 
 /// A bus that is off for 0.3 ms, between two ticks, is counted.
-pub fn off_for_less_than_a_tick(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ns(200 * MS + 7 * MS / 10)?;
+pub fn off_for_less_than_a_tick(bench: &Bench) {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    machine.run_ns(200 * MS + 7 * MS / 10);
     let before = Seen::since_last(&mut machine).last_status();
-    equal(
-        "times the bus was off before",
-        before.map(|s| s.bus_off),
-        Some(0),
-    )?;
+    assert_eq!(before.map(|s| s.bus_off), Some(0));
     let now_ns = machine.chip.now_ns;
     let at = tick_now(&machine);
     machine.chip.can.blip(now_ns, 3 * MS / 10);
-    machine.run_ticks(40)?;
-    let seen = Seen::since_last(&mut machine);
-    let status = seen.last_status().ok_or("no status frame")?;
-    equal("times the bus was off", status.bus_off, 1)?;
-    let reported = first_state(&seen, flag::BUS_WAS_OFF);
+    let seen = Seen::after(&mut machine, 40);
+    let status = seen.last_status().expect("no status frame");
+    assert_eq!(status.bus_off, 1);
+    let reported = seen.first_state(flag::BUS_WAS_OFF);
     row(bench, "bus off for 0.3 ms", at, reported, &seen.axes)
 }
 
 /// A frame that is on the wire when its tick is over is sent once or, if it fails then, not at all,
 /// and no newer one overtakes it.
-pub fn aborted_on_the_wire(bench: &Bench, fails: bool) -> Outcome {
-    let mut machine = bench.running(PART, 100)?;
-    let dropped_before = Stage::read(&machine, bench, PART)?.frames_dropped;
+fn aborted_on_the_wire(bench: &Bench, fails: bool) {
+    let mut machine = bench.running(PART, 100);
+    let dropped_before = Stage::read(&machine).count("frames_dropped");
     // Other nodes hold the bus from this tick's frames on until just before those of the next.
     let free_ns = machine.chip.now_ns + 2 * MS + 18 * MS / 100;
     machine.chip.can.occupy(free_ns);
-    machine.run_ns(free_ns + MS / 10 - machine.chip.now_ns)?;
+    machine.run_ns(free_ns + MS / 10 - machine.chip.now_ns);
     if fails {
         let now_ns = machine.chip.now_ns;
-        expect(machine.chip.can.destroy(now_ns), || {
-            "nothing was on the wire".to_owned()
-        })?;
+        assert!(machine.chip.can.destroy(now_ns), "nothing was on the wire");
     }
-    machine.run_ticks(10)?;
+    machine.run_ticks(10);
     let sent = machine.chip.can.sent.clone();
     let seen = Seen::since_last(&mut machine);
-    let x = seen.axes.iter().filter(|axis| axis.axis == 0);
-    let ticks: Vec<_> = x.map(|axis| axis.tick).collect();
+    let ticks: Vec<_> = seen.x().map(|axis| axis.tick).collect();
     let first = if fails { 100 } else { 99 };
     let count = ticks.len() as u64;
-    equal(
-        "ticks whose X was sent",
-        ticks,
-        (first..first + count).collect(),
-    )?;
-    expect(count >= 9, || format!("only {count} poses"))?;
+    assert!(ticks.iter().copied().eq(first..first + count), "{ticks:?}");
+    assert!(count >= 9, "only {count} poses");
     let in_order = sent.is_sorted_by_key(|frame| frame.asked_ns);
-    expect(in_order, || "a frame overtook an older one".to_owned())?;
-    same_words(&seen.axes, &bench.poses, 0, 0)?;
-    let dropped = Stage::read(&machine, bench, PART)?.frames_dropped - dropped_before;
-    expect(dropped >= 2, || format!("{dropped} frames dropped"))
+    assert!(in_order, "a frame overtook an older one");
+    same_words(&seen.axes, &bench.poses, 0, 0);
+    let dropped = Stage::read(&machine).count("frames_dropped") - dropped_before;
+    assert!(dropped >= 2, "{dropped} frames dropped");
+}
+
+/// It is sent.
+pub fn aborted_on_the_wire_and_completed(bench: &Bench) {
+    aborted_on_the_wire(bench, false);
+}
+
+/// It fails.
+pub fn aborted_on_the_wire_and_failed(bench: &Bench) {
+    aborted_on_the_wire(bench, true);
 }
 
 /// Of more frames than the store holds one is lost, and counted: once, however many they were.
-pub fn received_frames_without_room(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.run_ticks(100)?;
+pub fn received_frames_without_room(bench: &Bench) {
+    let mut machine = bench.running(PART, 100);
     for token in 0..5 {
         let (id, bytes) = command(Request::Identify { seconds: 1 }, token, token);
         machine.chip.can.receive(id, bytes);
     }
-    machine.run_ticks(20)?;
-    let counted = Stage::read(&machine, bench, PART)?.receive_overruns;
-    equal("overruns counted", counted, 1)
+    machine.run_ticks(20);
+    let counted = Stage::read(&machine).count("receive_overruns");
+    assert_eq!(counted, 1);
 }

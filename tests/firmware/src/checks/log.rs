@@ -1,107 +1,80 @@
 //! The whole log through converter, decoder and bus.
 
+use super::no_resets;
 use super::sensors::ticks_to_settle;
-use super::{Outcome, equal, expect, no_resets};
 use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen};
 use crate::machine::Machine;
 use hal_adapters::can::status::NodeState;
 
 /// Ticks between two looks at the bus.
-const STEP: u64 = 1000;
-
-/// Runs `ticks` ticks and compares every word on the bus with the host's.
-pub fn compare(
-    bench: &Bench,
-    machine: &mut Machine,
-    part: Part,
-    ticks: u64,
-) -> Result<(Comparison, Seen), super::Failure> {
-    let mut comparison = Comparison::default();
-    let mut all = Seen::default();
-    let mut left = ticks;
-    while left > 0 {
-        let now = left.min(STEP);
-        machine.run_ticks(now)?;
-        left -= now;
-        let seen = Seen::since_last(machine);
-        comparison.add(&seen.axes, &bench.poses, ticks_to_settle(part));
-        all.damaged += seen.damaged;
-        all.statuses = seen.statuses;
-        all.health = seen.health;
-    }
-    Ok((comparison, all))
-}
+const STEP: usize = 1000;
 
 /// The words of `ticks` ticks are those of `host-fit decode`, and there are no other frames.
-pub fn same_words(bench: &Bench, part: Part, ticks: u64, name: &str) -> Outcome {
-    let mut machine = bench.machine(part, [&bench.blob, &[]])?;
-    machine.run_ns(0)?; // The start-up feeds the watchdog, too.
+pub fn whole_log(bench: &Bench, part: Part, ticks: u64) {
+    let name = part.name();
+    let settling = ticks_to_settle(part);
+    let mut machine = bench.machine(part, [&bench.blob, &[]]);
+    machine.run_ns(0); // The start-up feeds the watchdog, too.
     let fed_before = machine.chip.watchdog.fed;
-    let (comparison, seen) = compare(bench, &mut machine, part, ticks)?;
+    let (mut comparison, mut seen) = (Comparison::default(), Seen::default());
+    for from in (0..ticks).step_by(STEP) {
+        seen = Seen::after(&mut machine, (ticks - from).min(STEP as u64));
+        comparison.add(&seen.axes, &bench.poses, settling);
+        assert_eq!(seen.damaged, 0);
+    }
     println!("RESULT firmware_{name}_ticks={ticks}");
     println!("RESULT firmware_{name}_words={}", comparison.words);
     println!("RESULT firmware_{name}_differing={}", comparison.differing);
-    println!(
-        "RESULT firmware_{name}_stack_bytes={}",
-        machine.stack_bytes()
-    );
-    let stage = Stage::read(&machine, bench, part)?;
-    for (counter, value) in stage.counters() {
+    let stack_bytes = machine.stack_bytes();
+    println!("RESULT firmware_{name}_stack_bytes={stack_bytes}");
+    let stage = Stage::read(&machine);
+    for (counter, value) in COUNTERS.iter().zip(stage.counters) {
         println!("RESULT firmware_{name}_{counter}={value}");
     }
-    equal("words that differ", comparison.differing, 0)?;
+    assert_eq!(comparison.differing, 0);
     // The first tick joins the bus, the last one is still on its way.
-    let settling = ticks_to_settle(part);
-    let ticks_with_codes = ticks - settling;
-    expect(comparison.planar >= ticks_with_codes - 2, || {
-        format!("only {} poses", comparison.planar)
-    })?;
-    expect(
-        comparison.words >= (ticks_with_codes - 2) * 15 / 4 - 8,
-        || format!("only {} words", comparison.words),
-    )?;
-    equal("damaged frames", seen.damaged, 0)?;
-    no_resets(&machine)?;
-    let state = seen
-        .last_status()
-        .map(|s| (s.state, s.missed_ticks, s.bus_off));
-    let running = Some((Some(NodeState::Running), 0, 0));
-    equal("state, missed ticks, times the bus was off", state, running)?;
-    equal("ticks without codes", stage.adc_faults.into(), settling)?;
-    expect(stage.frames_dropped <= 8, || {
-        format!("{} frames dropped", stage.frames_dropped)
-    })?;
+    let whole = ticks - settling - 2;
+    assert!(comparison.planar >= whole, "{comparison:?}");
+    assert!(comparison.words >= whole * 15 / 4 - 8, "{comparison:?}");
+    no_resets(&machine);
+    let status = seen.last_status().expect("a state");
+    let found = (status.state, status.missed_ticks, status.bus_off);
+    assert_eq!(found, (Some(NodeState::Running), 0, 0));
+    assert_eq!(u64::from(stage.count("adc_faults")), settling);
+    assert!(stage.count("frames_dropped") <= 8);
     let fed = machine.chip.watchdog.fed - fed_before;
-    equal("feeds of the watchdog", fed, u64::from(stage.sequence) + 1)?;
-    let ticks_reported = seen
+    assert_eq!(fed, u64::from(stage.sequence) + 1);
+    let ticks_reported = seen.page(0).expect("page 0");
+    assert!(
+        u64::from(ticks_reported) + 200 > ticks,
+        "health reports {ticks_reported} ticks"
+    );
+    // Ticks without a planar pose, without a vertical one, held, without codes, repeated.
+    let wanted = [settling, settling, 0, settling, 0];
+    for page in seen
         .health
         .iter()
-        .rev()
-        .find(|page| page.page == 0)
-        .map_or(0, |page| page.value);
-    expect(u64::from(ticks_reported) + 200 > ticks, || {
-        format!("health reports {ticks_reported} ticks")
-    })?;
-    let wrong = seen
-        .health
-        .iter()
-        .filter(|page| page.page != 0 && page.page < 6)
-        // Up to page 5, counters. Pages 1, 2 and 4: ticks without a planar pose, without a vertical one, without codes.
-        .find(|page| {
-            u64::from(page.value)
-                != if page.page == 3 || page.page == 5 {
-                    0
-                } else {
-                    settling
-                }
-        });
-    equal(
-        "a counter of the health frames",
-        wrong.map(|page| page.page),
-        None,
-    )
+        .filter(|page| (1..6).contains(&page.page))
+    {
+        assert_eq!(
+            u64::from(page.value),
+            wanted[usize::from(page.page) - 1],
+            "{page:?}"
+        );
+    }
 }
+
+/// The counters of `STAGE`, in their order.
+const COUNTERS: [&str; 7] = [
+    "overrun_ticks",
+    "adc_faults",
+    "adc_starts",
+    "frames_sent",
+    "frames_dropped",
+    "receive_overruns",
+    "fpu_restored",
+];
 
 /// The static `STAGE` as a debugger reads it.
 pub struct Stage {
@@ -109,64 +82,36 @@ pub struct Stage {
     pub sequence: u32,
     /// Bits of the pose.
     pub pose: [u32; 6],
-    /// Ticks not done in time.
-    pub overrun_ticks: u32,
-    /// Ticks without codes.
-    pub adc_faults: u32,
-    /// Starts of the converter.
-    pub adc_starts: u32,
-    /// Frames sent.
-    pub frames_sent: u32,
-    /// Frames dropped.
-    pub frames_dropped: u32,
-    /// Times that a received frame found no room.
-    pub receive_overruns: u32,
-    /// Ticks in which the FPU's settings were restored.
-    pub fpu_restored: u32,
+    counters: [u32; COUNTERS.len()],
 }
 
 impl Stage {
     /// Reads it by its symbol.
-    pub fn read(machine: &Machine, bench: &Bench, part: Part) -> Result<Self, String> {
-        let at = bench.image(part).address("STAGE")?;
-        let word = |k: u32| machine.word(at + 4 * k);
-        expect(word(0) % 2 == 0, || "STAGE is torn".to_owned()).map_err(|e| e.to_string())?;
-        Ok(Self {
+    pub fn read(machine: &Machine) -> Self {
+        let word = |k: usize| machine.word(machine.stage_at + 4 * k as u32);
+        assert_eq!(word(0) % 2, 0, "STAGE is torn");
+        Self {
             sequence: word(1),
-            pose: [4, 5, 6, 7, 8, 9].map(word),
-            overrun_ticks: word(10),
-            adc_faults: word(11),
-            adc_starts: word(12),
-            frames_sent: word(13),
-            frames_dropped: word(14),
-            receive_overruns: word(15),
-            fpu_restored: word(16),
-        })
+            pose: core::array::from_fn(|k| word(4 + k)),
+            counters: core::array::from_fn(|k| word(10 + k)),
+        }
     }
 
-    fn counters(&self) -> [(&'static str, u32); 7] {
-        [
-            ("overrun_ticks", self.overrun_ticks),
-            ("adc_faults", self.adc_faults),
-            ("adc_starts", self.adc_starts),
-            ("frames_sent", self.frames_sent),
-            ("frames_dropped", self.frames_dropped),
-            ("receive_overruns", self.receive_overruns),
-            ("fpu_restored", self.fpu_restored),
-        ]
+    /// One of [`COUNTERS`].
+    pub fn count(&self, name: &str) -> u32 {
+        let at = COUNTERS.iter().position(|counter| *counter == name);
+        self.counters[at.expect(name)]
+    }
+
+    /// It shows the host's pose, of this tick or of a later one.
+    pub fn has_the_pose(&self, bench: &Bench, least: u32) {
+        assert!(self.sequence >= least, "only tick {}", self.sequence);
+        assert_eq!(self.pose, bench.pose(self.sequence.into()).words);
     }
 }
 
 /// What a debugger reads is the pose of the last tick.
-pub fn a_debugger_reads_the_last_pose(bench: &Bench) -> Outcome {
-    let part = Part::Ads131m08;
-    let mut machine = bench.machine(part, [&bench.blob, &[]])?;
-    machine.run_ticks(321)?;
-    let stage = Stage::read(&machine, bench, part)?;
-    equal(
-        "pose",
-        stage.pose,
-        bench.poses[stage.sequence as usize].words,
-    )?;
-    expect(stage.sequence >= 319, || format!("tick {}", stage.sequence))
+pub fn a_debugger_reads_the_last_pose(bench: &Bench) {
+    let machine = bench.running(Part::Ads131m08, 321);
+    Stage::read(&machine).has_the_pose(bench, 319);
 }

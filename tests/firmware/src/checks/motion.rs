@@ -1,6 +1,5 @@
 //! Inputs that move: poses are those of the instant that the program stamps.
 
-use super::{Failure, Outcome, expect};
 use crate::adc_model::ads131m08::Variant;
 use crate::adc_model::{Input, Part};
 use crate::bench::{Bench, Seen};
@@ -15,43 +14,40 @@ const JITTER_NS: i64 = 3000;
 
 /// Whichever way the ADS131M08 goes where its sheet is silent, at the gaps that the program leaves
 /// between its frames: every instruction takes its time.
-pub fn a_pose_is_of_its_instant(bench: &Bench) -> Outcome {
+pub fn a_pose_is_of_its_instant(bench: &Bench) {
     let mut lags = Vec::new();
     for variant in Variant::all() {
         for jitter_ns in [-JITTER_NS, 0, JITTER_NS] {
-            let lag_us = lag_us(bench, variant, jitter_ns)?;
-            expect((lag_us - SAMPLE_US).abs() < 7.0, || {
-                format!("poses {lag_us:.1} us behind the trigger: {variant:?}, {jitter_ns} ns")
-            })?;
+            let lag_us = lag_us(bench, variant, jitter_ns);
+            assert!(
+                (lag_us - SAMPLE_US).abs() < 7.0,
+                "poses {lag_us:.1} us behind the trigger: {variant:?}, {jitter_ns} ns"
+            );
             lags.push(lag_us);
         }
     }
     lags.sort_by(f64::total_cmp);
     let (least, most) = (lags[0], lags[lags.len() - 1]);
     println!("RESULT firmware_ads131m08_sample_us={least:.1}..{most:.1}");
-    Ok(())
 }
 
 /// The inputs move from row to row of the log: the lag behind the row of the tick that fits the
 /// poses X, Y and Rz best, us.
-fn lag_us(bench: &Bench, variant: Variant, jitter_ns: i64) -> Result<f64, Failure> {
-    let mut machine = bench.machine(Part::Ads131m08, [&bench.blob, &[]])?;
-    machine.count_instructions()?;
+fn lag_us(bench: &Bench, variant: Variant, jitter_ns: i64) -> f64 {
+    let mut machine = bench.machine(Part::Ads131m08, [&bench.blob, &[]]);
+    machine.count_instructions();
     machine.chip.adc.set_variant(variant);
     machine.chip.settled_jitter_ns = jitter_ns;
     machine.chip.adc.input = Input::moving(bench.rows.clone(), PERIOD_US as u64, 0);
-    machine.run_ticks(TICKS)?;
-    let seen = Seen::since_last(&mut machine);
-    if seen.axes.len() < 3 * TICKS as usize {
-        return Err(format!("only {} words: {variant:?}", seen.axes.len()).into());
-    }
+    let seen = Seen::after(&mut machine, TICKS);
+    assert!(seen.axes.len() >= 3 * TICKS as usize, "{variant:?}");
     let value = |word: u32| f64::from(f32::from_bits(word));
     let (mut products, mut squares) = (0.0, 0.0);
     for axis in seen.axes.iter().filter(|axis| axis.axis < 3) {
-        let word = |tick: u64| value(bench.poses[tick as usize].words[axis.axis]);
+        let word = |tick: u64| value(bench.pose(tick).words[axis.axis]);
         let (row, next) = (word(axis.tick), word(axis.tick + 1));
         products += (value(axis.word) - row) * (next - row);
         squares += (next - row).powi(2);
     }
-    Ok(PERIOD_US * products / squares)
+    PERIOD_US * products / squares
 }

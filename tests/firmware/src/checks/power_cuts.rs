@@ -2,8 +2,8 @@
 //! that settles what a cut has left. Afterwards the old or the new blob runs, and another update is
 //! possible.
 
-use super::update::{large, plan, running, update};
-use super::{Failure, Outcome, expect};
+use super::update::{large, plan, running, update, updated};
+
 use crate::adc_model::Part;
 use crate::bench::Bench;
 use crate::flash_model::PowerCut;
@@ -16,9 +16,9 @@ const PART: Part = Part::Ads131m08;
 struct Scene<'b> {
     bench: &'b Bench,
     /// A controller just before it.
-    before: fn(&Bench) -> Result<Machine, Failure>,
+    before: fn(&Bench) -> Machine,
     /// It happens, until it is over or the power is cut.
-    happens: fn(&Bench, &mut Machine) -> Outcome,
+    happens: fn(&Bench, &mut Machine),
 }
 
 /// How often each blob ran after cuts.
@@ -30,58 +30,51 @@ struct Counts {
 
 impl Scene<'_> {
     /// Operations of the flash that it takes.
-    fn operations(&self) -> Result<u64, Failure> {
-        let mut machine = (self.before)(self.bench)?;
-        let before = machine.chip.flash.operations;
-        (self.happens)(self.bench, &mut machine)?;
-        Ok(machine.chip.flash.operations - before)
+    fn operations(&self) -> usize {
+        let mut machine = (self.before)(self.bench);
+        let before = machine.chip.flash.sectors.operations;
+        (self.happens)(self.bench, &mut machine);
+        machine.chip.flash.sectors.operations - before
     }
 
     /// It happens, and the power is cut. Gives the operations of the last start.
-    fn cut(&self, cuts: &[PowerCut], counts: &mut Counts) -> Result<u64, Failure> {
-        let mut machine = (self.before)(self.bench)?;
-        let before = machine.chip.flash.operations;
+    fn cut(&self, cuts: &[PowerCut], counts: &mut Counts) -> usize {
+        let mut machine = (self.before)(self.bench);
         machine.chip.flash.cut_at(cuts);
-        (self.happens)(self.bench, &mut machine)?;
-        machine.run_ticks(20)?;
-        expect(machine.power_cuts as usize == cuts.len(), || {
-            format!("{} cuts, not {cuts:?}", machine.power_cuts)
-        })?;
-        let until_the_last: u64 = cuts.iter().map(|cut| cut.at + 1).sum();
-        let settling = machine.chip.flash.operations - before - until_the_last;
-        let found = running(&mut machine)?;
+        (self.happens)(self.bench, &mut machine);
+        machine.run_ticks(20);
+        assert_eq!(machine.power_cuts as usize, cuts.len(), "{cuts:?}");
+        let settling = machine.chip.flash.sectors.operations;
+        let found = running(&mut machine);
         counts.old += u32::from(found == self.bench.blob);
         counts.new += u32::from(found == self.bench.later);
-        expect(
+        assert!(
             found == self.bench.blob || found == self.bench.later,
-            || format!("another blob after {cuts:?}"),
-        )?;
+            "another blob after {cuts:?}"
+        );
         // What was cut inside is the hardest to write beside.
         if cuts.iter().all(|cut| cut.place == Cut::Inside) {
-            let (updated, _) = update(&mut machine, &plan(&large()?))?;
-            expect(updated?.sequence.is_some(), || {
-                format!("no update after {cuts:?}")
-            })?;
+            let updated = updated(&mut machine, &plan(&large()));
+            assert!(updated.sequence.is_some(), "no update after {cuts:?}");
         }
-        Ok(settling)
+        settling
     }
 
     /// Cuts at these operations, and, for each that is cut inside, at every operation of the start
     /// that follows.
-    fn cut_at(&self, places: impl Iterator<Item = u64>) -> Result<[Counts; 2], Failure> {
+    fn cut_at(&self, places: impl Iterator<Item = usize>) -> [Counts; 2] {
         let [mut first, mut second] = [Counts::default(); 2];
-        for (seed, at) in (1u32..).zip(places) {
-            let seed = seed.wrapping_mul(0x9e37_79b9);
+        for (seed, at) in (1..).zip(places) {
             for place in Cut::ALL {
                 let cut = PowerCut { at, place, seed };
-                let settling = self.cut(&[cut], &mut first)?;
+                let settling = self.cut(&[cut], &mut first);
                 let again = (0..settling).filter(|_| place == Cut::Inside);
                 for (at, place) in again.flat_map(|at| Cut::ALL.map(|place| (at, place))) {
-                    self.cut(&[cut, PowerCut { at, place, seed }], &mut second)?;
+                    self.cut(&[cut, PowerCut { at, place, seed }], &mut second);
                 }
             }
         }
-        Ok([first, second])
+        [first, second]
     }
 }
 
@@ -100,43 +93,42 @@ fn print(name: &str, [first, second]: [Counts; 2]) {
 
 /// In an update beside one blob, and beside two: the new blob runs for certain once the update was
 /// answered.
-pub fn in_an_update(bench: &Bench) -> Outcome {
+pub fn in_an_update(bench: &Bench) {
     let scene = Scene {
         bench,
         before: |bench| bench.running(PART, 20),
         happens: |bench, machine| {
-            let _cut_or_done = update(machine, &plan(&bench.later))?;
-            Ok(())
+            let _cut_or_done = update(machine, &plan(&bench.later));
         },
     };
-    let whole = scene.operations()?;
-    expect(whole > 90, || format!("{whole} operations"))?;
+    let whole = scene.operations();
+    assert!(whole > 90, "{whole} operations");
     // The drop of the old slot, its erase, the first words, some between, and the last ones: check,
     // commit word, seal.
     let places = (0..4).chain((1..6).map(|k| k * whole / 6));
-    let counts = scene.cut_at(places.chain(whole - 4..whole))?;
+    let counts = scene.cut_at(places.chain(whole - 4..whole));
     print("update", counts);
     let [first, second] = counts;
-    expect(first.old > 0 && first.new > 0 && second.old > 0, || {
-        "all cuts ended alike".to_owned()
-    })?;
+    assert!(
+        first.old > 0 && first.new > 0 && second.old > 0,
+        "all cuts ended alike"
+    );
     let mut last = Counts::default();
     let (at, place, seed) = (whole - 1, Cut::After, 1);
-    scene.cut(&[PowerCut { at, place, seed }], &mut last)?;
-    expect(last.new == 1, || "the new one is lost".to_owned())?;
+    scene.cut(&[PowerCut { at, place, seed }], &mut last);
+    assert!(last.new == 1, "the new one is lost");
     // The older one of two is the field model's, and the newest must stay.
     let beside_two = Scene {
         before: |bench| {
-            let mut machine = bench.machine(PART, [&large()?, &[]])?;
-            machine.run_ticks(20)?;
-            update(&mut machine, &plan(&bench.blob))?.0?;
+            let mut machine = bench.machine(PART, [&large(), &[]]);
+            machine.run_ticks(20);
+            updated(&mut machine, &plan(&bench.blob));
             machine.power_cycle();
-            machine.run_ticks(20)?;
-            Ok(machine)
+            machine.run_ticks(20);
+            machine
         },
         ..scene
     };
-    let counts = beside_two.cut_at((0..3).chain(whole - 2..whole))?;
+    let counts = beside_two.cut_at((0..3).chain(whole - 2..whole));
     print("second_update", counts);
-    Ok(())
 }

@@ -2,11 +2,10 @@
 
 use super::asking::answers;
 use super::commands::SERVO_OFF;
-use super::start::TICK;
-use super::update::{PART, identity, plan, running, update};
-use super::{Failure, Outcome, equal, expect};
+use super::start::{NOWHERE, TICK};
+use super::update::{PART, identity, plan, running, updated};
+
 use crate::bench::{Bench, Seen};
-use crate::callbacks::Injected;
 use crate::machine::Machine;
 use crate::unicorn::register;
 use hal_adapters::can::command::{Outcome as Ended, Request};
@@ -18,97 +17,86 @@ use host_fit::bus::update::Plan;
 const CHECK: &str = "10from_flash";
 
 /// A blob that is stored waits: over resets of any cause what ran before runs, until power-on.
-pub fn a_reset_runs_what_ran(bench: &Bench) -> Outcome {
-    let mut machine = bench.running(PART, 20)?;
-    update(&mut machine, &plan(&bench.later))?.0?;
+pub fn a_reset_runs_what_ran(bench: &Bench) {
+    let mut machine = bench.running(PART, 20);
+    updated(&mut machine, &plan(&bench.later));
     machine.reset_by_pin();
-    equal("after the pin", running(&mut machine)?, bench.blob.clone())?;
-    machine.run_ticks(600)?;
+    assert_eq!(running(&mut machine), bench.blob);
+    machine.run_ticks(600);
     machine.hold_ns = 60_000_000;
-    machine.run_ticks(100)?;
-    equal("bites", machine.watchdog_resets, 1)?;
-    equal("after a bite", running(&mut machine)?, bench.blob.clone())?;
+    machine.run_ticks(100);
+    assert_eq!(machine.watchdog_resets, 1);
+    assert_eq!(running(&mut machine), bench.blob);
     machine.power_cycle();
-    equal(
-        "after power-on",
-        running(&mut machine)?,
-        bench.later.clone(),
-    )
+    assert_eq!(running(&mut machine), bench.later);
 }
 
 /// A controller that has just begun to run [`Bench::later`] in place of [`Bench::blob`].
-fn about_to_crash(bench: &Bench) -> Result<Machine, Failure> {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.hook_injection(bench.image(PART).address(TICK)?)?;
-    machine.run_ticks(20)?;
-    update(&mut machine, &plan(&bench.later))?.0?;
+fn about_to_crash(bench: &Bench) -> Machine {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    machine.hook_injection(bench.image(PART).address(TICK));
+    machine.run_ticks(20);
+    updated(&mut machine, &plan(&bench.later));
     // Not by the host, which waits until they have run for a second.
     let activate = Request::Update(UpdateRequest::Activate);
     let asked = [(SERVO_OFF, 97, Ended::Done), (activate, 98, Ended::Done)];
-    answers(&mut machine, &asked)?;
-    machine.run_ticks(10)?;
-    let runs = identity(&mut machine)?.running;
-    expect(runs.is_some_and(|runs| runs.are(&bench.later)), || {
-        "the new parameters do not run".to_owned()
-    })?;
-    Ok(machine)
+    answers(&mut machine, &asked);
+    machine.run_ticks(10);
+    let runs = identity(&mut machine).running;
+    assert!(
+        runs.is_some_and(|runs| runs.are(&bench.later)),
+        "the new parameters do not run"
+    );
+    machine
 }
 
 /// The program faults once, at the address of the hook.
-fn crash(machine: &mut Machine) -> Outcome {
-    let (register, value) = (register::R0, 0x6000_0000);
-    machine.chip.inject = vec![Injected { register, value }];
-    Ok(machine.run_ticks(10)?)
+fn crash(machine: &mut Machine) {
+    machine.chip.inject = vec![(register::R0, NOWHERE)];
+    machine.run_ticks(10)
 }
 
 /// Parameters that make the program fault twice at its start: none run, and the state says so, also after
 /// resets, until the user goes back.
-pub fn parameters_that_crash(bench: &Bench) -> Outcome {
-    let mut machine = about_to_crash(bench)?;
+pub fn parameters_that_crash(bench: &Bench) {
+    let mut machine = about_to_crash(bench);
     for resets in [2, 3] {
-        crash(&mut machine)?;
-        equal("resets", machine.panics, resets)?;
+        crash(&mut machine);
+        assert_eq!(machine.panics, resets);
     }
-    has_stopped(&mut machine)?;
-    machine.run_ticks(600)?;
+    has_stopped(&mut machine);
+    machine.run_ticks(600);
     machine.reset_by_pin();
-    has_stopped(&mut machine)?;
+    has_stopped(&mut machine);
     let back = Plan {
         activates: true,
         ..plan(&[])
     };
-    let (updated, _) = update(&mut machine, &back)?;
-    equal("back", updated?.is_active, true)?;
-    equal("running", running(&mut machine)?, bench.blob.clone())
+    assert!(updated(&mut machine, &back).is_active);
+    assert_eq!(running(&mut machine), bench.blob);
 }
 
 /// Parameters whose check at the start makes the program fault twice, though they are not the newest.
-pub fn parameters_whose_check_crashes(bench: &Bench) -> Outcome {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]])?;
-    machine.hook_injection(bench.image(PART).address(CHECK)?)?;
-    machine.run_ticks(20)?;
-    update(&mut machine, &plan(&bench.later))?.0?;
-    machine.run_ticks(600)?;
+pub fn parameters_whose_check_crashes(bench: &Bench) {
+    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    machine.hook_injection(bench.image(PART).address(CHECK));
+    machine.run_ticks(20);
+    updated(&mut machine, &plan(&bench.later));
+    machine.run_ticks(600);
     for resets in [1, 2] {
         machine.reset_by_pin();
-        crash(&mut machine)?;
-        equal("resets", machine.panics, resets)?;
+        crash(&mut machine);
+        assert_eq!(machine.panics, resets);
     }
-    has_stopped(&mut machine)?;
+    has_stopped(&mut machine);
     machine.power_cycle();
-    equal(
-        "after power-on",
-        running(&mut machine)?,
-        bench.later.clone(),
-    )
+    assert_eq!(running(&mut machine), bench.later);
 }
 
 /// Nothing runs, and the state says why.
-fn has_stopped(machine: &mut Machine) -> Outcome {
-    machine.run_ticks(10)?;
-    Seen::since_last(machine);
-    machine.run_ticks(40)?;
-    let seen = Seen::since_last(machine);
-    equal("state", seen.last_state(), Some((NodeState::Stopped, 1)))?;
-    equal("words of poses", seen.axes.len(), 0)
+fn has_stopped(machine: &mut Machine) {
+    Seen::after(machine, 10);
+    let seen = Seen::after(machine, 40);
+    assert_eq!(seen.last_state(), Some((NodeState::Stopped, 1)));
+    assert_eq!(seen.axes.len(), 0);
 }

@@ -1,16 +1,16 @@
 //! Temperatures from the thermometers to the pose: the words of the host's decoder at what the bus says
 //! of them, and a broken one that every pose says.
 
+use super::no_resets;
 use super::parameters::of_stage_7;
-use super::start::page;
-use super::{Outcome, equal, expect};
+use super::start::tick_now;
+
 use crate::adc_model::Part;
 use crate::adc_model::thermometers::Wiring;
-use crate::bench::{Bench, Seen};
-use hal_adapters::can::pose::status_to_bus;
+use crate::bench::{Bench, Seen, Words};
 use hal_adapters::can::status::board_check;
 use runtime::frame::MISSING_CODE;
-use runtime::{Decode, ParameterSet, PlanarPose, RawFrame, Status};
+use runtime::{ParameterSet, Status};
 
 /// A blob that wants temperatures, about 20.1 and 21.3 degC.
 const WARM: &[u8] = include_bytes!("../../../../runtime/examples/warm.bin");
@@ -21,9 +21,10 @@ const TICKS: u64 = 400;
 
 /// Poses follow the temperatures, which are those of the stage; a thermometer that is open or shorted
 /// is missing, and back when it is mended.
-pub fn follow_the_stage(bench: &Bench, part: Part, name: &str) -> Outcome {
-    let (blob, set) = of_stage_7(WARM)?;
-    let mut machine = bench.machine(part, [&blob, &[]])?;
+pub fn follow_the_stage(bench: &Bench, part: Part) {
+    let name = part.name();
+    let (blob, set) = of_stage_7(WARM);
+    let mut machine = bench.machine(part, [&blob, &[]]);
     let mut worst_mk = 0;
     let mut words = 0;
     let sound = [Wiring::Sound; 2];
@@ -38,52 +39,42 @@ pub fn follow_the_stage(bench: &Bench, part: Part, name: &str) -> Outcome {
     ] {
         machine.chip.adc.thermometers.celsius = celsius;
         machine.chip.adc.thermometers.wiring = wiring;
-        let first = machine
-            .chip
-            .first_tick_ns
-            .map_or(0, |ns| (machine.chip.now_ns - ns).div_ceil(2_000_000));
-        machine.run_ticks(TICKS)?;
+        let first = tick_now(&machine);
         let what = format!("{celsius:?} {wiring:?}");
-        let seen = Seen::since_last(&mut machine);
-        words += same_words(bench, &set, &seen, &what)?;
-        let (_, last_mc) = *seen.temperatures.last().ok_or("no temperatures")?;
+        let seen = Seen::after(&mut machine, TICKS);
+        words += same_words(bench, &set, &seen, &what);
+        let (_, last_mc) = *seen.temperatures.last().expect("no temperatures");
         for k in 0..2 {
             if wiring[k] != Wiring::Sound {
-                equal(&what, last_mc[k], MISSING_CODE)?;
+                assert_eq!(last_mc[k], MISSING_CODE, "{what}");
                 continue;
             }
             let off_mk = (f64::from(last_mc[k]) - 1e3 * celsius[k]).abs() as i32;
             worst_mk = worst_mk.max(off_mk);
-            expect(off_mk <= 60, || format!("{what}: {last_mc:?}"))?;
+            assert!(off_mk <= 60, "{what}: {last_mc:?}");
         }
         let is_missing = wiring != sound;
-        let late = seen.axes.iter().filter(|axis| axis.tick >= first + READ);
+        let late = seen.axes.iter().filter(|axis| axis.tick > first + READ);
         let marked = late.clone().filter(|axis| axis.status & MARK != 0).count();
         let wanted = if is_missing { late.count() } else { 0 };
-        equal(&format!("{what}: words that are marked"), marked, wanted)?;
-        let checks = page(&seen, 11).ok_or("no page 11")?;
-        equal(
-            &format!("{what}: page 11"),
+        assert_eq!(marked, wanted, "{what}: words that are marked");
+        let checks = seen.page(11).expect("no page 11");
+        assert_eq!(
             checks & board_check::TEMPERATURE_MISSING != 0,
             is_missing,
-        )?;
+            "{what}: page 11"
+        );
     }
     println!("RESULT firmware_{name}_temperature_off_max_mk={worst_mk}");
     println!("RESULT firmware_{name}_temperature_words={words}");
-    let resets = (machine.panics, machine.watchdog_resets);
-    equal("panics and watchdog resets", resets, (0, 0))
+    no_resets(&machine);
 }
 
 /// What says on the bus that a temperature of a valid pose is missing.
 const MARK: u32 = Status::PLANAR_HELD.bits();
 
 /// The words on the bus beside the host's at the temperatures that were sent last. Gives their number.
-fn same_words(
-    bench: &Bench,
-    set: &ParameterSet,
-    seen: &Seen,
-    what: &str,
-) -> Result<u64, super::Failure> {
+fn same_words(bench: &Bench, set: &ParameterSet, seen: &Seen, what: &str) -> u64 {
     let decoder = set.decoder();
     let mut words = 0;
     for axis in &seen.axes {
@@ -92,23 +83,11 @@ fn same_words(
             // Before the first frame since the last step.
             continue;
         };
-        let [a, b, c, g1, g2, g3] = bench.rows[axis.tick as usize % bench.rows.len()];
-        let frame = RawFrame::new([a, b, c], [g1, g2, g3], 0, 0);
-        let frame = frame.with_temperature_mc(*temperature_mc);
-        let reading = decoder.decode(&frame, &PlanarPose::ZERO);
-        let [x, y, rz] = reading.pose.planar.to_array();
-        let [z, rx, ry] = reading.pose.vertical.to_array();
-        let word = [x, y, rz, z, rx, ry][axis.axis].to_bits();
-        let want = (word, status_to_bus(reading.status));
-        equal(
-            &format!("{what}: axis {} of tick {}", axis.axis, axis.tick),
-            (axis.word, axis.status),
-            want,
-        )?;
+        let row = bench.rows[axis.tick as usize % bench.rows.len()];
+        let want = Words::decoded(&decoder, row, *temperature_mc);
+        assert!(axis.is_of(&want), "{what}: {axis:?}, not {want:?}");
         words += 1;
     }
-    expect(words > 3 * (TICKS - READ), || {
-        format!("{what}: only {words} words")
-    })?;
-    Ok(words)
+    assert!(words > 3 * (TICKS - READ), "{what}: only {words} words");
+    words
 }

@@ -44,7 +44,7 @@ pub struct Cost {
 impl Machine {
     /// An exception, by its number in the vector table: the core stacks its registers, runs the
     /// handler and takes them back.
-    pub(super) fn interrupt(&mut self, exception: u32) -> Result<(), String> {
+    pub(super) fn interrupt(&mut self, exception: u32) {
         let sp = self.core.get(register::SP);
         let saved = self.stack_registers();
         let is_tick = exception == 16 + IRQ_TIM2;
@@ -52,7 +52,7 @@ impl Machine {
         self.chip.instructions_timed = before;
         let (spi_before, filled_before) = (self.chip.spi_bytes, self.chip.can.filled);
         self.chip.instructions_at_mailbox = before;
-        self.go(self.vectors[exception as usize], RETURN)?;
+        self.go(self.vectors[exception as usize], RETURN);
         if is_tick && self.chip.instructions != before {
             let upto = match self.chip.instructions_at_mailbox {
                 at if at != before => at,
@@ -66,7 +66,7 @@ impl Machine {
             });
         }
         if self.chip.stops() {
-            return Ok(());
+            return;
         }
         for (k, word) in saved.into_iter().enumerate() {
             match k {
@@ -77,7 +77,6 @@ impl Machine {
             }
         }
         self.core.set(register::SP, sp);
-        Ok(())
     }
 
     /// What the core does before a handler: it stacks 26 words, floating-point registers included.
@@ -112,18 +111,12 @@ impl Machine {
 
     /// Runs until `until` or until the chip is reset. An access to what is not there or is protected
     /// leads into the handler of hard faults.
-    pub(super) fn go(&mut self, from: u32, until: u32) -> Result<(), String> {
+    pub(super) fn go(&mut self, from: u32, until: u32) {
         let mut ran = self.core.run(from, until);
         let protected = std::mem::take(&mut self.chip.memory_fault);
         if (ran.is_err() || protected) && !self.chip.stops() {
-            self.chip.write_core(
-                CFSR,
-                if protected {
-                    ACCESS_AND_STACKING
-                } else {
-                    PRECISE
-                },
-            );
+            let cause = [PRECISE, ACCESS_AND_STACKING][usize::from(protected)];
+            self.chip.write_core(CFSR, cause);
             self.stack_registers();
             let settings = self.chip.read_core(FPCCR);
             self.chip.write_core(FPCCR, settings | LSPACT);
@@ -131,13 +124,9 @@ impl Machine {
             self.lazy_left |= self.chip.read_core(FPCCR) & LSPACT != 0;
         }
         let pc = self.core.get(register::PC);
-        match ran {
-            _ if self.chip.stops() => Ok(()),
-            Ok(()) if pc & !1 == until => Ok(()),
-            Ok(()) => Err(format!(
-                "the program stopped at {pc:#010x}, not at {until:#010x}"
-            )),
-            Err(fault) => Err(format!("{fault} at {pc:#010x}")),
-        }
+        assert!(
+            self.chip.stops() || ran.is_ok() && pc & !1 == until,
+            "the program stopped at {pc:#010x}, not at {until:#010x}: {ran:?}"
+        );
     }
 }

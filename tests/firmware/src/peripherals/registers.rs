@@ -1,6 +1,9 @@
 //! Registers: what a read gives, and what a write does.
 
-use super::{Alarm, Dma, Peripherals, Request, Transfer, US};
+use super::{
+    Alarm, BELOW_RAM, BIT_BAND, CORE, Dma, Peripherals, RANDOM, RANDOM_FIRST, RANGE, Request,
+    SECTORS, Transfer, US, WINDOWS,
+};
 
 pub(super) const TIM2: usize = 0x0_0000;
 const IWDG: usize = 0x0_3000;
@@ -29,6 +32,8 @@ const OF_21_INSTRUCTIONS_NS: u64 = 250;
 /// The core's system timer, and the register by which a program resets it.
 const SYSTICK: usize = 0xe010;
 const AIRCR: usize = 0xed0c;
+/// Registers in which only a 1 does something.
+const INTERRUPT_ENABLES: std::ops::Range<usize> = 0xe100..0xe120;
 /// Memory protection: control, base and attributes of the region that was written last.
 pub(super) const MPU_CTRL: usize = 0xed94;
 pub(super) const MPU_RBAR: usize = 0xed9c;
@@ -48,6 +53,19 @@ const POLL_NS: u64 = US;
 const THRESHOLDS_MV: [u32; 8] = [2000, 2100, 2300, 2500, 2600, 2700, 2800, 2900];
 /// A supply that is low, mV: only the highest threshold tells.
 const LOW_MV: u32 = 2850;
+
+/// The window of an address, and how far it is from its start, or from the first register.
+fn window(address: u64) -> ((u64, u64), usize) {
+    let is_in = |window: &(u64, u64)| (window.0..window.0 + window.1).contains(&address);
+    let window = WINDOWS.into_iter().find(is_in).unwrap_or(RANGE);
+    let first = window.0 + u64::from(window == RANDOM) * RANDOM_FIRST;
+    (window, address.wrapping_sub(first) as usize)
+}
+
+/// The word and the bit of a word of the bit band.
+const fn in_band(offset: usize) -> (usize, usize) {
+    ((offset / 32) & !3, offset / 4 % 8 + 8 * (offset / 32 % 4))
+}
 
 impl Peripherals {
     /// PVDO (RM0090 5.4.2): valid only while the detector and its clock are on.
@@ -106,8 +124,52 @@ impl Peripherals {
         self.dma.transferred(&into, count);
     }
 
+    /// A read of the core, where it sees no plain memory.
+    pub fn load(&mut self, address: u64, bytes: u32) -> u64 {
+        let (window, offset) = window(address);
+        let word = match window {
+            SECTORS => return self.flash.read(offset, bytes as usize),
+            BIT_BAND => return u64::from(self.read(in_band(offset).0) >> in_band(offset).1 & 1),
+            BELOW_RAM => {
+                self.memory_fault |= self.is_protected(address as u32, false);
+                return 0;
+            }
+            RANDOM => self.read_random(offset),
+            CORE => self.read_core(offset & !3),
+            _ => self.read(offset & !3),
+        };
+        u64::from(word >> (8 * (address & 3)))
+    }
+
+    /// A write of the core. The converter's and the watchdog's data registers are written in parts of
+    /// words.
+    pub fn store(&mut self, address: u64, bytes: u32, value: u32) {
+        let (window, offset) = window(address);
+        let (shift, mask) = (8 * (address & 3), u32::MAX >> (32 - 8 * bytes.min(4)));
+        let value = value & mask;
+        match window {
+            SECTORS => self.flash.write(offset, bytes as usize, value, self.now_ns),
+            BIT_BAND => {
+                let (at, bit) = in_band(offset);
+                let word = self.read(at) & !(1 << bit) | (value & 1) << bit;
+                self.write(at, word);
+            }
+            BELOW_RAM => self.memory_fault |= self.is_protected(address as u32, true),
+            RANDOM => self.write_random(offset, value),
+            CORE => {
+                let at = offset & !3;
+                let kept = match INTERRUPT_ENABLES.contains(&at) {
+                    true => 0,
+                    false => self.read_core(at) & !(mask << shift),
+                };
+                self.write_core(at, kept | value << shift);
+            }
+            _ => self.write(offset & !3, value << shift),
+        }
+    }
+
     /// A register, by its distance from the start of the range.
-    pub fn read(&mut self, offset: usize) -> u32 {
+    fn read(&mut self, offset: usize) -> u32 {
         self.pass_instructions();
         let word = self.words[offset / 4];
         match offset {
@@ -153,7 +215,7 @@ impl Peripherals {
     }
 
     /// Writes a register.
-    pub fn write(&mut self, offset: usize, value: u32) {
+    fn write(&mut self, offset: usize, value: u32) {
         self.pass_instructions();
         self.words[offset / 4] = value;
         match offset {
@@ -204,13 +266,13 @@ impl Peripherals {
     }
 
     /// A register of the generator of random numbers.
-    pub fn read_random(&mut self, offset: usize) -> u32 {
+    fn read_random(&mut self, offset: usize) -> u32 {
         self.now_ns += POLL_NS;
         self.random.read(offset)
     }
 
     /// Writes a register of the generator, which takes nothing without its clock.
-    pub fn write_random(&mut self, offset: usize, value: u32) {
+    fn write_random(&mut self, offset: usize, value: u32) {
         if self.words[AHB2ENR / 4] & 1 << 6 != 0 {
             self.random.write(offset, value);
         }
@@ -282,7 +344,7 @@ impl Peripherals {
         }
         // The key and SYSRESETREQ.
         self.reset_asked |= offset == AIRCR && value & 0xffff_0004 == 0x05fa_0004;
-        let enable = (0xe100..0xe120).contains(&offset);
+        let enable = INTERRUPT_ENABLES.contains(&offset);
         let word = &mut self.core_words[offset / 4];
         *word = if enable { *word | value } else { value };
     }

@@ -29,22 +29,13 @@ impl Event {
     }
 }
 
-/// How long a fault lasts.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Lasts {
-    /// Until it is taken away.
-    Long,
-    /// One tick.
-    OneTick,
-    /// It is over at once, and what it changed is set right by the next start.
-    UntilStarted,
-}
-
 /// What a fault must look like from the bus.
 pub struct Case {
-    pub(super) name: String,
+    /// Its name.
+    pub name: String,
     pub(super) event: Event,
-    pub(super) lasts: Lasts,
+    /// Until it is taken away, and not for one tick, or until the next start sets it right.
+    pub(super) is_long: bool,
     /// The states and reasons that its status frames may have.
     pub(super) reported: Vec<(NodeState, u8)>,
     /// Ticks after which the fault is reported at the latest.
@@ -75,7 +66,7 @@ impl Case {
         Self {
             name: name.to_owned(),
             event: Event::Fault(fault),
-            lasts: Lasts::Long,
+            is_long: true,
             reported: reported.to_vec(),
             within: 1,
             status: NOTHING,
@@ -93,14 +84,9 @@ impl Case {
         ];
         Self {
             event: Event::Flip { register, bits },
-            lasts: Lasts::UntilStarted,
+            is_long: false,
             ..Self::of(name, AdcFault::None, &reported, part)
         }
-    }
-
-    /// The name of the case.
-    pub fn name(&self) -> &str {
-        &self.name
     }
 }
 
@@ -119,7 +105,7 @@ pub fn cases(part: Part) -> Vec<Case> {
         Case::of("data line high", AdcFault::Line(0xff), &[SILENT], part),
         Case::of("chip select cut", AdcFault::Select, &[SILENT], part),
         Case {
-            lasts: Lasts::OneTick,
+            is_long: false,
             back_within: 1,
             ..Case::of("frames of one tick lost", AdcFault::Select, &[SILENT], part)
         },
@@ -172,7 +158,7 @@ pub fn cases(part: Part) -> Vec<Case> {
     }
     all.push(Case {
         event: Event::PowerLoss,
-        lasts: Lasts::UntilStarted,
+        is_long: false,
         reported: vec![fault(5), fault(8), NOT_READY],
         ..Case::of("a short loss of power", AdcFault::None, &[], part)
     });
