@@ -2,8 +2,8 @@
 
 use host_fit::calibrate::CalibrateError;
 use host_fit::finding::Finding;
-use host_fit::input::log::LogError;
-use host_fit::input::source::SourceError;
+use host_fit::input::log::{LogError, LogProblem};
+use host_fit::input::source::SourceProblem;
 use host_fit::input::stage::StageError;
 use host_fit::output::OutputError;
 use host_fit::output::blob_file::BlobFileError;
@@ -33,24 +33,19 @@ fn own<'py>(py: Python<'py>, class: &str, arguments: impl PyCallArgs<'py>) -> Py
 
 /// A log that is refused: `LogError`, or `OSError` where its file cannot be read.
 pub fn of_log(py: Python<'_>, error: &LogError) -> PyErr {
-    match error {
-        LogError::Source(SourceError::Interrupted { .. }) => PyKeyboardInterrupt::new_err(()),
-        LogError::Source(SourceError::NotFound { .. }) => {
+    match &error.problem {
+        LogProblem::Source(SourceProblem::Interrupted) => PyKeyboardInterrupt::new_err(()),
+        LogProblem::Source(SourceProblem::NotFound) => {
             PyFileNotFoundError::new_err(error.to_string())
         }
-        LogError::Source(SourceError::IsFolder { .. } | SourceError::Unreadable { .. }) => {
+        LogProblem::Source(SourceProblem::IsFolder | SourceProblem::Unreadable { .. }) => {
             PyOSError::new_err(error.to_string())
         }
-        error => {
-            let (file, line) = error.file_and_line();
-            let place = error.place();
-            let arguments = (
-                error.to_string(),
-                file.map(|file| file.display().to_string()),
-                line,
-                place.map(|place| place.column),
-                place.map(|place| place.name.clone()),
-            );
+        _ => {
+            let place = &error.place;
+            let file = Some(place.path.display().to_string()).filter(|file| !file.is_empty());
+            let (column, name) = place.column.clone().unzip();
+            let arguments = (error.to_string(), file, place.line, column, name);
             own(py, "LogError", arguments)
         }
     }
@@ -58,23 +53,21 @@ pub fn of_log(py: Python<'_>, error: &LogError) -> PyErr {
 
 /// A log that arrays made, by argument and row: a header stands above its rows.
 pub fn of_arrays(py: Python<'_>, error: &LogError, arguments: &[(String, String)]) -> PyErr {
-    let Some(place) = error.place() else {
+    let place = &error.place;
+    let named = |(header, _): &&(String, String)| {
+        (place.column.as_ref()).is_some_and(|(_, name)| name == header)
+    };
+    let row = place.line.and_then(|line| line.checked_sub(2));
+    let (Some((_, argument)), Some(row)) = (arguments.iter().find(named), row) else {
         return of_log(py, error);
     };
-    let argument = arguments.iter().find(|(column, _)| *column == place.name);
-    let Some(((_, argument), row)) = argument.zip(place.line.checked_sub(2)) else {
-        return of_log(py, error);
-    };
-    let text = error.to_string();
-    let said = text.strip_prefix(&place.to_string()).unwrap_or(&text);
-    let arguments = (
-        format!("{argument}[{row}]{said}"),
-        None::<String>,
-        row,
-        place.column,
-        argument.clone(),
-    );
-    own(py, "LogError", arguments)
+    let said = format!("{argument}[{row}]: {}", error.problem);
+    let column = place.column.as_ref().map(|(column, _)| *column);
+    own(
+        py,
+        "LogError",
+        (said, None::<String>, row, column, argument),
+    )
 }
 
 /// A log that is no good for a calibration.
@@ -96,8 +89,8 @@ pub fn of_calibrate(py: Python<'_>, error: &CalibrateError) -> PyErr {
 
 pub fn of_stage(error: &StageError) -> PyErr {
     match error {
-        StageError::Source(source) => match source {
-            SourceError::NotFound { .. } => PyFileNotFoundError::new_err(error.to_string()),
+        StageError::Source(source) => match source.problem {
+            SourceProblem::NotFound => PyFileNotFoundError::new_err(error.to_string()),
             _ => PyOSError::new_err(error.to_string()),
         },
         _ => PyValueError::new_err(error.to_string()),

@@ -1,5 +1,6 @@
 //! A calibration judged on another log.
 
+use crate::choice::chosen;
 use crate::error::{of_log, wrong};
 use crate::finding;
 use crate::log::Log;
@@ -40,12 +41,9 @@ impl Evaluation {
         (delta, limit): (Option<&str>, Option<f64>),
     ) -> PyResult<Self> {
         let started = Instant::now();
-        let zeros = match delta {
-            None => None,
-            Some("fit") => Some(Zeros::Refit),
-            Some("zero") => Some(Zeros::None),
-            Some(other) => return Err(wrong("delta", format!("`{other}` is none of fit, zero"))),
-        };
+        let zeros = delta
+            .map(|name| chosen::<Zeros>("delta", name))
+            .transpose()?;
         if limit.is_some_and(|limit| !(limit.is_finite() && limit > 0.0)) {
             return Err(wrong("limit", "a factor above zero is needed"));
         }

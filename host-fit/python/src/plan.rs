@@ -1,6 +1,7 @@
 //! The run to make, and its rehearsal on a simulated stage.
 
 use crate::arrays::{slice, table};
+use crate::choice::chosen;
 use crate::error::{internal, of_log, of_output, wrong};
 use crate::log::Log;
 use crate::minimize::whole;
@@ -13,14 +14,11 @@ use host_fit::output::write_atomically;
 use host_fit::plan::{self, PERIODS_MAX, SECONDS_MAX};
 use host_fit::report::plan::{figures, tables};
 use host_fit::report::table::as_text;
-use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::log_text::log_csv;
 use host_fit::simulate::plan_file;
 use host_fit::simulate::pose::StagePose;
 use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
-use host_fit::simulate::recording::{RecordError, record, record_in};
-use host_fit::simulate::sensors::SensorErrors;
-use host_fit::simulate::thermal::{Climate, Thermal};
+use host_fit::simulate::recording::{RecordError, record_stage};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
@@ -105,7 +103,7 @@ pub struct SimulatedLog {
 /// Records a run of a simulated stage: magnets and their fields, rigid motion, noise, drift, converters; nothing
 /// of the models that are fitted.
 ///
-/// `run`: a `Plan`; "paper", "combined" or "service", the protocols of the program; or poses, (n, 6), X, Y, Rz,
+/// `run`: a `Plan`; "paper", "combined", "service" or "day", the protocols of the program; or poses, (n, 6), X, Y, Rz,
 /// Z, Rx, Ry in m and rad, one for each servo period. `seed`: which stage, and its noise: an even one has magnets
 /// as designed, an odd one imperfect magnets. `hour`: begins the run at this hour of a working day, -24 to 24
 /// (work begins at 0), and the stage follows the temperatures of the day; `[temperature]` of the stage names
@@ -126,23 +124,15 @@ pub fn simulate<'py>(
     if hour.is_some_and(|hour| !(-24.0..=24.0).contains(&hour)) {
         return Err(wrong("hour", "-24 to 24 h of the day are possible"));
     }
-    if hour.is_some() && designed.temperature.columns == [None, None] {
-        return Err(wrong("hour", "[temperature] of the stage names no column"));
-    }
     let recorded = work::run(py, || {
-        let assembly = Assembly::draw(&designed, seed);
-        let errors = &SensorErrors::USUAL;
-        let recording = match hour {
-            None => record(&designed, &assembly, run, errors, seed)?,
-            Some(hour) => {
-                let in_day = (&assembly, &Thermal::draw(seed));
-                record_in(&designed, in_day, Climate::Day { hour }, run, errors, seed)?
-            }
-        };
+        let recording = record_stage(&designed, run, hour, seed)?;
         let csv = log_csv(&recording, &designed);
         Ok((read(csv, &designed), recording.truth.concat()))
     })?;
-    let (reading, truth) = recorded.map_err(|error: RecordError| wrong("run", error))?;
+    let (reading, truth) = recorded.map_err(|error: RecordError| match error {
+        RecordError::NoTemperature => wrong("hour", error),
+        error => wrong("run", error),
+    })?;
     let log = Log {
         reading: Arc::new(reading.map_err(|error| of_log(py, &error))?),
         designed,
@@ -170,17 +160,8 @@ fn read_seed(given: &Bound<'_, PyAny>) -> PyResult<u64> {
 
 /// What is run. Poses are rounded as in a file, so that the noise, which follows from them, is the same, too.
 fn run_of(run: &Bound<'_, PyAny>, period_s: f64, seed: u64) -> PyResult<Run> {
-    let protocol = |name: &str| match name {
-        "paper" => Ok(Protocol::Paper),
-        "combined" => Ok(Protocol::Combined),
-        "service" => Ok(Protocol::Service),
-        _ => Err(wrong(
-            "run",
-            format!("{name:?} is none of paper, combined, service"),
-        )),
-    };
     if let Ok(name) = run.extract::<String>() {
-        return Ok(protocol(&name)?.run(period_s, seed));
+        return Ok(chosen::<Protocol>("run", &name)?.run(period_s, seed));
     }
     let csv = match run.cast::<Plan>() {
         Ok(plan) => plan.get().csv(),

@@ -4,12 +4,14 @@ mod pace;
 
 use crate::bus::BusAddress;
 use crate::bus::live::{Bus, BusError};
+use crate::calibrate::arguments::{between, choice};
 use crate::input::dataset::LoggedFrame;
 use crate::input::log::{LogError, LogRow, LogRows, ReadOptions};
 use crate::input::stage::{Stage, StageError};
 use crate::interrupt;
 use crate::output::is_standard;
 use crate::progress::Progress;
+use clap::Args;
 use hal_adapters::can::sensor::{self, TemperatureSender};
 use hal_adapters::can::{BusFrame, Layout};
 use pace::Pacer;
@@ -19,20 +21,30 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// What is played, and how.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Args)]
 pub struct ReplaySettings {
-    /// The log; it needs no reference.
+    /// The log: CSV or CSV.gz, or `-` for standard input; it needs no reference.
+    #[arg(value_name = "LOG")]
     pub log: PathBuf,
-    /// The stage file.
+    /// The stage as designed.
+    #[arg(long, value_name = "FILE", default_value = "stage.toml")]
     pub stage: PathBuf,
-    /// The interface, and the number of the node.
-    pub address: BusAddress,
+    /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
+    #[arg(long, value_name = "IFACE")]
+    pub can: BusAddress,
     /// How many times faster than it was logged.
+    #[arg(long, value_name = "X", default_value = "1", value_parser = rate)]
     pub rate: f64,
-    /// How codes are put into frames; the narrowest that holds them if `None`.
-    pub layout: Option<Layout>,
+    /// How codes are put into frames.
+    #[arg(long, value_parser = choice::<Option<Layout>>(), default_value = "auto")]
+    pub layout: std::option::Option<Layout>,
     /// Stop after so many rows.
+    #[arg(long, value_name = "N")]
     pub rows: Option<usize>,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    between(text, 1e-3, 1e6, "a number")
 }
 
 /// Why a replay ended early.
@@ -111,8 +123,7 @@ pub fn run(settings: &ReplaySettings) -> Result<Replayed, ReplayError> {
         _ if is_standard(&settings.log) => 0,
         _ => rows_of(&settings.log, &stage)?.min(most),
     };
-    let bus =
-        Bus::open(&settings.address, &[]).map_err(|cause| ReplayError::Bus { cause, rows: 0 })?;
+    let bus = Bus::open(&settings.can, &[]).map_err(|cause| ReplayError::Bus { cause, rows: 0 })?;
     let mut player = Player {
         layout,
         bus,

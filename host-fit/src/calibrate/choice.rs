@@ -2,13 +2,16 @@
 
 use crate::fit::ModelChoice;
 use crate::input::log::BadRows;
+use crate::judge::Zeros;
 use crate::output::pose_file::PoseFormat;
 use crate::problem::draw::Draw;
 use crate::problem::model::MODELS;
+use crate::simulate::protocol::Protocol;
 use crate::solve::field::update::Change;
 use crate::solve::robust::Loss;
 use crate::solve::search::kind::SearchKind;
 use crate::solve::{Projection, Solver};
+use hal_adapters::can::Layout;
 
 /// A type whose values are chosen by name.
 pub trait Choice: Clone + Send + Sync + 'static {
@@ -43,6 +46,16 @@ values! {
         Stratified: "stratified", "Each movement gives its share, so that none is missed while N is at least their number";
         Plain: "plain", "As the paper draws: any row with the same chance. Most draws of 200 rows out of 57 movements miss one, whose zero deviation then is free";
     }
+    Zeros<'static> {
+        Refit: "fit", "Refit them for each movement";
+        None: "zero", "None: as the target reads without a re-zero";
+    }
+    Protocol {
+        Paper: "paper", "The paper's: at the 19 settings of its Table 6, a sine along Y, X and Rz in turn";
+        Combined: "combined", "All six axes at once, 8 movements of 8 s";
+        Service: "service", "As combined, other trajectories, interferometers zeroed truly";
+        Day: "day", "A working day: 37 pieces of service, one each quarter of an hour, each after 0.4 s at rest";
+    }
     BadRows {
         Refuse: "refuse", "Stop at the first and say where it is";
         Skip: "skip", "Leave them out and count them";
@@ -56,6 +69,20 @@ values! {
     PoseFormat {
         Csv: "csv", "Text";
         Npy: "npy", "A structured array for numpy.load, in SI units, the decoder's words bit for bit";
+    }
+}
+
+impl Choice for Option<Layout> {
+    fn all() -> Vec<(Self, &'static str, &'static str)> {
+        vec![
+            (
+                None,
+                "auto",
+                "As the converters' codes, or the record, need it",
+            ),
+            (Some(Layout::Bits16), "16", "16 bits: two frames a tick"),
+            (Some(Layout::Bits24), "24", "24 bits: three frames a tick"),
+        ]
     }
 }
 

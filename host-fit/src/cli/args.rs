@@ -1,19 +1,15 @@
 //! What several commands take: logs and their stage, numbers, the library's own choices by name.
 
-use crate::calibrate::Choice;
+use crate::calibrate::arguments::between;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::input::log::{self, LogReading, ReadOptions};
 use crate::input::stage::Stage;
 use crate::output::Outputs;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
-use hal_adapters::can::Layout;
-use runtime::OnInvalid;
+use clap::Args;
 use runtime::parameters::Text;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::time::Duration;
 
 /// The stage file of a command.
 #[derive(Debug, Args)]
@@ -129,19 +125,6 @@ impl FromStr for Train {
     }
 }
 
-/// A number between two ends, both included.
-pub(super) fn between(text: &str, low: f64, high: f64, what: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if (low..=high).contains(&number) => Ok(number),
-        _ => Err(format!("expected {what} from {low} to {high}")),
-    }
-}
-
-/// How long a bus is watched.
-pub(super) fn seconds(text: &str) -> Result<Duration, String> {
-    between(text, 1e-9, 1e9, "a number of seconds").map(Duration::from_secs_f64)
-}
-
 /// A length of movements: `--split`.
 fn movement_seconds(text: &str) -> Result<f64, String> {
     between(text, 1e-3, 1e6, "a number of seconds")
@@ -150,48 +133,4 @@ fn movement_seconds(text: &str) -> Result<f64, String> {
 /// A text that goes into a blob.
 pub(super) fn blob_text(value: &str) -> Result<Text, &'static str> {
     Text::try_from(value).map_err(|_| "at most 32 bytes fit in the blob")
-}
-
-/// Parses a [`Choice`].
-pub(super) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
-    let value = |(_, name, help): (T, &'static str, &'static str)| match help {
-        "" => PossibleValue::new(name),
-        help => PossibleValue::new(name).help(help),
-    };
-    PossibleValuesParser::new(T::all().into_iter().map(value)).try_map(|name| {
-        let found = T::all().into_iter().find(|(_, known, _)| *known == name);
-        found.map(|(value, ..)| value).ok_or("not a known value")
-    })
-}
-
-/// How codes are put into frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum LayoutChoice {
-    /// As the converters' codes, or the record, need it.
-    Auto,
-    /// 16 bits: two frames a tick.
-    #[value(name = "16")]
-    Bits16,
-    /// 24 bits: three frames a tick.
-    #[value(name = "24")]
-    Bits24,
-}
-
-impl LayoutChoice {
-    /// The layout; `None` for the one that is needed.
-    pub(super) const fn layout(self) -> Option<Layout> {
-        match self {
-            Self::Auto => None,
-            Self::Bits16 => Some(Layout::Bits16),
-            Self::Bits24 => Some(Layout::Bits24),
-        }
-    }
-}
-
-/// What an invalid field reads with `--hold N`.
-pub(super) const fn on_invalid(hold: u16) -> OnInvalid {
-    match hold {
-        0 => OnInvalid::Zero,
-        ticks => OnInvalid::Hold { ticks },
-    }
 }

@@ -1,6 +1,7 @@
 //! `host-fit compare`.
 
-use super::args::{Logs, Threads, Train, choice};
+use super::args::{Logs, Threads, Train};
+use crate::calibrate::arguments::choice;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::compare::curves::{Course, history_csv, plot, runs_csv};

@@ -1,7 +1,7 @@
 //! `host-fit decode`.
 
-use super::args::choice;
-use super::args::{StageFile, on_invalid};
+use super::args::StageFile;
+use crate::calibrate::arguments::{choice, hold};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::input::stage::Stage;
@@ -13,7 +13,7 @@ use crate::problem::model::Model;
 use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::posterior::Posterior;
 use clap::Args;
-use runtime::ParameterSet;
+use runtime::{OnInvalid, ParameterSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -32,8 +32,8 @@ pub(super) struct DecodeArgs {
     #[arg(long, value_name = "pose.csv")]
     out: PathBuf,
     /// Repeat the last valid pose for at most so many rows where codes are bad.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    hold: u16,
+    #[arg(long, value_name = "N", default_value = "0", value_parser = hold)]
+    hold: OnInvalid,
     /// Add the standard uncertainty of X, Y, Rz to each line, by parameters and noise: three
     /// columns. For a blob of the field model with its posterior beside it.
     #[arg(long)]
@@ -60,7 +60,7 @@ pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     }
     let settings = DecodeSettings {
         decoder: &set.decoder(),
-        on_invalid: on_invalid(args.hold),
+        on_invalid: args.hold,
         posterior: posterior.as_ref(),
         format: args.format,
     };

@@ -15,12 +15,13 @@ use crate::bus::import::ImportError;
 use crate::bus::update::{UpdateError, UpdateRunError};
 use crate::calibrate::{CalibrateError, Mismatch, NOT_WRITTEN};
 use crate::fit::FitError;
-use crate::input::log::LogError;
-use crate::input::source::SourceError::Interrupted;
+use crate::input::log::{LogError, LogProblem};
+use crate::input::source::SourceProblem::Interrupted;
 use crate::interrupt;
 use crate::output::export::ExportError;
 use crate::plan::PlanError;
 use crate::recalibrate::RecalibrateError;
+use crate::simulate::recording::RecordError;
 use std::error::Error;
 use std::fmt::{self, Display, Formatter};
 
@@ -134,6 +135,9 @@ fn end_of(error: &(dyn Error + 'static)) -> (u8, &'static str) {
             "the calibration was not brought up to date, and no parameter blob was written: ",
         );
     }
+    if let Some(RecordError::NoTemperature) = error.downcast_ref() {
+        return (2, "");
+    }
     match error.downcast_ref() {
         Some(ExportError::NoSlot { .. } | ExportError::Unaligned { .. }) => (2, ""),
         _ => (3, ""),
@@ -142,23 +146,23 @@ fn end_of(error: &(dyn Error + 'static)) -> (u8, &'static str) {
 
 /// Whether Ctrl-C ended the work.
 fn is_interrupted(error: &(dyn Error + 'static)) -> bool {
-    let source = match (error.downcast_ref(), error.downcast_ref()) {
-        (Some(LogError::Source(source)), _)
-        | (_, Some(ImportError::Bus(source) | ImportError::Reference(LogError::Source(source)))) => {
-            Some(source)
-        }
+    let of_import = match error.downcast_ref() {
+        Some(ImportError::Log(error)) => Some(error),
         _ => None,
     };
+    let log: Option<&LogError> = error.downcast_ref().or(of_import);
     let dialog = match error.downcast_ref() {
         Some(UpdateRunError::Dialog { cause, .. }) => Some(cause),
         _ => None,
     };
-    matches!(source, Some(Interrupted { .. })) || matches!(dialog, Some(UpdateError::Interrupted))
+    log.is_some_and(|error| matches!(error.problem, LogProblem::Source(Interrupted)))
+        || matches!(dialog, Some(UpdateError::Interrupted))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::log::Place;
     use crate::output::blob_file::BlobFileError;
     use crate::solve::SolveError;
 
@@ -169,7 +173,8 @@ mod tests {
             cause: runtime::BlobError::Erased,
         };
         assert_eq!(HostError::from(blob).exit_status(), 3);
-        assert_eq!(HostError::from(LogError::NoLog).exit_status(), 3);
+        let refused = |problem| HostError::from(Place::of("log.csv", None).refuse(problem));
+        assert_eq!(refused(LogProblem::NoLog).exit_status(), 3);
         assert_eq!(HostError::usage("--train", "0 rows").exit_status(), 2);
         let fit = FitError::from(SolveError::NoPlanarMotion);
         assert_eq!(HostError::from(fit).exit_status(), 4);
@@ -177,9 +182,6 @@ mod tests {
         assert_eq!(HostError::from(plan).exit_status(), 4);
         let interrupted = HostError::interrupted("nothing was written");
         assert_eq!(interrupted.exit_status(), 130);
-        let source = Interrupted {
-            path: "log.csv".into(),
-        };
-        assert_eq!(HostError::from(LogError::Source(source)).exit_status(), 130);
+        assert_eq!(refused(Interrupted.into()).exit_status(), 130);
     }
 }

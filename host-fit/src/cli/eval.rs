@@ -2,6 +2,7 @@
 
 use super::args::{Json, Logs};
 use super::report::{Report, finish};
+use crate::calibrate::arguments::choice;
 use crate::calibrate::{EvalOrder, Judged};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -9,18 +10,9 @@ use crate::input::log;
 use crate::judge::Zeros;
 use crate::output::{Outputs, blob_file, posterior_file};
 use crate::report::table::tables;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
-
-/// How `eval` treats zero deviations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum DeltaChoice {
-    /// Refit them for each movement.
-    Fit,
-    /// None: as the target reads without a re-zero.
-    Zero,
-}
 
 /// Arguments of `eval`.
 #[derive(Debug, Args)]
@@ -31,8 +23,8 @@ pub(super) struct EvalArgs {
     #[command(flatten)]
     logs: Logs,
     /// Zero deviations; as the blob's model has them if not given: models (12) and (15) have none.
-    #[arg(long, value_enum)]
-    delta: Option<DeltaChoice>,
+    #[arg(long, value_parser = choice::<Zeros<'static>>())]
+    delta: Option<Zeros<'static>>,
     /// Largest rms error, in terms of that of the logs that the blob was fitted to: 3 if not given,
     /// and 10 for models (12) to (31), whose own logs may not show what they lack.
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
@@ -65,10 +57,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         })
     })?;
     let order = EvalOrder {
-        zeros: args.delta.map(|delta| match delta {
-            DeltaChoice::Fit => Zeros::Refit,
-            DeltaChoice::Zero => Zeros::None,
-        }),
+        zeros: args.delta,
         limit: args.limit,
     };
     // What is known of k and h stands beside the blob.

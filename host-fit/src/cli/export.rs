@@ -1,6 +1,6 @@
 //! `host-fit export`.
 
-use super::args::choice;
+use crate::calibrate::arguments::choice;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::blob_file;

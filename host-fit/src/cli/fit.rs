@@ -1,7 +1,8 @@
 //! `host-fit fit`.
 
-use super::args::{Json, Logs, Threads, Train, blob_text, choice};
+use super::args::{Json, Logs, Threads, Train, blob_text};
 use super::report::finish;
+use crate::calibrate::arguments::choice;
 use crate::calibrate::{FitOrder, Limits, checked, loss_of, warnings_of};
 use crate::cli::error::HostError;
 use crate::cli::terminal;

@@ -30,6 +30,9 @@ mod terminal;
 mod threads;
 mod update;
 
+use crate::bus::import::ImportSettings;
+use crate::bus::live::LiveSettings;
+use crate::bus::replay::ReplaySettings;
 use crate::calibrate::other_scales;
 use crate::cli::error::HostError;
 use crate::input::stage::Stage;
@@ -102,7 +105,7 @@ commands! {
     /// Bring a parameter blob up to date by a few seconds of log.
     Recalibrate(recalibrate::RecalibrateArgs) => recalibrate::run,
     /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
-    Import(import::ImportArgs) => import::run,
+    Import(ImportSettings) => import::run,
     /// Decode a log with a parameter blob, by the code that runs on the target.
     Decode(decode::DecodeArgs) => decode::run,
     /// Show what a parameter blob holds.
@@ -112,11 +115,11 @@ commands! {
     /// Write a parameter blob as the file that a flash tool takes.
     Export(export::ExportArgs) => export::run,
     /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
-    Live(live::LiveArgs) => live::run,
+    Live(LiveSettings) => live::run,
     /// Record the codes of a controller's own converter from a CAN bus (Linux).
     Record(record::RecordArgs) => record::run,
     /// Play a log onto a CAN bus as the sensor node would send it (Linux).
-    Replay(replay::ReplayArgs) => replay::run,
+    Replay(ReplaySettings) => replay::run,
     /// Show which controller is on a CAN bus, and which parameters it runs (Linux).
     Identify(identify::IdentifyArgs) => identify::run,
     /// Store new parameters in a controller over a CAN bus (Linux).

@@ -1,8 +1,8 @@
 //! `host-fit recalibrate`.
 
-use super::args::choice;
 use super::args::{Json, Logs};
 use super::report::finish;
+use crate::calibrate::arguments::choice;
 use crate::calibrate::{figures_of_recalibration, warnings_of_recalibration};
 use crate::cli::error::HostError;
 use crate::finding::{self, Severity};

@@ -1,29 +1,19 @@
 //! `host-fit simulate`.
 
-use super::args::{StageFile, between, choice};
+use super::args::StageFile;
+use crate::calibrate::arguments::{between, choice};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
-use crate::simulate::assembly::{Assembly, Magnets};
+use crate::simulate::assembly::Magnets;
 use crate::simulate::log_text::{log_csv, truth_csv};
 use crate::simulate::plan_file;
 use crate::simulate::protocol::{Protocol, Run};
-use crate::simulate::recording::{record, record_in};
-use crate::simulate::sensors::SensorErrors;
-use crate::simulate::thermal::{Climate, Thermal};
+use crate::simulate::recording::record_stage;
 use clap::Args;
 use flate2::{Compression, write::GzEncoder};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-
-crate::calibrate::values! {
-    Protocol {
-        Paper: "paper", "The paper's: at the 19 settings of its Table 6, a sine along Y, X and Rz in turn";
-        Combined: "combined", "All six axes at once, 8 movements of 8 s";
-        Service: "service", "As combined, other trajectories, interferometers zeroed truly";
-        Day: "day", "A working day: 37 pieces of service, one each quarter of an hour, each after 0.4 s at rest";
-    }
-}
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
@@ -73,30 +63,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
             return Err(HostError::usage("--protocol", problem));
         }
     };
-    let (seed, errors) = (args.seed, &SensorErrors::USUAL);
-    let assembly = Assembly::draw(&stage, seed);
-    let hour = args
-        .hour
-        .or_else(|| (args.protocol? == Protocol::Day).then_some(0.0));
-    let recording = match hour {
-        None => record(&stage, &assembly, run, errors, seed)?,
-        Some(_) if stage.temperature.columns == [None, None] => {
-            let problem = "the stage file names no column for a temperature: add [temperature] with mount = \"mount_mc\", \
-                           body = \"body_mc\" and unit = \"mC\"";
-            return Err(HostError::usage("--hour", problem));
-        }
-        Some(hour) => {
-            let stage_in_day = (&assembly, &Thermal::draw(seed));
-            record_in(
-                &stage,
-                stage_in_day,
-                Climate::Day { hour },
-                run,
-                errors,
-                seed,
-            )?
-        }
-    };
+    let recording = record_stage(&stage, run, args.hour, args.seed)?;
     let mut outputs = Outputs::default();
     if let Some(path) = truth {
         outputs.add(path, &bytes(path, truth_csv(&recording))?)?;

@@ -1,7 +1,5 @@
 //! Text in UTF-16, as spreadsheets and instruments under Windows save it, turned into UTF-8.
 
-use std::ops::Range;
-
 /// The first bytes of UTF-16, and whether the low byte of a character comes first.
 const MARKS: [([u8; 2], bool); 2] = [([0xff, 0xfe], true), ([0xfe, 0xff], false)];
 
@@ -49,13 +47,13 @@ impl Utf16 {
     /// Appends the next piece to `text` as UTF-8; `is_last`: nothing follows.
     ///
     /// # Errors
-    /// The first bytes that are no character, from 0.
+    /// The place of the first byte that is no character, from 0.
     pub(super) fn append(
         &mut self,
         piece: &[u8],
         is_last: bool,
         text: &mut Vec<u8>,
-    ) -> Result<(), Range<usize>> {
+    ) -> Result<(), usize> {
         self.rest.extend_from_slice(piece);
         let bytes = std::mem::take(&mut self.rest);
         let (pairs, odd) = bytes.as_chunks::<2>();
@@ -67,12 +65,11 @@ impl Utf16 {
         let half = pairs.last().filter(first_half).filter(|_| !is_last);
         let whole = pairs.len() - usize::from(half.is_some());
         if is_last && !odd.is_empty() {
-            let end = self.taken + bytes.len();
-            return Err(end - odd.len()..end);
+            return Err(self.taken + bytes.len() - odd.len());
         }
         let pairs = pairs.get(..whole).unwrap_or_default();
         for character in char::decode_utf16(pairs.iter().map(unit)) {
-            let character = character.map_err(|_| self.taken..self.taken + 2)?;
+            let character = character.map_err(|_| self.taken)?;
             self.taken += 2 * character.len_utf16();
             text.extend_from_slice(character.encode_utf8(&mut [0; 4]).as_bytes());
         }
@@ -86,7 +83,7 @@ mod tests {
     use super::*;
 
     /// The text in pieces of so many bytes; `None` if it is not UTF-16.
-    fn decoded(bytes: &[u8], piece: usize) -> Option<Result<Vec<u8>, Range<usize>>> {
+    fn decoded(bytes: &[u8], piece: usize) -> Option<Result<Vec<u8>, usize>> {
         let (mut decoder, mark) = Utf16::of_start(bytes)?;
         let mut text = Vec::new();
         for piece in bytes[mark..].chunks(piece) {
@@ -110,8 +107,8 @@ mod tests {
                 let marked = [&mark[..], bytes].concat();
                 assert_eq!(decoded(&marked, piece), want);
                 let cut = |bytes: usize| decoded(&marked[..marked.len() - bytes], piece);
-                assert_eq!(cut(1), Some(Err(38..39)));
-                assert_eq!(cut(2), Some(Err(36..38)));
+                assert_eq!(cut(1), Some(Err(38)));
+                assert_eq!(cut(2), Some(Err(36)));
             }
         }
         for other in [text, "", "a", "0,1,2,3,4,5,6,7,8,9"] {

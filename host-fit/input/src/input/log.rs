@@ -14,7 +14,7 @@ mod decimal;
 mod error;
 pub mod header;
 pub mod layout;
-mod lines;
+pub mod lines;
 pub mod order;
 mod preamble;
 mod record;
@@ -27,7 +27,7 @@ pub mod units;
 mod warning;
 
 pub use cell::CellFault;
-pub use error::{CellPlace, LogError};
+pub use error::{LogError, LogProblem, Place};
 pub use stream::{LogEnd, LogRow, LogRows};
 
 use crate::finding::Finding;
@@ -225,7 +225,7 @@ fn read_texts<'t>(
             take(log, &row);
             if options.rows_max.is_none() && sampler.rows_read() > ROWS_HELD_MAX {
                 let limit = ROWS_HELD_MAX;
-                return Err(LogError::TooManyRows { path, limit });
+                return Err(Place::of(path, None).refuse(LogProblem::TooManyRows { limit }));
             }
         }
         let end = rows.end()?;
@@ -239,16 +239,14 @@ fn read_texts<'t>(
             has_reference: end.has_reference,
         };
         if let Some(first) = sampler.end_log(source) {
-            return Err(LogError::SameLog {
-                path,
-                first: first.path.clone(),
-            });
+            let first = first.path.clone();
+            return Err(Place::of(path, None).refuse(LogProblem::SameLog { first }));
         }
         hash = end.hash.unwrap_or_default();
         logs += 1;
     }
     if logs == 0 {
-        return Err(LogError::NoLog);
+        return Err(Place::of("", None).refuse(LogProblem::NoLog));
     }
     reading.dataset = sampler.into_dataset(hash.finalize().into());
     reading.dataset.compensate_as_expected(&stage.temperature);
@@ -300,8 +298,7 @@ impl LogReading {
                 take(log, &row);
             }
             if source.rows_read != count {
-                let path = path.clone();
-                return Err(LogError::Changed { path });
+                return Err(Place::of(path, None).refuse(LogProblem::Changed));
             }
         }
         Ok(())

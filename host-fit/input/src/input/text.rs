@@ -4,7 +4,7 @@
 
 use super::binary;
 use super::encoding::Utf16;
-use super::source::{self, Raw, SourceError};
+use super::source::{self, Raw, SourceError, SourceProblem};
 use super::unpack::Unpacked;
 use sha2::{Digest, Sha256};
 use std::fs::File;
@@ -31,7 +31,8 @@ impl<'a> TextReader<'a> {
     /// # Errors
     /// Every variant of [`SourceError`] but `TooLarge` and `Utf16`.
     pub fn open(path: &Path) -> Result<Self, SourceError> {
-        Self::new(Unpacked::open(path)?, source::shown_name(path))
+        let raw = Raw::open(path).map_err(|problem| problem.of(path))?;
+        Self::new(raw, path)
     }
 
     /// Opens a file, and the copy that is made of it while it is read, if it can be read but once: see
@@ -40,9 +41,8 @@ impl<'a> TextReader<'a> {
     /// # Errors
     /// As [`Self::open`], and those of the copy.
     pub fn open_to_read_again(path: &Path) -> Result<(Self, Option<File>), SourceError> {
-        let (raw, copy) = Raw::open_copied(path)?;
-        let shown = source::shown_name(path);
-        Ok((Self::new(Unpacked::of_raw(raw, shown)?, shown)?, copy))
+        let (raw, copy) = Raw::open_copied(path).map_err(|problem| problem.of(path))?;
+        Ok((Self::new(raw, path)?, copy))
     }
 
     /// Opens the copy of a file that was read; `path` is only named in errors.
@@ -50,10 +50,9 @@ impl<'a> TextReader<'a> {
     /// # Errors
     /// As [`Self::open`].
     pub fn open_copy(copy: &'a File, path: &Path) -> Result<Self, SourceError> {
-        let (mut copy, shown) = (copy, source::shown_name(path));
-        copy.rewind()
-            .map_err(|error| source::refused(shown, error))?;
-        Self::of_reader(copy, shown)
+        let mut copy = copy;
+        (copy.rewind()).map_err(|error| SourceProblem::from(error).of(path))?;
+        Self::of_reader(copy, path)
     }
 
     /// The text that a reader gives, as bytes in memory do, plain or gzip; `path` is only named in errors.
@@ -61,19 +60,25 @@ impl<'a> TextReader<'a> {
     /// # Errors
     /// `Binary`, `Unreadable`, and those of gzip.
     pub fn of_reader(reader: impl Read + Send + 'a, path: &Path) -> Result<Self, SourceError> {
-        Self::new(Unpacked::of_raw(Raw::of_reader(reader, path), path)?, path)
+        Self::new(Raw::of_reader(reader), path)
     }
 
-    fn new(mut unpacked: Unpacked<'a>, path: &Path) -> Result<Self, SourceError> {
+    fn new(raw: Raw<'a>, path: &Path) -> Result<Self, SourceError> {
+        Self::probed(raw, path).map_err(|problem| problem.of(path))
+    }
+
+    fn probed(raw: Raw<'a>, path: &Path) -> Result<Self, SourceProblem> {
+        let mut unpacked = Unpacked::new(raw)?;
         let mut mark = Vec::new();
-        let probe = (&mut unpacked).take(binary::PROBE_BYTES as u64);
-        source::read_to_end(probe, &mut mark, path)?;
+        (&mut unpacked)
+            .take(binary::PROBE_BYTES as u64)
+            .read_to_end(&mut mark)?;
         let (utf16, bytes) = Utf16::of_start(&mark).unzip();
         let is_marked = mark.starts_with(BYTE_ORDER_MARK);
         let start =
             mark.split_off(bytes.unwrap_or(if is_marked { BYTE_ORDER_MARK.len() } else { 0 }));
         let mut text = Self {
-            path: path.to_path_buf(),
+            path: source::shown_name(path).to_path_buf(),
             bytes: Cursor::new(start.clone()).chain(unpacked),
             utf16: utf16.clone(),
             mark,
@@ -83,27 +88,31 @@ impl<'a> TextReader<'a> {
         text.utf16 = utf16;
         match binary::in_text(&start) {
             None => Ok(text),
-            Some((offset, looks_like)) => Err(SourceError::Binary {
-                path: path.to_path_buf(),
-                offset,
-                looks_like,
-            }),
+            Some((offset, looks_like)) => Err(SourceProblem::Binary { offset, looks_like }),
         }
     }
 
     /// The next piece of the text in UTF-8.
-    fn decoded(&mut self, piece: Vec<u8>, is_last: bool) -> Result<Vec<u8>, SourceError> {
+    fn decoded(&mut self, piece: Vec<u8>, is_last: bool) -> Result<Vec<u8>, SourceProblem> {
         let Some(decoder) = &mut self.utf16 else {
             return Ok(piece);
         };
         let mut text = Vec::new();
         let decoded = decoder.append(&piece, is_last, &mut text);
-        let path = self.path.clone();
-        decoded.map_err(|place| SourceError::Utf16 {
-            path,
-            offset: place.start,
-        })?;
+        decoded.map_err(|offset| SourceProblem::Utf16 { offset })?;
         Ok(text)
+    }
+
+    fn next(&mut self, bytes: usize) -> Result<Option<Vec<u8>>, SourceProblem> {
+        let mut piece = Vec::with_capacity(bytes);
+        (&mut self.bytes)
+            .take(bytes as u64)
+            .read_to_end(&mut piece)?;
+        if let Some(hash) = &mut self.hash {
+            hash.update(&piece);
+        }
+        let is_last = piece.is_empty();
+        Ok(Some(self.decoded(piece, is_last)?).filter(|_| !is_last))
     }
 
     /// Goes on with the hash of all that is read: of the decompressed file, as it is encoded.
@@ -135,13 +144,8 @@ impl<'a> TextReader<'a> {
     /// # Errors
     /// `Unreadable`, `Binary`, `Utf16`, and those of gzip.
     pub fn append(&mut self, text: &mut Vec<u8>, bytes: usize) -> Result<bool, SourceError> {
-        let mut piece = Vec::with_capacity(bytes);
-        source::read_to_end((&mut self.bytes).take(bytes as u64), &mut piece, &self.path)?;
-        let is_last = piece.is_empty();
-        if let Some(hash) = &mut self.hash {
-            hash.update(&piece);
-        }
-        text.extend(self.decoded(piece, is_last)?);
-        Ok(!is_last)
+        let more = self.next(bytes).map_err(|problem| problem.of(&self.path))?;
+        text.extend_from_slice(more.as_deref().unwrap_or_default());
+        Ok(more.is_some())
     }
 }

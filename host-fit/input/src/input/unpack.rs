@@ -1,9 +1,8 @@
 //! A file that is decompressed as it is read, if its first bytes say gzip.
 
-use super::source::{self, Raw, SourceError};
+use super::source::{Raw, SourceProblem};
 use flate2::bufread::MultiGzDecoder;
 use std::io::{BufReader, ErrorKind, Read};
-use std::path::{Path, PathBuf};
 
 /// First bytes of every gzip file, and of every member of one.
 const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
@@ -12,9 +11,8 @@ const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 const BUFFER_BYTES: usize = 64 * 1024;
 
 /// The bytes of a file, of gzip those of all members, one after the other. Errors of reading are
-/// [`SourceError`]s inside.
+/// [`SourceProblem`]s inside.
 pub(super) struct Unpacked<'a> {
-    path: PathBuf,
     source: Source<'a>,
     /// Decompressed bytes that were read.
     bytes: usize,
@@ -26,34 +24,23 @@ enum Source<'a> {
 }
 
 impl<'a> Unpacked<'a> {
-    /// Opens a file.
+    /// What is in `raw`.
     ///
     /// # Errors
-    /// `NotFound`, `IsFolder`, `Unreadable`.
-    pub(super) fn open(path: &Path) -> Result<Self, SourceError> {
-        Self::of_raw(Raw::open(path)?, source::shown_name(path))
-    }
-
-    /// What is in `raw`; `path` is only named in errors.
-    ///
-    /// # Errors
-    /// `Unreadable`, `IsFolder`.
-    pub(super) fn of_raw(mut raw: Raw<'a>, path: &Path) -> Result<Self, SourceError> {
-        let path = path.to_path_buf();
+    /// Those of reading.
+    pub(super) fn new(mut raw: Raw<'a>) -> std::io::Result<Self> {
         // The first two bytes, which a pipe may give one at a time.
         let mut start = Vec::new();
-        source::read_to_end((&mut raw).take(GZIP_MAGIC.len() as u64), &mut start, &path)?;
+        (&mut raw)
+            .take(GZIP_MAGIC.len() as u64)
+            .read_to_end(&mut start)?;
         let is_gzip = start == GZIP_MAGIC;
         let whole = BufReader::with_capacity(BUFFER_BYTES, raw.preceded_by(start)?);
         let source = match is_gzip {
             true => Source::Gzip(Box::new(MultiGzDecoder::new(whole))),
             false => Source::Plain(whole),
         };
-        Ok(Self {
-            path,
-            source,
-            bytes: 0,
-        })
+        Ok(Self { source, bytes: 0 })
     }
 
     /// How many bytes of the file were read, and how many it has; 0 where that is not known.
@@ -67,15 +54,11 @@ impl<'a> Unpacked<'a> {
 
     /// An error of the decoder, in the user's terms.
     fn damaged(&self, source: std::io::Error) -> std::io::Error {
-        let (path, bytes) = (self.path.clone(), self.bytes);
+        let bytes = self.bytes;
         match source.kind() {
-            ErrorKind::UnexpectedEof => std::io::Error::other(SourceError::GzipCut { path, bytes }),
+            ErrorKind::UnexpectedEof => std::io::Error::other(SourceProblem::GzipCut { bytes }),
             ErrorKind::InvalidInput | ErrorKind::InvalidData => {
-                std::io::Error::other(SourceError::GzipDamaged {
-                    path,
-                    bytes,
-                    source,
-                })
+                std::io::Error::other(SourceProblem::GzipDamaged { bytes, source })
             }
             // Of the file below.
             _ => source,
@@ -116,14 +99,12 @@ mod tests {
         let packed = encoder.finish().expect("in memory");
         for kind in [ErrorKind::OutOfMemory, ErrorKind::PermissionDenied] {
             let half = packed[..500].chain(Failing(kind));
-            let raw = Raw::of_reader(half, Path::new("log"));
-            let unpacked = Unpacked::of_raw(raw, Path::new("log")).expect("gzip");
-            let error = source::read_to_end(unpacked, &mut Vec::new(), Path::new("log"));
-            let is_kind = |error: SourceError| match error {
-                SourceError::Unreadable { source, .. } => source.kind() == kind,
-                _ => false,
+            let mut unpacked = Unpacked::new(Raw::of_reader(half)).expect("gzip");
+            let error = unpacked.read_to_end(&mut Vec::new()).expect_err("refused");
+            let SourceProblem::Unreadable { source } = error.into() else {
+                panic!("another problem");
             };
-            assert!(error.is_err_and(is_kind));
+            assert_eq!(source.kind(), kind);
         }
     }
 }

@@ -11,8 +11,8 @@
 
 use super::pose::StagePose;
 use super::protocol::Trajectory;
-use crate::input::log::LogError;
 use crate::input::log::table::Table;
+use crate::input::log::{CellFault, LogError};
 use crate::input::text::TextReader;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -97,7 +97,7 @@ pub fn of_text(text: TextReader<'_>, servo_period_s: f64) -> Result<Trajectory, 
         let line = table.row_line();
         let bad = |column| {
             let place = table.head.place(line, column, None);
-            move |fault| LogError::Cell { place, fault }
+            move |fault: CellFault| place.refuse(fault.into())
         };
         let t_us = table.cell(0).whole("times").map_err(bad(0))?;
         if poses.is_empty() {

@@ -27,6 +27,12 @@ pub enum RecordError {
         /// Time within it, us.
         t_us: i64,
     },
+    /// Temperatures are to be recorded, and no column is named for them.
+    #[error(
+        "the stage file names no column for a temperature: add [temperature] with mount = \"mount_mc\", \
+         body = \"body_mc\" and unit = \"mC\""
+    )]
+    NoTemperature,
 }
 
 /// What one servo period gives.
@@ -51,6 +57,28 @@ pub struct Recording {
     pub movements: Vec<Vec<Sample>>,
     /// The true poses: the run itself.
     pub truth: Vec<Vec<StagePose>>,
+}
+
+/// Runs the stage of a seed, with sensors as usual: without temperatures, or from an hour of a working day on,
+/// as a run of a day does from its beginning.
+///
+/// # Errors
+/// See [`RecordError`].
+pub fn record_stage(
+    stage: &Stage,
+    run: Run,
+    hour: Option<f64>,
+    seed: u64,
+) -> Result<Recording, RecordError> {
+    let (assembly, errors) = (Assembly::draw(stage, seed), &SensorErrors::USUAL);
+    match hour.or_else(|| run.spacing_s.map(|_| 0.0)) {
+        None => record(stage, &assembly, run, errors, seed),
+        Some(_) if stage.temperature.columns == [None, None] => Err(RecordError::NoTemperature),
+        Some(hour) => {
+            let in_day = (&assembly, &Thermal::draw(seed));
+            record_in(stage, in_day, Climate::Day { hour }, run, errors, seed)
+        }
+    }
 }
 
 /// Runs a stage. `seed` is that of noise, drift and resets, in a stream of its own for each
@@ -270,11 +298,11 @@ mod tests {
         let run = Run::planned(vec![StagePose::default(), low]);
         let assembly = Assembly::draw(&stage, 1);
         let error = record(&stage, &assembly, run, &SensorErrors::USUAL, 1).expect_err("too low");
-        let RecordError::ProbeHitsMagnet {
-            probe,
-            movement,
-            t_us,
-        } = error;
-        assert_eq!((probe, movement, t_us), ('A', 0, 2000));
+        let hit = RecordError::ProbeHitsMagnet {
+            probe: 'A',
+            movement: 0,
+            t_us: 2000,
+        };
+        assert_eq!(error, hit);
     }
 }

@@ -1,12 +1,14 @@
 //! A candump log to ticks with the times of their samples.
 
 use super::bus_log::{BusCounts, BusTick, Collector};
-use super::lines::Lines;
 use super::node_clock::{NodeClock, Run};
 use super::{ImportError, ImportSettings};
+use crate::input::log::LogError;
 use crate::input::log::layout::Quantity;
+use crate::input::log::lines::Lines;
 use crate::input::stage::{CodeScale, Stage};
 use crate::input::text::TextReader;
+use crate::progress::Progress;
 use hal_adapters::can::sensor::read_time;
 use hal_adapters::can::{NodeNumber, StampedFrame};
 use hal_adapters::candump::{LineError, LogLine};
@@ -17,7 +19,7 @@ const TICKS_MAX: usize = 3_600_000;
 /// Reads a record of the bus: the ticks of its longest run, and what it held.
 ///
 /// # Errors
-/// `Bus`, `BadLine`, `SeveralInterfaces`, `OutsideConverter`, `TwoRecords`, `TooLong`, `NoTicks`.
+/// `Log`, `BadLine`, `SeveralInterfaces`, `OutsideConverter`, `TwoRecords`, `TooLong`, `NoTicks`.
 pub(super) fn read(
     settings: &ImportSettings,
     stage: &Stage,
@@ -26,18 +28,21 @@ pub(super) fn read(
         settings,
         stage,
         line: 0,
-        interface: settings.address.as_ref().map(|at| at.interface.clone()),
+        interface: settings.interface.as_ref().map(|at| at.interface.clone()),
         node: settings
-            .address
+            .interface
             .as_ref()
             .map_or(NodeNumber::default(), |at| at.node),
         collector: Collector::new(settings.layout),
         clock: NodeClock::new(stage.servo_period_s * 1e6),
         counts: BusCounts::default(),
     };
-    let mut lines = Lines::new(TextReader::open(&settings.bus)?, "reading the bus");
-    while let Some(line) = lines.next()? {
+    let text = TextReader::open(&settings.bus).map_err(LogError::from)?;
+    let progress = Progress::new("reading the bus", text.progress().1);
+    let mut lines = Lines::new(text);
+    while let Some(line) = lines.next_line()? {
         reader.take_line(&String::from_utf8_lossy(line))?;
+        progress.reach(lines.progress().0);
         if reader.clock.timed() > TICKS_MAX {
             return Err(ImportError::TooLong {
                 path: settings.bus.clone(),
@@ -172,7 +177,7 @@ impl BusReader<'_> {
         let interface = self
             .interface
             .get_or_insert_with(|| found.interface.to_owned());
-        if interface == found.interface || self.settings.address.is_some() {
+        if interface == found.interface || self.settings.interface.is_some() {
             return Ok(interface == found.interface);
         }
         Err(ImportError::SeveralInterfaces {

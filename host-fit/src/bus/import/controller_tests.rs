@@ -116,7 +116,7 @@ fn try_import(
         offset_us: offset_us.unwrap_or(0.0),
         estimate_offset: offset_us.is_none(),
         search_s: 0.1,
-        address: None,
+        interface: None,
         layout: None,
         skip_bad_lines: false,
     };

@@ -2,7 +2,6 @@
 
 use super::join::JoinCounts;
 use crate::input::log::LogError;
-use crate::input::source::SourceError;
 use crate::input::stage::StageError;
 use crate::output::OutputError;
 use hal_adapters::candump::LineError;
@@ -14,9 +13,9 @@ pub enum ImportError {
     /// The stage file is refused.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// The record of the bus cannot be read.
+    /// The record or the reference cannot be read.
     #[error(transparent)]
-    Bus(#[from] SourceError),
+    Log(#[from] LogError),
     /// A line of the record is broken.
     #[error("{}, line {line}: {fault}; mend the line, or leave such lines out with --skip-bad-lines", path.display())]
     BadLine {
@@ -103,9 +102,6 @@ pub enum ImportError {
         /// The most there may be.
         most: usize,
     },
-    /// The log of the interferometers cannot be read.
-    #[error(transparent)]
-    Reference(#[from] LogError),
     /// It holds too few rows.
     #[error("{}: fewer than two rows of reference; record it again or name another file", path.display())]
     NoReference {

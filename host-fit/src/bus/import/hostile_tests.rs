@@ -3,8 +3,8 @@
 
 use super::tests::{OFFSET_US, candump, files, read_log, reference};
 use super::*;
-use crate::input::log::LogError;
-use crate::input::source::SourceError;
+use crate::input::log::LogProblem;
+use crate::input::source::SourceProblem;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -17,14 +17,18 @@ fn a_device_without_end_is_refused_by_its_start() {
     let (_folder, mut args) = files("", &reference());
     args.bus = zero.into();
     let refused = run(&args);
-    let binary = |error: &SourceError| matches!(error, SourceError::Binary { .. });
-    assert!(matches!(&refused, Err(ImportError::Bus(error)) if binary(error)));
+    let binary = |refused: Result<_, ImportError>| match refused {
+        Err(ImportError::Log(error)) => matches!(
+            error.problem,
+            LogProblem::Source(SourceProblem::Binary { .. })
+        ),
+        _ => false,
+    };
+    assert!(binary(refused));
     let (_folder, mut args) = files(&candump(|_, _| false), "");
     args.reference = zero.into();
     let refused = run(&args);
-    assert!(
-        matches!(&refused, Err(ImportError::Reference(LogError::Source(error))) if binary(error))
-    );
+    assert!(binary(refused));
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! The log of the interferometers.
 
 use super::ImportError;
-use crate::input::log::LogError;
 use crate::input::log::cell::{CellFault, WHOLE_MAX};
 use crate::input::log::header::{Header, Source, UnknownColumns};
 use crate::input::log::layout::{Kind, Quantity};
@@ -9,6 +8,7 @@ use crate::input::log::order::{Order, OrderCells};
 use crate::input::log::rows::{ROTATION_MAX_RAD, displacement_max_m};
 use crate::input::log::table::Table;
 use crate::input::log::time::Clock;
+use crate::input::log::{LogError, LogProblem};
 use crate::input::stage::Stage;
 use crate::input::text::TextReader;
 use std::path::Path;
@@ -74,7 +74,7 @@ impl Reference {
     /// time anew are put one period after the last, and repeated times are left out.
     ///
     /// # Errors
-    /// `Reference` for cells, time that runs backwards and movements that return; `NoReference`;
+    /// `Log` for cells, time that runs backwards and movements that return; `NoReference`;
     /// `TooLong`.
     pub(super) fn read(path: &Path, stage: &Stage) -> Result<Self, ImportError> {
         let text = TextReader::open(path).map_err(LogError::from)?;
@@ -104,7 +104,10 @@ impl Reference {
             let mut sample = cells.sample(&table, &mut clock)?;
             let (line, named) = (table.row_line(), Some(sample.movement));
             match order.take(&table.head, line, named, sample.t_us) {
-                Err(LogError::DuplicatedRow { .. }) => {
+                Err(LogError {
+                    problem: LogProblem::DuplicatedRow { .. },
+                    ..
+                }) => {
                     counts.duplicates += 1;
                     continue;
                 }
@@ -128,10 +131,9 @@ impl Reference {
             }
             if sample.t_us > WHOLE_MAX {
                 let (value, limit, unit) = (sample.t_us, WHOLE_MAX, "us");
-                return Err(ImportError::Reference(LogError::Cell {
-                    place: table.head.place(line, cells.time.cell, named),
-                    fault: CellFault::Absurd { value, limit, unit },
-                }));
+                let place = table.head.place(line, cells.time.cell, named);
+                let fault = CellFault::Absurd { value, limit, unit };
+                return Err(place.refuse(fault.into()).into());
             }
             samples.push(sample);
         }
@@ -177,9 +179,9 @@ impl Cells {
 
     /// The sample in the row in hand.
     fn sample(&self, table: &Table<'_>, clock: &mut Clock) -> Result<Sample, LogError> {
-        let bad = |cell, movement, fault: CellFault| LogError::Cell {
-            place: table.head.place(table.row_line(), cell, movement),
-            fault,
+        let bad = |cell, movement, fault: CellFault| {
+            let place = table.head.place(table.row_line(), cell, movement);
+            place.refuse(fault.into())
         };
         let movement = self.movement.map_or(Ok(0), |Source { cell, .. }| {
             let number = table.cell(cell).whole("movement numbers");

@@ -104,7 +104,7 @@ pub(super) fn files(bus: &str, reference: &str) -> (TempDir, ImportSettings) {
         offset_us: 0.0,
         estimate_offset: true,
         search_s: 0.4,
-        address: None,
+        interface: None,
         layout: None,
         skip_bad_lines: false,
     };
@@ -338,7 +338,7 @@ fn a_record_without_sensor_frames_and_one_of_two_interfaces_are_refused() {
     ));
     let (_folder, mut args) = files("", &ifm);
     args.bus = Path::new("/no/such/file").into();
-    assert!(matches!(run(&args), Err(ImportError::Bus(_))));
+    assert!(matches!(run(&args), Err(ImportError::Log(_))));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::bus::BusAddress;
 use crate::interrupt;
 use crate::output::record_file::RecordFile;
 use crate::output::{OutputError, blob_file, is_standard_output};
-use hal_adapters::can::{BusFault, BusFrame, Coded, Layout, StampedFrame};
+use hal_adapters::can::{BusFault, BusFrame, Coded, Layout, StampedFrame, Timing};
 use hal_adapters::candump::LogLine;
 use runtime::{ParameterSet, Reading};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,11 +32,14 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
         layout: layout_of(&set).ok_or_else(|| LiveError::CodesTooWide {
             path: settings.params.clone(),
         })?,
-        timing: settings.timing,
-        on_invalid: settings.on_invalid,
-        vertical_ticks: settings.vertical_ticks,
+        timing: Timing {
+            assembly_us: settings.assembly_us,
+            stale_us: settings.stale_us,
+        },
+        on_invalid: settings.hold,
+        vertical_ticks: settings.vertical_every,
     };
-    let bus = Bus::open(&settings.address, &Node::messages(node.layout))?;
+    let bus = Bus::open(&settings.can, &Node::messages(node.layout))?;
     let record = match &settings.record {
         Some(path) => Some(RecordFile::create(path).map_err(LiveError::NoRecord)?),
         None => None,
@@ -46,7 +49,7 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
     let mut session = Session {
         node: Node::new(decoder, &set.serial, &node),
         bus,
-        address: &settings.address,
+        address: &settings.can,
         record,
         record_ended: None,
         sends: !settings.listen_only,

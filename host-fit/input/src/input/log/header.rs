@@ -2,7 +2,7 @@
 
 use super::ReferenceUse;
 use super::cell::shown;
-use super::error::{CellPlace, LogError};
+use super::error::{LogError, LogProblem, Place};
 use super::layout::{Kind, LogLayout, Meaning, Quantity, UnitFault};
 use super::table::Head;
 use crate::input::stage::Stage;
@@ -104,43 +104,41 @@ impl<'a> Header<'a> {
             sources: [None; Quantity::ALL.len()],
         };
         for (cell, name) in table.names.iter().enumerate() {
+            let refuse = |problem| Err(table.place(table.line, cell, None).refuse(problem));
             let (quantity, scale) = match (header.source(cell, name), unknown) {
                 (Ok(Some(found)), _) => found,
                 (Ok(None), _) => continue,
                 (
                     Err(
-                        LogError::UnknownColumn { .. }
-                        | LogError::UnnamedColumn { .. }
-                        | LogError::NoUnit { .. },
+                        LogProblem::UnknownColumn { .. }
+                        | LogProblem::UnnamedColumn
+                        | LogProblem::NoUnit { .. },
                     ),
                     UnknownColumns::LeaveOut,
                 ) => continue,
-                (Err(error), _) => return Err(error),
+                (Err(problem), _) => return refuse(problem),
             };
             let earlier = header.sources[quantity as usize].replace(Source { cell, scale });
             if let Some(first) = earlier {
-                return Err(LogError::RepeatedColumn {
-                    place: header.place(cell),
-                    first: first.cell + 1,
-                });
+                let first = first.cell + 1;
+                return refuse(LogProblem::RepeatedColumn { first });
             }
         }
         Ok(header)
     }
 
-    /// Where the name of a column stands.
-    fn place(&self, cell: usize) -> Box<CellPlace> {
-        self.table.place(self.table.line, cell, None)
+    /// What is wrong with the header as a whole, as an error.
+    fn refused(&self, problem: LogProblem) -> LogError {
+        Place::of(&self.table.path, self.table.line).refuse(problem)
     }
 
     /// What a column holds, and m, rad, us or codes per unit; `None` if it is to be left out.
-    fn source(&self, cell: usize, name: &str) -> Result<Option<(Quantity, f64)>, LogError> {
-        let place = self.place(cell);
+    fn source(&self, cell: usize, name: &str) -> Result<Option<(Quantity, f64)>, LogProblem> {
         let below = self.table.unit(cell);
         let (quantity, unit) = match self.layout.meaning(name) {
             Meaning::Ignored => return Ok(None),
-            Meaning::Unknown if name.is_empty() => return Err(LogError::UnnamedColumn { place }),
-            Meaning::Unknown => return Err(self.unknown(place)),
+            Meaning::Unknown if name.is_empty() => return Err(LogProblem::UnnamedColumn),
+            Meaning::Unknown => return Err(self.unknown(name)),
             Meaning::Exact(quantity) => (quantity, None),
             Meaning::WithUnit(quantity, unit) => {
                 let quantity = quantity.in_unit(unit.or(Some(below)));
@@ -152,7 +150,8 @@ impl<'a> Header<'a> {
                 };
                 let Some(unit) = unit.or(fallback) else {
                     let (units, key) = (kind.units(), quantity.key());
-                    return Err(LogError::NoUnit { place, units, key });
+                    let name = shown(name.as_bytes());
+                    return Err(LogProblem::NoUnit { name, units, key });
                 };
                 (quantity, Some(unit))
             }
@@ -160,23 +159,25 @@ impl<'a> Header<'a> {
         let scale = match unit.map(|unit| self.layout.scale(quantity, unit)) {
             None => self.layout.column(quantity).scale,
             Some(Ok(scale)) => scale,
-            Some(Err(UnitFault::Unknown)) => return Err(self.unknown(place)),
+            Some(Err(UnitFault::Unknown)) => return Err(self.unknown(name)),
             Some(Err(UnitFault::NoVoltsPerCount)) => {
                 let table = quantity.table();
-                return Err(LogError::NoVoltsPerCount { place, table });
+                return Err(LogProblem::NoVoltsPerCount { table });
             }
         };
         if self.disagrees(quantity, scale, below) {
             let below = shown(below.as_bytes());
-            return Err(LogError::UnitsDisagree { place, below });
+            return Err(LogProblem::UnitsDisagree { below });
         }
         Ok(Some((quantity, scale)))
     }
 
-    fn unknown(&self, place: Box<CellPlace>) -> LogError {
+    fn unknown(&self, name: &str) -> LogProblem {
         let names = Quantity::ALL.map(|quantity| self.layout.column(quantity).name.as_str());
-        let known = names.join(", ");
-        LogError::UnknownColumn { place, known }
+        LogProblem::UnknownColumn {
+            name: shown(name.as_bytes()),
+            known: names.join(", "),
+        }
     }
 
     /// Whether the unit below the header is another than that of the column: it is of the
@@ -202,11 +203,11 @@ impl<'a> Header<'a> {
             scale: 1.0,
         }; N];
         for (source, quantity) in sources.iter_mut().zip(quantities) {
-            *source = self.find(quantity).ok_or_else(|| LogError::MissingColumn {
-                path: self.table.path.clone(),
-                line: self.table.line,
-                column: self.layout.column(quantity).name.clone(),
-                key: quantity.key(),
+            *source = self.find(quantity).ok_or_else(|| {
+                self.refused(LogProblem::MissingColumn {
+                    column: self.layout.column(quantity).name.clone(),
+                    key: quantity.key(),
+                })
             })?;
         }
         Ok(sources)
@@ -221,12 +222,8 @@ impl<'a> Header<'a> {
         let mut found = sets.iter().filter_map(|set| Some((*set, present(set)?)));
         let (first, second) = (found.next(), found.next());
         if let (Some((_, one)), Some((_, other))) = (first, second) {
-            return Err(LogError::AmbiguousColumns {
-                path: self.table.path.clone(),
-                line: self.table.line,
-                one: self.layout.column(one).name.clone(),
-                other: self.layout.column(other).name.clone(),
-            });
+            let [one, other] = [one, other].map(|q| self.layout.column(q).name.clone());
+            return Err(self.refused(LogProblem::AmbiguousColumns { one, other }));
         }
         let set = first.map_or(sets[0], |(set, _)| set);
         Ok((set, self.all(set)?))

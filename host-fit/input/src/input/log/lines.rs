@@ -1,6 +1,6 @@
 //! The lines of a text with their numbers, in little memory however long it is.
 
-use super::error::LogError;
+use super::error::{LogError, LogProblem, Place};
 use crate::input::text::TextReader;
 use sha2::Sha256;
 
@@ -14,13 +14,13 @@ pub(crate) const LINE_BYTES_MAX: usize = 1 << 20;
 pub(crate) const OPENING_BYTES: usize = 1 << 20;
 
 /// The lines of a text, one after the other; they end in LF, CRLF or CR.
-pub(super) struct Lines<'a> {
+pub struct Lines<'a> {
     text: TextReader<'a>,
     buffer: Vec<u8>,
     /// The first byte of the next line in the buffer.
     at: usize,
     /// Number of the last line, from 1.
-    pub(super) line: usize,
+    pub line: usize,
     /// Whether all of the text was read.
     is_whole: bool,
 }
@@ -36,7 +36,8 @@ pub(super) struct TextLine<'a> {
 }
 
 impl<'a> Lines<'a> {
-    pub(super) const fn new(text: TextReader<'a>) -> Self {
+    /// Of a text.
+    pub const fn new(text: TextReader<'a>) -> Self {
         Self {
             text,
             buffer: Vec::new(),
@@ -67,7 +68,7 @@ impl<'a> Lines<'a> {
     ///
     /// # Errors
     /// Those of reading, `LineTooLong`.
-    pub(super) fn next(&mut self) -> Result<Option<&[u8]>, LogError> {
+    pub fn next_line(&mut self) -> Result<Option<&[u8]>, LogError> {
         let line = loop {
             let rest = self.buffer.get(self.at..).unwrap_or_default();
             if let Some((length, taken)) = first_line(rest, self.is_whole) {
@@ -94,7 +95,7 @@ impl<'a> Lines<'a> {
     }
 
     /// How many bytes of the file were read, and how many it has; 0 where that is not known.
-    pub(super) fn progress(&self) -> (u64, u64) {
+    pub fn progress(&self) -> (u64, u64) {
         self.text.progress()
     }
 
@@ -111,11 +112,9 @@ impl<'a> Lines<'a> {
     }
 
     fn too_long(&self) -> LogError {
-        LogError::LineTooLong {
-            path: self.text.path().to_path_buf(),
-            line: self.line + 1,
+        Place::of(self.text.path(), self.line + 1).refuse(LogProblem::LineTooLong {
             limit_bytes: LINE_BYTES_MAX,
-        }
+        })
     }
 }
 
@@ -162,11 +161,11 @@ mod tests {
             let opening = lines.opening().expect("text").to_vec();
             assert!(text.as_bytes().starts_with(&opening));
             for k in 1..=90_000 {
-                let line = lines.next().expect("text").map(<[u8]>::to_vec);
+                let line = lines.next_line().expect("text").map(<[u8]>::to_vec);
                 assert_eq!(line, Some(k.to_string().into_bytes()));
                 assert_eq!(lines.line, k);
             }
-            assert!(matches!(lines.next(), Ok(None)) && !lines.is_open());
+            assert!(matches!(lines.next_line(), Ok(None)) && !lines.is_open());
         }
     }
 }

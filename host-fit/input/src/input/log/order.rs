@@ -5,7 +5,7 @@
 //! missing for more than ten of the log's own periods (its median step), or, where the user
 //! asks for it, after a given time.
 
-use super::error::LogError;
+use super::error::{LogError, LogProblem, Place};
 use super::table::Head;
 use std::collections::HashMap;
 
@@ -105,23 +105,19 @@ impl Order {
         named: Option<i64>,
         t_us: f64,
     ) -> Result<(), LogError> {
-        let place = |cell| head.place(line, cell, named);
+        let refuse = |cell, problem| Err(head.place(line, cell, named).refuse(problem));
         let (first_us, rows) = self.started;
         let restarts = named.is_none() && rows >= ROWS_MIN && t_us <= first_us;
         match self.current {
             Some((current, before_us)) if current == named && !restarts => {
                 if t_us < before_us {
-                    return Err(LogError::TimeBackwards {
-                        place: place(self.cells.time),
-                        before_us: before_us.round() as i64,
-                        t_us: t_us.round() as i64,
-                    });
+                    let (before_us, t_us) = (before_us.round() as i64, t_us.round() as i64);
+                    let problem = LogProblem::TimeBackwards { before_us, t_us };
+                    return refuse(self.cells.time, problem);
                 }
                 if t_us == before_us {
-                    return Err(LogError::DuplicatedRow {
-                        place: place(self.cells.time),
-                        t_us: t_us.round() as i64,
-                    });
+                    let t_us = t_us.round() as i64;
+                    return refuse(self.cells.time, LogProblem::DuplicatedRow { t_us });
                 }
                 let is_gap = t_us - before_us > GAP_PERIODS * self.period_us;
                 self.begins |= named.is_none() && is_gap;
@@ -131,17 +127,13 @@ impl Order {
                 let left = current.and_then(|(movement, _)| movement);
                 self.left.extend(left.map(|movement| (movement, line)));
                 if let Some(&left_line) = named.and_then(|named| self.left.get(&named)) {
-                    return Err(LogError::MovementReturns {
-                        place: place(self.cells.movement.unwrap_or_default()),
-                        left_line,
-                    });
+                    let cell = self.cells.movement.unwrap_or_default();
+                    return refuse(cell, LogProblem::MovementReturns { left_line });
                 }
                 if self.left.len() >= MOVEMENTS_MAX {
-                    return Err(LogError::TooManyMovements {
-                        path: head.path.clone(),
-                        line,
-                        limit: MOVEMENTS_MAX,
-                    });
+                    let limit = MOVEMENTS_MAX;
+                    let problem = LogProblem::TooManyMovements { limit };
+                    return Err(Place::of(&head.path, line).refuse(problem));
                 }
                 self.started = (t_us, 1);
                 self.begins = true;

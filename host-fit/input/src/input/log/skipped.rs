@@ -1,8 +1,9 @@
 //! Rows that were left out, as the user asked: how many, why, and the first of each reason.
 
 use super::cell::CellFault;
-use super::error::{CellPlace, LogError};
+use super::error::{LogError, LogProblem, Place};
 use crate::finding::{Code, Finding};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// So many movements of which nothing is left are named.
@@ -12,15 +13,11 @@ const MOVEMENTS_NAMED: usize = 10;
 #[derive(Debug, Default)]
 pub(super) struct Skipped {
     /// By reason: the first fault, and how many rows.
-    reasons: Vec<(CellFault, Box<CellPlace>, usize)>,
-    /// The movement in hand, and its rows that were left out, until one is kept.
-    lost: Option<(i64, usize)>,
+    reasons: Vec<(CellFault, Box<Place>, usize)>,
+    /// Movements of which no row was kept yet, and how many were left out.
+    lost: BTreeMap<i64, usize>,
     /// The movement of the last row that was kept.
     kept: Option<i64>,
-    /// The first movements of which nothing is left.
-    named: Vec<String>,
-    /// How many movements of which nothing is left there are, and their rows.
-    all_lost: (usize, usize),
 }
 
 impl Skipped {
@@ -29,15 +26,10 @@ impl Skipped {
         &mut self,
         fault: CellFault,
         movement: Option<i64>,
-        place: impl FnOnce() -> Box<CellPlace>,
+        place: impl FnOnce() -> Box<Place>,
     ) {
-        match (&mut self.lost, movement.filter(|_| movement != self.kept)) {
-            (_, None) => {}
-            (Some((lost, rows)), Some(movement)) if *lost == movement => *rows += 1,
-            (_, Some(movement)) => {
-                self.end_movement();
-                self.lost = Some((movement, 1));
-            }
+        if let Some(movement) = movement.filter(|_| movement != self.kept) {
+            *self.lost.entry(movement).or_default() += 1;
         }
         let reason = fault.reason();
         let same = |(first, ..): &&mut (CellFault, _, _)| first.reason() == reason;
@@ -55,56 +47,41 @@ impl Skipped {
     /// A log of which nothing is left: why, or that it had no rows at all.
     pub(super) fn nothing_left(self, path: &Path, header_line: usize) -> LogError {
         let rows = self.rows();
-        let path = path.to_path_buf();
         match self.reasons.into_iter().next() {
-            Some((fault, place, _)) => LogError::NoGoodRows {
-                path,
-                rows,
-                first: Box::new(LogError::Cell { place, fault }),
-            },
-            None => LogError::HeaderOnly {
-                path,
-                line: header_line,
-            },
+            Some((fault, place, _)) => {
+                let first = Box::new(place.refuse(fault.into()));
+                Place::of(path, None).refuse(LogProblem::NoGoodRows { rows, first })
+            }
+            None => Place::of(path, header_line).refuse(LogProblem::HeaderOnly),
         }
     }
 
     /// A row of this movement is kept.
     pub(super) fn keep(&mut self, movement: i64) {
         self.kept = Some(movement);
-        self.lost = self.lost.filter(|(lost, _)| *lost != movement);
-        self.end_movement();
-    }
-
-    /// Of the movement in hand no row was kept.
-    fn end_movement(&mut self) {
-        if let Some((movement, rows)) = self.lost.take() {
-            let (movements, all) = self.all_lost;
-            self.all_lost = (movements + 1, all + rows);
-            if movements < MOVEMENTS_NAMED {
-                self.named.push(movement.to_string());
-            }
-        }
+        self.lost.remove(&movement);
     }
 
     /// What the user should know.
-    pub(super) fn warnings(mut self, path: &Path) -> Vec<Finding> {
-        self.end_movement();
+    pub(super) fn warnings(self, path: &Path) -> Vec<Finding> {
         let mut warnings: Vec<Finding> = Vec::new();
         for (fault, first, rows) in &self.reasons {
+            let line = first.line.unwrap_or_default();
+            let (column, name) = first.column.clone().unwrap_or_default();
             let message = format!(
                 "{}: rows left out for {}: {rows} (the first: line {}, column {}, {})",
                 path.display(),
                 fault.reason(),
-                first.line,
-                first.column,
-                first.name
+                line,
+                column,
+                name
             );
             warnings.push(Finding::new(Code::RowsSkipped, message).of(*rows as f64, "rows"));
         }
-        let (movements, rows) = self.all_lost;
-        if movements > 0 {
-            let others = match movements.saturating_sub(MOVEMENTS_NAMED) {
+        if !self.lost.is_empty() {
+            let rows: usize = self.lost.values().sum();
+            let named = self.lost.keys().take(MOVEMENTS_NAMED).map(i64::to_string);
+            let others = match self.lost.len().saturating_sub(MOVEMENTS_NAMED) {
                 0 => String::new(),
                 more => format!(" and {more} more"),
             };
@@ -112,7 +89,7 @@ impl Skipped {
                 "{}: all rows of movement {}{others} are bad ({rows}), so nothing of it is left; record it again if its \
                  setting matters",
                 path.display(),
-                self.named.join(", "),
+                named.collect::<Vec<_>>().join(", "),
             );
             warnings.push(Finding::new(Code::RowsSkipped, message).of(rows as f64, "rows"));
         }

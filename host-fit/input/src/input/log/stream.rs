@@ -1,6 +1,6 @@
 //! A log row by row, in little memory however long it is.
 
-use super::error::LogError;
+use super::error::{LogError, LogProblem, Place};
 use super::header;
 use super::order::{Order, OrderCells};
 use super::rows::{BadCell, RowReader};
@@ -83,8 +83,7 @@ impl<'a> LogRows<'a> {
         let mut table = Table::open(text, |name| stage.log.knows(name))?;
         let columns = header::columns(&table.head, stage, options.reference)?;
         if columns.movement.is_some() && options.split_s.is_some() {
-            let path = table.head.path;
-            return Err(LogError::SplitWithMovements { path });
+            return Err(Place::of(table.head.path, None).refuse(LogProblem::SplitWithMovements));
         }
         let servo_us = stage.servo_period_s * 1e6;
         let period_us = table.period_us(columns.time, columns.movement)?;
@@ -152,10 +151,7 @@ impl<'a> LogRows<'a> {
         let (table, BadCell { cell, fault }) = (&self.table, bad);
         let place = || table.head.place(table.row_line(), cell, movement);
         match self.options.bad_rows {
-            BadRows::Refuse => Err(LogError::Cell {
-                place: place(),
-                fault,
-            }),
+            BadRows::Refuse => Err(place().refuse(fault.into())),
             BadRows::Skip => {
                 self.skipped.add(fault, movement, place);
                 Ok(())

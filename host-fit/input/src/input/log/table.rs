@@ -6,7 +6,7 @@
 
 use super::cell::{Cell, shown};
 use super::decimal;
-use super::error::{CellPlace, LogError};
+use super::error::{LogError, LogProblem, Place};
 use super::header::Source;
 use super::lines::{Lines, lines_of};
 use super::preamble::{self, COMMENT};
@@ -15,7 +15,7 @@ use super::time::{Clock, is_date_time};
 use super::units;
 use crate::input::text::TextReader;
 use crate::statistics::median;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Longest unit in a row of units, in characters, with brackets.
 const UNIT_CHARACTERS: usize = 10;
@@ -55,35 +55,23 @@ impl Head {
     }
 
     /// A cell of the row in this line, for messages.
-    pub fn place(&self, line: usize, cell: usize, movement: Option<i64>) -> Box<CellPlace> {
-        Box::new(CellPlace {
+    pub fn place(&self, line: usize, cell: usize, movement: Option<i64>) -> Box<Place> {
+        let name = shown(self.names.get(cell).map_or(&[], |name| name.as_bytes()));
+        Box::new(Place {
             path: self.path.clone(),
-            line,
-            column: cell + 1,
-            name: shown(self.names.get(cell).map_or(&[], |name| name.as_bytes())),
+            line: Some(line),
+            column: Some((cell + 1, name)),
             movement,
         })
     }
 }
 
-fn check_names(names: &[String], path: &Path, line: usize) -> Result<(), LogError> {
-    let path = path.to_path_buf();
-    if names.len() > COLUMNS_MAX {
-        return Err(LogError::TooManyColumns {
-            path,
-            line,
-            limit: COLUMNS_MAX,
-        });
-    }
-    if preamble::is_numeric(names) {
-        return Err(LogError::NoHeader { path, line });
-    }
+fn check_names(names: &[String]) -> Result<(), LogProblem> {
+    let (limit, text) = (COLUMNS_MAX, |name: &String| shown(name.as_bytes()));
     match names {
-        [one] => Err(LogError::NoSeparator {
-            path,
-            line,
-            text: shown(one.as_bytes()),
-        }),
+        names if names.len() > limit => Err(LogProblem::TooManyColumns { limit }),
+        names if preamble::is_numeric(names) => Err(LogProblem::NoHeader),
+        [one] => Err(LogProblem::NoSeparator { text: text(one) }),
         _ => Ok(()),
     }
 }
@@ -140,10 +128,11 @@ impl<'a> Table<'a> {
         let mut lines = Lines::new(text);
         let opening = lines.opening()?;
         let Some(header) = preamble::find_header(opening, is_known) else {
-            return Err(LogError::Empty { path });
+            return Err(Place::of(path, None).refuse(LogProblem::Empty));
         };
         let (line, separator) = (header.line, header.separator);
-        check_names(&header.names, &path, line)?;
+        let refused = |problem| Place::of(&path, line).refuse(problem);
+        check_names(&header.names).map_err(refused)?;
         let rows = opening.get(header.end..).unwrap_or_default();
         let mut row = Record::new(Dialect {
             separator,
@@ -160,7 +149,7 @@ impl<'a> Table<'a> {
                 break;
             }
         }
-        while lines.line < above && lines.next()?.is_some() {}
+        while lines.line < above && lines.next_line()?.is_some() {}
         let head = Head {
             path,
             line,
@@ -211,7 +200,7 @@ impl<'a> Table<'a> {
     pub fn next_row(&mut self) -> Result<bool, LogError> {
         let expected = self.head.names.len();
         loop {
-            let Some(line) = self.lines.next()? else {
+            let Some(line) = self.lines.next_line()? else {
                 return Ok(false);
             };
             if is_row(line, self.separator) {
@@ -219,27 +208,19 @@ impl<'a> Table<'a> {
                 break;
             }
         }
-        let (found, path, line) = (self.row.len(), &self.head.path, self.lines.line);
+        let (found, line) = (self.row.len(), self.lines.line);
+        let refuse = |problem| Err(Place::of(&self.head.path, line).refuse(problem));
         if self.lines.is_open() {
             self.open_line = Some(line);
             let last_is_empty = self.row.cell(found.saturating_sub(1)).text.is_empty();
             if found < expected || (found == expected && last_is_empty) {
-                return Err(LogError::CutLine {
-                    path: path.clone(),
-                    line,
-                    expected,
-                    found: found - usize::from(last_is_empty),
-                });
+                let found = found - usize::from(last_is_empty);
+                return refuse(LogProblem::CutLine { expected, found });
             }
         }
         match found == expected {
             true => Ok(true),
-            false => Err(LogError::CellCount {
-                path: path.clone(),
-                line,
-                expected,
-                found,
-            }),
+            false => refuse(LogProblem::CellCount { expected, found }),
         }
     }
 

@@ -9,7 +9,7 @@ mod skips;
 use super::*;
 use crate::finding::Code;
 use crate::input::dataset::Row;
-use crate::input::source::SourceError;
+use crate::input::source::SourceProblem;
 use crate::input::stage::tests::SOUND;
 use std::io::Write;
 
@@ -104,14 +104,14 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
 /// Line and column (from 1) of the cell that an error names, with the column's name and the
 /// movement.
 fn place(error: &LogError) -> (usize, usize, &str, Option<i64>) {
-    match error {
-        LogError::Cell { place, .. }
-        | LogError::TimeBackwards { place, .. }
-        | LogError::DuplicatedRow { place, .. }
-        | LogError::MovementReturns { place, .. } => {
-            (place.line, place.column, &place.name, place.movement)
-        }
-        other => panic!("no cell: {other}"),
+    match &*error.place {
+        Place {
+            line: Some(line),
+            column: Some((column, name)),
+            movement,
+            ..
+        } => (*line, *column, name, *movement),
+        _ => panic!("no cell: {error}"),
     }
 }
 

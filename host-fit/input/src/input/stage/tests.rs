@@ -1,6 +1,6 @@
 use super::*;
 use crate::input::log::layout::Quantity;
-use crate::input::source::SourceError;
+use crate::input::source::SourceProblem;
 use proptest::prelude::*;
 use std::path::Path;
 
@@ -333,12 +333,12 @@ fn a_file_that_cannot_be_read_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let error = Stage::from_file(folder.path()).expect_err("a folder");
     assert!(
-        matches!(error, StageError::Source(SourceError::IsFolder { .. })),
+        matches!(&error, StageError::Source(of) if matches!(of.problem, SourceProblem::IsFolder)),
         "{error}"
     );
     let error = Stage::from_file(&folder.path().join("none.toml")).expect_err("missing");
     assert!(
-        matches!(error, StageError::Source(SourceError::NotFound { .. })),
+        matches!(&error, StageError::Source(of) if matches!(of.problem, SourceProblem::NotFound)),
         "{error}"
     );
     assert!(error.to_string().contains("check the path"), "{error}");
@@ -352,7 +352,7 @@ fn a_file_that_cannot_be_read_is_named() {
     std::fs::write(&binary, [b'\n'; (1 << 20) + 1]).expect("written");
     let error = Stage::from_file(&binary).expect_err("too large");
     assert!(
-        matches!(error, StageError::Source(SourceError::TooLarge { .. })),
+        matches!(&error, StageError::Source(of) if matches!(of.problem, SourceProblem::TooLarge { .. })),
         "{error}"
     );
 }

@@ -38,7 +38,7 @@ fn units_stand_in_the_header_in_every_spelling() {
     // A default name with a unit is no other's once [log] names a column for the quantity.
     let mapped = stage_with("ifm_x = \"laser_nm\"");
     let other = LOG.replace("ifm_x_nm", "ifm_x [nm]");
-    refused_with(&other, &mapped, &["(ifm_x [nm]) is unknown"]);
+    refused_with(&other, &mapped, &["(ifm_x [nm]): it is unknown"]);
     // A name in [log] is that of the header, letter for letter, and its unit is read from it.
     let mapped = stage_with(
         "ifm_x = \"X [um]\"\nifm_y1 = \"Y left/um\"\nifm_y2 = { column = \"Y (right)\", unit = \"\u{b5}m\" }",
@@ -139,7 +139,7 @@ fn utf_16_with_and_without_a_mark() {
         assert_eq!(hash, <[u8; 32]>::from(Sha256::digest(&big)));
         let cut = read_in(&little[..little.len() - 1], stage()).expect_err("half a character");
         assert!(
-            matches!(cut, LogError::Source(SourceError::Utf16 { .. })),
+            matches!(cut.problem, LogProblem::Source(SourceProblem::Utf16 { .. })),
             "{cut}"
         );
     }

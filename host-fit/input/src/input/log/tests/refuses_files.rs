@@ -38,10 +38,10 @@ fn the_same_log_twice() {
     std::fs::write(at("c"), gzip(renamed.as_bytes())).expect("written");
     let logs = [at("a"), at("b"), at("c")];
     let error = read(&logs, stage(), &ReadOptions::default()).expect_err("a and c are one");
-    let LogError::SameLog { path, first } = &error else {
+    let LogProblem::SameLog { first } = &error.problem else {
         panic!("{error}");
     };
-    assert_eq!((path, first), (&logs[2], &logs[0]));
+    assert_eq!((&error.place.path, first), (&logs[2], &logs[0]));
     assert!(error.to_string().contains("name each log once"), "{error}");
     read(&logs[..2], stage(), &ReadOptions::default()).expect("two logs");
 }

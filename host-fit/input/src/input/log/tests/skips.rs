@@ -84,10 +84,10 @@ fn a_log_of_which_nothing_is_left_is_refused() {
         .replace(",-765,", ",?,")
         .replace(",-766,", ",?,");
     let error = read_text(&text, &SKIP).expect_err("nothing left");
-    let LogError::NoGoodRows { rows: 6, first, .. } = &error else {
+    let LogProblem::NoGoodRows { rows: 6, first } = &error.problem else {
         panic!("{error}");
     };
-    assert!(matches!(**first, LogError::Cell { .. }), "{error}");
+    assert!(matches!(first.problem, LogProblem::Cell(_)), "{error}");
 }
 
 #[test]
