@@ -3,7 +3,6 @@
 //!
 //! Prints `RESULT key=value` lines, medians of several runs.
 
-use host_fit::input::dataset::LoggedFrame;
 use host_fit::input::log;
 use host_fit::input::stage::Stage;
 use runtime::{Decode, ParameterSet, PlanarPose, RawFrame};
@@ -42,10 +41,7 @@ fn main() {
     std::fs::write(&path, host_fit::input::shipped::LOG_GZ).expect("written");
     let read = log::read(&[path], &stage, &log::ReadOptions::default()).expect("read");
     let frames: Vec<RawFrame> = (read.dataset.rows.iter())
-        .filter_map(|row| match row.frame {
-            LoggedFrame::Codes(frame) => Some(frame),
-            LoggedFrame::HallCodes { .. } => None,
-        })
+        .filter_map(|row| row.frame.all_codes())
         .collect();
     let blobs: [(&str, &[u8]); 2] = [
         ("31", include_bytes!("../../runtime/examples/stage.bin")),

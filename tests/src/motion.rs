@@ -1,7 +1,7 @@
 //! Sections of a job: the rows of a log, uniform random codes, random words as parameters.
 
 use crate::job::{self, Bare, Head};
-use host_fit::input::dataset::{Dataset, LoggedFrame};
+use host_fit::input::dataset::Dataset;
 use rand::{Rng, RngExt};
 use runtime::frame::MISSING_CODE;
 use runtime::geometry::SensingAxes;
@@ -24,10 +24,7 @@ pub struct Section {
 /// A row of SI columns has no capacitive codes and cannot be put into a frame: such a log
 /// gives `None`.
 pub fn of_log(blob: &[u8], dataset: &Dataset, hold: u16) -> Option<Vec<Section>> {
-    let frame_of = |row: &host_fit::input::dataset::Row| match row.frame {
-        LoggedFrame::Codes(frame) => Some(frame),
-        LoggedFrame::HallCodes { .. } => None,
-    };
+    let frame_of = |row: &host_fit::input::dataset::Row| row.frame.all_codes();
     let section = |movement: &host_fit::input::dataset::Movement| {
         let rows = dataset.rows.get(movement.rows.clone())?;
         let frames = rows.iter().map(frame_of).collect::<Option<Vec<_>>>()?;

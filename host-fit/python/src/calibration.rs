@@ -7,21 +7,18 @@ use crate::evaluation::Evaluation;
 use crate::finding;
 use crate::fit::blob_text;
 use crate::log::Log;
-use crate::origin::{OfFit, OfUpdate, Origin};
+use crate::origin::{OfFit, Origin};
 use crate::report::{About, head, residuals, text, write};
 use crate::stage::Stage;
 use crate::statistics::Statistics;
 use crate::work;
-use host_fit::calibrate::{
-    Outcome, figures_of_recalibration, other_scales, warnings_of, warnings_of_recalibration,
-};
-use host_fit::finding::{Severity, messages};
+use host_fit::calibrate::{Outcome, Updated, other_scales, warnings_of};
 use host_fit::fit::Fit;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::output::{Outputs, blob_file, posterior_file};
 use host_fit::problem::model::Model;
-use host_fit::recalibrate::{Known, recalibrate};
+use host_fit::recalibrate::Known;
 use host_fit::report::json::Report;
 use host_fit::report::page::Errors;
 use host_fit::report::table::tables;
@@ -300,35 +297,19 @@ impl Calibration {
         self.check_log(py, log)?;
         let what = chosen::<Change>("what", what)?;
         let created = blob_text("created", created)?;
-        let (dataset, designed) = (&log.reading.dataset, &log.designed);
-        let new = work::run(py, || {
-            recalibrate(
-                &self.set,
-                self.known.as_ref(),
-                dataset,
-                designed,
-                what,
-                created,
-            )
-        })?;
-        let new = new.map_err(|error| of_recalibrate(py, &error))?;
-        let findings = &new.diagnosis.findings;
-        let refusal = messages(findings, Severity::Refuse);
-        if !refusal.is_empty() {
-            return Err(refused(py, &refusal, findings));
+        let (reading, designed) = (&log.reading, &log.designed);
+        let blob = (&self.set, self.known.as_ref());
+        let updated = work::run(py, || Updated::new(blob, reading, designed, what, created))?;
+        let updated = updated.map_err(|error| of_recalibrate(py, &error))?;
+        if let Some(refusal) = &updated.refusal {
+            return Err(refused(py, refusal, &updated.new.diagnosis.findings));
         }
-        let warnings = warnings_of_recalibration(&log.reading, &new);
-        let figures = figures_of_recalibration(what, &new, &log.reading, &warnings);
         Ok(Self {
-            set: new.set.clone(),
-            known: new.known.clone(),
+            set: updated.new.set.clone(),
+            known: updated.new.known.clone(),
             designed: Arc::clone(designed),
             stage: log.stage.clone_ref(py),
-            origin: Origin::Update(Box::new(OfUpdate {
-                new,
-                warnings,
-                figures,
-            })),
+            origin: Origin::Update(Box::new(updated)),
         })
     }
 

@@ -7,7 +7,7 @@ use crate::log::Log;
 use crate::report::{About, head, residuals, text, write};
 use crate::stage::Stage;
 use crate::work;
-use host_fit::calibrate::{EvalOrder, Evaluation as Evaluated, Judged};
+use host_fit::calibrate::{EvalOrder, Evaluation as Evaluated};
 use host_fit::input::stage::Stage as Designed;
 use host_fit::judge::Zeros;
 use host_fit::recalibrate::Known;
@@ -36,7 +36,7 @@ impl Evaluation {
     pub fn new(
         py: Python<'_>,
         log: &Log,
-        (set, known): (&ParameterSet, Option<&Known>),
+        of_blob: (&ParameterSet, Option<&Known>),
         blob: Vec<u8>,
         (delta, limit): (Option<&str>, Option<f64>),
     ) -> PyResult<Self> {
@@ -48,13 +48,12 @@ impl Evaluation {
             return Err(wrong("limit", "a factor above zero is needed"));
         }
         let order = EvalOrder { zeros, limit };
-        let options = log.options(Judged::OPTIONS);
+        let options = log.options(Evaluated::OPTIONS);
         let (designed, logs) = (&log.designed, log.reading.dataset.logs.len());
         let evaluated = work::run(py, || {
-            let judged = Judged::new(set, designed, logs, |take| {
+            Evaluated::new(of_blob, designed, order, logs, |take| {
                 log.reading.read_anew(designed, &options, take)
-            })?;
-            Ok(judged.evaluated(order, known))
+            })
         })?;
         let evaluated = evaluated.map_err(|error| of_log(py, &error))?;
         Ok(Self {
@@ -62,7 +61,7 @@ impl Evaluation {
             evaluated,
             designed: Arc::clone(designed),
             stage: log.stage.clone_ref(py),
-            serial: set.serial.as_str().to_owned(),
+            serial: of_blob.0.serial.as_str().to_owned(),
             blob,
         })
     }

@@ -38,7 +38,7 @@ mod _hallstage {
     #[pymodule_export]
     use crate::log::{Log, read_log};
     #[pymodule_export]
-    use crate::minimize::{OptimizeResult, minimize};
+    use crate::minimize::minimize;
     #[pymodule_export]
     use crate::plan::{Plan, SimulatedLog, plan_run, simulate};
     #[pymodule_export]

@@ -13,42 +13,6 @@ use pyo3::prelude::*;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What a search found: the fields of SciPy's `OptimizeResult`.
-#[pyclass(frozen, get_all, module = "hallstage")]
-pub struct OptimizeResult {
-    /// The best place, shape (N,).
-    x: Py<PyArray1<f64>>,
-    /// The value there.
-    fun: f64,
-    /// How many places were evaluated.
-    nfev: usize,
-    /// How many generations were bred after the first population.
-    nit: usize,
-    /// Whether `fun` is a finite number.
-    success: bool,
-    /// Why the search ended, and how many values were NaN.
-    message: String,
-}
-
-#[pymethods]
-impl OptimizeResult {
-    fn __repr__(&self, python: Python<'_>) -> PyResult<String> {
-        Ok(format!(
-            " message: {}\n success: {}\n     fun: {:e}\n       x: {}\n     nit: {}\n    nfev: {}",
-            self.message,
-            if self.success { "True" } else { "False" },
-            self.fun,
-            self.x
-                .bind(python)
-                .str()?
-                .to_string()
-                .replace('\n', "\n          "),
-            self.nit,
-            self.nfev
-        ))
-    }
-}
-
 /// A function of Python over a box.
 struct Function<'a> {
     bounds: Vec<Range>,
@@ -193,8 +157,8 @@ impl CostFunction for Function<'_> {
 #[pyfunction]
 #[pyo3(signature = (fun, bounds, *, method="shtlbo", seed=1, population=50, maxiter=1000, maxfev=None, x0=None, vectorized=false))]
 #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
-pub fn minimize(
-    python: Python<'_>,
+pub fn minimize<'py>(
+    python: Python<'py>,
     fun: Py<PyAny>,
     bounds: &Bound<'_, PyAny>,
     method: &str,
@@ -204,7 +168,7 @@ pub fn minimize(
     maxfev: Option<&Bound<'_, PyAny>>,
     x0: Option<&Bound<'_, PyAny>>,
     vectorized: bool,
-) -> PyResult<OptimizeResult> {
+) -> PyResult<Bound<'py, PyAny>> {
     if !fun.bind(python).is_callable() {
         return Err(PyTypeError::new_err("fun: it must be callable"));
     }
@@ -250,14 +214,13 @@ pub fn minimize(
             found.nan_costs, found.evaluations
         );
     }
-    Ok(OptimizeResult {
-        x: PyArray1::from_vec(python, found.best).unbind(),
-        fun: found.cost,
-        nfev: found.evaluations,
-        nit: found.generations,
-        success: found.cost.is_finite(),
-        message,
-    })
+    let success = found.cost.is_finite();
+    let x = PyArray1::from_vec(python, found.best);
+    let class = python
+        .import("hallstage._results")?
+        .getattr("OptimizeResult")?;
+    let (generations, evaluations) = (found.generations, found.evaluations);
+    class.call1((message, success, found.cost, x, generations, evaluations))
 }
 
 /// Most individuals: more than any search makes use of.

@@ -1,19 +1,17 @@
 //! What a calibration comes from, and what that says of it.
 
-use host_fit::calibrate::Outcome;
+use host_fit::calibrate::{Outcome, Updated};
 use host_fit::diagnose::Diagnosis;
 use host_fit::fit::Fit;
 use host_fit::input::log::LogReading;
-use host_fit::recalibrate::Recalibration;
 use host_fit::report::json::Report;
-use host_fit::report::verdict::{End, Subject};
-use serde_json::Value;
+use host_fit::report::verdict::Subject;
 use std::sync::Arc;
 
 /// What a calibration comes from.
 pub enum Origin {
     Fit(Box<OfFit>),
-    Update(Box<OfUpdate>),
+    Update(Box<Updated>),
     Files,
 }
 
@@ -21,12 +19,6 @@ pub struct OfFit {
     pub outcome: Outcome,
     pub report: Report,
     pub log: Arc<LogReading>,
-}
-
-pub struct OfUpdate {
-    pub new: Recalibration,
-    pub warnings: Vec<String>,
-    pub figures: Value,
 }
 
 impl Origin {
@@ -50,14 +42,7 @@ impl Origin {
     pub fn subject(&self) -> Option<Subject<'_>> {
         match self {
             Self::Fit(of) => Some(of.outcome.subject()),
-            Self::Update(of) => Some(Subject {
-                end: End::Written,
-                diagnosis: &of.new.diagnosis,
-                is_field: true,
-                errors: Some(&of.new.judgement.errors),
-                limits: [None; 3],
-                in_service: false,
-            }),
+            Self::Update(of) => Some(of.subject()),
             Self::Files => None,
         }
     }

@@ -5,8 +5,7 @@ use host_fit::input::stage::AXES;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::report::table::{Table, as_text, number};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
-use std::fmt::Write;
+use pyo3::types::{IntoPyDict, PyBool, PyDict};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -36,24 +35,27 @@ impl PartialEq for Stage {
 impl Stage {
     #[new]
     #[pyo3(signature = (**tables))]
-    fn new(tables: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut text = String::new();
+    fn new(py: Python<'_>, tables: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let plain = py.import("hallstage._results")?.getattr("plain")?;
+        let options = [
+            ("default", plain),
+            ("allow_nan", PyBool::new(py, false).to_owned().into_any()),
+        ];
+        let options = options.into_py_dict(py)?;
+        let mut all = toml::Table::new();
         for (name, table) in tables.into_iter().flatten() {
             let name: String = name.extract()?;
-            let Ok(table) = table.cast::<PyDict>() else {
+            if !table.is_instance_of::<PyDict>() {
                 return Err(wrong(&name, "a dict is needed, as the table of stage.toml"));
-            };
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "[{}]", quoted(&name));
-            for (key, value) in table {
-                let _ = writeln!(
-                    text,
-                    "{} = {}",
-                    quoted(&key.to_string()),
-                    toml(&name, &value, 0)?
-                );
             }
+            let json = py
+                .import("json")?
+                .call_method("dumps", (table,), Some(&options));
+            let json: String = json.map_err(|error| wrong(&name, error))?.extract()?;
+            let table = serde_json::from_str(&json).map_err(|error| wrong(&name, error))?;
+            all.insert(name, table);
         }
+        let text = all.to_string();
         let designed = Designed::from_toml(&text, Path::new("Stage(...)"));
         Ok(Self {
             designed: Arc::new(designed.map_err(|error| of_stage(&error))?),
@@ -143,61 +145,4 @@ impl Stage {
         others.row("servo period", [format!("{period} ms")]);
         vec![sensors, motion, others]
     }
-}
-
-/// A text as TOML has it.
-fn quoted(text: &str) -> String {
-    serde_json::Value::from(text).to_string()
-}
-
-/// Lists in lists and dicts in dicts: a stage has three at most.
-const DEPTH_MAX: u32 = 8;
-
-/// A value as TOML has it: numbers, texts, lists, dicts.
-fn toml(table: &str, value: &Bound<'_, PyAny>, depth: u32) -> PyResult<String> {
-    if depth > DEPTH_MAX {
-        return Err(wrong(table, "lists or dicts too deep in each other"));
-    }
-    let inner = |value: &Bound<'_, PyAny>| toml(table, value, depth + 1);
-    let joined =
-        |items: Vec<String>, open: &str, close: &str| format!("{open}{}{close}", items.join(", "));
-    if value.is_instance_of::<PyBool>() {
-        return Ok(value.extract::<bool>()?.to_string());
-    }
-    if value.is_instance_of::<PyInt>() {
-        return Ok(value.to_string());
-    }
-    if value.is_instance_of::<PyFloat>() {
-        let number: f64 = value.extract()?;
-        return match number.is_finite() {
-            true => Ok(format!("{number:?}")),
-            false => Err(wrong(
-                table,
-                format!("{number} is no number that a stage has"),
-            )),
-        };
-    }
-    if value.is_instance_of::<PyString>() {
-        return Ok(quoted(&value.extract::<String>()?));
-    }
-    if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
-        let items = value.try_iter()?.map(|item| inner(&item?));
-        return Ok(joined(items.collect::<PyResult<_>>()?, "[", "]"));
-    }
-    if let Ok(dict) = value.cast::<PyDict>() {
-        let items = dict.iter().map(|(key, value)| {
-            let key = quoted(&key.to_string());
-            Ok(format!("{key} = {}", inner(&value)?))
-        });
-        return Ok(joined(items.collect::<PyResult<_>>()?, "{ ", " }"));
-    }
-    // Arrays of NumPy and their numbers.
-    if value.hasattr("tolist")? {
-        return inner(&value.call_method0("tolist")?);
-    }
-    let kind = value.get_type();
-    Err(wrong(
-        table,
-        format!("{kind} is no value of stage.toml: numbers, texts, lists and dicts are"),
-    ))
 }

@@ -16,7 +16,6 @@ pub mod join;
 mod node_clock;
 pub mod offset;
 pub mod reference;
-mod report;
 
 pub use error::ImportError;
 
@@ -33,6 +32,7 @@ use node_clock::Tick;
 use offset::{Clocks, Offset, Records};
 use reference::{Reference, ReferenceCounts};
 use runtime::frame::MISSING_CODE;
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// What is joined, and how.
@@ -93,7 +93,7 @@ fn search_seconds(text: &str) -> Result<f64, String> {
 }
 
 /// How an import went.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImportReport {
     /// What the record of the bus held.
     pub bus: BusCounts,
@@ -104,6 +104,7 @@ pub struct ImportReport {
     /// How ticks and reference went together.
     pub join: JoinCounts,
     /// The record has temperatures for which the stage names no columns: they are not in the log.
+    #[serde(skip)]
     pub temperatures_left_out: bool,
 }
 
@@ -144,20 +145,13 @@ pub fn run(settings: &ImportSettings) -> Result<ImportReport, ImportError> {
         joined(&given, &mut |_| Ok(()))?.check()?;
         records.checked(given)?
     };
-    let is_warm = |tick: &Tick| tick.temperature_mc != [MISSING_CODE; 2];
+    let is_warm = |tick: &Tick| tick.codes.temperature_mc != [MISSING_CODE; 2];
     let has_temperatures = run.ticks.iter().any(is_warm);
     let format = LogFormat::new(reference.quantities, has_temperatures, &stage);
     let mut log = Output::create(&settings.out)?;
     let mut text = format.header();
     let join = joined(&clocks, &mut |row| {
-        let at = (row.movement, row.t_us);
-        format.append(
-            &mut text,
-            at,
-            row.values,
-            [row.capacitive, row.hall],
-            row.temperature_mc,
-        );
+        format.append(&mut text, (row.movement, row.t_us), row.values, &row.codes);
         if text.len() > TEXT_BYTES {
             log.write(text.as_bytes())?;
             text.clear();

@@ -5,7 +5,6 @@ mod pace;
 use crate::bus::BusAddress;
 use crate::bus::live::{Bus, BusError};
 use crate::calibrate::arguments::{between, choice};
-use crate::input::dataset::LoggedFrame;
 use crate::input::log::{LogError, LogRow, LogRows, ReadOptions};
 use crate::input::stage::{Stage, StageError};
 use crate::interrupt;
@@ -170,12 +169,8 @@ fn rows_of(log: &Path, stage: &Stage) -> Result<usize, ReplayError> {
 
 /// The codes of a row, all six.
 fn codes(row: &LogRow, log: &Path) -> Result<RawFrame, ReplayError> {
-    match row.row.frame {
-        LoggedFrame::Codes(frame) => Ok(frame),
-        LoggedFrame::HallCodes { .. } => Err(ReplayError::NoCodes {
-            path: log.to_path_buf(),
-        }),
-    }
+    let path = || log.to_path_buf();
+    (row.row.frame.all_codes()).ok_or_else(|| ReplayError::NoCodes { path: path() })
 }
 
 /// The layout asked for, or the narrowest; refused if it does not hold the codes of the stage.

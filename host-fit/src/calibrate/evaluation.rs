@@ -32,14 +32,6 @@ pub struct EvalOrder {
     pub limit: Option<f64>,
 }
 
-/// Logs that were read and decoded row by row.
-pub struct Judged<'a> {
-    set: &'a ParameterSet,
-    stage: &'a Stage,
-    judge: Judge<'a>,
-    log: LogReading,
-}
-
 /// How a blob does on logs.
 #[derive(Debug)]
 pub struct Evaluation {
@@ -61,7 +53,7 @@ pub struct Evaluation {
     pub problem: Option<String>,
 }
 
-impl<'a> Judged<'a> {
+impl Evaluation {
     /// How logs are read: the reference is needed, and the decoder marks saturated codes.
     pub const OPTIONS: ReadOptions = ReadOptions {
         reference: ReferenceUse::Required,
@@ -69,13 +61,16 @@ impl<'a> Judged<'a> {
         ..ReadOptions::DECODE
     };
 
-    /// Of so many `logs`, which `read` reads and gives row by row to what it gets.
+    /// Decodes the rows of so many `logs`, which `read` reads and gives row by row to what it gets, counts the
+    /// errors and diagnoses the logs. `known` is what stands beside the blob, which tells how far from its
+    /// temperature it is good.
     ///
     /// # Errors
     /// Those of `read`.
     pub fn new(
-        set: &'a ParameterSet,
-        stage: &'a Stage,
+        (set, known): (&ParameterSet, Option<&Known>),
+        stage: &Stage,
+        order: EvalOrder,
         logs: usize,
         read: impl FnOnce(&mut dyn FnMut(usize, &LogRow)) -> Result<LogReading, LogError>,
     ) -> Result<Self, LogError> {
@@ -85,23 +80,6 @@ impl<'a> Judged<'a> {
             let error = error(&decoder, &row.row);
             judge.take((log, row.movement, row.begins), &row.row, error);
         })?;
-        Ok(Self {
-            set,
-            stage,
-            judge,
-            log,
-        })
-    }
-
-    /// Counts the errors and diagnoses the logs; `known` is what stands beside the blob, which tells how far
-    /// from its temperature it is good.
-    pub fn evaluated(self, order: EvalOrder, known: Option<&Known>) -> Evaluation {
-        let Self {
-            set,
-            stage,
-            judge,
-            log,
-        } = self;
         let own_zeros = Zeros::of_model(Model::of(set.model));
         let zeros = order.zeros.unwrap_or(own_zeros);
         let judgement = judge.clone().judgement(zeros);
@@ -122,7 +100,7 @@ impl<'a> Judged<'a> {
         let comparable = judge.judgement(own_zeros).errors;
         let usual = if is_field(set) { 3.0 } else { 10.0 };
         let limit = order.limit.unwrap_or(usual);
-        Evaluation {
+        Ok(Self {
             problem: beyond_limit(set, &comparable, limit),
             set: set.clone(),
             stage: stage.clone(),
@@ -133,34 +111,9 @@ impl<'a> Judged<'a> {
             of_rows,
             zeros,
             limit,
-        }
+        })
     }
-}
 
-fn is_field(set: &ParameterSet) -> bool {
-    set.model == ModelKind::Field
-}
-
-/// The largest error in terms of the blob's own, if that is beyond the limit; the blob of an exact fit
-/// has none to compare with.
-fn beyond_limit(set: &ParameterSet, errors: &PoseError, limit: f64) -> Option<String> {
-    const AXES: [(&str, &str); 3] = [("X", "um"), ("Y", "um"), ("Rz", "urad")];
-    let own = |axis: usize| f64::from(set.fit.rms[axis]);
-    let ratio = |axis: usize| errors.axes[axis].rms / own(axis);
-    let worst = (0..3)
-        .filter(|&axis| own(axis) > 0.0)
-        .max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
-    let (axis, unit) = AXES[worst];
-    (ratio(worst) > limit).then(|| {
-        let [error, own] = [errors.axes[worst].rms, own(worst)].map(|x| x * 1e6);
-        format!(
-            "the parameter blob does not describe this log: {error:.2} {unit} rms in {axis}, where it had {own:.2} {unit} in \
-             the logs that it was fitted to, more than {limit} times as much (--limit)"
-        )
-    })
-}
-
-impl Evaluation {
     /// The figures.
     pub fn report(&self, elapsed_s: f64) -> Report {
         let counts = of_counts(&self.judgement.zeros, self.judgement.undecoded);
@@ -226,4 +179,27 @@ impl Evaluation {
         };
         Some(format!("{problem}{more}"))
     }
+}
+
+fn is_field(set: &ParameterSet) -> bool {
+    set.model == ModelKind::Field
+}
+
+/// The largest error in terms of the blob's own, if that is beyond the limit; the blob of an exact fit
+/// has none to compare with.
+fn beyond_limit(set: &ParameterSet, errors: &PoseError, limit: f64) -> Option<String> {
+    const AXES: [(&str, &str); 3] = [("X", "um"), ("Y", "um"), ("Rz", "urad")];
+    let own = |axis: usize| f64::from(set.fit.rms[axis]);
+    let ratio = |axis: usize| errors.axes[axis].rms / own(axis);
+    let worst = (0..3)
+        .filter(|&axis| own(axis) > 0.0)
+        .max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
+    let (axis, unit) = AXES[worst];
+    (ratio(worst) > limit).then(|| {
+        let [error, own] = [errors.axes[worst].rms, own(worst)].map(|x| x * 1e6);
+        format!(
+            "the parameter blob does not describe this log: {error:.2} {unit} rms in {axis}, where it had {own:.2} {unit} in \
+             the logs that it was fitted to, more than {limit} times as much (--limit)"
+        )
+    })
 }

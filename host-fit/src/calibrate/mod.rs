@@ -11,10 +11,10 @@ mod settings;
 
 pub use choice::Choice;
 pub(crate) use choice::values;
-pub use evaluation::{EvalOrder, Evaluation, Judged};
+pub use evaluation::{EvalOrder, Evaluation};
 pub use fitted::{CalibrateError, FitOrder, Outcome};
 pub use limit::Limits;
-pub use recalibration::{figures_of_recalibration, warnings_of_recalibration};
+pub use recalibration::Updated;
 pub use settings::{Mismatch, loss_of};
 
 use crate::diagnose::Diagnosis;

@@ -1,16 +1,69 @@
 //! What is said of a calibration that was brought up to date.
 
 use super::warnings_of;
+use crate::finding::{Severity, messages};
 use crate::fit::of_undecoded;
 use crate::input::log::LogReading;
-use crate::recalibrate::Recalibration;
+use crate::input::stage::Stage;
+use crate::recalibrate::{Known, RecalibrateError, Recalibration, recalibrate};
 use crate::report::errors::errors;
 use crate::report::field::by_axis;
+use crate::report::verdict::{End, Subject};
 use crate::solve::field::update::Change;
+use runtime::ParameterSet;
+use runtime::parameters::Text;
 use serde_json::{Value, json};
 
-/// What the user should know of it.
-pub fn warnings_of_recalibration(log: &LogReading, new: &Recalibration) -> Vec<String> {
+/// A calibration that was brought up to date, and what is said of it.
+#[derive(Debug)]
+pub struct Updated {
+    /// The calibration.
+    pub new: Recalibration,
+    /// What the user should know of it.
+    pub warnings: Vec<String>,
+    /// The figures.
+    pub figures: Value,
+    /// Why it is no good, where the log says so.
+    pub refusal: Option<String>,
+}
+
+impl Updated {
+    /// Brings a blob, and what is known of it, up to date by a log.
+    ///
+    /// # Errors
+    /// See [`RecalibrateError`].
+    pub fn new(
+        (old, known): (&ParameterSet, Option<&Known>),
+        log: &LogReading,
+        stage: &Stage,
+        change: Change,
+        created: Text,
+    ) -> Result<Self, RecalibrateError> {
+        let new = recalibrate(old, known, &log.dataset, stage, change, created)?;
+        let warnings = warnings(log, &new);
+        let refusal = messages(&new.diagnosis.findings, Severity::Refuse);
+        Ok(Self {
+            figures: figures(change, &new, log, &warnings),
+            refusal: Some(refusal).filter(|refusal| !refusal.is_empty()),
+            new,
+            warnings,
+        })
+    }
+
+    /// What its verdict is about.
+    pub fn subject(&self) -> Subject<'_> {
+        Subject {
+            end: self.refusal.as_deref().map_or(End::Written, End::Failed),
+            diagnosis: &self.new.diagnosis,
+            is_field: true,
+            errors: Some(&self.new.judgement.errors),
+            limits: [None; 3],
+            in_service: false,
+        }
+    }
+}
+
+fn warnings(log: &LogReading, new: &Recalibration) -> Vec<String> {
     let mut warnings = warnings_of(log);
     let undecoded = of_undecoded(new.judgement.undecoded);
     warnings.extend(undecoded.map(|found| found.message));
@@ -24,13 +77,7 @@ pub fn warnings_of_recalibration(log: &LogReading, new: &Recalibration) -> Vec<S
     warnings
 }
 
-/// The figures.
-pub fn figures_of_recalibration(
-    change: Change,
-    new: &Recalibration,
-    log: &LogReading,
-    warnings: &[String],
-) -> Value {
+fn figures(change: Change, new: &Recalibration, log: &LogReading, warnings: &[String]) -> Value {
     let gain = |(change, error): (f64, f64)| json!({ "change_percent": change * 100.0, "standard_error_percent": error * 100.0 });
     let [a, b, c] = new.gains.map(gain);
     // rms errors, from ratios to the noise floor.

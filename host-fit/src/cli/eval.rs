@@ -3,7 +3,7 @@
 use super::args::{Json, Logs};
 use super::report::{Report, finish};
 use crate::calibrate::arguments::choice;
-use crate::calibrate::{EvalOrder, Judged};
+use crate::calibrate::{EvalOrder, Evaluation};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::input::log;
@@ -49,13 +49,8 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         .chain(args.logs.inputs());
     super::keep_apart_with([args.json.path.as_deref()], &args.report, inputs)?;
     let (set, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
-    let options = args.logs.options(Judged::OPTIONS);
+    let options = args.logs.options(Evaluation::OPTIONS);
     let paths = &args.logs.paths;
-    let judged = terminal::timed("reading", || {
-        Judged::new(&set, &stage, paths.len(), |take| {
-            log::read_each(paths, &stage, &options, take)
-        })
-    })?;
     let order = EvalOrder {
         zeros: args.delta,
         limit: args.limit,
@@ -63,8 +58,12 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     // What is known of k and h stands beside the blob.
     let known = posterior_file::beside(&args.params);
     let known = known.and_then(|path| posterior_file::read(&path, &set, &args.params).ok());
-    let judged = || judged.evaluated(order, known.as_ref());
-    let evaluation = terminal::timed("diagnosis", judged);
+    let blob = (&set, known.as_ref());
+    let evaluation = terminal::timed("evaluation", || {
+        Evaluation::new(blob, &stage, order, paths.len(), |take| {
+            log::read_each(paths, &stage, &options, take)
+        })
+    })?;
     let report = evaluation.report(started.elapsed().as_secs_f64());
     let subject = evaluation.subject();
     let mut hidden = report.hidden();

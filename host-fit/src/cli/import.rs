@@ -4,13 +4,22 @@ use crate::bus::import::{self, ImportSettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::interrupt;
+use crate::report::table::{as_text, tables};
 use std::path::PathBuf;
 
-/// Joins a record of the bus and a reference, and says how it went.
+/// Joins a record of the bus and a reference, and shows how it went.
 pub(super) fn run(args: &ImportSettings) -> Result<(), HostError> {
     let inputs = [&args.bus, &args.reference, &args.stage].map(PathBuf::as_path);
     super::keep_apart([Some(args.out.as_path())], inputs)?;
     interrupt::watch();
     let report = import::run(args)?;
-    terminal::print(&format!("{report}wrote {}\n", args.out.display()))
+    terminal::print(&as_text(&tables(&report, &[])))?;
+    let unnamed = "temperatures are left out: name their columns in [temperature] of the stage file (mount, body)";
+    terminal::warn(
+        report
+            .temperatures_left_out
+            .then(|| unnamed.to_owned())
+            .as_slice(),
+    );
+    super::wrote([args.out.clone()])
 }

@@ -2,17 +2,15 @@
 
 use super::args::{Json, Logs};
 use super::report::finish;
+use crate::calibrate::Updated;
 use crate::calibrate::arguments::choice;
-use crate::calibrate::{figures_of_recalibration, warnings_of_recalibration};
 use crate::cli::error::HostError;
-use crate::finding::{self, Severity};
 use crate::input::log::ReadOptions;
 use crate::output::posterior_file::PosteriorFileError;
 use crate::output::{Outputs, posterior_file};
 use crate::problem::model::Model;
-use crate::recalibrate::{Known, RecalibrateError, recalibrate};
+use crate::recalibrate::{Known, RecalibrateError};
 use crate::report::table::tables;
-use crate::report::verdict::{End, Subject};
 use crate::solve::field::update::Change;
 use clap::Args;
 use runtime::parameters::Text;
@@ -68,39 +66,20 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
     };
     let log = args.logs.read(&stage, options)?;
     let created = args.created.clone().unwrap_or_default();
-    let new = recalibrate(
-        &old,
-        known.as_ref(),
-        &log.dataset,
-        &stage,
-        args.what,
-        created,
-    )?;
-    let warnings = warnings_of_recalibration(&log, &new);
-    let figures = figures_of_recalibration(args.what, &new, &log, &warnings);
-    let refusal = finding::messages(&new.diagnosis.findings, Severity::Refuse);
+    let blob = (&old, known.as_ref());
+    let updated = Updated::new(blob, &log, &stage, args.what, created)?;
     let mut outputs = Outputs::default();
-    args.json.add(&mut outputs, &figures)?;
-    if refusal.is_empty() {
-        posterior_file::add_calibration(&mut outputs, &args.out, &new.set, new.known.as_ref())?;
+    args.json.add(&mut outputs, &updated.figures)?;
+    if updated.refusal.is_none() {
+        let (set, known) = (&updated.new.set, updated.new.known.as_ref());
+        posterior_file::add_calibration(&mut outputs, &args.out, set, known)?;
     }
-    let subject = Subject {
-        end: match refusal.as_str() {
-            "" => End::Written,
-            refusal => End::Failed(refusal),
-        },
-        diagnosis: &new.diagnosis,
-        is_field: true,
-        errors: Some(&new.judgement.errors),
-        limits: [None; 3],
-        in_service: false,
-    };
     let hidden = ["warnings", "findings", "verdict", "predicted"];
-    finish(outputs, &tables(&figures, &hidden), &warnings, &subject)?;
-    if !refusal.is_empty() {
-        return Err(HostError::rejected(refusal));
-    }
-    Ok(())
+    let details = tables(&updated.figures, &hidden);
+    finish(outputs, &details, &updated.warnings, &updated.subject())?;
+    updated
+        .refusal
+        .map_or(Ok(()), |why| Err(HostError::rejected(why)))
 }
 
 /// What is known beside the old blob; gains can be found without it.

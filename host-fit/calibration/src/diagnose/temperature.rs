@@ -228,7 +228,7 @@ mod tests {
                 Row {
                     movement,
                     t_us: 7,
-                    frame: LoggedFrame::Codes(frame.with_temperature_mc([mount_mc, MISSING_CODE])),
+                    frame: LoggedFrame::from(frame.with_temperature_mc([mount_mc, MISSING_CODE])),
                     signal_m: [0.0; 3],
                     vertical: [0.0; 3],
                     reference: [0.0; 3],

@@ -151,7 +151,7 @@ mod tests {
                 dataset.rows.push(Row {
                     movement,
                     t_us,
-                    frame: LoggedFrame::Codes(RawFrame::new([0; 3], [0; 3], 0, 0)),
+                    frame: LoggedFrame::from(RawFrame::new([0; 3], [0; 3], 0, 0)),
                     signal_m: pose(t_us as f64 * 1e-6),
                     vertical: [0.0; 3],
                     reference: pose(t_us as f64 * 1e-6 - lag_s),

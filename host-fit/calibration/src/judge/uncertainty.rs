@@ -7,7 +7,7 @@
 //! so that a chance cancellation within few clusters promises nothing.
 
 use crate::problem::model::{COUNT, ParameterId};
-use crate::problem::parameters::{ETA, Parameters};
+use crate::problem::parameters::Parameters;
 use crate::problem::{Group, Problem};
 use crate::solve::gauss_newton::{Equations, Normal, Point};
 use crate::solve::least_squares::rows::{COLUMNS, Decoder};
@@ -44,9 +44,6 @@ pub struct Uncertainty {
 
 /// Correlations above this are shown: the parameters stand in for each other.
 pub const CORRELATION_SHOWN: f64 = 0.95;
-
-/// A probe is moved if it is by more than this part of what that is which moves most.
-const MOVED_MIN: f64 = 0.1;
 
 /// Smallest eigenvalue of the scaled curvature that still counts as information.
 const EIGENVALUE_MIN: f64 = 1e-10;
@@ -127,88 +124,6 @@ fn normal(problem: &Problem, parameters: &Parameters) -> Option<Normal<COLUMNS>>
         values: DVector::from_column_slice(&parameters.values),
         offsets: Vec::new(),
     })
-}
-
-/// The weighted sum of squared errors of some rows near a solution, um^2, to second order in the
-/// change of the parameters. Those of movements add up.
-#[derive(Clone, Copy, Debug)]
-pub struct OwnFit {
-    /// At the solution.
-    pub cost: f64,
-    parameters: Parameters,
-    descent: Column,
-    curvature: Square,
-}
-
-impl OwnFit {
-    /// Of no rows.
-    pub fn none() -> Self {
-        Self {
-            cost: 0.0,
-            parameters: Parameters {
-                values: [0.0; COUNT],
-            },
-            descent: Column::zeros(),
-            curvature: Square::zeros(),
-        }
-    }
-
-    /// Zero deviations are free. `None` as for [`uncertainty`].
-    pub fn new(problem: &Problem, parameters: &Parameters) -> Option<Self> {
-        let normal = normal(problem, parameters)?;
-        Some(Self {
-            cost: normal.chi_squared(),
-            parameters: *parameters,
-            descent: Column::from_fn(|k, _| normal.descent(k)),
-            curvature: Square::from_fn(|i, j| normal.curvature(i, j)),
-        })
-    }
-
-    /// With more rows.
-    pub fn add(&mut self, more: &Self) {
-        self.cost += more.cost;
-        self.descent += more.descent;
-        self.curvature += more.curvature;
-    }
-
-    /// The step of Gauss and Newton to parameters of their own; what the rows do not determine stays
-    /// as it is.
-    pub fn step(&self) -> Column {
-        let all: Vec<usize> = (0..COUNT).collect();
-        pseudo_inverse(&self.curvature, &all).0 * self.descent
-    }
-
-    /// By what part the gain of each probe would change, if nothing else did: `None` for a probe that the rows
-    /// hardly move, beside that which they move most, and where they do not determine all three.
-    pub fn gain_step(&self) -> Option<[Option<f64>; 3]> {
-        // The pose grows with the gain as eta and the slopes fall.
-        let directions = SMatrix::<f64, COUNT, 3>::from_fn(|place, probe| {
-            let is_of_probe = place >= ETA && place % 3 == probe;
-            if is_of_probe {
-                -self.parameters.values[place]
-            } else {
-                0.0
-            }
-        });
-        let curvature = directions.transpose() * self.curvature * directions;
-        let factor = curvature.cholesky()?;
-        let steps = factor.solve(&(directions.transpose() * self.descent));
-        let most = curvature.diagonal().max();
-        let is_moved = |k: usize| curvature[(k, k)] > MOVED_MIN * MOVED_MIN * most;
-        Some([0, 1, 2].map(|k| is_moved(k).then(|| steps[k])))
-    }
-
-    /// The cost after a step.
-    pub fn cost_after(&self, step: &Column) -> f64 {
-        let first = self.descent.dot(step);
-        let second = step.dot(&(self.curvature * step));
-        self.cost - 2.0 * first + second
-    }
-
-    /// The cost with parameters of their own.
-    pub fn cost_alone(&self) -> f64 {
-        self.cost_after(&self.step())
-    }
 }
 
 /// The inverse of the curvature over the free parameters, without the directions that hold no

@@ -14,77 +14,63 @@ pub const FIT_ROWS_MAX: usize = 125_000;
 
 /// What one servo period of a log gives the decoder.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LoggedFrame {
-    /// All six codes, as on the target.
-    Codes(RawFrame),
-    /// Hall codes, and a vertical pose that the log holds in SI units: there are no
-    /// capacitive codes, so this goes through [`AnyDecoder::decode_at`].
-    HallCodes {
-        /// Hall codes of the probes A, B, C.
-        hall: [i32; 3],
-        /// Z, Rx, Ry rounded to the decoder's words: m, rad, rad.
-        vertical: VerticalPose<f32>,
-        /// Number of the servo period, wrapping.
-        sequence: u32,
-        /// When the codes were sampled, in us, wrapping.
-        time_us: u32,
-        /// Temperature of mount and body, m degC.
-        temperature_mc: [i32; 2],
-    },
+pub struct LoggedFrame {
+    /// All codes, as on the target; without codes of the gaps where the log holds a vertical pose.
+    pub codes: RawFrame,
+    /// Z, Rx, Ry that the log holds in SI units in place of codes, rounded to the decoder's words: m, rad,
+    /// rad. It goes through [`AnyDecoder::decode_at`].
+    pub vertical: Option<VerticalPose<f32>>,
+}
+
+impl From<RawFrame> for LoggedFrame {
+    fn from(codes: RawFrame) -> Self {
+        Self {
+            codes,
+            vertical: None,
+        }
+    }
 }
 
 impl LoggedFrame {
     /// Hall codes of the probes A, B, C.
     pub const fn hall(&self) -> [i32; 3] {
-        match self {
-            Self::Codes(frame) => frame.hall,
-            Self::HallCodes { hall, .. } => *hall,
-        }
+        self.codes.hall
     }
 
     /// Temperature of mount and body, m degC; [`MISSING_CODE`] where
     /// the log has none.
     pub const fn temperature_mc(&self) -> [i32; 2] {
-        match self {
-            Self::Codes(frame) => frame.temperature_mc,
-            Self::HallCodes { temperature_mc, .. } => *temperature_mc,
-        }
+        self.codes.temperature_mc
+    }
+
+    /// All codes, where the log has those of the gaps.
+    pub fn all_codes(&self) -> Option<RawFrame> {
+        self.vertical.is_none().then_some(self.codes)
     }
 
     /// Codes of the capacitive gaps 1, 2, 3, where the log has them.
-    pub const fn capacitive(&self) -> Option<[i32; 3]> {
-        match self {
-            Self::Codes(frame) => Some(frame.capacitive),
-            Self::HallCodes { .. } => None,
-        }
+    pub fn capacitive(&self) -> Option<[i32; 3]> {
+        Some(self.all_codes()?.capacitive)
     }
 
     /// Number of the servo period within its movement, from 0: by time, so a gap in the log
     /// shows as frames missed.
     pub const fn sequence(&self) -> u32 {
-        match self {
-            Self::Codes(frame) => frame.sequence,
-            Self::HallCodes { sequence, .. } => *sequence,
-        }
+        self.codes.sequence
     }
 
     /// The same frame with another sequence number.
     #[must_use]
     pub const fn with_sequence(mut self, number: u32) -> Self {
-        match &mut self {
-            Self::Codes(frame) => frame.sequence = number,
-            Self::HallCodes { sequence, .. } => *sequence = number,
-        }
+        self.codes.sequence = number;
         self
     }
 
     /// The reading of the runtime's own decoder, less `zero`.
     pub fn decode(&self, decoder: &AnyDecoder, zero: &PlanarPose<f32>) -> Reading {
-        match self {
-            Self::Codes(frame) => decoder.decode(frame, zero),
-            Self::HallCodes { hall, vertical, .. } => {
-                decoder.decode_at(*hall, self.temperature_mc(), *vertical, zero)
-            }
+        match self.vertical {
+            None => decoder.decode(&self.codes, zero),
+            Some(vertical) => decoder.decode_at(self.hall(), self.temperature_mc(), vertical, zero),
         }
     }
 }

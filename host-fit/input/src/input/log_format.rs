@@ -2,6 +2,7 @@
 
 use crate::input::log::layout::Quantity;
 use crate::input::stage::Stage;
+use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
 use std::fmt::Write;
 
@@ -55,21 +56,20 @@ impl LogFormat {
         text: &mut String,
         (movement, t_us): (i64, i64),
         [x, y, z]: [f64; 3],
-        [gaps, hall]: [[i32; 3]; 2],
-        temperature_mc: [i32; 2],
+        codes: &RawFrame,
     ) {
         let time = t_us as f64 / self.us_per_unit;
         let [gaps_per_unit, hall_per_unit] = self.codes_per_unit;
         let in_units = |codes: [i32; 3], per_unit: [f64; 3]| {
             [0, 1, 2].map(|k| f64::from(codes[k]) / per_unit[k])
         };
-        let [g1, g2, g3] = in_units(gaps, gaps_per_unit);
-        let [a, b, c] = in_units(hall, hall_per_unit);
+        let [g1, g2, g3] = in_units(codes.capacitive, gaps_per_unit);
+        let [a, b, c] = in_units(codes.hall, hall_per_unit);
         let _ = write!(
             text,
             "{movement},{time},{x},{y},{z},{g1},{g2},{g3},{a},{b},{c}"
         );
-        for (column, read_mc) in self.temperature_mc.into_iter().zip(temperature_mc) {
+        for (column, read_mc) in self.temperature_mc.into_iter().zip(codes.temperature_mc) {
             let _ = match column {
                 None => Ok(()),
                 Some(_) if read_mc == MISSING_CODE => text.write_str(","),

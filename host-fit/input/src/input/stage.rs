@@ -29,6 +29,19 @@ pub struct Range {
 }
 
 impl Range {
+    /// From one end to the other.
+    pub const fn new(low: f64, high: f64) -> Self {
+        Self { low, high }
+    }
+
+    /// The narrowest that holds all of these.
+    pub fn around(values: impl IntoIterator<Item = f64>) -> Self {
+        let none = Self::new(f64::INFINITY, f64::NEG_INFINITY);
+        values.into_iter().fold(none, |range, value| {
+            Self::new(range.low.min(value), range.high.max(value))
+        })
+    }
+
     /// The length of the interval.
     pub const fn width(&self) -> f64 {
         self.high - self.low
@@ -49,10 +62,7 @@ impl Neg for Range {
     type Output = Self;
 
     fn neg(self) -> Self {
-        Self {
-            low: -self.high,
-            high: -self.low,
-        }
+        Self::new(-self.high, -self.low)
     }
 }
 

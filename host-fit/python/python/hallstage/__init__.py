@@ -9,7 +9,6 @@ from ._hallstage import (
     Decoder,
     Evaluation,
     Log,
-    OptimizeResult,
     Plan,
     SimulatedLog,
     Stage,
@@ -22,7 +21,7 @@ from ._hallstage import (
     status_names,
     write_demo,
 )
-from ._results import Finding, Findings, Labelled, Parameter, Residuals
+from ._results import Finding, Findings, Labelled, OptimizeResult, Parameter, Residuals
 
 #: What each bit of a decoder's `status` means, by its value.
 STATUS: dict[int, str] = status_names()

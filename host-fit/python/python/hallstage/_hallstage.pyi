@@ -7,7 +7,7 @@ import pandas  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
-from ._results import Finding, Findings, Labelled, Parameter, Residuals
+from ._results import Finding, Findings, Labelled, OptimizeResult, Parameter, Residuals
 
 _Path = str | os.PathLike[str]
 _Model = Literal["auto", "12", "15", "30", "31", "field"]
@@ -17,7 +17,6 @@ __all__ = [
     "Decoder",
     "Evaluation",
     "Log",
-    "OptimizeResult",
     "Plan",
     "SimulatedLog",
     "Stage",
@@ -35,21 +34,6 @@ __all__ = [
 _Method = Literal[
     "shtlbo", "tlbo", "gbtlbo", "mutation", "hybrid", "success-ratio", "de", "pso", "ga", "cmaes", "random"
 ]
-
-@final
-class OptimizeResult:
-    @property
-    def x(self) -> NDArray[np.float64]: ...
-    @property
-    def fun(self) -> float: ...
-    @property
-    def nfev(self) -> int: ...
-    @property
-    def nit(self) -> int: ...
-    @property
-    def success(self) -> bool: ...
-    @property
-    def message(self) -> str: ...
 
 def main_of(arguments: Sequence[str]) -> int: ...
 def write_demo(folder: _Path) -> None: ...
@@ -76,7 +60,7 @@ def read_log(
 def plan(stage: Stage, *, seconds: float = 20.0) -> Plan: ...
 def simulate(
     stage: Stage,
-    run: Plan | Literal["paper", "combined", "service"] | ArrayLike,
+    run: Plan | Literal["paper", "combined", "service", "day"] | ArrayLike,
     *,
     seed: int = 1,
     hour: float | None = None,

@@ -18,6 +18,33 @@ _COVERS_95 = 1.959963984540054
 _AXES = {"x": ("X", "um"), "y": ("Y", "um"), "rz": ("Rz", "urad")}
 
 
+def plain(value: Any) -> Any:
+    """What a number or array of NumPy stands for in `stage.toml`."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise ValueError(f"{type(value)} is no value of stage.toml: numbers, texts, lists and dicts are")
+
+
+class OptimizeResult(NamedTuple):
+    """What a search found; its fields are those of SciPy. Made by `minimize`."""
+
+    #: Why the search ended.
+    message: str
+    #: Whether the smallest value is a finite number.
+    success: bool
+    #: The smallest value.
+    fun: float
+    #: Where it is, (n,).
+    x: NDArray[np.float64]
+    #: Generations.
+    nit: int
+    #: Evaluations of the function.
+    nfev: int
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{name:>8}: {str(value).replace(chr(10), chr(10) + ' ' * 10)}" for name, value in self._asdict().items())
+
+
 class Finding(NamedTuple):
     """One thing that is wrong with a log."""
 

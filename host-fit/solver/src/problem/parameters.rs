@@ -119,19 +119,13 @@ pub fn search_box(
     model: &'static Model,
     misalignment_rad: [f64; 3],
 ) -> [Range; COUNT] {
-    let mut ranges = [Range {
-        low: 0.0,
-        high: 0.0,
-    }; COUNT];
+    let mut ranges = [Range::new(0.0, 0.0); COUNT];
     let arms_m = lever_arm_ranges(stage, misalignment_rad);
     for id in model.parameters() {
         ranges[id.index] = if id.index < THETA {
             arms_m[id.probe]
         } else {
-            let held = Range {
-                low: id.term.fixed,
-                high: id.term.fixed,
-            };
+            let held = Range::new(id.term.fixed, id.term.fixed);
             let ranges = stage.search.of(id.term.range_key);
             let mut range = ranges.map_or(held, |ranges| ranges[id.probe]);
             if id.index < ETA {
@@ -152,12 +146,8 @@ pub fn lever_arm_ranges(stage: &Stage, misalignment_rad: [f64; 3]) -> [Range; 3]
     [0, 1, 2].map(|probe| {
         let [x, y] = [0, 1].map(|k| {
             let (range, factor) = (places[probe][k], factors[probe][k]);
-            let (a, b) = (range.low * factor, range.high * factor);
-            (a.min(b), a.max(b))
+            Range::around([range.low * factor, range.high * factor])
         });
-        Range {
-            low: x.0 + y.0,
-            high: x.1 + y.1,
-        }
+        Range::new(x.low + y.low, x.high + y.high)
     })
 }

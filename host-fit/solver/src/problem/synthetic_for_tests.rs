@@ -78,7 +78,7 @@ impl Protocol {
                 dataset.rows.push(Row {
                     movement: dataset.movements.len(),
                     t_us: (k as f64 * stage.servo_period_s * 1e6).round() as i64,
-                    frame: LoggedFrame::Codes(RawFrame::new(
+                    frame: LoggedFrame::from(RawFrame::new(
                         signal_m.map(|s| code(s, stage.hall.m_per_count)),
                         gaps.map(|g| code(g, stage.capacitive.m_per_count)),
                         k as u32,

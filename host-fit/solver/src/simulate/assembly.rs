@@ -100,11 +100,7 @@ impl Assembly {
 
 /// The search ranges of eta; the designed value where a stage has none.
 fn etas(stage: &Stage) -> [Range; 3] {
-    let designed = Range {
-        low: 1.0,
-        high: 1.0,
-    };
-    stage.search.of("eta").unwrap_or([designed; 3])
+    stage.search.of("eta").unwrap_or([Range::new(1.0, 1.0); 3])
 }
 
 fn inner(range: Range, random: &mut Stream) -> f64 {

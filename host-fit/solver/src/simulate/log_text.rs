@@ -23,14 +23,7 @@ pub fn log_csv(recording: &Recording, stage: &Stage) -> String {
     for (movement, samples) in (0..).zip(&recording.movements) {
         for s in samples {
             let beams = [0, 1, 2].map(|i| s.beams_nm[i] as f64 * per_nm[i]);
-            let at = (movement, s.t_us);
-            format.append(
-                &mut text,
-                at,
-                beams,
-                [s.capacitive, s.hall],
-                s.temperature_mc,
-            );
+            format.append(&mut text, (movement, s.t_us), beams, &s.codes(0));
         }
     }
     text

@@ -6,7 +6,7 @@ use super::protocol::Run;
 use super::random::{Purpose, Stream};
 use super::sensors::{ReferenceError, SensorErrors, beams_m, code, gaps_m};
 use super::thermal::{Climate, HELD_S, Thermal, Thermometers};
-use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
+use crate::input::dataset::{Dataset, Movement, Row};
 use crate::input::stage::Stage;
 use runtime::RawFrame;
 use runtime::capacitive::{vertical_pose, vertical_rows};
@@ -48,6 +48,14 @@ pub struct Sample {
     pub hall: [i32; 3],
     /// Temperatures of mount and body, m degC; [`MISSING_CODE`] where no climate is simulated.
     pub temperature_mc: [i32; 2],
+}
+
+impl Sample {
+    /// All codes, as the decoder takes them.
+    pub const fn codes(&self, sequence: u32) -> RawFrame {
+        RawFrame::new(self.hall, self.capacitive, sequence, self.t_us as u32)
+            .with_temperature_mc(self.temperature_mc)
+    }
 }
 
 /// The log of a run, and where the stage truly was.
@@ -222,10 +230,7 @@ fn row(stage: &Stage, plane: &[[f64; 3]; 3], movement: usize, sequence: u32, s: 
     Row {
         movement,
         t_us: s.t_us,
-        frame: LoggedFrame::Codes(
-            RawFrame::new(s.hall, s.capacitive, sequence, s.t_us as u32)
-                .with_temperature_mc(s.temperature_mc),
-        ),
+        frame: s.codes(sequence).into(),
         signal_m: s.hall.map(|code| f64::from(code) * stage.hall.m_per_count),
         vertical: vertical_pose(plane, gaps).to_array(),
         reference: [

@@ -3,26 +3,28 @@
 use hal_adapters::can::{BusHealth, Layout, Message, SensorReceiver, StampedFrame, Timing};
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
+use serde::{Serialize, Serializer};
 
 /// A whole tick of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusTick {
-    /// The last four bits of its number.
-    pub counter: u8,
     /// When its first frame was received, us.
     pub received_us: u64,
-    /// Hall codes of A, B, C.
-    pub hall: [i32; 3],
-    /// Capacitive codes 1, 2, 3.
-    pub capacitive: [i32; 3],
-    /// Temperatures of mount and body, m degC.
-    pub temperature_mc: [i32; 2],
+    /// All its codes.
+    pub codes: RawFrame,
     /// Whether a code is at a rail of its converter.
     pub is_saturated: bool,
 }
 
+impl BusTick {
+    /// The last four bits of its number.
+    pub(super) const fn counter(&self) -> u32 {
+        self.codes.sequence & 0xf
+    }
+}
+
 /// What a record held.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BusCounts {
     /// Lines with a frame.
     pub frames: usize,
@@ -44,7 +46,21 @@ pub struct BusCounts {
     /// Places where ticks are missing.
     pub gaps: usize,
     /// What the receiver noticed.
+    #[serde(serialize_with = "health")]
     pub health: BusHealth,
+}
+
+fn health<S: Serializer>(health: &BusHealth, to: S) -> Result<S::Ok, S::Error> {
+    let counts = [
+        ("lost", health.lost),
+        ("repeated", health.repeated),
+        ("out of sequence", health.wrong_sequence),
+        ("damaged", health.wrong_check),
+        ("of wrong length", health.wrong_length),
+        ("late", health.late),
+        ("incomplete ticks", health.incomplete),
+    ];
+    to.collect_map(counts)
 }
 
 /// A recorded tick may have been delayed as a whole: what is missing shows by the counters.
@@ -102,11 +118,8 @@ impl Collector {
         // The record's clock may step back within a tick.
         let age_us = if age_us > u32::MAX / 2 { 0 } else { age_us };
         Some(BusTick {
-            counter: (raw.sequence & 0xf) as u8,
             received_us: now_us.saturating_sub(age_us.into()),
-            hall: raw.hall,
-            capacitive: raw.capacitive,
-            temperature_mc: raw.temperature_mc,
+            codes: *raw,
             is_saturated: false,
         })
     }

@@ -140,8 +140,12 @@ impl BusReader<'_> {
     fn is_saturated(&self, tick: &BusTick) -> Result<bool, ImportError> {
         let mut is_sound = true;
         let sensors = [
-            (&self.stage.hall, Quantity::HALL, tick.hall),
-            (&self.stage.capacitive, Quantity::GAPS, tick.capacitive),
+            (&self.stage.hall, Quantity::HALL, tick.codes.hall),
+            (
+                &self.stage.capacitive,
+                Quantity::GAPS,
+                tick.codes.capacitive,
+            ),
         ];
         for (converter, quantities, codes) in sensors {
             for (quantity, code) in quantities.into_iter().zip(codes) {

@@ -4,6 +4,8 @@
 use super::ImportError;
 use super::node_clock::Tick;
 use super::reference::Sample;
+use runtime::RawFrame;
+use serde::Serialize;
 
 /// A tick with its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,16 +16,12 @@ pub struct JoinedRow {
     pub movement: i64,
     /// Reference, in the units of its columns.
     pub values: [f64; 3],
-    /// Hall codes.
-    pub hall: [i32; 3],
-    /// Capacitive codes.
-    pub capacitive: [i32; 3],
-    /// Temperatures of mount and body, m degC.
-    pub temperature_mc: [i32; 2],
+    /// All codes.
+    pub codes: RawFrame,
 }
 
 /// How ticks and reference went together.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct JoinCounts {
     /// Ticks.
     pub ticks: usize,
@@ -173,9 +171,7 @@ pub(super) fn join(
             t_us: t_us as i64,
             movement,
             values,
-            hall: tick.hall,
-            capacitive: tick.capacitive,
-            temperature_mc: tick.temperature_mc,
+            codes: tick.codes,
         })?;
     }
     Ok(counts)

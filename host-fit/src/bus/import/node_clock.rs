@@ -7,6 +7,7 @@
 
 use super::bus_log::BusTick;
 use hal_adapters::can::sensor::TickTime;
+use runtime::RawFrame;
 
 /// Numbers that a time frame distinguishes.
 const NUMBERS: u32 = 1 << 20;
@@ -29,9 +30,7 @@ const BLOCK_TICKS: usize = 250;
 pub(super) struct Tick {
     /// When they were sampled, us since the first time frame of the run by the node's clock.
     pub(super) t_us: f64,
-    pub(super) hall: [i32; 3],
-    pub(super) capacitive: [i32; 3],
-    pub(super) temperature_mc: [i32; 2],
+    pub(super) codes: RawFrame,
 }
 
 /// Ticks since the node started.
@@ -55,9 +54,7 @@ impl Run {
         }
         self.ticks.push(Tick {
             t_us,
-            hall: tick.hall,
-            capacitive: tick.capacitive,
-            temperature_mc: tick.temperature_mc,
+            codes: tick.codes,
         });
     }
 
@@ -149,11 +146,11 @@ impl NodeClock {
             self.run.since_start_us = received_us.saturating_sub(self.first_us) as f64;
         }
         self.mark = Some(mark);
-        let in_order = waiting.is_sorted_by(|a, b| a.counter < b.counter);
+        let in_order = waiting.is_sorted_by(|a, b| a.counter() < b.counter());
         if follows && ticks == TICKS && more_us < apart_us && in_order {
             let step_us = passed_us / f64::from(TICKS);
             for tick in &waiting {
-                let t_us = before.t_us + f64::from(tick.counter) * step_us;
+                let t_us = before.t_us + f64::from(tick.counter()) * step_us;
                 if !tick.is_saturated {
                     self.run.push(tick, t_us);
                 }
@@ -193,11 +190,8 @@ mod tests {
     /// Ticks carry their own number, from 1, by their code.
     fn tick(n: u32) -> BusTick {
         BusTick {
-            counter: (n % TICKS) as u8,
             received_us: u64::from(n) * 2_000 + 5_000,
-            hall: [n as i32; 3],
-            capacitive: [0; 3],
-            temperature_mc: [0; 2],
+            codes: RawFrame::new([n as i32; 3], [0; 3], n, 0),
             is_saturated: false,
         }
     }
@@ -234,9 +228,10 @@ mod tests {
                         let ticks = run.ticks.len() + untimed;
                         assert!(ticks as u32 + count + refused == 700, "{what}: {ticks}");
                         assert!(run.ticks.len() as u32 + count > 630, "{what}: {untimed}");
-                        let zero_us = run.ticks[0].t_us - 2_000.0 * f64::from(run.ticks[0].hall[0]);
+                        let zero_us =
+                            run.ticks[0].t_us - 2_000.0 * f64::from(run.ticks[0].codes.hall[0]);
                         for tick in &run.ticks {
-                            let n_us = 2_000.0 * f64::from(tick.hall[0]);
+                            let n_us = 2_000.0 * f64::from(tick.codes.hall[0]);
                             assert_eq!(tick.t_us - n_us, zero_us, "{what}");
                         }
                     }
@@ -262,6 +257,9 @@ mod tests {
         assert_eq!(clock.restarts, 1);
         let (run, untimed) = clock.into_longest();
         assert_eq!((run.ticks.len(), untimed), (192, 108));
-        assert_eq!((run.ticks[20].t_us, run.ticks[20].hall[0]), (40_000.0, 20));
+        assert_eq!(
+            (run.ticks[20].t_us, run.ticks[20].codes.hall[0]),
+            (40_000.0, 20)
+        );
     }
 }

@@ -17,22 +17,27 @@ use crate::input::stage::Stage;
 use crate::solve::field::clocks::{Alignment, Lag};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rows::Row;
+use serde::Serialize;
 
 /// The offset between the clocks.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Offset {
     /// Time of the recorder less time of the reference in the middle of the record, us.
+    #[serde(rename = "in_the_middle_us")]
     pub us: f64,
     /// How much faster the clock of the sensor node runs than that of the reference, as a part of one.
+    #[serde(rename = "node_clock_faster_by")]
     pub rate: f64,
     /// What the motion that both saw shows.
+    #[serde(flatten)]
     pub seen: Seen,
 }
 
 /// What the motion that both records saw shows of an offset.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Seen {
     /// Share of the Hall signals' motion that the reference explains.
+    #[serde(rename = "share_of_motion_explained")]
     pub explained: f64,
     /// Over how many ticks.
     pub ticks: usize,
@@ -40,6 +45,7 @@ pub struct Seen {
     /// larger, us.
     pub standard_error_us: f64,
     /// For an offset that was given: the one that the motion shows less the one given, us.
+    #[serde(rename = "motion_asks_for_more_us")]
     pub apart_us: Option<f64>,
 }
 
@@ -190,12 +196,12 @@ impl<'r> Records<'r> {
         let minutes = self.ticks.chunks(self.ticks.len().div_ceil(parts).max(1));
         let motion = |ticks: &&[Tick]| {
             let mean = |k: usize| {
-                let sum: f64 = ticks.iter().map(|tick| f64::from(tick.hall[k])).sum();
+                let sum: f64 = ticks.iter().map(|tick| f64::from(tick.codes.hall[k])).sum();
                 sum / ticks.len() as f64
             };
             let means = [0, 1, 2].map(mean);
             let of_tick = |tick: &Tick| -> f64 {
-                let of_probe = |k: usize| (f64::from(tick.hall[k]) - means[k]).powi(2);
+                let of_probe = |k: usize| (f64::from(tick.codes.hall[k]) - means[k]).powi(2);
                 [0, 1, 2].map(of_probe).iter().sum()
             };
             ticks.iter().map(of_tick).sum::<f64>()

@@ -11,6 +11,7 @@ use crate::input::log::time::Clock;
 use crate::input::log::{LogError, LogProblem};
 use crate::input::stage::Stage;
 use crate::input::text::TextReader;
+use serde::Serialize;
 use std::path::Path;
 
 /// One sample of the reference.
@@ -25,7 +26,7 @@ pub struct Sample {
 }
 
 /// What a log of the reference held.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ReferenceCounts {
     /// Rows.
     pub rows: usize,

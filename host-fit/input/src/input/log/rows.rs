@@ -96,38 +96,31 @@ impl<'a> RowReader<'a> {
     /// The row at `t_us`; its movement and sequence number are still 0.
     pub(super) fn row(&mut self, row: &Record, t_us: i64) -> Result<Row, BadCell> {
         let hall = self.codes(row, self.columns.hall, self.hall)?;
-        let (sequence, time_us) = (0, t_us as u32);
         let [mount, body] = self.columns.temperature;
         let temperature_mc = [
             self.temperature_mc(row, mount)?,
             self.temperature_mc(row, body)?,
         ];
-        let (set, sources) = self.columns.vertical;
-        let (frame, vertical) = if set == Quantity::GAPS {
-            let capacitive = self.codes(row, sources, self.capacitive)?;
-            let gaps_m = capacitive.map(|code| f64::from(code) * self.capacitive.m_per_count);
-            let frame = RawFrame::new(hall, capacitive, sequence, time_us);
-            let frame = LoggedFrame::Codes(frame.with_temperature_mc(temperature_mc));
-            (frame, vertical_pose(&self.vertical_rows, gaps_m).to_array())
-        } else {
-            let [a, b, c] = sources;
-            let height = |source| scaled(row, source, self.height_max_m, "m");
-            let rotation = |source| scaled(row, source, ROTATION_MAX_RAD, "rad");
-            let vertical = match set == Quantity::VERTICAL {
-                true => [height(a)?, rotation(b)?, rotation(c)?],
-                false => {
-                    let gaps_m = [height(a)?, height(b)?, height(c)?];
-                    vertical_pose(&self.vertical_rows, gaps_m).to_array()
-                }
-            };
-            let frame = LoggedFrame::HallCodes {
-                hall,
-                vertical: VerticalPose::from_array(vertical.map(|x| x as f32)),
-                sequence,
-                time_us,
-                temperature_mc,
-            };
-            (frame, vertical)
+        let (set, [a, b, c]) = self.columns.vertical;
+        let mut capacitive = [0; 3];
+        let height = |source| scaled(row, source, self.height_max_m, "m");
+        let rotation = |source| scaled(row, source, ROTATION_MAX_RAD, "rad");
+        let of_gaps = |gaps_m| vertical_pose(&self.vertical_rows, gaps_m).to_array();
+        let vertical = match set {
+            Quantity::VERTICAL => [height(a)?, rotation(b)?, rotation(c)?],
+            Quantity::GAP_LENGTHS => of_gaps([height(a)?, height(b)?, height(c)?]),
+            _ => {
+                capacitive = self.codes(row, [a, b, c], self.capacitive)?;
+                let m_per_count = self.capacitive.m_per_count;
+                let gaps_m = capacitive.map(|code| f64::from(code) * m_per_count);
+                vertical_pose(&self.vertical_rows, gaps_m).to_array()
+            }
+        };
+        let codes = RawFrame::new(hall, capacitive, 0, t_us as u32);
+        let frame = LoggedFrame {
+            codes: codes.with_temperature_mc(temperature_mc),
+            vertical: (set != Quantity::GAPS)
+                .then(|| VerticalPose::from_array(vertical.map(|x| x as f32))),
         };
         Ok(Row {
             movement: 0,

@@ -23,15 +23,9 @@ const PLACE_M: f64 = 0.1;
 /// Usual misalignment at most.
 const THETA_DEG: f64 = 8.0;
 /// Usual sensitivities.
-const ETA: Range = Range {
-    low: 0.5,
-    high: 1.5,
-};
+const ETA: Range = Range::new(0.5, 1.5);
 /// Usual change of a sensitivity with height, 1/m: the field falls as the gap grows.
-const FALL_PER_M: Range = Range {
-    low: -5000.0,
-    high: 0.0,
-};
+const FALL_PER_M: Range = Range::new(-5000.0, 0.0);
 /// Usual zero deviation at most, m.
 const DELTA_M: f64 = 1e-4;
 
@@ -63,10 +57,7 @@ pub(super) fn ranges(
     ranges.set("eta", [eta("eta_a")?, eta("eta_b")?, eta("eta_c")?]);
     let default = about(0.0, THETA_DEG);
     let theta = one("theta_deg", THETA_MAX_DEG, "degrees", Some(0.0), default)?;
-    let theta = Range {
-        low: theta.low * DEGREE,
-        high: theta.high * DEGREE,
-    };
+    let theta = Range::new(theta.low * DEGREE, theta.high * DEGREE);
     ranges.set("theta_deg", [theta; 3]);
     let three = |key, unit, default: [Range; 3]| -> Result<[Range; 3], StageError> {
         let Some(list) = document.read::<List<Ends>>("search", key)? else {
@@ -92,10 +83,7 @@ pub(super) fn ranges(
 
 /// The range of so much to both sides of a value.
 const fn about(value: f64, room: f64) -> Range {
-    Range {
-        low: value - room,
-        high: value + room,
-    }
+    Range::new(value - room, value + room)
 }
 
 /// The range of the products of two ranges.
@@ -106,10 +94,7 @@ fn product(a: Range, b: Range) -> Range {
         a.high * b.low,
         a.high * b.high,
     ];
-    Range {
-        low: ends.into_iter().fold(f64::INFINITY, f64::min),
-        high: ends.into_iter().fold(f64::NEG_INFINITY, f64::max),
-    }
+    Range::around(ends)
 }
 
 /// The range, if its ends are in order and at most `most` in magnitude, and it holds the

@@ -111,7 +111,7 @@ impl Run {
                 dataset.rows.push(Row {
                     movement,
                     t_us: (row as f64 * PERIOD_S * 1e6).round() as i64,
-                    frame: LoggedFrame::Codes(RawFrame::new([0; 3], [0; 3], 0, 0)),
+                    frame: LoggedFrame::from(RawFrame::new([0; 3], [0; 3], 0, 0)),
                     signal_m,
                     vertical,
                     reference: [0, 1, 2].map(|k| seen[k] + error[k]),

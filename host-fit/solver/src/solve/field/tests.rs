@@ -149,7 +149,7 @@ fn cold_and_warm(k_per_k: [f64; 3], logs: usize) -> Dataset {
         let change_k = if index < cold { 0.0 } else { 5.0 };
         let frame = RawFrame::new([0; 3], [0; 3], 0, 0);
         let mount_mc = 20_000 + (change_k * 1e3) as i32;
-        row.frame = LoggedFrame::Codes(frame.with_temperature_mc([mount_mc, MISSING_CODE]));
+        row.frame = LoggedFrame::from(frame.with_temperature_mc([mount_mc, MISSING_CODE]));
         for (signal, k) in row.signal_m.iter_mut().zip(k_per_k) {
             *signal *= 1.0 + k * change_k;
         }
@@ -189,9 +189,8 @@ fn logs_at_nearly_one_temperature_leave_k_as_expected() {
     for (logs, part) in [(1, 3), (2, 100)] {
         let mut dataset = cold_and_warm([-1.2e-3; 3], logs);
         for row in &mut dataset.rows {
-            if let LoggedFrame::Codes(frame) = &mut row.frame {
-                frame.temperature_mc[0] = 20_000 + (frame.temperature_mc[0] - 20_000) / part;
-            }
+            let [mount_mc, _] = &mut row.frame.codes.temperature_mc;
+            *mount_mc = 20_000 + (*mount_mc - 20_000) / part;
         }
         dataset.compensate_as_expected(&stage().temperature);
         let warmth = fit(&dataset).expect("a fit").warmth;
@@ -230,7 +229,7 @@ fn each_run_at_another_temperature_adds_to_what_is_known_of_k() {
         for row in &mut dataset.rows {
             let frame = RawFrame::new([0; 3], [0; 3], 0, 0);
             let temperature_mc = [20_000 + change_mk, MISSING_CODE];
-            row.frame = LoggedFrame::Codes(frame.with_temperature_mc(temperature_mc));
+            row.frame = LoggedFrame::from(frame.with_temperature_mc(temperature_mc));
             for (signal, k) in row.signal_m.iter_mut().zip(truth) {
                 *signal *= 1.0 + k * f64::from(change_mk) * 1e-3;
             }

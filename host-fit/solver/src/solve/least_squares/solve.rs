@@ -37,10 +37,7 @@ fn ranges(problem: &Problem, theta: [f64; 3], within: bool) -> [Range; COUNT] {
     let mut ranges = search_box(problem.stage, problem.model, theta);
     if !within {
         for index in free(problem) {
-            ranges[index] = Range {
-                low: f64::NEG_INFINITY,
-                high: f64::INFINITY,
-            };
+            ranges[index] = Range::new(f64::NEG_INFINITY, f64::INFINITY);
         }
     }
     ranges
@@ -78,9 +75,9 @@ fn unknowns(problem: &Problem, about: &Parameters, within: bool) -> Unknowns {
             unknowns.basis[(arm, THETA + arm)] = moved / STEP_RAD;
         }
     }
-    let range = |&index: &usize| Range {
-        low: here[index].low - about.values[index],
-        high: here[index].high - about.values[index],
+    let range = |&index: &usize| {
+        let (here, about) = (here[index], about.values[index]);
+        Range::new(here.low - about, here.high - about)
     };
     unknowns.ranges = free.iter().map(range).collect();
     unknowns

@@ -68,10 +68,7 @@ impl<'a> Objective<'a> {
                 bounds
             }
             Projection::Delta => {
-                ranges[..THETA].fill(Range {
-                    low: 0.0,
-                    high: 1.0,
-                });
+                ranges[..THETA].fill(Range::new(0.0, 1.0));
                 for k in SLOPES..free {
                     // With the largest eta the pole is farthest away.
                     let eta = ranges[ETA + k % 3];
@@ -251,10 +248,7 @@ fn quotient(numerator: Range, denominator: Range) -> Range {
     let ends = [numerator.low, numerator.high]
         .map(|n| [n / denominator.low, n / denominator.high])
         .concat();
-    Range {
-        low: ends.iter().copied().fold(f64::INFINITY, f64::min),
-        high: ends.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-    }
+    Range::around(ends)
 }
 
 /// The best zero deviation of each movement of the log, m; zero for movements

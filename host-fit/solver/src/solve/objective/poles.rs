@@ -16,10 +16,7 @@ pub const SHARE_MIN: f64 = 0.05;
 
 /// Lowest and highest Z, Rx, Ry over some rows, zero included: m, rad, rad.
 pub fn slope_extent(rows: &[TrainRow]) -> [Range; 3] {
-    let mut extent = [Range {
-        low: 0.0,
-        high: 0.0,
-    }; 3];
+    let mut extent = [Range::new(0.0, 0.0); 3];
     for row in rows {
         for (range, v) in extent.iter_mut().zip(row.vertical) {
             range.low = range.low.min(v);

@@ -36,10 +36,13 @@ impl Records<'_> {
                 (before.0 == after.0).then(|| FieldRow {
                     warmth_k: [[0.0; 2]; 3],
                     time_s: 1e-6 * (row.tick.t_us - clocks.middle_us),
-                    signal_mm: row.tick.hall.map(|code| hall_mm * f64::from(code)),
+                    signal_mm: row.tick.codes.hall.map(|code| hall_mm * f64::from(code)),
                     vertical: vertical_pose(
                         &vertical,
-                        row.tick.capacitive.map(|code| gap_m * f64::from(code)),
+                        row.tick
+                            .codes
+                            .capacitive
+                            .map(|code| gap_m * f64::from(code)),
                     )
                     .to_array(),
                     reference_mm: row.pose.map(|q| q * 1e3),
@@ -93,7 +96,12 @@ impl Records<'_> {
         for movement in rows.chunk_by(|a, b| a.movement == b.movement) {
             for (k, [ss, sp, pp]) in sums.iter_mut().enumerate() {
                 let n = movement.len() as f64;
-                let pair = |row: &Row| [f64::from(row.tick.hall[k]), dot(&self.plane[k], row.pose)];
+                let pair = |row: &Row| {
+                    [
+                        f64::from(row.tick.codes.hall[k]),
+                        dot(&self.plane[k], row.pose),
+                    ]
+                };
                 let [signal, probe] =
                     [0, 1].map(|i| movement.iter().map(|row| pair(row)[i]).sum::<f64>() / n);
                 for row in movement {
