@@ -79,115 +79,57 @@ pub struct Diagnosis {
 pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Diagnosis {
     let compensated = fitted.map(|fit| dataset.compensated(fit.calibration.temperature));
     let dataset = compensated.as_deref().unwrap_or(dataset);
-    let outliers = fitted.map_or(&[][..], |fit| &fit.outliers);
-    let sound = match outliers {
+    let sound = match fitted.map_or(&[][..], |fit| &fit.outliers) {
         [] => Cow::Borrowed(dataset),
         outliers => Cow::Owned(dataset.without(outliers)),
     };
-    let errors = (fitted.ok()).map(|fit| &fit.decoded.errors[..]);
     let (parameters, lag_s) = parameters_of(fitted, stage);
-    let model = fitted.map_or(ModelKind::M31, |fit| fit.model.kind);
     let field = fitted.ok().and_then(|fit| fit.field.as_ref());
-    let for_service = field.is_some_and(|field| !field.verdict.by_resets);
-    let of_signals = || signals::signal_findings(dataset, stage, (&parameters, lag_s), errors);
-    let (of_structure, (mut findings, bad)) =
-        rayon::join(|| structure::structure(&sound, stage), of_signals);
-    // A log that determines nothing says nothing of its channels.
-    let is_described = match fitted {
-        Ok(_) | Err(FitError::Failed(FitFailure::NotDescribed { .. })) => true,
-        Err(_) => false,
+    let by = Fitted {
+        parameters: &parameters,
+        model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
+        for_service: field.is_some_and(|field| !field.verdict.by_resets),
     };
-    let (mut predicted, mut repair) = (None, None);
-    let described = is_described.then(|| {
-        let fitted = Fitted {
-            parameters: &parameters,
-            model,
-            for_service,
-        };
-        of_channels(dataset, stage, &bad, &findings, fitted)
-    });
-    let mut described = described.flatten();
-    // A fault that leaves nothing of the residuals when it is taken off explains what a mistake would.
-    let explains = |of: &&mut bank::Diagnosis| of.repair.is_some() && of.rest < LIMITED_MAX;
-    if described.as_mut().filter(explains).is_none() || fitted.is_err() {
-        let refuses = |found: &Finding| found.severity == Severity::Refuse;
-        if let Some(of) = described
-            .as_mut()
-            .filter(|_| of_structure.iter().any(refuses))
-        {
-            (of.findings, of.repair) = (Vec::new(), None);
+    let errors = fitted.ok().map(|fit| &fit.decoded.errors[..]);
+    let mut out = Diagnosis::default();
+    match fitted {
+        Err(error) => {
+            // A log that determines nothing says nothing of its channels.
+            let described = matches!(error, FitError::Failed(FitFailure::NotDescribed { .. }));
+            out.shown(
+                dataset,
+                &sound,
+                stage,
+                by,
+                (lag_s, errors),
+                (described, false),
+            );
+            out.predicted = None;
         }
-        findings.extend(of_structure);
-    }
-    if let Some(of) = described {
-        // The failure of a fit says more of what the log leaves open.
-        let is_own = |found: &Finding| fitted.is_ok() || found.code != Code::NotDetermined;
-        let found = of.findings.into_iter().filter(is_own);
-        match of.repair.filter(|_| fitted.is_ok()) {
-            Some((mut found_repair, expected)) => {
-                for found in found {
-                    found_repair.faults.push(found.message.clone());
-                    findings.push(bank::repaired(found));
-                }
-                (predicted, repair) = (Some(expected), Some(found_repair));
-            }
-            None => {
-                findings.extend(found);
-                predicted = Some(of.predicted).filter(|_| fitted.is_ok());
-            }
+        Ok(fit) => {
+            out.shown(dataset, &sound, stage, by, (lag_s, errors), (true, true));
+            out.add_of_fit(fit, dataset, stage);
         }
     }
+    let findings = &mut out.findings;
     findings.extend(short_movements::finding(fitted.ok(), dataset));
-    if let Ok(fit) = fitted {
-        // Rows that a fault explains are no riddle.
-        if repair.is_none() {
-            findings.extend(left_out::finding(fit, dataset));
-        }
-        // One beam that is late is a lag of all of them to a fit.
-        let is_late = findings
-            .iter()
-            .any(|found| found.code == Code::ReferenceLag);
-        let of_fit = fit.warnings.iter();
-        let of_fit = of_fit.filter(|found| !is_late || found.code != Code::ReferenceLag);
-        findings.extend(of_fit.cloned());
-        findings.extend(temperature::findings(fit, dataset, stage));
-        let ranged = |found: &Finding| {
-            let is_of =
-                |other: &Finding| other.code == found.code && other.channel == found.channel;
-            fit.warnings.iter().any(is_of)
-        };
-        findings.extend(range::undeclared(dataset, stage).filter(|found| !ranged(found)));
-        if !is_explained(&findings) {
-            findings.extend(of_fit::undescribed(fit, dataset));
-            findings.extend(of_fit::not_field(fit, predicted.as_ref()));
-        }
-        // Of the field model the bank says what is left.
-        let is_other = fit.field.is_none();
-        if is_other && findings.iter().all(|f| f.severity == Severity::Note) {
-            findings.extend(of_fit::unexplained(fit, dataset));
-        }
+    *findings = in_order(std::mem::take(findings));
+    let (refused, ratio) = (is_refused(findings), out.predicted.map(|p| p.worst_ratio()));
+    if let Some(ratio) = ratio.filter(|ratio| by.for_service && *ratio > LIMITED_MAX && !refused) {
+        let message = format!(
+            "all that is wrong with the log together makes errors of {ratio:.2} times the noise floor at work"
+        );
+        findings.insert(0, Finding::new(Code::NotDetermined, message).costing(ratio));
     }
-    let mut findings = in_order(findings);
-    let beyond = predicted
-        .filter(|_| for_service)
-        .and_then(|p| beyond_service(&p, &findings));
-    findings.splice(0..0, beyond);
-    let verdict = match fitted {
-        Ok(_) => Verdict::new(for_service, predicted.as_ref(), &findings),
+    out.verdict = Some(match fitted {
+        Ok(_) => Verdict::new(by.for_service, out.predicted.as_ref(), findings),
         Err(_) => Verdict::Refused,
-    };
-    Diagnosis {
-        findings,
-        verdict: Some(verdict),
-        predicted,
-        repair,
-        validity: (fitted.ok())
-            .and_then(|fit| fit.field.as_ref())
-            .and_then(|field| {
-                let (white_mm, covariance) = (field.noise.white_mm, &field.posterior.covariance);
-                temperature::validity(stage, &field.parameters, white_mm, covariance)
-            }),
-    }
+    });
+    out.validity = field.and_then(|field| {
+        let (white_mm, covariance) = (field.noise.white_mm, &field.posterior.covariance);
+        temperature::validity(stage, &field.parameters, white_mm, covariance)
+    });
+    out
 }
 
 /// The parameters of a fit, those of the drawing where there is none, and the lag of the reference, s.
@@ -202,56 +144,111 @@ fn parameters_of(fitted: Result<&Fit, &FitError>, stage: &Stage) -> (FieldParame
     }
 }
 
-/// That a calibration is refused for what is predicted, where no finding refuses it by itself.
-fn beyond_service(predicted: &Predicted, findings: &[Finding]) -> Option<Finding> {
-    let ratio = predicted.worst_ratio();
-    let is_refused = findings.iter().any(|f| f.severity == Severity::Refuse);
-    (ratio > LIMITED_MAX && !is_refused).then(|| {
-        let message = format!(
-            "all that is wrong with the log together makes errors of {ratio:.2} times the noise floor at work"
-        );
-        Finding::new(Code::NotDetermined, message).costing(ratio)
-    })
+fn is_refused(findings: &[Finding]) -> bool {
+    findings.iter().any(|f| f.severity == Severity::Refuse)
 }
 
-/// What the bank of faults finds in the rows that are not `bad`, unless the log is refused already, and
-/// what it predicts.
-fn of_channels(
-    dataset: &Dataset,
-    stage: &Stage,
-    bad: &[usize],
-    others: &[Finding],
-    fitted: Fitted,
-) -> Option<bank::Diagnosis> {
-    if dataset.logs.iter().any(|log| !log.has_reference) {
-        return None;
+fn are_notes(findings: &[Finding]) -> bool {
+    findings.iter().all(|f| f.severity == Severity::Note)
+}
+
+impl Diagnosis {
+    /// What signals, channels and structure show, and what that predicts. `has_channels` where the log is
+    /// described by the parameters, `is_fit` where these are a fit to it, whose errors it explains.
+    fn shown(
+        &mut self,
+        dataset: &Dataset,
+        sound: &Dataset,
+        stage: &Stage,
+        by: Fitted,
+        (lag_s, errors): (f64, Option<&[Option<[f64; 3]>]>),
+        (has_channels, is_fit): (bool, bool),
+    ) {
+        let of_signals =
+            || signals::signal_findings(dataset, stage, (by.parameters, lag_s), errors);
+        let (of_structure, (findings, bad)) =
+            rayon::join(|| structure::structure(sound, stage), of_signals);
+        self.findings = findings;
+        let has_channels = has_channels && dataset.logs.iter().all(|log| log.has_reference);
+        let of_rows = has_channels.then(|| bank::diagnose(&dataset.without(&bad), stage, by));
+        let of_rows = of_rows.flatten();
+        // A fault that leaves nothing of the residuals when it is taken off explains what a mistake would.
+        let explains =
+            |of: &bank::Diagnosis| is_fit && of.repair.is_some() && of.rest < LIMITED_MAX;
+        if is_refused(&self.findings) || !of_rows.as_ref().is_some_and(explains) {
+            self.findings.extend(of_structure);
+        }
+        let Some(mut of) = of_rows else { return };
+        self.predicted = Some(of.predicted);
+        // What a log leaves open is no fault of parameters that are not fitted to it.
+        if !is_fit
+            && of
+                .findings
+                .iter()
+                .any(|found| found.code == Code::NotDetermined)
+        {
+            self.predicted = None;
+            of.findings
+                .retain(|found| found.code != Code::NotDetermined);
+        }
+        if is_refused(&self.findings) {
+            return;
+        }
+        if of.rest > LIMITED_MAX && are_notes(&self.findings) && are_notes(&of.findings) {
+            let message = format!(
+                "the log does not fit to itself: {:.1} times the noise are left of the Hall signals, and no single fault                  explains them. Fit parts of it",
+                of.rest
+            );
+            // Of other models it is what they lack.
+            let cost = of.predicted.worst_ratio();
+            let severity = match by.model {
+                ModelKind::Field => bank::severity(cost).max(Severity::Warn),
+                _ => Severity::Refuse,
+            };
+            let lacks = Finding::new(Code::ModelLacks, message).severe(severity);
+            of.findings.push(lacks.of(of.rest, "times").costing(cost));
+        }
+        if let Some((repair, expected)) = of.repair.filter(|_| is_fit) {
+            let messages = of.findings.iter().map(|found| found.message.clone());
+            let faults = messages.collect();
+            (self.predicted, self.repair) = (Some(expected), Some(Repair { faults, ..repair }));
+            for found in &mut of.findings {
+                found.message += ". The calibration has this taken off, and is that of the stage at the end of the log";
+                found.severity = found.severity.min(Severity::Warn);
+            }
+        }
+        self.findings.extend(of.findings);
     }
-    let mut found = bank::diagnose(&dataset.without(bad), stage, fitted)?;
-    let is_refused = others
-        .iter()
-        .any(|found| found.severity == Severity::Refuse);
-    if is_refused {
-        found.findings.clear();
-        found.repair = None;
-        return Some(found);
-    }
-    let all_notes = |findings: &[Finding]| findings.iter().all(|f| f.severity == Severity::Note);
-    let rest = found.rest;
-    if rest > LIMITED_MAX && all_notes(others) && all_notes(&found.findings) {
-        let message = format!(
-            "the log does not fit to itself: {rest:.1} times the noise are left of the Hall signals, and no single fault explains \
-             them. Fit parts of it"
-        );
-        // Of other models it is what they lack.
-        let cost = found.predicted.worst_ratio();
-        let severity = match fitted.model {
-            ModelKind::Field => bank::severity(cost).max(Severity::Warn),
-            _ => Severity::Refuse,
+
+    /// What a fit says of itself, where no fault says it already.
+    fn add_of_fit(&mut self, fit: &Fit, dataset: &Dataset, stage: &Stage) {
+        let findings = &mut self.findings;
+        // Rows that a fault explains are no riddle.
+        if self.repair.is_none() {
+            findings.extend(left_out::finding(fit, dataset));
+        }
+        // One beam that is late is a lag of all of them to a fit.
+        let is_late = findings
+            .iter()
+            .any(|found| found.code == Code::ReferenceLag);
+        let of_fit = fit.warnings.iter();
+        let of_fit = of_fit.filter(|found| !is_late || found.code != Code::ReferenceLag);
+        findings.extend(of_fit.cloned());
+        findings.extend(temperature::findings(fit, dataset, stage));
+        let ranged = |found: &Finding| {
+            let mut others = fit.warnings.iter();
+            others.any(|other| (other.code, &other.channel) == (found.code, &found.channel))
         };
-        let lacks = Finding::new(Code::ModelLacks, message).severe(severity);
-        found.findings.push(lacks.of(rest, "times").costing(cost));
+        findings.extend(range::undeclared(dataset, stage).filter(|found| !ranged(found)));
+        if !is_explained(findings) {
+            findings.extend(of_fit::undescribed(fit, dataset));
+            findings.extend(of_fit::not_field(fit, self.predicted.as_ref()));
+        }
+        // Of the field model the bank says what is left.
+        if fit.field.is_none() && are_notes(findings) {
+            findings.extend(of_fit::unexplained(fit, dataset));
+        }
     }
-    Some(found)
 }
 
 /// Everything that is wrong with a log that a blob is judged on; `errors` as in
@@ -265,54 +262,44 @@ pub fn of_judged(
     fitted: Option<Predicted>,
 ) -> Diagnosis {
     let dataset = &*dataset.compensated(set.constants.temperature.rounded());
-    let (parameters, model) = match FieldParameters::of_set(set, stage) {
-        Some(parameters) => (parameters, ModelKind::Field),
-        None => (
-            FieldParameters::of_model_31(&Parameters::of_set(set), stage),
-            set.model,
-        ),
-    };
-    let (more, bad) = signals::signal_findings(dataset, stage, (&parameters, 0.0), Some(errors));
-    let of_structure = structure::structure(dataset, stage);
-    let mut findings: Vec<Finding> = of_structure.into_iter().chain(more).collect();
-    let of_blob = Fitted {
-        parameters: &parameters,
-        model,
-        for_service: model == ModelKind::Field,
-    };
-    let of_channels = of_channels(dataset, stage, &bad, &findings, of_blob);
-    let (of_channels, predicted) =
-        of_channels.map_or((Vec::new(), None), |of| (of.findings, Some(of.predicted)));
-    // A log that leaves a calibration open says nothing of one that is not fitted to it.
-    let is_open = |found: &Finding| found.code == Code::NotDetermined;
-    let predicted = predicted.filter(|_| !of_channels.iter().any(is_open));
-    let predicted = fitted.or(predicted);
-    let of_channels = of_channels.into_iter().filter(|found| !is_open(found));
-    // A fault bends only what is fitted.
-    findings.extend(of_channels.map(|found| {
-        let most = if fitted.is_some() {
-            Severity::Refuse
+    let of_field = FieldParameters::of_set(set, stage);
+    let of_31 = || FieldParameters::of_model_31(&Parameters::of_set(set), stage);
+    let for_service = of_field.is_some();
+    let by = Fitted {
+        parameters: &of_field.unwrap_or_else(of_31),
+        model: if for_service {
+            ModelKind::Field
         } else {
-            Severity::Warn
-        };
-        let severity = found.severity.min(most);
-        found.severe(severity)
-    }));
+            set.model
+        },
+        for_service,
+    };
+    let mut out = Diagnosis::default();
+    out.shown(
+        dataset,
+        dataset,
+        stage,
+        by,
+        (0.0, Some(errors)),
+        (true, false),
+    );
+    out.predicted = fitted.or(out.predicted);
+    let findings = &mut out.findings;
+    if fitted.is_none() {
+        // A fault bends only what is fitted.
+        for found in findings.iter_mut().filter(|found| found.cost.is_some()) {
+            found.severity = found.severity.min(Severity::Warn);
+        }
+    }
     findings.extend(range::out_of_range(set, dataset));
     findings.extend(temperature::missing(&set.constants.temperature, dataset));
-    let findings = in_order(findings);
+    *findings = in_order(std::mem::take(findings));
     let is_bent = fitted.is_some() && findings.iter().any(|f| f.cost > Some(GOOD_MAX));
-    let verdict = predicted.map(|predicted| {
-        match Verdict::new(of_blob.for_service, Some(&predicted), &findings) {
+    out.verdict = (out.predicted).map(|predicted| {
+        match Verdict::new(for_service, Some(&predicted), findings) {
             Verdict::Good if is_bent => Verdict::Limited,
             verdict => verdict,
         }
     });
-    Diagnosis {
-        findings,
-        verdict,
-        predicted,
-        repair: None,
-        validity: None,
-    }
+    out
 }

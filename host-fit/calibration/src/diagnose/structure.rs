@@ -14,6 +14,7 @@ use crate::finding::{Code, Finding, Severity};
 use crate::input::dataset::Dataset;
 use crate::input::stage::{Range, Stage};
 use crate::judge::identify::check_motion;
+use crate::judge::lag::ALIKE_S;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::solve::field::parameters::FALL_PER_M;
@@ -24,8 +25,8 @@ use runtime::ModelKind;
 const ROWS: usize = 6000;
 /// Steps: the products of two parameters settle in four.
 const STEPS: usize = 8;
-/// Gain and its slopes, and how far height and tilts carry the probe.
-const UNKNOWNS: usize = 9;
+/// Gain and its slopes, how far height and tilts carry the probe, and what lags of the beams do.
+const UNKNOWNS: usize = 12;
 /// A parameter that the log does not show has any value, in mm and mrad.
 const OPEN: f64 = 10.0;
 
@@ -56,7 +57,7 @@ struct Fitted {
 pub fn structure(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
     let planar = Model::of(ModelKind::M30);
     check_motion(dataset, stage, dataset.rows.len(), planar).ok()?;
-    let fitted = fitted(dataset)?;
+    let fitted = fitted(dataset, stage.servo_period_s)?;
     let drawing = Drawing::new(stage);
     let distance = |change: &Change| drawing.distance(&fitted, change);
     let as_logged = distance(&Change::nothing());
@@ -210,9 +211,11 @@ impl Drawing {
     }
 }
 
-/// Each Hall signal by itself: s = (1 + a Z + b Rx + c Ry) g q + e V + a constant of each movement.
-fn fitted(dataset: &Dataset) -> Option<[Fitted; 3]> {
+/// Each Hall signal by itself: s = (1 + a Z + b Rx + c Ry) g q + e V + f dq/dt + a constant of each movement. What this
+/// leaves goes with the motion.
+fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
     let apart = (dataset.rows.len() / ROWS).max(1);
+    let alike = (ALIKE_S / (period_s * apart as f64)).max(1.0);
     let of_probe = |probe: usize| {
         let mut at = SVector::<f64, UNKNOWNS>::zeros();
         let mut found = None;
@@ -220,9 +223,14 @@ fn fitted(dataset: &Dataset) -> Option<[Fitted; 3]> {
             let mut products = SMatrix::<f64, { UNKNOWNS + 1 }, { UNKNOWNS + 1 }>::zeros();
             let mut count = 0.0;
             for movement in &dataset.movements {
-                let rows = dataset.rows[movement.rows.clone()].iter().step_by(apart);
+                let rows = dataset.rows[movement.rows.clone()].windows(3);
                 let columns: Vec<SVector<f64, { UNKNOWNS + 1 }>> = rows
-                    .map(|row| {
+                    .step_by(apart)
+                    .map(|rows| {
+                        let [before, row, after] = [&rows[0], &rows[1], &rows[2]];
+                        let moved =
+                            Vector3::from(after.reference) - Vector3::from(before.reference);
+                        let rate = moved * (1e6 / (after.t_us - before.t_us).max(1) as f64);
                         let q = Vector3::from(row.reference) * 1e3;
                         let v = Vector3::from(row.vertical) * 1e3;
                         let moved = at.fixed_rows::<3>(0).dot(&q);
@@ -231,7 +239,9 @@ fn fitted(dataset: &Dataset) -> Option<[Fitted; 3]> {
                         column.fixed_rows_mut::<3>(0).copy_from(&(q * grown));
                         column.fixed_rows_mut::<3>(3).copy_from(&(v * moved));
                         column.fixed_rows_mut::<3>(6).copy_from(&v);
-                        let carried = at.fixed_rows::<3>(6).dot(&v);
+                        column.fixed_rows_mut::<3>(9).copy_from(&rate);
+                        let carried =
+                            at.fixed_rows::<3>(6).dot(&v) + at.fixed_rows::<3>(9).dot(&rate);
                         column[UNKNOWNS] = row.signal_m[probe] * 1e3 - grown * moved - carried;
                         column
                     })
@@ -250,7 +260,7 @@ fn fitted(dataset: &Dataset) -> Option<[Fitted; 3]> {
             }
             let factor = Cholesky::new(own)?;
             at += factor.solve(&products.fixed_view::<UNKNOWNS, 1>(0, UNKNOWNS));
-            let covariance = factor.inverse() * rest;
+            let covariance = factor.inverse() * (rest * alike);
             found = Some(Fitted {
                 gains: at.fixed_rows::<3>(0).into(),
                 slopes: at.fixed_rows::<3>(3).into(),

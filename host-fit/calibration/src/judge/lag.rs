@@ -15,7 +15,7 @@ use std::ops::Range;
 
 /// For how long a model errs alike, s: its errors go with the motion. What it leaves unexplained
 /// counts as one residual in that time.
-const ALIKE_S: f64 = 0.5;
+pub(crate) const ALIKE_S: f64 = 0.5;
 
 /// The lag of the reference behind the probes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +50,7 @@ pub fn reference_lag(
             white_mm,
         },
         resets_mm: None,
+        faults: &[],
     };
     let normal = equations.of_blocks(&blocks);
     // The first terms of a probe are those of Model (31), in its order.

@@ -1,12 +1,14 @@
 //! The bank: what a fault of each channel does to the signals.
 
-use super::blocks::{Log, Mean};
-use super::map::Estimate;
+use super::means::Log;
 use crate::diagnose::slopes::Slopes;
 use crate::finding::Code;
 use crate::input::stage::Stage;
+use crate::solve::field::blocks::FieldRow;
+use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::probe::probes;
 use nalgebra::Vector3;
+use runtime::VerticalPose;
 use std::ops::Range;
 
 /// What is wrong with the channel.
@@ -16,11 +18,15 @@ pub(super) enum Kind {
     Offset,
     /// Its gain, by 1 %.
     Gain,
+    /// Its time: it is 1 ms later than the others of its kind.
+    Lag,
 }
 
 /// How a fault goes over the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Course {
+    /// All the time.
+    Whole,
     /// From a mean on to the end of the log.
     From(usize),
     /// From a mean on to the end of its movement: a reset takes it off.
@@ -31,95 +37,102 @@ pub(super) enum Course {
     RampInMovements,
 }
 
-/// A row of the bank.
+/// A row of the bank: what, the channel or the group, the first channel at fault and the one after the last
+/// (Hall A, B, C; beams X, Y1, Y2; gaps 1, 2, 3).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Family {
-    /// The channel or the group.
-    pub(super) channel: &'static str,
-    /// The first channel at fault and the one after the last: Hall A, B, C; beams X, Y1, Y2; gaps 1, 2, 3.
-    channels: (usize, usize),
-    pub(super) kind: Kind,
-    /// Whether it may come from one row to the next and stay.
-    pub(super) steps: bool,
-    /// Whether a reset takes it off.
-    pub(super) to_reset: bool,
-}
-
-const fn family(kind: Kind, channel: &'static str, from: usize, to: usize) -> Family {
-    let is_offset = matches!(kind, Kind::Offset);
-    Family {
-        channel,
-        channels: (from, to),
-        kind,
-        steps: !is_offset || from < 3 || from >= 6,
-        to_reset: is_offset && from < 6,
-    }
-}
+pub(super) struct Family(pub(super) Kind, pub(super) &'static str, usize, usize);
 
 /// All faults that are looked for.
-pub(super) const FAMILIES: [Family; 18] = [
-    family(Kind::Gain, "hall_a", 0, 1),
-    family(Kind::Gain, "hall_b", 1, 2),
-    family(Kind::Gain, "hall_c", 2, 3),
-    family(Kind::Gain, "hall", 0, 3),
-    family(Kind::Gain, "ifm", 3, 6),
-    family(Kind::Gain, "cap_1", 6, 7),
-    family(Kind::Gain, "cap_2", 7, 8),
-    family(Kind::Gain, "cap_3", 8, 9),
-    family(Kind::Gain, "cap", 6, 9),
-    family(Kind::Offset, "hall_a", 0, 1),
-    family(Kind::Offset, "hall_b", 1, 2),
-    family(Kind::Offset, "hall_c", 2, 3),
-    family(Kind::Offset, "ifm_x", 3, 4),
-    family(Kind::Offset, "ifm_y1", 4, 5),
-    family(Kind::Offset, "ifm_y2", 5, 6),
-    family(Kind::Offset, "cap_1", 6, 7),
-    family(Kind::Offset, "cap_2", 7, 8),
-    family(Kind::Offset, "cap_3", 8, 9),
+pub(super) const FAMILIES: [Family; 21] = [
+    Family(Kind::Gain, "hall_a", 0, 1),
+    Family(Kind::Gain, "hall_b", 1, 2),
+    Family(Kind::Gain, "hall_c", 2, 3),
+    Family(Kind::Gain, "hall", 0, 3),
+    Family(Kind::Gain, "ifm", 3, 6),
+    Family(Kind::Gain, "cap_1", 6, 7),
+    Family(Kind::Gain, "cap_2", 7, 8),
+    Family(Kind::Gain, "cap_3", 8, 9),
+    Family(Kind::Gain, "cap", 6, 9),
+    Family(Kind::Offset, "hall_a", 0, 1),
+    Family(Kind::Offset, "hall_b", 1, 2),
+    Family(Kind::Offset, "hall_c", 2, 3),
+    Family(Kind::Offset, "ifm_x", 3, 4),
+    Family(Kind::Offset, "ifm_y1", 4, 5),
+    Family(Kind::Offset, "ifm_y2", 5, 6),
+    Family(Kind::Offset, "cap_1", 6, 7),
+    Family(Kind::Offset, "cap_2", 7, 8),
+    Family(Kind::Offset, "cap_3", 8, 9),
+    BEAMS_LATE[0],
+    BEAMS_LATE[1],
+    BEAMS_LATE[2],
+];
+/// The beams X, Y1, Y2 each late.
+pub(super) const BEAMS_LATE: [Family; 3] = [
+    Family(Kind::Lag, "ifm_x", 3, 4),
+    Family(Kind::Lag, "ifm_y1", 4, 5),
+    Family(Kind::Lag, "ifm_y2", 5, 6),
 ];
 
+/// Changes of the signals (mm) by a change of each of the nine channels by 1 mm, by mean.
+pub(super) fn by_channel(
+    log: &Log,
+    stage: &Stage,
+    parameters: &FieldParameters,
+    lag_s: f64,
+) -> Vec<[Vector3<f64>; 9]> {
+    let slopes = Slopes::new(stage, probes(parameters));
+    let at = |row: &FieldRow| slopes.at(row.planar_mm(lag_s, [0.0; 3]), row.vertical);
+    log.means().iter().map(at).collect()
+}
+
 impl Family {
+    /// Whether it may come from one row to the next and stay.
+    pub(super) fn steps(&self) -> bool {
+        match self.0 {
+            Kind::Gain => true,
+            Kind::Offset => !(3..6).contains(&self.2),
+            Kind::Lag => false,
+        }
+    }
+
+    /// Whether a reset takes it off.
+    pub(super) fn to_reset(&self) -> bool {
+        self.0 == Kind::Offset && self.2 < 6
+    }
+
     pub(super) const fn code(&self, course: Course) -> Code {
-        match (self.kind, course) {
+        match (self.0, course) {
             (Kind::Gain, _) => Code::GainDrift,
+            (Kind::Lag, _) => Code::ReferenceLag,
             (Kind::Offset, Course::From(_) | Course::ToReset(_)) => Code::Step,
             (Kind::Offset, _) => Code::Drift,
         }
     }
-}
 
-/// Changes of the signals (mm) by a change of each of the nine channels by 1 mm, by mean.
-pub(super) fn by_channel(log: &Log, stage: &Stage, estimate: &Estimate) -> Vec<[Vector3<f64>; 9]> {
-    let slopes = Slopes::new(stage, probes(&estimate.parameters));
-    let lags_s = estimate.lags_s();
-    let rows = log.means.iter().map(|mean| &mean.row);
-    rows.map(|row| slopes.at(log.planar_mm(row, lags_s, [0.0; 3]), row.vertical))
-        .collect()
-}
-
-impl Family {
-    /// What it adds to the residuals in the channels of the filter, without its course.
+    /// What it adds to the signals, mm, without its course.
     pub(super) fn raw(
         &self,
         log: &Log,
-        estimate: &Estimate,
+        stage: &Stage,
         by_channel: &[[Vector3<f64>; 9]],
     ) -> Vec<[f64; 3]> {
-        let at = |(place, mean): (usize, &Mean)| {
-            let mut sum = Vector3::zeros();
-            let (first, end) = self.channels;
-            for (channel, by) in by_channel[place].iter().enumerate().take(end).skip(first) {
-                let size = match (self.kind, channel) {
-                    (Kind::Offset, _) => 1e-3,
-                    (Kind::Gain, 0..3) => 1e-2 * mean.row.signal_mm[channel],
-                    (Kind::Gain, 3..6) => 1e-2 * mean.beams_mm[channel - 3],
-                    (Kind::Gain, _) => 1e-2 * mean.gaps_mm[channel - 6],
-                };
-                sum += by * size;
-            }
-            (estimate.channels[place] * sum).into()
+        let half_m = 0.5 * stage.y_baseline_m;
+        let beams = |[x, y, rz]: [f64; 3]| [x, y + half_m * rz, y - half_m * rz];
+        let at = |(row, by_channel): (&FieldRow, &[Vector3<f64>; 9])| {
+            let vertical = VerticalPose::from_array(row.vertical);
+            let gaps_m = runtime::capacitive::gaps_m(&stage.capacitive_probes_m, &vertical);
+            let size = |channel: usize| match (self.0, channel) {
+                (Kind::Offset, _) => 1e-3,
+                (Kind::Gain, 0..3) => 1e-2 * row.signal_mm[channel],
+                (Kind::Gain, 3..6) => 1e-2 * beams(row.reference_mm)[channel - 3],
+                (Kind::Gain, _) => 1e-2 * (1e3 * gaps_m[channel - 6]),
+                (Kind::Lag, _) => -1e-3 * beams(row.rate_mm_per_s)[channel - 3],
+            };
+            let channels = self.2..self.3;
+            let sum: Vector3<f64> = channels.map(|k| by_channel[k] * size(k)).sum();
+            sum.into()
         };
-        log.means.iter().enumerate().map(at).collect()
+        log.means().iter().zip(by_channel).map(at).collect()
     }
 }
 
@@ -131,46 +144,32 @@ pub(super) fn shaped(
     family: &Family,
     course: Course,
 ) -> Vec<[f64; 3]> {
-    let mut shares = shares(log, course);
-    let stays = family.kind == Kind::Gain || family.channels.0 >= 6;
-    if stays && matches!(course, Course::From(_) | Course::Ramp) {
-        shares.iter_mut().for_each(|share| *share -= 1.0);
+    let stays = family.0 == Kind::Gain || family.2 >= 6;
+    let is_state = stays && matches!(course, Course::From(_) | Course::Ramp);
+    let range = range_of(log, course);
+    let mut out = raw.to_vec();
+    for (movement, at) in (log.movements().iter()).flat_map(|m| m.clone().map(move |at| (m, at))) {
+        let time_s = |at: usize| log.means()[at].time_s;
+        let share = match course {
+            Course::Ramp => at as f64 / raw.len() as f64,
+            Course::RampInMovements => time_s(at) - time_s(movement.start),
+            _ => f64::from(u8::from(range.contains(&at))),
+        };
+        let share = share - f64::from(u8::from(is_state));
+        out[at].iter_mut().for_each(|x| *x *= share);
     }
-    raw.iter()
-        .zip(shares)
-        .map(|(x, share)| x.map(|x| x * share))
-        .collect()
+    out
 }
 
-/// How much of a fault each mean has.
-fn shares(log: &Log, course: Course) -> Vec<f64> {
-    let count = log.means.len();
-    let mut shares = vec![0.0; count];
+/// The fault's column to its end.
+pub(super) fn range_of(log: &Log, course: Course) -> Range<usize> {
+    let all = 0..log.means().len();
     match course {
-        Course::From(from) => shares[from..].fill(1.0),
-        Course::ToReset(from) => shares[to_reset(log, from)].fill(1.0),
-        Course::Ramp => {
-            for (at, share) in shares.iter_mut().enumerate() {
-                *share = at as f64 / count as f64;
-            }
+        Course::From(from) => from..all.end,
+        Course::ToReset(from) => {
+            let movement = log.movements().iter().find(|m| m.contains(&from));
+            from..movement.map_or(from, |movement| movement.end)
         }
-        Course::RampInMovements => {
-            for movement in &log.movements {
-                let start_s = log.means[movement.start].row.time_s;
-                for at in movement.clone() {
-                    shares[at] = log.means[at].row.time_s - start_s;
-                }
-            }
-        }
+        _ => all,
     }
-    shares
-}
-
-/// The means from one on to the end of its movement.
-pub(super) fn to_reset(log: &Log, from: usize) -> Range<usize> {
-    let movement = log
-        .movements
-        .iter()
-        .find(|movement| movement.contains(&from));
-    from..movement.map_or(from, |movement| movement.end)
 }

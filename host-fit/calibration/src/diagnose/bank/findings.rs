@@ -1,26 +1,20 @@
 //! The findings of the bank.
 
-use super::columns::{Course, FAMILIES, Kind};
-use super::score::{Candidate, range_of};
-use super::{Job, severity};
-use crate::diagnose::slopes::CHANNELS;
-use crate::finding::{Code, Finding, Severity};
+use super::columns::{Course, FAMILIES, Kind, range_of};
+use super::{Fault, Job, severity};
+use crate::finding::{Code, Finding};
 use crate::judge::verdict::Predicted;
 
 impl Job<'_> {
     /// Movement and time of a mean, and its log if that begins there.
     fn place(&self, at: usize) -> (String, i64, Option<String>) {
-        let row = &self.dataset.rows[self.log.means[at].first];
-        let name = self
-            .dataset
-            .movement_name(&self.dataset.movements[row.movement]);
-        let log_of = |at: usize| {
-            let row = &self.dataset.rows[self.log.means[at].first];
-            self.dataset.movements[row.movement].log
-        };
-        let begins = at > 0 && log_of(at - 1) != log_of(at);
-        let log = begins.then(|| self.dataset.logs[log_of(at)].name());
-        (name, row.t_us, log)
+        let (dataset, first) = (self.dataset, &self.log.first);
+        let movement = |at: usize| &dataset.movements[dataset.rows[first[at]].movement];
+        let log = movement(at).log;
+        let begins = at > 0 && movement(at - 1).log != log;
+        let name = dataset.movement_name(movement(at));
+        let log = begins.then(|| dataset.logs[log].name());
+        (name, dataset.rows[first[at]].t_us, log)
     }
 
     pub(super) fn two_states(&self, from: usize, cost: f64) -> Finding {
@@ -40,20 +34,17 @@ impl Job<'_> {
         found.at(movement, t_us).costing(cost)
     }
 
-    pub(super) fn finding(
-        &self,
-        fault: &Candidate,
-        alike: &[Candidate],
-        size: f64,
-        cost: f64,
-    ) -> Finding {
-        let family = &FAMILIES[fault.family];
-        let (what, unit) = match family.kind {
+    pub(super) fn finding(&self, fault: &Fault, size: f64, cost: f64) -> Finding {
+        let (kind, channel) = (fault.family().0, fault.family().1);
+        let course = fault.best.course;
+        let (what, unit) = match kind {
             Kind::Gain => ("the gain", "%"),
             Kind::Offset => ("the zero", "um"),
+            Kind::Lag => ("the time", "ms"),
         };
-        let (movement, t_us, log) = self.place(range_of(self.log, fault.course).start);
-        let course = match (fault.course, &log) {
+        let (movement, t_us, log) = self.place(range_of(&self.log, course).start);
+        let how = match (course, &log) {
+            (Course::Whole, _) => format!("is {size:+.2} {unit} later than that of the others"),
             (Course::From(_), Some(log)) => {
                 format!("in {log} differs by {size:+.2} {unit} from that before")
             }
@@ -68,52 +59,36 @@ impl Job<'_> {
                 format!("drifts by {size:+.2} {unit}/s within movements")
             }
         };
-        let mut names: Vec<String> = vec![title(family.channel)];
-        for other in alike {
-            let other = title(FAMILIES[other.family].channel);
-            if !names.contains(&other) {
-                names.push(other);
-            }
-        }
+        let mut names = vec![title(channel)];
+        names.extend(
+            fault
+                .alike
+                .iter()
+                .map(|other| title(FAMILIES[other.family].1)),
+        );
+        names.dedup();
         let undecided = match names.len() {
             1 => "",
             _ => " (the log does not tell which)",
         };
-        let code = match (&log, fault.course) {
+        let code = match (&log, course) {
             (Some(_), Course::From(_)) => Code::LogsDisagree,
-            _ => family.code(fault.course),
+            _ => fault.family().code(course),
         };
         let message = format!(
-            "{what} of {}{undecided} {course}: {cost:.2} times the noise floor at work. Remedy: {}",
+            "{what} of {}{undecided} {how}: {cost:.2} times the noise floor at work. Remedy: {}",
             names.join(" or "),
             code.entry().remedy
         );
-        let found = Finding::new(code, message)
-            .severe(severity(cost))
-            .of(size, unit)
-            .costing(cost);
-        let found = if undecided.is_empty() {
-            found.on(family.channel)
-        } else {
-            found
-        };
-        match fault.course {
-            Course::From(_) | Course::ToReset(_) => found.at(movement, t_us),
-            Course::Ramp | Course::RampInMovements => found,
+        let mut found = Finding::new(code, message).severe(severity(cost));
+        if undecided.is_empty() {
+            found = found.on(channel);
         }
+        if let Course::From(_) | Course::ToReset(_) = course {
+            found = found.at(movement, t_us);
+        }
+        found.of(size, unit).costing(cost)
     }
-}
-
-/// That a beam (X, Y1, Y2) is late, s.
-pub(super) fn late_beam(beam: usize, late_s: f64, cost: f64) -> Finding {
-    let channel = CHANNELS[3 + beam];
-    let late_ms = late_s * 1e3;
-    let message = format!(
-        "{} shows the pose {late_ms:+.2} ms later than the other beams: {cost:.2} times the noise floor at work. Remedy: set its delay",
-        title(channel)
-    );
-    let found = Finding::new(Code::ReferenceLag, message).severe(severity(cost));
-    found.on(channel).of(late_ms, "ms").costing(cost)
 }
 
 /// That the log leaves so much open.
@@ -125,20 +100,6 @@ pub(super) fn not_determined(predicted: &Predicted) -> Finding {
         Code::NotDetermined.entry().remedy
     );
     Finding::new(Code::NotDetermined, message).costing(predicted.worst_ratio())
-}
-
-/// A finding of a fault that the calibration is without.
-pub(in crate::diagnose) fn repaired(found: Finding) -> Finding {
-    let message = format!(
-        "{}. The calibration has this taken off, and is that of the stage at the end of the log",
-        found.message
-    );
-    let severity = found.severity.min(Severity::Warn);
-    Finding {
-        message,
-        severity,
-        ..found
-    }
 }
 
 fn title(channel: &str) -> String {

@@ -3,18 +3,16 @@
 //!
 //! | module | what it does |
 //! |---|---|
-//! | `blocks` | the log in means over a few rows, spikes left out |
-//! | `noise` | white noise and the walk of the reference: three scalar filters |
-//! | `map` | the most likely parameters, with faults as further unknowns |
+//! | `means` | the log in means over a few rows, spikes left out |
+//! | `estimate` | the most likely parameters, with faults as further unknowns |
 //! | `columns` | the bank: each fault of a channel or a group, and its course in time |
 //! | `score` | which of them explains the residuals, the parameters profiled out |
 //! | `findings` | the findings, in words |
 
-mod blocks;
 mod columns;
+mod estimate;
 mod findings;
-mod map;
-mod noise;
+mod means;
 mod score;
 #[cfg(test)]
 mod tests;
@@ -30,14 +28,14 @@ use crate::solve::field::carry::{Service, service_poses};
 use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::probe::probes;
 use crate::solve::field::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE};
-use blocks::Log;
-use columns::{FAMILIES, Kind, by_channel, shaped};
+use columns::{BEAMS_LATE, Course, FAMILIES, Family, Kind, by_channel, shaped};
+use estimate::Estimate;
 use findings::not_determined;
-pub(super) use findings::repaired;
-use map::{Estimate, UNKNOWNS};
+use means::Log;
 use nalgebra::{DMatrix, DVector};
 use runtime::ModelKind;
-use score::{Candidate, Scan, Split, split};
+use score::{Candidate, Scan, split};
+use std::borrow::Cow;
 
 /// Faults of one log at most.
 const FAULTS_MAX: usize = 6;
@@ -47,8 +45,10 @@ const NOTE_MAX: f64 = 1.05;
 const OF_SINES: f64 = 0.866;
 /// One sound log in so many has a fault that a fit can feel.
 const RARITY: f64 = 100.0;
-/// A lag beyond this part of a servo period is taken off before anything else is looked at.
+/// A lag beyond this part of a servo period is taken off before anything else is looked at, in so many
+/// rounds at most.
 const LAG_MAX: f64 = 0.5;
+const ROUNDS: usize = 3;
 /// A fault that costs less is none.
 const COST_MIN: f64 = 1.01;
 /// Faults whose gains in chi-square differ by less are undecided: odds of 20 to 1, ...
@@ -79,31 +79,15 @@ pub fn severity(ratio: f64) -> Severity {
     }
 }
 
-/// The diagnosis of the rows of a log that no other test has found to be wrong, from the parameters of a
-/// fit. `None` where the log is too short or too still for an estimate.
-pub fn diagnose(dataset: &Dataset, stage: &Stage, fitted: Fitted) -> Option<Diagnosis> {
-    let log = Log::new(dataset, stage, &probes(fitted.parameters));
-    let estimate = Estimate::new(&log, fitted.parameters)?;
-    let of = |dataset, log: &Log, estimate, lags_s: [f64; 3]| {
-        Job {
-            dataset,
-            stage,
-            log,
-            fitted,
-            lags_s,
-        }
-        .diagnosis(estimate)
-    };
-    let lags_s = estimate.lags_s();
-    let most_s = LAG_MAX * stage.servo_period_s;
-    if lags_s.iter().all(|lag_s| lag_s.abs() < most_s) {
-        return of(dataset, &log, estimate, [0.0; 3]);
-    }
-    // A lag is not linear.
-    let dataset = &with_beams_later(dataset, lags_s, log.half_m);
-    let log = Log::new(dataset, stage, &probes(&estimate.parameters));
-    let estimate = Estimate::new(&log, &estimate.parameters)?;
-    of(dataset, &log, estimate, lags_s)
+/// What a log is judged by.
+#[derive(Clone, Copy, Debug)]
+pub struct Fitted<'a> {
+    /// The parameters, of other models as one of the field model.
+    pub parameters: &'a FieldParameters,
+    /// The model.
+    pub model: ModelKind,
+    /// Whether the model describes service and the log can carry it without what is declared of resets.
+    pub for_service: bool,
 }
 
 /// The service that `[motion]` declares, of a stage with this white noise of its probes, mm.
@@ -117,44 +101,162 @@ pub fn declared_service(
     Service::new(parameters, white_mm, poses)
 }
 
-/// What a log is judged by.
-#[derive(Clone, Copy, Debug)]
-pub struct Fitted<'a> {
-    /// The parameters, of other models as one of the field model.
-    pub parameters: &'a FieldParameters,
-    /// The model.
-    pub model: ModelKind,
-    /// Whether the model describes service and the log can carry it without what is declared of resets.
-    pub for_service: bool,
+/// The diagnosis of the rows of a log that no other test has found to be wrong, from the parameters of a
+/// fit. `None` where the log is too short or too still for an estimate.
+pub fn diagnose(dataset: &Dataset, stage: &Stage, fitted: Fitted) -> Option<Diagnosis> {
+    let (mut later, mut lags_s) = (Cow::Borrowed(dataset), [0.0; 3]);
+    let mut start = *fitted.parameters;
+    let mut rounds = 0..ROUNDS;
+    let (log, first) = loop {
+        let log = Log::new(&later, stage, &probes(&start));
+        let by_channel = by_channel(&log, stage, &start, 0.0);
+        // The lag of the reference is that of X.
+        let late = [1, 2].map(|beam| BEAMS_LATE[beam].raw(&log, stage, &by_channel));
+        let first = Estimate::first(&log, &start, &late)?;
+        let beyond_s =
+            [0.0, first.sizes()[0], first.sizes()[1]].map(|ms| first.lag_s() + 1e-3 * ms);
+        lags_s
+            .iter_mut()
+            .zip(beyond_s)
+            .for_each(|(lag_s, beyond_s)| *lag_s += beyond_s);
+        let most_s = LAG_MAX * stage.servo_period_s;
+        if beyond_s.iter().all(|lag_s| lag_s.abs() < most_s) || rounds.next().is_none() {
+            break (log, first);
+        }
+        // A lag is not linear.
+        later = Cow::Owned(with_beams_later(dataset, lags_s, 0.5 * stage.y_baseline_m));
+        start = first.parameters;
+    };
+    let faultless = first.faultless(&log)?;
+    let job = Job {
+        dataset: &later,
+        stage,
+        fitted,
+        log,
+        lags_s,
+    };
+    job.diagnosis(faultless)
+}
+
+/// A fault, and those that the log cannot tell it from.
+struct Fault {
+    best: Candidate,
+    alike: Vec<Candidate>,
+}
+
+impl Fault {
+    fn family(&self) -> &'static Family {
+        &FAMILIES[self.best.family]
+    }
 }
 
 /// A log with what it was fitted by.
 struct Job<'a> {
     dataset: &'a Dataset,
     stage: &'a Stage,
-    log: &'a Log,
     fitted: Fitted<'a>,
-    /// Lags of the beams X, Y1, Y2 that are taken off, s.
+    log: Log,
+    /// Lags of the beams X, Y1, Y2, with what is taken off already, s.
     lags_s: [f64; 3],
 }
 
+/// Faults of a log with the estimate that has them among its unknowns, and what their gain is worth.
+struct Search {
+    faults: Vec<Fault>,
+    estimate: Estimate,
+    worth: f64,
+}
+
 impl Job<'_> {
-    fn diagnosis(&self, mut estimate: Estimate) -> Option<Diagnosis> {
-        let log = self.log;
-        let declared = declared_service(self.stage, self.fitted.parameters, log.white_mm)?;
+    /// What a number more, of an unknown, has to gain in chi-square (Schwarz 1978).
+    fn per_unknown(&self) -> f64 {
+        libm::log(3.0 * self.log.means().len() as f64)
+    }
+
+    fn freedom(&self) -> f64 {
+        (self.log.count() - COUNT as f64).max(1.0)
+    }
+
+    /// What lowers chi-square from one value to another is worth this, whatever the noise is: where much
+    /// is left that no fault explains, as hum, a fault must explain its part of that.
+    fn worth(&self, from: f64, to: f64) -> f64 {
+        self.freedom() * libm::log(from / to.max(1.0))
+    }
+
+    fn penalty(&self, choices: f64) -> f64 {
+        self.per_unknown() + 2.0 * libm::log(RARITY * choices)
+    }
+
+    /// One fault after the other, as long as they explain more than chance.
+    fn search(&self, mut estimate: Estimate) -> Option<Search> {
+        let log = &self.log;
+        let raw_at = |estimate: &Estimate| {
+            let (parameters, lag_s) = (&estimate.parameters, estimate.lag_s());
+            let by_channel = by_channel(log, self.stage, parameters, lag_s);
+            FAMILIES.map(|family| family.raw(log, self.stage, &by_channel))
+        };
+        let refitted = |estimate: &Estimate, faults: &[Fault], raw: &[Vec<[f64; 3]>]| {
+            let column = |fault: &Fault| {
+                let raw = &raw[fault.best.family];
+                shaped(log, raw, fault.family(), fault.best.course)
+            };
+            let columns: Vec<_> = faults.iter().map(column).collect();
+            estimate.with_faults(log, &columns)
+        };
+        let mut raw = raw_at(&estimate);
+        let (mut faults, mut worth): (Vec<Fault>, f64) = (Vec::new(), 0.0);
+        while faults.len() < FAULTS_MAX {
+            let mut candidates = Scan::new(log, &estimate)?.candidates(&raw);
+            let before = estimate.chi_squared;
+            let net = |candidate: &Candidate| {
+                self.worth(before, before - candidate.gain) - self.penalty(candidate.choices)
+            };
+            candidates.sort_by(|a, b| net(b).total_cmp(&net(a)));
+            let Some(best) = candidates.first().copied().filter(|best| net(best) > 0.0) else {
+                break;
+            };
+            let near = f64::max(UNDECIDED, ALIKE * best.gain);
+            let is_other = |other: &&Candidate| {
+                FAMILIES[other.family].1 != FAMILIES[best.family].1 && best.gain - other.gain < near
+            };
+            let alike = candidates[1..].iter().filter(is_other).copied().collect();
+            faults.push(Fault { best, alike });
+            // A large fault bends what the others do, too.
+            let next = refitted(&estimate, &faults, &raw).and_then(|next| {
+                raw = raw_at(&next);
+                refitted(&next, &faults, &raw)
+            });
+            // A fault that can no longer be separated from the others is not a further one.
+            let Some(next) = next else {
+                faults.pop();
+                break;
+            };
+            worth += self.worth(before, next.chi_squared) - self.penalty(best.choices);
+            estimate = next;
+        }
+        Some(Search {
+            faults,
+            estimate,
+            worth,
+        })
+    }
+
+    fn diagnosis(&self, faultless: Estimate) -> Option<Diagnosis> {
+        let (log, fitted) = (&self.log, &self.fitted);
+        let declared = declared_service(self.stage, fitted.parameters, log.white_mm)?;
         // What the log leaves open of the model's own parameters decides before any fault does.
-        let of_model = match self.fitted.model {
+        let of_model = match fitted.model {
             ModelKind::Field => PER_PROBE,
             model => Model::of(model).fitted,
         };
-        let own = estimate.without_faults(of_model)?.inverse();
+        let own = faultless.without_faults(of_model)?.inverse();
         let own = Predicted::new(&declared, &own, &[0.0; COUNT]);
         let is_open = own.worst_ratio() > LIMITED_MAX;
-        let by_resets = self.fitted.model == ModelKind::Field && !self.fitted.for_service;
+        let by_resets = fitted.model == ModelKind::Field && !fitted.for_service;
         if is_open && !by_resets {
-            let predicted = match self.fitted.model {
+            let predicted = match fitted.model {
                 ModelKind::Field => own,
-                _ => self.expected(&estimate, &declared, 1.0)?,
+                _ => self.expected(&faultless, &declared, 1.0)?,
             };
             return Some(Diagnosis {
                 findings: vec![not_determined(&predicted)],
@@ -163,121 +265,87 @@ impl Job<'_> {
                 rest: 1.0,
             });
         }
-        let whole = estimate.curvature.inverse();
+        let whole = faultless.curvature.inverse();
         let carried = Predicted::new(&declared, &whole, &[0.0; COUNT]).worst_ratio() < LIMITED_MAX;
+        let other = split(log, &faultless);
+        let before = faultless.chi_squared;
+        let Search {
+            faults,
+            estimate,
+            worth,
+        } = self.search(faultless)?;
+        let rest = (estimate.chi_squared / self.freedom()).sqrt();
+        // What no fault explains makes the parameters as much less certain.
+        let certain = rest.max(1.0).powi(2);
         // A log that leaves the field model open shows what it costs the smaller one, on motion like its own.
         let (free, at_work) = match carried {
             true => (PER_PROBE, declared.clone()),
             false => {
                 let poses = log.poses().into_iter();
-                let own = Service::new(self.fitted.parameters, log.white_mm, poses)?;
+                let own = Service::new(fitted.parameters, log.white_mm, poses)?;
                 (BEYOND_MODEL_31, own)
             }
         };
-        let other = split(log, &estimate);
-        let by_channel = by_channel(log, self.stage, &estimate);
-        let raw: Vec<Vec<[f64; 3]>> = FAMILIES
-            .iter()
-            .map(|family| family.raw(log, &estimate, &by_channel))
-            .collect();
-        let per_unknown = libm::log(3.0 * log.means.len() as f64);
-        let count = log.count() - UNKNOWNS as f64;
-        // What lowers chi-square from one value to another is worth this, whatever the noise is: where much
-        // is left that no fault explains, as hum, a fault must explain its part of that.
-        let worth = |from: f64, to: f64| count.max(1.0) * libm::log(from / to.max(1.0));
-        let faultless = estimate.chi_squared;
-        let mut penalties = 0.0;
-        let mut faults: Vec<(Candidate, Vec<Candidate>)> = Vec::new();
-        while faults.len() < FAULTS_MAX {
-            let mut candidates = Scan::new(log, &estimate).candidates(&raw);
-            let penalty =
-                |candidate: &Candidate| per_unknown + 2.0 * libm::log(RARITY * candidate.choices);
-            let before = estimate.chi_squared;
-            let net =
-                |candidate: &Candidate| worth(before, before - candidate.gain) - penalty(candidate);
-            candidates.sort_by(|a, b| net(b).total_cmp(&net(a)));
-            let Some(best) = candidates.first().copied().filter(|best| net(best) > 0.0) else {
-                break;
-            };
-            let near = f64::max(UNDECIDED, ALIKE * best.gain);
-            let is_other = |other: &&Candidate| {
-                FAMILIES[other.family].channel != FAMILIES[best.family].channel
-                    && best.gain - other.gain < near
-            };
-            let alike = candidates[1..].iter().filter(is_other).copied().collect();
-            faults.push((best, alike));
-            let columns: Vec<_> = faults
-                .iter()
-                .map(|(fault, _)| {
-                    let family = &FAMILIES[fault.family];
-                    shaped(log, &raw[fault.family], family, fault.course)
-                })
-                .collect();
-            // A fault that can no longer be separated from the others is not a further one.
-            let Some(next) = estimate.with_faults(log, &columns) else {
-                faults.pop();
-                break;
-            };
-            estimate = next;
-            penalties += penalty(&best);
-        }
-        let rest = (estimate.chi_squared / count.max(1.0)).sqrt();
-        // What no fault explains makes the parameters as much less certain.
-        let certain = rest.max(1.0).powi(2);
         let without_faults = estimate.without_faults(free)?;
         let nothing = DMatrix::zeros(COUNT, COUNT);
-        let cost = |off: &DVector<f64>| {
+        let cost = |pull: &DVector<f64>| {
+            let off = without_faults.solve(pull);
             Predicted::new(&at_work, &nothing, &off.as_slice()[..COUNT]).worst_ratio()
         };
-        let explained = worth(faultless, estimate.chi_squared) - penalties;
-        let of_parts = |other: &Split| {
-            worth(faultless, faultless - other.gain) - UNKNOWNS as f64 * per_unknown
-        };
-        let other = other.filter(|other| of_parts(other) > explained.max(0.0));
-        let off_by =
-            |number: usize| without_faults.solve(&estimate.pull(number)) * estimate.sizes()[number];
-        let (predicted, of_parts, offs) = match &other {
-            Some(other) => {
-                let off = without_faults.solve(&other.pull);
-                let predicted = Predicted::new(&declared, &whole, &off.as_slice()[..COUNT]);
-                (
-                    predicted,
-                    Some(self.two_states(other.from, cost(&off))),
-                    Vec::new(),
-                )
-            }
-            None => {
-                let predicted = self.expected(&estimate, &declared, certain)?;
-                (predicted, None, (0..faults.len()).map(off_by).collect())
-            }
-        };
-        let mut costs: Vec<f64> = offs.iter().map(cost).collect();
-        let covariance = estimate.curvature.inverse() * certain;
-        let likely = per_unknown + 2.0 * libm::log(RARITY);
-        let late = self.late_beam(&estimate, &covariance, likely);
-        // What bent the fit, whatever else did.
-        let late = late.filter(|_| other.is_none()).map(|(beam, late_s)| {
-            costs.push(predicted.worst_ratio());
-            findings::late_beam(beam, late_s, predicted.worst_ratio())
-        });
-        let repair = self.repair(&estimate, (&declared, &covariance), &faults, &costs);
-        let of_faults = faults.iter().zip(costs.iter().copied()).enumerate();
-        let of_faults = of_faults.filter(|(_, (_, cost))| *cost >= COST_MIN);
-        let of_faults = of_faults.map(|(number, ((fault, alike), cost))| {
-            // A robust fit may have left out of account what it would have cost.
-            let cost = cost.min(predicted.worst_ratio());
-            self.finding(fault, alike, estimate.sizes()[number], cost)
-        });
+        let of_parts =
+            |gain: f64| self.worth(before, before - gain) - COUNT as f64 * self.per_unknown();
         let open = (is_open && by_resets).then(|| not_determined(&own).severe(Severity::Warn));
+        let mut findings: Vec<Finding> = open.into_iter().collect();
+        if let Some(other) = other.filter(|other| of_parts(other.gain) > worth.max(0.0)) {
+            let off = without_faults.solve(&other.pull);
+            findings.push(self.two_states(other.from, cost(&other.pull)));
+            return Some(Diagnosis {
+                findings,
+                predicted: Predicted::new(&declared, &whole, &off.as_slice()[..COUNT]),
+                repair: None,
+                rest,
+            });
+        }
+        let predicted = self.expected(&estimate, &declared, certain)?;
+        let cost_of = |number: usize| cost(&(estimate.pull(number) * estimate.sizes()[number]));
+        let mut costs: Vec<f64> = (0..faults.len()).map(cost_of).collect();
+        for (number, (fault, cost)) in faults.iter().zip(&costs).enumerate() {
+            if *cost >= COST_MIN {
+                // A robust fit may have left out of account what it would have cost.
+                let cost = cost.min(predicted.worst_ratio());
+                findings.push(self.finding(fault, estimate.sizes()[number], cost));
+            }
+        }
+        if let Some((fault, late_ms)) = self.late_beam() {
+            // What bent the fit, whatever else did.
+            costs.push(predicted.worst_ratio());
+            findings.insert(0, self.finding(&fault, late_ms, predicted.worst_ratio()));
+        }
+        let covariance = estimate.curvature.inverse() * certain;
+        let repair = self.repair(&estimate, (&declared, &covariance), &faults, &costs);
         Some(Diagnosis {
-            findings: (open.into_iter().chain(of_parts))
-                .chain(late)
-                .chain(of_faults)
-                .collect(),
+            findings,
             predicted,
             repair,
             rest,
         })
+    }
+
+    /// The beam that is not of the time of the two others, and by how much it is late, ms.
+    fn late_beam(&self) -> Option<(Fault, f64)> {
+        let mut sorted = self.lags_s;
+        sorted.sort_by(f64::total_cmp);
+        let off_s = self.lags_s.map(|lag_s| lag_s - sorted[1]);
+        let beam = (0..3).max_by(|&a, &b| off_s[a].abs().total_cmp(&off_s[b].abs()))?;
+        let best = Candidate {
+            family: FAMILIES.len() - 3 + beam,
+            course: Course::Whole,
+            gain: 0.0,
+            choices: 1.0,
+        };
+        let alike = Vec::new();
+        let is_late = off_s[beam].abs() > LAG_MAX * self.stage.servo_period_s;
+        is_late.then_some((Fault { best, alike }, off_s[beam] * 1e3))
     }
 
     /// What the fit at hand has to expect: what it is off the estimate, whatever bent it, and what that leaves
@@ -292,40 +360,23 @@ impl Job<'_> {
         Some(Predicted::new(declared, &(covariance * certain), &off))
     }
 
-    /// The beam that is not of the time of the two others, and by how much it is late, s.
-    fn late_beam(
-        &self,
-        estimate: &Estimate,
-        covariance: &DMatrix<f64>,
-        likely: f64,
-    ) -> Option<(usize, f64)> {
-        let rest_s = estimate.lags_s();
-        let lags_s = [0, 1, 2].map(|beam| self.lags_s[beam] + rest_s[beam]);
-        let mut sorted = lags_s;
-        sorted.sort_by(f64::total_cmp);
-        let off_s = lags_s.map(|lag_s| lag_s - sorted[1]);
-        let beam = (0..3).max_by(|&a, &b| off_s[a].abs().total_cmp(&off_s[b].abs()))?;
-        let late_s = off_s[beam];
-        let variance = covariance[(COUNT + beam, COUNT + beam)];
-        let is_late = late_s.abs() > LAG_MAX * self.stage.servo_period_s;
-        (is_late && late_s * late_s > likely * variance).then_some((beam, late_s))
-    }
-
     /// The estimate that has the faults among its unknowns, and what it has to expect, if it is worth it and
     /// good; an error of the reference or one that may be another's says nothing of the stage.
     fn repair(
         &self,
         estimate: &Estimate,
         (declared, covariance): (&Service, &DMatrix<f64>),
-        faults: &[(Candidate, Vec<Candidate>)],
+        faults: &[Fault],
         costs: &[f64],
     ) -> Option<(Repair, Predicted)> {
-        let is_worth_it = costs.iter().any(|cost| severity(*cost) > Severity::Note);
-        let is_clear = |(fault, alike): &(Candidate, Vec<Candidate>)| {
-            let family = &FAMILIES[fault.family];
-            alike.is_empty() && (family.channel != "ifm" || family.kind != Kind::Gain)
+        let counts = |cost: &f64| severity(*cost) > Severity::Note;
+        let is_clear = |fault: &Fault| {
+            let family = fault.family();
+            fault.alike.is_empty() && (family.1 != "ifm" || family.0 != Kind::Gain)
         };
-        if self.fitted.model != ModelKind::Field || !is_worth_it || !faults.iter().all(is_clear) {
+        let mut of_faults = faults.iter().zip(costs);
+        let are_clear = of_faults.all(|(fault, cost)| !counts(cost) || is_clear(fault));
+        if self.fitted.model != ModelKind::Field || !costs.iter().any(counts) || !are_clear {
             return None;
         }
         let predicted = Predicted::new(declared, covariance, &[0.0; COUNT]);

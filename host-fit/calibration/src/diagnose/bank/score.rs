@@ -1,22 +1,21 @@
 //! Which fault would explain the residuals best, the parameters profiled out.
 
 use super::UNDECIDED;
-use super::blocks::Log;
-use super::columns::{Course, FAMILIES, Family, to_reset};
-use super::map::{Estimate, RESIDUAL, Row, UNKNOWNS, WIDTH, solve_all};
+use super::columns::{Course, FAMILIES, Family, Kind, shaped};
+use super::estimate::{Estimate, RESIDUAL, Row, WIDTH, solve_all};
+use super::means::Log;
 use crate::solve::field::terms::PER_PROBE;
+use crate::solve::field::whiten::{Gain, UNKNOWNS};
 use crate::solve::gauss_newton::{Factor, Normal};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Onsets that are tried over the log, before the best is refined.
-const ONSETS: usize = 64;
-/// Onsets that are tried in a movement.
-const ONSETS_IN_MOVEMENT: usize = 12;
+const ONSETS: usize = 128;
 /// A fault that the parameters can follow but for this part of its information is theirs.
 const OWN_MIN: f64 = 0.01;
-/// Pieces of a movement at whose ends another stage may begin.
+/// Pieces of a log at whose ends another stage may begin.
 const PIECES: usize = 8;
 
 /// A fault that explains something.
@@ -30,23 +29,79 @@ pub(super) struct Candidate {
     pub(super) choices: f64,
 }
 
+/// One step back through the filter, of a column that begins there: its square is x' `own` x - 2 `kalman` x b
+/// more with b what it already does to the reference's error, which becomes `by_x` x + `by_b` b.
+struct Back {
+    own: Matrix3<f64>,
+    kalman: Matrix3<f64>,
+    by_x: Matrix3<f64>,
+    by_b: Matrix3<f64>,
+}
+
 /// Everything that a scan needs of an estimate.
 pub(super) struct Scan<'a> {
     log: &'a Log,
     estimate: &'a Estimate,
-    /// The rows of the estimate, whitened backwards.
-    back: Vec<Row>,
+    /// The rows of the estimate, whitened backwards too.
+    rows: Vec<Row>,
+    steps: Vec<Back>,
+}
+
+/// Where a sum from the end of the log on has come to.
+struct Sums {
+    /// Products of the column with all others.
+    products: [f64; WIDTH],
+    /// Its square.
+    squares: f64,
+    b: Vector3<f64>,
+}
+
+fn matrix(of: &[[f64; 3]; 3]) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| of[i][j])
 }
 
 impl<'a> Scan<'a> {
-    pub(super) fn new(log: &'a Log, estimate: &'a Estimate) -> Self {
-        let mut back = estimate.rows.clone();
-        estimate.filter.whiten_back(&mut back);
-        Self {
+    pub(super) fn new(log: &'a Log, estimate: &'a Estimate) -> Option<Self> {
+        let mut rows = estimate.rows.clone();
+        let mut steps = Vec::with_capacity(rows.len());
+        for movement in log.movements().iter().rev() {
+            let mut after = [[0.0; WIDTH]; 3];
+            let mut information = Matrix3::zeros();
+            for at in movement.clone().rev() {
+                let Gain {
+                    by_pose,
+                    kalman,
+                    factor,
+                    ..
+                } = &estimate.gains[at];
+                let to_white = matrix(factor).try_inverse()?;
+                for j in 0..WIDTH {
+                    let column = |of: &Row| Vector3::new(of[0][j], of[1][j], of[2][j]);
+                    let (white, error) = (column(&rows[at]), column(&after));
+                    let back = to_white.tr_mul(&white) + matrix(kalman).tr_mul(&error);
+                    let error = error - matrix(by_pose).tr_mul(&back);
+                    (0..3).for_each(|k| (rows[at][k][j], after[k][j]) = (back[k], error[k]));
+                }
+                let (h, kalman) = (matrix(by_pose), matrix(kalman));
+                let precision = to_white.tr_mul(&to_white);
+                let follows = Matrix3::identity() - kalman * h;
+                let seen = h.tr_mul(&precision);
+                steps.push(Back {
+                    own: precision + kalman.tr_mul(&(information * kalman)),
+                    kalman,
+                    by_x: seen - follows.tr_mul(&(information * kalman)),
+                    by_b: follows.transpose(),
+                });
+                information = seen * h + follows.tr_mul(&(information * follows));
+            }
+        }
+        steps.reverse();
+        Some(Self {
             log,
             estimate,
-            back,
-        }
+            rows,
+            steps,
+        })
     }
 
     /// The best of each row of the bank.
@@ -59,128 +114,121 @@ impl<'a> Scan<'a> {
 
     fn of_family(&self, number: usize, raw: &[[f64; 3]]) -> Vec<Candidate> {
         let family: &Family = &FAMILIES[number];
-        let count = self.log.means.len();
+        let (all, movements) = (0..self.log.means().len(), self.log.movements());
         let mut found = Vec::new();
         let mut add = |course, gain: Option<f64>, onsets: usize| {
-            let choices = (FAMILIES.len() * onsets) as f64;
             found.extend(gain.map(|gain| Candidate {
                 family: number,
                 course,
                 gain,
-                choices,
+                choices: (FAMILIES.len() * onsets) as f64,
             }));
         };
-        add(Course::Ramp, self.of_column(raw, family, Course::Ramp), 1);
-        let apart = (count / ONSETS).max(1);
-        if family.steps
-            && let Some((from, gain)) = self.onset(raw, std::slice::from_ref(&(0..count)), apart)
-        {
-            add(Course::From(from), Some(gain), count);
+        let mut whole = |course| add(course, self.of_column(raw, family, course), 1);
+        match family.0 {
+            Kind::Lag => whole(Course::Whole),
+            _ => whole(Course::Ramp),
         }
-        if family.to_reset {
-            let course = Course::RampInMovements;
-            add(course, self.of_column(raw, family, course), 1);
-            let longest = self.log.movements.iter().map(Range::len).max();
-            let apart = (longest.unwrap_or(1) / ONSETS_IN_MOVEMENT).max(1);
-            if let Some((from, gain)) = self.onset(raw, &self.log.movements, apart) {
-                add(Course::ToReset(from), Some(gain), count);
+        if family.to_reset() {
+            whole(Course::RampInMovements);
+        }
+        let mut onset = |ranges: &[Range<usize>], course: fn(usize) -> Course| {
+            if let Some((from, gain)) = self.onset(raw, ranges) {
+                add(course(from), Some(gain), all.end);
             }
+        };
+        if family.steps() {
+            onset(std::slice::from_ref(&all), Course::From);
+        }
+        if family.to_reset() {
+            onset(movements, Course::ToReset);
         }
         found
     }
 
     /// The onset that explains most: a fault from there on to the end of its range.
-    fn onset(
-        &self,
-        raw: &[[f64; 3]],
-        ranges: &[Range<usize>],
-        apart: usize,
-    ) -> Option<(usize, f64)> {
-        let mut best: Option<(usize, f64)> = None;
-        let mut within: Option<&Range<usize>> = None;
+    fn onset(&self, raw: &[[f64; 3]], ranges: &[Range<usize>]) -> Option<(usize, f64)> {
+        let apart = (self.log.means().len() / ONSETS).max(1);
+        let mut coarse: Option<(usize, f64, &Range<usize>)> = None;
         for range in ranges {
-            let coarse = |at: usize| at > range.start && (at - range.start).is_multiple_of(apart);
-            self.scan(raw, range, coarse, &mut |at, gain| {
-                if best.is_none_or(|(_, most)| gain > most) {
-                    best = Some((at, gain));
-                    within = Some(range);
+            let wanted = |at: usize| at > range.start && (at - range.start).is_multiple_of(apart);
+            self.scan(raw, range, wanted, |at, gain| {
+                if coarse.is_none_or(|(_, most, _)| gain > most) {
+                    coarse = Some((at, gain, range));
                 }
             });
         }
-        let (around, range) = (best?.0, within?);
-        let fine = |at: usize| at > range.start && at.abs_diff(around) < apart;
-        self.scan(raw, range, fine, &mut |at, gain| {
-            if best.is_none_or(|(_, most)| gain > most) {
-                best = Some((at, gain));
-            }
-        });
+        let (around, _, range) = coarse?;
         // Things change between movements rather than within them.
-        let most = best.map_or(0.0, |(_, most)| most) - UNDECIDED;
-        let starts: Vec<usize> = self
-            .log
-            .movements
-            .iter()
-            .map(|movement| movement.start)
-            .collect();
-        let between = |at: usize| fine(at) && starts.binary_search(&at).is_ok();
-        self.scan(raw, range, between, &mut |at, gain| {
-            if gain > most {
+        let (mut best, mut between): (Option<(usize, f64)>, Option<(usize, f64)>) = (None, None);
+        let is_start = |at: usize| self.log.movements().iter().any(|m| m.start == at);
+        let wanted = |at: usize| at > range.start && at.abs_diff(around) < apart;
+        self.scan(raw, range, wanted, |at, gain| {
+            let better = |of: Option<(usize, f64)>| of.is_none_or(|(_, most)| gain > most);
+            if better(best) {
                 best = Some((at, gain));
             }
+            if better(between) && is_start(at) {
+                between = Some((at, gain));
+            }
         });
-        best
+        let least = best?.1 - UNDECIDED;
+        between.filter(|(_, gain)| *gain > least).or(best)
     }
 
+    /// The gains of a column from the wanted means on to the end of a range, which is that of a movement.
     fn scan(
         &self,
         raw: &[[f64; 3]],
         range: &Range<usize>,
         wanted: impl Fn(usize) -> bool,
-        take: &mut impl FnMut(usize, f64),
+        mut take: impl FnMut(usize, f64),
     ) {
-        let mut sums = [0.0; WIDTH];
+        let mut sums = Sums {
+            products: [0.0; WIDTH],
+            squares: 0.0,
+            b: Vector3::zeros(),
+        };
+        let mut ends = self.log.movements().iter().rev().map(|m| m.end).peekable();
         for at in range.clone().rev() {
+            while ends.next_if(|end| *end > at).is_some() {
+                sums.b = Vector3::zeros();
+            }
             self.add(&mut sums, at, raw[at]);
-            if wanted(at) {
-                let squares = self.estimate.filter.squares(raw, &(at..range.end));
-                if let Some(gain) = self.gain(&sums, squares) {
-                    take(at, gain);
-                }
+            if wanted(at)
+                && let Some(gain) = self.gain(&sums)
+            {
+                take(at, gain);
             }
         }
     }
 
-    fn add(&self, sums: &mut [f64; WIDTH], at: usize, raw: [f64; 3]) {
-        for (x, row) in raw.into_iter().zip(&self.back[at]) {
-            sums.iter_mut().zip(row).for_each(|(sum, y)| *sum += x * y);
+    /// A column that begins a mean earlier.
+    fn add(&self, sums: &mut Sums, at: usize, raw: [f64; 3]) {
+        for (x, row) in raw.into_iter().zip(&self.rows[at]) {
+            let products = sums.products.iter_mut().zip(row);
+            products.for_each(|(sum, y)| *sum += x * y);
         }
+        let (x, step) = (Vector3::from(raw), &self.steps[at]);
+        sums.squares += x.dot(&(step.own * x)) - 2.0 * sums.b.dot(&(step.kalman * x));
+        sums.b = step.by_x * x + step.by_b * sums.b;
     }
 
     fn of_column(&self, raw: &[[f64; 3]], family: &Family, course: Course) -> Option<f64> {
-        let column = super::columns::shaped(self.log, raw, family, course);
-        let mut sums = [0.0; WIDTH];
-        for (at, x) in column.iter().enumerate() {
-            self.add(&mut sums, at, *x);
-        }
-        let squares = self.estimate.filter.squares(&column, &(0..column.len()));
-        self.gain(&sums, squares)
+        let column = shaped(self.log, raw, family, course);
+        let mut found = None;
+        let all = 0..column.len();
+        self.scan(&column, &all, |at| at == 0, |_, gain| found = Some(gain));
+        found
     }
 
-    /// What a column gains, by its products with all others and its squares.
-    fn gain(&self, sums: &[f64; WIDTH], squares: f64) -> Option<f64> {
-        let by = DVector::from_column_slice(&sums[..UNKNOWNS + self.estimate.sizes().len()]);
-        let score = sums[RESIDUAL] - by.dot(&self.estimate.step);
-        let information = squares - by.dot(&self.estimate.curvature.solve(&by));
-        (information > OWN_MIN * squares).then(|| score * score / information)
-    }
-}
-
-/// The fault's column to its end.
-pub(super) fn range_of(log: &Log, course: Course) -> Range<usize> {
-    match course {
-        Course::From(from) => from..log.means.len(),
-        Course::ToReset(from) => to_reset(log, from),
-        Course::Ramp | Course::RampInMovements => 0..log.means.len(),
+    /// What a column gains.
+    fn gain(&self, sums: &Sums) -> Option<f64> {
+        let size = UNKNOWNS + self.estimate.sizes().len();
+        let by = DVector::from_column_slice(&sums.products[..size]);
+        let score = sums.products[RESIDUAL] - by.dot(&self.estimate.step);
+        let information = sums.squares - by.dot(&self.estimate.curvature.solve(&by));
+        (information > OWN_MIN * sums.squares).then(|| score * score / information)
     }
 }
 
@@ -195,27 +243,18 @@ pub(super) struct Split {
     pub(super) pull: DVector<f64>,
 }
 
-/// Precision of the parameters of Model (31) over all stages.
-fn usual(unknown: usize) -> f64 {
-    /// Lever arm, theta, eta, a, b, c.
-    const SPREADS: [f64; 6] = [0.1, 0.1, 0.3, 100.0, 50.0, 50.0];
-    let spread = SPREADS.get(unknown % PER_PROBE).copied().unwrap_or(1.0);
-    1.0 / (spread * spread)
-}
-
 /// The onset from which on parameters of their own explain most, an eighth of the log or more on either
 /// side. Each part has half of the prior, so that both together are the common fit.
 pub(super) fn split(log: &Log, estimate: &Estimate) -> Option<Split> {
-    let count = log.means.len();
-    let mut ends: Vec<usize> = log.movements.iter().map(|movement| movement.end).collect();
+    let count = log.means().len();
+    let movements = log.movements().iter();
+    let mut ends: Vec<usize> = movements.clone().map(|movement| movement.end).collect();
     if ends.len() < PIECES {
-        let pieces = log
-            .movements
-            .iter()
-            .flat_map(|m| (1..=PIECES).map(|k| m.start + k * m.len() / PIECES));
+        let pieces = movements.flat_map(|m| (1..=PIECES).map(|k| m.start + k * m.len() / PIECES));
         ends = pieces.collect();
     }
     let common = estimate.without_faults(PER_PROBE)?;
+    let half = 0.5 * &estimate.prior;
     let mut sums = Normal::none();
     let mut best: Option<Split> = None;
     let mut to = ends.pop()?;
@@ -226,18 +265,16 @@ pub(super) fn split(log: &Log, estimate: &Estimate) -> Option<Split> {
         if from.min(count - from) < count / PIECES {
             continue;
         }
-        let mut of_second = DMatrix::from_fn(UNKNOWNS, UNKNOWNS, |i, j| sums.curvature(i, j));
-        let mut score = DVector::from_fn(UNKNOWNS, |k, _| sums.descent(k));
-        for (k, (precision, pull)) in estimate.of_prior().enumerate() {
-            of_second[(k, k)] += 0.5 * precision;
-            score[k] -= 0.5 * pull;
-        }
-        score -= &of_second * &estimate.step;
+        let of_rows = DMatrix::from_fn(UNKNOWNS, UNKNOWNS, |i, j| sums.curvature(i, j));
+        let of_second = of_rows + &half;
+        let score = DVector::from_fn(UNKNOWNS, |k, _| sums.descent(k))
+            - &half * estimate.values()
+            - &of_second * &estimate.step;
         let followed = solve_all(&common, &of_second);
         let mut information = &of_second - &of_second * followed;
         for k in 0..UNKNOWNS {
             // Against rounding, in directions that neither part determines.
-            information[(k, k)] += usual(k) + 1e-6 * of_second[(k, k)];
+            information[(k, k)] += 1e-6 * of_second[(k, k)];
         }
         let Some(factor) = Factor::new(&information, 0.0) else {
             continue;

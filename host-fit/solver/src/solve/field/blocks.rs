@@ -143,6 +143,35 @@ impl Rows {
         }
     }
 
+    /// Means over blocks that follow each other, as rows and blocks of their own, hardly more than `most`;
+    /// and the first row of each. Rows without weight are left out.
+    #[must_use]
+    pub fn means(&self, most: usize) -> (Self, Vec<usize>) {
+        let together = self.blocks.len().div_ceil(most).max(1);
+        let (mut rows, mut movements, mut first) = (Vec::new(), Vec::new(), Vec::new());
+        for movement in &self.movements {
+            let start = rows.len();
+            for some in self.blocks[movement.clone()].chunks(together) {
+                let some = some[0].start..some[some.len() - 1].end;
+                let mean = mean_row(&self.rows[some.clone()]);
+                if mean.weight > 0.0 {
+                    first.push(some.start);
+                    rows.push(mean);
+                }
+            }
+            if rows.len() > start {
+                movements.push(start..rows.len());
+            }
+        }
+        let means = Self {
+            blocks: (0..rows.len()).map(|k| k..k + 1).collect(),
+            rows,
+            movements,
+            ..*self
+        };
+        (means, first)
+    }
+
     /// The blocks at given parameters, lag (s) and offsets of the reference (mm, mm, mrad) by
     /// movement.
     pub fn evaluate(&self, probes: &[Probe; 3], lag_s: f64, offsets_mm: &[[f64; 3]]) -> Vec<Block> {
@@ -239,6 +268,23 @@ fn field_row(dataset: &Dataset, index: usize, trusted: &[bool], weight: f64) -> 
         vertical: row.vertical,
         reference_mm: row.reference.map(|q| q * 1e3),
         rate_mm_per_s: [rate(0), rate(1), rate(2)],
+        weight,
+    }
+}
+
+fn mean_row(rows: &[FieldRow]) -> FieldRow {
+    let weight: f64 = rows.iter().map(|row| row.weight).sum();
+    let mean = |of: &dyn Fn(&FieldRow) -> f64| {
+        rows.iter().map(|row| row.weight * of(row)).sum::<f64>() / weight
+    };
+    let three = |of: &dyn Fn(&FieldRow) -> [f64; 3]| [0, 1, 2].map(|k| mean(&|row| of(row)[k]));
+    FieldRow {
+        time_s: mean(&|row| row.time_s),
+        signal_mm: three(&|row| row.signal_mm),
+        vertical: three(&|row| row.vertical),
+        reference_mm: three(&|row| row.reference_mm),
+        rate_mm_per_s: three(&|row| row.rate_mm_per_s),
+        warmth_k: [0, 1, 2].map(|k| [0, 1].map(|sensor| mean(&|row| row.warmth_k[k][sensor]))),
         weight,
     }
 }

@@ -6,10 +6,10 @@ use super::noise::{USUAL_DRIFT_MM, white_mm};
 use super::parameters::{FALL_PER_M, FieldParameters, PLACE_M};
 use super::probe::probes;
 use super::terms::{COUNT, ETA, LEVER_ARM, PER_PROBE, SLOPES, TERMS, THETA};
-use super::whiten::{FieldEquations, LAG_RATE, Noise};
+use super::whiten::{COLUMNS, FieldEquations, LAG_RATE, Noise};
 use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
-use crate::solve::gauss_newton::{Equations, Point, Unknowns};
+use crate::solve::gauss_newton::{Equations, Normal, Point, Unknowns};
 use nalgebra::{DMatrix, DVector};
 
 /// Standard deviations of what is not known before: misalignment, sensitivity, lag and its rate.
@@ -75,7 +75,7 @@ impl<'s> Alignment<'s> {
 
     /// One step on rows whose reference is taken at the lag so far; `None` where they show nothing.
     pub fn step(&mut self, rows: &Rows) -> Option<Lag> {
-        let normal = self.equations(rows).normal(&self.point(rows))?;
+        let normal: Normal<COLUMNS> = self.equations(rows).normal(&self.point(rows))?;
         let factor = self.unknowns.factor(&normal)?;
         let descent = self.unknowns.descent(&normal, &self.x);
         let step = factor.solve(&descent);
@@ -100,7 +100,7 @@ impl<'s> Alignment<'s> {
 
     /// The lag that some rows show by themselves, all else as it is, and its standard error, s.
     pub fn own_lag_s(&self, rows: &Rows) -> Option<[f64; 2]> {
-        let normal = self.equations(rows).normal(&self.point(rows))?;
+        let normal: Normal<COLUMNS> = self.equations(rows).normal(&self.point(rows))?;
         let information = normal.curvature(COUNT, COUNT);
         Some([
             normal.descent(COUNT) / information,
@@ -130,6 +130,7 @@ impl<'s> Alignment<'s> {
                 drift_mm: USUAL_DRIFT_MM,
             },
             resets_mm: None,
+            faults: &[],
         }
     }
 }

@@ -301,6 +301,7 @@ impl WhiteFit {
             places: self.places,
             noise: self.noise,
             resets_mm: self.resets_mm,
+            faults: &[],
         }
     }
 

@@ -96,6 +96,7 @@ impl Forecaster {
             places,
             noise: self.noise,
             resets_mm: None,
+            faults: &[],
         };
         unknowns(&places, warmth).covariance(&equations.of_blocks(&blocks))
     }

@@ -242,11 +242,11 @@ pub(super) fn place(values: &[f64; PER_PROBE], designed: [f64; 2]) -> ([f64; 2],
 }
 
 /// Standard deviation of a temperature coefficient that stays at its prior, 1/K.
-pub(super) const HELD: f64 = 1e-9;
+pub const HELD: f64 = 1e-9;
 
 /// All parameters, the lag, k and h, with what is known of them before a log is seen; `warmth` are the
 /// standard deviations of k and h.
-pub(super) fn unknowns(places: &[[f64; 2]; 3], warmth: [f64; 2]) -> Unknowns {
+pub fn unknowns(places: &[[f64; 2]; 3], warmth: [f64; 2]) -> Unknowns {
     let mut prior = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
     for (probe, [x, y]) in places.iter().enumerate() {
         let own = probe * PER_PROBE;

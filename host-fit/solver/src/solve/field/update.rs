@@ -13,10 +13,10 @@ use super::posterior::Posterior;
 use super::probe::probes;
 use super::terms::{CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SLOPES, TERMS, THETA};
 use super::warmth::OF_SENSORS;
-use super::whiten::{FieldEquations, Noise, UNKNOWNS};
+use super::whiten::{COLUMNS, FieldEquations, Noise, UNKNOWNS};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
-use crate::solve::gauss_newton::{self, Limits, Unknowns};
+use crate::solve::gauss_newton::{self, Limits, Solved, Unknowns};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// What may have changed since the old log.
@@ -182,6 +182,7 @@ pub fn update(
             drift_mm,
         },
         resets_mm: stage.resets_mm(),
+        faults: &[],
     };
     let mut origin = DVector::zeros(UNKNOWNS);
     origin.as_mut_slice()[..COUNT].copy_from_slice(old.probes.as_flattened());
@@ -193,7 +194,8 @@ pub fn update(
         ranges: Vec::new(),
     };
     let x = DVector::zeros(changes);
-    let solved = gauss_newton::solve(&equations, &unknowns, x, offsets_mm, LIMITS);
+    let solved: Option<Solved<COLUMNS>> =
+        gauss_newton::solve(&equations, &unknowns, x, offsets_mm, LIMITS);
     let mut solved = solved.ok_or(FieldFitError::Singular)?;
     let mut lasting = unknowns.basis.clone();
     if change == Change::Temperature {

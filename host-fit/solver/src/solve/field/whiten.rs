@@ -20,8 +20,6 @@ pub const WARMTH: usize = COUNT + 1;
 pub const LAG_RATE: usize = UNKNOWNS;
 /// Columns: these and the residual.
 pub const COLUMNS: usize = 92;
-/// The residual's column.
-const RESIDUAL: usize = COLUMNS - 1;
 /// Standard deviation of an offset before a movement is seen, mm: far beyond any reset's.
 const OFFSET_MM: f64 = 1.0;
 
@@ -45,6 +43,9 @@ pub struct FieldEquations<'a> {
     pub noise: Noise,
     /// Errors of the resets in X, Y, Rz, standard deviations, mm, mm, mrad; `None` where nothing is known.
     pub resets_mm: Option<[f64; 3]>,
+    /// What a unit of each fault adds to the signals A, B, C, by block, mm; how large it is stands behind the
+    /// [`UNKNOWNS`].
+    pub faults: &'a [Vec<[f64; 3]>],
 }
 
 impl FieldEquations<'_> {
@@ -70,66 +71,111 @@ impl FieldEquations<'_> {
     pub fn of_blocks(&self, blocks: &[Block]) -> Normal<COLUMNS> {
         let movement = |k: usize| {
             let blocks = &blocks[self.rows.movements[k].clone()];
-            Some(filter(blocks, &self.noise, self.start([0.0; 3])))
+            Some(self.sums(k, blocks, [0.0; 3], &[]))
         };
         let sums = Normal::of_movements(self.rows.movements.len(), movement);
         sums.unwrap_or_else(Normal::none)
     }
+
+    /// The whitened columns at a point and the steps of the filter, block by block.
+    pub fn whitened<const W: usize>(&self, at: &Point) -> (Vec<[[f64; W]; 3]>, Vec<Gain>) {
+        let probes = probes(&self.parameters(at));
+        let (mut rows, mut gains) = (Vec::new(), Vec::new());
+        for (k, offset_mm) in at.offsets.iter().enumerate() {
+            let blocks = self
+                .rows
+                .evaluate_movement(k, &probes, at.values[COUNT], *offset_mm);
+            self.filter(k, &blocks, *offset_mm, self.sizes(at), |gain, row| {
+                rows.push(row);
+                gains.push(gain);
+            });
+        }
+        (rows, gains)
+    }
+
+    fn sizes<'v>(&self, at: &'v Point) -> &'v [f64] {
+        &at.values.as_slice()[at.values.len() - self.faults.len()..]
+    }
+
+    /// The sums over the blocks of a movement.
+    fn sums<const W: usize>(
+        &self,
+        movement: usize,
+        blocks: &[Block],
+        offset_mm: [f64; 3],
+        sizes: &[f64],
+    ) -> Normal<W> {
+        let mut out = Normal::none();
+        let end = self.filter(movement, blocks, offset_mm, sizes, |gain, row| {
+            out.log_determinant += gain.log_determinant();
+            out.add_row(&row, 1.0);
+        });
+        out.ends.push(end);
+        out
+    }
+
+    /// Whitens a movement block by block; the reference's error at its end.
+    fn filter<const W: usize>(
+        &self,
+        movement: usize,
+        blocks: &[Block],
+        offset_mm: [f64; 3],
+        sizes: &[f64],
+        mut take: impl FnMut(Gain, [[f64; W]; 3]),
+    ) -> [[f64; W]; 3] {
+        let [resets_mm, expected_mm] = self.start(offset_mm);
+        let mut end = [[0.0; W]; 3];
+        let mut spread: Matrix = [[0.0; 3]; 3];
+        for (axis, row) in spread.iter_mut().enumerate() {
+            row[axis] = resets_mm[axis] * resets_mm[axis];
+            end[axis][W - 1] = expected_mm[axis];
+        }
+        let mut time_s = blocks.first().map_or(0.0, |block| block.time_s);
+        for (number, block) in (self.rows.movements[movement].start..).zip(blocks) {
+            for (axis, drift) in self.noise.drift_mm.into_iter().enumerate() {
+                spread[axis][axis] += drift * drift * (block.time_s - time_s).max(0.0);
+            }
+            time_s = block.time_s;
+            let gain = Gain::new(block, &spread, &self.noise);
+            let mut columns = columns(block);
+            for (k, (fault, size)) in self.faults.iter().zip(sizes).enumerate() {
+                for (column, by) in columns.iter_mut().zip(fault[number]) {
+                    column[UNKNOWNS + k] = by;
+                    column[W - 1] -= size * by;
+                }
+            }
+            innovations(&mut columns, block, &end);
+            let [of_a, of_b, of_c] = &columns;
+            for (end, [a, b, c]) in end.iter_mut().zip(gain.kalman) {
+                for (j, end) in end.iter_mut().enumerate() {
+                    *end += (a * of_a[j] + b * of_b[j]) + c * of_c[j];
+                }
+            }
+            spread = gain.spread;
+            gain.whiten(&mut columns);
+            take(gain, columns);
+        }
+        end
+    }
 }
 
-impl Equations<COLUMNS> for FieldEquations<'_> {
-    fn normal(&self, at: &Point) -> Option<Normal<COLUMNS>> {
+impl<const W: usize> Equations<W> for FieldEquations<'_> {
+    fn normal(&self, at: &Point) -> Option<Normal<W>> {
         let probes = probes(&self.parameters(at));
         Normal::of_movements(self.rows.movements.len(), |k| {
             let (lag_s, offset_mm) = (at.values[COUNT], at.offsets[k]);
             let blocks = self.rows.evaluate_movement(k, &probes, lag_s, offset_mm);
-            Some(filter(&blocks, &self.noise, self.start(offset_mm)))
+            Some(self.sums(k, &blocks, offset_mm, self.sizes(at)))
         })
     }
 }
 
 type Matrix = [[f64; 3]; 3];
 
-/// The sums over the blocks of a movement.
-fn filter(
-    blocks: &[Block],
-    noise: &Noise,
-    [resets_mm, expected_mm]: [[f64; 3]; 2],
-) -> Normal<COLUMNS> {
-    let mut out = Normal::none();
-    let mut end = [[0.0; COLUMNS]; 3];
-    let mut spread: Matrix = [[0.0; 3]; 3];
-    for (axis, row) in spread.iter_mut().enumerate() {
-        row[axis] = resets_mm[axis] * resets_mm[axis];
-        end[axis][RESIDUAL] = expected_mm[axis];
-    }
-    let mut time_s = blocks.first().map_or(0.0, |block| block.time_s);
-    for block in blocks {
-        for (axis, drift) in noise.drift_mm.into_iter().enumerate() {
-            spread[axis][axis] += drift * drift * (block.time_s - time_s).max(0.0);
-        }
-        time_s = block.time_s;
-        let gain = Gain::new(block, &spread, noise);
-        let mut columns = innovations(block, &end);
-        let [of_a, of_b, of_c] = &columns;
-        for (end, [a, b, c]) in end.iter_mut().zip(gain.kalman) {
-            for (j, end) in end.iter_mut().enumerate() {
-                *end += (a * of_a[j] + b * of_b[j]) + c * of_c[j];
-            }
-        }
-        spread = gain.spread;
-        gain.whiten(&mut columns);
-        out.log_determinant += gain.log_determinant();
-        out.add_row(&columns, 1.0);
-    }
-    out.ends.push(end);
-    out
-}
-
-/// Residuals and derivatives of a block, less what the filter expects of them.
+/// Residuals and derivatives of a block.
 #[inline(always)]
-fn innovations(block: &Block, expected: &[[f64; COLUMNS]; 3]) -> [[f64; COLUMNS]; 3] {
-    let mut columns = [[0.0; COLUMNS]; 3];
+fn columns<const W: usize>(block: &Block) -> [[f64; W]; 3] {
+    let mut columns = [[0.0; W]; 3];
     for (probe, column) in columns.iter_mut().enumerate() {
         let own = probe * PER_PROBE;
         column[own..own + PER_PROBE].copy_from_slice(&block.by_parameter[probe]);
@@ -137,23 +183,36 @@ fn innovations(block: &Block, expected: &[[f64; COLUMNS]; 3]) -> [[f64; COLUMNS]
         let warmth = WARMTH + 2 * probe;
         column[warmth..warmth + 2].copy_from_slice(&block.by_warmth[probe]);
         column[LAG_RATE] = block.by_lag[probe] * block.time_s;
-        column[RESIDUAL] = block.residual_mm[probe];
-        let [x, y, rz] = block.by_pose[probe];
-        for j in 0..COLUMNS {
-            column[j] -= (x * expected[0][j] + y * expected[1][j]) + rz * expected[2][j];
-        }
+        column[W - 1] = block.residual_mm[probe];
     }
     columns
 }
 
+/// Columns less what the filter expects of them.
+#[inline(always)]
+fn innovations<const W: usize>(
+    columns: &mut [[f64; W]; 3],
+    block: &Block,
+    expected: &[[f64; W]; 3],
+) {
+    for (column, [x, y, rz]) in columns.iter_mut().zip(block.by_pose) {
+        for (j, column) in column.iter_mut().enumerate() {
+            *column -= (x * expected[0][j] + y * expected[1][j]) + rz * expected[2][j];
+        }
+    }
+}
+
 /// One step of the filter.
-struct Gain {
+#[derive(Clone, Copy, Debug)]
+pub struct Gain {
+    /// Innovation (A, B, C) per error of the reference (X, Y, Rz).
+    pub by_pose: [[f64; 3]; 3],
     /// Pose (X, Y, Rz) per innovation (A, B, C).
-    kalman: Matrix,
+    pub kalman: [[f64; 3]; 3],
     /// Covariance of the reference's error after the step.
     spread: Matrix,
     /// Cholesky factor of the covariance of the innovations.
-    factor: Matrix,
+    pub factor: [[f64; 3]; 3],
 }
 
 impl Gain {
@@ -171,6 +230,7 @@ impl Gain {
         let spread = each(|i, k| spread[i][k] - dot(&kalman[i], &seen[k]));
         let spread = each(|i, k| 0.5 * (spread[i][k] + spread[k][i]));
         Self {
+            by_pose: *h,
             kalman,
             spread,
             factor,
@@ -178,7 +238,7 @@ impl Gain {
     }
 
     #[inline(always)]
-    fn whiten(&self, columns: &mut [[f64; COLUMNS]; 3]) {
+    fn whiten<const W: usize>(&self, columns: &mut [[f64; W]; 3]) {
         let l = &self.factor;
         let [first, second, third] = [1.0 / l[0][0], 1.0 / l[1][1], 1.0 / l[2][2]];
         let [of_a, of_b, of_c] = columns;
@@ -228,6 +288,8 @@ fn solve(l: &Matrix, right: [f64; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const RESIDUAL: usize = COLUMNS - 1;
     use crate::solve::field::sample_for_tests::{Run, parameters};
     use nalgebra::{Cholesky, DMatrix};
 
@@ -255,6 +317,7 @@ mod tests {
                 places: parameters().places,
                 noise,
                 resets_mm,
+                faults: &[],
             };
             let found = equations.of_blocks(&blocks);
 

@@ -1,0 +1,228 @@
+//! The most likely parameters of the field model, with faults as further unknowns: the fit's own equations
+//! and prior, over means.
+
+use super::FAULTS_MAX;
+use super::means::Log;
+use crate::solve::field::noise::{USUAL_DRIFT_MM, drift_mm};
+use crate::solve::field::parameters::{FieldParameters, HELD, unknowns};
+use crate::solve::field::probe::probes;
+use crate::solve::field::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE, TERMS};
+use crate::solve::field::whiten::{FieldEquations, Gain, Noise, UNKNOWNS};
+use crate::solve::gauss_newton::{self, Factor, Limits, Point, Solved, Unknowns};
+use nalgebra::{DMatrix, DVector};
+
+/// Columns: the unknowns of the fit, the sizes of the faults, and the residual in the last one; a multiple of
+/// four is quick.
+pub(super) const WIDTH: usize = (UNKNOWNS + FAULTS_MAX + 1).next_multiple_of(4);
+pub(super) const RESIDUAL: usize = WIDTH - 1;
+/// From a start that is a fit.
+const LIMITS: Limits = Limits {
+    steps: 20,
+    gain: 0.1,
+};
+
+/// Declared drift of the interferometers in a movement: mm, mm, mrad. A free walk swallows faults.
+const DRIFT_MAX_MM: f64 = 0.6e-3;
+/// The priors are so much wider than what magnets and a workshop give: see
+/// [`TERMS`](crate::solve::field::terms::TERMS).
+const USUAL_PART: f64 = 0.5;
+/// E in parts of its prior: with magnets as designed, whose probes stand 2.5 mm off the tilt plane, ...
+const CARRY_LEAST: f64 = 0.03;
+/// ... and over the part that the other terms even in u have of theirs: by 60 simulated stages.
+const CARRY_PART: f64 = 0.4;
+/// Rounds in which that part settles.
+const ROUNDS: usize = 8;
+/// Lever arm, theta, eta and a, b, c, and a lag, s, of any stage, whose priors are flat: so far that no log
+/// that shows them feels it.
+const OPEN: [f64; 6] = [1.0, 1.0, 3.0, 400.0, 200.0, 200.0];
+const LAG_S: f64 = 0.02;
+
+/// Columns of a mean for A, B, C.
+pub(super) type Row = [[f64; WIDTH]; 3];
+
+/// The estimate of a log.
+#[derive(Debug)]
+pub(super) struct Estimate {
+    pub(super) parameters: FieldParameters,
+    /// By mean, whitened.
+    pub(super) rows: Vec<Row>,
+    /// What whitened them.
+    pub(super) gains: Vec<Gain>,
+    /// The curvature, with the prior: the unknowns, then the faults.
+    squares: DMatrix<f64>,
+    pub(super) curvature: Factor,
+    /// The step to the very end, which is too small for a fit but not where parts of a log are compared.
+    pub(super) step: DVector<f64>,
+    /// Sum of squares of the whitened residuals.
+    pub(super) chi_squared: f64,
+    noise: Noise,
+    at: Point,
+    /// Its precision; the mean is zero.
+    pub(super) prior: DMatrix<f64>,
+}
+
+/// The solution for each column.
+pub(super) fn solve_all(factor: &Factor, right: &DMatrix<f64>) -> DMatrix<f64> {
+    let columns = right.column_iter();
+    let solved: Vec<_> = columns.map(|c| factor.solve(&c.into_owned())).collect();
+    DMatrix::from_columns(&solved)
+}
+
+impl Estimate {
+    /// From a start near the truth, with these faults, under noise as usual.
+    pub(super) fn first(
+        log: &Log,
+        start: &FieldParameters,
+        faults: &[Vec<[f64; 3]>],
+    ) -> Option<Self> {
+        let values = start.probes.as_flattened();
+        let at = Point {
+            values: DVector::from_fn(UNKNOWNS, |k, _| values.get(k).copied().unwrap_or(0.0)),
+            offsets: vec![[0.0; 3]; log.movements().len()],
+        };
+        let noise = Noise {
+            white_mm: log.white_mm,
+            drift_mm: USUAL_DRIFT_MM,
+        };
+        Self::descend(log, start.places, at, noise, faults)
+    }
+
+    /// Without faults, under the noise that the residuals show.
+    pub(super) fn faultless(self, log: &Log) -> Option<Self> {
+        let (parameters, at, mut noise) = (&self.parameters, &self.at, self.noise);
+        let blocks = (log.rows).evaluate(&probes(parameters), self.lag_s(), &at.offsets);
+        let time_s = |mean: usize| log.means()[mean].time_s;
+        let movements = log.movements().iter();
+        let longest_s = movements.map(|movement| time_s(movement.end - 1) - time_s(movement.start));
+        let most_mm = DRIFT_MAX_MM / longest_s.fold(0.0, f64::max).max(0.1).sqrt();
+        let covariance = self.curvature.inverse();
+        noise.drift_mm = drift_mm(&log.rows, &blocks, noise.white_mm, &covariance)
+            .map(|drift_mm| drift_mm.min(most_mm));
+        Self::descend(log, parameters.places, self.at, noise, &[])
+    }
+
+    fn descend(
+        log: &Log,
+        places: [[f64; 2]; 3],
+        at: Point,
+        noise: Noise,
+        faults: &[Vec<[f64; 3]>],
+    ) -> Option<Self> {
+        let size = UNKNOWNS + faults.len();
+        let mut prior = unknowns(&places, [HELD; 2]).prior;
+        for k in 0..COUNT {
+            if let Some(open) = OPEN.get(k % PER_PROBE) {
+                prior[(k, k)] += 1.0 / (open * open);
+            }
+        }
+        prior[(COUNT, COUNT)] = 1.0 / (LAG_S * LAG_S);
+        let unknowns = Unknowns {
+            origin: DVector::zeros(size),
+            basis: DMatrix::identity(size, size),
+            prior: prior.clone().resize(size, size, 0.0),
+            ranges: Vec::new(),
+        };
+        let equations = FieldEquations {
+            rows: &log.rows,
+            places,
+            noise,
+            resets_mm: log.resets_mm,
+            faults,
+        };
+        let x = at.values.resize_vertically(size, 0.0);
+        let solved: Option<Solved<WIDTH>> =
+            gauss_newton::solve(&equations, &unknowns, x, at.offsets, LIMITS);
+        let solved = solved?;
+        let (rows, gains) = equations.whitened(&solved.point);
+        let curvature = unknowns.factor(&solved.normal)?;
+        Some(Self {
+            parameters: equations.parameters(&solved.point),
+            rows,
+            gains,
+            step: curvature.solve(&unknowns.descent(&solved.normal, &solved.x)),
+            curvature,
+            squares: unknowns.curvature(&solved.normal),
+            chi_squared: solved.normal.chi_squared(),
+            noise,
+            at: solved.point,
+            prior,
+        })
+    }
+
+    /// With columns of faults (changes of the signals, mm) as further unknowns.
+    pub(super) fn with_faults(&self, log: &Log, faults: &[Vec<[f64; 3]>]) -> Option<Self> {
+        let places = self.parameters.places;
+        Self::descend(log, places, self.at.clone(), self.noise, faults)
+    }
+
+    /// The lag of the reference, s.
+    pub(super) fn lag_s(&self) -> f64 {
+        self.at.values[COUNT]
+    }
+
+    /// The values of the unknowns: the parameters, the lag of the reference (s), k and h.
+    pub(super) fn values(&self) -> DVector<f64> {
+        self.at.values.rows(0, UNKNOWNS).into_owned()
+    }
+
+    /// How large the faults are.
+    pub(super) fn sizes(&self) -> &[f64] {
+        &self.at.values.as_slice()[UNKNOWNS..]
+    }
+
+    /// What a unit of a fault adds to the gradient of the parameters.
+    pub(super) fn pull(&self, fault: usize) -> DVector<f64> {
+        DVector::from_fn(UNKNOWNS, |k, _| self.squares[(k, UNKNOWNS + fault)])
+    }
+
+    /// The curvature of a fit that knows of no faults and has only the first `free` parameters of each
+    /// probe.
+    pub(super) fn without_faults(&self, free: usize) -> Option<Factor> {
+        let is_free = |unknown: usize| unknown >= COUNT || unknown % PER_PROBE < free;
+        let own = DMatrix::from_fn(UNKNOWNS, UNKNOWNS, |i, j| match is_free(i) && is_free(j) {
+            true => self.squares[(i, j)],
+            false => 0.0,
+        });
+        Factor::new(&own, 0.0)
+    }
+
+    /// The parameters and their covariance where terms beyond Model (31) are as large as on a stage of this
+    /// kind, for what a log leaves open of them is what it does to a model without them. A magnet as designed
+    /// has none that are even in u: how large those are that the log shows says how large the others are.
+    pub(super) fn of_this_stage(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let mut imperfect = USUAL_PART;
+        let mut found = None;
+        for _ in 0..ROUNDS {
+            let part = |k: usize| match (k % PER_PROBE, TERMS[k % PER_PROBE].powers) {
+                (0..BEYOND_MODEL_31, _) => 1.0,
+                (_, [0, 0, 0]) => CARRY_LEAST.hypot(CARRY_PART * imperfect),
+                (_, [0 | 2, ..]) => imperfect,
+                _ => USUAL_PART,
+            };
+            let mut squares = self.squares.clone();
+            let mut change = DVector::zeros(squares.nrows());
+            for k in 0..COUNT {
+                let more = (1.0 / (part(k) * part(k)) - 1.0) * self.prior[(k, k)];
+                squares[(k, k)] += more;
+                change[k] = -more * self.at.values[k];
+            }
+            let factor = Factor::new(&squares, 0.0)?;
+            let values = &self.at.values + factor.solve(&change);
+            let covariance = factor.inverse();
+            let even = (0..COUNT).filter(|k| {
+                let powers = TERMS[k % PER_PROBE].powers;
+                powers != [0; 3] && powers[0].is_multiple_of(2)
+            });
+            // Squares over the number of terms that the log, not the prior, tells (MacKay 1992).
+            let (mut sum, mut count) = (0.0, 0.0);
+            for k in even {
+                let precision = self.prior[(k, k)];
+                sum += precision * values[k] * values[k];
+                count += 1.0 - precision * covariance[(k, k)] / (imperfect * imperfect);
+            }
+            imperfect = (sum / f64::max(count, 1e-9)).sqrt().clamp(0.01, 1.0);
+            found = Some((values, covariance));
+        }
+        found
+    }
+}
