@@ -3,6 +3,8 @@
 use super::*;
 use crate::parameters::Text;
 use crate::sample;
+use proptest::prelude::*;
+use proptest::sample::Index;
 
 /// The blobs of [`samples`], by version of their layout.
 const GOLDEN: [&[u8]; 3] = [
@@ -55,33 +57,11 @@ fn blob_of(set: &ParameterSet) -> ([u8; MAX_BYTES], usize) {
     (buffer, n)
 }
 
-/// A plain pseudo-random sequence (xorshift).
-struct Words(u32);
-
-impl Words {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 17;
-        self.0 ^= self.0 << 5;
-        usize::try_from(self.0).expect("32 bits") % end
-    }
-}
-
 #[test]
-fn the_golden_blobs_are_written_byte_for_byte() {
+fn the_golden_blobs_are_written_byte_for_byte_and_read_as_their_sets() {
     for ((golden, n), set) in goldens().into_iter().zip(samples()) {
-        let mut buffer = [0; MAX_BYTES];
-        let written = set.to_bytes(&mut buffer).map(<[u8]>::len);
-        if written != Ok(n) || buffer[..n] != golden[..n] {
-            let written = written.unwrap_or(0);
-            panic!("{written} bytes: {:02x?}", &buffer[..written]);
-        }
-    }
-}
-
-#[test]
-fn the_golden_blobs_read_as_the_sets_that_they_were_made_of() {
-    for ((golden, n), set) in goldens().into_iter().zip(samples()) {
+        let (blob, written) = blob_of(&set);
+        assert_eq!(blob[..written], golden[..n]);
         assert_eq!(ParameterSet::from_flash(&golden).as_ref(), Ok(&set));
         assert_eq!(ParameterSet::from_bytes(&golden[..n]), Ok(set));
     }
@@ -149,21 +129,17 @@ fn every_flipped_bit_is_refused() {
     }
 }
 
-#[test]
-fn up_to_five_flipped_bits_are_refused() {
-    let mut words = Words(1);
-    for (golden, n) in goldens() {
-        for round in 0..3000 {
-            let mut blob = golden;
-            let bits: [usize; 5] = core::array::from_fn(|_| words.below(8 * n));
-            for bit in &bits[..2 + round % 4] {
-                blob[bit / 8] ^= 1 << (bit % 8);
-            }
-            // The same bit twice is no flip: only blobs that differ are damaged.
-            if blob[..n] != golden[..n] {
-                assert!(ParameterSet::from_flash(&blob).is_err(), "{bits:?}");
-            }
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(9_000))]
+    #[test]
+    fn up_to_five_flipped_bits_are_refused(which in 0..3usize, bits in prop::collection::vec(any::<Index>(), 2..=5)) {
+        let (golden, n) = goldens()[which];
+        let mut blob = golden;
+        for bit in bits.into_iter().map(|bit| bit.index(8 * n)) {
+            blob[bit / 8] ^= 1 << (bit % 8);
         }
+        // The same bit twice is no flip.
+        prop_assert!(blob == golden || ParameterSet::from_flash(&blob).is_err());
     }
 }
 
@@ -214,54 +190,32 @@ fn padding_is_refused_in_a_file_and_passed_over_in_flash() {
 }
 
 #[test]
-fn other_versions_are_refused_even_with_a_right_check() {
-    for found in [0, LAYOUT_VERSION + 1, 0x0100, u16::MAX] {
+fn a_header_that_no_blob_has_is_refused_by_its_reason_even_with_a_right_check() {
+    let with = |at: usize, bytes: &[u8]| {
         let (mut blob, n) = golden();
-        blob[4..6].copy_from_slice(&found.to_le_bytes());
+        blob[at..at + bytes.len()].copy_from_slice(bytes);
         seal(&mut blob, n - CRC_BYTES);
-        let unknown = BlobError::UnknownVersion {
-            found,
-            supported: LAYOUT_VERSION,
-        };
-        assert_eq!(ParameterSet::from_bytes(&blob[..n]), Err(unknown));
+        ParameterSet::from_flash(&blob).expect_err("refused")
+    };
+    let supported = LAYOUT_VERSION;
+    for found in [0, LAYOUT_VERSION + 1, 0x0100, u16::MAX] {
+        let unknown = BlobError::UnknownVersion { found, supported };
+        assert_eq!(with(4, &found.to_le_bytes()), unknown);
     }
-}
-
-#[test]
-fn erased_and_foreign_memory_are_distinguished() {
-    for fill in [0x00, 0xff] {
-        assert_eq!(
-            ParameterSet::from_flash(&[fill; MAX_BYTES]),
-            Err(BlobError::Erased)
-        );
-    }
-    let foreign = *b"\x7fELF\x01\x01\x01\x00\x00\x00\x00\x00";
-    let found = *b"\x7fELF";
-    assert_eq!(
-        ParameterSet::from_flash(&foreign),
-        Err(BlobError::BadMagic { found })
-    );
-}
-
-#[test]
-fn a_length_that_no_blob_has_is_refused() {
     let most = MAX_BYTES - HEADER_BYTES - CRC_BYTES;
     for payload_bytes in [most as u32 + 1, u32::MAX, u32::MAX - 15] {
-        let (mut blob, _) = golden();
-        blob[8..12].copy_from_slice(&payload_bytes.to_le_bytes());
-        assert_eq!(
-            ParameterSet::from_flash(&blob),
-            Err(BlobError::BadHeader { payload_bytes })
-        );
+        let bad = BlobError::BadHeader { payload_bytes };
+        assert_eq!(with(8, &payload_bytes.to_le_bytes()), bad);
     }
-    for (offset, byte) in [(6, 2), (7, 1)] {
-        let (mut blob, n) = golden();
-        blob[offset] = byte;
-        seal(&mut blob, n - CRC_BYTES);
-        assert!(matches!(
-            ParameterSet::from_flash(&blob),
-            Err(BlobError::BadHeader { .. })
-        ));
+    for (at, byte) in [(6, 2), (7, 1)] {
+        let refused = with(at, &[byte]);
+        assert!(matches!(refused, BlobError::BadHeader { .. }), "{at}");
+    }
+    let found = *b"\x7fELF";
+    assert_eq!(with(0, &found), BlobError::BadMagic { found });
+    for fill in [0x00, 0xff] {
+        let erased = ParameterSet::from_flash(&[fill; MAX_BYTES]);
+        assert_eq!(erased, Err(BlobError::Erased));
     }
 }
 
@@ -300,32 +254,6 @@ fn a_sealed_payload_of_another_length_is_refused() {
             );
         }
     }
-}
-
-#[test]
-fn unusable_parameters_are_refused_by_their_reason() {
-    let refused = |change: fn(&mut ParameterSet)| {
-        let mut set = sample::parameters();
-        change(&mut set);
-        let (blob, n) = blob_of(&set);
-        match ParameterSet::from_bytes(&blob[..n]) {
-            Err(BlobError::Parameters(error)) => error,
-            other => panic!("{other:?}"),
-        }
-    };
-    let group = "the sensitivities";
-    assert_eq!(
-        refused(|set| sample::sensitivities(set)[1].per_z_m = f32::NAN),
-        ParameterError::NotFinite { group }
-    );
-    assert!(matches!(
-        refused(|set| {
-            set.plane[1] = set.plane[0];
-            set.geometry.lever_arm_m[1] = set.geometry.lever_arm_m[0];
-            set.geometry.misalignment_rad[1] = set.geometry.misalignment_rad[0];
-        }),
-        ParameterError::NotTheInverse { .. }
-    ));
 }
 
 #[test]

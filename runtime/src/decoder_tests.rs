@@ -6,12 +6,12 @@ use crate::calibration::Calibration;
 use crate::model::Sensitivity;
 use crate::sample;
 
-pub(super) const HALL: [i32; 3] = [1200, 900, 700];
-pub(super) const CAPACITIVE: [i32; 3] = [300, -200, 100];
+const HALL: [i32; 3] = [1200, 900, 700];
+const CAPACITIVE: [i32; 3] = [300, -200, 100];
 
 type Linear = Decoder<LinearModel>;
 
-pub(super) fn decoder() -> Linear {
+fn decoder() -> Linear {
     match sample::parameters().decoder() {
         AnyDecoder::Linear(decoder) => decoder,
         AnyDecoder::Field(_) => panic!("the sample is of Model (31)"),
@@ -31,7 +31,7 @@ pub(super) fn frame(hall: [i32; 3], capacitive: [i32; 3]) -> RawFrame {
     RawFrame::new(hall, capacitive, 0, 0)
 }
 
-pub(super) fn decode(decoder: &Linear, hall: [i32; 3], capacitive: [i32; 3]) -> Reading {
+fn decode(decoder: &Linear, hall: [i32; 3], capacitive: [i32; 3]) -> Reading {
     decoder.decode(&frame(hall, capacitive), &PlanarPose::ZERO)
 }
 

@@ -1,6 +1,6 @@
 //! The tick beside plain comparisons, over any words as parameters.
 
-use super::tests::{CAPACITIVE, HALL, changed, decode, decoder, frame, words};
+use super::tests::{changed, frame, words};
 use super::*;
 use crate::model::{Sensitivity, planar_pose, sensitivity_at, with_gain};
 
@@ -51,17 +51,6 @@ fn expected(
         },
         status: Status::from_bits(status),
     }
-}
-
-#[test]
-fn good_codes_give_a_good_pose() {
-    let reading = decode(&decoder(), HALL, CAPACITIVE);
-    assert!(reading.status.is_good());
-    assert!(reading.planar().is_some() && reading.vertical().is_some());
-    assert_eq!(
-        words(&reading),
-        words(&expected(&decoder(), HALL, CAPACITIVE, &PlanarPose::ZERO))
-    );
 }
 
 /// A plain pseudo-random sequence (xorshift).

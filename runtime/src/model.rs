@@ -24,6 +24,70 @@ use core::fmt::Debug;
 use serde::{Deserialize, Serialize};
 
 /// A measurement model: how three Hall signals and a vertical pose become a planar pose.
+///
+/// One that the crate knows nothing of decodes as its own do:
+///
+/// ```
+/// # use runtime::model::{LinearModel, Sensitivity, planar_pose, sensitivity_at, with_gain};
+/// # use runtime::{Decode, Decoder, Model, PlanarPose, RawFrame, VerticalPose, decoder::DecoderConstants, real::Real};
+/// /// phi = eta + a Z + b Rx + c Ry + d Z^2.
+/// #[derive(Clone, Copy, Debug, PartialEq)]
+/// enum Bent {}
+///
+/// #[derive(Clone, Copy, Debug, PartialEq)]
+/// struct BentProbe<T> {
+///     linear: Sensitivity<T>,
+///     per_z2_m2: T,
+/// }
+///
+/// impl Model for Bent {
+///     type Probe<T: Real> = BentProbe<T>;
+///
+///     fn planar_pose<T: Real>(
+///         probes: &[BentProbe<T>; 3],
+///         pose_rows: &[[T; 3]; 3],
+///         signal: [T; 3],
+///         gain_change: [T; 3],
+///         vertical: &VerticalPose<T>,
+///         zero: &PlanarPose<T>,
+///     ) -> ([T; 3], PlanarPose<T>) {
+///         let z2 = vertical.z_m * vertical.z_m;
+///         let at = |p: &BentProbe<T>| sensitivity_at(&p.linear, vertical) + p.per_z2_m2 * z2;
+///         let phi = [0, 1, 2].map(|k| with_gain(at(&probes[k]), gain_change[k]));
+///         (phi, planar_pose(pose_rows, signal, phi, zero))
+///     }
+/// }
+///
+/// // One code is 10 nm of Hall displacement or gap; PM and the capacitive plane are the simplest.
+/// let rows = [[1e-8, 0.0, 0.0], [0.0, 1e-8, 0.0], [0.0, 0.0, 1e-8]];
+/// let window = runtime::frame::CodeWindow { low: -32767, high: 32766 };
+/// let constants = DecoderConstants {
+///     vertical_per_code: rows,
+///     planar_per_code: rows,
+///     calibrated_vertical: [1e-3; 3],
+///     calibrated_planar: [1e-3; 3],
+///     sensitivity_min: 0.1,
+///     hall_window: window,
+///     capacitive_window: window,
+///     ..DecoderConstants::default()
+/// };
+/// let linear = Sensitivity { eta: 1.0, per_z_m: 1000.0, per_rx_rad: 0.0, per_ry_rad: 0.0 };
+/// // At Z = 0.1 mm.
+/// let frame = RawFrame::new([1000, -500, 250], [10_000, 0, 0], 0, 0);
+/// let read = |per_z2_m2| {
+///     let decoder = Decoder::<Bent>::new(constants, [BentProbe { linear, per_z2_m2 }; 3]);
+///     decoder.decode(&frame, &PlanarPose::ZERO)
+/// };
+/// // phi = 1 + 0.1 + 9e7 * 1e-8 = 2: half of what the codes say.
+/// let pose = read(9e7).planar().expect("sound").to_array();
+/// for (have, want) in pose.iter().zip([5e-6, -2.5e-6, 1.25e-6]) {
+///     assert!((have - want).abs() < 1e-12);
+/// }
+/// let without = Decoder::<LinearModel>::new(constants, [linear; 3]);
+/// assert_eq!(read(0.0), without.decode(&frame, &PlanarPose::ZERO));
+/// // phi = 1 + 0.1 - 1.05: below the smallest one.
+/// assert!(read(-1.05e8).planar().is_none());
+/// ```
 pub trait Model: Copy + Debug + PartialEq + 'static {
     /// The coefficients of one probe.
     type Probe<T: Real>: Copy + Debug + PartialEq + Send + Sync;

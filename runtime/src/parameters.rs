@@ -206,25 +206,3 @@ impl ParameterSet {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sample;
-
-    #[test]
-    fn a_sensitivity_that_comes_near_zero_within_the_range_is_refused_and_its_probe_named() {
-        let mut set = sample::parameters();
-        assert_eq!(set.check(), Ok(()));
-        set.constants.calibrated_vertical = [250e-6, 0.0, 0.0];
-        for (probe, sensitivity) in (0u8..).zip([0, 1, 2]) {
-            let mut set = set.clone();
-            let s = &mut sample::sensitivities(&mut set)[sensitivity];
-            s.eta = 0.85;
-            s.per_z_m = 2900.0;
-            assert_eq!(set.check(), Ok(()));
-            sample::sensitivities(&mut set)[sensitivity].per_z_m = 3100.0;
-            assert_eq!(set.check(), Err(ParameterError::PoleInRange { probe }));
-        }
-    }
-}

@@ -1,222 +1,191 @@
-//! Tests of what is refused of a parameter set.
+//! What is refused of a parameter set.
 
 use super::*;
-use crate::Calibration;
 use crate::frame::CodeWindow;
-use crate::sample;
-
-fn refused(change: impl FnOnce(&mut ParameterSet)) -> ParameterError {
-    let mut set = sample::parameters();
-    change(&mut set);
-    set.check().expect_err("an unusable set")
-}
+use crate::sample::{self, field_probes, sensitivities};
+use crate::{BlobError, Calibration};
+use ParameterError::{Inconsistent, NotFinite, NotPositive, PoleInRange, UnsoundWindow};
 
 type Change = fn(&mut ParameterSet);
 type ChangeTo = fn(&mut ParameterSet, f32);
 
+/// What a sound set is refused for after a change.
+fn refused(mut set: ParameterSet, change: impl FnOnce(&mut ParameterSet)) -> ParameterError {
+    assert_eq!(set.check(), Ok(()));
+    change(&mut set);
+    set.check().expect_err("an unusable set")
+}
+
+/// Of Model (31), whose blob holds every number: it is refused, too.
+fn refused_31(change: impl FnOnce(&mut ParameterSet)) -> ParameterError {
+    let mut buffer = [0; crate::blob::MAX_BYTES];
+    let mut changed = sample::parameters();
+    let why = refused(sample::parameters(), |set| {
+        change(set);
+        changed = set.clone();
+    });
+    let blob = changed.to_bytes(&mut buffer).expect("room enough");
+    let of_blob = ParameterSet::from_bytes(blob);
+    assert!(matches!(of_blob, Err(BlobError::Parameters(_))), "{why:?}");
+    why
+}
+
+fn refused_field(change: impl FnOnce(&mut ParameterSet)) -> ParameterError {
+    refused(sample::field_parameters(), change)
+}
+
 #[test]
 fn a_number_that_is_not_finite_is_refused_by_the_name_of_its_group() {
-    let changes: [(&str, ChangeTo); 12] = [
+    #[rustfmt::skip]
+    let of_31: [(&str, ChangeTo); 12] = [
         ("the fit record", |s, x| s.fit.peak[2] = x),
         ("the probe geometry", |s, x| s.geometry.lever_arm_m[0] = x),
         ("PM", |s, x| s.plane[2][2] = x),
         ("PM^-1", |s, x| s.plane_inverse[0][0] = x),
         ("the scale of the Hall codes", |s, x| s.hall.m_per_code = x),
-        ("the capacitive plane matrix", |s, x| {
-            s.capacitive.vertical_per_m[1][1] = x;
-        }),
-        ("the scale of the capacitive codes", |s, x| {
-            s.capacitive.m_per_code = x;
-        }),
-        ("the vertical constants", |s, x| {
-            s.constants.vertical_per_code[2][2] = x;
-        }),
-        ("the sensitivities", |s, x| {
-            sample::sensitivities(s)[2].per_ry_rad = x;
-        }),
-        ("the planar constants", |s, x| {
-            s.constants.planar_per_code[0][0] = x;
-        }),
-        ("the calibrated range", |s, x| {
-            s.constants.calibrated_planar[2] = x;
-        }),
-        ("the smallest sensitivity", |s, x| {
-            s.constants.sensitivity_min = x;
-        }),
+        ("the capacitive plane matrix", |s, x| s.capacitive.vertical_per_m[1][1] = x),
+        ("the scale of the capacitive codes", |s, x| s.capacitive.m_per_code = x),
+        ("the vertical constants", |s, x| s.constants.vertical_per_code[2][2] = x),
+        ("the sensitivities", |s, x| sensitivities(s)[2].per_ry_rad = x),
+        ("the planar constants", |s, x| s.constants.planar_per_code[0][0] = x),
+        ("the calibrated range", |s, x| s.constants.calibrated_planar[2] = x),
+        ("the smallest sensitivity", |s, x| s.constants.sensitivity_min = x),
     ];
-    for (group, change) in changes {
-        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-            let want = ParameterError::NotFinite { group };
-            assert_eq!(refused(|set| change(set, bad)), want);
+    let of_field: [(&str, ChangeTo); 3] = [
+        ("the field terms", |s, x| field_probes(s)[1].carry[2] = x),
+        ("the field terms", |s, x| field_probes(s)[2].shape.w_w_w = x),
+        ("the lateral rows", |s, x| field_probes(s)[0].lateral[1] = x),
+    ];
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for (group, change) in of_31 {
+            assert_eq!(refused_31(|set| change(set, bad)), NotFinite { group });
+        }
+        for (group, change) in of_field {
+            assert_eq!(refused_field(|set| change(set, bad)), NotFinite { group });
         }
     }
 }
 
 #[test]
-fn terms_that_do_not_follow_from_each_other_are_refused() {
-    assert!(matches!(
-        refused(|set| set.plane_inverse[0][1] *= 1.001),
-        ParameterError::NotTheInverse { largest } if largest > INVERSE_TOLERANCE
-    ));
-    assert!(matches!(
-        refused(|set| set.plane_inverse = [[f32::MAX, f32::MAX, -f32::MAX]; 3]),
-        ParameterError::NotTheInverse { .. }
-    ));
-    let changes: [(&str, Change); 6] = [
-        ("the planar constants", |set| {
-            set.constants.planar_per_code[2][0] *= 1.00001;
-        }),
-        ("the vertical constants", |set| {
-            set.capacitive.m_per_code *= 1.00001;
-        }),
-        ("PM", |set| set.geometry.misalignment_rad[2] += 1e-4),
-        ("PM", |set| set.geometry.lever_arm_m[1] += 1e-4),
-        ("PM", |set| set.geometry.misalignment_rad[0] = 1e30),
-        // A sensing axis twice as long as a unit vector.
-        ("PM", |set| {
-            set.plane[0] = set.plane[0].map(|x| 2.0 * x);
-            set.geometry.lever_arm_m[0] *= 2.0;
-            for rows in [&mut set.plane_inverse, &mut set.constants.planar_per_code] {
-                rows.iter_mut().for_each(|row| row[0] *= 0.5);
-            }
-        }),
+fn what_cannot_be_or_does_not_follow_is_refused_by_its_reason() {
+    let sensors = "capacitive";
+    #[rustfmt::skip]
+    let of_31: [(Change, ParameterError); 12] = [
+        (|s| s.constants.planar_per_code[2][0] *= 1.00001, Inconsistent { term: "the planar constants" }),
+        (|s| s.capacitive.m_per_code *= 1.00001, Inconsistent { term: "the vertical constants" }),
+        (|s| s.geometry.misalignment_rad[2] += 1e-4, Inconsistent { term: "PM" }),
+        (|s| s.geometry.misalignment_rad[2] += 2.0 * TAU, Inconsistent { term: "PM" }),
+        (|s| s.geometry.misalignment_rad[0] = 1e30, Inconsistent { term: "PM" }),
+        (|s| s.geometry.lever_arm_m[1] += 1e-4, Inconsistent { term: "PM" }),
+        (twice_as_long, Inconsistent { term: "PM" }),
+        (|s| s.constants.sensitivity_min = 0.0, NotPositive { value: "the smallest sensitivity" }),
+        (|s| s.hall.m_per_code = -6.25e-8, NotPositive { value: "the scale of the Hall codes" }),
+        (|s| s.constants.calibrated_vertical[1] = -1e-3, NotPositive { value: "a calibrated range" }),
+        (|s| s.constants.capacitive_window = CodeWindow { low: 5, high: 4 }, UnsoundWindow { sensors }),
+        (|s| s.constants.calibrated_vertical[0] = 1.0, PoleInRange { probe: 0 }),
     ];
-    for (number, (term, change)) in changes.into_iter().enumerate() {
-        let want = ParameterError::Inconsistent { term };
-        assert_eq!(refused(change), want, "{number}");
+    for (number, (change, why)) in of_31.into_iter().enumerate() {
+        assert_eq!(refused_31(change), why, "{number}");
+    }
+    #[rustfmt::skip]
+    let of_field: [(Change, ParameterError); 4] = [
+        (|s| field_probes(s)[2].lateral[1] += 1e-3, Inconsistent { term: "the lateral rows" }),
+        (|s| field_probes(s).swap(0, 2), Inconsistent { term: "the lateral rows" }),
+        (|s| s.geometry.lever_arm_m[1] += 1e-4, Inconsistent { term: "PM" }),
+        (|s| field_probes(s)[0].sensitivity.per_z_m = 5000.0, PoleInRange { probe: 0 }),
+    ];
+    for (number, (change, why)) in of_field.into_iter().enumerate() {
+        assert_eq!(refused_field(change), why, "{number}");
+    }
+    let is_steep = |error| matches!(error, ParameterError::SteepInRange { probe: 0 | 1 });
+    assert!(is_steep(refused_field(
+        |s| field_probes(s)[1].shape.u_w[0] *= 100.0
+    )));
+    assert!(is_steep(refused_field(
+        |s| field_probes(s)[1].shape.w_w[0] = -1e-3
+    )));
+    assert!(is_steep(refused_field(|s| field_probes(s)[1]
+        .shape
+        .u_z_z[1] = f32::MAX)));
+    assert!(is_steep(refused_field(
+        |s| s.constants.calibrated_planar[1] = 0.05
+    )));
+}
+
+/// A sensing axis twice as long as a unit vector.
+fn twice_as_long(set: &mut ParameterSet) {
+    set.plane[0] = set.plane[0].map(|x| 2.0 * x);
+    set.geometry.lever_arm_m[0] *= 2.0;
+    for rows in [&mut set.plane_inverse, &mut set.constants.planar_per_code] {
+        rows.iter_mut().for_each(|row| row[0] *= 0.5);
     }
 }
 
 #[test]
-fn scales_limits_and_windows_must_make_sense() {
-    let changes: [(&str, Change); 3] = [
-        ("the smallest sensitivity", |set| {
-            set.constants.sensitivity_min = 0.0;
-        }),
-        ("the scale of the Hall codes", |set| {
-            set.hall.m_per_code = -6.25e-8;
-        }),
-        ("a calibrated range", |set| {
-            set.constants.calibrated_vertical[1] = -1e-3;
-        }),
-    ];
-    for (value, change) in changes {
-        assert_eq!(refused(change), ParameterError::NotPositive { value });
+fn what_does_not_invert_pm_is_refused() {
+    let is_off = |error| matches!(error, ParameterError::NotTheInverse { largest } if largest > INVERSE_TOLERANCE || largest.is_nan());
+    assert!(is_off(refused_31(|s| s.plane_inverse[0][1] *= 1.001)));
+    let overflow = [[f32::MAX, f32::MAX, -f32::MAX]; 3];
+    assert!(is_off(refused_31(|s| s.plane_inverse = overflow)));
+    assert!(is_off(refused_31(|s| {
+        s.plane[1] = s.plane[0];
+        s.geometry.lever_arm_m[1] = s.geometry.lever_arm_m[0];
+        s.geometry.misalignment_rad[1] = s.geometry.misalignment_rad[0];
+    })));
+    assert!(is_off(refused_field(|s| s.plane = [[f32::NAN; 3]; 3])));
+}
+
+#[test]
+fn a_sensitivity_that_comes_near_zero_within_the_range_is_refused_and_its_probe_named() {
+    let mut set = sample::parameters();
+    set.constants.calibrated_vertical = [250e-6, 0.0, 0.0];
+    for probe in 0..3u8 {
+        let at = usize::from(probe);
+        let mut set = set.clone();
+        sensitivities(&mut set)[at].eta = 0.85;
+        sensitivities(&mut set)[at].per_z_m = 2900.0;
+        let why = refused(set, |set| sensitivities(set)[at].per_z_m = 3100.0);
+        assert_eq!(why, PoleInRange { probe });
     }
-    let sensors = "capacitive";
-    assert_eq!(
-        refused(|set| set.constants.capacitive_window = CodeWindow { low: 5, high: 4 }),
-        ParameterError::UnsoundWindow { sensors }
-    );
 }
 
 #[test]
 fn no_pose_without_a_status_has_a_large_rotation() {
-    for change in [
-        (|set, rad| set.constants.calibrated_vertical[1] = rad) as fn(&mut ParameterSet, f32),
+    let changes: [ChangeTo; 3] = [
+        |set, rad| set.constants.calibrated_vertical[1] = rad,
         |set, rad| set.constants.calibrated_vertical[2] = rad,
         |set, rad| set.constants.calibrated_planar[2] = rad,
-    ] {
+    ];
+    for change in changes {
         // Without a change of the sensitivity by the tilt there is no pole.
-        let reaching = |rad| {
-            let mut set = sample::parameters();
-            for s in sample::sensitivities(&mut set) {
-                (s.per_rx_rad, s.per_ry_rad) = (0.0, 0.0);
-            }
-            change(&mut set, rad);
-            set.check()
-        };
-        assert_eq!(reaching(1.0), Ok(()));
+        let mut set = sample::parameters();
+        for s in sensitivities(&mut set) {
+            (s.per_rx_rad, s.per_ry_rad) = (0.0, 0.0);
+        }
+        change(&mut set, 1.0);
         let reach = 1.001;
-        assert_eq!(reaching(reach), Err(ParameterError::LargeRange { reach }));
+        let why = refused(set, |set| change(set, reach));
+        assert_eq!(why, ParameterError::LargeRange { reach });
     }
 }
 
 #[test]
 fn gaps_that_stand_nearer_to_each_other_than_they_measure_are_refused() {
-    let at = |distance_m| Calibration {
-        capacitive_probes_m: [[0.0, 0.0], [distance_m, 0.0], [0.0, distance_m]],
-        ..sample::calibration()
-    };
     // Codes of 0.5 mm.
-    assert!(at(1e-3).prepare(&sample::origin()).is_ok());
-    for distance_m in [1e-9, 1e-6, 1e-4] {
-        assert_eq!(
-            at(distance_m).prepare(&sample::origin()),
-            Err(ParameterError::CapacitiveProbesInLine)
-        );
+    for (distance_m, is_sound) in [(1e-3, true), (1e-4, false), (1e-6, false), (1e-9, false)] {
+        let calibration = Calibration {
+            capacitive_probes_m: [[0.0, 0.0], [distance_m, 0.0], [0.0, distance_m]],
+            ..sample::calibration()
+        };
+        let why = calibration.prepare(&sample::origin()).err();
+        let in_line = ParameterError::CapacitiveProbesInLine;
+        assert_eq!(why, (!is_sound).then_some(in_line), "{distance_m}");
     }
-}
-
-#[test]
-fn a_pole_within_the_calibrated_range_is_refused() {
-    assert_eq!(
-        refused(|set| sample::sensitivities(set)[2].per_z_m = 5000.0),
-        ParameterError::PoleInRange { probe: 2 }
-    );
-    assert_eq!(
-        refused(|set| set.constants.calibrated_vertical[0] = 1.0),
-        ParameterError::PoleInRange { probe: 0 }
-    );
-}
-#[test]
-fn a_field_model_is_refused_for_what_is_wrong_with_it() {
-    let refused = |change: fn(&mut ParameterSet)| {
-        let mut set = sample::field_parameters();
-        assert_eq!(set.check(), Ok(()));
-        change(&mut set);
-        set.check().expect_err("an unusable set")
-    };
-    let changes: [(&str, Change); 3] = [
-        ("the field terms", |set| {
-            sample::field_probes(set)[1].carry[2] = f32::NAN;
-        }),
-        ("the field terms", |set| {
-            sample::field_probes(set)[2].shape.w_w_w = f32::INFINITY;
-        }),
-        ("the lateral rows", |set| {
-            sample::field_probes(set)[0].lateral[1] = f32::NAN;
-        }),
-    ];
-    for (group, change) in changes {
-        assert_eq!(refused(change), ParameterError::NotFinite { group });
-    }
-    assert_eq!(
-        refused(|set| sample::field_probes(set)[0].sensitivity.per_z_m = 5000.0),
-        ParameterError::PoleInRange { probe: 0 }
-    );
-    for change in [
-        (|set| sample::field_probes(set)[1].shape.u_w[0] *= 100.0) as fn(&mut ParameterSet),
-        |set| sample::field_probes(set)[1].shape.w_w[0] = -1e-3,
-        |set| sample::field_probes(set)[1].shape.u_z_z[1] = f32::MAX,
-        |set| set.constants.calibrated_planar[1] = 0.05,
-    ] {
-        assert!(matches!(
-            refused(change),
-            ParameterError::SteepInRange { probe: 0 | 1 }
-        ));
-    }
-    let changes: [(&str, Change); 3] = [
-        ("the lateral rows", |set| {
-            sample::field_probes(set)[2].lateral[1] += 1e-3;
-        }),
-        ("the lateral rows", |set| {
-            sample::field_probes(set).swap(0, 2)
-        }),
-        ("PM", |set| set.geometry.lever_arm_m[1] += 1e-4),
-    ];
-    for (term, change) in changes {
-        assert_eq!(refused(change), ParameterError::Inconsistent { term });
-    }
-    assert!(matches!(
-        refused(|set| set.plane = [[f32::NAN; 3]; 3]),
-        ParameterError::NotTheInverse { .. }
-    ));
 }
 
 #[test]
 fn a_theta_beyond_a_half_turn_is_that_of_a_probe_mounted_the_other_way_round() {
-    use core::f64::consts::{PI, TAU};
+    use core::f64::consts::PI;
     for turn in [PI - 0.001, PI + 0.001, -PI - 0.05, 1.5 * PI] {
         let mut calibration = sample::calibration();
         calibration.geometry.misalignment_rad[1] += turn;
@@ -224,8 +193,4 @@ fn a_theta_beyond_a_half_turn_is_that_of_a_probe_mounted_the_other_way_round() {
         let set = calibration.prepare(&sample::origin());
         assert!(set.is_ok(), "{turn}: {set:?}");
     }
-    assert_eq!(
-        refused(|set| set.geometry.misalignment_rad[2] += 2.0 * TAU as f32),
-        ParameterError::Inconsistent { term: "PM" }
-    );
 }

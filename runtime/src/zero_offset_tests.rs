@@ -61,42 +61,25 @@ fn the_longest_run_sums_to_a_tenth_of_a_nanometre() {
 }
 
 #[test]
-fn a_jump_refuses_at_once_and_names_the_axis() {
-    let state = run_x(250, |k| if k < 50 { 0.0 } else { 11e-6 });
-    assert!(
-        matches!(state, ZeroOffsetState::Refused(ZeroOffsetRefusal::Moved { axis: 0, spread }) if spread > 10e-6)
-    );
-}
-
-#[test]
-fn a_slow_drift_below_the_spread_limit_is_still_refused() {
-    let state = run_x(500, |k| f32::from(k) * 8e-9);
-    assert!(
-        matches!(state, ZeroOffsetState::Refused(ZeroOffsetRefusal::Drifted { axis: 0, drift }) if drift > 1.9e-6)
-    );
-    let state = run_x(500, |k| f32::from(k) * -8e-9);
-    assert!(
-        matches!(state, ZeroOffsetState::Refused(ZeroOffsetRefusal::Drifted { axis: 0, drift }) if drift < -1.9e-6)
-    );
-}
-
-#[test]
-fn no_stage_that_moves_at_a_hundredth_of_its_speed_is_zeroed() {
-    // Down to 5 um/s at the shortest run: 2 ms a tick.
+fn a_stage_that_moves_is_refused_with_its_axis() {
+    use ZeroOffsetRefusal::{Drifted, Moved};
+    let refused = |ticks, x_at: &dyn Fn(u16) -> f32| match run_x(ticks, x_at) {
+        ZeroOffsetState::Refused(refusal) => refusal,
+        other => panic!("{other:?}"),
+    };
+    let jump = refused(250, &|k| if k < 50 { 0.0 } else { 11e-6 });
+    assert!(matches!(jump, Moved { axis: 0, spread } if spread > 10e-6));
+    // Below the largest spread.
+    for sign in [1.0, -1.0] {
+        let slow = refused(500, &|k| sign * f32::from(k) * 8e-9);
+        assert!(matches!(slow, Drifted { axis: 0, drift } if sign * drift > 1.9e-6));
+    }
+    // Down to 5 um/s at the shortest run, a hundredth of its speed: 2 ms a tick.
     for um_per_s in [450.0, 48.0, 5.0] {
-        let state = run_x(ZeroOffsetSettings::TICKS_MIN, |k| {
-            f32::from(k) * 2e-3 * um_per_s * 1e-6
-        });
-        assert!(
-            matches!(
-                state,
-                ZeroOffsetState::Refused(
-                    ZeroOffsetRefusal::Moved { axis: 0, .. }
-                        | ZeroOffsetRefusal::Drifted { axis: 0, .. }
-                )
-            ),
-            "{um_per_s} um/s: {state:?}"
-        );
+        let x_at = |k| f32::from(k) * 2e-3 * um_per_s * 1e-6;
+        let moving = refused(ZeroOffsetSettings::TICKS_MIN, &x_at);
+        let is_named = matches!(moving, Moved { axis: 0, .. } | Drifted { axis: 0, .. });
+        assert!(is_named, "{um_per_s} um/s: {moving:?}");
     }
 }
 
@@ -128,38 +111,21 @@ fn each_axis_is_refused_beyond_its_bound_and_accepted_up_to_it() {
     }
 }
 
+/// At once, or in the last tick of all.
 #[test]
-fn a_pose_outside_the_calibrated_range_refuses_with_its_status() {
-    for bit in [Status::PLANAR_EXTRAPOLATED, Status::VERTICAL_EXTRAPOLATED] {
+fn a_reading_that_is_bad_or_outside_the_calibrated_range_refuses_with_its_status() {
+    use ZeroOffsetRefusal::{Extrapolated, NoPose};
+    let bad = Status::PLANAR_INVALID.with(Status::HALL_A);
+    let (planar, vertical) = (Status::PLANAR_EXTRAPOLATED, Status::VERTICAL_EXTRAPOLATED);
+    for (status, at, why) in [
+        (bad, 0, NoPose { status: bad }),
+        (planar, 249, Extrapolated { status: planar }),
+        (vertical, 249, Extrapolated { status: vertical }),
+    ] {
         let state = run(250, |k| Reading {
-            status: if k == 249 { bit } else { Status::GOOD },
+            status: if k == at { status } else { Status::GOOD },
             ..reading(0.0)
         });
-        let status = bit;
-        assert_eq!(
-            state,
-            ZeroOffsetState::Refused(ZeroOffsetRefusal::Extrapolated { status })
-        );
+        assert_eq!(state, ZeroOffsetState::Refused(why));
     }
-}
-
-#[test]
-fn a_bad_reading_ends_the_run_with_its_status() {
-    let mut run = ZeroOffsetRun::start(ZeroOffsetSettings::default()).expect("long enough");
-    let bad = Reading {
-        status: Status::PLANAR_INVALID.with(Status::HALL_A),
-        ..reading(0.0)
-    };
-    assert_eq!(
-        run.take(&bad),
-        ZeroOffsetState::Refused(ZeroOffsetRefusal::NoPose { status: bad.status })
-    );
-    let settings = ZeroOffsetSettings {
-        ticks: 249,
-        ..ZeroOffsetSettings::default()
-    };
-    assert_eq!(
-        ZeroOffsetRun::start(settings),
-        Err(ZeroOffsetRefusal::TooShort { ticks: 249 })
-    );
 }
