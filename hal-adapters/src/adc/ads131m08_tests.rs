@@ -3,12 +3,11 @@
 
 extern crate std;
 
-use super::super::testing::Broken;
+use super::super::testing::{Frames, keeps_the_error_of_the_bus, on_part, transfer};
 use super::*;
 use embedded_hal::spi::ErrorKind;
 use embedded_hal_mock::eh1::delay::NoopDelay;
-use embedded_hal_mock::eh1::digital::{Mock as PinMock, State, Transaction as PinTransaction};
-use embedded_hal_mock::eh1::spi::{Mock, Transaction};
+use embedded_hal_mock::eh1::digital::State::{self, High, Low};
 use std::vec;
 use std::vec::Vec;
 
@@ -37,45 +36,34 @@ fn answer(response: u16, codes: [i32; 8]) -> Vec<u8> {
     bytes
 }
 
-fn frame(command: u16, data: u16, back: Vec<u8>) -> Vec<Transaction<u8>> {
+fn frame(command: u16, data: u16, back: Vec<u8>) -> Frames {
     let ([c0, c1], [d0, d1]) = (command.to_be_bytes(), data.to_be_bytes());
     let mut sent = vec![0; FRAME_BYTES];
     sent[..6].copy_from_slice(&[c0, c1, 0, d0, d1, 0]);
-    vec![
-        Transaction::transaction_start(),
-        Transaction::transfer_in_place(sent, back),
-        Transaction::transaction_end(),
-    ]
+    transfer(sent, back)
 }
 
 const FRAME_BYTES: usize = WORDS * WORD_BYTES;
 const QUIET: [i32; 8] = [0; 8];
 
-fn try_start(expected: &[Transaction<u8>]) -> Result<(), AdcError<ErrorKind>> {
-    let mut pin = PinMock::new(&[PinTransaction::set(State::High)]);
-    let mut bus = Mock::new(expected);
-    let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
-    let result = adc.start(&mut NoopDelay::new());
-    bus.done();
-    pin.done();
-    result
+type Sampled = Result<RawFrame, AdcError<ErrorKind>>;
+
+fn try_start(expected: &[Frames]) -> Result<(), AdcError<ErrorKind>> {
+    let levels = [State::High];
+    on_part(Ads131m08::new, &expected.concat(), &levels, |adc| {
+        adc.start(&mut NoopDelay::new())
+    })
 }
 
-/// What ticks give whose frames are `expected`.
-fn ticks<const N: usize>(
-    expected: &[Transaction<u8>],
-) -> [Result<RawFrame, AdcError<ErrorKind>>; N] {
-    let mut pin = PinMock::new(&[]);
-    let mut bus = Mock::new(expected);
-    let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
-    let results = [(); N].map(|()| adc.sample(7, 14_000));
-    bus.done();
-    pin.done();
-    results
+/// What so many ticks give whose frames are `expected`.
+fn ticks(count: usize, expected: &[Frames]) -> Vec<Sampled> {
+    on_part(Ads131m08::new, &expected.concat(), &[], |adc| {
+        (0..count).map(|_| adc.sample(7, 14_000)).collect()
+    })
 }
 
 /// The frames of a tick that reads `register` back: the STATUS, the register, the STATUS again.
-fn tick(status: u16, register: u16, found: u16, back: Vec<u8>) -> Vec<Transaction<u8>> {
+fn tick(status: u16, register: u16, found: u16, back: Vec<u8>) -> Frames {
     [
         frame(0xa000 | register << 7, 0, answer(status, QUIET)),
         frame(0, 0, answer(found, QUIET)),
@@ -85,13 +73,12 @@ fn tick(status: u16, register: u16, found: u16, back: Vec<u8>) -> Vec<Transactio
 }
 
 /// The first tick after a start, in which the first frame answers something else.
-fn try_sample(back: Vec<u8>) -> Result<RawFrame, AdcError<ErrorKind>> {
-    let [result] = ticks(&tick(0x2110, 0x02, 0x2110, back));
-    result
+fn try_sample(back: Vec<u8>) -> Sampled {
+    ticks(1, &[tick(0x2110, 0x02, 0x2110, back)])[0]
 }
 
 /// The frames of a good start, one per entry.
-fn started() -> Vec<Vec<Transaction<u8>>> {
+fn started() -> Vec<Frames> {
     vec![
         frame(0x0011, 0, answer(0x0500, QUIET)),
         frame(0xa000, 0, answer(0xff28, QUIET)),
@@ -113,26 +100,19 @@ fn the_check_is_that_of_the_data_sheet() {
 fn a_damaged_frame_before_the_reset_does_not_matter() {
     let mut all = started();
     all[0] = frame(0x0011, 0, vec![0x55; FRAME_BYTES]);
-    assert_eq!(try_start(&all.concat()), Ok(()));
+    assert_eq!(try_start(&all), Ok(()));
 }
 
 #[test]
 fn a_part_that_does_not_confirm_its_reset_or_has_other_channels_is_refused() {
-    let mut all = started()[..2].to_vec();
-    all[1] = frame(0xa000, 0, answer(0xff24, QUIET));
-    let (found, expected) = (0xff24, 0xff28);
-    assert_eq!(
-        try_start(&all.concat()),
-        Err(AdcError::WrongId { found, expected })
-    );
-
-    let mut all = started()[..3].to_vec();
-    all[2] = frame(0x6180, 0x3f06, answer(0x2401, QUIET));
-    let (found, expected) = (0x2401, 0x2800);
-    assert_eq!(
-        try_start(&all.concat()),
-        Err(AdcError::WrongId { found, expected })
-    );
+    for (place, command, data, found, expected) in [
+        (1, 0xa000, 0, 0xff24, 0xff28),
+        (2, 0x6180, 0x3f06, 0x2401, 0x2800),
+    ] {
+        let mut all = started()[..=place].to_vec();
+        all[place] = frame(command, data, answer(found, QUIET));
+        assert_eq!(try_start(&all), Err(AdcError::WrongId { found, expected }));
+    }
 }
 
 #[test]
@@ -146,7 +126,7 @@ fn a_setting_that_does_not_read_back_is_named() {
             found,
             wanted,
         };
-        assert_eq!(try_start(&all.concat()), Err(error));
+        assert_eq!(try_start(&all), Err(error));
     }
 }
 
@@ -201,22 +181,23 @@ fn a_part_that_was_reset_locked_or_changed_meanwhile_is_not_read() {
             tick(0, 0x02, 0x2110, good()),
             tick(found, 0x03, 0x3f06, good()),
         ];
-        assert_eq!(ticks::<2>(&both.concat())[1], Err(error));
+        assert_eq!(ticks(2, &both)[1], Err(error));
     }
 }
 
 #[test]
 fn a_conversion_that_is_not_there_yet_gets_one_more_frame() {
     let (late, new) = (answer(0x011f, QUIET), answer(0x013f, [5; 8]));
-    let mut all = tick(0, 0x02, 0x2110, late.clone());
-    all.extend(frame(0, 0, new));
-    let [result] = ticks(&all);
-    assert_eq!(result.map(|frame| frame.hall), Ok([5; 3]));
-
-    let mut all = tick(0, 0x02, 0x2110, late.clone());
-    all.extend(frame(0, 0, late));
+    let and_then = |back| {
+        let first = tick(0, 0x02, 0x2110, late.clone());
+        ticks(1, &[first, frame(0, 0, back)])[0]
+    };
+    assert_eq!(and_then(new).map(|frame| frame.hall), Ok([5; 3]));
     let (ready, read) = (0x1f, 0x3f);
-    assert_eq!(ticks(&all), [Err(AdcError::NotReady { ready, read })]);
+    assert_eq!(
+        and_then(late.clone()),
+        Err(AdcError::NotReady { ready, read })
+    );
 }
 
 /// The values after a reset are those of the data sheet's table 8-12.
@@ -229,37 +210,29 @@ fn every_register_is_read_back_in_turn() {
         0x0c | 0x11 | 0x16 | 0x1b | 0x20 | 0x25 | 0x2a | 0x2f => 0x8000,
         _ => 0,
     };
-    let good = |k: u16| {
+    let tick = |k: u16, flip: u16| {
         let register = 0x02 + k % 47;
         let status = if k == 0 { 0 } else { 0x413f };
-        tick(status, register, at_reset(register), answer(0x013f, QUIET))
+        let found = at_reset(register) ^ flip;
+        tick(status, register, found, answer(0x013f, QUIET))
     };
-    assert!(
-        ticks::<95>(&(0..95).flat_map(good).collect::<Vec<_>>())
-            .iter()
-            .all(Result::is_ok)
-    );
+    let good = ticks(95, &(0..95).map(|k| tick(k, 0)).collect::<Vec<_>>());
+    assert!(good.iter().all(Result::is_ok));
     for wrong in 0..47 {
-        let mut all: Vec<_> = (0..wrong).flat_map(good).collect();
-        let (register, wanted) = (0x02 + wrong, at_reset(0x02 + wrong));
-        let status = if wrong == 0 { 0 } else { 0x413f };
-        let found = wanted ^ 1 << (wrong % 16);
-        all.extend(tick(status, register, found, answer(0x013f, QUIET)));
-        let mut bus = Mock::new(&all);
-        let mut pin = PinMock::new(&[]);
-        let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
-        assert!((0..wrong).all(|_| adc.sample(0, 0).is_ok()));
-        let register = register as u8;
-        assert_eq!(
-            adc.sample(0, 0),
-            Err(AdcError::WrongSetting {
-                register,
-                found,
-                wanted
-            })
-        );
-        bus.done();
-        pin.done();
+        let flip = 1 << (wrong % 16);
+        let all: Vec<_> = (0..=wrong)
+            .map(|k| tick(k, if k == wrong { flip } else { 0 }))
+            .collect();
+        let read = ticks(all.len(), &all);
+        let (last, before) = read.split_last().expect("one tick at least");
+        assert!(before.iter().all(Result::is_ok));
+        let wanted = at_reset(0x02 + wrong);
+        let error = AdcError::WrongSetting {
+            register: 0x02 + wrong as u8,
+            found: wanted ^ flip,
+            wanted,
+        };
+        assert_eq!(*last, Err(error));
     }
 }
 
@@ -268,30 +241,18 @@ fn a_start_that_fails_is_followed_by_a_reset_that_lasts_a_period() {
     let mut all = frame(0x0011, 0, answer(0, QUIET));
     all.extend(frame(0xa000, 0, answer(0x0011, QUIET)));
     all.extend(started().concat());
-    let mut bus = Mock::new(&all);
-    let (low, high) = (
-        PinTransaction::set(State::Low),
-        PinTransaction::set(State::High),
-    );
-    let starts = [high.clone(), low.clone(), low.clone(), high.clone()];
-    let mut pin = PinMock::new(&[&starts[..], &[high.clone(), low, high]].concat());
-    let mut adc = Ads131m08::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
-    let mut delay = NoopDelay::new();
-    assert!(adc.start(&mut delay).is_err());
-    assert_eq!(adc.trigger(&mut delay), Ok(()));
-    assert_eq!(adc.trigger(&mut delay), Ok(()));
-    assert_eq!(adc.start(&mut delay), Ok(()));
-    assert_eq!(adc.trigger(&mut delay), Ok(()));
-    bus.done();
-    pin.done();
+    let levels = [High, Low, Low, High, High, Low, High];
+    on_part(Ads131m08::new, &all, &levels, |adc| {
+        let mut delay = NoopDelay::new();
+        assert!(adc.start(&mut delay).is_err());
+        assert_eq!(adc.trigger(&mut delay), Ok(()));
+        assert_eq!(adc.trigger(&mut delay), Ok(()));
+        assert_eq!(adc.start(&mut delay), Ok(()));
+        assert_eq!(adc.trigger(&mut delay), Ok(()));
+    });
 }
 
 #[test]
 fn the_error_of_the_bus_is_kept() {
-    let mut pin = PinMock::new(&[PinTransaction::set(State::High)]);
-    let mut adc = Ads131m08::new(Broken, pin.clone(), Channels::IN_ORDER);
-    let error = AdcError::Bus(ErrorKind::ModeFault);
-    assert_eq!(adc.start(&mut NoopDelay::new()), Err(error));
-    assert_eq!(adc.sample(0, 0), Err(error));
-    pin.done();
+    keeps_the_error_of_the_bus(Ads131m08::new);
 }

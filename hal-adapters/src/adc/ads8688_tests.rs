@@ -2,52 +2,42 @@
 
 extern crate std;
 
-use super::super::testing::Broken;
+use super::super::testing::{self, Broken, Frames, keeps_the_error_of_the_bus, transfer};
 use super::*;
 use embedded_hal::spi::ErrorKind;
 use embedded_hal_mock::eh1::delay::NoopDelay;
-use embedded_hal_mock::eh1::digital::{Mock as PinMock, State, Transaction as PinTransaction};
-use embedded_hal_mock::eh1::spi::{Mock, Transaction};
+use embedded_hal_mock::eh1::digital::{Mock as PinMock, State};
+use embedded_hal_mock::eh1::spi::Mock;
 use std::vec;
 use std::vec::Vec;
 
-/// What `work` gives on a part whose bus carries exactly `expected` and whose pin sees `levels`.
-fn on_part<T>(
-    expected: &[Transaction<u8>],
-    levels: &[PinTransaction],
-    work: impl FnOnce(&mut Ads8688<Mock<u8>, PinMock>) -> T,
-) -> T {
-    let (mut bus, mut pin) = (Mock::new(expected), PinMock::new(levels));
-    let mut adc = Ads8688::new(bus.clone(), pin.clone(), Channels::IN_ORDER);
-    let result = work(&mut adc);
-    bus.done();
-    pin.done();
-    result
+/// What `work` gives on a part whose bus carries exactly `expected` and whose reference has settled.
+fn on_part<T>(expected: &Frames, work: impl FnOnce(&mut Ads8688<Mock<u8>, PinMock>) -> T) -> T {
+    testing::on_part(Ads8688::new, expected, &[], |adc| {
+        adc.reference = Reference::Settled;
+        work(adc)
+    })
 }
 
-fn frame(out: [u8; 2], back: [u8; 3]) -> Vec<Transaction<u8>> {
+fn frame(out: [u8; 2], back: [u8; 3]) -> Frames {
     frame_of_41_bits(out, back, 0)
 }
 
-fn frame_of_41_bits(out: [u8; 2], back: [u8; 3], last: u8) -> Vec<Transaction<u8>> {
+fn frame_of_41_bits(out: [u8; 2], back: [u8; 3], last: u8) -> Frames {
     let (mut sent, mut read) = (out.to_vec(), vec![0, 0]);
     sent.extend([0; 4]);
     read.extend(back);
     read.push(last);
-    vec![
-        Transaction::transaction_start(),
-        Transaction::transfer_in_place(sent, read),
-        Transaction::transaction_end(),
-    ]
+    transfer(sent, read)
 }
 
 /// Register n is addressed by the upper seven bits; the bit after them writes.
-fn written(register: u8, value: u8) -> Vec<Transaction<u8>> {
+fn written(register: u8, value: u8) -> Frames {
     let write = frame([register << 1 | 1, value], [value, 0, 0]);
     [write, frame([register << 1, 0], [value, 0, 0])].concat()
 }
 
-fn started() -> Vec<Transaction<u8>> {
+fn started() -> Frames {
     let mut all = frame([0x85, 0x00], [0, 0, 0]);
     all.extend(frame([0x02, 0x00], [0xff, 0, 0]));
     all.extend(written(0x01, 0x3f));
@@ -58,7 +48,7 @@ fn started() -> Vec<Transaction<u8>> {
 }
 
 /// The sequence is started, then each channel gives its code, its number and the device's.
-fn sampled(codes: [[u8; 2]; 6]) -> Vec<Transaction<u8>> {
+fn sampled(codes: [[u8; 2]; 6]) -> Frames {
     let mut all = frame([0xa0, 0x00], [0x12, 0x34, 0x54]);
     for (k, [high, low]) in codes.into_iter().enumerate() {
         all.extend(frame(
@@ -71,45 +61,31 @@ fn sampled(codes: [[u8; 2]; 6]) -> Vec<Transaction<u8>> {
 
 const ZERO: [[u8; 2]; 6] = [[0x80, 0]; 6];
 
-fn try_start(expected: Vec<Transaction<u8>>) -> Result<(), AdcError<ErrorKind>> {
-    let levels = [PinTransaction::set(State::High)];
-    on_part(&expected, &levels, |adc| adc.start(&mut NoopDelay::new()))
-}
-
-/// What a part gives whose reference has settled.
-fn try_sample(expected: Vec<Transaction<u8>>) -> Result<RawFrame, AdcError<ErrorKind>> {
-    on_part(&expected, &[], |adc| {
-        adc.reference = Reference::Settled;
-        adc.sample(7, 14_000)
+fn try_start(expected: Frames) -> Result<(), AdcError<ErrorKind>> {
+    testing::on_part(Ads8688::new, &expected, &[State::High], |adc| {
+        adc.start(&mut NoopDelay::new())
     })
 }
 
+fn try_sample(expected: Frames) -> Result<RawFrame, AdcError<ErrorKind>> {
+    on_part(&expected, |adc| adc.sample(7, 14_000))
+}
+
 /// Codes, and the register that is read back after them.
-fn tick(register: u8, value: u8) -> Vec<Transaction<u8>> {
+fn tick(register: u8, value: u8) -> Frames {
     [sampled(ZERO), frame([register << 1, 0], [value, 0, 0])].concat()
 }
 
 #[test]
 fn every_register_is_read_back_in_turn() {
-    let wanted = [
-        (0x01, 0x3f),
-        (0x02, 0xc0),
-        (0x03, 0x43),
-        (0x05, 0),
-        (0x06, 0),
-        (0x07, 0),
-        (0x08, 0),
-        (0x09, 0),
-        (0x0a, 0),
-        (0x0b, 0),
-        (0x0c, 0),
-    ];
-    for (wrong, (register, value)) in wanted.into_iter().enumerate() {
+    let settings = [(0x01, 0x3f), (0x02, 0xc0), (0x03, 0x43)];
+    let ranges_and_reset = (0x05..=0x0c).map(|register| (register, 0));
+    let wanted: Vec<_> = settings.into_iter().chain(ranges_and_reset).collect();
+    for (wrong, &(register, value)) in wanted.iter().enumerate() {
         let good = wanted.iter().cycle().take(11 + wrong);
         let mut all: Vec<_> = good.flat_map(|(r, v)| tick(*r, *v)).collect();
         all.extend(tick(register, value ^ 1));
-        on_part(&all, &[], |adc| {
-            adc.reference = Reference::Settled;
+        on_part(&all, |adc| {
             assert!((0..11 + wrong).all(|_| adc.sample(0, 0).is_ok()));
             let (found, wanted) = (u16::from(value ^ 1), u16::from(value));
             let error = AdcError::WrongSetting {
@@ -191,12 +167,7 @@ fn a_code_of_another_range_is_refused() {
 
 #[test]
 fn the_error_of_the_bus_is_kept() {
-    let mut pin = PinMock::new(&[PinTransaction::set(State::High)]);
-    let mut adc = Ads8688::new(Broken, pin.clone(), Channels::IN_ORDER);
-    let error = AdcError::Bus(ErrorKind::ModeFault);
-    assert_eq!(adc.start(&mut NoopDelay::new()), Err(error));
-    assert_eq!(adc.sample(0, 0), Err(error));
-    pin.done();
+    keeps_the_error_of_the_bus(Ads8688::new);
 }
 
 /// The frame of the last code selects the thermometer's channel, and the next one has its code in place of
@@ -216,8 +187,7 @@ fn a_thermometer_is_read_in_place_of_a_register() {
     warm.extend(frame([0xdc, 0x00], [0x80, 0, 0x54]));
     warm.extend(frame([0, 0], [0x89, 0x60, 0x74]));
     let all = [warm.clone(), tick(0x01, 0x3f), warm].concat();
-    on_part(&all, &[], |adc| {
-        adc.reference = Reference::Settled;
+    on_part(&all, |adc| {
         adc.channels = channels.expect("a free input");
         for (time_us, body_mc) in [(0, 25_000), (99_999, 25_000), (100_000, 25_000)] {
             let read = adc.sample(7, time_us).map(|frame| frame.temperature_mc);

@@ -238,7 +238,51 @@ fn compare<B>(register: u8, found: u16, wanted: u16) -> Result<(), AdcError<B>> 
 
 #[cfg(test)]
 mod testing {
+    extern crate std;
+
+    use super::{AdcError, Channels, FrameSampler};
     use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
+    use embedded_hal_mock::eh1::delay::NoopDelay;
+    use embedded_hal_mock::eh1::digital::{Mock as PinMock, State, Transaction as PinTransaction};
+    use embedded_hal_mock::eh1::spi::{Mock, Transaction};
+    use std::vec::Vec;
+
+    /// Frames on a bus.
+    pub(super) type Frames = Vec<Transaction<u8>>;
+
+    /// One frame: what is sent, and what comes back meanwhile.
+    pub(super) fn transfer(sent: Vec<u8>, back: Vec<u8>) -> Frames {
+        let transfer = Transaction::transfer_in_place(sent, back);
+        let (start, end) = (
+            Transaction::transaction_start(),
+            Transaction::transaction_end(),
+        );
+        [start, transfer, end].into()
+    }
+
+    /// What `work` gives on a part whose bus carries exactly `expected` and whose pin sees `levels`.
+    pub(super) fn on_part<S, T>(
+        new: fn(Mock<u8>, PinMock, Channels) -> S,
+        expected: &Frames,
+        levels: &[State],
+        work: impl FnOnce(&mut S) -> T,
+    ) -> T {
+        let levels: Vec<_> = levels.iter().copied().map(PinTransaction::set).collect();
+        let (mut bus, mut pin) = (Mock::new(expected), PinMock::new(&levels));
+        let result = work(&mut new(bus.clone(), pin.clone(), Channels::IN_ORDER));
+        bus.done();
+        pin.done();
+        result
+    }
+
+    pub(super) fn keeps_the_error_of_the_bus<S: FrameSampler<Bus = ErrorKind>>(
+        new: fn(Broken, NoPin, Channels) -> S,
+    ) {
+        let mut part = new(Broken, NoPin, Channels::IN_ORDER);
+        let error = AdcError::Bus(ErrorKind::ModeFault);
+        assert_eq!(part.start(&mut NoopDelay::new()), Err(error));
+        assert_eq!(part.sample(0, 0), Err(error));
+    }
 
     /// A pin that nothing hangs on.
     pub(super) struct NoPin;
