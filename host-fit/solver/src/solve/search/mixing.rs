@@ -117,25 +117,19 @@ mod tests {
     }
 
     #[test]
-    fn p_stays_when_nothing_improved() {
+    fn p_stays_where_the_formula_has_no_value_and_keeps_both_kinds_alive() {
         for adaptation in [Adaptation::SuccessRatio, Adaptation::DeclineRatio] {
-            assert_eq!(Tally::default().next_p(adaptation, 0.3), 0.3);
-            let none = tally([0, 0], [70, 30], [0.0, 0.0]);
-            assert_eq!(none.next_p(adaptation, 0.3), 0.3);
-            // Only learning was tried: 25 and 27 are again 0/0.
-            let one_kind = tally([70, 0], [30, 0], [3.0, 0.0]);
-            assert_eq!(one_kind.next_p(adaptation, 0.3), 0.3);
-        }
-    }
-
-    #[test]
-    fn p_keeps_both_kinds_alive() {
-        let only_learning = tally([10, 0], [40, 50], [1.0, 0.0]);
-        let only_mutation = tally([0, 10], [50, 40], [0.0, 1.0]);
-        for adaptation in [Adaptation::SuccessRatio, Adaptation::DeclineRatio] {
-            assert_eq!(only_learning.next_p(adaptation, 0.5), P_MAX);
-            assert_eq!(only_mutation.next_p(adaptation, 0.5), P_MIN);
-            assert_eq!(only_mutation.next_p(Adaptation::Fixed, 0.5), 0.5);
+            for (improved, failed, decline, p) in [
+                ([0, 0], [0, 0], [0.0, 0.0], 0.3),
+                ([0, 0], [70, 30], [0.0, 0.0], 0.3),
+                // Only learning was tried: 25 and 27 are again 0/0.
+                ([70, 0], [30, 0], [3.0, 0.0], 0.3),
+                ([10, 0], [40, 50], [1.0, 0.0], P_MAX),
+                ([0, 10], [50, 40], [0.0, 1.0], P_MIN),
+            ] {
+                let tally = tally(improved, failed, decline);
+                assert_eq!(tally.next_p(adaptation, 0.3), p, "{tally:?}");
+            }
         }
     }
 

@@ -182,56 +182,49 @@ mod tests {
 
     #[test]
     fn each_criterion_stops_at_its_limit_and_not_before() {
-        let falling = history(&[8.0, 4.0, 2.0]);
-        let reached = |criteria: StopCriteria<'_>| criteria.reached(&falling);
         let none = StopCriteria::default();
-        assert_eq!(reached(none), None);
-        let with = |generations| StopCriteria {
-            generations,
+        let (generations, evaluations) = (
+            |count| StopCriteria {
+                generations: Some(count),
+                ..none
+            },
+            |count| StopCriteria {
+                evaluations: Some(count),
+                ..none
+            },
+        );
+        let stall = StopCriteria {
+            stall: Some(Stall {
+                generations: 2,
+                relative_decline: 0.01,
+            }),
             ..none
         };
-        assert_eq!(reached(with(Some(3))), None);
-        assert_eq!(reached(with(Some(2))), Some(StopReason::Generations));
-        let with = |evaluations| StopCriteria {
-            evaluations,
-            ..none
-        };
-        assert_eq!(reached(with(Some(501))), None);
-        assert_eq!(reached(with(Some(500))), Some(StopReason::Evaluations));
-    }
-
-    #[test]
-    fn a_stall_is_a_small_decline_over_its_generations() {
-        let stall = Some(Stall {
-            generations: 2,
-            relative_decline: 0.01,
-        });
-        let criteria = StopCriteria {
-            stall,
-            ..StopCriteria::default()
-        };
-        assert_eq!(criteria.reached(&history(&[1.0, 1.0])), None);
-        assert_eq!(criteria.reached(&history(&[1.0, 0.995, 0.98])), None);
-        let stalled = criteria.reached(&history(&[2.0, 1.0, 0.995, 0.991]));
-        assert_eq!(stalled, Some(StopReason::Stall));
-    }
-
-    #[test]
-    fn an_interrupt_comes_before_everything_else() {
         let flag = AtomicBool::new(true);
-        let criteria = StopCriteria {
-            generations: Some(0),
+        let interrupted = StopCriteria {
             interrupt: Some(&flag),
-            ..StopCriteria::default()
+            ..generations(0)
         };
-        assert_eq!(
-            criteria.reached(&history(&[1.0])),
-            Some(StopReason::Interrupted)
-        );
-        flag.store(false, Ordering::Relaxed);
-        assert_eq!(
-            criteria.reached(&history(&[1.0])),
-            Some(StopReason::Generations)
-        );
+        for (criteria, costs, reason) in [
+            (none, &[8.0, 4.0, 2.0][..], None),
+            (generations(3), &[8.0, 4.0, 2.0], None),
+            (
+                generations(2),
+                &[8.0, 4.0, 2.0],
+                Some(StopReason::Generations),
+            ),
+            (evaluations(501), &[8.0, 4.0, 2.0], None),
+            (
+                evaluations(500),
+                &[8.0, 4.0, 2.0],
+                Some(StopReason::Evaluations),
+            ),
+            (stall, &[1.0, 1.0], None),
+            (stall, &[1.0, 0.995, 0.98], None),
+            (stall, &[2.0, 1.0, 0.995, 0.991], Some(StopReason::Stall)),
+            (interrupted, &[1.0], Some(StopReason::Interrupted)),
+        ] {
+            assert_eq!(criteria.reached(&history(costs)), reason, "{criteria:?}");
+        }
     }
 }

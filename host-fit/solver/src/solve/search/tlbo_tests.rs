@@ -49,9 +49,9 @@ fn uniform(numbers: &[f64]) -> Script {
 #[test]
 fn tlbo_takes_equations_16_to_18() {
     let teacher = [
-        uniform(&[0.7, 0.5]),  // T_F 2: 8 + (4 - 16)/2 = 2, kept
-        uniform(&[0.2, 0.5]),  // T_F 1: 4 + (4 - 8)/2 = 2, kept
-        uniform(&[0.2, 0.25]), // T_F 1: 12 + (4 - 8)/4 = 11, kept
+        uniform(&[0.5, 0.5]),   // T_F 2: 8 + (4 - 16)/2 = 2, kept
+        uniform(&[0.499, 0.5]), // T_F 1: 4 + (4 - 8)/2 = 2, kept
+        uniform(&[0.2, 0.25]),  // T_F 1: 12 + (4 - 8)/4 = 11, kept
     ];
     let learner = [
         uniform(&[0.9, 0.25]), // partner 2 (11, worse): 2 + (2 - 11)/4 = -0.25, clipped to 0
