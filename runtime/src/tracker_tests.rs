@@ -74,6 +74,16 @@ fn a_re_zero_at_rest_is_taken_off_from_then_on() {
 }
 
 #[test]
+fn a_pose_less_another_zero_deviation_is_not_held() {
+    let mut tracker = tracker(HOLD_2);
+    tracker.tick(&frame(0));
+    assert!(tracker.set_zero(PlanarPose::from_array([1e-6, 0.0, 0.0])));
+    let reading = tracker.tick(&bad_frame(1));
+    assert_eq!(reading.planar_or_held(), None);
+    assert!(reading.status.any(Status::VERTICAL_HELD));
+}
+
+#[test]
 fn what_refuses_a_re_zero_keeps_the_zero_in_use() {
     use ZeroOffsetRefusal::{NoPose, TooShort};
     let mut tracker = tracker(HOLD_2);
