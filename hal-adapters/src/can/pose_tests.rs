@@ -54,35 +54,20 @@ fn the_words_of_the_decoder_come_back_to_the_bit() {
 }
 
 #[test]
-fn a_pose_that_is_no_number_is_invalid() {
-    let mut receiver = PoseReceiver::new(Timing::default());
-    let mut forged = reading(0);
+fn a_pose_that_is_no_number_disagrees_on_its_status_or_lacks_an_axis_is_invalid() {
+    let [x, y, rz] = planar_frames(&reading(2), 0).map(BusFrame::from);
+    let mut forged = reading(2);
     forged.pose.planar.y_m = f32::INFINITY;
-    let taken = planar_frames(&forged, 0).map(|frame| receiver.take(&BusFrame::from(frame), 0));
-    let pose = taken.into_iter().find_map(|taken| taken.tick);
-    assert_eq!(pose.expect("all three axes came").valid(), None);
-}
-
-#[test]
-fn a_pose_with_an_axis_missing_is_invalid() {
-    let mut receiver = PoseReceiver::new(Timing::default());
-    let [x, y, _] = planar_frames(&reading(2), 0).map(BusFrame::from);
-    receiver.take(&x, 0);
-    receiver.take(&y, 100);
-    let got = receiver.poll(1_000).tick.expect("its time is over");
-    assert_eq!(got.valid(), None);
-    assert!(got.status.any(Status::FRAMES_MISSED));
-}
-
-#[test]
-fn axes_that_disagree_on_the_status_are_invalid() {
-    let mut receiver = PoseReceiver::new(Timing::default());
-    let [x, y, _] = planar_frames(&reading(2), 0).map(BusFrame::from);
-    let [_, _, rz] = planar_frames(&reading(3), 0).map(BusFrame::from);
-    receiver.take(&x, 0);
-    receiver.take(&y, 0);
-    let got = receiver.take(&rz, 0).tick.expect("complete");
-    assert_eq!(got.valid(), None);
+    let [_, infinite, _] = planar_frames(&forged, 0).map(BusFrame::from);
+    let [_, _, other] = planar_frames(&reading(3), 0).map(BusFrame::from);
+    for frames in [&[x, infinite, rz][..], &[x, y, other], &[x, y]] {
+        let mut receiver = PoseReceiver::new(Timing::default());
+        let taken = frames.iter().map(|frame| receiver.take(frame, 0).tick);
+        let whole = taken.fold(None, Option::or);
+        let got = whole.or_else(|| receiver.poll(1_000).tick).expect("a tick");
+        assert_eq!(got.valid(), None);
+        assert!(frames.len() == 3 || got.status.any(Status::FRAMES_MISSED));
+    }
 }
 
 #[test]

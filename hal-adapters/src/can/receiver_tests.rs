@@ -1,6 +1,6 @@
 use super::super::e2e::unprotect;
 use super::super::frame::BusFrame;
-use super::super::sensor::{TemperatureSender, frames};
+use super::super::sensor::{TemperatureSender, frames, frames_16};
 use super::*;
 use proptest::prelude::*;
 
@@ -32,6 +32,11 @@ fn feed(r: &mut SensorReceiver, layout: Layout, sequence: u32) -> (Option<RawFra
     (tick, faults)
 }
 
+/// The frames of a tick, Hall and capacitive.
+fn pair(sequence: u32) -> [BusFrame; 2] {
+    frames_16(&raw(sequence)).map(BusFrame::from)
+}
+
 fn codes(frame: &RawFrame) -> ([i32; 3], [i32; 3]) {
     (frame.hall, frame.capacitive)
 }
@@ -60,7 +65,7 @@ fn every_tick_comes_out_whole_and_numbered_across_counter_wraps() {
 fn frames_of_a_tick_may_come_in_any_order() {
     let mut r = new(Layout::Bits16);
     for sequence in 1..40 {
-        let [hall, gaps] = super::super::sensor::frames_16(&raw(sequence)).map(BusFrame::from);
+        let [hall, gaps] = pair(sequence);
         assert_eq!(r.take(&gaps, sequence * 2000), Taken::NOTHING);
         let tick = r.take(&hall, sequence * 2000).tick;
         assert_eq!(tick, Some(raw(sequence)));
@@ -71,9 +76,9 @@ fn frames_of_a_tick_may_come_in_any_order() {
 fn a_dropped_frame_leaves_its_codes_missing_and_the_next_tick_whole() {
     let mut r = new(Layout::Bits16);
     feed(&mut r, Layout::Bits16, 1);
-    let [hall, _] = super::super::sensor::frames_16(&raw(2)).map(BusFrame::from);
+    let [hall, _] = pair(2);
     assert_eq!(r.take(&hall, 4_000), Taken::NOTHING);
-    let [hall, gaps] = super::super::sensor::frames_16(&raw(3)).map(BusFrame::from);
+    let [hall, gaps] = pair(3);
     let taken = r.take(&hall, 6_000);
     let partial = taken.tick.expect("the tick is over");
     assert_eq!(codes(&partial), (raw(2).hall, [MISSING_CODE; 3]));
@@ -88,7 +93,7 @@ fn a_dropped_frame_leaves_its_codes_missing_and_the_next_tick_whole() {
 fn the_passing_of_time_ends_a_tick_and_then_calls_the_source_stale() {
     let mut r = new(Layout::Bits16);
     feed(&mut r, Layout::Bits16, 1);
-    let [hall, _] = super::super::sensor::frames_16(&raw(2)).map(BusFrame::from);
+    let [hall, _] = pair(2);
     r.take(&hall, 4_000);
     assert_eq!(r.deadline_us(), Some(5_000));
     assert_eq!(r.poll(4_999), Taken::NOTHING);
@@ -101,12 +106,7 @@ fn the_passing_of_time_ends_a_tick_and_then_calls_the_source_stale() {
     assert_eq!((r.poll(9_000), r.deadline_us()), (Taken::NOTHING, None));
     assert_eq!(feed(&mut r, Layout::Bits16, 3).0, Some(raw(3)));
     assert!(!r.is_stale());
-}
-
-#[test]
-fn a_clock_that_steps_back_makes_nothing_stale() {
-    let mut r = new(Layout::Bits16);
-    feed(&mut r, Layout::Bits16, 100);
+    // A clock that steps back makes nothing stale.
     assert_eq!(r.poll(0), Taken::NOTHING);
 }
 
@@ -114,8 +114,8 @@ fn a_clock_that_steps_back_makes_nothing_stale() {
 fn a_delayed_frame_is_late_and_its_codes_are_not_used() {
     let mut r = new(Layout::Bits16);
     feed(&mut r, Layout::Bits16, 1);
-    let [hall_2, gaps_2] = super::super::sensor::frames_16(&raw(2)).map(BusFrame::from);
-    let [hall_3, gaps_3] = super::super::sensor::frames_16(&raw(3)).map(BusFrame::from);
+    let [hall_2, gaps_2] = pair(2);
+    let [hall_3, gaps_3] = pair(3);
     r.take(&hall_2, 4_000);
     assert!(r.take(&hall_3, 6_000).tick.is_some());
     let message = Message::Capacitive;
@@ -128,8 +128,8 @@ fn a_delayed_frame_is_late_and_its_codes_are_not_used() {
 #[test]
 fn a_frame_sixteen_ticks_on_is_not_joined_to_an_old_one() {
     let mut r = new(Layout::Bits16);
-    let [hall, _] = super::super::sensor::frames_16(&raw(2)).map(BusFrame::from);
-    let [_, gaps] = super::super::sensor::frames_16(&raw(18)).map(BusFrame::from);
+    let [hall, _] = pair(2);
+    let [_, gaps] = pair(18);
     r.take(&hall, 4_000);
     let taken = r.take(&gaps, 36_000);
     let partial = taken.tick.expect("the old tick, without the new codes");
@@ -181,14 +181,13 @@ fn a_sender_that_starts_again_is_used_from_its_second_frame_on() {
 #[test]
 fn a_remote_frame_a_short_one_and_a_foreign_one_give_no_tick() {
     let mut r = new(Layout::Bits16);
-    let id = Message::Hall.id();
-    let message = Message::Hall;
+    let (message, id) = (Message::Hall, Message::Hall.id());
     let remote = BusFrame::new_remote(id, 8).expect("eight");
-    let fault = Some(BusFault::WrongLength { message, bytes: 0 });
-    assert_eq!(r.take(&remote, 0), Taken { tick: None, fault });
     let short = BusFrame::new(id, &[0; 7]).expect("seven");
-    let fault = Some(BusFault::WrongLength { message, bytes: 7 });
-    assert_eq!(r.take(&short, 0), Taken { tick: None, fault });
+    for (frame, bytes) in [(remote, 0), (short, 7)] {
+        let fault = Some(BusFault::WrongLength { message, bytes });
+        assert_eq!(r.take(&frame, 0), Taken { tick: None, fault });
+    }
     for foreign in [
         BusFrame::new(embedded_can::StandardId::ZERO, &[0; 8]),
         BusFrame::new(embedded_can::ExtendedId::ZERO, &[0; 8]),

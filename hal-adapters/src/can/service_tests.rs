@@ -41,6 +41,10 @@ impl<'d> Stage<'d> {
         self.read(answered.answer.expect("an answer"), token)
     }
 
+    fn declares_off(&mut self, seconds: u8) -> Outcome {
+        self.ask(Request::ServoOff { seconds }, 100)
+    }
+
     fn read(&mut self, answer: Coded, token: u8) -> Outcome {
         match self.host.take(&BusFrame::from(answer)) {
             Some(Ok(Content::Answer(a))) if a.token == token => a.outcome.expect("a known one"),
@@ -76,10 +80,7 @@ fn the_zero_changes_only_while_the_servo_is_declared_off() {
     let decoder = decoder();
     let mut stage = Stage::new(&decoder);
     assert_eq!(stage.ask(REZERO, 1), Outcome::ServoOn);
-    assert_eq!(
-        stage.ask(Request::ServoOff { seconds: 3 }, 2),
-        Outcome::Done
-    );
+    assert_eq!(stage.declares_off(3), Outcome::Done);
     assert_eq!(stage.ask(REZERO, 3), Outcome::Started);
     assert_eq!(stage.flags(), flag::REZERO_RUNS);
     assert_eq!(stage.ask(REZERO, 4), Outcome::Busy);
@@ -93,16 +94,10 @@ fn the_zero_changes_only_while_the_servo_is_declared_off() {
     stage.rest(1, 0);
     assert_eq!(stage.ask(Request::ClearZero, 6), Outcome::ServoOn);
     assert_eq!(stage.servo.zero(), zero);
-    assert_eq!(
-        stage.ask(Request::ServoOff { seconds: 1 }, 7),
-        Outcome::Done
-    );
+    assert_eq!(stage.declares_off(1), Outcome::Done);
     assert_eq!(stage.ask(Request::ClearZero, 8), Outcome::Done);
     assert_eq!(stage.flags(), 0);
-    assert_eq!(
-        stage.ask(Request::ServoOff { seconds: 0 }, 9),
-        Outcome::Done
-    );
+    assert_eq!(stage.declares_off(0), Outcome::Done);
     assert_eq!(stage.ask(REZERO, 10), Outcome::ServoOn);
 }
 
@@ -110,7 +105,7 @@ fn the_zero_changes_only_while_the_servo_is_declared_off() {
 fn a_service_pin_that_says_on_overrules_the_declaration() {
     let decoder = decoder();
     let mut stage = Stage::new(&decoder);
-    stage.ask(Request::ServoOff { seconds: 9 }, 1);
+    stage.declares_off(9);
     for (pin, token, outcome) in [
         (Some(false), 2, Outcome::ServoOn),
         (None, 3, Outcome::Started),
@@ -126,18 +121,13 @@ fn a_service_pin_that_says_on_overrules_the_declaration() {
 fn a_servo_that_goes_on_ends_a_re_zero_and_leaves_the_zero() {
     let decoder = decoder();
     let on: [fn(&mut Stage<'_>); 2] = [
-        |stage| {
-            assert_eq!(
-                stage.ask(Request::ServoOff { seconds: 0 }, 3),
-                Outcome::Done
-            )
-        },
+        |stage| assert_eq!(stage.declares_off(0), Outcome::Done),
         |stage| stage.pin = Some(false),
     ];
     // In the middle, and before the tick that would end it.
     for (go_on, ticks) in on.into_iter().zip([100, 499]) {
         let mut stage = Stage::new(&decoder);
-        stage.ask(Request::ServoOff { seconds: 9 }, 1);
+        stage.declares_off(9);
         stage.ask(REZERO, 2);
         assert_eq!(stage.rest(ticks, 0), None);
         go_on(&mut stage);
@@ -157,10 +147,7 @@ fn a_stage_that_rests_elsewhere_is_zeroed_within_limits_of_its_own() {
             vertical_max,
             ..ZeroOffsetSettings::default()
         });
-        assert_eq!(
-            stage.ask(Request::ServoOff { seconds: 10 }, 1),
-            Outcome::Done
-        );
+        stage.declares_off(10);
         assert_eq!(stage.ask(REZERO, 2), Outcome::Started);
         stage.rest(500, 2)
     };
@@ -173,11 +160,9 @@ fn a_stage_that_rests_elsewhere_is_zeroed_within_limits_of_its_own() {
 fn a_re_zero_that_is_too_short_is_refused_at_once() {
     let decoder = decoder();
     let mut stage = Stage::new(&decoder);
-    stage.ask(Request::ServoOff { seconds: 1 }, 1);
-    assert_eq!(
-        stage.ask(Request::Rezero { ticks: 1 }, 2),
-        Outcome::TooShort
-    );
+    stage.declares_off(1);
+    let short = stage.ask(Request::Rezero { ticks: 1 }, 2);
+    assert_eq!(short, Outcome::TooShort);
     assert_eq!(stage.flags(), flag::REZERO_REFUSED);
     assert_eq!(stage.ask(REZERO, 3), Outcome::Started);
 }
