@@ -5,33 +5,23 @@
 //! Parameters have a truth only in logs that the field model itself makes; poses have one in logs
 //! of a stage made of physics as well, where the model is not exact.
 
+mod common;
+
+use common::{Coverage, Fallible, RUN_8, RUN_30, Twin, fitted};
 use host_fit::input::dataset::{Dataset, LoggedFrame, Movement, Row};
-use host_fit::input::shipped::STAGE_TOML;
+use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
-use host_fit::problem::Problem;
-use host_fit::problem::model::Model;
 use host_fit::problem::parameters::Parameters;
-use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::pose::StagePose;
-use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
+use host_fit::simulate::protocol::{Protocol, Run};
 use host_fit::simulate::random::{Purpose, Stream};
-use host_fit::simulate::recording::record;
 use host_fit::simulate::sensors::SensorErrors;
-use host_fit::solve::field::fit::{FieldFit, fit_field};
+use host_fit::solve::field::fit::FieldFit;
 use host_fit::solve::field::parameters::FieldParameters;
 use host_fit::solve::field::probe::probes;
 use host_fit::solve::field::terms::TERMS;
-use host_fit::solve::{Projection, Solver, SolverOptions};
 use runtime::{ModelKind, RawFrame, VerticalPose};
-use std::error::Error;
-use std::f64::consts::TAU;
 
-type Fallible<T> = Result<T, Box<dyn Error>>;
-
-/// 95 % of normal numbers are within this many standard deviations.
-const WITHIN: f64 = 1.959_964;
-/// Full service motion of X, Y, Rz, Z, Rx, Ry: m and rad.
-const AMPLITUDES: [f64; 6] = [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6];
 const PERIOD_S: f64 = 0.002;
 /// Every this many rows of a service log a pose is judged.
 const POSE_STRIDE: usize = 40;
@@ -55,29 +45,11 @@ impl Motion {
 
     fn run(self, seed: u64) -> Run {
         match self {
-            Self::EightSeconds => Run::planned(sines(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5])),
-            Self::ThirtySeconds => Run::planned(sines(30.0, [13.0, 17.0, 14.0, 19.0, 16.0, 11.0])),
+            Self::EightSeconds => Run::planned(RUN_8.trajectory(PERIOD_S)),
+            Self::ThirtySeconds => Run::planned(RUN_30.trajectory(PERIOD_S)),
             Self::Combined => Protocol::Combined.run(PERIOD_S, seed),
         }
     }
-}
-
-/// One movement, a sine of its own along each axis, with tapers of half a second.
-fn sines(seconds: f64, cycles: [f64; 6]) -> Trajectory {
-    let pose = |row: u32| {
-        let t_s = f64::from(row) * PERIOD_S;
-        let end = (t_s.min(seconds - t_s) / 0.5).clamp(0.0, 1.0);
-        let taper = end * end * (3.0 - 2.0 * end);
-        let at = |k: usize| {
-            let phase = TAU * cycles[k] * t_s / seconds + 1.7 * k as f64;
-            AMPLITUDES[k] * taper * libm::sin(phase)
-        };
-        StagePose {
-            planar: [at(0), at(1), at(2)],
-            vertical: [at(3), at(4), at(5)],
-        }
-    };
-    (0..(seconds / PERIOD_S).round() as u32).map(pose).collect()
 }
 
 /// Parameters drawn from the prior; those without one near what the stages at hand have.
@@ -136,51 +108,9 @@ fn model_log(truth: &FieldParameters, run: &Run, random: &mut Stream) -> Dataset
     dataset
 }
 
-/// Model (31) by least squares.
-fn model_31(dataset: &Dataset, stage: &Stage) -> Fallible<Parameters> {
-    let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let problem = Problem::new(dataset, &all, stage, Model::of(ModelKind::M31));
-    let options = SolverOptions::new(Projection::Linear, 1);
-    Ok(Solver::LeastSquares.solve(&problem, &options)?.parameters)
-}
-
-/// The field model.
 fn field(dataset: &Dataset, stage: &Stage) -> Fallible<FieldFit> {
-    let all: Vec<usize> = (0..dataset.rows.len()).collect();
-    let start = model_31(dataset, stage)?;
-    Ok(fit_field(dataset, &all, stage, &start)?)
-}
-
-/// How many of what was counted lay within their intervals.
-#[derive(Clone, Copy, Debug, Default)]
-struct Coverage {
-    within: u64,
-    of: u64,
-    squares: f64,
-}
-
-impl Coverage {
-    fn add(&mut self, error: f64, variance: f64) {
-        let ratio = error * error / variance;
-        self.within += u64::from(ratio <= WITHIN * WITHIN);
-        self.of += 1;
-        self.squares += ratio;
-    }
-
-    fn and(self, other: Self) -> Self {
-        Self {
-            within: self.within + other.within,
-            of: self.of + other.of,
-            squares: self.squares + other.squares,
-        }
-    }
-
-    /// Per cent within, and the rms error in terms of the standard error.
-    fn words(self) -> String {
-        let of = self.of.max(1) as f64;
-        let percent = 100.0 * self.within as f64 / of;
-        format!("{percent:5.1} % ({:.2})", (self.squares / of).sqrt())
-    }
+    let fit = fitted(dataset, stage, ModelKind::Field)?;
+    Ok(fit.field.ok_or("no field model")?)
 }
 
 /// Logs that the field model makes: parameters.
@@ -200,14 +130,6 @@ fn of_the_model(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Coverage> 
         }
     }
     Ok(parameters)
-}
-
-/// The stage of a seed, and its log of a motion.
-fn recorded(stage: &Stage, motion: Motion, seed: u64) -> Fallible<(Assembly, Dataset)> {
-    let assembly = Assembly::draw(stage, seed);
-    let run = motion.run(seed);
-    let log = record(stage, &assembly, run, &SensorErrors::USUAL, seed)?;
-    Ok((assembly, log.dataset(stage).ok_or("no plane")?))
 }
 
 /// Judges a pose: with the noise of the probes in its signals.
@@ -232,8 +154,9 @@ fn add_pose(
 fn of_physics(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Coverage> {
     let mut poses = Coverage::default();
     for seed in 0..logs {
-        let (assembly, dataset) = recorded(stage, motion, seed)?;
-        let fit = field(&dataset, stage)?;
+        let twin = Twin::new(stage, seed);
+        let log = twin.record(motion.run(seed));
+        let fit = field(&log.dataset(stage).ok_or("no plane")?, stage)?;
         let service = Protocol::Service.run(PERIOD_S, seed);
         let mut random = Stream::new(seed, Purpose::Sensors, 9);
         for pose in service
@@ -243,7 +166,7 @@ fn of_physics(stage: &Stage, motion: Motion, logs: u64) -> Fallible<Coverage> {
             .skip(POSE_STRIDE / 2)
             .step_by(POSE_STRIDE)
         {
-            let exact = assembly.probes.map(|probe| probe.signal_m(pose));
+            let exact = twin.assembly.probes.map(|probe| probe.signal_m(pose));
             let noisy = exact.map(|s| s + random.normal(SensorErrors::USUAL.hall_m));
             add_pose(&mut poses, &fit, pose, noisy);
         }
@@ -255,7 +178,7 @@ fn main() -> Fallible<()> {
     // Cargo passes `--bench`.
     let logs = std::env::args().skip(1).find_map(|a| a.parse().ok());
     let logs: u64 = logs.unwrap_or(200);
-    let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
+    let stage = shipped::stage();
     let shares = [
         (Motion::EightSeconds, logs / 2),
         (Motion::ThirtySeconds, logs * 3 / 10),

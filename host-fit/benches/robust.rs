@@ -3,22 +3,20 @@
 //!
 //! `cargo bench -p host-fit --bench robust`: a minute.
 
+mod common;
+
+use common::{Axes, Fallible, read, rms};
 use host_fit::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::dataset::Dataset;
-use host_fit::input::log::{ReadOptions, read_bytes};
-use host_fit::input::shipped::{LOG_GZ, RUN_GZ, SERVICE_GZ, STAGE_TOML};
+use host_fit::input::shipped::{self, LOG_GZ, RUN_GZ, SERVICE_GZ};
 use host_fit::input::stage::Stage;
-use host_fit::judge::{Decoded, Zeros};
 use host_fit::problem::model::Model;
 use host_fit::solve::Solver;
 use host_fit::solve::robust::Loss;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use runtime::ModelKind;
-use std::error::Error;
 use std::io::Read;
-
-type Fallible<T> = Result<T, Box<dyn Error>>;
 
 /// Columns of the shipped logs.
 const BEAMS: [usize; 3] = [2, 3, 4];
@@ -38,8 +36,8 @@ const FAULTS: [&str; 7] = [
 ];
 
 fn main() -> Fallible<()> {
-    let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
-    let service = read(&unzipped(SERVICE_GZ)?, &stage)?;
+    let stage = shipped::stage();
+    let service = read(SERVICE_GZ, &stage)?;
     println!("| log, model | fault | none | huber | cauchy |\n|---|---|---|---|---|");
     for (name, log, kind) in [
         ("run of 30 s, field", RUN_GZ, ModelKind::Field),
@@ -48,7 +46,7 @@ fn main() -> Fallible<()> {
         let rows = unzipped(log)?;
         let mut clean = None;
         for (fault, title) in FAULTS.into_iter().enumerate() {
-            let log = read(&with_fault(&rows, fault), &stage)?;
+            let log = read(with_fault(&rows, fault).as_bytes(), &stage)?;
             print!("| {name} | {title} |");
             for loss in [Loss::None, Loss::Huber, Loss::Cauchy] {
                 match rms_in_service(&log, &service, &stage, kind, loss) {
@@ -72,15 +70,13 @@ fn rms_in_service(
     stage: &Stage,
     kind: ModelKind,
     loss: Loss,
-) -> Fallible<[f64; 3]> {
+) -> Fallible<Axes> {
     let settings = FitSettings {
         solver: Solver::Finished,
         loss,
         ..FitSettings::new(ModelChoice::Named(Model::of(kind)))
     };
-    let fit = fit(log, stage, &settings)?;
-    let judged = Decoded::new(&fit.set, service).judge(service, stage, Zeros::None);
-    Ok(judged.errors.axes.map(|axis| axis.rms))
+    Ok(rms(&fit(log, stage, &settings)?.set, service, stage))
 }
 
 /// A log with one of the faults, the same at every call.
@@ -131,16 +127,6 @@ fn with_fault(log: &str, fault: usize) -> String {
         cells.join(",") + "\n"
     };
     header.to_owned() + "\n" + &rows.into_iter().map(line).collect::<String>()
-}
-
-fn read(log: &str, stage: &Stage) -> Fallible<Dataset> {
-    let log = read_bytes(
-        log.as_bytes(),
-        "log.csv".as_ref(),
-        stage,
-        &ReadOptions::default(),
-    )?;
-    Ok(log.dataset)
 }
 
 fn unzipped(log: &[u8]) -> Fallible<String> {

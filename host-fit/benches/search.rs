@@ -2,8 +2,10 @@
 //! bounds and one individual with its fitness into DIR, for other programs to be measured on the same
 //! problem, and prints what this one does with it. (`host-fit compare` has the other figures.)
 
-use host_fit::input::log::{ReadOptions, read_bytes};
-use host_fit::input::stage::Stage;
+mod common;
+
+use common::{Fallible, median, median_s, read};
+use host_fit::input::shipped::{self, LOG_GZ};
 use host_fit::problem::Problem;
 use host_fit::problem::draw::{Draw, draw_rows};
 use host_fit::problem::model::Model;
@@ -13,36 +15,13 @@ use host_fit::solve::search::cost::CostFunction;
 use host_fit::solve::search::kind::SearchKind;
 use host_fit::solve::search::run::{Start, StopCriteria};
 use runtime::ModelKind;
-use std::error::Error;
 use std::fmt::Write;
 use std::path::Path;
-use std::time::Instant;
 
 /// Np and Gm of the paper.
 const PAPER: usize = 100;
 /// Rows of the paper's experiment.
 const ROWS: usize = 200;
-
-/// Median of some numbers.
-fn median(mut numbers: Vec<f64>) -> f64 {
-    numbers.sort_by(f64::total_cmp);
-    let middle = numbers.len() / 2;
-    if numbers.len().is_multiple_of(2) {
-        0.5 * (numbers[middle - 1] + numbers[middle])
-    } else {
-        numbers[middle]
-    }
-}
-
-/// Median time of several calls, us.
-fn time_us(repeats: usize, mut call: impl FnMut()) -> f64 {
-    let time = |_| {
-        let started = Instant::now();
-        call();
-        started.elapsed().as_secs_f64() * 1e6
-    };
-    median((0..repeats).map(time).collect())
-}
 
 /// An individual inside the middle half of the box.
 fn inside(cost: &Objective<'_>, number: usize) -> Vec<f64> {
@@ -73,7 +52,7 @@ fn generations(count: usize) -> StopCriteria<'static> {
 }
 
 /// Writes the paper's problem of seed 1 for other programs, and measures this one on it.
-fn export(folder: &Path, problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
+fn export(folder: &Path, problem: &Problem<'_>) -> Fallible<()> {
     std::fs::create_dir_all(folder)?;
     let mut rows =
         String::from("movement,s_a_um,s_b_um,s_c_um,z_m,rx_rad,ry_rad,x_um,y_um,rz_urad\n");
@@ -95,12 +74,15 @@ fn export(folder: &Path, problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
     std::fs::write(folder.join("unknowns.csv"), unknowns)?;
     for (kind, name) in [(SearchKind::Tlbo, "tlbo"), (SearchKind::Shtlbo, "shtlbo")] {
         let mut fitness = Vec::new();
-        let middle = time_us(5, || {
+        let middle_s = median_s(5, || {
             let seed = fitness.len() as u64 + 1;
             let found = kind.minimize(&cost, &start(seed, PAPER), &generations(PAPER));
             fitness.push(found.cost);
         });
-        println!("RESULT {name}_us_per_evaluation={:.4}", middle / 20_100.0);
+        println!(
+            "RESULT {name}_us_per_evaluation={:.4}",
+            1e6 * middle_s / 20_100.0
+        );
         println!("RESULT {name}_fitness={:.4}", median(fitness));
     }
     println!(
@@ -110,14 +92,12 @@ fn export(folder: &Path, problem: &Problem<'_>) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Fallible<()> {
     // Cargo passes `--bench`.
     let folder = std::env::args().skip(1).find(|a| !a.starts_with("--"));
     let folder = folder.ok_or("name a folder")?;
-    let shipped = Path::new("the log that ships with the program");
-    let stage = Stage::from_toml(host_fit::input::shipped::STAGE_TOML, shipped)?;
-    let log = host_fit::input::shipped::LOG_GZ;
-    let dataset = read_bytes(log, shipped, &stage, &ReadOptions::default())?.dataset;
+    let stage = shipped::stage();
+    let dataset = read(LOG_GZ, &stage)?;
     let rows = draw_rows(&dataset, ROWS, Draw::Plain, 1);
     let problem = Problem::new(&dataset, &rows, &stage, Model::of(ModelKind::M31));
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;

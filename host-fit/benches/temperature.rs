@@ -4,33 +4,27 @@
 //! `cargo bench -p host-fit --bench temperature [-- STAGES | FOLDER STAGE.TOML]`: 20 stages by default,
 //! minutes; or the logs `cold`, `early`, `warm`, `day` and `day.truth` of a folder.
 
-use host_fit::fit::{Fit, FitSettings, ModelChoice, fit};
+mod common;
+
+use common::{Axes, Coverage, Fallible, RUN_8, RUN_30, Twin, fitted};
+use host_fit::fit::Fit;
 use host_fit::input::dataset::Dataset;
 use host_fit::input::log::{self, ReadOptions};
-use host_fit::input::shipped::STAGE_TOML;
+use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
 use host_fit::judge::Decoded;
 use host_fit::judge::statistics::over_noise;
 use host_fit::plan::run::Run as PlannedRun;
-use host_fit::problem::model::Model;
 use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::pose::StagePose;
 use host_fit::simulate::protocol::{Protocol, REST_S, Run};
-use host_fit::simulate::recording::{Recording, record_in};
-use host_fit::simulate::sensors::SensorErrors;
-use host_fit::simulate::thermal::{ASSEMBLED_C, Climate, Thermal};
+use host_fit::simulate::recording::Recording;
+use host_fit::simulate::thermal::{ASSEMBLED_C, Climate};
 use host_fit::solve::field::carry::service_poses;
 use runtime::ModelKind;
 use runtime::frame::MISSING_CODE;
-use std::error::Error;
 use std::path::{Path, PathBuf};
 
-type Fallible<T> = Result<T, Box<dyn Error>>;
-/// X, Y, Rz.
-type Axes = [f64; 3];
-
-/// 95 % of normal numbers are within this many standard deviations.
-const WITHIN: f64 = 1.959_964;
 /// Distances from the cold run, K.
 const CHANGES_K: [f64; 4] = [-10.0, -5.0, 5.0, 10.0];
 /// Most that the mean and the worst stage may have at these, ...
@@ -40,55 +34,10 @@ const LIMITS_OFF: [f64; 2] = [1.08, f64::INFINITY];
 /// ... and over the day.
 const LIMITS_DAY: [f64; 2] = [1.04, 1.1];
 
-/// `run30` and `run8` of the given logs.
-const RUN_30: PlannedRun = run(30.0, [13.0, 17.0, 14.0, 19.0, 16.0, 11.0]);
-const RUN_8: PlannedRun = run(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5]);
-
-const fn run(seconds: f64, cycles: [f64; 6]) -> PlannedRun {
-    PlannedRun {
-        seconds,
-        taper_s: 0.5,
-        amplitudes: [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6],
-        cycles,
-    }
-}
-
-/// A simulated stage.
-struct Twin<'a> {
-    stage: &'a Stage,
-    seed: u64,
-    assembly: Assembly,
-    thermal: Thermal,
-}
-
-impl<'a> Twin<'a> {
-    fn new(stage: &'a Stage, seed: u64) -> Self {
-        Self {
-            stage,
-            seed,
-            assembly: Assembly::draw(stage, seed),
-            thermal: Thermal::draw(seed),
-        }
-    }
-
-    fn record(&self, run: Run, climate: Climate) -> Recording {
-        let parts = (&self.assembly, &self.thermal);
-        record_in(
-            self.stage,
-            parts,
-            climate,
-            run,
-            &SensorErrors::USUAL,
-            self.seed,
-        )
-        .expect("no probe hits its magnet")
-    }
-
+impl Twin<'_> {
     fn planned(&self, run: &PlannedRun, climate: Climate) -> Recording {
-        self.record(
-            Run::planned(run.trajectory(self.stage.servo_period_s)),
-            climate,
-        )
+        let run = Run::planned(run.trajectory(self.stage.servo_period_s));
+        self.record_in(run, climate)
     }
 
     /// Service this far from the cold run, each movement after a rest.
@@ -99,14 +48,12 @@ impl<'a> Twin<'a> {
         for movement in &mut run.movements {
             movement.splice(0..0, rest.iter().copied());
         }
-        self.record(run, steady(change_k))
+        self.record_in(run, steady(change_k))
     }
 
     fn fit(&self, logs: &[&Recording]) -> Fallible<Fit> {
-        fitted(
-            &Recording::joined(logs, self.stage).ok_or("no plane")?,
-            self.stage,
-        )
+        let logs = Recording::joined(logs, self.stage).ok_or("no plane")?;
+        fitted(&logs, self.stage, ModelKind::Field)
     }
 
     fn judge(&self, fit: &Fit, recording: &Recording) -> Fallible<Axes> {
@@ -137,11 +84,6 @@ impl<'a> Twin<'a> {
 
 const fn steady(change_k: f64) -> Climate {
     Climate::Steady(ASSEMBLED_C + change_k)
-}
-
-fn fitted(dataset: &Dataset, stage: &Stage) -> Fallible<Fit> {
-    let model = ModelChoice::Named(Model::of(ModelKind::Field));
-    Ok(fit(dataset, stage, &FitSettings::new(model))?)
 }
 
 /// rms of the errors over that of the noise, in the rows after the rest.
@@ -187,41 +129,15 @@ impl Ratios {
     }
 }
 
-/// Errors of coefficients in terms of their standard errors.
-#[derive(Default)]
-struct Coefficients {
-    squares: f64,
-    scaled: f64,
-    within: u32,
-    of: u32,
-}
-
-impl Coefficients {
-    fn take(&mut self, found: f64, truth: f64, error: f64) {
-        self.squares += (found - truth) * (found - truth);
-        self.scaled += (found - truth) * (found - truth) / (error * error);
-        self.within += u32::from((found - truth).abs() <= WITHIN * error);
-        self.of += 1;
-    }
-
-    fn print(&self, title: &str) {
-        let of = f64::from(self.of.max(1));
-        let (rms, share) = (
-            (self.squares / of).sqrt() * 100.0,
-            f64::from(self.within) / of,
-        );
-        println!(
-            "{title:<58}{rms:.4} %/K rms, {:.1} % of {} within 95 % intervals ({:.2})",
-            100.0 * share,
-            self.of,
-            (self.scaled / of).sqrt()
-        );
-    }
+/// Prints errors of coefficients, per K.
+fn print(title: &str, errors: Coverage) {
+    let (percent, of, words) = (errors.rms() * 100.0, errors.of, errors.words());
+    println!("{title:<58}{percent:.4} %/K rms, of {of} within 95 % intervals {words}");
 }
 
 /// Errors of k of a mount's sensor alone (with which the body goes), by `run30` cold and `run8` warm.
-fn coefficients(stage: &Stage, stages: u64, spacing_k: f64, grows: bool) -> Fallible<Coefficients> {
-    let mut all = Coefficients::default();
+fn coefficients(stage: &Stage, stages: u64, spacing_k: f64, grows: bool) -> Fallible<Coverage> {
+    let mut all = Coverage::default();
     for seed in 1..=stages {
         let mut twin = Twin::new(stage, seed);
         if !grows {
@@ -235,7 +151,7 @@ fn coefficients(stage: &Stage, stages: u64, spacing_k: f64, grows: bool) -> Fall
         let truth = twin.change([zero_c - 0.5; 2], [zero_c + 0.5; 2]);
         for (probe, truth) in truth.into_iter().enumerate() {
             let found = field.warmth.temperature.per_mk[probe][0] * 1e3;
-            all.take(found, truth, field.warmth.error_per_k[probe][0]);
+            all.add(found - truth, field.warmth.error_per_k[probe][0].powi(2));
         }
     }
     Ok(all)
@@ -270,14 +186,14 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
         all_met &= off.print("the same, sensors of run8 0.1 K off; at +10 K", limits);
     }
     let mut days: [Ratios; 4] = Default::default();
-    let (mut k, mut h) = (Coefficients::default(), Coefficients::default());
+    let (mut k, mut h) = (Coverage::default(), Coverage::default());
     for seed in 1..=stages {
         let twin = Twin::new(stage, seed);
         let at = |hour: f64| Climate::Day { hour };
         let cold = twin.planned(&RUN_30, at(-1.0 / 6.0));
         let early = twin.planned(&RUN_8, at(1.0 / 6.0));
         let warm = twin.planned(&RUN_8, at(3.5));
-        let day = twin.record(Protocol::Day.run(stage.servo_period_s, seed), at(0.0));
+        let day = twin.record_in(Protocol::Day.run(stage.servo_period_s, seed), at(0.0));
         let none = [&cold, &early, &warm].map(|log| blind(log, [false; 2]));
         let fits: [&[&Recording]; 4] = [
             &[&cold, &early, &warm],
@@ -305,7 +221,10 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
             let truth = twin.change(at(-0.5), at(0.5));
             for (probe, truth) in truth.into_iter().enumerate() {
                 let found = field.warmth.temperature.per_mk[probe][sensor] * 1e3;
-                all.take(found, truth, field.warmth.error_per_k[probe][sensor]);
+                all.add(
+                    found - truth,
+                    field.warmth.error_per_k[probe][sensor].powi(2),
+                );
             }
         }
     }
@@ -319,8 +238,8 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
         let limits = (index == 0).then_some(LIMITS_DAY);
         all_met &= ratios.print(&format!("{title}; the day"), limits);
     }
-    k.print("k by cold, early, warm");
-    h.print("h by cold, early, warm");
+    print("k by cold, early, warm", k);
+    print("h by cold, early, warm", h);
     for (spacing_k, grows) in [(3.0, true), (5.0, true), (3.0, false)] {
         let found = coefficients(stage, 5 * stages, spacing_k, grows)?;
         let growth = if grows {
@@ -328,7 +247,10 @@ fn of_twins(stage: &Stage, stages: u64) -> Fallible<()> {
         } else {
             ", stages that do not grow"
         };
-        found.print(&format!("k by run30, run8 {spacing_k} K warmer{growth}"));
+        print(
+            &format!("k by run30, run8 {spacing_k} K warmer{growth}"),
+            found,
+        );
     }
     match all_met {
         true => Ok(()),
@@ -364,7 +286,9 @@ fn of_logs(folder: &Path, stage: &Path) -> Fallible<()> {
     for names in [&["cold", "early", "warm"][..], &["cold", "warm"], &["cold"]] {
         let logs = log::read(&paths(names), &stage, &ReadOptions::FIT)?.dataset;
         let mut ratio = Ratios::default();
-        ratio.0.push(ratios(&fitted(&logs, &stage)?, &day));
+        ratio
+            .0
+            .push(ratios(&fitted(&logs, &stage, ModelKind::Field)?, &day));
         ratio.print(&format!("{}; the day", names.join(", ")), None);
     }
     Ok(())
@@ -379,9 +303,6 @@ fn main() -> Fallible<()> {
     if let [folder, stage] = given.as_slice() {
         return of_logs(folder.as_ref(), stage.as_ref());
     }
-    let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
-    of_twins(
-        &stage,
-        given.first().map_or(Ok(20), |stages| stages.parse())?,
-    )
+    let stages = given.first().map_or(Ok(20), |stages| stages.parse())?;
+    of_twins(&shipped::stage(), stages)
 }

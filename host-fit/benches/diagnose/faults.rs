@@ -1,16 +1,16 @@
 //! Faults of channels in simulated logs: what is predicted for service, what is true there, and what the
 //! repaired calibration makes of it.
 
+use crate::common::{Twin, rms};
+use crate::service;
 use host_fit::diagnose;
 use host_fit::finding::Severity;
 use host_fit::fit::{FitSettings, ModelChoice, fit};
+use host_fit::input::dataset::Dataset;
 use host_fit::input::stage::Stage;
 use host_fit::judge::verdict::Verdict;
-use host_fit::judge::{Decoded, Zeros};
-use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
-use host_fit::simulate::recording::{Recording, Sample, record};
-use host_fit::simulate::sensors::SensorErrors;
+use host_fit::simulate::recording::Sample;
 use host_fit::solve::field::parameters::FieldParameters;
 use runtime::ParameterSet;
 
@@ -68,19 +68,9 @@ const FAULTS: [Fault; 27] = [
 ];
 
 /// Worst errors of a blob in service over the noise floor, which clean fits have.
-fn ratio(set: &ParameterSet, service: &Recording, stage: &Stage, floor: [f64; 3]) -> f64 {
-    let errors = in_service(set, service, stage);
+fn ratio(set: &ParameterSet, service: &Dataset, stage: &Stage, floor: [f64; 3]) -> f64 {
+    let errors = rms(set, service, stage);
     (0..3).map(|k| errors[k] / floor[k]).fold(0.0, f64::max)
-}
-
-pub fn in_service(set: &ParameterSet, service: &Recording, stage: &Stage) -> [f64; 3] {
-    let dataset = service.dataset(stage).expect("a plane");
-    let decoded = Decoded::new(set, &dataset);
-    decoded
-        .judge(&dataset, stage, Zeros::None)
-        .errors
-        .axes
-        .map(|axis| axis.rms)
 }
 
 /// Hits of each question of the table.
@@ -102,27 +92,21 @@ pub fn table(stage: &Stage, planned: &Trajectory, seeds: std::ops::Range<u64>) {
         "fault", "predicted", "true", "repaired", "true"
     );
     let mut score = Score::default();
-    let quiet = SensorErrors {
-        drift_per_root_s: [0.0; 3],
-        beam_m: 0.0,
-        ..SensorErrors::USUAL
-    };
     for seed in seeds {
         let run = match seed % 2 {
             0 => Protocol::Combined.run(stage.servo_period_s, seed),
             _ => Run::planned(planned.clone()),
         };
-        let assembly = Assembly::draw(stage, seed);
-        let clean = record(stage, &assembly, run, &SensorErrors::USUAL, seed).expect("clear");
-        let service = Protocol::Service.run(stage.servo_period_s, seed + 500);
-        let service = record(stage, &assembly, service, &quiet, seed + 500).expect("clear");
+        let twin = Twin::new(stage, seed);
+        let (clean, service) = (twin.record(run), service(&twin));
         let of_clean = clean.dataset(stage).expect("a plane");
         let settings = FitSettings {
             force: true,
             ..FitSettings::new(ModelChoice::Auto)
         };
         let fitted = fit(&of_clean, stage, &settings).expect("a fit");
-        let floor = in_service(&fitted.set, &service, stage);
+        let of_service = service.dataset(stage).expect("a plane");
+        let floor = rms(&fitted.set, &of_service, stage);
         for (name, stays, fault) in FAULTS {
             let rows = clean.rows() as f64;
             let mut faulty = clean.clone();
@@ -135,6 +119,7 @@ pub fn table(stage: &Stage, planned: &Trajectory, seeds: std::ops::Range<u64>) {
                     fault(sample, 1.0, 0, stage);
                 }
             }
+            let at_work = at_work.dataset(stage).expect("a plane");
             let dataset = faulty.dataset(stage).expect("a plane");
             let fitted = fit(&dataset, stage, &settings);
             let diagnosis = diagnose::of_log(&dataset, stage, fitted.as_ref());

@@ -3,22 +3,23 @@
 //!
 //! Prints a table and `RESULT key=value` lines.
 
+#[path = "../common/mod.rs"]
+mod common;
 mod faults;
 mod paper;
 mod signals;
 
+use common::Twin;
 use host_fit::diagnose;
 use host_fit::finding::{Code, Finding, Severity};
-use host_fit::fit::{FitSettings, ModelChoice, fit};
+use host_fit::fit::{FitError, FitSettings, ModelChoice, fit};
 use host_fit::input::dataset::Dataset;
-use host_fit::input::shipped::STAGE_TOML;
+use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
 use host_fit::plan::plan;
-use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
 use host_fit::simulate::recording::{Recording, Sample, record};
 use host_fit::simulate::sensors::SensorErrors;
-use std::path::Path;
 
 /// Clean stages: each makes one of the three kinds of log.
 const CLEAN: u64 = 200;
@@ -26,35 +27,33 @@ const CLEAN: u64 = 200;
 const FAULTY: u64 = 12;
 
 fn main() {
-    let stage = Stage::from_toml(STAGE_TOML, Path::new("stage.toml")).expect("a sound stage");
+    let stage = shipped::stage();
     let planned = plan(&stage, 20.0).expect("a plan").run;
     let planned = planned.trajectory(stage.servo_period_s);
     clean(&stage, &planned);
     println!("{:<36}{:>9}", "mistake", "named");
-    for (channels, change) in MISTAKES {
+    for (title, code, mistake) in MISTAKES {
         let found = (1..=FAULTY).map(|seed| {
             let mut recording = recording(&stage, &planned, 1000 + seed);
-            let samples = recording.movements.iter_mut().flatten();
-            samples.for_each(|sample| change.make(channels, sample));
+            recording.movements.iter_mut().flatten().for_each(mistake);
             let dataset = recording.dataset(&stage).expect("a plane");
             let mut found = diagnose::structure::structure(&dataset, &stage).into_iter();
-            found.any(|finding| finding.code == change.code(channels))
+            found.any(|finding| finding.code == code)
         });
         let named = found.filter(|is_named| *is_named).count();
-        println!(
-            "{:<36}{named:>6}/{FAULTY}",
-            format!("{channels:?} {change:?}")
-        );
+        println!("{title:<36}{named:>6}/{FAULTY}");
     }
     paper::table(&stage, 7000..7024);
     faults::table(&stage, &planned, 2000..2004);
     signals::table(&stage, &planned);
 }
 
-/// All findings of a log, as `fit` gives them.
-fn of_fit(dataset: &Dataset, stage: &Stage) -> Vec<Finding> {
+/// The findings of a log above a note, as `fit` gives them, and why there is no fit.
+fn grave(dataset: &Dataset, stage: &Stage) -> (Vec<Finding>, Option<FitError>) {
     let fitted = fit(dataset, stage, &FitSettings::new(ModelChoice::Auto));
-    diagnose::of_log(dataset, stage, fitted.as_ref()).findings
+    let mut found = diagnose::of_log(dataset, stage, fitted.as_ref()).findings;
+    found.retain(|finding| finding.severity > Severity::Note);
+    (found, fitted.err())
 }
 
 /// Findings above a note on clean stages.
@@ -62,23 +61,14 @@ fn clean(stage: &Stage, planned: &Trajectory) {
     let mut warned = 0;
     for seed in 1..=CLEAN {
         let recording = recording(stage, planned, seed);
-        let dataset = recording.dataset(stage).expect("a plane");
-        let settings = FitSettings::new(ModelChoice::Auto);
-        let fitted = fit(&dataset, stage, &settings);
-        let found = diagnose::of_log(&dataset, stage, fitted.as_ref()).findings;
-        let grave: Vec<_> = (found.iter())
-            .filter(|finding| finding.severity > Severity::Note)
-            .collect();
-        for finding in &grave {
-            println!(
-                "clean stage {seed}: {:?}: {}",
-                finding.code, finding.message
-            );
+        let (grave, error) = grave(&recording.dataset(stage).expect("a plane"), stage);
+        for Finding { code, message, .. } in &grave {
+            println!("clean stage {seed}: {code:?}: {message}");
         }
-        if let Err(error) = &fitted {
+        if let Some(error) = &error {
             println!("clean stage {seed}: {error}");
         }
-        warned += u64::from(!grave.is_empty() || fitted.is_err());
+        warned += u64::from(!grave.is_empty() || error.is_some());
     }
     println!("RESULT clean_stages={CLEAN}");
     println!("RESULT clean_stages_warned={warned}");
@@ -86,74 +76,45 @@ fn clean(stage: &Stage, planned: &Trajectory) {
 
 /// A log of the stage of a seed: by the paper's protocol, combined or planned.
 fn recording(stage: &Stage, planned: &Trajectory, seed: u64) -> Recording {
-    let run = match seed % 3 {
+    Twin::new(stage, seed).record(match seed % 3 {
         0 => Protocol::Paper.run(stage.servo_period_s, seed),
         1 => Protocol::Combined.run(stage.servo_period_s, seed),
         _ => Run::planned(planned.clone()),
+    })
+}
+
+/// Service of a stage with a reference that has no errors.
+fn service(twin: &Twin) -> Recording {
+    let quiet = SensorErrors {
+        drift_per_root_s: [0.0; 3],
+        beam_m: 0.0,
+        ..SensorErrors::USUAL
     };
-    let assembly = Assembly::draw(stage, seed);
-    let recording = record(stage, &assembly, run, &SensorErrors::USUAL, seed);
-    recording.expect("no probe hits its magnet")
+    let seed = twin.seed + 500;
+    let run = Protocol::Service.run(twin.stage.servo_period_s, seed);
+    record(twin.stage, &twin.assembly, run, &quiet, seed).expect("clear")
 }
 
-#[derive(Clone, Copy, Debug)]
-enum Channels {
-    Hall,
-    Beams,
-    Capacitive,
-}
+/// What a laboratory does to channels, and what names it.
+type Mistake = (&'static str, Code, fn(&mut Sample));
 
-/// What a laboratory does to channels, by their places.
-#[derive(Clone, Copy, Debug)]
-enum Change {
-    Exchanged(usize, usize),
-    Turned(&'static [usize]),
-}
-
-use Change::{Exchanged, Turned};
-use Channels::{Beams, Capacitive, Hall};
-
-const MISTAKES: [(Channels, Change); 17] = [
-    (Hall, Exchanged(0, 1)),
-    (Hall, Exchanged(0, 2)),
-    (Hall, Exchanged(1, 2)),
-    (Hall, Turned(&[0])),
-    (Hall, Turned(&[1])),
-    (Hall, Turned(&[2])),
-    (Hall, Turned(&[0, 1, 2])),
-    (Beams, Exchanged(1, 2)),
-    (Beams, Exchanged(0, 1)),
-    (Beams, Turned(&[0])),
-    (Beams, Turned(&[2])),
-    (Capacitive, Exchanged(0, 1)),
-    (Capacitive, Exchanged(0, 2)),
-    (Capacitive, Exchanged(1, 2)),
-    (Capacitive, Turned(&[0])),
-    (Capacitive, Turned(&[2])),
-    (Capacitive, Turned(&[0, 1, 2])),
+#[rustfmt::skip]
+const MISTAKES: [Mistake; 17] = [
+    ("Hall A and B exchanged", Code::ChannelsSwapped, |s| s.hall.swap(0, 1)),
+    ("Hall A and C exchanged", Code::ChannelsSwapped, |s| s.hall.swap(0, 2)),
+    ("Hall B and C exchanged", Code::ChannelsSwapped, |s| s.hall.swap(1, 2)),
+    ("Hall A turned", Code::ChannelInverted, |s| s.hall[0] *= -1),
+    ("Hall B turned", Code::ChannelInverted, |s| s.hall[1] *= -1),
+    ("Hall C turned", Code::ChannelInverted, |s| s.hall[2] *= -1),
+    ("Hall A, B, C turned", Code::ChannelInverted, |s| s.hall = s.hall.map(|code| -code)),
+    ("beams Y1 and Y2 exchanged", Code::BeamsSwapped, |s| s.beams_nm.swap(1, 2)),
+    ("beams X and Y1 exchanged", Code::BeamsSwapped, |s| s.beams_nm.swap(0, 1)),
+    ("beam X turned", Code::BeamInverted, |s| s.beams_nm[0] *= -1),
+    ("beam Y2 turned", Code::BeamInverted, |s| s.beams_nm[2] *= -1),
+    ("capacitive 1 and 2 exchanged", Code::CapacitiveSwapped, |s| s.capacitive.swap(0, 1)),
+    ("capacitive 1 and 3 exchanged", Code::CapacitiveSwapped, |s| s.capacitive.swap(0, 2)),
+    ("capacitive 2 and 3 exchanged", Code::CapacitiveSwapped, |s| s.capacitive.swap(1, 2)),
+    ("capacitive 1 turned", Code::CapacitiveInverted, |s| s.capacitive[0] *= -1),
+    ("capacitive 3 turned", Code::CapacitiveInverted, |s| s.capacitive[2] *= -1),
+    ("capacitive 1, 2, 3 turned", Code::CapacitiveInverted, |s| s.capacitive = s.capacitive.map(|code| -code)),
 ];
-
-impl Change {
-    fn make(self, channels: Channels, sample: &mut Sample) {
-        match (self, channels) {
-            (Exchanged(a, b), Hall) => sample.hall.swap(a, b),
-            (Exchanged(a, b), Beams) => sample.beams_nm.swap(a, b),
-            (Exchanged(a, b), Capacitive) => sample.capacitive.swap(a, b),
-            (Turned(of), Hall) => of.iter().for_each(|k| sample.hall[*k] *= -1),
-            (Turned(of), Beams) => of.iter().for_each(|k| sample.beams_nm[*k] *= -1),
-            (Turned(of), Capacitive) => of.iter().for_each(|k| sample.capacitive[*k] *= -1),
-        }
-    }
-
-    /// What names it.
-    const fn code(self, channels: Channels) -> Code {
-        match (self, channels) {
-            (Exchanged(..), Hall) => Code::ChannelsSwapped,
-            (Exchanged(..), Beams) => Code::BeamsSwapped,
-            (Exchanged(..), Capacitive) => Code::CapacitiveSwapped,
-            (Turned(_), Hall) => Code::ChannelInverted,
-            (Turned(_), Beams) => Code::BeamInverted,
-            (Turned(_), Capacitive) => Code::CapacitiveInverted,
-        }
-    }
-}

@@ -1,22 +1,16 @@
 //! Logs of the paper's protocol: whether the range of errors that is predicted of Model (31) holds the truth in
 //! service, and what the field model has there once the errors of the resets are declared.
 
-use crate::faults::in_service;
+use crate::common::{Twin, rms};
+use crate::service;
 use host_fit::diagnose;
 use host_fit::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::stage::Stage;
-use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::protocol::Protocol;
-use host_fit::simulate::recording::record;
 use host_fit::simulate::sensors::SensorErrors;
 
 /// Prints a line for each of the two.
 pub fn table(stage: &Stage, seeds: std::ops::Range<u64>) {
-    let quiet = SensorErrors {
-        drift_per_root_s: [0.0; 3],
-        beam_m: 0.0,
-        ..SensorErrors::USUAL
-    };
     let declared = Stage {
         reset_sd: Some(SensorErrors::USUAL.reset),
         ..stage.clone()
@@ -25,11 +19,9 @@ pub fn table(stage: &Stage, seeds: std::ops::Range<u64>) {
         let (mut inside, mut axes, mut field, mut fits) = (0, 0, 0, 0);
         let (mut predicted, mut true_worst) = (0.0, [0.0, 0.0f64]);
         for seed in seeds.clone() {
-            let assembly = Assembly::draw(stage, seed);
-            let run = Protocol::Paper.run(stage.servo_period_s, seed);
-            let log = record(stage, &assembly, run, &SensorErrors::USUAL, seed).expect("clear");
-            let service = Protocol::Service.run(stage.servo_period_s, seed + 500);
-            let service = record(stage, &assembly, service, &quiet, seed + 500).expect("clear");
+            let twin = Twin::new(stage, seed);
+            let log = twin.record(Protocol::Paper.run(stage.servo_period_s, seed));
+            let service = service(&twin).dataset(stage).expect("a plane");
             let dataset = log.dataset(stage).expect("a plane");
             let fitted = fit(&dataset, stage, &FitSettings::new(ModelChoice::Auto));
             let diagnosis = diagnose::of_log(&dataset, stage, fitted.as_ref());
@@ -37,7 +29,7 @@ pub fn table(stage: &Stage, seeds: std::ops::Range<u64>) {
                 println!("{what}: no fit of stage {seed}");
                 continue;
             };
-            let rms = in_service(&fitted.set, &service, stage);
+            let rms = rms(&fitted.set, &service, stage);
             let mut worst = 0.0f64;
             for (axis, rms) in rms.into_iter().enumerate() {
                 let [low, high] = expected.range[axis];

@@ -2,7 +2,7 @@
 //! with its channel, and how many other warnings come beside.
 
 use crate::{FAULTY, recording};
-use host_fit::finding::{Code, Severity};
+use host_fit::finding::Code;
 use host_fit::input::stage::Stage;
 use host_fit::simulate::protocol::Trajectory;
 use host_fit::simulate::recording::{Recording, Sample};
@@ -122,8 +122,7 @@ pub(crate) fn table(stage: &Stage, planned: &Trajectory) {
                 };
                 fault(&mut faulty, size);
                 let dataset = faulty.recording.dataset(stage).expect("a plane");
-                let mut found = crate::of_fit(&dataset, stage);
-                found.retain(|finding| finding.severity > Severity::Note);
+                let (found, _) = crate::grave(&dataset, stage);
                 let (right, wrong): (Vec<_>, Vec<_>) = (found.into_iter()).partition(|finding| {
                     finding.code == code && finding.channel.as_deref() == Some(CHANNELS[channel])
                 });

@@ -1,0 +1,148 @@
+//! What the benchmarks share: simulated stages, fits to their logs, and errors against the truth.
+#![allow(dead_code, reason = "each benchmark uses a part of it")]
+
+use host_fit::fit::{Fit, FitSettings, ModelChoice, fit};
+use host_fit::input::dataset::Dataset;
+use host_fit::input::log::{ReadOptions, read_bytes};
+use host_fit::input::stage::Stage;
+use host_fit::judge::{Decoded, Zeros};
+use host_fit::plan::run::Run as PlannedRun;
+use host_fit::problem::model::Model;
+use host_fit::simulate::assembly::Assembly;
+use host_fit::simulate::protocol::Run;
+use host_fit::simulate::recording::{Recording, record, record_in};
+use host_fit::simulate::sensors::SensorErrors;
+use host_fit::simulate::thermal::{Climate, Thermal};
+use runtime::{ModelKind, ParameterSet};
+use std::error::Error;
+use std::time::Instant;
+
+pub type Fallible<T> = Result<T, Box<dyn Error>>;
+/// X, Y, Rz.
+pub type Axes = [f64; 3];
+
+/// 95 % of normal numbers are within this many standard deviations.
+const WITHIN: f64 = 1.959_964;
+
+/// `run30` and `run8` of the given logs.
+pub const RUN_30: PlannedRun = run(30.0, [13.0, 17.0, 14.0, 19.0, 16.0, 11.0]);
+pub const RUN_8: PlannedRun = run(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5]);
+
+const fn run(seconds: f64, cycles: [f64; 6]) -> PlannedRun {
+    PlannedRun {
+        seconds,
+        taper_s: 0.5,
+        amplitudes: [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6],
+        cycles,
+    }
+}
+
+/// The rows of a log in memory.
+pub fn read(log: &[u8], stage: &Stage) -> Fallible<Dataset> {
+    Ok(read_bytes(log, "log".as_ref(), stage, &ReadOptions::default())?.dataset)
+}
+
+/// A simulated stage.
+pub struct Twin<'a> {
+    pub stage: &'a Stage,
+    pub seed: u64,
+    pub assembly: Assembly,
+    pub thermal: Thermal,
+}
+
+impl<'a> Twin<'a> {
+    pub fn new(stage: &'a Stage, seed: u64) -> Self {
+        Self {
+            stage,
+            seed,
+            assembly: Assembly::draw(stage, seed),
+            thermal: Thermal::draw(seed),
+        }
+    }
+
+    /// As it was assembled.
+    pub fn record(&self, run: Run) -> Recording {
+        let errors = &SensorErrors::USUAL;
+        let recording = record(self.stage, &self.assembly, run, errors, self.seed);
+        recording.expect("no probe hits its magnet")
+    }
+
+    /// Following the temperatures of a climate.
+    pub fn record_in(&self, run: Run, climate: Climate) -> Recording {
+        let (parts, errors) = ((&self.assembly, &self.thermal), &SensorErrors::USUAL);
+        let recording = record_in(self.stage, parts, climate, run, errors, self.seed);
+        recording.expect("no probe hits its magnet")
+    }
+}
+
+pub fn fitted(dataset: &Dataset, stage: &Stage, kind: ModelKind) -> Fallible<Fit> {
+    let model = ModelChoice::Named(Model::of(kind));
+    Ok(fit(dataset, stage, &FitSettings::new(model))?)
+}
+
+/// rms errors of the poses that a blob gives for a log whose reference is the truth, m, m, rad.
+pub fn rms(set: &ParameterSet, truth: &Dataset, stage: &Stage) -> Axes {
+    let judged = Decoded::new(set, truth).judge(truth, stage, Zeros::None);
+    judged.errors.axes.map(|axis| axis.rms)
+}
+
+/// Errors in terms of their standard errors, and how many of them lie within 95 % intervals.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Coverage {
+    within: u64,
+    pub of: u64,
+    squares: f64,
+    scaled: f64,
+}
+
+impl Coverage {
+    pub fn add(&mut self, error: f64, variance: f64) {
+        let scaled = error * error / variance;
+        self.within += u64::from(scaled <= WITHIN * WITHIN);
+        self.of += 1;
+        self.squares += error * error;
+        self.scaled += scaled;
+    }
+
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            within: self.within + other.within,
+            of: self.of + other.of,
+            squares: self.squares + other.squares,
+            scaled: self.scaled + other.scaled,
+        }
+    }
+
+    fn mean_root(&self, sum: f64) -> f64 {
+        (sum / self.of.max(1) as f64).sqrt()
+    }
+
+    pub fn rms(&self) -> f64 {
+        self.mean_root(self.squares)
+    }
+
+    /// Per cent within, and the rms error in terms of the standard error.
+    pub fn words(&self) -> String {
+        let percent = 100.0 * self.within as f64 / self.of.max(1) as f64;
+        format!("{percent:5.1} % ({:.2})", self.mean_root(self.scaled))
+    }
+}
+
+pub fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    let middle = numbers.len() / 2;
+    match numbers.len() % 2 {
+        0 => 0.5 * (numbers[middle - 1] + numbers[middle]),
+        _ => numbers[middle],
+    }
+}
+
+/// Median time of so many calls, s.
+pub fn median_s(calls: usize, mut call: impl FnMut()) -> f64 {
+    let time = |_| {
+        let started = Instant::now();
+        call();
+        started.elapsed().as_secs_f64()
+    };
+    median((0..calls).map(time).collect())
+}
