@@ -3,21 +3,19 @@
 //!
 //! ```
 //! use embedded_can::Frame;
-//! use hal_adapters::can::{BusFrame, Message, StampedFrame};
-//! use tests::fault::{Fault, FaultRates, Faulty};
+//! use hal_adapters::can::{BusFrame, Message};
+//! use tests::fault::{Channel, Fault};
 //!
 //! let frame = BusFrame::new(Message::Hall.id(), &[0; 8]).unwrap();
-//! let frames = [StampedFrame { time_us: 0, frame }; 100];
-//! let rates = FaultRates::NONE.with(Fault::Drop, 100_000); // one frame in ten
-//! let mut faulty = Faulty::new(frames.into_iter(), rates, 1);
-//! let got = faulty.by_ref().count() as u32;
-//! assert_eq!(got + faulty.injected(Fault::Drop), 100);
+//! let mut bus = Channel::new(&[(Fault::Drop, 100_000)], 1); // one frame in ten
+//! (0..100).for_each(|at_us| bus.send(at_us, frame));
+//! assert_eq!(bus.arrived(100).len() as u32 + bus.injected(Fault::Drop), 100);
 //! ```
 
 use crate::random::Random;
 use embedded_can::{Frame, Id, StandardId};
 use hal_adapters::can::table::TABLE;
-use hal_adapters::can::{BusFrame, Message, StampedFrame};
+use hal_adapters::can::{BusFrame, Message};
 
 /// What can happen to a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,9 +24,9 @@ pub enum Fault {
     Drop,
     /// It comes twice.
     Repeat,
-    /// It changes places with the next frame.
+    /// It comes after some of the next frames.
     Swap,
-    /// It comes after the next 2 to 9 frames.
+    /// It comes some ticks later.
     Delay,
     /// One to three of its bits are flipped.
     Flip,
@@ -55,45 +53,6 @@ impl Fault {
         Self::WrongLength,
         Self::WrongId,
     ];
-}
-
-/// How often each fault happens, per million frames; at most one happens to a frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct FaultRates {
-    per_million: [u32; 9],
-}
-
-impl FaultRates {
-    /// No faults.
-    pub const NONE: Self = Self {
-        per_million: [0; 9],
-    };
-
-    /// Every fault at the same rate.
-    pub const fn each(per_million: u32) -> Self {
-        Self {
-            per_million: [per_million; 9],
-        }
-    }
-
-    /// These rates, with a different one for `fault`.
-    #[must_use]
-    pub const fn with(mut self, fault: Fault, per_million: u32) -> Self {
-        self.per_million[fault as usize] = per_million;
-        self
-    }
-
-    fn draw(&self, random: u64) -> Option<Fault> {
-        let mut below = random % 1_000_000;
-        for (fault, rate) in Fault::ALL.into_iter().zip(self.per_million) {
-            let rate = u64::from(rate);
-            if below < rate {
-                return Some(fault);
-            }
-            below -= rate;
-        }
-        None
-    }
 }
 
 /// A mask of one to three bits, or of a burst of 2 to 8 bits with both ends set.
@@ -164,95 +123,70 @@ fn made(id: Id, data: &[u8]) -> BusFrame {
     BusFrame::new(id, data).expect("at most 8 bytes")
 }
 
-/// Injects faults into a stream of frames.
+/// A bus: frames under way, some lost, repeated, late or damaged.
 #[derive(Clone, Debug)]
-pub struct Faulty<I> {
-    frames: I,
-    rates: FaultRates,
+pub struct Channel {
     random: Random,
-    /// A frame that is held back, and the number of frames that still pass it.
-    held: Option<(u8, StampedFrame)>,
-    again: Option<StampedFrame>,
+    per_million: [u64; 9],
     injected: [u32; 9],
+    under_way: Vec<(u64, BusFrame)>,
 }
 
-impl<I: Iterator<Item = StampedFrame>> Faulty<I> {
-    /// Faults at these rates, drawn by `seed`.
-    pub const fn new(frames: I, rates: FaultRates, seed: u64) -> Self {
-        Self {
-            frames,
-            rates,
-            random: Random::new(seed),
-            held: None,
-            again: None,
-            injected: [0; 9],
+impl Channel {
+    /// Faults at these rates per million frames, drawn by `seed`; at most one happens to a frame. Of two
+    /// rates of a fault the last holds.
+    pub fn new(faults: &[(Fault, u64)], seed: u64) -> Self {
+        let mut per_million = [0; 9];
+        for (fault, rate) in faults {
+            per_million[*fault as usize] = *rate;
         }
+        Self {
+            random: Random::new(seed),
+            per_million,
+            injected: [0; 9],
+            under_way: Vec::new(),
+        }
+    }
+
+    /// Takes a frame at a time, us.
+    pub fn send(&mut self, now_us: u64, frame: BusFrame) {
+        let mut below = self.random.below(1_000_000);
+        let fault = Fault::ALL.into_iter().zip(self.per_million);
+        let fault = fault.into_iter().find_map(|(fault, rate)| {
+            let happens = below < rate;
+            below = below.saturating_sub(rate);
+            happens.then_some(fault)
+        });
+        let delay_us = self.random.below(9) * 1_000;
+        let due_us = match fault {
+            Some(Fault::Drop) => u64::MAX,
+            Some(Fault::Repeat) => {
+                self.under_way.push((now_us, frame));
+                now_us + 500
+            }
+            Some(Fault::Swap) => now_us + 1_500,
+            Some(Fault::Delay) => now_us + 2_000 + delay_us,
+            _ => now_us,
+        };
+        let mut sent = frame;
+        if let Some(fault) = fault {
+            self.injected[fault as usize] += 1;
+            sent = damaged(&frame, fault, &mut self.random);
+        }
+        if due_us < u64::MAX {
+            self.under_way.push((due_us, sent));
+        }
+    }
+
+    /// The frames that have arrived by a time, us.
+    pub fn arrived(&mut self, now_us: u64) -> Vec<BusFrame> {
+        let is_due = |(due_us, _): &mut (u64, BusFrame)| *due_us <= now_us;
+        let due = self.under_way.extract_if(.., is_due);
+        due.map(|(_, frame)| frame).collect()
     }
 
     /// How often a fault was injected.
     pub const fn injected(&self, fault: Fault) -> u32 {
         self.injected[fault as usize]
-    }
-
-    /// A frame that is due from an earlier fault.
-    fn due(&mut self) -> Option<StampedFrame> {
-        let held = &mut self.held;
-        let passed = || held.take_if(|(left, _)| *left == 0).map(|(_, frame)| frame);
-        self.again.take().or_else(passed)
-    }
-
-    fn inject(&mut self, fault: Fault, stamped: StampedFrame) -> Option<StampedFrame> {
-        // One frame can be held at a time; a second one passes.
-        if matches!(fault, Fault::Swap | Fault::Delay) && self.held.is_some() {
-            return Some(stamped);
-        }
-        let count = &mut self.injected[fault as usize];
-        *count = count.saturating_add(1);
-        match fault {
-            Fault::Drop => None,
-            Fault::Repeat => {
-                self.again = Some(stamped);
-                Some(stamped)
-            }
-            Fault::Swap => {
-                self.held = Some((1, stamped));
-                None
-            }
-            Fault::Delay => {
-                let after = 2 + self.random.below(8) as u8;
-                self.held = Some((after, stamped));
-                None
-            }
-            _ => Some(StampedFrame {
-                frame: damaged(&stamped.frame, fault, &mut self.random),
-                ..stamped
-            }),
-        }
-    }
-}
-
-impl<I: Iterator<Item = StampedFrame>> Iterator for Faulty<I> {
-    type Item = StampedFrame;
-
-    fn next(&mut self) -> Option<StampedFrame> {
-        if let Some(frame) = self.due() {
-            return Some(frame);
-        }
-        loop {
-            let Some(frame) = self.frames.next() else {
-                // No frame is left that could overtake the one held back.
-                return self.held.take().map(|(_, frame)| frame);
-            };
-            let frame = match self.rates.draw(self.random.bits()) {
-                Some(fault) => self.inject(fault, frame),
-                None => Some(frame),
-            };
-            if frame.is_some() {
-                if let Some((left, _)) = &mut self.held {
-                    *left = left.saturating_sub(1);
-                }
-                return frame;
-            }
-        }
     }
 }

@@ -13,6 +13,8 @@
 //! | [`trace`] | executed instructions, counted from an emulator's log |
 
 use firmware::store::{FlashFault, SLOT_BYTES};
+use std::error::Error;
+use std::process::ExitCode;
 
 pub mod compare;
 pub mod fault;
@@ -24,3 +26,15 @@ pub mod motion;
 pub mod node;
 pub mod random;
 pub mod trace;
+
+/// How the program `name` ends: well, with a failed check, or with an error that is printed.
+pub fn exit(name: &str, outcome: Result<bool, Box<dyn Error>>) -> ExitCode {
+    match outcome {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("{name}: {error}");
+            ExitCode::from(3)
+        }
+    }
+}

@@ -1,9 +1,10 @@
 //! Damaged frames of the bus never become a pose that is called valid: a million,
 //! through coder, damage, receiver and decoder.
 
-use hal_adapters::can::{BusFrame, Layout, SensorReceiver, StampedFrame, Timing, sensor};
-use runtime::{AnyDecoder, Decode, ParameterSet, PlanarPose, RawFrame, Reading, Status};
-use tests::fault::{Fault, FaultRates, Faulty};
+use hal_adapters::can::{BusFrame, Layout, SensorReceiver, Timing, sensor};
+use runtime::{AnyDecoder, Decode, ParameterSet, PlanarPose, RawFrame, Status};
+use tests::fault::{Channel, Fault};
+use tests::job::answer;
 
 fn decoder() -> AnyDecoder {
     let blob = include_bytes!("../../runtime/examples/stage.bin");
@@ -27,103 +28,50 @@ fn number(low: i32, high: i32) -> u32 {
     part(low) | part(high) << 12
 }
 
-/// Sends ticks over a bus with faults.
-struct Ticks {
-    next: u32,
-    end: u32,
-    left: Vec<BusFrame>,
-}
-
-impl Iterator for Ticks {
-    type Item = StampedFrame;
-
-    fn next(&mut self) -> Option<StampedFrame> {
-        if self.left.is_empty() {
-            if self.next == self.end {
-                return None;
-            }
-            let frames = sensor::frames(Layout::Bits16, &tick(self.next));
-            self.left = frames.map(BusFrame::from).collect();
-            self.left.reverse();
-            self.next += 1;
-        }
-        let time_us = u64::from(self.next) * 2_000;
-        let frame = self.left.pop()?;
-        Some(StampedFrame { time_us, frame })
-    }
-}
-
-fn bits(reading: &Reading) -> [u32; 7] {
-    let (p, v) = (&reading.pose.planar, &reading.pose.vertical);
-    [
-        p.x_m.to_bits(),
-        p.y_m.to_bits(),
-        p.rz_rad.to_bits(),
-        v.z_m.to_bits(),
-        v.rx_rad.to_bits(),
-        v.ry_rad.to_bits(),
-        reading.status.bits(),
-    ]
-}
-
-struct Outcome {
-    frames: u32,
-    damaged: u32,
-    valid_poses: u32,
-    wrong_poses: u32,
-}
-
-/// Runs `ticks` ticks; counts poses that are called valid, and those among them that are not
-/// the pose of one tick that was sent.
-fn run(ticks: u32, rates: FaultRates, damaging: &[Fault], seed: u64) -> Outcome {
-    let decoder = decoder();
-    let source = Ticks {
-        next: 0,
-        end: ticks,
-        left: Vec::new(),
-    };
-    let mut source = Faulty::new(source, rates, seed);
-    let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
-    let mut out = Outcome {
-        frames: 0,
-        damaged: 0,
-        valid_poses: 0,
-        wrong_poses: 0,
-    };
-    for stamped in source.by_ref() {
-        out.frames += 1;
-        let now_us = stamped.time_us as u32;
-        let Some(got) = receiver.take(&stamped.frame, now_us).tick else {
-            continue;
-        };
-        let reading = decoder.decode(&got, &PlanarPose::ZERO);
-        if reading.status.any(Status::PLANAR_INVALID) {
-            continue;
-        }
-        out.valid_poses += 1;
-        let sent = tick(number(got.hall[0], got.hall[1]));
-        let same = (sent.hall, sent.capacitive) == (got.hall, got.capacitive);
-        let want = decoder.decode(&sent, &PlanarPose::ZERO);
-        out.wrong_poses += u32::from(!same || bits(&want) != bits(&reading));
-    }
-    out.damaged = damaging.iter().map(|f| source.injected(*f)).sum();
-    out
-}
-
 #[test]
 fn no_pose_is_valid_from_three_flipped_bits_or_a_burst_of_eight() {
-    let rates = FaultRates::each(10_000)
-        .with(Fault::Flip, 200_000)
-        .with(Fault::Burst, 200_000)
-        .with(Fault::Noise, 0);
-    let out = run(600_000, rates, &[Fault::Flip, Fault::Burst], 1);
+    let each = Fault::ALL.map(|fault| (fault, 10_000));
+    let more = [
+        (Fault::Flip, 200_000),
+        (Fault::Burst, 200_000),
+        (Fault::Noise, 0),
+    ];
+    let mut bus = Channel::new(&[&each[..], &more].concat(), 1);
+    let mut receiver = SensorReceiver::new(Layout::Bits16, Timing::default());
+    let decoder = decoder();
+    let (mut frames, mut valid_poses, mut wrong_poses) = (0, 0, 0);
+    let sent = (0..600_000).flat_map(|n| {
+        let coded = sensor::frames(Layout::Bits16, &tick(n));
+        (0..)
+            .zip(coded)
+            .map(move |(k, coded)| (2_000 * u64::from(n) + 135 * k, coded))
+    });
+    for (now_us, coded) in sent {
+        bus.send(now_us, BusFrame::from(coded));
+        for frame in bus.arrived(now_us) {
+            frames += 1;
+            let Some(got) = receiver.take(&frame, now_us as u32).tick else {
+                continue;
+            };
+            let reading = decoder.decode(&got, &PlanarPose::ZERO);
+            if reading.status.any(Status::PLANAR_INVALID) {
+                continue;
+            }
+            valid_poses += 1;
+            // It must be the pose of one tick that was sent.
+            let sent = tick(number(got.hall[0], got.hall[1]));
+            let same = (sent.hall, sent.capacitive) == (got.hall, got.capacitive);
+            let want = decoder.decode(&sent, &PlanarPose::ZERO);
+            wrong_poses += u32::from(!same || answer(&want) != answer(&reading));
+        }
+    }
+    let damaged = bus.injected(Fault::Flip) + bus.injected(Fault::Burst);
     println!(
-        "RESULT light_damage_frames={} damaged={} valid_poses={} wrong_poses={} expected=0",
-        out.frames, out.damaged, out.valid_poses, out.wrong_poses
+        "RESULT light_damage_frames={frames} damaged={damaged} valid_poses={valid_poses} wrong_poses={wrong_poses} expected=0"
     );
-    assert!(out.frames >= 1_000_000 && out.damaged >= 400_000);
+    assert!(frames >= 1_000_000 && damaged >= 400_000);
     // Nearly half of the frames have a fault, so a quarter of the ticks is whole: the check
     // above means something only if many poses are valid.
-    assert!(out.valid_poses >= 100_000);
-    assert_eq!(out.wrong_poses, 0);
+    assert!(valid_poses >= 100_000);
+    assert_eq!(wrong_poses, 0);
 }

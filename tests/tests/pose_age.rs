@@ -2,15 +2,13 @@
 //! figures of the runtime's README.
 
 use host_fit::fit::{FitSettings, ModelChoice, fit};
-use host_fit::input::shipped::STAGE_TOML;
-use host_fit::input::stage::Stage;
+use host_fit::input::shipped;
 use host_fit::problem::model::Model;
 use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::protocol::Protocol;
 use host_fit::simulate::recording::{Recording, Sample, record};
 use host_fit::simulate::sensors::SensorErrors;
 use runtime::{ModelKind, OnInvalid, ParameterSet, PoseTracker, Predictor, RawFrame};
-use std::path::Path;
 
 /// The simulated stage, with magnets as designed.
 const SEED: u64 = 2;
@@ -75,7 +73,7 @@ fn add_squares(
 
 #[test]
 fn an_age_costs_what_the_readme_says_and_a_prediction_takes_it_back() {
-    let stage = Stage::from_toml(STAGE_TOML, Path::new("stage.toml")).expect("shipped");
+    let stage = shipped::stage();
     let assembly = Assembly::draw(&stage, SEED);
     let recorded = |protocol: Protocol| -> Recording {
         let run = protocol.run(stage.servo_period_s, SEED);

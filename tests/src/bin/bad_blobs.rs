@@ -5,25 +5,18 @@ use runtime::model::Probes;
 use runtime::parameters::Text;
 use runtime::{BlobError, ParameterSet};
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
-    let [good, folder] = arguments.as_slice() else {
-        eprintln!("use: bad_blobs params.bin FOLDER");
-        return ExitCode::from(2);
-    };
-    match write_all(good, folder) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("bad_blobs: {error}");
-            ExitCode::from(3)
-        }
-    }
+    tests::exit("bad_blobs", write_all(&arguments))
 }
 
-fn write_all(good: &Path, folder: &Path) -> Result<(), Box<dyn Error>> {
+fn write_all(arguments: &[PathBuf]) -> Result<bool, Box<dyn Error>> {
+    let [good, folder] = arguments else {
+        return Err("use: bad_blobs params.bin FOLDER".into());
+    };
     let blob = std::fs::read(good)?;
     let set = ParameterSet::from_bytes(&blob)?;
     let write = |name: &str, bytes: &[u8]| std::fs::write(folder.join(name), bytes);
@@ -65,5 +58,5 @@ fn write_all(good: &Path, folder: &Path) -> Result<(), Box<dyn Error>> {
         "singular.bin",
         &changed(&|set| set.plane[1] = set.plane[0])?,
     )?;
-    Ok(())
+    Ok(true)
 }

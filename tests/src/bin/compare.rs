@@ -1,6 +1,6 @@
 //! Compares the words of a target with those of the host. See `compare --help`.
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
@@ -29,31 +29,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Write a job file.
-    Make {
-        /// The parameter blob of a fit by Model (31); the field model's is made of it.
-        params: PathBuf,
-        /// The log; the one that ships with the program if not given.
-        #[arg(long)]
-        log: Option<PathBuf>,
-        /// The stage that the log belongs to.
-        #[arg(long, requires = "log")]
-        stage: Option<PathBuf>,
-        /// Where to write the job.
-        #[arg(long)]
-        out: PathBuf,
-        /// Ticks of uniform random codes, with Model (31) and again with the field model.
-        #[arg(long, default_value_t = 100_000)]
-        codes: usize,
-        /// Ticks with random parameters, with either model; 0 leaves out the predicted poses, too.
-        #[arg(long, default_value_t = 32_000)]
-        parameters: usize,
-        /// Ticks for which what is invalid is held.
-        #[arg(long, default_value_t = 3)]
-        hold: u16,
-        /// Seed of everything random.
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
-    },
+    Make(Make),
     /// Do a job on this machine and compare the target's words.
     Check {
         /// The job file.
@@ -63,36 +39,39 @@ enum Command {
     },
 }
 
+#[derive(Args)]
+struct Make {
+    /// The parameter blob of a fit by Model (31); the field model's is made of it.
+    params: PathBuf,
+    /// The log; the one that ships with the program if not given.
+    #[arg(long)]
+    log: Option<PathBuf>,
+    /// The stage that the log belongs to.
+    #[arg(long, requires = "log")]
+    stage: Option<PathBuf>,
+    /// Where to write the job.
+    #[arg(long)]
+    out: PathBuf,
+    /// Ticks of uniform random codes, with Model (31) and again with the field model.
+    #[arg(long, default_value_t = 100_000)]
+    codes: usize,
+    /// Ticks with random parameters, with either model; 0 leaves out the predicted poses, too.
+    #[arg(long, default_value_t = 32_000)]
+    parameters: usize,
+    /// Ticks for which what is invalid is held.
+    #[arg(long, default_value_t = 3)]
+    hold: u16,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
-        Command::Make {
-            params,
-            log,
-            stage,
-            out,
-            codes,
-            parameters,
-            hold,
-            seed,
-        } => make(
-            &params,
-            log.as_deref().zip(stage.as_deref()),
-            codes,
-            parameters,
-            hold,
-            seed,
-        )
-        .and_then(|bytes| Ok(std::fs::write(&out, bytes).map(|()| true)?)),
+        Command::Make(args) => make(&args),
         Command::Check { job, words } => check(&job, &words),
     };
-    match done {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("compare: {error}");
-            ExitCode::from(3)
-        }
-    }
+    tests::exit("compare", done)
 }
 
 fn read_blob(path: &Path) -> Result<ParameterSet, Box<dyn Error>> {
@@ -101,27 +80,21 @@ fn read_blob(path: &Path) -> Result<ParameterSet, Box<dyn Error>> {
     Ok(ParameterSet::from_bytes(&bytes).map_err(|error| named(&error))?)
 }
 
-fn make(
-    params: &Path,
-    log: Option<(&Path, &Path)>,
-    codes: usize,
-    parameters: usize,
-    hold: u16,
-    seed: u64,
-) -> Result<Vec<u8>, Box<dyn Error>> {
-    let set = read_blob(params)?;
-    let dataset = match log {
+fn make(args: &Make) -> Result<bool, Box<dyn Error>> {
+    let (codes, parameters, hold) = (args.codes, args.parameters, args.hold);
+    let set = read_blob(&args.params)?;
+    let dataset = match args.log.as_deref().zip(args.stage.as_deref()) {
         Some((log, stage)) => {
             log::read(&[log], &Stage::from_file(stage)?, &ReadOptions::DECODE)?.dataset
         }
         None => {
-            let stage = Stage::from_toml(shipped::STAGE_TOML, Path::new("stage.toml"))?;
+            let stage = shipped::stage();
             let name = Path::new("paper.csv.gz");
             log::read_bytes(shipped::LOG_GZ, name, &stage, &ReadOptions::DECODE)?.dataset
         }
     };
     let rows = dataset.rows.len();
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut rng = ChaCha8Rng::seed_from_u64(args.seed);
     let field_set = motion::with_field_terms(&mut rng, &set);
     let mut sections = Vec::new();
     for set in [&set, &field_set] {
@@ -162,7 +135,8 @@ fn make(
     let ticks: usize = sections.iter().map(|s: &Section| s.frames.len()).sum();
     println!("RESULT job_ticks={ticks}");
     println!("RESULT job_log_rows={rows}");
-    Ok(to_bytes(&sections))
+    std::fs::write(&args.out, to_bytes(&sections))?;
+    Ok(true)
 }
 
 /// Ticks with random parameters: sets of odd words, and any codes.

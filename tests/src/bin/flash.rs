@@ -25,14 +25,7 @@ struct Cli {
 const UNWANTED: [&str; 4] = ["panicking", "__rust_alloc", "__rg_alloc", "core3fmt5float"];
 
 fn main() -> ExitCode {
-    match run(&Cli::parse()) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("flash: {error}");
-            ExitCode::from(3)
-        }
-    }
+    tests::exit("flash", run(&Cli::parse()))
 }
 
 fn run(cli: &Cli) -> Result<bool, Box<dyn Error>> {

@@ -23,35 +23,19 @@ const SEND_DEADLINE: Duration = Duration::from_millis(20);
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let (interface, params, serial, key) = match &arguments[..] {
-        [interface, params, serial] => (interface, params, serial, None),
-        [interface, params, serial, key] => match u128::from_str_radix(key, 16) {
-            Ok(key) => (interface, params, serial, Some(key.to_be_bytes())),
-            Err(error) => {
-                eprintln!("update_node: {key}: {error}");
-                return ExitCode::from(2);
-            }
-        },
-        _ => {
-            eprintln!("use: update_node INTERFACE params.bin SERIAL [KEY]");
-            return ExitCode::from(2);
-        }
-    };
-    match run(interface, params, serial.clone().leak(), key) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("update_node: {error}");
-            ExitCode::from(3)
-        }
-    }
+    tests::exit("update_node", run(&arguments))
 }
 
-fn run(
-    interface: &str,
-    params: &str,
-    serial: &'static str,
-    key: Option<[u8; 16]>,
-) -> Result<(), Box<dyn Error>> {
+fn run(arguments: &[String]) -> Result<bool, Box<dyn Error>> {
+    let (interface, params, serial, key) = match arguments {
+        [interface, params, serial] => (interface, params, serial, None),
+        [interface, params, serial, key] => {
+            let key = u128::from_str_radix(key, 16)?.to_be_bytes();
+            (interface, params, serial, Some(key))
+        }
+        _ => return Err("use: update_node INTERFACE params.bin SERIAL [KEY]".into()),
+    };
+    let serial: &'static str = serial.clone().leak();
     let mut flash = FlashModel::erased();
     flash.load(0, &std::fs::read(params)?);
     let mut node = Node::new(Some(serial), key, flash, u64::from(std::process::id()));

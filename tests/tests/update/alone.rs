@@ -1,26 +1,23 @@
 //! One host: how long it takes, a bad bus, resets, what is reported and refused.
 
 use super::world::{World, flashed};
-use super::{KEY, NEW, OLD, SERIAL, back, plan};
+use super::{KEY, NEW, OLD, SERIAL, activating, back, changed, like, of, plan, undeclared};
 use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::status::NodeState;
 use hal_adapters::can::update::{Kept, UpdateRequest, crc_of};
 use host_fit::bus::update::{Plan, UpdateError, Updated, Wanted, on};
 use runtime::ParameterSet;
-use runtime::blob::MAX_BYTES;
 use tests::fault::Fault;
 use tests::flash_model::FlashModel;
 use tests::node::Node;
 
 /// The largest blob that a fit writes: the field model, with texts of full length.
 fn largest() -> Vec<u8> {
-    let mut set = ParameterSet::from_bytes(NEW).expect("a sound example");
-    set.serial = "S".repeat(32).as_str().try_into().expect("32 bytes");
-    set.created = "2026-11-22T10:00:00.000000+00:00"
-        .try_into()
-        .expect("32 bytes");
-    let mut buffer = [0; MAX_BYTES];
-    set.to_bytes(&mut buffer).expect("it fits").to_vec()
+    changed(NEW, |set| {
+        set.serial = "S".repeat(32).as_str().try_into().expect("32 bytes");
+        let created = "2026-11-22T10:00:00.000000+00:00";
+        set.created = created.try_into().expect("32 bytes");
+    })
 }
 
 #[test]
@@ -31,14 +28,8 @@ fn the_largest_blob_takes_less_than_one_second_and_a_half_on_a_loaded_bus() {
         let mut world = World::new(key, &[], 1);
         world.node = Node::new(Some(serial), key, flashed(&blob), 1);
         world.other_asks(0, Request::Record { on: true }, 3);
-        let mut newer = ParameterSet::from_bytes(&blob).expect("sound");
-        newer.fit.rows += 1;
-        let mut buffer = [0; MAX_BYTES];
-        let newer = newer.to_bytes(&mut buffer).expect("it fits");
-        let job = Plan {
-            serial: Some(serial.to_owned()),
-            ..plan(newer)
-        };
+        let newer = like(&blob);
+        let job = of(Some(serial), plan(&newer));
         let updated = world.update(&job).expect("it is taken");
         assert_eq!(updated.sequence, Some(1));
         assert_eq!(updated.repeated, (0, 0));
@@ -129,11 +120,7 @@ fn a_reset_at_any_moment_leaves_the_old_or_the_new_and_says_which() {
 #[test]
 fn activated_parameters_run_are_reported_and_read_back() {
     let mut world = World::new(Some(KEY), &[(Fault::Drop, 20_000)], 8);
-    let updated = world.update(&Plan {
-        activates: true,
-        ..plan(NEW)
-    });
-    let updated = updated.expect("it is taken");
+    let updated = world.update(&activating(plan(NEW))).expect("it is taken");
     assert!(updated.is_active && world.node.resets() == 1);
     let before = updated.before.running.expect("it ran");
     assert!(before.are(OLD) && before.sequence == 0);
@@ -151,18 +138,12 @@ fn activated_parameters_run_are_reported_and_read_back() {
     assert_eq!(running.created, set.created.as_str());
     assert_eq!(identity.program_version, [1, 2, 3]);
     // The same again is not sent, and the record before comes back on demand.
-    let again = Plan {
-        key: None,
-        declares_servo_off: false,
-        ..plan(NEW)
-    };
+    let mut again = undeclared(plan(NEW));
+    again.key = None;
     let again = world.update(&again).expect("nothing to do");
     assert_eq!((again.sequence, again.is_active), (None, true));
-    let back = world.update(&Plan {
-        activates: true,
-        ..back()
-    });
-    assert_eq!(back.expect("there is one").sequence, Some(2));
+    let back = world.update(&activating(back())).expect("there is one");
+    assert_eq!(back.sequence, Some(2));
     assert_eq!(world.newest(), OLD);
     let running = world.identify().running;
     assert!(running.is_some_and(|running| running.are(OLD) && running.sequence == 2));
@@ -190,11 +171,7 @@ fn what_waits_for_a_reset_is_not_sent_again_and_activated_alone() {
         of(identity.previous),
         Some((0, crc_of(OLD).expect("a blob")))
     );
-    let on = Plan {
-        declares_servo_off: false,
-        ..alone.clone()
-    };
-    let refused = world.update(&on);
+    let refused = world.update(&undeclared(alone.clone()));
     assert_eq!(refused, Err(UpdateError::NotActivated { sequence: 1 }));
     // The answer is lost: the node has restarted, and is asked what it runs.
     const ACTIVATE: u8 = UpdateRequest::Activate.number();
@@ -206,40 +183,18 @@ fn what_waits_for_a_reset_is_not_sent_again_and_activated_alone() {
 
 #[test]
 fn what_is_refused_is_refused_by_its_reason_and_nothing_is_written() {
-    let of_another = ParameterSet {
-        serial: "HS-0008".try_into().expect("short"),
-        ..ParameterSet::from_bytes(NEW).expect("sound")
-    };
-    let mut buffer = [0; MAX_BYTES];
-    let of_another = of_another.to_bytes(&mut buffer).expect("it fits");
-    let on = Plan {
-        declares_servo_off: false,
-        ..plan(NEW)
-    };
-    let no_key = Plan {
-        key: None,
-        ..plan(NEW)
-    };
-    let wrong_key = Plan {
-        key: Some([0; 16]),
-        ..plan(NEW)
-    };
-    let asked = Plan {
-        serial: Some("HS-0008".to_owned()),
-        ..plan(NEW)
-    };
-    let unnamed = Plan {
-        serial: None,
-        ..plan(of_another)
-    };
+    let serial = "HS-0008";
+    let of_another = changed(NEW, |set| set.serial = serial.try_into().expect("short"));
+    let with_key = |key| Plan { key, ..plan(NEW) };
     let (expected, found) = ("HS-0008".to_owned(), SERIAL.to_owned());
     let other_stage = UpdateError::OtherStage { expected, found };
+    let on = UpdateError::ServoOn { declared: false };
     for (plan, want) in [
-        (on, UpdateError::ServoOn { declared: false }),
-        (no_key, UpdateError::KeyNeeded),
-        (wrong_key, UpdateError::NotAuthorised),
-        (asked, other_stage.clone()),
-        (unnamed, other_stage),
+        (undeclared(plan(NEW)), on),
+        (with_key(None), UpdateError::KeyNeeded),
+        (with_key(Some([0; 16])), UpdateError::NotAuthorised),
+        (of(Some(serial), plan(NEW)), other_stage.clone()),
+        (of(None, plan(&of_another)), other_stage),
         (back(), UpdateError::NoPrevious),
     ] {
         let mut world = World::new(Some(KEY), &[], 3);
@@ -269,12 +224,8 @@ fn an_interrupted_update_closes_its_transfer() {
         assert_eq!(world.node.records(), 0);
         world.interrupt_at = None;
         // Another may begin at once, and the servo is on again.
-        let on = Plan {
-            declares_servo_off: false,
-            ..plan(NEW)
-        };
         let refused = Err(UpdateError::ServoOn { declared: false });
-        assert_eq!(world.update(&on), refused);
+        assert_eq!(world.update(&undeclared(plan(NEW))), refused);
         assert!(world.update(&plan(NEW)).is_ok());
     }
     // What is being stored is stored.
@@ -289,12 +240,8 @@ fn an_interrupted_update_closes_its_transfer() {
 #[test]
 fn parameters_that_fault_twice_stop_the_node_until_it_goes_back() {
     let mut world = World::new(Some(KEY), &[], 6);
-    let activating = Plan {
-        activates: true,
-        ..plan(NEW)
-    };
     world.faults_after_activation_us = vec![1_000_000, 2_000_000];
-    let result = world.update(&activating);
+    let result = world.update(&activating(plan(NEW)));
     assert_eq!(result, Err(UpdateError::NotActive { sequence: 1 }));
     for _ in 0..3 {
         assert_eq!(world.node.state(), (NodeState::Stopped, 1));
@@ -303,10 +250,7 @@ fn parameters_that_fault_twice_stop_the_node_until_it_goes_back() {
         world.node.reset();
         (0..2_000).for_each(|_| drop(world.slot()));
     }
-    let going_back = Plan {
-        activates: true,
-        ..back()
-    };
-    assert!(world.update(&going_back).expect("it is there").is_active);
+    let back = world.update(&activating(back())).expect("it is there");
+    assert!(back.is_active);
     assert_eq!(world.node.running(), crc_of(OLD));
 }

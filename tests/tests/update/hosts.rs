@@ -2,21 +2,14 @@
 //! or plays a recording.
 
 use super::world::{SLOT_US, World, command};
-use super::{KEY, NEW, OLD, back, like, plan};
+use super::{KEY, NEW, OLD, activating, back, like, plan, undeclared};
 use hal_adapters::can::command::{Command, Content, Mailbox, Outcome, Request};
 use hal_adapters::can::update::UpdateRequest;
-use host_fit::bus::update::{Plan, UpdateError, Zero, on};
+use host_fit::bus::update::{UpdateError, Zero, on};
 use tests::fault::Fault;
 
 const ACTIVATE: u8 = UpdateRequest::Activate.number();
 const COMMIT: u8 = UpdateRequest::Commit { sequence: 0 }.number();
-
-fn activating(plan: Plan) -> Plan {
-    Plan {
-        activates: true,
-        ..plan
-    }
-}
 
 /// Another transfer.
 const BEGIN: Request = Request::Update(UpdateRequest::begin(500, 0));
@@ -125,10 +118,7 @@ fn a_lost_answer_to_a_commit_is_settled_by_asking_what_the_node_keeps() {
 
 #[test]
 fn what_is_stored_and_not_activated_is_reported_as_stored() {
-    let on_the_word_of_another = Plan {
-        declares_servo_off: false,
-        ..activating(plan(NEW))
-    };
+    let on_the_word_of_another = undeclared(activating(plan(NEW)));
     let off = |seconds| Request::ServoOff { seconds };
     let mut world = World::new(None, &[], 6);
     world.other_asks(0, off(255), 3);
@@ -155,27 +145,21 @@ fn a_stage_at_rest_is_zeroed_by_its_key_with_the_servo_off_on_a_bad_bus_too() {
         clears: false,
     };
     let rezero = |world: &mut World, zero: &Zero| on::rezero(&mut world.talk(), zero);
+    let mut no_key = zero.clone();
+    no_key.key = None;
+    let mut undeclared = zero.clone();
+    undeclared.declares_servo_off = false;
+    let mut clear = zero.clone();
+    clear.clears = true;
     for seed in 0..10 {
         let mut world = World::new(Some(KEY), &[(Fault::Drop, 100_000)], seed);
-        let no_key = Zero {
-            key: None,
-            ..zero.clone()
-        };
         assert_eq!(rezero(&mut world, &no_key), Err(UpdateError::NotAuthorised));
-        let servo_on = Zero {
-            declares_servo_off: false,
-            ..zero.clone()
-        };
         let refused = Err(UpdateError::ServoOn { declared: false });
-        assert_eq!(rezero(&mut world, &servo_on), refused);
-        assert_eq!(rezero(&mut world, &zero), Ok(()), "{seed}");
-        assert!(world.node.is_zeroed(), "{seed}");
-        let clear = Zero {
-            clears: true,
-            ..zero.clone()
-        };
-        assert_eq!(rezero(&mut world, &clear), Ok(()), "{seed}");
-        assert!(!world.node.is_zeroed(), "{seed}");
+        assert_eq!(rezero(&mut world, &undeclared), refused);
+        for (wanted, is_zeroed) in [(&zero, true), (&clear, false)] {
+            assert_eq!(rezero(&mut world, wanted), Ok(()), "{seed}");
+            assert_eq!(world.node.is_zeroed(), is_zeroed, "{seed}");
+        }
     }
 }
 

@@ -32,12 +32,36 @@ fn back() -> Plan {
     }
 }
 
+fn activating(plan: Plan) -> Plan {
+    Plan {
+        activates: true,
+        ..plan
+    }
+}
+
+/// Without a declaration that the servo is off.
+fn undeclared(plan: Plan) -> Plan {
+    Plan {
+        declares_servo_off: false,
+        ..plan
+    }
+}
+
+/// Of the stage that has this serial number, as the user says.
+fn of(serial: Option<&str>, plan: Plan) -> Plan {
+    let serial = serial.map(str::to_owned);
+    Plan { serial, ..plan }
+}
+
+/// A sound blob with something changed.
+fn changed(blob: &[u8], change: impl FnOnce(&mut ParameterSet)) -> Vec<u8> {
+    let mut set = ParameterSet::from_bytes(blob).expect("sound");
+    change(&mut set);
+    let mut buffer = [0; MAX_BYTES];
+    set.to_bytes(&mut buffer).expect("it fits").to_vec()
+}
+
 /// A blob of the same length that differs.
 fn like(blob: &[u8]) -> Vec<u8> {
-    let mut set = ParameterSet::from_bytes(blob).expect("sound");
-    set.fit.rows += 1;
-    let mut buffer = [0; MAX_BYTES];
-    let other = set.to_bytes(&mut buffer).expect("it fits").to_vec();
-    assert_eq!(other.len(), blob.len());
-    other
+    changed(blob, |set| set.fit.rows += 1)
 }

@@ -6,10 +6,9 @@ use hal_adapters::can::command::{Answer, Command, Content, Mailbox, Request};
 use hal_adapters::can::update::Key;
 use host_fit::bus::update::{Identity, Link, Plan, Talk, UpdateError, Updated, on};
 use std::collections::VecDeque;
-use tests::fault::{Fault, damaged};
+use tests::fault::{Channel, Fault};
 use tests::flash_model::FlashModel;
 use tests::node::{Node, TAKEN_PER_TICK};
-use tests::random::Random;
 
 /// The longest frame at 1 Mbit/s, us.
 pub const SLOT_US: u64 = 135;
@@ -18,59 +17,6 @@ const TICK_US: u64 = 2_000;
 const START_US: u64 = 200_000;
 /// It is deaf while it erases a sector, too, us.
 const ERASE_US: u64 = 500_000;
-
-/// Frames under way, some lost, repeated, delayed or damaged.
-pub struct Channel {
-    random: Random,
-    per_million: [u64; 9],
-    under_way: Vec<(u64, BusFrame)>,
-}
-
-impl Channel {
-    pub fn new(faults: &[(Fault, u64)], seed: u64) -> Self {
-        let mut per_million = [0; 9];
-        faults
-            .iter()
-            .for_each(|(fault, rate)| per_million[*fault as usize] = *rate);
-        Self {
-            random: Random::new(seed),
-            per_million,
-            under_way: Vec::new(),
-        }
-    }
-
-    pub fn send(&mut self, now_us: u64, frame: BusFrame) {
-        let mut below = self.random.below(1_000_000);
-        let mut fault = None;
-        for (candidate, rate) in Fault::ALL.into_iter().zip(self.per_million) {
-            if below < rate {
-                fault = Some(candidate);
-                break;
-            }
-            below -= rate;
-        }
-        let delay = self.random.below(9) * 1_000;
-        let due_us = match fault {
-            Some(Fault::Drop) => return,
-            Some(Fault::Repeat) => {
-                self.under_way.push((now_us, frame));
-                now_us + 500
-            }
-            Some(Fault::Swap) => now_us + 1_500,
-            Some(Fault::Delay) => now_us + 2_000 + delay,
-            _ => now_us,
-        };
-        let frame = fault.map_or(frame, |fault| damaged(&frame, fault, &mut self.random));
-        self.under_way.push((due_us, frame));
-    }
-
-    fn arrived(&mut self, now_us: u64) -> Vec<BusFrame> {
-        let due = self
-            .under_way
-            .extract_if(.., |(due_us, _)| *due_us <= now_us);
-        due.map(|(_, frame)| frame).collect()
-    }
-}
 
 /// Flash of which a probe has written the first slot.
 pub fn flashed(blob: &[u8]) -> FlashModel {
