@@ -68,12 +68,11 @@ fn stratified(dataset: &Dataset, count: usize, random: &mut impl Rng) -> Vec<usi
 mod tests {
     use super::*;
     use crate::input::dataset::Movement;
-    use crate::input::shipped::STAGE_TOML;
-    use crate::input::stage::Stage;
+    use crate::input::shipped;
 
     /// A log with movements of the sizes given: a draw looks at nothing else.
     fn log(sizes: &[usize]) -> Dataset {
-        let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+        let stage = shipped::stage();
         let truth = crate::problem::parameters::Parameters::designed(&stage);
         let row = crate::problem::synthetic::Protocol::exact(truth, 1)
             .dataset(&stage)

@@ -190,12 +190,12 @@ impl TrainRow {
 mod tests {
     use super::*;
     use crate::input::dataset::Movement;
-    use crate::input::shipped::STAGE_TOML;
+    use crate::input::shipped;
     use runtime::ModelKind;
 
     #[test]
     fn thinning_leaves_rows_to_every_movement_that_moves() {
-        let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+        let stage = shipped::stage();
         let truth = parameters::Parameters::designed(&stage);
         let mut dataset = synthetic::Protocol::exact(truth, 20).dataset(&stage);
         // A stage that was left standing for ten times as long as all movements took.

@@ -56,15 +56,13 @@ impl ZeroDeviation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::shipped::STAGE_TOML;
-    use crate::input::stage::Stage;
+    use crate::input::shipped;
 
     /// Aligned probes with arms 0.1975, -0.1975, -0.36 m and eta 1: a pose offset of (x, y, rz)
     /// reads y + 0.1975 rz, y - 0.1975 rz, x - 0.36 rz.
     #[test]
     fn a_mean_error_becomes_the_deviation_of_each_probe() {
-        let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
-        let designed = Parameters::designed(&stage);
+        let designed = Parameters::designed(&shipped::stage());
         let range = Range {
             low: -10e-6,
             high: 10e-6,

@@ -151,8 +151,8 @@ fn probe(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::shipped::stage;
     use crate::simulate::pose::StagePose;
-    use crate::simulate::tests::stage;
 
     fn slope(probe: &TrimmedProbe, axis: usize) -> f64 {
         let mut planar = [0.0; 3];

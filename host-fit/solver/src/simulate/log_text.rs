@@ -53,9 +53,9 @@ mod tests {
     use super::*;
     use crate::input::log::layout::Column;
     use crate::input::log::{ReadOptions, read_bytes};
+    use crate::input::shipped::stage;
     use crate::simulate::pose::StagePose;
     use crate::simulate::recording::Sample;
-    use crate::simulate::tests::stage;
 
     fn recording() -> Recording {
         let sample = Sample {

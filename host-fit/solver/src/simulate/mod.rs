@@ -47,14 +47,3 @@ pub mod random;
 pub mod recording;
 pub mod sensors;
 pub mod thermal;
-
-#[cfg(test)]
-mod tests {
-    use crate::input::shipped::STAGE_TOML;
-    use crate::input::stage::Stage;
-
-    /// The stage that ships with the program.
-    pub fn stage() -> Stage {
-        Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")
-    }
-}

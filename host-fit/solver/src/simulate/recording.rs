@@ -245,9 +245,9 @@ fn row(stage: &Stage, plane: &[[f64; 3]; 3], movement: usize, sequence: u32, s: 
 mod tests {
     use super::*;
     use crate::input::log::{ReadOptions, read_bytes};
+    use crate::input::shipped::stage;
     use crate::simulate::log_text::log_csv;
     use crate::simulate::protocol::Protocol;
-    use crate::simulate::tests::stage;
     use sha2::{Digest, Sha256};
 
     fn short(protocol: Protocol, errors: &SensorErrors, seed: u64) -> Recording {

@@ -107,8 +107,8 @@ impl ReferenceError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::shipped::stage;
     use crate::simulate::random::Purpose;
-    use crate::simulate::tests::stage;
 
     #[test]
     fn codes_are_rounded_and_stop_at_the_rails() {

@@ -172,8 +172,8 @@ impl Thermometers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::shipped::stage;
     use crate::simulate::pose::StagePose;
-    use crate::simulate::tests::stage;
 
     /// Readings of the given day logs, degC: mount and body at the hour.
     #[test]

@@ -24,3 +24,11 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn what_nothing_shows_stays_as_it_is() {
+    let vector = |numbers: [f64; 2]| DVector::from_column_slice(&numbers);
+    let curvature = DMatrix::from_diagonal(&vector([4.0, 0.0]));
+    let factor = Factor::new(&curvature, 0.0).expect("regular");
+    assert_eq!(factor.solve(&vector([8.0, 0.0])), vector([2.0, 0.0]));
+}

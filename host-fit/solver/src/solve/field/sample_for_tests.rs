@@ -4,8 +4,7 @@ use super::parameters::FieldParameters;
 use super::probe::probes;
 use super::terms::{PER_PROBE, SHAPES, TERMS};
 use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
-use crate::input::shipped::STAGE_TOML;
-use crate::input::stage::Stage;
+pub(super) use crate::input::shipped::stage;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use runtime::RawFrame;
@@ -13,11 +12,6 @@ use std::f64::consts::TAU;
 
 /// The scale of the Hall codes of the shipped stage, m.
 pub(super) const M_PER_CODE: f64 = 6.25e-8;
-
-/// The shipped stage.
-pub(super) fn stage() -> Stage {
-    Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")
-}
 
 /// Parameters as a fit finds them: the terms of p a third of their priors' deviations.
 pub(super) fn parameters() -> FieldParameters {

@@ -3,7 +3,7 @@
 use super::gains::{parameters_of, point_of};
 use super::rows::COLUMNS;
 use super::solve::{fit, solve};
-use crate::input::shipped::STAGE_TOML;
+use crate::input::shipped::stage;
 use crate::input::stage::Stage;
 use crate::problem::Problem;
 use crate::problem::model::{COUNT, Model};
@@ -12,10 +12,6 @@ use crate::problem::synthetic::Protocol;
 use crate::solve::gauss_newton::{Equations, Normal, Point};
 use nalgebra::DVector;
 use runtime::ModelKind;
-
-fn stage() -> Stage {
-    Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("the shipped stage")
-}
 
 fn truth() -> Parameters {
     from_array([

@@ -1,19 +1,19 @@
 //! A small log for tests of the objective: Model (31) with noise of a known seed.
 
 use crate::input::dataset::Dataset;
-use crate::input::shipped::STAGE_TOML;
+use crate::input::shipped;
 use crate::input::stage::{Range, Stage};
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::synthetic::Protocol;
 use crate::problem::{Problem, TrainRow};
-use runtime::geometry::ProbeGeometry;
-use runtime::model::Sensitivity;
-use runtime::{ModelKind, VerticalPose};
+use runtime::geometry::{ProbeGeometry, inverse_rows};
+use runtime::model::{Sensitivity, planar_pose, sensitivity_at, zero_pose};
+use runtime::{ModelKind, PlanarPose, VerticalPose};
 
 /// The stage of the tests: Tables 1, 3 and 5 of the paper.
 pub fn stage() -> Stage {
-    let mut stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+    let mut stage = shipped::stage();
     let theta = Range {
         low: -0.14,
         high: 0.14,
@@ -74,14 +74,29 @@ pub fn problem<'a>(dataset: &Dataset, stage: &'a Stage, model: ModelKind) -> Pro
     Problem::new(dataset, &all, stage, Model::of(model))
 }
 
+/// The sensitivities of the probes in a row.
+pub fn phi(parameters: &Parameters, row: &TrainRow) -> [f64; 3] {
+    let vertical = VerticalPose::from_array(row.vertical);
+    (parameters.sensitivity()).map(|probe| sensitivity_at(&probe, &vertical))
+}
+
+/// X, Y, Rz of a row by the runtime's own model in f64.
+pub fn pose_by_the_runtime(
+    parameters: &Parameters,
+    inverse: &[[f64; 3]; 3],
+    row: &TrainRow,
+    zero: &PlanarPose<f64>,
+) -> [f64; 3] {
+    let signal = row.signal_um.map(|s| s * 1e-6);
+    planar_pose(inverse, signal, phi(parameters, row), zero).to_array()
+}
+
 /// The fitness by the runtime's own model in f64, row by row.
 pub fn fitness_by_the_runtime(
     problem: &Problem<'_>,
     parameters: &Parameters,
     delta_m: &[[f64; 3]],
 ) -> f64 {
-    use runtime::geometry::inverse_rows;
-    use runtime::model::{planar_pose, sensitivity_at, zero_pose};
     let Some(inverse) = inverse_rows(&parameters.geometry().plane_rows()) else {
         return f64::NAN;
     };
@@ -89,12 +104,7 @@ pub fn fitness_by_the_runtime(
     for group in &problem.groups {
         let zero = zero_pose(&inverse, parameters.eta(), delta_m[group.movement]);
         for row in &problem.rows[group.rows.clone()] {
-            let vertical = VerticalPose::from_array(vertical(row));
-            let phi = parameters
-                .sensitivity()
-                .map(|s| sensitivity_at(&s, &vertical));
-            let signal = row.signal_um.map(|s| s * 1e-6);
-            let pose = planar_pose(&inverse, signal, phi, &zero).to_array();
+            let pose = pose_by_the_runtime(parameters, &inverse, row, &zero);
             let axes = pose.iter().zip(row.reference_um).zip(problem.weights);
             for ((pose, reference), weight) in axes {
                 let error = pose * 1e6 - reference;
@@ -103,9 +113,4 @@ pub fn fitness_by_the_runtime(
         }
     }
     problem.fitness(cost)
-}
-
-/// Z, Rx, Ry of a row: the factors of the slopes of Model (31).
-pub fn vertical(row: &TrainRow) -> [f64; 3] {
-    row.vertical
 }

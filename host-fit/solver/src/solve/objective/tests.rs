@@ -2,7 +2,9 @@
 
 use super::Objective;
 use super::poles::SHARE_MIN;
-use super::sample_for_tests::{dataset, fitness_by_the_runtime, problem, stage, truth, vertical};
+use super::sample_for_tests::{
+    dataset, fitness_by_the_runtime, phi, pose_by_the_runtime, problem, stage, truth,
+};
 use crate::input::stage::Range;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
@@ -12,8 +14,7 @@ use crate::solve::Projection;
 use crate::solve::search::cost::CostFunction;
 use crate::solve::search::random::{Phase, RandomSource, stream};
 use runtime::geometry::inverse_rows;
-use runtime::model::{planar_pose, sensitivity_at};
-use runtime::{ModelKind, VerticalPose};
+use runtime::{ModelKind, PlanarPose};
 
 const MODELS: [ModelKind; 4] = [
     ModelKind::M12,
@@ -48,12 +49,7 @@ fn zero_deviations(problem: &Problem<'_>, parameters: &Parameters) -> Vec<ZeroDe
         let rows = &problem.rows[group.rows.clone()];
         let mut mean = [0.0; 3];
         for row in rows {
-            let vertical = VerticalPose::from_array(vertical(row));
-            let phi = parameters
-                .sensitivity()
-                .map(|s| sensitivity_at(&s, &vertical));
-            let signal = row.signal_um.map(|s| s * 1e-6);
-            let pose = planar_pose(&inverse, signal, phi, &runtime::PlanarPose::ZERO).to_array();
+            let pose = pose_by_the_runtime(parameters, &inverse, row, &PlanarPose::ZERO);
             for k in 0..3 {
                 mean[k] += (pose[k] - row.reference_um[k] * 1e-6) / rows.len() as f64;
             }
@@ -70,11 +66,9 @@ fn zero_deviations(problem: &Problem<'_>, parameters: &Parameters) -> Vec<ZeroDe
 /// The smallest phi / eta of all rows by the runtime's model.
 fn smallest_share(problem: &Problem<'_>, parameters: &Parameters) -> f64 {
     let share = |row: &TrainRow| {
-        let vertical = VerticalPose::from_array(vertical(row));
-        let shares = parameters
-            .sensitivity()
-            .map(|s| sensitivity_at(&s, &vertical) / s.eta);
-        shares[0].min(shares[1]).min(shares[2])
+        let shares = phi(parameters, row).into_iter().zip(parameters.eta());
+        let shares = shares.map(|(phi, eta)| phi / eta);
+        shares.fold(f64::INFINITY, f64::min)
     };
     problem.rows.iter().map(share).fold(f64::INFINITY, f64::min)
 }
@@ -163,16 +157,17 @@ fn the_linear_form_equals_the_runtimes_model_at_its_own_gain_and_offsets() {
             .map(|(near, far)| near + 0.1 * (far - near))
             .collect();
         let parameters = cost.parameters(&individual).expect("a gain");
-        let zeros = zero_deviations(&unclipped, &parameters);
-        let delta_m: Vec<_> = zeros.iter().map(|zero| zero.delta_m).collect();
-        let by_runtime = fitness_by_the_runtime(&problem, &parameters, &delta_m);
-        assert_close(cost.cost(&individual), by_runtime, 1e-9, "linear form");
+        let by_runtime = |parameters: &Parameters| {
+            let zeros = zero_deviations(&unclipped, parameters);
+            let delta_m: Vec<_> = zeros.iter().map(|zero| zero.delta_m).collect();
+            fitness_by_the_runtime(&problem, parameters, &delta_m)
+        };
+        let best = by_runtime(&parameters);
+        assert_close(cost.cost(&individual), best, 1e-9, "linear form");
         // No other gain does better with these ratios.
         let mut other = parameters;
         other.values[number % 3] *= 1.0 + 1e-3;
-        let zeros = zero_deviations(&unclipped, &other);
-        let delta_m: Vec<_> = zeros.iter().map(|zero| zero.delta_m).collect();
-        assert!(fitness_by_the_runtime(&problem, &other, &delta_m) > by_runtime);
+        assert!(by_runtime(&other) > best);
     }
 }
 
@@ -254,7 +249,7 @@ fn whatever_lies_beyond_a_pole_costs_nan() {
     let sound = cost.individual(&truth());
     assert!(cost.cost(&sound) < 3.0);
     // a / eta of A that leaves the first row a share of 0.06, 0.04, -0.5 of eta.
-    let [z, rx, ry] = vertical(&problem.rows[0]);
+    let [z, rx, ry] = problem.rows[0].vertical;
     let at_share = |share: f64| {
         let mut individual = sound.clone();
         individual[0] = (share - 1.0 - sound[1] * rx - sound[2] * ry) / z;

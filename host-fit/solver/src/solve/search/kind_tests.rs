@@ -13,7 +13,7 @@ fn evaluations(count: usize) -> StopCriteria<'static> {
     }
 }
 
-fn with_seed(seed: u64, population: usize) -> Start<'static> {
+const fn with_seed(seed: u64, population: usize) -> Start<'static> {
     Start {
         seed,
         population,
@@ -52,23 +52,6 @@ fn every_search_beats_random_draws_on_known_functions() {
     }
 }
 
-#[test]
-fn the_path_is_the_same_on_one_thread_and_on_several() {
-    let function = Known::new(7, -3.0, 3.0, rastrigin);
-    for kind in SearchKind::ALL {
-        let path = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            let search = || kind.minimize(&function, &with_seed(5, 50), &evaluations(1_500));
-            pool.expect("a thread pool").install(search)
-        };
-        let one = path(1);
-        assert_eq!(one, path(2), "{}", kind.name());
-        assert_eq!(one, path(3), "{}", kind.name());
-        let other = kind.minimize(&function, &with_seed(6, 50), &evaluations(1_500));
-        assert_ne!(one.best, other.best, "{}: the seed counts", kind.name());
-    }
-}
-
 /// A function that takes whole populations.
 struct Together(Known);
 
@@ -76,26 +59,35 @@ impl CostFunction for Together {
     fn bounds(&self) -> &[Range] {
         self.0.bounds()
     }
+
     fn cost(&self, _: &[f64]) -> f64 {
         unreachable!("it takes all at once")
     }
+
     fn costs(&self, individuals: &mut [Individual]) {
         assert_eq!(individuals.len(), 50);
         self.0.costs(individuals);
     }
+
     fn piece(&self) -> usize {
         usize::MAX
     }
 }
 
 #[test]
-fn a_function_of_whole_populations_takes_the_same_path() {
-    let one_by_one = Known::new(6, -3.0, 3.0, rosenbrock);
-    let together = Together(Known::new(6, -3.0, 3.0, rosenbrock));
+fn the_path_is_the_same_on_any_threads_and_for_a_function_of_whole_populations() {
+    let function = || Known::new(7, -3.0, 3.0, rastrigin);
     for kind in SearchKind::ALL {
-        let search =
-            |f: &dyn CostFunction| kind.minimize(f, &with_seed(5, 50), &evaluations(1_500));
-        assert_eq!(search(&one_by_one), search(&together), "{}", kind.name());
+        let path = |function: &dyn CostFunction, threads, seed| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let search = || kind.minimize(function, &with_seed(seed, 50), &evaluations(1_500));
+            pool.expect("a thread pool").install(search)
+        };
+        let one = path(&function(), 1, 5);
+        assert_eq!(one, path(&function(), 3, 5), "{}", kind.name());
+        assert_eq!(one, path(&Together(function()), 2, 5), "{}", kind.name());
+        let other = path(&function(), 1, 6);
+        assert_ne!(one.best, other.best, "{}: the seed counts", kind.name());
     }
 }
 
@@ -136,14 +128,8 @@ fn no_candidate_leaves_the_bounds_and_all_are_counted() {
         assert_eq!(outcome.evaluations, seen, "{}", kind.name());
         if kind != SearchKind::Random {
             let corner = outcome.best.iter().zip([1.0, 0.1, 3.0]);
-            for (x, best) in corner {
-                assert!(
-                    (x - best).abs() < 1e-2,
-                    "{}: {:?}",
-                    kind.name(),
-                    outcome.best
-                );
-            }
+            let is_there = { corner }.all(|(x, best)| (x - best).abs() < 1e-2);
+            assert!(is_there, "{}: {:?}", kind.name(), outcome.best);
         }
     }
 }
@@ -155,18 +141,12 @@ fn nan_costs_are_counted_and_never_win() {
     for kind in SearchKind::ALL {
         let outcome = kind.minimize(&function, &with_seed(4, 30), &evaluations(3_000));
         assert!(outcome.nan_costs > 0, "{}", kind.name());
-        assert!(
-            outcome.best[0] >= 0.0 && outcome.cost < 0.1,
-            "{}",
-            kind.name()
-        );
+        let is_found = outcome.best[0] >= 0.0 && outcome.cost < 0.1;
+        assert!(is_found, "{}", kind.name());
         let all = Known::new(2, -3.0, 3.0, |_| f64::NAN);
         let lost = kind.minimize(&all, &with_seed(4, 30), &evaluations(300));
-        assert!(
-            lost.cost.is_nan() && lost.nan_costs == lost.evaluations,
-            "{}",
-            kind.name()
-        );
+        let is_counted = lost.cost.is_nan() && lost.nan_costs == lost.evaluations;
+        assert!(is_counted, "{}", kind.name());
     }
 }
 
