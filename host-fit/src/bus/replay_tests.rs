@@ -1,5 +1,5 @@
 use super::*;
-use crate::input::shipped::STAGE_TOML;
+use crate::input::shipped::stage;
 
 /// A log of rows at these times, us, by movement.
 fn log(movements: &[&[i64]], header: &str) -> tempfile::NamedTempFile {
@@ -11,10 +11,6 @@ fn log(movements: &[&[i64]], header: &str) -> tempfile::NamedTempFile {
     let text = format!("movement,t_us,{header}\n{}", rows.collect::<String>());
     std::fs::write(file.path(), text).expect("written");
     file
-}
-
-fn stage() -> Stage {
-    Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")
 }
 
 const CODES: &str = "cap1_cnt,cap2_cnt,cap3_cnt,hall_a_cnt,hall_b_cnt,hall_c_cnt";

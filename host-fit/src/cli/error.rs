@@ -158,30 +158,3 @@ fn is_interrupted(error: &(dyn Error + 'static)) -> bool {
     log.is_some_and(|error| matches!(error.problem, LogProblem::Source(Interrupted)))
         || matches!(dialog, Some(UpdateError::Interrupted))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::input::log::Place;
-    use crate::output::blob_file::BlobFileError;
-    use crate::solve::SolveError;
-
-    #[test]
-    fn each_kind_of_end_has_its_exit_status() {
-        let blob = BlobFileError::Unusable {
-            path: "p.bin".into(),
-            cause: runtime::BlobError::Erased,
-        };
-        assert_eq!(HostError::from(blob).exit_status(), 3);
-        let refused = |problem| HostError::from(Place::of("log.csv", None).refuse(problem));
-        assert_eq!(refused(LogProblem::NoLog).exit_status(), 3);
-        assert_eq!(HostError::usage("--train", "0 rows").exit_status(), 2);
-        let fit = FitError::from(SolveError::NoPlanarMotion);
-        assert_eq!(HostError::from(fit).exit_status(), 4);
-        let plan = PlanError::TooFewFrequencies { seconds: 2.0 };
-        assert_eq!(HostError::from(plan).exit_status(), 4);
-        let interrupted = HostError::interrupted("nothing was written");
-        assert_eq!(interrupted.exit_status(), 130);
-        assert_eq!(refused(Interrupted.into()).exit_status(), 130);
-    }
-}

@@ -1,11 +1,11 @@
 use super::table::{Spread, table};
 use super::*;
 use crate::input::log::{ReadOptions, read_bytes};
-use crate::input::shipped::{LOG_GZ, STAGE_TOML};
+use crate::input::shipped::{self, LOG_GZ};
 
 #[test]
 fn an_interrupt_ends_a_comparison_with_what_there_is() {
-    let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+    let stage = shipped::stage();
     let log = read_bytes(LOG_GZ, "log".as_ref(), &stage, &ReadOptions::default());
     let comparison = Comparison {
         forms: vec![Projection::Linear],

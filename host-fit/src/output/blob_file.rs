@@ -86,19 +86,3 @@ pub fn to_bytes(path: &Path, set: &ParameterSet) -> Result<Vec<u8>, OutputError>
     let failed = |source| OutputError::new(path, OutputProblem::Failed { source });
     bytes.map(<[u8]>::to_vec).map_err(failed)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_refused_blob_is_named_with_its_remedy() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("p.bin");
-        std::fs::write(&path, b"HAL").expect("written");
-        let error = read(&path).expect_err("too short").to_string();
-        assert!(error.contains(
-            "p.bin: cut short: 3 bytes where at least 12 are needed; copy the file again"
-        ));
-    }
-}

@@ -2,10 +2,9 @@ use super::*;
 use crate::diagnose::Diagnosis;
 use crate::finding::{Code, Finding};
 use crate::fit::{FitSettings, ModelChoice, fit};
-use crate::input::dataset::Movement;
-use crate::input::log;
-use crate::input::log::ReadOptions;
-use crate::input::shipped::{LOG_GZ, STAGE_TOML};
+use crate::input::dataset::{Movement, Row};
+use crate::input::log::{ReadOptions, read_bytes};
+use crate::input::shipped::{LOG_GZ, stage};
 use crate::judge::Zeros;
 use crate::judge::verdict::Verdict;
 use crate::report::json::{Circumstances, of_eval};
@@ -13,10 +12,8 @@ use crate::report::verdict::End;
 
 /// Every 20th row of the shipped log, each movement as often as `copies` says.
 fn shipped(stage: &Stage, copies: usize) -> Dataset {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("log.csv.gz");
-    std::fs::write(&path, LOG_GZ).expect("written");
-    let read = log::read(&[path], stage, &ReadOptions::default()).expect("sound");
+    let read = read_bytes(LOG_GZ, "log".as_ref(), stage, &ReadOptions::default());
+    let read = read.expect("sound");
     let mut dataset = Dataset {
         sha256: read.dataset.sha256,
         ..Dataset::default()
@@ -25,12 +22,10 @@ fn shipped(stage: &Stage, copies: usize) -> Dataset {
         for movement in &read.dataset.movements {
             let (start, number) = (dataset.rows.len(), dataset.movements.len());
             let rows = read.dataset.rows[movement.rows.clone()].iter().step_by(20);
-            dataset
-                .rows
-                .extend(rows.map(|row| crate::input::dataset::Row {
-                    movement: number,
-                    ..*row
-                }));
+            dataset.rows.extend(rows.map(|row| Row {
+                movement: number,
+                ..*row
+            }));
             dataset.movements.push(Movement {
                 rows: start..dataset.rows.len(),
                 ..movement.clone()
@@ -40,10 +35,6 @@ fn shipped(stage: &Stage, copies: usize) -> Dataset {
     dataset.logs.clear();
     dataset.end_log("a <log> & more.csv");
     dataset
-}
-
-fn stage() -> Stage {
-    Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")
 }
 
 fn subject<'a>(end: End<'a>, diagnosis: &'a Diagnosis) -> Subject<'a> {

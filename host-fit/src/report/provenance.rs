@@ -107,8 +107,7 @@ pub fn hex(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
     use crate::input::log::{ReadOptions, read_bytes};
-    use crate::input::shipped::{LOG_GZ, STAGE_TOML};
-    use crate::input::stage::Stage;
+    use crate::input::shipped::{self, LOG_GZ};
 
     #[test]
     fn the_command_can_be_given_again_as_it_stands() {
@@ -132,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_report_says_how_much_of_a_long_log_is_drawn() {
-        let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound");
+        let stage = shipped::stage();
         let options = ReadOptions {
             rows_max: Some(50_000),
             ..ReadOptions::FIT

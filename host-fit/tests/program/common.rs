@@ -3,9 +3,9 @@
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fmt::Write;
-use std::io::Read;
+use std::io::{Read, Write as _};
 use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::{Child, ChildStdin, Command, Output, Stdio};
 
 /// A folder with `stage.toml` in it.
 pub struct Bench {
@@ -52,21 +52,40 @@ impl Bench {
 
     /// Runs the program with arguments separated by spaces, in the folder.
     pub fn run(&self, arguments: &str) -> Output {
-        self.run_args(&arguments.split_whitespace().collect::<Vec<_>>())
-    }
-
-    pub fn run_args(&self, arguments: &[&str]) -> Output {
-        let mut command = self.command(arguments);
-        command.output().expect("the program runs")
+        self.command(arguments).output().expect("the program runs")
     }
 
     /// The program with its arguments, not yet started.
-    pub fn command(&self, arguments: &[&str]) -> Command {
+    pub fn command(&self, arguments: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_host-fit"));
         // Units without signs, whatever the language of the machine.
         command.env("LC_ALL", "C");
-        command.args(arguments).current_dir(self.folder.path());
+        command.args(arguments.split_whitespace());
+        command.current_dir(self.folder.path());
         command
+    }
+
+    /// Started, with a pipe to its standard input.
+    pub fn reading(&self, arguments: &str) -> (Child, ChildStdin) {
+        let mut command = self.command(arguments);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut child = command.stderr(Stdio::piped()).spawn().expect("started");
+        let pipe = child.stdin.take().expect("a pipe");
+        (child, pipe)
+    }
+
+    /// Runs the program with this on its standard input.
+    pub fn piped(&self, arguments: &str, input: &[u8]) -> Output {
+        let (child, mut pipe) = self.reading(arguments);
+        pipe.write_all(input).expect("read");
+        drop(pipe);
+        child.wait_with_output().expect("it ends")
+    }
+
+    /// The figures of a command, which must succeed.
+    pub fn figures(&self, arguments: &str) -> Value {
+        self.good(&format!("{arguments} --json figures.json"));
+        self.json("figures.json")
     }
 
     /// Runs the program, which must succeed.
@@ -102,10 +121,8 @@ impl Bench {
 
     /// rms of X, Y, Rz of a blob over a log, zero deviations refitted, um, um, urad.
     pub fn rms(&self, blob: &str, log: &str) -> [f64; 3] {
-        self.good(&format!(
-            "eval {blob} {log} --stage stage.toml --limit 100 --json eval.json"
-        ));
-        let errors = &self.json("eval.json")["errors"];
+        let eval = self.figures(&format!("eval {blob} {log} --limit 100"));
+        let errors = &eval["errors"];
         [("x", "rmse_um"), ("y", "rmse_um"), ("rz", "rmse_urad")]
             .map(|(axis, rms)| number(&errors[axis][rms]))
     }
@@ -126,6 +143,21 @@ pub fn stderr(output: &Output) -> String {
 
 pub fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Presses Ctrl-C.
+#[cfg(unix)]
+pub fn interrupt(running: &Child) {
+    let mut kill = Command::new("kill");
+    let sent = kill.args(["-INT", &running.id().to_string()]).status();
+    assert!(sent.expect("kill runs").success());
+}
+
+/// The numbers of a table below its header.
+pub fn rows(table: &str) -> Vec<Vec<f64>> {
+    let number = |cell: &str| cell.parse().expect("a number");
+    let row = |line: &str| line.split(',').map(number).collect();
+    table.lines().skip(1).map(row).collect()
 }
 
 pub fn number(value: &Value) -> f64 {

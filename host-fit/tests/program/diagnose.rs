@@ -1,6 +1,6 @@
 //! What the program says of logs with mistakes that labs make, and that it writes no blob of them.
 
-use crate::common::{self, Bench, column, number, stderr, thinned_log};
+use crate::common::{self, Bench, column, number, rows, stderr, thinned_log};
 use host_fit::input::shipped::STAGE_TOML;
 
 /// Every fiftieth row of the shipped log.
@@ -35,22 +35,6 @@ fn changed(log: &str, columns: &[&str], change: impl Fn(i64, i64) -> i64) -> Str
 
 const BEAMS: [&str; 3] = ["ifm_x_nm", "ifm_y1_nm", "ifm_y2_nm"];
 
-/// Refused by `check` with this code and message.
-fn is_refused(log: &str, stage: &str, code: &str, words: &str) {
-    let bench = Bench::new();
-    bench.write("stage.toml", stage);
-    bench.write("log.csv", log);
-    let arguments = "check log.csv --stage stage.toml --json c.json";
-    bench.bad(arguments, 4, &[words]);
-    let found = &bench.json("c.json")["findings"][0];
-    assert_eq!(
-        (found["code"].as_str(), found["severity"].as_str()),
-        (Some(code), Some("refuse"))
-    );
-    let message = found["message"].as_str().expect("a message");
-    assert!(message.contains(words), "{code}: {message}");
-}
-
 /// Also where the fit of a model ends with a blob at hand, and with figures if they are asked for.
 #[test]
 fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
@@ -72,7 +56,7 @@ fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
             "capacitive_swapped",
         ),
     ] {
-        let fit = format!("fit {log} --stage stage.toml --out p.bin --json p.json");
+        let fit = format!("fit {log} --out p.bin --json p.json");
         bench.bad(&fit, 4, &[words]);
         assert!(!bench.has("p.bin"));
         assert_eq!(bench.json("p.json")["findings"][0]["code"], code);
@@ -89,7 +73,7 @@ fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
 fn a_fit_beyond_its_limits_is_not_written_without_force() {
     let bench = Bench::new();
     bench.write("log.csv", log());
-    let fit = "fit log.csv --stage stage.toml --out p.bin --limit";
+    let fit = "fit log.csv --out p.bin --limit";
     bench.bad(
         &format!("{fit} x=1nm,rz=1mrad"),
         4,
@@ -118,9 +102,17 @@ fn exchanged_capacitive_sensors_are_named_without_search_ranges_that_exclude_the
         _ => format!("{line}\n"),
     });
     let stage: String = lines.collect();
-    let exchanged = exchanged(&log(), "cap1_cnt", "cap2_cnt");
+    let bench = Bench::new();
+    bench.write("stage.toml", stage);
+    let gaps = exchanged(&log(), "cap1_cnt", "cap2_cnt");
+    bench.write("log.csv", gaps);
     let words = "fits if capacitive 1 and 2 are exchanged";
-    is_refused(&exchanged, &stage, "capacitive_swapped", words);
+    bench.bad("check log.csv --json c.json", 4, &[words]);
+    let found = &bench.json("c.json")["findings"][0];
+    assert_eq!(found["code"], "capacitive_swapped");
+    assert_eq!(found["severity"], "refuse");
+    let message = found["message"].as_str();
+    assert!(message.is_some_and(|text| text.contains(words)), "{found}");
 }
 
 #[test]
@@ -128,7 +120,7 @@ fn resets_far_from_zero_are_a_warning_and_not_called_signs() {
     let bench = Bench::new();
     let off = changed(&log(), &BEAMS, |movement, nm| nm + movement % 2 * 50_000);
     bench.write("log.csv", off);
-    let output = bench.run("fit log.csv --stage stage.toml --out p.bin");
+    let output = bench.run("fit log.csv --out p.bin");
     let message = stderr(&output);
     assert_eq!(output.status.code(), Some(0), "{message}");
     for part in ["of 57 movements", "widen search.delta_m in stage.toml"] {
@@ -138,7 +130,7 @@ fn resets_far_from_zero_are_a_warning_and_not_called_signs() {
     // The remedy is one.
     let wider = stage().replace("delta_m = [-10e-6, 10e-6]", "delta_m = [-60e-6, 60e-6]");
     bench.write("stage.toml", wider);
-    bench.good("check log.csv --stage stage.toml");
+    bench.good("check log.csv");
 }
 
 #[test]
@@ -152,13 +144,9 @@ fn a_log_of_another_gain_is_distinguished_from_the_first() {
         changed(&log, &halls, |_, code| (code * 103 + 50).div_euclid(100)),
     );
     let parts = ["all Hall probes", "in second.csv differs by +"];
-    bench.bad(
-        "fit first.csv second.csv --stage stage.toml --out p.bin",
-        4,
-        &parts,
-    );
+    bench.bad("fit first.csv second.csv --out p.bin", 4, &parts);
     assert!(bench.holds_only(&["first.csv", "second.csv"]));
-    bench.good("fit first.csv second.csv --stage stage.toml --out p.bin --json p.json --force");
+    bench.good("fit first.csv second.csv --out p.bin --json p.json --force");
     let json = bench.json("p.json");
     let logs = json["logs"].as_array().expect("a list");
     assert_eq!(logs.len(), 2);
@@ -174,8 +162,8 @@ fn a_sound_log_gives_no_finding_but_a_note() {
     let bench = Bench::new();
     bench.write("stage.toml", stage());
     bench.write("log.csv", log());
-    bench.good("check log.csv --stage stage.toml --json c.json");
-    bench.good("fit log.csv --stage stage.toml --out p.bin --json p.json");
+    bench.good("check log.csv --json c.json");
+    bench.good("fit log.csv --out p.bin --json p.json");
     for name in ["c.json", "p.json"] {
         let json = bench.json(name);
         let findings = json["findings"].as_array().expect("a list");
@@ -193,29 +181,21 @@ fn eval_judges_a_blob_by_its_own_errors() {
         "turned.csv",
         changed(&log, &["hall_a_cnt"], |_, code| -code),
     );
-    bench.good("fit log.csv --stage stage.toml --out p.bin");
-    bench.good("eval p.bin log.csv --stage stage.toml");
+    bench.good("fit log.csv --out p.bin");
+    bench.good("eval p.bin log.csv");
     let parts = ["more than 10 times", "fits if the sign of Hall A is turned"];
-    bench.bad(
-        "eval p.bin turned.csv --stage stage.toml --json e.json",
-        4,
-        &parts,
-    );
+    bench.bad("eval p.bin turned.csv --json e.json", 4, &parts);
     assert_eq!(
         bench.json("e.json")["findings"][0]["code"],
         "channel_inverted"
     );
-    bench.good("eval p.bin turned.csv --stage stage.toml --limit 1e6");
+    bench.good("eval p.bin turned.csv --limit 1e6");
     bench.bad(
-        "eval p.bin log.csv --stage stage.toml --limit 0.9",
+        "eval p.bin log.csv --limit 0.9",
         4,
         &["more than 0.9 times"],
     );
-    bench.bad(
-        "eval p.bin log.csv --stage stage.toml --limit 0",
-        2,
-        &["above zero"],
-    );
+    bench.bad("eval p.bin log.csv --limit 0", 2, &["above zero"]);
 }
 
 /// What the list of trusted inputs says of each is what an error of 1 % does.
@@ -224,17 +204,9 @@ fn an_error_of_a_trusted_input_is_not_seen_and_costs_what_is_announced() {
     let bench = Bench::new();
     bench.write("stage.toml", stage());
     bench.write("log.csv", log());
-    bench.good("fit log.csv --stage stage.toml --out p.bin --json p.json");
-    let poses = |name: &str| -> Vec<[f64; 6]> {
-        let text = bench.text(name);
-        let row = |line: &str| {
-            let cells = line.split(',').skip(2).take(6);
-            let cells: Vec<f64> = cells.map(|cell| cell.parse().expect("a number")).collect();
-            cells.try_into().expect("six")
-        };
-        text.lines().skip(1).map(row).collect()
-    };
-    bench.good("decode p.bin log.csv --stage stage.toml --out p.csv");
+    bench.good("fit log.csv --out p.bin --json p.json");
+    let poses = |name: &str| rows(&bench.text(name));
+    bench.good("decode p.bin log.csv --out p.csv");
     let true_poses = poses("p.csv");
     let trusted = bench.json("p.json")["trusted_inputs"].clone();
     for (place, from, to) in [
@@ -260,11 +232,11 @@ fn an_error_of_a_trusted_input_is_not_seen_and_costs_what_is_announced() {
             .expect("axes");
         for (k, axis) in ["X", "Y", "Rz", "Z", "Rx", "Ry"].into_iter().enumerate() {
             let pairs = || poses("w.csv").into_iter().zip(&true_poses);
-            let off = pairs().map(|(wrong, right)| (wrong[k] - right[k]).abs());
+            let off = pairs().map(|(wrong, right)| (wrong[2 + k] - right[2 + k]).abs());
             let off = off.fold(0.0, f64::max);
             let end = true_poses
                 .iter()
-                .map(|pose| pose[k].abs())
+                .map(|pose| pose[2 + k].abs())
                 .fold(0.0, f64::max);
             let cost = costs.iter().find(|cost| cost["axis"] == axis);
             match cost {
@@ -287,16 +259,12 @@ fn movements_that_are_too_short_to_show_an_error_are_reported_and_refused() {
     let bench = Bench::new();
     let log = thinned_log(10, |_| true);
     for (rows, status) in [(2, Some(4)), (5, Some(0)), (20, None)] {
-        let mut short = String::new();
-        for (k, line) in log.lines().enumerate() {
-            let cells: Vec<&str> = line.splitn(3, ',').collect();
-            short += &match k.checked_sub(1) {
-                None => format!("{line}\n"),
-                Some(k) => format!("{},{},{}\n", k / rows, 2_000 * k, cells[2]),
-            };
-        }
+        let short = common::changed(&log, |row, cells| {
+            let row = row as i64;
+            (cells[0], cells[1]) = (row / rows, 2_000 * row);
+        });
         bench.write("log.csv", short);
-        let fit = bench.run("fit log.csv --stage stage.toml --out p.bin --json fit.json");
+        let fit = bench.run("fit log.csv --out p.bin --json fit.json");
         let found = bench.json("fit.json");
         let codes = found["findings"].as_array().expect("a list");
         let is_found = codes.iter().any(|found| found["code"] == "short_movements");

@@ -1,6 +1,6 @@
 //! The field model from the log to the pose file, on a stage made of physics.
 
-use crate::common::{Bench, log, number, plan, stderr, stdout};
+use crate::common::{Bench, log, number, plan, rows, stderr, stdout};
 use serde_json::Value;
 
 /// A folder with the log of a run, and another run of the same stage as its service.
@@ -8,31 +8,22 @@ fn bench() -> Bench {
     let bench = Bench::new();
     bench.write("run.csv", plan(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5]));
     bench.write("other.csv", plan(8.0, [7.0, 5.0, 4.0, 8.0, 6.0, 3.0]));
-    bench.good("simulate --stage stage.toml --plan run.csv --seed 3 --out log.csv");
-    bench.good(
-        "simulate --stage stage.toml --plan other.csv --seed 3 --out service.csv --truth truth.csv",
-    );
+    bench.good("simulate --plan run.csv --seed 3 --out log.csv");
+    bench.good("simulate --plan other.csv --seed 3 --out service.csv --truth truth.csv");
     bench
 }
 
 /// rms of X, Y, Rz of a pose file against the truth, um, um, urad.
 fn rms_against_truth(bench: &Bench, pose: &str) -> [f64; 3] {
-    let cells = |line: &str| -> Vec<f64> {
-        let cells = line.split(',').map(|cell| cell.parse().expect("a number"));
-        cells.collect()
-    };
-    let (poses, truth) = (bench.text(pose), bench.text("truth.csv"));
+    let (poses, truth) = (rows(&bench.text(pose)), rows(&bench.text("truth.csv")));
     let mut squares = [0.0; 3];
-    let mut rows = 0.0;
-    for (pose, truth) in poses.lines().zip(truth.lines()).skip(1) {
-        let (pose, truth) = (cells(pose), cells(truth));
+    for (pose, truth) in poses.iter().zip(&truth) {
         assert_eq!(pose[..2], truth[..2]);
         for (axis, sum) in squares.iter_mut().enumerate() {
             *sum += (pose[2 + axis] - truth[2 + axis] * 1e-3).powi(2);
         }
-        rows += 1.0;
     }
-    squares.map(|sum: f64| (sum / rows).sqrt())
+    squares.map(|sum: f64| (sum / poses.len() as f64).sqrt())
 }
 
 /// What a fit to the truth of the same service leaves, um, um, urad.
@@ -43,7 +34,7 @@ const FLOOR: [f64; 3] = [1.186, 0.465, 2.341];
 fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
     let bench = bench();
     let fitted = bench.good(
-        "fit log.csv --stage stage.toml --out p.bin --model field --serial HS-3 --json p.json --report report -v",
+        "fit log.csv --out p.bin --model field --serial HS-3 --json p.json --report report -v",
     );
     assert!(stdout(&fitted).contains("reference lag"));
     let json = bench.json("p.json");
@@ -61,8 +52,7 @@ fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
     let page = bench.text("report/index.html");
     assert!(page.contains("Field model") && page.contains("uw2z"));
 
-    bench.good("inspect p.bin --json inspect.json");
-    let inspected = bench.json("inspect.json");
+    let inspected = bench.figures("inspect p.bin");
     assert_eq!(inspected["layout_version"], 2);
     for (name, p) in parameters {
         let value = |p: &Value| number(&p["value"]);
@@ -70,20 +60,14 @@ fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
         assert!((stored - fitted).abs() <= 1e-6 * fitted.abs(), "{name}");
     }
 
-    bench.good("decode p.bin service.csv --stage stage.toml --out pose.csv");
-    bench.good("fit log.csv --stage stage.toml --out p31.bin --model 31");
-    bench.good("decode p31.bin service.csv --stage stage.toml --out pose31.csv");
+    bench.good("decode p.bin service.csv --out pose.csv");
+    bench.good("fit log.csv --out p31.bin --model 31");
+    bench.good("decode p31.bin service.csv --out pose31.csv");
     let (field, model_31) = (
         rms_against_truth(&bench, "pose.csv"),
         rms_against_truth(&bench, "pose31.csv"),
     );
-    bench.good("eval p.bin service.csv --stage stage.toml --json eval.json");
-    let errors = &bench.json("eval.json")["errors"];
-    let judged = ["x", "y", "rz"].map(|axis| {
-        let errors = &errors[axis];
-        let rmse = errors["rmse_um"].as_f64().or(errors["rmse_urad"].as_f64());
-        rmse.expect("a number")
-    });
+    let judged = bench.rms("p.bin", "service.csv");
     for axis in 0..3 {
         assert!(field[axis] < 1.06 * FLOOR[axis], "{field:?} {FLOOR:?}");
         assert!(model_31[axis] > 1.1 * field[axis], "{model_31:?} {field:?}");
@@ -114,8 +98,7 @@ fn a_late_reference_is_reported_by_every_model_and_taken_off_when_asked() {
     let bench = bench();
     bench.write("late.csv", late(&bench.text("log.csv"), 3));
     for model in ["31", "field", "auto"] {
-        let fit =
-            format!("fit late.csv --stage stage.toml --out p.bin --model {model} --json p.json");
+        let fit = format!("fit late.csv --out p.bin --model {model} --json p.json");
         let output = bench.good(&fit);
         assert!(
             stderr(&output).contains("the reference lags behind the probes by "),
@@ -177,10 +160,7 @@ fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
             "model (31): this log leaves the field model",
         ),
     ] {
-        bench.good(&format!(
-            "fit {log} --stage stage.toml --out auto.bin --json auto.json"
-        ));
-        let json = bench.json("auto.json");
+        let json = bench.figures(&format!("fit {log} --out auto.bin"));
         assert_eq!(json["model"], model);
         let said = json["model_reason"].as_str().expect("a sentence");
         assert!(said.starts_with(reason), "{said}");
@@ -197,14 +177,10 @@ fn auto_takes_the_field_model_where_the_log_carries_it_and_else_31() {
         let rms_um = number(&json["predicted"]["x"]["rms_um"]);
         let floor_um = rms_um / number(&json["predicted"]["x"]["ratio"]);
         assert!((0.8..1.2).contains(&floor_um), "{floor_um}");
-        bench.good(&format!(
-            "fit {log} --stage stage.toml --out named.bin --model {model}"
-        ));
+        bench.good(&format!("fit {log} --out named.bin --model {model}"));
         assert_eq!(bench.read("auto.bin"), bench.read("named.bin"));
     }
-    bench.good(
-        "fit log.csv --stage stage.toml --out p.bin --solver shtlbo --generations 3 --json p.json",
-    );
+    bench.good("fit log.csv --out p.bin --solver shtlbo --generations 3 --json p.json");
     assert_eq!(bench.json("p.json")["model"], "31");
 }
 
@@ -216,7 +192,7 @@ fn a_log_of_little_motion_is_a_warning() {
     bench.write("wide.toml", stage);
     let fit = bench.good("fit log.csv --stage wide.toml --out p.bin --model field");
     assert!(stderr(&fit).contains("moves rz by 5"), "{}", stderr(&fit));
-    let fit = bench.good("fit log.csv --stage stage.toml --out p.bin --model field");
+    let fit = bench.good("fit log.csv --out p.bin --model field");
     assert_eq!(stderr(&fit), "");
 }
 
@@ -224,7 +200,7 @@ fn a_log_of_little_motion_is_a_warning() {
 fn a_log_of_still_heights_is_refused_and_no_blob_is_left() {
     let bench = Bench::with_log();
     bench.bad(
-        "fit log.csv --stage stage.toml --out p.bin --model field",
+        "fit log.csv --out p.bin --model field",
         4,
         &[
             "times the noise floor",
@@ -239,7 +215,7 @@ fn the_field_model_has_a_solver_of_its_own() {
     let bench = Bench::new();
     for choice in ["--solver lm", "--solver shtlbo", "--project none"] {
         bench.bad(
-            &format!("fit log.csv --stage stage.toml --out p.bin --model field {choice}"),
+            &format!("fit log.csv --out p.bin --model field {choice}"),
             2,
             &["--model field"],
         );

@@ -1,9 +1,8 @@
 //! Ctrl-C while a file is read.
 #![cfg(unix)]
 
-use crate::common::{Bench, stderr, thinned_log};
+use crate::common::{Bench, interrupt, stderr, thinned_log};
 use std::io::Write;
-use std::process::{Command, Stdio};
 
 /// Lines that every reader leaves out, more than a pipe holds.
 const LINES: usize = 20_000;
@@ -16,32 +15,25 @@ fn ctrl_c_ends_a_command_that_reads_and_leaves_nothing_behind() {
     let log = thinned_log(5, |_| true);
     bench.write("log.csv", &log);
     bench.write("ifm.csv", &log);
-    bench.good("fit log.csv --stage stage.toml --model 31 --out p.bin");
+    bench.good("fit log.csv --model 31 --out p.bin");
     for arguments in [
-        "fit - --stage stage.toml --out o.bin --json o.json --report o",
-        "check - --stage stage.toml --json o.json",
-        "decode p.bin - --stage stage.toml --out o.csv",
-        "import - ifm.csv --stage stage.toml --out o.csv --skip-bad-lines",
+        "fit - --out o.bin --json o.json --report o",
+        "check - --json o.json",
+        "decode p.bin - --out o.csv",
+        "import - ifm.csv --out o.csv --skip-bad-lines",
     ] {
-        let arguments: Vec<&str> = arguments.split(' ').collect();
-        let mut command = bench.command(&arguments);
-        command.stdin(Stdio::piped());
-        command.stdout(Stdio::null()).stderr(Stdio::piped());
-        let mut running = command.spawn().expect("started");
-        let mut pipe = running.stdin.take().expect("a pipe");
+        let (running, mut pipe) = bench.reading(arguments);
         let lines = "# nothing\n".repeat(LINES);
         // It reads, or these would not have fit into the pipe.
         pipe.write_all(log.as_bytes()).expect("read");
         pipe.write_all(lines.as_bytes()).expect("read");
-        let id = running.id().to_string();
-        let sent = Command::new("kill").args(["-INT", &id]).status();
-        assert!(sent.expect("kill runs").success());
+        interrupt(&running);
         let ended = (0..TIMES_MAX).any(|_| pipe.write_all(lines.as_bytes()).is_err());
         drop(pipe);
         let output = running.wait_with_output().expect("ended");
         let errors = stderr(&output);
-        assert!(ended, "{arguments:?} read on: {errors}");
-        assert_eq!(output.status.code(), Some(130), "{arguments:?}: {errors}");
+        assert!(ended, "{arguments} read on: {errors}");
+        assert_eq!(output.status.code(), Some(130), "{arguments}: {errors}");
         assert!(errors.contains("interrupted"), "{errors}");
         assert!(bench.holds_only(&["log.csv", "ifm.csv", "p.bin"]));
     }

@@ -30,20 +30,20 @@ struct Job {
 
 /// A command and its outputs, in a line. The last three write many files one after the other.
 const JOBS: &str = "\
-fit log.csv --stage stage.toml --out o.bin --json o.json --report o > o.json o/index.html o.bin
-fit run.csv.gz --stage stage.toml --model field --out o.bin > o.bin.posterior o.bin
-recalibrate field.bin run.csv.gz --stage stage.toml --what all --out o.bin --json o.json > o.json o.bin.posterior o.bin
-decode p.bin log.csv --stage stage.toml --out o.csv > o.csv
-eval p.bin log.csv --stage stage.toml --json o.json > o.json
-check log.csv --stage stage.toml --json o.json > o.json
-import bus.log ifm.csv --stage stage.toml --out o.csv > o.csv
+fit log.csv --out o.bin --json o.json --report o > o.json o/index.html o.bin
+fit run.csv.gz --model field --out o.bin > o.bin.posterior o.bin
+recalibrate field.bin run.csv.gz --what all --out o.bin --json o.json > o.json o.bin.posterior o.bin
+decode p.bin log.csv --out o.csv > o.csv
+eval p.bin log.csv --json o.json > o.json
+check log.csv --json o.json > o.json
+import bus.log ifm.csv --out o.csv > o.csv
 inspect p.bin --json o.json > o.json
 diff p.bin field.bin --json o.json > o.json
 export p.bin --format hex --slot 0 --out o.hex > o.hex
 init log.csv --out o.toml --force > o.toml
-plan --stage stage.toml --seconds 8 --out o.csv > o.csv
-simulate --stage stage.toml --protocol service --seed 1 --out o.csv --truth o.truth > o.csv o.truth
-compare log.csv --stage stage.toml --seeds 1 --evaluations 400 --project linear --out o > o/table.md o/runs.csv o/history.csv
+plan --seconds 8 --out o.csv > o.csv
+simulate --protocol service --seed 1 --out o.csv --truth o.truth > o.csv o.truth
+compare log.csv --seeds 1 --evaluations 400 --project linear --out o > o/table.md o/runs.csv o/history.csv
 man --out o > o/host-fit.1 o/host-fit-fit.1
 demo --out d > d/params.bin d/pose.csv d/field.bin";
 
@@ -93,8 +93,8 @@ fn bench() -> Bench {
     bench.write("ifm.csv", reference);
     std::fs::create_dir(bench.path("o")).expect("a folder");
     bench.good("demo --out d");
-    bench.good("fit log.csv --stage stage.toml --out p.bin");
-    bench.good("fit run.csv.gz --stage stage.toml --model field --out field.bin");
+    bench.good("fit log.csv --out p.bin");
+    bench.good("fit run.csv.gz --model field --out field.bin");
     bench
 }
 
@@ -106,7 +106,7 @@ impl Job {
     }
 
     fn start(&self, bench: &Bench) -> std::process::Child {
-        let mut command = bench.command(&self.arguments.split(' ').collect::<Vec<_>>());
+        let mut command = bench.command(self.arguments);
         command.stdout(Stdio::null()).stderr(Stdio::null());
         command.spawn().expect("the program runs")
     }
@@ -251,22 +251,16 @@ fn of_two_writers_of_an_output_each_writes_it_whole() {
     let short = thinned_log(5, |_| true);
     bench.write("short.csv", &short);
     bench.write("long.csv", shipped_log());
-    bench.good("fit short.csv --stage stage.toml --out p.bin");
+    bench.good("fit short.csv --out p.bin");
     let [short_whole, long_whole] = ["short", "long"].map(|log| {
-        bench.good(&format!(
-            "decode p.bin {log}.csv --stage stage.toml --out whole.csv"
-        ));
+        bench.good(&format!("decode p.bin {log}.csv --out whole.csv"));
         bench.read("whole.csv")
     });
-    let stalled = "decode p.bin - --stage stage.toml --out o.csv";
-    let mut command = bench.command(&stalled.split(' ').collect::<Vec<_>>());
-    command.stdin(Stdio::piped()).stdout(Stdio::null());
-    let mut stalled = command.spawn().expect("the program runs");
-    let mut pipe = stalled.stdin.take().expect("a pipe");
+    let (mut stalled, mut pipe) = bench.reading("decode p.bin - --out o.csv");
     let (begin, rest) = short.as_bytes().split_at(short.len() / 2);
     // More than a pipe holds: it has begun, and has its output open.
     pipe.write_all(begin).expect("read");
-    bench.good("decode p.bin long.csv --stage stage.toml --out o.csv");
+    bench.good("decode p.bin long.csv --out o.csv");
     assert!(bench.read("o.csv") == long_whole);
     pipe.write_all(rest).expect("read");
     drop(pipe);

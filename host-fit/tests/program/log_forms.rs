@@ -1,8 +1,6 @@
 //! Logs as laboratories have them, from the command line: split, read from a pipe, drafted for.
 
 use crate::common::{Bench, changed, log, stderr, stdout};
-use std::io::Write;
-use std::process::Stdio;
 
 const MARK: &str = "# FILL IN: ";
 
@@ -18,7 +16,7 @@ fn one_long_recording_is_fitted_as_its_movements_are() {
     let bench = Bench::with_log();
     bench.write("whole.csv", one_recording());
     let fit = |log: &str| {
-        let fit = format!("fit {log} --stage stage.toml --out p.bin --json p.json");
+        let fit = format!("fit {log} --out p.bin --json p.json");
         let warnings = stderr(&bench.good(&fit));
         (bench.json("p.json"), warnings)
     };
@@ -29,38 +27,20 @@ fn one_long_recording_is_fitted_as_its_movements_are() {
         (&want["errors"], &57.into())
     );
     assert!(warnings.contains("the times tell 57"), "{warnings}");
-    bench.good("eval p.bin whole.csv --split 2 --stage stage.toml");
-    let refused = "fit log.csv --stage stage.toml --out p.bin --split 2";
+    bench.good("eval p.bin whole.csv --split 2");
+    let refused = "fit log.csv --out p.bin --split 2";
     bench.bad(refused, 3, &["log.csv", "--split does not apply"]);
-    let usage = "fit log.csv --stage stage.toml --out p.bin --split 0";
+    let usage = "fit log.csv --out p.bin --split 0";
     bench.bad(usage, 2, &["--split"]);
 }
 
 #[test]
 fn a_log_comes_by_standard_input_too() {
     let bench = Bench::with_log();
-    bench.good("fit log.csv --stage stage.toml --out p.bin");
-    bench.good("decode p.bin log.csv --stage stage.toml --out want.csv");
+    bench.good("fit log.csv --out p.bin");
+    bench.good("decode p.bin log.csv --out want.csv");
     let pipe = |log: &[u8], status: i32| {
-        let mut child = bench
-            .command(&[
-                "decode",
-                "p.bin",
-                "-",
-                "--stage",
-                "stage.toml",
-                "--out",
-                "pose.csv",
-            ])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the program runs");
-        let mut input = child.stdin.take().expect("a pipe");
-        input.write_all(log).expect("written");
-        drop(input);
-        let output = child.wait_with_output().expect("it ends");
+        let output = bench.piped("decode p.bin - --out pose.csv", log);
         assert_eq!(output.status.code(), Some(status), "{}", stderr(&output));
         stderr(&output)
     };
@@ -104,7 +84,7 @@ fn init_drafts_a_stage_file_that_is_refused_until_it_is_filled_in() {
     );
     bench.good(fit);
     bench.write("old.csv", log());
-    bench.good("fit old.csv --stage stage.toml --out old.bin --json old.json");
+    bench.good("fit old.csv --out old.bin --json old.json");
     bench.good(&format!("{fit} --json new.json"));
     assert_eq!(
         bench.json("new.json")["errors"],

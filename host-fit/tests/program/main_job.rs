@@ -48,15 +48,13 @@ fn fit_eval_decode_and_inspect_agree_on_the_shipped_log() {
         assert!(p["unit"].is_string());
     }
 
-    bench.good("eval p.bin log.csv.gz --stage stage.toml --json eval.json");
-    let eval = bench.json("eval.json");
+    let eval = bench.figures("eval p.bin log.csv.gz");
     check_errors(&eval["errors"]);
     assert_eq!(eval["errors"], fit["errors"]);
-    bench.good("eval p.bin log.csv.gz --stage stage.toml --delta zero --json zero.json");
-    let zero = bench.json("zero.json");
+    let zero = bench.figures("eval p.bin log.csv.gz --delta zero");
     assert!(zero["errors"]["x"]["rmse_um"].as_f64() > eval["errors"]["x"]["rmse_um"].as_f64());
 
-    let output = bench.good("decode p.bin log.csv.gz --stage stage.toml --out pose.csv");
+    let output = bench.good("decode p.bin log.csv.gz --out pose.csv");
     assert!(
         stdout(&output).contains("57000 of them with status 0"),
         "{}",
@@ -69,8 +67,7 @@ fn fit_eval_decode_and_inspect_agree_on_the_shipped_log() {
         Some(host_fit::output::pose_file::HEADER)
     );
 
-    bench.good("inspect p.bin --json inspect.json");
-    let inspect = bench.json("inspect.json");
+    let inspect = bench.figures("inspect p.bin");
     assert_eq!(inspect["model"], "31");
     assert_eq!(inspect["serial"], "S7");
     assert_eq!(inspect["created"], "2026-01-02");
@@ -124,9 +121,7 @@ fn blob_bytes_do_not_depend_on_threads_and_follow_the_seed() {
         ("draw2.bin", "--train 200 --threads 2"),
         ("draw3.bin", "--train 200 --seed 2"),
     ] {
-        bench.good(&format!(
-            "fit log.csv.gz --stage stage.toml --out {out} {arguments}"
-        ));
+        bench.good(&format!("fit log.csv.gz --out {out} {arguments}"));
     }
     assert_eq!(bench.read("one.bin"), bench.read("two.bin"));
     assert_eq!(bench.read("draw1.bin"), bench.read("draw2.bin"));
@@ -140,13 +135,12 @@ fn every_model_and_form_fits_and_richer_models_fit_better() {
     for model in ["12", "15", "30", "31"] {
         for project in ["linear", "delta", "none"] {
             let arguments = format!(
-                "fit log.csv --stage stage.toml --out p.bin --json p.json --solver lm --model {model} --project {project}"
+                "fit log.csv --out p.bin --json p.json --solver lm --model {model} --project {project}"
             );
             bench.good(&arguments);
             let json = bench.json("p.json");
             assert_eq!(json["model"], model);
-            bench.good("eval p.bin log.csv --stage stage.toml --json eval.json");
-            let eval = bench.json("eval.json");
+            let eval = bench.figures("eval p.bin log.csv");
             assert_eq!(
                 (&eval["errors"], &eval["delta"]),
                 (&json["errors"], &json["delta"]),
@@ -174,7 +168,7 @@ fn movements_that_a_plain_draw_misses_are_named_and_a_stratified_one_misses_none
     let bench = Bench::with_log();
     for (draw, missed) in [("plain", 1), ("stratified", 0)] {
         bench.good(&format!(
-            "fit log.csv --stage stage.toml --out p.bin --json p.json --train 150 --draw {draw}"
+            "fit log.csv --out p.bin --json p.json --train 150 --draw {draw}"
         ));
         let json = bench.json("p.json");
         assert_eq!(json["train_rows"], 150);

@@ -11,8 +11,7 @@ fn a_range_narrower_than_the_errors_is_a_warning_and_one_without_width_holds_its
             "stage.toml",
             STAGE_TOML.replace("eta_a = [0.78, 0.98]", &format!("eta_a = {range}")),
         );
-        bench.good("fit log.csv --stage stage.toml --out p.bin --json p.json");
-        let json = bench.json("p.json");
+        let json = bench.figures("fit log.csv --out p.bin");
         let eta = &json["parameters"]["eta_a"];
         if range == "[0.85, 0.85]" {
             assert_eq!(eta["value"], 0.85);
@@ -37,7 +36,7 @@ fn a_range_narrower_than_the_errors_is_a_warning_and_one_without_width_holds_its
 #[test]
 fn a_blob_of_other_scales_is_refused() {
     let bench = Bench::with_log();
-    bench.good("fit log.csv --stage stage.toml --out p.bin");
+    bench.good("fit log.csv --out p.bin");
     for (from, to, key) in [
         (
             "m_per_count = 6.25e-8",
@@ -52,12 +51,8 @@ fn a_blob_of_other_scales_is_refused() {
     ] {
         assert!(STAGE_TOML.contains(from));
         bench.write("stage.toml", STAGE_TOML.replace(from, to));
-        bench.bad("eval p.bin log.csv --stage stage.toml", 3, &[key]);
-        bench.bad(
-            "decode p.bin log.csv --stage stage.toml --out pose.csv",
-            3,
-            &[key],
-        );
+        bench.bad("eval p.bin log.csv", 3, &[key]);
+        bench.bad("decode p.bin log.csv --out pose.csv", 3, &[key]);
     }
     assert!(bench.holds_only(&["log.csv", "p.bin"]));
 }
@@ -67,8 +62,7 @@ fn movements_of_several_logs_are_distinguished() {
     let bench = Bench::new();
     bench.write("a.csv", thinned_log(20, |m| m < 30));
     bench.write("b.csv", thinned_log(20, |m| m < 57));
-    bench.good("fit a.csv b.csv --stage stage.toml --out p.bin --json p.json");
-    let json = bench.json("p.json");
+    let json = bench.figures("fit a.csv b.csv --out p.bin");
     assert_eq!(json["zero_deviations"][0]["movement"], "a.csv:0");
     assert_eq!(json["zero_deviations"][30]["movement"], "b.csv:0");
 }
@@ -80,7 +74,7 @@ fn a_fit_goes_on_where_the_system_starts_no_threads() {
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
     use std::os::unix::process::CommandExt;
     let bench = Bench::with_log();
-    let fit = "exec ./host-fit fit log.csv --stage stage.toml --json p.json --out";
+    let fit = "exec ./host-fit fit log.csv --json p.json --out";
     std::fs::copy(env!("CARGO_BIN_EXE_host-fit"), bench.path("host-fit")).expect("copied");
     let folder = bench.path("");
     let everyone = std::fs::Permissions::from_mode(0o777);

@@ -2,35 +2,26 @@
 
 use crate::common::{Bench, log, stderr, stdout, with_cell};
 use host_fit::output::blob_file;
-use std::process::Stdio;
 
 #[test]
 fn an_output_that_cannot_be_written_is_refused_and_the_old_one_stays() {
     let bench = Bench::with_log();
-    bench.bad(
-        "fit log.csv --stage stage.toml --out no/such/p.bin",
-        3,
-        &["no/such"],
-    );
+    bench.bad("fit log.csv --out no/such/p.bin", 3, &["no/such"]);
     // None of the outputs is written when one of them cannot be.
     bench.write("file", "");
     for output in ["--json no/such/p.json", "--report file"] {
-        let arguments = format!("fit log.csv --stage stage.toml --out p.bin {output}");
+        let arguments = format!("fit log.csv --out p.bin {output}");
         bench.bad(&arguments, 3, &["folder"]);
         assert!(!bench.has("p.bin"), "{output}");
     }
     for twice in ["--json ./p.bin", "--report ./p.bin"] {
-        let twice = format!("fit log.csv --stage stage.toml --out p.bin {twice}");
+        let twice = format!("fit log.csv --out p.bin {twice}");
         bench.bad(&twice, 2, &["another output"]);
     }
     std::fs::create_dir(bench.path("p.bin")).expect("a folder");
-    bench.bad("fit log.csv --stage stage.toml --out p.bin", 3, &["p.bin"]);
+    bench.bad("fit log.csv --out p.bin", 3, &["p.bin"]);
     bench.write("old.bin", "old");
-    bench.bad(
-        "fit nowhere.csv --stage stage.toml --out old.bin",
-        3,
-        &["nowhere.csv"],
-    );
+    bench.bad("fit nowhere.csv --out old.bin", 3, &["nowhere.csv"]);
     assert_eq!(bench.read("old.bin"), b"old");
 }
 
@@ -44,10 +35,10 @@ fn no_output_takes_the_place_of_an_input() {
         bench.write(file, log());
     }
     let taken = |command: &str| bench.bad(command, 2, &["name another"]);
-    taken("fit r/index.html --stage stage.toml --out p.bin --report r");
-    taken("fit log.csv --stage stage.toml --out r/index.html --report r");
-    taken("fit log.csv --stage stage.toml --out p.bin --json r/index.html --report r");
-    taken("compare c/runs.csv --stage stage.toml --out c --seeds 1 --evaluations 100");
+    taken("fit r/index.html --out p.bin --report r");
+    taken("fit log.csv --out r/index.html --report r");
+    taken("fit log.csv --out p.bin --json r/index.html --report r");
+    taken("compare c/runs.csv --out c --seeds 1 --evaluations 100");
     bench.write("c/table.md", "");
     taken("compare log.csv --stage c/table.md --out c --seeds 1 --evaluations 100");
     let stage = std::fs::read(bench.path("stage.toml")).expect("there");
@@ -60,12 +51,11 @@ fn no_output_takes_the_place_of_an_input() {
 fn an_output_that_cannot_be_written_leaves_the_others_as_they_were() {
     let bench = Bench::with_log();
     bench.write("p.bin", "the blob before");
-    let fit = "fit log.csv --stage stage.toml --model 31 --out p.bin --json /dev/full";
+    let fit = "fit log.csv --model 31 --out p.bin --json /dev/full";
     bench.bad(fit, 3, &["/dev/full", "no room"]);
     assert_eq!(bench.text("p.bin"), "the blob before");
     bench.write("truth.csv", "the truth before");
-    let simulate =
-        "simulate --stage stage.toml --protocol service --seed 3 --out /dev/full --truth truth.csv";
+    let simulate = "simulate --protocol service --seed 3 --out /dev/full --truth truth.csv";
     bench.bad(simulate, 3, &["/dev/full", "no room"]);
     assert_eq!(bench.text("truth.csv"), "the truth before");
     assert!(bench.holds_only(&["log.csv", "p.bin", "truth.csv"]));
@@ -79,9 +69,9 @@ fn an_output_that_is_an_input_by_another_name_is_refused() {
     std::os::unix::fs::symlink("new.bin", bench.path("soft")).expect("linked");
     for command in [
         "live hard --can no-such-bus --record log.csv",
-        "fit log.csv --stage stage.toml --out hard",
-        "fit log.csv --stage stage.toml --out soft --json new.bin",
-        "fit log.csv --stage stage.toml --out - --json /dev/stdout",
+        "fit log.csv --out hard",
+        "fit log.csv --out soft --json new.bin",
+        "fit log.csv --out - --json /dev/stdout",
     ] {
         bench.bad(command, 2, &["another"]);
     }
@@ -95,15 +85,11 @@ fn a_file_that_is_standard_input_is_no_output() {
     let bench = Bench::with_log();
     let log_file = || OpenOptions::new().append(true).open(bench.path("log.csv"));
     for (command, output) in [
-        ("fit - --stage stage.toml --out log.csv", None),
-        ("check - --stage stage.toml --json log.csv", None),
-        (
-            "decode p.bin - --stage stage.toml --out -",
-            Some(log_file()),
-        ),
+        ("fit - --out log.csv", None),
+        ("check - --json log.csv", None),
+        ("decode p.bin - --out -", Some(log_file())),
     ] {
-        let arguments: Vec<&str> = command.split(' ').collect();
-        let mut program = bench.command(&arguments);
+        let mut program = bench.command(command);
         program.stdin(File::open(bench.path("log.csv")).expect("there"));
         if let Some(output) = output {
             program.stdout(output.expect("there"));
@@ -122,16 +108,14 @@ fn a_file_that_is_standard_input_is_no_output() {
 #[test]
 fn standard_output_carries_an_output_alone_by_whatever_name() {
     let bench = Bench::with_log();
-    bench.good("fit log.csv --stage stage.toml --out p.bin");
-    bench.good("decode p.bin log.csv --stage stage.toml --out pose.csv");
+    bench.good("fit log.csv --out p.bin");
+    bench.good("decode p.bin log.csv --out pose.csv");
     for name in ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"] {
-        let decoded = bench.good(&format!(
-            "decode p.bin log.csv --stage stage.toml --out {name}"
-        ));
+        let decoded = bench.good(&format!("decode p.bin log.csv --out {name}"));
         assert_eq!(stdout(&decoded), bench.text("pose.csv"), "{name}");
         assert!(stderr(&decoded).contains("rows, "), "{name}");
         // The header of an array holds the number of rows.
-        let array = format!("decode p.bin log.csv --stage stage.toml --format npy --out {name}");
+        let array = format!("decode p.bin log.csv --format npy --out {name}");
         bench.bad(&array, 2, &["--format npy", "name a file"]);
     }
 }
@@ -140,20 +124,15 @@ fn standard_output_carries_an_output_alone_by_whatever_name() {
 #[test]
 fn a_reader_that_has_seen_enough_is_no_error() {
     let bench = Bench::with_log();
-    bench.good("fit log.csv --stage stage.toml --out p.bin");
+    bench.good("fit log.csv --out p.bin");
     for command in [
-        "decode p.bin log.csv --stage stage.toml --out /dev/stdout",
-        "decode p.bin log.csv --stage stage.toml --out -",
+        "decode p.bin log.csv --out /dev/stdout",
+        "decode p.bin log.csv --out -",
         "inspect p.bin",
         "completions bash",
         "--help",
     ] {
-        let mut command = bench.command(&command.split(' ').collect::<Vec<_>>());
-        let mut child = command
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the program runs");
+        let (mut child, _) = bench.reading(command);
         drop(child.stdout.take());
         let ended = child.wait_with_output().expect("it ends");
         assert_eq!(ended.status.code(), Some(0), "{command:?}");
@@ -166,12 +145,12 @@ fn text_from_a_file_forges_no_line() {
     let bench = Bench::new();
     let forged = with_cell(&log(), 4, "ifm_x_nm", "1\u{202e}warning: forged");
     bench.write("log.csv", forged);
-    let of_log = stderr(&bench.run("fit log.csv --stage stage.toml --out p.bin"));
+    let of_log = stderr(&bench.run("fit log.csv --out p.bin"));
     let stage = bench.text("stage.toml") + "\"a\\nwarning: forged\\u001B[2J\" = 1\n";
     bench.write("odd.toml", stage);
     let of_stage = stderr(&bench.run("check log.csv --stage odd.toml"));
     bench.write("log.csv", log());
-    bench.good("fit log.csv --stage stage.toml --out p.bin");
+    bench.good("fit log.csv --out p.bin");
     let mut set = blob_file::read(&bench.path("p.bin")).expect("a blob");
     set.serial = "a\nwarning: forged\u{1b}[2J".try_into().expect("short");
     blob_file::write(&bench.path("q.bin"), &set).expect("written");
@@ -190,7 +169,7 @@ fn text_from_a_file_forges_no_line() {
 #[test]
 fn errors_of_a_fit_that_cannot_be_are_unknown() {
     let bench = Bench::with_log();
-    bench.good("fit log.csv --stage stage.toml --out p.bin");
+    bench.good("fit log.csv --out p.bin");
     let mut set = blob_file::read(&bench.path("p.bin")).expect("a blob");
     set.fit.rms = [3e38, -1e-6, 1e-6];
     blob_file::write(&bench.path("p.bin"), &set).expect("written");

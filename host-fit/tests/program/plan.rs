@@ -7,7 +7,7 @@ use host_fit::input::shipped::STAGE_TOML;
 #[test]
 fn a_planned_run_is_written_shown_and_can_be_rehearsed() {
     let bench = Bench::new();
-    let planned = bench.good("plan --stage stage.toml --seconds 60 --out run.csv --json plan.json");
+    let planned = bench.good("plan --seconds 60 --out run.csv --json plan.json");
     let shown = stdout(&planned);
     assert!(shown.contains("30001"), "{shown}");
     assert!(shown.contains("least determined") && shown.contains("wrote run.csv"));
@@ -21,14 +21,14 @@ fn a_planned_run_is_written_shown_and_can_be_rehearsed() {
     let rz = shown.lines().find(|line| line.starts_with("  rz "));
     assert!(rz.is_some_and(|line| line.contains("500.0")), "{shown}");
 
-    bench.good("simulate --stage stage.toml --plan run.csv --seed 2 --out log.csv");
+    bench.good("simulate --plan run.csv --seed 2 --out log.csv");
     assert_eq!(bench.text("log.csv").lines().count(), 30_002);
 }
 
 #[test]
 fn what_cannot_be_planned_leaves_no_file() {
     let bench = Bench::new();
-    let plan = "plan --stage stage.toml --out run.csv --json plan.json";
+    let plan = "plan --out run.csv --json plan.json";
     bench.bad(
         &format!("{plan} --seconds 2"),
         4,
@@ -42,15 +42,11 @@ fn what_cannot_be_planned_leaves_no_file() {
         );
     }
     bench.bad(
-        "plan --stage stage.toml --seconds 20 --out - --json -",
+        "plan --seconds 20 --out - --json -",
         2,
         &["standard output is another output"],
     );
-    bench.bad(
-        "plan --stage stage.toml --seconds 20 --out stage.toml",
-        2,
-        &["is an input"],
-    );
+    bench.bad("plan --seconds 20 --out stage.toml", 2, &["is an input"]);
     bench.write(
         "fast.toml",
         STAGE_TOML.replace("period_s = 0.002", "period_s = 1e-6"),

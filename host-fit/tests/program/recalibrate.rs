@@ -22,12 +22,10 @@ fn bench() -> Bench {
     bench.write("y.csv", plan(2.0, [0.0, 4.0, 0.0, 0.0, 0.0, 0.0]));
     for (run, log) in [("run", "log"), ("y", "sine")] {
         bench.good(&format!(
-            "simulate --stage stage.toml --plan {run}.csv --seed 3 --out {log}.csv"
+            "simulate --plan {run}.csv --seed 3 --out {log}.csv"
         ));
     }
-    bench.good(
-        "fit log.csv --stage stage.toml --out old.bin --model field --serial HS-3 --json fit.json",
-    );
+    bench.good("fit log.csv --out old.bin --model field --serial HS-3 --json fit.json");
     bench
 }
 
@@ -36,7 +34,7 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
     let bench = bench();
     bench.write("weak.csv", with_gains(&bench.text("sine.csv"), [0.99; 3]));
     bench.write("later.csv", with_gains(&bench.text("log.csv"), [0.99; 3]));
-    let recalibrate = "recalibrate old.bin weak.csv --stage stage.toml --what gain";
+    let recalibrate = "recalibrate old.bin weak.csv --what gain";
     bench.good(&format!(
         "{recalibrate} --out new.bin --created today --json new.json"
     ));
@@ -64,17 +62,14 @@ fn a_common_gain_is_found_from_two_seconds_along_y() {
     for axis in 0..3 {
         assert!(after[axis] < 1.02 * good[axis], "{after:?} {good:?}");
     }
-    bench.good("inspect new.bin --json inspect.json");
-    let inspected = bench.json("inspect.json");
+    let inspected = bench.figures("inspect new.bin");
     assert_eq!(
         (&inspected["serial"], &inspected["created"]),
         (&"HS-3".into(), &"today".into())
     );
 
     // The new posterior carries on: here all parameters, from the new blob.
-    bench.good(
-        "recalibrate new.bin later.csv --stage stage.toml --what all --out all.bin --json all.json",
-    );
+    bench.good("recalibrate new.bin later.csv --what all --out all.bin --json all.json");
     let change = number(&bench.json("all.json")["gains"]["b"]["change_percent"]);
     assert!(change.abs() < 0.05, "{change}");
     // The same without an old posterior: said, and none is written.
@@ -102,8 +97,7 @@ fn bad_rows_do_not_bend_it_and_what_does_is_in_the_verdict() {
         (drifts, "gain_drift", "limited"),
     ] {
         bench.write("new.csv", log);
-        bench.good("recalibrate old.bin new.csv --stage stage.toml --what all --out new.bin --json new.json");
-        let json = bench.json("new.json");
+        let json = bench.figures("recalibrate old.bin new.csv --what all --out new.bin");
         assert_eq!(json["findings"][0]["code"], code, "{json}");
         assert_eq!(json["verdict"], verdict, "{code}");
         let change = number(&json["gains"]["a"]["change_percent"]);
@@ -111,8 +105,7 @@ fn bad_rows_do_not_bend_it_and_what_does_is_in_the_verdict() {
     }
     // A fit takes it off, and says so beside the blob.
     // A limit holds for service, not for the fault in the log.
-    let fitted = bench
-        .good("fit new.csv --stage stage.toml --out repaired.bin --limit y=0.55um --json fit.json");
+    let fitted = bench.good("fit new.csv --out repaired.bin --limit y=0.55um --json fit.json");
     assert!(stdout(&fitted).contains("errors on the log still have the faults"));
     let errors = &bench.json("fit.json")["errors"];
     assert!(number(&errors["y"]["rmse_um"]) > 0.55, "{errors}");
@@ -133,7 +126,7 @@ fn bad_rows_do_not_bend_it_and_what_does_is_in_the_verdict() {
     assert!(!stdout(&bench.good("inspect repaired.bin")).contains(line));
     std::fs::remove_file(bench.path("repaired.bin.posterior")).expect("removed");
     assert!(stdout(&bench.good("inspect repaired.bin")).contains(line));
-    let fit = "fit new.csv --stage stage.toml --out other.bin --limit y=0.2um";
+    let fit = "fit new.csv --out other.bin --limit y=0.2um";
     let words = "the errors in service are beyond --limit: y 0.4";
     bench.bad(fit, 4, &[words]);
 }
@@ -144,7 +137,7 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
     let sine = bench.text("sine.csv");
     bench.write("weak-a.csv", with_gains(&sine, [0.99, 1.0, 1.0]));
     let refused = |arguments: &str, status: i32, parts: &[&str]| {
-        let arguments = format!("recalibrate {arguments} --stage stage.toml --out new.bin");
+        let arguments = format!("recalibrate {arguments} --out new.bin");
         bench.bad(&arguments, status, parts);
         assert!(!bench.has("new.bin") && !bench.has("new.bin.posterior"));
     };
@@ -162,7 +155,7 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
     ];
     refused("old.bin weak-a.csv --what gain", 4, &parts);
 
-    bench.good("fit log.csv --stage stage.toml --out p31.bin --model 31");
+    bench.good("fit log.csv --out p31.bin --model 31");
     let parts = ["Model (31)", "--model field"];
     refused("p31.bin sine.csv --what gain", 3, &parts);
     let posterior = bench.read("old.bin.posterior");
@@ -174,7 +167,7 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
         3,
         &["old.bin.posterior", "damaged"],
     );
-    bench.good("fit log.csv --stage stage.toml --out other.bin --model field --serial OTHER");
+    bench.good("fit log.csv --out other.bin --model field --serial OTHER");
     bench.write("other.bin.posterior", &posterior);
     refused(
         "other.bin log.csv --what all",
@@ -192,12 +185,12 @@ fn what_a_log_cannot_tell_is_refused_and_no_blob_is_left() {
         3,
         &["old.bin.posterior does not exist", "--what gains"],
     );
-    let arguments = "recalibrate old.bin sine.csv --stage stage.toml --what gain --out old.bin";
+    let arguments = "recalibrate old.bin sine.csv --what gain --out old.bin";
     bench.bad(arguments, 2, &["old.bin is an input"]);
     bench.write("old.bin.posterior", &posterior);
     for command in [
         "diff old.bin old.bin --json old.bin.posterior",
-        "decode old.bin short.csv --stage stage.toml --uncertainty --out old.bin.posterior",
+        "decode old.bin short.csv --uncertainty --out old.bin.posterior",
     ] {
         bench.bad(command, 2, &["old.bin.posterior is an input"]);
     }

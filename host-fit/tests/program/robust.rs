@@ -1,7 +1,7 @@
 //! Bad rows in a log, and how far a blob can be trusted: losses, cross-validation, uncertainty of
 //! poses, the difference between blobs.
 
-use crate::common::{Bench, changed, log, number, stderr, stdout, thinned_log, unzipped};
+use crate::common::{Bench, changed, log, number, rows, stderr, stdout, thinned_log, unzipped};
 use host_fit::input::shipped::{RUN_GZ, SERVICE_GZ};
 
 const HALL_CODES_IN_50_UM: i64 = 800;
@@ -38,7 +38,7 @@ fn bench() -> Bench {
     let bench = Bench::new();
     bench.write("run.csv", run());
     bench.write("service.csv.gz", SERVICE_GZ);
-    bench.good("fit run.csv --stage stage.toml --out clean.bin --loss none");
+    bench.good("fit run.csv --out clean.bin --loss none");
     bench
 }
 
@@ -54,11 +54,11 @@ fn assert_as_good(bench: &Bench, blob: &str, clean: &str, log: &str, limit: f64)
 fn a_clean_log_gives_the_same_bytes_with_and_without_a_loss() {
     let bench = bench();
     bench.write("paper.csv", log());
-    bench.good("fit paper.csv --stage stage.toml --out 31.bin --loss none");
+    bench.good("fit paper.csv --out 31.bin --loss none");
     for (log, clean) in [("run.csv", "clean.bin"), ("paper.csv", "31.bin")] {
         for loss in ["", "--loss huber", "--loss cauchy"] {
             bench.good(&format!(
-                "fit {log} --stage stage.toml --out robust.bin --json fit.json {loss}"
+                "fit {log} --out robust.bin --json fit.json {loss}"
             ));
             assert!(
                 bench.read("robust.bin") == bench.read(clean),
@@ -73,18 +73,17 @@ fn a_clean_log_gives_the_same_bytes_with_and_without_a_loss() {
 fn one_row_in_a_hundred_off_by_50_um_costs_nothing_in_service() {
     let bench = bench();
     bench.write("jumps.csv", with_jumps(&bench.text("run.csv")));
-    bench.good("fit jumps.csv --stage stage.toml --out robust.bin --json fit.json");
-    let report = bench.json("fit.json");
+    let report = bench.figures("fit jumps.csv --out robust.bin");
     assert_eq!(report["model"], "field");
     assert_eq!(
         (&report["loss"], &report["outlier_rows"]),
         (&"cauchy".into(), &78.into())
     );
     assert_as_good(&bench, "robust.bin", "clean.bin", "service.csv.gz", 1.005);
-    bench.good("fit jumps.csv --stage stage.toml --out one.bin --threads 1");
+    bench.good("fit jumps.csv --out one.bin --threads 1");
     assert!(bench.read("one.bin") == bench.read("robust.bin"));
     // Least squares follows them, and the verdict says so.
-    let bent = "fit jumps.csv --stage stage.toml --out bent.bin --model field --loss none";
+    let bent = "fit jumps.csv --out bent.bin --model field --loss none";
     bench.bad(bent, 4, &["times the noise floor at work"]);
     bench.good(&format!("{bent} --force --json bent.json"));
     assert_eq!(bench.json("bent.json")["verdict"], "refused");
@@ -111,12 +110,10 @@ fn model_31_forgets_a_stuck_movement_and_jumps() {
     });
     bench.write("stuck.csv", stuck);
     bench.write("jumps.csv", with_jumps(&log));
-    bench.good("fit clean.csv --stage stage.toml --out clean.bin --model 31");
+    bench.good("fit clean.csv --out clean.bin --model 31");
     for log in ["stuck", "jumps"] {
         for (loss, limit) in [("cauchy", 1.005), ("huber", 1.05)] {
-            let fit = format!(
-                "fit {log}.csv --stage stage.toml --out {log}.bin --model 31 --loss {loss}"
-            );
+            let fit = format!("fit {log}.csv --out {log}.bin --model 31 --loss {loss}");
             bench.good(&fit);
             assert_as_good(
                 &bench,
@@ -138,11 +135,11 @@ fn a_log_of_which_a_tenth_is_left_out_of_account_is_refused_with_the_place() {
         }
     });
     bench.write("inverted.csv", inverted);
-    let fit = "fit inverted.csv --stage stage.toml --out p.bin";
+    let fit = "fit inverted.csv --out p.bin";
     let parts = ["of 5700 rows", "from movement 5", "to movement 56"];
     bench.bad(fit, 4, &parts);
     assert!(!bench.has("p.bin"));
-    bench.bad("check inverted.csv --stage stage.toml", 4, &parts);
+    bench.bad("check inverted.csv", 4, &parts);
     bench.good(&format!("{fit} --force"));
 }
 
@@ -150,7 +147,7 @@ fn a_log_of_which_a_tenth_is_left_out_of_account_is_refused_with_the_place() {
 fn a_search_alone_refuses_a_loss() {
     let bench = Bench::new();
     bench.write("log.csv", thinned_log(200, |_| true));
-    let fit = "fit log.csv --stage stage.toml --out p.bin --model 31 --solver shtlbo";
+    let fit = "fit log.csv --out p.bin --model 31 --solver shtlbo";
     bench.bad(&format!("{fit} --loss cauchy"), 2, &["--loss", "shtlbo"]);
     bench.good(&format!("{fit} --loss none"));
     bench.good(fit);
@@ -163,7 +160,7 @@ fn rows_left_out_are_predicted_about_as_well_as_rows_fitted() {
     bench.write("paper.csv", log());
     for (log, split) in [("run.csv", "time"), ("paper.csv", "movements")] {
         bench.good(&format!(
-            "fit {log} --stage stage.toml --out p.bin --json fit.json --cross-validate"
+            "fit {log} --out p.bin --json fit.json --cross-validate"
         ));
         let found = &bench.json("fit.json")["cross_validation"];
         assert_eq!(
@@ -195,43 +192,30 @@ fn rows_left_out_are_predicted_about_as_well_as_rows_fitted() {
 #[test]
 fn poses_come_with_an_uncertainty_that_covers_their_errors() {
     let bench = bench();
-    let decode = "decode clean.bin service.csv.gz --stage stage.toml";
+    let decode = "decode clean.bin service.csv.gz";
     bench.good(&format!("{decode} --out with.csv --uncertainty"));
     bench.good(&format!("{decode} --out without.csv"));
     let (with, without) = (bench.text("with.csv"), bench.text("without.csv"));
     let service = unzipped(SERVICE_GZ);
-    let truth = |line: &str| -> Vec<f64> {
-        let cells = line.split(',').skip(2).take(3);
-        cells.map(|cell| cell.parse().expect("a number")).collect()
-    };
-    let names: Vec<&str> = service
-        .lines()
-        .next()
-        .expect("a header")
-        .split(',')
-        .collect();
-    assert_eq!(names[2..5], ["x_m", "y_m", "rz_rad"]);
-    let (mut rows, mut within) = (0.0, [0.0; 3]);
-    let lines = with.lines().zip(without.lines()).zip(service.lines());
-    for ((with, without), service) in lines.skip(1) {
+    assert!(service.contains(",x_m,y_m,rz_rad,"));
+    for (with, without) in with.lines().zip(without.lines()) {
         assert!(with.starts_with(without) && with[without.len()..].starts_with(','));
-        let cells: Vec<f64> = with
-            .split(',')
-            .map(|c| c.parse().expect("a number"))
-            .collect();
-        for (axis, truth) in truth(service).into_iter().enumerate() {
-            let error = cells[2 + axis] - truth * 1e6;
-            within[axis] += f64::from(u8::from(error.abs() <= 1.96 * cells[9 + axis]));
+    }
+    let (poses, truth) = (rows(&with), rows(&service));
+    let mut within = [0.0; 3];
+    for (pose, truth) in poses.iter().zip(&truth) {
+        for (axis, within) in within.iter_mut().enumerate() {
+            let error = pose[2 + axis] - truth[2 + axis] * 1e6;
+            *within += f64::from(u8::from(error.abs() <= 1.96 * pose[9 + axis]));
         }
-        rows += 1.0;
     }
     for (axis, within) in within.into_iter().enumerate() {
-        let share = within / rows;
+        let share = within / poses.len() as f64;
         assert!((0.93..0.97).contains(&share), "{axis}: {share}");
     }
     // Model (31) does not know, and neither does a blob without its posterior.
-    bench.good("fit run.csv --stage stage.toml --out 31.bin --model 31");
-    let to = "service.csv.gz --stage stage.toml --out u.csv --uncertainty";
+    bench.good("fit run.csv --out 31.bin --model 31");
+    let to = "service.csv.gz --out u.csv --uncertainty";
     bench.bad(
         &format!("decode 31.bin {to}"),
         3,
@@ -249,9 +233,8 @@ fn poses_come_with_an_uncertainty_that_covers_their_errors() {
 #[test]
 fn diff_tells_a_change_in_units_in_sigma_and_as_a_pose() {
     let bench = bench();
-    bench.good("fit run.csv --stage stage.toml --out 31.bin --model 31 --serial S2");
-    bench.good("diff clean.bin clean.bin --json same.json");
-    let same = bench.json("same.json");
+    bench.good("fit run.csv --out 31.bin --model 31 --serial S2");
+    let same = bench.figures("diff clean.bin clean.bin");
     assert_eq!(same["same_logs"], true);
     assert_eq!(same["parameters"]["eta_a"]["sigma"], 0.0);
     assert_eq!(same["pose_difference"]["axes"]["x"]["peak_um"], 0.0);

@@ -1,7 +1,6 @@
 //! The population searches through the command line, on the log that ships with the program.
 
-use crate::common::{Bench, stderr, stdout};
-use serde_json::Value;
+use crate::common::{Bench, interrupt, number, stderr, stdout};
 
 fn bench() -> Bench {
     let bench = Bench::new();
@@ -9,14 +8,10 @@ fn bench() -> Bench {
     bench
 }
 
-fn number(json: &Value, key: &str) -> f64 {
-    json[key].as_f64().expect("a number")
-}
-
 #[test]
 fn the_papers_experiment_runs_and_ends_far_above_the_floor() {
     let bench = bench();
-    let fit = "fit log.csv.gz --stage stage.toml --out p.bin --json fit.json --solver shtlbo \
+    let fit = "fit log.csv.gz --out p.bin --json fit.json --solver shtlbo \
                --project none --train 200 --draw plain --seed 3";
     bench.good(fit);
     let json = bench.json("fit.json");
@@ -26,22 +21,22 @@ fn the_papers_experiment_runs_and_ends_far_above_the_floor() {
         (&json["solver"], &json["project"]),
         (&"shtlbo".into(), &"none".into())
     );
-    let fitness = number(&json, "train_fitness");
+    let fitness = number(&json["train_fitness"]);
     assert!((3.0..15.0).contains(&fitness), "{fitness}");
     // With its own zero deviations it is worse than with refitted ones.
-    let rms = |key: &str| number(&json[key]["y"], "rmse_um");
+    let rms = |key: &str| number(&json[key]["y"]["rmse_um"]);
     assert!(rms("errors_solver_delta") > rms("errors"));
 }
 
 #[test]
 fn a_warm_start_continues_from_a_blob() {
     let bench = bench();
-    let fit = "fit log.csv.gz --stage stage.toml --train 200 --project none";
+    let fit = "fit log.csv.gz --train 200 --project none";
     bench.good(&format!("{fit} --solver lm --out lm.bin"));
     bench.good(&format!(
         "{fit} --solver shtlbo --generations 2 --start lm.bin --out p.bin --json p.json"
     ));
-    let fitness = number(&bench.json("p.json"), "train_fitness");
+    let fitness = number(&bench.json("p.json")["train_fitness"]);
     assert!(fitness < 1.3, "{fitness}");
 }
 
@@ -49,7 +44,7 @@ fn a_warm_start_continues_from_a_blob() {
 fn compare_prints_its_table_and_writes_curves() {
     let bench = bench();
     let printed = bench.good(
-        "compare log.csv.gz --stage stage.toml --project delta,linear --solvers shtlbo,de --seeds 2 \
+        "compare log.csv.gz --project delta,linear --solvers shtlbo,de --seeds 2 \
          --evaluations 3000 --population 30 --out report",
     );
     let table = stdout(&printed);
@@ -68,8 +63,8 @@ fn compare_prints_its_table_and_writes_curves() {
     assert_eq!(runs.lines().count(), 1 + 2 * 3 * 2);
     for run in runs.lines().skip(1) {
         let cells: Vec<&str> = run.split(',').collect();
-        let number = |cell: usize| cells[cell].parse::<f64>().expect("a number");
-        let (fitness, floor, evaluations) = (number(3), number(4), number(5));
+        let of = |cell: usize| cells[cell].parse::<f64>().expect("a number");
+        let (fitness, floor, evaluations) = (of(3), of(4), of(5));
         assert!(fitness >= floor * (1.0 - 1e-6), "{run}");
         assert!(
             cells[1] == "lm" || (3000.0..=3030.0).contains(&evaluations),
@@ -83,11 +78,10 @@ fn compare_prints_its_table_and_writes_curves() {
 /// long a busy machine takes to give it these.
 #[cfg(unix)]
 fn interrupted(bench: &Bench, options: &str) -> std::process::Output {
-    let fit = format!(
-        "fit log.csv.gz --stage stage.toml --out p.bin --solver shtlbo --generations 10000000 {options}"
-    );
+    let fit =
+        format!("fit log.csv.gz --out p.bin --solver shtlbo --generations 10000000 {options}");
     let mut running = bench
-        .command(&fit.split_whitespace().collect::<Vec<_>>())
+        .command(&fit)
         .stdout(std::process::Stdio::null())
         .stderr(std::process::Stdio::piped())
         .spawn()
@@ -103,10 +97,7 @@ fn interrupted(bench: &Bench, options: &str) -> std::process::Output {
     while running.try_wait().expect("its state").is_none() && waits() {
         std::thread::sleep(std::time::Duration::from_millis(50));
     }
-    let sent = std::process::Command::new("kill")
-        .args(["-INT", &id])
-        .status();
-    assert!(sent.expect("kill runs").success());
+    interrupt(&running);
     let ended = running.wait_with_output().expect("host-fit ends");
     assert_eq!(ended.status.code(), Some(130));
     ended
@@ -136,30 +127,27 @@ fn an_interrupt_keeps_nothing_that_has_errors_far_above_the_noise() {
 }
 
 #[test]
-fn arguments_that_do_not_go_together_are_a_matter_of_usage() {
-    bench().bad(
-        "fit log.csv.gz --stage stage.toml --out p.bin --solver shtlbo --model 30",
-        2,
-        &["--project", "model (30)", "use --project delta"],
-    );
-}
-
-#[test]
-fn a_search_that_ends_next_to_a_pole_says_so_and_writes_nothing() {
+fn what_a_search_cannot_do_is_refused_and_nothing_is_written() {
     let bench = bench();
-    bench.bad(
-        "fit log.csv.gz --stage stage.toml --out p.bin --solver random --project none --train 200",
-        4,
-        &["random search", "pole of 1/phi", "--generations"],
-    );
+    let fit = "fit log.csv.gz --out p.bin --solver";
+    for (command, status, parts) in [
+        (
+            format!("{fit} shtlbo --model 30"),
+            2,
+            ["--project", "use --project delta"],
+        ),
+        (
+            format!("{fit} random --project none --train 200"),
+            4,
+            ["random search", "pole of 1/phi"],
+        ),
+        (
+            "compare log.csv.gz --seeds 1 --train 60".to_owned(),
+            4,
+            ["60 rows cannot", "189 unknowns"],
+        ),
+    ] {
+        bench.bad(&command, status, &parts);
+    }
     assert!(!bench.has("p.bin"));
-}
-
-#[test]
-fn compare_refuses_fewer_rows_than_unknowns() {
-    bench().bad(
-        "compare log.csv.gz --stage stage.toml --seeds 1 --train 60",
-        4,
-        &["60 rows cannot determine 189 unknowns"],
-    );
 }

@@ -33,19 +33,14 @@ fn a_run_at_work_tells_how_the_stage_follows_temperature() {
     bench.write("run.csv", plan(8.0, [5.0, 8.0, 7.0, 6.0, 4.0, 7.5]));
     let simulate = "simulate --seed 3 --plan run.csv --hour";
     let refused = &["names no column", "[temperature]"];
-    bench.bad(
-        &format!("{simulate} 1 --stage stage.toml --out log.csv"),
-        2,
-        refused,
-    );
+    bench.bad(&format!("{simulate} 1 --out log.csv"), 2, refused);
     for (log, hour) in [("cold", "-0.2"), ("later", "2"), ("warm", "3.5")] {
         bench.good(&format!(
             "{simulate} {hour} --stage warm.toml --out {log}.csv"
         ));
     }
     bench.good("simulate --seed 3 --protocol day --stage warm.toml --out day.csv");
-    bench.good("fit cold.csv --stage warm.toml --model field --out cold.bin --json fit.json");
-    let fit = bench.json("fit.json");
+    let fit = bench.figures("fit cold.csv --stage warm.toml --model field --out cold.bin");
     assert_eq!(fit["temperatures"][0]["sensor"], "mount");
     let findings = fit["findings"].as_array().expect("findings");
     let notes = findings

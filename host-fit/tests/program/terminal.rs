@@ -1,8 +1,6 @@
 //! What goes to standard output and standard error, and what does not.
 
 use crate::common::{Bench, log, stderr, stdout};
-use std::io::Write;
-use std::process::Stdio;
 
 /// With rows every 40 ms, as the stage file says.
 fn bench() -> Bench {
@@ -17,7 +15,7 @@ fn bench() -> Bench {
 #[test]
 fn quiet_tells_errors_only() {
     let bench = bench();
-    let fit = "fit log.csv --stage stage.toml --out p.bin";
+    let fit = "fit log.csv --out p.bin";
     let output = bench.good(fit);
     assert!(stdout(&output).contains("wrote p.bin"));
     assert!(stderr(&output).contains("note: "));
@@ -30,7 +28,7 @@ fn quiet_tells_errors_only() {
 #[test]
 fn verbose_tells_the_time_of_each_step() {
     let bench = bench();
-    let output = bench.good("check log.csv --stage stage.toml -v");
+    let output = bench.good("check log.csv -v");
     for step in ["reading: ", "fit: ", "diagnosis: "] {
         assert!(stderr(&output).contains(step), "{}", stderr(&output));
     }
@@ -39,7 +37,7 @@ fn verbose_tells_the_time_of_each_step() {
 #[test]
 fn a_dash_is_standard_output_for_one_output_and_nothing_else() {
     let bench = bench();
-    let fit = "fit log.csv --stage stage.toml --out";
+    let fit = "fit log.csv --out";
     bench.good(&format!("{fit} p.bin"));
     let blob = bench.good(&format!("{fit} -"));
     assert_eq!(blob.stdout, bench.read("p.bin"));
@@ -56,21 +54,15 @@ fn a_dash_is_standard_output_for_one_output_and_nothing_else() {
 #[test]
 fn a_blob_is_read_from_standard_input() {
     let bench = bench();
-    bench.good("fit log.csv --stage stage.toml --out p.bin --serial HS-1");
-    let mut command = bench.command(&["inspect", "-"]);
-    let command = command.stdin(Stdio::piped()).stdout(Stdio::piped());
-    let mut child = command.spawn().expect("the program runs");
-    let mut input = child.stdin.take().expect("a pipe");
-    input.write_all(&bench.read("p.bin")).expect("written");
-    drop(input);
-    let output = child.wait_with_output().expect("it ends");
+    bench.good("fit log.csv --out p.bin --serial HS-1");
+    let output = bench.piped("inspect -", &bench.read("p.bin"));
     assert!(stdout(&output).contains("HS-1"));
 }
 
 #[test]
 fn nothing_is_coloured_or_drawn_where_there_is_no_terminal() {
     let bench = bench();
-    let output = bench.good("fit log.csv --stage stage.toml --out p.bin --project none");
+    let output = bench.good("fit log.csv --out p.bin --project none");
     assert!(!(stdout(&output) + &stderr(&output)).contains('\u{1b}'));
 }
 

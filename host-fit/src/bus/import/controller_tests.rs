@@ -1,9 +1,9 @@
 //! A record as the stage controller sends it with its own converter: poses, temperatures, codes of 24
 //! bits and times on one bus, over two minutes, by clocks that differ.
 
+use super::tests::files;
 use super::*;
 use crate::input::dataset::Row;
-use crate::input::log::{self, ReadOptions};
 use hal_adapters::can::sensor::{self, TemperatureSender};
 use hal_adapters::can::{BusFrame, Coded, PoseSender};
 use hal_adapters::candump::LogLine;
@@ -96,34 +96,20 @@ fn try_import(
     interferometer: f64,
     offset_us: Option<f64>,
 ) -> Result<(f64, Vec<Row>, ImportReport), ImportError> {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = |name: &str| folder.path().join(name);
     let stage = crate::input::shipped::STAGE_TOML
         .replace("m_per_count = 6.25e-8 ", "m_per_count = 2.44140625e-10 ")
         .replace("m_per_count = 1.5625e-8 ", "m_per_count = 6.103515625e-11 ")
         .replace("-32768", "-8388608")
         .replace("32767", "8388607")
         + "\n[temperature]\nmount = \"mount_c\"\nbody = \"body_c\"\nunit = \"C\"\n";
-    std::fs::write(path("bus.log"), candump(controller)).expect("written");
-    std::fs::write(path("ifm.csv"), reference(interferometer)).expect("written");
-    std::fs::write(path("stage.toml"), stage).expect("written");
-    let settings = ImportSettings {
-        bus: path("bus.log"),
-        reference: path("ifm.csv"),
-        stage: path("stage.toml"),
-        out: path("log.csv"),
-        tolerance_us: None,
-        offset_us: offset_us.unwrap_or(0.0),
-        estimate_offset: offset_us.is_none(),
-        search_s: 0.1,
-        interface: None,
-        layout: None,
-        skip_bad_lines: false,
+    let import = files(&candump(controller), &reference(interferometer));
+    std::fs::write(&import.settings.stage, stage).expect("written");
+    let import = match offset_us {
+        None => import.with(|settings| settings.search_s = 0.1),
+        Some(offset_us) => import.given(offset_us),
     };
-    let report = run(&settings)?;
-    let stage = Stage::from_file(&settings.stage).expect("sound");
-    let read = log::read(&[settings.out], &stage, &ReadOptions::default());
-    let rows = read.expect("a sound log").dataset.rows;
+    let report = run(&import.settings)?;
+    let rows = import.log().rows;
     let distance = rows.iter().flat_map(|row| {
         let [x, y, rz] = row.reference;
         let s = [y + 0.1975 * rz, y - 0.1975 * rz, x - 0.36 * rz];

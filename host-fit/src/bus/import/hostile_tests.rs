@@ -1,7 +1,7 @@
 //! Inputs that are damaged, mixed up or not what they should be. The fuzz targets `candump` and `reference`
 //! try what no one thinks of.
 
-use super::tests::{OFFSET_US, candump, files, read_log, reference};
+use super::tests::{OFFSET_US, candump, files, reference};
 use super::*;
 use crate::input::log::LogProblem;
 use crate::input::source::SourceProblem;
@@ -14,40 +14,37 @@ fn a_device_without_end_is_refused_by_its_start() {
     if !zero.exists() {
         return;
     }
-    let (_folder, mut args) = files("", &reference());
-    args.bus = zero.into();
-    let refused = run(&args);
-    let binary = |refused: Result<_, ImportError>| match refused {
-        Err(ImportError::Log(error)) => matches!(
-            error.problem,
-            LogProblem::Source(SourceProblem::Binary { .. })
-        ),
+    let is_binary = |error: &ImportError| match error {
+        ImportError::Log(error) => {
+            matches!(
+                error.problem,
+                LogProblem::Source(SourceProblem::Binary { .. })
+            )
+        }
         _ => false,
     };
-    assert!(binary(refused));
-    let (_folder, mut args) = files(&candump(|_, _| false), "");
-    args.reference = zero.into();
-    let refused = run(&args);
-    assert!(binary(refused));
+    let bus = files("", &reference()).with(|settings| settings.bus = zero.into());
+    bus.refused(is_binary);
+    let bus = candump(|_, _| false);
+    let ifm = files(&bus, "").with(|settings| settings.reference = zero.into());
+    ifm.refused(is_binary);
 }
 
 #[test]
 fn two_records_in_one_file_are_refused_where_the_second_begins() {
     let bus = candump(|_, _| false);
-    let (_folder, args) = files(&format!("{bus}{bus}"), &reference());
+    let twice = files(&format!("{bus}{bus}"), &reference());
     let second = bus.lines().count() + 1;
-    let refused = run(&args).expect_err("refused");
-    assert!(
-        matches!(refused, ImportError::TwoRecords { line, .. } if (second..second + 40).contains(&line)),
-        "{second}: {refused}"
+    let second = second..second + 40;
+    twice.refused(
+        |error| matches!(error, ImportError::TwoRecords { line, .. } if second.contains(line)),
     );
 }
 
 #[test]
 fn a_frame_for_which_the_clock_leapt_ahead_is_left_out_with_its_tick() {
     let sound = candump(|_, _| false);
-    let (_folder, args) = files(&sound, &reference());
-    let want = run(&args).expect("sound");
+    let want = files(&sound, &reference()).run();
     let leaps = |(number, line): (usize, &str)| {
         let seconds = |line: &str| line[1..line.find('.')?].parse::<u64>().ok();
         match (number, seconds(line)) {
@@ -57,8 +54,7 @@ fn a_frame_for_which_the_clock_leapt_ahead_is_left_out_with_its_tick() {
     };
     let bus: String = sound.lines().enumerate().map(leaps).collect();
     assert!(bus != sound);
-    let (_folder, args) = files(&bus, &reference());
-    let have = run(&args).expect("survived");
+    let have = files(&bus, &reference()).run();
     assert!(want.join.rows - have.join.rows <= 32, "{}", have.join.rows);
 }
 
@@ -70,36 +66,26 @@ fn records_that_have_little_in_common_are_refused() {
         (ticks(0, 750), OFFSET_US + 1.2e6),
         (ticks(100, 300), OFFSET_US),
     ] {
-        let (_folder, mut args) = files(&bus, &reference());
-        args.estimate_offset = false;
-        args.offset_us = offset_us;
-        let refused = run(&args).expect_err("refused");
-        assert!(matches!(refused, ImportError::Unpaired { .. }), "{refused}");
-        assert!(!args.out.exists());
+        let import = files(&bus, &reference()).given(offset_us);
+        import.refused(|error| matches!(error, ImportError::Unpaired { .. }));
     }
 }
 
 #[test]
 fn codes_beyond_the_converter_are_refused_and_those_at_its_rails_left_out() {
-    let stage = |code_max: i32| {
-        let (folder, mut args) = files(&candump(|_, _| false), &reference());
-        args.estimate_offset = false;
-        args.offset_us = OFFSET_US;
-        let text = crate::input::shipped::STAGE_TOML.replace("32767", &code_max.to_string());
-        std::fs::write(&args.stage, text).expect("written");
-        (folder, args)
+    let import = |code_max: &str| {
+        let import = files(&candump(|_, _| false), &reference()).given(OFFSET_US);
+        let text = crate::input::shipped::STAGE_TOML.replace("32767", code_max);
+        std::fs::write(&import.settings.stage, text).expect("written");
+        import
     };
     // A motion of 300 um has codes up to 4800; with the lever arm more.
-    let (_folder, args) = stage(4_000);
-    let refused = run(&args).expect_err("refused");
-    assert!(
-        matches!(refused, ImportError::OutsideConverter { .. }),
-        "{refused}"
-    );
-    let (_folder, args) = stage(4_800);
-    let report = run(&args).expect("imported");
+    let beyond = import("4000");
+    beyond.refused(|error| matches!(error, ImportError::OutsideConverter { .. }));
+    let at_rails = import("4800");
+    let report = at_rails.run();
     assert!(report.bus.saturated > 0);
-    assert_eq!(read_log(&args).rows.len(), report.join.rows);
+    assert_eq!(at_rails.log().rows.len(), report.join.rows);
 }
 
 /// Movements that start their time anew are laid end to end; here the bus ran on between them.
@@ -122,31 +108,20 @@ fn movements_whose_time_starts_anew_after_a_pause_are_refused() {
             writeln!(laid, "{movement},{since_us},{}", cells[2]).expect("a string");
         }
     }
-    let (_folder, mut args) = files(&candump(|_, _| false), &laid);
-    run(&args).expect_err("no offset fits all movements");
-    args.estimate_offset = false;
-    args.offset_us = OFFSET_US;
-    let refused = run(&args).expect_err("refused");
-    assert!(
-        matches!(
-            refused,
-            ImportError::Astray { .. }
-                | ImportError::NoOffset { .. }
-                | ImportError::WrongOffset { .. }
-        ),
-        "{refused}"
-    );
-    assert!(!args.out.exists());
+    let import = files(&candump(|_, _| false), &laid);
+    // No offset fits all movements.
+    import.refused(|_| true);
+    use ImportError::{Astray, NoOffset, WrongOffset};
+    let given = import.given(OFFSET_US);
+    given.refused(|error| matches!(error, Astray { .. } | NoOffset { .. } | WrongOffset { .. }));
 }
 
 #[test]
 fn a_given_offset_that_the_motion_contradicts_is_refused() {
     for (wrong_us, is_sound) in [(0.0, true), (3_000.0, false), (-50_000.0, false)] {
-        let (_folder, mut args) = files(&candump(|_, _| false), &reference());
-        args.estimate_offset = false;
-        args.offset_us = OFFSET_US + wrong_us;
-        assert_eq!(run(&args).is_ok(), is_sound, "{wrong_us}");
-        assert_eq!(args.out.exists(), is_sound);
+        let import = files(&candump(|_, _| false), &reference()).given(OFFSET_US + wrong_us);
+        assert_eq!(run(&import.settings).is_ok(), is_sound, "{wrong_us}");
+        assert_eq!(import.settings.out.exists(), is_sound);
     }
 }
 
@@ -155,14 +130,13 @@ fn a_reference_slower_than_the_servo_is_named_as_that() {
     let ifm = reference();
     let (head, rows) = ifm.split_once('\n').expect("a header");
     let slow: Vec<&str> = rows.lines().step_by(5).collect();
-    let (_folder, mut args) = files(
-        &candump(|_, _| false),
-        &format!("{head}\n{}", slow.join("\n")),
+    let slow = format!("{head}\n{}", slow.join("\n"));
+    let import = files(&candump(|_, _| false), &slow);
+    import.refused(
+        |error| matches!(error, ImportError::Unpaired(counts) if 2 * counts.too_far > counts.ticks),
     );
-    assert!(matches!(
-        run(&args),
-        Err(ImportError::Unpaired(counts)) if 2 * counts.too_far > counts.ticks
-    ));
-    args.tolerance_us = Some(5_000);
-    run(&args).expect("a line over 5 ms");
+    // A line over 5 ms.
+    import
+        .with(|settings| settings.tolerance_us = Some(5_000))
+        .run();
 }

@@ -1,6 +1,6 @@
 //! Frames that the recorder lost or received late: whatever is missing, each row is that of its tick.
 
-use super::tests::{OFFSET_US, files, hall, record, reference};
+use super::tests::{Import, OFFSET_US, files, hall, record, reference};
 use super::*;
 use hal_adapters::can::Coded;
 use std::f64::consts::TAU;
@@ -22,16 +22,10 @@ fn jittered_us(n: u32) -> f64 {
     sampled_us(n) + 150.0 + f64::from(n * 7919 % 1_201)
 }
 
-fn imported(bus: &str) -> Result<String, ImportError> {
-    let (_folder, mut args) = files(bus, &reference());
-    args.estimate_offset = false;
-    args.offset_us = OFFSET_US + 150.0;
-    run(&args)?;
-    Ok(std::fs::read_to_string(&args.out).expect("written"))
-}
-
 /// How many rows a log has, each checked against its own tick.
-fn check(log: &str, what: &str) -> usize {
+fn check(import: &Import, what: &str) -> usize {
+    import.run();
+    let log = std::fs::read_to_string(&import.settings.out).expect("written");
     for line in log.lines().skip(1) {
         let cells: Vec<f64> = line
             .split(',')
@@ -61,8 +55,8 @@ fn frames_that_come_late_all_at_once_with_or_without_a_loss_shift_no_row() {
                     (!is_lost).then(|| jittered_us(if is_late { end } else { n }))
                 });
                 let what = format!("{late} late, {lost} lost, from {start} on");
-                let log = imported(&bus).unwrap_or_else(|error| panic!("{what}: {error}"));
-                assert!(check(&log, &what) > 650, "{what}");
+                let import = files(&bus, &reference()).given(OFFSET_US + 150.0);
+                assert!(check(&import, &what) > 650, "{what}");
             }
         }
     }
@@ -75,8 +69,8 @@ fn a_record_without_time_frames_and_one_of_a_tenth_of_a_second_are_refused() {
         candump(|n, coded| (!is_time(coded)).then(|| jittered_us(n))),
         candump(|n, _| (n < 60).then(|| jittered_us(n))),
     ] {
-        let refused = imported(&bus).expect_err("refused");
-        assert!(matches!(refused, ImportError::NoTicks { .. }), "{refused}");
+        let import = files(&bus, &reference()).given(OFFSET_US);
+        import.refused(|error| matches!(error, ImportError::NoTicks { .. }));
     }
 }
 
@@ -87,10 +81,8 @@ fn a_recorder_whose_clock_is_set_shifts_no_row() {
         for start in [200, 300, 500, 700] {
             let bus = candump(|n, _| Some(jittered_us(n) + if n < start { 0.0 } else { step_us }));
             let what = format!("{step_us} us from {start} on");
-            let (_folder, args) = files(&bus, &reference());
-            run(&args).unwrap_or_else(|error| panic!("{what}: {error}"));
-            let log = std::fs::read_to_string(&args.out).expect("written");
-            assert!(check(&log, &what) > 700, "{what}");
+            let import = files(&bus, &reference());
+            assert!(check(&import, &what) > 700, "{what}");
         }
     }
 }

@@ -5,7 +5,6 @@ use hal_adapters::candump::{LineError, LogLine};
 use runtime::RawFrame;
 use std::f64::consts::TAU;
 use std::fmt::Write;
-use std::path::Path;
 use tempfile::TempDir;
 
 /// Time of the bus less time of the reference, us: the bus counts from 1970.
@@ -89,13 +88,19 @@ pub(super) fn reference() -> String {
     text
 }
 
-pub(super) fn files(bus: &str, reference: &str) -> (TempDir, ImportSettings) {
+/// Two records and their stage in a folder, and how they are joined.
+pub(super) struct Import {
+    _folder: TempDir,
+    pub(super) settings: ImportSettings,
+}
+
+pub(super) fn files(bus: &str, reference: &str) -> Import {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     std::fs::write(path("bus.log"), bus).expect("written");
     std::fs::write(path("ifm.csv"), reference).expect("written");
     std::fs::write(path("stage.toml"), crate::input::shipped::STAGE_TOML).expect("written");
-    let args = ImportSettings {
+    let settings = ImportSettings {
         bus: path("bus.log"),
         reference: path("ifm.csv"),
         stage: path("stage.toml"),
@@ -108,21 +113,52 @@ pub(super) fn files(bus: &str, reference: &str) -> (TempDir, ImportSettings) {
         layout: None,
         skip_bad_lines: false,
     };
-    (folder, args)
+    Import {
+        _folder: folder,
+        settings,
+    }
 }
 
-pub(super) fn read_log(args: &ImportSettings) -> crate::input::dataset::Dataset {
-    let stage = Stage::from_file(&args.stage).expect("the shipped stage");
-    let paths = std::slice::from_ref(&args.out);
-    log::read(paths, &stage, &ReadOptions::default())
-        .expect("a sound log")
-        .dataset
+impl Import {
+    /// With another setting.
+    pub(super) fn with(mut self, change: impl FnOnce(&mut ImportSettings)) -> Self {
+        change(&mut self.settings);
+        self
+    }
+
+    /// With this offset, us.
+    pub(super) fn given(self, offset_us: f64) -> Self {
+        self.with(|settings| {
+            (settings.estimate_offset, settings.offset_us) = (false, offset_us);
+        })
+    }
+
+    pub(super) fn run(&self) -> ImportReport {
+        run(&self.settings).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// Of an import that is refused, and writes nothing.
+    #[track_caller]
+    pub(super) fn refused(&self, is_why: impl Fn(&ImportError) -> bool) -> String {
+        let error = run(&self.settings).expect_err("refused");
+        assert!(is_why(&error), "{error}");
+        assert!(!self.settings.out.exists(), "{error}");
+        error.to_string()
+    }
+
+    /// The log that it wrote.
+    pub(super) fn log(&self) -> crate::input::dataset::Dataset {
+        let stage = Stage::from_file(&self.settings.stage).expect("sound");
+        let paths = std::slice::from_ref(&self.settings.out);
+        let read = log::read(paths, &stage, &ReadOptions::default());
+        read.expect("a sound log").dataset
+    }
 }
 
 #[test]
 fn two_clocks_are_joined_and_the_offset_is_found() {
-    let (_folder, args) = files(&candump(|_, _| false), &reference());
-    let report = run(&args).expect("imported");
+    let import = files(&candump(|_, _| false), &reference());
+    let report = import.run();
     // The earliest frames of each half second tell the recorder's clock, up to 100 us early here; that
     // belongs to the offset.
     let found_us = report.offset.us - OFFSET_US;
@@ -134,7 +170,7 @@ fn two_clocks_are_joined_and_the_offset_is_found() {
         "{standard_error_us}"
     );
     assert_eq!(report.bus.ticks, TICKS as usize);
-    let dataset = read_log(&args);
+    let dataset = import.log();
     assert_eq!(dataset.movements.len(), 3);
     assert!(dataset.rows.len() > 730);
     for row in &dataset.rows {
@@ -155,9 +191,8 @@ fn two_clocks_are_joined_and_the_offset_is_found() {
 /// much the same, and a record that ends early must not be taken for one.
 #[test]
 fn a_record_that_ends_early_is_not_shifted_by_a_movement() {
-    let (_folder, mut args) = files(&candump(|n, _| n >= 460), &reference());
-    args.search_s = 1.2;
-    let report = run(&args).expect("imported");
+    let import = files(&candump(|n, _| n >= 460), &reference());
+    let report = import.with(|settings| settings.search_s = 1.2).run();
     let found_us = report.offset.us - OFFSET_US;
     assert!((-160.0..160.0).contains(&found_us), "{found_us}");
     assert!(report.join.rows > 445);
@@ -177,9 +212,9 @@ fn an_offset_that_noise_leaves_uncertain_is_refused() {
             [a + noise(t_us, 0), b + noise(t_us, 1), c + noise(t_us, 2)]
         };
         let bus = candump_of(|_, _| false, noisy);
-        let (_folder, args) = files(&bus, &reference());
-        let outcome = run(&args);
-        assert_eq!(outcome.is_ok(), args.out.exists());
+        let import = files(&bus, &reference());
+        let outcome = run(&import.settings);
+        assert_eq!(outcome.is_ok(), import.settings.out.exists());
         outcome.map(|report| report.offset.seen.standard_error_us)
     };
     let little_us = standard_error_us(64.0).expect("4 um of noise");
@@ -211,16 +246,9 @@ fn of_a_circle_the_offset_is_uncertain_and_one_that_is_given_is_taken() {
         let [x, y] = circle(1e3 * f64::from(k));
         writeln!(ifm, "{k}000,{x:.12},{y:.12},0").expect("a string");
     }
-    let (_folder, mut args) = files(&bus, &ifm);
-    args.search_s = 0.1;
-    let refused = run(&args).expect_err("refused");
-    assert!(
-        matches!(refused, ImportError::UncertainOffset { .. }),
-        "{refused}"
-    );
-    args.estimate_offset = false;
-    args.offset_us = OFFSET_US;
-    let seen = run(&args).expect("imported").offset.seen;
+    let import = files(&bus, &ifm).with(|settings| settings.search_s = 0.1);
+    import.refused(|error| matches!(error, ImportError::UncertainOffset { .. }));
+    let seen = import.given(OFFSET_US).run().offset.seen;
     assert!(seen.standard_error_us > 1_000.0, "{seen:?}");
 }
 
@@ -232,13 +260,13 @@ fn missing_frames_and_repeated_samples_are_reported_and_leave_gaps() {
     let at = ifm.find(line).expect("that sample");
     let row = ifm[at..].lines().next().expect("a line").to_owned();
     let ifm = ifm.replacen(&row, &format!("{row}\n{row}"), 1);
-    let (_folder, args) = files(&bus, &ifm);
-    let report = run(&args).expect("imported");
+    let import = files(&bus, &ifm);
+    let report = import.run();
     assert_eq!(report.reference.duplicates, 1);
     assert_eq!(report.bus.health.incomplete, 1);
     // Three ticks are gone; the one after them only resumes the sequence.
     assert_eq!((report.bus.gaps, report.bus.ticks_missing), (2, 5));
-    assert_eq!(report.join.rows, read_log(&args).rows.len());
+    assert_eq!(report.join.rows, import.log().rows.len());
 }
 
 #[test]
@@ -258,8 +286,7 @@ fn a_clock_that_steps_back_within_a_tick_moves_no_time() {
         frame: gaps.frame,
     };
     lines[at + 1] = early.to_string();
-    let (_folder, args) = files(&lines.join("\n"), &reference());
-    let report = run(&args).expect("imported");
+    let report = files(&lines.join("\n"), &reference()).run();
     assert!(report.join.rows > 730);
 }
 
@@ -269,36 +296,25 @@ fn a_broken_line_is_refused_with_its_number_or_left_out() {
     let cut = bus.lines().nth(6).expect("a line").len() - 3;
     let mut lines: Vec<&str> = bus.lines().collect();
     lines[6] = &lines[6][..cut];
-    let (_folder, mut args) = files(&lines.join("\n"), &reference());
-    let error = run(&args).expect_err("a broken line");
-    assert!(
-        matches!(
-            error,
-            ImportError::BadLine {
-                line: 7,
-                fault: LineError::BadData { column: 30 },
-                ..
-            }
-        ),
-        "{error}"
+    let import = files(&lines.join("\n"), &reference());
+    let bad = LineError::BadData { column: 30 };
+    import.refused(
+        |error| matches!(error, ImportError::BadLine { line: 7, fault, .. } if *fault == bad),
     );
-    assert!(!args.out.exists());
-    args.skip_bad_lines = true;
-    let report = run(&args).expect("left out");
+    let report = import.with(|settings| settings.skip_bad_lines = true).run();
     assert_eq!(report.bus.bad_lines, 1);
 }
 
 #[test]
 fn records_of_different_runs_and_clocks_are_refused() {
-    let still = "movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm\n";
-    let mut other = still.to_owned();
+    let mut other = "movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm\n".to_owned();
     for k in 0..1_500 {
         writeln!(other, "0,{},{},5,{}", k * 1_000, k * 7 % 13, k * 3 % 7).expect("a string");
     }
-    let (_folder, mut args) = files(&candump(|_, _| false), &other);
-    assert!(matches!(run(&args), Err(ImportError::NoOffset { .. })));
-    args.estimate_offset = false;
-    assert!(matches!(run(&args), Err(ImportError::Unpaired { .. })));
+    let import = files(&candump(|_, _| false), &other);
+    import.refused(|error| matches!(error, ImportError::NoOffset { .. }));
+    let given = import.given(0.0);
+    given.refused(|error| matches!(error, ImportError::Unpaired { .. }));
 }
 
 /// It is read as every log is, without the columns of the probes.
@@ -313,32 +329,22 @@ fn a_fault_of_the_reference_has_its_place() {
             "ifm.csv:3: column 4 (ifm_y1_nm)",
         ),
     ] {
-        let (_folder, args) = files(&candump(|_, _| false), &reference);
-        let message = run(&args).expect_err(&reference).to_string();
-        assert!(
-            message.contains(place) && message.contains("; "),
-            "{message}"
-        );
+        let message = files(&candump(|_, _| false), &reference).refused(|_| true);
+        let is_told = message.contains(place) && message.contains("; ");
+        assert!(is_told, "{message}");
     }
 }
 
 #[test]
 fn a_record_without_sensor_frames_and_one_of_two_interfaces_are_refused() {
     let ifm = reference();
-    let (_folder, args) = files("(1.000000) can0 123#00\n", &ifm);
-    assert!(matches!(
-        run(&args),
-        Err(ImportError::NoTicks { frames: 1, .. })
-    ));
+    let none = files("(1.000000) can0 123#00\n", &ifm);
+    none.refused(|error| matches!(error, ImportError::NoTicks { frames: 1, .. }));
     let two = "(1.000000) can0 123#00\n(1.000000) can1 123#00\n";
-    let (_folder, args) = files(two, &ifm);
-    assert!(matches!(
-        run(&args),
-        Err(ImportError::SeveralInterfaces { line: 2, .. })
-    ));
-    let (_folder, mut args) = files("", &ifm);
-    args.bus = Path::new("/no/such/file").into();
-    assert!(matches!(run(&args), Err(ImportError::Log(_))));
+    let two = files(two, &ifm);
+    two.refused(|error| matches!(error, ImportError::SeveralInterfaces { line: 2, .. }));
+    let no_file = files("", &ifm).with(|settings| settings.bus = "/no/such/file".into());
+    no_file.refused(|error| matches!(error, ImportError::Log(_)));
 }
 
 #[test]
@@ -355,8 +361,7 @@ fn movements_that_start_their_time_anew_follow_each_other() {
         };
         writeln!(ifm, "{movement},{time},{rest}").expect("a string");
     }
-    let (_folder, args) = files(&candump(|_, _| false), &ifm);
-    let report = run(&args).expect("imported");
+    let report = files(&candump(|_, _| false), &ifm).run();
     assert_eq!(report.reference.restarts, 2);
     assert!(report.join.rows > 730);
 }

@@ -1,13 +1,8 @@
 use super::*;
 use crate::finding::Code;
 use crate::input::log::{LogError, LogProblem, LogReading, ReadOptions, read, read_bytes};
-use crate::input::shipped::{LOG_GZ, STAGE_TOML};
-use crate::input::stage::Stage;
+use crate::input::shipped::{LOG_GZ, stage};
 use std::path::{Path, PathBuf};
-
-fn stage() -> Stage {
-    Stage::from_toml(STAGE_TOML, Path::new("stage.toml")).expect("sound")
-}
 
 /// Movements of 20 rows, whose rows `row` gives by movement and row.
 fn movements(count: usize, row: impl Fn(usize, usize, Row) -> Row) -> Dataset {
