@@ -6,7 +6,7 @@
 mod common;
 
 use common::{Fallible, Twin, fitted, median_s, read};
-use host_fit::input::dataset::{Dataset, LoggedFrame};
+use host_fit::input::dataset::Dataset;
 use host_fit::input::shipped::{self, LOG_GZ, RUN_GZ};
 use host_fit::simulate::protocol::Protocol;
 use host_fit::simulate::recording::Recording;
@@ -36,10 +36,7 @@ fn main() -> Fallible<()> {
 /// Each reading is looked at: its words go into a sum.
 fn decode(log: &Dataset) {
     let frames: Vec<RawFrame> = (log.rows.iter())
-        .filter_map(|row| match row.frame {
-            LoggedFrame::Codes(frame) => Some(frame),
-            LoggedFrame::HallCodes { .. } => None,
-        })
+        .filter_map(|row| row.frame.all_codes())
         .collect();
     let blobs: [(&str, &[u8]); 2] = [
         ("31", include_bytes!("../../runtime/examples/stage.bin")),

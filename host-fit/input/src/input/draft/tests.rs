@@ -38,15 +38,20 @@ fn drafted(text: &str) -> Drafted {
 impl Drafted {
     /// The rows by the draft after `fill_in`, or why there are none.
     fn rows(&self, fill_in: impl Fn(&str) -> String) -> Result<Vec<Row>, String> {
-        let text: String = self
-            .draft
-            .text
-            .lines()
-            .map(|line| fill_in(line) + "\n")
-            .collect();
+        let text = self.draft.text.lines().map(|line| fill_in(line) + "\n");
+        let text: String = text.collect();
         let stage = Stage::from_toml(&text, Path::new("stage.toml")).map_err(|e| e.to_string())?;
         let reading = read(&[&self.path], &stage, &ReadOptions::default());
         Ok(reading.map_err(|e| e.to_string())?.dataset.rows)
+    }
+
+    #[track_caller]
+    fn has(&self, part: &str) {
+        assert!(
+            self.draft.text.contains(part),
+            "{part}: {}",
+            self.draft.text
+        );
     }
 }
 
@@ -61,11 +66,7 @@ fn a_draft_with_every_line_filled_in_reads_its_log() {
     assert_eq!((rows.len(), rows[1].t_us, rows[23].movement), (24, 2000, 1));
     assert_eq!(rows[1].reference[0], 0.1e-6);
     assert_eq!((plain.draft.mapped, plain.draft.ignored.len()), (11, 0));
-    assert!(
-        plain.draft.text.contains("period_s = 0.002 "),
-        "{}",
-        plain.draft.text
-    );
+    plain.has("period_s = 0.002 ");
     // Units in a row below, a pose in place of the beams, and columns to leave out.
     let below = "-,ms,um,um,mrad,-,-,-,-,-,-\n";
     let names = "Run,Time,X,Y,Yaw,gap1,gap2,gap3,probe A,probe B,probe C";
@@ -90,12 +91,8 @@ fn a_line_that_is_not_filled_in_is_refused_by_its_key() {
     let volts = PLAIN.replace("Hall A", "Hall A [V]");
     for names in [PLAIN, &volts] {
         let drafted = drafted(&log(names, ""));
-        let lines: Vec<&str> = drafted
-            .draft
-            .text
-            .lines()
-            .filter(|l| l.starts_with(MARK))
-            .collect();
+        let lines = drafted.draft.text.lines();
+        let lines: Vec<&str> = lines.filter(|line| line.starts_with(MARK)).collect();
         assert_eq!(lines.len(), drafted.draft.to_fill_in);
         // Places, scales and lengths: nothing else is left.
         assert_eq!(lines.len(), 10 + usize::from(names != PLAIN));
@@ -105,13 +102,10 @@ fn a_line_that_is_not_filled_in_is_refused_by_its_key() {
                 false => without_mark(line),
             };
             // m_per_count, code_min and code_max stand in two tables.
-            let key = without_mark(left)
-                .split(' ')
-                .next()
-                .map(str::to_owned)
-                .unwrap_or_default();
+            let own = without_mark(left);
+            let key = own.split(' ').next().unwrap_or_default();
             let error = drafted.rows(fill_in).expect_err(left);
-            assert!(error.contains(&key), "{key}: {error}");
+            assert!(error.contains(key), "{key}: {error}");
         }
     }
 }
@@ -119,11 +113,7 @@ fn a_line_that_is_not_filled_in_is_refused_by_its_key() {
 #[test]
 fn what_a_draft_cannot_tell_is_left_to_the_user() {
     let unit = drafted(&log(&PLAIN.replace("Laser X [um]", "Laser X"), ""));
-    assert!(
-        unit.draft
-            .text
-            .contains("# FILL IN: ifm_x = { column = \"Laser X\", unit = \"..\" }")
-    );
+    unit.has("# FILL IN: ifm_x = { column = \"Laser X\", unit = \"..\" }");
     let error = unit.rows(|line| match line.contains("ifm_x") {
         true => line.to_owned(),
         false => without_mark(line),
@@ -134,21 +124,12 @@ fn what_a_draft_cannot_tell_is_left_to_the_user() {
         "{error}"
     );
     let twice = drafted(&log(&PLAIN.replace("cap 2", "gap 1"), ""));
-    assert!(
-        twice
-            .draft
-            .text
-            .contains("# FILL IN: cap_1 = \"cap 1\" or \"gap 1\"")
-    );
+    twice.has("# FILL IN: cap_1 = \"cap 1\" or \"gap 1\"");
     // X beside Y1 and Y2 is a beam.
     let beam = drafted(&log(&PLAIN.replace("Laser ", ""), ""));
-    assert!(
-        beam.draft.text.contains("\nifm_x = \"X [um]\""),
-        "{}",
-        beam.draft.text
-    );
+    beam.has("\nifm_x = \"X [um]\"");
     let none = drafted(&log(&PLAIN.replace("run", "note"), ""));
-    assert!(none.draft.text.contains("# no column for the movement"));
+    none.has("# no column for the movement");
 }
 
 #[test]
@@ -187,7 +168,7 @@ fn times_are_found_under_any_name_and_in_any_unit() {
 fn gaps_in_a_unit_of_length_and_converters_of_24_bits_are_drafted() {
     let um = PLAIN.replace("cap 1,cap 2,cap 3", "cap 1 [um],gap2_um,Cap3 (\u{b5}m)");
     let gaps = drafted(&log(&um, ""));
-    assert!(gaps.draft.text.contains("\ngap_1 = \"cap 1 [um]\""));
+    gaps.has("\ngap_1 = \"cap 1 [um]\"");
     let rows = gaps.rows(without_mark).expect("filled in");
     // Gaps 1 and 2 of 5 um and 0 at x = +-0.12 m.
     assert!((rows[5].vertical[0] - 2.5e-6).abs() < 1e-15);

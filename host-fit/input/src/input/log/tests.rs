@@ -8,7 +8,7 @@ mod skips;
 
 use super::*;
 use crate::finding::Code;
-use crate::input::dataset::Row;
+use crate::input::dataset::{Dataset, Row};
 use crate::input::source::SourceProblem;
 use crate::input::stage::tests::SOUND;
 use std::io::Write;
@@ -83,6 +83,26 @@ fn refused_with(text: &str, stage: &Stage, parts: &[&str]) -> LogError {
         assert!(message.contains(part), "{part}: {message}");
     }
     error
+}
+
+/// The problem of a log that is refused.
+#[track_caller]
+fn problem(read: Result<LogReading, LogError>) -> LogProblem {
+    read.expect_err("refused").problem
+}
+
+/// A log with each of these texts in place of another.
+fn replaced(log: &str, pairs: &[(&str, &str)]) -> String {
+    let replace = |log: String, (old, new): &(&str, &str)| log.replace(old, new);
+    pairs.iter().fold(log.to_owned(), replace)
+}
+
+/// Log, index and rows of each movement.
+fn movements(dataset: &Dataset) -> Vec<(usize, i64, std::ops::Range<usize>)> {
+    let movements = dataset.movements.iter();
+    movements
+        .map(|m| (m.log, m.index, m.rows.clone()))
+        .collect()
 }
 
 /// The log with the cells of each line changed.

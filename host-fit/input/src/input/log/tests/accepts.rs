@@ -11,12 +11,7 @@ fn codes_and_beams_become_si_units_by_movement() {
     } = sound(LOG);
     assert_eq!((warnings.as_slice(), skipped_rows), (&[][..], 0));
     assert_eq!(dataset.rows.len(), 6);
-    let movements: Vec<_> = dataset
-        .movements
-        .iter()
-        .map(|m| (m.log, m.index, m.rows.clone()))
-        .collect();
-    assert_eq!(movements, [(0, 0, 0..3), (0, 4, 3..6)]);
+    assert_eq!(movements(&dataset), [(0, 0, 0..3), (0, 4, 3..6)]);
     assert_eq!(
         (dataset.logs[0].rows.clone(), dataset.logs[0].has_reference),
         (0..6, true)
@@ -43,39 +38,28 @@ fn codes_and_beams_become_si_units_by_movement() {
 
 #[test]
 fn separators_line_ends_comments_and_marks_do_not_matter() {
-    for separator in [";", "\t"] {
-        same_rows(LOG.replace(',', separator), stage());
-    }
-    same_rows(LOG.replace('\n', "\r\n"), stage());
-    same_rows(format!("\u{feff}{LOG}"), stage());
-    same_rows(
-        format!("\u{feff}# a note; of; many; parts; on; the; log; and; how; it; was; made\n{LOG}"),
-        stage(),
-    );
     let commented = LOG.replace("\n4,0", "\n# second, movement\n\n4,0");
-    same_rows(
+    for text in [
+        LOG.replace(',', ";"),
+        LOG.replace(',', "\t"),
+        LOG.replace('\n', "\r\n"),
+        format!("\u{feff}{LOG}"),
+        format!("\u{feff}# a note; of; many; parts; on; the; log; and; how; it; was; made\n{LOG}"),
         format!("# made, by hand; twice\n\n{commented}\n  \n# end"),
-        stage(),
-    );
-    same_rows(LOG.replace(',', " , "), stage());
-    same_rows(LOG.replace("movement", "\"movement\""), stage());
-    same_rows(
-        LOG.replace(",97,", ",97.0,")
-            .replace(",2000,161,", ",2.0e3,161.0,"),
-        stage(),
-    );
+        LOG.replace(',', " , "),
+        LOG.replace("movement", "\"movement\""),
+        replaced(LOG, &[(",97,", ",97.0,"), (",2000,161,", ",2.0e3,161.0,")]),
+    ] {
+        same_rows(text, stage());
+    }
 }
 
 #[test]
 fn columns_come_in_any_order_and_under_any_name() {
     same_rows(with_cells(|cells| cells.reverse()), stage());
-    let named = LOG
-        .replace("movement", "run")
-        .replace("hall_b_cnt", "ADC 2");
-    same_rows(
-        &named,
-        &stage_with("movement = \"run\"\nhall_b = \"ADC 2\""),
-    );
+    let named = replaced(LOG, &[("movement", "run"), ("hall_b_cnt", "ADC 2")]);
+    let mapped = stage_with("movement = \"run\"\nhall_b = \"ADC 2\"");
+    same_rows(&named, &mapped);
     let long = "a column with a name that is longer than any message would show it";
     let named = LOG.replace("cap3_cnt", long);
     same_rows(&named, &stage_with(&format!("cap_3 = \"{long}\"")));
@@ -121,10 +105,12 @@ fn decode_needs_no_reference() {
     assert!(!dataset.logs[0].has_reference);
     assert_eq!(dataset.rows[3].reference, [0.0; 3]);
     assert_eq!(dataset.rows[3].frame, sound(LOG).dataset.rows[3].frame);
-    let partly = text
-        .replace("movement,", "ifm_x_nm,movement,")
-        .replace("\n0,", "\n5,0,")
-        .replace("\n4,", "\n5,4,");
+    let beam = [
+        ("movement,", "ifm_x_nm,movement,"),
+        ("\n0,", "\n5,0,"),
+        ("\n4,", "\n5,4,"),
+    ];
+    let partly = replaced(&text, &beam);
     let error = read_text(&partly, &ReadOptions::DECODE).expect_err("one beam of three");
     assert!(
         error.to_string().contains("`ifm_y1_nm` is missing"),
@@ -166,10 +152,10 @@ fn a_gap_in_time_shows_as_frames_missed_and_another_period_does_not() {
         let gap = sound(&LOG.replace("0,4000,", &format!("0,{late_us},")));
         assert_eq!(sequences(&gap), [0, 1, 4, 0, 1, 2]);
     }
-    let slow = sound(
-        &LOG.replace(",2000,", ",20000,")
-            .replace(",4000,", ",40000,"),
-    );
+    let slow = sound(&replaced(
+        LOG,
+        &[(",2000,", ",20000,"), (",4000,", ",40000,")],
+    ));
     assert_eq!(sequences(&slow), [0, 1, 2, 0, 1, 2]);
 }
 
@@ -194,15 +180,8 @@ fn several_logs_are_one_dataset_hashed_in_their_order() {
     let dataset = read(&[&plain, &packed], stage(), &ReadOptions::default())
         .expect("sound")
         .dataset;
-    let movements: Vec<_> = dataset
-        .movements
-        .iter()
-        .map(|m| (m.log, m.index, m.rows.clone()))
-        .collect();
-    assert_eq!(
-        movements,
-        [(0, 0, 0..3), (0, 4, 3..6), (1, 3, 6..9), (1, 4, 9..12)]
-    );
+    let want = [(0, 0, 0..3), (0, 4, 3..6), (1, 3, 6..9), (1, 4, 9..12)];
+    assert_eq!(movements(&dataset), want);
     let slots: Vec<_> = dataset.rows.iter().map(|row| row.movement).collect();
     assert_eq!(slots, [0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3]);
     assert_eq!(

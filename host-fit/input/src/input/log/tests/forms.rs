@@ -22,8 +22,10 @@ fn divided(columns: std::ops::Range<usize>, by: f64, decimals: usize) -> String 
 fn units_stand_in_the_header_in_every_spelling() {
     let um = divided(2..5, 1e3, 3);
     let named = |[x, y1, y2]: [&str; 3]| {
-        let log = um.replace("ifm_x_nm", x).replace("ifm_y1_nm", y1);
-        log.replace("ifm_y2_nm", y2)
+        replaced(
+            &um,
+            &[("ifm_x_nm", x), ("ifm_y1_nm", y1), ("ifm_y2_nm", y2)],
+        )
     };
     same_rows(named(["ifm_x [um]", "IFM Y1 (um)", "ifm_y2/um"]), stage());
     let log = divided(1..2, 1e6, 3)
@@ -149,11 +151,8 @@ fn utf_16_with_and_without_a_mark() {
 fn gaps_in_um_are_read_as_they_are() {
     // 1.5625e-8 m a code.
     let um = divided(5..8, 64.0, 6);
-    let named = |names: [&str; 3]| {
-        let log = um.replace("cap1_cnt", names[0]);
-        log.replace("cap2_cnt", names[1])
-            .replace("cap3_cnt", names[2])
-    };
+    let named =
+        |[a, b, c]: [&str; 3]| replaced(&um, &[("cap1_cnt", a), ("cap2_cnt", b), ("cap3_cnt", c)]);
     let units = "\n-,us,nm,nm,nm,um,um,um,-,-,-\n";
     let below = named(["cap1_um", "Cap 2 [um]", "cap 3"]).replacen('\n', units, 1);
     let log = "gap_1 = { column = \"left\", unit = \"um\" }\ngap_2 = { column = \"right\", unit = \"um\" }\ngap_3 = \"front_um\"";
@@ -208,10 +207,13 @@ fn dates_and_times_become_microseconds() {
 fn voltages_become_the_codes_of_the_converter() {
     // 20.48 V over 65536 codes.
     let volts = divided(8..11, 1.0 / 3.125e-4, 6);
-    let in_volts = volts
-        .replace("hall_a_cnt", "Hall A [V]")
-        .replace("hall_b_cnt", "hall_b/V")
-        .replace("hall_c_cnt", "hall_c_V");
+    let named = |volts: &str, [a, b, c]: [&str; 3]| {
+        replaced(
+            volts,
+            &[("hall_a_cnt", a), ("hall_b_cnt", b), ("hall_c_cnt", c)],
+        )
+    };
+    let in_volts = named(&volts, ["Hall A [V]", "hall_b/V", "hall_c_V"]);
     refused_with(
         &in_volts,
         stage(),
@@ -227,10 +229,8 @@ fn voltages_become_the_codes_of_the_converter() {
     };
     let stage = with_volts("3.125e-4", "").expect("sound");
     same_rows(&in_volts, &stage);
-    let mv = divided(8..11, 1.0 / 0.3125, 3).replace("hall_a_cnt", "ADC 1");
-    let mv = mv
-        .replace("hall_b_cnt", "hall_b [mV]")
-        .replace("hall_c_cnt", "hall_c [mV]");
+    let mv = divided(8..11, 1.0 / 0.3125, 3);
+    let mv = named(&mv, ["ADC 1", "hall_b [mV]", "hall_c [mV]"]);
     let mapped = with_volts("3.125e-4", "hall_a = { column = \"ADC 1\", unit = \"mV\" }");
     same_rows(&mv, &mapped.expect("sound"));
     // Counts stay counts.

@@ -4,14 +4,10 @@ use super::*;
 
 /// Rows at these times, ms, without a movement.
 fn log_at(times_ms: impl IntoIterator<Item = i64>) -> String {
-    let header = LOG.split_once('\n').expect("a header").0;
-    let header = header.replace("movement,", "");
-    times_ms
-        .into_iter()
-        .enumerate()
-        .fold(header + "\n", |text, (k, t)| {
-            text + &format!("{},{k},0,0,0,0,0,{},13,14\n", t * 1000, k % 100)
-        })
+    let (header, _) = LOG.split_once('\n').expect("a header");
+    let rows = (0..).zip(times_ms);
+    let rows = rows.map(|(k, t)| format!("{},{k},0,0,0,0,0,{},13,14\n", t * 1000, k % 100));
+    header.replace("movement,", "") + "\n" + &rows.collect::<String>()
 }
 
 fn read_split(text: &str, split_s: Option<f64>) -> Result<LogReading, LogError> {
@@ -73,11 +69,7 @@ fn rows_that_are_left_out_make_no_gap() {
     }
     assert_eq!(lengths(&(lines.join("\n") + "\n"), None), [35]);
     // A gap before rows that are left out is one.
-    for line in &mut lines[20..45] {
-        let (time, rest) = line.split_once(',').expect("cells");
-        *line = format!("{},{rest}", time.parse::<i64>().expect("a time") + 100_000);
-    }
-    for line in &mut lines[45..] {
+    for line in &mut lines[20..] {
         let (time, rest) = line.split_once(',').expect("cells");
         *line = format!("{},{rest}", time.parse::<i64>().expect("a time") + 100_000);
     }
@@ -93,11 +85,8 @@ fn split_cuts_movements_of_a_length() {
     // A gap begins a movement, too.
     let gap = log_at((0..130).chain(200..250).map(|k| 2 * k));
     assert_eq!(lengths(&gap, Some(0.2)), [100, 30, 50]);
-    let error = read_split(LOG, Some(2.0)).expect_err("there is a column");
-    assert!(
-        matches!(error.problem, LogProblem::SplitWithMovements),
-        "{error}"
-    );
+    let has_a_column = problem(read_split(LOG, Some(2.0)));
+    assert!(matches!(has_a_column, LogProblem::SplitWithMovements));
 }
 
 #[test]
@@ -109,23 +98,15 @@ fn rows_out_of_order_stay_refused() {
     ] {
         let error = read_split(&log_at(times), None).expect_err("out of order");
         let text = error.to_string();
-        assert!(
-            text.contains("backwards") || text.contains("repeats"),
-            "{text}"
-        );
+        let is_order = text.contains("backwards") || text.contains("repeats");
+        assert!(is_order, "{text}");
     }
     // A column that stage.toml names must be there.
     let stage = stage_with("movement = \"run\"");
     let log = log_at((0..30).map(|k| 2 * k));
-    let error = read_bytes(
-        log.as_bytes(),
-        Path::new("log.csv"),
-        &stage,
-        &ReadOptions::default(),
-    );
-    let problem = error.expect_err("no such column").problem;
+    let missing = problem(read_in(&log, &stage));
     let key = "movement";
-    assert!(matches!(problem, LogProblem::MissingColumn { key: found, .. } if found == key));
+    assert!(matches!(missing, LogProblem::MissingColumn { key: found, .. } if found == key));
 }
 
 #[test]
@@ -138,19 +119,10 @@ fn one_file_for_each_movement() {
         std::fs::write(path, log_at((0..30 + k).map(|k| 2 * k))).expect("written");
     }
     let reading = read(&paths, stage(), &ReadOptions::default()).expect("sound");
-    let names: Vec<_> = reading
-        .dataset
-        .movements
-        .iter()
-        .map(|m| (m.log, m.index, m.rows.len()))
-        .collect();
-    assert_eq!(names, [(0, 0, 30), (1, 0, 31), (2, 0, 32)]);
+    let want = [(0, 0, 0..30), (1, 0, 30..61), (2, 0, 61..93)];
+    assert_eq!(movements(&reading.dataset), want);
     let codes: Vec<Code> = reading.warnings.iter().map(|found| found.code).collect();
     assert_eq!(codes, [Code::MovementsByTime; 3]);
-    assert!(
-        reading
-            .dataset
-            .movement_name(&reading.dataset.movements[1])
-            .contains("run1.csv")
-    );
+    let name = reading.dataset.movement_name(&reading.dataset.movements[1]);
+    assert!(name.contains("run1.csv"));
 }

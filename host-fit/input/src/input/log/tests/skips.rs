@@ -35,13 +35,8 @@ fn bad_cells_are_left_out_and_counted_by_reason() {
     for ((message, rows), (words, count)) in skipped.into_iter().zip(want) {
         assert!(message.contains(words) && rows == Some(count), "{message}");
     }
-    let movements: Vec<_> = reading
-        .dataset
-        .movements
-        .iter()
-        .map(|m| (m.index, m.rows.clone()))
-        .collect();
-    assert_eq!(movements, [(0, 0..1), (4, 1..2)]);
+    let want = [(0, 0, 0..1), (0, 4, 1..2)];
+    assert_eq!(movements(&reading.dataset), want);
 }
 
 #[test]
