@@ -63,12 +63,4 @@ mod tests {
             for (have, want) in back.to_array().iter().zip(v) { prop_assert!((have - want).abs() < 1e-17); }
         }
     }
-
-    #[test]
-    fn probes_in_one_line_define_no_plane() {
-        assert_eq!(
-            vertical_rows(&[[0.0f64, 0.0], [0.1, 0.1], [0.2, 0.2]]),
-            None
-        );
-    }
 }

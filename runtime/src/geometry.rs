@@ -157,15 +157,6 @@ mod tests {
     /// The places of the paper's stage.
     const PLACES_M: [[f64; 2]; 3] = [[0.1975, 0.40], [-0.1975, 0.42], [0.1975, 0.36]];
 
-    #[test]
-    fn aligned_probes_sense_y_y_x_with_the_designed_arms() {
-        let rows = ProbeGeometry::of_places(PLACES_M, [0.0; 3]).plane_rows();
-        assert_eq!(
-            rows,
-            [[0.0, 1.0, 0.1975], [0.0, 1.0, -0.1975], [1.0, 0.0, -0.36]]
-        );
-    }
-
     /// A rigid body turned by a small Rz moves a probe at p by Rz x p. Worked from vectors,
     /// not from equation 11.
     #[test]

@@ -5,7 +5,7 @@ extern crate std;
 
 use super::PROTOCOL_VERSION;
 use super::e2e::BASE_LIST;
-use super::load_tests::{FRAME_BITS_MAX, Traffic};
+use super::load_tests::{FRAME_BITS_MAX, frames_in_slow_ticks, worst_load};
 use super::sensor::{Layout, REPEAT_US};
 use super::table::FRAME_BYTES;
 use super::tables_tests::{Kind, Rate, Row, Signal, rows};
@@ -106,18 +106,14 @@ fn write_load(out: &mut impl Write) -> Result {
         ("none", None),
     ] {
         for vertical_ticks in [1, 4, 16] {
-            let traffic = Traffic {
-                ticks_per_s: 500,
-                layout,
-                vertical_ticks,
-            };
+            let load = |bits_per_s| 100.0 * worst_load(layout, vertical_ticks, bits_per_s);
             let tick = if vertical_ticks == 1 { "tick" } else { "ticks" };
             writeln!(
                 out,
                 "| {codes} | {vertical_ticks} {tick} | {} | {:.1} % | {:.1} % |",
-                traffic.frames_in_slow_ticks(),
-                100.0 * traffic.worst_load(1_000_000),
-                100.0 * traffic.worst_load(500_000),
+                frames_in_slow_ticks(layout, vertical_ticks),
+                load(1_000_000),
+                load(500_000),
             )?;
         }
     }

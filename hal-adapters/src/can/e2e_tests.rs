@@ -87,33 +87,19 @@ fn the_base_list_holds_sixteen_different_ids() {
 }
 
 #[test]
-fn the_counter_wraps_without_a_verdict() {
-    let mut sequence = Sequence::START;
-    assert_eq!(sequence.judge(14), Verdict::First);
-    for counter in [15, 0, 1, 2] {
-        assert_eq!(sequence.judge(counter), Verdict::Next);
+fn gaps_repeats_and_late_frames_are_distinguished_and_the_counter_wraps() {
+    use Verdict::{First, Lost, Next, Repeated, Resumed, WrongSequence};
+    let (one, two) = (Lost { frames: 1 }, Lost { frames: 2 });
+    let ahead = |ahead| WrongSequence { ahead };
+    for (counters, verdicts) in [
+        (&[14, 15, 0, 1, 2][..], &[First, Next, Next, Next, Next][..]),
+        (&[3, 3, 5, 4, 6], &[First, Repeated, one, ahead(15), Next]),
+        (&[6, 9, 13, 14, 15], &[First, two, ahead(4), Resumed, Next]),
+        // Two late frames that are not successive resume nothing.
+        (&[10, 4, 2, 11], &[First, ahead(10), ahead(8), Next]),
+    ] {
+        let mut sequence = Sequence::START;
+        let found = counters.iter().map(|counter| sequence.judge(*counter));
+        assert!(found.eq(verdicts.iter().copied()), "{counters:?}");
     }
-}
-
-#[test]
-fn gaps_repeats_and_late_frames_are_distinguished() {
-    let mut sequence = Sequence::START;
-    assert_eq!(sequence.judge(3), Verdict::First);
-    assert_eq!(sequence.judge(3), Verdict::Repeated);
-    assert_eq!(sequence.judge(5), Verdict::Lost { frames: 1 });
-    assert_eq!(sequence.judge(4), Verdict::WrongSequence { ahead: 15 });
-    assert_eq!(sequence.judge(6), Verdict::Next);
-    assert_eq!(sequence.judge(9), Verdict::Lost { frames: 2 });
-    assert_eq!(sequence.judge(13), Verdict::WrongSequence { ahead: 4 });
-    assert_eq!(sequence.judge(14), Verdict::Resumed);
-    assert_eq!(sequence.judge(15), Verdict::Next);
-}
-
-#[test]
-fn two_late_frames_in_a_row_do_not_resume_when_they_are_not_successive() {
-    let mut sequence = Sequence::START;
-    sequence.judge(10);
-    assert_eq!(sequence.judge(4), Verdict::WrongSequence { ahead: 10 });
-    assert_eq!(sequence.judge(2), Verdict::WrongSequence { ahead: 8 });
-    assert_eq!(sequence.judge(11), Verdict::Next);
 }

@@ -153,6 +153,13 @@ pub fn interrupt(running: &Child) {
     assert!(sent.expect("kill runs").success());
 }
 
+/// A text must hold this.
+#[track_caller]
+pub fn says(text: impl AsRef<str>, part: &str) {
+    let text = text.as_ref();
+    assert!(text.contains(part), "no `{part}` in: {text}");
+}
+
 /// The numbers of a table below its header.
 pub fn rows(table: &str) -> Vec<Vec<f64>> {
     let number = |cell: &str| cell.parse().expect("a number");

@@ -1,6 +1,6 @@
 //! The field model from the log to the pose file, on a stage made of physics.
 
-use crate::common::{Bench, log, number, plan, rows, stderr, stdout};
+use crate::common::{Bench, log, number, plan, rows, says, stderr, stdout};
 use serde_json::Value;
 
 /// A folder with the log of a run, and another run of the same stage as its service.
@@ -40,7 +40,7 @@ fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
     let json = bench.json("p.json");
     assert_eq!(json["model"], "field");
     let reason = json["model_reason"].as_str().expect("a sentence");
-    assert!(reason.contains("times the noise floor"), "{reason}");
+    says(&reason, "times the noise floor");
     let lag = &json["reference_lag"];
     let error = number(&lag["standard_error_us"]);
     assert!(number(&lag["value_us"]).abs() < 5.0 * error);
@@ -100,11 +100,7 @@ fn a_late_reference_is_reported_by_every_model_and_taken_off_when_asked() {
     for model in ["31", "field", "auto"] {
         let fit = format!("fit late.csv --out p.bin --model {model} --json p.json");
         let output = bench.good(&fit);
-        assert!(
-            stderr(&output).contains("the reference lags behind the probes by "),
-            "{}",
-            stderr(&output)
-        );
+        says(stderr(&output), "the reference lags behind the probes by ");
         let lag = |bench: &Bench| {
             let lag = &bench.json("p.json")["reference_lag"];
             let number = |key: &str| number(&lag[key]);

@@ -1,7 +1,7 @@
 //! Ctrl-C while a file is read.
 #![cfg(unix)]
 
-use crate::common::{Bench, interrupt, stderr, thinned_log};
+use crate::common::{Bench, interrupt, says, stderr, thinned_log};
 use std::io::Write;
 
 /// Lines that every reader leaves out, more than a pipe holds.
@@ -34,7 +34,7 @@ fn ctrl_c_ends_a_command_that_reads_and_leaves_nothing_behind() {
         let errors = stderr(&output);
         assert!(ended, "{arguments} read on: {errors}");
         assert_eq!(output.status.code(), Some(130), "{arguments}: {errors}");
-        assert!(errors.contains("interrupted"), "{errors}");
+        says(&errors, "interrupted");
         assert!(bench.holds_only(&["log.csv", "ifm.csv", "p.bin"]));
     }
 }

@@ -1,6 +1,6 @@
 //! Logs as laboratories have them, from the command line: split, read from a pipe, drafted for.
 
-use crate::common::{Bench, changed, log, stderr, stdout};
+use crate::common::{Bench, changed, log, says, stderr, stdout};
 
 const MARK: &str = "# FILL IN: ";
 
@@ -26,7 +26,7 @@ fn one_long_recording_is_fitted_as_its_movements_are() {
         (&have["errors"], &have["movements"]),
         (&want["errors"], &57.into())
     );
-    assert!(warnings.contains("the times tell 57"), "{warnings}");
+    says(&warnings, "the times tell 57");
     bench.good("eval p.bin whole.csv --split 2");
     let refused = "fit log.csv --out p.bin --split 2";
     bench.bad(refused, 3, &["log.csv", "--split does not apply"]);
@@ -48,12 +48,9 @@ fn a_log_comes_by_standard_input_too() {
     assert_eq!(bench.read("pose.csv"), bench.read("want.csv"));
     pipe(host_fit::input::shipped::LOG_GZ, 0);
     let message = pipe(b"movement,t_us,hall_a\n", 3);
-    assert!(message.contains("standard input:1"), "{message}");
+    says(&message, "standard input:1");
     let message = pipe(b"", 3);
-    assert!(
-        message.contains("standard input: the log is empty"),
-        "{message}"
-    );
+    says(&message, "standard input: the log is empty");
 }
 
 #[test]
@@ -68,10 +65,7 @@ fn init_drafts_a_stage_file_that_is_refused_until_it_is_filled_in() {
     bench.write("log.csv", renamed);
     bench.bad("init log.csv", 2, &["stage.toml exists", "--force"]);
     let shown = stdout(&bench.good("init log.csv --out new.toml"));
-    assert!(
-        shown.contains("11 columns mapped, left out: temperature"),
-        "{shown}"
-    );
+    says(&shown, "11 columns mapped, left out: temperature");
     let fit = "fit log.csv --stage new.toml --out p.bin";
     bench.bad(fit, 3, &["new.toml", "`: missing; fill in the"]);
     // The examples are those of the stage that made the log.

@@ -1,6 +1,6 @@
 //! The main job through the command line, on the log that ships with the program.
 
-use crate::common::{Bench, number, stdout};
+use crate::common::{Bench, number, says, stdout};
 use serde_json::Value;
 
 fn close(value: &Value, expected: f64, part: f64) {
@@ -55,11 +55,7 @@ fn fit_eval_decode_and_inspect_agree_on_the_shipped_log() {
     assert!(zero["errors"]["x"]["rmse_um"].as_f64() > eval["errors"]["x"]["rmse_um"].as_f64());
 
     let output = bench.good("decode p.bin log.csv.gz --out pose.csv");
-    assert!(
-        stdout(&output).contains("57000 of them with status 0"),
-        "{}",
-        stdout(&output)
-    );
+    says(stdout(&output), "57000 of them with status 0");
     let poses = bench.text("pose.csv");
     assert_eq!(poses.lines().count(), 57001);
     assert_eq!(

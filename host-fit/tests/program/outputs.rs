@@ -1,6 +1,6 @@
 //! Outputs: whole or not at all, never in the place of an input, and nothing but them on standard output.
 
-use crate::common::{Bench, log, stderr, stdout, with_cell};
+use crate::common::{Bench, log, says, stderr, stdout, with_cell};
 use host_fit::output::blob_file;
 
 #[test]
@@ -96,10 +96,7 @@ fn a_file_that_is_standard_input_is_no_output() {
         }
         let refused = program.output().expect("runs");
         assert_eq!(refused.status.code(), Some(2), "{command}");
-        assert!(
-            stderr(&refused).contains("an input of this command"),
-            "{command}"
-        );
+        says(stderr(&refused), "an input of this command");
         assert_eq!(bench.text("log.csv"), log());
     }
 }
@@ -157,7 +154,7 @@ fn text_from_a_file_forges_no_line() {
     let shown = stdout(&bench.good("inspect q.bin"));
     let compared = stdout(&bench.good("diff q.bin q.bin"));
     for text in [of_log, of_stage, shown, compared] {
-        assert!(text.contains("warning: forged"), "{text}");
+        says(&text, "warning: forged");
         assert!(!text.contains(['\u{1b}', '\u{202e}']), "{text}");
         assert!(
             !text.lines().any(|line| line.starts_with("warning: f")),

@@ -1,6 +1,6 @@
 //! `plan` from the command line: what it writes, and what it refuses.
 
-use crate::common::{Bench, number, stderr, stdout};
+use crate::common::{Bench, number, says, stderr, stdout};
 use host_fit::input::shipped::STAGE_TOML;
 
 /// A run that is short enough to be planned fast, rehearsed, and written nowhere else.
@@ -9,7 +9,7 @@ fn a_planned_run_is_written_shown_and_can_be_rehearsed() {
     let bench = Bench::new();
     let planned = bench.good("plan --seconds 60 --out run.csv --json plan.json");
     let shown = stdout(&planned);
-    assert!(shown.contains("30001"), "{shown}");
+    says(&shown, "30001");
     assert!(shown.contains("least determined") && shown.contains("wrote run.csv"));
     let json = bench.json("plan.json");
     for axis in ["x", "y", "rz"] {

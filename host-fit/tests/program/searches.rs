@@ -1,6 +1,6 @@
 //! The population searches through the command line, on the log that ships with the program.
 
-use crate::common::{Bench, interrupt, number, stderr, stdout};
+use crate::common::{Bench, interrupt, number, says, stderr, stdout};
 
 fn bench() -> Bench {
     let bench = Bench::new();
@@ -54,10 +54,7 @@ fn compare_prints_its_table_and_writes_curves() {
     }
     assert_eq!(bench.text("report/table.md"), table);
     for name in ["convergence-delta.svg", "p-linear.svg"] {
-        assert!(
-            bench.text(&format!("report/{name}")).contains("shtlbo"),
-            "{name}"
-        );
+        says(bench.text(&format!("report/{name}")), "shtlbo");
     }
     let runs = bench.text("report/runs.csv");
     assert_eq!(runs.lines().count(), 1 + 2 * 3 * 2);
@@ -122,7 +119,7 @@ fn an_interrupt_keeps_nothing_that_has_errors_far_above_the_noise() {
     let bench = bench();
     bench.write("p.bin", "the blob before");
     let errors = stderr(&interrupted(&bench, "--project delta --population 2000"));
-    assert!(errors.contains("nothing was written"), "{errors}");
+    says(&errors, "nothing was written");
     assert_eq!(bench.text("p.bin"), "the blob before");
 }
 

@@ -1,6 +1,6 @@
 //! A simulated stage that warms at work: fitted cold, brought up to date warm, judged over the day.
 
-use crate::common::{Bench, number, plan, stderr, stdout};
+use crate::common::{Bench, number, plan, says, stderr, stdout};
 
 const TEMPERATURE: &str = "
 [temperature]
@@ -93,7 +93,7 @@ fn a_run_at_work_tells_how_the_stage_follows_temperature() {
     let without: Vec<String> = bench.text("warm.csv").lines().map(first_columns).collect();
     bench.write("none.csv", without.join("\n") + "\n");
     let none = stderr(&bench.good("eval warm.bin none.csv --stage warm.toml --limit 99"));
-    assert!(none.contains("rows have no temperature"), "{none}");
+    says(&none, "rows have no temperature");
     bench.bad(
         "fit cold.csv none.csv --stage warm.toml --out x.bin",
         4,

@@ -136,7 +136,9 @@ fn activated_parameters_run_are_reported_and_read_back() {
     assert_eq!((running.sequence, identity.newest_sequence), (1, 1));
     assert_eq!((running.rms, running.peak), (set.fit.rms, set.fit.peak));
     assert_eq!(running.created, set.created.as_str());
-    assert_eq!(identity.program_version, [1, 2, 3]);
+    let program = (identity.program_version, identity.program_hash);
+    assert_eq!(program, ([1, 2, 3], 0xfeed_beef));
+    assert_eq!((running.slot, running.forced), (1, set.fit.forced));
     // The same again is not sent, and the record before comes back on demand.
     let mut again = undeclared(plan(NEW));
     again.key = None;

@@ -91,6 +91,12 @@ fn problem(read: Result<LogReading, LogError>) -> LogProblem {
     read.expect_err("refused").problem
 }
 
+/// It is refused for this reason.
+#[track_caller]
+fn is_for(error: &LogError, is_why: impl Fn(&LogProblem) -> bool) {
+    assert!(is_why(&error.problem), "{error}");
+}
+
 /// A log with each of these texts in place of another.
 fn replaced(log: &str, pairs: &[(&str, &str)]) -> String {
     let replace = |log: String, (old, new): &(&str, &str)| log.replace(old, new);

@@ -1,6 +1,5 @@
 use super::*;
 use crate::input::log::layout::Quantity;
-use crate::input::source::SourceProblem;
 use proptest::prelude::*;
 use std::path::Path;
 
@@ -331,30 +330,20 @@ fn text_that_is_not_toml_is_refused_with_its_place() {
 #[test]
 fn a_file_that_cannot_be_read_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
-    let error = Stage::from_file(folder.path()).expect_err("a folder");
-    assert!(
-        matches!(&error, StageError::Source(of) if matches!(of.problem, SourceProblem::IsFolder)),
-        "{error}"
-    );
-    let error = Stage::from_file(&folder.path().join("none.toml")).expect_err("missing");
-    assert!(
-        matches!(&error, StageError::Source(of) if matches!(of.problem, SourceProblem::NotFound)),
-        "{error}"
-    );
-    assert!(error.to_string().contains("check the path"), "{error}");
-    let binary = folder.path().join("binary.toml");
-    std::fs::write(&binary, b"[hall]\n\xff\xfe").expect("written");
-    let error = Stage::from_file(&binary).expect_err("binary");
-    assert!(
-        matches!(error, StageError::NotText { offset: 7, .. }),
-        "{error}"
-    );
-    std::fs::write(&binary, [b'\n'; (1 << 20) + 1]).expect("written");
-    let error = Stage::from_file(&binary).expect_err("too large");
-    assert!(
-        matches!(&error, StageError::Source(of) if matches!(of.problem, SourceProblem::TooLarge { .. })),
-        "{error}"
-    );
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("written");
+        path
+    };
+    for (path, part) in [
+        (folder.path().to_owned(), "is a folder"),
+        (folder.path().join("none.toml"), "check the path"),
+        (write("binary.toml", b"[hall]\n\xff\xfe"), "byte 7"),
+        (write("large.toml", &[b'\n'; (1 << 20) + 1]), "1048576"),
+    ] {
+        let error = Stage::from_file(&path).expect_err(part).to_string();
+        assert!(error.contains(part), "{part}: {error}");
+    }
 }
 
 proptest! {

@@ -140,10 +140,9 @@ fn utf_16_with_and_without_a_mark() {
         let hash = read_in(gzip(&big), stage()).expect("sound").dataset.sha256;
         assert_eq!(hash, <[u8; 32]>::from(Sha256::digest(&big)));
         let cut = read_in(&little[..little.len() - 1], stage()).expect_err("half a character");
-        assert!(
-            matches!(cut.problem, LogProblem::Source(SourceProblem::Utf16 { .. })),
-            "{cut}"
-        );
+        is_for(&cut, |why| {
+            matches!(why, LogProblem::Source(SourceProblem::Utf16 { .. }))
+        });
     }
 }
 

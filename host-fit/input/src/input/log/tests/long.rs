@@ -55,15 +55,14 @@ fn faults_far_down_are_named_with_their_place_and_the_first_wins() {
     lines[line_of(90_001) - 1] = lines[line_of(90_000) - 1].clone();
     lines[line_of(90_001)] = "1,2".to_owned();
     let error = refused(&text_of(&lines));
-    assert!(
-        matches!(error.problem, LogProblem::DuplicatedRow { .. }),
-        "{error}"
-    );
+    is_for(&error, |why| {
+        matches!(why, LogProblem::DuplicatedRow { .. })
+    });
     assert_eq!(place(&error).0, line_of(90_001));
     let error = refused(&spoilt_row(90_000, "90,0,", "3,0,"));
-    assert!(
-        matches!(error.problem, LogProblem::MovementReturns { left_line } if left_line == line_of(4000)),
-        "{error}"
+    is_for(
+        &error,
+        |why| matches!(why, LogProblem::MovementReturns { left_line } if *left_line == line_of(4000)),
     );
     let error = refused(&spoilt_row(90_000, "90,0,", "90,2026-01-02T03:04:05,"));
     let LogProblem::Cell(fault) = &error.problem else {
@@ -122,23 +121,16 @@ fn a_ditto_mark_in_a_column_that_is_left_out_does_not_swallow_lines() {
 fn headers_and_lines_that_no_log_has_are_refused_by_their_length() {
     let commas = |count: usize| format!("{}\n1,2\n", ",".repeat(count));
     let error = refused(&commas(COLUMNS_MAX));
-    assert!(
-        matches!(error.problem, LogProblem::TooManyColumns { .. }),
-        "{error}"
-    );
+    is_for(&error, |why| {
+        matches!(why, LogProblem::TooManyColumns { .. })
+    });
     assert_eq!(error.place.line, Some(1));
     let error = refused(&commas(2 * LINE_BYTES_MAX));
-    assert!(
-        matches!(error.problem, LogProblem::LineTooLong { .. }),
-        "{error}"
-    );
+    is_for(&error, |why| matches!(why, LogProblem::LineTooLong { .. }));
     assert_eq!(error.place.line, Some(1));
     let long = "7".repeat(2 * LINE_BYTES_MAX);
     let error = refused(&format!("{LOG}5,0,{long}\n"));
-    assert!(
-        matches!(error.problem, LogProblem::LineTooLong { .. }),
-        "{error}"
-    );
+    is_for(&error, |why| matches!(why, LogProblem::LineTooLong { .. }));
     assert_eq!(error.place.line, Some(8));
     let packed = gzip(&vec![b'\n'; 100 << 20]);
     let read = |bytes: &[u8]| read_bytes(bytes, Path::new("log"), stage(), &ReadOptions::default());
