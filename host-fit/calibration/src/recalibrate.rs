@@ -244,13 +244,10 @@ pub fn recalibrate(
         }
     }
     let dataset = &*dataset.compensated(temperature);
-    let decoded = |set: &ParameterSet| Decoded::new(set, dataset);
-    let by_row = |of: &Decoded| {
-        let judgement = of.judge(dataset, stage, Zeros::Refit);
-        (of.errors_less(&judgement.zeros, dataset), judgement)
-    };
-    let (errors, judgement_before) = by_row(&decoded(old));
-    let (_, bad) = signal_findings(dataset, stage, (&old_parameters, 0.0), Some(&errors));
+    let judged =
+        |set: &ParameterSet| Decoded::new(set, dataset).judge(dataset, stage, Zeros::Refit);
+    let judgement_before = judged(old);
+    let (_, bad) = signal_findings(dataset, stage, (&old_parameters, 0.0));
     let covariance = known.map(|known| &known.covariance);
     let drift_mm = known.map_or(USUAL_DRIFT_MM, |known| known.noise.drift_mm);
     let update = update(
@@ -295,14 +292,14 @@ pub fn recalibrate(
         fit: FitRecord::default(),
     };
     let set = prepare(old, &update.parameters, stage, &origin)?;
-    let (errors, judgement) = by_row(&decoded(&set));
+    let judgement = judged(&set);
     let predicted = declared_service(stage, &update.parameters, update.noise.white_mm)
         .map(|at_work| Predicted::new(&at_work, &update.posterior.covariance, &[0.0; COUNT]));
     let (white_mm, covariance) = (update.noise.white_mm, &update.posterior.covariance);
     let validity = known.and_then(|_| validity(stage, &update.parameters, white_mm, covariance));
     let diagnosis = Diagnosis {
         validity,
-        ..of_judged(dataset, stage, &set, &errors, predicted)
+        ..of_judged(dataset, stage, &set, predicted)
     };
     let axes = judgement.errors.axes;
     let rows = u32::try_from(dataset.rows.len()).unwrap_or(u32::MAX);

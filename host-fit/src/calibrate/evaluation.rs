@@ -86,7 +86,7 @@ impl Evaluation {
         let decoded = Decoded::new(set, &log.dataset);
         let of_rows = decoded.judge(&log.dataset, stage, zeros);
         let by_row = decoded.errors_less(&of_rows.zeros, &log.dataset);
-        let mut diagnosis = diagnose::of_judged(&log.dataset, stage, set, &by_row, None);
+        let mut diagnosis = diagnose::of_judged(&log.dataset, stage, set, None);
         let (temperature, refitted) = (&set.constants.temperature, zeros == Zeros::Refit);
         let rezero = diagnose::temperature::rezero(temperature, &log.dataset, refitted);
         let findings = diagnosis.findings.into_iter().chain(rezero);

@@ -90,24 +90,16 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
         for_service: field.is_some_and(|field| !field.verdict.by_resets),
     };
-    let errors = fitted.ok().map(|fit| &fit.decoded.errors[..]);
     let mut out = Diagnosis::default();
     match fitted {
         Err(error) => {
             // A log that determines nothing says nothing of its channels.
             let described = matches!(error, FitError::Failed(FitFailure::NotDescribed { .. }));
-            out.shown(
-                dataset,
-                &sound,
-                stage,
-                by,
-                (lag_s, errors),
-                (described, false),
-            );
+            out.shown(dataset, &sound, stage, by, lag_s, (described, false));
             out.predicted = None;
         }
         Ok(fit) => {
-            out.shown(dataset, &sound, stage, by, (lag_s, errors), (true, true));
+            out.shown(dataset, &sound, stage, by, lag_s, (true, true));
             out.add_of_fit(fit, dataset, stage);
         }
     }
@@ -161,11 +153,10 @@ impl Diagnosis {
         sound: &Dataset,
         stage: &Stage,
         by: Fitted,
-        (lag_s, errors): (f64, Option<&[Option<[f64; 3]>]>),
+        lag_s: f64,
         (has_channels, is_fit): (bool, bool),
     ) {
-        let of_signals =
-            || signals::signal_findings(dataset, stage, (by.parameters, lag_s), errors);
+        let of_signals = || signals::signal_findings(dataset, stage, (by.parameters, lag_s));
         let (of_structure, (findings, bad)) =
             rayon::join(|| structure::structure(sound, stage), of_signals);
         self.findings = findings;
@@ -251,14 +242,12 @@ impl Diagnosis {
     }
 }
 
-/// Everything that is wrong with a log that a blob is judged on; `errors` as in
-/// [`signals::signal_findings`]. Of a blob that was `fitted` to it with what was known before, this is what
-/// service has to expect.
+/// Everything that is wrong with a log that a blob is judged on. Of a blob that was `fitted` to it with what was
+/// known before, this is what service has to expect.
 pub fn of_judged(
     dataset: &Dataset,
     stage: &Stage,
     set: &ParameterSet,
-    errors: &[Option<[f64; 3]>],
     fitted: Option<Predicted>,
 ) -> Diagnosis {
     let dataset = &*dataset.compensated(set.constants.temperature.rounded());
@@ -275,14 +264,7 @@ pub fn of_judged(
         for_service,
     };
     let mut out = Diagnosis::default();
-    out.shown(
-        dataset,
-        dataset,
-        stage,
-        by,
-        (0.0, Some(errors)),
-        (true, false),
-    );
+    out.shown(dataset, dataset, stage, by, 0.0, (true, false));
     out.predicted = fitted.or(out.predicted);
     let findings = &mut out.findings;
     if fitted.is_none() {

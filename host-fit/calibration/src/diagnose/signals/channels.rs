@@ -2,13 +2,10 @@
 
 use crate::diagnose::slopes::CHANNELS;
 use crate::finding::{Code, Finding, Severity};
-use crate::input::dataset::{Dataset, Row};
+use crate::input::dataset::{Dataset, LogSource, Row};
 use crate::input::stage::Stage;
 use crate::statistics;
 use std::ops::Range;
-
-/// Finer than any interferometer reads.
-const BEAM_GRID_M: f64 = 1e-11;
 
 /// One channel of a log.
 pub(super) struct Channel {
@@ -23,13 +20,13 @@ pub(super) struct Channel {
 pub(super) struct LogSignals<'a> {
     pub(super) dataset: &'a Dataset,
     pub(super) stage: &'a Stage,
-    log: usize,
+    pub(super) source: &'a LogSource,
     pub(super) rows: &'a [Row],
     /// Its movements.
     pub(super) segments: Vec<Range<usize>>,
     /// Hall A, B, C; X, Y1, Y2; then the gaps where the log has codes.
     pub(super) channels: Vec<Channel>,
-    /// Whether a row is used by the tests of residuals.
+    /// Whether a row is used by the tests that follow.
     pub(super) usable: Vec<bool>,
     /// Median time between rows, s.
     pub(super) period_s: f64,
@@ -39,7 +36,8 @@ pub(super) struct LogSignals<'a> {
 
 impl<'a> LogSignals<'a> {
     pub(super) fn new(dataset: &'a Dataset, stage: &'a Stage, log: usize) -> Self {
-        let range = dataset.logs[log].rows.clone();
+        let source = &dataset.logs[log];
+        let range = source.rows.clone();
         let rows = &dataset.rows[range.clone()];
         let movements = dataset.movements.iter().filter(|m| m.log == log);
         let segments: Vec<Range<usize>> = movements
@@ -52,97 +50,61 @@ impl<'a> LogSignals<'a> {
             first: range.start,
             dataset,
             stage,
-            log,
+            source,
             rows,
             segments,
             period_s,
         }
     }
 
-    pub(super) const fn len(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// How many rows last this long, at least one.
-    pub(super) fn rows_in(&self, time_s: f64) -> usize {
-        ((time_s / self.period_s).round() as usize).max(1)
-    }
-
-    pub(super) fn same_movement(&self, a: usize, b: usize) -> bool {
-        self.rows[a].movement == self.rows[b].movement
-    }
-
-    /// Whether the tests of residuals use at least half of some rows.
-    pub(super) fn is_mostly_used(&self, rows: &Range<usize>) -> bool {
-        let used = self.usable[rows.clone()].iter().filter(|used| **used);
-        2 * used.count() >= rows.len()
-    }
-
     /// Leaves rows out, with those beside them, whose velocity is not that of the motion.
     pub(super) fn leave_out(&mut self, runs: impl IntoIterator<Item = Range<usize>>) {
-        let rows = self.len();
+        let end = self.rows.len();
         for run in runs {
-            self.usable[run.start.saturating_sub(2)..(run.end + 2).min(rows)].fill(false);
+            self.usable[run.start.saturating_sub(2)..end.min(run.end + 2)].fill(false);
         }
+    }
+
+    /// The movement of a row and its time, us.
+    fn at(&self, row: usize) -> (String, i64) {
+        let Row { movement, t_us, .. } = self.rows[row];
+        let movement = &self.dataset.movements[movement];
+        (self.dataset.movement_name(movement), t_us)
     }
 
     /// "movement 3 at t_us = 4000".
     pub(super) fn place(&self, row: usize) -> String {
-        let Row { movement, t_us, .. } = self.rows[row];
-        let movement = &self.dataset.movements[movement];
-        let name = self.dataset.movement_name(movement);
-        format!("movement {name} at t_us = {t_us}")
-    }
-
-    /// The first of many, in words.
-    pub(super) fn places(&self, rows: &[usize]) -> String {
-        const SHOWN: usize = 3;
-        let shown: Vec<String> = rows
-            .iter()
-            .take(SHOWN)
-            .map(|&row| self.place(row))
-            .collect();
-        let dots = if rows.len() > SHOWN { ", ..." } else { "" };
-        shown.join(", ") + dots
+        let (movement, t_us) = self.at(row);
+        format!("movement {movement} at t_us = {t_us}")
     }
 
     /// A warning about the whole log, or several of its movements.
     pub(super) fn warning(&self, code: Code, message: String) -> Finding {
         let message = match self.dataset.logs.len() {
             1 => message,
-            _ => format!("{}: {message}", self.dataset.logs[self.log].name()),
+            _ => format!("{}: {message}", self.source.name()),
         };
         Finding::new(code, message).severe(Severity::Warn)
     }
 
     /// A warning about a place in the log.
     pub(super) fn warning_at(&self, code: Code, row: usize, message: String) -> Finding {
-        let Row { movement, t_us, .. } = self.rows[row];
-        let name = self
-            .dataset
-            .movement_name(&self.dataset.movements[movement]);
-        self.warning(code, message).at(name, t_us)
-    }
-
-    pub(super) fn leave_out_undecoded(&mut self, errors: &[Option<[f64; 3]>]) {
-        let errors = errors.get(self.first..).unwrap_or_default();
-        for (usable, error) in self.usable.iter_mut().zip(errors) {
-            *usable &= error.is_some();
-        }
+        let (movement, t_us) = self.at(row);
+        self.warning(code, message).at(movement, t_us)
     }
 }
 
 fn channels(rows: &[Row], stage: &Stage) -> Vec<Channel> {
     let half_m = 0.5 * stage.y_baseline_m;
-    // Through the pose and back equal beams would differ by rounding.
-    let on_grid = |beam_m: f64| Some((beam_m / BEAM_GRID_M).round() * BEAM_GRID_M);
+    // Through the pose and back equal beams differ by rounding.
+    let beam = |beam_m: f64| Some(f64::from(beam_m as f32));
     let value = |channel: usize, row: &Row| {
         let [x, y, rz] = row.reference;
         match channel {
             0..3 => Some(row.signal_m[channel]),
-            3 => on_grid(x),
-            4 => on_grid(y + half_m * rz.tan()),
-            5 => on_grid(y - half_m * rz.tan()),
+            3 => beam(x),
+            4 => beam(y + half_m * rz.tan()),
+            5 => beam(y - half_m * rz.tan()),
             _ => {
                 let codes = row.frame.capacitive()?;
                 Some(f64::from(codes[channel - 6]) * stage.capacitive.m_per_count)
@@ -151,12 +113,10 @@ fn channels(rows: &[Row], stage: &Stage) -> Vec<Channel> {
     };
     let per_code = [stage.hall.m_per_count, 0.0, stage.capacitive.m_per_count];
     let channel = |(k, name): (usize, &'static str)| {
+        let values = rows.iter().map(|row| value(k, row));
         Some(Channel {
             name,
-            values: rows
-                .iter()
-                .map(|row| value(k, row))
-                .collect::<Option<_>>()?,
+            values: values.collect::<Option<_>>()?,
             m_per_code: per_code[k / 3],
         })
     };
@@ -173,19 +133,11 @@ pub fn period_s(rows: &[Row], segments: &[Range<usize>], servo_period_s: f64) ->
 }
 
 /// The median; 0 of nothing.
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    statistics::median(values).unwrap_or(0.0)
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    statistics::median(&mut values.collect::<Vec<f64>>()).unwrap_or(0.0)
 }
 
 /// Standard deviation of normal numbers about zero from their median magnitude.
 pub(in crate::diagnose) fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
-    let mut magnitudes: Vec<f64> = values.map(f64::abs).collect();
-    1.4826 * median(&mut magnitudes)
-}
-
-/// Largest less smallest.
-pub(super) fn spread(values: &[f64]) -> f64 {
-    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    (high - low).max(0.0)
+    1.4826 * median(values.map(f64::abs))
 }

@@ -1,101 +1,74 @@
 //! Outliers: single rows far from those before and behind.
 
-use super::channels::{LogSignals, robust_deviation};
-use super::residual::{Error, Residuals, blamed};
+use super::channels::{LogSignals, median, robust_deviation};
+use super::residual::{Residuals, is_seen};
+use super::{BLOCK, CLEAR};
 use crate::finding::{Code, Finding};
-use crate::statistics;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Deviation of an outlier, in standard deviations of such deviations. The largest of a million
-/// rows of noise is at 5.
-const OUTLIER_MIN: f64 = 7.0;
-/// Rows on each side that show where a row should be.
-const SIDE: usize = 12;
-
 /// Names rows far outside the noise, by channel, and leaves them out.
 pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
-    let all: Vec<(&Range<usize>, usize)> = rows(log).collect();
-    let off = |&(segment, row): &(&Range<usize>, usize)| {
-        [0, 1, 2].map(|k| off_m(log, &residuals.values[k], segment, row))
+    let rows = log
+        .segments
+        .iter()
+        .flat_map(|s| s.clone().map(move |row| (s, row)));
+    let rows: Vec<(&Range<usize>, usize)> = rows.filter(|(_, row)| log.usable[*row]).collect();
+    // From the median of those about it: beside a step is no outlier.
+    let off_m = |&(segment, row): &(&Range<usize>, usize)| {
+        let about = row.saturating_sub(BLOCK).max(segment.start)..segment.end.min(row + BLOCK + 1);
+        let about: Vec<usize> = about.filter(|&row| log.usable[row]).collect();
+        let middle_m = |values: &Vec<f64>| median(about.iter().map(|&row| values[row]));
+        (residuals.values.each_ref()).map(|values| values[row] - middle_m(values))
     };
-    let off_m: Vec<[f64; 3]> = all.par_iter().map(off).collect();
-    let usual_m = [0, 1, 2].map(|k| {
-        let usual_m = robust_deviation(off_m.iter().map(|off_m| off_m[k]));
-        usual_m.max(residuals.noise_m[k])
-    });
-    let is_far = |off_m: &[f64; 3]| (0..3).any(|k| off_m[k].abs() > OUTLIER_MIN * usual_m[k]);
-    let found = all
+    let off_m: Vec<[f64; 3]> = rows.par_iter().map(off_m).collect();
+    let usual_m = [0, 1, 2].map(|k| robust_deviation(off_m.iter().map(|off_m| off_m[k])));
+    let is_far = |off_m: &[f64; 3]| (0..3).any(|k| off_m[k].abs() > CLEAR * usual_m[k]);
+    let far = rows
         .into_iter()
         .zip(off_m)
         .filter(|(_, off_m)| is_far(off_m));
-    let found: Vec<_> = found
-        .map(|((s, row), off_m)| (s.clone(), row, off_m))
-        .collect();
-    for (_, row, _) in &found {
-        log.usable[*row] = false;
+    let far = far.map(|((segment, row), off_m)| (segment.clone(), row, off_m));
+    let far: Vec<(Range<usize>, usize, [f64; 3])> = far.collect();
+    far.iter().for_each(|(_, row, _)| log.usable[*row] = false);
+    let mut by_channel: BTreeMap<usize, Vec<(usize, f64)>> = BTreeMap::new();
+    for (segment, row, shown_m) in far {
+        let mut rows = (segment.start..row).rev().filter(|&row| log.usable[row]);
+        let before = rows.next();
+        let behind = (row + 1..segment.end).find(|&row| log.usable[row]);
+        let beside = [before.or(behind), behind.or(before)].map(|row| row.unwrap_or(0));
+        // A channel that jumps by what the residuals ask of it, before any other.
+        let worth = |(channel, [size_m, explained]): &(usize, [f64; 2])| {
+            let values = &log.channels[*channel].values;
+            let own_m = values[row] - 0.5 * (values[beside[0]] + values[beside[1]]);
+            (f64::from(u8::from(is_seen(own_m, *size_m))) + 1e-9) * explained
+        };
+        let errors = residuals.errors(log, row, shown_m).into_iter().enumerate();
+        if let Some((channel, [size_m, _])) = errors.max_by(|a, b| worth(a).total_cmp(&worth(b))) {
+            by_channel
+                .entry(channel)
+                .or_default()
+                .push((row, size_m.abs()));
+        }
     }
-    let mut by_channel: BTreeMap<&'static str, Vec<(usize, Error)>> = BTreeMap::new();
-    for (segment, row, shown_m) in found {
-        let seen_m = |k: usize| off_line_m(log, &log.channels[k].values, &segment, row);
-        let error = blamed(&residuals.errors(log, row, shown_m), seen_m).unwrap_or_default();
-        let name = log.channels[error.channel].name;
-        by_channel.entry(name).or_default().push((row, error));
-    }
-    let of_channel = |(name, rows): (&'static str, Vec<_>)| finding(log, name, &rows);
-    by_channel.into_iter().map(of_channel).collect()
-}
-
-fn finding(log: &LogSignals, name: &str, outliers: &[(usize, Error)]) -> Finding {
-    let sizes_m = outliers.iter().map(|(_, error)| error.size_m.abs());
-    let rows: Vec<usize> = outliers.iter().map(|(row, _)| *row).collect();
-    let count = rows.len();
-    let message = format!(
-        "{count} {} of {name} far outside the noise, by up to {:.1} um: {}. A fit with --loss cauchy, the default, leaves \
-         them out of account; look for lost pulses, sparks and bits",
-        if count == 1 { "row" } else { "rows" },
-        sizes_m.fold(0.0, f64::max) * 1e6,
-        log.places(&rows),
-    );
-    let found = log.warning_at(Code::Outliers, rows[0], message);
-    found.on(name).of(count as f64, "rows")
-}
-
-/// The usable rows, each with its movement.
-fn rows<'s>(log: &'s LogSignals) -> impl Iterator<Item = (&'s Range<usize>, usize)> {
-    let of = |segment: &'s Range<usize>| segment.clone().map(move |row| (segment, row));
-    (log.segments.iter().flat_map(of)).filter(|(_, row)| log.usable[*row])
-}
-
-/// How far a row is from the median of those before it, or from that of those behind it, whichever is
-/// nearer: beside a step, or on the way from one level to another, is no outlier.
-fn off_m(log: &LogSignals, values: &[f64], segment: &Range<usize>, row: usize) -> f64 {
-    let off = |rows: Range<usize>| {
-        let used = rows.filter(|&row| log.usable[row]);
-        Some(
-            values[row] - statistics::median(&mut used.map(|row| values[row]).collect::<Vec<_>>())?,
-        )
+    let finding = |(channel, outliers): (usize, Vec<(usize, f64)>)| {
+        let (name, count) = (log.channels[channel].name, outliers.len());
+        let message = format!(
+            "{count} {} of {name} far outside the noise, by up to {:.1} um (the first: {}). A fit with --loss cauchy, the \
+             default, leaves them out of account; look for lost pulses, sparks and bits",
+            if count == 1 { "row" } else { "rows" },
+            outliers
+                .iter()
+                .map(|(_, size_m)| *size_m)
+                .fold(0.0, f64::max)
+                * 1e6,
+            log.place(outliers[0].0),
+        );
+        let found = log.warning_at(Code::Outliers, outliers[0].0, message);
+        found.on(name).of(count as f64, "rows")
     };
-    let before = off(row.saturating_sub(SIDE).max(segment.start)..row);
-    let behind = off(row + 1..(row + 1 + SIDE).min(segment.end));
-    match (before, behind) {
-        (Some(before), Some(behind)) if before * behind < 0.0 => 0.0,
-        (Some(before), Some(behind)) if before.abs() > behind.abs() => behind,
-        (before, behind) => before.or(behind).unwrap_or(0.0),
-    }
-}
-
-/// How far a row is off the line through the used rows beside it, m.
-fn off_line_m(log: &LogSignals, values: &[f64], segment: &Range<usize>, row: usize) -> f64 {
-    let before = (segment.start..row).rev().find(|&row| log.usable[row]);
-    let behind = (row + 1..segment.end).find(|&row| log.usable[row]);
-    let (before, behind) = (
-        before.or(behind).unwrap_or(row),
-        behind.or(before).unwrap_or(row),
-    );
-    let share = row.abs_diff(before) as f64 / before.abs_diff(behind).max(1) as f64;
-    values[row] - values[before] - share * (values[behind] - values[before])
+    by_channel.into_iter().map(finding).collect()
 }
 
 #[cfg(test)]

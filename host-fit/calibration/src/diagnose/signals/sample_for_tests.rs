@@ -9,8 +9,10 @@ use crate::input::shipped::STAGE_TOML;
 use crate::input::stage::Stage;
 use crate::simulate::assembly::Assembly;
 use crate::simulate::protocol::Protocol;
+use crate::simulate::random::{Purpose, Stream};
 use crate::simulate::recording::{Recording, Sample, record};
 use crate::simulate::sensors::SensorErrors;
+use std::ops::Range;
 
 /// Rows of each of its movements, and their servo period, s.
 pub(super) const ROWS: usize = 2000;
@@ -42,6 +44,30 @@ pub(super) fn codes(error_m: f64) -> i32 {
     (error_m / stage().hall.m_per_count).round() as i32
 }
 
+/// The recording with one of the nine channels held at its value in the first of some rows of a movement, beside
+/// so much of its usual noise.
+pub(super) fn held(
+    recording: &Recording,
+    channel: usize,
+    movement: usize,
+    rows: Range<usize>,
+    noise: f64,
+) -> Recording {
+    let mut held = recording.clone();
+    let mut random = Stream::new(7, Purpose::Sensors, channel as u64);
+    let first = held.movements[movement][rows.start];
+    for sample in &mut held.movements[movement][rows] {
+        let mut codes = |deviation: f64| random.normal(deviation * noise).round();
+        let k = channel % 3;
+        match channel / 3 {
+            0 => sample.hall[k] = first.hall[k] + codes(8.0) as i32,
+            1 => sample.beams_nm[k] = first.beams_nm[k] + codes(5.0) as i64,
+            _ => sample.capacitive[k] = first.capacitive[k] + codes(0.8) as i32,
+        }
+    }
+    held
+}
+
 pub(super) fn dataset(recording: &Recording) -> Dataset {
     let mut dataset = recording.dataset(&stage()).expect("a triangle");
     let period_us = dataset.rows[1].t_us - dataset.rows[0].t_us;
@@ -51,10 +77,10 @@ pub(super) fn dataset(recording: &Recording) -> Dataset {
     dataset
 }
 
-fn found(dataset: &Dataset) -> Vec<Finding> {
+pub(super) fn found(dataset: &Dataset) -> Vec<Finding> {
     let fitted = fit(dataset, &stage(), &FitSettings::new(ModelChoice::Auto));
     let (parameters, lag_s) = parameters_of(fitted.as_ref(), &stage());
-    signal_findings(dataset, &stage(), (&parameters, lag_s), None).0
+    signal_findings(dataset, &stage(), (&parameters, lag_s)).0
 }
 
 /// The warnings about a log.

@@ -1,78 +1,21 @@
 //! Mean power spectra of the signals of a log.
 
+use super::CLEAR;
 use super::channels::median;
-use nalgebra::Complex;
+use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Bins on each side that give the level of the noise.
 const SIDE: usize = 20;
-/// How far outside the noise a line is, in standard deviations of a normal number.
-const LINE_MIN: f64 = 6.5;
-
-/// The longest window of at most so many rows without prime factors above 5: others take long to
-/// transform.
-pub(super) fn smooth(rows: usize) -> usize {
-    let left = |n: usize| {
-        let without = |n: usize, factor: usize| {
-            core::iter::successors(Some(n), |n| n.is_multiple_of(factor).then(|| n / factor)).last()
-        };
-        [2, 3, 5].into_iter().try_fold(n, without)
-    };
-    (1..=rows).rfind(|&n| left(n) == Some(1)).unwrap_or(rows)
-}
 
 /// Pieces of segments of equal length.
 pub fn windows(segments: &[Range<usize>], length: usize) -> Vec<Range<usize>> {
     let of = |segment: &Range<usize>| {
-        let starts = segment.clone().step_by(length);
-        let end = segment.end;
-        starts
-            .map(move |start| start..start + length)
-            .filter(move |w| w.end <= end)
+        let (start, count) = (segment.start, segment.len() / length);
+        (0..count).map(move |k| start + k * length..start + (k + 1) * length)
     };
     segments.iter().flat_map(of).collect()
-}
-
-/// The discrete Fourier transform of one length.
-struct Transform {
-    /// exp(-2 pi i k / length).
-    roots: Vec<Complex<f64>>,
-}
-
-impl Transform {
-    fn new(length: usize) -> Self {
-        let root = |k| {
-            let (sin, cos) = libm::sincos(TAU * k as f64 / length as f64);
-            Complex::new(cos, -sin)
-        };
-        Self {
-            roots: (0..length).map(root).collect(),
-        }
-    }
-
-    /// Of every so many values, by decimation in time: the cost is the length times the sum of its
-    /// prime factors.
-    fn of(&self, values: &[Complex<f64>], every: usize, bins: &mut [Complex<f64>]) {
-        let length = bins.len();
-        let Some(parts) = (2..=length).find(|factor| length.is_multiple_of(*factor)) else {
-            bins.copy_from_slice(&values[..length]);
-            return;
-        };
-        let part = length / parts;
-        for (first, bins) in bins.chunks_mut(part).enumerate() {
-            self.of(&values[first * every..], every * parts, bins);
-        }
-        let mut own = vec![Complex::ZERO; parts];
-        for k in 0..part {
-            (own.iter_mut().zip(0..)).for_each(|(own, p): (_, usize)| *own = bins[p * part + k]);
-            for bin in (k..length).step_by(part) {
-                bins[bin] = (own.iter().zip(0..))
-                    .map(|(own, p): (_, usize)| own * self.roots[p * bin % length * every])
-                    .sum();
-            }
-        }
-    }
 }
 
 /// Mean power over windows with a Hann taper.
@@ -88,34 +31,23 @@ impl Spectrum {
     /// All windows have the same length.
     pub fn new(values: &[f64], windows: &[Range<usize>]) -> Self {
         let length = windows.first().map_or(2, Range::len);
-        let transform = Transform::new(length);
-        let taper: Vec<f64> = (0..length)
-            .map(|k| 0.5 - 0.5 * libm::cos(TAU * k as f64 / length as f64))
-            .collect();
+        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+        let (mut tapered, mut bins) = (transform.make_input_vec(), transform.make_output_vec());
         let mut power = vec![0.0; length / 2];
-        let tapered = |window: &Range<usize>| -> Vec<f64> {
+        let share = 1.0 / windows.len().max(1) as f64;
+        for window in windows {
             let rows = &values[window.clone()];
             let mean = rows.iter().sum::<f64>() / length as f64;
-            (rows.iter().zip(&taper))
-                .map(|(value, taper)| (value - mean) * taper)
-                .collect()
-        };
-        let mut bins = vec![Complex::ZERO; length];
-        // One transform of two real windows: their powers are those of a bin and its mirror.
-        for pair in windows.chunks(2) {
-            let real = tapered(&pair[0]);
-            let imaginary = pair.get(1).map_or_else(|| vec![0.0; length], tapered);
-            let both: Vec<_> = (real.into_iter().zip(imaginary))
-                .map(|(re, im)| Complex::new(re, im))
-                .collect();
-            transform.of(&both, 1, &mut bins);
-            for (k, sum) in power.iter_mut().enumerate() {
-                let mirrored = bins[(length - k) % length];
-                *sum += 0.5 * (bins[k].norm_sqr() + mirrored.norm_sqr());
+            for (k, (tapered, value)) in tapered.iter_mut().zip(rows).enumerate() {
+                let taper = 0.5 - 0.5 * libm::cos(TAU * k as f64 / length as f64);
+                *tapered = (value - mean) * taper;
+            }
+            // It fails for vectors of another length only.
+            if transform.process(&mut tapered, &mut bins).is_ok() {
+                let powers = power.iter_mut().zip(&bins);
+                powers.for_each(|(power, bin)| *power += share * bin.norm_sqr());
             }
         }
-        let count = windows.len().max(1) as f64;
-        power.iter_mut().for_each(|sum| *sum /= count);
         Self {
             power,
             windows: windows.len(),
@@ -126,10 +58,9 @@ impl Spectrum {
     /// The level of the noise around a bin.
     fn level(&self, bin: usize) -> f64 {
         let bins = bin.saturating_sub(SIDE).max(3)..(bin + SIDE + 1).min(self.power.len());
-        let mut around: Vec<f64> = bins.map(|k| self.power[k]).collect();
         let n = self.windows.max(1) as f64;
         // The median of chi-squared with 2 n degrees of freedom over its mean.
-        median(&mut around) / (1.0 - 1.0 / (9.0 * n)).powi(3)
+        median(bins.map(|k| self.power[k])) / (1.0 - 1.0 / (9.0 * n)).powi(3)
     }
 
     /// Amplitude of a line at a bin of at least 1: Hann spreads it over three.
@@ -140,43 +71,22 @@ impl Spectrum {
         (4.0 * excess.max(0.0) / (0.375 * (self.length * self.length) as f64)).sqrt()
     }
 
-    /// The clearest line from a bin on, and its power in parts of what noise may have; `None` where
-    /// noise explains all.
-    pub(super) fn clearest_line(&self, lowest: usize) -> Option<(usize, f64)> {
+    /// The lines from a bin on that noise does not explain.
+    pub(super) fn lines(&self, lowest: usize) -> impl Iterator<Item = usize> {
         let n = self.windows.max(1) as f64;
-        let limit = (1.0 - 1.0 / (9.0 * n) + LINE_MIN / (3.0 * n.sqrt())).powi(3);
-        let peak = |bin: usize| {
-            self.power[bin] >= self.power[bin - 1].max(f64::max(self.power[bin + 1], 0.0))
+        let limit = (1.0 - 1.0 / (9.0 * n) + CLEAR / (3.0 * n.sqrt())).powi(3);
+        let is_line = move |bin: &usize| {
+            let highest = self.power[bin - 1].max(self.power[bin + 1]);
+            self.power[*bin] >= highest && self.power[*bin] > limit * self.level(*bin)
         };
-        (lowest.max(1)..self.power.len().saturating_sub(2))
-            .filter(|&bin| peak(bin))
-            .map(|bin| (bin, self.power[bin] / (limit * self.level(bin))))
-            .filter(|(_, clear)| *clear > 1.0)
-            .max_by(|a, b| a.1.total_cmp(&b.1))
+        (lowest.max(1)..self.power.len().saturating_sub(2)).filter(is_line)
     }
 
     /// The highest bin with a considerable part of the power.
     pub(super) fn highest(&self) -> usize {
         let most = self.power.iter().copied().fold(0.0, f64::max);
-        self.power
-            .iter()
-            .rposition(|&power| power > 1e-3 * most)
-            .unwrap_or(0)
-    }
-
-    /// Cycles per row of a line at a bin: the ratio of two neighbouring bins of a Hann spectrum gives
-    /// where between them it is.
-    pub(super) fn cycles_per_row(&self, bin: usize) -> f64 {
-        let level = self.level(bin);
-        let size = |k: usize| (self.power[k] - level).max(0.0).sqrt();
-        let (neighbour, side) = if self.power[bin + 1] > self.power[bin - 1] {
-            (bin + 1, 1.0)
-        } else {
-            (bin - 1, -1.0)
-        };
-        let ratio = size(neighbour) / size(bin).max(f64::MIN_POSITIVE);
-        let off = ((2.0 * ratio - 1.0) / (1.0 + ratio)).clamp(0.0, 0.5);
-        (bin as f64 + side * off) / self.length as f64
+        let considerable = self.power.iter().rposition(|&power| power > 1e-3 * most);
+        considerable.unwrap_or(0)
     }
 }
 
@@ -190,57 +100,29 @@ mod tests {
         (0..rows).map(|_| random.normal(1.0)).collect()
     }
 
-    fn cut(rows: usize, length: usize) -> Vec<Range<usize>> {
-        (0..rows / length)
-            .map(|k| k * length..(k + 1) * length)
-            .collect()
-    }
-
     #[test]
-    fn a_line_is_found_at_its_frequency_with_its_amplitude() {
-        let windows = cut(8000, 1000);
+    fn a_line_is_found_at_its_bin_with_its_amplitude() {
         let mut values = noise(8000, 1);
         for (k, value) in values.iter_mut().enumerate() {
             *value += 0.8 * libm::sin(TAU * 0.1004 * k as f64 + 0.3);
         }
-        let spectrum = Spectrum::new(&values, &windows);
-        let (bin, clear) = spectrum.clearest_line(10).expect("a line");
-        assert!(clear > 5.0, "{clear}");
-        let frequency = spectrum.cycles_per_row(bin);
-        assert!((frequency - 0.1004).abs() < 5e-5, "{frequency}");
-        let amplitude = spectrum.amplitude(bin);
+        let spectrum = Spectrum::new(&values, &windows(&[0..8000], 1000));
+        assert!(spectrum.lines(10).eq([100]));
+        let amplitude = spectrum.amplitude(100);
         assert!((amplitude - 0.8).abs() < 0.06, "{amplitude}");
     }
 
+    /// Noise of variance 1 has the sum of the squared tapers as mean power.
     #[test]
-    fn power_is_that_of_the_sum_over_the_rows() {
-        for length in [1, 2, 12, 30, 49] {
-            let windows = cut(3 * length, length);
-            let values = noise(3 * length, 5);
-            let spectrum = Spectrum::new(&values, &windows);
-            for (bin, power) in spectrum.power.iter().enumerate() {
-                let of = |window: &Range<usize>| {
-                    let rows = &values[window.clone()];
-                    let mean = rows.iter().sum::<f64>() / length as f64;
-                    let (mut re, mut im) = (0.0, 0.0);
-                    for (k, value) in rows.iter().enumerate() {
-                        let turn = k as f64 / length as f64;
-                        let tapered = (value - mean) * (0.5 - 0.5 * libm::cos(TAU * turn));
-                        re += tapered * libm::cos(TAU * bin as f64 * turn);
-                        im += tapered * libm::sin(TAU * bin as f64 * turn);
-                    }
-                    re * re + im * im
-                };
-                let expected = windows.iter().map(of).sum::<f64>() / 3.0;
-                assert!((power - expected).abs() < 1e-9, "{length} {bin}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_window_has_no_large_prime_factor_and_is_hardly_shorter() {
-        for (rows, length) in [(1, 1), (1000, 1000), (997, 972), (500, 500), (7, 6)] {
-            assert_eq!(smooth(rows), length);
+    fn power_is_a_mean_over_windows_of_any_length() {
+        for length in [250, 997] {
+            let values = noise(100 * length, 5);
+            let power = Spectrum::new(&values, &windows(&[0..values.len()], length)).power;
+            let mean = power[3..].iter().sum::<f64>() / (power.len() - 3) as f64;
+            assert!(
+                (mean / (0.375 * length as f64) - 1.0).abs() < 0.02,
+                "{mean}"
+            );
         }
     }
 
@@ -248,8 +130,8 @@ mod tests {
     fn noise_has_no_lines_however_few_windows_there_are() {
         for (rows, length) in [(1000, 1000), (3000, 1000), (40_000, 500)] {
             for seed in 0..10 {
-                let spectrum = Spectrum::new(&noise(rows, seed), &cut(rows, length));
-                assert_eq!(spectrum.clearest_line(5), None, "{rows} {length} {seed}");
+                let spectrum = Spectrum::new(&noise(rows, seed), &windows(&[0..rows], length));
+                assert_eq!(spectrum.lines(5).next(), None, "{rows} {length} {seed}");
             }
         }
     }

@@ -1,157 +1,237 @@
-//! Movements in which nothing moves, and those that end in a rest.
+//! What stands still: movements in which nothing moves, and channels that repeat one value.
 
-use super::channels::{LogSignals, median, spread};
+use super::BLOCK;
+use super::channels::LogSignals;
 use crate::diagnose::left_out;
 use crate::finding::{Code, Finding, Severity};
 use std::ops::Range;
 
-/// A movement stands still within this, m; its beams within this time, s.
-const IDLE_M: f64 = 2e-6;
-const ONCE_S: f64 = 1.0;
-/// Length of a rest after a crash, s, of the stretches it is looked for in, and the share of
-/// the usual speed that the stage has just before it.
-const REST_S: f64 = 0.2;
-const REST_STRETCH_S: f64 = 0.05;
-const SPEED_SHARE: f64 = 0.3;
+/// What moves by less stands still, m: a few times what the interferometers drift in a movement.
+const STILL_M: f64 = 2e-6;
+/// One sound log in so many has a run of equal values that is called one.
+const RARITY: f64 = 1e6;
 
-/// A channel that stood still, at the longest in these rows, and in such a share of the log's rows.
-pub(super) fn stuck(log: &LogSignals, who: &str, longest: &Range<usize>, share: f64) -> Finding {
-    let severity = left_out::severity(share);
-    let stood_s = longest.len() as f64 * log.period_s;
-    let in_all = match severity {
-        Severity::Refuse => format!(", in {:.0} % of the log in all", 100.0 * share),
-        _ => String::new(),
+/// Names movements in which nothing moves; their rows are left out.
+pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
+    let is_idle = |rows: &&Range<usize>| {
+        // Over longer the interferometers of a stage at rest drift.
+        let mut pieces = (rows.start..rows.end).step_by(BLOCK);
+        let is_still = |start: usize| {
+            let piece = start..rows.end.min(start + BLOCK);
+            (3..6).all(|beam| spread(&log.channels[beam].values[piece.clone()]) < STILL_M)
+        };
+        log.source.has_reference && hall_motion_m(log, rows) < STILL_M && pieces.all(is_still)
     };
+    let idle: Vec<Range<usize>> = log.segments.iter().filter(is_idle).cloned().collect();
+    let first = idle.first()?.start;
     let message = format!(
-        "{who} stood still for {stood_s:.2} s ({}){in_all} while it should have moved or shown its noise: look for a stage that \
-         stopped, a cable or a frozen register, and leave these rows out",
-        log.place(longest.start),
+        "nothing moves in {} of {} movements (the first: {}): they add nothing to the fit; leave them out or record them again",
+        idle.len(),
+        log.segments.len(),
+        log.place(first),
     );
-    let found = log.warning_at(Code::Stuck, longest.start, message);
-    found.severe(severity).of(stood_s, "s")
+    log.leave_out(idle);
+    Some(log.warning_at(Code::IdleMovement, first, message))
 }
 
-/// Names movements in which nothing moves, and rests at the end of movements; their rows are left out.
-pub(super) fn rests(log: &mut LogSignals) -> Vec<Finding> {
-    let (mut idle, mut crashed) = (Vec::new(), Vec::new());
-    let (movements, once) = (log.segments.len(), log.rows_in(ONCE_S));
-    for rows in &log.segments {
-        if rows.len() < 2 || !log.usable[rows.clone()].iter().all(|used| *used) {
-            continue;
+/// Names channels that repeat a value for longer than noise does.
+pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
+    let mut all = Vec::new();
+    for (k, channel) in log.channels.iter().enumerate() {
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for segment in &log.segments {
+            let mut start = segment.start;
+            for values in channel.values[segment.clone()].chunk_by(|a, b| a == b) {
+                runs.push(start..start + values.len());
+                start += values.len();
+            }
         }
-        // Over longer the interferometers of a stage at rest drift.
-        let is_still = |moved: &f64| *moved < IDLE_M;
-        if hall_motion_m(log, rows) < IDLE_M && moved_m(log, rows, once).iter().all(is_still) {
-            idle.push(rows.clone());
-        } else if let Some(rest) = sudden_rest(log, rows) {
-            crashed.push(rest);
-        }
-    }
-    // Where most movements end in a rest, it is how the stage is driven.
-    if 2 * crashed.len() > movements.max(2) {
-        crashed.clear();
-    }
-    let mut findings = Vec::new();
-    if let Some(first) = idle.first() {
-        let starts: Vec<usize> = idle.iter().map(|rows| rows.start).collect();
-        let message = format!(
-            "nothing moves in {} of {movements} movements ({}): they add nothing to the fit; leave them out or record \
-             them again",
-            idle.len(),
-            log.places(&starts),
-        );
-        findings.push(log.warning_at(Code::IdleMovement, first.start, message));
-    }
-    if let Some(longest) = crashed.iter().max_by_key(|rest| rest.len()) {
-        let who = match crashed.len() {
-            1 => "the stage".to_owned(),
-            count => format!("the stage, at the end of {count} of {movements} movements,"),
+        // White noise by second differences; the most likely of its codes comes with this chance.
+        let seconds = log
+            .segments
+            .iter()
+            .flat_map(|s| channel.values[s.clone()].windows(3));
+        let seconds = seconds.map(|v| v[0] - 2.0 * v[1] + v[2]);
+        let count = log.rows.len() as f64;
+        let noise_m = (seconds.map(|x| x * x).sum::<f64>() / (6.0 * count)).sqrt();
+        let chance = libm::erf(channel.m_per_code / (8f64.sqrt() * noise_m));
+        let least = match spread(&channel.values) {
+            0.0 => 2.0,
+            _ => 1.0 + libm::log(RARITY * count) / libm::log(chance).abs(),
         };
-        findings.push(stuck(log, &who, longest, 0.0));
+        runs.retain(|run| run.len() as f64 >= least && should_move(log, k, run));
+        all.push(runs);
     }
-    log.leave_out(idle.into_iter().chain(crashed));
+    named_stuck(log, all)
+}
+
+/// Whether a channel should show something in these rows: a probe its noise, which is many codes; a beam
+/// motion that a probe shows, a gap that of another.
+fn should_move(log: &LogSignals, channel: usize, rows: &Range<usize>) -> bool {
+    let moves = |channel: usize| spread(&log.channels[channel].values[rows.clone()]) > STILL_M;
+    match channel {
+        0..3 => true,
+        3..6 => log.source.has_reference && hall_motion_m(log, rows) > STILL_M,
+        _ => (6..log.channels.len()).any(moves),
+    }
+}
+
+/// Names channels that stand still in runs of rows, by channel, at their longest: as saturated where that is an
+/// end of what the channel reads. What is stuck together is named once. The rows are left out.
+pub(super) fn named_stuck(log: &mut LogSignals, runs: Vec<Vec<Range<usize>>>) -> Vec<Finding> {
+    let mut found: Vec<(Vec<usize>, &Range<usize>, bool, usize)> = Vec::new();
+    for (k, (channel, runs)) in log.channels.iter().zip(&runs).enumerate() {
+        let Some(longest) = runs.iter().max_by_key(|run| run.len()) else {
+            continue;
+        };
+        let rows = runs.iter().map(Range::len).sum();
+        let values = &channel.values;
+        let is_end = |end: fn(f64, f64) -> f64| {
+            values.iter().copied().reduce(end) == Some(values[longest.start])
+        };
+        let is_top = channel.m_per_code > 0.0
+            && spread(&values[longest.clone()]) == 0.0
+            && is_end(f64::min) != is_end(f64::max);
+        let middle = (longest.start + longest.end) / 2;
+        let mut others = found
+            .iter_mut()
+            .filter(|(_, _, other, _)| !is_top && !other);
+        match others.find(|(_, run, ..)| run.contains(&middle)) {
+            Some((channels, ..)) => channels.push(k),
+            None => found.push((vec![k], longest, is_top, rows)),
+        }
+    }
+    let finding = |(channels, longest, is_top, rows): (Vec<usize>, &Range<usize>, bool, usize)| {
+        let mut all = log.channels.iter();
+        // Rows that repeat whole are true, if of no use.
+        let is_whole = all.all(|channel| spread(&channel.values[longest.clone()]) == 0.0);
+        let share = rows as f64 / log.rows.len() as f64;
+        let severity = if is_whole {
+            Severity::Warn
+        } else {
+            left_out::severity(share)
+        };
+        let names: Vec<&str> = channels.iter().map(|&k| log.channels[k].name).collect();
+        let who = if is_whole {
+            "every channel".to_owned()
+        } else {
+            names.join(", ")
+        };
+        let (place, percent) = (log.place(longest.start), 100.0 * share);
+        let stood_s = longest.len() as f64 * log.period_s;
+        let (code, size, what) = match is_top {
+            true => {
+                let channel = &log.channels[channels[0]];
+                let code = channel.values[longest.start] / channel.m_per_code;
+                let what = format!(
+                    "is flat at code {code:.0} for {rows} rows, {percent:.1} % of the log, at most {} together ({place}): its \
+                     converter or amplifier is at the end of its range; lower the gain or the motion",
+                    longest.len()
+                );
+                (Code::Saturated, (rows as f64, "rows"), what)
+            }
+            false => {
+                let what = format!(
+                    "stood still for {stood_s:.2} s ({place}), in {percent:.1} % of the log in all, while it should have moved \
+                     or shown its noise: look for a stage that stopped, a cable or a frozen register"
+                );
+                (Code::Stuck, (stood_s, "s"), what)
+            }
+        };
+        let message = format!("{who} {what}, and leave these rows out");
+        let found = log
+            .warning_at(code, longest.start, message)
+            .severe(severity);
+        let found = found.of(size.0, size.1);
+        match names[..] {
+            [name] => found.on(name),
+            _ => found,
+        }
+    };
+    let findings = found.into_iter().map(finding).collect();
+    log.leave_out(runs.into_iter().flatten());
     findings
 }
 
-/// How far the stage moves by any beam, m.
-fn motion_m(log: &LogSignals, rows: &Range<usize>) -> f64 {
-    let beams = log.channels[3..6].iter();
-    let spreads = beams.map(|beam| spread(&beam.values[rows.clone()]));
-    spreads.fold(0.0, f64::max)
-}
-
-/// How far it moves by any probe, by means of 25 rows, so that noise does not count, m.
-pub(super) fn hall_motion_m(log: &LogSignals, rows: &Range<usize>) -> f64 {
+/// How far a stage moves by any probe, by means of rows, m.
+fn hall_motion_m(log: &LogSignals, rows: &Range<usize>) -> f64 {
     let moved = |k: usize| {
-        let some = log.channels[k].values[rows.clone()].chunks(25);
-        let some = some.filter(|some| some.len() > 12);
-        let means = some.map(|some| some.iter().sum::<f64>() / some.len() as f64);
+        let pieces = log.channels[k].values[rows.clone()].chunks_exact(BLOCK);
+        let means = pieces.map(|piece| piece.iter().sum::<f64>() / BLOCK as f64);
         spread(&means.collect::<Vec<_>>())
     };
     moved(0).max(moved(1)).max(moved(2))
 }
 
-/// How far the stage moves in stretches of some rows, counted from the last, m.
-fn moved_m(log: &LogSignals, rows: &Range<usize>, length: usize) -> Vec<f64> {
-    let length = length.min(rows.len());
-    let ends = (0..rows.len() / length).map(|k| rows.end - k * length);
-    ends.map(|end| motion_m(log, &(end - length..end)))
-        .collect()
-}
-
-/// The rest at the end of a movement that was at speed just before.
-fn sudden_rest(log: &LogSignals, rows: &Range<usize>) -> Option<Range<usize>> {
-    let length = log.rows_in(REST_STRETCH_S);
-    // Cheap first: most movements do not end in a rest.
-    let last = rows.end.saturating_sub(length).max(rows.start)..rows.end;
-    if motion_m(log, &last) >= IDLE_M {
-        return None;
-    }
-    let mut moved = moved_m(log, rows, length);
-    let still_m = IDLE_M.min(0.01 * motion_m(log, rows)).max(0.3e-6);
-    let still = moved.iter().take_while(|moved| **moved < still_m).count();
-    if still * length < log.rows_in(REST_S) || still + 4 > moved.len() {
-        return None;
-    }
-    // The stretch in which it stopped holds part of the motion only.
-    let last = moved[still].max(moved[still + 1]);
-    (last > SPEED_SHARE * median(&mut moved[still..]))
-        .then_some(rows.end - still * length..rows.end)
+/// Largest less smallest.
+fn spread(values: &[f64]) -> f64 {
+    let end = |end: fn(f64, f64) -> f64| values.iter().copied().reduce(end).unwrap_or(0.0);
+    end(f64::max) - end(f64::min)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::sample_for_tests::{ROWS, only, recording};
-    use super::*;
-    use crate::simulate::random::{Purpose, Stream};
-    use crate::simulate::recording::{Recording, Sample};
+    use super::super::sample_for_tests::{ROWS, dataset, held, only, recording, warnings};
+    use crate::finding::{Code, Severity};
 
-    /// Rows that repeat the first of them, with the noise of sensors.
-    fn rest(recording: &mut Recording, movement: usize, rows: Range<usize>) {
-        let mut random = Stream::new(7, Purpose::Sensors, 0);
-        let first = recording.movements[movement][rows.start];
-        for sample in &mut recording.movements[movement][rows] {
-            let mut noise = |deviation: f64| random.normal(deviation).round();
-            *sample = Sample {
-                t_us: sample.t_us,
-                beams_nm: first.beams_nm.map(|nm| nm + noise(5.0) as i64),
-                capacitive: first.capacitive.map(|code| code + noise(0.8) as i32),
-                hall: first.hall.map(|code| code + noise(8.0) as i32),
-                ..*sample
-            };
+    #[test]
+    fn a_channel_that_repeats_its_code_is_stuck_and_one_that_does_so_in_a_tenth_refused() {
+        for (channel, name) in [(2, "hall_c"), (3, "ifm_x"), (7, "cap_2")] {
+            for (rows, severity) in [(300, Severity::Warn), (600, Severity::Refuse)] {
+                let frozen = held(&recording(), channel, 1, 500..500 + rows, 0.0);
+                let found = only(&frozen, Code::Stuck, Some(name));
+                assert_eq!(found.severity, severity, "{rows} of 6,000 rows");
+                assert_eq!(
+                    (found.movement.as_deref(), found.t_us),
+                    (Some("1"), Some(1_000_000))
+                );
+            }
         }
     }
 
     #[test]
-    fn a_stage_that_stops_in_a_movement_is_stuck_and_one_that_does_not_start_idle() {
-        let mut crashed = recording();
-        rest(&mut crashed, 1, 1200..ROWS);
-        let found = only(&crashed, Code::Stuck, None);
-        let off_us = found.t_us.expect("a time") - 2_400_000;
-        assert!(off_us.abs() <= 100_000, "{off_us} us");
+    fn a_logger_that_hangs_is_named_once() {
+        let mut hung = recording();
+        for channel in 0..9 {
+            hung = held(&hung, channel, 0, 300..400, 0.0);
+        }
+        let found = &warnings(&dataset(&hung))[0];
+        assert!(
+            found
+                .message
+                .starts_with("every channel stood still for 0.20 s"),
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn a_movement_in_which_nothing_moves_is_idle() {
         let mut idle = recording();
-        rest(&mut idle, 2, 0..ROWS);
+        for channel in 0..9 {
+            idle = held(&idle, channel, 2, 0..ROWS, 1.0);
+        }
         let found = only(&idle, Code::IdleMovement, None);
         assert_eq!(found.movement.as_deref(), Some("2"));
+    }
+
+    #[test]
+    fn flat_tops_are_named_below_the_end_of_the_converter_too() {
+        for (tenths, severity) in [(9, Severity::Warn), (4, Severity::Refuse)] {
+            let mut recording = recording();
+            let all = recording.movements.iter().flatten();
+            let top = all.map(|sample| sample.hall[1]).max().unwrap_or(0) * tenths / 10;
+            let mut clipped = 0;
+            for sample in recording.movements.iter_mut().flatten() {
+                clipped += usize::from(sample.hall[1] >= top);
+                sample.hall[1] = sample.hall[1].min(top);
+            }
+            let found = only(&recording, Code::Saturated, Some("hall_b"));
+            assert_eq!(found.severity, severity);
+            let rows = found.value.expect("rows");
+            assert!(
+                rows > 0.8 * f64::from(clipped as u32) && rows <= f64::from(clipped as u32),
+                "{rows} {clipped}"
+            );
+        }
     }
 }

@@ -2,142 +2,125 @@
 
 use super::channels::LogSignals;
 use crate::finding::{Code, Finding, Severity};
-use crate::input::stage::Stage;
 
-/// Deviation of the times of rows from even ones that is worth a warning, in periods: at 1 mm/s
-/// and 2 ms it is 20 nm of motion.
-const JITTER_MIN: f64 = 0.01;
-/// Relative difference of the rate from the servo's that is: far above a crystal's.
-const RATE_MIN: f64 = 0.005;
-/// From here on, in servo periods, rows are thinned on purpose.
-const THINNED_FROM: f64 = 5.0;
-/// Share of missing rows from which they are worth a warning.
-const MISSING_MIN: f64 = 1e-3;
+/// Part of the rows that may be missing, of the servo period that the period of a log may be off, and of its own
+/// period that the times of rows may be off, rms: at 1 mm/s and 2 ms the last is 20 nm of motion.
+const TOLERANCE: f64 = 0.01;
 
-/// What the times of rows show.
-pub(super) fn timing(log: &LogSignals, stage: &Stage) -> impl Iterator<Item = Finding> {
-    let found = [missing(log), uneven(log), other_rate(log, stage)];
-    found.into_iter().flatten()
-}
-
-/// Periods of the log from one row to a later one of its movement.
-fn periods(log: &LogSignals, from: usize, to: usize) -> u32 {
-    let [from, to] = [from, to].map(|row| log.rows[row].frame.sequence());
-    to.wrapping_sub(from)
-}
-
-/// Time from one row to a later one of its movement, s.
-fn seconds(log: &LogSignals, from: usize, to: usize) -> f64 {
-    (log.rows[to].t_us - log.rows[from].t_us) as f64 * 1e-6
-}
-
-fn missing(log: &LogSignals) -> Option<Finding> {
-    let rows = log.segments.iter().flat_map(|s| s.start + 1..s.end);
-    let missed = |row: usize| periods(log, row - 1, row).saturating_sub(1);
-    let gaps: Vec<usize> = rows.filter(|&row| missed(row) > 0).collect();
-    let longest = gaps.iter().map(|&row| missed(row)).max()?;
-    let rows: f64 = gaps.iter().map(|&row| f64::from(missed(row))).sum();
-    let share = rows / (rows + log.len() as f64);
-    let message = format!(
-        "{rows} rows are missing ({:.2} %) in {} gaps, the longest of {longest}; before {}: look for frames that the \
-         recorder lost",
-        share * 100.0,
-        gaps.len(),
-        log.places(&gaps),
-    );
-    let severity = match share < MISSING_MIN {
-        true => Severity::Note,
-        false => Severity::Warn,
+/// What the times of rows show against a line over their sequence, the same in all movements.
+pub(super) fn timing(log: &LogSignals) -> Vec<Finding> {
+    let steps = |from: usize, row: usize| {
+        let [from, to] = [from, row].map(|row| log.rows[row].frame.sequence());
+        f64::from(to.wrapping_sub(from))
     };
-    let found = log.warning_at(Code::RowsMissing, gaps[0], message);
-    Some(found.severe(severity).of(rows, "rows"))
-}
+    let centred = |segment: &std::ops::Range<usize>| {
+        let at = |row: usize| {
+            let t_us = (log.rows[row].t_us - log.rows[segment.start].t_us) as f64;
+            [steps(segment.start, row), t_us * 1e-6]
+        };
+        let points: Vec<[f64; 2]> = segment.clone().map(at).collect();
+        let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64;
+        let [k, t] = [mean(0), mean(1)];
+        let points = segment.clone().zip(points);
+        points
+            .map(|(row, p)| (row, p[0] - k, p[1] - t))
+            .collect::<Vec<_>>()
+    };
+    let points: Vec<(usize, f64, f64)> = log.segments.iter().flat_map(centred).collect();
+    let sum = |of: &dyn Fn(&(usize, f64, f64)) -> f64| points.iter().map(of).sum::<f64>();
+    let period_s = sum(&|(_, k, t)| k * t) / sum(&|(_, k, _)| k * k);
+    let off_s = |(_, k, t): &(usize, f64, f64)| (t - period_s * k).abs();
+    let rms_s = (sum(&|point| off_s(point).powi(2)) / log.rows.len() as f64).sqrt();
+    let worst = points.iter().max_by(|a, b| off_s(a).total_cmp(&off_s(b)));
 
-/// Times of the rows against even ones, in each movement.
-fn uneven(log: &LogSignals) -> Option<Finding> {
-    let (mut squares, mut rows) = (0.0, 0.0);
-    let mut worst = (0.0, 0);
-    for segment in log.segments.iter().filter(|segment| segment.len() >= 10) {
-        let number = |row: usize| f64::from(periods(log, segment.start, row));
-        // A line through the times: a rate that is only another one is not uneven.
-        let n = segment.len() as f64;
-        let mean_k = segment.clone().map(number).sum::<f64>() / n;
-        let time_s = |row: usize| seconds(log, segment.start, row);
-        let mean_s = segment.clone().map(time_s).sum::<f64>() / n;
-        let (mut kk, mut kt) = (0.0, 0.0);
-        for row in segment.clone() {
-            let k = number(row) - mean_k;
-            kk += k * k;
-            kt += k * (time_s(row) - mean_s);
-        }
-        for row in segment.clone() {
-            let off_s = time_s(row) - mean_s - kt / kk * (number(row) - mean_k);
-            squares += off_s * off_s;
-            if off_s.abs() > worst.0 {
-                worst = (off_s.abs(), row);
-            }
-        }
-        rows += n;
+    let rows = log.segments.iter().flat_map(|s| s.start + 1..s.end);
+    let missed = |row: usize| steps(row - 1, row) - 1.0;
+    let gaps: Vec<usize> = rows.filter(|&row| missed(row) > 0.0).collect();
+    let mut found = Vec::new();
+    if let Some(&longest) = gaps
+        .iter()
+        .max_by(|a, b| missed(**a).total_cmp(&missed(**b)))
+    {
+        let rows: f64 = gaps.iter().map(|&row| missed(row)).sum();
+        let share = rows / (rows + log.rows.len() as f64);
+        let message = format!(
+            "{rows} rows are missing ({:.2} %) in {} gaps, the longest of {} before {}: look for frames that the recorder lost",
+            share * 100.0,
+            gaps.len(),
+            missed(longest),
+            log.place(longest),
+        );
+        let missing = log.warning_at(Code::RowsMissing, longest, message);
+        found.push(missing.severe(severity(share)).of(rows, "rows"));
     }
-    let rms_s = (squares / f64::max(rows, 1.0)).sqrt();
-    (rms_s > JITTER_MIN * log.period_s).then(|| {
+    if let Some(worst) = worst.filter(|_| rms_s > TOLERANCE * log.period_s) {
         let message = format!(
             "rows come at uneven times: {:.0} us rms off an even rate, at most {:.0} us ({}): have the servo's clock start \
              all converters and stamp the rows",
             rms_s * 1e6,
-            worst.0 * 1e6,
-            log.place(worst.1),
+            off_s(worst) * 1e6,
+            log.place(worst.0),
         );
-        let found = log.warning_at(Code::Jitter, worst.1, message);
-        found.of(rms_s * 1e6, "us")
-    })
-}
-
-fn other_rate(log: &LogSignals, stage: &Stage) -> Option<Finding> {
-    let ends = log.segments.iter().filter(|segment| segment.len() >= 2);
-    let ends = ends.map(|segment| (segment.start, segment.end - 1));
-    let time_s: f64 = ends.clone().map(|(a, b)| seconds(log, a, b)).sum();
-    let period_s = time_s
-        / ends
-            .map(|(a, b)| f64::from(periods(log, a, b)))
-            .sum::<f64>();
-    let servo_periods = period_s / stage.servo_period_s;
-    let is = |count: f64| (servo_periods / count - 1.0).abs() <= RATE_MIN;
-    if !servo_periods.is_finite() || is(1.0) {
-        return None;
+        found.push(
+            log.warning_at(Code::Jitter, worst.0, message)
+                .of(rms_s * 1e6, "us"),
+        );
     }
-    let count = servo_periods.round();
-    let severity = match count >= THINNED_FROM && is(count) {
-        true => Severity::Note,
-        false => Severity::Warn,
-    };
-    let rates = format!(
-        "rows are {:.1} us apart, the servo period of stage.toml is {:.1} us",
-        period_s * 1e6,
-        stage.servo_period_s * 1e6,
-    );
-    let message = match is(count) && count >= 2.0 {
-        true => format!(
-            "the log is thinned, to one of {count} servo periods ({rates}): nothing is known of the rows between; log \
-             every period, or correct servo.period_s"
-        ),
-        false => format!("{rates}: correct servo.period_s, or log every period"),
-    };
-    let found = log.warning(Code::Jitter, message).severe(severity);
-    Some(found.of(period_s * 1e6, "us"))
+    let servo_periods = period_s / log.stage.servo_period_s;
+    if (servo_periods - 1.0).abs() > TOLERANCE {
+        let count = servo_periods.round().max(1.0);
+        let off = (servo_periods / count - 1.0).abs();
+        let what = match off > TOLERANCE {
+            true => String::new(),
+            false => format!("the log is thinned, to one of {count} servo periods: "),
+        };
+        let message = format!(
+            "{what}rows are {:.1} us apart, the servo period of stage.toml is {:.1} us: log every period, or correct \
+             servo.period_s",
+            period_s * 1e6,
+            log.stage.servo_period_s * 1e6,
+        );
+        let rate = log.warning(Code::Jitter, message);
+        found.push(rate.severe(severity(off)).of(period_s * 1e6, "us"));
+    }
+    found
 }
 
+fn severity(off: f64) -> Severity {
+    match off > TOLERANCE {
+        true => Severity::Warn,
+        false => Severity::Note,
+    }
+}
 #[cfg(test)]
 mod tests {
-    use super::super::sample_for_tests::{PERIOD_S, dataset, recording, warnings};
+    use super::super::sample_for_tests::{PERIOD_S, dataset, found, recording};
     use super::*;
     use crate::input::dataset::Dataset;
     use crate::simulate::random::{Purpose, Stream};
 
-    fn only(dataset: &Dataset) -> (Code, Option<f64>) {
-        let found = warnings(dataset);
+    fn only(dataset: &Dataset) -> (Code, Severity, f64) {
+        let found = found(dataset);
         assert_eq!(found.len(), 1, "{found:#?}");
-        (found[0].code, found[0].value)
+        let value = found[0].value.expect("a size");
+        (found[0].code, found[0].severity, value)
+    }
+
+    /// One row of so many is missing.
+    fn without_one_of(count: usize) -> Dataset {
+        let sound = dataset(&recording());
+        let mut gappy = sound.clone();
+        let mut rows = sound.rows.into_iter().enumerate();
+        gappy.rows.clear();
+        for movement in &mut gappy.movements {
+            let (start, all) = (gappy.rows.len(), movement.rows.len());
+            let kept = rows.by_ref().take(all);
+            let kept = kept.filter(|(k, _)| k % count != count / 2);
+            gappy.rows.extend(kept.map(|(_, row)| row));
+            movement.rows = start..gappy.rows.len();
+        }
+        gappy.logs[0].rows = 0..gappy.rows.len();
+        gappy
     }
 
     /// With so many servo periods from row to row.
@@ -152,19 +135,16 @@ mod tests {
     }
 
     #[test]
-    fn missing_rows_are_counted() {
-        let sound = dataset(&recording());
-        let mut gappy = sound.clone();
-        let mut rows = sound.rows.into_iter().enumerate();
-        gappy.rows.clear();
-        for movement in &mut gappy.movements {
-            let (start, count) = (gappy.rows.len(), movement.rows.len());
-            let kept = rows.by_ref().take(count).filter(|(k, _)| k % 100 != 50);
-            gappy.rows.extend(kept.map(|(_, row)| row));
-            movement.rows = start..gappy.rows.len();
-        }
-        gappy.logs[0].rows = 0..gappy.rows.len();
-        assert_eq!(only(&gappy), (Code::RowsMissing, Some(60.0)));
+    fn missing_rows_are_counted_and_many_a_warning() {
+        let found = [200, 50].map(|count| only(&without_one_of(count)));
+        let missing = |severity, rows| (Code::RowsMissing, severity, rows);
+        assert_eq!(
+            found,
+            [
+                missing(Severity::Note, 30.0),
+                missing(Severity::Warn, 120.0)
+            ]
+        );
     }
 
     #[test]
@@ -174,25 +154,21 @@ mod tests {
         for row in &mut uneven.rows {
             row.t_us += random.between(-150.0, 150.0) as i64;
         }
-        let (code, rms_us) = only(&uneven);
-        assert_eq!(code, Code::Jitter);
-        let rms_us = rms_us.expect("a size");
+        let (code, severity, rms_us) = only(&uneven);
+        assert_eq!((code, severity), (Code::Jitter, Severity::Warn));
         assert!((80.0..93.0).contains(&rms_us), "{rms_us}");
     }
 
     #[test]
-    fn another_rate_is_reported_and_a_thinned_log_is_not_warned_of() {
-        for periods in [2.0, 5.5] {
-            let (code, period_us) = only(&every(periods));
-            assert_eq!(code, Code::Jitter);
-            let period_us = period_us.expect("a period");
+    fn another_rate_is_a_warning_and_that_of_a_thinned_log_a_note() {
+        for (periods, severity) in [
+            (0.5, Severity::Warn),
+            (5.5, Severity::Warn),
+            (4.0, Severity::Note),
+        ] {
+            let (code, found, period_us) = only(&every(periods));
+            assert_eq!((code, found), (Code::Jitter, severity), "{periods}");
             assert!((period_us - 2000.0 * periods).abs() < 0.1, "{period_us}");
         }
-        let thinned = &warnings(&every(4.0))[0];
-        assert!(
-            thinned.message.contains("one of 4 servo periods"),
-            "{thinned:?}"
-        );
-        assert_eq!(warnings(&every(10.0)), []);
     }
 }
