@@ -118,10 +118,10 @@ pub static TABLE: [Entry; 32] = [
     entry(C::Step, "step", Warn, "a channel jumps and stays there", "record the movement again")
         .suppresses(&[C::TermsAtLimit, C::ZeroClipped, C::Outliers]),
     entry(C::Stuck, "stuck", Warn, "a channel stands still while the others move", "check cable, register and drive; leave the rows out")
-        .suppresses(&[C::TermsAtLimit, C::ZeroClipped, C::Outliers, C::Step]),
+        .suppresses(&[C::TermsAtLimit, C::ZeroClipped, C::Outliers, C::Step, C::LeftOut]),
     entry(C::IdleMovement, "idle_movement", Note, "a movement in which nothing moves", "record it again"),
     entry(C::Saturated, "saturated", Warn, "codes at the end of a converter's range", "less gain, or less motion")
-        .suppresses(&[C::TermsAtLimit, C::ZeroClipped, C::Outliers, C::LogsDisagree]),
+        .suppresses(&[C::TermsAtLimit, C::ZeroClipped, C::Outliers, C::LogsDisagree, C::LeftOut]),
     entry(C::Outliers, "outliers", Warn, "rows far outside the noise", "leave the rows out")
         .suppresses(&[C::Outliers]),
     entry(C::LeftOut, "left_out", Warn, "many rows count less than half in the fit", "find out what happened there and record again"),

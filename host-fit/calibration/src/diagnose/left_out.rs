@@ -16,27 +16,12 @@ pub(super) fn severity(share: f64) -> Severity {
     }
 }
 
-/// The rows that count less than half in a fit, or lie in a stretch of such rows.
+/// The rows that count less than half in a fit.
 pub(super) fn finding(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     let left_out = &fit.left_out;
     let share = left_out.share();
-    if share < WARN_MIN {
-        return None;
-    }
-    let (first, last) = left_out.stretch?;
-    let (movement, t_us) = (
-        dataset.movement_named(first.log, first.movement),
-        first.t_us,
-    );
-    let place = match left_out.stretch_rows() {
-        0..=1 => format!("the first in movement {movement} at t_us = {t_us}"),
-        rows => format!(
-            "many of them in a stretch of {rows} rows from movement {movement}, t_us = {t_us}, to movement {}, \
-             t_us = {}",
-            dataset.movement_named(last.log, last.movement),
-            last.t_us
-        ),
-    };
+    let (first, last) = left_out.span.filter(|_| share >= WARN_MIN)?;
+    let [from, to] = [first, last].map(|at| dataset.movement_named(at.log, at.movement));
     let severity = severity(share);
     let remedy = match severity {
         Severity::Refuse => {
@@ -46,11 +31,14 @@ pub(super) fn finding(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
         _ => "look for a fault there",
     };
     let message = format!(
-        "{} of {} rows ({:.1} %) are so far from the fitted model that they count little or nothing in the fit, {place}: {remedy}",
+        "{} of {} rows ({:.1} %), from movement {from}, t_us = {}, to movement {to}, t_us = {}, are so far from the fitted \
+         model that they count little or nothing in the fit: {remedy}",
         left_out.rows,
         left_out.of,
-        100.0 * left_out.rows as f64 / left_out.of.max(1) as f64,
+        100.0 * share,
+        first.t_us,
+        last.t_us,
     );
     let found = Finding::new(Code::LeftOut, message).severe(severity);
-    Some(found.at(movement, t_us).of(left_out.rows as f64, "rows"))
+    Some(found.at(from, first.t_us).of(left_out.rows as f64, "rows"))
 }

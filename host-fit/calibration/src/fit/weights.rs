@@ -1,7 +1,7 @@
 //! What the weights of a robust fit say of its rows.
 
 use crate::input::dataset::Dataset;
-use crate::judge::left_out::{Block, LeftOut, RowPlace};
+use crate::judge::left_out::{LeftOut, RowPlace};
 use crate::solve::robust::HALF;
 
 /// The rows that count less than half.
@@ -22,21 +22,15 @@ pub(super) fn by_row(dataset: &Dataset, selected: &[usize], weights: &[f64]) -> 
 /// How many count less than half, and where.
 pub(super) fn left_out(dataset: &Dataset, selected: &[usize], weights: &[f64]) -> LeftOut {
     let mut left_out = LeftOut::default();
-    let drawn: Vec<(usize, (&usize, &f64))> = selected.iter().zip(weights).enumerate().collect();
-    for rows in drawn.chunks(Block::ROWS) {
-        let mut block = Block::default();
-        for &(number, (&row, weight)) in rows {
-            let row = &dataset.rows[row];
-            let movement = &dataset.movements[row.movement];
-            let place = RowPlace {
-                row: number,
-                log: movement.log,
-                movement: movement.index,
-                t_us: row.t_us,
-            };
-            block.take(place, *weight < HALF);
-        }
-        left_out.take(block);
+    for (&row, weight) in selected.iter().zip(weights) {
+        let row = &dataset.rows[row];
+        let movement = &dataset.movements[row.movement];
+        let place = RowPlace {
+            log: movement.log,
+            movement: movement.index,
+            t_us: row.t_us,
+        };
+        left_out.take(place, *weight < HALF);
     }
     left_out
 }

@@ -1,7 +1,7 @@
 //! The one judge of parameters: it takes rows as they come, movement after movement, and keeps sums.
 
 use super::Zeros;
-use super::left_out::{Block, LeftOut, RowPlace};
+use super::left_out::{LeftOut, RowPlace};
 use super::statistics::{ErrorSums, PoseError};
 use crate::input::dataset::{Movement, Row};
 use crate::input::stage::Stage;
@@ -67,6 +67,9 @@ struct OfMovement {
     vertical: [f64; 3],
 }
 
+/// Rows of a run, whose median shows which are far off: a second at 2 ms.
+const RUN: usize = 500;
+
 /// Judges a parameter set on rows as they come, movement after movement.
 #[derive(Clone, Debug)]
 pub struct Judge<'s> {
@@ -92,7 +95,7 @@ impl<'s> Judge<'s> {
             logs,
             limit: [f64::INFINITY; 3],
             rows: 0,
-            run: Vec::with_capacity(Block::ROWS),
+            run: Vec::with_capacity(RUN),
             movements: Vec::new(),
             left_out: LeftOut::default(),
             planar: [0.0; 3],
@@ -114,7 +117,7 @@ impl<'s> Judge<'s> {
         row: &Row,
         error: Option<[f64; 3]>,
     ) {
-        if begins || self.run.len() == Block::ROWS {
+        if begins || self.run.len() == RUN {
             self.end_run();
         }
         if begins || self.movements.is_empty() {
@@ -139,7 +142,6 @@ impl<'s> Judge<'s> {
         }
         self.run.push(Seen {
             place: RowPlace {
-                row: row_number,
                 log,
                 movement: index,
                 t_us: row.t_us,
@@ -153,13 +155,12 @@ impl<'s> Judge<'s> {
     /// Separates the rows of a run that are far off.
     fn end_run(&mut self) {
         let far = far_off(&self.run, self.limit);
-        let mut block = Block::default();
         for seen in &self.run {
             let Some(error) = seen.error else {
                 continue;
             };
             let is_far = far(error);
-            block.take(seen.place, is_far);
+            self.left_out.take(seen.place, is_far);
             if is_far {
                 continue;
             }
@@ -168,7 +169,6 @@ impl<'s> Judge<'s> {
                 self.vertical[axis] = self.vertical[axis].max(seen.vertical[axis].abs());
             }
         }
-        self.left_out.take(block);
         self.run.clear();
     }
 

@@ -65,19 +65,6 @@ impl<'a> LogSignals<'a> {
         }
     }
 
-    /// The movement of a row and its time, us.
-    fn at(&self, row: usize) -> (String, i64) {
-        let Row { movement, t_us, .. } = self.rows[row];
-        let movement = &self.dataset.movements[movement];
-        (self.dataset.movement_name(movement), t_us)
-    }
-
-    /// "movement 3 at t_us = 4000".
-    pub(super) fn place(&self, row: usize) -> String {
-        let (movement, t_us) = self.at(row);
-        format!("movement {movement} at t_us = {t_us}")
-    }
-
     /// A warning about the whole log, or several of its movements.
     pub(super) fn warning(&self, code: Code, message: String) -> Finding {
         let message = match self.dataset.logs.len() {
@@ -89,7 +76,10 @@ impl<'a> LogSignals<'a> {
 
     /// A warning about a place in the log.
     pub(super) fn warning_at(&self, code: Code, row: usize, message: String) -> Finding {
-        let (movement, t_us) = self.at(row);
+        let Row { movement, t_us, .. } = self.rows[row];
+        let dataset = self.dataset;
+        let movement = dataset.movement_name(&dataset.movements[movement]);
+        let message = format!("{message}. See movement {movement} at t_us = {t_us}");
         self.warning(code, message).at(movement, t_us)
     }
 }

@@ -31,7 +31,7 @@ pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let spectrum = |values: &Vec<f64>| Spectrum::new(values, &windows);
     let raw: Vec<Spectrum> = log.channels.iter().map(|c| spectrum(&c.values)).collect();
     let motion = raw[3..6].iter().map(Spectrum::highest).max().unwrap_or(0);
-    // By channel: amplitude, m, in parts of the noise of a probe, and bin.
+    // By channel: amplitude in parts of the noise of a probe, and in the channel, m; and bin.
     let mut found: BTreeMap<usize, (f64, f64, usize)> = BTreeMap::new();
     for (probe, values) in residuals.values.iter().enumerate() {
         let residual = spectrum(values);
@@ -43,14 +43,15 @@ pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
             let best = channels.max_by(|&a, &b| in_probe(a).total_cmp(&in_probe(b)));
             if let Some(channel) = best {
                 let noises = shown_m / residuals.noise_m[probe];
-                let line = found.entry(channel).or_default();
-                if noises > line.1 {
-                    *line = (raw[channel].amplitude(bin), noises, bin);
+                let line = (noises, raw[channel].amplitude(bin), bin);
+                let strongest = found.entry(channel).or_insert(line);
+                if line.0 > strongest.0 {
+                    *strongest = line;
                 }
             }
         }
     }
-    let finding = |(channel, (size_m, noises, bin)): (usize, (f64, f64, usize))| {
+    let finding = |(channel, (noises, size_m, bin)): (usize, (f64, f64, usize))| {
         let name = log.channels[channel].name;
         let frequency_hz = bin as f64 / (length as f64 * log.period_s);
         let message = format!(
@@ -58,16 +59,16 @@ pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
              its cable and supply, or for a vibration of that part",
             size_m * 1e6,
         );
-        let severity = if noises < WARN_MIN {
-            Severity::Note
-        } else {
-            Severity::Warn
+        let severity = match noises < WARN_MIN {
+            true => Severity::Note,
+            false => Severity::Warn,
         };
         let found = log.warning(Code::Hum, message).severe(severity);
         found.on(name).of(frequency_hz, "Hz")
     };
     found.into_iter().map(finding).collect()
 }
+
 #[cfg(test)]
 mod tests {
     use super::super::sample_for_tests::{PERIOD_S, codes, only, recording};

@@ -54,11 +54,8 @@ pub fn signal_findings(
     for log in 0..dataset.logs.len() {
         let mut signals = LogSignals::new(dataset, stage, log);
         findings.extend(of_log(&mut signals, fitted));
-        let rows = signals.usable.iter().enumerate();
-        bad.extend(
-            rows.filter(|(_, used)| !**used)
-                .map(|(row, _)| signals.first + row),
-        );
+        let unused = (0..signals.rows.len()).filter(|&row| !signals.usable[row]);
+        bad.extend(unused.map(|row| signals.first + row));
     }
     (findings, bad)
 }
@@ -69,16 +66,11 @@ fn of_log(log: &mut LogSignals, (parameters, lag_s): (&FieldParameters, f64)) ->
     found.extend(still::repeats(log));
     let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 3] =
         [standing::standing, outliers::outliers, hum::hum];
-    let mut residuals = None;
     let source = log.source;
     for test in tests.into_iter().filter(|_| source.has_reference) {
-        residuals = residuals.or_else(|| Residuals::new(log, parameters, lag_s));
-        let Some(here) = &residuals else { break };
-        let more = test(log, here);
-        if !more.is_empty() {
-            residuals = None;
+        if let Some(residuals) = Residuals::new(log, parameters, lag_s) {
+            found.extend(test(log, &residuals));
         }
-        found.extend(more);
     }
     let (rows, all) = (log.rows.len(), source.rows_read);
     if rows < all {

@@ -55,15 +55,14 @@ pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
     let finding = |(channel, outliers): (usize, Vec<(usize, f64)>)| {
         let (name, count) = (log.channels[channel].name, outliers.len());
         let message = format!(
-            "{count} {} of {name} far outside the noise, by up to {:.1} um (the first: {}). A fit with --loss cauchy, the \
-             default, leaves them out of account; look for lost pulses, sparks and bits",
+            "{count} {} of {name} far outside the noise, by up to {:.1} um. A fit with --loss cauchy, the default, leaves them \
+             out of account; look for lost pulses, sparks and bits",
             if count == 1 { "row" } else { "rows" },
             outliers
                 .iter()
                 .map(|(_, size_m)| *size_m)
                 .fold(0.0, f64::max)
                 * 1e6,
-            log.place(outliers[0].0),
         );
         let found = log.warning_at(Code::Outliers, outliers[0].0, message);
         found.on(name).of(count as f64, "rows")

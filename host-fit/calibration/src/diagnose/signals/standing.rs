@@ -3,7 +3,7 @@
 use super::channels::{LogSignals, median};
 use super::residual::Residuals;
 use super::spectrum::windows;
-use super::still::named_stuck;
+use super::still;
 use super::{BLOCK, CLEAR};
 use crate::finding::Finding;
 use rayon::prelude::*;
@@ -29,7 +29,7 @@ pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
     // It may have begun and ended in the windows beside.
     let beside = |run: &Range<usize>| run.start.saturating_sub(WINDOW)..run.end + WINDOW;
     let wider: Vec<Range<usize>> = runs.iter().flatten().map(beside).collect();
-    let found = named_stuck(log, runs);
+    let found = still::named(log, runs);
     log.leave_out(wider);
     found
 }

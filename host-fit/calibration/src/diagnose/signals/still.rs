@@ -1,9 +1,9 @@
 //! What stands still: movements in which nothing moves, and channels that repeat one value.
 
 use super::BLOCK;
-use super::channels::LogSignals;
+use super::channels::{Channel, LogSignals};
 use crate::diagnose::left_out;
-use crate::finding::{Code, Finding, Severity};
+use crate::finding::{Code, Finding};
 use std::ops::Range;
 
 /// What moves by less stands still, m: a few times what the interferometers drift in a movement.
@@ -25,10 +25,9 @@ pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
     let idle: Vec<Range<usize>> = log.segments.iter().filter(is_idle).cloned().collect();
     let first = idle.first()?.start;
     let message = format!(
-        "nothing moves in {} of {} movements (the first: {}): they add nothing to the fit; leave them out or record them again",
+        "nothing moves in {} of {} movements: they add nothing to the fit; leave them out or record them again",
         idle.len(),
         log.segments.len(),
-        log.place(first),
     );
     log.leave_out(idle);
     Some(log.warning_at(Code::IdleMovement, first, message))
@@ -47,11 +46,8 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
             }
         }
         // White noise by second differences; the most likely of its codes comes with this chance.
-        let seconds = log
-            .segments
-            .iter()
-            .flat_map(|s| channel.values[s.clone()].windows(3));
-        let seconds = seconds.map(|v| v[0] - 2.0 * v[1] + v[2]);
+        let of = |s: &Range<usize>| channel.values[s.clone()].windows(3);
+        let seconds = (log.segments.iter().flat_map(of)).map(|v| v[0] - 2.0 * v[1] + v[2]);
         let count = log.rows.len() as f64;
         let noise_m = (seconds.map(|x| x * x).sum::<f64>() / (6.0 * count)).sqrt();
         let chance = libm::erf(channel.m_per_code / (8f64.sqrt() * noise_m));
@@ -62,7 +58,7 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
         runs.retain(|run| run.len() as f64 >= least && should_move(log, k, run));
         all.push(runs);
     }
-    named_stuck(log, all)
+    named(log, all)
 }
 
 /// Whether a channel should show something in these rows: a probe its noise, which is many codes; a beam
@@ -77,78 +73,31 @@ fn should_move(log: &LogSignals, channel: usize, rows: &Range<usize>) -> bool {
 }
 
 /// Names channels that stand still in runs of rows, by channel, at their longest: as saturated where that is an
-/// end of what the channel reads. What is stuck together is named once. The rows are left out.
-pub(super) fn named_stuck(log: &mut LogSignals, runs: Vec<Vec<Range<usize>>>) -> Vec<Finding> {
-    let mut found: Vec<(Vec<usize>, &Range<usize>, bool, usize)> = Vec::new();
-    for (k, (channel, runs)) in log.channels.iter().zip(&runs).enumerate() {
-        let Some(longest) = runs.iter().max_by_key(|run| run.len()) else {
-            continue;
-        };
-        let rows = runs.iter().map(Range::len).sum();
-        let values = &channel.values;
-        let is_end = |end: fn(f64, f64) -> f64| {
-            values.iter().copied().reduce(end) == Some(values[longest.start])
-        };
-        let is_top = channel.m_per_code > 0.0
-            && spread(&values[longest.clone()]) == 0.0
-            && is_end(f64::min) != is_end(f64::max);
-        let middle = (longest.start + longest.end) / 2;
-        let mut others = found
-            .iter_mut()
-            .filter(|(_, _, other, _)| !is_top && !other);
-        match others.find(|(_, run, ..)| run.contains(&middle)) {
-            Some((channels, ..)) => channels.push(k),
-            None => found.push((vec![k], longest, is_top, rows)),
-        }
-    }
-    let finding = |(channels, longest, is_top, rows): (Vec<usize>, &Range<usize>, bool, usize)| {
-        let mut all = log.channels.iter();
-        // Rows that repeat whole are true, if of no use.
-        let is_whole = all.all(|channel| spread(&channel.values[longest.clone()]) == 0.0);
-        let share = rows as f64 / log.rows.len() as f64;
-        let severity = if is_whole {
-            Severity::Warn
-        } else {
-            left_out::severity(share)
-        };
-        let names: Vec<&str> = channels.iter().map(|&k| log.channels[k].name).collect();
-        let who = if is_whole {
-            "every channel".to_owned()
-        } else {
-            names.join(", ")
-        };
-        let (place, percent) = (log.place(longest.start), 100.0 * share);
+/// end of what the channel reads. The rows are left out.
+pub(super) fn named(log: &mut LogSignals, runs: Vec<Vec<Range<usize>>>) -> Vec<Finding> {
+    let finding = |(channel, runs): (&Channel, &Vec<Range<usize>>)| {
+        let longest = runs.iter().max_by_key(|run| run.len())?;
+        let rows = runs.iter().map(Range::len).sum::<usize>() as f64;
+        let share = rows / log.rows.len() as f64;
+        let (values, start) = (&channel.values, longest.start);
+        let value = values[start];
+        let is_end = values.iter().all(|&x| x <= value) != values.iter().all(|&x| x >= value);
+        let is_flat = channel.m_per_code > 0.0 && spread(&values[longest.clone()]) == 0.0;
         let stood_s = longest.len() as f64 * log.period_s;
-        let (code, size, what) = match is_top {
-            true => {
-                let channel = &log.channels[channels[0]];
-                let code = channel.values[longest.start] / channel.m_per_code;
-                let what = format!(
-                    "is flat at code {code:.0} for {rows} rows, {percent:.1} % of the log, at most {} together ({place}): its \
-                     converter or amplifier is at the end of its range; lower the gain or the motion",
-                    longest.len()
-                );
-                (Code::Saturated, (rows as f64, "rows"), what)
-            }
-            false => {
-                let what = format!(
-                    "stood still for {stood_s:.2} s ({place}), in {percent:.1} % of the log in all, while it should have moved \
-                     or shown its noise: look for a stage that stopped, a cable or a frozen register"
-                );
-                (Code::Stuck, (stood_s, "s"), what)
-            }
+        let (code, size, unit) = match is_flat && is_end {
+            true => (Code::Saturated, rows, "rows"),
+            false => (Code::Stuck, stood_s, "s"),
         };
-        let message = format!("{who} {what}, and leave these rows out");
-        let found = log
-            .warning_at(code, longest.start, message)
-            .severe(severity);
-        let found = found.of(size.0, size.1);
-        match names[..] {
-            [name] => found.on(name),
-            _ => found,
-        }
+        let message = format!(
+            "{} stands still in {rows} rows, {:.1} % of the log, for up to {stood_s:.3} s together: {}",
+            channel.name,
+            100.0 * share,
+            code.entry().remedy,
+        );
+        let found = log.warning_at(code, start, message).on(channel.name);
+        Some(found.severe(left_out::severity(share)).of(size, unit))
     };
-    let findings = found.into_iter().map(finding).collect();
+    let findings = log.channels.iter().zip(&runs).filter_map(finding).collect();
     log.leave_out(runs.into_iter().flatten());
     findings
 }
@@ -171,7 +120,7 @@ fn spread(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sample_for_tests::{ROWS, dataset, held, only, recording, warnings};
+    use super::super::sample_for_tests::{ROWS, held, only, recording};
     use crate::finding::{Code, Severity};
 
     #[test]
@@ -187,21 +136,6 @@ mod tests {
                 );
             }
         }
-    }
-
-    #[test]
-    fn a_logger_that_hangs_is_named_once() {
-        let mut hung = recording();
-        for channel in 0..9 {
-            hung = held(&hung, channel, 0, 300..400, 0.0);
-        }
-        let found = &warnings(&dataset(&hung))[0];
-        assert!(
-            found
-                .message
-                .starts_with("every channel stood still for 0.20 s"),
-            "{found:?}"
-        );
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::channels::LogSignals;
 use crate::finding::{Code, Finding, Severity};
+use std::ops::Range;
 
 /// Part of the rows that may be missing, of the servo period that the period of a log may be off, and of its own
 /// period that the times of rows may be off, rms: at 1 mm/s and 2 ms the last is 20 nm of motion.
@@ -9,70 +10,53 @@ const TOLERANCE: f64 = 0.01;
 
 /// What the times of rows show against a line over their sequence, the same in all movements.
 pub(super) fn timing(log: &LogSignals) -> Vec<Finding> {
-    let steps = |from: usize, row: usize| {
-        let [from, to] = [from, row].map(|row| log.rows[row].frame.sequence());
+    let steps = |from: usize, to: usize| {
+        let [from, to] = [from, to].map(|row| log.rows[row].frame.sequence());
         f64::from(to.wrapping_sub(from))
     };
-    let centred = |segment: &std::ops::Range<usize>| {
-        let at = |row: usize| {
-            let t_us = (log.rows[row].t_us - log.rows[segment.start].t_us) as f64;
-            [steps(segment.start, row), t_us * 1e-6]
-        };
-        let points: Vec<[f64; 2]> = segment.clone().map(at).collect();
+    let centred = |segment: &Range<usize>| {
+        let time_s = |row: usize| (log.rows[row].t_us - log.rows[segment.start].t_us) as f64 * 1e-6;
+        let point = |row: usize| [steps(segment.start, row), time_s(row)];
+        let points: Vec<[f64; 2]> = segment.clone().map(point).collect();
         let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64;
-        let [k, t] = [mean(0), mean(1)];
-        let points = segment.clone().zip(points);
-        points
-            .map(|(row, p)| (row, p[0] - k, p[1] - t))
-            .collect::<Vec<_>>()
+        let [k, t] = [0, 1].map(mean);
+        points.into_iter().map(move |p| [p[0] - k, p[1] - t])
     };
-    let points: Vec<(usize, f64, f64)> = log.segments.iter().flat_map(centred).collect();
-    let sum = |of: &dyn Fn(&(usize, f64, f64)) -> f64| points.iter().map(of).sum::<f64>();
-    let period_s = sum(&|(_, k, t)| k * t) / sum(&|(_, k, _)| k * k);
-    let off_s = |(_, k, t): &(usize, f64, f64)| (t - period_s * k).abs();
-    let rms_s = (sum(&|point| off_s(point).powi(2)) / log.rows.len() as f64).sqrt();
-    let worst = points.iter().max_by(|a, b| off_s(a).total_cmp(&off_s(b)));
+    let points: Vec<[f64; 2]> = log.segments.iter().flat_map(centred).collect();
+    let sum = |of: &dyn Fn(&[f64; 2]) -> f64| points.iter().map(of).sum::<f64>();
+    let period_s = sum(&|[k, t]| k * t) / sum(&|[k, _]| k * k);
+    let count = log.rows.len() as f64;
+    let rms_s = (sum(&|[k, t]| (t - period_s * k).powi(2)) / count).sqrt();
 
     let rows = log.segments.iter().flat_map(|s| s.start + 1..s.end);
-    let missed = |row: usize| steps(row - 1, row) - 1.0;
-    let gaps: Vec<usize> = rows.filter(|&row| missed(row) > 0.0).collect();
+    let gaps: Vec<usize> = rows.filter(|&row| steps(row - 1, row) > 1.0).collect();
     let mut found = Vec::new();
-    if let Some(&longest) = gaps
-        .iter()
-        .max_by(|a, b| missed(**a).total_cmp(&missed(**b)))
-    {
-        let rows: f64 = gaps.iter().map(|&row| missed(row)).sum();
-        let share = rows / (rows + log.rows.len() as f64);
+    if let Some(&first) = gaps.first() {
+        let rows: f64 = gaps.iter().map(|&row| steps(row - 1, row) - 1.0).sum();
+        let share = rows / (rows + count);
         let message = format!(
-            "{rows} rows are missing ({:.2} %) in {} gaps, the longest of {} before {}: look for frames that the recorder lost",
+            "{rows} rows are missing ({:.2} %) in {} gaps: look for frames that the recorder lost",
             share * 100.0,
             gaps.len(),
-            missed(longest),
-            log.place(longest),
         );
-        let missing = log.warning_at(Code::RowsMissing, longest, message);
+        let missing = log.warning_at(Code::RowsMissing, first, message);
         found.push(missing.severe(severity(share)).of(rows, "rows"));
     }
-    if let Some(worst) = worst.filter(|_| rms_s > TOLERANCE * log.period_s) {
+    let rms_us = rms_s * 1e6;
+    if rms_s > TOLERANCE * log.period_s {
         let message = format!(
-            "rows come at uneven times: {:.0} us rms off an even rate, at most {:.0} us ({}): have the servo's clock start \
-             all converters and stamp the rows",
-            rms_s * 1e6,
-            off_s(worst) * 1e6,
-            log.place(worst.0),
+            "rows come at uneven times, {rms_us:.0} us rms off an even rate: have the servo's clock start all converters and \
+             stamp the rows"
         );
-        found.push(
-            log.warning_at(Code::Jitter, worst.0, message)
-                .of(rms_s * 1e6, "us"),
-        );
+        found.push(log.warning(Code::Jitter, message).of(rms_us, "us"));
     }
     let servo_periods = period_s / log.stage.servo_period_s;
     if (servo_periods - 1.0).abs() > TOLERANCE {
         let count = servo_periods.round().max(1.0);
         let off = (servo_periods / count - 1.0).abs();
-        let what = match off > TOLERANCE {
-            true => String::new(),
-            false => format!("the log is thinned, to one of {count} servo periods: "),
+        let what = match severity(off) {
+            Severity::Note => format!("the log is thinned, to one of {count} servo periods: "),
+            _ => String::new(),
         };
         let message = format!(
             "{what}rows are {:.1} us apart, the servo period of stage.toml is {:.1} us: log every period, or correct \
@@ -92,6 +76,7 @@ fn severity(off: f64) -> Severity {
         false => Severity::Note,
     }
 }
+
 #[cfg(test)]
 mod tests {
     use super::super::sample_for_tests::{PERIOD_S, dataset, found, recording};
