@@ -127,7 +127,7 @@ fn model_31_forgets_a_stuck_movement_and_jumps() {
 }
 
 #[test]
-fn a_log_of_which_a_tenth_is_left_out_of_account_is_refused_with_the_place() {
+fn a_log_of_which_a_tenth_is_wrong_is_refused_with_the_place() {
     let bench = Bench::new();
     let inverted = changed(&thinned_log(10, |_| true), |_, row| {
         if row[0] >= 51 {

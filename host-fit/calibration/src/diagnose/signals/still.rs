@@ -55,7 +55,9 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
             0.0 => 2.0,
             _ => 1.0 + libm::log(RARITY * count) / libm::log(chance).abs(),
         };
-        runs.retain(|run| run.len() as f64 >= least && should_move(log, k, run));
+        // Not where nothing moves at all.
+        let is_new = |run: &Range<usize>| run.len() as f64 >= least && log.usable[run.start];
+        runs.retain(|run| is_new(run) && should_move(log, k, run));
         all.push(runs);
     }
     named(log, all)
