@@ -1,10 +1,11 @@
 //! What labs mix up between stage, wires, log and `stage.toml`, as the linear change of the rows that sets it
 //! right.
 
+use super::bank::UNDECIDED;
 use super::slopes::CHANNELS;
 use crate::finding::Code;
 use crate::input::stage::Stage;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use runtime::capacitive::ProbePositions;
 
 /// What is done to the rows: each matrix times its three numbers. Hall signals, reference, vertical pose.
@@ -43,28 +44,23 @@ const FACTOR_MIN: f64 = 1.4;
 /// Factors to a power of ten that are tried, and the largest power: units of um and m.
 const FACTORS: i32 = 24;
 const POWERS: i32 = 6;
-/// Any factor is less likely than two, a half or a power of ten.
-const ANY_FACTOR: f64 = 6.0;
 
 /// By side: the kind of channel, all of them together, the codes of an exchange and of a sign.
-const SIDES: [(&str, [&str; 2], Code, Code); 3] = [
+const SIDES: [(&str, [&str; 2], [Code; 2]); 3] = [
     (
         "Hall",
         ["hall", "the Hall signals are"],
-        Code::ChannelsSwapped,
-        Code::ChannelInverted,
+        [Code::ChannelsSwapped, Code::ChannelInverted],
     ),
     (
         "beam",
         ["ifm", "the reference is"],
-        Code::BeamsSwapped,
-        Code::BeamInverted,
+        [Code::BeamsSwapped, Code::BeamInverted],
     ),
     (
         "capacitive",
         ["cap", "the gaps are"],
-        Code::CapacitiveSwapped,
-        Code::CapacitiveInverted,
+        [Code::CapacitiveSwapped, Code::CapacitiveInverted],
     ),
 ];
 
@@ -73,54 +69,47 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
     let half_m = 0.5 * stage.y_baseline_m;
     let beams = Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, half_m, 0.0, 1.0, -half_m);
     let gaps = of_gaps(&stage.capacitive_probes_m);
-    let sides = [Matrix3::identity(), beams, gaps];
+    let sides = [Matrix3::identity(), beams, gaps].into_iter().enumerate();
     let mut out = Vec::new();
-    for (side, to_channels) in sides
-        .into_iter()
-        .enumerate()
-        .take(2 + usize::from(has_codes))
-    {
+    for (side, to_channels) in sides.take(2 + usize::from(has_codes)) {
         let Some(to_pose) = to_channels.try_inverse() else {
             continue;
         };
         let change = |matrix: Matrix3<f64>| Change::of(side, to_pose * matrix * to_channels);
-        let own = &CHANNELS[3 * side..];
-        let name = |k: usize| own[k].rsplit('_').next().unwrap_or_default().to_uppercase();
+        let (kind, [all, are], [swapped, inverted]) = SIDES[side];
+        let own = &CHANNELS[3 * side..][..3];
+        let name = |k: &usize| {
+            own[*k]
+                .rsplit('_')
+                .next()
+                .unwrap_or_default()
+                .to_uppercase()
+        };
+        let names = |some: &[usize]| some.iter().map(name).collect::<Vec<_>>().join(" and ");
         let channels = |some: &[usize]| some.iter().map(|&k| own[k]).collect::<Vec<_>>().join(", ");
-        let (kind, [all, are], swapped, inverted) = SIDES[side];
         for order in [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]] {
             let moved: Vec<usize> = (0..3).filter(|&k| order[k] != k).collect();
+            let of = names(&moved);
             let what = match moved[..] {
-                [one, other] => format!("{kind} {} and {} are exchanged", name(one), name(other)),
-                _ => format!(
-                    "{kind} {} are read from {}",
-                    [0, 1, 2].map(name).join(", "),
-                    order.map(name).join(", ")
-                ),
+                [_, _] => format!("{kind} {of} are exchanged"),
+                _ => format!("{kind} {of} are read from {}", names(&order)),
             };
             let matrix = Matrix3::from_fn(|i, j| f64::from(u8::from(j == order[i])));
             out.push(mistake(swapped, channels(&moved), what, change(matrix)));
         }
         for bits in 1..8u32 {
             let turned: Vec<usize> = (0..3).filter(|k| bits >> k & 1 == 1).collect();
-            let what = match turned[..] {
-                [one] => format!("the sign of {kind} {} is turned", name(one)),
-                [one, other] => {
-                    let (one, other) = (name(one), name(other));
-                    format!("the signs of {kind} {one} and {other} are turned")
-                }
-                _ => format!("the signs of all {kind} channels are turned"),
-            };
-            let signs = Vector3::from_fn(|k, _| if turned.contains(&k) { -1.0 } else { 1.0 });
-            let matrix = Matrix3::from_diagonal(&signs);
+            let what = format!("the sign of {kind} {} is turned", names(&turned));
+            let sign = |k: usize| if turned.contains(&k) { -1.0 } else { 1.0 };
+            let matrix = Matrix3::from_diagonal(&[0, 1, 2].map(sign).into());
             out.push(mistake(inverted, channels(&turned), what, change(matrix)));
         }
-        for (k, channel) in own.iter().enumerate().take(3) {
-            let what = format!("{kind} {} is multiplied by", name(k));
+        for (k, channel) in own.iter().enumerate() {
+            let what = format!("{kind} {} is multiplied by", name(&k));
             scales(&mut out, channel, &what, |factor| {
-                let mut diagonal = Vector3::repeat(1.0);
-                diagonal[k] = factor;
-                change(Matrix3::from_diagonal(&diagonal))
+                let mut matrix = Matrix3::identity();
+                matrix[(k, k)] = factor;
+                change(matrix)
             });
         }
         scales(&mut out, all, &format!("{are} multiplied by"), |factor| {
@@ -141,7 +130,7 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
     out
 }
 
-fn mistake(code: Code, channel: String, what: String, change: Change) -> Mistake {
+const fn mistake(code: Code, channel: String, what: String, change: Change) -> Mistake {
     Mistake {
         code,
         channel,
@@ -154,18 +143,20 @@ fn mistake(code: Code, channel: String, what: String, change: Change) -> Mistake
 
 /// One mistake for each factor.
 fn scales(out: &mut Vec<Mistake>, channel: &str, what: &str, change: impl Fn(f64) -> Change) {
-    let any = (-FACTORS * POWERS..=FACTORS * POWERS)
-        .map(|k| (10f64.powf(f64::from(k) / f64::from(FACTORS)), ANY_FACTOR));
-    let round = (-POWERS..=POWERS).map(|power| (10f64.powi(power), 0.0));
-    let all = any.chain(round).chain([(2.0, 0.0), (0.5, 0.0)]);
+    let any = (-FACTORS * POWERS..=FACTORS * POWERS).map(|k| {
+        // Any factor is less likely than two, a half or a power of ten.
+        let penalty = if k % FACTORS == 0 { 0.0 } else { UNDECIDED };
+        (10f64.powf(f64::from(k) / f64::from(FACTORS)), penalty)
+    });
+    let all = any.chain([(2.0, 0.0), (0.5, 0.0)]);
     let far = all.filter(|(factor, _)| !(1.0 / FACTOR_MIN..FACTOR_MIN).contains(factor));
     out.extend(far.map(|(factor, penalty)| Mistake {
         factor: Some(factor),
         penalty,
         ..mistake(
             Code::ScaleWrong,
-            channel.to_owned(),
-            what.to_owned(),
+            channel.into(),
+            what.into(),
             change(factor),
         )
     }));
@@ -179,7 +170,7 @@ fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
             let change = Change::of(2, to_pose * gaps);
             out.push(mistake(
                 Code::CapacitiveInverted,
-                channel.to_owned(),
+                channel.into(),
                 what,
                 change,
             ));
@@ -195,18 +186,21 @@ fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
             add(CHANNELS[6 + sensor], what, places);
         }
     }
-    type Turn = (&'static str, fn([f64; 2]) -> [f64; 2]);
-    let turned: [Turn; 6] = [
-        ("turned by 90 degrees", |[x, y]| [-y, x]),
-        ("turned by 180 degrees", |[x, y]| [-x, -y]),
-        ("turned by -90 degrees", |[x, y]| [y, -x]),
-        ("mirrored along x", |[x, y]| [-x, y]),
-        ("mirrored along y", |[x, y]| [x, -y]),
-        ("given as y, x", |[x, y]| [y, x]),
-    ];
-    for (how, turn) in turned {
+    // What x and y are made of.
+    for (how, [a, b, c, d]) in [
+        ("turned by 90 degrees", [0.0, -1.0, 1.0, 0.0]),
+        ("turned by 180 degrees", [-1.0, 0.0, 0.0, -1.0]),
+        ("turned by -90 degrees", [0.0, 1.0, -1.0, 0.0]),
+        ("mirrored along x", [-1.0, 0.0, 0.0, 1.0]),
+        ("mirrored along y", [1.0, 0.0, 0.0, -1.0]),
+        ("given as y, x", [0.0, 1.0, 1.0, 0.0]),
+    ] {
         let what = format!("the places of the capacitive sensors are {how}");
-        add("cap", what, designed.map(turn));
+        add(
+            "cap",
+            what,
+            designed.map(|[x, y]| [a * x + b * y, c * x + d * y]),
+        );
     }
 }
 

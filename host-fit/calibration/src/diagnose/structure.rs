@@ -7,7 +7,7 @@
 //! parameters: the direction that it senses, its lever arm and sensitivity must be those of the drawing, and
 //! the sensitivity must fall with the height at its place, so that b/a = y and c/a = -x.
 
-use super::bank::UNDECIDED;
+use super::bank::{MEANS_MAX, RARITY, ROUNDS, UNDECIDED};
 use super::mistakes::{Change, Mistake, mistakes};
 use super::range::SPANS;
 use crate::finding::{Code, Finding, Severity};
@@ -21,10 +21,6 @@ use crate::solve::field::parameters::FALL_PER_M;
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 use runtime::ModelKind;
 
-/// Rows that a probe is fitted to.
-const ROWS: usize = 6000;
-/// Steps: the products of two parameters settle in four.
-const STEPS: usize = 8;
 /// Gain and its slopes, how far height and tilts carry the probe, and what lags of the beams do.
 const UNKNOWNS: usize = 12;
 /// A parameter that the log does not show has any value, in mm and mrad.
@@ -36,10 +32,8 @@ const OPEN: f64 = 10.0;
 const TOLERANCES: [f64; 6] = [1.0, 0.04, 0.035, 0.025, 0.009, 0.009];
 /// Of spans beyond twice or below a tenth of the declared motion, by the logarithm.
 const SPAN: f64 = 0.35;
-/// Squares of distances in terms of tolerances, of three probes: one sound log in a thousand has more, ...
+/// Squares of distances in terms of tolerances, of three probes: one sound log in a thousand has more.
 const SOUND_MAX: f64 = 42.0;
-/// ... and a mistake undone makes them so much smaller: odds of 10^4 to 1.
-const GAIN_MIN: f64 = 20.0;
 
 type Vector = SVector<f64, 6>;
 type Covariance = SMatrix<f64, 6, 6>;
@@ -61,10 +55,6 @@ pub fn structure(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
     let drawing = Drawing::new(stage);
     let distance = |change: &Change| drawing.distance(&fitted, change);
     let as_logged = distance(&Change::nothing());
-    // Nothing could make it so much smaller.
-    if as_logged < GAIN_MIN {
-        return None;
-    }
     let spans = spans(dataset);
     let has_codes = dataset
         .rows
@@ -74,12 +64,18 @@ pub fn structure(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
     let rank = |mistake: &Mistake| {
         distance(&mistake.change) + beyond_motion(stage, &spans, &mistake.change) + mistake.penalty
     };
-    let mistakes = mistakes(stage, has_codes).into_iter();
-    let mut ranked: Vec<(f64, Mistake)> = mistakes.map(|m| (rank(&m), m)).collect();
+    let mistakes = mistakes(stage, has_codes);
+    // Chance alone makes no distance so much smaller by one of them undone.
+    let likely = mistakes.iter().filter(|mistake| mistake.penalty == 0.0);
+    let gain_min = 2.0 * libm::log(RARITY * likely.count() as f64);
+    if as_logged < gain_min {
+        return None;
+    }
+    let mut ranked: Vec<(f64, Mistake)> = mistakes.into_iter().map(|m| (rank(&m), m)).collect();
     ranked.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     let (least, _) = ranked.first()?;
-    let (least, sound) = (*least, 1.5 * SOUND_MAX);
-    if !(least < sound && least < as_logged - GAIN_MIN) {
+    let least = *least;
+    if !(least < SOUND_MAX && least < as_logged - gain_min) {
         return (as_logged > SOUND_MAX).then(|| unexplained(as_logged));
     }
     ranked.retain(|(rank, _)| *rank < least + UNDECIDED);
@@ -214,12 +210,12 @@ impl Drawing {
 /// Each Hall signal by itself: s = (1 + a Z + b Rx + c Ry) g q + e V + f dq/dt + a constant of each movement. What this
 /// leaves goes with the motion.
 fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
-    let apart = (dataset.rows.len() / ROWS).max(1);
+    let apart = (dataset.rows.len() / MEANS_MAX).max(1);
     let alike = (ALIKE_S / (period_s * apart as f64)).max(1.0);
     let of_probe = |probe: usize| {
         let mut at = SVector::<f64, UNKNOWNS>::zeros();
         let mut found = None;
-        for _ in 0..STEPS {
+        for _ in 0..ROUNDS {
             let mut products = SMatrix::<f64, { UNKNOWNS + 1 }, { UNKNOWNS + 1 }>::zeros();
             let mut count = 0.0;
             for movement in &dataset.movements {

@@ -33,6 +33,22 @@ fn a_sound_log_is_that_of_its_stage() {
     }
 }
 
+/// Two seconds show little, and what the simple form lacks goes with the motion.
+#[test]
+fn a_short_sound_log_has_no_mistake() {
+    let stage = stage("", "");
+    for seed in [22, 47, 67] {
+        let run = Protocol::Combined.run(stage.servo_period_s, seed);
+        let assembly = Assembly::draw(&stage, seed);
+        let recording = record(&stage, &assembly, run, &SensorErrors::USUAL, seed);
+        let mut recording = recording.expect("clear");
+        recording.movements.truncate(1);
+        recording.movements[0].truncate(1000);
+        let dataset = recording.dataset(&stage).expect("a triangle");
+        assert_eq!(structure(&dataset, &stage), None, "{seed}");
+    }
+}
+
 #[test]
 fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
     type Mistake = (Code, &'static [&'static str], fn(&mut Sample));

@@ -79,17 +79,3 @@ pub fn trusted(set: &ParameterSet) -> Vec<Trusted> {
     };
     INPUTS.map(of_input).to_vec()
 }
-
-impl Trusted {
-    /// A line: input, place, cost.
-    pub fn as_text(&self) -> String {
-        let cost =
-            (self.cost.iter()).map(|cost| format!("{} {:.2} {}", cost.axis, cost.value, cost.unit));
-        format!(
-            "{} ({}): {}",
-            self.input,
-            self.place,
-            cost.collect::<Vec<_>>().join(", ")
-        )
-    }
-}

@@ -1,8 +1,8 @@
 //! The most likely parameters of the field model, with faults as further unknowns: the fit's own equations
 //! and prior, over means.
 
-use super::FAULTS_MAX;
 use super::means::Log;
+use super::{FAULTS_MAX, ROUNDS};
 use crate::solve::field::noise::{USUAL_DRIFT_MM, drift_mm};
 use crate::solve::field::parameters::{FieldParameters, HELD, unknowns};
 use crate::solve::field::probe::probes;
@@ -30,8 +30,6 @@ const USUAL_PART: f64 = 0.5;
 const CARRY_LEAST: f64 = 0.03;
 /// ... and over the part that the other terms even in u have of theirs: by 60 simulated stages.
 const CARRY_PART: f64 = 0.4;
-/// Rounds in which that part settles.
-const ROUNDS: usize = 8;
 /// Lever arm, theta, eta and a, b, c, and a lag, s, of any stage, whose priors are flat: so far that no log
 /// that shows them feels it.
 const OPEN: [f64; 6] = [1.0, 1.0, 3.0, 400.0, 200.0, 200.0];
@@ -153,6 +151,19 @@ impl Estimate {
     pub(super) fn with_faults(&self, log: &Log, faults: &[Vec<[f64; 3]>]) -> Option<Self> {
         let places = self.parameters.places;
         Self::descend(log, places, self.at.clone(), self.noise, faults)
+    }
+
+    /// Lags of the beams X, Y1, Y2, s, where the faults are what Y1 and Y2 are later than X, ms; 0 where the
+    /// square of one is not so many times its variance.
+    pub(super) fn lags_s(&self, likely: f64) -> [f64; 3] {
+        let covariance = self.curvature.inverse();
+        let sure_s = |(k, unit_s): (usize, f64)| {
+            let value = self.at.values[k];
+            let is_sure = value * value > likely * covariance[(k, k)];
+            if is_sure { unit_s * value } else { 0.0 }
+        };
+        let [x, y1, y2] = [(COUNT, 1.0), (UNKNOWNS, 1e-3), (UNKNOWNS + 1, 1e-3)].map(sure_s);
+        [x, x + y1, x + y2]
     }
 
     /// The lag of the reference, s.

@@ -1,5 +1,7 @@
 //! A log in means over a few rows each, rows far from the others left out.
 
+use super::MEANS_MAX;
+use super::score::ONSETS;
 use crate::diagnose::signals::robust_deviation;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
@@ -11,9 +13,6 @@ use std::ops::Range;
 /// A row this many times its white noise off the middle of its block, as beside a step, is left out: noise
 /// alone does that once in 10^9 rows.
 const SPIKE: f64 = 6.0;
-/// Of long logs a mean is over so many more rows that there are not many more than these: a scan is
-/// quick, and onsets within a tenth of a second.
-const MEANS_MAX: usize = 4000;
 
 /// A log.
 #[derive(Debug)]
@@ -77,13 +76,18 @@ impl Log {
         3.0 * (self.means().len() - offsets) as f64
     }
 
+    /// What a number more, of an unknown, has to gain in chi-square (Schwarz 1978).
+    pub(super) fn per_unknown(&self) -> f64 {
+        libm::log(3.0 * self.means().len() as f64)
+    }
+
     /// Poses (X, Y, Rz and Z, Rx, Ry: m, rad) spread over the log: what a model is good for that has no more
     /// terms.
-    pub(super) fn poses(&self) -> Vec<([f64; 3], [f64; 3])> {
-        const COUNT: usize = 256;
-        let apart = (self.means().len() / COUNT).max(1);
-        let rows = self.means().iter().step_by(apart);
+    pub(super) fn poses(&self) -> impl ExactSizeIterator<Item = ([f64; 3], [f64; 3])> {
+        let rows = self
+            .means()
+            .iter()
+            .step_by((self.means().len() / ONSETS).max(1));
         rows.map(|row| (row.reference_mm.map(|x| x * 1e-3), row.vertical))
-            .collect()
     }
 }

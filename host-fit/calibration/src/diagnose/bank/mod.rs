@@ -44,17 +44,19 @@ const NOTE_MAX: f64 = 1.05;
 /// Poses spread evenly over this part of a range have half of it as rms, as sines have that start anywhere.
 const OF_SINES: f64 = 0.866;
 /// One sound log in so many has a fault that a fit can feel.
-const RARITY: f64 = 100.0;
-/// A lag beyond this part of a servo period is taken off before anything else is looked at, in so many
-/// rounds at most.
+pub(super) const RARITY: f64 = 100.0;
+/// A lag beyond this part of a servo period is taken off before anything else is looked at.
 const LAG_MAX: f64 = 0.5;
-const ROUNDS: usize = 3;
-/// A fault that costs less is none.
-const COST_MIN: f64 = 1.01;
-/// Faults whose gains in chi-square differ by less are undecided: odds of 20 to 1, ...
+/// Rounds in which what is not linear settles.
+pub(super) const ROUNDS: usize = 8;
+/// Of long logs a mean is over so many more rows that there are not many more than these: a scan is
+/// quick, and onsets within a tenth of a second.
+pub(super) const MEANS_MAX: usize = 4000;
+/// A part that counts for nothing: of the errors at work by a fault, of its information that the parameters
+/// cannot follow, of the gains of two large ones, which are not quite linear.
+const NOTHING: f64 = 0.01;
+/// Causes whose chi-squares differ by less are undecided: odds of 20 to 1.
 pub(super) const UNDECIDED: f64 = 6.0;
-/// ... or by less than this part, for large faults are not quite linear.
-const ALIKE: f64 = 0.01;
 
 /// What the diagnosis of a log says.
 #[derive(Debug)]
@@ -110,11 +112,9 @@ pub fn diagnose(dataset: &Dataset, stage: &Stage, fitted: Fitted) -> Option<Diag
     let (log, first) = loop {
         let log = Log::new(&later, stage, &probes(&start));
         let by_channel = by_channel(&log, stage, &start, 0.0);
-        // The lag of the reference is that of X.
         let late = [1, 2].map(|beam| BEAMS_LATE[beam].raw(&log, stage, &by_channel));
         let first = Estimate::first(&log, &start, &late)?;
-        let beyond_s =
-            [0.0, first.sizes()[0], first.sizes()[1]].map(|ms| first.lag_s() + 1e-3 * ms);
+        let beyond_s = first.lags_s(log.per_unknown() + 2.0 * libm::log(RARITY));
         lags_s
             .iter_mut()
             .zip(beyond_s)
@@ -160,19 +160,7 @@ struct Job<'a> {
     lags_s: [f64; 3],
 }
 
-/// Faults of a log with the estimate that has them among its unknowns, and what their gain is worth.
-struct Search {
-    faults: Vec<Fault>,
-    estimate: Estimate,
-    worth: f64,
-}
-
 impl Job<'_> {
-    /// What a number more, of an unknown, has to gain in chi-square (Schwarz 1978).
-    fn per_unknown(&self) -> f64 {
-        libm::log(3.0 * self.log.means().len() as f64)
-    }
-
     fn freedom(&self) -> f64 {
         (self.log.count() - COUNT as f64).max(1.0)
     }
@@ -184,11 +172,12 @@ impl Job<'_> {
     }
 
     fn penalty(&self, choices: f64) -> f64 {
-        self.per_unknown() + 2.0 * libm::log(RARITY * choices)
+        self.log.per_unknown() + 2.0 * libm::log(RARITY * choices)
     }
 
-    /// One fault after the other, as long as they explain more than chance.
-    fn search(&self, mut estimate: Estimate) -> Option<Search> {
+    /// One fault after the other, as long as they explain more than chance: with the estimate that has them
+    /// among its unknowns, and what their gain is worth.
+    fn search(&self, mut estimate: Estimate) -> Option<(Vec<Fault>, Estimate, f64)> {
         let log = &self.log;
         let raw_at = |estimate: &Estimate| {
             let (parameters, lag_s) = (&estimate.parameters, estimate.lag_s());
@@ -215,7 +204,7 @@ impl Job<'_> {
             let Some(best) = candidates.first().copied().filter(|best| net(best) > 0.0) else {
                 break;
             };
-            let near = f64::max(UNDECIDED, ALIKE * best.gain);
+            let near = f64::max(UNDECIDED, NOTHING * best.gain);
             let is_other = |other: &&Candidate| {
                 FAMILIES[other.family].1 != FAMILIES[best.family].1 && best.gain - other.gain < near
             };
@@ -234,11 +223,7 @@ impl Job<'_> {
             worth += self.worth(before, next.chi_squared) - self.penalty(best.choices);
             estimate = next;
         }
-        Some(Search {
-            faults,
-            estimate,
-            worth,
-        })
+        Some((faults, estimate, worth))
     }
 
     fn diagnosis(&self, faultless: Estimate) -> Option<Diagnosis> {
@@ -269,11 +254,7 @@ impl Job<'_> {
         let carried = Predicted::new(&declared, &whole, &[0.0; COUNT]).worst_ratio() < LIMITED_MAX;
         let other = split(log, &faultless);
         let before = faultless.chi_squared;
-        let Search {
-            faults,
-            estimate,
-            worth,
-        } = self.search(faultless)?;
+        let (faults, estimate, worth) = self.search(faultless)?;
         let rest = (estimate.chi_squared / self.freedom()).sqrt();
         // What no fault explains makes the parameters as much less certain.
         let certain = rest.max(1.0).powi(2);
@@ -281,7 +262,7 @@ impl Job<'_> {
         let (free, at_work) = match carried {
             true => (PER_PROBE, declared.clone()),
             false => {
-                let poses = log.poses().into_iter();
+                let poses = log.poses();
                 let own = Service::new(fitted.parameters, log.white_mm, poses)?;
                 (BEYOND_MODEL_31, own)
             }
@@ -293,7 +274,7 @@ impl Job<'_> {
             Predicted::new(&at_work, &nothing, &off.as_slice()[..COUNT]).worst_ratio()
         };
         let of_parts =
-            |gain: f64| self.worth(before, before - gain) - COUNT as f64 * self.per_unknown();
+            |gain: f64| self.worth(before, before - gain) - COUNT as f64 * self.log.per_unknown();
         let open = (is_open && by_resets).then(|| not_determined(&own).severe(Severity::Warn));
         let mut findings: Vec<Finding> = open.into_iter().collect();
         if let Some(other) = other.filter(|other| of_parts(other.gain) > worth.max(0.0)) {
@@ -310,7 +291,7 @@ impl Job<'_> {
         let cost_of = |number: usize| cost(&(estimate.pull(number) * estimate.sizes()[number]));
         let mut costs: Vec<f64> = (0..faults.len()).map(cost_of).collect();
         for (number, (fault, cost)) in faults.iter().zip(&costs).enumerate() {
-            if *cost >= COST_MIN {
+            if *cost >= 1.0 + NOTHING {
                 // A robust fit may have left out of account what it would have cost.
                 let cost = cost.min(predicted.worst_ratio());
                 findings.push(self.finding(fault, estimate.sizes()[number], cost));

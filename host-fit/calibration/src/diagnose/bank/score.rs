@@ -1,9 +1,9 @@
 //! Which fault would explain the residuals best, the parameters profiled out.
 
-use super::UNDECIDED;
 use super::columns::{Course, FAMILIES, Family, Kind, shaped};
 use super::estimate::{Estimate, RESIDUAL, Row, WIDTH, solve_all};
 use super::means::Log;
+use super::{NOTHING, UNDECIDED};
 use crate::solve::field::terms::PER_PROBE;
 use crate::solve::field::whiten::{Gain, UNKNOWNS};
 use crate::solve::gauss_newton::{Factor, Normal};
@@ -12,9 +12,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Onsets that are tried over the log, before the best is refined.
-const ONSETS: usize = 128;
-/// A fault that the parameters can follow but for this part of its information is theirs.
-const OWN_MIN: f64 = 0.01;
+pub(super) const ONSETS: usize = 128;
 /// Pieces of a log at whose ends another stage may begin.
 const PIECES: usize = 8;
 
@@ -228,7 +226,7 @@ impl<'a> Scan<'a> {
         let by = DVector::from_column_slice(&sums.products[..size]);
         let score = sums.products[RESIDUAL] - by.dot(&self.estimate.step);
         let information = sums.squares - by.dot(&self.estimate.curvature.solve(&by));
-        (information > OWN_MIN * sums.squares).then(|| score * score / information)
+        (information > NOTHING * sums.squares).then(|| score * score / information)
     }
 }
 

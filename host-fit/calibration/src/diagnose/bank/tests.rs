@@ -1,5 +1,9 @@
 //! Faults of known size in simulated logs, and logs without any.
 
+use super::columns::{FAMILIES, by_channel, shaped};
+use super::estimate::Estimate;
+use super::means::Log;
+use super::score::Scan;
 use super::severity;
 use crate::diagnose::{Diagnosis, of_log};
 use crate::finding::{Code, Finding, Severity};
@@ -15,6 +19,7 @@ use crate::simulate::protocol::Protocol;
 use crate::simulate::recording::{Recording, Sample, record};
 use crate::simulate::sensors::SensorErrors;
 use crate::solve::field::parameters::FieldParameters;
+use crate::solve::field::probe::probes;
 use runtime::ModelKind;
 
 fn stage() -> Stage {
@@ -125,24 +130,55 @@ fn declared_errors_of_resets_let_the_field_model_serve_on_a_log_of_the_paper() {
     assert!(worst(after) < 0.7 * worst(before), "{after:?} {before:?}");
 }
 
+/// One of the beams along Y turns the whole reference, so that there is no fit to be repaired.
 #[test]
-fn a_beam_that_lags_is_named_with_its_time() {
-    let mut late = recording(3);
-    for samples in &mut late.movements {
-        let shown: Vec<i64> = samples.iter().map(|sample| sample.beams_nm[1]).collect();
-        for (sample, shown) in samples.iter_mut().skip(3).zip(shown) {
-            sample.beams_nm[1] = shown;
+fn a_beam_that_lags_is_named_with_its_time_and_that_along_x_taken_off() {
+    for (beam, channel, verdict) in [(0, "ifm_x", Verdict::Good), (1, "ifm_y1", Verdict::Refused)] {
+        let mut late = recording(3);
+        for samples in &mut late.movements {
+            let shown: Vec<i64> = samples.iter().map(|s| s.beams_nm[beam]).collect();
+            for (sample, shown) in samples.iter_mut().skip(3).zip(shown) {
+                sample.beams_nm[beam] = shown;
+            }
         }
+        let diagnosis = diagnosed(late, |_, _| {});
+        let is_late = |found: &&Finding| found.code == Code::ReferenceLag;
+        let found = diagnosis.findings.iter().find(is_late).expect("a lag");
+        assert_eq!(found.channel.as_deref(), Some(channel), "{found:#?}");
+        assert!((found.value.expect("ms") - 6.0).abs() < 0.2, "{found:?}");
+        assert_eq!(diagnosis.verdict, Some(verdict));
+        assert_eq!(diagnosis.repair.is_some(), verdict == Verdict::Good);
     }
-    let diagnosis = diagnosed(late, |_, _| {});
-    let first = &diagnosis.findings[0];
-    assert_eq!(
-        (first.code, first.channel.as_deref()),
-        (Code::ReferenceLag, Some("ifm_y1")),
-        "{first:#?}"
-    );
-    assert!((first.value.expect("ms") - 6.0).abs() < 0.2, "{first:?}");
-    assert_eq!(diagnosis.verdict, Some(Verdict::Refused));
+}
+
+/// Offsets within a movement, steps to the end and ramps, of channels of all kinds.
+#[test]
+fn what_the_scan_promises_is_what_a_refit_gains() {
+    let stage = stage();
+    let dataset = changed(recording(3), |sample, is_second| {
+        sample.hall[1] = gain(sample.hall[1], 0.3);
+        sample.beams_nm[0] += if is_second { 3000 } else { 0 };
+    });
+    let fitted = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto)).expect("a fit");
+    let parameters = fitted.field.expect("the field model").parameters;
+    let log = Log::new(&dataset, &stage, &probes(&parameters));
+    let first = Estimate::first(&log, &parameters, &[]);
+    let estimate = first.and_then(|first| first.faultless(&log)).expect("one");
+    let by_channel = by_channel(&log, &stage, &estimate.parameters, estimate.lag_s());
+    let raw = FAMILIES.map(|family| family.raw(&log, &stage, &by_channel));
+    let candidates = Scan::new(&log, &estimate).expect("one").candidates(&raw);
+    let large = candidates.iter().filter(|candidate| candidate.gain > 300.0);
+    assert!(large.clone().count() > 10);
+    for candidate in large {
+        let (raw, family) = (&raw[candidate.family], &FAMILIES[candidate.family]);
+        let column = shaped(&log, raw, family, candidate.course);
+        let with = estimate.with_faults(&log, &[column]).expect("one");
+        let gain = estimate.chi_squared - with.chi_squared;
+        assert!(
+            (gain / candidate.gain - 1.0).abs() < 0.1,
+            "{gain} {candidate:?}"
+        );
+    }
 }
 
 /// What is found in a recording, with a change of the samples from the middle of the second movement on.
@@ -150,8 +186,13 @@ fn found(recording: Recording, change: impl Fn(&mut Sample, bool)) -> Vec<Findin
     diagnosed(recording, change).findings
 }
 
-fn diagnosed(mut recording: Recording, change: impl Fn(&mut Sample, bool)) -> Diagnosis {
-    let stage = stage();
+fn diagnosed(recording: Recording, change: impl Fn(&mut Sample, bool)) -> Diagnosis {
+    let (stage, dataset) = (stage(), changed(recording, change));
+    let fitted = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto));
+    of_log(&dataset, &stage, fitted.as_ref())
+}
+
+fn changed(mut recording: Recording, change: impl Fn(&mut Sample, bool)) -> Dataset {
     let middle = recording.movements[1].len() / 2;
     for (movement, samples) in recording.movements.iter_mut().enumerate() {
         for (row, sample) in samples.iter_mut().enumerate() {
@@ -160,9 +201,7 @@ fn diagnosed(mut recording: Recording, change: impl Fn(&mut Sample, bool)) -> Di
             }
         }
     }
-    let dataset = recording.dataset(&stage).expect("a triangle");
-    let fitted = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto));
-    of_log(&dataset, &stage, fitted.as_ref())
+    recording.dataset(&stage()).expect("a triangle")
 }
 
 fn gain(code: i32, percent: f64) -> i32 {
