@@ -125,7 +125,7 @@ pub enum RecalibrateError {
     /// `all` and `temperature` need the old posterior.
     #[error("without the old posterior nothing but gains can be found: fit again")]
     NothingKnown,
-    /// `temperature` of a blob, or of a log, without temperatures.
+    /// A log without temperatures that the blob needs, or `temperature` of a blob without them.
     #[error(
         "{0} has no temperatures: name their columns in [temperature] of the stage file, and fit a cold and a warm log together"
     )]
@@ -238,9 +238,15 @@ pub fn recalibrate(
         if !temperature.is_used() || !with_warmth {
             return Err(RecalibrateError::NoTemperature("the blob"));
         }
+    }
+    for (sensor, name) in ["the mount in the log", "the body in the log"]
+        .into_iter()
+        .enumerate()
+    {
+        let is_needed = temperature.per_mk.iter().any(|probe| probe[sensor] != 0.0);
         let all = 0..dataset.rows.len();
-        if (0..2).all(|sensor| dataset.temperature_mean_mc(sensor, all.clone()).is_none()) {
-            return Err(RecalibrateError::NoTemperature("the log"));
+        if is_needed && dataset.temperature_mean_mc(sensor, all).is_none() {
+            return Err(RecalibrateError::NoTemperature(name));
         }
     }
     let dataset = &*dataset.compensated(temperature);

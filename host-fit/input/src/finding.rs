@@ -17,44 +17,6 @@ pub enum Severity {
     Refuse,
 }
 
-/// What was found. Names are stable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[expect(missing_docs, reason = "TABLE says what each one is")]
-pub enum Code {
-    ChannelsSwapped,
-    ChannelInverted,
-    BeamsSwapped,
-    BeamInverted,
-    CapacitiveSwapped,
-    CapacitiveInverted,
-    ScaleWrong,
-    ReferenceLag,
-    Hum,
-    Drift,
-    GainDrift,
-    Step,
-    Stuck,
-    IdleMovement,
-    Saturated,
-    Outliers,
-    LeftOut,
-    ShortMovements,
-    RowsMissing,
-    Jitter,
-    LogsDisagree,
-    ZeroClipped,
-    TermsAtLimit,
-    OutOfRange,
-    ModelLacks,
-    NotDetermined,
-    RowsSkipped,
-    MovementsByTime,
-    BetweenCodes,
-    FileCut,
-    Excerpt,
-    Temperature,
-}
-
 /// All that holds for every finding of a code.
 #[derive(Debug)]
 pub struct Entry {
@@ -72,76 +34,65 @@ pub struct Entry {
     suppresses: &'static [Code],
 }
 
-const fn entry(
-    code: Code,
-    name: &'static str,
-    severity: Severity,
-    meaning: &'static str,
-    remedy: &'static str,
-) -> Entry {
-    Entry {
-        code,
-        name,
-        severity,
-        meaning,
-        remedy,
-        suppresses: &[],
-    }
-}
+/// The codes and their table, in one order.
+macro_rules! codes {
+    ($($code:ident, $name:literal, $severity:ident, $meaning:literal, $remedy:literal, [$($hidden:ident)*];)*) => {
+        /// What was found. Names are stable.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        #[expect(missing_docs, reason = "TABLE says what each one is")]
+        pub enum Code { $($code,)* }
 
-impl Entry {
-    const fn suppresses(self, suppresses: &'static [Code]) -> Self {
-        Self { suppresses, ..self }
-    }
+        /// One row for each code, in the order of [`Code`].
+        pub static TABLE: [Entry; [$($name),*].len()] = [$(Entry {
+            code: Code::$code,
+            name: $name,
+            severity: Severity::$severity,
+            meaning: $meaning,
+            remedy: $remedy,
+            suppresses: &[$(Code::$hidden),*],
+        }),*];
+    };
 }
 
 use Code as C;
-use Severity::{Note, Refuse, Warn};
+use Severity::{Note, Refuse};
 
-/// One row for each code, in the order of [`Code`].
+// Code, name, usual severity, what it is, what to do, and the codes of consequences that it hides.
 #[rustfmt::skip]
-pub static TABLE: [Entry; 32] = [
-    entry(C::ChannelsSwapped, "channels_swapped", Refuse, "two Hall channels are exchanged", "check wires, column order and stage.toml"),
-    entry(C::ChannelInverted, "channel_inverted", Refuse, "a Hall channel has the wrong sign", "check wires, the sensor's direction and stage.toml"),
-    entry(C::BeamsSwapped, "beams_swapped", Refuse, "two beams of the interferometers are exchanged", "check the column order"),
-    entry(C::BeamInverted, "beam_inverted", Refuse, "a beam has the wrong sign", "check the interferometer's direction setting"),
-    entry(C::CapacitiveSwapped, "capacitive_swapped", Refuse, "two capacitive channels, or their places in stage.toml, are exchanged", "check wires, column order and capacitive.probes_m"),
-    entry(C::CapacitiveInverted, "capacitive_inverted", Refuse, "capacitive channels, or a coordinate of theirs in stage.toml, have the wrong sign", "check wires, signs and capacitive.probes_m"),
-    entry(C::ScaleWrong, "scale_wrong", Refuse, "a scale, a unit or a length is wrong", "check units, single or double pass, and the scales in stage.toml"),
-    entry(C::ReferenceLag, "reference_lag", Warn, "the reference, or one of its beams, shows an earlier or later pose than the probes", "set the delay of the interferometers; of all beams alike fit with --compensate-lag"),
-    entry(C::Hum, "hum", Warn, "a channel has a disturbance of one frequency", "look for mains in its cable and supply, or a vibration")
-        .suppresses(&[C::ReferenceLag, C::Outliers]),
-    entry(C::Drift, "drift", Warn, "a channel drifts", "let the stage and its electronics warm up")
-        .suppresses(&[C::TermsAtLimit, C::ZeroClipped]),
-    entry(C::GainDrift, "gain_drift", Warn, "the gain of a channel changes", "let it warm up; check its supply")
-        .suppresses(&[C::TermsAtLimit]),
-    entry(C::Step, "step", Warn, "a channel jumps and stays there", "record the movement again")
-        .suppresses(&[C::TermsAtLimit, C::ZeroClipped, C::Outliers]),
-    entry(C::Stuck, "stuck", Warn, "a channel stands still while the others move", "check cable, register and drive; leave the rows out")
-        .suppresses(&[C::TermsAtLimit, C::ZeroClipped, C::Outliers, C::Step, C::LeftOut]),
-    entry(C::IdleMovement, "idle_movement", Note, "a movement in which nothing moves", "record it again"),
-    entry(C::Saturated, "saturated", Warn, "codes at the end of a converter's range", "less gain, or less motion")
-        .suppresses(&[C::TermsAtLimit, C::ZeroClipped, C::Outliers, C::LogsDisagree, C::LeftOut]),
-    entry(C::Outliers, "outliers", Warn, "rows far outside the noise", "leave the rows out")
-        .suppresses(&[C::Outliers]),
-    entry(C::LeftOut, "left_out", Warn, "many rows count less than half in the fit", "find out what happened there and record again"),
-    entry(C::ShortMovements, "short_movements", Warn, "movements whose own zero deviations take their errors", "check the times and the movement column"),
-    entry(C::RowsMissing, "rows_missing", Warn, "servo periods without a row, or movements that a draw misses", "use a recorder that keeps up; a larger --train"),
-    entry(C::Jitter, "jitter", Warn, "rows come at uneven times, or at another rate than the servo's", "one clock for all converters; correct servo.period_s"),
-    entry(C::LogsDisagree, "logs_disagree", Refuse, "logs, or parts of one, are not of one stage in one state", "fit the parts that agree"),
-    entry(C::ZeroClipped, "zero_clipped", Note, "zero deviations beyond their range", "reset the interferometers nearer to zero, or widen search.delta_m")
-        .suppresses(&[C::TermsAtLimit]),
-    entry(C::TermsAtLimit, "terms_at_limit", Warn, "parameters at an end of their search range", "check the log, or widen the range in stage.toml"),
-    entry(C::OutOfRange, "out_of_range", Warn, "the log covers less than service, or a blob is used beyond its range", "record a log of the full range (host-fit plan)"),
-    entry(C::ModelLacks, "model_lacks", Warn, "the log shows more than the model describes, or cannot carry a better model", "see the other findings; move all six axes at once"),
-    entry(C::NotDetermined, "not_determined", Refuse, "the log leaves the calibration too open for service", "record all six axes moving at once over the range of service, for longer (host-fit plan makes such a run)"),
-    entry(C::RowsSkipped, "rows_skipped", Warn, "rows or movements left out because a cell is bad", "record them again if they matter"),
-    entry(C::MovementsByTime, "movements_by_time", Warn, "no column for the movement; gaps in the times tell where movements begin", "record a movement column"),
-    entry(C::BetweenCodes, "between_codes", Warn, "voltages that are no whole codes of the converter", "check volts_per_count and the instrument"),
-    entry(C::FileCut, "file_cut", Warn, "the last line has no line break", "check whether the file was cut"),
-    entry(C::Excerpt, "excerpt", Warn, "more rows than a fit needs: it takes some of all", "nothing"),
-    entry(C::Temperature, "temperature", Note, "the effect of temperature that the logs show", "fit a cold and a warm log together, 3 K apart or more"),
-];
+codes! {
+    ChannelsSwapped, "channels_swapped", Refuse, "two Hall channels are exchanged", "check wires, column order and stage.toml", [];
+    ChannelInverted, "channel_inverted", Refuse, "a Hall channel has the wrong sign", "check wires, the sensor's direction and stage.toml", [];
+    BeamsSwapped, "beams_swapped", Refuse, "two beams of the interferometers are exchanged", "check the column order", [];
+    BeamInverted, "beam_inverted", Refuse, "a beam has the wrong sign", "check the interferometer's direction setting", [];
+    CapacitiveSwapped, "capacitive_swapped", Refuse, "two capacitive channels, or their places in stage.toml, are exchanged", "check wires, column order and capacitive.probes_m", [];
+    CapacitiveInverted, "capacitive_inverted", Refuse, "capacitive channels, or a coordinate of theirs in stage.toml, have the wrong sign", "check wires, signs and capacitive.probes_m", [];
+    ScaleWrong, "scale_wrong", Refuse, "a scale, a unit or a length is wrong", "check units, single or double pass, and the scales in stage.toml", [];
+    ReferenceLag, "reference_lag", Warn, "the reference, or one of its beams, shows an earlier or later pose than the probes", "set the delay of the interferometers; of all beams alike fit with --compensate-lag", [];
+    Hum, "hum", Warn, "a channel has a disturbance of one frequency", "look for mains in its cable and supply, or a vibration", [ReferenceLag Outliers];
+    Drift, "drift", Warn, "a channel drifts", "let the stage and its electronics warm up", [TermsAtLimit ZeroClipped];
+    GainDrift, "gain_drift", Warn, "the gain of a channel changes", "let it warm up; check its supply", [TermsAtLimit];
+    Step, "step", Warn, "a channel jumps and stays there", "record the movement again", [TermsAtLimit ZeroClipped Outliers];
+    Stuck, "stuck", Warn, "a channel stands still while the others move", "check cable, register and drive; leave the rows out", [TermsAtLimit ZeroClipped Outliers Step LeftOut];
+    IdleMovement, "idle_movement", Note, "a movement in which nothing moves", "record it again", [];
+    Saturated, "saturated", Warn, "codes at the end of a converter's range", "less gain, or less motion", [TermsAtLimit ZeroClipped Outliers LogsDisagree LeftOut];
+    Outliers, "outliers", Warn, "rows far outside the noise", "leave the rows out", [Outliers];
+    LeftOut, "left_out", Warn, "many rows count less than half in the fit", "find out what happened there and record again", [];
+    ShortMovements, "short_movements", Warn, "movements whose own zero deviations take their errors", "check the times and the movement column", [];
+    RowsMissing, "rows_missing", Warn, "servo periods without a row, or movements that a draw misses", "use a recorder that keeps up; a larger --train", [];
+    Jitter, "jitter", Warn, "rows come at uneven times, or at another rate than the servo's", "one clock for all converters; correct servo.period_s", [];
+    LogsDisagree, "logs_disagree", Refuse, "logs, or parts of one, are not of one stage in one state", "fit the parts that agree", [];
+    ZeroClipped, "zero_clipped", Note, "zero deviations beyond their range", "reset the interferometers nearer to zero, or widen search.delta_m", [TermsAtLimit];
+    TermsAtLimit, "terms_at_limit", Warn, "parameters at an end of their search range", "check the log, or widen the range in stage.toml", [];
+    OutOfRange, "out_of_range", Warn, "the log covers less than service, or a blob is used beyond its range", "record a log of the full range (host-fit plan)", [];
+    ModelLacks, "model_lacks", Warn, "the log shows more than the model describes, or cannot carry a better model", "see the other findings; move all six axes at once", [];
+    NotDetermined, "not_determined", Refuse, "the log leaves the calibration too open for service", "record all six axes moving at once over the range of service, for longer (host-fit plan makes such a run)", [];
+    RowsSkipped, "rows_skipped", Warn, "rows or movements left out because a cell is bad", "record them again if they matter", [];
+    MovementsByTime, "movements_by_time", Warn, "no column for the movement; gaps in the times tell where movements begin", "record a movement column", [];
+    BetweenCodes, "between_codes", Warn, "voltages that are no whole codes of the converter", "check volts_per_count and the instrument", [];
+    FileCut, "file_cut", Warn, "the last line has no line break", "check whether the file was cut", [];
+    Excerpt, "excerpt", Warn, "more rows than a fit needs: it takes some of all", "nothing", [];
+    Temperature, "temperature", Note, "the effect of temperature that the logs show", "fit a cold and a warm log together, 3 K apart or more", [];
+}
 
 impl Code {
     /// Its row of [`TABLE`].
@@ -298,28 +249,9 @@ pub fn messages(findings: &[Finding], least: Severity) -> String {
     messages.join(". ")
 }
 
-/// [`TABLE`] as the reference shows it.
-pub fn as_markdown() -> String {
-    let mut table = "| code | severity | what | remedy |\n|---|---|---|---|\n".to_owned();
-    for entry in &TABLE {
-        let severity = match entry.severity {
-            Note => "note",
-            Warn => "warn",
-            Refuse => "refuse",
-        };
-        let Entry {
-            name,
-            meaning,
-            remedy,
-            ..
-        } = entry;
-        table += &format!("| `{name}` | {severity} | {meaning} | {remedy} |\n");
-    }
-    table
-}
-
 #[cfg(test)]
 mod tests {
+    use super::Severity::Warn;
     use super::*;
     use std::path::Path;
 
@@ -331,9 +263,8 @@ mod tests {
     }
 
     #[test]
-    fn each_code_has_its_row_and_names_are_unique() {
-        for (number, entry) in TABLE.iter().enumerate() {
-            assert_eq!(entry.code as usize, number, "{}", entry.name);
+    fn names_are_unique() {
+        for entry in &TABLE {
             assert_eq!(TABLE.iter().filter(|e| e.name == entry.name).count(), 1);
         }
     }
@@ -344,7 +275,13 @@ mod tests {
         let text = std::fs::read_to_string(path).expect("a reference");
         let (_, rest) = text.split_once("<!-- findings -->\n").expect("a table");
         let (shown, _) = rest.split_once("<!-- /findings -->").expect("its end");
-        assert_eq!(shown, as_markdown());
+        let mut table = "| code | severity | what | remedy |\n|---|---|---|---|\n".to_owned();
+        for row in &TABLE {
+            let severity = format!("{:?}", row.severity).to_lowercase();
+            let (meaning, remedy) = (row.meaning, row.remedy);
+            table += &format!("| `{}` | {severity} | {meaning} | {remedy} |\n", row.name);
+        }
+        assert_eq!(shown, table);
     }
 
     #[test]

@@ -21,7 +21,6 @@ use host_fit::problem::model::Model;
 use host_fit::recalibrate::Known;
 use host_fit::report::json::Report;
 use host_fit::report::page::Errors;
-use host_fit::report::table::tables;
 use host_fit::solve::field::update::Change;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -346,7 +345,6 @@ impl Calibration {
         let stage_file = self.stage.get().path.as_ref();
         py.detach(|| {
             let (log, report) = (&of.log, &of.report);
-            let details = tables(report, &[&report.hidden()[..], &["errors"]].concat());
             write(
                 &path,
                 about,
@@ -354,7 +352,7 @@ impl Calibration {
                 stage_file,
                 of.outcome.subject(),
                 (warnings_of(log), &blob),
-                Errors::of_fit(fit, &log.dataset, report, details),
+                Errors::of_fit(fit, &log.dataset, report),
             )
         })
     }

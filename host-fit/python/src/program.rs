@@ -1,9 +1,10 @@
 //! The program `host-fit`, and the logs that it brings.
 
-use host_fit::input::shipped::{LOG_GZ, RUN_GZ, SERVICE_GZ, STAGE_TOML};
+use crate::error::of_output;
+use host_fit::input::shipped::FILES;
+use host_fit::output::{make_folder, write_atomically};
 use pyo3::prelude::*;
 use std::ffi::OsString;
-use std::fs;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
@@ -28,14 +29,10 @@ pub fn main_of(python: Python<'_>, arguments: Vec<OsString>) -> u8 {
 /// cannot be written.
 #[pyfunction]
 pub fn write_demo(folder: PathBuf) -> PyResult<()> {
-    fs::create_dir_all(&folder)?;
-    for (name, bytes) in [
-        ("paper.csv.gz", LOG_GZ),
-        ("run30.csv.gz", RUN_GZ),
-        ("service.csv.gz", SERVICE_GZ),
-        ("stage.toml", STAGE_TOML.as_bytes()),
-    ] {
-        fs::write(folder.join(name), bytes)?;
+    make_folder(&folder).map_err(|error| of_output(&error))?;
+    for (name, bytes) in FILES {
+        let written = write_atomically(&folder.join(name), bytes);
+        written.map_err(|error| of_output(&error))?;
     }
     Ok(())
 }

@@ -212,6 +212,33 @@ pub enum UpdateError {
     Interrupted,
 }
 
+impl UpdateError {
+    /// What another outcome than the one hoped for means; `declared`: whether the servo was declared off.
+    const fn of(outcome: Outcome, detail: u32, declared: bool) -> Self {
+        match outcome {
+            Outcome::ServoOn => Self::ServoOn { declared },
+            Outcome::Busy => Self::Busy,
+            Outcome::UnknownCommand => Self::TellsNothing,
+            Outcome::NoParameters => Self::NothingRuns,
+            Outcome::NoRandomNumber => Self::NoRandomNumber,
+            Outcome::NotAuthorised => Self::NotAuthorised,
+            Outcome::BadContent => Self::BadContent { kind: detail },
+            Outcome::WrongSequence => Self::Overtaken { least: detail },
+            Outcome::SupplyLow => Self::SupplyLow,
+            Outcome::StoreFailed => Self::StoreFailed,
+            Outcome::NoTransfer => Self::Lossy,
+            Outcome::NoPose
+            | Outcome::Moved
+            | Outcome::Drifted
+            | Outcome::OutOfBounds
+            | Outcome::Extrapolated => Self::NotAtRest { outcome, detail },
+            outcome => Self::Unexpected {
+                outcome: Some(outcome),
+            },
+        }
+    }
+}
+
 /// Name of an axis by its number in an answer.
 fn axis(number: u32) -> &'static str {
     const NAMES: [&str; 6] = ["X", "Y", "Rz", "Z", "Rx", "Ry"];

@@ -14,7 +14,6 @@ use crate::recalibrate::Known;
 use crate::report::errors::RowErrors;
 use crate::report::json::{Circumstances, Report, of_eval};
 use crate::report::page::Errors;
-use crate::report::table::tables;
 use crate::report::verdict::{End, Subject};
 use crate::solve::field::parameters::FieldParameters;
 use runtime::{ModelKind, ParameterSet};
@@ -148,14 +147,13 @@ impl Evaluation {
 
     /// What a page shows of the errors.
     pub fn errors<'e>(&'e self, report: &'e Report) -> Errors<'e> {
-        let hidden = [&report.hidden()[..], &["trusted_inputs", "errors"]].concat();
         Errors {
             set: &self.set,
             by_row: self.by_row.clone(),
             figures: &self.of_rows.errors,
             movements: &report.zero_deviations,
             parameters: &report.parameters,
-            details: tables(report, &hidden),
+            details: report.details(&["trusted_inputs", "errors"]),
         }
     }
 

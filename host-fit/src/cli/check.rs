@@ -81,10 +81,9 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         let mut source = args
             .report
             .source(what, &args.logs, (&log, &stage), subject);
-        source.errors = fit.zip(judged.as_ref()).map(|(fit, judged)| {
-            let details = tables(judged, &[&judged.hidden()[..], &["errors"]].concat());
-            Errors::of_fit(fit, &log.dataset, judged, details)
-        });
+        source.errors = fit
+            .zip(judged.as_ref())
+            .map(|(fit, judged)| Errors::of_fit(fit, &log.dataset, judged));
         Ok(source)
     })?;
     let hidden = ["failure", "warnings", "verdict", "predicted", "findings"];

@@ -5,7 +5,7 @@ use crate::cli::terminal;
 use crate::fit::{Fit, FitError, FitSettings, ModelChoice, fit};
 use crate::input::dataset::{Dataset, Row};
 use crate::input::log::{self, ReadOptions};
-use crate::input::shipped::{LOG_GZ, RUN_GZ, SERVICE_GZ, STAGE_TOML};
+use crate::input::shipped::{FILES, STAGE_TOML};
 use crate::input::stage::Stage;
 use crate::judge::precision::largest_difference;
 use crate::judge::statistics::over_noise;
@@ -112,14 +112,8 @@ pub(super) fn run(args: &DemoArgs) -> Result<(), HostError> {
 /// Writes logs and stage into `folder`, fits, decodes, judges. Gives what it shows, and the files. Refuses
 /// a folder with a file of such a name that is not of an earlier demo: its stage file shows that.
 fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
-    let inputs = [
-        ("paper.csv.gz", LOG_GZ),
-        ("run30.csv.gz", RUN_GZ),
-        ("service.csv.gz", SERVICE_GZ),
-        ("stage.toml", STAGE_TOML.as_bytes()),
-    ];
     let results = ["params.bin", "pose.csv", "field.bin", "field.bin.posterior"];
-    let names = inputs.iter().map(|(name, _)| *name).chain(results);
+    let names = FILES.iter().map(|(name, _)| *name).chain(results);
     let files: Vec<PathBuf> = names.map(|name| folder.join(name)).collect();
     let of_a_demo = fs::read(&files[3]).is_ok_and(|text| text == STAGE_TOML.as_bytes());
     if let Some(file) = files.iter().find(|file| file.exists() && !of_a_demo) {
@@ -128,7 +122,7 @@ fn job(folder: &Path) -> Result<(String, Vec<PathBuf>), HostError> {
             format!("{there} is there already and is not of this demo; name another folder");
         return Err(HostError::usage("--out", problem));
     }
-    for ((_, bytes), path) in inputs.iter().zip(&files) {
+    for ((_, bytes), path) in FILES.iter().zip(&files) {
         output::write_atomically(path, bytes)?;
     }
     let stage = Stage::from_file(&files[3])?;

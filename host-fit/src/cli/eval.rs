@@ -9,7 +9,6 @@ use crate::cli::terminal;
 use crate::input::log;
 use crate::judge::Zeros;
 use crate::output::{Outputs, blob_file, posterior_file};
-use crate::report::table::tables;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -66,8 +65,6 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
     })?;
     let report = evaluation.report(started.elapsed().as_secs_f64());
     let subject = evaluation.subject();
-    let mut hidden = report.hidden();
-    hidden.push("trusted_inputs");
     let mut outputs = Outputs::default();
     args.json.add(&mut outputs, &report)?;
     args.report.add(&mut outputs, || {
@@ -81,12 +78,8 @@ pub(super) fn run(args: &EvalArgs) -> Result<(), HostError> {
         source.errors = Some(evaluation.errors(&report));
         Ok(source)
     })?;
-    finish(
-        outputs,
-        &tables(&report, &hidden),
-        &report.warnings,
-        &subject,
-    )?;
+    let details = report.details(&["trusted_inputs"]);
+    finish(outputs, &details, &report.warnings, &subject)?;
     match evaluation.refusal() {
         Some(why) => Err(HostError::rejected(why)),
         None => Ok(()),

@@ -16,7 +16,6 @@ use crate::problem::parameters::Parameters;
 use crate::report::json::Report;
 use crate::report::page::{Errors, Source};
 use crate::report::parameters;
-use crate::report::table::tables;
 use crate::report::verdict::{End, Subject};
 use crate::solve::robust::Loss;
 use crate::solve::{Projection, Solver, SolverOptions};
@@ -160,7 +159,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let known = outcome.known();
     posterior_file::add_calibration(&mut outputs, &args.out, &fit.set, known.as_ref())?;
     let designed = [("designed", parameters::designed(&stage))];
-    let mut details = tables(&report, &report.hidden());
+    let mut details = report.details(&[]);
     details.splice(1..1, parameters::tables(&report.parameters, &designed));
     finish(outputs, &details, &warnings, &subject)?;
     match interrupt::requested() {
@@ -216,9 +215,6 @@ fn source<'a>(
         let provenance = &mut source.provenance;
         provenance.add_bytes(&args.out, &blob, "parameter blob, written");
     }
-    source.errors = fit.map(|(fit, report)| {
-        let details = tables(report, &[&report.hidden()[..], &["errors"]].concat());
-        Errors::of_fit(fit, &log.dataset, report, details)
-    });
+    source.errors = fit.map(|(fit, report)| Errors::of_fit(fit, &log.dataset, report));
     Ok(source)
 }

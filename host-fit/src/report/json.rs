@@ -16,6 +16,7 @@ use crate::report::field::{self, by_axis};
 use crate::report::parameters::{
     Parameter, coordinates, field_parameters, parameters, parameters_in,
 };
+use crate::report::table::{Table, tables};
 use runtime::ParameterSet;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -122,7 +123,7 @@ pub struct Report {
 
 impl Report {
     /// What tables of figures leave out: what is shown in another way, or nowhere.
-    pub fn hidden(&self) -> Vec<&'static str> {
+    fn hidden(&self) -> Vec<&'static str> {
         let mut hidden = vec![
             "parameters",
             "zero_deviations",
@@ -142,6 +143,11 @@ impl Report {
             hidden.push("temperatures");
         }
         hidden
+    }
+
+    /// Its tables, without what is hidden and those of `more` keys.
+    pub fn details(&self, more: &[&str]) -> Vec<Table> {
+        tables(self, &[&self.hidden()[..], more].concat())
     }
 }
 

@@ -67,12 +67,7 @@ pub struct Errors<'a> {
 
 impl<'a> Errors<'a> {
     /// Of a fit to a dataset.
-    pub fn of_fit(
-        fit: &'a Fit,
-        dataset: &Dataset,
-        report: &'a Report,
-        details: Vec<Table>,
-    ) -> Self {
+    pub fn of_fit(fit: &'a Fit, dataset: &Dataset, report: &'a Report) -> Self {
         let judgement = &fit.judgement;
         Self {
             set: &fit.set,
@@ -80,7 +75,7 @@ impl<'a> Errors<'a> {
             figures: &judgement.errors,
             movements: &report.zero_deviations,
             parameters: &report.parameters,
-            details,
+            details: report.details(&["errors"]),
         }
     }
 }

@@ -87,13 +87,12 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
         &Vec::new(),
         &circumstances,
     );
-    let details = vec![Table::new("some details", &["more"])];
     let subject = Subject {
         errors: Some(&fit.all.errors),
         ..subject(End::Written, &diagnosis)
     };
     let source = Source {
-        errors: Some(Errors::of_fit(&fit, &dataset, &judged, details)),
+        errors: Some(Errors::of_fit(&fit, &dataset, &judged)),
         ..source(&stage, &dataset, subject)
     };
     let page = source.html().expect("a page");
@@ -107,7 +106,6 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
         "Errors against Rz",
         "Errors against signal C",
         "Amplitude spectral density",
-        "some details",
         "sensitivity at rest over the designed one",
         "Sensors 2016",
         "X rms, µm",

@@ -8,6 +8,7 @@
 //! phases, and nothing is random. Of a log in which nothing moves, the runs at rest are kept likewise.
 
 use crate::input::dataset::{Dataset, LogSource, Movement, Row};
+use crate::input::stage;
 use runtime::Temperature;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Range;
@@ -256,15 +257,10 @@ impl Sampler {
 /// Whether the stage moves in any of the six axes between any two of the rows.
 fn moves(rows: &[Row]) -> bool {
     const IDLE: [f64; 6] = [IDLE_M, IDLE_M, IDLE_RAD, IDLE_M, IDLE_RAD, IDLE_RAD];
-    let (mut low, mut high) = ([f64::INFINITY; 6], [f64::NEG_INFINITY; 6]);
-    for row in rows.iter().step_by(rows.len().div_ceil(LOOKED_AT).max(1)) {
-        let ([x, y, rz], [z, rx, ry]) = (row.reference, row.vertical);
-        for (k, value) in [x, y, rz, z, rx, ry].into_iter().enumerate() {
-            low[k] = low[k].min(value);
-            high[k] = high[k].max(value);
-        }
-    }
-    (0..6).any(|k| high[k] - low[k] >= IDLE[k])
+    let looked_at = || rows.iter().step_by(rows.len().div_ceil(LOOKED_AT).max(1));
+    let pose = |row: &Row, k: usize| [row.reference, row.vertical].as_flattened()[k];
+    let span = |k: usize| stage::Range::around(looked_at().map(|row| pose(row, k))).width();
+    (0..6).any(|k| span(k) >= IDLE[k])
 }
 
 #[cfg(test)]

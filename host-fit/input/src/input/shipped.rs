@@ -18,3 +18,11 @@ pub const STAGE_TOML: &str = include_str!("../../../data/stage.toml");
 pub fn stage() -> Stage {
     Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")
 }
+
+/// The logs, and the stage, by the names of their files.
+pub const FILES: [(&str, &[u8]); 4] = [
+    ("paper.csv.gz", LOG_GZ),
+    ("run30.csv.gz", RUN_GZ),
+    ("service.csv.gz", SERVICE_GZ),
+    ("stage.toml", STAGE_TOML.as_bytes()),
+];

@@ -29,7 +29,7 @@ pub mod terms;
 pub mod zero_deviation;
 
 use crate::input::dataset::{Dataset, Row};
-use crate::input::stage::Stage;
+use crate::input::stage::{self, Stage};
 use model::Model;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -162,17 +162,10 @@ impl<'a> Problem<'a> {
 }
 
 /// How far a movement moves: the largest range of X, Y (um) and Rz (urad) by the reference.
-fn moved(reference_um: impl Iterator<Item = [f64; 3]>) -> f64 {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for reference in reference_um {
-        for axis in 0..3 {
-            low[axis] = low[axis].min(reference[axis]);
-            high[axis] = high[axis].max(reference[axis]);
-        }
-    }
-    (0..3)
-        .map(|axis| high[axis] - low[axis])
-        .fold(0.0, f64::max)
+fn moved(reference_um: impl Iterator<Item = [f64; 3]> + Clone) -> f64 {
+    let of_axis = |axis: usize| reference_um.clone().map(move |reference| reference[axis]);
+    let span = |axis| stage::Range::around(of_axis(axis)).width();
+    (0..3).map(span).fold(0.0, f64::max)
 }
 
 impl TrainRow {

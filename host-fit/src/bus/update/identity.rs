@@ -147,10 +147,7 @@ fn ask_page<L: Link>(talk: &mut Talk<L>, number: u8) -> Result<Option<u32>, Upda
     match talk.exchange(tell(number))? {
         (Outcome::Done, word) => Ok(Some(word)),
         (Outcome::NoParameters, _) => Ok(None),
-        (Outcome::UnknownCommand, _) => Err(UpdateError::TellsNothing),
-        (outcome, _) => Err(UpdateError::Unexpected {
-            outcome: Some(outcome),
-        }),
+        (outcome, detail) => Err(UpdateError::of(outcome, detail, false)),
     }
 }
 

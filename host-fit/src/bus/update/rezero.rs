@@ -46,17 +46,6 @@ pub fn rezero<L: Link>(talk: &mut Talk<L>, zero: &Zero) -> Result<(), UpdateErro
 fn done((outcome, detail): (Outcome, u32), declared: bool) -> Result<(), UpdateError> {
     match outcome {
         Outcome::Done => Ok(()),
-        Outcome::ServoOn => Err(UpdateError::ServoOn { declared }),
-        Outcome::NotAuthorised => Err(UpdateError::NotAuthorised),
-        Outcome::NoParameters => Err(UpdateError::NothingRuns),
-        Outcome::Busy => Err(UpdateError::Busy),
-        Outcome::NoPose
-        | Outcome::Moved
-        | Outcome::Drifted
-        | Outcome::OutOfBounds
-        | Outcome::Extrapolated => Err(UpdateError::NotAtRest { outcome, detail }),
-        outcome => Err(UpdateError::Unexpected {
-            outcome: Some(outcome),
-        }),
+        outcome => Err(UpdateError::of(outcome, detail, declared)),
     }
 }

@@ -186,27 +186,11 @@ impl<L: Link> Script<'_, L> {
 
     /// Why a request of a transfer was not done.
     fn refused(&mut self, outcome: Outcome, detail: u32) -> UpdateError {
+        let declared = self.declared;
+        self.declared &= !matches!(outcome, Outcome::ServoOn | Outcome::Busy | Outcome::Done);
         match outcome {
-            Outcome::ServoOn => {
-                let declared = std::mem::take(&mut self.declared);
-                UpdateError::ServoOn { declared }
-            }
-            Outcome::Busy | Outcome::Done => {
-                // To declare the servo on would end the transfer of another host.
-                self.declared = false;
-                UpdateError::Busy
-            }
-            Outcome::NoRandomNumber => UpdateError::NoRandomNumber,
-            Outcome::NotAuthorised => UpdateError::NotAuthorised,
-            Outcome::BadContent => UpdateError::BadContent { kind: detail },
-            Outcome::WrongSequence => UpdateError::Overtaken { least: detail },
-            Outcome::SupplyLow => UpdateError::SupplyLow,
-            Outcome::StoreFailed => UpdateError::StoreFailed,
-            // The node was reset, or has waited too long.
-            Outcome::NoTransfer => UpdateError::Lossy,
-            outcome => UpdateError::Unexpected {
-                outcome: Some(outcome),
-            },
+            Outcome::Done => UpdateError::Busy,
+            outcome => UpdateError::of(outcome, detail, declared),
         }
     }
 

@@ -217,13 +217,9 @@ impl<L: Link> Talk<L> {
                 let challenge = Request::Update(UpdateRequest::Challenge { part });
                 *word = match self.exchange(challenge)? {
                     (Outcome::Done, drawn) => drawn,
-                    (Outcome::NoRandomNumber, _) => return Err(UpdateError::NoRandomNumber),
                     // The node was reset, or another computer has used it up.
                     (Outcome::NoTransfer, _) => continue 'anew,
-                    (outcome, _) => {
-                        let outcome = Some(outcome);
-                        return Err(UpdateError::Unexpected { outcome });
-                    }
+                    (outcome, detail) => return Err(UpdateError::of(outcome, detail, false)),
                 };
             }
             return Ok(nonce);

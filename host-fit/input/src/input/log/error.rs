@@ -174,7 +174,7 @@ pub enum LogProblem {
         /// The column's name.
         name: String,
         /// The units of its kind.
-        units: &'static str,
+        units: String,
         /// The key in the `[log]` table.
         key: &'static str,
     },

@@ -81,33 +81,19 @@ impl Kind {
         self.unit(split(name).1.unwrap_or(name))
     }
 
-    /// The units of this kind, for messages.
-    pub const fn units(self) -> &'static str {
-        match self {
-            Self::Length => "m, mm, um, nm, pm",
-            Self::Angle => "rad, mrad, urad, nrad, deg",
-            Self::Time => "s, ms, us, ns, iso",
-            Self::Code => "V, mV, uV",
-            Self::Index => "none",
+    /// Its units, as messages list them.
+    pub fn units(self) -> String {
+        let symbols: Vec<&str> = self.table().iter().map(|(symbol, _)| *symbol).collect();
+        match symbols[..] {
+            [] => "none".to_owned(),
+            _ => symbols.join(", "),
         }
     }
 
-    /// The SI unit in which a `scale` is given.
-    pub const fn scale_unit(self) -> &'static str {
-        match self {
-            Self::Length => "m",
-            Self::Angle => "rad",
-            Self::Time => "s",
-            Self::Index | Self::Code => "",
-        }
-    }
-
-    /// A `scale` in SI units times this leads to m, rad or us.
-    pub const fn per_si(self) -> f64 {
-        match self {
-            Self::Time => 1e6,
-            _ => 1.0,
-        }
+    /// The unit of SI, and what a scale in it is worth; `None` of numbers without a unit, or of voltages.
+    pub fn si(self) -> Option<(&'static str, f64)> {
+        let first = || self.table().first().copied();
+        first().filter(|_| !matches!(self, Self::Index | Self::Code))
     }
 }
 

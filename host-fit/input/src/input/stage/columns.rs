@@ -15,7 +15,7 @@
 
 use super::document::Document;
 use super::error::StageError;
-use crate::input::log::layout::{Column, Kind, LogLayout, Quantity, UnitFault};
+use crate::input::log::layout::{Column, LogLayout, Quantity, UnitFault};
 use crate::input::log::units;
 use std::ops::Range;
 use toml::Spanned;
@@ -30,12 +30,7 @@ const VOLTS_PER_COUNT: (f64, f64) = (1e-9, 10.0);
 /// The layout that the table describes; quantities that it leaves out keep their default, as all
 /// do without the table.
 pub(super) fn log_layout(document: &Document<'_>) -> Result<LogLayout, StageError> {
-    let volts = |table: &str| -> Result<Option<f64>, StageError> {
-        let value: Option<Spanned<f64>> = document.read(table, "volts_per_count")?;
-        let (low, high) = VOLTS_PER_COUNT;
-        let volts = value.map(|value| document.within(&value, low, high, "V per code"));
-        volts.transpose()
-    };
+    let volts = |table| document.number(table, "volts_per_count", VOLTS_PER_COUNT, "V per code");
     let mut layout = LogLayout::default();
     layout.hall_volts_per_count = volts("hall")?;
     layout.capacitive_volts_per_count = volts("capacitive")?;
@@ -108,14 +103,14 @@ fn column(
         };
     let name = named(document, &column)?;
     let known = kind.units();
-    let has_unit = !matches!(kind, Kind::Index | Kind::Code);
+    let si = kind.si();
     let of_unit = |symbol: &str, span| {
         let problem = |fault| match fault {
             UnitFault::NoVoltsPerCount => format!(
                 "the column is a voltage; give the converter's `volts_per_count` (V) in [{}]",
                 quantity.table()
             ),
-            UnitFault::Unknown if has_unit => {
+            UnitFault::Unknown if si.is_some() => {
                 format!("unknown unit; use one of {known}, or give `scale`")
             }
             UnitFault::Unknown => {
@@ -130,21 +125,21 @@ fn column(
             let problem = "`unit` and `scale` are both given; keep one of them";
             return Err(document.refuse(scale.span(), problem));
         }
-        (None, Some(scale)) if has_unit => {
+        (None, Some(scale)) => {
+            let Some((unit, per_si)) = si else {
+                let problem = "this column holds numbers without a unit; give only its name";
+                return Err(document.refuse(scale.span(), problem));
+            };
             let (low, high) = SCALE_MAGNITUDES;
             let magnitude = Spanned::new(scale.span(), scale.get_ref().abs());
-            document.within(&magnitude, low, high, kind.scale_unit())?;
-            scale.into_inner() * kind.per_si()
-        }
-        (None, Some(scale)) => {
-            let problem = "this column holds numbers without a unit; give only its name";
-            return Err(document.refuse(scale.span(), problem));
+            document.within(&magnitude, low, high, unit)?;
+            scale.into_inner() * per_si
         }
         (Some(unit), None) => of_unit(unit.get_ref(), unit.span())?,
         (None, None) if kind.unit_of_name(&name).is_some() => {
             of_unit(units::split(&name).1.unwrap_or(&name), column.span())?
         }
-        (None, None) if has_unit => {
+        (None, None) if si.is_some() => {
             let example = format!("{{ column = \"{name}\", unit = \"...\" }}");
             let problem = format!("its unit is unknown; write {example} with one of {known}");
             return Err(document.refuse(column.span(), problem));

@@ -145,6 +145,22 @@ impl<'t> Document<'t> {
         })
     }
 
+    /// A number from `low` to `high`; `None` if the file does not have it.
+    ///
+    /// # Errors
+    /// As [`Self::read`] and [`Self::within`].
+    pub(super) fn number(
+        &self,
+        table: &str,
+        name: &str,
+        (low, high): (f64, f64),
+        unit: &str,
+    ) -> Result<Option<f64>, StageError> {
+        let given: Option<Spanned<f64>> = self.read(table, name)?;
+        let number = given.map(|number| self.within(&number, low, high, unit));
+        number.transpose()
+    }
+
     /// A number, if it lies within `low` to `high`; infinities and NaN never do.
     pub(super) fn within(
         &self,

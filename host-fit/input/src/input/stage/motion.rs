@@ -9,7 +9,6 @@
 
 use super::document::Document;
 use super::error::StageError;
-use toml::Spanned;
 
 /// How one axis moves, SI: m or rad, per s, per s2.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,12 +80,10 @@ pub(super) fn motion(document: &Document<'_>) -> Result<Motion, StageError> {
         let keys = ["service", "amplitude", "speed", "acceleration"];
         let per = ["", "", "_per_s", "_per_s2"];
         let names = [0, 1, 2, 3].map(|k| format!("{}_{unit}{}", keys[k], per[k]));
-        let or = |k: usize, default: f64, (low, high): (f64, f64)| {
-            let given: Option<Spanned<f64>> = document.read(&table, &names[k])?;
+        let or = |k: usize, default: f64, range| -> Result<f64, StageError> {
             let unit = format!("{unit}{}", ["", "", "/s", "/s2"][k]);
-            given.map_or(Ok(default), |number| {
-                document.within(&number, low, high, &unit)
-            })
+            let given = document.number(&table, &names[k], range, &unit)?;
+            Ok(given.unwrap_or(default))
         };
         *axis = AxisMotion::within(or(0, service, RANGES)?);
         // An axis may stand still in a run: what that costs is for the plan to say.

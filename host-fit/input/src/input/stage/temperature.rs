@@ -63,18 +63,17 @@ pub(super) fn temperature(document: &Document<'_>) -> Result<TemperatureTable, S
         ],
         ..TemperatureTable::default()
     };
-    let number = |key, (low, high), unit| -> Result<Option<f64>, StageError> {
-        let value: Option<Spanned<f64>> = document.read(TABLE, key)?;
-        let value = value.map(|value| document.within(&value, low, high, unit));
-        value.transpose()
+    let twice = |one: &str, other: &str| {
+        let problem = format!("`{one}` and `{other}` are both given; keep one of them");
+        Err(document.refuse(document.span(TABLE, other), problem))
     };
-    if let Some(scale_mc) = named(document, "unit", &UNITS)? {
-        out.scale_mc = scale_mc;
-    }
-    let per_count = number("c_per_count", (-10.0, 10.0), "degC per code")?;
-    let at_zero = number("c_at_zero", (-300.0, 300.0), "degC")?;
+    let unit = named(document, "unit", &UNITS)?;
+    out.scale_mc = unit.unwrap_or(out.scale_mc);
+    let per_count = document.number(TABLE, "c_per_count", (-10.0, 10.0), "degC per code")?;
+    let at_zero = document.number(TABLE, "c_at_zero", (-300.0, 300.0), "degC")?;
     match (per_count, at_zero) {
         (None, None) => {}
+        (Some(_), _) if unit.is_some() => return twice("unit", "c_per_count"),
         (Some(per_count), at_zero) if per_count != 0.0 => {
             out.scale_mc = [per_count * 1e3, at_zero.unwrap_or(0.0) * 1e3];
         }
@@ -89,11 +88,13 @@ pub(super) fn temperature(document: &Document<'_>) -> Result<TemperatureTable, S
         ("hall", &HALL_PARTS, "h_per_k"),
     ];
     for (prior, (class, known, numbers)) in out.prior_per_k.iter_mut().zip(classes) {
-        if let Some(of_class) = named(document, class, known)? {
-            *prior = of_class;
-        }
+        let of_class = named(document, class, known)?;
+        *prior = of_class.unwrap_or(*prior);
         let list: Option<List<Spanned<f64>>> = document.read(TABLE, numbers)?;
         if let Some(list) = &list {
+            if of_class.is_some() {
+                return twice(class, numbers);
+            }
             let [mean, deviation]: &[_; 2] = document.exactly(list)?;
             *prior = [
                 document.within(mean, -COEFFICIENT_MAX, COEFFICIENT_MAX, "1/K")?,

@@ -359,7 +359,11 @@ proptest! {
 
 #[test]
 fn codes_of_temperatures_need_a_scale() {
-    for line in ["c_at_zero = 25.0", "c_per_count = 0.0"] {
+    for line in [
+        "c_at_zero = 25.0",
+        "c_per_count = 0.0",
+        "unit = \"K\"\nc_per_count = 0.01",
+    ] {
         let toml = format!("{SOUND}\n[temperature]\nmount = \"mount\"\n{line}\n");
         let refused = parse(&toml).expect_err(line);
         assert!(refused.to_string().contains("`c_per_count`"), "{refused}");

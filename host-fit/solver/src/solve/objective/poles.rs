@@ -16,14 +16,7 @@ pub const SHARE_MIN: f64 = 0.05;
 
 /// Lowest and highest Z, Rx, Ry over some rows, zero included: m, rad, rad.
 pub fn slope_extent(rows: &[TrainRow]) -> [Range; 3] {
-    let mut extent = [Range::new(0.0, 0.0); 3];
-    for row in rows {
-        for (range, v) in extent.iter_mut().zip(row.vertical) {
-            range.low = range.low.min(v);
-            range.high = range.high.max(v);
-        }
-    }
-    extent
+    [0, 1, 2].map(|k| Range::around(rows.iter().map(|row| row.vertical[k]).chain([0.0])))
 }
 
 /// The part of `slopes` (a, b or c) in which, while the other slopes are zero, `eta` + slope v is
