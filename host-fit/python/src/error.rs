@@ -15,7 +15,6 @@ use pyo3::exceptions::{
 };
 use pyo3::prelude::*;
 use std::fmt::Display;
-use std::io;
 
 /// A wrong argument, by its name.
 pub fn wrong(argument: &str, problem: impl Display) -> PyErr {
@@ -33,13 +32,10 @@ fn own<'py>(py: Python<'py>, class: &str, arguments: impl PyCallArgs<'py>) -> Py
 
 /// A log that is refused: `LogError`, or `OSError` where its file cannot be read.
 pub fn of_log(py: Python<'_>, error: &LogError) -> PyErr {
+    use SourceProblem::{Interrupted, IsFolder, NotFound, Unreadable};
     match &error.problem {
-        LogProblem::Source(SourceProblem::Interrupted) => PyKeyboardInterrupt::new_err(()),
-        LogProblem::Source(SourceProblem::NotFound) => {
-            PyFileNotFoundError::new_err(error.to_string())
-        }
-        LogProblem::Source(SourceProblem::IsFolder | SourceProblem::Unreadable { .. }) => {
-            PyOSError::new_err(error.to_string())
+        LogProblem::Source(of @ (Interrupted | NotFound | IsFolder | Unreadable { .. })) => {
+            of_source(of, error.to_string())
         }
         _ => {
             let place = &error.place;
@@ -89,32 +85,31 @@ pub fn of_calibrate(py: Python<'_>, error: &CalibrateError) -> PyErr {
 
 pub fn of_stage(error: &StageError) -> PyErr {
     match error {
-        StageError::Source(source) => match source.problem {
-            SourceProblem::NotFound => PyFileNotFoundError::new_err(error.to_string()),
-            _ => PyOSError::new_err(error.to_string()),
-        },
+        StageError::Source(source) => of_source(&source.problem, error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
 }
 
-fn of_system(cause: &io::Error, message: String) -> PyErr {
-    match cause.kind() {
-        io::ErrorKind::NotFound => PyFileNotFoundError::new_err(message),
+/// A file that cannot be read.
+fn of_source(problem: &SourceProblem, message: String) -> PyErr {
+    match problem {
+        SourceProblem::NotFound => PyFileNotFoundError::new_err(message),
+        SourceProblem::Interrupted => PyKeyboardInterrupt::new_err(()),
         _ => PyOSError::new_err(message),
     }
 }
 
 pub fn of_blob(error: &BlobFileError) -> PyErr {
     match error {
-        BlobFileError::Read { cause, .. } => of_system(cause, error.to_string()),
+        BlobFileError::Read(source) => of_source(&source.problem, error.to_string()),
         BlobFileError::Unusable { .. } => PyValueError::new_err(error.to_string()),
     }
 }
 
 pub fn of_posterior(error: &PosteriorFileError) -> PyErr {
     match error {
+        PosteriorFileError::Read(source) => of_source(&source.problem, error.to_string()),
         PosteriorFileError::Missing { .. } => PyFileNotFoundError::new_err(error.to_string()),
-        PosteriorFileError::Read { cause, .. } => of_system(cause, error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
 }

@@ -38,3 +38,12 @@ pub(crate) fn hold(text: &str) -> Result<OnInvalid, ParseIntError> {
         ticks => OnInvalid::Hold { ticks },
     })
 }
+
+/// How many rows are fitted: a number, or `None` for `all`.
+pub(crate) fn train(text: &str) -> Result<Option<usize>, &'static str> {
+    match (text, text.parse()) {
+        ("all", _) => Ok(None),
+        (_, Ok(rows)) if rows > 0 => Ok(Some(rows)),
+        _ => Err("expected `all` or a number of rows, 1 or more"),
+    }
+}

@@ -1,16 +1,13 @@
 //! Largest rms errors: `--limit x=1.5um,y=1um,rz=4urad`.
 
+use crate::input::log::layout::Kind;
 use std::str::FromStr;
 
-/// Name, unit in messages and units on the command line of an axis.
-type Axis = (&'static str, &'static str, [(&'static str, f64); 4]);
-
-const LENGTHS: [(&str, f64); 4] = [("nm", 1e-9), ("um", 1e-6), ("mm", 1e-3), ("m", 1.0)];
-const ANGLES: [(&str, f64); 4] = [("nrad", 1e-9), ("urad", 1e-6), ("mrad", 1e-3), ("rad", 1.0)];
-const AXES: [Axis; 3] = [
-    ("x", "um", LENGTHS),
-    ("y", "um", LENGTHS),
-    ("rz", "urad", ANGLES),
+/// Name, unit in messages and kind of unit of an axis.
+const AXES: [(&str, &str, Kind); 3] = [
+    ("x", "um", Kind::Length),
+    ("y", "um", Kind::Length),
+    ("rz", "urad", Kind::Angle),
 ];
 
 /// The largest rms errors of X, Y, Rz that a fit may have: m, m, rad; `None` where any will do.
@@ -28,12 +25,10 @@ impl FromStr for Limits {
             let (name, value) = part.split_once('=').ok_or_else(wrong)?;
             let axis = AXES.iter().position(|(axis, ..)| *axis == name.trim());
             let axis = axis.ok_or_else(wrong)?;
-            let value = value.trim();
-            let units = AXES[axis].2;
-            // The longest unit that fits: `mm` ends with `m` too.
-            let unit = units.iter().filter(|(unit, _)| value.ends_with(unit));
-            let (unit, si) = unit.max_by_key(|(unit, _)| unit.len()).ok_or_else(wrong)?;
-            let number = value.strip_suffix(unit).unwrap_or(value).trim().parse();
+            let is_digit = |c: char| c.is_ascii_digit() || c == '.';
+            let (number, unit) = value.split_at(value.rfind(is_digit).map_or(0, |at| at + 1));
+            let si = AXES[axis].2.unit(unit).ok_or_else(wrong)?;
+            let number = number.trim().parse();
             let number: f64 = number.map_err(|_| wrong())?;
             if !(number.is_finite() && number > 0.0) {
                 return Err(format!("`{part}`: a limit above zero is needed"));

@@ -9,7 +9,6 @@ use crate::output::Outputs;
 use clap::Args;
 use runtime::parameters::Text;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 /// The stage file of a command.
 #[derive(Debug, Args)]
@@ -107,22 +106,6 @@ pub(super) struct Threads {
     /// Threads; all cores if not given. The result does not depend on it.
     #[arg(id = "threads", long = "threads", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) number: Option<u16>,
-}
-
-/// How many rows are fitted: a number, or `None` for `all`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Train(pub(super) Option<usize>);
-
-impl FromStr for Train {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match (text, text.parse()) {
-            ("all", _) => Ok(Self(None)),
-            (_, Ok(rows)) if rows > 0 => Ok(Self(Some(rows))),
-            _ => Err("expected `all` or a number of rows, 1 or more"),
-        }
-    }
 }
 
 /// A length of movements: `--split`.

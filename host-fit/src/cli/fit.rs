@@ -1,8 +1,8 @@
 //! `host-fit fit`.
 
-use super::args::{Json, Logs, Threads, Train, blob_text};
+use super::args::{Json, Logs, Threads, blob_text};
 use super::report::finish;
-use crate::calibrate::arguments::choice;
+use crate::calibrate::arguments::{choice, train};
 use crate::calibrate::{FitOrder, Limits, checked, loss_of, warnings_of};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
@@ -46,8 +46,8 @@ pub(super) struct FitArgs {
     #[arg(long, value_name = "NAME", value_parser = choice::<Loss>())]
     loss: Option<Loss>,
     /// Rows to fit: `all` or a number.
-    #[arg(long, value_name = "N|all", default_value = "all")]
-    train: Train,
+    #[arg(long, value_name = "N|all", default_value = "all", value_parser = train)]
+    train: std::option::Option<usize>,
     /// How rows are drawn.
     #[arg(long, value_parser = choice::<Draw>(), default_value = "stratified")]
     draw: Draw,
@@ -184,7 +184,7 @@ fn settings(args: &FitArgs, loss: Loss) -> Result<FitSettings, HostError> {
     };
     Ok(FitSettings {
         model: args.model,
-        train: args.train.0,
+        train: args.train,
         draw: args.draw,
         solver: args.solver,
         loss,

@@ -14,6 +14,7 @@
 pub mod curves;
 pub mod table;
 
+use crate::calibrate::arguments::{choice, train};
 use crate::fit::{FitError, calibration};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
@@ -27,6 +28,7 @@ use crate::solve::objective::Objective;
 use crate::solve::search::kind::SearchKind;
 use crate::solve::search::run::{Checkpoint, Start, StopCriteria};
 use crate::solve::{Projection, Solution, Solver, SolverOptions};
+use clap::Args;
 use runtime::ModelKind;
 use runtime::calibration::Origin;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -40,22 +42,35 @@ pub const EXACT: f64 = 5e-7;
 pub const LEAST_SQUARES: &str = "lm";
 
 /// What is compared.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Args)]
 pub struct Comparison {
-    /// The forms of the problem.
+    /// Forms of the problem, separated by commas.
+    #[arg(
+        long = "project",
+        value_name = "PROJECT",
+        value_parser = choice::<Projection>(),
+        value_delimiter = ',',
+        default_value = "none,delta,linear"
+    )]
     pub forms: Vec<Projection>,
-    /// The searches.
+    /// Searches, separated by commas; all if not given. Least squares is always there.
+    #[arg(long = "solvers", value_name = "NAMES", value_delimiter = ',', default_values = SearchKind::ALL.map(SearchKind::name), value_parser = choice::<SearchKind>())]
     pub searches: Vec<SearchKind>,
-    /// Seeds 1 to this.
+    /// Runs of each: seeds 1 to N.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub seeds: u64,
-    /// Rows drawn by each seed; all if `None`.
-    pub train: Option<usize>,
-    /// How they are drawn.
+    /// Rows that each seed draws: `all` or a number.
+    #[arg(long, value_name = "N|all", default_value = "200", value_parser = train)]
+    pub train: std::option::Option<usize>,
+    /// How rows are drawn.
+    #[arg(long, value_parser = choice::<Draw>(), default_value = "stratified")]
     pub draw: Draw,
-    /// Evaluations of each run.
-    pub evaluations: usize,
-    /// Np.
-    pub population: usize,
+    /// Evaluations of each run; the paper's are 100 + 100 generations of 200.
+    #[arg(long, value_name = "N", default_value_t = 20_100, value_parser = clap::value_parser!(u32).range(4..=1_000_000_000))]
+    pub evaluations: u32,
+    /// Individuals of a population.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(4..=100_000))]
+    pub population: u32,
 }
 
 /// One solver on one form with one seed.
@@ -185,11 +200,11 @@ fn search_on(
 ) -> Run {
     let start = Start {
         seed,
-        population: comparison.population,
-        individuals: &objective.first_population(comparison.population, seed),
+        population: comparison.population as usize,
+        individuals: &objective.first_population(comparison.population as usize, seed),
     };
     let criteria = StopCriteria {
-        evaluations: Some(comparison.evaluations),
+        evaluations: Some(comparison.evaluations as usize),
         ..StopCriteria::default()
     };
     let started = Instant::now();

@@ -1,22 +1,17 @@
 //! The parameter blob as a file.
 
-use crate::output::{OutputError, OutputProblem, is_standard, write_atomically};
+use crate::input::source::{SourceError, read_start};
+use crate::output::{OutputError, OutputProblem, write_atomically};
 use runtime::blob::MAX_BYTES;
 use runtime::{BlobError, ParameterSet};
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Why a file is not a usable parameter blob.
 #[derive(Debug, thiserror::Error)]
 pub enum BlobFileError {
     /// The file cannot be read.
-    #[error("cannot read the parameter blob {}: {cause}. Name a file that `host-fit fit` wrote", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        cause: std::io::Error,
-    },
+    #[error("{0}. Name a file that `host-fit fit` wrote")]
+    Read(#[from] SourceError),
     /// The file is no usable blob.
     #[error("{}: {cause}; {}", path.display(), remedy(cause))]
     Unusable {
@@ -46,21 +41,8 @@ const fn remedy(cause: &BlobError) -> &'static str {
 /// # Errors
 /// See [`BlobFileError`].
 pub fn read(path: &Path) -> Result<ParameterSet, BlobFileError> {
-    let failed = |cause| BlobFileError::Read {
-        path: path.to_owned(),
-        cause,
-    };
-    let mut bytes = Vec::with_capacity(2 * MAX_BYTES);
-    let source: Box<dyn Read> = if is_standard(path) {
-        Box::new(std::io::stdin().lock())
-    } else {
-        Box::new(std::fs::File::open(path).map_err(failed)?)
-    };
     // A wrong file may be huge; what lies behind twice the largest blob changes no verdict.
-    source
-        .take(2 * MAX_BYTES as u64)
-        .read_to_end(&mut bytes)
-        .map_err(failed)?;
+    let bytes = read_start(path, 2 * MAX_BYTES as u64)?;
     ParameterSet::from_bytes(&bytes).map_err(|cause| BlobFileError::Unusable {
         path: path.to_owned(),
         cause,

@@ -15,6 +15,7 @@
 //! | | | layouts 2 and 3: the faults of the log that the calibration is without, a line each, in UTF-8 |
 //! | the end | 32 | SHA-256 of everything before it |
 
+use crate::input::source::{SourceError, SourceProblem, read_whole};
 use crate::output::file_identity::is_stream;
 use crate::output::{OutputError, Outputs, blob_file, is_standard};
 use crate::recalibrate::Known;
@@ -23,7 +24,6 @@ use crate::solve::field::whiten::Noise;
 use nalgebra::{Cholesky, DMatrix};
 use runtime::ParameterSet;
 use sha2::{Digest, Sha256};
-use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 const MAGIC: [u8; 8] = *b"HALLPOST";
@@ -51,13 +51,8 @@ pub enum PosteriorFileError {
         path: PathBuf,
     },
     /// The file cannot be read.
-    #[error("cannot read {}: {cause}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        cause: std::io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] SourceError),
     /// It is no posterior, or a damaged one.
     #[error("{} is no posterior of this program: {problem}. Copy it again, or fit again", path.display())]
     Unusable {
@@ -115,20 +110,13 @@ pub fn add_calibration(
 /// # Errors
 /// See [`PosteriorFileError`].
 pub fn read(path: &Path, set: &ParameterSet, blob: &Path) -> Result<Known, PosteriorFileError> {
-    let failed = |cause: std::io::Error| match cause.kind() {
-        ErrorKind::NotFound => PosteriorFileError::Missing {
-            path: path.to_owned(),
-        },
-        _ => PosteriorFileError::Read {
-            path: path.to_owned(),
-            cause,
-        },
+    let most = (self::bytes(ROWS_MAX) + TEXT_BYTES_MAX) as u64;
+    let bytes = match read_whole(path, most) {
+        Err(error) if matches!(error.problem, SourceProblem::NotFound) => {
+            return Err(PosteriorFileError::Missing { path: error.path });
+        }
+        read => read?,
     };
-    let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(failed)?;
-    file.take((self::bytes(ROWS_MAX) + TEXT_BYTES_MAX) as u64 + 1)
-        .read_to_end(&mut bytes)
-        .map_err(failed)?;
     let unusable = |problem| PosteriorFileError::Unusable {
         path: path.to_owned(),
         problem,

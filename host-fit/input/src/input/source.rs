@@ -99,17 +99,22 @@ pub fn shown_name(path: &Path) -> &Path {
 /// # Errors
 /// `NotFound`, `IsFolder`, `Unreadable`, `TooLarge`.
 pub fn read_whole(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, SourceError> {
-    let mut bytes = Vec::new();
-    let read = Raw::open(path).and_then(|raw| {
-        raw.take(limit_bytes.saturating_add(1))
-            .read_to_end(&mut bytes)?;
-        Ok(())
-    });
-    match read {
-        Ok(()) if bytes.len() as u64 <= limit_bytes => Ok(bytes),
-        Ok(()) => Err(SourceProblem::TooLarge { limit_bytes }.of(path)),
-        Err(problem) => Err(problem.of(path)),
+    let bytes = read_start(path, limit_bytes.saturating_add(1))?;
+    if bytes.len() as u64 > limit_bytes {
+        return Err(SourceProblem::TooLarge { limit_bytes }.of(path));
     }
+    Ok(bytes)
+}
+
+/// The first bytes of a file, as many as `most`, from standard input for `-`.
+///
+/// # Errors
+/// `NotFound`, `IsFolder`, `Unreadable`.
+pub fn read_start(path: &Path, most: u64) -> Result<Vec<u8>, SourceError> {
+    let mut bytes = Vec::new();
+    let read = Raw::open(path).and_then(|raw| Ok(raw.take(most).read_to_end(&mut bytes)?));
+    read.map_err(|problem| problem.of(path))?;
+    Ok(bytes)
 }
 
 /// The bytes of a file as they are, counted. Errors of reading are
