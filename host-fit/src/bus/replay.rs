@@ -122,7 +122,8 @@ pub fn run(settings: &ReplaySettings) -> Result<Replayed, ReplayError> {
         _ if is_standard(&settings.log) => 0,
         _ => rows_of(&settings.log, &stage)?.min(most),
     };
-    let bus = Bus::open(&settings.can, &[]).map_err(|cause| ReplayError::Bus { cause, rows: 0 })?;
+    let bus = Bus::open(&settings.can.interface, settings.can.node, &[])
+        .map_err(|cause| ReplayError::Bus { cause, rows: 0 })?;
     let mut player = Player {
         layout,
         bus,
@@ -275,7 +276,7 @@ impl Player<'_> {
             }
             let rows = self.done.rows;
             self.bus
-                .send(&self.frames, SEND_DEADLINE)
+                .send_all(&self.frames, SEND_DEADLINE)
                 .map_err(|cause| ReplayError::Bus { cause, rows })?;
             self.done.frames += self.frames.len();
             self.done.rows += now.len();

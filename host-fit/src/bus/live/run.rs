@@ -39,7 +39,11 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
         on_invalid: settings.hold,
         vertical_ticks: settings.vertical_every,
     };
-    let bus = Bus::open(&settings.can, &Node::messages(node.layout))?;
+    let bus = Bus::open(
+        &settings.can.interface,
+        settings.can.node,
+        &Node::messages(node.layout),
+    )?;
     let record = match &settings.record {
         Some(path) => Some(RecordFile::create(path).map_err(LiveError::NoRecord)?),
         None => None,
@@ -227,7 +231,7 @@ impl Session<'_> {
             return Ok(());
         }
         let frames: Vec<BusFrame> = self.out.drain(..).map(BusFrame::from).collect();
-        if let Err(error) = self.bus.send(&frames, SEND_DEADLINE) {
+        if let Err(error) = self.bus.send_all(&frames, SEND_DEADLINE) {
             let count = u32::try_from(frames.len()).unwrap_or(u32::MAX);
             self.not_sent = self.not_sent.saturating_add(count);
             return self.wait_out(error);
@@ -242,14 +246,14 @@ impl Session<'_> {
     /// An interface that is down and a queue that is full are waited for; the rest ends the
     /// run.
     fn wait_out(&mut self, error: BusError) -> Result<(), LiveError> {
-        if error.is_down() {
+        if matches!(error, BusError::Down { .. }) {
             if !self.is_down {
                 self.is_down = true;
                 self.display.say(&format!("{error}; waiting for it"));
             }
             std::thread::sleep(Duration::from_millis(1));
             Ok(())
-        } else if error.is_queue_full() {
+        } else if matches!(error, BusError::QueueFull { .. }) {
             Ok(())
         } else {
             Err(error.into())

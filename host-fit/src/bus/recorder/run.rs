@@ -30,7 +30,11 @@ pub fn run(settings: &RecorderSettings) -> Result<Recorded, RecorderError> {
     let messages: Vec<Message> = TABLE.iter().map(|row| row.message).collect();
     let mut session = Session {
         settings,
-        bus: Bus::open(&settings.address, &messages)?,
+        bus: Bus::open(
+            &settings.address.interface,
+            settings.address.node,
+            &messages,
+        )?,
         file: RecordFile::create(&settings.out).map_err(RecorderError::NoRecord)?,
         watch: Watch::default(),
         failure: None,
@@ -140,7 +144,7 @@ impl Session<'_> {
     }
 
     fn request(&mut self, frame: BusFrame) -> Result<(), RecorderError> {
-        match self.bus.send(&[frame], SEND_DEADLINE) {
+        match self.bus.send_all(&[frame], SEND_DEADLINE) {
             Ok(()) => self.write(&StampedFrame {
                 time_us: now_us(),
                 frame,
@@ -166,7 +170,7 @@ impl Session<'_> {
     /// An interface that is down and a queue that is full may pass; the ticks that are lost
     /// then are counted.
     fn wait_out(&self, error: BusError) -> Result<(), RecorderError> {
-        if !error.is_down() && !error.is_queue_full() {
+        if !matches!(error, BusError::Down { .. } | BusError::QueueFull { .. }) {
             return Err(error.into());
         }
         std::thread::sleep(Duration::from_millis(1));

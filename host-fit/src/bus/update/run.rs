@@ -76,9 +76,9 @@ impl Interface<'_> {
 
 impl Link for Interface<'_> {
     fn send(&mut self, frame: BusFrame) -> Result<(), UpdateError> {
-        match self.bus.send(&[frame], SEND_DEADLINE) {
+        match self.bus.send_all(&[frame], SEND_DEADLINE) {
             // Lost, like any frame that nobody answers.
-            Err(error) if error.is_queue_full() => Ok(()),
+            Err(BusError::QueueFull { .. }) => Ok(()),
             sent => sent.map_err(|error| self.failed(error)),
         }
     }
@@ -105,7 +105,11 @@ fn hold<T>(
     talks: impl FnOnce(&mut Talk<Interface<'_>>, &mut dyn FnMut(u64, u64)) -> Result<T, UpdateError>,
 ) -> Result<T, UpdateRunError> {
     let link = Interface {
-        bus: Bus::open(address, &[Message::Answer, Message::Command])?,
+        bus: Bus::open(
+            &address.interface,
+            address.node,
+            &[Message::Answer, Message::Command],
+        )?,
         started: Instant::now(),
         stop: interrupt::watch(),
         failure: None,
