@@ -43,9 +43,6 @@
 // The version as one number that can be compared: major << 16, minor << 8, patch.
 #define HALL_RUNTIME_VERSION (((HALL_RUNTIME_VERSION_MAJOR << 16) | (HALL_RUNTIME_VERSION_MINOR << 8)) | HALL_RUNTIME_VERSION_PATCH)
 
-// In place of a code that could not be read: INT32_MIN.
-#define HALL_MISSING_CODE INT32_MIN
-
 // Hall code A is at a rail, implausible or missing.
 #define HALL_STATUS_HALL_A (1 << 0)
 
@@ -108,6 +105,10 @@
 
 // A temperature is missing or implausible: decoded as if at that of the calibration.
 #define HALL_STATUS_TEMPERATURE_MISSING (1 << 20)
+
+// In place of a code that could not be read. No converter gives it, and it lies below
+// every window of accepted codes, so a missing code is never decoded.
+#define HALL_MISSING_CODE INT32_MIN
 
 // What became of a call. 32 bits wide, whatever a compiler makes of enums.
 enum HallResult
@@ -195,7 +196,8 @@ typedef struct {
   uint32_t opaque[HALL_SERVO_WORDS];
 } HallServo;
 
-// The codes of one servo period.
+// The codes of one servo period. Time and sequence arrive as data: the runtime reads
+// no clock.
 typedef struct {
   // Hall codes of the probes A, B, C.
   int32_t hall[3];
@@ -203,10 +205,10 @@ typedef struct {
   int32_t capacitive[3];
   // Number of the servo period, wrapping.
   uint32_t sequence;
-  // When the codes were sampled, in us, wrapping.
+  // When the codes were sampled, in us, wrapping (after 71 minutes).
   uint32_t time_us;
-  // Temperature of the magnets' mount and of the stage body at the Hall elements, m degC;
-  // HALL_MISSING_CODE where there is none.
+  // Temperature of the magnets' mount and of the stage body at the Hall elements, in m degC,
+  // held from the last measurement; a missing code where there is none.
   int32_t temperature_mc[2];
 } HallFrame;
 
@@ -239,7 +241,7 @@ typedef struct {
   float rz_rad;
 } HallPlanarPose;
 
-// Counters since start. They stay at their largest value.
+// Counters since start. They saturate: they never wrap to a good-looking zero.
 typedef struct {
   // Ticks, with and without a frame.
   uint32_t ticks;

@@ -7,25 +7,16 @@
 use core::hint::black_box;
 
 /// How floating-point arithmetic is set wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ArithmeticFault {
     /// Subnormal numbers become zero.
+    #[error("subnormal numbers become zero: clear FZ of FPSCR")]
     SubnormalsLost,
     /// Results are not rounded to the nearest number.
+    #[error("results are not rounded to nearest: clear RMode of FPSCR")]
     RoundingChanged,
 }
-
-impl core::fmt::Display for ArithmeticFault {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::SubnormalsLost => "subnormal numbers become zero: clear FZ of FPSCR",
-            Self::RoundingChanged => "results are not rounded to nearest: clear RMode of FPSCR",
-        })
-    }
-}
-
-impl core::error::Error for ArithmeticFault {}
 
 /// Checks by a few sums and products that arithmetic is set as after a reset. Call it once,
 /// before the first tick, in the context that ticks.

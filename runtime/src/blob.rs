@@ -58,10 +58,11 @@ pub const MAX_BYTES: usize = 656;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
 /// Why bytes are not a usable blob.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum BlobError {
     /// Shorter than a header, or than the header says.
+    #[error("cut short: {found} bytes where at least {needed} are needed")]
     Truncated {
         /// Bytes that are needed, at least.
         needed: usize,
@@ -69,13 +70,18 @@ pub enum BlobError {
         found: usize,
     },
     /// All bytes are 0xFF or all 0x00: flash that holds no blob.
+    #[error("erased memory: no parameter blob was written here")]
     Erased,
     /// The first four bytes are not `HALL`: no parameter blob at all.
+    #[error(
+        "not a parameter blob: it starts with {found:02x?} where {MAGIC:02x?} (\"HALL\") belongs"
+    )]
     BadMagic {
         /// The bytes that are there.
         found: [u8; 4],
     },
     /// A layout that this version does not read.
+    #[error("layout version {found}, but this program reads versions 1 to {supported}")]
     UnknownVersion {
         /// Version in the header.
         found: u16,
@@ -83,11 +89,13 @@ pub enum BlobError {
         supported: u16,
     },
     /// A payload length that no blob has, or reserved bytes that are not zero.
+    #[error("damaged header: payload length {payload_bytes}, or reserved bytes not zero")]
     BadHeader {
         /// Payload length in the header.
         payload_bytes: u32,
     },
     /// Bytes follow the blob in a file, where its length must be exact.
+    #[error("the blob ends after {blob_bytes} bytes but the file has {found}: padded or joined")]
     TrailingBytes {
         /// Bytes of the blob.
         blob_bytes: usize,
@@ -95,6 +103,7 @@ pub enum BlobError {
         found: usize,
     },
     /// The check over header and payload fails: a bit is wrong.
+    #[error("damaged: stored check {stored:08x}, computed {computed:08x}")]
     BadCrc {
         /// The check that the blob carries.
         stored: u32,
@@ -102,12 +111,16 @@ pub enum BlobError {
         computed: u32,
     },
     /// The check holds, yet the payload is not a parameter set of this layout.
+    #[error("the check holds but the payload cannot be read")]
     BadPayload,
     /// The parameters are readable but unusable.
-    Parameters(ParameterError),
+    #[error("unusable parameters: {0}")]
+    Parameters(#[source] ParameterError),
     /// The blob belongs to another stage than the one expected.
+    #[error("the parameters belong to another stage")]
     OtherStage,
     /// The buffer to write into is too small.
+    #[error("a blob takes up to {MAX_BYTES} bytes, the buffer has {bytes}")]
     BufferTooSmall {
         /// Its size.
         bytes: usize,
@@ -129,58 +142,6 @@ impl BlobError {
             Self::Parameters(_) => 9,
             Self::OtherStage => 10,
             Self::BufferTooSmall { .. } => 11,
-        }
-    }
-}
-
-impl core::fmt::Display for BlobError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match *self {
-            Self::Truncated { needed, found } => {
-                write!(
-                    f,
-                    "cut short: {found} bytes where at least {needed} are needed"
-                )
-            }
-            Self::Erased => f.write_str("erased memory: no parameter blob was written here"),
-            Self::BadMagic { found } => write!(
-                f,
-                "not a parameter blob: it starts with {found:02x?} where {MAGIC:02x?} (\"HALL\") belongs"
-            ),
-            Self::UnknownVersion { found, supported } => write!(
-                f,
-                "layout version {found}, but this program reads versions 1 to {supported}"
-            ),
-            Self::BadHeader { payload_bytes } => write!(
-                f,
-                "damaged header: payload length {payload_bytes}, or reserved bytes not zero"
-            ),
-            Self::TrailingBytes { blob_bytes, found } => write!(
-                f,
-                "the blob ends after {blob_bytes} bytes but the file has {found}: padded or joined"
-            ),
-            Self::BadCrc { stored, computed } => write!(
-                f,
-                "damaged: stored check {stored:08x}, computed {computed:08x}"
-            ),
-            Self::BadPayload => f.write_str("the check holds but the payload cannot be read"),
-            Self::Parameters(error) => write!(f, "unusable parameters: {error}"),
-            Self::OtherStage => f.write_str("the parameters belong to another stage"),
-            Self::BufferTooSmall { bytes } => {
-                write!(
-                    f,
-                    "a blob takes up to {MAX_BYTES} bytes, the buffer has {bytes}"
-                )
-            }
-        }
-    }
-}
-
-impl core::error::Error for BlobError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            Self::Parameters(error) => Some(error),
-            _ => None,
         }
     }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// In place of a code that could not be read. No converter gives it, and it lies below
-/// every [`CodeWindow`], so a missing code is never decoded.
+/// every window of accepted codes, so a missing code is never decoded.
 pub const MISSING_CODE: i32 = i32::MIN;
 
 /// The largest magnitude of a code that the decoder accepts: 24 bits, signed, which `f32`
@@ -25,7 +25,7 @@ pub struct RawFrame {
     /// When the codes were sampled, in us, wrapping (after 71 minutes).
     pub time_us: u32,
     /// Temperature of the magnets' mount and of the stage body at the Hall elements, in m degC,
-    /// held from the last measurement; [`MISSING_CODE`] where there is none.
+    /// held from the last measurement; a missing code where there is none.
     pub temperature_mc: [i32; 2],
 }
 

@@ -90,112 +90,80 @@ pub struct FitRecord {
 pub const RANGE_MAX: f32 = 1.0;
 
 /// What is wrong with a parameter set.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ParameterError {
     /// A number of this group is NaN or infinite.
+    #[error("{group} holds a NaN or an infinity")]
     NotFinite {
         /// Which group of numbers.
         group: &'static str,
     },
     /// PM has no inverse: two probes sense the same motion.
+    #[error("the plane matrix PM has no inverse: two probes sense the same motion")]
     SingularPlane,
     /// The three capacitive sensors stand in one line, or so near each other that their largest
     /// codes stand for more than a whole turn: they define no plane.
+    #[error(
+        "the three capacitive sensors stand in one line, or nearer to each other than their gaps, and define no plane"
+    )]
     CapacitiveProbesInLine,
     /// The stored PM^-1 is not the inverse of the stored PM.
+    #[error("the stored PM^-1 is not the inverse of PM (PM PM^-1 differs from I by {largest:e})")]
     NotTheInverse {
         /// Largest element of PM PM^-1 - I, in magnitude.
         largest: f32,
     },
     /// A precomputed term does not follow from the terms that it was made of.
+    #[error("{term} does not follow from the values that it was made of")]
     Inconsistent {
         /// Which term.
         term: &'static str,
     },
     /// A value that must be above zero is not.
+    #[error("{value} must be above zero")]
     NotPositive {
         /// Which value.
         value: &'static str,
     },
     /// The calibrated range reaches beyond [`RANGE_MAX`].
+    #[error("the calibrated range reaches {reach:e} m or rad, more than {RANGE_MAX}")]
     LargeRange {
         /// How far, m or rad.
         reach: f32,
     },
     /// phi comes nearer to zero than `sensitivity_min` within the calibrated vertical range.
+    #[error("the sensitivity of probe {} comes too near zero within the calibrated range", letter(*.probe))]
     PoleInRange {
         /// Which probe, 0 to 2 for A to C.
         probe: u8,
     },
     /// A slope of p of the field model may reach 1 within the calibrated range: one reading could
     /// then stand for two displacements.
+    #[error("the field terms of probe {} are too large for the calibrated range", letter(*.probe))]
     SteepInRange {
         /// Which probe, 0 to 2 for A to C.
         probe: u8,
     },
     /// The gain of a probe changes by half or more within the reach of the temperatures, or the
     /// reach is beyond 24 bits.
+    #[error("the temperature coefficients of probe {} are too large", letter(*.probe))]
     LargeTemperatureChange {
         /// Which probe, 0 to 2 for A to C.
         probe: u8,
     },
     /// A window of accepted codes is empty or reaches beyond 24 bits.
+    #[error("the window of accepted {sensors} codes is empty or reaches beyond 24 bits")]
     UnsoundWindow {
         /// Which sensors' window.
         sensors: &'static str,
     },
 }
 
-impl core::fmt::Display for ParameterError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match *self {
-            Self::NotFinite { group } => write!(f, "{group} holds a NaN or an infinity"),
-            Self::SingularPlane => {
-                f.write_str("the plane matrix PM has no inverse: two probes sense the same motion")
-            }
-            Self::CapacitiveProbesInLine => {
-                f.write_str("the three capacitive sensors stand in one line, or nearer to each other than their gaps, and define no plane")
-            }
-            Self::NotTheInverse { largest } => write!(
-                f,
-                "the stored PM^-1 is not the inverse of PM (PM PM^-1 differs from I by {largest:e})"
-            ),
-            Self::Inconsistent { term } => {
-                write!(
-                    f,
-                    "{term} does not follow from the values that it was made of"
-                )
-            }
-            Self::NotPositive { value } => write!(f, "{value} must be above zero"),
-            Self::LargeRange { reach } => write!(
-                f,
-                "the calibrated range reaches {reach:e} m or rad, more than {RANGE_MAX}"
-            ),
-            Self::PoleInRange { probe } => write!(
-                f,
-                "the sensitivity of probe {} comes too near zero within the calibrated range",
-                ["A", "B", "C"].get(usize::from(probe)).unwrap_or(&"?")
-            ),
-            Self::SteepInRange { probe } => write!(
-                f,
-                "the field terms of probe {} are too large for the calibrated range",
-                ["A", "B", "C"].get(usize::from(probe)).unwrap_or(&"?")
-            ),
-            Self::LargeTemperatureChange { probe } => write!(
-                f,
-                "the temperature coefficients of probe {} are too large",
-                ["A", "B", "C"].get(usize::from(probe)).unwrap_or(&"?")
-            ),
-            Self::UnsoundWindow { sensors } => write!(
-                f,
-                "the window of accepted {sensors} codes is empty or reaches beyond 24 bits"
-            ),
-        }
-    }
+/// The name of a probe.
+fn letter(probe: u8) -> char {
+    char::from(b'A'.saturating_add(probe))
 }
-
-impl core::error::Error for ParameterError {}
 
 impl ParameterSet {
     /// The decoder of this set, of its model.

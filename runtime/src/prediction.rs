@@ -16,7 +16,7 @@
 
 use crate::decoder::{Decode, Reading};
 use crate::frame::RawFrame;
-use crate::pose::PlanarPose;
+use crate::pose::{PlanarPose, pairwise};
 use crate::tracker::PoseTracker;
 
 /// Poses through which the line is laid.
@@ -136,18 +136,11 @@ impl Predictor {
         for sample in &self.samples {
             let weight = sum_back_us.wrapping_sub(8 * back_us(sample)) as i32 as f32;
             squares += weight * weight;
-            slope = [
-                slope[0] + weight * (sample.pose[0] - last.pose[0]),
-                slope[1] + weight * (sample.pose[1] - last.pose[1]),
-                slope[2] + weight * (sample.pose[2] - last.pose[2]),
-            ];
+            let moved = pairwise(sample.pose, last.pose, |then, now| weight * (then - now));
+            slope = pairwise(slope, moved, |sum, moved| sum + moved);
         }
         let ahead = (8 * age_us) as f32 / squares;
-        let pose = [
-            last.pose[0] + ahead * slope[0],
-            last.pose[1] + ahead * slope[1],
-            last.pose[2] + ahead * slope[2],
-        ];
+        let pose = pairwise(last.pose, slope, |now, slope| now + ahead * slope);
         pose.iter()
             .all(|q| q.is_finite())
             .then(|| PlanarPose::from_array(pose))

@@ -39,8 +39,7 @@ pub struct Health {
     pub vertical_invalid: u32,
     /// Ticks in which a value was held.
     pub held: u32,
-    /// Servo periods that had no frame, by the sequence numbers or by
-    /// [`PoseTracker::tick_without_frame`].
+    /// Servo periods that had no frame.
     pub frames_missed: u32,
     /// Frames that repeated an earlier sequence number.
     pub frames_repeated: u32,

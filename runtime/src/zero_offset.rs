@@ -8,7 +8,7 @@
 //! lifted or tilted, or when a pose lies outside the calibrated range.
 
 use crate::decoder::Reading;
-use crate::pose::PlanarPose;
+use crate::pose::{PlanarPose, pairwise};
 use crate::status::Status;
 
 /// How long to average, and what still counts as rest at the zero.
@@ -177,27 +177,19 @@ impl ZeroOffsetRun {
         if self.taken == 0 {
             self.first = pose;
         }
-        let d = [
-            pose[0] - self.first[0],
-            pose[1] - self.first[1],
-            pose[2] - self.first[2],
-        ];
+        let d = pairwise(pose, self.first, |now, first| now - first);
         let sum = if self.taken < self.half {
             &mut self.sum_first_half
         } else {
             &mut self.sum_second_half
         };
-        *sum = [sum[0] + d[0], sum[1] + d[1], sum[2] + d[2]];
+        *sum = pairwise(*sum, d, |sum, d| sum + d);
         for ((low, high), d) in self.low.iter_mut().zip(&mut self.high).zip(d) {
             *low = if d < *low { d } else { *low };
             *high = if d > *high { d } else { *high };
         }
         self.taken = self.taken.saturating_add(1);
-        let spread = [
-            self.high[0] - self.low[0],
-            self.high[1] - self.low[1],
-            self.high[2] - self.low[2],
-        ];
+        let spread = pairwise(self.high, self.low, |high, low| high - low);
         if let Some((axis, spread)) = beyond(spread, self.settings.spread_max) {
             return ZeroOffsetState::Refused(ZeroOffsetRefusal::Moved { axis, spread });
         }
@@ -214,20 +206,13 @@ impl ZeroOffsetRun {
     fn finish(&self) -> ZeroOffsetState {
         let n = f32::from(self.half);
         let (early, late) = (self.sum_first_half, self.sum_second_half);
-        let drift = [
-            (late[0] - early[0]) / n,
-            (late[1] - early[1]) / n,
-            (late[2] - early[2]) / n,
-        ];
+        let drift = pairwise(late, early, |late, early| (late - early) / n);
         if let Some((axis, drift)) = beyond(drift, self.settings.drift_max) {
             return ZeroOffsetState::Refused(ZeroOffsetRefusal::Drifted { axis, drift });
         }
         let all = n + n;
-        let zero = [
-            self.first[0] + (early[0] + late[0]) / all,
-            self.first[1] + (early[1] + late[1]) / all,
-            self.first[2] + (early[2] + late[2]) / all,
-        ];
+        let mean = pairwise(early, late, |early, late| (early + late) / all);
+        let zero = pairwise(self.first, mean, |first, mean| first + mean);
         if let Some((axis, value)) = beyond(zero, self.settings.zero_max) {
             return ZeroOffsetState::Refused(ZeroOffsetRefusal::OutOfBounds { axis, value });
         }

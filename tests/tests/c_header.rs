@@ -1,5 +1,6 @@
 //! The header of the C interface is what its source says.
 
+use runtime::Status;
 use std::path::Path;
 
 /// With `UPDATE_HEADER` set the header is written instead.
@@ -9,8 +10,14 @@ fn the_c_header_is_made_from_the_source() {
     let config =
         cbindgen::Config::from_file(folder.join("cbindgen.toml")).expect("a configuration");
     let mut builder = cbindgen::Builder::new().with_config(config);
-    for source in ["lib.rs", "storage.rs", "types.rs"] {
-        builder = builder.with_src(folder.join("src").join(source));
+    for source in [
+        "src/lib.rs",
+        "src/storage.rs",
+        "src/types.rs",
+        "../src/frame.rs",
+        "../src/tracker.rs",
+    ] {
+        builder = builder.with_src(folder.join(source));
     }
     let mut made = Vec::new();
     builder.generate().expect("a header").write(&mut made);
@@ -24,5 +31,24 @@ fn the_c_header_is_made_from_the_source() {
         kept.replace("\r\n", "\n"),
         made,
         "set UPDATE_HEADER=1 to write it anew"
+    );
+    // Every bit of the status has a name there, lowest first, and the version is the crate's.
+    let bits = made
+        .lines()
+        .filter(|line| line.starts_with("#define HALL_STATUS_"));
+    let bits: Vec<_> = bits
+        .map(|line| line.rsplit_once(" (").expect("a bit").1)
+        .collect();
+    let all = Status::NAMES.map(|(bit, _)| format!("1 << {})", bit.bits().trailing_zeros()));
+    assert_eq!(bits, all);
+    let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).expect("a manifest");
+    let of = |part: &str| {
+        let line = made.split_once(&format!("#define HALL_RUNTIME_VERSION_{part} "));
+        line.and_then(|(_, rest)| rest.lines().next()).expect(part)
+    };
+    let version = ["MAJOR", "MINOR", "PATCH"].map(of).join(".");
+    assert!(
+        manifest.contains(&format!("version = \"{version}\"")),
+        "{version}"
     );
 }

@@ -38,7 +38,7 @@
 //! opens no transfer while one of another blob is open; and `Done` names what was begun or stored.
 //! Whoever lost the answer to a commit asks which blob is the newest ([`page::NEXT`]).
 //!
-//! Who may: where the node has a key, whoever sends the right tag ([`Authenticator`]): AES-CMAC over
+//! Who may: where the node has a key, whoever sends the right tag ([`tag`]): AES-CMAC over
 //! the nonce, the request with its token, and for a commit the blob. A nonce serves once, for a right
 //! tag and for a wrong one: a recording is worth nothing, and each guess takes a challenge. All that
 //! moves the pose, makes it invalid or resets needs a tag ([`Command::needs_authority`]). Where the
@@ -54,7 +54,7 @@ mod staging;
 mod store;
 mod tell;
 
-pub use authentication::{Authenticator, Key, Nonce, TAG_BYTES, tag};
+pub use authentication::{Key, Nonce, TAG_BYTES, tag};
 pub use receiver::{Receiver, Surroundings};
 pub use request::{UpdateData, UpdateRequest};
 pub use staging::{TAG_INDEX, crc_of, word_of};

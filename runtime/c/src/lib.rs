@@ -12,13 +12,13 @@ mod types;
 
 use core::ffi::{CStr, c_char};
 use core::mem::MaybeUninit;
+use runtime::tracker::Health;
 use runtime::zero_offset::{ZeroOffsetRefusal, ZeroOffsetSettings, ZeroOffsetState};
-use runtime::{AnyDecoder, BlobError, OnInvalid, ParameterSet, PoseTracker, Predictor, Reading};
-pub use storage::{HallDecoder, HallPredictor, HallServo};
-pub use types::{
-    HALL_RUNTIME_VERSION, HallFrame, HallHealth, HallPlanarPose, HallReading, HallResult,
-    HallRezero,
+use runtime::{
+    AnyDecoder, BlobError, OnInvalid, ParameterSet, PoseTracker, Predictor, RawFrame, Reading,
 };
+pub use storage::{HallDecoder, HallPredictor, HallServo};
+pub use types::{HALL_RUNTIME_VERSION, HallPlanarPose, HallReading, HallResult, HallRezero};
 
 /// A panic cannot be reached: the tests link every function of the runtime against a panic
 /// handler that does not exist. The language requires one.
@@ -103,11 +103,11 @@ pub unsafe extern "C" fn hall_servo_start(
 #[unsafe(no_mangle)]
 pub extern "C" fn hall_tick(
     servo: Option<&mut HallServo>,
-    frame: Option<&HallFrame>,
+    frame: Option<&RawFrame>,
     reading: Option<&mut MaybeUninit<HallReading>>,
 ) -> HallResult {
     tick(servo, reading, |servo| {
-        Ok(servo.tick(&frame.ok_or(HallResult::NullPointer)?.raw()))
+        Ok(servo.tick(frame.ok_or(HallResult::NullPointer)?))
     })
 }
 
@@ -174,11 +174,8 @@ pub extern "C" fn hall_set_zero(servo: Option<&mut HallServo>, zero: HallPlanarP
 
 /// The counters; zeros for a null pointer or a servo that was never started.
 #[unsafe(no_mangle)]
-pub extern "C" fn hall_health(servo: Option<&HallServo>) -> HallHealth {
-    running(servo)
-        .map(PoseTracker::health)
-        .unwrap_or_default()
-        .into()
+pub extern "C" fn hall_health(servo: Option<&HallServo>) -> Health {
+    running(servo).map(PoseTracker::health).unwrap_or_default()
 }
 
 /// Starts a predictor without poses. `age_max_us` is the largest age of a pose that is carried
@@ -202,7 +199,7 @@ pub extern "C" fn hall_predictor_start(
 pub extern "C" fn hall_predictor_take(
     predictor: Option<&mut HallPredictor>,
     servo: Option<&HallServo>,
-    frame: Option<&HallFrame>,
+    frame: Option<&RawFrame>,
     reading: Option<&HallReading>,
 ) -> HallResult {
     let (Some(predictor), Some(servo), Some(frame), Some(reading)) =
@@ -213,7 +210,7 @@ pub extern "C" fn hall_predictor_take(
     let (Some(predictor), Some(servo)) = (predictor.get_mut(), servo.get()) else {
         return HallResult::NotStarted;
     };
-    predictor.take(servo, &frame.raw(), &reading.into());
+    predictor.take(servo, frame, &reading.into());
     HallResult::Ok
 }
 

@@ -1,7 +1,6 @@
 //! What C hands in and gets back.
 
-use runtime::tracker::Health;
-use runtime::{PlanarPose, Pose, RawFrame, Reading, Status, VerticalPose};
+use runtime::{PlanarPose, Pose, Reading, Status, VerticalPose};
 
 /// Major version of the library that this header belongs to.
 pub const HALL_RUNTIME_VERSION_MAJOR: u32 = 0;
@@ -13,27 +12,6 @@ pub const HALL_RUNTIME_VERSION_PATCH: u32 = 0;
 pub const HALL_RUNTIME_VERSION: u32 = (HALL_RUNTIME_VERSION_MAJOR << 16)
     | (HALL_RUNTIME_VERSION_MINOR << 8)
     | HALL_RUNTIME_VERSION_PATCH;
-
-const _: () = {
-    const fn is(number: u32, text: &str) -> bool {
-        matches!(u32::from_str_radix(text, 10), Ok(written) if written == number)
-    }
-    assert!(is(
-        HALL_RUNTIME_VERSION_MAJOR,
-        env!("CARGO_PKG_VERSION_MAJOR")
-    ));
-    assert!(is(
-        HALL_RUNTIME_VERSION_MINOR,
-        env!("CARGO_PKG_VERSION_MINOR")
-    ));
-    assert!(is(
-        HALL_RUNTIME_VERSION_PATCH,
-        env!("CARGO_PKG_VERSION_PATCH")
-    ));
-};
-
-/// In place of a code that could not be read: INT32_MIN.
-pub const HALL_MISSING_CODE: i32 = i32::MIN;
 
 /// What became of a call. 32 bits wide, whatever a compiler makes of enums.
 #[repr(u32)]
@@ -89,23 +67,6 @@ pub enum HallRezero {
     OutOfBounds = 7,
     /// Refused: a pose lies outside the calibrated range.
     Extrapolated = 8,
-}
-
-/// The codes of one servo period.
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-pub struct HallFrame {
-    /// Hall codes of the probes A, B, C.
-    pub hall: [i32; 3],
-    /// Capacitive codes of the gaps 1, 2, 3.
-    pub capacitive: [i32; 3],
-    /// Number of the servo period, wrapping.
-    pub sequence: u32,
-    /// When the codes were sampled, in us, wrapping.
-    pub time_us: u32,
-    /// Temperature of the magnets' mount and of the stage body at the Hall elements, m degC;
-    /// HALL_MISSING_CODE where there is none.
-    pub temperature_mc: [i32; 2],
 }
 
 /// Motion in the plane.
@@ -184,65 +145,6 @@ pub const HALL_STATUS_ZERO_SET: u32 = 1 << 19;
 /// A temperature is missing or implausible: decoded as if at that of the calibration.
 pub const HALL_STATUS_TEMPERATURE_MISSING: u32 = 1 << 20;
 
-/// Every bit has its name here, lowest first.
-const _: () = {
-    let bits = [
-        HALL_STATUS_HALL_A,
-        HALL_STATUS_HALL_B,
-        HALL_STATUS_HALL_C,
-        HALL_STATUS_CAPACITIVE_1,
-        HALL_STATUS_CAPACITIVE_2,
-        HALL_STATUS_CAPACITIVE_3,
-        HALL_STATUS_SENSITIVITY_A,
-        HALL_STATUS_SENSITIVITY_B,
-        HALL_STATUS_SENSITIVITY_C,
-        HALL_STATUS_PLANAR_NOT_FINITE,
-        HALL_STATUS_VERTICAL_NOT_FINITE,
-        HALL_STATUS_VERTICAL_EXTRAPOLATED,
-        HALL_STATUS_PLANAR_EXTRAPOLATED,
-        HALL_STATUS_PLANAR_INVALID,
-        HALL_STATUS_VERTICAL_INVALID,
-        HALL_STATUS_PLANAR_HELD,
-        HALL_STATUS_VERTICAL_HELD,
-        HALL_STATUS_FRAMES_MISSED,
-        HALL_STATUS_FRAME_REPEATED,
-        HALL_STATUS_ZERO_SET,
-        HALL_STATUS_TEMPERATURE_MISSING,
-    ];
-    assert!(bits.len() == Status::NAMES.len());
-    let mut k = 0;
-    while k < bits.len() {
-        assert!(bits[k] == Status::NAMES[k].0.bits());
-        k += 1;
-    }
-};
-const _: () = assert!(HALL_MISSING_CODE == runtime::frame::MISSING_CODE);
-
-/// Counters since start. They stay at their largest value.
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-pub struct HallHealth {
-    /// Ticks, with and without a frame.
-    pub ticks: u32,
-    /// Ticks whose planar pose was invalid.
-    pub planar_invalid: u32,
-    /// Ticks whose vertical pose was invalid.
-    pub vertical_invalid: u32,
-    /// Ticks in which a value was held.
-    pub held: u32,
-    /// Servo periods that had no frame.
-    pub frames_missed: u32,
-    /// Frames that repeated an earlier sequence number.
-    pub frames_repeated: u32,
-}
-
-impl HallFrame {
-    pub(crate) const fn raw(&self) -> RawFrame {
-        RawFrame::new(self.hall, self.capacitive, self.sequence, self.time_us)
-            .with_temperature_mc(self.temperature_mc)
-    }
-}
-
 impl HallPlanarPose {
     pub(crate) const ZERO: Self = Self {
         x_m: 0.0,
@@ -309,19 +211,6 @@ impl From<&HallReading> for Reading {
                 },
             },
             status: Status::from_bits(reading.status),
-        }
-    }
-}
-
-impl From<Health> for HallHealth {
-    fn from(health: Health) -> Self {
-        Self {
-            ticks: health.ticks,
-            planar_invalid: health.planar_invalid,
-            vertical_invalid: health.vertical_invalid,
-            held: health.held,
-            frames_missed: health.frames_missed,
-            frames_repeated: health.frames_repeated,
         }
     }
 }

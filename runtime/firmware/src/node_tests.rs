@@ -1,11 +1,10 @@
 extern crate std;
 
 use super::*;
-use crate::records::{Choice, Loaded, Records, Refusal};
+use crate::records::{Choice, Loaded, Records};
 use crate::store::flash_model::FlashModel;
-use hal_adapters::adc::AdcError;
+use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Command, Mailbox, Outcome, Request};
-use hal_adapters::can::{BusFrame, SensorReceiver, Timing};
 use runtime::calibration::{Calibration, Origin};
 use runtime::frame::CodeWindow;
 use runtime::geometry::ProbeGeometry;
@@ -138,91 +137,6 @@ fn ask(node: &mut Node<'_>, request: Request, token: u8) -> Vec<Content> {
         &mut outbox,
     );
     contents(&core::iter::from_fn(|| outbox.pop()).collect::<Vec<_>>())
-}
-
-#[test]
-fn every_sixteenth_tick_sends_the_state_and_half_way_a_counter() {
-    let mut node = node();
-    for k in 0..64u32 {
-        let contents = contents(&tick(&mut node, Ok(frame(k))));
-        let status = contents
-            .iter()
-            .any(|t| matches!(t, Content::Status(s) if s.state == Some(NodeState::Running)));
-        let health = contents.iter().any(|t| matches!(t, Content::Health(_)));
-        assert_eq!((status, health), (k % 16 == 0, k % 16 == 8), "{k}");
-    }
-}
-
-#[test]
-fn a_re_zero_needs_the_servo_off_and_its_answer_comes_in_the_tick_that_ends_it() {
-    let mut node = node();
-    tick(&mut node, Ok(frame(0)));
-    let mut token = 0;
-    let mut asked = |node: &mut Node<'_>, request| {
-        token += 1;
-        match ask(node, request, token)[..] {
-            [Content::Answer(answer)] => answer.outcome,
-            _ => None,
-        }
-    };
-    let rezero = Request::Rezero { ticks: 300 };
-    assert_eq!(asked(&mut node, rezero), Some(Outcome::ServoOn));
-    let off = Request::ServoOff { seconds: 2 };
-    assert_eq!(asked(&mut node, off), Some(Outcome::Done));
-    assert_eq!(asked(&mut node, rezero), Some(Outcome::Started));
-    let answers = (1..=400).flat_map(|k| {
-        let contents = contents(&tick(&mut node, Ok(frame(k))));
-        let answers = contents
-            .into_iter()
-            .filter(|t| matches!(t, Content::Answer(_)));
-        answers.map(move |answer| (k, answer)).collect::<Vec<_>>()
-    });
-    let answers: Vec<_> = answers.collect();
-    assert!(matches!(answers[..], [(300, Content::Answer(a))] if a.outcome == Some(Outcome::Done)));
-    assert_ne!(node.zero(), PlanarPose::ZERO);
-}
-
-/// Codes as wide as the converter's, with a tick that the schedule missed and one that the
-/// converter failed.
-#[test]
-fn a_record_holds_the_codes_of_every_tick_and_shows_those_without_as_gaps() {
-    for (parameters, layout) in [(true, Layout::Bits24), (false, Layout::Bits16)] {
-        let mut node = if parameters {
-            node()
-        } else {
-            let refusal = Refusal::NEITHER;
-            Node::new(Parameters::None { refusal }, false, layout, IDENTITY)
-        };
-        let width = if parameters { 1_000 } else { 1 };
-        let codes = |sequence: u32| RawFrame {
-            hall: [-5 * width, 8 * width, sequence as i32 * width],
-            ..frame(sequence)
-        };
-        let is_code = |coded: &hal_adapters::can::Coded| layout.messages().contains(&coded.message);
-        assert!(!tick(&mut node, Ok(codes(0))).iter().any(is_code));
-        ask(&mut node, Request::Record { on: true }, 1);
-        let mut receiver = SensorReceiver::new(layout, Timing::default());
-        let mut got = Vec::new();
-        for sequence in (1..100).filter(|s| *s != 40) {
-            let sample = if sequence == 70 {
-                Err(SampleFault::from(&AdcError::Bus(())))
-            } else {
-                Ok(codes(sequence))
-            };
-            for coded in tick(&mut node, sample) {
-                let taken = receiver.take(&BusFrame::from(coded), sequence * 2_000);
-                got.extend(taken.tick);
-            }
-        }
-        let want: Vec<_> = (1..100).filter(|s| ![40, 70].contains(s)).collect();
-        assert_eq!(got.len(), want.len());
-        for (got, sequence) in got.iter().zip(want) {
-            assert_eq!(got.hall, codes(sequence).hall);
-            assert_eq!(got.sequence & 0xf, sequence & 0xf);
-        }
-        ask(&mut node, Request::Record { on: false }, 2);
-        assert!(!tick(&mut node, Ok(codes(100))).iter().any(is_code));
-    }
 }
 
 #[test]

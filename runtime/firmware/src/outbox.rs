@@ -142,45 +142,4 @@ mod tests {
             .collect();
         assert_eq!(left, [Message::PoseX, Message::Answer, Message::Identity]);
     }
-
-    /// Three mailboxes as in the reference manual: the lowest identifier leaves first; among
-    /// equal ones that in the lowest mailbox.
-    #[test]
-    fn three_mailboxes_never_hold_two_frames_of_a_message_and_keep_the_order() {
-        let group = [Message::PoseX, Message::PoseY, Message::PoseRz].map(frame);
-        let codes = [Message::Hall, Message::Capacitive].map(frame);
-        let answers = (0..3).map(|k| Coded {
-            bytes: [k; 8],
-            ..frame(Message::Answer)
-        });
-        let mut outbox = Outbox::new();
-        answers.clone().for_each(|answer| outbox.push(answer));
-        outbox.push_group(&group);
-        outbox.push(frame(Message::PoseTime));
-        outbox.push_group(&codes);
-        outbox.push(frame(Message::NodeStatus));
-        let want: Vec<_> = group
-            .into_iter()
-            .chain([frame(Message::PoseTime)])
-            .chain(codes)
-            .chain([frame(Message::NodeStatus)])
-            .chain(answers)
-            .collect();
-        let (mut mailboxes, mut sent) = ([None::<Coded>; 3], Vec::new());
-        loop {
-            while let Some(next) = outbox.front(mailboxes.iter().all(Option::is_none)) {
-                let waits = |message| mailboxes.iter().flatten().any(|f| f.message == message);
-                assert!(!waits(next.message), "{:?} waits twice", next.message);
-                let free = mailboxes.iter_mut().find(|mailbox| mailbox.is_none());
-                *free.expect("a free mailbox") = outbox.pop();
-            }
-            let waiting = mailboxes.iter_mut().filter(|mailbox| mailbox.is_some());
-            let first = waiting.min_by_key(|mailbox| mailbox.map(|f| f.message.spec().id));
-            match first.and_then(Option::take) {
-                Some(frame) => sent.push(frame),
-                None => break,
-            }
-        }
-        assert_eq!(sent, want);
-    }
 }

@@ -219,27 +219,6 @@ fn any_number_of_cuts_in_a_row_loses_nothing() {
 }
 
 #[test]
-fn a_supply_that_drops_at_any_operation_leaves_the_old_blob_and_says_why() {
-    let sound = holding(&[], &[1, 2]);
-    let mut whole = sound.clone();
-    whole.power_on();
-    assert_eq!(update(&mut whole, &blob(3)), Ok(()));
-    // Without the seal the blob counts, and a start seals it.
-    for from in 0..whole.operations - 1 {
-        let mut flash = sound.clone();
-        flash.power_on();
-        flash.supply_low = Some(from);
-        assert_eq!(update(&mut flash, &blob(3)), Err(NotWritten::SupplyLow));
-        let after = flash.clone();
-        assert_eq!(update(&mut flash, &blob(3)), Err(NotWritten::SupplyLow));
-        assert_eq!(flash, after, "{from}: it was written");
-        flash.supply_low = None;
-        assert_eq!(found(&mut flash), Some(crc(&blob(2))), "{from}");
-        assert_eq!(update(&mut flash, &blob(4)), Ok(()), "{from}");
-    }
-}
-
-#[test]
 fn a_word_that_does_not_hold_costs_no_blob_that_was_there() {
     let sound = holding(&[], &[1, 2]);
     for word in (0..SLOT_BYTES as usize / 4).filter(|word| word % 61 == 0 || *word < USED / 4) {

@@ -13,6 +13,7 @@ use crate::memory::{Memory, memory};
 use crate::peripherals::{IRQ_TIM2, Peripherals, WINDOWS, cause};
 use crate::unicorn::{Unicorn, register};
 use std::ffi::{OsStr, c_void};
+use tests::flash_model::Words;
 
 /// Return address of interrupts. No program is there.
 const RETURN: u32 = 0x1fff_0000;
@@ -24,13 +25,8 @@ const NMI: u32 = 2;
 
 /// What RAM holds after power-on.
 fn fill_with_noise(ram: &mut [u8]) {
-    let mut state = 0x2545_f491u32;
-    for byte in ram {
-        state ^= state << 13;
-        state ^= state >> 17;
-        state ^= state << 5;
-        *byte = state as u8;
-    }
+    let mut words = Words(1);
+    ram.fill_with(|| words.draw() as u8);
 }
 
 /// A controller with a program in flash.

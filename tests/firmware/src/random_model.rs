@@ -1,5 +1,7 @@
 //! The random number generator, from RM0090 section 24: ready at once, unless it has a fault.
 
+use tests::flash_model::Words;
+
 /// Bits of RNG_SR: a number is there; the clock or the seed is wrong, and was.
 const READY: u32 = 1;
 const SEED: u32 = 1 << 6 | 1 << 2;
@@ -10,7 +12,7 @@ pub struct RandomModel {
     pub on: bool,
     /// Whether the seed is wrong from now on.
     pub broken: bool,
-    state: u32,
+    words: Words,
     latched: bool,
 }
 
@@ -20,13 +22,13 @@ impl RandomModel {
         Self {
             on: false,
             broken: false,
-            state: 0x1234_5678,
+            words: Words(2),
             latched: false,
         }
     }
 
     /// A register.
-    pub const fn read(&mut self, offset: usize) -> u32 {
+    pub fn read(&mut self, offset: usize) -> u32 {
         match offset {
             4 if !self.on => 0,
             4 if self.broken || self.latched => {
@@ -34,12 +36,7 @@ impl RandomModel {
                 SEED
             }
             4 => READY,
-            8 if self.on => {
-                self.state ^= self.state << 13;
-                self.state ^= self.state >> 17;
-                self.state ^= self.state << 5;
-                self.state
-            }
+            8 if self.on => self.words.draw(),
             _ => 0,
         }
     }

@@ -29,70 +29,6 @@ pub(super) const BLOCK: usize = 16;
 /// these.
 const DOMAIN: [u8; BLOCK] = *b"hall-requests-v2";
 
-/// A tag that is computed piece by piece. The round keys, 352 bytes, are made anew for each.
-#[derive(Clone)]
-pub struct Authenticator {
-    key: Key,
-    chain: u128,
-}
-
-impl Authenticator {
-    /// Before the first byte of a blob.
-    pub fn new(key: &Key, nonce: &Nonce) -> Self {
-        let head = [u128::from_le_bytes(DOMAIN), in_one_block(*nonce)];
-        let (key, chain) = (*key, 0);
-        let mut new = Self { key, chain };
-        new.blocks(head.into_iter());
-        new
-    }
-
-    /// The next bytes of the blob: whole blocks, or the last bytes.
-    pub fn update(&mut self, piece: &[u8]) {
-        self.blocks(piece.chunks(BLOCK).map(|bytes| {
-            let mut block = [0; BLOCK];
-            for (to, from) in block.iter_mut().zip(bytes) {
-                *to = *from;
-            }
-            u128::from_le_bytes(block)
-        }));
-    }
-
-    /// Blocks before the last.
-    fn blocks(&mut self, blocks: impl Iterator<Item = u128>) {
-        let cipher = Aes128Enc::new(&self.key.into());
-        for block in blocks {
-            self.chain = encrypt(&cipher, self.chain ^ block);
-        }
-    }
-
-    /// The tag, once all bytes of the blob went in.
-    pub fn tag(&self, command: &Command, bytes: u32, crc: u32) -> [u8; TAG_BYTES] {
-        let Payload { short, long } = command.payload();
-        self.last(in_one_block([short, long, bytes, crc]))
-    }
-
-    /// The tag that ends with this block, which is whole.
-    fn last(&self, block: u128) -> [u8; TAG_BYTES] {
-        let cipher = Aes128Enc::new(&self.key.into());
-        // The subkey K1 is E(0) times x in GF(2^128), most significant bit first.
-        let zero = encrypt(&cipher, 0).swap_bytes();
-        let reduction = if zero >> 127 == 1 { 0x87 } else { 0 };
-        let k1 = (zero << 1 ^ reduction).swap_bytes();
-        encrypt(&cipher, self.chain ^ block ^ k1).to_le_bytes()
-    }
-
-    /// Whether `tag` is that of this command, in a time that does not depend on where they differ.
-    pub fn agrees(
-        &self,
-        command: &Command,
-        (bytes, crc): (u32, u32),
-        tag: &[u8; TAG_BYTES],
-    ) -> bool {
-        let own = self.tag(command, bytes, crc);
-        u128::from_le_bytes(own) ^ u128::from_le_bytes(*tag) == 0
-    }
-}
-
 /// A tag that came, and the number that it must be over.
 #[derive(Clone, Debug)]
 pub(super) struct Tag {
@@ -112,9 +48,9 @@ impl Tag {
         let Some(key) = key else {
             return true;
         };
-        let mut authenticator = Authenticator::new(key, &self.nonce);
-        authenticator.update(blob);
-        authenticator.agrees(command, (blob.len() as u32, crc), &self.bytes)
+        let own = tag(key, &self.nonce, command, blob, crc);
+        // In a time that does not depend on where they differ.
+        u128::from_le_bytes(own) ^ u128::from_le_bytes(self.bytes) == 0
     }
 }
 
@@ -128,20 +64,32 @@ const fn in_one_block([a, b, c, d]: [u32; 4]) -> u128 {
     (d as u128) << 96 | (c as u128) << 64 | (b as u128) << 32 | a as u128
 }
 
-impl core::fmt::Debug for Authenticator {
-    /// Nothing that follows from the key.
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("Authenticator")
-    }
+/// AES-CMAC over whole blocks, of which the last comes by itself.
+fn cmac(key: &Key, blocks: impl Iterator<Item = u128>, last: u128) -> [u8; TAG_BYTES] {
+    let cipher = Aes128Enc::new(&(*key).into());
+    let chain = blocks.fold(0, |chain, block| encrypt(&cipher, chain ^ block));
+    // The subkey K1 is E(0) times x in GF(2^128), most significant bit first.
+    let zero = encrypt(&cipher, 0).swap_bytes();
+    let reduction = if zero >> 127 == 1 { 0x87 } else { 0 };
+    let k1 = (zero << 1 ^ reduction).swap_bytes();
+    encrypt(&cipher, chain ^ last ^ k1).to_le_bytes()
 }
 
 /// The tag that a host sends before a command. `blob` and `crc` are those of what a commit stores:
 /// without a blob it goes back to the one of this CRC. For any other command both are empty.
 pub fn tag(key: &Key, nonce: &Nonce, command: &Command, blob: &[u8], crc: u32) -> [u8; TAG_BYTES] {
+    let head = [u128::from_le_bytes(DOMAIN), in_one_block(*nonce)];
+    let padded = blob.chunks(BLOCK).map(|bytes| {
+        let mut block = [0; BLOCK];
+        for (to, from) in block.iter_mut().zip(bytes) {
+            *to = *from;
+        }
+        u128::from_le_bytes(block)
+    });
+    let Payload { short, long } = command.payload();
     let bytes = u32::try_from(blob.len()).unwrap_or(u32::MAX);
-    let mut authenticator = Authenticator::new(key, nonce);
-    authenticator.update(blob);
-    authenticator.tag(command, bytes, crc)
+    let last = in_one_block([short, long, bytes, crc]);
+    cmac(key, head.into_iter().chain(padded), last)
 }
 
 #[cfg(test)]
@@ -181,15 +129,14 @@ mod tests {
     }
 
     #[test]
-    fn every_input_changes_the_tag_and_pieces_do_not() {
+    fn every_input_changes_the_tag_and_no_other_is_taken() {
         let (key, nonce, blob) = ([7; 16], [1, 2, 3, 4], [5; 100]);
         let want = tag(&key, &nonce, &commit(9), &blob, 6);
-        let mut pieces = Authenticator::new(&key, &nonce);
-        blob.chunks(32).for_each(|piece| pieces.update(piece));
-        assert!(pieces.agrees(&commit(9), (100, 6), &want));
+        let is_taken = |bytes| Tag { nonce, bytes }.is_of(Some(&key), &commit(9), &blob, 6);
+        assert!(is_taken(want));
         for bit in 0..128 {
             let wrong = u128::from_le_bytes(want) ^ 1 << bit;
-            assert!(!pieces.agrees(&commit(9), (100, 6), &wrong.to_le_bytes()));
+            assert!(!is_taken(wrong.to_le_bytes()));
         }
         assert_ne!(tag(&[8; 16], &nonce, &commit(9), &blob, 6), want);
         assert_ne!(tag(&key, &[1, 2, 3, 5], &commit(9), &blob, 6), want);

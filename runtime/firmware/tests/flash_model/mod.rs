@@ -99,8 +99,6 @@ pub struct FlashModel {
     pub operations: usize,
     cut: Option<(usize, Cut)>,
     off: bool,
-    /// From this operation on the supply is too low.
-    pub supply_low: Option<usize>,
     /// An operation that reports an error, and is done all the same.
     pub reports: Option<usize>,
     /// A word, of both sectors, that neither programming nor an erase changes, without an error.
@@ -121,7 +119,6 @@ impl FlashModel {
             operations: 0,
             cut: None,
             off: false,
-            supply_low: None,
             reports: None,
             stuck: None,
         }
@@ -186,9 +183,6 @@ impl FlashModel {
         }
         let operation = self.operations;
         self.operations += 1;
-        if self.supply_low.is_some_and(|from| operation >= from) {
-            return Err(FlashFault::SupplyLow);
-        }
         let cut = (self.cut)
             .filter(|&(at, _)| at == operation)
             .map(|(_, cut)| cut);

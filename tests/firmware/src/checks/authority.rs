@@ -3,7 +3,6 @@
 use super::asking::{ask, ask_alone};
 use super::commands::SERVO_OFF;
 use super::no_resets;
-
 use crate::adc_model::Part;
 use crate::bench::Bench;
 use hal_adapters::can::command::{Outcome as Ended, Request};

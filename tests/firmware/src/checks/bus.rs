@@ -12,37 +12,29 @@ use hal_adapters::can::status::flag;
 const PART: Part = Part::Ads131m08;
 const MS: u64 = 1_000_000;
 
-/// The bus goes away and comes back. The ticks go on; old poses are never sent late.
-fn goes_and_comes_back(bench: &Bench, bus: BusState) {
-    let mut machine = bench.running(PART, 100);
-    machine.set_bus(bus);
-    let silent = Seen::after(&mut machine, 500);
-    assert!(silent.axes.len() <= 6, "words on a dead bus");
-    let meanwhile = Stage::read(&machine);
-    meanwhile.has_the_pose(bench, 598);
-    assert!(meanwhile.count("frames_dropped") > 1000);
+/// The bus goes away, by a short circuit or without any other node, and comes back. The ticks go on; old poses are never sent late.
+pub fn goes_and_comes_back(bench: &Bench) {
+    for bus in [BusState::Off, BusState::Alone] {
+        let mut machine = bench.running(PART, 100);
+        machine.set_bus(bus);
+        let silent = Seen::after(&mut machine, 500);
+        assert!(silent.axes.len() <= 6, "words on a dead bus");
+        let meanwhile = Stage::read(&machine);
+        meanwhile.has_the_pose(bench, 598);
+        assert!(meanwhile.count("frames_dropped") > 1000);
 
-    machine.set_bus(BusState::Good);
-    let after = Seen::after(&mut machine, 500);
-    same_words(&after.axes, &bench.poses, 0, 498);
-    let first = after.axes.first().map_or(0, |axis| axis.tick);
-    assert!(first >= 598, "a pose of tick {first} was sent late");
-    let status = after.last_status().expect("no status frame");
-    let off = u8::from(bus == BusState::Off);
-    assert_eq!(status.bus_off, off);
-    assert_eq!(status.flags & flag::BUS_WAS_OFF, off * flag::BUS_WAS_OFF);
-    assert_eq!(status.missed_ticks, 0);
-    no_resets(&machine)
-}
-
-/// A short circuit.
-pub fn off_and_back(bench: &Bench) {
-    goes_and_comes_back(bench, BusState::Off);
-}
-
-/// Nobody acknowledges.
-pub fn no_other_node_for_a_second(bench: &Bench) {
-    goes_and_comes_back(bench, BusState::Alone);
+        machine.set_bus(BusState::Good);
+        let after = Seen::after(&mut machine, 500);
+        same_words(&after.axes, &bench.poses, 0, 498);
+        let first = after.axes.first().map_or(0, |axis| axis.tick);
+        assert!(first >= 598, "a pose of tick {first} was sent late");
+        let status = after.last_status().expect("no status frame");
+        let off = u8::from(bus == BusState::Off);
+        assert_eq!(status.bus_off, off);
+        assert_eq!(status.flags & flag::BUS_WAS_OFF, off * flag::BUS_WAS_OFF);
+        assert_eq!(status.missed_ticks, 0);
+        no_resets(&machine);
+    }
 }
 
 /// A controller that starts alone on the bus runs, and is heard once other nodes are there.
@@ -75,40 +67,32 @@ pub fn off_for_less_than_a_tick(bench: &Bench) {
 
 /// A frame that is on the wire when its tick is over is sent once or, if it fails then, not at all,
 /// and no newer one overtakes it.
-fn aborted_on_the_wire(bench: &Bench, fails: bool) {
-    let mut machine = bench.running(PART, 100);
-    let dropped_before = Stage::read(&machine).count("frames_dropped");
-    // Other nodes hold the bus from this tick's frames on until just before those of the next.
-    let free_ns = machine.chip.now_ns + 2 * MS + 18 * MS / 100;
-    machine.chip.can.occupy(free_ns);
-    machine.run_ns(free_ns + MS / 10 - machine.chip.now_ns);
-    if fails {
-        let now_ns = machine.chip.now_ns;
-        assert!(machine.chip.can.destroy(now_ns), "nothing was on the wire");
+pub fn aborted_on_the_wire(bench: &Bench) {
+    for fails in [false, true] {
+        let mut machine = bench.running(PART, 100);
+        let dropped_before = Stage::read(&machine).count("frames_dropped");
+        // Other nodes hold the bus from this tick's frames on until just before those of the next.
+        let free_ns = machine.chip.now_ns + 2 * MS + 18 * MS / 100;
+        machine.chip.can.occupy(free_ns);
+        machine.run_ns(free_ns + MS / 10 - machine.chip.now_ns);
+        if fails {
+            let now_ns = machine.chip.now_ns;
+            assert!(machine.chip.can.destroy(now_ns), "nothing was on the wire");
+        }
+        machine.run_ticks(10);
+        let sent = machine.chip.can.sent.clone();
+        let seen = Seen::since_last(&mut machine);
+        let ticks: Vec<_> = seen.x().map(|axis| axis.tick).collect();
+        let first = if fails { 100 } else { 99 };
+        let count = ticks.len() as u64;
+        assert!(ticks.iter().copied().eq(first..first + count), "{ticks:?}");
+        assert!(count >= 9, "only {count} poses");
+        let in_order = sent.is_sorted_by_key(|frame| frame.asked_ns);
+        assert!(in_order, "a frame overtook an older one");
+        same_words(&seen.axes, &bench.poses, 0, 0);
+        let dropped = Stage::read(&machine).count("frames_dropped") - dropped_before;
+        assert!(dropped >= 2, "{dropped} frames dropped");
     }
-    machine.run_ticks(10);
-    let sent = machine.chip.can.sent.clone();
-    let seen = Seen::since_last(&mut machine);
-    let ticks: Vec<_> = seen.x().map(|axis| axis.tick).collect();
-    let first = if fails { 100 } else { 99 };
-    let count = ticks.len() as u64;
-    assert!(ticks.iter().copied().eq(first..first + count), "{ticks:?}");
-    assert!(count >= 9, "only {count} poses");
-    let in_order = sent.is_sorted_by_key(|frame| frame.asked_ns);
-    assert!(in_order, "a frame overtook an older one");
-    same_words(&seen.axes, &bench.poses, 0, 0);
-    let dropped = Stage::read(&machine).count("frames_dropped") - dropped_before;
-    assert!(dropped >= 2, "{dropped} frames dropped");
-}
-
-/// It is sent.
-pub fn aborted_on_the_wire_and_completed(bench: &Bench) {
-    aborted_on_the_wire(bench, false);
-}
-
-/// It fails.
-pub fn aborted_on_the_wire_and_failed(bench: &Bench) {
-    aborted_on_the_wire(bench, true);
 }
 
 /// Of more frames than the store holds one is lost, and counted: once, however many they were.

@@ -2,7 +2,7 @@
 
 use super::asking::{answers, ask};
 use super::no_resets;
-use crate::adc_model::{Part, Row};
+use crate::adc_model::{AdcFault, Part, Row};
 use crate::bench::{Bench, Seen, command};
 use embedded_can::{Id, StandardId};
 use hal_adapters::can::command::{Outcome as Ended, Request};
@@ -99,7 +99,7 @@ pub fn rezero(bench: &Bench) {
 }
 
 /// Record mode: every tick's codes, after the pose, with parameters and without, until a command
-/// ends it.
+/// ends it; a tick without codes is a gap.
 pub fn record(bench: &Bench, part: Part) {
     let layout = match part {
         Part::Ads131m08 => Layout::Bits24,
@@ -109,35 +109,46 @@ pub fn record(bench: &Bench, part: Part) {
         let mut machine = bench.machine(part, [blob, &[]]);
         let seen = Seen::after(&mut machine, 50);
         assert_eq!(seen.recorded, 0);
-        let seen = ask(&mut machine, Request::Record { on: true }, 1, 800);
+        let mut seen = ask(&mut machine, Request::Record { on: true }, 1, 400);
         assert_eq!(seen.ended(1), [Some(Ended::Done)]);
         assert_eq!(seen.flags() & flag::RECORDING, flag::RECORDING);
+        // A tick without codes, and one that never comes.
+        machine.chip.adc.fault = AdcFault::Line(0);
+        for ticks in [1, 399] {
+            let more = Seen::after(&mut machine, ticks);
+            seen.frames.extend(more.frames);
+            seen.axes.extend(more.axes);
+            machine.chip.adc.fault = AdcFault::None;
+            machine.hold_ns = 3_000_000;
+        }
+        machine.hold_ns = 0;
         let mut receiver = SensorReceiver::new(layout, Timing::default());
         let mut ticks: Vec<RawFrame> = Vec::new();
         for (done_ns, frame) in &seen.frames {
             ticks.extend(receiver.take(frame, (done_ns / 1000) as u32).tick);
         }
-        assert_eq!(receiver.health().lost + receiver.health().incomplete, 0);
-        assert!(ticks.len() >= 797, "{} ticks", ticks.len());
+        let health = receiver.health();
+        let lost = 2 * layout.messages().len() as u32;
+        assert_eq!((health.lost, health.incomplete), (lost, 0));
+        assert!(ticks.len() >= 795, "{} ticks", ticks.len());
         let warm = |tick: &&RawFrame| !tick.temperature_mc.contains(&MISSING_CODE);
         let warm = ticks.iter().filter(warm).count();
         // Record mode begins up to 100 ms before the next frame of temperatures.
-        assert!(warm >= 797 - 52, "{warm} ticks with temperatures");
+        assert!(warm >= 795 - 52, "{warm} ticks with temperatures");
         let codes = |tick: &RawFrame| -> Row {
             let ([a, b, c], [d, e, f]) = (tick.hall, tick.capacitive);
             [a, b, c, d, e, f]
         };
         // Its codes show which tick is the first of the record.
-        let first = ticks.first().map(codes).expect("no ticks");
-        let at = (50..90).find(|k| bench.rows[*k] == first);
-        let rows = &bench.rows[at.expect("other codes than the converter's")..];
-        let mut differ = ticks
-            .iter()
-            .zip(rows)
-            .filter(|(tick, row)| codes(tick) != **row);
-        assert_eq!(differ.next(), None);
+        let first = ticks.first().expect("ticks");
+        let at = (50..90).find(|k| bench.rows[*k] == codes(first));
+        let at = at.expect("the converter's codes");
+        for tick in &ticks {
+            let since = (tick.sequence - first.sequence) as usize;
+            assert_eq!(codes(tick), bench.rows[at + since], "tick {since}");
+        }
         let words = seen.axes.iter().filter(|axis| axis.axis < 3).count();
-        let planar = if blob.is_empty() { 0 } else { 3 * 799 };
+        let planar = if blob.is_empty() { 0 } else { 3 * 797 };
         assert!(words >= planar, "{words} words of poses");
         let seen = ask(&mut machine, Request::Record { on: false }, 2, 20);
         assert_eq!(seen.ended(2), [Some(Ended::Done)]);

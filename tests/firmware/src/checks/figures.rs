@@ -1,7 +1,6 @@
 //! What the program takes: flash, RAM, instructions.
 
 use super::sensors::ticks_to_settle;
-
 use crate::adc_model::Part;
 use crate::bench::{Bench, Seen};
 use crate::flash_model::{BYTES, FIRST};

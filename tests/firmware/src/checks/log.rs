@@ -22,6 +22,12 @@ pub fn whole_log(bench: &Bench, part: Part, ticks: u64) {
         seen = Seen::after(&mut machine, (ticks - from).min(STEP as u64));
         comparison.add(&seen.axes, &bench.poses, settling);
         assert_eq!(seen.damaged, 0);
+        // Every sixteenth tick has a state.
+        let states = || seen.statuses.iter().map(|(tick, _)| tick);
+        assert!(states().all(|tick| tick % 16 == 0));
+        assert!(
+            (STEP / 16..STEP / 16 + 2).contains(&states().count()) || ticks - from < STEP as u64
+        );
     }
     println!("RESULT firmware_{name}_ticks={ticks}");
     println!("RESULT firmware_{name}_words={}", comparison.words);

@@ -36,12 +36,14 @@ fn none_usable(bench: &Bench, [slot_0, slot_1]: [&[u8]; 2], state: NodeState, re
     no_resets(&machine)
 }
 
-/// Unusable parameters: both slots erased, a torn blob in either, the blob of another stage.
+/// Unusable parameters: both slots erased, a torn blob in either, no blob, the blob of another stage.
 pub fn unusable(bench: &Bench) {
     let torn = torn(&bench.blob);
     let bad = NodeState::BadParameters;
     none_usable(bench, [&[], &[]], NodeState::NoParameters, 2);
     none_usable(bench, [&torn, &[]], bad, 7);
+    let foreign = [b"X", &bench.blob[1..]].concat();
+    none_usable(bench, [&foreign, &[]], bad, 3);
     none_usable(bench, [&bench.other, &[]], bad, 10);
     none_usable(bench, [&[], &torn], bad, 0x17)
 }

@@ -3,7 +3,6 @@
 //! possible.
 
 use super::update::{large, plan, running, update, updated};
-
 use crate::adc_model::Part;
 use crate::bench::Bench;
 use crate::flash_model::PowerCut;

@@ -5,6 +5,7 @@ mod cases;
 
 pub use cases::{Case, cases, ticks_to_settle};
 
+use super::log::Stage;
 use super::{no_resets, same_words, wrong_valid};
 use crate::adc_model::{AdcFault, Part};
 use crate::bench::{Axis, Bench, Seen};
@@ -106,6 +107,8 @@ pub fn dead_from_the_start(bench: &Bench, part: Part) {
         run_to(&mut machine, 200);
         let seen = Seen::since_last(&mut machine);
         assert_eq!(state(&seen), Some(NodeState::NoFrames));
+        let starts = u64::from(Stage::read(&machine).count("adc_starts"));
+        assert_eq!(starts, 1 + 199 / RESTART);
         machine.chip.adc.fault = AdcFault::None;
         if late_supply {
             let now_ns = machine.chip.now_ns;

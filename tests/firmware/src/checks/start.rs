@@ -40,16 +40,6 @@ fn reported_fault(seen: &Seen) -> Option<[u32; 3]> {
     Some([seen.page(6)?, seen.page(7)?, seen.page(8)?])
 }
 
-/// A tick, counted from power-on in place of the first tick, which must come within so many.
-fn since_power_on(machine: &Machine, tick: Option<u64>, first_max: u64) -> Option<u64> {
-    let first = machine.chip.first_tick_ns.unwrap_or(u64::MAX) / 2_000_000;
-    assert!(
-        first <= first_max,
-        "the first tick came {first} periods after power-on"
-    );
-    tick.map(|tick| first + tick)
-}
-
 fn flashes(machine: &mut Machine) -> u32 {
     let (mut flashes, mut lit) = (0, machine.chip.led);
     for _ in 0..500 {
@@ -82,20 +72,64 @@ pub fn supply_that_comes_late(bench: &Bench) {
     row(bench, fault, 0, Some(0), &seen.axes)
 }
 
-/// No crystal: the internal oscillator from the start, shown by flag, check and light.
+/// Without a crystal the internal oscillator serves, shown by flag, check and light: none from the
+/// start; one that stops while the program runs, which starts anew; one that the PLL does not lock to,
+/// where the watchdog resets once.
 pub fn no_crystal(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
-    machine.chip.clocks.crystal = false;
-    assert_eq!(flashes(&mut machine), 4);
-    let seen = Seen::since_last(&mut machine);
-    let checks = seen.page(11);
-    assert_eq!(checks, Some(board_check::INTERNAL_OSCILLATOR));
-    assert_eq!(reported_fault(&seen), Some([0; 3]));
-    assert!(valid(&seen.axes) > 1800, "too few poses");
-    no_resets(&machine);
-    let reported = seen.first_state(flag::INTERNAL_OSCILLATOR);
-    let reported = since_power_on(&machine, reported, 10);
-    row(bench, "crystal absent", 0, reported, &seen.axes)
+    type Spoil = fn(&mut Machine);
+    let cases: [(&str, u64, Spoil, u32, (u32, u32)); 3] = [
+        (
+            "crystal absent",
+            0,
+            |m| m.chip.clocks.crystal = false,
+            0,
+            (0, 0),
+        ),
+        (
+            "crystal lost while running",
+            200_700_000,
+            |m| m.chip.stop_crystal(),
+            4,
+            (1, 0),
+        ),
+        (
+            "PLL does not lock to the crystal",
+            0,
+            |m| m.chip.clocks.pll = Pll::NotToCrystal,
+            0x0105,
+            (0, 1),
+        ),
+    ];
+    for (fault, from_ns, spoil, kind, resets) in cases {
+        let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+        if from_ns > 0 {
+            machine.run_ns(from_ns);
+            let before = Seen::since_last(&mut machine);
+            assert_eq!(before.first_state(flag::INTERNAL_OSCILLATOR), None);
+        }
+        spoil(&mut machine);
+        let at = tick_now(&machine);
+        let flashes = flashes(&mut machine);
+        assert!(flashes == 4 || resets != (0, 0), "{flashes} flashes");
+        let seen = Seen::since_last(&mut machine);
+        assert_eq!(seen.page(11), Some(board_check::INTERNAL_OSCILLATOR));
+        assert_eq!(reported_fault(&seen), Some([kind, 0, 0]));
+        assert_eq!((machine.panics, machine.watchdog_resets), resets);
+        assert_eq!(seen.page(9), Some(resets.0 + resets.1));
+        assert!(valid(&seen.axes) > 1800, "too few poses");
+        let faulted = flag::WATCHDOG_RESET * u8::from(resets != (0, 0));
+        let reported = seen.first_state(flag::INTERNAL_OSCILLATOR | faulted);
+        // At power-on the start-up counts, too.
+        let first_ns = machine.chip.first_tick_ns.expect("a tick");
+        let first = if from_ns == 0 {
+            first_ns / 2_000_000
+        } else {
+            0
+        };
+        assert!(first <= 10 + 5 * u64::from(resets.1), "{first} periods");
+        let reported = reported.map(|tick| first + tick);
+        row(bench, fault, at, reported, &seen.axes);
+    }
 }
 
 /// On the internal oscillator a bus-off is for good: a clock that is too inexact disturbs the bus
@@ -111,42 +145,6 @@ pub fn silent_after_bus_off(bench: &Bench) {
     Seen::since_last(&mut machine);
     assert_eq!(Seen::after(&mut machine, 500).axes.len(), 0);
     Stage::read(&machine).has_the_pose(bench, 0);
-}
-
-/// The crystal stops while the program runs: it starts anew by the internal oscillator.
-pub fn crystal_lost(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
-    machine.run_ns(200_700_000);
-    let before = Seen::since_last(&mut machine);
-    assert_eq!(before.first_state(flag::INTERNAL_OSCILLATOR), None);
-    let at = tick_now(&machine);
-    machine.chip.stop_crystal();
-    let seen = Seen::after(&mut machine, 500);
-    assert_eq!(reported_fault(&seen), Some([4, 0, 0]));
-    assert_eq!(seen.page(9), Some(1));
-    assert_eq!((machine.panics, machine.watchdog_resets), (1, 0));
-    assert!(valid(&seen.axes) > 1800, "too few poses");
-    let reported = seen.first_state(flag::INTERNAL_OSCILLATOR | flag::WATCHDOG_RESET);
-    let fault = "crystal lost while running";
-    row(bench, fault, at, reported, &seen.axes)
-}
-
-/// The PLL does not lock to the crystal: the watchdog resets once, and the internal oscillator
-/// serves.
-pub fn pll_without_lock(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
-    machine.chip.clocks.pll = Pll::NotToCrystal;
-    let seen = Seen::after(&mut machine, 500);
-    assert_eq!(reported_fault(&seen), Some([0x0105, 0, 0]));
-    let checks = seen.page(11);
-    assert_eq!(checks, Some(board_check::INTERNAL_OSCILLATOR));
-    assert_eq!((machine.panics, machine.watchdog_resets), (0, 1));
-    assert!(valid(&seen.axes) > 1800, "too few poses");
-    let reported = seen.first_state(flag::INTERNAL_OSCILLATOR);
-    // The watchdog's 20 ms, and the start-up twice.
-    let reported = since_power_on(&machine, reported, 15);
-    let fault = "PLL does not lock to the crystal";
-    row(bench, fault, 0, reported, &seen.axes)
 }
 
 /// The PLL locks to nothing: the chip is broken, starts over and over, and sends nothing.

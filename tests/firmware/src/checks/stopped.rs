@@ -4,7 +4,6 @@ use super::asking::answers;
 use super::commands::SERVO_OFF;
 use super::start::{NOWHERE, TICK};
 use super::update::{PART, identity, plan, running, updated};
-
 use crate::bench::{Bench, Seen};
 use crate::machine::Machine;
 use crate::unicorn::register;

@@ -4,7 +4,6 @@
 use super::no_resets;
 use super::parameters::of_stage_7;
 use super::start::tick_now;
-
 use crate::adc_model::Part;
 use crate::adc_model::thermometers::Wiring;
 use crate::bench::{Bench, Seen, Words};

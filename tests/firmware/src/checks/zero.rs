@@ -3,7 +3,6 @@
 use super::asking::{answers, ask};
 use super::commands::{REZERO, SERVO_OFF, at_rest};
 use super::start::tick_now;
-
 use crate::adc_model::Part;
 use crate::bench::{Bench, Seen};
 use crate::machine::Machine;

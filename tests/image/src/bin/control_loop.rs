@@ -52,24 +52,6 @@ fn load(number: usize) -> Result<ParameterSet, BlobError> {
     Ok(set)
 }
 
-/// Why a slot was refused, in a word: formatting the whole reason would take more flash than
-/// the runtime does.
-const fn reason(error: &BlobError) -> &'static str {
-    match error {
-        BlobError::Truncated { .. } => "Truncated",
-        BlobError::Erased => "Erased",
-        BlobError::BadMagic { .. } => "BadMagic",
-        BlobError::UnknownVersion { .. } => "UnknownVersion",
-        BlobError::BadHeader { .. } => "BadHeader",
-        BlobError::TrailingBytes { .. } => "TrailingBytes",
-        BlobError::BadCrc { .. } => "BadCrc",
-        BlobError::BadPayload => "BadPayload",
-        BlobError::Parameters(_) => "Parameters",
-        BlobError::OtherStage => "OtherStage",
-        BlobError::BufferTooSmall { .. } => "BufferTooSmall",
-    }
-}
-
 /// Stands for the converters. Period 4 has no code of probe B; period 8 no frame at all.
 fn converters(period: u32) -> Option<RawFrame> {
     let step = 25 * period as i32;
@@ -115,7 +97,7 @@ fn main() -> ! {
                 break;
             }
             Err(error) => {
-                let _ = writeln!(console, "slot {number}: refused: {}", reason(&error));
+                let _ = writeln!(console, "slot {number}: refused: {}", error.number());
             }
         }
     }

@@ -61,6 +61,14 @@ pub const fn ticks_to_settle(part: Part) -> u64 {
     }
 }
 
+/// The part that says so is started in the next tick; of the other one it shows as a wrong input.
+const fn back_after_a_lost_setting(part: Part) -> u64 {
+    match part {
+        Part::Ads131m08 => 1,
+        Part::Ads8688 => 1 + RESTART + ticks_to_settle(part),
+    }
+}
+
 impl Case {
     fn of(name: &str, fault: AdcFault, reported: &[(NodeState, u8)], part: Part) -> Self {
         Self {
@@ -85,6 +93,7 @@ impl Case {
         Self {
             event: Event::Flip { register, bits },
             is_long: false,
+            back_within: back_after_a_lost_setting(part),
             ..Self::of(name, AdcFault::None, &reported, part)
         }
     }
@@ -159,6 +168,7 @@ pub fn cases(part: Part) -> Vec<Case> {
     all.push(Case {
         event: Event::PowerLoss,
         is_long: false,
+        back_within: back_after_a_lost_setting(part),
         reported: vec![fault(5), fault(8), NOT_READY],
         ..Case::of("a short loss of power", AdcFault::None, &[], part)
     });
