@@ -105,7 +105,10 @@ fn a_log_that_cannot_identify_the_model_ends_with_status_4_and_no_blob() {
     for (name, parts) in [
         (
             "dead",
-            ["Hall probe C does not follow the motion", "its cable"],
+            [
+                "hall_c stands still in 2850 rows, 100.0 % of the log",
+                "cable",
+            ],
         ),
         ("height", ["Z does not move", "record"]),
         ("no_tilt", ["Rx does not move", "record"]),
