@@ -146,3 +146,26 @@ fn first_line(text: &[u8], is_whole: bool) -> Option<(usize, usize)> {
         _ => Some((end, end + 1)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn lines_have_their_numbers_across_pieces_whatever_ends_them() {
+        for end in ["\n", "\r\n", "\r"] {
+            let text: String = (1..=90_000).map(|k| format!("{k}{end}")).collect();
+            let reader = TextReader::of_reader(text.as_bytes(), Path::new("x")).expect("text");
+            let mut lines = Lines::new(reader);
+            let opening = lines.opening().expect("text").to_vec();
+            assert!(text.as_bytes().starts_with(&opening));
+            for k in 1..=90_000 {
+                let line = lines.next_line().expect("text").map(<[u8]>::to_vec);
+                assert_eq!(line, Some(k.to_string().into_bytes()));
+                assert_eq!(lines.line, k);
+            }
+            assert!(matches!(lines.next_line(), Ok(None)) && !lines.is_open());
+        }
+    }
+}
