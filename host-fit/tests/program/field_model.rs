@@ -40,7 +40,7 @@ fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
     let json = bench.json("p.json");
     assert_eq!(json["model"], "field");
     let reason = json["model_reason"].as_str().expect("a sentence");
-    says(&reason, "times the noise floor");
+    says(reason, "times the noise floor");
     let lag = &json["reference_lag"];
     let error = number(&lag["standard_error_us"]);
     assert!(number(&lag["value_us"]).abs() < 5.0 * error);
