@@ -104,7 +104,7 @@ impl Calibration {
     /// [`ParameterError::CapacitiveProbesInLine`] when the three gaps define no plane, or one that
     /// the largest codes turn by more than a whole turn.
     pub fn constants(&self) -> Result<DecoderConstants<f64>, ParameterError> {
-        let (inverse, vertical) = self.rows()?;
+        let [inverse, vertical] = self.rows()?;
         Ok(DecoderConstants {
             vertical_per_code: vertical.map(|row| row.map(|x| x * self.capacitive_m_per_code)),
             planar_per_code: inverse.map(|row| row.map(|x| x * self.hall_m_per_code)),
@@ -118,13 +118,13 @@ impl Calibration {
     }
 
     /// PM^-1, and the rows that make the vertical pose of gaps.
-    fn rows(&self) -> Result<([[f64; 3]; 3], [[f64; 3]; 3]), ParameterError> {
+    fn rows(&self) -> Result<[[[f64; 3]; 3]; 2], ParameterError> {
         let plane = self.geometry.plane_rows();
         let inverse = inverse_rows(&plane).ok_or(ParameterError::SingularPlane)?;
         let vertical = vertical_rows(&self.capacitive_probes_m)
             .filter(|rows| self.largest_tilt_rad(rows) <= TAU)
             .ok_or(ParameterError::CapacitiveProbesInLine)?;
-        Ok((inverse, vertical))
+        Ok([inverse, vertical])
     }
 
     /// The largest Rx or Ry that codes within the window stand for, rad.
@@ -141,7 +141,7 @@ impl Calibration {
     /// # Errors
     /// As [`Calibration::constants`], and every error of [`ParameterSet::check`].
     pub fn prepare(&self, origin: &Origin) -> Result<ParameterSet, ParameterError> {
-        let (inverse, vertical) = self.rows()?;
+        let [inverse, vertical] = self.rows()?;
         let mut set = ParameterSet {
             model: self.model,
             serial: origin.serial.clone(),

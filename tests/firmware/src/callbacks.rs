@@ -32,7 +32,7 @@ impl Context {
 
 /// The context that `Machine` has given.
 fn context<'c>(user: *mut c_void) -> &'c Context {
-    // SAFETY: `user` is a `Context` that `Machine` keeps in a box.
+    // SAFETY: `user` is a `Context` that `Machine` has leaked.
     unsafe { &*user.cast::<Context>() }
 }
 

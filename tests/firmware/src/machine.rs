@@ -57,8 +57,6 @@ pub struct Machine {
     pub watchdog_resets: u32,
     /// What each interrupt of the timer took, where instructions are counted.
     pub costs: Vec<Cost>,
-    /// What the emulator's callbacks are given.
-    contexts: Vec<Box<Context>>,
 }
 
 impl Machine {
@@ -91,10 +89,9 @@ impl Machine {
             core.map_memory(RAM.into(), chip.ram.0.as_mut_ptr(), RAM_BYTES);
             core.map_memory(RETURN.into(), returns.0.as_mut_ptr(), 4096);
         }
-        let mut contexts = Vec::new();
         for window in WINDOWS {
-            let context = context(&mut contexts, &core, &mut chip, window.0);
-            // SAFETY: the context is a box that is kept, too.
+            let context = context(&core, &mut chip, window.0);
+            // SAFETY: as above; the context is leaked.
             unsafe { core.map_io(window, read, write, context) };
         }
         let mut vectors = [0; 48];
@@ -118,13 +115,12 @@ impl Machine {
             lazy_left: false,
             watchdog_resets: 0,
             costs: Vec::new(),
-            contexts,
         }
     }
 
     /// Counts instructions from now on. Call it before the first run.
     pub fn count_instructions(&mut self) {
-        let context = context(&mut self.contexts, &self.core, &mut self.chip, 0);
+        let context = context(&self.core, &mut self.chip, 0);
         // SAFETY: as in `new`.
         unsafe { self.core.hook_code(count, context, (1, 0)) };
     }
@@ -132,7 +128,7 @@ impl Machine {
     /// Changes the registers that `chip.inject` says whenever the core comes to `address`. Call it
     /// before the first run.
     pub fn hook_injection(&mut self, address: u32) {
-        let context = context(&mut self.contexts, &self.core, &mut self.chip, 0);
+        let context = context(&self.core, &mut self.chip, 0);
         let at = u64::from(address);
         // SAFETY: as in `new`.
         unsafe { self.core.hook_code(inject, context, (at, at)) };
@@ -283,21 +279,14 @@ fn waits_at(image: &Image) -> u32 {
     start + 2 * found[0].0
 }
 
-/// A box that a callback is given, and that is kept.
-fn context(
-    kept: &mut Vec<Box<Context>>,
-    core: &Unicorn,
-    chip: &mut Peripherals,
-    start: u64,
-) -> *mut c_void {
+/// What a callback is given. It is leaked, so that it lives as long as the emulator.
+fn context(core: &Unicorn, chip: &mut Peripherals, start: u64) -> *mut c_void {
     let (stop, write) = (core.stopper(), core.writer());
-    let mut context = Box::new(Context {
+    let context = Context {
         chip,
         start,
         stop,
         write,
-    });
-    let user = (&raw mut *context).cast();
-    kept.push(context);
-    user
+    };
+    (&raw mut *Box::leak(Box::new(context))).cast()
 }

@@ -46,7 +46,8 @@ macro_rules! named {
 }
 
 /// The checks of each image.
-const OF_PARTS: &[(&str, fn(&Bench, Part))] = &named! {
+type OfPart = fn(&Bench, Part);
+const OF_PARTS: &[(&str, OfPart)] = &named! {
     figures: flash_and_ram, interrupt_to_mailbox;
     sensors: dead_from_the_start, transfers_that_never_end;
     temperature: follow_the_stage;
@@ -54,7 +55,8 @@ const OF_PARTS: &[(&str, fn(&Bench, Part))] = &named! {
 };
 
 /// The checks of one image.
-const OF_ONE: &[(&str, fn(&Bench))] = &named! {
+type OfOne = fn(&Bench);
+const OF_ONE: &[(&str, OfOne)] = &named! {
     motion: a_pose_is_of_its_instant;
     sensors: a_register_changes_at_any_time, every_variant;
     log: a_debugger_reads_the_last_pose;

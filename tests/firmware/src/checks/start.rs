@@ -76,8 +76,8 @@ pub fn supply_that_comes_late(bench: &Bench) {
 /// start; one that stops while the program runs, which starts anew; one that the PLL does not lock to,
 /// where the watchdog resets once.
 pub fn no_crystal(bench: &Bench) {
-    type Spoil = fn(&mut Machine);
-    let cases: [(&str, u64, Spoil, u32, (u32, u32)); 3] = [
+    type Case = (&'static str, u64, fn(&mut Machine), u32, (u32, u32));
+    let cases: [Case; 3] = [
         (
             "crystal absent",
             0,
