@@ -112,6 +112,20 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
                 change(matrix)
             });
         }
+        for one in 0..3 {
+            let pair = [(one + 1) % 3, (one + 2) % 3];
+            let [first, second] = [pair[0].min(pair[1]), pair[0].max(pair[1])];
+            let what = format!(
+                "{kind} {} and {} are multiplied by",
+                name(first),
+                name(second)
+            );
+            scales(&mut out, &channels(&[first, second]), &what, |factor| {
+                let mut diagonal = Vector3::repeat(factor);
+                diagonal[one] = 1.0;
+                change(Matrix3::from_diagonal(&diagonal))
+            });
+        }
         scales(&mut out, all, &format!("{are} multiplied by"), |factor| {
             change(Matrix3::from_diagonal_element(factor))
         });

@@ -204,7 +204,7 @@ impl Diagnosis {
             let faults = messages.collect();
             (self.predicted, self.repair) = (Some(expected), Some(Repair { faults, ..repair }));
             for found in &mut of.findings {
-                found.message += ". The calibration has this taken off, and is that of the stage at the end of the log";
+                found.message += ". The calibration has this taken off, and is that of the stage at the end of the log: zero the stage before it is used";
                 found.severity = found.severity.min(Severity::Warn);
             }
         }

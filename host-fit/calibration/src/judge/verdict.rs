@@ -1,6 +1,6 @@
 //! What a calibration is good for at work.
 
-use crate::finding::{Finding, Severity};
+use crate::finding::{Code, Finding, Severity};
 use crate::input::stage::TemperatureTable;
 use crate::solve::field::carry::Service;
 use crate::solve::field::parameters::FieldParameters;
@@ -38,10 +38,15 @@ impl Verdict {
     /// could show it.
     pub fn new(for_service: bool, predicted: Option<&Predicted>, findings: &[Finding]) -> Self {
         let is_refused = findings.iter().any(|f| f.severity == Severity::Refuse);
+        // No prediction holds what contradicts the drawing or the model.
+        let is_doubtful = findings.iter().any(|f| {
+            let of_model = matches!(f.code, Code::TermsAtLimit | Code::ModelLacks);
+            of_model && f.severity > Severity::Note
+        });
         let ratio = predicted.map_or(LIMITED_MAX, Predicted::worst_ratio);
         match (is_refused, for_service) {
             (true, _) => Self::Refused,
-            (false, true) if ratio <= GOOD_MAX => Self::Good,
+            (false, true) if ratio <= GOOD_MAX && !is_doubtful => Self::Good,
             (false, true) if ratio > LIMITED_MAX => Self::Refused,
             // What other models lack is no fault of the log.
             _ => Self::Limited,

@@ -14,6 +14,10 @@ use std::ops::Range;
 /// alone does that once in 10^9 rows.
 const SPIKE: f64 = 6.0;
 
+/// Pieces of a movement, of so many rows at least, each with its own noise.
+const PIECES: usize = 8;
+const PIECE_MIN: usize = 500;
+
 /// A log.
 #[derive(Debug)]
 pub(super) struct Log {
@@ -35,13 +39,17 @@ impl Log {
         let residuals = rows.residuals_mm(probes, 0.0, &vec![[0.0; 3]; rows.movements.len()]);
         let least_mm = stage.hall.m_per_count * 1e3 / 12f64.sqrt();
         // From second differences within movements, by their median.
-        let white_mm = [0, 1, 2].map(|k| {
-            let windows = rows
-                .movement_rows()
-                .flat_map(|rows| residuals[rows].windows(3));
-            let differences = windows.map(|w| (w[0][k] - 2.0 * w[1][k]) + w[2][k]);
-            (robust_deviation(differences) / 6f64.sqrt()).max(least_mm)
-        });
+        let white = |windows: &mut dyn Iterator<Item = &[[f64; 3]]>| {
+            let windows: Vec<_> = windows.collect();
+            [0, 1, 2].map(|k| {
+                let differences = windows.iter().map(|w| (w[0][k] - 2.0 * w[1][k]) + w[2][k]);
+                (robust_deviation(differences) / 6f64.sqrt()).max(least_mm)
+            })
+        };
+        let all = rows
+            .movement_rows()
+            .flat_map(|rows| residuals[rows].windows(3));
+        let white_mm = white(&mut all.into_iter());
         for block in rows.blocks.clone() {
             for (k, white_mm) in white_mm.into_iter().enumerate() {
                 let mut values: Vec<f64> = residuals[block.clone()].iter().map(|r| r[k]).collect();
@@ -51,6 +59,19 @@ impl Log {
                         rows.rows[row].weight = 0.0;
                     }
                 }
+            }
+        }
+        // Where a probe is noisier than usual, rows count less.
+        for movement in rows.movement_rows().collect::<Vec<_>>() {
+            let length = movement.len().div_ceil(PIECES).max(PIECE_MIN);
+            for start in movement.clone().step_by(length) {
+                let piece = start..(start + length).min(movement.end);
+                let own_mm = white(&mut residuals[piece.clone()].windows(3));
+                let part = [0, 1, 2].map(|k| white_mm[k] / own_mm[k].max(white_mm[k]));
+                let weight = part.into_iter().fold(1.0, f64::min).powi(2);
+                rows.rows[piece]
+                    .iter_mut()
+                    .for_each(|row| row.weight *= weight);
             }
         }
         let (rows, first) = rows.means(MEANS_MAX);

@@ -39,6 +39,8 @@ use std::borrow::Cow;
 
 /// Faults of one log at most.
 const FAULTS_MAX: usize = 6;
+/// Of one channel at most so many are taken off: it may change and come back.
+const COURSES_MAX: usize = 2;
 /// Errors in service over the noise floor below which a finding is a note.
 const NOTE_MAX: f64 = 1.05;
 /// Poses spread evenly over this part of a range have half of it as rms, as sines have that start anywhere.
@@ -356,7 +358,16 @@ impl Job<'_> {
             fault.alike.is_empty() && (family.1 != "ifm" || family.0 != Kind::Gain)
         };
         let mut of_faults = faults.iter().zip(costs);
-        let are_clear = of_faults.all(|(fault, cost)| !counts(cost) || is_clear(fault));
+        let of_one = |channel| {
+            faults
+                .iter()
+                .filter(|other| other.family().1 == channel)
+                .count()
+        };
+        // Steps and ramps that together follow a course are not that course.
+        let is_known = |fault: &Fault| of_one(fault.family().1) <= COURSES_MAX;
+        let are_clear = of_faults.all(|(fault, cost)| !counts(cost) || is_clear(fault))
+            && faults.iter().all(is_known);
         if self.fitted.model != ModelKind::Field || !costs.iter().any(counts) || !are_clear {
             return None;
         }
