@@ -56,7 +56,7 @@ fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
         "the Hall signals are multiplied by 2.0",
         "the reference is multiplied by 0.50",
     ];
-    let mistakes: [Mistake; 10] = [
+    let mistakes: [Mistake; 11] = [
         (
             Code::ChannelsSwapped,
             &["Hall A and C are exchanged"],
@@ -96,6 +96,11 @@ fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
             |s| {
                 s.beams_nm = s.beams_nm.map(|nm| nm / 1000);
             },
+        ),
+        (
+            Code::ScaleWrong,
+            &["beam Y1 and Y2 are multiplied by 0.50"],
+            |s| (1..3).for_each(|beam| s.beams_nm[beam] *= 2),
         ),
         (Code::ScaleWrong, both, |s| {
             s.beams_nm = s.beams_nm.map(|nm| 2 * nm)

@@ -16,6 +16,7 @@ use crate::judge::{Decoded, Zeros};
 use crate::problem::model::Model;
 use crate::simulate::assembly::Assembly;
 use crate::simulate::protocol::Protocol;
+use crate::simulate::random::{Purpose, Stream};
 use crate::simulate::recording::{Recording, Sample, record};
 use crate::simulate::sensors::SensorErrors;
 use crate::solve::field::parameters::FieldParameters;
@@ -289,6 +290,36 @@ fn hum_is_not_taken_for_another_fault() {
             "{seed} {hertz}"
         );
     }
+}
+
+/// Steps can follow it, but between them the gain is not theirs.
+#[test]
+fn a_gain_that_rises_and_falls_smoothly_is_named_and_not_taken_off() {
+    let mut rises = recording(3);
+    for samples in &mut rises.movements {
+        let count = samples.len() as f64;
+        for (row, sample) in samples.iter_mut().enumerate() {
+            let phase = std::f64::consts::TAU * row as f64 / count;
+            sample.hall[1] = gain(sample.hall[1], 1.0 - libm::cos(phase));
+        }
+    }
+    let diagnosis = diagnosed(rises, |_, _| {});
+    let first = &diagnosis.findings[0];
+    assert_eq!(
+        (first.code, first.channel.as_deref()),
+        (Code::GainDrift, Some("hall_b"))
+    );
+    assert_eq!(diagnosis.verdict, Some(Verdict::Refused));
+}
+
+#[test]
+fn a_probe_that_becomes_noisy_is_not_taken_for_one_whose_gain_changes() {
+    let random = std::cell::RefCell::new(Stream::new(7, Purpose::Sensors, 0));
+    let codes = 3e-6 / stage().hall.m_per_count;
+    let found = found(recording(3), |sample, _| {
+        sample.hall[1] += random.borrow_mut().normal(codes).round() as i32;
+    });
+    assert!(found.iter().all(|f| f.cost.is_none()), "{found:#?}");
 }
 
 #[test]
