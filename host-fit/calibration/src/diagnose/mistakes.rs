@@ -98,37 +98,20 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
             out.push(mistake(swapped, channels(&moved), what, change(matrix)));
         }
         for bits in 1..8u32 {
-            let turned: Vec<usize> = (0..3).filter(|k| bits >> k & 1 == 1).collect();
-            let what = format!("the sign of {kind} {} is turned", names(&turned));
-            let sign = |k: usize| if turned.contains(&k) { -1.0 } else { 1.0 };
-            let matrix = Matrix3::from_diagonal(&[0, 1, 2].map(sign).into());
-            out.push(mistake(inverted, channels(&turned), what, change(matrix)));
+            let some: Vec<usize> = (0..3).filter(|k| bits >> k & 1 == 1).collect();
+            let times = |factor: f64| {
+                let of = |k: usize| if some.contains(&k) { factor } else { 1.0 };
+                change(Matrix3::from_diagonal(&[0, 1, 2].map(of).into()))
+            };
+            let (of, channels) = (names(&some), channels(&some));
+            let what = format!("the sign of {kind} {of} is turned");
+            out.push(mistake(inverted, channels.clone(), what, times(-1.0)));
+            let (channel, what) = match some.len() {
+                3 => (all, format!("{are} multiplied by")),
+                _ => (&*channels, format!("{kind} {of} is multiplied by")),
+            };
+            scales(&mut out, channel, &what, times);
         }
-        for (k, channel) in own.iter().enumerate() {
-            let what = format!("{kind} {} is multiplied by", name(&k));
-            scales(&mut out, channel, &what, |factor| {
-                let mut matrix = Matrix3::identity();
-                matrix[(k, k)] = factor;
-                change(matrix)
-            });
-        }
-        for one in 0..3 {
-            let pair = [(one + 1) % 3, (one + 2) % 3];
-            let [first, second] = [pair[0].min(pair[1]), pair[0].max(pair[1])];
-            let what = format!(
-                "{kind} {} and {} are multiplied by",
-                name(first),
-                name(second)
-            );
-            scales(&mut out, &channels(&[first, second]), &what, |factor| {
-                let mut diagonal = Vector3::repeat(factor);
-                diagonal[one] = 1.0;
-                change(Matrix3::from_diagonal(&diagonal))
-            });
-        }
-        scales(&mut out, all, &format!("{are} multiplied by"), |factor| {
-            change(Matrix3::from_diagonal_element(factor))
-        });
     }
     let of_turns = |side, by: [f64; 3]| Change::of(side, Matrix3::from_diagonal(&by.into()));
     let what = "Rz of the reference is multiplied by";
