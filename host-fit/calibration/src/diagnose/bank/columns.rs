@@ -96,7 +96,7 @@ impl Family {
     }
 
     /// Whether a reset takes it off.
-    pub(super) fn to_reset(&self) -> bool {
+    pub(super) fn ends_with_movement(&self) -> bool {
         self.0 == Kind::Offset && self.2 < 6
     }
 

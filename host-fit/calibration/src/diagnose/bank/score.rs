@@ -127,7 +127,7 @@ impl<'a> Scan<'a> {
             Kind::Lag => whole(Course::Whole),
             _ => whole(Course::Ramp),
         }
-        if family.to_reset() {
+        if family.ends_with_movement() {
             whole(Course::RampInMovements);
         }
         let mut onset = |ranges: &[Range<usize>], course: fn(usize) -> Course| {
@@ -138,7 +138,7 @@ impl<'a> Scan<'a> {
         if family.steps() {
             onset(std::slice::from_ref(&all), Course::From);
         }
-        if family.to_reset() {
+        if family.ends_with_movement() {
             onset(movements, Course::ToReset);
         }
         found
@@ -158,7 +158,8 @@ impl<'a> Scan<'a> {
         }
         let (around, _, range) = coarse?;
         // Things change between movements rather than within them.
-        let (mut best, mut between): (Option<(usize, f64)>, Option<(usize, f64)>) = (None, None);
+        let mut best: Option<(usize, f64)> = None;
+        let mut between: Option<(usize, f64)> = None;
         let is_start = |at: usize| self.log.movements().iter().any(|m| m.start == at);
         let wanted = |at: usize| at > range.start && at.abs_diff(around) < apart;
         self.scan(raw, range, wanted, |at, gain| {
