@@ -106,7 +106,7 @@ mod tests {
         for (k, value) in values.iter_mut().enumerate() {
             *value += 0.8 * libm::sin(TAU * 0.1004 * k as f64 + 0.3);
         }
-        let spectrum = Spectrum::new(&values, &windows(&[0..8000], 1000));
+        let spectrum = Spectrum::new(&values, &windows(std::slice::from_ref(&(0..8000)), 1000));
         assert!(spectrum.lines(10).eq([100]));
         let amplitude = spectrum.amplitude(100);
         assert!((amplitude - 0.8).abs() < 0.06, "{amplitude}");
@@ -117,7 +117,11 @@ mod tests {
     fn power_is_a_mean_over_windows_of_any_length() {
         for length in [250, 997] {
             let values = noise(100 * length, 5);
-            let power = Spectrum::new(&values, &windows(&[0..values.len()], length)).power;
+            let power = Spectrum::new(
+                &values,
+                &windows(std::slice::from_ref(&(0..values.len())), length),
+            )
+            .power;
             let mean = power[3..].iter().sum::<f64>() / (power.len() - 3) as f64;
             assert!(
                 (mean / (0.375 * length as f64) - 1.0).abs() < 0.02,
@@ -130,7 +134,10 @@ mod tests {
     fn noise_has_no_lines_however_few_windows_there_are() {
         for (rows, length) in [(1000, 1000), (3000, 1000), (40_000, 500)] {
             for seed in 0..10 {
-                let spectrum = Spectrum::new(&noise(rows, seed), &windows(&[0..rows], length));
+                let spectrum = Spectrum::new(
+                    &noise(rows, seed),
+                    &windows(std::slice::from_ref(&(0..rows)), length),
+                );
                 assert_eq!(spectrum.lines(5).next(), None, "{rows} {length} {seed}");
             }
         }
