@@ -162,10 +162,14 @@ impl Diagnosis {
         self.findings = findings;
         let has_channels = has_channels && dataset.logs.iter().all(|log| log.has_reference);
         let of_rows = has_channels.then(|| bank::diagnose(&dataset.without(&bad), stage, by));
-        let of_rows = of_rows.flatten();
+        let mut of_rows = of_rows.flatten();
+        if let Some(of) = &mut of_rows {
+            // Nothing is wrong that a repair could take off.
+            of.repair = (of.repair.take())
+                .filter(|_| is_fit && !(of.findings.is_empty() && bad.is_empty()));
+        }
         // A fault that leaves nothing of the residuals when it is taken off explains what a mistake would.
-        let explains =
-            |of: &bank::Diagnosis| is_fit && of.repair.is_some() && of.rest < LIMITED_MAX;
+        let explains = |of: &bank::Diagnosis| of.repair.is_some() && of.rest < LIMITED_MAX;
         if is_refused(&self.findings) || !of_rows.as_ref().is_some_and(explains) {
             self.findings.extend(of_structure);
         }
@@ -187,7 +191,7 @@ impl Diagnosis {
         }
         if of.rest > LIMITED_MAX && are_notes(&self.findings) && are_notes(&of.findings) {
             let message = format!(
-                "the log does not fit to itself: {:.1} times the noise are left of the Hall signals, and no single fault                  explains them. Fit parts of it",
+                "the log does not fit to itself: {:.1} times the noise are left of the Hall signals, and no single fault explains them. Fit parts of it",
                 of.rest
             );
             // Of other models it is what they lack.
@@ -199,14 +203,22 @@ impl Diagnosis {
             let lacks = Finding::new(Code::ModelLacks, message).severe(severity);
             of.findings.push(lacks.of(of.rest, "times").costing(cost));
         }
-        if let Some((repair, expected)) = of.repair.filter(|_| is_fit) {
-            let messages = of.findings.iter().map(|found| found.message.clone());
-            let faults = messages.collect();
-            (self.predicted, self.repair) = (Some(expected), Some(Repair { faults, ..repair }));
+        if let Some((repair, expected)) = of.repair {
             for found in &mut of.findings {
                 found.message += ". The calibration has this taken off, and is that of the stage at the end of the log: zero the stage before it is used";
                 found.severity = found.severity.min(Severity::Warn);
             }
+            let of_signals = self
+                .findings
+                .iter()
+                .filter(|f| f.severity == Severity::Warn);
+            let messages = of
+                .findings
+                .iter()
+                .chain(of_signals)
+                .map(|found| found.message.clone());
+            let faults = messages.collect();
+            (self.predicted, self.repair) = (Some(expected), Some(Repair { faults, ..repair }));
         }
         self.findings.extend(of.findings);
     }

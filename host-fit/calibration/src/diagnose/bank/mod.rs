@@ -305,7 +305,12 @@ impl Job<'_> {
             findings.insert(0, self.finding(&fault, late_ms, predicted.worst_ratio()));
         }
         let covariance = estimate.curvature.inverse() * certain;
-        let repair = self.repair(&estimate, (&declared, &covariance), &faults, &costs);
+        let repair = self.repair(
+            &estimate,
+            (&declared, &covariance),
+            &faults,
+            (&costs, predicted.worst_ratio()),
+        );
         Some(Diagnosis {
             findings,
             predicted,
@@ -343,14 +348,15 @@ impl Job<'_> {
         Some(Predicted::new(declared, &(covariance * certain), &off))
     }
 
-    /// The estimate that has the faults among its unknowns, and what it has to expect, if it is worth it and
-    /// good; an error of the reference or one that may be another's says nothing of the stage.
+    /// The estimate that has the faults among its unknowns, and what it has to expect, if it is good and a fault
+    /// costs something, or the fit at hand does, whose rows have more that is wrong; an error of the reference or
+    /// one that may be another's says nothing of the stage.
     fn repair(
         &self,
         estimate: &Estimate,
         (declared, covariance): (&Service, &DMatrix<f64>),
         faults: &[Fault],
-        costs: &[f64],
+        (costs, of_fit): (&[f64], f64),
     ) -> Option<(Repair, Predicted)> {
         let counts = |cost: &f64| severity(*cost) > Severity::Note;
         let is_clear = |fault: &Fault| {
@@ -358,17 +364,15 @@ impl Job<'_> {
             fault.alike.is_empty() && (family.1 != "ifm" || family.0 != Kind::Gain)
         };
         let mut of_faults = faults.iter().zip(costs);
-        let of_one = |channel| {
-            faults
-                .iter()
-                .filter(|other| other.family().1 == channel)
-                .count()
-        };
         // Steps and ramps that together follow a course are not that course.
-        let is_known = |fault: &Fault| of_one(fault.family().1) <= COURSES_MAX;
+        let is_known = |fault: &Fault| {
+            let is_same = |other: &&Fault| other.family().1 == fault.family().1;
+            faults.iter().filter(is_same).count() <= COURSES_MAX
+        };
         let are_clear = of_faults.all(|(fault, cost)| !counts(cost) || is_clear(fault))
             && faults.iter().all(is_known);
-        if self.fitted.model != ModelKind::Field || !costs.iter().any(counts) || !are_clear {
+        let is_worth_it = counts(&of_fit) || costs.iter().any(counts);
+        if self.fitted.model != ModelKind::Field || !is_worth_it || !are_clear {
             return None;
         }
         let predicted = Predicted::new(declared, covariance, &[0.0; COUNT]);
