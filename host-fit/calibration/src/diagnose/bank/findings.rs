@@ -2,7 +2,7 @@
 
 use super::columns::{Course, FAMILIES, Kind, range_of};
 use super::{Fault, Job, severity};
-use crate::finding::{Code, Finding};
+use crate::finding::{Code, Finding, Severity};
 use crate::judge::verdict::Predicted;
 
 impl Job<'_> {
@@ -100,6 +100,18 @@ pub(super) fn not_determined(predicted: &Predicted) -> Finding {
         Code::NotDetermined.entry().remedy
     );
     Finding::new(Code::NotDetermined, message).costing(predicted.worst_ratio())
+}
+
+/// That a channel has more faults than are taken off.
+pub(super) fn without_course(fault: &Fault, cost: f64) -> Finding {
+    let channel = fault.family().1;
+    let message = format!(
+        "{} changes more than twice: what it does between is not known, and not taken off. Remedy: let it warm up, look for loose \
+         contacts, and record the log again",
+        title(channel)
+    );
+    let found = Finding::new(Code::ModelLacks, message).severe(severity(cost).max(Severity::Warn));
+    found.on(channel).costing(cost)
 }
 
 fn title(channel: &str) -> String {

@@ -152,6 +152,18 @@ impl Fault {
     }
 }
 
+/// A fault of a channel that changes more often than it may: steps and ramps that together follow a course are
+/// not that course.
+fn without_course<'f>(faults: &'f [Fault], costs: &[f64]) -> Option<&'f Fault> {
+    let worse = || {
+        let both = faults.iter().zip(costs);
+        both.filter(|(_, cost)| severity(**cost) > Severity::Note)
+    };
+    let of = |channel| worse().filter(move |(other, _)| other.family().1 == channel);
+    let mut found = worse().map(|(fault, _)| fault);
+    found.find(|fault| of(fault.family().1).count() > COURSES_MAX)
+}
+
 /// A log with what it was fitted by.
 struct Job<'a> {
     dataset: &'a Dataset,
@@ -299,6 +311,9 @@ impl Job<'_> {
                 findings.push(self.finding(fault, estimate.sizes()[number], cost));
             }
         }
+        if let Some(fault) = without_course(&faults, &costs) {
+            findings.push(findings::without_course(fault, predicted.worst_ratio()));
+        }
         if let Some((fault, late_ms)) = self.late_beam() {
             // What bent the fit, whatever else did.
             costs.push(predicted.worst_ratio());
@@ -364,13 +379,8 @@ impl Job<'_> {
             fault.alike.is_empty() && (family.1 != "ifm" || family.0 != Kind::Gain)
         };
         let mut of_faults = faults.iter().zip(costs);
-        // Steps and ramps that together follow a course are not that course.
-        let is_known = |fault: &Fault| {
-            let is_same = |other: &&Fault| other.family().1 == fault.family().1;
-            faults.iter().filter(is_same).count() <= COURSES_MAX
-        };
         let are_clear = of_faults.all(|(fault, cost)| !counts(cost) || is_clear(fault))
-            && faults.iter().all(is_known);
+            && without_course(faults, costs).is_none();
         let is_worth_it = counts(&of_fit) || costs.iter().any(counts);
         if self.fitted.model != ModelKind::Field || !is_worth_it || !are_clear {
             return None;
