@@ -108,6 +108,7 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
             out.push(mistake(inverted, channels.clone(), what, times(-1.0)));
             let (channel, what) = match some.len() {
                 3 => (all, format!("{are} multiplied by")),
+                2 => (&*channels, format!("{kind} {of} are multiplied by")),
                 _ => (&*channels, format!("{kind} {of} is multiplied by")),
             };
             scales(&mut out, channel, &what, times);

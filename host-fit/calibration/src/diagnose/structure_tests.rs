@@ -99,7 +99,7 @@ fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
         ),
         (
             Code::ScaleWrong,
-            &["beam Y1 and Y2 is multiplied by 0.50"],
+            &["beam Y1 and Y2 are multiplied by 0.50"],
             |s| (1..3).for_each(|beam| s.beams_nm[beam] *= 2),
         ),
         (Code::ScaleWrong, both, |s| {
