@@ -163,10 +163,14 @@ impl Diagnosis {
         let has_channels = has_channels && dataset.logs.iter().all(|log| log.has_reference);
         let of_rows = has_channels.then(|| bank::diagnose(&dataset.without(&bad), stage, by));
         let mut of_rows = of_rows.flatten();
-        if let Some(of) = &mut of_rows {
-            // Nothing is wrong that a repair could take off.
-            of.repair = (of.repair.take())
-                .filter(|_| is_fit && !(of.findings.is_empty() && bad.is_empty()));
+        // Rows that jump are for the loss of the fit.
+        let stands = |found: &&Finding| matches!(found.code, Code::Stuck | Code::Saturated);
+        let stand = self.findings.iter().any(|found| stands(&found));
+        if let Some(of) = of_rows
+            .as_mut()
+            .filter(|of| !is_fit || of.findings.is_empty() && !stand)
+        {
+            of.repair = None;
         }
         // A fault that leaves nothing of the residuals when it is taken off explains what a mistake would.
         let explains = |of: &bank::Diagnosis| of.repair.is_some() && of.rest < LIMITED_MAX;
@@ -208,10 +212,7 @@ impl Diagnosis {
                 found.message += ". The calibration has this taken off, and is that of the stage at the end of the log: zero the stage before it is used";
                 found.severity = found.severity.min(Severity::Warn);
             }
-            let of_signals = self
-                .findings
-                .iter()
-                .filter(|f| f.severity == Severity::Warn);
+            let of_signals = self.findings.iter().filter(stands);
             let messages = of
                 .findings
                 .iter()
