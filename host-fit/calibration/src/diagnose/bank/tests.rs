@@ -322,6 +322,23 @@ fn a_probe_that_becomes_noisy_is_not_taken_for_one_whose_gain_changes() {
     assert!(found.iter().all(|f| f.cost.is_none()), "{found:#?}");
 }
 
+/// The fit holds these rows; the calibration is without them.
+#[test]
+fn rows_in_which_a_gap_repeats_its_code_bend_no_calibration() {
+    let mut stands = recording(3);
+    let held = stands.movements[1][1000].capacitive[2];
+    for sample in &mut stands.movements[1][1000..1600] {
+        sample.capacitive[2] = held;
+    }
+    let diagnosis = diagnosed(stands, |_, _| {});
+    let stuck = diagnosis.findings.iter().find(|f| f.code == Code::Stuck);
+    let stuck = stuck.expect("a finding");
+    assert_eq!(stuck.channel.as_deref(), Some("cap_3"));
+    let repair = diagnosis.repair.expect("a repair");
+    assert_eq!(repair.faults, std::slice::from_ref(&stuck.message));
+    assert_eq!(diagnosis.verdict, Some(Verdict::Good));
+}
+
 #[test]
 fn a_large_step_of_a_hall_probe_is_named_as_that_and_taken_off() {
     let codes = (25e-6 / stage().hall.m_per_count).round() as i32;
