@@ -126,8 +126,3 @@ pub fn period_s(rows: &[Row], segments: &[Range<usize>], servo_period_s: f64) ->
 pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
     statistics::median(&mut values.collect::<Vec<f64>>()).unwrap_or(0.0)
 }
-
-/// Standard deviation of normal numbers about zero from their median magnitude.
-pub(in crate::diagnose) fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
-    1.4826 * median(values.map(f64::abs))
-}

@@ -32,8 +32,8 @@ use crate::solve::field::parameters::FieldParameters;
 use channels::LogSignals;
 use residual::Residuals;
 
+pub(super) use crate::statistics::robust_deviation;
 pub use channels::period_s;
-pub(super) use channels::robust_deviation;
 pub use spectrum::{Spectrum, windows};
 
 /// Rows whose median knows no outlier, and whose mean hardly any noise of a Hall probe: a third of 0.5 um.

@@ -1,9 +1,10 @@
 //! Outliers: single rows far from those before and behind.
 
-use super::channels::{LogSignals, median, robust_deviation};
+use super::channels::{LogSignals, median};
 use super::residual::{Residuals, is_seen};
 use super::{BLOCK, CLEAR};
 use crate::finding::{Code, Finding};
+use crate::statistics::robust_deviation;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -1,10 +1,11 @@
 //! Residuals of the Hall signals, and how an error of each channel shows in them.
 
-use super::channels::{LogSignals, median, robust_deviation};
+use super::channels::{LogSignals, median};
 use crate::diagnose::slopes::Slopes;
 use crate::solve::field::blocks::Rows;
 use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::probe::probes;
+use crate::statistics::{robust_deviation, white_noise};
 use nalgebra::Vector3;
 
 /// Residuals beyond this part of the signals are those of a log that is not understood.
@@ -52,12 +53,10 @@ impl Residuals {
                 return None;
             }
         }
-        // Second differences hardly know the motion; their variance is six times that of white noise.
         let white = |values: &Vec<f64>| {
             let rows = log.segments.iter().flat_map(|s| s.start + 2..s.end);
             let used = rows.filter(|&row| (row - 2..=row).all(|row| log.usable[row]));
-            let second = used.map(|row| values[row] - 2.0 * values[row - 1] + values[row - 2]);
-            (robust_deviation(second) / 6f64.sqrt()).max(1e-10)
+            white_noise(used.map(|row| [row - 2, row - 1, row].map(|row| values[row]))).max(1e-10)
         };
         Some(Self {
             slopes: Slopes::new(log.stage, probes),
