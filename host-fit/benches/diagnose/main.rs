@@ -37,7 +37,7 @@ fn main() {
             let mut recording = recording(&stage, &planned, 1000 + seed);
             recording.movements.iter_mut().flatten().for_each(mistake);
             let dataset = recording.dataset(&stage).expect("a plane");
-            let mut found = diagnose::structure::structure(&dataset, &stage).into_iter();
+            let mut found = diagnose::structure::structure(&dataset, &stage, false).into_iter();
             found.any(|finding| finding.code == code)
         });
         let named = found.filter(|is_named| *is_named).count();

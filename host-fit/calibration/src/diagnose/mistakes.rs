@@ -30,20 +30,20 @@ pub(super) struct Mistake {
     pub(super) code: Code,
     /// The channels, as in [`Finding::channel`](crate::finding::Finding::channel).
     pub(super) channel: String,
-    /// What sets the log right, as the end of "it fits if ...", but for the factor.
+    /// What sets the log right, as the end of "it fits if ...", but for the value.
     pub(super) what: String,
-    /// The factor of a scale.
-    pub(super) factor: Option<f64>,
-    /// What a factor that may be any costs: twice the logarithm of the odds.
+    /// What follows: the factor of a scale, or how far something is turned, degrees.
+    pub(super) value: Option<(f64, &'static str)>,
+    /// What a value that may be any costs: twice the logarithm of the odds.
     pub(super) penalty: f64,
     pub(super) change: Change,
 }
 
-/// Scales within this factor of the designed ones are no mistake but tolerances.
-const FACTOR_MIN: f64 = 1.4;
 /// Factors to a power of ten that are tried, and the largest power: units of um and m.
 const FACTORS: i32 = 24;
 const POWERS: i32 = 6;
+/// Turns that are tried, degrees.
+const TURN_DEG: i32 = 10;
 
 /// By side: the kind of channel, all of them together, the codes of an exchange and of a sign.
 const SIDES: [(&str, [&str; 2], [Code; 2]); 3] = [
@@ -114,15 +114,21 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
             scales(&mut out, channel, &what, times);
         }
     }
-    let of_turns = |side, by: [f64; 3]| Change::of(side, Matrix3::from_diagonal(&by.into()));
+    // By Rz of the reference, and by Rx and Ry.
+    let turned = |rz: f64, tilts: f64| {
+        let [planar, vertical] = [[1.0, 1.0, rz], [1.0, tilts, tilts]];
+        let by = |by: [f64; 3]| Matrix3::from_diagonal(&by.into());
+        Change([Matrix3::identity(), by(planar), by(vertical)])
+    };
     let what = "Rz of the reference is multiplied by";
-    scales(&mut out, "rz", what, |factor| {
-        of_turns(1, [1.0, 1.0, factor])
+    scales(&mut out, "rz", what, |factor| turned(factor, 1.0));
+    let what = "the places of the Hall probes are multiplied by";
+    scales(&mut out, "hall", what, |factor| {
+        turned(1.0 / factor, 1.0 / factor)
     });
     if has_codes {
         let what = "the places of the capacitive sensors are multiplied by";
-        let by = |factor: f64| of_turns(2, [1.0, 1.0 / factor, 1.0 / factor]);
-        scales(&mut out, "cap", what, by);
+        scales(&mut out, "cap", what, |factor| turned(1.0, 1.0 / factor));
         places(&mut out, stage, &gaps);
     }
     out
@@ -133,7 +139,7 @@ const fn mistake(code: Code, channel: String, what: String, change: Change) -> M
         code,
         channel,
         what,
-        factor: None,
+        value: None,
         penalty: 0.0,
         change,
     }
@@ -141,38 +147,45 @@ const fn mistake(code: Code, channel: String, what: String, change: Change) -> M
 
 /// One mistake for each factor.
 fn scales(out: &mut Vec<Mistake>, channel: &str, what: &str, change: impl Fn(f64) -> Change) {
-    let any = (-FACTORS * POWERS..=FACTORS * POWERS).map(|k| {
-        // Any factor is less likely than two, a half or a power of ten.
-        let penalty = if k % FACTORS == 0 { 0.0 } else { UNDECIDED };
-        (10f64.powf(f64::from(k) / f64::from(FACTORS)), penalty)
+    let powers = (-FACTORS * POWERS..=FACTORS * POWERS).filter(|power| *power != 0);
+    let any = powers.map(|power| {
+        let factor = 10f64.powf(f64::from(power) / f64::from(FACTORS));
+        (factor, power % FACTORS == 0)
     });
-    let all = any.chain([(2.0, 0.0), (0.5, 0.0)]);
-    let far = all.filter(|(factor, _)| !(1.0 / FACTOR_MIN..FACTOR_MIN).contains(factor));
-    out.extend(far.map(|(factor, penalty)| Mistake {
-        factor: Some(factor),
-        penalty,
-        ..mistake(
-            Code::ScaleWrong,
-            channel.into(),
-            what.into(),
-            change(factor),
-        )
-    }));
+    out.extend(
+        any.chain([(2.0, true), (0.5, true)])
+            .map(|(factor, is_usual)| Mistake {
+                value: Some((factor, "")),
+                penalty: penalty(is_usual),
+                ..mistake(
+                    Code::ScaleWrong,
+                    channel.into(),
+                    what.into(),
+                    change(factor),
+                )
+            }),
+    );
+}
+
+/// Any factor is less likely than two, a half or a power of ten, any turn less than a right angle.
+const fn penalty(is_usual: bool) -> f64 {
+    if is_usual { 0.0 } else { UNDECIDED }
 }
 
 /// Sensors that stand elsewhere than `stage.toml` says.
 fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
     let designed = stage.capacitive_probes_m;
-    let mut add = |channel: &str, what: String, places: ProbePositions<f64>| {
-        if let Some(to_pose) = of_gaps(&places).try_inverse() {
-            let change = Change::of(2, to_pose * gaps);
-            out.push(mistake(
+    let mut add = |channel: &str, what: String, value, penalty, places: ProbePositions<f64>| {
+        out.extend(of_gaps(&places).try_inverse().map(|to_pose| Mistake {
+            value,
+            penalty,
+            ..mistake(
                 Code::CapacitiveInverted,
                 channel.into(),
                 what,
-                change,
-            ));
-        }
+                Change::of(2, to_pose * gaps),
+            )
+        }));
     };
     for (sensor, axis) in (0..3).flat_map(|sensor| [(sensor, 0), (sensor, 1)]) {
         let mut places = designed;
@@ -181,37 +194,42 @@ fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
         let (name, number) = (["x", "y"][axis], sensor + 1);
         let what = format!("the {name} of capacitive sensor {number} in stage.toml is {place} m");
         if *place != 0.0 {
-            add(CHANNELS[6 + sensor], what, places);
+            add(CHANNELS[6 + sensor], what, None, 0.0, places);
         }
     }
-    // What x and y are made of.
-    for (how, [a, b, c, d]) in [
-        ("turned by 90 degrees", [0.0, -1.0, 1.0, 0.0]),
-        ("turned by 180 degrees", [-1.0, 0.0, 0.0, -1.0]),
-        ("turned by -90 degrees", [0.0, 1.0, -1.0, 0.0]),
-        ("mirrored along x", [-1.0, 0.0, 0.0, 1.0]),
-        ("mirrored along y", [1.0, 0.0, 0.0, -1.0]),
-        ("given as y, x", [0.0, 1.0, 1.0, 0.0]),
-    ] {
-        let what = format!("the places of the capacitive sensors are {how}");
-        add(
-            "cap",
-            what,
-            designed.map(|[x, y]| [a * x + b * y, c * x + d * y]),
-        );
+    for (how, sign) in [("turned by", 1.0), ("mirrored along x and turned by", -1.0)] {
+        for degrees in (-180 + TURN_DEG..=180)
+            .step_by(TURN_DEG as usize)
+            .filter(|turn| sign < 0.0 || *turn != 0)
+        {
+            let (sin, cos) = libm::sincos(f64::from(degrees).to_radians());
+            let places =
+                designed.map(|[x, y]| [cos * sign * x - sin * y, sin * sign * x + cos * y]);
+            let what = format!("the places of the capacitive sensors are {how}");
+            add(
+                "cap",
+                what,
+                Some((f64::from(degrees), " degrees")),
+                penalty(degrees % 90 == 0),
+                places,
+            );
+        }
     }
 }
 
 impl Mistake {
-    /// What sets the log right, with two digits of the factor.
+    /// What sets the log right, with two digits of a factor.
     pub(super) fn cure(&self) -> String {
-        let Some(factor) = self.factor else {
-            return self.what.clone();
-        };
-        let digits = 1 - factor.log10().floor() as i32;
-        let unit = 10f64.powi(-digits);
-        let rounded = (factor / unit).round() * unit;
-        format!("{} {rounded:.*}", self.what, digits.max(0) as usize)
+        match self.value {
+            None => self.what.clone(),
+            Some((factor, "")) => {
+                let digits = 1 - factor.log10().floor() as i32;
+                let unit = 10f64.powi(-digits);
+                let rounded = (factor / unit).round() * unit;
+                format!("{} {rounded:.*}", self.what, digits.max(0) as usize)
+            }
+            Some((value, unit)) => format!("{} {value}{unit}", self.what),
+        }
     }
 }
 

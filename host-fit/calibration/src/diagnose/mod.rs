@@ -158,7 +158,7 @@ impl Diagnosis {
     ) {
         let of_signals = || signals::signal_findings(dataset, stage, (by.parameters, lag_s));
         let (of_structure, (findings, bad)) =
-            rayon::join(|| structure::structure(sound, stage), of_signals);
+            rayon::join(|| structure::structure(sound, stage, false), of_signals);
         self.findings = findings;
         let has_channels = has_channels && dataset.logs.iter().all(|log| log.has_reference);
         let of_rows = has_channels.then(|| bank::diagnose(&dataset.without(&bad), stage, by));
@@ -175,7 +175,16 @@ impl Diagnosis {
         // A fault that leaves nothing of the residuals when it is taken off explains what a mistake would.
         let explains = |of: &bank::Diagnosis| of.repair.is_some() && of.rest < LIMITED_MAX;
         if is_refused(&self.findings) || !of_rows.as_ref().is_some_and(explains) {
-            self.findings.extend(of_structure);
+            let is_named = |found: &Finding| found.severity == Severity::Refuse;
+            let parts = |found: &Finding| is_named(found) && found.code == Code::LogsDisagree;
+            let is_wrong = of_rows
+                .as_ref()
+                .is_some_and(|of| of.findings.iter().any(parts));
+            let other = || structure::structure(sound, stage, true);
+            self.findings.extend(match is_wrong {
+                true => of_structure.filter(is_named).or_else(other),
+                false => of_structure,
+            });
         }
         let Some(mut of) = of_rows else { return };
         self.predicted = Some(of.predicted);

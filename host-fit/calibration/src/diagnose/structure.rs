@@ -46,49 +46,55 @@ struct Fitted {
     covariance: Covariance,
 }
 
-/// What keeps a log from being that of the designed stage, if anything does; `None` of a log in which
-/// nothing moves.
-pub fn structure(dataset: &Dataset, stage: &Stage) -> Option<Finding> {
+/// What keeps a log from being that of the designed stage, if anything does; `None` of a log in which nothing
+/// moves. Where `is_wrong`, something does, for nothing else describes the log: then a mistake needs less to be
+/// likely, and is a warning beside the refusal.
+pub fn structure(dataset: &Dataset, stage: &Stage, is_wrong: bool) -> Option<Finding> {
     let planar = Model::of(ModelKind::M30);
     check_motion(dataset, stage, dataset.rows.len(), planar).ok()?;
     let fitted = fitted(dataset, stage.servo_period_s)?;
     let drawing = Drawing::new(stage);
     let distance = |change: &Change| drawing.distance(&fitted, change);
     let as_logged = distance(&Change::nothing());
-    let spans = spans(dataset);
-    let has_codes = dataset
-        .rows
-        .iter()
-        .all(|row| row.frame.capacitive().is_some());
-    // The declared motion tells apart what the geometry does not.
-    let rank = |mistake: &Mistake| {
-        distance(&mistake.change) + beyond_motion(stage, &spans, &mistake.change) + mistake.penalty
-    };
-    let mistakes = mistakes(stage, has_codes);
+    let mut rows = dataset.rows.iter();
+    let mistakes = mistakes(stage, rows.all(|row| row.frame.capacitive().is_some()));
     // Chance alone makes no distance so much smaller by one of them undone.
     let likely = mistakes.iter().filter(|mistake| mistake.penalty == 0.0);
-    let gain_min = 2.0 * libm::log(RARITY * likely.count() as f64);
+    let gain_min = match is_wrong {
+        true => UNDECIDED,
+        false => 2.0 * libm::log(RARITY * likely.count() as f64),
+    };
     if as_logged < gain_min {
         return None;
     }
-    let mut ranked: Vec<(f64, Mistake)> = mistakes.into_iter().map(|m| (rank(&m), m)).collect();
+    let spans = spans(dataset);
+    // The declared motion tells apart what the geometry does not.
+    let rank = |mistake: Mistake| {
+        let of_motion = beyond_motion(stage, &spans, &mistake.change);
+        (
+            distance(&mistake.change) + of_motion + mistake.penalty,
+            mistake,
+        )
+    };
+    let mut ranked: Vec<(f64, Mistake)> = mistakes.into_iter().map(rank).collect();
     ranked.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-    let (least, _) = ranked.first()?;
-    let least = *least;
+    let least = ranked.first()?.0;
     if !(least < SOUND_MAX && least < as_logged - gain_min) {
         return (as_logged > SOUND_MAX).then(|| unexplained(as_logged));
     }
-    ranked.retain(|(rank, _)| *rank < least + UNDECIDED);
+    let near = ranked
+        .iter()
+        .take_while(|(rank, _)| *rank < least + UNDECIDED);
     let mut named: Vec<&Mistake> = Vec::new();
-    for (_, mistake) in &ranked {
+    for (_, mistake) in near {
         if named.iter().all(|other| other.what != mistake.what) {
             named.push(mistake);
         }
     }
-    Some(finding(&named))
+    Some(finding(&named, is_wrong))
 }
 
-fn finding(named: &[&Mistake]) -> Finding {
+fn finding(named: &[&Mistake], is_wrong: bool) -> Finding {
     let cures: Vec<String> = named.iter().map(|mistake| mistake.cure()).collect();
     let (undecided, remedy) = match named {
         [one] => ("", one.code.entry().remedy),
@@ -97,16 +103,26 @@ fn finding(named: &[&Mistake]) -> Finding {
             "find out which before anything is changed: check wiring, columns, units and stage.toml",
         ),
     };
-    let message = format!(
-        "the log is not that of the stage in stage.toml as it is, and fits if {}{undecided}: {remedy}",
-        cures.join(", or if ")
-    );
-    let found = Finding::new(named[0].code, message).severe(Severity::Refuse);
+    let (what, severity) = match is_wrong {
+        true => (
+            "the log may be of one stage all the same, but not of that in stage.toml as it is: it would fit",
+            Severity::Warn,
+        ),
+        false => (
+            "the log is not that of the stage in stage.toml as it is, and fits",
+            Severity::Refuse,
+        ),
+    };
+    let message = format!("{what} if {}{undecided}: {remedy}", cures.join(", or if "));
+    let found = Finding::new(named[0].code, message).severe(severity);
     match named {
-        [one] => match one.factor {
-            Some(factor) => found.on(one.channel.clone()).of(factor, ""),
-            None => found.on(one.channel.clone()),
-        },
+        [one] => {
+            let found = found.on(one.channel.clone());
+            match one.value {
+                Some((value, unit)) => found.of(value, unit.trim()),
+                None => found,
+            }
+        }
         _ => found,
     }
 }

@@ -29,7 +29,7 @@ fn a_sound_log_is_that_of_its_stage() {
     let stage = stage("", "");
     for recording in recordings() {
         let dataset = recording.dataset(&stage).expect("a triangle");
-        assert_eq!(structure(&dataset, &stage), None);
+        assert_eq!(structure(&dataset, &stage, false), None);
     }
 }
 
@@ -45,7 +45,7 @@ fn a_short_sound_log_has_no_mistake() {
         recording.movements.truncate(1);
         recording.movements[0].truncate(1000);
         let dataset = recording.dataset(&stage).expect("a triangle");
-        assert_eq!(structure(&dataset, &stage), None, "{seed}");
+        assert_eq!(structure(&dataset, &stage, false), None, "{seed}");
     }
 }
 
@@ -112,7 +112,7 @@ fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
             let mut recording = recording.clone();
             recording.movements.iter_mut().flatten().for_each(mistake);
             let dataset = recording.dataset(&stage).expect("a triangle");
-            let found = structure(&dataset, &stage).expect("a finding");
+            let found = structure(&dataset, &stage, false).expect("a finding");
             assert_eq!(
                 (found.code, found.severity),
                 (code, Severity::Refuse),
@@ -159,7 +159,7 @@ fn a_mistake_in_the_stage_file_is_named() {
         let stage = stage(from, to);
         for recording in recordings() {
             let dataset = recording.dataset(&stage).expect("a triangle");
-            let found = structure(&dataset, &stage).expect("a finding");
+            let found = structure(&dataset, &stage, false).expect("a finding");
             assert!(found.message.contains(cure), "{cure}: {}", found.message);
         }
     }
