@@ -119,8 +119,8 @@ pub(super) fn warnings(
         let value = solution.parameters.values[id.index];
         let (value_shown, unit) = shown(value, id.term.unit);
         let message = format!(
-            "{} stands at an end of its search range or beyond ({value_shown:.6} {unit}): widen the range in stage.toml, or \
-             check the log",
+            "{} stands at an end of its search range or beyond ({value_shown:.6} {unit}): check the scales and signs of that probe \
+             and of the beams; where they are right, widen the range in stage.toml",
             id.name()
         );
         let channel = ["hall_a", "hall_b", "hall_c"][id.probe];
