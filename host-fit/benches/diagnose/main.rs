@@ -99,7 +99,7 @@ fn service(twin: &Twin) -> Recording {
 type Mistake = (&'static str, Code, fn(&mut Sample));
 
 #[rustfmt::skip]
-const MISTAKES: [Mistake; 17] = [
+const MISTAKES: [Mistake; 26] = [
     ("Hall A and B exchanged", Code::ChannelsSwapped, |s| s.hall.swap(0, 1)),
     ("Hall A and C exchanged", Code::ChannelsSwapped, |s| s.hall.swap(0, 2)),
     ("Hall B and C exchanged", Code::ChannelsSwapped, |s| s.hall.swap(1, 2)),
@@ -116,5 +116,14 @@ const MISTAKES: [Mistake; 17] = [
     ("capacitive 2 and 3 exchanged", Code::CapacitiveSwapped, |s| s.capacitive.swap(1, 2)),
     ("capacitive 1 turned", Code::CapacitiveInverted, |s| s.capacitive[0] *= -1),
     ("capacitive 3 turned", Code::CapacitiveInverted, |s| s.capacitive[2] *= -1),
+    ("Hall A x 2", Code::ScaleWrong, |s| s.hall[0] *= 2),
+    ("Hall C x 0.5", Code::ScaleWrong, |s| s.hall[2] /= 2),
+    ("beam X x 0.5", Code::ScaleWrong, |s| s.beams_nm[0] /= 2),
+    ("beam Y1 x 1.1", Code::ScaleWrong, |s| s.beams_nm[1] += s.beams_nm[1] / 10),
+    ("beam Y2 x 0.8", Code::ScaleWrong, |s| s.beams_nm[2] -= s.beams_nm[2] / 5),
+    ("reference x 2", Code::ScaleWrong, |s| s.beams_nm = s.beams_nm.map(|nm| 2 * nm)),
+    ("capacitive 1 x 1.2", Code::ScaleWrong, |s| s.capacitive[0] += s.capacitive[0] / 5),
+    ("capacitive 2 x 0.5", Code::ScaleWrong, |s| s.capacitive[1] /= 2),
+    ("capacitive 1, 2, 3 x 0.1", Code::ScaleWrong, |s| s.capacitive = s.capacitive.map(|code| code / 10)),
     ("capacitive 1, 2, 3 turned", Code::CapacitiveInverted, |s| s.capacitive = s.capacitive.map(|code| -code)),
 ];

@@ -155,6 +155,11 @@ fn a_mistake_in_the_stage_file_is_named() {
             "[[0.0, 0.12], [0.0, -0.12], [0.12, 0.0]]",
             "sensors are turned by -90 degrees",
         ),
+        (
+            PLACES,
+            "[[0.092, 0.077], [-0.092, -0.077], [0.077, -0.092]]",
+            "sensors are turned by -40 degrees",
+        ),
     ] {
         let stage = stage(from, to);
         for recording in recordings() {
@@ -163,4 +168,60 @@ fn a_mistake_in_the_stage_file_is_named() {
             assert!(found.message.contains(cure), "{cure}: {}", found.message);
         }
     }
+}
+
+#[test]
+fn a_beam_that_is_a_tenth_too_long_is_named_beside_others() {
+    let stage = stage("", "");
+    for mut recording in recordings() {
+        let samples = recording.movements.iter_mut().flatten();
+        samples.for_each(|s| s.beams_nm[1] += s.beams_nm[1] / 10);
+        let dataset = recording.dataset(&stage).expect("a triangle");
+        let found = structure(&dataset, &stage, false).expect("a finding");
+        assert_eq!(
+            (found.code, found.severity),
+            (Code::ScaleWrong, Severity::Refuse)
+        );
+        let cure = "beam Y1 is multiplied by 0.91";
+        assert!(found.message.contains(cure), "{}", found.message);
+    }
+}
+
+/// Probes at twice the distance show half of the turns and tilts.
+#[test]
+fn places_of_the_hall_probes_at_twice_the_distance_are_named() {
+    let stage = stage("", "");
+    for recording in recordings() {
+        let mut dataset = recording.dataset(&stage).expect("a triangle");
+        for row in &mut dataset.rows {
+            let [_, _, rz] = &mut row.reference;
+            let [_, rx, ry] = &mut row.vertical;
+            [rz, rx, ry].into_iter().for_each(|turn| *turn *= 2.0);
+        }
+        let found = structure(&dataset, &stage, false).expect("a finding");
+        let cure = "the places of the Hall probes are multiplied by 2.0";
+        assert!(found.message.contains(cure), "{}", found.message);
+    }
+}
+
+/// A third of the radius changes less than chance may, but not in a log that fits to nothing.
+#[test]
+fn a_mistake_is_more_likely_where_nothing_else_describes_the_log() {
+    let stage = stage(
+        "[[0.12, 0.0], [-0.12, 0.0], [0.0, -0.12]]",
+        "[[0.084, 0.0], [-0.084, 0.0], [0.0, -0.084]]",
+    );
+    let [_, recording] = recordings();
+    let dataset = recording.dataset(&stage).expect("a triangle");
+    assert_eq!(structure(&dataset, &stage, false), None);
+    let found = structure(&dataset, &stage, true).expect("a finding");
+    assert_eq!(
+        (found.code, found.severity),
+        (Code::ScaleWrong, Severity::Warn)
+    );
+    assert!(
+        found.message.contains("sensors are multiplied by"),
+        "{}",
+        found.message
+    );
 }
