@@ -52,7 +52,7 @@ fn fit_writes_no_blob_of_a_refused_log_but_with_force_one_that_says_so() {
         ),
         (
             "gaps.csv",
-            "capacitive 1 and 2 are exchanged",
+            "capacitive sensor 1 and capacitive sensor 2 are exchanged",
             "capacitive_swapped",
         ),
     ] {
@@ -106,7 +106,7 @@ fn exchanged_capacitive_sensors_are_named_without_search_ranges_that_exclude_the
     bench.write("stage.toml", stage);
     let gaps = exchanged(&log(), "cap1_cnt", "cap2_cnt");
     bench.write("log.csv", gaps);
-    let words = "fits if capacitive 1 and 2 are exchanged";
+    let words = "fits if capacitive sensor 1 and capacitive sensor 2 are exchanged";
     bench.bad("check log.csv --json c.json", 4, &[words]);
     let found = &bench.json("c.json")["findings"][0];
     assert_eq!(found["code"], "capacitive_swapped");

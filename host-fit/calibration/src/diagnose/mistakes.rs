@@ -2,7 +2,7 @@
 //! right.
 
 use super::bank::UNDECIDED;
-use super::slopes::CHANNELS;
+use super::slopes::{CHANNELS, title};
 use crate::finding::Code;
 use crate::input::stage::Stage;
 use nalgebra::Matrix3;
@@ -45,23 +45,11 @@ const POWERS: i32 = 6;
 /// Turns that are tried, degrees.
 const TURN_DEG: i32 = 10;
 
-/// By side: the kind of channel, all of them together, the codes of an exchange and of a sign.
-const SIDES: [(&str, [&str; 2], [Code; 2]); 3] = [
-    (
-        "Hall",
-        ["hall", "the Hall signals are"],
-        [Code::ChannelsSwapped, Code::ChannelInverted],
-    ),
-    (
-        "beam",
-        ["ifm", "the reference is"],
-        [Code::BeamsSwapped, Code::BeamInverted],
-    ),
-    (
-        "capacitive",
-        ["cap", "the gaps are"],
-        [Code::CapacitiveSwapped, Code::CapacitiveInverted],
-    ),
+/// Of Hall probes, beams and gaps: all of them together, the codes of an exchange and of a sign.
+const SIDES: [(&str, [Code; 2]); 3] = [
+    ("hall", [Code::ChannelsSwapped, Code::ChannelInverted]),
+    ("ifm", [Code::BeamsSwapped, Code::BeamInverted]),
+    ("cap", [Code::CapacitiveSwapped, Code::CapacitiveInverted]),
 ];
 
 /// All mistakes with order, sign, scale and place; of the gaps those that codes can have.
@@ -76,26 +64,25 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
             continue;
         };
         let change = |matrix: Matrix3<f64>| Change::of(side, to_pose * matrix * to_channels);
-        let (kind, [all, are], [swapped, inverted]) = SIDES[side];
+        let (all, [swapped, inverted]) = SIDES[side];
         let own = &CHANNELS[3 * side..][..3];
-        let name = |k: &usize| {
-            own[*k]
-                .rsplit('_')
-                .next()
-                .unwrap_or_default()
-                .to_uppercase()
+        // The channels, and what they are called.
+        let names = |some: &[usize]| {
+            let named = match some.len() {
+                3 => vec![all],
+                _ => some.iter().map(|&k| own[k]).collect(),
+            };
+            (named.join(", "), titles(&named))
         };
-        let names = |some: &[usize]| some.iter().map(name).collect::<Vec<_>>().join(" and ");
-        let channels = |some: &[usize]| some.iter().map(|&k| own[k]).collect::<Vec<_>>().join(", ");
         for order in [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]] {
             let moved: Vec<usize> = (0..3).filter(|&k| order[k] != k).collect();
-            let of = names(&moved);
+            let (channel, of) = names(&moved);
             let what = match moved[..] {
-                [_, _] => format!("{kind} {of} are exchanged"),
-                _ => format!("{kind} {of} are read from {}", names(&order)),
+                [_, _] => format!("{of} are exchanged"),
+                _ => format!("{of} are read as {}", titles(&order.map(|k| own[k]))),
             };
             let matrix = Matrix3::from_fn(|i, j| f64::from(u8::from(j == order[i])));
-            out.push(mistake(swapped, channels(&moved), what, change(matrix)));
+            out.push(mistake(swapped, channel, what, change(matrix)));
         }
         for bits in 1..8u32 {
             let some: Vec<usize> = (0..3).filter(|k| bits >> k & 1 == 1).collect();
@@ -103,22 +90,17 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
                 let of = |k: usize| if some.contains(&k) { factor } else { 1.0 };
                 change(Matrix3::from_diagonal(&[0, 1, 2].map(of).into()))
             };
-            let (of, channels) = (names(&some), channels(&some));
-            let what = format!("the sign of {kind} {of} is turned");
-            out.push(mistake(inverted, channels.clone(), what, times(-1.0)));
-            let (channel, what) = match some.len() {
-                3 => (all, format!("{are} multiplied by")),
-                2 => (&*channels, format!("{kind} {of} are multiplied by")),
-                _ => (&*channels, format!("{kind} {of} is multiplied by")),
-            };
-            scales(&mut out, channel, &what, times);
+            let (channel, of) = names(&some);
+            let what = format!("the scale of {of} is multiplied by");
+            scales(&mut out, &channel, &what, times);
+            let what = format!("the sign of {of} is turned");
+            out.push(mistake(inverted, channel, what, times(-1.0)));
         }
     }
-    // By Rz of the reference, and by Rx and Ry.
+    // Rz of the reference, and Rx and Ry, are so many times larger.
     let turned = |rz: f64, tilts: f64| {
-        let [planar, vertical] = [[1.0, 1.0, rz], [1.0, tilts, tilts]];
-        let by = |by: [f64; 3]| Matrix3::from_diagonal(&by.into());
-        Change([Matrix3::identity(), by(planar), by(vertical)])
+        let diagonals = [[1.0; 3], [1.0, 1.0, rz], [1.0, tilts, tilts]];
+        Change(diagonals.map(|by| Matrix3::from_diagonal(&by.into())))
     };
     let what = "Rz of the reference is multiplied by";
     scales(&mut out, "rz", what, |factor| turned(factor, 1.0));
@@ -231,6 +213,11 @@ impl Mistake {
             Some((value, unit)) => format!("{} {value}{unit}", self.what),
         }
     }
+}
+
+fn titles(channels: &[&str]) -> String {
+    let titles: Vec<String> = channels.iter().map(|channel| title(channel)).collect();
+    titles.join(" and ")
 }
 
 /// Gap changes 1, 2, 3 of a vertical pose Z, Rx, Ry: z + rx y - ry x.

@@ -9,6 +9,19 @@ use runtime::capacitive::{vertical_pose, vertical_rows};
 pub(super) const CHANNELS: [&str; 9] = [
     "hall_a", "hall_b", "hall_c", "ifm_x", "ifm_y1", "ifm_y2", "cap_1", "cap_2", "cap_3",
 ];
+
+/// What a channel, or all of a kind, is called in a message.
+pub(super) fn title(channel: &str) -> String {
+    match channel.split_once('_') {
+        Some(("hall", probe)) => format!("Hall {}", probe.to_uppercase()),
+        Some(("cap", gap)) => format!("capacitive sensor {gap}"),
+        Some((_, beam)) => format!("beam {}", beam.to_uppercase()),
+        None if channel == "hall" => "all Hall probes".to_owned(),
+        None if channel == "cap" => "all capacitive sensors".to_owned(),
+        None => "all beams".to_owned(),
+    }
+}
+
 /// Step of the derivative by Z, Rx, Ry: m, rad.
 const STEP: f64 = 1e-6;
 

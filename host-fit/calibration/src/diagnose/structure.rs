@@ -12,11 +12,12 @@ use super::mistakes::{Change, Mistake, mistakes};
 use super::range::SPANS;
 use crate::finding::{Code, Finding, Severity};
 use crate::input::dataset::Dataset;
-use crate::input::stage::{Range, Stage};
+use crate::input::stage::Stage;
 use crate::judge::identify::check_motion;
 use crate::judge::lag::ALIKE_S;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
+use crate::solve::field::blocks::{FieldRow, Rows};
 use crate::solve::field::parameters::FALL_PER_M;
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 use runtime::ModelKind;
@@ -41,8 +42,7 @@ type Covariance = SMatrix<f64, 6, 6>;
 /// A probe fitted by itself: gains by X, Y, Rz (per mm, mm, mrad), and slopes over gain by Z, Rx, Ry.
 #[derive(Clone, Copy, Debug)]
 struct Fitted {
-    gains: Vector3<f64>,
-    slopes: Vector3<f64>,
+    at: Vector,
     covariance: Covariance,
 }
 
@@ -137,33 +137,35 @@ fn unexplained(distance: f64) -> Finding {
     Finding::new(Code::TermsAtLimit, message)
 }
 
-/// What the drawing says of the probes.
+/// What the drawing says of the probes: one of each in its turn.
 struct Drawing {
     eta: [f64; 3],
-    eta_tolerance: [f64; 3],
     theta: [f64; 3],
     lever_arm: [f64; 3],
     places: [[f64; 2]; 3],
+    tolerances: [Vector; 3],
 }
 
 impl Drawing {
     fn new(stage: &Stage) -> Self {
         let geometry = Parameters::designed(stage).geometry();
-        let etas = stage.search.of("eta");
-        let middle = |range: Range| 0.5 * (range.low + range.high);
-        let even = |range: Range| range.width() / (middle(range) * 12f64.sqrt());
+        let (mut eta, mut tolerances) = ([1.0; 3], [Vector::from(TOLERANCES); 3]);
+        for (probe, range) in stage.search.of("eta").into_iter().flatten().enumerate() {
+            eta[probe] = 0.5 * (range.low + range.high);
+            tolerances[probe][0] = range.width() / (eta[probe] * 12f64.sqrt());
+        }
         Self {
-            eta: etas.map_or([1.0; 3], |ranges| ranges.map(middle)),
-            eta_tolerance: etas.map_or([TOLERANCES[0]; 3], |ranges| ranges.map(even)),
+            eta,
             theta: geometry.misalignment_rad,
             lever_arm: geometry.lever_arm_m,
             places: stage.places_m(),
+            tolerances,
         }
     }
 
     /// How far a probe is from where the drawing has it.
     fn features(&self, probe: usize, at: &Vector) -> Vector {
-        let (x, y, turn) = (at[0], at[1], at[2]);
+        let [x, y, turn, a, b, c] = (*at).into();
         // A and B sense Y, C senses X.
         let theta = match probe {
             2 => libm::atan2(y, x),
@@ -171,7 +173,6 @@ impl Drawing {
         };
         let off = theta - self.theta[probe];
         let eta = x.hypot(y).max(f64::MIN_POSITIVE);
-        let [a, b, c] = [at[3], at[4], at[5]];
         let [place_x, place_y] = self.places[probe];
         Vector::from([
             libm::log(eta / self.eta[probe]),
@@ -186,9 +187,8 @@ impl Drawing {
     /// Squares of the distances in terms of tolerances and of what the log leaves open, of three probes.
     fn distance(&self, fitted: &[Fitted; 3], change: &Change) -> f64 {
         let of_probe = |probe: usize| self.distance_of(probe, fitted, change);
-        (0..3)
-            .map(|probe| of_probe(probe).unwrap_or(f64::INFINITY))
-            .sum()
+        let all = (0..3).map(|probe| of_probe(probe).unwrap_or(f64::INFINITY));
+        all.sum()
     }
 
     fn distance_of(&self, probe: usize, fitted: &[Fitted; 3], change: &Change) -> Option<f64> {
@@ -199,26 +199,18 @@ impl Drawing {
         let mut turned = Covariance::zeros();
         turned.fixed_view_mut::<3, 3>(0, 0).copy_from(&by_gain);
         turned.fixed_view_mut::<3, 3>(3, 3).copy_from(&by_slope);
-        let Fitted {
-            gains,
-            slopes,
-            covariance,
-        } = fitted[from];
-        let (gains, slopes) = (by_gain * gains, by_slope * slopes);
-        let at = Vector::from([gains.x, gains.y, gains.z, slopes.x, slopes.y, slopes.z]);
+        let at = turned * fitted[from].at;
         let here = self.features(probe, &at);
         let mut by = Covariance::zeros();
         for k in 0..6 {
             let step = 1e-6 * at.fixed_rows::<3>(k / 3 * 3).norm().max(1e-9);
-            let mut moved = at;
-            moved[k] += step;
+            let moved = at + step * Vector::ith(k, 1.0);
             by.set_column(k, &((self.features(probe, &moved) - here) / step));
         }
         let by = by * turned;
-        let mut tolerance = Vector::from(TOLERANCES);
-        tolerance[0] = self.eta_tolerance[probe];
-        let tolerance = Covariance::from_diagonal(&tolerance.map(|x| x * x));
-        let spread = Cholesky::new(tolerance + by * covariance * by.transpose())?;
+        let tolerances = self.tolerances[probe].map(|x| x * x);
+        let open = by * fitted[from].covariance * by.transpose();
+        let spread = Cholesky::new(Covariance::from_diagonal(&tolerances) + open)?;
         Some(here.dot(&spread.solve(&here)))
     }
 }
@@ -226,66 +218,47 @@ impl Drawing {
 /// Each Hall signal by itself: s = (1 + a Z + b Rx + c Ry) g q + e V + f dq/dt + a constant of each movement. What this
 /// leaves goes with the motion.
 fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
-    let apart = (dataset.rows.len() / MEANS_MAX).max(1);
+    let all: Vec<usize> = (0..dataset.rows.len()).collect();
+    let rows = Rows::new(dataset, &all);
+    let apart = all.len().div_ceil(MEANS_MAX);
     let alike = (ALIKE_S / (period_s * apart as f64)).max(1.0);
     let of_probe = |probe: usize| {
         let mut at = SVector::<f64, UNKNOWNS>::zeros();
-        let mut found = None;
+        let mut covariance = SMatrix::zeros();
         for _ in 0..ROUNDS {
+            let column = |row: &FieldRow| {
+                let [q, rate] = [row.reference_mm, row.rate_mm_per_s].map(Vector3::from);
+                let v = Vector3::from(row.vertical) * 1e3;
+                let by = |k: usize, of: &Vector3<f64>| at.fixed_rows::<3>(k).dot(of);
+                let (moved, grown) = (by(0, &q), 1.0 + by(3, &v));
+                let rest = row.signal_mm[probe] - grown * moved - by(6, &v) - by(9, &rate);
+                let parts = [q * grown, v * moved, v, rate];
+                let parts = parts.iter().flatten().copied().chain([rest]);
+                SVector::<f64, { UNKNOWNS + 1 }>::from_iterator(parts)
+            };
             let mut products = SMatrix::<f64, { UNKNOWNS + 1 }, { UNKNOWNS + 1 }>::zeros();
             let mut count = 0.0;
-            for movement in &dataset.movements {
-                let rows = dataset.rows[movement.rows.clone()].windows(3);
-                let columns: Vec<SVector<f64, { UNKNOWNS + 1 }>> = rows
-                    .step_by(apart)
-                    .map(|rows| {
-                        let [before, row, after] = [&rows[0], &rows[1], &rows[2]];
-                        let moved =
-                            Vector3::from(after.reference) - Vector3::from(before.reference);
-                        let rate = moved * (1e6 / (after.t_us - before.t_us).max(1) as f64);
-                        let q = Vector3::from(row.reference) * 1e3;
-                        let v = Vector3::from(row.vertical) * 1e3;
-                        let moved = at.fixed_rows::<3>(0).dot(&q);
-                        let grown = 1.0 + at.fixed_rows::<3>(3).dot(&v);
-                        let mut column = SVector::<f64, { UNKNOWNS + 1 }>::zeros();
-                        column.fixed_rows_mut::<3>(0).copy_from(&(q * grown));
-                        column.fixed_rows_mut::<3>(3).copy_from(&(v * moved));
-                        column.fixed_rows_mut::<3>(6).copy_from(&v);
-                        column.fixed_rows_mut::<3>(9).copy_from(&rate);
-                        let carried =
-                            at.fixed_rows::<3>(6).dot(&v) + at.fixed_rows::<3>(9).dot(&rate);
-                        column[UNKNOWNS] = row.signal_m[probe] * 1e3 - grown * moved - carried;
-                        column
-                    })
-                    .collect();
-                let mean = columns.iter().sum::<SVector<_, _>>() / columns.len().max(1) as f64;
-                for column in &columns {
-                    let column = column - mean;
-                    products.ger(1.0, &column, &column, 1.0);
-                }
-                count += columns.len() as f64 - 1.0;
+            for movement in rows.movement_rows() {
+                let some = rows.rows[movement].iter().step_by(apart);
+                let columns: Vec<_> = some.map(column).collect();
+                let mean = columns.iter().sum::<SVector<_, _>>() / columns.len() as f64;
+                let off = columns.iter().map(|column| column - mean);
+                off.for_each(|off| products.ger(1.0, &off, &off, 1.0));
+                count += columns.len() as f64;
             }
-            let rest = products[(UNKNOWNS, UNKNOWNS)] / f64::max(count, 1.0);
+            let rest = products[(UNKNOWNS, UNKNOWNS)] / count;
             let mut own = products.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into_owned();
-            for k in 0..UNKNOWNS {
-                own[(k, k)] += (rest / (OPEN * OPEN)).max(f64::MIN_POSITIVE);
-            }
+            let open = (rest / (OPEN * OPEN)).max(f64::MIN_POSITIVE);
+            own += SMatrix::from_diagonal_element(open);
             let factor = Cholesky::new(own)?;
             at += factor.solve(&products.fixed_view::<UNKNOWNS, 1>(0, UNKNOWNS));
-            let covariance = factor.inverse() * (rest * alike);
-            found = Some(Fitted {
-                gains: at.fixed_rows::<3>(0).into(),
-                slopes: at.fixed_rows::<3>(3).into(),
-                covariance: covariance.fixed_view::<6, 6>(0, 0).into(),
-            });
+            covariance = factor.inverse() * (rest * alike);
         }
-        found.filter(|found| {
-            found
-                .gains
-                .iter()
-                .chain(&found.slopes)
-                .all(|x| x.is_finite())
-        })
+        let found = Fitted {
+            at: at.fixed_rows::<6>(0).into(),
+            covariance: covariance.fixed_view::<6, 6>(0, 0).into(),
+        };
+        found.at.iter().all(|x| x.is_finite()).then_some(found)
     };
     Some([of_probe(0)?, of_probe(1)?, of_probe(2)?])
 }

@@ -53,13 +53,13 @@ fn a_short_sound_log_has_no_mistake() {
 fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
     type Mistake = (Code, &'static [&'static str], fn(&mut Sample));
     let both: &[&str] = &[
-        "the Hall signals are multiplied by 2.0",
-        "the reference is multiplied by 0.50",
+        "the scale of all Hall probes is multiplied by 2.0",
+        "the scale of all beams is multiplied by 0.50",
     ];
     let mistakes: [Mistake; 11] = [
         (
             Code::ChannelsSwapped,
-            &["Hall A and C are exchanged"],
+            &["Hall A and Hall C are exchanged"],
             |s| s.hall.swap(0, 2),
         ),
         (
@@ -67,39 +67,51 @@ fn a_mistake_with_channels_is_named_with_all_that_a_log_cannot_tell_it_from() {
             &["the sign of Hall B is turned"],
             |s| s.hall[1] = -s.hall[1],
         ),
-        (Code::BeamsSwapped, &["beam Y1 and Y2 are exchanged"], |s| {
-            s.beams_nm.swap(1, 2)
-        }),
+        (
+            Code::BeamsSwapped,
+            &["beam Y1 and beam Y2 are exchanged"],
+            |s| s.beams_nm.swap(1, 2),
+        ),
         (Code::BeamInverted, &["the sign of beam X is turned"], |s| {
             s.beams_nm[0] = -s.beams_nm[0]
         }),
         (
             Code::CapacitiveSwapped,
             &[
-                "capacitive 1 and 2 are exchanged",
+                "capacitive sensor 1 and capacitive sensor 2 are exchanged",
                 "the places of the capacitive sensors are mirrored along x",
             ],
             |s| s.capacitive.swap(0, 1),
         ),
-        (Code::ScaleWrong, &["the gaps are multiplied by 10"], |s| {
-            s.capacitive = s.capacitive.map(|code| code / 10);
-        }),
-        (Code::ScaleWrong, &["Hall B is multiplied by 0.50"], |s| {
-            s.hall[1] *= 2
-        }),
-        (Code::ScaleWrong, &["Hall A is multiplied by 0.6"], |s| {
-            s.hall[0] += s.hall[0] / 2;
-        }),
         (
             Code::ScaleWrong,
-            &["the reference is multiplied by 1000"],
+            &["the scale of all capacitive sensors is multiplied by 10"],
+            |s| {
+                s.capacitive = s.capacitive.map(|code| code / 10);
+            },
+        ),
+        (
+            Code::ScaleWrong,
+            &["the scale of Hall B is multiplied by 0.50"],
+            |s| s.hall[1] *= 2,
+        ),
+        (
+            Code::ScaleWrong,
+            &["the scale of Hall A is multiplied by 0.6"],
+            |s| {
+                s.hall[0] += s.hall[0] / 2;
+            },
+        ),
+        (
+            Code::ScaleWrong,
+            &["the scale of all beams is multiplied by 1000"],
             |s| {
                 s.beams_nm = s.beams_nm.map(|nm| nm / 1000);
             },
         ),
         (
             Code::ScaleWrong,
-            &["beam Y1 and Y2 are multiplied by 0.50"],
+            &["the scale of beam Y1 and beam Y2 is multiplied by 0.50"],
             |s| (1..3).for_each(|beam| s.beams_nm[beam] *= 2),
         ),
         (Code::ScaleWrong, both, |s| {
@@ -182,7 +194,7 @@ fn a_beam_that_is_a_tenth_too_long_is_named_beside_others() {
             (found.code, found.severity),
             (Code::ScaleWrong, Severity::Refuse)
         );
-        let cure = "beam Y1 is multiplied by 0.91";
+        let cure = "the scale of beam Y1 is multiplied by 0.91";
         assert!(found.message.contains(cure), "{}", found.message);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::columns::{Course, FAMILIES, Kind, range_of};
 use super::{Fault, Job, severity};
+use crate::diagnose::slopes::title;
 use crate::finding::{Code, Finding, Severity};
 use crate::judge::verdict::Predicted;
 
@@ -112,15 +113,4 @@ pub(super) fn without_course(fault: &Fault, cost: f64) -> Finding {
     );
     let found = Finding::new(Code::ModelLacks, message).severe(severity(cost).max(Severity::Warn));
     found.on(channel).costing(cost)
-}
-
-fn title(channel: &str) -> String {
-    match channel.split_once('_') {
-        Some(("hall", probe)) => format!("Hall {}", probe.to_uppercase()),
-        Some(("cap", gap)) => format!("capacitive sensor {gap}"),
-        Some((_, beam)) => format!("beam {}", beam.to_uppercase()),
-        None if channel == "hall" => "all Hall probes".to_owned(),
-        None if channel == "cap" => "all capacitive sensors".to_owned(),
-        None => "all beams".to_owned(),
-    }
 }
