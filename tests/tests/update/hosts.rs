@@ -63,6 +63,27 @@ fn a_host_that_finds_another_at_it_gives_up_as_busy_and_does_not_end_its_transfe
 }
 
 #[test]
+fn a_host_whose_numbers_another_uses_up_waits_for_its_turn_or_gives_up_as_busy() {
+    let zero = Zero {
+        key: Some(KEY),
+        declares_servo_off: true,
+        clears: true,
+    };
+    for (lasts_ms, ends) in [(600, true), (10_000, false)] {
+        for after_ms in 0..10 {
+            let mut world = World::new(Some(KEY), &[], after_ms);
+            for (k, at_ms) in (after_ms..lasts_ms).step_by(10).enumerate() {
+                let draw = Request::Update(UpdateRequest::Challenge { part: 0 });
+                world.other_asks(at_ms * 1_000, draw, 64 + k as u8 % 16);
+            }
+            let ended = on::rezero(&mut world.talk(), &zero);
+            let want = if ends { Ok(()) } else { Err(UpdateError::Busy) };
+            assert_eq!(ended, want, "{after_ms}");
+        }
+    }
+}
+
+#[test]
 fn what_another_host_declares_on_is_not_declared_off_again() {
     let (mut stored, mut refused) = (0, 0);
     for after_ms in (80..1_000).step_by(10) {

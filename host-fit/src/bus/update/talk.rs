@@ -4,6 +4,7 @@ use super::UpdateError;
 use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Command, Content, Mailbox, Outcome, Request};
 use hal_adapters::can::update::{Key, Nonce, TAG_INDEX, UpdateData, UpdateRequest, tag, word_of};
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 
 /// From frame to frame, us. The receive store of a controller holds three frames and is emptied in
 /// every tick of 2 ms: at one frame in a millisecond none is lost, not even to a tick that is late.
@@ -17,8 +18,8 @@ const STARTED_US: u64 = 6_000_000;
 const ATTEMPTS: u32 = 30;
 /// How often a request is sent with a new tag, after one over a number that was no longer the last.
 const TAGS: u32 = 8;
-/// Pause before a new tag, times the token, us: two hosts hardly have the same.
-const BACK_OFF_US: u64 = 500;
+/// Longest pause before the second tag, us: two tagged requests take less. It doubles with each tag.
+const BACK_OFF_US: u64 = 40_000;
 /// How often a node names a word that was lost.
 const LOST_MAX: u32 = 1_000;
 /// The tokens of transfers have this bit, those of other requests do not.
@@ -58,6 +59,8 @@ pub struct Talk<L> {
     free_us: u64,
     /// Whether the user may end it now.
     pub(super) may_stop: bool,
+    /// Whether another host was heard.
+    hears_others: bool,
 }
 
 impl<L: Link> Talk<L> {
@@ -70,6 +73,7 @@ impl<L: Link> Talk<L> {
             token: token & !TRANSFER_TOKEN,
             free_us: 0,
             may_stop: true,
+            hears_others: false,
         }
     }
 
@@ -133,7 +137,8 @@ impl<L: Link> Talk<L> {
         Err(UpdateError::NoAnswer)
     }
 
-    /// As [`Talk::exchange`], of a request that a node with a key obeys only with a tag.
+    /// As [`Talk::exchange`], of a request that a node with a key obeys only with a tag. It is
+    /// [`Outcome::Busy`] where another host is heard and no tag is right.
     ///
     /// # Errors
     /// As [`Talk::exchange`], and [`UpdateError::NoRandomNumber`].
@@ -153,21 +158,27 @@ impl<L: Link> Talk<L> {
         key: Option<&Key>,
         request: Request,
     ) -> Result<(Outcome, u32), UpdateError> {
+        let Some(key) = key else {
+            let answer = self.exchange_words(token, request, &[]);
+            return answer.map(|(answer, _)| answer);
+        };
         let command = Command::new(request, token);
-        let mut answer = (Outcome::NotAuthorised, 0);
-        for _ in 0..TAGS {
-            let words = match key {
-                Some(key) => self.authorise(key, &command, &[], 0)?,
-                None => Vec::new(),
-            };
-            answer = self.exchange_words(token, request, &words)?.0;
-            if key.is_none() || answer.0 != Outcome::NotAuthorised {
-                break;
+        for tries in 0..TAGS {
+            let words = self.authorise(key, &command, &[], 0);
+            match words.and_then(|words| self.exchange_words(token, request, &words)) {
+                // The number was no longer the last: the node was reset, or another host used it up.
+                Ok(((Outcome::NotAuthorised, _), _)) | Err(UpdateError::Lossy) => {}
+                answer => return answer.map(|(answer, _)| answer),
             }
-            // Another host may have asked for a number meanwhile: not again at the same time.
-            self.pause(u64::from(token) * BACK_OFF_US)?;
+            if self.hears_others {
+                self.back_off(BACK_OFF_US << tries)?;
+            }
         }
-        Ok(answer)
+        // Which of the two it is shows once the other host is done.
+        match self.hears_others {
+            true => Ok((Outcome::Busy, 0)),
+            false => Ok((Outcome::NotAuthorised, 0)),
+        }
     }
 
     /// The answer to a request for which these words were sent: those that were lost are sent again.
@@ -211,20 +222,17 @@ impl<L: Link> Talk<L> {
 
     /// A number that a tag is to be over.
     fn nonce(&mut self) -> Result<Nonce, UpdateError> {
-        'anew: for _ in 0..TAGS {
-            let mut nonce = [0; 4];
-            for (part, word) in (0..).zip(&mut nonce) {
-                let challenge = Request::Update(UpdateRequest::Challenge { part });
-                *word = match self.exchange(challenge)? {
-                    (Outcome::Done, drawn) => drawn,
-                    // The node was reset, or another computer has used it up.
-                    (Outcome::NoTransfer, _) => continue 'anew,
-                    (outcome, detail) => return Err(UpdateError::of(outcome, detail, false)),
-                };
-            }
-            return Ok(nonce);
+        let mut nonce = [0; 4];
+        for (part, word) in (0..).zip(&mut nonce) {
+            let challenge = Request::Update(UpdateRequest::Challenge { part });
+            *word = match self.exchange(challenge)? {
+                (Outcome::Done, drawn) => drawn,
+                // The node was reset, or another computer has used it up.
+                (Outcome::NoTransfer, _) => return Err(UpdateError::Lossy),
+                (outcome, detail) => return Err(UpdateError::of(outcome, detail, false)),
+            };
         }
-        Err(UpdateError::Lossy)
+        Ok(nonce)
     }
 
     /// Sends a word, to which no answer comes.
@@ -237,6 +245,12 @@ impl<L: Link> Talk<L> {
         let until_us = self.link.now_us() + us;
         while self.receive(until_us)?.is_some() {}
         Ok(())
+    }
+
+    /// Waits up to so long, by chance: two hosts do not ask at the same time again.
+    fn back_off(&mut self, us_max: u64) -> Result<(), UpdateError> {
+        let hasher = BuildHasherDefault::<DefaultHasher>::default();
+        self.pause(hasher.hash_one((self.link.now_us(), self.token)) % us_max)
     }
 
     fn send(&mut self, content: &Content) -> Result<(), UpdateError> {
@@ -261,6 +275,7 @@ impl<L: Link> Talk<L> {
             if let Some(frame) = self.link.receive(until_us.min(now_us + WAIT_US))?
                 && let Some(Ok(content)) = self.mailbox.take(&frame)
             {
+                self.hears_others |= matches!(content, Content::Command(_));
                 return Ok(Some(content));
             }
         }
