@@ -73,7 +73,7 @@ codes! {
     GainDrift, "gain_drift", Warn, "the gain of a channel changes", "let it warm up; check its supply", [TermsAtLimit];
     Step, "step", Warn, "a channel jumps and stays there", "record the movement again", [TermsAtLimit ZeroClipped Outliers];
     Stuck, "stuck", Warn, "a channel stands still while the others move", "check cable, register and drive; leave the rows out", [TermsAtLimit ZeroClipped Outliers Step LeftOut];
-    IdleMovement, "idle_movement", Note, "a movement in which nothing moves", "record it again", [];
+    IdleMovement, "idle_movement", Warn, "a movement in which nothing moves", "record it again", [];
     Saturated, "saturated", Warn, "codes at the end of a converter's range", "less gain, or less motion", [TermsAtLimit ZeroClipped Outliers LogsDisagree LeftOut];
     Outliers, "outliers", Warn, "rows far outside the noise", "leave the rows out", [Outliers];
     LeftOut, "left_out", Warn, "many rows count less than half in the fit", "find out what happened there and record again", [];

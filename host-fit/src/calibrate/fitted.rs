@@ -240,10 +240,11 @@ impl Outcome {
 
 /// Why a search that was interrupted is not to be written: a finished one leaves little but noise.
 fn unfinished(fit: &Fit, log: &LogReading) -> Option<String> {
-    let found = of_residuals::unexplained(fit, &log.dataset)?;
-    let (rms, unit) = (found.value?, found.unit?);
-    Some(format!(
-        "the best so far has errors of {rms:.1} {unit} rms, more than {} times the noise from sample to sample: let it run longer",
-        of_residuals::ERROR_TO_NOISE_MAX
-    ))
+    let ratio = of_residuals::over_noise(fit, &log.dataset);
+    (ratio > of_residuals::ERROR_TO_NOISE_MAX).then(|| {
+        format!(
+            "the best so far has errors of {ratio:.1} times the noise from sample to sample, more than {}: let it run longer",
+            of_residuals::ERROR_TO_NOISE_MAX
+        )
+    })
 }

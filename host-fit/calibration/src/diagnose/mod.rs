@@ -6,8 +6,6 @@
 //! | [`structure`] | which of them alone explains a log |
 //! | [`bank`] | faults of channels, logs or parts of one that contradict each other, with their cost |
 //! | [`range`] | poses beyond the range of a calibration |
-//! | `left_out` | rows that a fit left out of account |
-//! | `short_movements` | movements whose zero deviations take their errors |
 //! | [`of_fit`] | what a fit says of itself |
 //! | [`signals`] | what the signals show by themselves |
 //! | `slopes` | how an error of each channel shows in the Hall signals |
@@ -33,11 +31,9 @@
 //! ```
 
 pub mod bank;
-mod left_out;
 mod mistakes;
 pub mod of_fit;
 pub mod range;
-mod short_movements;
 pub mod signals;
 mod slopes;
 pub mod structure;
@@ -104,7 +100,7 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         }
     }
     let findings = &mut out.findings;
-    findings.extend(short_movements::finding(fitted.ok(), dataset));
+    findings.extend(of_fit::short_movements(fitted.ok(), dataset));
     *findings = in_order(std::mem::take(findings));
     let (refused, ratio) = (is_refused(findings), out.predicted.map(|p| p.worst_ratio()));
     if let Some(ratio) = ratio.filter(|ratio| by.for_service && *ratio > LIMITED_MAX && !refused) {
@@ -238,7 +234,7 @@ impl Diagnosis {
         let findings = &mut self.findings;
         // Rows that a fault explains are no riddle.
         if self.repair.is_none() {
-            findings.extend(left_out::finding(fit, dataset));
+            findings.extend(of_fit::left_out(fit, dataset));
         }
         // One beam that is late is a lag of all of them to a fit.
         let is_late = findings
@@ -255,11 +251,7 @@ impl Diagnosis {
         findings.extend(range::undeclared(dataset, stage).filter(|found| !ranged(found)));
         if !is_explained(findings) {
             findings.extend(of_fit::undescribed(fit, dataset));
-            findings.extend(of_fit::not_field(fit, self.predicted.as_ref()));
-        }
-        // Of the field model the bank says what is left.
-        if fit.field.is_none() && are_notes(findings) {
-            findings.extend(of_fit::unexplained(fit, dataset));
+            findings.extend(of_fit::not_field(fit, dataset, self.predicted.as_ref()));
         }
     }
 }

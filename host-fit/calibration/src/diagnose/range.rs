@@ -9,42 +9,41 @@ use runtime::ParameterSet;
 /// moves otherwise: no log shows a scale that is common to all channels of a kind.
 pub(super) const SPANS: (f64, f64) = (0.1, 2.0);
 
+/// X, Y, Rz, Z, Rx, Ry: m, rad.
+fn pose(row: &Row) -> impl Iterator<Item = f64> {
+    row.reference.into_iter().chain(row.vertical)
+}
+
 /// Axes that span far more or far less than `[motion]` declares.
 pub(super) fn undeclared(dataset: &Dataset, stage: &Stage) -> impl Iterator<Item = Finding> {
-    let spans: Vec<f64> = (0..AXES.len())
-        .map(|axis| {
-            let value = |row: &Row| match axis {
-                0..3 => row.reference[axis],
-                _ => row.vertical[axis - 3],
-            };
-            let values = || dataset.rows.iter().map(value);
-            let low = values().fold(f64::INFINITY, f64::min);
-            values().fold(f64::NEG_INFINITY, f64::max) - low
-        })
-        .collect();
-    let axes = AXES.iter().zip(&stage.motion.axes).zip(spans);
-    let off = axes.filter(|((_, motion), span)| {
-        let part = span / (2.0 * motion.service);
-        part.is_finite() && !(SPANS.0..=SPANS.1).contains(&part)
-    });
-    off.map(|(((axis, _), motion), span)| {
+    let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; AXES.len()];
+    for row in &dataset.rows {
+        for ([low, high], value) in ends.iter_mut().zip(pose(row)) {
+            (*low, *high) = (low.min(value), high.max(value));
+        }
+    }
+    let axes = AXES.iter().zip(stage.motion.axes).zip(ends);
+    axes.filter_map(|(((axis, _), motion), [low, high])| {
+        let [span, service] = [high - low, 2.0 * motion.service].map(|x| x * 1e6);
+        let part = span / service;
+        if !part.is_finite() || (SPANS.0..=SPANS.1).contains(&part) {
+            return None;
+        }
         let unit = if axis.starts_with('r') { "urad" } else { "um" };
-        let [span, service] = [span, 2.0 * motion.service].map(|x| x * 1e6);
         let message = format!(
             "the log spans {span:.0} {unit} in {axis}, service {service:.0} ([motion] in stage.toml): a scale of all channels of a \
              kind may be wrong, which nothing else shows; check units and scales, or declare the motion"
         );
-        Finding::new(Code::OutOfRange, message).on(*axis).of(span, unit)
+        Some(Finding::new(Code::OutOfRange, message).on(*axis).of(span, unit))
     })
 }
 
 /// The rows whose pose leaves the range in which a blob was calibrated.
 pub fn out_of_range(set: &ParameterSet, dataset: &Dataset) -> Option<Finding> {
-    let planar = set.constants.calibrated_planar.map(f64::from);
-    let vertical = set.constants.calibrated_vertical.map(f64::from);
-    let beyond = |pose: [f64; 3], range: [f64; 3]| (0..3).any(|k| pose[k].abs() > range[k]);
-    let mut rows = (dataset.rows.iter())
-        .filter(|row| beyond(row.reference, planar) || beyond(row.vertical, vertical));
+    let constants = &set.constants;
+    let range = [constants.calibrated_planar, constants.calibrated_vertical].concat();
+    let is_beyond = |(value, end): (f64, &f32)| value.abs() > f64::from(*end);
+    let mut rows = (dataset.rows.iter()).filter(|row| pose(row).zip(&range).any(is_beyond));
     let first = rows.next()?;
     let count = 1 + rows.count();
     let message = format!(

@@ -63,14 +63,11 @@ const INPUTS: [(&str, &str, &[usize]); 4] = [
 pub fn trusted(set: &ParameterSet) -> Vec<Trusted> {
     let constants = &set.constants;
     let ends = [constants.calibrated_planar, constants.calibrated_vertical].concat();
+    let unit = |axis: &str| if axis.starts_with('R') { "urad" } else { "um" };
     let cost = |&axis: &usize| AxisCost {
         axis: AXES[axis],
         value: PART * f64::from(ends[axis]) * 1e6,
-        unit: if AXES[axis].starts_with('R') {
-            "urad"
-        } else {
-            "um"
-        },
+        unit: unit(AXES[axis]),
     };
     let of_input = |(input, place, axes): (_, _, &[usize])| Trusted {
         input,

@@ -147,7 +147,7 @@ impl Validity {
 
 /// The quantile, this many standard deviations from the middle, of a sum of squares with this mean and
 /// variance: as of a chi-square with as many degrees of freedom, by Wilson and Hilferty.
-fn quantile(mean: f64, variance: f64, deviations: f64) -> f64 {
+pub(crate) fn quantile(mean: f64, variance: f64, deviations: f64) -> f64 {
     if mean <= 0.0 {
         return 0.0;
     }

@@ -1,20 +1,9 @@
 //! The signals of one log, channel by channel.
 
-use crate::diagnose::slopes::CHANNELS;
-use crate::finding::{Code, Finding, Severity};
 use crate::input::dataset::{Dataset, LogSource, Row};
 use crate::input::stage::Stage;
 use crate::statistics;
 use std::ops::Range;
-
-/// One channel of a log.
-pub(super) struct Channel {
-    pub(super) name: &'static str,
-    /// By row, m.
-    pub(super) values: Vec<f64>,
-    /// m per code; 0 for a beam.
-    pub(super) m_per_code: f64,
-}
 
 /// One log. Rows are numbered from its first.
 pub(super) struct LogSignals<'a> {
@@ -24,36 +13,32 @@ pub(super) struct LogSignals<'a> {
     pub(super) rows: &'a [Row],
     /// Its movements.
     pub(super) segments: Vec<Range<usize>>,
-    /// Hall A, B, C; X, Y1, Y2; then the gaps where the log has codes.
-    pub(super) channels: Vec<Channel>,
+    /// By channel and row, m: those of [`CHANNELS`](crate::diagnose::slopes::CHANNELS), gaps where the log
+    /// has codes.
+    pub(super) channels: Vec<Vec<f64>>,
     /// Whether a row is used by the tests that follow.
     pub(super) usable: Vec<bool>,
     /// Median time between rows, s.
     pub(super) period_s: f64,
-    /// The first of them in the dataset.
-    pub(super) first: usize,
 }
 
 impl<'a> LogSignals<'a> {
     pub(super) fn new(dataset: &'a Dataset, stage: &'a Stage, log: usize) -> Self {
         let source = &dataset.logs[log];
-        let range = source.rows.clone();
-        let rows = &dataset.rows[range.clone()];
+        let (start, rows) = (source.rows.start, &dataset.rows[source.rows.clone()]);
         let movements = dataset.movements.iter().filter(|m| m.log == log);
         let segments: Vec<Range<usize>> = movements
-            .map(|m| m.rows.start - range.start..m.rows.end - range.start)
+            .map(|m| m.rows.start - start..m.rows.end - start)
             .collect();
-        let period_s = period_s(rows, &segments, stage.servo_period_s);
         Self {
             channels: channels(rows, stage),
             usable: vec![true; rows.len()],
-            first: range.start,
+            period_s: period_s(rows, &segments, stage.servo_period_s),
             dataset,
             stage,
             source,
             rows,
             segments,
-            period_s,
         }
     }
 
@@ -65,53 +50,30 @@ impl<'a> LogSignals<'a> {
         }
     }
 
-    /// A warning about the whole log, or several of its movements.
-    pub(super) fn warning(&self, code: Code, message: String) -> Finding {
-        let message = match self.dataset.logs.len() {
-            1 => message,
-            _ => format!("{}: {message}", self.source.name()),
-        };
-        Finding::new(code, message).severe(Severity::Warn)
-    }
-
-    /// A warning about a place in the log.
-    pub(super) fn warning_at(&self, code: Code, row: usize, message: String) -> Finding {
+    /// Name of the movement of a row, and its time, us.
+    pub(super) fn place(&self, row: usize) -> (String, i64) {
         let Row { movement, t_us, .. } = self.rows[row];
-        let dataset = self.dataset;
-        let movement = dataset.movement_name(&dataset.movements[movement]);
-        let message = format!("{message}. See movement {movement} at t_us = {t_us}");
-        self.warning(code, message).at(movement, t_us)
+        let movement = &self.dataset.movements[movement];
+        (self.dataset.movement_name(movement), t_us)
     }
 }
 
-fn channels(rows: &[Row], stage: &Stage) -> Vec<Channel> {
-    let half_m = 0.5 * stage.y_baseline_m;
-    // Through the pose and back equal beams differ by rounding.
-    let beam = |beam_m: f64| Some(f64::from(beam_m as f32));
-    let value = |channel: usize, row: &Row| {
+fn channels(rows: &[Row], stage: &Stage) -> Vec<Vec<f64>> {
+    let mut channels = vec![Vec::with_capacity(rows.len()); 9];
+    for row in rows {
         let [x, y, rz] = row.reference;
-        match channel {
-            0..3 => Some(row.signal_m[channel]),
-            3 => beam(x),
-            4 => beam(y + half_m * rz.tan()),
-            5 => beam(y - half_m * rz.tan()),
-            _ => {
-                let codes = row.frame.capacitive()?;
-                Some(f64::from(codes[channel - 6]) * stage.capacitive.m_per_count)
-            }
+        let turned_m = 0.5 * stage.y_baseline_m * rz.tan();
+        // Through the pose and back equal beams differ by rounding.
+        let beams_m = [x, y + turned_m, y - turned_m].map(|beam_m| f64::from(beam_m as f32));
+        let codes = row.frame.capacitive().into_iter().flatten();
+        let gaps_m = codes.map(|code| f64::from(code) * stage.capacitive.m_per_count);
+        let values = row.signal_m.into_iter().chain(beams_m).chain(gaps_m);
+        for (channel, value) in channels.iter_mut().zip(values) {
+            channel.push(value);
         }
-    };
-    let per_code = [stage.hall.m_per_count, 0.0, stage.capacitive.m_per_count];
-    let channel = |(k, name): (usize, &'static str)| {
-        let values = rows.iter().map(|row| value(k, row));
-        Some(Channel {
-            name,
-            values: values.collect::<Option<_>>()?,
-            m_per_code: per_code[k / 3],
-        })
-    };
-    let channels = CHANNELS.into_iter().enumerate();
-    channels.map_while(channel).collect()
+    }
+    channels.retain(|values| values.len() == rows.len());
+    channels
 }
 
 /// Median time between the rows of the segments, s; that of the servo where there are too few.
@@ -125,4 +87,10 @@ pub fn period_s(rows: &[Row], segments: &[Range<usize>], servo_period_s: f64) ->
 /// The median; 0 of nothing.
 pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
     statistics::median(&mut values.collect::<Vec<f64>>()).unwrap_or(0.0)
+}
+
+/// The medians of blocks of rows.
+pub(super) fn levels(values: &[f64]) -> Vec<f64> {
+    let blocks = values.chunks_exact(super::BLOCK);
+    blocks.map(|block| median(block.iter().copied())).collect()
 }

@@ -3,70 +3,63 @@
 use super::channels::LogSignals;
 use super::residual::{Residuals, is_seen};
 use super::spectrum::{Spectrum, windows};
+use crate::diagnose::of_fit::severity;
+use crate::diagnose::slopes::CHANNELS;
 use crate::finding::{Code, Finding, Severity};
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Longest window, s: its bins tell 50 Hz from 60.
 const WINDOW_S: f64 = 2.0;
 /// Below this many times the frequency of the motion residuals may hold what the model does not describe.
 const OF_MOTION: usize = 8;
-/// Amplitude in parts of the noise of a probe from which a line is worth a warning: it makes the noise 2 % more.
-const WARN_MIN: f64 = 0.3;
 
 /// Names the channels that hum, each at its strongest line above the motion.
 pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let longest = log.segments.iter().map(Range::len).max().unwrap_or(0);
-    let length = longest.min((WINDOW_S / log.period_s).round().max(1.0) as usize);
-    let mut windows = windows(&log.segments, length.max(1));
+    let length = longest
+        .min((WINDOW_S / log.period_s).round() as usize)
+        .max(1);
+    let mut windows = windows(&log.segments, length);
     // A mean over windows without residuals would count as if all of them had gone in.
     windows.retain(|window| {
         let used = log.usable[window.clone()].iter().filter(|used| **used);
-        2 * used.count() >= window.len()
+        2 * used.count() >= length
     });
     let Some(middle) = windows.get(windows.len() / 2) else {
         return Vec::new();
     };
     let slopes = residuals.slopes(log, middle.start);
     let spectrum = |values: &Vec<f64>| Spectrum::new(values, &windows);
-    let raw: Vec<Spectrum> = log.channels.iter().map(|c| spectrum(&c.values)).collect();
+    let raw: Vec<Spectrum> = log.channels.iter().map(spectrum).collect();
     let motion = raw[3..6].iter().map(Spectrum::highest).max().unwrap_or(0);
-    // By channel: amplitude in parts of the noise of a probe, and in the channel, m; and bin.
-    let mut found: BTreeMap<usize, (f64, f64, usize)> = BTreeMap::new();
+    // Channel, amplitude in parts of the noise of a probe, bin.
+    let mut lines: Vec<(usize, f64, usize)> = Vec::new();
     for (probe, values) in residuals.values.iter().enumerate() {
         let residual = spectrum(values);
         for bin in residual.lines(OF_MOTION * motion) {
             let shown_m = residual.amplitude(bin);
-            let in_probe =
-                |channel: usize| slopes[channel][probe].abs() * raw[channel].amplitude(bin);
-            let channels = (0..raw.len()).filter(|&channel| is_seen(in_probe(channel), shown_m));
-            let best = channels.max_by(|&a, &b| in_probe(a).total_cmp(&in_probe(b)));
-            if let Some(channel) = best {
-                let noises = shown_m / residuals.noise_m[probe];
-                let line = (noises, raw[channel].amplitude(bin), bin);
-                let strongest = found.entry(channel).or_insert(line);
-                if line.0 > strongest.0 {
-                    *strongest = line;
-                }
-            }
+            let in_probe = |k: usize| slopes[k][probe].abs() * raw[k].amplitude(bin);
+            let seen = (0..raw.len()).filter(|&k| is_seen(in_probe(k), shown_m));
+            let best = seen.max_by(|&a, &b| in_probe(a).total_cmp(&in_probe(b)));
+            lines.extend(best.map(|channel| (channel, shown_m / residuals.noise_m[probe], bin)));
         }
     }
-    let finding = |(channel, (noises, size_m, bin)): (usize, (f64, f64, usize))| {
-        let name = log.channels[channel].name;
+    let finding = |channel: usize| {
+        let own = lines.iter().filter(|line| line.0 == channel);
+        let &(_, noises, bin) = own.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let name = CHANNELS[channel];
         let frequency_hz = bin as f64 / (length as f64 * log.period_s);
         let message = format!(
             "{name} hums at {frequency_hz:.1} Hz with an amplitude of {:.2} um: look for mains (50 or 60 Hz and multiples) in \
              its cable and supply, or for a vibration of that part",
-            size_m * 1e6,
+            raw[channel].amplitude(bin) * 1e6,
         );
-        let severity = match noises < WARN_MIN {
-            true => Severity::Note,
-            false => Severity::Warn,
-        };
-        let found = log.warning(Code::Hum, message).severe(severity);
-        found.on(name).of(frequency_hz, "Hz")
+        // How much more noise it makes.
+        let share = (1.0 + 0.5 * noises * noises).sqrt() - 1.0;
+        let found = Finding::new(Code::Hum, message).severe(severity(share).min(Severity::Warn));
+        Some(found.on(name).of(frequency_hz, "Hz"))
     };
-    found.into_iter().map(finding).collect()
+    (0..raw.len()).filter_map(finding).collect()
 }
 
 #[cfg(test)]

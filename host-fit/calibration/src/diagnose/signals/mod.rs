@@ -55,7 +55,7 @@ pub fn signal_findings(
         let mut signals = LogSignals::new(dataset, stage, log);
         findings.extend(of_log(&mut signals, fitted));
         let unused = (0..signals.rows.len()).filter(|&row| !signals.usable[row]);
-        bad.extend(unused.map(|row| signals.first + row));
+        bad.extend(unused.map(|row| signals.source.rows.start + row));
     }
     (findings, bad)
 }
@@ -72,9 +72,15 @@ fn of_log(log: &mut LogSignals, (parameters, lag_s): (&FieldParameters, f64)) ->
             found.extend(test(log, &residuals));
         }
     }
-    let (rows, all) = (log.rows.len(), source.rows_read);
-    if rows < all {
-        for found in &mut found {
+    let (rows, all, count) = (log.rows.len(), source.rows_read, log.dataset.logs.len());
+    for found in &mut found {
+        if count > 1 {
+            found.message = format!("{}: {}", source.name(), found.message);
+        }
+        if let (Some(movement), Some(t_us)) = (&found.movement, found.t_us) {
+            found.message += &format!(". See movement {movement} at t_us = {t_us}");
+        }
+        if rows < all {
             found.message += &format!(" (looked for in {rows} of {all} rows)");
         }
     }

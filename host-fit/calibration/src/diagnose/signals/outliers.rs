@@ -3,72 +3,64 @@
 use super::channels::{LogSignals, median};
 use super::residual::{Residuals, is_seen};
 use super::{BLOCK, CLEAR};
+use crate::diagnose::slopes::CHANNELS;
 use crate::finding::{Code, Finding};
 use crate::statistics::robust_deviation;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
-use std::ops::Range;
+use std::cmp::Ordering::Equal;
 
 /// Names rows far outside the noise, by channel, and leaves them out.
 pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
-    let rows = log
-        .segments
-        .iter()
-        .flat_map(|s| s.clone().map(move |row| (s, row)));
-    let rows: Vec<(&Range<usize>, usize)> = rows.filter(|(_, row)| log.usable[*row]).collect();
+    let rows: Vec<usize> = (0..log.rows.len()).filter(|&row| log.usable[row]).collect();
     // From the median of those about it: beside a step is no outlier.
-    let off_m = |&(segment, row): &(&Range<usize>, usize)| {
-        let about = row.saturating_sub(BLOCK).max(segment.start)..segment.end.min(row + BLOCK + 1);
-        let about: Vec<usize> = about.filter(|&row| log.usable[row]).collect();
+    let off_m = |&row: &usize| {
+        let about: Vec<usize> = about(log, row).collect();
         let middle_m = |values: &Vec<f64>| median(about.iter().map(|&row| values[row]));
         (residuals.values.each_ref()).map(|values| values[row] - middle_m(values))
     };
     let off_m: Vec<[f64; 3]> = rows.par_iter().map(off_m).collect();
     let usual_m = [0, 1, 2].map(|k| robust_deviation(off_m.iter().map(|off_m| off_m[k])));
-    let is_far = |off_m: &[f64; 3]| (0..3).any(|k| off_m[k].abs() > CLEAR * usual_m[k]);
-    let far = rows
-        .into_iter()
-        .zip(off_m)
-        .filter(|(_, off_m)| is_far(off_m));
-    let far = far.map(|((segment, row), off_m)| (segment.clone(), row, off_m));
-    let far: Vec<(Range<usize>, usize, [f64; 3])> = far.collect();
-    far.iter().for_each(|(_, row, _)| log.usable[*row] = false);
-    let mut by_channel: BTreeMap<usize, Vec<(usize, f64)>> = BTreeMap::new();
-    for (segment, row, shown_m) in far {
-        let mut rows = (segment.start..row).rev().filter(|&row| log.usable[row]);
-        let before = rows.next();
-        let behind = (row + 1..segment.end).find(|&row| log.usable[row]);
-        let beside = [before.or(behind), behind.or(before)].map(|row| row.unwrap_or(0));
+    let is_far =
+        |(_, off_m): &(usize, [f64; 3])| (0..3).any(|k| off_m[k].abs() > CLEAR * usual_m[k]);
+    let far: Vec<(usize, [f64; 3])> = rows.into_iter().zip(off_m).filter(is_far).collect();
+    far.iter().for_each(|(row, _)| log.usable[*row] = false);
+    // Channel, row, size.
+    let cause = |&(row, shown_m): &(usize, [f64; 3])| {
+        let before = about(log, row).take_while(|&other| other < row).last();
+        let behind = about(log, row).find(|&other| other > row);
+        let beside = [before.or(behind), behind.or(before)].map(|beside| beside.unwrap_or(row));
         // A channel that jumps by what the residuals ask of it, before any other.
         let worth = |(channel, [size_m, explained]): &(usize, [f64; 2])| {
-            let values = &log.channels[*channel].values;
+            let values = &log.channels[*channel];
             let own_m = values[row] - 0.5 * (values[beside[0]] + values[beside[1]]);
-            (f64::from(u8::from(is_seen(own_m, *size_m))) + 1e-9) * explained
+            (is_seen(own_m, *size_m), *explained)
         };
         let errors = residuals.errors(log, row, shown_m).into_iter().enumerate();
-        if let Some((channel, [size_m, _])) = errors.max_by(|a, b| worth(a).total_cmp(&worth(b))) {
-            by_channel
-                .entry(channel)
-                .or_default()
-                .push((row, size_m.abs()));
-        }
-    }
-    let finding = |(channel, outliers): (usize, Vec<(usize, f64)>)| {
-        let (name, count) = (log.channels[channel].name, outliers.len());
+        let worst = errors.max_by(|a, b| worth(a).partial_cmp(&worth(b)).unwrap_or(Equal))?;
+        Some((worst.0, row, worst.1[0].abs()))
+    };
+    let found: Vec<(usize, usize, f64)> = far.iter().filter_map(cause).collect();
+    let finding = |channel: usize| {
+        let own = || found.iter().filter(move |found| found.0 == channel);
+        let (movement, t_us) = log.place(own().next()?.1);
+        let (name, count) = (CHANNELS[channel], own().count());
         let message = format!(
             "{count} {} of {name} far outside the noise, by up to {:.1} um. A fit with --loss cauchy, the default, leaves them \
              out of account; look for lost pulses, sparks and bits",
             if count == 1 { "row" } else { "rows" },
-            outliers
-                .iter()
-                .map(|(_, size_m)| *size_m)
-                .fold(0.0, f64::max)
-                * 1e6,
+            own().map(|found| found.2).fold(0.0, f64::max) * 1e6,
         );
-        let found = log.warning_at(Code::Outliers, outliers[0].0, message);
-        found.on(name).of(count as f64, "rows")
+        let found = Finding::new(Code::Outliers, message).at(movement, t_us);
+        Some(found.on(name).of(count as f64, "rows"))
     };
-    by_channel.into_iter().map(finding).collect()
+    (0..log.channels.len()).filter_map(finding).collect()
+}
+
+/// The usable rows of its movement about a row.
+fn about(log: &LogSignals, row: usize) -> impl Iterator<Item = usize> {
+    let rows = row.saturating_sub(BLOCK)..log.rows.len().min(row + BLOCK + 1);
+    let movement = |row: usize| log.rows[row].movement;
+    rows.filter(move |&other| log.usable[other] && movement(other) == movement(row))
 }
 
 #[cfg(test)]

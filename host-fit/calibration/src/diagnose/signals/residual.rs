@@ -8,9 +8,8 @@ use crate::solve::field::probe::probes;
 use crate::statistics::{robust_deviation, white_noise};
 use nalgebra::Vector3;
 
-/// Residuals beyond this part of the signals are those of a log that is not understood.
-const UNEXPLAINED_MAX: f64 = 0.3;
-/// What a channel shows itself is an error that the residuals ask for from this part of it to its inverse.
+/// A channel shows an error that the residuals ask of it if it moves by this part of it to its inverse; and of
+/// a log that is understood no more than this part of its signals is residuals.
 const SEEN_MIN: f64 = 0.5;
 
 /// Residuals of the three Hall signals.
@@ -27,38 +26,41 @@ impl Residuals {
     /// fault of some rows moves none of the others. `None` where the parameters do not explain the signals.
     pub(super) fn new(log: &LogSignals, parameters: &FieldParameters, lag_s: f64) -> Option<Self> {
         let probes = probes(parameters);
-        let count = log.rows.len();
-        let all: Vec<usize> = (log.first..log.first + count).collect();
+        let all: Vec<usize> = log.source.rows.clone().collect();
         let weights: Vec<f64> = log.usable.iter().map(|&u| f64::from(u8::from(u))).collect();
         let rows = Rows::weighted(log.dataset, &all, &weights);
         let left_mm = rows.residuals_mm(&probes, lag_s, &vec![[0.0; 3]; rows.movements.len()]);
-        let used: Vec<usize> = (0..count).filter(|&row| log.usable[row]).collect();
-        let mut values = [(); 3].map(|()| vec![0.0; count]);
-        for (k, values) in values.iter_mut().enumerate() {
+        let used: Vec<usize> = (0..all.len()).filter(|&row| log.usable[row]).collect();
+        let centred = |values: &[f64]| {
+            let mut centred = vec![0.0; values.len()];
+            for segment in &log.segments {
+                let used = || segment.clone().filter(|&row| log.usable[row]);
+                let zero = median(used().map(|row| values[row]));
+                used().for_each(|row| centred[row] = values[row] - zero);
+            }
+            centred
+        };
+        let values = [0, 1, 2].map(|probe| {
+            let mut left_m = vec![0.0; all.len()];
             for (&row, left_mm) in used.iter().zip(&left_mm) {
-                values[row] = left_mm[k] * 1e-3;
+                left_m[row] = left_mm[probe] * 1e-3;
             }
-            let mut moved = log.channels[k].values.clone();
-            for values in [&mut *values, &mut moved] {
-                for segment in &log.segments {
-                    let rows = || segment.clone().filter(|&row| log.usable[row]);
-                    let zero = median(rows().map(|row| values[row]));
-                    rows().for_each(|row| values[row] -= zero);
-                }
-            }
-            let moved_m = used.iter().map(|&row| moved[row] * moved[row]).sum::<f64>();
-            let moved_m = (moved_m / used.len().max(1) as f64).sqrt();
-            let left_m = robust_deviation(used.iter().map(|&row| values[row]));
-            if left_m > UNEXPLAINED_MAX * moved_m {
-                return None;
-            }
-        }
+            centred(&left_m)
+        });
+        let is_understood = |probe: usize| {
+            let moved = centred(&log.channels[probe])
+                .into_iter()
+                .map(|x| x * x)
+                .sum::<f64>();
+            let left_m = robust_deviation(used.iter().map(|&row| values[probe][row]));
+            left_m <= SEEN_MIN * (moved / used.len().max(1) as f64).sqrt()
+        };
         let white = |values: &Vec<f64>| {
             let rows = log.segments.iter().flat_map(|s| s.start + 2..s.end);
             let used = rows.filter(|&row| (row - 2..=row).all(|row| log.usable[row]));
             white_noise(used.map(|row| [row - 2, row - 1, row].map(|row| values[row]))).max(1e-10)
         };
-        Some(Self {
+        (0..3).all(is_understood).then(|| Self {
             slopes: Slopes::new(log.stage, probes),
             noise_m: values.each_ref().map(white),
             values,
@@ -68,9 +70,7 @@ impl Residuals {
     /// Changes of the residuals by an error of each channel of the log at a row.
     pub(super) fn slopes(&self, log: &LogSignals, row: usize) -> Vec<Vector3<f64>> {
         let here = &log.rows[row];
-        let slopes = self
-            .slopes
-            .at(here.reference.map(|x| x * 1e3), here.vertical);
+        let slopes = (self.slopes).at(here.reference.map(|x| x * 1e3), here.vertical);
         slopes.into_iter().take(log.channels.len()).collect()
     }
 

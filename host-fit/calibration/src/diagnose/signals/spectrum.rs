@@ -1,13 +1,11 @@
 //! Mean power spectra of the signals of a log.
 
-use super::CLEAR;
 use super::channels::median;
+use super::{BLOCK, CLEAR};
+use crate::judge::verdict::quantile;
 use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 use std::ops::Range;
-
-/// Bins on each side that give the level of the noise.
-const SIDE: usize = 20;
 
 /// Pieces of segments of equal length.
 pub fn windows(segments: &[Range<usize>], length: usize) -> Vec<Range<usize>> {
@@ -22,8 +20,7 @@ pub fn windows(segments: &[Range<usize>], length: usize) -> Vec<Range<usize>> {
 pub struct Spectrum {
     /// Mean squared magnitude of the transform, by bin; unit that of the values, squared.
     pub power: Vec<f64>,
-    /// Windows that went in.
-    pub windows: usize,
+    windows: usize,
     length: usize,
 }
 
@@ -55,12 +52,16 @@ impl Spectrum {
         }
     }
 
+    /// Power of noise over its mean, this many standard deviations from the middle: a chi-squared with two
+    /// degrees of freedom for each window.
+    fn noise(&self, deviations: f64) -> f64 {
+        quantile(1.0, 1.0 / self.windows.max(1) as f64, deviations)
+    }
+
     /// The level of the noise around a bin.
     fn level(&self, bin: usize) -> f64 {
-        let bins = bin.saturating_sub(SIDE).max(3)..(bin + SIDE + 1).min(self.power.len());
-        let n = self.windows.max(1) as f64;
-        // The median of chi-squared with 2 n degrees of freedom over its mean.
-        median(bins.map(|k| self.power[k])) / (1.0 - 1.0 / (9.0 * n)).powi(3)
+        let bins = bin.saturating_sub(2 * BLOCK).max(3)..self.power.len().min(bin + 2 * BLOCK + 1);
+        median(bins.map(|k| self.power[k])) / self.noise(0.0)
     }
 
     /// Amplitude of a line at a bin of at least 1: Hann spreads it over three.
@@ -73,8 +74,7 @@ impl Spectrum {
 
     /// The lines from a bin on that noise does not explain.
     pub(super) fn lines(&self, lowest: usize) -> impl Iterator<Item = usize> {
-        let n = self.windows.max(1) as f64;
-        let limit = (1.0 - 1.0 / (9.0 * n) + CLEAR / (3.0 * n.sqrt())).powi(3);
+        let limit = self.noise(CLEAR);
         let is_line = move |bin: &usize| {
             let highest = self.power[bin - 1].max(self.power[bin + 1]);
             self.power[*bin] >= highest && self.power[*bin] > limit * self.level(*bin)

@@ -1,6 +1,6 @@
 //! Channels that stand still, noise aside, where the residuals say that they should move.
 
-use super::channels::{LogSignals, median};
+use super::channels::{LogSignals, levels};
 use super::residual::Residuals;
 use super::spectrum::windows;
 use super::still;
@@ -15,12 +15,14 @@ const WINDOW: usize = BLOCK * BLOCK;
 /// Names channels that stand still in windows in which their motion would explain the residuals better than
 /// an error of any other.
 pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
-    let windows = windows(&log.segments, WINDOW);
-    let standing =
-        |window: &Range<usize>| Some((stuck_in(log, residuals, window)?, window.clone()));
-    let found: Vec<(usize, Range<usize>)> = windows.par_iter().filter_map(standing).collect();
+    let mut windows = windows(&log.segments, WINDOW);
+    windows.retain(|window| log.usable[window.clone()].iter().all(|used| *used));
+    let stuck = windows
+        .par_iter()
+        .map(|window| stuck_in(log, residuals, window));
     let mut runs: Vec<Vec<Range<usize>>> = vec![Vec::new(); log.channels.len()];
-    for (channel, window) in found {
+    for (channel, window) in stuck.collect::<Vec<_>>().into_iter().zip(windows) {
+        let Some(channel) = channel else { continue };
         match runs[channel].last_mut() {
             Some(run) if run.end == window.start => run.end = window.end,
             _ => runs[channel].push(window),
@@ -36,19 +38,17 @@ pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
 
 /// The channel that stands still in a window.
 fn stuck_in(log: &LogSignals, residuals: &Residuals, window: &Range<usize>) -> Option<usize> {
-    if !log.usable[window.clone()].iter().all(|used| *used) {
-        return None;
-    }
-    let levels = |values: &[f64]| {
-        let blocks = values[window.clone()].chunks(BLOCK);
-        let levels: Vec<f64> = blocks.map(|block| median(block.iter().copied())).collect();
+    let centred = |values: &Vec<f64>| {
+        let levels = levels(&values[window.clone()]);
         let mean = levels.iter().sum::<f64>() / BLOCK as f64;
-        levels
-            .into_iter()
-            .map(move |level| level - mean)
-            .collect::<Vec<f64>>()
+        levels.into_iter().map(move |level| level - mean)
     };
-    let shown_m = residuals.values.each_ref().map(|values| levels(values));
+    let squares = |values: &Vec<f64>| centred(values).map(|x| x * x).sum::<f64>();
+    let shown_m = residuals
+        .values
+        .each_ref()
+        .map(|values| centred(values).collect::<Vec<_>>());
+    // By channel: what its errors explain, and their squares.
     let mut sums = vec![[0.0; 2]; log.channels.len()];
     for block in 0..BLOCK {
         let row = window.start + block * BLOCK + BLOCK / 2;
@@ -60,12 +60,10 @@ fn stuck_in(log: &LogSignals, residuals: &Residuals, window: &Range<usize>) -> O
     }
     let best = (0..sums.len()).max_by(|&a, &b| sums[a][0].total_cmp(&sums[b][0]))?;
     let [explained, missed] = sums[best];
-    let own: f64 = levels(&log.channels[best].values)
-        .iter()
-        .map(|x| x * x)
-        .sum();
     let clear = CLEAR * CLEAR;
-    (explained > clear * BLOCK as f64 && missed > clear * own).then_some(best)
+    let is_stuck =
+        explained > clear * BLOCK as f64 && missed > clear * squares(&log.channels[best]);
+    is_stuck.then_some(best)
 }
 
 #[cfg(test)]

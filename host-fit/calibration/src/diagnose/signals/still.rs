@@ -1,117 +1,125 @@
 //! What stands still: movements in which nothing moves, and channels that repeat one value.
 
-use super::BLOCK;
-use super::channels::{Channel, LogSignals};
-use crate::diagnose::left_out;
-use crate::finding::{Code, Finding};
+use super::channels::{LogSignals, levels};
+use super::{BLOCK, CLEAR};
+use crate::diagnose::of_fit::severity;
+use crate::diagnose::slopes::CHANNELS;
+use crate::finding::{Code, Finding, Severity};
+use crate::statistics::white_noise;
 use std::ops::Range;
 
 /// What moves by less stands still, m: a few times what the interferometers drift in a movement.
 const STILL_M: f64 = 2e-6;
-/// One sound log in so many has a run of equal values that is called one.
-const RARITY: f64 = 1e6;
 
 /// Names movements in which nothing moves; their rows are left out.
 pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
     let is_idle = |rows: &&Range<usize>| {
         // Over longer the interferometers of a stage at rest drift.
-        let mut pieces = (rows.start..rows.end).step_by(BLOCK);
-        let is_still = |start: usize| {
+        let beams_rest = |start: usize| {
             let piece = start..rows.end.min(start + BLOCK);
-            (3..6).all(|beam| spread(&log.channels[beam].values[piece.clone()]) < STILL_M)
+            (3..6).all(|beam| spread(&log.channels[beam][piece.clone()]) < STILL_M)
         };
-        log.source.has_reference && hall_motion_m(log, rows) < STILL_M && pieces.all(is_still)
+        let mut pieces = (rows.start..rows.end).step_by(BLOCK);
+        log.source.has_reference && hall_motion_m(log, rows) < STILL_M && pieces.all(beams_rest)
     };
     let idle: Vec<Range<usize>> = log.segments.iter().filter(is_idle).cloned().collect();
-    let first = idle.first()?.start;
+    let (movement, t_us) = log.place(idle.first()?.start);
     let message = format!(
         "nothing moves in {} of {} movements: they add nothing to the fit; leave them out or record them again",
         idle.len(),
         log.segments.len(),
     );
     log.leave_out(idle);
-    Some(log.warning_at(Code::IdleMovement, first, message))
+    Some(Finding::new(Code::IdleMovement, message).at(movement, t_us))
 }
 
 /// Names channels that repeat a value for longer than noise does.
 pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
-    let mut all = Vec::new();
-    for (k, channel) in log.channels.iter().enumerate() {
-        let mut runs: Vec<Range<usize>> = Vec::new();
-        for segment in &log.segments {
-            let mut start = segment.start;
-            for values in channel.values[segment.clone()].chunk_by(|a, b| a == b) {
-                runs.push(start..start + values.len());
-                start += values.len();
-            }
-        }
-        // White noise by second differences; the most likely of its codes comes with this chance.
-        let of = |s: &Range<usize>| channel.values[s.clone()].windows(3);
-        let seconds = (log.segments.iter().flat_map(of)).map(|v| v[0] - 2.0 * v[1] + v[2]);
-        let count = log.rows.len() as f64;
-        let noise_m = (seconds.map(|x| x * x).sum::<f64>() / (6.0 * count)).sqrt();
-        let chance = libm::erf(channel.m_per_code / (8f64.sqrt() * noise_m));
-        let least = match spread(&channel.values) {
+    // Beams are rounded, by less.
+    let (hall_m, gap_m) = (log.stage.hall.m_per_count, log.stage.capacitive.m_per_count);
+    let codes_m = [hall_m, 1e-12, gap_m];
+    let runs = |(channel, values): (usize, &Vec<f64>)| -> Vec<Range<usize>> {
+        let threes = log
+            .segments
+            .iter()
+            .flat_map(|s| values[s.clone()].windows(3));
+        let white_m = white_noise(threes.map(|three| [three[0], three[1], three[2]]));
+        let code_m = codes_m[channel / 3];
+        // The chance of the most likely code, and for how long it is as rare as what is clear.
+        let chance = libm::erf(code_m / 8f64.sqrt() / white_m.max(code_m / 12f64.sqrt()));
+        let least = match spread(values) {
             0.0 => 2.0,
-            _ => 1.0 + libm::log(RARITY * count) / libm::log(chance).abs(),
+            _ => 1.0 + 0.5 * CLEAR * CLEAR / libm::log(chance).abs(),
         };
         // Not where nothing moves at all.
-        let is_new = |run: &Range<usize>| run.len() as f64 >= least && log.usable[run.start];
-        runs.retain(|run| is_new(run) && should_move(log, k, run));
-        all.push(runs);
-    }
-    named(log, all)
+        let is_found = |run: &Range<usize>| {
+            run.len() as f64 >= least && log.usable[run.start] && should_move(log, channel, run)
+        };
+        let of = |segment: &Range<usize>| {
+            let mut end = segment.start;
+            let chunks = values[segment.clone()].chunk_by(|a, b| a == b);
+            chunks.map(move |run| {
+                end += run.len();
+                end - run.len()..end
+            })
+        };
+        log.segments.iter().flat_map(of).filter(is_found).collect()
+    };
+    let runs = log.channels.iter().enumerate().map(runs).collect();
+    named(log, runs)
 }
 
 /// Whether a channel should show something in these rows: a probe its noise, which is many codes; a beam
 /// motion that a probe shows, a gap that of another.
 fn should_move(log: &LogSignals, channel: usize, rows: &Range<usize>) -> bool {
-    let moves = |channel: usize| spread(&log.channels[channel].values[rows.clone()]) > STILL_M;
     match channel {
         0..3 => true,
         3..6 => log.source.has_reference && hall_motion_m(log, rows) > STILL_M,
-        _ => (6..log.channels.len()).any(moves),
+        _ => log.channels[6..]
+            .iter()
+            .any(|values| spread(&values[rows.clone()]) > STILL_M),
     }
 }
 
 /// Names channels that stand still in runs of rows, by channel, at their longest: as saturated where that is an
 /// end of what the channel reads. The rows are left out.
 pub(super) fn named(log: &mut LogSignals, runs: Vec<Vec<Range<usize>>>) -> Vec<Finding> {
-    let finding = |(channel, runs): (&Channel, &Vec<Range<usize>>)| {
+    let finding = |(channel, runs): (usize, &Vec<Range<usize>>)| {
         let longest = runs.iter().max_by_key(|run| run.len())?;
         let rows = runs.iter().map(Range::len).sum::<usize>() as f64;
         let share = rows / log.rows.len() as f64;
-        let (values, start) = (&channel.values, longest.start);
-        let value = values[start];
+        let (name, values) = (CHANNELS[channel], &log.channels[channel]);
+        let value = values[longest.start];
         let is_end = values.iter().all(|&x| x <= value) != values.iter().all(|&x| x >= value);
-        let is_flat = channel.m_per_code > 0.0 && spread(&values[longest.clone()]) == 0.0;
+        let is_flat = channel / 3 != 1 && spread(&values[longest.clone()]) == 0.0;
         let stood_s = longest.len() as f64 * log.period_s;
         let (code, size, unit) = match is_flat && is_end {
             true => (Code::Saturated, rows, "rows"),
             false => (Code::Stuck, stood_s, "s"),
         };
         let message = format!(
-            "{} stands still in {rows} rows, {:.1} % of the log, for up to {stood_s:.3} s together: {}",
-            channel.name,
+            "{name} stands still in {rows} rows, {:.1} % of the log, for up to {stood_s:.3} s together: {}",
             100.0 * share,
             code.entry().remedy,
         );
-        let found = log.warning_at(code, start, message).on(channel.name);
-        Some(found.severe(left_out::severity(share)).of(size, unit))
+        let (movement, t_us) = log.place(longest.start);
+        let found = Finding::new(code, message).on(name).at(movement, t_us);
+        Some(
+            found
+                .severe(severity(share).max(Severity::Warn))
+                .of(size, unit),
+        )
     };
-    let findings = log.channels.iter().zip(&runs).filter_map(finding).collect();
+    let findings = runs.iter().enumerate().filter_map(finding).collect();
     log.leave_out(runs.into_iter().flatten());
     findings
 }
 
-/// How far a stage moves by any probe, by means of rows, m.
+/// How far a stage moves by any probe, by the levels of rows, m.
 fn hall_motion_m(log: &LogSignals, rows: &Range<usize>) -> f64 {
-    let moved = |k: usize| {
-        let pieces = log.channels[k].values[rows.clone()].chunks_exact(BLOCK);
-        let means = pieces.map(|piece| piece.iter().sum::<f64>() / BLOCK as f64);
-        spread(&means.collect::<Vec<_>>())
-    };
-    moved(0).max(moved(1)).max(moved(2))
+    let halls = log.channels[..3].iter();
+    let moved = halls.map(|values| spread(&levels(&values[rows.clone()])));
+    moved.fold(0.0, f64::max)
 }
 
 /// Largest less smallest.

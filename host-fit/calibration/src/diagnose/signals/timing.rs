@@ -1,80 +1,68 @@
 //! Rows missing, and rows at uneven times or another rate.
 
 use super::channels::LogSignals;
+use crate::diagnose::of_fit::severity;
 use crate::finding::{Code, Finding, Severity};
-use std::ops::Range;
 
-/// Part of the rows that may be missing, of the servo period that the period of a log may be off, and of its own
-/// period that the times of rows may be off, rms: at 1 mm/s and 2 ms the last is 20 nm of motion.
-const TOLERANCE: f64 = 0.01;
-
-/// What the times of rows show against a line over their sequence, the same in all movements.
+/// What the times of rows show against their sequence. Shares of the rows, and of the period: at 1 mm/s and
+/// 2 ms a part of 2 % is 40 nm of motion.
 pub(super) fn timing(log: &LogSignals) -> Vec<Finding> {
-    let steps = |from: usize, to: usize| {
-        let [from, to] = [from, to].map(|row| log.rows[row].frame.sequence());
-        f64::from(to.wrapping_sub(from))
+    // Rows, and the servo periods and the time (us) since the one before.
+    let step = |row: usize| {
+        let [before, here] = [row - 1, row].map(|row| &log.rows[row]);
+        let periods = (here.frame.sequence()).wrapping_sub(before.frame.sequence());
+        (row, f64::from(periods), (here.t_us - before.t_us) as f64)
     };
-    let centred = |segment: &Range<usize>| {
-        let time_s = |row: usize| (log.rows[row].t_us - log.rows[segment.start].t_us) as f64 * 1e-6;
-        let point = |row: usize| [steps(segment.start, row), time_s(row)];
-        let points: Vec<[f64; 2]> = segment.clone().map(point).collect();
-        let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64;
-        let [k, t] = [0, 1].map(mean);
-        points.into_iter().map(move |p| [p[0] - k, p[1] - t])
-    };
-    let points: Vec<[f64; 2]> = log.segments.iter().flat_map(centred).collect();
-    let sum = |of: &dyn Fn(&[f64; 2]) -> f64| points.iter().map(of).sum::<f64>();
-    let period_s = sum(&|[k, t]| k * t) / sum(&|[k, _]| k * k);
-    let count = log.rows.len() as f64;
-    let rms_s = (sum(&|[k, t]| (t - period_s * k).powi(2)) / count).sqrt();
-
     let rows = log.segments.iter().flat_map(|s| s.start + 1..s.end);
-    let gaps: Vec<usize> = rows.filter(|&row| steps(row - 1, row) > 1.0).collect();
+    let steps: Vec<(usize, f64, f64)> = rows.map(step).collect();
+    let sum = |of: &dyn Fn(f64, f64) -> f64| steps.iter().map(|&(_, k, us)| of(k, us)).sum::<f64>();
+    let period_us = sum(&|_, us| us) / sum(&|k, _| k);
+    // A step has the errors of two times.
+    let squares = sum(&|k, us| (us - period_us * k).powi(2));
+    let rms_us = (squares / (2 * steps.len()) as f64).sqrt();
+
     let mut found = Vec::new();
-    if let Some(&first) = gaps.first() {
-        let rows: f64 = gaps.iter().map(|&row| steps(row - 1, row) - 1.0).sum();
-        let share = rows / (rows + count);
+    let gaps: Vec<_> = steps.iter().filter(|(_, k, _)| *k > 1.0).collect();
+    if let Some((first, ..)) = gaps.first() {
+        let missing: f64 = gaps.iter().map(|(_, k, _)| k - 1.0).sum();
+        let share = missing / (missing + log.rows.len() as f64);
         let message = format!(
-            "{rows} rows are missing ({:.2} %) in {} gaps: look for frames that the recorder lost",
+            "{missing} rows are missing ({:.2} %) in {} gaps: look for frames that the recorder lost",
             share * 100.0,
             gaps.len(),
         );
-        let missing = log.warning_at(Code::RowsMissing, first, message);
-        found.push(missing.severe(severity(share)).of(rows, "rows"));
+        let (movement, t_us) = log.place(*first);
+        let found_missing = Finding::new(Code::RowsMissing, message).at(movement, t_us);
+        found.push(
+            found_missing
+                .severe(severity(share).min(Severity::Warn))
+                .of(missing, "rows"),
+        );
     }
-    let rms_us = rms_s * 1e6;
-    if rms_s > TOLERANCE * log.period_s {
+    if severity(rms_us / period_us) > Severity::Note {
         let message = format!(
             "rows come at uneven times, {rms_us:.0} us rms off an even rate: have the servo's clock start all converters and \
              stamp the rows"
         );
-        found.push(log.warning(Code::Jitter, message).of(rms_us, "us"));
+        found.push(Finding::new(Code::Jitter, message).of(rms_us, "us"));
     }
-    let servo_periods = period_s / log.stage.servo_period_s;
-    if (servo_periods - 1.0).abs() > TOLERANCE {
+    let servo_us = log.stage.servo_period_s * 1e6;
+    let servo_periods = period_us / servo_us;
+    if severity((servo_periods - 1.0).abs()) > Severity::Note {
         let count = servo_periods.round().max(1.0);
-        let off = (servo_periods / count - 1.0).abs();
-        let what = match severity(off) {
+        let severity = severity((servo_periods / count - 1.0).abs()).min(Severity::Warn);
+        let what = match severity {
             Severity::Note => format!("the log is thinned, to one of {count} servo periods: "),
             _ => String::new(),
         };
         let message = format!(
-            "{what}rows are {:.1} us apart, the servo period of stage.toml is {:.1} us: log every period, or correct \
-             servo.period_s",
-            period_s * 1e6,
-            log.stage.servo_period_s * 1e6,
+            "{what}rows are {period_us:.1} us apart, the servo period of stage.toml is {servo_us:.1} us: log every period, or \
+             correct servo.period_s"
         );
-        let rate = log.warning(Code::Jitter, message);
-        found.push(rate.severe(severity(off)).of(period_s * 1e6, "us"));
+        let rate = Finding::new(Code::Jitter, message).severe(severity);
+        found.push(rate.of(period_us, "us"));
     }
     found
-}
-
-fn severity(off: f64) -> Severity {
-    match off > TOLERANCE {
-        true => Severity::Warn,
-        false => Severity::Note,
-    }
 }
 
 #[cfg(test)]
