@@ -31,21 +31,15 @@ pub(super) fn left_out(fit: &Fit, dataset: &Dataset) -> Option<Finding> {
     let severity = severity(left_out.share());
     let (first, last) = left_out.span.filter(|_| severity > Severity::Note)?;
     let [from, to] = [first, last].map(|at| dataset.movement_named(at.log, at.movement));
-    let remedy = match severity {
-        Severity::Refuse => {
-            "too many to take the rest for the stage: find out what happened there, leave these rows out of the log or record \
-             it again (--loss none lets every row count)"
-        }
-        _ => "look for a fault there",
-    };
     let message = format!(
         "{} of {} rows ({:.1} %), from movement {from}, t_us = {}, to movement {to}, t_us = {}, are so far from the fitted \
-         model that they count little or nothing in the fit: {remedy}",
+         model that they count little or nothing in the fit: {} (--loss none lets every row count)",
         left_out.rows,
         left_out.of,
         100.0 * left_out.share(),
         first.t_us,
         last.t_us,
+        Code::LeftOut.entry().remedy,
     );
     let found = Finding::new(Code::LeftOut, message).severe(severity);
     Some(found.at(from, first.t_us).of(left_out.rows as f64, "rows"))

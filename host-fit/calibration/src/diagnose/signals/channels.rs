@@ -1,5 +1,6 @@
 //! The signals of one log, channel by channel.
 
+use crate::finding::{Code, Finding};
 use crate::input::dataset::{Dataset, LogSource, Row};
 use crate::input::stage::Stage;
 use crate::statistics;
@@ -50,11 +51,11 @@ impl<'a> LogSignals<'a> {
         }
     }
 
-    /// Name of the movement of a row, and its time, us.
-    pub(super) fn place(&self, row: usize) -> (String, i64) {
+    /// A finding at a row.
+    pub(super) fn found_at(&self, row: usize, code: Code, message: String) -> Finding {
         let Row { movement, t_us, .. } = self.rows[row];
         let movement = &self.dataset.movements[movement];
-        (self.dataset.movement_name(movement), t_us)
+        Finding::new(code, message).at(self.dataset.movement_name(movement), t_us)
     }
 }
 

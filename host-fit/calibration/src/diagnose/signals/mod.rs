@@ -64,9 +64,8 @@ fn of_log(log: &mut LogSignals, (parameters, lag_s): (&FieldParameters, f64)) ->
     let mut found = timing::timing(log);
     found.extend(still::idle(log));
     found.extend(still::repeats(log));
-    let tests: [fn(&mut LogSignals, &Residuals) -> Vec<Finding>; 3] =
-        [standing::standing, outliers::outliers, hum::hum];
     let source = log.source;
+    let tests = [standing::standing, outliers::outliers, hum::hum];
     for test in tests.into_iter().filter(|_| source.has_reference) {
         if let Some(residuals) = Residuals::new(log, parameters, lag_s) {
             found.extend(test(log, &residuals));

@@ -7,60 +7,50 @@ use crate::diagnose::slopes::CHANNELS;
 use crate::finding::{Code, Finding};
 use crate::statistics::robust_deviation;
 use rayon::prelude::*;
-use std::cmp::Ordering::Equal;
 
 /// Names rows far outside the noise, by channel, and leaves them out.
 pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let rows: Vec<usize> = (0..log.rows.len()).filter(|&row| log.usable[row]).collect();
     // From the median of those about it: beside a step is no outlier.
     let off_m = |&row: &usize| {
-        let about: Vec<usize> = about(log, row).collect();
+        let about = row.saturating_sub(BLOCK)..log.rows.len().min(row + BLOCK + 1);
+        let movement = |row: usize| log.rows[row].movement;
+        let is_beside = |&other: &usize| log.usable[other] && movement(other) == movement(row);
+        let about: Vec<usize> = about.filter(is_beside).collect();
         let middle_m = |values: &Vec<f64>| median(about.iter().map(|&row| values[row]));
         (residuals.values.each_ref()).map(|values| values[row] - middle_m(values))
     };
     let off_m: Vec<[f64; 3]> = rows.par_iter().map(off_m).collect();
-    let usual_m = [0, 1, 2].map(|k| robust_deviation(off_m.iter().map(|off_m| off_m[k])));
-    let is_far =
-        |(_, off_m): &(usize, [f64; 3])| (0..3).any(|k| off_m[k].abs() > CLEAR * usual_m[k]);
+    let most_m = [0, 1, 2].map(|k| CLEAR * robust_deviation(off_m.iter().map(|off_m| off_m[k])));
+    let is_far = |(_, off_m): &(usize, [f64; 3])| (0..3).any(|k| off_m[k].abs() > most_m[k]);
     let far: Vec<(usize, [f64; 3])> = rows.into_iter().zip(off_m).filter(is_far).collect();
     far.iter().for_each(|(row, _)| log.usable[*row] = false);
-    // Channel, row, size.
+    // Channel, row, size: a channel that jumps by what the residuals ask of it, before any other.
     let cause = |&(row, shown_m): &(usize, [f64; 3])| {
-        let before = about(log, row).take_while(|&other| other < row).last();
-        let behind = about(log, row).find(|&other| other > row);
-        let beside = [before.or(behind), behind.or(before)].map(|beside| beside.unwrap_or(row));
-        // A channel that jumps by what the residuals ask of it, before any other.
         let worth = |(channel, [size_m, explained]): &(usize, [f64; 2])| {
             let values = &log.channels[*channel];
-            let own_m = values[row] - 0.5 * (values[beside[0]] + values[beside[1]]);
-            (is_seen(own_m, *size_m), *explained)
+            let beside_m = values[row.saturating_sub(1)] + values[(row + 1).min(values.len() - 1)];
+            let is_seen = is_seen(values[row] - 0.5 * beside_m, *size_m);
+            (f64::from(u8::from(is_seen)) + 1e-9) * explained
         };
         let errors = residuals.errors(log, row, shown_m).into_iter().enumerate();
-        let worst = errors.max_by(|a, b| worth(a).partial_cmp(&worth(b)).unwrap_or(Equal))?;
-        Some((worst.0, row, worst.1[0].abs()))
+        let (channel, [size_m, _]) = errors.max_by(|a, b| worth(a).total_cmp(&worth(b)))?;
+        Some((channel, row, size_m.abs()))
     };
     let found: Vec<(usize, usize, f64)> = far.iter().filter_map(cause).collect();
     let finding = |channel: usize| {
         let own = || found.iter().filter(move |found| found.0 == channel);
-        let (movement, t_us) = log.place(own().next()?.1);
-        let (name, count) = (CHANNELS[channel], own().count());
+        let (name, first, count) = (CHANNELS[channel], own().next()?.1, own().count());
         let message = format!(
             "{count} {} of {name} far outside the noise, by up to {:.1} um. A fit with --loss cauchy, the default, leaves them \
              out of account; look for lost pulses, sparks and bits",
             if count == 1 { "row" } else { "rows" },
             own().map(|found| found.2).fold(0.0, f64::max) * 1e6,
         );
-        let found = Finding::new(Code::Outliers, message).at(movement, t_us);
+        let found = log.found_at(first, Code::Outliers, message);
         Some(found.on(name).of(count as f64, "rows"))
     };
     (0..log.channels.len()).filter_map(finding).collect()
-}
-
-/// The usable rows of its movement about a row.
-fn about(log: &LogSignals, row: usize) -> impl Iterator<Item = usize> {
-    let rows = row.saturating_sub(BLOCK)..log.rows.len().min(row + BLOCK + 1);
-    let movement = |row: usize| log.rows[row].movement;
-    rows.filter(move |&other| log.usable[other] && movement(other) == movement(row))
 }
 
 #[cfg(test)]

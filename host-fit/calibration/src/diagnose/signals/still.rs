@@ -23,14 +23,14 @@ pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
         log.source.has_reference && hall_motion_m(log, rows) < STILL_M && pieces.all(beams_rest)
     };
     let idle: Vec<Range<usize>> = log.segments.iter().filter(is_idle).cloned().collect();
-    let (movement, t_us) = log.place(idle.first()?.start);
+    let first = idle.first()?.start;
     let message = format!(
         "nothing moves in {} of {} movements: they add nothing to the fit; leave them out or record them again",
         idle.len(),
         log.segments.len(),
     );
     log.leave_out(idle);
-    Some(Finding::new(Code::IdleMovement, message).at(movement, t_us))
+    Some(log.found_at(first, Code::IdleMovement, message))
 }
 
 /// Names channels that repeat a value for longer than noise does.
@@ -102,8 +102,7 @@ pub(super) fn named(log: &mut LogSignals, runs: Vec<Vec<Range<usize>>>) -> Vec<F
             100.0 * share,
             code.entry().remedy,
         );
-        let (movement, t_us) = log.place(longest.start);
-        let found = Finding::new(code, message).on(name).at(movement, t_us);
+        let found = log.found_at(longest.start, code, message).on(name);
         Some(
             found
                 .severe(severity(share).max(Severity::Warn))

@@ -31,11 +31,9 @@ pub(super) fn timing(log: &LogSignals) -> Vec<Finding> {
             share * 100.0,
             gaps.len(),
         );
-        let (movement, t_us) = log.place(*first);
-        let found_missing = Finding::new(Code::RowsMissing, message).at(movement, t_us);
+        let lost = log.found_at(*first, Code::RowsMissing, message);
         found.push(
-            found_missing
-                .severe(severity(share).min(Severity::Warn))
+            lost.severe(severity(share).min(Severity::Warn))
                 .of(missing, "rows"),
         );
     }
