@@ -2,7 +2,6 @@
 
 use crate::error::{internal, of_output, wrong};
 use crate::log::rows_of_three;
-use host_fit::diagnose::signals::period_s;
 use host_fit::finding::Finding;
 use host_fit::input::dataset::Dataset;
 use host_fit::input::log::LogReading;
@@ -57,8 +56,8 @@ pub fn residuals<'py>(
         Some(weights) => PyArray1::from_slice(py, weights),
         None => PyArray1::from_vec(py, vec![1.0; errors.len()]),
     };
-    let movements: Vec<_> = dataset.movements.iter().map(|m| m.rows.clone()).collect();
-    let period_s = period_s(&dataset.rows, &movements, stage.servo_period_s);
+    let period_s = dataset.period_s(0..dataset.rows.len());
+    let period_s = period_s.unwrap_or(stage.servo_period_s);
     let density = Density::new(dataset, period_s, errors);
     let (bin_hz, power) = density.map_or((0.0, Vec::new()), |density| {
         let power = density.power.map(|power| PyArray1::from_vec(py, power));

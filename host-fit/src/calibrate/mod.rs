@@ -18,13 +18,13 @@ pub use recalibration::Updated;
 pub use settings::{Mismatch, loss_of};
 
 use crate::diagnose::Diagnosis;
-use crate::diagnose::trusted::trusted;
 use crate::finding::{self, Code, Finding, Severity};
 use crate::fit::{Fit, FitError};
 use crate::input::log::LogReading;
 use crate::input::stage::Stage;
 use crate::judge::identify::FitFailure;
 use crate::report::errors::errors;
+use crate::report::trusted::trusted;
 use runtime::ParameterSet;
 use serde_json::{Value, json};
 
@@ -121,6 +121,6 @@ pub fn checked(log: &LogReading, fitted: Result<&Fit, &FitError>, diagnosis: &Di
         "verdict": diagnosis.verdict,
         "predicted": diagnosis.predicted,
         "findings": diagnosis.findings,
-        "trusted_inputs": fit.map_or_else(Vec::new, |fit| trusted(&fit.set)),
+        "trusted_inputs": fit.map_or_else(|| json!([]), |fit| trusted(&fit.set)),
     })
 }

@@ -1,7 +1,6 @@
 //! What `fit` and `eval` report, as programs read it.
 
 use crate::diagnose::Diagnosis;
-use crate::diagnose::trusted::{Trusted, trusted};
 use crate::finding::Finding;
 use crate::fit::{CrossValidation, Fit};
 use crate::input::dataset::{Dataset, Movement};
@@ -17,6 +16,7 @@ use crate::report::parameters::{
     Parameter, coordinates, field_parameters, parameters, parameters_in,
 };
 use crate::report::table::{Table, tables};
+use crate::report::trusted::trusted;
 use runtime::ParameterSet;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -114,7 +114,7 @@ pub struct Report {
     /// The same errors log by log.
     pub logs: Vec<Value>,
     /// The inputs whose errors no log shows, with what 1 % costs.
-    pub trusted_inputs: Vec<Trusted>,
+    pub trusted_inputs: Value,
     /// What only a fit has: see [`of_fit`]. Of a judgement those keys of it that programs may look up in
     /// any report, null.
     #[serde(flatten)]

@@ -13,6 +13,7 @@ pub mod plan;
 pub mod provenance;
 mod series;
 pub mod table;
+pub mod trusted;
 pub mod verdict;
 
 pub use figures::Density;

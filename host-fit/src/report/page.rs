@@ -9,7 +9,6 @@ use super::parameters::{self, Parameter};
 use super::provenance::Provenance;
 use super::table::{self, Table};
 use super::verdict::{Subject, Summary};
-use crate::diagnose::signals::period_s;
 use crate::fit::Fit;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
@@ -112,10 +111,9 @@ impl Source<'_> {
     /// [`Error`] as in [`Page::html`].
     pub fn html(&self) -> Result<String, Error> {
         let (stage, dataset) = (self.stage, self.dataset);
-        let segments: Vec<_> = dataset.movements.iter().map(|m| m.rows.clone()).collect();
         let log = Log {
             dataset,
-            period_s: period_s(&dataset.rows, &segments, stage.servo_period_s),
+            period_s: (dataset.period_s(0..dataset.rows.len())).unwrap_or(stage.servo_period_s),
         };
         let before = designed(dataset, stage);
         let mut sections = Vec::new();

@@ -10,7 +10,6 @@
 //! | [`signals`] | what the signals show by themselves |
 //! | `slopes` | how an error of each channel shows in the Hall signals |
 //! | [`temperature`] | k and h, a drift of temperature, how far a calibration is good |
-//! | [`trusted`] | the inputs that no log can show to be wrong |
 //!
 //! ```
 //! # use hall_input::input::shipped::STAGE_TOML;
@@ -40,7 +39,6 @@ pub mod structure;
 #[cfg(test)]
 mod structure_tests;
 pub mod temperature;
-pub mod trusted;
 
 use crate::finding::{Code, Finding, Severity, in_order, is_explained};
 use crate::fit::{Fit, FitError, Repair};

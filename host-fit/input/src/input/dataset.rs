@@ -1,6 +1,7 @@
 //! A log as the fit sees it: rows in SI units, grouped by movement.
 
 use super::stage::TemperatureTable;
+use crate::statistics::median;
 use runtime::frame::MISSING_CODE;
 use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Reading, Temperature, VerticalPose};
 use std::borrow::Cow;
@@ -235,6 +236,16 @@ impl Dataset {
             let [low, high] = ends.unwrap_or([code; 2]);
             Some([low.min(code), high.max(code)])
         })
+    }
+
+    /// Median time between these rows, within their movements, s; at least a microsecond. `None` where none
+    /// follow each other.
+    pub fn period_s(&self, rows: Range<usize>) -> Option<f64> {
+        let pairs = self.rows.get(rows)?.windows(2);
+        let pairs = pairs.filter(|pair| pair[0].movement == pair[1].movement);
+        let steps_us = pairs.map(|pair| (pair[1].t_us - pair[0].t_us) as f64);
+        let median_us = median(&mut steps_us.collect::<Vec<f64>>())?;
+        Some((median_us * 1e-6).max(1e-6))
     }
 
     /// How to name a movement: its number, after the name of its log where there are several.

@@ -34,7 +34,7 @@ impl<'a> LogSignals<'a> {
         Self {
             channels: channels(rows, stage),
             usable: vec![true; rows.len()],
-            period_s: period_s(rows, &segments, stage.servo_period_s),
+            period_s: (dataset.period_s(source.rows.clone())).unwrap_or(stage.servo_period_s),
             dataset,
             stage,
             source,
@@ -43,11 +43,15 @@ impl<'a> LogSignals<'a> {
         }
     }
 
-    /// Leaves rows out, with those beside them, whose velocity is not that of the motion.
-    pub(super) fn leave_out(&mut self, runs: impl IntoIterator<Item = Range<usize>>) {
+    /// Leaves rows out, and so many on either side.
+    pub(super) fn leave_out(
+        &mut self,
+        runs: impl IntoIterator<Item = Range<usize>>,
+        beside: usize,
+    ) {
         let end = self.rows.len();
         for run in runs {
-            self.usable[run.start.saturating_sub(2)..end.min(run.end + 2)].fill(false);
+            self.usable[run.start.saturating_sub(beside)..end.min(run.end + beside)].fill(false);
         }
     }
 
@@ -75,14 +79,6 @@ fn channels(rows: &[Row], stage: &Stage) -> Vec<Vec<f64>> {
     }
     channels.retain(|values| values.len() == rows.len());
     channels
-}
-
-/// Median time between the rows of the segments, s; that of the servo where there are too few.
-pub fn period_s(rows: &[Row], segments: &[Range<usize>], servo_period_s: f64) -> f64 {
-    let steps = (segments.iter()).flat_map(|s| rows[s.clone()].windows(2));
-    let steps_us = steps.map(|pair| (pair[1].t_us - pair[0].t_us) as f64);
-    let median_us = statistics::median(&mut steps_us.collect::<Vec<f64>>());
-    median_us.map_or(servo_period_s, |us| (us * 1e-6).max(1e-6))
 }
 
 /// The median; 0 of nothing.

@@ -1,11 +1,12 @@
 //! Hum: lines in the spectra of the residuals that one channel has, too.
 
+use super::CLEAR;
 use super::channels::LogSignals;
 use super::residual::{Residuals, is_seen};
-use super::spectrum::{Spectrum, windows};
 use crate::diagnose::of_fit::severity;
 use crate::diagnose::slopes::CHANNELS;
 use crate::finding::{Code, Finding, Severity};
+use crate::judge::spectrum::{Spectrum, windows};
 use std::ops::Range;
 
 /// Longest window, s: its bins tell 50 Hz from 60.
@@ -36,7 +37,7 @@ pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
     let mut lines: Vec<(usize, f64, usize)> = Vec::new();
     for (probe, values) in residuals.values.iter().enumerate() {
         let residual = spectrum(values);
-        for bin in residual.lines(OF_MOTION * motion) {
+        for bin in residual.lines(OF_MOTION * motion, CLEAR) {
             let shown_m = residual.amplitude(bin);
             let in_probe = |k: usize| slopes[k][probe].abs() * raw[k].amplitude(bin);
             let seen = (0..raw.len()).filter(|&k| is_seen(in_probe(k), shown_m));

@@ -9,7 +9,7 @@
 //! | `residual` | residuals of the Hall signals, and the channel that explains them |
 //! | `standing` | channels that show no more than their noise |
 //! | `outliers` | rows that jump |
-//! | `spectrum`, `hum` | lines of one frequency |
+//! | `hum` | lines of one frequency |
 //!
 //! Each log is tested alone, and what an earlier test names is left out of the later ones. A
 //! channel is named where it alone explains what was found.
@@ -20,7 +20,6 @@ mod outliers;
 mod residual;
 #[cfg(test)]
 mod sample_for_tests;
-mod spectrum;
 mod standing;
 mod still;
 mod timing;
@@ -33,8 +32,6 @@ use channels::LogSignals;
 use residual::Residuals;
 
 pub(super) use crate::statistics::robust_deviation;
-pub use channels::period_s;
-pub use spectrum::{Spectrum, windows};
 
 /// Rows whose median knows no outlier, and whose mean hardly any noise of a Hall probe: a third of 0.5 um.
 const BLOCK: usize = 10;

@@ -56,9 +56,9 @@ impl Residuals {
             left_m <= SEEN_MIN * (moved / used.len().max(1) as f64).sqrt()
         };
         let white = |values: &Vec<f64>| {
-            let rows = log.segments.iter().flat_map(|s| s.start + 2..s.end);
-            let used = rows.filter(|&row| (row - 2..=row).all(|row| log.usable[row]));
-            white_noise(used.map(|row| [row - 2, row - 1, row].map(|row| values[row]))).max(1e-10)
+            let threes = used.windows(3);
+            let threes = threes.map(|rows| [values[rows[0]], values[rows[1]], values[rows[2]]]);
+            white_noise(threes).max(1e-10)
         };
         (0..3).all(is_understood).then(|| Self {
             slopes: Slopes::new(log.stage, probes),

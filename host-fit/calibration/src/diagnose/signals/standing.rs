@@ -2,10 +2,10 @@
 
 use super::channels::{LogSignals, levels};
 use super::residual::Residuals;
-use super::spectrum::windows;
 use super::still;
 use super::{BLOCK, CLEAR};
 use crate::finding::Finding;
+use crate::judge::spectrum::windows;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -29,11 +29,7 @@ pub(super) fn standing(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
         }
     }
     // It may have begun and ended in the windows beside.
-    let beside = |run: &Range<usize>| run.start.saturating_sub(WINDOW)..run.end + WINDOW;
-    let wider: Vec<Range<usize>> = runs.iter().flatten().map(beside).collect();
-    let found = still::named(log, runs);
-    log.leave_out(wider);
-    found
+    still::named(log, runs, WINDOW)
 }
 
 /// The channel that stands still in a window.

@@ -1,7 +1,7 @@
 //! What stands still: movements in which nothing moves, and channels that repeat one value.
 
+use super::CLEAR;
 use super::channels::{LogSignals, levels};
-use super::{BLOCK, CLEAR};
 use crate::diagnose::of_fit::severity;
 use crate::diagnose::slopes::CHANNELS;
 use crate::finding::{Code, Finding, Severity};
@@ -14,13 +14,10 @@ const STILL_M: f64 = 2e-6;
 /// Names movements in which nothing moves; their rows are left out.
 pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
     let is_idle = |rows: &&Range<usize>| {
-        // Over longer the interferometers of a stage at rest drift.
-        let beams_rest = |start: usize| {
-            let piece = start..rows.end.min(start + BLOCK);
-            (3..6).all(|beam| spread(&log.channels[beam][piece.clone()]) < STILL_M)
-        };
-        let mut pieces = (rows.start..rows.end).step_by(BLOCK);
-        log.source.has_reference && hall_motion_m(log, rows) < STILL_M && pieces.all(beams_rest)
+        // In a long rest the interferometers drift further.
+        let rest_m = [(0..3, STILL_M), (3..6, 10.0 * STILL_M)];
+        let mut rest = rest_m.into_iter();
+        log.source.has_reference && rest.all(|(of, most_m)| motion_m(log, of, rows) < most_m)
     };
     let idle: Vec<Range<usize>> = log.segments.iter().filter(is_idle).cloned().collect();
     let first = idle.first()?.start;
@@ -29,7 +26,7 @@ pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
         idle.len(),
         log.segments.len(),
     );
-    log.leave_out(idle);
+    log.leave_out(idle, 0);
     Some(log.found_at(first, Code::IdleMovement, message))
 }
 
@@ -39,34 +36,23 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
     let (hall_m, gap_m) = (log.stage.hall.m_per_count, log.stage.capacitive.m_per_count);
     let codes_m = [hall_m, 1e-12, gap_m];
     let runs = |(channel, values): (usize, &Vec<f64>)| -> Vec<Range<usize>> {
-        let threes = log
-            .segments
-            .iter()
-            .flat_map(|s| values[s.clone()].windows(3));
+        let threes = values.windows(3);
         let white_m = white_noise(threes.map(|three| [three[0], three[1], three[2]]));
         let code_m = codes_m[channel / 3];
         // The chance of the most likely code, and for how long it is as rare as what is clear.
         let chance = libm::erf(code_m / 8f64.sqrt() / white_m.max(code_m / 12f64.sqrt()));
-        let least = match spread(values) {
-            0.0 => 2.0,
-            _ => 1.0 + 0.5 * CLEAR * CLEAR / libm::log(chance).abs(),
-        };
-        // Not where nothing moves at all.
-        let is_found = |run: &Range<usize>| {
-            run.len() as f64 >= least && log.usable[run.start] && should_move(log, channel, run)
-        };
-        let of = |segment: &Range<usize>| {
-            let mut end = segment.start;
-            let chunks = values[segment.clone()].chunk_by(|a, b| a == b);
-            chunks.map(move |run| {
-                end += run.len();
-                end - run.len()..end
-            })
-        };
-        log.segments.iter().flat_map(of).filter(is_found).collect()
+        let least = 1.0 + 0.5 * CLEAR * CLEAR / libm::log(chance).abs();
+        let mut end = 0;
+        let runs = values.chunk_by(|a, b| a == b).map(|run| {
+            end += run.len();
+            end - run.len()..end
+        });
+        let is_long = |run: &Range<usize>| run.len() as f64 >= least && log.usable[run.start];
+        runs.filter(|run| is_long(run) && should_move(log, channel, run))
+            .collect()
     };
     let runs = log.channels.iter().enumerate().map(runs).collect();
-    named(log, runs)
+    named(log, runs, 2)
 }
 
 /// Whether a channel should show something in these rows: a probe its noise, which is many codes; a beam
@@ -74,16 +60,25 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
 fn should_move(log: &LogSignals, channel: usize, rows: &Range<usize>) -> bool {
     match channel {
         0..3 => true,
-        3..6 => log.source.has_reference && hall_motion_m(log, rows) > STILL_M,
-        _ => log.channels[6..]
-            .iter()
-            .any(|values| spread(&values[rows.clone()]) > STILL_M),
+        3..6 => log.source.has_reference && motion_m(log, 0..3, rows) > STILL_M,
+        _ => motion_m(log, 6..9, rows) > STILL_M,
     }
 }
 
+/// How far some channels move by the levels of rows, m.
+fn motion_m(log: &LogSignals, channels: Range<usize>, rows: &Range<usize>) -> f64 {
+    let channels = log.channels[channels].iter();
+    let moved = channels.map(|values| spread(&levels(&values[rows.clone()])));
+    moved.fold(0.0, f64::max)
+}
+
 /// Names channels that stand still in runs of rows, by channel, at their longest: as saturated where that is an
-/// end of what the channel reads. The rows are left out.
-pub(super) fn named(log: &mut LogSignals, runs: Vec<Vec<Range<usize>>>) -> Vec<Finding> {
+/// end of what the channel reads. The rows are left out, and so many on either side.
+pub(super) fn named(
+    log: &mut LogSignals,
+    runs: Vec<Vec<Range<usize>>>,
+    beside: usize,
+) -> Vec<Finding> {
     let finding = |(channel, runs): (usize, &Vec<Range<usize>>)| {
         let longest = runs.iter().max_by_key(|run| run.len())?;
         let rows = runs.iter().map(Range::len).sum::<usize>() as f64;
@@ -110,15 +105,8 @@ pub(super) fn named(log: &mut LogSignals, runs: Vec<Vec<Range<usize>>>) -> Vec<F
         )
     };
     let findings = runs.iter().enumerate().filter_map(finding).collect();
-    log.leave_out(runs.into_iter().flatten());
+    log.leave_out(runs.into_iter().flatten(), beside);
     findings
-}
-
-/// How far a stage moves by any probe, by the levels of rows, m.
-fn hall_motion_m(log: &LogSignals, rows: &Range<usize>) -> f64 {
-    let halls = log.channels[..3].iter();
-    let moved = halls.map(|values| spread(&levels(&values[rows.clone()])));
-    moved.fold(0.0, f64::max)
 }
 
 /// Largest less smallest.

@@ -7,29 +7,7 @@
 //! probes, the vertical terms by that of the gaps, which remain wrong in Z, Rx and Ry alone.
 
 use runtime::ParameterSet;
-use serde::Serialize;
-
-/// What an error of 1 % of an input costs.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Trusted {
-    /// The input.
-    pub input: &'static str,
-    /// Where it is said.
-    pub place: &'static str,
-    /// The error of the pose at the ends of the calibrated range: X, Y, Z in um, Rx, Ry, Rz in urad.
-    pub cost: Vec<AxisCost>,
-}
-
-/// The error of an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct AxisCost {
-    /// The axis.
-    pub axis: &'static str,
-    /// Error of the pose.
-    pub value: f64,
-    /// um or urad.
-    pub unit: &'static str,
-}
+use serde_json::{Value, json};
 
 /// An error of this part of an input.
 const PART: f64 = 0.01;
@@ -59,20 +37,23 @@ const INPUTS: [(&str, &str, &[usize]); 4] = [
     ),
 ];
 
-/// Every trusted input of a calibration.
-pub fn trusted(set: &ParameterSet) -> Vec<Trusted> {
+/// Every trusted input of a calibration, and what an error of 1 % of it costs: the error of the pose by axis
+/// at the ends of the calibrated range, in um or urad.
+pub fn trusted(set: &ParameterSet) -> Value {
     let constants = &set.constants;
     let ends = [constants.calibrated_planar, constants.calibrated_vertical].concat();
-    let unit = |axis: &str| if axis.starts_with('R') { "urad" } else { "um" };
-    let cost = |&axis: &usize| AxisCost {
-        axis: AXES[axis],
-        value: PART * f64::from(ends[axis]) * 1e6,
-        unit: unit(AXES[axis]),
+    let cost = |&axis: &usize| {
+        let unit = if AXES[axis].starts_with('R') {
+            "urad"
+        } else {
+            "um"
+        };
+        let value = PART * f64::from(ends[axis]) * 1e6;
+        json!({ "axis": AXES[axis], "value": value, "unit": unit })
     };
-    let of_input = |(input, place, axes): (_, _, &[usize])| Trusted {
-        input,
-        place,
-        cost: axes.iter().map(cost).collect(),
+    let of_input = |(input, place, axes): (_, _, &[usize])| {
+        let cost: Vec<Value> = axes.iter().map(cost).collect();
+        json!({ "input": input, "place": place, "cost": cost })
     };
-    INPUTS.map(of_input).to_vec()
+    INPUTS.map(of_input).into_iter().collect()
 }

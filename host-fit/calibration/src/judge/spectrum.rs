@@ -1,11 +1,13 @@
-//! Mean power spectra of the signals of a log.
+//! Mean power spectra of signals and errors, and their lines.
 
-use super::channels::median;
-use super::{BLOCK, CLEAR};
-use crate::judge::verdict::quantile;
+use super::verdict::quantile;
+use crate::statistics::median;
 use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 use std::ops::Range;
+
+/// Bins on each side that give the level of the noise.
+const SIDE: usize = 20;
 
 /// Pieces of segments of equal length.
 pub fn windows(segments: &[Range<usize>], length: usize) -> Vec<Range<usize>> {
@@ -60,21 +62,22 @@ impl Spectrum {
 
     /// The level of the noise around a bin.
     fn level(&self, bin: usize) -> f64 {
-        let bins = bin.saturating_sub(2 * BLOCK).max(3)..self.power.len().min(bin + 2 * BLOCK + 1);
-        median(bins.map(|k| self.power[k])) / self.noise(0.0)
+        let bins = bin.saturating_sub(SIDE).max(3)..self.power.len().min(bin + SIDE + 1);
+        let mut powers: Vec<f64> = bins.map(|k| self.power[k]).collect();
+        median(&mut powers).unwrap_or(0.0) / self.noise(0.0)
     }
 
     /// Amplitude of a line at a bin of at least 1: Hann spreads it over three.
-    pub(super) fn amplitude(&self, bin: usize) -> f64 {
+    pub fn amplitude(&self, bin: usize) -> f64 {
         let level = self.level(bin);
         let excess: f64 = (bin - 1..=bin + 1).map(|k| self.power[k] - level).sum();
         // The sum of squares of the taper is 3/8 of its length.
         (4.0 * excess.max(0.0) / (0.375 * (self.length * self.length) as f64)).sqrt()
     }
 
-    /// The lines from a bin on that noise does not explain.
-    pub(super) fn lines(&self, lowest: usize) -> impl Iterator<Item = usize> {
-        let limit = self.noise(CLEAR);
+    /// The lines from a bin on that are so many standard deviations of the noise's power above it.
+    pub fn lines(&self, lowest: usize, deviations: f64) -> impl Iterator<Item = usize> {
+        let limit = self.noise(deviations);
         let is_line = move |bin: &usize| {
             let highest = self.power[bin - 1].max(self.power[bin + 1]);
             self.power[*bin] >= highest && self.power[*bin] > limit * self.level(*bin)
@@ -83,7 +86,7 @@ impl Spectrum {
     }
 
     /// The highest bin with a considerable part of the power.
-    pub(super) fn highest(&self) -> usize {
+    pub fn highest(&self) -> usize {
         let most = self.power.iter().copied().fold(0.0, f64::max);
         let considerable = self.power.iter().rposition(|&power| power > 1e-3 * most);
         considerable.unwrap_or(0)
@@ -107,7 +110,7 @@ mod tests {
             *value += 0.8 * libm::sin(TAU * 0.1004 * k as f64 + 0.3);
         }
         let spectrum = Spectrum::new(&values, &windows(std::slice::from_ref(&(0..8000)), 1000));
-        assert!(spectrum.lines(10).eq([100]));
+        assert!(spectrum.lines(10, 6.5).eq([100]));
         let amplitude = spectrum.amplitude(100);
         assert!((amplitude - 0.8).abs() < 0.06, "{amplitude}");
     }
@@ -138,7 +141,11 @@ mod tests {
                     &noise(rows, seed),
                     &windows(std::slice::from_ref(&(0..rows)), length),
                 );
-                assert_eq!(spectrum.lines(5).next(), None, "{rows} {length} {seed}");
+                assert_eq!(
+                    spectrum.lines(5, 6.5).next(),
+                    None,
+                    "{rows} {length} {seed}"
+                );
             }
         }
     }
