@@ -1,7 +1,7 @@
 //! What stands still: movements in which nothing moves, and channels that repeat one value.
 
-use super::CLEAR;
 use super::channels::{LogSignals, levels};
+use super::{BLOCK, CLEAR};
 use crate::diagnose::of_fit::severity;
 use crate::diagnose::slopes::CHANNELS;
 use crate::finding::{Code, Finding, Severity};
@@ -14,10 +14,13 @@ const STILL_M: f64 = 2e-6;
 /// Names movements in which nothing moves; their rows are left out.
 pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
     let is_idle = |rows: &&Range<usize>| {
-        // In a long rest the interferometers drift further.
-        let rest_m = [(0..3, STILL_M), (3..6, 10.0 * STILL_M)];
-        let mut rest = rest_m.into_iter();
-        log.source.has_reference && rest.all(|(of, most_m)| motion_m(log, of, rows) < most_m)
+        // Over longer the interferometers of a stage at rest drift.
+        let rests = |start: usize| {
+            let piece = start..rows.end.min(start + BLOCK);
+            (3..6).all(|beam| spread(&log.channels[beam][piece.clone()]) < STILL_M)
+        };
+        let mut pieces = (rows.start..rows.end).step_by(BLOCK);
+        log.source.has_reference && motion_m(log, 0..3, rows) < STILL_M && pieces.all(rests)
     };
     let idle: Vec<Range<usize>> = log.segments.iter().filter(is_idle).cloned().collect();
     let first = idle.first()?.start;
