@@ -249,7 +249,8 @@ impl Diagnosis {
         findings.extend(range::undeclared(dataset, stage).filter(|found| !ranged(found)));
         if !is_explained(findings) {
             findings.extend(of_fit::undescribed(fit, dataset));
-            findings.extend(of_fit::not_field(fit, dataset, self.predicted.as_ref()));
+            let unexplained = are_notes(findings).then(|| of_fit::over_noise(fit, dataset));
+            findings.extend(of_fit::not_field(fit, self.predicted.as_ref(), unexplained));
         }
     }
 }

@@ -68,15 +68,13 @@ pub(super) fn short_movements(fit: Option<&Fit>, dataset: &Dataset) -> Option<Fi
     })
 }
 
-/// Why a fit is not the field model, and what it is good for; a warning where its errors are not noise.
+/// Why a fit is not the field model, and what it is good for; a warning where its errors are so many times their
+/// noise that no other finding explains.
 pub(super) fn not_field(
     fit: &Fit,
-    dataset: &Dataset,
     predicted: Option<&Predicted>,
+    unexplained: Option<f64>,
 ) -> Option<Finding> {
-    if fit.model.kind == ModelKind::Field {
-        return None;
-    }
     let mut message = fit.model_reason.clone();
     if let Some(predicted) = predicted {
         let um = predicted.range.map(|ends| ends.map(|end| end * 1e6));
@@ -85,15 +83,16 @@ pub(super) fn not_field(
             ". It is good on movements like those of the log; in service expect {x} um in X, {y} um in Y, {rz} urad in Rz"
         );
     }
-    let ratio = over_noise(fit, dataset);
-    if ratio <= ERROR_TO_NOISE_MAX {
-        return Some(Finding::new(Code::ModelLacks, message).severe(Severity::Note));
+    let unexplained = unexplained.filter(|ratio| *ratio > ERROR_TO_NOISE_MAX);
+    if let Some(ratio) = unexplained {
+        message += &format!(
+            ". Its errors are {ratio:.1} times the noise from sample to sample: something in the log is not in the model. With \
+             all six axes moving at once take --model field or auto; else see the errors over the log in the report"
+        );
     }
-    message += &format!(
-        ". Its errors are {ratio:.1} times the noise from sample to sample: something in the log is not in the model. With all \
-         six axes moving at once take --model field or auto; else see the other findings, and the errors over the log in the report"
-    );
-    Some(Finding::new(Code::ModelLacks, message).of(ratio, "times"))
+    let severity = unexplained.map_or(Severity::Note, |_| Severity::Warn);
+    let lacks = Finding::new(Code::ModelLacks, message).severe(severity);
+    (fit.model.kind != ModelKind::Field).then_some(lacks)
 }
 
 /// A fit that leaves most of the motion unexplained and was kept all the same.

@@ -13,10 +13,7 @@ pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
     let rows: Vec<usize> = (0..log.rows.len()).filter(|&row| log.usable[row]).collect();
     // From the median of those about it: beside a step is no outlier.
     let off_m = |&row: &usize| {
-        let about = row.saturating_sub(BLOCK)..log.rows.len().min(row + BLOCK + 1);
-        let movement = |row: usize| log.rows[row].movement;
-        let is_beside = |&other: &usize| log.usable[other] && movement(other) == movement(row);
-        let about: Vec<usize> = about.filter(is_beside).collect();
+        let about = about(log, row, BLOCK);
         let middle_m = |values: &Vec<f64>| median(about.iter().map(|&row| values[row]));
         (residuals.values.each_ref()).map(|values| values[row] - middle_m(values))
     };
@@ -27,10 +24,11 @@ pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
     far.iter().for_each(|(row, _)| log.usable[*row] = false);
     // Channel, row, size: a channel that jumps by what the residuals ask of it, before any other.
     let cause = |&(row, shown_m): &(usize, [f64; 3])| {
+        let beside = about(log, row, 1);
         let worth = |(channel, [size_m, explained]): &(usize, [f64; 2])| {
             let values = &log.channels[*channel];
-            let beside_m = values[row.saturating_sub(1)] + values[(row + 1).min(values.len() - 1)];
-            let is_seen = is_seen(values[row] - 0.5 * beside_m, *size_m);
+            let sum = beside.iter().map(|&row| values[row]).sum::<f64>();
+            let is_seen = is_seen(values[row] - sum / beside.len() as f64, *size_m);
             (f64::from(u8::from(is_seen)) + 1e-9) * explained
         };
         let errors = residuals.errors(log, row, shown_m).into_iter().enumerate();
@@ -51,6 +49,14 @@ pub(super) fn outliers(log: &mut LogSignals, residuals: &Residuals) -> Vec<Findi
         Some(found.on(name).of(count as f64, "rows"))
     };
     (0..log.channels.len()).filter_map(finding).collect()
+}
+
+/// The usable rows of its movement about a row.
+fn about(log: &LogSignals, row: usize, reach: usize) -> Vec<usize> {
+    let rows = row.saturating_sub(reach)..log.rows.len().min(row + reach + 1);
+    let movement = |row: usize| log.rows[row].movement;
+    rows.filter(|&other| log.usable[other] && movement(other) == movement(row))
+        .collect()
 }
 
 #[cfg(test)]
