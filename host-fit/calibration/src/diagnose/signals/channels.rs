@@ -64,7 +64,7 @@ impl<'a> LogSignals<'a> {
 }
 
 fn channels(rows: &[Row], stage: &Stage) -> Vec<Vec<f64>> {
-    let mut channels = vec![Vec::with_capacity(rows.len()); 9];
+    let mut channels = vec![Vec::new(); 9];
     for row in rows {
         let [x, y, rz] = row.reference;
         let turned_m = 0.5 * stage.y_baseline_m * rz.tan();

@@ -35,9 +35,9 @@ pub(super) fn idle(log: &mut LogSignals) -> Option<Finding> {
 
 /// Names channels that repeat a value for longer than noise does.
 pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
-    // Beams are rounded, by less.
     let (hall_m, gap_m) = (log.stage.hall.m_per_count, log.stage.capacitive.m_per_count);
-    let codes_m = [hall_m, 1e-12, gap_m];
+    // Those of beams are nm.
+    let codes_m = [hall_m, 1e-9, gap_m];
     let runs = |(channel, values): (usize, &Vec<f64>)| -> Vec<Range<usize>> {
         let threes = values.windows(3);
         let white_m = white_noise(threes.map(|three| [three[0], three[1], three[2]]));

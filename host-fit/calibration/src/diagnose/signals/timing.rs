@@ -16,7 +16,7 @@ pub(super) fn timing(log: &LogSignals) -> Vec<Finding> {
     let rows = log.segments.iter().flat_map(|s| s.start + 1..s.end);
     let steps: Vec<(usize, f64, f64)> = rows.map(step).collect();
     let sum = |of: &dyn Fn(f64, f64) -> f64| steps.iter().map(|&(_, k, us)| of(k, us)).sum::<f64>();
-    let period_us = sum(&|_, us| us) / sum(&|k, _| k);
+    let period_us = sum(&|_, us| us) / sum(&|k, _| k).max(1.0);
     // A step has the errors of two times.
     let squares = sum(&|k, us| (us - period_us * k).powi(2));
     let rms_us = (squares / (2 * steps.len()) as f64).sqrt();
