@@ -2,8 +2,8 @@
 
 use crate::input::stage::Stage;
 use crate::solve::field::probe::Probe;
-use nalgebra::Vector3;
-use runtime::capacitive::{vertical_pose, vertical_rows};
+use nalgebra::{Matrix3, Vector3};
+use runtime::capacitive::vertical_rows;
 
 /// Hall A, B, C; beams X, Y1, Y2; gaps 1, 2, 3.
 pub(super) const CHANNELS: [&str; 9] = [
@@ -22,53 +22,36 @@ pub(super) fn title(channel: &str) -> String {
     }
 }
 
-/// Step of the derivative by Z, Rx, Ry: m, rad.
-const STEP: f64 = 1e-6;
-
 /// The probes, and the poses that errors of the reference and of the gaps make.
 pub(super) struct Slopes {
     probes: [Probe; 3],
     /// X, Y, Rz (mm, mm, mrad) by an error of each beam, mm.
-    per_beam: [[f64; 3]; 3],
+    by_beam: Matrix3<f64>,
     /// Z, Rx, Ry (m, rad, rad) by an error of each gap, mm.
-    per_gap: [[f64; 3]; 3],
+    by_gap: Matrix3<f64>,
 }
 
 impl Slopes {
     pub(super) fn new(stage: &Stage, probes: [Probe; 3]) -> Self {
+        let turn = 1.0 / stage.y_baseline_m;
         // A checked stage has its sensors apart.
         let rows = vertical_rows(&stage.capacitive_probes_m).unwrap_or_default();
-        let turn = 1.0 / stage.y_baseline_m;
-        let of_gap = |gap: usize| {
-            let gaps_m = [0, 1, 2].map(|k| if k == gap { 1e-3 } else { 0.0 });
-            vertical_pose(&rows, gaps_m).to_array()
-        };
         Self {
             probes,
-            per_beam: [[1.0, 0.0, 0.0], [0.0, 0.5, turn], [0.0, 0.5, -turn]],
-            per_gap: [0, 1, 2].map(of_gap),
+            by_beam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0, turn, -turn),
+            by_gap: Matrix3::from_fn(|axis, gap| 1e-3 * rows[axis][gap]),
         }
     }
 
     /// Changes of the residuals of A, B, C by an error of each of [`CHANNELS`] at a pose, both in mm.
     pub(super) fn at(&self, planar_mm: [f64; 3], vertical: [f64; 3]) -> [Vector3<f64>; 9] {
         let here = self.probes.map(|probe| probe.read(planar_mm, vertical));
-        let by_planar = |axis: usize| Vector3::from(here.map(|reading| reading.by_pose[axis]));
-        let by_planar = [0, 1, 2].map(by_planar);
-        let by_vertical = [0, 1, 2].map(|axis| {
-            let mut moved = vertical;
-            moved[axis] += STEP;
-            Vector3::from_fn(|k, _| {
-                (self.probes[k].signal_mm(planar_mm, moved) - here[k].signal_mm) / STEP
-            })
-        });
-        let along = |by: &[Vector3<f64>; 3], pose: [f64; 3]| {
-            -(by[0] * pose[0] + by[1] * pose[1] + by[2] * pose[2])
-        };
+        let by_beam = Matrix3::from_fn(|k, axis| here[k].by_pose[axis]) * self.by_beam;
+        let by_gap = Matrix3::from_fn(|k, axis| here[k].by_vertical[axis]) * self.by_gap;
         std::array::from_fn(|channel| match channel {
             0..3 => Vector3::ith(channel, 1.0),
-            3..6 => along(&by_planar, self.per_beam[channel - 3]),
-            _ => along(&by_vertical, self.per_gap[channel - 6]),
+            3..6 => -by_beam.column(channel - 3),
+            _ => -by_gap.column(channel - 6),
         })
     }
 }

@@ -325,6 +325,7 @@ fn mean(rows: &[FieldRow], probes: &[Probe; 3], lag_s: f64, offset_mm: [f64; 3])
                 signal_mm,
                 by_pose,
                 by_parameter,
+                ..
             } = probe.read(planar_mm, row.vertical);
             let gain = probe.gain(row.warmth_k[k]);
             sum.residual_mm[k] += row.weight * (row.signal_mm[k] - gain * signal_mm);

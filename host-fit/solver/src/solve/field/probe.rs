@@ -23,6 +23,8 @@ pub struct Reading {
     pub signal_mm: f64,
     /// Its derivatives by X, Y (mm) and Rz (mrad).
     pub by_pose: [f64; 3],
+    /// Its derivatives by Z, Rx, Ry, mm per m and rad.
+    pub by_vertical: [f64; 3],
     /// Its derivatives by the parameters of the probe, in mm and their units.
     pub by_parameter: [f64; PER_PROBE],
 }
@@ -110,6 +112,7 @@ impl Probe {
                 by_u * cos - by_w * sin,
                 by_u * p[LEVER_ARM] + by_w * self.lateral_arm,
             ],
+            by_vertical: [0, 1, 2].map(|k| slope * p[SLOPES + k] + 1e3 * phi * p[CARRY + k]),
             by_parameter,
         }
     }
@@ -213,13 +216,18 @@ mod tests {
             let read = probes(&parameters).map(|probe| probe.read(PLANAR_MM, VERTICAL));
             for (k, read) in read.iter().enumerate() {
                 for axis in 0..3 {
-                    let moved = |step: f64| {
-                        let mut planar_mm = PLANAR_MM;
-                        planar_mm[axis] += step;
-                        probes(&parameters)[k].signal_mm(planar_mm, VERTICAL)
+                    let moved = |planar: f64, vertical: f64| {
+                        let (mut planar_mm, mut at) = (PLANAR_MM, VERTICAL);
+                        planar_mm[axis] += planar;
+                        at[axis] += vertical;
+                        probes(&parameters)[k].signal_mm(planar_mm, at)
                     };
-                    let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+                    let slope = (moved(1e-5, 0.0) - moved(-1e-5, 0.0)) / 2e-5;
                     assert!((slope - read.by_pose[axis]).abs() < 1e-9, "{k} {axis}");
+                    let slope = (moved(0.0, 1e-6) - moved(0.0, -1e-6)) / 2e-6;
+                    let found = read.by_vertical[axis];
+                    let close = (slope - found).abs() < 1e-6 * found.abs();
+                    assert!(close, "{k} {axis}: {slope} {found}");
                 }
                 for (term, &found) in read.by_parameter.iter().enumerate() {
                     let step = 1e-4 * parameters.probes[k][term].abs().max(0.01);
