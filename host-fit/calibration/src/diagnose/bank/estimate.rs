@@ -3,7 +3,7 @@
 
 use super::means::Log;
 use super::{FAULTS_MAX, ROUNDS};
-use crate::solve::field::noise::{USUAL_DRIFT_MM, drift_mm};
+use crate::solve::field::noise::{DRIFT_SPREAD, USUAL_DRIFT_MM, drift_mm};
 use crate::solve::field::parameters::{FieldParameters, HELD, unknowns};
 use crate::solve::field::probe::probes;
 use crate::solve::field::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE, TERMS};
@@ -15,25 +15,18 @@ use nalgebra::{DMatrix, DVector};
 /// four is quick.
 pub(super) const WIDTH: usize = (UNKNOWNS + FAULTS_MAX + 1).next_multiple_of(4);
 pub(super) const RESIDUAL: usize = WIDTH - 1;
-/// From a start that is a fit.
-const LIMITS: Limits = Limits {
-    steps: 20,
-    gain: 0.1,
-};
 
-/// Declared drift of the interferometers in a movement: mm, mm, mrad. A free walk swallows faults.
-const DRIFT_MAX_MM: f64 = 0.6e-3;
 /// The priors are so much wider than what magnets and a workshop give: see
 /// [`TERMS`](crate::solve::field::terms::TERMS).
 const USUAL_PART: f64 = 0.5;
-/// E in parts of its prior: with magnets as designed, whose probes stand 2.5 mm off the tilt plane, ...
-const CARRY_LEAST: f64 = 0.03;
-/// ... and over the part that the other terms even in u have of theirs: by 60 simulated stages.
+/// E in parts of its prior, over the part that the terms even in u have of theirs: by 60 simulated stages.
 const CARRY_PART: f64 = 0.4;
-/// Lever arm, theta, eta and a, b, c, and a lag, s, of any stage, whose priors are flat: so far that no log
+/// Terms even in u have at least this part of their prior: the probes stand 2.5 mm off the tilt plane, which
+/// alone makes .03 of E.
+const EVEN_LEAST: f64 = 0.075;
+/// Standard deviation of the lag and of the parameters whose priors are flat, in their units: so far that no log
 /// that shows them feels it.
-const OPEN: [f64; 6] = [1.0, 1.0, 3.0, 400.0, 200.0, 200.0];
-const LAG_S: f64 = 0.02;
+const OPEN: f64 = 1e3;
 
 /// Columns of a mean for A, B, C.
 pub(super) type Row = [[f64; WIDTH]; 3];
@@ -47,7 +40,7 @@ pub(super) struct Estimate {
     /// What whitened them.
     pub(super) gains: Vec<Gain>,
     /// The curvature, with the prior: the unknowns, then the faults.
-    squares: DMatrix<f64>,
+    pub(super) squares: DMatrix<f64>,
     pub(super) curvature: Factor,
     /// The step to the very end, which is too small for a fit but not where parts of a log are compared.
     pub(super) step: DVector<f64>,
@@ -57,13 +50,6 @@ pub(super) struct Estimate {
     at: Point,
     /// Its precision; the mean is zero.
     pub(super) prior: DMatrix<f64>,
-}
-
-/// The solution for each column.
-pub(super) fn solve_all(factor: &Factor, right: &DMatrix<f64>) -> DMatrix<f64> {
-    let columns = right.column_iter();
-    let solved: Vec<_> = columns.map(|c| factor.solve(&c.into_owned())).collect();
-    DMatrix::from_columns(&solved)
 }
 
 impl Estimate {
@@ -76,7 +62,7 @@ impl Estimate {
         let values = start.probes.as_flattened();
         let at = Point {
             values: DVector::from_fn(UNKNOWNS, |k, _| values.get(k).copied().unwrap_or(0.0)),
-            offsets: vec![[0.0; 3]; log.movements().len()],
+            offsets: vec![[0.0; 3]; log.means.movements.len()],
         };
         let noise = Noise {
             white_mm: log.white_mm,
@@ -88,14 +74,13 @@ impl Estimate {
     /// Without faults, under the noise that the residuals show.
     pub(super) fn faultless(self, log: &Log) -> Option<Self> {
         let (parameters, at, mut noise) = (&self.parameters, &self.at, self.noise);
-        let blocks = (log.rows).evaluate(&probes(parameters), self.lag_s(), &at.offsets);
-        let time_s = |mean: usize| log.means()[mean].time_s;
-        let movements = log.movements().iter();
-        let longest_s = movements.map(|movement| time_s(movement.end - 1) - time_s(movement.start));
-        let most_mm = DRIFT_MAX_MM / longest_s.fold(0.0, f64::max).max(0.1).sqrt();
+        let blocks = (log.means).evaluate(&probes(parameters), self.lag_s(), &at.offsets);
         let covariance = self.curvature.inverse();
-        noise.drift_mm = drift_mm(&log.rows, &blocks, noise.white_mm, &covariance)
-            .map(|drift_mm| drift_mm.min(most_mm));
+        noise.drift_mm = drift_mm(&log.means, &blocks, noise.white_mm, &covariance);
+        for (drift_mm, usual_mm) in noise.drift_mm.iter_mut().zip(USUAL_DRIFT_MM) {
+            // A free walk swallows faults.
+            *drift_mm = drift_mm.min(usual_mm * libm::exp(DRIFT_SPREAD));
+        }
         Self::descend(log, parameters.places, self.at, noise, &[])
     }
 
@@ -108,12 +93,9 @@ impl Estimate {
     ) -> Option<Self> {
         let size = UNKNOWNS + faults.len();
         let mut prior = unknowns(&places, [HELD; 2]).prior;
-        for k in 0..COUNT {
-            if let Some(open) = OPEN.get(k % PER_PROBE) {
-                prior[(k, k)] += 1.0 / (open * open);
-            }
+        for k in (0..=COUNT).filter(|k| k % PER_PROBE < BEYOND_MODEL_31) {
+            prior[(k, k)] += 1.0 / (OPEN * OPEN);
         }
-        prior[(COUNT, COUNT)] = 1.0 / (LAG_S * LAG_S);
         let unknowns = Unknowns {
             origin: DVector::zeros(size),
             basis: DMatrix::identity(size, size),
@@ -121,7 +103,7 @@ impl Estimate {
             ranges: Vec::new(),
         };
         let equations = FieldEquations {
-            rows: &log.rows,
+            rows: &log.means,
             places,
             noise,
             resets_mm: log.resets_mm,
@@ -129,7 +111,7 @@ impl Estimate {
         };
         let x = at.values.resize_vertically(size, 0.0);
         let solved: Option<Solved<WIDTH>> =
-            gauss_newton::solve(&equations, &unknowns, x, at.offsets, LIMITS);
+            gauss_newton::solve(&equations, &unknowns, x, at.offsets, Limits::CLOSE);
         let solved = solved?;
         let (rows, gains) = equations.whitened(&solved.point);
         let curvature = unknowns.factor(&solved.normal)?;
@@ -201,37 +183,40 @@ impl Estimate {
     /// kind, for what a log leaves open of them is what it does to a model without them. A magnet as designed
     /// has none that are even in u: how large those are that the log shows says how large the others are.
     pub(super) fn of_this_stage(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let powers = |k: usize| TERMS[k % PER_PROBE].powers;
+        let is_even = |k: &usize| powers(*k) != [0; 3] && powers(*k)[0].is_multiple_of(2);
         let mut imperfect = USUAL_PART;
         let mut found = None;
         for _ in 0..ROUNDS {
-            let part = |k: usize| match (k % PER_PROBE, TERMS[k % PER_PROBE].powers) {
-                (0..BEYOND_MODEL_31, _) => 1.0,
-                (_, [0, 0, 0]) => CARRY_LEAST.hypot(CARRY_PART * imperfect),
-                (_, [0 | 2, ..]) => imperfect,
-                _ => USUAL_PART,
-            };
             let mut squares = self.squares.clone();
             let mut change = DVector::zeros(squares.nrows());
-            for k in 0..COUNT {
-                let more = (1.0 / (part(k) * part(k)) - 1.0) * self.prior[(k, k)];
+            for k in (0..COUNT).filter(|k| k % PER_PROBE >= BEYOND_MODEL_31) {
+                let part = match powers(k) {
+                    [0, 0, 0] => CARRY_PART * imperfect,
+                    _ if is_even(&k) => imperfect,
+                    _ => USUAL_PART,
+                };
+                let more = (1.0 / (part * part) - 1.0) * self.prior[(k, k)];
                 squares[(k, k)] += more;
                 change[k] = -more * self.at.values[k];
             }
             let factor = Factor::new(&squares, 0.0)?;
             let values = &self.at.values + factor.solve(&change);
             let covariance = factor.inverse();
-            let even = (0..COUNT).filter(|k| {
-                let powers = TERMS[k % PER_PROBE].powers;
-                powers != [0; 3] && powers[0].is_multiple_of(2)
-            });
             // Squares over the number of terms that the log, not the prior, tells (MacKay 1992).
-            let (mut sum, mut count) = (0.0, 0.0);
-            for k in even {
-                let precision = self.prior[(k, k)];
-                sum += precision * values[k] * values[k];
-                count += 1.0 - precision * covariance[(k, k)] / (imperfect * imperfect);
-            }
-            imperfect = (sum / f64::max(count, 1e-9)).sqrt().clamp(0.01, 1.0);
+            let of_even = (0..COUNT)
+                .filter(is_even)
+                .fold([0.0; 2], |[sum, count], k| {
+                    let precision = self.prior[(k, k)];
+                    let by_prior = precision * covariance[(k, k)] / (imperfect * imperfect);
+                    [
+                        sum + precision * values[k] * values[k],
+                        count + 1.0 - by_prior,
+                    ]
+                });
+            imperfect = (of_even[0] / of_even[1].max(1e-9))
+                .sqrt()
+                .clamp(EVEN_LEAST, 1.0);
             found = Some((values, covariance));
         }
         found

@@ -18,8 +18,7 @@ mod score;
 mod tests;
 
 use crate::finding::{Finding, Severity};
-use crate::fit::Repair;
-use crate::fit::with_beams_later;
+use crate::fit::{Repair, with_beams_later};
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, Predicted};
@@ -27,24 +26,24 @@ use crate::problem::model::Model;
 use crate::solve::field::carry::{Service, service_poses};
 use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::probe::probes;
-use crate::solve::field::terms::{BEYOND_MODEL_31, COUNT, PER_PROBE};
-use columns::{BEAMS_LATE, Course, FAMILIES, Family, Kind, by_channel, shaped};
+use crate::solve::field::terms::{COUNT, PER_PROBE};
+use crate::solve::gauss_newton::Factor;
+use columns::{Bank, Course, Family, Kind};
 use estimate::Estimate;
-use findings::not_determined;
+use findings::{not_determined, without_course};
 use means::Log;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use runtime::ModelKind;
-use score::{Candidate, Scan, split};
+use score::{Fault, Scan, Split, split};
 use std::borrow::Cow;
 
 /// Faults of one log at most.
 const FAULTS_MAX: usize = 6;
-/// Of one channel at most so many are taken off: it may change and come back.
+/// Of one channel at most so many are taken off: it may change and come back. Steps and ramps can follow another
+/// course, too, but are not that.
 const COURSES_MAX: usize = 2;
 /// Errors in service over the noise floor below which a finding is a note.
 const NOTE_MAX: f64 = 1.05;
-/// Poses spread evenly over this part of a range have half of it as rms, as sines have that start anywhere.
-const OF_SINES: f64 = 0.866;
 /// One sound log in so many has a fault that a fit can feel.
 pub(super) const RARITY: f64 = 100.0;
 /// A lag beyond this part of a servo period is taken off before anything else is looked at.
@@ -100,7 +99,8 @@ pub fn declared_service(
     parameters: &FieldParameters,
     white_mm: [f64; 3],
 ) -> Option<Service> {
-    let most = |axis: usize| OF_SINES * stage.motion.axes[axis].service;
+    // Sines that start anywhere have half of their range as rms, poses spread evenly a part of 1 / sqrt(3).
+    let most = |axis: usize| 0.75f64.sqrt() * stage.motion.axes[axis].service;
     let poses = service_poses(([0, 1, 2].map(most), [3, 4, 5].map(most)));
     Service::new(parameters, white_mm, poses)
 }
@@ -108,65 +108,36 @@ pub fn declared_service(
 /// The diagnosis of the rows of a log that no other test has found to be wrong, from the parameters of a
 /// fit. `None` where the log is too short or too still for an estimate.
 pub fn diagnose(dataset: &Dataset, stage: &Stage, fitted: Fitted) -> Option<Diagnosis> {
-    let (mut later, mut lags_s) = (Cow::Borrowed(dataset), [0.0; 3]);
-    let mut start = *fitted.parameters;
-    let mut rounds = 0..ROUNDS;
-    let (log, first) = loop {
-        let log = Log::new(&later, stage, &probes(&start));
-        let by_channel = by_channel(&log, stage, &start, 0.0);
-        let late = [1, 2].map(|beam| BEAMS_LATE[beam].raw(&log, stage, &by_channel));
-        let first = Estimate::first(&log, &start, &late)?;
-        let beyond_s = first.lags_s(log.per_unknown() + 2.0 * libm::log(RARITY));
-        lags_s
-            .iter_mut()
-            .zip(beyond_s)
-            .for_each(|(lag_s, beyond_s)| *lag_s += beyond_s);
-        let most_s = LAG_MAX * stage.servo_period_s;
-        if beyond_s.iter().all(|lag_s| lag_s.abs() < most_s) || rounds.next().is_none() {
-            break (log, first);
-        }
-        // A lag is not linear.
-        later = Cow::Owned(with_beams_later(dataset, lags_s, 0.5 * stage.y_baseline_m));
-        start = first.parameters;
-    };
-    let faultless = first.faultless(&log)?;
-    let job = Job {
-        dataset: &later,
+    let mut job = Job {
+        dataset: Cow::Borrowed(dataset),
         stage,
         fitted,
-        log,
-        lags_s,
+        log: Log::new(dataset, stage, &probes(fitted.parameters)),
+        lags_s: [0.0; 3],
     };
-    job.diagnosis(faultless)
-}
-
-/// A fault, and those that the log cannot tell it from.
-struct Fault {
-    best: Candidate,
-    alike: Vec<Candidate>,
-}
-
-impl Fault {
-    fn family(&self) -> &'static Family {
-        &FAMILIES[self.best.family]
-    }
-}
-
-/// A fault of a channel that changes more often than it may: steps and ramps that together follow a course are
-/// not that course.
-fn without_course<'f>(faults: &'f [Fault], costs: &[f64]) -> Option<&'f Fault> {
-    let worse = || {
-        let both = faults.iter().zip(costs);
-        both.filter(|(_, cost)| severity(**cost) > Severity::Note)
+    let mut start = *fitted.parameters;
+    let mut rounds = 0..ROUNDS;
+    let first = loop {
+        let bank = Bank::new(&job.log, stage, &start, 0.0);
+        let late = [1, 2].map(|beam| bank.raw(Family::late(beam)));
+        let first = Estimate::first(&job.log, &start, &late)?;
+        let beyond_s = first.lags_s(job.log.per_fault());
+        (0..3).for_each(|beam| job.lags_s[beam] += beyond_s[beam]);
+        if !beyond_s.iter().any(|lag_s| job.is_lag(*lag_s)) || rounds.next().is_none() {
+            break first;
+        }
+        // A lag is not linear.
+        let later = with_beams_later(dataset, job.lags_s, 0.5 * stage.y_baseline_m);
+        start = first.parameters;
+        job.log = Log::new(&later, stage, &probes(&start));
+        job.dataset = Cow::Owned(later);
     };
-    let of = |channel| worse().filter(move |(other, _)| other.family().1 == channel);
-    let mut found = worse().map(|(fault, _)| fault);
-    found.find(|fault| of(fault.family().1).count() > COURSES_MAX)
+    job.diagnosis(&first.faultless(&job.log)?)
 }
 
 /// A log with what it was fitted by.
 struct Job<'a> {
-    dataset: &'a Dataset,
+    dataset: Cow<'a, Dataset>,
     stage: &'a Stage,
     fitted: Fitted<'a>,
     log: Log,
@@ -175,161 +146,176 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn freedom(&self) -> f64 {
-        (self.log.count() - COUNT as f64).max(1.0)
-    }
-
     /// What lowers chi-square from one value to another is worth this, whatever the noise is: where much
     /// is left that no fault explains, as hum, a fault must explain its part of that.
     fn worth(&self, from: f64, to: f64) -> f64 {
-        self.freedom() * libm::log(from / to.max(1.0))
+        self.log.freedom() * libm::log(from / to.max(1.0))
     }
 
-    fn penalty(&self, choices: f64) -> f64 {
-        self.log.per_unknown() + 2.0 * libm::log(RARITY * choices)
+    fn is_lag(&self, lag_s: f64) -> bool {
+        lag_s.abs() > LAG_MAX * self.stage.servo_period_s
     }
 
-    /// One fault after the other, as long as they explain more than chance: with the estimate that has them
-    /// among its unknowns, and what their gain is worth.
-    fn search(&self, mut estimate: Estimate) -> Option<(Vec<Fault>, Estimate, f64)> {
-        let log = &self.log;
-        let raw_at = |estimate: &Estimate| {
-            let (parameters, lag_s) = (&estimate.parameters, estimate.lag_s());
-            let by_channel = by_channel(log, self.stage, parameters, lag_s);
-            FAMILIES.map(|family| family.raw(log, self.stage, &by_channel))
-        };
-        let refitted = |estimate: &Estimate, faults: &[Fault], raw: &[Vec<[f64; 3]>]| {
-            let column = |fault: &Fault| {
-                let raw = &raw[fault.best.family];
-                shaped(log, raw, fault.family(), fault.best.course)
-            };
-            let columns: Vec<_> = faults.iter().map(column).collect();
-            estimate.with_faults(log, &columns)
-        };
-        let mut raw = raw_at(&estimate);
-        let (mut faults, mut worth): (Vec<Fault>, f64) = (Vec::new(), 0.0);
+    /// The estimate with faults among its unknowns.
+    fn refitted(&self, estimate: &Estimate, faults: &[Fault]) -> Option<Estimate> {
+        let bank = self.bank(estimate);
+        let columns = faults
+            .iter()
+            .map(|fault| bank.column(fault.family, fault.course));
+        estimate.with_faults(&self.log, &columns.collect::<Vec<_>>())
+    }
+
+    /// One fault after the other, as long as they explain more than chance, and the estimate that has them among
+    /// its unknowns; `None` where it is the one without.
+    fn search(&self, faultless: &Estimate) -> Option<(Vec<Fault>, Option<Estimate>)> {
+        let (mut faults, mut last): (Vec<Fault>, Option<Estimate>) = (Vec::new(), None);
         while faults.len() < FAULTS_MAX {
-            let mut candidates = Scan::new(log, &estimate)?.candidates(&raw);
+            let estimate = last.as_ref().unwrap_or(faultless);
+            let mut found = Scan::new(&self.bank(estimate), estimate)?.faults();
+            found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
             let before = estimate.chi_squared;
-            let net = |candidate: &Candidate| {
-                self.worth(before, before - candidate.gain) - self.penalty(candidate.choices)
-            };
-            candidates.sort_by(|a, b| net(b).total_cmp(&net(a)));
-            let Some(best) = candidates.first().copied().filter(|best| net(best) > 0.0) else {
+            let counts = |gain: f64| self.worth(before, before - gain) > self.log.per_fault();
+            let Some(best) = found.first().filter(|best| counts(best.gain)) else {
                 break;
             };
-            let near = f64::max(UNDECIDED, NOTHING * best.gain);
-            let is_other = |other: &&Candidate| {
-                FAMILIES[other.family].1 != FAMILIES[best.family].1 && best.gain - other.gain < near
-            };
-            let alike = candidates[1..].iter().filter(is_other).copied().collect();
-            faults.push(Fault { best, alike });
-            // A large fault bends what the others do, too.
-            let next = refitted(&estimate, &faults, &raw).and_then(|next| {
-                raw = raw_at(&next);
-                refitted(&next, &faults, &raw)
+            let near = best.gain - f64::max(UNDECIDED, NOTHING * best.gain);
+            let channels = found.iter().filter(|other| other.gain > near);
+            let mut alike: Vec<&str> = channels.map(|other| other.family.channel()).collect();
+            alike.retain(|channel| *channel != best.family.channel());
+            alike.dedup();
+            faults.push(Fault {
+                alike,
+                ..best.clone()
             });
-            // A fault that can no longer be separated from the others is not a further one.
-            let Some(next) = next else {
+            // A large fault bends what the others do, too.
+            let next = self.refitted(estimate, &faults);
+            let Some(next) = next.and_then(|next| self.refitted(&next, &faults)) else {
+                // It can no longer be separated from the others.
                 faults.pop();
                 break;
             };
-            worth += self.worth(before, next.chi_squared) - self.penalty(best.choices);
-            estimate = next;
+            last = Some(next);
         }
-        Some((faults, estimate, worth))
+        Some((faults, last))
     }
 
-    fn diagnosis(&self, faultless: Estimate) -> Option<Diagnosis> {
-        let (log, fitted) = (&self.log, &self.fitted);
-        let declared = declared_service(self.stage, fitted.parameters, log.white_mm)?;
-        // What the log leaves open of the model's own parameters decides before any fault does.
-        let of_model = match fitted.model {
+    fn bank(&self, estimate: &Estimate) -> Bank<'_> {
+        Bank::new(
+            &self.log,
+            self.stage,
+            &estimate.parameters,
+            estimate.lag_s(),
+        )
+    }
+
+    /// The curvature that the model at hand has.
+    fn bent(&self, estimate: &Estimate) -> Option<Factor> {
+        estimate.without_faults(match self.fitted.model {
             ModelKind::Field => PER_PROBE,
             model => Model::of(model).fitted,
-        };
-        let own = faultless.without_faults(of_model)?.inverse();
+        })
+    }
+
+    fn diagnosis(&self, faultless: &Estimate) -> Option<Diagnosis> {
+        let declared = declared_service(self.stage, self.fitted.parameters, self.log.white_mm)?;
+        let own = self.bent(faultless)?.inverse();
         let own = Predicted::new(&declared, &own, &[0.0; COUNT]);
         let is_open = own.worst_ratio() > LIMITED_MAX;
-        let by_resets = fitted.model == ModelKind::Field && !fitted.for_service;
-        if is_open && !by_resets {
-            let predicted = match fitted.model {
-                ModelKind::Field => own,
-                _ => self.expected(&faultless, &declared, 1.0)?,
-            };
-            return Some(Diagnosis {
-                findings: vec![not_determined(&predicted)],
-                predicted,
-                repair: None,
-                rest: 1.0,
-            });
+        // What the log leaves open decides before any fault does, but where the fit lives with it.
+        let decides = is_open && (self.fitted.model != ModelKind::Field || self.fitted.for_service);
+        let (faults, last) = match decides {
+            true => (Vec::new(), None),
+            false => self.search(faultless)?,
+        };
+        let estimate = last.as_ref().unwrap_or(faultless);
+        let rest = (estimate.chi_squared / self.log.freedom()).sqrt();
+        // Two stages are a fault whose onset is found, and more than all faults explain.
+        let worth = |to: f64, penalty: f64| self.worth(faultless.chi_squared, to) - penalty;
+        let of_faults = faults.len() as f64 * self.log.per_fault();
+        let of_faults = worth(estimate.chi_squared, of_faults).max(0.0);
+        let of_parts = COUNT as f64 * self.log.per_unknown();
+        let other = split(
+            faultless,
+            faults.iter().filter_map(|fault| fault.course.onset()),
+        );
+        let other =
+            other.filter(|other| worth(faultless.chi_squared - other.gain, of_parts) > of_faults);
+        let without_repair = |finding: Finding, predicted: Predicted| Diagnosis {
+            findings: vec![finding],
+            predicted,
+            repair: None,
+            rest,
+        };
+        let mut out = if decides {
+            let predicted = self.expected(faultless, &declared, 1.0)?;
+            without_repair(not_determined(&predicted), predicted)
+        } else if let Some(Split { from, off, .. }) = other {
+            let whole = faultless.curvature.inverse();
+            let predicted = Predicted::new(&declared, &whole, &off.as_slice()[..COUNT]);
+            without_repair(self.two_states(from, predicted.worst_ratio()), predicted)
+        } else {
+            self.of_faults(&faults, estimate, &declared, rest)?
+        };
+        if is_open && !decides {
+            let open = not_determined(&own).severe(Severity::Warn);
+            out.findings.insert(0, open);
         }
-        let whole = faultless.curvature.inverse();
-        let carried = Predicted::new(&declared, &whole, &[0.0; COUNT]).worst_ratio() < LIMITED_MAX;
-        let other = split(log, &faultless);
-        let before = faultless.chi_squared;
-        let (faults, estimate, worth) = self.search(faultless)?;
-        let rest = (estimate.chi_squared / self.freedom()).sqrt();
+        Some(out)
+    }
+
+    /// What the faults cost, and whether the estimate that has them among its unknowns is the better calibration.
+    fn of_faults(
+        &self,
+        faults: &[Fault],
+        estimate: &Estimate,
+        declared: &Service,
+        rest: f64,
+    ) -> Option<Diagnosis> {
         // What no fault explains makes the parameters as much less certain.
         let certain = rest.max(1.0).powi(2);
-        // A log that leaves the field model open shows what it costs the smaller one, on motion like its own.
-        let (free, at_work) = match carried {
-            true => (PER_PROBE, declared.clone()),
-            false => {
-                let poses = log.poses();
-                let own = Service::new(fitted.parameters, log.white_mm, poses)?;
-                (BEYOND_MODEL_31, own)
+        let predicted = self.expected(estimate, declared, certain)?;
+        let (of_fit, bent) = (predicted.worst_ratio(), self.bent(estimate)?);
+        let is_felt = |cost: f64| severity(cost) > Severity::Note;
+        let (mut is_worth_it, mut is_clear) = (is_felt(of_fit), true);
+        let (mut findings, mut channels) = (Vec::new(), Vec::new());
+        for (number, (fault, size)) in faults.iter().zip(estimate.sizes()).enumerate() {
+            let off = bent.solve(&(estimate.pull(number) * *size));
+            let (known, off) = (DMatrix::zeros(COUNT, COUNT), &off.as_slice()[..COUNT]);
+            let cost = Predicted::new(declared, &known, off).worst_ratio();
+            if is_felt(cost) {
+                is_worth_it = true;
+                // An error of the reference or one that may be another's says nothing of the stage.
+                let of_laser = fault.family.0 == Kind::Gain && fault.family.is_of_beams();
+                is_clear &= fault.alike.is_empty() && !of_laser;
+                channels.push(fault.family.channel());
             }
-        };
-        let without_faults = estimate.without_faults(free)?;
-        let nothing = DMatrix::zeros(COUNT, COUNT);
-        let cost = |pull: &DVector<f64>| {
-            let off = without_faults.solve(pull);
-            Predicted::new(&at_work, &nothing, &off.as_slice()[..COUNT]).worst_ratio()
-        };
-        let of_parts =
-            |gain: f64| self.worth(before, before - gain) - COUNT as f64 * self.log.per_unknown();
-        let open = (is_open && by_resets).then(|| not_determined(&own).severe(Severity::Warn));
-        let mut findings: Vec<Finding> = open.into_iter().collect();
-        if let Some(other) = other.filter(|other| of_parts(other.gain) > worth.max(0.0)) {
-            let off = without_faults.solve(&other.pull);
-            findings.push(self.two_states(other.from, cost(&other.pull)));
-            return Some(Diagnosis {
-                findings,
-                predicted: Predicted::new(&declared, &whole, &off.as_slice()[..COUNT]),
-                repair: None,
-                rest,
-            });
-        }
-        let predicted = self.expected(&estimate, &declared, certain)?;
-        let cost_of = |number: usize| cost(&(estimate.pull(number) * estimate.sizes()[number]));
-        let mut costs: Vec<f64> = (0..faults.len()).map(cost_of).collect();
-        for (number, (fault, cost)) in faults.iter().zip(&costs).enumerate() {
-            if *cost >= 1.0 + NOTHING {
+            if cost >= 1.0 + NOTHING {
                 // A robust fit may have left out of account what it would have cost.
-                let cost = cost.min(predicted.worst_ratio());
-                findings.push(self.finding(fault, estimate.sizes()[number], cost));
+                findings.push(self.finding(fault, *size, cost.min(of_fit)));
             }
         }
-        if let Some(fault) = without_course(&faults, &costs) {
-            findings.push(findings::without_course(fault, predicted.worst_ratio()));
+        let of = |channel: &str| channels.iter().filter(|other| **other == channel).count();
+        if let Some(channel) = channels.iter().find(|channel| of(channel) > COURSES_MAX) {
+            is_clear = false;
+            findings.push(without_course(channel, of_fit));
         }
         if let Some((fault, late_ms)) = self.late_beam() {
             // What bent the fit, whatever else did.
-            costs.push(predicted.worst_ratio());
-            findings.insert(0, self.finding(&fault, late_ms, predicted.worst_ratio()));
+            findings.insert(0, self.finding(&fault, late_ms, of_fit));
         }
         let covariance = estimate.curvature.inverse() * certain;
-        let repair = self.repair(
-            &estimate,
-            (&declared, &covariance),
-            &faults,
-            (&costs, predicted.worst_ratio()),
-        );
+        let expected = Predicted::new(declared, &covariance, &[0.0; COUNT]);
+        let is_better = is_worth_it && is_clear && expected.worst_ratio() <= GOOD_MAX;
+        let is_better = is_better && self.fitted.model == ModelKind::Field;
+        let repair = Repair {
+            parameters: estimate.parameters,
+            covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
+            faults: Vec::new(),
+        };
         Some(Diagnosis {
             findings,
             predicted,
-            repair,
+            repair: is_better.then_some((repair, expected)),
             rest,
         })
     }
@@ -339,16 +325,15 @@ impl Job<'_> {
         let mut sorted = self.lags_s;
         sorted.sort_by(f64::total_cmp);
         let off_s = self.lags_s.map(|lag_s| lag_s - sorted[1]);
-        let beam = (0..3).max_by(|&a, &b| off_s[a].abs().total_cmp(&off_s[b].abs()))?;
-        let best = Candidate {
-            family: FAMILIES.len() - 3 + beam,
-            course: Course::Whole,
+        let late = (0..3).filter(|&beam| self.is_lag(off_s[beam]));
+        let beam = late.max_by(|&a, &b| off_s[a].abs().total_cmp(&off_s[b].abs()))?;
+        let fault = Fault {
+            family: Family::late(beam),
+            course: Course::On(0, self.log.means.rows.len()),
             gain: 0.0,
-            choices: 1.0,
+            alike: Vec::new(),
         };
-        let alike = Vec::new();
-        let is_late = off_s[beam].abs() > LAG_MAX * self.stage.servo_period_s;
-        is_late.then_some((Fault { best, alike }, off_s[beam] * 1e3))
+        Some((fault, off_s[beam] * 1e3))
     }
 
     /// What the fit at hand has to expect: what it is off the estimate, whatever bent it, and what that leaves
@@ -361,38 +346,5 @@ impl Job<'_> {
         let pairs = (self.fitted.parameters.probes.as_flattened().iter()).zip(&own);
         let off: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
         Some(Predicted::new(declared, &(covariance * certain), &off))
-    }
-
-    /// The estimate that has the faults among its unknowns, and what it has to expect, if it is good and a fault
-    /// costs something, or the fit at hand does, whose rows have more that is wrong; an error of the reference or
-    /// one that may be another's says nothing of the stage.
-    fn repair(
-        &self,
-        estimate: &Estimate,
-        (declared, covariance): (&Service, &DMatrix<f64>),
-        faults: &[Fault],
-        (costs, of_fit): (&[f64], f64),
-    ) -> Option<(Repair, Predicted)> {
-        let counts = |cost: &f64| severity(*cost) > Severity::Note;
-        let is_clear = |fault: &Fault| {
-            let family = fault.family();
-            fault.alike.is_empty() && (family.1 != "ifm" || family.0 != Kind::Gain)
-        };
-        let mut of_faults = faults.iter().zip(costs);
-        let are_clear = of_faults.all(|(fault, cost)| !counts(cost) || is_clear(fault))
-            && without_course(faults, costs).is_none();
-        let is_worth_it = counts(&of_fit) || costs.iter().any(counts);
-        if self.fitted.model != ModelKind::Field || !is_worth_it || !are_clear {
-            return None;
-        }
-        let predicted = Predicted::new(declared, covariance, &[0.0; COUNT]);
-        (predicted.worst_ratio() <= GOOD_MAX).then(|| {
-            let repair = Repair {
-                parameters: estimate.parameters,
-                covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
-                faults: Vec::new(),
-            };
-            (repair, predicted)
-        })
     }
 }

@@ -1,6 +1,6 @@
 //! Faults of known size in simulated logs, and logs without any.
 
-use super::columns::{FAMILIES, by_channel, shaped};
+use super::columns::Bank;
 use super::estimate::Estimate;
 use super::means::Log;
 use super::score::Scan;
@@ -165,14 +165,12 @@ fn what_the_scan_promises_is_what_a_refit_gains() {
     let log = Log::new(&dataset, &stage, &probes(&parameters));
     let first = Estimate::first(&log, &parameters, &[]);
     let estimate = first.and_then(|first| first.faultless(&log)).expect("one");
-    let by_channel = by_channel(&log, &stage, &estimate.parameters, estimate.lag_s());
-    let raw = FAMILIES.map(|family| family.raw(&log, &stage, &by_channel));
-    let candidates = Scan::new(&log, &estimate).expect("one").candidates(&raw);
+    let bank = Bank::new(&log, &stage, &estimate.parameters, estimate.lag_s());
+    let candidates = Scan::new(&bank, &estimate).expect("one").faults();
     let large = candidates.iter().filter(|candidate| candidate.gain > 300.0);
     assert!(large.clone().count() > 10);
     for candidate in large {
-        let (raw, family) = (&raw[candidate.family], &FAMILIES[candidate.family]);
-        let column = shaped(&log, raw, family, candidate.course);
+        let column = bank.column(candidate.family, candidate.course);
         let with = estimate.with_faults(&log, &[column]).expect("one");
         let gain = estimate.chi_squared - with.chi_squared;
         assert!(

@@ -31,8 +31,6 @@ use crate::solve::field::parameters::FieldParameters;
 use channels::LogSignals;
 use residual::Residuals;
 
-pub(super) use crate::statistics::robust_deviation;
-
 /// Rows whose median knows no outlier, and whose mean hardly any noise of a Hall probe: a third of 0.5 um.
 const BLOCK: usize = 10;
 /// What is beyond so many standard deviations is not noise: once in 10^10 rows, and what residuals have beside

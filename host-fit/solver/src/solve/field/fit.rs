@@ -30,11 +30,6 @@ const WHITE: Limits = Limits {
 };
 /// One step after each change of the weights: both settle together.
 const REWEIGHTED: Limits = Limits { steps: 1, ..WHITE };
-/// The last step would be three hundredths of a standard error.
-const WHITENED: Limits = Limits {
-    steps: 20,
-    gain: 1e-3,
-};
 /// Rounds of weights and fit at most: two seconds of 57,000 rows.
 const ROUNDS_MAX: u32 = 15;
 /// Weights that change by less have settled.
@@ -226,7 +221,7 @@ impl WhiteFit {
             };
             drop(blocks);
             // On a faulty log it ends where no step gains more: the diagnosis goes on from there.
-            normal = self.descend(WHITENED)?.normal;
+            normal = self.descend(Limits::CLOSE)?.normal;
         }
         let covariance = self.covariance(&normal)?;
         let (posterior, warmth) = self.with_warmth(covariance);

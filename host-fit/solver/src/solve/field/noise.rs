@@ -54,7 +54,7 @@ struct Span {
 /// What the reference of a stage like those at hand walks in a second in X, Y, Rz: mm, mm, mrad.
 pub const USUAL_DRIFT_MM: [f64; 3] = [1e-4; 3];
 /// Standard deviation of the logarithm of a walk, before a log is seen: a factor of two.
-const DRIFT_SPREAD: f64 = 0.7;
+pub const DRIFT_SPREAD: f64 = 0.7;
 
 /// The reference's walk in X, Y, Rz, per root of a second (mm, mm, mrad): from differences
 /// between means of neighbouring spans of a second, with what the fitted parameters took of them

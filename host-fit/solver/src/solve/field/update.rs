@@ -48,12 +48,6 @@ const PLACE_M: f64 = 5e-3;
 const OF_PRIOR: f64 = 0.2;
 const LAG_S: f64 = 0.01;
 
-/// Residuals are nearly linear in the unknowns: three steps do.
-const LIMITS: Limits = Limits {
-    steps: 20,
-    gain: 1e-3,
-};
-
 impl Change {
     /// How the command line names it.
     pub const fn name(self) -> &'static str {
@@ -195,7 +189,7 @@ pub fn update(
     };
     let x = DVector::zeros(changes);
     let solved: Option<Solved<COLUMNS>> =
-        gauss_newton::solve(&equations, &unknowns, x, offsets_mm, LIMITS);
+        gauss_newton::solve(&equations, &unknowns, x, offsets_mm, Limits::CLOSE);
     let mut solved = solved.ok_or(FieldFitError::Singular)?;
     let mut lasting = unknowns.basis.clone();
     if change == Change::Temperature {
