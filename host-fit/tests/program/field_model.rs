@@ -61,7 +61,17 @@ fn eight_seconds_give_a_blob_that_decodes_another_run_at_the_noise_floor() {
     }
 
     bench.good("decode p.bin service.csv --out pose.csv");
-    bench.good("fit log.csv --out p31.bin --model 31");
+    let of_31 = bench.figures("fit log.csv --out p31.bin --model 31");
+    let lacks = &of_31["findings"][0];
+    let message = lacks["message"].as_str().expect("a sentence");
+    assert!(
+        message.contains("times the noise from sample to sample"),
+        "{lacks}"
+    );
+    assert_eq!(
+        (&lacks["code"], &lacks["severity"]),
+        (&"model_lacks".into(), &"warn".into())
+    );
     bench.good("decode p31.bin service.csv --out pose31.csv");
     let (field, model_31) = (
         rms_against_truth(&bench, "pose.csv"),

@@ -44,7 +44,10 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
         let code_m = codes_m[channel / 3];
         // The chance of the most likely code, and for how long it is as rare as what is clear.
         let chance = libm::erf(code_m / 8f64.sqrt() / white_m.max(code_m / 12f64.sqrt()));
-        let least = 1.0 + 0.5 * CLEAR * CLEAR / libm::log(chance).abs();
+        let least = match spread(values) {
+            0.0 => 2.0,
+            _ => 1.0 + 0.5 * CLEAR * CLEAR / libm::log(chance).abs(),
+        };
         let mut end = 0;
         let runs = values.chunk_by(|a, b| a == b).map(|run| {
             end += run.len();
