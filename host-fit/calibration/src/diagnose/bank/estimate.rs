@@ -204,19 +204,12 @@ impl Estimate {
             let values = &self.at.values + factor.solve(&change);
             let covariance = factor.inverse();
             // Squares over the number of terms that the log, not the prior, tells (MacKay 1992).
-            let of_even = (0..COUNT)
-                .filter(is_even)
-                .fold([0.0; 2], |[sum, count], k| {
-                    let precision = self.prior[(k, k)];
-                    let by_prior = precision * covariance[(k, k)] / (imperfect * imperfect);
-                    [
-                        sum + precision * values[k] * values[k],
-                        count + 1.0 - by_prior,
-                    ]
-                });
-            imperfect = (of_even[0] / of_even[1].max(1e-9))
-                .sqrt()
-                .clamp(EVEN_LEAST, 1.0);
+            let sum =
+                |of: &dyn Fn(usize) -> f64| -> f64 { (0..COUNT).filter(is_even).map(of).sum() };
+            let squares = sum(&|k| self.prior[(k, k)] * values[k] * values[k]);
+            let by_prior = |k| self.prior[(k, k)] * covariance[(k, k)] / (imperfect * imperfect);
+            let count = sum(&|k| 1.0 - by_prior(k)).max(1e-9);
+            imperfect = (squares / count).sqrt().clamp(EVEN_LEAST, 1.0);
             found = Some((values, covariance));
         }
         found
