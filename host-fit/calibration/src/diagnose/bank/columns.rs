@@ -8,6 +8,7 @@ use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::probe::probes;
 use nalgebra::Vector3;
 use runtime::VerticalPose;
+use runtime::capacitive::gaps_m;
 use std::ops::Range;
 
 /// What is wrong with the channel.
@@ -17,7 +18,7 @@ pub(super) enum Kind {
     Offset,
     /// Its gain, by 1 %.
     Gain,
-    /// Its time: it is 1 ms later than the others of its kind.
+    /// Its time: it is 1 ms later than the others.
     Lag,
 }
 
@@ -46,14 +47,15 @@ impl Course {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Family(pub(super) Kind, usize, usize);
 
-/// All faults that are looked for: each alone, and the gains of all channels of a kind together; the beams have
-/// one laser.
+/// All faults that are looked for: each alone, and the gains and times of all channels of a kind together; the
+/// beams have one laser. What they are all late by is an unknown of the fit, and so that of all Hall probes.
 pub(super) fn families() -> impl Iterator<Item = Family> {
     let each = |kind, channels: Range<usize>| channels.map(move |k| Family(kind, k, k + 1));
-    let all = [0, 3, 6].map(|k| Family(Kind::Gain, k, k + 3));
+    let all = |kind, first: &'static [usize]| first.iter().map(move |&k| Family(kind, k, k + 3));
     let gains = each(Kind::Gain, 0..3).chain(each(Kind::Gain, 6..9));
-    let others = each(Kind::Offset, 0..9).chain(each(Kind::Lag, 3..6));
-    gains.chain(all).chain(others)
+    let others = each(Kind::Offset, 0..9).chain(each(Kind::Lag, 0..9));
+    let groups = all(Kind::Gain, &[0, 3, 6]).chain(all(Kind::Lag, &[3, 6]));
+    gains.chain(groups).chain(others)
 }
 
 impl Family {
@@ -89,7 +91,8 @@ impl Family {
 /// What each fault does to the signals of a log.
 pub(super) struct Bank<'a> {
     pub(super) log: &'a Log,
-    stage: &'a Stage,
+    /// What each of the nine channels shows, mm, by mean.
+    values: Vec<[f64; 9]>,
     /// Changes of the signals (mm) by a change of each of the nine channels by 1 mm, by mean.
     by_channel: Vec<[Vector3<f64>; 9]>,
 }
@@ -104,32 +107,53 @@ impl<'a> Bank<'a> {
     ) -> Self {
         let slopes = Slopes::new(stage, probes(parameters));
         let at = |row: &FieldRow| slopes.at(row.planar_mm(lag_s, [0.0; 3]), row.vertical);
+        let half_m = 0.5 * stage.y_baseline_m;
+        let values = |row: &FieldRow| {
+            let ([a, b, c], [x, y, rz]) = (row.signal_mm, row.reference_mm);
+            let vertical = VerticalPose::from_array(row.vertical);
+            let [one, two, three] = gaps_m(&stage.capacitive_probes_m, &vertical).map(|m| 1e3 * m);
+            [
+                a,
+                b,
+                c,
+                x,
+                y + half_m * rz,
+                y - half_m * rz,
+                one,
+                two,
+                three,
+            ]
+        };
         Self {
             log,
-            stage,
+            values: log.means.rows.iter().map(values).collect(),
             by_channel: log.means.rows.iter().map(at).collect(),
         }
     }
 
     /// What a fault adds to the signals, mm, without its course.
     pub(super) fn raw(&self, family: Family) -> Vec<[f64; 3]> {
-        let half_m = 0.5 * self.stage.y_baseline_m;
-        let beams = |[x, y, rz]: [f64; 3]| [x, y + half_m * rz, y - half_m * rz];
-        let at = |(row, by_channel): (&FieldRow, &[Vector3<f64>; 9])| {
-            let vertical = VerticalPose::from_array(row.vertical);
-            let gaps_m = runtime::capacitive::gaps_m(&self.stage.capacitive_probes_m, &vertical);
-            let size = |channel: usize| match (family.0, channel) {
-                (Kind::Offset, _) => 1e-3,
-                (Kind::Gain, 0..3) => 1e-2 * row.signal_mm[channel],
-                (Kind::Gain, 3..6) => 1e-2 * beams(row.reference_mm)[channel - 3],
-                (Kind::Gain, _) => 1e-2 * (1e3 * gaps_m[channel - 6]),
-                (Kind::Lag, _) => -1e-3 * beams(row.rate_mm_per_s)[channel - 3],
+        let time_s = |at: usize| self.log.means.rows[at].time_s;
+        let at = |movement: &Range<usize>, at: usize| {
+            let before = at.saturating_sub(1).max(movement.start);
+            let after = (at + 1).min(movement.end - 1);
+            let size = |channel: usize| match family.0 {
+                Kind::Offset => 1e-3,
+                Kind::Gain => 1e-2 * self.values[at][channel],
+                Kind::Lag if before == after => 0.0,
+                Kind::Lag => {
+                    let [from, to] = [before, after].map(|at| self.values[at][channel]);
+                    -1e-3 * (to - from) / (time_s(after) - time_s(before))
+                }
             };
             let channels = family.1..family.2;
-            let sum: Vector3<f64> = channels.map(|k| by_channel[k] * size(k)).sum();
+            let sum: Vector3<f64> = channels.map(|k| self.by_channel[at][k] * size(k)).sum();
             sum.into()
         };
-        (self.log.means.rows.iter().zip(&self.by_channel).map(at)).collect()
+        let movements = self.log.means.movements.iter();
+        movements
+            .flat_map(|movement| movement.clone().map(move |k| at(movement, k)))
+            .collect()
     }
 
     /// The same with its course. What becomes another stage is zero at the end of the log, so that the

@@ -75,10 +75,10 @@ impl<'a> Scan<'a> {
             let found = self.scan(&column, &all, |at| at == 0);
             found.first().map(|(_, gain)| (course, *gain))
         };
-        let mut found = vec![whole(match family.0 {
-            Kind::Lag => Course::On(0, all.end),
-            _ => Course::Ramp,
-        })];
+        let mut found = vec![whole(Course::Ramp)];
+        if family.0 == Kind::Lag {
+            found.push(whole(Course::On(0, all.end)));
+        }
         if family.stays() {
             found.push(self.onset(&raw, std::slice::from_ref(&all)));
         }
