@@ -152,6 +152,47 @@ fn a_beam_that_lags_is_named_with_its_time_and_that_along_x_taken_off() {
     }
 }
 
+/// A Hall probe a row late, gaps three, and a clock of the reference that ends two rows late.
+#[test]
+fn channels_that_are_late_and_a_clock_that_drifts_are_named_and_taken_off() {
+    type Late = (&'static str, f64, fn(&mut Sample, [Sample; 4], f64));
+    let cases: [Late; 3] = [
+        ("hall_b", 2.0, |sample, [before, ..], _| {
+            sample.hall[1] = before.hall[1]
+        }),
+        ("cap", 6.0, |sample, [.., before, _], _| {
+            sample.capacitive = before.capacitive
+        }),
+        ("ifm", 4.0, |sample, [before, ..], part| {
+            for (nm, before_nm) in sample.beams_nm.iter_mut().zip(before.beams_nm) {
+                *nm -= (2.0 * part * (*nm - before_nm) as f64).round() as i64;
+            }
+        }),
+    ];
+    for (channel, late_ms, change) in cases {
+        let mut late = recording(3);
+        let (mut row, rows) = (0.0, late.rows() as f64);
+        for samples in &mut late.movements {
+            let shown = samples.clone();
+            for (k, sample) in samples.iter_mut().enumerate() {
+                let before = [1, 2, 3, 4].map(|rows| shown[k.saturating_sub(rows)]);
+                change(sample, before, row / rows);
+                row += 1.0;
+            }
+        }
+        let diagnosis = diagnosed(late, |_, _| {});
+        let is_late = |found: &&Finding| found.code == Code::ReferenceLag;
+        let found = diagnosis.findings.iter().find(is_late).expect("a lag");
+        assert_eq!(found.channel.as_deref(), Some(channel), "{found:#?}");
+        assert!(
+            (found.value.expect("ms") - late_ms).abs() < 0.1 * late_ms,
+            "{found:?}"
+        );
+        assert_eq!(diagnosis.verdict, Some(Verdict::Good), "{channel}");
+        assert!(diagnosis.repair.is_some(), "{channel}");
+    }
+}
+
 /// Offsets within a movement, steps to the end and ramps, of channels of all kinds.
 #[test]
 fn what_the_scan_promises_is_what_a_refit_gains() {
