@@ -83,17 +83,18 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         parameters: &parameters,
         model: fitted.map_or(ModelKind::M31, |fit| fit.model.kind),
         for_service: field.is_some_and(|field| !field.verdict.by_resets),
+        is_to_rows: fitted.is_ok(),
     };
     let mut out = Diagnosis::default();
     match fitted {
         Err(error) => {
             // A log that determines nothing says nothing of its channels.
             let described = matches!(error, FitError::Failed(FitFailure::NotDescribed { .. }));
-            out.shown(dataset, &sound, stage, by, lag_s, (described, false));
+            out.shown(dataset, &sound, stage, by, lag_s, described);
             out.predicted = None;
         }
         Ok(fit) => {
-            out.shown(dataset, &sound, stage, by, lag_s, (true, true));
+            out.shown(dataset, &sound, stage, by, lag_s, true);
             out.add_of_fit(fit, dataset, stage);
         }
     }
@@ -140,7 +141,7 @@ fn are_notes(findings: &[Finding]) -> bool {
 
 impl Diagnosis {
     /// What signals, channels and structure show, and what that predicts. `has_channels` where the log is
-    /// described by the parameters, `is_fit` where these are a fit to it, whose errors it explains.
+    /// described by the parameters.
     fn shown(
         &mut self,
         dataset: &Dataset,
@@ -148,51 +149,29 @@ impl Diagnosis {
         stage: &Stage,
         by: Fitted,
         lag_s: f64,
-        (has_channels, is_fit): (bool, bool),
+        has_channels: bool,
     ) {
-        let of_signals = || signals::signal_findings(dataset, stage, (by.parameters, lag_s));
-        let (of_structure, (findings, bad)) =
-            rayon::join(|| structure::structure(sound, stage, false), of_signals);
+        let (findings, bad) = signals::signal_findings(dataset, stage, (by.parameters, lag_s));
         self.findings = findings;
-        let has_channels = has_channels && dataset.logs.iter().all(|log| log.has_reference);
-        let of_rows = has_channels.then(|| bank::diagnose(&dataset.without(&bad), stage, by));
-        let mut of_rows = of_rows.flatten();
         // Rows that jump are for the loss of the fit.
         let stands = |found: &&Finding| matches!(found.code, Code::Stuck | Code::Saturated);
         let stand = self.findings.iter().any(|found| stands(&found));
-        if let Some(of) = of_rows
-            .as_mut()
-            .filter(|of| !is_fit || of.findings.is_empty() && !stand)
-        {
-            of.repair = None;
-        }
+        let has_channels = has_channels && dataset.logs.iter().all(|log| log.has_reference);
+        let of_rows =
+            has_channels.then(|| bank::diagnose(&dataset.without(&bad), stage, by, stand));
+        let of_rows = of_rows.flatten();
         // A fault that leaves nothing of the residuals when it is taken off explains what a mistake would.
         let explains = |of: &bank::Diagnosis| of.repair.is_some() && of.rest < LIMITED_MAX;
         if is_refused(&self.findings) || !of_rows.as_ref().is_some_and(explains) {
-            let is_named = |found: &Finding| found.severity == Severity::Refuse;
-            let parts = |found: &Finding| is_named(found) && found.code == Code::LogsDisagree;
-            let is_wrong = of_rows
+            let parts = |found: &Finding| found.code == Code::LogsDisagree;
+            let disagree = of_rows
                 .as_ref()
                 .is_some_and(|of| of.findings.iter().any(parts));
-            let other = || structure::structure(sound, stage, true);
-            self.findings.extend(match is_wrong {
-                true => of_structure.filter(is_named).or_else(other),
-                false => of_structure,
-            });
+            self.findings
+                .extend(structure::structure(sound, stage, disagree));
         }
         let Some(mut of) = of_rows else { return };
-        self.predicted = Some(of.predicted);
-        // What a log leaves open is no fault of parameters that are not fitted to it.
-        if !is_fit
-            && of
-                .findings
-                .iter()
-                .any(|found| found.code == Code::NotDetermined)
-        {
-            self.predicted = None;
-            of.findings
-                .retain(|found| found.code != Code::NotDetermined);
-        }
+        self.predicted = of.predicted;
         if is_refused(&self.findings) {
             return;
         }
@@ -202,7 +181,9 @@ impl Diagnosis {
                 of.rest
             );
             // Of other models it is what they lack.
-            let cost = of.predicted.worst_ratio();
+            let cost = of
+                .predicted
+                .map_or(1.0, |predicted| predicted.worst_ratio());
             let severity = match by.model {
                 ModelKind::Field => bank::severity(cost).max(Severity::Warn),
                 _ => Severity::Refuse,
@@ -215,13 +196,11 @@ impl Diagnosis {
                 found.message += ". The calibration has this taken off, and is that of the stage at the end of the log: zero the stage before it is used";
                 found.severity = found.severity.min(Severity::Warn);
             }
-            let of_signals = self.findings.iter().filter(stands);
-            let messages = of
+            let of_both = of
                 .findings
                 .iter()
-                .chain(of_signals)
-                .map(|found| found.message.clone());
-            let faults = messages.collect();
+                .chain(self.findings.iter().filter(stands));
+            let faults = of_both.map(|found| found.message.clone()).collect();
             (self.predicted, self.repair) = (Some(expected), Some(Repair { faults, ..repair }));
         }
         self.findings.extend(of.findings);
@@ -275,9 +254,10 @@ pub fn of_judged(
             set.model
         },
         for_service,
+        is_to_rows: false,
     };
     let mut out = Diagnosis::default();
-    out.shown(dataset, dataset, stage, by, 0.0, (true, false));
+    out.shown(dataset, dataset, stage, by, 0.0, true);
     out.predicted = fitted.or(out.predicted);
     let findings = &mut out.findings;
     if fitted.is_none() {

@@ -47,9 +47,9 @@ struct Fitted {
 }
 
 /// What keeps a log from being that of the designed stage, if anything does; `None` of a log in which nothing
-/// moves. Where `is_wrong`, something does, for nothing else describes the log: then a mistake needs less to be
-/// likely, and is a warning beside the refusal.
-pub fn structure(dataset: &Dataset, stage: &Stage, is_wrong: bool) -> Option<Finding> {
+/// moves. Where its parts `disagree`, which a mistake may cause, too, one needs less to be likely, and is a
+/// warning beside that.
+pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Finding> {
     let planar = Model::of(ModelKind::M30);
     check_motion(dataset, stage, dataset.rows.len(), planar).ok()?;
     let fitted = fitted(dataset, stage.servo_period_s)?;
@@ -59,12 +59,10 @@ pub fn structure(dataset: &Dataset, stage: &Stage, is_wrong: bool) -> Option<Fin
     let mut rows = dataset.rows.iter();
     let mistakes = mistakes(stage, rows.all(|row| row.frame.capacitive().is_some()));
     // Chance alone makes no distance so much smaller by one of them undone.
-    let likely = mistakes.iter().filter(|mistake| mistake.penalty == 0.0);
-    let gain_min = match is_wrong {
-        true => UNDECIDED,
-        false => 2.0 * libm::log(RARITY * likely.count() as f64),
-    };
-    if as_logged < gain_min {
+    let usual = mistakes.iter().filter(|mistake| mistake.penalty == 0.0);
+    let sure = 2.0 * libm::log(RARITY * usual.count() as f64);
+    let likely = if disagree { UNDECIDED } else { sure };
+    if as_logged < likely {
         return None;
     }
     let spans = spans(dataset);
@@ -79,7 +77,8 @@ pub fn structure(dataset: &Dataset, stage: &Stage, is_wrong: bool) -> Option<Fin
     let mut ranked: Vec<(f64, Mistake)> = mistakes.into_iter().map(rank).collect();
     ranked.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     let least = ranked.first()?.0;
-    if !(least < SOUND_MAX && least < as_logged - gain_min) {
+    let gain = as_logged - least;
+    if least > SOUND_MAX || gain < likely {
         return (as_logged > SOUND_MAX).then(|| unexplained(as_logged));
     }
     let near = ranked
@@ -91,10 +90,10 @@ pub fn structure(dataset: &Dataset, stage: &Stage, is_wrong: bool) -> Option<Fin
             named.push(mistake);
         }
     }
-    Some(finding(&named, is_wrong))
+    Some(finding(&named, gain > sure))
 }
 
-fn finding(named: &[&Mistake], is_wrong: bool) -> Finding {
+fn finding(named: &[&Mistake], is_sure: bool) -> Finding {
     let cures: Vec<String> = named.iter().map(|mistake| mistake.cure()).collect();
     let (undecided, remedy) = match named {
         [one] => ("", one.code.entry().remedy),
@@ -103,14 +102,14 @@ fn finding(named: &[&Mistake], is_wrong: bool) -> Finding {
             "find out which before anything is changed: check wiring, columns, units and stage.toml",
         ),
     };
-    let (what, severity) = match is_wrong {
+    let (what, severity) = match is_sure {
         true => (
-            "the log may be of one stage all the same, but not of that in stage.toml as it is: it would fit",
-            Severity::Warn,
-        ),
-        false => (
             "the log is not that of the stage in stage.toml as it is, and fits",
             Severity::Refuse,
+        ),
+        false => (
+            "the log may be of one stage all the same, but not of that in stage.toml as it is: it would fit",
+            Severity::Warn,
         ),
     };
     let message = format!("{what} if {}{undecided}: {remedy}", cures.join(", or if "));

@@ -60,12 +60,12 @@ const NOTHING: f64 = 0.01;
 pub(super) const UNDECIDED: f64 = 6.0;
 
 /// What the diagnosis of a log says.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Diagnosis {
     /// What is wrong, each with its cost.
     pub findings: Vec<Finding>,
-    /// What the fit has to expect at work.
-    pub predicted: Predicted,
+    /// What the fit has to expect at work; `None` of parameters that are not fitted to a log that leaves them open.
+    pub predicted: Option<Predicted>,
     /// The parameters with the faults taken off and what they have to expect, where the faults are clear and
     /// that makes a good calibration.
     pub repair: Option<(Repair, Predicted)>,
@@ -91,6 +91,8 @@ pub struct Fitted<'a> {
     pub model: ModelKind,
     /// Whether the model describes service and the log can carry it without what is declared of resets.
     pub for_service: bool,
+    /// Whether they are fitted to the rows that are judged.
+    pub is_to_rows: bool,
 }
 
 /// The service that `[motion]` declares, of a stage with this white noise of its probes, mm.
@@ -106,12 +108,18 @@ pub fn declared_service(
 }
 
 /// The diagnosis of the rows of a log that no other test has found to be wrong, from the parameters of a
-/// fit. `None` where the log is too short or too still for an estimate.
-pub fn diagnose(dataset: &Dataset, stage: &Stage, fitted: Fitted) -> Option<Diagnosis> {
+/// fit; `is_bent` where it had some that were. `None` where the log is too short or too still for an estimate.
+pub fn diagnose(
+    dataset: &Dataset,
+    stage: &Stage,
+    fitted: Fitted,
+    is_bent: bool,
+) -> Option<Diagnosis> {
     let mut job = Job {
         dataset: Cow::Borrowed(dataset),
         stage,
         fitted,
+        is_bent,
         log: Log::new(dataset, stage, &probes(fitted.parameters)),
         lags_s: [0.0; 3],
     };
@@ -140,6 +148,7 @@ struct Job<'a> {
     dataset: Cow<'a, Dataset>,
     stage: &'a Stage,
     fitted: Fitted<'a>,
+    is_bent: bool,
     log: Log,
     /// Lags of the beams X, Y1, Y2, with what is taken off already, s.
     lags_s: [f64; 3],
@@ -242,11 +251,17 @@ impl Job<'_> {
             other.filter(|other| worth(faultless.chi_squared - other.gain, of_parts) > of_faults);
         let without_repair = |finding: Finding, predicted: Predicted| Diagnosis {
             findings: vec![finding],
-            predicted,
+            predicted: Some(predicted),
             repair: None,
             rest,
         };
-        let mut out = if decides {
+        let mut out = if decides && !self.fitted.is_to_rows {
+            // What a log leaves open is no fault of parameters that are not fitted to it.
+            Diagnosis {
+                rest,
+                ..Diagnosis::default()
+            }
+        } else if decides {
             let predicted = self.expected(faultless, &declared, 1.0)?;
             without_repair(not_determined(&predicted), predicted)
         } else if let Some(Split { from, off, .. }) = other {
@@ -276,7 +291,7 @@ impl Job<'_> {
         let predicted = self.expected(estimate, declared, certain)?;
         let (of_fit, bent) = (predicted.worst_ratio(), self.bent(estimate)?);
         let is_felt = |cost: f64| severity(cost) > Severity::Note;
-        let (mut is_worth_it, mut is_clear) = (is_felt(of_fit), true);
+        let (mut is_worth_it, mut is_clear) = (is_felt(of_fit), self.fitted.is_to_rows);
         let (mut findings, mut channels) = (Vec::new(), Vec::new());
         for (number, (fault, size)) in faults.iter().zip(estimate.sizes()).enumerate() {
             let off = bent.solve(&(estimate.pull(number) * *size));
@@ -307,6 +322,7 @@ impl Job<'_> {
         let expected = Predicted::new(declared, &covariance, &[0.0; COUNT]);
         let is_better = is_worth_it && is_clear && expected.worst_ratio() <= GOOD_MAX;
         let is_better = is_better && self.fitted.model == ModelKind::Field;
+        let is_better = is_better && (self.is_bent || !findings.is_empty());
         let repair = Repair {
             parameters: estimate.parameters,
             covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
@@ -314,7 +330,7 @@ impl Job<'_> {
         };
         Some(Diagnosis {
             findings,
-            predicted,
+            predicted: Some(predicted),
             repair: is_better.then_some((repair, expected)),
             rest,
         })
