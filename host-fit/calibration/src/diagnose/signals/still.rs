@@ -5,7 +5,6 @@ use super::{BLOCK, CLEAR};
 use crate::diagnose::of_fit::severity;
 use crate::diagnose::slopes::CHANNELS;
 use crate::finding::{Code, Finding, Severity};
-use crate::statistics::white_noise;
 use std::ops::Range;
 
 /// What moves by less stands still, m: a few times what the interferometers drift in a movement.
@@ -39,8 +38,14 @@ pub(super) fn repeats(log: &mut LogSignals) -> Vec<Finding> {
     // Those of beams are nm.
     let codes_m = [hall_m, 1e-9, gap_m];
     let runs = |(channel, values): (usize, &Vec<f64>)| -> Vec<Range<usize>> {
-        let threes = values.windows(3);
-        let white_m = white_noise(threes.map(|three| [three[0], three[1], three[2]]));
+        // Not by the median: a channel that is read at a tenth of the rate mostly has no second differences.
+        let threes = log
+            .segments
+            .iter()
+            .flat_map(|s| values[s.clone()].windows(3));
+        let second = threes.map(|v| (v[0] - 2.0 * v[1]) + v[2]);
+        let squares: f64 = second.map(|x| x * x).sum();
+        let white_m = (squares / (6.0 * values.len() as f64)).sqrt();
         let code_m = codes_m[channel / 3];
         // The chance of the most likely code, and for how long it is as rare as what is clear.
         let chance = libm::erf(code_m / 8f64.sqrt() / white_m.max(code_m / 12f64.sqrt()));
@@ -139,6 +144,19 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_probe_that_is_read_at_a_tenth_of_the_rate_is_stuck() {
+        let mut slow = recording();
+        for samples in &mut slow.movements {
+            for ten in samples.chunks_mut(10) {
+                let read = ten[0].hall[2];
+                ten.iter_mut().for_each(|sample| sample.hall[2] = read);
+            }
+        }
+        let found = only(&slow, Code::Stuck, Some("hall_c"));
+        assert_eq!(found.severity, Severity::Refuse);
     }
 
     #[test]
