@@ -314,11 +314,12 @@ fn causes_that_a_log_cannot_tell_apart_are_named_together() {
 /// Its slow lines are in the means over a few rows, where the end of a log can take them for anything.
 #[test]
 fn hum_is_not_taken_for_another_fault() {
+    let codes = 2e-6 / stage().hall.m_per_count;
     for (seed, hertz) in [(3, 7.0), (4, 7.0), (3, 12.0), (4, 12.0)] {
         let mut hums = recording(seed);
         for sample in hums.movements.iter_mut().flatten() {
             let phase = std::f64::consts::TAU * hertz * sample.t_us as f64 * 1e-6;
-            sample.hall[0] += (2e-6 * libm::sin(phase) / stage().hall.m_per_count).round() as i32;
+            sample.hall[0] += (codes * libm::sin(phase)).round() as i32;
         }
         let diagnosis = diagnosed(hums, |_, _| {});
         let is_fault =
