@@ -7,7 +7,7 @@
 //! parameters: the direction that it senses, its lever arm and sensitivity must be those of the drawing, and
 //! the sensitivity must fall with the height at its place, so that b/a = y and c/a = -x.
 
-use super::bank::{MEANS_MAX, RARITY, ROUNDS, UNDECIDED};
+use super::bank::{MEANS_MAX, NOTHING, RARITY, ROUNDS, UNDECIDED};
 use super::mistakes::{Change, Mistake, mistakes};
 use super::range::SPANS;
 use crate::finding::{Code, Finding, Severity};
@@ -24,15 +24,11 @@ use runtime::ModelKind;
 
 /// Gain and its slopes, how far height and tilts carry the probe, and what lags of the beams do.
 const UNKNOWNS: usize = 12;
-/// A parameter that the log does not show has any value, in mm and mrad.
-const OPEN: f64 = 10.0;
 
 /// Tolerances, standard deviations, up to twice those of simulated stages: of the logarithm of eta (where
 /// `stage.toml` has a range of it, that of any value within), of theta, of a lever arm (m), of a/eta (1/mm), and
 /// of b/eta and c/eta, which show the place of a probe within 40 mm (1/mrad).
 const TOLERANCES: [f64; 6] = [1.0, 0.04, 0.035, 0.025, 0.009, 0.009];
-/// Of spans beyond twice or below a tenth of the declared motion, by the logarithm.
-const SPAN: f64 = 0.35;
 /// Squares of distances in terms of tolerances, of three probes: one sound log in a thousand has more.
 const SOUND_MAX: f64 = 42.0;
 
@@ -247,7 +243,8 @@ fn fitted(dataset: &Dataset, period_s: f64) -> Option<[Fitted; 3]> {
             }
             let rest = products[(UNKNOWNS, UNKNOWNS)] / count;
             let mut own = products.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into_owned();
-            let open = (rest / (OPEN * OPEN)).max(f64::MIN_POSITIVE);
+            // What the log does not show has any value, in mm and mrad.
+            let open = (NOTHING * rest).max(f64::MIN_POSITIVE);
             own += SMatrix::from_diagonal_element(open);
             let factor = Cholesky::new(own)?;
             at += factor.solve(&products.fixed_view::<UNKNOWNS, 1>(0, UNKNOWNS));
@@ -285,7 +282,8 @@ fn beyond_motion(stage: &Stage, spans: &[Matrix3<f64>; 2], change: &Change) -> f
             let part = products[(axis, axis)].max(0.0).sqrt() * std::f64::consts::SQRT_2 / service;
             let log = libm::log(part.max(f64::MIN_POSITIVE));
             let beyond = f64::max(log - libm::log(SPANS.1), libm::log(SPANS.0) - log).max(0.0);
-            sum += (beyond.min(20.0) / SPAN).powi(2);
+            // Twice as far makes the odds those of an undecided cause.
+            sum += UNDECIDED * (beyond.min(20.0) / std::f64::consts::LN_2).powi(2);
         }
     }
     sum

@@ -2,6 +2,7 @@
 
 use super::columns::families;
 use super::{MEANS_MAX, RARITY};
+use crate::diagnose::signals::CLEAR;
 use crate::input::dataset::Dataset;
 use crate::input::stage::Stage;
 use crate::solve::field::blocks::Rows;
@@ -9,10 +10,6 @@ use crate::solve::field::probe::Probe;
 use crate::solve::field::terms::COUNT;
 use crate::statistics::{median, white_noise};
 use std::ops::Range;
-
-/// A row this many times its white noise off the middle of its block, as beside a step, is left out: noise
-/// alone does that once in 10^9 rows.
-const SPIKE: f64 = 6.0;
 
 /// Each so many rows of a movement have a noise of their own, known within a tenth.
 const PIECE: usize = 500;
@@ -48,12 +45,13 @@ impl Log {
         };
         let movements: Vec<Range<usize>> = rows.movement_rows().collect();
         let white_mm = white(&movements);
+        // Rows far off the middle of their block, as beside a step, are left out.
         for block in rows.blocks.clone() {
             for (k, white_mm) in white_mm.into_iter().enumerate() {
                 let mut values: Vec<f64> = residuals[block.clone()].iter().map(|r| r[k]).collect();
                 let middle = median(&mut values).unwrap_or(0.0);
                 for row in block.clone() {
-                    if (residuals[row][k] - middle).abs() > SPIKE * white_mm {
+                    if (residuals[row][k] - middle).abs() > CLEAR * white_mm {
                         rows.rows[row].weight = 0.0;
                     }
                 }

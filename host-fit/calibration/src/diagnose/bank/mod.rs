@@ -54,8 +54,8 @@ pub(super) const ROUNDS: usize = 8;
 /// quick, and onsets within a tenth of a second.
 pub(super) const MEANS_MAX: usize = 4000;
 /// A part that counts for nothing: of the errors at work by a fault, of its information that the parameters
-/// cannot follow, of the gains of two large ones, which are not quite linear.
-const NOTHING: f64 = 0.01;
+/// cannot follow, of the gains of two large ones, which are not quite linear, of the residual as a prior.
+pub(super) const NOTHING: f64 = 0.01;
 /// Causes whose chi-squares differ by less are undecided: odds of 20 to 1.
 pub(super) const UNDECIDED: f64 = 6.0;
 

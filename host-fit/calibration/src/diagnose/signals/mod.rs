@@ -35,7 +35,7 @@ use residual::Residuals;
 const BLOCK: usize = 10;
 /// What is beyond so many standard deviations is not noise: once in 10^10 rows, and what residuals have beside
 /// noise gives them longer tails.
-const CLEAR: f64 = 6.5;
+pub(super) const CLEAR: f64 = 6.5;
 
 /// What the signals of a dataset show, log after log, and the rows that no other test is to use.
 ///
