@@ -221,11 +221,7 @@ impl Diagnosis {
         let of_fit = of_fit.filter(|found| !is_late || found.code != Code::ReferenceLag);
         findings.extend(of_fit.cloned());
         findings.extend(temperature::findings(fit, dataset, stage));
-        let ranged = |found: &Finding| {
-            let mut others = fit.warnings.iter();
-            others.any(|other| (other.code, &other.channel) == (found.code, &found.channel))
-        };
-        findings.extend(range::undeclared(dataset, stage).filter(|found| !ranged(found)));
+        findings.extend(range::undeclared(fit, stage));
         if !is_explained(findings) {
             findings.extend(of_fit::undescribed(fit, dataset));
             let unexplained = are_notes(findings).then(|| of_fit::over_noise(fit, dataset));

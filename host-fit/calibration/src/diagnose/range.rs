@@ -1,40 +1,46 @@
 //! Poses beyond the range of a calibration, and motion that is not the declared one.
 
 use crate::finding::{Code, Finding};
+use crate::fit::{Fit, RANGE_MARGIN};
 use crate::input::dataset::{Dataset, Row};
 use crate::input::stage::{AXES, Stage};
 use runtime::ParameterSet;
 
-/// An axis that spans more than this times its declared range, or less than that, has another scale or
+/// An axis that moves by more than this times its declared range, or less than that, has another scale or
 /// moves otherwise: no log shows a scale that is common to all channels of a kind.
 pub(super) const SPANS: (f64, f64) = (0.1, 2.0);
+/// The field model is less good than predicted beyond a log that moves an axis by less than this part.
+const RANGE_MIN: f64 = 0.5;
 
 /// X, Y, Rz, Z, Rx, Ry: m, rad.
 fn pose(row: &Row) -> impl Iterator<Item = f64> {
     row.reference.into_iter().chain(row.vertical)
 }
 
-/// Axes that span far more or far less than `[motion]` declares.
-pub(super) fn undeclared(dataset: &Dataset, stage: &Stage) -> impl Iterator<Item = Finding> {
-    let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; AXES.len()];
-    for row in &dataset.rows {
-        for ([low, high], value) in ends.iter_mut().zip(pose(row)) {
-            (*low, *high) = (low.min(value), high.max(value));
-        }
-    }
-    let axes = AXES.iter().zip(stage.motion.axes).zip(ends);
-    axes.filter_map(|(((axis, _), motion), [low, high])| {
-        let [span, service] = [high - low, 2.0 * motion.service].map(|x| x * 1e6);
-        let part = span / service;
-        if !part.is_finite() || (SPANS.0..=SPANS.1).contains(&part) {
-            return None;
-        }
+/// Axes that the logs of a fit move far more or far less than `[motion]` declares.
+pub(super) fn undeclared(fit: &Fit, stage: &Stage) -> impl Iterator<Item = Finding> {
+    let to = &fit.calibration;
+    let moved = (to.calibrated_planar.into_iter()).chain(to.calibrated_vertical);
+    let is_for_service = fit.field.is_some();
+    let axes = AXES.iter().zip(stage.motion.axes).zip(moved);
+    axes.filter_map(move |(((axis, _), motion), moved)| {
+        let [moved, service] = [moved / RANGE_MARGIN, motion.service].map(|x| x * 1e6);
+        let part = moved / service;
+        let what = match (SPANS.0..=SPANS.1).contains(&part) {
+            true if is_for_service && part < RANGE_MIN => {
+                "errors beyond the log's range are larger than predicted; `host-fit plan` makes a run of full range"
+            }
+            true => return None,
+            false => {
+                "a scale of all channels of a kind may be wrong, which nothing else shows; check units and scales, or declare the \
+                 motion"
+            }
+        };
         let unit = if axis.starts_with('r') { "urad" } else { "um" };
         let message = format!(
-            "the log spans {span:.0} {unit} in {axis}, service {service:.0} ([motion] in stage.toml): a scale of all channels of a \
-             kind may be wrong, which nothing else shows; check units and scales, or declare the motion"
+            "the log moves {axis} by {moved:.0} {unit} to either side, service by {service:.0} ([motion] in stage.toml): {what}"
         );
-        Some(Finding::new(Code::OutOfRange, message).on(*axis).of(span, unit))
+        Some(Finding::new(Code::OutOfRange, message).on(*axis).of(moved, unit))
     })
 }
 

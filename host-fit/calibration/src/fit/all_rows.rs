@@ -1,8 +1,7 @@
 //! A fit to a sample of the rows of logs, judged on all of them.
 
-use super::warning::{is_count, of_counts, of_ranges, of_rest};
+use super::warning::{is_count, of_counts, of_rest};
 use super::{Fit, FitError, FitSettings, RANGE_MARGIN, fit};
-use crate::finding::Code;
 use crate::input::dataset::Dataset;
 use crate::input::log::{LogError, LogReading};
 use crate::input::stage::Stage;
@@ -68,7 +67,7 @@ impl Fit {
         self.warnings.retain(|warning| !is_count(warning));
         let counts = of_counts(&self.all.zeros, self.all.undecoded);
         self.warnings.extend(counts);
-        Ok(self.with_range_of_all_rows(stage))
+        Ok(self.with_range_of_all_rows())
     }
 
     /// How far a row may be from the median of its run, m, m, rad, by the rows that the fit kept.
@@ -91,7 +90,7 @@ impl Fit {
     }
 
     /// Widens the range of the calibration to what all rows reach.
-    fn with_range_of_all_rows(mut self, stage: &Stage) -> Result<Self, FitError> {
+    fn with_range_of_all_rows(mut self) -> Result<Self, FitError> {
         let to = &mut self.calibration;
         let wider = |range: f64, reach: f64| range.max(RANGE_MARGIN * reach);
         for axis in 0..3 {
@@ -106,13 +105,6 @@ impl Fit {
             fit: self.set.fit,
         };
         self.set = to.prepare(&origin).map_err(FitError::Unusable)?;
-        if self.field.is_some() {
-            self.warnings
-                .retain(|warning| warning.code != Code::OutOfRange);
-            let ranges = [to.calibrated_planar, to.calibrated_vertical];
-            let [planar, vertical] = ranges.map(|range| range.map(|most| most / RANGE_MARGIN));
-            self.warnings.extend(of_ranges(stage, planar, vertical));
-        }
         Ok(self)
     }
 }

@@ -1,7 +1,7 @@
 //! The main job for the field model: Model (31) by least squares first, then the field model from
 //! there, refused where the log leaves it worse than Model (31).
 
-use super::warning::{of_ranges, warnings};
+use super::warning::warnings;
 use super::{Fit, FitError, Job, Judged, calibration};
 use crate::input::dataset::Row;
 use crate::input::stage::Stage;
@@ -167,10 +167,7 @@ impl Job<'_> {
         Ok(Fit {
             model,
             model_reason: field.verdict.to_string(),
-            warnings: warnings(dataset, selected, &problem, &solution, &judgement)
-                .into_iter()
-                .chain(of_ranges(stage, field.planar_range, field.vertical_range))
-                .collect(),
+            warnings: warnings(dataset, selected, &problem, &solution, &judgement),
             train_fitness: problem.fitness(cost),
             train_rows: selected.len(),
             loss: self.settings.loss,

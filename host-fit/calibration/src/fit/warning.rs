@@ -2,7 +2,6 @@
 
 use crate::finding::{Code, Finding};
 use crate::input::dataset::Dataset;
-use crate::input::stage::{AXES, Stage};
 use crate::judge::Judgement;
 use crate::judge::lag::ReferenceLag;
 use crate::judge::statistics::{AxisError, PoseError};
@@ -18,8 +17,6 @@ const POSE: [(&str, &str, &str); 3] = [("x", "X", "um"), ("y", "Y", "um"), ("rz"
 const LAG_MIN: f64 = 0.1;
 /// ... and from this many of its standard errors.
 const LAG_ERRORS_MIN: f64 = 3.0;
-/// Warn where the log moves an axis over less than this part of its range in service.
-const RANGE_MIN: f64 = 0.5;
 /// Warn where errors over all rows are this many times those over the rows that were fitted.
 const REST_MAX: f64 = 1.5;
 /// In a million rows of noise alone the largest error is five times the rms.
@@ -67,27 +64,6 @@ pub fn of_undecoded(rows: usize) -> Option<Finding> {
 /// Whether it is one of [`of_counts`].
 pub(super) const fn is_count(found: &Finding) -> bool {
     matches!(found.code, Code::ZeroClipped | Code::Saturated)
-}
-
-/// Axes that the log moves (X, Y, Rz and Z, Rx, Ry: largest magnitudes, m, rad) far less than service
-/// does.
-pub(super) fn of_ranges(
-    stage: &Stage,
-    planar: [f64; 3],
-    vertical: [f64; 3],
-) -> impl Iterator<Item = Finding> {
-    let moved = planar.into_iter().chain(vertical);
-    let axes = AXES.iter().zip(&stage.motion.axes).zip(moved);
-    let narrow = axes.filter(|((_, motion), moved)| *moved < RANGE_MIN * motion.service);
-    narrow.map(|(((axis, _), motion), moved)| {
-        let unit = if axis.starts_with('r') { "urad" } else { "um" };
-        let [moved, service] = [moved, motion.service].map(|most| most * 1e6);
-        let message = format!(
-            "the log moves {axis} by {moved:.0} {unit} to either side, service by {service:.0} ([motion] in stage.toml): errors \
-             beyond the log's range are larger than predicted; `host-fit plan` makes a run of full range"
-        );
-        Finding::new(Code::OutOfRange, message).on(*axis).of(moved, unit)
-    })
 }
 
 /// A lag of the reference that is large and beyond doubt.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::finding::Code;
 use crate::fit::ModelChoice;
 use crate::input::log::{ReadOptions, SaturatedCodes, read};
 use crate::input::shipped::{LOG_GZ, STAGE_TOML};
