@@ -67,7 +67,7 @@ codes! {
     CapacitiveSwapped, "capacitive_swapped", Refuse, "two capacitive channels, or their places in stage.toml, are exchanged", "check wires, column order and capacitive.probes_m", [];
     CapacitiveInverted, "capacitive_inverted", Refuse, "capacitive channels, or a coordinate of theirs in stage.toml, have the wrong sign", "check wires, signs and capacitive.probes_m", [];
     ScaleWrong, "scale_wrong", Refuse, "a scale, a unit or a length is wrong", "check units, single or double pass, and the scales in stage.toml", [];
-    ReferenceLag, "reference_lag", Warn, "the reference or one channel is earlier or later than the others", "set the delays of converters and interferometers, for a probe or gap that is late at work is wrong in motion; of all beams alike fit with --compensate-lag", [];
+    ReferenceLag, "reference_lag", Warn, "the reference or one channel is earlier or later than the others", "set its delay to zero: a probe or gap that is late at work makes the pose wrong while the stage moves; where all beams are late alike fit with --compensate-lag", [];
     Hum, "hum", Warn, "a channel has a disturbance of one frequency", "look for mains in its cable and supply, or a vibration", [ReferenceLag Outliers];
     Drift, "drift", Warn, "a channel drifts", "let the stage and its electronics warm up", [TermsAtLimit ZeroClipped];
     GainDrift, "gain_drift", Warn, "the gain of a channel changes", "let it warm up; check its supply", [TermsAtLimit];

@@ -104,9 +104,9 @@ impl FitOrder {
     ) -> Result<Outcome, CalibrateError> {
         let is_interrupted = interrupt::requested();
         let diagnosis = diagnose::of_log(&log.dataset, stage, fitted.as_ref());
-        if let Some(repair) = &diagnosis.repair {
+        if let (Some(repair), Some(predicted)) = (&diagnosis.repair, &diagnosis.predicted) {
             fitted = match fitted {
-                Ok(fit) => fit.repaired(log, stage, repair)?,
+                Ok(fit) => fit.repaired(log, stage, repair, predicted)?,
                 failed => failed,
             };
         }

@@ -89,7 +89,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     let hidden = ["failure", "warnings", "verdict", "predicted", "findings"];
     let is_note = |found: &Finding| found.severity == Severity::Note;
     if why.is_none() && findings.iter().all(is_note) {
-        terminal::print("nothing is wrong with it\n")?;
+        terminal::print("no fault found\n")?;
     }
     finish(
         outputs,

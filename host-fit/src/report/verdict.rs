@@ -63,6 +63,8 @@ impl Summary {
             (End::Failed(_), _) => ("refused", "Refused"),
             (End::Interrupted, _) => ("limited", "Interrupted, the best so far"),
             (End::Written, Some(Verdict::Refused)) => ("refused", "Written in spite of a refusal"),
+            // The command does not end with an error that says why.
+            (End::Judged, Some(Verdict::Refused)) => ("refused", "Not good enough for service"),
             (_, Some(Verdict::Refused)) => ("refused", "Refused"),
             (_, Some(Verdict::Limited)) => ("limited", "Limited"),
             (_, Some(Verdict::Good)) => ("good", "Good"),
@@ -195,6 +197,7 @@ fn next(of: &Subject, verdict: Option<Verdict>) -> String {
     let usual = match of.end {
         End::Written => "judge it on another log with host-fit eval",
         End::Checked => "host-fit fit",
+        End::Judged if verdict == Some(Verdict::Refused) => "host-fit recalibrate, or a new fit",
         _ => "",
     };
     match (of.end, verdict) {

@@ -102,7 +102,7 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
         let diagonals = [[1.0; 3], [1.0, 1.0, rz], [1.0, tilts, tilts]];
         Change(diagonals.map(|by| Matrix3::from_diagonal(&by.into())))
     };
-    let what = "Rz of the reference is multiplied by";
+    let what = "Rz of the reference (1 / interferometer.y_baseline_m) is multiplied by";
     scales(&mut out, "rz", what, |factor| turned(factor, 1.0));
     let what = "the places of the Hall probes are multiplied by";
     scales(&mut out, "hall", what, |factor| {
@@ -199,20 +199,34 @@ fn places(out: &mut Vec<Mistake>, stage: &Stage, gaps: &Matrix3<f64>) {
     }
 }
 
-impl Mistake {
-    /// What sets the log right, with two digits of a factor.
-    pub(super) fn cure(&self) -> String {
-        match self.value {
-            None => self.what.clone(),
-            Some((factor, "")) => {
-                let digits = 1 - factor.log10().floor() as i32;
-                let unit = 10f64.powi(-digits);
-                let rounded = (factor / unit).round() * unit;
-                format!("{} {rounded:.*}", self.what, digits.max(0) as usize)
-            }
-            Some((value, unit)) => format!("{} {value}{unit}", self.what),
-        }
-    }
+/// What sets the log right: the first of mistakes that differ by a value, with all values that do.
+pub(super) fn cure(alike: &[&Mistake]) -> String {
+    let first = alike[0];
+    let Some((value, unit)) = first.value else {
+        return first.what.clone();
+    };
+    // Two digits of a factor.
+    let shown = |value: f64| {
+        let digits = match unit.is_empty() {
+            true => 1 - value.log10().floor() as i32,
+            false => 0,
+        };
+        let place = 10f64.powi(-digits);
+        format!(
+            "{:.*}",
+            digits.max(0) as usize,
+            (value / place).round() * place
+        )
+    };
+    let values = alike.iter().filter_map(|mistake| Some(mistake.value?.0));
+    let ends = values.fold([value; 2], |[low, high], value| {
+        [low.min(value), high.max(value)]
+    });
+    let range = match ends.map(shown) {
+        [low, high] if low != high => format!(" ({low} to {high})"),
+        _ => String::new(),
+    };
+    format!("{} about {}{unit}{range}", first.what, shown(value))
 }
 
 fn titles(channels: &[&str]) -> String {

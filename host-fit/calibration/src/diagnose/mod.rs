@@ -113,8 +113,15 @@ pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>)
         Err(_) => Verdict::Refused,
     });
     out.validity = field.and_then(|field| {
-        let (white_mm, covariance) = (field.noise.white_mm, &field.posterior.covariance);
-        temperature::validity(stage, &field.parameters, white_mm, covariance)
+        let (mut parameters, mut covariance) =
+            (field.parameters, field.posterior.covariance.clone());
+        if let Some(repair) = &out.repair {
+            parameters = repair.parameters;
+            covariance
+                .view_mut((0, 0), repair.covariance.shape())
+                .copy_from(&repair.covariance);
+        }
+        temperature::validity(stage, &parameters, field.noise.white_mm, &covariance)
     });
     out
 }

@@ -8,7 +8,7 @@
 //! the sensitivity must fall with the height at its place, so that b/a = y and c/a = -x.
 
 use super::bank::{MEANS_MAX, NOTHING, RARITY, ROUNDS, UNDECIDED};
-use super::mistakes::{Change, Mistake, mistakes};
+use super::mistakes::{Change, Mistake, cure, mistakes};
 use super::range::SPANS;
 use crate::finding::{Code, Finding, Severity};
 use crate::input::dataset::Dataset;
@@ -80,19 +80,21 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
     let near = ranked
         .iter()
         .take_while(|(rank, _)| *rank < least + UNDECIDED);
-    let mut named: Vec<&Mistake> = Vec::new();
+    let mut named: Vec<Vec<&Mistake>> = Vec::new();
     for (_, mistake) in near {
-        if named.iter().all(|other| other.what != mistake.what) {
-            named.push(mistake);
+        match named.iter_mut().find(|alike| alike[0].what == mistake.what) {
+            Some(alike) => alike.push(mistake),
+            None => named.push(vec![mistake]),
         }
     }
     Some(finding(&named, gain > sure))
 }
 
-fn finding(named: &[&Mistake], is_sure: bool) -> Finding {
-    let cures: Vec<String> = named.iter().map(|mistake| mistake.cure()).collect();
+fn finding(named: &[Vec<&Mistake>], is_sure: bool) -> Finding {
+    let cures: Vec<String> = named.iter().map(|alike| cure(alike)).collect();
+    let is_rough = named.iter().any(|alike| alike[0].value.is_some());
     let (undecided, remedy) = match named {
-        [one] => ("", one.code.entry().remedy),
+        [one] => ("", one[0].code.entry().remedy),
         _ => (
             " (the log does not tell which)",
             "find out which before anything is changed: check wiring, columns, units and stage.toml",
@@ -108,12 +110,17 @@ fn finding(named: &[&Mistake], is_sure: bool) -> Finding {
             Severity::Warn,
         ),
     };
-    let message = format!("{what} if {}{undecided}: {remedy}", cures.join(", or if "));
-    let found = Finding::new(named[0].code, message).severe(severity);
+    let rough = match is_rough {
+        true => ". The figures are rough: find the exact ones and write those",
+        false => "",
+    };
+    let cures = cures.join(", or if ");
+    let message = format!("{what} if {cures}{undecided}: {remedy}{rough}");
+    let found = Finding::new(named[0][0].code, message).severe(severity);
     match named {
         [one] => {
-            let found = found.on(one.channel.clone());
-            match one.value {
+            let found = found.on(one[0].channel.clone());
+            match one[0].value {
                 Some((value, unit)) => found.of(value, unit.trim()),
                 None => found,
             }

@@ -3,6 +3,7 @@
 use super::{Fit, FitError};
 use crate::input::log::{LogError, LogReading};
 use crate::input::stage::Stage;
+use crate::judge::verdict::Predicted;
 use crate::judge::{Decoded, Zeros};
 use crate::solve::field::parameters::FieldParameters;
 use crate::solve::field::posterior::Posterior;
@@ -23,7 +24,8 @@ pub struct Repair {
 }
 
 impl Fit {
-    /// This fit of the field model with the repaired parameters, judged on the rows of its logs.
+    /// This fit of the field model with the repaired parameters, judged on the rows of its logs; the blob has the
+    /// errors that are `predicted` for service.
     ///
     /// # Errors
     /// Those of reading again, and inside the result [`FitError::Unusable`].
@@ -32,6 +34,7 @@ impl Fit {
         log: &LogReading,
         stage: &Stage,
         repair: &Repair,
+        predicted: &Predicted,
     ) -> Result<Result<Self, FitError>, LogError> {
         let (parameters, dataset) = (&repair.parameters, &log.dataset);
         let Some(constants) = parameters.constants(stage.hall.m_per_count) else {
@@ -83,9 +86,14 @@ impl Fit {
             field.parameters = *parameters;
             self.standard_error = field.posterior.standard_errors_31();
         }
-        match dataset.read() {
-            (rows, _) if rows > dataset.rows.len() => self.judged_on_all_rows(log, stage),
-            _ => Ok(Ok(self)),
-        }
+        let judged = match dataset.read() {
+            (rows, _) if rows > dataset.rows.len() => self.judged_on_all_rows(log, stage)?,
+            _ => Ok(self),
+        };
+        // Those on the log have the faults that are taken off: no measure for another one.
+        Ok(judged.map(|mut fit| {
+            fit.set.fit.rms = predicted.rms.map(|rms| rms as f32);
+            fit
+        }))
     }
 }

@@ -38,10 +38,16 @@ impl Verdict {
     /// could show it.
     pub fn new(for_service: bool, predicted: Option<&Predicted>, findings: &[Finding]) -> Self {
         let is_refused = findings.iter().any(|f| f.severity == Severity::Refuse);
-        // No prediction holds what contradicts the drawing or the model.
+        // No prediction holds what contradicts the drawing or the model, nor what a probe or a gap that is late at work,
+        // too, makes of motion.
         let is_doubtful = findings.iter().any(|f| {
+            let of_beams = f
+                .channel
+                .as_deref()
+                .is_none_or(|channel| channel.starts_with("ifm"));
+            let is_late = f.code == Code::ReferenceLag && !of_beams;
             let of_model = matches!(f.code, Code::TermsAtLimit | Code::ModelLacks);
-            of_model && f.severity > Severity::Note
+            (of_model || is_late) && f.severity > Severity::Note
         });
         let ratio = predicted.map_or(LIMITED_MAX, Predicted::worst_ratio);
         match (is_refused, for_service) {

@@ -67,10 +67,14 @@ impl Family {
     /// The channel or the group.
     pub(super) fn channel(&self) -> &'static str {
         let name = CHANNELS[self.1];
-        match self.2 - self.1 {
-            1 => name,
-            _ => name.split('_').next().unwrap_or(name),
+        match self.is_single() {
+            true => name,
+            false => name.split('_').next().unwrap_or(name),
         }
+    }
+
+    pub(super) fn is_single(&self) -> bool {
+        self.2 - self.1 == 1
     }
 
     pub(super) fn is_of_beams(&self) -> bool {

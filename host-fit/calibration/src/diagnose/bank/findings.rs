@@ -40,7 +40,10 @@ impl Job<'_> {
         };
         let (movement, t_us, log) = self.place(course.onset().unwrap_or(0));
         let how = match (course, &log) {
-            (Course::On(0, _), _) => format!("is {size:+.2} {unit} later than that of the others"),
+            (Course::On(0, _), _) => {
+                let how = if size > 0.0 { "later" } else { "earlier" };
+                format!("is {:.2} {unit} {how} than that of the others", size.abs())
+            }
             (Course::On(..), Some(log)) => {
                 format!("in {log} differs by {size:+.2} {unit} from that before")
             }
@@ -68,7 +71,7 @@ impl Job<'_> {
             (Kind::Offset, ..) => Code::Drift,
         };
         let message = format!(
-            "{what} of {}{undecided} {how}: {cost:.2} times the noise floor at work. Remedy: {}",
+            "{what} of {}{undecided} {how}: alone it makes errors in service of {cost:.2} times the noise floor. Remedy: {}",
             names.join(" or "),
             code.entry().remedy
         );

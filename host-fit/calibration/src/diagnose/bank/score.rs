@@ -75,9 +75,13 @@ impl<'a> Scan<'a> {
             let found = self.scan(&column, &all, |at| at == 0);
             found.first().map(|(_, gain)| (course, *gain))
         };
-        let mut found = vec![whole(Course::Ramp)];
+        let mut found = Vec::new();
         if family.0 == Kind::Lag {
             found.push(whole(Course::On(0, all.end)));
+        }
+        // Channels of a kind have one clock.
+        if family.0 != Kind::Lag || !family.is_single() {
+            found.push(whole(Course::Ramp));
         }
         if family.stays() {
             found.push(self.onset(&raw, std::slice::from_ref(&all)));

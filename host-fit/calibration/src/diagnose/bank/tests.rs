@@ -188,7 +188,12 @@ fn channels_that_are_late_and_a_clock_that_drifts_are_named_and_taken_off() {
             (found.value.expect("ms") - late_ms).abs() < 0.1 * late_ms,
             "{found:?}"
         );
-        assert_eq!(diagnosis.verdict, Some(Verdict::Good), "{channel}");
+        // Of one that is late at work, too, nothing says what motion makes of it.
+        let verdict = match channel {
+            "ifm" => Verdict::Good,
+            _ => Verdict::Limited,
+        };
+        assert_eq!(diagnosis.verdict, Some(verdict), "{channel}");
         assert!(diagnosis.repair.is_some(), "{channel}");
     }
 }
