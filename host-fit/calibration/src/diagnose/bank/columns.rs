@@ -109,11 +109,13 @@ impl<'a> Bank<'a> {
         parameters: &FieldParameters,
         lag_s: f64,
     ) -> Self {
-        let slopes = Slopes::new(stage, probes(parameters));
-        let at = |row: &FieldRow| slopes.at(row.planar_mm(lag_s, [0.0; 3]), row.vertical);
+        let probes = probes(parameters);
+        let planar_mm = |row: &FieldRow| row.planar_mm(lag_s, [0.0; 3]);
         let half_m = 0.5 * stage.y_baseline_m;
         let values = |row: &FieldRow| {
-            let ([a, b, c], [x, y, rz]) = (row.signal_mm, row.reference_mm);
+            // As fitted: at rest a signal is all noise, which explains itself.
+            let [a, b, c] = probes.map(|probe| probe.signal_mm(planar_mm(row), row.vertical));
+            let [x, y, rz] = row.reference_mm;
             let vertical = VerticalPose::from_array(row.vertical);
             let [one, two, three] = gaps_m(&stage.capacitive_probes_m, &vertical).map(|m| 1e3 * m);
             [
@@ -128,6 +130,8 @@ impl<'a> Bank<'a> {
                 three,
             ]
         };
+        let slopes = Slopes::new(stage, probes);
+        let at = |row: &FieldRow| slopes.at(planar_mm(row), row.vertical);
         Self {
             log,
             values: log.means.rows.iter().map(values).collect(),

@@ -337,6 +337,24 @@ fn hum_is_not_taken_for_another_fault() {
     }
 }
 
+/// At rest near zero a signal is all noise, which a gain of -100 % would explain.
+#[test]
+fn a_log_that_ends_at_rest_is_sound() {
+    let stage = stage();
+    let mut run = Protocol::Combined.run(stage.servo_period_s, 3);
+    run.movements.truncate(2);
+    for movement in &mut run.movements {
+        // Backwards it ends where it began, at zero.
+        movement.reverse();
+        movement.resize(movement.len() + 500, movement[movement.len() - 1]);
+    }
+    let assembly = Assembly::draw(&stage, 3);
+    let rests = record(&stage, &assembly, run, &SensorErrors::USUAL, 3).expect("clear");
+    let diagnosis = diagnosed(rests, |_, _| {});
+    assert_eq!(diagnosis.findings, []);
+    assert_eq!(diagnosis.verdict, Some(Verdict::Good));
+}
+
 /// Steps can follow it, but between them the gain is not theirs.
 #[test]
 fn a_gain_that_rises_and_falls_smoothly_is_named_and_not_taken_off() {
