@@ -36,6 +36,8 @@ pub(super) struct Mistake {
     pub(super) value: Option<(f64, &'static str)>,
     /// What a value that may be any costs: twice the logarithm of the odds.
     pub(super) penalty: f64,
+    /// Whether other magnets than designed show the same.
+    pub(super) may_be_magnets: bool,
     pub(super) change: Change,
 }
 
@@ -92,7 +94,13 @@ pub(super) fn mistakes(stage: &Stage, has_codes: bool) -> Vec<Mistake> {
             };
             let (channel, of) = names(&some);
             let what = format!("the scale of {of} is multiplied by");
+            let first = out.len();
             scales(&mut out, &channel, &what, times);
+            for mistake in out[first..].iter_mut().filter(|_| channel == "cap") {
+                // Their field falls with the height half as fast, or less than twice.
+                let factors = 0.5..2.0;
+                mistake.may_be_magnets = mistake.value.is_some_and(|(by, _)| factors.contains(&by));
+            }
             let what = format!("the sign of {of} is turned");
             out.push(mistake(inverted, channel, what, times(-1.0)));
         }
@@ -123,6 +131,7 @@ const fn mistake(code: Code, channel: String, what: String, change: Change) -> M
         what,
         value: None,
         penalty: 0.0,
+        may_be_magnets: false,
         change,
     }
 }

@@ -93,28 +93,41 @@ pub fn structure(dataset: &Dataset, stage: &Stage, disagree: bool) -> Option<Fin
 fn finding(named: &[Vec<&Mistake>], is_sure: bool) -> Finding {
     let cures: Vec<String> = named.iter().map(|alike| cure(alike)).collect();
     let is_rough = named.iter().any(|alike| alike[0].value.is_some());
+    let magnets = named.iter().any(|alike| alike[0].may_be_magnets);
     let (undecided, remedy) = match named {
-        [one] => ("", one[0].code.entry().remedy),
+        [one] if !magnets => ("", one[0].code.entry().remedy),
         _ => (
             " (the log does not tell which)",
             "find out which before anything is changed: check wiring, columns, units and stage.toml",
         ),
     };
+    // Other magnets are no mistake.
+    let severe = if named.iter().all(|alike| alike[0].may_be_magnets) {
+        Severity::Warn
+    } else {
+        Severity::Refuse
+    };
     let (what, severity) = match is_sure {
         true => (
             "the log is not that of the stage in stage.toml as it is, and fits",
-            Severity::Refuse,
+            severe,
         ),
         false => (
             "the log may be of one stage all the same, but not of that in stage.toml as it is: it would fit",
             Severity::Warn,
         ),
     };
+    let cures = cures.join(", or if ");
+    let cures = match magnets {
+        true => format!(
+            "{cures}, or if the field of the magnets falls so much faster with the height than designed"
+        ),
+        false => cures,
+    };
     let rough = match is_rough {
         true => ". The figures are rough: find the exact ones and write those",
         false => "",
     };
-    let cures = cures.join(", or if ");
     let message = format!("{what} if {cures}{undecided}: {remedy}{rough}");
     let found = Finding::new(named[0][0].code, message).severe(severity);
     match named {

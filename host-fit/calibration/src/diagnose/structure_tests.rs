@@ -199,6 +199,27 @@ fn a_beam_that_is_a_tenth_too_long_is_named_beside_others() {
     }
 }
 
+#[test]
+fn gaps_that_are_a_third_too_small_may_be_other_magnets_and_are_no_refusal() {
+    let stage = stage("", "");
+    for mut recording in recordings() {
+        let samples = recording.movements.iter_mut().flatten();
+        samples.for_each(|s| s.capacitive = s.capacitive.map(|code| code * 2 / 3));
+        let dataset = recording.dataset(&stage).expect("a triangle");
+        let found = structure(&dataset, &stage, false).expect("a finding");
+        assert_eq!(
+            (found.code, found.severity),
+            (Code::ScaleWrong, Severity::Warn)
+        );
+        for cause in [
+            "the scale of all capacitive sensors is",
+            "the field of the magnets",
+        ] {
+            assert!(found.message.contains(cause), "{}", found.message);
+        }
+    }
+}
+
 /// Probes at twice the distance show half of the turns and tilts.
 #[test]
 fn places_of_the_hall_probes_at_twice_the_distance_are_named() {

@@ -46,7 +46,10 @@ impl Verdict {
                 .as_deref()
                 .is_none_or(|channel| channel.starts_with("ifm"));
             let is_late = f.code == Code::ReferenceLag && !of_beams;
-            let of_model = matches!(f.code, Code::TermsAtLimit | Code::ModelLacks);
+            let of_model = matches!(
+                f.code,
+                Code::TermsAtLimit | Code::ModelLacks | Code::ScaleWrong
+            );
             (of_model || is_late) && f.severity > Severity::Note
         });
         let ratio = predicted.map_or(LIMITED_MAX, Predicted::worst_ratio);
