@@ -102,7 +102,7 @@ fn finding(named: &[Vec<&Mistake>], is_sure: bool) -> Finding {
         ),
     };
     // Other magnets are no mistake.
-    let severe = if named.iter().all(|alike| alike[0].may_be_magnets) {
+    let severe = if magnets {
         Severity::Warn
     } else {
         Severity::Refuse
