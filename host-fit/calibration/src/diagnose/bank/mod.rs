@@ -15,6 +15,8 @@ mod findings;
 mod means;
 mod score;
 #[cfg(test)]
+mod service_tests;
+#[cfg(test)]
 mod tests;
 
 use crate::finding::{Finding, Severity};
@@ -335,9 +337,11 @@ impl Job<'_> {
         }
         let covariance = estimate.curvature.inverse() * certain;
         let expected = Predicted::new(declared, &covariance, &[0.0; COUNT]);
-        let is_better = is_worth_it && is_clear && expected.worst_ratio() <= GOOD_MAX;
-        let is_better = is_better && self.fitted.model == ModelKind::Field;
-        let is_better = is_better && (self.is_bent || !findings.is_empty());
+        let is_better = is_worth_it
+            && is_clear
+            && expected.worst_ratio() <= GOOD_MAX
+            && self.fitted.model == ModelKind::Field
+            && (self.is_bent || !findings.is_empty());
         let repair = Repair {
             parameters: estimate.parameters,
             covariance: covariance.view((0, 0), (COUNT, COUNT)).into_owned(),
