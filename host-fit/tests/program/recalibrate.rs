@@ -109,7 +109,15 @@ fn bad_rows_do_not_bend_it_and_what_does_is_in_the_verdict() {
     assert!(stdout(&fitted).contains("errors on the log still have the faults"));
     let errors = &bench.json("fit.json")["errors"];
     assert!(number(&errors["y"]["rmse_um"]) > 0.55, "{errors}");
+    // The blob has the errors that it is good for, and its own reach in temperature.
     bench.good("inspect repaired.bin --json inspect.json");
+    let held = &bench.json("inspect.json")["fit"]["errors"]["y"]["rmse_um"];
+    let predicted = number(&bench.json("fit.json")["predicted"]["y"]["rms_um"]);
+    assert!(
+        (number(held) - predicted).abs() < 1e-6,
+        "{held} {predicted}"
+    );
+    assert!(number(&bench.json("fit.json")["valid_within_k"]) > 0.1);
     let repaired = bench.json("inspect.json")["repaired"][0].to_string();
     says(&repaired, "the gain of Hall B changes");
     assert_eq!(
