@@ -8,22 +8,22 @@
 mod common;
 
 use common::{Coverage, Fallible, RUN_8, RUN_30, Twin};
+use host_fit::calibration::plan::run::Run as PlannedRun;
 use host_fit::input::dataset::{Dataset, LoggedFrame, Movement, Row};
 use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
-use host_fit::plan::run::Run as PlannedRun;
-use host_fit::problem::Problem;
-use host_fit::problem::model::Model;
-use host_fit::problem::parameters::Parameters;
 use host_fit::simulate::pose::StagePose;
 use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
 use host_fit::simulate::random::{Purpose, Stream};
 use host_fit::simulate::sensors::SensorErrors;
-use host_fit::solve::field::fit::{FieldFit, fit_field};
-use host_fit::solve::field::parameters::FieldParameters;
-use host_fit::solve::field::probe::probes;
-use host_fit::solve::field::terms::TERMS;
-use host_fit::solve::{Projection, Solver, SolverOptions};
+use host_fit::solver::problem::Problem;
+use host_fit::solver::problem::model::Model;
+use host_fit::solver::problem::parameters::Parameters;
+use host_fit::solver::solve::field::fit::{FieldFit, fit_field};
+use host_fit::solver::solve::field::parameters::FieldParameters;
+use host_fit::solver::solve::field::probe::probes;
+use host_fit::solver::solve::field::terms::TERMS;
+use host_fit::solver::solve::{Projection, Solver, SolverOptions};
 use runtime::{ModelKind, RawFrame, VerticalPose};
 use std::f64::consts::TAU;
 

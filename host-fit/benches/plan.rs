@@ -7,8 +7,8 @@
 mod common;
 
 use common::{Axes, Fallible, Twin, fitted, rms};
+use host_fit::calibration::plan::plan;
 use host_fit::input::shipped;
-use host_fit::plan::plan;
 use host_fit::simulate::protocol::{Protocol, Run};
 use runtime::ModelKind;
 use std::time::Instant;

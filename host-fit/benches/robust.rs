@@ -6,13 +6,13 @@
 mod common;
 
 use common::{Axes, Fallible, read, rms};
-use host_fit::fit::{FitSettings, ModelChoice, fit};
+use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::dataset::Dataset;
 use host_fit::input::shipped::{self, LOG_GZ, RUN_GZ, SERVICE_GZ};
 use host_fit::input::stage::Stage;
-use host_fit::problem::model::Model;
-use host_fit::solve::Solver;
-use host_fit::solve::robust::Loss;
+use host_fit::solver::problem::model::Model;
+use host_fit::solver::solve::Solver;
+use host_fit::solver::solve::robust::Loss;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use runtime::ModelKind;

@@ -7,20 +7,20 @@
 mod common;
 
 use common::{Axes, Coverage, Fallible, RUN_8, RUN_30, Twin, fitted};
-use host_fit::fit::Fit;
+use host_fit::calibration::fit::Fit;
+use host_fit::calibration::judge::Decoded;
+use host_fit::calibration::judge::statistics::over_noise;
+use host_fit::calibration::plan::run::Run as PlannedRun;
 use host_fit::input::dataset::Dataset;
 use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
-use host_fit::judge::Decoded;
-use host_fit::judge::statistics::over_noise;
-use host_fit::plan::run::Run as PlannedRun;
 use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::pose::StagePose;
 use host_fit::simulate::protocol::{Protocol, REST_S, Run};
 use host_fit::simulate::recording::Recording;
 use host_fit::simulate::thermal::{ASSEMBLED_C, Climate};
-use host_fit::solve::field::carry::service_poses;
+use host_fit::solver::solve::field::carry::service_poses;
 use runtime::ModelKind;
 use runtime::frame::MISSING_CODE;
 use std::path::{Path, PathBuf};

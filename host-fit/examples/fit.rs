@@ -4,9 +4,9 @@
 //! cargo run -p host-fit --example fit -- host-fit/data/run30.csv.gz host-fit/data/stage.toml target/example.bin
 //! ```
 
-use host_fit::diagnose;
-use host_fit::finding::Severity;
-use host_fit::fit::{FitSettings, ModelChoice, fit};
+use host_fit::calibration::diagnose;
+use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
+use host_fit::input::finding::Severity;
 use host_fit::input::log::{self, ReadOptions};
 use host_fit::input::stage::Stage;
 use host_fit::output::blob_file;

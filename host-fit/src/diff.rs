@@ -129,7 +129,7 @@ struct Codes {
 impl Codes {
     fn new(set: &ParameterSet) -> Option<Self> {
         let of_words = |rows: &[[f32; 3]; 3]| Matrix3::from_fn(|i, k| f64::from(rows[i][k]));
-        let eta = crate::problem::parameters::Parameters::of_set(set).eta();
+        let eta = hallstage_solver::problem::parameters::Parameters::of_set(set).eta();
         let m_per_code = f64::from(set.hall.m_per_code);
         let plane = of_words(&set.plane);
         Some(Self {

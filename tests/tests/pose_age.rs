@@ -1,13 +1,13 @@
 //! What the age of a pose costs in service, and what is left of it after a prediction: the
 //! figures of the runtime's README.
 
-use host_fit::fit::{FitSettings, ModelChoice, fit};
+use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::shipped;
-use host_fit::problem::model::Model;
 use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::protocol::Protocol;
 use host_fit::simulate::recording::{Recording, Sample, record};
 use host_fit::simulate::sensors::SensorErrors;
+use host_fit::solver::problem::model::Model;
 use runtime::{ModelKind, OnInvalid, ParameterSet, PoseTracker, Predictor, RawFrame};
 
 /// The simulated stage, with magnets as designed.

@@ -1,18 +1,18 @@
 //! What the benchmarks share: simulated stages, fits to their logs, and errors against the truth.
 #![allow(dead_code, reason = "each benchmark uses a part of it")]
 
-use host_fit::fit::{Fit, FitSettings, ModelChoice, fit};
+use host_fit::calibration::fit::{Fit, FitSettings, ModelChoice, fit};
+use host_fit::calibration::judge::{Decoded, Zeros};
+use host_fit::calibration::plan::run::Run as PlannedRun;
 use host_fit::input::dataset::Dataset;
 use host_fit::input::log::{ReadOptions, read_bytes};
 use host_fit::input::stage::Stage;
-use host_fit::judge::{Decoded, Zeros};
-use host_fit::plan::run::Run as PlannedRun;
-use host_fit::problem::model::Model;
 use host_fit::simulate::assembly::Assembly;
 use host_fit::simulate::protocol::Run;
 use host_fit::simulate::recording::{Recording, record, record_in};
 use host_fit::simulate::sensors::SensorErrors;
 use host_fit::simulate::thermal::{Climate, Thermal};
+use host_fit::solver::problem::model::Model;
 use runtime::{ModelKind, ParameterSet};
 use std::error::Error;
 use std::time::Instant;

@@ -3,15 +3,15 @@
 
 use crate::common::{Twin, rms};
 use crate::service;
-use host_fit::diagnose;
-use host_fit::finding::Severity;
-use host_fit::fit::{FitSettings, ModelChoice, fit};
+use host_fit::calibration::diagnose;
+use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
+use host_fit::calibration::judge::verdict::Verdict;
 use host_fit::input::dataset::Dataset;
+use host_fit::input::finding::Severity;
 use host_fit::input::stage::Stage;
-use host_fit::judge::verdict::Verdict;
 use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
 use host_fit::simulate::recording::Sample;
-use host_fit::solve::field::parameters::FieldParameters;
+use host_fit::solver::solve::field::parameters::FieldParameters;
 use runtime::ParameterSet;
 
 /// What becomes of a sample of which this part of the log is over, and of its number.

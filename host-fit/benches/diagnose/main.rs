@@ -10,13 +10,13 @@ mod paper;
 mod signals;
 
 use common::Twin;
-use host_fit::diagnose;
-use host_fit::finding::{Code, Finding, Severity};
-use host_fit::fit::{FitError, FitSettings, ModelChoice, fit};
+use host_fit::calibration::diagnose;
+use host_fit::calibration::fit::{FitError, FitSettings, ModelChoice, fit};
+use host_fit::calibration::plan::plan;
 use host_fit::input::dataset::Dataset;
+use host_fit::input::finding::{Code, Finding, Severity};
 use host_fit::input::shipped;
 use host_fit::input::stage::Stage;
-use host_fit::plan::plan;
 use host_fit::simulate::protocol::{Protocol, Run, Trajectory};
 use host_fit::simulate::recording::{Recording, Sample, record};
 use host_fit::simulate::sensors::SensorErrors;

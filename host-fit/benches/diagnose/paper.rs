@@ -3,8 +3,8 @@
 
 use crate::common::{Twin, rms};
 use crate::service;
-use host_fit::diagnose;
-use host_fit::fit::{FitSettings, ModelChoice, fit};
+use host_fit::calibration::diagnose;
+use host_fit::calibration::fit::{FitSettings, ModelChoice, fit};
 use host_fit::input::stage::Stage;
 use host_fit::simulate::protocol::Protocol;
 use host_fit::simulate::sensors::SensorErrors;

@@ -2,7 +2,7 @@
 //! with its channel, and how many other warnings come beside.
 
 use crate::{FAULTY, recording};
-use host_fit::finding::Code;
+use host_fit::input::finding::Code;
 use host_fit::input::stage::Stage;
 use host_fit::simulate::protocol::Trajectory;
 use host_fit::simulate::recording::{Recording, Sample};

@@ -4,14 +4,14 @@
 //! Nothing is written here.
 //!
 //! ```
-//! # use hall_input::input::shipped::STAGE_TOML;
-//! # use hall_input::input::stage::Stage;
+//! # use hallstage_input::shipped::STAGE_TOML;
+//! # use hallstage_input::stage::Stage;
 //! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
-//! # use hall_input::input::log::{self, ReadOptions};
-//! # use hall_input::input::shipped::RUN_GZ;
+//! # use hallstage_input::log::{self, ReadOptions};
+//! # use hallstage_input::shipped::RUN_GZ;
 //! # let reading = log::read_bytes(RUN_GZ, "run30.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
 //! # let dataset = reading.dataset;
-//! use hall_calibration::fit::{FitSettings, ModelChoice, fit};
+//! use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 //!
 //! let fit = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto))?;
 //! assert_eq!(fit.model.name, "field");
@@ -46,23 +46,23 @@ pub use settings::{FitSettings, ModelChoice};
 pub use warning::{of_counts, of_undecoded};
 use weights::{by_row, left_out, outliers};
 
-use crate::finding::Finding;
-use crate::input::dataset::{Dataset, Row};
-use crate::input::stage::Stage;
 use crate::judge::identify::{check_described, check_determined, check_motion};
 use crate::judge::lag::{ReferenceLag, reference_lag};
 use crate::judge::left_out::LeftOut;
 use crate::judge::statistics::PoseError;
 use crate::judge::uncertainty::uncertainty;
 use crate::judge::{Decoded, Judgement, Zeros};
-use crate::problem::Problem;
-use crate::problem::draw::draw_rows;
-use crate::problem::model::{COUNT, Model, ParameterId};
-use crate::solve::field::blocks::Rows;
-use crate::solve::field::fit::FieldFit;
-use crate::solve::field::terms;
-use crate::solve::robust::Loss;
-use crate::solve::{Projection, Solution, Solver};
+use hallstage_input::dataset::{Dataset, Row};
+use hallstage_input::finding::Finding;
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::Problem;
+use hallstage_solver::problem::draw::draw_rows;
+use hallstage_solver::problem::model::{COUNT, Model, ParameterId};
+use hallstage_solver::solve::field::blocks::Rows;
+use hallstage_solver::solve::field::fit::FieldFit;
+use hallstage_solver::solve::field::terms;
+use hallstage_solver::solve::robust::Loss;
+use hallstage_solver::solve::{Projection, Solution, Solver};
 use nalgebra::DMatrix;
 use runtime::calibration::Origin;
 use runtime::parameters::FitRecord;

@@ -1,9 +1,6 @@
 //! Fits, judges, plans and diagnoses the calibration of a Hall-sensor array.
 #![forbid(unsafe_code)]
 
-use hall_input::{finding, input, interrupt, progress, statistics};
-use hall_solver::{problem, simulate, solve};
-
 pub mod diagnose;
 pub mod fit;
 pub mod judge;

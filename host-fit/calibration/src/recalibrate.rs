@@ -4,17 +4,17 @@
 //! is written here.
 //!
 //! ```
-//! # use hall_input::input::shipped::STAGE_TOML;
-//! # use hall_input::input::stage::Stage;
+//! # use hallstage_input::shipped::STAGE_TOML;
+//! # use hallstage_input::stage::Stage;
 //! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
-//! # use hall_input::input::log::{self, ReadOptions};
-//! # use hall_input::input::shipped::RUN_GZ;
+//! # use hallstage_input::log::{self, ReadOptions};
+//! # use hallstage_input::shipped::RUN_GZ;
 //! # let reading = log::read_bytes(RUN_GZ, "run30.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
 //! # let dataset = reading.dataset;
-//! # use hall_calibration::fit::{FitSettings, ModelChoice, fit};
+//! # use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 //! # let fit = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto))?;
-//! use hall_calibration::recalibrate::{Known, recalibrate};
-//! use hall_solver::solve::field::update::Change;
+//! use hallstage_calibration::recalibrate::{Known, recalibrate};
+//! use hallstage_solver::solve::field::update::Change;
 //!
 //! let known = fit.field.as_ref().map(Known::of_fit);
 //! let created = "2026-11-23".try_into()?;
@@ -33,20 +33,20 @@ use crate::diagnose::signals::signal_findings;
 use crate::diagnose::temperature::validity;
 use crate::diagnose::{Diagnosis, of_judged};
 use crate::fit::RANGE_MARGIN;
-use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
 use crate::judge::verdict::Predicted;
 use crate::judge::{Decoded, Judgement, Zeros};
-use crate::problem::model::Model;
-use crate::solve::field::carry::ServiceVariance;
-use crate::solve::field::error::FieldFitError;
-use crate::solve::field::fit::FieldFit;
-use crate::solve::field::noise::USUAL_DRIFT_MM;
-use crate::solve::field::parameters::FieldParameters;
-use crate::solve::field::posterior::Posterior;
-use crate::solve::field::terms::COUNT;
-use crate::solve::field::update::{Change, update};
-use crate::solve::field::whiten::Noise;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::solve::field::carry::ServiceVariance;
+use hallstage_solver::solve::field::error::FieldFitError;
+use hallstage_solver::solve::field::fit::FieldFit;
+use hallstage_solver::solve::field::noise::USUAL_DRIFT_MM;
+use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::solve::field::posterior::Posterior;
+use hallstage_solver::solve::field::terms::COUNT;
+use hallstage_solver::solve::field::update::{Change, update};
+use hallstage_solver::solve::field::whiten::Noise;
 use nalgebra::DMatrix;
 use runtime::calibration::Origin;
 use runtime::model::Probes;

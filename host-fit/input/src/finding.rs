@@ -118,7 +118,7 @@ pub struct Finding {
     pub message: String,
     /// The channel: `hall_a`, `cap_1`, `ifm_y1`, `x`, ...
     pub channel: Option<String>,
-    /// The movement, by [`Dataset::movement_name`](crate::input::dataset::Dataset::movement_name).
+    /// The movement, by [`Dataset::movement_name`](crate::dataset::Dataset::movement_name).
     pub movement: Option<String>,
     /// When, us in the log.
     pub t_us: Option<i64>,

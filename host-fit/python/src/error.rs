@@ -1,14 +1,14 @@
 //! The library's errors as Python's exceptions. Those of their own stand in `hallstage._errors`.
 
 use host_fit::calibrate::CalibrateError;
-use host_fit::finding::Finding;
+use host_fit::calibration::recalibrate::RecalibrateError;
+use host_fit::input::finding::Finding;
 use host_fit::input::log::{LogError, LogProblem};
 use host_fit::input::source::SourceProblem;
 use host_fit::input::stage::StageError;
 use host_fit::output::OutputError;
 use host_fit::output::blob_file::BlobFileError;
 use host_fit::output::posterior_file::PosteriorFileError;
-use host_fit::recalibrate::RecalibrateError;
 use pyo3::call::PyCallArgs;
 use pyo3::exceptions::{
     PyFileNotFoundError, PyKeyboardInterrupt, PyOSError, PyRuntimeError, PyValueError,

@@ -1,6 +1,6 @@
 //! Findings, and figures in general, on their way to Python: as JSON, which has a name for each.
 
-use host_fit::finding::Finding;
+use host_fit::input::finding::Finding;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 use serde::Serialize;

@@ -3,10 +3,10 @@
 use crate::arrays::{reals, slice, table};
 use crate::error::wrong;
 use host_fit::input::stage::Range;
-use host_fit::solve::search::cost::CostFunction;
-use host_fit::solve::search::kind::SearchKind;
-use host_fit::solve::search::population::Individual;
-use host_fit::solve::search::run::{Start, StopCriteria, StopReason};
+use host_fit::solver::solve::search::cost::CostFunction;
+use host_fit::solver::solve::search::kind::SearchKind;
+use host_fit::solver::solve::search::population::Individual;
+use host_fit::solver::solve::search::run::{Start, StopCriteria, StopReason};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;

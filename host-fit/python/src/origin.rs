@@ -1,8 +1,8 @@
 //! What a calibration comes from, and what that says of it.
 
 use host_fit::calibrate::{Outcome, Updated};
-use host_fit::diagnose::Diagnosis;
-use host_fit::fit::Fit;
+use host_fit::calibration::diagnose::Diagnosis;
+use host_fit::calibration::fit::Fit;
 use host_fit::input::log::LogReading;
 use host_fit::report::json::Report;
 use host_fit::report::verdict::Subject;

@@ -2,8 +2,8 @@
 
 use crate::error::{internal, of_output, wrong};
 use crate::log::rows_of_three;
-use host_fit::finding::Finding;
 use host_fit::input::dataset::Dataset;
+use host_fit::input::finding::Finding;
 use host_fit::input::log::LogReading;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::output::write_atomically;

@@ -1,11 +1,11 @@
 //! What is known of the parameters of a calibration: values, standard errors, covariance.
 
+use host_fit::calibration::fit::Fit;
+use host_fit::calibration::recalibrate::Known;
 use host_fit::diff::{parameter_changes, pose_difference};
-use host_fit::fit::Fit;
-use host_fit::recalibrate::Known;
 use host_fit::report::json::Report;
 use host_fit::report::parameters::{Parameter, parameters_in, temperature_parameters_in};
-use host_fit::solve::field::terms;
+use host_fit::solver::solve::field::terms;
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;

@@ -1,6 +1,6 @@
 //! Long work without the GIL: Ctrl-C ends it, and a notebook shows how far it is.
 
-use host_fit::{interrupt, progress};
+use host_fit::input::{interrupt, progress};
 use pyo3::prelude::*;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;

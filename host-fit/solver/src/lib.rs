@@ -1,8 +1,5 @@
-//! The estimation problem of a Hall-sensor array, its solvers, and simulated stages.
+//! The estimation problem of a Hall-sensor array and its solvers.
 #![forbid(unsafe_code)]
 
-use hall_input::{input, interrupt, progress, statistics};
-
 pub mod problem;
-pub mod simulate;
 pub mod solve;

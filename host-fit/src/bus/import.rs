@@ -21,12 +21,12 @@ pub use error::ImportError;
 
 use crate::bus::BusAddress;
 use crate::calibrate::arguments::{between, choice};
-use crate::input::log_format::LogFormat;
-use crate::input::stage::Stage;
 use crate::output::Output;
 use bus_log::BusCounts;
 use clap::Args;
 use hal_adapters::can::Layout;
+use hallstage_input::log_format::LogFormat;
+use hallstage_input::stage::Stage;
 use join::{JoinCounts, JoinedRow, join};
 use node_clock::Tick;
 use offset::{Clocks, Offset, Records};

@@ -1,5 +1,5 @@
 use super::*;
-use crate::input::shipped::stage;
+use hallstage_input::shipped::stage;
 
 /// A log of rows at these times, us, by movement.
 fn log(movements: &[&[i64]], header: &str) -> tempfile::NamedTempFile {

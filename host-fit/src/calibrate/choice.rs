@@ -1,17 +1,17 @@
 //! Settings that are chosen by name, on the command line and in Python.
 
-use crate::fit::ModelChoice;
-use crate::input::log::BadRows;
-use crate::judge::Zeros;
 use crate::output::pose_file::PoseFormat;
-use crate::problem::draw::Draw;
-use crate::problem::model::MODELS;
-use crate::simulate::protocol::Protocol;
-use crate::solve::field::update::Change;
-use crate::solve::robust::Loss;
-use crate::solve::search::kind::SearchKind;
-use crate::solve::{Projection, Solver};
 use hal_adapters::can::Layout;
+use hallstage_calibration::fit::ModelChoice;
+use hallstage_calibration::judge::Zeros;
+use hallstage_input::log::BadRows;
+use hallstage_simulate::protocol::Protocol;
+use hallstage_solver::problem::draw::Draw;
+use hallstage_solver::problem::model::MODELS;
+use hallstage_solver::solve::field::update::Change;
+use hallstage_solver::solve::robust::Loss;
+use hallstage_solver::solve::search::kind::SearchKind;
+use hallstage_solver::solve::{Projection, Solver};
 
 /// A type whose values are chosen by name.
 pub trait Choice: Clone + Send + Sync + 'static {

@@ -1,21 +1,21 @@
 //! A blob judged on logs with reference.
 
 use super::warnings_of;
-use crate::diagnose::{self, Diagnosis};
-use crate::finding::{self, Severity};
-use crate::fit::of_counts;
-use crate::input::log::{LogError, LogReading, LogRow, ReadOptions, ReferenceUse};
-use crate::input::stage::Stage;
-use crate::judge::statistics::PoseError;
-use crate::judge::{Decoded, Judge, Judgement, Zeros, error};
-use crate::problem::model::Model;
-use crate::problem::parameters::Parameters;
-use crate::recalibrate::Known;
 use crate::report::errors::RowErrors;
 use crate::report::json::{Circumstances, Report, of_eval};
 use crate::report::page::Errors;
 use crate::report::verdict::{End, Subject};
-use crate::solve::field::parameters::FieldParameters;
+use hallstage_calibration::diagnose::{self, Diagnosis};
+use hallstage_calibration::fit::of_counts;
+use hallstage_calibration::judge::statistics::PoseError;
+use hallstage_calibration::judge::{Decoded, Judge, Judgement, Zeros, error};
+use hallstage_calibration::recalibrate::Known;
+use hallstage_input::finding::{self, Severity};
+use hallstage_input::log::{LogError, LogReading, LogRow, ReadOptions, ReferenceUse};
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::problem::parameters::Parameters;
+use hallstage_solver::solve::field::parameters::FieldParameters;
 use runtime::{ModelKind, ParameterSet};
 
 /// The most rows that the diagnosis looks at: three minutes, in less than 64 MB with all else.

@@ -1,18 +1,20 @@
 //! A fit with the decisions around it.
 
 use super::{Limits, failure};
-use crate::diagnose::of_fit as of_residuals;
-use crate::diagnose::{self, Diagnosis};
-use crate::finding::{self, Severity};
-use crate::fit::{Fit, FitError, FitSettings, cross_validate, fit_compensated, fit_log};
-use crate::input::dataset::Dataset;
-use crate::input::log::{LogError, LogReading, ReadOptions};
-use crate::input::stage::Stage;
-use crate::interrupt;
-use crate::recalibrate::Known;
 use crate::report::json::{Choice, Circumstances, Report, of_cross_validation, of_fit};
 use crate::report::verdict::{End, Subject};
-use crate::solve::{Projection, SolveError, Solver};
+use hallstage_calibration::diagnose::of_fit as of_residuals;
+use hallstage_calibration::diagnose::{self, Diagnosis};
+use hallstage_calibration::fit::{
+    Fit, FitError, FitSettings, cross_validate, fit_compensated, fit_log,
+};
+use hallstage_calibration::recalibrate::Known;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::{self, Severity};
+use hallstage_input::interrupt;
+use hallstage_input::log::{LogError, LogReading, ReadOptions};
+use hallstage_input::stage::Stage;
+use hallstage_solver::solve::{Projection, SolveError, Solver};
 
 /// What a fit is asked for.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! Largest rms errors: `--limit x=1.5um,y=1um,rz=4urad`.
 
-use crate::input::log::layout::Kind;
+use hallstage_input::log::layout::Kind;
 use std::str::FromStr;
 
 /// Name, unit in messages and kind of unit of an axis.

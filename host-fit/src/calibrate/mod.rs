@@ -17,14 +17,14 @@ pub use limit::Limits;
 pub use recalibration::Updated;
 pub use settings::{Mismatch, loss_of};
 
-use crate::diagnose::Diagnosis;
-use crate::finding::{self, Code, Finding, Severity};
-use crate::fit::{Fit, FitError};
-use crate::input::log::LogReading;
-use crate::input::stage::Stage;
-use crate::judge::identify::FitFailure;
 use crate::report::errors::errors;
 use crate::report::trusted::trusted;
+use hallstage_calibration::diagnose::Diagnosis;
+use hallstage_calibration::fit::{Fit, FitError};
+use hallstage_calibration::judge::identify::FitFailure;
+use hallstage_input::finding::{self, Code, Finding, Severity};
+use hallstage_input::log::LogReading;
+use hallstage_input::stage::Stage;
 use runtime::ParameterSet;
 use serde_json::{Value, json};
 

@@ -1,15 +1,15 @@
 //! What is said of a calibration that was brought up to date.
 
 use super::warnings_of;
-use crate::finding::{Severity, messages};
-use crate::fit::of_undecoded;
-use crate::input::log::LogReading;
-use crate::input::stage::Stage;
-use crate::recalibrate::{Known, RecalibrateError, Recalibration, recalibrate};
 use crate::report::errors::errors;
 use crate::report::field::by_axis;
 use crate::report::verdict::{End, Subject};
-use crate::solve::field::update::Change;
+use hallstage_calibration::fit::of_undecoded;
+use hallstage_calibration::recalibrate::{Known, RecalibrateError, Recalibration, recalibrate};
+use hallstage_input::finding::{Severity, messages};
+use hallstage_input::log::LogReading;
+use hallstage_input::stage::Stage;
+use hallstage_solver::solve::field::update::Change;
 use runtime::ParameterSet;
 use runtime::parameters::Text;
 use serde_json::{Value, json};

@@ -1,9 +1,9 @@
 //! Which settings of a fit go together: only least squares has weights, and the field model has one way to
 //! be fitted.
 
-use crate::fit::ModelChoice;
-use crate::solve::robust::Loss;
-use crate::solve::{Projection, Solver};
+use hallstage_calibration::fit::ModelChoice;
+use hallstage_solver::solve::robust::Loss;
+use hallstage_solver::solve::{Projection, Solver};
 use runtime::ModelKind;
 
 /// A setting that does not go with the others.

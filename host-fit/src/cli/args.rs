@@ -3,10 +3,10 @@
 use crate::calibrate::arguments::between;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::input::log::{self, LogReading, ReadOptions};
-use crate::input::stage::Stage;
 use crate::output::Outputs;
 use clap::Args;
+use hallstage_input::log::{self, LogReading, ReadOptions};
+use hallstage_input::stage::Stage;
 use runtime::parameters::Text;
 use std::path::{Path, PathBuf};
 

@@ -5,19 +5,19 @@ use super::report::{Report, finish};
 use crate::calibrate::{check_refusal, checked, warnings_of};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::diagnose::{self, Diagnosis};
-use crate::finding::{Finding, Severity};
-use crate::fit::{FitSettings, ModelChoice, fit_log};
-use crate::input::log::ReadOptions;
-use crate::interrupt;
-use crate::judge::Zeros;
 use crate::output::Outputs;
 use crate::report::json::{Circumstances, of_eval};
 use crate::report::page::Errors;
 use crate::report::table::tables;
 use crate::report::verdict::{End, Subject};
-use crate::solve::{Projection, SolverOptions};
 use clap::Args;
+use hallstage_calibration::diagnose::{self, Diagnosis};
+use hallstage_calibration::fit::{FitSettings, ModelChoice, fit_log};
+use hallstage_calibration::judge::Zeros;
+use hallstage_input::finding::{Finding, Severity};
+use hallstage_input::interrupt;
+use hallstage_input::log::ReadOptions;
+use hallstage_solver::solve::{Projection, SolverOptions};
 use std::time::Instant;
 
 /// Arguments of `check`.

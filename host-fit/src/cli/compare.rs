@@ -6,12 +6,12 @@ use crate::cli::terminal;
 use crate::compare::curves::{Course, history_csv, plot, runs_csv};
 use crate::compare::table::table;
 use crate::compare::{Comparison, Run, compare};
-use crate::input::log::ReadOptions;
-use crate::interrupt;
 use crate::output::{make_folder, write_atomically};
-use crate::progress::Progress;
-use crate::solve::Projection;
 use clap::Args;
+use hallstage_input::interrupt;
+use hallstage_input::log::ReadOptions;
+use hallstage_input::progress::Progress;
+use hallstage_solver::solve::Projection;
 use std::path::{Path, PathBuf};
 
 const TABLE: &str = "table.md";

@@ -14,14 +14,14 @@
 use crate::bus::import::ImportError;
 use crate::bus::update::{UpdateError, UpdateRunError};
 use crate::calibrate::{CalibrateError, Mismatch, NOT_WRITTEN};
-use crate::fit::FitError;
-use crate::input::log::{LogError, LogProblem};
-use crate::input::source::SourceProblem::Interrupted;
-use crate::interrupt;
 use crate::output::export::ExportError;
-use crate::plan::PlanError;
-use crate::recalibrate::RecalibrateError;
-use crate::simulate::recording::RecordError;
+use hallstage_calibration::fit::FitError;
+use hallstage_calibration::plan::PlanError;
+use hallstage_calibration::recalibrate::RecalibrateError;
+use hallstage_input::interrupt;
+use hallstage_input::log::{LogError, LogProblem};
+use hallstage_input::source::SourceProblem::Interrupted;
+use hallstage_simulate::recording::RecordError;
 use std::error::Error;
 use std::fmt::{self, Display, Formatter};
 

@@ -6,10 +6,10 @@ use crate::calibrate::arguments::choice;
 use crate::calibrate::{EvalOrder, Evaluation};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::input::log;
-use crate::judge::Zeros;
 use crate::output::{Outputs, blob_file, posterior_file};
 use clap::Args;
+use hallstage_calibration::judge::Zeros;
+use hallstage_input::log;
 use std::path::PathBuf;
 use std::time::Instant;
 

@@ -3,8 +3,8 @@
 use crate::bus::import::{self, ImportSettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::interrupt;
 use crate::report::table::{as_text, tables};
+use hallstage_input::interrupt;
 use std::path::PathBuf;
 
 /// Joins a record of the bus and a reference, and shows how it went.

@@ -2,9 +2,9 @@
 
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::input::draft::draft;
 use crate::output::{is_standard, write_atomically};
 use clap::Args;
+use hallstage_input::draft::draft;
 use std::path::PathBuf;
 
 /// Arguments of `init`.

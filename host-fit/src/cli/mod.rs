@@ -35,12 +35,12 @@ use crate::bus::live::LiveSettings;
 use crate::bus::replay::ReplaySettings;
 use crate::calibrate::other_scales;
 use crate::cli::error::HostError;
-use crate::input::stage::Stage;
 use crate::output::{
     FileIdentity, blob_file, check_writable, is_standard, is_standard_output, posterior_file,
 };
-use crate::progress;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use hallstage_input::progress;
+use hallstage_input::stage::Stage;
 use runtime::ParameterSet;
 use std::ffi::OsString;
 use std::fmt::Write;

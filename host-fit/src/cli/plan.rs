@@ -5,12 +5,12 @@ use crate::calibrate::arguments::between;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
-use crate::plan::temperature::{COLD_S, protocol};
-use crate::plan::{PERIODS_MAX, SECONDS_MAX, plan};
 use crate::report::plan::{figures, steps, tables};
 use crate::report::table::as_text;
-use crate::simulate::plan_file;
 use clap::Args;
+use hallstage_calibration::plan::temperature::{COLD_S, protocol};
+use hallstage_calibration::plan::{PERIODS_MAX, SECONDS_MAX, plan};
+use hallstage_simulate::plan_file;
 use std::path::PathBuf;
 
 fn seconds(text: &str) -> Result<f64, String> {

@@ -3,7 +3,7 @@
 use crate::bus::replay::{self, ReplaySettings};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::interrupt;
+use hallstage_input::interrupt;
 
 /// Plays a log onto a bus and says how it went.
 pub(super) fn run(args: &ReplaySettings) -> Result<(), HostError> {

@@ -4,14 +4,14 @@ use super::args::{Logs, blob_text};
 use crate::calibrate::warnings_of;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
-use crate::input::log::LogReading;
-use crate::input::stage::Stage;
 use crate::output::{Outputs, make_folder};
 use crate::report::page::{Source, facts};
 use crate::report::provenance::Provenance;
 use crate::report::table::Table;
 use crate::report::verdict::{Subject, Summary};
 use clap::Args;
+use hallstage_input::log::LogReading;
+use hallstage_input::stage::Stage;
 use runtime::parameters::Text;
 use std::path::PathBuf;
 

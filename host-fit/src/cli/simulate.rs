@@ -5,13 +5,13 @@ use crate::calibrate::arguments::{between, choice};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
-use crate::simulate::assembly::Magnets;
-use crate::simulate::log_text::{log_csv, truth_csv};
-use crate::simulate::plan_file;
-use crate::simulate::protocol::{Protocol, Run};
-use crate::simulate::recording::record_stage;
 use clap::Args;
 use flate2::{Compression, write::GzEncoder};
+use hallstage_simulate::assembly::Magnets;
+use hallstage_simulate::log_text::{log_csv, truth_csv};
+use hallstage_simulate::plan_file;
+use hallstage_simulate::protocol::{Protocol, Run};
+use hallstage_simulate::recording::record_stage;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

@@ -4,9 +4,9 @@
 //! Nothing that a file holds moves the cursor or begins a line here: see [`plain`].
 
 use crate::cli::error::HostError;
-use crate::finding::{Finding, Severity};
 use crate::report::table::{Table, as_text, plain, with_signs};
 use anstyle::{AnsiColor, Style};
+use hallstage_input::finding::{Finding, Severity};
 use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};

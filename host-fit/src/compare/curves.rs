@@ -4,9 +4,9 @@ use super::table::{Spread, by_solver};
 use super::{ARRIVED, EXACT, Run};
 use crate::report::axis::Axis;
 use crate::report::chart::{Chart, Mark, Panel, Scale, Tone};
-use crate::solve::Projection;
-use crate::solve::search::kind::SearchKind;
-use crate::solve::search::run::Checkpoint;
+use hallstage_solver::solve::Projection;
+use hallstage_solver::solve::search::kind::SearchKind;
+use hallstage_solver::solve::search::run::Checkpoint;
 use std::fmt::Write;
 
 /// Points of a plotted curve.

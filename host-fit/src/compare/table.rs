@@ -1,7 +1,7 @@
 //! The table of a comparison: medians and ranges over the seeds.
 
 use super::{ARRIVED, EXACT, LEAST_SQUARES, Run};
-use crate::solve::search::kind::SearchKind;
+use hallstage_solver::solve::search::kind::SearchKind;
 use std::fmt::Write;
 
 /// Median, smallest and largest of some numbers.

@@ -1,7 +1,7 @@
 use super::table::{Spread, table};
 use super::*;
-use crate::input::log::{ReadOptions, read_bytes};
-use crate::input::shipped::{self, LOG_GZ};
+use hallstage_input::log::{ReadOptions, read_bytes};
+use hallstage_input::shipped::{self, LOG_GZ};
 
 #[test]
 fn an_interrupt_ends_a_comparison_with_what_there_is() {

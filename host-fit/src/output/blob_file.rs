@@ -1,7 +1,7 @@
 //! The parameter blob as a file.
 
-use crate::input::source::{SourceError, read_start};
 use crate::output::{OutputError, OutputProblem, write_atomically};
+use hallstage_input::source::{SourceError, read_start};
 use runtime::blob::MAX_BYTES;
 use runtime::{BlobError, ParameterSet};
 use std::path::{Path, PathBuf};

@@ -15,12 +15,12 @@
 //! | | | layouts 2 and 3: the faults of the log that the calibration is without, a line each, in UTF-8 |
 //! | the end | 32 | SHA-256 of everything before it |
 
-use crate::input::source::{SourceError, SourceProblem, read_whole};
 use crate::output::file_identity::is_stream;
 use crate::output::{OutputError, Outputs, blob_file, is_standard};
-use crate::recalibrate::Known;
-use crate::solve::field::terms::COUNT;
-use crate::solve::field::whiten::Noise;
+use hallstage_calibration::recalibrate::Known;
+use hallstage_input::source::{SourceError, SourceProblem, read_whole};
+use hallstage_solver::solve::field::terms::COUNT;
+use hallstage_solver::solve::field::whiten::Noise;
 use nalgebra::{Cholesky, DMatrix};
 use runtime::ParameterSet;
 use sha2::{Digest, Sha256};

@@ -1,13 +1,13 @@
 //! Errors of the pose in a report: as JSON and as tables, over all rows and log by log.
 
 use super::table::{Table, file_name};
-use crate::fit::calibration;
-use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
-use crate::judge::statistics::{ErrorSums, PoseError};
-use crate::judge::{Decoded, Judgement, Zeros};
-use crate::problem::model::Model;
-use crate::problem::parameters::Parameters;
+use hallstage_calibration::fit::calibration;
+use hallstage_calibration::judge::statistics::{ErrorSums, PoseError};
+use hallstage_calibration::judge::{Decoded, Judgement, Zeros};
+use hallstage_input::dataset::Dataset;
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::problem::parameters::Parameters;
 use runtime::ModelKind;
 use runtime::calibration::Origin;
 use runtime::frame::MISSING_CODE;

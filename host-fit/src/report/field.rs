@@ -1,7 +1,7 @@
 //! What a fit of the field model says of itself: noise, uncertainty of the pose, correlations.
 
-use crate::solve::field::fit::FieldFit;
-use crate::solve::field::posterior::PoseUncertainty;
+use hallstage_solver::solve::field::fit::FieldFit;
+use hallstage_solver::solve::field::posterior::PoseUncertainty;
 use serde_json::{Value, json};
 
 /// Pairs and directions that are reported.

@@ -5,8 +5,8 @@ use super::axis::Axis;
 use super::chart::{Chart, Mark, Panel, Scale, Tone};
 use super::errors::RowErrors;
 use super::series::{Column, band, columns};
-use crate::input::dataset::{Dataset, Row};
-use crate::judge::spectrum::{Spectrum, windows};
+use hallstage_calibration::judge::spectrum::{Spectrum, windows};
+use hallstage_input::dataset::{Dataset, Row};
 use runtime::frame::MISSING_CODE;
 use std::ops::Range;
 

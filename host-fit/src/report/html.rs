@@ -4,7 +4,7 @@
 use super::chart::Chart;
 use super::table::{Table, with_signs};
 use super::verdict::Summary;
-use crate::finding::{Code, Finding, Severity};
+use hallstage_input::finding::{Code, Finding, Severity};
 use minijinja::value::Serde;
 use minijinja::{Environment, Error, UndefinedBehavior};
 use serde::Serialize;

@@ -1,15 +1,5 @@
 //! What `fit` and `eval` report, as programs read it.
 
-use crate::diagnose::Diagnosis;
-use crate::finding::Finding;
-use crate::fit::{CrossValidation, Fit};
-use crate::input::dataset::{Dataset, Movement};
-use crate::input::log::LogReading;
-use crate::input::stage::Stage;
-use crate::judge::verdict::{Predicted, Verdict};
-use crate::judge::{Judgement, Zeros};
-use crate::problem::model::Model;
-use crate::problem::parameters::Parameters;
 use crate::report::errors::{RowErrors, by_log, by_temperature, errors};
 use crate::report::field::{self, by_axis};
 use crate::report::parameters::{
@@ -17,6 +7,16 @@ use crate::report::parameters::{
 };
 use crate::report::table::{Table, tables};
 use crate::report::trusted::trusted;
+use hallstage_calibration::diagnose::Diagnosis;
+use hallstage_calibration::fit::{CrossValidation, Fit};
+use hallstage_calibration::judge::verdict::{Predicted, Verdict};
+use hallstage_calibration::judge::{Judgement, Zeros};
+use hallstage_input::dataset::{Dataset, Movement};
+use hallstage_input::finding::Finding;
+use hallstage_input::log::LogReading;
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::problem::parameters::Parameters;
 use runtime::ParameterSet;
 use serde::Serialize;
 use serde_json::{Map, Value, json};

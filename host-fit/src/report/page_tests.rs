@@ -1,14 +1,14 @@
 use super::*;
-use crate::diagnose::Diagnosis;
-use crate::finding::{Code, Finding};
-use crate::fit::{FitSettings, ModelChoice, fit};
-use crate::input::dataset::{Movement, Row};
-use crate::input::log::{ReadOptions, read_bytes};
-use crate::input::shipped::{LOG_GZ, stage};
-use crate::judge::Zeros;
-use crate::judge::verdict::Verdict;
 use crate::report::json::{Circumstances, of_eval};
 use crate::report::verdict::End;
+use hallstage_calibration::diagnose::Diagnosis;
+use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
+use hallstage_calibration::judge::Zeros;
+use hallstage_calibration::judge::verdict::Verdict;
+use hallstage_input::dataset::{Movement, Row};
+use hallstage_input::finding::{Code, Finding};
+use hallstage_input::log::{ReadOptions, read_bytes};
+use hallstage_input::shipped::{LOG_GZ, stage};
 
 /// Every 20th row of the shipped log, each movement as often as `copies` says.
 fn shipped(stage: &Stage, copies: usize) -> Dataset {

@@ -1,12 +1,12 @@
 //! Parameters by name in JSON.
 
-use crate::input::stage::{Stage, paper_signs};
-use crate::problem::model::{COUNT, Model, ParameterId};
-use crate::problem::parameters::Parameters;
-use crate::problem::terms::shown;
 use crate::report::table::{Table, number, with_error};
-use crate::solve::field::parameters::values_of;
-use crate::solve::field::terms::{self, BEYOND_MODEL_31, PER_PROBE};
+use hallstage_input::stage::{Stage, paper_signs};
+use hallstage_solver::problem::model::{COUNT, Model, ParameterId};
+use hallstage_solver::problem::parameters::Parameters;
+use hallstage_solver::problem::terms::shown;
+use hallstage_solver::solve::field::parameters::values_of;
+use hallstage_solver::solve::field::terms::{self, BEYOND_MODEL_31, PER_PROBE};
 use runtime::{ModelKind, ParameterSet};
 use serde::Serialize;
 use serde_json::{Value, json};

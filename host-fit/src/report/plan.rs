@@ -2,10 +2,10 @@
 
 use super::parameters::by_probe;
 use super::table::{Table, number};
-use crate::input::stage::{AXES, Stage};
-use crate::plan::Plan;
-use crate::plan::temperature::WarmLog;
-use crate::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
+use hallstage_calibration::plan::Plan;
+use hallstage_calibration::plan::temperature::WarmLog;
+use hallstage_input::stage::{AXES, Stage};
+use hallstage_solver::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
 use serde_json::{Map, Value, json};
 
 /// How many of the least determined parameters are named.
@@ -15,7 +15,7 @@ const NAMED: usize = 5;
 pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Value {
     let run = &plan.run;
     let axis =
-        |(k, ((key, _), motion)): (usize, (&(&str, _), &crate::input::stage::AxisMotion))| {
+        |(k, ((key, _), motion)): (usize, (&(&str, _), &hallstage_input::stage::AxisMotion))| {
             let [peak_speed, peak_acceleration] = run.peaks(k);
             json!({
                 "axis": key,

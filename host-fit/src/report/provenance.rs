@@ -1,7 +1,7 @@
 //! Where the figures of a report come from: command, versions, inputs, seed.
 
 use super::table::{Table, file_name};
-use crate::input::dataset::Dataset;
+use hallstage_input::dataset::Dataset;
 use sha2::{Digest, Sha256};
 use std::ffi::{OsStr, OsString};
 use std::fmt::Write;
@@ -106,8 +106,8 @@ pub fn hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::log::{ReadOptions, read_bytes};
-    use crate::input::shipped::{self, LOG_GZ};
+    use hallstage_input::log::{ReadOptions, read_bytes};
+    use hallstage_input::shipped::{self, LOG_GZ};
 
     #[test]
     fn the_command_can_be_given_again_as_it_stands() {

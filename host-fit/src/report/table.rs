@@ -1,7 +1,7 @@
 //! A result as tables: of every figure its name, its value and its unit. The terminal and the pages
 //! show the same tables, and JSON has the same figures.
 
-use crate::problem::terms::shown;
+use hallstage_solver::problem::terms::shown;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::borrow::Cow;

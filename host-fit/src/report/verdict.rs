@@ -1,10 +1,10 @@
 //! What a person reads first: whether the calibration can be used, its errors by axis, what to do next.
 
 use super::table::{Table, as_text};
-use crate::diagnose::Diagnosis;
-use crate::finding::Severity;
-use crate::judge::statistics::PoseError;
-use crate::judge::verdict::{LIMITED_MAX, Predicted, Validity, Verdict};
+use hallstage_calibration::diagnose::Diagnosis;
+use hallstage_calibration::judge::statistics::PoseError;
+use hallstage_calibration::judge::verdict::{LIMITED_MAX, Predicted, Validity, Verdict};
+use hallstage_input::finding::Severity;
 use serde::Serialize;
 
 /// How a run ended.
@@ -214,8 +214,8 @@ fn next(of: &Subject, verdict: Option<Verdict>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::finding::{Code, Finding};
-    use crate::judge::statistics::AxisError;
+    use hallstage_calibration::judge::statistics::AxisError;
+    use hallstage_input::finding::{Code, Finding};
 
     const PREDICTED: Predicted = Predicted {
         rms: [1.2e-6, 0.5e-6, 2.4e-6],

@@ -3,8 +3,8 @@
 
 use super::bank::UNDECIDED;
 use super::slopes::{CHANNELS, title};
-use crate::finding::Code;
-use crate::input::stage::Stage;
+use hallstage_input::finding::Code;
+use hallstage_input::stage::Stage;
 use nalgebra::Matrix3;
 use runtime::capacitive::ProbePositions;
 
@@ -28,7 +28,7 @@ impl Change {
 #[derive(Clone, Debug)]
 pub(super) struct Mistake {
     pub(super) code: Code,
-    /// The channels, as in [`Finding::channel`](crate::finding::Finding::channel).
+    /// The channels, as in [`Finding::channel`](hallstage_input::finding::Finding::channel).
     pub(super) channel: String,
     /// What sets the log right, as the end of "it fits if ...", but for the value.
     pub(super) what: String,

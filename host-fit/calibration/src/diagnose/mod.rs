@@ -12,18 +12,18 @@
 //! | [`temperature`] | k and h, a drift of temperature, how far a calibration is good |
 //!
 //! ```
-//! # use hall_input::input::shipped::STAGE_TOML;
-//! # use hall_input::input::stage::Stage;
+//! # use hallstage_input::shipped::STAGE_TOML;
+//! # use hallstage_input::stage::Stage;
 //! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
-//! # use hall_input::input::log::{self, ReadOptions};
-//! # use hall_input::input::shipped::RUN_GZ;
+//! # use hallstage_input::log::{self, ReadOptions};
+//! # use hallstage_input::shipped::RUN_GZ;
 //! # let reading = log::read_bytes(RUN_GZ, "run30.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
 //! # let dataset = reading.dataset;
-//! # use hall_calibration::fit::{FitSettings, ModelChoice, fit};
+//! # use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 //! # let fit = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto))?;
-//! use hall_calibration::judge::verdict::Verdict;
+//! use hallstage_calibration::judge::verdict::Verdict;
 //!
-//! let diagnosis = hall_calibration::diagnose::of_log(&dataset, &stage, Ok(&fit));
+//! let diagnosis = hallstage_calibration::diagnose::of_log(&dataset, &stage, Ok(&fit));
 //! assert!(diagnosis.findings.is_empty());
 //! assert_eq!(diagnosis.verdict, Some(Verdict::Good));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -40,15 +40,15 @@ pub mod structure;
 mod structure_tests;
 pub mod temperature;
 
-use crate::finding::{Code, Finding, Severity, in_order, is_explained};
 use crate::fit::{Fit, FitError, Repair};
-use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
 use crate::judge::identify::FitFailure;
 use crate::judge::verdict::{GOOD_MAX, LIMITED_MAX, Predicted, Validity, Verdict};
-use crate::problem::parameters::Parameters;
-use crate::solve::field::parameters::FieldParameters;
 use bank::Fitted;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::{Code, Finding, Severity, in_order, is_explained};
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::parameters::Parameters;
+use hallstage_solver::solve::field::parameters::FieldParameters;
 use runtime::{ModelKind, ParameterSet};
 use std::borrow::Cow;
 

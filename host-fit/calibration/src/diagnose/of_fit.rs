@@ -1,12 +1,12 @@
 //! What a fit says of itself, as findings.
 
 use super::bank;
-use crate::finding::{Code, Finding, Severity};
 use crate::fit::Fit;
-use crate::input::dataset::Dataset;
 use crate::judge::identify::check_described;
 use crate::judge::statistics;
 use crate::judge::verdict::Predicted;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::{Code, Finding, Severity};
 use runtime::ModelKind;
 
 /// A fault in this part of the rows, or one that makes noise or a period so much larger, is worth a warning, ...

@@ -1,9 +1,9 @@
 //! Poses beyond the range of a calibration, and motion that is not the declared one.
 
-use crate::finding::{Code, Finding};
 use crate::fit::{Fit, RANGE_MARGIN};
-use crate::input::dataset::{Dataset, Row};
-use crate::input::stage::{AXES, Stage};
+use hallstage_input::dataset::{Dataset, Row};
+use hallstage_input::finding::{Code, Finding};
+use hallstage_input::stage::{AXES, Stage};
 use runtime::ParameterSet;
 
 /// An axis that moves by more than this times its declared range, or less than that, has another scale or

@@ -10,15 +10,15 @@
 use super::bank::{MEANS_MAX, NOTHING, RARITY, ROUNDS, UNDECIDED};
 use super::mistakes::{Change, Mistake, cure, mistakes};
 use super::range::SPANS;
-use crate::finding::{Code, Finding, Severity};
-use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
 use crate::judge::identify::check_motion;
 use crate::judge::lag::ALIKE_S;
-use crate::problem::model::Model;
-use crate::problem::parameters::Parameters;
-use crate::solve::field::blocks::{FieldRow, Rows};
-use crate::solve::field::parameters::FALL_PER_M;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::problem::parameters::Parameters;
+use hallstage_solver::solve::field::blocks::{FieldRow, Rows};
+use hallstage_solver::solve::field::parameters::FALL_PER_M;
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 use runtime::ModelKind;
 

@@ -1,13 +1,13 @@
 //! Every mistake is named by itself, or beside what a log cannot tell it from.
 
 use super::structure::structure;
-use crate::finding::{Code, Severity};
-use crate::input::shipped::STAGE_TOML;
-use crate::input::stage::Stage;
-use crate::simulate::assembly::Assembly;
-use crate::simulate::protocol::Protocol;
-use crate::simulate::recording::{Recording, Sample, record};
-use crate::simulate::sensors::SensorErrors;
+use hallstage_input::finding::{Code, Severity};
+use hallstage_input::shipped::STAGE_TOML;
+use hallstage_input::stage::Stage;
+use hallstage_simulate::assembly::Assembly;
+use hallstage_simulate::protocol::Protocol;
+use hallstage_simulate::recording::{Recording, Sample, record};
+use hallstage_simulate::sensors::SensorErrors;
 
 fn stage(from: &str, to: &str) -> Stage {
     assert!(STAGE_TOML.contains(from));

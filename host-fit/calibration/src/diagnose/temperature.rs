@@ -2,15 +2,15 @@
 //! temperature of its log it is good, and when to zero again.
 
 use super::bank::{declared_service, severity};
-use crate::finding::{Code, Finding, Severity};
 use crate::fit::Fit;
-use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
 use crate::judge::statistics::white_noise;
 use crate::judge::verdict::Validity;
-use crate::solve::field::parameters::FieldParameters;
-use crate::solve::field::posterior::covariance_at;
-use crate::solve::field::terms::COUNT;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::stage::Stage;
+use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::solve::field::posterior::covariance_at;
+use hallstage_solver::solve::field::terms::COUNT;
 use nalgebra::DMatrix;
 use runtime::Temperature;
 use runtime::real::Real;
@@ -139,7 +139,7 @@ pub(super) fn missing<T: Real>(temperature: &Temperature<T>, dataset: &Dataset) 
 
 /// rms distance of a sensor's temperature from T0 over the log, K.
 fn drift_k(dataset: &Dataset, temperature: &Temperature<f64>, sensor: usize) -> f64 {
-    let change_k = |row: &crate::input::dataset::Row| {
+    let change_k = |row: &hallstage_input::dataset::Row| {
         temperature.changes_k(row.frame.temperature_mc())[sensor]
     };
     let squares: f64 = dataset
@@ -152,7 +152,7 @@ fn drift_k(dataset: &Dataset, temperature: &Temperature<f64>, sensor: usize) -> 
 }
 
 /// How far from the temperature of its calibration a stage stays good; `covariance` is a
-/// [`Posterior::covariance`](crate::solve::field::posterior::Posterior::covariance).
+/// [`Posterior::covariance`](hallstage_solver::solve::field::posterior::Posterior::covariance).
 pub fn validity(
     stage: &Stage,
     parameters: &FieldParameters,
@@ -207,10 +207,10 @@ pub fn rezero(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::dataset::{LoggedFrame, Movement, Row};
-    use crate::input::shipped::STAGE_TOML;
     use crate::judge::verdict::{GOOD_MAX, Predicted};
-    use crate::problem::parameters::Parameters;
+    use hallstage_input::dataset::{LoggedFrame, Movement, Row};
+    use hallstage_input::shipped::STAGE_TOML;
+    use hallstage_solver::problem::parameters::Parameters;
     use runtime::RawFrame;
     use runtime::frame::MISSING_CODE;
 

@@ -2,12 +2,12 @@
 
 use super::warning::{is_count, of_counts, of_rest};
 use super::{Fit, FitError, FitSettings, RANGE_MARGIN, fit};
-use crate::input::dataset::Dataset;
-use crate::input::log::{LogError, LogReading};
-use crate::input::stage::Stage;
-use crate::interrupt;
 use crate::judge::{Judge, Zeros, error, medians};
-use crate::solve::robust::Loss;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::interrupt;
+use hallstage_input::log::{LogError, LogReading};
+use hallstage_input::stage::Stage;
+use hallstage_solver::solve::robust::Loss;
 use runtime::calibration::Origin;
 use runtime::parameters::FitRecord;
 

@@ -1,9 +1,9 @@
 //! The calibration that fitted parameters make.
 
-use crate::input::dataset::Row;
-use crate::input::stage::Stage;
-use crate::problem::model::Model;
-use crate::problem::parameters::Parameters;
+use hallstage_input::dataset::Row;
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::problem::parameters::Parameters;
 use runtime::model::Probes;
 use runtime::{Calibration, Temperature};
 

@@ -2,9 +2,9 @@
 //! read later by as much, and so on until nothing of it is left.
 
 use super::{Fit, FitError, FitSettings, ModelChoice, fit};
-use crate::input::dataset::{Dataset, Movement, Row};
-use crate::input::stage::Stage;
-use crate::problem::model::Model;
+use hallstage_input::dataset::{Dataset, Movement, Row};
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::model::Model;
 use runtime::ModelKind;
 
 /// Rounds of fit and compensation: the first leaves a hundredth of a lag of several rows.
@@ -132,7 +132,7 @@ fn between(four: &[Row], t_us: f64) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::dataset::LoggedFrame;
+    use hallstage_input::dataset::LoggedFrame;
     use runtime::RawFrame;
 
     /// A pose of third order in time, s.

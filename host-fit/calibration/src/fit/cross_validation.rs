@@ -1,11 +1,11 @@
 //! Cross-validation: how well a fit predicts rows that it has not seen.
 
 use super::{Fit, FitError, FitSettings, Job};
-use crate::input::dataset::{Dataset, Movement};
-use crate::input::stage::Stage;
 use crate::judge::statistics::PoseError;
 use crate::judge::{Decoded, Zeros};
-use crate::progress::Progress;
+use hallstage_input::dataset::{Dataset, Movement};
+use hallstage_input::progress::Progress;
+use hallstage_input::stage::Stage;
 
 /// Groups that rows are left out by.
 const GROUPS: usize = 5;

@@ -2,14 +2,14 @@
 //! calibration at the noise floor.
 
 use crate::fit::{FitSettings, ModelChoice, fit};
-use crate::input::shipped::STAGE_TOML;
-use crate::input::stage::Stage;
-use crate::problem::model::Model;
-use crate::simulate::assembly::Assembly;
-use crate::simulate::protocol::Protocol;
-use crate::simulate::recording::record;
-use crate::simulate::sensors::SensorErrors;
-use crate::solve::field::parameters::FieldParameters;
+use hallstage_input::shipped::STAGE_TOML;
+use hallstage_input::stage::Stage;
+use hallstage_simulate::assembly::Assembly;
+use hallstage_simulate::protocol::Protocol;
+use hallstage_simulate::recording::record;
+use hallstage_simulate::sensors::SensorErrors;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::solve::field::parameters::FieldParameters;
 use runtime::{ModelKind, ParameterSet, VerticalPose};
 
 const SEED: u64 = 2;

@@ -1,12 +1,12 @@
 //! A fit with the faults of its log taken off.
 
 use super::{Fit, FitError};
-use crate::input::log::{LogError, LogReading};
-use crate::input::stage::Stage;
 use crate::judge::verdict::Predicted;
 use crate::judge::{Decoded, Zeros};
-use crate::solve::field::parameters::FieldParameters;
-use crate::solve::field::posterior::Posterior;
+use hallstage_input::log::{LogError, LogReading};
+use hallstage_input::stage::Stage;
+use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::solve::field::posterior::Posterior;
 use nalgebra::DMatrix;
 use runtime::calibration::Origin;
 use runtime::model::Probes;

@@ -1,9 +1,9 @@
 //! What the user of a fit chooses.
 
-use crate::problem::draw::Draw;
-use crate::problem::model::Model;
-use crate::solve::robust::Loss;
-use crate::solve::{Projection, Solver, SolverOptions};
+use hallstage_solver::problem::draw::Draw;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::solve::robust::Loss;
+use hallstage_solver::solve::{Projection, Solver, SolverOptions};
 use runtime::parameters::Text;
 
 /// Which model is fitted.

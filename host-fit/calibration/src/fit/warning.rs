@@ -1,14 +1,14 @@
 //! What a user should know of a fit that is good nevertheless.
 
-use crate::finding::{Code, Finding};
-use crate::input::dataset::Dataset;
 use crate::judge::Judgement;
 use crate::judge::lag::ReferenceLag;
 use crate::judge::statistics::{AxisError, PoseError};
-use crate::problem::Problem;
-use crate::problem::terms::shown;
-use crate::problem::zero_deviation::ZeroDeviation;
-use crate::solve::Solution;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::{Code, Finding};
+use hallstage_solver::problem::Problem;
+use hallstage_solver::problem::terms::shown;
+use hallstage_solver::problem::zero_deviation::ZeroDeviation;
+use hallstage_solver::solve::Solution;
 
 /// The axes of the pose: key, name, unit.
 const POSE: [(&str, &str, &str); 3] = [("x", "X", "um"), ("y", "Y", "um"), ("rz", "Rz", "urad")];

@@ -1,8 +1,8 @@
 //! What the weights of a robust fit say of its rows.
 
-use crate::input::dataset::Dataset;
 use crate::judge::left_out::{LeftOut, RowPlace};
-use crate::solve::robust::HALF;
+use hallstage_input::dataset::Dataset;
+use hallstage_solver::solve::robust::HALF;
 
 /// The rows that count less than half.
 pub(super) fn outliers(selected: &[usize], weights: &[f64]) -> impl Iterator<Item = usize> {

@@ -1,14 +1,14 @@
 //! Whether a log can determine the model at all, and whether the model describes the log.
 
-use crate::input::dataset::{Dataset, Row};
-use crate::input::stage::Stage;
 use crate::judge::statistics::PoseError;
 use crate::judge::uncertainty::Uncertainty;
-use crate::problem::Problem;
-use crate::problem::model::{GAIN_TERMS, Model, ParameterId};
-use crate::problem::parameters::{Parameters, THETA, search_box};
-use crate::problem::terms::Motion;
-use crate::statistics::median;
+use hallstage_input::dataset::{Dataset, Row};
+use hallstage_input::stage::Stage;
+use hallstage_input::statistics::median;
+use hallstage_solver::problem::Problem;
+use hallstage_solver::problem::model::{GAIN_TERMS, Model, ParameterId};
+use hallstage_solver::problem::parameters::{Parameters, THETA, search_box};
+use hallstage_solver::problem::terms::Motion;
 use runtime::model::dot;
 
 /// An axis moves when its span is at least this many times its noise from sample to sample: a

@@ -3,11 +3,11 @@
 use super::Zeros;
 use super::left_out::{LeftOut, RowPlace};
 use super::statistics::{ErrorSums, PoseError};
-use crate::input::dataset::{Movement, Row};
-use crate::input::stage::Stage;
-use crate::problem::parameters::Parameters;
-use crate::problem::zero_deviation::ZeroDeviation;
-use crate::statistics::median;
+use hallstage_input::dataset::{Movement, Row};
+use hallstage_input::stage::Stage;
+use hallstage_input::statistics::median;
+use hallstage_solver::problem::parameters::Parameters;
+use hallstage_solver::problem::zero_deviation::ZeroDeviation;
 
 /// The figures of one parameter set on the rows of one or more logs.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,15 +1,15 @@
 //! How far the reference lags behind the probes, estimated together with the parameters.
 
-use crate::input::stage::Stage;
-use crate::problem::model::Model;
-use crate::problem::parameters::Parameters;
-use crate::solve::field::blocks::{Block, Rows};
-use crate::solve::field::noise::{drift_mm, white_mm};
-use crate::solve::field::parameters::FieldParameters;
-use crate::solve::field::probe::probes;
-use crate::solve::field::terms::{COUNT, PER_PROBE};
-use crate::solve::field::whiten::{FieldEquations, Noise, UNKNOWNS};
-use crate::solve::gauss_newton::Unknowns;
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::problem::parameters::Parameters;
+use hallstage_solver::solve::field::blocks::{Block, Rows};
+use hallstage_solver::solve::field::noise::{drift_mm, white_mm};
+use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::solve::field::probe::probes;
+use hallstage_solver::solve::field::terms::{COUNT, PER_PROBE};
+use hallstage_solver::solve::field::whiten::{FieldEquations, Noise, UNKNOWNS};
+use hallstage_solver::solve::gauss_newton::Unknowns;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 

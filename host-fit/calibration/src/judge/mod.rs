@@ -1,16 +1,16 @@
 //! How good a parameter set is on a log, by the decoder that runs on the target.
 //!
 //! ```
-//! # use hall_input::input::shipped::STAGE_TOML;
-//! # use hall_input::input::stage::Stage;
+//! # use hallstage_input::shipped::STAGE_TOML;
+//! # use hallstage_input::stage::Stage;
 //! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
-//! # use hall_input::input::log::{self, ReadOptions};
-//! # use hall_input::input::shipped::RUN_GZ;
+//! # use hallstage_input::log::{self, ReadOptions};
+//! # use hallstage_input::shipped::RUN_GZ;
 //! # let reading = log::read_bytes(RUN_GZ, "run30.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
 //! # let dataset = reading.dataset;
-//! # use hall_calibration::fit::{FitSettings, ModelChoice, fit};
+//! # use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 //! # let fit = fit(&dataset, &stage, &FitSettings::new(ModelChoice::Auto))?;
-//! use hall_calibration::judge::{Decoded, Zeros};
+//! use hallstage_calibration::judge::{Decoded, Zeros};
 //!
 //! let judgement = Decoded::new(&fit.set, &dataset).judge(&dataset, &stage, Zeros::Refit);
 //! assert!(judgement.errors.axes[0].rms < 1e-6); // X, m
@@ -30,11 +30,11 @@ pub mod verdict;
 pub(crate) use judgement::medians;
 pub use judgement::{Judge, Judgement, LogJudgement};
 
-use crate::input::dataset::{Dataset, Row};
-use crate::input::stage::Stage;
-use crate::problem::model::Model;
-use crate::problem::parameters::Parameters;
-use crate::problem::zero_deviation::ZeroDeviation;
+use hallstage_input::dataset::{Dataset, Row};
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::problem::parameters::Parameters;
+use hallstage_solver::problem::zero_deviation::ZeroDeviation;
 use rayon::prelude::*;
 use runtime::{AnyDecoder, ParameterSet, PlanarPose};
 use statistics::ErrorSums;

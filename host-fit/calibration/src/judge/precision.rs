@@ -1,6 +1,6 @@
 //! What the target's `f32` costs: its poses beside those of the same model in `f64`.
 
-use crate::input::dataset::{Dataset, LoggedFrame};
+use hallstage_input::dataset::{Dataset, LoggedFrame};
 use rayon::prelude::*;
 use runtime::capacitive::vertical_pose;
 use runtime::decoder::DecoderConstants;
@@ -30,7 +30,7 @@ pub fn largest_difference(
     decoder: &AnyDecoder,
     dataset: &Dataset,
 ) -> [f64; 3] {
-    let one = |row: &crate::input::dataset::Row| {
+    let one = |row: &hallstage_input::dataset::Row| {
         let words = row
             .frame
             .decode(decoder, &PlanarPose::ZERO)

@@ -1,7 +1,7 @@
 //! Mean power spectra of signals and errors, and their lines.
 
 use super::verdict::quantile;
-use crate::statistics::median;
+use hallstage_input::statistics::median;
 use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -96,7 +96,7 @@ impl Spectrum {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::random::{Purpose, Stream};
+    use hallstage_simulate::random::{Purpose, Stream};
 
     fn noise(rows: usize, seed: u64) -> Vec<f64> {
         let mut random = Stream::new(seed, Purpose::Sensors, 0);

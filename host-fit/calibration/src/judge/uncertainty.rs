@@ -6,12 +6,12 @@
 //! half a second within them. Where independence would give the larger figure that one is taken,
 //! so that a chance cancellation within few clusters promises nothing.
 
-use crate::problem::model::{COUNT, ParameterId};
-use crate::problem::parameters::Parameters;
-use crate::problem::{Group, Problem};
-use crate::solve::gauss_newton::{Equations, Normal, Point};
-use crate::solve::least_squares::rows::{COLUMNS, Decoder};
-use crate::solve::least_squares::solve::free;
+use hallstage_solver::problem::model::{COUNT, ParameterId};
+use hallstage_solver::problem::parameters::Parameters;
+use hallstage_solver::problem::{Group, Problem};
+use hallstage_solver::solve::gauss_newton::{Equations, Normal, Point};
+use hallstage_solver::solve::least_squares::rows::{COLUMNS, Decoder};
+use hallstage_solver::solve::least_squares::solve::free;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, SymmetricEigen};
 use rayon::prelude::*;
 

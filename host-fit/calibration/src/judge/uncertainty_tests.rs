@@ -1,10 +1,10 @@
 use super::*;
-use crate::input::log::{ReadOptions, read_bytes};
-use crate::input::shipped::{LOG_GZ, STAGE_TOML};
-use crate::input::stage::Stage;
-use crate::problem::model::Model;
-use crate::solve::{Projection, Solver, SolverOptions};
 use crate::synthetic::Protocol;
+use hallstage_input::log::{ReadOptions, read_bytes};
+use hallstage_input::shipped::{LOG_GZ, STAGE_TOML};
+use hallstage_input::stage::Stage;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::solve::{Projection, Solver, SolverOptions};
 use runtime::ModelKind;
 
 /// Sandwich over the 57 movements of the shipped log, computed apart from this program from

@@ -1,11 +1,11 @@
 //! What a calibration is good for at work.
 
-use crate::finding::{Code, Finding, Severity};
-use crate::input::stage::TemperatureTable;
-use crate::solve::field::carry::Service;
-use crate::solve::field::parameters::FieldParameters;
-use crate::solve::field::posterior::covariance_at;
-use crate::solve::field::terms::COUNT;
+use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::stage::TemperatureTable;
+use hallstage_solver::solve::field::carry::Service;
+use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::solve::field::posterior::covariance_at;
+use hallstage_solver::solve::field::terms::COUNT;
 use nalgebra::DMatrix;
 use runtime::Temperature;
 use serde::ser::SerializeMap;

@@ -1,13 +1,13 @@
 //! What a fit to a run will give, before anything is measured.
 
 use super::run::Run;
-use crate::input::stage::Stage;
-use crate::problem::parameters::Parameters;
-use crate::simulate::sensors::SensorErrors;
-use crate::solve::field::blocks::{FieldRow, Rows};
-use crate::solve::field::forecast::{Forecast, Forecaster};
-use crate::solve::field::parameters::{FALL_PER_M, FieldParameters};
-use crate::solve::field::whiten::Noise;
+use hallstage_input::stage::Stage;
+use hallstage_simulate::sensors::SensorErrors;
+use hallstage_solver::problem::parameters::Parameters;
+use hallstage_solver::solve::field::blocks::{FieldRow, Rows};
+use hallstage_solver::solve::field::forecast::{Forecast, Forecaster};
+use hallstage_solver::solve::field::parameters::{FALL_PER_M, FieldParameters};
+use hallstage_solver::solve::field::whiten::Noise;
 use runtime::model::Sensitivity;
 
 /// The stage as it is known before it is calibrated: probes at their designed places with

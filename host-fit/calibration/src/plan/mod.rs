@@ -8,10 +8,10 @@
 //! | [`temperature`] | the logs that determine how the stage follows temperature |
 //!
 //! ```
-//! # use hall_input::input::shipped::STAGE_TOML;
-//! # use hall_input::input::stage::Stage;
+//! # use hallstage_input::shipped::STAGE_TOML;
+//! # use hallstage_input::stage::Stage;
 //! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
-//! let plan = hall_calibration::plan::plan(&stage, 8.0)?;
+//! let plan = hallstage_calibration::plan::plan(&stage, 8.0)?;
 //! assert_eq!(plan.run.seconds, 8.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -23,9 +23,9 @@ pub mod temperature;
 #[cfg(test)]
 mod tests;
 
-use crate::input::stage::{AXES, Stage};
-use crate::solve::field::forecast::{Forecast, Forecaster};
 use forecast::{forecast, forecaster};
+use hallstage_input::stage::{AXES, Stage};
+use hallstage_solver::solve::field::forecast::{Forecast, Forecaster};
 use run::Run;
 
 /// Errors in service over the noise floor that a run may lead to. Beyond this the run, not the

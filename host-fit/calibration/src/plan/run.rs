@@ -4,8 +4,8 @@
 //! rises as 10 x^3 - 15 x^4 + 6 x^5 and falls likewise: pose, speed and acceleration are zero at
 //! both ends and nowhere jump.
 
-use crate::simulate::pose::StagePose;
-use crate::simulate::protocol::Trajectory;
+use hallstage_simulate::pose::StagePose;
+use hallstage_simulate::protocol::Trajectory;
 use std::f64::consts::TAU;
 
 /// Phase from one axis to the next, rad.

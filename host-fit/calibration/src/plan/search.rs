@@ -6,10 +6,10 @@
 
 use super::forecast::forecast;
 use super::run::Run;
-use crate::input::stage::{AxisMotion, Stage};
-use crate::progress::Progress;
-use crate::simulate::random::{Purpose, Stream};
-use crate::solve::field::forecast::Forecaster;
+use hallstage_input::progress::Progress;
+use hallstage_input::stage::{AxisMotion, Stage};
+use hallstage_simulate::random::{Purpose, Stream};
+use hallstage_solver::solve::field::forecast::Forecaster;
 use rayon::prelude::*;
 
 /// Highest frequency, Hz: faster motion shakes the stage and gains nothing, since the reference

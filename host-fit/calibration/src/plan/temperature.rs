@@ -5,8 +5,8 @@
 
 use super::forecast::{forecaster, rows_of};
 use super::{PlanError, plan};
-use crate::input::stage::Stage;
-use crate::solve::field::warmth::Sensors;
+use hallstage_input::stage::Stage;
+use hallstage_solver::solve::field::warmth::Sensors;
 
 /// Usual length of the cold run, s.
 pub const COLD_S: f64 = 30.0;

@@ -2,17 +2,17 @@
 
 use super::run::Run;
 use super::*;
-use crate::input::dataset::Dataset;
-use crate::input::shipped::STAGE_TOML;
-use crate::problem::Problem;
-use crate::problem::model::Model;
-use crate::simulate::assembly::Assembly;
-use crate::simulate::pose::StagePose;
-use crate::simulate::protocol;
-use crate::simulate::recording::record;
-use crate::simulate::sensors::SensorErrors;
-use crate::solve::field::fit::{FieldFit, fit_field};
-use crate::solve::{Projection, Solver, SolverOptions};
+use hallstage_input::dataset::Dataset;
+use hallstage_input::shipped::STAGE_TOML;
+use hallstage_simulate::assembly::Assembly;
+use hallstage_simulate::pose::StagePose;
+use hallstage_simulate::protocol;
+use hallstage_simulate::recording::record;
+use hallstage_simulate::sensors::SensorErrors;
+use hallstage_solver::problem::Problem;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::solve::field::fit::{FieldFit, fit_field};
+use hallstage_solver::solve::{Projection, Solver, SolverOptions};
 use runtime::{ModelKind, VerticalPose};
 use std::sync::LazyLock;
 

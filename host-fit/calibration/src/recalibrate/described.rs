@@ -1,7 +1,7 @@
 //! Does the change asked for explain the log of a recalibration?
 
 use super::{Known, OPEN_MAX_ALL, RecalibrateError};
-use crate::solve::field::update::{Change, Update};
+use hallstage_solver::solve::field::update::{Change, Update};
 
 /// Chi-square may exceed that of the old log by this part, for the model is not exact ...
 const MISFIT_MAX: f64 = 0.02;

@@ -3,17 +3,17 @@
 
 use super::{Change, Known, RecalibrateError, Recalibration, recalibrate};
 use crate::fit::{FitSettings, ModelChoice, fit};
-use crate::input::dataset::Dataset;
-use crate::input::shipped::STAGE_TOML;
-use crate::input::stage::Stage;
-use crate::problem::model::Model;
-use crate::simulate::assembly::Assembly;
-use crate::simulate::pose::StagePose;
-use crate::simulate::probe::TrimmedProbe;
-use crate::simulate::protocol::{Protocol, Run, Trajectory};
-use crate::simulate::recording::record;
-use crate::simulate::sensors::SensorErrors;
-use crate::solve::field::parameters::FieldParameters;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::shipped::STAGE_TOML;
+use hallstage_input::stage::Stage;
+use hallstage_simulate::assembly::Assembly;
+use hallstage_simulate::pose::StagePose;
+use hallstage_simulate::probe::TrimmedProbe;
+use hallstage_simulate::protocol::{Protocol, Run, Trajectory};
+use hallstage_simulate::recording::record;
+use hallstage_simulate::sensors::SensorErrors;
+use hallstage_solver::problem::model::Model;
+use hallstage_solver::solve::field::parameters::FieldParameters;
 use nalgebra::Vector3;
 use runtime::parameters::Text;
 use runtime::{ModelKind, ParameterSet, VerticalPose};

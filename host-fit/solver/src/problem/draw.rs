@@ -1,6 +1,6 @@
 //! Which rows a fit uses: all, or a draw of N by the seed.
 
-use crate::input::dataset::Dataset;
+use hallstage_input::dataset::Dataset;
 use rand::rngs::ChaCha8Rng;
 use rand::seq::index;
 use rand::{Rng, SeedableRng};
@@ -67,8 +67,8 @@ fn stratified(dataset: &Dataset, count: usize, random: &mut impl Rng) -> Vec<usi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::dataset::Movement;
-    use crate::input::shipped;
+    use hallstage_input::dataset::Movement;
+    use hallstage_input::shipped;
 
     /// A log with movements of the sizes given: a draw looks at nothing else.
     fn log(sizes: &[usize]) -> Dataset {

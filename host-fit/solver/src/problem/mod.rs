@@ -1,16 +1,16 @@
 //! The estimation problem: which rows, which model, which weights, which offsets are free.
 //!
 //! ```
-//! # use hall_input::input::shipped::STAGE_TOML;
-//! # use hall_input::input::stage::Stage;
+//! # use hallstage_input::shipped::STAGE_TOML;
+//! # use hallstage_input::stage::Stage;
 //! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
-//! # use hall_input::input::log::{self, ReadOptions};
-//! # use hall_input::input::shipped::LOG_GZ;
+//! # use hallstage_input::log::{self, ReadOptions};
+//! # use hallstage_input::shipped::LOG_GZ;
 //! # let reading = log::read_bytes(LOG_GZ, "paper.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
 //! # let dataset = reading.dataset;
-//! use hall_solver::problem::Problem;
-//! use hall_solver::problem::draw::{Draw, draw_rows};
-//! use hall_solver::problem::model::Model;
+//! use hallstage_solver::problem::Problem;
+//! use hallstage_solver::problem::draw::{Draw, draw_rows};
+//! use hallstage_solver::problem::model::Model;
 //! use runtime::ModelKind;
 //!
 //! let rows = draw_rows(&dataset, 200, Draw::Stratified, 1);
@@ -28,8 +28,8 @@ pub mod synthetic;
 pub mod terms;
 pub mod zero_deviation;
 
-use crate::input::dataset::{Dataset, Row};
-use crate::input::stage::{self, Stage};
+use hallstage_input::dataset::{Dataset, Row};
+use hallstage_input::stage::{self, Stage};
 use model::Model;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -182,8 +182,8 @@ impl TrainRow {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::dataset::Movement;
-    use crate::input::shipped;
+    use hallstage_input::dataset::Movement;
+    use hallstage_input::shipped;
     use runtime::ModelKind;
 
     #[test]

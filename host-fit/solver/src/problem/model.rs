@@ -1,7 +1,7 @@
 //! The models as a fit sees them: which terms they have and which are fitted.
 
 use super::terms::{MODEL_31, Motion, Term};
-use crate::input::stage::Stage;
+use hallstage_input::stage::Stage;
 use runtime::ModelKind;
 use std::f64::consts::FRAC_1_SQRT_2;
 

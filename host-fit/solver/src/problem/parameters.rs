@@ -1,7 +1,7 @@
 //! Values of a model's parameters, and the box in which a fit searches for them.
 
 use super::model::{COUNT, GAIN_TERMS, Model};
-use crate::input::stage::{Range, Stage};
+use hallstage_input::stage::{Range, Stage};
 use runtime::ParameterSet;
 use runtime::geometry::{ProbeGeometry, SensingAxes};
 use runtime::model::Sensitivity;

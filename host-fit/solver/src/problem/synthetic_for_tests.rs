@@ -1,10 +1,10 @@
 //! Logs made from Model (31) itself, by the paper's protocol: for tests, where the true parameters must
 //! be known. Other crates include this file.
 
-use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
-use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
-use crate::simulate::protocol::TABLE_6;
+use hallstage_input::dataset::{Dataset, LoggedFrame, Movement, Row};
+use hallstage_input::stage::Stage;
+use hallstage_simulate::protocol::TABLE_6;
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
 use runtime::capacitive::gaps_m;

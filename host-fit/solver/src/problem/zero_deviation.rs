@@ -3,8 +3,8 @@
 //! Given the other parameters the pose is linear in it: delta = eta (PM mean pose error of the
 //! movement).
 
-use crate::input::stage::Range;
 use crate::problem::parameters::Parameters;
+use hallstage_input::stage::Range;
 use runtime::PlanarPose;
 use runtime::geometry::inverse_rows;
 use runtime::model::{zero_deviation_m, zero_pose};
@@ -56,7 +56,7 @@ impl ZeroDeviation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::shipped;
+    use hallstage_input::shipped;
 
     /// Aligned probes with arms 0.1975, -0.1975, -0.36 m and eta 1: a pose offset of (x, y, rz)
     /// reads y + 0.1975 rz, y - 0.1975 rz, x - 0.36 rz.

@@ -5,7 +5,7 @@
 //! a basis of some unit vectors; an old covariance L L' is the basis L with the prior 1. Where x has
 //! ranges, it stays within them.
 
-use crate::input::stage::Range;
+use hallstage_input::stage::Range;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 

@@ -11,19 +11,19 @@
 //! | [`by_search`] | a search on the fitness, with or without a least-squares finish |
 //!
 //! ```
-//! # use hall_input::input::shipped::STAGE_TOML;
-//! # use hall_input::input::stage::Stage;
+//! # use hallstage_input::shipped::STAGE_TOML;
+//! # use hallstage_input::stage::Stage;
 //! # let stage = Stage::from_toml(STAGE_TOML, "stage.toml".as_ref())?;
-//! # use hall_input::input::log::{self, ReadOptions};
-//! # use hall_input::input::shipped::LOG_GZ;
+//! # use hallstage_input::log::{self, ReadOptions};
+//! # use hallstage_input::shipped::LOG_GZ;
 //! # let reading = log::read_bytes(LOG_GZ, "paper.csv.gz".as_ref(), &stage, &ReadOptions::FIT)?;
 //! # let dataset = reading.dataset;
-//! # use hall_solver::problem::Problem;
-//! # use hall_solver::problem::draw::{Draw, draw_rows};
-//! # use hall_solver::problem::model::Model;
+//! # use hallstage_solver::problem::Problem;
+//! # use hallstage_solver::problem::draw::{Draw, draw_rows};
+//! # use hallstage_solver::problem::model::Model;
 //! # let rows = draw_rows(&dataset, 200, Draw::Stratified, 1);
 //! # let problem = Problem::new(&dataset, &rows, &stage, Model::of(runtime::ModelKind::M31));
-//! use hall_solver::solve::{Projection, Solver, SolverOptions};
+//! use hallstage_solver::solve::{Projection, Solver, SolverOptions};
 //!
 //! let options = SolverOptions::new(Projection::Linear, 1);
 //! let solution = Solver::LeastSquares.solve(&problem, &options)?;

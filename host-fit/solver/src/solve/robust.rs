@@ -14,7 +14,7 @@ use super::least_squares::solve::solve;
 use super::{Solution, SolveError};
 use crate::problem::Problem;
 use crate::problem::parameters::Parameters;
-use crate::statistics::median;
+use hallstage_input::statistics::median;
 use std::ops::Range;
 
 /// From how many robust standard deviations on a row counts less.

@@ -3,15 +3,15 @@
 use super::bus_log::{BusCounts, BusTick, Collector};
 use super::node_clock::{NodeClock, Run};
 use super::{ImportError, ImportSettings};
-use crate::input::log::LogError;
-use crate::input::log::layout::Quantity;
-use crate::input::log::lines::Lines;
-use crate::input::stage::{CodeScale, Stage};
-use crate::input::text::TextReader;
-use crate::progress::Progress;
 use hal_adapters::can::sensor::read_time;
 use hal_adapters::can::{NodeNumber, StampedFrame};
 use hal_adapters::candump::{LineError, LogLine};
+use hallstage_input::log::LogError;
+use hallstage_input::log::layout::Quantity;
+use hallstage_input::log::lines::Lines;
+use hallstage_input::progress::Progress;
+use hallstage_input::stage::{CodeScale, Stage};
+use hallstage_input::text::TextReader;
 
 /// Ticks of a record, at most: two hours at 500 Hz.
 const TICKS_MAX: usize = 3_600_000;

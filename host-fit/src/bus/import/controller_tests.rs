@@ -3,10 +3,10 @@
 
 use super::tests::files;
 use super::*;
-use crate::input::dataset::Row;
 use hal_adapters::can::sensor::{self, TemperatureSender};
 use hal_adapters::can::{BusFrame, Coded, PoseSender};
 use hal_adapters::candump::LogLine;
+use hallstage_input::dataset::Row;
 use runtime::{RawFrame, Reading};
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -96,7 +96,7 @@ fn try_import(
     interferometer: f64,
     offset_us: Option<f64>,
 ) -> Result<(f64, Vec<Row>, ImportReport), ImportError> {
-    let stage = crate::input::shipped::STAGE_TOML
+    let stage = hallstage_input::shipped::STAGE_TOML
         .replace("m_per_count = 6.25e-8 ", "m_per_count = 2.44140625e-10 ")
         .replace("m_per_count = 1.5625e-8 ", "m_per_count = 6.103515625e-11 ")
         .replace("-32768", "-8388608")

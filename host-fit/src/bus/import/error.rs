@@ -1,10 +1,10 @@
 //! Why an import was refused.
 
 use super::join::JoinCounts;
-use crate::input::log::LogError;
-use crate::input::stage::StageError;
 use crate::output::OutputError;
 use hal_adapters::candump::LineError;
+use hallstage_input::log::LogError;
+use hallstage_input::stage::StageError;
 use std::path::PathBuf;
 
 /// Why an import was refused. Nothing was written.

@@ -3,8 +3,8 @@
 
 use super::tests::{OFFSET_US, candump, files, reference};
 use super::*;
-use crate::input::log::LogProblem;
-use crate::input::source::SourceProblem;
+use hallstage_input::log::LogProblem;
+use hallstage_input::source::SourceProblem;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -75,7 +75,7 @@ fn records_that_have_little_in_common_are_refused() {
 fn codes_beyond_the_converter_are_refused_and_those_at_its_rails_left_out() {
     let import = |code_max: &str| {
         let import = files(&candump(|_, _| false), &reference()).given(OFFSET_US);
-        let text = crate::input::shipped::STAGE_TOML.replace("32767", code_max);
+        let text = hallstage_input::shipped::STAGE_TOML.replace("32767", code_max);
         std::fs::write(&import.settings.stage, text).expect("written");
         import
     };

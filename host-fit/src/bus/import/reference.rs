@@ -1,16 +1,16 @@
 //! The log of the interferometers.
 
 use super::ImportError;
-use crate::input::log::cell::{CellFault, WHOLE_MAX};
-use crate::input::log::header::{Header, Source, UnknownColumns};
-use crate::input::log::layout::{Kind, Quantity};
-use crate::input::log::order::{Order, OrderCells};
-use crate::input::log::rows::{ROTATION_MAX_RAD, displacement_max_m};
-use crate::input::log::table::Table;
-use crate::input::log::time::Clock;
-use crate::input::log::{LogError, LogProblem};
-use crate::input::stage::Stage;
-use crate::input::text::TextReader;
+use hallstage_input::log::cell::{CellFault, WHOLE_MAX};
+use hallstage_input::log::header::{Header, Source, UnknownColumns};
+use hallstage_input::log::layout::{Kind, Quantity};
+use hallstage_input::log::order::{Order, OrderCells};
+use hallstage_input::log::rows::{ROTATION_MAX_RAD, displacement_max_m};
+use hallstage_input::log::table::Table;
+use hallstage_input::log::time::Clock;
+use hallstage_input::log::{LogError, LogProblem};
+use hallstage_input::stage::Stage;
+use hallstage_input::text::TextReader;
 use serde::Serialize;
 use std::path::Path;
 

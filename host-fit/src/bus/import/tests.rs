@@ -1,7 +1,7 @@
 use super::*;
-use crate::input::log::{self, ReadOptions};
 use hal_adapters::can::{BusFrame, Coded, sensor};
 use hal_adapters::candump::{LineError, LogLine};
+use hallstage_input::log::{self, ReadOptions};
 use runtime::RawFrame;
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -99,7 +99,7 @@ pub(super) fn files(bus: &str, reference: &str) -> Import {
     let path = |name: &str| folder.path().join(name);
     std::fs::write(path("bus.log"), bus).expect("written");
     std::fs::write(path("ifm.csv"), reference).expect("written");
-    std::fs::write(path("stage.toml"), crate::input::shipped::STAGE_TOML).expect("written");
+    std::fs::write(path("stage.toml"), hallstage_input::shipped::STAGE_TOML).expect("written");
     let settings = ImportSettings {
         bus: path("bus.log"),
         reference: path("ifm.csv"),
@@ -147,7 +147,7 @@ impl Import {
     }
 
     /// The log that it wrote.
-    pub(super) fn log(&self) -> crate::input::dataset::Dataset {
+    pub(super) fn log(&self) -> hallstage_input::dataset::Dataset {
         let stage = Stage::from_file(&self.settings.stage).expect("sound");
         let paths = std::slice::from_ref(&self.settings.out);
         let read = log::read(paths, &stage, &ReadOptions::default());

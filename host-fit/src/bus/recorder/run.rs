@@ -3,12 +3,12 @@
 use super::{MISSING_ONE_IN, Recorded, RecorderError, RecorderSettings, Watch};
 use crate::bus::live::{Bus, BusError, now_us};
 use crate::bus::update::{Link, Talk, UpdateError};
-use crate::interrupt;
 use crate::output::record_file::RecordFile;
 use hal_adapters::can::command::{Outcome, Request};
 use hal_adapters::can::table::TABLE;
 use hal_adapters::can::{BusFrame, Message, StampedFrame};
 use hal_adapters::candump::LogLine;
+use hallstage_input::interrupt;
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};

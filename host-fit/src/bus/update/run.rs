@@ -5,9 +5,9 @@ use super::{
 };
 use crate::bus::BusAddress;
 use crate::bus::live::{Bus, BusError};
-use crate::interrupt;
-use crate::progress::Progress;
 use hal_adapters::can::{BusFrame, Message};
+use hallstage_input::interrupt;
+use hallstage_input::progress::Progress;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 

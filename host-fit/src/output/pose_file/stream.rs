@@ -1,10 +1,10 @@
 //! From a log to its pose file, in little memory however long they are.
 
 use super::{PoseRow, StatusCounts, npy, text, uncertainty};
-use crate::input::log::{LogEnd, LogError, LogRows, ReadOptions};
-use crate::input::stage::Stage;
 use crate::output::{Output, OutputError};
-use crate::solve::field::posterior::Posterior;
+use hallstage_input::log::{LogEnd, LogError, LogRows, ReadOptions};
+use hallstage_input::stage::Stage;
+use hallstage_solver::solve::field::posterior::Posterior;
 use runtime::{AnyDecoder, OnInvalid, PlanarPose, PoseTracker};
 use std::path::Path;
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::input::dataset::Dataset;
+use hallstage_input::dataset::Dataset;
 use proptest::prelude::*;
 use runtime::{AnyDecoder, OnInvalid, PlanarPose, Pose, PoseTracker, Status, VerticalPose};
 use std::path::Path;
@@ -146,7 +146,7 @@ fn words(row: &PoseRow) -> Vec<u32> {
 /// A log decoded into a file: its bytes and the counts.
 fn decoded_file(log: &Path, on_invalid: OnInvalid, format: PoseFormat) -> (Vec<u8>, StatusCounts) {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
-    let stage = crate::input::stage::Stage::from_file(&data.join("stage.toml")).expect("sound");
+    let stage = hallstage_input::stage::Stage::from_file(&data.join("stage.toml")).expect("sound");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("pose");
     let out = crate::output::Output::create(&path).expect("writable");
@@ -165,10 +165,11 @@ fn decoded_file(log: &Path, on_invalid: OnInvalid, format: PoseFormat) -> (Vec<u
 #[test]
 fn a_log_is_decoded_piece_by_piece_as_it_is_in_memory() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
-    let stage = crate::input::stage::Stage::from_file(&data.join("stage.toml")).expect("sound");
+    let stage = hallstage_input::stage::Stage::from_file(&data.join("stage.toml")).expect("sound");
     let logs = [data.join("paper.csv.gz")];
-    let reading = crate::input::log::read(&logs, &stage, &crate::input::log::ReadOptions::DECODE)
-        .expect("sound");
+    let reading =
+        hallstage_input::log::read(&logs, &stage, &hallstage_input::log::ReadOptions::DECODE)
+            .expect("sound");
     for on_invalid in [OnInvalid::Zero, OnInvalid::Hold { ticks: 2 }] {
         let rows = decode(&reading.dataset, &decoder(), on_invalid);
         let (text, counts) = decoded_file(&logs[0], on_invalid, PoseFormat::Csv);

@@ -2,10 +2,10 @@
 
 use super::means::Log;
 use crate::diagnose::slopes::{CHANNELS, Slopes};
-use crate::input::stage::Stage;
-use crate::solve::field::blocks::FieldRow;
-use crate::solve::field::parameters::FieldParameters;
-use crate::solve::field::probe::probes;
+use hallstage_input::stage::Stage;
+use hallstage_solver::solve::field::blocks::FieldRow;
+use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::solve::field::probe::probes;
 use nalgebra::Vector3;
 use runtime::VerticalPose;
 use runtime::capacitive::gaps_m;

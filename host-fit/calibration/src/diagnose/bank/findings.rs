@@ -4,8 +4,8 @@ use super::columns::{Course, Kind};
 use super::score::Fault;
 use super::{Job, severity};
 use crate::diagnose::slopes::title;
-use crate::finding::{Code, Finding, Severity};
 use crate::judge::verdict::Predicted;
+use hallstage_input::finding::{Code, Finding, Severity};
 
 impl Job<'_> {
     /// Movement and time of a mean, and its log if that begins there.

@@ -3,12 +3,12 @@
 use super::columns::families;
 use super::{MEANS_MAX, RARITY};
 use crate::diagnose::signals::CLEAR;
-use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
-use crate::solve::field::blocks::Rows;
-use crate::solve::field::probe::Probe;
-use crate::solve::field::terms::COUNT;
-use crate::statistics::{median, white_noise};
+use hallstage_input::dataset::Dataset;
+use hallstage_input::stage::Stage;
+use hallstage_input::statistics::{median, white_noise};
+use hallstage_solver::solve::field::blocks::Rows;
+use hallstage_solver::solve::field::probe::Probe;
+use hallstage_solver::solve::field::terms::COUNT;
 use std::ops::Range;
 
 /// Each so many rows of a movement have a noise of their own, known within a tenth.

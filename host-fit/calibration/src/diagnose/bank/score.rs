@@ -3,8 +3,8 @@
 use super::columns::{Bank, Course, Family, Kind, families};
 use super::estimate::{Estimate, RESIDUAL, WIDTH};
 use super::{NOTHING, UNDECIDED};
-use crate::solve::field::whiten::UNKNOWNS;
-use crate::solve::gauss_newton::{Factor, Normal};
+use hallstage_solver::solve::field::whiten::UNKNOWNS;
+use hallstage_solver::solve::gauss_newton::{Factor, Normal};
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 use std::ops::Range;

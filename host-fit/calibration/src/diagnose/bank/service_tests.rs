@@ -3,15 +3,15 @@
 use super::tests::stage;
 use crate::diagnose::{Diagnosis, of_log};
 use crate::fit::{Fit, FitSettings, ModelChoice, fit};
-use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
 use crate::judge::verdict::Verdict;
 use crate::judge::{Decoded, Zeros};
-use crate::problem::model::Model;
-use crate::simulate::assembly::Assembly;
-use crate::simulate::protocol::Protocol;
-use crate::simulate::recording::record;
-use crate::simulate::sensors::SensorErrors;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::stage::Stage;
+use hallstage_simulate::assembly::Assembly;
+use hallstage_simulate::protocol::Protocol;
+use hallstage_simulate::recording::record;
+use hallstage_simulate::sensors::SensorErrors;
+use hallstage_solver::problem::model::Model;
 use runtime::ModelKind;
 
 /// A log of a stage by a protocol.

@@ -6,19 +6,19 @@ use super::means::Log;
 use super::score::Scan;
 use super::severity;
 use crate::diagnose::{Diagnosis, of_log};
-use crate::finding::{Code, Finding, Severity};
 use crate::fit::{FitSettings, ModelChoice, fit};
-use crate::input::dataset::Dataset;
-use crate::input::shipped::STAGE_TOML;
-use crate::input::stage::Stage;
 use crate::judge::verdict::Verdict;
-use crate::simulate::assembly::Assembly;
-use crate::simulate::protocol::Protocol;
-use crate::simulate::random::{Purpose, Stream};
-use crate::simulate::recording::{Recording, Sample, record};
-use crate::simulate::sensors::SensorErrors;
-use crate::solve::field::parameters::FieldParameters;
-use crate::solve::field::probe::probes;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::shipped::STAGE_TOML;
+use hallstage_input::stage::Stage;
+use hallstage_simulate::assembly::Assembly;
+use hallstage_simulate::protocol::Protocol;
+use hallstage_simulate::random::{Purpose, Stream};
+use hallstage_simulate::recording::{Recording, Sample, record};
+use hallstage_simulate::sensors::SensorErrors;
+use hallstage_solver::solve::field::parameters::FieldParameters;
+use hallstage_solver::solve::field::probe::probes;
 
 pub(super) fn stage() -> Stage {
     Stage::from_toml(STAGE_TOML, "stage.toml".as_ref()).expect("sound")

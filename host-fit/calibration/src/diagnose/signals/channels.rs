@@ -1,9 +1,9 @@
 //! The signals of one log, channel by channel.
 
-use crate::finding::{Code, Finding};
-use crate::input::dataset::{Dataset, LogSource, Row};
-use crate::input::stage::Stage;
-use crate::statistics;
+use hallstage_input::dataset::{Dataset, LogSource, Row};
+use hallstage_input::finding::{Code, Finding};
+use hallstage_input::stage::Stage;
+use hallstage_input::statistics;
 use std::ops::Range;
 
 /// One log. Rows are numbered from its first.

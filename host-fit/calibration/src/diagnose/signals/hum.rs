@@ -5,8 +5,8 @@ use super::channels::LogSignals;
 use super::residual::{Residuals, is_seen};
 use crate::diagnose::of_fit::severity;
 use crate::diagnose::slopes::CHANNELS;
-use crate::finding::{Code, Finding, Severity};
 use crate::judge::spectrum::{Spectrum, windows};
+use hallstage_input::finding::{Code, Finding, Severity};
 use std::ops::Range;
 
 /// Longest window, s: its bins tell 50 Hz from 60.
@@ -66,7 +66,7 @@ pub(super) fn hum(log: &mut LogSignals, residuals: &Residuals) -> Vec<Finding> {
 #[cfg(test)]
 mod tests {
     use super::super::sample_for_tests::{PERIOD_S, codes, only, recording};
-    use crate::finding::Code;
+    use hallstage_input::finding::Code;
     use std::f64::consts::TAU;
 
     #[test]

@@ -24,11 +24,11 @@ mod standing;
 mod still;
 mod timing;
 
-use crate::finding::Finding;
-use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
-use crate::solve::field::parameters::FieldParameters;
 use channels::LogSignals;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::Finding;
+use hallstage_input::stage::Stage;
+use hallstage_solver::solve::field::parameters::FieldParameters;
 use residual::Residuals;
 
 /// Rows whose median knows no outlier, and whose mean hardly any noise of a Hall probe: a third of 0.5 um.

@@ -4,8 +4,8 @@ use super::channels::{LogSignals, median};
 use super::residual::{Residuals, is_seen};
 use super::{BLOCK, CLEAR};
 use crate::diagnose::slopes::CHANNELS;
-use crate::finding::{Code, Finding};
-use crate::statistics::robust_deviation;
+use hallstage_input::finding::{Code, Finding};
+use hallstage_input::statistics::robust_deviation;
 use rayon::prelude::*;
 
 /// Names rows far outside the noise, by channel, and leaves them out.
@@ -62,7 +62,7 @@ fn about(log: &LogSignals, row: usize, reach: usize) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use crate::diagnose::signals::sample_for_tests::{codes, only, recording};
-    use crate::finding::Code;
+    use hallstage_input::finding::Code;
 
     #[test]
     fn jumps_are_counted_and_the_channel_named_that_jumps() {

@@ -2,16 +2,16 @@
 
 use super::signal_findings;
 use crate::diagnose::parameters_of;
-use crate::finding::{Code, Finding, Severity};
 use crate::fit::{FitSettings, ModelChoice, fit};
-use crate::input::dataset::Dataset;
-use crate::input::shipped::STAGE_TOML;
-use crate::input::stage::Stage;
-use crate::simulate::assembly::Assembly;
-use crate::simulate::protocol::Protocol;
-use crate::simulate::random::{Purpose, Stream};
-use crate::simulate::recording::{Recording, Sample, record};
-use crate::simulate::sensors::SensorErrors;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::finding::{Code, Finding, Severity};
+use hallstage_input::shipped::STAGE_TOML;
+use hallstage_input::stage::Stage;
+use hallstage_simulate::assembly::Assembly;
+use hallstage_simulate::protocol::Protocol;
+use hallstage_simulate::random::{Purpose, Stream};
+use hallstage_simulate::recording::{Recording, Sample, record};
+use hallstage_simulate::sensors::SensorErrors;
 use std::ops::Range;
 
 /// Rows of each of its movements, and their servo period, s.

@@ -4,8 +4,8 @@ use super::channels::{LogSignals, levels};
 use super::residual::Residuals;
 use super::still;
 use super::{BLOCK, CLEAR};
-use crate::finding::Finding;
 use crate::judge::spectrum::windows;
+use hallstage_input::finding::Finding;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -65,7 +65,7 @@ fn stuck_in(log: &LogSignals, residuals: &Residuals, window: &Range<usize>) -> O
 #[cfg(test)]
 mod tests {
     use super::super::sample_for_tests::{held, only, recording};
-    use crate::finding::Code;
+    use hallstage_input::finding::Code;
 
     #[test]
     fn a_channel_that_stands_still_but_for_its_noise_is_stuck() {

@@ -4,7 +4,7 @@ use super::channels::{LogSignals, levels};
 use super::{BLOCK, CLEAR};
 use crate::diagnose::of_fit::severity;
 use crate::diagnose::slopes::CHANNELS;
-use crate::finding::{Code, Finding, Severity};
+use hallstage_input::finding::{Code, Finding, Severity};
 use std::ops::Range;
 
 /// What moves by less stands still, m: a few times what the interferometers drift in a movement.
@@ -129,7 +129,7 @@ fn spread(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::sample_for_tests::{ROWS, held, only, recording};
-    use crate::finding::{Code, Severity};
+    use hallstage_input::finding::{Code, Severity};
 
     #[test]
     fn a_channel_that_repeats_its_code_is_stuck_and_one_that_does_so_in_a_tenth_refused() {

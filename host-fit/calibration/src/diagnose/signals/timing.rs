@@ -2,7 +2,7 @@
 
 use super::channels::LogSignals;
 use crate::diagnose::of_fit::severity;
-use crate::finding::{Code, Finding, Severity};
+use hallstage_input::finding::{Code, Finding, Severity};
 
 /// What the times of rows show against their sequence. Shares of the rows, and of the period: at 1 mm/s and
 /// 2 ms a part of 2 % is 40 nm of motion.
@@ -67,8 +67,8 @@ pub(super) fn timing(log: &LogSignals) -> Vec<Finding> {
 mod tests {
     use super::super::sample_for_tests::{PERIOD_S, dataset, found, recording};
     use super::*;
-    use crate::input::dataset::Dataset;
-    use crate::simulate::random::{Purpose, Stream};
+    use hallstage_input::dataset::Dataset;
+    use hallstage_simulate::random::{Purpose, Stream};
 
     fn only(dataset: &Dataset) -> (Code, Severity, f64) {
         let found = found(dataset);

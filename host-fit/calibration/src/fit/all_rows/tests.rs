@@ -1,10 +1,10 @@
 use super::*;
-use crate::finding::Code;
 use crate::fit::ModelChoice;
-use crate::input::log::{ReadOptions, SaturatedCodes, read};
-use crate::input::shipped::{LOG_GZ, STAGE_TOML};
-use crate::problem::model::Model;
 use flate2::read::GzDecoder;
+use hallstage_input::finding::Code;
+use hallstage_input::log::{ReadOptions, SaturatedCodes, read};
+use hallstage_input::shipped::{LOG_GZ, STAGE_TOML};
+use hallstage_solver::problem::model::Model;
 use runtime::ModelKind;
 use std::io::Read;
 use std::path::PathBuf;

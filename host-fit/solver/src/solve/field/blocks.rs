@@ -6,8 +6,8 @@
 
 use super::probe::{Probe, Reading};
 use super::terms::PER_PROBE;
-use crate::input::dataset::Dataset;
 use crate::solve::robust::HALF;
+use hallstage_input::dataset::Dataset;
 use rayon::prelude::*;
 use std::ops::Range;
 

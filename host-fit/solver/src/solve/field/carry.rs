@@ -4,8 +4,8 @@ use super::parameters::FieldParameters;
 use super::posterior::{FORM_MM, PoseErrors, Posterior};
 use super::probe::probes;
 use super::terms::COUNT;
-use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
+use hallstage_input::stage::Stage;
 use nalgebra::{DMatrix, DVector};
 use runtime::VerticalPose;
 

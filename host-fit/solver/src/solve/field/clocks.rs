@@ -7,9 +7,9 @@ use super::parameters::{FALL_PER_M, FieldParameters, PLACE_M};
 use super::probe::probes;
 use super::terms::{COUNT, ETA, LEVER_ARM, PER_PROBE, SLOPES, TERMS, THETA};
 use super::whiten::{COLUMNS, FieldEquations, LAG_RATE, Noise};
-use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
 use crate::solve::gauss_newton::{Equations, Normal, Point, Unknowns};
+use hallstage_input::stage::Stage;
 use nalgebra::{DMatrix, DVector};
 
 /// Standard deviations of what is not known before: misalignment, sensitivity, lag and its rate.

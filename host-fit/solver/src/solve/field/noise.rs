@@ -4,9 +4,9 @@ use super::blocks::{Block, Rows};
 use super::probe::Probe;
 use super::terms::{COUNT, PER_PROBE};
 use super::whiten::{Noise, UNKNOWNS};
-use crate::input::stage::Stage;
 use crate::solve::robust::HALF;
-use crate::statistics::SecondDifferences;
+use hallstage_input::stage::Stage;
+use hallstage_input::statistics::SecondDifferences;
 use nalgebra::DMatrix;
 use runtime::geometry::inverse_rows;
 

@@ -4,9 +4,9 @@ use super::terms::{
     CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SHAPE, SHAPES, SLOPES, TERMS, THETA, shape, shape_list,
 };
 use super::whiten::{UNKNOWNS, WARMTH};
-use crate::input::stage::Stage;
 use crate::problem::parameters::Parameters;
 use crate::solve::gauss_newton::Unknowns;
+use hallstage_input::stage::Stage;
 use nalgebra::{DMatrix, DVector};
 use runtime::geometry::{ProbeGeometry, SensingAxes, inverse_rows};
 use runtime::model::{FieldModel, FieldProbe, Model, Probes, Sensitivity, dot};
@@ -18,7 +18,7 @@ pub struct FieldParameters {
     /// The values in the order of [`TERMS`] and in its units, of A, B and C.
     pub probes: [[f64; PER_PROBE]; 3],
     /// k and h of A, B, C beyond what the rows were compensated with, 1/K: see
-    /// [`Dataset::compensate`](crate::input::dataset::Dataset::compensate).
+    /// [`Dataset::compensate`](hallstage_input::dataset::Dataset::compensate).
     pub gain_per_k: [[f64; 2]; 3],
     /// Designed places (x, y) of A, B and C, m.
     pub places: [[f64; 2]; 3],

@@ -3,8 +3,8 @@
 use super::parameters::FieldParameters;
 use super::probe::probes;
 use super::terms::{PER_PROBE, SHAPES, TERMS};
-use crate::input::dataset::{Dataset, LoggedFrame, Movement, Row};
-pub(super) use crate::input::shipped::stage;
+use hallstage_input::dataset::{Dataset, LoggedFrame, Movement, Row};
+pub(super) use hallstage_input::shipped::stage;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use runtime::RawFrame;

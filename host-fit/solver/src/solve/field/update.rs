@@ -14,9 +14,9 @@ use super::probe::probes;
 use super::terms::{CARRY, COUNT, ETA, LEVER_ARM, PER_PROBE, SLOPES, TERMS, THETA};
 use super::warmth::OF_SENSORS;
 use super::whiten::{COLUMNS, FieldEquations, Noise, UNKNOWNS};
-use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
 use crate::solve::gauss_newton::{self, Limits, Solved, Unknowns};
+use hallstage_input::dataset::Dataset;
+use hallstage_input::stage::Stage;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// What may have changed since the old log.

@@ -2,8 +2,8 @@
 //! temperature sensors leave.
 
 use super::parameters::HELD;
-use crate::input::dataset::Dataset;
-use crate::input::stage::Stage;
+use hallstage_input::dataset::Dataset;
+use hallstage_input::stage::Stage;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use runtime::Temperature;
 use std::ops::Range;

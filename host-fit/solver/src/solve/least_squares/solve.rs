@@ -2,13 +2,13 @@
 
 use super::gains::{Point, parameters_of};
 use super::rows::{COLUMNS, Decoder};
-use crate::input::stage::Range;
 use crate::problem::Problem;
 use crate::problem::model::{COUNT, ParameterId};
 use crate::problem::parameters::{Parameters, SLOPES, THETA, search_box};
 use crate::problem::zero_deviation::ZeroDeviation;
 use crate::solve::gauss_newton::{self, Limits, Solved, Unknowns};
 use crate::solve::{Solution, SolveError};
+use hallstage_input::stage::Range;
 use nalgebra::{DVector, Matrix3, Vector3};
 use std::time::Duration;
 

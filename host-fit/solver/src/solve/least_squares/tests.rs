@@ -3,13 +3,13 @@
 use super::gains::{parameters_of, point_of};
 use super::rows::COLUMNS;
 use super::solve::{fit, solve};
-use crate::input::shipped::stage;
-use crate::input::stage::Stage;
 use crate::problem::Problem;
 use crate::problem::model::{COUNT, Model};
 use crate::problem::parameters::Parameters;
 use crate::problem::synthetic::Protocol;
 use crate::solve::gauss_newton::{Equations, Normal, Point};
+use hallstage_input::shipped::stage;
+use hallstage_input::stage::Stage;
 use nalgebra::DVector;
 use runtime::ModelKind;
 
@@ -26,7 +26,7 @@ fn from_array(first: [f64; 18]) -> Parameters {
     Parameters { values }
 }
 
-fn model_31<'a>(dataset: &crate::input::dataset::Dataset, stage: &'a Stage) -> Problem<'a> {
+fn model_31<'a>(dataset: &hallstage_input::dataset::Dataset, stage: &'a Stage) -> Problem<'a> {
     let all: Vec<usize> = (0..dataset.rows.len()).collect();
     Problem::new(dataset, &all, stage, Model::of(ModelKind::M31))
 }

@@ -28,7 +28,6 @@ pub(crate) mod sample_for_tests;
 #[cfg(test)]
 mod tests;
 
-use crate::input::stage::{Range, paper_signs};
 use crate::problem::Problem;
 use crate::problem::parameters::{ETA, Parameters, SLOPES, THETA, lever_arm_ranges, search_box};
 use crate::solve::Projection;
@@ -36,6 +35,7 @@ use crate::solve::least_squares::gains::{Point, parameters_of, point_of};
 use crate::solve::least_squares::solve::zero_deviations;
 use crate::solve::search::cost::CostFunction;
 use crate::solve::search::random::{Phase, RandomSource, stream};
+use hallstage_input::stage::{Range, paper_signs};
 use nalgebra::Vector3;
 use poles::{cut, slope_extent};
 use runtime::geometry::ProbeGeometry;

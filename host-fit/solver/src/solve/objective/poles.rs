@@ -8,8 +8,8 @@
 //! is NaN; and the range of each slope is cut where it alone would break that rule. The form
 //! `none` is the paper's and has neither.
 
-use crate::input::stage::Range;
 use crate::problem::TrainRow;
+use hallstage_input::stage::Range;
 
 /// Smallest phi / eta of any row: at a twentieth, noise is already twenty times larger.
 pub const SHARE_MIN: f64 = 0.05;

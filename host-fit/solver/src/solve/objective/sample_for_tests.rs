@@ -1,12 +1,12 @@
 //! A small log for tests of the objective: Model (31) with noise of a known seed.
 
-use crate::input::dataset::Dataset;
-use crate::input::shipped;
-use crate::input::stage::{Range, Stage};
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::synthetic::Protocol;
 use crate::problem::{Problem, TrainRow};
+use hallstage_input::dataset::Dataset;
+use hallstage_input::shipped;
+use hallstage_input::stage::{Range, Stage};
 use runtime::geometry::{ProbeGeometry, inverse_rows};
 use runtime::model::{Sensitivity, planar_pose, sensitivity_at, zero_pose};
 use runtime::{ModelKind, PlanarPose, VerticalPose};

@@ -5,7 +5,6 @@ use super::poles::SHARE_MIN;
 use super::sample_for_tests::{
     dataset, fitness_by_the_runtime, phi, pose_by_the_runtime, problem, stage, truth,
 };
-use crate::input::stage::Range;
 use crate::problem::model::Model;
 use crate::problem::parameters::Parameters;
 use crate::problem::zero_deviation::ZeroDeviation;
@@ -13,6 +12,7 @@ use crate::problem::{Problem, TrainRow};
 use crate::solve::Projection;
 use crate::solve::search::cost::CostFunction;
 use crate::solve::search::random::{Phase, RandomSource, stream};
+use hallstage_input::stage::Range;
 use runtime::geometry::inverse_rows;
 use runtime::{ModelKind, PlanarPose};
 

@@ -1,7 +1,7 @@
 //! The function to be minimized.
 
 use super::population::Individual;
-use crate::input::stage::Range;
+use hallstage_input::stage::Range;
 
 /// Individuals that a thread takes at a time: handing work to another thread and waiting for it takes
 /// 5 to 10 us here, an evaluation on a few hundred rows 2 to 3.

@@ -1,8 +1,8 @@
 use super::*;
-use crate::input::stage::Range;
 use crate::solve::search::cost::known::{Known, rastrigin, rosenbrock, sphere};
 use crate::solve::search::population::Individual;
 use crate::solve::search::run::StopReason;
+use hallstage_input::stage::Range;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 

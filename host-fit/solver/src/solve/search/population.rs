@@ -6,7 +6,7 @@
 
 use super::cost::{CostFunction, clip, ranks_before};
 use super::random::{Phase, RandomSource};
-use crate::input::stage::Range;
+use hallstage_input::stage::Range;
 use rayon::prelude::*;
 
 /// A point of the box and its cost.

@@ -10,7 +10,7 @@
 //! exponentials from `libm`. `rand_distr` takes them from the standard library, whose last digits
 //! differ between systems.
 
-use crate::input::stage::Range;
+use hallstage_input::stage::Range;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 use std::sync::LazyLock;

@@ -3,7 +3,7 @@
 use super::cost::CostFunction;
 use super::population::{Breeding, Search};
 use super::random::stream;
-use crate::progress::Progress;
+use hallstage_input::progress::Progress;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The seed and the first population of a search.

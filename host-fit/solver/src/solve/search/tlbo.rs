@@ -30,7 +30,7 @@ use super::operators::{
 };
 use super::population::{Breeding, Individual, Parents, best_index, improve};
 use super::random::{Phase, RandomSource};
-use crate::input::stage::Range;
+use hallstage_input::stage::Range;
 
 /// A search by TLBO or one of its relatives.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use super::{Clocks, EXPLAINED_MIN, Records};
 use crate::bus::import::ImportError;
 use crate::bus::import::join::{At, at};
 use crate::bus::import::node_clock::Tick;
-use crate::solve::field::blocks::{FieldRow, Rows};
+use hallstage_solver::solve::field::blocks::{FieldRow, Rows};
 use runtime::capacitive::{vertical_pose, vertical_rows};
 use runtime::model::dot;
 

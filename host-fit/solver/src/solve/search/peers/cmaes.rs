@@ -9,10 +9,10 @@
 //! Sums are written out or nalgebra's own loops: its products of large matrices choose their
 //! instructions by the processor, and with them the last bits of a result.
 
-use crate::input::stage::Range;
 use crate::solve::search::population::{Breeding, Individual, Parents, improve};
 use crate::solve::search::random::RandomSource;
 use crate::solve::search::run::Start;
+use hallstage_input::stage::Range;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Standard deviation of the first draws, as a share of the range.

@@ -2,10 +2,10 @@
 //! 1993): tournament of two, extended intermediate crossover, mutation on all scales, and the
 //! best individual always survives.
 
-use crate::input::stage::Range;
 use crate::solve::search::cost::ranks_before;
 use crate::solve::search::population::{Breeding, Individual, Parents, best_index};
 use crate::solve::search::random::RandomSource;
+use hallstage_input::stage::Range;
 
 /// A child lies between its parents or up to this share of their distance beyond.
 const EXTENSION: f64 = 0.25;

@@ -1,8 +1,8 @@
 //! Particle swarm optimization, global best, with the constants of Clerc and Kennedy (2002).
 
-use crate::input::stage::Range;
 use crate::solve::search::population::{Breeding, Individual, Parents, best_index, improve};
 use crate::solve::search::random::RandomSource;
+use hallstage_input::stage::Range;
 
 /// Share of the velocity that is kept: the constriction factor for 2.05 + 2.05.
 const INERTIA: f64 = 0.729_843_788;

@@ -1,0 +1,309 @@
+//! Reads logs: CSV or CSV.gz, raw codes and reference, into rows in SI units by movement.
+//!
+//! One row per servo period below a header. Which column holds what is said in
+//! [`layout`], in which units in `units.rs`, what else a table may look like at
+//! [`table::Table::open`]; a log without a column for the movement is taken apart in [`order`].
+//! A file is taken for gzip or UTF-16 by its first bytes, not by its name.
+//!
+//! Anything wrong is refused with file, line and column ([`LogError`]). Bad cells and
+//! saturated codes can be left out and counted instead ([`BadRows::Skip`]); a log whose
+//! structure is wrong is always refused.
+
+pub mod cell;
+mod decimal;
+mod error;
+pub mod header;
+pub mod layout;
+pub mod lines;
+pub mod order;
+mod preamble;
+mod record;
+pub mod rows;
+mod skipped;
+mod stream;
+pub mod table;
+pub mod time;
+pub mod units;
+mod warning;
+
+pub use cell::CellFault;
+pub use error::{LogError, LogProblem, Place};
+pub use stream::{LogEnd, LogRow, LogRows};
+
+use crate::dataset::{Dataset, FIT_ROWS_MAX, LogSource};
+use crate::finding::Finding;
+use crate::sample::Sampler;
+use crate::stage::Stage;
+use crate::text::TextReader;
+use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What to do with a row that has a bad cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BadRows {
+    /// Refuse the log.
+    #[default]
+    Refuse,
+    /// Leave the row out and count it.
+    Skip,
+}
+
+/// What to do with a code at a rail of its converter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SaturatedCodes {
+    /// The row is bad: see [`BadRows`].
+    #[default]
+    Bad,
+    /// The row is kept: the decoder marks it.
+    Keep,
+}
+
+/// Whether a log must hold the interferometers' reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ReferenceUse {
+    /// It must.
+    #[default]
+    Required,
+    /// It is read where it is there; [`crate::dataset::LogSource::has_reference`] tells.
+    IfPresent,
+}
+
+/// Most rows that are held where all are: more than five hours of the servo, 1.5 GB.
+pub const ROWS_HELD_MAX: usize = 10_000_000;
+
+/// How to read logs. The default refuses what is wrong, needs the reference and holds all rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ReadOptions {
+    /// What to do with bad rows.
+    pub bad_rows: BadRows,
+    /// What to do with saturated codes.
+    pub saturated: SaturatedCodes,
+    /// Whether the reference is needed.
+    pub reference: ReferenceUse,
+    /// Length of the movements of logs that have no column for them, s; without it they end at gaps
+    /// alone.
+    pub split_s: Option<f64>,
+    /// Most rows that are held: of more the dataset is a sample. All are held if `None`, up to
+    /// [`ROWS_HELD_MAX`].
+    pub rows_max: Option<usize>,
+}
+
+impl ReadOptions {
+    /// For `fit`: of a long log a sample.
+    pub const FIT: Self = Self {
+        bad_rows: BadRows::Refuse,
+        saturated: SaturatedCodes::Bad,
+        reference: ReferenceUse::Required,
+        split_s: None,
+        rows_max: Some(FIT_ROWS_MAX),
+    };
+
+    /// For `decode`: saturated rows are kept, a reference is not needed.
+    pub const DECODE: Self = Self {
+        bad_rows: BadRows::Refuse,
+        saturated: SaturatedCodes::Keep,
+        reference: ReferenceUse::IfPresent,
+        split_s: None,
+        rows_max: None,
+    };
+}
+
+/// What [`read`] gives.
+#[derive(Debug, Default)]
+pub struct LogReading {
+    /// The rows of all logs, or a sample of them.
+    pub dataset: Dataset,
+    /// What is odd about the logs, in their order.
+    pub warnings: Vec<Finding>,
+    /// How many rows were left out; the warnings say why.
+    pub skipped_rows: usize,
+    options: ReadOptions,
+    /// Where the logs can be read again.
+    again: Vec<(PathBuf, Again)>,
+}
+
+/// How a log can be read again.
+#[derive(Debug)]
+enum Again {
+    /// From its file.
+    File,
+    /// From a copy, as its own file can be read but once.
+    Copy(File),
+    /// From memory.
+    Bytes(Arc<[u8]>),
+}
+
+impl Again {
+    fn open(&self, path: &Path) -> Result<TextReader<'_>, LogError> {
+        Ok(match self {
+            Self::File => TextReader::open(path)?,
+            Self::Copy(copy) => TextReader::open_copy(copy, path)?,
+            Self::Bytes(bytes) => TextReader::of_reader(&**bytes, path)?,
+        })
+    }
+}
+
+/// Reads the logs, in this order, into one dataset: in little memory however long they are, where
+/// `rows_max` says so. They can be read again by [`LogReading::each_row`].
+///
+/// # Errors
+/// Every variant of [`LogError`]; the first fault of the first bad log.
+pub fn read<P: AsRef<Path>>(
+    paths: &[P],
+    stage: &Stage,
+    options: &ReadOptions,
+) -> Result<LogReading, LogError> {
+    let mut again = Vec::new();
+    let texts = paths.iter().map(|path| {
+        let path = path.as_ref();
+        let (text, copy) = match options.rows_max {
+            Some(_) => TextReader::open_to_read_again(path)?,
+            None => (TextReader::open(path)?, None),
+        };
+        let place = copy.map_or(Again::File, Again::Copy);
+        again.push((path.to_path_buf(), place));
+        Ok(text)
+    });
+    let reading = read_texts(texts, stage, options, |_, _| ())?;
+    Ok(LogReading { again, ..reading })
+}
+
+/// As [`read`], and gives all rows away: `take` gets each with the number of its log.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_each<P: AsRef<Path>>(
+    paths: &[P],
+    stage: &Stage,
+    options: &ReadOptions,
+    take: impl FnMut(usize, &LogRow),
+) -> Result<LogReading, LogError> {
+    let texts = paths
+        .iter()
+        .map(|path| Ok(TextReader::open(path.as_ref())?));
+    read_texts(texts, stage, options, take)
+}
+
+/// Reads one log that is in memory, plain or gzip; `path` is only named in errors.
+///
+/// # Errors
+/// As [`read`], without those of opening the file.
+pub fn read_bytes(
+    bytes: &[u8],
+    path: &Path,
+    stage: &Stage,
+    options: &ReadOptions,
+) -> Result<LogReading, LogError> {
+    let text = TextReader::of_reader(bytes, path).map_err(LogError::from);
+    let reading = read_texts([text], stage, options, |_, _| ())?;
+    let again = vec![(path.to_path_buf(), Again::Bytes(bytes.into()))];
+    Ok(LogReading { again, ..reading })
+}
+
+fn read_texts<'t>(
+    texts: impl IntoIterator<Item = Result<TextReader<'t>, LogError>>,
+    stage: &'t Stage,
+    options: &ReadOptions,
+    mut take: impl FnMut(usize, &LogRow),
+) -> Result<LogReading, LogError> {
+    let mut reading = LogReading {
+        options: *options,
+        ..LogReading::default()
+    };
+    let mut sampler = Sampler::new(options.rows_max.unwrap_or(usize::MAX));
+    let mut hash = Sha256::new();
+    let mut logs = 0;
+    for (log, text) in texts.into_iter().enumerate() {
+        let text = text?.with_hash(hash);
+        let path = text.path().to_path_buf();
+        sampler.begin_log();
+        let mut rows = LogRows::new(text, "reading", stage, options)?;
+        while let Some(row) = rows.next_row()? {
+            sampler.push(row.movement, row.begins, &row.row);
+            take(log, &row);
+            if options.rows_max.is_none() && sampler.rows_read() > ROWS_HELD_MAX {
+                let limit = ROWS_HELD_MAX;
+                return Err(Place::of(path, None).refuse(LogProblem::TooManyRows { limit }));
+            }
+        }
+        let end = rows.end()?;
+        reading.skipped_rows += end.skipped_rows;
+        reading.warnings.extend(end.warnings);
+        let source = LogSource {
+            path: end.path,
+            rows: 0..0,
+            rows_read: 0,
+            movements_read: 0,
+            has_reference: end.has_reference,
+        };
+        if let Some(first) = sampler.end_log(source) {
+            let first = first.path.clone();
+            return Err(Place::of(path, None).refuse(LogProblem::SameLog { first }));
+        }
+        hash = end.hash.unwrap_or_default();
+        logs += 1;
+    }
+    if logs == 0 {
+        return Err(Place::of("", None).refuse(LogProblem::NoLog));
+    }
+    reading.dataset = sampler.into_dataset(hash.finalize().into());
+    reading.dataset.compensate_as_expected(&stage.temperature);
+    let (rows, _) = reading.dataset.read();
+    let (taken, runs) = (reading.dataset.rows.len(), reading.dataset.movements.len());
+    if taken < rows {
+        let sampled = warning::sampled(rows, taken, runs);
+        reading.warnings.push(sampled);
+    }
+    Ok(reading)
+}
+
+impl LogReading {
+    /// Reads the logs anew in another way, as [`read_each`] would; of what is read nothing can be read again.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn read_anew(
+        &self,
+        stage: &Stage,
+        options: &ReadOptions,
+        take: impl FnMut(usize, &LogRow),
+    ) -> Result<Self, LogError> {
+        let texts = self.again.iter().map(|(path, again)| again.open(path));
+        read_texts(texts, stage, options, take)
+    }
+
+    /// How the logs were read.
+    pub const fn options(&self) -> &ReadOptions {
+        &self.options
+    }
+
+    /// Reads the logs again, as they were read by [`read`]; `take` as for [`read_each`].
+    ///
+    /// # Errors
+    /// As [`read`]; `Changed` where a log has other rows now.
+    pub fn each_row(
+        &self,
+        stage: &Stage,
+        mut take: impl FnMut(usize, &LogRow),
+    ) -> Result<(), LogError> {
+        let sources = self.again.iter().zip(&self.dataset.logs);
+        for (log, ((path, again), source)) in sources.enumerate() {
+            let text = again.open(path)?;
+            let mut rows = LogRows::new(text, "judging", stage, &self.options)?;
+            let mut count = 0;
+            while let Some(row) = rows.next_row()? {
+                count += 1;
+                take(log, &row);
+            }
+            if source.rows_read != count {
+                return Err(Place::of(path, None).refuse(LogProblem::Changed));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,294 @@
+//! One cell of a log as a number, or what is wrong with it.
+
+use super::decimal;
+use crate::stage::CodeScale;
+
+/// What is wrong with one cell.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CellFault {
+    /// Nothing in it.
+    #[error("the cell is empty; fill it in or remove the row")]
+    Empty,
+    /// Not a number.
+    #[error(
+        "\"{text}\" is not a number; correct it or remove the row{}",
+        comma_hint(text)
+    )]
+    NotANumber {
+        /// What is there, shortened.
+        text: String,
+    },
+    /// A decimal point in a table whose first rows have decimal commas.
+    #[error(
+        "\"{text}\" has a decimal point, where the first rows of the log have decimal commas; write all numbers alike, without marks between thousands"
+    )]
+    DecimalPoint {
+        /// What is there, shortened.
+        text: String,
+    },
+    /// A time that is written in another way than the first of the log.
+    #[error(
+        "\"{text}\" is a time written in another way than the first of the log; write all as numbers, all as dates and times with a zone, or all without"
+    )]
+    OtherTime {
+        /// What is there, shortened.
+        text: String,
+    },
+    /// NaN.
+    #[error("NaN stands for a missing value; remove the row")]
+    Nan,
+    /// An infinity.
+    #[error("\"{text}\" is infinite; remove the row")]
+    Infinite {
+        /// What is there.
+        text: String,
+    },
+    /// A fraction where codes or indices are whole.
+    #[error(
+        "{value} is not a whole number; this column holds {what}, check the [log] table of stage.toml"
+    )]
+    NotWhole {
+        /// The value.
+        value: f64,
+        /// What the column holds.
+        what: &'static str,
+    },
+    /// Beyond every sensible magnitude.
+    #[error(
+        "{value:e} {unit} is absurd (more than {limit:e} {unit}); remove the row, or check the column's unit in the [log] table of stage.toml"
+    )]
+    Absurd {
+        /// The value, in `unit`.
+        value: f64,
+        /// The largest sensible magnitude.
+        limit: f64,
+        /// The unit of both.
+        unit: &'static str,
+    },
+    /// A code that the converter cannot give.
+    #[error(
+        "code {code} is outside the converter's range {code_min} to {code_max}; remove the row, or correct code_min and code_max in stage.toml"
+    )]
+    OutsideConverter {
+        /// The code.
+        code: i64,
+        /// Smallest code of the converter.
+        code_min: i32,
+        /// Largest code of the converter.
+        code_max: i32,
+    },
+    /// A code at the end of the converter's range.
+    #[error(
+        "code {code} is at the converter's rail: the sensor is saturated; record the movement again, or leave such rows out with --bad-rows skip"
+    )]
+    Saturated {
+        /// The code.
+        code: i32,
+    },
+}
+
+impl CellFault {
+    /// Why a row with such a cell is left out, in words.
+    pub(super) const fn reason(&self) -> &'static str {
+        match self {
+            Self::Empty => "an empty cell",
+            Self::NotANumber { .. } | Self::DecimalPoint { .. } => "a cell that is not a number",
+            Self::OtherTime { .. } => "a time written in another way than the first",
+            Self::Nan | Self::Infinite { .. } => "a NaN or an infinity",
+            Self::NotWhole { .. } => "a fraction where a whole number belongs",
+            Self::Absurd { .. } => "an absurd number",
+            Self::OutsideConverter { .. } => "a code outside the converter's range",
+            Self::Saturated { .. } => "a saturated code",
+        }
+    }
+}
+
+fn comma_hint(text: &str) -> &'static str {
+    let digits = text
+        .bytes()
+        .all(|b| b.is_ascii_digit() || b",.-+eE".contains(&b));
+    if digits && text.contains(',') {
+        " (write points for decimal commas, and no commas between thousands)"
+    } else {
+        ""
+    }
+}
+
+/// Largest index or time that is kept exactly on its way through `f64`.
+pub const WHOLE_MAX: f64 = 9_007_199_254_740_992.0;
+
+/// How much of a bad cell an error shows, in characters.
+const SHOWN_CHARS: usize = 40;
+
+/// A cell's text for a message: valid UTF-8, no control characters, not too long.
+pub fn shown(cell: &[u8]) -> String {
+    let text = String::from_utf8_lossy(cell.get(..4 * SHOWN_CHARS).unwrap_or(cell));
+    let clean = |c: char| if c.is_control() { '\u{fffd}' } else { c };
+    let mut short: String = text.chars().map(clean).take(SHOWN_CHARS).collect();
+    if short.len() < cell.len() && text.chars().count() > SHOWN_CHARS {
+        short.push_str("...");
+    }
+    short
+}
+
+/// A cell of a table.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell<'a> {
+    /// Its text.
+    pub text: &'a [u8],
+    /// Whether numbers have decimal commas.
+    pub(super) decimal_commas: bool,
+}
+
+/// A converter's code.
+pub(super) struct Code {
+    pub(super) code: i32,
+    /// How far the cell is from a whole code; 0 in a column of codes.
+    pub(super) fraction: f64,
+    pub(super) is_saturated: bool,
+}
+
+/// Most digits of a plain integer, which is exact in `f64`: enough for all codes and times.
+const PLAIN_DIGITS: usize = 15;
+
+impl Cell<'_> {
+    /// The number in a cell of nothing but a few digits, as most cells of codes are; with a minus sign
+    /// or without.
+    #[inline]
+    fn plain(self) -> Option<i64> {
+        let (digits, sign) = match self.text {
+            [b'-', digits @ ..] => (digits, -1),
+            digits => (digits, 1),
+        };
+        if digits.is_empty() || digits.len() > PLAIN_DIGITS {
+            return None;
+        }
+        let mut number = 0;
+        for byte in digits {
+            let digit = byte.wrapping_sub(b'0');
+            if digit > 9 {
+                return None;
+            }
+            number = 10 * number + i64::from(digit);
+        }
+        Some(sign * number)
+    }
+
+    /// A finite number.
+    #[inline(always)]
+    pub fn number(self) -> Result<f64, CellFault> {
+        match self.plain() {
+            Some(number) => Ok(number as f64),
+            None => self.other_number(),
+        }
+    }
+
+    #[cold]
+    fn other_number(self) -> Result<f64, CellFault> {
+        let text = self.text.trim_ascii();
+        if text.is_empty() {
+            return Err(CellFault::Empty);
+        }
+        let number = match self.decimal_commas && decimal::is_number(text) {
+            true if text.contains(&b'.') => {
+                return Err(CellFault::DecimalPoint { text: shown(text) });
+            }
+            true => {
+                let point = |byte: &u8| if *byte == b',' { b'.' } else { *byte };
+                fast_float2::parse(text.iter().map(point).collect::<Vec<u8>>())
+            }
+            false => fast_float2::parse(text),
+        };
+        let number: f64 = number.map_err(|_| CellFault::NotANumber { text: shown(text) })?;
+        match number {
+            _ if number.is_nan() => Err(CellFault::Nan),
+            _ if number.is_infinite() => Err(CellFault::Infinite { text: shown(text) }),
+            _ => Ok(number),
+        }
+    }
+
+    /// A whole number; `12.0` counts as one. `what` says what the column holds.
+    #[inline]
+    pub fn whole(self, what: &'static str) -> Result<i64, CellFault> {
+        if let Some(number) = self.plain() {
+            return Ok(number);
+        }
+        let value = self.scaled(1.0, WHOLE_MAX, "")?;
+        match value.fract() == 0.0 {
+            // In range: checked above.
+            true => Ok(value as i64),
+            false => Err(CellFault::NotWhole { value, what }),
+        }
+    }
+
+    /// A number times `scale`, at most `limit` in magnitude.
+    #[inline(always)]
+    pub fn scaled(self, scale: f64, limit: f64, unit: &'static str) -> Result<f64, CellFault> {
+        let value = self.number()? * scale;
+        match value.abs() <= limit {
+            true => Ok(value),
+            false => Err(CellFault::Absurd { value, limit, unit }),
+        }
+    }
+
+    /// The code: a whole number, or the nearest to a voltage of `codes_per_unit` each.
+    #[inline]
+    pub(super) fn code(
+        self,
+        codes_per_unit: f64,
+        converter: &CodeScale,
+    ) -> Result<Code, CellFault> {
+        let (code, fraction) = match codes_per_unit == 1.0 {
+            true => (self.whole("codes")?, 0.0),
+            false => {
+                let exact = self.scaled(codes_per_unit, WHOLE_MAX, "codes")?;
+                (exact.round() as i64, exact - exact.round())
+            }
+        };
+        let (code_min, code_max) = (converter.window.low - 1, converter.window.high + 1);
+        match i32::try_from(code) {
+            Ok(inside) if (code_min..=code_max).contains(&inside) => Ok(Code {
+                code: inside,
+                fraction,
+                is_saturated: !converter.window.contains(inside),
+            }),
+            _ => Err(CellFault::OutsideConverter {
+                code,
+                code_min,
+                code_max,
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    impl<'a> Cell<'a> {
+        /// With decimal points.
+        pub(in crate::log) const fn of(text: &'a str) -> Self {
+            Self {
+                text: text.as_bytes(),
+                decimal_commas: false,
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_are_read_as_rust_reads_them() {
+        let numbers = "0 -0 +1 1. .5 +.5 1e5 1E-5 1.e5 0.1 9007199254740993 123456789.123456789 \
+                       179769313486231580793e289 2.2250738585072014e-308 1e400 1e-400";
+        let others = ". - + e5 1e 1_0 0x1 --1 1,5 nan inf -Infinity infinit";
+        let split = numbers.split_whitespace().chain(others.split(' '));
+        for text in split.chain(["", "1 2"]) {
+            let have = Cell::of(text).number();
+            match text.parse::<f64>() {
+                Ok(number) if number.is_finite() => {
+                    assert_eq!(have, Ok(number), "{text}");
+                }
+                _ => assert!(have.is_err(), "{text}"),
+            }
+        }
+    }
+}

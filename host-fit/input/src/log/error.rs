@@ -1,0 +1,271 @@
+//! Why a log is refused: where, what, and what to do.
+
+use super::cell::CellFault;
+use crate::source::{SourceError, SourceProblem};
+use std::fmt::{Display, Formatter, Result as FmtResult};
+use std::path::PathBuf;
+
+/// A place in a log: a file, a line of it, or a cell.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The file; empty where no log was named.
+    pub path: PathBuf,
+    /// Line, from 1.
+    pub line: Option<usize>,
+    /// Column of the table, from 1, and its name in the header.
+    pub column: Option<(usize, String)>,
+    /// The movement of the cell, if its number could be read.
+    pub movement: Option<i64>,
+}
+
+impl Place {
+    /// A file, or a line of it.
+    pub fn of(path: impl Into<PathBuf>, line: impl Into<Option<usize>>) -> Box<Self> {
+        Box::new(Self {
+            path: path.into(),
+            line: line.into(),
+            ..Self::default()
+        })
+    }
+
+    /// What is wrong here, as an error.
+    pub fn refuse(self: Box<Self>, problem: LogProblem) -> LogError {
+        LogError {
+            place: self,
+            problem,
+        }
+    }
+}
+
+impl Display for Place {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        write!(f, "{}", self.path.display())?;
+        if let Some(line) = self.line {
+            write!(f, ":{line}")?;
+        }
+        if let Some((column, name)) = &self.column {
+            write!(f, ": column {column}")?;
+            if !name.is_empty() {
+                write!(f, " ({name})")?;
+            }
+        }
+        match self.movement {
+            Some(movement) => write!(f, ", movement {movement}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Why a log is refused, and where.
+#[derive(Debug, thiserror::Error)]
+#[error("{place}{}{problem}", if place.path.as_os_str().is_empty() { "" } else { ": " })]
+pub struct LogError {
+    /// Where.
+    pub place: Box<Place>,
+    /// What.
+    pub problem: LogProblem,
+}
+
+impl From<SourceError> for LogError {
+    fn from(SourceError { path, problem }: SourceError) -> Self {
+        Place::of(path, None).refuse(problem.into())
+    }
+}
+
+/// What is wrong with a log.
+#[derive(Debug, thiserror::Error)]
+pub enum LogProblem {
+    /// No log was named.
+    #[error("no log was named; name one or more CSV or CSV.gz files")]
+    NoLog,
+    /// The file cannot be read, or is no text.
+    #[error(transparent)]
+    Source(#[from] SourceProblem),
+    /// Nothing in its first mebibyte, or only comments and blank lines.
+    #[error(
+        "the log is empty, or its first mebibyte is only comments; record it again or name another file"
+    )]
+    Empty,
+    /// A header and no row.
+    #[error("a header but no rows; record the log again or name another file")]
+    HeaderOnly,
+    /// The first line holds numbers.
+    #[error(
+        "the first line holds numbers, not column names; put a header such as movement,t_us,... above it"
+    )]
+    NoHeader,
+    /// No separator between columns was found in the line that should be the header.
+    #[error(
+        "\"{text}\" is not a header with several columns; separate the cells by commas, semicolons or tabs, or name a log"
+    )]
+    NoSeparator {
+        /// The start of the line.
+        text: String,
+    },
+    /// More columns than any log has.
+    #[error(
+        "the header has more than {limit} columns; name another file, or leave out the columns that are not needed"
+    )]
+    TooManyColumns {
+        /// The most that are read.
+        limit: usize,
+    },
+    /// More rows than are held at once.
+    #[error(
+        "more than {limit} rows in all, the most that are held at once; name a part of the logs"
+    )]
+    TooManyRows {
+        /// The most.
+        limit: usize,
+    },
+    /// The log has other rows than when it was read first.
+    #[error("the log changed while it was read: it is read twice; wait until it is recorded")]
+    Changed,
+    /// A line without an end.
+    #[error(
+        "the line is longer than {limit_bytes} bytes, the most that is read; name a log with a row in each line"
+    )]
+    LineTooLong {
+        /// The most bytes.
+        limit_bytes: usize,
+    },
+    /// More movements than are counted.
+    #[error(
+        "more than {limit} movements, the most that a log may have; check the movement column, or split the log"
+    )]
+    TooManyMovements {
+        /// The most.
+        limit: usize,
+    },
+    /// A column that is needed is not there.
+    #[error(
+        "the column `{column}` is missing; record it, or name the column that holds it with `{key} = \"...\"` in the [log] table of stage.toml"
+    )]
+    MissingColumn {
+        /// The name that was looked for.
+        column: String,
+        /// The key in the `[log]` table.
+        key: &'static str,
+    },
+    /// A column that nothing maps.
+    #[error(
+        "it is unknown; map it, or drop it with `ignore = [\"{name}\"]`, in the [log] table of stage.toml, which `host-fit init` drafts (known columns: {known})"
+    )]
+    UnknownColumn {
+        /// Its name.
+        name: String,
+        /// The columns that are known, by name.
+        known: String,
+    },
+    /// A column without a name.
+    #[error("it has no name; name it, or remove the separator too many")]
+    UnnamedColumn,
+    /// Two columns for one quantity.
+    #[error("it repeats the quantity of column {first}; rename or remove one")]
+    RepeatedColumn {
+        /// The other column, from 1.
+        first: usize,
+    },
+    /// A quantity whose unit is known from nowhere.
+    #[error(
+        "it has no unit; write one of {units} into its name, as in `{name} [..]`, or give it with `{key} = {{ column = \"{name}\", unit = \"..\" }}` in the [log] table of stage.toml"
+    )]
+    NoUnit {
+        /// The column's name.
+        name: String,
+        /// The units of its kind.
+        units: String,
+        /// The key in the `[log]` table.
+        key: &'static str,
+    },
+    /// A voltage where the parameters are for codes.
+    #[error(
+        "it is a voltage, and the parameters are for the converter's codes; give its `volts_per_count` (V) in the [{table}] table of stage.toml"
+    )]
+    NoVoltsPerCount {
+        /// The table of its converter.
+        table: &'static str,
+    },
+    /// Two units for one column.
+    #[error(
+        "it has the unit {below} in the row below the header, and another by its name or the [log] table of stage.toml; correct one of them"
+    )]
+    UnitsDisagree {
+        /// The unit in the row below the header.
+        below: String,
+    },
+    /// `--split` for a log that has movements.
+    #[error("the log has a column for the movement, so --split does not apply; leave it out")]
+    SplitWithMovements,
+    /// Two sets of columns hold the same quantities.
+    #[error(
+        "both `{one}` and `{other}` are there and hold the same thing; drop one set with `ignore = [...]` in the [log] table of stage.toml"
+    )]
+    AmbiguousColumns {
+        /// A column of the one set.
+        one: String,
+        /// A column of the other.
+        other: String,
+    },
+    /// A line with more or fewer cells than the header.
+    #[error("{found} cells where the header has {expected}; correct or remove the line")]
+    CellCount {
+        /// Cells of the header.
+        expected: usize,
+        /// Cells of the line.
+        found: usize,
+    },
+    /// The last line has too few cells and no line break.
+    #[error(
+        "the file ends in the middle of this line ({found} of {expected} cells); copy it again, or remove the line"
+    )]
+    CutLine {
+        /// Cells of the header.
+        expected: usize,
+        /// Cells of the line.
+        found: usize,
+    },
+    /// A cell that cannot be used.
+    #[error(transparent)]
+    Cell(#[from] CellFault),
+    /// A row is earlier than the one above.
+    #[error(
+        "time runs backwards, from {before_us} us to {t_us} us; sort the rows by time, or give each run a movement number of its own"
+    )]
+    TimeBackwards {
+        /// Time of the row above, us.
+        before_us: i64,
+        /// Time of this row, us.
+        t_us: i64,
+    },
+    /// A row has the time of the one above.
+    #[error("the row repeats the time {t_us} us of the row above; remove the duplicate")]
+    DuplicatedRow {
+        /// The time, us.
+        t_us: i64,
+    },
+    /// A movement has rows in two places.
+    #[error(
+        "the movement was left at line {left_line} and comes back; keep the rows of a movement together, or give the second part a number of its own"
+    )]
+    MovementReturns {
+        /// The line of the first row after it.
+        left_line: usize,
+    },
+    /// Two logs have the same rows.
+    #[error("the same rows as in {}; name each log once", first.display())]
+    SameLog {
+        /// The log with the same rows.
+        first: PathBuf,
+    },
+    /// Nothing is left after bad rows were skipped.
+    #[error(
+        "every row is bad and was left out, {rows} in all (the first: {first}); record the log again"
+    )]
+    NoGoodRows {
+        /// Their number.
+        rows: usize,
+        /// Why the first was left out.
+        first: Box<LogError>,
+    },
+}

@@ -1,0 +1,231 @@
+//! The header of a table: which cell of a row holds what.
+
+use super::ReferenceUse;
+use super::cell::shown;
+use super::error::{LogError, LogProblem, Place};
+use super::layout::{Kind, LogLayout, Meaning, Quantity, UnitFault};
+use super::table::Head;
+use crate::stage::Stage;
+
+/// A cell of each row that is read.
+#[derive(Clone, Copy, Debug)]
+pub struct Source {
+    /// Which cell, from 0.
+    pub cell: usize,
+    /// m, rad, us or codes per unit.
+    pub scale: f64,
+}
+
+/// Three quantities and their cells.
+pub type Set = ([Quantity; 3], [Source; 3]);
+
+/// The columns of one log.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Columns {
+    /// `None` where gaps in the time separate the movements.
+    pub(super) movement: Option<Source>,
+    pub(super) time: Source,
+    pub(super) hall: [Source; 3],
+    /// The gaps, or Z, Rx, Ry.
+    pub(super) vertical: Set,
+    /// The beams, or X, Y, Rz.
+    pub(super) reference: Option<Set>,
+    /// Temperatures of mount and body.
+    pub(super) temperature: [Option<Source>; 2],
+}
+
+/// What to do with columns that the layout does not know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UnknownColumns {
+    /// Refuse the table: a misspelt name would be ignored without a word.
+    Refuse,
+    /// Leave them out: an instrument may record more than is asked for.
+    LeaveOut,
+}
+
+/// The cells of a row that hold quantities of the layout.
+pub struct Header<'a> {
+    table: &'a Head,
+    layout: &'a LogLayout,
+    /// Where each quantity is that is there.
+    sources: [Option<Source>; Quantity::ALL.len()],
+}
+
+/// Finds the columns of a log.
+pub(super) fn columns(
+    table: &Head,
+    stage: &Stage,
+    reference: ReferenceUse,
+) -> Result<Columns, LogError> {
+    let layout = &stage.log;
+    let header = Header::new(table, layout, UnknownColumns::Refuse)?;
+    let movement = match header.find(Quantity::Movement) {
+        None if !layout.is_mapped(Quantity::Movement) => None,
+        _ => Some(header.all([Quantity::Movement])?[0]),
+    };
+    let [time] = header.all([Quantity::Time])?;
+    let hall = header.all(Quantity::HALL)?;
+    let vertical = header.one_of(&[Quantity::GAPS, Quantity::GAP_LENGTHS, Quantity::VERTICAL])?;
+    let sets = [Quantity::BEAMS, Quantity::PLANAR];
+    let is_there = sets.iter().flatten().any(|q| header.find(*q).is_some());
+    let is_needed = is_there || reference == ReferenceUse::Required;
+    let reference = is_needed.then(|| header.one_of(&sets)).transpose()?;
+    Ok(Columns {
+        movement,
+        time,
+        hall,
+        vertical,
+        reference,
+        temperature: stage.temperature.columns.each_ref().map(|column| {
+            let cell = table
+                .names
+                .iter()
+                .position(|name| Some(name) == column.as_ref())?;
+            let scale = stage.temperature.scale_mc[0];
+            Some(Source { cell, scale })
+        }),
+    })
+}
+
+impl<'a> Header<'a> {
+    /// Finds the quantities of the layout among the columns.
+    ///
+    /// # Errors
+    /// `UnnamedColumn`, `UnknownColumn`, `RepeatedColumn`, `NoUnit`, `NoVoltsPerCount`,
+    /// `UnitsDisagree`.
+    pub fn new(
+        table: &'a Head,
+        layout: &'a LogLayout,
+        unknown: UnknownColumns,
+    ) -> Result<Self, LogError> {
+        let mut header = Self {
+            table,
+            layout,
+            sources: [None; Quantity::ALL.len()],
+        };
+        for (cell, name) in table.names.iter().enumerate() {
+            let refuse = |problem| Err(table.place(table.line, cell, None).refuse(problem));
+            let (quantity, scale) = match (header.source(cell, name), unknown) {
+                (Ok(Some(found)), _) => found,
+                (Ok(None), _) => continue,
+                (
+                    Err(
+                        LogProblem::UnknownColumn { .. }
+                        | LogProblem::UnnamedColumn
+                        | LogProblem::NoUnit { .. },
+                    ),
+                    UnknownColumns::LeaveOut,
+                ) => continue,
+                (Err(problem), _) => return refuse(problem),
+            };
+            let earlier = header.sources[quantity as usize].replace(Source { cell, scale });
+            if let Some(first) = earlier {
+                let first = first.cell + 1;
+                return refuse(LogProblem::RepeatedColumn { first });
+            }
+        }
+        Ok(header)
+    }
+
+    /// What is wrong with the header as a whole, as an error.
+    fn refused(&self, problem: LogProblem) -> LogError {
+        Place::of(&self.table.path, self.table.line).refuse(problem)
+    }
+
+    /// What a column holds, and m, rad, us or codes per unit; `None` if it is to be left out.
+    fn source(&self, cell: usize, name: &str) -> Result<Option<(Quantity, f64)>, LogProblem> {
+        let below = self.table.unit(cell);
+        let (quantity, unit) = match self.layout.meaning(name) {
+            Meaning::Ignored => return Ok(None),
+            Meaning::Unknown if name.is_empty() => return Err(LogProblem::UnnamedColumn),
+            Meaning::Unknown => return Err(self.unknown(name)),
+            Meaning::Exact(quantity) => (quantity, None),
+            Meaning::WithUnit(quantity, unit) => {
+                let quantity = quantity.in_unit(unit.or(Some(below)));
+                let kind = quantity.kind();
+                let fallback = match kind {
+                    Kind::Index | Kind::Code => Some(below),
+                    Kind::Time if self.table.is_date(cell) => Some("iso"),
+                    _ => (!below.is_empty()).then_some(below),
+                };
+                let Some(unit) = unit.or(fallback) else {
+                    let (units, key) = (kind.units(), quantity.key());
+                    let name = shown(name.as_bytes());
+                    return Err(LogProblem::NoUnit { name, units, key });
+                };
+                (quantity, Some(unit))
+            }
+        };
+        let scale = match unit.map(|unit| self.layout.scale(quantity, unit)) {
+            None => self.layout.column(quantity).scale,
+            Some(Ok(scale)) => scale,
+            Some(Err(UnitFault::Unknown)) => return Err(self.unknown(name)),
+            Some(Err(UnitFault::NoVoltsPerCount)) => {
+                let table = quantity.table();
+                return Err(LogProblem::NoVoltsPerCount { table });
+            }
+        };
+        if self.disagrees(quantity, scale, below) {
+            let below = shown(below.as_bytes());
+            return Err(LogProblem::UnitsDisagree { below });
+        }
+        Ok(Some((quantity, scale)))
+    }
+
+    fn unknown(&self, name: &str) -> LogProblem {
+        let names = Quantity::ALL.map(|quantity| self.layout.column(quantity).name.as_str());
+        LogProblem::UnknownColumn {
+            name: shown(name.as_bytes()),
+            known: names.join(", "),
+        }
+    }
+
+    /// Whether the unit below the header is another than that of the column: it is of the
+    /// quantity's kind, and so is the scale of the column that of a unit.
+    fn disagrees(&self, quantity: Quantity, scale: f64, below: &str) -> bool {
+        let kind = quantity.kind();
+        match (kind, kind.unit(below)) {
+            (_, None) => false,
+            (Kind::Code, Some(_)) => self.layout.scale(quantity, below) != Ok(scale),
+            (_, Some(unit)) => unit != scale.abs() && kind.has_unit_of(scale.abs()),
+        }
+    }
+
+    /// Where a quantity is, if the table has it.
+    pub fn find(&self, quantity: Quantity) -> Option<Source> {
+        self.sources[quantity as usize]
+    }
+
+    /// The cells of the quantities, or an error that names the first missing one.
+    pub fn all<const N: usize>(&self, quantities: [Quantity; N]) -> Result<[Source; N], LogError> {
+        let mut sources = [Source {
+            cell: 0,
+            scale: 1.0,
+        }; N];
+        for (source, quantity) in sources.iter_mut().zip(quantities) {
+            *source = self.find(quantity).ok_or_else(|| {
+                self.refused(LogProblem::MissingColumn {
+                    column: self.layout.column(quantity).name.clone(),
+                    key: quantity.key(),
+                })
+            })?;
+        }
+        Ok(sources)
+    }
+
+    /// The cells of the one that is there of sets that hold the same, of the first if none is.
+    ///
+    /// # Errors
+    /// `AmbiguousColumns`, `MissingColumn`.
+    pub fn one_of(&self, sets: &[[Quantity; 3]]) -> Result<Set, LogError> {
+        let present = |set: &[Quantity; 3]| set.iter().copied().find(|q| self.find(*q).is_some());
+        let mut found = sets.iter().filter_map(|set| Some((*set, present(set)?)));
+        let (first, second) = (found.next(), found.next());
+        if let (Some((_, one)), Some((_, other))) = (first, second) {
+            let [one, other] = [one, other].map(|q| self.layout.column(q).name.clone());
+            return Err(self.refused(LogProblem::AmbiguousColumns { one, other }));
+        }
+        let set = first.map_or(sets[0], |(set, _)| set);
+        Ok((set, self.all(set)?))
+    }
+}

@@ -1,0 +1,171 @@
+//! The lines of a text with their numbers, in little memory however long it is.
+
+use super::error::{LogError, LogProblem, Place};
+use crate::text::TextReader;
+use sha2::Sha256;
+
+/// Bytes that are read at once.
+const PIECE_BYTES: usize = 128 * 1024;
+
+/// Longest line. What is longer is damaged or hostile.
+pub(crate) const LINE_BYTES_MAX: usize = 1 << 20;
+
+/// How much of a text is read to find out the form of its table.
+pub(crate) const OPENING_BYTES: usize = 1 << 20;
+
+/// The lines of a text, one after the other; they end in LF, CRLF or CR.
+pub struct Lines<'a> {
+    text: TextReader<'a>,
+    buffer: Vec<u8>,
+    /// The first byte of the next line in the buffer.
+    at: usize,
+    /// Number of the last line, from 1.
+    pub line: usize,
+    /// Whether all of the text was read.
+    is_whole: bool,
+}
+
+/// A line of a text that is in memory.
+pub(super) struct TextLine<'a> {
+    /// Without its break.
+    pub(super) text: &'a [u8],
+    /// Its number, from 1.
+    pub(super) line: usize,
+    /// The first byte after its break.
+    pub(super) end: usize,
+}
+
+impl<'a> Lines<'a> {
+    /// Of a text.
+    pub const fn new(text: TextReader<'a>) -> Self {
+        Self {
+            text,
+            buffer: Vec::new(),
+            at: 0,
+            line: 0,
+            is_whole: false,
+        }
+    }
+
+    /// The lines that follow, about a mebibyte of them; they stay the next ones.
+    ///
+    /// # Errors
+    /// Those of reading, `LineTooLong`.
+    pub(super) fn opening(&mut self) -> Result<&[u8], LogError> {
+        while !self.is_whole && self.buffer.len() - self.at < OPENING_BYTES {
+            self.fill(OPENING_BYTES)?;
+        }
+        let rest = self.buffer.get(self.at..).unwrap_or_default();
+        if self.is_whole {
+            return Ok(rest);
+        }
+        let last = rest.iter().rposition(|byte| matches!(byte, b'\n' | b'\r'));
+        let end = last.ok_or_else(|| self.too_long())? + 1;
+        Ok(rest.get(..end).unwrap_or_default())
+    }
+
+    /// The next line, without its break; `None` at the end.
+    ///
+    /// # Errors
+    /// Those of reading, `LineTooLong`.
+    pub fn next_line(&mut self) -> Result<Option<&[u8]>, LogError> {
+        let line = loop {
+            let rest = self.buffer.get(self.at..).unwrap_or_default();
+            if let Some((length, taken)) = first_line(rest, self.is_whole) {
+                let start = self.at;
+                self.at += taken;
+                self.line += 1;
+                break start..start + length;
+            }
+            if self.is_whole {
+                return Ok(None);
+            }
+            if rest.len() > LINE_BYTES_MAX {
+                return Err(self.too_long());
+            }
+            self.fill(PIECE_BYTES)?;
+        };
+        Ok(self.buffer.get(line))
+    }
+
+    /// Whether the text ends with the line that was taken, without a line break.
+    pub(super) fn is_open(&self) -> bool {
+        let is_break = |byte: &u8| matches!(byte, b'\n' | b'\r');
+        self.is_whole && self.at == self.buffer.len() && !self.buffer.last().is_some_and(is_break)
+    }
+
+    /// How many bytes of the file were read, and how many it has; 0 where that is not known.
+    pub fn progress(&self) -> (u64, u64) {
+        self.text.progress()
+    }
+
+    pub(super) fn into_hash(self) -> Option<Sha256> {
+        self.text.into_hash()
+    }
+
+    /// Reads on, and lets go of the lines that were taken.
+    fn fill(&mut self, bytes: usize) -> Result<(), LogError> {
+        self.buffer.drain(..self.at);
+        self.at = 0;
+        self.is_whole = !self.text.append(&mut self.buffer, bytes)?;
+        Ok(())
+    }
+
+    fn too_long(&self) -> LogError {
+        Place::of(self.text.path(), self.line + 1).refuse(LogProblem::LineTooLong {
+            limit_bytes: LINE_BYTES_MAX,
+        })
+    }
+}
+
+/// The lines of a text.
+pub(super) fn lines_of(text: &[u8]) -> impl Iterator<Item = TextLine<'_>> {
+    let (mut at, mut line) = (0, 0);
+    std::iter::from_fn(move || {
+        let rest = text.get(at..)?;
+        let (length, taken) = first_line(rest, true)?;
+        (at, line) = (at + taken, line + 1);
+        Some(TextLine {
+            text: rest.get(..length)?,
+            line,
+            end: at,
+        })
+    })
+}
+
+/// The length of the first line, without and with its break; `None` if it may go on after the text,
+/// which is the whole rest or not, or if there is none.
+fn first_line(text: &[u8], is_whole: bool) -> Option<(usize, usize)> {
+    let Some(end) = memchr::memchr2(b'\n', b'\r', text) else {
+        return (is_whole && !text.is_empty()).then_some((text.len(), text.len()));
+    };
+    match text.get(end..) {
+        Some([b'\r', b'\n', ..]) => Some((end, end + 2)),
+        // The first half of a line break, perhaps.
+        Some([b'\r']) if !is_whole => None,
+        _ => Some((end, end + 1)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn lines_have_their_numbers_across_pieces_whatever_ends_them() {
+        for end in ["\n", "\r\n", "\r"] {
+            let text: String = (1..=90_000).map(|k| format!("{k}{end}")).collect();
+            let reader = TextReader::of_reader(text.as_bytes(), Path::new("x")).expect("text");
+            let mut lines = Lines::new(reader);
+            let opening = lines.opening().expect("text").to_vec();
+            assert!(text.as_bytes().starts_with(&opening));
+            for k in 1..=90_000 {
+                let line = lines.next_line().expect("text").map(<[u8]>::to_vec);
+                assert_eq!(line, Some(k.to_string().into_bytes()));
+                assert_eq!(lines.line, k);
+            }
+            assert!(matches!(lines.next_line(), Ok(None)) && !lines.is_open());
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! A log row by row, in little memory however long it is.
+
+use super::error::{LogError, LogProblem, Place};
+use super::header;
+use super::order::{Order, OrderCells};
+use super::rows::{BadCell, RowReader};
+use super::skipped::Skipped;
+use super::table::Table;
+use super::warning::{between_codes, by_time, file_cut, single_rows};
+use super::{BadRows, ReadOptions, SaturatedCodes};
+use crate::dataset::Row;
+use crate::finding::Finding;
+use crate::progress::Progress;
+use crate::stage::Stage;
+use crate::text::TextReader;
+use sha2::Sha256;
+use std::path::{Path, PathBuf};
+
+/// Mean distance of voltages from whole codes that passes in silence: those that were computed from
+/// codes and written with few digits stay below it, those of another instrument have 0.25.
+const BETWEEN_CODES: f64 = 0.15;
+
+/// So many lines are read before the progress is shown anew.
+const LINES_SHOWN: usize = 4096;
+
+/// A row of a log.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogRow {
+    /// Number of its movement in the log.
+    pub movement: i64,
+    /// Whether a movement begins with it.
+    pub begins: bool,
+    /// The row; its own number of the movement is 0.
+    pub row: Row,
+}
+
+/// The rows of a log from its start to its end. Memory does not grow with the log, other than by some
+/// bytes for each movement.
+pub struct LogRows<'a> {
+    table: Table<'a>,
+    reader: RowReader<'a>,
+    order: Order,
+    skipped: Skipped,
+    options: ReadOptions,
+    progress: Progress,
+}
+
+/// What is known of a log at its end.
+#[derive(Debug)]
+pub struct LogEnd {
+    /// The file, as messages name it.
+    pub path: PathBuf,
+    /// How many rows were left out; the warnings say why.
+    pub skipped_rows: usize,
+    /// Whether it holds the interferometers' reference.
+    pub has_reference: bool,
+    /// What is odd about it.
+    pub warnings: Vec<Finding>,
+    pub(super) hash: Option<Sha256>,
+}
+
+impl<'a> LogRows<'a> {
+    /// Opens a log; `what` is being done with it, for the progress.
+    ///
+    /// # Errors
+    /// Those of [`LogError`] up to the first row.
+    pub fn open(
+        path: &Path,
+        what: &'static str,
+        stage: &'a Stage,
+        options: &ReadOptions,
+    ) -> Result<Self, LogError> {
+        Self::new(TextReader::open(path)?, what, stage, options)
+    }
+
+    /// As [`Self::open`], of a text that is open.
+    pub(super) fn new(
+        text: TextReader<'a>,
+        what: &'static str,
+        stage: &'a Stage,
+        options: &ReadOptions,
+    ) -> Result<Self, LogError> {
+        let mut table = Table::open(text, |name| stage.log.knows(name))?;
+        let columns = header::columns(&table.head, stage, options.reference)?;
+        if columns.movement.is_some() && options.split_s.is_some() {
+            return Err(Place::of(table.head.path, None).refuse(LogProblem::SplitWithMovements));
+        }
+        let servo_us = stage.servo_period_s * 1e6;
+        let period_us = table.period_us(columns.time, columns.movement)?;
+        let cells = OrderCells {
+            time: columns.time.cell,
+            movement: columns.movement.map(|source| source.cell),
+        };
+        let keep_saturated = options.saturated == SaturatedCodes::Keep;
+        Ok(Self {
+            order: Order::new(cells, period_us.unwrap_or(servo_us), options.split_s),
+            reader: RowReader::new(columns, stage, keep_saturated),
+            skipped: Skipped::default(),
+            options: *options,
+            progress: Progress::new(what, table.lines.progress().1),
+            table,
+        })
+    }
+
+    /// The median time between the first rows, us.
+    pub const fn period_us(&self) -> f64 {
+        self.order.period_us
+    }
+
+    /// The next row; `None` at the end.
+    ///
+    /// # Errors
+    /// Those of [`LogError`] but `NoLog` and `SameLog`: the first fault of the log.
+    pub fn next_row(&mut self) -> Result<Option<LogRow>, LogError> {
+        while self.table.next_row()? {
+            let (cells, line) = (&self.table.row, self.table.lines.line);
+            if line.is_multiple_of(LINES_SHOWN) {
+                self.progress.reach(self.table.lines.progress().0);
+            }
+            let movement = self.reader.movement(cells);
+            let known = movement.as_ref().map_or(None, |movement| *movement);
+            let row = match movement.and_then(|_| self.reader.t_us(cells)) {
+                Ok(t_us) => {
+                    self.order.take(&self.table.head, line, known, t_us)?;
+                    self.reader.row(cells, t_us as i64)
+                }
+                Err(bad) => Err(bad),
+            };
+            match row {
+                Ok(row) => {
+                    let place = self.order.keep();
+                    if place.begins {
+                        self.skipped.keep(place.movement);
+                    }
+                    return Ok(Some(LogRow {
+                        movement: place.movement,
+                        begins: place.begins,
+                        row: Row {
+                            frame: row.frame.with_sequence(place.sequence),
+                            ..row
+                        },
+                    }));
+                }
+                Err(bad) => self.leave_out(bad, known)?,
+            }
+        }
+        Ok(None)
+    }
+
+    fn leave_out(&mut self, bad: BadCell, movement: Option<i64>) -> Result<(), LogError> {
+        let (table, BadCell { cell, fault }) = (&self.table, bad);
+        let place = || table.head.place(table.row_line(), cell, movement);
+        match self.options.bad_rows {
+            BadRows::Refuse => Err(place().refuse(fault.into())),
+            BadRows::Skip => {
+                self.skipped.add(fault, movement, place);
+                Ok(())
+            }
+        }
+    }
+
+    /// What is odd about a log that was read to its end.
+    ///
+    /// # Errors
+    /// `HeaderOnly`, `NoGoodRows`.
+    pub fn end(mut self) -> Result<LogEnd, LogError> {
+        let (head, order) = (self.table.head, &mut self.order);
+        let path = head.path.as_path();
+        let skipped_rows = self.skipped.rows();
+        if order.movements == 0 {
+            return Err(self.skipped.nothing_left(path, head.line));
+        }
+        let columns = &self.reader.columns;
+        let mut warnings = Vec::new();
+        let open_line = self.table.open_line;
+        warnings.extend(open_line.map(|line| file_cut(path, line)));
+        if columns.movement.is_none() {
+            warnings.push(by_time(path, order.movements, self.options.split_s));
+        }
+        let mean = self.reader.between_codes();
+        warnings.extend((mean > BETWEEN_CODES).then(|| between_codes(path, mean)));
+        warnings.extend(self.skipped.warnings(path));
+        let single = order.end_movement();
+        warnings.extend(single.map(|(first, count)| single_rows(path, first, count)));
+        Ok(LogEnd {
+            skipped_rows,
+            has_reference: columns.reference.is_some(),
+            warnings,
+            hash: self.table.lines.into_hash(),
+            path: head.path,
+        })
+    }
+}

@@ -1,0 +1,236 @@
+//! A log as a table: named columns, then rows of cells, each with its place in the file.
+//!
+//! This is the seam for other formats. Whatever reads logs and references sees a table only
+//! through [`Head`] and [`Table`]; CSV is the one format behind them today. Columns may be fewer
+//! than a log of `fit` has: which of them are needed is decided in [`super::header`].
+
+use super::cell::{Cell, shown};
+use super::decimal;
+use super::error::{LogError, LogProblem, Place};
+use super::header::Source;
+use super::lines::{Lines, lines_of};
+use super::preamble::{self, COMMENT};
+use super::record::{Dialect, Record};
+use super::time::{Clock, is_date_time};
+use super::units;
+use crate::statistics::median;
+use crate::text::TextReader;
+use std::path::PathBuf;
+
+/// Longest unit in a row of units, in characters, with brackets.
+const UNIT_CHARACTERS: usize = 10;
+
+/// Most columns of a table. What has more is damaged or hostile.
+pub(super) const COLUMNS_MAX: usize = 4096;
+
+/// What stands above the rows of a table.
+#[derive(Debug)]
+pub struct Head {
+    /// The file.
+    pub path: PathBuf,
+    /// The line of the header, from 1.
+    pub line: usize,
+    /// Names of the columns, without white space around them.
+    pub names: Vec<String>,
+    /// Units of the columns, where a row below the header holds them.
+    units: Vec<String>,
+    /// Whether the cells of the first row hold date and time.
+    dates: Vec<bool>,
+}
+
+impl Head {
+    /// The unit that a row below the header gives for a column, from 0; empty if it gives none.
+    pub fn unit(&self, column: usize) -> &str {
+        let unit = self.units.get(column).map_or("", String::as_str);
+        let inside = unit
+            .strip_prefix('[')
+            .and_then(|unit| unit.strip_suffix(']'));
+        let inside = inside.or_else(|| unit.strip_prefix('(')?.strip_suffix(')'));
+        inside.unwrap_or(unit)
+    }
+
+    /// Whether a column, from 0, holds date and time in the first row.
+    pub fn is_date(&self, column: usize) -> bool {
+        self.dates.get(column).is_some_and(|is_date| *is_date)
+    }
+
+    /// A cell of the row in this line, for messages.
+    pub fn place(&self, line: usize, cell: usize, movement: Option<i64>) -> Box<Place> {
+        let name = shown(self.names.get(cell).map_or(&[], |name| name.as_bytes()));
+        Box::new(Place {
+            path: self.path.clone(),
+            line: Some(line),
+            column: Some((cell + 1, name)),
+            movement,
+        })
+    }
+}
+
+fn check_names(names: &[String]) -> Result<(), LogProblem> {
+    let (limit, text) = (COLUMNS_MAX, |name: &String| shown(name.as_bytes()));
+    match names {
+        names if names.len() > limit => Err(LogProblem::TooManyColumns { limit }),
+        names if preamble::is_numeric(names) => Err(LogProblem::NoHeader),
+        [one] => Err(LogProblem::NoSeparator { text: text(one) }),
+        _ => Ok(()),
+    }
+}
+
+fn texts(row: &Record) -> Vec<String> {
+    row.cells().map(|cell| preamble::text(cell.text)).collect()
+}
+
+/// Whether a row holds the units of the columns: no number, at least two units, and nothing as
+/// long as a remark.
+fn is_units(row: &Record) -> bool {
+    let cells = texts(row);
+    let inside = |cell: &str| cell.trim_matches(['[', ']', '(', ')']).to_owned();
+    let known = |cell: &&String| units::is_known(&inside(cell));
+    let is_number = |cell: &String| cell.parse::<f64>().is_ok();
+    !cells.iter().any(is_number)
+        && cells
+            .iter()
+            .all(|cell| cell.chars().count() <= UNIT_CHARACTERS)
+        && cells.iter().filter(known).count() >= 2
+}
+
+/// Whether a line is neither blank nor a comment.
+fn is_row(line: &[u8], separator: u8) -> bool {
+    line.first() != Some(&COMMENT)
+        && (!line.iter().all(u8::is_ascii_whitespace) || line.contains(&separator))
+}
+
+/// A table, one row in hand at a time.
+pub struct Table<'a> {
+    /// What stands above the rows.
+    pub head: Head,
+    pub(super) lines: Lines<'a>,
+    /// The row in hand.
+    pub(super) row: Record,
+    separator: u8,
+    /// The line of the last row, if no line break follows it.
+    pub(super) open_line: Option<usize>,
+}
+
+impl<'a> Table<'a> {
+    /// Opens a table, and reads what stands above its rows.
+    ///
+    /// Cells are separated by commas, semicolons or tabs, whichever the header has most;
+    /// lines end in LF, CRLF or CR, a line that starts with `#` is a comment, blank lines are
+    /// skipped. Notes may stand above the header, which is recognised by the names of its
+    /// columns, and a row of units below it. Numbers may have decimal commas where commas do not
+    /// separate cells. All this is decided by the first mebibyte of the text.
+    ///
+    /// # Errors
+    /// Those of reading, `Empty`, `NoHeader`, `NoSeparator`, `TooManyColumns`, `LineTooLong`.
+    pub fn open(text: TextReader<'a>, is_known: impl Fn(&str) -> bool) -> Result<Self, LogError> {
+        let path = text.path().to_path_buf();
+        let mut lines = Lines::new(text);
+        let opening = lines.opening()?;
+        let Some(header) = preamble::find_header(opening, is_known) else {
+            return Err(Place::of(path, None).refuse(LogProblem::Empty));
+        };
+        let (line, separator) = (header.line, header.separator);
+        let refused = |problem| Place::of(&path, line).refuse(problem);
+        check_names(&header.names).map_err(refused)?;
+        let rows = opening.get(header.end..).unwrap_or_default();
+        let mut row = Record::new(Dialect {
+            separator,
+            decimal_commas: decimal::has_decimal_commas(rows, separator),
+        });
+        let (mut units, mut dates, mut above) = (Vec::new(), Vec::new(), line);
+        for below in lines_of(rows).filter(|below| is_row(below.text, separator)) {
+            row.split(below.text);
+            if units.is_empty() && is_units(&row) {
+                units = texts(&row);
+                above = line + below.line;
+            } else {
+                dates = row.cells().map(|cell| is_date_time(cell.text)).collect();
+                break;
+            }
+        }
+        while lines.line < above && lines.next_line()?.is_some() {}
+        let head = Head {
+            path,
+            line,
+            names: header.names,
+            units,
+            dates,
+        };
+        Ok(Self {
+            head,
+            lines,
+            row,
+            separator,
+            open_line: None,
+        })
+    }
+
+    /// The median time between the rows that follow in one movement, us, by the next mebibyte of the
+    /// text; `None` if that does not show it.
+    ///
+    /// # Errors
+    /// Those of reading, `LineTooLong`.
+    pub fn period_us(
+        &mut self,
+        time: Source,
+        movement: Option<Source>,
+    ) -> Result<Option<f64>, LogError> {
+        let (mut clock, mut before, mut steps) = (Clock::default(), None, Vec::new());
+        for line in lines_of(self.lines.opening()?).filter(|l| is_row(l.text, self.separator)) {
+            self.row.split(line.text);
+            let movement = movement.map(|source| self.row.cell(source.cell).text.to_vec());
+            if let Ok(t_us) = clock.t_us(self.row.cell(time.cell), time.scale) {
+                if let Some((same, before_us)) = before
+                    && same == movement
+                    && before_us < t_us
+                {
+                    steps.push(t_us - before_us);
+                }
+                before = Some((movement, t_us));
+            }
+        }
+        Ok(median(&mut steps))
+    }
+
+    /// Takes the next row in hand; `false` at the end.
+    ///
+    /// # Errors
+    /// Those of reading, `LineTooLong`, `CellCount`, `CutLine`.
+    pub fn next_row(&mut self) -> Result<bool, LogError> {
+        let expected = self.head.names.len();
+        loop {
+            let Some(line) = self.lines.next_line()? else {
+                return Ok(false);
+            };
+            if is_row(line, self.separator) {
+                self.row.split(line);
+                break;
+            }
+        }
+        let (found, line) = (self.row.len(), self.lines.line);
+        let refuse = |problem| Err(Place::of(&self.head.path, line).refuse(problem));
+        if self.lines.is_open() {
+            self.open_line = Some(line);
+            let last_is_empty = self.row.cell(found.saturating_sub(1)).text.is_empty();
+            if found < expected || (found == expected && last_is_empty) {
+                let found = found - usize::from(last_is_empty);
+                return refuse(LogProblem::CutLine { expected, found });
+            }
+        }
+        match found == expected {
+            true => Ok(true),
+            false => refuse(LogProblem::CellCount { expected, found }),
+        }
+    }
+
+    /// A cell of the row in hand, from 0; empty if there is none.
+    pub fn cell(&self, cell: usize) -> Cell<'_> {
+        self.row.cell(cell)
+    }
+
+    /// The line of the row in hand, from 1.
+    pub const fn row_line(&self) -> usize {
+        self.lines.line
+    }
+}

@@ -1,0 +1,148 @@
+//! Reads the optional table `[motion]`: how far the stage moves in service, and how a calibration
+//! run may move it. An axis or key that it leaves out has its default.
+//!
+//! ```toml
+//! [motion]
+//! x = { service_m = 500e-6, amplitude_m = 450e-6, speed_m_per_s = 2e-3, acceleration_m_per_s2 = 0.03 }
+//! rx = { service_rad = 300e-6, speed_rad_per_s = 1e-3 }
+//! ```
+
+use super::document::Document;
+use super::error::StageError;
+
+/// How one axis moves, SI: m or rad, per s, per s2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisMotion {
+    /// Largest magnitude in service.
+    pub service: f64,
+    /// Largest magnitude in a calibration run; by default that of service.
+    pub amplitude: f64,
+    /// Largest speed; by default that of a sine over the range of service at 1 Hz.
+    pub speed: f64,
+    /// Largest acceleration; by default that of a sine over half the range of service at 2 Hz.
+    pub acceleration: f64,
+}
+
+/// How the stage moves along X, Y, Rz, Z, Rx, Ry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// The axes.
+    pub axes: [AxisMotion; 6],
+}
+
+/// The axes in the order of [`Motion::axes`], by their keys, and the default range in service of
+/// each, m or rad: that of the given logs.
+pub const AXES: [(&str, f64); 6] = [
+    ("x", 500e-6),
+    ("y", 800e-6),
+    ("rz", 500e-6),
+    ("z", 240e-6),
+    ("rx", 480e-6),
+    ("ry", 480e-6),
+];
+
+/// Default speed over range of service, 1/s: 2 pi 1 Hz. The fastest motion of the given logs,
+/// sines over half the range at up to 2 Hz, has the same.
+const SPEED: f64 = std::f64::consts::TAU;
+/// Default acceleration over range of service, 1/s2: that of those sines.
+const ACCELERATION: f64 = 2.0 * SPEED * SPEED;
+/// Ranges that make sense, m or rad: beyond the larger one no small angle is small.
+const RANGES: (f64, f64) = (1e-7, 1e-2);
+/// Speeds and accelerations that make sense, SI.
+const RATES: (f64, f64) = (1e-7, 1e3);
+
+impl AxisMotion {
+    /// The defaults of an axis that moves this far in service.
+    const fn within(service: f64) -> Self {
+        Self {
+            service,
+            amplitude: service,
+            speed: SPEED * service,
+            acceleration: ACCELERATION * service,
+        }
+    }
+}
+
+impl Default for Motion {
+    fn default() -> Self {
+        Self {
+            axes: AXES.map(|(_, service)| AxisMotion::within(service)),
+        }
+    }
+}
+
+/// The motion that the table describes.
+pub(super) fn motion(document: &Document<'_>) -> Result<Motion, StageError> {
+    let mut motion = Motion::default();
+    for (axis, (key, service)) in motion.axes.iter_mut().zip(AXES) {
+        let unit = if key.starts_with('r') { "rad" } else { "m" };
+        let table = format!("motion.{key}");
+        let keys = ["service", "amplitude", "speed", "acceleration"];
+        let per = ["", "", "_per_s", "_per_s2"];
+        let names = [0, 1, 2, 3].map(|k| format!("{}_{unit}{}", keys[k], per[k]));
+        let or = |k: usize, default: f64, range| -> Result<f64, StageError> {
+            let unit = format!("{unit}{}", ["", "", "/s", "/s2"][k]);
+            let given = document.number(&table, &names[k], range, &unit)?;
+            Ok(given.unwrap_or(default))
+        };
+        *axis = AxisMotion::within(or(0, service, RANGES)?);
+        // An axis may stand still in a run: what that costs is for the plan to say.
+        axis.amplitude = or(1, axis.amplitude, (0.0, RANGES.1))?;
+        axis.speed = or(2, axis.speed, RATES)?;
+        axis.acceleration = or(3, axis.acceleration, RATES)?;
+    }
+    Ok(motion)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stage::Stage;
+    use crate::stage::tests::SOUND;
+
+    fn parse(motion: &str) -> Result<Motion, String> {
+        let text = format!("{SOUND}[motion]\n{motion}");
+        let stage = Stage::from_toml(&text, "stage.toml".as_ref());
+        stage.map(|s| s.motion).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn what_the_table_leaves_out_has_its_default() {
+        let without = Stage::from_toml(SOUND, "stage.toml".as_ref()).expect("sound");
+        assert_eq!(without.motion, Motion::default());
+        let motion = parse(
+            "x = { service_m = 1e-3, acceleration_m_per_s2 = 0.5 }\nry = { amplitude_rad = 0.0 }\n",
+        )
+        .expect("sound");
+        let default = Motion::default();
+        assert_eq!(motion.axes[1..5], default.axes[1..5]);
+        let x = &motion.axes[0];
+        assert_eq!((x.amplitude, x.acceleration), (1e-3, 0.5));
+        assert!((x.speed - 2.0 * default.axes[0].speed).abs() < 1e-12);
+        let ry = &motion.axes[5];
+        assert_eq!((ry.service, ry.amplitude), (480e-6, 0.0));
+    }
+
+    #[test]
+    fn what_is_wrong_with_it_is_named_with_its_place() {
+        #[rustfmt::skip]
+        let cases = [
+            ("rotation = 3", 1, "rotation", "expected one of x, y, rz"),
+            ("z = 3", 5, "z", ""),
+            ("z = { amplitude_rad = 1e-4 }", 7, "z.amplitude_rad", "did you mean `amplitude_m`?"),
+            ("rx = { speed_rad_per_s = \"fast\" }", 26, "rx.speed_rad_per_s", ""),
+            ("y = { service_m = 0.8 }", 19, "y.service_m", "0.8 m is outside"),
+            ("y = { service_m = 0.0 }", 19, "y.service_m", "0 m is outside"),
+            ("y = { amplitude_m = -1e-4 }", 21, "y.amplitude_m", "-0.0001 m is outside"),
+            ("y = { speed_m_per_s = nan }", 23, "y.speed_m_per_s", "NaN m/s is outside"),
+        ];
+        for (motion, column, key, says) in cases {
+            let place = format!("41:{column}: `motion.{key}`: ");
+            let message = parse(motion).expect_err(motion);
+            assert!(
+                message.contains(&place) && message.contains(says),
+                "{message}"
+            );
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! A recording as CSV: the log in the columns of the given logs, and the truth.
+
+use super::recording::Recording;
+use hallstage_input::log::layout::Quantity;
+use hallstage_input::log_format::LogFormat;
+use hallstage_input::stage::Stage;
+use runtime::frame::MISSING_CODE;
+use std::fmt::Write;
+
+/// The columns of a truth file.
+pub const TRUTH_HEADER: &str = "movement,t_us,x_nm,y_nm,rz_nrad,z_nm,rx_nrad,ry_nrad";
+
+/// The log, in the columns and units that the stage names; by default those of the given logs:
+/// `movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm,cap1_cnt,..,hall_a_cnt,..`; then, in a climate, the
+/// temperatures that the stage names.
+pub fn log_csv(recording: &Recording, stage: &Stage) -> String {
+    let first = recording.movements.iter().flatten().next();
+    let in_climate = first.is_some_and(|sample| sample.temperature_mc != [MISSING_CODE; 2]);
+    let format = LogFormat::new(Quantity::BEAMS, in_climate, stage);
+    let mut text = format.header();
+    text.reserve(64 * recording.rows());
+    let per_nm = Quantity::BEAMS.map(|beam| 1e-9 / stage.log.column(beam).scale);
+    for (movement, samples) in (0..).zip(&recording.movements) {
+        for s in samples {
+            let beams = [0, 1, 2].map(|i| s.beams_nm[i] as f64 * per_nm[i]);
+            format.append(&mut text, (movement, s.t_us), beams, &s.codes(0));
+        }
+    }
+    text
+}
+
+/// The true poses, to 0.01 nm and nrad.
+pub fn truth_csv(recording: &Recording) -> String {
+    let mut text = format!("{TRUTH_HEADER}\n");
+    text.reserve(64 * recording.rows());
+    let movements = recording.truth.iter().zip(&recording.movements);
+    for (movement, (poses, samples)) in movements.enumerate() {
+        for (pose, sample) in poses.iter().zip(samples) {
+            let _ = write!(text, "{movement},{}", sample.t_us);
+            for value in pose.planar.iter().chain(&pose.vertical) {
+                // Rounded first, and zero added: never -0.00.
+                let hundredths = (value * 1e11).round() + 0.0;
+                let _ = write!(text, ",{:.2}", hundredths / 100.0);
+            }
+            text.push('\n');
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pose::StagePose;
+    use crate::recording::Sample;
+    use hallstage_input::log::layout::Column;
+    use hallstage_input::log::{ReadOptions, read_bytes};
+    use hallstage_input::shipped::stage;
+
+    fn recording() -> Recording {
+        let sample = Sample {
+            t_us: 0,
+            beams_nm: [1, -2, 3],
+            capacitive: [4, -5, 6],
+            hall: [-7, 8, -9],
+            temperature_mc: [MISSING_CODE; 2],
+        };
+        let later = Sample {
+            t_us: 2000,
+            ..sample
+        };
+        let pose = StagePose {
+            planar: [1e-9, -2.346e-9, -1e-13],
+            vertical: [1.5e-4, 0.0, 3e-7],
+        };
+        Recording {
+            movements: vec![vec![sample, later], vec![sample]],
+            truth: vec![vec![StagePose::default(), pose], vec![pose]],
+        }
+    }
+
+    #[test]
+    fn the_columns_are_those_of_the_given_logs() {
+        let want = "movement,t_us,ifm_x_nm,ifm_y1_nm,ifm_y2_nm,cap1_cnt,cap2_cnt,cap3_cnt,hall_a_cnt,hall_b_cnt,hall_c_cnt\n\
+                    0,0,1,-2,3,4,-5,6,-7,8,-9\n0,2000,1,-2,3,4,-5,6,-7,8,-9\n1,0,1,-2,3,4,-5,6,-7,8,-9\n";
+        assert_eq!(log_csv(&recording(), &stage()), want);
+        let want = "movement,t_us,x_nm,y_nm,rz_nrad,z_nm,rx_nrad,ry_nrad\n\
+                    0,0,0.00,0.00,0.00,0.00,0.00,0.00\n0,2000,1.00,-2.35,0.00,150000.00,0.00,300.00\n\
+                    1,0,1.00,-2.35,0.00,150000.00,0.00,300.00\n";
+        assert_eq!(truth_csv(&recording()), want);
+    }
+
+    #[test]
+    fn a_log_in_other_columns_and_units_reads_back() {
+        let mut stage = stage();
+        let mut recording = recording();
+        recording.movements[0][1].temperature_mc = [20_348, MISSING_CODE];
+        recording.movements[0][0].temperature_mc = [-40_001, 29_000];
+        stage.temperature.columns = ["mount", "body"].map(|name| Some(name.to_owned()));
+        stage.log.ignored = ["mount", "body"].map(str::to_owned).to_vec();
+        stage.temperature.scale_mc = [1e3, -273_150.0];
+        let mut set = |quantity, name: &str, scale| {
+            let name = name.to_owned();
+            stage.log.set(quantity, Column { name, scale });
+        };
+        set(Quantity::Movement, "#run, \"no.\"", 1.0);
+        set(Quantity::Time, "time_ms", 1e3);
+        set(Quantity::BeamX, "ifm_x_um", 1e-6);
+        set(Quantity::HallA, "Hall A [V]", 1.0 / 3.125e-4);
+        let csv = log_csv(&recording, &stage);
+        let read = read_bytes(
+            csv.as_bytes(),
+            "log".as_ref(),
+            &stage,
+            &ReadOptions::default(),
+        );
+        let rows = read.expect("a sound log").dataset.rows;
+        assert_eq!((rows.len(), rows[1].t_us), (3, 2000));
+        assert!((rows[2].reference[0] - 1e-9).abs() < 1e-20);
+        assert_eq!(rows[2].frame.hall(), [-7, 8, -9]);
+        let read: Vec<_> = rows.iter().map(|row| row.frame.temperature_mc()).collect();
+        let written = recording.movements.iter().flatten();
+        assert!(
+            read.into_iter()
+                .eq(written.map(|sample| sample.temperature_mc))
+        );
+    }
+}

@@ -1,0 +1,152 @@
+//! From a pose to what the converters and the interferometers give.
+//!
+//! | what | value | source |
+//! |---|---|---|
+//! | Hall noise | 0.5 um rms at the designed scale | `README.md` of the given logs; fits leave 0.49-0.51 |
+//! | capacitive noise | 12 nm rms | same; 12.8 with the converter's steps |
+//! | noise of a beam | 5 nm rms | service logs against their truth |
+//! | drift of X and of Y | random walk, 110 nm after 1 s, 0.31 um after 8 s | same |
+//! | drift of Rz | random walk, 85 nrad after 1 s | same |
+//! | error of a reset in X and Y / in Rz | 2.1 um / 1.6 urad rms | first rows of the 171 movements of three paper logs |
+
+use super::pose::StagePose;
+use super::random::Stream;
+use hallstage_input::stage::{CodeScale, Stage};
+
+/// How imperfect the sensors are: standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorErrors {
+    /// White noise of a Hall reading at the designed scale, m.
+    pub hall_m: f64,
+    /// White noise of a gap, m.
+    pub gap_m: f64,
+    /// White noise of a beam, m.
+    pub beam_m: f64,
+    /// Drift of X, Y (m) and Rz (rad) after 1 s; it grows with the square root of time.
+    pub drift_per_root_s: [f64; 3],
+    /// Error of a reset in X, Y (m) and Rz (rad).
+    pub reset: [f64; 3],
+}
+
+impl SensorErrors {
+    /// Those of the given logs.
+    pub const USUAL: Self = Self {
+        hall_m: 0.5e-6,
+        gap_m: 12e-9,
+        beam_m: 5e-9,
+        drift_per_root_s: [110e-9, 110e-9, 85e-9],
+        reset: [2.1e-6, 2.1e-6, 1.6e-6],
+    };
+    /// None but the steps of the converters: for what a fit would find in a log without end.
+    pub const NONE: Self = Self {
+        hall_m: 0.0,
+        gap_m: 0.0,
+        beam_m: 0.0,
+        drift_per_root_s: [0.0; 3],
+        reset: [0.0; 3],
+    };
+}
+
+/// The code of a value, held at the converter's rails.
+pub fn code(value_m: f64, scale: &CodeScale) -> i32 {
+    let (low, high) = (scale.window.low - 1, scale.window.high + 1);
+    let code = (value_m / scale.m_per_count).round();
+    // A cast keeps to the range of the type.
+    (code as i32).clamp(low, high)
+}
+
+/// The gap changes at the capacitive sensors, which stand on the framework: heights of the
+/// stage's plane at their places, m.
+pub fn gaps_m(stage: &Stage, pose: &StagePose) -> [f64; 3] {
+    let (at, normal) = (pose.position_m(), pose.rotation().column(2).into_owned());
+    stage
+        .capacitive_probes_m
+        .map(|[x, y]| at.z - (normal.x * (x - at.x) + normal.y * (y - at.y)) / normal.z)
+}
+
+/// The displacements along the beams X, Y1, Y2 of X, Y, Rz, m: the Y beams meet the stage at
+/// plus and minus half their distance.
+pub fn beams_m(stage: &Stage, [x, y, rz]: [f64; 3]) -> [f64; 3] {
+    let half = 0.5 * stage.y_baseline_m * libm::sin(rz);
+    [x, y + half, y - half]
+}
+
+/// What the interferometers are off: a walk that starts at the error of the reset.
+#[derive(Clone, Copy, Debug)]
+pub struct ReferenceError {
+    error: [f64; 3],
+    step: [f64; 3],
+}
+
+impl ReferenceError {
+    /// That of a movement which starts now.
+    pub fn reset(
+        errors: &SensorErrors,
+        zeroed_truly: bool,
+        period_s: f64,
+        random: &mut Stream,
+    ) -> Self {
+        let reset = errors.reset.map(|deviation| random.normal(deviation));
+        let root = libm::sqrt(period_s);
+        Self {
+            error: if zeroed_truly { [0.0; 3] } else { reset },
+            step: errors.drift_per_root_s.map(|drift| drift * root),
+        }
+    }
+
+    /// The error now in X, Y (m) and Rz (rad); the walk then goes on by a servo period.
+    pub fn next(&mut self, random: &mut Stream) -> [f64; 3] {
+        let now = self.error;
+        for (error, step) in self.error.iter_mut().zip(self.step) {
+            *error += random.normal(step);
+        }
+        now
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Purpose;
+    use hallstage_input::shipped::stage;
+
+    #[test]
+    fn codes_are_rounded_and_stop_at_the_rails() {
+        let hall = stage().hall;
+        let codes = [-1.0, -2.5e-8, 0.0, 3.2e-8, 6.25e-5, 1.0].map(|x| code(x, &hall));
+        assert_eq!(codes, [-32768, 0, 0, 1, 1000, 32767]);
+    }
+
+    /// The stage's plane moves sideways with the stage: -Rx Y and Ry X.
+    #[test]
+    fn gaps_follow_the_tilted_plane_and_its_sideways_motion() {
+        let stage = stage();
+        let planar = [3e-4, -5e-4, 2e-4];
+        let [z, rx, ry] = [1e-4, 4e-4, -3e-4];
+        let vertical = [z, rx, ry];
+        let gaps = gaps_m(&stage, &StagePose { planar, vertical });
+        for (gap, [x, y]) in gaps.iter().zip(stage.capacitive_probes_m) {
+            let ([at_x, at_y, rz], plane) = (planar, z + rx * y - ry * x);
+            // Small angles to second order: Rx before Rz tilts by Rx Rz about Y.
+            let want = plane - rx * at_y + ry * at_x - rz * (rx * x + ry * y);
+            assert!((gap - want).abs() < 1e-10, "{gap}, not {want}");
+        }
+    }
+
+    #[test]
+    fn the_drift_after_a_movement_is_that_of_its_length() {
+        let mut random = Stream::new(3, Purpose::Sensors, 0);
+        let mut squares = [0.0; 3];
+        let walks = 400;
+        for _ in 0..walks {
+            let mut walk = ReferenceError::reset(&SensorErrors::USUAL, true, 0.002, &mut random);
+            assert_eq!(walk.next(&mut random), [0.0; 3]);
+            let end = (1..2000).fold([0.0; 3], |_, _| walk.next(&mut random));
+            (0..3).for_each(|i| squares[i] += end[i] * end[i]);
+        }
+        for (sum, per_root_s) in squares.iter().zip(SensorErrors::USUAL.drift_per_root_s) {
+            let ratio = (sum / f64::from(walks)).sqrt() / (2.0 * per_root_s);
+            assert!((0.9..1.1).contains(&ratio), "{ratio}");
+        }
+    }
+}

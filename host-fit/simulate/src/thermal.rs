@@ -1,0 +1,235 @@
+//! How a stage follows temperature, and how warm it is: of its mount (magnets, framework) and of its
+//! body (Hall elements, stage).
+//!
+//! | what | drawn: mean, standard deviation | source |
+//! |---|---|---|
+//! | remanence, NdFeB, with M | -0.11 %/K, 0.005 of a stage and 0.005 of each magnet | sheets of magnets; scatter assumed |
+//! | gain of a Hall element, with H | 0, 0.01 %/K | sheets of uncompensated parts |
+//! | offset of a Hall element, with H | 0, 1.6 uT/K at 1.3 T of remanence | same |
+//! | gap, with M | 0.4, 0.2 um/K | 20 mm of metal |
+//! | expansion of stage (H) and of framework (M) | 6e-6, 2e-6 1/K | ceramics, granite, steel |
+//! | error of a temperature sensor, for a run | 0, 25 mK | from run to run stable to 0.1 K |
+//! | its noise, each 100 ms | 0, 20 mK | `README.md` of the given logs |
+//!
+//! The working day is that of the given logs: work from 0 to 4 h and from 5 h on; a room with a wave of
+//! a day.
+
+use super::assembly::Assembly;
+use super::probe::Warmed;
+use super::random::{Purpose, Stream};
+use std::f64::consts::TAU;
+
+/// Temperature at which a stage is assembled and its amplifiers are trimmed, degC.
+pub const ASSEMBLED_C: f64 = 20.0;
+/// How long a converter holds a temperature, s.
+pub const HELD_S: f64 = 0.1;
+
+/// Remanence that offsets of Hall elements refer to, T.
+const REMANENCE_T: f64 = 1.3;
+const REMANENCE_PER_K: f64 = -1.1e-3;
+const REMANENCE_SCATTER_PER_K: f64 = 5e-5;
+const HALL_GAIN_PER_K: f64 = 1e-4;
+const HALL_OFFSET_PER_K: f64 = 1.6e-6 / REMANENCE_T;
+const GAP_M_PER_K: [f64; 2] = [0.4e-6, 0.2e-6];
+const EXPANSION_PER_K: [f64; 2] = [6e-6, 2e-6];
+const SENSOR_K: f64 = 0.025;
+const SENSOR_NOISE_K: f64 = 0.02;
+
+/// The body above the room when at work, K, and its time constant, s.
+const BODY: (f64, f64) = (5.2, 22.0 * 60.0);
+/// The mount above the room in parts of that, and its time constant, s.
+const MOUNT: (f64, f64) = (0.36, 46.0 * 60.0);
+/// Mean of the room, degC, amplitude of its wave, K, and the hour at which it rises through the mean.
+const ROOM: (f64, f64, f64) = (22.0, 1.8, 4.0);
+/// Work begins and pauses, h.
+const BEGINS_AND_PAUSES: [f64; 4] = [0.0, 4.0, 5.0, f64::INFINITY];
+
+/// Temperatures of mount and body during a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Climate {
+    /// Those of a working day; the run begins at this hour of it.
+    Day {
+        /// Hours after work begins; before it the stage is as warm as the room.
+        hour: f64,
+    },
+    /// All parts at one temperature, degC.
+    Steady(f64),
+}
+
+impl Climate {
+    /// Temperatures of mount and body a time after the run's begin (s), degC.
+    pub fn at(&self, time_s: f64) -> [f64; 2] {
+        match *self {
+            Self::Steady(celsius) => [celsius; 2],
+            Self::Day { hour } => {
+                let hour = hour + time_s / 3600.0;
+                let (mean_c, wave_k, rises) = ROOM;
+                let room_c = mean_c + wave_k * libm::sin(TAU / 24.0 * (hour - rises));
+                let (rise_k, lag_s) = BODY;
+                let (part, slow_s) = MOUNT;
+                let (mut body, mut mount) = (0.0, 0.0);
+                for (switch, at) in BEGINS_AND_PAUSES.into_iter().enumerate() {
+                    let since_s = (hour - at) * 3600.0;
+                    if since_s > 0.0 {
+                        let step = if switch % 2 == 0 { 1.0 } else { -1.0 };
+                        let [fast, slow] = [lag_s, slow_s].map(|lag| libm::exp(-since_s / lag));
+                        body += step * (1.0 - fast);
+                        // The mount follows the body.
+                        mount += step * (1.0 - (slow_s * slow - lag_s * fast) / (slow_s - lag_s));
+                    }
+                }
+                [room_c + part * rise_k * mount, room_c + rise_k * body]
+            }
+        }
+    }
+
+    /// What tells the noise of a run in this climate from that of the same run in another.
+    pub(super) const fn number(&self) -> u64 {
+        match *self {
+            Self::Day { hour } => hour.to_bits().rotate_left(1),
+            Self::Steady(celsius) => celsius.to_bits(),
+        }
+    }
+}
+
+/// How the parts of a stage follow temperature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thermal {
+    /// Of the magnets of A, B, C, 1/K.
+    pub remanence_per_k: [f64; 3],
+    /// Gain of the Hall elements of A, B, C, 1/K.
+    pub gain_per_k: [f64; 3],
+    /// Their offset, designed remanences per K.
+    pub offset_per_k: [f64; 3],
+    /// Growth of the gaps of A, B, C with the mount, m/K.
+    pub gap_m_per_k: [f64; 3],
+    /// Expansion of the framework (with the mount) and of the stage (with the body), 1/K.
+    pub expansion_per_k: [f64; 2],
+}
+
+impl Thermal {
+    /// That of the stage of a seed.
+    pub fn draw(seed: u64) -> Self {
+        let mut random = Stream::new(seed, Purpose::Thermal, 0);
+        let of_stage = REMANENCE_PER_K + random.normal(REMANENCE_SCATTER_PER_K);
+        let mut three = |mean: f64, deviation| [(); 3].map(|()| mean + random.normal(deviation));
+        Self {
+            remanence_per_k: three(of_stage, REMANENCE_SCATTER_PER_K),
+            gain_per_k: three(0.0, HALL_GAIN_PER_K),
+            offset_per_k: three(0.0, HALL_OFFSET_PER_K),
+            gap_m_per_k: three(GAP_M_PER_K[0], GAP_M_PER_K[1]),
+            expansion_per_k: [(); 2]
+                .map(|()| EXPANSION_PER_K[0] + random.normal(EXPANSION_PER_K[1])),
+        }
+    }
+
+    /// A stage with mount and body at these temperatures, degC.
+    pub fn warmed(&self, assembly: &Assembly, celsius: [f64; 2]) -> Assembly {
+        let [mount_k, body_k] = celsius.map(|celsius| celsius - ASSEMBLED_C);
+        let probe = |k: usize| {
+            assembly.probes[k].warmed(&Warmed {
+                remanence: 1.0 + self.remanence_per_k[k] * mount_k,
+                frame: self.expansion_per_k[0] * mount_k,
+                body: self.expansion_per_k[1] * body_k,
+                gap_m: self.gap_m_per_k[k] * mount_k,
+                element: [
+                    1.0 + self.gain_per_k[k] * body_k,
+                    self.offset_per_k[k] * body_k,
+                ],
+            })
+        };
+        Assembly {
+            probes: [probe(0), probe(1), probe(2)],
+        }
+    }
+}
+
+/// Two sensors of temperature: an error for the run, and noise.
+#[derive(Debug)]
+pub struct Thermometers {
+    random: Stream,
+    error_k: [f64; 2],
+}
+
+impl Thermometers {
+    /// Those of a run, by its number.
+    pub fn new(seed: u64, run: u64) -> Self {
+        // The stage itself has the first stream.
+        let mut random = Stream::new(seed, Purpose::Thermal, run + 1);
+        let error_k = [(); 2].map(|()| random.normal(SENSOR_K));
+        Self { random, error_k }
+    }
+
+    /// What they read of mount and body at these temperatures (degC), m degC.
+    pub fn read_mc(&mut self, celsius: [f64; 2]) -> [i32; 2] {
+        [0, 1].map(|k| {
+            let read = celsius[k] + self.error_k[k] + self.random.normal(SENSOR_NOISE_K);
+            (read * 1e3).round() as i32
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pose::StagePose;
+    use hallstage_input::shipped::stage;
+
+    /// Readings of the given day logs, degC: mount and body at the hour.
+    #[test]
+    fn the_day_is_that_of_the_given_logs() {
+        for (hour, mount_c, body_c) in [
+            (0.25, 20.60, 23.12),
+            (1.0, 21.55, 25.46),
+            (2.0, 22.42, 26.13),
+            (4.0, 23.55, 27.16),
+            (4.5, 23.41, 23.61),
+            (5.5, 23.50, 26.75),
+            (7.0, 24.81, 28.48),
+            (9.0, 25.37, 28.90),
+        ] {
+            let [mount, body] = Climate::Day { hour: 0.0 }.at(hour * 3600.0);
+            let off = [mount - mount_c, body - body_c];
+            assert!(off.iter().all(|x| x.abs() < 0.45), "{hour} h: {off:?}");
+        }
+    }
+
+    #[test]
+    fn a_stage_at_the_temperature_of_its_assembly_is_as_assembled() {
+        let assembly = Assembly::draw(&stage(), 3);
+        let same = Thermal::draw(3).warmed(&assembly, [ASSEMBLED_C; 2]);
+        assert_eq!(same, assembly);
+    }
+
+    /// Remanence and gap with the mount, the element with the body: -0.11 %/K, and 226 per m of 0.4 um/K.
+    #[test]
+    fn sensitivities_follow_both_temperatures() {
+        let slope = |assembly: &Assembly, probe: usize| {
+            let at = |u: f64| {
+                let planar = if probe == 2 {
+                    [u, 0.0, 0.0]
+                } else {
+                    [0.0, u, 0.0]
+                };
+                let vertical = [0.0; 3];
+                assembly.probes[probe].signal_m(&StagePose { planar, vertical })
+            };
+            at(1e-4) - at(-1e-4)
+        };
+        for seed in 0..10 {
+            let (assembly, thermal) = (Assembly::draw(&stage(), seed), Thermal::draw(seed));
+            for probe in 0..3 {
+                let change = |celsius| {
+                    let warmed = thermal.warmed(&assembly, celsius);
+                    (slope(&warmed, probe) / slope(&assembly, probe) - 1.0) / 5.0
+                };
+                let k = thermal.remanence_per_k[probe] - 226.0 * thermal.gap_m_per_k[probe];
+                let [mount, body] = [[25.0, 20.0], [20.0, 25.0]].map(change);
+                // What is left is the expansion: a probe beside the centre line moves across it.
+                assert!((mount - k).abs() < 1e-4, "{seed} {probe}: {mount} {k}");
+                let h = thermal.gain_per_k[probe];
+                assert!((body - h).abs() < 1e-4, "{seed} {probe}: {body} {h}");
+            }
+        }
+    }
+}
