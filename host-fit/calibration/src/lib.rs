@@ -7,5 +7,7 @@ pub mod judge;
 pub mod plan;
 pub mod recalibrate;
 #[cfg(test)]
+use hallstage_solver::problem;
+#[cfg(test)]
 #[path = "../../solver/src/problem/synthetic_for_tests.rs"]
 mod synthetic;
