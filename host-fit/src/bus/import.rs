@@ -20,10 +20,8 @@ pub mod reference;
 pub use error::ImportError;
 
 use crate::bus::BusAddress;
-use crate::calibrate::arguments::{between, choice};
 use crate::output::Output;
 use bus_log::BusCounts;
-use clap::Args;
 use hal_adapters::can::Layout;
 use hallstage_input::log_format::LogFormat;
 use hallstage_input::stage::Stage;
@@ -36,60 +34,33 @@ use serde::Serialize;
 use std::path::PathBuf;
 
 /// What is joined, and how.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug)]
 pub struct ImportSettings {
     /// Record of the bus, as `record`, `live --record` or `candump -L` writes it.
-    #[arg(value_name = "CANDUMP")]
     pub bus: PathBuf,
     /// Log of the interferometers: CSV with time, movement and beams (or pose), in the
     /// columns that stage.toml names.
-    #[arg(value_name = "REFERENCE")]
     pub reference: PathBuf,
     /// The stage as designed.
-    #[arg(long, value_name = "FILE", default_value = "stage.toml")]
     pub stage: PathBuf,
     /// Where to write the calibration log.
-    #[arg(long, value_name = "LOG.csv")]
     pub out: PathBuf,
     /// Largest time from a tick to the reference samples before and after it, us; one servo
     /// period if not given.
-    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub tolerance_us: Option<u32>,
     /// Time of the bus less time of the reference, us.
-    #[arg(
-        long,
-        value_name = "US",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
     pub offset_us: f64,
     /// Find the offset between the clocks, and how much faster one runs, by the motion that both
     /// saw.
-    #[arg(long, conflicts_with = "offset_us")]
     pub estimate_offset: bool,
     /// How far from "both records start together" the offset is looked for, s.
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        default_value_t = 2.0,
-        value_parser = search_seconds,
-        requires = "estimate_offset"
-    )]
     pub search_s: f64,
     /// Only frames of this interface, where the record holds several; can0@5 for those of node 5.
-    #[arg(long, value_name = "IFACE")]
     pub interface: Option<BusAddress>,
     /// How codes are put into frames; auto: as the first frame with codes shows.
-    #[arg(long, value_parser = choice::<Option<Layout>>(), default_value = "auto")]
-    pub layout: std::option::Option<Layout>,
+    pub layout: Option<Layout>,
     /// Leave out lines that cannot be read, and count them.
-    #[arg(long)]
     pub skip_bad_lines: bool,
-}
-
-/// Further than an hour apart, two records are dated by hand: `--offset-us`.
-fn search_seconds(text: &str) -> Result<f64, String> {
-    between(text, 0.0, 3600.0, "a number of seconds")
 }
 
 /// How an import went.

@@ -15,57 +15,37 @@ pub(crate) use bus::{Bus, now_us};
 pub use run::run;
 
 use crate::bus::BusAddress;
-use crate::calibrate::arguments::{hold, seconds};
 use crate::output::OutputError;
 use crate::output::blob_file::BlobFileError;
-use clap::Args;
 use runtime::OnInvalid;
 use std::path::PathBuf;
 use std::time::Duration;
 
 /// What is decoded, and how.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug)]
 pub struct LiveSettings {
     /// CAN interface, for instance can0; can0@5 for node 5 of the bus.
-    #[arg(long, value_name = "IFACE")]
     pub can: BusAddress,
     /// The parameter blob.
-    #[arg(value_name = "params.bin")]
     pub params: PathBuf,
     /// Refuse a blob of another stage than the one with this serial number.
-    #[arg(long, value_name = "TEXT")]
     pub serial: Option<String>,
     /// Record every frame received and sent, as `candump -L` does, in a new file.
-    #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
     /// Repeat the last valid pose for at most so many ticks where codes are bad.
-    #[arg(long, value_name = "N", default_value = "0", value_parser = hold)]
     pub hold: OnInvalid,
     /// Send each vertical axis in every so many ticks: 1, 2, 4, 8 or 16.
-    #[arg(long, value_name = "TICKS", default_value_t = 4, value_parser = vertical_ticks)]
     pub vertical_every: u8,
     /// Send nothing: only watch, record and show.
-    #[arg(long)]
     pub listen_only: bool,
     /// End after so many seconds; without it, on Ctrl-C.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub duration: Option<Duration>,
     /// Seconds from line to line where output is no terminal.
-    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
     pub every: Duration,
     /// Give up a tick whose frames are not all there after so long.
-    #[arg(long, value_name = "US", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub assembly_us: u32,
     /// Call the sensors stale after so long without a good frame.
-    #[arg(long, value_name = "US", default_value_t = 3_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub stale_us: u32,
-}
-
-fn vertical_ticks(text: &str) -> Result<u8, &'static str> {
-    match text.parse() {
-        Ok(ticks @ (1 | 2 | 4 | 8 | 16)) => Ok(ticks),
-        _ => Err("expected 1, 2, 4, 8 or 16"),
-    }
 }
 
 /// Why `live` ended early.

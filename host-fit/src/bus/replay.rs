@@ -4,7 +4,7 @@ mod pace;
 
 use crate::bus::BusAddress;
 use crate::bus::live::{Bus, BusError};
-use crate::calibrate::arguments::{between, choice};
+use crate::cli::arguments::{between, choice};
 use crate::output::is_standard;
 use clap::Args;
 use hal_adapters::can::sensor::{self, TemperatureSender};

@@ -1,7 +1,6 @@
 //! What `fit`, `check`, `eval` and `recalibrate` decide, before anything is written: fitted, diagnosed,
 //! repaired, refused or not. The command line and the Python package show the same.
 
-pub(crate) mod arguments;
 mod choice;
 mod evaluation;
 mod fitted;

@@ -1,6 +1,6 @@
 //! What several commands take: logs and their stage, numbers, the library's own choices by name.
 
-use crate::calibrate::arguments::between;
+use super::arguments::between;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;

@@ -1,7 +1,7 @@
 //! `host-fit decode`.
 
 use super::args::StageFile;
-use crate::calibrate::arguments::{choice, hold};
+use super::arguments::{choice, hold};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Output;

@@ -1,8 +1,8 @@
 //! `host-fit eval`.
 
 use super::args::{Json, Logs};
+use super::arguments::choice;
 use super::report::{Report, finish};
-use crate::calibrate::arguments::choice;
 use crate::calibrate::{EvalOrder, Evaluation};
 use crate::cli::error::HostError;
 use crate::cli::terminal;

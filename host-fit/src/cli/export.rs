@@ -1,6 +1,6 @@
 //! `host-fit export`.
 
-use crate::calibrate::arguments::choice;
+use super::arguments::choice;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::blob_file;

@@ -1,8 +1,8 @@
 //! `host-fit fit`.
 
 use super::args::{Json, Logs, Threads, blob_text};
+use super::arguments::{choice, train};
 use super::report::finish;
-use crate::calibrate::arguments::{choice, train};
 use crate::calibrate::{FitOrder, Limits, checked, loss_of, warnings_of};
 use crate::cli::error::HostError;
 use crate::cli::terminal;

@@ -2,6 +2,7 @@
 //! One file a command; the work is the library's.
 
 mod args;
+pub(crate) mod arguments;
 mod check;
 mod compare;
 mod decode;
@@ -30,8 +31,6 @@ mod terminal;
 mod threads;
 mod update;
 
-use crate::bus::import::ImportSettings;
-use crate::bus::live::LiveSettings;
 use crate::bus::replay::ReplaySettings;
 use crate::calibrate::other_scales;
 use crate::cli::error::HostError;
@@ -105,7 +104,7 @@ commands! {
     /// Bring a parameter blob up to date by a few seconds of log.
     Recalibrate(recalibrate::RecalibrateArgs) => recalibrate::run,
     /// Join a record of the CAN bus and a log of the interferometers into a calibration log.
-    Import(ImportSettings) => import::run,
+    Import(import::ImportArgs) => import::run,
     /// Decode a log with a parameter blob, by the code that runs on the target.
     Decode(decode::DecodeArgs) => decode::run,
     /// Show what a parameter blob holds.
@@ -115,7 +114,7 @@ commands! {
     /// Write a parameter blob as the file that a flash tool takes.
     Export(export::ExportArgs) => export::run,
     /// Decode the sensor frames of a CAN bus as they come, and publish the pose (Linux).
-    Live(LiveSettings) => live::run,
+    Live(live::LiveArgs) => live::run,
     /// Record the codes of a controller's own converter from a CAN bus (Linux).
     Record(record::RecordArgs) => record::run,
     /// Play a log onto a CAN bus as the sensor node would send it (Linux).

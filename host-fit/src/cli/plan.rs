@@ -1,7 +1,7 @@
 //! `host-fit plan`.
 
 use super::args::{Json, StageFile};
-use crate::calibrate::arguments::between;
+use super::arguments::between;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;

@@ -1,9 +1,9 @@
 //! `host-fit recalibrate`.
 
 use super::args::{Json, Logs};
+use super::arguments::choice;
 use super::report::finish;
 use crate::calibrate::Updated;
-use crate::calibrate::arguments::choice;
 use crate::cli::error::HostError;
 use crate::output::posterior_file::PosteriorFileError;
 use crate::output::{Outputs, posterior_file};

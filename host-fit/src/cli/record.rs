@@ -1,9 +1,9 @@
 //! `host-fit record`.
 
+use super::arguments::seconds;
 use super::key::KeyFile;
 use crate::bus::BusAddress;
 use crate::bus::recorder::{self, RecorderSettings};
-use crate::calibrate::arguments::seconds;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use clap::Args;

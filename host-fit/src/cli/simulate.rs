@@ -1,7 +1,7 @@
 //! `host-fit simulate`.
 
 use super::args::StageFile;
-use crate::calibrate::arguments::{between, choice};
+use super::arguments::{between, choice};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;

@@ -14,7 +14,7 @@
 pub mod curves;
 pub mod table;
 
-use crate::calibrate::arguments::{choice, train};
+use crate::cli::arguments::{choice, train};
 use clap::Args;
 use hallstage_calibration::fit::{FitError, calibration};
 use hallstage_calibration::judge::identify::check_motion;

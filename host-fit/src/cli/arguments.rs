@@ -1,6 +1,6 @@
-//! How the arguments of a command line are read.
+//! Parsers of arguments that several commands take.
 
-use super::Choice;
+use crate::calibrate::Choice;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use runtime::OnInvalid;
 use std::num::ParseIntError;
