@@ -1,59 +1,77 @@
-//! `cargo bench -p host-fit --bench search -- DIR` writes the 200 rows of the paper's experiment, its
-//! bounds and one individual with its fitness into DIR, for other programs to be measured on the same
-//! problem, and prints what this one does with it. (`host-fit compare` has the other figures.)
+//! The solvers of the paper beside each other and beside least squares, and the paper's problem as
+//! files for other programs:
+//!
+//! ```sh
+//! cargo bench -p host-fit --bench search -- DIR
+//! ```
+//!
+//! Writes into DIR the 200 rows of the paper's experiment (`rows.csv`), its bounds and one individual
+//! (`unknowns.csv`), and every generation of every search (`history.csv`). Prints the time of an
+//! evaluation as `RESULT key=value` lines, and the table of `README.md`.
 
 mod common;
 
 use common::{Fallible, median, median_s, read};
+use host_fit::calibration::fit::calibration;
+use host_fit::calibration::judge::{Decoded, Zeros};
+use host_fit::input::dataset::Dataset;
 use host_fit::input::shipped::{self, LOG_GZ};
 use host_fit::solver::problem::Problem;
 use host_fit::solver::problem::draw::{Draw, draw_rows};
 use host_fit::solver::problem::model::Model;
-use host_fit::solver::solve::Projection;
 use host_fit::solver::solve::objective::Objective;
 use host_fit::solver::solve::search::cost::CostFunction;
 use host_fit::solver::solve::search::kind::SearchKind;
 use host_fit::solver::solve::search::run::{Start, StopCriteria};
+use host_fit::solver::solve::{Projection, Solution, Solver, SolverOptions};
 use runtime::ModelKind;
+use runtime::calibration::Origin;
 use std::fmt::Write;
 use std::path::Path;
 
 /// Np and Gm of the paper.
 const PAPER: usize = 100;
+/// Evaluations of the paper: the first population and two phases of each generation.
+const EVALUATIONS: f64 = 20_100.0;
 /// Rows of the paper's experiment.
 const ROWS: usize = 200;
+/// Each solver runs with the seeds 1 to 10; a seed draws the rows and the first population.
+const SEEDS: u64 = 10;
+/// A search is near once its fitness is within 1 % of the least-squares fitness, and exact once
+/// the sum of squares is within 1e-6.
+const NEAR: f64 = 0.01;
+const EXACT: f64 = 5e-7;
 
-/// An individual inside the middle half of the box.
-fn inside(cost: &Objective<'_>, number: usize) -> Vec<f64> {
-    let place = |(j, range): (usize, &host_fit::input::stage::Range)| {
-        let share = 0.25 + 0.5 * ((number * 31 + j * 17) % 97) as f64 / 96.0;
-        range.low + share * range.width()
-    };
-    cost.bounds().iter().enumerate().map(place).collect()
-}
-
-fn objective<'a>(problem: &'a Problem<'a>, projection: Projection) -> Objective<'a> {
-    Objective::new(problem, projection).expect("Model (31) has slopes")
-}
-
-fn start(seed: u64, population: usize) -> Start<'static> {
-    Start {
-        seed,
-        population,
-        individuals: &[],
-    }
-}
-
-fn generations(count: usize) -> StopCriteria<'static> {
-    StopCriteria {
-        generations: Some(count),
-        ..StopCriteria::default()
-    }
-}
-
-/// Writes the paper's problem of seed 1 for other programs, and measures this one on it.
-fn export(folder: &Path, problem: &Problem<'_>) -> Fallible<()> {
+fn main() -> Fallible<()> {
+    // Cargo passes `--bench`.
+    let folder = std::env::args().skip(1).find(|a| !a.starts_with("--"));
+    let folder = folder.ok_or("name a folder")?;
+    let folder = Path::new(&folder);
     std::fs::create_dir_all(folder)?;
+    let stage = shipped::stage();
+    let dataset = read(LOG_GZ, &stage)?;
+    let problem = |draw, seed| {
+        let rows = draw_rows(&dataset, ROWS, draw, seed);
+        Problem::new(&dataset, &rows, &stage, Model::of(ModelKind::M31))
+    };
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    one.install(|| export(folder, &problem(Draw::Plain, 1)).map_err(|e| e.to_string()))?;
+    let problems: Vec<Problem<'_>> = (1..=SEEDS)
+        .map(|seed| problem(Draw::Stratified, seed))
+        .collect();
+    let mut history = String::from("form,solver,seed,evaluations,fitness,p\n");
+    println!(
+        "| form | solver | train fitness: median (range) | X, Y, Rz rms, median (um, um, urad) \
+         | within 1 % of the floor | at the floor (1e-6) |\n|---|---|---|---|---|---|"
+    );
+    for form in [Projection::None, Projection::Delta, Projection::Linear] {
+        compare(form, &problems, &dataset, &mut history)?;
+    }
+    Ok(std::fs::write(folder.join("history.csv"), history)?)
+}
+
+/// Writes the paper's problem for other programs, and measures an evaluation.
+fn export(folder: &Path, problem: &Problem<'_>) -> Fallible<()> {
     let mut rows =
         String::from("movement,s_a_um,s_b_um,s_c_um,z_m,rx_rad,ry_rad,x_um,y_um,rz_urad\n");
     for group in &problem.groups {
@@ -66,41 +84,155 @@ fn export(folder: &Path, problem: &Problem<'_>) -> Fallible<()> {
     }
     std::fs::write(folder.join("rows.csv"), rows)?;
     let cost = objective(problem, Projection::None);
-    let individual = inside(&cost, 1);
+    // Inside the middle half of the box.
+    let place = |(j, range): (usize, &host_fit::input::stage::Range)| {
+        range.low + (0.25 + 0.5 * ((31 + j * 17) % 97) as f64 / 96.0) * range.width()
+    };
+    let individual: Vec<f64> = cost.bounds().iter().enumerate().map(place).collect();
     let mut unknowns = String::from("low,high,individual\n");
     for (range, x) in cost.bounds().iter().zip(&individual) {
         writeln!(unknowns, "{},{},{x}", range.low, range.high)?;
     }
     std::fs::write(folder.join("unknowns.csv"), unknowns)?;
-    for (kind, name) in [(SearchKind::Tlbo, "tlbo"), (SearchKind::Shtlbo, "shtlbo")] {
+    for kind in [SearchKind::Tlbo, SearchKind::Shtlbo] {
         let mut fitness = Vec::new();
-        let middle_s = median_s(5, || {
+        let seconds = median_s(5, || {
             let seed = fitness.len() as u64 + 1;
-            let found = kind.minimize(&cost, &start(seed, PAPER), &generations(PAPER));
-            fitness.push(found.cost);
+            let start = Start {
+                seed,
+                population: PAPER,
+                individuals: &[],
+            };
+            fitness.push(kind.minimize(&cost, &start, &budget()).cost);
         });
-        println!(
-            "RESULT {name}_us_per_evaluation={:.4}",
-            1e6 * middle_s / 20_100.0
-        );
+        let (name, each_us) = (kind.name(), 1e6 * seconds / EVALUATIONS);
+        println!("RESULT {name}_us_per_evaluation={each_us:.4}");
         println!("RESULT {name}_fitness={:.4}", median(fitness));
     }
-    println!(
-        "RESULT fitness_of_individual={:.12}",
-        cost.cost(&individual)
-    );
+    let cost = cost.cost(&individual);
+    println!("RESULT fitness_of_individual={cost:.12}");
     Ok(())
 }
 
-fn main() -> Fallible<()> {
-    // Cargo passes `--bench`.
-    let folder = std::env::args().skip(1).find(|a| !a.starts_with("--"));
-    let folder = folder.ok_or("name a folder")?;
-    let stage = shipped::stage();
-    let dataset = read(LOG_GZ, &stage)?;
-    let rows = draw_rows(&dataset, ROWS, Draw::Plain, 1);
-    let problem = Problem::new(&dataset, &rows, &stage, Model::of(ModelKind::M31));
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let done = one.install(|| export(Path::new(&folder), &problem).map_err(|e| e.to_string()));
-    done.map_err(Into::into)
+fn objective<'a>(problem: &'a Problem<'a>, form: Projection) -> Objective<'a> {
+    Objective::new(problem, form).expect("Model (31) has slopes")
+}
+
+/// The evaluations of the paper.
+fn budget() -> StopCriteria<'static> {
+    StopCriteria {
+        generations: Some(PAPER),
+        ..StopCriteria::default()
+    }
+}
+
+/// Least squares and every search on one form of each problem: prints a line for each solver.
+fn compare(
+    form: Projection,
+    problems: &[Problem<'_>],
+    dataset: &Dataset,
+    history: &mut String,
+) -> Fallible<()> {
+    let floors = (1..).zip(problems).map(|(seed, problem)| {
+        Solver::LeastSquares.solve(problem, &SolverOptions::new(form, seed))
+    });
+    let floors: Vec<Solution> = floors.collect::<Result<_, _>>()?;
+    let runs = problems.iter().zip(&floors);
+    let runs: Vec<Run> = runs
+        .map(|(problem, floor)| Run::new(problem, floor, floor, dataset))
+        .collect();
+    print(form, "lm", &runs);
+    for kind in SearchKind::ALL {
+        let mut runs = Vec::new();
+        for (seed, (problem, floor)) in (1..).zip(problems.iter().zip(&floors)) {
+            let options = SolverOptions {
+                population: PAPER,
+                generations: PAPER,
+                ..SolverOptions::new(form, seed)
+            };
+            let found = Solver::Search(kind).solve(problem, &options)?;
+            for point in &found.history {
+                let p = point.p.map_or(String::new(), |p| p.to_string());
+                let (form, name) = (form.name(), kind.name());
+                let (evaluations, fitness) = (point.evaluations, point.best_cost);
+                writeln!(history, "{form},{name},{seed},{evaluations},{fitness},{p}")?;
+            }
+            runs.push(Run::new(problem, &found, floor, dataset));
+        }
+        print(form, &format!("{} ({})", kind.name(), kind.source()), &runs);
+    }
+    Ok(())
+}
+
+/// One solver on one problem.
+struct Run {
+    /// Fitness over the rows of the problem, um, um, urad.
+    fitness: f64,
+    /// Evaluations until the search was near, and exact.
+    arrivals: [Option<f64>; 2],
+    /// rms over all rows of the log, zero deviations refitted, um, um, urad; `None` where the
+    /// parameters cannot serve a decoder.
+    rms: Option<[f64; 3]>,
+}
+
+impl Run {
+    fn new(problem: &Problem<'_>, found: &Solution, floor: &Solution, dataset: &Dataset) -> Self {
+        let (fitness, floor) = (problem.fitness(found.cost), problem.fitness(floor.cost));
+        let arrival = |share: f64| {
+            let is_near = |fitness: f64| fitness <= floor * (1.0 + share);
+            let mut points = found.history.iter();
+            let first = points.find(|point| is_near(point.best_cost));
+            let first = first.map(|point| point.evaluations as f64);
+            let is_search = !found.history.is_empty();
+            first.or((!is_search && is_near(fitness)).then_some(found.evaluations as f64))
+        };
+        let (stage, parameters) = (problem.stage, &found.parameters);
+        let calibration = calibration(&dataset.rows, stage, problem.model, parameters);
+        let set = calibration.prepare(&Origin::default()).ok();
+        let rms = set.map(|set| {
+            let judged = Decoded::new(&set, dataset).judge(dataset, stage, Zeros::Refit);
+            judged.errors.axes.map(|axis| axis.rms * 1e6)
+        });
+        Self {
+            fitness,
+            arrivals: [NEAR, EXACT].map(arrival),
+            rms,
+        }
+    }
+}
+
+fn print(form: Projection, solver: &str, runs: &[Run]) {
+    let fitness = || runs.iter().map(|run| run.fitness);
+    let (low, high) = (
+        fitness().fold(f64::INFINITY, f64::min),
+        fitness().fold(0.0, f64::max),
+    );
+    let fitness = median(fitness().collect());
+    let sound: Vec<[f64; 3]> = runs.iter().filter_map(|run| run.rms).collect();
+    let rms = match sound.len() {
+        0 => "-".to_owned(),
+        count => {
+            let axis = |axis: usize| median(sound.iter().map(|rms| rms[axis]).collect());
+            let [x, y, rz] = [0, 1, 2].map(axis);
+            let part = match count == runs.len() {
+                true => String::new(),
+                false => format!(" ({count} of {})", runs.len()),
+            };
+            format!("{x:.3}, {y:.3}, {rz:.3}{part}")
+        }
+    };
+    let arrivals = [0, 1].map(|k| {
+        let arrived: Vec<f64> = runs.iter().filter_map(|run| run.arrivals[k]).collect();
+        let when = match arrived.len() {
+            0 => String::new(),
+            _ => format!(", {:.0} evaluations", median(arrived.clone())),
+        };
+        format!("{} of {}{when}", arrived.len(), runs.len())
+    });
+    println!(
+        "| {form} | {solver} | {fitness:.3} ({low:.3} to {high:.3}) | {rms} | {} | {} |",
+        arrivals[0],
+        arrivals[1],
+        form = form.name(),
+    );
 }

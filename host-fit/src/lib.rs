@@ -10,7 +10,6 @@
 //! | [`output`] | blobs, pose files and images for flash tools, written whole or not at all |
 //! | [`report`] | JSON, tables, plots, an HTML page |
 //! | [`calibrate`] | what the commands decide: used, refused or forced |
-//! | [`compare`] | the solvers beside each other |
 //! | [`diff`] | what changed between two blobs |
 //! | [`bus`] | the stage on a CAN bus: decoded as it comes, played from a log, made into a log |
 //! | [`cli`] | the commands |
@@ -24,7 +23,6 @@ pub use {
 pub mod bus;
 pub mod calibrate;
 pub mod cli;
-pub mod compare;
 pub mod diff;
 pub mod output;
 pub mod report;

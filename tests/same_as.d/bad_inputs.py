@@ -170,7 +170,6 @@ def bad_inputs(inputs):
         "address not aligned": ["export", blob, "--address", "0x08000001", "--out", "x.hex"],
         "no such slot": ["export", blob, "--slot", "2", "--out", "x.hex"],
         "slot and address": ["export", blob, "--slot", "0", "--address", "0", "--out", "x.hex"],
-        "compare with no seeds": ["compare", *sound, "--seeds", "0"],
         "import of a log": ["import", sound[0], f"{IN}/interferometer.csv", *sound[1:], "--out", "x.csv"],
         "import without reference": ["import", record, record, *sound[1:], "--out", "x.csv"],
         "import far off": [*import_record, "--offset-us", "900000000"],

@@ -10,7 +10,7 @@ from candump import candump
 KINDS = ("paper", "combined", "service", "run30", "run8")
 MODELS = ("auto", "12", "15", "30", "31")
 PROJECTIONS = ("none", "delta", "linear")
-SEARCHES = "shtlbo tlbo gbtlbo mutation hybrid success-ratio de pso ga cmaes random".split()
+SEARCHES = "shtlbo tlbo gbtlbo mutation hybrid success-ratio".split()
 # Inputs lie beside the folder of each run.
 IN = "../../in"
 
@@ -142,10 +142,6 @@ def cases(logs):
     for log in logs:
         yield from fits(log)
         yield from readers(log)
-        few = ["--seeds", "2", "--evaluations", "1500", "--out", "."]
-        if log.shipped or log.name.endswith(("paper", "run8")):
-            # Its table is full of times.
-            yield Case(f"{log.name}: compare", ["compare", *log.arguments, *few], message=False)
     stages = {}
     for log in logs:
         if "-" in log.name:

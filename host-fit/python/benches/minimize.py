@@ -83,8 +83,6 @@ SEARCHES: list[tuple[str, str, Any]] = [
     ("hallstage shtlbo", "one", ours("shtlbo", False)),
     ("hallstage tlbo", "batch", ours("tlbo", True)),
     ("hallstage tlbo", "one", ours("tlbo", False)),
-    ("hallstage de", "batch", ours("de", True)),
-    ("hallstage cmaes", "batch", ours("cmaes", True)),
     ("MEALPY TLBO", "one", mealpy),
     ("SciPy differential_evolution", "batch", scipy(True)),
     ("SciPy differential_evolution", "one", scipy(False)),

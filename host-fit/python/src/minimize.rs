@@ -131,7 +131,7 @@ impl CostFunction for Function<'_> {
 ///     Lower and upper end of each unknown, finite. A place outside is moved to the nearer end.
 /// method : str
 ///     "shtlbo" (equations 23, 24, 27-29 of the paper), "tlbo" (16-18), "gbtlbo" (19, 20), "mutation" (21, 22),
-///     "hybrid" (23, 24), "success-ratio" (23-25), or "de", "pso", "ga", "cmaes", "random".
+///     "hybrid" (23, 24), "success-ratio" (23-25).
 /// seed : int
 ///     Seed of all random numbers, from 0 to 2**64 - 1: the same seed gives the same result.
 /// population : int

@@ -10,7 +10,6 @@ use hallstage_solver::problem::draw::Draw;
 use hallstage_solver::problem::model::MODELS;
 use hallstage_solver::solve::field::update::Change;
 use hallstage_solver::solve::robust::Loss;
-use hallstage_solver::solve::search::kind::SearchKind;
 use hallstage_solver::solve::{Projection, Solver};
 
 /// A type whose values are chosen by name.
@@ -83,13 +82,6 @@ impl Choice for Option<Layout> {
             (Some(Layout::Bits16), "16", "16 bits: two frames a tick"),
             (Some(Layout::Bits24), "24", "24 bits: three frames a tick"),
         ]
-    }
-}
-
-impl Choice for SearchKind {
-    fn all() -> Vec<(Self, &'static str, &'static str)> {
-        let named = Self::ALL.iter().map(|value| (*value, value.name(), ""));
-        named.collect()
     }
 }
 

@@ -4,7 +4,6 @@
 mod args;
 pub(crate) mod arguments;
 mod check;
-mod compare;
 mod decode;
 mod demo;
 mod diff;
@@ -127,17 +126,14 @@ commands! {
     ReadBack(read_back::ReadBackArgs) => read_back::run,
     /// Make the pose of a stage at rest the zero of its controller (Linux).
     Rezero(rezero::RezeroArgs) => rezero::run,
-    /// Compare the solvers on one or more logs, over several seeds at equal evaluations.
-    Compare(compare::CompareArgs) => compare::run,
 }
 
 /// The first command of each group, in the order of the commands.
-const GROUPS: [(&str, &str); 5] = [
+const GROUPS: [(&str, &str); 4] = [
     ("Start", "demo"),
     ("Calibrate", "check"),
     ("Use", "decode"),
     ("Controller", "live"),
-    ("Research", "compare"),
 ];
 
 /// The command line, its commands in groups.
@@ -182,7 +178,6 @@ fn run(cli: &Cli) -> u8 {
     }
     threads::start(match &cli.command {
         Command::Fit(args) => args.threads.number,
-        Command::Compare(args) => args.threads.number,
         _ => None,
     });
     match cli.command.run() {

@@ -28,19 +28,12 @@ fn an_output_that_cannot_be_written_is_refused_and_the_old_one_stays() {
 #[test]
 fn no_output_takes_the_place_of_an_input() {
     let bench = Bench::with_log();
-    for folder in ["r", "c"] {
-        std::fs::create_dir(bench.path(folder)).expect("a folder");
-    }
-    for file in ["r/index.html", "c/runs.csv"] {
-        bench.write(file, log());
-    }
+    std::fs::create_dir(bench.path("r")).expect("a folder");
+    bench.write("r/index.html", log());
     let taken = |command: &str| bench.bad(command, 2, &["name another"]);
     taken("fit r/index.html --out p.bin --report r");
     taken("fit log.csv --out r/index.html --report r");
     taken("fit log.csv --out p.bin --json r/index.html --report r");
-    taken("compare c/runs.csv --out c --seeds 1 --evaluations 100");
-    bench.write("c/table.md", "");
-    taken("compare log.csv --stage c/table.md --out c --seeds 1 --evaluations 100");
     let stage = std::fs::read(bench.path("stage.toml")).expect("there");
     std::fs::write(bench.path("stage.toml"), [&stage[..], b"# mine\n"].concat()).expect("written");
     taken("demo --out .");

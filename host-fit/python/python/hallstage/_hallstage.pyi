@@ -31,9 +31,7 @@ __all__ = [
     "write_demo",
 ]
 
-_Method = Literal[
-    "shtlbo", "tlbo", "gbtlbo", "mutation", "hybrid", "success-ratio", "de", "pso", "ga", "cmaes", "random"
-]
+_Method = Literal["shtlbo", "tlbo", "gbtlbo", "mutation", "hybrid", "success-ratio"]
 
 def main_of(arguments: Sequence[str]) -> int: ...
 def write_demo(folder: _Path) -> None: ...

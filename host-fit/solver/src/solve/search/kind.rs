@@ -2,11 +2,6 @@
 
 use super::cost::CostFunction;
 use super::mixing::{Adaptation, Step};
-use super::peers::cmaes::Covariance;
-use super::peers::de::Differential;
-use super::peers::ga::Genetic;
-use super::peers::pso::Swarm;
-use super::peers::random::RandomDraws;
 use super::run::{Outcome, Start, StopCriteria, run};
 use super::tlbo::Tlbo;
 
@@ -25,31 +20,16 @@ pub enum SearchKind {
     Hybrid,
     /// The hybrid with p by the success ratio (equation 25).
     SuccessRatio,
-    /// Differential evolution.
-    De,
-    /// Particle swarm.
-    Pso,
-    /// Genetic algorithm.
-    Ga,
-    /// CMA-ES.
-    Cmaes,
-    /// Random draws.
-    Random,
 }
 
 /// The searches with their names and where they come from, the paper's and its ablations first.
-const TABLE: [(SearchKind, &str, &str); 11] = [
+const TABLE: [(SearchKind, &str, &str); 6] = [
     (SearchKind::Shtlbo, "shtlbo", "eqs 23, 24, 27-29"),
     (SearchKind::Tlbo, "tlbo", "eqs 16-18"),
     (SearchKind::Gbtlbo, "gbtlbo", "eqs 19, 20"),
     (SearchKind::Mutation, "mutation", "eqs 21, 22"),
     (SearchKind::Hybrid, "hybrid", "eqs 23, 24"),
     (SearchKind::SuccessRatio, "success-ratio", "eqs 23-25"),
-    (SearchKind::De, "de", "DE/rand/1/bin"),
-    (SearchKind::Pso, "pso", "global best"),
-    (SearchKind::Ga, "ga", "breeder GA"),
-    (SearchKind::Cmaes, "cmaes", "tutorial of 2016"),
-    (SearchKind::Random, "random", "uniform draws"),
 ];
 
 impl SearchKind {
@@ -90,16 +70,6 @@ impl SearchKind {
             Self::Mutation => tlbo(Tlbo::pure(Step::Mutate)),
             Self::Hybrid => tlbo(Tlbo::hybrid(Adaptation::Fixed, 1)),
             Self::SuccessRatio => tlbo(Tlbo::hybrid(Adaptation::SuccessRatio, 1)),
-            Self::De => run(Differential, function, start, criteria),
-            Self::Pso => run(Swarm::default(), function, start, criteria),
-            Self::Ga => run(Genetic, function, start, criteria),
-            Self::Cmaes => run(
-                Covariance::new(function.bounds(), start),
-                function,
-                start,
-                criteria,
-            ),
-            Self::Random => run(RandomDraws, function, start, criteria),
         }
     }
 }

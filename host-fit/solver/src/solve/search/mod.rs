@@ -1,4 +1,4 @@
-//! Population searches: SHTLBO, its relatives and its peers, behind one interface.
+//! Population searches: SHTLBO and its relatives.
 //!
 //! A [`cost::CostFunction`] says what is minimized and in which box; a [`kind::SearchKind`]
 //! names a method; [`run::StopCriteria`] say when to stop; a [`run::Outcome`] says what was
@@ -13,14 +13,12 @@
 //! | [`tlbo`] | the phases, the hybrids (equations 23, 24, 26), SHTLBO |
 //! | [`population`] | individuals; a generation: what all searches share |
 //! | [`run`] | generations, stop criteria, history |
-//! | [`peers`] | DE, PSO, GA, CMA-ES, random draws |
 //! | [`kind`] | all searches by name |
 
 pub mod cost;
 pub mod kind;
 pub mod mixing;
 pub mod operators;
-pub mod peers;
 pub mod population;
 pub mod random;
 pub mod run;

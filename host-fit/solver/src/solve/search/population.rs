@@ -82,11 +82,8 @@ pub trait Breeding: Sync {
         improve(population, candidates);
     }
 
-    /// Learns from a whole generation; they are numbered from 1. `false`: there is nothing more to
-    /// do.
-    fn end(&mut self, _generation: usize) -> bool {
-        true
-    }
+    /// Learns from a whole generation; they are numbered from 1.
+    fn end(&mut self, _generation: usize) {}
 
     /// p, if the search has one.
     fn p(&self) -> Option<f64> {
@@ -175,8 +172,8 @@ impl<'f, B: Breeding, R: RandomSource, S: Fn(usize, Phase, usize) -> R + Sync> S
         (self.candidates, self.notes) = (candidates, notes);
     }
 
-    /// Runs one generation, numbered from 1. `false`: there is nothing more to do.
-    pub fn generation(&mut self, number: usize) -> bool {
+    /// Runs one generation, numbered from 1.
+    pub fn generation(&mut self, number: usize) {
         let bounds = self.function.bounds();
         for &phase in B::PHASES {
             self.breeding.begin(&self.population, bounds);
@@ -193,7 +190,7 @@ impl<'f, B: Breeding, R: RandomSource, S: Fn(usize, Phase, usize) -> R + Sync> S
             let (old, new) = (&mut self.population, &mut self.candidates);
             self.breeding.select(old, new, &self.notes, bounds);
         }
-        self.breeding.end(number)
+        self.breeding.end(number);
     }
 
     /// The best individual so far.

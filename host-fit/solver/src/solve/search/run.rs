@@ -52,8 +52,6 @@ pub enum StopReason {
     Evaluations,
     /// The best cost hardly fell any more.
     Stall,
-    /// The method itself found nothing more to do.
-    Converged,
 }
 
 impl core::fmt::Display for StopReason {
@@ -63,7 +61,6 @@ impl core::fmt::Display for StopReason {
             Self::Generations => "all generations were run",
             Self::Evaluations => "the budget of evaluations was used",
             Self::Stall => "the best cost no longer fell",
-            Self::Converged => "the method converged",
         })
     }
 }
@@ -115,7 +112,6 @@ pub fn run<B: Breeding>(
     );
     let progress = Progress::new("searching", criteria.generations.unwrap_or(0) as u64);
     let mut history = Vec::new();
-    let mut more = true;
     let reason = loop {
         history.push(Checkpoint {
             evaluations: search.evaluations,
@@ -126,10 +122,7 @@ pub fn run<B: Breeding>(
         if let Some(reason) = criteria.reached(&history) {
             break reason;
         }
-        if !more {
-            break StopReason::Converged;
-        }
-        more = search.generation(history.len());
+        search.generation(history.len());
     };
     let best = search.best();
     Outcome {

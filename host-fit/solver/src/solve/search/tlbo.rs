@@ -152,12 +152,11 @@ impl Breeding for Tlbo {
         improve(population, students);
     }
 
-    fn end(&mut self, generation: usize) -> bool {
+    fn end(&mut self, generation: usize) {
         if generation.is_multiple_of(self.learning_period) {
             self.p = self.tally.next_p(self.adaptation, self.p);
             self.tally = Tally::default();
         }
-        true
     }
 
     fn p(&self) -> Option<f64> {
