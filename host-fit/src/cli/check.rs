@@ -34,7 +34,7 @@ pub(super) struct CheckArgs {
 /// Reads and fits, keeps nothing, and reports what was found.
 pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     let started = Instant::now();
-    super::keep_apart_with(
+    super::check_outputs(
         [args.json.path.as_deref()],
         &args.report,
         args.logs.inputs(),

@@ -2,6 +2,7 @@
 
 use super::args::StageFile;
 use super::arguments::{choice, hold};
+use super::report::Report;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Output;
@@ -46,7 +47,7 @@ pub(super) struct DecodeArgs {
 /// Decodes a log into a pose file.
 pub(super) fn run(args: &DecodeArgs) -> Result<(), HostError> {
     let inputs = [&args.params, &args.log, &args.stage.path].map(PathBuf::as_path);
-    super::keep_apart([Some(args.out.as_path())], inputs)?;
+    super::check_outputs([Some(args.out.as_path())], &Report::default(), inputs)?;
     let (set, stage) = super::blob_of_stage(&args.params, &args.stage)?;
     let known = || posterior(&set, &stage, &args.params);
     let posterior = args.uncertainty.then(known).transpose()?;

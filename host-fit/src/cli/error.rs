@@ -15,6 +15,7 @@ use crate::bus::import::ImportError;
 use crate::bus::update::{UpdateError, UpdateRunError};
 use crate::calibrate::{CalibrateError, Mismatch, NOT_WRITTEN};
 use crate::output::export::ExportError;
+use crate::output::{OutputError, OutputProblem};
 use hallstage_calibration::fit::FitError;
 use hallstage_calibration::plan::PlanError;
 use hallstage_calibration::recalibrate::RecalibrateError;
@@ -134,6 +135,13 @@ fn end_of(error: &(dyn Error + 'static)) -> (u8, &'static str) {
             status,
             "the calibration was not brought up to date, and no parameter blob was written: ",
         );
+    }
+    if let Some(OutputError {
+        problem: OutputProblem::IsInput | OutputProblem::IsOutput,
+        ..
+    }) = error.downcast_ref()
+    {
+        return (2, "");
     }
     if let Some(RecordError::NoTemperature) = error.downcast_ref() {
         return (2, "");

@@ -98,7 +98,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let outputs = [Some(&args.out), posterior.as_ref(), args.json.path.as_ref()];
     let outputs = outputs.map(|path| path.map(PathBuf::as_path));
     let inputs = args.logs.inputs().chain(args.start.as_deref());
-    super::keep_apart_with(outputs, &args.report, inputs)?;
+    super::check_outputs(outputs, &args.report, inputs)?;
     let loss = loss_of(args.loss, args.model, args.solver, args.project);
     let loss = loss.map_err(HostError::of_mismatch)?;
     interrupt::watch();

@@ -2,6 +2,7 @@
 
 use super::args::Json;
 use super::inspect::errors;
+use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::update::{self, Identity, RunningParameters};
 use crate::cli::error::HostError;
@@ -23,7 +24,7 @@ pub(super) struct IdentifyArgs {
 
 /// Asks a controller who it is and what it runs.
 pub(super) fn run(args: &IdentifyArgs) -> Result<(), HostError> {
-    super::keep_apart([args.json.path.as_deref()], [])?;
+    super::check_outputs([args.json.path.as_deref()], &Report::default(), [])?;
     let figures = figures(&update::identify(&args.can)?);
     args.json.write(&figures)?;
     terminal::print(&as_text(&tables(&figures, &["next", "newest_sequence"])))

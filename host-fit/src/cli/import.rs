@@ -1,6 +1,7 @@
 //! `host-fit import`.
 
 use super::arguments::{between, choice};
+use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::import::{self, ImportSettings};
 use crate::cli::error::HostError;
@@ -89,7 +90,7 @@ impl ImportArgs {
 /// Joins a record of the bus and a reference, and shows how it went.
 pub(super) fn run(args: &ImportArgs) -> Result<(), HostError> {
     let inputs = [&args.bus, &args.reference, &args.stage].map(PathBuf::as_path);
-    super::keep_apart([Some(args.out.as_path())], inputs)?;
+    super::check_outputs([Some(args.out.as_path())], &Report::default(), inputs)?;
     interrupt::watch();
     let report = import::run(&args.settings())?;
     terminal::print(&as_text(&tables(&report, &[])))?;

@@ -1,5 +1,6 @@
 //! `host-fit init`.
 
+use super::report::Report;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::{is_standard, write_atomically};
@@ -24,7 +25,7 @@ pub(super) struct InitArgs {
 /// Drafts a stage file for logs.
 pub(super) fn run(args: &InitArgs) -> Result<(), HostError> {
     let inputs = args.logs.iter().map(PathBuf::as_path);
-    super::keep_apart([Some(args.out.as_path())], inputs)?;
+    super::check_outputs([Some(args.out.as_path())], &Report::default(), inputs)?;
     if !is_standard(&args.out) && !args.force && args.out.exists() {
         let there = args.out.display();
         let problem =

@@ -1,6 +1,7 @@
 //! `host-fit live`.
 
 use super::arguments::{hold, seconds};
+use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::live::{self, LiveSettings};
 use crate::cli::error::HostError;
@@ -74,6 +75,10 @@ impl LiveArgs {
 
 /// Decodes a bus.
 pub(super) fn run(args: &LiveArgs) -> Result<(), HostError> {
-    super::keep_apart([args.record.as_deref()], [args.params.as_path()])?;
+    super::check_outputs(
+        [args.record.as_deref()],
+        &Report::default(),
+        [args.params.as_path()],
+    )?;
     Ok(live::run(&args.settings())?)
 }

@@ -33,9 +33,7 @@ mod update;
 use crate::bus::replay::ReplaySettings;
 use crate::calibrate::other_scales;
 use crate::cli::error::HostError;
-use crate::output::{
-    FileIdentity, blob_file, check_writable, is_standard, is_standard_output, posterior_file,
-};
+use crate::output::{blob_file, check_writable, is_standard, is_standard_output, keep_apart};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use hallstage_input::progress;
 use hallstage_input::stage::Stage;
@@ -197,18 +195,9 @@ fn wrote(paths: impl IntoIterator<Item = PathBuf>) -> Result<(), HostError> {
     paths.into_iter().try_for_each(line)
 }
 
-/// Refuses outputs that are an input, the posterior beside one, or each other, by whatever name, and those
-/// that cannot be written: before the work. Where one goes to standard output, nothing else does from now
-/// on.
-fn keep_apart<'p>(
-    outputs: impl IntoIterator<Item = Option<&'p Path>>,
-    inputs: impl IntoIterator<Item = &'p Path>,
-) -> Result<(), HostError> {
-    keep_apart_with(outputs, &report::Report::default(), inputs)
-}
-
-/// The same beside a report in a folder.
-fn keep_apart_with<'p>(
+/// Refuses outputs that are an input or one another, and outputs that cannot be written: before the work. Where one
+/// goes to standard output, nothing else does from now on.
+fn check_outputs<'p>(
     outputs: impl IntoIterator<Item = Option<&'p Path>>,
     report: &report::Report,
     inputs: impl IntoIterator<Item = &'p Path>,
@@ -218,57 +207,16 @@ fn keep_apart_with<'p>(
         let problem = "standard input can be read only once; name other inputs by their files";
         return Err(HostError::usage("-", problem));
     }
-    let beside = |path| posterior_file::beside(path).filter(|path| path.exists());
-    let files = |path| {
-        let posterior = beside(path).map(|path| FileIdentity::of(&path));
-        file_of_input(path).into_iter().chain(posterior)
-    };
-    let inputs: Vec<FileIdentity> = inputs.into_iter().flat_map(files).collect();
-    let mut taken: Vec<FileIdentity> = Vec::new();
-    let outputs: Vec<&Path> = outputs.into_iter().flatten().collect();
-    let page = report.page();
-    // A new folder holds only new files; in one that exists the page may be an input.
-    let (folder, page) = match report.folder.as_deref() {
-        Some(folder) if folder.exists() => (None, page.as_deref()),
-        folder => (folder, None),
-    };
-    for output in outputs.iter().copied().chain(folder).chain(page) {
-        let (name, here) = match is_standard(output) {
-            true => (
-                "standard output".into(),
-                FileIdentity::of(Path::new("/dev/stdout")),
-            ),
-            false => (output.to_string_lossy(), FileIdentity::of(output)),
-        };
-        if is_standard_output(output) {
-            terminal::keep_for_output();
-        }
-        let what = if inputs.contains(&here) {
-            "an input"
-        } else if taken.contains(&here) {
-            "another output"
-        } else {
-            taken.push(here);
-            continue;
-        };
-        let problem = format!("{name} is {what} of this command; name another file");
-        return Err(HostError::usage("output", problem));
+    let mut outputs: Vec<&Path> = outputs.into_iter().flatten().collect();
+    if outputs.iter().any(|path| is_standard_output(path)) {
+        terminal::keep_for_output();
     }
-    outputs
-        .into_iter()
-        .chain(page)
-        .try_for_each(check_writable)?;
-    Ok(())
-}
-
-/// The file that an input is read from, also where the shell opened it as standard input; of a
-/// pipe or a terminal there is none.
-fn file_of_input(path: &Path) -> Option<FileIdentity> {
-    let standard = Path::new("/dev/stdin");
-    match is_standard(path) {
-        true => (standard.metadata().ok()?.is_file()).then(|| FileIdentity::of(standard)),
-        false => Some(FileIdentity::of(path)),
-    }
+    // A new folder holds only new files.
+    let new = report.folder.as_deref().filter(|folder| !folder.exists());
+    let page = report.page().filter(|_| new.is_none());
+    outputs.extend(page.as_deref());
+    keep_apart(outputs.iter().copied().chain(new), inputs)?;
+    Ok(outputs.into_iter().try_for_each(check_writable)?)
 }
 
 /// Reads a blob and its stage. A blob that was made for other scales than `stage.toml` gives is refused.

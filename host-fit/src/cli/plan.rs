@@ -2,6 +2,7 @@
 
 use super::args::{Json, StageFile};
 use super::arguments::between;
+use super::report::Report;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
@@ -42,7 +43,7 @@ pub(super) struct PlanArgs {
 /// file says how the stage may move.
 pub(super) fn run(args: &PlanArgs) -> Result<(), HostError> {
     let outputs = [args.out.as_deref(), args.json.path.as_deref()];
-    super::keep_apart(outputs, [args.stage.path.as_path()])?;
+    super::check_outputs(outputs, &Report::default(), [args.stage.path.as_path()])?;
     let stage = args.stage.read()?;
     let (seconds, period_s) = (args.seconds.unwrap_or(COLD_S), stage.servo_period_s);
     if seconds / period_s > PERIODS_MAX {

@@ -1,6 +1,7 @@
 //! `host-fit read-back`.
 
 use super::identify;
+use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::update;
 use crate::cli::error::HostError;
@@ -22,7 +23,7 @@ pub(super) struct ReadBackArgs {
 
 /// Writes the parameters that a controller runs, as a blob, bit for bit.
 pub(super) fn run(args: &ReadBackArgs) -> Result<(), HostError> {
-    super::keep_apart([Some(args.out.as_path())], [])?;
+    super::check_outputs([Some(args.out.as_path())], &Report::default(), [])?;
     let (identity, blob) = update::read_back(&args.can)?;
     write_atomically(&args.out, &blob)?;
     let parameters = identify::parameters(identity.running.as_ref());

@@ -2,7 +2,7 @@
 
 use super::args::{Json, Logs};
 use super::arguments::choice;
-use super::report::finish;
+use super::report::{Report, finish};
 use crate::calibrate::Updated;
 use crate::cli::error::HostError;
 use crate::output::posterior_file::PosteriorFileError;
@@ -50,7 +50,11 @@ pub(super) fn run(args: &RecalibrateArgs) -> Result<(), HostError> {
         new_posterior.as_deref(),
         args.json.path.as_deref(),
     ];
-    super::keep_apart(outputs, inputs.chain(old_posterior.as_deref()))?;
+    super::check_outputs(
+        outputs,
+        &Report::default(),
+        inputs.chain(old_posterior.as_deref()),
+    )?;
     let (old, stage) = super::blob_of_stage(&args.params, &args.logs.stage)?;
     if old.model != ModelKind::Field {
         let model = Model::of(old.model).title();

@@ -2,6 +2,7 @@
 
 use super::arguments::seconds;
 use super::key::KeyFile;
+use super::report::Report;
 use crate::bus::BusAddress;
 use crate::bus::recorder::{self, RecorderSettings};
 use crate::cli::error::HostError;
@@ -28,7 +29,7 @@ pub(super) struct RecordArgs {
 
 /// Records, and says what the record holds.
 pub(super) fn run(args: &RecordArgs) -> Result<(), HostError> {
-    super::keep_apart([Some(args.out.as_path())], [])?;
+    super::check_outputs([Some(args.out.as_path())], &Report::default(), [])?;
     let settings = RecorderSettings {
         address: args.can.clone(),
         out: args.out.clone(),

@@ -2,6 +2,7 @@
 
 use super::args::StageFile;
 use super::arguments::{between, choice};
+use super::report::Report;
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::output::Outputs;
@@ -52,7 +53,11 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), HostError> {
     let truth = args.truth.as_deref();
     let inputs = [Some(&args.stage.path), args.plan.as_ref()];
     let outputs = [Some(args.out.as_path()), truth];
-    super::keep_apart(outputs, inputs.into_iter().flatten().map(PathBuf::as_path))?;
+    super::check_outputs(
+        outputs,
+        &Report::default(),
+        inputs.into_iter().flatten().map(PathBuf::as_path),
+    )?;
     let stage = args.stage.read()?;
     let period_s = stage.servo_period_s;
     let run = match (&args.plan, args.protocol) {

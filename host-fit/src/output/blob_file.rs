@@ -65,6 +65,6 @@ pub fn to_bytes(path: &Path, set: &ParameterSet) -> Result<Vec<u8>, OutputError>
     let mut buffer = [0; MAX_BYTES];
     // The buffer has the size that every blob fits into.
     let bytes = set.to_bytes(&mut buffer).map_err(std::io::Error::other);
-    let failed = |source| OutputError::new(path, OutputProblem::Failed { source });
+    let failed = |source| OutputError::new(path, OutputProblem::Failed(source));
     bytes.map(<[u8]>::to_vec).map_err(failed)
 }

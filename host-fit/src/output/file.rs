@@ -1,100 +1,80 @@
-//! An output of any length, written piece by piece.
+//! One output file, written piece by piece, whole or absent; and which file a path means.
 
 use super::error::{OutputError, OutputProblem};
-use super::file_identity::{folder_of, is_stream, names_standard_output, resolve};
-use super::temporary::{sweep, temporary};
-use std::fs::{self, File, Metadata, OpenOptions};
-use std::io::{Seek, SeekFrom, Stdout, Write};
+use std::fs::{self, File, OpenOptions};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// An output on its way. A device or pipe is written to directly, and so is standard output: what was
-/// written there before a fault stays.
+/// An output while it is written.
+///
+/// A regular file is written beside its target and replaces it when it is [finished](Self::finish). If it never is,
+/// nothing has changed. A killed program may leave a hidden file `.host-fit-…`, which can be deleted. A device, a
+/// pipe and standard output are written to directly.
 #[derive(Debug)]
 pub struct Output {
+    /// As the user named it.
     path: PathBuf,
     target: PathBuf,
-    existing: Option<Metadata>,
     sink: Sink,
-    /// So far the disk was asked to begin with what was written, bytes.
-    begun: u64,
 }
 
-/// Where bytes go.
+/// Where the bytes go.
 #[derive(Debug)]
 enum Sink {
-    /// A new file beside its target, whose place it takes at the end.
+    /// A new file beside the target.
     Beside(NamedTempFile),
-    /// A new file in its place from the start.
+    /// A new file at the target from the start.
     Placed(File),
+    /// A device or a pipe.
     Device(File),
-    Standard(Stdout),
+    StandardOutput,
 }
 
 impl Output {
-    /// An empty output. It takes the place of its target when it is [finished](Self::finish), and is
-    /// gone if it never is.
+    /// An empty output that replaces a file when it is finished.
     ///
     /// # Errors
     /// [`OutputError`].
     pub fn create(path: &Path) -> Result<Self, OutputError> {
-        Self::open(path, |_, target| {
-            let folder = folder_of(target);
-            sweep(&folder);
-            let file = temporary(&folder).map(Sink::Beside);
-            file.map_err(|source| OutputError::of_system(source, path, &folder, 0))
-        })
+        Self::open(path, |target| temporary(target).map(Sink::Beside))
     }
 
-    /// An empty file, in its place from now on; one that is there is never replaced.
+    /// An empty file, visible from now on. An existing file is refused.
     ///
     /// # Errors
-    /// [`OutputError`], for a file that is there too.
+    /// [`OutputError`].
     pub(super) fn create_new(path: &Path) -> Result<Self, OutputError> {
-        Self::open(path, |existing, target| {
-            if existing.is_some() {
-                return Err(OutputError::new(path, OutputProblem::Exists));
-            }
-            let file = File::create_new(target).map(Sink::Placed);
-            file.map_err(|source| OutputError::of_system(source, path, &folder_of(target), 0))
-        })
+        Self::open(path, |target| File::create_new(target).map(Sink::Placed))
     }
 
     fn open(
         path: &Path,
-        file: impl FnOnce(Option<&Metadata>, &Path) -> Result<Sink, OutputError>,
+        create: impl FnOnce(&Path) -> std::io::Result<Sink>,
     ) -> Result<Self, OutputError> {
-        let (target, existing, sink);
-        if names_standard_output(path) {
-            (target, existing) = (path.to_path_buf(), None);
-            sink = Sink::Standard(std::io::stdout());
+        let (target, sink) = if is_standard_output(path) {
+            (path.to_owned(), Ok(Sink::StandardOutput))
+        } else if is_stream(path) {
+            let device = OpenOptions::new().append(true).open(path);
+            (path.to_owned(), device.map(Sink::Device))
         } else {
-            (target, existing) = resolve(path)?;
-            sink = match existing.as_ref().is_some_and(|it| is_stream(path, it)) {
-                true => {
-                    let device = OpenOptions::new().append(true).open(path);
-                    let refused =
-                        |source| OutputError::of_system(source, path, &folder_of(&target), 0);
-                    Sink::Device(device.map_err(refused)?)
-                }
-                false => file(existing.as_ref(), &target)?,
-            };
-        }
+            let target = target(path)?;
+            let sink = create(&target);
+            (target, sink)
+        };
         Ok(Self {
-            path: path.to_path_buf(),
+            sink: sink.map_err(|source| OutputError::from_system(path, source))?,
+            path: path.to_owned(),
             target,
-            existing,
-            sink,
-            begun: 0,
         })
     }
 
-    /// How the user named it.
-    pub(super) fn name(&self) -> &Path {
+    /// The path as the user named it.
+    pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether its start can be written again at the end: a pipe's cannot.
+    /// Whether it replaces a file when it is finished, so that its start can still be rewritten.
     pub const fn is_file(&self) -> bool {
         matches!(self.sink, Sink::Beside(_))
     }
@@ -105,16 +85,14 @@ impl Output {
     /// [`OutputError`].
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), OutputError> {
         let written = match &mut self.sink {
-            Sink::Beside(file) => {
-                (file.write_all(bytes)).map(|()| begin(file.as_file_mut(), &mut self.begun))
-            }
+            Sink::Beside(file) => file.write_all(bytes),
             Sink::Placed(file) | Sink::Device(file) => file.write_all(bytes),
-            Sink::Standard(out) => out.write_all(bytes),
+            Sink::StandardOutput => std::io::stdout().write_all(bytes),
         };
-        written.map_err(|source| self.failed(source, bytes.len()))
+        written.map_err(|source| self.failed(source))
     }
 
-    /// Writes its start again, if it [is a file](Self::is_file); nothing can be added after that.
+    /// Rewrites the first bytes of a [file](Self::is_file). Nothing can be added afterwards.
     ///
     /// # Errors
     /// [`OutputError`].
@@ -124,85 +102,176 @@ impl Output {
         };
         let start = file.seek(SeekFrom::Start(0));
         let written = start.and_then(|_| file.write_all(bytes));
-        written.map_err(|source| self.failed(source, bytes.len()))
+        written.map_err(|source| self.failed(source))
     }
 
-    /// Gives it the permissions of the file that it replaces, and waits until all bytes are on the
-    /// disk, or with the reader of a stream.
+    /// Waits until all bytes are on the disk, or with the reader of a stream. A replacement gets the permissions
+    /// of the old file.
     ///
     /// # Errors
     /// [`OutputError`].
     pub(super) fn complete(&mut self) -> Result<(), OutputError> {
         let done = match &mut self.sink {
             Sink::Beside(file) => {
-                let permissions = self.existing.as_ref().map(Metadata::permissions);
-                let set = permissions.map_or(Ok(()), |it| file.as_file().set_permissions(it));
-                set.and_then(|()| file.as_file().sync_all())
+                let file = file.as_file();
+                let old = fs::metadata(&self.target).map(|metadata| metadata.permissions());
+                let set = old.map_or(Ok(()), |permissions| file.set_permissions(permissions));
+                set.and_then(|()| file.sync_all())
             }
             Sink::Placed(file) => file.sync_all(),
             Sink::Device(file) => file.flush(),
-            Sink::Standard(out) => out.flush(),
+            Sink::StandardOutput => std::io::stdout().flush(),
         };
-        done.map_err(|source| self.failed(source, 0))
+        done.map_err(|source| self.failed(source))
     }
 
-    /// Puts it in the place of its target.
+    /// Replaces the target.
     ///
     /// # Errors
     /// [`OutputError`].
     pub fn finish(mut self) -> Result<(), OutputError> {
         self.complete()?;
-        let folder = folder_of(&self.target);
         if let Sink::Beside(file) = self.sink {
-            let put = file.persist(&self.target).map_err(|error| error.error);
-            put.map_err(|source| OutputError::of_system(source, &self.path, &folder, 0))?;
-            // The name is on the disk too once its folder is. Not every file system can do it, and
-            // the file itself is safe already.
+            let put = file.persist(&self.target);
+            put.map_err(|failed| OutputError::from_system(&self.path, failed.error))?;
+            // The new name reaches the disk with its folder. Some file systems refuse; the bytes are safe already.
             #[cfg(unix)]
-            let _ = File::open(folder).and_then(|folder| folder.sync_all());
+            let _ = File::open(folder(&self.target)).and_then(|folder| folder.sync_all());
         }
         Ok(())
     }
 
-    /// Cuts a file that is in its place to the last line end after `kept` bytes, no further than
-    /// `bytes`, which were to follow: how many of those stay.
-    pub(super) fn cut_to_whole_lines(&mut self, kept: u64, bytes: &[u8]) -> u64 {
-        let Sink::Placed(file) = &mut self.sink else {
-            return 0;
-        };
-        let length = file.metadata().map_or(0, |metadata| metadata.len());
-        let room = usize::try_from(length.saturating_sub(kept)).unwrap_or(0);
-        let fits = bytes.get(..room).unwrap_or_default();
-        let whole = fits.iter().rposition(|byte| *byte == b'\n');
-        let stay = whole.map_or(0, |end| end as u64 + 1);
-        let _ = file.set_len(kept + stay);
-        stay
+    /// Cuts a new file to whole lines after a write that failed: `before` bytes, then the lines of `bytes` that are
+    /// in the file.
+    pub(super) fn cut_to_lines(&mut self, before: u64, bytes: &[u8]) {
+        if let Sink::Placed(file) = &mut self.sink {
+            let end = file.metadata().map_or(before, |metadata| metadata.len());
+            let there = end.saturating_sub(before) as usize;
+            let lines = bytes.iter().take(there).rposition(|byte| *byte == b'\n');
+            let _ = file.set_len(before + lines.map_or(0, |end| end as u64 + 1));
+        }
     }
 
-    /// Removes a file that is in its place.
+    /// Removes a new file.
     pub(super) fn discard(self) {
         if let Sink::Placed(_) = self.sink {
             let _ = fs::remove_file(&self.target);
         }
     }
 
-    fn failed(&self, source: std::io::Error, bytes: usize) -> OutputError {
-        OutputError::of_system(source, &self.path, &folder_of(&self.target), bytes)
+    fn failed(&self, source: std::io::Error) -> OutputError {
+        OutputError::from_system(&self.path, source)
     }
 }
 
-/// Asks the disk to begin with what was written since the last time, if it is much: else all of it would
-/// wait for the end. The end tells whether it could.
-#[cfg(target_os = "linux")]
-fn begin(file: &mut File, begun: &mut u64) {
-    const WAITING_MAX: u64 = 4 << 20;
-    let end = file.stream_position().unwrap_or_default();
-    if end.saturating_sub(*begun) >= WAITING_MAX {
-        // So Linux takes it that these bytes are no longer wanted in memory.
-        let _ = rustix::fs::fadvise(file, *begun, None, rustix::fs::Advice::DontNeed);
-        *begun = end;
+/// Checks that an output can be created, and creates nothing: for use before long work.
+///
+/// # Errors
+/// [`OutputError`].
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    if is_stream(path) {
+        return Ok(());
     }
+    let tried = temporary(&target(path)?);
+    tried.map_or_else(|e| Err(OutputError::from_system(path, e)), |_| Ok(()))
 }
 
-#[cfg(not(target_os = "linux"))]
-fn begin(_: &mut File, _: &mut u64) {}
+/// Refuses an output that is an input or another output of the same command. Paths are compared in canonical form.
+///
+/// # Errors
+/// [`OutputProblem::IsInput`] and [`OutputProblem::IsOutput`].
+pub fn keep_apart<'p>(
+    outputs: impl IntoIterator<Item = &'p Path>,
+    inputs: impl IntoIterator<Item = &'p Path>,
+) -> Result<(), OutputError> {
+    let stdin = |path| {
+        if is_standard(path) {
+            Path::new("/dev/stdin")
+        } else {
+            path
+        }
+    };
+    let inputs = inputs.into_iter().map(|path| canonical(stdin(path)));
+    // A terminal can be both.
+    let inputs: Vec<PathBuf> = inputs.filter(|path| path.is_file()).collect();
+    let mut taken = Vec::new();
+    for output in outputs {
+        let file = canonical(output);
+        let problem = if inputs.contains(&file) {
+            OutputProblem::IsInput
+        } else if taken.contains(&file) {
+            OutputProblem::IsOutput
+        } else {
+            taken.push(file);
+            continue;
+        };
+        return Err(OutputError::new(output, problem));
+    }
+    Ok(())
+}
+
+/// The form of a path in which two paths to one file are equal, whether the file exists or not.
+fn canonical(path: &Path) -> PathBuf {
+    let path = match is_standard_output(path) {
+        true => Path::new("/dev/stdout"),
+        false => path,
+    };
+    let new = || Some(folder(path).canonicalize().ok()?.join(path.file_name()?));
+    let there = path.canonicalize().ok().or_else(new);
+    there.unwrap_or_else(|| path.to_owned())
+}
+
+/// Whether a path is `-`: standard input of a command, or its standard output.
+pub fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// Whether an output path is one of the names of standard output. It is not opened anew, because opening a pipe
+/// that nobody reads waits forever.
+pub fn is_standard_output(path: &Path) -> bool {
+    let names = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+    names.into_iter().any(|name| path.as_os_str() == name)
+}
+
+/// Whether a path is written to and not replaced: a device, a pipe, or a standard stream that a shell may have
+/// redirected to a file.
+pub(super) fn is_stream(path: &Path) -> bool {
+    let names = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc/self/fd"];
+    let is_special = || fs::metadata(path).is_ok_and(|it| !it.is_file() && !it.is_dir());
+    is_standard(path) || names.iter().any(|name| path.starts_with(name)) || is_special()
+}
+
+/// The file that an output replaces. Of a link it is the linked file, so that the link stays.
+fn target(path: &Path) -> Result<PathBuf, OutputError> {
+    let problem = match fs::metadata(path) {
+        _ if path.as_os_str().is_empty() => OutputProblem::NoName,
+        Ok(metadata) if metadata.is_dir() => OutputProblem::IsFolder,
+        Ok(metadata) if metadata.permissions().readonly() => OutputProblem::ReadOnly,
+        Ok(_) => return Ok(path.canonicalize().unwrap_or_else(|_| path.to_owned())),
+        // `out/` asks for a folder.
+        Err(_) if path.as_os_str().as_encoded_bytes().ends_with(b"/") => OutputProblem::IsFolder,
+        Err(_) => return Ok(path.to_owned()),
+    };
+    Err(OutputError::new(path, problem))
+}
+
+/// A new file in the folder of `target`, with the permissions of any new file.
+fn temporary(target: &Path) -> std::io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".host-fit-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // Less the user's umask.
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder(target))
+}
+
+/// The folder of a file.
+fn folder(target: &Path) -> &Path {
+    match target.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}

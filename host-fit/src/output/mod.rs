@@ -1,7 +1,7 @@
 //! Writes output files whole or not at all.
 //!
-//! The bytes go to a new file in the same folder, reach the disk, and then take the place
-//! of the target in one step: whoever reads the target sees the old file or the new one.
+//! The bytes go to a new file in the same folder, reach the disk, and then replace the target in one step. A reader of
+//! the target sees the old file or the new one.
 //!
 //! ```
 //! use host_fit::output::Outputs;
@@ -22,23 +22,18 @@ pub mod blob_file;
 mod error;
 pub mod export;
 mod file;
-mod file_identity;
 pub mod pose_file;
 pub mod posterior_file;
 pub mod record_file;
-mod temporary;
 
 pub use error::{OutputError, OutputProblem};
-pub use file::Output;
-pub use file_identity::{FileIdentity, is_standard, is_standard_output};
+pub use file::{Output, check_writable, is_standard, is_standard_output, keep_apart};
 
-use file_identity::{is_stream, names_standard_output, resolve};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Writes `bytes` to `path`: all of them, or nothing. An existing file is replaced and
-/// keeps its permissions; a link is followed; a device or pipe is written to directly, and so is
-/// standard output for `-`.
+/// Writes `bytes` to `path`: all of them, or nothing. An existing file is replaced and keeps its permissions. A link is
+/// followed. A device, a pipe and standard output (`-`) are written to directly.
 ///
 /// # Errors
 /// [`OutputError`].
@@ -48,15 +43,17 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     outputs.commit().map(drop)
 }
 
-/// The outputs of one command: all are written, or none. Dropped, it leaves nothing behind.
+/// The outputs of one command: all are written, or none. Dropped, it changes nothing.
 #[derive(Default)]
 pub struct Outputs {
-    /// New files, with all their bytes on the disk; what cannot be replaced, with the bytes to come.
+    /// New files with all their bytes on the disk, and streams with the bytes to come.
     all: Vec<(Output, Vec<u8>)>,
+    /// Old files that no longer belong to what is written.
+    removed: Vec<PathBuf>,
 }
 
 impl Outputs {
-    /// Writes the bytes of `path` beside it, as [`write_atomically`] does before its last step.
+    /// Adds an output. The bytes of a file go to the disk, beside `path`.
     ///
     /// # Errors
     /// [`OutputError`].
@@ -71,16 +68,20 @@ impl Outputs {
         Ok(())
     }
 
-    /// Puts everything in its place, in the order in which it was added; streams first, since only
-    /// they can still be full. Where one is, nothing has been replaced. The other way round a blob
-    /// would be replaced by a command that fails and whose figures are lost. A reader of standard
-    /// output that closes it early, as `head` does, is no error. Gives the names of all.
+    /// Removes a file with the commit, if it exists.
+    pub fn remove(&mut self, path: PathBuf) {
+        self.removed.push(path);
+    }
+
+    /// Writes the streams, then replaces the files in the order in which they were added. Only a stream can still be
+    /// full, and then no file has changed. A reader that closes standard output early, as `head` does, is no error.
+    /// Returns the paths of all outputs.
     ///
     /// # Errors
     /// [`OutputError`].
     pub fn commit(self) -> Result<Vec<PathBuf>, OutputError> {
-        let names = self.all.iter().map(|(output, _)| output.name().to_owned());
-        let names = names.collect();
+        let paths = self.all.iter().map(|(output, _)| output.path().to_owned());
+        let paths = paths.collect();
         let (files, streams): (Vec<_>, Vec<_>) =
             (self.all.into_iter()).partition(|(output, _)| output.is_file());
         for (mut output, bytes) in streams {
@@ -89,43 +90,23 @@ impl Outputs {
                 _ => {}
             }
         }
+        for path in self.removed.iter().filter(|path| path.exists()) {
+            fs::remove_file(path).map_err(|source| OutputError::from_system(path, source))?;
+        }
         files.into_iter().try_for_each(|(file, _)| file.finish())?;
-        Ok(names)
+        Ok(paths)
     }
 }
 
-/// Makes a folder, with those above it, unless it is there.
+/// Makes a folder and its parents, unless it exists.
 ///
 /// # Errors
 /// [`OutputError`].
 pub fn make_folder(path: &Path) -> Result<(), OutputError> {
     if path.is_file() {
-        let folder = path.to_path_buf();
-        return Err(OutputError::new(path, OutputProblem::NotAFolder { folder }));
+        return Err(OutputError::new(path, OutputProblem::NotAFolder));
     }
-    fs::create_dir_all(path)
-        .map_err(|source| OutputError::new(path, OutputProblem::Failed { source }))
-}
-
-/// Whether `path` can be written by [`write_atomically`], without writing it: for a check before long
-/// work.
-///
-/// # Errors
-/// [`OutputError`].
-pub fn check_writable(path: &Path) -> Result<(), OutputError> {
-    if names_standard_output(path) {
-        return Ok(());
-    }
-    let (target, existing) = resolve(path)?;
-    if existing.is_some_and(|metadata| is_stream(path, &metadata)) {
-        return Ok(());
-    }
-    let folder = file_identity::folder_of(&target);
-    let tried = temporary::temporary(&folder);
-    tried.map_or_else(
-        |source| Err(OutputError::of_system(source, path, &folder, 0)),
-        |_| Ok(()),
-    )
+    fs::create_dir_all(path).map_err(|source| OutputError::from_system(path, source))
 }
 
 #[cfg(test)]

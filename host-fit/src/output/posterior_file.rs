@@ -15,8 +15,8 @@
 //! | | | layouts 2 and 3: the faults of the log that the calibration is without, a line each, in UTF-8 |
 //! | the end | 32 | SHA-256 of everything before it |
 
-use crate::output::file_identity::is_stream;
-use crate::output::{OutputError, Outputs, blob_file, is_standard};
+use crate::output::file::is_stream;
+use crate::output::{OutputError, Outputs, blob_file};
 use hallstage_calibration::recalibrate::Known;
 use hallstage_input::source::{SourceError, SourceProblem, read_whole};
 use hallstage_solver::solve::field::terms::COUNT;
@@ -76,10 +76,7 @@ pub enum PosteriorFileError {
 
 /// The file beside a blob; `None` if the blob is a device, a pipe or standard output.
 pub fn beside(blob: &Path) -> Option<PathBuf> {
-    if is_standard(blob) {
-        return None;
-    }
-    if std::fs::metadata(blob).is_ok_and(|metadata| is_stream(blob, &metadata)) {
+    if is_stream(blob) {
         return None;
     }
     let mut name = blob.as_os_str().to_owned();
@@ -87,8 +84,8 @@ pub fn beside(blob: &Path) -> Option<PathBuf> {
     Some(name.into())
 }
 
-/// Adds a blob to the outputs, and before it, if it is known, the posterior beside it: the blob is what
-/// the stage takes, and a posterior without its blob is refused.
+/// Adds a blob to the outputs, and before it the posterior beside it. Without a posterior, the file of an older blob
+/// goes, since it would be refused beside the new one.
 ///
 /// # Errors
 /// [`OutputError`].
@@ -99,8 +96,12 @@ pub fn add_calibration(
     known: Option<&Known>,
 ) -> Result<(), OutputError> {
     let blob = blob_file::to_bytes(path, set)?;
-    if let (Some(known), Some(beside)) = (known, beside(path)) {
-        outputs.add(&beside, &encode(&Sha256::digest(&blob).into(), known))?;
+    match (known, beside(path)) {
+        (Some(known), Some(beside)) => {
+            outputs.add(&beside, &encode(&Sha256::digest(&blob).into(), known))?;
+        }
+        (None, Some(beside)) => outputs.remove(beside),
+        (_, None) => {}
     }
     outputs.add(path, &blob)
 }
@@ -267,6 +268,21 @@ mod tests {
         let bytes = encode(&[7; HASH_BYTES], &with_warmth);
         assert_eq!(bytes.len(), 26_700 + 4_056);
         assert_eq!(from_bytes(&bytes), Ok(([7; HASH_BYTES], with_warmth)));
+    }
+
+    #[test]
+    fn a_blob_without_posterior_takes_the_older_one_away() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("params.bin");
+        let set = include_bytes!("../../../runtime/examples/field.bin");
+        let set = ParameterSet::from_bytes(set).expect("sound");
+        for known in [Some(&known()), None] {
+            let mut outputs = Outputs::default();
+            add_calibration(&mut outputs, &path, &set, known).expect("added");
+            outputs.commit().expect("written");
+            let beside = beside(&path).expect("a file");
+            assert_eq!(read(&beside, &set, &path).ok().as_ref(), known);
+        }
     }
 
     #[test]

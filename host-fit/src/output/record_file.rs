@@ -1,27 +1,26 @@
-//! A record: what came is in the file, whatever ends the run.
+//! A record of a bus: the file holds what has come, however the run ends.
 
 use super::{Output, OutputError};
 use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// The longest time for which a line stays in memory: what is lost with the program.
+/// The longest time that a line stays in memory, where a killed program loses it.
 const UNWRITTEN_MAX: Duration = Duration::from_secs(1);
-/// Bytes in memory from which they are written.
+/// Bytes in memory that are written at once.
 const UNWRITTEN_BYTES: usize = 64 * 1024;
 
-/// A file that gains lines as they come. Lines go to it whole, a second after they came at the
-/// latest. An earlier record is never replaced. A device or pipe is written to directly, and so is
-/// standard output for `-`.
+/// A file that gains whole lines, each within a second. An existing file is never replaced. A device, a pipe and
+/// standard output (`-`) are written to directly.
 #[derive(Debug)]
 pub struct RecordFile {
     output: Output,
-    /// Lines that are not in the file yet.
+    /// Lines that are not yet in the file.
     unwritten: Vec<u8>,
     since: Instant,
     /// Bytes of the lines in the file.
     written: u64,
-    /// Whether a line is lost, so that none may follow.
+    /// Whether a line is lost. None may follow.
     has_ended: bool,
 }
 
@@ -29,7 +28,7 @@ impl RecordFile {
     /// An empty record.
     ///
     /// # Errors
-    /// [`OutputError`], for a file that is there too.
+    /// [`OutputError`], also for a file that exists.
     pub fn create(path: &Path) -> Result<Self, OutputError> {
         Ok(Self {
             output: Output::create_new(path)?,
@@ -51,7 +50,7 @@ impl RecordFile {
         if self.unwritten.is_empty() {
             self.since = Instant::now();
         }
-        // Into memory, which does not fail.
+        // Memory does not fail.
         let _ = writeln!(self.unwritten, "{text}");
         match self.unwritten.len() >= UNWRITTEN_BYTES {
             true => self.flush(),
@@ -59,7 +58,7 @@ impl RecordFile {
         }
     }
 
-    /// Writes lines that have waited long enough: to be called several times a second.
+    /// Writes lines that have waited long enough. Call it several times a second.
     ///
     /// # Errors
     /// As [`flush`](Self::flush).
@@ -70,19 +69,20 @@ impl RecordFile {
         }
     }
 
-    /// Writes all lines that have come.
+    /// Writes all lines.
     ///
     /// # Errors
-    /// Then the file ends with the last line that is whole, those not written are gone, and so are all
-    /// that follow.
+    /// [`OutputError`]. The file then ends with its last whole line, and gains no more.
     pub fn flush(&mut self) -> Result<(), OutputError> {
         let bytes = std::mem::take(&mut self.unwritten);
         let written = self.output.write(&bytes);
-        self.written += match &written {
-            Ok(()) => bytes.len() as u64,
-            Err(_) => self.output.cut_to_whole_lines(self.written, &bytes),
-        };
-        self.has_ended |= written.is_err();
+        match &written {
+            Ok(()) => self.written += bytes.len() as u64,
+            Err(_) => {
+                self.output.cut_to_lines(self.written, &bytes);
+                self.has_ended = true;
+            }
+        }
         self.unwritten = bytes;
         self.unwritten.clear();
         written

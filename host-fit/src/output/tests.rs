@@ -36,13 +36,13 @@ fn a_target_that_cannot_be_is_named_with_its_reason() {
         (at("new/"), |why| matches!(why, IsFolder), "in it"),
         (
             at("missing/params.bin"),
-            |why| matches!(why, NoFolder { .. }),
+            |why| matches!(why, NoFolder),
             "create it",
         ),
         ("".into(), |why| matches!(why, NoName), "name a file"),
         (
             at("file/params.bin"),
-            |why| matches!(why, NotAFolder { .. }) || !cfg!(unix),
+            |why| matches!(why, NotAFolder) || !cfg!(unix),
             "another",
         ),
     ];
@@ -96,18 +96,6 @@ fn a_link_is_followed_not_replaced() {
     assert!(fs::symlink_metadata(&link).expect("there").is_symlink());
 }
 
-#[cfg(target_os = "linux")]
-#[test]
-fn a_file_below_dev_is_replaced_like_any_other() {
-    let Ok(folder) = tempfile::tempdir_in("/dev/shm") else {
-        return; // A system without it.
-    };
-    let file = folder.path().join("params.bin");
-    write_atomically(&file, b"old").expect("written");
-    write_atomically(&file, b"new").expect("replaced");
-    assert_eq!(fs::read(&file).expect("readable"), b"new");
-}
-
 #[test]
 fn a_record_is_in_its_file_before_it_is_finished_and_never_replaces_one() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -131,32 +119,8 @@ fn a_record_is_in_its_file_before_it_is_finished_and_never_replaces_one() {
     assert_eq!(lines(&path), 20_000);
     let missing = RecordFile::create(&folder.path().join("missing/bus.log"));
     let missing = missing.expect_err("no folder").problem;
-    assert!(matches!(missing, OutputProblem::NoFolder { .. }));
+    assert!(matches!(missing, OutputProblem::NoFolder));
     let other = RecordFile::create(&folder.path().join("other.log")).expect("writable");
     other.discard();
     assert_eq!(names(folder.path()), ["bus.log"]);
-}
-
-#[cfg(unix)]
-#[test]
-fn a_link_to_a_file_that_is_not_there_makes_that_file() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| folder.path().join(name);
-    let link = |to: &str, name: &str| std::os::unix::fs::symlink(to, at(name)).expect("linked");
-    fs::create_dir(at("there")).expect("a folder");
-    link("second", "first");
-    link("there/params.bin", "second");
-    write_atomically(&at("first"), b"new").expect("written");
-    assert_eq!(fs::read(at("there/params.bin")).expect("readable"), b"new");
-    assert_eq!(fs::read(at("first")).expect("readable"), b"new");
-    link("there/bus.log", "record");
-    RecordFile::create(&at("record")).expect("writable");
-    assert!(at("there/bus.log").is_file());
-    link("circle", "circle");
-    let error = write_atomically(&at("circle"), b"new").expect_err("refused");
-    assert!(
-        matches!(error.problem, OutputProblem::Failed { .. }),
-        "{error}"
-    );
-    assert!(at("circle").is_symlink());
 }
