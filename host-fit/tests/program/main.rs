@@ -6,6 +6,7 @@ mod bad_input;
 mod common;
 mod diagnose;
 mod field_model;
+mod generated_logs;
 mod interrupted;
 mod killed;
 mod log_forms;

@@ -2,7 +2,8 @@
 //!
 //! A row's residuals, each less the median of its movement, are measured in a robust scale of their
 //! channel, 1.4826 times the median magnitude over the log: the standard deviation if they are
-//! normal. With r the largest of the three and k = 6 the row's weight is 1 up to k, then k / r (Huber)
+//! normal. Residuals of exactly zero are no noise and do not count for the scale: they come from rows
+//! that the recorder repeated. With r the largest of the three and k = 6 the row's weight is 1 up to k, then k / r (Huber)
 //! or (k / r)^2 (the tail of Cauchy's loss). Weights and fit in turn until both settle: iteratively
 //! reweighted least squares.
 //!
@@ -19,6 +20,9 @@ use std::ops::Range;
 
 /// From how many robust standard deviations on a row counts less.
 const THRESHOLD: f64 = 6.0;
+/// Smallest Huber weight. Every row keeps a weight above 0 until [`Loss::last`], so that no movement is
+/// lost while the weights settle.
+const SHARE_MIN: f64 = 1e-9;
 /// Below this weight a row is an outlier.
 pub const HALF: f64 = 0.5;
 /// The standard deviation of normal numbers over the median of their magnitudes.
@@ -60,7 +64,8 @@ impl Loss {
             Self::Huber => share,
             Self::Cauchy => share * share,
         };
-        let weight = |r| weight(if r > THRESHOLD { THRESHOLD / r } else { 1.0 });
+        let share = |r: f64| (THRESHOLD / r).clamp(SHARE_MIN, 1.0);
+        let weight = |r| weight(if r > THRESHOLD { share(r) } else { 1.0 });
         deviations(residuals, movements).map(weight).collect()
     }
 
@@ -109,7 +114,8 @@ fn deviations(
     }
     let scale = [0, 1, 2].map(|k| {
         scratch.clear();
-        scratch.extend(residuals.iter().map(|row| row[k].abs()));
+        let magnitudes = residuals.iter().map(|row| row[k].abs());
+        scratch.extend(magnitudes.filter(|size| *size > 0.0));
         (PER_MEDIAN * median(&mut scratch).unwrap_or(0.0)).max(f64::MIN_POSITIVE)
     });
     residuals.into_iter().map(move |row| {
