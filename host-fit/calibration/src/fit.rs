@@ -19,12 +19,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod all_rows;
 mod calibration;
-mod compensate;
-mod cross_validation;
 mod error;
 mod field;
+mod lag;
 #[cfg(test)]
 mod mounting_tests;
 mod repair;
@@ -32,15 +30,12 @@ mod settings;
 mod warning;
 mod weights;
 
-pub use all_rows::fit_log;
 pub(crate) use calibration::RANGE_MARGIN;
 pub use calibration::calibration;
-pub use compensate::fit_compensated;
-pub(crate) use compensate::with_beams_later;
-pub use cross_validation::{CrossValidation, Split, cross_validate};
 pub use error::FitError;
 pub use field::field_calibration;
 use field::{FirstPhase, check_near};
+pub(crate) use lag::with_beams_later;
 pub use repair::Repair;
 pub use settings::{FitSettings, ModelChoice};
 pub use warning::{of_counts, of_undecoded};
@@ -92,6 +87,9 @@ pub struct Fit {
     /// By how much the reference lags behind the probes, fitted with the parameters; `None` where
     /// nothing in the log shows it.
     pub lag: Option<ReferenceLag>,
+    /// The rows of the fit, where the reference lags clearly: the reference is read later by the lag, and
+    /// the first or last rows of each movement are missing.
+    pub later: Option<Dataset>,
     /// The calibration in `f64`.
     pub calibration: Calibration,
     /// What goes into the blob.
@@ -106,42 +104,48 @@ pub struct Fit {
     pub weights: Vec<f64>,
     /// Those of them that count less than half, as the loss says: row numbers, ascending.
     pub outliers: Vec<usize>,
-    /// How many these are and where; of a sample, those of all rows of the logs whose errors are beyond
-    /// any that the fit kept.
+    /// How many these are and where.
     pub left_out: LeftOut,
     /// The rows of the dataset, decoded by the target's decoder.
     pub decoded: Decoded,
     /// Over these, by the target's decoder; zero deviations refitted where the model has them.
     pub judgement: Judgement,
-    /// The same over all rows of the logs, where the dataset is a sample of them: this counts, and the
-    /// blob records it.
-    pub all: Judgement,
     /// Errors over the rows that are no outliers.
     pub sound: PoseError,
-    /// With the solver's own zero deviations; `None` where the dataset is a sample.
-    pub errors_solver_zeros: Option<PoseError>,
+    /// With the solver's own zero deviations.
+    pub errors_solver_zeros: PoseError,
     /// What the user should know.
     pub warnings: Vec<Finding>,
 }
 
-/// Fits, checks and judges.
+/// Fits, checks and judges. A clear lag of the reference is taken off: see [`Fit::later`].
 ///
 /// # Errors
 /// See [`FitError`].
 pub fn fit(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<Fit, FitError> {
-    let job = Job::new(dataset, stage, settings);
-    let mut fit = match settings.model {
-        ModelChoice::Auto => job.best()?,
-        ModelChoice::Named(model) => job.of_model(model)?,
-    };
-    if let Some(lag) = &fit.lag {
-        fit.warnings
-            .extend(warning::of_lag(lag, stage.servo_period_s));
+    let mut found = lag::without_lag(dataset, stage, settings)?;
+    if let Some(lag) = &found.lag {
+        let clear = warning::of_lag(lag, stage.servo_period_s);
+        found.warnings.extend(clear);
     }
-    Ok(fit)
+    Ok(found)
+}
+
+/// The fit to rows as they are.
+fn fit_once(dataset: &Dataset, stage: &Stage, settings: &FitSettings) -> Result<Fit, FitError> {
+    let job = Job::new(dataset, stage, settings);
+    match settings.model {
+        ModelChoice::Auto => job.best(),
+        ModelChoice::Named(model) => job.of_model(model),
+    }
 }
 
 impl Fit {
+    /// The rows of the fit, of a log with these rows.
+    pub fn rows<'r>(&'r self, read: &'r Dataset) -> &'r Dataset {
+        self.later.as_ref().unwrap_or(read)
+    }
+
     /// The parameters that have a standard error, by name, and their covariance in this order, SI.
     pub fn covariance(&self) -> (Vec<String>, DMatrix<f64>) {
         if let Some(field) = &self.field {
@@ -284,8 +288,14 @@ impl<'a> Job<'a> {
         let own_zeros = Zeros::Given(&solution.delta_m);
         let warnings = warning::warnings(dataset, selected, &problem, &solution, &judgement);
         let train_fitness = problem.fitness(solution.cost);
+        // A lag shows at the best description of the log, which a search may be far from.
+        let best = match solver {
+            Solver::Search(_) => Solver::LeastSquares.solve(&problem, &settings.options).ok(),
+            Solver::Finished | Solver::LeastSquares => None,
+        };
         // Room for what the lag takes.
         drop(problem);
+        let best = best.map_or(*parameters, |best| best.parameters);
         Ok(Fit {
             model,
             model_reason: format!("model ({}): --model asks for it", model.name),
@@ -294,19 +304,19 @@ impl<'a> Job<'a> {
             train_rows: selected.len(),
             standard_error: uncertainty.standard_error,
             field: None,
-            lag: reference_lag(&self.field_rows(&weights), stage, model, parameters),
+            later: None,
+            lag: reference_lag(&self.field_rows(&weights), stage, model, &best),
             loss,
             outliers: outliers(selected, &weights).collect(),
             left_out: left_out(dataset, selected, &weights),
             correlations: uncertainty.correlations,
             covariance_31: uncertainty.covariance,
             weights: by_row(dataset, selected, &weights),
-            errors_solver_zeros: Some(decoded.judge(dataset, stage, own_zeros).errors),
+            errors_solver_zeros: decoded.judge(dataset, stage, own_zeros).errors,
             solution,
             calibration,
             set,
             decoded,
-            all: judgement.clone(),
             judgement,
             sound,
         })

@@ -249,7 +249,7 @@ impl Calibration {
     /// Raises `ValueError` of a calibration that `fit` has not made.
     fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (of, fit) = self.fit_or_raise("residuals")?;
-        let dataset = &of.log.dataset;
+        let dataset = fit.rows(&of.log.dataset);
         let errors = fit.decoded.errors_less(&fit.judgement.zeros, dataset);
         residuals(py, dataset, &self.designed, &errors, Some(&fit.weights))
     }
@@ -352,7 +352,7 @@ impl Calibration {
                 stage_file,
                 of.outcome.subject(),
                 (warnings_of(log), &blob),
-                Errors::of_fit(fit, &log.dataset, report),
+                Errors::of_fit(fit, fit.rows(&log.dataset), report),
             )
         })
     }

@@ -75,9 +75,8 @@ pub fn refused(py: Python<'_>, why: &str, findings: &[Finding]) -> PyErr {
     )
 }
 
-pub fn of_calibrate(py: Python<'_>, error: &CalibrateError) -> PyErr {
+pub fn of_calibrate(error: &CalibrateError) -> PyErr {
     match error {
-        CalibrateError::Log(error) => of_log(py, error),
         CalibrateError::Unsupported(error) => wrong("project", error),
         CalibrateError::Interrupted(_) => PyKeyboardInterrupt::new_err(()),
     }

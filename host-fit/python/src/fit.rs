@@ -2,13 +2,13 @@
 
 use crate::calibration::Calibration;
 use crate::choice::chosen;
-use crate::error::{of_calibrate, of_log, refused, wrong};
+use crate::error::{of_calibrate, refused, wrong};
 use crate::finding;
 use crate::log::Log;
 use crate::work;
 use host_fit::calibrate::{FitOrder, Limits, check_refusal, loss_of};
 use host_fit::calibration::diagnose;
-use host_fit::calibration::fit::{FitSettings, ModelChoice, fit_log};
+use host_fit::calibration::fit::{FitSettings, ModelChoice, fit as fit_rows};
 use host_fit::input::interrupt;
 use host_fit::solver::problem::draw::Draw;
 use host_fit::solver::problem::parameters::Parameters;
@@ -47,13 +47,12 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
     let mut settings = FitSettings::new(ModelChoice::Auto);
     settings.options.interrupt = Some(interrupt::flag());
     let (reading, stage) = (&log.reading, &log.designed);
-    let checked = work::run(py, || {
-        let fitted = fit_log(reading, stage, &settings)?;
+    let (diagnosis, refusal) = work::run(py, || {
+        let fitted = fit_rows(&reading.dataset, stage, &settings);
         let diagnosis = diagnose::of_log(&reading.dataset, stage, fitted.as_ref());
         let refusal = check_refusal(fitted.as_ref(), &diagnosis.findings);
-        Ok((diagnosis, refusal))
+        (diagnosis, refusal)
     })?;
-    let (diagnosis, refusal) = checked.map_err(|error| of_log(py, &error))?;
     let verdict = finding::figures(py, &diagnosis.verdict)?;
     let findings = finding::list(py, &diagnosis.findings)?;
     let class = py.import("hallstage._results")?.getattr("Findings")?;
@@ -65,7 +64,7 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
 ///
 /// `model`: "auto" (the field model where the log can carry it, else 31), "12", "15", "30", "31" (equations of
 /// the paper), "field". `solver`, `project`, `loss`, `train`, `draw`, `population`, `generations`, `seed`,
-/// `start` (a calibration), `compensate_lag`, `cross_validate`, `serial`, `created`, `limit` ("x=1.5um,rz=4urad"),
+/// `start` (a calibration), `serial`, `created`, `limit` ("x=1.5um,rz=4urad"),
 /// `force`: as the options of that program, which its reference explains. Other threads of Python go on
 /// meanwhile; Ctrl-C ends it.
 ///
@@ -74,8 +73,8 @@ pub fn check<'py>(py: Python<'py>, log: &Bound<'_, Log>) -> PyResult<Bound<'py, 
 #[pyfunction]
 #[pyo3(signature = (
     log, *, model = "auto", solver = "shtlbo-lm", project = "linear", loss = None, train = None,
-    draw = "stratified", population = None, generations = None, seed = 1, start = None, compensate_lag = false,
-    cross_validate = false, serial = "", created = "", limit = None, force = false
+    draw = "stratified", population = None, generations = None, seed = 1, start = None,
+    serial = "", created = "", limit = None, force = false
 ))]
 #[expect(
     clippy::too_many_arguments,
@@ -94,8 +93,6 @@ pub fn fit(
     generations: Option<i64>,
     seed: u64,
     start: Option<PyRef<'_, Calibration>>,
-    compensate_lag: bool,
-    cross_validate: bool,
     serial: &str,
     created: &str,
     limit: Option<&str>,
@@ -132,7 +129,6 @@ pub fn fit(
             created: blob_text("created", created)?,
             force,
         },
-        compensate_lag,
         limits: limits
             .transpose()
             .map_err(|problem| wrong("limit", problem))?
@@ -140,30 +136,13 @@ pub fn fit(
     };
     let stage = &log.designed;
     let made = work::run(py, || {
-        // With the lag taken off all rows are other rows.
-        let options = log.options(FitOrder::read_options(compensate_lag));
-        let anew = || log.reading.read_anew(stage, &options, |_, _| ());
-        let anew = compensate_lag.then(anew).transpose()?;
-        let (fitted, compensated) = order.fit(anew.as_ref().unwrap_or(&log.reading), stage)?;
-        let reading = match anew.zip(compensated) {
-            Some((mut anew, dataset)) => {
-                anew.dataset = dataset;
-                Arc::new(anew)
-            }
-            None => Arc::clone(&log.reading),
-        };
-        let outcome = order.judge(fitted, &reading, stage)?;
-        let of_log = (&*reading, &**stage);
-        let mut report = outcome.report(&order, of_log, started.elapsed().as_secs_f64());
-        if let Some(report) = report
-            .as_mut()
-            .filter(|_| cross_validate && outcome.refusal.is_none())
-        {
-            outcome.cross_validate(report, &order, of_log);
-        }
-        Ok((outcome, report, reading))
+        let of_log = (&*log.reading, &**stage);
+        let fitted = order.fit(&log.reading, stage)?;
+        let outcome = order.judge(fitted, &log.reading, stage)?;
+        let report = outcome.report(&order, of_log, started.elapsed().as_secs_f64());
+        Ok((outcome, report))
     })?;
-    let (outcome, report, reading) = made.map_err(|error| of_calibrate(py, &error))?;
+    let (outcome, report) = made.map_err(|error| of_calibrate(&error))?;
     // A search that was interrupted in another thread.
     if interrupt::requested() {
         return Err(PyKeyboardInterrupt::new_err(()));
@@ -171,7 +150,7 @@ pub fn fit(
     match report {
         Some(report) if outcome.has_blob => {
             let (designed, stage) = (Arc::clone(stage), log.stage.clone_ref(py));
-            Calibration::of_fit(outcome, report, reading, designed, stage)
+            Calibration::of_fit(outcome, report, Arc::clone(&log.reading), designed, stage)
         }
         _ => {
             let why = outcome.refusal.as_deref().unwrap_or_default();

@@ -19,8 +19,8 @@ use std::sync::Arc;
 
 /// Logs of a stage, read and checked: rows in SI units, by movement.
 ///
-/// Of more than 125,000 rows it holds a sample, of whole runs; `fit`, `evaluate` and a decoder that take it go
-/// through all rows all the same. Made by `read_log` and `Log.from_arrays`.
+/// Of more than 125,000 rows it holds a sample, of whole runs; `fit` works on these. `evaluate` and a decoder
+/// go through all rows. Made by `read_log` and `Log.from_arrays`.
 #[pyclass(frozen, subclass, module = "hallstage")]
 pub struct Log {
     pub reading: Arc<LogReading>,

@@ -49,12 +49,6 @@ def test_each_option_is_that_of_the_program(stage: hs.Stage, host_fit: HostFit) 
     assert searched.figures is not None and searched.figures["solver"] == "shtlbo"
 
 
-def test_the_lag_of_a_reference_is_taken_off(run30: hs.Log) -> None:
-    cal = hs.fit(run30, compensate_lag=True)
-    assert cal.figures is not None and cal.figures["reference_lag"]["compensated"]
-    assert len(cal.residuals()) <= len(run30)
-
-
 def test_parameters_have_what_is_known_of_them(cal: hs.Calibration) -> None:
     eta = cal.parameters["eta_a"]
     assert eta.name == "eta_a" and eta.std is not None and eta.interval is not None

@@ -1,18 +1,15 @@
 //! A fit with the decisions around it.
 
 use super::{Limits, failure};
-use crate::report::json::{Choice, Circumstances, Report, of_cross_validation, of_fit};
+use crate::report::json::{Choice, Circumstances, Report, of_fit};
 use crate::report::verdict::{End, Subject};
 use hallstage_calibration::diagnose::of_fit as of_residuals;
 use hallstage_calibration::diagnose::{self, Diagnosis};
-use hallstage_calibration::fit::{
-    Fit, FitError, FitSettings, cross_validate, fit_compensated, fit_log,
-};
+use hallstage_calibration::fit::{self, Fit, FitError, FitSettings};
 use hallstage_calibration::recalibrate::Known;
-use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{self, Severity};
 use hallstage_input::interrupt;
-use hallstage_input::log::{LogError, LogReading, ReadOptions};
+use hallstage_input::log::LogReading;
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::{Projection, SolveError, Solver};
 
@@ -21,8 +18,6 @@ use hallstage_solver::solve::{Projection, SolveError, Solver};
 pub struct FitOrder {
     /// How it is made. With `force` the blob of a refused log is written, too.
     pub settings: FitSettings,
-    /// Whether the lag of the reference is taken off.
-    pub compensate_lag: bool,
     /// Largest rms errors of X, Y, Rz: of the field model in service, of others over all rows.
     pub limits: Limits,
 }
@@ -30,9 +25,6 @@ pub struct FitOrder {
 /// Why nothing is known of a log.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrateError {
-    /// Those of reading a long log again.
-    #[error(transparent)]
-    Log(#[from] LogError),
     /// No fit was tried: the settings do not go together.
     #[error(transparent)]
     Unsupported(SolveError),
@@ -56,17 +48,7 @@ pub struct Outcome {
 }
 
 impl FitOrder {
-    /// How logs are read for it, beyond what the user says of bad rows and movements.
-    pub fn read_options(compensate_lag: bool) -> ReadOptions {
-        ReadOptions {
-            // With the lag taken off all rows are other rows.
-            rows_max: ReadOptions::FIT.rows_max.filter(|_| !compensate_lag),
-            ..ReadOptions::FIT
-        }
-    }
-
-    /// Fits a log. With the lag of the reference taken off it also gives the rows with the reference read
-    /// later, for which the fit is.
+    /// Fits a log.
     ///
     /// # Errors
     /// See [`CalibrateError`]; inside the result those of the fit.
@@ -74,23 +56,15 @@ impl FitOrder {
         &self,
         log: &LogReading,
         stage: &Stage,
-    ) -> Result<(Result<Fit, FitError>, Option<Dataset>), CalibrateError> {
-        let (fitted, compensated) = if self.compensate_lag {
-            match fit_compensated(&log.dataset, stage, &self.settings) {
-                Ok((fit, compensated)) => (Ok(fit), Some(compensated)),
-                Err(error) => (Err(error), None),
-            }
-        } else {
-            (fit_log(log, stage, &self.settings)?, None)
-        };
-        match fitted {
+    ) -> Result<Result<Fit, FitError>, CalibrateError> {
+        match fit::fit(&log.dataset, stage, &self.settings) {
             Err(FitError::Solver(error @ SolveError::Unsupported { .. })) => {
                 Err(CalibrateError::Unsupported(error))
             }
             Err(error) if interrupt::requested() => Err(CalibrateError::Interrupted(format!(
                 "nothing was written: {error}"
             ))),
-            fitted => Ok((fitted, compensated)),
+            fitted => Ok(fitted),
         }
     }
 
@@ -108,7 +82,10 @@ impl FitOrder {
         let diagnosis = diagnose::of_log(&log.dataset, stage, fitted.as_ref());
         if let (Some(repair), Some(predicted)) = (&diagnosis.repair, &diagnosis.predicted) {
             fitted = match fitted {
-                Ok(fit) => fit.repaired(log, stage, repair, predicted)?,
+                Ok(fit) => {
+                    let rows = fit.rows(&log.dataset).clone();
+                    fit.repaired(&rows, stage, repair, predicted)
+                }
                 failed => failed,
             };
         }
@@ -159,7 +136,7 @@ impl Outcome {
         if !refused.is_empty() {
             return Some(format!("the log is refused: {refused}"));
         }
-        let on_log = || (fit.all.errors.axes.map(|axis| axis.rms), "on the log");
+        let on_log = || (fit.judgement.errors.axes.map(|axis| axis.rms), "on the log");
         let (rms, which) = self
             .in_service()
             .map_or_else(on_log, |rms| (rms, "in service"));
@@ -187,7 +164,7 @@ impl Outcome {
             end,
             diagnosis: &self.diagnosis,
             is_field: self.is_field(),
-            errors: self.fitted.as_ref().ok().map(|fit| &fit.all.errors),
+            errors: self.fitted.as_ref().ok().map(|fit| &fit.judgement.errors),
             limits: self.limits.0,
             in_service: self.in_service().is_some(),
         }
@@ -210,39 +187,19 @@ impl Outcome {
             solver: solver.name(),
             project: project.name(),
             seed: settings.options.seed,
-            lag_compensated: order.compensate_lag,
         };
         let diagnosis = self.diagnosis.clone();
-        let circumstances = Circumstances::new(log, stage, elapsed_s, diagnosis);
+        let circumstances = Circumstances {
+            dataset: fit.rows(&log.dataset),
+            ..Circumstances::new(log, stage, elapsed_s, diagnosis)
+        };
         Some(of_fit(fit, choice, &circumstances))
-    }
-
-    /// Adds the errors on rows left out to a report: five more fits. Where one fails, it warns and gives the
-    /// warning.
-    pub fn cross_validate(
-        &self,
-        report: &mut Report,
-        order: &FitOrder,
-        (log, stage): (&LogReading, &Stage),
-    ) -> Option<String> {
-        let fit = self.fitted.as_ref().ok()?;
-        match cross_validate(fit, &log.dataset, stage, &order.settings) {
-            Ok(found) => {
-                report.of_fit["cross_validation"] = of_cross_validation(&found);
-                None
-            }
-            Err(error) => {
-                let warning = format!("no cross-validation: without a fifth of the rows, {error}");
-                report.warnings.push(warning.clone());
-                Some(warning)
-            }
-        }
     }
 }
 
 /// Why a search that was interrupted is not to be written: a finished one leaves little but noise.
 fn unfinished(fit: &Fit, log: &LogReading) -> Option<String> {
-    let ratio = of_residuals::over_noise(fit, &log.dataset);
+    let ratio = of_residuals::over_noise(fit, fit.rows(&log.dataset));
     (ratio > of_residuals::ERROR_TO_NOISE_MAX).then(|| {
         format!(
             "the best so far has errors of {ratio:.1} times the noise from sample to sample, more than {}: let it run longer",

@@ -111,10 +111,11 @@ pub fn checked(log: &LogReading, fitted: Result<&Fit, &FitError>, diagnosis: &Di
     let fit = fitted.ok();
     json!({
         "rows": rows,
+        "judged_rows": fit.map(|fit| fit.judgement.rows()),
         "movements": movements,
         "skipped_rows": log.skipped_rows,
         "model": fit.map(|fit| fit.model.name),
-        "errors": fit.map(|fit| errors(&fit.all.errors)),
+        "errors": fit.map(|fit| errors(&fit.judgement.errors)),
         "failure": fitted.err().map(ToString::to_string),
         "warnings": warnings_of(log),
         "verdict": diagnosis.verdict,

@@ -12,7 +12,7 @@ use crate::report::table::tables;
 use crate::report::verdict::{End, Subject};
 use clap::Args;
 use hallstage_calibration::diagnose::{self, Diagnosis};
-use hallstage_calibration::fit::{FitSettings, ModelChoice, fit_log};
+use hallstage_calibration::fit::{FitSettings, ModelChoice, fit};
 use hallstage_calibration::judge::Zeros;
 use hallstage_input::finding::{Finding, Severity};
 use hallstage_input::interrupt;
@@ -48,7 +48,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         options,
         ..FitSettings::new(ModelChoice::Auto)
     };
-    let fitted = terminal::timed("fit", || fit_log(&log, &stage, &settings))?;
+    let fitted = terminal::timed("fit", || fit(&log.dataset, &stage, &settings));
     if interrupt::requested() {
         return Err(HostError::interrupted("nothing was written"));
     }
@@ -62,7 +62,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
         end: why.as_deref().map_or(End::Checked, End::Failed),
         diagnosis: &diagnosis,
         is_field: fit.is_some_and(|fit| fit.field.is_some()),
-        errors: fit.map(|fit| &fit.all.errors),
+        errors: fit.map(|fit| &fit.judgement.errors),
         limits: [None; 3],
         in_service: false,
     };
@@ -70,11 +70,14 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
     let checked = checked(&log, fitted.as_ref(), &diagnosis);
     args.json.add(&mut outputs, &checked)?;
     let elapsed_s = started.elapsed().as_secs_f64();
-    let circumstances = Circumstances::new(&log, &stage, elapsed_s, Diagnosis::default());
+    let circumstances = Circumstances {
+        dataset: fit.map_or(&log.dataset, |fit| fit.rows(&log.dataset)),
+        ..Circumstances::new(&log, &stage, elapsed_s, Diagnosis::default())
+    };
     let judged = fit.map(|fit| {
         let zeros = Zeros::of_model(fit.model);
-        let by_row = fit.decoded.errors_less(&fit.judgement.zeros, &log.dataset);
-        of_eval(&fit.set, &fit.all, zeros, &by_row, &circumstances)
+        let by_row = (fit.decoded).errors_less(&fit.judgement.zeros, circumstances.dataset);
+        of_eval(&fit.set, &fit.judgement, zeros, &by_row, &circumstances)
     });
     args.report.add(&mut outputs, || {
         let what = ("Check of a log", "");
@@ -83,7 +86,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), HostError> {
             .source(what, &args.logs, (&log, &stage), subject);
         source.errors = fit
             .zip(judged.as_ref())
-            .map(|(fit, judged)| Errors::of_fit(fit, &log.dataset, judged));
+            .map(|(fit, judged)| Errors::of_fit(fit, circumstances.dataset, judged));
         Ok(source)
     })?;
     let hidden = ["failure", "warnings", "verdict", "predicted", "findings"];

@@ -90,7 +90,6 @@ impl HostError {
     /// Why a fit was not tried, or not kept.
     pub(super) fn of_fit(error: CalibrateError) -> Self {
         match error {
-            CalibrateError::Log(error) => error.into(),
             CalibrateError::Unsupported(error) => Self::usage("--project", error),
             CalibrateError::Interrupted(kept) => Self::interrupted(kept),
         }

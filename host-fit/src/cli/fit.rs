@@ -66,12 +66,6 @@ pub(super) struct FitArgs {
     start: Option<PathBuf>,
     #[command(flatten)]
     pub(super) threads: Threads,
-    /// Take the lag of the reference off, as the fit finds it.
-    #[arg(long)]
-    compensate_lag: bool,
-    /// Also report the errors on rows left out: five more fits.
-    #[arg(long)]
-    cross_validate: bool,
     /// Serial number of the stage, for the blob; at most 32 bytes.
     #[arg(long, value_name = "TEXT", value_parser = blob_text)]
     serial: Option<Text>,
@@ -103,40 +97,30 @@ pub(super) fn run(args: &FitArgs) -> Result<(), HostError> {
     let loss = loss.map_err(HostError::of_mismatch)?;
     interrupt::watch();
     let stage = args.logs.stage.read()?;
-    let mut log = args.logs.read(
+    let log = args.logs.read(
         &stage,
         ReadOptions {
             bad_rows: args.bad_rows,
-            ..FitOrder::read_options(args.compensate_lag)
+            ..ReadOptions::FIT
         },
     )?;
     let order = FitOrder {
         settings: settings(args, loss)?,
-        compensate_lag: args.compensate_lag,
         limits: args.limit.unwrap_or_default(),
     };
     let fitted = terminal::timed("fit", || order.fit(&log, &stage));
-    let (fitted, compensated) = fitted.map_err(HostError::of_fit)?;
-    if let Some(compensated) = compensated {
-        log.dataset = compensated;
-    }
+    let fitted = fitted.map_err(HostError::of_fit)?;
     let outcome = terminal::timed("diagnosis", || order.judge(fitted, &log, &stage));
     let outcome = outcome.map_err(HostError::of_fit)?;
     let of_log = (&log, &stage);
-    let mut report = outcome.report(&order, of_log, started.elapsed().as_secs_f64());
+    let report = outcome.report(&order, of_log, started.elapsed().as_secs_f64());
     let mut outputs = Outputs::default();
-    match &mut report {
+    match &report {
         None => {
             let checked = checked(&log, outcome.fitted.as_ref(), &outcome.diagnosis);
             args.json.add(&mut outputs, &checked)?;
         }
-        Some(report) => {
-            if args.cross_validate && outcome.refusal.is_none() {
-                let failed = outcome.cross_validate(report, &order, of_log);
-                terminal::warn(failed.as_slice());
-            }
-            args.json.add(&mut outputs, report)?;
-        }
+        Some(report) => args.json.add(&mut outputs, report)?,
     }
     let found = outcome.fitted.as_ref().ok().zip(report.as_ref());
     let subject = outcome.subject();
@@ -215,6 +199,6 @@ fn source<'a>(
         let provenance = &mut source.provenance;
         provenance.add_bytes(&args.out, &blob, "parameter blob, written");
     }
-    source.errors = fit.map(|(fit, report)| Errors::of_fit(fit, &log.dataset, report));
+    source.errors = fit.map(|(fit, report)| Errors::of_fit(fit, fit.rows(&log.dataset), report));
     Ok(source)
 }

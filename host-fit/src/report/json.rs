@@ -1,14 +1,14 @@
 //! What `fit` and `eval` report, as programs read it.
 
 use crate::report::errors::{RowErrors, by_log, by_temperature, errors};
-use crate::report::field::{self, by_axis};
+use crate::report::field;
 use crate::report::parameters::{
     Parameter, coordinates, field_parameters, parameters, parameters_in,
 };
 use crate::report::table::{Table, tables};
 use crate::report::trusted::trusted;
 use hallstage_calibration::diagnose::Diagnosis;
-use hallstage_calibration::fit::{CrossValidation, Fit};
+use hallstage_calibration::fit::Fit;
 use hallstage_calibration::judge::verdict::{Predicted, Verdict};
 use hallstage_calibration::judge::{Judgement, Zeros};
 use hallstage_input::dataset::{Dataset, Movement};
@@ -74,6 +74,8 @@ pub struct Report {
     pub model: &'static str,
     /// Rows of the logs named.
     pub rows: usize,
+    /// Rows that the errors are over: those of the logs, and in a fit to a long log those of its sample.
+    pub judged_rows: usize,
     /// Rows that the fit used: of a long log those of a sample at most.
     pub train_rows: usize,
     /// Movements of the logs named.
@@ -85,7 +87,7 @@ pub struct Report {
     /// Fitness over the rows that the fit used, with the solver's own zero deviations; for `eval`
     /// that of the errors below.
     pub train_fitness: f64,
-    /// Over all rows of the logs named; zero deviations refitted unless `delta` says zero.
+    /// Over the judged rows; zero deviations refitted unless `delta` says zero.
     pub errors: Value,
     /// How zero deviations were treated: "fit" or "zero".
     pub delta: &'static str,
@@ -97,7 +99,7 @@ pub struct Report {
     pub serial: String,
     /// Of a long log the rows that fit, diagnosis and figures use; null where they use all.
     pub excerpt: Value,
-    /// Zero deviation of each movement of the logs named.
+    /// Zero deviation of each movement that was judged.
     pub zero_deviations: Vec<MovementZero>,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -210,17 +212,6 @@ fn movement_zeros(dataset: &Dataset, judgement: &Judgement) -> Vec<MovementZero>
     judgement.movements.iter().enumerate().map(one).collect()
 }
 
-/// Errors on rows left out, by the fit that had not seen their group, and over the same rows by the fit to
-/// all; outliers do not count.
-pub fn of_cross_validation(found: &CrossValidation) -> Value {
-    json!({
-        "groups": found.groups,
-        "split": found.split.name(),
-        "left_out": by_axis(found.left_out),
-        "in_fit": by_axis(found.in_fit),
-    })
-}
-
 /// What led to a fit.
 #[derive(Clone, Debug)]
 pub struct Choice {
@@ -230,8 +221,6 @@ pub struct Choice {
     pub project: &'static str,
     /// Seed.
     pub seed: u64,
-    /// Whether the lag of the reference was taken off.
-    pub lag_compensated: bool,
 }
 
 /// The report of a fit. What only a fit has:
@@ -240,11 +229,10 @@ pub struct Choice {
 /// |---|---|
 /// | `model_reason`, `solver`, `project`, `seed` | why this model, and how it was fitted |
 /// | `evaluations`, `solver_s`, `stopped` | evaluations of the cost, time of the solver alone, why it stopped |
-/// | `loss`, `outlier_rows` | what the weights of the rows are by, also where the log lets none act; rows that count less than half, of a long log those of all rows whose errors are beyond any that the fit kept |
+/// | `loss`, `outlier_rows` | what the weights of the rows are by, also where the log lets none act; rows that count less than half, of a long log those of the sample |
 /// | `standard_errors` | what the standard errors of the parameters are |
 /// | `correlations` | pairs of parameters with a correlation above 0.95 or below -0.95 |
-/// | `cross_validation` | errors on rows left out; null unless asked for |
-/// | `errors_solver_delta` | errors over all rows with the solver's own zero deviations; null where there are none, and for a long log, of which only a sample has them |
+/// | `errors_solver_delta` | errors with the solver's own zero deviations; null of a judgement |
 /// | `field` | what a fit of the field model says of itself; null for other models |
 /// | `reference_lag` | lag of the reference, us, positive where it shows an earlier pose, with its standard error and whether it was taken off before the fit; null where no motion shows it |
 pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
@@ -270,7 +258,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         json!({
             "value_us": lag.value_s * 1e6,
             "standard_error_us": lag.standard_error_s * 1e6,
-            "compensated": choice.lag_compensated,
+            "compensated": fit.later.is_some(),
         })
     });
     let of_fit = json!({
@@ -285,8 +273,7 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         "outlier_rows": fit.left_out.rows,
         "standard_errors": standard_errors,
         "correlations": correlations.collect::<Vec<_>>(),
-        "cross_validation": null,
-        "errors_solver_delta": fit.errors_solver_zeros.as_ref().map(errors),
+        "errors_solver_delta": errors(&fit.errors_solver_zeros),
         "field": fit.field.as_ref().map(field::figures),
         "reference_lag": lag,
     });
@@ -296,7 +283,13 @@ pub fn of_fit(fit: &Fit, choice: Choice, c: &Circumstances) -> Report {
         coordinates: coordinates(fit.solution.parameters.nearest_places_m(c.stage)),
         warnings: c.warnings.iter().cloned().chain(warnings).collect(),
         of_fit: of_fit.as_object().cloned().unwrap_or_default(),
-        ..of_eval(&fit.set, &fit.all, Zeros::of_model(fit.model), &by_row, c)
+        ..of_eval(
+            &fit.set,
+            &fit.judgement,
+            Zeros::of_model(fit.model),
+            &by_row,
+            c,
+        )
     }
 }
 
@@ -311,9 +304,10 @@ pub fn of_eval(
     let dataset = c.dataset;
     Report {
         model: Model::of(set.model).name,
-        rows: judgement.rows(),
+        rows: dataset.read().0,
+        judged_rows: judgement.rows(),
         train_rows: set.fit.train_rows as usize,
-        movements: judgement.movements.len(),
+        movements: dataset.read().1,
         skipped_rows: c.skipped_rows,
         elapsed_s: c.elapsed_s,
         train_fitness: judgement.errors.fitness(),

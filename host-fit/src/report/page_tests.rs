@@ -82,13 +82,13 @@ fn a_page_holds_every_figure_in_one_file_that_needs_no_other() {
     };
     let judged = of_eval(
         &fit.set,
-        &fit.all,
+        &fit.judgement,
         Zeros::Refit,
         &Vec::new(),
         &circumstances,
     );
     let subject = Subject {
-        errors: Some(&fit.all.errors),
+        errors: Some(&fit.judgement.errors),
         ..subject(End::Written, &diagnosis)
     };
     let source = Source {

@@ -71,6 +71,7 @@ pub struct Diagnosis {
 ///
 /// Rows that the fit left out of account are for the tests of the signals and the channels alone.
 pub fn of_log(dataset: &Dataset, stage: &Stage, fitted: Result<&Fit, &FitError>) -> Diagnosis {
+    let dataset = fitted.map_or(dataset, |fit| fit.rows(dataset));
     let compensated = fitted.map(|fit| dataset.compensated(fit.calibration.temperature));
     let dataset = compensated.as_deref().unwrap_or(dataset);
     let sound = match fitted.map_or(&[][..], |fit| &fit.outliers) {

@@ -51,7 +51,7 @@ pub(super) fn short_movements(fit: Option<&Fit>, dataset: &Dataset) -> Option<Fi
         return None;
     }
     let (movements, rows) = match fit {
-        Some(fit) => (&fit.all.movements, fit.all.rows()),
+        Some(fit) => (&fit.judgement.movements, fit.judgement.rows()),
         None => (&dataset.movements, dataset.rows.len()),
     };
     let mean = rows as f64 / movements.len().max(1) as f64;

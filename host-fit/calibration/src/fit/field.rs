@@ -182,16 +182,16 @@ impl Job<'_> {
             standard_error: field.posterior.standard_errors_31(),
             covariance_31: DMatrix::zeros(0, 0),
             weights: super::by_row(dataset, selected, &field.weights),
+            later: None,
             lag: field.posterior.lag_error_s.map(lag),
             errors_solver_zeros: {
                 let zeros = Zeros::Given(&solution.delta_m);
-                Some(decoded.judge(dataset, stage, zeros).errors)
+                decoded.judge(dataset, stage, zeros).errors
             },
             solution,
             calibration,
             set,
             decoded,
-            all: judgement.clone(),
             judgement,
             sound,
             field: Some(field),

@@ -3,7 +3,7 @@
 use super::{Fit, FitError};
 use crate::judge::verdict::Predicted;
 use crate::judge::{Decoded, Zeros};
-use hallstage_input::log::{LogError, LogReading};
+use hallstage_input::dataset::Dataset;
 use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::parameters::FieldParameters;
 use hallstage_solver::solve::field::posterior::Posterior;
@@ -28,18 +28,17 @@ impl Fit {
     /// errors that are `predicted` for service.
     ///
     /// # Errors
-    /// Those of reading again, and inside the result [`FitError::Unusable`].
+    /// [`FitError::Unusable`].
     pub fn repaired(
         mut self,
-        log: &LogReading,
+        dataset: &Dataset,
         stage: &Stage,
         repair: &Repair,
         predicted: &Predicted,
-    ) -> Result<Result<Self, FitError>, LogError> {
-        let (parameters, dataset) = (&repair.parameters, &log.dataset);
-        let Some(constants) = parameters.constants(stage.hall.m_per_count) else {
-            return Ok(Err(FitError::Unusable(ParameterError::SingularPlane)));
-        };
+    ) -> Result<Self, FitError> {
+        let parameters = &repair.parameters;
+        let constants = parameters.constants(stage.hall.m_per_count);
+        let constants = constants.ok_or(FitError::Unusable(ParameterError::SingularPlane))?;
         self.calibration.geometry = parameters.model_31().geometry();
         self.calibration.probes = Probes::Field(constants.probes);
         let origin = Origin {
@@ -48,13 +47,9 @@ impl Fit {
             logs_sha256: self.set.logs_sha256,
             fit: self.set.fit,
         };
-        self.set = match self.calibration.prepare(&origin) {
-            Ok(set) => set,
-            Err(error) => return Ok(Err(FitError::Unusable(error))),
-        };
+        self.set = (self.calibration.prepare(&origin)).map_err(FitError::Unusable)?;
         self.decoded = Decoded::new(&self.set, dataset);
         self.judgement = self.decoded.judge(dataset, stage, Zeros::Refit);
-        self.all = self.judgement.clone();
         let mut sound = self.decoded.clone();
         for &row in &self.outliers {
             sound.errors[row] = None;
@@ -70,7 +65,7 @@ impl Fit {
         self.solution.parameters = parameters.model_31();
         let zeros = self.judgement.zeros.iter();
         self.solution.delta_m = zeros.map(|zero| zero.delta_m).collect();
-        self.errors_solver_zeros = Some(self.judgement.errors);
+        self.errors_solver_zeros = self.judgement.errors;
         if let Some(field) = &mut self.field {
             let mut covariance = repair.covariance.clone();
             // The faults are separated from the parameters, not from k and h.
@@ -86,14 +81,8 @@ impl Fit {
             field.parameters = *parameters;
             self.standard_error = field.posterior.standard_errors_31();
         }
-        let judged = match dataset.read() {
-            (rows, _) if rows > dataset.rows.len() => self.judged_on_all_rows(log, stage)?,
-            _ => Ok(self),
-        };
         // Those on the log have the faults that are taken off: no measure for another one.
-        Ok(judged.map(|mut fit| {
-            fit.set.fit.rms = predicted.rms.map(|rms| rms as f32);
-            fit
-        }))
+        self.set.fit.rms = predicted.rms.map(|rms| rms as f32);
+        Ok(self)
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::judge::Judgement;
 use crate::judge::lag::ReferenceLag;
-use crate::judge::statistics::{AxisError, PoseError};
+use crate::judge::statistics::AxisError;
 use hallstage_input::dataset::Dataset;
 use hallstage_input::finding::{Code, Finding};
 use hallstage_solver::problem::Problem;
@@ -17,25 +17,8 @@ const POSE: [(&str, &str, &str); 3] = [("x", "X", "um"), ("y", "Y", "um"), ("rz"
 const LAG_MIN: f64 = 0.1;
 /// ... and from this many of its standard errors.
 const LAG_ERRORS_MIN: f64 = 3.0;
-/// Warn where errors over all rows are this many times those over the rows that were fitted.
-const REST_MAX: f64 = 1.5;
 /// In a million rows of noise alone the largest error is five times the rms.
 const PEAK_TO_RMS_MAX: f64 = 8.0;
-
-/// Rows that were not fitted have other errors than those that were.
-pub(super) fn of_rest(fitted: &PoseError, all: &PoseError) -> Option<Finding> {
-    let ratio = |axis: usize| all.axes[axis].rms / fitted.axes[axis].rms;
-    let worst = (0..3).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
-    let (key, axis, unit) = POSE[worst];
-    let [all_micro, fitted_micro] = [all, fitted].map(|error| error.axes[worst].rms * 1e6);
-    (ratio(worst) > REST_MAX).then(|| {
-        let message = format!(
-            "over all rows the error in {axis} is {all_micro:.2} {unit} rms, over those that were fitted {fitted_micro:.2}: a \
-             movement so long that the reference drifts, or a fault elsewhere in the log; run `host-fit check` on parts of it"
-        );
-        Finding::new(Code::ModelLacks, message).on(key).of(all_micro, unit)
-    })
-}
 
 /// Movements whose zero deviation is beyond its range, and rows that were not decoded.
 pub fn of_counts(zeros: &[ZeroDeviation], undecoded: usize) -> impl Iterator<Item = Finding> {
@@ -61,11 +44,6 @@ pub fn of_undecoded(rows: usize) -> Option<Finding> {
     (rows > 0).then(|| Finding::new(Code::Saturated, message()).of(rows as f64, "rows"))
 }
 
-/// Whether it is one of [`of_counts`].
-pub(super) const fn is_count(found: &Finding) -> bool {
-    matches!(found.code, Code::ZeroClipped | Code::Saturated)
-}
-
 /// A lag of the reference that is large and beyond doubt.
 pub(super) fn of_lag(lag: &ReferenceLag, period_s: f64) -> Option<Finding> {
     let lag_s = lag.value_s;
@@ -73,7 +51,7 @@ pub(super) fn of_lag(lag: &ReferenceLag, period_s: f64) -> Option<Finding> {
     (lag_s.abs() > least).then(|| {
         let lags = if lag_s > 0.0 { "lags behind" } else { "is ahead of" };
         let message = format!(
-            "the reference {lags} the probes by {:.0} us, {:.2} servo periods: fit with --compensate-lag, or set the delay of \
+            "the reference {lags} the probes by {:.0} us, {:.2} servo periods, which the fit has taken off: set the delay of \
              the interferometers",
             lag_s.abs() * 1e6,
             lag_s.abs() / period_s

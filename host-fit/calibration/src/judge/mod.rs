@@ -27,7 +27,6 @@ pub mod statistics;
 pub mod uncertainty;
 pub mod verdict;
 
-pub(crate) use judgement::medians;
 pub use judgement::{Judge, Judgement, LogJudgement};
 
 use hallstage_input::dataset::{Dataset, Row};

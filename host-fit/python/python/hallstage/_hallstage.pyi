@@ -77,8 +77,6 @@ def fit(
     generations: int | None = None,
     seed: int = 1,
     start: Calibration | None = None,
-    compensate_lag: bool = False,
-    cross_validate: bool = False,
     serial: str = "",
     created: str = "",
     limit: str | None = None,

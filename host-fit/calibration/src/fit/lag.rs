@@ -1,13 +1,13 @@
-//! A fit to a log whose reference lags: the lag is estimated with the parameters, the reference
-//! read later by as much, and so on until nothing of it is left.
+//! A fit to a log whose reference lags: the lag is estimated with the parameters, the reference is
+//! read later by the lag, and the fit is made again, until nothing of the lag is left.
 
-use super::{Fit, FitError, FitSettings, ModelChoice, fit};
+use super::{Fit, FitError, FitSettings, ModelChoice, fit_once, warning};
 use hallstage_input::dataset::{Dataset, Movement, Row};
 use hallstage_input::stage::Stage;
 use hallstage_solver::problem::model::Model;
 use runtime::ModelKind;
 
-/// Rounds of fit and compensation: the first leaves a hundredth of a lag of several rows.
+/// Rounds of fit and interpolation: the first leaves a hundredth of a lag of several rows.
 const ROUNDS_MAX: u32 = 4;
 /// A lag below this part of its standard error is none.
 const LEFT: f64 = 0.1;
@@ -15,46 +15,64 @@ const LEFT: f64 = 0.1;
 /// one row may be missing.
 const STEP_MAX: i64 = 2;
 
-/// Fits, with the lag of the reference compensated: the fit, whose lag is the whole of it, and
-/// the dataset as compensated, which lacks the first or last rows of each movement.
+/// Fits with a clear lag of the reference taken off. The lag of the fit is the whole of it.
 ///
 /// # Errors
 /// See [`FitError`].
-pub fn fit_compensated(
+pub(super) fn without_lag(
     dataset: &Dataset,
     stage: &Stage,
     settings: &FitSettings,
-) -> Result<(Fit, Dataset), FitError> {
-    let mut total_s = 0.0;
-    let mut at = dataset.clone();
-    let mut found = match fit(&at, stage, settings) {
-        // A lag of many rows is more than the field model's fit can follow: Model (31) finds it first.
-        Err(FitError::Field(_)) => {
+) -> Result<Fit, FitError> {
+    let found = match (fit_once(dataset, stage, settings), settings.model) {
+        // A lag of many rows is more than the field model can follow: Model (31) finds it.
+        (Err(FitError::Field(error)), ModelChoice::Named(_)) => {
             let model = ModelChoice::Named(Model::of(ModelKind::M31));
-            fit(
-                &at,
-                stage,
-                &FitSettings {
-                    model,
-                    ..settings.clone()
-                },
-            )?
+            let of_31 = FitSettings {
+                model,
+                ..settings.clone()
+            };
+            let found = fit_once(dataset, stage, &of_31).ok();
+            let found = found.filter(|found| is_clear(found, stage));
+            return match found {
+                Some(found) => again(found, dataset, stage, settings),
+                None => Err(FitError::Field(error)),
+            };
         }
-        found => found?,
+        (found, _) => found?,
     };
+    match is_clear(&found, stage) {
+        true => again(found, dataset, stage, settings),
+        false => Ok(found),
+    }
+}
+
+fn is_clear(found: &Fit, stage: &Stage) -> bool {
+    (found.lag.as_ref()).is_some_and(|lag| warning::of_lag(lag, stage.servo_period_s).is_some())
+}
+
+/// Fits again until nothing of the lag of `found` is left.
+fn again(
+    mut found: Fit,
+    dataset: &Dataset,
+    stage: &Stage,
+    settings: &FitSettings,
+) -> Result<Fit, FitError> {
+    let mut total_s = 0.0;
     for _ in 0..ROUNDS_MAX {
         let Some(lag) = found.lag else { break };
         if lag.value_s.abs() < LEFT * lag.standard_error_s {
             break;
         }
         total_s += lag.value_s;
-        at = with_reference_later(dataset, total_s);
-        found = fit(&at, stage, settings)?;
+        let later = with_reference_later(dataset, total_s);
+        found = fit_once(&later, stage, settings)?;
+        found.later = Some(later);
     }
     if let Some(lag) = &mut found.lag {
         lag.value_s += total_s;
     }
-    Ok((found, at))
+    Ok(found)
 }
 
 /// The rows with the reference of `later_s` after them: see [`with_beams_later`].
