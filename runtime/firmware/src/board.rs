@@ -18,11 +18,7 @@ use stm32f4xx_hal::rcc::{Config, Enable, Rcc, Reset};
 use stm32f4xx_hal::time::Hertz;
 
 /// The converter: any part with a driver that implements [`FrameSampler`].
-#[cfg(not(feature = "ads8688"))]
 pub type Converter = hal_adapters::adc::Ads131m08<SpiDevice, ControlPin>;
-/// The converter: any part with a driver that implements [`FrameSampler`].
-#[cfg(feature = "ads8688")]
-pub type Converter = hal_adapters::adc::Ads8688<SpiDevice, ControlPin>;
 
 /// Which input of the converter carries which sensor.
 const CHANNELS: Channels = match Channels::IN_ORDER.with_thermometers(THERMOMETERS) {
@@ -50,7 +46,7 @@ const THERMOMETERS: [Option<&Thermometer>; 2] = [
 
 /// The SPI bus with chip select, to the converter alone.
 pub type SpiDevice = ExclusiveDevice<SpiDma, PA4<Output>, NoDelay>;
-/// SYNC/RESET of an ADS131M08, RST/PD of an ADS8688. High at rest.
+/// SYNC/RESET of the converter. High at rest.
 pub type ControlPin = PB0<Output>;
 /// The LED, on when high.
 pub type Led = PC1<Output>;

@@ -1,7 +1,7 @@
 //! What every check starts from: images, blobs, the log and the poses that the host decodes
 //! from it; and what the frames on the bus say.
 
-use crate::adc_model::{Part, Row};
+use crate::adc_model::{Input, Row};
 use crate::can_model::Sent;
 use crate::image::Image;
 use crate::machine::Machine;
@@ -10,7 +10,7 @@ use hal_adapters::can::command::{Answer, Command, IdentityPage, Outcome, Request
 use hal_adapters::can::e2e::{protect, unprotect};
 use hal_adapters::can::pose::status_to_bus;
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus};
-use hal_adapters::can::{BusFrame, Layout, Message};
+use hal_adapters::can::{BusFrame, Layout, Message, NodeNumber};
 use runtime::frame::MISSING_CODE;
 use runtime::{AnyDecoder, Decode, PlanarPose, RawFrame, Status};
 use std::ffi::OsString;
@@ -50,10 +50,10 @@ pub const NEIGHBOUR_PERIOD_US: u64 = 1000;
 pub struct Bench {
     /// The emulator's library.
     pub library: OsString,
-    /// The programs for both converters.
-    pub images: [Image; 2],
-    /// The program for the ADS8688 as [`NEIGHBOUR`] with a servo period of [`NEIGHBOUR_PERIOD_US`].
-    pub neighbour: Image,
+    /// The program with a key.
+    pub image: Image,
+    /// The program without a key, as [`NEIGHBOUR`] with a servo period of [`NEIGHBOUR_PERIOD_US`].
+    neighbour: Image,
     /// The blob of the log, of serial `stage-7`.
     pub blob: Vec<u8>,
     /// The same calibration, made later.
@@ -84,7 +84,7 @@ impl Bench {
         ];
         Self {
             library,
-            images: ["ads131m08.elf", "ads8688.elf"].map(image),
+            image: image("stage.elf"),
             neighbour: image("neighbour.elf"),
             blob: bytes("params.bin"),
             later: bytes("later.bin"),
@@ -94,30 +94,31 @@ impl Bench {
         }
     }
 
-    /// The program for a part.
-    pub fn image(&self, part: Part) -> &Image {
-        match part {
-            Part::Ads131m08 => &self.images[0],
-            Part::Ads8688 => &self.images[1],
-        }
+    /// A controller with these parameter slots; its converter plays the log.
+    pub fn machine(&self, slots: [&[u8]; 2]) -> Machine {
+        self.machine_playing(slots, self.rows.clone())
     }
 
-    /// A controller with these parameter slots, whose converter plays the log.
-    pub fn machine(&self, part: Part, slots: [&[u8]; 2]) -> Machine {
-        self.machine_playing(part, slots, self.rows.clone())
-    }
-
-    /// The same with the blob of the log, after so many ticks; what it sent is forgotten.
-    pub fn running(&self, part: Part, ticks: u64) -> Machine {
-        let mut machine = self.machine(part, [&self.blob, &[]]);
+    /// A controller with the blob of the log after some ticks; the frames before are forgotten.
+    pub fn running(&self, ticks: u64) -> Machine {
+        let mut machine = self.machine([&self.blob, &[]]);
         machine.run_ticks(ticks);
         machine.chip.can.sent.clear();
         machine
     }
 
     /// A controller whose converter plays these rows.
-    pub fn machine_playing(&self, part: Part, slots: [&[u8]; 2], rows: Vec<Row>) -> Machine {
-        Machine::new(&self.library, self.image(part), part, rows, slots)
+    pub fn machine_playing(&self, slots: [&[u8]; 2], rows: Vec<Row>) -> Machine {
+        Machine::new(&self.library, &self.image, rows, slots)
+    }
+
+    /// The neighbour, with the blob of the log; its converter plays the log in its own period.
+    pub fn neighbour(&self) -> Machine {
+        let slots = [&self.blob[..], &[]];
+        let mut machine = Machine::new(&self.library, &self.neighbour, vec![], slots);
+        machine.chip.can.node = NodeNumber::new(NEIGHBOUR).expect("no number");
+        machine.chip.adc.input = Input::held(self.rows.clone()).every(NEIGHBOUR_PERIOD_US);
+        machine
     }
 
     /// The host's words of a tick: the log is played in a loop.

@@ -4,7 +4,7 @@ mod exceptions;
 
 pub use exceptions::{ACCESS_AND_STACKING, Cost};
 
-use crate::adc_model::{Part, Row};
+use crate::adc_model::Row;
 use crate::callbacks::{Context, count, inject, read, write};
 use crate::can_model::BusState;
 use crate::flash_model::{BYTES, FIRST};
@@ -61,18 +61,12 @@ pub struct Machine {
 
 impl Machine {
     /// A chip with the program and two parameter slots in flash, before its first instruction.
-    pub fn new(
-        library: &OsStr,
-        image: &Image,
-        part: Part,
-        rows: Vec<Row>,
-        slots: [&[u8]; 2],
-    ) -> Self {
+    pub fn new(library: &OsStr, image: &Image, rows: Vec<Row>, slots: [&[u8]; 2]) -> Self {
         let core = Unicorn::open(library);
         let mut flash = memory::<FLASH_BYTES>(0xff);
         flash.0.copy_from_slice(&image.flash);
         let mut returns = memory::<4096>(0);
-        let mut chip = Box::new(Peripherals::new(part, rows));
+        let mut chip = Box::new(Peripherals::new(rows));
         chip.ram.0[..image.stack_bytes].fill(PAINT);
         fill_with_noise(&mut chip.ram.0[image.stack_bytes..]);
         for (slot, contents) in (0..).zip(slots) {

@@ -1,14 +1,14 @@
 //! Runs the stage controller's unmodified image on an emulated STM32F405, with an emulated
 //! converter that plays a log over SPI, and compares what it sends over CAN with what the host
-//! decodes from the log. A line `FAULT part | fault | ticks | poses` says after how many ticks a
+//! decodes from the log. A line `FAULT fault | ticks | poses` says after how many ticks a
 //! fault was reported, and how many valid poses were wrong until then.
 //!
 //! Use, as the scripts beside this package do:
 //!
 //! - `bench FOLDER LIBRARY TICKS [PART OF A NAME]`: a folder with images, blobs, log and poses, the
 //!   library of Unicorn 2.1, the ticks of the long run (0: one pass over the log).
-//! - `bench FOLDER LIBRARY record PART LOG BUS REFERENCE` and
-//!   `bench FOLDER LIBRARY judge PART LOG STAGE BLOB DIRECT`: see [`rehearsal`].
+//! - `bench FOLDER LIBRARY record LOG BUS REFERENCE` and
+//!   `bench FOLDER LIBRARY judge LOG STAGE BLOB DIRECT`: see [`rehearsal`].
 
 mod adc_model;
 mod bench;
@@ -28,7 +28,6 @@ mod rehearsal;
 mod unicorn;
 mod watchdog_model;
 
-use adc_model::Part;
 use bench::Bench;
 use checks::{
     authority, bus, commands, figures, log, motion, neighbour, parameters, power_cuts, sensors,
@@ -45,20 +44,12 @@ macro_rules! named {
     };
 }
 
-/// The checks of each image.
-type OfPart = fn(&Bench, Part);
-const OF_PARTS: &[(&str, OfPart)] = &named! {
+/// The checks.
+const CHECKS: &[(&str, fn(&Bench))] = &named! {
     figures: flash_and_ram, interrupt_to_mailbox;
-    sensors: dead_from_the_start, transfers_that_never_end;
     temperature: follow_the_stage;
-    commands: record, order_and_age;
-};
-
-/// The checks of one image.
-type OfOne = fn(&Bench);
-const OF_ONE: &[(&str, OfOne)] = &named! {
-    motion: a_pose_is_of_its_instant;
-    sensors: a_register_changes_at_any_time, every_variant;
+    motion: a_pose_has_its_instant;
+    sensors: dead_from_the_start, transfers_that_never_end, a_register_changes_at_any_time, every_variant;
     log: a_debugger_reads_the_last_pose;
     timing: a_late_tick, ticks_that_never_come, the_clock_wraps, a_watchdog_reset,
         overrun_ticks_do_not_feed, fpu_settings_left_behind,
@@ -69,7 +60,7 @@ const OF_ONE: &[(&str, OfOne)] = &named! {
     start: supply_that_comes_late, no_crystal, silent_after_bus_off, pll_dead,
         can_dead, receive_line_low, the_board;
     parameters: one_usable, the_field_model, the_first_of_two, unusable;
-    commands: identify, rezero, any_length_code;
+    commands: record, order_and_age, identify, rezero, any_length_code;
     update: new_parameters, refused, no_nonce_twice, flash_that_fails, supply_that_drops;
     power_cuts: in_an_update;
     stopped: a_reset_runs_what_ran, parameters_that_crash, parameters_whose_check_crashes;
@@ -95,21 +86,13 @@ impl Runner {
     }
 
     fn everything(&mut self, bench: &Bench, ticks: u64) {
-        let whole = bench.rows.len() as u64;
-        for part in Part::ALL {
-            let name = part.name();
-            let ticks = whole.max(if part == Part::Ads131m08 { ticks } else { 0 });
-            let log = format!("{name}: log: whole_log");
-            self.run(&log, || log::whole_log(bench, part, ticks));
-            for case in sensors::cases(part) {
-                let name = format!("{name}: {}", case.name);
-                self.run(&name, || sensors::survives(bench, part, &case));
-            }
-            for (check, run) in OF_PARTS {
-                self.run(&format!("{name}: {check}"), || run(bench, part));
-            }
+        let ticks = ticks.max(bench.rows.len() as u64);
+        self.run("log: whole_log", || log::whole_log(bench, ticks));
+        for case in sensors::cases() {
+            let name = format!("sensors: {}", case.name);
+            self.run(&name, || sensors::survives(bench, &case));
         }
-        for (check, run) in OF_ONE {
+        for (check, run) in CHECKS {
             self.run(check, || run(bench));
         }
         for crash in start::crashes(bench) {
@@ -131,15 +114,12 @@ fn main() -> ExitCode {
         filter: String::new(),
         counts: [0; 2],
     };
-    let part_of = |name| Part::ALL.into_iter().find(|part| part.name() == name);
     match (*what, rest) {
-        ("record", [part, log, bus, reference]) => runner.run(what, || {
-            let part = part_of(*part).expect("a converter");
-            rehearsal::record(&bench, part, log, bus, reference);
-        }),
-        ("judge", [part, log, stage, blob, direct]) => runner.run(what, || {
-            let part = part_of(*part).expect("a converter");
-            rehearsal::judge(&bench, part, (log, stage), (blob, direct));
+        ("record", [log, bus, reference]) => {
+            runner.run(what, || rehearsal::record(&bench, log, bus, reference));
+        }
+        ("judge", [log, stage, blob, direct]) => runner.run(what, || {
+            rehearsal::judge(&bench, (log, stage), (blob, direct));
         }),
         (ticks, filter) => {
             runner.filter = filter.concat();

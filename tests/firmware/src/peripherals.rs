@@ -4,7 +4,7 @@
 
 mod registers;
 
-use crate::adc_model::{Adc, Input, Part, Row};
+use crate::adc_model::{Adc, Input, Row};
 use crate::can_model::CanModel;
 use crate::clock_model::{Clocks, Pll};
 use crate::dma_model::{Dma, Request, Side};
@@ -135,12 +135,12 @@ struct Transfer {
 
 impl Peripherals {
     /// A chip after power-up.
-    pub fn new(part: Part, rows: Vec<Row>) -> Self {
+    pub fn new(rows: Vec<Row>) -> Self {
         let mut new = Self {
             now_ns: BOOT_NS,
             spi_byte_ns: None,
             spi_bytes: 0,
-            adc: Adc::new(part, Input::held(rows)),
+            adc: Adc::new(Input::held(rows)),
             ram: memory(0),
             settled_jitter_ns: 0,
             dma_stands: false,

@@ -2,7 +2,7 @@
 //! it, record mode puts the codes on the bus; and the poses of a controller that has what was
 //! made of them are judged against the log.
 
-use crate::adc_model::{Input, Part};
+use crate::adc_model::Input;
 use crate::bench::{Bench, Seen, rows};
 use crate::checks::no_resets;
 use crate::checks::update::{KEY, talk};
@@ -28,6 +28,8 @@ const REFERENCE_CLOCK_US: u64 = 5_432_100;
 const REFERENCE_FASTER_PPM: u64 = 20;
 /// The servo period, us.
 const PERIOD_US: u64 = 2000;
+/// From the first tick to the middle of its sample, us.
+const MIDDLE_US: u64 = 150;
 /// Errors of the poses over those of a fit to the log itself, at most.
 const RATIO_MAX: f64 = 1.03;
 /// Lag of the poses by their own time stamps, at most, us.
@@ -35,23 +37,19 @@ const LAG_US_MAX: f64 = 20.0;
 
 /// A controller whose stage moves as the codes say. Row 0 is there in the middle of the first
 /// sample, so that samples see rows with all of their noise, not means of two rows.
-fn moving(bench: &Bench, part: Part, slots: [&[u8]; 2], log: &str) -> (Machine, u64) {
+fn moving(bench: &Bench, slots: [&[u8]; 2], log: &str) -> (Machine, u64) {
     let codes = rows(log);
     let ticks = codes.len() as u64;
-    let mut machine = bench.machine_playing(part, slots, Vec::new());
-    let middle_us = match part {
-        Part::Ads131m08 => 150,
-        Part::Ads8688 => 12,
-    };
-    machine.chip.adc.input = Input::moving(codes, PERIOD_US, middle_us);
+    let mut machine = bench.machine_playing(slots, Vec::new());
+    machine.chip.adc.input = Input::moving(codes, PERIOD_US, MIDDLE_US);
     (machine, ticks)
 }
 
 /// Plays `log` to a controller without parameters in record mode; writes what was on the bus as
 /// `candump -L` does, and the reference of the log as the interferometers' own file.
-pub fn record(bench: &Bench, part: Part, log: &str, bus: &str, reference: &str) {
+pub fn record(bench: &Bench, log: &str, bus: &str, reference: &str) {
     let text = std::fs::read_to_string(log).expect("the log");
-    let (mut machine, ticks) = moving(bench, part, [&[], &[]], &text);
+    let (mut machine, ticks) = moving(bench, [&[], &[]], &text);
     // A request before the controller has joined the bus is lost.
     machine.run_ticks(TICKS_APART);
     // What was on the bus before the answer is not recorded. The record ends as candump does.
@@ -100,8 +98,7 @@ fn reference_of(log: &str) -> String {
 /// Runs a controller whose second slot holds `blob` while the stage moves as `log` says, and
 /// compares the poses on its bus, at the times that it tells, with the reference of the log. Their
 /// errors must be those that `direct` tells, the blob that was fitted to the log itself.
-pub fn judge(bench: &Bench, part: Part, (log, stage): (&str, &str), (blob, direct): (&str, &str)) {
-    let name = part.name();
+pub fn judge(bench: &Bench, (log, stage): (&str, &str), (blob, direct): (&str, &str)) {
     let stage = Stage::from_file(Path::new(stage)).expect("the stage");
     let dataset = log::read(&[Path::new(log)], &stage, &ReadOptions::default());
     let dataset = dataset.expect("the log").dataset;
@@ -109,7 +106,7 @@ pub fn judge(bench: &Bench, part: Part, (log, stage): (&str, &str), (blob, direc
     let direct = std::fs::read(direct).expect("that of the log itself");
     let of_fit = ParameterSet::from_bytes(&direct).expect("sound").fit.rms;
     let text = std::fs::read_to_string(log).expect("the log");
-    let (mut machine, ticks) = moving(bench, part, [&[], &blob], &text);
+    let (mut machine, ticks) = moving(bench, [&[], &blob], &text);
     machine.run_ticks(ticks - 1);
     no_resets(&machine);
 
@@ -122,13 +119,13 @@ pub fn judge(bench: &Bench, part: Part, (log, stage): (&str, &str), (blob, direc
         (sum + ex * vx + ey * vy, weight + vx * vx + vy * vy)
     });
     let lag_us = -sums / weights * 1e6;
-    println!("RESULT rehearsal_{name}_lag_us={lag_us:.1}");
+    println!("RESULT rehearsal_lag_us={lag_us:.1}");
     for (axis, unit) in ["x_um", "y_um", "rz_urad"].iter().enumerate() {
         let squares: f64 = errors.iter().map(|e| e.less_zero[axis].powi(2)).sum();
         let rms = (squares / errors.len() as f64).sqrt() * 1e6;
         let of_fit = f64::from(of_fit[axis]) * 1e6;
-        println!("RESULT rehearsal_{name}_rms_{unit}={rms:.4}");
-        println!("RESULT rehearsal_{name}_rms_of_fit_{unit}={of_fit:.4}");
+        println!("RESULT rehearsal_rms_{unit}={rms:.4}");
+        println!("RESULT rehearsal_rms_of_fit_{unit}={of_fit:.4}");
         assert!(rms <= RATIO_MAX * of_fit);
     }
     assert!(lag_us.abs() <= LAG_US_MAX);

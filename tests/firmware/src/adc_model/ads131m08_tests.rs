@@ -30,7 +30,7 @@ fn frame(part: &mut Ads131m08, now_ns: u64, command: u16, data: u16) -> (u16, [i
     part.select(
         now_ns,
         &input(),
-        |codes| super::super::with(codes, [0; 2]),
+        |codes| super::super::all_inputs(codes, [0; 2]),
         false,
     );
     let read: Vec<_> = out.into_iter().map(|byte| part.exchange(byte)).collect();
@@ -189,7 +189,7 @@ fn commands_are_answered_in_the_next_frame_and_not_before_power_is_good() {
     part.select(
         T_0,
         &input(),
-        |codes| super::super::with(codes, [0; 2]),
+        |codes| super::super::all_inputs(codes, [0; 2]),
         false,
     );
     for byte in [0x00, 0x11, 0] {

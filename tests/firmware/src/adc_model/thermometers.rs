@@ -1,7 +1,5 @@
-//! Thermometers at inputs 7 and 8, and the voltage that a converter's input has of them: at the
-//! magnets' mount a Semitec 103AT-2 to ground with 68 kOhm to 3.3 V, on the stage body a TI TMP235.
-
-use super::Part;
+//! Thermometers at inputs 7 and 8: at the magnets' mount a Semitec 103AT-2 to ground with 68 kOhm to
+//! 3.3 V, on the stage body a TI TMP235.
 
 /// Rows of the 103AT-2's sheet (Semitec P12-13): degC, Ohm.
 const THERMISTOR: [(f64, f64); 10] = [
@@ -23,9 +21,9 @@ const SERIES_OHM: f64 = 68e3;
 /// A sensor and its wires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wiring {
-    /// As it should be.
+    /// No fault.
     Sound,
-    /// The sensor is torn off: the input has what the rest of its circuit gives.
+    /// The sensor is torn off: the rest of its circuit stays at the input.
     Open,
     /// Both wires touch.
     Shorted,
@@ -65,7 +63,7 @@ fn thermistor_ohm(celsius: f64) -> f64 {
 
 impl Thermometers {
     /// Codes of inputs 7 and 8.
-    pub fn codes(&self, part: Part) -> [i32; 2] {
+    pub fn codes(&self) -> [i32; 2] {
         let [mount, body] = self.celsius;
         let mount_ohm = match self.wiring[0] {
             Wiring::Sound => thermistor_ohm(mount),
@@ -82,15 +80,13 @@ impl Thermometers {
             Wiring::Open => (0.0, 1e12),
             Wiring::Shorted => (0.0, 1e-3),
         };
+        // SBAS950: an input has 330 kOhm to ground, and 24 bits for +-1.2 V.
+        const INPUT_OHM: f64 = 330e3;
+        const FULL_SCALE: f64 = 8_388_608.0;
         [mount, body].map(|(volt, ohm)| {
-            // SBAS950: 330 kOhm to ground, +-1.2 V in 24 bits. SBAS582C 7.5: (V - 2.25 V) / 1 MOhm, and
-            // +-10.24 V in 16 bits.
-            let (input_ohm, bias_v, full_v, rail) = match part {
-                Part::Ads131m08 => (330e3, 0.0, 1.2, 8_388_608.0),
-                Part::Ads8688 => (1e6, 2.25, 10.24, 32_768.0),
-            };
-            let at_pin = (volt * input_ohm + bias_v * ohm) / (input_ohm + ohm);
-            (at_pin / full_v * rail).round().clamp(-rail, rail - 1.0) as i32
+            let at_pin = volt * INPUT_OHM / (INPUT_OHM + ohm);
+            let code = (at_pin / 1.2 * FULL_SCALE).round();
+            code.clamp(-FULL_SCALE, FULL_SCALE - 1.0) as i32
         })
     }
 }

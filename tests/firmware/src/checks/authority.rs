@@ -3,8 +3,7 @@
 use super::asking::{ask, ask_alone};
 use super::commands::SERVO_OFF;
 use super::no_resets;
-use crate::adc_model::Part;
-use crate::bench::Bench;
+use crate::bench::{Bench, Seen};
 use hal_adapters::can::command::{Outcome as Ended, Request};
 use hal_adapters::can::update::UpdateRequest;
 
@@ -23,13 +22,12 @@ const REQUESTS: [Request; 7] = [
 /// with it the servo is declared off. The other one obeys while the line is low, and not while it is
 /// high or open.
 pub fn tag_or_line(bench: &Bench) {
-    for (part, refusal) in [
-        (Part::Ads131m08, Ended::NotAuthorised),
-        (Part::Ads8688, Ended::ServoOn),
+    for (mut machine, refusal) in [
+        (bench.machine([&bench.blob, &[]]), Ended::NotAuthorised),
+        (bench.neighbour(), Ended::ServoOn),
     ] {
-        let mut machine = bench.running(part, 50);
-        machine.chip.servo_on = part == Part::Ads8688;
-        machine.run_ticks(1);
+        machine.chip.servo_on = refusal == Ended::ServoOn;
+        Seen::after(&mut machine, 50);
         for (token, request) in (1..).zip(REQUESTS) {
             let seen = ask_alone(&mut machine, request, token, 10);
             assert_eq!(seen.ended(token), [Some(refusal)], "{request:?}");

@@ -3,19 +3,17 @@
 use super::log::Stage;
 use super::start::{row, tick_now};
 use super::{no_resets, same_words};
-use crate::adc_model::Part;
 use crate::bench::{Bench, Seen, command};
 use crate::can_model::BusState;
 use hal_adapters::can::command::Request;
 use hal_adapters::can::status::flag;
 
-const PART: Part = Part::Ads131m08;
 const MS: u64 = 1_000_000;
 
 /// The bus goes away, by a short circuit or without any other node, and comes back. The ticks go on; old poses are never sent late.
 pub fn goes_and_comes_back(bench: &Bench) {
     for bus in [BusState::Off, BusState::Alone] {
-        let mut machine = bench.running(PART, 100);
+        let mut machine = bench.running(100);
         machine.set_bus(bus);
         let silent = Seen::after(&mut machine, 500);
         assert!(silent.axes.len() <= 6, "words on a dead bus");
@@ -39,7 +37,7 @@ pub fn goes_and_comes_back(bench: &Bench) {
 
 /// A controller that starts alone on the bus runs, and is heard once other nodes are there.
 pub fn alone_from_the_start(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.chip.can.set_bus(BusState::Alone, 0);
     machine.run_ticks(200);
     assert_eq!(Seen::since_last(&mut machine).axes.len(), 0);
@@ -51,7 +49,7 @@ pub fn alone_from_the_start(bench: &Bench) {
 
 /// A bus that is off for 0.3 ms, between two ticks, is counted.
 pub fn off_for_less_than_a_tick(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.run_ns(200 * MS + 7 * MS / 10);
     let before = Seen::since_last(&mut machine).last_status();
     assert_eq!(before.map(|s| s.bus_off), Some(0));
@@ -69,7 +67,7 @@ pub fn off_for_less_than_a_tick(bench: &Bench) {
 /// and no newer one overtakes it.
 pub fn aborted_on_the_wire(bench: &Bench) {
     for fails in [false, true] {
-        let mut machine = bench.running(PART, 100);
+        let mut machine = bench.running(100);
         let dropped_before = Stage::read(&machine).count("frames_dropped");
         // Other nodes hold the bus from this tick's frames on until just before those of the next.
         let free_ns = machine.chip.now_ns + 2 * MS + 18 * MS / 100;
@@ -97,7 +95,7 @@ pub fn aborted_on_the_wire(bench: &Bench) {
 
 /// Of more frames than the store holds one is lost, and counted: once, however many they were.
 pub fn received_frames_without_room(bench: &Bench) {
-    let mut machine = bench.running(PART, 100);
+    let mut machine = bench.running(100);
     for token in 0..5 {
         let (id, bytes) = command(Request::Identify { seconds: 1 }, token, token);
         machine.chip.can.receive(id, bytes);

@@ -2,7 +2,7 @@
 
 use super::asking::{answers, ask};
 use super::no_resets;
-use crate::adc_model::{AdcFault, Part, Row};
+use crate::adc_model::{AdcFault, Row};
 use crate::bench::{Bench, Seen, command};
 use embedded_can::{Id, StandardId};
 use hal_adapters::can::command::{Outcome as Ended, Request};
@@ -11,14 +11,13 @@ use hal_adapters::can::{Layout, Message as M, SensorReceiver, Timing};
 use runtime::RawFrame;
 use runtime::frame::MISSING_CODE;
 
-const PART: Part = Part::Ads131m08;
-/// From the trigger to the middle of what is sampled, by the drivers' documentation, us.
-const ADS131M08_SAMPLE_US: u32 = 166;
-const ADS8688_SAMPLE_US: u32 = 12;
+/// From the trigger to the middle of the sample, by the driver's documentation, us.
+const SAMPLE_US: u64 = 166;
+const LAYOUT: Layout = Layout::Bits24;
 
 /// Identify: the serial number in six pages, the flag for as long as was asked, a fast LED.
 pub fn identify(bench: &Bench) {
-    let mut machine = bench.running(PART, 50);
+    let mut machine = bench.running(50);
     let seen = ask(&mut machine, Request::Identify { seconds: 1 }, 1, 100);
     assert_eq!(seen.ended(1), [Some(Ended::Done)]);
     assert_eq!(seen.identity[..8], *b"stage-7\0");
@@ -51,7 +50,7 @@ pub(super) const SERVO_OFF: Request = Request::ServoOff { seconds: 3 };
 /// until the zero is cleared; with the servo on neither is.
 pub fn rezero(bench: &Bench) {
     let rows = at_rest([100, -50, 70, 10, 20, -30]);
-    let mut machine = bench.machine_playing(PART, [&bench.blob, &[]], rows);
+    let mut machine = bench.machine_playing([&bench.blob, &[]], rows);
     let x = |seen: &Seen| {
         seen.x()
             .last()
@@ -100,13 +99,9 @@ pub fn rezero(bench: &Bench) {
 
 /// Record mode: every tick's codes, after the pose, with parameters and without, until a command
 /// ends it; a tick without codes is a gap.
-pub fn record(bench: &Bench, part: Part) {
-    let layout = match part {
-        Part::Ads131m08 => Layout::Bits24,
-        Part::Ads8688 => Layout::Bits16,
-    };
+pub fn record(bench: &Bench) {
     for blob in [bench.blob.as_slice(), &[]] {
-        let mut machine = bench.machine(part, [blob, &[]]);
+        let mut machine = bench.machine([blob, &[]]);
         let seen = Seen::after(&mut machine, 50);
         assert_eq!(seen.recorded, 0);
         let mut seen = ask(&mut machine, Request::Record { on: true }, 1, 400);
@@ -122,13 +117,13 @@ pub fn record(bench: &Bench, part: Part) {
             machine.hold_ns = 3_000_000;
         }
         machine.hold_ns = 0;
-        let mut receiver = SensorReceiver::new(layout, Timing::default());
+        let mut receiver = SensorReceiver::new(LAYOUT, Timing::default());
         let mut ticks: Vec<RawFrame> = Vec::new();
         for (done_ns, frame) in &seen.frames {
             ticks.extend(receiver.take(frame, (done_ns / 1000) as u32).tick);
         }
         let health = receiver.health();
-        let lost = 2 * layout.messages().len() as u32;
+        let lost = 2 * LAYOUT.messages().len() as u32;
         assert_eq!((health.lost, health.incomplete), (lost, 0));
         assert!(ticks.len() >= 795, "{} ticks", ticks.len());
         let warm = |tick: &&RawFrame| !tick.temperature_mc.contains(&MISSING_CODE);
@@ -159,26 +154,20 @@ pub fn record(bench: &Bench, part: Part) {
 
 /// What one tick sends, in the order of sending: X, Y, Rz, what else belongs to the pose, the
 /// codes; and how old each is then.
-pub fn order_and_age(bench: &Bench, part: Part) {
-    let name = part.name();
-    let mut machine = bench.running(part, 50);
+pub fn order_and_age(bench: &Bench) {
+    let mut machine = bench.running(50);
     ask(&mut machine, Request::Record { on: true }, 1, 20);
     ask(&mut machine, Request::Identify { seconds: 1 }, 2, 0);
     machine.chip.can.sent.clear();
     machine.run_ticks(320);
     let first_ns = machine.chip.first_tick_ns.expect("no tick");
-    let sampled_us = match part {
-        Part::Ads131m08 => ADS131M08_SAMPLE_US,
-        Part::Ads8688 => ADS8688_SAMPLE_US,
-    };
     let groups = [
         &[M::PoseX, M::PoseY, M::PoseRz][..],
         &[M::PoseTime],
         &[M::PoseZ, M::PoseRx, M::PoseRy],
         &[M::Temperature],
         &[M::SensorTime],
-        Layout::Bits16.messages(),
-        Layout::Bits24.messages(),
+        LAYOUT.messages(),
         &[M::NodeStatus, M::Health],
         &[M::Answer, M::Identity],
     ];
@@ -199,13 +188,13 @@ pub fn order_and_age(bench: &Bench, part: Part) {
         );
         last = (tick, place);
         let since_us = (sent.done_ns - first_ns) / 1000 - 2_000 * tick;
-        let age_us = since_us - u64::from(sampled_us);
+        let age_us = since_us - SAMPLE_US;
         let (least, most) = ages[place].get_or_insert((age_us, age_us));
         (*least, *most) = (age_us.min(*least), age_us.max(*most));
     }
     for (message, age) in places.iter().zip(&ages) {
         if let Some((least, most)) = age {
-            let key = format!("RESULT firmware_{name}_age_at_end_of_{message:?}_us");
+            let key = format!("RESULT firmware_age_at_end_of_{message:?}_us");
             println!("{key}={least}..{most}");
         }
     }
@@ -216,7 +205,7 @@ pub fn order_and_age(bench: &Bench, part: Part) {
 
 /// Frames under the command's identifier with every data length code: none stops the program.
 pub fn any_length_code(bench: &Bench) {
-    let mut machine = bench.running(PART, 50);
+    let mut machine = bench.running(50);
     for code in 0..16 {
         let (id, bytes) = command(Request::ClearZero, code, code);
         machine.chip.can.receive_coded(id, code, bytes);

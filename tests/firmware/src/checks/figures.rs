@@ -1,7 +1,5 @@
 //! What the program takes: flash, RAM, instructions.
 
-use super::sensors::ticks_to_settle;
-use crate::adc_model::Part;
 use crate::bench::{Bench, Seen};
 use crate::flash_model::{BYTES, FIRST};
 use crate::image::FLASH;
@@ -19,19 +17,18 @@ const SPI_HZ_MAX: u64 = 10_500_000;
 pub const CYCLES_PER_INSTRUCTION: f64 = 2.0;
 
 /// Flash, RAM, and the stack's painted maximum, with faults of all kinds behind it.
-pub fn flash_and_ram(bench: &Bench, part: Part) {
-    let name = part.name();
-    let image = bench.image(part);
-    let mut machine = bench.machine(part, [&bench.other, &bench.blob]);
+pub fn flash_and_ram(bench: &Bench) {
+    let image = &bench.image;
+    let mut machine = bench.machine([&bench.other, &bench.blob]);
     machine.run_ticks(200);
     machine.chip.adc.fault = crate::adc_model::AdcFault::Line(0);
     machine.run_ticks(200);
     let stack = machine.stack_bytes();
     let ram = image.static_bytes + stack;
-    println!("RESULT firmware_{name}_text_bytes={}", image.text_bytes);
-    println!("RESULT firmware_{name}_static_bytes={}", image.static_bytes);
-    println!("RESULT firmware_{name}_stack_max_bytes={stack}");
-    println!("RESULT firmware_{name}_ram_bytes={ram}");
+    println!("RESULT firmware_text_bytes={}", image.text_bytes);
+    println!("RESULT firmware_static_bytes={}", image.static_bytes);
+    println!("RESULT firmware_stack_max_bytes={stack}");
+    println!("RESULT firmware_ram_bytes={ram}");
     assert!(image.text_bytes <= TEXT_BYTES_MAX);
     assert!(ram <= RAM_BYTES_MAX);
     // No instruction of the program ends up where parameters lie, and it writes nowhere else.
@@ -45,25 +42,20 @@ pub fn flash_and_ram(bench: &Bench, part: Part) {
 
 /// Instructions and time from the interrupt to the third mailbox, over all ticks of a run, and how
 /// long the longest interrupt blocks.
-pub fn interrupt_to_mailbox(bench: &Bench, part: Part) {
-    let name = part.name();
-    let mut machine = bench.machine(part, [&bench.blob, &[]]);
+pub fn interrupt_to_mailbox(bench: &Bench) {
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.count_instructions();
     let seen = Seen::after(&mut machine, 200);
     assert!(seen.axes.len() > 600, "too few poses");
-    // With a converter that settles, a tick is two interrupts: its trigger, and its codes.
-    let per_tick = if part == Part::Ads131m08 { 2 } else { 1 };
-    // The first ticks join the bus and wait for the converter.
-    let skipped = (4 + ticks_to_settle(part) as usize) * per_tick;
-    let steady = machine.costs.get(skipped..).unwrap_or_default().to_vec();
-    assert!(steady.len() > 180 * per_tick, "too few ticks");
+    // A tick is two interrupts: its trigger, and its codes. The first ticks join the bus.
+    let steady = machine.costs.get(8..).unwrap_or_default().to_vec();
+    assert!(steady.len() > 360, "too few ticks");
     let codes: Vec<_> = steady.iter().filter(|cost| cost.spi_bytes > 0).collect();
-    assert_eq!(codes.len(), steady.len() / per_tick);
+    assert_eq!(codes.len(), steady.len() / 2);
     let all_three = codes.iter().filter(|cost| cost.mailboxes == 3).count();
     assert_eq!(all_three, codes.len());
     let spi_bytes = codes.iter().map(|cost| cost.spi_bytes).max().unwrap_or(0);
-    let wanted = if per_tick == 2 { 3 * 30 } else { 8 * 6 };
-    assert_eq!(spi_bytes, wanted);
+    assert_eq!(spi_bytes, 3 * 30);
 
     // Instructions between two bytes are counted, so that the bytes themselves take their bits.
     let spi_hz = machine.chip.spi_hz();
@@ -82,7 +74,7 @@ pub fn interrupt_to_mailbox(bench: &Bench, part: Part) {
     // A start that follows a loss of power.
     let before = machine.costs.len();
     let now_ns = machine.chip.now_ns;
-    machine.chip.adc.power_up(now_ns);
+    machine.chip.adc.part.power_up(now_ns);
     machine.run_ticks(20);
     let longest = |cost: &Cost| us(cost.all_instructions) + cost.spi_bytes as f64 * spi_byte_us;
     let starts = machine.costs[before..].iter().map(longest);
@@ -99,7 +91,7 @@ pub fn interrupt_to_mailbox(bench: &Bench, part: Part) {
         ("us_blocked_estimate", format!("{blocked_us:.1}")),
         ("us_blocked_by_start_estimate", format!("{start_us:.1}")),
     ] {
-        println!("RESULT firmware_{name}_{key}={value}");
+        println!("RESULT firmware_{key}={value}");
     }
     assert!(blocked_us <= BLOCKED_US_MAX);
 }

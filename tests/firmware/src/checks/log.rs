@@ -1,8 +1,6 @@
 //! The whole log through converter, decoder and bus.
 
 use super::no_resets;
-use super::sensors::ticks_to_settle;
-use crate::adc_model::Part;
 use crate::bench::{Bench, Comparison, Seen};
 use crate::machine::Machine;
 use hal_adapters::can::status::NodeState;
@@ -11,16 +9,14 @@ use hal_adapters::can::status::NodeState;
 const STEP: usize = 1000;
 
 /// The words of `ticks` ticks are those of `host-fit decode`, and there are no other frames.
-pub fn whole_log(bench: &Bench, part: Part, ticks: u64) {
-    let name = part.name();
-    let settling = ticks_to_settle(part);
-    let mut machine = bench.machine(part, [&bench.blob, &[]]);
+pub fn whole_log(bench: &Bench, ticks: u64) {
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.run_ns(0); // The start-up feeds the watchdog, too.
     let fed_before = machine.chip.watchdog.fed;
     let (mut comparison, mut seen) = (Comparison::default(), Seen::default());
     for from in (0..ticks).step_by(STEP) {
         seen = Seen::after(&mut machine, (ticks - from).min(STEP as u64));
-        comparison.add(&seen.axes, &bench.poses, settling);
+        comparison.add(&seen.axes, &bench.poses, 0);
         assert_eq!(seen.damaged, 0);
         // Every sixteenth tick has a state.
         let states = || seen.statuses.iter().map(|(tick, _)| tick);
@@ -29,25 +25,25 @@ pub fn whole_log(bench: &Bench, part: Part, ticks: u64) {
             (STEP / 16..STEP / 16 + 2).contains(&states().count()) || ticks - from < STEP as u64
         );
     }
-    println!("RESULT firmware_{name}_ticks={ticks}");
-    println!("RESULT firmware_{name}_words={}", comparison.words);
-    println!("RESULT firmware_{name}_differing={}", comparison.differing);
+    println!("RESULT firmware_ticks={ticks}");
+    println!("RESULT firmware_words={}", comparison.words);
+    println!("RESULT firmware_differing={}", comparison.differing);
     let stack_bytes = machine.stack_bytes();
-    println!("RESULT firmware_{name}_stack_bytes={stack_bytes}");
+    println!("RESULT firmware_stack_bytes={stack_bytes}");
     let stage = Stage::read(&machine);
     for (counter, value) in COUNTERS.iter().zip(stage.counters) {
-        println!("RESULT firmware_{name}_{counter}={value}");
+        println!("RESULT firmware_{counter}={value}");
     }
     assert_eq!(comparison.differing, 0);
     // The first tick joins the bus, the last one is still on its way.
-    let whole = ticks - settling - 2;
+    let whole = ticks - 2;
     assert!(comparison.planar >= whole, "{comparison:?}");
     assert!(comparison.words >= whole * 15 / 4 - 8, "{comparison:?}");
     no_resets(&machine);
     let status = seen.last_status().expect("a state");
     let found = (status.state, status.missed_ticks, status.bus_off);
     assert_eq!(found, (Some(NodeState::Running), 0, 0));
-    assert_eq!(u64::from(stage.count("adc_faults")), settling);
+    assert_eq!(stage.count("adc_faults"), 0);
     assert!(stage.count("frames_dropped") <= 8);
     let fed = machine.chip.watchdog.fed - fed_before;
     assert_eq!(fed, u64::from(stage.sequence) + 1);
@@ -57,17 +53,8 @@ pub fn whole_log(bench: &Bench, part: Part, ticks: u64) {
         "health reports {ticks_reported} ticks"
     );
     // Ticks without a planar pose, without a vertical one, held, without codes, repeated.
-    let wanted = [settling, settling, 0, settling, 0];
-    for page in seen
-        .health
-        .iter()
-        .filter(|page| (1..6).contains(&page.page))
-    {
-        assert_eq!(
-            u64::from(page.value),
-            wanted[usize::from(page.page) - 1],
-            "{page:?}"
-        );
+    for page in (seen.health.iter()).filter(|page| (1..6).contains(&page.page)) {
+        assert_eq!(page.value, 0, "{page:?}");
     }
 }
 
@@ -118,6 +105,6 @@ impl Stage {
 
 /// What a debugger reads is the pose of the last tick.
 pub fn a_debugger_reads_the_last_pose(bench: &Bench) {
-    let machine = bench.running(Part::Ads131m08, 321);
+    let machine = bench.running(321);
     Stage::read(&machine).has_the_pose(bench, 319);
 }

@@ -1,20 +1,19 @@
 //! Inputs that move: poses are those of the instant that the program stamps.
 
+use crate::adc_model::Input;
 use crate::adc_model::ads131m08::Variant;
-use crate::adc_model::{Input, Part};
 use crate::bench::{Bench, Seen};
 
 const PERIOD_US: f64 = 2000.0;
 const TICKS: u64 = 60;
-/// From the trigger to the middle of what the driver of the ADS131M08 reads: it stands for 160 and 171 us.
-/// (An ADS8688 is 12 us late: too little of a step of the log to show in codes of 16 bits.)
+/// From the trigger to the middle of the sample, by the driver: it stands for 160 and 171 us.
 const SAMPLE_US: f64 = 166.0;
 /// By how much the interrupt may come early or late after which the codes are read, ns.
 const JITTER_NS: i64 = 3000;
 
 /// Whichever way the ADS131M08 goes where its sheet is silent, at the gaps that the program leaves
 /// between its frames: every instruction takes its time.
-pub fn a_pose_is_of_its_instant(bench: &Bench) {
+pub fn a_pose_has_its_instant(bench: &Bench) {
     let mut lags = Vec::new();
     for variant in Variant::all() {
         for jitter_ns in [-JITTER_NS, 0, JITTER_NS] {
@@ -28,15 +27,15 @@ pub fn a_pose_is_of_its_instant(bench: &Bench) {
     }
     lags.sort_by(f64::total_cmp);
     let (least, most) = (lags[0], lags[lags.len() - 1]);
-    println!("RESULT firmware_ads131m08_sample_us={least:.1}..{most:.1}");
+    println!("RESULT firmware_sample_us={least:.1}..{most:.1}");
 }
 
 /// The inputs move from row to row of the log: the lag behind the row of the tick that fits the
 /// poses X, Y and Rz best, us.
 fn lag_us(bench: &Bench, variant: Variant, jitter_ns: i64) -> f64 {
-    let mut machine = bench.machine(Part::Ads131m08, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.count_instructions();
-    machine.chip.adc.set_variant(variant);
+    machine.chip.adc.part.variant = variant;
     machine.chip.settled_jitter_ns = jitter_ns;
     machine.chip.adc.input = Input::moving(bench.rows.clone(), PERIOD_US as u64, 0);
     let seen = Seen::after(&mut machine, TICKS);

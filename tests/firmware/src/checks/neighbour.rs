@@ -1,6 +1,5 @@
 //! A second stage on the bus, with a servo period of its own.
 
-use crate::adc_model::{Input, Part};
 use crate::bench::{Bench, NEIGHBOUR, NEIGHBOUR_PERIOD_US, Seen, command};
 use crate::machine::Machine;
 use hal_adapters::can::NodeNumber;
@@ -11,11 +10,8 @@ const MS: u64 = 1_000_000;
 /// Its frames have its own identifiers and checks, and come in its own period with the poses that the
 /// host decodes; it obeys what is sent to its number, and nothing else.
 pub fn has_identifiers_and_a_period_of_its_own(bench: &Bench) {
-    let (part, slots) = (Part::Ads8688, [&bench.blob[..], &[]]);
-    let mut machine = Machine::new(&bench.library, &bench.neighbour, part, vec![], slots);
-    let own = NodeNumber::new(NEIGHBOUR).expect("no number");
-    machine.chip.can.node = own;
-    machine.chip.adc.input = Input::held(bench.rows.clone()).every(NEIGHBOUR_PERIOD_US);
+    let mut machine = bench.neighbour();
+    let own = machine.chip.can.node;
     machine.run_ns(100 * MS);
     Seen::since_last(&mut machine);
     machine.run_ns(1_000 * MS);

@@ -2,15 +2,13 @@
 
 use super::log::Stage;
 use super::{no_resets, same_words};
-use crate::adc_model::{Part, Row};
+use crate::adc_model::Row;
 use crate::bench::{Bench, Seen, Words};
 use hal_adapters::can::status::{NodeState, board_check};
 use runtime::ParameterSet;
 use runtime::blob::MAX_BYTES;
 use runtime::frame::MISSING_CODE;
 use runtime::parameters::Text;
-
-const PART: Part = Part::Ads131m08;
 
 /// The blob cut short as a power failure leaves it: the rest is erased.
 fn torn(blob: &[u8]) -> Vec<u8> {
@@ -22,7 +20,7 @@ fn torn(blob: &[u8]) -> Vec<u8> {
 /// Without usable parameters the controller runs, says why in every status frame and gives
 /// no pose.
 fn none_usable(bench: &Bench, [slot_0, slot_1]: [&[u8]; 2], state: NodeState, reason: u8) {
-    let mut machine = bench.machine(PART, [slot_0, slot_1]);
+    let mut machine = bench.machine([slot_0, slot_1]);
     let seen = Seen::after(&mut machine, 400);
     assert_eq!(seen.axes.len(), 0);
     assert!(seen.statuses.len() >= 24, "status frames");
@@ -58,7 +56,7 @@ pub fn one_usable(bench: &Bench) {
         ([&bench.blob, &torn], 0x97),
     ];
     for (slots, reason) in cases {
-        let mut machine = bench.machine(PART, slots);
+        let mut machine = bench.machine(slots);
         let seen = Seen::after(&mut machine, 100);
         same_words(&seen.axes, &bench.poses, 0, 98);
         let state = Some((NodeState::Running, reason));
@@ -80,7 +78,7 @@ pub(super) fn poses_of(bench: &Bench, set: &ParameterSet) -> Vec<Words> {
 pub fn the_field_model(bench: &Bench) {
     let (blob, set) = of_stage_7(FIELD);
     let poses = poses_of(bench, &set);
-    let mut machine = bench.machine(PART, [&blob, &[]]);
+    let mut machine = bench.machine([&blob, &[]]);
     let seen = Seen::after(&mut machine, 1000);
     let comparison = same_words(&seen.axes, &poses, 0, 998);
     println!("RESULT firmware_field_words={}", comparison.words);
@@ -105,7 +103,7 @@ pub(super) fn bytes_of(set: &ParameterSet) -> Vec<u8> {
 /// Of two blobs that a probe has flashed the one in slot 0 is used.
 pub fn the_first_of_two(bench: &Bench) {
     let run = |slots: [&[u8]; 2]| -> [u32; 6] {
-        let mut machine = bench.machine(PART, slots);
+        let mut machine = bench.machine(slots);
         machine.run_ticks(100);
         Stage::read(&machine).pose
     };

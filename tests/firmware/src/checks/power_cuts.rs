@@ -3,13 +3,10 @@
 //! possible.
 
 use super::update::{large, plan, running, update, updated};
-use crate::adc_model::Part;
 use crate::bench::Bench;
 use crate::flash_model::PowerCut;
 use crate::machine::Machine;
 use tests::flash_model::Cut;
-
-const PART: Part = Part::Ads131m08;
 
 /// Something that writes flash.
 struct Scene<'b> {
@@ -95,7 +92,7 @@ fn print(name: &str, [first, second]: [Counts; 2]) {
 pub fn in_an_update(bench: &Bench) {
     let scene = Scene {
         bench,
-        before: |bench| bench.running(PART, 20),
+        before: |bench| bench.running(20),
         happens: |bench, machine| {
             let _cut_or_done = update(machine, &plan(&bench.later));
         },
@@ -119,7 +116,7 @@ pub fn in_an_update(bench: &Bench) {
     // The older one of two is the field model's, and the newest must stay.
     let beside_two = Scene {
         before: |bench| {
-            let mut machine = bench.machine(PART, [&large(), &[]]);
+            let mut machine = bench.machine([&large(), &[]]);
             machine.run_ticks(20);
             updated(&mut machine, &plan(&bench.blob));
             machine.power_cycle();

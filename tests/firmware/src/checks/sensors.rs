@@ -3,14 +3,15 @@
 
 mod cases;
 
-pub use cases::{Case, cases, ticks_to_settle};
+pub use cases::{Case, cases};
 
 use super::log::Stage;
 use super::{no_resets, same_words, wrong_valid};
-use crate::adc_model::{AdcFault, Part};
+use crate::adc_model::AdcFault;
+use crate::adc_model::ads131m08::Variant;
 use crate::bench::{Axis, Bench, Seen};
 use crate::machine::Machine;
-use cases::NOTHING;
+use cases::BOTH_INVALID;
 use hal_adapters::can::status::NodeState;
 use runtime::Status;
 
@@ -43,11 +44,11 @@ fn state(seen: &Seen) -> Option<NodeState> {
 }
 
 /// A fault that comes and goes.
-pub fn survives(bench: &Bench, part: Part, case: &Case) {
-    let mut machine = bench.machine(part, [&bench.blob, &[]]);
+pub fn survives(bench: &Bench, case: &Case) {
+    let mut machine = bench.machine([&bench.blob, &[]]);
     run_to(&mut machine, BEFORE);
     let before = Seen::since_last(&mut machine);
-    same_words(&before.axes, &bench.poses, ticks_to_settle(part), 81);
+    same_words(&before.axes, &bench.poses, 0, 98);
 
     let now_ns = machine.chip.now_ns;
     case.event.happen(&mut machine.chip.adc, now_ns);
@@ -66,7 +67,7 @@ pub fn survives(bench: &Bench, part: Part, case: &Case) {
     let reported = invalid.next().map(|axis| axis.tick + 1 - BEFORE);
     let wrong = wrong_valid(&axes, &bench.poses, 0);
     let text = reported.map_or("never".to_owned(), |ticks| ticks.to_string());
-    println!("FAULT   {part:?} | {} | {text} | {wrong}", case.name);
+    println!("FAULT   {} | {text} | {wrong}", case.name);
     assert!(reported.is_some_and(|ticks| ticks <= case.within));
     assert!(wrong as u64 <= case.wrong);
 
@@ -76,7 +77,7 @@ pub fn survives(bench: &Bench, part: Part, case: &Case) {
         assert!(shown.len() > 800, "only {} words", shown.len());
         let other = shown.into_iter().filter(planar).find(|axis| {
             let status = axis.status & !NOT_COMPARED;
-            axis.word != 0 || status != case.status.bits() && status != NOTHING.bits()
+            axis.word != 0 || status != case.status.bits() && status != BOTH_INVALID.bits()
         });
         let other = other.map(|axis| (axis.tick, axis.word, axis.status));
         assert_eq!(other, None);
@@ -100,9 +101,9 @@ pub fn survives(bench: &Bench, part: Part, case: &Case) {
 
 /// A converter that does not answer when the controller starts, and does later; one whose supply
 /// comes later.
-pub fn dead_from_the_start(bench: &Bench, part: Part) {
+pub fn dead_from_the_start(bench: &Bench) {
     for late_supply in [false, true] {
-        let mut machine = bench.machine(part, [&bench.blob, &[]]);
+        let mut machine = bench.machine([&bench.blob, &[]]);
         machine.chip.adc.fault = AdcFault::Line(0xff);
         run_to(&mut machine, 200);
         let seen = Seen::since_last(&mut machine);
@@ -112,12 +113,12 @@ pub fn dead_from_the_start(bench: &Bench, part: Part) {
         machine.chip.adc.fault = AdcFault::None;
         if late_supply {
             let now_ns = machine.chip.now_ns;
-            machine.chip.adc.power_up(now_ns);
+            machine.chip.adc.part.power_up(now_ns);
         }
         run_to(&mut machine, 400);
         let seen = Seen::since_last(&mut machine);
         assert_eq!(wrong_valid(&seen.axes, &bench.poses, 0), 0);
-        let first = 200 + 2 * RESTART + ticks_to_settle(part);
+        let first = 200 + 2 * RESTART;
         same_words(&seen.axes, &bench.poses, first, 150);
         assert_eq!(state(&seen), Some(NodeState::Running));
         no_resets(&machine);
@@ -125,8 +126,8 @@ pub fn dead_from_the_start(bench: &Bench, part: Part) {
 }
 
 /// Transfers by DMA that never end are given up, reported as errors of the bus, and work again later.
-pub fn transfers_that_never_end(bench: &Bench, part: Part) {
-    let mut machine = bench.machine(part, [&bench.blob, &[]]);
+pub fn transfers_that_never_end(bench: &Bench) {
+    let mut machine = bench.machine([&bench.blob, &[]]);
     run_to(&mut machine, BEFORE);
     Seen::since_last(&mut machine);
     machine.chip.dma_stands = true;
@@ -138,7 +139,7 @@ pub fn transfers_that_never_end(bench: &Bench, part: Part) {
     machine.chip.dma_stands = false;
     run_to(&mut machine, BEFORE + 300);
     let after = Seen::since_last(&mut machine);
-    let first = BEFORE + 20 + RESTART + ticks_to_settle(part);
+    let first = BEFORE + 20 + RESTART;
     same_words(&after.axes, &bench.poses, first, 201);
     no_resets(&machine)
 }
@@ -147,11 +148,11 @@ pub fn transfers_that_never_end(bench: &Bench, part: Part) {
 /// latest: what changes while codes settle can be flagged after they are read.
 pub fn a_register_changes_at_any_time(bench: &Bench) {
     for offset_ns in (0..TICK_NS).step_by(50_000) {
-        let mut machine = bench.machine(Part::Ads131m08, [&bench.blob, &[]]);
+        let mut machine = bench.machine([&bench.blob, &[]]);
         run_to(&mut machine, BEFORE);
         machine.run_ns(TICK_NS / 2 + offset_ns);
         let now_ns = machine.chip.now_ns;
-        machine.chip.adc.flip(0x04, 1, now_ns);
+        machine.chip.adc.part.flip(0x04, 1, now_ns);
         Seen::since_last(&mut machine);
         run_to(&mut machine, BEFORE + 4);
         let seen = Seen::since_last(&mut machine);
@@ -168,10 +169,10 @@ pub fn a_register_changes_at_any_time(bench: &Bench) {
 pub fn every_variant(bench: &Bench) {
     const TICKS: u64 = 100;
     let mut words = 0;
-    for variant in crate::adc_model::ads131m08::Variant::all() {
+    for variant in Variant::all() {
         for spi_byte_ns in [762, 1000] {
-            let mut machine = bench.machine(Part::Ads131m08, [&bench.blob, &[]]);
-            machine.chip.adc.set_variant(variant);
+            let mut machine = bench.machine([&bench.blob, &[]]);
+            machine.chip.adc.part.variant = variant;
             machine.chip.spi_byte_ns = Some(spi_byte_ns);
             let seen = Seen::after(&mut machine, TICKS);
             println!("{variant:?}, {spi_byte_ns} ns a byte");

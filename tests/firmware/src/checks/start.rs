@@ -4,7 +4,6 @@
 
 use super::log::Stage;
 use super::{no_resets, wrong_valid};
-use crate::adc_model::Part;
 use crate::bench::{Axis, Bench, Seen};
 use crate::can_model::BusState;
 use crate::clock_model::Pll;
@@ -12,7 +11,6 @@ use crate::machine::{ACCESS_AND_STACKING, Machine};
 use crate::unicorn::register;
 use hal_adapters::can::status::{board_check, flag};
 
-const PART: Part = Part::Ads131m08;
 /// Where there is no memory and no peripheral.
 pub const NOWHERE: u32 = 0x6000_0000;
 /// The function of the tick's arithmetic, where faults are put in.
@@ -23,7 +21,7 @@ pub fn row(bench: &Bench, fault: &str, at: u64, reported: Option<u64>, axes: &[A
     let reported = reported.expect("it was never reported");
     let wrong = wrong_valid(axes, &bench.poses, 1);
     println!(
-        "FAULT   controller | {fault} | {} | {wrong}",
+        "FAULT   {fault} | {} | {wrong}",
         reported.saturating_sub(at)
     );
     assert_eq!(wrong, 0);
@@ -58,7 +56,7 @@ fn valid(axes: &[Axis]) -> usize {
 /// is sound, and the watchdog does not bite meanwhile.
 pub fn supply_that_comes_late(bench: &Bench) {
     const LATE_NS: u64 = 300_000_000;
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.chip.supply_low_until_ns = LATE_NS;
     machine.run_ticks(400);
     let first_ns = machine.chip.first_tick_ns.unwrap_or(0);
@@ -101,7 +99,7 @@ pub fn no_crystal(bench: &Bench) {
         ),
     ];
     for (fault, from_ns, spoil, kind, resets) in cases {
-        let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+        let mut machine = bench.machine([&bench.blob, &[]]);
         if from_ns > 0 {
             machine.run_ns(from_ns);
             let before = Seen::since_last(&mut machine);
@@ -135,7 +133,7 @@ pub fn no_crystal(bench: &Bench) {
 /// On the internal oscillator a bus-off is for good: a clock that is too inexact disturbs the bus
 /// once, and then no more.
 pub fn silent_after_bus_off(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.chip.clocks.crystal = false;
     machine.run_ticks(100);
     for bus in [BusState::Off, BusState::Good] {
@@ -149,38 +147,38 @@ pub fn silent_after_bus_off(bench: &Bench) {
 
 /// The PLL locks to nothing: the chip is broken, starts over and over, and sends nothing.
 pub fn pll_dead(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.chip.clocks.pll = Pll::Dead;
     machine.run_ticks(200);
     assert!(machine.watchdog_resets > 10, "no resets");
     assert_eq!(Seen::since_last(&mut machine).axes.len(), 0);
-    println!("FAULT   controller | PLL dead | no frame at all | 0");
+    println!("FAULT   PLL dead | no frame at all | 0");
 }
 
 /// A CAN controller that does not start: no frame, but the poses are there and the light tells.
 pub fn can_dead(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.chip.can.acknowledges = false;
     assert_eq!(flashes(&mut machine), 5);
     Stage::read(&machine).has_the_pose(bench, 498);
     no_resets(&machine);
     assert_eq!(Seen::since_last(&mut machine).axes.len(), 0);
-    println!("FAULT   controller | CAN does not start | shown by the light from tick 1 on | 0");
+    println!("FAULT   CAN does not start | shown by the light from tick 1 on | 0");
 }
 
 /// A receive line that is held low keeps the controller from the bus: the light tells, also
 /// without parameters.
 pub fn receive_line_low(bench: &Bench) {
     for (slot, flash) in [(&bench.blob[..], 1), (&[], 2)] {
-        let mut machine = bench.machine(PART, [slot, &[]]);
+        let mut machine = bench.machine([slot, &[]]);
         assert_eq!(flashes(&mut machine), flash);
-        let mut machine = bench.machine(PART, [slot, &[]]);
+        let mut machine = bench.machine([slot, &[]]);
         machine.chip.can.held_low = true;
         machine.run_ticks(500);
         assert_eq!(flashes(&mut machine), 5);
         assert_eq!(Seen::since_last(&mut machine).axes.len(), 0);
     }
-    println!("FAULT   controller | CAN receive line low | shown by the light after 0.5 s | 0");
+    println!("FAULT   CAN receive line low | shown by the light after 0.5 s | 0");
 }
 
 /// Pull-ups and option bytes of the board are reported.
@@ -200,7 +198,7 @@ pub fn the_board(bench: &Bench) {
         ([true, true], 0x0fff_aaed, board_check::BROWN_OUT_LOW),
     ];
     for (pulled_up, option_bytes, check) in cases {
-        let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+        let mut machine = bench.machine([&bench.blob, &[]]);
         machine.chip.pulled_up = pulled_up;
         machine.chip.option_bytes = option_bytes;
         let seen = Seen::after(&mut machine, 200);
@@ -212,8 +210,8 @@ pub fn the_board(bench: &Bench) {
 
 /// A program that crashes reports after the reset how and where.
 pub fn crash(bench: &Bench, wanted: &Crash) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
-    machine.hook_injection(bench.image(PART).address(TICK));
+    let mut machine = bench.machine([&bench.blob, &[]]);
+    machine.hook_injection(bench.image.address(TICK));
     Seen::after(&mut machine, 100);
     let at = tick_now(&machine);
     machine.chip.inject.clone_from(&wanted.inject);
@@ -242,7 +240,7 @@ pub struct Crash {
 
 /// The crashes.
 pub fn crashes(bench: &Bench) -> Vec<Crash> {
-    let image = bench.image(PART);
+    let image = &bench.image;
     let stack = crate::image::RAM;
     let mut crashes = vec![
         Crash {

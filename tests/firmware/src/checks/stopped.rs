@@ -3,7 +3,7 @@
 use super::asking::answers;
 use super::commands::SERVO_OFF;
 use super::start::{NOWHERE, TICK};
-use super::update::{PART, identity, plan, running, updated};
+use super::update::{identity, plan, running, updated};
 use crate::bench::{Bench, Seen};
 use crate::machine::Machine;
 use crate::unicorn::register;
@@ -17,7 +17,7 @@ const CHECK: &str = "10from_flash";
 
 /// A blob that is stored waits: over resets of any cause what ran before runs, until power-on.
 pub fn a_reset_runs_what_ran(bench: &Bench) {
-    let mut machine = bench.running(PART, 20);
+    let mut machine = bench.running(20);
     updated(&mut machine, &plan(&bench.later));
     machine.reset_by_pin();
     assert_eq!(running(&mut machine), bench.blob);
@@ -32,8 +32,8 @@ pub fn a_reset_runs_what_ran(bench: &Bench) {
 
 /// A controller that has just begun to run [`Bench::later`] in place of [`Bench::blob`].
 fn about_to_crash(bench: &Bench) -> Machine {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
-    machine.hook_injection(bench.image(PART).address(TICK));
+    let mut machine = bench.machine([&bench.blob, &[]]);
+    machine.hook_injection(bench.image.address(TICK));
     machine.run_ticks(20);
     updated(&mut machine, &plan(&bench.later));
     // Not by the host, which waits until they have run for a second.
@@ -77,8 +77,8 @@ pub fn parameters_that_crash(bench: &Bench) {
 
 /// Parameters whose check at the start makes the program fault twice, though they are not the newest.
 pub fn parameters_whose_check_crashes(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
-    machine.hook_injection(bench.image(PART).address(CHECK));
+    let mut machine = bench.machine([&bench.blob, &[]]);
+    machine.hook_injection(bench.image.address(CHECK));
     machine.run_ticks(20);
     updated(&mut machine, &plan(&bench.later));
     machine.run_ticks(600);

@@ -4,7 +4,6 @@
 use super::no_resets;
 use super::parameters::of_stage_7;
 use super::start::tick_now;
-use crate::adc_model::Part;
 use crate::adc_model::thermometers::Wiring;
 use crate::bench::{Bench, Seen, Words};
 use hal_adapters::can::status::board_check;
@@ -20,10 +19,9 @@ const TICKS: u64 = 400;
 
 /// Poses follow the temperatures, which are those of the stage; a thermometer that is open or shorted
 /// is missing, and back when it is mended.
-pub fn follow_the_stage(bench: &Bench, part: Part) {
-    let name = part.name();
+pub fn follow_the_stage(bench: &Bench) {
     let (blob, set) = of_stage_7(WARM);
-    let mut machine = bench.machine(part, [&blob, &[]]);
+    let mut machine = bench.machine([&blob, &[]]);
     let mut worst_mk = 0;
     let mut words = 0;
     let sound = [Wiring::Sound; 2];
@@ -64,8 +62,8 @@ pub fn follow_the_stage(bench: &Bench, part: Part) {
             "{what}: page 11"
         );
     }
-    println!("RESULT firmware_{name}_temperature_off_max_mk={worst_mk}");
-    println!("RESULT firmware_{name}_temperature_words={words}");
+    println!("RESULT firmware_temperature_off_max_mk={worst_mk}");
+    println!("RESULT firmware_temperature_words={words}");
     no_resets(&machine);
 }
 

@@ -4,14 +4,12 @@ use super::log::Stage;
 use super::start::TICK;
 use super::update::talk;
 use super::{no_resets, same_words};
-use crate::adc_model::Part;
 use crate::bench::{Axis, Bench, Seen};
 use crate::unicorn::register;
 use hal_adapters::can::status::{NodeState, flag};
 use host_fit::bus::update::{UpdateError, on};
 use runtime::Status;
 
-const PART: Part = Part::Ads131m08;
 const MS: u64 = 1_000_000;
 /// FPSCR that rounds towards zero and flushes subnormal numbers.
 const OTHER_SETTINGS: u32 = 0b111 << 22;
@@ -25,7 +23,7 @@ fn stays_in_step(seen: &Seen, late: usize) {
 
 /// A tick that comes 0.5 ms late is decoded and counted, and does not shift the others.
 pub fn a_late_tick(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.run_ticks(100);
     machine.hold_ns = MS / 2;
     let seen = Seen::after(&mut machine, 100);
@@ -37,7 +35,7 @@ pub fn a_late_tick(bench: &Bench) {
 
 /// Ticks that never come keep their numbers, and the schedule stays where it was.
 pub fn ticks_that_never_come(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.run_ticks(100);
     // Due at tick k, comes 2.3 periods later: ticks k and k + 1 are missed, k + 2 is late.
     machine.hold_ns = 46 * MS / 10;
@@ -55,7 +53,7 @@ pub fn ticks_that_never_come(bench: &Bench) {
 
 /// The watchdog bites when ticks stay away; the program starts again, says so and goes on.
 pub fn a_watchdog_reset(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     let before = Seen::after(&mut machine, 1000);
     assert_eq!(before.flags() & flag::WATCHDOG_RESET, 0);
     machine.hold_ns = 60 * MS;
@@ -69,7 +67,7 @@ pub fn a_watchdog_reset(bench: &Bench) {
 
 /// Ticks that all overrun do not feed the watchdog: it bites.
 pub fn overrun_ticks_do_not_feed(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.run_ticks(100);
     // An SPI so slow that the codes of a tick take 2.4 ms.
     machine.chip.spi_byte_ns = Some(80_000);
@@ -87,7 +85,7 @@ pub fn overrun_ticks_do_not_feed(bench: &Bench) {
 
 /// Settings that an interrupt left changed are restored before the decoding, and counted.
 pub fn fpu_settings_left_behind(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.run_ticks(100);
     for _ in 0..50 {
         machine.set_fpscr(OTHER_SETTINGS);
@@ -101,8 +99,8 @@ pub fn fpu_settings_left_behind(bench: &Bench) {
 
 /// Settings that change during the decoding: the pose of that tick is withdrawn.
 pub fn fpu_settings_changed_during_the_decoding(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
-    machine.hook_injection(bench.image(PART).address(TICK));
+    let mut machine = bench.machine([&bench.blob, &[]]);
+    machine.hook_injection(bench.image.address(TICK));
     Seen::after(&mut machine, 100);
     machine.chip.inject = vec![(register::FPSCR, OTHER_SETTINGS)];
     machine.chip.injects_again = true;
@@ -119,7 +117,7 @@ pub fn fpu_settings_changed_during_the_decoding(bench: &Bench) {
 
 /// The clock of 32 bits wraps after 71 minutes: no tick is lost or doubled.
 pub fn the_clock_wraps(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     machine.chip.timer_offset_us = u32::MAX - 200_500;
     let seen = Seen::after(&mut machine, 300);
     same_words(&seen.axes, &bench.poses, 0, 298);
@@ -130,7 +128,7 @@ pub fn the_clock_wraps(bench: &Bench) {
 /// A core that would give interrupts wrong settings fails the self-test: no pose, and the state
 /// says so.
 pub fn fpu_defaults_that_are_wrong(bench: &Bench) {
-    let mut machine = bench.machine(PART, [&bench.blob, &[]]);
+    let mut machine = bench.machine([&bench.blob, &[]]);
     const FPDSCR: usize = 0xef3c;
     machine.chip.write_core(FPDSCR, OTHER_SETTINGS);
     let seen = Seen::after(&mut machine, 200);

@@ -4,7 +4,6 @@ use super::asking::{answers, ask};
 use super::commands::SERVO_OFF;
 use super::parameters::{FIELD, bytes_of, of_stage_7, poses_of};
 use super::same_words;
-use crate::adc_model::Part;
 use crate::bench::{Bench, Seen};
 use crate::flash_model::BYTES;
 use crate::machine::Machine;
@@ -18,8 +17,7 @@ use runtime::ParameterSet;
 use runtime::parameters::Text;
 use std::collections::VecDeque;
 
-/// The program for the ADS131M08 is built with this key, the other one without any.
-pub(super) const PART: Part = Part::Ads131m08;
+/// The key of the stage's program.
 pub(crate) const KEY: Key = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 /// Between two looks at the bus.
 const STEP_NS: u64 = 250_000;
@@ -128,7 +126,7 @@ pub(super) fn running(machine: &mut Machine) -> Vec<u8> {
 /// The next start with what is in flash now: its words are those of the host with this blob.
 fn starts_with(bench: &Bench, machine: &Machine, blob: &[u8]) {
     let poses = poses_of(bench, &ParameterSet::from_bytes(blob).expect("sound"));
-    let mut next = bench.machine(PART, [&[], &[]]);
+    let mut next = bench.machine([&[], &[]]);
     next.chip.flash.sectors = machine.chip.flash.sectors.clone();
     let seen = Seen::after(&mut next, 200);
     same_words(&seen.axes, &poses, 0, 198);
@@ -145,7 +143,7 @@ pub(super) fn large() -> Vec<u8> {
 /// stand and the watchdog does not bite; the next power-on runs it. Another one takes its place and is
 /// activated at once; back is to the one that ran before.
 pub fn new_parameters(bench: &Bench) {
-    let mut machine = bench.running(PART, 100);
+    let mut machine = bench.running(100);
     let large = large();
     let from_ns = machine.chip.now_ns;
     let (ended, seen) = update(&mut machine, &plan(&large));
@@ -181,7 +179,7 @@ pub fn new_parameters(bench: &Bench) {
         assert_eq!(running(&mut machine), *runs);
     }
     assert_eq!((machine.panics, machine.watchdog_resets), (2, 0));
-    let (statics, stack) = (bench.image(PART).static_bytes, machine.stack_bytes());
+    let (statics, stack) = (bench.image.static_bytes, machine.stack_bytes());
     println!("RESULT firmware_update_ram_bytes={}", statics + stack);
     assert!(
         statics + stack <= super::figures::RAM_BYTES_MAX,
@@ -191,7 +189,7 @@ pub fn new_parameters(bench: &Bench) {
 
 /// A key that is not the program's, the service pin, a generator of random numbers that is broken.
 pub fn refused(bench: &Bench) {
-    let mut machine = bench.running(PART, 100);
+    let mut machine = bench.running(100);
     let other = Plan {
         key: Some([0; 16]),
         ..plan(&bench.later)
@@ -214,7 +212,7 @@ pub fn refused(bench: &Bench) {
 
 /// Every transfer has a random number of its own: what was proven for one proves nothing for another.
 pub fn no_nonce_twice(bench: &Bench) {
-    let mut machine = bench.running(PART, 20);
+    let mut machine = bench.running(20);
     answers(&mut machine, &[(SERVO_OFF, 99, Ended::Done)]);
     let mut nonces: Vec<[u32; 4]> = Vec::new();
     for token in 100..104 {
@@ -251,7 +249,7 @@ pub fn flash_that_fails(bench: &Bench) {
         (None, Some(OTHER_SLOT)),
         (None, Some(OTHER_SLOT + 50)),
     ] {
-        let mut machine = bench.running(PART, 20);
+        let mut machine = bench.running(20);
         let sectors = &mut machine.chip.flash.sectors;
         (sectors.reports, sectors.stuck) = (reports, stuck);
         let (ended, _) = update(&mut machine, &plan(&bench.later));
@@ -272,12 +270,12 @@ pub fn flash_that_fails(bench: &Bench) {
 /// The supply drops at any operation of an update: no further one is done, the answer says why, the blob that
 /// was there runs, and with a sound supply another update is taken.
 pub fn supply_that_drops(bench: &Bench) {
-    let mut whole = bench.running(PART, 20);
+    let mut whole = bench.running(20);
     updated(&mut whole, &plan(&bench.later));
     let operations = whole.chip.flash.sectors.operations;
     // Without its seal the blob counts, and a start seals it.
     for at in 0..operations - 1 {
-        let mut machine = bench.running(PART, 20);
+        let mut machine = bench.running(20);
         machine.chip.supply_drops_at = Some(at);
         let (ended, _) = update(&mut machine, &plan(&bench.later));
         assert_eq!(ended, Err(UpdateError::SupplyLow));

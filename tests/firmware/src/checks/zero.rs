@@ -3,13 +3,11 @@
 use super::asking::{answers, ask};
 use super::commands::{REZERO, SERVO_OFF, at_rest};
 use super::start::tick_now;
-use crate::adc_model::Part;
 use crate::bench::{Bench, Seen};
 use crate::machine::Machine;
 use hal_adapters::can::command::Outcome as Ended;
 use hal_adapters::can::status::{NodeState, board_check, flag};
 
-const PART: Part = Part::Ads131m08;
 const MS: u64 = 1_000_000;
 /// X of a stage at rest once it is re-zeroed is less than this, m, and more than this before.
 const NOISE_M: f32 = 0.5e-6;
@@ -34,7 +32,7 @@ fn expect_zero(seen: &Seen, is_set: bool) {
 /// A controller whose stage was re-zeroed at rest.
 fn re_zeroed(bench: &Bench) -> Machine {
     let rows = at_rest([100, -50, 70, 10, 20, -30]);
-    let mut machine = bench.machine_playing(PART, [&bench.blob, &[]], rows);
+    let mut machine = bench.machine_playing([&bench.blob, &[]], rows);
     machine.run_ticks(300);
     expect_zero(&Seen::since_last(&mut machine), false);
     answers(&mut machine, &[(SERVO_OFF, 1, Ended::Done)]);
@@ -60,7 +58,7 @@ pub fn over_a_watchdog_reset(bench: &Bench) {
         .expect("it was never reported");
     let (valid, near) = near_zero(&seen);
     println!(
-        "FAULT   controller | watchdog reset with a zero set | {} | {}",
+        "FAULT   watchdog reset with a zero set | {} | {}",
         reported - at,
         valid - near
     );
@@ -89,7 +87,7 @@ pub fn over_power_on(bench: &Bench) {
 /// What ran is no longer in flash, or the record is damaged: no pose, and the state says so and that a zero is
 /// lost.
 pub fn lost(bench: &Bench) {
-    let image = bench.image(PART);
+    let image = &bench.image;
     let record = image.address("RETAINED");
     type Change<'c> = &'c dyn Fn(&mut Machine);
     let changes: [(&str, u8, Change<'_>); 2] = [
@@ -110,6 +108,6 @@ pub fn lost(bench: &Bench) {
         let stopped = Some((NodeState::Stopped, reason));
         assert_eq!(seen.last_state(), stopped);
         assert_eq!(seen.page(11), Some(board_check::ZERO_LOST));
-        println!("FAULT   controller | {fault} | in the first state | 0");
+        println!("FAULT   {fault} | in the first state | 0");
     }
 }
