@@ -14,6 +14,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod axis;
 mod binary;
 pub mod dataset;
 pub mod draft;

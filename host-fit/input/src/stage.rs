@@ -9,7 +9,7 @@ mod search;
 mod temperature;
 
 pub use error::{StageError, TextPosition};
-pub use motion::{AXES, AxisMotion, Motion};
+pub use motion::{AxisMotion, Motion};
 pub use temperature::TemperatureTable;
 
 use crate::log::layout::LogLayout;

@@ -1,7 +1,7 @@
 //! The stage as designed.
 
 use crate::error::{of_stage, wrong};
-use host_fit::input::stage::AXES;
+use host_fit::input::axis::AXES;
 use host_fit::input::stage::Stage as Designed;
 use host_fit::report::table::{Table, as_text, number};
 use pyo3::prelude::*;
@@ -131,10 +131,9 @@ impl Stage {
             sensors.row(name, cells);
         }
         let mut motion = Table::new("in service", &["to either side", "unit"]);
-        for ((name, _), axis) in AXES.iter().zip(&stage.motion.axes) {
-            let unit = if name.starts_with('r') { "urad" } else { "um" };
-            let cells = [number(axis.service * 1e6, ""), unit.to_owned()];
-            motion.row(*name, cells);
+        for (axis, moves) in AXES.iter().zip(&stage.motion.axes) {
+            let cells = [number(moves.service * 1e6, ""), axis.micro.to_owned()];
+            motion.row(axis.key, cells);
         }
         let mut others = Table::default();
         others.row(

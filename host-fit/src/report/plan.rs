@@ -4,7 +4,8 @@ use super::parameters::by_probe;
 use super::table::{Table, number};
 use hallstage_calibration::plan::Plan;
 use hallstage_calibration::plan::temperature::WarmLog;
-use hallstage_input::stage::{AXES, Stage};
+use hallstage_input::axis::{AXES, Axis};
+use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::terms::{COUNT, PER_PROBE, TERMS, name};
 use serde_json::{Map, Value, json};
 
@@ -14,21 +15,23 @@ const NAMED: usize = 5;
 /// the prior, 1 where the log adds nothing.
 pub fn figures(plan: &Plan, protocol: &[WarmLog], stage: &Stage) -> Value {
     let run = &plan.run;
-    let axis =
-        |(k, ((key, _), motion)): (usize, (&(&str, _), &hallstage_input::stage::AxisMotion))| {
-            let [peak_speed, peak_acceleration] = run.peaks(k);
-            json!({
-                "axis": key,
-                "unit": if key.starts_with('r') { "rad" } else { "m" },
-                "amplitude": run.amplitudes[k],
-                "service": motion.service,
-                "frequency_hz": run.frequency_hz(k),
-                "peak_speed": peak_speed,
-                "speed_limit": motion.speed,
-                "peak_acceleration": peak_acceleration,
-                "acceleration_limit": motion.acceleration,
-            })
-        };
+    let axis = |(k, (Axis { key, unit, .. }, motion)): (
+        usize,
+        (&Axis, &hallstage_input::stage::AxisMotion),
+    )| {
+        let [peak_speed, peak_acceleration] = run.peaks(k);
+        json!({
+            "axis": key,
+            "unit": unit,
+            "amplitude": run.amplitudes[k],
+            "service": motion.service,
+            "frequency_hz": run.frequency_hz(k),
+            "peak_speed": peak_speed,
+            "speed_limit": motion.speed,
+            "peak_acceleration": peak_acceleration,
+            "acceleration_limit": motion.acceleration,
+        })
+    };
     let axes = AXES.iter().zip(&stage.motion.axes).enumerate().map(axis);
     let service = &plan.forecast.service;
     let (ratios, floor) = (

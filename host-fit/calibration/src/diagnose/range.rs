@@ -1,9 +1,10 @@
 //! Poses beyond the range of a calibration, and motion that is not the declared one.
 
 use crate::fit::{Fit, RANGE_MARGIN};
+use hallstage_input::axis::{AXES, Axis};
 use hallstage_input::dataset::{Dataset, Row};
 use hallstage_input::finding::{Code, Finding};
-use hallstage_input::stage::{AXES, Stage};
+use hallstage_input::stage::Stage;
 use runtime::ParameterSet;
 
 /// An axis that moves by more than this times its declared range, or less than that, has another scale or
@@ -23,7 +24,7 @@ pub(super) fn undeclared(fit: &Fit, stage: &Stage) -> impl Iterator<Item = Findi
     let moved = (to.calibrated_planar.into_iter()).chain(to.calibrated_vertical);
     let is_for_service = fit.field.is_some();
     let axes = AXES.iter().zip(stage.motion.axes).zip(moved);
-    axes.filter_map(move |(((axis, _), motion), moved)| {
+    axes.filter_map(move |((Axis { key: axis, micro: unit, .. }, motion), moved)| {
         let [moved, service] = [moved / RANGE_MARGIN, motion.service].map(|x| x * 1e6);
         let part = moved / service;
         let what = match (SPANS.0..=SPANS.1).contains(&part) {
@@ -36,11 +37,10 @@ pub(super) fn undeclared(fit: &Fit, stage: &Stage) -> impl Iterator<Item = Findi
                  motion"
             }
         };
-        let unit = if axis.starts_with('r') { "urad" } else { "um" };
         let message = format!(
             "the log moves {axis} by {moved:.0} {unit} to either side, service by {service:.0} ([motion] in stage.toml): {what}"
         );
-        Some(Finding::new(Code::OutOfRange, message).on(*axis).of(moved, unit))
+        Some(Finding::new(Code::OutOfRange, message).on(*axis).of(moved, *unit))
     })
 }
 

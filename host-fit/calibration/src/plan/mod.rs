@@ -24,7 +24,8 @@ pub mod temperature;
 mod tests;
 
 use forecast::{forecast, forecaster};
-use hallstage_input::stage::{AXES, Stage};
+use hallstage_input::axis::AXES;
+use hallstage_input::stage::Stage;
 use hallstage_solver::solve::field::forecast::{Forecast, Forecaster};
 use run::Run;
 
@@ -114,7 +115,7 @@ pub fn plan(stage: &Stage, seconds: f64) -> Result<Plan, PlanError> {
         // Longer ends are slower.
         if taper_s >= TAPER_MAX * seconds {
             return Err(PlanError::TooFast {
-                axis: AXES[axis].0,
+                axis: AXES[axis].key,
                 amplitude: stage.motion.axes[axis].amplitude,
                 seconds,
             });
@@ -156,7 +157,7 @@ fn remedy(stage: &Stage, run: &Run) -> String {
     let short = AXES.iter().zip(&stage.motion.axes).zip(run.amplitudes);
     let short: Vec<&str> = short
         .filter(|((_, motion), amplitude)| *amplitude < motion.service)
-        .map(|(((key, _), _), _)| *key)
+        .map(|((axis, _), _)| axis.key)
         .collect();
     if short.is_empty() {
         "make the run longer, or allow higher speeds in [motion] of stage.toml".to_owned()

@@ -9,6 +9,7 @@
 
 use super::document::Document;
 use super::error::StageError;
+use crate::axis::{AXES, Axis};
 
 /// How one axis moves, SI: m or rad, per s, per s2.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,16 +31,8 @@ pub struct Motion {
     pub axes: [AxisMotion; 6],
 }
 
-/// The axes in the order of [`Motion::axes`], by their keys, and the default range in service of
-/// each, m or rad: that of the given logs.
-pub const AXES: [(&str, f64); 6] = [
-    ("x", 500e-6),
-    ("y", 800e-6),
-    ("rz", 500e-6),
-    ("z", 240e-6),
-    ("rx", 480e-6),
-    ("ry", 480e-6),
-];
+/// Default range in service by axis, m or rad: the range of the given logs.
+const SERVICE: [f64; 6] = [500e-6, 800e-6, 500e-6, 240e-6, 480e-6, 480e-6];
 
 /// Default speed over range of service, 1/s: 2 pi 1 Hz. The fastest motion of the given logs,
 /// sines over half the range at up to 2 Hz, has the same.
@@ -66,7 +59,7 @@ impl AxisMotion {
 impl Default for Motion {
     fn default() -> Self {
         Self {
-            axes: AXES.map(|(_, service)| AxisMotion::within(service)),
+            axes: SERVICE.map(AxisMotion::within),
         }
     }
 }
@@ -74,8 +67,7 @@ impl Default for Motion {
 /// The motion that the table describes.
 pub(super) fn motion(document: &Document<'_>) -> Result<Motion, StageError> {
     let mut motion = Motion::default();
-    for (axis, (key, service)) in motion.axes.iter_mut().zip(AXES) {
-        let unit = if key.starts_with('r') { "rad" } else { "m" };
+    for (motion, Axis { key, unit, .. }) in motion.axes.iter_mut().zip(AXES) {
         let table = format!("motion.{key}");
         let keys = ["service", "amplitude", "speed", "acceleration"];
         let per = ["", "", "_per_s", "_per_s2"];
@@ -85,11 +77,11 @@ pub(super) fn motion(document: &Document<'_>) -> Result<Motion, StageError> {
             let given = document.number(&table, &names[k], range, &unit)?;
             Ok(given.unwrap_or(default))
         };
-        *axis = AxisMotion::within(or(0, service, RANGES)?);
-        // An axis may stand still in a run: what that costs is for the plan to say.
-        axis.amplitude = or(1, axis.amplitude, (0.0, RANGES.1))?;
-        axis.speed = or(2, axis.speed, RATES)?;
-        axis.acceleration = or(3, axis.acceleration, RATES)?;
+        *motion = AxisMotion::within(or(0, motion.service, RANGES)?);
+        // An axis may stand still in a run; the plan predicts what that costs.
+        motion.amplitude = or(1, motion.amplitude, (0.0, RANGES.1))?;
+        motion.speed = or(2, motion.speed, RATES)?;
+        motion.acceleration = or(3, motion.acceleration, RATES)?;
     }
     Ok(motion)
 }
