@@ -9,22 +9,22 @@ use hal_adapters::can::{Message, NodeNumber};
 use std::error::Error;
 
 /// The file of node 0.
-const OF_THE_TABLE: &str = include_str!("../stage.dbc");
-/// In this format, the bit of an extended identifier.
+const NODE_0: &str = include_str!("../stage.dbc");
+/// The bit of an extended identifier in this format.
 const EXTENDED: u32 = 0x8000_0000;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let number = std::env::args().nth(1).and_then(|text| text.parse().ok());
     let node = number.and_then(NodeNumber::new);
     let node = node.ok_or_else(|| format!("use: dbc NODE, a number up to {}", NodeNumber::MAX))?;
-    for line in OF_THE_TABLE.lines() {
-        println!("{}", of_node(line, node));
+    for line in NODE_0.lines() {
+        println!("{}", renumbered(line, node));
     }
     Ok(())
 }
 
-/// A line with the identifier and the key that a message has at this node.
-fn of_node(line: &str, node: NodeNumber) -> String {
+/// A line with the identifier of its message at this node.
+fn renumbered(line: &str, node: NodeNumber) -> String {
     let mut words: Vec<String> = line.split(' ').map(str::to_owned).collect();
     let at = match line.split(' ').next() {
         Some("BO_" | "VAL_" | "SIG_VALTYPE_") => 1,
@@ -38,9 +38,6 @@ fn of_node(line: &str, node: NodeNumber) -> String {
         Id::Standard(id) => id.as_raw().to_string(),
         Id::Extended(id) => (id.as_raw() | EXTENDED).to_string(),
     };
-    if line.starts_with("BA_ \"E2EDataIdKey\"") {
-        words[at + 1] = format!("{};", node.key(message));
-    }
     words.join(" ")
 }
 
@@ -57,22 +54,19 @@ mod tests {
 
     fn file(number: u32) -> Vec<String> {
         let node = NodeNumber::new(number).expect("within");
-        OF_THE_TABLE
-            .lines()
-            .map(|line| of_node(line, node))
-            .collect()
+        NODE_0.lines().map(|line| renumbered(line, node)).collect()
     }
 
     #[test]
-    fn the_file_of_node_0_is_that_of_the_table() {
-        assert_eq!(file(0), OF_THE_TABLE.lines().collect::<Vec<_>>());
+    fn the_file_of_node_0_stays() {
+        assert_eq!(file(0), NODE_0.lines().collect::<Vec<_>>());
     }
 
-    /// Lines that name a message name its identifier, and the others stay as they are.
+    /// Only lines that name a message change.
     #[test]
-    fn each_line_of_a_message_has_the_nodes_identifier_and_key() {
+    fn each_line_of_a_message_has_the_nodes_identifier() {
         let mut found = 0;
-        for (before, after) in OF_THE_TABLE.lines().zip(file(5)) {
+        for (before, after) in NODE_0.lines().zip(file(5)) {
             let names = ["BO_", "VAL_", "SIG_VALTYPE_", "CM_", "BA_"];
             let is_named = names.contains(&before.split(' ').next().unwrap_or(""));
             let is_its = |id: u16| is_named && before.contains(&format!(" {id} "));
@@ -83,10 +77,6 @@ mod tests {
             // The table's bits, the node's 18, and the bit of an extended one.
             let id = u32::from(row.id) << 18 | 5 | 1 << 31;
             let own = before.replacen(&format!(" {} ", row.id), &format!(" {id} "), 1);
-            let own = match before.contains("E2EDataIdKey") {
-                true => own.replace(&format!(" {};", row.key), &format!(" {};", row.key ^ 5)),
-                false => own,
-            };
             assert_eq!(after, own);
             found += 1;
         }

@@ -174,7 +174,7 @@ impl Node {
 
     /// The CRC of the blob that runs.
     pub fn running(&self) -> Option<u32> {
-        self.records.running().map(|running| running.crc)
+        self.records.running().map(|running| running.id.crc)
     }
 
     /// The highest sequence number; 0 for a plain blob.
@@ -228,7 +228,6 @@ fn start(
         serial,
         key,
         program_version: 0x00_01_02_03,
-        program_hash: 0xfeed_beef,
     };
     let mut node = Ticking::new(parameters, before.by_fault, Layout::Bits24, identity);
     before.restore_zero(&mut node, loaded.map_or(0, |loaded| loaded.crc));
@@ -239,7 +238,7 @@ fn start(
 fn retained(before: &Before, records: &Records<FlashModel>, ticking: &Ticking<'_>) -> [u32; WORDS] {
     let mut record = before.record;
     if let Some(running) = records.running() {
-        record.runs(running.crc, ticking.zero());
+        record.runs(running.id.crc, ticking.zero());
     }
     record.to_words()
 }

@@ -1,5 +1,5 @@
-//! Requests to the decoding node, its answers, and all other messages that are not sent in every
-//! tick. [`Mailbox`] numbers what is sent and checks what is received.
+//! Requests to the decoding node, its answers, and all other messages that are not sent in every tick.
+//! [`Mailbox`] numbers the frames that are sent and checks the frames that are received.
 //!
 //! ```
 //! use hal_adapters::can::BusFrame;
@@ -20,44 +20,44 @@ use super::update::{UpdateData, UpdateRequest};
 use embedded_can::Frame;
 use runtime::zero_offset::ZeroOffsetRefusal;
 
-/// What a node is asked for.
+/// A request to a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Average `ticks` ticks at rest, and subtract the mean from then on; 0 stands for the
-    /// default of [`runtime::zero_offset::ZeroOffsetSettings`].
+    /// Average `ticks` ticks at rest, and subtract the mean from then on; 0 stands for the default of
+    /// [`runtime::zero_offset::ZeroOffsetSettings`].
     Rezero {
         /// Ticks to average.
         ticks: u16,
     },
-    /// Send the serial number and blink for so many seconds.
+    /// Blink.
     Identify {
         /// How long, s.
         seconds: u8,
     },
     /// Stop subtracting the mean of a re-zero.
     ClearZero,
-    /// Send the codes of every tick, or stop to.
+    /// Send the codes of every tick, or stop.
     Record {
-        /// Whether from now on they are sent.
+        /// Whether codes are sent from now on.
         on: bool,
     },
-    /// The servo is off, and stays off for so many seconds: the stage may be re-zeroed.
+    /// Declare the servo off: the stage may be re-zeroed.
     ServoOff {
-        /// For how long, s; 0 says that the servo is on.
+        /// How long the declaration holds, s; 0 declares the servo on.
         seconds: u8,
     },
     /// About the parameters.
     Update(UpdateRequest),
 }
 
-/// A request with the token that its answer will carry.
+/// A request with the token of its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Command {
-    /// What is asked for; `None` for a request that this version does not know.
+    /// The request; `None` for one that this version does not know.
     pub request: Option<Request>,
     /// Number of the command in the frame, 0 to 15.
     pub number: u8,
-    /// Chosen by the sender: another each time, but for the requests of one transfer of an update.
+    /// Chosen by the sender, a new one each time; the requests of one transfer share theirs.
     pub token: u8,
 }
 
@@ -79,14 +79,14 @@ impl Command {
         }
     }
 
-    /// Whether it moves the pose, makes it invalid, resets the node, or leads to that. A node with a
-    /// key obeys such a request only with a tag ([`super::update::tag`]), and a controller without one
-    /// only while its line says that the servo is off. (A commit has its own rule: its tag is over the
-    /// blob, too.)
+    /// Whether it moves the pose, invalidates it, resets the node, or prepares one of these. A node with a
+    /// key obeys such a request only with a tag ([`super::update::tag`]), a controller without a key only
+    /// while its line says that the servo is off. (The tag of a commit covers the blob, so the receiver
+    /// checks it.)
     pub const fn needs_authority(&self) -> bool {
         match self.request {
             Some(Request::Rezero { .. } | Request::ClearZero | Request::Record { .. }) => true,
-            // That the servo is on can be said by anyone.
+            // Anyone may say that the servo is on.
             Some(Request::ServoOff { seconds }) => seconds > 0,
             Some(Request::Update(request)) => matches!(
                 request,
@@ -133,17 +133,17 @@ impl Command {
 }
 
 numbered! {
-    /// How a request ended: the numbers of the frame, as in the table.
+    /// How a request ended, by its number in the frame.
     Outcome {
         /// It was done.
         Done = 0,
         /// It is running; another answer follows.
         Started = 1,
-        /// This node does not know it.
+        /// This node does not know the request.
         UnknownCommand = 2,
         /// There is no usable parameter blob.
         NoParameters = 3,
-        /// Too few ticks were asked for.
+        /// Too few ticks.
         TooShort = 4,
         /// A tick had no pose; the detail is its status.
         NoPose = 5,
@@ -159,28 +159,28 @@ numbered! {
         OutOfBounds = 10,
         /// A pose lay outside the calibrated range; the detail is its status.
         Extrapolated = 11,
-        /// The tag is missing, or not that of the stage's key.
+        /// The tag is missing, or was not made with the stage's key.
         NotAuthorised = 12,
         /// The blob is refused; the detail is [`runtime::BlobError::number`].
         BadContent = 13,
-        /// The sequence number is not the one that follows those in the store: the detail.
+        /// The sequence number is not the next one; the detail is the next one.
         WrongSequence = 14,
-        /// The supply is too low to write: nothing was.
+        /// The supply is too low to write. Nothing was written.
         SupplyLow = 15,
         /// Words are missing; the detail is the index of the first.
         Incomplete = 16,
-        /// The store could not write. What runs goes on, and runs from the next start on.
+        /// The store failed. The parameters before stay in force.
         StoreFailed = 17,
-        /// No transfer is open with this token: never begun, aborted, or nothing came for 5 s.
+        /// No transfer is open with this token: never begun, aborted, or silent for 5 s.
         NoTransfer = 18,
-        /// The node's random number generator gives none, so that nothing can be authorised.
+        /// The random number generator gives no number, so nothing can be authorised.
         NoRandomNumber = 19,
     }
 }
 
 impl Outcome {
     /// Outcome and detail of a refused re-zero.
-    pub fn of_refusal(refusal: &ZeroOffsetRefusal) -> (Self, u32) {
+    pub fn from_refusal(refusal: &ZeroOffsetRefusal) -> (Self, u32) {
         match *refusal {
             ZeroOffsetRefusal::TooShort { .. } => (Self::TooShort, 0),
             ZeroOffsetRefusal::NoPose { status } => (Self::NoPose, status.bits()),
@@ -230,49 +230,6 @@ impl Answer {
     }
 }
 
-/// Six characters of the stage's serial number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct IdentityPage {
-    /// Which six, from 0.
-    pub page: u8,
-    /// UTF-8 bytes, 0 after the end.
-    pub text: [u8; 6],
-}
-
-impl IdentityPage {
-    /// Pages there are: 36 bytes for a text of up to 32.
-    pub const PAGES: u8 = 6;
-
-    /// One page of a serial number.
-    pub fn of(serial: &str, page: u8) -> Self {
-        let mut text = [0; 6];
-        let rest = serial.bytes().skip(usize::from(page) * text.len());
-        for (to, from) in text.iter_mut().zip(rest) {
-            *to = from;
-        }
-        Self { page, text }
-    }
-
-    /// The 52 bits of the frame.
-    pub const fn payload(&self) -> Payload {
-        let [a, b, c, d, e, f] = self.text;
-        Payload {
-            short: u16::from_le_bytes([a, b]) as u32 * 16 + (self.page & 0xf) as u32,
-            long: u32::from_le_bytes([c, d, e, f]),
-        }
-    }
-
-    /// From the 52 bits of a frame.
-    pub const fn from_payload(p: Payload) -> Self {
-        let [a, b, _, _] = (p.short >> 4).to_le_bytes();
-        let [c, d, e, f] = p.long.to_le_bytes();
-        Self {
-            page: (p.short & 0xf) as u8,
-            text: [a, b, c, d, e, f],
-        }
-    }
-}
-
 /// The content of an occasional frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
@@ -284,19 +241,16 @@ pub enum Content {
     Command(Command),
     /// The answer to one.
     Answer(Answer),
-    /// A page of the serial number.
-    Identity(IdentityPage),
     /// A word of an update.
     UpdateData(UpdateData),
 }
 
 impl Content {
-    const MESSAGES: [Message; 6] = [
+    const MESSAGES: [Message; 5] = [
         Message::NodeStatus,
         Message::Health,
         Message::Command,
         Message::Answer,
-        Message::Identity,
         Message::UpdateData,
     ];
 
@@ -306,8 +260,7 @@ impl Content {
             Self::Health(x) => (1, x.payload()),
             Self::Command(x) => (2, x.payload()),
             Self::Answer(x) => (3, x.payload()),
-            Self::Identity(x) => (4, x.payload()),
-            Self::UpdateData(x) => (5, x.payload()),
+            Self::UpdateData(x) => (4, x.payload()),
         }
     }
 
@@ -317,7 +270,6 @@ impl Content {
             1 => Self::Health(HealthPage::from_payload(p)),
             2 => Self::Command(Command::from_payload(p)),
             3 => Self::Answer(Answer::from_payload(p)),
-            4 => Self::Identity(IdentityPage::from_payload(p)),
             _ => Self::UpdateData(UpdateData::from_payload(p)),
         }
     }
@@ -326,9 +278,9 @@ impl Content {
 /// Numbers and checks the occasional frames of one node.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mailbox {
-    sent: [u8; 6],
+    sent: [u8; 5],
     /// Counter and payload of the last frame of each message.
-    received: [Option<(u8, Payload)>; 6],
+    received: [Option<(u8, Payload)>; 5],
 }
 
 impl Mailbox {
@@ -343,9 +295,9 @@ impl Mailbox {
 
     /// The content of a frame; `None` for a frame of another kind.
     ///
-    /// A gap in the counter is no fault here, and neither is a sender that restarts, since these
-    /// messages have no fixed rate. A frame that equals the last one bit for bit is a fault:
-    /// a program that sends one request and ends must choose a different token each time.
+    /// These messages have no fixed rate, so a gap in the counter is no fault, and neither is a sender that
+    /// restarts. A frame that equals the last one bit for bit is a fault: a program that sends one request
+    /// and ends must choose a different token each time.
     pub fn take<F: Frame>(&mut self, frame: &F) -> Option<Result<Content, BusFault>> {
         let (id, data) = standard(frame)?;
         let k = Content::MESSAGES.iter().position(|m| m.id() == id)?;

@@ -22,25 +22,11 @@ fn an_argument_that_does_not_fit_is_an_unknown_request() {
     assert_eq!(read(4, 2), None);
     assert_eq!(read(5, 256), None);
     assert_eq!(read(6, 4), None);
+    assert_eq!(read(7, 65536), None);
     assert_eq!(read(10, 1), None);
     assert_eq!(read(12, 0), None);
     assert_eq!(read(15, 0), None);
     assert_eq!(read(2, 255), Some(Request::Identify { seconds: 255 }));
-}
-
-#[test]
-fn a_serial_number_of_32_bytes_comes_over_in_pages() {
-    let serial = "stage-0007/hall-array/2026-11-é!";
-    assert_eq!(serial.len(), 32 + 1);
-    let pages = (0..IdentityPage::PAGES).map(|page| IdentityPage::of(serial, page));
-    let bytes: [[u8; 6]; 6] = core::array::from_fn(|k| {
-        let sent = pages.clone().nth(k).expect("six pages");
-        let read = IdentityPage::from_payload(sent.payload());
-        assert_eq!(read, sent);
-        read.text
-    });
-    assert_eq!(&bytes.as_flattened()[..33], serial.as_bytes());
-    assert_eq!(&bytes.as_flattened()[33..], [0; 3]);
 }
 
 #[test]
@@ -73,7 +59,7 @@ fn every_request_comes_back_as_sent() {
         Request::Record { on: false },
         Request::ServoOff { seconds: 255 },
         Request::Update(UpdateRequest::Challenge { part: 3 }),
-        Request::Update(UpdateRequest::begin(656, 0x89ab_cdef)),
+        Request::Update(UpdateRequest::Begin { bytes: 656 }),
         Request::Update(UpdateRequest::Commit { sequence: 7 }),
         Request::Update(UpdateRequest::Abort),
         Request::Update(UpdateRequest::Activate),

@@ -1,5 +1,4 @@
-//! Frames by value: [`Coded`], ready for any CAN controller, and [`BusFrame`], for receivers,
-//! logs and replays.
+//! Frames by value: [`Coded`], ready for any CAN controller, and [`BusFrame`], for receivers and logs.
 
 use super::e2e::{Payload, protect};
 use super::table::Message;
@@ -15,7 +14,7 @@ pub struct Coded {
 }
 
 impl Coded {
-    /// The frame of this counter, of which the low nibble is used.
+    /// The frame with this counter; only its low nibble is sent.
     #[inline(always)]
     pub(super) const fn new(message: Message, counter: u32, payload: Payload) -> Self {
         Self {
@@ -24,8 +23,7 @@ impl Coded {
         }
     }
 
-    /// The frame in the type of a CAN controller's driver. `None` only if that type refuses
-    /// eight bytes.
+    /// The frame in the type of a CAN driver. `None` only if this type refuses eight bytes.
     pub fn to_frame<F: Frame>(&self) -> Option<F> {
         F::new(self.message.id(), &self.bytes)
     }
@@ -54,15 +52,13 @@ impl From<Coded> for BusFrame {
 }
 
 impl BusFrame {
-    /// The same data under another identifier, with the check changed by so much.
-    pub(super) const fn readdressed(&self, id: Id, check: u8) -> Self {
-        let [first, b, c, d, e, f, g, h] = self.bytes;
-        let bytes = [first ^ check, b, c, d, e, f, g, h];
-        Self { id, bytes, ..*self }
+    /// The same data under another identifier.
+    pub(super) const fn with_id(&self, id: Id) -> Self {
+        Self { id, ..*self }
     }
 
-    /// Copies any frame.
-    pub fn copy_of<F: Frame>(frame: &F) -> Self {
+    /// A copy of any frame.
+    pub fn from_frame<F: Frame>(frame: &F) -> Self {
         let mut bytes = [0; 8];
         for (to, from) in bytes.iter_mut().zip(frame.data()) {
             *to = *from;
@@ -165,7 +161,7 @@ mod tests {
         for length in 0..=8 {
             let data = &[1, 2, 3, 4, 5, 6, 7, 8][..length];
             let frame = BusFrame::new(ID, data).expect("up to eight bytes");
-            assert_eq!(BusFrame::copy_of(&frame), frame);
+            assert_eq!(BusFrame::from_frame(&frame), frame);
             assert_eq!((frame.dlc(), frame.data()), (length, data));
         }
         assert_eq!(BusFrame::new(ID, &[0; 9]), None);

@@ -1,11 +1,11 @@
 #![doc = include_str!("protocol.md")]
 
-/// An enum, and the list of its variants, of which each stands at the place of its number.
+/// An enum with the list of its variants in the order of their numbers.
 macro_rules! numbered {
-    ($(#[$of_enum:meta])* $name:ident {
+    ($(#[$outer:meta])* $name:ident {
         $($(#[$doc:meta])* $variant:ident $(= $number:literal)?,)*
     }) => {
-        $(#[$of_enum])*
+        $(#[$outer])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
         pub enum $name {
@@ -13,7 +13,7 @@ macro_rules! numbered {
         }
 
         impl $name {
-            /// Every one, by its number.
+            /// Every variant, at the place of its number.
             pub const ALL: [Self; [$(stringify!($variant)),*].len()] = [$(Self::$variant),*];
         }
 
@@ -56,5 +56,5 @@ pub use sensor::Layout;
 pub use service::Service;
 pub use table::Message;
 
-/// Version of this protocol, as [`Message::NodeStatus`] carries it.
-pub const PROTOCOL_VERSION: u8 = 5;
+/// Version of this protocol, sent in [`Message::NodeStatus`].
+pub const PROTOCOL_VERSION: u8 = 6;

@@ -1,11 +1,10 @@
-//! What a decoding node does on request, whatever it runs on: [`Service`] takes commands, obeys
-//! them, and has their answers sent.
+//! [`Service`] takes the commands for a decoding node, obeys them, and gives their answers. A controller and a
+//! computer use the same code.
 //!
-//! A zero that is set or cleared moves the pose at once, and with it a stage whose servo is on.
-//! So both are refused unless the servo was declared off ([`Request::ServoOff`]; the
-//! declaration ends by itself) and the board's service pin, where there is one, agrees. Against
-//! malice stands the key: where the node has one, such a request carries a tag
-//! ([`Command::needs_authority`]); where it has none, the line must say that the servo is off.
+//! Setting or clearing the zero moves the pose at once, and a stage with its servo on follows. Both are refused
+//! unless the servo was declared off ([`Request::ServoOff`]; the declaration expires) and the board's service
+//! pin, if it has one, agrees. A node with a key obeys such a request only with a tag
+//! ([`Command::needs_authority`]); a node without a key obeys only while the line says that the servo is off.
 //!
 //! ```
 //! use hal_adapters::can::BusFrame;
@@ -15,17 +14,17 @@
 //! let (mut host, mut node) = (Mailbox::default(), Service::new(500));
 //! let record = Content::Command(Command::new(Request::Record { on: true }, 17));
 //! let frame = BusFrame::from(host.send(&record).expect("a command"));
-//! let answered = node.take(&frame, None::<&mut runtime::PoseTracker>).expect("a command").expect("a sound one");
+//! let answered = node.take(&frame, None::<&mut runtime::PoseTracker>, None).expect("a command").expect("a sound one");
 //! assert!(node.is_recording());
 //! let answer = host.take(&BusFrame::from(answered.answer.expect("an answer")));
 //! assert!(matches!(answer, Some(Ok(Content::Answer(a))) if a.outcome == Some(Outcome::Done)));
 //! ```
 
-use super::command::{Answer, Command, Content, IdentityPage, Mailbox, Outcome, Request};
+use super::command::{Answer, Command, Content, Mailbox, Outcome, Request};
 use super::frame::Coded;
 use super::notice::BusFault;
 use super::status::flag;
-use super::update::{Nonce, Receiver, Store, Surroundings};
+use super::update::{Nonce, Receiver, Store};
 use embedded_can::Frame;
 use runtime::zero_offset::{ZeroOffsetSettings, ZeroOffsetState};
 use runtime::{Decode, PlanarPose, PoseTracker};
@@ -33,23 +32,23 @@ use runtime::{Decode, PlanarPose, PoseTracker};
 /// A command that came, and its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answered {
-    /// What was asked for.
+    /// The command.
     pub command: Command,
-    /// The answer, to be sent.
+    /// Its answer, to be sent.
     pub answer: Option<Coded>,
 }
 
-/// What takes new parameters over the bus.
+/// The parts of a node that take new parameters over the bus.
 pub struct Updates<'u, 's> {
     /// The node's side of an update.
     pub receiver: &'u mut Receiver<'s>,
     /// Keeps the records.
     pub store: &'u mut dyn Store,
-    /// See [`Surroundings::nonce`].
+    /// A fresh random number; `None` without a source of any.
     pub nonce: Option<Nonce>,
 }
 
-/// Obeys commands. It counts time in ticks, and needs [`Service::tick`] in every one.
+/// Obeys commands. It counts time in ticks: call [`Service::tick`] in every one.
 #[derive(Clone, Debug)]
 pub struct Service {
     ticks_per_s: u32,
@@ -63,8 +62,6 @@ pub struct Service {
     /// Whether the service pin says that the servo is off; `None` without such a pin.
     servo_off_pin: Option<bool>,
     identify_ticks: u32,
-    /// The next page of the serial number to be sent.
-    page: u8,
     is_recording: bool,
 }
 
@@ -80,44 +77,31 @@ impl Service {
             servo_off_ticks: 0,
             servo_off_pin: None,
             identify_ticks: 0,
-            page: IdentityPage::PAGES,
             is_recording: false,
         }
     }
 
-    /// Sends codes from the start, as if asked for.
+    /// Whether codes are sent from the start, as after a request.
     #[must_use]
-    pub const fn recording(mut self, is_on: bool) -> Self {
+    pub const fn with_recording(mut self, is_on: bool) -> Self {
         self.is_recording = is_on;
         self
     }
 
-    /// Re-zeros within the limits of this stage, in place of those of
-    /// [`ZeroOffsetSettings::default`].
+    /// Re-zeros within these limits in place of [`ZeroOffsetSettings::default`].
     #[must_use]
-    pub const fn rezeroing_within(mut self, limits: ZeroOffsetSettings) -> Self {
+    pub const fn with_rezero_limits(mut self, limits: ZeroOffsetSettings) -> Self {
         self.rezero_settings = limits;
         self
     }
 
-    /// As [`Service::take_updating`], of a node that takes no parameters over the bus.
+    /// Takes a frame from the bus, and obeys it if it is a command. `servo` is `None` for a node without
+    /// parameters, `updates` for a node that takes no parameters over the bus. Gives `None` for a frame that
+    /// is no command.
     ///
     /// # Errors
     /// The command's frame is damaged or repeated: not obeyed, not answered.
     pub fn take<F: Frame, D: Decode>(
-        &mut self,
-        frame: &F,
-        servo: Option<&mut PoseTracker<D>>,
-    ) -> Option<Result<Answered, BusFault>> {
-        self.take_updating(frame, servo, None)
-    }
-
-    /// Takes a frame that came over the bus, and obeys it if it is a command. `servo` is `None`
-    /// for a node without parameters. `None` for a frame that is no command.
-    ///
-    /// # Errors
-    /// The command's frame is damaged or repeated: not obeyed, not answered.
-    pub fn take_updating<F: Frame, D: Decode>(
         &mut self,
         frame: &F,
         servo: Option<&mut PoseTracker<D>>,
@@ -128,14 +112,13 @@ impl Service {
                 let refusal = self.refusal(&command, updates.as_mut());
                 let (outcome, detail) = match (refusal, command.request, &mut updates) {
                     (Some(refusal), ..) => refusal,
-                    (None, Some(Request::Update(request)), Some(updates)) => {
-                        let around = Surroundings {
-                            servo_is_off: self.servo_is_off(),
-                            store: &mut *updates.store,
-                            nonce: updates.nonce,
-                        };
-                        updates.receiver.obey(command.token, request, around)
-                    }
+                    (None, Some(Request::Update(request)), Some(updates)) => updates.receiver.obey(
+                        command.token,
+                        request,
+                        self.servo_is_off(),
+                        updates.nonce,
+                        &mut *updates.store,
+                    ),
                     _ => self.obey(&command, servo),
                 };
                 if let Some(updates) = updates
@@ -155,9 +138,9 @@ impl Service {
         }
     }
 
-    /// Before the servo's own tick, which may end a re-zero and move the pose: one that runs is
-    /// given up if the servo is not off. `servo_off_pin` is whether the service pin says that it
-    /// is, `None` without such a pin.
+    /// Call this before the servo's own tick, which may end a re-zero and move the pose: it cancels a running
+    /// re-zero unless the servo is off. `servo_off_pin` says whether the service pin says "off"; `None` without
+    /// such a pin.
     pub fn before_tick<D: Decode>(
         &mut self,
         servo: Option<&mut PoseTracker<D>>,
@@ -172,8 +155,8 @@ impl Service {
         }
     }
 
-    /// One tick, after the servo's own: the declaration and the blinking run on, and a re-zero
-    /// that has ended is answered.
+    /// One tick, after the servo's own: counts the declaration and the blinking down, and answers a re-zero
+    /// that has ended.
     pub fn tick<D: Decode>(&mut self, servo: Option<&PoseTracker<D>>) -> Option<Coded> {
         self.identify_ticks = self.identify_ticks.saturating_sub(1);
         self.servo_off_ticks = self.servo_off_ticks.saturating_sub(1);
@@ -182,23 +165,12 @@ impl Service {
             ZeroOffsetState::Running { .. } => return None,
             ZeroOffsetState::Idle => (Outcome::ServoOn, 0),
             ZeroOffsetState::Done { .. } => (Outcome::Done, 0),
-            ZeroOffsetState::Refused(refusal) => Outcome::of_refusal(&refusal),
+            ZeroOffsetState::Refused(refusal) => Outcome::from_refusal(&refusal),
         };
         self.rezero = None;
         self.was_refused = outcome != Outcome::Done;
         let number = Command::new(Request::Rezero { ticks: 0 }, token).number;
         self.answer(number, token, outcome, detail)
-    }
-
-    /// The next page of the serial number, while one is due: a controller sends one in every
-    /// tick.
-    pub fn identity_page(&mut self, serial: &str) -> Option<Coded> {
-        if self.page >= IdentityPage::PAGES {
-            return None;
-        }
-        let page = IdentityPage::of(serial, self.page);
-        self.page += 1;
-        self.send(&Content::Identity(page))
     }
 
     /// The frame with this content, numbered.
@@ -217,7 +189,7 @@ impl Service {
             | on(flag::RECORDING, self.is_recording)
     }
 
-    /// Whether the node is to show where it is.
+    /// Whether the node is to blink.
     pub const fn is_identifying(&self) -> bool {
         self.identify_ticks > 0
     }
@@ -232,8 +204,8 @@ impl Service {
         self.servo_off_ticks > 0 && !matches!(self.servo_off_pin, Some(false))
     }
 
-    /// The answer to a command that is not obeyed whatever it asks for: it needs a tag, or without a
-    /// key a line that says that the servo is off; or it has been obeyed.
+    /// The answer to a command that must not be obeyed, for lack of a tag or, without a key, of a line that
+    /// says "off"; or the first answer to a repeated command.
     fn refusal(
         &self,
         command: &Command,
@@ -260,12 +232,11 @@ impl Service {
         };
         match (request, servo) {
             (Request::Identify { seconds }, _) => {
-                self.identify_ticks = self.ticks_of(seconds);
-                self.page = 0;
+                self.identify_ticks = self.ticks_in(seconds);
             }
             (Request::Update(_), _) => return (Outcome::UnknownCommand, 0),
             (Request::Record { on }, _) => self.is_recording = on,
-            (Request::ServoOff { seconds }, _) => self.servo_off_ticks = self.ticks_of(seconds),
+            (Request::ServoOff { seconds }, _) => self.servo_off_ticks = self.ticks_in(seconds),
             (Request::Rezero { .. } | Request::ClearZero, None) => {
                 return (Outcome::NoParameters, 0);
             }
@@ -299,14 +270,14 @@ impl Service {
         servo.start_zero_offset(settings);
         if let ZeroOffsetState::Refused(refusal) = servo.zero_offset_state() {
             self.was_refused = true;
-            return Outcome::of_refusal(&refusal);
+            return Outcome::from_refusal(&refusal);
         }
         self.rezero = Some(token);
         self.was_refused = false;
         (Outcome::Started, 0)
     }
 
-    const fn ticks_of(&self, seconds: u8) -> u32 {
+    const fn ticks_in(&self, seconds: u8) -> u32 {
         (seconds as u32).saturating_mul(self.ticks_per_s)
     }
 

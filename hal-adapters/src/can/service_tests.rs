@@ -2,7 +2,6 @@ extern crate std;
 
 use super::super::frame::BusFrame;
 use super::*;
-use crate::can::Message;
 use runtime::{AnyDecoder, OnInvalid, ParameterSet, RawFrame};
 use std::vec::Vec;
 
@@ -36,7 +35,7 @@ impl<'d> Stage<'d> {
     fn ask(&mut self, request: Request, token: u8) -> Outcome {
         let command = Content::Command(Command::new(request, token));
         let frame = BusFrame::from(self.host.send(&command).expect("a command"));
-        let taken = self.service.take(&frame, Some(&mut self.servo));
+        let taken = self.service.take(&frame, Some(&mut self.servo), None);
         let answered = taken.expect("a command").expect("a sound one");
         self.read(answered.answer.expect("an answer"), token)
     }
@@ -143,7 +142,7 @@ fn a_stage_that_rests_elsewhere_is_zeroed_within_limits_of_its_own() {
     let decoder = decoder();
     let zeroed_within = |vertical_max: [f32; 3]| {
         let mut stage = Stage::new(&decoder);
-        stage.service = Service::new(TICKS_PER_S).rezeroing_within(ZeroOffsetSettings {
+        stage.service = Service::new(TICKS_PER_S).with_rezero_limits(ZeroOffsetSettings {
             vertical_max,
             ..ZeroOffsetSettings::default()
         });
@@ -181,7 +180,7 @@ fn a_node_without_parameters_records_and_identifies_and_has_no_zero() {
         let command = Content::Command(Command::new(request, token));
         let frame = BusFrame::from(host.send(&command).expect("a command"));
         let answered = service
-            .take(&frame, None::<&mut PoseTracker>)
+            .take(&frame, None::<&mut PoseTracker>, None)
             .expect("a command")
             .expect("sound");
         let answer = BusFrame::from(answered.answer.expect("an answer"));
@@ -196,9 +195,6 @@ fn a_node_without_parameters_records_and_identifies_and_has_no_zero() {
         service.flags(None::<&PoseTracker>),
         flag::RECORDING | flag::IDENTIFYING
     );
-    let pages: Vec<_> = core::iter::from_fn(|| service.identity_page("")).collect();
-    assert_eq!(pages.len(), usize::from(IdentityPage::PAGES));
-    assert!(pages.iter().all(|page| page.message == Message::Identity));
     (0..TICKS_PER_S).for_each(|_| assert_eq!(service.tick(None::<&PoseTracker>), None));
     assert_eq!(service.flags(None::<&PoseTracker>), flag::RECORDING);
 }
@@ -209,13 +205,13 @@ fn a_repeated_command_is_neither_obeyed_nor_answered() {
     let command = Content::Command(Command::new(Request::Record { on: true }, 1));
     let frame = BusFrame::from(host.send(&command).expect("a command"));
     assert!(matches!(
-        service.take(&frame, None::<&mut PoseTracker>),
+        service.take(&frame, None::<&mut PoseTracker>, None),
         Some(Ok(_))
     ));
     assert!(matches!(
-        service.take(&frame, None::<&mut PoseTracker>),
+        service.take(&frame, None::<&mut PoseTracker>, None),
         Some(Err(BusFault::Repeated { .. }))
     ));
     let foreign = BusFrame::new(embedded_can::StandardId::MAX, &[0; 8]).expect("eight bytes");
-    assert_eq!(service.take(&foreign, None::<&mut PoseTracker>), None);
+    assert_eq!(service.take(&foreign, None::<&mut PoseTracker>, None), None);
 }

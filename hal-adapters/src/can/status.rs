@@ -4,7 +4,7 @@ use super::e2e::Payload;
 use runtime::tracker::Health;
 
 numbered! {
-    /// What the decoding node is doing.
+    /// State of the decoding node.
     NodeState {
         /// Between reset and the first tick.
         Starting = 0,
@@ -22,7 +22,7 @@ numbered! {
         SelfTestFailed = 6,
         /// New parameters are being received or stored: no pose.
         Updating = 7,
-        /// No parameters run until that is acknowledged: no pose. The reason says why.
+        /// No parameters run until a host acknowledges: no pose. The reason says why.
         Stopped = 8,
     }
 }
@@ -55,7 +55,7 @@ pub mod flag {
     pub const RECORDING: u8 = 1 << 7;
 }
 
-/// A bit, if it `is` so.
+/// `bit` if `is`, else 0.
 pub const fn bit(bit: u32, is: bool) -> u32 {
     if is { bit } else { 0 }
 }
@@ -63,7 +63,7 @@ pub const fn bit(bit: u32, is: bool) -> u32 {
 /// A frame of [`super::Message::NodeStatus`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeStatus {
-    /// What the node is doing; `None` for a number that this version does not know.
+    /// State of the node; `None` for a number that this version does not know.
     pub state: Option<NodeState>,
     /// Detail of the state, defined by the node; 0 for none.
     pub reason: u8,
@@ -106,7 +106,7 @@ impl NodeStatus {
     }
 }
 
-/// What a controller reports of its start and its board: pages 6 to 11, in this order.
+/// Facts about the start and the board of a controller: pages 6 to 11, in this order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BoardFacts {
     /// The last fault that caused a reset since power-on. Bits 0 to 7: 0 none, 1 panic, 2 hard
@@ -115,7 +115,7 @@ pub struct BoardFacts {
     pub last_fault: u32,
     /// Program counter of that fault.
     pub fault_address: u32,
-    /// CFSR of that fault, or what its kind needs.
+    /// CFSR of that fault, or another detail of its kind.
     pub fault_detail: u32,
     /// Resets by faults since power-on.
     pub faults: u32,
@@ -156,19 +156,18 @@ pub mod board_check {
     pub const TEMPERATURE_MISSING: u32 = 1 << 7;
 }
 
-/// One counter of [`runtime::tracker::Health`], or one of [`BoardFacts`], with its page.
+/// One counter of [`runtime::tracker::Health`], or one fact of [`BoardFacts`], with its page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HealthPage {
-    /// Which: 0 to 5 in the order of the counters, 6 to 11 in that of the facts.
+    /// 0 to 5: the counters in their order; 6 to 11: the facts in their order.
     pub page: u8,
     /// Its value.
     pub value: u32,
 }
 
 impl HealthPage {
-    /// Page `number`, modulo the pages there are: the counters, and the facts of a node that has
-    /// a board.
-    pub const fn of(health: &Health, board: Option<&BoardFacts>, number: u32) -> Self {
+    /// Page `number` modulo the number of pages: the counters, and the facts of a node with a board.
+    pub const fn new(health: &Health, board: Option<&BoardFacts>, number: u32) -> Self {
         let counters = [
             health.ticks,
             health.planar_invalid,
@@ -247,10 +246,10 @@ mod tests {
             board_checks: 111,
         };
         for number in 0..24 {
-            let page = HealthPage::of(&health, Some(&board), number);
+            let page = HealthPage::new(&health, Some(&board), number);
             let want = number % 12;
             assert_eq!((u32::from(page.page), page.value), (want, 100 + want));
-            let page = HealthPage::of(&health, None, number);
+            let page = HealthPage::new(&health, None, number);
             assert_eq!(u32::from(page.page), number % 6);
         }
     }

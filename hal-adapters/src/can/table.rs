@@ -1,5 +1,5 @@
-//! The one table of messages and identifiers; what each carries is in the tables of `protocol.md`,
-//! from which the `.dbc` file follows.
+//! The table of messages and identifiers. `protocol.md` lists the signals of each message; the `.dbc` file
+//! follows from it.
 
 use embedded_can::{Id, StandardId};
 
@@ -72,10 +72,8 @@ messages! {
     Command: 0x1cc, 0xb6;
     /// Its answer.
     Answer: 0x1f0, 0xc3;
-    /// Counters of the decoding node, one after the other.
+    /// Counters of the decoding node, one a frame.
     Health: 0x1ff, 0xd0;
-    /// Serial number of the stage, six characters a page.
-    Identity: 0x203, 0xdd;
     /// Number and time of the tick whose pose was just sent.
     PoseTime: 0x20c, 0xea;
     /// A word of new parameters.

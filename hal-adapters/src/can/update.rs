@@ -1,49 +1,44 @@
-//! New parameters for a node over the bus, checked as a whole before anything is stored.
+//! New parameters for a node over the bus. The node checks a blob as a whole before it stores
+//! anything.
 //!
 //! ```text
 //! host                               node
-//! Tell {page}, ReadBack {k}   ->     who it is, what it runs
-//! ServoOff {seconds}     (tag)->     the servo is off: Done
-//! Begin {bytes, check}   (tag)->     a transfer is open, under the token of this command; the pose
-//!                                    is invalid until it ends. Done {bytes, check}, ServoOn, Busy,
-//!                                    BadContent (too long), NoParameters (nothing to go back to),
-//!                                    WrongSequence (another blob to go back to)
+//! Tell {page}, ReadBack {k}   ->     who it is, the blob that runs
+//! ServoOff {seconds}     (tag)->     Done: the servo is declared off
+//! Begin {bytes}          (tag)->     Done: a transfer is open under this command's token, and the pose
+//!                                    is invalid until it ends. ServoOn, Busy, BadContent (wrong length)
 //! UpdateData, any order       ->     kept in RAM
-//! Commit {sequence}      (tag)->     Incomplete {first missing index}: send it and ask again;
+//! Commit {sequence}      (tag)->     Incomplete {first missing index}: send that word and ask again;
 //!                                    WrongSequence; Started. Then up to half a second without any
 //!                                    frame, and Done {CRC}, NotAuthorised, BadContent, SupplyLow,
 //!                                    StoreFailed, ServoOn
 //! Activate               (tag)->     Done, and a reset: the newest blob runs
 //! ```
 //!
-//! Where the node has a key, a request with a tag is sent like this; else alone.
+//! A node with a key obeys a request marked (tag) only after its tag:
 //!
 //! ```text
-//! Challenge {0}               ->     a new nonce is drawn, the answer is its first word; NoRandomNumber
+//! Challenge {0}               ->     a new nonce is drawn; the answer is its first word. NoRandomNumber
 //! Challenge {1 to 3}          ->     its other words
 //! UpdateData 240 to 243       ->     the tag, kept in RAM
-//! the request                 ->     Incomplete {first missing index}: send it and ask again;
-//!                                    NotAuthorised, if the tag is not that of this nonce and request
+//! the request                 ->     Incomplete {first missing index}: send that word and ask again;
+//!                                    NotAuthorised: the tag is not the one of this nonce and request
 //! ```
 //!
-//! Every request may be repeated, with the same token: it is not done twice, and its answer comes
-//! again (that of a tagged one until the next challenge). A transfer ends when it is committed, refused or aborted, when the servo is declared on,
-//! and when nothing came for 5 s; until then another host gets Busy. A host sends at most one
-//! frame in a millisecond: the store of a controller holds three frames, and is emptied every 2 ms.
+//! A host may repeat every request with the same token. The node does it once and gives its answer again
+//! (to a tagged request until the next challenge). A transfer ends when it is committed, refused or
+//! aborted, when the servo is declared on, and after 5 s without a frame. Until then a host with another
+//! token gets Busy. A host sends at most one frame in a millisecond: a controller stores three frames and
+//! reads them every 2 ms.
 //!
-//! A transfer of length 0 has no words; its commit goes back to the blob before
-//! the newest, if that is the one whose check it began with.
+//! `Done` of a commit names the stored blob. A host that lost this answer asks which blob is the newest
+//! ([`page::NEXT_CRC`]). To go back, a host reads the blob back before the update, and sends it again.
 //!
-//! Two hosts may choose the same token. So `Begin` names the low half of the blob's CRC-32C, and
-//! opens no transfer while one of another blob is open; and `Done` names what was begun or stored.
-//! Whoever lost the answer to a commit asks which blob is the newest ([`page::NEXT`]).
-//!
-//! Who may: where the node has a key, whoever sends the right tag ([`tag`]): AES-CMAC over
-//! the nonce, the request with its token, and for a commit the blob. A nonce serves once, for a right
-//! tag and for a wrong one: a recording is worth nothing, and each guess takes a challenge. All that
-//! moves the pose, makes it invalid or resets needs a tag ([`Command::needs_authority`]). Where the
-//! node has no key, whoever can send on the bus may, while the line says that the servo is off: the
-//! check of a frame shows damage, not who sent it.
+//! **Authority.** The tag ([`tag`]) is AES-CMAC over the nonce, the request with its token, and for a
+//! commit the blob. One nonce serves for one tag, right or wrong: a recorded tag is worth nothing, and each
+//! guess takes a challenge. All requests that move the pose, invalidate it or reset the node need a tag
+//! ([`Command::needs_authority`]). Without a key any host on the bus may send them while the line says that
+//! the servo is off: the check of a frame shows damage, not the sender.
 //!
 //! [`Command::needs_authority`]: super::command::Command::needs_authority
 
@@ -55,8 +50,8 @@ mod store;
 mod tell;
 
 pub use authentication::{Key, Nonce, TAG_BYTES, tag};
-pub use receiver::{Receiver, Surroundings};
+pub use receiver::Receiver;
 pub use request::{UpdateData, UpdateRequest};
-pub use staging::{TAG_INDEX, crc_of, word_of};
-pub use store::{Change, Kept, NotWritten, Running, Store};
+pub use staging::{TAG_INDEX, blob_crc, word_at};
+pub use store::{BlobId, NotWritten, Running, Store};
 pub use tell::{Identity, page};

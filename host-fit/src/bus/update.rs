@@ -1,19 +1,18 @@
-//! `identify`, `update`, `read-back`, `rezero`: who a node is, new parameters for it, the parameters that
-//! it runs, and its zero, over the bus. The protocol is that of [`hal_adapters::can::update`].
+//! `identify`, `update`, `read-back`, `rezero`: the identity of a node, new parameters for it, its parameters,
+//! and its zero, over the bus. The protocol is [`hal_adapters::can::update`].
 //!
-//! Each is a straight script over [`Talk::exchange`], on whatever [`Link`]: a bus, or a model of one.
+//! Each command is a script over [`Talk::exchange`], on any [`Link`]: a bus, or a model of one.
 
 mod identity;
-mod plan;
 mod rezero;
 mod run;
 mod script;
 mod talk;
 
-pub use identity::{Identity, RunningParameters};
-pub use plan::{Plan, Updated, Wanted};
+pub use identity::Identity;
 pub use rezero::Zero;
 pub use run::{identify, read_back, rezero, update};
+pub use script::{Plan, Updated};
 pub use talk::{Link, SPACING_US, Talk};
 /// The scripts without an interface.
 pub mod on {
@@ -33,44 +32,44 @@ pub enum UpdateError {
     /// The bus cannot be used.
     #[error("the bus cannot be used")]
     Link,
-    /// Nobody answers.
+    /// No node answers.
     #[error(
         "no controller answered for 3 s; is it on, and is the interface set to its bit rate (`ip -details link show`)?"
     )]
     NoAnswer,
     /// The node answers, but does not know these requests.
     #[error(
-        "the controller does not say what it runs: its program is too old for updates over the bus, or it is `host-fit \
-         live`. Flash a newer program, and parameters with `host-fit export` and a probe"
+        "the controller does not say what it runs: its program is too old for this version, or it is `host-fit live`. Flash a \
+         newer program, and parameters with `host-fit export` and a probe"
     )]
     TellsNothing,
     /// An answer that makes no sense here.
-    #[error("the controller gave an answer that was not expected: {}", outcome.map_or("one that this version does not know".to_owned(), |outcome| format!("{outcome:?}")))]
+    #[error("the controller gave an unexpected answer: {}", outcome.map_or("unknown to this version".to_owned(), |outcome| format!("{outcome:?}")))]
     Unexpected {
         /// The answer.
         outcome: Option<Outcome>,
     },
-    /// The blob is that of another stage, or another stage is there.
+    /// The blob, or the serial number asked for, belongs to another stage than the node.
     #[error(
-        "the controller is that of the stage `{found}`, not `{expected}`; nothing was sent to it. Name the blob of this \
-         stage, or connect the other one"
+        "the controller belongs to the stage `{found}`, not `{expected}`; nothing was sent to it. Name the blob of this stage, \
+         or connect the other controller"
     )]
     OtherStage {
         /// Serial number of the blob, or the one asked for.
         expected: String,
-        /// That of the node.
+        /// Serial number of the node.
         found: String,
     },
     /// A serial number was asked for, and the node has none.
     #[error(
-        "the controller has no serial number, so it may not be that of the stage `{expected}`; nothing was sent to it. \
-         Leave out --serial if it is"
+        "the controller has no serial number, so it may not belong to the stage `{expected}`; nothing was sent to it. Leave \
+         out --serial if it does"
     )]
     NoSerial {
-        /// The one asked for.
+        /// The serial number asked for.
         expected: String,
     },
-    /// The node wants a tag.
+    /// The node needs a tag.
     #[error(
         "the controller takes new parameters only with the key of its stage: name it with --key FILE"
     )]
@@ -83,79 +82,62 @@ pub enum UpdateError {
         _ => format!("{} is not at rest; wait until the stage is quiet", axis(*detail)),
     })]
     NotAtRest {
-        /// What the node says.
+        /// The answer.
         outcome: Outcome,
         /// Its detail: an axis, or a status.
         detail: u32,
     },
-    /// The node takes the servo for on.
+    /// The servo is on for the node.
     #[error("{}", match declared {
-        false => "the servo may be on: switch it off, and say so with --servo-off, which declares it meanwhile",
-        true => "the controller does not take the servo for off: it has restarted, its service pin says on, another \
-                 computer has declared it on, or the time of the declaration ran out. Nothing was changed. Look at the stage; \
-                 once the servo is off, try again",
+        false => "the servo may be on: switch it off and add --servo-off, which declares it off meanwhile",
+        true => "the controller no longer takes the servo for off: it restarted, its service pin says on, another computer \
+                 declared the servo on, or the declaration expired. Nothing was changed. Look at the stage; once the servo is \
+                 off, try again",
     })]
     ServoOn {
         /// Whether it was declared off.
         declared: bool,
     },
-    /// Another host is at it.
-    #[error("another computer is updating this controller; try again when it is done")]
+    /// Another host is updating the node.
+    #[error("another computer is updating this controller; try again when it has finished")]
     Busy,
     /// Nothing can be authorised.
     #[error(
-        "the controller's random number generator gives no numbers, so that it cannot authorise anything; restart it. If \
+        "the random number generator of the controller gives no numbers, so it cannot authorise anything; restart it. If \
          that does not help, the generator or its clock is broken"
     )]
     NoRandomNumber,
     /// The tag is wrong.
     #[error(
-        "the controller refuses this as not authorised: name the key of its stage with --key FILE; a key that was named is that \
-         of another stage"
+        "the controller refuses this as not authorised: name the key of its stage with --key FILE. If you did, the key belongs \
+         to another stage, or another computer is busy with this controller"
     )]
     NotAuthorised,
     /// The node refuses the blob.
     #[error("the controller refuses the parameters: {}", match kind {
-        4 => "their layout is too new for its program; update that first",
-        7 => "they came over damaged four times; look at the bus and its termination",
+        4 => "their layout is too new for its program; update the program first",
+        7 => "they arrived damaged four times; look at the bus and its termination",
         10 => "they belong to another stage",
-        _ => "its program does not take them; update it, or fit again",
+        _ => "its program does not accept them; update it, or fit again",
     })]
     BadContent {
         /// See [`BlobError::number`].
         kind: u32,
     },
-    /// Another host has stored records meanwhile.
-    #[error(
-        "another computer has stored newer parameters meanwhile (the next number is {least}); look at them with `host-fit \
-         identify`, and try again"
-    )]
-    Overtaken {
-        /// The least sequence number that the node takes.
-        least: u32,
-    },
-    /// No number is left.
-    #[error(
-        "the controller's records have used up all sequence numbers: erase its store with a probe"
-    )]
-    NumbersUsedUp,
     /// The supply is too low to write.
     #[error(
-        "the supply of the controller is below 2.9 V, so that nothing is written: it goes on with the parameters that it runs"
+        "the supply of the controller is below 2.9 V, so nothing was written; its parameters stay in force"
     )]
     SupplyLow,
     /// The flash could not be written.
     #[error(
-        "the controller could not write its flash, and goes on with the parameters that it runs; those before them may be \
-         lost. Try again; if it fails again, the flash is worn out"
+        "the controller could not write its flash. Its parameters stay in force; the parameters before them may be lost. Try \
+         again; if it fails again, the flash is worn out"
     )]
     StoreFailed,
     /// There are no parameters to activate.
-    #[error("the controller keeps no parameters that it could run")]
+    #[error("the controller has no parameters to activate")]
     NothingKept,
-    /// There is nothing to go back to.
-    #[error("the controller keeps no parameters from before the newest")]
-    NoPrevious,
     /// Too much is lost.
     #[error(
         "the controller lost the update again and again, or was restarted; look at the bus, its termination and its load"
@@ -163,15 +145,14 @@ pub enum UpdateError {
     Lossy,
     /// No answer to the commit.
     #[error(
-        "the controller stopped to answer while it stored the parameters: see with `host-fit identify` which it has. It \
-         has the old or the new ones, never a mixture"
+        "the controller stopped answering while it stored the parameters. It has the old or the new set, never a mixture: \
+         `host-fit identify` shows which"
     )]
     Unknown,
     /// The new parameters are stored, but the node was not reset.
     #[error(
-        "the parameters are stored as number {sequence} and wait; they were not activated, because the servo may be on \
-         again, or another computer is updating. Once it is off and the other one done, use `host-fit update --servo-off \
-         --activate`"
+        "the parameters are stored as number {sequence}, but not active: the servo may be on again, or another computer is \
+         updating. Once the servo is off and the other computer has finished, use `host-fit update --servo-off --activate`"
     )]
     NotActivated {
         /// Their sequence number.
@@ -179,17 +160,17 @@ pub enum UpdateError {
     },
     /// The new parameters do not run.
     #[error(
-        "the parameters are stored as number {sequence}, but the controller does not run them, or has stopped because its \
-         program failed twice: see its state, and go back with `host-fit update --servo-off --previous --activate`"
+        "the parameters are stored as number {sequence}, but the controller does not run them, or stopped because its program \
+         failed twice: see its state. To go back, update with the parameters before"
     )]
     NotActive {
         /// Their sequence number.
         sequence: u32,
     },
-    /// The new parameters are stored, and then nobody answered.
+    /// The new parameters are stored, and then the node was silent.
     #[error(
-        "the parameters are stored as number {sequence}, and the controller has not answered for 3 s since: is it on? See \
-         what it runs with `host-fit identify`"
+        "the parameters are stored as number {sequence}, but the controller has not answered for 3 s since: is it on? \
+         `host-fit identify` shows which parameters it runs"
     )]
     Silent {
         /// Their sequence number.
@@ -198,32 +179,32 @@ pub enum UpdateError {
     /// There is no blob to read.
     #[error("the controller runs no parameters: there is nothing to read back")]
     NothingRuns,
-    /// What was read back is not sound.
-    #[error("what the controller gave is no sound parameter blob: {cause}; try again")]
+    /// The blob that was read back is not sound.
+    #[error("the parameters read back are damaged: {cause}; try again")]
     ReadBack {
         /// What is wrong with it.
         cause: BlobError,
     },
-    /// What was read back is not what the node said it runs.
+    /// The blob that was read back has another check than the running one.
     #[error("the controller's parameters changed while they were read: try again")]
     Changed,
     /// Ctrl-C.
-    #[error("interrupted; the controller keeps the parameters that it has")]
+    #[error("interrupted; the parameters of the controller are unchanged")]
     Interrupted,
 }
 
 impl UpdateError {
-    /// What another outcome than the one hoped for means; `declared`: whether the servo was declared off.
-    const fn of(outcome: Outcome, detail: u32, declared: bool) -> Self {
+    /// The error of an outcome other than the expected one; `declared`: whether the servo was declared off.
+    const fn from_outcome(outcome: Outcome, detail: u32, declared: bool) -> Self {
         match outcome {
             Outcome::ServoOn => Self::ServoOn { declared },
-            Outcome::Busy => Self::Busy,
+            // Another host has stored a blob since this one asked for the newest number.
+            Outcome::Busy | Outcome::WrongSequence => Self::Busy,
             Outcome::UnknownCommand => Self::TellsNothing,
             Outcome::NoParameters => Self::NothingRuns,
             Outcome::NoRandomNumber => Self::NoRandomNumber,
             Outcome::NotAuthorised => Self::NotAuthorised,
             Outcome::BadContent => Self::BadContent { kind: detail },
-            Outcome::WrongSequence => Self::Overtaken { least: detail },
             Outcome::SupplyLow => Self::SupplyLow,
             Outcome::StoreFailed => Self::StoreFailed,
             Outcome::NoTransfer => Self::Lossy,
@@ -246,18 +227,18 @@ fn axis(number: u32) -> &'static str {
     named.copied().unwrap_or("an axis")
 }
 
-/// Why a command that talks to a node ended early.
+/// Why a command to a node ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum UpdateRunError {
     /// The bus cannot be used.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The node, or the dialog with it.
+    /// An error of the node, or of the dialog with it.
     #[error("{address}: {cause}")]
     Dialog {
-        /// Where.
+        /// The node.
         address: BusAddress,
-        /// What is wrong.
+        /// The error.
         cause: UpdateError,
     },
 }

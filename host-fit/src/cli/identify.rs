@@ -1,15 +1,14 @@
 //! `host-fit identify`.
 
 use super::args::Json;
-use super::inspect::errors;
 use super::report::Report;
 use crate::bus::BusAddress;
-use crate::bus::update::{self, Identity, RunningParameters};
+use crate::bus::update::{self, Identity};
 use crate::cli::error::HostError;
 use crate::cli::terminal;
 use crate::report::table::{as_text, tables};
 use clap::Args;
-use hal_adapters::can::update::Kept;
+use hal_adapters::can::update::BlobId;
 use serde_json::{Value, json};
 
 /// Arguments of `identify`.
@@ -22,7 +21,7 @@ pub(super) struct IdentifyArgs {
     json: Json,
 }
 
-/// Asks a controller who it is and what it runs.
+/// Asks a controller for its identity and its parameters.
 pub(super) fn run(args: &IdentifyArgs) -> Result<(), HostError> {
     super::check_outputs([args.json.path.as_deref()], &Report::default(), [])?;
     let figures = figures(&update::identify(&args.can)?);
@@ -31,47 +30,37 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<(), HostError> {
 }
 
 fn figures(identity: &Identity) -> Value {
-    let kept = |record: Kept| json!({ "sequence": record.sequence, "crc32c": format!("{:08x}", record.crc) });
-    let running = identity.running.as_ref();
-    let in_force = |record: &Kept| running.is_some_and(|r| r.sequence == record.sequence);
+    let blob = |id: BlobId| json!({ "sequence": id.sequence, "crc32c": format!("{:08x}", id.crc) });
+    let running = identity.running.map(|(id, bytes)| {
+        json!({
+            "sequence": id.sequence,
+            "crc32c": format!("{:08x}", id.crc),
+            "bytes": bytes,
+        })
+    });
+    let runs = |id: &BlobId| identity.running.is_some_and(|(running, _)| running == *id);
     let newest = identity.newest_sequence;
-    let is_unused = newest > identity.next.map_or(0, |record| record.sequence);
+    let is_unused = newest > identity.next.map_or(0, |next| next.sequence);
     json!({
         "serial": identity.serial,
-        "running": running.map(|running| json!({
-            "slot": running.slot,
-            "sequence": running.sequence,
-            "crc32c": format!("{:08x}", running.crc),
-            "bytes": running.bytes,
-            "created": running.created,
-            "forced": running.forced,
-            "errors": errors(running.rms, running.peak),
-        })),
+        "running": running,
         "newest_sequence": newest,
-        "next": identity.next.map(kept),
-        // Stored, and in force from the next reset on.
-        "waiting": identity.next.filter(|record| !in_force(record)).map(kept),
-        // Damaged, of another stage, or passed over.
+        "next": identity.next.map(blob),
+        // Stored, and in force after an activation or power-on.
+        "waiting": identity.next.filter(|next| !runs(next)).map(blob),
+        // Damaged, or of another stage.
         "not_used": is_unused.then(|| json!({ "sequence": newest })),
-        "previous": identity.previous.map(kept),
         "program_version": identity.program_version.map(|part| part.to_string()).join("."),
-        "program_hash": format!("{:08x}", identity.program_hash),
         "needs_key": identity.needs_key,
-        "last_update": identity.last_update,
     })
 }
 
-/// Which parameters, in one line.
-pub(super) fn parameters(running: Option<&RunningParameters>) -> String {
-    let Some(running) = running else {
-        return "none".to_owned();
-    };
-    let created = match running.created.as_str() {
-        "" => String::new(),
-        created => format!(", created {created}"),
-    };
-    let (sequence, crc) = (running.sequence, running.crc);
-    format!("number {sequence}, check {crc:08x}{created}")
+/// The parameters that run, in one line.
+pub(super) fn parameters(identity: &Identity) -> String {
+    match identity.running {
+        Some((id, _)) => format!("number {}, check {:08x}", id.sequence, id.crc),
+        None => "none".to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -79,41 +68,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_waits_for_a_reset_and_what_is_not_used_are_distinguished() {
-        let kept = |sequence| Some(Kept { sequence, crc: 7 });
-        let shown = |next, newest_sequence| {
-            let running = RunningParameters {
-                slot: 0,
-                forced: false,
-                sequence: 3,
-                crc: 7,
-                bytes: 500,
-                created: String::new(),
-                rms: [0.0; 3],
-                peak: [0.0; 3],
-            };
-            figures(&Identity {
-                serial: "HS-0007".to_owned(),
-                running: Some(running),
-                newest_sequence,
-                next,
-                previous: kept(2),
-                program_version: [0; 3],
-                program_hash: 0,
-                needs_key: true,
-                last_update: None,
-            })
-        };
-        for (next, newest, waits, is_unused) in [
-            (kept(3), 3, false, false),
-            (kept(4), 4, true, false),
-            (kept(3), 4, false, true),
-            (kept(4), 5, true, true),
+    fn a_waiting_blob_and_an_unused_blob_are_distinguished() {
+        let blob = |sequence| BlobId { sequence, crc: 7 };
+        for (next, newest_sequence, waits, is_unused) in [
+            (3, 3, false, false),
+            (4, 4, true, false),
+            (3, 4, false, true),
+            (4, 5, true, true),
         ] {
-            let found = shown(next, newest);
-            assert_eq!(found["waiting"].is_object(), waits, "{found}");
-            assert_eq!(found["not_used"].is_object(), is_unused, "{found}");
-            assert!(found["previous"].is_object(), "{found}");
+            let shown = figures(&Identity {
+                serial: "HS-0007".to_owned(),
+                running: Some((blob(3), 500)),
+                newest_sequence,
+                next: Some(blob(next)),
+                program_version: [0; 3],
+                needs_key: true,
+            });
+            assert_eq!(shown["waiting"].is_object(), waits, "{shown}");
+            assert_eq!(shown["not_used"].is_object(), is_unused, "{shown}");
         }
     }
 }

@@ -26,7 +26,7 @@ pub(super) fn run(args: &ReadBackArgs) -> Result<(), HostError> {
     super::check_outputs([Some(args.out.as_path())], &Report::default(), [])?;
     let (identity, blob) = update::read_back(&args.can)?;
     write_atomically(&args.out, &blob)?;
-    let parameters = identify::parameters(identity.running.as_ref());
+    let parameters = identify::parameters(&identity);
     terminal::print(&format!("{}: runs {parameters}\n", identity.serial))?;
     super::wrote([args.out.clone()])
 }

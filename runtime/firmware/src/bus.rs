@@ -39,8 +39,6 @@ pub struct Bus {
     can: CAN1,
     /// The bits of an identifier register that the node's number sets.
     node_bits: u32,
-    /// See [`NodeNumber::seal`].
-    seal: u8,
     started: bool,
     /// Ticks in a row in which the controller took no part in the bus.
     apart_ticks: u16,
@@ -87,7 +85,6 @@ impl Bus {
         Self {
             can,
             node_bits,
-            seal: node.seal(),
             started,
             apart_ticks: 0,
             was_off: false,
@@ -163,7 +160,6 @@ impl Bus {
             let (low, high) = (received.rdlr().read().bits(), received.rdhr().read().bits());
             self.can.rf0r().write(|w| w.rfom().release());
             let bytes = (u64::from(high) << 32 | u64::from(low)).to_le_bytes();
-            let bytes = sealed(bytes, self.seal);
             // A length code of 9 to 15 also means eight bytes, by the standard; no command is so.
             let frame = match (id, bytes.get(..length)) {
                 (Some(id), Some(data)) => BusFrame::new(id, data),
@@ -189,7 +185,7 @@ impl Bus {
             let Some(mailbox) = self.can.tx_iter().nth(empty.trailing_zeros() as usize) else {
                 return;
             };
-            fill(mailbox, frame, self.node_bits, self.seal);
+            fill(mailbox, frame, self.node_bits);
             self.outbox.pop();
             self.sent = self.sent.wrapping_add(1);
         }
@@ -261,14 +257,8 @@ fn receive_commands_only(can: &CAN1, node_bits: u32) {
     can.fmr().modify(|_, w| w.finit().clear_bit());
 }
 
-/// The bytes of a frame, of which the first is the check, with that of the node for that of the table
-/// or the other way round.
-const fn sealed([check, b, c, d, e, f, g, h]: [u8; 8], seal: u8) -> [u8; 8] {
-    [check ^ seal, b, c, d, e, f, g, h]
-}
-
-fn fill(mailbox: &TX, frame: &Coded, node_bits: u32, seal: u8) {
-    let [a, b, c, d, e, f, g, h] = sealed(frame.bytes, seal);
+fn fill(mailbox: &TX, frame: &Coded, node_bits: u32) {
+    let [a, b, c, d, e, f, g, h] = frame.bytes;
     let (low, high) = (
         u32::from_le_bytes([a, b, c, d]),
         u32::from_le_bytes([e, f, g, h]),

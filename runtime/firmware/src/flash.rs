@@ -3,7 +3,6 @@
 
 use crate::supply::Supply;
 use cortex_m::asm;
-use crc::{CRC_32_ISCSI, Crc, NoTable};
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, ReadNorFlash, check_erase, check_read, check_write,
 };
@@ -14,8 +13,6 @@ const BYTES: usize = SLOTS * SLOT_BYTES as usize;
 
 unsafe extern "C" {
     static mut _parameter_slot_0: [u8; BYTES];
-    static __stext: u8;
-    static __erodata: u8;
 }
 
 /// The keys that open FLASH_CR, one after the other (section 3.6.1).
@@ -31,15 +28,6 @@ const BUSY: u32 = 1 << 16;
 /// most with words of 32 bits (DS8626, flash memory programming).
 const WORD_LOOKS: u32 = 10_000;
 const SECTOR_LOOKS: u32 = 42_000_000;
-
-/// CRC-32C of the program's instructions and constants: the same for every stage.
-pub fn program_crc() -> u32 {
-    let (start, end) = (&raw const __stext, &raw const __erodata);
-    // SAFETY: the linker puts `.text` and `.rodata` between these symbols, one after the other,
-    // and nothing writes there.
-    let program = unsafe { core::slice::from_raw_parts(start, end as usize - start as usize) };
-    Crc::<u32, NoTable>::new(&CRC_32_ISCSI).checksum(program)
-}
 
 /// The parameter sectors of `memory.x`: offset 0 is the start of slot 0, which slot 1 follows.
 pub struct Sectors {

@@ -130,7 +130,6 @@ mod app {
         let options = device.FLASH.optcr().read().bits();
         let sectors = flash::Sectors::new(device.FLASH, supply);
         let (mut records, refusal) = Records::start(sectors, before.choice, board::stage_serial());
-        let program_hash = flash::program_crc();
         // After a warm start the FPU may have any settings; with these the arithmetic is the host's.
         Fpu.restore();
         let sound = runtime::arithmetic::check().is_ok() && Fpu::defaults_are_sound();
@@ -146,7 +145,6 @@ mod app {
             serial: board::stage_serial(),
             key: board::stage_key(),
             program_version: board::PROGRAM_VERSION,
-            program_hash,
         };
         let node = node(cx.local.node_place, parameters, before.by_fault, identity);
         let zero_lost = before.restore_zero(node, blob);

@@ -103,7 +103,7 @@ impl<'d> Node<'d> {
     #[must_use]
     pub fn recording(self, is_on: bool) -> Self {
         Self {
-            service: self.service.recording(is_on),
+            service: self.service.with_recording(is_on),
             ..self
         }
     }
@@ -112,7 +112,7 @@ impl<'d> Node<'d> {
     #[must_use]
     pub fn rezeroing_within(self, limits: ZeroOffsetSettings) -> Self {
         Self {
-            service: self.service.rezeroing_within(limits),
+            service: self.service.with_rezero_limits(limits),
             ..self
         }
     }
@@ -192,7 +192,6 @@ impl<'d> Node<'d> {
         }
         let servo = self.parameters.servo_mut();
         let answer = self.service.tick(servo.as_deref());
-        let page = self.service.identity_page(self.parameters.serial());
         let was_off = core::mem::replace(&mut self.bus_off_sent, facts.bus_off) != facts.bus_off;
         self.receiver.tick(self.service.servo_is_off());
         let due = match self.ticks % u32::from(SLOW_TICKS) {
@@ -201,13 +200,13 @@ impl<'d> Node<'d> {
             _ if was_off || self.is_storing() => Some(Content::Status(self.status(facts))),
             8 => {
                 let number = self.ticks / u32::from(SLOW_TICKS);
-                let page = HealthPage::of(&self.health(), Some(&facts.board), number);
+                let page = HealthPage::new(&self.health(), Some(&facts.board), number);
                 Some(Content::Health(page))
             }
             _ => None,
         };
         let due = due.and_then(|content| self.service.send(&content));
-        let frames = answer.into_iter().chain(page).chain(due);
+        let frames = answer.into_iter().chain(due);
         frames.for_each(|frame| outbox.push(frame));
         self.ticks = self.ticks.wrapping_add(1);
         reading
@@ -228,7 +227,7 @@ impl<'d> Node<'d> {
             store,
             nonce,
         };
-        if let Some(Ok(answered)) = self.service.take_updating(frame, servo, Some(updates))
+        if let Some(Ok(answered)) = self.service.take(frame, servo, Some(updates))
             && let Some(answer) = answered.answer
         {
             outbox.push(answer);

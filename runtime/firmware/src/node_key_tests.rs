@@ -12,7 +12,7 @@ fn ask_tagged(node: &mut Node<'_>, request: Request, token: u8, key: Option<Key>
             token,
         );
         let command = Command::new(request, token);
-        let tag = tag(&key, &NONCE, &command, &[], 0);
+        let tag = tag(&key, &NONCE, &command, &[]);
         let mut host = Mailbox::default();
         for (index, word) in (TAG_INDEX..).zip(tag.as_chunks().0) {
             let word = u32::from_le_bytes(*word);

@@ -83,7 +83,6 @@ fn node() -> Node<'static> {
     let loaded = loaded();
     let parameters = Parameters::Usable {
         servo: PoseTracker::new(&loaded.decoder, OnInvalid::Zero),
-        serial: &loaded.serial,
         other_slot: None,
     };
     Node::new(parameters, false, Layout::Bits24, IDENTITY)
@@ -93,7 +92,6 @@ const IDENTITY: Identity<'_> = Identity {
     serial: None,
     key: None,
     program_version: 1,
-    program_hash: 2,
 };
 
 /// What is drawn for a tag.

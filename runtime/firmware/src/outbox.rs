@@ -12,12 +12,11 @@ use heapless::Deque;
 /// Frames of one tick at most: X, Y, Rz, their time, a vertical axis, temperatures, three of codes,
 /// their time, a state or a counter.
 const FRESH_MAX: usize = 11;
-/// Answers to the commands of a few ticks, and the six pages of a serial number.
-const LASTING_MAX: usize = 14;
+/// Answers to the commands of a few ticks.
+const LASTING_MAX: usize = 8;
 
 /// A queue in two parts. Poses, codes, states and counters are out of date in the next tick,
-/// which discards and counts them; answers and the serial number, which are sent only once,
-/// wait as long as it takes.
+/// which discards and counts them; answers, which are sent only once, wait as long as it takes.
 #[derive(Debug, Default)]
 pub struct Outbox {
     /// Frames of this tick, and whether each may join the one before in the mailboxes.
@@ -38,7 +37,7 @@ impl Outbox {
 
     /// Whether a frame is still worth sending after its tick.
     pub const fn is_lasting(message: Message) -> bool {
-        matches!(message, Message::Answer | Message::Identity)
+        matches!(message, Message::Answer)
     }
 
     /// Adds a frame at the end.
@@ -124,14 +123,9 @@ mod tests {
     }
 
     #[test]
-    fn answers_and_the_serial_number_outlive_their_tick_and_let_the_next_pose_pass() {
+    fn answers_outlive_their_tick_and_let_the_next_pose_pass() {
         let mut outbox = Outbox::new();
-        for message in [
-            Message::PoseX,
-            Message::Answer,
-            Message::NodeStatus,
-            Message::Identity,
-        ] {
+        for message in [Message::PoseX, Message::Answer, Message::NodeStatus] {
             outbox.push(frame(message));
         }
         outbox.start_tick();
@@ -140,6 +134,6 @@ mod tests {
         let left: Vec<_> = core::iter::from_fn(|| outbox.pop())
             .map(|frame| frame.message)
             .collect();
-        assert_eq!(left, [Message::PoseX, Message::Answer, Message::Identity]);
+        assert_eq!(left, [Message::PoseX, Message::Answer]);
     }
 }

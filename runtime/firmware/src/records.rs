@@ -1,11 +1,11 @@
 //! The parameters that the controller keeps in flash: which it runs, what it reports of the others, and
 //! new ones that come over the bus.
 
-use crate::store::{self, Contents, Flash, FlashFault, Image, SLOTS, Stored};
+use crate::store::{self, Contents, Flash, Image, SLOTS, Stored};
 use core::mem::MaybeUninit;
-use hal_adapters::can::update::{Change, Kept, NotWritten, Running, Store};
+use hal_adapters::can::update::{BlobId, NotWritten, Running, Store, word_at};
 use runtime::blob::{BlobError, MAX_BYTES};
-use runtime::parameters::{FitRecord, Text};
+use runtime::parameters::Text;
 use runtime::{AnyDecoder, ParameterSet};
 
 /// Which blob a start runs.
@@ -44,10 +44,6 @@ pub struct Loaded {
     pub decoder: AnyDecoder,
     /// Serial number of the stage.
     pub serial: Text,
-    /// When it was made.
-    pub created: Text,
-    /// The errors of its fit.
-    pub fit: FitRecord,
     /// CRC of the blob.
     pub crc: u32,
 }
@@ -140,8 +136,6 @@ impl<F: Flash> Records<F> {
         let loaded: &'static Loaded = place.write(Loaded {
             decoder: set.decoder(),
             serial: set.serial.clone(),
-            created: set.created.clone(),
-            fit: set.fit,
             crc: stored.crc,
         });
         self.running = Some((stored, loaded));
@@ -152,12 +146,6 @@ impl<F: Flash> Records<F> {
     fn latest(&self, is_meant: impl Fn(&Stored) -> bool) -> Option<Stored> {
         let stored = self.stored.iter().rev().flatten().copied();
         stored.filter(is_meant).max_by_key(|stored| stored.sequence)
-    }
-
-    /// The other one than the newest, if it differs.
-    fn before(&self) -> Option<Stored> {
-        let newest = self.latest(|_| true)?;
-        self.latest(|stored| stored.slot != newest.slot && stored.crc != newest.crc)
     }
 
     /// The flash as it is now.
@@ -171,24 +159,6 @@ impl<F: Flash> Records<F> {
         let kept = running.or_else(|| self.latest(|_| true));
         kept.map_or(0, |kept| 1 - kept.slot)
     }
-
-    fn try_write(
-        &mut self,
-        slot: u8,
-        sequence: u32,
-        change: Change<'_>,
-    ) -> Result<Stored, FlashFault> {
-        match (change, self.before()) {
-            (Change::Blob(blob), _) => store::write(&mut self.flash, slot, sequence, blob),
-            (Change::Previous, Some(before)) => {
-                let image = Image::read(&mut self.flash, before.slot)?;
-                let blob = image.blob().get(..before.bytes as usize);
-                let blob = blob.unwrap_or_default();
-                store::write(&mut self.flash, slot, sequence, blob)
-            }
-            (Change::Previous, None) => Err(FlashFault::ReadsOtherwise { offset: 0 }),
-        }
-    }
 }
 
 /// Whether a blob, with what follows it or without, is sound and that of the stage.
@@ -198,24 +168,18 @@ fn check(memory: &[u8], serial: Option<&str>) -> Result<(), BlobError> {
     serial.map_or(Ok(()), |serial| set.expect_serial(serial))
 }
 
-const fn kept(stored: Stored) -> Kept {
+const fn id(stored: Stored) -> BlobId {
     let Stored { sequence, crc, .. } = stored;
-    Kept { sequence, crc }
+    BlobId { sequence, crc }
 }
 
 impl<F: Flash> Store for Records<F> {
     fn running(&self) -> Option<Running<'_>> {
         let (stored, loaded) = self.running.as_ref()?;
         Some(Running {
-            slot: stored.slot,
-            sequence: stored.sequence,
-            crc: stored.crc,
+            id: id(*stored),
             bytes: stored.bytes,
-            is_forced: loaded.fit.forced,
             serial: &loaded.serial,
-            created: &loaded.created,
-            rms: loaded.fit.rms,
-            peak: loaded.fit.peak,
         })
     }
 
@@ -225,24 +189,20 @@ impl<F: Flash> Store for Records<F> {
         // An update may have written another one into its slot.
         let is_there = image.stored(stored.slot)?.crc == loaded.crc;
         let blob = image.blob().get(..(stored.bytes as usize).min(MAX_BYTES))?;
-        hal_adapters::can::update::word_of(blob, index).filter(|_| is_there)
+        word_at(blob, index).filter(|_| is_there)
     }
 
-    fn newest(&self) -> Option<Kept> {
-        self.latest(|_| true).map(kept)
-    }
-
-    fn previous(&self) -> Option<Kept> {
-        self.before().map(kept)
+    fn newest(&self) -> Option<BlobId> {
+        self.latest(|_| true).map(id)
     }
 
     fn newest_sequence(&self) -> u32 {
         self.highest
     }
 
-    fn write(&mut self, sequence: u32, change: Change<'_>) -> Result<(), NotWritten> {
+    fn write(&mut self, sequence: u32, blob: &[u8]) -> Result<(), NotWritten> {
         let slot = self.spare();
-        let written = self.try_write(slot, sequence, change);
+        let written = store::write(&mut self.flash, slot, sequence, blob);
         // What a failure has left there is what was there before, or nothing.
         let left = Image::read(&mut self.flash, slot).ok();
         if let Some(to) = self.stored.get_mut(usize::from(slot)) {

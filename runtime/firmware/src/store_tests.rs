@@ -7,7 +7,7 @@ extern crate std;
 use super::flash_model::{Cut, FlashModel, Words};
 use super::*;
 use crate::records::{Choice, Records};
-use hal_adapters::can::update::{Change, Kept, Store};
+use hal_adapters::can::update::{BlobId, Store};
 use runtime::ParameterSet;
 use runtime::parameters::Text;
 use std::vec::Vec;
@@ -52,12 +52,8 @@ fn holding(plain: &[usize], stored: &[usize]) -> FlashModel {
 }
 
 pub(crate) fn update(flash: &mut FlashModel, blob: &[u8]) -> Result<(), NotWritten> {
-    change(flash, Change::Blob(blob))
-}
-
-fn change(flash: &mut FlashModel, change: Change<'_>) -> Result<(), NotWritten> {
     let mut records = start(flash);
-    records.write(records.newest_sequence() + 1, change)
+    records.write(records.newest_sequence() + 1, blob)
 }
 
 /// The CRC of the blob that a start runs.
@@ -69,7 +65,6 @@ fn found(flash: &mut FlashModel) -> Option<u32> {
 struct Scenario {
     name: &'static str,
     flash: FlashModel,
-    back: bool,
     found: [Option<u32>; 2],
 }
 
@@ -96,42 +91,24 @@ fn verify(mut flash: FlashModel, scenario: &Scenario, confirmed: bool, case: &st
 fn after_any_cut_the_old_blob_is_found_or_the_new_one() {
     let of = |number| Some(crc(&blob(number)));
     let new = of(100);
-    let scenario = |name, flash, back, found| Scenario {
-        name,
-        flash,
-        back,
-        found,
-    };
+    let scenario = |name, flash, found| Scenario { name, flash, found };
     let mut damaged = holding(&[], &[1, 2]);
     damaged.seed(5);
     damaged.cut_at(80, Cut::Inside);
     assert!(update(&mut damaged, &blob(3)).is_err());
     let mut total = 0;
     for scenario in [
-        scenario("empty", FlashModel::erased(), false, [None, new]),
-        scenario("a plain blob", holding(&[1], &[]), false, [of(1), new]),
-        scenario(
-            "two plain blobs",
-            holding(&[1, 2], &[]),
-            false,
-            [of(1), new],
-        ),
-        scenario("one stored", holding(&[], &[1]), false, [of(1), new]),
-        scenario("two stored", holding(&[], &[1, 2]), false, [of(2), new]),
+        scenario("empty", FlashModel::erased(), [None, new]),
+        scenario("a plain blob", holding(&[1], &[]), [of(1), new]),
+        scenario("two plain blobs", holding(&[1, 2], &[]), [of(1), new]),
+        scenario("one stored", holding(&[], &[1]), [of(1), new]),
+        scenario("two stored", holding(&[], &[1, 2]), [of(2), new]),
         scenario(
             "stored beside a plain one",
             holding(&[1], &[2]),
-            false,
             [of(2), new],
         ),
-        scenario("a torn one", damaged, false, [of(2), new]),
-        scenario("going back", holding(&[], &[1, 2]), true, [of(2), of(1)]),
-        scenario(
-            "back to a plain one",
-            holding(&[1], &[2]),
-            true,
-            [of(2), of(1)],
-        ),
+        scenario("a torn one", damaged, [of(2), new]),
     ] {
         total += cut_everywhere(&scenario);
     }
@@ -140,13 +117,7 @@ fn after_any_cut_the_old_blob_is_found_or_the_new_one() {
 
 fn cut_everywhere(scenario: &Scenario) -> usize {
     let new = blob(100);
-    let run = |flash: &mut FlashModel| {
-        let wanted = match scenario.back {
-            true => Change::Previous,
-            false => Change::Blob(&new),
-        };
-        change(flash, wanted).is_ok()
-    };
+    let run = |flash: &mut FlashModel| update(flash, &new).is_ok();
     let mut whole = scenario.flash.clone();
     whole.power_on();
     assert!(run(&mut whole));
@@ -257,22 +228,13 @@ fn no_changed_bit_of_a_stored_blob_or_its_number_is_accepted() {
 }
 
 #[test]
-fn what_was_written_is_found_at_the_next_start_and_the_one_before_too() {
+fn a_written_blob_is_found_at_the_next_start() {
     let mut flash = FlashModel::erased();
     for number in 0..20 {
         assert_eq!(update(&mut flash, &blob(number)), Ok(()));
         let records = start(&mut flash);
         let sequence = number as u32 + 1;
-        let kept = |number, sequence| {
-            Some(Kept {
-                sequence,
-                crc: crc(&blob(number)),
-            })
-        };
-        assert_eq!(records.newest(), kept(number, sequence));
-        let before = number
-            .checked_sub(1)
-            .and_then(|before| kept(before, sequence - 1));
-        assert_eq!(records.previous(), before);
+        let crc = crc(&blob(number));
+        assert_eq!(records.newest(), Some(BlobId { sequence, crc }));
     }
 }

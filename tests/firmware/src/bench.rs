@@ -6,7 +6,7 @@ use crate::can_model::Sent;
 use crate::image::Image;
 use crate::machine::Machine;
 use embedded_can::{Frame, Id, StandardId};
-use hal_adapters::can::command::{Answer, Command, IdentityPage, Outcome, Request};
+use hal_adapters::can::command::{Answer, Command, Outcome, Request};
 use hal_adapters::can::e2e::{protect, unprotect};
 use hal_adapters::can::pose::status_to_bus;
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus};
@@ -194,8 +194,6 @@ pub struct Seen {
     pub answers: Vec<Answer>,
     /// Counters.
     pub health: Vec<HealthPage>,
-    /// Text of the identity pages.
-    pub identity: Vec<u8>,
     /// Number and time of ticks, us, by the controller.
     pub times: Vec<(u32, u32)>,
     /// Temperatures of mount and body, m degC, each from its tick on.
@@ -253,10 +251,6 @@ impl Seen {
                 .push((tick, NodeStatus::from_payload(payload))),
             Message::Health => self.health.push(HealthPage::from_payload(payload)),
             Message::Answer => self.answers.push(Answer::from_payload(payload)),
-            Message::Identity => {
-                self.identity
-                    .extend(IdentityPage::from_payload(payload).text);
-            }
             Message::PoseTime | Message::SensorTime => {
                 self.times.push((payload.short, payload.long));
             }

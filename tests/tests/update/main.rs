@@ -1,12 +1,12 @@
-//! A host and a node on one bus, in memory: the host's own script against the firmware's own
-//! node, with a lossy bus, two hosts, resets, and a recording played again.
+//! A host and a node on one bus, in memory: the host's own script against the firmware's own node, with a
+//! bad bus, a second host, resets, and a replayed recording.
 
 mod alone;
 mod hosts;
 mod world;
 
 use hal_adapters::can::update::Key;
-use host_fit::bus::update::{Plan, Wanted};
+use host_fit::bus::update::Plan;
 use runtime::ParameterSet;
 use runtime::blob::MAX_BYTES;
 
@@ -17,18 +17,11 @@ const KEY: Key = *b"a key for a test";
 
 fn plan(blob: &[u8]) -> Plan {
     Plan {
-        wanted: Wanted::Blob(blob.to_vec()),
+        blob: Some(blob.to_vec()),
         serial: Some(SERIAL.to_owned()),
         key: Some(KEY),
         declares_servo_off: true,
         activates: false,
-    }
-}
-
-fn back() -> Plan {
-    Plan {
-        wanted: Wanted::Previous,
-        ..plan(&[])
     }
 }
 
@@ -47,21 +40,16 @@ fn undeclared(plan: Plan) -> Plan {
     }
 }
 
-/// Of the stage that has this serial number, as the user says.
-fn of(serial: Option<&str>, plan: Plan) -> Plan {
+/// For the stage with this serial number.
+fn for_serial(serial: Option<&str>, plan: Plan) -> Plan {
     let serial = serial.map(str::to_owned);
     Plan { serial, ..plan }
 }
 
-/// A sound blob with something changed.
+/// A sound blob with a change.
 fn changed(blob: &[u8], change: impl FnOnce(&mut ParameterSet)) -> Vec<u8> {
     let mut set = ParameterSet::from_bytes(blob).expect("sound");
     change(&mut set);
     let mut buffer = [0; MAX_BYTES];
     set.to_bytes(&mut buffer).expect("it fits").to_vec()
-}
-
-/// A blob of the same length that differs.
-fn like(blob: &[u8]) -> Vec<u8> {
-    changed(blob, |set| set.fit.rows += 1)
 }

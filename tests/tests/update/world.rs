@@ -11,7 +11,7 @@ use tests::flash_model::FlashModel;
 use tests::node::{Node, TAKEN_PER_TICK};
 
 /// The longest frame at 1 Mbit/s, us.
-pub const SLOT_US: u64 = 135;
+const SLOT_US: u64 = 135;
 const TICK_US: u64 = 2_000;
 /// A node is deaf for so long after a reset, us.
 const START_US: u64 = 200_000;
@@ -32,17 +32,17 @@ pub struct World {
     pub to_node: Channel,
     to_hosts: Channel,
     pub now_us: u64,
-    /// Everything that the host sent, and when.
+    /// The frames of the host, and when it sent them.
     pub recording: Vec<(u64, BusFrame)>,
-    /// What another host sends, and when; in the order of time.
+    /// The frames of another host, in the order of time.
     pub others: VecDeque<(u64, BusFrame)>,
-    /// What another host sends as soon as something was stored, and the node hears again.
-    pub once_stored: Option<BusFrame>,
-    /// The user wants the script to end at this frame of the host.
+    /// Another host declares the servo on as soon as a blob was stored and the node hears again.
+    pub declares_on_once_stored: bool,
+    /// The user stops the script at this frame of the host.
     pub interrupt_at: Option<usize>,
     token: u8,
     faults_us: Vec<u64>,
-    /// What the host has yet to hear.
+    /// Frames that the host has not received yet.
     heard: VecDeque<BusFrame>,
     pub overruns: u32,
     /// The node is reset at these times.
@@ -64,7 +64,7 @@ impl World {
             now_us: 0,
             recording: Vec::new(),
             others: VecDeque::new(),
-            once_stored: None,
+            declares_on_once_stored: false,
             interrupt_at: None,
             token: 8,
             faults_us: Vec::new(),
@@ -76,7 +76,7 @@ impl World {
         }
     }
 
-    /// The time from one slot to the next: the node's frames and ticks; what reaches the hosts.
+    /// One slot: the frames and the tick of the node; gives the frames that reach the hosts.
     pub fn slot(&mut self) -> Vec<BusFrame> {
         let tick_before = self.now_us / TICK_US;
         self.now_us += SLOT_US;
@@ -92,10 +92,9 @@ impl World {
         {
             self.deaf_until_us = self.now_us + ERASE_US;
         }
-        if self.node.records() > 0
-            && let Some(frame) = self.once_stored.take()
-        {
-            self.others.push_back((self.deaf_until_us, frame));
+        if self.node.records() > 0 && core::mem::take(&mut self.declares_on_once_stored) {
+            let on = command(Request::ServoOff { seconds: 0 }, 4, 1);
+            self.others.push_back((self.deaf_until_us, on));
         }
         while let Some((_, frame)) = self.others.pop_front_if(|(at, _)| *at <= self.now_us) {
             self.to_node.send(self.now_us, frame);
@@ -163,8 +162,8 @@ impl World {
     }
 }
 
-/// A frame with a request, by another host's count of frames.
-pub fn command(request: Request, token: u8, counter: usize) -> BusFrame {
+/// A frame with a request and the counter of another host.
+fn command(request: Request, token: u8, counter: usize) -> BusFrame {
     let mut mailbox = Mailbox::default();
     let content = Content::Command(Command::new(request, token));
     let frames = (0..=counter).map(|_| mailbox.send(&content));

@@ -1,13 +1,13 @@
-//! Who may move the pose, make it invalid, or reset: whoever knows the key of the stage.
+//! Authority: whoever knows the key of the stage may move the pose, invalidate it, or reset the node.
 //!
-//! The tag is AES-CMAC (NIST SP 800-38B, RFC 4493) over whole blocks of 16 bytes: a domain, the
-//! nonce, the blob padded with zeros, and a last block of four words: those of the command
-//! ([`Command::payload`], number and token first), the blob's length in bytes, and its CRC-32C. A
-//! command other than a commit has no blob, and two zeros; a commit that goes back has the CRC-32C of
-//! the blob to go back to. Numbers are words of 32 bits, lowest byte first. The construction stands here, on the
-//! block cipher of a library: over whole blocks it is a few lines, and they cannot panic. (The crate
+//! The tag is AES-CMAC (NIST SP 800-38B, RFC 4493) over whole blocks of 16 bytes: a domain, the nonce, the
+//! blob padded with zeros, and a last block of four words. These are the two words of the command
+//! ([`Command::payload`], number and token first), the length of the blob in bytes, and its CRC-32C; the last
+//! two are zero for a command without a blob. Words have 32 bits, lowest byte first. CMAC is written here on
+//! the block cipher of a library: over whole blocks it takes a few lines, and they cannot panic. (The crate
 //! `cmac` 0.8.0 can, as the linker shows at opt-level "s".)
 
+use super::staging::blob_crc;
 use crate::can::command::Command;
 use crate::can::e2e::Payload;
 use aes::Aes128Enc;
@@ -16,20 +16,19 @@ use aes::cipher::{BlockCipherEncrypt, KeyInit};
 /// A key of AES-128, one for each stage.
 pub type Key = [u8; 16];
 
-/// A number used once: random, drawn by the node for each tag.
+/// A number used once: the node draws it at random for each tag.
 pub type Nonce = [u32; 4];
 
-/// Bytes of a tag: all that AES-CMAC gives.
+/// Bytes of a tag: the whole output of AES-CMAC.
 pub const TAG_BYTES: usize = BLOCK;
 
 /// Bytes of a block of AES.
-pub(super) const BLOCK: usize = 16;
+const BLOCK: usize = 16;
 
-/// First block under every tag, so that a tag made with the same key for anything else is none of
-/// these.
+/// First block under every tag: a tag that the same key made for another purpose is not accepted here.
 const DOMAIN: [u8; BLOCK] = *b"hall-requests-v2";
 
-/// A tag that came, and the number that it must be over.
+/// A tag from a host, and the nonce that it must answer.
 #[derive(Clone, Debug)]
 pub(super) struct Tag {
     pub(super) nonce: Nonce,
@@ -37,19 +36,13 @@ pub(super) struct Tag {
 }
 
 impl Tag {
-    /// Whether it is that of this command; `blob` and `crc` as in [`tag`]. Without a key any is.
-    pub(super) fn is_of(
-        &self,
-        key: Option<&Key>,
-        command: &Command,
-        blob: &[u8],
-        crc: u32,
-    ) -> bool {
+    /// Whether this is the tag of a command and its blob. Without a key every tag is.
+    pub(super) fn matches(&self, key: Option<&Key>, command: &Command, blob: &[u8]) -> bool {
         let Some(key) = key else {
             return true;
         };
-        let own = tag(key, &self.nonce, command, blob, crc);
-        // In a time that does not depend on where they differ.
+        let own = tag(key, &self.nonce, command, blob);
+        // In constant time.
         u128::from_le_bytes(own) ^ u128::from_le_bytes(self.bytes) == 0
     }
 }
@@ -64,7 +57,7 @@ const fn in_one_block([a, b, c, d]: [u32; 4]) -> u128 {
     (d as u128) << 96 | (c as u128) << 64 | (b as u128) << 32 | a as u128
 }
 
-/// AES-CMAC over whole blocks, of which the last comes by itself.
+/// AES-CMAC over whole blocks; `last` is the last one.
 fn cmac(key: &Key, blocks: impl Iterator<Item = u128>, last: u128) -> [u8; TAG_BYTES] {
     let cipher = Aes128Enc::new(&(*key).into());
     let chain = blocks.fold(0, |chain, block| encrypt(&cipher, chain ^ block));
@@ -75,9 +68,8 @@ fn cmac(key: &Key, blocks: impl Iterator<Item = u128>, last: u128) -> [u8; TAG_B
     encrypt(&cipher, chain ^ last ^ k1).to_le_bytes()
 }
 
-/// The tag that a host sends before a command. `blob` and `crc` are those of what a commit stores:
-/// without a blob it goes back to the one of this CRC. For any other command both are empty.
-pub fn tag(key: &Key, nonce: &Nonce, command: &Command, blob: &[u8], crc: u32) -> [u8; TAG_BYTES] {
+/// The tag of a command. `blob` is the blob of a commit, and empty for any other command.
+pub fn tag(key: &Key, nonce: &Nonce, command: &Command, blob: &[u8]) -> [u8; TAG_BYTES] {
     let head = [u128::from_le_bytes(DOMAIN), in_one_block(*nonce)];
     let padded = blob.chunks(BLOCK).map(|bytes| {
         let mut block = [0; BLOCK];
@@ -88,7 +80,7 @@ pub fn tag(key: &Key, nonce: &Nonce, command: &Command, blob: &[u8], crc: u32) -
     });
     let Payload { short, long } = command.payload();
     let bytes = u32::try_from(blob.len()).unwrap_or(u32::MAX);
-    let last = in_one_block([short, long, bytes, crc]);
+    let last = in_one_block([short, long, bytes, blob_crc(blob).unwrap_or(0)]);
     cmac(key, head.into_iter().chain(padded), last)
 }
 
@@ -106,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_that_of_another_implementation_for_any_length() {
+    fn the_tag_equals_another_implementation_for_any_length() {
         for bytes in 0..200_u32 {
             let key = [bytes as u8 ^ 0x5a; 16];
             let nonce = [bytes, 0x8000_0001, !bytes, 7];
@@ -120,40 +112,41 @@ mod tests {
                 .for_each(|word| other.update(&word.to_le_bytes()));
             other.update(&padded);
             // Commit is command 9; the token stands above the four bits of the number.
-            for word in [0xab9, bytes + 1, bytes, !bytes] {
+            let crc = blob_crc(&blob).unwrap_or(0);
+            for word in [0xab9, bytes + 1, bytes, crc] {
                 other.update(&word.to_le_bytes());
             }
             let want: [u8; 16] = other.finalize().into_bytes().into();
-            assert_eq!(tag(&key, &nonce, &commit(bytes + 1), &blob, !bytes), want);
+            assert_eq!(tag(&key, &nonce, &commit(bytes + 1), &blob), want);
         }
     }
 
     #[test]
-    fn every_input_changes_the_tag_and_no_other_is_taken() {
+    fn every_input_changes_the_tag_and_no_other_is_accepted() {
         let (key, nonce, blob) = ([7; 16], [1, 2, 3, 4], [5; 100]);
-        let want = tag(&key, &nonce, &commit(9), &blob, 6);
-        let is_taken = |bytes| Tag { nonce, bytes }.is_of(Some(&key), &commit(9), &blob, 6);
-        assert!(is_taken(want));
+        let want = tag(&key, &nonce, &commit(9), &blob);
+        let is_accepted = |bytes| Tag { nonce, bytes }.matches(Some(&key), &commit(9), &blob);
+        assert!(is_accepted(want));
         for bit in 0..128 {
             let wrong = u128::from_le_bytes(want) ^ 1 << bit;
-            assert!(!is_taken(wrong.to_le_bytes()));
+            assert!(!is_accepted(wrong.to_le_bytes()));
         }
-        assert_ne!(tag(&[8; 16], &nonce, &commit(9), &blob, 6), want);
-        assert_ne!(tag(&key, &[1, 2, 3, 5], &commit(9), &blob, 6), want);
-        assert_ne!(tag(&key, &nonce, &commit(10), &blob, 6), want);
-        let (other_token, other_request) = (
-            Command {
-                token: 0xac,
-                ..commit(9)
-            },
-            Command::new(Request::ServoOff { seconds: 9 }, 0xab),
-        );
-        assert_ne!(tag(&key, &nonce, &other_token, &blob, 6), want);
-        assert_ne!(tag(&key, &nonce, &other_request, &blob, 6), want);
-        assert_ne!(tag(&key, &nonce, &commit(9), &blob[..99], 6), want);
-        assert_ne!(tag(&key, &nonce, &commit(9), &blob, 7), want);
-        // Of equal blocks, too, the length is part of it.
-        let of_zeros = |bytes| tag(&key, &nonce, &commit(9), &[0; 4][..bytes], 6);
-        assert_ne!(of_zeros(3), of_zeros(4));
+        let other_token = Command {
+            token: 0xac,
+            ..commit(9)
+        };
+        let other_request = Command::new(Request::ServoOff { seconds: 9 }, 0xab);
+        for (key, nonce, command, blob) in [
+            ([8; 16], nonce, commit(9), &blob[..]),
+            (key, [1, 2, 3, 5], commit(9), &blob),
+            (key, nonce, commit(10), &blob),
+            (key, nonce, other_token, &blob),
+            (key, nonce, other_request, &blob),
+            (key, nonce, commit(9), &blob[..99]),
+            // The padded blocks are equal.
+            (key, nonce, commit(9), &[&blob[..], &[0]].concat()),
+        ] {
+            assert_ne!(tag(&key, &nonce, &command, blob), want);
+        }
     }
 }

@@ -1,6 +1,6 @@
 extern crate std;
 
-use super::super::{Kept, Key, Running, TAG_BYTES, TAG_INDEX, page, tag, word_of};
+use super::super::{BlobId, Key, Running, TAG_BYTES, TAG_INDEX, page, tag, word_at};
 use super::*;
 use crate::can::command::{Command, Content, Mailbox, Request};
 use crate::can::service::{Service, Updates};
@@ -24,87 +24,41 @@ struct Bench {
     nonce: u32,
 }
 
-/// Keeps the newest blob and the one before, and runs what was newest at the last reset. Every write
-/// must be of the new blob or of the one before, under the next number.
+/// Runs the old blob. Every write must be of the new blob under the next number.
 struct Watched {
-    newest: (u32, Vec<u8>),
-    previous: Option<(u32, Vec<u8>)>,
-    running: Option<(u32, Vec<u8>, ParameterSet)>,
-    writes: u32,
+    runs: bool,
+    newest: (u32, &'static [u8]),
     fails: Option<NotWritten>,
-}
-
-impl Watched {
-    fn new() -> Self {
-        let mut store = Self {
-            newest: (3, OLD.to_vec()),
-            previous: None,
-            running: None,
-            writes: 0,
-            fails: None,
-        };
-        store.reset();
-        store
-    }
-
-    fn reset(&mut self) {
-        let (sequence, blob) = self.newest.clone();
-        let set = ParameterSet::from_bytes(&blob).expect("sound");
-        self.running = Some((sequence, blob, set));
-    }
-}
-
-fn kept((sequence, blob): &(u32, Vec<u8>)) -> Option<Kept> {
-    let (sequence, crc) = (*sequence, crc_of(blob)?);
-    Some(Kept { sequence, crc })
 }
 
 impl Store for Watched {
     fn running(&self) -> Option<Running<'_>> {
-        let (sequence, blob, set) = self.running.as_ref()?;
-        Some(Running {
-            slot: 0,
-            sequence: *sequence,
-            crc: crc_of(blob)?,
-            bytes: blob.len() as u32,
-            is_forced: set.fit.forced,
-            serial: &set.serial,
-            created: &set.created,
-            rms: set.fit.rms,
-            peak: set.fit.peak,
+        let crc = blob_crc(OLD)?;
+        self.runs.then_some(Running {
+            id: BlobId { sequence: 3, crc },
+            bytes: OLD.len() as u32,
+            serial: SERIAL,
         })
     }
 
     fn word(&mut self, index: usize) -> Option<u32> {
-        word_of(&self.running.as_ref()?.1, index)
+        word_at(OLD, index).filter(|_| self.runs)
     }
 
-    fn newest(&self) -> Option<Kept> {
-        kept(&self.newest)
-    }
-
-    fn previous(&self) -> Option<Kept> {
-        kept(self.previous.as_ref()?)
+    fn newest(&self) -> Option<BlobId> {
+        let (sequence, blob) = self.newest;
+        let crc = blob_crc(blob)?;
+        Some(BlobId { sequence, crc })
     }
 
     fn newest_sequence(&self) -> u32 {
         self.newest.0
     }
 
-    fn write(&mut self, sequence: u32, change: Change<'_>) -> Result<(), NotWritten> {
-        assert_eq!(sequence, self.newest_sequence() + 1);
-        let blob = match change {
-            Change::Blob(blob) => {
-                assert_eq!(blob, NEW);
-                blob.to_vec()
-            }
-            Change::Previous => self.previous.clone().expect("one before").1,
-        };
-        if let Some(why) = self.fails {
-            return Err(why);
-        }
-        self.previous = Some(core::mem::replace(&mut self.newest, (sequence, blob)));
-        self.writes += 1;
+    fn write(&mut self, sequence: u32, blob: &[u8]) -> Result<(), NotWritten> {
+        assert_eq!((sequence, blob), (self.newest_sequence() + 1, NEW));
+        self.fails.map_or(Ok(()), Err)?;
+        self.newest = (sequence, NEW);
         Ok(())
     }
 }
@@ -115,12 +69,15 @@ impl Bench {
             serial: Some(SERIAL),
             key,
             program_version: 0x010203,
-            program_hash: 0xfeed,
         };
         Self {
             service: Service::new(TICKS_PER_S),
             receiver: Receiver::new(identity, TICKS_PER_S),
-            store: Watched::new(),
+            store: Watched {
+                runs: true,
+                newest: (3, OLD),
+                fails: None,
+            },
             host: Mailbox::default(),
             nonce: 0,
         }
@@ -134,9 +91,9 @@ impl Bench {
             store: &mut self.store,
             nonce: Some(nonce),
         };
-        let taken =
-            self.service
-                .take_updating(frame, None::<&mut runtime::PoseTracker>, Some(updates))?;
+        let taken = self
+            .service
+            .take(frame, None::<&mut runtime::PoseTracker>, Some(updates))?;
         taken.ok()?.answer
     }
 
@@ -168,10 +125,7 @@ impl Bench {
     fn ask_tagged(&mut self, request: Request, token: u8) -> (Outcome, u32) {
         if self.receiver.has_key() {
             let nonce = self.nonce();
-            self.tag(
-                token,
-                tag(&KEY, &nonce, &Command::new(request, token), &[], 0),
-            );
+            self.tag(token, tag(&KEY, &nonce, &Command::new(request, token), &[]));
         }
         self.ask(request, token)
     }
@@ -188,7 +142,7 @@ impl Bench {
 
     fn blob(&mut self, token: u8, blob: &[u8]) {
         for index in (0..blob.len().div_ceil(4)).rev() {
-            self.data(token, index as u8, word_of(blob, index).expect("within"));
+            self.data(token, index as u8, word_at(blob, index).expect("within"));
         }
     }
 
@@ -201,7 +155,7 @@ impl Bench {
 
     fn tag(&mut self, token: u8, tag: [u8; TAG_BYTES]) {
         for index in 0..4 {
-            let word = word_of(&tag, index).expect("four words");
+            let word = word_at(&tag, index).expect("four words");
             self.data(token, TAG_INDEX + index as u8, word);
         }
     }
@@ -237,11 +191,11 @@ impl Bench {
 
     /// Everything up to the commit, with the right tag for `sequence`.
     fn transfer(&mut self, token: u8, blob: &[u8], sequence: u32) {
-        let previous = self.store.previous().map(|kept| kept.crc);
-        let crc = crc_of(blob).or(previous).expect("a blob, or one before");
-        let begin = UpdateRequest::begin(blob.len(), crc);
-        let begun = (Outcome::Done, begin.argument());
-        assert_eq!(self.update_tagged(begin, token), begun);
+        let bytes = blob.len() as u16;
+        assert_eq!(
+            self.update_tagged(UpdateRequest::Begin { bytes }, token),
+            DONE
+        );
         let nonce = self.nonce();
         self.blob(token, blob);
         if self.receiver.identity.key.is_some() {
@@ -249,14 +203,15 @@ impl Bench {
             assert_eq!(self.update(commit(sequence), token), incomplete);
         }
         let command = Command::new(Request::Update(commit(sequence)), token);
-        self.tag(token, tag(&KEY, &nonce, &command, blob, crc));
+        self.tag(token, tag(&KEY, &nonce, &command, blob));
     }
 }
 
 const DONE: (Outcome, u32) = (Outcome::Done, 0);
 const STARTED: (Outcome, u32) = (Outcome::Started, 0);
-const BEGIN: UpdateRequest = UpdateRequest::begin(NEW.len(), NEW_CRC);
-const BEGUN: (Outcome, u32) = (Outcome::Done, BEGIN.argument());
+const BEGIN: UpdateRequest = UpdateRequest::Begin {
+    bytes: NEW.len() as u16,
+};
 const NEW_DONE: (Outcome, u32) = (Outcome::Done, NEW_CRC);
 const NEW_CRC: u32 = match NEW {
     [.., a, b, c, d] => u32::from_le_bytes([*a, *b, *c, *d]),

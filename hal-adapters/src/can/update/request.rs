@@ -1,54 +1,42 @@
-//! What a host asks of a node about its parameters, and the frames that carry a blob.
+//! Requests about the parameters, and the frames that carry a blob.
 
 use super::super::e2e::Payload;
 
 /// A request about the parameters: commands 6 to 14.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UpdateRequest {
-    /// A word of the open transfer's nonce: the detail of the answer.
+    /// Asks for a word of the nonce: the detail of the answer.
     Challenge {
-        /// Which, 0 to 3.
+        /// Which word, 0 to 3; word 0 draws a new nonce.
         part: u8,
     },
-    /// Opens a transfer, whose token this command's becomes.
+    /// Opens a transfer under the token of this command.
     Begin {
-        /// Length of the blob, 1 to [`runtime::blob::MAX_BYTES`]; 0 for no blob: the commit then
-        /// goes back to the blob before the newest.
+        /// Length of the blob, 1 to [`runtime::blob::MAX_BYTES`].
         bytes: u16,
-        /// The low half of its CRC-32C, or of that of the blob to go back to: another one is
-        /// not stored.
-        check: u16,
     },
-    /// Checks what was transferred, and stores it.
+    /// Checks the transferred blob and stores it.
     Commit {
-        /// Sequence number that it will have: one above the highest in the store.
+        /// Its sequence number: one above the highest in the store.
         sequence: u32,
     },
     /// Closes the transfer; nothing is stored.
     Abort,
-    /// Resets the node, which then runs the newest blob. Acknowledges that it stopped.
+    /// Resets the node, which then runs the newest blob. Acknowledges that the node stopped.
     Activate,
-    /// A word of the blob that runs: the detail of the answer.
+    /// Asks for a word of the blob that runs: the detail of the answer.
     ReadBack {
-        /// Which, from 0; the last is padded with zeros.
+        /// Which word, from 0; the last one is padded with zeros.
         index: u8,
     },
-    /// A fact of the node: the detail of the answer.
+    /// Asks for a fact of the node: the detail of the answer.
     Tell {
-        /// Which; see [`super::page`].
+        /// Which fact; see [`super::page`].
         page: u8,
     },
 }
 
 impl UpdateRequest {
-    /// Opens a transfer of `bytes` bytes whose CRC-32C is `crc`.
-    pub const fn begin(bytes: usize, crc: u32) -> Self {
-        Self::Begin {
-            bytes: bytes as u16,
-            check: crc as u16,
-        }
-    }
-
     /// Number of the command in the frame.
     pub const fn number(&self) -> u8 {
         match self {
@@ -68,7 +56,7 @@ impl UpdateRequest {
             Self::Challenge { part: byte }
             | Self::ReadBack { index: byte }
             | Self::Tell { page: byte } => byte as u32,
-            Self::Begin { bytes, check } => (check as u32) << 16 | bytes as u32,
+            Self::Begin { bytes } => bytes as u32,
             Self::Commit { sequence } => sequence,
             Self::Abort | Self::Activate => 0,
         }
@@ -79,10 +67,9 @@ impl UpdateRequest {
         let byte = u8::try_from(argument).ok();
         match (number, argument) {
             (6, 0..4) => byte.map(|part| Self::Challenge { part }),
-            (7, _) => Some(Self::Begin {
-                bytes: argument as u16,
-                check: (argument >> 16) as u16,
-            }),
+            (7, _) => u16::try_from(argument)
+                .ok()
+                .map(|bytes| Self::Begin { bytes }),
             (9, sequence) => Some(Self::Commit { sequence }),
             (10, 0) => Some(Self::Abort),
             (11, 0) => Some(Self::Activate),

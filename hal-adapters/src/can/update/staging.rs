@@ -1,4 +1,4 @@
-//! A blob and its tag in RAM, as they come.
+//! A blob and its tag in RAM while their words arrive.
 
 use super::authentication::TAG_BYTES;
 use runtime::blob::{CRC_BYTES, MAX_BYTES};
@@ -8,30 +8,31 @@ pub(super) const WORD: usize = 4;
 /// Words of the largest blob.
 const WORDS_MAX: usize = MAX_BYTES.div_ceil(WORD);
 const TAG_WORDS: usize = TAG_BYTES / WORD;
-/// Words that are noted as there: those of a blob, then those of the tag.
+/// Words of a blob and of its tag.
 const NOTED: usize = WORDS_MAX + TAG_WORDS;
 
 /// Index of the tag's first word.
 pub const TAG_INDEX: u8 = 240;
 const _: () = assert!(WORDS_MAX <= TAG_INDEX as usize);
 
-/// Words that came, and which.
+/// The words that arrived, and which.
 #[derive(Clone, Debug)]
 pub(super) struct Staging {
     blob: [[u8; WORD]; WORDS_MAX],
     tag: [[u8; WORD]; TAG_WORDS],
+    /// One bit for each word of the blob, then for each of the tag.
     there: [u8; NOTED.div_ceil(8)],
 }
 
 impl Staging {
-    /// Nothing came yet.
+    /// No word yet.
     pub(super) const EMPTY: Self = Self {
         blob: [[0; WORD]; WORDS_MAX],
         tag: [[0; WORD]; TAG_WORDS],
         there: [0; NOTED.div_ceil(8)],
     };
 
-    /// Forgets what came.
+    /// Forgets all words.
     pub(super) const fn clear(&mut self) {
         *self = Self::EMPTY;
     }
@@ -43,11 +44,11 @@ impl Staging {
         }
     }
 
-    /// Keeps a word of a blob of `bytes` bytes, or of the tag. Any other index is ignored.
+    /// Keeps a word of a blob of `bytes` bytes, or of the tag. Ignores any other index.
     pub(super) fn put(&mut self, index: u8, word: u32, bytes: usize) {
         let k = usize::from(index);
-        let of_tag = k.checked_sub(usize::from(TAG_INDEX));
-        let (to, noted) = match of_tag {
+        let in_tag = k.checked_sub(usize::from(TAG_INDEX));
+        let (to, noted) = match in_tag {
             Some(k) => (self.tag.get_mut(k), WORDS_MAX + k),
             None if k < bytes.div_ceil(WORD) => (self.blob.get_mut(k), k),
             None => return,
@@ -74,7 +75,7 @@ impl Staging {
         there.is_some_and(|bits| bits >> (noted % 8) & 1 == 1)
     }
 
-    /// Index of the first word that a blob of `bytes` bytes, with its tag or without, still lacks.
+    /// Index of the first missing word of a blob of `bytes` bytes, and of its tag if `with_tag`.
     pub(super) fn missing(&self, bytes: usize, with_tag: bool) -> Option<u8> {
         let blob = (0..bytes.div_ceil(WORD)).map(|k| (k, k));
         let tag = (0..TAG_WORDS).map(|k| (usize::from(TAG_INDEX) + k, WORDS_MAX + k));
@@ -100,15 +101,15 @@ impl Staging {
     }
 }
 
-/// The CRC-32C that a blob carries as its last bytes.
-pub fn crc_of(blob: &[u8]) -> Option<u32> {
+/// The CRC-32C in the last bytes of a blob.
+pub fn blob_crc(blob: &[u8]) -> Option<u32> {
     blob.last_chunk::<CRC_BYTES>()
         .copied()
         .map(u32::from_le_bytes)
 }
 
-/// A word of `bytes`, the last one padded with zeros.
-pub fn word_of(bytes: &[u8], index: usize) -> Option<u32> {
+/// Word `index` of `bytes`; the last one is padded with zeros.
+pub fn word_at(bytes: &[u8], index: usize) -> Option<u32> {
     let chunk = bytes.chunks(WORD).nth(index)?;
     let mut word = [0; WORD];
     for (to, from) in word.iter_mut().zip(chunk) {

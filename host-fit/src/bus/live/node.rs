@@ -1,4 +1,4 @@
-//! The decoding node, without a bus and without a clock: frames and times in, frames out.
+//! The decoding node without a bus and a clock: frames and times in, frames out.
 
 use hal_adapters::can::command::{Command, Content};
 use hal_adapters::can::status::{HealthPage, NodeState, NodeStatus};
@@ -9,43 +9,42 @@ use hal_adapters::can::{
 };
 use runtime::{AnyDecoder, OnInvalid, PoseTracker, RawFrame, Reading, Status};
 
-/// Ticks of a second: while the sensors are silent the node publishes at this rate.
+/// Ticks per second. The node publishes at this rate while the sensors are silent.
 const TICKS_PER_S: u32 = 1_000_000 / SILENT_US;
 /// Time from pose to pose while the sensors are silent, us.
 const SILENT_US: u32 = 2_000;
 
-/// How a node is set up.
+/// The settings of a node.
 #[derive(Clone, Copy, Debug)]
 pub struct NodeSettings {
-    /// How codes come.
+    /// The layout of the codes.
     pub layout: Layout,
-    /// When ticks are given up and the sensors are stale.
+    /// Time limits for incomplete ticks and silent sensors.
     pub timing: Timing,
-    /// What an invalid field reads.
+    /// The value of an invalid field.
     pub on_invalid: OnInvalid,
-    /// Every how many ticks each vertical axis is sent.
+    /// Ticks between two frames of a vertical axis.
     pub vertical_ticks: u8,
 }
 
-/// What a frame, or the passing of time, led to.
+/// The result of a frame, or of time that passed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Step {
-    /// The tick that was decoded, as received and as decoded.
+    /// A tick, as received and as decoded.
     pub tick: Option<(RawFrame, Reading)>,
-    /// What is wrong with the bus.
+    /// A fault of the bus.
     pub fault: Option<BusFault>,
-    /// A request that came.
+    /// A request.
     pub command: Option<Command>,
 }
 
 /// A decoding node.
 #[derive(Debug)]
-pub struct Node<'d> {
+pub struct Node {
     receiver: SensorReceiver,
     tracker: PoseTracker,
     poses: PoseSender,
     service: Service,
-    serial: &'d str,
     ticks: u32,
 }
 
@@ -54,15 +53,14 @@ const NO_FRAMES: Status = Status::PLANAR_INVALID
     .with(Status::VERTICAL_INVALID)
     .with(Status::FRAMES_MISSED);
 
-impl<'d> Node<'d> {
-    /// A node that has seen nothing; `serial` is its answer when asked who it is.
-    pub fn new(decoder: AnyDecoder, serial: &'d str, settings: &NodeSettings) -> Self {
+impl Node {
+    /// A node before its first frame.
+    pub fn new(decoder: AnyDecoder, settings: &NodeSettings) -> Self {
         Self {
             receiver: SensorReceiver::new(settings.layout, settings.timing),
             tracker: PoseTracker::new(decoder, settings.on_invalid),
             poses: PoseSender::new(settings.vertical_ticks),
             service: Service::new(TICKS_PER_S),
-            serial,
             ticks: 0,
         }
     }
@@ -74,15 +72,11 @@ impl<'d> Node<'d> {
         messages
     }
 
-    /// Takes one frame; what is to be sent is added to `out`.
+    /// Takes one frame, and adds the frames to send to `out`.
     pub fn take(&mut self, frame: &StampedFrame, out: &mut Vec<Coded>) -> Step {
-        match self.service.take(&frame.frame, Some(&mut self.tracker)) {
+        match (self.service).take(&frame.frame, Some(&mut self.tracker), None) {
             Some(Ok(answered)) => {
                 out.extend(answered.answer);
-                // A controller spreads the pages over ticks, for its three mailboxes.
-                out.extend(core::iter::from_fn(|| {
-                    self.service.identity_page(self.serial)
-                }));
                 return Step {
                     command: Some(answered.command),
                     ..Step::default()
@@ -96,7 +90,7 @@ impl<'d> Node<'d> {
             }
             None => {}
         }
-        // The receiver's times wrap after 71 minutes, as those of a controller do.
+        // The receiver's times wrap after 71 minutes, as on a controller.
         let taken = self.receiver.take(&frame.frame, frame.time_us as u32);
         self.step(taken.tick, taken.fault, out)
     }
@@ -114,8 +108,7 @@ impl<'d> Node<'d> {
         self.step(taken.tick, taken.fault, out)
     }
 
-    /// How long to wait for a frame before [`Node::poll`] has something to say, us; `None`
-    /// before the first frame.
+    /// How long to wait for a frame before the next [`Node::poll`], us; `None` before the first frame.
     pub fn patience_us(&self, time_us: u64) -> Option<u32> {
         if self.receiver.is_stale() {
             return Some(SILENT_US);
@@ -144,13 +137,13 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// Pose frames, every sixteenth time state and a counter, and the answer that is due.
+    /// Adds the pose frames, every sixteenth time a state and a counter, and the answer of a re-zero.
     fn publish(&mut self, reading: &Reading, sampled: Option<&RawFrame>, out: &mut Vec<Coded>) {
         out.extend(self.poses.frames(reading, sampled));
         if self.ticks.is_multiple_of(u32::from(SLOW_TICKS)) {
             let round = self.ticks / u32::from(SLOW_TICKS);
             let status = Content::Status(self.status());
-            let health = Content::Health(HealthPage::of(&self.tracker.health(), None, round));
+            let health = Content::Health(HealthPage::new(&self.tracker.health(), None, round));
             out.extend([status, health].iter().filter_map(|t| self.service.send(t)));
         }
         out.extend(self.service.tick(Some(&self.tracker)));

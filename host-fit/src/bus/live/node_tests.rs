@@ -37,7 +37,7 @@ fn stamped(coded: Coded, time_us: u64) -> StampedFrame {
 }
 
 /// Feeds one tick; gives what the node sent.
-fn feed(node: &mut Node<'_>, frame: &RawFrame) -> Vec<Coded> {
+fn feed(node: &mut Node, frame: &RawFrame) -> Vec<Coded> {
     let mut out = Vec::new();
     for coded in sensor::frames(Layout::Bits16, frame) {
         node.take(&stamped(coded, u64::from(frame.time_us)), &mut out);
@@ -56,7 +56,7 @@ fn contents(node_sent: &[Coded], mailbox: &mut Mailbox) -> Vec<Content> {
 #[test]
 fn the_published_pose_has_the_bits_of_the_decoder() {
     let decoder = decoder();
-    let mut node = Node::new(decoder, "", &SETTINGS);
+    let mut node = Node::new(decoder, &SETTINGS);
     let mut tracker = PoseTracker::new(decoder, OnInvalid::Zero);
     let mut receiver = PoseReceiver::new(SETTINGS.timing);
     for sequence in 3..500 {
@@ -76,7 +76,7 @@ fn the_published_pose_has_the_bits_of_the_decoder() {
 #[test]
 fn a_silent_bus_is_published_as_invalid_until_frames_come_again() {
     let decoder = decoder();
-    let mut node = Node::new(decoder, "", &SETTINGS);
+    let mut node = Node::new(decoder, &SETTINGS);
     feed(&mut node, &raw(1));
     let mut out = Vec::new();
     assert_eq!(node.patience_us(4_500), Some(500));
@@ -98,7 +98,7 @@ fn a_silent_bus_is_published_as_invalid_until_frames_come_again() {
 #[test]
 fn a_re_zero_at_rest_is_done_while_the_servo_is_off() {
     let decoder = decoder();
-    let mut node = Node::new(decoder, "", &SETTINGS);
+    let mut node = Node::new(decoder, &SETTINGS);
     let (mut host, mut out) = (Mailbox::default(), Vec::new());
     for (token, request) in (1..).zip([
         Request::Rezero { ticks: 250 },

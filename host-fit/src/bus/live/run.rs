@@ -51,7 +51,7 @@ pub fn run(settings: &LiveSettings) -> Result<(), LiveError> {
     let stop = interrupt::watch();
     let decoder = set.decoder();
     let mut session = Session {
-        node: Node::new(decoder, &set.serial, &node),
+        node: Node::new(decoder, &node),
         bus,
         address: &settings.can,
         record,
@@ -98,7 +98,7 @@ fn check_serial(set: &ParameterSet, settings: &LiveSettings) -> Result<(), LiveE
 }
 
 struct Session<'d> {
-    node: Node<'d>,
+    node: Node,
     bus: Bus,
     address: &'d BusAddress,
     record: Option<RecordFile>,

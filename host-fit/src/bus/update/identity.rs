@@ -1,158 +1,89 @@
-//! Who a node is, asked page by page, and the blob that it runs.
+//! The identity of a node, asked page by page, and the blob that it runs.
 
 use super::UpdateError;
 use super::talk::{Link, Talk, page as tell};
 use hal_adapters::can::command::{Outcome, Request};
-use hal_adapters::can::update::{Kept, UpdateRequest, crc_of, page};
+use hal_adapters::can::update::{BlobId, UpdateRequest, blob_crc, page};
 use runtime::ParameterSet;
 use runtime::blob::MAX_BYTES;
 
-/// What a node says about itself.
+/// The answers of a node to [`identify`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identity {
-    /// Serial number of its stage; empty if it knows none.
+    /// Serial number of its stage; empty without one.
     pub serial: String,
-    /// The parameters that it runs, if any.
-    pub running: Option<RunningParameters>,
-    /// The highest sequence number of any blob in its store, of one that is refused too; 0 if
-    /// there is none.
+    /// The blob that runs, and its length in bytes.
+    pub running: Option<(BlobId, u32)>,
+    /// The highest sequence number in its store, refused blobs included; 0 for none.
     pub newest_sequence: u32,
-    /// The blob that runs once it is activated or after power-on, if there is one.
-    pub next: Option<Kept>,
-    /// The blob before, to which it can go back.
-    pub previous: Option<Kept>,
+    /// The blob that runs after an activation or power-on.
+    pub next: Option<BlobId>,
     /// Version of its program: major, minor, patch.
     pub program_version: [u8; 3],
-    /// Hash of its program.
-    pub program_hash: u32,
     /// Whether an update must be authorised by the stage's key.
     pub needs_key: bool,
-    /// Number of the [`Outcome`] that ended the last transfer since its reset.
-    pub last_update: Option<u8>,
 }
 
-/// The parameters that a node runs.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RunningParameters {
-    /// Where they lie: number of the slot.
-    pub slot: u8,
-    /// Whether the fit was refused and written all the same.
-    pub forced: bool,
-    /// Sequence number; 0 for a blob that a probe has flashed.
-    pub sequence: u32,
-    /// CRC-32C of the blob.
-    pub crc: u32,
-    /// Length of the blob, bytes.
-    pub bytes: u32,
-    /// When they were made, as given by the user; empty if not given.
-    pub created: String,
-    /// rms error of X, Y, Rz of the fit: m, m, rad.
-    pub rms: [f32; 3],
-    /// Peak error of X, Y, Rz of the fit: m, m, rad.
-    pub peak: [f32; 3],
-}
-
-impl RunningParameters {
-    /// Whether these are the parameters of `blob`, by length and check.
-    pub fn are(&self, blob: &[u8]) -> bool {
-        (Some(self.crc), self.bytes as usize) == (crc_of(blob), blob.len())
-    }
-}
-
-/// The pages of a node, as they come.
-#[derive(Clone, Debug, Default)]
-struct Pages {
-    /// `None`: the node has no parameters, and so no such page.
-    words: Vec<Option<u32>>,
-}
-
-impl Pages {
-    fn word(&self, page: u8) -> Option<u32> {
-        self.words.get(usize::from(page)).copied().flatten()
-    }
-
-    fn three(&self, first: u8) -> Option<[f32; 3]> {
-        let [x, y, rz] = [first, first + 1, first + 2].map(|page| self.word(page));
-        Some([x?, y?, rz?].map(f32::from_bits))
-    }
-
-    fn text(&self, first: u8) -> String {
-        let words = (first..first + 8).filter_map(|page| self.word(page));
-        let bytes: Vec<u8> = words.flat_map(u32::to_le_bytes).collect();
-        let text = bytes.split(|&byte| byte == 0).next().unwrap_or_default();
-        String::from_utf8_lossy(text).into_owned()
-    }
-
-    fn running(&self) -> Option<RunningParameters> {
-        let place = self.word(page::PLACE)?;
-        Some(RunningParameters {
-            slot: place as u8,
-            forced: place >> 8 & 1 == 1,
-            sequence: self.word(page::SEQUENCE)?,
-            crc: self.word(page::CRC)?,
-            bytes: self.word(page::LENGTH)?,
-            created: self.text(page::CREATED),
-            rms: self.three(page::RMS)?,
-            peak: self.three(page::PEAK)?,
-        })
-    }
-
-    fn kept(&self, first: u8) -> Option<Kept> {
-        let (sequence, crc) = (self.word(first)?, self.word(first + 1)?);
-        Some(Kept { sequence, crc })
-    }
-
-    /// All pages together.
-    fn identity(&self) -> Identity {
-        let [patch, minor, major, _] = self
-            .word(page::PROGRAM_VERSION)
-            .unwrap_or_default()
-            .to_le_bytes();
-        let last = self.word(page::LAST_UPDATE).unwrap_or_default();
-        let outcome = last as u8;
-        Identity {
-            serial: self.text(page::SERIAL),
-            running: self.running(),
-            newest_sequence: self.word(page::NEWEST).unwrap_or_default(),
-            next: self.kept(page::NEXT),
-            previous: self.kept(page::PREVIOUS),
-            program_version: [major, minor, patch],
-            program_hash: self.word(page::PROGRAM_HASH).unwrap_or_default(),
-            needs_key: last >> 8 & 1 == 1,
-            last_update: (outcome != u8::MAX).then_some(outcome),
-        }
-    }
-}
-
-/// Asks who the node is.
+/// Asks for the identity of the node.
 ///
 /// # Errors
 /// [`UpdateError::NoAnswer`], [`UpdateError::TellsNothing`], [`UpdateError::Unexpected`].
 pub fn identify<L: Link>(talk: &mut Talk<L>) -> Result<Identity, UpdateError> {
-    let mut pages = Pages::default();
-    while pages.words.len() < usize::from(page::COUNT) {
-        let number = pages.words.len() as u8;
-        let word = ask_page(talk, number)?;
-        pages.words.push(word);
-        // Between the two pages another host may have stored a blob.
-        if number == page::NEXT + 1 && ask_page(talk, page::NEXT)? != pages.word(page::NEXT) {
-            pages.words.clear();
-        }
-    }
-    Ok(pages.identity())
+    let program = ask_page(talk, page::PROGRAM)?.unwrap_or_default();
+    let [patch, minor, major, needs_key] = program.to_le_bytes();
+    let running = ask_blob(talk, page::RUNNING_SEQUENCE, page::RUNNING_CRC)?;
+    let bytes = ask_page(talk, page::RUNNING_BYTES)?;
+    Ok(Identity {
+        serial: ask_serial(talk)?,
+        running: running.zip(bytes),
+        newest_sequence: ask_page(talk, page::NEWEST_SEQUENCE)?.unwrap_or_default(),
+        next: ask_next(talk)?,
+        program_version: [major, minor, patch],
+        needs_key: needs_key & 1 == 1,
+    })
 }
 
-/// A page; `None` where the node has no parameters, and so no such page.
+fn ask_serial<L: Link>(talk: &mut Talk<L>) -> Result<String, UpdateError> {
+    let mut serial = Vec::new();
+    for number in page::SERIAL..page::COUNT {
+        let word = ask_page(talk, number)?.unwrap_or_default();
+        serial.extend(word.to_le_bytes());
+    }
+    let text = serial.split(|&byte| byte == 0).next().unwrap_or_default();
+    Ok(String::from_utf8_lossy(text).into_owned())
+}
+
+/// The blob that runs after an activation or power-on.
+pub(super) fn ask_next<L: Link>(talk: &mut Talk<L>) -> Result<Option<BlobId>, UpdateError> {
+    ask_blob(talk, page::NEXT_SEQUENCE, page::NEXT_CRC)
+}
+
+/// The blob that runs.
+pub(super) fn ask_running<L: Link>(talk: &mut Talk<L>) -> Result<Option<BlobId>, UpdateError> {
+    ask_blob(talk, page::RUNNING_SEQUENCE, page::RUNNING_CRC)
+}
+
+fn ask_blob<L: Link>(
+    talk: &mut Talk<L>,
+    sequence: u8,
+    crc: u8,
+) -> Result<Option<BlobId>, UpdateError> {
+    let (sequence, crc) = (ask_page(talk, sequence)?, ask_page(talk, crc)?);
+    let blob = sequence.zip(crc);
+    Ok(blob.map(|(sequence, crc)| BlobId { sequence, crc }))
+}
+
+/// A fact; `None` where the node has no parameters, and so no such fact.
 fn ask_page<L: Link>(talk: &mut Talk<L>, number: u8) -> Result<Option<u32>, UpdateError> {
     match talk.exchange(tell(number))? {
         (Outcome::Done, word) => Ok(Some(word)),
         (Outcome::NoParameters, _) => Ok(None),
-        (outcome, detail) => Err(UpdateError::of(outcome, detail, false)),
+        (outcome, detail) => Err(UpdateError::from_outcome(outcome, detail, false)),
     }
 }
 
-/// The blob that the node runs, word by word, checked, and who the node is. `progress` takes how many bytes
-/// came, and of how many.
+/// Reads the blob that the node runs, word by word, and checks it. Also gives the identity of the node.
+/// `progress` takes the bytes received and the bytes in all.
 ///
 /// # Errors
 /// As [`identify`]; [`UpdateError::NothingRuns`]; [`UpdateError::Changed`]; [`UpdateError::ReadBack`].
@@ -161,8 +92,8 @@ pub fn read_back<L: Link>(
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<(Identity, Vec<u8>), UpdateError> {
     let identity = identify(talk)?;
-    let running = identity.running.clone().ok_or(UpdateError::NothingRuns)?;
-    let bytes = (running.bytes as usize).min(MAX_BYTES);
+    let (running, bytes) = identity.running.ok_or(UpdateError::NothingRuns)?;
+    let bytes = (bytes as usize).min(MAX_BYTES);
     let mut blob = Vec::new();
     for index in 0..bytes.div_ceil(4) {
         let index = index as u8;
@@ -175,7 +106,7 @@ pub fn read_back<L: Link>(
     }
     blob.truncate(bytes);
     ParameterSet::from_bytes(&blob).map_err(|cause| UpdateError::ReadBack { cause })?;
-    match running.are(&blob) {
+    match blob_crc(&blob) == Some(running.crc) {
         true => Ok((identity, blob)),
         false => Err(UpdateError::Changed),
     }

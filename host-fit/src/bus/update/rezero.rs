@@ -1,5 +1,4 @@
-//! A re-zero, step by step: the servo declared off, the mean of a second at rest taken for zero, the
-//! servo declared on again.
+//! A re-zero: declares the servo off, takes the mean of a second at rest as zero, declares the servo on.
 
 use super::UpdateError;
 use super::talk::{Link, Talk};
@@ -9,21 +8,21 @@ use hal_adapters::can::update::Key;
 /// How long the servo is declared off, s: longer than a re-zero takes.
 const SERVO_OFF_S: u8 = 15;
 
-/// What is to be done with the zero.
+/// The settings of a re-zero.
 #[derive(Clone, Debug, Default)]
 pub struct Zero {
     /// The stage's key.
     pub key: Option<Key>,
     /// Declare the servo off meanwhile.
     pub declares_servo_off: bool,
-    /// Clear it in place of setting it.
+    /// Clear the zero instead of setting it.
     pub clears: bool,
 }
 
 /// Sets the zero of a stage at rest, or clears it.
 ///
 /// # Errors
-/// [`UpdateError::ServoOn`], [`UpdateError::NotAtRest`] with what the node says, and those of
+/// [`UpdateError::ServoOn`], [`UpdateError::NotAtRest`] with the reason that the node gives, and the errors of
 /// [`Talk::exchange_tagged`].
 pub fn rezero<L: Link>(talk: &mut Talk<L>, zero: &Zero) -> Result<(), UpdateError> {
     let seconds = SERVO_OFF_S;
@@ -37,7 +36,7 @@ pub fn rezero<L: Link>(talk: &mut Talk<L>, zero: &Zero) -> Result<(), UpdateErro
     };
     let answer = talk.exchange_tagged(zero.key.as_ref(), request);
     if zero.declares_servo_off {
-        // It ends by itself, too.
+        // The declaration also expires by itself.
         let _ = talk.exchange(Request::ServoOff { seconds: 0 });
     }
     done(answer?, zero.declares_servo_off)
@@ -46,6 +45,6 @@ pub fn rezero<L: Link>(talk: &mut Talk<L>, zero: &Zero) -> Result<(), UpdateErro
 fn done((outcome, detail): (Outcome, u32), declared: bool) -> Result<(), UpdateError> {
     match outcome {
         Outcome::Done => Ok(()),
-        outcome => Err(UpdateError::of(outcome, detail, declared)),
+        outcome => Err(UpdateError::from_outcome(outcome, detail, declared)),
     }
 }

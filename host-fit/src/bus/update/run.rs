@@ -1,4 +1,4 @@
-//! Talks on an interface.
+//! The scripts on a CAN interface.
 
 use super::{
     Identity, Link, Plan, Talk, UpdateError, UpdateRunError, Updated, Zero, identity, script,
@@ -14,7 +14,7 @@ use std::time::{Duration, Instant, SystemTime};
 /// How long a frame may wait for a place in the transmit queue.
 const SEND_DEADLINE: Duration = Duration::from_millis(20);
 
-/// Asks who the node is.
+/// Asks for the identity of the node.
 ///
 /// # Errors
 /// See [`UpdateRunError`].
@@ -32,7 +32,7 @@ pub fn read_back(address: &BusAddress) -> Result<(Identity, Vec<u8>), UpdateRunE
     })
 }
 
-/// Updates the node. On Ctrl-C nothing is stored, unless the node is storing already.
+/// Updates the node. Ctrl-C ends it until the node stores the blob.
 ///
 /// # Errors
 /// See [`UpdateRunError`].
@@ -52,18 +52,18 @@ pub fn rezero(address: &BusAddress, zero: &Zero) -> Result<(), UpdateRunError> {
     })
 }
 
-/// A token that another program, or the last run of this one, hardly has.
+/// A token from the clock: the last run of this program hardly had the same.
 fn now_token() -> u8 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     since.map_or(0, |d| (d.as_millis() ^ d.as_millis() >> 8) as u8)
 }
 
-/// An interface.
+/// A CAN interface as a link.
 struct Interface<'s> {
     bus: Bus,
     started: Instant,
     stop: &'s AtomicBool,
-    /// Why it cannot be used.
+    /// The error of the interface.
     failure: Option<BusError>,
 }
 
@@ -77,7 +77,7 @@ impl Interface<'_> {
 impl Link for Interface<'_> {
     fn send(&mut self, frame: BusFrame) -> Result<(), UpdateError> {
         match self.bus.send_all(&[frame], SEND_DEADLINE) {
-            // Lost, like any frame that nobody answers.
+            // Lost, like a frame without an answer.
             Err(BusError::QueueFull { .. }) => Ok(()),
             sent => sent.map_err(|error| self.failed(error)),
         }
@@ -98,18 +98,14 @@ impl Link for Interface<'_> {
     }
 }
 
-/// Talks on an interface, and shows how far it is.
+/// Runs a script on an interface with a progress bar.
 fn hold<T>(
     address: &BusAddress,
     what: &'static str,
     talks: impl FnOnce(&mut Talk<Interface<'_>>, &mut dyn FnMut(u64, u64)) -> Result<T, UpdateError>,
 ) -> Result<T, UpdateRunError> {
     let link = Interface {
-        bus: Bus::open(
-            &address.interface,
-            address.node,
-            &[Message::Answer, Message::Command],
-        )?,
+        bus: Bus::open(&address.interface, address.node, &[Message::Answer])?,
         started: Instant::now(),
         stop: interrupt::watch(),
         failure: None,

@@ -1,43 +1,77 @@
-//! An update, step by step: who is there, the servo declared off, the blob transferred and stored, the
-//! node reset to run it, the servo declared on again.
+//! An update, step by step: identify the node, declare the servo off, transfer and store the blob, reset the
+//! node so that it runs the blob, declare the servo on.
 
-use super::identity::{Identity, identify};
-use super::talk::{Link, Talk, page as tell, words};
-use super::{Plan, UpdateError, Updated, Wanted};
+use super::UpdateError;
+use super::identity::{Identity, ask_next, ask_running, identify};
+use super::talk::{Link, Talk, words};
 use hal_adapters::can::command::{Command, Outcome, Request};
-use hal_adapters::can::update::{Kept, Key, UpdateRequest, crc_of, page};
+use hal_adapters::can::update::{BlobId, Key, UpdateRequest, blob_crc};
+use runtime::ParameterSet;
 
-/// How long the servo is declared off: longer than an update takes, on a bad bus too.
+/// How long the servo is declared off, s: longer than an update takes on a bad bus.
 const SERVO_OFF_S: u8 = 30;
-/// How often a transfer that came to nothing, damaged or forgotten, is begun anew.
+/// How often a damaged or forgotten transfer is begun again.
 const RESTARTS_MAX: u32 = 3;
-/// Pause before a node is asked again whether it runs the new parameters, us, and how often.
+/// Pause before the node is asked again whether it runs the new parameters, us, and how often.
 const RESET_US: u64 = 20_000;
 const RESET_MAX: u32 = 250;
-/// Parameters that make the program fault twice in its first second have stopped it by then, us.
+/// A program that faults twice in its first second has stopped after this time, us.
 const PROVEN_US: u64 = 2_500_000;
+
+/// The settings of an update.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The blob to store, which the caller has checked; `None` for the newest one in the node's store.
+    pub blob: Option<Vec<u8>>,
+    /// Serial number that the node must have; `None`: the serial number of the blob, if both have one.
+    pub serial: Option<String>,
+    /// The stage's key.
+    pub key: Option<Key>,
+    /// Declare the servo off during the update.
+    pub declares_servo_off: bool,
+    /// Reset the node at the end, so that it runs the new parameters.
+    pub activates: bool,
+}
+
+/// The result of an update.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Updated {
+    /// The node before.
+    pub before: Identity,
+    /// Sequence number of the blob.
+    pub sequence: u32,
+    /// Whether this update stored it; otherwise the node had it already.
+    pub is_stored: bool,
+    /// Whether the node runs it.
+    pub is_active: bool,
+    /// Lost words that were sent again.
+    pub repeated_words: u32,
+    /// Transfers that failed and were begun again.
+    pub repeated_transfers: u32,
+}
 
 /// An update under way.
 struct Script<'p, L> {
     talk: &'p mut Talk<L>,
     plan: &'p Plan,
-    /// The stage's key, if the node wants tags.
+    /// The stage's key, if the node needs tags.
     key: Option<Key>,
-    /// What is to run.
-    wanted: Kept,
+    /// The blob that is to run.
+    wanted: BlobId,
     /// Token of the open transfer.
     open: Option<u8>,
-    /// Whether the declaration that the servo is off is to be taken back.
+    /// Whether the servo must be declared on at the end.
     declared: bool,
-    repeated: (u32, u32),
+    repeated_words: u32,
+    repeated_transfers: u32,
     progress: &'p mut dyn FnMut(u64, u64),
 }
 
-/// Updates the node. Once it stores, the user no longer ends it. `progress` takes how many words were
-/// sent, and of how many.
+/// Updates the node. The user can end it until the node stores the blob. `progress` takes the words sent and
+/// the words in all.
 ///
 /// # Errors
-/// See [`UpdateError`]. Unless it says otherwise the node keeps what it kept before.
+/// See [`UpdateError`]. The node keeps its parameters unless the error says otherwise.
 pub fn update<L: Link>(
     talk: &mut Talk<L>,
     plan: &Plan,
@@ -47,57 +81,55 @@ pub fn update<L: Link>(
     if let Some(error) = other_stage(plan, &before) {
         return Err(error);
     }
-    let (wanted, is_kept) = wanted(plan, &before)?;
-    let runs = |kept: Kept| {
-        let running = before.running.as_ref();
-        running.is_some_and(|r| (r.sequence, r.crc) == (kept.sequence, kept.crc))
+    let crc = plan.blob.as_deref().and_then(blob_crc);
+    let kept = before
+        .next
+        .filter(|next| crc.is_none_or(|crc| crc == next.crc));
+    let wanted = match (kept, crc) {
+        (Some(kept), _) => kept,
+        (None, Some(crc)) => BlobId {
+            sequence: before.newest_sequence.saturating_add(1),
+            crc,
+        },
+        (None, None) => return Err(UpdateError::NothingKept),
     };
+    let (is_stored, runs) = (
+        kept.is_none(),
+        before.running.map(|(id, _)| id) == Some(wanted),
+    );
     let mut script = Script {
         wanted,
         open: None,
         declared: false,
-        repeated: (0, 0),
+        repeated_words: 0,
+        repeated_transfers: 0,
         talk,
         plan,
         key: plan.key.filter(|_| before.needs_key),
         progress,
     };
-    let is_active = if is_kept && (runs(wanted) || !plan.activates) {
-        Ok(runs(wanted))
+    let is_active = if !is_stored && (runs || !plan.activates) {
+        Ok(runs)
     } else if before.needs_key && plan.key.is_none() {
         Err(UpdateError::KeyNeeded)
     } else {
-        let done = script.run(is_kept);
+        let done = script.run(is_stored);
         script.close();
         done
     };
     Ok(Updated {
-        record: wanted.sequence,
-        sequence: (!is_kept).then_some(wanted.sequence),
+        sequence: wanted.sequence,
+        is_stored,
         is_active: is_active?,
-        repeated: script.repeated,
+        repeated_words: script.repeated_words,
+        repeated_transfers: script.repeated_transfers,
         before,
     })
 }
 
-/// What is to run, and whether the node keeps it already as the newest.
-fn wanted(plan: &Plan, node: &Identity) -> Result<(Kept, bool), UpdateError> {
-    let crc = match &plan.wanted {
-        Wanted::Blob(blob) => crc_of(blob).unwrap_or_default(),
-        Wanted::Previous => node.previous.ok_or(UpdateError::NoPrevious)?.crc,
-        Wanted::Newest => return Ok((node.next.ok_or(UpdateError::NothingKept)?, true)),
-    };
-    if let Some(next) = node.next.filter(|next| next.crc == crc) {
-        return Ok((next, true));
-    }
-    let sequence = node.newest_sequence.checked_add(1);
-    let sequence = sequence.ok_or(UpdateError::NumbersUsedUp)?;
-    Ok((Kept { sequence, crc }, false))
-}
-
 impl<L: Link> Script<'_, L> {
-    /// Says whether it runs in the end.
-    fn run(&mut self, is_kept: bool) -> Result<bool, UpdateError> {
+    /// Returns whether the blob runs in the end.
+    fn run(&mut self, stores: bool) -> Result<bool, UpdateError> {
         if self.plan.declares_servo_off {
             let seconds = SERVO_OFF_S;
             let (outcome, detail) = self.tagged(Request::ServoOff { seconds })?;
@@ -106,7 +138,7 @@ impl<L: Link> Script<'_, L> {
                 return Err(self.refused(outcome, detail));
             }
         }
-        if !is_kept {
+        if stores {
             self.store()?;
         }
         if self.plan.activates {
@@ -116,7 +148,7 @@ impl<L: Link> Script<'_, L> {
         Ok(self.plan.activates)
     }
 
-    /// Asks with a tag, where the node wants one.
+    /// Asks with a tag, if the node needs one.
     fn tagged(&mut self, request: Request) -> Result<(Outcome, u32), UpdateError> {
         self.talk.exchange_tagged(self.key.as_ref(), request)
     }
@@ -127,7 +159,7 @@ impl<L: Link> Script<'_, L> {
                 Ok(()) => return Ok(()),
                 Err(failure) => failure,
             };
-            // The commit may have come through and its answer not.
+            // The commit may have arrived and its answer been lost.
             if !self.talk.may_stop && self.is_stored()? {
                 return Ok(());
             }
@@ -135,32 +167,30 @@ impl<L: Link> Script<'_, L> {
                 failure,
                 UpdateError::BadContent { .. } | UpdateError::NotAuthorised | UpdateError::Lossy
             );
-            if !is_damage || self.repeated.1 == RESTARTS_MAX {
+            if !is_damage || self.repeated_transfers == RESTARTS_MAX {
                 return Err(failure);
             }
-            self.repeated.1 += 1;
+            self.repeated_transfers += 1;
         }
     }
 
     fn is_stored(&mut self) -> Result<bool, UpdateError> {
-        let node = identify(self.talk).map_err(|_| UpdateError::Unknown)?;
-        Ok(node.next == Some(self.wanted))
+        let next = ask_next(self.talk).map_err(|_| UpdateError::Unknown)?;
+        Ok(next == Some(self.wanted))
     }
 
     /// One transfer and its commit.
     fn transfer(&mut self) -> Result<(), UpdateError> {
         self.talk.may_stop = true;
-        let blob = self.plan.wanted.blob();
-        let token = self.talk.transfer_token();
-        let begin = UpdateRequest::begin(blob.len(), self.wanted.crc);
-        let key = self.key;
-        let begun = (self.talk).exchange_tagged_under(token, key.as_ref(), Request::Update(begin));
-        match begun? {
-            (Outcome::Done, detail) if detail == begin.argument() => self.open = Some(token),
-            (Outcome::NoParameters, _) => return Err(UpdateError::NoPrevious),
+        let blob = self.plan.blob.as_deref().unwrap_or_default();
+        let (key, token) = (self.key, self.talk.transfer_token());
+        let bytes = blob.len() as u16;
+        let begin = Request::Update(UpdateRequest::Begin { bytes });
+        match (self.talk).exchange_tagged_under(token, key.as_ref(), begin)? {
+            (Outcome::Done, _) => self.open = Some(token),
             (outcome, detail) => return Err(self.refused(outcome, detail)),
         }
-        let Kept { sequence, crc } = self.wanted;
+        let sequence = self.wanted.sequence;
         let commit = Request::Update(UpdateRequest::Commit { sequence });
         let mut words = words(token, blob, 0);
         for (sent, word) in (1..).zip(&words) {
@@ -169,33 +199,32 @@ impl<L: Link> Script<'_, L> {
         }
         if let Some(key) = &key {
             let command = Command::new(commit, token);
-            words.extend(self.talk.authorise(key, &command, blob, crc)?);
+            words.extend(self.talk.authorise(key, &command, blob)?);
         }
-        // What is being stored will be, in less than a second.
+        // From here on the node may store the blob, within a second.
         self.talk.may_stop = false;
         let (answer, lost) = self.talk.exchange_words(token, commit, &words)?;
-        self.repeated.0 += lost;
+        self.repeated_words += lost;
         match answer {
             (Outcome::Done, crc) if crc == self.wanted.crc => {
                 self.open = None;
                 Ok(())
             }
+            // The blob of another host with the same token.
+            (Outcome::Done, _) => Err(UpdateError::Busy),
             (outcome, detail) => Err(self.refused(outcome, detail)),
         }
     }
 
-    /// Why a request of a transfer was not done.
+    /// The error of a refused request.
     fn refused(&mut self, outcome: Outcome, detail: u32) -> UpdateError {
         let declared = self.declared;
-        self.declared &= !matches!(outcome, Outcome::ServoOn | Outcome::Busy | Outcome::Done);
-        match outcome {
-            Outcome::Done => UpdateError::Busy,
-            outcome => UpdateError::of(outcome, detail, declared),
-        }
+        self.declared &= !matches!(outcome, Outcome::ServoOn | Outcome::Busy);
+        UpdateError::from_outcome(outcome, detail, declared)
     }
 
-    /// Resets the node, and waits until it runs what is wanted, and whether it still does when it could
-    /// have faulted twice.
+    /// Resets the node, waits until it runs the blob, and looks again after a program that faults twice
+    /// would have stopped.
     fn activate(&mut self) -> Result<(), UpdateError> {
         let sequence = self.wanted.sequence;
         let silent = |error| match error {
@@ -207,13 +236,13 @@ impl<L: Link> Script<'_, L> {
         if outcome == Outcome::NotAuthorised {
             return Err(UpdateError::NotAuthorised);
         }
-        // The answer may have been lost with the reset: then the servo counts as on.
+        // If the reset came before the answer, a repeated request finds the servo on.
         let looks = if outcome == Outcome::Done {
             RESET_MAX
         } else {
             1
         };
-        for look in 1..=looks {
+        for _ in 0..looks {
             self.talk.pause(RESET_US)?;
             if self.runs().map_err(silent)? {
                 self.declared = false;
@@ -223,25 +252,19 @@ impl<L: Link> Script<'_, L> {
                     false => Err(UpdateError::NotActive { sequence }),
                 };
             }
-            if look == looks && outcome == Outcome::Done {
-                return Err(UpdateError::NotActive { sequence });
-            }
+        }
+        if outcome == Outcome::Done {
+            return Err(UpdateError::NotActive { sequence });
         }
         self.declared &= outcome != Outcome::Busy;
         Err(UpdateError::NotActivated { sequence })
     }
 
     fn runs(&mut self) -> Result<bool, UpdateError> {
-        let Kept { sequence, crc } = self.wanted;
-        for (page, wanted) in [(page::SEQUENCE, sequence), (page::CRC, crc)] {
-            if self.talk.exchange(tell(page))? != (Outcome::Done, wanted) {
-                return Ok(false);
-            }
-        }
-        Ok(true)
+        Ok(ask_running(self.talk)? == Some(self.wanted))
     }
 
-    /// Closes what is open; the answers no longer matter.
+    /// Closes the transfer and takes the declaration back; the answers do not matter.
     fn close(&mut self) {
         self.talk.may_stop = false;
         if let Some(token) = self.open {
@@ -254,10 +277,12 @@ impl<L: Link> Script<'_, L> {
     }
 }
 
-/// Why this node is not to be touched: it is that of another stage, or may be.
+/// The error if the node is, or may be, the node of another stage.
 fn other_stage(plan: &Plan, identity: &Identity) -> Option<UpdateError> {
     let found = identity.serial.clone();
-    match (plan.serial.clone(), plan.wanted.serial()) {
+    let set = plan.blob.as_deref().map(ParameterSet::from_bytes);
+    let own = set.and_then(Result::ok).map(|set| set.serial.to_string());
+    match (plan.serial.clone(), own.filter(|own| !own.is_empty())) {
         (Some(expected), _) if found.is_empty() => Some(UpdateError::NoSerial { expected }),
         (Some(expected), _) | (None, Some(expected)) if !found.is_empty() && expected != found => {
             Some(UpdateError::OtherStage { expected, found })

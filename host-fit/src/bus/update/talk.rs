@@ -1,33 +1,31 @@
-//! Requests and their answers, over a bus that may lose either.
+//! Requests and their answers over a bus that may lose either.
 
 use super::UpdateError;
 use hal_adapters::can::BusFrame;
 use hal_adapters::can::command::{Command, Content, Mailbox, Outcome, Request};
-use hal_adapters::can::update::{Key, Nonce, TAG_INDEX, UpdateData, UpdateRequest, tag, word_of};
-use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
+use hal_adapters::can::update::{Key, Nonce, TAG_INDEX, UpdateData, UpdateRequest, tag, word_at};
 
-/// From frame to frame, us. The receive store of a controller holds three frames and is emptied in
-/// every tick of 2 ms: at one frame in a millisecond none is lost, not even to a tick that is late.
+/// From frame to frame, us. A controller stores three received frames and reads them every 2 ms. At one frame
+/// in a millisecond none is lost, even to a tick that is late.
 pub const SPACING_US: u64 = 1_000;
-/// How long an answer is waited for before the request is repeated, us.
+/// Wait for an answer before the request is repeated, us.
 const PATIENCE_US: u64 = 100_000;
-/// The same where a node has said that it is at it: longer than an erase of its flash, and than a re-zero
-/// at the longest servo period, us.
+/// Wait for the second answer after [`Outcome::Started`], us: longer than an erase of the flash, and than a
+/// re-zero at the longest servo period.
 const STARTED_US: u64 = 6_000_000;
-/// How often a request is sent: for 3 s, in which a controller starts.
+/// How often a request is sent: for 3 s, the time in which a controller starts.
 const ATTEMPTS: u32 = 30;
-/// How often a request is sent with a new tag, after one over a number that was no longer the last.
-const TAGS: u32 = 8;
-/// Longest pause before the second tag, us: two tagged requests take less. It doubles with each tag.
-const BACK_OFF_US: u64 = 40_000;
-/// How often a node names a word that was lost.
+/// How often a request is sent with a new tag: a reset of the node, or a challenge that arrives late, makes
+/// a nonce void.
+const TAGS: u32 = 4;
+/// How often a node names a lost word.
 const LOST_MAX: u32 = 1_000;
-/// The tokens of transfers have this bit, those of other requests do not.
+/// The tokens of transfers have this bit, other tokens do not.
 const TRANSFER_TOKEN: u8 = 0x80;
 
 /// A bus and a clock.
 pub trait Link {
-    /// Sends a frame; one that finds no place may be lost.
+    /// Sends a frame; a frame that finds no place may be lost.
     ///
     /// # Errors
     /// [`UpdateError::Link`] if the bus cannot be used.
@@ -42,25 +40,23 @@ pub trait Link {
     /// Time since some moment, us.
     fn now_us(&self) -> u64;
 
-    /// Whether the user wants it to end.
+    /// Whether the user wants to stop.
     fn is_interrupted(&self) -> bool {
         false
     }
 }
 
-/// A host that asks one thing after the other.
+/// A host that sends one request after the other.
 #[derive(Debug)]
 pub struct Talk<L> {
     /// The bus.
     pub link: L,
     mailbox: Mailbox,
     token: u8,
-    /// When the next frame may leave, us.
+    /// When the next frame may be sent, us.
     free_us: u64,
-    /// Whether the user may end it now.
+    /// Whether the user may stop now.
     pub(super) may_stop: bool,
-    /// Whether another host was heard.
-    hears_others: bool,
 }
 
 impl<L: Link> Talk<L> {
@@ -73,7 +69,6 @@ impl<L: Link> Talk<L> {
             token: token & !TRANSFER_TOKEN,
             free_us: 0,
             may_stop: true,
-            hears_others: false,
         }
     }
 
@@ -87,7 +82,7 @@ impl<L: Link> Talk<L> {
         self.token
     }
 
-    /// The answer to a request, which is repeated until it comes.
+    /// Outcome and detail of the answer to a request. The request is repeated until the answer comes.
     ///
     /// # Errors
     /// [`UpdateError::NoAnswer`], [`UpdateError::Unexpected`], [`UpdateError::Interrupted`],
@@ -97,48 +92,34 @@ impl<L: Link> Talk<L> {
         self.exchange_under(token, request)
     }
 
-    /// The same of a request about parameters, under the token of a transfer.
+    /// The same under the token of a transfer.
     pub(super) fn exchange_under(
         &mut self,
-        mut token: u8,
-        request: impl Into<Request>,
+        token: u8,
+        request: Request,
     ) -> Result<(Outcome, u32), UpdateError> {
-        let request = request.into();
+        let command = Command::new(request, token);
         for _ in 0..ATTEMPTS {
-            let command = Command::new(request, token);
             self.send(&Content::Command(command))?;
             let mut until_us = self.link.now_us() + PATIENCE_US;
             while let Some(content) = self.receive(until_us)? {
-                match content {
-                    Content::Answer(answer)
-                        if (answer.number, answer.token) == (command.number, token) =>
-                    {
-                        match answer.outcome {
-                            None => return Err(UpdateError::Unexpected { outcome: None }),
-                            Some(Outcome::Started) => {
-                                until_us = self.link.now_us() + STARTED_US;
-                            }
-                            Some(outcome) => return Ok((outcome, answer.detail)),
-                        }
-                    }
-                    // The answer could be that of another host: ask anew.
-                    Content::Command(other)
-                        if (other.number, other.token) == (command.number, token)
-                            && token < TRANSFER_TOKEN
-                            && other.request != command.request =>
-                    {
-                        token = self.next_token();
-                        break;
-                    }
-                    _ => {}
+                let Content::Answer(answer) = content else {
+                    continue;
+                };
+                if (answer.number, answer.token) != (command.number, token) {
+                    continue;
+                }
+                match answer.outcome {
+                    None => return Err(UpdateError::Unexpected { outcome: None }),
+                    Some(Outcome::Started) => until_us = self.link.now_us() + STARTED_US,
+                    Some(outcome) => return Ok((outcome, answer.detail)),
                 }
             }
         }
         Err(UpdateError::NoAnswer)
     }
 
-    /// As [`Talk::exchange`], of a request that a node with a key obeys only with a tag. It is
-    /// [`Outcome::Busy`] where another host is heard and no tag is right.
+    /// As [`Talk::exchange`], for a request that a node with a key obeys only with a tag.
     ///
     /// # Errors
     /// As [`Talk::exchange`], and [`UpdateError::NoRandomNumber`].
@@ -159,30 +140,20 @@ impl<L: Link> Talk<L> {
         request: Request,
     ) -> Result<(Outcome, u32), UpdateError> {
         let Some(key) = key else {
-            let answer = self.exchange_words(token, request, &[]);
-            return answer.map(|(answer, _)| answer);
+            return self.exchange_under(token, request);
         };
         let command = Command::new(request, token);
-        for tries in 0..TAGS {
-            let words = self.authorise(key, &command, &[], 0);
+        for _ in 0..TAGS {
+            let words = self.authorise(key, &command, &[]);
             match words.and_then(|words| self.exchange_words(token, request, &words)) {
-                // The number was no longer the last: the node was reset, or another host used it up.
                 Ok(((Outcome::NotAuthorised, _), _)) | Err(UpdateError::Lossy) => {}
                 answer => return answer.map(|(answer, _)| answer),
             }
-            if self.hears_others {
-                self.back_off(BACK_OFF_US << tries)?;
-            }
         }
-        // Which of the two it is shows once the other host is done.
-        match self.hears_others {
-            true => Ok((Outcome::Busy, 0)),
-            false => Ok((Outcome::NotAuthorised, 0)),
-        }
+        Ok((Outcome::NotAuthorised, 0))
     }
 
-    /// The answer to a request for which these words were sent: those that were lost are sent again.
-    /// And how many they were.
+    /// The answer to a request that follows these words, and the number of lost words, which are sent again.
     pub(super) fn exchange_words(
         &mut self,
         token: u8,
@@ -201,8 +172,7 @@ impl<L: Link> Talk<L> {
         Err(UpdateError::Lossy)
     }
 
-    /// Sends the tag of a command, over a number that is asked for now; `blob` and `crc` as in [`tag`].
-    /// Gives the words.
+    /// Asks for a nonce and sends the tag of a command; `blob` as in [`tag`]. Gives the words of the tag.
     ///
     /// # Errors
     /// As [`Talk::exchange`], and [`UpdateError::NoRandomNumber`], [`UpdateError::Lossy`].
@@ -211,31 +181,28 @@ impl<L: Link> Talk<L> {
         key: &Key,
         command: &Command,
         blob: &[u8],
-        crc: u32,
     ) -> Result<Vec<UpdateData>, UpdateError> {
-        let nonce = self.nonce()?;
-        let tag = tag(key, &nonce, command, blob, crc);
+        let tag = tag(key, &self.nonce()?, command, blob);
         let words = words(command.token, &tag, TAG_INDEX);
         words.iter().try_for_each(|word| self.send_word(*word))?;
         Ok(words)
     }
 
-    /// A number that a tag is to be over.
     fn nonce(&mut self) -> Result<Nonce, UpdateError> {
         let mut nonce = [0; 4];
         for (part, word) in (0..).zip(&mut nonce) {
             let challenge = Request::Update(UpdateRequest::Challenge { part });
             *word = match self.exchange(challenge)? {
                 (Outcome::Done, drawn) => drawn,
-                // The node was reset, or another computer has used it up.
+                // The node was reset, or another computer has used the nonce.
                 (Outcome::NoTransfer, _) => return Err(UpdateError::Lossy),
-                (outcome, detail) => return Err(UpdateError::of(outcome, detail, false)),
+                (outcome, detail) => return Err(UpdateError::from_outcome(outcome, detail, false)),
             };
         }
         Ok(nonce)
     }
 
-    /// Sends a word, to which no answer comes.
+    /// Sends a word; no answer comes.
     pub(super) fn send_word(&mut self, data: UpdateData) -> Result<(), UpdateError> {
         self.send(&Content::UpdateData(data))
     }
@@ -247,12 +214,6 @@ impl<L: Link> Talk<L> {
         Ok(())
     }
 
-    /// Waits up to so long, by chance: two hosts do not ask at the same time again.
-    fn back_off(&mut self, us_max: u64) -> Result<(), UpdateError> {
-        let hasher = BuildHasherDefault::<DefaultHasher>::default();
-        self.pause(hasher.hash_one((self.link.now_us(), self.token)) % us_max)
-    }
-
     fn send(&mut self, content: &Content) -> Result<(), UpdateError> {
         while self.receive(self.free_us)?.is_some() {}
         self.free_us = self.link.now_us() + SPACING_US;
@@ -260,7 +221,7 @@ impl<L: Link> Talk<L> {
         coded.map_or(Ok(()), |coded| self.link.send(BusFrame::from(coded)))
     }
 
-    /// The content of the next frame, if one comes until then.
+    /// The content of the next frame until then.
     fn receive(&mut self, until_us: u64) -> Result<Option<Content>, UpdateError> {
         /// How soon Ctrl-C is noticed.
         const WAIT_US: u64 = 50_000;
@@ -275,23 +236,22 @@ impl<L: Link> Talk<L> {
             if let Some(frame) = self.link.receive(until_us.min(now_us + WAIT_US))?
                 && let Some(Ok(content)) = self.mailbox.take(&frame)
             {
-                self.hears_others |= matches!(content, Content::Command(_));
                 return Ok(Some(content));
             }
         }
     }
 }
 
-/// The words of `bytes`, whose first has this index.
+/// The words of `bytes`; the first has the index `first`.
 pub(super) fn words(token: u8, bytes: &[u8], first: u8) -> Vec<UpdateData> {
     let words = (0..).map_while(|k| {
-        let (index, word) = (first.checked_add(k)?, word_of(bytes, k.into())?);
+        let (index, word) = (first.checked_add(k)?, word_at(bytes, k.into())?);
         Some(UpdateData { token, index, word })
     });
     words.collect()
 }
 
-/// Tells a fact of the node.
+/// The request for a fact of the node.
 pub(super) const fn page(page: u8) -> Request {
     Request::Update(UpdateRequest::Tell { page })
 }

@@ -15,8 +15,6 @@ pub enum Parameters<'d> {
     Usable {
         /// Runs their decoder.
         servo: PoseTracker<&'d AnyDecoder>,
-        /// Serial number of the stage.
-        serial: &'d str,
         /// What is wrong with parameters that are not used.
         other_slot: Option<Refusal>,
     },
@@ -45,7 +43,6 @@ impl<'d> Parameters<'d> {
             (_, Some(stop)) => Self::Stopped(stop),
             (Some(loaded), None) => Self::Usable {
                 servo: PoseTracker::new(&loaded.decoder, OnInvalid::Zero),
-                serial: &loaded.serial,
                 other_slot: refusal,
             },
             (None, None) => Self::None {
@@ -67,14 +64,6 @@ impl<'d> Parameters<'d> {
         match self {
             Self::Usable { servo, .. } => Some(servo),
             _ => None,
-        }
-    }
-
-    /// Serial number of the stage; empty without parameters.
-    pub(super) const fn serial(&self) -> &'d str {
-        match self {
-            Self::Usable { serial, .. } => serial,
-            _ => "",
         }
     }
 }

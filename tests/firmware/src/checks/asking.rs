@@ -10,7 +10,7 @@ pub(super) fn ask(machine: &mut Machine, request: Request, token: u8, ticks: u64
     let command = Command::new(request, token);
     if command.needs_authority() {
         // The controller without a key ignores the tag.
-        talk(machine, |talk| talk.authorise(&KEY, &command, &[], 0))
+        talk(machine, |talk| talk.authorise(&KEY, &command, &[]))
             .0
             .expect("a tag");
     }

@@ -14,7 +14,7 @@ const REQUESTS: [Request; 7] = [
     Request::ClearZero,
     Request::Record { on: true },
     Request::Record { on: false },
-    Request::Update(UpdateRequest::begin(400, 0)),
+    Request::Update(UpdateRequest::Begin { bytes: 400 }),
     Request::Update(UpdateRequest::Activate),
 ];
 

@@ -53,7 +53,7 @@ fuzz_target!(|data: &[u8]| {
     let mut step = |step: Step| match step {
         Step::Frame(frame) => {
             let _ = (host.take(&frame), poses.take(&frame, now_us));
-            if let Some(Ok(answered)) = service.take(&frame, Some(&mut servo)) {
+            if let Some(Ok(answered)) = service.take(&frame, Some(&mut servo), None) {
                 let record = matches!(answered.command.request, Some(Request::Record { on: true }));
                 asked_to_record |= record;
                 assert!(answered.answer.is_some());
@@ -82,7 +82,6 @@ fuzz_target!(|data: &[u8]| {
                     is_sound(&servo.tick(&raw));
                 }
                 service.tick(Some(&servo));
-                service.identity_page("HS-0007");
                 poses.poll(now_us);
             }
         }

@@ -8,7 +8,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use hal_adapters::can::command::{Command, Content, Mailbox, Request};
 use hal_adapters::can::service::Updates;
-use hal_adapters::can::update::{Change, Identity, Kept, NotWritten, Receiver, Running, Store};
+use hal_adapters::can::update::{BlobId, Identity, NotWritten, Receiver, Running, Store};
 use hal_adapters::can::{
     BusFrame, Layout, PoseReceiver, PoseSender, SensorReceiver, Service, Timing, sensor,
 };
@@ -50,13 +50,12 @@ fn commands(tracker: &mut PoseTracker) {
     let mut mailbox = Mailbox::default();
     let command = Command::new(black_box(Request::Rezero { ticks: 500 }), 1);
     let sent = mailbox.send(&black_box(Content::Command(command)));
-    let mut service = black_box(Service::new(500).recording(true));
+    let mut service = black_box(Service::new(500).with_recording(true));
     if let Some(coded) = sent {
-        black_box(service.take(&black_box(BusFrame::from(coded)), Some(tracker)));
+        black_box(service.take(&black_box(BusFrame::from(coded)), Some(tracker), None));
     }
     service.before_tick(Some(tracker), black_box(Some(true)));
     black_box(service.tick(Some(tracker)));
-    black_box(service.identity_page(black_box("HS-0007")));
     black_box(service.flags(Some(tracker)));
 }
 
@@ -68,11 +67,7 @@ impl Store for Nowhere {
         black_box(None)
     }
 
-    fn newest(&self) -> Option<Kept> {
-        black_box(None)
-    }
-
-    fn previous(&self) -> Option<Kept> {
+    fn newest(&self) -> Option<BlobId> {
         black_box(None)
     }
 
@@ -85,8 +80,8 @@ impl Store for Nowhere {
         black_box(None)
     }
 
-    fn write(&mut self, sequence: u32, change: Change<'_>) -> Result<(), NotWritten> {
-        black_box((sequence, change));
+    fn write(&mut self, sequence: u32, blob: &[u8]) -> Result<(), NotWritten> {
+        black_box((sequence, blob));
         black_box(Ok(()))
     }
 }
@@ -98,7 +93,6 @@ fn update(frame: &BusFrame) {
         serial: black_box(Some("HS-0007")),
         key: black_box(Some([0; 16])),
         program_version: 1,
-        program_hash: 2,
     };
     let (mut service, mut receiver) = (Service::new(500), Receiver::new(identity, 500));
     let store = &mut Nowhere;
@@ -107,7 +101,7 @@ fn update(frame: &BusFrame) {
         store,
         nonce: black_box(Some([0; 4])),
     };
-    black_box(service.take_updating(frame, None::<&mut PoseTracker>, Some(updates)));
+    black_box(service.take(frame, None::<&mut PoseTracker>, Some(updates)));
     receiver.tick(service.servo_is_off());
     black_box(receiver.store(service.servo_is_off(), store));
     black_box((receiver.is_updating(), receiver.wants_reset()));
