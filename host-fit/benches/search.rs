@@ -22,7 +22,7 @@ use host_fit::solver::problem::model::Model;
 use host_fit::solver::solve::objective::Objective;
 use host_fit::solver::solve::search::cost::CostFunction;
 use host_fit::solver::solve::search::kind::SearchKind;
-use host_fit::solver::solve::search::run::{Start, StopCriteria};
+use host_fit::solver::solve::search::run::SearchOptions;
 use host_fit::solver::solve::{Projection, Solution, Solver, SolverOptions};
 use runtime::ModelKind;
 use runtime::calibration::Origin;
@@ -98,12 +98,8 @@ fn export(folder: &Path, problem: &Problem<'_>) -> Fallible<()> {
         let mut fitness = Vec::new();
         let seconds = median_s(5, || {
             let seed = fitness.len() as u64 + 1;
-            let start = Start {
-                seed,
-                population: PAPER,
-                individuals: &[],
-            };
-            fitness.push(kind.minimize(&cost, &start, &budget()).cost);
+            let options = SearchOptions::new(seed, PAPER, PAPER);
+            fitness.push(kind.minimize(&cost, &options).cost);
         });
         let (name, each_us) = (kind.name(), 1e6 * seconds / EVALUATIONS);
         println!("RESULT {name}_us_per_evaluation={each_us:.4}");
@@ -116,14 +112,6 @@ fn export(folder: &Path, problem: &Problem<'_>) -> Fallible<()> {
 
 fn objective<'a>(problem: &'a Problem<'a>, form: Projection) -> Objective<'a> {
     Objective::new(problem, form).expect("Model (31) has slopes")
-}
-
-/// The evaluations of the paper.
-fn budget() -> StopCriteria<'static> {
-    StopCriteria {
-        generations: Some(PAPER),
-        ..StopCriteria::default()
-    }
 }
 
 /// Least squares and every search on one form of each problem: prints a line for each solver.
@@ -159,7 +147,7 @@ fn compare(
             }
             runs.push(Run::new(problem, &found, floor, dataset));
         }
-        print(form, &format!("{} ({})", kind.name(), kind.source()), &runs);
+        print(form, kind.name(), &runs);
     }
     Ok(())
 }

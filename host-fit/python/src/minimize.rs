@@ -3,10 +3,9 @@
 use crate::arrays::{reals, slice, table};
 use crate::error::wrong;
 use host_fit::input::stage::Range;
-use host_fit::solver::solve::search::cost::CostFunction;
+use host_fit::solver::solve::search::cost::{CostFunction, Individual};
 use host_fit::solver::solve::search::kind::SearchKind;
-use host_fit::solver::solve::search::population::Individual;
-use host_fit::solver::solve::search::run::{Start, StopCriteria, StopReason};
+use host_fit::solver::solve::search::run::{SearchOptions, StopReason};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -98,6 +97,7 @@ impl CostFunction for Function<'_> {
         cost
     }
 
+    /// On the caller's thread: Python runs one thread.
     fn costs(&self, individuals: &mut [Individual]) {
         for individual in &mut *individuals {
             individual.cost = match self.vectorized {
@@ -111,11 +111,6 @@ impl CostFunction for Function<'_> {
                 self.values(python, individuals)
             }));
         }
-    }
-
-    /// All of them: Python runs one thread, that of the caller.
-    fn piece(&self) -> usize {
-        usize::MAX
     }
 }
 
@@ -189,18 +184,13 @@ pub fn minimize<'py>(
         error: Mutex::new(None),
         failed: AtomicBool::new(false),
     };
-    let start = Start {
-        seed,
-        population: population as usize,
-        individuals: first.as_slice(),
-    };
-    let criteria = StopCriteria {
-        generations: Some(maxiter as usize),
+    let options = SearchOptions {
+        first: first.as_slice(),
         evaluations: maxfev.map(|count| count as usize),
-        stall: None,
         interrupt: Some(&function.failed),
+        ..SearchOptions::new(seed, population as usize, maxiter as usize)
     };
-    let found = kind.minimize(&function, &start, &criteria);
+    let found = kind.minimize(&function, &options);
     if let Some(error) = function.error.into_inner().ok().flatten() {
         return Err(error);
     }
@@ -219,7 +209,7 @@ pub fn minimize<'py>(
     let class = python
         .import("hallstage._results")?
         .getattr("OptimizeResult")?;
-    let (generations, evaluations) = (found.generations, found.evaluations);
+    let (generations, evaluations) = (found.history.len() - 1, found.evaluations);
     class.call1((message, success, found.cost, x, generations, evaluations))
 }
 

@@ -7,7 +7,7 @@
 use super::least_squares::solve::{self as least_squares, at_limit};
 use super::objective::{Objective, best_delta_m};
 use super::search::kind::SearchKind;
-use super::search::run::{Outcome, Stall, Start, StopCriteria};
+use super::search::run::{SearchOptions, SearchResult, Stall};
 use super::{Projection, Solution, SolveError, SolverOptions};
 use crate::problem::Problem;
 use crate::problem::parameters::Parameters;
@@ -95,22 +95,17 @@ fn search(
     objective: &Objective<'_>,
     options: &SolverOptions,
     stall: Option<Stall>,
-) -> Outcome {
+) -> SearchResult {
     let known = options.known.iter();
     let mut first: Vec<Vec<f64>> = known.map(|p| objective.individual(p)).collect();
     first.extend(objective.first_population(options.population, options.seed));
-    let start = Start {
-        seed: options.seed,
-        population: options.population,
-        individuals: &first,
-    };
-    let criteria = StopCriteria {
-        generations: Some(options.generations),
+    let options = SearchOptions {
+        first: &first,
         stall,
         interrupt: options.interrupt,
-        ..StopCriteria::default()
+        ..SearchOptions::new(options.seed, options.population, options.generations)
     };
-    kind.minimize(objective, &start, &criteria)
+    kind.minimize(objective, &options)
 }
 
 /// What a search found.
@@ -121,7 +116,7 @@ fn search(
 pub fn solution_of(
     problem: &Problem<'_>,
     objective: &Objective<'_>,
-    found: &Outcome,
+    found: &SearchResult,
 ) -> Result<Solution, SolveError> {
     if !found.cost.is_finite() {
         return Err(SolveError::NoUsableStart);

@@ -1,12 +1,11 @@
 //! The searches by name.
 
 use super::cost::CostFunction;
-use super::mixing::{Adaptation, Step};
-use super::run::{Outcome, Start, StopCriteria, run};
-use super::tlbo::Tlbo;
+use super::mixing::{Adaptation, Mixing, Step};
+use super::run::{SearchOptions, SearchResult, run};
 
 /// A search method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchKind {
     /// SHTLBO (equations 23, 24, 27-29).
     Shtlbo,
@@ -18,59 +17,49 @@ pub enum SearchKind {
     Mutation,
     /// The hybrid with a fixed p (equations 23, 24).
     Hybrid,
-    /// The hybrid with p by the success ratio (equation 25).
+    /// The hybrid with p by the success ratio (equations 23-25).
     SuccessRatio,
 }
 
-/// The searches with their names and where they come from, the paper's and its ablations first.
-const TABLE: [(SearchKind, &str, &str); 6] = [
-    (SearchKind::Shtlbo, "shtlbo", "eqs 23, 24, 27-29"),
-    (SearchKind::Tlbo, "tlbo", "eqs 16-18"),
-    (SearchKind::Gbtlbo, "gbtlbo", "eqs 19, 20"),
-    (SearchKind::Mutation, "mutation", "eqs 21, 22"),
-    (SearchKind::Hybrid, "hybrid", "eqs 23, 24"),
-    (SearchKind::SuccessRatio, "success-ratio", "eqs 23-25"),
-];
-
 impl SearchKind {
-    /// All of them.
-    pub const ALL: [Self; TABLE.len()] = {
-        let mut all = [Self::Shtlbo; TABLE.len()];
-        let mut index = 0;
-        while index < TABLE.len() {
-            all[index] = TABLE[index].0;
-            index += 1;
-        }
-        all
-    };
+    /// All of them, the paper's first.
+    pub const ALL: [Self; 6] = [
+        Self::Shtlbo,
+        Self::Tlbo,
+        Self::Gbtlbo,
+        Self::Mutation,
+        Self::Hybrid,
+        Self::SuccessRatio,
+    ];
 
     /// The name on the command line and in reports.
     pub const fn name(self) -> &'static str {
-        TABLE[self as usize].1
+        match self {
+            Self::Shtlbo => "shtlbo",
+            Self::Tlbo => "tlbo",
+            Self::Gbtlbo => "gbtlbo",
+            Self::Mutation => "mutation",
+            Self::Hybrid => "hybrid",
+            Self::SuccessRatio => "success-ratio",
+        }
     }
 
-    /// The equations of the paper that the method consists of, or where it comes from.
-    pub const fn source(self) -> &'static str {
-        TABLE[self as usize].2
-    }
-
-    /// Searches for the minimum of `function`. SHTLBO updates p every generation. Without any stop
-    /// criterion it runs until the interrupt flag is set.
+    /// Searches for the minimum of `function`, on the threads of the current rayon pool. The result
+    /// is the same on any number of threads.
     pub fn minimize(
         self,
         function: &dyn CostFunction,
-        start: &Start<'_>,
-        criteria: &StopCriteria<'_>,
-    ) -> Outcome {
-        let tlbo = |tlbo| run(tlbo, function, start, criteria);
-        match self {
-            Self::Shtlbo => tlbo(Tlbo::hybrid(Adaptation::DeclineRatio, 1)),
-            Self::Tlbo => tlbo(Tlbo::pure(Step::Learn)),
-            Self::Gbtlbo => tlbo(Tlbo::pure(Step::Scatter)),
-            Self::Mutation => tlbo(Tlbo::pure(Step::Mutate)),
-            Self::Hybrid => tlbo(Tlbo::hybrid(Adaptation::Fixed, 1)),
-            Self::SuccessRatio => tlbo(Tlbo::hybrid(Adaptation::SuccessRatio, 1)),
-        }
+        options: &SearchOptions<'_>,
+    ) -> SearchResult {
+        let mixing = match self {
+            Self::Shtlbo => Mixing::Hybrid(Adaptation::DeclineRatio),
+            Self::Tlbo => Mixing::Pure(Step::Learn),
+            Self::Gbtlbo => Mixing::Pure(Step::Scatter),
+            Self::Mutation => Mixing::Pure(Step::Mutate),
+            Self::Hybrid => Mixing::Hybrid(Adaptation::Fixed),
+            Self::SuccessRatio => Mixing::Hybrid(Adaptation::SuccessRatio),
+        };
+        run(mixing, function, options)
     }
 }
 

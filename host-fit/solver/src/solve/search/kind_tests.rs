@@ -1,24 +1,15 @@
 use super::*;
 use crate::solve::search::cost::known::{Known, rastrigin, rosenbrock, sphere};
-use crate::solve::search::population::Individual;
 use crate::solve::search::random::{Phase, RandomSource, stream};
 use crate::solve::search::run::StopReason;
 use hallstage_input::stage::Range;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-fn evaluations(count: usize) -> StopCriteria<'static> {
-    StopCriteria {
-        evaluations: Some(count),
-        ..StopCriteria::default()
-    }
-}
-
-const fn with_seed(seed: u64, population: usize) -> Start<'static> {
-    Start {
-        seed,
-        population,
-        individuals: &[],
+fn options(seed: u64, population: usize, evaluations: usize) -> SearchOptions<'static> {
+    SearchOptions {
+        evaluations: Some(evaluations),
+        ..SearchOptions::new(seed, population, usize::MAX)
     }
 }
 
@@ -42,7 +33,7 @@ fn every_search_beats_random_draws_on_known_functions() {
     for (function, half_width, share) in cases {
         let function = Known::new(8, -half_width, half_width, function);
         let median = |kind: SearchKind| {
-            let run = |seed| kind.minimize(&function, &with_seed(seed, 40), &evaluations(8_000));
+            let run = |seed| kind.minimize(&function, &options(seed, 40, 8_000));
             let mut costs: Vec<f64> = (1..=5).map(|seed| run(seed).cost).collect();
             costs.sort_by(f64::total_cmp);
             costs[2]
@@ -59,41 +50,18 @@ fn every_search_beats_random_draws_on_known_functions() {
     }
 }
 
-/// A function that takes whole populations.
-struct Together(Known);
-
-impl CostFunction for Together {
-    fn bounds(&self) -> &[Range] {
-        self.0.bounds()
-    }
-
-    fn cost(&self, _: &[f64]) -> f64 {
-        unreachable!("it takes all at once")
-    }
-
-    fn costs(&self, individuals: &mut [Individual]) {
-        assert_eq!(individuals.len(), 50);
-        self.0.costs(individuals);
-    }
-
-    fn piece(&self) -> usize {
-        usize::MAX
-    }
-}
-
 #[test]
-fn the_path_is_the_same_on_any_threads_and_for_a_function_of_whole_populations() {
-    let function = || Known::new(7, -3.0, 3.0, rastrigin);
+fn the_path_is_the_same_on_any_number_of_threads() {
+    let function = Known::new(7, -3.0, 3.0, rastrigin);
     for kind in SearchKind::ALL {
-        let path = |function: &dyn CostFunction, threads, seed| {
+        let path = |threads, seed| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            let search = || kind.minimize(function, &with_seed(seed, 50), &evaluations(1_500));
+            let search = || kind.minimize(&function, &options(seed, 50, 1_500));
             pool.expect("a thread pool").install(search)
         };
-        let one = path(&function(), 1, 5);
-        assert_eq!(one, path(&function(), 3, 5), "{}", kind.name());
-        assert_eq!(one, path(&Together(function()), 2, 5), "{}", kind.name());
-        let other = path(&function(), 1, 6);
+        let one = path(1, 5);
+        assert_eq!(one, path(3, 5), "{}", kind.name());
+        let other = path(1, 6);
         assert_ne!(one.best, other.best, "{}: the seed counts", kind.name());
     }
 }
@@ -129,13 +97,13 @@ fn no_candidate_leaves_the_bounds_and_all_are_counted() {
             outside: AtomicUsize::new(0),
             seen: Mutex::new(0),
         };
-        let outcome = kind.minimize(&function, &with_seed(2, 20), &evaluations(2_000));
+        let found = kind.minimize(&function, &options(2, 20, 2_000));
         assert_eq!(function.outside.into_inner(), 0, "{}", kind.name());
         let seen = function.seen.into_inner().expect("not poisoned");
-        assert_eq!(outcome.evaluations, seen, "{}", kind.name());
-        let corner = outcome.best.iter().zip([1.0, 0.1, 3.0]);
+        assert_eq!(found.evaluations, seen, "{}", kind.name());
+        let corner = found.best.iter().zip([1.0, 0.1, 3.0]);
         let is_there = { corner }.all(|(x, best)| (x - best).abs() < 1e-2);
-        assert!(is_there, "{}: {:?}", kind.name(), outcome.best);
+        assert!(is_there, "{}: {:?}", kind.name(), found.best);
     }
 }
 
@@ -144,12 +112,12 @@ fn nan_costs_are_counted_and_never_win() {
     let hole = |x: &[f64]| if x[0] < 0.0 { f64::NAN } else { sphere(x) };
     let function = Known::new(2, -3.0, 3.0, hole);
     for kind in SearchKind::ALL {
-        let outcome = kind.minimize(&function, &with_seed(4, 30), &evaluations(3_000));
-        assert!(outcome.nan_costs > 0, "{}", kind.name());
-        let is_found = outcome.best[0] >= 0.0 && outcome.cost < 0.1;
+        let found = kind.minimize(&function, &options(4, 30, 3_000));
+        assert!(found.nan_costs > 0, "{}", kind.name());
+        let is_found = found.best[0] >= 0.0 && found.cost < 0.1;
         assert!(is_found, "{}", kind.name());
         let all = Known::new(2, -3.0, 3.0, |_| f64::NAN);
-        let lost = kind.minimize(&all, &with_seed(4, 30), &evaluations(300));
+        let lost = kind.minimize(&all, &options(4, 30, 300));
         let is_counted = lost.cost.is_nan() && lost.nan_costs == lost.evaluations;
         assert!(is_counted, "{}", kind.name());
     }
@@ -160,12 +128,12 @@ fn a_warm_start_is_never_worse_than_what_it_starts_from() {
     let function = Known::new(5, -3.0, 3.0, rosenbrock);
     let known = vec![vec![1.0, 1.0, 1.0, 1.0, 1.001], vec![0.0; 4]];
     for kind in SearchKind::ALL {
-        let start = Start {
-            individuals: &known,
-            ..with_seed(1, 20)
+        let start = SearchOptions {
+            first: &known,
+            ..options(1, 20, 200)
         };
-        let outcome = kind.minimize(&function, &start, &evaluations(200));
-        assert!(outcome.cost <= rosenbrock(&known[0]), "{}", kind.name());
+        let found = kind.minimize(&function, &start);
+        assert!(found.cost <= rosenbrock(&known[0]), "{}", kind.name());
     }
 }
 
@@ -174,14 +142,14 @@ fn an_interrupt_ends_every_search_with_what_it_has() {
     let function = Known::new(3, -3.0, 3.0, sphere);
     let flag = AtomicBool::new(true);
     for kind in SearchKind::ALL {
-        let criteria = StopCriteria {
+        let options = SearchOptions {
             interrupt: Some(&flag),
-            ..StopCriteria::default()
+            ..SearchOptions::new(1, 10, usize::MAX)
         };
-        let outcome = kind.minimize(&function, &with_seed(1, 10), &criteria);
-        assert_eq!(outcome.reason, StopReason::Interrupted);
+        let found = kind.minimize(&function, &options);
+        assert_eq!(found.reason, StopReason::Interrupted);
         assert!(
-            outcome.cost.is_finite() && outcome.best.len() == 3,
+            found.cost.is_finite() && found.best.len() == 3,
             "{}",
             kind.name()
         );
@@ -191,28 +159,15 @@ fn an_interrupt_ends_every_search_with_what_it_has() {
 #[test]
 fn the_papers_budget_is_20_100_evaluations() {
     let function = Known::new(3, -3.0, 3.0, sphere);
-    let criteria = StopCriteria {
-        generations: Some(100),
-        ..StopCriteria::default()
-    };
-    let outcome = SearchKind::Shtlbo.minimize(&function, &with_seed(1, 100), &criteria);
-    assert_eq!((outcome.evaluations, outcome.generations), (20_100, 100));
-    assert_eq!(outcome.reason, StopReason::Generations);
-    assert_eq!(outcome.history.len(), 101);
-    assert!(outcome.history.iter().all(|point| point.p.is_some()));
+    let found = SearchKind::Shtlbo.minimize(&function, &SearchOptions::new(1, 100, 100));
+    assert_eq!(found.evaluations, 20_100);
+    assert_eq!(found.reason, StopReason::Generations);
+    assert_eq!(found.history.len(), 101);
+    assert!(found.history.iter().all(|point| point.p.is_some()));
     assert!(
-        outcome
+        found
             .history
             .windows(2)
             .all(|w| w[1].best_cost <= w[0].best_cost)
     );
-}
-
-#[test]
-fn each_search_stands_at_its_place_of_the_table_under_a_name_of_its_own() {
-    for (place, kind) in SearchKind::ALL.into_iter().enumerate() {
-        assert_eq!(place, kind as usize);
-    }
-    let names: std::collections::BTreeSet<_> = SearchKind::ALL.map(SearchKind::name).into();
-    assert_eq!(names.len(), SearchKind::ALL.len());
 }

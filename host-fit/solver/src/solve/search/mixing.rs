@@ -1,11 +1,11 @@
 //! p, the share of individuals that learn rather than mutate, and how it adapts
 //! (equations 25 and 27-29).
 //!
-//! Choices that the paper leaves open: p is updated at the end of each learning period
-//! (default: every generation, both phases counted together), kept within
-//! [[`P_MIN`], [`P_MAX`]] so that neither kind of step dies out, and kept as it was when the
-//! formula gives 0/0. An individual whose old cost is NaN, infinite or zero counts with a
-//! decline of one, since equation 29 has no value there.
+//! Choices that the paper leaves open:
+//! - The learning period is one generation; both phases count together.
+//! - p is kept within [`P_MIN`] to [`P_MAX`], so that neither kind of step dies out. It stays as it was
+//!   when the formula gives 0/0.
+//! - Equation 29 has no value where the old cost is NaN, infinite or zero. The decline is 1 there.
 
 use super::cost::ranks_before;
 
@@ -16,7 +16,17 @@ pub const P_MAX: f64 = 0.95;
 /// p at the start (section 4.2 of the paper).
 pub const P_START: f64 = 0.5;
 
-/// How p follows what the two kinds of step achieve.
+/// How an individual gets its step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mixing {
+    /// Every individual takes the same step.
+    Pure(Step),
+    /// Equation 26: an individual takes "Eq. (1)", learning, when rand < p, and "Eq. (2)", the
+    /// mutation, otherwise.
+    Hybrid(Adaptation),
+}
+
+/// How p is adapted to the success of the two kinds of step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Adaptation {
     /// p stays as it is (equations 23, 24).
@@ -27,12 +37,10 @@ pub enum Adaptation {
     DeclineRatio,
 }
 
-/// The step that one individual takes. A hybrid (equation 26) takes "Eq. (1)", learning, when
-/// rand < p, and "Eq. (2)", the mutation, otherwise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// The step that one individual takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// Equations 16-18: the step of TLBO.
-    #[default]
     Learn,
     /// Equations 19, 20: the step of GBTLBO.
     Scatter,
@@ -40,7 +48,7 @@ pub enum Step {
     Mutate,
 }
 
-/// What the two kinds of step achieved since the last update of p.
+/// The success of the two kinds of step, learning and mutation, in one generation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tally {
     /// ns1, ns2: individuals improved.
@@ -69,11 +77,11 @@ impl Tally {
         }
     }
 
-    /// Equations 25 and 27, whose form is the same: w1 n2 / (w2 n1 + w1 n2), with w the
-    /// achievement of each kind and n how often it was tried. `None` on 0/0.
-    fn share(achieved: [f64; 2], tried: [f64; 2]) -> Option<f64> {
-        let first = achieved[0] * tried[1];
-        let second = achieved[1] * tried[0];
+    /// Equations 25 and 27: w1 n2 / (w2 n1 + w1 n2), where w is the success of a kind of step and n
+    /// the number of its tries. `None` on 0/0.
+    fn share(success: [f64; 2], tried: [f64; 2]) -> Option<f64> {
+        let first = success[0] * tried[1];
+        let second = success[1] * tried[0];
         let sum = second + first;
         (sum > 0.0).then(|| first / sum)
     }

@@ -1,25 +1,22 @@
-//! Population searches: SHTLBO and its relatives.
+//! SHTLBO and its relatives, for any cost function over a box.
 //!
-//! A [`cost::CostFunction`] says what is minimized and in which box; a [`kind::SearchKind`]
-//! names a method; [`run::StopCriteria`] say when to stop; a [`run::Outcome`] says what was
-//! found, why the search stopped and how it went.
+//! A [`cost::CostFunction`] is minimized by a [`kind::SearchKind`] with [`run::SearchOptions`]; a
+//! [`run::SearchResult`] has the best individual, the reason to stop and the history.
 //!
-//! | module | what it holds |
+//! | module | content |
 //! |---|---|
-//! | [`cost`] | the function, ranking of costs |
+//! | [`cost`] | the cost function, the ranking of costs |
 //! | [`random`] | a stream of random numbers for each individual |
 //! | [`operators`] | the steps of TLBO and its relatives (equations 16-22) |
 //! | [`mixing`] | p and its adaptation (equations 25, 27-29) |
-//! | [`tlbo`] | the phases, the hybrids (equations 23, 24, 26), SHTLBO |
-//! | [`population`] | individuals; a generation: what all searches share |
-//! | [`run`] | generations, stop criteria, history |
-//! | [`kind`] | all searches by name |
+//! | [`tlbo`] | a population and its generations (equations 23, 24, 26) |
+//! | [`kind`] | the searches by name |
+//! | [`run`] | options, the loop over generations, the result |
 
 pub mod cost;
 pub mod kind;
 pub mod mixing;
 pub mod operators;
-pub mod population;
 pub mod random;
 pub mod run;
 pub mod tlbo;

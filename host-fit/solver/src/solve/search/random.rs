@@ -1,21 +1,20 @@
 //! Random numbers of a search: each individual of each generation has a stream of its own.
 //!
-//! The stream's seed is a hash of (seed of the run, generation, phase, individual), so what
-//! an individual draws does not depend on who was worked on before it or on which thread.
-//! The generator is xoshiro256++: its words are the same on every platform
-//! and for every version of the crate, it starts from a 64-bit seed in a few ns, and it gives
-//! the 192 numbers that a candidate needs in well under 1 us. Nothing comes from the operating system.
+//! The stream's seed is a hash of the seed of the run, the generation, the phase and the individual.
+//! So the draws of an individual do not depend on the others. The generator is xoshiro256++: it gives
+//! the same words on every platform and in every version of the crate, and starts from a 64-bit seed in
+//! a few ns. Nothing comes from the operating system.
 //!
 //! Normal numbers come from the ziggurat of Marsaglia and Tsang (2000), with logarithms and
-//! exponentials from `libm`. `rand_distr` takes them from the standard library, whose last digits
-//! differ between systems.
+//! exponentials from `libm`. (`rand_distr` uses the standard library, and its last digits differ
+//! between systems.)
 
 use hallstage_input::stage::Range;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 use std::sync::LazyLock;
 
-/// What an operator draws from. Tests script it.
+/// Where an operator takes its random numbers from. Tests script it.
 pub trait RandomSource {
     /// A number in [0, 1), all equally likely.
     fn uniform(&mut self) -> f64;
@@ -30,7 +29,6 @@ pub trait RandomSource {
     }
 
     /// Fills `numbers` with [`RandomSource::uniform`], one after the other.
-    #[inline(always)]
     fn fill_uniform(&mut self, numbers: &mut [f64]) {
         for number in numbers {
             *number = self.uniform();
@@ -46,7 +44,6 @@ pub trait RandomSource {
     }
 
     /// Fills `numbers` with [`RandomSource::normal`], one after the other.
-    #[inline(always)]
     fn fill_normal(&mut self, numbers: &mut [f64]) {
         for number in numbers {
             *number = self.normal();
@@ -54,20 +51,18 @@ pub trait RandomSource {
     }
 }
 
-/// Which draw of a generation a stream serves.
+/// The purpose of a stream within a generation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// The first population.
     Start,
-    /// The teacher phase; the only one of methods that have one phase.
+    /// The teacher phase.
     Teacher,
     /// The learner phase.
     Learner,
 }
 
-/// The stream of one individual in one phase; generation 0 is the first population. Every seed is as
-/// good as any other.
-#[inline(always)]
+/// The stream of one individual in one phase; generation 0 is the first population.
 pub fn stream(seed: u64, generation: usize, phase: Phase, individual: usize) -> SeededSource {
     let step = mix((generation as u64) << 2 | phase as u64).wrapping_add(seed);
     let key = mix(mix(step).wrapping_add(individual as u64));
@@ -93,8 +88,8 @@ const TAIL: f64 = 3.442_619_855_899;
 /// Area of each layer under exp(-x^2 / 2).
 const LAYER_AREA: f64 = 9.912_563_035_262_17e-3;
 
-/// The right ends of the layers from the lowest, whose end is that of a rectangle with the area of the
-/// lowest layer and the tail, to the top at 0.
+/// The right ends of the layers, from the lowest to the top at 0. The lowest layer includes the tail: its
+/// end is the width of a rectangle with the same area.
 static LAYERS: LazyLock<[f64; 129]> = LazyLock::new(|| {
     let mut ends = [0.0; 129];
     ends[0] = LAYER_AREA / density(TAIL);
@@ -112,7 +107,7 @@ fn density(x: f64) -> f64 {
 }
 
 impl SeededSource {
-    /// A number beyond the tail's beginning.
+    /// A number beyond [`TAIL`].
     #[cold]
     fn tail(&mut self) -> f64 {
         loop {
@@ -125,12 +120,12 @@ impl SeededSource {
 }
 
 impl RandomSource for SeededSource {
-    #[inline(always)]
+    #[inline]
     fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 * SPACING
     }
 
-    #[inline(always)]
+    #[inline]
     fn normal(&mut self) -> f64 {
         let layers = &*LAYERS;
         loop {
@@ -154,7 +149,7 @@ impl RandomSource for SeededSource {
 
 #[cfg(test)]
 pub(crate) mod script {
-    //! A random source that gives prepared numbers.
+    //! Random numbers from a list.
     use super::{Phase, RandomSource};
     use std::collections::VecDeque;
 

@@ -1,41 +1,52 @@
-//! The loop that all searches share: generations, stop criteria, history, outcome.
+//! The loop over the generations of a search: its options, why it stops, its result.
 
 use super::cost::CostFunction;
-use super::population::{Breeding, Search};
+use super::mixing::Mixing;
 use super::random::stream;
+use super::tlbo::Population;
 use hallstage_input::progress::Progress;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The seed and the first population of a search.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Start<'a> {
+/// How a search starts and when it stops. It checks after each generation, in the order of
+/// [`StopReason`].
+#[derive(Clone, Copy, Debug)]
+pub struct SearchOptions<'a> {
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Np: how many individuals; fewer than a method needs are raised to that.
+    /// Np: the number of individuals, at least 2.
     pub population: usize,
-    /// Warm start: these take the first places, clipped to the bounds. Those of a wrong length
-    /// are left out. The other individuals are drawn.
-    pub individuals: &'a [Vec<f64>],
+    /// Gm: the number of generations after the first population.
+    pub generations: usize,
+    /// Individuals that take the first places of the first population, clipped to the bounds. One of
+    /// a wrong length is left out. The other individuals are drawn.
+    pub first: &'a [Vec<f64>],
+    /// Stop after so many evaluations, the first population included.
+    pub evaluations: Option<usize>,
+    /// Stop once the best cost hardly falls.
+    pub stall: Option<Stall>,
+    /// Stop once this flag is set, by Ctrl-C or another thread.
+    pub interrupt: Option<&'a AtomicBool>,
 }
 
-/// When to stop. The criteria are checked after each generation, in the order of
-/// [`StopReason`]; at least one of them should be set.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StopCriteria<'a> {
-    /// Gm: after so many generations beyond the first population.
-    pub generations: Option<usize>,
-    /// Once so many candidates were evaluated, the first population included.
-    pub evaluations: Option<usize>,
-    /// Once the best cost has hardly fallen for long.
-    pub stall: Option<Stall>,
-    /// Once this flag is set, by Ctrl-C or another thread.
-    pub interrupt: Option<&'a AtomicBool>,
+impl SearchOptions<'_> {
+    /// No individuals given; the search stops after the last generation only.
+    pub const fn new(seed: u64, population: usize, generations: usize) -> Self {
+        Self {
+            seed,
+            population,
+            generations,
+            first: &[],
+            evaluations: None,
+            stall: None,
+            interrupt: None,
+        }
+    }
 }
 
 /// A search stalls when its best cost falls by less than a share over some generations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stall {
-    /// How many generations.
+    /// The number of generations.
     pub generations: usize,
     /// The share of the best cost, such as 1e-9.
     pub relative_decline: f64,
@@ -72,82 +83,71 @@ pub struct Checkpoint {
     pub evaluations: usize,
     /// Best cost so far.
     pub best_cost: f64,
-    /// p after the generation, for methods that have one.
+    /// p of a hybrid after the generation.
     pub p: Option<f64>,
 }
 
-/// What a search found.
+/// The result of a search.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
+pub struct SearchResult {
     /// The best individual.
     pub best: Vec<f64>,
     /// Its cost.
     pub cost: f64,
-    /// Candidates evaluated.
+    /// The number of evaluations.
     pub evaluations: usize,
-    /// How many of them had no cost (NaN).
+    /// The number of evaluations that gave NaN.
     pub nan_costs: usize,
-    /// Generations run after the first population.
-    pub generations: usize,
     /// Why the search stopped.
     pub reason: StopReason,
     /// The first population and every generation.
     pub history: Vec<Checkpoint>,
 }
 
-/// Breeds until a criterion says stop.
-pub fn run<B: Breeding>(
-    breeding: B,
+/// Runs generations until a stop criterion is met.
+pub(super) fn run(
+    mixing: Mixing,
     function: &dyn CostFunction,
-    start: &Start<'_>,
-    criteria: &StopCriteria<'_>,
-) -> Outcome {
-    let streams = |generation, phase, k| stream(start.seed, generation, phase, k);
-    let mut search = Search::new(
-        breeding,
-        streams,
-        function,
-        start.population,
-        start.individuals,
-    );
-    let progress = Progress::new("searching", criteria.generations.unwrap_or(0) as u64);
+    options: &SearchOptions<'_>,
+) -> SearchResult {
+    let streams = |generation, phase, k| stream(options.seed, generation, phase, k);
+    let mut population =
+        Population::new(mixing, streams, function, options.population, options.first);
+    let progress = Progress::new("searching", options.generations as u64);
     let mut history = Vec::new();
     let reason = loop {
         history.push(Checkpoint {
-            evaluations: search.evaluations,
-            best_cost: search.best().cost,
-            p: search.breeding.p(),
+            evaluations: population.evaluations,
+            best_cost: population.best().cost,
+            p: population.p(),
         });
         progress.reach(history.len() as u64);
-        if let Some(reason) = criteria.reached(&history) {
+        if let Some(reason) = options.stop(&history) {
             break reason;
         }
-        search.generation(history.len());
+        population.run_generation(history.len());
     };
-    let best = search.best();
-    Outcome {
+    let best = population.best();
+    SearchResult {
         best: best.place.clone(),
         cost: best.cost,
-        evaluations: search.evaluations,
-        nan_costs: search.nan_costs,
-        generations: history.len() - 1,
+        evaluations: population.evaluations,
+        nan_costs: population.nan_costs,
         reason,
         history,
     }
 }
 
-impl StopCriteria<'_> {
-    /// The first criterion that the history meets.
-    pub fn reached(&self, history: &[Checkpoint]) -> Option<StopReason> {
+impl SearchOptions<'_> {
+    /// The first stop criterion that the history meets.
+    fn stop(&self, history: &[Checkpoint]) -> Option<StopReason> {
         let now = history.last()?;
         let generations = history.len() - 1;
-        if self
-            .interrupt
-            .is_some_and(|flag| flag.load(Ordering::Relaxed))
-        {
+        let interrupt = self.interrupt;
+        if interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
             return Some(StopReason::Interrupted);
         }
-        if self.generations.is_some_and(|most| generations >= most) {
+        if generations >= self.generations {
             return Some(StopReason::Generations);
         }
         if self.evaluations.is_some_and(|most| now.evaluations >= most) {
@@ -164,60 +164,47 @@ impl StopCriteria<'_> {
 mod tests {
     use super::*;
 
-    fn history(costs: &[f64]) -> Vec<Checkpoint> {
-        let point = |(k, &best_cost): (usize, &f64)| Checkpoint {
-            evaluations: 100 + 200 * k,
-            best_cost,
-            p: None,
-        };
-        costs.iter().enumerate().map(point).collect()
-    }
-
     #[test]
     fn each_criterion_stops_at_its_limit_and_not_before() {
-        let none = StopCriteria::default();
-        let (generations, evaluations) = (
-            |count| StopCriteria {
-                generations: Some(count),
-                ..none
-            },
-            |count| StopCriteria {
-                evaluations: Some(count),
-                ..none
-            },
-        );
-        let stall = StopCriteria {
+        let history = |costs: &[f64]| -> Vec<Checkpoint> {
+            let point = |(k, &best_cost): (usize, &f64)| Checkpoint {
+                evaluations: 100 + 200 * k,
+                best_cost,
+                p: None,
+            };
+            costs.iter().enumerate().map(point).collect()
+        };
+        let flag = AtomicBool::new(true);
+        let none = SearchOptions::new(1, 100, 1_000);
+        let generations = |count| SearchOptions::new(1, 100, count);
+        let evaluations = |count| SearchOptions {
+            evaluations: Some(count),
+            ..none
+        };
+        let stall = SearchOptions {
             stall: Some(Stall {
                 generations: 2,
                 relative_decline: 0.01,
             }),
             ..none
         };
-        let flag = AtomicBool::new(true);
-        let interrupted = StopCriteria {
+        let interrupted = SearchOptions {
             interrupt: Some(&flag),
             ..generations(0)
         };
-        for (criteria, costs, reason) in [
-            (none, &[8.0, 4.0, 2.0][..], None),
-            (generations(3), &[8.0, 4.0, 2.0], None),
-            (
-                generations(2),
-                &[8.0, 4.0, 2.0],
-                Some(StopReason::Generations),
-            ),
-            (evaluations(501), &[8.0, 4.0, 2.0], None),
-            (
-                evaluations(500),
-                &[8.0, 4.0, 2.0],
-                Some(StopReason::Evaluations),
-            ),
+        let falls = [8.0, 4.0, 2.0];
+        for (options, costs, reason) in [
+            (none, &falls[..], None),
+            (generations(3), &falls, None),
+            (generations(2), &falls, Some(StopReason::Generations)),
+            (evaluations(501), &falls, None),
+            (evaluations(500), &falls, Some(StopReason::Evaluations)),
             (stall, &[1.0, 1.0], None),
             (stall, &[1.0, 0.995, 0.98], None),
             (stall, &[2.0, 1.0, 0.995, 0.991], Some(StopReason::Stall)),
             (interrupted, &[1.0], Some(StopReason::Interrupted)),
         ] {
-            assert_eq!(criteria.reached(&history(costs)), reason, "{criteria:?}");
+            assert_eq!(options.stop(&history(costs)), reason, "{options:?}");
         }
     }
 }

@@ -10,158 +10,187 @@
 //! | `shtlbo` | 23 | 24 | 27, 28, 29 |
 //!
 //! Choices that the paper leaves open:
-//! - A phase works on the population as it was at the phase's start: teacher, mean and
-//!   partners are those of that moment, and the better of old and new is kept at its end. So
-//!   all candidates of a phase can be evaluated at once, on any number of threads.
-//! - One `rand < p` for each individual and phase; T_F for each individual; r and N(0, 1) for
-//!   each coordinate. An individual draws in this order: rand (hybrids only), the partner
-//!   (learner phase only; any other individual, all equally likely), T_F, then r or N(0, 1).
+//! - Each phase works on the population at its start: teacher, mean and partners do not change within
+//!   a phase. So all candidates of a phase can be evaluated at once.
+//! - One `rand < p` and one T_F for each individual and phase; r and N(0, 1) for each coordinate. An
+//!   individual draws in this order: rand (hybrids only), the partner (learner phase only; any other
+//!   individual, all equally likely), T_F, then r or N(0, 1).
 //! - A candidate outside the bounds is clipped to them.
-//! - The new student replaces the old one when its cost is lower, not when it is equal.
-//! - p: see [`super::mixing`]. "LP > 100" is read as the end after Gm = 100 learning periods.
+//! - A candidate replaces its individual when its cost is lower. An equal cost is not enough.
+//! - p: see [`super::mixing`]. The paper's "LP > 100" is read as the end after Gm = 100 learning
+//!   periods.
 //!
-//! The best student is never lost, so the last teacher is the result.
+//! The best individual is never lost, so the last teacher is the result.
 
-use super::cost::ranks_before;
-use super::mixing::{Adaptation, P_START, Step, Tally};
+use super::cost::{CostFunction, Individual, clip, ranks_before};
+use super::mixing::{Mixing, P_START, Step, Tally};
 use super::operators::{
     learn_from_partner, learn_from_teacher, mutate_about_self, scatter_about_middle,
     teaching_factor,
 };
-use super::population::{Breeding, Individual, Parents, best_index, improve};
 use super::random::{Phase, RandomSource};
-use hallstage_input::stage::Range;
 
-/// A search by TLBO or one of its relatives.
-#[derive(Clone, Debug)]
-pub struct Tlbo {
-    /// The step of every individual; hybrids have none and choose.
-    step: Option<Step>,
-    adaptation: Adaptation,
-    learning_period: usize,
-    teacher: usize,
-    mean: Vec<f64>,
+/// The individuals of a search, and p.
+pub struct Population<'f, S> {
+    mixing: Mixing,
     p: f64,
-    tally: Tally,
+    function: &'f dyn CostFunction,
+    /// The random numbers for a generation, a phase and an individual.
+    streams: S,
+    individuals: Vec<Individual>,
+    candidates: Vec<Individual>,
+    /// Evaluations so far.
+    pub evaluations: usize,
+    /// The number of evaluations that gave NaN.
+    pub nan_costs: usize,
 }
 
-impl Tlbo {
-    /// Every individual takes the same step: TLBO, GBTLBO, the mutation alone.
-    pub fn pure(step: Step) -> Self {
-        Self {
-            step: Some(step),
-            ..Self::hybrid(Adaptation::Fixed, 1)
-        }
-    }
-
-    /// Individuals learn or mutate. p is updated every `learning_period` generations (the default of
-    /// the program is 1).
-    pub fn hybrid(adaptation: Adaptation, learning_period: usize) -> Self {
-        Self {
-            step: None,
-            adaptation,
-            learning_period: learning_period.max(1),
-            teacher: 0,
-            mean: Vec::new(),
+impl<'f, R: RandomSource, S: Fn(usize, Phase, usize) -> R> Population<'f, S> {
+    /// The first population (generation 0), evaluated: `first`, clipped to the bounds, then uniform draws
+    /// from the box; `size` in all, at least 2. Of `first`, those of a wrong length are left out.
+    pub fn new(
+        mixing: Mixing,
+        streams: S,
+        function: &'f dyn CostFunction,
+        size: usize,
+        first: &[Vec<f64>],
+    ) -> Self {
+        let bounds = function.bounds();
+        let individual = |k: usize| {
+            let given = first.get(k).filter(|given| given.len() == bounds.len());
+            let place = given.cloned().unwrap_or_else(|| {
+                let mut place = vec![0.0; bounds.len()];
+                streams(0, Phase::Start, k).fill_within(bounds, &mut place);
+                place
+            });
+            let cost = f64::NAN;
+            Individual { place, cost }
+        };
+        let mut population = Self {
+            candidates: (0..size.max(2)).map(individual).collect(),
+            individuals: Vec::new(),
             p: P_START,
-            tally: Tally::default(),
+            evaluations: 0,
+            nan_costs: 0,
+            mixing,
+            streams,
+            function,
+        };
+        population.evaluate();
+        population.individuals = population.candidates.clone();
+        population
+    }
+
+    /// The best individual so far.
+    pub fn best(&self) -> &Individual {
+        &self.individuals[self.teacher()]
+    }
+
+    /// p of a hybrid.
+    pub fn p(&self) -> Option<f64> {
+        matches!(self.mixing, Mixing::Hybrid(_)).then_some(self.p)
+    }
+
+    /// Runs one generation, numbered from 1: the teacher phase, the learner phase, the update of p.
+    pub fn run_generation(&mut self, number: usize) {
+        let mut tally = Tally::default();
+        for phase in [Phase::Teacher, Phase::Learner] {
+            let steps = self.make_candidates(number, phase);
+            self.evaluate();
+            let pairs = self.individuals.iter_mut().zip(&mut self.candidates);
+            for ((old, new), step) in pairs.zip(steps) {
+                tally.count(step, old.cost, new.cost);
+                if ranks_before(new.cost, old.cost) {
+                    std::mem::swap(old, new);
+                }
+            }
+        }
+        if let Mixing::Hybrid(adaptation) = self.mixing {
+            self.p = tally.next_p(adaptation, self.p);
         }
     }
 
-    /// The step of one individual: equations 23, 24 and 26 for the hybrids.
-    #[inline(always)]
-    fn choose(&self, random: &mut impl RandomSource) -> Step {
-        match self.step {
-            Some(step) => step,
-            None if random.uniform() < self.p => Step::Learn,
-            None => Step::Mutate,
-        }
+    /// Makes a candidate for each individual: equations 16, 19, 21 in the teacher phase, 18, 20, 22 in
+    /// the learner phase, and the choice between them (equations 23, 24, 26). Returns the steps.
+    fn make_candidates(&mut self, generation: usize, phase: Phase) -> Vec<Step> {
+        let (teacher, mean) = (self.teacher(), self.mean());
+        let individuals = &self.individuals;
+        let make = |(k, candidate): (usize, &mut Individual)| {
+            let mut random = (self.streams)(generation, phase, k);
+            let step = match self.mixing {
+                Mixing::Pure(step) => step,
+                Mixing::Hybrid(_) if random.uniform() < self.p => Step::Learn,
+                Mixing::Hybrid(_) => Step::Mutate,
+            };
+            let other = match phase {
+                Phase::Learner => another(k, individuals.len(), &mut random),
+                _ => teacher,
+            };
+            let (old, other, new) = (&individuals[k], &individuals[other], &mut candidate.place);
+            match step {
+                Step::Learn if phase == Phase::Learner => {
+                    random.fill_uniform(new);
+                    let is_better = ranks_before(other.cost, old.cost);
+                    learn_from_partner(&old.place, &other.place, is_better, new);
+                }
+                Step::Learn => {
+                    let factor = teaching_factor(random.uniform());
+                    random.fill_uniform(new);
+                    learn_from_teacher(&old.place, &other.place, &mean, factor, new);
+                }
+                Step::Scatter => {
+                    random.fill_normal(new);
+                    scatter_about_middle(&old.place, &other.place, new);
+                }
+                Step::Mutate => {
+                    random.fill_normal(new);
+                    mutate_about_self(&old.place, &other.place, new);
+                }
+            }
+            step
+        };
+        self.candidates.iter_mut().enumerate().map(make).collect()
     }
 
-    /// The individual that a step looks at: the teacher, or a partner.
-    #[inline(always)]
-    fn other(&self, parents: &Parents<'_>, random: &mut impl RandomSource) -> usize {
-        if parents.phase != Phase::Learner {
-            return self.teacher;
+    /// Clips and evaluates the candidates.
+    fn evaluate(&mut self) {
+        for candidate in &mut self.candidates {
+            clip(&mut candidate.place, self.function.bounds());
         }
-        let drawn = random.index(parents.population.len() - 1);
-        if drawn < parents.k { drawn } else { drawn + 1 }
+        self.function.costs(&mut self.candidates);
+        let costs = self.candidates.iter().map(|candidate| candidate.cost);
+        self.evaluations += costs.len();
+        self.nan_costs += costs.filter(|cost| cost.is_nan()).count();
     }
-}
 
-impl Breeding for Tlbo {
-    type Note = Step;
+    /// The index of the individual that ranks first; of equal ones the first.
+    fn teacher(&self) -> usize {
+        let all = &self.individuals;
+        let better = |best: usize, k: usize| match ranks_before(all[k].cost, all[best].cost) {
+            true => k,
+            false => best,
+        };
+        (0..all.len()).fold(0, better)
+    }
 
-    const PHASES: &'static [Phase] = &[Phase::Teacher, Phase::Learner];
-
-    /// The teacher, and the mean, summed in the order of the individuals.
-    fn begin(&mut self, population: &[Individual], bounds: &[Range]) {
-        self.teacher = best_index(population);
-        self.mean.clear();
-        self.mean.resize(bounds.len(), 0.0);
-        for individual in population {
-            for (sum, x) in self.mean.iter_mut().zip(&individual.place) {
+    /// The mean of the individuals, summed in their order.
+    fn mean(&self) -> Vec<f64> {
+        let mut mean = vec![0.0; self.function.bounds().len()];
+        for individual in &self.individuals {
+            for (sum, x) in mean.iter_mut().zip(&individual.place) {
                 *sum += x;
             }
         }
-        for sum in &mut self.mean {
-            *sum /= population.len() as f64;
-        }
+        let count = self.individuals.len() as f64;
+        mean.iter_mut().for_each(|sum| *sum /= count);
+        mean
     }
+}
 
-    /// Equations 16, 19, 21 in the teacher phase, 18, 20, 22 in the learner phase; `new` holds
-    /// the random numbers on the way.
-    #[inline(always)]
-    fn make(&self, parents: Parents<'_>, random: &mut impl RandomSource, new: &mut [f64]) -> Step {
-        let step = self.choose(random);
-        let old = &parents.population[parents.k];
-        let other = &parents.population[self.other(&parents, random)];
-        match step {
-            Step::Learn if parents.phase == Phase::Learner => {
-                random.fill_uniform(new);
-                let better = ranks_before(other.cost, old.cost);
-                learn_from_partner(&old.place, &other.place, better, new);
-            }
-            Step::Learn => {
-                let factor = teaching_factor(random.uniform());
-                random.fill_uniform(new);
-                learn_from_teacher(&old.place, &other.place, &self.mean, factor, new);
-            }
-            Step::Scatter => {
-                random.fill_normal(new);
-                scatter_about_middle(&old.place, &other.place, new);
-            }
-            Step::Mutate => {
-                random.fill_normal(new);
-                mutate_about_self(&old.place, &other.place, new);
-            }
-        }
-        step
-    }
-
-    fn select(
-        &mut self,
-        population: &mut [Individual],
-        students: &mut [Individual],
-        steps: &[Step],
-        _: &[Range],
-    ) {
-        for ((old, new), step) in population.iter().zip(&*students).zip(steps) {
-            self.tally.count(*step, old.cost, new.cost);
-        }
-        improve(population, students);
-    }
-
-    fn end(&mut self, generation: usize) {
-        if generation.is_multiple_of(self.learning_period) {
-            self.p = self.tally.next_p(self.adaptation, self.p);
-            self.tally = Tally::default();
-        }
-    }
-
-    fn p(&self) -> Option<f64> {
-        self.step.is_none().then_some(self.p)
-    }
+/// The index of a partner: any of `count` individuals but `k`, all equally likely.
+fn another(k: usize, count: usize, random: &mut impl RandomSource) -> usize {
+    let drawn = random.index(count - 1);
+    if drawn < k { drawn } else { drawn + 1 }
 }
 
 #[cfg(test)]

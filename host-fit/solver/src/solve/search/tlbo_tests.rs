@@ -1,10 +1,9 @@
 //! Whole generations against steps worked by hand, with scripted random numbers.
 
 use super::*;
-use crate::solve::search::cost::known::{Known, sphere};
-use crate::solve::search::population::Search;
+use crate::solve::search::cost::known::Known;
+use crate::solve::search::mixing::Adaptation;
 use crate::solve::search::random::script::{Script, scripted};
-use crate::solve::search::random::stream;
 
 /// Three students in one dimension, cost = position: teacher 4, mean 8.
 const START: [f64; 3] = [8.0, 4.0, 12.0];
@@ -22,23 +21,27 @@ fn keyed(
 }
 
 /// Where the students are, and p, after one generation for each pair of phases.
-fn bred(tlbo: Tlbo, generations: Vec<[[Script; 3]; 2]>) -> (Vec<f64>, Option<f64>) {
+fn bred(mixing: Mixing, generations: Vec<[[Script; 3]; 2]>) -> (Vec<f64>, Option<f64>) {
     let function = Known::new(1, 0.0, 100.0, |x| x[0]);
     let count = generations.len();
     let scripts = (1..).zip(generations);
     let scripts = scripts.flat_map(|(number, phases)| keyed(number, phases));
     let start = START.map(|x| vec![x]);
-    let mut search = Search::new(tlbo, scripted(scripts.collect()), &function, 3, &start);
+    let mut population = Population::new(mixing, scripted(scripts.collect()), &function, 3, &start);
     for number in 1..=count {
-        search.generation(number);
+        population.run_generation(number);
     }
-    assert_eq!(search.evaluations, 3 + 6 * count);
-    let positions = search.population.iter().map(|student| student.place[0]);
-    (positions.collect(), search.breeding.p())
+    assert_eq!(population.evaluations, 3 + 6 * count);
+    let positions = population.individuals.iter().map(|one| one.place[0]);
+    (positions.collect(), population.p())
 }
 
-fn generation(tlbo: Tlbo, teacher: [Script; 3], learner: [Script; 3]) -> (Vec<f64>, Option<f64>) {
-    bred(tlbo, vec![[teacher, learner]])
+fn generation(
+    mixing: Mixing,
+    teacher: [Script; 3],
+    learner: [Script; 3],
+) -> (Vec<f64>, Option<f64>) {
+    bred(mixing, vec![[teacher, learner]])
 }
 
 fn uniform(numbers: &[f64]) -> Script {
@@ -58,7 +61,7 @@ fn tlbo_takes_equations_16_to_18() {
         uniform(&[0.0, 0.5]),  // partner 0 (2, equal): 2 + 0 = 2, not better
         uniform(&[0.6, 0.5]),  // partner 1 (2, better): 11 + (2 - 11)/2 = 6.5, kept
     ];
-    let (positions, p) = generation(Tlbo::pure(Step::Learn), teacher, learner);
+    let (positions, p) = generation(Mixing::Pure(Step::Learn), teacher, learner);
     assert_eq!(positions, [0.0, 2.0, 6.5]);
     assert_eq!(p, None);
 }
@@ -76,7 +79,7 @@ fn gbtlbo_takes_equations_19_and_20() {
         Script::new(&[0.0], &[-2.5]), // partner 0 (5): 4.5 - 2.5 = 2, kept
         Script::new(&[0.0], &[0.5]),  // partner 0 (5): 8.5 + 3.5 = 12, not better
     ];
-    let (positions, p) = generation(Tlbo::pure(Step::Scatter), teacher, learner);
+    let (positions, p) = generation(Mixing::Pure(Step::Scatter), teacher, learner);
     assert_eq!(positions, [5.0, 2.0, 12.0]);
     assert_eq!(p, None);
 }
@@ -93,7 +96,7 @@ fn mutation_alone_takes_equations_21_and_22() {
         Script::new(&[0.0], &[2.0]),  // partner 0 (5): 4 + 2 = 6, not better
         Script::new(&[0.6], &[-0.5]), // partner 1 (4): 12 - 8/2 = 8, kept
     ];
-    let (positions, _) = generation(Tlbo::pure(Step::Mutate), teacher, learner);
+    let (positions, _) = generation(Mixing::Pure(Step::Mutate), teacher, learner);
     assert_eq!(positions, [1.5, 4.0, 8.0]);
 }
 
@@ -128,7 +131,7 @@ fn hybrids_take_equations_23_and_24_and_differ_only_in_p() {
     ];
     for (adaptation, expected) in cases {
         let (teacher, learner) = hybrid_scripts();
-        let (positions, p) = generation(Tlbo::hybrid(adaptation, 1), teacher, learner);
+        let (positions, p) = generation(Mixing::Hybrid(adaptation), teacher, learner);
         assert_eq!(positions, [1.5, 4.0, 3.0]);
         let p = p.expect("hybrids have a p");
         assert!(
@@ -136,27 +139,6 @@ fn hybrids_take_equations_23_and_24_and_differ_only_in_p() {
             "{adaptation:?}: {p}, expected {expected}"
         );
     }
-}
-
-/// With a learning period of two, both generations count together and p changes after the
-/// second only.
-#[test]
-fn p_is_updated_at_the_end_of_each_learning_period() {
-    let function = Known::new(4, -3.0, 3.0, sphere);
-    let course = |period| {
-        let shtlbo = Tlbo::hybrid(Adaptation::DeclineRatio, period);
-        let streams = |generation, phase, k| stream(8, generation, phase, k);
-        let mut search = Search::new(shtlbo, streams, &function, 20, &[]);
-        [1, 2, 3, 4].map(|number| {
-            search.generation(number);
-            search.breeding.p().expect("hybrids have a p")
-        })
-    };
-    let [a, b, c, d] = course(2);
-    assert_eq!(a, P_START);
-    assert!(b != a && c == b && d != c);
-    let [a, b, _, _] = course(1);
-    assert!(a != P_START && b != a);
 }
 
 /// "Once p updates, ns1, ns2, nf1 and nf2 would be reset" (section 4.2).
@@ -177,7 +159,7 @@ fn an_update_of_p_forgets_what_came_before_it() {
             uniform(&[0.1, 0.0, 0.0]), // learns nothing: 3, fails
         ],
     ];
-    let shtlbo = Tlbo::hybrid(Adaptation::DeclineRatio, 1);
+    let shtlbo = Mixing::Hybrid(Adaptation::DeclineRatio);
     let (_, p) = bred(shtlbo, vec![[teacher, learner], second]);
     // Of the second generation alone only mutation improved anything.
     assert_eq!(p, Some(0.05));
